@@ -1,0 +1,7 @@
+"""Generate aerial object-goal-search datasets from 3D scenes, on an ordinary machine.
+
+The package is a staged pipeline: every stage reads and writes Parquet tables (see `aerialdojo_gen.schemas`)
+and is both a command of `aerialdojo-gen` and a plain function over tables.
+"""
+
+__version__ = "0.1.0"

@@ -1,0 +1,45 @@
+"""Errors that a user can cause or must be told about.
+
+Everything raised on purpose is an `AerialDojoError`: the command line prints its message as one line and exits
+with `exit_code`; anything else is a defect of ours and shows its traceback.
+"""
+
+from __future__ import annotations
+
+
+class AerialDojoError(Exception):
+    """An expected failure; the message names the thing and the mend.
+
+    Attributes
+    ----------
+    exit_code : int
+        What the command line exits with: 2 for something wrong in what was asked, 1 otherwise.
+    """
+
+    exit_code = 1
+
+
+class UsageError(AerialDojoError):
+    """What was asked for does not exist or makes no sense (unknown scene, bad option)."""
+
+    exit_code = 2
+
+
+class ConfigError(UsageError):
+    """A pipeline file or one of its values is wrong."""
+
+
+class AssetError(AerialDojoError):
+    """A recipe, a prop or a mesh is missing or wrong."""
+
+
+class AnnotationError(AerialDojoError):
+    """An annotation file is wrong; the message lists every error in it."""
+
+
+class StoreError(AerialDojoError):
+    """A table is missing, damaged, or does not fit its schema."""
+
+
+class RenderError(AerialDojoError):
+    """Rendering or encoding failed."""

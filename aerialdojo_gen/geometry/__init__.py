@@ -1,0 +1,1 @@
+"""Frames, angles, cameras and ray casting."""

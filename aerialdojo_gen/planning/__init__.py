@@ -1,0 +1,1 @@
+"""Collision world, clearance grid, motion primitives, cost-to-go and Hybrid A*."""

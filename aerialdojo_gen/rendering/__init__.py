@@ -1,0 +1,1 @@
+"""PyBullet rendering, video and depth codecs, image checks."""

@@ -1,0 +1,41 @@
+"""Random generators that depend on what is drawn for, never on the order of drawing."""
+
+from __future__ import annotations
+
+import hashlib
+
+import numpy as np
+
+
+def _digest(seed: int, stage: str, key: tuple[object, ...]) -> bytes:
+    """Hash (seed, stage, key); lengths are part of the hash, so that ("a", "bc") and ("ab", "c") differ."""
+    h = hashlib.blake2b(digest_size=16)
+    for part in (str(seed), stage, *(str(k) for k in key)):
+        raw = part.encode()
+        h.update(len(raw).to_bytes(4, "little") + raw)
+    return h.digest()
+
+
+def generator(seed: int, stage: str, *key: object) -> np.random.Generator:
+    """Make the generator of one row.
+
+    Parameters
+    ----------
+    seed : int
+        The pipeline's seed; 0 is a seed like any other.
+    stage : str
+        Name of the stage that draws, e.g. ``"anchor-sample"``.
+    *key : object
+        The row's key, e.g. ``("U_Mall_0", 17)``; its parts are hashed by their ``str``.
+
+    Returns
+    -------
+    numpy.random.Generator
+        A PCG64 generator, the same on every platform, run and number of workers.
+    """
+    return np.random.Generator(np.random.PCG64(int.from_bytes(_digest(seed, stage, key), "little")))
+
+
+def rank(seed: int, stage: str, *key: object) -> int:
+    """Give the row its place in a random but fixed order: an integer in [0, 2**64)."""
+    return int.from_bytes(_digest(seed, stage, key)[:8], "little")

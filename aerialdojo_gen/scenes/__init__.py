@@ -1,0 +1,1 @@
+"""Scenes: the in-memory model, recipes, props, layouts and the GLB on disk."""

@@ -1,0 +1,157 @@
+"""The scene in memory: named instances made of parts, each part of one material.
+
+World frame: right-handed, x east, y north, z up, metres.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True, eq=False)
+class Material:
+    """A surface: a colour, or a small tileable texture.
+
+    Attributes
+    ----------
+    name : str
+        Unique in a scene, e.g. ``"brick:#9a4a3c"``.
+    colour : tuple of int
+        sRGB, 0-255; for a textured material the texture's mean colour.
+    texture : (H, W, 3) uint8 or None
+        sRGB tile, repeated over the surface; row 0 is the top (v = 1).
+    tile_m : float
+        Edge of one texture tile in metres; UVs are metres divided by it.
+    """
+
+    name: str
+    colour: tuple[int, int, int]
+    texture: NDArray[np.uint8] | None = None
+    tile_m: float = 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """Triangles of one material.
+
+    Attributes
+    ----------
+    vertices : (n, 3) float64
+        Metres; the frame is the owner's (a prop's own frame, or the world for an `Instance`).
+    faces : (m, 3) int32
+        Indices into `vertices`, counter-clockwise seen from outside.
+    uv : (n, 2) float32
+        Texture coordinates in tiles (metres / `Material.tile_m`).
+    material : str
+        Name of a `Material` of the scene.
+    """
+
+    vertices: NDArray[np.float64]
+    faces: NDArray[np.int32]
+    uv: NDArray[np.float32]
+    material: str
+
+
+@dataclass(frozen=True, eq=False)
+class Instance:
+    """A named thing that stands in the scene, in world coordinates.
+
+    Attributes
+    ----------
+    node : str
+        Unique in the scene and stable between builds, e.g. ``"delivery_van_003"``.
+    category : str
+        Category of the catalogue (``"delivery_van"``) or of the structure (``"ground"``, ``"mall_building"``).
+    variant : str
+        Name of the catalogue's variant, empty if it has none.
+    attributes : dict of str to str
+        What a description may speak of, e.g. ``{"colour": "red", "state": "open"}``.
+    parts : tuple of Part
+        At least one, none of them empty.
+    """
+
+    node: str
+    category: str
+    variant: str
+    attributes: dict[str, str]
+    parts: tuple[Part, ...]
+
+    @cached_property
+    def vertices(self) -> NDArray[np.float64]:
+        """Vertices of all parts, (n, 3) float64, metres, world frame."""
+        return np.concatenate([p.vertices for p in self.parts])
+
+    @cached_property
+    def faces(self) -> NDArray[np.int32]:
+        """Faces of all parts, (m, 3) int32, indices into `vertices`."""
+        offsets = np.cumsum([0, *(len(p.vertices) for p in self.parts[:-1])])
+        return np.concatenate([p.faces + np.int32(o) for p, o in zip(self.parts, offsets, strict=True)])
+
+    @cached_property
+    def bounds(self) -> NDArray[np.float64]:
+        """Axis-aligned box, (2, 3) float64, metres, world frame: lower corner, upper corner."""
+        v = self.vertices
+        return np.stack([v.min(axis=0), v.max(axis=0)])
+
+    @cached_property
+    def centroid(self) -> NDArray[np.float64]:
+        """Centre of the axis-aligned box, (3,) float64, metres, world frame."""
+        return self.bounds.mean(axis=0)
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """A whole scene.
+
+    Attributes
+    ----------
+    name : str
+        E.g. ``"U_Mall_0"``.
+    instances : tuple of Instance
+        In a stable order; node names are unique.
+    materials : dict of str to Material
+        By name; every part's material is here.
+    bounds : (2, 3) float64
+        The volume that a drone may fly in: lower corner (x, y, ground), upper corner (x, y, ceiling), metres.
+    sky : tuple of int
+        sRGB of the sky, 0-255.
+    sun : tuple of float
+        Unit vector from the scene towards the sun, world frame.
+    """
+
+    name: str
+    instances: tuple[Instance, ...]
+    materials: dict[str, Material]
+    bounds: NDArray[np.float64]
+    sky: tuple[int, int, int] = (150, 190, 230)
+    sun: tuple[float, float, float] = (0.45, -0.35, 0.82)
+    _by_node: dict[str, Instance] = field(default_factory=dict, init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        """Index the instances and refuse a node name that stands twice."""
+        for instance in self.instances:
+            if instance.node in self._by_node:
+                raise ValueError(f"scene {self.name}: node {instance.node!r} stands twice")
+            self._by_node[instance.node] = instance
+
+    @property
+    def ceiling_m(self) -> float:
+        """Highest z that a drone may fly at, metres."""
+        return float(self.bounds[1, 2])
+
+    @property
+    def n_triangles(self) -> int:
+        """Number of triangles of all instances."""
+        return sum(len(p.faces) for i in self.instances for p in i.parts)
+
+    def __contains__(self, node: object) -> bool:
+        """Whether an instance of that node name stands in the scene."""
+        return node in self._by_node
+
+    def __getitem__(self, node: str) -> Instance:
+        """Look an instance up by its node name; KeyError where there is none."""
+        return self._by_node[node]
