@@ -1,0 +1,198 @@
+"""Ray casts against a whole scene, over Embree."""
+
+from __future__ import annotations
+
+import numpy as np
+from embreex.mesh_construction import TriangleMesh
+from embreex.rtcore_scene import EmbreeScene
+from numpy.typing import ArrayLike, NDArray
+
+from aerialdojo_gen.scenes.model import Instance, Scene
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int32]
+
+
+class TriangleRayCaster:
+    """First hits of rays on a heap of triangles.
+
+    Embree works in float32: it finds the triangle, and the distance is then computed in float64 from that triangle's
+    plane, so that it is exact to about 1e-9 m. Coordinates are centred first; over 400 m Embree itself is good to
+    about 0.02 mm, which decides only which of two triangles a ray at their very edge takes.
+
+    Parameters
+    ----------
+    vertices : (n, 3) float64
+        Metres, world frame.
+    faces : (m, 3) int32
+        At least one; orientation does not matter, both sides are hit.
+    """
+
+    def __init__(self, vertices: Floats, faces: NDArray[np.int32]) -> None:
+        triangles = np.asarray(vertices, dtype=np.float64)[faces]
+        # A hit's distance comes from its triangle's plane: a sliver without a normal has none.
+        normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+        self._face = np.flatnonzero((normals != 0.0).any(axis=1)).astype(np.int32)
+        if not len(self._face):
+            raise ValueError("no triangle with an area to cast rays at")
+        self._corner, self._normal = triangles[self._face, 0], normals[self._face]
+        self._centre = (triangles.min(axis=(0, 1)) + triangles.max(axis=(0, 1))) / 2.0
+        self._scene = EmbreeScene(robust=True)
+        TriangleMesh(
+            self._scene,
+            (np.asarray(vertices, dtype=np.float64) - self._centre).astype(np.float32),
+            np.ascontiguousarray(faces[self._face], dtype=np.int32),
+        )
+
+    def first_hit(self, origins: ArrayLike, directions: ArrayLike) -> tuple[Floats, Ints]:
+        """Find the first triangle along every ray.
+
+        Parameters
+        ----------
+        origins : (n, 3) or (3,) array_like
+            Metres, world frame; broadcasts against the directions.
+        directions : (n, 3) array_like
+            Any length but zero.
+
+        Returns
+        -------
+        distance_m : (n,) float64
+            Along the ray; inf where it hits nothing.
+        face : (n,) int32
+            Index of the face that is hit, -1 where none is.
+        """
+        d = np.asarray(directions, dtype=np.float64)
+        d = d / np.linalg.norm(d, axis=1, keepdims=True)
+        o = np.broadcast_to(np.asarray(origins, dtype=np.float64), d.shape)
+        hit = self._scene.run(
+            np.ascontiguousarray(o - self._centre, dtype=np.float32),
+            np.ascontiguousarray(d, dtype=np.float32),
+            output=True,
+        )
+        which = np.asarray(hit["primID"], dtype=np.int64)
+        found = which >= 0
+        k = which[found]
+        distance = np.full(len(d), np.inf)
+        rough = np.asarray(hit["tfar"], dtype=np.float64)[found]
+        facing = np.einsum("ij,ij->i", self._normal[k], d[found])
+        height = np.einsum("ij,ij->i", self._normal[k], self._corner[k] - o[found])
+        # A ray along the triangle's plane has no point on it: there Embree's own distance stands.
+        exact = np.divide(height, facing, out=rough.copy(), where=facing != 0.0)
+        distance[found] = np.where(np.abs(exact - rough) < 1e-2, np.maximum(exact, 0.0), rough)
+        face = np.full(len(d), -1, dtype=np.int32)
+        face[found] = self._face[k]
+        return distance, face
+
+    def unobstructed(self, origins: ArrayLike, points: ArrayLike, tolerance_m: float = 5e-3) -> NDArray[np.bool_]:
+        """Whether nothing stands between origins and points.
+
+        Parameters
+        ----------
+        origins, points : (n, 3) or (3,) array_like
+            Metres, world frame; they broadcast against each other.
+        tolerance_m : float
+            What is hit closer to the point than this is the point's own surface.
+
+        Returns
+        -------
+        (n,) bool
+            True where the segment is free.
+        """
+        o, p = np.broadcast_arrays(np.asarray(origins, dtype=np.float64), np.asarray(points, dtype=np.float64))
+        o, p = np.atleast_2d(o), np.atleast_2d(p)
+        length = np.linalg.norm(p - o, axis=1)
+        free = np.ones(len(p), dtype=np.bool_)
+        far = length > tolerance_m
+        free[far] = self.first_hit(o[far], (p - o)[far])[0] >= length[far] - tolerance_m
+        return free
+
+
+class RayCaster:
+    """First hits of rays on the instances of a scene.
+
+    Parameters
+    ----------
+    scene : Scene
+        All its instances are hit, from both sides.
+
+    Attributes
+    ----------
+    nodes : tuple of str
+        Node names in the scene's order: what `first_hit`'s indices mean.
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        self.nodes = tuple(i.node for i in scene.instances)
+        counts = [len(i.vertices) for i in scene.instances]
+        offsets = np.cumsum([0, *counts[:-1]])
+        self._owner = np.repeat(np.arange(len(self.nodes), dtype=np.int32), [len(i.faces) for i in scene.instances])
+        self._triangles = TriangleRayCaster(
+            np.concatenate([i.vertices for i in scene.instances]),
+            np.concatenate([i.faces + np.int32(k) for i, k in zip(scene.instances, offsets, strict=True)]),
+        )
+
+    def first_hit(self, origins: ArrayLike, directions: ArrayLike) -> tuple[Floats, Ints]:
+        """Find what every ray hits first.
+
+        Parameters
+        ----------
+        origins : (n, 3) or (3,) array_like
+            Metres, world frame; broadcasts against the directions.
+        directions : (n, 3) array_like
+            Any length but zero.
+
+        Returns
+        -------
+        distance_m : (n,) float64
+            Along the ray; inf where it hits nothing.
+        instance_index : (n,) int32
+            Index into `nodes` (and the scene's instances), -1 where nothing is hit.
+        """
+        distance, face = self._triangles.first_hit(origins, directions)
+        return distance, np.where(face >= 0, self._owner[face], np.int32(-1))
+
+    def visible(
+        self, origins: ArrayLike, points: ArrayLike, own_instance: int | None = None, tolerance_m: float = 5e-3
+    ) -> NDArray[np.bool_]:
+        """Whether points are seen from origins.
+
+        Parameters
+        ----------
+        origins, points : (n, 3) or (3,) array_like
+            Metres, world frame; they broadcast against each other.
+        own_instance : int, optional
+            Index of the instance that the points belong to: where the ray meets that one first, be it nearer than the
+            point, the instance is seen along that line of sight, and the answer is True.
+        tolerance_m : float
+            What is hit closer to the point than this is the point's own surface.
+
+        Returns
+        -------
+        (n,) bool
+            True where the first thing hit on the way is the point (or its instance), or nothing is.
+        """
+        o, p = np.broadcast_arrays(np.asarray(origins, dtype=np.float64), np.asarray(points, dtype=np.float64))
+        o, p = np.atleast_2d(o), np.atleast_2d(p)
+        length = np.linalg.norm(p - o, axis=1)
+        seen = np.ones(len(p), dtype=np.bool_)
+        far = length > tolerance_m
+        distance, instance = self.first_hit(o[far], (p - o)[far])
+        reached = distance >= length[far] - tolerance_m
+        seen[far] = reached if own_instance is None else reached | (instance == own_instance)
+        return seen
+
+
+def instance_caster(instance: Instance) -> TriangleRayCaster:
+    """Cast rays at one instance as if it stood alone.
+
+    Parameters
+    ----------
+    instance : Instance
+        In world coordinates.
+
+    Returns
+    -------
+    TriangleRayCaster
+        Over the instance's own faces.
+    """
+    return TriangleRayCaster(instance.vertices, instance.faces)

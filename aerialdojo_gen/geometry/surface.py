@@ -1,0 +1,234 @@
+"""Distances to a mesh's surface, points on it, and the way from outside to a given distance.
+
+Exact in float64 and brute force over the triangles with a bounding-sphere test: an object has hundreds of them, and
+a tree would cost more to build than all of its queries. Whole scenes are `aerialdojo_gen.planning.collision`'s.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import ArrayLike, NDArray
+
+from aerialdojo_gen.scenes.model import Instance
+
+Floats = NDArray[np.float64]
+
+_LEAST_AREA_M2 = 1e-12
+
+
+@njit(cache=True)
+def _triangle_distance_sq(p: Floats, t: Floats) -> float:
+    """Squared distance from p to a triangle (Ericson, Real-Time Collision Detection, 5.1.5)."""
+    a0, a1, a2 = t[0], t[1], t[2]
+    ab0, ab1, ab2 = t[3] - a0, t[4] - a1, t[5] - a2
+    ac0, ac1, ac2 = t[6] - a0, t[7] - a1, t[8] - a2
+    ap0, ap1, ap2 = p[0] - a0, p[1] - a1, p[2] - a2
+    d1 = ab0 * ap0 + ab1 * ap1 + ab2 * ap2
+    d2 = ac0 * ap0 + ac1 * ap1 + ac2 * ap2
+    d3 = d1 - (ab0 * ab0 + ab1 * ab1 + ab2 * ab2)
+    d4 = d2 - (ab0 * ac0 + ab1 * ac1 + ab2 * ac2)
+    d5 = d1 - (ab0 * ac0 + ab1 * ac1 + ab2 * ac2)
+    d6 = d2 - (ac0 * ac0 + ac1 * ac1 + ac2 * ac2)
+    va, vb, vc = d3 * d6 - d5 * d4, d5 * d2 - d1 * d6, d1 * d4 - d3 * d2
+    if d1 <= 0.0 and d2 <= 0.0:
+        v, w = 0.0, 0.0
+    elif d3 >= 0.0 and d4 <= d3:
+        v, w = 1.0, 0.0
+    elif vc <= 0.0 and d1 >= 0.0 and d3 <= 0.0:
+        v, w = d1 / (d1 - d3), 0.0
+    elif d6 >= 0.0 and d5 <= d6:
+        v, w = 0.0, 1.0
+    elif vb <= 0.0 and d2 >= 0.0 and d6 <= 0.0:
+        v, w = 0.0, d2 / (d2 - d6)
+    elif va <= 0.0 and d4 - d3 >= 0.0 and d5 - d6 >= 0.0:
+        w = (d4 - d3) / ((d4 - d3) + (d5 - d6))
+        v = 1.0 - w
+    else:
+        total = va + vb + vc
+        v, w = vb / total, vc / total
+    x = ap0 - v * ab0 - w * ac0
+    y = ap1 - v * ab1 - w * ac1
+    z = ap2 - v * ab2 - w * ac2
+    return x * x + y * y + z * z
+
+
+@njit(cache=True)
+def _distance(p: Floats, triangles: Floats, spheres: Floats, guess: int) -> tuple[float, int]:
+    """Distance to the nearest triangle and its index, searched from a guess that prunes the rest."""
+    nearest = guess
+    best_sq = _triangle_distance_sq(p, triangles[guess])
+    best = np.sqrt(best_sq)
+    for k in range(len(triangles)):
+        x, y, z = p[0] - spheres[k, 0], p[1] - spheres[k, 1], p[2] - spheres[k, 2]
+        reach = best + spheres[k, 3]
+        if x * x + y * y + z * z < reach * reach:
+            d_sq = _triangle_distance_sq(p, triangles[k])
+            if d_sq < best_sq:
+                best_sq, nearest = d_sq, k
+                best = np.sqrt(d_sq)
+    return best, nearest
+
+
+@njit(cache=True)
+def _distances(points: Floats, triangles: Floats, spheres: Floats) -> tuple[Floats, NDArray[np.int64]]:
+    out = np.empty(len(points))
+    which = np.empty(len(points), dtype=np.int64)
+    nearest = 0
+    for i in range(len(points)):
+        out[i], nearest = _distance(points[i], triangles, spheres, nearest)
+        which[i] = nearest
+    return out, which
+
+
+@njit(cache=True)
+def _march(
+    origins: Floats, directions: Floats, travel: Floats, triangles: Floats, spheres: Floats, offset: float, tol: float
+) -> Floats:
+    """Sphere tracing: a step of (distance - offset) can never jump over the surface at that offset."""
+    out = np.full(len(origins), np.nan)
+    p = np.empty(3)
+    nearest = 0
+    for i in range(len(origins)):
+        t = 0.0
+        for _ in range(200):
+            for a in range(3):
+                p[a] = origins[i, a] + t * directions[i, a]
+            d, nearest = _distance(p, triangles, spheres, nearest)
+            step = d - offset
+            if step < tol:
+                out[i] = t
+                break
+            t += step
+            if t > travel[i]:
+                break
+    return out
+
+
+class Surface:
+    """The surface of one mesh.
+
+    Parameters
+    ----------
+    vertices : (n, 3) float64
+        Metres, world frame.
+    faces : (m, 3) int32
+        At least one triangle; orientation does not matter.
+    """
+
+    def __init__(self, vertices: Floats, faces: NDArray[np.int32]) -> None:
+        corners = np.asarray(vertices, dtype=np.float64)[faces]
+        edges = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        self.areas_m2: Floats = np.linalg.norm(edges, axis=1) / 2.0
+        # A triangle without area lies on its neighbours' edges in a sound mesh, and divides by zero in the kernel.
+        sound = self.areas_m2 > _LEAST_AREA_M2
+        corners, self.areas_m2 = corners[sound], self.areas_m2[sound]
+        if not len(corners):
+            raise ValueError("a surface needs a triangle with an area")
+        self._corners = corners
+        self._triangles = np.ascontiguousarray(corners.reshape(-1, 9))
+        centre = (corners.min(axis=1) + corners.max(axis=1)) / 2.0
+        radius = np.linalg.norm(corners - centre[:, None], axis=2).max(axis=1)
+        # Rounding must not prune a triangle that is as near as the best one.
+        self._spheres = np.ascontiguousarray(np.column_stack([centre, radius * (1 + 1e-9) + 1e-9]))
+
+    @classmethod
+    def of(cls, instance: Instance) -> Surface:
+        """Take the surface of an instance."""
+        return cls(instance.vertices, instance.faces)
+
+    def distance_m(self, points: ArrayLike) -> Floats:
+        """Distance from points to the surface, whichever side they are on.
+
+        Parameters
+        ----------
+        points : (n, 3) array_like
+            Metres, world frame.
+
+        Returns
+        -------
+        (n,) float64
+            Metres, never negative.
+        """
+        p = np.ascontiguousarray(np.atleast_2d(np.asarray(points, dtype=np.float64)))
+        return np.asarray(_distances(p, self._triangles, self._spheres)[0])
+
+    def sample(self, n: int, rng: np.random.Generator) -> Floats:
+        """Draw points evenly by area, stratified: every n-th of the total area gets one point.
+
+        Parameters
+        ----------
+        n : int
+            Number of points.
+        rng : numpy.random.Generator
+            Source of the draw.
+
+        Returns
+        -------
+        (n, 3) float64
+            Metres, world frame.
+        """
+        total = np.cumsum(self.areas_m2)
+        place = (np.arange(n) + rng.random(n)) / n * total[-1]
+        which = np.minimum(np.searchsorted(total, place, side="right"), len(total) - 1)
+        r, s = np.sqrt(rng.random(n))[:, None], rng.random(n)[:, None]
+        a, b, c = np.moveaxis(self._corners[which], 1, 0)
+        return np.asarray((1 - r) * a + r * (1 - s) * b + r * s * c)
+
+    def standoff(self, aims: ArrayLike, directions: ArrayLike, offset_m: float, tolerance_m: float = 1e-4) -> Floats:
+        """Come from far towards aims, and stop where the surface is as near as the offset.
+
+        Parameters
+        ----------
+        aims : (3,) or (n, 3) array_like
+            Where the lines lead to, metres, world frame.
+        directions : (n, 3) array_like
+            Unit vectors from the aim outwards: the sides that the lines come from.
+        offset_m : float
+            Distance from the surface to stop at.
+        tolerance_m : float
+            The distance reached exceeds the offset by less than this.
+
+        Returns
+        -------
+        (n, 3) float64
+            The first point on each line, from outside, whose distance to the surface is the offset; NaN where a line
+            gets as far as its aim without coming that near.
+        """
+        d = np.ascontiguousarray(directions, dtype=np.float64)
+        aim = np.broadcast_to(np.asarray(aims, dtype=np.float64), d.shape)
+        corners = self._triangles.reshape(-1, 3)
+        middle = (corners.min(axis=0) + corners.max(axis=0)) / 2.0
+        far = np.linalg.norm(corners - middle, axis=1).max() + np.linalg.norm(aim - middle, axis=1) + offset_m + 1e-3
+        origins = aim + far[:, None] * d
+        t = _march(np.ascontiguousarray(origins), -d, far, self._triangles, self._spheres, offset_m, tolerance_m)
+        return np.asarray(origins - t[:, None] * d)
+
+    def nearest_point(self, point: ArrayLike) -> Floats:
+        """Find a point of the surface that is as near as any.
+
+        Parameters
+        ----------
+        point : (3,) array_like
+            Metres, world frame.
+
+        Returns
+        -------
+        (3,) float64
+            On the surface, metres, world frame.
+        """
+        p = np.asarray(point, dtype=np.float64)
+        _, which = _distances(p[None], self._triangles, self._spheres)
+        return _closest_on_triangle(p, self._corners[int(which[0])])
+
+
+def _closest_on_triangle(p: Floats, t: Floats) -> Floats:
+    """Nearest point of a triangle: inside it, else on one of its edges."""
+    a, b, c = t
+    n = np.cross(b - a, c - a)
+    q = p - n * (np.dot(p - a, n) / np.dot(n, n))
+    if all(np.dot(np.cross(v - u, q - u), n) >= 0.0 for u, v in ((a, b), (b, c), (c, a))):
+        return np.asarray(q)
+    ends = [u + (v - u) * np.clip(np.dot(p - u, v - u) / np.dot(v - u, v - u), 0.0, 1.0)
+            for u, v in ((a, b), (b, c), (c, a))]  # fmt: skip
+    return np.asarray(min(ends, key=lambda e: float(np.dot(p - e, p - e))))
