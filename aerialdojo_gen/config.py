@@ -1,0 +1,209 @@
+"""Configuration: one frozen, validated section a stage, read from a pipeline's TOML file.
+
+A key that does not exist is an error that names the file, the key and what was probably meant. Every value has a
+default, so that a stage can be called as a library function without a file.
+"""
+
+from __future__ import annotations
+
+import difflib
+import tomllib
+from pathlib import Path
+from typing import Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+
+from aerialdojo_gen.errors import ConfigError
+
+
+class Section(BaseModel):
+    """Base of every section: frozen, and unknown keys are errors."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+
+class Embodiment(Section):
+    """The drone's body (paper, section on the embodiment)."""
+
+    radius_m: float = Field(0.25, gt=0, description="radius of the collision sphere")
+    wheelbase_m: float = Field(0.25, gt=0, description="distance between opposite rotors; told to agents")
+
+
+class BuildScenesConfig(Section):
+    """`build-scenes` has nothing to set: a scene is its recipe."""
+
+
+class AnnotateImportConfig(Section):
+    """Checks of the annotation files."""
+
+    paper_counts: bool = Field(False, description="require the paper's numbers of landmarks and objects")
+
+
+class AnchorSampleConfig(Section):
+    """Candidate viewpoints around each object (paper: anchors)."""
+
+
+class ReferenceImagesConfig(Section):
+    """Pictures of the objects for image goals."""
+
+
+class PairObjectsConfig(Section):
+    """Candidate tasks: ordered pairs of objects times the start object's anchors."""
+
+    start_variants: int = Field(3, ge=1, description="how many anchors of the start object may start a task")
+    min_euclidean_m: float = Field(3.0, ge=0, description="d_E at or below which no task is kept")
+    max_length_m: float = Field(100.0, gt=0, description="L at or above which no task is kept")
+
+
+class PlanConfig(Section):
+    """Reference trajectories."""
+
+    targets_per_part: int = Field(8, ge=1, description="targets whose plans share a shard")
+
+
+class Setting(Section):
+    """One length setting (paper: Base, Standard, Long-Horizon)."""
+
+    min_length_m: float = Field(ge=0, description="smallest length that belongs to it")
+    max_length_m: float = Field(gt=0, description="smallest length that is too long for it")
+    action_budget: int = Field(ge=1, description="most actions an episode may take, Stop included")
+
+
+class FilterConfig(Section):
+    """Which candidates become tasks (paper, section on filtering)."""
+
+    min_euclidean_m: float = Field(3.0, ge=0, description="kept: d_E greater than this")
+    min_detour_ratio: float = Field(1.05, ge=1, description="kept: κ at least this")
+    base: Setting = Setting(min_length_m=5, max_length_m=30, action_budget=90)
+    standard: Setting = Setting(min_length_m=30, max_length_m=60, action_budget=180)
+    long_horizon: Setting = Setting(min_length_m=60, max_length_m=100, action_budget=300)
+
+    @model_validator(mode="after")
+    def _settings_join(self) -> FilterConfig:
+        if (self.base.max_length_m, self.standard.max_length_m) != (
+            self.standard.min_length_m,
+            self.long_horizon.min_length_m,
+        ):
+            raise ValueError("the settings must join: base.max_length_m = standard.min_length_m, and so on")
+        return self
+
+
+class SplitConfig(Section):
+    """Train and test, and which tasks the release holds."""
+
+    id_train_fraction: float = Field(0.8, ge=0, le=1, description="share of the tasks of ID scenes that train")
+    ood_train_fraction: float = Field(0.2, ge=0, le=1, description="share of the tasks of OOD scenes that train")
+
+
+class RenderConfig(Section):
+    """Recordings along the trajectories."""
+
+    limit: int | None = Field(None, ge=1, description="trajectories a scene and setting; all where absent")
+    sampling: Literal["steps", "time"] = Field("steps", description="a frame a pose, or a constant frame rate")
+
+
+class Pipeline(Section):
+    """A whole pipeline file."""
+
+    name: str = Field("default", pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*$")
+    seed: int = Field(0, ge=0, description="seed of every random draw")
+    scenes: tuple[str, ...] = Field(("*",), description="names or globs of the scenes to make")
+    stages: tuple[str, ...] | None = Field(None, description="stages that `run` runs; all where absent")
+    scene_assets: Path | None = Field(None, description="folder of recipes and props, relative to the file")
+    annotations: Path | None = Field(None, description="folder of annotation files, relative to the file")
+    embodiment: Embodiment = Embodiment()
+    build_scenes: BuildScenesConfig = Field(BuildScenesConfig(), alias="build-scenes")
+    annotate_import: AnnotateImportConfig = Field(AnnotateImportConfig(), alias="annotate-import")
+    anchor_sample: AnchorSampleConfig = Field(AnchorSampleConfig(), alias="anchor-sample")
+    reference_images: ReferenceImagesConfig = Field(ReferenceImagesConfig(), alias="reference-images")
+    pair_objects: PairObjectsConfig = Field(PairObjectsConfig(), alias="pair-objects")
+    plan: PlanConfig = PlanConfig()
+    filter: FilterConfig = FilterConfig()
+    split: SplitConfig = SplitConfig()
+    render: RenderConfig = RenderConfig()
+
+    def section(self, stage: str) -> Section:
+        """Return the section of a stage, by the stage's name (``"anchor-sample"``)."""
+        section = getattr(self, stage.replace("-", "_"))
+        assert isinstance(section, Section)
+        return section
+
+
+def load_pipeline(path: Path) -> Pipeline:
+    """Read and validate a pipeline file.
+
+    Parameters
+    ----------
+    path : Path
+        A TOML file; relative folders in it are relative to its own folder.
+
+    Returns
+    -------
+    Pipeline
+        With absolute folders.
+
+    Raises
+    ------
+    ConfigError
+        The file does not exist, is not TOML, has a key that does not exist or a value out of range; every
+        fault is named.
+    """
+    try:
+        raw = tomllib.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        known = sorted(p.name for p in path.parent.glob("*.toml")) if path.parent.is_dir() else []
+        hint = f"; there are {', '.join(known)} in {path.parent}" if known else ""
+        raise ConfigError(f"no pipeline file {path}{hint}") from None
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise ConfigError(f"{path}: {error}") from None
+    for key in ("scene_assets", "annotations"):
+        if isinstance(raw.get(key), str):
+            raw[key] = (path.parent / raw[key]).resolve()
+    try:
+        return Pipeline.model_validate(raw)
+    except ValidationError as error:
+        raise ConfigError("; ".join(f"{path}: {line}" for line in explain(error, Pipeline))) from None
+
+
+def explain(error: ValidationError, model: type[BaseModel]) -> list[str]:
+    """Turn a validation error into one line a fault, with the nearest known key for an unknown one.
+
+    Parameters
+    ----------
+    error : pydantic.ValidationError
+        What validating against `model` raised.
+    model : type of BaseModel
+        The model, to look up the keys that exist.
+
+    Returns
+    -------
+    list of str
+        E.g. ``["[plan] unknown key 'wieght': did you mean 'weight'?"]``.
+    """
+    lines = []
+    for fault in error.errors():
+        *where, last = [str(part) for part in fault["loc"]] or [""]
+        table = f"[{'.'.join(where)}] " if where else ""
+        if fault["type"] == "extra_forbidden":
+            known = _keys_at(model, where)
+            near = difflib.get_close_matches(last, known, n=1)
+            hint = f"did you mean {near[0]!r}?" if near else f"known keys: {', '.join(known)}"
+            lines.append(f"{table}unknown key {last!r}: {hint}")
+        else:
+            lines.append(f"{table}{last} = {_short(fault.get('input'))}: {fault['msg']}")
+    return lines
+
+
+def _keys_at(model: type[BaseModel], where: list[str]) -> list[str]:
+    for name in where:
+        fields = {(f.alias or key): f for key, f in model.model_fields.items()}
+        inner = fields[name].annotation if name in fields else None
+        if not (isinstance(inner, type) and issubclass(inner, BaseModel)):
+            return []
+        model = inner
+    return sorted(f.alias or key for key, f in model.model_fields.items())
+
+
+def _short(value: Any) -> str:
+    text = repr(value)
+    return text if len(text) <= 60 else text[:57] + "..."

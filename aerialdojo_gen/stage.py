@@ -1,0 +1,246 @@
+"""What a stage is, and the stages in their order.
+
+A stage's work is a plain function ``run(job, config) -> Output`` in its module under `aerialdojo_gen.stages`. What
+the runner must know without importing that module (and with it numba, FCL or PyBullet) stands here.
+"""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager
+from dataclasses import dataclass, field
+from functools import lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from aerialdojo_gen import store
+from aerialdojo_gen.config import Embodiment
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+    from aerialdojo_gen.scenes.model import Scene
+
+
+@dataclass(frozen=True)
+class Roots:
+    """The folders that a run works with.
+
+    Attributes
+    ----------
+    data : Path
+        The data directory: every table and file that stages write.
+    scene_assets : Path
+        Recipes, props and materials.
+    annotations : Path
+        Annotation files.
+    """
+
+    data: Path
+    scene_assets: Path
+    annotations: Path
+
+
+@dataclass(frozen=True)
+class Output:
+    """What a stage's function returns for one shard.
+
+    Attributes
+    ----------
+    tables : dict of str to pyarrow.Table
+        Every table that the stage writes, also where it has no rows; rows sorted by the table's key.
+    rows_in, rows_out : int
+        For the summary line.
+    counts : dict of str to int
+        Why rows were rejected, or what became of them: stable words, for the summary line.
+    """
+
+    tables: dict[str, pa.Table]
+    rows_in: int
+    rows_out: int
+    counts: dict[str, int] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Job:
+    """One shard's work: where it reads, what it is a part of, and the pipeline's seed.
+
+    Attributes
+    ----------
+    stage, scene : str
+        Name of the stage and of the scene.
+    part, parts : int
+        Which part of the scene's work this is, and how many there are.
+    seed : int
+        Seed of the pipeline, for `aerialdojo_gen.rng.generator`.
+    embodiment : Embodiment
+        The drone's body.
+    roots : Roots
+        The folders.
+    """
+
+    stage: str
+    scene: str
+    part: int
+    parts: int
+    seed: int
+    embodiment: Embodiment
+    roots: Roots
+    files: list[str] = field(default_factory=list, compare=False)
+
+    def read(self, table: str) -> pa.Table:
+        """Read all of this scene's rows of a table; StoreError names a missing or damaged shard."""
+        return store.read_scene(self.roots.data, table, self.scene)
+
+    def scene_model(self) -> Scene:
+        """Read the scene's mesh (kept in memory between the jobs of a process)."""
+        row = self.read("scenes").to_pylist()[0]
+        return _scene_model(self.roots.data / row["mesh_path"], row["mesh_sha256"])
+
+    def output_file(self, relative: str) -> AbstractContextManager[Path]:
+        """Open a file output: a temporary path that takes its name when the block ends without an error.
+
+        Parameters
+        ----------
+        relative : str
+            Path relative to the data directory; it must stay inside it.
+
+        Returns
+        -------
+        context manager of Path
+            The temporary path to write to, with the same suffix.
+        """
+        self.files.append(relative)
+        return store.atomic_file(self.roots.data, relative)
+
+
+@lru_cache(maxsize=2)
+def _scene_model(path: Path, _sha256: str) -> Scene:
+    from aerialdojo_gen.scenes.glb import read_glb
+
+    return read_glb(path)
+
+
+def _one_part(_data: Path, _scene: str, _config: Any) -> int:
+    return 1
+
+
+def _no_sources(_roots: Roots, _scene: str) -> list[Path]:
+    return []
+
+
+@dataclass(frozen=True)
+class Stage:
+    """A stage of the pipeline.
+
+    Attributes
+    ----------
+    name : str
+        The command's name, e.g. ``"anchor-sample"``.
+    version : int
+        Raised when the meaning of what the stage writes changes; part of every fingerprint.
+    help : str
+        One line for the command line.
+    reads, writes : tuple of str
+        Tables (keys of `aerialdojo_gen.store.LAYOUT`), one scene of each.
+    parts : callable
+        ``(data, scene, config) -> int``: number of shards of a scene; may read upstream tables.
+    sources : callable
+        ``(roots, scene) -> list of Path``: files outside the store whose bytes the result depends on.
+    """
+
+    name: str
+    version: int
+    help: str
+    reads: tuple[str, ...]
+    writes: tuple[str, ...]
+    parts: Callable[[Path, str, Any], int] = _one_part
+    sources: Callable[[Roots, str], list[Path]] = _no_sources
+
+    def load(self) -> Callable[[Job, Any], Output]:
+        """Import the stage's module and return its ``run``."""
+        module = importlib.import_module(f"aerialdojo_gen.stages.{self.name.replace('-', '_')}")
+        run: Callable[[Job, Any], Output] = module.run
+        return run
+
+
+def _scene_sources(roots: Roots, scene: str) -> list[Path]:
+    # A layout is code: the scene package's modules are assets of the scene as much as the recipe is.
+    package = Path(__file__).parent / "scenes"
+    return [
+        roots.scene_assets / "scenes" / f"{scene}.toml",
+        roots.scene_assets / "materials.toml",
+        *sorted((roots.scene_assets / "props").glob("*.toml")),
+        *sorted(package.rglob("*.py")),
+    ]
+
+
+def _annotation_sources(roots: Roots, scene: str) -> list[Path]:
+    return [roots.annotations / f"{scene}.json", *sorted((roots.scene_assets / "props").glob("*.toml"))]
+
+
+def _plan_parts(data: Path, scene: str, config: Any) -> int:
+    return -(-store.count_rows(data, "objects", scene) // config.targets_per_part)
+
+
+def _render_parts(data: Path, scene: str, config: Any) -> int:
+    from aerialdojo_gen.rendering.sample import n_parts
+
+    return n_parts(data, scene, config)
+
+
+_UPSTREAM_OF_SPLIT = ("scenes", "landmarks", "objects", "anchors", "references", "pairs", "plans", "verdicts")
+
+STAGES: tuple[Stage, ...] = (
+    Stage(
+        "build-scenes", 1, "Build the scenes' meshes from their recipes.", (), ("scenes",), sources=_scene_sources
+    ),
+    Stage(
+        "annotate-import", 1, "Check the annotations against the scenes and import them.",
+        ("scenes",), ("landmarks", "objects"), sources=_annotation_sources,
+    ),
+    Stage(
+        "anchor-sample", 1, "Find viewpoints 1 m from each object that see it.",
+        ("scenes", "objects"), ("anchors",),
+    ),
+    Stage(
+        "reference-images", 1, "Render each object's picture from its selected anchor.",
+        ("scenes", "objects", "anchors"), ("references",),
+    ),
+    Stage(
+        "pair-objects", 1, "Pair start anchors with targets: the candidate tasks.",
+        ("objects", "anchors"), ("pairs",),
+    ),
+    Stage(
+        "plan", 1, "Plan a collision-free reference trajectory for every candidate.",
+        ("scenes", "objects", "anchors", "pairs"), ("plans",), parts=_plan_parts,
+    ),
+    Stage(
+        "filter", 1, "Keep the candidates that make tasks, with a reason for every rejection.",
+        ("pairs", "plans"), ("verdicts",),
+    ),
+    Stage(
+        "split", 1, "Write the release: tasks, routes, objects, train and test.",
+        _UPSTREAM_OF_SPLIT,
+        ("tasks/train", "tasks/test", "routes/train", "routes/test",
+         "release/scenes", "release/landmarks", "release/objects", "release/anchors"),
+    ),
+    Stage(
+        "render", 1, "Record four RGB-D views along trajectories of the release.",
+        ("scenes", "objects", "routes/train", "routes/test"), ("recordings", "frames"), parts=_render_parts,
+    ),
+)  # fmt: skip
+
+BY_NAME = {stage.name: stage for stage in STAGES}
+
+
+def upstream(name: str) -> Iterator[Stage]:
+    """Yield the stages that `name` needs, in order, and then the stage itself."""
+    needed = {name}
+    tables: set[str] = set()
+    for stage in reversed(STAGES):
+        if stage.name in needed or tables & set(stage.writes):
+            needed.add(stage.name)
+            tables |= set(stage.reads)
+    yield from (stage for stage in STAGES if stage.name in needed)
