@@ -42,6 +42,21 @@ class AnnotateImportConfig(Section):
 class AnchorSampleConfig(Section):
     """Candidate viewpoints around each object (paper: anchors)."""
 
+    standoff_m: float = Field(1.0, gt=0, description="distance from the object's surface")
+    azimuths: int = Field(16, ge=3, description="directions in the plane that candidates are placed in")
+    elevations_deg: tuple[float, ...] = Field(
+        (-15.0, 0.0, 15.0, 30.0), min_length=1, description="elevations of the candidates, seen from the centroid"
+    )
+    level_heights: tuple[float, ...] = Field(
+        (0.2, 0.8), description="heights of more level candidates around a tall object, 0 bottom, 1 top"
+    )
+    margin_m: float = Field(0.05, ge=0, description="free space that a candidate needs beyond the body's radius")
+    surface_points: int = Field(192, ge=8, description="points of the object's surface that rays are cast to")
+    fov_deg: float = Field(90.0, gt=0, lt=180, description="field of view of the front camera")
+    min_visible_fraction: float = Field(0.3, ge=0, le=1, description="visible fraction below which nothing is seen")
+    shortlist: int = Field(3, ge=1, description="anchors kept an object")
+    separation_deg: float = Field(45.0, gt=0, le=180, description="wanted azimuth between kept anchors")
+
 
 class ReferenceImagesConfig(Section):
     """Pictures of the objects for image goals."""
@@ -53,6 +68,7 @@ class PairObjectsConfig(Section):
     start_variants: int = Field(3, ge=1, description="how many anchors of the start object may start a task")
     min_euclidean_m: float = Field(3.0, ge=0, description="d_E at or below which no task is kept")
     max_length_m: float = Field(100.0, gt=0, description="L at or above which no task is kept")
+    max_approach_m: float = Field(1.0, ge=0, description="longest straight Approach at the end of a route")
 
 
 class PlanConfig(Section):
