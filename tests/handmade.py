@@ -1,0 +1,42 @@
+"""Small scenes made by hand from trimesh's primitives, for tests that need to know where everything is."""
+
+from __future__ import annotations
+
+import numpy as np
+import trimesh
+
+from aerialdojo_gen.scenes.model import Instance, Material, Part, Scene
+
+
+def instance(node: str, *meshes: trimesh.Trimesh, category: str = "thing") -> Instance:
+    parts = tuple(
+        Part(
+            np.asarray(m.vertices, dtype=np.float64),
+            np.asarray(m.faces, dtype=np.int32),
+            np.zeros((len(m.vertices), 2), dtype=np.float32),
+            "grey",
+        )
+        for m in meshes
+    )
+    return Instance(node, category, "", {}, parts)
+
+
+def box(low: tuple[float, float, float], high: tuple[float, float, float]) -> trimesh.Trimesh:
+    return trimesh.creation.box(bounds=[low, high])
+
+
+def ground(half: float) -> Instance:
+    return instance("ground", box((-half, -half, -0.5), (half, half, 0.0)), category="ground")
+
+
+def scene(*instances: Instance, half: float = 15.0, ceiling: float = 15.0, name: str = "U_Test_0") -> Scene:
+    return Scene(
+        name,
+        (ground(half + 1), *instances),
+        {"grey": Material("grey", (128, 128, 128))},
+        np.array([[-half, -half, 0.0], [half, half, ceiling]]),
+    )
+
+
+def mesh_of(item: Instance) -> trimesh.Trimesh:
+    return trimesh.Trimesh(item.vertices, item.faces, process=False)
