@@ -9,9 +9,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import pyarrow as pa
 from numpy.typing import NDArray
 
+from aerialdojo_gen import store
 from aerialdojo_gen.config import AnchorSampleConfig
 from aerialdojo_gen.errors import StoreError
 from aerialdojo_gen.geometry.frames import yaw_towards
@@ -72,7 +72,7 @@ def run(job: Job, config: AnchorSampleConfig) -> Output:
 
     A candidate lies `standoff_m` from the object's surface (its mesh, not its box) and faces its centroid in yaw. It
     goes through these tests, and is counted under the first that it fails: ``no_surface`` (its line comes nowhere
-    near the surface), ``out_of_bounds`` (the body sticks out of the flight volume), ``in_collision`` (a surface within
+    near the surface), ``out_of_bounds`` (the body leaves the flight volume), ``in_collision`` (a surface within
     the body's radius plus `margin_m`), ``unreachable`` (no way from the open sky: inside a closed room),
     ``not_visible`` (visible fraction below `min_visible_fraction`), ``not_shortlisted`` (`shortlist` others show the
     object better, or from a side of their own). The rest are the object's anchors, the best of them is selected.
@@ -113,10 +113,9 @@ def run(job: Job, config: AnchorSampleConfig) -> Output:
             bare += 1
             why = ", ".join(f"{reason} {n}" for reason, n in rejected.items() if n)
             log.warning("%s: object %d (%s) has no anchor: %s", job.scene, item["object_id"], item["name"], why)
-    table = pa.Table.from_pylist(sorted(rows, key=lambda r: (r["object_id"], r["anchor_id"])), schema=ANCHORS.schema)
     tally = {reason: counts[reason] for reason in REASONS}
     return Output(
-        {"anchors": table},
+        {"anchors": store.from_rows(ANCHORS, rows)},
         rows_in=len(rows) + sum(tally.values()),
         rows_out=len(rows),
         counts=tally | {"no_anchor": bare},
