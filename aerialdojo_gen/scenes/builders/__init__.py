@@ -1,0 +1,24 @@
+"""Props that the shape vocabulary cannot say, as code.
+
+A builder is a function ``(rng, params) -> [(role, mesh), …]``: it draws from the generator alone, takes the prop's parameters
+by name, and returns meshes in the prop's own frame (metres; base centre at the origin, front along +x), each with a role of
+the category or a material. `builder` registers it under its name; every module of this folder is loaded.
+"""
+
+from __future__ import annotations
+
+import importlib
+import pkgutil
+from functools import cache
+
+from aerialdojo_gen.scenes.builders.registry import BUILDERS, Builder, builder
+
+__all__ = ["Builder", "builder", "builders"]
+
+
+@cache
+def builders() -> dict[str, Builder]:
+    """Load all modules of this folder and give their builders by name."""
+    for module in sorted(m.name for m in pkgutil.iter_modules(__path__)):
+        importlib.import_module(f"{__name__}.{module}")
+    return dict(sorted(BUILDERS.items()))

@@ -1,0 +1,214 @@
+"""The catalogue of props: `scene_assets/props/*.toml`, and how a category becomes an instance."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aerialdojo_gen.errors import AssetError
+from aerialdojo_gen.scenes.builders import builders
+from aerialdojo_gen.scenes.materials import MaterialLibrary, load_materials, nearest, read_toml, refuse_unknown
+from aerialdojo_gen.scenes.mesh import Mesh, merge, rotation, to_part
+from aerialdojo_gen.scenes.model import Instance, Part
+from aerialdojo_gen.scenes.prop import Category, Variant, parse_category
+from aerialdojo_gen.scenes.vocabulary import part_mesh
+
+_CACHE_SIZE = 2000
+_CROWN_SHAPES = 6
+
+
+class Catalogue:
+    """All categories by name.
+
+    Parameters
+    ----------
+    categories : mapping of str to Category
+        By key.
+    materials : MaterialLibrary
+        What their roles may name.
+    """
+
+    def __init__(self, categories: Mapping[str, Category], materials: MaterialLibrary) -> None:
+        self._categories = dict(categories)
+        self.materials = materials
+        self._parts: dict[tuple[object, ...], tuple[Part, ...]] = {}
+
+    def __len__(self) -> int:
+        return len(self._categories)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._categories)
+
+    def __contains__(self, category: object) -> bool:
+        return category in self._categories
+
+    def __getitem__(self, category: str) -> Category:
+        """Look a category up; an `AssetError` names the nearest one."""
+        if category not in self._categories:
+            raise AssetError(f"unknown category {category!r}{nearest(category, self._categories)}")
+        return self._categories[category]
+
+    def instantiate(
+        self,
+        category: str,
+        node: str,
+        rng: np.random.Generator,
+        position: Sequence[float] = (0.0, 0.0, 0.0),
+        yaw_deg: float = 0.0,
+        variant: str | None = None,
+        scale: float = 1.0,
+        params: Mapping[str, float] | None = None,
+        roles: Mapping[str, str] | None = None,
+        attributes: Mapping[str, str] | None = None,
+    ) -> Instance:
+        """Make an instance of a category.
+
+        Parameters
+        ----------
+        category : str
+            Key of the catalogue.
+        node : str
+            Node name, unique in the scene.
+        rng : numpy.random.Generator
+            Draws the variant by weight, then every parameter in file order, then what a builder draws.
+        position : (x, y, z)
+            Where the prop's origin goes, metres, world frame.
+        yaw_deg : float
+            Direction of its front, degrees, counter-clockwise from +x.
+        variant : str, optional
+            Name of a variant, in place of a drawn one.
+        scale : float
+            Factor on all lengths; patterns keep their size.
+        params : mapping, optional
+            Fixed values in place of drawn ones.
+        roles : mapping, optional
+            Materials in place of the variant's.
+        attributes : mapping, optional
+            Added to the variant's; they also fill ``{…}`` in a sign's text.
+
+        Returns
+        -------
+        Instance
+            World coordinates, exact in float32.
+
+        Raises
+        ------
+        AssetError
+            Unknown category, variant, parameter, role or material, or sizes that make no body.
+        """
+        prop = self[category]
+        look = self._draw_variant(prop, variant, rng)
+        sizes = self._draw_params(prop, look, params or {}, rng)
+        shape_seed = int(rng.integers(_CROWN_SHAPES))
+        surfaces = dict(prop.roles) | dict(look.roles) | dict(roles or {})
+        refuse_unknown(roles or {}, prop.roles, f"{prop.source} roles")
+        words = dict(look.attributes) | dict(attributes or {})
+        if prop.builder is not None:
+            parts = self._built(prop, prop.builder, sizes, surfaces, rng)
+        else:
+            signs = tuple(words.items()) if any(p["shape"] == "text" for p in prop.parts) else ()
+            key = (category, look.name, tuple(sizes.items()), tuple(surfaces.items()), signs, shape_seed)
+            if key not in self._parts:
+                if len(self._parts) >= _CACHE_SIZE:
+                    self._parts.clear()
+                self._parts[key] = self._assembled(prop, look, sizes, surfaces, words, shape_seed)
+            parts = self._parts[key]
+        return Instance(node, category, look.name, words, placed(parts, position, yaw_deg, scale))
+
+    def _draw_variant(self, prop: Category, name: str | None, rng: np.random.Generator) -> Variant:
+        weights = np.array([v.weight for v in prop.variants])
+        drawn = int(np.searchsorted(np.cumsum(weights) / weights.sum(), rng.random(), side="right"))
+        return prop.variants[min(drawn, len(prop.variants) - 1)] if name is None else prop.variant(name)
+
+    @staticmethod
+    def _draw_params(
+        prop: Category, look: Variant, fixed: Mapping[str, float], rng: np.random.Generator
+    ) -> dict[str, float]:
+        refuse_unknown(fixed, prop.params, f"{prop.source} params")
+        out = {}
+        for name, ends in prop.params.items():
+            low, high = look.params.get(name, ends)
+            drawn = float(rng.uniform(low, high)) if low < high else low
+            # Centimetres: no eye sees less, and equal sizes share their geometry.
+            out[name] = float(fixed[name]) if name in fixed else round(drawn, 2) if low < high else low
+        return out
+
+    def _assembled(
+        self,
+        prop: Category,
+        look: Variant,
+        sizes: Mapping[str, float],
+        surfaces: Mapping[str, str],
+        words: Mapping[str, str],
+        shape_seed: int,
+    ) -> tuple[Part, ...]:
+        meshes: list[tuple[str, Mesh]] = []
+        for k, part in enumerate(prop.parts):
+            if part.get("tag") in look.without:
+                continue
+            own = part
+            if part["shape"] == "crown" and "seed" not in part:
+                own = {**part, "seed": shape_seed + k * _CROWN_SHAPES}
+            try:
+                meshes.append((part["role"], part_mesh(own, sizes, words)))
+            except (ValueError, TypeError) as error:
+                raise AssetError(f"{prop.source} parts[{k}] ({part['shape']}): {error}") from error
+        return self._textured(meshes, surfaces)
+
+    def _built(
+        self,
+        prop: Category,
+        builder: str,
+        sizes: Mapping[str, float],
+        surfaces: Mapping[str, str],
+        rng: np.random.Generator,
+    ) -> tuple[Part, ...]:
+        try:
+            meshes = list(builders()[builder](rng, sizes))
+        except (ValueError, KeyError) as error:
+            raise AssetError(f"{prop.source} builder {builder!r}: {error}") from error
+        return self._textured(meshes, surfaces)
+
+    def _textured(self, meshes: Sequence[tuple[str, Mesh]], surfaces: Mapping[str, str]) -> tuple[Part, ...]:
+        by_material: dict[str, list[Mesh]] = {}
+        for role, body in meshes:
+            by_material.setdefault(surfaces.get(role, role), []).append(body)
+        return tuple(to_part(merge(m), spec, self.materials.tile_m(spec)) for spec, m in by_material.items())
+
+
+def placed(
+    parts: Sequence[Part], position: Sequence[float], yaw_deg: float = 0.0, scale: float = 1.0
+) -> tuple[Part, ...]:
+    """Scale, turn and move parts into the world, rounded to what float32 holds."""
+    turn = rotation(0.0, 0.0, yaw_deg).T
+    offset = np.asarray(position, dtype=np.float64)
+    return tuple(
+        Part(single(p.vertices * scale @ turn + offset), p.faces, (p.uv * np.float32(scale)), p.material)
+        for p in parts
+    )
+
+
+def single(vertices: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Round coordinates to float32, kept as float64: a scene file holds float32 and must come back the same."""
+    return vertices.astype(np.float32).astype(np.float64)
+
+
+def load_catalogue(folder: Path) -> Catalogue:
+    """Read a `scene_assets` folder: `materials.toml` and every `props/*.toml`.
+
+    Raises
+    ------
+    AssetError
+        The first thing that is wrong: file, category, part or variant, key, and what was probably meant.
+    """
+    materials = load_materials(folder / "materials.toml")
+    categories: dict[str, Category] = {}
+    for path in sorted((folder / "props").glob("*.toml")):
+        for name, body in read_toml(path).items():
+            if name in categories:
+                raise AssetError(f"{path}: [{name}] stands already in {categories[name].source.partition(':')[0]}")
+            categories[name] = parse_category(path, name, body, materials)
+    return Catalogue(categories, materials)

@@ -1,0 +1,241 @@
+"""Scenes as GLB files: one named node an instance, one primitive a material, textures embedded.
+
+The file is glTF 2.0, so that any viewer shows it: a root node turns the world's z up to glTF's y up, and below it the
+coordinates are the world's own, in float32. The model's v points up and glTF's down, hence the sign of v.
+"""
+
+from __future__ import annotations
+
+import json
+import struct
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from aerialdojo_gen.errors import AssetError
+from aerialdojo_gen.scenes.model import Instance, Material, Part, Scene
+
+_MAGIC, _JSON, _BIN = b"glTF", 0x4E4F534A, 0x004E4942
+_FLOAT, _UINT16, _UINT32 = 5126, 5123, 5125
+_ARRAY_BUFFER, _INDEX_BUFFER = 34962, 34963
+_DTYPES: dict[int, np.dtype[Any]] = {_FLOAT: np.dtype("<f4"), _UINT16: np.dtype("<u2"), _UINT32: np.dtype("<u4")}
+_WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3}
+# Quaternion (x, y, z, w) of a quarter turn about x: z up becomes y up.
+_Z_UP_TO_Y_UP = [-0.7071067811865476, 0.0, 0.0, 0.7071067811865476]
+_VERSION = 1
+
+
+def write_glb(scene: Scene, path: Path) -> None:
+    """Write a scene; the same scene always makes the same bytes.
+
+    Parameters
+    ----------
+    scene : Scene
+        Coordinates and texture coordinates must be exact in float32, as those of built scenes are.
+    path : Path
+        Written in place; callers that need atomicity write to a temporary name and rename.
+    """
+    writer = _Writer()
+    names = sorted({p.material for i in scene.instances for p in i.parts})
+    for name in names:
+        writer.material(scene.materials[name])
+    index = {name: k for k, name in enumerate(names)}
+    for instance in scene.instances:
+        writer.instance(instance, index)
+    document = writer.document(scene)
+    head = json.dumps(document, separators=(",", ":"), ensure_ascii=False, allow_nan=False).encode()
+    head += b" " * (-len(head) % 4)
+    body = bytes(writer.data)
+    with path.open("wb") as file:
+        file.write(struct.pack("<4sII", _MAGIC, 2, 12 + 8 + len(head) + 8 + len(body)))
+        file.write(struct.pack("<II", len(head), _JSON))
+        file.write(head)
+        file.write(struct.pack("<II", len(body), _BIN))
+        file.write(body)
+
+
+def read_glb(path: Path) -> Scene:
+    """Read a scene that `write_glb` wrote; it equals the written one to the last bit.
+
+    Raises
+    ------
+    AssetError
+        The file is missing, cut short, or no scene of this program (other meshes come in through ``add-scene``).
+    """
+    try:
+        document, data = _chunks(path)
+        extras = document["extras"]["aerialdojo"]
+        if extras["version"] != _VERSION:
+            raise AssetError(f"{path}: scene format {extras['version']} is not {_VERSION}; run build-scenes again")
+        materials = [_read_material(m, document, data) for m in document["materials"]]
+        names = [m.name for m in materials]
+        instances = tuple(
+            _read_instance(document["nodes"][k], document, data, names) for k in document["nodes"][0]["children"]
+        )
+        return Scene(
+            name=extras["name"],
+            instances=instances,
+            materials={m.name: m for m in materials},
+            bounds=np.array(extras["bounds_m"], dtype=np.float64),
+            sky=tuple(extras["sky"]),
+            sun=tuple(extras["sun"]),
+        )
+    except OSError as error:
+        raise AssetError(f"{path}: cannot be read ({error.strerror}); run build-scenes first") from error
+    except (KeyError, IndexError, TypeError, ValueError, struct.error) as error:
+        raise AssetError(f"{path}: is no scene file of this program or is damaged; run build-scenes again") from error
+
+
+class _Writer:
+    """Collects the glTF document and its binary chunk."""
+
+    def __init__(self) -> None:
+        self.data = bytearray()
+        self._views: list[dict[str, Any]] = []
+        self._accessors: list[dict[str, Any]] = []
+        self._materials: list[dict[str, Any]] = []
+        self._images: list[dict[str, Any]] = []
+        self._meshes: list[dict[str, Any]] = []
+        self._nodes: list[dict[str, Any]] = []
+
+    def material(self, material: Material) -> None:
+        surface: dict[str, Any] = {"metallicFactor": 0.0, "roughnessFactor": 0.9}
+        extras: dict[str, Any] = {"colour": list(material.colour), "tile_m": material.tile_m}
+        if material.texture is None:
+            surface["baseColorFactor"] = [*(_linear(c) for c in material.colour), 1.0]
+        else:
+            surface["baseColorTexture"] = {"index": len(self._images)}
+            ok, png = cv2.imencode(".png", material.texture[..., ::-1], [cv2.IMWRITE_PNG_COMPRESSION, 6])
+            if not ok:
+                raise AssetError(f"material {material.name!r}: its texture cannot be encoded")
+            self._images.append({"mimeType": "image/png", "bufferView": self._view(png.tobytes(), None)})
+        self._materials.append({"name": material.name, "pbrMetallicRoughness": surface, "extras": extras})
+
+    def instance(self, instance: Instance, materials: dict[str, int]) -> None:
+        primitives = []
+        for part in instance.parts:
+            v = part.vertices.astype("<f4")
+            uv = part.uv.astype("<f4") * np.array([1, -1], dtype="<f4")
+            kind = _UINT16 if len(v) < 65536 else _UINT32
+            attributes = {
+                "POSITION": self._accessor(v, _FLOAT, "VEC3", _ARRAY_BUFFER, bounds=True),
+                "TEXCOORD_0": self._accessor(uv, _FLOAT, "VEC2", _ARRAY_BUFFER),
+            }
+            indices = self._accessor(part.faces.reshape(-1).astype(_DTYPES[kind]), kind, "SCALAR", _INDEX_BUFFER)
+            primitives.append({"attributes": attributes, "indices": indices, "material": materials[part.material]})
+        extras = {"category": instance.category, "variant": instance.variant, "attributes": instance.attributes}
+        self._nodes.append({"name": instance.node, "mesh": len(self._meshes), "extras": extras})
+        self._meshes.append({"primitives": primitives})
+
+    def document(self, scene: Scene) -> dict[str, Any]:
+        own = {
+            "version": _VERSION,
+            "name": scene.name,
+            "bounds_m": scene.bounds.tolist(),
+            "sky": list(scene.sky),
+            "sun": list(scene.sun),
+        }
+        children = list(range(1, len(self._nodes) + 1))
+        root = {"name": scene.name, "rotation": _Z_UP_TO_Y_UP, "children": children}
+        document: dict[str, Any] = {
+            "asset": {"version": "2.0", "generator": "aerialdojo-gen"},
+            "extras": {"aerialdojo": own},
+            "scene": 0,
+            "scenes": [{"name": scene.name, "nodes": [0]}],
+            "nodes": [root, *self._nodes],
+            "meshes": self._meshes,
+            "materials": self._materials,
+            "accessors": self._accessors,
+            "bufferViews": self._views,
+            "buffers": [{"byteLength": len(self.data)}],
+        }
+        if self._images:
+            document["images"] = self._images
+            document["samplers"] = [{"wrapS": 10497, "wrapT": 10497, "magFilter": 9729, "minFilter": 9987}]
+            document["textures"] = [{"source": k, "sampler": 0} for k in range(len(self._images))]
+        return document
+
+    def _accessor(self, values: NDArray[Any], component: int, kind: str, target: int, bounds: bool = False) -> int:
+        entry: dict[str, Any] = {
+            "bufferView": self._view(values.tobytes(), target),
+            "componentType": component,
+            "count": len(values),
+            "type": kind,
+        }
+        if bounds:
+            entry |= {"min": values.min(axis=0).tolist(), "max": values.max(axis=0).tolist()}
+        self._accessors.append(entry)
+        return len(self._accessors) - 1
+
+    def _view(self, raw: bytes, target: int | None) -> int:
+        view = {"buffer": 0, "byteOffset": len(self.data), "byteLength": len(raw)}
+        self._views.append(view if target is None else view | {"target": target})
+        self.data += raw + b"\0" * (-len(raw) % 4)
+        return len(self._views) - 1
+
+
+def _chunks(path: Path) -> tuple[dict[str, Any], memoryview]:
+    raw = memoryview(path.read_bytes())
+    magic, version, length = struct.unpack_from("<4sII", raw)
+    if magic != _MAGIC or version != 2 or length != len(raw):
+        raise ValueError("no whole GLB 2 file")
+    head, kind = struct.unpack_from("<II", raw, 12)
+    body, kind2 = struct.unpack_from("<II", raw, 20 + head)
+    if kind != _JSON or kind2 != _BIN or 28 + head + body != length:
+        raise ValueError("chunks do not fit")
+    document = json.loads(bytes(raw[20 : 20 + head]))
+    return document, raw[28 + head :]
+
+
+def _read_material(entry: dict[str, Any], document: dict[str, Any], data: memoryview) -> Material:
+    texture = None
+    source = entry["pbrMetallicRoughness"].get("baseColorTexture")
+    if source is not None:
+        image = document["images"][document["textures"][source["index"]]["source"]]
+        png = np.frombuffer(_view_bytes(image["bufferView"], document, data), dtype=np.uint8)
+        decoded = cv2.imdecode(png, cv2.IMREAD_COLOR)
+        if decoded is None:
+            raise ValueError("texture cannot be decoded")
+        texture = np.ascontiguousarray(decoded[..., ::-1]).astype(np.uint8)
+    red, green, blue = entry["extras"]["colour"]
+    return Material(entry["name"], (red, green, blue), texture, float(entry["extras"]["tile_m"]))
+
+
+def _read_instance(
+    node: dict[str, Any], document: dict[str, Any], data: memoryview, materials: list[str]
+) -> Instance:
+    parts = []
+    for primitive in document["meshes"][node["mesh"]]["primitives"]:
+        v = _array(primitive["attributes"]["POSITION"], document, data).astype(np.float64)
+        uv = _array(primitive["attributes"]["TEXCOORD_0"], document, data) * np.array([1, -1], dtype=np.float32)
+        faces = _array(primitive["indices"], document, data).astype(np.int32).reshape(-1, 3)
+        if len(faces) and int(faces.max()) >= len(v):
+            raise ValueError("face beyond the vertices")
+        parts.append(Part(v, faces, uv.astype(np.float32), materials[primitive["material"]]))
+    extras = node["extras"]
+    return Instance(node["name"], extras["category"], extras["variant"], dict(extras["attributes"]), tuple(parts))
+
+
+def _array(accessor: int, document: dict[str, Any], data: memoryview) -> NDArray[Any]:
+    entry = document["accessors"][accessor]
+    width, dtype = _WIDTHS[entry["type"]], _DTYPES[entry["componentType"]]
+    raw = _view_bytes(entry["bufferView"], document, data)
+    flat = np.frombuffer(raw, dtype=dtype, count=entry["count"] * width)
+    return flat.reshape(-1, width) if width > 1 else flat
+
+
+def _view_bytes(view: int, document: dict[str, Any], data: memoryview) -> memoryview:
+    entry = document["bufferViews"][view]
+    start, size = entry["byteOffset"], entry["byteLength"]
+    if start + size > len(data):
+        raise ValueError("buffer view beyond the data")
+    return data[start : start + size]
+
+
+def _linear(channel: int) -> float:
+    """Turn an sRGB channel, 0-255, into the linear factor that glTF wants, 0-1."""
+    c = channel / 255.0
+    return round(c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4, 6)

@@ -1,0 +1,114 @@
+"""Named surfaces: `scene_assets/materials.toml` and colours, resolved to `Material`s."""
+
+from __future__ import annotations
+
+import difflib
+import re
+import tomllib
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+from aerialdojo_gen.errors import AssetError
+from aerialdojo_gen.scenes.model import Material
+from aerialdojo_gen.scenes.textures import TEXTURES, make_texture
+
+_COLOUR = re.compile(r"#[0-9a-fA-F]{6}")
+_KEYS = {"texture", "colour", "tile_m"}
+
+
+class MaterialLibrary:
+    """The surfaces of `materials.toml`, made when first asked for.
+
+    A material's specification is a name (``"brick"``), a name with a colour (``"brick:#8a4b3c"``) or a bare colour
+    (``"#8a4b3c"``).
+    """
+
+    def __init__(self, entries: dict[str, tuple[str | None, str, float]], source: str) -> None:
+        self._entries = entries
+        self._source = source
+        self._made: dict[str, Material] = {}
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of all surfaces, sorted."""
+        return tuple(sorted(self._entries))
+
+    def check(self, spec: str, where: str) -> None:
+        """Raise an `AssetError` that begins with `where` if `spec` names no material."""
+        name, _, colour = spec.partition(":")
+        if _COLOUR.fullmatch(spec) or (name in self._entries and (not colour or _COLOUR.fullmatch(colour))):
+            return
+        if name in self._entries or name.startswith("#"):
+            raise AssetError(f"{where}: colour of material {spec!r} is not of the form #rrggbb")
+        raise AssetError(f"{where}: unknown material {name!r}{nearest(name, self._entries)} (see {self._source})")
+
+    def __getitem__(self, spec: str) -> Material:
+        """Make or look up the material of a specification; its name is the specification."""
+        if spec not in self._made:
+            self.check(spec, "material")
+            name, _, colour = spec.partition(":")
+            texture, default, tile_m = self._entries.get(name, (None, spec, 1.0))
+            rgb = parse_colour(colour or default)
+            image = None if texture is None else make_texture(texture, rgb)
+            mean = rgb if image is None else tuple(int(c) for c in image.reshape(-1, 3).mean(axis=0).round())
+            self._made[spec] = Material(spec, (mean[0], mean[1], mean[2]), image, tile_m)
+        return self._made[spec]
+
+    def tile_m(self, spec: str) -> float:
+        """Edge of a texture tile of a material, metres; 1 for a flat colour."""
+        return self[spec].tile_m
+
+
+def load_materials(path: Path) -> MaterialLibrary:
+    """Read `materials.toml`.
+
+    Raises
+    ------
+    AssetError
+        Names the file, the material and the key at fault.
+    """
+    entries = {}
+    for name, body in read_toml(path).items():
+        where = f"{path}: material {name!r}"
+        if not isinstance(body, dict):
+            raise AssetError(f"{where} is no table")
+        refuse_unknown(body, _KEYS, where)
+        texture, colour, tile_m = body.get("texture"), body.get("colour"), body.get("tile_m", 1.0)
+        if texture is not None and texture not in TEXTURES:
+            raise AssetError(f"{where}: unknown texture {texture!r}{nearest(str(texture), TEXTURES)}")
+        if not isinstance(colour, str) or not _COLOUR.fullmatch(colour):
+            raise AssetError(f"{where}: colour must be of the form #rrggbb, got {colour!r}")
+        if not isinstance(tile_m, int | float) or tile_m <= 0:
+            raise AssetError(f"{where}: tile_m must be a positive number of metres, got {tile_m!r}")
+        entries[name] = (texture, colour, float(tile_m))
+    return MaterialLibrary(entries, path.name)
+
+
+def parse_colour(text: str) -> tuple[int, int, int]:
+    """Read ``"#rrggbb"`` as sRGB, 0-255."""
+    return int(text[1:3], 16), int(text[3:5], 16), int(text[5:7], 16)
+
+
+def nearest(name: str, known: Iterable[str]) -> str:
+    """Say what was probably meant: ``", did you mean 'box'?"``, or nothing."""
+    close = difflib.get_close_matches(name, list(known), n=1)
+    return f", did you mean {close[0]!r}?" if close else ""
+
+
+def refuse_unknown(body: Iterable[str], known: Iterable[str], where: str) -> None:
+    """Raise an `AssetError` for the first key that is not among the known ones."""
+    names = set(known)
+    for key in body:
+        if key not in names:
+            raise AssetError(f"{where}: unknown key {key!r}{nearest(key, names)}")
+
+
+def read_toml(path: Path) -> dict[str, Any]:
+    """Read a TOML file; an `AssetError` names it and the line that cannot be read."""
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise AssetError(f"{path}: cannot be read ({error.strerror})") from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise AssetError(f"{path}: {error}") from error

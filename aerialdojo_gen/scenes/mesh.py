@@ -1,0 +1,180 @@
+"""Triangle meshes of the shape vocabulary, and how they become textured parts.
+
+A mesh lives in its prop's own frame (x front, y left, z up, metres) until it is placed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from aerialdojo_gen.scenes.model import Part
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int32]
+
+# A triangle below this area (m²) is a sliver that no renderer shows and whose normal is noise.
+_MIN_AREA_M2 = 1e-9
+# Faces flatter than this (cosine of the slope) take their texture straight from above, so that a
+# gently rolling surface shows no jump of the pattern between its triangles.
+_FLAT_COSINE = 0.96
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """Triangles, and where the shape knows better than a projection, their texture coordinates.
+
+    Attributes
+    ----------
+    vertices : (n, 3) float64
+        Metres.
+    faces : (m, 3) int32
+        Indices into `vertices`, counter-clockwise seen from outside.
+    corner_uv : (m, 3, 2) float64 or None
+        Texture coordinates of every face's corners in metres; NaN for faces that are to be projected.
+    """
+
+    vertices: Floats
+    faces: Ints
+    corner_uv: Floats | None = None
+
+    @property
+    def volume_m3(self) -> float:
+        """Signed volume: positive for a closed mesh whose faces are wound outwards."""
+        a, b, c = (self.vertices[self.faces[:, k]] for k in range(3))
+        return float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6.0)
+
+
+def mesh(vertices: ArrayLike, faces: ArrayLike, corner_uv: Floats | None = None) -> Mesh:
+    """Make a mesh of array-likes; faces of fewer than three distinct vertices or of no area are dropped."""
+    v = np.asarray(vertices, dtype=np.float64).reshape(-1, 3)
+    f = np.asarray(faces, dtype=np.int32).reshape(-1, 3)
+    keep = _areas(v, f) > _MIN_AREA_M2
+    if keep.all():
+        return Mesh(v, f, corner_uv)
+    return Mesh(v, f[keep], None if corner_uv is None else corner_uv[keep])
+
+
+def outward(m: Mesh) -> Mesh:
+    """Turn the faces of a closed mesh outwards, whichever way they were wound."""
+    return flipped(m) if m.volume_m3 < 0 else m
+
+
+def flipped(m: Mesh) -> Mesh:
+    """Reverse the winding of every face."""
+    return Mesh(m.vertices, m.faces[:, ::-1].copy(), None if m.corner_uv is None else m.corner_uv[:, ::-1].copy())
+
+
+def merge(meshes: Sequence[Mesh]) -> Mesh:
+    """Put meshes together without welding them."""
+    if len(meshes) == 1:
+        return meshes[0]
+    offsets = np.cumsum([0, *(len(m.vertices) for m in meshes[:-1])])
+    uv = None
+    if any(m.corner_uv is not None for m in meshes):
+        uv = np.concatenate([_uv_or_nan(m) for m in meshes])
+    return Mesh(
+        np.concatenate([m.vertices for m in meshes]),
+        np.concatenate([m.faces + np.int32(o) for m, o in zip(meshes, offsets, strict=True)]),
+        uv,
+    )
+
+
+def translated(m: Mesh, offset: ArrayLike) -> Mesh:
+    """Move a mesh by (x, y, z) metres."""
+    return replace(m, vertices=m.vertices + np.asarray(offset, dtype=np.float64))
+
+
+def rotation(x_deg: float, y_deg: float, z_deg: float) -> Floats:
+    """Make the (3, 3) matrix that turns about x, then y, then z by right-handed angles in degrees."""
+    out = np.eye(3)
+    for axis, angle in enumerate((x_deg, y_deg, z_deg)):
+        if angle:
+            out = _axis_rotation(axis, angle) @ out
+    return out
+
+
+def rotated(m: Mesh, matrix: Floats) -> Mesh:
+    """Apply a rotation matrix (3, 3)."""
+    return replace(m, vertices=m.vertices @ matrix.T)
+
+
+def mirrored(m: Mesh, axis: int) -> Mesh:
+    """Mirror in the plane where coordinate `axis` is 0, with faces wound outwards again."""
+    v = m.vertices.copy()
+    v[:, axis] *= -1.0
+    return flipped(replace(m, vertices=v))
+
+
+def to_part(m: Mesh, material: str, tile_m: float) -> Part:
+    """Give a mesh its material and texture coordinates.
+
+    Parameters
+    ----------
+    m : Mesh
+        In the prop's own frame: the pattern is laid out in that frame.
+    material : str
+        Name of the material.
+    tile_m : float
+        Edge of a texture tile, metres.
+
+    Returns
+    -------
+    Part
+        Vertices are split where the texture coordinates jump. Each face is projected along its own normal:
+        u runs along the face's horizontal, v up its slope, so that patterns are level and undistorted.
+    """
+    uv_m = _projected_uv(m)
+    if m.corner_uv is not None:
+        given = ~np.isnan(m.corner_uv)
+        uv_m = np.where(given, m.corner_uv, uv_m)
+    corners = m.faces.reshape(-1)
+    uv = (uv_m.reshape(-1, 2) / tile_m).astype(np.float32)
+    key = np.column_stack([corners.astype(np.int64), np.rint(uv * 4096.0).astype(np.int64)])
+    order = np.lexsort(key.T[::-1])
+    new = np.empty(len(key), dtype=bool)
+    new[:1] = True
+    new[1:] = np.any(key[order[1:]] != key[order[:-1]], axis=1)
+    index = np.empty(len(key), dtype=np.int32)
+    index[order] = np.cumsum(new) - 1
+    first = order[new]
+    return Part(m.vertices[corners[first]], index.reshape(-1, 3), uv[first], material)
+
+
+def _uv_or_nan(m: Mesh) -> Floats:
+    return np.full((len(m.faces), 3, 2), np.nan) if m.corner_uv is None else m.corner_uv
+
+
+def _areas(v: Floats, f: Ints) -> Floats:
+    a, b, c = (v[f[:, k]] for k in range(3))
+    return np.asarray(np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2.0)
+
+
+def _projected_uv(m: Mesh) -> Floats:
+    corners = m.vertices[m.faces]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
+    flat = np.abs(normals[:, 2]) > _FLAT_COSINE
+    along = np.column_stack([-normals[:, 1], normals[:, 0], np.zeros(len(normals))])
+    along /= np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-12)
+    along[flat] = (1.0, 0.0, 0.0)
+    up = np.cross(normals, along)
+    up[flat] = (0.0, 1.0, 0.0)
+    return np.stack([np.einsum("fkj,fj->fk", corners, along), np.einsum("fkj,fj->fk", corners, up)], axis=2)
+
+
+def _axis_rotation(axis: int, angle_deg: float) -> Floats:
+    # Quarter turns are exact, so that what is meant to stand flush stands flush.
+    quarter = round(angle_deg / 90.0)
+    if angle_deg == quarter * 90.0:
+        c, s = ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))[quarter % 4]
+    else:
+        c, s = float(np.cos(np.radians(angle_deg))), float(np.sin(np.radians(angle_deg)))
+    i, j = ((1, 2), (2, 0), (0, 1))[axis]
+    out = np.eye(3)
+    out[i, i] = out[j, j] = c
+    out[i, j], out[j, i] = -s, s
+    return out

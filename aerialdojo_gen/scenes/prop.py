@@ -1,0 +1,220 @@
+"""Categories of the catalogue as data: read from TOML tables and checked to the last key."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from aerialdojo_gen.errors import AssetError
+from aerialdojo_gen.scenes.builders import builders
+from aerialdojo_gen.scenes.materials import MaterialLibrary, nearest, refuse_unknown
+from aerialdojo_gen.scenes.vocabulary import ARRAY_KEYS, PLACEMENT_KEYS, RING_KEYS, SHAPES, names_used, shape_keys
+
+KINDS = ("prop", "vegetation", "vehicle", "building", "landmark")
+Range = tuple[float, float]
+_CATEGORY_KEYS = ("name", "kind", "params", "roles", "parts", "builder", "variants", "looks")
+_VARIANT_KEYS = ("name", "attributes", "roles", "params", "without", "weight")
+_MIRRORS = ("x", "y", "xy")
+
+
+@dataclass(frozen=True)
+class Variant:
+    """A named look of a category: what differs from the default."""
+
+    name: str
+    attributes: Mapping[str, str]
+    roles: Mapping[str, str]
+    params: Mapping[str, Range]
+    without: frozenset[str]
+    weight: float
+
+
+@dataclass(frozen=True)
+class Category:
+    """A kind of thing that scenes are furnished with.
+
+    Attributes
+    ----------
+    category : str
+        Its key, e.g. ``"delivery_van"``.
+    name : str
+        What a person says, e.g. ``"delivery van"``.
+    kind : str
+        One of `KINDS`.
+    looks : tuple of str
+        Phrases that describe every variant, e.g. ``"with a sliding door"``; may be empty.
+    params : mapping of str to (low, high)
+        Sizes drawn once an instance; a fixed one has low == high.
+    roles : mapping of str to str
+        Default material of every role.
+    parts : tuple of mapping
+        Tables of the parts; empty where a builder makes them.
+    builder : str or None
+        Name of the builder.
+    variants : tuple of Variant
+        At least one; a category without variants has one of an empty name.
+    source : str
+        File and category, for messages.
+    """
+
+    category: str
+    name: str
+    kind: str
+    looks: tuple[str, ...]
+    params: Mapping[str, Range]
+    roles: Mapping[str, str]
+    parts: tuple[Mapping[str, Any], ...]
+    builder: str | None
+    variants: tuple[Variant, ...]
+    source: str
+
+    def variant(self, name: str) -> Variant:
+        """Look a variant up; an `AssetError` names the nearest one."""
+        for v in self.variants:
+            if v.name == name:
+                return v
+        known = [v.name for v in self.variants]
+        raise AssetError(f"{self.source}: unknown variant {name!r}{nearest(name, known)}")
+
+
+def parse_category(path: Path, category: str, body: Any, materials: MaterialLibrary) -> Category:
+    """Check one category's table.
+
+    Raises
+    ------
+    AssetError
+        Names file, category, part or variant, and key, with the nearest known name.
+    """
+    where = f"{path}: [{category}]"
+    if not isinstance(body, dict):
+        raise AssetError(f"{where} is no table")
+    if not category.isidentifier() or category != category.lower():
+        raise AssetError(f"{where}: a category is named in snake_case")
+    refuse_unknown(body, _CATEGORY_KEYS, where)
+    name, kind = body.get("name"), body.get("kind", "prop")
+    if not isinstance(name, str) or not name.strip():
+        raise AssetError(f"{where}: name is missing: what a person calls it")
+    if kind not in KINDS:
+        raise AssetError(f"{where}: unknown kind {kind!r}{nearest(str(kind), KINDS)} (one of {', '.join(KINDS)})")
+    looks = body.get("looks", [])
+    if not isinstance(looks, list) or not all(isinstance(x, str) for x in looks):
+        raise AssetError(f"{where}: looks must be a list of phrases")
+    params = _params(body.get("params", {}), f"{where} params")
+    roles = _roles(body.get("roles", {}), None, materials, f"{where} roles")
+    builder, parts = body.get("builder"), body.get("parts", [])
+    if (builder is None) == (not parts):
+        raise AssetError(f"{where}: give parts or a builder, one of them")
+    if builder is not None and builder not in builders():
+        raise AssetError(f"{where}: unknown builder {builder!r}{nearest(str(builder), builders())}")
+    if not isinstance(parts, list):
+        raise AssetError(f"{where}: parts must be an array of tables, [[{category}.parts]]")
+    for k, part in enumerate(parts):
+        _check_part(part, params, roles, materials, f"{where} parts[{k}]")
+    tags = {p["tag"] for p in parts if "tag" in p}
+    raw = body.get("variants", [])
+    if not isinstance(raw, list):
+        raise AssetError(f"{where}: variants must be an array of tables, [[{category}.variants]]")
+    variants: list[Variant] = []
+    for k, v in enumerate(raw):
+        variants.append(_variant(v, params, roles, tags, materials, f"{where} variants[{k}]"))
+        if variants[-1].name in {x.name for x in variants[:-1]}:
+            raise AssetError(f"{where} variants[{k}]: variant {variants[-1].name!r} stands twice")
+    if not variants:
+        variants.append(Variant("", {}, {}, {}, frozenset(), 1.0))
+    return Category(category, name, kind, tuple(looks), params, roles, tuple(parts), builder, tuple(variants), where)
+
+
+def _check_part(
+    part: Any, params: Mapping[str, Range], roles: Mapping[str, str], materials: MaterialLibrary, where: str
+) -> None:
+    if not isinstance(part, dict) or "shape" not in part:
+        raise AssetError(f"{where}: shape is missing")
+    shape = part["shape"]
+    if shape not in SHAPES:
+        raise AssetError(f"{where}: unknown shape {shape!r}{nearest(str(shape), SHAPES)}")
+    where = f"{where} ({shape})"
+    required, known = shape_keys(shape)
+    refuse_unknown(part, PLACEMENT_KEYS | known, where)
+    for key in sorted(required - part.keys()):
+        raise AssetError(f"{where}: key {key!r} is missing")
+    for key, inner in (("array", ARRAY_KEYS), ("ring", RING_KEYS)):
+        if key in part:
+            if not isinstance(part[key], dict) or "count" not in part[key]:
+                raise AssetError(f"{where}: {key} must be a table with a count")
+            refuse_unknown(part[key], inner, f"{where} {key}")
+    if part.get("ring", {}).get("axis", "z") not in ("x", "y", "z"):
+        raise AssetError(f"{where} ring: axis must be x, y or z")
+    if part.get("mirror", "x") not in _MIRRORS:
+        raise AssetError(f"{where}: mirror must be x, y or xy, got {part['mirror']!r}")
+    role = part.get("role")
+    if not isinstance(role, str):
+        raise AssetError(f"{where}: role is missing: a role of the category or a material")
+    if role not in roles:
+        _check_material(role, roles, materials, where)
+    try:
+        unknown = sorted(names_used(part) - params.keys())
+    except ValueError as error:
+        raise AssetError(f"{where}: {error}") from error
+    if unknown:
+        raise AssetError(f"{where}: unknown parameter {unknown[0]!r}{nearest(unknown[0], params)}")
+
+
+def _variant(
+    body: Any,
+    params: Mapping[str, Range],
+    roles: Mapping[str, str],
+    tags: set[str],
+    materials: MaterialLibrary,
+    where: str,
+) -> Variant:
+    if not isinstance(body, dict) or not isinstance(body.get("name"), str) or not body["name"]:
+        raise AssetError(f"{where}: name is missing")
+    where = f"{where} ({body['name']})"
+    refuse_unknown(body, _VARIANT_KEYS, where)
+    attributes = body.get("attributes", {})
+    if not isinstance(attributes, dict) or not all(isinstance(v, str) for v in attributes.values()):
+        raise AssetError(f"{where}: attributes must be words")
+    own_params = _params(body.get("params", {}), f"{where} params")
+    refuse_unknown(own_params, params, f"{where} params")
+    without = body.get("without", [])
+    for tag in without:
+        if tag not in tags:
+            raise AssetError(f"{where}: without names the unknown tag {tag!r}{nearest(str(tag), tags)}")
+    weight = body.get("weight", 1)
+    if not isinstance(weight, int | float) or weight <= 0:
+        raise AssetError(f"{where}: weight must be a positive number, got {weight!r}")
+    own_roles = _roles(body.get("roles", {}), roles, materials, f"{where} roles")
+    return Variant(body["name"], attributes, own_roles, own_params, frozenset(without), float(weight))
+
+
+def _params(body: Any, where: str) -> dict[str, Range]:
+    if not isinstance(body, dict):
+        raise AssetError(f"{where} is no table")
+    out = {}
+    for key, value in body.items():
+        ends = value if isinstance(value, list) else [value, value]
+        if len(ends) != 2 or not all(isinstance(v, int | float) for v in ends) or ends[0] > ends[1]:
+            raise AssetError(f"{where}: {key} must be a number or [low, high], got {value!r}")
+        out[key] = (float(ends[0]), float(ends[1]))
+    return out
+
+
+def _roles(body: Any, known: Mapping[str, str] | None, materials: MaterialLibrary, where: str) -> dict[str, str]:
+    if not isinstance(body, dict):
+        raise AssetError(f"{where} is no table")
+    if known is not None:
+        refuse_unknown(body, known, where)
+    for role, spec in body.items():
+        if not isinstance(spec, str):
+            raise AssetError(f"{where}: {role} must be a material, got {spec!r}")
+        _check_material(spec, (), materials, f"{where} {role}")
+    return dict(body)
+
+
+def _check_material(spec: str, roles: Mapping[str, str] | tuple[()], materials: MaterialLibrary, where: str) -> None:
+    near = nearest(spec, roles)
+    if near and spec.partition(":")[0] not in materials.names and not spec.startswith("#"):
+        raise AssetError(f"{where}: unknown role {spec!r}{near}")
+    materials.check(spec, where)

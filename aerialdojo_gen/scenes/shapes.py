@@ -1,0 +1,213 @@
+"""Solids of the prop vocabulary: boxes, turned bodies and rough ellipsoids.
+
+Every function returns a `Mesh` with outward faces in the prop's own frame; lengths are metres, and the base centre is
+what scene_assets/README.md says of the shape. A `ValueError` names a size that makes no body.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import lru_cache
+
+import numpy as np
+import trimesh
+
+from aerialdojo_gen.rng import generator
+from aerialdojo_gen.scenes.mesh import Floats, Ints, Mesh, mesh, outward
+
+Numbers = Sequence[float]
+
+_BOX_FACES = (
+    (0, 3, 2), (0, 2, 1), (4, 5, 6), (4, 6, 7), (0, 1, 5), (0, 5, 4),
+    (1, 2, 6), (1, 6, 5), (2, 3, 7), (2, 7, 6), (3, 0, 4), (3, 4, 7),
+)  # fmt: skip
+
+
+def box(*, size: Numbers, taper: Numbers = (1.0, 1.0)) -> Mesh:
+    """Make a box on its bottom face; `taper` is the top's size along x and y as a fraction of the bottom's."""
+    x, y, z = _positive("size", size, 3)
+    fx, fy = _numbers("taper", taper, 2)
+    square = np.array([(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)]) * (x, y)
+    bottom = np.column_stack([square, np.zeros(4)])
+    top = np.column_stack([square * (fx, fy), np.full(4, z)])
+    return mesh(np.concatenate([bottom, top]), _BOX_FACES)
+
+
+def sheet(*, size: Numbers) -> Mesh:
+    """Make a horizontal rectangle, 2 cm thick, so that it shows and collides from both sides."""
+    x, y = _positive("size", size, 2)
+    return box(size=(x, y, 0.02))
+
+
+def cylinder(*, radius: float, height: float, radius_top: float | None = None, segments: float = 12) -> Mesh:
+    """Make an upright cylinder, or a frustum where `radius_top` differs from `radius`."""
+    _positive("radius, height", (radius, height), 2)
+    top = radius if radius_top is None else radius_top
+    return lathe(points=((radius, 0.0), (top, height)), segments=segments)
+
+
+def cone(*, radius: float, height: float, segments: float = 12) -> Mesh:
+    """Make an upright cone."""
+    _positive("radius, height", (radius, height), 2)
+    return lathe(points=((radius, 0.0), (0.0, height)), segments=segments)
+
+
+def sphere(
+    *, radius: float | None = None, radii: Numbers | None = None, subdivisions: float = 1, half: bool = False
+) -> Mesh:
+    """Make an ellipsoid about its centre; `half` keeps the upper half, closed by a flat bottom."""
+    x, y, z = _radii(radius, radii)
+    level = int(subdivisions)
+    if half:
+        angles = np.linspace(0.0, np.pi / 2, 3 + level)
+        body = lathe(points=tuple((float(np.cos(a)), float(np.sin(a))) for a in angles), segments=8 + 4 * level)
+        return mesh(body.vertices * (x, y, z), body.faces)
+    vertices, faces = _icosphere(level)
+    return Mesh(vertices * (x, y, z), faces)
+
+
+def capsule(*, radius: float, height: float, segments: float = 8) -> Mesh:
+    """Make an upright capsule; the straight part runs from z = 0 to `height`."""
+    _positive("radius", (radius,), 1)
+    angles = np.linspace(0.0, np.pi / 2, 3)
+    lower = [(radius * float(np.sin(a)), -radius * float(np.cos(a))) for a in angles]
+    upper = [(radius * float(np.cos(a)), height + radius * float(np.sin(a))) for a in angles]
+    return lathe(points=(*lower, *upper), segments=segments)
+
+
+def torus(*, radius: float, tube: float, segments: float = 16, sides: float = 6) -> Mesh:
+    """Make a ring about the z axis; `radius` is that of the tube's middle line, `tube` that of the tube."""
+    _positive("radius, tube", (radius, tube), 2)
+    angles = np.arange(int(sides)) * 2 * np.pi / int(sides)
+    ring = [(radius + tube * float(np.cos(a)), tube * float(np.sin(a))) for a in angles]
+    return lathe(points=(*ring, ring[0]), segments=segments)
+
+
+def lathe(*, points: Sequence[Numbers], segments: float = 12) -> Mesh:
+    """Turn a profile about z.
+
+    Parameters
+    ----------
+    points : sequence of (radius, z)
+        The profile, metres. Ends off the axis are closed by flat discs, unless the last point repeats the first:
+        then the profile is a closed ring.
+    segments : float
+        Corners of the turned polygon, at least 3.
+
+    Returns
+    -------
+    Mesh
+        Watertight. Textures wrap around (u) and run along the profile (v).
+    """
+    profile = np.array([_numbers("points", p, 2) for p in points])
+    profile[np.abs(profile[:, 0]) < 1e-9, 0] = 0.0
+    n = int(segments)
+    if len(profile) < 2 or n < 3 or (profile[:, 0] < 0).any() or not (profile[:, 0] > 0).any():
+        raise ValueError("a lathe needs two or more points of radius >= 0, one of them > 0, and 3 or more segments")
+    profile = profile[np.concatenate([[True], np.any(np.diff(profile, axis=0) != 0.0, axis=1)])]
+    closed = len(profile) > 3 and bool(np.all(profile[0] == profile[-1]))
+    rows = profile[:-1] if closed else profile
+    vertices, rings = _ring_vertices(rows, n)
+    length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(profile, axis=0), axis=1))])
+    around = 2 * np.pi * float(rows[:, 0].max()) / n
+    faces: list[tuple[int, int, int]] = []
+    uvs: list[tuple[tuple[float, float], ...]] = []
+    for r in range(len(profile) - 1):
+        low, high = rings[r], rings[(r + 1) % len(rows)]
+        v0, v1 = float(length[r]), float(length[r + 1])
+        for k in range(n):
+            a, b = low[k], low[(k + 1) % n]
+            c, d = high[(k + 1) % n], high[k]
+            u0, u1 = k * around, (k + 1) * around
+            if a != b:
+                faces.append((a, b, c))
+                uvs.append(((u0, v0), (u1, v0), (u1, v1)))
+            if c != d:
+                faces.append((a, c, d))
+                uvs.append(((u0, v0), (u1, v1), (u0, v1)))
+    nan = ((np.nan, np.nan),) * 3
+    if not closed:
+        for ring, down in ((rings[0], True), (rings[-1], False)):
+            if ring[0] != ring[1]:
+                fan = [(ring[0], ring[k], ring[k + 1]) for k in range(1, n - 1)]
+                faces += [(a, c, b) for a, b, c in fan] if down else fan
+                uvs += [nan] * len(fan)
+    return outward(mesh(vertices, faces, np.array(uvs)))
+
+
+def crown(
+    *,
+    radii: Numbers | None = None,
+    radius: float | None = None,
+    noise: float = 0.2,
+    subdivisions: float = 2,
+    seed: float = 0,
+) -> Mesh:
+    """Make a rough ellipsoid about its centre, for foliage, rocks and rubble.
+
+    Parameters
+    ----------
+    radii, radius : sequence of float or float
+        Half extents before the noise, metres.
+    noise : float
+        How far a point may lie from the ellipsoid, as a fraction of the radius, 0 to 0.6.
+    subdivisions : float
+        Of the icosahedron: 0, 1, 2, 3 make 20, 80, 320, 1280 triangles.
+    seed : float
+        Which of the random shapes; a whole number.
+    """
+    scale = _radii(radius, radii)
+    if not 0.0 <= noise <= 0.6:
+        raise ValueError(f"noise {noise:g} is outside 0 to 0.6")
+    vertices, faces = _icosphere(int(subdivisions))
+    rng = generator(int(seed), "shape-crown")
+    waves = rng.normal(size=(10, 3)) * np.repeat([2.0, 4.0], 5)[:, None]
+    phases = rng.uniform(0, 2 * np.pi, size=10)
+    weights = np.repeat([1.0, 0.6], 5)
+    lumps = (np.cos(vertices @ waves.T + phases) * weights).sum(axis=1) / weights.sum() * 1.6
+    rough = rng.uniform(-0.5, 0.5, size=len(vertices))
+    factor = 1.0 + noise * np.clip(lumps + rough, -1.0, 1.0)
+    return mesh(vertices * factor[:, None] * scale, faces)
+
+
+def _ring_vertices(rows: Floats, n: int) -> tuple[Floats, list[list[int]]]:
+    # Half a step of turn lets a square (4 segments) stand with its sides along x and y.
+    angles = (np.arange(n) + 0.5) * 2 * np.pi / n
+    vertices: list[tuple[float, float, float]] = []
+    rings: list[list[int]] = []
+    for r, z in rows:
+        start = len(vertices)
+        if r == 0.0:
+            vertices.append((0.0, 0.0, float(z)))
+            rings.append([start] * n)
+        else:
+            vertices += [(float(r * np.cos(a)), float(r * np.sin(a)), float(z)) for a in angles]
+            rings.append(list(range(start, start + n)))
+    return np.array(vertices), rings
+
+
+@lru_cache(maxsize=8)
+def _icosphere(subdivisions: int) -> tuple[Floats, Ints]:
+    if not 0 <= subdivisions <= 4:
+        raise ValueError(f"subdivisions {subdivisions} is outside 0 to 4")
+    ball = trimesh.creation.icosphere(subdivisions=subdivisions)
+    return np.asarray(ball.vertices, dtype=np.float64), np.asarray(ball.faces, dtype=np.int32)
+
+
+def _radii(radius: float | None, radii: Numbers | None) -> tuple[float, ...]:
+    if (radius is None) == (radii is None):
+        raise ValueError("give radius or radii, one of them")
+    return _positive("radii", (radius,) * 3 if radius is not None else radii or (), 3)
+
+
+def _numbers(key: str, values: Numbers, count: int) -> tuple[float, ...]:
+    if isinstance(values, int | float) or len(values) != count:
+        raise ValueError(f"{key} needs {count} numbers")
+    return tuple(float(v) for v in values)
+
+
+def _positive(key: str, values: Numbers, count: int) -> tuple[float, ...]:
+    numbers = _numbers(key, values, count)
+    if min(numbers) <= 0.0:
+        raise ValueError(f"{key} must be positive, got {', '.join(f'{n:g}' for n in numbers)}")
+    return numbers

@@ -1,0 +1,219 @@
+"""Extruded and swept shapes of the prop vocabulary: prisms, polygons, side views, sweeps.
+
+Conventions as in `aerialdojo_gen.scenes.shapes`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import mapbox_earcut
+import numpy as np
+from shapely.geometry import Polygon
+from shapely.geometry.polygon import orient
+
+from aerialdojo_gen.scenes.mesh import Floats, Ints, Mesh, mesh, outward
+from aerialdojo_gen.scenes.shapes import Numbers, _numbers, _positive
+
+_SECTIONS = ("gable", "wedge", "trapezoid")
+
+
+def prism(*, size: Numbers, section: str = "gable", top: float = 0.5) -> Mesh:
+    """Make a prism that runs along x.
+
+    Parameters
+    ----------
+    size : sequence of float
+        Extent along x, y and z, metres.
+    section : str
+        ``"gable"`` (ridge in the middle), ``"wedge"`` (rises towards +y) or ``"trapezoid"``.
+    top : float
+        Width of the trapezoid's top as a fraction of its bottom.
+    """
+    x, y, z = _positive("size", size, 3)
+    if section not in _SECTIONS:
+        raise ValueError(f"section {section!r} is none of {', '.join(_SECTIONS)}")
+    w = y / 2
+    outline = {
+        "gable": [(-w, 0.0), (w, 0.0), (0.0, z)],
+        "wedge": [(-w, 0.0), (w, 0.0), (w, z)],
+        "trapezoid": [(-w, 0.0), (w, 0.0), (w * top, z), (-w * top, z)],
+    }[section]
+    body = extrude(Polygon(outline), x)
+    return Mesh(body.vertices[:, [2, 0, 1]] - (x / 2, 0.0, 0.0), body.faces)
+
+
+def polygon(*, points: Sequence[Numbers], height: float, holes: Sequence[Sequence[Numbers]] = ()) -> Mesh:
+    """Extrude a plan upwards from z = 0; `points` are (x, y), metres, in either sense of rotation."""
+    _positive("height", (height,), 1)
+    outline = [_numbers("points", p, 2) for p in points]
+    inner = [[_numbers("holes", p, 2) for p in hole] for hole in holes]
+    return extrude(_checked(Polygon(outline, inner) if len(outline) > 2 else None), height)
+
+
+def profile(*, points: Sequence[Numbers], width: float) -> Mesh:
+    """Extrude a side view along y, centred on y = 0; `points` are (x, z), metres."""
+    _positive("width", (width,), 1)
+    outline = [_numbers("points", p, 2) for p in points]
+    body = extrude(_checked(Polygon(outline) if len(outline) > 2 else None), width)
+    a, b, c = body.vertices.T
+    return Mesh(np.column_stack([a, width / 2 - c, b]), body.faces)
+
+
+def sweep(
+    *,
+    path: Sequence[Numbers],
+    radius: float | None = None,
+    section: Numbers | None = None,
+    closed: bool = False,
+    sides: float = 6,
+) -> Mesh:
+    """Sweep a round or rectangular section along a path.
+
+    Parameters
+    ----------
+    path : sequence of (x, y, z)
+        Middle line, metres.
+    radius : float, optional
+        Of a round section with `sides` corners.
+    section : (width, height), optional
+        Of a rectangular section; height is measured up (across the path where it climbs straight up).
+    closed : bool
+        Join the last point to the first.
+
+    Returns
+    -------
+    Mesh
+        Watertight, mitred at the path's corners; textures run along the path.
+    """
+    line = np.array([_numbers("path", p, 3) for p in path])
+    line = line[np.concatenate([[True], np.linalg.norm(np.diff(line, axis=0), axis=1) > 1e-9])]
+    if len(line) < (3 if closed else 2):
+        raise ValueError("a sweep needs a path of two distinct points, three where it is closed")
+    if (radius is None) == (section is None):
+        raise ValueError("give radius or section, one of them")
+    if section is not None:
+        w, h = _positive("section", section, 2)
+        ring = np.array([(-w, -h), (w, -h), (w, h), (-w, h)]) / 2
+    else:
+        _positive("radius", (radius or 0.0,), 1)
+        angles = (np.arange(int(sides)) + 0.5) * 2 * np.pi / int(sides)
+        ring = np.column_stack([np.cos(angles), np.sin(angles)]) * radius
+    rings = _swept_rings(line, ring, closed)
+    return _skin(rings, closed)
+
+
+def extrude(plan: Polygon, height: float) -> Mesh:
+    """Extrude a shapely polygon from z = 0 to `height` metres; wall textures run on around the corners."""
+    plan = _without_straight_corners(orient(plan))
+    flat, top = triangulate(plan)
+    n = len(flat)
+    vertices = np.concatenate([np.column_stack([flat, np.zeros(n)]), np.column_stack([flat, np.full(n, height)])])
+    faces = [top[:, ::-1], top + n]
+    uvs = [np.full((2 * len(top), 3, 2), np.nan)]
+    start = 0
+    for ring in (plan.exterior, *plan.interiors):
+        count = len(ring.coords) - 1
+        a = start + np.arange(count)
+        b = start + (np.arange(count) + 1) % count
+        lengths = np.linalg.norm(flat[b] - flat[a], axis=1)
+        u1 = np.cumsum(lengths)
+        u0 = u1 - lengths
+        faces += [np.column_stack([a, b, b + n]), np.column_stack([a, b + n, a + n])]
+        z0, z1 = np.zeros(count), np.full(count, height)
+        uvs.append(np.stack([np.column_stack(p) for p in ((u0, z0), (u1, z0), (u1, z1))], axis=1))
+        uvs.append(np.stack([np.column_stack(p) for p in ((u0, z0), (u1, z1), (u0, z1))], axis=1))
+        start += count
+    return mesh(vertices, np.concatenate(faces), np.concatenate(uvs))
+
+
+def triangulate(plan: Polygon) -> tuple[Floats, Ints]:
+    """Triangulate a polygon with holes.
+
+    Returns
+    -------
+    vertices : (n, 2) float64
+        Exterior first, then the holes, without closing points.
+    faces : (m, 3) int32
+        Counter-clockwise seen from +z.
+    """
+    rings = [np.array(r.coords)[:-1, :2] for r in (plan.exterior, *plan.interiors)]
+    vertices = np.concatenate(rings)
+    ends = np.cumsum([len(r) for r in rings]).astype(np.uint32)
+    faces = mapbox_earcut.triangulate_float64(vertices, ends).reshape(-1, 3).astype(np.int32)
+    a, b, c = (vertices[faces[:, k]] for k in range(3))
+    turned = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0] < 0
+    faces[turned] = faces[turned][:, ::-1]
+    return vertices, faces
+
+
+def _without_straight_corners(plan: Polygon) -> Polygon:
+    # Earcut leaves such corners out of its triangles, and the walls would not meet the lids there.
+    rings = []
+    for ring in (plan.exterior, *plan.interiors):
+        xy = np.array(ring.coords)[:-1, :2]
+        a, b = xy - np.roll(xy, 1, axis=0), np.roll(xy, -1, axis=0) - xy
+        turn = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
+        rings.append(xy[np.abs(turn) > 1e-9 * (1.0 + np.linalg.norm(a, axis=1) * np.linalg.norm(b, axis=1))])
+    return Polygon(rings[0], rings[1:])
+
+
+def _checked(plan: Polygon | None) -> Polygon:
+    if plan is None or not plan.is_valid or plan.area <= 0.0:
+        raise ValueError("the outline is no simple polygon of three or more points")
+    return plan
+
+
+def _swept_rings(line: Floats, ring: Floats, closed: bool) -> Floats:
+    ahead = np.roll(line, -1, axis=0) - line
+    if not closed:
+        ahead[-1] = line[-1] - line[-2]
+    ahead /= np.linalg.norm(ahead, axis=1, keepdims=True)
+    behind = np.roll(ahead, 1, axis=0)
+    if not closed:
+        behind[0] = ahead[0]
+    rings = []
+    right = np.array([0.0, -1.0, 0.0])
+    for p, t0, t1 in zip(line, behind, ahead, strict=True):
+        middle = t0 + t1
+        if np.linalg.norm(middle) < 1e-6:
+            raise ValueError("the path turns back on itself")
+        middle /= np.linalg.norm(middle)
+        level = np.cross(middle, (0.0, 0.0, 1.0))
+        # Nearly vertical stretches have no level direction of their own: carry the last one on.
+        right = level if np.linalg.norm(level) > 0.1 else right - middle * (right @ middle)
+        right = right / np.linalg.norm(right)
+        up = np.cross(right, middle)
+        offsets = ring[:, :1] * right + ring[:, 1:] * up
+        bend = t1 - t0
+        bend = bend - middle * (bend @ middle)
+        if np.linalg.norm(bend) > 1e-9:
+            bend /= np.linalg.norm(bend)
+            stretch = min(1.0 / max(float(middle @ t1), 0.1), 2.5) - 1.0
+            offsets = offsets + stretch * (offsets @ bend)[:, None] * bend
+        rings.append(p + offsets)
+    return np.array(rings)
+
+
+def _skin(rings: Floats, closed: bool) -> Mesh:
+    rows, n = rings.shape[:2]
+    middle = rings.mean(axis=1)
+    steps = np.linalg.norm(np.roll(middle, -1, axis=0) - middle, axis=1)
+    along = np.concatenate([[0.0], np.cumsum(steps)])
+    edges = np.linalg.norm(np.roll(rings[0], -1, axis=0) - rings[0], axis=1)
+    around = np.concatenate([[0.0], np.cumsum(edges)])
+    faces, uvs = [], []
+    for r in range(rows if closed else rows - 1):
+        nxt = (r + 1) % rows
+        for k in range(n):
+            m = (k + 1) % n
+            a, b, c, d = r * n + k, r * n + m, nxt * n + m, nxt * n + k
+            u0, u1, v0, v1 = along[r], along[r + 1], around[k], around[k + 1]
+            faces += [(a, b, c), (a, c, d)]
+            uvs += [((u0, v0), (u0, v1), (u1, v1)), ((u0, v0), (u1, v1), (u1, v0))]
+    if not closed:
+        last = (rows - 1) * n
+        faces += [(0, k + 1, k) for k in range(1, n - 1)]
+        faces += [(last, last + k, last + k + 1) for k in range(1, n - 1)]
+        uvs += [((np.nan, np.nan),) * 3] * (2 * (n - 2))
+    return outward(mesh(rings.reshape(-1, 3), faces, np.array(uvs)))

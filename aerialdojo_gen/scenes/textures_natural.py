@@ -1,0 +1,193 @@
+"""Textures of ground, plants, rock, wood and water; see `aerialdojo_gen.scenes.textures`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from aerialdojo_gen.scenes.noise import Floats, cells, fractal, shade, texture_rng, value_noise
+
+Generator = Callable[[Floats], Floats]
+
+
+def grass(colour: Floats) -> Floats:
+    """Lawn: short blades in clumps, drawn for 4 m."""
+    rng = texture_rng("grass")
+    clumps, blades = fractal(256, 6, 3, rng), value_noise(256, 128, rng, 64) + value_noise(256, 64, rng, 128)
+    image = shade(colour, 1.0 + 0.07 * clumps + 0.16 * blades)
+    image[..., 0] += 9.0 * clumps
+    return image
+
+
+def meadow(colour: Floats) -> Floats:
+    """Rough grass with dry tufts and small flowers, drawn for 4 m."""
+    rng = texture_rng("meadow")
+    image = shade(colour, 1.0 + 0.12 * fractal(256, 8, 4, rng, 0.8))
+    dry = np.clip(fractal(256, 5, 3, rng) - 0.6, 0, 1)[..., None]
+    image = image * (1 - 0.5 * dry) + np.array([168.0, 154.0, 90.0]) * 0.5 * dry
+    for tint in ((235, 225, 120), (240, 240, 235)):
+        y, x = rng.integers(0, 256, size=(2, 55))
+        image[y, x] = tint
+        image[y, (x + 1) % 256] = tint
+    return image
+
+
+def dirt(colour: Floats) -> Floats:
+    """Trodden earth with small stones, drawn for 4 m."""
+    rng = texture_rng("dirt")
+    image = shade(colour, 1.0 + 0.09 * fractal(256, 5, 5, rng, 0.65))
+    return _pebbles(image, rng, 260, 0.012, 0.25)
+
+
+def gravel(colour: Floats) -> Floats:
+    """Loose stones, drawn for 2 m."""
+    rng = texture_rng("gravel")
+    first, second, owner = cells(256, 500, rng)
+    tone = rng.uniform(0.75, 1.2, size=500)[owner]
+    joint = np.clip((second - first) / 0.012, 0.35, 1.0)
+    warm = rng.uniform(-8, 8, size=500)[owner]
+    image = shade(colour, tone * joint)
+    image[..., 0] += warm
+    image[..., 2] -= warm
+    return image
+
+
+def sand(colour: Floats) -> Floats:
+    """Sand with wind ripples, drawn for 3 m."""
+    rng = texture_rng("sand")
+    warp = value_noise(256, 4, rng) * 0.35 + value_noise(256, 8, rng) * 0.15
+    y = np.arange(256)[:, None] / 256
+    ripples = np.sin(2 * np.pi * (8 * y + warp))
+    grain = rng.uniform(-1, 1, size=(256, 256))
+    return shade(colour, 1.0 + 0.05 * ripples + 0.035 * grain + 0.03 * fractal(256, 4, 3, rng))
+
+
+def snow(colour: Floats) -> Floats:
+    """Snow with soft drifts and a little glitter, drawn for 5 m."""
+    rng = texture_rng("snow")
+    drift = fractal(256, 4, 4, rng, 0.45)
+    image = shade(colour, 0.97 + 0.028 * drift + 0.01 * rng.uniform(-1, 1, size=(256, 256)))
+    image[..., 2] += 3.0 * np.clip(-drift, 0, 2)
+    return image
+
+
+def rock(colour: Floats) -> Floats:
+    """Weathered rock with cracks, drawn for 2 m."""
+    rng = texture_rng("rock")
+    base = fractal(256, 4, 6, rng, 0.62)
+    bands = value_noise(256, 3, rng, 14)
+    ridge = np.abs(fractal(256, 4, 4, rng))
+    crack = np.clip(ridge / 0.12, 0.55, 1.0)
+    return shade(colour, (1.0 + 0.14 * base + 0.06 * bands) * crack)
+
+
+def bark(colour: Floats) -> Floats:
+    """Upright ridges of bark, drawn for 1 m."""
+    rng = texture_rng("bark")
+    warp = value_noise(128, 4, rng) * 0.8 + value_noise(128, 8, rng) * 0.3
+    x = np.arange(128)[None, :] / 128
+    ridges = np.sin(2 * np.pi * (10 * x + warp)) + 0.6 * value_noise(128, 16, rng, 6)
+    breaks = value_noise(128, 12, rng, 24)
+    return shade(colour, 1.0 + 0.2 * ridges + 0.1 * breaks)
+
+
+def birch_bark(colour: Floats) -> Floats:
+    """White bark with dark level scars, drawn for 1 m."""
+    rng = texture_rng("birch_bark")
+    image = shade(colour, 1.0 + 0.05 * value_noise(128, 8, rng, 32))
+    for _ in range(34):
+        y, x, w = int(rng.integers(128)), int(rng.integers(128)), int(rng.integers(6, 30))
+        h = int(rng.integers(1, 4))
+        rows, columns = (y + np.arange(h)) % 128, (x + np.arange(w)) % 128
+        image[np.ix_(rows, columns)] *= rng.uniform(0.2, 0.45)
+    return image
+
+
+def foliage(colour: Floats) -> Floats:
+    """Leaves, lit above and dark between, drawn for 2 m."""
+    rng = texture_rng("foliage")
+    first, second, owner = cells(256, 420, rng)
+    tone = rng.uniform(0.7, 1.3, size=420)[owner]
+    edge = np.clip((second - first) / 0.02, 0.45, 1.0)
+    gaps = np.clip(1.0 + 0.25 * fractal(256, 6, 3, rng), 0.55, 1.25)
+    image = shade(colour, tone * edge * gaps)
+    image[..., 0] += rng.uniform(-14, 18, size=420)[owner]
+    return image
+
+
+def needles(colour: Floats) -> Floats:
+    """Conifer twigs: fine hanging strokes, drawn for 1.5 m."""
+    rng = texture_rng("needles")
+    strokes = value_noise(256, 128, rng, 20) + 0.7 * value_noise(256, 64, rng, 40)
+    tiers = np.sin(2 * np.pi * (5 * np.arange(256)[:, None] / 256 + 0.2 * value_noise(256, 6, rng)))
+    return shade(colour, np.clip(1.0 + 0.26 * strokes + 0.16 * tiers, 0.4, 1.6))
+
+
+def leaf_litter(colour: Floats) -> Floats:
+    """Forest floor: fallen leaves and needles on earth, drawn for 3 m."""
+    rng = texture_rng("leaf_litter")
+    first, second, owner = cells(256, 650, rng)
+    tone = rng.uniform(0.65, 1.3, size=650)[owner]
+    image = shade(colour, tone * np.clip((second - first) / 0.014, 0.5, 1.0) * (1 + 0.08 * fractal(256, 5, 3, rng)))
+    tint = rng.uniform(-1, 1, size=650)[owner]
+    image[..., 0] += 16.0 * tint
+    image[..., 1] -= 5.0 * tint
+    return image
+
+
+def moss(colour: Floats) -> Floats:
+    """Moss cushions, drawn for 2 m."""
+    rng = texture_rng("moss")
+    lumps = fractal(256, 12, 4, rng, 0.7)
+    return shade(colour, np.clip(1.0 + 0.15 * lumps, 0.5, 1.5))
+
+
+def water(colour: Floats) -> Floats:
+    """Small waves with bright crests, drawn for 6 m."""
+    rng = texture_rng("water")
+    wave = fractal(256, 5, 4, rng, 0.55)
+    crest = np.clip(1.0 - np.abs(wave) / 0.25, 0.0, 1.0)
+    foam = np.clip(fractal(256, 9, 3, rng) - 1.1, 0, 1)
+    return shade(colour, 1.0 + 0.09 * wave + 0.16 * crest) + 60.0 * (foam * crest)[..., None]
+
+
+def mud(colour: Floats) -> Floats:
+    """Wet silt with puddles, drawn for 4 m."""
+    rng = texture_rng("mud")
+    base = fractal(256, 5, 5, rng)
+    puddle = np.clip((fractal(256, 4, 3, rng) - 0.7) * 3, 0, 1)[..., None]
+    image = shade(colour, 1.0 + 0.1 * base)
+    return image * (1 - 0.6 * puddle) + np.array([128.0, 138.0, 145.0]) * 0.6 * puddle
+
+
+def rubble(colour: Floats) -> Floats:
+    """Broken masonry, drawn for 3 m."""
+    rng = texture_rng("rubble")
+    first, second, owner = cells(256, 160, rng)
+    tone = rng.uniform(0.6, 1.25, size=160)[owner]
+    image = shade(colour, tone * np.clip((second - first) / 0.02, 0.3, 1.0) * (1 + 0.06 * fractal(256, 16, 3, rng)))
+    brick = (rng.uniform(size=160) < 0.16)[owner][..., None]
+    return np.where(brick, image * np.array([1.12, 0.72, 0.6]), image)
+
+
+def thatch(colour: Floats) -> Floats:
+    """Straw or reed laid in courses, drawn for 1.5 m."""
+    rng = texture_rng("thatch")
+    straw = value_noise(128, 64, rng, 8) + value_noise(128, 32, rng, 16)
+    course = (np.arange(128)[:, None] * 4 / 128) % 1.0
+    return shade(colour, np.clip(0.78 + 0.3 * course + 0.14 * straw, 0.4, 1.5))
+
+
+def _pebbles(image: Floats, rng: np.random.Generator, count: int, radius: float, contrast: float) -> Floats:
+    first, _, owner = cells(len(image), count, rng)
+    tone = 1.0 + contrast * rng.uniform(-1, 1, size=count)[owner]
+    size = radius * rng.uniform(0.3, 1.2, size=count)[owner]
+    return np.where((first < size)[..., None], image * tone[..., None], image)
+
+
+NATURAL: dict[str, Generator] = {
+    f.__name__: f
+    for f in (grass, meadow, dirt, gravel, sand, snow, rock, bark, birch_bark, foliage, needles, leaf_litter, moss,
+              water, mud, rubble, thatch)
+}  # fmt: skip

@@ -1,0 +1,158 @@
+"""The shape vocabulary of props: which shapes there are, what keys they take, and how parts are repeated."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+
+from aerialdojo_gen.scenes import lettering, shapes, shapes_extruded
+from aerialdojo_gen.scenes.expressions import evaluate, names_in
+from aerialdojo_gen.scenes.mesh import Mesh, merge, mirrored, rotated, rotation, translated
+
+SHAPES: dict[str, Callable[..., Mesh]] = {
+    f.__name__: f
+    for f in (
+        shapes.box, shapes.cylinder, shapes.cone, shapes.sphere, shapes.capsule, shapes.torus, shapes.lathe,
+        shapes.sheet, shapes.crown, shapes_extruded.prism, shapes_extruded.polygon, shapes_extruded.profile,
+        shapes_extruded.sweep, lettering.text,
+    )
+}  # fmt: skip
+PLACEMENT_KEYS = frozenset({"shape", "role", "at", "rotate", "tag", "array", "ring", "mirror"})
+ARRAY_KEYS = frozenset({"count", "step", "count2", "step2"})
+RING_KEYS = frozenset({"count", "radius", "axis", "arc", "start"})
+_WORDS = frozenset({("prism", "section"), ("text", "text"), ("ring", "axis")})
+_AXES = {"x": 0, "y": 1, "z": 2}
+_MAX_COPIES = 2000
+
+
+def shape_keys(shape: str) -> tuple[frozenset[str], frozenset[str]]:
+    """List a shape's own keys: those it must have, and all of them."""
+    parameters = inspect.signature(SHAPES[shape]).parameters
+    required = frozenset(n for n, p in parameters.items() if p.default is inspect.Parameter.empty)
+    return required, frozenset(parameters)
+
+
+def names_used(part: Mapping[str, Any]) -> frozenset[str]:
+    """List the parameters that a part's expressions speak of; `ValueError` for what is no expression."""
+    shape = part["shape"]
+    found: set[str] = set()
+    for key, value in part.items():
+        if key in ("shape", "role", "tag", "mirror") or (shape, key) in _WORDS:
+            continue
+        if key in ("array", "ring"):
+            for inner, number in value.items():
+                if (key, inner) not in _WORDS:
+                    _collect(number, found)
+        else:
+            _collect(value, found)
+    return frozenset(found)
+
+
+def part_mesh(part: Mapping[str, Any], names: Mapping[str, float], words: Mapping[str, str]) -> Mesh:
+    """Make one part of a prop, repeated and placed in the prop's frame.
+
+    Parameters
+    ----------
+    part : mapping
+        The part's table in the asset file.
+    names : mapping of str to float
+        The prop's parameters.
+    words : mapping of str to str
+        The variant's attributes, which may stand in a sign's text as ``{label}``.
+
+    Returns
+    -------
+    Mesh
+        The shape is turned, repeated along `array`, repeated around `ring`, moved to `at` and mirrored, in that order.
+
+    Raises
+    ------
+    ValueError
+        Sizes that make no body, or an expression that cannot be computed.
+    """
+    shape = part["shape"]
+    own = {k: v if (shape, k) in _WORDS else _number(v, names) for k, v in part.items() if k not in PLACEMENT_KEYS}
+    if shape == "text":
+        own["text"] = _fill(own["text"], words)
+    body = SHAPES[shape](**own)
+    if "rotate" in part:
+        body = rotated(body, rotation(*_triple("rotate", part["rotate"], names)))
+    if "array" in part:
+        body = _arrayed(body, part["array"], names)
+    if "ring" in part:
+        body = _ringed(body, part["ring"], names)
+    if "at" in part:
+        body = translated(body, _triple("at", part["at"], names))
+    for axis in part.get("mirror", ""):
+        body = merge([body, mirrored(body, _AXES[axis])])
+    return body
+
+
+def _arrayed(body: Mesh, array: Mapping[str, Any], names: Mapping[str, float]) -> Mesh:
+    copies = [body]
+    for count_key, step_key in (("count", "step"), ("count2", "step2")):
+        if count_key not in array:
+            continue
+        count = _count(array[count_key], names)
+        step = np.array(_triple(step_key, array.get(step_key), names))
+        copies = [translated(c, step * k) for k in range(count) for c in copies]
+    return merge(copies)
+
+
+def _ringed(body: Mesh, ring: Mapping[str, Any], names: Mapping[str, float]) -> Mesh:
+    count = _count(ring["count"], names)
+    axis = _AXES[ring.get("axis", "z")]
+    arc = float(_number(ring.get("arc", 360.0), names))
+    start = float(_number(ring.get("start", 0.0), names))
+    offset = np.zeros(3)
+    offset[1 if axis == 0 else 0] = float(_number(ring.get("radius", 0.0), names))
+    body = translated(body, offset)
+    step = arc / count if arc == 360.0 else arc / max(count - 1, 1)
+    copies = []
+    for k in range(count):
+        angles = [0.0, 0.0, 0.0]
+        angles[axis] = start + k * step
+        copies.append(rotated(body, rotation(*angles)))
+    return merge(copies)
+
+
+def _count(value: Any, names: Mapping[str, float]) -> int:
+    count = round(float(_number(value, names)))
+    if not 1 <= count <= _MAX_COPIES:
+        raise ValueError(f"count must be 1 to {_MAX_COPIES}, got {count}")
+    return count
+
+
+def _triple(key: str, value: Any, names: Mapping[str, float]) -> tuple[float, float, float]:
+    numbers = _number(value, names)
+    if not isinstance(numbers, list) or len(numbers) != 3:
+        raise ValueError(f"{key} needs three numbers")
+    x, y, z = (float(n) for n in numbers)
+    return x, y, z
+
+
+def _number(value: Any, names: Mapping[str, float]) -> Any:
+    if isinstance(value, str):
+        return evaluate(value, names)
+    if isinstance(value, list):
+        return [_number(v, names) for v in value]
+    return value
+
+
+def _collect(value: Any, found: set[str]) -> None:
+    if isinstance(value, str):
+        found |= names_in(value)
+    elif isinstance(value, list):
+        for item in value:
+            _collect(item, found)
+    elif not isinstance(value, int | float):
+        raise ValueError(f"{value!r} is neither a number nor an expression")
+
+
+def _fill(text: str, words: Mapping[str, str]) -> str:
+    for key, word in words.items():
+        text = text.replace("{" + key + "}", word)
+    return text
