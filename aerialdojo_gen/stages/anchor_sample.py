@@ -163,14 +163,14 @@ def anchors_of(
     places = keep(places, ~np.isnan(places[:, 0]), "no_surface")
     low, high = world.scene.bounds
     places = keep(places, ((places >= low + radius) & (places <= high - radius)).all(axis=1), "out_of_bounds")
-    clearance = np.array([world.collisions.distance_m(p) for p in places])
-    free = clearance > radius + config.margin_m
-    places, clearance = keep(places, free, "in_collision"), clearance[free]
-    reachable = np.array([world.free.reachable(p) for p in places], dtype=np.bool_)
-    places, clearance = keep(places, reachable, "unreachable"), clearance[reachable]
+    body = radius + config.margin_m
+    touching = np.array([world.collisions.sphere_in_collision(p, body) for p in places], dtype=np.bool_)
+    places = keep(places, ~touching, "in_collision")
+    places = keep(places, np.array([world.free.reachable(p) for p in places], dtype=np.bool_), "unreachable")
     if not len(places):
         return [], rejected
 
+    clearance = np.array([world.collisions.distance_m(p) for p in places])
     yaw = yaw_towards(places, centroid)
     points = surface.sample(config.surface_points, generator(job.seed, "anchor-sample", job.scene, item["object_id"]))
     views = look(places, yaw, points, instance_caster(instance), world.rays, k, config.fov_deg)
