@@ -223,3 +223,20 @@ def _keys_at(model: type[BaseModel], where: list[str]) -> list[str]:
 def _short(value: Any) -> str:
     text = repr(value)
     return text if len(text) <= 60 else text[:57] + "..."
+
+
+def with_overrides(pipeline: Pipeline, stage: str, **values: Any) -> Pipeline:
+    """Return the pipeline with values of one section replaced; None leaves a value as it is.
+
+    Raises
+    ------
+    ConfigError
+        A value is out of range.
+    """
+    section = pipeline.section(stage)
+    given = {key: value for key, value in values.items() if value is not None}
+    try:
+        changed = type(section).model_validate(section.model_dump() | given)
+    except ValidationError as error:
+        raise ConfigError("; ".join(explain(error, type(section)))) from None
+    return pipeline.model_copy(update={stage.replace("-", "_"): changed})

@@ -185,6 +185,7 @@ VERDICTS = _table(
     _field("keep", pa.bool_(), "whether the candidate becomes a task"),
     _field("reason", pa.string(), "kept, or why not: a stable word"),
     _field("setting", pa.string(), "length setting, null where the length fits none", nullable=True),
+    _field("action_budget", pa.int32(), "most actions an episode of that setting may take", nullable=True),
 )  # fmt: skip
 
 REFERENCES = _table(
@@ -267,6 +268,5 @@ ROUTES = _table(
 RELEASE_OBJECTS = _table("objects", ["scene", "object_id"], *_OBJECT_FIELDS, *_REFERENCE)
 
 TABLES = {
-    t.name: t
-    for t in (SCENES, LANDMARKS, OBJECTS, ANCHORS, PAIRS, PLANS, VERDICTS, REFERENCES, RECORDINGS, FRAMES)
+    t.name: t for t in (SCENES, LANDMARKS, OBJECTS, ANCHORS, PAIRS, PLANS, VERDICTS, REFERENCES, RECORDINGS, FRAMES)
 }

@@ -1,0 +1,229 @@
+"""The command line: one thin command a stage; the library does the work.
+
+Nothing heavy is imported before a command runs, so that ``--help`` answers at once.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from aerialdojo_gen.errors import AerialDojoError, ConfigError
+
+if TYPE_CHECKING:
+    from aerialdojo_gen.config import Pipeline
+    from aerialdojo_gen.stage import Roots, Stage
+
+app = typer.Typer(
+    name="aerialdojo-gen",
+    help="Generate aerial object-goal-search datasets: scenes, tasks, certified routes, RGB-D recordings.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+DEFAULT_PIPELINE = "aerialdojo-200k.toml"
+
+Data = Annotated[
+    Path, typer.Option("--data", envvar="AERIALDOJO_DATA", help="Data directory: tables, meshes, release.")
+]
+Scene = Annotated[
+    list[str] | None, typer.Option("--scene", help="Scene or glob, repeatable: --scene 'U_*'.  (default: all)")
+]
+PipelineFile = Annotated[
+    Path | None, typer.Option("--pipeline", help=f"Pipeline file.  (default: pipelines/{DEFAULT_PIPELINE})")
+]
+Workers = Annotated[int | None, typer.Option("--workers", min=1, help="Processes.  (default: all cores)")]
+Force = Annotated[bool, typer.Option("--force", help="Compute this stage's shards even where they are fresh.")]
+Quiet = Annotated[bool, typer.Option("--quiet", help="No progress and no summary.")]
+
+
+def home() -> Path:
+    """Return the folder that holds scene_assets/, annotations/ and pipelines/.
+
+    A checkout's own folder where the package lies in one, else what the wheel carries.
+    """
+    package = Path(__file__).resolve().parent
+    return package.parent if (package.parent / "scene_assets").is_dir() else package / "_shipped"
+
+
+def open_pipeline(path: Path | None, data: Path) -> tuple[Pipeline, Roots]:
+    """Read the pipeline file and find the folders.
+
+    Parameters
+    ----------
+    path : Path or None
+        The pipeline file; None for the default one.
+    data : Path
+        The data directory.
+
+    Returns
+    -------
+    Pipeline, Roots
+
+    Raises
+    ------
+    ConfigError
+        The file is missing or wrong.
+    """
+    from aerialdojo_gen.config import load_pipeline
+    from aerialdojo_gen.stage import Roots
+
+    pipeline = load_pipeline(path or home() / "pipelines" / DEFAULT_PIPELINE)
+    roots = Roots(
+        data=data.absolute(),
+        scene_assets=pipeline.scene_assets or home() / "scene_assets",
+        annotations=pipeline.annotations or home() / "annotations",
+    )
+    if not roots.scene_assets.is_dir():
+        raise ConfigError(f"no folder {roots.scene_assets}: set scene_assets in the pipeline file")
+    return pipeline, roots
+
+
+def run_until(
+    stage: str,
+    *,
+    data: Path,
+    scene: list[str] | None = None,
+    pipeline: Path | Pipeline | None = None,
+    workers: int | None = None,
+    force: bool = False,
+    quiet: bool = False,
+) -> None:
+    """Bring a stage's tables up to date, running what it needs upstream; the twin of a stage's command.
+
+    Parameters
+    ----------
+    stage : str
+        Name of the stage, e.g. ``"plan"``.
+    data : Path
+        The data directory.
+    scene : list of str, optional
+        Names or globs; the pipeline's scenes where absent.
+    pipeline : Path or Pipeline, optional
+        A pipeline file, or one that was read and changed.
+    workers : int, optional
+        Processes; all cores where absent.
+    force : bool
+        Compute this stage's shards even where they are fresh (not those of the stages upstream).
+    quiet : bool
+        No progress and no summary.
+
+    Raises
+    ------
+    AerialDojoError
+        An expected failure.
+    """
+    from aerialdojo_gen.stage import upstream
+
+    config, roots = open_pipeline(pipeline if isinstance(pipeline, Path) else None, data)
+    config = config if isinstance(pipeline, Path) or pipeline is None else pipeline
+    _run(list(upstream(stage)), config, roots, scene, workers, [stage] if force else [], quiet)
+
+
+def _run(
+    stages: list[Stage],
+    config: Pipeline,
+    roots: Roots,
+    scene: list[str] | None,
+    workers: int | None,
+    force: list[str],
+    quiet: bool,
+) -> None:
+    from aerialdojo_gen import runner
+    from aerialdojo_gen.progress import Reporter
+
+    reporter = Reporter(quiet=quiet)
+    scenes = runner.choose_scenes(scene or config.scenes, runner.known_scenes(roots.scene_assets))
+    workers = workers or default_workers()
+    runner.run(stages, scenes, config, roots, workers=workers, force=force, reporter=reporter)
+    if any(stage.name == "split" for stage in stages):
+        from aerialdojo_gen.release.card import write_card
+
+        reporter.line(f"release: {write_card(roots.data).parent}")
+
+
+def default_workers() -> int:
+    """Count the cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+# The stages whose command has no option of its own; their texts are those of `aerialdojo_gen.stage`, which is
+# not imported here because it brings pyarrow.
+PLAIN_STAGES = {
+    "build-scenes": "Build the scenes' meshes from their recipes.",
+    "annotate-import": "Check the annotations against the scenes and import them.",
+    "anchor-sample": "Find viewpoints 1 m from each object that see it.",
+    "reference-images": "Render each object's picture from its selected anchor.",
+    "pair-objects": "Pair start anchors with targets: the candidate tasks.",
+    "plan": "Plan a collision-free reference trajectory for every candidate.",
+    "filter": "Keep the candidates that make tasks, with a reason for every rejection.",
+    "split": "Write the release: tasks, routes, objects, train and test.",
+}
+
+
+def _stage_command(name: str) -> Callable[..., None]:
+    def command(
+        data: Data = Path("data"), scene: Scene = None, pipeline: PipelineFile = None,
+        workers: Workers = None, force: Force = False, quiet: Quiet = False,
+    ) -> None:  # fmt: skip
+        run_until(name, data=data, scene=scene, pipeline=pipeline, workers=workers, force=force, quiet=quiet)
+
+    return command
+
+
+for _name, _help in PLAIN_STAGES.items():
+    app.command(_name, help=_help)(_stage_command(_name))
+
+
+@app.command("render")
+def render(
+    data: Data = Path("data"), scene: Scene = None, pipeline: PipelineFile = None,
+    workers: Workers = None, force: Force = False, quiet: Quiet = False,
+    limit: Annotated[int | None, typer.Option("--limit", min=1, help="Trajectories a scene and setting.")] = None,
+    sampling: Annotated[
+        str | None, typer.Option("--sampling", help="steps: a frame a pose; time: constant frame rate.")
+    ] = None,
+) -> None:  # fmt: skip
+    """Record four RGB-D views along trajectories of the release."""
+    from aerialdojo_gen.config import with_overrides
+
+    config, _ = open_pipeline(pipeline, data)
+    config = with_overrides(config, "render", limit=limit, sampling=sampling)
+    run_until("render", data=data, scene=scene, pipeline=config, workers=workers, force=force, quiet=quiet)
+
+
+@app.command("run")
+def run(
+    pipeline: Annotated[Path, typer.Argument(help="Pipeline file, e.g. pipelines/smoke.toml.")],
+    data: Data = Path("data"), scene: Scene = None,
+    workers: Workers = None, force: Force = False, quiet: Quiet = False,
+) -> None:  # fmt: skip
+    """Run a pipeline's stages, from recipes and annotations to the release."""
+    from aerialdojo_gen.runner import stages_named
+
+    config, roots = open_pipeline(pipeline, data)
+    stages = stages_named(config.stages)
+    _run(stages, config, roots, scene, workers, [stage.name for stage in stages] if force else [], quiet)
+
+
+def main() -> None:
+    """Run the command line; an expected error becomes one line and an exit code."""
+    try:
+        app(standalone_mode=True)
+    except AerialDojoError as error:
+        print(f"error: {error}", file=sys.stderr)
+        raise SystemExit(error.exit_code) from None
+    except KeyboardInterrupt:
+        print("interrupted: finished shards are kept, the same command goes on from here", file=sys.stderr)
+        raise SystemExit(130) from None
+
+
+if __name__ == "__main__":
+    main()

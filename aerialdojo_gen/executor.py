@@ -1,0 +1,165 @@
+"""The executor seam: compute shards in this process or in several, and commit each one whole."""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes
+import multiprocessing
+import os
+import signal
+import sys
+from collections.abc import Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import dataclass
+from types import TracebackType
+from typing import Any
+
+from aerialdojo_gen import store
+from aerialdojo_gen.config import Section
+from aerialdojo_gen.errors import AerialDojoError
+from aerialdojo_gen.stage import BY_NAME, Job
+
+
+@dataclass(frozen=True)
+class Task:
+    """A shard to compute: its job, its stage's config, and the fingerprint to store with it."""
+
+    job: Job
+    config: Section
+    fingerprint: str
+
+    @property
+    def label(self) -> str:
+        """The shard in words, for messages."""
+        part = f" part {self.job.part} of {self.job.parts}" if self.job.parts > 1 else ""
+        return f"{self.job.stage} {self.job.scene}{part}"
+
+
+def compute(task: Task) -> dict[str, Any]:
+    """Compute one shard and commit its tables.
+
+    Returns
+    -------
+    dict
+        The shard's summary: ``rows_in``, ``rows_out``, ``counts``.
+
+    Raises
+    ------
+    AerialDojoError
+        An expected failure.
+    RuntimeError
+        Anything else, with the shard in its message and the cause chained.
+    """
+    job = task.job
+    stage = BY_NAME[job.stage]
+    try:
+        output = stage.load()(job, task.config)
+    except AerialDojoError:
+        raise
+    except Exception as error:
+        raise RuntimeError(f"{task.label} failed: {type(error).__name__}: {error}") from error
+    if set(output.tables) != set(stage.writes):
+        raise RuntimeError(f"{task.label} returned tables {sorted(output.tables)}, not {sorted(stage.writes)}")
+    summary = {"rows_in": output.rows_in, "rows_out": output.rows_out, "counts": dict(sorted(output.counts.items()))}
+    files = {name: (job.roots.data / name).stat().st_size for name in sorted(job.files)}
+    for name, table in output.tables.items():
+        store.write_shard(
+            job.roots.data,
+            name,
+            job.scene,
+            job.part,
+            table,
+            fingerprint=task.fingerprint,
+            parts=job.parts,
+            summary=summary,
+            files=files,
+        )
+    return summary
+
+
+def _start_worker() -> None:
+    # Ctrl-C goes to the whole process group: the parent alone answers it, and ends the workers itself.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    # A worker must not outlive a parent that was killed with SIGKILL.
+    if sys.platform == "linux":
+        parent = os.getppid()
+        ctypes.CDLL(None).prctl(1, signal.SIGKILL)  # PR_SET_PDEATHSIG
+        if os.getppid() != parent:
+            os._exit(1)
+
+
+def _guarded(task: Task) -> dict[str, Any] | AerialDojoError:
+    try:
+        return compute(task)
+    except AerialDojoError as error:
+        return error
+
+
+class Pool:
+    """Computes tasks in `workers` processes; in this one where that is 1.
+
+    Processes are started when the first tasks need them and are kept for the stages that follow.
+    """
+
+    def __init__(self, workers: int) -> None:
+        self.workers = workers
+        self._executor: ProcessPoolExecutor | None = None
+
+    def __enter__(self) -> Pool:
+        """Return self."""
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """End the processes; at once where an error is under way."""
+        if self._executor is None:
+            return
+        if kind is not None:
+            for process in list((self._executor._processes or {}).values()):
+                with contextlib.suppress(OSError):
+                    process.terminate()
+        self._executor.shutdown(wait=True, cancel_futures=True)
+        self._executor = None
+
+    def imap(self, tasks: Sequence[Task]) -> Iterator[dict[str, Any] | AerialDojoError]:
+        """Compute tasks and yield summaries, or the expected errors, in the order of finishing.
+
+        Raises
+        ------
+        AerialDojoError
+            A worker was killed.
+        RuntimeError
+            A task failed in an unexpected way.
+        """
+        if self.workers <= 1 or len(tasks) <= 1:
+            for task in tasks:
+                yield _guarded(task)
+            return
+        if self._executor is None:
+            # spawn: FCL, PyBullet and numba hold state that does not survive a fork.
+            context = multiprocessing.get_context("spawn")
+            self._executor = ProcessPoolExecutor(self.workers, mp_context=context, initializer=_start_worker)
+        waiting = iter(tasks)
+        running: dict[Future[dict[str, Any] | AerialDojoError], Task] = {}
+        try:
+            while True:
+                # A short queue keeps a Ctrl-C from waiting for what has not begun.
+                for task in waiting:
+                    running[self._executor.submit(_guarded, task)] = task
+                    if len(running) > self.workers:
+                        break
+                if not running:
+                    return
+                finished, _ = wait(running, return_when=FIRST_COMPLETED)
+                for future in finished:
+                    outcome = future.result()
+                    del running[future]
+                    yield outcome
+        except BrokenProcessPool:
+            labels = "; ".join(task.label for task in list(running.values())[: self.workers])
+            raise AerialDojoError(
+                f"a worker process was killed at {labels} (out of memory?): "
+                "run again, finished shards are kept; use fewer --workers if memory ran out"
+            ) from None

@@ -1,0 +1,79 @@
+"""Progress on a terminal as a bar, elsewhere as plain lines."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import TextIO
+
+from tqdm import tqdm
+
+_PLAIN_EVERY_S = 10.0
+
+
+class Bar:
+    """Counts finished shards; `advance` is called once for each."""
+
+    def __init__(self, label: str, total: int, stream: TextIO, quiet: bool) -> None:
+        self._label, self._total, self._stream = label, total, stream
+        self._done, self._started, self._said = 0, time.monotonic(), time.monotonic()
+        self._plain = not quiet and not stream.isatty()
+        self._tqdm = tqdm(
+            total=total,
+            desc=label,
+            unit=" shards",
+            file=stream,
+            leave=False,
+            disable=quiet or self._plain or not total,
+        )
+
+    def advance(self) -> None:
+        """Count one more."""
+        self._done += 1
+        self._tqdm.update()
+        now = time.monotonic()
+        if self._plain and now - self._said >= _PLAIN_EVERY_S:
+            self._said = now
+            rate = self._done / (now - self._started)
+            left = (self._total - self._done) / rate
+            print(
+                f"{self._label}: {self._done}/{self._total} shards, {rate:.2f}/s, ETA {left:.0f} s",
+                file=self._stream,
+                flush=True,
+            )
+
+    def close(self) -> None:
+        """Take the bar off the screen."""
+        self._tqdm.close()
+
+
+class Reporter:
+    """Writes progress and summary lines to a stream (standard error by default).
+
+    Parameters
+    ----------
+    quiet : bool
+        Say nothing.
+    stream : text stream, optional
+        Where to write.
+    """
+
+    def __init__(self, quiet: bool = False, stream: TextIO | None = None) -> None:
+        self._quiet, self._stream = quiet, stream or sys.stderr
+
+    def line(self, text: str) -> None:
+        """Write one line, above a bar if there is one."""
+        if not self._quiet:
+            tqdm.write(text, file=self._stream)
+            self._stream.flush()
+
+    @contextmanager
+    def bar(self, label: str, total: int) -> Iterator[Bar]:
+        """Show progress over `total` shards for the length of the block."""
+        bar = Bar(label, total, self._stream, self._quiet)
+        try:
+            yield bar
+        finally:
+            bar.close()

@@ -1,0 +1,1 @@
+"""The release: what users load, its tables' contents and its dataset card."""

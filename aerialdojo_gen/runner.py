@@ -1,0 +1,259 @@
+"""Run stages: find the stale shards, compute them in processes, commit each one whole.
+
+A shard with the right fingerprint is never computed again, one with a wrong one always is; so a killed run goes on
+where it stopped, and the tables do not depend on the number of workers, their order, or the kills.
+"""
+
+from __future__ import annotations
+
+import difflib
+import fcntl
+import fnmatch
+import time
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from aerialdojo_gen import store
+from aerialdojo_gen.config import Pipeline
+from aerialdojo_gen.errors import AerialDojoError, StoreError, UsageError
+from aerialdojo_gen.executor import Pool, Task
+from aerialdojo_gen.fingerprint import scene_fingerprint
+from aerialdojo_gen.progress import Reporter
+from aerialdojo_gen.stage import STAGES, Job, Roots, Stage
+
+
+@dataclass(frozen=True)
+class StageSummary:
+    """What a stage did.
+
+    Attributes
+    ----------
+    stage : str
+        Name of the stage.
+    rows_in, rows_out : int
+        Over all its shards, also those that were already there.
+    counts : Counter
+        Reasons and outcomes, over all its shards.
+    shards, computed : int
+        Shards in all; shards that were computed now.
+    seconds : float
+        Wall time.
+    """
+
+    stage: str
+    rows_in: int
+    rows_out: int
+    counts: Counter[str] = field(default_factory=Counter)
+    shards: int = 0
+    computed: int = 0
+    seconds: float = 0.0
+
+    def __str__(self) -> str:
+        """One line: rows in, rows out, why the others were rejected, seconds."""
+        counts = ", ".join(f"{name} {n:,}" for name, n in sorted(self.counts.items(), key=lambda c: (-c[1], c[0])))
+        fresh = "nothing to do" if not self.computed else f"{self.computed} of {self.shards} shards computed"
+        return (
+            f"{self.stage}: {self.rows_in:,} rows in, {self.rows_out:,} out"
+            f"{f' ({counts})' if counts else ''}; {fresh}; {self.seconds:.1f} s"
+        )
+
+
+@contextmanager
+def data_lock(data: Path) -> Iterator[None]:
+    """Hold the data directory: one run writes to it at a time; a killed run's lock is gone with it."""
+    try:
+        data.mkdir(parents=True, exist_ok=True)
+        file = (data / ".lock").open("a")
+    except OSError as error:
+        raise store.disk_error(error, data / ".lock") from None
+    with file:
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise StoreError(f"another run is writing to {data}: wait for it, or use another --data") from None
+        yield
+
+
+def run(
+    stages: Sequence[Stage],
+    scenes: Sequence[str],
+    pipeline: Pipeline,
+    roots: Roots,
+    *,
+    workers: int = 1,
+    force: Iterable[str] = (),
+    reporter: Reporter | None = None,
+) -> list[StageSummary]:
+    """Run stages in their order on scenes.
+
+    Parameters
+    ----------
+    stages : sequence of Stage
+        In pipeline order; what they read must be there or be written by an earlier one.
+    scenes : sequence of str
+        Names of the scenes.
+    pipeline : Pipeline
+        Configuration and seed.
+    roots : Roots
+        The folders.
+    workers : int
+        Processes; with 1 everything runs in this one.
+    force : iterable of str
+        Names of stages whose shards are computed even where they are fresh.
+    reporter : Reporter, optional
+        Shows progress and summaries.
+
+    Returns
+    -------
+    list of StageSummary
+        One a stage.
+
+    Raises
+    ------
+    AerialDojoError
+        A shard failed in an expected way; the others of its stage are finished first.
+    KeyboardInterrupt
+        Workers have ended; finished shards stay.
+    """
+    reporter = reporter or Reporter(quiet=True)
+    forced = set(force)
+    summaries = []
+    with data_lock(roots.data), Pool(workers) as pool:
+        for stage in stages:
+            summary = _run_stage(stage, scenes, pipeline, roots, pool, stage.name in forced, reporter)
+            reporter.line(str(summary))
+            summaries.append(summary)
+    return summaries
+
+
+def _run_stage(
+    stage: Stage,
+    scenes: Sequence[str],
+    pipeline: Pipeline,
+    roots: Roots,
+    pool: Pool,
+    force: bool,
+    reporter: Reporter,
+) -> StageSummary:
+    started = time.monotonic()
+    config = pipeline.section(stage.name)
+    tasks, fresh, errors = [], [], []
+    for scene in scenes:
+        try:
+            fingerprint = scene_fingerprint(stage, pipeline, roots, scene)
+            parts = stage.parts(roots.data, scene, config)
+        except AerialDojoError as error:
+            errors.append(error)
+            continue
+        for table in stage.writes:
+            store.prune(roots.data, table, scene, parts)
+            store.sweep(store.shard_path(roots.data, table, scene).parent)
+        for part in range(parts):
+            summary = None if force else _fresh(stage, roots.data, scene, part, parts, fingerprint, reporter)
+            if summary is not None:
+                fresh.append(summary)
+            else:
+                job = Job(stage.name, scene, part, parts, pipeline.seed, pipeline.embodiment, roots)
+                tasks.append(Task(job, config, fingerprint))
+    done = []
+    with reporter.bar(stage.name, len(tasks)) as bar:
+        for outcome in pool.imap(tasks):
+            if isinstance(outcome, AerialDojoError):
+                errors.append(outcome)
+            else:
+                done.append(outcome)
+            bar.advance()
+    if errors:
+        raise _together(errors)
+    counts: Counter[str] = Counter()
+    for summary in (*fresh, *done):
+        counts.update(summary["counts"])
+    every = (*fresh, *done)
+    return StageSummary(
+        stage.name,
+        sum(s["rows_in"] for s in every),
+        sum(s["rows_out"] for s in every),
+        counts,
+        len(every),
+        len(done),
+        time.monotonic() - started,
+    )
+
+
+def _fresh(
+    stage: Stage, data: Path, scene: str, part: int, parts: int, fingerprint: str, reporter: Reporter
+) -> dict[str, Any] | None:
+    """Return the shard's stored summary if all its tables and files are there and up to date."""
+    summary = None
+    for table in stage.writes:
+        path = store.shard_path(data, table, scene, part)
+        if not path.exists():
+            return None
+        try:
+            info = store.read_info(path)
+        except StoreError as error:
+            reporter.line(f"{str(error).split(':', 1)[0]}: computed again")
+            return None
+        if info is None or info.fingerprint != fingerprint or info.parts != parts:
+            return None
+        for relative, size in info.files.items():
+            file = data / relative
+            if not file.is_file() or file.stat().st_size != size:
+                reporter.line(f"{file} is missing or damaged: computed again")
+                return None
+        summary = info.summary
+    return summary
+
+
+def _together(errors: Sequence[AerialDojoError]) -> AerialDojoError:
+    """Make one error of several, of the first one's kind, that lists them all."""
+    messages = list(dict.fromkeys(str(error) for error in errors))
+    return type(errors[0])("\n".join(messages))
+
+
+def known_scenes(scene_assets: Path) -> list[str]:
+    """List the scenes that have a recipe, by name."""
+    return sorted(path.stem for path in (scene_assets / "scenes").glob("*.toml"))
+
+
+def choose_scenes(patterns: Sequence[str], known: Sequence[str]) -> list[str]:
+    """Resolve names and globs to scenes, in the order of `known`.
+
+    Raises
+    ------
+    UsageError
+        A pattern matches nothing; the message gives the nearest names.
+    """
+    if not known:
+        raise UsageError("there are no scenes: scene_assets/scenes holds no recipe")
+    chosen = set()
+    for pattern in patterns:
+        matches = fnmatch.filter(known, pattern)
+        if not matches:
+            folded = {name.lower(): name for name in known}
+            near = difflib.get_close_matches(pattern.lower(), list(folded), n=3, cutoff=0.3)
+            names = ", ".join(folded[n] for n in near) or ", ".join(known[:5])
+            raise UsageError(f"no scene {pattern!r}; nearest: {names}")
+        chosen.update(matches)
+    return [name for name in known if name in chosen]
+
+
+def stages_named(names: Sequence[str] | None) -> list[Stage]:
+    """Return the stages of these names in pipeline order; all of them for None.
+
+    Raises
+    ------
+    UsageError
+        A name is unknown.
+    """
+    if names is None:
+        return list(STAGES)
+    unknown = set(names) - {stage.name for stage in STAGES}
+    if unknown:
+        known = ", ".join(stage.name for stage in STAGES)
+        raise UsageError(f"unknown stage {sorted(unknown)[0]!r}; stages: {known}")
+    return [stage for stage in STAGES if stage.name in names]
