@@ -1,3 +1,4 @@
+import hashlib
 import logging
 import math
 
@@ -11,6 +12,7 @@ from aerialdojo_gen.config import AnchorSampleConfig, Embodiment
 from aerialdojo_gen.errors import StoreError
 from aerialdojo_gen.geometry.frames import wrap_angle_rad
 from aerialdojo_gen.geometry.viewpoints import shortlist
+from aerialdojo_gen.scenes.glb import write_glb
 from aerialdojo_gen.stage import Job, Roots
 from aerialdojo_gen.stages import anchor_sample
 from aerialdojo_gen.stages.anchor_sample import World, anchors_of
@@ -180,37 +182,48 @@ def test_shortlist_prefers_sides_apart_then_score():
     assert shortlist(np.zeros(0), np.zeros(0), 3, math.radians(45)).tolist() == []
 
 
-def whole_run(place, objects, data, monkeypatch, seed=0):
-    """The stage on real tables; only the mesh comes from memory."""
+def whole_run(place, objects, data, seed=0):
+    """The stage on real tables and a real mesh file."""
+    name = place.name
+    write_glb(place, data / "scene.glb")
+    bounds = {f"{e}_{a}_m": float(v) for e, row in zip(("min", "max"), place.bounds, strict=True)
+              for a, v in zip("xyz", row, strict=True)}  # fmt: skip
+    place_row = bounds | {
+        "scene": name, "family": "Urban", "scene_type": "Test", "partition": "ID", "mesh_path": "scene.glb",
+        "mesh_sha256": hashlib.sha256((data / "scene.glb").read_bytes()).hexdigest(), "ceiling_m": place.ceiling_m,
+        "n_triangles": place.n_triangles, "n_instances": len(place.instances), "n_categories": 2,
+    }  # fmt: skip
     rows = [
         item(o, k) | {
-            "scene": "U_Test_0", "category": "thing", "description": "A thing.",
-            "landmark_id": 0, "direction": "east",
+            "scene": name, "category": "thing", "description": "A thing.", "landmark_id": 0, "direction": "east",
             **dict(zip(("size_x_m", "size_y_m", "size_z_m"), np.ptp(o.bounds, axis=0).tolist(), strict=True)),
         }
         for k, o in enumerate(objects)
     ]  # fmt: skip
-    store.write_shard(data, "objects", "U_Test_0", 0, store.from_rows(schemas.OBJECTS, rows))
-    monkeypatch.setattr(Job, "scene_model", lambda _self: place)
+    store.write_shard(data, "scenes", name, 0, store.from_rows(schemas.SCENES, [place_row]))
+    store.write_shard(data, "objects", name, 0, store.from_rows(schemas.OBJECTS, rows))
     return anchor_sample.run(job(data, seed), CONFIG)
 
 
-def test_the_stage_accounts_for_every_candidate_and_names_objects_without_anchors(tmp_path, monkeypatch, caplog):
+def test_the_stage_accounts_for_every_candidate_and_names_objects_without_anchors(tmp_path, caplog):
     walled = instance("safe", box((8, 8, 0.5), (9, 9, 1.5)))
     vault = instance("vault", box((5, 5, 0), (12, 12, 6)))
     bus = instance("bus", box((-6.0, -1.2, 0.3), (4.0, 1.2, 3.2)))
     with caplog.at_level(logging.WARNING):
-        out = whole_run(scene(bus, walled, vault), [bus, walled], tmp_path, monkeypatch)
+        out = whole_run(scene(bus, walled, vault), [bus, walled], tmp_path)
     table = store.check_table(schemas.ANCHORS, out.tables["anchors"])
     assert table["object_id"].to_pylist() == [0, 0, 0]
     reasons = {k: n for k, n in out.counts.items() if k != "no_anchor"}
     assert out.rows_in == out.rows_out + sum(reasons.values())
     assert out.rows_out == 3
+    again = whole_run(scene(bus, walled, vault), [bus, walled], tmp_path)
+    assert again.tables["anchors"].equals(table)
+    assert again.counts == out.counts
     assert out.rows_in >= 2 * 48
     assert out.counts["no_anchor"] == 1
     assert "object 1 (safe) has no anchor: unreachable" in caplog.text
 
 
-def test_an_object_of_another_scene_is_refused_in_one_line(tmp_path, monkeypatch):
+def test_an_object_of_another_scene_is_refused_in_one_line(tmp_path):
     with pytest.raises(StoreError, match=r"object 0 \(ball\) has the mesh node 'ball', which is not in the scene"):
-        whole_run(scene(BUS), [BALL], tmp_path, monkeypatch)
+        whole_run(scene(BUS), [BALL], tmp_path)
