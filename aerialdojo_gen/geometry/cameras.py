@@ -1,0 +1,184 @@
+"""Pinhole cameras: intrinsics, the poses of the four views, projection.
+
+Camera frame (OpenCV): x right, y down, z forward along the optical axis. Pixels: u to the right, v down, and the
+centre of the top-left pixel is (0.5, 0.5); the image spans [0, width] x [0, height], and the optical axis meets it at
+(width / 2, height / 2). Depth is planar: the z of a point in the camera frame, metres.
+
+World and body frames: `aerialdojo_gen.geometry.frames`. The four views share the body's centre: front looks along
+the yaw, left and right are turned by +90° and -90°, down looks at the ground, the body's forward at the image's top.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Floats = NDArray[np.float64]
+
+# Columns are the camera's x, y and z axes in the body frame (x forward, y left, z up).
+_BODY_FROM_CAMERA = {
+    "front": np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]]),
+    "left": np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]]),
+    "right": np.array([[-1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, -1.0, 0.0]]),
+    "down": np.array([[0.0, -1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, -1.0]]),
+}
+
+
+@dataclass(frozen=True)
+class Camera:
+    """A pinhole camera with square pixels.
+
+    Attributes
+    ----------
+    width, height : int
+        Pixels.
+    fov_deg : float
+        Horizontal field of view, degrees, in (0, 180).
+    """
+
+    width: int = 640
+    height: int = 640
+    fov_deg: float = 90.0
+
+    def __post_init__(self) -> None:
+        """Refuse what is no picture."""
+        if self.width < 1 or self.height < 1 or not 0.0 < self.fov_deg < 180.0:
+            raise ValueError(f"no camera has {self.width} x {self.height} pixels and a view of {self.fov_deg}°")
+
+    @property
+    def focal_px(self) -> float:
+        """Focal length, pixels, the same along u and v."""
+        return self.width / 2.0 / math.tan(math.radians(self.fov_deg) / 2.0)
+
+    @cached_property
+    def matrix(self) -> Floats:
+        """Intrinsics K, (3, 3) float64: pixels = K @ (camera point / its z)."""
+        f = self.focal_px
+        return np.array([[f, 0.0, self.width / 2.0], [0.0, f, self.height / 2.0], [0.0, 0.0, 1.0]])
+
+    def rays(self) -> Floats:
+        """Directions through the pixel centres in the camera frame, (height, width, 3) float64, z = 1.
+
+        A ray's parameter is therefore planar depth, not distance.
+        """
+        u, v = np.meshgrid(np.arange(self.width) + 0.5, np.arange(self.height) + 0.5)
+        f = self.focal_px
+        return np.stack([(u - self.width / 2.0) / f, (v - self.height / 2.0) / f, np.ones_like(u)], axis=-1)
+
+
+def view_pose(position: ArrayLike, yaw_rad: float, view: str) -> Floats:
+    """Pose of one of the body's cameras.
+
+    Parameters
+    ----------
+    position : (3,) array_like
+        The body's centre, metres, world frame.
+    yaw_rad : float
+        The body's yaw, counter-clockwise from +x.
+    view : str
+        One of `aerialdojo_gen.schemas.VIEWS`.
+
+    Returns
+    -------
+    (4, 4) float64
+        world_from_camera.
+
+    Raises
+    ------
+    KeyError
+        If there is no such view.
+    """
+    c, s = math.cos(yaw_rad), math.sin(yaw_rad)
+    world_from_body = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    pose = np.eye(4)
+    pose[:3, :3] = world_from_body @ _BODY_FROM_CAMERA[view]
+    pose[:3, 3] = np.asarray(position, dtype=np.float64)
+    return pose
+
+
+def look_at_pose(eye: ArrayLike, target: ArrayLike) -> Floats:
+    """Pose of a camera that looks from one point at another, its picture upright.
+
+    Parameters
+    ----------
+    eye, target : (3,) array_like
+        Metres, world frame; distinct.
+
+    Returns
+    -------
+    (4, 4) float64
+        world_from_camera; looking straight up or down, north (+y) is at the image's top.
+
+    Raises
+    ------
+    ValueError
+        If the two points coincide.
+    """
+    e, t = np.asarray(eye, dtype=np.float64), np.asarray(target, dtype=np.float64)
+    distance = float(np.linalg.norm(t - e))
+    if distance < 1e-9:
+        raise ValueError("a camera cannot look at the point that it stands in")
+    forward = (t - e) / distance
+    right = np.array([forward[1], -forward[0], 0.0])
+    if np.linalg.norm(right) < 1e-6:
+        right = np.array([1.0, 0.0, 0.0])
+        forward = np.array([0.0, 0.0, math.copysign(1.0, forward[2])])
+        if forward[2] > 0:
+            right = -right
+    right /= np.linalg.norm(right)
+    pose = np.eye(4)
+    pose[:3, :3] = np.stack([right, np.cross(forward, right), forward], axis=1)
+    pose[:3, 3] = e
+    return pose
+
+
+def project(camera: Camera, world_from_camera: Floats, points: ArrayLike) -> tuple[Floats, Floats]:
+    """Project world points into a picture.
+
+    Parameters
+    ----------
+    camera : Camera
+    world_from_camera : (4, 4) float64
+    points : (..., 3) array_like
+        Metres, world frame.
+
+    Returns
+    -------
+    uv : (..., 2) float64
+        Pixels; meaningless where the depth is not positive, outside the picture where it is not in view.
+    depth_m : (...) float64
+        Planar depth.
+    """
+    p = np.asarray(points, dtype=np.float64)
+    local = (p - world_from_camera[:3, 3]) @ world_from_camera[:3, :3]
+    depth = local[..., 2]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        uv = camera.focal_px * local[..., :2] / depth[..., None]
+    return uv + np.array([camera.width / 2.0, camera.height / 2.0]), depth
+
+
+def unproject(camera: Camera, world_from_camera: Floats, uv: ArrayLike, depth_m: ArrayLike) -> Floats:
+    """World points from pixels and planar depths: the inverse of `project`.
+
+    Parameters
+    ----------
+    camera : Camera
+    world_from_camera : (4, 4) float64
+    uv : (..., 2) array_like
+        Pixels; (column + 0.5, row + 0.5) for a pixel's centre.
+    depth_m : (...) array_like
+        Planar depth, metres.
+
+    Returns
+    -------
+    (..., 3) float64
+        Metres, world frame.
+    """
+    pixels, depth = np.asarray(uv, dtype=np.float64), np.asarray(depth_m, dtype=np.float64)
+    plane = (pixels - np.array([camera.width / 2.0, camera.height / 2.0])) / camera.focal_px
+    local = np.concatenate([plane, np.ones((*plane.shape[:-1], 1))], axis=-1) * depth[..., None]
+    return np.asarray(local @ world_from_camera[:3, :3].T + world_from_camera[:3, 3])

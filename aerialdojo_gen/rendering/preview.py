@@ -1,0 +1,92 @@
+"""Single pictures of a scene, and sheets of them: for people who build scenes and look at results."""
+
+from __future__ import annotations
+
+import weakref
+from collections.abc import Sequence
+
+import cv2
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from aerialdojo_gen.geometry.cameras import Camera, look_at_pose
+from aerialdojo_gen.rendering.world import RenderWorld
+from aerialdojo_gen.scenes.model import Scene
+
+# The last scene's world: several views of it are then cheap, and memory stays that of one scene.
+_latest: list[tuple[weakref.ref[Scene], RenderWorld]] = []
+
+
+def look_at(
+    scene: Scene, eye: ArrayLike, target: ArrayLike, width: int = 640, height: int = 480, fov_deg: float = 60.0
+) -> NDArray[np.uint8]:
+    """Take a picture of a scene.
+
+    Parameters
+    ----------
+    scene : Scene
+        Its renderer is kept until another scene is looked at.
+    eye, target : (3,) array_like
+        Where the camera stands and what it looks at, metres, world frame.
+    width, height : int
+        Pixels.
+    fov_deg : float
+        Horizontal field of view, degrees.
+
+    Returns
+    -------
+    (height, width, 3) uint8
+        sRGB.
+    """
+    return _world(scene).render(Camera(width, height, fov_deg), look_at_pose(eye, target)).rgb
+
+
+def contact_sheet(
+    images: Sequence[NDArray[np.uint8]], labels: Sequence[str] = (), columns: int = 4
+) -> NDArray[np.uint8]:
+    """Put pictures side by side, each under its label.
+
+    Parameters
+    ----------
+    images : sequence of (H, W, 3) uint8
+        At least one; smaller ones are padded to the largest.
+    labels : sequence of str
+        As many as pictures, or none.
+    columns : int
+        Pictures a row.
+
+    Returns
+    -------
+    (H', W', 3) uint8
+        The sheet.
+
+    Raises
+    ------
+    ValueError
+        If there is no picture, or the numbers of pictures and labels differ.
+    """
+    if not images or (labels and len(labels) != len(images)):
+        raise ValueError(f"a sheet of {len(images)} pictures with {len(labels)} labels")
+    height, width = max(i.shape[0] for i in images), max(i.shape[1] for i in images)
+    head = 20 if labels else 0
+    columns = min(columns, len(images))
+    rows = -(-len(images) // columns)
+    sheet = np.full((rows * (height + head + 4) + 4, columns * (width + 4) + 4, 3), 255, dtype=np.uint8)
+    for k, image in enumerate(images):
+        top, left = 4 + k // columns * (height + head + 4), 4 + k % columns * (width + 4)
+        if labels:
+            cell = np.full((head, width, 3), 255, dtype=np.uint8)
+            cv2.putText(cell, labels[k], (3, 14), cv2.FONT_HERSHEY_SIMPLEX, 0.45, (30, 30, 30), 1, cv2.LINE_AA)
+            sheet[top : top + head, left : left + width] = cell
+        sheet[top + head : top + head + image.shape[0], left : left + image.shape[1]] = image
+    return sheet
+
+
+def _world(scene: Scene) -> RenderWorld:
+    if _latest and _latest[0][0]() is scene:
+        return _latest[0][1]
+    while _latest:
+        _latest.pop()[1].close()
+    world = RenderWorld(scene)
+    _latest.append((weakref.ref(scene), world))
+    return world

@@ -1,0 +1,176 @@
+"""A scene in PyBullet's software renderer (TinyRenderer): pictures and depth on any machine."""
+
+from __future__ import annotations
+
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+
+import cv2
+import numpy as np
+import pybullet
+from numpy.typing import NDArray
+
+from aerialdojo_gen.errors import RenderError
+from aerialdojo_gen.geometry.cameras import Camera
+from aerialdojo_gen.rendering.shading import Lighting, lighting, shade
+from aerialdojo_gen.rendering.surfaces import Surface, surfaces
+from aerialdojo_gen.scenes.model import Material, Scene
+
+Floats = NDArray[np.float64]
+
+NEAR_M, FAR_M = 0.1, 2000.0
+
+
+@dataclass(frozen=True, eq=False)
+class Picture:
+    """What a camera sees.
+
+    Attributes
+    ----------
+    rgb : (H, W, 3) uint8
+        sRGB.
+    depth_m : (H, W) float32
+        Planar depth, metres; inf where nothing is hit.
+    """
+
+    rgb: NDArray[np.uint8]
+    depth_m: NDArray[np.float32]
+
+
+class RenderWorld:
+    """A scene ready to be rendered; a context manager that frees the renderer's memory at its end.
+
+    Parameters
+    ----------
+    scene : Scene
+        Copied into the renderer: one body a surface (see `aerialdojo_gen.rendering.surfaces`).
+
+    Raises
+    ------
+    RenderError
+        If PyBullet cannot start or cannot load a surface.
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        found = surfaces(scene)
+        self._light: Lighting = lighting(scene, found)
+        self._client = pybullet.connect(pybullet.DIRECT)
+        if self._client < 0:
+            raise RenderError("PyBullet's DIRECT client did not start: too many renderers are open in this process")
+        # A reused file name would otherwise bring back the mesh that it once held.
+        pybullet.setPhysicsEngineParameter(enableFileCaching=0, physicsClientId=self._client)
+        # Meshes go through OBJ files: inline vertices leak about 50 MB a scene in PyBullet.
+        with tempfile.TemporaryDirectory(prefix="aerialdojo-render-") as folder:
+            textures: dict[str, int] = {}
+            for k, surface in enumerate(found):
+                self._add(surface, k, scene.materials[surface.material], textures, Path(folder))
+
+    def _add(self, surface: Surface, k: int, material: Material, textures: dict[str, int], folder: Path) -> None:
+        client = self._client
+        path = folder / f"{k}.obj"
+        write_obj(path, surface)
+        rgba = (1.0, 1.0, 1.0, 1.0) if material.texture is not None else (*(c / 255 for c in material.colour), 1.0)
+        shape = pybullet.createVisualShape(
+            pybullet.GEOM_MESH, fileName=str(path), rgbaColor=rgba, specularColor=(0, 0, 0),
+            flags=pybullet.VISUAL_SHAPE_DOUBLE_SIDED, physicsClientId=client,
+        )  # fmt: skip
+        body = pybullet.createMultiBody(0, -1, shape, physicsClientId=client) if shape >= 0 else -1
+        path.unlink()
+        # Bodies are numbered in order, and the segmentation mask is read as the surface's number.
+        if body != k:
+            raise RenderError(f"PyBullet did not load the surface of material {material.name!r}")
+        if material.texture is not None:
+            if material.name not in textures:
+                picture = folder / f"texture{len(textures)}.png"
+                cv2.imwrite(str(picture), material.texture[..., ::-1])
+                textures[material.name] = pybullet.loadTexture(str(picture), physicsClientId=client)
+            pybullet.changeVisualShape(body, -1, textureUniqueId=textures[material.name], physicsClientId=client)
+
+    def render(self, camera: Camera, world_from_camera: Floats) -> Picture:
+        """Take a picture.
+
+        Parameters
+        ----------
+        camera : Camera
+        world_from_camera : (4, 4) float64
+            From `aerialdojo_gen.geometry.cameras.view_pose` or `look_at_pose`.
+
+        Returns
+        -------
+        Picture
+        """
+        albedo, depth, surface = self.rasterise(camera, world_from_camera)
+        return Picture(shade(camera, world_from_camera, albedo, depth, surface, self._light), depth)
+
+    def rasterise(
+        self, camera: Camera, world_from_camera: Floats
+    ) -> tuple[NDArray[np.uint8], NDArray[np.float32], NDArray[np.int32]]:
+        """Rasterise without light.
+
+        Parameters
+        ----------
+        camera : Camera
+        world_from_camera : (4, 4) float64
+
+        Returns
+        -------
+        albedo : (H, W, 3) uint8
+        depth_m : (H, W) float32
+            Planar depth, inf where nothing is hit.
+        surface : (H, W) int32
+            Number of the surface, -1 where nothing is hit.
+        """
+        w, h = camera.width, camera.height
+        view = np.linalg.inv(world_from_camera)
+        view[1:3] *= -1.0  # OpenGL's camera: y up, looking along -z
+        # TinyRenderer samples at (column, row + 1) in place of the pixel's centre: shift by half a pixel each.
+        projection = np.array(
+            [
+                [2.0 * camera.focal_px / w, 0.0, 1.0 / w, 0.0],
+                [0.0, 2.0 * camera.focal_px / h, 1.0 / h, 0.0],
+                [0.0, 0.0, -(FAR_M + NEAR_M) / (FAR_M - NEAR_M), -2.0 * FAR_M * NEAR_M / (FAR_M - NEAR_M)],
+                [0.0, 0.0, -1.0, 0.0],
+            ]
+        )
+        _, _, rgba, buffer, mask = pybullet.getCameraImage(
+            w, h, view.T.ravel().tolist(), projection.T.ravel().tolist(),
+            shadow=0, lightDirection=(0, 0, 1), lightColor=(1, 1, 1), lightAmbientCoeff=1.0, lightDiffuseCoeff=0.0,
+            lightSpecularCoeff=0.0, renderer=pybullet.ER_TINY_RENDERER, physicsClientId=self._client,
+        )  # fmt: skip
+        surface = np.asarray(mask, dtype=np.int32).reshape(h, w)
+        linear = FAR_M * NEAR_M / (FAR_M - (FAR_M - NEAR_M) * np.asarray(buffer, dtype=np.float64).reshape(h, w))
+        depth = np.where(surface >= 0, linear, np.inf).astype(np.float32)
+        return np.asarray(rgba, dtype=np.uint8).reshape(h, w, 4)[..., :3], depth, surface
+
+    def close(self) -> None:
+        """Free the renderer's memory; a second call does nothing."""
+        if self._client >= 0:
+            pybullet.disconnect(physicsClientId=self._client)
+            self._client = -1
+
+    def __enter__(self) -> RenderWorld:
+        """Return itself."""
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Free the renderer's memory."""
+        self.close()
+
+
+def write_obj(path: Path, surface: Surface) -> None:
+    """Write a surface as Wavefront OBJ with texture coordinates.
+
+    Parameters
+    ----------
+    path : Path
+    surface : Surface
+    """
+    with path.open("w", encoding="ascii") as file:
+        file.write(("v %.5f %.5f %.5f\n" * len(surface.vertices)) % tuple(surface.vertices.ravel().tolist()))
+        file.write(("vt %.5f %.5f\n" * len(surface.uv)) % tuple(surface.uv.ravel().tolist()))
+        corners = np.repeat(surface.faces.ravel() + 1, 2)
+        file.write(("f %d/%d %d/%d %d/%d\n" * len(surface.faces)) % tuple(corners.tolist()))
