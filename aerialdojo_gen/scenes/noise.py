@@ -41,9 +41,9 @@ def cells(size: int, count: int, rng: np.random.Generator) -> tuple[Floats, Floa
     points = rng.uniform(0.0, 1.0, size=(count, 2))
     axis = (np.arange(size) + 0.5) / size
     x, y = np.meshgrid(axis, axis)
-    distance, owner = cKDTree(points, boxsize=[1.0, 1.0]).query(np.column_stack([x.ravel(), y.ravel()]), k=2)
+    distance, owner = _nearest_two(points, np.column_stack([x.ravel(), y.ravel()]))
     first, second = distance.T.reshape(2, size, size)
-    return first, second, owner[:, 0].reshape(size, size).astype(np.int64)
+    return first, second, owner[:, 0].reshape(size, size)
 
 
 def texture_rng(name: str) -> np.random.Generator:
@@ -54,6 +54,11 @@ def texture_rng(name: str) -> np.random.Generator:
 def shade(colour: Floats, value: Floats) -> Floats:
     """Multiply a colour (3,) or an image (H, W, 3) by a brightness (H, W)."""
     return np.asarray(np.broadcast_to(colour, (*value.shape, 3)) * value[..., None])
+
+
+def _nearest_two(points: Floats, queries: Floats) -> tuple[Floats, NDArray[np.int64]]:
+    distance, index = cKDTree(points, boxsize=np.ones(2)).query(queries, k=2)
+    return np.asarray(distance, dtype=np.float64), np.asarray(index, dtype=np.int64)
 
 
 def _smooth(t: Floats) -> Floats:

@@ -66,7 +66,7 @@ def part_mesh(part: Mapping[str, Any], names: Mapping[str, float], words: Mappin
     Returns
     -------
     Mesh
-        The shape is turned, repeated along `array`, repeated around `ring`, moved to `at` and mirrored, in that order.
+        The shape turned, repeated along `array`, repeated around `ring`, moved to `at` and mirrored, in that order.
 
     Raises
     ------

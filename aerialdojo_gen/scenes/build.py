@@ -1,0 +1,82 @@
+"""From a recipe to a scene."""
+
+from __future__ import annotations
+
+import importlib
+import pkgutil
+from collections import Counter
+from pathlib import Path
+from types import ModuleType
+
+from aerialdojo_gen.errors import AssetError
+from aerialdojo_gen.scenes import layouts
+from aerialdojo_gen.scenes.catalogue import Catalogue
+from aerialdojo_gen.scenes.materials import nearest
+from aerialdojo_gen.scenes.model import Scene
+from aerialdojo_gen.scenes.recipe import Recipe, load_recipe, validated
+from aerialdojo_gen.scenes.site import Site
+
+
+def build_scene(recipe_path: Path, catalogue: Catalogue) -> Scene:
+    """Build the scene of a recipe.
+
+    Parameters
+    ----------
+    recipe_path : Path
+        ``scene_assets/scenes/<scene>.toml``; the file's stem names the scene.
+    catalogue : Catalogue
+        Props and materials.
+
+    Returns
+    -------
+    Scene
+        Exact in float32, and the same for the same files on every run.
+
+    Raises
+    ------
+    AssetError
+        The recipe, its layout's parameters or its palette are wrong, the layout asks for something that the catalogue
+        lacks, or the built scene has fewer instances of a category than `inventory` asks for.
+    """
+    recipe = load_recipe(recipe_path)
+    layout = _layout(recipe, recipe_path)
+    _check_names(recipe, recipe_path, catalogue)
+    model = getattr(layout, "Parameters", None)
+    parameters = None
+    if model is not None:
+        parameters = validated(model, recipe.parameters, f"{recipe_path}: parameters")
+    elif recipe.parameters:
+        key = next(iter(recipe.parameters))
+        raise AssetError(
+            f"{recipe_path}: parameters: unknown key {key!r}: layout {recipe.layout!r} has no parameters"
+        )
+    site = Site(recipe_path.stem, recipe, catalogue, parameters)
+    layout.build(site)
+    scene = site.scene()
+    _check_inventory(scene, recipe, recipe_path)
+    return scene
+
+
+def _layout(recipe: Recipe, path: Path) -> ModuleType:
+    known = [m.name for m in pkgutil.iter_modules(layouts.__path__)]
+    if recipe.layout not in known:
+        raise AssetError(f"{path}: unknown layout {recipe.layout!r}{nearest(recipe.layout, known)}")
+    module = importlib.import_module(f"{layouts.__name__}.{recipe.layout}")
+    if not hasattr(module, "build"):
+        raise AssetError(f"{path}: {recipe.layout!r} is a helper of layouts, not a layout")
+    return module
+
+
+def _check_names(recipe: Recipe, path: Path, catalogue: Catalogue) -> None:
+    for role, spec in recipe.palette.items():
+        catalogue.materials.check(spec, f"{path}: palette {role}")
+    for category in recipe.inventory:
+        if category not in catalogue:
+            raise AssetError(f"{path}: inventory: unknown category {category!r}{nearest(category, catalogue)}")
+
+
+def _check_inventory(scene: Scene, recipe: Recipe, path: Path) -> None:
+    found = Counter(i.category for i in scene.instances)
+    short = [f"{c} (needs {n}, has {found[c]})" for c, n in recipe.inventory.items() if found[c] < n]
+    if short:
+        raise AssetError(f"{path}: inventory: the layout placed too few of {', '.join(short)}")

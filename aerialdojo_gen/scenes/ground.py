@@ -1,0 +1,185 @@
+"""The ground of a scene: a terrain painted with surfaces that meet edge to edge.
+
+Roads, pavements, lawns and lane marks are polygons painted one over the other; what is seen of each is cut out of the
+terrain's own triangles. So a mark lies exactly in the road, nothing overlaps, and nothing flickers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import groupby
+
+import numpy as np
+import shapely
+from shapely.geometry import MultiPolygon, Polygon
+from shapely.geometry.base import BaseGeometry
+
+from aerialdojo_gen.scenes.mesh import Floats, Mesh, merge, mesh
+from aerialdojo_gen.scenes.shapes_extruded import triangulate
+from aerialdojo_gen.scenes.terrain import Terrain
+
+# Polygons meet on this grid (metres), so that rounding cannot open slits between them.
+_GRID_M = 1e-3
+_MIN_AREA_M2 = 1e-4
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """A painted area.
+
+    Attributes
+    ----------
+    area : Polygon or MultiPolygon
+        World frame, metres.
+    material : str
+        What it shows.
+    rise_m : float
+        Height over the terrain, metres: a pavement's 0.12, say; its edge becomes a kerb.
+    edge : str
+        Material of that kerb.
+    """
+
+    area: BaseGeometry
+    material: str
+    rise_m: float = 0.0
+    edge: str = "concrete"
+
+
+def ground_meshes(
+    terrain: Terrain, extent: Polygon, base: str, surfaces: Sequence[Surface]
+) -> list[tuple[str, Mesh]]:
+    """Cut the terrain into its surfaces.
+
+    Parameters
+    ----------
+    terrain : Terrain
+        Heights.
+    extent : Polygon
+        Where there is ground.
+    base : str
+        Material where nothing is painted.
+    surfaces : sequence of Surface
+        In the order of painting: a later one covers an earlier one.
+
+    Returns
+    -------
+    list of (material, Mesh)
+        Together they cover the extent once; kerbs stand where rises differ.
+    """
+    layers = visible_surfaces(extent, base, surfaces)
+    flat = bool(np.ptp(terrain.heights_m) == 0.0)
+    out: list[tuple[str, Mesh]] = []
+    for layer in layers:
+        body = _flat_mesh(layer, terrain) if flat else _draped_mesh(layer, terrain)
+        if len(body.faces):
+            out.append((layer.material, body))
+        if layer.rise_m > 0.0:
+            out.append((layer.edge, _kerb(layer, terrain)))
+    return out
+
+
+def visible_surfaces(extent: Polygon, base: str, surfaces: Sequence[Surface]) -> list[Surface]:
+    """Work out what is seen of every surface: disjoint areas that cover the extent."""
+    groups = [Surface(extent, base)]
+    for (material, rise, edge), members in groupby(surfaces, lambda s: (s.material, s.rise_m, s.edge)):
+        union = shapely.unary_union([_snapped(m.area) for m in members])
+        groups.append(Surface(union, material, rise, edge))
+    covered: BaseGeometry = Polygon()
+    layers = []
+    for layer in reversed(groups):
+        seen = _snapped(layer.area).intersection(_snapped(extent))
+        seen = shapely.difference(seen, covered, grid_size=_GRID_M)
+        covered = shapely.union(covered, seen, grid_size=_GRID_M)
+        if seen.area > _MIN_AREA_M2:
+            layers.append(Surface(seen, layer.material, layer.rise_m, layer.edge))
+    return layers[::-1]
+
+
+def polygons_of(area: BaseGeometry) -> list[Polygon]:
+    """List the polygons of a geometry, without points, lines and slivers."""
+    if isinstance(area, Polygon):
+        return [area] if area.area > _MIN_AREA_M2 else []
+    return [p for g in getattr(area, "geoms", ()) for p in polygons_of(g)]
+
+
+def _snapped(area: BaseGeometry) -> BaseGeometry:
+    return shapely.set_precision(shapely.make_valid(area), _GRID_M)
+
+
+def _flat_mesh(layer: Surface, terrain: Terrain) -> Mesh:
+    z = float(terrain.heights_m[0, 0]) + layer.rise_m
+    pieces = [_lifted(*triangulate(p), z=z) for p in polygons_of(layer.area)]
+    return merge(pieces) if pieces else mesh([], [])
+
+
+def _draped_mesh(layer: Surface, terrain: Terrain) -> Mesh:
+    corners, faces = terrain.corners(), terrain.triangles()
+    tiles = shapely.polygons(corners[faces][:, :, :2])
+    shapely.prepare(layer.area)
+    inside = shapely.contains_properly(layer.area, tiles) | shapely.covers(layer.area, tiles)
+    crossed = shapely.intersects(layer.area, tiles) & ~inside
+    pieces = [Mesh(corners, faces[inside])] if inside.any() else []
+    for k in np.flatnonzero(crossed):
+        a, b, c = corners[faces[k]]
+        normal = np.cross(b - a, c - a)
+        for piece in polygons_of(layer.area.intersection(tiles[k])):
+            flat, cut = triangulate(piece)
+            z = a[2] - ((flat - a[:2]) @ normal[:2]) / normal[2]
+            pieces.append(Mesh(np.column_stack([flat, z]), cut))
+    if not pieces:
+        return mesh([], [])
+    whole = _compact(merge(pieces))
+    return _from_above(mesh(whole.vertices + np.array([0.0, 0.0, layer.rise_m]), whole.faces))
+
+
+def _compact(m: Mesh) -> Mesh:
+    used, faces = np.unique(m.faces, return_inverse=True)
+    return Mesh(m.vertices[used], faces.reshape(-1, 3).astype(np.int32))
+
+
+def _kerb(layer: Surface, terrain: Terrain) -> Mesh:
+    walls: list[Mesh] = []
+    for piece in polygons_of(layer.area):
+        for k, ring in enumerate((piece.exterior, *piece.interiors)):
+            # Walls follow the ground: no stretch is longer than a cell of the terrain.
+            xy = np.array(shapely.segmentize(ring, terrain.cell_m).coords)[:, :2]
+            z = terrain.z(xy[:, 0], xy[:, 1])
+            low, high = np.column_stack([xy, z - 0.02]), np.column_stack([xy, z + layer.rise_m])
+            n = len(xy)
+            a = np.arange(n - 1)
+            outwards = np.concatenate(
+                [np.column_stack([a, a + 1, a + 1 + n]), np.column_stack([a, a + 1 + n, a + n])]
+            )
+            # Shapely leaves the sense of rings open; the filled side must lie behind the wall.
+            if ring.is_ccw != (k == 0):
+                outwards = outwards[:, ::-1]
+            walls.append(mesh(np.concatenate([low, high]), outwards))
+    return merge(walls)
+
+
+def _lifted(flat: Floats, faces: np.ndarray, z: float) -> Mesh:
+    return _from_above(mesh(np.column_stack([flat, np.full(len(flat), z)]), faces))
+
+
+def _from_above(m: Mesh) -> Mesh:
+    """Lay the texture on from above, continuous over all pieces and slopes."""
+    return Mesh(m.vertices, m.faces, m.vertices[m.faces][:, :, :2].copy())
+
+
+def disc(x: float, y: float, radius_m: float, corners: int = 24) -> Polygon:
+    """Make a round area, metres, world frame."""
+    angles = np.arange(corners) * 2 * np.pi / corners
+    return Polygon(np.column_stack([x + radius_m * np.cos(angles), y + radius_m * np.sin(angles)]))
+
+
+def rectangle(x0: float, y0: float, x1: float, y1: float) -> Polygon:
+    """Make an axis-aligned rectangle, metres, world frame."""
+    return Polygon([(x0, y0), (x1, y0), (x1, y1), (x0, y1)])
+
+
+def ribbon(path: Sequence[Sequence[float]], width_m: float, round_ends: bool = False) -> BaseGeometry:
+    """Make the area within `width_m` / 2 of a path's middle line."""
+    cap = "round" if round_ends else "flat"
+    area = shapely.LineString(path).buffer(width_m / 2, cap_style=cap, join_style="round", quad_segs=4)
+    return area if isinstance(area, Polygon | MultiPolygon) else Polygon()

@@ -1,0 +1,81 @@
+"""A scene's recipe: `scene_assets/scenes/<scene>.toml`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any, TypeVar
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from aerialdojo_gen.errors import AssetError
+from aerialdojo_gen.scenes.materials import nearest, read_toml
+
+Model = TypeVar("Model", bound=BaseModel)
+Positive = Annotated[float, Field(gt=0)]
+Colour = Annotated[str, Field(pattern=r"^#[0-9a-fA-F]{6}$")]
+
+
+class Recipe(BaseModel):
+    """What a scene is made from.
+
+    Attributes
+    ----------
+    layout : str
+        Module of `aerialdojo_gen.scenes.layouts`.
+    seed : int
+        Of everything drawn in the scene.
+    size_m : (float, float)
+        Extent along x and y, metres; the origin lies in the middle.
+    ceiling_m : float
+        Highest z that a drone may fly at, metres.
+    sky : str
+        ``"#rrggbb"``.
+    sun : (float, float, float)
+        Direction towards the sun, of any length.
+    palette : dict of str to str
+        Materials by the layout's names for them.
+    parameters : dict
+        The layout's own.
+    inventory : dict of str to int
+        Least number of instances of a category that the built scene must have.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    layout: str
+    seed: int = 0
+    size_m: tuple[Positive, Positive]
+    ceiling_m: Positive
+    sky: Colour = "#96bee6"
+    sun: tuple[float, float, float] = (0.45, -0.35, 0.82)
+    palette: dict[str, str] = {}
+    parameters: dict[str, Any] = {}
+    inventory: dict[str, Annotated[int, Field(ge=0)]] = {}
+
+    @property
+    def sun_direction(self) -> tuple[float, float, float]:
+        """Unit vector towards the sun, world frame."""
+        x, y, z = np.array(self.sun) / np.linalg.norm(self.sun)
+        return float(x), float(y), float(z)
+
+
+def load_recipe(path: Path) -> Recipe:
+    """Read a recipe; an `AssetError` names the file, the key, and the nearest known key."""
+    return validated(Recipe, read_toml(path), str(path))
+
+
+def validated(model: type[Model], body: dict[str, Any], where: str) -> Model:
+    """Check a table against its model; an `AssetError` says what is wrong at which key."""
+    try:
+        return model.model_validate(body)
+    except ValidationError as error:
+        first = error.errors()[0]
+        key = ".".join(str(k) for k in first["loc"])
+        if first["type"] == "extra_forbidden":
+            message = f"unknown key {key!r}{nearest(key, model.model_fields)}"
+        elif first["type"] == "missing":
+            message = f"key {key!r} is missing"
+        else:
+            message = f"{key}: {first['msg']}, got {first['input']!r}"
+        raise AssetError(f"{where}: {message}") from error

@@ -1,0 +1,279 @@
+"""A scene under construction: what layouts place things on."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import shapely
+from shapely.geometry import Polygon
+from shapely.geometry.base import BaseGeometry
+
+from aerialdojo_gen.errors import AssetError
+from aerialdojo_gen.rng import generator
+from aerialdojo_gen.scenes.catalogue import Catalogue, placed
+from aerialdojo_gen.scenes.footprints import Footprints, around, footprint
+from aerialdojo_gen.scenes.ground import Surface, ground_meshes, rectangle
+from aerialdojo_gen.scenes.materials import parse_colour
+from aerialdojo_gen.scenes.mesh import Mesh, merge, to_part
+from aerialdojo_gen.scenes.model import Instance, Part, Scene
+from aerialdojo_gen.scenes.recipe import Recipe
+from aerialdojo_gen.scenes.terrain import Terrain, flat_terrain
+
+
+class Site:
+    """What a layout builds on; the origin lies in the middle, x east, y north, z up, metres.
+
+    Parameters
+    ----------
+    name : str
+        Scene's name.
+    recipe : Recipe
+        Extents, palette and the rest.
+    catalogue : Catalogue
+        Props and materials.
+    parameters : object
+        The layout's own `Parameters`, validated; None where it has none.
+
+    Attributes
+    ----------
+    extent : Polygon
+        The site's rectangle.
+    rng : numpy.random.Generator
+        For the layout's own draws; props draw from generators of their own node names.
+    """
+
+    def __init__(self, name: str, recipe: Recipe, catalogue: Catalogue, parameters: Any = None) -> None:
+        self.name = name
+        self.recipe = recipe
+        self.catalogue = catalogue
+        self.parameters = parameters
+        self.rng = self.rng_for("layout")
+        x, y = recipe.size_m
+        self.extent = rectangle(-x / 2, -y / 2, x / 2, y / 2)
+        self.instances: list[Instance] = []
+        self._counts: dict[str, int] = {}
+        self._nodes: set[str] = set()
+        self._footprints = Footprints()
+        self._terrain = flat_terrain(recipe.size_m)
+        self._base = "grass"
+        self._surfaces: list[Surface] = []
+
+    def rng_for(self, *key: object) -> np.random.Generator:
+        """Make the generator of one thing in this scene: adding another thing does not change its draws."""
+        return generator(self.recipe.seed, "build-scenes", self.name, *key)
+
+    def material(self, role: str, default: str) -> str:
+        """Material of a role in the recipe's palette, or the default."""
+        spec = self.recipe.palette.get(role, default)
+        self.catalogue.materials.check(spec, f"{self.name}: palette {role}")
+        return spec
+
+    def node(self, category: str) -> str:
+        """Give the next free node name of a category: ``category_000``, then ``category_001``."""
+        while True:
+            k = self._counts.get(category, 0)
+            self._counts[category] = k + 1
+            name = f"{category}_{k:03d}"
+            if name not in self._nodes:
+                return name
+
+    # Ground
+
+    def set_ground(self, terrain: Terrain | None = None, material: str = "grass") -> None:
+        """Choose the heights (level at z = 0 by default) and what shows where nothing is painted; do it first."""
+        self._terrain = flat_terrain(self.recipe.size_m) if terrain is None else terrain
+        self._base = material
+
+    @property
+    def terrain(self) -> Terrain:
+        """Heights of the ground."""
+        return self._terrain
+
+    def paint(self, area: BaseGeometry, material: str, rise_m: float = 0.0, edge: str = "concrete") -> None:
+        """Paint an area of the ground over what was painted before; see `Surface`."""
+        shapely.prepare(area)
+        self._surfaces.append(Surface(area, material, rise_m, edge))
+
+    def ground_z(self, x: float, y: float) -> float:
+        """Height of the painted ground at a point, metres."""
+        z = float(self._terrain.z(x, y))
+        for surface in reversed(self._surfaces):
+            if shapely.contains_xy(surface.area, x, y):
+                return z + surface.rise_m
+        return z
+
+    # Things
+
+    def place(
+        self,
+        category: str,
+        x: float,
+        y: float,
+        yaw_deg: float = 0.0,
+        *,
+        z: float | None = None,
+        variant: str | None = None,
+        scale: float = 1.0,
+        params: Mapping[str, float] | None = None,
+        roles: Mapping[str, str] | None = None,
+        attributes: Mapping[str, str] | None = None,
+        node: str | None = None,
+        solid: bool = True,
+    ) -> Instance:
+        """Place a prop of the catalogue.
+
+        Parameters
+        ----------
+        category : str
+            Key of the catalogue.
+        x, y : float
+            Where its origin goes, metres.
+        yaw_deg : float
+            Direction of its front, degrees, counter-clockwise from +x.
+        z : float, optional
+            Height of its base; the ground's there by default.
+        variant, scale, params, roles, attributes
+            As in `Catalogue.instantiate`.
+        node : str, optional
+            Its node name, in place of the next free one.
+        solid : bool
+            Whether it takes the ground it stands on.
+
+        Returns
+        -------
+        Instance
+            In world coordinates.
+        """
+        name = self._claim(node or self.node(category))
+        base = self.ground_z(x, y) if z is None else z
+        instance = self.catalogue.instantiate(
+            category,
+            name,
+            self.rng_for("prop", name),
+            (x, y, base),
+            yaw_deg,
+            variant,
+            scale,
+            params,
+            roles,
+            attributes,
+        )
+        self.instances.append(instance)
+        if solid:
+            self._footprints.add(footprint(instance, base), base, float(instance.bounds[1, 2]))
+        return instance
+
+    def try_place(self, category: str, x: float, y: float, yaw_deg: float = 0.0, **options: Any) -> Instance | None:
+        """Place a prop where its footprint is free and inside the site; otherwise place nothing and return None."""
+        z = options.get("z")
+        base = self.ground_z(x, y) if z is None else float(z)
+        before = dict(self._counts)
+        name = options.pop("node", None) or self.node(category)
+        trial = {k: v for k, v in options.items() if k not in ("z", "solid")}
+        instance = self.catalogue.instantiate(
+            category, name, self.rng_for("prop", name), (x, y, base), yaw_deg, **trial
+        )
+        area = footprint(instance, base)
+        if not (self.extent.contains(area) and self._footprints.is_free(area, base, float(instance.bounds[1, 2]))):
+            self._counts = before
+            return None
+        self._claim(name)
+        self.instances.append(instance)
+        if options.get("solid", True):
+            self._footprints.add(area, base, float(instance.bounds[1, 2]))
+        return instance
+
+    def add(
+        self,
+        node: str | None,
+        category: str,
+        parts: Sequence[Part | tuple[str, Mesh]],
+        attributes: Mapping[str, str] | None = None,
+        *,
+        variant: str = "",
+        footprint: BaseGeometry | None = None,
+    ) -> Instance:
+        """Add structure that the layout itself made.
+
+        Parameters
+        ----------
+        node : str or None
+            Node name; None takes the next free one of the category.
+        category : str
+            What it is, e.g. ``"mall_building"``; need not stand in the catalogue.
+        parts : sequence of (material, Mesh) or Part
+            World coordinates; meshes of one material become one part.
+        attributes : mapping, optional
+            What a description may say.
+        variant : str
+            Name of its look, if any.
+        footprint : shapely geometry, optional
+            Ground that it takes, over its whole height.
+        """
+        name = self._claim(node or self.node(category))
+        instance = Instance(name, category, variant, dict(attributes or {}), placed(self._as_parts(parts), (0, 0, 0)))
+        self.instances.append(instance)
+        if footprint is not None:
+            low, high = instance.bounds[:, 2]
+            self._footprints.add(footprint, float(low), float(high))
+        return instance
+
+    def part(self, body: Mesh, material: str) -> Part:
+        """Give a mesh in world coordinates a material; its pattern runs on from its neighbours'."""
+        return to_part(body, material, self.catalogue.materials.tile_m(material))
+
+    # Room
+
+    def occupy(self, area: BaseGeometry, z0_m: float = -100.0, z1_m: float = 1000.0) -> None:
+        """Take an area, over all heights by default: nothing that asks `is_free` is put there."""
+        self._footprints.add(area, z0_m, z1_m)
+
+    def is_free(self, x: float, y: float, radius_m: float, z: float | None = None, height_m: float = 2.0) -> bool:
+        """Whether a disc of ground inside the site is free up to `height_m` above the ground (or above `z`)."""
+        base = self.ground_z(x, y) if z is None else z
+        area = around(x, y, radius_m)
+        return bool(self.extent.contains(area)) and self._footprints.is_free(area, base, base + height_m)
+
+    def is_free_area(self, area: BaseGeometry, z0_m: float = 0.0, z1_m: float = 3.0) -> bool:
+        """Whether an area inside the site is free between two heights, metres."""
+        return bool(self.extent.contains(area)) and self._footprints.is_free(area, z0_m, z1_m)
+
+    def scene(self) -> Scene:
+        """Finish: cut the ground, check that everything has its material, and make the scene."""
+        ground = self._ground()
+        instances = (ground, *self.instances)
+        specs = sorted({p.material for i in instances for p in i.parts})
+        materials = {s: self.catalogue.materials[s] for s in specs}
+        x, y = self.recipe.size_m
+        floor = float(ground.bounds[0, 2])
+        bounds = np.array([[-x / 2, -y / 2, floor], [x / 2, y / 2, self.recipe.ceiling_m]])
+        sky, sun = parse_colour(self.recipe.sky), self.recipe.sun_direction
+        return Scene(self.name, instances, materials, bounds, sky, sun)
+
+    def _ground(self) -> Instance:
+        meshes = ground_meshes(self._terrain, self.extent, self._base, self._surfaces)
+        parts = placed(self._as_parts(meshes), (0, 0, 0))
+        return Instance(self._claim("ground"), "ground", "", {}, parts)
+
+    def _as_parts(self, parts: Sequence[Part | tuple[str, Mesh]]) -> tuple[Part, ...]:
+        by_material: dict[str, list[Mesh]] = {}
+        done: list[Part] = []
+        for part in parts:
+            if isinstance(part, Part):
+                done.append(part)
+            else:
+                by_material.setdefault(part[0], []).append(part[1])
+        return (*done, *(self.part(merge(m), spec) for spec, m in by_material.items()))
+
+    def _claim(self, node: str) -> str:
+        if node in self._nodes:
+            raise AssetError(f"{self.name}: node {node!r} stands twice; choose another name")
+        self._nodes.add(node)
+        return node
+
+
+def corners_of(area: Polygon) -> list[tuple[float, float]]:
+    """Corners of a polygon's exterior without the closing point, metres."""
+    return [(float(x), float(y)) for x, y in list(area.exterior.coords)[:-1]]

@@ -1,0 +1,176 @@
+"""Heightfields: rolling ground from noise, graded where things stand and paths run."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import shapely
+from numpy.typing import ArrayLike, NDArray
+from opensimplex import OpenSimplex
+from shapely.geometry import LineString, Point
+from shapely.geometry.base import BaseGeometry
+
+from aerialdojo_gen.scenes.mesh import Floats, Ints
+
+
+@dataclass(frozen=True, eq=False)
+class Terrain:
+    """Heights on a regular grid; every cell is cut into two triangles by its south-west to north-east diagonal.
+
+    Attributes
+    ----------
+    x0_m, y0_m : float
+        South-west corner, world frame, metres.
+    cell_m : float
+        Edge of a cell, metres.
+    heights_m : (ny + 1, nx + 1) float64
+        z at the corners of the cells, metres; rows run north.
+    """
+
+    x0_m: float
+    y0_m: float
+    cell_m: float
+    heights_m: Floats
+
+    def z(self, x: ArrayLike, y: ArrayLike) -> Floats:
+        """Height of the triangulated surface at points, metres; beyond the border that of the nearest point in it."""
+        rows, columns = (n - 1 for n in self.heights_m.shape)
+        u = np.clip((np.asarray(x, dtype=np.float64) - self.x0_m) / self.cell_m, 0.0, columns)
+        v = np.clip((np.asarray(y, dtype=np.float64) - self.y0_m) / self.cell_m, 0.0, rows)
+        j = np.minimum(u.astype(np.int64), columns - 1)
+        i = np.minimum(v.astype(np.int64), rows - 1)
+        u, v = u - j, v - i
+        h = self.heights_m
+        sw, se, nw, ne = h[i, j], h[i, j + 1], h[i + 1, j], h[i + 1, j + 1]
+        below = sw + u * (se - sw) + v * (ne - se)
+        above = sw + v * (nw - sw) + u * (ne - nw)
+        return np.where(u >= v, below, above)
+
+    def corners(self) -> Floats:
+        """Grid corners as (n, 3) float64 in rows running north, metres."""
+        rows, columns = self.heights_m.shape
+        x = self.x0_m + np.arange(columns) * self.cell_m
+        y = self.y0_m + np.arange(rows) * self.cell_m
+        grid_x, grid_y = np.meshgrid(x, y)
+        return np.column_stack([grid_x.ravel(), grid_y.ravel(), self.heights_m.ravel()])
+
+    def triangles(self) -> Ints:
+        """Triangles as (m, 3) int32 indices into `corners`, counter-clockwise from above."""
+        rows, columns = self.heights_m.shape
+        i, j = np.mgrid[0 : rows - 1, 0 : columns - 1]
+        sw = (i * columns + j).ravel()
+        se, nw, ne = sw + 1, sw + columns, sw + columns + 1
+        return np.concatenate([np.column_stack([sw, se, ne]), np.column_stack([sw, ne, nw])]).astype(np.int32)
+
+    def flattened(self, area: BaseGeometry, z_m: float | None = None, blend_m: float = 4.0) -> Terrain:
+        """Level an area (a shapely geometry, world frame).
+
+        Parameters
+        ----------
+        area : shapely geometry
+            What becomes level; grid corners within one cell of it too, so that no triangle leans into it.
+        z_m : float, optional
+            The level; by default the mean height of the area.
+        blend_m : float
+            Width of the slope back to the old ground, metres.
+        """
+        near = self._distance(area)
+        inside = near <= self.cell_m * 1.5
+        level = float(self.heights_m[inside].mean()) if z_m is None else z_m
+        return self._blended(np.full_like(self.heights_m, level), near, blend_m)
+
+    def graded(self, path: ArrayLike, width_m: float, blend_m: float = 3.0, smooth_m: float = 12.0) -> Terrain:
+        """Lay a path into the ground: level across, and smoothed along over `smooth_m` metres.
+
+        Parameters
+        ----------
+        path : (n, 2) array-like
+            Middle line, world frame, metres.
+        width_m, blend_m, smooth_m : float
+            Level width, width of the slopes beside it, and length of the moving average along it.
+        """
+        line = LineString(np.asarray(path, dtype=np.float64))
+        s = np.linspace(0.0, line.length, max(int(line.length / 0.5), 2) + 1)
+        points = shapely.get_coordinates(line.interpolate(s))
+        profile = self.z(points[:, 0], points[:, 1])
+        weights = np.exp(-(((s[:, None] - s[None, :]) / (smooth_m / 2)) ** 2))
+        profile = weights @ profile / weights.sum(axis=1)
+        corners = self.corners()
+        at = line.project(shapely.points(corners[:, :2]))
+        target = np.interp(at, s, profile).reshape(self.heights_m.shape)
+        return self._blended(target, self._distance(line.buffer(width_m / 2)), blend_m)
+
+    def lowered(self, area: BaseGeometry, depth_m: float, blend_m: float) -> Terrain:
+        """Sink an area by `depth_m`, with slopes of `blend_m` inside its border: a bed of water, a crater."""
+        inside = shapely.distance(area.boundary, shapely.points(self.corners()[:, :2]))
+        inside = np.where(shapely.contains_xy(area, *self.corners()[:, :2].T), inside, 0.0)
+        t = np.clip(inside.reshape(self.heights_m.shape) / blend_m, 0.0, 1.0)
+        return replace(self, heights_m=self.heights_m - depth_m * _smooth(t))
+
+    def _distance(self, area: BaseGeometry) -> Floats:
+        shapely.prepare(area)
+        return np.asarray(shapely.distance(area, shapely.points(self.corners()[:, :2])).reshape(self.heights_m.shape))
+
+    def _blended(self, target: Floats, distance: Floats, blend_m: float) -> Terrain:
+        t = _smooth(np.clip((distance - self.cell_m * 1.5) / max(blend_m, 1e-9), 0.0, 1.0))
+        return replace(self, heights_m=target * (1.0 - t) + self.heights_m * t)
+
+
+def rolling_terrain(
+    size_m: tuple[float, float],
+    cell_m: float,
+    seed: int,
+    amplitude_m: float,
+    wavelength_m: float,
+    octaves: int = 4,
+    gain: float = 0.45,
+    ridged: bool = False,
+) -> Terrain:
+    """Make a terrain about the origin by fractal simplex noise.
+
+    Parameters
+    ----------
+    size_m : (float, float)
+        Extent along x and y, metres.
+    cell_m : float
+        Wanted edge of a cell; made a little smaller where it does not divide both extents.
+    seed : int
+        Of the noise.
+    amplitude_m : float
+        Heights lie within about plus or minus this, metres.
+    wavelength_m : float
+        Length of the longest waves, metres.
+    octaves, gain : int, float
+        Number of octaves, and the weight of each beside the one before.
+    ridged : bool
+        Sharp crests (mountains, dunes) in place of soft hills.
+    """
+    columns, rows = (int(np.ceil(s / cell_m - 1e-9)) for s in size_m)
+    cell = max(size_m[0] / columns, size_m[1] / rows)
+    x = -size_m[0] / 2 + np.arange(columns + 1) * cell
+    y = -size_m[1] / 2 + np.arange(rows + 1) * cell
+    total = np.zeros((rows + 1, columns + 1))
+    weight = 0.0
+    for k in range(octaves):
+        noise = OpenSimplex(seed=seed * 31 + k).noise2array(x * 2**k / wavelength_m, y * 2**k / wavelength_m)
+        total += gain**k * ((0.5 - np.abs(noise)) * 2.0 if ridged else noise)
+        weight += gain**k
+    return Terrain(-size_m[0] / 2, -size_m[1] / 2, cell, total / weight * amplitude_m * 1.4)
+
+
+def flat_terrain(size_m: tuple[float, float], z_m: float = 0.0) -> Terrain:
+    """Make level ground about the origin."""
+    return Terrain(-size_m[0] / 2, -size_m[1] / 2, max(size_m), np.full((2, 2), z_m))
+
+
+def mound(terrain: Terrain, centre: tuple[float, float], radius_m: float, height_m: float) -> Terrain:
+    """Raise a round hill, or sink a hollow where `height_m` is negative."""
+    corners = terrain.corners()[:, :2]
+    d: NDArray[np.float64] = np.asarray(shapely.distance(Point(centre), shapely.points(corners)))
+    t = _smooth(np.clip(1.0 - d / radius_m, 0.0, 1.0)).reshape(terrain.heights_m.shape)
+    return replace(terrain, heights_m=terrain.heights_m + height_m * t)
+
+
+def _smooth(t: Floats) -> Floats:
+    return t * t * (3.0 - 2.0 * t)
