@@ -130,6 +130,47 @@ def test_visible_fraction_is_the_share_that_others_leave(tmp_path):
     assert back["visible_fraction"] == 1.0
 
 
+def clear_sight(mesh, origin, points):
+    """By trimesh's own ray caster, in float64: whether nothing stands before each point."""
+    way = points - origin
+    length = np.linalg.norm(way, axis=1)
+    caster = trimesh.ray.ray_triangle.RayMeshIntersector(mesh)
+    hits, ray, _ = caster.intersects_location(np.tile(origin, (len(points), 1)), way / length[:, None])
+    nearest = np.full(len(points), np.inf)
+    np.minimum.at(nearest, ray, np.linalg.norm(hits - origin, axis=1))
+    return nearest >= length - 5e-3
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_anchors_among_clutter_agree_with_trimesh(seed, tmp_path):
+    rng = np.random.default_rng(seed)
+    target = instance("target", box((-0.7, -0.4, 0.0), (0.6, 0.5, 1.7)), box((-0.2, -0.2, 1.7), (0.2, 0.2, 2.4)))
+    low = np.column_stack([rng.uniform(-4, 3.5, (30, 2)), rng.uniform(0, 2.5, 30)])
+    high = low + rng.uniform(0.1, 1.0, (30, 3))
+    apart = ((low[:, :2] > [0.9, 0.8]) | (high[:, :2] < [-1.0, -0.7])).any(axis=1)
+    clutter = [instance(f"box_{k}", box(low[k], high[k])) for k in np.flatnonzero(apart)]
+    place = scene(target, *clutter)
+    rows, rejected = find(place, "target", tmp_path)
+    assert rows
+    assert rejected["in_collision"] > 0
+    own, whole = mesh_of(target), trimesh.util.concatenate([mesh_of(i) for i in place.instances])
+    for r in rows:
+        p = xyz(r)
+        _, (to_own, *_), _ = trimesh.proximity.closest_point(own, [p])
+        _, (to_any, *_), _ = trimesh.proximity.closest_point(whole, [p])
+        assert to_own == pytest.approx(1.0, abs=1e-3)
+        assert to_any == pytest.approx(r["clearance_m"], abs=1e-4)
+        assert to_any > RADIUS + CONFIG.margin_m - 1e-6
+        points = np.asarray(trimesh.sample.sample_surface(own, 600, seed=seed)[0])
+        forward = np.array([math.cos(r["yaw_rad"]), math.sin(r["yaw_rad"]), 0.0])
+        ahead = (points - p) @ forward
+        aside = (points - p) @ [-forward[1], forward[0], 0.0]
+        points = points[(ahead > 0) & (np.abs(aside) <= ahead) & (np.abs(points[:, 2] - p[2]) <= ahead)]
+        points = points[clear_sight(own, p, points)]
+        assert r["visible_fraction"] == pytest.approx(clear_sight(whole, p, points).mean(), abs=0.12)
+        assert r["visible_fraction"] >= CONFIG.min_visible_fraction
+
+
 def test_an_object_in_a_sealed_room_has_no_anchor(tmp_path):
     lamp = instance("lamp", box((-0.2, -0.2, 1.0), (0.2, 0.2, 1.8)))
     walls = [
