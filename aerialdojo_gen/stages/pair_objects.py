@@ -1,4 +1,4 @@
-"""`pair-objects`: candidate tasks, every start anchor with every other object's selected anchor (paper: task pairs)."""
+"""`pair-objects`: candidate tasks, every start anchor with every other object's selected anchor (paper: pairs)."""
 
 from __future__ import annotations
 
