@@ -152,9 +152,10 @@ def check_table(spec: schemas.TableSpec, table: pa.Table) -> pa.Table:
     StoreError
         Names, types, a null in a column without nulls, rows out of the key's order, or a key that stands twice.
     """
-    if not table.schema.equals(spec.schema):
+    if (table.schema.names, table.schema.types) != (spec.schema.names, spec.schema.types):
         raise StoreError(f"{spec.name}: columns {table.schema.names} are not those of its schema, or types differ")
-    table = table.cast(spec.schema).combine_chunks()
+    # Not a cast: that fails with an error of its own on nulls, before they can be counted and named.
+    table = pa.Table.from_arrays(table.columns, schema=spec.schema).combine_chunks()
     for name in spec.schema.names:
         column = table.column(name)
         nulls = column.null_count

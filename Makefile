@@ -1,0 +1,64 @@
+# aerialdojo-gen. `make help` lists the targets.
+
+SHELL := /bin/bash
+PYTHON ?= $(shell command -v python3.11 || command -v python3)
+DATA ?= data
+SMOKE_DATA := $(if $(filter-out file,$(origin DATA)),$(DATA),data-smoke)
+WORKERS ?=
+RUN := .venv/bin/aerialdojo-gen
+RUN_FLAGS := $(if $(WORKERS),--workers $(WORKERS))
+
+.DEFAULT_GOAL := help
+.PHONY: help env dev dataset smoke test lint format bench lock clean
+
+help:  ## list the targets
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-9s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
+	@echo "  DATA=DIR chooses the data directory, WORKERS=N the number of processes, PYTHON=… the interpreter."
+
+env: .venv/.installed  ## make the environment in .venv/
+dev: .venv/.dev  ## the same with what tests and linters need
+
+.venv/.installed: pyproject.toml constraints.txt
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { \
+	  echo "error: $(PYTHON) is older than Python 3.11: install Python 3.11, or make PYTHON=/path/to/python3.11" >&2; exit 1; }
+	@test -x .venv/bin/python || $(PYTHON) -m venv .venv
+	@echo "installing the packages of constraints.txt into .venv/ (a minute or two the first time)"
+	@.venv/bin/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e . || { \
+	  $(PYTHON) -c 'import sys; sys.exit(sys.version_info[:2] == (3, 11))' && echo "error: a package could not be installed, see above" >&2 || \
+	  echo "error: a package could not be installed, see above. PyBullet has a wheel for Python 3.11 only and is built from" \
+	       "source on others (C++ compiler and Python headers needed): with Python 3.11, rm -rf .venv and make PYTHON=python3.11" >&2; exit 1; }
+	@touch $@
+
+.venv/.dev: .venv/.installed
+	@.venv/bin/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[dev]'
+	@touch $@
+
+dataset: .venv/.installed  ## generate the dataset: scene_assets/ and annotations/ to $(DATA)/release/
+	@$(RUN) run pipelines/aerialdojo-200k.toml --data $(DATA) $(RUN_FLAGS)
+
+smoke: .venv/.installed  ## two small scenes through all stages, a rendered video included (DATA=data-smoke)
+	@$(RUN) run pipelines/smoke.toml --data $(SMOKE_DATA) $(RUN_FLAGS)
+
+test: .venv/.dev  ## run the tests
+	@.venv/bin/python -m pytest $(PYTEST_FLAGS)
+
+lint: .venv/.dev  ## ruff and mypy --strict
+	@.venv/bin/ruff check .
+	@.venv/bin/ruff format --check .
+	@.venv/bin/mypy
+
+format: .venv/.dev  ## let ruff format the code
+	@.venv/bin/ruff check --fix-only --quiet .
+	@.venv/bin/ruff format .
+
+bench: .venv/.dev  ## measure planner and renderer
+	@for bench in tests/bench/bench_*.py; do echo "== $$bench"; .venv/bin/python $$bench || exit 1; done
+
+lock: .venv/.dev  ## write constraints.txt anew from the ranges in pyproject.toml
+	@.venv/bin/python -m pip install --quiet uv
+	@.venv/bin/uv pip compile pyproject.toml --all-extras --python-version 3.11 --upgrade --no-header \
+	  --no-annotate --no-emit-index-url --no-emit-find-links --quiet -o constraints.txt
+
+clean:  ## remove caches (not data, not .venv)
+	@rm -rf .mypy_cache .ruff_cache .pytest_cache .hypothesis
+	@find aerialdojo_gen tests -name __pycache__ -type d -prune -exec rm -rf {} +
