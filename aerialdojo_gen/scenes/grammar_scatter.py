@@ -1,0 +1,198 @@
+"""Grammar of layouts: points and poses along lines, in rows, and strewn over areas."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from itertools import pairwise
+from typing import Any, NamedTuple
+
+import numpy as np
+import shapely
+from shapely.geometry import LineString, Point
+from shapely.geometry.base import BaseGeometry
+
+from aerialdojo_gen.scenes.mesh import Mesh
+from aerialdojo_gen.scenes.model import Instance
+from aerialdojo_gen.scenes.shapes_extruded import extrude, sweep
+from aerialdojo_gen.scenes.site import Site
+
+Polyline = Sequence[Sequence[float]]
+
+
+class Pose(NamedTuple):
+    """Where a thing goes: metres, and degrees counter-clockwise from +x."""
+
+    x: float
+    y: float
+    yaw_deg: float
+
+
+def smooth_path(path: Polyline, rounds: int = 3) -> list[tuple[float, float]]:
+    """Round a polyline's corners by Chaikin's corner cutting; the ends stay."""
+    points = np.asarray(path, dtype=np.float64)
+    for _ in range(rounds):
+        a, b = points[:-1], points[1:]
+        cut = np.stack([0.75 * a + 0.25 * b, 0.25 * a + 0.75 * b], axis=1).reshape(-1, 2)
+        points = np.concatenate([points[:1], cut[1:-1], points[-1:]])
+    return [(float(x), float(y)) for x, y in points]
+
+
+def along(
+    path: Polyline,
+    spacing_m: float,
+    offset_m: float = 0.0,
+    start_m: float = 0.0,
+    end_m: float = 0.0,
+    turn_deg: float = 0.0,
+) -> list[Pose]:
+    """List poses along a polyline.
+
+    Parameters
+    ----------
+    path : sequence of (x, y)
+        World frame, metres.
+    spacing_m : float
+        Wanted distance; stretched a little so that the first and the last stand at the ends.
+    offset_m : float
+        To the left of the path (negative: to the right).
+    start_m, end_m : float
+        Lengths left out at the ends.
+    turn_deg : float
+        Added to the path's direction: 90 faces left of it.
+    """
+    line = LineString(path)
+    length = line.length - start_m - end_m
+    if length <= 0.0:
+        return []
+    count = max(round(length / spacing_m), 1)
+    poses = []
+    for k in range(count + 1):
+        s = start_m + length * k / count
+        before, after = line.interpolate(max(s - 0.05, 0.0)), line.interpolate(min(s + 0.05, line.length))
+        yaw = float(np.arctan2(after.y - before.y, after.x - before.x))
+        p = line.interpolate(s)
+        x, y = p.x - offset_m * np.sin(yaw), p.y + offset_m * np.cos(yaw)
+        poses.append(Pose(float(x), float(y), float(np.degrees(yaw)) + turn_deg))
+    return poses
+
+
+def place_along(
+    site: Site, category: str, path: Polyline, spacing_m: float, *, offset_m: float = 0.0, turn_deg: float = 0.0,
+    closed: bool = False, **options: Any,
+) -> list[Instance]:  # fmt: skip
+    """Set a prop in the middle of every stretch of `spacing_m` (fence panels, hedges, rails), turned with the path.
+
+    The stretches are shortened or lengthened to fit each straight leg; legs shorter than half a stretch stay empty.
+    A panel that runs along its own y axis wants ``turn_deg=90``.
+    """
+    points = [*path, path[0]] if closed else list(path)
+    out = []
+    for a, b in pairwise(points):
+        dx, dy = b[0] - a[0], b[1] - a[1]
+        length = float(np.hypot(dx, dy))
+        count = round(length / spacing_m)
+        for k in range(count):
+            t = (k + 0.5) / count
+            x = a[0] + dx * t - dy / length * offset_m
+            y = a[1] + dy * t + dx / length * offset_m
+            yaw = float(np.degrees(np.arctan2(dy, dx)))
+            out.append(site.place(category, x, y, yaw + turn_deg, **options))
+    return out
+
+
+def wall(
+    site: Site, path: Polyline, height_m: float, thickness_m: float, closed: bool = False, z: float = 0.0
+) -> Mesh:
+    """Make a wall along a path on the ground at its points (plus `z`), to be given to `Site.add`."""
+    line = [(x, y, site.ground_z(x, y) + z + height_m / 2) for x, y in path]
+    return sweep(path=line, section=(thickness_m, height_m), closed=closed)
+
+
+def slab(area: BaseGeometry, z0_m: float, z1_m: float) -> Mesh:
+    """Extrude a polygon between two heights: a deck, a roof, a plinth."""
+    body = extrude(area, z1_m - z0_m)
+    return Mesh(body.vertices + np.array([0.0, 0.0, z0_m]), body.faces, body.corner_uv)
+
+
+def grid(
+    area: BaseGeometry,
+    spacing_m: tuple[float, float],
+    rng: np.random.Generator,
+    jitter_m: float = 0.0,
+    yaw_deg: float = 0.0,
+) -> list[Pose]:
+    """List the points of a turned grid about an area's centre that lie in the area, moved by up to `jitter_m`."""
+    c, s = np.cos(np.radians(yaw_deg)), np.sin(np.radians(yaw_deg))
+    x0, y0, x1, y1 = area.bounds
+    reach = float(np.hypot(x1 - x0, y1 - y0)) / 2
+    nx, ny = (int(reach / d) + 1 for d in spacing_m)
+    centre = area.centroid
+    poses = []
+    for j in range(-ny, ny + 1):
+        for i in range(-nx, nx + 1):
+            u, v = np.array([i, j]) * spacing_m + rng.uniform(-1, 1, size=2) * jitter_m
+            x, y = float(centre.x + c * u - s * v), float(centre.y + s * u + c * v)
+            if shapely.contains_xy(area, x, y):
+                poses.append(Pose(x, y, yaw_deg))
+    return poses
+
+
+def poisson_disc(
+    area: BaseGeometry,
+    radius_m: float,
+    rng: np.random.Generator,
+    density: Callable[[float, float], float] | None = None,
+    limit: int = 100_000,
+) -> list[Pose]:
+    """Strew points over an area, none nearer to another than a radius, by Bridson's dart throwing.
+
+    Parameters
+    ----------
+    area : shapely geometry
+        World frame, metres.
+    radius_m : float
+        Least distance where the density is 1.
+    rng : numpy.random.Generator
+        Draws points and yaws.
+    density : callable, optional
+        ``(x, y) -> float`` in 0 to 1: the share of points kept there; the least distance grows as 1 / sqrt(density).
+    limit : int
+        Most points returned.
+
+    Returns
+    -------
+    list of Pose
+        With random yaws, in the order they were found.
+    """
+    shapely.prepare(area)
+    x0, y0, x1, y1 = area.bounds
+    buckets: dict[tuple[int, int], list[tuple[float, float, float]]] = {}
+    widest = radius_m
+    poses: list[Pose] = []
+    tries = int(30 * max(area.area, 1.0) / radius_m**2)
+    candidates = rng.uniform((x0, y0, 0.0), (x1, y1, 360.0), size=(min(tries, 400_000), 3))
+    inside = shapely.contains_xy(area, candidates[:, 0], candidates[:, 1])
+    for x, y, yaw in candidates[inside]:
+        share = 1.0 if density is None else float(density(float(x), float(y)))
+        if share <= 0.01:
+            continue
+        own = radius_m / float(np.sqrt(min(share, 1.0)))
+        widest = max(widest, own)
+        i, j, reach = int(x // radius_m), int(y // radius_m), int(np.ceil(widest / radius_m))
+        near = (
+            q for a in range(i - reach, i + reach + 1) for b in range(j - reach, j + reach + 1)
+            for q in buckets.get((a, b), ())
+        )  # fmt: skip
+        if all((x - qx) ** 2 + (y - qy) ** 2 >= max(own, qr) ** 2 for qx, qy, qr in near):
+            buckets.setdefault((i, j), []).append((float(x), float(y), own))
+            poses.append(Pose(float(x), float(y), float(yaw)))
+            if len(poses) >= limit:
+                break
+    return poses
+
+
+def nearest_on(path: Polyline, x: float, y: float) -> Pose:
+    """Give the point of a path nearest to (x, y), with the yaw that looks from (x, y) towards it."""
+    line = LineString(path)
+    p = line.interpolate(line.project(Point(x, y)))
+    return Pose(float(p.x), float(p.y), float(np.degrees(np.arctan2(p.y - y, p.x - x))))

@@ -1,0 +1,155 @@
+"""Grammar of layouts: streets with marks and kerbs, crossings, car parks."""
+
+from __future__ import annotations
+
+import numpy as np
+from shapely.affinity import rotate, translate
+from shapely.geometry import LineString
+from shapely.geometry.base import BaseGeometry
+
+from aerialdojo_gen.scenes.grammar_scatter import Polyline, Pose
+from aerialdojo_gen.scenes.ground import rectangle, ribbon
+from aerialdojo_gen.scenes.site import Site
+
+MARK_M = 0.15
+KERB_M = 0.12
+
+
+def street(
+    site: Site,
+    path: Polyline,
+    *,
+    lanes: int = 2,
+    lane_m: float = 3.25,
+    pavement_m: float = 2.0,
+    surface: str = "asphalt",
+    pavement: str = "paving",
+    marks: bool = True,
+) -> BaseGeometry:
+    """Paint a street: raised pavements, carriageway, edge lines, a dashed line between lanes.
+
+    Paint all streets of a scene before `junction`s, so that crossings lie clear.
+
+    Parameters
+    ----------
+    site : Site
+        Where.
+    path : sequence of (x, y)
+        Middle line, metres.
+    lanes, lane_m : int, float
+        Number and width of the lanes.
+    pavement_m : float
+        Width of the pavement on either side; 0 for none.
+    surface, pavement : str
+        Materials.
+    marks : bool
+        Whether it has lines.
+
+    Returns
+    -------
+    shapely geometry
+        The carriageway.
+    """
+    width = lanes * lane_m
+    road = ribbon(path, width)
+    if pavement_m > 0.0:
+        site.paint(ribbon(path, width + 2 * pavement_m), pavement, KERB_M)
+    site.paint(road, surface)
+    if marks:
+        for side in (-1, 1):
+            _line(site, path, side * (width / 2 - 0.3), dashed=False)
+        for k in range(1, lanes):
+            _line(site, path, k * lane_m - width / 2, dashed=not (lanes >= 4 and k * 2 == lanes))
+    return road
+
+
+def junction(site: Site, area: BaseGeometry, surface: str = "asphalt") -> None:
+    """Clear the ground where streets cross of lines and kerbs."""
+    site.paint(area, surface)
+
+
+def crossing(
+    site: Site, x: float, y: float, yaw_deg: float, length_m: float, width_m: float = 3.0, material: str = "marking"
+) -> None:
+    """Paint a zebra crossing about (x, y): walked along `yaw_deg` for `length_m`, stripes half a metre wide."""
+    count = int(length_m // 1.0)
+    for k in range(count):
+        u = (k - (count - 1) / 2) * 1.0
+        stripe = rectangle(u - 0.25, -width_m / 2, u + 0.25, width_m / 2)
+        site.paint(_posed(stripe, x, y, yaw_deg), material)
+
+
+def parking_row(
+    site: Site,
+    x: float,
+    y: float,
+    yaw_deg: float,
+    count: int,
+    *,
+    bay_m: tuple[float, float] = (2.6, 5.2),
+    z: float | None = None,
+    material: str = "marking",
+) -> list[Pose]:
+    """Mark a row of parking bays.
+
+    Parameters
+    ----------
+    site : Site
+        Where; with `z` nothing is painted (a deck's lines are the deck's own affair).
+    x, y : float
+        Middle of the row's closed side, metres.
+    yaw_deg : float
+        Direction that parked cars face (from the open side to the closed one), degrees.
+    count : int
+        Number of bays.
+    bay_m : (float, float)
+        Width and depth of a bay, metres.
+
+    Returns
+    -------
+    list of Pose
+        Middle of every bay, facing the closed side.
+    """
+    width, depth = bay_m
+    half = count * width / 2
+    if z is None:
+        for k in range(count + 1):
+            v = k * width - half
+            site.paint(_posed(rectangle(-depth, v - 0.06, 0.0, v + 0.06), x, y, yaw_deg), material)
+        site.paint(_posed(rectangle(-0.12, -half, 0.0, half), x, y, yaw_deg), material)
+    c, s = float(np.cos(np.radians(yaw_deg))), float(np.sin(np.radians(yaw_deg)))
+    poses = []
+    for k in range(count):
+        u, v = -depth / 2, (k + 0.5) * width - half
+        poses.append(Pose(x + c * u - s * v, y + s * u + c * v, yaw_deg))
+    return poses
+
+
+def arrow(site: Site, x: float, y: float, yaw_deg: float, length_m: float = 3.0, material: str = "marking") -> None:
+    """Paint a straight arrow on the ground that points along `yaw_deg`."""
+    shaft = rectangle(-length_m / 2, -0.09, length_m * 0.15, 0.09)
+    head = LineString([(length_m * 0.15, 0.0), (length_m / 2, 0.0)]).buffer(0.01).convex_hull.union(
+        rectangle(length_m * 0.15, -0.4, length_m * 0.16, 0.4)
+    ).convex_hull  # fmt: skip
+    site.paint(_posed(shaft.union(head), x, y, yaw_deg), material)
+
+
+def _line(site: Site, path: Polyline, offset_m: float, dashed: bool, dash_m: float = 2.0, gap_m: float = 3.0) -> None:
+    line = LineString(path)
+    if offset_m:
+        line = line.offset_curve(offset_m, join_style="mitre")
+    if line.is_empty or line.geom_type != "LineString":
+        return
+    if not dashed:
+        site.paint(line.buffer(MARK_M / 2, cap_style="flat", join_style="mitre"), "marking")
+        return
+    s = gap_m / 2
+    while s + dash_m <= line.length:
+        a, b, c = (line.interpolate(s + dash_m * t) for t in (0.0, 0.5, 1.0))
+        dash = LineString([(a.x, a.y), (b.x, b.y), (c.x, c.y)])
+        site.paint(dash.buffer(MARK_M / 2, cap_style="flat"), "marking")
+        s += dash_m + gap_m
+
+
+def _posed(area: BaseGeometry, x: float, y: float, yaw_deg: float) -> BaseGeometry:
+    return translate(rotate(area, yaw_deg, origin=(0, 0)), x, y)
