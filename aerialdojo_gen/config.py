@@ -61,6 +61,10 @@ class AnchorSampleConfig(Section):
 class ReferenceImagesConfig(Section):
     """Pictures of the objects for image goals."""
 
+    width: int = Field(320, ge=16, le=4096, description="columns, pixels")
+    height: int = Field(320, ge=16, le=4096, description="rows, pixels")
+    fov_deg: float = Field(90.0, gt=0, lt=180, description="horizontal field of view, as the drone's camera")
+
 
 class PairObjectsConfig(Section):
     """Candidate tasks: ordered pairs of objects times the start object's anchors."""
@@ -112,10 +116,22 @@ class SplitConfig(Section):
 
 
 class RenderConfig(Section):
-    """Recordings along the trajectories."""
+    """Recordings along the trajectories (paper: sensors)."""
 
-    limit: int | None = Field(None, ge=1, description="trajectories a scene and setting; all where absent")
+    limit: int | None = Field(2, ge=1, description="trajectories a scene and setting")
+    subset: Literal["train", "test", "all"] = Field("train", description="which side of the split is recorded")
     sampling: Literal["steps", "time"] = Field("steps", description="a frame a pose, or a constant frame rate")
+    views: tuple[Literal["front", "left", "right", "down"], ...] = Field(
+        ("front", "left", "right", "down"), min_length=1, description="cameras of the body"
+    )
+    width: int = Field(640, ge=16, le=4096, multiple_of=2, description="columns, pixels")
+    height: int = Field(640, ge=16, le=4096, multiple_of=2, description="rows, pixels")
+    fov_deg: float = Field(90.0, gt=0, lt=180, description="horizontal field of view")
+    fps: float = Field(15.0, gt=0, le=240, description="frames a second; for steps, how fast the video plays")
+    cruise_m_s: float = Field(3.0, gt=0, description="speed along the path, for sampling by time")
+    yaw_rate_deg_s: float = Field(90.0, gt=0, description="speed of turns, for sampling by time")
+    crf: int = Field(23, ge=0, le=51, description="quality of the pictures' H.264, lower is better")
+    trajectories_per_part: int = Field(2, ge=1, description="recordings that share a shard")
 
 
 class Pipeline(Section):
