@@ -1,0 +1,72 @@
+"""Which trajectories of a scene are recorded, and in which shard."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+from aerialdojo_gen import rng, store
+from aerialdojo_gen.config import RenderConfig
+from aerialdojo_gen.schemas import SETTINGS
+
+
+def subsets(config: RenderConfig) -> tuple[str, ...]:
+    """Return the tables of routes that the configuration records."""
+    return ("routes/train", "routes/test") if config.subset == "all" else (f"routes/{config.subset}",)
+
+
+def choose(rows: Iterable[Mapping[str, Any]], limit: int | None, seed: int) -> list[str]:
+    """Draw a sample of each length setting.
+
+    Parameters
+    ----------
+    rows : iterable of mapping
+        With ``nav_id`` and ``setting``.
+    limit : int or None
+        At most so many a setting; None for all.
+    seed : int
+        The pipeline's seed.
+
+    Returns
+    -------
+    list of str
+        The navigation tasks, sorted; a larger limit only adds to them.
+    """
+    by_setting: dict[str, list[str]] = {setting: [] for setting in SETTINGS}
+    for row in rows:
+        by_setting[row["setting"]].append(row["nav_id"])
+    return sorted(
+        nav_id
+        for ids in by_setting.values()
+        for nav_id in sorted(ids, key=lambda i: (rng.rank(seed, "render", i), i))[:limit]
+    )
+
+
+def n_parts(data: Path, scene: str, config: RenderConfig) -> int:
+    """Count the shards of a scene: `trajectories_per_part` recordings each, at least one shard.
+
+    Parameters
+    ----------
+    data : Path
+        The data directory.
+    scene : str
+        Name of the scene.
+    config : RenderConfig
+
+    Returns
+    -------
+    int
+
+    Raises
+    ------
+    StoreError
+        The scene's routes are missing.
+    """
+    rows = [
+        row
+        for table in subsets(config)
+        for row in store.read_scene(data, table, scene).select(["nav_id", "setting"]).to_pylist()
+    ]
+    # How many are drawn does not depend on the seed; which, does.
+    return max(1, -(-len(choose(rows, config.limit, 0)) // config.trajectories_per_part))

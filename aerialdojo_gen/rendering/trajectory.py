@@ -1,0 +1,110 @@
+"""From a route's poses to the poses of a recording's frames."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from aerialdojo_gen.geometry.frames import wrap_angle_rad
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class FramePoses:
+    """Where the body is in every frame.
+
+    Attributes
+    ----------
+    time_s : (n,) float64
+        Since the first frame.
+    step : (n,) int32
+        Trajectory pose that the frame belongs to: the last one reached.
+    action : (n,) int8
+        Action under way: the one done at that pose.
+    position : (n, 3) float64
+        The body's centre, metres, world frame.
+    yaw_rad : (n,) float64
+        In (-π, π] where it is interpolated, as stored where it is not.
+    """
+
+    time_s: Floats
+    step: NDArray[np.int32]
+    action: NDArray[np.int8]
+    position: Floats
+    yaw_rad: Floats
+
+
+def by_steps(position: ArrayLike, yaw_rad: ArrayLike, action: ArrayLike, fps: float) -> FramePoses:
+    """One frame a trajectory pose.
+
+    Parameters
+    ----------
+    position : (n, 3) array_like
+        Metres, world frame.
+    yaw_rad : (n,) array_like
+        Radians.
+    action : (n,) array_like
+        Ids of `aerialdojo_gen.schemas.ACTION_NAMES`.
+    fps : float
+        At which the video plays: time is a matter of display here.
+
+    Returns
+    -------
+    FramePoses
+        n frames.
+    """
+    p = np.asarray(position, dtype=np.float64)
+    step = np.arange(len(p), dtype=np.int32)
+    yaw = np.asarray(yaw_rad, dtype=np.float64)
+    return FramePoses(step / fps, step, np.asarray(action, dtype=np.int8), p, yaw)
+
+
+def by_time(
+    position: ArrayLike, yaw_rad: ArrayLike, action: ArrayLike, fps: float, cruise_m_s: float, yaw_rate_deg_s: float
+) -> FramePoses:
+    """Frames at a constant rate along the path.
+
+    The body flies every segment at cruise speed and turns at the yaw rate, the short way round; a segment that does
+    both takes the longer of the two times.
+
+    Parameters
+    ----------
+    position, yaw_rad, action
+        As for `by_steps`.
+    fps : float
+        Frames a second.
+    cruise_m_s : float
+        Metres a second.
+    yaw_rate_deg_s : float
+        Degrees a second.
+
+    Returns
+    -------
+    FramePoses
+        The first frame is the first pose, the last frame the last pose.
+    """
+    p, yaw = np.asarray(position, dtype=np.float64), np.asarray(yaw_rad, dtype=np.float64)
+    turn = wrap_angle_rad(np.diff(yaw))
+    seconds = np.maximum(
+        np.linalg.norm(np.diff(p, axis=0), axis=1) / cruise_m_s, np.abs(np.degrees(turn)) / yaw_rate_deg_s
+    )
+    arrival = np.concatenate([[0.0], np.cumsum(seconds)])
+    # An ulp over a whole number of frames is no frame more.
+    n = int(np.ceil(arrival[-1] * fps - 1e-9)) + 1
+    time = np.arange(n) / fps
+    flown = np.minimum(time, arrival[-1])
+    step = np.searchsorted(arrival, flown + 1e-12, side="right") - 1
+    step[-1] = len(p) - 1
+    k = np.minimum(step, len(p) - 2) if len(p) > 1 else np.zeros(n, dtype=np.int64)
+    if len(p) == 1:
+        at, heading = np.repeat(p, n, axis=0), np.repeat(yaw, n)
+    else:
+        share = np.divide(flown - arrival[k], seconds[k], out=np.ones(n), where=seconds[k] > 0)
+        share = np.clip(share, 0.0, 1.0)
+        at = p[k] + share[:, None] * (p[k + 1] - p[k])
+        heading = np.asarray(wrap_angle_rad(yaw[k] + share * turn[k]))
+        at[-1], heading[-1] = p[-1], yaw[-1]
+    return FramePoses(time, step.astype(np.int32), np.asarray(action, dtype=np.int8)[step], at, heading)
