@@ -78,11 +78,13 @@ def open_pipeline(path: Path | None, data: Path) -> tuple[Pipeline, Roots]:
     pipeline = load_pipeline(path or home() / "pipelines" / DEFAULT_PIPELINE)
     roots = Roots(
         data=data.absolute(),
-        scene_assets=pipeline.scene_assets or home() / "scene_assets",
+        scene_assets=(assets := pipeline.scene_assets or home() / "scene_assets"),
+        recipes=pipeline.recipes or assets / "scenes",
         annotations=pipeline.annotations or home() / "annotations",
     )
-    if not roots.scene_assets.is_dir():
-        raise ConfigError(f"no folder {roots.scene_assets}: set scene_assets in the pipeline file")
+    for key, folder in (("scene_assets", roots.scene_assets), ("recipes", roots.recipes)):
+        if not folder.is_dir():
+            raise ConfigError(f"no folder {folder}: set {key} in the pipeline file")
     return pipeline, roots
 
 
@@ -140,7 +142,7 @@ def _run(
     from aerialdojo_gen.progress import Reporter
 
     reporter = Reporter(quiet=quiet)
-    scenes = runner.choose_scenes(scene or config.scenes, runner.known_scenes(roots.scene_assets))
+    scenes = runner.choose_scenes(scene or config.scenes, runner.known_scenes(roots.recipes))
     workers = workers or default_workers()
     runner.run(stages, scenes, config, roots, workers=workers, force=force, reporter=reporter)
     if any(stage.name == "split" for stage in stages):

@@ -141,7 +141,8 @@ class Pipeline(Section):
     seed: int = Field(0, ge=0, description="seed of every random draw")
     scenes: tuple[str, ...] = Field(("*",), description="names or globs of the scenes to make")
     stages: tuple[str, ...] | None = Field(None, description="stages that `run` runs; all where absent")
-    scene_assets: Path | None = Field(None, description="folder of recipes and props, relative to the file")
+    scene_assets: Path | None = Field(None, description="folder of props and materials, relative to the file")
+    recipes: Path | None = Field(None, description="folder of recipes; scene_assets/scenes where absent")
     annotations: Path | None = Field(None, description="folder of annotation files, relative to the file")
     embodiment: Embodiment = Embodiment()
     build_scenes: BuildScenesConfig = Field(BuildScenesConfig(), alias="build-scenes")
@@ -188,7 +189,7 @@ def load_pipeline(path: Path) -> Pipeline:
         raise ConfigError(f"no pipeline file {path}{hint}") from None
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         raise ConfigError(f"{path}: {error}") from None
-    for key in ("scene_assets", "annotations"):
+    for key in ("scene_assets", "recipes", "annotations"):
         if isinstance(raw.get(key), str):
             raw[key] = (path.parent / raw[key]).resolve()
     try:

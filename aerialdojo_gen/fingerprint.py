@@ -74,7 +74,7 @@ def scene_fingerprint(stage: Stage, pipeline: Pipeline, roots: Roots, scene: str
 
 
 def _short(path: Path, roots: Roots, package: Path) -> str:
-    for root in (roots.scene_assets, roots.annotations, package):
+    for root in (roots.recipes, roots.scene_assets, roots.annotations, package):
         if path.is_relative_to(root):
             return str(path.relative_to(root))
     return path.name

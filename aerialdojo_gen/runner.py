@@ -215,9 +215,9 @@ def _together(errors: Sequence[AerialDojoError]) -> AerialDojoError:
     return type(errors[0])("\n".join(messages))
 
 
-def known_scenes(scene_assets: Path) -> list[str]:
+def known_scenes(recipes: Path) -> list[str]:
     """List the scenes that have a recipe, by name."""
-    return sorted(path.stem for path in (scene_assets / "scenes").glob("*.toml"))
+    return sorted(path.stem for path in recipes.glob("*.toml"))
 
 
 def choose_scenes(patterns: Sequence[str], known: Sequence[str]) -> list[str]:
@@ -229,7 +229,7 @@ def choose_scenes(patterns: Sequence[str], known: Sequence[str]) -> list[str]:
         A pattern matches nothing; the message gives the nearest names.
     """
     if not known:
-        raise UsageError("there are no scenes: scene_assets/scenes holds no recipe")
+        raise UsageError("there are no scenes: the folder of recipes is empty")
     chosen = set()
     for pattern in patterns:
         matches = fnmatch.filter(known, pattern)

@@ -32,13 +32,16 @@ class Roots:
     data : Path
         The data directory: every table and file that stages write.
     scene_assets : Path
-        Recipes, props and materials.
+        Props and materials.
+    recipes : Path
+        Recipes, one TOML file a scene.
     annotations : Path
         Annotation files.
     """
 
     data: Path
     scene_assets: Path
+    recipes: Path
     annotations: Path
 
 
@@ -169,7 +172,7 @@ def _scene_sources(roots: Roots, scene: str) -> list[Path]:
     # A layout is code: the scene package's modules are assets of the scene as much as the recipe is.
     package = Path(__file__).parent / "scenes"
     return [
-        roots.scene_assets / "scenes" / f"{scene}.toml",
+        roots.recipes / f"{scene}.toml",
         roots.scene_assets / "materials.toml",
         *sorted((roots.scene_assets / "props").glob("*.toml")),
         *sorted(package.rglob("*.py")),

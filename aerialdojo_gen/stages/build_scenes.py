@@ -26,7 +26,7 @@ def run(job: Job, config: BuildScenesConfig) -> Output:
     Parameters
     ----------
     job : Job
-        Names the scene; its recipe is ``scene_assets/scenes/<scene>.toml``.
+        Names the scene; its recipe is ``<recipes>/<scene>.toml``.
     config : BuildScenesConfig
         Nothing to set.
 
@@ -41,7 +41,7 @@ def run(job: Job, config: BuildScenesConfig) -> Output:
         The recipe or the catalogue is wrong.
     """
     catalogue = load_catalogue(job.roots.scene_assets)
-    scene = build_scene(job.roots.scene_assets / "scenes" / f"{job.scene}.toml", catalogue)
+    scene = build_scene(job.roots.recipes / f"{job.scene}.toml", catalogue)
     relative = f"scenes/{job.scene}/{job.scene}.glb"
     with job.output_file(relative) as path:
         write_glb(scene, path)
