@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from shapely.affinity import rotate, translate
 from shapely.geometry import LineString
 from shapely.geometry.base import BaseGeometry
+from shapely.ops import substring, unary_union
 
 from aerialdojo_gen.scenes.grammar_scatter import Polyline, Pose
 from aerialdojo_gen.scenes.ground import rectangle, ribbon
@@ -13,11 +16,12 @@ from aerialdojo_gen.scenes.site import Site
 
 MARK_M = 0.15
 KERB_M = 0.12
+_DASH_M, _GAP_M = 2.0, 3.0
 
 
-def street(
+def streets(
     site: Site,
-    path: Polyline,
+    paths: Sequence[Polyline],
     *,
     lanes: int = 2,
     lane_m: float = 3.25,
@@ -26,16 +30,14 @@ def street(
     pavement: str = "paving",
     marks: bool = True,
 ) -> BaseGeometry:
-    """Paint a street: raised pavements, carriageway, edge lines, a dashed line between lanes.
-
-    Paint all streets of a scene before `junction`s, so that crossings lie clear.
+    """Paint streets that may cross: raised pavements, carriageways, edge lines, a dashed line between lanes.
 
     Parameters
     ----------
     site : Site
         Where.
-    path : sequence of (x, y)
-        Middle line, metres.
+    paths : sequence of polylines
+        Middle lines, metres.
     lanes, lane_m : int, float
         Number and width of the lanes.
     pavement_m : float
@@ -43,29 +45,27 @@ def street(
     surface, pavement : str
         Materials.
     marks : bool
-        Whether it has lines.
+        Whether there are lines; they stop at junctions.
 
     Returns
     -------
     shapely geometry
-        The carriageway.
+        All carriageways.
     """
     width = lanes * lane_m
-    road = ribbon(path, width)
+    roads = [ribbon(path, width) for path in paths]
     if pavement_m > 0.0:
-        site.paint(ribbon(path, width + 2 * pavement_m), pavement, KERB_M)
-    site.paint(road, surface)
+        site.paint(unary_union([ribbon(path, width + 2 * pavement_m) for path in paths]), pavement, KERB_M)
+    carriageways = unary_union(roads)
+    site.paint(carriageways, surface)
     if marks:
-        for side in (-1, 1):
-            _line(site, path, side * (width / 2 - 0.3), dashed=False)
-        for k in range(1, lanes):
-            _line(site, path, k * lane_m - width / 2, dashed=not (lanes >= 4 and k * 2 == lanes))
-    return road
-
-
-def junction(site: Site, area: BaseGeometry, surface: str = "asphalt") -> None:
-    """Clear the ground where streets cross of lines and kerbs."""
-    site.paint(area, surface)
+        for k, path in enumerate(paths):
+            others = unary_union([r.buffer(1.0) for j, r in enumerate(roads) if j != k])
+            for side in (-1, 1):
+                _line(site, path, side * (width / 2 - 0.3), False, others)
+            for lane in range(1, lanes):
+                _line(site, path, lane * lane_m - width / 2, not (lanes >= 4 and lane * 2 == lanes), others)
+    return carriageways
 
 
 def crossing(
@@ -115,8 +115,8 @@ def parking_row(
     if z is None:
         for k in range(count + 1):
             v = k * width - half
-            site.paint(_posed(rectangle(-depth, v - 0.06, 0.0, v + 0.06), x, y, yaw_deg), material)
-        site.paint(_posed(rectangle(-0.12, -half, 0.0, half), x, y, yaw_deg), material)
+            site.paint(_posed(rectangle(-depth, v - MARK_M / 2, 0.0, v + MARK_M / 2), x, y, yaw_deg), material)
+        site.paint(_posed(rectangle(-MARK_M, -half, 0.0, half), x, y, yaw_deg), material)
     c, s = float(np.cos(np.radians(yaw_deg))), float(np.sin(np.radians(yaw_deg)))
     poses = []
     for k in range(count):
@@ -134,21 +134,20 @@ def arrow(site: Site, x: float, y: float, yaw_deg: float, length_m: float = 3.0,
     site.paint(_posed(shaft.union(head), x, y, yaw_deg), material)
 
 
-def _line(site: Site, path: Polyline, offset_m: float, dashed: bool, dash_m: float = 2.0, gap_m: float = 3.0) -> None:
+def _line(site: Site, path: Polyline, offset_m: float, dashed: bool, clear: BaseGeometry) -> None:
     line = LineString(path)
     if offset_m:
         line = line.offset_curve(offset_m, join_style="mitre")
-    if line.is_empty or line.geom_type != "LineString":
-        return
-    if not dashed:
-        site.paint(line.buffer(MARK_M / 2, cap_style="flat", join_style="mitre"), "marking")
-        return
-    s = gap_m / 2
-    while s + dash_m <= line.length:
-        a, b, c = (line.interpolate(s + dash_m * t) for t in (0.0, 0.5, 1.0))
-        dash = LineString([(a.x, a.y), (b.x, b.y), (c.x, c.y)])
-        site.paint(dash.buffer(MARK_M / 2, cap_style="flat"), "marking")
-        s += dash_m + gap_m
+    for leg in getattr(line, "geoms", [line]):
+        if not dashed:
+            mark = leg.buffer(MARK_M / 2, cap_style="flat", join_style="mitre").difference(clear)
+            if not mark.is_empty:
+                site.paint(mark, "marking")
+            continue
+        for s in np.arange(_GAP_M / 2, leg.length - _DASH_M, _DASH_M + _GAP_M):
+            dash = substring(leg, s, s + _DASH_M).buffer(MARK_M / 2, cap_style="flat")
+            if not dash.intersects(clear):
+                site.paint(dash, "marking")
 
 
 def _posed(area: BaseGeometry, x: float, y: float, yaw_deg: float) -> BaseGeometry:
