@@ -147,6 +147,12 @@ def _run(
     runner.run(stages, scenes, config, roots, workers=workers, force=force, reporter=reporter)
     if any(stage.name == "split" for stage in stages):
         from aerialdojo_gen.release.card import write_card
+        from aerialdojo_gen.store import prune_release
+
+        if scene is None:
+            # The whole pipeline was asked for: the release holds its scenes and no others.
+            for gone in prune_release(roots.data, scenes):
+                reporter.line(f"release: {gone} is no scene of this pipeline, removed")
 
         reporter.line(f"release: {write_card(roots.data).parent}")
 

@@ -385,6 +385,21 @@ def prune(data: Path, table: str, scene: str, parts: int) -> None:
             path.unlink(missing_ok=True)
 
 
+def release_scenes(data: Path) -> list[str]:
+    """List the scenes that the release holds, by name."""
+    return sorted(p.stem.removeprefix("part-") for p in (data / "release" / "scenes").glob("part-*.parquet"))
+
+
+def prune_release(data: Path, scenes: Sequence[str]) -> list[str]:
+    """Remove the parts of all other scenes from the release; returns the names of those removed."""
+    gone = [scene for scene in release_scenes(data) if scene not in scenes]
+    for scene in gone:
+        for table, place in LAYOUT.items():
+            if place.template.startswith("release/"):
+                shard_path(data, table, scene).unlink(missing_ok=True)
+    return gone
+
+
 def _alive(pid: int) -> bool:
     if pid == os.getpid():
         return True

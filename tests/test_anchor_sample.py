@@ -22,7 +22,7 @@ RADIUS = Embodiment().radius_m
 
 
 def job(tmp_path, seed=0):
-    return Job("anchor-sample", "U_Test_0", 0, 1, seed, Embodiment(), Roots(tmp_path, tmp_path, tmp_path))
+    return Job("anchor-sample", "U_Test_0", 0, 1, seed, Embodiment(), Roots(tmp_path, tmp_path, tmp_path, tmp_path))
 
 
 def item(thing, object_id=0):

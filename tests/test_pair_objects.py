@@ -30,7 +30,7 @@ def anchor_rows(places, variants=3):
 def pair(data: Path, rows, config=None):
     config = config or PairObjectsConfig()
     store.write_shard(data, "anchors", SCENE, 0, store.from_rows(schemas.ANCHORS, rows))
-    job = Job("pair-objects", SCENE, 0, 1, 0, Embodiment(), Roots(data, data, data))
+    job = Job("pair-objects", SCENE, 0, 1, 0, Embodiment(), Roots(data, data, data, data))
     out = pair_objects.run(job, config)
     store.check_table(schemas.PAIRS, out.tables["pairs"])
     assert out.rows_out == out.tables["pairs"].num_rows
