@@ -1,0 +1,139 @@
+"""Whether a description fits anything but its own object.
+
+Two objects are told apart by the landmark nearest to them, the compass direction from it, and what the description
+asserts (`claims`). Rivals of an object are all instances of its category that share its landmark and direction,
+whether they are annotated or not: whoever searches the scene sees them all. A rival that every assertion fits, with
+the slack `claims.RIVAL_SLACK` on distances and angles, makes the description ambiguous.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aerialdojo_gen.annotations.claims import RIVAL_SLACK, Claim, Lexicon, Reading
+from aerialdojo_gen.annotations.relations import SceneGeometry
+from aerialdojo_gen.geometry.frames import compass_direction
+
+
+@dataclass(frozen=True)
+class Bearing:
+    """The nearest landmark in the plane, by its place in the list of landmarks, and the direction from it."""
+
+    landmark: int
+    direction: str
+
+
+def nearest_landmark(centre_m: NDArray[np.float64], landmarks_m: NDArray[np.float64]) -> Bearing | None:
+    """Find the landmark that an object is located by (paper, section on goals).
+
+    Parameters
+    ----------
+    centre_m : (2,) or (3,) float64
+        Centre of the object's box, metres, world frame; z plays no part.
+    landmarks_m : (n, 2) or (n, 3) float64
+        Centres of the landmarks' boxes.
+
+    Returns
+    -------
+    Bearing or None
+        Of landmarks at the same distance the first; None without landmarks or where the nearest coincides with
+        the object in the plane, so that there is no direction.
+    """
+    if len(landmarks_m) == 0:
+        return None
+    offset = np.asarray(centre_m)[:2] - np.asarray(landmarks_m)[:, :2]
+    # Millimetres: which landmark is nearest must not hang on the last bit of a square root.
+    nearest = int(np.argmin(np.round(np.hypot(offset[:, 0], offset[:, 1]), 3)))
+    dx, dy = float(offset[nearest, 0]), float(offset[nearest, 1])
+    return None if dx == 0.0 and dy == 0.0 else Bearing(nearest, compass_direction(dx, dy))
+
+
+class Ambiguity:
+    """The check of descriptions against one scene.
+
+    Parameters
+    ----------
+    geometry : SceneGeometry
+        The scene's.
+    lexicon : Lexicon
+        Its phrases.
+    landmarks : sequence of int
+        Indices of the landmarks' instances, in the order of their ids.
+    """
+
+    def __init__(self, geometry: SceneGeometry, lexicon: Lexicon, landmarks: Sequence[int]) -> None:
+        self.geometry = geometry
+        self.lexicon = lexicon
+        self.landmarks = tuple(landmarks)
+
+    @cached_property
+    def _bearings(self) -> list[Bearing | None]:
+        places = self.geometry.centres[list(self.landmarks)]
+        return [nearest_landmark(centre, places) for centre in self.geometry.centres]
+
+    @cached_property
+    def _alike(self) -> dict[tuple[str, Bearing | None], list[int]]:
+        groups: dict[tuple[str, Bearing | None], list[int]] = {}
+        for i, instance in enumerate(self.geometry.scene.instances):
+            groups.setdefault((instance.category, self._bearings[i]), []).append(i)
+        return groups
+
+    def bearing(self, i: int) -> Bearing | None:
+        """Nearest landmark and direction of an instance."""
+        return self._bearings[i]
+
+    def candidates(self, i: int) -> list[int]:
+        """Other instances of the same category, landmark and direction."""
+        category = self.geometry.scene.instances[i].category
+        return [j for j in self._alike[category, self._bearings[i]] if j != i]
+
+    def rivals(self, i: int, description: str) -> list[int]:
+        """Instances that a description of `i` fits as well.
+
+        Parameters
+        ----------
+        i : int
+            Index of the instance that is described.
+        description : str
+            English.
+
+        Returns
+        -------
+        list of int
+            Indices; empty where the description is unambiguous.
+        """
+        candidates = self.candidates(i)
+        if not candidates:
+            return []
+        reading = self.lexicon.read(description, i)
+        own = [value for value in reading.values if self.lexicon.has(i, value)]
+        return [
+            j
+            for j in candidates
+            if self.lexicon.fits(j, own)
+            and all(claim.holds(self.geometry, j, RIVAL_SLACK) for claim in reading.claims)
+        ]
+
+    def untruths(self, i: int, text: str) -> list[str]:
+        """What a name or description says that is not so of instance `i`, in words.
+
+        Values are held against the instance only where they stand right before its name: "with a white roof" is
+        no claim that the whole is white.
+        """
+        reading: Reading = self.lexicon.read(text, i)
+        instance = self.geometry.scene.instances[i]
+        wrong = [f"it is called {value!r}, and the mesh is not" for value in self._wrong(i, reading.named)]
+        return wrong + [
+            f"{claim.text!r} is not so of {instance.node}" for claim in reading.claims if not self._true(claim, i)
+        ]
+
+    def _wrong(self, i: int, values: Sequence[str]) -> list[str]:
+        return [value for value in values if self.lexicon.denied(i, value)]
+
+    def _true(self, claim: Claim, i: int) -> bool:
+        return claim.holds(self.geometry, i)

@@ -1,0 +1,245 @@
+"""What a description asserts, read out of its English by a small grammar.
+
+The reader knows three kinds of phrase: *things* (the names of the scene's categories and landmarks), *values* (of
+the instances' attributes: red, open, in the car park) and *relations* (beside, under, north of, between ... and).
+Values before a thing, or with no thing after them in the clause, belong to it or to the subject; a relation and the
+things after it make a claim. Whatever it does not know it passes over: a claim that is missed makes a description
+say less, so that the check of ambiguity is stricter for it, never laxer.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+
+from aerialdojo_gen.annotations.relations import SceneGeometry
+from aerialdojo_gen.schemas import DIRECTIONS
+
+RIVAL_SLACK = 1.35
+
+_TOKEN = re.compile(r"[a-z0-9']+|[,.;:!?()]")
+_STOPS = frozenset(".;:!?")
+
+
+def _relations() -> dict[str, str]:
+    phrases = {
+        "beside": "beside, right beside, next to, right next to, alongside, by, adjacent to, flanked by, close beside, "
+        "leaning against, at the foot of",
+        "near": "near, nearby, close to, not far from, a few steps from, a short way from, a short walk from, "
+        "surrounded by, behind, in front of, facing, around",
+        "on": "on, on top of, atop, upon, on the top of",
+        "under": "under, beneath, underneath, below, sheltered by, in the shade of, under the cover of",
+        "above": "above, over, high above",
+        "between": "between, in between",
+    }
+    table = {phrase.strip(): relation for relation, many in phrases.items() for phrase in many.split(",")}
+    for direction in DIRECTIONS:
+        for form in ("{} of", "to the {} of", "just {} of", "on the {} side of", "at the {} side of"):
+            table[form.format(direction)] = f"side:{direction}"
+    return table
+
+
+RELATIONS: Mapping[str, str] = _relations()
+
+
+@dataclass(frozen=True)
+class Claim:
+    """A relation that a description asserts of its object.
+
+    Attributes
+    ----------
+    relation : str
+        ``beside``, ``near``, ``on``, ``under``, ``above``, ``between`` or ``side:<compass direction>``.
+    things : tuple of frozenset of int
+        For each thing named, the instances that answer to what is said of it; two for ``between``, else one.
+    text : str
+        The words, for messages.
+    """
+
+    relation: str
+    things: tuple[frozenset[int], ...]
+    text: str
+
+    def holds(self, geometry: SceneGeometry, i: int, slack: float = 1.0) -> bool:
+        """Whether the claim is true of instance `i`; see `relations` for `slack`."""
+        reach = 15.0 * slack
+        close = set(geometry.around(i, reach))
+        sets = [sorted((things & close) - {i}) for things in self.things]
+        if self.relation == "between":
+            return len(sets) == 2 and any(geometry.between(i, j, k, slack) for j in sets[0] for k in sets[1])
+        if self.relation.startswith("side:"):
+            direction = self.relation.removeprefix("side:")
+            return any(geometry.side(i, j, direction, slack) for j in sets[0])
+        test = getattr(geometry, self.relation)
+        return any(test(i, j, slack) for j in sets[0])
+
+
+@dataclass(frozen=True)
+class Reading:
+    """What was read out of a text.
+
+    Attributes
+    ----------
+    values : tuple of str
+        Attribute values said of the subject, anywhere.
+    named : tuple of str
+        Those that stand directly before the subject's own name: what it is called.
+    claims : tuple of Claim
+        Relations asserted of the subject.
+    """
+
+    values: tuple[str, ...]
+    named: tuple[str, ...]
+    claims: tuple[Claim, ...]
+
+
+@dataclass
+class _State:
+    relation: str = ""
+    words: list[str] = field(default_factory=list)
+    pending: list[str] = field(default_factory=list)
+    values: list[str] = field(default_factory=list)
+    named: list[str] = field(default_factory=list)
+    first: frozenset[int] | None = None
+    adjacent: bool = False
+    claims: list[Claim] = field(default_factory=list)
+
+    def end_clause(self) -> None:
+        self.values += self.pending
+        self.pending, self.relation, self.words, self.first = [], "", [], None
+
+
+class Lexicon:
+    """The phrases that descriptions of a scene can be made of.
+
+    Parameters
+    ----------
+    geometry : SceneGeometry
+        The scene's.
+    names : mapping of str to str
+        What a person says for each category; a category that is not in it is called by its words.
+    landmarks : mapping of str to int
+        Name of each landmark and the index of its instance.
+    """
+
+    def __init__(self, geometry: SceneGeometry, names: Mapping[str, str], landmarks: Mapping[str, int]) -> None:
+        instances = geometry.scene.instances
+        self._attributes = [i.attributes for i in instances]
+        self._categories = [i.category for i in instances]
+        self._keys_of: dict[str, set[str]] = {}
+        self._phrases: dict[tuple[str, ...], tuple[str, str]] = {}
+        self._things: dict[str, frozenset[int]] = {}
+        by_name: dict[str, set[int]] = {}
+        for i, instance in enumerate(instances):
+            by_name.setdefault(names.get(instance.category, spoken(instance.category)).lower(), set()).add(i)
+        things = {name: frozenset(members) for name, members in by_name.items()}
+        things |= {name.lower(): frozenset([i]) for name, i in landmarks.items()}
+        values = {v for attributes in self._attributes for v in attributes.values()}
+        for attributes in self._attributes:
+            for key, value in attributes.items():
+                self._keys_of.setdefault(value.lower(), set()).add(key)
+        for phrase, relation in RELATIONS.items():
+            self._add(phrase, "relation", relation)
+        for value in sorted(values):
+            self._add(value, "value", value.lower())
+        for name in sorted(things):
+            self._things[name] = things[name]
+            for form in (plural(name), name):
+                self._add(form, "thing", name)
+        self._longest = max(map(len, self._phrases), default=0)
+
+    def _add(self, phrase: str, kind: str, meaning: str) -> None:
+        tokens = tuple(_TOKEN.findall(phrase.lower()))
+        if tokens:
+            self._phrases[tokens] = (kind, meaning)
+
+    def read(self, text: str, subject: int) -> Reading:
+        """Read a description or a name.
+
+        Parameters
+        ----------
+        text : str
+            English.
+        subject : int
+            Index of the instance that the text is of.
+
+        Returns
+        -------
+        Reading
+            What the text says of it.
+        """
+        tokens = _TOKEN.findall(text.lower())
+        state, at = _State(), 0
+        while at < len(tokens):
+            if tokens[at] in _STOPS or (tokens[at] in ",()" and state.first is None):
+                state.end_clause()
+            length, kind, meaning = self._match(tokens, at)
+            words = tokens[at : at + length]
+            if kind == "relation":
+                state.end_clause()
+                state.relation, state.words = meaning, list(words)
+            elif kind == "value":
+                state.pending.append(meaning)
+                state.words += words
+            elif kind == "thing":
+                self._thing(state, meaning, words, subject)
+            elif state.relation:
+                state.words += words
+            state.adjacent = kind == "value" or (state.adjacent and tokens[at] == "and")
+            at += length
+        state.end_clause()
+        return Reading(tuple(state.values), tuple(state.named), tuple(state.claims))
+
+    def _match(self, tokens: list[str], at: int) -> tuple[int, str, str]:
+        for length in range(min(self._longest, len(tokens) - at), 0, -1):
+            found = self._phrases.get(tuple(tokens[at : at + length]))
+            if found:
+                return length, *found
+        return 1, "", ""
+
+    def _thing(self, state: _State, name: str, words: list[str], subject: int) -> None:
+        members = self._things[name]
+        if state.relation:
+            chosen = frozenset(i for i in members if self.fits(i, state.pending))
+            text = " ".join([*state.words, *words])
+            if state.relation != "between":
+                state.claims.append(Claim(state.relation, (chosen,), text))
+            elif state.first is None:
+                state.first = chosen
+            else:
+                state.claims.append(Claim("between", (state.first, chosen), text))
+                state.first = None
+            state.words = [*state.words, *words]
+        elif subject in members:
+            state.values += state.pending
+            state.named += state.pending if state.adjacent else []
+        state.pending = []
+
+    def fits(self, i: int, values: Iterable[str]) -> bool:
+        """Whether values can be said of an instance; one of a kind that it does not have is passed over."""
+        return not any(self.denied(i, value) for value in values)
+
+    def denied(self, i: int, value: str) -> bool:
+        """Whether an instance has attributes of that value's kind, and none of them is that value."""
+        attributes = self._attributes[i]
+        own = [attributes[key].lower() for key in self._keys_of.get(value, ()) if key in attributes]
+        return bool(own) and value not in own
+
+    def has(self, i: int, value: str) -> bool:
+        """Whether an instance has that value."""
+        return value in {v.lower() for v in self._attributes[i].values()}
+
+
+def spoken(category: str) -> str:
+    """Say a category in words: ``delivery_van`` is a delivery van."""
+    return category.replace("_", " ")
+
+
+def plural(name: str) -> str:
+    """Make the plural of a name, by the regular rules."""
+    if name.endswith(("s", "x", "ch", "sh")):
+        return name + "es"
+    if name.endswith("y") and name[-2:-1] not in "aeiou":
+        return name[:-1] + "ies"
+    return name + "s"

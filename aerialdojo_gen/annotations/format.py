@@ -1,0 +1,219 @@
+"""The annotation file: a versioned JSON format, written so that diffs are small (see annotations/README.md)."""
+
+from __future__ import annotations
+
+import difflib
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, TypeVar
+
+from pydantic import BaseModel, ConfigDict, Field, StrictFloat, StrictInt, StrictStr, ValidationError
+
+from aerialdojo_gen.annotations.positions import Document, Fault, read_json
+
+FORMAT = "aerialdojo-annotations"
+VERSION = 1
+
+_KEYS = ("format", "version", "scene", "landmarks", "objects")
+_Id = Annotated[StrictInt, Field(ge=0, le=2**31 - 1)]
+_Finite = Annotated[StrictFloat, Field(allow_inf_nan=False)]
+
+
+class _Entry(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class Anchor(_Entry):
+    """A viewpoint that a person chose for an object.
+
+    Attributes
+    ----------
+    position_m : tuple of three float
+        Position of the body's centre, metres, world frame.
+    yaw_deg : float
+        Degrees, counter-clockwise from +x.
+    """
+
+    position_m: tuple[_Finite, _Finite, _Finite]
+    yaw_deg: _Finite
+
+
+class Landmark(_Entry):
+    """A landmark: an id, a name that is unique in the scene, and a node of the scene's mesh."""
+
+    id: _Id
+    name: StrictStr
+    node: StrictStr
+
+
+class Object(_Entry):
+    """A target object.
+
+    Attributes
+    ----------
+    id : int
+        Unique in the scene.
+    name : str
+        What a person would call it, e.g. ``"red delivery van"``.
+    category : str
+        Category of the catalogue, the node's own.
+    description : str
+        One to three sentences: what it looks like and what stands by it.
+    node : str
+        Node of the scene's mesh.
+    anchor : Anchor or None
+        The viewpoint that a person chose, where one did.
+    """
+
+    id: _Id
+    name: StrictStr
+    category: StrictStr
+    description: StrictStr
+    node: StrictStr
+    anchor: Anchor | None = None
+
+
+@dataclass(frozen=True)
+class Annotations:
+    """The content of one annotation file.
+
+    Attributes
+    ----------
+    scene : str
+        Name of the scene.
+    landmarks : tuple of Landmark
+    objects : tuple of Object
+    """
+
+    scene: str
+    landmarks: tuple[Landmark, ...]
+    objects: tuple[Object, ...]
+
+
+@dataclass(frozen=True)
+class Source:
+    """An annotation file as far as it could be read.
+
+    Attributes
+    ----------
+    document : Document
+        The JSON with the line of every value.
+    scene : str
+        What the file says, empty where it says nothing of the kind.
+    landmarks, objects : dict of int to entry
+        The well-formed entries by their index in the file.
+    faults : tuple of Fault
+        What is wrong with the form; an entry at fault is in neither dict.
+    """
+
+    document: Document
+    scene: str
+    landmarks: dict[int, Landmark]
+    objects: dict[int, Object]
+    faults: tuple[Fault, ...]
+
+    @property
+    def annotations(self) -> Annotations:
+        """The well-formed entries in the file's order."""
+        return Annotations(self.scene, tuple(self.landmarks.values()), tuple(self.objects.values()))
+
+
+_E = TypeVar("_E", bound=_Entry)
+
+
+def parse_annotations(text: str) -> Source:
+    """Read an annotation file's text.
+
+    Parameters
+    ----------
+    text : str
+        The whole file.
+
+    Returns
+    -------
+    Source
+        Every fault of the form is in it, with path and line; nothing is raised.
+    """
+    document = read_json(text)
+    faults = list(document.faults)
+    raw = document.value
+    if not isinstance(raw, dict):
+        if not faults:
+            faults.append(document.fault((), f"must be an object with the keys {', '.join(_KEYS)}"))
+        return Source(document, "", {}, {}, tuple(faults))
+    faults += [document.fault((key,), _unknown(key, _KEYS)) for key in raw if key not in _KEYS]
+    faults += [document.fault((), f"the key {key!r} is missing") for key in _KEYS if key not in raw]
+    if "format" in raw and raw["format"] != FORMAT:
+        faults.append(document.fault(("format",), f"must be {FORMAT!r}, is {raw['format']!r}"))
+    if "version" in raw and (raw["version"] != VERSION or isinstance(raw["version"], bool)):
+        faults.append(document.fault(("version",), f"version {raw['version']!r} is not known; this is {VERSION}"))
+    scene = raw.get("scene", "")
+    if not isinstance(scene, str):
+        faults.append(document.fault(("scene",), "must be a text"))
+        scene = ""
+    landmarks = _entries(document, "landmarks", raw.get("landmarks", []), Landmark, faults)
+    objects = _entries(document, "objects", raw.get("objects", []), Object, faults)
+    return Source(document, scene, landmarks, objects, tuple(faults))
+
+
+def format_annotations(annotations: Annotations) -> str:
+    """Write annotations as the file's text: two spaces of indent, one key a line, keys in a fixed order.
+
+    Parameters
+    ----------
+    annotations : Annotations
+        What to write; entries keep their order.
+
+    Returns
+    -------
+    str
+        `parse_annotations` reads the same back, and writing that gives the same text.
+    """
+    return json.dumps(
+        {
+            "format": FORMAT,
+            "version": VERSION,
+            "scene": annotations.scene,
+            "landmarks": [entry.model_dump() for entry in annotations.landmarks],
+            "objects": [entry.model_dump(exclude_none=True) for entry in annotations.objects],
+        },
+        indent=2,
+        ensure_ascii=False,
+    ) + "\n"  # fmt: skip
+
+
+def write_annotations(annotations: Annotations, path: Path) -> None:
+    """Write an annotation file, replacing one that is there only when the whole text is on disk."""
+    temporary = path.with_name(f".{path.name}.tmp")
+    temporary.write_text(format_annotations(annotations), encoding="utf-8")
+    temporary.replace(path)
+
+
+def _entries(document: Document, key: str, raw: Any, kind: type[_E], faults: list[Fault]) -> dict[int, _E]:
+    if not isinstance(raw, list):
+        faults.append(document.fault((key,), "must be a list"))
+        return {}
+    entries: dict[int, _E] = {}
+    for i, item in enumerate(raw):
+        try:
+            entries[i] = kind.model_validate(item)
+        except ValidationError as error:
+            for fault in error.errors():
+                path = (key, i, *fault["loc"])
+                faults.append(document.fault(path, _explain(fault["type"], fault["msg"], path, kind)))
+    return entries
+
+
+def _explain(kind: str, message: str, path: tuple[str | int, ...], model: type[_Entry]) -> str:
+    if kind == "extra_forbidden":
+        owner = Anchor if "anchor" in path[2:-1] else model
+        return _unknown(str(path[-1]), tuple(owner.model_fields))
+    if kind == "missing":
+        return "the key is missing"
+    return message
+
+
+def _unknown(key: str, known: tuple[str, ...]) -> str:
+    near = difflib.get_close_matches(key, known, n=1)
+    return f"unknown key {key!r}: " + (f"did you mean {near[0]!r}?" if near else f"known are {', '.join(known)}")

@@ -1,0 +1,141 @@
+"""JSON with the line of every value, so that a fault can be named by path and line."""
+
+from __future__ import annotations
+
+import json
+from bisect import bisect_left
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, cast
+
+JsonPath = tuple[str | int, ...]
+
+
+@dataclass(frozen=True)
+class Fault:
+    """Something wrong in an annotation file.
+
+    Attributes
+    ----------
+    line : int
+        Counted from 1; 0 where no line can be named.
+    path : str
+        JSON path, e.g. ``"objects[3].node"``; empty for the file itself.
+    message : str
+        What is wrong, and the mend where one can be guessed.
+    """
+
+    line: int
+    path: str
+    message: str
+
+    def __str__(self) -> str:
+        where = f"line {self.line}: " if self.line else ""
+        return f"{where}{self.path + ': ' if self.path else ''}{self.message}"
+
+
+@dataclass(frozen=True)
+class Document:
+    """A parsed JSON text.
+
+    Attributes
+    ----------
+    value : object
+        What `json.loads` would return; None where the text is not JSON.
+    lines : dict of path to int
+        Line of every value, counted from 1; the path ``()`` is the whole document.
+    faults : tuple of Fault
+        Syntax error, or keys that stand twice in one object.
+    """
+
+    value: Any
+    lines: dict[JsonPath, int]
+    faults: tuple[Fault, ...]
+
+    def fault(self, path: JsonPath, message: str) -> Fault:
+        """Make a fault of the value at a path; where no such value stands, of the nearest one around it."""
+        known = path
+        while known and known not in self.lines:
+            known = known[:-1]
+        return Fault(self.lines.get(known, 0), dotted(path), message)
+
+
+def dotted(path: JsonPath) -> str:
+    """Write a path as ``objects[3].node``."""
+    text = ""
+    for key in path:
+        text += f"[{key}]" if isinstance(key, int) else f".{key}"
+    return text.removeprefix(".")
+
+
+@dataclass(frozen=True)
+class _Located:
+    value: Any
+    offset: int
+
+
+class _Decoder(json.JSONDecoder):
+    """The standard library's own decoder, in its Python form, with the offset of every value kept."""
+
+    def __init__(self) -> None:
+        super().__init__(object_pairs_hook=_Pairs)
+        scan: Callable[[str, int], tuple[Any, int]]
+
+        def located(text: str, start: int) -> tuple[_Located, int]:
+            value, end = scan(text, start)
+            return _Located(value, start), end
+
+        # The scanner hands its own inner function to these two: put ours in its place.
+        module = cast(Any, json.decoder)
+        vars(self)["parse_object"] = lambda at, strict, _, *rest: module.JSONObject(at, strict, located, *rest)
+        vars(self)["parse_array"] = lambda at, _: module.JSONArray(at, located)
+        scan = cast(Any, json.scanner).py_make_scanner(self)
+        vars(self)["scan_once"] = located
+
+
+class _Pairs(list[tuple[str, _Located]]):
+    """Keys and values of an object, in order, duplicates included."""
+
+
+def read_json(text: str) -> Document:
+    """Parse a JSON text and note where every value stands.
+
+    Parameters
+    ----------
+    text : str
+        One JSON document.
+
+    Returns
+    -------
+    Document
+        A syntax error is a fault in it, with ``value`` None; of a key that stands twice the last value is kept.
+    """
+    try:
+        root = cast(_Located, _Decoder().decode(text))
+    except json.JSONDecodeError as error:
+        return Document(None, {}, (Fault(error.lineno, "", f"not JSON: {error.msg} (column {error.colno})"),))
+    except (RecursionError, ValueError) as error:
+        return Document(None, {}, (Fault(0, "", f"not readable as JSON: {error}"),))
+    starts = [i for i, c in enumerate(text) if c == "\n"]
+    lines: dict[JsonPath, int] = {}
+    faults: list[Fault] = []
+    value = _unwrap(root, (), starts, lines, faults)
+    return Document(value, lines, tuple(faults))
+
+
+def _unwrap(
+    node: _Located, path: JsonPath, newlines: list[int], lines: dict[JsonPath, int], faults: list[Fault]
+) -> Any:
+    lines[path] = bisect_left(newlines, node.offset) + 1
+    if isinstance(node.value, _Pairs):
+        plain: dict[str, Any] = {}
+        for key, child in node.value:
+            inner = _unwrap(child, (*path, key), newlines, lines, faults)
+            if key in plain:
+                fault = Fault(lines[*path, key], dotted((*path, key)), f"the key {key!r} stands twice in one object")
+                faults.append(fault)
+            plain[key] = inner
+        return plain
+    if isinstance(node.value, list):
+        return [_unwrap(child, (*path, i), newlines, lines, faults) for i, child in enumerate(node.value)]
+    return node.value

@@ -1,0 +1,192 @@
+"""How the things of a scene stand to one another, computed from their meshes.
+
+The relations are those that descriptions speak of. Each takes a `slack`: with 1 it says whether a person could
+truly say so; with more it asks whether somebody might still think so, which is what a rival of a description gets.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import cached_property
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from aerialdojo_gen.geometry.frames import wrap_angle_rad
+from aerialdojo_gen.scenes.model import Scene
+from aerialdojo_gen.schemas import DIRECTIONS
+
+Floats = NDArray[np.float64]
+
+BESIDE_M = 3.0
+NEAR_M = 8.0
+SIDE_M = 10.0
+BETWEEN_M = 6.0
+COVER_M = 12.0
+BETWEEN_DEG = 120.0
+_LARGE_M = 10.0  # above it a thing's outline is its projected mesh; below, the convex hull is as good and cheaper
+_MANY_FACES = 20_000
+_TOUCH_M = 0.35
+
+
+class SceneGeometry:
+    """Distances and relations between the instances of a scene, each computed when first asked for.
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene; instances are named by their index in it.
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        self.scene = scene
+        self.index = {instance.node: i for i, instance in enumerate(scene.instances)}
+        self.boxes: Floats = np.array([instance.bounds for instance in scene.instances]).reshape(-1, 2, 3)
+        self.centres: Floats = self.boxes.mean(axis=1)
+        self._outlines: dict[int, shapely.Geometry] = {}
+        self._supports: dict[int, int | None] = {}
+        self._covers: dict[int, frozenset[int]] = {}
+
+    @cached_property
+    def _tree(self) -> shapely.STRtree:
+        low, high = self.boxes[:, 0], self.boxes[:, 1]
+        return shapely.STRtree(shapely.box(low[:, 0], low[:, 1], high[:, 0], high[:, 1]))
+
+    def outline(self, i: int) -> shapely.Geometry:
+        """The outline of an instance on the ground, metres."""
+        if i not in self._outlines:
+            instance = self.scene.instances[i]
+            xy = instance.vertices[:, :2]
+            if np.ptp(xy, axis=0).max() < _LARGE_M or len(instance.faces) > _MANY_FACES:
+                outline = shapely.convex_hull(shapely.multipoints(xy))
+            else:
+                triangles = shapely.polygons(xy[instance.faces])
+                solid = shapely.area(triangles) > 1e-6
+                hull = shapely.convex_hull(shapely.multipoints(xy))
+                outline = shapely.union_all(triangles[solid], grid_size=1e-3) if solid.any() else hull
+            shapely.prepare(outline)
+            self._outlines[i] = outline
+        return self._outlines[i]
+
+    def gap_m(self, i: int, j: int) -> float:
+        """Distance between two instances: horizontally between outlines, vertically between height ranges."""
+        return math.hypot(self.level_gap_m(i, j), self._rise_m(i, j))
+
+    def level_gap_m(self, i: int, j: int) -> float:
+        """Horizontal distance between the outlines of two instances, metres."""
+        return float(shapely.distance(self.outline(i), self.outline(j)))
+
+    def _rise_m(self, i: int, j: int) -> float:
+        (low_i, high_i), (low_j, high_j) = self.boxes[i, :, 2], self.boxes[j, :, 2]
+        return max(0.0, float(low_j - high_i), float(low_i - high_j))
+
+    def around(self, i: int, radius_m: float) -> list[int]:
+        """Instances whose box comes within a distance of an instance's box, by index, itself left out."""
+        (x0, y0, z0), (x1, y1, z1) = self.boxes[i]
+        r = radius_m
+        hits = np.sort(self._tree.query(shapely.box(x0 - r, y0 - r, x1 + r, y1 + r)))
+        level = (self.boxes[hits, 0, 2] <= z1 + r) & (self.boxes[hits, 1, 2] >= z0 - r)
+        return [int(j) for j in hits[level] if j != i]
+
+    def support(self, i: int) -> int | None:
+        """The instance that an instance stands on: the highest surface within a hand's breadth of its bottom."""
+        if i not in self._supports:
+            low = float(self.boxes[i, 0, 2])
+            best: tuple[float, int] | None = None
+            for x, y in self._probes(i):
+                for j, heights in self._columns(i, x, y):
+                    below = heights[heights <= low + _TOUCH_M]
+                    if len(below) and below.max() >= low - _TOUCH_M and (best is None or below.max() > best[0]):
+                        best = (float(below.max()), j)
+            self._supports[i] = None if best is None else best[1]
+        return self._supports[i]
+
+    def covers(self, i: int) -> frozenset[int]:
+        """The instances that have a surface overhead, at most `COVER_M` above an instance's top."""
+        if i not in self._covers:
+            high = float(self.boxes[i, 1, 2])
+            x, y = self.centres[i, :2]
+            self._covers[i] = frozenset(
+                j
+                for j, heights in self._columns(i, float(x), float(y))
+                if ((heights >= high - 0.05) & (heights <= high + COVER_M)).any()
+            )
+        return self._covers[i]
+
+    def _probes(self, i: int) -> list[tuple[float, float]]:
+        (x, y), (rx, ry) = self.centres[i, :2], 0.3 * (self.boxes[i, 1, :2] - self.boxes[i, 0, :2])
+        return [(x, y), (x - rx, y - ry), (x + rx, y - ry), (x - rx, y + ry), (x + rx, y + ry)]
+
+    def _columns(self, i: int, x: float, y: float) -> list[tuple[int, Floats]]:
+        """Every other instance with surfaces above or below a place, and the heights of those."""
+        found = []
+        for j in np.sort(self._tree.query(shapely.Point(x, y))):
+            if j != i:
+                heights = self._heights(int(j), x, y)
+                if len(heights):
+                    found.append((int(j), heights))
+        return found
+
+    def _heights(self, j: int, x: float, y: float) -> Floats:
+        instance = self.scene.instances[j]
+        a, b, c = np.moveaxis(instance.vertices[instance.faces], 1, 0)
+        det = (b[:, 1] - c[:, 1]) * (a[:, 0] - c[:, 0]) + (c[:, 0] - b[:, 0]) * (a[:, 1] - c[:, 1])
+        flat = np.abs(det) > 1e-12
+        a, b, c, det = a[flat], b[flat], c[flat], det[flat]
+        u = ((b[:, 1] - c[:, 1]) * (x - c[:, 0]) + (c[:, 0] - b[:, 0]) * (y - c[:, 1])) / det
+        v = ((c[:, 1] - a[:, 1]) * (x - c[:, 0]) + (a[:, 0] - c[:, 0]) * (y - c[:, 1])) / det
+        inside = (u >= 0.0) & (v >= 0.0) & (u + v <= 1.0)
+        z: Floats = (u * a[:, 2] + v * b[:, 2] + (1.0 - u - v) * c[:, 2])[inside]
+        return z
+
+    def bearing_rad(self, i: int, j: int) -> float | None:
+        """Direction from the nearest point of `j`'s outline to the middle of `i`; None within the outline."""
+        x, y = self.centres[i, :2]
+        here = shapely.Point(x, y)
+        line = shapely.shortest_line(self.outline(j), here)
+        if line is None or shapely.length(line) < 0.05:
+            return None
+        px, py = line.coords[0]
+        return math.atan2(y - py, x - px)
+
+    def beside(self, i: int, j: int, slack: float = 1.0) -> bool:
+        """`i` stands within arm's reach of `j`, and not on, under or over it."""
+        if self.gap_m(i, j) > BESIDE_M * slack or j in self.covers(i) or i in self.covers(j):
+            return False
+        stacked = self.support(i) == j or self.support(j) == i
+        within = self.level_gap_m(i, j) == 0.0 and float(np.ptp(self.boxes[j, :, :2], axis=0).max()) > _LARGE_M
+        return not stacked and not within
+
+    def near(self, i: int, j: int, slack: float = 1.0) -> bool:
+        """`i` stands a few steps from `j`."""
+        return self.gap_m(i, j) <= NEAR_M * slack
+
+    def on(self, i: int, j: int, slack: float = 1.0) -> bool:
+        """`i` stands on `j`."""
+        return self.support(i) == j
+
+    def under(self, i: int, j: int, slack: float = 1.0) -> bool:
+        """`j` has a surface overhead of `i`."""
+        return j in self.covers(i)
+
+    def above(self, i: int, j: int, slack: float = 1.0) -> bool:
+        """`i` is overhead of `j`, or on it."""
+        return i in self.covers(j) or self.support(i) == j
+
+    def side(self, i: int, j: int, direction: str, slack: float = 1.0) -> bool:
+        """`i` stands in that compass direction of `j`, not far away."""
+        bearing = self.bearing_rad(i, j)
+        if bearing is None or self.gap_m(i, j) > SIDE_M * slack:
+            return False
+        middle = math.radians(45.0 * DIRECTIONS.index(direction))
+        return abs(float(wrap_angle_rad(bearing - middle))) <= math.radians(22.5) * slack
+
+    def between(self, i: int, j: int, k: int, slack: float = 1.0) -> bool:
+        """`i` stands between `j` and `k`: both close by and on opposite sides."""
+        if j == k or max(self.gap_m(i, j), self.gap_m(i, k)) > BETWEEN_M * slack:
+            return False
+        a, b = self.bearing_rad(i, j), self.bearing_rad(i, k)
+        return a is not None and b is not None and bool(
+            abs(float(wrap_angle_rad(a - b))) >= math.radians(BETWEEN_DEG) / slack
+        )  # fmt: skip
