@@ -1,7 +1,7 @@
 """Writers of the recordings: RGB as H.264 in MP4, depth without loss as FFV1 in Matroska.
 
-Depth is stored as 16-bit grey: planar depth in whole millimetres, rounded. 0 means that nothing lies within range: the
-sky, or a surface farther than 65.535 m. Both writers give the same bytes for the same frames.
+Depth is stored as 16-bit grey: planar depth in whole millimetres, rounded. 0 means that nothing lies within range:
+the sky, or a surface farther than 65.535 m. Both writers give the same bytes for the same frames.
 """
 
 from __future__ import annotations

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import weakref
 from collections.abc import Sequence
 
 import cv2
@@ -10,11 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from aerialdojo_gen.geometry.cameras import Camera, look_at_pose
-from aerialdojo_gen.rendering.world import RenderWorld
+from aerialdojo_gen.rendering.world import render_world
 from aerialdojo_gen.scenes.model import Scene
-
-# The last scene's world: several views of it are then cheap, and memory stays that of one scene.
-_latest: list[tuple[weakref.ref[Scene], RenderWorld]] = []
 
 
 def look_at(
@@ -38,7 +34,7 @@ def look_at(
     (height, width, 3) uint8
         sRGB.
     """
-    return _world(scene).render(Camera(width, height, fov_deg), look_at_pose(eye, target)).rgb
+    return render_world(scene).render(Camera(width, height, fov_deg), look_at_pose(eye, target)).rgb
 
 
 def contact_sheet(
@@ -80,13 +76,3 @@ def contact_sheet(
             sheet[top : top + head, left : left + width] = cell
         sheet[top + head : top + head + image.shape[0], left : left + image.shape[1]] = image
     return sheet
-
-
-def _world(scene: Scene) -> RenderWorld:
-    if _latest and _latest[0][0]() is scene:
-        return _latest[0][1]
-    while _latest:
-        _latest.pop()[1].close()
-    world = RenderWorld(scene)
-    _latest.append((weakref.ref(scene), world))
-    return world

@@ -83,7 +83,7 @@ def shade(
     depth_m: NDArray[np.float32],
     surface: NDArray[np.int32],
     light: Lighting,
-) -> NDArray[np.uint8]:
+) -> tuple[NDArray[np.uint8], float]:
     """Light a picture.
 
     Parameters
@@ -100,21 +100,24 @@ def shade(
 
     Returns
     -------
-    (H, W, 3) uint8
+    rgb : (H, W, 3) uint8
         sRGB.
+    behind_fraction : float
+        Share of the pixels showing a surface that see its back; 0 where no pixel shows one.
     """
     out = np.empty_like(albedo)
-    _shade(
+    hits, behind = _shade(
         albedo, depth_m, surface, camera.focal_px, np.ascontiguousarray(world_from_camera), light.normal,
         light.colour, light.texel_m, light.sun, light.zenith, light.horizon, out,
     )  # fmt: skip
-    return out
+    return out, behind / max(hits, 1)
 
 
 @njit(cache=True)
 def _shade(albedo, depth, surface, focal, pose, normal, colour, texel, sun, zenith, horizon, out):  # type: ignore[no-untyped-def]
     height, width = depth.shape
     base = np.empty(3)
+    hits, behind = 0, 0
     for row in range(height):
         y = (row + 0.5 - height / 2.0) / focal
         for col in range(width):
@@ -133,7 +136,9 @@ def _shade(albedo, depth, surface, focal, pose, normal, colour, texel, sun, zeni
             z = depth[row, col]
             nx, ny, nz = normal[k, 0], normal[k, 1], normal[k, 2]
             facing = -(dx * nx + dy * ny + dz * nz) / stretch
+            hits += 1
             if facing < 0.0:
+                behind += 1
                 nx, ny, nz, facing = -nx, -ny, -nz, -facing
             for c in range(3):
                 base[c] = colour[k, c]
@@ -151,3 +156,4 @@ def _shade(albedo, depth, surface, focal, pose, normal, colour, texel, sun, zeni
                 value = base[c] * level
                 value += (horizon[c] - value) * haze
                 out[row, col, c] = np.uint8(min(255.0, value + 0.5))
+    return hits, behind

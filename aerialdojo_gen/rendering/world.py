@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tempfile
+import weakref
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 
 from aerialdojo_gen.errors import RenderError
 from aerialdojo_gen.geometry.cameras import Camera
+from aerialdojo_gen.geometry.rays import RayCaster
 from aerialdojo_gen.rendering.shading import Lighting, lighting, shade
 from aerialdojo_gen.rendering.surfaces import Surface, surfaces
 from aerialdojo_gen.scenes.model import Material, Scene
@@ -33,10 +35,13 @@ class Picture:
         sRGB.
     depth_m : (H, W) float32
         Planar depth, metres; inf where nothing is hit.
+    behind_fraction : float
+        Share of the pixels showing a surface that see its back: near 1 for a camera inside a solid.
     """
 
     rgb: NDArray[np.uint8]
     depth_m: NDArray[np.float32]
+    behind_fraction: float = 0.0
 
 
 class RenderWorld:
@@ -102,7 +107,8 @@ class RenderWorld:
         Picture
         """
         albedo, depth, surface = self.rasterise(camera, world_from_camera)
-        return Picture(shade(camera, world_from_camera, albedo, depth, surface, self._light), depth)
+        rgb, behind = shade(camera, world_from_camera, albedo, depth, surface, self._light)
+        return Picture(rgb, depth, behind)
 
     def rasterise(
         self, camera: Camera, world_from_camera: Floats
@@ -159,6 +165,27 @@ class RenderWorld:
     ) -> None:
         """Free the renderer's memory."""
         self.close()
+
+
+# The last scene's renderer and ray caster: the next view of it is then cheap, and memory stays that of one scene.
+_worlds: list[tuple[weakref.ref[Scene], RenderWorld]] = []
+_casters: list[tuple[weakref.ref[Scene], RayCaster]] = []
+
+
+def render_world(scene: Scene) -> RenderWorld:
+    """Return a renderer of the scene, kept until that of another scene is asked for; not for the caller to close."""
+    if not _worlds or _worlds[0][0]() is not scene:
+        while _worlds:
+            _worlds.pop()[1].close()
+        _worlds.append((weakref.ref(scene), RenderWorld(scene)))
+    return _worlds[0][1]
+
+
+def ray_caster(scene: Scene) -> RayCaster:
+    """Return a ray caster of the scene, kept until that of another scene is asked for."""
+    if not _casters or _casters[0][0]() is not scene:
+        _casters[:] = [(weakref.ref(scene), RayCaster(scene))]
+    return _casters[0][1]
 
 
 def write_obj(path: Path, surface: Surface) -> None:

@@ -1,0 +1,152 @@
+"""Checks of rendered frames against what the camera must have seen.
+
+Flags, in the order of `FLAGS`:
+
+- ``black``: nearly all of the picture is black
+- ``uniform``: one colour fills the picture
+- ``frozen``: picture and depth equal those of the frame before, though the camera has moved
+- ``depth_invalid``: depth is NaN, negative, or nearer than the near plane
+- ``depth_mismatch``: depth is not what ray casts say at sampled pixels
+- ``camera_inside``: the camera looks at most surfaces from behind, or touches one
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aerialdojo_gen.geometry.cameras import Camera
+from aerialdojo_gen.geometry.rays import RayCaster
+from aerialdojo_gen.rendering.codecs import MAX_DEPTH_M
+from aerialdojo_gen.rendering.world import NEAR_M, Picture
+
+Floats = NDArray[np.float64]
+
+FLAGS = ("black", "uniform", "frozen", "depth_invalid", "depth_mismatch", "camera_inside")
+OF_DEPTH = frozenset({"depth_invalid", "depth_mismatch", "camera_inside"})
+OF_RGB = frozenset({"black", "uniform", "frozen", "camera_inside"})
+
+_BLACK_LEVEL, _BLACK_SHARE = 8, 0.98
+_UNIFORM_RANGE = 6
+_BEHIND_SHARE = 0.5
+_SAMPLES_A_SIDE = 9
+_DEPTH_TOLERANCE_M = 0.01
+# One bad sample among 81 may be a sliver between two triangles; a wrong image has many.
+_MISMATCH_SHARE = 0.03
+
+
+@dataclass
+class ViewChecks:
+    """Checks of one view's frames, in their order.
+
+    Attributes
+    ----------
+    camera : Camera
+    rays : RayCaster
+        Over the scene that is rendered.
+    flags : set of str
+        What has been found so far.
+    """
+
+    camera: Camera
+    rays: RayCaster
+    flags: set[str] = field(default_factory=set)
+    _picture: Picture | None = None
+    _pose: Floats | None = None
+
+    def add(self, picture: Picture, world_from_camera: Floats) -> None:
+        """Check the next frame.
+
+        Parameters
+        ----------
+        picture : Picture
+        world_from_camera : (4, 4) float64
+        """
+        self.flags |= picture_flags(picture)
+        if not self.flags & {"depth_invalid"} and self.mismatch(picture, world_from_camera) > _MISMATCH_SHARE:
+            self.flags.add("depth_mismatch")
+        before = self._picture
+        if (
+            before is not None
+            and self._pose is not None
+            and not np.allclose(self._pose, world_from_camera, rtol=0.0, atol=1e-4)
+            and "uniform" not in picture_flags(picture)
+            and np.array_equal(before.rgb, picture.rgb)
+            and np.array_equal(before.depth_m, picture.depth_m)
+        ):
+            self.flags.add("frozen")
+        self._picture, self._pose = picture, world_from_camera
+
+    def mismatch(self, picture: Picture, world_from_camera: Floats) -> float:
+        """Compare depth with ray casts at a lattice of pixels.
+
+        Pixels at edges are left out: they have no one depth. An edge is where inverse depth, linear on any plane,
+        bends within the pixel's neighbours.
+
+        Parameters
+        ----------
+        picture : Picture
+        world_from_camera : (4, 4) float64
+
+        Returns
+        -------
+        float
+            Share of the compared pixels that differ by more than 1 cm (and the depth buffer's own resolution).
+        """
+        h, w = picture.depth_m.shape
+        n = _SAMPLES_A_SIDE
+        rows, cols = (a.ravel() for a in np.meshgrid(_lattice(h, n), _lattice(w, n), indexing="ij"))
+        depth = picture.depth_m.astype(np.float64)
+        here = depth[rows, cols]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            inverse = [1.0 / depth[rows + r, cols + c] for r, c in ((0, 0), (-1, 0), (1, 0), (0, -1), (0, 1))]
+            bend = np.maximum(
+                np.abs(inverse[1] + inverse[2] - 2 * inverse[0]), np.abs(inverse[3] + inverse[4] - 2 * inverse[0])
+            )
+            smooth = np.where(np.isfinite(here), bend * here**2 < _DEPTH_TOLERANCE_M / 2, bend == 0.0)
+        f = self.camera.focal_px
+        local = np.stack([(cols + 0.5 - w / 2) / f, (rows + 0.5 - h / 2) / f, np.ones(len(rows))], axis=1)
+        along, _ = self.rays.first_hit(world_from_camera[:3, 3], local @ world_from_camera[:3, :3].T)
+        cast = along / np.linalg.norm(local, axis=1)
+        near = np.minimum(here, cast) <= MAX_DEPTH_M
+        compared = smooth & near
+        if not compared.any():
+            return 0.0
+        with np.errstate(invalid="ignore"):
+            wrong = ~(np.abs(here - cast) <= _DEPTH_TOLERANCE_M + 2e-6 * here**2)
+        return float(wrong[compared].mean())
+
+
+def picture_flags(picture: Picture) -> set[str]:
+    """Check a frame by itself.
+
+    Parameters
+    ----------
+    picture : Picture
+
+    Returns
+    -------
+    set of str
+        Of ``black``, ``uniform``, ``depth_invalid``, ``camera_inside``.
+    """
+    flags = set()
+    coarse = picture.rgb[::4, ::4].reshape(-1, 3)
+    if (coarse.max(axis=1) < _BLACK_LEVEL).mean() > _BLACK_SHARE:
+        flags.add("black")
+    if int(np.ptp(coarse, axis=0).max()) <= _UNIFORM_RANGE:
+        flags.add("uniform")
+    depth = picture.depth_m
+    nearest = float(np.min(depth))
+    if np.isnan(nearest) or nearest < 0.99 * NEAR_M:
+        flags.add("depth_invalid")
+    elif nearest < 1.2 * NEAR_M:
+        flags.add("camera_inside")
+    if picture.behind_fraction > _BEHIND_SHARE:
+        flags.add("camera_inside")
+    return flags
+
+
+def _lattice(n: int, k: int) -> NDArray[np.int64]:
+    return np.unique(np.linspace(1, n - 2, k + 2)[1:-1].astype(np.int64))

@@ -1,0 +1,113 @@
+"""`reference-images`: the picture of every object from its selected anchor, for image goals."""
+
+from __future__ import annotations
+
+import hashlib
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from aerialdojo_gen import store
+from aerialdojo_gen.config import ReferenceImagesConfig
+from aerialdojo_gen.errors import RenderError
+from aerialdojo_gen.geometry.cameras import Camera, view_pose
+from aerialdojo_gen.geometry.rays import RayCaster
+from aerialdojo_gen.rendering.world import ray_caster, render_world
+from aerialdojo_gen.schemas import REFERENCES
+from aerialdojo_gen.stage import Job, Output
+
+_BOX = ("box_u0_px", "box_v0_px", "box_u1_px", "box_v1_px")
+
+
+def run(job: Job, config: ReferenceImagesConfig) -> Output:
+    """Take the front view from every object's selected anchor.
+
+    Parameters
+    ----------
+    job : Job
+        Reads ``objects`` and ``anchors``.
+    config : ReferenceImagesConfig
+
+    Returns
+    -------
+    Output
+        ``references``, a row an object; an object without a selected anchor has no picture (``no_anchor``), one that
+        its picture does not show has no box (``not_in_view``).
+    """
+    objects = job.read("objects").to_pylist()
+    anchors = {row["object_id"]: row for row in job.read("anchors").to_pylist() if row["selected"]}
+    scene = job.scene_model()
+    world, rays = render_world(scene), ray_caster(scene)
+    index = {node: k for k, node in enumerate(rays.nodes)}
+    camera = Camera(config.width, config.height, config.fov_deg)
+    counts = {"no_anchor": 0, "not_in_view": 0}
+    rows = []
+    for item in objects:
+        row: dict[str, Any] = {
+            "scene": job.scene,
+            "object_id": item["object_id"],
+            "reference_image_id": reference_id(job.scene, item["object_id"]),
+            "reference_image": None,
+            **dict.fromkeys(_BOX),
+            "image_fraction": None,
+        }
+        rows.append(row)
+        anchor = anchors.get(item["object_id"])
+        if anchor is None:
+            counts["no_anchor"] += 1
+            continue
+        pose = view_pose((anchor["x_m"], anchor["y_m"], anchor["z_m"]), anchor["yaw_rad"], "front")
+        row["reference_image"] = png(world.render(camera, pose).rgb)
+        mask = instance_map(rays, camera, pose) == index[item["mesh_node"]]
+        row["image_fraction"] = float(mask.mean())
+        if mask.any():
+            row |= zip(_BOX, box_of(mask), strict=True)
+        else:
+            counts["not_in_view"] += 1
+    pictures = sum(row["reference_image"] is not None for row in rows)
+    return Output({"references": store.from_rows(REFERENCES, rows)}, len(objects), pictures, counts)
+
+
+def reference_id(scene: str, object_id: int) -> str:
+    """Name an object's picture without giving the object away: ``ref_`` and 12 hexadecimal digits."""
+    return "ref_" + hashlib.blake2b(f"{scene}/{object_id}".encode(), digest_size=6).hexdigest()
+
+
+def instance_map(rays: RayCaster, camera: Camera, world_from_camera: NDArray[np.float64]) -> NDArray[np.int32]:
+    """Which instance every pixel shows.
+
+    Parameters
+    ----------
+    rays : RayCaster
+    camera : Camera
+    world_from_camera : (4, 4) float64
+
+    Returns
+    -------
+    (H, W) int32
+        Index into ``rays.nodes``, -1 for the sky.
+    """
+    directions = camera.rays().reshape(-1, 3) @ world_from_camera[:3, :3].T
+    return rays.first_hit(world_from_camera[:3, 3], directions)[1].reshape(camera.height, camera.width)
+
+
+def box_of(mask: NDArray[np.bool_]) -> tuple[int, int, int, int]:
+    """Smallest box around a mask's pixels: left, top, one past right, one past bottom; the mask is not empty."""
+    rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
+    return int(columns[0]), int(rows[0]), int(columns[-1]) + 1, int(rows[-1]) + 1
+
+
+def png(rgb: NDArray[np.uint8]) -> bytes:
+    """Encode a picture as PNG; the same bytes for the same picture.
+
+    Raises
+    ------
+    RenderError
+        OpenCV cannot encode it.
+    """
+    done, encoded = cv2.imencode(".png", np.ascontiguousarray(rgb[..., ::-1]), [cv2.IMWRITE_PNG_COMPRESSION, 7])
+    if not done:
+        raise RenderError(f"a picture of shape {rgb.shape} does not encode as PNG")
+    return encoded.tobytes()
