@@ -37,7 +37,7 @@ def rows_of_objects():
 def rows_of_anchors():
     for i in range(N_OBJECTS):
         for a in range(3):
-            x, y, z = position(i) + [1.5, 0.5 * a, 0]
+            x, y, z = position(i) + np.array([1.5, 0.5 * a, 0])
             yield {
                 "scene": SCENE, "object_id": i, "anchor_id": a, "x_m": x, "y_m": y, "z_m": z, "yaw_rad": 0.1 * a,
                 "clearance_m": 1.0, "surface_distance_m": 1.0, "visible_fraction": 0.5, "score": 1.0 - 0.1 * a,
@@ -76,7 +76,8 @@ def data(tmp_path_factory):
         "max_z_m": 20.0, "ceiling_m": 20.0, "n_triangles": 12, "n_instances": 7, "n_categories": 2,
     }  # fmt: skip
     landmark = {
-        "scene": SCENE, "landmark_id": 0, "name": "tower", "mesh_node": "tower_000", "x_m": 0.0, "y_m": 0.0, "z_m": 5.0
+        "scene": SCENE, "landmark_id": 0, "name": "tower", "mesh_node": "tower_000",
+        "x_m": 0.0, "y_m": 0.0, "z_m": 5.0,
     }  # fmt: skip
     references = [
         {
@@ -132,13 +133,8 @@ def test_train_share_and_both_instances_on_one_side(data):
 
 def test_tasks_tell_the_start_and_nothing_of_the_goal(data):
     tasks, routes = load(data, "tasks").set_index("nav_id"), load(data, "routes").set_index("nav_id")
-    assert set(tasks.columns).isdisjoint(
-        {
-            c
-            for c in routes.columns
-            if c.startswith(("goal", "target_o", "start_o", "start_a", "len", "euc", "x_", "y_"))
-        }
-    )
+    telling = ("goal", "target_o", "start_o", "start_a", "len", "euc", "x_", "y_")
+    assert set(tasks.columns).isdisjoint({c for c in routes.columns if c.startswith(telling)})
     for name, row in tasks.iterrows():
         route = routes.loc[name]
         assert row["start_x_m"] == route["x_m"][0]

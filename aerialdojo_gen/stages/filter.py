@@ -57,12 +57,13 @@ def judge(
         inside = solved & (length_m >= rule.min_length_m) & (length_m < rule.max_length_m)
         setting[inside] = name
         over |= inside & (n_actions > rule.action_budget)
-    ratio = np.divide(length_m, euclidean_m, out=np.full(len(outcome), np.inf), where=euclidean_m > 0)
+    # A product, not a ratio: it has no division by a d_E of zero.
+    near_straight = length_m < config.min_detour_ratio * euclidean_m
     rules = [
         ("too_close", euclidean_m <= config.min_euclidean_m),
         ("too_short", length_m < config.base.min_length_m),
         ("too_long", length_m >= config.long_horizon.max_length_m),
-        ("near_straight", ratio < config.min_detour_ratio),
+        ("near_straight", near_straight),
         ("over_budget", over),
     ]
     reason = np.full(len(outcome), KEPT, dtype="U24")
