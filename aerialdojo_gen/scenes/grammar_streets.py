@@ -69,14 +69,17 @@ def streets(
 
 
 def crossing(
-    site: Site, x: float, y: float, yaw_deg: float, length_m: float, width_m: float = 3.0, material: str = "marking"
+    site: Site, x: float, y: float, yaw_deg: float, length_m: float, width_m: float = 3.0, surface: str = "asphalt"
 ) -> None:
     """Paint a zebra crossing about (x, y): walked along `yaw_deg` for `length_m`, stripes half a metre wide."""
+    site.paint(
+        _posed(rectangle(-length_m / 2, -width_m / 2 - 0.5, length_m / 2, width_m / 2 + 0.5), x, y, yaw_deg), surface
+    )
     count = int(length_m // 1.0)
     for k in range(count):
         u = (k - (count - 1) / 2) * 1.0
         stripe = rectangle(u - 0.25, -width_m / 2, u + 0.25, width_m / 2)
-        site.paint(_posed(stripe, x, y, yaw_deg), material)
+        site.paint(_posed(stripe, x, y, yaw_deg), "marking")
 
 
 def parking_row(

@@ -46,6 +46,35 @@ def cells(size: int, count: int, rng: np.random.Generator) -> tuple[Floats, Floa
     return first, second, owner[:, 0].reshape(size, size)
 
 
+def leaves(
+    image: Floats, rng: np.random.Generator, count: int, length_px: tuple[float, float], tones: Floats
+) -> Floats:
+    """Strew small pointed leaves over an image, each in one of the tones (n, 3), darker towards its rim."""
+    size = len(image)
+    out = image.copy()
+    reach = int(np.ceil(length_px[1] / 2)) + 1
+    dy, dx = np.mgrid[-reach : reach + 1, -reach : reach + 1].astype(np.float64)
+    for x, y, turn, length, slim in rng.uniform(
+        (0, 0, 0, length_px[0], 0.35), (size, size, 2 * np.pi, length_px[1], 0.6), size=(count, 5)
+    ):
+        u = (dx * np.cos(turn) + dy * np.sin(turn)) / (length / 2)
+        v = (-dx * np.sin(turn) + dy * np.cos(turn)) / (length / 2 * slim)
+        rim = u**2 + np.abs(v) * (1.0 + 0.4 * np.abs(u))
+        inside = rim < 1.0
+        rows = (int(y) + np.arange(-reach, reach + 1)) % size
+        columns = (int(x) + np.arange(-reach, reach + 1)) % size
+        window = out[np.ix_(rows, columns)]
+        tone = tones[int(rng.integers(len(tones)))] * rng.uniform(0.85, 1.12)
+        light = 1.08 - 0.3 * rim + np.where(np.abs(v) < 0.18, 0.08, 0.0)
+        out[np.ix_(rows, columns)] = np.where(inside[..., None], tone * light[..., None], window)
+    return out
+
+
+def balanced(image: Floats, colour: Floats) -> Floats:
+    """Scale an image so that its mean is the colour: a surface seen from afar keeps the tint asked for."""
+    return np.asarray(image * (colour / np.maximum(image.mean(axis=(0, 1)), 1.0)))
+
+
 def texture_rng(name: str) -> np.random.Generator:
     """Give the generator of a texture: the pattern depends on its name alone, not on its colour."""
     return generator(0, "texture", name)

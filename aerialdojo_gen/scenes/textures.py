@@ -11,6 +11,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from aerialdojo_gen.scenes.noise import balanced
 from aerialdojo_gen.scenes.textures_built import BUILT
 from aerialdojo_gen.scenes.textures_natural import NATURAL
 
@@ -33,7 +34,10 @@ def make_texture(name: str, colour: tuple[int, int, int]) -> NDArray[np.uint8]:
     (H, W, 3) uint8
         sRGB, 64 to 256 pixels on a side, wrapping around without a seam; read-only.
     """
-    image = TEXTURES[name](np.array(colour, dtype=np.float64))
+    base = np.array(colour, dtype=np.float64)
+    image = TEXTURES[name](base)
+    if name in NATURAL:
+        image = balanced(image, base)
     out = np.clip(np.rint(image), 0, 255).astype(np.uint8)
     out.flags.writeable = False
     return out

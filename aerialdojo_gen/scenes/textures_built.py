@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from aerialdojo_gen.scenes.noise import Floats, cells, fractal, shade, texture_rng, value_noise
+from aerialdojo_gen.scenes.noise import Floats, fractal, shade, texture_rng, value_noise
 from aerialdojo_gen.scenes.textures_facade import FACADES
 
 Generator = Callable[[Floats], Floats]
@@ -36,9 +36,14 @@ def tiles(colour: Floats) -> Floats:
 def cobbles(colour: Floats) -> Floats:
     """Cobblestones, drawn for 1.5 m."""
     rng = texture_rng("cobbles")
-    first, second, owner = cells(256, 140, rng)
-    tone = rng.uniform(0.8, 1.15, size=140)[owner]
-    return shade(colour, tone * np.clip((second - first) / 0.025, 0.45, 1.0))
+    y, x = np.mgrid[0:256, 0:256] / 32.0
+    row = np.floor(y)
+    across = x + 0.5 * (row % 2) + 0.12 * value_noise(256, 8, rng)
+    up = y + 0.1 * value_noise(256, 8, rng)
+    column, row = np.floor(across).astype(int) % 8, np.floor(up).astype(int) % 8
+    tone = rng.uniform(0.82, 1.15, size=(8, 8))[row, column]
+    dome = ((across % 1.0 - 0.5) ** 4 + (up % 1.0 - 0.5) ** 4) * 16.0
+    return shade(colour, tone * np.clip(1.08 - 0.7 * dome, 0.5, 1.08) * (1 + 0.04 * fractal(256, 16, 3, rng)))
 
 
 def asphalt(colour: Floats) -> Floats:

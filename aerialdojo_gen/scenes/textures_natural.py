@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from aerialdojo_gen.scenes.noise import Floats, cells, fractal, shade, texture_rng, value_noise
+from aerialdojo_gen.scenes.noise import Floats, cells, fractal, leaves, shade, texture_rng, value_noise
 
 Generator = Callable[[Floats], Floats]
 
@@ -14,9 +14,10 @@ Generator = Callable[[Floats], Floats]
 def grass(colour: Floats) -> Floats:
     """Lawn: short blades in clumps, drawn for 4 m."""
     rng = texture_rng("grass")
-    clumps, blades = fractal(256, 6, 3, rng), value_noise(256, 128, rng, 64) + value_noise(256, 64, rng, 128)
-    image = shade(colour, 1.0 + 0.07 * clumps + 0.16 * blades)
-    image[..., 0] += 9.0 * clumps
+    clumps = fractal(256, 12, 3, rng, 0.7)
+    blades = value_noise(256, 128, rng, 64) + value_noise(256, 64, rng, 128)
+    image = shade(colour, 1.0 + 0.045 * clumps + 0.17 * blades)
+    image[..., 0] += 6.0 * clumps
     return image
 
 
@@ -43,10 +44,10 @@ def dirt(colour: Floats) -> Floats:
 def gravel(colour: Floats) -> Floats:
     """Loose stones, drawn for 2 m."""
     rng = texture_rng("gravel")
-    first, second, owner = cells(256, 500, rng)
-    tone = rng.uniform(0.75, 1.2, size=500)[owner]
-    joint = np.clip((second - first) / 0.012, 0.35, 1.0)
-    warm = rng.uniform(-8, 8, size=500)[owner]
+    first, second, owner = cells(256, 900, rng)
+    tone = rng.uniform(0.7, 1.25, size=900)[owner]
+    joint = np.clip((second - first) / 0.008, 0.55, 1.0)
+    warm = rng.uniform(-8, 8, size=900)[owner]
     image = shade(colour, tone * joint)
     image[..., 0] += warm
     image[..., 2] -= warm
@@ -107,13 +108,9 @@ def birch_bark(colour: Floats) -> Floats:
 def foliage(colour: Floats) -> Floats:
     """Leaves, lit above and dark between, drawn for 2 m."""
     rng = texture_rng("foliage")
-    first, second, owner = cells(256, 420, rng)
-    tone = rng.uniform(0.7, 1.3, size=420)[owner]
-    edge = np.clip((second - first) / 0.02, 0.45, 1.0)
-    gaps = np.clip(1.0 + 0.25 * fractal(256, 6, 3, rng), 0.55, 1.25)
-    image = shade(colour, tone * edge * gaps)
-    image[..., 0] += rng.uniform(-14, 18, size=420)[owner]
-    return image
+    depth = np.clip(0.55 + 0.12 * fractal(256, 8, 3, rng), 0.35, 0.8)
+    tints = np.array([[1.0, 1.0, 1.0], [1.15, 1.1, 0.85], [0.82, 0.9, 0.9], [0.7, 0.82, 0.75], [1.25, 1.18, 0.8]])
+    return leaves(shade(colour, depth), rng, 900, (9.0, 17.0), colour * tints)
 
 
 def needles(colour: Floats) -> Floats:
@@ -125,15 +122,13 @@ def needles(colour: Floats) -> Floats:
 
 
 def leaf_litter(colour: Floats) -> Floats:
-    """Forest floor: fallen leaves and needles on earth, drawn for 3 m."""
+    """Forest floor: fallen leaves, twigs and moss on earth, drawn for 3 m."""
     rng = texture_rng("leaf_litter")
-    first, second, owner = cells(256, 650, rng)
-    tone = rng.uniform(0.65, 1.3, size=650)[owner]
-    image = shade(colour, tone * np.clip((second - first) / 0.014, 0.5, 1.0) * (1 + 0.08 * fractal(256, 5, 3, rng)))
-    tint = rng.uniform(-1, 1, size=650)[owner]
-    image[..., 0] += 16.0 * tint
-    image[..., 1] -= 5.0 * tint
-    return image
+    image = shade(colour * 0.82, 1.0 + 0.13 * fractal(256, 8, 5, rng, 0.75))
+    tints = np.array([[1.2, 1.05, 0.9], [0.85, 0.84, 0.85], [1.32, 1.0, 0.7], [1.05, 1.12, 0.8], [0.7, 0.68, 0.7]])
+    image = leaves(image, rng, 700, (5.0, 10.0), colour * tints)
+    green = np.clip(fractal(256, 10, 3, rng) - 0.9, 0, 0.7)[..., None]
+    return image * (1 - 0.6 * green) + colour * np.array([0.72, 1.05, 0.6]) * 0.6 * green
 
 
 def moss(colour: Floats) -> Floats:
@@ -162,13 +157,15 @@ def mud(colour: Floats) -> Floats:
 
 
 def rubble(colour: Floats) -> Floats:
-    """Broken masonry, drawn for 3 m."""
+    """Broken masonry in dust, drawn for 3 m."""
     rng = texture_rng("rubble")
-    first, second, owner = cells(256, 160, rng)
-    tone = rng.uniform(0.6, 1.25, size=160)[owner]
-    image = shade(colour, tone * np.clip((second - first) / 0.02, 0.3, 1.0) * (1 + 0.06 * fractal(256, 16, 3, rng)))
-    brick = (rng.uniform(size=160) < 0.16)[owner][..., None]
-    return np.where(brick, image * np.array([1.12, 0.72, 0.6]), image)
+    first, second, owner = cells(256, 260, rng)
+    tone = rng.uniform(0.68, 1.22, size=260)[owner]
+    image = shade(colour, tone * np.clip((second - first) / 0.012, 0.5, 1.0) * (1 + 0.07 * fractal(256, 16, 3, rng)))
+    brick = (rng.uniform(size=260) < 0.16)[owner][..., None]
+    image = np.where(brick, image * np.array([1.12, 0.74, 0.62]), image)
+    dust = np.clip(0.45 + 0.5 * fractal(256, 5, 4, rng), 0, 1)[..., None]
+    return image * (1 - 0.55 * dust) + colour * 0.55 * dust
 
 
 def thatch(colour: Floats) -> Floats:
