@@ -7,8 +7,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import mapbox_earcut
 import numpy as np
+import shapely
 from shapely.geometry import Polygon
 from shapely.geometry.polygon import orient
 
@@ -137,10 +137,12 @@ def triangulate(plan: Polygon) -> tuple[Floats, Ints]:
     faces : (m, 3) int32
         Counter-clockwise seen from +z.
     """
-    rings = [np.array(r.coords)[:-1, :2] for r in (plan.exterior, *plan.interiors)]
-    vertices = np.concatenate(rings)
-    ends = np.cumsum([len(r) for r in rings]).astype(np.uint32)
-    faces = mapbox_earcut.triangulate_float64(vertices, ends).reshape(-1, 3).astype(np.int32)
+    vertices = np.concatenate([np.array(r.coords)[:-1, :2] for r in (plan.exterior, *plan.interiors)])
+    # Constrained Delaunay: plain ear clipping leaves triangles without area, and with them cracks.
+    pieces = shapely.constrained_delaunay_triangles(plan)
+    corners = shapely.get_coordinates(pieces).reshape(-1, 4, 2)[:, :3]
+    index = {xy: k for k, xy in enumerate(map(tuple, vertices.tolist()))}
+    faces = np.array([[index[x, y] for x, y in c] for c in corners.tolist()], dtype=np.int32).reshape(-1, 3)
     a, b, c = (vertices[faces[:, k]] for k in range(3))
     turned = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0] < 0
     faces[turned] = faces[turned][:, ::-1]
@@ -148,7 +150,7 @@ def triangulate(plan: Polygon) -> tuple[Floats, Ints]:
 
 
 def _without_straight_corners(plan: Polygon) -> Polygon:
-    # Earcut leaves such corners out of its triangles, and the walls would not meet the lids there.
+    # They add triangles to lids and walls, and no shape.
     rings = []
     for ring in (plan.exterior, *plan.interiors):
         xy = np.array(ring.coords)[:-1, :2]
