@@ -51,7 +51,7 @@ class AnchorSampleConfig(Section):
         (0.2, 0.8), description="heights of more level candidates around a tall object, 0 bottom, 1 top"
     )
     margin_m: float = Field(0.05, ge=0, description="free space that a candidate needs beyond the body's radius")
-    surface_points: int = Field(192, ge=8, description="points of the object's surface that rays are cast to")
+    surface_points: int = Field(256, ge=8, description="points of the object's surface that rays are cast to")
     fov_deg: float = Field(90.0, gt=0, lt=180, description="field of view of the front camera")
     min_visible_fraction: float = Field(0.3, ge=0, le=1, description="visible fraction below which nothing is seen")
     shortlist: int = Field(3, ge=1, description="anchors kept an object")

@@ -31,7 +31,7 @@ def item(thing, object_id=0):
 
 
 def find(place, node, tmp_path, config=CONFIG, seed=0):
-    return anchors_of(item(place[node]), World.of(place, RADIUS), job(tmp_path, seed), config)
+    return anchors_of(item(place[node]), World.of(place, RADIUS, CONFIG.margin_m), job(tmp_path, seed), config)
 
 
 def xyz(row):
@@ -151,7 +151,7 @@ def test_anchors_among_clutter_agree_with_trimesh(seed, tmp_path):
     size = rng.uniform(0.03, 0.5, (30, 3))
     clutter = [instance(f"twig_{k}", box(low[k] - size[k] / 2, low[k] + size[k] / 2)) for k in range(30)]
     place = scene(target, *clutter)
-    config = AnchorSampleConfig(shortlist=16, min_visible_fraction=0.2)
+    config = AnchorSampleConfig(shortlist=16, min_visible_fraction=0.2, surface_points=1500)
     rows, rejected = find(place, "target", tmp_path, config)
     assert len(rows) >= 3
     assert rejected["in_collision"] > 0
@@ -164,7 +164,7 @@ def test_anchors_among_clutter_agree_with_trimesh(seed, tmp_path):
         assert to_own == pytest.approx(1.0, abs=1e-3)
         assert to_any == pytest.approx(r["clearance_m"], abs=1e-4)
         assert to_any > RADIUS + CONFIG.margin_m - 1e-6
-        points = np.asarray(trimesh.sample.sample_surface(own, 600, seed=seed)[0])
+        points = np.asarray(trimesh.sample.sample_surface(own, 1200, seed=seed)[0])
         forward = np.array([math.cos(r["yaw_rad"]), math.sin(r["yaw_rad"]), 0.0])
         ahead = (points - p) @ forward
         aside = (points - p) @ [-forward[1], forward[0], 0.0]

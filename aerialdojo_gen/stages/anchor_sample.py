@@ -56,12 +56,12 @@ class World:
     index: dict[str, int]
 
     @classmethod
-    def of(cls, scene: Scene, radius_m: float) -> World:
-        """Build it all for a body of a radius."""
+    def of(cls, scene: Scene, radius_m: float, margin_m: float) -> World:
+        """Build it all for a body of a radius that keeps a margin to surfaces."""
         return cls(
             scene,
             CollisionWorld(scene),
-            ClearanceGrid.build(scene),
+            ClearanceGrid.build(scene, radius_m=radius_m, margin_m=margin_m),
             RayCaster(scene),
             {i.node: k for k, i in enumerate(scene.instances)},
         )
@@ -96,7 +96,7 @@ def run(job: Job, config: AnchorSampleConfig) -> Output:
         An object's mesh node is not in the scene: the two tables do not belong together.
     """
     objects = job.read("objects").to_pylist()
-    world = World.of(job.scene_model(), job.embodiment.radius_m)
+    world = World.of(job.scene_model(), job.embodiment.radius_m, config.margin_m)
     rows: list[dict[str, Any]] = []
     counts: Counter[str] = Counter(dict.fromkeys(REASONS, 0))
     bare = 0
