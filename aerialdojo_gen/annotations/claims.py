@@ -24,8 +24,8 @@ _STOPS = frozenset(".;:!?")
 
 def _relations() -> dict[str, str]:
     phrases = {
-        "beside": "beside, right beside, next to, right next to, alongside, by, adjacent to, flanked by, close beside, "
-        "leaning against, at the foot of",
+        "beside": "beside, right beside, next to, right next to, alongside, by, adjacent to, flanked by, "
+        "close beside, leaning against, at the foot of",
         "near": "near, nearby, close to, not far from, a few steps from, a short way from, a short walk from, "
         "surrounded by, behind, in front of, facing, around",
         "on": "on, on top of, atop, upon, on the top of",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import json.scanner
 from bisect import bisect_left
 from collections.abc import Callable
 from dataclasses import dataclass

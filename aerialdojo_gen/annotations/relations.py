@@ -21,7 +21,7 @@ Floats = NDArray[np.float64]
 
 BESIDE_M = 3.0
 NEAR_M = 8.0
-SIDE_M = 10.0
+SIDE_M = 12.0
 BETWEEN_M = 6.0
 COVER_M = 12.0
 BETWEEN_DEG = 120.0

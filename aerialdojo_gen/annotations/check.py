@@ -1,0 +1,214 @@
+"""Every check that an annotation file must pass, each fault by JSON path and line."""
+
+from __future__ import annotations
+
+import difflib
+import re
+from collections.abc import Iterable, Mapping, Sequence
+
+import numpy as np
+
+from aerialdojo_gen.annotations.ambiguity import Ambiguity, nearest_landmark
+from aerialdojo_gen.annotations.claims import Lexicon
+from aerialdojo_gen.annotations.format import Landmark, Object, Source
+from aerialdojo_gen.annotations.positions import Fault
+from aerialdojo_gen.annotations.relations import SceneGeometry
+from aerialdojo_gen.scenes.model import Scene
+
+# What a mesh or a map says and a person does not: node names, decimals, number pairs, measured lengths.
+_UNSPOKEN = re.compile(
+    r"[A-Za-z0-9]+_[A-Za-z0-9_]+|\d+\.\d+|-?\d+\s*,\s*-?\d+|\b\d+\s*(?:m|metres?|meters?|cm|km)\b|\b[xyz]\s*=",
+    re.IGNORECASE,
+)
+_SENTENCES = 3
+
+
+def check_source(
+    source: Source, scene: Scene, names: Mapping[str, str], counts: tuple[int, int] | None = None
+) -> list[Fault]:
+    """Hold an annotation file against its scene.
+
+    Parameters
+    ----------
+    source : Source
+        The file as read by `parse_annotations`.
+    scene : Scene
+        The scene that it must be of.
+    names : mapping of str to str
+        The catalogue's categories and what a person says for each.
+    counts : (int, int) or None
+        How many landmarks and objects there must be; None where any number will do.
+
+    Returns
+    -------
+    list of Fault
+        Every fault, the form's included, in the order of the file's lines; empty where the file is right.
+    """
+    faults = list(source.faults)
+    if source.document.value is not None:
+        if source.scene and source.scene != scene.name:
+            faults.append(source.document.fault(("scene",), f"is {source.scene!r}, the scene is {scene.name!r}"))
+        faults += _counts(source, counts)
+        faults += _unique(source)
+        for i, landmark in source.landmarks.items():
+            faults += _landmark(source, scene, ("landmarks", i), landmark)
+        for i, entry in source.objects.items():
+            faults += _object(source, scene, names, ("objects", i), entry)
+        faults += _geometry(source, scene, names)
+    return sorted(faults, key=lambda fault: fault.line)
+
+
+def _counts(source: Source, counts: tuple[int, int] | None) -> Iterable[Fault]:
+    raw = source.document.value
+    for key, wanted in zip(("landmarks", "objects"), counts or (), strict=False):
+        found = len(raw[key]) if isinstance(raw, dict) and isinstance(raw.get(key), list) else 0
+        if found != wanted:
+            yield source.document.fault((key,), f"there are {found}; the paper's inventory has {wanted}")
+
+
+def _unique(source: Source) -> Iterable[Fault]:
+    entries: tuple[tuple[str, Mapping[int, Landmark | Object], tuple[str, ...]], ...] = (
+        ("landmarks", source.landmarks, ("id", "name", "node")),
+        ("objects", source.objects, ("id", "node")),
+    )
+    for kind, members, keys in entries:
+        for key in keys:
+            first: dict[object, int] = {}
+            for i, entry in members.items():
+                value = getattr(entry, key)
+                value = value.strip().lower() if key == "name" else value
+                if value in first:
+                    text = f"{value!r} is the {key} of {kind}[{first[value]}] already"
+                    yield source.document.fault((kind, i, key), text)
+                first.setdefault(value, i)
+    landmark_nodes = {entry.node: i for i, entry in source.landmarks.items()}
+    for i, item in source.objects.items():
+        if item.node in landmark_nodes:
+            text = f"{item.node!r} is landmarks[{landmark_nodes[item.node]}]: an object must be another thing"
+            yield source.document.fault(("objects", i, "node"), text)
+
+
+def _landmark(source: Source, scene: Scene, path: tuple[str | int, ...], entry: Landmark) -> Iterable[Fault]:
+    yield from _name(source, path, entry.name)
+    yield from _node(source, scene, path, entry.node)
+
+
+def _object(
+    source: Source, scene: Scene, names: Mapping[str, str], path: tuple[str | int, ...], entry: Object
+) -> Iterable[Fault]:
+    yield from _name(source, path, entry.name)
+    yield from _node(source, scene, path, entry.node)
+    yield from _description(source, (*path, "description"), entry.description)
+    known = sorted({*names, *(instance.category for instance in scene.instances)})
+    if entry.category not in known:
+        text = f"no category {entry.category!r}{_near(entry.category, known)}"
+        yield source.document.fault((*path, "category"), text)
+    elif entry.node in scene and scene[entry.node].category != entry.category:
+        text = f"is {entry.category!r}, the node {entry.node!r} is a {scene[entry.node].category!r}"
+        yield source.document.fault((*path, "category"), text)
+    if entry.anchor is not None and not _inside(scene, entry.anchor.position_m):
+        yield source.document.fault((*path, "anchor", "position_m"), "outside the scene's bounds")
+
+
+def _name(source: Source, path: tuple[str | int, ...], name: str) -> Iterable[Fault]:
+    if not name.strip():
+        yield source.document.fault((*path, "name"), "is empty")
+    elif name != " ".join(name.split()):
+        yield source.document.fault((*path, "name"), "has space at an end or twice in a row")
+    elif _UNSPOKEN.search(name):
+        yield source.document.fault((*path, "name"), f"{name!r} is not what a person would say")
+
+
+def _node(source: Source, scene: Scene, path: tuple[str | int, ...], node: str) -> Iterable[Fault]:
+    if node not in scene:
+        text = f"no node {node!r} in the scene{_near(node, [i.node for i in scene.instances])}"
+        yield source.document.fault((*path, "node"), text)
+    elif not _inside(scene, scene[node].centroid):
+        yield source.document.fault((*path, "node"), f"the middle of {node!r} is outside the scene's bounds")
+
+
+def _description(source: Source, path: tuple[str | int, ...], text: str) -> Iterable[Fault]:
+    if not text.strip():
+        yield source.document.fault(path, "is empty")
+        return
+    if text != " ".join(text.split()):
+        yield source.document.fault(path, "has space at an end or twice in a row")
+    unspoken = _UNSPOKEN.search(text)
+    if unspoken:
+        yield source.document.fault(path, f"{unspoken.group()!r}: coordinates and node names are not for people")
+    if text.strip()[-1] not in ".!?":
+        yield source.document.fault(path, "must end with a full stop")
+    if len(re.findall(r"[.!?](?:\s|$)", text)) > _SENTENCES:
+        yield source.document.fault(path, f"has more than {_SENTENCES} sentences")
+
+
+def _inside(scene: Scene, point: Sequence[float] | np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> bool:
+    return bool(np.all(np.asarray(point) >= scene.bounds[0]) and np.all(np.asarray(point) <= scene.bounds[1]))
+
+
+def _near(word: str, known: Sequence[str]) -> str:
+    near = difflib.get_close_matches(word, known, n=2)
+    return f": did you mean {' or '.join(repr(n) for n in near)}?" if near else ""
+
+
+def _geometry(source: Source, scene: Scene, names: Mapping[str, str]) -> Iterable[Fault]:
+    """Directions, and descriptions held against the mesh; only where all landmarks are right."""
+    nodes = [landmark.node for landmark in sorted(source.landmarks.values(), key=lambda entry: entry.id)]
+    raw = source.document.value.get("landmarks") if isinstance(source.document.value, dict) else None
+    if not isinstance(raw, list) or len(nodes) < len(raw) or len(set(nodes)) < len(nodes):
+        return
+    if not all(node in scene for node in nodes):
+        return
+    if not nodes:
+        if source.objects:
+            yield source.document.fault(("landmarks",), "there is none: objects need one to be located by")
+        return
+    ambiguity = make_ambiguity(scene, names, {e.name: e.node for e in source.landmarks.values()}, nodes)
+    geometry = ambiguity.geometry
+    described: dict[tuple[object, ...], int] = {}
+    for k, entry in source.objects.items():
+        if entry.node not in scene or entry.node in nodes:
+            continue
+        i = geometry.index[entry.node]
+        bearing = nearest_landmark(geometry.centres[i], geometry.centres[list(ambiguity.landmarks)])
+        if bearing is None:
+            text = "stands exactly at its nearest landmark's place, so that there is no direction to it"
+            yield source.document.fault(("objects", k, "node"), text)
+            continue
+        for key in ("name", "description"):
+            for untruth in ambiguity.untruths(i, getattr(entry, key)):
+                yield source.document.fault(("objects", k, key), untruth)
+        same = (entry.name.lower(), bearing, entry.description.lower())
+        if same in described:
+            text = f"name, landmark, direction and description are those of objects[{described[same]}]"
+            yield source.document.fault(("objects", k, "description"), text)
+        described.setdefault(same, k)
+        rivals = ambiguity.rivals(i, entry.description)
+        if rivals:
+            others = ", ".join(scene.instances[j].node for j in rivals[:3]) + ("..." if len(rivals) > 3 else "")
+            text = (
+                f"ambiguous: it fits {others} as well, {bearing.direction} of the same landmark; "
+                "say how this one looks otherwise or what else stands by it"
+            )
+            yield source.document.fault(("objects", k, "description"), text)
+
+
+def make_ambiguity(
+    scene: Scene, names: Mapping[str, str], landmarks: Mapping[str, str], order: Sequence[str]
+) -> Ambiguity:
+    """Make the check of ambiguity of a scene.
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene.
+    names : mapping of str to str
+        What a person says for each category.
+    landmarks : mapping of str to str
+        Name and node of each landmark.
+    order : sequence of str
+        The landmarks' nodes in the order of their ids.
+    """
+    geometry = SceneGeometry(scene)
+    lexicon = Lexicon(geometry, names, {name: geometry.index[node] for name, node in landmarks.items()})
+    return Ambiguity(geometry, lexicon, [geometry.index[node] for node in order])
