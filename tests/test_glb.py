@@ -1,0 +1,169 @@
+"""Scene files: exact round trip, standard readers, damage."""
+
+import json
+import struct
+
+import numpy as np
+import pygltflib
+import pytest
+import trimesh
+from hypothesis import given
+from hypothesis import strategies as st
+
+from aerialdojo_gen.errors import AssetError
+from aerialdojo_gen.scenes import shapes
+from aerialdojo_gen.scenes.catalogue import placed
+from aerialdojo_gen.scenes.glb import read_glb, write_glb
+from aerialdojo_gen.scenes.mesh import to_part
+from aerialdojo_gen.scenes.model import Instance, Material, Scene
+from aerialdojo_gen.scenes.textures import make_texture
+
+BRICK = Material("brick:#9a4a3c", (150, 80, 60), make_texture("brick", (154, 74, 60)), 0.75)
+GREY = Material("#808080", (128, 128, 128))
+BLUE = Material("paint:#2040c0", (0x20, 0x40, 0xC0))
+
+
+def instance(node: str, x: float, yaw: float, materials: tuple[str, ...], attributes: dict[str, str]) -> Instance:
+    bodies = [shapes.cylinder(radius=0.3 + k, height=2.7) for k in range(len(materials))]
+    parts = [to_part(b, m, 0.75) for b, m in zip(bodies, materials, strict=True)]
+    return Instance(node, "post", "tall" if attributes else "", attributes, placed(parts, (x, 1 / 3, 0.1), yaw))
+
+
+@pytest.fixture
+def scene() -> Scene:
+    instances = (
+        instance("post_000", 7.3, 33.0, (BRICK.name, GREY.name), {"colour": "grün", "state": 'half "open"'}),
+        instance("post_001", -120.7, 200.0, (BLUE.name,), {}),
+    )
+    bounds = np.array([[-130.1, -20.3, -1.7], [130.1, 20.3, 25.9]])
+    materials = {m.name: m for m in (BRICK, GREY, BLUE)}
+    return Scene("U_Test_0", instances, materials, bounds, (10, 20, 30), (0.6, 0.0, 0.8))
+
+
+def assert_same(a: Scene, b: Scene) -> None:
+    assert (a.name, a.sky, a.sun) == (b.name, b.sky, b.sun)
+    assert np.array_equal(a.bounds, b.bounds)
+    assert [i.node for i in a.instances] == [i.node for i in b.instances]
+    for i, j in zip(a.instances, b.instances, strict=True):
+        assert (i.category, i.variant, i.attributes) == (j.category, j.variant, j.attributes)
+        for p, q in zip(i.parts, j.parts, strict=True):
+            assert p.material == q.material
+            for field in ("vertices", "faces", "uv"):
+                left, right = getattr(p, field), getattr(q, field)
+                assert left.dtype == right.dtype
+                assert np.array_equal(left, right)
+    assert a.materials.keys() == b.materials.keys()
+    for name, m in a.materials.items():
+        n = b.materials[name]
+        assert (m.name, m.colour, m.tile_m) == (n.name, n.colour, n.tile_m)
+        assert (m.texture is None) == (n.texture is None)
+        assert m.texture is None or np.array_equal(m.texture, n.texture)
+
+
+def test_round_trip_is_exact(scene, tmp_path):
+    write_glb(scene, tmp_path / "a.glb")
+    again = read_glb(tmp_path / "a.glb")
+    assert_same(scene, again)
+    write_glb(again, tmp_path / "b.glb")
+    assert (tmp_path / "a.glb").read_bytes() == (tmp_path / "b.glb").read_bytes()
+
+
+@given(
+    st.lists(st.floats(-500, 500, width=32), min_size=9, max_size=9),
+    st.lists(st.floats(-1e4, 1e4, width=32), min_size=6, max_size=6),
+)
+def test_any_coordinates_come_back(tmp_path_factory, xyz, uv):
+    path = tmp_path_factory.mktemp("glb") / "x.glb"
+    part = type(instance("a", 0, 0, (GREY.name,), {}).parts[0])(
+        np.array(xyz).reshape(3, 3),
+        np.array([[0, 1, 2]], dtype=np.int32),
+        np.array(uv, np.float32).reshape(3, 2),
+        GREY.name,
+    )
+    scene = Scene("U_X_0", (Instance("a", "b", "", {}, (part,)),), {GREY.name: GREY}, np.zeros((2, 3)))
+    write_glb(scene, path)
+    assert_same(scene, read_glb(path))
+
+
+def test_a_large_part_keeps_its_indices(tmp_path):
+    n = 70_000
+    body = instance("a", 0, 0, (GREY.name,), {}).parts[0]
+    rng = np.random.default_rng(0)
+    part = type(body)(
+        rng.uniform(-50, 50, (n, 3)).astype(np.float32).astype(np.float64),
+        rng.integers(0, n, (n, 3)).astype(np.int32),
+        np.zeros((n, 2), np.float32),
+        GREY.name,
+    )
+    scene = Scene("U_X_0", (Instance("a", "b", "", {}, (part,)),), {GREY.name: GREY}, np.zeros((2, 3)))
+    write_glb(scene, tmp_path / "a.glb")
+    assert_same(scene, read_glb(tmp_path / "a.glb"))
+
+
+def test_other_readers_see_the_scene_with_y_up(scene, tmp_path):
+    path = tmp_path / "a.glb"
+    write_glb(scene, path)
+    seen = trimesh.load(path)
+    low, high = (
+        np.array([i.bounds for i in scene.instances])[:, 0].min(0),
+        np.array([i.bounds for i in scene.instances])[:, 1].max(0),
+    )
+    np.testing.assert_allclose(seen.bounds, [[low[0], low[2], -high[1]], [high[0], high[2], -low[1]]], atol=1e-4)
+    assert sum(len(g.faces) for g in seen.geometry.values()) == scene.n_triangles
+
+
+def test_file_is_gltf_with_linear_colours_and_repeating_textures(scene, tmp_path):
+    path = tmp_path / "a.glb"
+    write_glb(scene, path)
+    document = pygltflib.GLTF2().load(str(path))
+    assert [n.name for n in document.nodes] == ["U_Test_0", "post_000", "post_001"]
+    assert document.nodes[1].extras == {
+        "category": "post", "variant": "tall", "attributes": {"colour": "grün", "state": 'half "open"'},
+    }  # fmt: skip
+    by_name = {m.name: m.pbrMetallicRoughness for m in document.materials}
+    # sRGB 128 is 0.2158 of full light.
+    assert by_name["#808080"].baseColorFactor == pytest.approx([0.2158605] * 3 + [1.0], abs=1e-5)
+    assert by_name[BRICK.name].baseColorTexture.index == 0
+    assert document.samplers[0].wrapS == document.samplers[0].wrapT == pygltflib.REPEAT
+    for accessor in document.accessors:
+        view = document.bufferViews[accessor.bufferView]
+        width = {"SCALAR": 1, "VEC2": 2, "VEC3": 3}[accessor.type]
+        size = {5126: 4, 5123: 2, 5125: 4}[accessor.componentType]
+        assert accessor.count * width * size == view.byteLength
+        assert view.byteOffset % 4 == 0
+
+
+def test_a_file_cut_anywhere_is_refused(scene, tmp_path):
+    path = tmp_path / "a.glb"
+    write_glb(scene, path)
+    whole = path.read_bytes()
+    for length in (0, 3, 11, 19, 25, 400, len(whole) // 2, len(whole) - 1):
+        path.write_bytes(whole[:length])
+        with pytest.raises(AssetError, match=r"a\.glb.*run build-scenes again"):
+            read_glb(path)
+
+
+def test_lying_headers_are_refused(scene, tmp_path):
+    path = tmp_path / "a.glb"
+    write_glb(scene, path)
+    whole = path.read_bytes()
+    length = struct.unpack_from("<I", whole, 12)[0]
+    for change in ({"count": 10**9}, {"bufferView": 10**6}, {"componentType": 1}, {"type": "MAT4"}):
+        document = json.loads(whole[20 : 20 + length])
+        document["accessors"][0] |= change
+        head = json.dumps(document).encode()
+        head += b" " * (-len(head) % 4)
+        rest = whole[20 + length :]
+        path.write_bytes(
+            struct.pack("<4sIIII", b"glTF", 2, 20 + len(head) + len(rest), len(head), 0x4E4F534A) + head + rest
+        )
+        with pytest.raises(AssetError, match="damaged"):
+            read_glb(path)
+
+
+def test_missing_and_foreign_files_are_refused(tmp_path):
+    with pytest.raises(AssetError, match="run build-scenes first"):
+        read_glb(tmp_path / "none.glb")
+    trimesh.creation.box().export(tmp_path / "foreign.glb")
+    with pytest.raises(AssetError, match="no scene file of this program"):
+        read_glb(tmp_path / "foreign.glb")
