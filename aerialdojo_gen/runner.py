@@ -54,7 +54,9 @@ class StageSummary:
 
     def __str__(self) -> str:
         """One line: rows in, rows out, why the others were rejected, seconds."""
-        counts = ", ".join(f"{name} {n:,}" for name, n in sorted(self.counts.items(), key=lambda c: (-c[1], c[0])))
+        counts = ", ".join(
+            f"{name} {n:,}" for name, n in sorted(self.counts.items(), key=lambda c: (-c[1], c[0])) if n
+        )
         fresh = "nothing to do" if not self.computed else f"{self.computed} of {self.shards} shards computed"
         return (
             f"{self.stage}: {self.rows_in:,} rows in, {self.rows_out:,} out"
