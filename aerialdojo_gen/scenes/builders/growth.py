@@ -1,0 +1,227 @@
+"""Limbs, leaf clumps and rocks: what plants and stones are made of."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cache
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.spatial import ConvexHull
+
+from aerialdojo_gen.scenes.mesh import Floats, Ints, Mesh, mesh, outward
+
+_GOLDEN = np.pi * (3.0 - np.sqrt(5.0))
+_CLUMP_CORNERS = 24
+
+
+def limb(points: ArrayLike, radii: Sequence[float], sides: int = 6) -> Mesh:
+    """Make a tapering trunk or branch.
+
+    Parameters
+    ----------
+    points : (n, 3) array-like
+        Middle line, metres.
+    radii : sequence of float
+        One a point, metres; a last radius of 0 ends the limb in a tip.
+    sides : int
+        Corners of the section.
+
+    Returns
+    -------
+    Mesh
+        Watertight; u runs around, v along the limb, in metres.
+    """
+    line = np.asarray(points, dtype=np.float64)
+    tip = radii[-1] == 0.0
+    rings = len(line) - 1 if tip else len(line)
+    ahead = np.gradient(line, axis=0)
+    ahead /= np.linalg.norm(ahead, axis=1, keepdims=True)
+    angles = (np.arange(sides) + 0.5) * 2 * np.pi / sides
+    side = np.array([1.0, 0.0, 0.0]) if abs(ahead[0, 0]) < 0.9 else np.array([0.0, 1.0, 0.0])
+    vertices = []
+    for p, t, r in zip(line[:rings], ahead[:rings], radii[:rings], strict=True):
+        side = side - t * (side @ t)
+        side /= np.linalg.norm(side)
+        other = np.cross(t, side)
+        vertices.append(p + r * (np.cos(angles)[:, None] * side + np.sin(angles)[:, None] * other))
+    along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
+    width = 2 * np.pi * max(radii) / sides
+    faces: list[tuple[int, int, int]] = []
+    uv: list[Sequence[tuple[float, float]]] = []
+    for i in range(rings - 1):
+        for k in range(sides):
+            a, b = i * sides + k, i * sides + (k + 1) % sides
+            u0, u1, v0, v1 = k * width, (k + 1) * width, float(along[i]), float(along[i + 1])
+            faces += [(a, b, b + sides), (a, b + sides, a + sides)]
+            uv += [((u0, v0), (u1, v0), (u1, v1)), ((u0, v0), (u1, v1), (u0, v1))]
+    last = (rings - 1) * sides
+    flat = [(np.nan, np.nan)] * 3
+    for k in range(1, sides - 1):
+        faces.append((0, k + 1, k))
+        uv.append(flat)
+        if not tip:
+            faces.append((last, last + k, last + k + 1))
+            uv.append(flat)
+    if tip:
+        vertices.append(line[-1:])
+        for k in range(sides):
+            a, b = last + k, last + (k + 1) % sides
+            faces.append((a, b, rings * sides))
+            v0, v1 = float(along[-2]), float(along[-1])
+            uv.append(((k * width, v0), ((k + 1) * width, v0), ((k + 0.5) * width, v1)))
+    return outward(mesh(np.concatenate(vertices), faces, np.array(uv)))
+
+
+def clump(
+    rng: np.random.Generator,
+    centre: ArrayLike,
+    radii: ArrayLike,
+    ragged: float = 0.3,
+    belly: float = 0.6,
+) -> Mesh:
+    """Make a clump of leaves: a lumpy ellipsoid bristling with sprays of twigs, 88 triangles, closed.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+        Draws lumps and sprays.
+    centre, radii : (x, y, z)
+        Middle and half extents, metres; sprays reach about `ragged` of the radius beyond.
+    ragged : float
+        Depth of lumps and sprays as a fraction of the radius.
+    belly : float
+        How far the clump hangs below its middle, as a fraction of its height above it.
+    """
+    directions, faces = _ball()
+    turn = rng.uniform(0, 2 * np.pi)
+    c, s = np.cos(turn), np.sin(turn)
+    v = directions @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+    v = v * (1.0 - ragged * rng.uniform(0.0, 0.9, size=(len(v), 1)))
+    # Every other face carries a spray: a low pyramid whose tip stands out from the clump.
+    bare, sprayed = faces[::2], faces[1::2]
+    a, b, c3 = (v[sprayed[:, k]] for k in range(3))
+    weights = rng.dirichlet((3.0, 3.0, 3.0), size=len(sprayed))
+    tips = weights[:, :1] * a + weights[:, 1:2] * b + weights[:, 2:] * c3
+    tips = tips / np.linalg.norm(tips, axis=1, keepdims=True)
+    tips = tips * (1.0 + ragged * rng.uniform(-0.1, 0.9, size=(len(tips), 1)))
+    k = np.arange(len(v), len(v) + len(tips))
+    corner = [np.column_stack([sprayed[:, i], sprayed[:, (i + 1) % 3], k]) for i in range(3)]
+    v = np.concatenate([v, tips])
+    v[:, 2] = np.where(v[:, 2] < 0, v[:, 2] * belly, v[:, 2])
+    return mesh(v * np.asarray(radii) + np.asarray(centre), np.concatenate([bare, *corner]))
+
+
+@cache
+def _ball() -> tuple[Floats, Ints]:
+    """Spread points evenly over the unit sphere and triangulate it."""
+    k = np.arange(_CLUMP_CORNERS) + 0.5
+    z = 1.0 - 2.0 * k / _CLUMP_CORNERS
+    r = np.sqrt(1.0 - z * z)
+    return _hull(np.column_stack([r * np.cos(_GOLDEN * k), r * np.sin(_GOLDEN * k), z]))
+
+
+def _hull(points: Floats) -> tuple[Floats, Ints]:
+    """Convex hull of points about the origin: its corners, and faces wound outwards."""
+    hull = ConvexHull(points)
+    used = np.sort(hull.vertices)
+    index = np.zeros(len(points), dtype=np.int32)
+    index[used] = np.arange(len(used))
+    v, faces = points[used], index[hull.simplices]
+    normals = np.cross(v[faces[:, 1]] - v[faces[:, 0]], v[faces[:, 2]] - v[faces[:, 0]])
+    inward = np.einsum("ij,ij->i", normals, v[faces].mean(axis=1) - v.mean(axis=0)) < 0
+    faces[inward] = faces[inward][:, ::-1]
+    order = np.lexsort(faces.T[::-1])
+    return v, faces[order]
+
+
+def whorl(
+    rng: np.random.Generator,
+    z: float,
+    reach: float,
+    droop: float,
+    rise: float,
+    branches: int = 7,
+    core: ArrayLike = (0.0, 0.0),
+) -> Mesh:
+    """Make a tier of a conifer: branches that hang outwards from the stem like the ribs of a torn umbrella.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+        Draws each branch's length, hang and direction.
+    z : float
+        Height at which the branches leave the stem, metres.
+    reach : float
+        Length of the branches, metres.
+    droop : float
+        How far the tips hang below `z`, metres.
+    rise : float
+        How far the tier's top stands above `z`, metres.
+    branches : int
+        Number of branches.
+    core : (x, y)
+        Where the stem stands at that height, metres.
+    """
+    n = 2 * branches
+    angles = (np.arange(n) + rng.uniform(-0.25, 0.25, size=n)) * 2 * np.pi / n + rng.uniform(0, 2 * np.pi)
+    tips = np.arange(n) % 2 == 0
+    radius = np.where(tips, reach * rng.uniform(0.85, 1.15, size=n), reach * rng.uniform(0.5, 0.62, size=n))
+    drop = np.where(tips, droop * rng.uniform(0.8, 1.2, size=n), droop * 0.3)
+    rim = np.column_stack([radius * np.cos(angles), radius * np.sin(angles), z - drop])
+    vertices = np.concatenate([rim, [[0.0, 0.0, z + rise], [0.0, 0.0, z - droop * 0.15]]])
+    vertices[:, :2] += np.asarray(core)
+    k = np.arange(n)
+    nxt = (k + 1) % n
+    top = np.column_stack([k, nxt, np.full(n, n)])
+    under = np.column_stack([nxt, k, np.full(n, n + 1)])
+    return mesh(vertices, np.concatenate([top, under]))
+
+
+def blade(root: ArrayLike, bend: ArrayLike, tip: ArrayLike, width: float) -> Mesh:
+    """Make a frond or leaf: two long facets a side from a root over a bend to a tip, 1 cm thick at the bend."""
+    a, b, c = (np.asarray(p, dtype=np.float64) for p in (root, bend, tip))
+    across = np.cross(c - a, (0.0, 0.0, 1.0))
+    length = float(np.linalg.norm(across))
+    across = np.array([1.0, 0.0, 0.0]) if length < 1e-6 else across / length
+    w = across * width / 2
+    lift = np.array([0.0, 0.0, 0.01])
+    v = np.stack([a, b + w, b - w, c, b + lift, b - lift])
+    faces = [(0, 1, 4), (0, 4, 2), (1, 3, 4), (4, 3, 2), (0, 5, 1), (0, 2, 5), (1, 5, 3), (5, 2, 3)]
+    return outward(mesh(v, faces))
+
+
+def stone(rng: np.random.Generator, radii: ArrayLike, corners: int = 22, sunk: float = 0.3) -> Mesh:
+    """Make an angular rock that stands on z = 0, `sunk` of its height below the ground.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+        Draws the corners.
+    radii : (x, y, z)
+        Half extents, metres.
+    corners : int
+        Points whose convex hull is the rock: few make it blocky, many make it round.
+    sunk : float
+        Fraction of the whole height that lies below z = 0.
+    """
+    p = rng.normal(size=(corners, 3))
+    p /= np.linalg.norm(p, axis=1, keepdims=True)
+    p *= rng.uniform(0.82, 1.05, size=(corners, 1))
+    v, faces = _hull(p)
+    v = v * np.asarray(radii)
+    low, high = v[:, 2].min(), v[:, 2].max()
+    return mesh(v - (0.0, 0.0, low + sunk * (high - low)), faces)
+
+
+def split_by_slope(m: Mesh, cosine: float) -> tuple[Mesh, Mesh]:
+    """Part a mesh into what faces up (normal's z above `cosine`), where moss lies, and the rest."""
+    a, b, c = (m.vertices[m.faces[:, k]] for k in range(3))
+    normals = np.cross(b - a, c - a)
+    up = normals[:, 2] > cosine * np.linalg.norm(normals, axis=1)
+    return mesh(m.vertices, m.faces[up]), mesh(m.vertices, m.faces[~up])
+
+
+def vec(x: float, y: float, z: float) -> Floats:
+    """Make a point or an offset, (3,) float64, metres."""
+    return np.array([x, y, z], dtype=np.float64)
