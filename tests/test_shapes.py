@@ -134,7 +134,9 @@ def test_profile_is_a_side_view():
 
 @settings(max_examples=50)
 @given(
-    st.lists(st.tuples(st.floats(0.5, 3), st.floats(-60, 60), st.floats(-1, 1)), min_size=1, max_size=6),
+    st.lists(
+        st.tuples(st.floats(0.5, 3), st.floats(-60, 60), st.just(0.0) | st.floats(-1, 1)), min_size=1, max_size=6
+    ),
     st.booleans(),
 )
 def test_sweep_is_closed_and_contains_its_path(legs, round_):
@@ -147,7 +149,9 @@ def test_sweep_is_closed_and_contains_its_path(legs, round_):
     solid(body)
     length = sum(np.linalg.norm(b - a) for a, b in pairwise(points))
     area = 6 / 2 * 0.05**2 * math.sin(math.pi / 3) if round_ else 0.01
-    assert body.volume_m3 == pytest.approx(length * area, rel=0.06)
+    # Mitres are exact where a path bends in the plane; where it also climbs, the section twists a little.
+    level = all(climb == 0 for _, _, climb in legs)
+    assert body.volume_m3 == pytest.approx(length * area, rel=1e-9 if level else 0.25)
 
 
 def test_rectangular_sweep_stands_upright():

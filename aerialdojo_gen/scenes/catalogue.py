@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from aerialdojo_gen.errors import AssetError
 from aerialdojo_gen.scenes.builders import builders
 from aerialdojo_gen.scenes.materials import MaterialLibrary, load_materials, nearest, read_toml, refuse_unknown
-from aerialdojo_gen.scenes.mesh import Mesh, merge, rotation, to_part
+from aerialdojo_gen.scenes.mesh import Mesh, areas, merge, rotation, to_part
 from aerialdojo_gen.scenes.model import Instance, Part
 from aerialdojo_gen.scenes.prop import Category, Variant, parse_category
 from aerialdojo_gen.scenes.vocabulary import part_mesh
@@ -156,7 +156,7 @@ class Catalogue:
                 meshes.append((part["role"], part_mesh(own, sizes, words)))
             except (ValueError, TypeError) as error:
                 raise AssetError(f"{prop.source} parts[{k}] ({part['shape']}): {error}") from error
-        return self._textured(meshes, surfaces)
+        return self._textured(prop, meshes, surfaces)
 
     def _built(
         self,
@@ -170,12 +170,16 @@ class Catalogue:
             meshes = list(builders()[builder](rng, sizes))
         except (ValueError, KeyError) as error:
             raise AssetError(f"{prop.source} builder {builder!r}: {error}") from error
-        return self._textured(meshes, surfaces)
+        return self._textured(prop, meshes, surfaces)
 
-    def _textured(self, meshes: Sequence[tuple[str, Mesh]], surfaces: Mapping[str, str]) -> tuple[Part, ...]:
+    def _textured(
+        self, prop: Category, meshes: Sequence[tuple[str, Mesh]], surfaces: Mapping[str, str]
+    ) -> tuple[Part, ...]:
         by_material: dict[str, list[Mesh]] = {}
         for role, body in meshes:
             by_material.setdefault(surfaces.get(role, role), []).append(body)
+        for spec in by_material:
+            self.materials.check(spec, prop.source)
         return tuple(to_part(merge(m), spec, self.materials.tile_m(spec)) for spec, m in by_material.items())
 
 
@@ -185,10 +189,14 @@ def placed(
     """Scale, turn and move parts into the world, rounded to what float32 holds."""
     turn = rotation(0.0, 0.0, yaw_deg).T
     offset = np.asarray(position, dtype=np.float64)
-    return tuple(
-        Part(single(p.vertices * scale @ turn + offset), p.faces, (p.uv * np.float32(scale)), p.material)
-        for p in parts
-    )
+    out = []
+    for p in parts:
+        vertices = single(p.vertices * scale @ turn + offset)
+        # Far from the origin float32 may flatten a sliver to nothing.
+        faces = p.faces[areas(vertices, p.faces) > 0.0]
+        if len(faces):
+            out.append(Part(vertices, faces, p.uv * np.float32(scale), p.material))
+    return tuple(out)
 
 
 def single(vertices: NDArray[np.float64]) -> NDArray[np.float64]:

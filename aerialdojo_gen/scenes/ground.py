@@ -117,7 +117,7 @@ def _draped_mesh(layer: Surface, terrain: Terrain) -> Mesh:
     corners, faces = terrain.corners(), terrain.triangles()
     tiles = shapely.polygons(corners[faces][:, :, :2])
     shapely.prepare(layer.area)
-    inside = shapely.contains_properly(layer.area, tiles) | shapely.covers(layer.area, tiles)
+    inside = shapely.covers(layer.area, tiles)
     crossed = shapely.intersects(layer.area, tiles) & ~inside
     pieces = [Mesh(corners, faces[inside])] if inside.any() else []
     for k in np.flatnonzero(crossed):

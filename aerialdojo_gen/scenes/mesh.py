@@ -52,7 +52,7 @@ def mesh(vertices: ArrayLike, faces: ArrayLike, corner_uv: Floats | None = None)
     """Make a mesh of array-likes; faces of fewer than three distinct vertices or of no area are dropped."""
     v = np.asarray(vertices, dtype=np.float64).reshape(-1, 3)
     f = np.asarray(faces, dtype=np.int32).reshape(-1, 3)
-    keep = _areas(v, f) > _MIN_AREA_M2
+    keep = areas(v, f) > _MIN_AREA_M2
     if keep.all():
         return Mesh(v, f, corner_uv)
     return Mesh(v, f[keep], None if corner_uv is None else corner_uv[keep])
@@ -148,7 +148,8 @@ def _uv_or_nan(m: Mesh) -> Floats:
     return np.full((len(m.faces), 3, 2), np.nan) if m.corner_uv is None else m.corner_uv
 
 
-def _areas(v: Floats, f: Ints) -> Floats:
+def areas(v: Floats, f: Ints) -> Floats:
+    """Areas of faces (m, 3) over vertices (n, 3): (m,) float64, square metres."""
     a, b, c = (v[f[:, k]] for k in range(3))
     return np.asarray(np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2.0)
 

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
 
 from aerialdojo_gen.errors import AssetError
 from aerialdojo_gen.scenes.materials import nearest, read_toml
@@ -52,6 +52,13 @@ class Recipe(BaseModel):
     palette: dict[str, str] = {}
     parameters: dict[str, Any] = {}
     inventory: dict[str, Annotated[int, Field(ge=0)]] = {}
+
+    @field_validator("sun")
+    @classmethod
+    def _sun_stands_above(cls, sun: tuple[float, float, float]) -> tuple[float, float, float]:
+        if sun[2] <= 0.0:
+            raise ValueError("the sun must stand above the horizon (z > 0)")
+        return sun
 
     @property
     def sun_direction(self) -> tuple[float, float, float]:

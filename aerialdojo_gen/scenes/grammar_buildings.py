@@ -1,0 +1,205 @@
+"""Grammar of layouts: buildings from a plan, with façades of whole windows, roofs, and walls with openings."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
+
+import numpy as np
+from shapely.geometry import LineString, MultiPolygon, Polygon
+from shapely.geometry.base import BaseGeometry
+from shapely.geometry.polygon import orient
+
+from aerialdojo_gen.scenes.grammar_scatter import Pose, slab
+from aerialdojo_gen.scenes.mesh import Mesh, merge, mesh, rotated, rotation, translated
+from aerialdojo_gen.scenes.model import Instance
+from aerialdojo_gen.scenes.shapes_extruded import extrude, profile
+from aerialdojo_gen.scenes.site import Site
+
+ROOFS = ("flat", "gable", "hip")
+
+
+def building(
+    site: Site,
+    plan: Polygon,
+    *,
+    wall: str,
+    roof: str,
+    storeys: int = 2,
+    storey_m: float = 3.2,
+    roof_kind: str = "flat",
+    roof_m: float = 2.5,
+    parapet_m: float = 0.6,
+    overhang_m: float = 0.4,
+    z: float | None = None,
+    node: str | None = None,
+    category: str = "building",
+    attributes: Mapping[str, str] | None = None,
+    extra: Sequence[tuple[str, Mesh]] = (),
+) -> Instance:
+    """Put up a building; it takes its ground.
+
+    Parameters
+    ----------
+    site : Site
+        Where.
+    plan : Polygon
+        Outline, world frame, metres; pitched roofs want a rectangle, turned as it may be.
+    wall, roof : str
+        Materials. A façade's windows are stretched to whole ones on every wall.
+    storeys, storey_m : int, float
+        Number and height of the storeys.
+    roof_kind : str
+        ``"flat"`` with a parapet of `parapet_m`, ``"gable"`` or ``"hip"`` with a ridge `roof_m` high and eaves of
+        `overhang_m`.
+    z : float, optional
+        Height of the floor; by default the lowest ground under the plan's corners.
+    node, category, attributes
+        As in `Site.add`.
+    extra : sequence of (material, Mesh)
+        More of the same building, world coordinates: canopies, chimneys, steps.
+    """
+    if roof_kind not in ROOFS:
+        raise ValueError(f"roof_kind {roof_kind!r} is none of {', '.join(ROOFS)}")
+    base = min(site.ground_z(x, y) for x, y in plan.exterior.coords) if z is None else z
+    top = base + storeys * storey_m
+    parts: list[tuple[str, Mesh]] = [(wall, facade(plan, base, top, site.catalogue.materials.tile_m(wall)))]
+    if roof_kind == "flat":
+        # The roof's sides must not lie in the walls' plane, where both would flicker.
+        lid = plan.buffer(-0.02 if parapet_m > 0.0 else 0.15, join_style="mitre")
+        parts += [(roof, slab(p, top - 0.3, top)) for p in _pieces(lid)]
+        if parapet_m > 0.0:
+            rim = plan.difference(plan.buffer(-0.3, join_style="mitre"))
+            parts += [("concrete", slab(p, top, top + parapet_m)) for p in _pieces(rim)]
+    else:
+        parts += pitched_roof(plan, top, roof_m, wall, roof, hip=roof_kind == "hip", overhang_m=overhang_m)
+    return site.add(node, category, [*parts, *extra], attributes, footprint=plan)
+
+
+def facade(plan: Polygon, z0_m: float, z1_m: float, tile_m: float) -> Mesh:
+    """Make the outer walls of a plan, each with a whole number of texture tiles across and of half tiles up.
+
+    A façade's tile is two storeys high and one or two windows wide, so that no window is cut at a corner or an eave.
+    """
+    up = max(round((z1_m - z0_m) / (tile_m / 2)), 1) * tile_m / 2
+    vertices: list[tuple[float, float, float]] = []
+    faces: list[tuple[int, int, int]] = []
+    uvs: list[tuple[tuple[float, float], ...]] = []
+    outline = orient(plan)
+    for ring in (outline.exterior, *outline.interiors):
+        xy = [(float(x), float(y)) for x, y in ring.coords]
+        for (ax, ay), (bx, by) in pairwise(xy):
+            length = float(np.hypot(bx - ax, by - ay))
+            across = max(round(length / tile_m), 1) * tile_m if length > 0.7 * tile_m else length
+            k = len(vertices)
+            vertices += [(ax, ay, z0_m), (bx, by, z0_m), (bx, by, z1_m), (ax, ay, z1_m)]
+            faces += [(k, k + 1, k + 2), (k, k + 2, k + 3)]
+            uvs += [((0.0, 0.0), (across, 0.0), (across, up)), ((0.0, 0.0), (across, up), (0.0, up))]
+    return mesh(vertices, faces, np.array(uvs))
+
+
+def pitched_roof(
+    plan: Polygon, z_m: float, height_m: float, wall: str, roof: str, *, hip: bool = False, overhang_m: float = 0.4
+) -> list[tuple[str, Mesh]]:
+    """Make a gable or hip roof over a rectangle, the ridge along its longer side.
+
+    Returns
+    -------
+    list of (material, Mesh)
+        World coordinates; the gables are of the wall's material.
+    """
+    centre, length, width, yaw = oriented_rectangle(plan)
+    pitch = height_m / (width / 2)
+    eave, out = -overhang_m * pitch, width / 2 + overhang_m
+    parts: list[tuple[str, Mesh]] = []
+    if hip:
+        # A short ridge even over a square: an apex would stand twice.
+        ridge = max(length - width, 0.2) / 2
+        far = length / 2 + overhang_m
+        points = [(-far, -out, eave), (far, -out, eave), (far, out, eave), (-far, out, eave),
+                  (-ridge, 0.0, height_m), (ridge, 0.0, height_m)]  # fmt: skip
+        faces = [(0, 1, 5), (0, 5, 4), (1, 2, 5), (2, 3, 4), (2, 4, 5), (3, 0, 4), (0, 3, 2), (0, 2, 1)]
+        parts.append((roof, mesh(points, faces)))
+    else:
+        thick = 0.18
+        chevron = [
+            (-out, eave),
+            (0.0, height_m),
+            (out, eave),
+            (out, eave + thick),
+            (0.0, height_m + thick),
+            (-out, eave + thick),
+        ]
+        quarter = rotation(0.0, 0.0, 90.0)
+        parts.append((roof, rotated(profile(points=chevron, width=length + 2 * overhang_m), quarter)))
+        gable = profile(points=[(-width / 2, 0.0), (width / 2, 0.0), (0.0, height_m)], width=length)
+        parts.append((wall, rotated(gable, quarter)))
+    turn = rotation(0.0, 0.0, yaw)
+    return [(m, translated(rotated(b, turn), (*centre, z_m))) for m, b in parts]
+
+
+def wall_with_openings(
+    a: tuple[float, float],
+    b: tuple[float, float],
+    z0_m: float,
+    z1_m: float,
+    openings: Sequence[tuple[float, float, float, float]],
+    thickness_m: float = 0.3,
+) -> Mesh:
+    """Make a straight wall from `a` to `b` with rectangular openings that one can look and fly through.
+
+    Parameters
+    ----------
+    a, b : (x, y)
+        Ends of its middle line, world frame, metres.
+    z0_m, z1_m : float
+        Foot and top.
+    openings : sequence of (from, to, sill, head)
+        Along the wall from `a`, and up from its foot, metres; those that reach the foot are doorways.
+    thickness_m : float
+        Of the wall.
+    """
+    length = float(np.hypot(b[0] - a[0], b[1] - a[1]))
+    face: BaseGeometry = Polygon([(0, 0), (length, 0), (length, z1_m - z0_m), (0, z1_m - z0_m)])
+    for u0, u1, sill, head in openings:
+        face = face.difference(Polygon([(u0, sill), (u1, sill), (u1, head), (u0, head)]))
+    bodies = []
+    for piece in _pieces(face):
+        flat = extrude(piece, thickness_m)
+        u, v, w = flat.vertices.T
+        # (u, v, w) becomes (x, z, -y): the wall stands on y = 0 and its pattern is projected anew.
+        bodies.append(Mesh(np.column_stack([u, thickness_m / 2 - w, v]), flat.faces))
+    yaw = float(np.degrees(np.arctan2(b[1] - a[1], b[0] - a[0])))
+    return translated(rotated(merge(bodies), rotation(0.0, 0.0, yaw)), (*a, z0_m))
+
+
+def before_walls(plan: Polygon, spacing_m: float, offset_m: float, inset_m: float = 1.0) -> list[Pose]:
+    """List poses along a plan's walls, `offset_m` outside them and facing away from them."""
+    outline = orient(plan)
+    xy = list(outline.exterior.coords)
+    poses = []
+    for p, q in pairwise(xy):
+        leg = LineString([p, q])
+        count = int((leg.length - 2 * inset_m) // spacing_m) + 1 if leg.length > 2 * inset_m else 0
+        yaw = float(np.degrees(np.arctan2(q[1] - p[1], q[0] - p[0]))) - 90.0
+        c, s = np.cos(np.radians(yaw)), np.sin(np.radians(yaw))
+        for k in range(count):
+            at = leg.interpolate((leg.length - (count - 1) * spacing_m) / 2 + k * spacing_m)
+            poses.append(Pose(float(at.x + c * offset_m), float(at.y + s * offset_m), yaw))
+    return poses
+
+
+def oriented_rectangle(plan: Polygon) -> tuple[tuple[float, float], float, float, float]:
+    """Give the least rectangle about a plan: centre, length, width (metres), and yaw of its length (degrees)."""
+    corners = np.array(plan.minimum_rotated_rectangle.exterior.coords)[:4]
+    legs = np.diff(corners[:3], axis=0)
+    lengths = np.linalg.norm(legs, axis=1)
+    long = int(lengths[1] > lengths[0])
+    yaw = float(np.degrees(np.arctan2(legs[long, 1], legs[long, 0])))
+    x, y = corners.mean(axis=0)
+    return (float(x), float(y)), float(lengths[long]), float(lengths[1 - long]), yaw
+
+
+def _pieces(area: BaseGeometry) -> list[Polygon]:
+    geoms = area.geoms if isinstance(area, MultiPolygon) else [area]
+    return [g for g in geoms if isinstance(g, Polygon) and g.area > 1e-6]
