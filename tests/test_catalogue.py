@@ -215,7 +215,7 @@ def test_every_shipped_variant_is_a_body_of_sensible_size(shipped):
             made = shipped.instantiate(category, "n", generator(0, "t", category), variant=variant.name)
             low, high = made.bounds
             largest = float((high - low).max())
-            if not 0.05 < largest < 120 or low[2] < -1.0 or len(made.faces) > 6000:
+            if not 0.05 < largest < 120 or low[2] < -2.5 or len(made.faces) > 6000:
                 faults.append((category, variant.name, made.bounds.round(2).tolist(), len(made.faces)))
             area = np.linalg.norm(np.cross(*(made.vertices[made.faces][:, k] - made.vertices[made.faces][:, 0]
                                              for k in (1, 2))), axis=1)  # fmt: skip
