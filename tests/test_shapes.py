@@ -14,6 +14,7 @@ from aerialdojo_gen.scenes import lettering, shapes, shapes_extruded
 from aerialdojo_gen.scenes.expressions import evaluate, names_in
 from aerialdojo_gen.scenes.mesh import Mesh, merge, mirrored, rotated, rotation, to_part, translated
 from aerialdojo_gen.scenes.textures import TEXTURES, make_texture
+from aerialdojo_gen.scenes.textures_natural import NATURAL
 from aerialdojo_gen.scenes.vocabulary import SHAPES, part_mesh
 
 size = st.floats(0.05, 20.0)
@@ -301,3 +302,9 @@ def test_textures_tile_without_a_seam_and_show_contrast(name):
         steps = np.abs(np.roll(grey, -1, axis=axis) - grey).mean(axis=1 - axis)
         # The step over the border is no larger than the largest step inside the tile.
         assert steps[-1] <= steps[:-1].max() * 1.05 + 1.0
+
+
+@pytest.mark.parametrize("name", sorted(NATURAL))
+def test_natural_textures_keep_the_tint_asked_for(name):
+    mean = make_texture(name, (110, 100, 80)).reshape(-1, 3).mean(axis=0)
+    np.testing.assert_allclose(mean, (110, 100, 80), atol=3)

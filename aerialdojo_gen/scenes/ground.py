@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import groupby
 
 import numpy as np
@@ -44,6 +45,12 @@ class Surface:
     material: str
     rise_m: float = 0.0
     edge: str = "concrete"
+
+    @cached_property
+    def bounds(self) -> tuple[float, float, float, float]:
+        """Least and greatest x and y: (x0, y0, x1, y1), metres."""
+        x0, y0, x1, y1 = self.area.bounds
+        return x0, y0, x1, y1
 
 
 def ground_meshes(

@@ -100,7 +100,9 @@ class Site:
         """Height of the painted ground at a point, metres."""
         z = float(self._terrain.z(x, y))
         for surface in reversed(self._surfaces):
-            if shapely.contains_xy(surface.area, x, y):
+            # Hundreds of lane marks are painted: their boxes are cheaper to ask than their areas.
+            x0, y0, x1, y1 = surface.bounds
+            if x0 <= x <= x1 and y0 <= y <= y1 and shapely.contains_xy(surface.area, x, y):
                 return z + surface.rise_m
         return z
 

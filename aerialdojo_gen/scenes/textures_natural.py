@@ -74,13 +74,15 @@ def snow(colour: Floats) -> Floats:
 
 
 def rock(colour: Floats) -> Floats:
-    """Weathered rock with cracks, drawn for 2 m."""
+    """Weathered rock with lichen and fine cracks, drawn for 2 m."""
     rng = texture_rng("rock")
-    base = fractal(256, 4, 6, rng, 0.62)
-    bands = value_noise(256, 3, rng, 14)
-    ridge = np.abs(fractal(256, 4, 4, rng))
-    crack = np.clip(ridge / 0.12, 0.55, 1.0)
-    return shade(colour, (1.0 + 0.14 * base + 0.06 * bands) * crack)
+    base = fractal(256, 5, 6, rng, 0.7)
+    bands = value_noise(256, 3, rng, 18)
+    ridge = np.abs(fractal(256, 7, 4, rng, 0.6))
+    crack = np.clip(ridge / 0.05, 0.78, 1.0)
+    image = shade(colour, (1.0 + 0.13 * base + 0.07 * bands) * crack)
+    lichen = np.clip(fractal(256, 9, 4, rng) - 1.2, 0, 0.6)[..., None]
+    return image * (1 - lichen) + (colour * 0.6 + np.array([78.0, 80.0, 60.0])) * lichen
 
 
 def bark(colour: Floats) -> Floats:
@@ -126,7 +128,7 @@ def leaf_litter(colour: Floats) -> Floats:
     rng = texture_rng("leaf_litter")
     image = shade(colour * 0.82, 1.0 + 0.13 * fractal(256, 8, 5, rng, 0.75))
     tints = np.array([[1.2, 1.05, 0.9], [0.85, 0.84, 0.85], [1.32, 1.0, 0.7], [1.05, 1.12, 0.8], [0.7, 0.68, 0.7]])
-    image = leaves(image, rng, 700, (5.0, 10.0), colour * tints)
+    image = leaves(image, rng, 1300, (5.0, 10.0), colour * tints)
     green = np.clip(fractal(256, 10, 3, rng) - 0.9, 0, 0.7)[..., None]
     return image * (1 - 0.6 * green) + colour * np.array([0.72, 1.05, 0.6]) * 0.6 * green
 
@@ -148,24 +150,29 @@ def water(colour: Floats) -> Floats:
 
 
 def mud(colour: Floats) -> Floats:
-    """Wet silt with puddles, drawn for 4 m."""
+    """Wet silt with small puddles, drawn for 4 m."""
     rng = texture_rng("mud")
-    base = fractal(256, 5, 5, rng)
-    puddle = np.clip((fractal(256, 4, 3, rng) - 0.7) * 3, 0, 1)[..., None]
-    image = shade(colour, 1.0 + 0.1 * base)
-    return image * (1 - 0.6 * puddle) + np.array([128.0, 138.0, 145.0]) * 0.6 * puddle
+    base = fractal(256, 8, 6, rng, 0.8)
+    puddle = np.clip((fractal(256, 7, 4, rng, 0.45) - 1.1) * 3, 0, 1)[..., None]
+    image = shade(colour, 1.0 + 0.1 * base + 0.03 * rng.uniform(-1, 1, size=(256, 256)))
+    return image * (1 - 0.55 * puddle) + (colour * 0.4 + np.array([78.0, 84.0, 90.0])) * 0.55 * puddle
 
 
 def rubble(colour: Floats) -> Floats:
     """Broken masonry in dust, drawn for 3 m."""
     rng = texture_rng("rubble")
-    first, second, owner = cells(256, 260, rng)
-    tone = rng.uniform(0.68, 1.22, size=260)[owner]
-    image = shade(colour, tone * np.clip((second - first) / 0.012, 0.5, 1.0) * (1 + 0.07 * fractal(256, 16, 3, rng)))
-    brick = (rng.uniform(size=260) < 0.16)[owner][..., None]
-    image = np.where(brick, image * np.array([1.12, 0.74, 0.62]), image)
-    dust = np.clip(0.45 + 0.5 * fractal(256, 5, 4, rng), 0, 1)[..., None]
-    return image * (1 - 0.55 * dust) + colour * 0.55 * dust
+    first, second, owner = cells(256, 420, rng)
+    # Every lump is lit from one side, as if it lay tilted.
+    tilt = np.gradient(first)
+    lean = rng.uniform(-1, 1, size=(420, 2))
+    light = 1.0 + 18.0 * (tilt[0] * lean[owner, 0] + tilt[1] * lean[owner, 1])
+    tone = rng.uniform(0.72, 1.2, size=420)[owner] * np.clip(light, 0.75, 1.25)
+    edge = np.clip((second - first) / 0.012, 0.68, 1.0)
+    image = shade(colour, tone * edge * (1 + 0.08 * fractal(256, 16, 4, rng, 0.7)))
+    brick = (rng.uniform(size=420) < 0.13)[owner][..., None]
+    image = np.where(brick, image * np.array([0.98, 0.62, 0.52]), image)
+    dust = np.clip(0.5 + 0.5 * fractal(256, 9, 4, rng), 0, 1)[..., None]
+    return image * (1 - 0.6 * dust) + colour * 0.6 * dust * (1 + 0.06 * fractal(256, 32, 3, rng))[..., None]
 
 
 def thatch(colour: Floats) -> Floats:
