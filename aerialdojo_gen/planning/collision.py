@@ -7,6 +7,7 @@ Surfaces are what it knows: a point deep inside a closed solid is far from every
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 
@@ -157,7 +158,7 @@ class CollisionWorld:
         p = np.asarray(points, np.float64)
         if len(p) == 1:
             return self.sphere_in_collision(p[0], radius_m)
-        return any(self.segment_in_collision(a, b, radius_m) for a, b in zip(p[:-1], p[1:], strict=True))
+        return any(self.segment_in_collision(a, b, radius_m) for a, b in itertools.pairwise(p))
 
     def _sphere(self, p: ArrayLike, radius_m: float) -> fcl.CollisionObject:
         sphere = self._spheres.get(radius_m)

@@ -1,0 +1,227 @@
+"""A bounding-volume hierarchy of triangles for queries inside numba kernels.
+
+The tree is implicit: node i has children 2i and 2i + 1, the leaves are the last level, and leaf j holds triangles
+``LEAF*j`` to ``LEAF*(j+1)`` of an array sorted along a Morton curve. So it is two plain arrays and needs no pointers.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from aerialdojo_gen.planning.triangles import point_triangle_d2, segment_triangle_d2
+
+LEAF = 4
+_STACK = 64
+
+
+def _morton(points: NDArray[np.float64]) -> NDArray[np.uint64]:
+    """Interleave the bits of 21-bit coordinates, (n, 3) float64 to (n,) uint64."""
+    low = points.min(axis=0)
+    extent = max(float((points.max(axis=0) - low).max()), 1e-9)
+    cells = ((points - low) / extent * (2**21 - 1)).astype(np.uint64)
+    code = np.zeros(len(points), np.uint64)
+    for bit in range(21):
+        for axis in range(3):
+            code |= ((cells[:, axis] >> np.uint64(bit)) & np.uint64(1)) << np.uint64(3 * bit + axis)
+    return code
+
+
+def build_bvh(triangles: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Sort triangles and box them.
+
+    Parameters
+    ----------
+    triangles : (n, 9) float64
+        Metres; n may be 0.
+
+    Returns
+    -------
+    triangles : (n, 9) float64
+        In the tree's order.
+    boxes : (2 m, 6) float64
+        Lower and upper corner of every node's box, m leaves (a power of two); row 0 is unused, an empty node's box
+        is inverted.
+    """
+    n = len(triangles)
+    if n:
+        centres = triangles.reshape(-1, 3, 3).mean(axis=1)
+        triangles = np.ascontiguousarray(triangles[np.argsort(_morton(centres), kind="stable")])
+    leaves = 1
+    while leaves * LEAF < n:
+        leaves *= 2
+    corners = triangles.reshape(-1, 3, 3)
+    boxes = np.empty((2 * leaves, 6))
+    boxes[:, :3], boxes[:, 3:] = np.inf, -np.inf
+    low, high = np.full((leaves * LEAF, 3), np.inf), np.full((leaves * LEAF, 3), -np.inf)
+    low[:n], high[:n] = corners.min(axis=1), corners.max(axis=1)
+    boxes[leaves:, :3] = low.reshape(leaves, LEAF, 3).min(axis=1)
+    boxes[leaves:, 3:] = high.reshape(leaves, LEAF, 3).max(axis=1)
+    while leaves > 1:
+        below = boxes[leaves : 2 * leaves].reshape(-1, 2, 6)
+        leaves //= 2
+        boxes[leaves : 2 * leaves, :3] = below[:, :, :3].min(axis=1)
+        boxes[leaves : 2 * leaves, 3:] = below[:, :, 3:].max(axis=1)
+    return triangles, boxes
+
+
+@njit(cache=True, inline="always")
+def _box_gap2(
+    lx: float, ly: float, lz: float, hx: float, hy: float, hz: float, boxes: NDArray[np.float64], node: int
+) -> float:
+    """Squared distance between the box (l, h) and a node's box."""
+    gx = max(0.0, max(boxes[node, 0] - hx, lx - boxes[node, 3]))
+    gy = max(0.0, max(boxes[node, 1] - hy, ly - boxes[node, 4]))
+    gz = max(0.0, max(boxes[node, 2] - hz, lz - boxes[node, 5]))
+    return gx * gx + gy * gy + gz * gz
+
+
+@njit(cache=True)
+def segment_near(
+    px: float, py: float, pz: float, qx: float, qy: float, qz: float,
+    radius: float, tri: NDArray[np.float64], boxes: NDArray[np.float64],
+) -> bool:  # fmt: skip
+    """Whether any triangle lies within `radius` of the segment pq: True means collision."""
+    lx, ly, lz = min(px, qx), min(py, qy), min(pz, qz)
+    hx, hy, hz = max(px, qx), max(py, qy), max(pz, qz)
+    leaves = boxes.shape[0] // 2
+    r2 = radius * radius
+    stack = np.empty(_STACK, np.int64)
+    stack[0] = 1
+    top = 1
+    while top > 0:
+        top -= 1
+        node = stack[top]
+        if _box_gap2(lx, ly, lz, hx, hy, hz, boxes, node) > r2:
+            continue
+        if node < leaves:
+            stack[top] = 2 * node
+            stack[top + 1] = 2 * node + 1
+            top += 2
+            continue
+        first = (node - leaves) * LEAF
+        for k in range(first, min(first + LEAF, tri.shape[0])):
+            if segment_triangle_d2(px, py, pz, qx, qy, qz, tri, k, radius) <= r2:
+                return True
+    return False
+
+
+@njit(cache=True)
+def segment_distance(
+    px: float, py: float, pz: float, qx: float, qy: float, qz: float,
+    bound: float, tri: NDArray[np.float64], boxes: NDArray[np.float64],
+) -> float:  # fmt: skip
+    """Distance from the segment pq to the nearest triangle, or `bound` where that is less; metres."""
+    lx, ly, lz = min(px, qx), min(py, qy), min(pz, qz)
+    hx, hy, hz = max(px, qx), max(py, qy), max(pz, qz)
+    leaves = boxes.shape[0] // 2
+    best2 = bound * bound
+    stack = np.empty(_STACK, np.int64)
+    stack[0] = 1
+    top = 1
+    while top > 0:
+        top -= 1
+        node = stack[top]
+        if _box_gap2(lx, ly, lz, hx, hy, hz, boxes, node) >= best2:
+            continue
+        if node < leaves:
+            left, right = 2 * node, 2 * node + 1
+            gl = _box_gap2(lx, ly, lz, hx, hy, hz, boxes, left)
+            gr = _box_gap2(lx, ly, lz, hx, hy, hz, boxes, right)
+            # The nearer child goes on top, so that the bound shrinks early.
+            stack[top] = right if gl <= gr else left
+            stack[top + 1] = left if gl <= gr else right
+            top += 2
+            continue
+        first = (node - leaves) * LEAF
+        for k in range(first, min(first + LEAF, tri.shape[0])):
+            d2 = segment_triangle_d2(px, py, pz, qx, qy, qz, tri, k, np.sqrt(best2))
+            best2 = min(best2, d2)
+    return np.sqrt(best2)
+
+
+@njit(cache=True)
+def crossings_above(px: float, py: float, pz: float, tri: NDArray[np.float64], boxes: NDArray[np.float64]) -> int:
+    """Surfaces crossed on the way straight up from p: outward faces count +1, inward faces -1.
+
+    Parameters
+    ----------
+    px, py, pz : float
+        World frame, metres.
+    tri, boxes : arrays
+        As `build_bvh` returns them.
+
+    Returns
+    -------
+    int
+        Positive inside a closed solid, or below a surface that faces up.
+    """
+    leaves = boxes.shape[0] // 2
+    stack = np.empty(_STACK, np.int64)
+    stack[0] = 1
+    top = 1
+    count = 0
+    while top > 0:
+        top -= 1
+        node = stack[top]
+        if (
+            px < boxes[node, 0] or px > boxes[node, 3]
+            or py < boxes[node, 1] or py > boxes[node, 4]
+            or pz > boxes[node, 5]
+        ):  # fmt: skip
+            continue
+        if node < leaves:
+            stack[top] = 2 * node
+            stack[top + 1] = 2 * node + 1
+            top += 2
+            continue
+        first = (node - leaves) * LEAF
+        for k in range(first, min(first + LEAF, tri.shape[0])):
+            count += _crossing(px, py, pz, tri, k)
+    return count
+
+
+@njit(cache=True)
+def _crossing(px: float, py: float, pz: float, tri: NDArray[np.float64], k: int) -> int:
+    ax, ay = tri[k, 0] - px, tri[k, 1] - py
+    bx, by = tri[k, 3] - px, tri[k, 4] - py
+    cx, cy = tri[k, 6] - px, tri[k, 7] - py
+    u, v, w = bx * cy - by * cx, cx * ay - cy * ax, ax * by - ay * bx
+    if not ((u >= 0.0 and v >= 0.0 and w >= 0.0) or (u <= 0.0 and v <= 0.0 and w <= 0.0)):
+        return 0
+    area = u + v + w
+    if area == 0.0:
+        return 0
+    if (u * tri[k, 2] + v * tri[k, 5] + w * tri[k, 8]) / area <= pz:
+        return 0
+    return 1 if area > 0.0 else -1
+
+
+@njit(cache=True)
+def point_distance(
+    px: float, py: float, pz: float, bound: float, tri: NDArray[np.float64], boxes: NDArray[np.float64]
+) -> float:
+    """Distance from p to the nearest triangle, or `bound` where that is less; metres."""
+    leaves = boxes.shape[0] // 2
+    best2 = bound * bound
+    stack = np.empty(_STACK, np.int64)
+    stack[0] = 1
+    top = 1
+    while top > 0:
+        top -= 1
+        node = stack[top]
+        if _box_gap2(px, py, pz, px, py, pz, boxes, node) >= best2:
+            continue
+        if node < leaves:
+            left, right = 2 * node, 2 * node + 1
+            gl = _box_gap2(px, py, pz, px, py, pz, boxes, left)
+            gr = _box_gap2(px, py, pz, px, py, pz, boxes, right)
+            stack[top] = right if gl <= gr else left
+            stack[top + 1] = left if gl <= gr else right
+            top += 2
+            continue
+        first = (node - leaves) * LEAF
+        for k in range(first, min(first + LEAF, tri.shape[0])):
+            best2 = min(best2, point_triangle_d2(px, py, pz, tri, k))
+    return np.sqrt(best2)

@@ -1,0 +1,155 @@
+"""The clearance grid of a scene: how far the nearest surface is, and what is connected with the open sky."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from aerialdojo_gen.planning.bvh import build_bvh, crossings_above, point_distance
+from aerialdojo_gen.planning.connectivity import connected_with_ceiling, linked_cell, passable_moves
+from aerialdojo_gen.planning.distance_field import build_distance_field
+from aerialdojo_gen.planning.grid_kernels import GridArrays, inside, segment_free
+from aerialdojo_gen.planning.triangles import split_triangles
+from aerialdojo_gen.scenes.model import Scene
+
+# Longer triangles would have boxes full of nothing.
+_LONGEST_EDGE_M = 4.0
+
+
+@dataclass(frozen=True, eq=False)
+class ClearanceGrid:
+    """Distances on a grid, backed by the triangles where the grid cannot decide.
+
+    Attributes
+    ----------
+    arrays : GridArrays
+        Distance field, triangles and bounds, for numba kernels.
+    moves : (nx, ny, nz) uint32
+        Passable moves of every cell (`aerialdojo_gen.planning.connectivity.passable_moves`).
+    sky : (nx, ny, nz) bool
+        Cells from which the body can fly to the ceiling.
+    radius_m : float
+        The body's radius, with the planner's margin.
+    cap_m : float
+        Distances are known up to this.
+    """
+
+    arrays: GridArrays
+    moves: NDArray[np.uint32]
+    sky: NDArray[np.bool_]
+    radius_m: float
+    cap_m: float
+
+    @classmethod
+    def build(
+        cls,
+        scene: Scene,
+        cell_m: float = 0.5,
+        radius_m: float = 0.25,
+        band_m: float = 1.0,
+        cap_m: float = 5.0,
+        margin_m: float = 0.0,
+    ) -> ClearanceGrid:
+        """Build the grid over a scene's flight volume.
+
+        Parameters
+        ----------
+        scene : Scene
+            World coordinates, metres.
+        cell_m : float
+            Edge of a cell.
+        radius_m : float
+            The body's radius.
+        band_m : float
+            The field is exact up to this distance.
+        cap_m : float
+            The field is never above this.
+        margin_m : float
+            Added to the radius against surfaces, not against the bounds of the flight volume.
+
+        Returns
+        -------
+        ClearanceGrid
+            Depends on the scene and the parameters alone.
+        """
+        low, high = np.asarray(scene.bounds, np.float64)
+        reach = cap_m + 1.0
+        parts = [i.vertices[i.faces].reshape(-1, 9) for i in scene.instances]
+        triangles = np.concatenate(parts) if parts else np.empty((0, 9))
+        triangles, boxes = build_bvh(split_triangles(triangles, _LONGEST_EDGE_M, low - reach, high + reach))
+        nx, ny, nz = (max(1, int(n)) for n in np.ceil((high - low) / cell_m - 1e-9))
+        field = build_distance_field(triangles, low, (nx, ny, nz), cell_m, band_m, cap_m)
+        arrays = GridArrays(field, low.copy(), cell_m, triangles, boxes, low + radius_m, high - radius_m)
+        moves = passable_moves(arrays, radius_m + margin_m)
+        return cls(arrays, moves, connected_with_ceiling(moves), radius_m + margin_m, cap_m)
+
+    def distance_m(self, p: ArrayLike) -> float:
+        """Exact distance from a point to the nearest surface, up to `cap_m`; metres.
+
+        Parameters
+        ----------
+        p : (3,) float
+            World frame, metres.
+        """
+        x, y, z = np.asarray(p, np.float64)
+        return float(point_distance(x, y, z, self.cap_m, self.arrays.tri, self.arrays.boxes))
+
+    def in_collision(self, p: ArrayLike) -> bool:
+        """Whether the body cannot be at a point: it would touch a surface, leave the bounds, or sit in a solid.
+
+        Parameters
+        ----------
+        p : (3,) float
+            World frame, metres.
+
+        Returns
+        -------
+        bool
+            True for a collision. A point that cannot reach the sky counts as inside a solid if a ray straight up
+            leaves more surfaces than it enters; the air in a sealed room is no collision.
+        """
+        x, y, z = np.asarray(p, np.float64)
+        a = self.arrays
+        if not inside(x, y, z, a.lower, a.upper) or self.distance_m(p) <= self.radius_m:
+            return True
+        return not self.reachable(p) and crossings_above(x, y, z, a.tri, a.boxes) > 0
+
+    def reachable(self, p: ArrayLike) -> bool:
+        """Whether the body can be at a point and fly from there to the ceiling.
+
+        Parameters
+        ----------
+        p : (3,) float
+            World frame, metres.
+        """
+        x, y, z = np.asarray(p, np.float64)
+        if not inside(x, y, z, self.arrays.lower, self.arrays.upper):
+            return False
+        return bool(linked_cell(x, y, z, self.radius_m, self.sky, self.arrays))
+
+    def segment_proven_free(self, p: ArrayLike, q: ArrayLike, radius_m: float) -> bool:
+        """Whether the grid alone proves that a ball moving from `p` to `q` touches nothing; False is undecided.
+
+        Parameters
+        ----------
+        p, q : (3,) float
+            World frame, metres, inside the flight volume.
+        radius_m : float
+            Radius of the ball.
+        """
+        return bool(segment_free(*np.asarray(p, np.float64), *np.asarray(q, np.float64), radius_m, self.arrays, True))
+
+    def segment_in_collision(self, p: ArrayLike, q: ArrayLike, radius_m: float) -> bool:
+        """Whether a ball moving from `p` to `q` touches a surface: the grid's answer, exact by the triangles.
+
+        Parameters
+        ----------
+        p, q : (3,) float
+            World frame, metres, inside the flight volume.
+        radius_m : float
+            Radius of the ball.
+        """
+        a, b = np.asarray(p, np.float64), np.asarray(q, np.float64)
+        return not bool(segment_free(*a, *b, radius_m, self.arrays, False))

@@ -1,0 +1,174 @@
+"""Which cells of the clearance grid the body can move between, and which of them see the sky."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from aerialdojo_gen.planning.grid_kernels import GridArrays, inside, segment_free
+
+# Half of the moves between cells: neighbours in the plane, knight's moves in the plane, up. Move k + 9 undoes move k.
+_HALF = ((1, 0, 0), (0, 1, 0), (1, 1, 0), (-1, 1, 0), (2, 1, 0), (1, 2, 0), (-1, 2, 0), (-2, 1, 0), (0, 0, 1))
+N_HALF = len(_HALF)
+MOVES = np.array(_HALF + tuple((-x, -y, -z) for x, y, z in _HALF), np.int64)
+MOVE_LENGTHS = np.sqrt((MOVES**2).sum(axis=1))
+ALL_MOVES = np.uint32(2 ** len(MOVES) - 1)
+# The two shorter moves that make up a diagonal or knight's move; -1 for the axes.
+_PARTS = np.array([(-1, -1), (-1, -1), (0, 1), (9, 1), (0, 2), (1, 2), (1, 3), (9, 3), (-1, -1)], np.int64)
+_ONE = np.uint32(1)
+
+
+@njit(cache=True, inline="always")
+def cell_centre(i: int, j: int, k: int, grid: GridArrays) -> tuple[float, float, float]:
+    """Centre of a cell, world frame, metres."""
+    return (
+        grid.origin[0] + (i + 0.5) * grid.cell,
+        grid.origin[1] + (j + 0.5) * grid.cell,
+        grid.origin[2] + (k + 0.5) * grid.cell,
+    )
+
+
+@njit(cache=True, inline="always")
+def _has(moves: NDArray[np.uint32], i: int, j: int, k: int, m: int) -> bool:
+    return (moves[i, j, k] >> np.uint32(m)) & _ONE != 0
+
+
+@njit(cache=True)
+def _composed(moves: NDArray[np.uint32], i: int, j: int, k: int, m: int) -> bool:
+    """Whether both ways round, by the two shorter moves, are passable."""
+    a, b = _PARTS[m, 0], _PARTS[m, 1]
+    return (
+        _has(moves, i, j, k, a)
+        and _has(moves, i, j, k, b)
+        and _has(moves, i + MOVES[a, 0], j + MOVES[a, 1], k, b)
+        and _has(moves, i + MOVES[b, 0], j + MOVES[b, 1], k, a)
+    )
+
+
+@njit(cache=True)
+def passable_moves(grid: GridArrays, radius: float) -> NDArray[np.uint32]:
+    """Find the moves that the body can make from every cell.
+
+    Axis moves are exact. A diagonal or knight's move is passable where both ways round it are, for what is left
+    between them is too small to hold a surface that keeps its distance from both; another diagonal is passable
+    where the triangles say so.
+
+    Parameters
+    ----------
+    grid : GridArrays
+        The clearance grid.
+    radius : float
+        The body's radius, metres.
+
+    Returns
+    -------
+    (nx, ny, nz) uint32
+        Bit m stands for ``MOVES[m]``; 0 for a cell in which the body cannot be, or cannot leave.
+    """
+    nx, ny, nz = grid.field.shape
+    moves = np.zeros((nx, ny, nz), np.uint32)
+    free = np.zeros((nx, ny, nz), np.bool_)
+    for i in range(nx):
+        for j in range(ny):
+            for k in range(nz):
+                x, y, z = cell_centre(i, j, k, grid)
+                free[i, j, k] = grid.field[i, j, k] >= radius and inside(x, y, z, grid.lower, grid.upper)
+    # The order matters: diagonals are made of axis moves, knight's moves of both.
+    for m in (0, 1, 8, 2, 3, 4, 5, 6, 7):
+        dx, dy, dz = MOVES[m]
+        length = MOVE_LENGTHS[m] * grid.cell
+        for i in range(max(0, -dx), min(nx, nx - dx)):
+            for j in range(ny - dy):
+                for k in range(nz - dz):
+                    if not (free[i, j, k] and free[i + dx, j + dy, k + dz]):
+                        continue
+                    # Both balls together cover the move if the gap between them is no wider than this.
+                    if grid.field[i, j, k] + grid.field[i + dx, j + dy, k + dz] - length < 2 * radius:
+                        composed = _PARTS[m, 0] >= 0 and _composed(moves, i, j, k, m)
+                        if not composed and m >= 4 and m < 8:
+                            continue
+                        if not composed:
+                            x, y, z = cell_centre(i, j, k, grid)
+                            u, v, w = cell_centre(i + dx, j + dy, k + dz, grid)
+                            if not segment_free(x, y, z, u, v, w, radius, grid, False):
+                                continue
+                    moves[i, j, k] |= _ONE << np.uint32(m)
+                    moves[i + dx, j + dy, k + dz] |= _ONE << np.uint32(m + N_HALF)
+    return moves
+
+
+@njit(cache=True)
+def connected_with_ceiling(moves: NDArray[np.uint32]) -> NDArray[np.bool_]:
+    """Mark the cells that `passable_moves` connects with the highest layer that has any.
+
+    Parameters
+    ----------
+    moves : (nx, ny, nz) uint32
+        What `passable_moves` returns.
+
+    Returns
+    -------
+    (nx, ny, nz) bool
+        True where the body can fly to the ceiling.
+    """
+    nx, ny, nz = moves.shape
+    seen = np.zeros((nx, ny, nz), np.bool_)
+    flat_moves, flat_seen = moves.ravel(), seen.ravel()
+    stack = np.empty(nx * ny * nz, np.int32)
+    top = 0
+    for k in range(nz - 1, -1, -1):
+        for c in range(k, nx * ny * nz, nz):
+            if flat_moves[c]:
+                flat_seen[c] = True
+                stack[top] = c
+                top += 1
+        if top > 0:
+            break
+    steps = MOVES[:, 0] * (ny * nz) + MOVES[:, 1] * nz + MOVES[:, 2]
+    while top > 0:
+        top -= 1
+        c = stack[top]
+        bits = flat_moves[c]
+        for m in range(steps.shape[0]):
+            if (bits >> np.uint32(m)) & _ONE and not flat_seen[c + steps[m]]:
+                flat_seen[c + steps[m]] = True
+                stack[top] = c + steps[m]
+                top += 1
+    return seen
+
+
+@njit(cache=True)
+def linked_cell(x: float, y: float, z: float, radius: float, marked: NDArray[np.bool_], grid: GridArrays) -> bool:
+    """Whether the body at a point can move straight to the centre of a nearby cell that is marked.
+
+    Parameters
+    ----------
+    x, y, z : float
+        World frame, metres.
+    radius : float
+        The body's radius, metres.
+    marked : (nx, ny, nz) bool
+        Cells that count.
+    grid : GridArrays
+        The clearance grid.
+
+    Returns
+    -------
+    bool
+        True if there is such a cell among the 64 nearest.
+    """
+    nx, ny, nz = marked.shape
+    i0 = math.floor((x - grid.origin[0]) / grid.cell - 0.5)
+    j0 = math.floor((y - grid.origin[1]) / grid.cell - 0.5)
+    k0 = math.floor((z - grid.origin[2]) / grid.cell - 0.5)
+    for i in range(max(0, i0 - 1), min(nx, i0 + 3)):
+        for j in range(max(0, j0 - 1), min(ny, j0 + 3)):
+            for k in range(max(0, k0 - 1), min(nz, k0 + 3)):
+                if marked[i, j, k]:
+                    u, v, w = cell_centre(i, j, k, grid)
+                    if segment_free(x, y, z, u, v, w, radius, grid, False):
+                        return True
+    return False

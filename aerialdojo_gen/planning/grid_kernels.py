@@ -1,0 +1,145 @@
+"""Numba kernels over the clearance grid: is a segment free, and how near does it come to a surface."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from aerialdojo_gen.planning.bvh import point_distance, segment_distance, segment_near
+
+
+class GridArrays(NamedTuple):
+    """What kernels need of a clearance grid.
+
+    Attributes
+    ----------
+    field : (nx, ny, nz) float32
+        Lower bound of the distance from a cell's centre to the nearest surface, metres.
+    origin : (3,) float64
+        Lower corner of cell (0, 0, 0), metres.
+    cell : float
+        Edge of a cell, metres.
+    tri, boxes : arrays
+        Triangles and their tree (`aerialdojo_gen.planning.bvh.build_bvh`).
+    lower, upper : (3,) float64
+        Where the body's centre may be, metres.
+    """
+
+    field: NDArray[np.float32]
+    origin: NDArray[np.float64]
+    cell: float
+    tri: NDArray[np.float64]
+    boxes: NDArray[np.float64]
+    lower: NDArray[np.float64]
+    upper: NDArray[np.float64]
+
+
+@njit(cache=True, inline="always")
+def inside(x: float, y: float, z: float, lower: NDArray[np.float64], upper: NDArray[np.float64]) -> bool:
+    """Whether a point lies in the closed box (lower, upper), give or take a nanometre of rounding."""
+    e = 1e-9
+    return (
+        lower[0] - e <= x <= upper[0] + e and lower[1] - e <= y <= upper[1] + e and lower[2] - e <= z <= upper[2] + e
+    )
+
+
+@njit(cache=True, inline="always")
+def point_bound(x: float, y: float, z: float, grid: GridArrays) -> float:
+    """Lower bound of the distance from a point to the nearest surface, metres; may be negative."""
+    i = min(max(int((x - grid.origin[0]) / grid.cell), 0), grid.field.shape[0] - 1)
+    j = min(max(int((y - grid.origin[1]) / grid.cell), 0), grid.field.shape[1] - 1)
+    k = min(max(int((z - grid.origin[2]) / grid.cell), 0), grid.field.shape[2] - 1)
+    dx = x - grid.origin[0] - (i + 0.5) * grid.cell
+    dy = y - grid.origin[1] - (j + 0.5) * grid.cell
+    dz = z - grid.origin[2] - (k + 0.5) * grid.cell
+    return grid.field[i, j, k] - math.sqrt(dx * dx + dy * dy + dz * dz)
+
+
+@njit(cache=True)
+def segment_free(
+    px: float, py: float, pz: float, qx: float, qy: float, qz: float,
+    radius: float, grid: GridArrays, prove_only: bool,
+) -> bool:  # fmt: skip
+    """Whether a ball that moves from p to q stays clear of every surface.
+
+    The grid's bound is 1-Lipschitz and carries the ball over open space in few steps; where it cannot decide, the
+    triangles do, exactly.
+
+    Parameters
+    ----------
+    px, py, pz, qx, qy, qz : float
+        Ends, metres; inside the flight volume.
+    radius : float
+        Radius of the ball, metres.
+    grid : GridArrays
+        The clearance grid.
+    prove_only : bool
+        Do not ask the triangles: True is then a proof by the grid alone, False means undecided.
+
+    Returns
+    -------
+    bool
+        True for free.
+    """
+    dx, dy, dz = qx - px, qy - py, qz - pz
+    length = math.sqrt(dx * dx + dy * dy + dz * dz)
+    if length == 0.0:
+        if point_bound(px, py, pz, grid) > radius:
+            return True
+        return not prove_only and not segment_near(px, py, pz, qx, qy, qz, radius, grid.tri, grid.boxes)
+    ux, uy, uz = dx / length, dy / length, dz / length
+    step = grid.cell
+    t = 0.0
+    while t < length:
+        slack = point_bound(px + t * ux, py + t * uy, pz + t * uz, grid) - radius
+        if slack > 0.1 * grid.cell:
+            t += slack
+            continue
+        s = min(t + step, length)
+        m = 0.5 * (t + s)
+        if point_bound(px + m * ux, py + m * uy, pz + m * uz, grid) - radius <= 0.5 * (s - t) and (
+            prove_only
+            or segment_near(
+                px + t * ux, py + t * uy, pz + t * uz, px + s * ux, py + s * uy, pz + s * uz,
+                radius, grid.tri, grid.boxes,
+            )
+        ):  # fmt: skip
+            return False
+        t = s
+    return True
+
+
+@njit(cache=True)
+def segment_clearance(
+    px: float, py: float, pz: float, qx: float, qy: float, qz: float, bound: float, grid: GridArrays
+) -> float:  # fmt: skip
+    """Exact distance from the segment pq to the nearest surface, or `bound` where that is less; metres."""
+    dx, dy, dz = qx - px, qy - py, qz - pz
+    length = math.sqrt(dx * dx + dy * dy + dz * dz)
+    best = bound
+    step = 2.0 * grid.cell
+    n = max(1, math.ceil(length / step))
+    for i in range(n):
+        a, b = i / n, (i + 1) / n
+        m = 0.5 * (a + b)
+        if point_bound(px + m * dx, py + m * dy, pz + m * dz, grid) - 0.5 * length / n >= best:
+            continue
+        best = segment_distance(
+            px + a * dx, py + a * dy, pz + a * dz, px + b * dx, py + b * dy, pz + b * dz,
+            best, grid.tri, grid.boxes,
+        )  # fmt: skip
+    return best
+
+
+@njit(cache=True)
+def polyline_clearance(points: NDArray[np.float64], bound: float, grid: GridArrays) -> float:
+    """Smallest distance from a polyline, (n, 3) float64, to any surface, or `bound` where that is less; metres."""
+    best = point_distance(points[-1, 0], points[-1, 1], points[-1, 2], bound, grid.tri, grid.boxes)
+    for i in range(points.shape[0] - 1):
+        p, q = points[i], points[i + 1]
+        best = segment_clearance(p[0], p[1], p[2], q[0], q[1], q[2], best, grid)
+    return best

@@ -1,0 +1,176 @@
+"""Exact distances between points, segments and triangles, as numba kernels.
+
+All coordinates are float64, metres, world frame. A triangle is nine consecutive numbers of a row: ax, ay, az, bx,
+… cz. Distances are returned squared. The closed forms are Ericson's, Real-Time Collision Detection, chapter 5.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+_PARALLEL = 1e-14
+
+
+@njit(cache=True, inline="always")
+def point_segment_d2(
+    px: float, py: float, pz: float, ax: float, ay: float, az: float, bx: float, by: float, bz: float
+) -> float:
+    """Squared distance from point p to segment ab."""
+    ux, uy, uz = bx - ax, by - ay, bz - az
+    wx, wy, wz = px - ax, py - ay, pz - az
+    uu = ux * ux + uy * uy + uz * uz
+    t = 0.0
+    if uu > 0.0:
+        t = min(1.0, max(0.0, (wx * ux + wy * uy + wz * uz) / uu))
+    ex, ey, ez = wx - t * ux, wy - t * uy, wz - t * uz
+    return ex * ex + ey * ey + ez * ez
+
+
+@njit(cache=True)
+def point_triangle_d2(px: float, py: float, pz: float, tri: NDArray[np.float64], k: int) -> float:
+    """Squared distance from point p to triangle `tri[k]`; right for degenerate triangles too."""
+    ax, ay, az = tri[k, 0], tri[k, 1], tri[k, 2]
+    bx, by, bz = tri[k, 3], tri[k, 4], tri[k, 5]
+    cx, cy, cz = tri[k, 6], tri[k, 7], tri[k, 8]
+    ux, uy, uz = bx - ax, by - ay, bz - az
+    vx, vy, vz = cx - ax, cy - ay, cz - az
+    nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
+    nn = nx * nx + ny * ny + nz * nz
+    wx, wy, wz = px - ax, py - ay, pz - az
+    if nn > 0.0:
+        # Barycentric coordinates of the foot on the plane: inside means that the plane decides.
+        s = ((uy * wz - uz * wy) * nx + (uz * wx - ux * wz) * ny + (ux * wy - uy * wx) * nz) / nn
+        t = ((wy * vz - wz * vy) * nx + (wz * vx - wx * vz) * ny + (wx * vy - wy * vx) * nz) / nn
+        if s >= 0.0 and t >= 0.0 and s + t <= 1.0:
+            h = wx * nx + wy * ny + wz * nz
+            return h * h / nn
+    d = point_segment_d2(px, py, pz, ax, ay, az, bx, by, bz)
+    d = min(d, point_segment_d2(px, py, pz, bx, by, bz, cx, cy, cz))
+    return min(d, point_segment_d2(px, py, pz, cx, cy, cz, ax, ay, az))
+
+
+@njit(cache=True, inline="always")
+def segment_segment_d2(
+    px: float, py: float, pz: float, qx: float, qy: float, qz: float,
+    ax: float, ay: float, az: float, bx: float, by: float, bz: float,
+) -> float:  # fmt: skip
+    """Squared distance between segments pq and ab."""
+    ux, uy, uz = qx - px, qy - py, qz - pz
+    vx, vy, vz = bx - ax, by - ay, bz - az
+    wx, wy, wz = px - ax, py - ay, pz - az
+    uu = ux * ux + uy * uy + uz * uz
+    vv = vx * vx + vy * vy + vz * vz
+    uv = ux * vx + uy * vy + uz * vz
+    uw = ux * wx + uy * wy + uz * wz
+    vw = vx * wx + vy * wy + vz * wz
+    s, t = 0.0, 0.0
+    if uu <= 0.0:
+        if vv > 0.0:
+            t = min(1.0, max(0.0, vw / vv))
+    elif vv <= 0.0:
+        s = min(1.0, max(0.0, -uw / uu))
+    else:
+        det = uu * vv - uv * uv
+        if det > _PARALLEL * uu * vv:
+            s = min(1.0, max(0.0, (uv * vw - uw * vv) / det))
+        t = (uv * s + vw) / vv
+        if t < 0.0:
+            t = 0.0
+            s = min(1.0, max(0.0, -uw / uu))
+        elif t > 1.0:
+            t = 1.0
+            s = min(1.0, max(0.0, (uv - uw) / uu))
+    ex, ey, ez = wx + s * ux - t * vx, wy + s * uy - t * vy, wz + s * uz - t * vz
+    return ex * ex + ey * ey + ez * ez
+
+
+@njit(cache=True)
+def segment_triangle_d2(
+    px: float, py: float, pz: float, qx: float, qy: float, qz: float,
+    tri: NDArray[np.float64], k: int, bound: float,
+) -> float:  # fmt: skip
+    """Squared distance between segment pq and triangle `tri[k]`; infinity where it exceeds `bound` squared.
+
+    Parameters
+    ----------
+    px, py, pz, qx, qy, qz : float
+        Ends of the segment, metres.
+    tri : (n, 9) float64
+        Triangles.
+    k : int
+        Row of the triangle.
+    bound : float
+        Distances beyond it need not be known, metres.
+
+    Returns
+    -------
+    float
+        Square metres, or infinity.
+    """
+    ax, ay, az = tri[k, 0], tri[k, 1], tri[k, 2]
+    bx, by, bz = tri[k, 3], tri[k, 4], tri[k, 5]
+    cx, cy, cz = tri[k, 6], tri[k, 7], tri[k, 8]
+    ux, uy, uz = bx - ax, by - ay, bz - az
+    vx, vy, vz = cx - ax, cy - ay, cz - az
+    nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
+    nn = nx * nx + ny * ny + nz * nz
+    limit = bound * bound
+    if nn > 0.0:
+        hp = (px - ax) * nx + (py - ay) * ny + (pz - az) * nz
+        hq = (qx - ax) * nx + (qy - ay) * ny + (qz - az) * nz
+        if hp * hq > 0.0:
+            h = min(abs(hp), abs(hq))
+            if h * h > limit * nn:
+                return np.inf
+        else:
+            f = hp / (hp - hq) if hp != hq else 0.0
+            wx, wy, wz = px + f * (qx - px) - ax, py + f * (qy - py) - ay, pz + f * (qz - pz) - az
+            s = ((uy * wz - uz * wy) * nx + (uz * wx - ux * wz) * ny + (ux * wy - uy * wx) * nz) / nn
+            t = ((wy * vz - wz * vy) * nx + (wz * vx - wx * vz) * ny + (wx * vy - wy * vx) * nz) / nn
+            if s >= 0.0 and t >= 0.0 and s + t <= 1.0:
+                return 0.0
+    d = segment_segment_d2(px, py, pz, qx, qy, qz, ax, ay, az, bx, by, bz)
+    d = min(d, segment_segment_d2(px, py, pz, qx, qy, qz, bx, by, bz, cx, cy, cz))
+    d = min(d, segment_segment_d2(px, py, pz, qx, qy, qz, cx, cy, cz, ax, ay, az))
+    d = min(d, point_triangle_d2(px, py, pz, tri, k))
+    d = min(d, point_triangle_d2(qx, qy, qz, tri, k))
+    return d if d <= limit else np.inf
+
+
+def split_triangles(
+    triangles: NDArray[np.float64], max_edge_m: float, lower: NDArray[np.float64], upper: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Halve long triangles until none is longer than asked, and leave out what lies outside a box.
+
+    Parameters
+    ----------
+    triangles : (n, 9) float64
+        Metres.
+    max_edge_m : float
+        Longest edge that may remain.
+    lower, upper : (3,) float64
+        Corners of the box: triangles whose own box does not touch it are dropped.
+
+    Returns
+    -------
+    (m, 9) float64
+        Covering the same surface inside the box, in an order that depends on the input alone.
+    """
+    done: list[NDArray[np.float64]] = []
+    todo = triangles.reshape(-1, 3, 3)
+    while len(todo):
+        inside = ((todo.min(axis=1) <= upper) & (todo.max(axis=1) >= lower)).all(axis=1)
+        todo = todo[inside]
+        edges = np.linalg.norm(todo - np.roll(todo, -1, axis=1), axis=2)
+        short = edges.max(axis=1, initial=0.0) <= max_edge_m
+        done.append(todo[short])
+        todo, edges = todo[~short], edges[~short]
+        rows = np.arange(len(todo))
+        i = edges.argmax(axis=1)
+        j, k = (i + 1) % 3, (i + 2) % 3
+        a, b, c = todo[rows, i], todo[rows, j], todo[rows, k]
+        middle = (a + b) / 2
+        todo = np.concatenate([np.stack([a, middle, c], axis=1), np.stack([middle, b, c], axis=1)])
+    return np.concatenate(done or [np.empty((0, 3, 3))]).reshape(-1, 9)
