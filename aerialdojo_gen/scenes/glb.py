@@ -108,7 +108,7 @@ class _Writer:
             surface["baseColorFactor"] = [*(_linear(c) for c in material.colour), 1.0]
         else:
             surface["baseColorTexture"] = {"index": len(self._images)}
-            ok, png = cv2.imencode(".png", material.texture[..., ::-1], [cv2.IMWRITE_PNG_COMPRESSION, 6])
+            ok, png = cv2.imencode(".png", material.texture[..., ::-1], [cv2.IMWRITE_PNG_COMPRESSION, 3])
             if not ok:
                 raise AssetError(f"material {material.name!r}: its texture cannot be encoded")
             self._images.append({"mimeType": "image/png", "bufferView": self._view(png.tobytes(), None)})

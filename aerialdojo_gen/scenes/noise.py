@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
@@ -46,28 +48,42 @@ def cells(size: int, count: int, rng: np.random.Generator) -> tuple[Floats, Floa
     return first, second, owner[:, 0].reshape(size, size)
 
 
-def leaves(
-    image: Floats, rng: np.random.Generator, count: int, length_px: tuple[float, float], tones: Floats
-) -> Floats:
-    """Strew small pointed leaves over an image, each in one of the tones (n, 3), darker towards its rim."""
-    size = len(image)
-    out = image.copy()
+@lru_cache(maxsize=8)
+def leaf_pattern(
+    name: str, size: int, count: int, length_px: tuple[float, float], tones: int
+) -> tuple[Floats, NDArray[np.int64]]:
+    """Strew small pointed leaves over a tile, darker towards their rims.
+
+    Returns
+    -------
+    light : (size, size) float64
+        Brightness of the leaf that lies on top.
+    tone : (size, size) int64
+        Which of the tones it has; -1 where no leaf lies.
+    """
+    rng = texture_rng(name)
+    light = np.ones((size, size))
+    tone = np.full((size, size), -1, dtype=np.int64)
     reach = int(np.ceil(length_px[1] / 2)) + 1
     dy, dx = np.mgrid[-reach : reach + 1, -reach : reach + 1].astype(np.float64)
-    for x, y, turn, length, slim in rng.uniform(
-        (0, 0, 0, length_px[0], 0.35), (size, size, 2 * np.pi, length_px[1], 0.6), size=(count, 5)
+    window = np.arange(-reach, reach + 1)
+    for x, y, turn, length, slim, own in rng.uniform(
+        (0, 0, 0, length_px[0], 0.35, 0.85), (size, size, 2 * np.pi, length_px[1], 0.6, 1.12), size=(count, 6)
     ):
         u = (dx * np.cos(turn) + dy * np.sin(turn)) / (length / 2)
         v = (-dx * np.sin(turn) + dy * np.cos(turn)) / (length / 2 * slim)
         rim = u**2 + np.abs(v) * (1.0 + 0.4 * np.abs(u))
-        inside = rim < 1.0
-        rows = (int(y) + np.arange(-reach, reach + 1)) % size
-        columns = (int(x) + np.arange(-reach, reach + 1)) % size
-        window = out[np.ix_(rows, columns)]
-        tone = tones[int(rng.integers(len(tones)))] * rng.uniform(0.85, 1.12)
-        light = 1.08 - 0.3 * rim + np.where(np.abs(v) < 0.18, 0.08, 0.0)
-        out[np.ix_(rows, columns)] = np.where(inside[..., None], tone * light[..., None], window)
-    return out
+        i, j = np.nonzero(rim < 1.0)
+        rows, columns = (int(y) + window)[i] % size, (int(x) + window)[j] % size
+        light[rows, columns] = own * (1.08 - 0.3 * rim[i, j] + np.where(np.abs(v[i, j]) < 0.18, 0.08, 0.0))
+        tone[rows, columns] = int(rng.integers(tones))
+    return light, tone
+
+
+def leaves(image: Floats, name: str, count: int, length_px: tuple[float, float], tones: Floats) -> Floats:
+    """Lay the leaves of `leaf_pattern` over an image, each in one of the tones (n, 3)."""
+    light, tone = leaf_pattern(name, len(image), count, length_px, len(tones))
+    return np.where((tone >= 0)[..., None], tones[tone] * light[..., None], image)
 
 
 def balanced(image: Floats, colour: Floats) -> Floats:

@@ -112,7 +112,7 @@ def foliage(colour: Floats) -> Floats:
     rng = texture_rng("foliage")
     depth = np.clip(0.55 + 0.12 * fractal(256, 8, 3, rng), 0.35, 0.8)
     tints = np.array([[1.0, 1.0, 1.0], [1.15, 1.1, 0.85], [0.82, 0.9, 0.9], [0.7, 0.82, 0.75], [1.25, 1.18, 0.8]])
-    return leaves(shade(colour, depth), rng, 900, (9.0, 17.0), colour * tints)
+    return leaves(shade(colour, depth), "foliage leaves", 900, (9.0, 17.0), colour * tints)
 
 
 def needles(colour: Floats) -> Floats:
@@ -128,7 +128,7 @@ def leaf_litter(colour: Floats) -> Floats:
     rng = texture_rng("leaf_litter")
     image = shade(colour * 0.82, 1.0 + 0.13 * fractal(256, 8, 5, rng, 0.75))
     tints = np.array([[1.2, 1.05, 0.9], [0.85, 0.84, 0.85], [1.32, 1.0, 0.7], [1.05, 1.12, 0.8], [0.7, 0.68, 0.7]])
-    image = leaves(image, rng, 1300, (5.0, 10.0), colour * tints)
+    image = leaves(image, "fallen leaves", 1300, (5.0, 10.0), colour * tints)
     green = np.clip(fractal(256, 10, 3, rng) - 0.9, 0, 0.7)[..., None]
     return image * (1 - 0.6 * green) + colour * np.array([0.72, 1.05, 0.6]) * 0.6 * green
 
