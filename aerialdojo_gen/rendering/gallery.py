@@ -1,0 +1,140 @@
+"""Contact sheets: what every prop and every scene looks like, for a person to judge."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from aerialdojo_gen.errors import RenderError
+from aerialdojo_gen.rendering.preview import contact_sheet, look_at
+from aerialdojo_gen.rng import generator
+from aerialdojo_gen.scenes.catalogue import Catalogue
+from aerialdojo_gen.scenes.ground import rectangle
+from aerialdojo_gen.scenes.mesh import to_part
+from aerialdojo_gen.scenes.model import Instance, Scene
+from aerialdojo_gen.scenes.shapes_extruded import extrude
+from aerialdojo_gen.store import atomic_file
+
+Image = NDArray[np.uint8]
+_STREET_HEIGHT_M = 3.0
+
+
+def prop_picture(catalogue: Catalogue, category: str, size_px: int = 240, variant: str | None = None) -> Image:
+    """Picture a prop from before it and above, on a paved floor as wide as it needs.
+
+    Parameters
+    ----------
+    catalogue : Catalogue
+        Where the category stands.
+    category : str
+        Its key.
+    size_px : int
+        Edge of the picture.
+    variant : str, optional
+        One of its variants; the first by default.
+
+    Returns
+    -------
+    (size_px, size_px, 3) uint8
+        sRGB.
+    """
+    names = [v.name for v in catalogue[category].variants]
+    chosen = variant if variant is not None else (names[0] if names else None)
+    prop = catalogue.instantiate(category, "prop", generator(0, "gallery", category), variant=chosen)
+    low, high = prop.bounds
+    reach = float(np.linalg.norm(high - low)) / 2
+    floor = to_part(extrude(rectangle(-6 * reach, -6 * reach, 6 * reach, 6 * reach), 0.02), "paving", 1.2)
+    down = np.array([0, 0, min(float(low[2]), 0.0) - 0.02])
+    ground = Instance(
+        "ground", "ground", "", {}, (type(floor)(floor.vertices + down, floor.faces, floor.uv, "paving"),)
+    )
+    materials = {name: catalogue.materials[name] for name in {p.material for p in (*prop.parts, *ground.parts)}}
+    bounds = np.array([[-8 * reach] * 3, [8 * reach] * 3])
+    scene = Scene(category, (ground, prop), materials, bounds)
+    centre = (low + high) / 2
+    eye = centre + 2.35 * reach * np.array([0.72, -0.55, 0.42]) / math.sqrt(0.72**2 + 0.55**2 + 0.42**2)
+    return look_at(scene, eye, centre, size_px, size_px, 55)
+
+
+def props_sheet(catalogue: Catalogue, size_px: int = 200, columns: int = 16) -> Image:
+    """Picture every category of the catalogue under its name, in alphabetical order; (H, W, 3) uint8 sRGB."""
+    names = sorted(catalogue)
+    return contact_sheet(
+        [prop_picture(catalogue, name, size_px) for name in names], [catalogue[n].name for n in names], columns
+    )
+
+
+def scene_sheet(scene: Scene, width: int = 640, height: int = 440) -> Image:
+    """Picture a scene: from straight above, from four sides, and twice at flying height.
+
+    Parameters
+    ----------
+    scene : Scene
+        Any scene.
+    width, height : int
+        Of each picture, pixels.
+
+    Returns
+    -------
+    (H, W, 3) uint8
+        sRGB.
+    """
+    low, high = scene.bounds
+    centre = np.array([*(low[:2] + high[:2]) / 2, low[2]])
+    span = high - low
+    reach = float(max(span[0], span[1]))
+    fov = 60.0
+    half = math.tan(math.radians(fov / 2))
+    up = 1.08 * max(span[0] / 2, span[1] / 2 * width / height) / half
+    # A breath to the south, so that north is up in the picture.
+    above = centre + np.array([0, -1e-3 * up, up])
+    views = [(above, centre, fov, "from above")]
+    for name, (dx, dy) in {
+        "south-west": (-1, -1),
+        "south-east": (1, -1),
+        "north-east": (1, 1),
+        "north-west": (-1, 1),
+    }.items():
+        eye = centre + np.array([dx * 0.48 * span[0], dy * 0.48 * span[1], 0.38 * reach])
+        views.append((eye, centre - [dx * 0.04 * reach, dy * 0.04 * reach, 0], fov, f"from the {name}"))
+    for k, (fx, fy) in enumerate(((-0.22, -0.18), (0.2, 0.16))):
+        x, y = centre[0] + fx * span[0], centre[1] + fy * span[1]
+        z = _open_height(scene, x, y)
+        views.append((np.array([x, y, z]), np.array([centre[0], centre[1], z - 1.0]), 80.0, f"flying, {k + 1}"))
+    images = [look_at(scene, eye, target, width, height, angle) for eye, target, angle, _ in views]
+    return contact_sheet(images, [f"{scene.name}, {label}" for *_, label in views], 3)
+
+
+def _open_height(scene: Scene, x: float, y: float) -> float:
+    """Flying height at a place: a little over whatever stands or lies there, not over the ceiling."""
+    tops = [scene.bounds[0, 2]]
+    for instance in scene.instances:
+        v = instance.vertices[instance.faces]
+        boxes = np.stack([v[..., :2].min(axis=1), v[..., :2].max(axis=1)])
+        over = ((boxes[0] - 1.0 <= (x, y)) & (boxes[1] + 1.0 >= (x, y))).all(axis=1)
+        if over.any():
+            tops.append(float(v[over][..., 2].max()))
+    return min(max(tops) + _STREET_HEIGHT_M, scene.ceiling_m - 0.5)
+
+
+def write_png(image: Image, folder: Path, name: str) -> Path:
+    """Write a picture as PNG, whole or not at all; returns its path.
+
+    Raises
+    ------
+    RenderError
+        The picture could not be encoded.
+    StoreError
+        The disk is full or read-only.
+    """
+    done, data = cv2.imencode(".png", image[..., ::-1], [cv2.IMWRITE_PNG_COMPRESSION, 9])
+    if not done:
+        raise RenderError(f"cannot encode {name} as PNG")
+    folder.mkdir(parents=True, exist_ok=True)
+    with atomic_file(folder, name) as path:
+        path.write_bytes(data.tobytes())
+    return folder / name
