@@ -9,7 +9,7 @@ RUN := .venv/bin/aerialdojo-gen
 RUN_FLAGS := $(if $(WORKERS),--workers $(WORKERS))
 
 .DEFAULT_GOAL := help
-.PHONY: help env dev dataset smoke test lint format bench lock clean
+.PHONY: help env dev dataset smoke test lint format gallery bench lock clean
 
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-9s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -50,6 +50,9 @@ lint: .venv/.dev  ## ruff and mypy --strict
 format: .venv/.dev  ## let ruff format the code
 	@.venv/bin/ruff check --fix-only --quiet .
 	@.venv/bin/ruff format .
+
+gallery: .venv/.installed  ## picture every prop and every scene into docs/gallery/
+	@$(RUN) gallery --out docs/gallery
 
 bench: .venv/.dev  ## measure planner and renderer
 	@for bench in tests/bench/bench_*.py; do echo "== $$bench"; .venv/bin/python $$bench || exit 1; done

@@ -221,6 +221,26 @@ def run(
     _run(stages, config, roots, scene, workers, [stage.name for stage in stages] if force else [], quiet)
 
 
+@app.command("gallery")
+def gallery(
+    out: Annotated[Path, typer.Option("--out", help="Folder for the pictures.")] = Path("docs/gallery"),
+    scene: Scene = None, pipeline: PipelineFile = None,
+    props: Annotated[bool, typer.Option("--props/--no-props", help="The sheet of all props too.")] = True,
+) -> None:  # fmt: skip
+    """Picture every prop and every scene as contact sheets."""
+    from aerialdojo_gen import runner
+    from aerialdojo_gen.rendering.gallery import props_sheet, scene_sheet, write_png
+    from aerialdojo_gen.scenes.build import build_scene
+    from aerialdojo_gen.scenes.catalogue import load_catalogue
+
+    config, roots = open_pipeline(pipeline, out)
+    catalogue = load_catalogue(roots.scene_assets)
+    for name in runner.choose_scenes(scene or config.scenes, runner.known_scenes(roots.recipes)):
+        print(write_png(scene_sheet(build_scene(roots.recipes / f"{name}.toml", catalogue)), out, f"{name}.png"))
+    if props:
+        print(write_png(props_sheet(catalogue), out, "props.png"))
+
+
 def main() -> None:
     """Run the command line; an expected error becomes one line and an exit code."""
     try:
