@@ -1,79 +1,30 @@
 """Deferred shading: from albedo, depth and surface of every pixel to the picture.
 
-The rasteriser delivers unlit texture colour, depth and the surface's number; sun, sky light, haze and the sky itself
-are added here, so that every rendering backend gives the same picture. Light is computed in sRGB values, which is
-not physics, but what the eye expects of a game.
+The rasteriser delivers unlit texture colour, depth and the surface's number; sun, shadow, sky light, haze and the sky
+itself are added here, so that every rendering backend gives the same picture. Light is computed in sRGB values, which
+is not physics, but what the eye expects of a game.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
 from aerialdojo_gen.geometry.cameras import Camera
-from aerialdojo_gen.rendering.surfaces import Surface
-from aerialdojo_gen.scenes.model import Scene
+from aerialdojo_gen.rendering.lighting import Lighting, ShadowMap
 
 Floats = NDArray[np.float64]
 
-_AMBIENT, _FROM_ABOVE, _FROM_SIDE, _SUN = 0.52, 0.12, 0.07, 0.50
-_HAZE_M = 420.0
-
-
-@dataclass(frozen=True, eq=False)
-class Lighting:
-    """What shading must know of a scene; row k of the tables is surface k.
-
-    Attributes
-    ----------
-    normal : (n, 3) float64
-        Unit normals, world frame.
-    colour : (n, 3) float64
-        The material's mean colour, 0-255.
-    texel_m : (n,) float64
-        Edge of a texel, metres; 0 for a flat material.
-    sun : (3,) float64
-        Unit vector towards the sun.
-    zenith, horizon : (3,) float64
-        The sky's colours, 0-255.
-    """
-
-    normal: Floats
-    colour: Floats
-    texel_m: Floats
-    sun: Floats
-    zenith: Floats
-    horizon: Floats
-
-
-def lighting(scene: Scene, surfaces: list[Surface]) -> Lighting:
-    """Collect what shading must know.
-
-    Parameters
-    ----------
-    scene : Scene
-    surfaces : list of Surface
-        As `aerialdojo_gen.rendering.surfaces.surfaces` gives them.
-
-    Returns
-    -------
-    Lighting
-    """
-    materials = [scene.materials[s.material] for s in surfaces]
-    sky = np.array(scene.sky, dtype=np.float64)
-    sun = np.array(scene.sun, dtype=np.float64)
-    return Lighting(
-        normal=np.array([s.normal for s in surfaces]).reshape(-1, 3),
-        colour=np.array([m.colour for m in materials], dtype=np.float64).reshape(-1, 3),
-        texel_m=np.array([0.0 if m.texture is None else m.tile_m / m.texture.shape[1] for m in materials]),
-        sun=sun / np.linalg.norm(sun),
-        zenith=sky * np.array([0.72, 0.84, 0.97]),
-        horizon=sky + (np.array([236.0, 238.0, 240.0]) - sky) * 0.6,
-    )
+# Light on a surface, as shares of its colour: from everywhere, more from above, a little from east and north so that
+# the faces of a building in the shade can be told apart, and from the sun.
+_AMBIENT, _FROM_ABOVE, _FROM_EAST, _FROM_NORTH, _SUN = 0.55, 0.11, 0.05, 0.03, 0.47
+# Haze grows with the square of distance up to about this range, metres.
+_HAZE_RANGE_M = 420.0
+# A texture fades into its mean colour between one and nine texels a pixel.
+_FADE_TEXELS = 9.0
 
 
 def shade(
@@ -83,6 +34,7 @@ def shade(
     depth_m: NDArray[np.float32],
     surface: NDArray[np.int32],
     light: Lighting,
+    shadow: ShadowMap,
 ) -> tuple[NDArray[np.uint8], float]:
     """Light a picture.
 
@@ -97,6 +49,7 @@ def shade(
     surface : (H, W) int32
         Number of the surface, -1 where nothing is hit.
     light : Lighting
+    shadow : ShadowMap
 
     Returns
     -------
@@ -107,15 +60,60 @@ def shade(
     """
     out = np.empty_like(albedo)
     hits, behind = _shade(
-        albedo, depth_m, surface, camera.focal_px, np.ascontiguousarray(world_from_camera), light.normal,
-        light.colour, light.texel_m, light.sun, light.zenith, light.horizon, out,
-    )  # fmt: skip
+        albedo,
+        depth_m,
+        surface,
+        camera.focal_px,
+        np.ascontiguousarray(world_from_camera),
+        light.normal,
+        light.colour,
+        light.texel_m,
+        np.stack([light.sun, light.zenith, light.horizon]),
+        shadow.depth_m,
+        np.ascontiguousarray(shadow.world_from_camera),
+        shadow.camera.focal_px,
+        0.03 + 1.5 * shadow.texel_m,
+        out,
+    )
     return out, behind / max(hits, 1)
 
 
 @njit(cache=True)
-def _shade(albedo, depth, surface, focal, pose, normal, colour, texel, sun, zenith, horizon, out):  # type: ignore[no-untyped-def]
+def _sunlit(x: float, y: float, z: float, shadow: NDArray[np.float32], pose: Floats, focal: float) -> float:
+    """Share of the sun that reaches a point: 0 in shadow, 1 in the light, between them at a shadow's edge."""
+    x, y, z = x - pose[0, 3], y - pose[1, 3], z - pose[2, 3]
+    depth = pose[0, 2] * x + pose[1, 2] * y + pose[2, 2] * z
+    n = shadow.shape[0]
+    u = focal * (pose[0, 0] * x + pose[1, 0] * y + pose[2, 0] * z) / depth + n / 2.0 - 0.5
+    v = focal * (pose[0, 1] * x + pose[1, 1] * y + pose[2, 1] * z) / depth + n / 2.0 - 0.5
+    col, row = math.floor(u), math.floor(v)
+    if col < 0 or row < 0 or col > n - 2 or row > n - 2:
+        return 1.0
+    a, b = u - col, v - row
+    top = (1.0 - a) * (depth <= shadow[row, col]) + a * (depth <= shadow[row, col + 1])
+    bottom = (1.0 - a) * (depth <= shadow[row + 1, col]) + a * (depth <= shadow[row + 1, col + 1])
+    return float((1.0 - b) * top + b * bottom)
+
+
+@njit(cache=True)
+def _shade(
+    albedo: NDArray[np.uint8],
+    depth: NDArray[np.float32],
+    surface: NDArray[np.int32],
+    focal: float,
+    pose: Floats,
+    normal: Floats,
+    colour: Floats,
+    texel: Floats,
+    sky: Floats,
+    shadow: NDArray[np.float32],
+    sun_pose: Floats,
+    sun_focal: float,
+    bias_m: float,
+    out: NDArray[np.uint8],
+) -> tuple[int, int]:
     height, width = depth.shape
+    sun, zenith, horizon = sky[0], sky[1], sky[2]
     base = np.empty(3)
     hits, behind = 0, 0
     for row in range(height):
@@ -128,15 +126,15 @@ def _shade(albedo, depth, surface, focal, pose, normal, colour, texel, sun, zeni
             stretch = math.sqrt(dx * dx + dy * dy + dz * dz)
             k = surface[row, col]
             if k < 0:
-                # The horizon lies where nothing is hit below it too: the ground fades into haze there.
+                # Beyond the ground's end nothing is hit below the horizon either: haze stands there.
                 up = max(0.0, dz / stretch) ** 0.55
                 for c in range(3):
                     out[row, col, c] = np.uint8(horizon[c] + (zenith[c] - horizon[c]) * up + 0.5)
                 continue
+            hits += 1
             z = depth[row, col]
             nx, ny, nz = normal[k, 0], normal[k, 1], normal[k, 2]
             facing = -(dx * nx + dy * ny + dz * nz) / stretch
-            hits += 1
             if facing < 0.0:
                 behind += 1
                 nx, ny, nz, facing = -nx, -ny, -nz, -facing
@@ -145,12 +143,21 @@ def _shade(albedo, depth, surface, focal, pose, normal, colour, texel, sun, zeni
             if texel[k] > 0.0:
                 # The rasteriser picks the nearest texel: far away, fade into the mean colour instead of noise.
                 texels = z * stretch / focal / math.sqrt(max(facing, 0.02)) / texel[k]
-                keep = min(1.0, max(0.0, (9.0 - texels) / 8.0))
+                keep = min(1.0, max(0.0, (_FADE_TEXELS - texels) / (_FADE_TEXELS - 1.0)))
                 for c in range(3):
                     base[c] += (albedo[row, col, c] - base[c]) * keep
-            lit = max(0.0, nx * sun[0] + ny * sun[1] + nz * sun[2])
-            level = 0.52 + 0.12 * nz + 0.05 * nx + 0.03 * ny + 0.50 * lit
-            haze = 1.0 - math.exp(-z * stretch / 420.0)
+            lit = nx * sun[0] + ny * sun[1] + nz * sun[2]
+            if lit <= 0.0:
+                lit = 0.0
+            else:
+                # Off the surface by more than a texel of the map, or it would shade itself.
+                px = pose[0, 3] + dx * z + nx * bias_m
+                py = pose[1, 3] + dy * z + ny * bias_m
+                pz = pose[2, 3] + dz * z + nz * bias_m
+                lit *= _sunlit(px, py, pz, shadow, sun_pose, sun_focal)
+            level = _AMBIENT + _FROM_ABOVE * nz + _FROM_EAST * nx + _FROM_NORTH * ny + _SUN * lit
+            range_m = z * stretch / _HAZE_RANGE_M
+            haze = 1.0 - math.exp(-range_m)
             haze *= haze
             for c in range(3):
                 value = base[c] * level

@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from aerialdojo_gen.errors import RenderError
 from aerialdojo_gen.geometry.cameras import Camera
 from aerialdojo_gen.geometry.rays import RayCaster
-from aerialdojo_gen.rendering.shading import Lighting, lighting, shade
+from aerialdojo_gen.rendering.lighting import Lighting, ShadowMap, lighting, sun_view
+from aerialdojo_gen.rendering.shading import shade
 from aerialdojo_gen.rendering.surfaces import Surface, surfaces
 from aerialdojo_gen.scenes.model import Material, Scene
 
@@ -71,6 +72,8 @@ class RenderWorld:
             textures: dict[str, int] = {}
             for k, surface in enumerate(found):
                 self._add(surface, k, scene.materials[surface.material], textures, Path(folder))
+        camera, pose, near_m, far_m = sun_view(scene)
+        self._shadow = ShadowMap(camera, pose, self.rasterise(camera, pose, near_m, far_m)[1])
 
     def _add(self, surface: Surface, k: int, material: Material, textures: dict[str, int], folder: Path) -> None:
         client = self._client
@@ -107,11 +110,11 @@ class RenderWorld:
         Picture
         """
         albedo, depth, surface = self.rasterise(camera, world_from_camera)
-        rgb, behind = shade(camera, world_from_camera, albedo, depth, surface, self._light)
+        rgb, behind = shade(camera, world_from_camera, albedo, depth, surface, self._light, self._shadow)
         return Picture(rgb, depth, behind)
 
     def rasterise(
-        self, camera: Camera, world_from_camera: Floats
+        self, camera: Camera, world_from_camera: Floats, near_m: float = NEAR_M, far_m: float = FAR_M
     ) -> tuple[NDArray[np.uint8], NDArray[np.float32], NDArray[np.int32]]:
         """Rasterise without light.
 
@@ -119,6 +122,8 @@ class RenderWorld:
         ----------
         camera : Camera
         world_from_camera : (4, 4) float64
+        near_m, far_m : float
+            Planar depths between which surfaces are drawn, metres.
 
         Returns
         -------
@@ -136,7 +141,7 @@ class RenderWorld:
             [
                 [2.0 * camera.focal_px / w, 0.0, 1.0 / w, 0.0],
                 [0.0, 2.0 * camera.focal_px / h, 1.0 / h, 0.0],
-                [0.0, 0.0, -(FAR_M + NEAR_M) / (FAR_M - NEAR_M), -2.0 * FAR_M * NEAR_M / (FAR_M - NEAR_M)],
+                [0.0, 0.0, -(far_m + near_m) / (far_m - near_m), -2.0 * far_m * near_m / (far_m - near_m)],
                 [0.0, 0.0, -1.0, 0.0],
             ]
         )
@@ -146,7 +151,7 @@ class RenderWorld:
             lightSpecularCoeff=0.0, renderer=pybullet.ER_TINY_RENDERER, physicsClientId=self._client,
         )  # fmt: skip
         surface = np.asarray(mask, dtype=np.int32).reshape(h, w)
-        linear = FAR_M * NEAR_M / (FAR_M - (FAR_M - NEAR_M) * np.asarray(buffer, dtype=np.float64).reshape(h, w))
+        linear = far_m * near_m / (far_m - (far_m - near_m) * np.asarray(buffer, dtype=np.float64).reshape(h, w))
         depth = np.where(surface >= 0, linear, np.inf).astype(np.float32)
         return np.asarray(rgba, dtype=np.uint8).reshape(h, w, 4)[..., :3], depth, surface
 

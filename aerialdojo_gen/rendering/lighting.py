@@ -1,0 +1,122 @@
+"""What lights a scene: surface tables, sky colours, and the sun's shadow map."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aerialdojo_gen.geometry.cameras import Camera, look_at_pose
+from aerialdojo_gen.rendering.surfaces import Surface
+from aerialdojo_gen.scenes.model import Scene
+
+Floats = NDArray[np.float64]
+
+# How far the sun of the shadow map stands, in radii of the scene: its rays are then within 5° of parallel.
+_SUN_RADII = 12.0
+
+
+@dataclass(frozen=True, eq=False)
+class Lighting:
+    """What shading must know of a scene; row k of the tables is surface k.
+
+    Attributes
+    ----------
+    normal : (n, 3) float64
+        Unit normals, world frame.
+    colour : (n, 3) float64
+        The material's mean colour, 0-255.
+    texel_m : (n,) float64
+        Edge of a texel, metres; 0 for a flat material.
+    sun : (3,) float64
+        Unit vector towards the sun.
+    zenith, horizon : (3,) float64
+        The sky's colours, 0-255.
+    """
+
+    normal: Floats
+    colour: Floats
+    texel_m: Floats
+    sun: Floats
+    zenith: Floats
+    horizon: Floats
+
+
+def lighting(scene: Scene, surfaces: list[Surface]) -> Lighting:
+    """Collect what shading must know.
+
+    Parameters
+    ----------
+    scene : Scene
+    surfaces : list of Surface
+        As `aerialdojo_gen.rendering.surfaces.surfaces` gives them.
+
+    Returns
+    -------
+    Lighting
+    """
+    materials = [scene.materials[s.material] for s in surfaces]
+    sky = np.array(scene.sky, dtype=np.float64)
+    sun = np.array(scene.sun, dtype=np.float64)
+    return Lighting(
+        normal=np.array([s.normal for s in surfaces]).reshape(-1, 3),
+        colour=np.array([m.colour for m in materials], dtype=np.float64).reshape(-1, 3),
+        texel_m=np.array([0.0 if m.texture is None else m.tile_m / m.texture.shape[1] for m in materials]),
+        sun=sun / np.linalg.norm(sun),
+        zenith=sky * np.array([0.72, 0.84, 0.97]),
+        horizon=sky + (np.array([236.0, 238.0, 240.0]) - sky) * 0.6,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class ShadowMap:
+    """What the sun sees.
+
+    Attributes
+    ----------
+    camera : Camera
+    world_from_camera : (4, 4) float64
+    depth_m : (n, n) float32
+        Planar depth of the lit surfaces; inf where there is none.
+    """
+
+    camera: Camera
+    world_from_camera: Floats
+    depth_m: NDArray[np.float32]
+
+    @cached_property
+    def texel_m(self) -> float:
+        """Edge of a texel at the distance of the scene's centre, metres, to within a tenth."""
+        hit = self.depth_m[np.isfinite(self.depth_m)]
+        return float(hit.mean()) / self.camera.focal_px if len(hit) else 0.0
+
+
+def sun_view(scene: Scene, size_px: int = 2048) -> tuple[Camera, Floats, float, float]:
+    """Place the camera of the shadow map.
+
+    TinyRenderer has no parallel projection: the sun stands twelve scene radii away, its rays within 5° of parallel.
+
+    Parameters
+    ----------
+    scene : Scene
+    size_px : int
+        Edge of the map.
+
+    Returns
+    -------
+    camera : Camera
+    world_from_camera : (4, 4) float64
+    near_m, far_m : float
+        Planar depths that enclose the scene.
+    """
+    boxes = np.stack([i.bounds for i in scene.instances])
+    low, high = boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)
+    centre, radius = (low + high) / 2.0, float(np.linalg.norm(high - low)) / 2.0 + 1.0
+    sun = np.array(scene.sun, dtype=np.float64)
+    distance = _SUN_RADII * radius
+    pose = look_at_pose(centre + sun / np.linalg.norm(sun) * distance, centre)
+    camera = Camera(size_px, size_px, 2.0 * math.degrees(math.asin(radius / distance)))
+    return camera, pose, distance - radius, distance + radius
