@@ -1,0 +1,88 @@
+"""The action set as motion primitives, and its motion model.
+
+Body frame: x forward, y left, z up. Headings are 15° apart and counted from the start's yaw, so that a replay of the
+actions from the start pose meets the stored poses exactly.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from aerialdojo_gen.schemas import ACTION_NAMES, APPROACH, STOP, TURN_LEFT, TURN_RIGHT
+
+N_HEADINGS = 24
+TURN_RAD = 2 * math.pi / N_HEADINGS
+# Headings in a right angle: between the direction flown and the heading of who strafes there.
+QUARTER = N_HEADINGS // 4
+
+_AXES = {"Forward": (1.0, 0.0, 0.0), "Left": (0.0, 1.0, 0.0), "Right": (0.0, -1.0, 0.0),
+         "Up": (0.0, 0.0, 1.0), "Down": (0.0, 0.0, -1.0)}  # fmt: skip
+
+
+def _displacement(name: str) -> tuple[float, float, float]:
+    for axis, (x, y, z) in _AXES.items():
+        if name.startswith(f"Move{axis}"):
+            step = float(name.removeprefix(f"Move{axis}"))
+            return x * step, y * step, z * step
+    return 0.0, 0.0, 0.0
+
+
+# (17, 3) float64: displacement of every action in the body frame, metres; zero for turns, Stop and Approach.
+DISPLACEMENTS = np.array([_displacement(name) for name in ACTION_NAMES])
+# (17,) int64: how many headings an action turns to the left.
+TURNS = np.array([(a == TURN_LEFT) - (a == TURN_RIGHT) for a in range(len(ACTION_NAMES))], np.int64)
+
+
+def wrap_rad(yaw: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Bring angles into (-pi, pi], element by element."""
+    wrapped = math.pi - np.mod(math.pi - yaw, 2 * math.pi)
+    return np.asarray(wrapped, np.float64)
+
+
+def replay(start: ArrayLike, actions: ArrayLike) -> NDArray[np.float64]:
+    """Fly actions from a start pose, without collisions.
+
+    Parameters
+    ----------
+    start : (4,) float
+        x, y, z in metres, world frame, and yaw in radians.
+    actions : (n,) int
+        Ids of the action set. Stop and Approach do not move: where an Approach leads only a map can tell.
+
+    Returns
+    -------
+    (n + 1, 4) float64
+        Poses before each action and after the last; yaw in (-pi, pi].
+
+    Raises
+    ------
+    ValueError
+        There is no such action.
+    """
+    a = np.asarray(actions, np.int64).reshape(-1)
+    if ((a < STOP) | (a > APPROACH)).any():
+        raise ValueError(f"actions are numbers from {STOP} to {APPROACH}")
+    x, y, z, yaw = np.asarray(start, np.float64)
+    headings = np.concatenate([[0], np.cumsum(TURNS[a])])
+    yaws = yaw + headings * TURN_RAD
+    cos, sin = np.cos(yaws[:-1]), np.sin(yaws[:-1])
+    d = DISPLACEMENTS[a]
+    steps = np.stack([cos * d[:, 0] - sin * d[:, 1], sin * d[:, 0] + cos * d[:, 1], d[:, 2]], axis=1)
+    poses = np.empty((len(a) + 1, 4))
+    poses[0, :3] = x, y, z
+    poses[1:, :3] = poses[0, :3] + np.cumsum(steps, axis=0)
+    poses[:, 3] = wrap_rad(yaws)
+    return poses
+
+
+def route_length_m(points: NDArray[np.float64]) -> float:
+    """Length of a polyline, (n, 3) float64 metres: the paper's L, in which yaw adds nothing."""
+    return float(np.sqrt((np.diff(points, axis=0) ** 2).sum(axis=1)).sum())
+
+
+def nearest_heading(start_yaw: float, yaw: float) -> int:
+    """Number of the heading, of those that `start_yaw` fixes, nearest to `yaw` (radians): at most 7.5° off."""
+    return round((yaw - start_yaw) / TURN_RAD) % N_HEADINGS
