@@ -106,7 +106,7 @@ def birch(rng: np.random.Generator, params: Mapping[str, float]) -> Parts:
         line = _stem(rng, h * 0.92, 0.09 * h if stems == 2 else 0.04 * h)
         line[1:, :2] += (s * 1.6 * girth, s * 0.9 * girth)
         out.append(("bark", _trunk(line, girth, 0.02, 6)))
-        lobes = 6 if stems == 1 else 4
+        lobes = 5 if stems == 1 else 3
         turn = rng.uniform(0, 2 * np.pi)
         for k in range(lobes):
             t = k / (lobes - 1)

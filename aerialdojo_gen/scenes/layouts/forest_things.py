@@ -1,0 +1,122 @@
+"""What stands at each place of the forest, in the frame of its spot: x along the spot's yaw, metres, degrees."""
+
+from __future__ import annotations
+
+from aerialdojo_gen.scenes.layouts.natural_ground import Thing
+
+_PORCH = {"place": "on the cabin's porch"}
+_DECK = {"place": "on the fire tower's deck"}
+
+CABIN = (
+    Thing("log_cabin", 0.0, 0.0, variant="green_door", lift_m=0.15, words={"place": "in the north-western clearing"}),
+    Thing("rocking_chair", 3.9, 1.5, 0.0, "red_cushion", lift_m=0.6, words=_PORCH),
+    Thing("flower_tub", 5.6, -2.6, 0.0, "pink", words={"place": "beside the cabin's steps"}),
+    Thing("water_barrel", 0.4, -3.4, -90.0, "blue", words={"place": "against the cabin's side"}),
+    Thing("woodshed", -2.6, -7.4, 60.0, "full", words={"place": "beside the log cabin"}),
+    Thing("axe_block", 2.4, -6.0, 20.0, "red", words={"place": "in front of the woodshed"}),
+    Thing("sawhorse", 5.2, -5.6, 60.0, "orange_saw", words={"place": "in front of the woodshed"}),
+    Thing("outhouse", -4.6, 6.2, -30.0, "brown", words={"place": "behind the log cabin"}),
+    Thing("stone_well", 5.4, 5.4, -20.0, "red_roof", words={"place": "in front of the log cabin"}),
+    Thing("wheelbarrow", 8.6, -3.2, 130.0, "green", words={"place": "in front of the log cabin"}),
+    Thing("lantern_post", 8.6, 1.8, 180.0, "black", words={"place": "on the path to the log cabin"}),
+    Thing("mountain_bike", 1.6, 4.3, 8.0, "orange", words={"place": "beside the log cabin"}),
+    Thing("log_pile", -7.0, -9.8, 35.0, "spruce", words={"place": "behind the woodshed"}),
+)
+
+TOWER = (
+    Thing("fire_tower", 0.0, 0.0, 20.0, "red", words={"place": "on the knoll in the north-east"}),
+    Thing("cooler_box", -1.64, -0.62, 20.0, "red", lift_m=11.12, words=_DECK),
+    Thing("fuel_drum", -0.4, 0.3, 0.0, "rusty", words={"place": "under the fire tower"}),
+    Thing("weather_station", -5.0, 3.0, 140.0, "red_vane"),
+    Thing("quad_bike", 5.2, -3.0, 70.0, "green", words={"place": "at the foot of the fire tower"}),
+    Thing("stone_cairn", -4.4, -4.2, 0.0, "white_top"),
+    Thing("information_board", 5.6, 2.6, -20.0, "green_map", words={"place": "at the foot of the fire tower"}),
+    Thing("telescope", -0.4, -5.4, -60.0, "white"),
+)
+
+CAMP = (
+    Thing("campfire", 0.0, 0.0, 0.0, "burning", words={"place": "in the middle of the camp site"}),
+    Thing("tent", -4.6, 2.6, -25.0, "orange"),
+    Thing("tent", -5.6, -2.4, 30.0, "blue"),
+    Thing("dome_tent", -0.6, 5.6, -90.0, "yellow"),
+    Thing("camp_chair", 1.5, 1.9, -125.0, "red", words={"place": "by the campfire"}),
+    Thing("log_bench", 2.5, -0.9, 165.0, "birch", words={"place": "by the campfire"}),
+    Thing("cooking_tripod", -0.4, -3.4, 0.0, "black"),
+    Thing("camping_stove_table", 3.6, 4.6, -130.0, "green"),
+    Thing("backpack", -2.9, -4.4, 60.0, "yellow"),
+    Thing("hammock", 3.4, -5.2, 150.0, "teal"),
+    Thing("tarp_shelter", -8.6, 1.2, 0.0, "green", words={"place": "behind the tents"}),
+    Thing("lantern_post", 6.4, 1.2, 180.0, "red", words={"place": "at the camp site's entrance"}),
+)
+
+PICNIC = (
+    Thing("picnic_table", 0.0, 0.0, 30.0, "brown"),
+    Thing("picnic_table", -3.6, 2.6, -10.0, "green"),
+    Thing("cooler_box", 1.6, -2.2, 60.0, "blue", words={"place": "beside the brown picnic table"}),
+    Thing("rope_swing", 1.2, 4.6, 80.0, "red"),
+    Thing("birdhouse", -3.4, -3.0, 0.0, "blue"),
+    Thing("carved_owl", 4.8, 2.0, 0.0, "brown"),
+    Thing("bird_feeder", 4.4, -3.0, 0.0, "thatched"),
+)
+
+POND_SIDE = (
+    Thing("canoe", 5.2, 6.0, 35.0, "red"),
+    Thing("kayak", -7.4, 3.4, 80.0, "orange"),
+    Thing("log_bench", 5.8, 1.8, 180.0, "with_back"),
+    Thing("deer", -1.2, -6.4, 100.0, "stag", words={"place": "drinking at the pond"}),
+    Thing("mossy_rock", -6.2, -2.6, 20.0, "green"),
+)
+
+RUIN = (
+    Thing("stone_arch", 0.0, 0.0, 10.0, "mossy"),
+    Thing("ruined_wall", -3.2, 3.2, 30.0, "grey"),
+    Thing("standing_stone", 2.0, -5.4, 60.0, "carved"),
+    Thing("totem_pole", 4.6, 4.2, -20.0, "red_wings", words={"place": "beside the ruin"}),
+    Thing("fox", -2.0, -3.4, 40.0, "red"),
+)
+
+APIARY = (
+    Thing("beehive", 0.0, -1.9, 0.0, "yellow"),
+    Thing("beehive", 0.0, 0.0, 0.0, "blue"),
+    Thing("beehive", 0.0, 1.9, 0.0, "green"),
+    Thing("wind_chime", 2.2, -3.0, 0.0, "silver", words={"place": "beside the bee yard"}),
+)
+
+CROSSROADS = (
+    Thing("trail_signpost", 1.6, 1.4, 30.0, "yellow"),
+    Thing("tree_stump", -2.2, 2.6, 0.0, "fresh", words={"place": "near the crossing of the paths"}),
+    Thing("backpack", 2.8, -1.6, 200.0, "red", words={"place": "beside the path to the picnic place"}),
+)
+
+STRAYS = {
+    "in the south-eastern wood": (
+        Thing("hunting_stand", 7.0, -19.0, 120.0, "brown"),
+        Thing("wild_boar", 12.5, -17.6, 200.0, "dark"),
+    ),
+    "in the northern wood": (
+        Thing("hunting_stand", -16.5, 20.5, -60.0, "camouflage"),
+        Thing("brown_bear", -6.4, 21.0, -40.0, "brown"),
+    ),
+    "beside the path to the bridge": (
+        Thing("information_board", 2.6, -13.4, 150.0, "blue_map"),
+        Thing("mushroom_cluster", 3.6, -9.6, 0.0, "red"),
+    ),
+    "between the cabin and the ruin": (
+        Thing("wooden_gate", -12.0, 1.4, 60.0, "white"),
+        Thing("fallen_log", -7.8, 1.6, 70.0, "mossy"),
+        Thing("birdhouse", -16.6, 3.2, -10.0, "red"),
+    ),
+    "between the tower and the picnic place": (
+        Thing("boulder", 9.6, 7.4, 40.0, "sandstone"),
+        Thing("deer", 18.6, 8.2, 210.0, "doe"),
+        Thing("oak_tree", 5.6, 4.9, 0.0, "russet"),
+    ),
+    "east of the pond": (
+        Thing("rock_pile", 20.6, -4.0, 0.0, "red"),
+        Thing("birch_tree", 21.0, -11.5, 0.0, "golden"),
+    ),
+    "south of the stream": (
+        Thing("dead_tree", -14.6, -10.6, 0.0, "grey"),
+        Thing("bush", 5.4, -14.6, 0.0, "red_berries"),
+    ),
+}
