@@ -20,6 +20,26 @@ RIVAL_SLACK = 1.35
 
 _TOKEN = re.compile(r"[a-z0-9']+|[,.;:!?()]")
 _STOPS = frozenset(".;:!?")
+_VERBS = frozenset(
+    {
+        "is",
+        "are",
+        "stands",
+        "grows",
+        "lies",
+        "sits",
+        "hangs",
+        "rises",
+        "leans",
+        "has",
+        "have",
+        "which",
+        "that",
+        "it",
+        "its",
+        "you",
+    }
+)
 
 
 def _relations() -> dict[str, str]:
@@ -106,7 +126,8 @@ class _State:
     claims: list[Claim] = field(default_factory=list)
 
     def end_clause(self) -> None:
-        self.values += self.pending
+        # After "beside a bench with ..." values are the bench's: said of the subject they would be guesswork.
+        self.values += [] if self.relation else self.pending
         self.pending, self.relation, self.words, self.first = [], "", [], None
 
 

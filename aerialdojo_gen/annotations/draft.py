@@ -1,0 +1,275 @@
+"""Drafts of annotation files: what a person would otherwise write by hand, to be read and owned by one.
+
+Objects are chosen category by category in turn, and described by their attributes, their category's looks and as
+many of the facts about their place as it takes to tell them from their rivals. Every draft passes the checks of
+`annotate-import`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from aerialdojo_gen.annotations.ambiguity import Ambiguity
+from aerialdojo_gen.annotations.check import make_ambiguity
+from aerialdojo_gen.annotations.claims import RIVAL_SLACK
+from aerialdojo_gen.annotations.compose import compose
+from aerialdojo_gen.annotations.facts import Fact, FactFinder
+from aerialdojo_gen.annotations.format import Annotations, Landmark, Object
+from aerialdojo_gen.annotations.phrases import Noun, Words, noun_of, place_of, words_of
+from aerialdojo_gen.errors import AnnotationError
+from aerialdojo_gen.rng import generator, rank
+from aerialdojo_gen.scenes.catalogue import Catalogue
+from aerialdojo_gen.scenes.model import Instance, Scene
+
+_STAGE = "annotate-draft"
+_MOST_FACTS = 4
+_TRIES = 12
+
+
+@dataclass(frozen=True)
+class Choice:
+    """Which instances may become objects, and how many of a kind.
+
+    Attributes
+    ----------
+    eligible : callable or None
+        ``node -> bool``, e.g. whether anchors exist; None lets all in.
+    centre_m : tuple of two float or None
+        Middle of the area that objects are taken from; the landmarks' mean where absent.
+    within_m : float or None
+        Radius of that area; None for the whole scene.
+    most_vegetation : int
+        Most objects of one category of vegetation.
+    most : int
+        Most objects of any other category.
+    """
+
+    eligible: Callable[[str], bool] | None = None
+    centre_m: tuple[float, float] | None = None
+    within_m: float | None = None
+    most_vegetation: int = 3
+    most: int = 8
+
+
+def draft_annotations(
+    scene: Scene,
+    catalogue: Catalogue,
+    n_landmarks: int,
+    n_objects: int,
+    seed: int,
+    choice: Choice | None = None,
+    landmarks: Sequence[str] = (),
+) -> Annotations:
+    """Draft the annotations of a scene.
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene.
+    catalogue : Catalogue
+        Names and kinds of its categories.
+    n_landmarks, n_objects : int
+        How many of each.
+    seed : int
+        The same seed gives the same draft.
+    choice : Choice or None
+        Which instances may become objects.
+    landmarks : sequence of str
+        Nodes of landmarks that are wanted; the rest is chosen among the catalogue's kind ``landmark``.
+
+    Returns
+    -------
+    Annotations
+        It passes `check.check_source`.
+
+    Raises
+    ------
+    AnnotationError
+        The scene has too few landmarks, or too few things that can be described without ambiguity.
+    """
+    drafter = _Drafter(scene, catalogue, seed, choice or Choice())
+    marks = drafter.landmarks(n_landmarks, landmarks)
+    return Annotations(scene.name, marks, drafter.objects(marks, n_objects))
+
+
+class _Drafter:
+    def __init__(self, scene: Scene, catalogue: Catalogue, seed: int, choice: Choice) -> None:
+        self._scene, self._seed, self._choice = scene, seed, choice
+        self._names = {category: catalogue[category].name for category in catalogue}
+        self._kinds = {category: catalogue[category].kind for category in catalogue}
+        looks = {category: catalogue[category].looks for category in catalogue}
+        by_category: dict[str, Words] = {}
+        for i in scene.instances:
+            kind = self._kinds.get(i.category, "")
+            if i.category not in by_category:
+                name = self._names.get(i.category)
+                by_category[i.category] = words_of(i.category, name, kind, looks.get(i.category, ()))
+        self._words = [by_category[i.category] for i in scene.instances]
+        self._nouns = [noun_of(i, w) for i, w in zip(scene.instances, self._words, strict=True)]
+
+    def landmarks(self, n: int, wanted: Sequence[str]) -> tuple[Landmark, ...]:
+        """Choose landmarks: the wanted, then the tallest, then whatever is farthest from the chosen."""
+        missing = [node for node in wanted if node not in self._scene]
+        if missing:
+            raise AnnotationError(f"{self._scene.name}: no node {missing[0]!r} to make a landmark of")
+        chosen = [self._scene[node] for node in wanted][:n]
+        rest = [i for i in self._scene.instances if self._kinds.get(i.category) == "landmark" and i not in chosen]
+        while len(chosen) < n and rest:
+            best = max(rest, key=lambda i: (_spread(i, chosen), float(i.bounds[1, 2])))
+            chosen.append(best)
+            rest.remove(best)
+        if len(chosen) < n:
+            raise AnnotationError(f"{self._scene.name}: {n} landmarks are wanted, the scene has {len(chosen)}")
+        noun = {i.node: noun for i, noun in zip(self._scene.instances, self._nouns, strict=True)}
+        plain = [noun[i.node].name for i in chosen]
+        names = [noun[i.node].short if plain.count(p) > 1 else p for i, p in zip(chosen, plain, strict=True)]
+        if len(set(names)) < n:
+            raise AnnotationError(f"{self._scene.name}: landmarks share a name: {', '.join(sorted(names))}")
+        return tuple(
+            Landmark(id=k, name=name, node=i.node) for k, (name, i) in enumerate(zip(names, chosen, strict=True))
+        )
+
+    def objects(self, marks: tuple[Landmark, ...], n: int) -> tuple[Object, ...]:
+        """Choose and describe objects, a category at a time in turn."""
+        ambiguity = make_ambiguity(self._scene, self._names, {m.name: m.node for m in marks}, [m.node for m in marks])
+        index = ambiguity.geometry.index
+        finder = FactFinder(ambiguity, self._words, self._nouns, {index[m.node]: m.name for m in marks})
+        taken: dict[int, str] = {}
+        used: dict[str, int] = {}
+        queues = self._queues(ambiguity)
+        while len(taken) < n:
+            before = len(taken)
+            for category, queue in queues.items():
+                if len(taken) < n and not self._full(category, taken):
+                    self._take(queue, ambiguity, finder, taken, used)
+            if len(taken) == before:
+                raise AnnotationError(
+                    f"{self._scene.name}: {n} objects are wanted, {before} can be chosen and told apart"
+                )
+        return tuple(
+            Object(
+                id=k,
+                name=self._nouns[i].short,
+                category=self._scene.instances[i].category,
+                description=taken[i],
+                node=self._scene.instances[i].node,
+            )
+            for k, i in enumerate(sorted(taken))
+        )
+
+    def _full(self, category: str, taken: dict[int, str]) -> bool:
+        many = sum(self._scene.instances[i].category == category for i in taken)
+        most = self._choice.most_vegetation if self._kinds.get(category) == "vegetation" else self._choice.most
+        return many >= most
+
+    def _queues(self, ambiguity: Ambiguity) -> dict[str, list[int]]:
+        """Instances that may become objects, by category; categories in a random but fixed order."""
+        queues: dict[str, list[int]] = {}
+        for i, instance in enumerate(self._scene.instances):
+            if self._may_be_object(i, instance, ambiguity):
+                queues.setdefault(instance.category, []).append(i)
+        return {
+            c: queues[c] for c in sorted(queues, key=lambda c: (rank(self._seed, _STAGE, self._scene.name, c), c))
+        }
+
+    def _may_be_object(self, i: int, instance: Instance, ambiguity: Ambiguity) -> bool:
+        choice = self._choice
+        if i in ambiguity.landmarks or not self._words[i].target or ambiguity.bearing(i) is None:
+            return False
+        middle = instance.centroid
+        if not (np.all(middle >= self._scene.bounds[0]) and np.all(middle <= self._scene.bounds[1])):
+            return False
+        if choice.within_m is not None:
+            places = ambiguity.geometry.centres[list(ambiguity.landmarks), :2]
+            centre = choice.centre_m if choice.centre_m is not None else places.mean(axis=0)
+            if float(np.hypot(*(middle[:2] - np.asarray(centre)))) > choice.within_m:
+                return False
+        return choice.eligible is None or choice.eligible(instance.node)
+
+    def _take(
+        self,
+        queue: list[int],
+        ambiguity: Ambiguity,
+        finder: FactFinder,
+        taken: dict[int, str],
+        used: dict[str, int],
+    ) -> None:
+        """Move one instance from its category's queue to the objects; those that defy description are dropped."""
+        instances = self._scene.instances
+        while queue:
+            alike = [instances[j] for j in taken if instances[j].category == instances[queue[0]].category]
+            names = [self._nouns[j].short for j in taken]
+            best = max(
+                queue,
+                key=lambda i: (
+                    -names.count(self._nouns[i].short),
+                    round(_spread(instances[i], alike), 3),
+                    rank(self._seed, _STAGE, self._scene.name, instances[i].node),
+                ),
+            )
+            queue.remove(best)
+            text = self._describe(best, ambiguity, finder, set(taken.values()), used)
+            if text is not None:
+                taken[best] = text
+                return
+
+    def _describe(
+        self, i: int, ambiguity: Ambiguity, finder: FactFinder, others: set[str], used: dict[str, int]
+    ) -> str | None:
+        instance, words, noun = self._scene.instances[i], self._words[i], self._nouns[i]
+        rng = generator(self._seed, _STAGE, self._scene.name, instance.node)
+        facts = finder.facts(i, rng)
+        for attempt in range(_TRIES):
+            chosen = self._choose(i, noun, facts[attempt % 3 :], ambiguity)
+            if not chosen:
+                return None
+            place = place_of(instance) if attempt < _TRIES // 2 else ""
+            text, template = compose(words, noun, place, [fact.text for fact in chosen], rng, used)
+            clash = ambiguity.untruths(i, text) or ambiguity.untruths(i, noun.short)
+            if text not in others and not clash and not ambiguity.rivals(i, text):
+                used[template] = used.get(template, 0) + 1
+                return text
+        return None
+
+    def _choose(self, i: int, noun: Noun, facts: list[Fact], ambiguity: Ambiguity) -> list[Fact]:
+        """Take the most natural fact, then whatever rules out most of the rivals that are left."""
+        chosen: list[Fact] = []
+        rivals = set(ambiguity.rivals(i, f"It is {noun.a()}."))
+        for fact in _greedy(facts, rivals, ambiguity):
+            chosen.append(fact)
+            if len(chosen) >= _MOST_FACTS:
+                break
+        return chosen
+
+
+def _greedy(facts: list[Fact], rivals: set[int], ambiguity: Ambiguity) -> Iterator[Fact]:
+    left = list(facts)
+    things: set[int] = set()
+    taken = 0
+    while left:
+        if taken == 0:
+            best = left[0]
+        elif rivals:
+            best = max(left, key=lambda fact: (len(rivals - _fitting(fact, rivals, ambiguity)), -left.index(fact)))
+        elif taken == 1 and left[0].weight > 0.35 and not left[0].things & things:
+            best = left[0]
+        else:
+            return
+        rivals &= _fitting(best, rivals, ambiguity)
+        things |= best.things
+        taken += 1
+        yield best
+        left = [fact for fact in left if not fact.things & best.things]
+
+
+def _fitting(fact: Fact, rivals: set[int], ambiguity: Ambiguity) -> set[int]:
+    return {j for j in rivals if all(c.holds(ambiguity.geometry, j, RIVAL_SLACK) for c in fact.claims)}
+
+
+def _spread(instance: Instance, chosen: Sequence[Instance]) -> float:
+    """Distance in the plane to the nearest of the chosen, metres; a kilometre where there is none."""
+    gaps = [float(np.hypot(*(instance.centroid[:2] - other.centroid[:2]))) for other in chosen]
+    return min(gaps, default=1000.0)

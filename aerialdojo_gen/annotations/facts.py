@@ -1,0 +1,158 @@
+"""What can truly be said of where an instance stands: the material that drafts choose from."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass
+
+import numpy as np
+
+from aerialdojo_gen.annotations.ambiguity import Ambiguity
+from aerialdojo_gen.annotations.claims import Claim
+from aerialdojo_gen.annotations.phrases import Noun, Words
+from aerialdojo_gen.annotations.templates import RELATIONS
+from aerialdojo_gen.geometry.frames import compass_direction
+
+# Well within what the check takes for true, so that a drafted text stays true when the scene is touched up.
+_TIGHT = 0.9
+_REACH_M = 9.0
+_MOST_THINGS = 10
+_SMALLEST_M = 0.3
+
+
+@dataclass(frozen=True)
+class Fact:
+    """A relation of an instance to others, in words.
+
+    Attributes
+    ----------
+    text : str
+        ``"beside a red mailbox"``.
+    claims : tuple of Claim
+        The same as the check reads it.
+    weight : float
+        How natural it is to say; higher first.
+    things : frozenset of int
+        Indices of what it speaks of.
+    """
+
+    text: str
+    claims: tuple[Claim, ...]
+    weight: float
+    things: frozenset[int]
+
+
+class FactFinder:
+    """Finds facts about the instances of one scene.
+
+    Parameters
+    ----------
+    ambiguity : Ambiguity
+        The scene's geometry, lexicon and landmarks.
+    words : list of Words
+        Of every instance.
+    nouns : list of Noun
+        Of every instance.
+    landmarks : dict of int to str
+        Names of the landmarks by index.
+    """
+
+    def __init__(
+        self, ambiguity: Ambiguity, words: list[Words], nouns: list[Noun], landmarks: dict[int, str]
+    ) -> None:
+        self._ambiguity = ambiguity
+        self._geometry = ambiguity.geometry
+        self._words = words
+        self._nouns = nouns
+        self._landmarks = landmarks
+        self._count = Counter(w.name for w in words)
+        self._short = Counter(n.short for n in nouns)
+
+    def facts(self, i: int, rng: np.random.Generator) -> list[Fact]:
+        """List facts about instance `i`, the most natural first.
+
+        Parameters
+        ----------
+        i : int
+            Index in the scene.
+        rng : numpy.random.Generator
+            Chooses among wordings, and among facts that are about as natural.
+
+        Returns
+        -------
+        list of Fact
+            True of the mesh by `relations`, with a margin.
+        """
+        things = [j for j in self._geometry.around(i, _REACH_M) if self._may_refer(i, j)]
+        gaps = {j: self._geometry.gap_m(i, j) for j in things}
+        things.sort(key=lambda j: (-self._salience(j) / (1.5 + gaps[j]), j))
+        found: list[Fact] = []
+        for j in things[:_MOST_THINGS]:
+            found += self._of(i, j, rng)
+        for a, j in enumerate(things[:6]):
+            for k in things[a + 1 : 6]:
+                texts = self._thing(i, j), self._thing(i, k)
+                if texts[0] != texts[1] and self._geometry.between(i, j, k, _TIGHT):
+                    weight = 1.2 * min(self._weight(i, j), self._weight(i, k))
+                    found += self._checked(i, "between {} and {}".format(*texts), weight, (j, k))
+        keyed = [(-fact.weight * float(rng.uniform(0.8, 1.25)), k, fact) for k, fact in enumerate(found)]
+        return [fact for _, _, fact in sorted(keyed, key=lambda item: item[:2])]
+
+    def _may_refer(self, i: int, j: int) -> bool:
+        size = self._geometry.boxes[j, 1] - self._geometry.boxes[j, 0]
+        return self._words[j].reference and float(size.max()) >= _SMALLEST_M and j != i
+
+    def _salience(self, j: int) -> float:
+        size = float((self._geometry.boxes[j, 1] - self._geometry.boxes[j, 0]).max())
+        rarity = 1.0 / self._count[self._words[j].name] ** 0.5 + 1.0 / self._short[self._nouns[j].short] ** 0.5
+        return (2.0 if j in self._landmarks else 1.0) * rarity * min(size, 4.0) ** 0.4
+
+    def _weight(self, i: int, j: int) -> float:
+        same = self._words[i].name == self._words[j].name
+        return self._salience(j) / (1.5 + self._geometry.gap_m(i, j)) * (0.5 if same else 1.0)
+
+    def _of(self, i: int, j: int, rng: np.random.Generator) -> list[Fact]:
+        geometry, weight, thing = self._geometry, self._weight(i, j), self._thing(i, j)
+        found: list[Fact] = []
+        touching = geometry.support(i) == j or j in geometry.covers(i)
+        if geometry.support(i) == j:
+            found += self._checked(i, self._word("on", rng).format(thing), 3.0 * weight, (j,))
+        if j in geometry.covers(i):
+            found += self._checked(i, self._word("under", rng).format(thing), 2.0 * weight, (j,))
+        if not touching and geometry.beside(i, j, _TIGHT):
+            found += self._checked(i, self._word("beside", rng).format(thing), 1.5 * weight, (j,))
+        elif not touching and geometry.near(i, j, _TIGHT) and geometry.level_gap_m(i, j) > 0.0:
+            found += self._checked(i, self._word("near", rng).format(thing), 0.8 * weight, (j,))
+        bearing = geometry.bearing_rad(i, j)
+        if bearing is not None and not touching and geometry.level_gap_m(i, j) > 0.0:
+            direction = compass_direction(float(np.cos(bearing)), float(np.sin(bearing)))
+            if geometry.side(i, j, direction, _TIGHT):
+                text = self._word("side", rng).format(thing, d=direction)
+                found += self._checked(i, text, weight, (j,))
+        return found
+
+    def _checked(self, i: int, text: str, weight: float, things: tuple[int, ...]) -> list[Fact]:
+        # The check must read the words as they were meant: names may hold words that mean something else to it.
+        reading = self._ambiguity.lexicon.read(f"it stands {text}", i)
+        claims = reading.claims
+        meant = len(claims) == 1 and all(j in members for j, members in zip(things, claims[0].things, strict=False))
+        if not meant or reading.values or not claims[0].holds(self._geometry, i, _TIGHT):
+            return []
+        return [Fact(text, claims, weight, frozenset(things))]
+
+    def _word(self, relation: str, rng: np.random.Generator) -> str:
+        forms = RELATIONS[relation]
+        return forms[int(rng.integers(len(forms)))]
+
+    def _thing(self, i: int, j: int) -> str:
+        if j in self._landmarks:
+            return f"the {self._landmarks[j]}"
+        noun = self._nouns[j]
+        if self._count[noun.name] == 1:
+            return f"the {noun.name}"
+        if self._short[noun.short] == 1 and not noun.group:
+            return noun.the(short=True)
+        if self._words[i].name == noun.name and not noun.group:
+            same = self._nouns[i].short == noun.short
+            return f"another {noun.short}" if same else noun.a(short=True)
+        return noun.a(short=True)

@@ -1,0 +1,215 @@
+"""Words for drafts: noun phrases of instances, and what each category looks like (`phrases.toml`)."""
+
+from __future__ import annotations
+
+import tomllib
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+from aerialdojo_gen.annotations.claims import spoken
+from aerialdojo_gen.scenes.model import Instance
+
+# Said before the noun, in the order of English: a small rotten brown wooden bench.
+_ADJECTIVES = ("size", "state", "pattern", "shape", "colour", "material")
+_PLACE = "place"
+_AFTER_NOUN = frozenset({"down", "up", "open", "closed", "raised", "lowered", "covered", "folded", "lit", "shut"})
+_MASS = frozenset(["lichen", "moss", "snow", "ivy", "graffiti", "water", "fruit", "rust", "foliage"])
+_VERBS = {"vehicle": ("is parked", "parked"), "vegetation": ("grows", "growing")}
+
+
+@dataclass(frozen=True)
+class Words:
+    """What drafts say of a category.
+
+    Attributes
+    ----------
+    name : str
+        What a person calls it.
+    looks : tuple of str
+        Noun phrases that are true of every variant, to follow "with" or "it has".
+    verb, participle : str
+        ``"stands"`` and ``"standing"``, or what suits the thing better.
+    group : str
+        For plural names, what makes one thing of them: ``"a patch of"``; else empty.
+    reference : bool
+        Whether a description of something else may refer to it.
+    target : bool
+        Whether a draft may make it an object.
+    """
+
+    name: str
+    looks: tuple[str, ...] = ()
+    verb: str = "stands"
+    participle: str = "standing"
+    group: str = ""
+    reference: bool = True
+    target: bool = True
+
+
+@cache
+def _tables() -> tuple[dict[str, dict[str, object]], dict[str, str]]:
+    raw = tomllib.loads(Path(__file__).with_name("phrases.toml").read_text(encoding="utf-8"))
+    said = raw.pop("values")
+    return raw, said
+
+
+def words_of(category: str, name: str | None, kind: str, looks: tuple[str, ...] = ()) -> Words:
+    """Look up what drafts say of a category.
+
+    Parameters
+    ----------
+    category : str
+        E.g. ``"delivery_van"``.
+    name : str or None
+        The catalogue's name; None for structure, which is neither target nor reference unless the phrases say so.
+    kind : str
+        The catalogue's kind, empty for structure.
+    looks : tuple of str
+        The catalogue's own looks, used where the phrases have none.
+
+    Returns
+    -------
+    Words
+    """
+    entry = _tables()[0].get(category, {})
+    verb, participle = _VERBS.get(kind, ("stands", "standing"))
+    in_catalogue = name is not None
+    return Words(
+        name=name or spoken(category),
+        looks=tuple(_texts(entry.get("looks", ()))) or tuple(look.removeprefix("with ") for look in looks),
+        verb=str(entry.get("verb", verb)),
+        participle=str(entry.get("participle", participle)),
+        group=str(entry.get("group", "")),
+        reference=bool(entry.get("reference", in_catalogue)),
+        target=bool(entry.get("target", in_catalogue and kind != "landmark")),
+    )
+
+
+def _texts(value: object) -> list[str]:
+    return [str(v) for v in value] if isinstance(value, (list, tuple)) else []
+
+
+@dataclass(frozen=True)
+class Noun:
+    """A noun phrase in its pieces.
+
+    Attributes
+    ----------
+    adjectives : tuple of str
+        Before the name.
+    name : str
+        The category's.
+    after : str
+        After it: ``"with a black roof"``; may be empty.
+    group : str
+        See `Words`.
+    """
+
+    adjectives: tuple[str, ...]
+    name: str
+    after: str
+    group: str
+
+    @property
+    def bare(self) -> str:
+        """Without article: ``"orange hatchback with a black roof"``."""
+        return " ".join([*self.adjectives, self.name, *([self.after] if self.after else [])])
+
+    @property
+    def short(self) -> str:
+        """Without article and without what follows the name, unless there would be nothing but the name."""
+        return " ".join([*self.adjectives, self.name]) if self.adjectives or not self.after else self.bare
+
+    def a(self, short: bool = False) -> str:
+        """With the indefinite article, or its group."""
+        text = self.short if short else self.bare
+        return f"{self.group} {text}" if self.group else f"{article(text)} {text}"
+
+    def the(self, short: bool = False) -> str:
+        """With the definite article."""
+        return f"the {self.short if short else self.bare}"
+
+
+def noun_of(instance: Instance, words: Words) -> Noun:
+    """Make the noun phrase that says an instance's attributes.
+
+    Parameters
+    ----------
+    instance : Instance
+        Its attributes are what is said.
+    words : Words
+        Of its category.
+
+    Returns
+    -------
+    Noun
+        ``a red delivery van with a white stripe``.
+    """
+    before: list[str] = []
+    after: list[str] = []
+    rest = [k for k in instance.attributes if k not in _ADJECTIVES and k != _PLACE]
+    for key in (*_ADJECTIVES, *rest):
+        value = instance.attributes.get(key)
+        if not value or value in words.name.split():
+            continue
+        said = _said(key, value)
+        if said.startswith("+"):
+            before.append(said[1:])
+        else:
+            after.append(said)
+    return Noun(tuple(before), words.name, _joined(after), words.group)
+
+
+def place_of(instance: Instance) -> str:
+    """Where its layout says that an instance is: ``"in the car park"``; may be empty."""
+    return instance.attributes.get(_PLACE, "")
+
+
+def _said(key: str, value: str) -> str:
+    """Say one value: ``+`` before an adjective, else the words that follow the noun."""
+    special = _tables()[1].get(f"{key}={value}") or _tables()[1].get(f"{key}=*", "").replace("{}", value)
+    if special:
+        return special
+    words = value.split()
+    if key in ("size", "colour", "material", "shape"):
+        return "+" + value
+    if words[0].endswith("ing") or words[0] in ("in", "on", "under", "without", "with", "of"):
+        return value
+    if key == "state" and len(words) > 1 and words[-1] in _AFTER_NOUN:
+        return f"with its {value}"
+    if key in ("state", "pattern") and (len(words) == 1 or words[0].endswith("ly")) and not _noun(words[-1]):
+        return "+" + value
+    return f"with {value if _plural(words) else _with_article(value)}"
+
+
+def _noun(word: str) -> bool:
+    return (word.endswith("s") and not word.endswith("ss")) or word in _MASS
+
+
+def _plural(words: list[str]) -> bool:
+    head = words[words.index("in") - 1] if "in" in words[1:] else words[-1]
+    head = words[words.index("on") - 1] if "on" in words[1:] else head
+    return _noun(head) or words[0] in ("a", "an", "the", "its", "one", "two", "three", "four")
+
+
+def _with_article(text: str) -> str:
+    return f"{article(text)} {text}"
+
+
+def _joined(parts: list[str]) -> str:
+    text = ""
+    for part in parts:
+        again = part.startswith("with ") and "with " in text
+        text += " and " + part.removeprefix("with ") if again else (" " if text else "") + part
+    return text
+
+
+def article(text: str) -> str:
+    """Choose between a and an by the sound that the text begins with."""
+    first = text.split()[0].lower() if text else ""
+    if first in ("suv", "atm", "led", "hour", "mp3", "x-shaped"):
+        return "an"
+    if first.startswith(("uni", "use", "one", "eu")) and first != "uninviting":
+        return "a"
+    return "an" if first[:1] in tuple("aeiou") else "a"
