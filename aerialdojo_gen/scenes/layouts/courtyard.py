@@ -62,7 +62,9 @@ def build(site: Site) -> None:
         site.add(None, "wall", [(site.material("wall", "brick"), body)])
     for x0, y0, x1, y1, height in drawing.roofs:
         posts = [
-            translated(cylinder(radius=_POST_RADIUS_M, height=height - _ROOF_M, segments=8), (x, y, site.ground_z(x, y)))
+            translated(
+                cylinder(radius=_POST_RADIUS_M, height=height - _ROOF_M, segments=8), (x, y, site.ground_z(x, y))
+            )
             for x in (x0 + 0.2, x1 - 0.2)
             for y in (y0 + 0.2, y1 - 0.2)
         ]
