@@ -142,8 +142,8 @@ def _paint(
     for key, radius in (("camp", 2.6), ("cabin", 2.0)):
         x, y = _SPOTS[key].world(*((0.0, 0.0) if key == "camp" else (7.0, 0.0)))
         site.paint(blob(x, y, radius, seed + 7, 0.3), path)
-    wash = [blob(*water.boundary.interpolate(t, normalized=True).coords[0], 1.6, seed + 200 + k, 0.4)
-            for k, t in enumerate(i / 44 for i in range(44))]  # fmt: skip
+    shore = [water.boundary.interpolate(i / 44, normalized=True) for i in range(44)]
+    wash = [blob(p.x, p.y, 1.6, seed + 200 + k, 0.4) for k, p in enumerate(shore)]
     site.paint(shapely.union_all([water.buffer(0.5, quad_segs=3), *wash]), site.material("bank", "gravel"))
     site.paint(water, site.material("water", "water"))
 

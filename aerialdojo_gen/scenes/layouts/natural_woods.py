@@ -17,6 +17,9 @@ from aerialdojo_gen.scenes.site import Site
 
 Field = Callable[[float, float], float]
 
+# Where not even a stem has room, nothing need be grown to find that out.
+_STEM_M = 0.3
+
 
 @dataclass(frozen=True)
 class Species:
@@ -85,6 +88,8 @@ def plant(
     rng = site.rng_for("woods", species[0].category, spacing_m)
     out = []
     for x, y, yaw in poisson_disc(area, spacing_m, rng, density):
+        if not site.is_free(x, y, _STEM_M):
+            continue
         suits = np.array([s.habitat(x, y) for s in species])
         pick = species[int(rng.choice(len(species), p=suits / suits.sum()))]
         if rng.random() > pick.crowding:
@@ -107,9 +112,11 @@ def strew(
     """Strew undergrowth or stones over an area, where there is room; things that lie are turned along the slope."""
     rng = site.rng_for("strew", category)
     out = []
-    for x, y, yaw in poisson_disc(area, spacing_m, rng, density):
+    for x, y, yaw in poisson_disc(area, spacing_m, rng, density, limit * 3):
         if len(out) >= limit:
             break
+        if not site.is_free(x, y, _STEM_M):
+            continue
         turn = downhill_deg(site, x, y) if category == "fallen_log" else yaw
         thing = site.try_place(category, x, y, turn, z=settled_z(site, x, y), **options)
         if thing is not None:
