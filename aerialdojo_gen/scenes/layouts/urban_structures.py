@@ -1,0 +1,158 @@
+"""Structure that urban layouts share: decks on columns, railings, stairs, canopies, portals, lettering on walls.
+
+Every function returns meshes in world coordinates with their materials, to be given to `Site.add`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+from shapely.geometry import LineString
+from shapely.geometry.base import BaseGeometry
+
+from aerialdojo_gen.scenes.grammar_scatter import slab
+from aerialdojo_gen.scenes.ground import rectangle
+from aerialdojo_gen.scenes.lettering import text
+from aerialdojo_gen.scenes.mesh import Mesh, merge, rotated, rotation, translated
+from aerialdojo_gen.scenes.shapes import box, cylinder
+from aerialdojo_gen.scenes.shapes_extruded import profile
+
+Parts = list[tuple[str, Mesh]]
+Point = tuple[float, float]
+
+
+def block(x0: float, y0: float, x1: float, y1: float, z0: float, z1: float) -> Mesh:
+    """Make an axis-parallel block between two corners, metres."""
+    return slab(rectangle(x0, y0, x1, y1), z0, z1)
+
+
+def columns(points: Sequence[Point], z0: float, z1: float, radius_m: float = 0.25, segments: int = 8) -> Mesh:
+    """Make round columns at points, from `z0` to `z1`, metres."""
+    return merge([translated(cylinder(radius=radius_m, height=z1 - z0, segments=segments), (*p, z0)) for p in points])
+
+
+def railing(
+    path: Sequence[Point], z_m: float, *, height_m: float = 1.05, pane: str = "glass", frame: str = "iron"
+) -> Parts:
+    """Make a glazed railing along a polyline on a floor at `z_m`: posts every 2 m, panes, and a handrail."""
+    posts, panes, rails = [], [], []
+    for a, b in pairwise(path):
+        length = float(np.hypot(b[0] - a[0], b[1] - a[1]))
+        yaw = float(np.degrees(np.arctan2(b[1] - a[1], b[0] - a[0])))
+        middle = ((a[0] + b[0]) / 2, (a[1] + b[1]) / 2)
+        turn = rotation(0.0, 0.0, yaw)
+        panes.append(_posed(box(size=[length, 0.04, height_m - 0.25]), turn, (*middle, z_m + 0.12)))
+        rails.append(_posed(box(size=[length + 0.08, 0.1, 0.08]), turn, (*middle, z_m + height_m)))
+        count = max(round(length / 2.0), 1)
+        for k in range(count + 1):
+            t = k / count
+            at = (a[0] + (b[0] - a[0]) * t, a[1] + (b[1] - a[1]) * t, z_m)
+            posts.append(_posed(box(size=[0.08, 0.08, height_m]), turn, at))
+    return [(pane, merge(panes)), (frame, merge(posts + rails))]
+
+
+def deck(
+    plan: BaseGeometry,
+    z_m: float,
+    *,
+    floor: str,
+    under: str = "plaster",
+    thickness_m: float = 0.3,
+    posts: Sequence[Point] = (),
+    foot_m: float = 0.0,
+    post: str = "plaster",
+    post_radius_m: float = 0.28,
+) -> Parts:
+    """Make a floor at `z_m` (its top) on round columns that stand on `foot_m`."""
+    parts: Parts = [
+        (floor, slab(plan, z_m - 0.05, z_m)),
+        (under, slab(plan.buffer(-0.02, join_style="mitre"), z_m - thickness_m, z_m - 0.05)),
+    ]
+    if posts:
+        parts.append((post, columns(posts, foot_m, z_m - thickness_m, post_radius_m)))
+    return parts
+
+
+def stairs(
+    foot: Point, yaw_deg: float, width_m: float, rise_m: float, run_m: float, *, z_m: float = 0.0,
+    tread: str = "concrete", stringer: str = "iron",
+) -> Parts:  # fmt: skip
+    """Make open stairs that climb from `foot` along `yaw_deg`: treads between two stringers.
+
+    Parameters
+    ----------
+    foot : (x, y)
+        Middle of the lowest edge, metres.
+    yaw_deg : float
+        Direction of climbing, degrees.
+    width_m, rise_m, run_m : float
+        Of the whole flight.
+    z_m : float
+        Height of its foot.
+    """
+    count = max(round(rise_m / 0.22), 2)
+    step, going = rise_m / count, run_m / count
+    treads = [
+        translated(box(size=[going + 0.06, width_m, 0.08]), (going * (k + 0.5), 0.0, step * (k + 1) - 0.08))
+        for k in range(count)
+    ]
+    edge = [(0.0, 0.0), (run_m, rise_m - 0.28), (run_m, rise_m), (-0.0, 0.28)]
+    side = [translated(profile(points=edge, width=0.1), (0.0, s * (width_m / 2 + 0.05), 0.0)) for s in (-1, 1)]
+    rail = [(0.0, 1.0), (run_m, rise_m + 1.0), (run_m, rise_m + 1.08), (0.0, 1.08)]
+    side += [translated(profile(points=rail, width=0.06), (0.0, s * (width_m / 2 + 0.05), 0.0)) for s in (-1, 1)]
+    for k in range(0, count, 4):
+        at = (going * (k + 0.5), step * (k + 1))
+        side += [translated(box(size=[0.06, 0.06, 1.0]), (at[0], s * (width_m / 2 + 0.05), at[1])) for s in (-1, 1)]
+    turn = rotation(0.0, 0.0, yaw_deg)
+    return [(m, _posed(merge(b), turn, (*foot, z_m))) for m, b in ((tread, treads), (stringer, side))]
+
+
+def canopy(
+    x0: float, y0: float, x1: float, y1: float, z_m: float, *, roof: str, post: str = "chrome",
+    posts: Sequence[Point] = (), foot_m: float = 0.0,
+) -> Parts:  # fmt: skip
+    """Make a flat roof with its underside at `z_m`, a fascia around it, and slender posts, metres."""
+    ring = rectangle(x0, y0, x1, y1).exterior.buffer(0.09, join_style="mitre", cap_style="flat")
+    parts: Parts = [(roof, block(x0, y0, x1, y1, z_m + 0.08, z_m + 0.22)), (post, slab(ring, z_m, z_m + 0.34))]
+    if posts:
+        parts.append((post, columns(posts, foot_m, z_m + 0.08, 0.12)))
+    return parts
+
+
+def ramp(a: Point, b: Point, z0_m: float, z1_m: float, width_m: float, *, floor: str, wall: str) -> Parts:
+    """Make a straight ramp of a car park from `a` up to `b` with low walls on both sides."""
+    length = float(np.hypot(b[0] - a[0], b[1] - a[1]))
+    turn = rotation(0.0, 0.0, float(np.degrees(np.arctan2(b[1] - a[1], b[0] - a[0]))))
+    rise = z1_m - z0_m
+    way = profile(points=[(0.0, -0.02), (length, rise - 0.3), (length, rise), (0.0, 0.01)], width=width_m)
+    edge = [(0.0, 0.0), (length, rise - 0.3), (length, rise + 0.9), (0.0, 0.9)]
+    sides = [translated(profile(points=edge, width=0.2), (0.0, s * (width_m / 2 + 0.1), 0.0)) for s in (-1, 1)]
+    return [(floor, _posed(way, turn, (*a, z0_m))), (wall, _posed(merge(sides), turn, (*a, z0_m)))]
+
+
+def parapet(plan: BaseGeometry, z_m: float, height_m: float = 1.0, gaps: Sequence[BaseGeometry] = ()) -> Mesh:
+    """Make a low wall along a plan's edge on a floor at `z_m`, open where it meets `gaps`."""
+    band = plan.difference(plan.buffer(-0.2, join_style="mitre"))
+    for gap in gaps:
+        band = band.difference(gap)
+    return merge([slab(p, z_m, z_m + height_m) for p in getattr(band, "geoms", [band]) if p.area > 1e-6])
+
+
+def letters(
+    line: str, height_m: float, at: tuple[float, float, float], yaw_deg: float, depth_m: float = 0.12
+) -> Mesh:
+    """Write on a wall: bottom middle `at` a point of its face, metres, read by whoever looks against `yaw_deg`."""
+    return _posed(text(text=line, height=height_m, depth=depth_m), rotation(0.0, 0.0, yaw_deg), at)
+
+
+def spaced(a: Point, b: Point, spacing_m: float) -> list[Point]:
+    """List points from `a` to `b`, both of them and others about `spacing_m` apart."""
+    line = LineString([a, b])
+    count = max(round(line.length / spacing_m), 1)
+    return [(float(p.x), float(p.y)) for p in (line.interpolate(line.length * k / count) for k in range(count + 1))]
+
+
+def _posed(body: Mesh, turn: np.ndarray, at: tuple[float, float, float]) -> Mesh:
+    return translated(rotated(body, turn), at)
