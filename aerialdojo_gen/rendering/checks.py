@@ -7,7 +7,7 @@ Flags, in the order of `FLAGS`:
 - ``frozen``: picture and depth equal those of the frame before, though the camera has moved
 - ``depth_invalid``: depth is NaN, negative, or nearer than the near plane
 - ``depth_mismatch``: depth is not what ray casts say at sampled pixels
-- ``camera_inside``: the camera looks at most surfaces from behind, or touches one
+- ``camera_inside``: most rays from the camera meet a surface from behind, or the camera touches one
 """
 
 from __future__ import annotations
@@ -18,9 +18,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerialdojo_gen.geometry.cameras import Camera
-from aerialdojo_gen.geometry.rays import RayCaster
+from aerialdojo_gen.geometry.rays import TriangleRayCaster
 from aerialdojo_gen.rendering.codecs import MAX_DEPTH_M
 from aerialdojo_gen.rendering.world import NEAR_M, Picture
+from aerialdojo_gen.scenes.model import Scene
 
 Floats = NDArray[np.float64]
 
@@ -44,14 +45,14 @@ class ViewChecks:
     Attributes
     ----------
     camera : Camera
-    rays : RayCaster
-        Over the scene that is rendered.
+    solid : Solid
+        The scene that is rendered.
     flags : set of str
         What has been found so far.
     """
 
     camera: Camera
-    rays: RayCaster
+    solid: Solid
     flags: set[str] = field(default_factory=set)
     _picture: Picture | None = None
     _pose: Floats | None = None
@@ -65,8 +66,11 @@ class ViewChecks:
         world_from_camera : (4, 4) float64
         """
         self.flags |= picture_flags(picture)
-        if not self.flags & {"depth_invalid"} and self.mismatch(picture, world_from_camera) > _MISMATCH_SHARE:
+        wrong, behind = self.against_rays(picture, world_from_camera)
+        if wrong > _MISMATCH_SHARE:
             self.flags.add("depth_mismatch")
+        if behind > _BEHIND_SHARE:
+            self.flags.add("camera_inside")
         before = self._picture
         if (
             before is not None
@@ -79,7 +83,7 @@ class ViewChecks:
             self.flags.add("frozen")
         self._picture, self._pose = picture, world_from_camera
 
-    def mismatch(self, picture: Picture, world_from_camera: Floats) -> float:
+    def against_rays(self, picture: Picture, world_from_camera: Floats) -> tuple[float, float]:
         """Compare depth with ray casts at a lattice of pixels.
 
         Pixels at edges are left out: they have no one depth. An edge is where inverse depth, linear on any plane,
@@ -92,8 +96,10 @@ class ViewChecks:
 
         Returns
         -------
-        float
+        wrong : float
             Share of the compared pixels that differ by more than 1 cm (and the depth buffer's own resolution).
+        behind : float
+            Share of the rays that hit something which hit it from behind.
         """
         h, w = picture.depth_m.shape
         n = _SAMPLES_A_SIDE
@@ -108,15 +114,53 @@ class ViewChecks:
             smooth = np.where(np.isfinite(here), bend * here**2 < _DEPTH_TOLERANCE_M / 2, bend == 0.0)
         f = self.camera.focal_px
         local = np.stack([(cols + 0.5 - w / 2) / f, (rows + 0.5 - h / 2) / f, np.ones(len(rows))], axis=1)
-        along, _ = self.rays.first_hit(world_from_camera[:3, 3], local @ world_from_camera[:3, :3].T)
+        along, behind = self.solid.first_hit(world_from_camera[:3, 3], local @ world_from_camera[:3, :3].T)
         cast = along / np.linalg.norm(local, axis=1)
         near = np.minimum(here, cast) <= MAX_DEPTH_M
         compared = smooth & near
         if not compared.any():
-            return 0.0
+            return 0.0, behind
         with np.errstate(invalid="ignore"):
-            wrong = ~(np.abs(here - cast) <= _DEPTH_TOLERANCE_M + 2e-6 * here**2)
-        return float(wrong[compared].mean())
+            wrong = ~(np.abs(here - cast) <= _DEPTH_TOLERANCE_M + 2e-6 * np.minimum(here, cast) ** 2)
+        return float(wrong[compared].mean()), behind
+
+
+class Solid:
+    """A scene for ray casts that tell front from back.
+
+    Parameters
+    ----------
+    scene : Scene
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        offsets = np.cumsum([0, *(len(i.vertices) for i in scene.instances[:-1])])
+        vertices = np.concatenate([i.vertices for i in scene.instances])
+        faces = np.concatenate([i.faces + np.int32(o) for i, o in zip(scene.instances, offsets, strict=True)])
+        corners = vertices[faces]
+        self._normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        self._caster = TriangleRayCaster(vertices, faces)
+
+    def first_hit(self, origin: Floats, directions: Floats) -> tuple[Floats, float]:
+        """Find what rays hit first.
+
+        Parameters
+        ----------
+        origin : (3,) float64
+            Metres, world frame.
+        directions : (n, 3) float64
+
+        Returns
+        -------
+        distance_m : (n,) float64
+            Along the ray; inf where it hits nothing.
+        behind : float
+            Share of the rays that hit something which hit it from behind: near 1 inside a solid.
+        """
+        distance, face = self._caster.first_hit(origin, directions)
+        hit = face >= 0
+        away = np.einsum("ij,ij->i", self._normal[face[hit]], directions[hit]) > 0.0
+        return distance, float(away.mean()) if hit.any() else 0.0
 
 
 def picture_flags(picture: Picture) -> set[str]:
@@ -129,7 +173,7 @@ def picture_flags(picture: Picture) -> set[str]:
     Returns
     -------
     set of str
-        Of ``black``, ``uniform``, ``depth_invalid``, ``camera_inside``.
+        Of ``black``, ``uniform``, ``depth_invalid``, and ``camera_inside`` where the camera touches a surface.
     """
     flags = set()
     coarse = picture.rgb[::4, ::4].reshape(-1, 3)
@@ -142,8 +186,6 @@ def picture_flags(picture: Picture) -> set[str]:
     if np.isnan(nearest) or nearest < 0.99 * NEAR_M:
         flags.add("depth_invalid")
     elif nearest < 1.2 * NEAR_M:
-        flags.add("camera_inside")
-    if picture.behind_fraction > _BEHIND_SHARE:
         flags.add("camera_inside")
     return flags
 

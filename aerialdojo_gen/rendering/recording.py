@@ -9,8 +9,7 @@ import numpy as np
 
 from aerialdojo_gen.config import RenderConfig
 from aerialdojo_gen.geometry.cameras import Camera, view_pose
-from aerialdojo_gen.geometry.rays import RayCaster
-from aerialdojo_gen.rendering.checks import ViewChecks
+from aerialdojo_gen.rendering.checks import Solid, ViewChecks
 from aerialdojo_gen.rendering.codecs import VideoWriter, to_millimetres
 from aerialdojo_gen.rendering.trajectory import FramePoses, by_steps, by_time
 from aerialdojo_gen.rendering.world import RenderWorld
@@ -39,7 +38,7 @@ def frame_poses(route: dict[str, list[float]], config: RenderConfig) -> FramePos
 
 def record_view(
     world: RenderWorld,
-    rays: RayCaster,
+    solid: Solid,
     view: str,
     poses: FramePoses,
     config: RenderConfig,
@@ -51,8 +50,8 @@ def record_view(
     Parameters
     ----------
     world : RenderWorld
-    rays : RayCaster
-        Over the same scene.
+    solid : Solid
+        The same scene.
     view : str
         One of `aerialdojo_gen.schemas.VIEWS`.
     poses : FramePoses
@@ -67,7 +66,7 @@ def record_view(
     """
     camera = Camera(config.width, config.height, config.fov_deg)
     comment = camera_comment(camera, view)
-    checks = ViewChecks(camera, rays)
+    checks = ViewChecks(camera, solid)
     size = (config.width, config.height, config.fps)
     with (
         VideoWriter(rgb_path, "rgb", *size, crf=config.crf, comment=comment) as rgb,

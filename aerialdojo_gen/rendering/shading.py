@@ -35,7 +35,7 @@ def shade(
     surface: NDArray[np.int32],
     light: Lighting,
     shadow: ShadowMap,
-) -> tuple[NDArray[np.uint8], float]:
+) -> NDArray[np.uint8]:
     """Light a picture.
 
     Parameters
@@ -53,13 +53,11 @@ def shade(
 
     Returns
     -------
-    rgb : (H, W, 3) uint8
+    (H, W, 3) uint8
         sRGB.
-    behind_fraction : float
-        Share of the pixels showing a surface that see its back; 0 where no pixel shows one.
     """
     out = np.empty_like(albedo)
-    hits, behind = _shade(
+    _shade(
         albedo,
         depth_m,
         surface,
@@ -75,7 +73,7 @@ def shade(
         0.03 + 1.5 * shadow.texel_m,
         out,
     )
-    return out, behind / max(hits, 1)
+    return out
 
 
 @njit(cache=True)
@@ -111,11 +109,10 @@ def _shade(
     sun_focal: float,
     bias_m: float,
     out: NDArray[np.uint8],
-) -> tuple[int, int]:
+) -> None:
     height, width = depth.shape
     sun, zenith, horizon = sky[0], sky[1], sky[2]
     base = np.empty(3)
-    hits, behind = 0, 0
     for row in range(height):
         y = (row + 0.5 - height / 2.0) / focal
         for col in range(width):
@@ -131,12 +128,10 @@ def _shade(
                 for c in range(3):
                     out[row, col, c] = np.uint8(horizon[c] + (zenith[c] - horizon[c]) * up + 0.5)
                 continue
-            hits += 1
             z = depth[row, col]
             nx, ny, nz = normal[k, 0], normal[k, 1], normal[k, 2]
             facing = -(dx * nx + dy * ny + dz * nz) / stretch
             if facing < 0.0:
-                behind += 1
                 nx, ny, nz, facing = -nx, -ny, -nz, -facing
             for c in range(3):
                 base[c] = colour[k, c]
@@ -163,4 +158,3 @@ def _shade(
                 value = base[c] * level
                 value += (horizon[c] - value) * haze
                 out[row, col, c] = np.uint8(min(255.0, value + 0.5))
-    return hits, behind

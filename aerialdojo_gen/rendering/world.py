@@ -36,13 +36,10 @@ class Picture:
         sRGB.
     depth_m : (H, W) float32
         Planar depth, metres; inf where nothing is hit.
-    behind_fraction : float
-        Share of the pixels showing a surface that see its back: near 1 for a camera inside a solid.
     """
 
     rgb: NDArray[np.uint8]
     depth_m: NDArray[np.float32]
-    behind_fraction: float = 0.0
 
 
 class RenderWorld:
@@ -51,7 +48,9 @@ class RenderWorld:
     Parameters
     ----------
     scene : Scene
-        Copied into the renderer: one body a surface (see `aerialdojo_gen.rendering.surfaces`).
+        Copied into the renderer: one body a surface (see `aerialdojo_gen.rendering.surfaces`). Only front faces are
+        drawn (those wound counter-clockwise as the camera sees them): TinyRenderer's double-sided flag does nothing,
+        and drawing every face twice doubles the time.
 
     Raises
     ------
@@ -82,7 +81,7 @@ class RenderWorld:
         rgba = (1.0, 1.0, 1.0, 1.0) if material.texture is not None else (*(c / 255 for c in material.colour), 1.0)
         shape = pybullet.createVisualShape(
             pybullet.GEOM_MESH, fileName=str(path), rgbaColor=rgba, specularColor=(0, 0, 0),
-            flags=pybullet.VISUAL_SHAPE_DOUBLE_SIDED, physicsClientId=client,
+            physicsClientId=client,
         )  # fmt: skip
         body = pybullet.createMultiBody(0, -1, shape, physicsClientId=client) if shape >= 0 else -1
         path.unlink()
@@ -110,8 +109,8 @@ class RenderWorld:
         Picture
         """
         albedo, depth, surface = self.rasterise(camera, world_from_camera)
-        rgb, behind = shade(camera, world_from_camera, albedo, depth, surface, self._light, self._shadow)
-        return Picture(rgb, depth, behind)
+        rgb = shade(camera, world_from_camera, albedo, depth, surface, self._light, self._shadow)
+        return Picture(rgb, depth)
 
     def rasterise(
         self, camera: Camera, world_from_camera: Floats, near_m: float = NEAR_M, far_m: float = FAR_M

@@ -10,13 +10,12 @@ from typing import Any
 
 from aerialdojo_gen import store
 from aerialdojo_gen.config import RenderConfig
-from aerialdojo_gen.geometry.rays import RayCaster
-from aerialdojo_gen.rendering.checks import FLAGS, OF_DEPTH, OF_RGB
+from aerialdojo_gen.rendering.checks import FLAGS, OF_DEPTH, OF_RGB, Solid
 from aerialdojo_gen.rendering.codecs import DEPTH_CODEC, RGB_CODEC, SUFFIX
 from aerialdojo_gen.rendering.recording import frame_poses, record_view
 from aerialdojo_gen.rendering.sample import choose, subsets
 from aerialdojo_gen.rendering.trajectory import FramePoses
-from aerialdojo_gen.rendering.world import RenderWorld, ray_caster, render_world
+from aerialdojo_gen.rendering.world import RenderWorld, render_world
 from aerialdojo_gen.schemas import FRAMES, RECORDINGS
 from aerialdojo_gen.stage import Job, Output
 
@@ -43,11 +42,11 @@ def run(job: Job, config: RenderConfig) -> Output:
     frames: list[dict[str, Any]] = []
     if mine:
         scene = job.scene_model()
-        world, rays = render_world(scene), ray_caster(scene)
+        world, solid = render_world(scene), Solid(scene)
         for nav_id in mine:
             poses = frame_poses(routes[nav_id], config)
             for view in config.views:
-                recordings += _record(job, config, world, rays, nav_id, view, poses)
+                recordings += _record(job, config, world, solid, nav_id, view, poses)
             frames += _frame_rows(job.scene, nav_id, poses)
     counts = Counter(flag for row in recordings for flag in row["flags"])
     counts["frames"] = len(frames)
@@ -62,7 +61,7 @@ def _record(
     job: Job,
     config: RenderConfig,
     world: RenderWorld,
-    rays: RayCaster,
+    solid: Solid,
     nav_id: str,
     view: str,
     poses: FramePoses,
@@ -70,11 +69,11 @@ def _record(
     paths = {m: f"media/{job.scene}/{nav_id}/{view}_{m}.{SUFFIX[m]}" for m in _MODALITIES}
     with ExitStack() as stack:
         files = {m: stack.enter_context(job.output_file(path)) for m, path in paths.items()}
-        flags = record_view(world, rays, view, poses, config, files["rgb"], files["depth"])
+        flags = record_view(world, solid, view, poses, config, files["rgb"], files["depth"])
         if flags:
             # A renderer that has gone wrong may be right when it is built anew; what stays is the view's own fault.
             with RenderWorld(job.scene_model()) as again:
-                flags = record_view(again, rays, view, poses, config, files["rgb"], files["depth"])
+                flags = record_view(again, solid, view, poses, config, files["rgb"], files["depth"])
         facts = {m: (path.stat().st_size, _sha256(path)) for m, path in files.items()}
     return [
         {

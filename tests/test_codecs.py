@@ -1,0 +1,114 @@
+from __future__ import annotations
+
+import json
+
+import cv2
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from aerialdojo_gen.errors import RenderError
+from aerialdojo_gen.rendering.codecs import MAX_DEPTH_M, VideoWriter, to_metres, to_millimetres
+from aerialdojo_gen.rendering.reader import Video, read_recording
+
+N, H, W = 40, 96, 128
+
+
+def depth_frames() -> list[np.ndarray]:
+    u, v = np.meshgrid(np.arange(W), np.arange(H))
+    return [((u * 499 + v * 331 + k * 1777) % 65536).astype(np.uint16) for k in range(N)]
+
+
+def rgb_frames() -> list[np.ndarray]:
+    u, v = np.meshgrid(np.arange(W), np.arange(H))
+    return [
+        np.stack([120 + 60 * np.sin((u + 3 * k) / 20), 90 + v, 60 + k + u / 2], axis=-1).astype(np.uint8)
+        for k in range(N)
+    ]
+
+
+def write(path, modality, frames, **options):
+    with VideoWriter(path, modality, W, H, 15.0, **options) as writer:
+        for frame in frames:
+            writer.write(frame)
+    return path
+
+
+def test_depth_comes_back_bit_for_bit(tmp_path):
+    frames = depth_frames()
+    video = Video(write(tmp_path / "d.mkv", "depth", frames))
+    assert len(video) == N
+    assert all(np.array_equal(a, b) for a, b in zip(video, frames, strict=True))
+
+
+def test_rgb_comes_back_close(tmp_path):
+    frames = rgb_frames()
+    video = Video(write(tmp_path / "c.mp4", "rgb", frames))
+    assert len(video) == N
+    for a, b in zip(video, frames, strict=True):
+        error = np.mean((a.astype(float) - b.astype(float)) ** 2)
+        assert 10 * np.log10(255**2 / error) > 30
+
+
+@pytest.mark.parametrize(("modality", "frames"), [("rgb", rgb_frames()), ("depth", depth_frames())])
+def test_same_frames_same_bytes(tmp_path, modality, frames):
+    a, b = (write(tmp_path / f"{k}.video", modality, frames, comment="{}") for k in "ab")
+    assert a.read_bytes() == b.read_bytes()
+
+
+@pytest.mark.parametrize(("modality", "frames"), [("rgb", rgb_frames()), ("depth", depth_frames())])
+def test_a_seek_lands_on_the_frame_asked_for(tmp_path, modality, frames):
+    path = write(tmp_path / "v", modality, frames)
+    in_order = list(Video(path))
+    video = Video(path)
+    for k in (0, 39, 14, 15, 16, 31, 30, 29, 7, 8, -1):
+        assert np.array_equal(video[k], in_order[k])
+    assert len(video[10:13]) == 3
+    with pytest.raises(IndexError, match="has 40 frames"):
+        video[40]
+
+
+def test_opencv_reads_depth_with_conversion_off(tmp_path):
+    frames = depth_frames()
+    capture = cv2.VideoCapture(str(write(tmp_path / "d.mkv", "depth", frames)))
+    capture.set(cv2.CAP_PROP_CONVERT_RGB, 0)
+    for frame in frames[:5]:
+        read, image = capture.read()
+        assert read
+        assert np.array_equal(image.view(np.uint16).reshape(H, W), frame)
+
+
+@given(st.floats(0.001, MAX_DEPTH_M))
+def test_depth_in_millimetres_is_within_half_of_one(depth):
+    assert to_metres(to_millimetres(np.array([depth])))[0] == pytest.approx(depth, abs=5.1e-4)
+
+
+def test_nothing_within_range_is_zero_and_comes_back_as_infinity():
+    stored = to_millimetres(np.array([np.inf, np.nan, -1.0, 65.5356, 65.535, 1e9]))
+    assert stored.tolist() == [0, 0, 0, 0, 65535, 0]
+    assert np.isinf(to_metres(stored)).tolist() == [True, True, True, True, False, True]
+
+
+def test_a_recording_has_all_its_videos_or_is_refused_by_name(tmp_path):
+    for view in ("front", "down"):
+        write(tmp_path / f"{view}_rgb.mp4", "rgb", rgb_frames(), comment=json.dumps({"view": view}))
+        write(tmp_path / f"{view}_depth.mkv", "depth", depth_frames())
+    recording = read_recording(tmp_path)
+    assert len(recording) == N
+    assert recording.fps == 15.0
+    assert recording.cameras["down"] == {"view": "down"}
+    assert recording.rgb["front"][3].shape == (H, W, 3)
+    assert recording.depth_m["down"][3].dtype == np.float32
+    assert recording.depth_m["down"][2:4][1] == pytest.approx(to_metres(depth_frames()[3]))
+
+    (tmp_path / "down_depth.mkv").unlink()
+    with pytest.raises(RenderError, match="no complete recording"):
+        read_recording(tmp_path)
+
+
+def test_a_cut_off_file_is_named(tmp_path):
+    path = write(tmp_path / "c.mp4", "rgb", rgb_frames())
+    path.write_bytes(path.read_bytes()[:200])
+    with pytest.raises(RenderError, match=r"c\.mp4"):
+        Video(path)
