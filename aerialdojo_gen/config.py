@@ -75,10 +75,38 @@ class PairObjectsConfig(Section):
     max_approach_m: float = Field(1.0, ge=0, description="longest straight Approach at the end of a route")
 
 
+class Rung(Section):
+    """One search of the planner's ladder."""
+
+    weight: float = Field(gt=0, description="of the cost-to-go; 1 is plain A*")
+    budget: int = Field(ge=1, le=2_000_000, description="most expansions")
+    duplicate_cell_m: float = Field(0.5, gt=0, description="edge of the cells in which states are duplicates")
+    heading_sectors: Literal[1, 2, 3, 4, 6, 8, 12, 24] = Field(1, description="headings told apart in a cell")
+    extra_radius_m: float = Field(0.0, ge=0, description="added to the radius while searching")
+
+
 class PlanConfig(Section):
     """Reference trajectories."""
 
     targets_per_part: int = Field(8, ge=1, description="targets whose plans share a shard")
+    cell_m: float = Field(0.5, gt=0, description="edge of the cells of clearance grid and cost-to-go")
+    margin_m: float = Field(0.002, ge=0, description="added to the body's radius in the search alone")
+    max_length_m: float = Field(100.0, gt=0, description="longest route worth planning")
+    length_slack: float = Field(1.04, ge=1, description="the cost-to-go may exceed it by this: it overestimates")
+    field_slack_m: float = Field(3.0, ge=0, description="how far the cost-to-go reaches beyond the farthest start")
+    max_approach_m: float = Field(1.0, gt=0, description="longest straight Approach at the end")
+    action_cost_m: float = Field(0.02, ge=0, description="what an action costs beside its metres: breaks ties")
+    clearance_cap_m: float = Field(5.0, gt=0, description="clearances are known up to this distance")
+    prove_by_grid: bool = Field(True, description="leave FCL unasked about legs that the grid proves free")
+    ladder: tuple[Rung, ...] = Field(
+        (
+            Rung(weight=1.05, budget=20_000),
+            Rung(weight=1.15, budget=200_000, duplicate_cell_m=0.25, heading_sectors=4, extra_radius_m=0.02),
+            Rung(weight=1.15, budget=200_000, duplicate_cell_m=0.25, heading_sectors=4),
+        ),
+        min_length=1,
+        description="searches tried in turn until FCL accepts what one of them finds",
+    )
 
 
 class Setting(Section):

@@ -35,9 +35,18 @@ def seed_goal(
     nx, ny, nz = cost.shape
     found = np.empty(4096, np.int32)
     n = 0
-    i0, i1 = math.ceil((gx - reach - grid.origin[0]) / grid.cell - 0.5), (gx + reach - grid.origin[0]) / grid.cell - 0.5
-    j0, j1 = math.ceil((gy - reach - grid.origin[1]) / grid.cell - 0.5), (gy + reach - grid.origin[1]) / grid.cell - 0.5
-    k0, k1 = math.ceil((gz - reach - grid.origin[2]) / grid.cell - 0.5), (gz + reach - grid.origin[2]) / grid.cell - 0.5
+    i0, i1 = (
+        math.ceil((gx - reach - grid.origin[0]) / grid.cell - 0.5),
+        (gx + reach - grid.origin[0]) / grid.cell - 0.5,
+    )
+    j0, j1 = (
+        math.ceil((gy - reach - grid.origin[1]) / grid.cell - 0.5),
+        (gy + reach - grid.origin[1]) / grid.cell - 0.5,
+    )
+    k0, k1 = (
+        math.ceil((gz - reach - grid.origin[2]) / grid.cell - 0.5),
+        (gz + reach - grid.origin[2]) / grid.cell - 0.5,
+    )
     for i in range(max(0, i0), min(nx - 1, math.floor(i1)) + 1):
         for j in range(max(0, j0), min(ny - 1, math.floor(j1)) + 1):
             for k in range(max(0, k0), min(nz - 1, math.floor(k1)) + 1):

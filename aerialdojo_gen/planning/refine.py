@@ -1,0 +1,251 @@
+"""From translations to actions: put a found route in its best order and fly it with the fewest actions.
+
+Translations commute: flown in another order they end in the same place, after the same length. So equal directions
+are brought together, there and back cancels out, and the headings are chosen by dynamic programming.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from aerialdojo_gen.planning.grid_kernels import GridArrays, inside, segment_free
+from aerialdojo_gen.planning.hybrid_astar import LIFTS_M, N_FLAT, N_STEPS, STEPS_M, turns_between
+from aerialdojo_gen.planning.primitives import N_HEADINGS, QUARTER, TURN_RAD
+from aerialdojo_gen.schemas import MOVE_DOWN_1, MOVE_UP_1, TURN_LEFT, TURN_RIGHT
+
+# Directions of a leg beyond the horizontal ones.
+_UP, _DOWN = N_HEADINGS, N_HEADINGS + 1
+_MOVE_FORWARD_1, _MOVE_LEFT_1, _MOVE_RIGHT_1 = 1, 4, 7
+_MAX_PASSES = 50
+
+
+@njit(cache=True, inline="always")
+def _opposite(a: int, b: int) -> bool:
+    if a >= N_HEADINGS or b >= N_HEADINGS:
+        return a != b and a >= N_HEADINGS and b >= N_HEADINGS
+    return (a - b) % N_HEADINGS == N_HEADINGS // 2
+
+
+@njit(cache=True)
+def _merge(direction: NDArray[np.int64], metres: NDArray[np.int64], n: int) -> int:
+    """Join neighbouring legs of one direction and cancel opposite ones, in place; return how many are left."""
+    m = 0
+    for i in range(n):
+        d, length = direction[i], metres[i]
+        while length > 0 and m > 0:
+            if direction[m - 1] == d:
+                length += metres[m - 1]
+                m -= 1
+            elif _opposite(direction[m - 1], d):
+                rest = metres[m - 1] - length
+                m -= 1
+                length = abs(rest)
+                if rest > 0:
+                    d = direction[m]
+            else:
+                break
+        if length > 0:
+            direction[m], metres[m] = d, length
+            m += 1
+    return m
+
+
+@njit(cache=True, inline="always")
+def _fewest_moves(direction: int, metres: int) -> int:
+    if direction >= N_HEADINGS:
+        return (metres + 1) // 2
+    rest = metres % 5
+    return metres // 5 + rest // 3 + rest % 3
+
+
+@njit(cache=True)
+def _headings(direction: NDArray[np.int64], n: int, goal_heading: int, chosen: NDArray[np.int64]) -> int:
+    """Choose the heading of every leg with the fewest turns overall; return that number.
+
+    A leg is flown ahead, to the left or to the right; on a tie ahead. A vertical leg keeps the heading.
+    """
+    best = np.zeros((n + 1, 3), np.int64)
+    back = np.zeros((n + 1, 3), np.int64)
+    at = np.zeros((n + 1, 3), np.int64)
+    for i in range(1, n + 1):
+        d = direction[i - 1]
+        for side in range(3):
+            if d >= N_HEADINGS:
+                at[i, side], best[i, side], back[i, side] = at[i - 1, side], best[i - 1, side], side
+                continue
+            offset = 0 if side == 0 else (-QUARTER if side == 1 else QUARTER)
+            at[i, side] = (d + offset) % N_HEADINGS
+            best[i, side] = 1 << 40
+            for before in range(3):
+                turns = best[i - 1, before] + turns_between(at[i - 1, before], at[i, side])
+                if turns < best[i, side]:
+                    best[i, side], back[i, side] = turns, before
+    total, side = 1 << 40, 0
+    for last in range(3):
+        turns = best[n, last] + turns_between(at[n, last], goal_heading)
+        if turns < total:
+            total, side = turns, last
+    for i in range(n, 0, -1):
+        chosen[i - 1] = at[i, side]
+        side = back[i, side]
+    return total
+
+
+@njit(cache=True)
+def _n_actions(direction: NDArray[np.int64], metres: NDArray[np.int64], n: int, goal_heading: int,
+               chosen: NDArray[np.int64]) -> int:  # fmt: skip
+    total = _headings(direction, n, goal_heading, chosen)
+    for i in range(n):
+        total += _fewest_moves(direction[i], metres[i])
+    return total
+
+
+@njit(cache=True)
+def _legs_free(
+    start: NDArray[np.float64], direction: NDArray[np.int64], metres: NDArray[np.int64], n: int,
+    radius: float, grid: GridArrays,
+) -> bool:  # fmt: skip
+    x, y, z = start[0], start[1], start[2]
+    for i in range(n):
+        d, length = direction[i], float(metres[i])
+        u, v, w = x, y, z
+        if d == _UP:
+            w += length
+        elif d == _DOWN:
+            w -= length
+        else:
+            u += math.cos(start[3] + d * TURN_RAD) * length
+            v += math.sin(start[3] + d * TURN_RAD) * length
+        if not inside(u, v, w, grid.lower, grid.upper) or not segment_free(x, y, z, u, v, w, radius, grid, False):
+            return False
+        x, y, z = u, v, w
+    return True
+
+
+@njit(cache=True)
+def _reorder(
+    start: NDArray[np.float64], direction: NDArray[np.int64], metres: NDArray[np.int64], n: int, goal_heading: int,
+    radius: float, grid: GridArrays,
+) -> int:  # fmt: skip
+    """Move single legs elsewhere in the sequence as long as that is free and saves length or actions, in place."""
+    new_direction, new_metres, chosen = np.empty_like(direction), np.empty_like(metres), np.empty_like(direction)
+    length, actions = metres[:n].sum(), _n_actions(direction, metres, n, goal_heading, chosen)
+    for _ in range(_MAX_PASSES):
+        improved = False
+        for source in range(n):
+            for target in range(n):
+                if target == source:
+                    continue
+                k = 0
+                for i in range(n):
+                    if i == source:
+                        continue
+                    if k == target:
+                        new_direction[k], new_metres[k] = direction[source], metres[source]
+                        k += 1
+                    new_direction[k], new_metres[k] = direction[i], metres[i]
+                    k += 1
+                if k == target:
+                    new_direction[k], new_metres[k] = direction[source], metres[source]
+                    k += 1
+                m = _merge(new_direction, new_metres, k)
+                new_length = new_metres[:m].sum()
+                if new_length > length:
+                    continue
+                new_actions = _n_actions(new_direction, new_metres, m, goal_heading, chosen)
+                if new_length == length and new_actions >= actions:
+                    continue
+                if not _legs_free(start, new_direction, new_metres, m, radius, grid):
+                    continue
+                direction[:m], metres[:m] = new_direction[:m], new_metres[:m]
+                n, length, actions = m, new_length, new_actions
+                improved = True
+                break
+            if improved:
+                break
+        if not improved:
+            break
+    return n
+
+
+@njit(cache=True, inline="always")
+def _turn(actions: NDArray[np.int8], k: int, heading: int, wanted: int) -> int:
+    left = (wanted - heading) % N_HEADINGS
+    count, action = (left, TURN_LEFT) if left <= N_HEADINGS // 2 else (N_HEADINGS - left, TURN_RIGHT)
+    actions[k : k + count] = action
+    return k + count
+
+
+@njit(cache=True)
+def _write(actions: NDArray[np.int8], k: int, first: int, steps: tuple[int, ...], metres: int) -> int:
+    """Write the fewest moves that add up to `metres`, the longest first; `first` is the action of the shortest."""
+    for s in range(len(steps) - 1, -1, -1):
+        count = metres // steps[s]
+        actions[k : k + count] = first + s
+        metres -= count * steps[s]
+        k += count
+    return k
+
+
+@njit(cache=True)
+def moves_to_actions(
+    start: NDArray[np.float64],
+    moves: NDArray[np.int8],
+    goal_heading: int,
+    radius: float,
+    grid: GridArrays,
+) -> NDArray[np.int8]:
+    """Turn the search's translations into actions.
+
+    Parameters
+    ----------
+    start : (4,) float64
+        x, y, z in metres, and yaw in radians.
+    moves : (n,) int8
+        Translations, as `aerialdojo_gen.planning.hybrid_astar.search` returns them.
+    goal_heading : int
+        Heading to end with, counted from the start's yaw.
+    radius : float
+        Radius that must stay clear, metres.
+    grid : GridArrays
+        The clearance grid.
+
+    Returns
+    -------
+    (m,) int8
+        Actions, the turns to the final heading included, Approach and Stop not.
+    """
+    direction, metres = np.empty(len(moves) + 1, np.int64), np.empty(len(moves) + 1, np.int64)
+    total = 0
+    for i in range(len(moves)):
+        move = int(moves[i])
+        if move < N_FLAT:
+            direction[i], metres[i] = move // N_STEPS, int(STEPS_M[move % N_STEPS])
+        else:
+            lift = LIFTS_M[move - N_FLAT]
+            direction[i], metres[i] = (_UP if lift > 0 else _DOWN), int(abs(lift))
+        total += metres[i]
+    n = _merge(direction, metres, len(moves))
+    n = _reorder(start, direction, metres, n, goal_heading, radius, grid)
+    chosen = np.empty(n + 1, np.int64)
+    _headings(direction, n, goal_heading, chosen)
+    actions = np.empty(total + N_HEADINGS * (n + 1), np.int8)
+    k, heading = 0, 0
+    for i in range(n):
+        k = _turn(actions, k, heading, chosen[i])
+        heading = chosen[i]
+        d = direction[i]
+        if d == _UP:
+            k = _write(actions, k, MOVE_UP_1, (1, 2), metres[i])
+        elif d == _DOWN:
+            k = _write(actions, k, MOVE_DOWN_1, (1, 2), metres[i])
+        else:
+            side = (d - heading) % N_HEADINGS
+            first = _MOVE_FORWARD_1 if side == 0 else (_MOVE_LEFT_1 if side == QUARTER else _MOVE_RIGHT_1)
+            k = _write(actions, k, first, (1, 3, 5), metres[i])
+    k = _turn(actions, k, heading, goal_heading)
+    return actions[:k].copy()
