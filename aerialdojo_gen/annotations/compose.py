@@ -8,6 +8,7 @@ from aerialdojo_gen.annotations.phrases import Noun, Words
 from aerialdojo_gen.annotations.templates import FULL, MORE, PLAIN
 
 _MOST_IN_ONE = 2
+_LONG_PLACE = 5
 
 
 def compose(
@@ -37,7 +38,8 @@ def compose(
     first, rest = facts[:_MOST_IN_ONE], facts[_MOST_IN_ONE:]
     if place and len(first) == _MOST_IN_ONE:
         first, rest = facts[:1], facts[1:]
-    rel = " ".join([*([place] if place else []), " and ".join(first)])
+    comma = "," if len(place.split()) > _LONG_PLACE else ""
+    rel = " ".join([*([place + comma] if place else []), " and ".join(first)])
     template = _template(noun, look, bool(rest), rng, used)
     fields = {
         "a": noun.a(),

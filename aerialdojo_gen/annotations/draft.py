@@ -7,7 +7,7 @@ many of the facts about their place as it takes to tell them from their rivals. 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,7 +18,7 @@ from aerialdojo_gen.annotations.claims import RIVAL_SLACK
 from aerialdojo_gen.annotations.compose import compose
 from aerialdojo_gen.annotations.facts import Fact, FactFinder
 from aerialdojo_gen.annotations.format import Annotations, Landmark, Object
-from aerialdojo_gen.annotations.phrases import Noun, Words, noun_of, place_of, words_of
+from aerialdojo_gen.annotations.phrases import Words, noun_of, place_of, words_of
 from aerialdojo_gen.errors import AnnotationError
 from aerialdojo_gen.rng import generator, rank
 from aerialdojo_gen.scenes.catalogue import Catalogue
@@ -27,6 +27,7 @@ from aerialdojo_gen.scenes.model import Instance, Scene
 _STAGE = "annotate-draft"
 _MOST_FACTS = 4
 _TRIES = 12
+_WORTH_SAYING = 0.35
 
 
 @dataclass(frozen=True)
@@ -223,10 +224,12 @@ class _Drafter:
         rng = generator(self._seed, _STAGE, self._scene.name, instance.node)
         facts = finder.facts(i, rng)
         for attempt in range(_TRIES):
-            chosen = self._choose(i, noun, facts[attempt % 3 :], ambiguity)
-            if not chosen:
-                return None
             place = place_of(instance) if attempt < _TRIES // 2 else ""
+            usable = [fact for fact in facts if not self._named_in(fact, place)][attempt % 3 :]
+            talkative = not place or bool(rng.random() < 0.4)
+            chosen = self._choose(i, f"It is {noun.a()} {place}.", usable, ambiguity, talkative)
+            if not chosen:
+                continue
             text, template = compose(words, noun, place, [fact.text for fact in chosen], rng, used)
             clash = ambiguity.untruths(i, text) or ambiguity.untruths(i, noun.short)
             if text not in others and not clash and not ambiguity.rivals(i, text):
@@ -234,35 +237,27 @@ class _Drafter:
                 return text
         return None
 
-    def _choose(self, i: int, noun: Noun, facts: list[Fact], ambiguity: Ambiguity) -> list[Fact]:
+    def _named_in(self, fact: Fact, place: str) -> bool:
+        """Whether the place speaks of the same thing already."""
+        spoken = set(place.replace("'s", "").split())
+        return any(self._nouns[j].name.split()[-1] in spoken for j in fact.things)
+
+    def _choose(self, i: int, said: str, facts: list[Fact], ambiguity: Ambiguity, talkative: bool) -> list[Fact]:
         """Take the most natural fact, then whatever rules out most of the rivals that are left."""
         chosen: list[Fact] = []
-        rivals = set(ambiguity.rivals(i, f"It is {noun.a()}."))
-        for fact in _greedy(facts, rivals, ambiguity):
-            chosen.append(fact)
-            if len(chosen) >= _MOST_FACTS:
+        rivals = set(ambiguity.rivals(i, said))
+        left = list(facts)
+        while left and len(chosen) < _MOST_FACTS:
+            best = left[0]
+            if chosen and rivals:
+                best = max(left, key=lambda fact: len(rivals) - len(_fitting(fact, rivals, ambiguity)))
+            elif chosen and not (talkative and len(chosen) == 1 and best.weight > _WORTH_SAYING):
                 break
+            chosen.append(best)
+            rivals = _fitting(best, rivals, ambiguity)
+            nouns = {self._nouns[j].short for j in best.things}
+            left = [f for f in left if not nouns & {self._nouns[j].short for j in f.things}]
         return chosen
-
-
-def _greedy(facts: list[Fact], rivals: set[int], ambiguity: Ambiguity) -> Iterator[Fact]:
-    left = list(facts)
-    things: set[int] = set()
-    taken = 0
-    while left:
-        if taken == 0:
-            best = left[0]
-        elif rivals:
-            best = max(left, key=lambda fact: (len(rivals - _fitting(fact, rivals, ambiguity)), -left.index(fact)))
-        elif taken == 1 and left[0].weight > 0.35 and not left[0].things & things:
-            best = left[0]
-        else:
-            return
-        rivals &= _fitting(best, rivals, ambiguity)
-        things |= best.things
-        taken += 1
-        yield best
-        left = [fact for fact in left if not fact.things & best.things]
 
 
 def _fitting(fact: Fact, rivals: set[int], ambiguity: Ambiguity) -> set[int]:

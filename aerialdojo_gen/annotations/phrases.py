@@ -14,6 +14,8 @@ from aerialdojo_gen.scenes.model import Instance
 _ADJECTIVES = ("size", "state", "pattern", "shape", "colour", "material")
 _PLACE = "place"
 _AFTER_NOUN = frozenset({"down", "up", "open", "closed", "raised", "lowered", "covered", "folded", "lit", "shut"})
+_OPENERS = frozenset({"showing", "carrying", "leaning", "facing", "selling", "holding", "wearing", "half-buried"})
+_LETTERED = frozenset({"sign", "billboard", "board", "arch", "banner"})
 _MASS = frozenset(["lichen", "moss", "snow", "ivy", "graffiti", "water", "fruit", "rust", "foliage"])
 _VERBS = {"vehicle": ("is parked", "parked"), "vegetation": ("grows", "growing")}
 
@@ -50,8 +52,15 @@ class Words:
 @cache
 def _tables() -> tuple[dict[str, dict[str, object]], dict[str, str]]:
     raw = tomllib.loads(Path(__file__).with_name("phrases.toml").read_text(encoding="utf-8"))
+    raw.pop("colours")
     said = raw.pop("values")
     return raw, said
+
+
+@cache
+def _colours() -> frozenset[str]:
+    raw = tomllib.loads(Path(__file__).with_name("phrases.toml").read_text(encoding="utf-8"))
+    return frozenset(raw["colours"])
 
 
 def words_of(category: str, name: str | None, kind: str, looks: tuple[str, ...] = ()) -> Words:
@@ -151,9 +160,12 @@ def noun_of(instance: Instance, words: Words) -> Noun:
     rest = [k for k in instance.attributes if k not in _ADJECTIVES and k != _PLACE]
     for key in (*_ADJECTIVES, *rest):
         value = instance.attributes.get(key)
-        if not value or value in words.name.split():
+        others = [v for k, v in instance.attributes.items() if k != key and k != _PLACE]
+        if not value or value in words.name.split() or any(value in v.split() for v in others):
             continue
         said = _said(key, value)
+        if words.name.split()[-1] in _LETTERED:
+            said = said.replace("with a sign reading", "reading")
         if said.startswith("+"):
             before.append(said[1:])
         else:
@@ -168,13 +180,14 @@ def place_of(instance: Instance) -> str:
 
 def _said(key: str, value: str) -> str:
     """Say one value: ``+`` before an adjective, else the words that follow the noun."""
-    special = _tables()[1].get(f"{key}={value}") or _tables()[1].get(f"{key}=*", "").replace("{}", value)
-    if special:
-        return special
+    table = _tables()[1]
+    pattern = table.get(f"{key}={value}") or table.get(f"{key}=*", "")
+    if pattern:
+        return pattern.replace("{a}", _with_article(value)).replace("{up}", value.upper()).replace("{}", value)
     words = value.split()
-    if key in ("size", "colour", "material", "shape"):
+    if key in ("size", "material", "shape") or (key == "colour" and words[-1] in _colours()):
         return "+" + value
-    if words[0].endswith("ing") or words[0] in ("in", "on", "under", "without", "with", "of"):
+    if words[0] in _OPENERS or words[0] in ("in", "on", "under", "without", "with", "of", "full"):
         return value
     if key == "state" and len(words) > 1 and words[-1] in _AFTER_NOUN:
         return f"with its {value}"

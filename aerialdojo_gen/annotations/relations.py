@@ -23,6 +23,7 @@ BESIDE_M = 3.0
 NEAR_M = 8.0
 SIDE_M = 12.0
 BETWEEN_M = 6.0
+LEVEL_M = 1.5  # less than a storey: who is a floor above is not beside
 COVER_M = 12.0
 BETWEEN_DEG = 120.0
 _LARGE_M = 10.0  # above it a thing's outline is its projected mesh; below, the convex hull is as good and cheaper
@@ -107,11 +108,14 @@ class SceneGeometry:
         if i not in self._covers:
             high = float(self.boxes[i, 1, 2])
             x, y = self.centres[i, :2]
-            self._covers[i] = frozenset(
-                j
-                for j, heights in self._columns(i, float(x), float(y))
-                if ((heights >= high - 0.05) & (heights <= high + COVER_M)).any()
-            )
+            lowest: dict[int, float] = {}
+            for j, heights in self._columns(i, float(x), float(y)):
+                overhead = heights[(heights >= high - 0.05) & (heights <= high + COVER_M)]
+                if len(overhead):
+                    lowest[j] = float(overhead.min())
+            # What lies on the ceiling above is not what one stands under.
+            limit = min(lowest.values(), default=0.0) + 1.0
+            self._covers[i] = frozenset(j for j, z in lowest.items() if z <= limit)
         return self._covers[i]
 
     def _probes(self, i: int) -> list[tuple[float, float]]:
@@ -152,15 +156,23 @@ class SceneGeometry:
 
     def beside(self, i: int, j: int, slack: float = 1.0) -> bool:
         """`i` stands within arm's reach of `j`, and not on, under or over it."""
-        if self.gap_m(i, j) > BESIDE_M * slack or j in self.covers(i) or i in self.covers(j):
+        if (
+            self.gap_m(i, j) > BESIDE_M * slack
+            or not self._level(i, j, slack)
+            or j in self.covers(i)
+            or i in self.covers(j)
+        ):
             return False
         stacked = self.support(i) == j or self.support(j) == i
         within = self.level_gap_m(i, j) == 0.0 and float(np.ptp(self.boxes[j, :, :2], axis=0).max()) > _LARGE_M
         return not stacked and not within
 
     def near(self, i: int, j: int, slack: float = 1.0) -> bool:
-        """`i` stands a few steps from `j`."""
-        return self.gap_m(i, j) <= NEAR_M * slack
+        """`i` stands a few steps from `j`, about level with it."""
+        return self.gap_m(i, j) <= NEAR_M * slack and self._level(i, j, slack)
+
+    def _level(self, i: int, j: int, slack: float) -> bool:
+        return self._rise_m(i, j) <= LEVEL_M * slack
 
     def on(self, i: int, j: int, slack: float = 1.0) -> bool:
         """`i` stands on `j`."""
@@ -177,13 +189,15 @@ class SceneGeometry:
     def side(self, i: int, j: int, direction: str, slack: float = 1.0) -> bool:
         """`i` stands in that compass direction of `j`, not far away."""
         bearing = self.bearing_rad(i, j)
-        if bearing is None or self.gap_m(i, j) > SIDE_M * slack:
+        if bearing is None or self.gap_m(i, j) > SIDE_M * slack or not self._level(i, j, slack):
             return False
         middle = math.radians(45.0 * DIRECTIONS.index(direction))
         return abs(float(wrap_angle_rad(bearing - middle))) <= math.radians(22.5) * slack
 
     def between(self, i: int, j: int, k: int, slack: float = 1.0) -> bool:
         """`i` stands between `j` and `k`: both close by and on opposite sides."""
+        if not (self._level(i, j, slack) and self._level(i, k, slack)):
+            return False
         if j == k or max(self.gap_m(i, j), self.gap_m(i, k)) > BETWEEN_M * slack:
             return False
         a, b = self.bearing_rad(i, j), self.bearing_rad(i, k)

@@ -45,10 +45,10 @@ PLAIN = (
 # For what does not fit into the first {rel}.
 MORE = (
     "It is also {rel}.",
-    "You will see it {rel}.",
-    "Seen from above, it is {rel}.",
     "More exactly, it {verb} {rel}.",
-    "To be sure, check that it is {rel}.",
+    "You will see it {rel}.",
+    "Seen from the air, it is {rel}.",
+    "It also {verb} {rel}.",
 )
 RELATIONS = {
     "beside": ("beside {}", "next to {}", "right beside {}", "right next to {}"),
