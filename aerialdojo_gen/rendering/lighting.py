@@ -25,8 +25,6 @@ class Lighting:
 
     Attributes
     ----------
-    normal : (n, 3) float64
-        Unit normals, world frame.
     colour : (n, 3) float64
         The material's mean colour, 0-255.
     texel_m : (n,) float64
@@ -37,7 +35,6 @@ class Lighting:
         The sky's colours, 0-255.
     """
 
-    normal: Floats
     colour: Floats
     texel_m: Floats
     sun: Floats
@@ -62,7 +59,6 @@ def lighting(scene: Scene, surfaces: list[Surface]) -> Lighting:
     sky = np.array(scene.sky, dtype=np.float64)
     sun = np.array(scene.sun, dtype=np.float64)
     return Lighting(
-        normal=np.array([s.normal for s in surfaces]).reshape(-1, 3),
         colour=np.array([m.colour for m in materials], dtype=np.float64).reshape(-1, 3),
         texel_m=np.array([0.0 if m.texture is None else m.tile_m / m.texture.shape[1] for m in materials]),
         sun=sun / np.linalg.norm(sun),

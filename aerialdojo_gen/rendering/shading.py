@@ -1,8 +1,8 @@
 """Deferred shading: from albedo, depth and surface of every pixel to the picture.
 
-The rasteriser delivers unlit texture colour, depth and the surface's number; sun, shadow, sky light, haze and the sky
-itself are added here, so that every rendering backend gives the same picture. Light is computed in sRGB values, which
-is not physics, but what the eye expects of a game.
+The rasteriser delivers unlit texture colour, depth and the material's number; normals follow from depth. Sun, shadow,
+sky light, haze and the sky itself are added here, so that every rendering backend gives the same picture. Light is
+computed in sRGB values, which is not physics, but what the eye expects of a game.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ def shade(
     depth_m : (H, W) float32
         Planar depth; inf where nothing is hit.
     surface : (H, W) int32
-        Number of the surface, -1 where nothing is hit.
+        Number of the material, -1 where nothing is hit.
     light : Lighting
     shadow : ShadowMap
 
@@ -63,7 +63,6 @@ def shade(
         surface,
         camera.focal_px,
         np.ascontiguousarray(world_from_camera),
-        light.normal,
         light.colour,
         light.texel_m,
         np.stack([light.sun, light.zenith, light.horizon]),
@@ -94,13 +93,31 @@ def _sunlit(x: float, y: float, z: float, shadow: NDArray[np.float32], pose: Flo
 
 
 @njit(cache=True)
+def _slope(w: Floats, row: int, col: int, down: int, right: int) -> float:
+    """Change of inverse depth a pixel, along a row or a column, of the surface that the pixel shows.
+
+    Inverse depth is linear on a plane: of the two sides, the one where it bends less belongs to that surface.
+    """
+    height, width = w.shape
+    best, slope = np.inf, 0.0
+    for side in (-1, 1):
+        r1, c1 = row + side * down, col + side * right
+        r2, c2 = r1 + side * down, c1 + side * right
+        if r2 < 0 or c2 < 0 or r2 >= height or c2 >= width:
+            continue
+        bend = abs(w[row, col] - 2.0 * w[r1, c1] + w[r2, c2])
+        if bend < best:
+            best, slope = bend, side * (w[r1, c1] - w[row, col])
+    return slope
+
+
+@njit(cache=True)
 def _shade(
     albedo: NDArray[np.uint8],
     depth: NDArray[np.float32],
     surface: NDArray[np.int32],
     focal: float,
     pose: Floats,
-    normal: Floats,
     colour: Floats,
     texel: Floats,
     sky: Floats,
@@ -113,6 +130,11 @@ def _shade(
     height, width = depth.shape
     sun, zenith, horizon = sky[0], sky[1], sky[2]
     base = np.empty(3)
+    w = np.zeros((height, width))
+    for row in range(height):
+        for col in range(width):
+            if surface[row, col] >= 0:
+                w[row, col] = 1.0 / depth[row, col]
     for row in range(height):
         y = (row + 0.5 - height / 2.0) / focal
         for col in range(width):
@@ -129,10 +151,15 @@ def _shade(
                     out[row, col, c] = np.uint8(horizon[c] + (zenith[c] - horizon[c]) * up + 0.5)
                 continue
             z = depth[row, col]
-            nx, ny, nz = normal[k, 0], normal[k, 1], normal[k, 2]
-            facing = -(dx * nx + dy * ny + dz * nz) / stretch
-            if facing < 0.0:
-                nx, ny, nz, facing = -nx, -ny, -nz, -facing
+            # The plane n . P = d through the pixel has 1 / z = n . (x, y, 1) / d: its slopes are n's x and y.
+            a = _slope(w, row, col, 0, 1) * focal
+            b = _slope(w, row, col, 1, 0) * focal
+            e = w[row, col] - x * a - y * b
+            norm = math.sqrt(a * a + b * b + e * e)
+            facing = w[row, col] / (norm * stretch)
+            nx = -(pose[0, 0] * a + pose[0, 1] * b + pose[0, 2] * e) / norm
+            ny = -(pose[1, 0] * a + pose[1, 1] * b + pose[1, 2] * e) / norm
+            nz = -(pose[2, 0] * a + pose[2, 1] * b + pose[2, 2] * e) / norm
             for c in range(3):
                 base[c] = colour[k, c]
             if texel[k] > 0.0:

@@ -48,7 +48,7 @@ class RenderWorld:
     Parameters
     ----------
     scene : Scene
-        Copied into the renderer: one body a surface (see `aerialdojo_gen.rendering.surfaces`). Only front faces are
+        Copied into the renderer: one body a material (see `aerialdojo_gen.rendering.surfaces`). Only front faces are
         drawn (those wound counter-clockwise as the camera sees them): TinyRenderer's double-sided flag does nothing,
         and drawing every face twice doubles the time.
 
