@@ -202,7 +202,7 @@ def test_frames_by_time_follow_the_path_at_no_more_than_cruise_speed(rows):
     table = np.array(rows)
     position, yaw, action = table[:, :3], table[:, 3], table[:, 4]
     frames = by_time(position, yaw, action, 15.0, 3.0, 90.0)
-    assert np.array_equal(frames.position[0], position[0])
+    assert frames.position[0] == pytest.approx(position[0], abs=1e-9)
     assert np.array_equal(frames.position[-1], position[-1])
     assert frames.yaw_rad[-1] == yaw[-1]
     assert frames.step[-1] == len(position) - 1

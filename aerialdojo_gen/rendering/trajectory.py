@@ -106,5 +106,5 @@ def by_time(
         share = np.clip(share, 0.0, 1.0)
         at = p[k] + share[:, None] * (p[k + 1] - p[k])
         heading = np.asarray(wrap_angle_rad(yaw[k] + share * turn[k]))
-        at[0], heading[0], at[-1], heading[-1] = p[0], yaw[0], p[-1], yaw[-1]
+        at[-1], heading[-1] = p[-1], yaw[-1]
     return FramePoses(time, step.astype(np.int32), np.asarray(action, dtype=np.int8)[step], at, heading)
