@@ -41,7 +41,7 @@ _SPOTS = {
     "apiary": Spot(-0.5, 18.5, -80.0, "in the bee yard"),
     "crossroads": Spot(1.0, 3.0, 0.0, "where the paths meet"),
 }
-_CLEARINGS = {"cabin": 8.0, "tower": 5.0, "camp": 7.0, "picnic": 5.5, "ruin": 6.0, "apiary": 3.5, "crossroads": 4.0}
+_CLEARINGS = {"cabin": 8.0, "tower": 6.5, "camp": 7.0, "picnic": 5.5, "ruin": 6.0, "apiary": 3.5, "crossroads": 4.0}
 _STREAM: list[tuple[float, float]] = [
     (-46, -7), (-34, -11), (-24, -10), (-14, -6.5), (-5, -4.5), (3, -5.5),
     (9, -8.5), (16, -9.5), (25, -7), (34, -12), (46, -10),
@@ -108,12 +108,14 @@ def _terrain(
 ) -> Terrain:
     ground = rolling_terrain(site.recipe.size_m, 1.6, site.recipe.seed, p.relief_m, 38.0, octaves=3)
     tower = _SPOTS["tower"]
-    ground = mound(ground, (tower.x, tower.y), 11.0, 3.0)
+    ground = mound(ground, (tower.x, tower.y), 13.0, 3.2)
     for path in paths:
         ground = ground.graded(path, 1.2, blend_m=3.0, smooth_m=9.0)
     for key, radius in _CLEARINGS.items():
         spot = _SPOTS[key]
         ground = ground.flattened(disc(spot.x, spot.y, radius * 0.6), blend_m=radius * 0.8)
+    for t in (t for things in STRAYS.values() for t in things):
+        ground = ground.flattened(Point(t.x, t.y), blend_m=2.5)
     ground = ground.graded(stream, 2.0, blend_m=4.5, smooth_m=40.0)
     level = float(ground.z(14.0, -9.8))
     ground = ground.flattened(pond.buffer(0.5), level, blend_m=4.0)

@@ -25,12 +25,12 @@ CABIN = (
 
 TOWER = (
     Thing("fire_tower", 0.0, 0.0, 20.0, "red", words={"place": "on the knoll in the north-east"}),
-    Thing("cooler_box", -1.64, -0.62, 20.0, "red", lift_m=11.12, words=_DECK),
+    Thing("cooler_box", -1.64, -0.62, 20.0, "red", lift_m=11.22, words=_DECK),
     Thing("fuel_drum", -0.4, 0.3, 0.0, "rusty", words={"place": "under the fire tower"}),
     Thing("weather_station", -5.0, 3.0, 140.0, "red_vane"),
-    Thing("quad_bike", 5.2, -3.0, 70.0, "green", words={"place": "at the foot of the fire tower"}),
+    Thing("quad_bike", -4.4, -0.4, 100.0, "green", words={"place": "at the foot of the fire tower"}),
     Thing("stone_cairn", -4.4, -4.2, 0.0, "white_top"),
-    Thing("information_board", 5.6, 2.6, -20.0, "green_map", words={"place": "at the foot of the fire tower"}),
+    Thing("information_board", 4.8, 2.4, -20.0, "green_map", words={"place": "at the foot of the fire tower"}),
     Thing("telescope", -0.4, -5.4, -60.0, "white"),
 )
 
@@ -53,7 +53,7 @@ PICNIC = (
     Thing("picnic_table", 0.0, 0.0, 30.0, "brown"),
     Thing("picnic_table", -3.6, 2.6, -10.0, "green"),
     Thing("cooler_box", 1.6, -2.2, 60.0, "blue", words={"place": "beside the brown picnic table"}),
-    Thing("rope_swing", 1.2, 4.6, 80.0, "red"),
+    Thing("rope_swing", 0.8, -5.4, 90.0, "red"),
     Thing("birdhouse", -3.4, -3.0, 0.0, "blue"),
     Thing("carved_owl", 4.8, 2.0, 0.0, "brown"),
     Thing("bird_feeder", 4.4, -3.0, 0.0, "thatched"),
@@ -61,7 +61,7 @@ PICNIC = (
 
 POND_SIDE = (
     Thing("canoe", 5.2, 6.0, 35.0, "red"),
-    Thing("kayak", -7.4, 3.4, 80.0, "orange"),
+    Thing("kayak", -3.5, 5.2, 20.0, "orange"),
     Thing("log_bench", 5.8, 1.8, 180.0, "with_back"),
     Thing("deer", -1.2, -6.4, 100.0, "stag", words={"place": "drinking at the pond"}),
     Thing("mossy_rock", -6.2, -2.6, 20.0, "green"),
@@ -69,7 +69,7 @@ POND_SIDE = (
 
 RUIN = (
     Thing("stone_arch", 0.0, 0.0, 10.0, "mossy"),
-    Thing("ruined_wall", -3.2, 3.2, 30.0, "grey"),
+    Thing("ruined_wall", -5.4, 2.6, 30.0, "grey"),
     Thing("standing_stone", 2.0, -5.4, 60.0, "carved"),
     Thing("totem_pole", 4.6, 4.2, -20.0, "red_wings", words={"place": "beside the ruin"}),
     Thing("fox", -2.0, -3.4, 40.0, "red"),
@@ -91,7 +91,7 @@ CROSSROADS = (
 STRAYS = {
     "in the south-eastern wood": (
         Thing("hunting_stand", 7.0, -19.0, 120.0, "brown"),
-        Thing("wild_boar", 12.5, -17.6, 200.0, "dark"),
+        Thing("wild_boar", 13.8, -20.6, 200.0, "dark"),
     ),
     "in the northern wood": (
         Thing("hunting_stand", -16.5, 20.5, -60.0, "camouflage"),
@@ -102,21 +102,21 @@ STRAYS = {
         Thing("mushroom_cluster", 3.6, -9.6, 0.0, "red"),
     ),
     "between the cabin and the ruin": (
-        Thing("wooden_gate", -12.0, 1.4, 60.0, "white"),
-        Thing("fallen_log", -7.8, 1.6, 70.0, "mossy"),
+        Thing("wooden_gate", -13.2, -1.4, 188.0, "white", words={"place": "across the path to the ruin"}),
         Thing("birdhouse", -16.6, 3.2, -10.0, "red"),
     ),
     "between the tower and the picnic place": (
         Thing("boulder", 9.6, 7.4, 40.0, "sandstone"),
-        Thing("deer", 18.6, 8.2, 210.0, "doe"),
+        Thing("deer", 20.4, 10.2, 210.0, "doe"),
         Thing("oak_tree", 5.6, 4.9, 0.0, "russet"),
     ),
+    "between the cabin and the fire tower": (Thing("fallen_log", 1.4, 10.2, 70.0, "mossy"),),
     "east of the pond": (
         Thing("rock_pile", 20.6, -4.0, 0.0, "red"),
         Thing("birch_tree", 21.0, -11.5, 0.0, "golden"),
     ),
     "south of the stream": (
-        Thing("dead_tree", -14.6, -10.6, 0.0, "grey"),
+        Thing("dead_tree", -19.5, -14.5, 0.0, "grey"),
         Thing("bush", 5.4, -14.6, 0.0, "red_berries"),
     ),
 }
