@@ -6,6 +6,7 @@ import subprocess
 import sys
 import textwrap
 
+import numpy as np
 import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
@@ -204,3 +205,10 @@ def test_digest_sees_every_change_and_no_metadata():
     assert store.content_digest(pa.concat_tables([table[:2], table[2:]])) == digest
     changed = table.set_column(5, "euclidean_m", pa.array([4.5, 5.5, 6.5, 7.5, 8.500001]))
     assert store.content_digest(changed) != digest
+
+
+def test_digest_does_not_see_what_lies_under_a_null(tmp_path):
+    masked = pa.array(np.array([1.0, 7.0]), mask=np.array([False, True]))
+    clean = pa.array([1.0, None])
+    assert store.content_digest(pa.table({"a": masked})) == store.content_digest(pa.table({"a": clean}))
+    assert store.content_digest(pa.table({"a": [1.0, None]})) != store.content_digest(pa.table({"a": [None, 1.0]}))

@@ -33,7 +33,7 @@ def run(job: Job, config: BuildScenesConfig) -> Output:
     Returns
     -------
     Output
-        One row of `scenes`; the mesh is written to ``scenes/<scene>/<scene>.glb``.
+        One row of `scenes`; the mesh is written to ``meshes/<scene>.glb``.
 
     Raises
     ------
@@ -42,7 +42,7 @@ def run(job: Job, config: BuildScenesConfig) -> Output:
     """
     catalogue = load_catalogue(job.roots.scene_assets)
     scene = build_scene(job.roots.recipes / f"{job.scene}.toml", catalogue)
-    relative = f"scenes/{job.scene}/{job.scene}.glb"
+    relative = f"meshes/{job.scene}.glb"
     with job.output_file(relative) as path:
         write_glb(scene, path)
         digest = hashlib.sha256(path.read_bytes()).hexdigest()
