@@ -38,9 +38,10 @@ def compose(
     first, rest = facts[:_MOST_IN_ONE], facts[_MOST_IN_ONE:]
     if place and len(first) == _MOST_IN_ONE:
         first, rest = facts[:1], facts[1:]
-    comma = "," if len(place.split()) > _LONG_PLACE else ""
-    rel = " ".join([*([place + comma] if place else []), " and ".join(first)])
     template = _template(noun, look, bool(rest), rng, used)
+    closing = any(mark in template for mark in ("{rel}.", "{rel};", "{rel}:"))
+    comma = "," if closing and len(place.split()) > _LONG_PLACE else ""
+    rel = " ".join([*([place + comma] if place else []), " and ".join(first)])
     fields = {
         "a": noun.a(),
         "bare": noun.bare,

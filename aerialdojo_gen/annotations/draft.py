@@ -39,9 +39,11 @@ class Choice:
     eligible : callable or None
         ``node -> bool``, e.g. whether anchors exist; None lets all in.
     centre_m : tuple of two float or None
-        Middle of the area that objects are taken from; the landmarks' mean where absent.
+        Middle of the core that objects are taken from; the landmarks' mean where absent.
     within_m : float or None
-        Radius of that area; None for the whole scene.
+        Radius of the core; None for the whole scene. How long tasks are hangs on it.
+    core_share : float
+        Share of the objects that come from the core; the others may stand anywhere.
     most_vegetation : int
         Most objects of one category of vegetation.
     most : int
@@ -51,6 +53,7 @@ class Choice:
     eligible: Callable[[str], bool] | None = None
     centre_m: tuple[float, float] | None = None
     within_m: float | None = None
+    core_share: float = 1.0
     most_vegetation: int = 3
     most: int = 8
 
@@ -140,16 +143,22 @@ class _Drafter:
         finder = FactFinder(ambiguity, self._words, self._nouns, {index[m.node]: m.name for m in marks})
         taken: dict[int, str] = {}
         used: dict[str, int] = {}
-        queues = self._queues(ambiguity)
-        while len(taken) < n:
-            before = len(taken)
-            for category, queue in queues.items():
-                if len(taken) < n and not self._full(category, taken):
-                    self._take(queue, ambiguity, finder, taken, used)
-            if len(taken) == before:
-                raise AnnotationError(
-                    f"{self._scene.name}: {n} objects are wanted, {before} can be chosen and told apart"
-                )
+        everywhere = self._queues(ambiguity)
+        core = {c: [i for i in queue if self._in_core(i, ambiguity)] for c, queue in everywhere.items()}
+        rest = {c: [i for i in queue if i not in core[c]] for c, queue in everywhere.items()}
+        in_core = n if self._choice.within_m is None else round(n * self._choice.core_share)
+        for queues, upto in ((core, in_core), (rest, n if in_core < n else in_core)):
+            while len(taken) < upto:
+                before = len(taken)
+                for category, queue in queues.items():
+                    if len(taken) < upto and not self._full(category, taken):
+                        self._take(queue, ambiguity, finder, taken, used)
+                if len(taken) == before:
+                    break
+        if len(taken) < n:
+            raise AnnotationError(
+                f"{self._scene.name}: {n} objects are wanted, {len(taken)} can be chosen and told apart"
+            )
         return tuple(
             Object(
                 id=k,
@@ -183,12 +192,17 @@ class _Drafter:
         middle = instance.centroid
         if not (np.all(middle >= self._scene.bounds[0]) and np.all(middle <= self._scene.bounds[1])):
             return False
-        if choice.within_m is not None:
-            places = ambiguity.geometry.centres[list(ambiguity.landmarks), :2]
-            centre = choice.centre_m if choice.centre_m is not None else places.mean(axis=0)
-            if float(np.hypot(*(middle[:2] - np.asarray(centre)))) > choice.within_m:
-                return False
         return choice.eligible is None or choice.eligible(instance.node)
+
+    def _in_core(self, i: int, ambiguity: Ambiguity) -> bool:
+        if self._choice.within_m is None:
+            return True
+        centre = self._choice.centre_m
+        if centre is None:
+            x, y = ambiguity.geometry.centres[list(ambiguity.landmarks), :2].mean(axis=0)
+            centre = float(x), float(y)
+        away = ambiguity.geometry.centres[i, :2] - np.asarray(centre)
+        return float(np.hypot(*away)) <= self._choice.within_m
 
     def _take(
         self,

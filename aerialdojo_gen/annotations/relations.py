@@ -47,6 +47,7 @@ class SceneGeometry:
         self.centres: Floats = self.boxes.mean(axis=1)
         self._outlines: dict[int, shapely.Geometry] = {}
         self._supports: dict[int, int | None] = {}
+        self._corners: dict[int, tuple[Floats, Floats, Floats, Floats]] = {}
         self._covers: dict[int, frozenset[int]] = {}
 
     @cached_property
@@ -133,16 +134,22 @@ class SceneGeometry:
         return found
 
     def _heights(self, j: int, x: float, y: float) -> Floats:
-        instance = self.scene.instances[j]
-        a, b, c = np.moveaxis(instance.vertices[instance.faces], 1, 0)
-        det = (b[:, 1] - c[:, 1]) * (a[:, 0] - c[:, 0]) + (c[:, 0] - b[:, 0]) * (a[:, 1] - c[:, 1])
-        flat = np.abs(det) > 1e-12
-        a, b, c, det = a[flat], b[flat], c[flat], det[flat]
+        a, b, c, det = self._triangles(j)
         u = ((b[:, 1] - c[:, 1]) * (x - c[:, 0]) + (c[:, 0] - b[:, 0]) * (y - c[:, 1])) / det
         v = ((c[:, 1] - a[:, 1]) * (x - c[:, 0]) + (a[:, 0] - c[:, 0]) * (y - c[:, 1])) / det
         inside = (u >= 0.0) & (v >= 0.0) & (u + v <= 1.0)
         z: Floats = (u * a[:, 2] + v * b[:, 2] + (1.0 - u - v) * c[:, 2])[inside]
         return z
+
+    def _triangles(self, j: int) -> tuple[Floats, Floats, Floats, Floats]:
+        """Corners of the triangles that are not upright, and twice their signed areas from above."""
+        if j not in self._corners:
+            instance = self.scene.instances[j]
+            a, b, c = np.moveaxis(instance.vertices[instance.faces], 1, 0)
+            det = (b[:, 1] - c[:, 1]) * (a[:, 0] - c[:, 0]) + (c[:, 0] - b[:, 0]) * (a[:, 1] - c[:, 1])
+            flat = np.abs(det) > 1e-12
+            self._corners[j] = a[flat], b[flat], c[flat], det[flat]
+        return self._corners[j]
 
     def bearing_rad(self, i: int, j: int) -> float | None:
         """Direction from the nearest point of `j`'s outline to the middle of `i`; None within the outline."""

@@ -15,7 +15,7 @@ FULL = (
     "{A} with {look} that {verb} {rel}.",
     "{Rel} {verb} {a} with {look}.",
     "{Rel} {verb} {a}. You can tell it by {look}.",
-    "The {bare} {verb} {rel}. Its marks are {look}.",
+    "The {bare} {verb} {rel}. You will know it by {look}.",
     "You are looking for {a}. It has {look} and {verb} {rel}.",
     "Find the {bare} {rel}: it has {look}.",
     "It is {a} with {look}, and it {verb} {rel}.",
@@ -48,7 +48,6 @@ MORE = (
     "More exactly, it {verb} {rel}.",
     "You will see it {rel}.",
     "Seen from the air, it is {rel}.",
-    "It also {verb} {rel}.",
 )
 RELATIONS = {
     "beside": ("beside {}", "next to {}", "right beside {}", "right next to {}"),
