@@ -1,0 +1,330 @@
+"""Grammar of layouts: detached and terraced houses, their fences, and things dealt out over spots.
+
+A house is built in a frame of its own: the origin is the middle of its plan, +u looks out of its front door, v runs
+to the left of it.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from shapely.affinity import rotate, translate
+from shapely.geometry import LineString
+from shapely.geometry.base import BaseGeometry
+
+from aerialdojo_gen.scenes.grammar_buildings import pitched_roof
+from aerialdojo_gen.scenes.grammar_scatter import Polyline, Pose
+from aerialdojo_gen.scenes.ground import rectangle
+from aerialdojo_gen.scenes.mesh import Mesh, merge, rotated, rotation, translated
+from aerialdojo_gen.scenes.model import Instance
+from aerialdojo_gen.scenes.shapes import box
+from aerialdojo_gen.scenes.shapes_extruded import prism, sweep
+from aerialdojo_gen.scenes.site import Site
+
+Parts = list[tuple[str, Mesh]]
+
+
+@dataclass(frozen=True)
+class Frame:
+    """A frame on the ground: origin in metres, direction of its u axis in degrees counter-clockwise from +x."""
+
+    x: float
+    y: float
+    yaw_deg: float = 0.0
+
+    def at(self, u: float, v: float) -> tuple[float, float]:
+        """World coordinates of a point, metres."""
+        c, s = float(np.cos(np.radians(self.yaw_deg))), float(np.sin(np.radians(self.yaw_deg)))
+        return self.x + c * u - s * v, self.y + s * u + c * v
+
+    def pose(self, u: float, v: float, yaw_deg: float = 0.0) -> Pose:
+        """World pose of a point that looks along `yaw_deg` from the u axis."""
+        return Pose(*self.at(u, v), self.yaw_deg + yaw_deg)
+
+    def path(self, points: Iterable[tuple[float, float]]) -> list[tuple[float, float]]:
+        """World coordinates of a polyline."""
+        return [self.at(u, v) for u, v in points]
+
+    def area(self, area: BaseGeometry) -> BaseGeometry:
+        """World coordinates of an area."""
+        return translate(rotate(area, self.yaw_deg, origin=(0, 0)), self.x, self.y)
+
+    def parts(self, parts: Parts, z_m: float = 0.0) -> Parts:
+        """World coordinates of meshes whose z starts at `z_m`."""
+        turn = rotation(0.0, 0.0, self.yaw_deg)
+        return [(material, translated(rotated(m, turn), (self.x, self.y, z_m))) for material, m in parts]
+
+
+@dataclass(frozen=True)
+class HouseStyle:
+    """What a house looks like.
+
+    Attributes
+    ----------
+    width_m, depth_m : float
+        Of its plan, across the front and from front to back.
+    storeys, storey_m : int, float
+        Number and height of its storeys.
+    wall, roof, trim, door : str
+        Materials.
+    roof_kind, roof_m : str, float
+        ``"gable"`` or ``"hip"``, and the ridge's height over the eaves.
+    porch_m : float
+        Depth of a roofed porch on posts along the front; 0 for a hood over the door.
+    garage : int
+        -1 or 1: a garage on the right or the left of the front; 0 for none.
+    chimney : bool
+        Whether there is one.
+    """
+
+    width_m: float = 9.0
+    depth_m: float = 8.0
+    storeys: int = 2
+    storey_m: float = 2.8
+    wall: str = "planks:#d8d2c2"
+    roof: str = "shingles"
+    trim: str = "#f2efe6"
+    door: str = "#8a2f2a"
+    roof_kind: str = "gable"
+    roof_m: float = 2.6
+    porch_m: float = 0.0
+    garage: int = 0
+    chimney: bool = True
+
+
+FLOOR_M = 0.4
+_GARAGE_M = (3.6, 6.0, 2.9)
+
+
+def house(site: Site, frame: Frame, style: HouseStyle, attributes: dict[str, str] | None = None) -> Instance:
+    """Put up a house with real windows, a door, steps, a pitched roof, and what its style asks for.
+
+    Parameters
+    ----------
+    site : Site
+        Where; the house takes its ground.
+    frame : Frame
+        Middle of its plan; u looks out of the front.
+    style : HouseStyle
+        Sizes and materials.
+    attributes : dict, optional
+        As in `Site.add`.
+    """
+    d, w, top = style.depth_m / 2, style.width_m / 2, FLOOR_M + style.storeys * style.storey_m
+    parts: Parts = [
+        ("stone", _block(-d - 0.06, -w - 0.06, d + 0.06, w + 0.06, -0.1, FLOOR_M)),
+        (style.wall, _block(-d, -w, d, w, FLOOR_M, top)),
+        *pitched_roof(rectangle(-d, -w, d, w), top, style.roof_m, style.wall, style.roof,
+                      hip=style.roof_kind == "hip", overhang_m=0.45),
+    ]  # fmt: skip
+    parts += _fenestration(style)
+    plan = rectangle(-d, -w, d, w)
+    parts += _porch(style) if style.porch_m else _hood(style)
+    if style.porch_m:
+        plan = plan.union(rectangle(d, -w, d + style.porch_m, w))
+    if style.garage:
+        parts += _garage(style)
+        side = style.garage
+        plan = plan.union(rectangle(d - _GARAGE_M[1], *sorted((side * w, side * (w + _GARAGE_M[0]))), d))
+    if style.chimney:
+        at = (-0.25 * d, 0.55 * w)
+        peak = top + style.roof_m + 0.7
+        parts.append(
+            ("brick:#7f4a3c", _block(at[0] - 0.4, at[1] - 0.45, at[0] + 0.4, at[1] + 0.45, top - 0.2, peak))
+        )
+        parts.append(
+            ("concrete", _block(at[0] - 0.5, at[1] - 0.55, at[0] + 0.5, at[1] + 0.55, peak, peak + 0.15))
+        )
+    base = site.ground_z(frame.x, frame.y)
+    world = frame.parts(parts, base)
+    return site.add(None, "house", world, attributes, footprint=frame.area(plan))
+
+
+def window_parts(width_m: float, height_m: float, trim: str, pane: str = "window") -> Parts:
+    """Make a window in the u = 0 plane that looks along +u, its sill's middle at the origin: frame, pane, bars."""
+    w, h = width_m, height_m
+    frame = translated(box(size=(0.08, w + 0.24, h + 0.24)), (0.03, 0, -0.12))
+    sill = translated(box(size=(0.22, w + 0.36, 0.09)), (0.08, 0, -0.18))
+    bars = [
+        translated(box(size=(0.04, 0.07, h)), (0.1, 0, 0)),
+        translated(box(size=(0.04, w, 0.07)), (0.1, 0, h * 0.55)),
+    ]
+    return [(trim, merge([frame, sill, *bars])), (pane, translated(box(size=(0.06, w, h)), (0.06, 0, 0)))]
+
+
+def _fenestration(style: HouseStyle) -> Parts:
+    d, w = style.depth_m / 2, style.width_m / 2
+    parts: Parts = []
+    for yaw, half, out in ((0.0, w, d), (180.0, w, d), (90.0, d, w), (-90.0, d, w)):
+        # Windows stand symmetrically, whatever the length; the door takes the middle of the front.
+        count = max(int((2 * half - 1.2) // 2.3), 1)
+        if yaw == 0.0 and count % 2 == 0:
+            count -= 1
+        hidden = style.garage and yaw == 90.0 * style.garage
+        for storey in range(style.storeys):
+            for k in range(count):
+                v = (k - (count - 1) / 2) * (2 * half - 1.2) / count
+                if storey == 0 and ((yaw == 0.0 and abs(v) < 0.9) or hidden):
+                    continue
+                z = FLOOR_M + storey * style.storey_m + 0.85
+                opening = window_parts(1.15, 1.35, style.trim)
+                parts += [
+                    (m, rotated(translated(b, (out, v, z)), rotation(0.0, 0.0, yaw))) for m, b in opening
+                ]
+    parts.append((style.trim, _block(d - 0.02, -0.68, d + 0.08, 0.68, FLOOR_M, FLOOR_M + 2.25)))
+    parts.append((style.door, _block(d, -0.5, d + 0.12, 0.5, FLOOR_M, FLOOR_M + 2.1)))
+    parts.append(("brass", _block(d + 0.1, 0.32, d + 0.18, 0.4, FLOOR_M + 1.0, FLOOR_M + 1.08)))
+    return parts
+
+
+def _porch(style: HouseStyle) -> Parts:
+    d, w, p = style.depth_m / 2, style.width_m / 2, style.porch_m
+    head = FLOOR_M + 2.5
+    slope = translated(
+        rotated(prism(size=(style.width_m, p + 0.4, 0.55), section="wedge"), rotation(0, 0, 90)),
+        (d + p / 2 + 0.2, 0, head),
+    )
+    posts = [
+        _block(d + p - 0.2, v - 0.08, d + p - 0.04, v + 0.08, FLOOR_M, head)
+        for v in np.linspace(-w + 0.12, w - 0.12, 4)
+    ]
+    rails = [
+        _block(d + p - 0.16, a, d + p - 0.08, b, FLOOR_M + 0.75, FLOOR_M + 0.85)
+        for a, b in ((-w + 0.2, -w / 3 - 0.05), (w / 3 + 0.05, w - 0.2))
+    ]
+    return [
+        ("boards:#a08a6a", _block(d, -w, d + p, w, 0.0, FLOOR_M)),
+        ("concrete", _block(d + p, -0.9, d + p + 0.4, 0.9, 0.0, FLOOR_M / 2)),
+        (style.roof, slope),
+        (style.trim, merge([*posts, *rails])),
+    ]
+
+
+def _hood(style: HouseStyle) -> Parts:
+    d = style.depth_m / 2
+    hood = rotated(prism(size=(2.0, 1.2, 0.45), section="wedge"), rotation(0, 0, 90))
+    return [
+        ("concrete", _block(d, -0.9, d + 1.1, 0.9, 0.0, FLOOR_M)),
+        ("concrete", _block(d + 1.1, -0.9, d + 1.45, 0.9, 0.0, FLOOR_M / 2)),
+        (style.roof, translated(hood, (d + 0.6, 0, FLOOR_M + 2.4))),
+    ]
+
+
+def _garage(style: HouseStyle) -> Parts:
+    d, w, side = style.depth_m / 2, style.width_m / 2, style.garage
+    wide, deep, high = _GARAGE_M
+    a, b = sorted((side * w, side * (w + wide)))
+    middle = (a + b) / 2
+    ribs = [_block(d, middle - 1.35, d + 0.1, middle + 1.35, 0.1 + k * 0.55, 0.55 + k * 0.55) for k in range(4)]
+    return [
+        (style.wall, _block(d - deep, a, d, b, 0.0, high)),
+        (style.roof, _block(d - deep - 0.25, a - 0.1, d + 0.35, b + 0.1, high, high + 0.22)),
+        (style.trim, merge([_block(d - 0.02, middle - 1.5, d + 0.05, middle + 1.5, 0.0, 2.45), *ribs])),
+    ]
+
+
+def fence(site: Site, path: Polyline, kind: str, colour: str | None = None) -> Instance:
+    """Put up a fence along a path: pickets, close boards, a hedge, a brick wall or railings.
+
+    Parameters
+    ----------
+    site : Site
+        Where; the fence takes its ground.
+    path : sequence of (x, y)
+        World frame, metres.
+    kind : str
+        ``"picket"``, ``"board"``, ``"hedge"``, ``"wall"`` or ``"railing"``.
+    colour : str, optional
+        Material of its body in place of the kind's own.
+    """
+    material, height, thickness = {
+        "picket": ("#f2efe6", 1.0, 0.05),
+        "board": ("boards:#8d6f4c", 1.8, 0.08),
+        "hedge": ("hedge", 1.3, 0.7),
+        "wall": ("brick:#96604c", 1.2, 0.24),
+        "railing": ("iron", 1.2, 0.04),
+    }[kind]
+    body = colour or material
+    z = min(site.ground_z(x, y) for x, y in path)
+    parts: Parts = []
+    if kind in ("picket", "railing"):
+        step, width = (0.28, 0.14) if kind == "picket" else (0.2, 0.035)
+        for level in (0.3, 0.78) if kind == "picket" else (0.15, height - 0.05):
+            parts.append((body, sweep(path=[(x, y, z + level) for x, y in path], section=(0.05, 0.08))))
+        for a, b in pairwise(path):
+            length = float(np.hypot(b[0] - a[0], b[1] - a[1]))
+            yaw = float(np.degrees(np.arctan2(b[1] - a[1], b[0] - a[0])))
+            count = max(round(length / step), 1)
+            bars = [
+                translated(box(size=(width, thickness, height), taper=(0.6, 1.0)), ((k + 0.5) * length / count, 0, 0))
+                for k in range(count)
+            ]
+            parts += Frame(a[0], a[1], yaw).parts([(body, merge(bars))], z + 0.03)
+    else:
+        line = [(x, y, z + height / 2) for x, y in path]
+        parts.append((body, sweep(path=line, section=(thickness, height))))
+        if kind != "hedge":
+            cap = "concrete" if kind == "wall" else body
+            lid = [(x, y, z + height + 0.03) for x, y in path]
+            parts.append((cap, sweep(path=lid, section=(thickness + 0.1, 0.08))))
+        if kind == "board":
+            line_m = LineString(path)
+            posts = [line_m.interpolate(s) for s in np.linspace(0.0, line_m.length, max(int(line_m.length / 2.4), 1) + 1)]
+            parts.append(("wood", merge([_block(p.x - 0.07, p.y - 0.07, p.x + 0.07, p.y + 0.07, z, z + 1.95)
+                                         for p in posts])))  # fmt: skip
+    area = LineString(path).buffer(thickness / 2 + 0.02, cap_style="flat", join_style="mitre")
+    return site.add(None, f"{kind}_fence" if kind != "hedge" else "garden_hedge", parts, footprint=area)
+
+
+def next_variant(site: Site, category: str) -> str | None:
+    """Name the variant of a category that stands least often on the site so far; None where it has none."""
+    names = [v.name for v in site.catalogue[category].variants]
+    used = Counter(i.variant for i in site.instances if i.category == category)
+    return min(names, key=lambda n: (used[n], names.index(n)), default=None)
+
+
+def deal(
+    site: Site, categories: Sequence[str], poses: Sequence[Pose], place: str = "", **options: Any
+) -> list[Instance]:
+    """Set out props, a pose each and the categories in turn, always the variant that is rarest so far.
+
+    Parameters
+    ----------
+    site : Site
+        Where; poses whose ground is taken stay empty, and their category waits for the next one.
+    categories : sequence of str
+        Keys of the catalogue.
+    poses : sequence of Pose
+        Where to; as many props as poses at most.
+    place : str
+        Goes into the props' attributes where it is given, e.g. ``"in the car park"``.
+    **options
+        As in `Site.try_place`.
+    """
+    out: list[Instance] = []
+    for pose in poses:
+        category = categories[len(out) % len(categories)]
+        attributes = {"place": place} if place else None
+        thing = site.try_place(
+            category, *pose, variant=next_variant(site, category), attributes=attributes, **options
+        )
+        if thing is not None:
+            out.append(thing)
+    return out
+
+
+def put(
+    site: Site, category: str, x: float, y: float, yaw_deg: float = 0.0, place: str = "", **options: Any
+) -> Instance:
+    """Place a prop as `Site.place` does, of the variant that is rarest so far unless one is asked for."""
+    options.setdefault("variant", next_variant(site, category))
+    return site.place(category, x, y, yaw_deg, attributes={"place": place} if place else None, **options)
+
+
+def _block(x0: float, y0: float, x1: float, y1: float, z0: float, z1: float) -> Mesh:
+    return translated(box(size=(x1 - x0, y1 - y0, z1 - z0)), ((x0 + x1) / 2, (y0 + y1) / 2, z0))
