@@ -12,11 +12,37 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from aerialdojo_gen.planning.connectivity import MOVE_LENGTHS, MOVES, cell_centre
+from aerialdojo_gen.planning.connectivity import MOVE_LENGTHS, MOVES, OPEN, cell_centre
 from aerialdojo_gen.planning.grid_kernels import GridArrays, segment_free
 
 # The longest move is sqrt(5) cells, and levels are a cell wide: what a level pushes lies in the next three.
 _RING = 4
+# Costs are multiples of this, so that float32 adds them without rounding and equal costs compare equal.
+_QUANTUM_M = 2.0**-12
+
+
+def _canonical() -> NDArray[np.uint32]:
+    """For every move, as bits, the moves that may follow it where nothing is near.
+
+    Moves commute there, so one order of them is enough: knight's moves, then neighbours in the plane, then the
+    vertical. Two moves in the plane that are not next to each other in angle are never part of a shortest path.
+    """
+    after = np.zeros(len(MOVES), np.uint32)
+    flat = np.flatnonzero(MOVES[:, 2] == 0)
+    angles = np.arctan2(MOVES[flat, 1], MOVES[flat, 0])
+    around = flat[np.argsort(angles)]
+    lifts = np.flatnonzero(MOVES[:, 2] != 0)
+    for position, m in enumerate(around):
+        knight = MOVE_LENGTHS[m] > 2
+        beside = [around[position - 1], around[(position + 1) % len(around)]] if knight else []
+        for follower in (m, *beside, *lifts):
+            after[m] |= np.uint32(1 << int(follower))
+    for m in lifts:
+        after[m] = np.uint32(1 << int(m))
+    return after
+
+
+_AFTER = _canonical()
 
 
 @njit(cache=True)
@@ -55,7 +81,7 @@ def seed_goal(
                 x, y, z = cell_centre(i, j, k, grid)
                 d = math.sqrt((x - gx) ** 2 + (y - gy) ** 2 + (z - gz) ** 2)
                 if d <= reach and segment_free(x, y, z, gx, gy, gz, radius, grid, False):
-                    cost[i, j, k] = d
+                    cost[i, j, k] = round(d / _QUANTUM_M) * _QUANTUM_M
                     found[n] = (i * ny + j) * nz + k
                     n += 1
     return found[:n]
@@ -74,7 +100,8 @@ def expand_cost(
     """Dijkstra's algorithm over the grid's passable moves, outwards from seeded cells.
 
     Levels are as wide as the shortest move: whatever stands in the lowest level is final (Dinitz), so that a ring of
-    stacks does in place of a heap.
+    stacks does in place of a heap. In the open only one of the orders of a path's moves is followed (a canonical
+    ordering, as in jump point search); the costs are the same.
 
     Parameters
     ----------
@@ -100,10 +127,10 @@ def expand_cost(
     """
     nx, ny, nz = cost.shape
     flat_cost, flat_moves = cost.ravel(), moves.ravel()
-    lengths = (MOVE_LENGTHS * grid.cell).astype(np.float32)
+    lengths = (np.rint(MOVE_LENGTHS * grid.cell / _QUANTUM_M) * _QUANTUM_M).astype(np.float32)
     steps = (MOVES[:, 0] * (ny * nz) + MOVES[:, 1] * nz + MOVES[:, 2]).astype(np.int32)
     n_moves = steps.shape[0]
-    done = np.zeros(nx * ny * nz, np.bool_)
+    follow = np.empty(nx * ny * nz, np.uint32)
     entries = np.empty((_RING, 1 << 15), np.int32)
     tops = np.zeros(_RING, np.int64)
     inverse = np.float32(1.0 / grid.cell)
@@ -111,6 +138,7 @@ def expand_cost(
         slot = int(flat_cost[c] * inverse) % _RING
         entries[slot, tops[slot]] = c
         tops[slot] += 1
+        follow[c] = ~np.uint32(0)
     waiting = np.arange(starts.shape[0])
     n_waiting = starts.shape[0]
     end = bound
@@ -124,21 +152,27 @@ def expand_cost(
             tops[slot] -= 1
             c = entries[slot, tops[slot]]
             d = flat_cost[c]
-            if done[c]:
-                continue
-            done[c] = True
+            followers = follow[c]
+            if followers == 0:
+                continue  # done already
+            follow[c] = 0
             bits = flat_moves[c]
+            if bits & OPEN:
+                bits &= followers
             for m in range(n_moves):
                 if (bits >> np.uint32(m)) & one:
                     e = c + steps[m]
                     reached = d + lengths[m]
                     if reached < flat_cost[e]:
                         flat_cost[e] = reached
+                        follow[e] = _AFTER[m]
                         to = int(reached * inverse) & (_RING - 1)
                         if tops[to] == entries.shape[1]:
                             entries = _grown(entries)
                         entries[to, tops[to]] = e
                         tops[to] += 1
+                    elif reached == flat_cost[e]:
+                        follow[e] |= _AFTER[m]
         level += 1
         if n_waiting > 0:
             kept = 0
