@@ -27,6 +27,9 @@ dev: .venv/.dev  ## the same with what tests and linters need
 	  $(PYTHON) -c 'import sys; sys.exit(sys.version_info[:2] == (3, 11))' && echo "error: a package could not be installed, see above" >&2 || \
 	  echo "error: a package could not be installed, see above. PyBullet has a wheel for Python 3.11 only and is built from" \
 	       "source on others (C++ compiler and Python headers needed): with Python 3.11, rm -rf .venv and make PYTHON=python3.11" >&2; exit 1; }
+	@echo "compiling the kernels (half a minute, once)"
+	@dir=$$(mktemp -d) && trap 'rm -rf "$$dir"' EXIT && \
+	  $(RUN) plan --pipeline pipelines/smoke.toml --scene U_Courtyard_0 --data "$$dir" --workers 1 --quiet
 	@touch $@
 
 .venv/.dev: .venv/.installed
