@@ -183,7 +183,7 @@ def _geometry(source: Source, scene: Scene, names: Mapping[str, str]) -> Iterabl
             text = f"name, landmark, direction and description are those of objects[{described[same]}]"
             yield source.document.fault(("objects", k, "description"), text)
         described.setdefault(same, k)
-        rivals = ambiguity.rivals(i, entry.description)
+        rivals = ambiguity.rivals(i, entry.description) if entry.description.strip() else []
         if rivals:
             others = ", ".join(scene.instances[j].node for j in rivals[:3]) + ("..." if len(rivals) > 3 else "")
             text = (
