@@ -128,10 +128,10 @@ def _paint(
 ) -> None:
     grass, path, moss = site.material("grass", "grass"), site.material("path", "dirt"), site.material("moss", "moss")
     seed, rng = site.recipe.seed, site.rng_for("moss")
-    for k in range(34):
-        x, y = rng.uniform((-42, -40), (42, 40))
-        cover = moss if k % 2 else site.material("clover", "grass")
-        site.paint(blob(float(x), float(y), float(rng.uniform(2.0, 5.5)), seed + 100 + k, 0.5), cover)
+    for first, cover in ((100, site.material("clover", "grass")), (120, moss)):
+        for k in range(17):
+            x, y = rng.uniform((-42, -40), (42, 40))
+            site.paint(blob(float(x), float(y), float(rng.uniform(2.0, 5.5)), seed + first + k, 0.5), cover)
     for i, (key, radius) in enumerate(_CLEARINGS.items()):
         fringe = blob(_SPOTS[key].x, _SPOTS[key].y, radius * 1.18, seed + 50 + i, 0.3)
         site.paint(fringe, site.material("fringe", "moss"))
