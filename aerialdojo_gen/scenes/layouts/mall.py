@@ -12,7 +12,7 @@ from shapely.ops import unary_union
 
 from aerialdojo_gen.scenes.grammar_streets import arrow, crossing, parking_row, streets
 from aerialdojo_gen.scenes.ground import rectangle
-from aerialdojo_gen.scenes.layouts.urban_mall_furniture import furnish
+from aerialdojo_gen.scenes.layouts.urban_furniture import Furniture, furnish
 from aerialdojo_gen.scenes.layouts.urban_parking import park_cars, parking_deck
 from aerialdojo_gen.scenes.layouts.urban_shops import STOREY_M, anchor_store, shop_names, shop_row, shopping_hall
 from aerialdojo_gen.scenes.layouts.urban_structures import (
@@ -39,12 +39,15 @@ class Parameters(BaseModel):
     Attributes
     ----------
     occupancy : float
-        Share of the parking bays that is taken.
+        Share of the parking bays in front of the mall that is taken.
+    furniture : tuple of Furniture
+        What stands where.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    occupancy: float = Field(default=0.55, ge=0.0, le=1.0)
+    occupancy: float = Field(default=0.4, ge=0.0, le=1.0)
+    furniture: tuple[Furniture, ...] = ()
 
 
 def build(site: Site) -> None:
@@ -57,12 +60,9 @@ def build(site: Site) -> None:
     floors = parking_deck(site, 50.0, 10.0, 82.0, 46.0)
     _restaurant(site)
     _park(site)
-    furnish(site)
-    for z, bays in zip(floors.levels_m, floors.bays, strict=True):
-        place = "on the ground floor of the parking deck" if z == 0.0 else (
-            "on the roof of the parking deck" if z == floors.levels_m[-1] else "on the middle floor of the parking deck"
-        )  # fmt: skip
-        park_cars(site, bays, 0.34, place, z=z or None)
+    furnish(site, parameters.furniture)
+    for z, floor, bays in zip(floors.levels_m, ("ground floor", "middle floor", "roof"), floors.bays, strict=True):
+        park_cars(site, bays, 0.3, f"on the {floor} of the parking deck", z=z or None)
     _car_park(site, parameters.occupancy)
 
 
@@ -82,17 +82,13 @@ def _ground(site: Site) -> None:
     site.paint(rectangle(44, 27, 52, 37), "asphalt")
     site.paint(rectangle(44, -16, 54, -9), "asphalt")
     site.paint(rectangle(36, 50, 40, 60), "concrete:#8f8d88")
-    for x, y, yaw, length in ((42, -12, 0, 6.5), (42, 24, 0, 6.5), (-30, -66, 90, 6.5), (42, -56, 0, 6.5)):
-        crossing(site, x, y, yaw, length)
-    for x, y, yaw in (
-        (40.3, -35, -90),
-        (43.7, -35, 90),
-        (40.3, 8, -90),
-        (43.7, 8, 90),
-        (-20, -67.6, 0),
-        (20, -64.4, 180),
-    ):
-        arrow(site, x, y, yaw)
+    for x, y, yaw in ((42.0, -12.0, 0.0), (42.0, 24.0, 0.0), (-30.0, -66.0, 90.0), (42.0, -56.0, 0.0)):
+        crossing(site, x, y, yaw, 6.5)
+    for y in (-35.0, 8.0):
+        arrow(site, 40.3, y, -90.0)
+        arrow(site, 43.7, y, 90.0)
+    arrow(site, -20.0, -67.6, 0.0)
+    arrow(site, 20.0, -64.4, 180.0)
 
 
 def _hall(site: Site) -> None:
@@ -119,12 +115,11 @@ def _hall(site: Site) -> None:
 def _courtyard(site: Site) -> None:
     floor = site.material("gallery_floor", "boards:#a5855c")
     posts = [
-        *spaced((-30, 16.9), (8, 16.9), 6.33),
+        *((x, 16.9) for x in (-30.0, -23.5, -17.0, -4.0, 2.0, 8.0)),
         *spaced((-32.9, 0.5), (-32.9, 12), 5.5),
         *spaced((10.9, 0.5), (10.9, 12), 5.5),
     ]
     parts = deck(GALLERY, STOREY_M, floor=floor, under="#f0ebdf", posts=posts, post="#f0ebdf")
-    edge = [(-32.55, 2.0), (-32.55, 11.4)]
     for path in (
         [(-32.55, 2.0), (-32.55, 16.55), (-31.2, 16.55)],
         [(-28.8, 16.55), (10.55, 16.55), (10.55, 2.0)],
@@ -132,7 +127,6 @@ def _courtyard(site: Site) -> None:
         [(10.5, -0.95), (14, -0.95)],
     ):
         parts += railing(path, STOREY_M)
-    del edge
     parts += stairs((-30.0, 7.6), 90.0, 2.2, STOREY_M - 0.12, 8.9, z_m=0.12, tread="boards:#a5855c")
     site.add("gallery", "gallery", parts, {"place": "around the courtyard"})
 
@@ -224,8 +218,7 @@ def _restaurant(site: Site) -> None:
 
 def _park(site: Site) -> None:
     path = "gravel:#c2b393"
-    for line in ([(-79, -58), (-79, 58)],):
-        site.paint(rectangle(line[0][0] - 1.2, line[0][1], line[1][0] + 1.2, line[1][1]), path)
+    site.paint(rectangle(-80.2, -58, -77.8, 58), path)
     site.paint(rectangle(-93, -9, -68, -6.6), path)
     site.paint(Disc(-79, 26).buffer(6.0), path)
     site.paint(Disc(-79, -40).buffer(8.5), "paving:#bfae96")
@@ -236,8 +229,5 @@ def _park(site: Site) -> None:
 def _car_park(site: Site, occupancy: float) -> None:
     rows = [(-20.0, 90.0, 33), (-37.0, -90.0, 33), (-38.6, 90.0, 33), (-56.0, -90.0, 33)]
     site.paint(rectangle(-56, -38.6, 31, -37.0), site.material("lawn", "grass"), 0.12)
-    bays = []
-    for y, yaw, count in rows:
-        poses = parking_row(site, -12.5, y, yaw, count)
-        bays += poses
+    bays = [bay for y, yaw, count in rows for bay in parking_row(site, -12.5, y, yaw, count)]
     park_cars(site, bays, occupancy, "in the car park")
