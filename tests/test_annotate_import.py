@@ -83,7 +83,7 @@ def test_a_wrong_file_is_refused_whole_with_every_fault(tmp_path):
     for path, words in (
         ("objects[0].description", "ambiguous: it fits delivery_van_001"),
         ("objects[2].description", "is empty"),
-        ("objects[3].node", "did you mean 'mailbox_000'"),
+        ("objects[3].node", "did you mean 'mailbox_001'"),
     ):
         (line,) = [m for m in message if path in m]
         assert words in line

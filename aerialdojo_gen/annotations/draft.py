@@ -55,7 +55,7 @@ class Choice:
     within_m: float | None = None
     core_share: float = 1.0
     most_vegetation: int = 3
-    most: int = 8
+    most: int = 5
 
 
 def draft_annotations(
@@ -150,7 +150,8 @@ class _Drafter:
         for queues, upto in ((core, in_core), (rest, n if in_core < n else in_core)):
             while len(taken) < upto:
                 before = len(taken)
-                for category, queue in queues.items():
+                # What the core has none of comes first.
+                for category, queue in sorted(queues.items(), key=lambda item: self._many(item[0], taken) > 0):
                     if len(taken) < upto and not self._full(category, taken):
                         self._take(queue, ambiguity, finder, taken, used)
                 if len(taken) == before:
@@ -170,10 +171,12 @@ class _Drafter:
             for k, i in enumerate(sorted(taken))
         )
 
+    def _many(self, category: str, taken: dict[int, str]) -> int:
+        return sum(self._scene.instances[i].category == category for i in taken)
+
     def _full(self, category: str, taken: dict[int, str]) -> bool:
-        many = sum(self._scene.instances[i].category == category for i in taken)
         most = self._choice.most_vegetation if self._kinds.get(category) == "vegetation" else self._choice.most
-        return many >= most
+        return self._many(category, taken) >= most
 
     def _queues(self, ambiguity: Ambiguity) -> dict[str, list[int]]:
         """Instances that may become objects, by category; categories in a random but fixed order."""

@@ -170,7 +170,10 @@ def noun_of(instance: Instance, words: Words) -> Noun:
             before.append(said[1:])
         else:
             after.append(said)
-    return Noun(tuple(before), words.name, _joined(after), words.group)
+    tail = _joined(after)
+    if " with " in words.name and tail.startswith("with "):
+        tail = "and" + tail.removeprefix("with")
+    return Noun(tuple(before), words.name, tail, words.group)
 
 
 def place_of(instance: Instance) -> str:

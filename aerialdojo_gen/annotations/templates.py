@@ -28,7 +28,7 @@ FULL = (
     "{A}. It has {look} and {verb} {rel}.",
     "The {bare} {rel} is the target. It has {look}.",
     "Your target is {a}, {ing} {rel}. It has {look}.",
-    "{A} {verb} {rel}. From the air you notice {look}.",
+    "{A} {verb} {rel}. You will notice {look}.",
     "Go to the {bare} {rel}, the one with {look}.",
     "{Rel}, {a} {verb}; note {look}.",
 )
