@@ -221,6 +221,31 @@ def run(
     _run(stages, config, roots, scene, workers, [stage.name for stage in stages] if force else [], quiet)
 
 
+@app.command("annotate-draft")
+def annotate_draft(
+    scene: Annotated[str, typer.Argument(help="Scene with a recipe, e.g. U_Mall_0.")],
+    landmarks: Annotated[int | None, typer.Option(min=1, help="How many.  (default: the paper's number)")] = None,
+    objects: Annotated[int | None, typer.Option(min=2, help="How many.  (default: the paper's number)")] = None,
+    within: Annotated[float | None, typer.Option(min=1, help="Metres around the landmarks' middle.")] = None,
+    landmark: Annotated[list[str] | None, typer.Option(help="Node that is to be a landmark, repeatable.")] = None,
+    seed: Annotated[int, typer.Option(min=0, help="The same seed gives the same draft.")] = 0,
+    pipeline: PipelineFile = None,
+    force: Annotated[bool, typer.Option("--force", help="Overwrite an existing file.")] = False,
+) -> None:
+    """Draft a scene's annotations, to be checked and owned as sources."""
+    from aerialdojo_gen.annotations.command import draft_scene
+    from aerialdojo_gen.runner import choose_scenes, known_scenes
+
+    config, roots = open_pipeline(pipeline, Path("data"))
+    choose_scenes([scene], known_scenes(roots.recipes))
+    print(
+        draft_scene(
+            scene, config, roots, n_landmarks=landmarks, n_objects=objects, within_m=within,
+            landmarks=tuple(landmark or ()), seed=seed, force=force,
+        )
+    )  # fmt: skip
+
+
 @app.command("gallery")
 def gallery(
     out: Annotated[Path, typer.Option("--out", help="Folder for the pictures.")] = Path("docs/gallery"),
