@@ -94,7 +94,7 @@ def test_a_room_with_a_gap_is_reachable_where_the_body_fits_through(gap, passed)
     y = 0.13
     room = instance(
         "room", box((-4, -4, 3), (4, 4, 3.3)), box((-4, -4, 0), (-3.8, 4, 3)), box((3.8, -4, 0), (4, 4, 3)),
-        box((-4, 3.8, 0), (4, 4, 3)), box((-4, -4, 0), (y - gap / 2, -3.8, 3)), 
+        box((-4, 3.8, 0), (4, 4, 3)), box((-4, -4, 0), (y - gap / 2, -3.8, 3)),
         box((y + gap / 2, -4, 0), (4, -3.8, 3)),
     )  # fmt: skip
     assert ClearanceGrid.build(scene(room)).reachable((0, 1, 1.5)) is passed

@@ -108,7 +108,7 @@ def expand_cost(
     seeds : (n,) int32
         Flat numbers of cells whose `cost` is set.
     starts : (m, 3) float64
-        The expansion ends when all of them are reached, metres.
+        The expansion ends when all of them are reached, metres; with none it does not end before the bound.
     bound : float
         … or when the cost exceeds this, metres.
     slack : float
@@ -202,7 +202,10 @@ def cost_at(x: float, y: float, z: float, grid: GridArrays, cost: NDArray[np.flo
     i = max(0, min(int(max(fx, 0.0)), nx - 2))
     j = max(0, min(int(max(fy, 0.0)), ny - 2))
     k = max(0, min(int(max(fz, 0.0)), nz - 2))
-    fx, fy, fz = fx - i, fy - j, fz - k
+    # Points within half a cell of the border are extrapolated to, others outside are not.
+    fx = min(max(fx - i, -0.5), 1.5)
+    fy = min(max(fy - j, -0.5), 1.5)
+    fz = min(max(fz - k, -0.5), 1.5)
     i1, j1, k1 = min(i + 1, nx - 1), min(j + 1, ny - 1), min(k + 1, nz - 1)
     a, b, c, d = cost[i, j, k], cost[i, j, k1], cost[i, j1, k], cost[i, j1, k1]
     e, f, g, h = cost[i1, j, k], cost[i1, j, k1], cost[i1, j1, k], cost[i1, j1, k1]
