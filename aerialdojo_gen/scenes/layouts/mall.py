@@ -147,7 +147,7 @@ def _courtyard(site: Site) -> None:
     portal.append(("curtain_wall", block(-14.7, 19.7, -6.3, 19.95, 5.3, 11.2)))
     site.add("mall_portal", "portal", portal, {"colour": "orange"}, footprint=rectangle(-16.1, 18.6, -14.7, 20.3))
 
-    for x0, x1, node in ((-62, -58.6, "west_canopy"), (34.6, 38.2, "east_canopy")):
+    for x0, x1, node in ((-60.7, -58.6, "west_canopy"), (34.6, 38.2, "east_canopy")):
         posts = spaced((x0 + 0.3 if x0 < 0 else x1 - 0.3, 0), (x0 + 0.3 if x0 < 0 else x1 - 0.3, 42), 7)
         site.add(
             node, "canopy", canopy(x0, -1.5, x1, 44, 4.9, roof="#f0ebdf", posts=posts), {"place": "along the mall"}
