@@ -141,7 +141,6 @@ def _footbridge(site: Site) -> None:
                  posts=[(x, y) for x in (-18.3, -16.5) for y in (-13.0, 0.0, 13.0)])  # fmt: skip
     for x in (-18.55, -16.25):
         parts += railing([(x, -15.0), (x, 14.0)], _BRIDGE_M, pane="chain_link", frame=rail)
-    parts += stairs((-17.4, -17.2), 90.0, 2.0, 0.001 + 0.3, 0.6)[:0]
     parts += stairs((-8.2, 12.9), 180.0, 1.9, _BRIDGE_M, 8.0, tread="boards:#8f8676", stringer=rail)
     parts += stairs((-26.6, -13.9), 0.0, 1.9, _BRIDGE_M, 8.0, tread="boards:#8f8676", stringer=rail)
     parts += canopy(-19.0, -4.0, -15.8, 6.0, _BRIDGE_M + 2.6, roof="corrugated:#5f7466", post=rail, foot_m=_BRIDGE_M,
