@@ -1,6 +1,9 @@
 """A scene's triangles merged by material: what a renderer draws as one body.
 
 The segmentation mask then tells the shader the material of every pixel.
+
+A software rasteriser visits every pixel of a triangle's bounding box, seen or not. So triangles that no camera can see
+from the front are left out, and long ones are cut up: a ground of slivers otherwise costs the whole picture a sliver.
 """
 
 from __future__ import annotations
@@ -11,6 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerialdojo_gen.scenes.model import Part, Scene
+
+# Edges longer than this are halved, metres.
+_LONGEST_EDGE_M = 10.0
+# Cameras stand within so much of the flight volume, at its sides and above it, metres.
+_AROUND_M = 300.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +59,11 @@ def surfaces(scene: Scene) -> list[Surface]:
     for instance in scene.instances:
         for part in instance.parts:
             by_material.setdefault(part.material, []).append(part)
-    return [_merge(material, by_material[material]) for material in sorted(by_material)]
+    low, high = scene.bounds[0], scene.bounds[1]
+    room = np.stack([low - [_AROUND_M, _AROUND_M, 0.0], high + _AROUND_M])
+    merged = (_merge(material, by_material[material]) for material in sorted(by_material))
+    cut = (_cut(_visible(surface, room)) for surface in merged)
+    return [surface for surface in cut if len(surface.faces)]
 
 
 def _merge(material: str, parts: list[Part]) -> Surface:
@@ -62,3 +74,37 @@ def _merge(material: str, parts: list[Part]) -> Surface:
         np.concatenate([p.uv for p in parts]).astype(np.float64),
         np.concatenate([p.faces.astype(np.int64) + o for p, o in zip(parts, offsets, strict=True)]),
     )
+
+
+def _visible(surface: Surface, room: NDArray[np.float64]) -> Surface:
+    """Drop the triangles that turn their backs on every point of a box, and those without an area."""
+    corners = surface.vertices[surface.faces]
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    # The box's corner farthest along the normal is the one that would see the front.
+    farthest = np.where(normal > 0.0, room[1], room[0])
+    front = np.einsum("ij,ij->i", normal, farthest - corners[:, 0]) > 0.0
+    return Surface(surface.material, surface.vertices, surface.uv, surface.faces[front])
+
+
+def _cut(surface: Surface) -> Surface:
+    """Halve the longest edge of every triangle until none is too long.
+
+    Every edge that is too long is halved in both of its triangles at the same point, so that no gap opens.
+    """
+    vertices, uv, faces = surface.vertices, surface.uv, surface.faces
+    done = []
+    while len(faces):
+        edges = vertices[np.roll(faces, -1, axis=1)] - vertices[faces]
+        length = np.linalg.norm(edges, axis=2)
+        long = length.max(axis=1) > _LONGEST_EDGE_M
+        done.append(faces[~long])
+        faces, longest = faces[long], length[long].argmax(axis=1)
+        rows = np.arange(len(faces))
+        a, b, c = (faces[rows, (longest + k) % 3] for k in range(3))
+        # Both triangles of an edge must round its middle alike: sum the ends in the same order.
+        first, second = np.minimum(a, b), np.maximum(a, b)
+        middle = len(vertices) + rows
+        vertices = np.concatenate([vertices, (vertices[first] + vertices[second]) / 2.0])
+        uv = np.concatenate([uv, (uv[first] + uv[second]) / 2.0])
+        faces = np.concatenate([np.stack([a, middle, c], axis=1), np.stack([middle, b, c], axis=1)])
+    return Surface(surface.material, vertices, uv, np.concatenate([*done, faces]))
