@@ -226,7 +226,12 @@ def annotate_draft(
     scene: Annotated[str, typer.Argument(help="Scene with a recipe, e.g. U_Mall_0.")],
     landmarks: Annotated[int | None, typer.Option(min=1, help="How many.  (default: the paper's number)")] = None,
     objects: Annotated[int | None, typer.Option(min=2, help="How many.  (default: the paper's number)")] = None,
-    within: Annotated[float | None, typer.Option(min=1, help="Metres around the landmarks' middle.")] = None,
+    centre: Annotated[
+        tuple[float, float] | None, typer.Option(help="Middle of the core, x y in metres.  (default: the landmarks')")
+    ] = None,
+    within: Annotated[float | None, typer.Option(min=1, help="Radius of the core, metres.")] = None,
+    core_share: Annotated[float, typer.Option(min=0, max=1, help="Share of the objects that lie in the core.")] = 1.0,
+    plants: Annotated[int, typer.Option(min=0, help="Most objects of one category of vegetation.")] = 3,
     landmark: Annotated[list[str] | None, typer.Option(help="Node that is to be a landmark, repeatable.")] = None,
     seed: Annotated[int, typer.Option(min=0, help="The same seed gives the same draft.")] = 0,
     pipeline: PipelineFile = None,
@@ -234,16 +239,17 @@ def annotate_draft(
 ) -> None:
     """Draft a scene's annotations, to be checked and owned as sources."""
     from aerialdojo_gen.annotations.command import draft_scene
+    from aerialdojo_gen.annotations.draft import Choice
     from aerialdojo_gen.runner import choose_scenes, known_scenes
 
     config, roots = open_pipeline(pipeline, Path("data"))
     choose_scenes([scene], known_scenes(roots.recipes))
-    print(
-        draft_scene(
-            scene, config, roots, n_landmarks=landmarks, n_objects=objects, within_m=within,
-            landmarks=tuple(landmark or ()), seed=seed, force=force,
-        )
+    choice = Choice(centre_m=centre, within_m=within, core_share=core_share, most_vegetation=plants)
+    path = draft_scene(
+        scene, config, roots, n_landmarks=landmarks, n_objects=objects, choice=choice,
+        landmarks=tuple(landmark or ()), seed=seed, force=force,
     )  # fmt: skip
+    print(path)
 
 
 @app.command("gallery")

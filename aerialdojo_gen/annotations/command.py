@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -25,7 +26,7 @@ def draft_scene(
     *,
     n_landmarks: int | None = None,
     n_objects: int | None = None,
-    within_m: float | None = None,
+    choice: Choice | None = None,
     landmarks: tuple[str, ...] = (),
     seed: int = 0,
     force: bool = False,
@@ -40,8 +41,8 @@ def draft_scene(
         Configuration and folders.
     n_landmarks, n_objects : int, optional
         How many of each; the paper's numbers for the scene where absent.
-    within_m : float, optional
-        Take objects from this far around the middle of the landmarks, metres; from the whole scene where absent.
+    choice : Choice, optional
+        Where objects are taken from and how many of a kind; its `eligible` is set here.
     landmarks : tuple of str
         Nodes that are to be landmarks; the rest is chosen among the catalogue's landmarks.
     seed : int
@@ -70,7 +71,7 @@ def draft_scene(
         raise UsageError(f"the paper has no scene {name}: give --landmarks and --objects")
     catalogue = load_catalogue(roots.scene_assets)
     scene = build_scene(roots.recipes / f"{name}.toml", catalogue)
-    choice = Choice(eligible=reachable_nodes(scene, pipeline, roots), within_m=within_m)
+    choice = replace(choice or Choice(), eligible=reachable_nodes(scene, pipeline, roots))
     annotations = draft_annotations(scene, catalogue, wanted[0], wanted[1], seed, choice, landmarks)
     path.parent.mkdir(parents=True, exist_ok=True)
     write_annotations(annotations, path)
