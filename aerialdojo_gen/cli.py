@@ -144,7 +144,12 @@ def _run(
     reporter = Reporter(quiet=quiet)
     scenes = runner.choose_scenes(scene or config.scenes, runner.known_scenes(roots.recipes))
     workers = workers or default_workers()
-    runner.run(stages, scenes, config, roots, workers=workers, force=force, reporter=reporter)
+    try:
+        runner.run(stages, scenes, config, roots, workers=workers, force=force, reporter=reporter)
+    except KeyboardInterrupt:
+        # Said here because Typer turns Ctrl-C into a silent exit.
+        print("interrupted: finished shards are kept, the same command goes on from here", file=sys.stderr)
+        raise SystemExit(130) from None
     if any(stage.name == "split" for stage in stages):
         from aerialdojo_gen.release.card import write_card
         from aerialdojo_gen.store import prune_release
@@ -279,9 +284,6 @@ def main() -> None:
     except AerialDojoError as error:
         print(f"error: {error}", file=sys.stderr)
         raise SystemExit(error.exit_code) from None
-    except KeyboardInterrupt:
-        print("interrupted: finished shards are kept, the same command goes on from here", file=sys.stderr)
-        raise SystemExit(130) from None
 
 
 if __name__ == "__main__":
