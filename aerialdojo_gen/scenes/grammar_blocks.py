@@ -80,6 +80,8 @@ class HouseStyle:
         -1 or 1: a garage on the right or the left of the front; 0 for none.
     chimney : bool
         Whether there is one.
+    overhang_m : float
+        How far the eaves reach out; 0 where houses stand wall to wall.
     """
 
     width_m: float = 9.0
@@ -95,6 +97,7 @@ class HouseStyle:
     porch_m: float = 0.0
     garage: int = 0
     chimney: bool = True
+    overhang_m: float = 0.45
 
 
 FLOOR_M = 0.4
@@ -120,7 +123,7 @@ def house(site: Site, frame: Frame, style: HouseStyle, attributes: dict[str, str
         ("stone", _block(-d - 0.06, -w - 0.06, d + 0.06, w + 0.06, -0.1, FLOOR_M)),
         (style.wall, _block(-d, -w, d, w, FLOOR_M, top)),
         *pitched_roof(rectangle(-d, -w, d, w), top, style.roof_m, style.wall, style.roof,
-                      hip=style.roof_kind == "hip", overhang_m=0.45),
+                      hip=style.roof_kind == "hip", overhang_m=style.overhang_m),
     ]  # fmt: skip
     parts += _fenestration(style)
     plan = rectangle(-d, -w, d, w)
