@@ -133,16 +133,13 @@ def house(site: Site, frame: Frame, style: HouseStyle, attributes: dict[str, str
     if style.garage:
         parts += _garage(style)
         side = style.garage
-        plan = plan.union(rectangle(d - _GARAGE_M[1], *sorted((side * w, side * (w + _GARAGE_M[0]))), d))
+        low, high = sorted((side * w, side * (w + _GARAGE_M[0])))
+        plan = plan.union(rectangle(d - _GARAGE_M[1], low, d, high))
     if style.chimney:
         at = (-0.25 * d, 0.55 * w)
         peak = top + style.roof_m + 0.7
-        parts.append(
-            ("brick:#7f4a3c", _block(at[0] - 0.4, at[1] - 0.45, at[0] + 0.4, at[1] + 0.45, top - 0.2, peak))
-        )
-        parts.append(
-            ("concrete", _block(at[0] - 0.5, at[1] - 0.55, at[0] + 0.5, at[1] + 0.55, peak, peak + 0.15))
-        )
+        parts.append(("brick:#7f4a3c", _block(at[0] - 0.4, at[1] - 0.45, at[0] + 0.4, at[1] + 0.45, top - 0.2, peak)))
+        parts.append(("concrete", _block(at[0] - 0.5, at[1] - 0.55, at[0] + 0.5, at[1] + 0.55, peak, peak + 0.15)))
     base = site.ground_z(frame.x, frame.y)
     world = frame.parts(parts, base)
     return site.add(None, "house", world, attributes, footprint=frame.area(plan))
@@ -176,9 +173,7 @@ def _fenestration(style: HouseStyle) -> Parts:
                     continue
                 z = FLOOR_M + storey * style.storey_m + 0.85
                 opening = window_parts(1.15, 1.35, style.trim)
-                parts += [
-                    (m, rotated(translated(b, (out, v, z)), rotation(0.0, 0.0, yaw))) for m, b in opening
-                ]
+                parts += [(m, rotated(translated(b, (out, v, z)), rotation(0.0, 0.0, yaw))) for m, b in opening]
     parts.append((style.trim, _block(d - 0.02, -0.68, d + 0.08, 0.68, FLOOR_M, FLOOR_M + 2.25)))
     parts.append((style.door, _block(d, -0.5, d + 0.12, 0.5, FLOOR_M, FLOOR_M + 2.1)))
     parts.append(("brass", _block(d + 0.1, 0.32, d + 0.18, 0.4, FLOOR_M + 1.0, FLOOR_M + 1.08)))
@@ -277,7 +272,9 @@ def fence(site: Site, path: Polyline, kind: str, colour: str | None = None) -> I
             parts.append((cap, sweep(path=lid, section=(thickness + 0.1, 0.08))))
         if kind == "board":
             line_m = LineString(path)
-            posts = [line_m.interpolate(s) for s in np.linspace(0.0, line_m.length, max(int(line_m.length / 2.4), 1) + 1)]
+            posts = [
+                line_m.interpolate(s) for s in np.linspace(0.0, line_m.length, max(int(line_m.length / 2.4), 1) + 1)
+            ]
             parts.append(("wood", merge([_block(p.x - 0.07, p.y - 0.07, p.x + 0.07, p.y + 0.07, z, z + 1.95)
                                          for p in posts])))  # fmt: skip
     area = LineString(path).buffer(thickness / 2 + 0.02, cap_style="flat", join_style="mitre")

@@ -88,7 +88,10 @@ def _houses(site: Site) -> dict[str, float]:
     roofs["bridge"] = passage_house(
         site, (9.0, -1.68, 26.5, 2.28), (8.9, -1.7, 26.6, 2.3), 4.2, 1, f"{_BRICK}:#8f4a3c", "brick:#7a4438", tar
     )
-    pipes = [pipe(x, y, 0.0, 9.0) for x, y in ((-37, 3.1), (-10.5, 14.8), (1.7, 3.1), (-17.9, -20), (7.9, -3.1), (2.1, 20), (7.9, 10))]
+    pipes = [
+        pipe(x, y, 0.0, 9.0)
+        for x, y in ((-37, 3.1), (-10.5, 14.8), (1.7, 3.1), (-17.9, -20), (7.9, -3.1), (2.1, 20), (7.9, 10))
+    ]
     site.add("downpipes", "pipes", [("copper", merge(pipes))])
     return roofs
 
@@ -100,19 +103,26 @@ def _on_walls(site: Site) -> None:
     for x, y, yaw, storey, thing in (
         (-3.0, -3.2, 90.0, 1, "flower_tub"), (3.0, -3.2, 90.0, 2, "camp_chair"), (8.0, 10.5, 180.0, 1, "bicycle"),
         (8.0, 6.0, 180.0, 2, "planter"), (-24.0, 10.0, 0.0, 1, "topiary"), (-24.0, 6.0, 0.0, 2, "rocking_chair"),
-        (-18.0, -14.0, 0.0, 2, "flower_tub"), (18.0, 17.0, 90.0, 1, "parasol"), (-6.0, 3.2, -90.0, 2, "cooler_box"),
+        (-18.0, -14.0, 0.0, 2, "flower_tub"), (-6.0, 3.2, -90.0, 2, "cooler_box"),
     ):  # fmt: skip
         z = storey * _STOREY_M
-        wide = 3.4 if thing in ("parasol", "planter") else 3.0
-        rail = balcony(site, x, y, yaw, z, width_m=wide, depth_m=1.5 if thing != "parasol" else 3.0)
+        wide = 3.4 if thing == "planter" else 3.0
+        rail = balcony(site, x, y, yaw, z, width_m=wide, depth_m=1.5)
         cx, cy = rail.centroid[:2]
         along = yaw + 90.0 if thing == "bicycle" else yaw
         put(site, thing, float(cx), float(cy), along, "on a balcony above the alley", z=z, solid=False)
-    for x, y, yaw, variant in ((-33.0, 3.2, -90.0, "coffee"), (-2.5, 3.2, -90.0, "books"), (-6.0, -3.2, 90.0, "games"),
-                               (27.5, 10.0, 0.0, "bakery"), (27.5, -8.0, 0.0, "phones"), (18.0, 17.0, 90.0, "flowers")):  # fmt: skip
+    for x, y, yaw, variant in ((-33.0, 3.2, -90.0, "coffee"), (-2.5, 3.2, -90.0, "books"),
+        (-6.0, -3.2, 90.0, "games"),
+                               (27.5, 10.0, 0.0, "bakery"), (27.5, -8.0, 0.0, "phones"),
+                               (18.0, 17.0, 90.0, "flowers")):  # fmt: skip
         place = "in the alley" if x < 10 else "on the street"
         site.place("storefront", x, y, yaw, variant=variant, attributes={"place": place})
-    for x, y, yaw, z in ((-27.0, 3.2, -90.0, 3.4), (-9.2, -3.2, 90.0, 3.6), (8.0, 13.6, 180.0, 3.3), (2.0, 9.0, 0.0, 3.4)):
+    for x, y, yaw, z in (
+        (-27.0, 3.2, -90.0, 3.4),
+        (-9.2, -3.2, 90.0, 3.6),
+        (8.0, 13.6, 180.0, 3.3),
+        (2.0, 9.0, 0.0, 3.4),
+    ):
         put(site, "shop_sign", x, y, yaw, "over the alley", z=z)
     for x, y, yaw in ((-20.5, -3.2, 90.0), (8.0, 3.8, 180.0), (-9.5, 8.0, 180.0)):
         put(site, "wall_banner", x, y, yaw, "on a wall of the alley", z=4.2)
@@ -125,8 +135,10 @@ def _on_walls(site: Site) -> None:
 
 
 def _washing(site: Site, count: int) -> None:
-    lines = (((-22.0, 3.15), (-22.5, -3.15), 8.2), ((2.05, 12.0), (7.95, 12.4), 7.4), ((-17.95, -12.0), (-12.55, -11.6), 6.8),
-             ((-6.0, 3.15), (-5.4, -3.15), 7.6), ((2.05, 24.0), (7.0, 28.0), 8.6), ((-17.95, -22.0), (-12.55, -22.4), 7.6))  # fmt: skip
+    lines = (((-22.0, 3.15), (-22.5, -3.15), 8.2), ((2.05, 12.0), (7.95, 12.4), 7.4), ((-17.95, -12.0),
+        (-12.55, -11.6), 6.8),
+             ((-6.0, 3.15), (-5.4, -3.15), 7.6), ((2.05, 24.0), (7.0, 28.0), 8.6), ((-17.95, -22.0),
+             (-12.55, -22.4), 7.6))  # fmt: skip
     for a, b, z in lines[:count]:
         washing_line(site, a, b, z)
 
@@ -134,13 +146,25 @@ def _washing(site: Site, count: int) -> None:
 def _on_roofs(site: Site, roofs: dict[str, float]) -> None:
     for category, x, y, house in (
         ("water_tank", -30.0, 24.0, "north-west"), ("satellite_dish", -16.0, 20.0, "north-west"),
-        ("skylight", -32.0, 8.5, "west"), ("vent_stack", -26.5, 12.5, "west"), ("air_conditioner", -4.0, 24.0, "middle"),
-        ("parasol", -4.0, 10.0, "middle"), ("camp_chair", -6.4, 12.6, "middle"), ("solar_panels", -28.0, -18.0, "south-west"),
-        ("water_tank", -22.5, -8.5, "south-west"), ("beehive", -4.0, -20.0, "south"), ("telescope", 3.0, -12.0, "south"),
-        ("air_conditioner", -6.0, -9.0, "south"), ("skylight", 18.0, 9.0, "east"), ("satellite_dish", 12.0, 13.5, "east"),
+        ("skylight", -32.0, 8.5, "west"), ("vent_stack", -26.5, 12.5, "west"),
+        ("air_conditioner", -4.0, 24.0, "middle"),
+        ("parasol", -4.0, 10.0, "middle"), ("camp_chair", -6.4, 12.6, "middle"),
+        ("solar_panels", -28.0, -18.0, "south-west"),
+        ("water_tank", -22.5, -8.5, "south-west"), ("beehive", -4.0, -20.0, "south"),
+        ("telescope", 3.0, -12.0, "south"), ("clothes_line", 2.0, -22.0, "south"),
+        ("air_conditioner", -6.0, -9.0, "south"), ("skylight", 18.0, 9.0, "east"),
+        ("satellite_dish", 12.0, 13.5, "east"),
         ("vent_stack", 12.0, -11.0, "south-east"), ("billboard", 22.0, -8.0, "south-east"),
     ):  # fmt: skip
-        put(site, category, x, y, 30.0 if category != "billboard" else 0.0, "on a roof above the alley", z=roofs[house])
+        put(
+            site,
+            category,
+            x,
+            y,
+            30.0 if category != "billboard" else 0.0,
+            "on a roof above the alley",
+            z=roofs[house],
+        )
 
 
 def _landmarks(site: Site) -> None:
@@ -153,13 +177,16 @@ def _landmarks(site: Site) -> None:
 
 def _alley_things(site: Site) -> None:
     things = (
-        ("dumpster", -12.0, 2.2, -90), ("cardboard_boxes", -14.6, 2.3, 20), ("bicycle", -23.0, -2.5, 5),
+        ("dumpster", -12.0, 2.2, -90), ("cardboard_boxes", -14.6, 2.3, 20), ("gas_cylinder_cage", -27.0, -2.4, 90),
+        ("crate_stack", -1.0, 2.2, 0), ("bicycle", -23.0, -2.5, 5),
         ("fuel_drum", -18.4, 2.4, 0), ("litter_bin", -36.2, -2.4, 90), ("a_board", -36.6, 2.0, -90),
         ("newspaper_box", -29.0, 2.6, -90), ("vending_machine", -8.2, 2.6, -90), ("scooter", 0.2, -2.4, 170),
-        ("pallet_stack", 7.1, 2.0, 10), ("lantern", 2.9, -2.4, 90), ("cafe_table", 5.8, 7.8, 0), ("fox", 4.6, 15.6, 70),
+        ("pallet_stack", 7.1, 2.0, 10), ("lantern", 2.9, -2.4, 90), ("cafe_table", 5.8, 7.8, 0),
+        ("fox", 4.6, 15.6, 70),
         ("shopping_cart", 3.2, 25.6, 100), ("traffic_cone", 6.8, 22.6, 0), ("roll_cage", 7.2, 27.8, 90),
         ("skip_container", -15.3, -25.4, 90), ("ladder_stand", -17.2, -17.5, -90), ("sawhorse", -13.5, -15.0, 60),
-        ("wheelbarrow", -14.0, -9.0, -70), ("litter_bin", -17.3, -5.4, 0), ("dumpster", -13.5, -6.0, 180),
+        ("wheelbarrow", -14.0, -9.0, -70), ("wheelie_bin", -17.2, -6.4, 0), ("oil_drums", -13.4, -20.0, 0),
+        ("dumpster", -13.5, -6.0, 180),
         ("phone_booth", 10.6, -0.9, 90), ("recycling_bin", 16.0, 1.5, -90), ("motorcycle", 21.6, 0.4, 8),
         ("basketball_hoop", -10.6, 9.6, 180), ("bench", -15.4, 6.4, 90), ("bicycle_rack", -12.0, 13.6, -90),
         ("market_stall", -21.0, 5.4, 0),
@@ -173,7 +200,17 @@ def _alley_things(site: Site) -> None:
 
 
 def _street_things(site: Site) -> None:
-    square = ["parasol", "cafe_table", "bench", "planter", "kiosk", "flower_tub", "balloon_stand", "urban_tree", "urban_tree"]
+    square = [
+        "parasol",
+        "cafe_table",
+        "bench",
+        "planter",
+        "kiosk",
+        "flower_tub",
+        "balloon_stand",
+        "urban_tree",
+        "urban_tree",
+    ]
     spots = [(11.0, 20.0, 0), (14.2, 19.4, 0), (15.0, 26.8, -30), (11.0, 27.6, 90), (25.2, 19.6, 90), (24.8, 27.6, 0),
              (16.0, 22.6, 0), (10.0, 24.0, 0), (26.0, 24.0, 0)]  # fmt: skip
     deal(site, square, [Pose(float(x), float(y), float(a)) for x, y, a in spots], "on the little square")
@@ -181,7 +218,8 @@ def _street_things(site: Site) -> None:
               "advertising_column", "street_lamp"]  # fmt: skip
     ys = [-26.0, -12.5, -4.5, 26.0, -18.0, 13.4, 3.2, 21.5, 16.0]
     deal(site, street, [Pose(29.0, y, 0.0) for y in ys], "on the street")
-    deal(site, ["delivery_van", "sedan", "motorcycle"], [Pose(31.6, -8.0, -90.0), Pose(34.4, 18.0, 90.0), Pose(34.6, -20.0, 90.0)],
+    deal(site, ["delivery_van", "sedan", "motorcycle"], [Pose(31.6, -8.0, -90.0), Pose(34.4, 18.0, 90.0),
+        Pose(34.6, -20.0, 90.0)],
          "in the street")  # fmt: skip
     south = ["food_truck", "bench", "picnic_table", "bicycle", "urban_tree", "urban_tree", "ice_cream_cart"]
     spots2 = [(12.5, -19.5, -90), (26.6, -18.4, 0), (13.6, -26.6, 20), (17.0, -17.0, 10), (26.0, -28.0, 0),

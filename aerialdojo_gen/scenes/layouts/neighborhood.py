@@ -9,7 +9,7 @@ from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from aerialdojo_gen.scenes.grammar_blocks import Frame, HouseStyle, deal, fence, put
+from aerialdojo_gen.scenes.grammar_blocks import Frame, HouseStyle, deal, put
 from aerialdojo_gen.scenes.grammar_scatter import Pose, smooth_path
 from aerialdojo_gen.scenes.grammar_streets import crossing, streets
 from aerialdojo_gen.scenes.ground import disc, rectangle
@@ -68,17 +68,19 @@ def _turning_circle(site: Site, tree_every_m: float) -> None:
     for lot in lots:
         settle(site, lot)
     gardens = (
-        ["trampoline", "picnic_table", "birdhouse", "wheelbarrow", "camp_chair"],
-        ["swing_set", "hammock", "parasol", "water_barrel", "bird_feeder"],
-        ["playground_slide", "dome_tent", "beehive", "camp_chair", "spring_rider"],
-        ["gazebo", "telescope", "topiary", "wind_chime", "flower_tub"],
-        ["woodshed", "axe_block", "sawhorse", "log_pile", "wheelbarrow"],
-        ["trampoline", "cafe_table", "water_barrel", "rope_swing", "kayak"],
-        ["tent", "canoe", "cooler_box", "campfire", "picnic_table"],
+        ["trampoline", "garden_swing", "barbecue", "lawn_mower", "birdhouse", "clothes_line"],
+        ["swing_set", "hammock", "dog_house", "parasol", "water_butt", "bird_bath"],
+        ["playground_slide", "sandbox", "seesaw", "garden_gnome", "camp_chair"],
+        ["pergola", "garden_gnome", "wind_chime", "telescope", "bird_feeder"],
+        ["woodshed", "axe_block", "garden_shed", "compost_heap", "wheelbarrow"],
+        ["above_ground_pool", "barbecue", "clothes_line", "rope_swing", "kayak"],
+        ["dome_tent", "rabbit_hutch", "greenhouse", "campfire", "canoe", "picnic_table"],
     )
-    fronts = (["birdhouse", "mailbox", "flower_tub"], ["bird_feeder", "mailbox", "bicycle"], ["topiary", "mailbox"],
-              ["planter", "mailbox", "bench"], ["weather_station", "mailbox"], ["topiary", "mailbox", "scooter"],
-              ["flagpole", "mailbox", "mountain_bike"])  # fmt: skip
+    fronts = (["bird_bath", "letterbox_post", "flower_tub"], ["garden_gnome", "letterbox_post",
+        "bicycle"], ["topiary", "letterbox_post"],
+              ["planter", "letterbox_post", "bench"], ["weather_station", "letterbox_post"], ["topiary",
+              "wheelie_bin", "scooter"],
+              ["flagpole", "wheelie_bin", "mountain_bike"])  # fmt: skip
     cars = ("sedan", "pickup_truck", "suv", "hatchback", "delivery_van", "golf_cart", "sedan")
     for k, lot in enumerate(lots):
         enclose(site, lot, "picket" if k % 2 == 0 else "hedge", "board")
@@ -89,14 +91,16 @@ def _turning_circle(site: Site, tree_every_m: float) -> None:
         if lot.style.garage:
             in_drive(site, lot, cars[k])
             on_garage(site, lot, ("solar_panels", "satellite_dish", "air_conditioner")[k % 3])
-    put(site, "water_tower", 31.0, 29.5)
+    put(site, "water_tower", 33.0, 32.0)
+    put(site, "treehouse", -34.5, 32.0, -45.0)
     put(site, "oak_tree", 0.0, 11.0)
     kerb = ["fire_hydrant", "street_lamp", "litter_bin", "recycling_bin", "street_lamp", "dumpster", "parking_meter"]
     spots = [(-4.2, -21.0, 0.0), (4.2, -9.5, 180.0), (-4.2, -5.0, 0.0), (9.4, 4.0, 140.0), (-9.2, 15.5, -30.0),
              (-5.6, -25.8, 90.0), (4.3, -23.0, 180.0)]  # fmt: skip
     deal(site, kerb, [Pose(*s) for s in spots], "at the kerb")
     deal(site, ["ice_cream_cart", "motorcycle", "basketball_hoop"],
-         [Pose(4.6, 15.6, -120.0), Pose(-6.4, 8.2, 60.0), Pose(-2.4, -13.0, -90.0)], "in the turning circle")  # fmt: skip
+         [Pose(4.6, 15.6, -120.0), Pose(-6.4, 8.2, 60.0),
+         Pose(-2.4, -13.0, -90.0)], "in the turning circle")  # fmt: skip
     stop = ["bus_shelter", "stop_sign", "newspaper_box", "phone_booth", "direction_sign"]
     deal(site, stop, [Pose(x, -27.3, -90.0) for x in (14.0, 5.4, 18.6, 21.0, -8.0)], "along the main road")
     put(site, "city_bus", 16.0, -30.0, 180.0, "at the bus stop")
@@ -110,8 +114,11 @@ def _suburban_lots() -> list[Lot]:
     clap, tile = "planks", "shingles"
     yellow = style(width_m=9.4, wall=f"{clap}:#e0c678", roof=f"{tile}:#6b5a50", porch_m=2.2, garage=1)
     blue = style(width_m=8.8, wall=f"{clap}:#7f9fb8", roof=f"{tile}:#4f565e", door="#d9a62e", garage=-1)
-    white = style(width_m=9.0, depth_m=7.6, wall=f"{clap}:#ece8dc", roof=f"{tile}:#7a4038", porch_m=2.0, door="#2f6f5a")
-    green = style(width_m=11, depth_m=8.4, wall=f"{clap}:#8fa383", roof=f"{tile}:#5a5550", roof_kind="hip", roof_m=2.9,
+    white = style(
+        width_m=9.0, depth_m=7.6, wall=f"{clap}:#ece8dc", roof=f"{tile}:#7a4038", porch_m=2.0, door="#2f6f5a"
+    )
+    green = style(width_m=11, depth_m=8.4, wall=f"{clap}:#8fa383", roof=f"{tile}:#5a5550", roof_kind="hip",
+        roof_m=2.9,
                   porch_m=2.4)  # fmt: skip
     brick = style(width_m=9.0, wall="brick:#a85f48", roof=f"{tile}:#57504a", roof_m=3.2, door="#26364f")
     grey = style(width_m=8.8, wall=f"{clap}:#a5a8a6", roof=f"{tile}:#3f4448", door="#b8452e", porch_m=2.0, garage=1)
@@ -131,23 +138,26 @@ def _suburban_lots() -> list[Lot]:
 def _green(site: Site, tree_every_m: float) -> None:
     site.set_ground(material=site.material("lawn", "grass"))
     streets(site, [[(-44, -5), (44, -5)], [(1, -5), (1, 37)]], lane_m=2.75, pavement_m=1.7,
-            surface=site.material("street", "asphalt:#66625e"), pavement=site.material("pavement", "cobbles"))  # fmt: skip
+            surface=site.material("street", "asphalt:#66625e"), pavement=site.material("pavement",
+                "cobbles"))  # fmt: skip
     crossing(site, -8, -5, 90, 5.4, 2.4)
     crossing(site, 1, 4, 0, 5.4, 2.4)
     lots = _village_lots()
     for lot in lots:
         settle(site, lot, drive="cobbles", path="paving:#b89a80")
     gardens = (
-        ["woodshed", "flower_tub", "wheelbarrow", "bird_feeder", "parasol", "rocking_chair"],
-        ["trampoline", "water_barrel", "beehive", "beehive", "topiary", "bench"],
-        ["swing_set", "cafe_table", "birdhouse", "hammock", "bicycle", "planter"],
-        ["gazebo", "camp_chair", "telescope", "wind_chime", "flower_tub", "stone_well"],
-        ["playground_slide", "picnic_table", "weather_station", "spring_rider", "sawhorse", "parasol"],
-        ["dome_tent", "cooler_box", "hammock", "carved_owl", "planter", "log_bench"],
-        ["picnic_set", "totem_pole", "bird_feeder", "water_barrel", "mountain_bike", "rocking_chair"],
+        ["garden_shed", "flower_tub", "lawn_mower", "clothes_line", "parasol", "garden_gnome"],
+        ["trampoline", "water_butt", "beehive", "rabbit_hutch", "bird_bath", "barbecue"],
+        ["swing_set", "cafe_table", "dog_house", "hammock", "compost_heap", "sandbox"],
+        ["pergola", "camp_chair", "telescope", "wind_chime", "garden_gnome", "seesaw"],
+        ["playground_slide", "picnic_table", "greenhouse", "dog_house", "barbecue", "clothes_line"],
+        ["garden_swing", "water_butt", "bird_feeder", "carved_owl", "lawn_mower", "compost_heap"],
+        ["bird_bath"],
     )
-    fronts = (["flower_tub", "mailbox", "bench"], ["topiary", "mailbox"], ["planter", "mailbox", "bicycle"],
-              ["lantern_post", "mailbox"], ["flower_tub", "bird_feeder", "scooter"], ["topiary", "birdhouse"],
+    fronts = (["flower_tub", "letterbox_post", "bench"], ["topiary", "letterbox_post"], ["planter", "mailbox",
+        "bicycle"],
+              ["lantern_post", "wheelie_bin"], ["flower_tub", "wheelie_bin", "scooter"], ["topiary",
+              "letterbox_post"],
               ["planter", "lantern_post", "bicycle"])  # fmt: skip
     cars = ("hatchback", "sedan", "pickup_truck", "hatchback", "suv", "delivery_van", "sedan")
     for k, lot in enumerate(lots):
@@ -174,7 +184,8 @@ def _green(site: Site, tree_every_m: float) -> None:
 
 
 def _village_green(site: Site) -> None:
-    for path in ([(7, 2), (12, 9), (20.5, 13.5)], [(36.5, 3), (28, 9), (20.5, 13.5)], [(20.5, 13.5), (18, 22), (9, 29)],
+    for path in ([(7, 2), (12, 9), (20.5, 13.5)], [(36.5, 3), (28, 9), (20.5, 13.5)], [(20.5, 13.5), (18, 22),
+        (9, 29)],
                  [(20.5, 13.5), (29, 21), (35, 30)]):  # fmt: skip
         winding_path(site, smooth_path(path), 1.7, "gravel:#c9b893")
     site.paint(disc(20.5, 13.5, 6.6), "paving:#bfae96", 0.02)
@@ -186,10 +197,12 @@ def _village_green(site: Site) -> None:
     site.add("market_hall", "market_hall", shelter, {"place": "on the green"})
     deal(site, ["market_stall"], [Pose(11.2, 23.6, -90.0)], "under the roof on the green")
     things = ["bench", "litter_bin", "stage", "statue", "kiosk", "ice_cream_cart", "flower_tub", "information_board",
-              "parasol", "cafe_table", "picnic_table", "planter", "market_stall", "a_board", "bicycle_rack"]  # fmt: skip
+              "parasol", "cafe_table", "picnic_table", "planter", "market_stall", "a_board",
+              "bicycle_rack"]  # fmt: skip
     spots = [(14.0, 16.5, -20.0), (26.0, 18.2, 200.0), (25.0, 26.8, -110.0), (33.4, 13.0, 180.0), (10.2, 13.8, 0.0),
              (25.2, 6.6, 120.0), (13.5, 7.2, 60.0), (8.0, 8.0, -60.0), (31.0, 19.6, 30.0), (32.0, 8.6, 120.0),
-             (18.4, 28.6, 0.0), (20.8, 5.2, 90.0), (7.2, 16.8, 0.0), (15.6, 20.2, 0.0), (29.6, 3.6, 90.0)]  # fmt: skip
+             (18.4, 28.6, 0.0), (20.8, 5.2, 90.0), (7.2, 16.8, 0.0), (15.6, 20.2, 0.0),
+             (29.6, 3.6, 90.0)]  # fmt: skip
     keep = [(c, s) for c, s in zip(things, spots, strict=True) if c != "statue"]
     for category, spot in keep:
         deal(site, [category], [Pose(*spot)], "on the green")
@@ -223,7 +236,9 @@ def _village_lots() -> list[Lot]:
     three = style(width_m=9.0, depth_m=7.4, storeys=2, wall="brick:#b98a6a", roof=f"{tiles}:#5f4a44", roof_m=3.4)
     four = style(width_m=8.0, depth_m=7.2, wall="plaster:#c9a9a0", roof=f"{tiles}:#7a4638", roof_kind=hip, garage=1)
     five = style(width_m=8.2, depth_m=7.4, wall="plaster:#b8c4b0", roof=f"{tiles}:#8a5040", garage=-1, door="#6a3f2a")
-    six = style(width_m=8.4, depth_m=7.4, wall="brick:#7f4f48", roof=f"{tiles}:#4f4644", roof_kind=hip, door="#e2ded0")
+    six = style(
+        width_m=8.4, depth_m=7.4, wall="brick:#7f4f48", roof=f"{tiles}:#4f4644", roof_kind=hip, door="#e2ded0"
+    )
     seven = style(width_m=8.0, depth_m=7.2, wall="plaster:#d8b878", roof=f"{tiles}:#9a5540", garage=1, door="#39513f")
     return [
         Lot(Frame(-28.5, -16.8, 90.0), one, "red brick house", 4.2, 8.0, 7.9),

@@ -96,7 +96,8 @@ def _ground(site: Site) -> None:
 
 
 def _bays(site: Site) -> tuple[list[Pose], list[Pose]]:
-    bays, shaded = [], []
+    bays: list[Pose] = []
+    shaded: list[Pose] = []
     for x, count in _GROUPS:
         bays += parking_row(site, x, _SOUTH_ROW, -90.0, count)
         for y in _DOUBLE_ROWS:
@@ -114,18 +115,22 @@ def _islands(site: Site) -> None:
         site.paint(rectangle(_ISLAND[0], y - 4.8, _ISLAND[1], y + 4.8), site.material("paving", "paving"), 0.14)
     for k, y in enumerate(_DOUBLE_ROWS[:-1]):
         crossing(site, -17, (y + _DOUBLE_ROWS[k + 1]) / 2, 90, 6.4)
-    trees = [Pose(x, y + dy, 60.0 * k) for k, y in enumerate(_DOUBLE_ROWS) for x in (-51.3, 13.8) for dy in (-2.6, 2.6)]
+    trees = [
+        Pose(x, y + dy, 60.0 * k) for k, y in enumerate(_DOUBLE_ROWS) for x in (-51.3, 13.8) for dy in (-2.6, 2.6)
+    ]
     deal(site, ["urban_tree"], trees, "on a traffic island")
     walk = ["planter", "litter_bin", "bench", "shopping_cart", "recycling_bin", "flower_tub", "parking_meter",
             "vending_machine", "bollard", "fire_hydrant", "photo_booth", "mailbox", "phone_booth"]  # fmt: skip
-    spots = [Pose(x, y + dy, 0.0 if x < -17 else 180.0) for y in _DOUBLE_ROWS for x, dy in ((-18.3, 3.0), (-15.6, -3.0))]
+    spots = [
+        Pose(x, y + dy, 0.0 if x < -17 else 180.0) for y in _DOUBLE_ROWS for x, dy in ((-18.3, 3.0), (-15.6, -3.0))
+    ]
     deal(site, walk, spots, "on the walk across the car park")
     for k, y in enumerate(_DOUBLE_ROWS):
         if y != _SOLAR_ROW:
             put(site, "street_lamp", -36.0, y, 90.0 if k % 2 else -90.0, "between two rows of the car park")
             put(site, "street_lamp", 1.6, y, -90.0 if k % 2 else 90.0, "between two rows of the car park")
     for x, y in ((-47.2, -5.0), (11.2, -22.0), (-21.4, 24.4)):
-        put(site, "cart_corral", x - 0.3, y, 0.0, "in a bay of the car park", params=None)
+        put(site, "cart_corral", x - 0.3, y, 0.0, "in a bay of the car park")
 
 
 def _solar_roofs(site: Site) -> None:
@@ -140,7 +145,8 @@ def _solar_roofs(site: Site) -> None:
             parts.append((steel, block(u - 0.15, y0 + 0.2, u + 0.15, y1 - 0.2, z - 0.25, z)))
         site.add(None, "solar_roof", parts, {"place": "over the middle rows of the car park"})
         for i in range(2):
-            put(site, "solar_panels", x0 + 6 + i * 12, _SOLAR_ROW - 1.5 + 3 * ((i + k) % 2), -90.0, "on the solar roof",
+            put(site, "solar_panels", x0 + 6 + i * 12, _SOLAR_ROW - 1.5 + 3 * ((i + k) % 2),
+                -90.0, "on the solar roof",
                 z=z + 0.22)  # fmt: skip
 
 
@@ -213,7 +219,8 @@ def _charging_court(site: Site) -> None:
     cars = [Pose(x, y, yaw) for x in (33.9, 44.1) for y, yaw in ((-34.8, -90.0), (-39.4, 90.0))]
     deal(site, ["hatchback", "suv", "sedan", "delivery_van"], cars, "under the charging roof")
     for x, y, category, yaw in ((57.5, -36.0, "food_truck", 100.0), (65.0, -40.0, "box_truck", 90.0),
-                                (56.0, -43.5, "billboard", 150.0), (65.5, -28.5, "site_light_tower", 200.0)):  # fmt: skip
+                                (56.0, -43.5, "billboard", 150.0), (65.5, -28.5, "site_light_tower",
+                                200.0)):  # fmt: skip
         put(site, category, x, y, yaw, "beside the charging court")
     deal(site, ["concrete_barrier", "traffic_cone", "generator", "barrier"],
          [Pose(61.5, -44 + 4.2 * k, 0.0) for k in range(4)], "beside the charging court")  # fmt: skip
@@ -221,7 +228,7 @@ def _charging_court(site: Site) -> None:
 
 def _entrance(site: Site) -> None:
     site.paint(rectangle(13.6, -46, 15.4, -40.5), "concrete", 0.14)
-    put(site, "ticket_booth", 18.4 + 4.0, -44.6, 180.0, "at the entrance")
+    put(site, "guard_booth", 22.4, -44.6, 180.0, "at the entrance")
     for x, y, yaw in ((11.2, -45.2, 90.0), (17.8, -45.2, -90.0)):
         put(site, "boom_gate", x, y, yaw, "at the entrance")
     put(site, "parking_meter", 14.5, -41.6, 0.0, "at the entrance")

@@ -1,4 +1,4 @@
-"""What hangs on the walls of narrow lanes and spans them: balconies, fire escapes, awnings, washing, strings of lights."""
+"""What hangs on the walls of narrow lanes and across them: balconies, fire escapes, awnings, washing, lights."""
 
 from __future__ import annotations
 
@@ -18,9 +18,17 @@ Box = tuple[float, float, float, float]
 
 
 def town_house(
-    site: Site, outline: Box, storeys: int, wall: str, roof: str, *, kind: str = "flat", name: str = "", foot_m: float = 0.0
+    site: Site,
+    outline: Box,
+    storeys: int,
+    wall: str,
+    roof: str,
+    *,
+    kind: str = "flat",
+    name: str = "",
+    foot_m: float = 0.0,
 ) -> float:
-    """Put up a town house over a rectangle (x0, y0, x1, y1), from `foot_m` upwards; returns its eaves' height, metres."""
+    """Put up a town house on (x0, y0, x1, y1) from `foot_m` upwards; returns the height of its eaves, metres."""
     storey_m = site.catalogue.materials.tile_m(wall) / 2
     attributes = {"place": name} if name else None
     building(site, rectangle(*outline), wall=wall, roof=roof, storeys=storeys, storey_m=storey_m, roof_kind=kind,
@@ -31,7 +39,7 @@ def town_house(
 def passage_house(
     site: Site, outline: Box, opening: Box, head_m: float, storeys: int, wall: str, base: str, roof: str
 ) -> float:
-    """Put up a house over a passage: its ground storey is left open over `opening`; returns its eaves' height, metres."""
+    """Put up a house whose ground storey is open over `opening`; returns the height of its eaves, metres."""
     plan, gap = rectangle(*outline), rectangle(*opening)
     low = plan.difference(gap)
     parts: Parts = []
@@ -58,8 +66,10 @@ def balcony(site: Site, x: float, y: float, yaw_deg: float, z_m: float, *, width
     return site.add(None, "balcony", Frame(x, y, yaw_deg).parts(parts, z_m))
 
 
-def fire_escape(site: Site, x: float, y: float, yaw_deg: float, storeys: int, storey_m: float, *, frame: str = "iron") -> Instance:
-    """Hang a fire escape on a wall at (x, y) that faces `yaw_deg`: a platform a storey, flights between them, a ladder."""
+def fire_escape(
+    site: Site, x: float, y: float, yaw_deg: float, storeys: int, storey_m: float, *, frame: str = "iron"
+) -> Instance:
+    """Hang a fire escape on a wall at (x, y) that faces `yaw_deg`: platforms, flights between them, a ladder."""
     parts: Parts = []
     for k in range(1, storeys):
         z = k * storey_m + 0.1

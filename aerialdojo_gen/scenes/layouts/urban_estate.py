@@ -73,9 +73,13 @@ def put_up(site: Site, slab: Slab) -> None:
                 parts.append(("glass", _leaf(s * (d - 0.05), s * (d + 0.04), w - 0.7, w + 0.7, 1.0, 2.2)))
     site.add(None, "flats_base", slab.frame.parts(parts), {"place": slab.name}, footprint=slab.frame.area(low))
     plan = slab.frame.area(rectangle(-d, -half, d, half))
-    sign: Parts = [("marking", letters(slab.name.split()[-1], 1.8, (d + 0.02, half - 2.4, slab.top_m - 2.6), 0.0, 0.08))]
-    building(site, plan, wall=slab.wall, roof="gravel:#a09a90", storeys=slab.storeys - 1, storey_m=STOREY_M, z=STOREY_M,
-             category="flats", attributes={"place": slab.name}, extra=[*slab.frame.parts(sign), *_balconies(slab)])  # fmt: skip
+    sign: Parts = [
+        ("marking", letters(slab.name.split()[-1], 1.8, (d + 0.02, half - 2.4, slab.top_m - 2.6), 0.0, 0.08))
+    ]
+    building(site, plan, wall=slab.wall, roof="gravel:#a09a90",
+        storeys=slab.storeys - 1, storey_m=STOREY_M, z=STOREY_M,
+             category="flats", attributes={"place": slab.name}, extra=[*slab.frame.parts(sign),
+                 *_balconies(slab)])  # fmt: skip
 
 
 def balcony_spots(slab: Slab) -> list[tuple[float, float]]:

@@ -86,7 +86,10 @@ def back_garden(site: Site, lot: Lot, things: Sequence[str], trees: Sequence[str
         v = (column + 0.5 - columns / 2) * (2 * side - 3.0) / columns + (0.5 if row else -0.3)
         poses.append(lot.frame.pose(u, v, float(rng.uniform(-50, 50))))
     for thing, pose in zip(things, poses, strict=True):
-        tries = [pose, *(Pose(pose.x + dx, pose.y + dy, pose.yaw_deg) for dx, dy in ((0.8, 0.8), (-0.8, 0.8), (-0.8, -0.8)))]
+        tries = [
+            pose,
+            *(Pose(pose.x + dx, pose.y + dy, pose.yaw_deg) for dx, dy in ((0.8, 0.8), (-0.8, 0.8), (-0.8, -0.8))),
+        ]
         for attempt in tries:
             if deal(site, [thing], [attempt], place):
                 break

@@ -11,7 +11,16 @@ from aerialdojo_gen.scenes.grammar_scatter import Pose
 from aerialdojo_gen.scenes.grammar_streets import arrow, crossing, streets
 from aerialdojo_gen.scenes.ground import rectangle
 from aerialdojo_gen.scenes.layouts.urban_parking import park_cars
-from aerialdojo_gen.scenes.layouts.urban_structures import Parts, block, canopy, columns, deck, letters, railing, stairs
+from aerialdojo_gen.scenes.layouts.urban_structures import (
+    Parts,
+    block,
+    canopy,
+    columns,
+    deck,
+    letters,
+    railing,
+    stairs,
+)
 from aerialdojo_gen.scenes.mesh import merge
 from aerialdojo_gen.scenes.site import Site
 
@@ -85,7 +94,9 @@ def _garages(site: Site) -> None:
     ]
     for k in range(count):
         if k % 3 == 1:
-            parts.append((door[k % 4], block(x0 + k * width + 0.4, y0 + 0.3, x0 + (k + 1) * width - 0.4, y0 + 2.6, 2.46, 2.54)))
+            parts.append(
+                (door[k % 4], block(x0 + k * width + 0.4, y0 + 0.3, x0 + (k + 1) * width - 0.4, y0 + 2.6, 2.46, 2.54))
+            )
         else:
             slats = [block(x0 + k * width + 0.36, y0 + 0.06, x0 + (k + 1) * width - 0.36, y0 + 0.16 + 0.04 * (i % 2),
                            0.02 + 0.4 * i, 0.4 + 0.4 * i) for i in range(6)]  # fmt: skip
@@ -111,7 +122,12 @@ def _carport(site: Site) -> None:
     ]
     site.add("carport", "carport", parts, {"place": "along the west side"})
     bays = [Pose(-29.9, -10.1 + 4.56 * k, 180.0) for k in range(5)]
-    deal(site, ["pickup_truck", "hatchback", "golf_cart", "suv"], [b for k, b in enumerate(bays) if k != 2], "under the carport")
+    deal(
+        site,
+        ["pickup_truck", "hatchback", "golf_cart", "suv"],
+        [b for k, b in enumerate(bays) if k != 2],
+        "under the carport",
+    )
     put(site, "bicycle_rack", -30.2, -1.0, 0.0, "under the carport")
 
 
@@ -128,7 +144,9 @@ def _station(site: Site) -> None:
              storey_m=3.0, roof_kind="hip", roof_m=2.4, z=0.0, category="ticket_office",
              attributes={"material": "brick"}, extra=extra)  # fmt: skip
     front = ["vending_machine", "bench", "newspaper_box", "a_board", "flower_tub", "phone_booth", "information_board"]
-    deal(site, front, [Pose(27.2 + 2.2 * k, 4.4 - 1.5 * (k % 2), -90.0) for k in range(3)], "before the ticket office")
+    deal(
+        site, front, [Pose(27.2 + 2.2 * k, 4.4 - 1.5 * (k % 2), -90.0) for k in range(3)], "before the ticket office"
+    )
     deal(site, front[3:], [Pose(24.2, y, 180.0) for y in (7.2, 10.6, 15.4, 18.8)], "beside the ticket office")
     put(site, "wall_clock", 26.0, 18.4, 180.0, "on the ticket office", z=3.6)
     put(site, "clock_tower", 29.8, -7.0, 180.0)
@@ -167,7 +185,15 @@ def _furnish(site: Site) -> None:
     yard = ["kiosk", "planter", "bicycle", "cafe_table", "parking_meter", "ev_charger", "balloon_stand"]
     spots = [(28.0, -15.5), (32.0, -12.0), (27.0, -1.0), (32.0, 0.8), (25.6, -4.0), (25.6, -10.0), (32.2, -3.0)]
     deal(site, yard, [Pose(x, y, 180.0) for x, y in spots], "in the station yard")
-    middle = ["food_truck", "traffic_cone", "dumpster", "recycling_bin", "generator", "delivery_van", "basketball_hoop"]
+    middle = [
+        "food_truck",
+        "traffic_cone",
+        "dumpster",
+        "recycling_bin",
+        "generator",
+        "delivery_van",
+        "basketball_hoop",
+    ]
     spots2 = [(14.0, 9.6, -90.0), (-6.4, -4.0, 0.0), (10.0, 18.9, -90.0), (12.6, 21.5, 180.0), (17.0, 19.5, 90.0),
               (21.5, 13.0, 100.0), (-22.8, 8.0, 0.0)]  # fmt: skip
     deal(site, middle, [Pose(*s) for s in spots2], "in the gravel lot")
