@@ -90,9 +90,9 @@ def _ground(site: Site) -> None:
         site.paint(rectangle(-62, y - 1, -54, y + 1), path)
     crossing(site, 24, -51.2, 90, 6.5)
     crossing(site, -45, -51.2, 90, 6.5)
-    for y in (-32.5, -15.6, 1.3, 18.2, 34.2):
+    for aisle in (-32.5, -15.6, 1.3, 18.2, 34.2):
         for x, yaw in ((-38, 0), (-28, 0), (-8, 180), (6, 180)):
-            arrow(site, x, y + (1.4 if yaw == 0 else -1.4), yaw)
+            arrow(site, x, aisle + (1.4 if yaw == 0 else -1.4), yaw)
 
 
 def _bays(site: Site) -> tuple[list[Pose], list[Pose]]:
