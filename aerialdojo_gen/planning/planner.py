@@ -104,7 +104,8 @@ class Planner:
         Returns
         -------
         list of Route
-            One a start, in their order; each depends on the scene, the configuration, its own start and the goal.
+            One a start, in their order. The cost-to-go ends a little beyond the farthest start, so that a route may
+            in principle depend on the other starts too: plan a target's starts together.
         """
         target = np.asarray(goal, np.float64)
         begins = np.asarray(starts, np.float64).reshape(-1, 4)
