@@ -149,3 +149,16 @@ def test_previews_keep_the_latest_scene_and_sheets_hold_all_pictures(scene):
     assert found == 5
     with pytest.raises(ValueError, match="labels"):
         contact_sheet([image], ["a", "b"])
+
+
+@pytest.mark.parametrize("view", VIEWS)
+def test_vertices_in_the_camera_s_own_plane_do_no_harm(scene, view):
+    """TinyRenderer divides by zero there; routes on whole metres meet such vertices often."""
+    long = Scene(
+        "long", (*scene.instances, block("curb", (-24, -1, 0), (24, 1, 0.5), "blue")), MATERIALS, scene.bounds
+    )
+    with RenderWorld(long) as world:
+        for position in ((0.0, 0.0, 3.0), (0.0, 0.0, 0.75), (6.0, 0.0, 2.0), (-6.0, 3.0, 2.0)):
+            depth = world.render(CAMERA, view_pose(position, 0.0, view)).depth_m
+            assert not np.isnan(depth).any()
+            assert depth.min() > 0.1

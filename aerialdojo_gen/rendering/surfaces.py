@@ -2,8 +2,8 @@
 
 The segmentation mask then tells the shader the material of every pixel.
 
-A software rasteriser visits every pixel of a triangle's bounding box, seen or not. So triangles that no camera can see
-from the front are left out, and long ones are cut up: a ground of slivers otherwise costs the whole picture a sliver.
+A software rasteriser visits every pixel of a triangle's bounding box, seen or not. So triangles that no camera
+can see from the front are left out, and long ones are cut up: a ground of slivers would cost a picture each.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ from aerialdojo_gen.scenes.model import Part, Scene
 
 # Edges longer than this are halved, metres.
 _LONGEST_EDGE_M = 10.0
-# Cameras stand within so much of the flight volume, at its sides and above it, metres.
-_AROUND_M = 300.0
+# Cameras stand within so much of the flight volume at its sides and above it, and so much over its floor, metres.
+_AROUND_M, _FLOOR_M = 300.0, 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +60,7 @@ def surfaces(scene: Scene) -> list[Surface]:
         for part in instance.parts:
             by_material.setdefault(part.material, []).append(part)
     low, high = scene.bounds[0], scene.bounds[1]
-    room = np.stack([low - [_AROUND_M, _AROUND_M, 0.0], high + _AROUND_M])
+    room = np.stack([low + np.array([-_AROUND_M, -_AROUND_M, _FLOOR_M]), high + _AROUND_M])
     merged = (_merge(material, by_material[material]) for material in sorted(by_material))
     cut = (_cut(_visible(surface, room)) for surface in merged)
     return [surface for surface in cut if len(surface.faces)]

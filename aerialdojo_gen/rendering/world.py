@@ -24,6 +24,7 @@ from aerialdojo_gen.scenes.model import Material, Scene
 Floats = NDArray[np.float64]
 
 NEAR_M, FAR_M = 0.1, 2000.0
+_NUDGE_M = np.array([3.1e-5, 1.7e-5, 1.3e-4])
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,24 +134,24 @@ class RenderWorld:
             Number of the surface, -1 where nothing is hit.
         """
         w, h = camera.width, camera.height
-        view = np.linalg.inv(world_from_camera)
-        view[1:3] *= -1.0  # OpenGL's camera: y up, looking along -z
-        # TinyRenderer samples at (column, row + 1) in place of the pixel's centre: shift by half a pixel each.
-        projection = np.array(
-            [
-                [2.0 * camera.focal_px / w, 0.0, 1.0 / w, 0.0],
-                [0.0, 2.0 * camera.focal_px / h, 1.0 / h, 0.0],
-                [0.0, 0.0, -(far_m + near_m) / (far_m - near_m), -2.0 * far_m * near_m / (far_m - near_m)],
-                [0.0, 0.0, -1.0, 0.0],
-            ]
-        )
-        _, _, rgba, buffer, mask = pybullet.getCameraImage(
-            w, h, view.T.ravel().tolist(), projection.T.ravel().tolist(),
-            shadow=0, lightDirection=(0, 0, 1), lightColor=(1, 1, 1), lightAmbientCoeff=1.0, lightDiffuseCoeff=0.0,
-            lightSpecularCoeff=0.0, renderer=pybullet.ER_TINY_RENDERER, physicsClientId=self._client,
-        )  # fmt: skip
+        projection = _projection(camera, near_m, far_m)
+        # TinyRenderer loses triangles with a vertex exactly in the camera's plane, or leaves NaN for their depth, and
+        # poses on whole metres meet such vertices: a camera 0.1 mm away sees the same without them.
+        for nudge in (1.0, -1.3, 1.7, -2.1):
+            view = np.linalg.inv(world_from_camera)
+            view[:3, 3] += nudge * _NUDGE_M
+            view[1:3] *= -1.0  # OpenGL's camera: y up, looking along -z
+            _, _, rgba, buffer, mask = pybullet.getCameraImage(
+                w, h, view.T.ravel().tolist(), projection.T.ravel().tolist(),
+                shadow=0, lightDirection=(0, 0, 1), lightColor=(1, 1, 1), lightAmbientCoeff=1.0,
+                lightDiffuseCoeff=0.0, lightSpecularCoeff=0.0, renderer=pybullet.ER_TINY_RENDERER,
+                physicsClientId=self._client,
+            )  # fmt: skip
+            nearness = np.asarray(buffer, dtype=np.float64).reshape(h, w)
+            if nearness.min() >= 0.0:  # False for NaN
+                break
         surface = np.asarray(mask, dtype=np.int32).reshape(h, w)
-        linear = far_m * near_m / (far_m - (far_m - near_m) * np.asarray(buffer, dtype=np.float64).reshape(h, w))
+        linear = far_m * near_m / (far_m - (far_m - near_m) * nearness) - nudge * _NUDGE_M[2]
         depth = np.where(surface >= 0, linear, np.inf).astype(np.float32)
         return np.asarray(rgba, dtype=np.uint8).reshape(h, w, 4)[..., :3], depth, surface
 
@@ -169,6 +170,23 @@ class RenderWorld:
     ) -> None:
         """Free the renderer's memory."""
         self.close()
+
+
+def _projection(camera: Camera, near_m: float, far_m: float) -> Floats:
+    """OpenGL's projection, row-major (4, 4), shifted for TinyRenderer.
+
+    It samples at (column, row + 1) in place of the pixel's centre: the picture is shifted by half a pixel each way.
+    """
+    x, y = 2.0 * camera.focal_px / camera.width, 2.0 * camera.focal_px / camera.height
+    span = far_m - near_m
+    return np.array(
+        [
+            [x, 0.0, 1.0 / camera.width, 0.0],
+            [0.0, y, 1.0 / camera.height, 0.0],
+            [0.0, 0.0, -(far_m + near_m) / span, -2.0 * far_m * near_m / span],
+            [0.0, 0.0, -1.0, 0.0],
+        ]
+    )
 
 
 # The last scene's renderer and ray caster: the next view of it is then cheap, and memory stays that of one scene.
