@@ -169,6 +169,7 @@ def _green(site: Site, tree_every_m: float) -> None:
             on_garage(site, lot, ("satellite_dish", "solar_panels", "vent_stack")[k % 3])
     _village_green(site)
     _lane_garages(site)
+    _paddock(site)
     kerb = ["lantern", "litter_bin", "parking_meter", "lantern", "recycling_bin", "fire_hydrant", "phone_booth",
             "direction_sign", "advertising_column", "bus_shelter", "newspaper_box", "traffic_light"]  # fmt: skip
     spots = [(-34.0, -1.2, -90.0), (-20.5, -1.2, -90.0), (-13.0, -8.9, 90.0), (5.2, -8.9, 90.0), (-26.5, -8.9, 90.0),
@@ -208,6 +209,28 @@ def _village_green(site: Site) -> None:
         deal(site, [category], [Pose(*spot)], "on the green")
     tree_line(site, [(7.5, 30.0), (29.0, 30.4), (37.4, 20.0), (37.4, 8.0), (28.0, 12.4), (15.0, 11.6)],
               ["urban_tree", "oak_tree", "urban_tree"])  # fmt: skip
+
+
+def _paddock(site: Site) -> None:
+    """Fill the plot behind the dark brick house: hay, a tractor, boats on trestles, a skip."""
+    site.paint(rectangle(-18.6, 19.0, -6.4, 36.0), "dirt")
+    things = ["tractor", "hay_bales", "skip_container", "kayak", "log_pile", "canoe", "ladder_stand", "fuel_drum",
+              "cardboard_boxes", "basketball_hoop", "stone_well", "quad_bike"]  # fmt: skip
+    spots = [(-9.4, 22.0, 100), (-16.6, 21.4, 0), (-14.6, 33.8, 0), (-16.8, 27.0, 90), (-12.4, 20.4, 0),
+        (-14.8, 27.0, 90),
+             (-8.4, 27.0, 180), (-10.6, 34.2, 0), (-8.2, 31.0, 30), (-18.0, 31.0, -45), (-11.8, 28.0, 0),
+             (-12.6, 24.0, 60)]  # fmt: skip
+    deal(site, things, [Pose(float(x), float(y), float(a)) for x, y, a in spots], "in the paddock")
+    more = ["food_truck", "photo_booth", "flagpole", "golf_cart", "vending_machine", "atm_kiosk"]
+    spots = [
+        (35.5, -0.6, 180),
+        (16.6, 33.0, -90),
+        (30.4, 33.4, -90),
+        (-37.8, -8.9, 90),
+        (10.6, 34.0, -90),
+        (14.0, 0.6, 200),
+    ]
+    deal(site, more, [Pose(float(x), float(y), float(a)) for x, y, a in spots], "by the green")
 
 
 def _lane_garages(site: Site) -> None:
