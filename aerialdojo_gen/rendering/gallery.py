@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerialdojo_gen.errors import RenderError
+from aerialdojo_gen.geometry.rays import RayCaster
 from aerialdojo_gen.rendering.preview import contact_sheet, look_at
 from aerialdojo_gen.rng import generator
 from aerialdojo_gen.scenes.catalogue import Catalogue
@@ -20,7 +21,7 @@ from aerialdojo_gen.scenes.shapes_extruded import extrude
 from aerialdojo_gen.store import atomic_file
 
 Image = NDArray[np.uint8]
-_STREET_HEIGHT_M = 3.0
+_FLYING_HEIGHT_M = 3.0
 
 
 def prop_picture(catalogue: Catalogue, category: str, size_px: int = 240, variant: str | None = None) -> Image:
@@ -101,24 +102,39 @@ def scene_sheet(scene: Scene, width: int = 640, height: int = 440) -> Image:
     }.items():
         eye = centre + np.array([dx * 0.48 * span[0], dy * 0.48 * span[1], 0.38 * reach])
         views.append((eye, centre - [dx * 0.04 * reach, dy * 0.04 * reach, 0], fov, f"from the {name}"))
-    for k, (fx, fy) in enumerate(((-0.22, -0.18), (0.2, 0.16))):
-        x, y = centre[0] + fx * span[0], centre[1] + fy * span[1]
-        z = _open_height(scene, x, y)
-        views.append((np.array([x, y, z]), np.array([centre[0], centre[1], z - 1.0]), 80.0, f"flying, {k + 1}"))
+    for k, (eye, target) in enumerate(_flying_views(scene)):
+        views.append((eye, target, 80.0, f"flying, {k + 1}"))
     images = [look_at(scene, eye, target, width, height, angle) for eye, target, angle, _ in views]
     return contact_sheet(images, [f"{scene.name}, {label}" for *_, label in views], 3)
 
 
-def _open_height(scene: Scene, x: float, y: float) -> float:
-    """Flying height at a place: a little over whatever stands or lies there, not over the ceiling."""
-    tops = [scene.bounds[0, 2]]
-    for instance in scene.instances:
-        v = instance.vertices[instance.faces]
-        boxes = np.stack([v[..., :2].min(axis=1), v[..., :2].max(axis=1)])
-        over = ((boxes[0] - 1.0 <= (x, y)) & (boxes[1] + 1.0 >= (x, y))).all(axis=1)
-        if over.any():
-            tops.append(float(v[over][..., 2].max()))
-    return min(max(tops) + _STREET_HEIGHT_M, scene.ceiling_m - 0.5)
+def _flying_views(scene: Scene) -> list[tuple[NDArray[np.float64], NDArray[np.float64]]]:
+    """Two views among the objects, one from each half of the scene: low places from which one sees far."""
+    low, high = scene.bounds
+    caster = RayCaster(scene)
+    n = 9
+    fractions = (np.arange(n) + 0.5) / n
+    places = np.stack(np.meshgrid(*(low[:2, None] + (high - low)[:2, None] * fractions), indexing="ij"), -1).reshape(
+        -1, 2
+    )
+    down = np.tile([0.0, 0.0, -1.0], (len(places), 1))
+    drop, _ = caster.first_hit(np.column_stack([places, np.full(len(places), high[2])]), down)
+    eyes = np.column_stack([places, high[2] - drop + _FLYING_HEIGHT_M])
+    centre = (low[:2] + high[:2]) / 2
+    flat = centre - places
+    angle = np.arctan2(flat[:, 1], flat[:, 0])[:, None] + np.radians([-25, -12, 0, 12, 25])
+    rays = np.stack([np.cos(angle), np.sin(angle), np.full(angle.shape, -0.05)], -1)
+    seen, _ = caster.first_hit(np.repeat(eyes, 5, axis=0), rays.reshape(-1, 3) / np.linalg.norm(rays[0, 0]))
+    reach = float(np.linalg.norm((high - low)[:2]))
+    # Something at a middle distance in every direction is a better picture than an open field or a wall.
+    seen = np.minimum(np.where(np.isfinite(seen), seen, 0.3 * reach), 0.5 * reach).reshape(-1, 5)
+    score = np.minimum(seen, 0.25 * reach).mean(axis=1) + 2.0 * np.minimum(seen.min(axis=1), 4.0) - 2.0 * eyes[:, 2]
+    score[~np.isfinite(score)] = -np.inf
+    views = []
+    for half in (places[:, 1] < centre[1], places[:, 1] >= centre[1]):
+        k = int(np.argmax(np.where(half, score, -np.inf)))
+        views.append((eyes[k], np.array([*centre, eyes[k, 2] - 2.0])))
+    return views
 
 
 def write_png(image: Image, folder: Path, name: str) -> Path:
