@@ -10,12 +10,12 @@ from types import TracebackType
 
 import cv2
 import numpy as np
-import pybullet
 from numpy.typing import NDArray
 
 from aerialdojo_gen.errors import RenderError
 from aerialdojo_gen.geometry.cameras import Camera
 from aerialdojo_gen.geometry.rays import RayCaster
+from aerialdojo_gen.rendering.bullet import pybullet
 from aerialdojo_gen.rendering.lighting import Lighting, ShadowMap, lighting, sun_view
 from aerialdojo_gen.rendering.shading import shade
 from aerialdojo_gen.rendering.surfaces import Surface, surfaces
