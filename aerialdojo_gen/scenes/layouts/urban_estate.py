@@ -57,6 +57,7 @@ def put_up(site: Site, slab: Slab) -> None:
     half, d, gap = slab.length_m / 2, slab.depth_m / 2, slab.arch_m / 2
     low = rectangle(-d, -half, d, -gap).union(rectangle(-d, gap, d, half))
     base = site.material("estate_base", "blocks:#8d867a")
+    site.paint(slab.frame.area(rectangle(-d - 1.2, -gap, d + 4.5, gap)), site.material("plaza", "paving"))
     parts: Parts = [
         (base, block(-d, -half, d, -gap, 0.0, STOREY_M)),
         (base, block(-d, gap, d, half, 0.0, STOREY_M)),
