@@ -1,4 +1,4 @@
-"""PyBullet, imported without the line about its build that it prints to standard output."""
+"""PyBullet, imported without the line about its build that it prints to standard error."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ from types import ModuleType
 
 
 def _import_silently() -> ModuleType:
-    sys.stdout.flush()
-    saved, null = os.dup(1), os.open(os.devnull, os.O_WRONLY)
+    sys.stderr.flush()
+    saved, null = os.dup(2), os.open(os.devnull, os.O_WRONLY)
     try:
-        os.dup2(null, 1)
+        os.dup2(null, 2)
         import pybullet as module
 
-        # It prints through C's stdio, which would write the line only when its buffer is flushed, at exit say.
+        # C's stdio may hold the line back until after the descriptor is restored.
         ctypes.CDLL(None).fflush(None)
     finally:
-        os.dup2(saved, 1)
+        os.dup2(saved, 2)
         os.close(saved)
         os.close(null)
     result: ModuleType = module
