@@ -42,7 +42,8 @@ dataset: .venv/.installed  ## generate the dataset: scene_assets/ and annotation
 smoke: .venv/.installed  ## two small scenes through all stages, a rendered video included (DATA=data-smoke)
 	@$(RUN) run pipelines/smoke.toml --data $(SMOKE_DATA) $(RUN_FLAGS)
 
-test: .venv/.dev  ## run the tests
+PYTEST_FLAGS ?= -n 2 --dist loadfile
+test: .venv/.dev  ## run the tests (PYTEST_FLAGS='-k planner' for some of them)
 	@.venv/bin/python -m pytest $(PYTEST_FLAGS)
 
 lint: .venv/.dev  ## ruff and mypy --strict
