@@ -1,8 +1,9 @@
 """Props that the shape vocabulary cannot say, as code.
 
 A builder is a function ``(rng, params) -> [(role, mesh), …]``. It draws from the generator alone, takes the prop's
-parameters by name, and returns meshes in the prop's own frame (metres; base centre at the origin, front along +x), each
-with a role of the category or a material. `builder` registers it under its name; every module of this folder is loaded.
+parameters by name, and returns meshes in the prop's own frame (metres; base centre at the origin, front along +x),
+each with a role of the category or a material. `builder` registers it under its name; every module of this folder is
+loaded.
 """
 
 from __future__ import annotations

@@ -111,7 +111,7 @@ def strew(
 ) -> list[Instance]:
     """Strew undergrowth or stones over an area, where there is room; things that lie are turned along the slope."""
     rng = site.rng_for("strew", category)
-    out = []
+    out: list[Instance] = []
     for x, y, yaw in poisson_disc(area, spacing_m, rng, density, limit * 3):
         if len(out) >= limit:
             break
