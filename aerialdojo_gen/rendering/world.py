@@ -16,6 +16,7 @@ from aerialdojo_gen.errors import RenderError
 from aerialdojo_gen.geometry.cameras import Camera
 from aerialdojo_gen.geometry.rays import RayCaster
 from aerialdojo_gen.rendering.bullet import pybullet
+from numba import njit
 from aerialdojo_gen.rendering.lighting import Lighting, ShadowMap, lighting, sun_view
 from aerialdojo_gen.rendering.shading import shade
 from aerialdojo_gen.rendering.surfaces import Surface, surfaces
@@ -24,7 +25,8 @@ from aerialdojo_gen.scenes.model import Material, Scene
 Floats = NDArray[np.float64]
 
 NEAR_M, FAR_M = 0.1, 2000.0
-_NUDGE_M = np.array([3.1e-5, 1.7e-5, 1.3e-4])
+# Steps by which a camera gives way to a vertex in its own plane, and the gap that float32 needs, metres.
+_NUDGE_M, _GAP_M = 1.3e-4, 3e-5
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,6 +63,7 @@ class RenderWorld:
 
     def __init__(self, scene: Scene) -> None:
         found = surfaces(scene)
+        self._vertices = np.concatenate([s.vertices for s in found])
         self._light: Lighting = lighting(scene, found)
         self._client = pybullet.connect(pybullet.DIRECT)
         if self._client < 0:
@@ -135,23 +138,18 @@ class RenderWorld:
         """
         w, h = camera.width, camera.height
         projection = _projection(camera, near_m, far_m)
-        # TinyRenderer loses triangles with a vertex exactly in the camera's plane, or leaves NaN for their depth, and
-        # poses on whole metres meet such vertices: a camera 0.1 mm away sees the same without them.
-        for nudge in (1.0, -1.3, 1.7, -2.1):
-            view = np.linalg.inv(world_from_camera)
-            view[:3, 3] += nudge * _NUDGE_M
-            view[1:3] *= -1.0  # OpenGL's camera: y up, looking along -z
-            _, _, rgba, buffer, mask = pybullet.getCameraImage(
-                w, h, view.T.ravel().tolist(), projection.T.ravel().tolist(),
-                shadow=0, lightDirection=(0, 0, 1), lightColor=(1, 1, 1), lightAmbientCoeff=1.0,
-                lightDiffuseCoeff=0.0, lightSpecularCoeff=0.0, renderer=pybullet.ER_TINY_RENDERER,
-                physicsClientId=self._client,
-            )  # fmt: skip
-            nearness = np.asarray(buffer, dtype=np.float64).reshape(h, w)
-            if nearness.min() >= 0.0:  # False for NaN
-                break
+        view = np.linalg.inv(world_from_camera)
+        nudge = _nudge(_close_to_plane(self._vertices, view[2], 0.02))
+        view[2, 3] += nudge
+        view[1:3] *= -1.0  # OpenGL's camera: y up, looking along -z
+        _, _, rgba, buffer, mask = pybullet.getCameraImage(
+            w, h, view.T.ravel().tolist(), projection.T.ravel().tolist(),
+            shadow=0, lightDirection=(0, 0, 1), lightColor=(1, 1, 1), lightAmbientCoeff=1.0, lightDiffuseCoeff=0.0,
+            lightSpecularCoeff=0.0, renderer=pybullet.ER_TINY_RENDERER, physicsClientId=self._client,
+        )  # fmt: skip
+        nearness = np.asarray(buffer, dtype=np.float64).reshape(h, w)
         surface = np.asarray(mask, dtype=np.int32).reshape(h, w)
-        linear = far_m * near_m / (far_m - (far_m - near_m) * nearness) - nudge * _NUDGE_M[2]
+        linear = far_m * near_m / (far_m - (far_m - near_m) * nearness) - nudge
         depth = np.where(surface >= 0, linear, np.inf).astype(np.float32)
         return np.asarray(rgba, dtype=np.uint8).reshape(h, w, 4)[..., :3], depth, surface
 
@@ -170,6 +168,36 @@ class RenderWorld:
     ) -> None:
         """Free the renderer's memory."""
         self.close()
+
+
+@njit(cache=True)
+def _close_to_plane(points: Floats, plane: Floats, reach_m: float) -> Floats:
+    """Signed distances (k,) of those points (n, 3) that lie within reach of a plane (4,)."""
+    close = []
+    for i in range(len(points)):
+        distance = plane[0] * points[i, 0] + plane[1] * points[i, 1] + plane[2] * points[i, 2] + plane[3]
+        if abs(distance) < reach_m:
+            close.append(distance)
+    return np.array(close, dtype=np.float64)
+
+
+def _nudge(close: Floats) -> float:
+    """Choose how far the camera steps back, metres, so that no vertex lies in its own plane.
+
+    TinyRenderer divides by a vertex's depth: where that is zero, it loses triangles, writes NaN, or never ends. Poses
+    on whole metres meet such vertices often. The picture is the same: the depth that comes out is put right again.
+
+    Parameters
+    ----------
+    close : (k,) float64
+        Depths of the vertices near the plane.
+    """
+    if not len(close):
+        return 0.0
+    steps = _NUDGE_M * np.array([k * sign for k in range(40) for sign in (1, -1)])
+    gap = np.abs(close[None] + steps[:, None]).min(axis=1)
+    free = gap > _GAP_M
+    return float(steps[free.argmax() if free.any() else gap.argmax()])
 
 
 def _projection(camera: Camera, near_m: float, far_m: float) -> Floats:
