@@ -65,18 +65,20 @@ def test_scenes_are_as_rich_as_the_paper_asks(name):
 @each_scene
 def test_props_stand_on_something(name):
     scene = scene_of(name)
-    cast = RayCaster(scene)
-    index = {i.node: k for k, i in enumerate(scene.instances)}
+    structure = tuple(i for i in scene.instances if i.category not in catalogue())
+    cast = RayCaster(Scene(name, structure, scene.materials, scene.bounds))
     floating = []
     for prop in props_of(scene):
         if prop.category in ("shop_sign", "wall_banner", "wall_clock", "storefront"):
             continue
-        v = prop.vertices[prop.vertices[:, 2] < prop.bounds[0, 2] + 0.25]
-        feet = np.array([[*v[:, :2].mean(axis=0), 0.0], *v[:: max(len(v) // 8, 1)]])
-        feet[:, 2] = max(prop.bounds[0, 2], 0.0) + 0.3
-        # What stands on legs has nothing under its middle: any foot that bears is enough.
-        distance, hit = cast.first_hit(feet, np.tile([0.0, 0.0, -1.0], (len(feet), 1)))
-        bears = (distance < 0.3 + 0.35) & (hit >= 0) | (hit == index[prop.node])
+        bottom = float(prop.bounds[0, 2])
+        low = prop.vertices[prop.vertices[:, 2] < bottom + 0.25]
+        feet = np.array([low[:, :2].mean(axis=0), *low[:: max(len(low) // 8, 1), :2]])
+        # Some props reach into what they stand on: rays start at several heights above the lowest point.
+        heights = bottom + np.arange(0.05, 0.9, 0.15)
+        origins = np.array([(x, y, z) for x, y in feet for z in heights])
+        distance, _ = cast.first_hit(origins, np.tile([0.0, 0.0, -1.0], (len(origins), 1)))
+        bears = origins[:, 2] - distance > bottom - 0.12
         if not bears.any():
             floating.append(prop.node)
     assert not floating

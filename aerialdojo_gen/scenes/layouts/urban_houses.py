@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from aerialdojo_gen.scenes.grammar_blocks import FLOOR_M, Frame, HouseStyle, deal, fence, house
+from aerialdojo_gen.scenes.grammar_blocks import FLOOR_M, Frame, HouseStyle, deal, fence, house, put
 from aerialdojo_gen.scenes.grammar_scatter import Pose
 from aerialdojo_gen.scenes.ground import rectangle, ribbon
 from aerialdojo_gen.scenes.site import Site
@@ -116,7 +116,7 @@ def on_porch(site: Site, lot: Lot, things: Sequence[str]) -> None:
     z = site.ground_z(lot.frame.x, lot.frame.y) + FLOOR_M
     for thing, pose in zip(things, spots, strict=False):
         # The porch itself has taken the ground: its floor is what the thing stands on.
-        site.place(thing, *pose, z=z, attributes={"place": f"on the porch of the {lot.name}"}, solid=False)
+        put(site, thing, *pose, place=f"on the porch of the {lot.name}", z=z, solid=False)
 
 
 def in_drive(site: Site, lot: Lot, vehicle: str) -> None:
@@ -130,7 +130,8 @@ def on_garage(site: Site, lot: Lot, thing: str) -> None:
     v = lot.style.garage * (lot.style.width_m / 2 + 1.8)
     pose = lot.frame.pose(lot.half_depth_m - 3.0, v, 0.0)
     z = site.ground_z(lot.frame.x, lot.frame.y) + GARAGE_ROOF_M
-    deal(site, [thing], [pose], f"on the garage of the {lot.name}", z=z)
+    # The house has taken its ground over its whole height, the garage's roof with it.
+    put(site, thing, *pose, place=f"on the garage of the {lot.name}", z=z)
 
 
 def tree_line(site: Site, path: Sequence[tuple[float, float]], categories: Sequence[str]) -> None:
