@@ -10,13 +10,13 @@ from types import TracebackType
 
 import cv2
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from aerialdojo_gen.errors import RenderError
 from aerialdojo_gen.geometry.cameras import Camera
 from aerialdojo_gen.geometry.rays import RayCaster
 from aerialdojo_gen.rendering.bullet import pybullet
-from numba import njit
 from aerialdojo_gen.rendering.lighting import Lighting, ShadowMap, lighting, sun_view
 from aerialdojo_gen.rendering.shading import shade
 from aerialdojo_gen.rendering.surfaces import Surface, surfaces
