@@ -126,7 +126,8 @@ def run(job: Job, config: SplitConfig) -> Output:
         },
         schema=RELEASE_OBJECTS.schema,
     )
-    named = pictured.append_column(
+    # Without the pictures: every task takes its target's row, and would take a copy of the picture with it.
+    named = pictured.drop_columns("reference_image").append_column(
         "landmark", _take(landmarks, "landmark_id", objects.column("landmark_id")).column("name")
     )
     fraction = config.ood_train_fraction if scene["partition"] == "OOD" else config.id_train_fraction
