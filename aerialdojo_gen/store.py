@@ -111,7 +111,7 @@ def shard_path(data: Path, table: str, scene: str, part: int = 0) -> Path:
 def shards(data: Path, table: str, scene: str) -> list[Path]:
     """List the existing shards of a scene, by part."""
     first = shard_path(data, table, scene)
-    if "{part" not in LAYOUT[table].template:
+    if "{part:" not in LAYOUT[table].template:
         return [first] if first.exists() else []
     return sorted(first.parent.glob("part-*.parquet"))
 

@@ -212,3 +212,17 @@ def test_digest_does_not_see_what_lies_under_a_null(tmp_path):
     clean = pa.array([1.0, None])
     assert store.content_digest(pa.table({"a": masked})) == store.content_digest(pa.table({"a": clean}))
     assert store.content_digest(pa.table({"a": [1.0, None]})) != store.content_digest(pa.table({"a": [None, 1.0]}))
+
+
+@pytest.mark.parametrize("table", sorted(store.LAYOUT))
+def test_pruning_one_scene_leaves_the_others(tmp_path, table):
+    mine, other = (store.shard_path(tmp_path, table, scene) for scene in ("U_A_0", "U_B_0"))
+    for path in (mine, other):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text("x")
+    extra = mine.with_name("part-00001.parquet")
+    extra.write_text("x")
+    store.prune(tmp_path, table, "U_A_0", 1)
+    assert mine.exists()
+    assert other.exists()
+    assert extra.exists() == ("{part:" not in store.LAYOUT[table].template)
