@@ -78,13 +78,13 @@ def compute(task: Task) -> dict[str, Any]:
     return summary
 
 
-def _start_worker() -> None:
+def _start_worker(parent: int) -> None:
     # Ctrl-C goes to the whole process group: the parent alone answers it, and ends the workers itself.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     # A worker must not outlive a parent that was killed with SIGKILL.
     if sys.platform == "linux":
-        parent = os.getppid()
         ctypes.CDLL(None).prctl(1, signal.SIGKILL)  # PR_SET_PDEATHSIG
+        # It may have been killed before the line above, while this process was starting.
         if os.getppid() != parent:
             os._exit(1)
 
@@ -140,7 +140,9 @@ class Pool:
         if self._executor is None:
             # spawn: FCL, PyBullet and numba hold state that does not survive a fork.
             context = multiprocessing.get_context("spawn")
-            self._executor = ProcessPoolExecutor(self.workers, mp_context=context, initializer=_start_worker)
+            self._executor = ProcessPoolExecutor(
+                self.workers, mp_context=context, initializer=_start_worker, initargs=(os.getpid(),)
+            )
         waiting = iter(tasks)
         running: dict[Future[dict[str, Any] | AerialDojoError], Task] = {}
         try:
