@@ -148,10 +148,16 @@ class Pool:
         try:
             while True:
                 # A short queue keeps a Ctrl-C from waiting for what has not begun.
-                for task in waiting:
-                    running[self._executor.submit(_guarded, task)] = task
-                    if len(running) > self.workers:
-                        break
+                # The first submit starts the processes; they inherit a blocked SIGINT, so that a Ctrl-C while they
+                # start is the parent's alone.
+                signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+                try:
+                    for task in waiting:
+                        running[self._executor.submit(_guarded, task)] = task
+                        if len(running) > self.workers:
+                            break
+                finally:
+                    signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
                 if not running:
                     return
                 finished, _ = wait(running, return_when=FIRST_COMPLETED)

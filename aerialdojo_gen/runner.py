@@ -22,6 +22,7 @@ from aerialdojo_gen.config import Pipeline
 from aerialdojo_gen.errors import AerialDojoError, StoreError, UsageError
 from aerialdojo_gen.executor import Pool, Task
 from aerialdojo_gen.fingerprint import scene_fingerprint
+from aerialdojo_gen.interrupt import Interrupts
 from aerialdojo_gen.progress import Reporter
 from aerialdojo_gen.stage import STAGES, Job, Roots, Stage
 
@@ -124,9 +125,10 @@ def run(
     reporter = reporter or Reporter(quiet=True)
     forced = set(force)
     summaries = []
-    with data_lock(roots.data), Pool(workers) as pool:
+    with data_lock(roots.data), Interrupts() as interrupts, Pool(workers) as pool:
         for stage in stages:
-            summary = _run_stage(stage, scenes, pipeline, roots, pool, stage.name in forced, reporter)
+            summary = _run_stage(stage, scenes, pipeline, roots, pool, stage.name in forced, reporter, interrupts)
+            interrupts.check()
             reporter.line(str(summary))
             summaries.append(summary)
     return summaries
@@ -140,6 +142,7 @@ def _run_stage(
     pool: Pool,
     force: bool,
     reporter: Reporter,
+    interrupts: Interrupts,
 ) -> StageSummary:
     started = time.monotonic()
     config = pipeline.section(stage.name)
@@ -164,6 +167,7 @@ def _run_stage(
     done = []
     with reporter.bar(stage.name, len(tasks)) as bar:
         for outcome in pool.imap(tasks):
+            interrupts.check()
             if isinstance(outcome, AerialDojoError):
                 errors.append(outcome)
             else:
