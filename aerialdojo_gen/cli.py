@@ -93,10 +93,11 @@ def run_until(
     *,
     data: Path,
     scene: list[str] | None = None,
-    pipeline: Path | Pipeline | None = None,
+    pipeline: Path | None = None,
     workers: int | None = None,
     force: bool = False,
     quiet: bool = False,
+    **overrides: object,
 ) -> None:
     """Bring a stage's tables up to date, running what it needs upstream; the twin of a stage's command.
 
@@ -108,24 +109,27 @@ def run_until(
         The data directory.
     scene : list of str, optional
         Names or globs; the pipeline's scenes where absent.
-    pipeline : Path or Pipeline, optional
-        A pipeline file, or one that was read and changed.
+    pipeline : Path, optional
+        A pipeline file; the default one where absent.
     workers : int, optional
         Processes; all cores where absent.
     force : bool
         Compute this stage's shards even where they are fresh (not those of the stages upstream).
     quiet : bool
         No progress and no summary.
+    **overrides
+        Values of the stage's section that replace the file's; None leaves one as it is.
 
     Raises
     ------
     AerialDojoError
         An expected failure.
     """
+    from aerialdojo_gen.config import with_overrides
     from aerialdojo_gen.stage import upstream
 
-    config, roots = open_pipeline(pipeline if isinstance(pipeline, Path) else None, data)
-    config = config if isinstance(pipeline, Path) or pipeline is None else pipeline
+    config, roots = open_pipeline(pipeline, data)
+    config = with_overrides(config, stage, **overrides)
     _run(list(upstream(stage)), config, roots, scene, workers, [stage] if force else [], quiet)
 
 
@@ -205,11 +209,10 @@ def render(
     ] = None,
 ) -> None:  # fmt: skip
     """Record four RGB-D views along trajectories of the release."""
-    from aerialdojo_gen.config import with_overrides
-
-    config, _ = open_pipeline(pipeline, data)
-    config = with_overrides(config, "render", limit=limit, sampling=sampling)
-    run_until("render", data=data, scene=scene, pipeline=config, workers=workers, force=force, quiet=quiet)
+    run_until(
+        "render", data=data, scene=scene, pipeline=pipeline, workers=workers, force=force, quiet=quiet,
+        limit=limit, sampling=sampling,
+    )  # fmt: skip
 
 
 @app.command("run")

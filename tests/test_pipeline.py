@@ -4,6 +4,8 @@ import io
 import itertools
 import json
 import math
+import subprocess
+import sys
 
 import cv2
 import numpy as np
@@ -262,3 +264,14 @@ def test_the_card_is_written(smoke, tasks):
     card = (smoke / "release" / "README.md").read_text()
     assert f"{len(tasks):,} task instances" in card
     assert io.StringIO(card).readline() == "---\n"
+
+
+def test_render_command_keeps_to_the_pipelines_scenes(smoke, project):
+    before = {p: p.stat().st_mtime_ns for p in smoke.rglob("*.parquet")}
+    command = [sys.executable, "-m", "aerialdojo_gen.cli", "render", "--pipeline", "pipelines/smoke.toml"]
+    done = subprocess.run(
+        [*command, "--limit", "1", "--data", str(smoke)], cwd=project, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    assert "render: 2 rows in, 16 out" in done.stderr
+    assert {p: p.stat().st_mtime_ns for p in smoke.rglob("*.parquet")} == before
