@@ -68,7 +68,7 @@ def data(tmp_path_factory) -> Path:
 
 @pytest.fixture(scope="module")
 def shards(data):
-    parts = plan.n_parts(N_OBJECTS, CONFIG)
+    parts = -(-N_OBJECTS // CONFIG.targets_per_part)
     assert parts == 3
     return [plan.run(job(data, "plan", k, parts), CONFIG) for k in range(parts)]
 

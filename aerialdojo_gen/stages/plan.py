@@ -25,11 +25,6 @@ from aerialdojo_gen.stage import Job, Output
 Floats = NDArray[np.float64]
 
 
-def n_parts(n_objects: int, config: PlanConfig) -> int:
-    """Count the shards of a scene with so many objects."""
-    return -(-n_objects // config.targets_per_part)
-
-
 def targets_of_part(object_ids: list[int], part: int, config: PlanConfig) -> list[int]:
     """Return the targets of one shard: a slice of the scene's objects in the order of their ids."""
     first = part * config.targets_per_part
