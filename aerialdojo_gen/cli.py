@@ -260,6 +260,19 @@ def annotate_draft(
     print(path)
 
 
+@app.command("stats")
+def stats(
+    data: Data = Path("data"), scene: Scene = None, pipeline: PipelineFile = None,
+) -> None:  # fmt: skip
+    """Compare what was kept with what the paper has, scene by scene and setting by setting."""
+    from aerialdojo_gen import runner
+    from aerialdojo_gen.release.stats import pool_lines, pool_of
+
+    config, roots = open_pipeline(pipeline, data)
+    scenes = runner.choose_scenes(scene or config.scenes, runner.known_scenes(roots.recipes))
+    print("\n".join(pool_lines([pool_of(roots.data, name) for name in scenes])))
+
+
 @app.command("gallery")
 def gallery(
     out: Annotated[Path, typer.Option("--out", help="Folder for the pictures.")] = Path("docs/gallery"),

@@ -174,13 +174,19 @@ def _scene_sources(roots: Roots, scene: str) -> list[Path]:
     return [
         roots.recipes / f"{scene}.toml",
         roots.scene_assets / "materials.toml",
-        *sorted((roots.scene_assets / "props").glob("*.toml")),
+        *_catalogue_files(roots),
         *sorted(package.rglob("*.py")),
     ]
 
 
 def _annotation_sources(roots: Roots, scene: str) -> list[Path]:
-    return [roots.annotations / f"{scene}.json", *sorted((roots.scene_assets / "props").glob("*.toml"))]
+    return [roots.annotations / f"{scene}.json", *_catalogue_files(roots)]
+
+
+def _catalogue_files(roots: Roots) -> list[Path]:
+    from aerialdojo_gen.scenes.catalogue import catalogue_files
+
+    return catalogue_files(roots.scene_assets)
 
 
 def _plan_parts(data: Path, scene: str, config: Any) -> int:

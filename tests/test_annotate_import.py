@@ -11,9 +11,9 @@ from annotation_scenes import NAMES, street, street_annotations
 
 from aerialdojo_gen.annotations.check import check_source
 from aerialdojo_gen.annotations.format import Anchor, Landmark, format_annotations, parse_annotations
-from aerialdojo_gen.annotations.inventory import paper_counts
 from aerialdojo_gen.config import AnnotateImportConfig, Embodiment
 from aerialdojo_gen.errors import AnnotationError, UsageError
+from aerialdojo_gen.paper import paper_counts
 from aerialdojo_gen.scenes.model import Scene
 from aerialdojo_gen.schemas import LANDMARKS, OBJECTS
 from aerialdojo_gen.stage import Job, Roots

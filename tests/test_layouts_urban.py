@@ -10,8 +10,8 @@ import pytest
 import shapely
 import trimesh
 
-from aerialdojo_gen.annotations.inventory import paper_counts
 from aerialdojo_gen.geometry.rays import RayCaster
+from aerialdojo_gen.paper import paper_counts
 from aerialdojo_gen.scenes.build import build_scene
 from aerialdojo_gen.scenes.catalogue import Catalogue, load_catalogue
 from aerialdojo_gen.scenes.footprints import footprint

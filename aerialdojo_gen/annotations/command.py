@@ -9,9 +9,9 @@ from pathlib import Path
 
 from aerialdojo_gen.annotations.draft import Choice, draft_annotations
 from aerialdojo_gen.annotations.format import write_annotations
-from aerialdojo_gen.annotations.inventory import paper_counts
 from aerialdojo_gen.config import Pipeline
 from aerialdojo_gen.errors import UsageError
+from aerialdojo_gen.paper import paper_counts
 from aerialdojo_gen.scenes.build import build_scene
 from aerialdojo_gen.scenes.catalogue import load_catalogue
 from aerialdojo_gen.scenes.model import Scene

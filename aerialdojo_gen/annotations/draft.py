@@ -104,13 +104,16 @@ class _Drafter:
         self._scene, self._seed, self._choice = scene, seed, choice
         self._names = {category: catalogue[category].name for category in catalogue}
         self._kinds = {category: catalogue[category].kind for category in catalogue}
+        targets = frozenset(catalogue.targets)
         looks = {category: catalogue[category].looks for category in catalogue}
         by_category: dict[str, Words] = {}
         for i in scene.instances:
             kind = self._kinds.get(i.category, "")
             if i.category not in by_category:
                 name = self._names.get(i.category)
-                by_category[i.category] = words_of(i.category, name, kind, looks.get(i.category, ()))
+                by_category[i.category] = words_of(
+                    i.category, name, kind, looks.get(i.category, ()), i.category in targets
+                )
         self._words = [by_category[i.category] for i in scene.instances]
         self._nouns = [noun_of(i, w) for i, w in zip(scene.instances, self._words, strict=True)]
 

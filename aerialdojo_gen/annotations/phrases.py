@@ -1,4 +1,4 @@
-"""Words for drafts: noun phrases of instances, and what each category looks like (`phrases.toml`)."""
+"""Words for drafts: noun phrases of instances, and what each category looks like (`phrases/*.toml`)."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from functools import cache
 from pathlib import Path
 
 from aerialdojo_gen.annotations.claims import spoken
+from aerialdojo_gen.errors import AnnotationError
 from aerialdojo_gen.scenes.model import Instance
 
 # Said before the noun, in the order of English: a small rotten brown wooden bench.
@@ -51,19 +52,28 @@ class Words:
 
 @cache
 def _tables() -> tuple[dict[str, dict[str, object]], dict[str, str]]:
-    raw = tomllib.loads(Path(__file__).with_name("phrases.toml").read_text(encoding="utf-8"))
-    raw.pop("colours")
-    said = raw.pop("values")
-    return raw, said
+    tables: dict[str, dict[str, object]] = {}
+    for path in _files():
+        for name, entry in tomllib.loads(path.read_text(encoding="utf-8")).items():
+            if name in tables:
+                raise AnnotationError(f"{path}: [{name}] stands in another file of its folder already")
+            tables[name] = entry
+    tables.pop("colours")
+    said = {key: str(value) for key, value in tables.pop("values").items()}
+    return tables, said
+
+
+def _files() -> list[Path]:
+    return sorted((Path(__file__).parent / "phrases").glob("*.toml"))
 
 
 @cache
 def _colours() -> frozenset[str]:
-    raw = tomllib.loads(Path(__file__).with_name("phrases.toml").read_text(encoding="utf-8"))
-    return frozenset(raw["colours"])
+    path = Path(__file__).parent / "phrases" / "common.toml"
+    return frozenset(tomllib.loads(path.read_text(encoding="utf-8"))["colours"])
 
 
-def words_of(category: str, name: str | None, kind: str, looks: tuple[str, ...] = ()) -> Words:
+def words_of(category: str, name: str | None, kind: str, looks: tuple[str, ...] = (), target: bool = True) -> Words:
     """Look up what drafts say of a category.
 
     Parameters
@@ -76,6 +86,8 @@ def words_of(category: str, name: str | None, kind: str, looks: tuple[str, ...] 
         The catalogue's kind, empty for structure.
     looks : tuple of str
         The catalogue's own looks, used where the phrases have none.
+    target : bool
+        Whether the catalogue lets tasks ask for it.
 
     Returns
     -------
@@ -91,7 +103,7 @@ def words_of(category: str, name: str | None, kind: str, looks: tuple[str, ...] 
         participle=str(entry.get("participle", participle)),
         group=str(entry.get("group", "")),
         reference=bool(entry.get("reference", in_catalogue)),
-        target=bool(entry.get("target", in_catalogue and kind != "landmark")),
+        target=bool(in_catalogue and target and entry.get("target", True)),
     )
 
 

@@ -1,4 +1,4 @@
-"""The catalogue of props: `scene_assets/props/*.toml`, and how a category becomes an instance."""
+"""The catalogue: `scene_assets/{props,landmarks,scenery}/*.toml`, and how a category becomes an instance."""
 
 from __future__ import annotations
 
@@ -18,6 +18,9 @@ from aerialdojo_gen.scenes.vocabulary import part_mesh
 
 _CACHE_SIZE = 2000
 _CROWN_SHAPES = 6
+# What tasks may ask for, what they are told from, and what else a place is full of.
+TARGETS = "props"
+FOLDERS = ("landmarks", TARGETS, "scenery")
 
 
 class Catalogue:
@@ -44,6 +47,11 @@ class Catalogue:
 
     def __contains__(self, category: object) -> bool:
         return category in self._categories
+
+    @property
+    def targets(self) -> tuple[str, ...]:
+        """Categories that tasks may ask for: the semantic categories of the dataset."""
+        return tuple(name for name, category in self._categories.items() if category.target)
 
     def __getitem__(self, category: str) -> Category:
         """Look a category up; an `AssetError` names the nearest one."""
@@ -204,8 +212,13 @@ def single(vertices: NDArray[np.float64]) -> NDArray[np.float64]:
     return vertices.astype(np.float32).astype(np.float64)
 
 
+def catalogue_files(folder: Path) -> list[Path]:
+    """List the files of a `scene_assets` folder that categories stand in, in a fixed order."""
+    return [path for name in FOLDERS for path in sorted((folder / name).glob("*.toml"))]
+
+
 def load_catalogue(folder: Path) -> Catalogue:
-    """Read a `scene_assets` folder: `materials.toml` and every `props/*.toml`.
+    """Read a `scene_assets` folder: `materials.toml` and the files of `FOLDERS`.
 
     Raises
     ------
@@ -214,9 +227,9 @@ def load_catalogue(folder: Path) -> Catalogue:
     """
     materials = load_materials(folder / "materials.toml")
     categories: dict[str, Category] = {}
-    for path in sorted((folder / "props").glob("*.toml")):
+    for path in catalogue_files(folder):
         for name, body in read_toml(path).items():
             if name in categories:
                 raise AssetError(f"{path}: [{name}] stands already in {categories[name].source.partition(':')[0]}")
-            categories[name] = parse_category(path, name, body, materials)
+            categories[name] = parse_category(path, name, body, materials, path.parent.name == TARGETS)
     return Catalogue(categories, materials)

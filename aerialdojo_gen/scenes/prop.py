@@ -57,6 +57,8 @@ class Category:
         At least one; a category without variants has one of an empty name.
     source : str
         File and category, for messages.
+    target : bool
+        Whether tasks may ask for it: false of landmarks and of scenery.
     """
 
     category: str
@@ -69,6 +71,7 @@ class Category:
     builder: str | None
     variants: tuple[Variant, ...]
     source: str
+    target: bool = True
 
     def variant(self, name: str) -> Variant:
         """Look a variant up; an `AssetError` names the nearest one."""
@@ -79,7 +82,7 @@ class Category:
         raise AssetError(f"{self.source}: unknown variant {name!r}{nearest(name, known)}")
 
 
-def parse_category(path: Path, category: str, body: Any, materials: MaterialLibrary) -> Category:
+def parse_category(path: Path, category: str, body: Any, materials: MaterialLibrary, target: bool = True) -> Category:
     """Check one category's table.
 
     Raises
@@ -123,7 +126,9 @@ def parse_category(path: Path, category: str, body: Any, materials: MaterialLibr
             raise AssetError(f"{where} variants[{k}]: variant {variants[-1].name!r} stands twice")
     if not variants:
         variants.append(Variant("", {}, {}, {}, frozenset(), 1.0))
-    return Category(category, name, kind, tuple(looks), params, roles, tuple(parts), builder, tuple(variants), where)
+    return Category(
+        category, name, kind, tuple(looks), params, roles, tuple(parts), builder, tuple(variants), where, target
+    )
 
 
 def _check_part(

@@ -11,10 +11,10 @@ import pyarrow as pa
 from aerialdojo_gen.annotations.ambiguity import nearest_landmark
 from aerialdojo_gen.annotations.check import check_source
 from aerialdojo_gen.annotations.format import Annotations, parse_annotations
-from aerialdojo_gen.annotations.inventory import paper_counts
 from aerialdojo_gen.annotations.positions import Fault
 from aerialdojo_gen.config import AnnotateImportConfig
 from aerialdojo_gen.errors import AnnotationError, UsageError
+from aerialdojo_gen.paper import paper_counts
 from aerialdojo_gen.scenes.catalogue import load_catalogue
 from aerialdojo_gen.scenes.model import Scene
 from aerialdojo_gen.schemas import LANDMARKS, OBJECTS
