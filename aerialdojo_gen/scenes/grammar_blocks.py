@@ -104,7 +104,9 @@ FLOOR_M = 0.4
 _GARAGE_M = (3.6, 6.0, 2.9)
 
 
-def house(site: Site, frame: Frame, style: HouseStyle, attributes: dict[str, str] | None = None) -> Instance:
+def house(
+    site: Site, frame: Frame, style: HouseStyle, attributes: dict[str, str] | None = None, *, z: float | None = None
+) -> Instance:
     """Put up a house with real windows, a door, steps, a pitched roof, and what its style asks for.
 
     Parameters
@@ -117,6 +119,8 @@ def house(site: Site, frame: Frame, style: HouseStyle, attributes: dict[str, str
         Sizes and materials.
     attributes : dict, optional
         As in `Site.add`.
+    z : float, optional
+        Height of its foot, metres; the ground's there by default.
     """
     d, w, top = style.depth_m / 2, style.width_m / 2, FLOOR_M + style.storeys * style.storey_m
     parts: Parts = [
@@ -140,7 +144,7 @@ def house(site: Site, frame: Frame, style: HouseStyle, attributes: dict[str, str
         peak = top + style.roof_m + 0.7
         parts.append(("brick:#7f4a3c", _block(at[0] - 0.4, at[1] - 0.45, at[0] + 0.4, at[1] + 0.45, top - 0.2, peak)))
         parts.append(("concrete", _block(at[0] - 0.5, at[1] - 0.55, at[0] + 0.5, at[1] + 0.55, peak, peak + 0.15)))
-    base = site.ground_z(frame.x, frame.y)
+    base = site.ground_z(frame.x, frame.y) if z is None else z
     world = frame.parts(parts, base)
     return site.add(None, "house", world, attributes, footprint=frame.area(plan))
 
