@@ -31,6 +31,9 @@ _VERBS = frozenset(
         "hangs",
         "rises",
         "leans",
+        "floats",
+        "flies",
+        "waits",
         "has",
         "have",
         "which",
@@ -197,6 +200,8 @@ class Lexicon:
                 state.end_clause()
             length, kind, meaning = self._match(tokens, at)
             words = tokens[at : at + length]
+            if not kind and tokens[at] in _VERBS:
+                state.end_clause()
             if kind == "relation":
                 state.end_clause()
                 state.relation, state.words = meaning, list(words)
