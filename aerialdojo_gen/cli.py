@@ -239,7 +239,9 @@ def annotate_draft(
     ] = None,
     within: Annotated[float | None, typer.Option(min=1, help="Radius of the core, metres.")] = None,
     core_share: Annotated[float, typer.Option(min=0, max=1, help="Share of the objects that lie in the core.")] = 1.0,
+    aloft: Annotated[float, typer.Option(min=0, max=1, help="Share of the core's objects from 3 m up.")] = 0.0,
     plants: Annotated[int, typer.Option(min=0, help="Most objects of one category of vegetation.")] = 3,
+    most: Annotated[int, typer.Option(min=1, help="Most objects of any other category.")] = 5,
     landmark: Annotated[list[str] | None, typer.Option(help="Node that is to be a landmark, repeatable.")] = None,
     seed: Annotated[int, typer.Option(min=0, help="The same seed gives the same draft.")] = 0,
     pipeline: PipelineFile = None,
@@ -252,7 +254,9 @@ def annotate_draft(
 
     config, roots = open_pipeline(pipeline, Path("data"))
     choose_scenes([scene], known_scenes(roots.recipes))
-    choice = Choice(centre_m=centre, within_m=within, core_share=core_share, most_vegetation=plants)
+    choice = Choice(
+        centre_m=centre, within_m=within, core_share=core_share, aloft_share=aloft, most_vegetation=plants, most=most
+    )
     path = draft_scene(
         scene, config, roots, n_landmarks=landmarks, n_objects=objects, choice=choice,
         landmarks=tuple(landmark or ()), seed=seed, force=force,

@@ -41,5 +41,9 @@ class StoreError(AerialDojoError):
     """A table is missing, damaged, or does not fit its schema."""
 
 
+class PoolError(AerialDojoError):
+    """Scenes have fewer kept candidates than are to be released."""
+
+
 class RenderError(AerialDojoError):
     """Rendering or encoding failed."""

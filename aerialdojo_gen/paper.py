@@ -74,9 +74,15 @@ def splits() -> dict[tuple[str, str], dict[str, int]]:
     return {(r["partition"], r["subset"]): {s: int(r[s]) // 2 for s in settings} for r in _rows("splits.csv")}
 
 
-def _rows(name: str) -> list[dict[str, str]]:
+def files() -> list[Path]:
+    """Return the CSV files that the figures are read from."""
     # In a checkout the pipelines lie beside the package, in a wheel within it.
     package = Path(__file__).resolve().parent
     root = package.parent if (package.parent / "pipelines").is_dir() else package / "_shipped"
-    with (root / "pipelines" / "paper" / name).open(encoding="utf-8", newline="") as file:
+    return [root / "pipelines" / "paper" / name for name in ("inventory.csv", "splits.csv")]
+
+
+def _rows(name: str) -> list[dict[str, str]]:
+    path = next(path for path in files() if path.name == name)
+    with path.open(encoding="utf-8", newline="") as file:
         return list(csv.DictReader(file))

@@ -146,6 +146,7 @@ def _run_stage(
 ) -> StageSummary:
     started = time.monotonic()
     config = pipeline.section(stage.name)
+    stage.check(roots.data, scenes, config)
     tasks, fresh, errors = [], [], []
     for scene in scenes:
         try:

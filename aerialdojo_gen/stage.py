@@ -7,7 +7,7 @@ the runner must know without importing that module (and with it numba, FCL or Py
 from __future__ import annotations
 
 import importlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from functools import lru_cache
@@ -129,6 +129,10 @@ def _one_part(_data: Path, _scene: str, _config: Any) -> int:
     return 1
 
 
+def _no_check(_data: Path, _scenes: Sequence[str], _config: Any) -> None:
+    pass
+
+
 def _no_sources(_roots: Roots, _scene: str) -> list[Path]:
     return []
 
@@ -151,6 +155,9 @@ class Stage:
         ``(data, scene, config) -> int``: number of shards of a scene; may read upstream tables.
     sources : callable
         ``(roots, scene) -> list of Path``: files outside the store whose bytes the result depends on.
+    check : callable
+        ``(data, scenes, config)``: raises an `AerialDojoError` where the inputs of all scenes together will not do,
+        before anything is written.
     """
 
     name: str
@@ -160,6 +167,7 @@ class Stage:
     writes: tuple[str, ...]
     parts: Callable[[Path, str, Any], int] = _one_part
     sources: Callable[[Roots, str], list[Path]] = _no_sources
+    check: Callable[[Path, Sequence[str], Any], None] = _no_check
 
     def load(self) -> Callable[[Job, Any], Output]:
         """Import the stage's module and return its ``run``."""
@@ -191,6 +199,19 @@ def _catalogue_files(roots: Roots) -> list[Path]:
 
 def _plan_parts(data: Path, scene: str, config: Any) -> int:
     return -(-store.count_rows(data, "objects", scene) // config.targets_per_part)
+
+
+def _paper_sources(_roots: Roots, _scene: str) -> list[Path]:
+    from aerialdojo_gen.paper import files
+
+    return files()
+
+
+def _enough_for_the_paper(data: Path, scenes: Sequence[str], config: Any) -> None:
+    if config.paper_counts:
+        from aerialdojo_gen.release.stats import require_pools
+
+        require_pools(data, scenes)
 
 
 def _render_parts(data: Path, scene: str, config: Any) -> int:
@@ -234,6 +255,7 @@ STAGES: tuple[Stage, ...] = (
         _UPSTREAM_OF_SPLIT,
         ("tasks/train", "tasks/test", "routes/train", "routes/test",
          "release/scenes", "release/landmarks", "release/objects", "release/anchors"),
+        sources=_paper_sources, check=_enough_for_the_paper,
     ),
     Stage(
         "render", 1, "Record four RGB-D views along trajectories of the release.",

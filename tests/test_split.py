@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from aerialdojo_gen import schemas, store
 from aerialdojo_gen.config import Embodiment, FilterConfig, SplitConfig
 from aerialdojo_gen.release.card import counts, write_card
-from aerialdojo_gen.release.select import nav_id, train_mask
+from aerialdojo_gen.release.select import nav_id, train_counts, train_mask
 from aerialdojo_gen.stage import Job, Roots
 from aerialdojo_gen.stages import filter as filter_stage
 from aerialdojo_gen.stages import split
@@ -183,11 +183,12 @@ def test_nav_ids_do_not_tell_the_pair():
 )  # fmt: skip
 def test_training_tasks_are_chosen_by_key_not_by_row(n, fraction, seed, order):
     ids, settings = [f"t{i}" for i in range(n)], [("base", "standard")[i % 2] for i in range(n)]
-    mask = train_mask(ids, settings, fraction, seed)
+    trains = train_counts(settings, fraction)
+    mask = train_mask(ids, settings, trains, seed)
     for setting in ("base", "standard"):
         total = settings.count(setting)
         assert sum(m for m, s in zip(mask, settings, strict=True) if s == setting) == int(fraction * total + 0.5)
     shuffled = list(range(n))
     order.shuffle(shuffled)
-    again = train_mask([ids[i] for i in shuffled], [settings[i] for i in shuffled], fraction, seed)
+    again = train_mask([ids[i] for i in shuffled], [settings[i] for i in shuffled], trains, seed)
     assert [mask[i] for i in shuffled] == list(again)

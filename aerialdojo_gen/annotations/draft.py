@@ -28,6 +28,7 @@ _STAGE = "annotate-draft"
 _MOST_FACTS = 4
 _TRIES = 12
 _WORTH_SAYING = 0.35
+_ALOFT_M = 3.0
 
 
 @dataclass(frozen=True)
@@ -44,6 +45,9 @@ class Choice:
         Radius of the core; None for the whole scene. How long tasks are hangs on it.
     core_share : float
         Share of the objects that come from the core; the others may stand anywhere.
+    aloft_share : float
+        Share of the core's objects that is taken from what stands 3 m above z = 0 or higher, as far as there is any:
+        roofs and decks against the street make routes that are not straight.
     most_vegetation : int
         Most objects of one category of vegetation.
     most : int
@@ -54,6 +58,7 @@ class Choice:
     centre_m: tuple[float, float] | None = None
     within_m: float | None = None
     core_share: float = 1.0
+    aloft_share: float = 0.0
     most_vegetation: int = 3
     most: int = 5
 
@@ -149,8 +154,14 @@ class _Drafter:
         everywhere = self._queues(ambiguity)
         core = {c: [i for i in queue if self._in_core(i, ambiguity)] for c, queue in everywhere.items()}
         rest = {c: [i for i in queue if i not in core[c]] for c, queue in everywhere.items()}
+        aloft = {c: [i for i in queue if self._aloft(i)] for c, queue in core.items()}
+        low = {c: [i for i in queue if i not in aloft[c]] for c, queue in core.items()}
         in_core = n if self._choice.within_m is None else round(n * self._choice.core_share)
-        for queues, upto in ((core, in_core), (rest, n if in_core < n else in_core)):
+        phases = ((core, in_core), (rest, n if in_core < n else in_core))
+        if self._choice.aloft_share > 0:
+            high = round(in_core * self._choice.aloft_share)
+            phases = ((aloft, high), (low, in_core), (aloft, in_core), phases[1])
+        for queues, upto in phases:
             while len(taken) < upto:
                 before = len(taken)
                 # What the core has none of comes first.
@@ -199,6 +210,9 @@ class _Drafter:
         if not (np.all(middle >= self._scene.bounds[0]) and np.all(middle <= self._scene.bounds[1])):
             return False
         return choice.eligible is None or choice.eligible(instance.node)
+
+    def _aloft(self, i: int) -> bool:
+        return float(self._scene.instances[i].bounds[0, 2]) >= _ALOFT_M
 
     def _in_core(self, i: int, ambiguity: Ambiguity) -> bool:
         if self._choice.within_m is None:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,15 +23,22 @@ def nav_id(scene: str, pair_id: str) -> str:
     return f"{scene}-{hashlib.blake2b(f'{scene}/{pair_id}'.encode(), digest_size=6).hexdigest()}"
 
 
-def train_mask(nav_ids: Sequence[str], settings: Sequence[str], fraction: float, seed: int) -> NDArray[np.bool_]:
-    """Choose the navigation tasks that train, the same share in each setting.
+def train_counts(settings: Sequence[str], fraction: float) -> dict[str, int]:
+    """Return how many tasks of each setting train: the same share of each, rounded half up."""
+    return {setting: int(fraction * n + 0.5) for setting, n in Counter(settings).items()}
+
+
+def train_mask(
+    nav_ids: Sequence[str], settings: Sequence[str], trains: Mapping[str, int], seed: int
+) -> NDArray[np.bool_]:
+    """Choose the navigation tasks that train.
 
     Parameters
     ----------
     nav_ids, settings : sequences of n str
         The tasks and their length settings.
-    fraction : float
-        Share that trains, in [0, 1]; a setting's number is rounded half up.
+    trains : mapping of str to int
+        How many of each setting train.
     seed : int
         Of the pipeline. A task's place depends on the seed and its id, not on its row.
 
@@ -40,8 +48,8 @@ def train_mask(nav_ids: Sequence[str], settings: Sequence[str], fraction: float,
         True for training. Both instances of a task follow it.
     """
     mask = np.zeros(len(nav_ids), dtype=bool)
-    for setting in sorted(set(settings)):
+    for setting, n in trains.items():
         rows = [i for i, s in enumerate(settings) if s == setting]
         rows.sort(key=lambda i: rank(seed, "split", nav_ids[i]))
-        mask[rows[: int(fraction * len(rows) + 0.5)]] = True
+        mask[rows[:n]] = True
     return mask

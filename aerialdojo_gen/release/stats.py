@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from aerialdojo_gen import store
+from aerialdojo_gen.errors import PoolError
 from aerialdojo_gen.paper import PaperScene, inventory
 from aerialdojo_gen.schemas import SETTINGS
 
@@ -71,6 +72,24 @@ def pool_of(data: Path, scene: str) -> Pool:
         most = sum(float(lengths[s][len(lengths[s]) - n :].sum()) for s, n in paper.tasks.items())
         path = least, most
     return Pool(scene, verdicts.num_rows, {s: len(v) for s, v in lengths.items()}, paper, path)
+
+
+def require_pools(data: Path, scenes: Sequence[str]) -> None:
+    """Raise a `PoolError` that names every scene and setting with fewer kept candidates than the paper has tasks.
+
+    Raises
+    ------
+    PoolError
+        One line a scene and setting that falls short, with the mend.
+    """
+    lacking = [
+        f"{pool.scene}: {n} {setting} tasks short: {pool.kept[setting]} are kept, the paper has {pool.kept[setting] + n}"
+        for pool in (pool_of(data, scene) for scene in scenes)
+        for setting, n in pool.short.items()
+    ]
+    if lacking:
+        mend = "move objects or obstacles in the recipe, or draft the annotations anew with another --within"
+        raise PoolError("\n".join([*lacking, f"nothing is released; {mend}"]))
 
 
 def pool_lines(pools: Sequence[Pool]) -> list[str]:

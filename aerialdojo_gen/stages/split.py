@@ -7,9 +7,12 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
+from numpy.typing import NDArray
 
 from aerialdojo_gen.config import SplitConfig
-from aerialdojo_gen.release.select import nav_id, train_mask
+from aerialdojo_gen.paper import PaperScene, inventory, splits
+from aerialdojo_gen.release import quota
+from aerialdojo_gen.release.select import nav_id, train_counts, train_mask
 from aerialdojo_gen.schemas import RELEASE_OBJECTS, ROUTES, TASKS
 from aerialdojo_gen.stage import Job, Output
 
@@ -109,6 +112,17 @@ def tasks_table(routes: pa.Table, train: pa.ChunkedArray, scene: dict[str, Any],
     return pa.concat_tables(instances).sort_by([(key, "ascending") for key in TASKS.key])
 
 
+def _chosen(routes: pa.Table, paper: PaperScene, seed: int) -> NDArray[np.bool_]:
+    return quota.choose(
+        routes.column("nav_id").to_pylist(),
+        routes.column("setting").to_pylist(),
+        routes.column("length_m").to_numpy(),
+        paper.tasks,
+        paper.path_m,
+        seed,
+    )
+
+
 def run(job: Job, config: SplitConfig) -> Output:
     """Write a scene's tasks, routes, objects, landmarks, anchors and scene row to the release."""
     scenes, landmarks, objects, anchors = (job.read(t) for t in ("scenes", "landmarks", "objects", "anchors"))
@@ -130,8 +144,14 @@ def run(job: Job, config: SplitConfig) -> Output:
     named = pictured.drop_columns("reference_image").append_column(
         "landmark", _take(landmarks, "landmark_id", objects.column("landmark_id")).column("name")
     )
-    fraction = config.ood_train_fraction if scene["partition"] == "OOD" else config.id_train_fraction
-    train = train_mask(routes.column("nav_id").to_pylist(), routes.column("setting").to_pylist(), fraction, job.seed)
+    paper = inventory().get(job.scene) if config.paper_counts else None
+    if paper is not None:
+        routes = routes.filter(pa.array(_chosen(routes, paper, job.seed)))
+        trains = quota.train_quotas(job.scene, inventory(), splits())
+    else:
+        fraction = config.ood_train_fraction if scene["partition"] == "OOD" else config.id_train_fraction
+        trains = train_counts(routes.column("setting").to_pylist(), fraction)
+    train = train_mask(routes.column("nav_id").to_pylist(), routes.column("setting").to_pylist(), trains, job.seed)
     tasks = tasks_table(routes, pa.chunked_array([pa.array(train)]), scene, named)
     routes = routes.drop_columns("action_budget")
     is_train = pc.equal(tasks.column("subset"), "train")

@@ -101,9 +101,9 @@ def _on_walls(site: Site) -> None:
     fire_escape(site, -28.0, -3.2, 90.0, 4, _STOREY_M)
     fire_escape(site, -16.5, 15.0, -90.0, 4, _STOREY_M)
     for x, y, yaw, storey, thing in (
-        (-3.0, -3.2, 90.0, 1, "flower_tub"), (3.0, -3.2, 90.0, 2, "camp_chair"), (8.0, 10.5, 180.0, 1, "bicycle"),
+        (-3.0, -3.2, 90.0, 1, "planter"), (3.0, -3.2, 90.0, 2, "rocking_chair"), (8.0, 10.5, 180.0, 1, "bicycle"),
         (8.0, 6.0, 180.0, 2, "planter"), (-24.0, 10.0, 0.0, 1, "topiary"), (-24.0, 6.0, 0.0, 2, "rocking_chair"),
-        (-18.0, -14.0, 0.0, 2, "flower_tub"), (-6.0, 3.2, -90.0, 2, "cooler_box"),
+        (-18.0, -14.0, 0.0, 2, "planter"), (-6.0, 3.2, -90.0, 2, "garden_gnome"),
     ):  # fmt: skip
         z = storey * _STOREY_M
         wide = 3.4 if thing == "planter" else 3.0
@@ -146,15 +146,15 @@ def _washing(site: Site, count: int) -> None:
 def _on_roofs(site: Site, roofs: dict[str, float]) -> None:
     for category, x, y, house in (
         ("water_tank", -30.0, 24.0, "north-west"), ("satellite_dish", -16.0, 20.0, "north-west"),
-        ("skylight", -32.0, 8.5, "west"), ("vent_stack", -26.5, 12.5, "west"),
+        ("satellite_dish", -32.0, 8.5, "west"), ("weather_station", -26.5, 12.5, "west"),
         ("air_conditioner", -4.0, 24.0, "middle"),
-        ("parasol", -4.0, 10.0, "middle"), ("camp_chair", -6.4, 12.6, "middle"),
+        ("topiary", -4.0, 10.0, "middle"), ("rocking_chair", -6.4, 12.6, "middle"),
         ("solar_panels", -28.0, -18.0, "south-west"),
         ("water_tank", -22.5, -8.5, "south-west"), ("beehive", -4.0, -20.0, "south"),
         ("telescope", 3.0, -12.0, "south"), ("clothes_line", 2.0, -22.0, "south"),
-        ("air_conditioner", -6.0, -9.0, "south"), ("skylight", 18.0, 9.0, "east"),
+        ("air_conditioner", -6.0, -9.0, "south"), ("satellite_dish", 18.0, 9.0, "east"),
         ("satellite_dish", 12.0, 13.5, "east"),
-        ("vent_stack", 12.0, -11.0, "south-east"), ("billboard", 22.0, -8.0, "south-east"),
+        ("weather_station", 12.0, -11.0, "south-east"), ("billboard", 22.0, -8.0, "south-east"),
     ):  # fmt: skip
         put(
             site,
@@ -179,12 +179,12 @@ def _alley_things(site: Site) -> None:
     things = (
         ("dumpster", -12.0, 2.2, -90), ("cardboard_boxes", -14.6, 2.3, 20), ("gas_cylinder_cage", -27.0, -2.4, 90),
         ("crate_stack", -1.0, 2.2, 0), ("bicycle", -23.0, -2.5, 5),
-        ("fuel_drum", -18.4, 2.4, 0), ("litter_bin", -36.2, -2.4, 90), ("a_board", -36.6, 2.0, -90),
+        ("oil_drums", -18.4, 2.4, 0), ("litter_bin", -36.2, -2.4, 90), ("a_board", -36.6, 2.0, -90),
         ("newspaper_box", -29.0, 2.6, -90), ("vending_machine", -8.2, 2.6, -90), ("scooter", 0.2, -2.4, 170),
-        ("pallet_stack", 7.1, 2.0, 10), ("lantern", 2.9, -2.4, 90), ("cafe_table", 5.8, 7.8, 0),
+        ("pallet_stack", 7.1, 2.0, 10), ("litter_bin", 2.9, -2.4, 90), ("cafe_table", 5.8, 7.8, 0),
         ("fox", 4.6, 15.6, 70),
-        ("shopping_cart", 3.2, 25.6, 100), ("traffic_cone", 6.8, 22.6, 0), ("roll_cage", 7.2, 27.8, 90),
-        ("skip_container", -15.3, -25.4, 90), ("ladder_stand", -17.2, -17.5, -90), ("sawhorse", -13.5, -15.0, 60),
+        ("shopping_cart", 3.2, 25.6, 100), ("traffic_cone", 6.8, 22.6, 0), ("cardboard_boxes", 7.2, 27.8, 90),
+        ("skip_container", -15.3, -25.4, 90), ("sawhorse", -17.2, -17.5, -90), ("sawhorse", -13.5, -15.0, 60),
         ("wheelbarrow", -14.0, -9.0, -70), ("wheelie_bin", -17.2, -6.4, 0), ("oil_drums", -13.4, -20.0, 0),
         ("dumpster", -13.5, -6.0, 180),
         ("phone_booth", 10.6, -0.9, 90), ("recycling_bin", 16.0, 1.5, -90), ("motorcycle", 21.6, 0.4, 8),
@@ -201,12 +201,12 @@ def _alley_things(site: Site) -> None:
 
 def _street_things(site: Site) -> None:
     square = [
-        "parasol",
+        "topiary",
         "cafe_table",
         "bench",
         "planter",
         "kiosk",
-        "flower_tub",
+        "planter",
         "balloon_stand",
         "urban_tree",
         "urban_tree",

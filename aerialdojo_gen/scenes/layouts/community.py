@@ -107,12 +107,12 @@ def _slabs(site: Site) -> list[Slab]:
 
 
 def _flats(site: Site) -> None:
-    balconies = (["rocking_chair", "flower_tub", "bicycle"], ["camp_chair", "planter", "topiary"],
-                 ["telescope", "flower_tub", "clothes_line"], ["bicycle", "topiary"], ["rocking_chair", "cooler_box"],
-                 ["camp_chair", "mountain_bike", "bird_feeder"])  # fmt: skip
-    roofs = (["water_tank", "solar_panels", "satellite_dish"], ["gazebo", "solar_panels", "vent_stack"],
-             ["air_conditioner", "skylight", "beehive"], ["solar_panels", "parasol", "water_tank"],
-             ["satellite_dish", "air_conditioner"], ["vent_stack", "water_tank", "billboard"])  # fmt: skip
+    balconies = (["rocking_chair", "planter", "bicycle"], ["rocking_chair", "planter", "topiary"],
+                 ["telescope", "planter", "clothes_line"], ["bicycle", "topiary"], ["rocking_chair", "garden_gnome"],
+                 ["rocking_chair", "mountain_bike", "bird_bath"])  # fmt: skip
+    roofs = (["water_tank", "solar_panels", "satellite_dish"], ["gazebo", "solar_panels", "weather_station"],
+             ["air_conditioner", "satellite_dish", "beehive"], ["solar_panels", "topiary", "water_tank"],
+             ["satellite_dish", "air_conditioner"], ["weather_station", "water_tank", "billboard"])  # fmt: skip
     arches = ("bicycle_rack", "vending_machine", "mailbox", "scooter", "recycling_bin", "bench")
     for slab, things, top, arch in zip(_slabs(site), balconies, roofs, arches, strict=True):
         put_up(site, slab)
@@ -124,7 +124,7 @@ def _flats(site: Site) -> None:
         front = (
             ["planter", "bench", "litter_bin"]
             if arch in ("mailbox", "scooter")
-            else ["flower_tub", "mailbox", "bicycle"]
+            else ["planter", "mailbox", "bicycle"]
         )
         deal(site, front, [slab.frame.pose(slab.depth_m / 2 + 2.6, v, 0.0) for v in (side, -side, -side + 3.4)],
              f"in front of {slab.name}")  # fmt: skip
@@ -148,7 +148,7 @@ def _gate(site: Site) -> None:
         ((64, -50.6), (64, 53)),
                  ((-64, 53), (64, 53))):  # fmt: skip
         fence(site, [a, b], "wall", "brick:#a8735c")
-    deal(site, ["flagpole", "flower_tub", "information_board", "lantern"],
+    deal(site, ["flagpole", "planter", "information_board", "litter_bin"],
          [Pose(-9.6, -39.0, -90.0), Pose(-5.0, -36.5, 0.0), Pose(-9.0, -34.0, -90.0),
          Pose(5.0, -38.0, 90.0)], "inside the gate")  # fmt: skip
 
@@ -180,7 +180,7 @@ def _garden_structures(site: Site) -> None:
     deal(site, ["cafe_table", "a_board", "bench",
         "phone_booth"], [Pose(x, 29.2, -90.0) for x in (-4.5, -1.5, 2.2, 5.2)],
          "under the canopy of the hall")  # fmt: skip
-    for category, x in (("solar_panels", -3.5), ("vent_stack", 3.6)):
+    for category, x in (("solar_panels", -3.5), ("weather_station", 3.6)):
         put(site, category, x, 35.0, -90.0, "on the roof of the hall", z=4.7)
     for k, (x, y) in enumerate(((12.5, -9.5), (-11.5, 8.0))):
         for r in (3.2, 5.2):
@@ -203,7 +203,7 @@ def _landmarks(site: Site) -> None:
 def _garden_things(site: Site) -> None:
     put(site, "gazebo", -19.0, 15.0, 0.0, "in the garden")
     deal(site, ["cafe_table"], [Pose(-25.5, 21.5, 0.0)], "in the garden")
-    garden = ["bench", "lantern", "litter_bin", "bird_feeder", "picnic_table", "flower_tub", "planter", "parasol",
+    garden = ["bench", "litter_bin", "litter_bin", "bird_bath", "picnic_table", "planter", "planter", "topiary",
         "birdhouse",
               "information_board", "hammock", "kiosk", "ice_cream_cart", "weather_station", "market_stall",
               "recycling_bin"]  # fmt: skip

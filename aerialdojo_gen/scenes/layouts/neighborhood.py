@@ -69,16 +69,16 @@ def _turning_circle(site: Site, tree_every_m: float) -> None:
         settle(site, lot)
     gardens = (
         ["trampoline", "garden_swing", "barbecue", "lawn_mower", "birdhouse", "clothes_line"],
-        ["swing_set", "hammock", "dog_house", "parasol", "water_butt", "bird_bath"],
-        ["playground_slide", "sandbox", "seesaw", "garden_gnome", "camp_chair"],
-        ["pergola", "garden_gnome", "wind_chime", "telescope", "bird_feeder"],
-        ["woodshed", "axe_block", "garden_shed", "compost_heap", "wheelbarrow"],
-        ["above_ground_pool", "barbecue", "clothes_line", "rope_swing", "kayak"],
+        ["swing_set", "hammock", "dog_house", "topiary", "water_barrel", "bird_bath"],
+        ["playground_slide", "sandbox", "seesaw", "garden_gnome", "rocking_chair"],
+        ["pergola", "garden_gnome", "birdhouse", "telescope", "bird_bath"],
+        ["woodshed", "axe_block", "garden_shed", "wheelbarrow", "wheelbarrow"],
+        ["above_ground_pool", "barbecue", "clothes_line", "rope_swing", "mountain_bike"],
         ["dome_tent", "rabbit_hutch", "greenhouse", "campfire", "canoe", "picnic_table"],
     )
-    fronts = (["bird_bath", "letterbox_post", "flower_tub"], ["garden_gnome", "letterbox_post",
-        "bicycle"], ["topiary", "letterbox_post"],
-              ["planter", "letterbox_post", "bench"], ["weather_station", "letterbox_post"], ["topiary",
+    fronts = (["bird_bath", "mailbox", "planter"], ["garden_gnome", "mailbox",
+        "bicycle"], ["topiary", "mailbox"],
+              ["planter", "mailbox", "bench"], ["weather_station", "mailbox"], ["topiary",
               "wheelie_bin", "scooter"],
               ["flagpole", "wheelie_bin", "mountain_bike"])  # fmt: skip
     cars = ("sedan", "pickup_truck", "suv", "hatchback", "delivery_van", "golf_cart", "sedan")
@@ -87,7 +87,7 @@ def _turning_circle(site: Site, tree_every_m: float) -> None:
         back_garden(site, lot, gardens[k], ["urban_tree", "oak_tree"] if k % 2 else ["birch_tree", "urban_tree"])
         front_garden(site, lot, fronts[k])
         if lot.style.porch_m:
-            on_porch(site, lot, ["rocking_chair", "flower_tub"] if k % 2 else ["bench", "flower_tub"])
+            on_porch(site, lot, ["rocking_chair", "planter"] if k % 2 else ["bench", "planter"])
         if lot.style.garage:
             in_drive(site, lot, cars[k])
             on_garage(site, lot, ("solar_panels", "satellite_dish", "air_conditioner")[k % 3])
@@ -146,19 +146,19 @@ def _green(site: Site, tree_every_m: float) -> None:
     for lot in lots:
         settle(site, lot, drive="cobbles", path="paving:#b89a80")
     gardens = (
-        ["garden_shed", "flower_tub", "lawn_mower", "clothes_line", "parasol", "garden_gnome"],
-        ["trampoline", "water_butt", "beehive", "rabbit_hutch", "bird_bath", "barbecue"],
-        ["swing_set", "cafe_table", "dog_house", "hammock", "compost_heap", "sandbox"],
-        ["pergola", "camp_chair", "telescope", "wind_chime", "garden_gnome", "seesaw"],
+        ["garden_shed", "planter", "lawn_mower", "clothes_line", "topiary", "garden_gnome"],
+        ["trampoline", "water_barrel", "beehive", "rabbit_hutch", "bird_bath", "barbecue"],
+        ["swing_set", "cafe_table", "dog_house", "hammock", "wheelbarrow", "sandbox"],
+        ["pergola", "rocking_chair", "telescope", "birdhouse", "garden_gnome", "seesaw"],
         ["playground_slide", "picnic_table", "greenhouse", "dog_house", "barbecue", "clothes_line"],
-        ["garden_swing", "water_butt", "bird_feeder", "carved_owl", "lawn_mower", "compost_heap"],
+        ["garden_swing", "water_barrel", "bird_bath", "carved_owl", "lawn_mower", "wheelbarrow"],
         ["bird_bath"],
     )
-    fronts = (["flower_tub", "letterbox_post", "bench"], ["topiary", "letterbox_post"], ["planter", "mailbox",
+    fronts = (["planter", "mailbox", "bench"], ["topiary", "mailbox"], ["planter", "mailbox",
         "bicycle"],
-              ["lantern_post", "wheelie_bin"], ["flower_tub", "wheelie_bin", "scooter"], ["topiary",
-              "letterbox_post"],
-              ["planter", "lantern_post", "bicycle"])  # fmt: skip
+              ["bird_bath", "wheelie_bin"], ["planter", "wheelie_bin", "scooter"], ["topiary",
+              "mailbox"],
+              ["planter", "bird_bath", "bicycle"])  # fmt: skip
     cars = ("hatchback", "sedan", "pickup_truck", "hatchback", "suv", "delivery_van", "sedan")
     for k, lot in enumerate(lots):
         enclose(site, lot, ("wall", "hedge", "railing")[k % 3], "hedge" if k % 2 else "board")
@@ -166,11 +166,11 @@ def _green(site: Site, tree_every_m: float) -> None:
         front_garden(site, lot, fronts[k])
         if lot.style.garage:
             in_drive(site, lot, cars[k])
-            on_garage(site, lot, ("satellite_dish", "solar_panels", "vent_stack")[k % 3])
+            on_garage(site, lot, ("satellite_dish", "solar_panels", "weather_station")[k % 3])
     _village_green(site)
     _lane_garages(site)
     _paddock(site)
-    kerb = ["lantern", "litter_bin", "parking_meter", "lantern", "recycling_bin", "fire_hydrant", "phone_booth",
+    kerb = ["litter_bin", "litter_bin", "parking_meter", "litter_bin", "recycling_bin", "fire_hydrant", "phone_booth",
             "direction_sign", "advertising_column", "bus_shelter", "newspaper_box", "traffic_light"]  # fmt: skip
     spots = [(-34.0, -1.2, -90.0), (-20.5, -1.2, -90.0), (-13.0, -8.9, 90.0), (5.2, -8.9, 90.0), (-26.5, -8.9, 90.0),
              (12.5, -1.3, -90.0), (5.6, 0.4, 200.0), (-2.9, 0.2, -45.0), (33.5, -0.4, -90.0), (22.0, -1.4, -90.0),
@@ -197,8 +197,8 @@ def _village_green(site: Site) -> None:
     shelter.append(("boards:#8d6f4c", block(8.2, 26.0, 14.0, 26.2, 0.0, 2.9)))
     site.add("market_hall", "market_hall", shelter, {"place": "on the green"})
     deal(site, ["market_stall"], [Pose(11.2, 23.6, -90.0)], "under the roof on the green")
-    things = ["bench", "litter_bin", "stage", "statue", "kiosk", "ice_cream_cart", "flower_tub", "information_board",
-              "parasol", "cafe_table", "picnic_table", "planter", "market_stall", "a_board",
+    things = ["bench", "litter_bin", "stage", "statue", "kiosk", "ice_cream_cart", "planter", "information_board",
+              "topiary", "cafe_table", "picnic_table", "planter", "market_stall", "a_board",
               "bicycle_rack"]  # fmt: skip
     spots = [(14.0, 16.5, -20.0), (26.0, 18.2, 200.0), (25.0, 26.8, -110.0), (33.4, 13.0, 180.0), (10.2, 13.8, 0.0),
              (25.2, 6.6, 120.0), (13.5, 7.2, 60.0), (8.0, 8.0, -60.0), (31.0, 19.6, 30.0), (32.0, 8.6, 120.0),
@@ -214,7 +214,7 @@ def _village_green(site: Site) -> None:
 def _paddock(site: Site) -> None:
     """Fill the plot behind the dark brick house: hay, a tractor, boats on trestles, a skip."""
     site.paint(rectangle(-18.6, 19.0, -6.4, 36.0), "dirt")
-    things = ["tractor", "hay_bales", "skip_container", "kayak", "log_pile", "canoe", "ladder_stand", "fuel_drum",
+    things = ["tractor", "hay_bales", "skip_container", "mountain_bike", "log_pile", "canoe", "sawhorse", "oil_drums",
               "cardboard_boxes", "basketball_hoop", "stone_well", "quad_bike"]  # fmt: skip
     spots = [(-9.4, 22.0, 100), (-16.6, 21.4, 0), (-14.6, 33.8, 0), (-16.8, 27.0, 90), (-12.4, 20.4, 0),
         (-14.8, 27.0, 90),
@@ -246,7 +246,7 @@ def _lane_garages(site: Site) -> None:
     ]
     site.add("gate_house", "gate_house", parts, {"place": "over the lane"}, footprint=rectangle(-4.6, 26, -2.4, 31.4))
     site.occupy(rectangle(4.4, 26.0, 6.6, 31.4))
-    put(site, "flower_tub", 3.2, 28.4, 180.0, "in the passage under the gate house", z=0.0)
+    put(site, "planter", 3.2, 28.4, 180.0, "in the passage under the gate house", z=0.0)
     put(site, "bicycle", -1.7, 29.2, 90.0, "in the passage under the gate house", z=0.0)
     put(site, "solar_panels", 1.0, 28.6, -90.0, "on the gate house", z=6.6)
 

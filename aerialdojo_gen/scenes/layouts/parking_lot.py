@@ -56,7 +56,7 @@ def build(site: Site) -> None:
 def _city(site: Site, occupancy: float) -> None:
     _ground(site)
     bays, shaded = _bays(site)
-    deck = parking_deck(site, 31.0, 2.0, 59.0, 36.0)
+    deck = parking_deck(site, 31.0, 2.0, 59.0, 36.0, place="beside the car park")
     _islands(site)
     _solar_roofs(site)
     _offices(site)
@@ -68,6 +68,12 @@ def _city(site: Site, occupancy: float) -> None:
     park_cars(site, shaded, 0.5, "under the solar roof")
     park_cars(site, bays, occupancy, "in the car park")
     top = len(deck.levels_m) - 1
+    stalls = ["market_stall", "ice_cream_cart", "cafe_table", "food_truck", "stage", "cotton_candy_stand", "planter",
+              "carousel", "kiosk", "balloon_stand", "vending_machine", "bench", "motorcycle", "ev_charger"]  # fmt: skip
+    spots = [
+        Pose(34.5 + 5.2 * k, y, 90.0 * (1 - 2 * row)) for row, y in enumerate((6.0, 13.4, 24.6)) for k in range(5)
+    ]
+    deal(site, stalls, spots, "in the market on the roof of the parking deck", z=deck.levels_m[top])
     for k, (z, poses) in enumerate(zip(deck.levels_m, deck.bays, strict=True)):
         floor = "ground floor" if k == 0 else "roof" if k == top else "middle floor"
         park_cars(site, poses, 0.34, f"on the {floor} of the parking deck", z=z or None)
@@ -119,8 +125,8 @@ def _islands(site: Site) -> None:
         Pose(x, y + dy, 60.0 * k) for k, y in enumerate(_DOUBLE_ROWS) for x in (-51.3, 13.8) for dy in (-2.6, 2.6)
     ]
     deal(site, ["urban_tree"], trees, "on a traffic island")
-    walk = ["planter", "litter_bin", "bench", "shopping_cart", "recycling_bin", "flower_tub", "parking_meter",
-            "vending_machine", "bollard", "fire_hydrant", "photo_booth", "mailbox", "phone_booth"]  # fmt: skip
+    walk = ["planter", "litter_bin", "bench", "shopping_cart", "recycling_bin", "planter", "parking_meter",
+            "vending_machine", "fire_hydrant", "fire_hydrant", "photo_booth", "mailbox", "phone_booth"]  # fmt: skip
     spots = [
         Pose(x, y + dy, 0.0 if x < -17 else 180.0) for y in _DOUBLE_ROWS for x, dy in ((-18.3, 3.0), (-15.6, -3.0))
     ]
@@ -156,7 +162,11 @@ def _offices(site: Site) -> None:
         (-26.0, -6.0, 4, "facade_brick", "brick office"),
         (-1.0, 20.0, 3, "curtain_wall", "glass office"),
     )
-    roofs = (["satellite_dish", "air_conditioner"], ["water_tank", "vent_stack"], ["skylight", "air_conditioner"])
+    roofs = (
+        ["satellite_dish", "air_conditioner"],
+        ["water_tank", "weather_station"],
+        ["satellite_dish", "air_conditioner"],
+    )
     for (x0, x1, storeys, wall, what), equipment in zip(blocks, roofs, strict=True):
         plan = rectangle(x0, 43.0, x1, 55.0)
         top = storeys * 3.5
@@ -170,14 +180,26 @@ def _offices(site: Site) -> None:
         middle = (x0 + x1) / 2
         for category, dx in zip(equipment, (-5.0, 4.5), strict=True):
             put(site, category, middle + dx, 49.0, -90.0, "on the roof of an office", z=top)
+    terraces = {
+        "on the roof terrace of the north-west office": (-52.0, -30.0, 10.5, [
+            "cafe_table", "hammock", "planter", "beehive", "barbecue", "telescope", "bench", "flagpole"]),
+        "on the roof terrace of the brick office": (-26.0, -6.0, 14.0, [
+            "weather_station", "picnic_table", "topiary", "rocking_chair", "solar_panels", "pergola"]),
+        "on the roof terrace of the glass office": (-1.0, 20.0, 10.5, [
+            "garden_swing", "cafe_table", "bench", "birdhouse", "planter", "information_board", "swing_set"]),
+    }  # fmt: skip
+    for place, (x0, x1, top, things) in terraces.items():
+        spots = [Pose(x0 + 3.0 + 4.6 * k, 45.4 + 7.0 * (k % 2), -90.0) for k in range(int((x1 - x0 - 4) // 4.6) + 1)]
+        spots += [Pose(p.x, 97.8 - p.y, 90.0) for p in spots[1::2]]
+        deal(site, things, spots, place, z=top)
     for x, variant in ((-47.5, "coffee"), (-34.5, "pharmacy"), (3.5, "bakery"), (15.0, "books")):
         site.place("storefront", x, 43.0, -90.0, z=0.12, variant=variant, attributes={"place": "in an office front"})
     banners = ((-23.5, "red_disc"), (-8.5, "blue_triangle"))
     for x, variant in banners:
         site.place("wall_banner", x, 43.0, -90.0, z=4.6, variant=variant, attributes={"place": "on the brick office"})
     put(site, "wall_clock", -16.0, 43.0, -90.0, "on the brick office", z=9.2)
-    front = ["bicycle_rack", "bench", "planter", "a_board", "newspaper_box", "cafe_table", "parasol", "flower_tub",
-             "bicycle", "topiary", "atm_kiosk", "scooter", "information_board", "lantern"]  # fmt: skip
+    front = ["bicycle_rack", "bench", "planter", "a_board", "newspaper_box", "cafe_table", "topiary", "planter",
+             "bicycle", "topiary", "atm_kiosk", "scooter", "information_board", "litter_bin"]  # fmt: skip
     xs = [-51.5, -43.5, -39.0, -31.0, -28.0, -24.5, -20.5, -11.5, -7.0, -3.5, 7.5, 11.3, 19.0, 22.5]
     deal(site, front, [Pose(x, 39.6 + 0.9 * (k % 2), -90.0) for k, x in enumerate(xs)], "in front of the offices")
     put(site, "dumpster", -28.0, 46.5, -90.0, "between two offices")
@@ -201,11 +223,11 @@ def _shop(site: Site) -> None:
     parts += canopy(25.0, -24.0, 47.0, -20.1, 3.3, roof=band, posts=[(25.5, -23.6), (32.5, -23.6), (39.5, -23.6),
                                                                     (46.5, -23.6)])  # fmt: skip
     site.add("market", "market", parts, {"colour": "green"}, footprint=plan)
-    front = ["vending_machine", "shopping_cart", "cardboard_boxes", "roll_cage", "newspaper_box", "bench"]
+    front = ["vending_machine", "shopping_cart", "cardboard_boxes", "cardboard_boxes", "newspaper_box", "bench"]
     deal(site, front, [Pose(26.6 + 3.6 * k, -21.0, -90.0) for k in range(6) if k != 3], "under the market's canopy")
-    for category, x in (("air_conditioner", 30.0), ("vent_stack", 36.0), ("solar_panels", 42.0)):
+    for category, x in (("air_conditioner", 30.0), ("weather_station", 36.0), ("solar_panels", 42.0)):
         put(site, category, x, -14.0, -90.0, "on the roof of the market", z=4.72)
-    back = ["dumpster", "pallet_stack", "forklift", "roll_cage", "fuel_drum"]
+    back = ["dumpster", "pallet_stack", "forklift", "cardboard_boxes", "oil_drums"]
     deal(site, back, [Pose(27.0 + 4.4 * k, -6.3, 90.0) for k in range(5)], "behind the market")
 
 
@@ -222,7 +244,7 @@ def _charging_court(site: Site) -> None:
                                 (56.0, -43.5, "billboard", 150.0), (65.5, -28.5, "site_light_tower",
                                 200.0)):  # fmt: skip
         put(site, category, x, y, yaw, "beside the charging court")
-    deal(site, ["concrete_barrier", "traffic_cone", "generator", "barrier"],
+    deal(site, ["barrier", "traffic_cone", "generator", "barrier"],
          [Pose(61.5, -44 + 4.2 * k, 0.0) for k in range(4)], "beside the charging court")  # fmt: skip
 
 
@@ -259,11 +281,11 @@ def _landmarks(site: Site) -> None:
 def _furnish(site: Site) -> None:
     trees = [Pose(x, y, 35.0 * y) for y in range(-42, 52, 11) for x in (-67.0, -56.5)]
     deal(site, ["urban_tree", "oak_tree", "urban_tree", "birch_tree"], trees, "in the strip of park")
-    park = ["bench", "litter_bin", "swing_set", "picnic_table", "flower_tub", "playground_slide", "bicycle",
+    park = ["bench", "litter_bin", "swing_set", "picnic_table", "planter", "playground_slide", "bicycle",
             "spring_rider", "trampoline", "gazebo", "market_stall", "ice_cream_cart"]  # fmt: skip
     poses = [Pose(-65.5 if k % 2 else -58.8, -42.0 + 7.7 * k, 0.0 if k % 2 else 180.0) for k in range(12)]
     deal(site, park, poses, "in the strip of park")
-    around = ["bench", "planter", "cafe_table", "parasol", "topiary", "balloon_stand"]
+    around = ["bench", "planter", "cafe_table", "topiary", "topiary", "balloon_stand"]
     deal(site, around, [Pose(58 + dx, -14 + dy, yaw) for dx, dy, yaw in (
         (-7.5, 0, 0), (7.8, 3.5, 180), (-7.0, 6.2, 0), (4.5, 6.9, -90), (7.6, -5.5, 150), (-3.5, -7.4, 90))],
         "around the fountain")  # fmt: skip

@@ -78,7 +78,7 @@ def _arcade(site: Site) -> None:
     parts: Parts = deck(rectangle(-8, -10.0, -0.4, -6.0), _ARCADE_M, floor="tiles:#c9a98a", under="plaster:#e6d8b8",
                         posts=posts, post="stone", post_radius_m=0.3)  # fmt: skip
     site.add("arcade", "arcade", parts, {"place": "on the piazza"})
-    for category, x, y in (("parasol", -5.8, -8.0), ("cafe_table", -2.6, -8.0), ("flower_tub", -7.3, -6.7)):
+    for category, x, y in (("topiary", -5.8, -8.0), ("cafe_table", -2.6, -8.0), ("planter", -7.3, -6.7)):
         put(site, category, x, y, 0.0, "on the terrace over the arcade", z=_ARCADE_M)
     deal(site, ["bench", "a_board", "newspaper_box"], [Pose(-7.0, -8.6, 0.0), Pose(-3.0, -7.2, 90.0),
         Pose(-0.9, -9.2, 180.0)],
@@ -97,12 +97,12 @@ def _on_walls(site: Site) -> None:
     ):  # fmt: skip
         site.place("storefront", x, y, yaw, variant=variant, attributes={"place": "in the market lanes"})
     for x, y, yaw, storey, thing in (
-        (-24.0, 8.0, 0.0, 1, "flower_tub"), (-24.0, -9.0, 0.0, 1, "planter"),
+        (-24.0, 8.0, 0.0, 1, "planter"), (-24.0, -9.0, 0.0, 1, "planter"),
         (-19.5, 16.0, 180.0, 2, "rocking_chair"),
-        (-2.0, 18.0, 0.0, 1, "topiary"), (3.0, 27.0, 180.0, 2, "flower_tub"), (-8.0, 6.6, 0.0, 1, "cafe_table"),
-        (2.0, -16.0, 0.0, 2, "camp_chair"), (7.0, -21.0, 180.0, 1, "bicycle"), (10.0, -1.6, 180.0, 2, "topiary"),
-        (31.0, -10.0, 180.0, 1, "planter"), (25.2, -16.1, 90.0, 2, "bird_feeder"), (22.4, 7.0, -90.0, 1, "telescope"),
-        (-19.5, -22.0, 180.0, 1, "camp_chair"),
+        (-2.0, 18.0, 0.0, 1, "topiary"), (3.0, 27.0, 180.0, 2, "planter"), (-8.0, 6.6, 0.0, 1, "cafe_table"),
+        (2.0, -16.0, 0.0, 2, "rocking_chair"), (7.0, -21.0, 180.0, 1, "bicycle"), (10.0, -1.6, 180.0, 2, "topiary"),
+        (31.0, -10.0, 180.0, 1, "planter"), (25.2, -16.1, 90.0, 2, "bird_bath"), (22.4, 7.0, -90.0, 1, "telescope"),
+        (-19.5, -22.0, 180.0, 1, "rocking_chair"),
     ):  # fmt: skip
         z = storey * _STOREY_M
         depth = 2.4 if thing in ("cafe_table",) else 1.4
@@ -143,17 +143,17 @@ def _across(site: Site, count: int) -> None:
 
 def _on_roofs(site: Site, tops: dict[str, float]) -> None:
     for category, x, y, house in (
-        ("satellite_dish", -31.0, -12.0, "c"), ("parasol", -29.0, -6.0, "c"), ("rocking_chair", -32.4, -6.2, "c"),
+        ("satellite_dish", -31.0, -12.0, "c"), ("topiary", -29.0, -6.0, "c"), ("rocking_chair", -32.4, -6.2, "c"),
         ("clothes_line", -34.0, -10.0, "c"), ("bird_bath", -26.4, -13.6, "c"),
-        ("water_tank", -11.0, 6.0, "e"), ("flower_tub", -15.5, 9.5, "e"), ("solar_panels", 18.0, 22.0, "j"),
+        ("water_tank", -11.0, 6.0, "e"), ("planter", -15.5, 9.5, "e"), ("solar_panels", 18.0, 22.0, "j"),
         ("gazebo", 18.0, 13.0, "j"), ("planter", 14.2, 28.0, "j"), ("air_conditioner", 13.5, -26.0, "m"),
-        ("parasol", 12.0, -15.0, "m"), ("beehive", 16.4, -19.0, "m"), ("rabbit_hutch", 8.6, -30.0, "m"),
-        ("hammock", 17.0, -12.5, "m"), ("garden_swing", 22.0, 27.0, "j"), ("water_butt", 22.8, 9.0, "j"),
-        ("wind_chime", 13.4, 9.0, "j"), ("garden_gnome", 22.6, 20.0, "j"), ("trampoline", 14.6, 18.0, "j"),
+        ("topiary", 12.0, -15.0, "m"), ("beehive", 16.4, -19.0, "m"), ("rabbit_hutch", 8.6, -30.0, "m"),
+        ("hammock", 17.0, -12.5, "m"), ("garden_swing", 22.0, 27.0, "j"), ("water_barrel", 22.8, 9.0, "j"),
+        ("birdhouse", 13.4, 9.0, "j"), ("garden_gnome", 22.6, 20.0, "j"), ("trampoline", 14.6, 18.0, "j"),
         ("barbecue", -17.6, 4.4, "e"), ("dog_house", -35.0, -4.6, "c"), ("weather_station", -18.4, -9.0, "h"),
         ("telescope", 33.0, 0.6, "p"), ("birdhouse", 22.0, 0.2, "arch"), ("pergola", 15.0, -28.6, "m"),
-        ("barbecue", 9.0, -22.0, "m"), ("bird_feeder", -12.0, -6.0, "h"),
-        ("cafe_table", -16.0, -6.4, "h"), ("vent_stack", 34.0, -4.0, "p"), ("skylight", 34.0, -11.0, "p"),
+        ("barbecue", 9.0, -22.0, "m"), ("bird_bath", -12.0, -6.0, "h"),
+        ("cafe_table", -16.0, -6.4, "h"), ("weather_station", 34.0, -4.0, "p"), ("satellite_dish", 34.0, -11.0, "p"),
         ("satellite_dish", 28.0, -1.0, "arch"), ("topiary", -21.7, 23.5, "lane arch"),
     ):  # fmt: skip
         put(site, category, x, y, 200.0, "on a roof terrace", z=tops[house])
@@ -172,14 +172,14 @@ def _stalls(site: Site) -> None:
 
 def _lane_things(site: Site) -> None:
     things = (
-        ("bicycle", -33.6, -1.9, 4), ("cafe_table", -34.8, 1.0, 0), ("flower_tub", -26.0, 1.9, 0),
+        ("bicycle", -33.6, -1.9, 4), ("cafe_table", -34.8, 1.0, 0), ("planter", -26.0, 1.9, 0),
         ("scooter", -18.0, 1.8, 0),
         ("clothes_rack", -17.5, -1.7, 90), ("a_board", -10.0, 1.7, -90), ("litter_bin", -9.4, -1.8, 90),
         ("water_barrel", -23.3, 18.4, 0), ("bicycle", -20.2, 29.4, 90), ("cardboard_boxes", -23.0, 25.0, 0),
-        ("market_stall", -21.7, 14.0, 90), ("wheelbarrow", -20.4, -8.0, 80), ("fuel_drum", -23.4, -6.0, 0),
+        ("market_stall", -21.7, 14.0, 90), ("wheelbarrow", -20.4, -8.0, 80), ("oil_drums", -23.4, -6.0, 0),
         ("motorcycle", -20.3, -18.6, 90), ("wheelie_bin", -23.0, -28.8, 0), ("crate_stack", -23.3, -19.0, 90),
         ("pallet_stack", -20.4, -25.0, 0),
-        ("lantern", -22.0, 0.0, 0), ("lantern", 0.4, 16.0, 90), ("newspaper_box", -1.4, 22.4, 0),
+        ("litter_bin", -22.0, 0.0, 0), ("litter_bin", 0.4, 16.0, 90), ("newspaper_box", -1.4, 22.4, 0),
         ("vending_machine", 2.4, 29.6, 180),
         ("shopping_cart", -0.9, 30.4, 60), ("clothes_rack", 2.1, 24.4, 90), ("market_stall", 4.5, -13.2, 90),
         ("scooter", 6.3, -17.0, 95), ("litter_bin", 2.6, -22.6, 0), ("fox", 4.8, -26.0, 80),
@@ -187,7 +187,7 @@ def _lane_things(site: Site) -> None:
         ("mailbox", 13.0, 6.3, -90), ("bench", 21.0, 2.6, 90), ("market_stall", 33.6, 4.6, 180),
         ("planter", 26.0, 5.9, 0),
         ("a_board", 12.2, 3.2, 160), ("bicycle", 28.6, 6.3, 0), ("stone_well", 22.6, -7.0, 0),
-        ("parasol", 29.0, -6.0, 0),
+        ("topiary", 29.0, -6.0, 0),
         ("picnic_table", 29.2, -8.6, 90), ("topiary", 20.8, -15.2, 0), ("rocking_chair", 30.0, -14.6, 120),
         ("urban_tree", 21.8, -11.0, 0), ("water_barrel", 23.9, -1.0, 0), ("motorcycle", 26.6, -0.4, 88),
     )  # fmt: skip

@@ -106,9 +106,14 @@ def _garages(site: Site) -> None:
     inside = ["motorcycle", "bicycle", "quad_bike"]
     for n, k in enumerate((1, 4, 7)):
         put(site, inside[n], x0 + (k + 0.5) * width, y0 + 1.6, -90.0, "in an open garage")
-    for category, x in (("solar_panels", -20.0), ("water_tank", -10.0), ("satellite_dish", -2.0), ("kayak", 3.4)):
+    for category, x in (
+        ("solar_panels", -20.0),
+        ("water_tank", -10.0),
+        ("satellite_dish", -2.0),
+        ("mountain_bike", 3.4),
+    ):
         put(site, category, x, y0 + 3.0, -90.0, "on the roof of the garages", z=high + 0.32)
-    front = ["fuel_drum", "wheelbarrow", "pallet_stack", "shopping_cart", "cable_drum"]
+    front = ["oil_drums", "wheelbarrow", "pallet_stack", "shopping_cart", "crate_stack"]
     deal(site, front, [Pose(x0 + width * k, y0 - 1.3, -90.0) for k in (1, 3, 6, 8)], "in front of the garages")
 
 
@@ -143,7 +148,7 @@ def _station(site: Site) -> None:
     building(site, plan, wall=site.material("station", "facade_brick:#a8785a"), roof="roof_tiles:#7d4a38", storeys=2,
              storey_m=3.0, roof_kind="hip", roof_m=2.4, z=0.0, category="ticket_office",
              attributes={"material": "brick"}, extra=extra)  # fmt: skip
-    front = ["vending_machine", "bench", "newspaper_box", "a_board", "flower_tub", "phone_booth", "information_board"]
+    front = ["vending_machine", "bench", "newspaper_box", "a_board", "planter", "phone_booth", "information_board"]
     deal(
         site, front, [Pose(27.2 + 2.2 * k, 4.4 - 1.5 * (k % 2), -90.0) for k in range(3)], "before the ticket office"
     )
@@ -165,7 +170,7 @@ def _footbridge(site: Site) -> None:
                     posts=[(x, y) for x in (-18.5, -16.3) for y in (-3.6, 5.6)])  # fmt: skip
     site.add("footbridge", "footbridge_structure", parts, {"place": "across the car park"})
     site.occupy(rectangle(-18.8, -15.2, -16.0, 14.2), 4.2, 6.0)
-    put(site, "flower_tub", -17.4, -12.0, 0.0, "on the footbridge", z=_BRIDGE_M)
+    put(site, "planter", -17.4, -12.0, 0.0, "on the footbridge", z=_BRIDGE_M)
     put(site, "telescope", -17.4, 1.0, 180.0, "on the footbridge", z=_BRIDGE_M)
     put(site, "litter_bin", -17.4, 9.6, 0.0, "on the footbridge", z=_BRIDGE_M)
 
@@ -175,7 +180,7 @@ def _furnish(site: Site) -> None:
     for k, (x, y) in enumerate([*((x, -14.1) for x in range(-8, 22, 6)), (-33.0, 20.0), (-28.5, 25.5), (-12.0, 26.0),
                                 (4.0, 26.0), (18.0, 26.0), (33.4, 26.0), (33.4, -14.0)]):  # fmt: skip
         site.try_place("urban_tree", x, y, 47.0 * k, variant=autumn[k % 2])
-    stop = ["bus_shelter", "mailbox", "traffic_light", "fire_hydrant", "lantern", "crossing_sign", "litter_bin"]
+    stop = ["bus_shelter", "mailbox", "traffic_light", "fire_hydrant", "litter_bin", "crossing_sign", "litter_bin"]
     deal(site, stop, [Pose(x, -19.4, -90.0) for x in (4.0, 8.4, 16.6, 12.0, -2.5, 23.0, -7.0)], "at the bus stop")
     put(site, "city_bus", 3.0, -25.6, 0.0, "at the bus stop")
     put(site, "scooter", 27.0, -25.4, 8.0, "in the street")

@@ -92,7 +92,15 @@ class ParkingDeck:
 
 
 def parking_deck(
-    site: Site, x0: float, y0: float, x1: float, y1: float, *, levels: int = 3, level_m: float = 3.7
+    site: Site,
+    x0: float,
+    y0: float,
+    x1: float,
+    y1: float,
+    *,
+    levels: int = 3,
+    level_m: float = 3.7,
+    place: str = "east of the mall",
 ) -> ParkingDeck:
     """Build a parking deck with ramps along its east and north sides and a stair tower at its south-west corner.
 
@@ -106,6 +114,8 @@ def parking_deck(
         Number of floors, the ground's and the roof's among them.
     level_m : float
         From floor to floor; 0.4 m of it are slab and beam.
+    place : str
+        How a person says where it stands.
     """
     plan = rectangle(x0, y0, x1, y1)
     heights = tuple(k * level_m for k in range(levels))
@@ -132,7 +142,7 @@ def parking_deck(
     parts.append(("marking", merge(lines)))
     parts += _ramps(x0, y0, x1, y1, heights, floor, wall)
     parts += _stair_tower(site, (x0, y0), heights)
-    site.add("parking_deck", "parking_deck", parts, {"place": "east of the mall"})
+    site.add("parking_deck", "parking_deck", parts, {"place": place})
     return ParkingDeck(heights, tuple(bays))
 
 

@@ -49,7 +49,7 @@ def _ground(site: Site) -> list[Pose]:
 
 def _terrace(site: Site, frame: Frame, count: int, first: int, name: str) -> None:
     """Put up a row of houses wall to wall, with front steps, back gardens and chimneys, and things about each."""
-    front = ["flower_tub", "bicycle", "bench", "planter", "letterbox_post", "topiary", "scooter", "garden_gnome"]
+    front = ["planter", "bicycle", "bench", "planter", "mailbox", "topiary", "scooter", "garden_gnome"]
     back = [
         "barbecue",
         "garden_shed",
@@ -144,7 +144,7 @@ def _gardens(site: Site) -> None:
         site.add(None, "glasshouse", parts, {"material": "glass"})
         site.occupy(rectangle(x - 2.4, y - 3.1, x - 2.0, y + 3.1))
         site.occupy(rectangle(x + 2.0, y - 3.1, x + 2.4, y + 3.1))
-        deal(site, ["planter", "flower_tub"], [Pose(x, y - 0.8, 0.0)], "in a glasshouse")
+        deal(site, ["planter", "planter"], [Pose(x, y - 0.8, 0.0)], "in a glasshouse")
     orchard = [Pose(x, y, 50.0 * x) for x in (8.0, 12.6, 17.2) for y in (6.4, 10.8, 15.0)]
     deal(site, ["urban_tree"], [p for k, p in enumerate(orchard) if k != 4], "in the orchard")
 
@@ -153,9 +153,9 @@ def _things(site: Site) -> None:
     put(site, "fountain", 0.0, 0.0)
     put(site, "clock_tower", 30.5, 13.4, 180.0)
     put(site, "statue", -20.0, 4.6, -90.0)
-    garden = ["bench", "gazebo", "swing_set", "stone_well", "bird_feeder", "picnic_table", "cafe_table", "kiosk",
-        "market_stall", "lantern",
-              "seesaw", "beehive", "compost_heap", "wheelbarrow", "carved_owl", "totem_pole", "campfire",
+    garden = ["bench", "gazebo", "swing_set", "stone_well", "bird_bath", "picnic_table", "cafe_table", "kiosk",
+        "market_stall", "litter_bin",
+              "seesaw", "beehive", "wheelbarrow", "wheelbarrow", "carved_owl", "totem_pole", "campfire",
               "litter_bin"]  # fmt: skip
     spots = [(-6.4, 3.2, -20), (-12.6, 10.8, 0), (-6.0, 13.6, 0), (-5.6, -6.6, 0), (-15.0, 5.6, 0),
         (12.6, 10.8, 30), (6.2, 5.0, 0), (6.6, -5.0, 120),
@@ -163,7 +163,7 @@ def _things(site: Site) -> None:
              (3.6, 14.2, -90),
              (18.0, -5.2, 150), (20.6, 10.4, 0), (-2.4, -9.6, 0)]  # fmt: skip
     deal(site, garden, [Pose(float(x), float(y), float(a)) for x, y, a in spots], "in the shared garden")
-    lane = ["lantern", "recycling_bin", "phone_booth", "wheelie_bin", "golf_cart", "information_board", "scooter"]
+    lane = ["litter_bin", "recycling_bin", "phone_booth", "wheelie_bin", "golf_cart", "information_board", "scooter"]
     spots2 = [
         (-29.0, 9.0, 0),
         (-20.0, 16.2, -90),

@@ -1,0 +1,136 @@
+"""The paper's numbers as quotas: which of a scene's kept candidates are released, and how many of them train."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aerialdojo_gen.paper import PaperScene
+from aerialdojo_gen.rng import rank
+from aerialdojo_gen.store import partition
+
+Floats = NDArray[np.float64]
+_HALVINGS = 60
+# Metres over which a tilt of 1 changes a route's odds by e; tilts are searched for between -_STEEPEST and _STEEPEST.
+_SCALE_M = 10.0
+_STEEPEST = 40.0
+
+
+def apportion(total: int, sizes: Mapping[str, int]) -> dict[str, int]:
+    """Share a total out in proportion to sizes, in whole numbers (largest remainders, ties by name).
+
+    Parameters
+    ----------
+    total : int
+        At most the sum of `sizes`.
+    sizes : mapping of str to int
+        What each could give.
+
+    Returns
+    -------
+    dict of str to int
+        Sums to `total`; every share is its size times total / sum, rounded down or up.
+    """
+    whole = sum(sizes.values())
+    if not whole:
+        return dict.fromkeys(sizes, 0)
+    shares = {name: total * size // whole for name, size in sizes.items()}
+    by_rest = sorted(sizes, key=lambda name: (-(total * sizes[name] % whole), name))
+    for name in by_rest[: total - sum(shares.values())]:
+        shares[name] += 1
+    return shares
+
+
+def train_quotas(
+    scene: str, scenes: Mapping[str, PaperScene], splits: Mapping[tuple[str, str], Mapping[str, int]]
+) -> dict[str, int]:
+    """Return a scene's share of the paper's training tasks of its partition.
+
+    The shares hang on the paper's figures alone, so that each scene's part of the release can be written on its own.
+
+    Parameters
+    ----------
+    scene : str
+        Name of the scene.
+    scenes : mapping of str to PaperScene
+        What `aerialdojo_gen.paper.inventory` returns.
+    splits : mapping
+        What `aerialdojo_gen.paper.splits` returns.
+
+    Returns
+    -------
+    dict of str to int
+        By setting: how many navigation tasks train.
+    """
+    alike = [row for row in scenes.values() if partition(row.scene) == partition(scene)]
+    totals = splits[partition(scene).upper(), "train"]
+    return {s: apportion(total, {row.scene: row.tasks[s] for row in alike})[scene] for s, total in totals.items()}
+
+
+def choose(
+    nav_ids: Sequence[str],
+    settings: Sequence[str],
+    length_m: Floats,
+    wanted: Mapping[str, int],
+    path_m: float,
+    seed: int,
+) -> NDArray[np.bool_]:
+    """Choose so many tasks of each setting that their lengths sum to a given total.
+
+    Every task draws a number from its own id; the largest are taken, after the numbers have been tilted towards short
+    or long routes by as little as the total needs (weighted sampling without replacement with weights exp(tilt · L),
+    by Gumbel's trick). A task's chance hangs on its id and its length alone, never on its row.
+
+    Parameters
+    ----------
+    nav_ids, settings : sequences of n str
+        The kept candidates' ids and length settings.
+    length_m : (n,) float64
+        L, metres.
+    wanted : mapping of str to int
+        How many of each setting; each at most what there is.
+    path_m : float
+        Wanted sum of the lengths, metres. Where no choice reaches it, the nearest is made.
+    seed : int
+        Of the pipeline.
+
+    Returns
+    -------
+    (n,) bool
+        True for the chosen.
+    """
+    luck = np.array([_gumbel(seed, nav_id) for nav_id in nav_ids])
+    # Ties are broken by the id, so that the order of rows decides nothing.
+    place = np.argsort(np.argsort(np.asarray(nav_ids)))
+    groups = [(np.flatnonzero(np.asarray(settings) == s), n) for s, n in sorted(wanted.items())]
+
+    def chosen(tilt: float) -> NDArray[np.bool_]:
+        mask = np.zeros(len(nav_ids), dtype=bool)
+        for rows, n in groups:
+            score = luck[rows] + tilt * length_m[rows] / _SCALE_M
+            mask[rows[np.lexsort((place[rows], -score))[:n]]] = True
+        return mask
+
+    low, high = -_STEEPEST, _STEEPEST
+    best = chosen(0.0)
+    for _ in range(_HALVINGS):
+        middle = (low + high) / 2
+        mask = chosen(middle)
+        total = float(length_m[mask].sum())
+        if abs(total - path_m) < abs(float(length_m[best].sum()) - path_m):
+            best = mask
+        if total < path_m:
+            low = middle
+        else:
+            high = middle
+        if abs(total - path_m) <= 1e-4 * path_m:
+            break
+    return best
+
+
+def _gumbel(seed: int, nav_id: str) -> float:
+    uniform = (rank(seed, "quota", nav_id) + 0.5) / 2**64
+    return -math.log(-math.log(uniform))
