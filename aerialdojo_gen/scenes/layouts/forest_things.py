@@ -18,7 +18,7 @@ CABIN = (
     Thing("outhouse", -4.6, 6.2, -30.0, "brown", words={"place": "behind the log cabin"}),
     Thing("stone_well", 5.4, 5.4, -20.0, "red_roof", words={"place": "in front of the log cabin"}),
     Thing("wheelbarrow", 8.6, -3.2, 130.0, "green", words={"place": "in front of the log cabin"}),
-    Thing("lantern_post", 8.6, 1.8, 180.0, "black", words={"place": "on the path to the log cabin"}),
+    Thing("trail_signpost", 8.6, 1.8, 180.0, "white", words={"place": "on the path to the log cabin"}),
     Thing("mountain_bike", 1.6, 4.3, 8.0, "orange", words={"place": "beside the log cabin"}),
     Thing("log_pile", -7.0, -9.8, 35.0, "spruce", words={"place": "behind the woodshed"}),
 )
@@ -40,31 +40,31 @@ CAMP = (
     Thing("tent", -5.6, -2.4, 30.0, "blue"),
     Thing("dome_tent", -0.6, 5.6, -90.0, "yellow"),
     Thing("camp_chair", 1.5, 1.9, -125.0, "red", words={"place": "by the campfire"}),
-    Thing("log_bench", 2.5, -0.9, 165.0, "birch", words={"place": "by the campfire"}),
+    Thing("tree_stump", 2.7, -1.0, 0.0, "mossy", words={"place": "by the campfire"}),
     Thing("cooking_tripod", -0.4, -3.4, 0.0, "black"),
-    Thing("camping_stove_table", 3.6, 4.6, -130.0, "green"),
-    Thing("backpack", -2.9, -4.4, 60.0, "yellow"),
+    Thing("log_pile", 3.8, 4.6, -40.0, "birch"),
+    Thing("sawhorse", -2.9, -4.6, 60.0, "blue_saw"),
     Thing("hammock", 3.4, -5.2, 150.0, "teal"),
-    Thing("tarp_shelter", -8.6, 1.2, 0.0, "green", words={"place": "behind the tents"}),
-    Thing("lantern_post", 6.4, 1.2, 180.0, "red", words={"place": "at the camp site's entrance"}),
+    Thing("tent", -8.6, 1.4, 0.0, "green", words={"place": "behind the tents"}),
+    Thing("carved_owl", 6.4, 1.2, 180.0, "grey", words={"place": "at the camp site's entrance"}),
 )
 
 PICNIC = (
     Thing("picnic_table", 0.0, 0.0, 30.0, "brown"),
     Thing("picnic_table", -3.6, 2.6, -10.0, "green"),
     Thing("cooler_box", 1.6, -2.2, 60.0, "blue", words={"place": "beside the brown picnic table"}),
-    Thing("rope_swing", 0.8, -5.4, 90.0, "red"),
+    Thing("hammock", 0.8, -5.4, 90.0, "red"),
     Thing("birdhouse", -3.4, -3.0, 0.0, "blue"),
     Thing("carved_owl", 4.8, 2.0, 0.0, "brown"),
-    Thing("bird_feeder", 4.4, -3.0, 0.0, "thatched"),
+    Thing("water_barrel", 4.4, -3.0, 0.0, "brown"),
 )
 
 POND_SIDE = (
     Thing("canoe", 5.2, 6.0, 35.0, "red"),
-    Thing("kayak", -3.5, 5.2, 20.0, "orange"),
+    Thing("canoe", -3.5, 5.2, 20.0, "green"),
     Thing("log_bench", 5.8, 1.8, 180.0, "with_back"),
     Thing("deer", -1.2, -6.4, 100.0, "stag", words={"place": "drinking at the pond"}),
-    Thing("mossy_rock", -6.2, -2.6, 20.0, "green"),
+    Thing("rock_pile", -6.4, -2.6, 20.0, "grey"),
 )
 
 RUIN = (
@@ -79,19 +79,20 @@ APIARY = (
     Thing("beehive", 0.0, -1.9, 0.0, "yellow"),
     Thing("beehive", 0.0, 0.0, 0.0, "blue"),
     Thing("beehive", 0.0, 1.9, 0.0, "green"),
-    Thing("wind_chime", 2.2, -3.0, 0.0, "silver", words={"place": "beside the bee yard"}),
+    Thing("birdhouse", 2.2, -3.0, 0.0, "yellow", words={"place": "beside the bee yard"}),
 )
 
 CROSSROADS = (
     Thing("trail_signpost", 1.6, 1.4, 30.0, "yellow"),
     Thing("tree_stump", -2.2, 2.6, 0.0, "fresh", words={"place": "near the crossing of the paths"}),
-    Thing("backpack", 2.8, -1.6, 200.0, "red", words={"place": "beside the path to the picnic place"}),
+    Thing("mushroom_cluster", 2.8, -1.6, 200.0, "brown", words={"place": "beside the path to the picnic place"}),
 )
 
 STRAYS = {
     "in the south-eastern wood": (
         Thing("hunting_stand", 7.0, -19.0, 120.0, "brown"),
         Thing("wild_boar", 13.8, -20.6, 200.0, "dark"),
+        Thing("brown_bear", 19.5, -17.0, 130.0, "black"),
     ),
     "in the northern wood": (
         Thing("hunting_stand", -16.5, 20.5, -60.0, "camouflage"),
@@ -119,4 +120,20 @@ STRAYS = {
         Thing("dead_tree", -19.5, -14.5, 0.0, "grey"),
         Thing("bush", 5.4, -14.6, 0.0, "red_berries"),
     ),
+    "at the camp site": (
+        Thing("dome_tent", -2.6, -19.0, 120.0, "purple"),
+        Thing("axe_block", -3.8, -10.6, 0.0, "blue"),
+    ),
+    "at the picnic place": (Thing("picnic_table", 8.6, -2.4, 70.0, "red"),),
+    "beside the path to the picnic place": (Thing("mountain_bike", 6.0, -0.1, 30.0, "blue"),),
+    "beside the path to the ruin": (Thing("stone_cairn", -8.5, -3.2, 0.0, "grey"),),
+    "near the footbridge": (Thing("trail_signpost", -3.2, -9.2, 80.0, "red_top"),),
+    "between the bee yard and the fire tower": (
+        Thing("fox", 4.2, 13.2, -60.0, "grey"),
+        Thing("wheelbarrow", 2.6, 15.6, 150.0, "red"),
+    ),
+    "in the wood behind the woodshed": (Thing("mushroom_cluster", -19.5, 13.2, 0.0, "orange"),),
+    "near the crossing of the paths": (Thing("standing_stone", -3.8, -1.2, 40.0, "plain"),),
+    "between the log cabin and the bee yard": (Thing("weather_station", -4.4, 13.4, 60.0, "blue_vane"),),
+    "south of the bee yard": (Thing("tree_stump", 0.8, 13.6, 0.0, "old"),),
 }
