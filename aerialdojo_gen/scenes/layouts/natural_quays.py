@@ -191,6 +191,30 @@ def sand_fence(
     return site.add(None, "sand_fence", [(material, merge([*pales, *wires, *posts]))], footprint=area)
 
 
+def field_wall(
+    site: Site, path: Sequence[Point], *, height_m: float = 1.1, material: str = "blocks:#938c80"
+) -> Instance:
+    """Put up a dry stone wall along a path over uneven ground."""
+    poses = along(path, 2.0)
+    line = [(p.x, p.y, site.ground_z(p.x, p.y) + height_m / 2 - 0.25) for p in poses]
+    area = LineString(path).buffer(0.35, cap_style="flat")
+    body = sweep(path=line, section=(0.55, height_m + 0.5))
+    return site.add(None, "stone_wall", [(material, body)], footprint=area)
+
+
+def mole(site: Site, path: Sequence[Point], width_m: float, z_m: float, *, stone: str = "blocks:#9a9488") -> Instance:
+    """Put up a solid breakwater of masonry along a path, its walkway at `z_m`, with a parapet on its left side."""
+    line = LineString(path)
+    body = line.buffer(width_m / 2, cap_style="flat", join_style="mitre")
+    parapet = line.offset_curve(width_m / 2 - 0.3).buffer(0.3, cap_style="flat", join_style="mitre")
+    parts: Parts = [
+        (stone, slab(body, -1.0, z_m - 0.2)),
+        ("paving:#a59c8c", slab(body.buffer(0.08, join_style="mitre"), z_m - 0.2, z_m)),
+        (stone, slab(parapet, z_m, z_m + 0.9)),
+    ]
+    return site.add(None, "breakwater", parts, footprint=body)
+
+
 def _gaps(start: float, end: float, gates: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
     out, at = [], start
     for a, b in sorted(gates):

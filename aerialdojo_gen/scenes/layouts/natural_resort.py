@@ -1,4 +1,4 @@
-"""A seaside resort: a beach with groynes, a promenade on a sea wall, a pier, a terrace of hotels, dunes and a headland.
+"""A seaside resort: a beach with groynes, a promenade on a sea wall, a pier, a row of hotels, dunes and a headland.
 
 The sea lies in the south. From there the ground climbs in steps: the beach, the promenade at 4.5 m, the hotels'
 terrace at 9 m, and the headland in the east at 13 m.
@@ -152,7 +152,7 @@ def _pier(site: Site) -> None:
     end_rail(site, ring, PIER_M + 0.02)
     hall = rectangle(7.0, -46.0, 17.0, -36.0)
     building(
-        site, hall, wall=site.material("pavilion", "planks:#ece6d6"), roof=site.material("pavilion_roof", "sheet_metal:#3f8f8a"),
+        site, hall, wall=site.material("pavilion", "planks:#ece6d6"), roof="sheet_metal:#3f8f8a",
         storeys=1, storey_m=4.0, roof_kind="hip", roof_m=3.4, overhang_m=0.8, z=PIER_M, category="pier_pavilion",
         attributes={"place": "on the pier head"}, extra=_pavilion_trim(),
     )  # fmt: skip

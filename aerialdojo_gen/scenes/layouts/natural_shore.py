@@ -17,9 +17,9 @@ from shapely.geometry.base import BaseGeometry
 from aerialdojo_gen.scenes.grammar_blocks import next_variant
 from aerialdojo_gen.scenes.grammar_scatter import poisson_disc
 from aerialdojo_gen.scenes.layouts.natural_ground import Spot, Thing, blob, furnish
-from aerialdojo_gen.scenes.mesh import Floats, merge, rotated, rotation, translated
+from aerialdojo_gen.scenes.mesh import Floats, Mesh, merge, rotated, rotation, translated
 from aerialdojo_gen.scenes.model import Instance
-from aerialdojo_gen.scenes.shapes import crown
+from aerialdojo_gen.scenes.shapes import crown, cylinder
 from aerialdojo_gen.scenes.site import Site
 from aerialdojo_gen.scenes.terrain import Terrain, rolling_terrain
 
@@ -53,8 +53,8 @@ def inland_m(land: BaseGeometry, x: Floats, y: Floats) -> Floats:
     return np.where(shapely.contains_xy(land, x, y), away, -away)
 
 
-def rise(t: Floats | float, start: float, end: float) -> Floats:
-    """Climb smoothly from 0 at `start` to 1 at `end`."""
+def rise(t: Floats | float, start: Floats | float, end: Floats | float) -> Floats:
+    """Climb smoothly from 0 at `start` to 1 at `end`: numbers, or arrays of one shape."""
     u = np.clip((np.asarray(t, dtype=np.float64) - start) / (end - start), 0.0, 1.0)
     return np.asarray(u * u * (3.0 - 2.0 * u))
 
@@ -161,6 +161,58 @@ def boulders(
     if not bodies:
         return None
     return site.add(None, category, [(material, merge(bodies))], footprint=shapely.union_all(plans))
+
+
+def broadleaves(
+    site: Site,
+    area: BaseGeometry,
+    spacing_m: float,
+    density: Callable[[float, float], float],
+    limit: int,
+    height_m: tuple[float, float],
+    leaves: str = "foliage:#4a7a32",
+) -> Instance | None:
+    """Grow nameless round-crowned trees over an area as one piece of structure: background that nothing refers to.
+
+    Parameters
+    ----------
+    site : Site
+        Where; the stems take their ground.
+    area : shapely geometry
+        World frame, metres.
+    spacing_m : float
+        Least distance of two stems where the density is 1.
+    density : callable
+        ``(x, y) -> float`` in 0 to 1.
+    limit : int
+        Most trees.
+    height_m : (float, float)
+        Least and greatest height.
+    leaves : str
+        Material of the crowns.
+    """
+    rng = site.rng_for("broadleaves", round(area.area, 2))
+    stems: list[Mesh] = []
+    crowns: list[Mesh] = []
+    plans: list[BaseGeometry] = []
+    for x, y, yaw in poisson_disc(area, spacing_m, rng, density, 3 * limit):
+        high = float(rng.uniform(*height_m))
+        if len(stems) >= limit or not site.is_free(x, y, 0.18 * high):
+            continue
+        z, reach = site.ground_z(x, y), 0.3 * high
+        stem = cylinder(radius=0.035 * high, radius_top=0.02 * high, height=0.62 * high + 0.4, segments=7)
+        stems.append(translated(stem, (x, y, z - 0.4)))
+        for k, (out, share, up) in enumerate(((0.0, 1.0, 0.72), (0.75, 0.7, 0.6), (0.75, 0.6, 0.66))):
+            turn = np.radians(yaw + 170.0 * k)
+            at = (x + out * reach * float(np.cos(turn)), y + out * reach * float(np.sin(turn)), z + up * high)
+            size = [share * reach, share * reach, share * reach * 0.8]
+            body = crown(radii=size, noise=0.25, subdivisions=1, seed=int(rng.integers(1, 40)))
+            crowns.append(translated(body, at))
+        plans.append(shapely.Point(x, y).buffer(0.5, quad_segs=2))
+    if not stems:
+        return None
+    parts = [("bark", merge(stems)), (leaves, merge(crowns))]
+    return site.add(None, "broadleaf_trees", parts, footprint=shapely.union_all(plans))
 
 
 def ragged(points: Sequence[tuple[float, float]], seed: int, amplitude_m: float, step_m: float = 3.0) -> Polygon:
