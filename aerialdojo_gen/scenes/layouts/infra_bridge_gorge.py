@@ -51,6 +51,8 @@ def _terrain(site: Site) -> Terrain:
     t = t.flattened(rectangle(-58, -6.0, 58, 6.0), 0.0, 6.0)
     t = t.flattened(rectangle(-44, -18.0, -27, 16.0), 0.0, 5.0)
     t = t.flattened(rectangle(27, -14.0, 44, 18.0), 0.0, 5.0)
+    for x0, y0 in ((48.0, -19.0), (-48.0, 19.0)):
+        t = t.flattened(rectangle(x0 - 3.0, y0 - 3.0, x0 + 3.0, y0 + 3.0), blend_m=4.0)
     xy = t.corners().reshape(*t.heights_m.shape, 3)
     x, y = xy[..., 0], xy[..., 1]
     rough = OpenSimplex(seed=site.recipe.seed + 5).noise2array(x[0] / 7.0, y[:, 0] / 7.0)

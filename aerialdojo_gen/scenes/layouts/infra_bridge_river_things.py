@@ -77,8 +77,7 @@ def _river(site: Site) -> None:
     boats = [
         ("work_barge", 11.0, -18.0, 70.0), ("tugboat", -12.0, -26.0, 100.0), ("sailboat", 3.0, 27.0, 120.0),
         ("fishing_boat", -24.0, -35.0, 60.0), ("motor_yacht", -27.0, 30.0, 90.0), ("rowing_boat", -30.8, -8.0, 90.0),
-        ("buoy", -4.0, 10.5, 0.0), ("buoy", 12.0, -32.0, 0.0), ("rowing_boat", 10.0, 14.0, 40.0),
-        ("buoy", -14.0, 16.0, 0.0),
+        ("rowing_boat", 10.0, 14.0, 40.0), ("sailboat", 14.0, -40.0, 20.0),
         ("work_barge", -10.0, 3.0, 88.0),
     ]  # fmt: skip
     things(site, "on the river", boats, _WATER_M)
@@ -91,7 +90,7 @@ def _river(site: Site) -> None:
 
 def _east(site: Site) -> None:
     wild(site, "on the river beach", [
-        ("rowing_boat", 32.5, 15.0, 20.0), ("picnic_table", 36.0, 22.0, 0.0), ("campfire", 34.6, -14.0, 0.0),
+        ("canoe", 32.8, 16.0, 40.0), ("picnic_table", 36.0, 22.0, 0.0), ("campfire", 34.6, -14.0, 0.0),
         ("canoe", 32.6, -21.0, 70.0), ("deck_chair", 35.6, 11.0, 180.0), ("beach_umbrella_set", 34.8, 30.0, 180.0),
         ("dome_tent", 37.4, -20.0, 180.0), ("stone_cairn", 36.8, 4.0, 0.0), ("reed_clump", 30.6, 25.0, 0.0),
         ("reed_clump", 30.8, -27.0, 0.0), ("boulder", 31.6, -9.8, 0.0), ("driftwood", 33.0, -31.0, 0.0),

@@ -202,5 +202,5 @@ def _village(site: Site) -> None:
     fence(site, [(-31.5, 28.4), (-16.5, 28.4)], "picket")
     fence(site, [(-14.0, 28.4), (1.0, 28.4)], "hedge")
     place_along(site, "wooden_fence", [(-28.8, -23.2), (1.5, -23.2)], 2.6, turn_deg=90.0)
-    place_along(site, "wooden_fence", [(8.4, 19.8), (10.6, 13.6)], 2.6, turn_deg=90.0)
+    place_along(site, "wooden_fence", [(8.4, 19.8), (11.2, 12.5)], 2.6, turn_deg=90.0)
     put(site, "dutch_windmill", -50.0, 40.0, -40.0)
