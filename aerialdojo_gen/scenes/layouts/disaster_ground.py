@@ -35,6 +35,16 @@ def faulted(terrain: Terrain, path: Sequence[XY], drop_m: float, width_m: float 
     return replace(terrain, heights_m=terrain.heights_m - drop_m * t.reshape(terrain.heights_m.shape))
 
 
+def sloped(terrain: Terrain, path: Sequence[tuple[float, float, float]], axis: int) -> Terrain:
+    """Add a slope along x (axis 0) or y (axis 1): heights between stations (from, to, rise), smooth between them."""
+    corners = terrain.corners()[:, axis]
+    rise = np.zeros(len(corners))
+    for start, end, height in path:
+        t = np.clip((corners - start) / (end - start), 0.0, 1.0)
+        rise += height * t * t * (3.0 - 2.0 * t)
+    return replace(terrain, heights_m=terrain.heights_m + rise.reshape(terrain.heights_m.shape))
+
+
 def crater(terrain: Terrain, x: float, y: float, radius_m: float, depth_m: float, rim_m: float, seed: int) -> Terrain:
     """Blast a crater: a bowl of `radius_m` to its crest, thrown-up earth `rim_m` high that runs out at twice that."""
     corners = terrain.corners()[:, :2] - (x, y)

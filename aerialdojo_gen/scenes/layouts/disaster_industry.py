@@ -193,8 +193,9 @@ def burst_tank(
 
 
 def pipe_bridge(
-    site: Site, a: XY, b: XY, z_m: float, gap: tuple[float, float], node: str, walkway_m: float = 2.2
-) -> Instance:
+    site: Site, a: XY, b: XY, z_m: float, gap: tuple[float, float], node: str, walkway_m: float = 2.2,
+    pipes: bool = True, category: str = "pipe_bridge",
+) -> Instance:  # fmt: skip
     """Put up a pipe bridge at a height over its foot, with a walkway, broken between two shares of its length.
 
     Parameters
@@ -207,11 +208,16 @@ def pipe_bridge(
         Where it is broken, shares of the length from `a`.
     walkway_m : float
         Width of the walkway, metres.
+    pipes : bool
+        Whether pipes run beside it; else it is a footbridge.
+    category : str
+        As in `Site.add`.
     """
     rng = site.rng_for("bridge", node)
     length = float(np.hypot(b[0] - a[0], b[1] - a[1]))
     frame = Frame(a[0], a[1], float(np.degrees(np.arctan2(b[1] - a[1], b[0] - a[0]))))
-    steel, pipes, deck = [], {}, []
+    steel, deck = [], []
+    runs: dict[str, list[Mesh]] = {}
     for s0, s1 in ((0.0, gap[0] * length), (gap[1] * length, length)):
         w = walkway_m / 2
         deck.append(block(s0, -w, s1, w, z_m - 0.1, z_m))
@@ -225,9 +231,8 @@ def pipe_bridge(
         toward = 1.0 if s0 == 0.0 else -1.0
         torn = s1 if s0 == 0.0 else s0
         start = s0 if s0 == 0.0 else s1
-        for k, (v, radius, colour) in enumerate(
-            ((-w - 0.5, 0.22, "paint:#d8b23a"), (-w - 1.05, 0.15, "paint:#b9bec4"), (w + 0.45, 0.18, "paint:#3f7d4e"))
-        ):
+        lines = ((-w - 0.5, 0.22, "paint:#d8b23a"), (-w - 1.05, 0.15, "paint:#b9bec4"), (w + 0.45, 0.18, "paint:#3f7d4e"))
+        for k, (v, radius, colour) in enumerate(lines if pipes else ()):
             drop = float(rng.uniform(0.6, 2.0))
             end = torn + toward * float(rng.uniform(0.2, 1.6))
             path = [
@@ -235,12 +240,12 @@ def pipe_bridge(
                 (torn - toward * 1.2, v, z_m - 0.1 + 0.1 * k),
                 (end, v + float(rng.uniform(-0.5, 0.5)), z_m - drop),
             ]
-            pipes.setdefault(colour, []).append(sweep(path=path, radius=radius, sides=8))
+            runs.setdefault(colour, []).append(sweep(path=path, radius=radius, sides=8))
     parts: Parts = [("sheet_metal", merge(deck)), ("rust", merge(steel))]
-    parts += [(colour, merge(bodies)) for colour, bodies in pipes.items()]
+    parts += [(colour, merge(bodies)) for colour, bodies in runs.items()]
     for s0, s1 in ((0.0, gap[0] * length), (gap[1] * length, length)):
         parts += railing([(s0, walkway_m / 2), (s1, walkway_m / 2)], z_m, pane="chain_link", frame="steel")
-    return site.add(node, "pipe_bridge", frame.parts(parts))
+    return site.add(node, category, frame.parts(parts))
 
 
 def twisted_steel(site: Site, places: Sequence[tuple[float, float, float]], key: str) -> Instance:

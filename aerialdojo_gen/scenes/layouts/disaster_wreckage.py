@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from shapely.affinity import translate
+import shapely
 from shapely.geometry import LineString, Point, Polygon
 from shapely.geometry.base import BaseGeometry
 
@@ -27,6 +27,7 @@ XY = tuple[float, float]
 _CORNERS = 26
 _LEVEL_M = 0.55
 _CRUMB_M2 = 0.4
+_GRID_M = 0.01
 
 
 @dataclass(frozen=True)
@@ -133,11 +134,12 @@ def torn_wall(
         face = face.difference(bite.tear(a, b, top, rng))
     yaw = float(np.degrees(np.arctan2(b[1] - a[1], b[0] - a[0])))
     bodies = []
-    for piece in polygons_of(face):
+    # Tears and openings that all but touch leave slivers that cannot be triangulated.
+    for piece in polygons_of(shapely.set_precision(face, _GRID_M)):
         if piece.area < _CRUMB_M2:
             continue
-        u, v, w = extrude(piece, thickness_m).vertices.T
         flat = extrude(piece, thickness_m)
+        u, v, w = flat.vertices.T
         # (u, v, w) becomes (x, z, -y): the wall stands on y = 0 and its pattern is projected anew.
         bodies.append(Mesh(np.column_stack([u, thickness_m / 2 - w, v]), flat.faces))
     if not bodies:
@@ -237,8 +239,3 @@ def chunk(kind: str, size_m: float, rng: np.random.Generator) -> Mesh:
     body = box(size=sizes[kind], taper=(float(rng.uniform(0.8, 1.0)), 1.0))
     tilt = (float(rng.uniform(-28, 28)), float(rng.uniform(-24, 24)), float(rng.uniform(0, 360)))
     return translated(rotated(body, rotation(*tilt)), (0, 0, -0.03))
-
-
-def moved(area: BaseGeometry, x: float, y: float) -> BaseGeometry:
-    """Move an area by (x, y) metres."""
-    return translate(area, x, y)

@@ -211,7 +211,7 @@ def _rim(site: Site, crater_m: float) -> None:
 
 
 def _things(site: Site, factory: Wreck, gate: Wreck, bases: list[float], hall_base: float, walkway: float) -> None:
-    stand(site, "on the ground of the crater", [("burnt_car", BLAST[0] + 0.3, BLAST[1] - 0.2, 35.0)], sink_m=0.15)
+    stand(site, "at the bottom of the crater", [("burnt_car", BLAST[0] + 0.3, BLAST[1] - 0.2, 35.0)], sink_m=0.15)
     stand(site, "by the gate of the yard", [("chimney_stack", -29.6, 20.5, 0.0)])
     for storey, place, rows in (
         (

@@ -9,6 +9,7 @@ from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from aerialdojo_gen.scenes.layouts.disaster_old_town import build_old_town
 from aerialdojo_gen.scenes.layouts.disaster_square import build_square
 from aerialdojo_gen.scenes.site import Site
 
@@ -36,4 +37,5 @@ class Parameters(BaseModel):
 def build(site: Site) -> None:
     """Build the town."""
     parameters: Parameters = site.parameters
-    build_square(site, parameters.drop_m, parameters.litter)
+    builder = build_old_town if parameters.plan == "old_town" else build_square
+    builder(site, parameters.drop_m, parameters.litter)

@@ -9,6 +9,7 @@ from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from aerialdojo_gen.scenes.layouts.disaster_street import build_street
 from aerialdojo_gen.scenes.layouts.disaster_yard import build_yard
 from aerialdojo_gen.scenes.site import Site
 
@@ -36,4 +37,5 @@ class Parameters(BaseModel):
 def build(site: Site) -> None:
     """Build the place."""
     parameters: Parameters = site.parameters
-    build_yard(site, parameters.crater_m, parameters.litter)
+    builder = build_street if parameters.plan == "street" else build_yard
+    builder(site, parameters.crater_m, parameters.litter)
