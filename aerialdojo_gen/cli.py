@@ -229,6 +229,40 @@ def run(
     _run(stages, config, roots, scene, workers, [stage.name for stage in stages] if force else [], quiet)
 
 
+@app.command("add-scene")
+def add_scene(
+    name: Annotated[str, typer.Argument(help="Name of the scene; the suffix _1 makes it out-of-distribution.")],
+    mesh: Annotated[Path, typer.Argument(help="GLB, OBJ, STL, PLY or 3DS file.")],
+    up: Annotated[str, typer.Option(help="The mesh's axis that points up: z or y.")],
+    scale: Annotated[float, typer.Option(help="Metres a unit of the mesh: 0.01 for centimetres.")] = 1.0,
+    annotations: Annotated[Path | None, typer.Option(help="Annotation file to go with it.")] = None,
+    project: Annotated[Path, typer.Option(help="Folder for your scenes and their pipeline.")] = Path("my-scenes"),
+    crop: Annotated[
+        tuple[float, float, float] | None, typer.Option(help="Keep a circle: x y radius, metres.")
+    ] = None,
+    ceiling: Annotated[
+        float | None, typer.Option(help="Highest z to fly at, metres.  (default: 6 m over all)")
+    ] = None,
+    force: Annotated[bool, typer.Option("--force", help="Replace a scene of this name.")] = False,
+) -> None:
+    """Make a scene of a mesh of your own."""
+    from aerialdojo_gen.imports import command
+
+    added = command.add_scene(
+        name, mesh, project, up=up, scale=scale, annotations=annotations, crop_m=crop, ceiling_m=ceiling, force=force
+    )
+    size = added.scene.bounds[1] - added.scene.bounds[0]
+    print(
+        f"{name}: {len(added.scene.instances):,} instances, {added.scene.n_triangles:,} triangles, "
+        f"{size[0]:.0f} x {size[1]:.0f} m, ceiling {added.scene.ceiling_m:.0f} m"
+    )
+    for line in added.repairs.lines:
+        print(f"  {line}")
+    if not added.annotations.exists():
+        print(f"next: aerialdojo-gen annotate-draft {name} --pipeline {added.pipeline} --landmarks 2 --objects 20")
+    print(f"then: aerialdojo-gen run {added.pipeline} --data {project / 'data'}")
+
+
 @app.command("annotate-draft")
 def annotate_draft(
     scene: Annotated[str, typer.Argument(help="Scene with a recipe, e.g. U_Mall_0.")],

@@ -179,8 +179,10 @@ class Stage:
 def _scene_sources(roots: Roots, scene: str) -> list[Path]:
     # A layout is code: the scene package's modules are assets of the scene as much as the recipe is.
     package = Path(__file__).parent / "scenes"
+    mesh = roots.recipes / f"{scene}.glb"
     return [
         roots.recipes / f"{scene}.toml",
+        *([mesh] if mesh.is_file() else []),
         roots.scene_assets / "materials.toml",
         *_catalogue_files(roots),
         *sorted(package.rglob("*.py")),

@@ -14,12 +14,13 @@ import numpy as np
 
 from aerialdojo_gen.annotations.ambiguity import Ambiguity
 from aerialdojo_gen.annotations.check import make_ambiguity
-from aerialdojo_gen.annotations.claims import RIVAL_SLACK
+from aerialdojo_gen.annotations.claims import RIVAL_SLACK, spoken
 from aerialdojo_gen.annotations.compose import compose
 from aerialdojo_gen.annotations.facts import Fact, FactFinder
 from aerialdojo_gen.annotations.format import Annotations, Landmark, Object
 from aerialdojo_gen.annotations.phrases import Words, noun_of, place_of, words_of
 from aerialdojo_gen.errors import AnnotationError
+from aerialdojo_gen.geometry.frames import compass_direction
 from aerialdojo_gen.rng import generator, rank
 from aerialdojo_gen.scenes.catalogue import Catalogue
 from aerialdojo_gen.scenes.model import Instance, Scene
@@ -29,6 +30,8 @@ _MOST_FACTS = 4
 _TRIES = 12
 _WORTH_SAYING = 0.35
 _ALOFT_M = 3.0
+# What an imported mesh has and nobody looks for.
+_NO_THING = frozenset({"ground", "clutter", "slab", "terrain"})
 
 
 @dataclass(frozen=True)
@@ -114,6 +117,10 @@ class _Drafter:
         by_category: dict[str, Words] = {}
         for i in scene.instances:
             kind = self._kinds.get(i.category, "")
+            if scene.imported and i.category not in _NO_THING:
+                # A mesh of another make has categories of its own, and all of them may be asked for.
+                self._names.setdefault(i.category, spoken(i.category))
+                targets |= {i.category}
             if i.category not in by_category:
                 name = self._names.get(i.category)
                 by_category[i.category] = words_of(
@@ -129,6 +136,8 @@ class _Drafter:
             raise AnnotationError(f"{self._scene.name}: no node {missing[0]!r} to make a landmark of")
         chosen = [self._scene[node] for node in wanted][:n]
         rest = [i for i in self._scene.instances if self._kinds.get(i.category) == "landmark" and i not in chosen]
+        if self._scene.imported:
+            rest = self._prominent(4 * n)
         while len(chosen) < n and rest:
             best = max(rest, key=lambda i: (_spread(i, chosen), float(i.bounds[1, 2])))
             chosen.append(best)
@@ -138,11 +147,25 @@ class _Drafter:
         noun = {i.node: noun for i, noun in zip(self._scene.instances, self._nouns, strict=True)}
         plain = [noun[i.node].name for i in chosen]
         names = [noun[i.node].short if plain.count(p) > 1 else p for i, p in zip(chosen, plain, strict=True)]
+        if self._scene.imported:
+            # Told apart by where they stand, as nothing else is known of them.
+            names = [
+                self._sided(i, name) if names.count(name) > 1 else name for i, name in zip(chosen, names, strict=True)
+            ]
         if len(set(names)) < n:
             raise AnnotationError(f"{self._scene.name}: landmarks share a name: {', '.join(sorted(names))}")
         return tuple(
             Landmark(id=k, name=name, node=i.node) for k, (name, i) in enumerate(zip(names, chosen, strict=True))
         )
+
+    def _prominent(self, n: int) -> list[Instance]:
+        """The n tallest things of a mesh of another make."""
+        things = [i for i in self._scene.instances if i.category not in _NO_THING]
+        return sorted(things, key=lambda i: (-float(i.bounds[1, 2]), i.node))[:n]
+
+    def _sided(self, instance: Instance, name: str) -> str:
+        x, y = instance.centroid[:2] - self._scene.bounds[:, :2].mean(axis=0)
+        return f"{compass_direction(float(x), float(y))} {name}"
 
     def objects(self, marks: tuple[Landmark, ...], n: int) -> tuple[Object, ...]:
         """Choose and describe objects, a category at a time in turn."""
@@ -157,7 +180,10 @@ class _Drafter:
         aloft = {c: [i for i in queue if self._aloft(i)] for c, queue in core.items()}
         low = {c: [i for i in queue if i not in aloft[c]] for c, queue in core.items()}
         in_core = n if self._choice.within_m is None else round(n * self._choice.core_share)
-        phases = ((core, in_core), (rest, n if in_core < n else in_core))
+        phases: tuple[tuple[dict[str, list[int]], int], ...] = (
+            (core, in_core),
+            (rest, n if in_core < n else in_core),
+        )
         if self._choice.aloft_share > 0:
             high = round(in_core * self._choice.aloft_share)
             phases = ((aloft, high), (low, in_core), (aloft, in_core), phases[1])

@@ -8,12 +8,15 @@ from collections import Counter
 from pathlib import Path
 from types import ModuleType
 
+import numpy as np
+
 from aerialdojo_gen.errors import AssetError
 from aerialdojo_gen.scenes import layouts
 from aerialdojo_gen.scenes.catalogue import Catalogue
+from aerialdojo_gen.scenes.glb import read_glb
 from aerialdojo_gen.scenes.materials import nearest
 from aerialdojo_gen.scenes.model import Scene
-from aerialdojo_gen.scenes.recipe import Recipe, load_recipe, validated
+from aerialdojo_gen.scenes.recipe import Imported, Recipe, load_imported, load_recipe, validated
 from aerialdojo_gen.scenes.site import Site
 
 
@@ -38,6 +41,9 @@ def build_scene(recipe_path: Path, catalogue: Catalogue) -> Scene:
         The recipe, its layout's parameters or its palette are wrong, the layout asks for something that the catalogue
         lacks, or the built scene has fewer instances of a category than `inventory` asks for.
     """
+    imported = load_imported(recipe_path)
+    if imported is not None:
+        return _imported(recipe_path, imported)
     recipe = load_recipe(recipe_path)
     layout = _layout(recipe, recipe_path)
     _check_names(recipe, recipe_path, catalogue)
@@ -55,6 +61,20 @@ def build_scene(recipe_path: Path, catalogue: Catalogue) -> Scene:
     scene = site.scene()
     _check_inventory(scene, recipe, recipe_path)
     return scene
+
+
+def _imported(recipe_path: Path, imported: Imported) -> Scene:
+    """Read the mesh that ``add-scene`` put beside the recipe; ceiling, sky and sun are the recipe's."""
+    path = recipe_path.with_suffix(".glb")
+    scene = read_glb(path)
+    bounds = scene.bounds.copy()
+    bounds[1, 2] = imported.ceiling_m
+    sun = np.asarray(imported.sun) / np.linalg.norm(imported.sun)
+    red, green, blue = (int(imported.sky[k : k + 2], 16) for k in (1, 3, 5))
+    return Scene(
+        recipe_path.stem, scene.instances, scene.materials, bounds, (red, green, blue),
+        (float(sun[0]), float(sun[1]), float(sun[2])), imported=True,
+    )  # fmt: skip
 
 
 def _layout(recipe: Recipe, path: Path) -> ModuleType:

@@ -82,6 +82,7 @@ def read_glb(path: Path) -> Scene:
             bounds=np.array(extras["bounds_m"], dtype=np.float64),
             sky=tuple(extras["sky"]),
             sun=tuple(extras["sun"]),
+            imported=bool(extras.get("imported", False)),
         )
     except OSError as error:
         raise AssetError(f"{path}: cannot be read ({error.strerror}); run build-scenes first") from error
@@ -137,6 +138,7 @@ class _Writer:
             "bounds_m": scene.bounds.tolist(),
             "sky": list(scene.sky),
             "sun": list(scene.sun),
+            **({"imported": True} if scene.imported else {}),
         }
         children = list(range(1, len(self._nodes) + 1))
         root = {"name": scene.name, "rotation": _Z_UP_TO_Y_UP, "children": children}

@@ -121,6 +121,8 @@ class Scene:
         sRGB of the sky, 0-255.
     sun : tuple of float
         Unit vector from the scene towards the sun, world frame.
+    imported : bool
+        Whether it comes from a mesh of another make, whose categories are its own.
     """
 
     name: str
@@ -129,6 +131,7 @@ class Scene:
     bounds: NDArray[np.float64]
     sky: tuple[int, int, int] = (150, 190, 230)
     sun: tuple[float, float, float] = (0.45, -0.35, 0.82)
+    imported: bool = False
     _by_node: dict[str, Instance] = field(default_factory=dict, init=False, repr=False)
 
     def __post_init__(self) -> None:

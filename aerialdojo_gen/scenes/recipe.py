@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, Any, Literal, TypeVar
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
@@ -65,6 +65,49 @@ class Recipe(BaseModel):
         """Unit vector towards the sun, world frame."""
         x, y, z = np.array(self.sun) / np.linalg.norm(self.sun)
         return float(x), float(y), float(z)
+
+
+class Imported(BaseModel):
+    """Where a scene comes from that ``add-scene`` made of a mesh, and what may still be set of it.
+
+    Attributes
+    ----------
+    source, source_sha256 : str
+        Name and digest of the mesh file.
+    up : str
+        The file's axis that pointed up.
+    scale : float
+        Metres a unit of the file.
+    crop_m : (x, y, radius) or None
+        The part that was kept, metres.
+    ceiling_m : float
+        Highest z that a drone may fly at, metres.
+    sky : str
+        ``"#rrggbb"``.
+    sun : (float, float, float)
+        Direction towards the sun, of any length.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    source: str
+    source_sha256: str
+    up: Literal["y", "z"]
+    scale: Positive
+    crop_m: tuple[float, float, Positive] | None = None
+    ceiling_m: Positive
+    sky: Colour = "#96bee6"
+    sun: tuple[float, float, float] = (0.45, -0.35, 0.82)
+
+
+def load_imported(path: Path) -> Imported | None:
+    """Read the table ``[imported]`` of a recipe; None where it is a recipe with a layout."""
+    body = read_toml(path)
+    if "imported" not in body:
+        return None
+    if set(body) != {"imported"} or not isinstance(body["imported"], dict):
+        raise AssetError(f"{path}: a scene is imported or has a layout: nothing may stand beside [imported]")
+    return validated(Imported, body["imported"], f"{path}: imported")
 
 
 def load_recipe(path: Path) -> Recipe:

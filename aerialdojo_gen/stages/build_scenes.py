@@ -8,13 +8,14 @@ import re
 import pyarrow as pa
 
 from aerialdojo_gen.config import BuildScenesConfig
-from aerialdojo_gen.errors import UsageError
 from aerialdojo_gen.scenes.build import build_scene
 from aerialdojo_gen.scenes.catalogue import load_catalogue
 from aerialdojo_gen.scenes.glb import write_glb
 from aerialdojo_gen.scenes.model import Scene
 from aerialdojo_gen.schemas import FAMILIES, SCENES
 from aerialdojo_gen.stage import Job, Output
+from aerialdojo_gen.store import check_scene_name
+from aerialdojo_gen.store import partition as store_partition
 
 _NAME = re.compile(r"([UNID])_([A-Za-z0-9]+)_([01])")
 _PARTITIONS = {"0": "ID", "1": "OOD"}
@@ -72,9 +73,13 @@ def scene_row(scene: Scene, mesh_path: str, mesh_sha256: str) -> dict[str, objec
 
 
 def parse_name(scene: str) -> tuple[str, str, str]:
-    """Split a scene's name, ``U_Mall_0``, into family, type and partition: ``("Urban", "Mall", "ID")``."""
+    """Split a scene's name into family, type and partition.
+
+    ``U_Mall_0`` is ``("Urban", "Mall", "ID")``; a name of another form is of the family Custom, and in the ID
+    partition unless it ends in ``_1``.
+    """
     match = _NAME.fullmatch(scene)
     if match is None:
-        raise UsageError(f"scene {scene!r}: a name is <U|N|I|D>_<Type>_<0|1>, e.g. U_Mall_0 (0 is ID, 1 is OOD)")
+        return "Custom", re.sub(r"_[01]$", "", check_scene_name(scene)), store_partition(scene).upper()
     family, scene_type, suffix = match.groups()
     return FAMILIES[family], scene_type, _PARTITIONS[suffix]

@@ -1,0 +1,327 @@
+"""From a file's nodes to a scene like those of recipes: axes, units, repair, instances, ground, ceiling."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+import trimesh
+from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from aerialdojo_gen.errors import AssetError
+from aerialdojo_gen.imports.raw import RawNode
+from aerialdojo_gen.scenes.catalogue import single
+from aerialdojo_gen.scenes.mesh import areas
+from aerialdojo_gen.scenes.model import Instance, Material, Part, Scene
+
+Floats = NDArray[np.float64]
+
+LARGEST_M = 2000.0
+SMALLEST_M = 5.0
+# Cells of half a metre that planning keeps a few bytes each of.
+_MOST_CELLS = 150e6
+_MARGIN_M = 5.0
+_HEADROOM_M = 6.0
+_LOWEST_CEILING_M = 12.0
+_GROUND_COVER = 0.97
+_CLUTTER_M = 0.5
+_REACH_M = 0.3
+_MOST_INSTANCES = 3000
+_LEAST_AREA_M2 = 1e-9
+_WELD_M = 1e-4
+_GROUND = (122, 132, 108)
+
+
+@dataclass
+class Repairs:
+    """What was found wrong and how it was mended, for the user to read."""
+
+    lines: list[str] = field(default_factory=list)
+
+    def add(self, n: int, text: str) -> None:
+        """Note a repair of n things, if there were any."""
+        if n:
+            self.lines.append(f"{n:,} {text}")
+
+
+def adopt(
+    name: str,
+    nodes: Sequence[RawNode],
+    *,
+    up: str = "z",
+    scale: float = 1.0,
+    crop_m: tuple[float, float, float] | None = None,
+    ceiling_m: float | None = None,
+) -> tuple[Scene, Repairs]:
+    """Make a scene of a foreign mesh.
+
+    Parameters
+    ----------
+    name : str
+        Name of the scene.
+    nodes : sequence of RawNode
+        What the file holds.
+    up : {"z", "y"}
+        The file's axis that points up.
+    scale : float
+        Metres a unit of the file: 0.01 for centimetres.
+    crop_m : (x, y, radius), optional
+        Keep what has its middle within a circle, metres, in the file's axes after `up` and `scale`.
+    ceiling_m : float, optional
+        Highest z that a drone may fly at; 6 m above the highest point, at least 12 m, where absent.
+
+    Returns
+    -------
+    Scene
+        Its origin is the middle of the mesh at the ground. Nodes of the file are its instances; a file without them
+        is taken apart into connected components. Surfaces that are not closed are there from both sides.
+    Repairs
+        What had to be mended.
+
+    Raises
+    ------
+    AssetError
+        Nothing is left to build from, or the extent cannot be metres.
+    """
+    if up not in ("y", "z"):
+        raise AssetError(f"--up {up!r}: a mesh's up axis is y or z")
+    if not (math.isfinite(scale) and scale > 0):
+        raise AssetError(f"--scale {scale}: must be a number above 0")
+    repairs = Repairs()
+    bodies = [b for node in nodes for b in [_sound(_turned(node, up, scale), repairs)] if len(b.faces)]
+    if not bodies:
+        raise AssetError("no triangle is left after repair: the mesh is empty or degenerate")
+    bodies = _instances(bodies)
+    if crop_m is not None:
+        x, y, radius = crop_m
+        bodies = [b for b in bodies if math.hypot(*(_middle(b)[:2] - (x, y))) <= radius]
+        if not bodies:
+            raise AssetError(f"--crop {x:g} {y:g} {radius:g}: nothing of the mesh lies there")
+    low, high = _bounds(bodies)
+    _check_extent(high - low)
+    shift = np.array([(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, low[2]])
+    bodies = _merged_clutter([RawNode(b.name, b.vertices - shift, b.faces, b.colours) for b in bodies])
+    parts: dict[str, Material] = {}
+    instances = _named([(b, _parts(b, parts, repairs)) for b in bodies])
+    low, high = low - shift, high - shift
+    if not instances:
+        raise AssetError("no triangle is left after repair: the mesh is empty or degenerate")
+    cover = _ground_cover(instances, low, high)
+    if cover < _GROUND_COVER:
+        instances.insert(0, _ground_plane(low, high, parts))
+        repairs.lines.append(f"level ground laid under it (the mesh covers {cover:.0%} of its extent)")
+    top = max(float(high[2]) + _HEADROOM_M, _LOWEST_CEILING_M) if ceiling_m is None else ceiling_m
+    bounds = np.array(
+        [[low[0] - _MARGIN_M, low[1] - _MARGIN_M, 0.0], [high[0] + _MARGIN_M, high[1] + _MARGIN_M, top]]
+    )
+    return Scene(name, tuple(instances), parts, bounds), repairs
+
+
+def _turned(node: RawNode, up: str, scale: float) -> RawNode:
+    v = node.vertices * scale
+    if up == "y":
+        v = np.column_stack([v[:, 0], -v[:, 2], v[:, 1]])
+    return RawNode(node.name, v, node.faces, node.colours)
+
+
+def _sound(node: RawNode, repairs: Repairs) -> RawNode:
+    """Drop faces that are no triangles of finite size; weld vertices, so that neighbours are known."""
+    faces, colours = node.faces, node.colours
+    inside = ((faces >= 0) & (faces < len(node.vertices))).all(axis=1)
+    finite = np.asarray(np.isfinite(node.vertices).all(axis=1) & (np.abs(node.vertices) < 1e7).all(axis=1))
+    ok = np.array(inside)
+    ok[inside] = finite[faces[inside]].all(axis=1)
+    repairs.add(int((~ok).sum()), f"triangles of {node.name or 'the mesh'} with no place (NaN, infinite) dropped")
+    faces, colours = faces[ok], colours[ok]
+    used, faces = np.unique(faces, return_inverse=True)
+    vertices = node.vertices[used]
+    if len(vertices):
+        _, first, same = np.unique(np.round(vertices / _WELD_M), axis=0, return_index=True, return_inverse=True)
+        vertices, faces = vertices[first], same.reshape(-1)[faces.reshape(-1)]
+    faces = faces.reshape(-1, 3).astype(np.int64)
+    solid = _areas(vertices, faces) > _LEAST_AREA_M2 if len(faces) else np.zeros(0, dtype=bool)
+    repairs.add(int((~solid).sum()), f"triangles of {node.name or 'the mesh'} without area dropped")
+    return RawNode(node.name, vertices, faces[solid], colours[solid])
+
+
+def _areas(vertices: Floats, faces: NDArray[np.int64]) -> Floats:
+    return areas(vertices, faces.astype(np.int32))
+
+
+def _instances(bodies: list[RawNode]) -> list[RawNode]:
+    """The file's nodes; where it has one alone, its connected components."""
+    if len(bodies) > 1:
+        return bodies
+    body = bodies[0]
+    f, n = body.faces, len(body.vertices)
+    edges = coo_array((np.ones(2 * len(f)), (np.repeat(f[:, 0], 2), f[:, 1:].reshape(-1))), shape=(n, n))
+    _, labels = connected_components(edges, directed=False)
+    of_face = labels[f[:, 0]]
+    order = np.argsort(of_face, kind="stable")
+    starts = np.flatnonzero(np.diff(of_face[order], prepend=-1))
+    pieces = []
+    for rows in np.split(order, starts[1:]):
+        rows = np.sort(rows)
+        used, faces = np.unique(f[rows], return_inverse=True)
+        pieces.append(RawNode("", body.vertices[used], faces.reshape(-1, 3), body.colours[rows]))
+    return _gathered(pieces)
+
+
+def _gathered(pieces: list[RawNode]) -> list[RawNode]:
+    """Give what lies within the box of something larger to the smallest such thing: a roof has its tiles."""
+    low = np.array([p.vertices.min(axis=0) for p in pieces])
+    high = np.array([p.vertices.max(axis=0) for p in pieces])
+    size = np.linalg.norm(high - low, axis=1)
+    order = np.argsort(size, kind="stable")
+    owner = np.arange(len(pieces))
+    for rank, k in enumerate(order):
+        larger = order[rank + 1 :]
+        around = (low[larger] <= low[k] + _REACH_M).all(axis=1) & (high[larger] >= high[k] - _REACH_M).all(axis=1)
+        if around.any() and size[larger[np.argmax(around)]] > 1.5 * size[k]:
+            owner[k] = larger[np.argmax(around)]
+    for k in order[::-1]:
+        owner[k] = owner[owner[k]]
+    groups: dict[int, list[RawNode]] = {}
+    for k, piece in enumerate(pieces):
+        groups.setdefault(int(owner[k]), []).append(piece)
+    return [_joined("", members) for _, members in sorted(groups.items())]
+
+
+def _joined(name: str, bodies: Sequence[RawNode]) -> RawNode:
+    offsets = np.cumsum([0, *(len(b.vertices) for b in bodies[:-1])])
+    return RawNode(
+        name,
+        np.concatenate([b.vertices for b in bodies]),
+        np.concatenate([b.faces + o for b, o in zip(bodies, offsets, strict=True)]),
+        np.concatenate([b.colours for b in bodies]),
+    )
+
+
+def _middle(body: RawNode) -> Floats:
+    return np.asarray((body.vertices.min(axis=0) + body.vertices.max(axis=0)) / 2)
+
+
+def _bounds(bodies: Sequence[RawNode]) -> tuple[Floats, Floats]:
+    low = np.min([b.vertices.min(axis=0) for b in bodies], axis=0)
+    high = np.max([b.vertices.max(axis=0) for b in bodies], axis=0)
+    return low, high
+
+
+def _check_extent(size: Floats) -> None:
+    wide = float(max(size[0], size[1]))
+    text = f"the mesh is {size[0]:,.4g} by {size[1]:,.4g} by {size[2]:,.4g} m"
+    if wide > LARGEST_M or math.prod(2 * (s + 2 * _MARGIN_M) for s in size) > _MOST_CELLS:
+        raise AssetError(
+            f"{text}, too large to plan in: --scale 0.01 if it is in centimetres, --crop X Y RADIUS for a part"
+        )
+    if wide < SMALLEST_M:
+        raise AssetError(f"{text}, too small to fly in: --scale 100 if its unit is a hectometre, --scale 10, …")
+
+
+def _merged_clutter(bodies: list[RawNode]) -> list[RawNode]:
+    """Make one body of all that is too small to be a thing of its own."""
+    size = np.array([np.linalg.norm(b.vertices.max(axis=0) - b.vertices.min(axis=0)) for b in bodies])
+    small = (size < _CLUTTER_M) & np.array([not b.name for b in bodies])
+    if len(bodies) - small.sum() > _MOST_INSTANCES:
+        small |= size < np.sort(size)[-_MOST_INSTANCES]
+    if small.sum() < 2:
+        return bodies
+    scraps = [b for b, s in zip(bodies, small, strict=True) if s]
+    return [*(b for b, s in zip(bodies, small, strict=True) if not s), _joined("clutter", scraps)]
+
+
+def _parts(body: RawNode, materials: dict[str, Material], repairs: Repairs) -> tuple[Part, ...]:
+    """Make parts by colour; a closed body faces outwards, an open one is there from both sides."""
+    mesh = trimesh.Trimesh(body.vertices, body.faces, process=False)
+    faces, colours = body.faces, body.colours
+    if mesh.is_watertight and mesh.is_winding_consistent:
+        if mesh.volume < 0:
+            faces = faces[:, ::-1]
+            repairs.lines.append(f"{body.name or 'a component'} was inside out")
+    else:
+        faces, colours = np.concatenate([faces, faces[:, ::-1]]), np.concatenate([colours, colours])
+    # Photographs bring thousands of shades: sixteen levels a channel are materials enough.
+    shades = (colours // 16) * 16 + 8
+    parts = []
+    for shade in np.unique(shades, axis=0):
+        rows = (shades == shade).all(axis=1)
+        red, green, blue = (int(c) for c in shade)
+        spec = f"#{red:02x}{green:02x}{blue:02x}"
+        materials.setdefault(spec, Material(spec, (red, green, blue)))
+        used, own = np.unique(faces[rows], return_inverse=True)
+        vertices = single(body.vertices[used])
+        triangles = np.asarray(own.reshape(-1, 3), dtype=np.int32)
+        triangles = triangles[areas(vertices, triangles) > 0.0]
+        if len(triangles):
+            parts.append(Part(vertices, triangles, np.zeros((len(vertices), 2), dtype=np.float32), spec))
+    return tuple(parts)
+
+
+def _named(bodies: Sequence[tuple[RawNode, tuple[Part, ...]]]) -> list[Instance]:
+    """Give every body a node name, a category from it, and what can be said of its colour, height and form."""
+    counts: dict[str, int] = {}
+    heights = [float(b.vertices[:, 2].max() - b.vertices[:, 2].min()) for b, parts in bodies if parts]
+    tall, low = (float(np.quantile(heights, q)) for q in (0.8, 0.2)) if heights else (0.0, 0.0)
+    out = []
+    for body, parts in bodies:
+        if not parts:
+            continue
+        category = _category(body)
+        k = counts[category] = counts.get(category, -1) + 1
+        out.append(Instance(f"{category}_{k:04d}", category, "", _looks(body, tall, low), parts))
+    return out
+
+
+def _category(body: RawNode) -> str:
+    """Read a category from a node's name: ``"Building.012"`` and ``"building_12"`` are both a building."""
+    words = re.sub(r"([a-z])([A-Z])", r"\1 \2", body.name)
+    words = re.sub(r"[^a-z]+", "_", words.lower()).strip("_")[:40].strip("_")
+    if words and words not in ("geometry", "mesh", "object", "node", "group", "default"):
+        return words
+    size = body.vertices.max(axis=0) - body.vertices.min(axis=0)
+    if size[2] < 0.05 * max(size[0], size[1]) or (size[2] < 1.0 and max(size[:2]) > 10.0):
+        return "slab"
+    return "structure" if size[2] > 3.0 else "block"
+
+
+def _looks(body: RawNode, tall: float, low: float) -> dict[str, str]:
+    from aerialdojo_gen.imports.colours import colour_name
+
+    size = body.vertices.max(axis=0) - body.vertices.min(axis=0)
+    looks = {"colour": colour_name(np.median(body.colours, axis=0))}
+    if tall > 1.2 * low:
+        looks |= {"size": "tall"} if size[2] >= tall else {"size": "low"} if size[2] <= low else {}
+    flat = body.vertices[:, :2] - body.vertices[:, :2].mean(axis=0)
+    spread = np.sqrt(np.maximum(np.linalg.eigvalsh(np.cov(flat.T) + 1e-9 * np.eye(2)), 0.0))
+    if spread[1] > 3.0 * spread[0]:
+        looks["shape"] = "long"
+    return looks
+
+
+def _ground_cover(instances: Sequence[Instance], low: Floats, high: Floats) -> float:
+    """Share of a grid of plumb lines that meet the mesh."""
+    from aerialdojo_gen.geometry.rays import RayCaster
+
+    scene = Scene("probe", tuple(instances), {}, np.stack([low, high]))
+    fractions = (np.arange(24) + 0.5) / 24
+    places = np.stack(np.meshgrid(*(low[:2, None] + (high - low)[:2, None] * fractions), indexing="ij"), -1).reshape(
+        -1, 2
+    )
+    origins = np.column_stack([places, np.full(len(places), high[2] + 1.0)])
+    hit, _ = RayCaster(scene).first_hit(origins, np.tile([0.0, 0.0, -1.0], (len(origins), 1)))
+    return float(np.isfinite(hit).mean())
+
+
+def _ground_plane(low: Floats, high: Floats, materials: dict[str, Material]) -> Instance:
+    x0, y0, x1, y1 = low[0] - 4 * _MARGIN_M, low[1] - 4 * _MARGIN_M, high[0] + 4 * _MARGIN_M, high[1] + 4 * _MARGIN_M
+    spec = "#{:02x}{:02x}{:02x}".format(*_GROUND)
+    materials.setdefault(spec, Material(spec, _GROUND))
+    # Just under the lowest point, where a floor of the mesh may lie.
+    vertices = single(np.array([[x0, y0, -0.02], [x1, y0, -0.02], [x1, y1, -0.02], [x0, y1, -0.02]]))
+    faces = np.array([[0, 1, 2], [0, 2, 3]], dtype=np.int32)
+    return Instance("ground", "ground", "", {}, (Part(vertices, faces, np.zeros((4, 2), dtype=np.float32), spec),))

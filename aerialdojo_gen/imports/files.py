@@ -1,0 +1,232 @@
+"""Read a mesh file of a foreign make: GLB, OBJ, STL, PLY (by trimesh) or 3DS.
+
+Files are hostile until shown otherwise: they are read in a process of their own that may take neither more memory
+nor more time than it is given, GLB files are looked over before an array of theirs is made, and what a file refers
+to is read from beside it or not at all.
+"""
+
+from __future__ import annotations
+
+import json
+import multiprocessing
+import resource
+import struct
+import tempfile
+import warnings
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aerialdojo_gen.errors import AssetError
+from aerialdojo_gen.imports.raw import RawNode, plain
+
+SUFFIXES = (".glb", ".obj", ".stl", ".ply", ".3ds")
+MAX_FILE_BYTES = 1 << 30
+MAX_TRIANGLES = 4_000_000
+MAX_MEMORY_BYTES = 6 << 30
+MAX_SECONDS = 300
+_MAX_SIDE_FILE = 64 << 20
+
+
+def read_mesh(path: Path, max_memory_bytes: int = MAX_MEMORY_BYTES) -> list[RawNode]:
+    """Read a mesh file's nodes, in bounded memory and time.
+
+    Parameters
+    ----------
+    path : Path
+        A file with one of `SUFFIXES`.
+    max_memory_bytes : int
+        Most address space of the reading process.
+
+    Returns
+    -------
+    list of RawNode
+        Nodes with at least one triangle, in the order of the file; transformations are applied.
+
+    Raises
+    ------
+    AssetError
+        The file is missing, of another kind, too large, damaged, empty, or needs too much memory or time.
+    """
+    suffix = path.suffix.lower()
+    if suffix not in SUFFIXES:
+        raise AssetError(f"{path}: meshes are read from {', '.join(s[1:].upper() for s in SUFFIXES)} files")
+    try:
+        size = path.stat().st_size
+    except OSError as error:
+        raise AssetError(f"{path}: {error.strerror}") from None
+    if size > MAX_FILE_BYTES:
+        raise AssetError(f"{path}: {size >> 20} MiB, the most is {MAX_FILE_BYTES >> 20}: simplify or split the mesh")
+    with tempfile.TemporaryDirectory(prefix="aerialdojo-") as folder:
+        out = Path(folder) / "nodes.npz"
+        context = multiprocessing.get_context("spawn")
+        reader, writer = context.Pipe(duplex=False)
+        process = context.Process(target=_work, args=(path, out, max_memory_bytes, writer), daemon=True)
+        process.start()
+        writer.close()
+        process.join(MAX_SECONDS)
+        if process.is_alive():
+            process.kill()
+            process.join()
+            raise AssetError(f"{path}: reading takes more than {MAX_SECONDS} s: simplify or split the mesh")
+        message = reader.recv() if reader.poll() else "its reader crashed: the file is damaged or too large"
+        if message:
+            raise AssetError(f"{path}: {message}")
+        return _unpacked(out)
+
+
+def _work(path: Path, out: Path, max_memory_bytes: int, report: Any) -> None:
+    """Read in a process of its own; reports an empty string, or what is wrong."""
+    # What readers grumble about is repaired and reported later.
+    warnings.simplefilter("ignore")
+    resource.setrlimit(resource.RLIMIT_AS, (max_memory_bytes, max_memory_bytes))
+    resource.setrlimit(resource.RLIMIT_CPU, (MAX_SECONDS, MAX_SECONDS))
+    try:
+        nodes = [n for n in _read(path) if len(n.faces)]
+        total = sum(len(n.faces) for n in nodes)
+        if not nodes:
+            raise AssetError("holds no triangles")
+        if total > MAX_TRIANGLES:
+            raise AssetError(f"{total:,} triangles, the most is {MAX_TRIANGLES:,}: simplify or split the mesh")
+        _pack(nodes, out)
+        report.send("")
+    except AssetError as error:
+        report.send(str(error))
+    except MemoryError:
+        report.send(f"needs more than {max_memory_bytes >> 20} MiB to read: simplify or split the mesh")
+    except Exception as error:  # a foreign file may make a reader fail in any way: it is named, never let through
+        first = (str(error).splitlines() or [""])[0]
+        report.send(f"cannot be read ({type(error).__name__}{': ' + first[:120] if first else ''})")
+
+
+def _read(path: Path) -> list[RawNode]:
+    suffix = path.suffix.lower()
+    if suffix == ".3ds":
+        from aerialdojo_gen.imports.three_ds import read_3ds
+
+        return read_3ds(path.read_bytes())
+    if suffix == ".glb":
+        look_over_glb(path)
+    import trimesh
+
+    # What the file refers to comes through a resolver that stays in its folder.
+    scene = trimesh.load_scene(
+        path, file_type=suffix[1:], resolver=_beside(path), process=False, split_objects=True, group_material=False,
+        maintain_order=True,
+    )  # fmt: skip
+    nodes = []
+    for name in scene.graph.nodes_geometry:
+        transform, geometry = scene.graph[name]
+        body = scene.geometry[geometry]
+        if not isinstance(body, trimesh.Trimesh):
+            continue
+        vertices = trimesh.transform_points(np.asarray(body.vertices, dtype=np.float64), transform)
+        faces = np.asarray(body.faces, dtype=np.int64)
+        label = "" if suffix in (".stl", ".ply") else str(name)
+        nodes.append(RawNode(label, vertices, faces, _colours(body)))
+    return nodes
+
+
+def _beside(path: Path) -> Any:
+    import trimesh
+
+    folder = path.resolve().parent
+
+    class Beside(trimesh.resolvers.Resolver):
+        """Gives files of the mesh's own folder and below, and no other."""
+
+        def __init__(self) -> None:
+            pass
+
+        def get(self, name: str) -> bytes:
+            wanted = (folder / name.strip()).resolve()
+            if not wanted.is_relative_to(folder) or not wanted.is_file():
+                raise FileNotFoundError(name)
+            if wanted.stat().st_size > _MAX_SIDE_FILE:
+                raise FileNotFoundError(name)
+            return wanted.read_bytes()
+
+        def keys(self) -> list[str]:
+            return []
+
+        def namespaced(self, namespace: str) -> Any:
+            return self
+
+        def write(self, name: str, data: bytes) -> None:
+            raise PermissionError(name)
+
+    return Beside()
+
+
+def _colours(body: Any) -> NDArray[np.uint8]:
+    """Colour a mesh's faces: by face or vertex colours, else by its material's colour or its texture's mean."""
+    n = len(body.faces)
+    visual = body.visual
+    if visual.kind in ("face", "vertex"):
+        return np.asarray(visual.face_colors[:, :3], dtype=np.uint8)
+    material = getattr(visual, "material", None)
+    if material is None:
+        return plain(n)
+    image = getattr(material, "baseColorTexture", None) or getattr(material, "image", None)
+    if image is not None and image.width * image.height <= 16 << 20:
+        mean = np.asarray(image.convert("RGB").resize((1, 1), 4), dtype=np.uint8).reshape(3)
+        return np.tile(mean, (n, 1))
+    colour = np.asarray(material.main_color, dtype=np.uint8)[:3]
+    return np.tile(colour, (n, 1))
+
+
+def look_over_glb(path: Path) -> None:
+    """Refuse a GLB whose arrays would be far larger than the file, before any of them is made.
+
+    An accessor without a buffer view is all zeros and costs the file nothing, and several nodes may show one mesh: a
+    few hundred bytes can ask for terabytes.
+
+    Raises
+    ------
+    AssetError
+        It is no GLB 2 file, or it asks for more triangles or numbers than `MAX_TRIANGLES` allows.
+    """
+    with path.open("rb") as file:
+        head = file.read(20)
+        if len(head) < 20 or head[:4] != b"glTF":
+            raise AssetError("is no GLB file")
+        version, _, length, kind = struct.unpack("<IIII", head[4:])
+        if version != 2 or kind != 0x4E4F534A or length > MAX_FILE_BYTES // 4:
+            raise AssetError("is no GLB 2 file")
+        try:
+            document = json.loads(file.read(length))
+            accessors = document.get("accessors", [])
+            counts = [int(a["count"]) for a in accessors]
+            shown = sum(
+                (counts[p["indices"]] if "indices" in p else counts[p["attributes"]["POSITION"]]) // 3
+                for node in document.get("nodes", [])
+                if "mesh" in node
+                for p in document["meshes"][node["mesh"]]["primitives"]
+            )
+        except (ValueError, KeyError, IndexError, TypeError, AttributeError) as error:
+            raise AssetError("is a damaged GLB file") from error
+    if min(counts, default=0) < 0 or sum(counts) > 6 * MAX_TRIANGLES or shown > MAX_TRIANGLES:
+        raise AssetError(
+            f"asks for {max(shown, sum(counts) // 3):,} triangles, the most is {MAX_TRIANGLES:,}: "
+            "simplify or split the mesh"
+        )
+    required = set(document.get("extensionsRequired", []))
+    packed = required & {"KHR_draco_mesh_compression", "EXT_meshopt_compression"}
+    if packed:
+        raise AssetError(f"is compressed ({', '.join(sorted(packed))}): export it without compression")
+
+
+def _pack(nodes: list[RawNode], out: Path) -> None:
+    arrays: dict[str, Any] = {"names": np.array([n.name for n in nodes], dtype=np.str_)}
+    for k, node in enumerate(nodes):
+        arrays |= {f"v{k}": node.vertices, f"f{k}": node.faces, f"c{k}": node.colours}
+    np.savez(out, **arrays)
+
+
+def _unpacked(path: Path) -> list[RawNode]:
+    with np.load(path, allow_pickle=False) as file:
+        return [
+            RawNode(str(name), file[f"v{k}"], file[f"f{k}"], file[f"c{k}"]) for k, name in enumerate(file["names"])
+        ]
