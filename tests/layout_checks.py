@@ -52,12 +52,15 @@ def looks_of(scene: Scene) -> set[tuple[str, str]]:
     }
 
 
-def floating(scene: Scene, hung: Collection[str] = (), reach_m: float = 0.9) -> list[str]:
+def floating(
+    scene: Scene, hung: Collection[str] = (), reach_m: float = 0.9, bearers: Collection[str] = ()
+) -> list[str]:
     """List the props that nothing bears: no surface of structure or ground under their feet.
 
-    A prop may reach up to `reach_m` into what it stands on; those of the categories `hung` hang on walls.
+    A prop may reach up to `reach_m` into what it stands on; those of the categories `hung` hang on walls, those of
+    the categories `bearers` (ships, say) bear others.
     """
-    structure = tuple(i for i in scene.instances if i.category not in catalogue())
+    structure = tuple(i for i in scene.instances if i.category not in catalogue() or i.category in bearers)
     cast = RayCaster(Scene(scene.name, structure, scene.materials, scene.bounds))
     out = []
     for prop in props_of(scene):
@@ -74,8 +77,8 @@ def floating(scene: Scene, hung: Collection[str] = (), reach_m: float = 0.9) -> 
     return out
 
 
-def clashes(scene: Scene, share: float = 0.2) -> list[tuple[str, str]]:
-    """List the pairs of props that stand in one another."""
+def clashes(scene: Scene, share: float = 0.2, bearers: Collection[str] = ()) -> list[tuple[str, str]]:
+    """List the pairs of props that stand in one another; those of `bearers` may have others on them."""
     props = props_of(scene)
     outlines = [footprint(p, float(p.bounds[0, 2])) for p in props]
     tree = shapely.STRtree(outlines)
@@ -83,7 +86,7 @@ def clashes(scene: Scene, share: float = 0.2) -> list[tuple[str, str]]:
     for a, b in zip(*tree.query(outlines, predicate="intersects"), strict=True):
         low = max(props[a].bounds[0, 2], props[b].bounds[0, 2])
         high = min(props[a].bounds[1, 2], props[b].bounds[1, 2])
-        if a < b and high - low > 0.2:
+        if a < b and high - low > 0.2 and not {props[a].category, props[b].category} & set(bearers):
             shared = outlines[a].intersection(outlines[b]).area
             if shared > share * min(outlines[a].area, outlines[b].area):
                 out.append((props[a].node, props[b].node))
