@@ -84,7 +84,7 @@ WEST_SHORE = (
     Thing("seagull_statue", -42.0, -12.6, 200.0, "white"),
     Thing("deck_chair", -44.4, 2.4, 180.0, "blue"),
     Thing("oil_drums", -34.0, -20.4, 0.0, "green"),
-    Thing("cattle_skull_post", -44.6, 10.4, 180.0, "white"),
+    Thing("carved_owl", -44.6, 10.4, 180.0, "grey"),
     Thing("dinghy_on_trailer", -40.2, -17.4, -120.0, "white"),
 )
 NORTH = (

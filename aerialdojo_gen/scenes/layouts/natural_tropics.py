@@ -51,6 +51,8 @@ _PATHS = [
 ]
 _HUTS = ((-17.0, -9.0, -20.0), (-1.0, -4.5, -130.0), (6.0, -21.0, 120.0), (-20.0, -2.0, -60.0), (17.0, -20.0, 100.0))
 _OVER_WATER = ((0.7, -50.0, 0.0), (13.3, -50.0, 180.0), (0.7, -58.5, 0.0), (13.3, -58.5, 180.0))
+# Ground that long things stand on.
+_LEVEL = ((0.4, 3.0, 1.8), (-13.6, 0.0, 1.3), (12.4, -6.0, 1.6), (-36.0, 36.4, 2.4), (31.4, 6.6, 1.6))
 _JETTY = Frame(-13.0, -22.4, -90.0)
 
 
@@ -94,6 +96,8 @@ def _ground(site: Site, land: BaseGeometry, paths: list[list[tuple[float, float]
     ground = ground.flattened(disc(*_LIGHTHOUSE, 5.5), blend_m=3.0)
     for x, y, _ in _HUTS:
         ground = ground.flattened(disc(x, y, 2.5), blend_m=3.5)
+    for x, y, radius in _LEVEL:
+        ground = ground.flattened(disc(x, y, radius), blend_m=2.5)
     site.set_ground(ground, site.material("jungle", "moss:#5f7a3a"))
 
 
