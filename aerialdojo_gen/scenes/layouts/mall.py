@@ -6,6 +6,8 @@ footbridge, and joined with the loading yard by a passage through the hall. Nort
 
 from __future__ import annotations
 
+from typing import Literal
+
 from pydantic import BaseModel, ConfigDict, Field
 from shapely.geometry import Point as Disc
 from shapely.ops import unary_union
@@ -13,6 +15,7 @@ from shapely.ops import unary_union
 from aerialdojo_gen.scenes.grammar_streets import arrow, crossing, parking_row, streets
 from aerialdojo_gen.scenes.ground import rectangle
 from aerialdojo_gen.scenes.layouts.urban_furniture import Furniture, furnish
+from aerialdojo_gen.scenes.layouts.urban_outlets import build_outlets
 from aerialdojo_gen.scenes.layouts.urban_parking import park_cars, parking_deck
 from aerialdojo_gen.scenes.layouts.urban_shops import STOREY_M, anchor_store, shop_names, shop_row, shopping_hall
 from aerialdojo_gen.scenes.layouts.urban_structures import (
@@ -38,6 +41,8 @@ class Parameters(BaseModel):
 
     Attributes
     ----------
+    plan : str
+        ``"courtyard"`` (190 by 150 m) or ``"outlets"`` (160 by 128 m).
     occupancy : float
         Share of the parking bays in front of the mall that is taken.
     furniture : tuple of Furniture
@@ -46,6 +51,7 @@ class Parameters(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
+    plan: Literal["courtyard", "outlets"] = "courtyard"
     occupancy: float = Field(default=0.4, ge=0.0, le=1.0)
     furniture: tuple[Furniture, ...] = ()
 
@@ -53,6 +59,10 @@ class Parameters(BaseModel):
 def build(site: Site) -> None:
     """Build the mall."""
     parameters: Parameters = site.parameters
+    if parameters.plan == "outlets":
+        build_outlets(site, parameters.occupancy)
+        furnish(site, parameters.furniture)
+        return
     _ground(site)
     _hall(site)
     _courtyard(site)

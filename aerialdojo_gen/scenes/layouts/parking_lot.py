@@ -180,18 +180,6 @@ def _offices(site: Site) -> None:
         middle = (x0 + x1) / 2
         for category, dx in zip(equipment, (-5.0, 4.5), strict=True):
             put(site, category, middle + dx, 49.0, -90.0, "on the roof of an office", z=top)
-    terraces = {
-        "on the roof terrace of the north-west office": (-52.0, -30.0, 10.5, [
-            "cafe_table", "hammock", "planter", "beehive", "barbecue", "telescope", "bench", "flagpole"]),
-        "on the roof terrace of the brick office": (-26.0, -6.0, 14.0, [
-            "weather_station", "picnic_table", "topiary", "rocking_chair", "solar_panels", "pergola"]),
-        "on the roof terrace of the glass office": (-1.0, 20.0, 10.5, [
-            "garden_swing", "cafe_table", "bench", "birdhouse", "planter", "information_board", "swing_set"]),
-    }  # fmt: skip
-    for place, (x0, x1, top, things) in terraces.items():
-        spots = [Pose(x0 + 3.0 + 4.6 * k, 45.4 + 7.0 * (k % 2), -90.0) for k in range(int((x1 - x0 - 4) // 4.6) + 1)]
-        spots += [Pose(p.x, 97.8 - p.y, 90.0) for p in spots[1::2]]
-        deal(site, things, spots, place, z=top)
     for x, variant in ((-47.5, "coffee"), (-34.5, "pharmacy"), (3.5, "bakery"), (15.0, "books")):
         site.place("storefront", x, 43.0, -90.0, z=0.12, variant=variant, attributes={"place": "in an office front"})
     banners = ((-23.5, "red_disc"), (-8.5, "blue_triangle"))

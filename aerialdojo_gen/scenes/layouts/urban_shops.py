@@ -21,7 +21,7 @@ _SHOPS = (
 )  # fmt: skip
 
 
-def shopping_hall(site: Site, plan: Polygon, passage: Polygon, *, node: str, category: str) -> None:
+def shopping_hall(site: Site, plan: Polygon, passage: BaseGeometry, *, node: str, category: str) -> None:
     """Put up a hall of two storeys, its ground storey cut through by a passage that one can fly along.
 
     Parameters
@@ -30,7 +30,7 @@ def shopping_hall(site: Site, plan: Polygon, passage: Polygon, *, node: str, cat
         Where; its palette may name ``shop_wall``, ``upper_wall``, ``roof`` and ``cornice``.
     plan : Polygon
         Outline, metres.
-    passage : Polygon
+    passage : Polygon or MultiPolygon
         What is left open of the ground storey.
     node, category : str
         Names of the structure.
@@ -47,7 +47,8 @@ def shopping_hall(site: Site, plan: Polygon, passage: Polygon, *, node: str, cat
     parts.append(
         (cornice, slab(plan.buffer(0.18, join_style="mitre").difference(plan), STOREY_M - 0.2, STOREY_M + 0.1))
     )
-    parts.append((site.material("soffit", "planks:#b08a58"), slab(passage, STOREY_M - 0.2, STOREY_M - 0.02)))
+    for piece in getattr(passage, "geoms", [passage]):
+        parts.append((site.material("soffit", "planks:#b08a58"), slab(piece, STOREY_M - 0.2, STOREY_M - 0.02)))
     parts.append(
         (site.material("roof", "gravel:#b3aea4"), slab(plan.buffer(-0.02, join_style="mitre"), top - 0.3, top))
     )
