@@ -67,9 +67,7 @@ def test_a_choice_has_the_numbers_and_the_metres(seed, longer):
     assert {s: sum(m and t == s for m, t in zip(mask, setting, strict=True)) for s in wanted} == wanted
     assert lengths[mask].sum() == pytest.approx(longer * plain, rel=0.01)
     order = np.random.default_rng(seed).permutation(len(ids))
-    again = choose(
-        [ids[k] for k in order], [setting[k] for k in order], lengths[order], wanted, longer * plain, seed
-    )
+    again = choose([ids[k] for k in order], [setting[k] for k in order], lengths[order], wanted, longer * plain, seed)
     assert {ids[k] for k in np.flatnonzero(mask)} == {ids[order[k]] for k in np.flatnonzero(again)}
 
 

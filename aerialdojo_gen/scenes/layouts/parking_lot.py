@@ -69,7 +69,8 @@ def _city(site: Site, occupancy: float) -> None:
     park_cars(site, bays, occupancy, "in the car park")
     top = len(deck.levels_m) - 1
     stalls = ["market_stall", "ice_cream_cart", "cafe_table", "food_truck", "stage", "cotton_candy_stand", "planter",
-              "carousel", "kiosk", "balloon_stand", "vending_machine", "bench", "motorcycle", "ev_charger"]  # fmt: skip
+              "carousel", "kiosk", "balloon_stand", "vending_machine", "bench", "motorcycle",
+              "ev_charger"]  # fmt: skip
     spots = [
         Pose(34.5 + 5.2 * k, y, 90.0 * (1 - 2 * row)) for row, y in enumerate((6.0, 13.4, 24.6)) for k in range(5)
     ]
