@@ -1,7 +1,8 @@
 """A forest with a lived-in heart: a cabin, a camp, a fire tower, a pond, a ruin, and paths between them.
 
 Everything worth searching for stands within about 22 m of the origin, at many heights; the wood goes on around it to
-the borders. The plan is fixed, the wood, the ground and the small things follow the recipe's seed and parameters.
+the borders. The plan is fixed, the wood, the ground and the small things follow the recipe's seed and parameters. A
+recipe that sets out groups of its own gets another forest, a birch wood along a creek (`natural_birchwood`).
 """
 
 from __future__ import annotations
@@ -26,6 +27,7 @@ from aerialdojo_gen.scenes.layouts.forest_things import (
     STRAYS,
     TOWER,
 )  # fmt: skip
+from aerialdojo_gen.scenes.layouts.natural_birchwood import BirchWood, build_birch_wood
 from aerialdojo_gen.scenes.layouts.natural_ground import Spot, Thing, blob, furnish, keep_clear
 from aerialdojo_gen.scenes.layouts.natural_woods import Species, near, patches, plant, strew
 from aerialdojo_gen.scenes.site import Site
@@ -69,6 +71,8 @@ class Parameters(BaseModel):
         Least distance of trees in the densest wood, metres.
     undergrowth : float
         Factor on the number of shrubs, ferns and stones.
+    birch_wood : BirchWood, optional
+        A birch wood with places of its own, in place of the mixed forest.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -76,11 +80,15 @@ class Parameters(BaseModel):
     relief_m: Annotated[float, Field(ge=0, le=6)] = 3.2
     tree_spacing_m: Annotated[float, Field(ge=2.5, le=10)] = 3.9
     undergrowth: Annotated[float, Field(ge=0, le=3)] = 1.0
+    birch_wood: BirchWood | None = None
 
 
 def build(site: Site) -> None:
     """Build the forest."""
     p: Parameters = site.parameters
+    if p.birch_wood:
+        build_birch_wood(site, p.birch_wood, p.relief_m, p.tree_spacing_m, p.undergrowth)
+        return
     stream, pond = smooth_path(_STREAM), blob(14.5, -10.0, 5.2, site.recipe.seed, 0.16)
     water = shapely.union(ribbon(stream, 2.2), pond)
     paths = [smooth_path(points) for points in _PATHS]

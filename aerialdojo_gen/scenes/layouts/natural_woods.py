@@ -33,11 +33,14 @@ class Species:
         ``(x, y) -> float``: how well the place suits it, 0 or more.
     crowding : float
         Share of the density at which it stands: below 1 for broad crowns.
+    variant : str or None
+        None draws one for every tree.
     """
 
     category: str
     habitat: Field
     crowding: float = 1.0
+    variant: str | None = None
 
 
 def patches(seed: int, wavelength_m: float, sharpness: float = 2.5) -> Field:
@@ -94,7 +97,8 @@ def plant(
         pick = species[int(rng.choice(len(species), p=suits / suits.sum()))]
         if rng.random() > pick.crowding:
             continue
-        tree = site.try_place(pick.category, x, y, yaw, z=settled_z(site, x, y, 0.3), attributes=words)
+        z = settled_z(site, x, y, 0.3)
+        tree = site.try_place(pick.category, x, y, yaw, z=z, variant=pick.variant, attributes=words)
         if tree is not None:
             out.append(tree)
     return out

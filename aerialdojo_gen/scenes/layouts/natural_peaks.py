@@ -1,0 +1,156 @@
+"""Mountain ground: ridges and peaks that fall away in benches, faces of rock where it is steep, and crags."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Annotated
+
+import numpy as np
+import shapely
+from pydantic import BaseModel, ConfigDict, Field
+from shapely.geometry import LineString, Point
+from shapely.geometry.base import BaseGeometry
+
+from aerialdojo_gen.scenes.mesh import Floats, Mesh, merge, rotated, rotation, translated
+from aerialdojo_gen.scenes.shapes import crown
+from aerialdojo_gen.scenes.site import Site
+from aerialdojo_gen.scenes.terrain import Terrain, flat_terrain, rolling_terrain
+
+_SMOOTH_MAX = 5.0
+
+
+class Ridge(BaseModel):
+    """A ridge, as a recipe gives it.
+
+    Attributes
+    ----------
+    line : tuple of (x, y, z)
+        Its crest, metres; one point makes a peak.
+    width_m : float
+        How far its flanks reach, metres.
+    hollow : float
+        Above 1 the flanks are hollow, as ice leaves them; below 1 they bulge.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    line: tuple[tuple[float, float, float], ...]
+    width_m: Annotated[float, Field(gt=0)]
+    hollow: Annotated[float, Field(gt=0, le=4)] = 1.3
+
+
+class Crag(BaseModel):
+    """A crag that stands on the ground: middle, radius and height, metres, and how many blocks it is made of."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    at: tuple[float, float]
+    radius_m: Annotated[float, Field(gt=0)]
+    height_m: Annotated[float, Field(gt=0)]
+    blocks: Annotated[int, Field(ge=1, le=12)] = 5
+
+    def area(self) -> BaseGeometry:
+        """Ground that it takes, world frame, metres."""
+        return Point(self.at).buffer(self.radius_m * 1.15, quad_segs=4)
+
+
+def massif(
+    size_m: tuple[float, float], cell_m: float, seed: int, ridges: Sequence[Ridge], bench_m: float, rough_m: float
+) -> Terrain:
+    """Make mountains.
+
+    Parameters
+    ----------
+    size_m : (float, float)
+        Extent along x and y, metres.
+    cell_m : float
+        Edge of a cell, metres.
+    seed : int
+        Of the roughness.
+    ridges : sequence of Ridge
+        Where they overlap, the higher one shows, with a soft valley between.
+    bench_m : float
+        Height of the steps in which the flanks fall; 0 leaves them plain.
+    rough_m : float
+        Height of gullies and spurs on the steepest ground, metres.
+    """
+    columns, rows = (int(np.ceil(s / cell_m - 1e-9)) for s in size_m)
+    cell = max(size_m[0] / columns, size_m[1] / rows)
+    ground = replace(flat_terrain(size_m), cell_m=cell, heights_m=np.zeros((rows + 1, columns + 1)))
+    corners = ground.corners()
+    places = shapely.points(corners[:, :2])
+    total = np.zeros(len(corners))
+    for ridge in ridges:
+        line = np.array(ridge.line)
+        if len(line) == 1:
+            away = np.hypot(*(corners[:, :2] - line[0, :2]).T)
+            crest = np.full(len(corners), line[0, 2])
+        else:
+            path = LineString(line[:, :2])
+            stations = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line[:, :2], axis=0), axis=1))])
+            crest = np.interp(shapely.line_locate_point(path, places), stations, line[:, 2])
+            away = shapely.distance(path, places)
+        total += (crest * np.clip(1.0 - away / ridge.width_m, 0.0, 1.0) ** ridge.hollow) ** _SMOOTH_MAX
+    height = total ** (1.0 / _SMOOTH_MAX)
+    share = height / max(float(height.max()), 1e-9)
+    folds = rolling_terrain(size_m, cell_m, seed, rough_m, 26.0, octaves=3, ridged=True).heights_m.ravel()
+    height = height + folds * np.clip(share * 1.6, 0.12, 1.0)
+    if bench_m > 0.0:
+        # Benches follow the contour but not quite: strata dip.
+        level = (height + 0.03 * corners[:, 0]) / bench_m
+        part = level - np.floor(level)
+        riser = np.clip((part - 0.5) / 0.4, 0.0, 1.0)
+        benched = (np.floor(level) + riser * riser * (3.0 - 2.0 * riser)) * bench_m - 0.03 * corners[:, 0]
+        height = 0.3 * height + 0.7 * benched
+    return replace(ground, heights_m=height.reshape(ground.heights_m.shape))
+
+
+def steep(terrain: Terrain, slope: float) -> BaseGeometry:
+    """Outline the ground that rises more than `slope` metres a metre, world frame."""
+    dy, dx = np.gradient(terrain.heights_m, terrain.cell_m)
+    return cells_where(terrain, np.hypot(dx, dy) > slope)
+
+
+def above(terrain: Terrain, z_m: float, slope: float) -> BaseGeometry:
+    """Outline the ground above a height that is gentle enough for snow to lie, world frame."""
+    dy, dx = np.gradient(terrain.heights_m, terrain.cell_m)
+    return cells_where(terrain, (terrain.heights_m > z_m) & (np.hypot(dx, dy) < slope))
+
+
+def cells_where(terrain: Terrain, chosen: np.ndarray) -> BaseGeometry:
+    """Join the cells about chosen corners into areas with round outlines; single corners are left out."""
+    points = terrain.corners()[chosen.ravel(), :2]
+    if not len(points):
+        return Point(0, 0).buffer(0.0)
+    half = terrain.cell_m * 0.62
+    area = shapely.union_all(shapely.box(*(points - half).T, *(points + half).T))
+    return area.buffer(-0.8, quad_segs=2).buffer(1.3, quad_segs=2).simplify(0.25)
+
+
+def put_up_crag(site: Site, crag: Crag, number: int, materials: tuple[str, str]) -> None:
+    """Pile a crag of angular blocks, the tallest in the middle; it takes its ground."""
+    rng = site.rng_for("crag", number)
+    parts: list[tuple[str, Mesh]] = []
+    for k in range(crag.blocks):
+        angle = float(rng.uniform(0, 2 * np.pi))
+        out = 0.0 if k == 0 else crag.radius_m * float(rng.uniform(0.45, 0.7))
+        x, y = crag.at[0] + out * float(np.cos(angle)), crag.at[1] + out * float(np.sin(angle))
+        tall = crag.height_m * (1.0 if k == 0 else float(rng.uniform(0.35, 0.75)))
+        wide = crag.radius_m * (0.62 if k == 0 else float(rng.uniform(0.35, 0.5)))
+        # A crown reaches as far below its middle as above: half of it stays in the ground.
+        body = crown(radii=(wide, wide * 0.8, tall), noise=0.34, subdivisions=2, seed=int(rng.integers(1 << 20)))
+        body = _faceted(
+            rotated(body, rotation(float(rng.uniform(-8, 8)), float(rng.uniform(-8, 8)), float(rng.uniform(0, 360))))
+        )
+        parts.append((materials[k % 2], translated(body, (x, y, site.ground_z(x, y) - 0.15 * tall))))
+    by_material = {m: merge([b for n, b in parts if n == m]) for m in dict.fromkeys(m for m, _ in parts)}
+    site.add(None, "crag", list(by_material.items()), footprint=crag.area())
+
+
+def _faceted(body: Mesh) -> Mesh:
+    """Cut the lower half away where it would lie deep in the ground, so that no triangle is wasted."""
+    low = float(body.vertices[:, 2].min()) * 0.45
+    v: Floats = body.vertices.copy()
+    v[:, 2] = np.maximum(v[:, 2], low)
+    return Mesh(v, body.faces)
