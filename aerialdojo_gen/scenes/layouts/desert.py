@@ -15,7 +15,15 @@ from shapely.geometry.base import BaseGeometry
 from aerialdojo_gen.scenes.grammar_scatter import smooth_path
 from aerialdojo_gen.scenes.ground import disc, rectangle, ribbon
 from aerialdojo_gen.scenes.layouts.natural_ground import blob
-from aerialdojo_gen.scenes.layouts.natural_groups import Deck, Group, Planned, level_ground, plan_groups, set_out
+from aerialdojo_gen.scenes.layouts.natural_groups import (
+    Deck,
+    Group,
+    Planned,
+    gentle,
+    level_ground,
+    plan_groups,
+    set_out,
+)
 from aerialdojo_gen.scenes.layouts.natural_mudbrick import House, Wall, build_house, build_wall, wall_area
 from aerialdojo_gen.scenes.layouts.natural_sands import dunes, wash
 from aerialdojo_gen.scenes.layouts.natural_strata import Rock, put_up, raise_foot
@@ -221,6 +229,7 @@ def _grow(
     open_ = site.extent.buffer(-1.5)
     rocks = shapely.union_all([r.area(site.recipe.seed) for r in p.rocks])
     foot = near(rocks, 7.0)
+
     if p.pond:
         shore = water.buffer(p.pond.green_m * 0.9).difference(water.buffer(0.6))
         strew(site, "palm_tree", shore, 2.6, lambda _x, _y: 1.0, p.pond.palms, attributes={"place": "at the oasis"})
@@ -250,8 +259,16 @@ def _grow(
         "top": site.material("boulder_top", "rock:#c49a68"),
     }
     strew(site, "acacia_tree", open_, 11.0, lambda _x, _y: 0.7, p.trees)
-    strew(site, "boulder", open_, 2.4, lambda x, y: 0.03 + foot(x, y), p.stones, variant="sandstone",
-          roles=sandstone)  # fmt: skip
+    strew(
+        site,
+        "boulder",
+        open_,
+        2.4,
+        lambda x, y: (0.03 + foot(x, y)) * gentle(site, x, y),
+        p.stones,
+        variant="sandstone",
+        roles=sandstone,
+    )
     dry = {"leaves": site.material("shrub", "foliage:#9a9458")}
     thirsty = near(shapely.union_all([Point(q.x, q.y) for q in planned]) if planned else Point(0, 0), 16.0)
     strew(
@@ -264,13 +281,13 @@ def _grow(
         scale=0.6,
         roles=dry,
         params={"berries": 0},
+        attributes={"pattern": "dry leaves"},
     )
     strew(
         site,
-        "fern",
+        "grass_tuft",
         open_,
         2.4,
         lambda x, y: 0.15 + 0.5 * foot(x, y),
         p.shrubs,
-        roles={"frond": site.material("tuft", "foliage:#b5a565")},
     )

@@ -170,6 +170,13 @@ def set_out(
     return out
 
 
+def gentle(site: Site, x: float, y: float, fall: float = 0.64) -> float:
+    """Say 1 where a stone stays lying, 0 where the ground falls by more than `fall` metres a metre."""
+    east = site.ground_z(x + 0.7, y) - site.ground_z(x - 0.7, y)
+    north = site.ground_z(x, y + 0.7) - site.ground_z(x, y - 0.7)
+    return float(np.hypot(east, north) < 1.4 * fall)
+
+
 def _plan(
     site: Site,
     group: Group,

@@ -21,7 +21,6 @@ from aerialdojo_gen.scenes.mesh import Mesh
 from aerialdojo_gen.scenes.site import Site
 from aerialdojo_gen.scenes.terrain import Terrain
 
-
 _CAP_M = 0.22
 
 

@@ -11,6 +11,7 @@ import numpy as np
 import shapely
 from pydantic import BaseModel, ConfigDict, Field
 from scipy.ndimage import gaussian_filter1d
+from shapely.affinity import rotate
 from shapely.geometry import LineString, Polygon
 from shapely.geometry.base import BaseGeometry
 
@@ -66,6 +67,23 @@ class Hut(BaseModel):
             return {}
         porch = self.plan(2.4).difference(self.plan(0.3))
         return {self.name: self.plan().buffer(-0.2), f"{self.name} porch": porch}
+
+
+class Rink(BaseModel):
+    """An ice rink: middle, length and width, metres, and the direction of its length."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    at: tuple[float, float]
+    size_m: tuple[float, float] = (18.0, 11.0)
+    yaw_deg: float = 0.0
+
+    def area(self) -> Polygon:
+        """Plan with round corners, world frame, metres."""
+        u, v = (s / 2 - 3.0 for s in self.size_m)
+        x, y = self.at
+        core = _rect(x - u, y - v, x + u, y + v).buffer(3.0, quad_segs=4)
+        return rotate(core, self.yaw_deg, origin=(x, y))
 
 
 def slope_ground(

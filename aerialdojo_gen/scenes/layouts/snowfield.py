@@ -16,10 +16,19 @@ from shapely.geometry.base import BaseGeometry
 from aerialdojo_gen.scenes.grammar_scatter import along, smooth_path
 from aerialdojo_gen.scenes.ground import disc, rectangle, ribbon
 from aerialdojo_gen.scenes.layouts.natural_ground import blob
-from aerialdojo_gen.scenes.layouts.natural_groups import Deck, Group, Planned, level_ground, plan_groups, set_out
+from aerialdojo_gen.scenes.layouts.natural_groups import (
+    Deck,
+    Group,
+    Planned,
+    gentle,
+    level_ground,
+    plan_groups,
+    set_out,
+)
 from aerialdojo_gen.scenes.layouts.natural_strata import Rock, put_up, raise_foot
 from aerialdojo_gen.scenes.layouts.natural_winter import (
     Hut,
+    Rink,
     banked,
     build_boards,
     build_cables,
@@ -49,23 +58,6 @@ class Piste(BaseModel):
     bank_m: Annotated[float, Field(ge=0)] = 0.7
     gates: Annotated[int, Field(ge=0)] = 0
     moguls_m: Annotated[float, Field(ge=0)] = 0.0
-
-
-class Rink(BaseModel):
-    """An ice rink: middle, length and width, metres, and the direction of its length."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-    at: tuple[float, float]
-    size_m: tuple[float, float] = (18.0, 11.0)
-    yaw_deg: float = 0.0
-
-    def area(self) -> shapely.Polygon:
-        """Plan with round corners, world frame, metres."""
-        u, v = (s / 2 - 3.0 for s in self.size_m)
-        x, y = self.at
-        core = rectangle(x - u, y - v, x + u, y + v).buffer(3.0, quad_segs=4)
-        return rotate(core, self.yaw_deg, origin=(x, y))
 
 
 class Parameters(BaseModel):
@@ -296,4 +288,13 @@ def _grow(
     strew(site, "snowy_spruce", wood, 2.9, quiet, p.spruces, attributes=words)
     strew(site, "young_spruce", wood, 4.0, quiet, p.spruces // 4, roles={"needles": "needles:#5a7466"})
     snowed = {"rock": site.material("boulder", "rock:#7c8288"), "top": "snow"}
-    strew(site, "boulder", wood, 3.5, lambda _x, _y: 0.4, p.boulders, roles=snowed, variant="grey")
+    strew(
+        site,
+        "boulder",
+        wood,
+        3.5,
+        lambda x, y: 0.4 * gentle(site, x, y, 0.4),
+        p.boulders,
+        roles=snowed,
+        variant="grey",
+    )
