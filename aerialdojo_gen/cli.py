@@ -315,20 +315,26 @@ def stats(
 def gallery(
     out: Annotated[Path, typer.Option("--out", help="Folder for the pictures.")] = Path("docs/gallery"),
     scene: Scene = None, pipeline: PipelineFile = None,
-    props: Annotated[bool, typer.Option("--props/--no-props", help="The sheet of all props too.")] = True,
+    props: Annotated[bool, typer.Option("--props/--no-props", help="The sheets of all props too.")] = True,
+    small: Annotated[bool, typer.Option("--small", help="JPEGs of 1280 columns, for pages.")] = False,
 ) -> None:  # fmt: skip
     """Picture every prop and every scene as contact sheets."""
     from aerialdojo_gen import runner
-    from aerialdojo_gen.rendering.gallery import props_sheet, scene_sheet, write_png
+    from aerialdojo_gen.rendering.gallery import props_sheet, scene_sheet, write_picture
     from aerialdojo_gen.scenes.build import build_scene
     from aerialdojo_gen.scenes.catalogue import load_catalogue
 
     config, roots = open_pipeline(pipeline, out)
     catalogue = load_catalogue(roots.scene_assets)
+    suffix, width = ("jpg", 1280) if small else ("png", None)
     for name in runner.choose_scenes(scene or config.scenes, runner.known_scenes(roots.recipes)):
-        print(write_png(scene_sheet(build_scene(roots.recipes / f"{name}.toml", catalogue)), out, f"{name}.png"))
+        sheet = scene_sheet(build_scene(roots.recipes / f"{name}.toml", catalogue))
+        print(write_picture(sheet, out, f"{name}.{suffix}", width))
     if props:
-        print(write_png(props_sheet(catalogue), out, "props.png"))
+        landmarks = [name for name in catalogue if catalogue[name].kind == "landmark"]
+        for title, names in (("props", catalogue.targets), ("landmarks", landmarks)):
+            size = 120 if small else 200
+            print(write_picture(props_sheet(catalogue, names, size), out, f"{title}.{suffix}"))
 
 
 def main() -> None:

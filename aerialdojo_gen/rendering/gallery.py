@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from pathlib import Path
 
 import cv2
@@ -61,9 +62,17 @@ def prop_picture(catalogue: Catalogue, category: str, size_px: int = 240, varian
     return look_at(scene, eye, centre, size_px, size_px, 55)
 
 
-def props_sheet(catalogue: Catalogue, size_px: int = 200, columns: int = 16) -> Image:
-    """Picture every category of the catalogue under its name, in alphabetical order; (H, W, 3) uint8 sRGB."""
-    names = sorted(catalogue)
+def props_sheet(
+    catalogue: Catalogue, names: Sequence[str] | None = None, size_px: int = 200, columns: int = 16
+) -> Image:
+    """Picture categories under their names, in alphabetical order; all targets where none are named.
+
+    Returns
+    -------
+    (H, W, 3) uint8
+        sRGB.
+    """
+    names = sorted(catalogue.targets if names is None else names)
     return contact_sheet(
         [prop_picture(catalogue, name, size_px) for name in names], [catalogue[n].name for n in names], columns
     )
@@ -137,8 +146,19 @@ def _flying_views(scene: Scene) -> list[tuple[NDArray[np.float64], NDArray[np.fl
     return views
 
 
-def write_png(image: Image, folder: Path, name: str) -> Path:
-    """Write a picture as PNG, whole or not at all; returns its path.
+def write_picture(image: Image, folder: Path, name: str, max_width: int | None = None) -> Path:
+    """Write a picture as PNG or JPEG, whole or not at all; returns its path.
+
+    Parameters
+    ----------
+    image : (H, W, 3) uint8
+        sRGB.
+    folder : Path
+        Made where it is missing.
+    name : str
+        Ends in ``.png`` or ``.jpg``.
+    max_width : int, optional
+        Columns that a wider picture is reduced to.
 
     Raises
     ------
@@ -147,9 +167,13 @@ def write_png(image: Image, folder: Path, name: str) -> Path:
     StoreError
         The disk is full or read-only.
     """
-    done, data = cv2.imencode(".png", image[..., ::-1], [cv2.IMWRITE_PNG_COMPRESSION, 9])
+    if max_width is not None and image.shape[1] > max_width:
+        height = round(image.shape[0] * max_width / image.shape[1])
+        image = np.asarray(cv2.resize(image, (max_width, height), interpolation=cv2.INTER_AREA), dtype=np.uint8)
+    options = [cv2.IMWRITE_PNG_COMPRESSION, 9, cv2.IMWRITE_JPEG_QUALITY, 82, cv2.IMWRITE_JPEG_OPTIMIZE, 1]
+    done, data = cv2.imencode(Path(name).suffix, image[..., ::-1], options)
     if not done:
-        raise RenderError(f"cannot encode {name} as PNG")
+        raise RenderError(f"cannot encode {name}")
     folder.mkdir(parents=True, exist_ok=True)
     with atomic_file(folder, name) as path:
         path.write_bytes(data.tobytes())
