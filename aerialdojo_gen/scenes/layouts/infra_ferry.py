@@ -103,7 +103,8 @@ def _waiting(site: Site) -> None:
                    ("vending_machine", 29.6, 27.0, 0.0)], "in the waiting shed of the ferry terminal")  # fmt: skip
     set_out(site, [
         ("ticket_booth", 50.0, 43.6, 90.0), ("direction_sign", 64.4, 40.0, 90.0), ("food_truck", 57.6, 47.4, -90.0),
-        ("departure_board", 34.0, 20.6, 0.0), ("lifebuoy_stand", 63.6, 1.6, 90.0), ("traffic_light", 42.6, 4.6, 90.0),
+        ("information_board", 34.0, 20.6, 0.0), ("lifebuoy_stand", 63.6, 1.6, 90.0),
+        ("traffic_light", 42.6, 4.6, 90.0),
         ("mooring_bollard", 41.0, 1.5, -90.0), ("mooring_bollard", 60.0, 1.5, -90.0),
         ("phone_booth", 48.8, 52.6, -90.0),
         ("advertising_column", 64.0, 30.0, 0.0),

@@ -75,9 +75,9 @@ def _front(site: Site) -> None:
     place = "on the fishing harbour's west quay"
     set_out(site, [
         ("anchor_monument", 75.0, 46.0, -90.0), ("fuel_pump", 77.6, 12.6, 0.0), ("fuel_pump", 77.6, 18.4, 0.0),
-        ("bench", 77.4, 30.0, 0.0), ("seagull_statue", 74.6, -2.6, -90.0), ("motorcycle", 71.8, 20.0, 90.0),
+        ("bench", 77.4, 30.0, 0.0), ("seagull_statue", 74.8, -3.6, -90.0), ("motorcycle", 71.8, 20.0, 90.0),
         ("parking_meter", 71.4, 15.0, 90.0),
-        ("delivery_van", 73.0, -0.0, 90.0), ("litter_bin", 77.8, 24.2, 0.0), ("mooring_bollard", 78.6, 6.0, 0.0),
+        ("delivery_van", 72.2, 1.6, 90.0), ("litter_bin", 77.8, 24.2, 0.0), ("mooring_bollard", 78.6, 6.0, 0.0),
         ("scooter", 72.4, 38.0, 80.0), ("a_board", 74.6, 24.4, 0.0), ("bicycle", 72.2, 31.0, 90.0),
         ("navigation_beacon", 78.0, -4.4, 0.0), ("food_truck", 73.0, 8.6, 0.0), ("cafe_table", 76.4, 36.2, 0.0),
     ], place)  # fmt: skip
