@@ -144,7 +144,7 @@ def _stand(site: Site) -> None:
         decks += platform(area, foot, z, floor=concrete, rim="marking_yellow")
     site.add("platforms", "platform", decks)
     roof = roof_parts(
-        Frame(-33.4, 0.0, 0.0), 2 * _STAND_Y, 11.0, ROOF_Z, foot_m=0.0, bay_m=6.8, rise_m=2.0,
+        Frame(-33.4, 0.0, 0.0), 2 * _STAND_Y, 11.0, ROOF_Z, foot_m=0.0, bay_m=7.6, rise_m=2.0,
         roof=site.material("roof", "corrugated:#4f7d5a"), truss=site.material("truss", "#e9e4d6"),
         fascia=site.material("band", "#3f7d4e"),
     )  # fmt: skip

@@ -5,6 +5,7 @@ The pitch runs east and west; the main stand stands north of it, the forecourt a
 
 from __future__ import annotations
 
+import numpy as np
 from shapely.geometry import Polygon
 from shapely.ops import unary_union
 
@@ -138,7 +139,7 @@ def _walls(site: Site, low: Tier, east: Tier, upper: Tier) -> Parts:
     parts += [(concrete, end_walls(upper, end)) for end in ends]
     walk = upper.edge(0).difference(low.edge(9)).intersection(upper.region or upper.plan)
     parts += [(concrete, slab(p, _WALKWAY_Z - 0.35, _WALKWAY_Z)) for p in polygons_of(walk)]
-    north = [passage(Pose(x, 39.75, 90.0), 3.4, 3.0) for x in (-21.0, -14.0, -7.0, 0.0, 7.0, 14.0, 21.0)]
+    north = [passage(Pose(float(x), 39.75, 90.0), 3.4, 3.0) for x in np.linspace(-17.67, 17.67, 7)]
     parts += back_wall(_from_ground(upper), 11.0, north, 3.6, wall=wall, band=band)
     for s in (-1, 1):
         # Side walls of the main stand, with a doorway under the tier.
@@ -165,7 +166,7 @@ def _roofs(site: Site) -> None:
     main.append(("marking", letters("MAIN STAND", 0.55, (0.0, 23.46, ROOF_Z - 0.1), -90.0, 0.06)))
     site.add("main_stand_roof", "stand_roof", main, {"material": "metal"})
     south = roof_parts(
-        Frame(-2.0, -19.7, 90.0), 32.0, 8.0, SOUTH_ROOF_Z,
+        Frame(0.0, -19.7, 90.0), 31.0, 8.0, SOUTH_ROOF_Z,
         foot_m=0.0, rise_m=1.6, roof=roof, truss=truss, fascia=band,
     )  # fmt: skip
     site.add("south_stand_roof", "stand_roof", south, {"material": "metal"})
@@ -234,6 +235,6 @@ def _grounds(site: Site) -> None:
     for variant, x, y, yaw in masts:
         site.place("floodlight_mast", x, y, yaw, variant=variant, params={"h": 15.0})
     rows = [(-53.0, float(y)) for y in range(-28, 46, 9)] + [(51.5, float(y)) for y in range(-30, 46, 9)]
-    rows += [(float(x), 45.5) for x in range(-40, 44, 10)] + [(x, -20.6) for x in (-43.0, 43.0)]
+    rows += [(float(x), 45.5) for x in range(-40, 44, 10)] + [(-43.0, -20.6)]
     for k, (x, y) in enumerate(rows):
         site.try_place("urban_tree", x, y, 40.0 * k, variant=("green", "column", "green")[k % 3])
