@@ -142,9 +142,33 @@ def slab_pile(
     floor: str = "concrete",
     wall: str = "plaster",
     tilt_deg: float = 5.0,
+    top: str | None = None,
     node: str | None = None,
 ) -> float:
     """Pile up the floors of a pancaked building, crushed walls between them; the top one lies level.
+
+    Parameters
+    ----------
+    site : Site
+        Where.
+    x, y, yaw_deg : float
+        Middle of the pile, metres, and the direction of its length.
+    size_m : (float, float)
+        Length and width of the lowest floor, metres.
+    count : int
+        Number of floors.
+    key : str
+        Of the draws.
+    base_m : float, optional
+        Height of its foot; the ground's in the middle by default.
+    gap_m : float
+        Mean distance of the floors, metres.
+    floor, wall, top : str
+        Materials; `top` is that of the highest floor where it differs.
+    tilt_deg : float
+        Most that a floor is tilted across.
+    node : str, optional
+        As in `Site.add`.
 
     Returns
     -------
@@ -167,7 +191,7 @@ def slab_pile(
         at = (x + float(shift[0]), y + float(shift[1]), z)
         size = (size_m[0] * shrink, size_m[1] * shrink)
         yaw = yaw_deg + float(rng.uniform(-4, 4))
-        parts.append((floor, tilted_plate(size, 0.26, at, (tilt[0], tilt[1]), yaw, rng)))
+        parts.append(((top or floor) if level else floor, tilted_plate(size, 0.26, at, (tilt[0], tilt[1]), yaw, rng)))
         for _ in range(int(sum(size_m) / 1.3)):
             # Crushed wall and columns look out between the floors all around.
             edge, s = int(rng.integers(4)), float(rng.uniform(-0.45, 0.45))

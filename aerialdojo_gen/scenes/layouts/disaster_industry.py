@@ -231,7 +231,11 @@ def pipe_bridge(
         toward = 1.0 if s0 == 0.0 else -1.0
         torn = s1 if s0 == 0.0 else s0
         start = s0 if s0 == 0.0 else s1
-        lines = ((-w - 0.5, 0.22, "paint:#d8b23a"), (-w - 1.05, 0.15, "paint:#b9bec4"), (w + 0.45, 0.18, "paint:#3f7d4e"))
+        lines = (
+            (-w - 0.5, 0.22, "paint:#d8b23a"),
+            (-w - 1.05, 0.15, "paint:#b9bec4"),
+            (w + 0.45, 0.18, "paint:#3f7d4e"),
+        )
         for k, (v, radius, colour) in enumerate(lines if pipes else ()):
             drop = float(rng.uniform(0.6, 2.0))
             end = torn + toward * float(rng.uniform(0.2, 1.6))

@@ -11,11 +11,12 @@ from shapely.geometry import LineString, Polygon
 from aerialdojo_gen.scenes.grammar_blocks import Frame
 from aerialdojo_gen.scenes.grammar_scatter import smooth_path
 from aerialdojo_gen.scenes.ground import disc, rectangle, ribbon
-from aerialdojo_gen.scenes.layouts.disaster_buildings import Style, Wreck, put_up
+from aerialdojo_gen.scenes.layouts.disaster_buildings import put_up
 from aerialdojo_gen.scenes.layouts.disaster_ground import cracks, faulted, heaped, slab_pile, sloped, strew_chunks
 from aerialdojo_gen.scenes.layouts.disaster_old_town_things import furnish_town
 from aerialdojo_gen.scenes.layouts.disaster_relief import leaning_poles
 from aerialdojo_gen.scenes.layouts.disaster_wreckage import Bite, Parts, torn_floor
+from aerialdojo_gen.scenes.layouts.disaster_wrecks import Style, Wreck
 from aerialdojo_gen.scenes.layouts.natural_ground import blob
 from aerialdojo_gen.scenes.layouts.urban_structures import columns
 from aerialdojo_gen.scenes.mesh import merge
@@ -38,19 +39,21 @@ def build_old_town(site: Site, drop_m: float, litter: float) -> None:
         bases[name] = site.ground_z(wreck.frame.x, wreck.frame.y) - (0.5 if wreck.lean_deg else 0.0)
         put_up(site, wreck, bases[name], node=name, category="damaged_house")
     stone = site.material("stone", "blocks:#b5a78c")
-    floor = "boards:#7d6243"
-    pile = slab_pile(site, 3.0, 19.0, 4.0, (13.0, 9.0), 4, "north", floor=floor, wall=stone, gap_m=0.7)
-    low = slab_pile(site, 31.5, -13.5, 86.0, (12.0, 8.5), 3, "east", floor=floor, wall=stone, gap_m=0.7)
+    floor, tiles = "boards:#7d6243", site.material("tiles", "roof_tiles:#b0684a")
+    pile = slab_pile(site, 3.0, 19.0, 4.0, (13.0, 9.0), 4, "north", floor=floor, wall=stone, gap_m=0.7, top=tiles)
+    low = slab_pile(site, 31.5, -13.5, 86.0, (12.0, 8.5), 3, "east", floor=floor, wall=stone, gap_m=0.7, top=tiles)
     arcade = _arcade(site, stone)
     _shores(site, wrecks)
     furnish_town(site, wrecks, bases, (pile, low, arcade))
     leaning_poles(site, [(-22.4, -24.0, 8.0, 80.0), (-21.6, -6.0, 13.0, 300.0), (-21.8, 10.6, 7.0, 120.0),
                          (20.6, 12.4, 15.0, 200.0), (27.0, 22.0, 6.0, 20.0)], 7.0)  # fmt: skip
     for k, (area, _) in enumerate(heaps):
-        strew_chunks(site, area.buffer(2.0), 1.0 / litter, f"heap{k}", plate="boards:#8a6a46", brick=stone, beam="wood",
-                     lump="rubble:#b3a58c")  # fmt: skip
-    strew_chunks(site, site.extent.buffer(-2.0), 4.6 / litter, "everywhere", plate="roof_tiles", brick=stone, beam="wood",
-                 size_m=(0.3, 0.75))  # fmt: skip
+        look = {"plate": "boards:#8a6a46", "brick": stone, "beam": "wood", "lump": "rubble:#b3a58c"}
+        strew_chunks(site, area.buffer(2.0), 1.0 / litter, f"heap{k}", **look)  # type: ignore[arg-type]
+    edge = site.extent.buffer(-2.0)
+    strew_chunks(
+        site, edge, 4.6 / litter, "everywhere", plate="roof_tiles", brick=stone, beam="wood", size_m=(0.3, 0.75)
+    )
 
 
 def _houses(site: Site) -> dict[str, Wreck]:
@@ -82,7 +85,8 @@ def _houses(site: Site) -> dict[str, Wreck]:
         "east_house": Wreck(Frame(33.0, 4.5, -90.0), 16.0, 9.5, 3, style(cream, True),
                             (Bite(-6.5, -4.5, 2.6, 5.5, 0.4, seed=58),), ridge_m=2.8),
         "church": Wreck(Frame(-8.0, 36.0), 25.0, 11.0, 1, church,
-                        (Bite(9.5, -4.5, 3.0, 6.5, 0.6, 12.0, seed=59), Bite(-4.0, 2.0, 0.6, 4.0, 8.5, 12.0, seed=60)),
+                        (Bite(9.5, -4.5, 3.0, 6.5, 0.6, 12.0, seed=59),
+                         Bite(-4.0, 2.0, 0.6, 4.0, 8.5, 12.0, seed=60)),
                         ridge_m=5.0, rooms_m=60.0),
         "north_west_house": Wreck(Frame(-36.0, 27.0, 90.0), 18.0, 9.5, 3, style(rose),
                                   (Bite(-8.0, -4.0, 2.4, 5.5, seed=62),), ridge_m=2.8),
@@ -112,7 +116,7 @@ def _ground(site: Site, drop_m: float, wrecks: dict[str, Wreck], heaps: list[tup
         ground = heaped(ground, area, height, site.recipe.seed + k)
     site.set_ground(ground, site.material("garden", "meadow:#7d8450"))
     cobbles, lane = site.material("piazza", "paving:#c2b195"), site.material("lane", "cobbles:#8f877a")
-    lanes = [
+    lanes: list[tuple[list[tuple[float, float]], float]] = [
         ([(-56, 9.0), (-20, 9.5), (8, 8.8), (30, 11.0), (56, 13.0)], 6.0), ([(-23.5, -48), (-23.5, 9)], 5.0),
         ([(23.5, -48), (24.5, -20), (23.5, 9)], 5.0), ([(-56, -38), (56, -38)], 5.0),
         ([(-24, 9), (-27, 24), (-24, 34), (-16, 47)], 4.4), ([(24, 11), (28, 24), (29, 48)], 4.4),
@@ -122,7 +126,9 @@ def _ground(site: Site, drop_m: float, wrecks: dict[str, Wreck], heaps: list[tup
         site.paint(ribbon(smooth_path(path), width).intersection(site.extent), lane)
     site.paint(rectangle(-21.0, -23.5, 21.5, 6.0), cobbles)
     for r in (13.5, 9.0):
-        site.paint(disc(-2.0, -8.0, r, 32).difference(disc(-2.0, -8.0, r - 0.6, 32)), site.material("band", "cobbles"))
+        site.paint(
+            disc(-2.0, -8.0, r, 32).difference(disc(-2.0, -8.0, r - 0.6, 32)), site.material("band", "cobbles")
+        )
     site.paint(_TERRACE.buffer(1.7, join_style="mitre").difference(_TERRACE), site.material("bank", "rock:#9a8c74"))
     site.paint(_TERRACE, site.material("terrace", "gravel:#bfae8f"))
     scarp = LineString(_FAULT).buffer(0.9, quad_segs=2).union(
@@ -160,7 +166,8 @@ def _arcade(site: Site, stone: str) -> float:
 def _shores(site: Site, wrecks: dict[str, Wreck]) -> None:
     """Prop leaning and cracked walls with raking timbers."""
     timber = []
-    for name, us in (("split_house", (-6.0, -3.5, 6.0)), ("east_house", (2.0, 4.0, 6.0)), ("town_hall", (1.0, 3.0, 5.0)),
+    for name, us in (("split_house", (-6.0, -3.5, 6.0)), ("east_house", (2.0, 4.0, 6.0)),
+    ("town_hall", (1.0, 3.0, 5.0)),
                      ("west_house", (-5.0, -2.5, 0.0, 2.5, 5.0))):  # fmt: skip
         wreck = wrecks[name]
         reach = 3.2 + (1.1 if wreck.lean_deg else 0.0)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from aerialdojo_gen.scenes.ground import rectangle
-from aerialdojo_gen.scenes.layouts.disaster_buildings import Wreck
 from aerialdojo_gen.scenes.layouts.disaster_relief import stand, stand_on_floor, strew_things
+from aerialdojo_gen.scenes.layouts.disaster_wrecks import Wreck
 from aerialdojo_gen.scenes.site import Site
 
 
@@ -17,12 +17,14 @@ def furnish_town(
     pile, low, arcade = tops
     stand(site, "in the middle of the piazza", [("fountain", -2.0, -8.0, 0.0)])
     stand(site, "on the piazza", [
-        ("field_hospital_tent", 14.6, -8.6, 90.0), ("rescue_tent", -10.6, 1.6, -90.0), ("rescue_tent", -2.0, 2.2, -90.0),
+        ("field_hospital_tent", 14.6, -8.6, 90.0), ("rescue_tent", -10.6, 1.6, -90.0),
+        ("rescue_tent", -2.0, 2.2, -90.0),
         ("rescue_tent", 14.6, 1.4, 180.0), ("field_kitchen", -11.2, -8.0, 10.0), ("stretcher", -6.4, -3.4, 60.0),
         ("stretcher", 9.6, -15.0, 10.0), ("search_light", 4.4, 3.6, -110.0), ("ambulance", 12.6, -19.4, 186.0),
         ("rescue_boat", -9.6, -14.6, 30.0), ("lion_statue", -9.6, -18.8, 60.0), ("market_stall", 0.4, -18.8, 95.0),
         ("cafe_table", 4.6, -21.4, 20.0), ("bench", -4.0, -13.8, -80.0), ("generator", 18.4, -15.6, 90.0),
-        ("evacuation_sign", -6.6, 4.2, -90.0), ("relief_crates", -12.6, -3.6, 30.0), ("portable_toilet", 19.4, -3.6, 180.0),
+        ("evacuation_sign", -6.6, 4.2, -90.0), ("relief_crates", -12.6, -3.6, 30.0),
+        ("portable_toilet", 19.4, -3.6, 180.0),
         ("overturned_car", 3.6, -13.8, 40.0),
     ])  # fmt: skip
     stand(site, "on the terrace of the church", [
@@ -37,11 +39,12 @@ def furnish_town(
     stand(site, "on top of a fallen house", [
         ("rubble_heap", 5.2, 20.2, 20.0), ("search_light", -0.4, 20.6, -70.0),
     ], z=pile)  # fmt: skip
-    stand(site, "on the wreck of the east corner", [
+    stand(site, "on the ruins of a house east of the piazza", [
         ("stretcher", 31.0, -16.2, 80.0), ("satellite_dish", 32.4, -10.8, 160.0),
     ], z=low)  # fmt: skip
     rooms = {
-        ("town_hall", 1): ("on the first floor of the open house", [("bench", 2.4, 1.6, 90.0), ("planter", 6.4, 1.0, 0.0)]),
+        ("town_hall", 1): ("on the first floor of the town hall", [("bench", 2.4, 1.6, 90.0),
+                                                                ("planter", 6.4, 1.0, 0.0)]),
         ("corner_house", 1): ("on the first floor of the corner house", [("rocking_chair", 3.0, 1.0, -100.0)]),
         ("corner_house", 2): ("on the second floor of the corner house", [("cardboard_boxes", 4.2, 1.6, 0.0)]),
         ("split_house", 1): ("on the first floor of the split house", [("bicycle", -5.0, 0.4, 10.0)]),
@@ -76,11 +79,12 @@ def _lanes(site: Site) -> None:
         "field_kitchen", "water_barrel", "urban_tree", "litter_bin", "urban_tree", "evacuation_sign",
     ], "terrace")  # fmt: skip
     strew_things(site, "on the slope below the church", rectangle(-24.0, 22.0, 28.0, 27.0), [
-        "rubble_heap", "bush", "clay_pots", "dog_house", "wheelie_bin", "bird_bath",
+        "rubble_heap", "bush", "clay_pots", "wheelie_bin", "bird_bath",
     ], "slope")  # fmt: skip
     strew_things(site, "in the street north of the piazza", rectangle(-22.0, 6.6, 22.0, 12.0), [
         "motorcycle", "fire_hydrant", "stop_sign", "flower_tub", "bicycle_rack", "phone_booth",
     ], "street")  # fmt: skip
     strew_things(site, "in the gardens at the edge of the town", site.extent.buffer(-3.0), [
-        "urban_tree", "oak_tree", "urban_tree", "urban_tree", "urban_tree", "bush", "urban_tree", "bush", "urban_tree",
+        "urban_tree", "oak_tree", "urban_tree", "urban_tree", "urban_tree", "bush", "urban_tree", "bush",
+        "urban_tree",
     ], "gardens", 2.4)  # fmt: skip

@@ -11,8 +11,8 @@ from shapely.geometry.base import BaseGeometry
 from aerialdojo_gen.errors import AssetError
 from aerialdojo_gen.scenes.grammar_blocks import next_variant
 from aerialdojo_gen.scenes.grammar_scatter import poisson_disc
-from aerialdojo_gen.scenes.layouts.disaster_buildings import Wreck
 from aerialdojo_gen.scenes.layouts.disaster_wreckage import Parts
+from aerialdojo_gen.scenes.layouts.disaster_wrecks import Wreck
 from aerialdojo_gen.scenes.layouts.natural_ground import settled_z
 from aerialdojo_gen.scenes.model import Instance
 from aerialdojo_gen.scenes.shapes_extruded import sweep

@@ -12,11 +12,12 @@ from shapely.ops import unary_union
 from aerialdojo_gen.scenes.grammar_blocks import Frame
 from aerialdojo_gen.scenes.grammar_streets import crossing, streets
 from aerialdojo_gen.scenes.ground import disc, rectangle
-from aerialdojo_gen.scenes.layouts.disaster_buildings import Style, Wreck, put_up
+from aerialdojo_gen.scenes.layouts.disaster_buildings import put_up
 from aerialdojo_gen.scenes.layouts.disaster_ground import cracks, crater, heaped, slab_pile, sloped, strew_chunks
 from aerialdojo_gen.scenes.layouts.disaster_industry import pipe_bridge, twisted_steel
 from aerialdojo_gen.scenes.layouts.disaster_street_things import furnish_street
 from aerialdojo_gen.scenes.layouts.disaster_wreckage import Bite
+from aerialdojo_gen.scenes.layouts.disaster_wrecks import Style, Wreck
 from aerialdojo_gen.scenes.layouts.natural_ground import blob
 from aerialdojo_gen.scenes.mesh import merge
 from aerialdojo_gen.scenes.shapes_extruded import sweep
@@ -40,7 +41,7 @@ def build_street(site: Site, crater_m: float, litter: float) -> None:
     pipe_bridge(site, (19.0, 10.6), (19.0, -13.0), deck, (0.4, 0.62), "footbridge", 2.4, False, "broken_footbridge")
     _lamps(site)
     furnish_street(site, wrecks, bases, pile, deck)
-    twisted_steel(site, [(4.0, 6.0, 3.6), (-9.5, -5.0, 4.2), (5.5, -5.5, 3.4), (-11.5, 5.6, 3.8), (12.5, 2.0, 4.0)],
+    twisted_steel(site, [(4.0, 6.0, 3.6), (-9.5, -5.0, 4.2), (7.0, -8.4, 3.4), (-11.5, 5.6, 3.8), (12.5, 2.0, 4.0)],
                   "street")  # fmt: skip
     brick = site.material("shops", "brick:#7d4538")
     for k, (area, _) in enumerate(heaps):
@@ -67,12 +68,16 @@ def _fronts(site: Site) -> dict[str, Wreck]:
         "east_flats": Wreck(Frame(32.0, 18.0), 18.0, 11.0, 3, plain, (Bite(-8.0, -5.0, 0.8, 4.0, 4.0, seed=85),),
                             balconies=True),
         "hotel": Wreck(Frame(-16.5, -17.0, 180.0), 28.0, 12.0, 4, hotel,
-                       (Bite(-11.0, -6.5, 5.0, 9.5, seed=86), Bite(9.0, -6.0, 0.6, 3.0, 7.0, seed=87)), balconies=True),
-        "west_flats": Wreck(Frame(-46.5, 17.0, -90.0), 20.0, 10.0, 4, plain, (Bite(-8.0, -5.0, 0.5, 3.0, 7.0, seed=88),)),
-        "corner_shop": Wreck(Frame(-46.0, -17.0, 90.0), 18.0, 10.0, 2, shops, (Bite(7.0, -4.0, 1.5, 4.0, seed=89),),
+                       (Bite(-11.0, -6.5, 5.0, 9.5, seed=86), Bite(9.0, -6.0, 0.6, 3.0, 7.0, seed=87)),
+                       balconies=True),
+        "west_flats": Wreck(Frame(-46.5, 17.0, -90.0), 20.0, 10.0, 4, plain,
+                            (Bite(-8.0, -5.0, 0.5, 3.0, 7.0, seed=88),)),
+        "corner_shop": Wreck(Frame(-46.0, -17.0, 90.0), 18.0, 10.0, 2, shops,
+                             (Bite(7.0, -4.0, 1.5, 4.0, seed=89),),
                              ridge_m=3.0),
         "row_house": Wreck(Frame(-10.0, -35.5), 22.0, 8.0, 2, plain, ridge_m=2.6),
-        "back_house": Wreck(Frame(2.0, 35.5, 180.0), 30.0, 8.0, 3, plain, (Bite(-10.0, -3.0, 0.6, 3.0, 6.0, seed=91),)),
+        "back_house": Wreck(Frame(2.0, 35.5, 180.0), 30.0, 8.0, 3, plain,
+                            (Bite(-10.0, -3.0, 0.6, 3.0, 6.0, seed=91),)),
     }  # fmt: skip
 
 
@@ -82,9 +87,7 @@ def _heaps(seed: int) -> list[tuple[Polygon, float]]:
     return [(blob(x, y, r, seed + k, 0.3), h) for k, (x, y, r, h) in enumerate(spots)]
 
 
-def _ground(
-    site: Site, crater_m: float, wrecks: dict[str, Wreck], heaps: list[tuple[Polygon, float]]
-) -> None:
+def _ground(site: Site, crater_m: float, wrecks: dict[str, Wreck], heaps: list[tuple[Polygon, float]]) -> None:
     ground = rolling_terrain(site.recipe.size_m, 1.7, site.recipe.seed, 0.2, 24.0, octaves=2)
     ground = sloped(ground, [(-60.0, -6.0, 2.2), (-10.0, 55.0, 3.6)], 0)
     ground = sloped(ground, [(-40.0, -10.0, 1.4)], 1)
@@ -100,7 +103,11 @@ def _ground(
     for x in (-28.0, 28.0):
         crossing(site, x, 0.5, 90.0, 11.0, 3.0)
     site.paint(disc(34.0, -22.0, 6.4, 28), site.material("path", "gravel:#c4b692"))
-    for line in (rectangle(21.5, -22.8, 30.0, -21.2), rectangle(33.2, -40.0, 34.8, -9.5), rectangle(38.0, -22.8, 55, -21.2)):
+    for line in (
+        rectangle(21.5, -22.8, 30.0, -21.2),
+        rectangle(33.2, -40.0, 34.8, -9.5),
+        rectangle(38.0, -22.8, 55, -21.2),
+    ):
         site.paint(line, site.material("path", "gravel:#c4b692"))
     seed = site.recipe.seed
     site.paint(blob(*BLAST, crater_m * 2.7, seed, 0.4), "asphalt:#3a3a3b")
@@ -116,7 +123,12 @@ def _ground(
     site.paint(blob(*BLAST, crater_m * 0.95, seed + 2, 0.15), "mud:#4d4032")
     # The main under the street burst: its water stands in the crater.
     site.paint(blob(BLAST[0] + 0.4, BLAST[1] - 0.3, crater_m * 0.42, seed + 3, 0.2), "water:#5d6a62")
-    cracks(site, [(-9.0, 2.0, 170.0), (4.0, -1.0, -10.0), (0.0, 6.0, 60.0), (-8.0, -3.0, 220.0), (3.0, 4.0, 30.0)], 8.0, 3)
+    cracks(
+        site,
+        [(-9.0, 2.0, 170.0), (4.0, -1.0, -10.0), (0.0, 6.0, 60.0), (-8.0, -3.0, 220.0), (3.0, 4.0, 30.0)],
+        8.0,
+        3,
+    )
     for area, _ in heaps:
         site.paint(area, site.material("heap", "rubble:#9d9184"))
 
@@ -138,7 +150,9 @@ def _lamps(site: Site) -> None:
                     (x + (lean + 0.4) * u[0], y + (lean + 0.4) * u[1], z + 7.4 - 0.75 * lean)]  # fmt: skip
             bodies.append(sweep(path=path, radius=0.09, sides=6))
             end = path[-1]
-            heads.append(sweep(path=[end, (end[0] + 0.7 * u[0], end[1] + 0.7 * u[1], end[2] - 0.1)], section=(0.3, 0.14)))
+            heads.append(
+                sweep(path=[end, (end[0] + 0.7 * u[0], end[1] + 0.7 * u[1], end[2] - 0.1)], section=(0.3, 0.14))
+            )
             site.occupy(disc(x, y, 0.4, 8))
     z = site.ground_z(*BLAST) + 0.9
     main = []
