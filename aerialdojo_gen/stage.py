@@ -211,7 +211,7 @@ def _paper_sources(_roots: Roots, _scene: str) -> list[Path]:
 
 def _enough_for_the_paper(data: Path, scenes: Sequence[str], config: Any) -> None:
     if config.paper_counts:
-        from aerialdojo_gen.release.stats import require_pools
+        from aerialdojo_gen.release.pool import require_pools
 
         require_pools(data, scenes)
 

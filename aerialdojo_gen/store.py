@@ -276,7 +276,7 @@ def _infos(data: Path, table: str, scene: str) -> list[ShardInfo]:
     return [info for info in infos if info is not None]
 
 
-def read_scene(data: Path, table: str, scene: str) -> pa.Table:
+def read_scene(data: Path, table: str, scene: str, columns: Sequence[str] | None = None) -> pa.Table:
     """Read all of a scene's rows of a table.
 
     Parameters
@@ -287,6 +287,8 @@ def read_scene(data: Path, table: str, scene: str) -> pa.Table:
         A key of `LAYOUT`.
     scene : str
         Name of the scene.
+    columns : sequence of str, optional
+        Read these columns alone.
 
     Returns
     -------
@@ -303,13 +305,19 @@ def read_scene(data: Path, table: str, scene: str) -> pa.Table:
     tables = []
     for path in shards(data, table, scene):
         try:
-            shard = pq.read_table(path, partitioning=None, page_checksum_verification=True)
+            shard = pq.read_table(
+                path,
+                partitioning=None,
+                page_checksum_verification=True,
+                columns=None if columns is None else [*columns],
+            )
         except (pa.ArrowInvalid, OSError) as error:
             raise StoreError(
                 f"{path} is damaged ({_first_line(error)}): delete it and run "
                 f"aerialdojo-gen {LAYOUT[table].command} --scene {scene}"
             ) from None
-        if not shard.schema.equals(spec.schema):
+        wanted = spec.schema if columns is None else pa.schema([spec.schema.field(name) for name in columns])
+        if not shard.schema.equals(wanted):
             raise StoreError(
                 f"{path} has other columns than this version's {spec.name}: delete it and run "
                 f"aerialdojo-gen {LAYOUT[table].command} --scene {scene}"

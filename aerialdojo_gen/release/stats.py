@@ -1,7 +1,8 @@
-"""What was made, beside what the paper has: tasks by scene and setting, and metres of reference trajectory."""
+"""What the release holds, beside the paper's tables: tasks by scene and setting, metres of route, splits."""
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,99 +10,108 @@ from pathlib import Path
 import numpy as np
 
 from aerialdojo_gen import store
-from aerialdojo_gen.errors import PoolError
-from aerialdojo_gen.paper import PaperScene, inventory
+from aerialdojo_gen.paper import PaperScene, inventory, splits
 from aerialdojo_gen.schemas import SETTINGS
 
 
 @dataclass(frozen=True)
-class Pool:
-    """What `filter` kept of a scene, and what the paper wants of it.
+class Made:
+    """What the release holds of a scene.
 
     Attributes
     ----------
     scene : str
         Name.
-    candidates : int
-        Candidates that were judged.
-    kept : dict of str to int
-        Kept candidates by setting.
+    landmarks, objects : int
+        How many.
+    tasks : dict of (str, str) to int
+        Navigation tasks by subset (train, test) and setting.
+    path_m : float
+        Summed length of their routes, metres.
     paper : PaperScene or None
-        The paper's row; None for a scene that the paper does not have.
-    path_m : (float, float) or None
-        Least and most summed length of as many routes as the paper wants, metres; None where a setting has too few.
+        The paper's row.
     """
 
     scene: str
-    candidates: int
-    kept: dict[str, int]
+    landmarks: int
+    objects: int
+    tasks: dict[tuple[str, str], int]
+    path_m: float
     paper: PaperScene | None
-    path_m: tuple[float, float] | None
 
-    @property
-    def short(self) -> dict[str, int]:
-        """How many tasks each setting lacks; settings that lack none are left out."""
-        wanted = self.paper.tasks if self.paper else {}
-        return {s: n - self.kept[s] for s, n in wanted.items() if self.kept[s] < n}
-
-    @property
-    def reaches_path(self) -> bool:
-        """Whether a choice of tasks can have the paper's summed length to within 1 %."""
-        if self.paper is None or self.path_m is None:
-            return False
-        return self.path_m[0] <= 1.01 * self.paper.path_m and self.path_m[1] >= 0.99 * self.paper.path_m
+    def of(self, setting: str) -> int:
+        """Navigation tasks of a setting."""
+        return self.tasks.get(("train", setting), 0) + self.tasks.get(("test", setting), 0)
 
 
-def pool_of(data: Path, scene: str) -> Pool:
-    """Read what `filter` kept of a scene.
+def made_of(data: Path, scene: str) -> Made:
+    """Read what the release holds of a scene.
 
     Raises
     ------
     StoreError
-        There are no verdicts of the scene.
+        The scene is not in the release.
     """
-    verdicts = store.read_scene(data, "verdicts", scene)
-    keep = verdicts["keep"].to_numpy(zero_copy_only=False)
-    setting = np.asarray(verdicts["setting"].to_pylist(), dtype=object)
-    length = verdicts["length_m"].to_numpy(zero_copy_only=False)
-    lengths = {s: np.sort(length[keep & (setting == s)]) for s in SETTINGS}
-    paper = inventory().get(scene)
-    path = None
-    if paper is not None and all(len(lengths[s]) >= n for s, n in paper.tasks.items()):
-        least = sum(float(lengths[s][:n].sum()) for s, n in paper.tasks.items())
-        most = sum(float(lengths[s][len(lengths[s]) - n :].sum()) for s, n in paper.tasks.items())
-        path = least, most
-    return Pool(scene, verdicts.num_rows, {s: len(v) for s, v in lengths.items()}, paper, path)
+    tasks: Counter[tuple[str, str]] = Counter()
+    path = 0.0
+    for subset in ("train", "test"):
+        routes = store.read_scene(data, f"routes/{subset}", scene, ["setting", "length_m"])
+        tasks.update((subset, setting) for setting in routes["setting"].to_pylist())
+        path += float(np.sum(routes["length_m"].to_numpy()))
+    landmarks, objects = (store.count_rows(data, f"release/{table}", scene) for table in ("landmarks", "objects"))
+    return Made(scene, landmarks, objects, dict(tasks), path, inventory().get(scene))
 
 
-def require_pools(data: Path, scenes: Sequence[str]) -> None:
-    """Raise a `PoolError` that names every scene and setting with fewer kept candidates than the paper has tasks.
+def made_lines(made: Sequence[Made]) -> list[str]:
+    """Set the release beside the paper's Table 10: ``ours`` where they agree, ``ours/paper`` where not.
 
-    Raises
-    ------
-    PoolError
-        One line a scene and setting that falls short, with the mend.
+    Settings count instances, two of which a navigation task has; kilometres are those of the tasks' routes.
     """
-    lacking = [
-        f"{pool.scene}: {n} {setting} tasks short: {pool.kept[setting]} are kept, the paper has {pool.kept[setting] + n}"
-        for pool in (pool_of(data, scene) for scene in scenes)
-        for setting, n in pool.short.items()
-    ]
-    if lacking:
-        mend = "move objects or obstacles in the recipe, or draft the annotations anew with another --within"
-        raise PoolError("\n".join([*lacking, f"nothing is released; {mend}"]))
+    head = f"{'scene':<22}{'landmarks':>10}{'objects':>9}"
+    head += "".join(f"{s.replace('_horizon', ''):>15}" for s in (*SETTINGS, "instances")) + f"{'km (paper)':>22}"
+    lines, unlike = [head], 0
+    for m in made:
+        ours = [m.landmarks, m.objects, *(2 * m.of(s) for s in SETTINGS)]
+        paper = [m.paper.landmarks, m.paper.objects, *(2 * m.paper.tasks[s] for s in SETTINGS)] if m.paper else ours
+        ours.append(sum(ours[2:]))
+        paper = [*paper, sum(paper[2:])] if m.paper else ours
+        unlike += sum(a != b for a, b in zip(ours, paper, strict=True))
+        cells = [f"{a:,}" if a == b else f"{a:,}/{b:,}" for a, b in zip(ours, paper, strict=True)]
+        km = f"{m.path_m / 1000:,.1f}" + (f" ({m.paper.path_m / 1000:,.1f})" if m.paper else "")
+        lines.append(_line(m.scene, cells, km))
+    total = [sum(m.landmarks for m in made), sum(m.objects for m in made)]
+    total += [2 * sum(m.of(s) for m in made) for s in SETTINGS]
+    total.append(sum(total[2:]))
+    km = f"{sum(m.path_m for m in made) / 1000:,.1f}"
+    if all(m.paper for m in made):
+        km += f" ({sum(m.paper.path_m for m in made if m.paper) / 1000:,.1f})"
+    widths = (10, 9, 15, 15, 15, 15)
+    lines.append(
+        f"{'all':<22}" + "".join(f"{t:,}".rjust(w) for t, w in zip(total, widths, strict=True)) + f"{km:>22}"
+    )
+    if any(m.paper for m in made):
+        lines.append("every number is the paper's" if not unlike else f"{unlike} numbers are not the paper's")
+    return lines
 
 
-def pool_lines(pools: Sequence[Pool]) -> list[str]:
-    """Set pools as a table for the terminal: kept / wanted, and kilometres that a choice can reach."""
-    head = f"{'scene':<22}{'candidates':>10}" + "".join(f"{s.replace('_horizon', ''):>16}" for s in SETTINGS)
-    lines = [head + f"{'km reachable':>18}{'paper km':>10}"]
-    for pool in pools:
-        cells = ""
-        for s in SETTINGS:
-            wanted = f"/{pool.paper.tasks[s]}" if pool.paper else ""
-            cells += f"{pool.kept[s]}{wanted}{'!' if s in pool.short else ' '}".rjust(16)
-        reach = f"{pool.path_m[0] / 1000:.1f}-{pool.path_m[1] / 1000:.1f}" if pool.path_m else "-"
-        paper = f"{pool.paper.path_m / 1000:.1f}{' ' if pool.reaches_path else '!'}" if pool.paper else "-"
-        lines.append(f"{pool.scene:<22}{pool.candidates:>10}{cells}{reach:>18}{paper:>10}")
+def _line(name: str, cells: Sequence[str], km: str) -> str:
+    widths = (10, 9, 15, 15, 15, 15)
+    return f"{name:<22}" + "".join(c.rjust(w) for c, w in zip(cells, widths, strict=True)) + f"{km:>22}"
+
+
+def split_lines(made: Sequence[Made]) -> list[str]:
+    """Set the release beside the paper's table of splits, in instances, as `made_lines` does."""
+    lines = [f"{'partition':<12}{'subset':<8}" + "".join(f"{s:>18}" for s in (*SETTINGS, "instances"))]
+    whole = {m.scene for m in made} >= set(inventory())
+    for (partition, subset), cells in splits().items():
+        ours = [
+            2 * sum(m.tasks.get((subset, s), 0) for m in made if store.partition(m.scene).upper() == partition)
+            for s in SETTINGS
+        ]
+        paper = [2 * cells[s] for s in SETTINGS] if whole else ours
+        pairs = zip([*ours, sum(ours)], [*paper, sum(paper)], strict=True)
+        lines.append(
+            f"{partition:<12}{subset:<8}"
+            + "".join(f"{a:,}".rjust(18) if a == b else f"{a:,}/{b:,}".rjust(18) for a, b in pairs)
+        )
     return lines
