@@ -70,6 +70,8 @@ class Parameters(BaseModel):
         Least distance of trees, metres.
     boulders : int
         How many are strewn.
+    stone : str
+        Their colour, as a person would say it.
     groups : tuple of Group
         What stands where.
     """
@@ -92,6 +94,7 @@ class Parameters(BaseModel):
     trees_z_m: float = 8.0
     tree_spacing_m: Annotated[float, Field(ge=2, le=12)] = 4.6
     boulders: Annotated[int, Field(ge=0)] = 60
+    stone: str = "grey"
     groups: tuple[Group, ...] = ()
 
 
@@ -212,11 +215,11 @@ def _grow(site: Site, p: Parameters, water: BaseGeometry, bare: BaseGeometry) ->
     if not water.is_empty:
         bank = water.buffer(1.8).difference(water.buffer(-0.5))
         strew(site, "boulder", bank, 2.2, lambda _x, _y: 1.0, p.boulders // 2, scale=0.75, roles=grey,
-              attributes={"place": "beside the stream"})  # fmt: skip
+              attributes={"place": "beside the stream", "colour": p.stone})  # fmt: skip
     plant(site, green, p.tree_spacing_m, wood, trees, {"place": "on the wooded slope"})
     words = {"place": "on the slope"}
     strew(site, "boulder", slope.difference(water.buffer(1.0)), 2.6, lambda x, y: 0.04 + 0.9 * foot(x, y), p.boulders,
-          roles=grey, attributes=words)  # fmt: skip
+          roles=grey, attributes=words | {"colour": p.stone})  # fmt: skip
     strew(site, "young_spruce", green, 2.6, dwarf, 40, attributes=words)
     strew(site, "bush", green, 3.0, dwarf, 24, scale=0.7, params={"berries": 2}, attributes=words)
     strew(site, "fern", green, 1.8, lambda x, y: 0.3 * glades(x, y), 40, attributes=words)
