@@ -5,8 +5,10 @@ import pytest
 import shapely
 from layout_checks import catalogue, clashes, floating, glb_bytes, kinds_of, looks_of, props_of, scene_of
 
+from aerialdojo_gen.geometry.rays import RayCaster
 from aerialdojo_gen.paper import paper_counts
 from aerialdojo_gen.scenes.layouts.natural_peaks import Ridge, above, massif, steep
+from aerialdojo_gen.scenes.model import Scene
 
 SCENES = ["N_Mountain_0", "N_Mountain_1", "N_Forest_1"]
 each_scene = pytest.mark.parametrize("name", SCENES)
@@ -24,9 +26,21 @@ def test_scenes_are_as_rich_as_the_paper_asks(name):
 
 @each_scene
 def test_props_stand_on_something(name):
-    # A chair may stand on a cabin's porch, which is a prop itself; boulders lie deep.
-    chairs = ("rocking_chair",)
-    assert not floating(scene_of(name), hung=chairs, reach_m=2.2)
+    # A chair may stand on a cabin's porch, which is a prop itself; boulders are half sunk in steep slopes.
+    apart = ("rocking_chair", "boulder")
+    assert not floating(scene_of(name), hung=apart, reach_m=2.2)
+
+
+@each_scene
+def test_boulders_touch_the_ground(name):
+    scene = scene_of(name)
+    ground = RayCaster(Scene(name, (scene["ground"],), scene.materials, scene.bounds))
+    for boulder in (i for i in scene.instances if i.category == "boulder"):
+        v = boulder.vertices
+        origins = np.column_stack([v[:, :2], np.full(len(v), 60.0)])
+        depth, _ = ground.first_hit(origins, np.tile([0.0, 0.0, -1.0], (len(v), 1)))
+        above = v[:, 2] - (60.0 - depth)
+        assert above.min() < 0.0 < above.max(), boulder.node
 
 
 @each_scene
