@@ -95,7 +95,9 @@ class PlanConfig(Section):
     length_slack: float = Field(1.04, ge=1, description="the cost-to-go may exceed it by this: it overestimates")
     field_slack_m: float = Field(3.0, ge=0, description="how far the cost-to-go reaches beyond the farthest start")
     max_approach_m: float = Field(1.0, gt=0, description="longest straight Approach at the end")
-    min_detour_ratio: float = Field(0.0, ge=0, description="no search where a grid path is shorter than this times d_E")
+    min_detour_ratio: float = Field(
+        0.0, ge=0, description="no search where a grid path is shorter than this times d_E"
+    )
     action_cost_m: float = Field(0.02, ge=0, description="what an action costs beside its metres: breaks ties")
     clearance_cap_m: float = Field(5.0, gt=0, description="clearances are known up to this distance")
     prove_by_grid: bool = Field(True, description="leave FCL unasked about legs that the grid proves free")

@@ -119,11 +119,11 @@ def _stacks(site: Site) -> None:
     for (x, y), tiers in _TIERS.items():
         container_block(site, x, y, tiers, z=QUAY_M)
     top = "on top of a stack of containers"
-    for category, x, y, tiers, yaw in (
+    for category, x, y, height, yaw in (
         ("shipping_container", -91.9, 32.2, 3, _EAST), ("shipping_container", -27.9, 39.9, 4, _EAST),
         ("shipping_container", -59.9, 56.0, 3, _EAST), ("shipping_container", 4.1, 32.2, 2, _EAST),
     ):  # fmt: skip
-        put(site, category, x, y, yaw, top, z=QUAY_M + 2.59 * tiers - 0.04)
+        put(site, category, x, y, yaw, top, z=QUAY_M + 2.59 * height - 0.04)
     masts: Parts = []
     for x, y in ((-69.6, 49.0), (-5.6, 49.0), (-101.6, 26.0), (25.0, 26.0)):
         masts.append(("steel", columns([(x, y)], QUAY_M, 19.0, 0.22, 6)))

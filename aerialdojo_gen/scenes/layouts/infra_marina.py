@@ -60,8 +60,8 @@ def _terraces(site: Site) -> None:
         gaps = [ribbon([(x, y - 1.0), (x, y + 1.0)], 3.0) for x in (-30.0, 22.0)]
         rail = LineString([(-65.0, y + 0.2), (65.0, y + 0.2)]).buffer(0.15, cap_style="flat")
         rail = rail.difference(unary_union(gaps))
-        parts: Parts = [(wall, merge([block(*p.bounds[:2], *p.bounds[2:], z, z + 0.7)
-                                      for p in getattr(rail, "geoms", [rail])]))]  # fmt: skip
+        stretches = [p.bounds for p in getattr(rail, "geoms", [rail])]
+        parts: Parts = [(wall, merge([block(x0, y0, x1, y1, z, z + 0.7) for x0, y0, x1, y1 in stretches]))]
         site.add(None, "terrace_parapet", parts)
     for x in (-30.0, 22.0):
         parts = stairs((x, _MIDDLE_Y - 5.0), 90.0, 2.4, _MIDDLE_M - QUAY_M, 5.0, z_m=QUAY_M, tread="stone")
