@@ -1,5 +1,9 @@
 """Quotas: the paper's numbers to the integer, chosen by the tasks' own ids, or a word on what is lacking."""
 
+import json
+import shutil
+from pathlib import Path
+
 import numpy as np
 import pyarrow as pa
 import pytest
@@ -7,12 +11,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from aerialdojo_gen import schemas, store
+from aerialdojo_gen.annotations.command import draft_scene
+from aerialdojo_gen.cli import open_pipeline, run_until
 from aerialdojo_gen.errors import PoolError
 from aerialdojo_gen.paper import inventory, splits
 from aerialdojo_gen.release.pool import pool_lines, pool_of, require_pools
 from aerialdojo_gen.release.quota import apportion, choose, train_quotas
 from aerialdojo_gen.release.stats import Made, made_lines, split_lines
 
+ROOT = Path(__file__).resolve().parents[1]
 SETTINGS = {"base": (5.0, 30.0), "standard": (30.0, 60.0), "long_horizon": (60.0, 100.0)}
 
 
@@ -135,3 +142,26 @@ def test_tables_show_where_the_release_is_not_the_papers():
     assert "13/14" in lines[1]
     assert lines[-1] == "3 numbers are not the paper's"
     assert split_lines([right])[1].split()[2:] == [f"{2 * n:,}" for n in (*trains.values(), sum(trains.values()))]
+
+
+def test_split_writes_nothing_where_a_pool_is_too_small(tmp_path):
+    project = tmp_path / "project"
+    (project / "scenes").mkdir(parents=True)
+    (project / "annotations").mkdir()
+    shutil.copy(ROOT / "scene_assets" / "smoke" / "U_Courtyard_0.toml", project / "scenes" / "D_Flood_1.toml")
+    assets = json.dumps(str(ROOT / "scene_assets"))
+    (project / "pipeline.toml").write_text(
+        f'name = "short"\nscene_assets = {assets}\nrecipes = "scenes"\nannotations = "annotations"\n'
+        "[split]\npaper_counts = true\n"
+    )
+    data = tmp_path / "data"
+    pipeline, roots = open_pipeline(project / "pipeline.toml", data)
+    source = json.loads((ROOT / "annotations" / "smoke" / "U_Courtyard_0.json").read_text())
+    draft_scene(
+        "D_Flood_1", pipeline, roots, n_objects=4, landmarks=tuple(entry["node"] for entry in source["landmarks"]),
+        n_landmarks=len(source["landmarks"]),
+    )  # fmt: skip
+    with pytest.raises(PoolError, match=r"D_Flood_1: \d+ base tasks short"):
+        run_until("split", data=data, pipeline=project / "pipeline.toml", workers=1, quiet=True)
+    assert store.shards(data, "verdicts", "D_Flood_1")
+    assert not (data / "release").exists()
