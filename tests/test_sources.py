@@ -53,7 +53,8 @@ def test_the_two_instances_of_a_type_differ_in_more_than_the_seed():
             one, two = (load_recipe(folder / f"{stem}.toml") for stem in (name, f"{name[:-1]}1"))
             assert one.layout == two.layout
             assert one.size_m != two.size_m, name
-            assert one.palette != two.palette, name
+            # A plan of its own may bring colours of its own.
+            assert (one.palette, one.sky) != (two.palette, two.sky), name
             assert one.parameters != two.parameters, name
 
 
@@ -62,7 +63,7 @@ def test_descriptions_are_sentences_of_people(annotations):
     assert len(set(texts)) > 0.99 * len(texts)
     for text in texts:
         assert re.match(r"[A-Z]", text), text
-        assert not re.search(r"\b(a|an|the) (a|an|the)\b|\ba [aeio]\w|  |_|\d\.\d", text), text
+        assert not re.search(r"\b(a|an|the) (a|an|the)\b|\ba (?!one\b)[aeio]\w|  |_|\d\.\d", text), text
         assert 5 <= len(text.split()) <= 70, text
     openings = Counter(" ".join(text.split()[:2]) for text in texts)
     assert max(openings.values()) < 0.15 * len(texts)
