@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from shapely.geometry import Point, Polygon
 
 from aerialdojo_gen.config import BuildScenesConfig, Embodiment
-from aerialdojo_gen.errors import AssetError, UsageError
+from aerialdojo_gen.errors import AssetError
 from aerialdojo_gen.geometry.rays import RayCaster
 from aerialdojo_gen.scenes import layouts
 from aerialdojo_gen.scenes.build import build_scene
@@ -191,10 +191,18 @@ def test_recipe_errors_name_file_and_key(assets, old, new, says):
     assert "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize("name", ["Mall", "X_Mall_0", "U_Mall_2", "U_Mall", "u_Mall_0"])
-def test_scene_names_that_say_no_family_or_partition(name):
-    with pytest.raises(UsageError, match="U_Mall_0"):
-        build_scenes.parse_name(name)
+@pytest.mark.parametrize(
+    ("name", "parsed"),
+    [
+        ("U_Mall_0", ("Urban", "Mall", "ID")),
+        ("D_Flood_1", ("Disaster", "Flood", "OOD")),
+        ("Campus", ("Custom", "Campus", "ID")),
+        ("Campus_1", ("Custom", "Campus", "OOD")),
+        ("X_Mall_0", ("Custom", "X_Mall", "ID")),
+    ],
+)
+def test_scene_names_tell_family_type_and_partition(name, parsed):
+    assert build_scenes.parse_name(name) == parsed
 
 
 def site(width: float = 60.0, height: float = 40.0) -> Site:

@@ -8,9 +8,10 @@ to is read from beside it or not at all.
 from __future__ import annotations
 
 import json
-import multiprocessing
 import resource
 import struct
+import subprocess
+import sys
 import tempfile
 import warnings
 from pathlib import Path
@@ -61,24 +62,20 @@ def read_mesh(path: Path, max_memory_bytes: int = MAX_MEMORY_BYTES) -> list[RawN
         raise AssetError(f"{path}: {size >> 20} MiB, the most is {MAX_FILE_BYTES >> 20}: simplify or split the mesh")
     with tempfile.TemporaryDirectory(prefix="aerialdojo-") as folder:
         out = Path(folder) / "nodes.npz"
-        context = multiprocessing.get_context("spawn")
-        reader, writer = context.Pipe(duplex=False)
-        process = context.Process(target=_work, args=(path, out, max_memory_bytes, writer), daemon=True)
-        process.start()
-        writer.close()
-        process.join(MAX_SECONDS)
-        if process.is_alive():
-            process.kill()
-            process.join()
-            raise AssetError(f"{path}: reading takes more than {MAX_SECONDS} s: simplify or split the mesh")
-        message = reader.recv() if reader.poll() else "its reader crashed: the file is damaged or too large"
-        if message:
-            raise AssetError(f"{path}: {message}")
+        # Not multiprocessing, which would run a caller's unguarded script a second time.
+        command = [sys.executable, "-m", __name__, str(path.resolve()), str(out), str(max_memory_bytes)]
+        try:
+            ended = subprocess.run(command, capture_output=True, text=True, timeout=MAX_SECONDS, check=False)
+        except subprocess.TimeoutExpired:
+            raise AssetError(f"{path}: reading takes more than {MAX_SECONDS} s: simplify or split the mesh") from None
+        if ended.returncode:
+            said = ended.stdout.strip().splitlines()
+            raise AssetError(f"{path}: {said[-1] if said else 'its reader crashed: damaged, or too large'}")
         return _unpacked(out)
 
 
-def _work(path: Path, out: Path, max_memory_bytes: int, report: Any) -> None:
-    """Read in a process of its own; reports an empty string, or what is wrong."""
+def _work(path: Path, out: Path, max_memory_bytes: int) -> str:
+    """Read in a process of its own; returns an empty string, or what is wrong."""
     # What readers grumble about is repaired and reported later.
     warnings.simplefilter("ignore")
     resource.setrlimit(resource.RLIMIT_AS, (max_memory_bytes, max_memory_bytes))
@@ -87,18 +84,18 @@ def _work(path: Path, out: Path, max_memory_bytes: int, report: Any) -> None:
         nodes = [n for n in _read(path) if len(n.faces)]
         total = sum(len(n.faces) for n in nodes)
         if not nodes:
-            raise AssetError("holds no triangles")
+            return "holds no triangles"
         if total > MAX_TRIANGLES:
-            raise AssetError(f"{total:,} triangles, the most is {MAX_TRIANGLES:,}: simplify or split the mesh")
+            return f"{total:,} triangles, the most is {MAX_TRIANGLES:,}: simplify or split the mesh"
         _pack(nodes, out)
-        report.send("")
     except AssetError as error:
-        report.send(str(error))
-    except MemoryError:
-        report.send(f"needs more than {max_memory_bytes >> 20} MiB to read: simplify or split the mesh")
+        return str(error)
+    except (MemoryError, ImportError):
+        return f"needs more than {max_memory_bytes >> 20} MiB to read: simplify or split the mesh"
     except Exception as error:  # a foreign file may make a reader fail in any way: it is named, never let through
         first = (str(error).splitlines() or [""])[0]
-        report.send(f"cannot be read ({type(error).__name__}{': ' + first[:120] if first else ''})")
+        return f"cannot be read ({type(error).__name__}{': ' + first[:120] if first else ''})"
+    return ""
 
 
 def _read(path: Path) -> list[RawNode]:
@@ -230,3 +227,9 @@ def _unpacked(path: Path) -> list[RawNode]:
         return [
             RawNode(str(name), file[f"v{k}"], file[f"f{k}"], file[f"c{k}"]) for k, name in enumerate(file["names"])
         ]
+
+
+if __name__ == "__main__":
+    fault = _work(Path(sys.argv[1]), Path(sys.argv[2]), int(sys.argv[3]))
+    print(fault)
+    raise SystemExit(1 if fault else 0)
