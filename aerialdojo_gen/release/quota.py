@@ -16,7 +16,7 @@ Floats = NDArray[np.float64]
 _HALVINGS = 60
 # Metres over which a tilt of 1 changes a route's odds by e; tilts are searched for between -_STEEPEST and _STEEPEST.
 _SCALE_M = 10.0
-_STEEPEST = 40.0
+_STEEPEST = 1e4
 
 
 def apportion(total: int, sizes: Mapping[str, int]) -> dict[str, int]:
