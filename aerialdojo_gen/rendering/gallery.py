@@ -170,8 +170,9 @@ def write_picture(image: Image, folder: Path, name: str, max_width: int | None =
     if max_width is not None and image.shape[1] > max_width:
         height = round(image.shape[0] * max_width / image.shape[1])
         image = np.asarray(cv2.resize(image, (max_width, height), interpolation=cv2.INTER_AREA), dtype=np.uint8)
-    options = [cv2.IMWRITE_PNG_COMPRESSION, 9, cv2.IMWRITE_JPEG_QUALITY, 82, cv2.IMWRITE_JPEG_OPTIMIZE, 1]
-    done, data = cv2.imencode(Path(name).suffix, image[..., ::-1], options)
+    suffix = Path(name).suffix
+    options = [cv2.IMWRITE_PNG_COMPRESSION, 9] if suffix == ".png" else [cv2.IMWRITE_JPEG_QUALITY, 82]
+    done, data = cv2.imencode(suffix, image[..., ::-1], options)
     if not done:
         raise RenderError(f"cannot encode {name}")
     folder.mkdir(parents=True, exist_ok=True)
