@@ -13,7 +13,7 @@ import trimesh
 from aerialdojo_gen import store
 from aerialdojo_gen.annotations.command import draft_scene
 from aerialdojo_gen.annotations.draft import Choice
-from aerialdojo_gen.cli import open_pipeline, run_until
+from aerialdojo_gen.commands.common import open_pipeline, run_until
 from aerialdojo_gen.errors import AnnotationError, AssetError, StoreError, UsageError
 from aerialdojo_gen.imports.adopt import adopt
 from aerialdojo_gen.imports.colours import colour_name

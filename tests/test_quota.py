@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from aerialdojo_gen import schemas, store
 from aerialdojo_gen.annotations.command import draft_scene
-from aerialdojo_gen.cli import open_pipeline, run_until
+from aerialdojo_gen.commands.common import open_pipeline, run_until
 from aerialdojo_gen.errors import PoolError
 from aerialdojo_gen.paper import inventory, splits
 from aerialdojo_gen.release.pool import pool_lines, pool_of, require_pools

@@ -1,0 +1,107 @@
+"""Commands that make and picture sources: scenes of one's own, drafts of annotations, the gallery."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from aerialdojo_gen.commands.common import PipelineFile, Scene, open_pipeline
+
+app = typer.Typer()
+
+
+@app.command("add-scene")
+def add_scene(
+    name: Annotated[str, typer.Argument(help="Name of the scene; the suffix _1 makes it out-of-distribution.")],
+    mesh: Annotated[Path, typer.Argument(help="GLB, OBJ, STL, PLY or 3DS file.")],
+    up: Annotated[str, typer.Option(help="The mesh's axis that points up: z or y.")],
+    scale: Annotated[float, typer.Option(help="Metres a unit of the mesh: 0.01 for centimetres.")] = 1.0,
+    annotations: Annotated[Path | None, typer.Option(help="Annotation file to go with it.")] = None,
+    project: Annotated[Path, typer.Option(help="Folder for your scenes and their pipeline.")] = Path("my-scenes"),
+    crop: Annotated[
+        tuple[float, float, float] | None, typer.Option(help="Keep a circle: x y radius, metres.")
+    ] = None,
+    ceiling: Annotated[
+        float | None, typer.Option(help="Highest z to fly at, metres.  (default: 6 m over all)")
+    ] = None,
+    force: Annotated[bool, typer.Option("--force", help="Replace a scene of this name.")] = False,
+) -> None:
+    """Make a scene of a mesh of your own."""
+    from aerialdojo_gen.imports import command
+
+    added = command.add_scene(
+        name, mesh, project, up=up, scale=scale, annotations=annotations, crop_m=crop, ceiling_m=ceiling, force=force
+    )
+    size = added.scene.bounds[1] - added.scene.bounds[0]
+    print(
+        f"{name}: {len(added.scene.instances):,} instances, {added.scene.n_triangles:,} triangles, "
+        f"{size[0]:.0f} x {size[1]:.0f} m, ceiling {added.scene.ceiling_m:.0f} m"
+    )
+    for line in added.repairs.lines:
+        print(f"  {line}")
+    if not added.annotations.exists():
+        print(f"next: aerialdojo-gen annotate-draft {name} --pipeline {added.pipeline} --landmarks 2 --objects 20")
+    print(f"then: aerialdojo-gen run {added.pipeline} --data {project / 'data'}")
+
+
+@app.command("annotate-draft")
+def annotate_draft(
+    scene: Annotated[str, typer.Argument(help="Scene with a recipe, e.g. U_Mall_0.")],
+    landmarks: Annotated[int | None, typer.Option(min=1, help="How many.  (default: the paper's number)")] = None,
+    objects: Annotated[int | None, typer.Option(min=2, help="How many.  (default: the paper's number)")] = None,
+    centre: Annotated[
+        tuple[float, float] | None, typer.Option(help="Middle of the core, x y in metres.  (default: the landmarks')")
+    ] = None,
+    within: Annotated[float | None, typer.Option(min=1, help="Radius of the core, metres.")] = None,
+    core_share: Annotated[float, typer.Option(min=0, max=1, help="Share of the objects that lie in the core.")] = 1.0,
+    aloft: Annotated[float, typer.Option(min=0, max=1, help="Share of the core's objects from 3 m up.")] = 0.0,
+    plants: Annotated[int, typer.Option(min=0, help="Most objects of one category of vegetation.")] = 3,
+    most: Annotated[int, typer.Option(min=1, help="Most objects of any other category.")] = 5,
+    landmark: Annotated[list[str] | None, typer.Option(help="Node that is to be a landmark, repeatable.")] = None,
+    seed: Annotated[int, typer.Option(min=0, help="The same seed gives the same draft.")] = 0,
+    pipeline: PipelineFile = None,
+    force: Annotated[bool, typer.Option("--force", help="Overwrite an existing file.")] = False,
+) -> None:
+    """Draft a scene's annotations, to be checked and owned as sources."""
+    from aerialdojo_gen.annotations.command import draft_scene
+    from aerialdojo_gen.annotations.draft import Choice
+    from aerialdojo_gen.runner import choose_scenes, known_scenes
+
+    config, roots = open_pipeline(pipeline, Path("data"))
+    choose_scenes([scene], known_scenes(roots.recipes))
+    choice = Choice(
+        centre_m=centre, within_m=within, core_share=core_share, aloft_share=aloft, most_vegetation=plants, most=most
+    )
+    path = draft_scene(
+        scene, config, roots, n_landmarks=landmarks, n_objects=objects, choice=choice,
+        landmarks=tuple(landmark or ()), seed=seed, force=force,
+    )  # fmt: skip
+    print(path)
+
+
+@app.command("gallery")
+def gallery(
+    out: Annotated[Path, typer.Option("--out", help="Folder for the pictures.")] = Path("docs/gallery"),
+    scene: Scene = None, pipeline: PipelineFile = None,
+    props: Annotated[bool, typer.Option("--props/--no-props", help="The sheets of all props too.")] = True,
+    small: Annotated[bool, typer.Option("--small", help="JPEGs of 1280 columns, for pages.")] = False,
+) -> None:  # fmt: skip
+    """Picture every prop and every scene as contact sheets."""
+    from aerialdojo_gen import runner
+    from aerialdojo_gen.rendering.gallery import props_sheet, scene_sheet, write_picture
+    from aerialdojo_gen.scenes.build import build_scene
+    from aerialdojo_gen.scenes.catalogue import load_catalogue
+
+    config, roots = open_pipeline(pipeline, out)
+    catalogue = load_catalogue(roots.scene_assets)
+    suffix, width = ("jpg", 1280) if small else ("png", None)
+    for name in runner.choose_scenes(scene or config.scenes, runner.known_scenes(roots.recipes)):
+        sheet = scene_sheet(build_scene(roots.recipes / f"{name}.toml", catalogue))
+        print(write_picture(sheet, out, f"{name}.{suffix}", width))
+    if props:
+        landmarks = [name for name in catalogue if catalogue[name].kind == "landmark"]
+        for title, names in (("props", catalogue.targets), ("landmarks", landmarks)):
+            size = 120 if small else 200
+            print(write_picture(props_sheet(catalogue, names, size), out, f"{title}.{suffix}"))

@@ -1,0 +1,80 @@
+"""One command a stage, and ``run``."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from aerialdojo_gen.commands.common import (
+    Data,
+    Force,
+    PipelineFile,
+    Quiet,
+    Scene,
+    Workers,
+    open_pipeline,
+    run_stages,
+    run_until,
+)
+
+app = typer.Typer()
+
+# The stages whose command has no option of its own; their texts are those of `aerialdojo_gen.stage`, which is
+# not imported here because it brings pyarrow.
+PLAIN_STAGES = {
+    "build-scenes": "Build the scenes' meshes from their recipes.",
+    "annotate-import": "Check the annotations against the scenes and import them.",
+    "anchor-sample": "Find viewpoints 1 m from each object that see it.",
+    "reference-images": "Render each object's picture from its selected anchor.",
+    "pair-objects": "Pair start anchors with targets: the candidate tasks.",
+    "plan": "Plan a collision-free reference trajectory for every candidate.",
+    "filter": "Keep the candidates that make tasks, with a reason for every rejection.",
+    "split": "Write the release: tasks, routes, objects, train and test.",
+}
+
+
+def _stage_command(name: str) -> Callable[..., None]:
+    def command(
+        data: Data = Path("data"), scene: Scene = None, pipeline: PipelineFile = None,
+        workers: Workers = None, force: Force = False, quiet: Quiet = False,
+    ) -> None:  # fmt: skip
+        run_until(name, data=data, scene=scene, pipeline=pipeline, workers=workers, force=force, quiet=quiet)
+
+    return command
+
+
+for _name, _help in PLAIN_STAGES.items():
+    app.command(_name, help=_help)(_stage_command(_name))
+
+
+@app.command("render")
+def render(
+    data: Data = Path("data"), scene: Scene = None, pipeline: PipelineFile = None,
+    workers: Workers = None, force: Force = False, quiet: Quiet = False,
+    limit: Annotated[int | None, typer.Option("--limit", min=1, help="Trajectories a scene and setting.")] = None,
+    sampling: Annotated[
+        str | None, typer.Option("--sampling", help="steps: a frame a pose; time: constant frame rate.")
+    ] = None,
+) -> None:  # fmt: skip
+    """Record four RGB-D views along trajectories of the release."""
+    run_until(
+        "render", data=data, scene=scene, pipeline=pipeline, workers=workers, force=force, quiet=quiet,
+        limit=limit, sampling=sampling,
+    )  # fmt: skip
+
+
+@app.command("run")
+def run(
+    pipeline: Annotated[Path, typer.Argument(help="Pipeline file, e.g. pipelines/smoke.toml.")],
+    data: Data = Path("data"), scene: Scene = None,
+    workers: Workers = None, force: Force = False, quiet: Quiet = False,
+) -> None:  # fmt: skip
+    """Run a pipeline's stages, from recipes and annotations to the release."""
+    from aerialdojo_gen.runner import stages_named
+
+    config, roots = open_pipeline(pipeline, data)
+    stages = stages_named(config.stages)
+    run_stages(stages, config, roots, scene, workers, [stage.name for stage in stages] if force else [], quiet)
