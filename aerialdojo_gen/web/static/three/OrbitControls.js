@@ -91,7 +91,7 @@ class OrbitControls extends Controls {
 	 * Constructs a new controls instance.
 	 *
 	 * @param {Object3D} object - The object that is managed by the controls.
-	 * @param {?HTMLElement} domElement - The HTML element used for event listeners.
+	 * @param {?HTMLDOMElement} domElement - The HTML element used for event listeners.
 	 */
 	constructor( object, domElement = null ) {
 
@@ -391,8 +391,6 @@ class OrbitControls extends Controls {
 		 */
 		this.zoom0 = this.object.zoom;
 
-		this._cursorStyle = 'auto';
-
 		// the target DOM element for key events
 		this._domElementKeyEvents = null;
 
@@ -464,34 +462,6 @@ class OrbitControls extends Controls {
 
 	}
 
-	/**
-	 * Defines the visual representation of the cursor.
-	 *
-	 * @type {('auto'|'grab')}
-	 * @default 'auto'
-	 */
-	set cursorStyle( type ) {
-
-		this._cursorStyle = type;
-
-		if ( type === 'grab' ) {
-
-			this.domElement.style.cursor = 'grab';
-
-		} else {
-
-			this.domElement.style.cursor = 'auto';
-
-		}
-
-	}
-
-	get cursorStyle() {
-
-		return this._cursorStyle;
-
-	}
-
 	connect( element ) {
 
 		super.connect( element );
@@ -502,19 +472,18 @@ class OrbitControls extends Controls {
 		this.domElement.addEventListener( 'contextmenu', this._onContextMenu );
 		this.domElement.addEventListener( 'wheel', this._onMouseWheel, { passive: false } );
 
-		this.domElement.ownerDocument.addEventListener( 'keydown', this._interceptControlDown, { passive: true, capture: true } );
+		const document = this.domElement.getRootNode(); // offscreen canvas compatibility
+		document.addEventListener( 'keydown', this._interceptControlDown, { passive: true, capture: true } );
 
-		this.domElement.style.touchAction = 'none'; // Disable touch scroll
+		this.domElement.style.touchAction = 'none'; // disable touch scroll
 
 	}
 
 	disconnect() {
 
-		this.state = _STATE.NONE;
-
 		this.domElement.removeEventListener( 'pointerdown', this._onPointerDown );
-		this.domElement.ownerDocument.removeEventListener( 'pointermove', this._onPointerMove );
-		this.domElement.ownerDocument.removeEventListener( 'pointerup', this._onPointerUp );
+		this.domElement.removeEventListener( 'pointermove', this._onPointerMove );
+		this.domElement.removeEventListener( 'pointerup', this._onPointerUp );
 		this.domElement.removeEventListener( 'pointercancel', this._onPointerUp );
 
 		this.domElement.removeEventListener( 'wheel', this._onMouseWheel );
@@ -522,16 +491,10 @@ class OrbitControls extends Controls {
 
 		this.stopListenToKeyEvents();
 
-		this.domElement.ownerDocument.removeEventListener( 'keydown', this._interceptControlDown, { capture: true } );
-		this.domElement.ownerDocument.removeEventListener( 'keyup', this._interceptControlUp, { capture: true } );
+		const document = this.domElement.getRootNode(); // offscreen canvas compatibility
+		document.removeEventListener( 'keydown', this._interceptControlDown, { capture: true } );
 
-		this._controlActive = false;
-
-		this._pointers.length = 0;
-		this._pointerPositions = {};
-
-		this.domElement.style.touchAction = ''; // Restore touch scroll
-		this.domElement.style.cursor = 'auto';
+		this.domElement.style.touchAction = 'auto';
 
 	}
 
@@ -578,7 +541,7 @@ class OrbitControls extends Controls {
 	 * Adds key event listeners to the given DOM element.
 	 * `window` is a recommended argument for using this method.
 	 *
-	 * @param {HTMLElement} domElement - The DOM element
+	 * @param {HTMLDOMElement} domElement - The DOM element
 	 */
 	listenToKeyEvents( domElement ) {
 
@@ -628,67 +591,6 @@ class OrbitControls extends Controls {
 		this.update();
 
 		this.state = _STATE.NONE;
-
-	}
-
-	/**
-	 * Programmatically pan the camera.
-	 *
-	 * @param {number} deltaX - The horizontal pan amount in pixels.
-	 * @param {number} deltaY - The vertical pan amount in pixels.
-	 */
-	pan( deltaX, deltaY ) {
-
-		this._pan( deltaX, deltaY );
-		this.update();
-
-	}
-
-	/**
-	 * Programmatically dolly in (zoom in for perspective camera).
-	 *
-	 * @param {number} dollyScale - The dolly scale factor.
-	 */
-	dollyIn( dollyScale ) {
-
-		this._dollyIn( dollyScale );
-		this.update();
-
-	}
-
-	/**
-	 * Programmatically dolly out (zoom out for perspective camera).
-	 *
-	 * @param {number} dollyScale - The dolly scale factor.
-	 */
-	dollyOut( dollyScale ) {
-
-		this._dollyOut( dollyScale );
-		this.update();
-
-	}
-
-	/**
-	 * Programmatically rotate the camera left (around the vertical axis).
-	 *
-	 * @param {number} angle - The rotation angle in radians.
-	 */
-	rotateLeft( angle ) {
-
-		this._rotateLeft( angle );
-		this.update();
-
-	}
-
-	/**
-	 * Programmatically rotate the camera up (around the horizontal axis).
-	 *
-	 * @param {number} angle - The rotation angle in radians.
-	 */
-	rotateUp( angle ) {
-
-		this._rotateUp( angle );
-		this.update();
 
 	}
 
@@ -1094,7 +996,7 @@ class OrbitControls extends Controls {
 
 	_handleMouseDownDolly( event ) {
 
-		this._updateZoomParameters( event.clientX, event.clientY );
+		this._updateZoomParameters( event.clientX, event.clientX );
 		this._dollyStart.set( event.clientX, event.clientY );
 
 	}
@@ -1140,15 +1042,6 @@ class OrbitControls extends Controls {
 		}
 
 		this._dollyStart.copy( this._dollyEnd );
-
-		if ( this.zoomToCursor ) {
-
-			// update() resets the cursor zoom, so keep zooming towards the position where the drag started
-
-			this._performCursorZoom = true;
-			this._dollyDirection.set( this._mouse.x, this._mouse.y, 1 ).unproject( this.object ).sub( this.object.position ).normalize();
-
-		}
 
 		this.update();
 
@@ -1565,8 +1458,8 @@ function onPointerDown( event ) {
 
 		this.domElement.setPointerCapture( event.pointerId );
 
-		this.domElement.ownerDocument.addEventListener( 'pointermove', this._onPointerMove );
-		this.domElement.ownerDocument.addEventListener( 'pointerup', this._onPointerUp );
+		this.domElement.addEventListener( 'pointermove', this._onPointerMove );
+		this.domElement.addEventListener( 'pointerup', this._onPointerUp );
 
 	}
 
@@ -1585,12 +1478,6 @@ function onPointerDown( event ) {
 	} else {
 
 		this._onMouseDown( event );
-
-	}
-
-	if ( this._cursorStyle === 'grab' ) {
-
-		this.domElement.style.cursor = 'grabbing';
 
 	}
 
@@ -1622,18 +1509,12 @@ function onPointerUp( event ) {
 
 			this.domElement.releasePointerCapture( event.pointerId );
 
-			this.domElement.ownerDocument.removeEventListener( 'pointermove', this._onPointerMove );
-			this.domElement.ownerDocument.removeEventListener( 'pointerup', this._onPointerUp );
+			this.domElement.removeEventListener( 'pointermove', this._onPointerMove );
+			this.domElement.removeEventListener( 'pointerup', this._onPointerUp );
 
 			this.dispatchEvent( _endEvent );
 
 			this.state = _STATE.NONE;
-
-			if ( this._cursorStyle === 'grab' ) {
-
-				this.domElement.style.cursor = 'grab';
-
-			}
 
 			break;
 
@@ -1814,12 +1695,7 @@ function onTouchStart( event ) {
 
 				case TOUCH.ROTATE:
 
-					if ( this.enableRotate === false ) {
-
-						this.state = _STATE.NONE;
-						break;
-
-					}
+					if ( this.enableRotate === false ) return;
 
 					this._handleTouchStartRotate( event );
 
@@ -1829,12 +1705,7 @@ function onTouchStart( event ) {
 
 				case TOUCH.PAN:
 
-					if ( this.enablePan === false ) {
-
-						this.state = _STATE.NONE;
-						break;
-
-					}
+					if ( this.enablePan === false ) return;
 
 					this._handleTouchStartPan( event );
 
@@ -1964,7 +1835,9 @@ function interceptControlDown( event ) {
 
 		this._controlActive = true;
 
-		this.domElement.ownerDocument.addEventListener( 'keyup', this._interceptControlUp, { passive: true, capture: true } );
+		const document = this.domElement.getRootNode(); // offscreen canvas compatibility
+
+		document.addEventListener( 'keyup', this._interceptControlUp, { passive: true, capture: true } );
 
 	}
 
@@ -1976,7 +1849,9 @@ function interceptControlUp( event ) {
 
 		this._controlActive = false;
 
-		this.domElement.ownerDocument.removeEventListener( 'keyup', this._interceptControlUp, { passive: true, capture: true } );
+		const document = this.domElement.getRootNode(); // offscreen canvas compatibility
+
+		document.removeEventListener( 'keyup', this._interceptControlUp, { passive: true, capture: true } );
 
 	}
 
