@@ -28,6 +28,8 @@ SETTINGS = ("base", "standard", "long_horizon")
 SUBSETS = ("id_train", "id_test", "ood_train", "ood_test")
 DIRECTIONS = ("east", "north-east", "north", "north-west", "west", "south-west", "south", "south-east")
 VIEWS = ("front", "left", "right", "down")
+# What ends an episode (benchmark): an agent's Stop, a collision, or the last action of the budget.
+TERMINATIONS = ("stop", "collision", "budget")
 FAMILIES = {"U": "Urban", "N": "Natural", "I": "Infrastructure", "D": "Disaster"}
 
 
@@ -140,11 +142,19 @@ LANDMARKS = _table(
 
 OBJECTS = _table("objects", ["scene", "object_id"], *_OBJECT_FIELDS)
 
+CHOSEN_ANCHORS = _table(
+    "chosen_anchors", ["scene", "object_id"],
+    _SCENE,
+    _field("object_id", pa.int32(), "object that a person chose an anchor for; the others have no row"),
+    *_xyz("position of the body's centre"),
+    _field("yaw_rad", pa.float64(), "yaw", "rad"),
+)  # fmt: skip
+
 ANCHORS = _table(
     "anchors", ["scene", "object_id", "anchor_id"],
     _SCENE,
     _field("object_id", pa.int32(), "object that the anchor looks at"),
-    _field("anchor_id", pa.int32(), "rank among the object's anchors, 0 is the best"),
+    _field("anchor_id", pa.int32(), "rank among the object's anchors, 0 is the best or the one that a person chose"),
     *_xyz("position of the body's centre"),
     _field("yaw_rad", pa.float64(), "yaw that faces the object's centroid", "rad"),
     _field("clearance_m", pa.float64(), "distance to the nearest surface of the scene", "m"),
@@ -267,6 +277,90 @@ ROUTES = _table(
 
 RELEASE_OBJECTS = _table("objects", ["scene", "object_id"], *_OBJECT_FIELDS, *_REFERENCE)
 
+# What an agent did (benchmark). All of it is the evaluator's: an agent sees none of these tables.
+_RUN = _field("run_id", pa.string(), "name of the evaluation run")
+_TASK_ID = _field("task_id", pa.string(), "the task instance")
+
+EPISODES = _table(
+    "episodes", ["run_id", "task_id"],
+    _RUN,
+    _field("agent", pa.string(), "name of the agent, or package.module:Class"),
+    _field("agent_options", pa.string(), "the agent's options, JSON with sorted keys"),
+    _TASK_ID,
+    _field("nav_id", pa.string(), "the navigation task, shared by its two instances"),
+    _SCENE,
+    *[TASKS.schema.field(name) for name in ("family", "scene_type", "partition", "subset")],
+    _field("split", pa.string(), "id_train, id_test, ood_train or ood_test"),
+    *[TASKS.schema.field(name) for name in ("setting", "modality", "action_budget")],
+    *_xyz("start position of the body's centre", "start_"),
+    _field("start_yaw_rad", pa.float64(), "yaw at the start", "rad"),
+    _field("success", pa.bool_(), "Stop within 3 m of the goal, without collision, within the budget"),
+    _field("oracle_success", pa.bool_(), "min_distance_m is at most 3 m, whatever happens later"),
+    _field("collision", pa.bool_(), "the episode ended in a collision"),
+    _field("stop_called", pa.bool_(), "the agent chose Stop"),
+    _field("termination", pa.string(), "stop, collision or budget"),
+    _field("final_distance_m", pa.float64(), "distance to the goal where the episode ended", "m"),
+    _field("min_distance_m", pa.float64(),
+           "smallest distance to the goal at the start, after any action, or where the episode ended", "m"),
+    _field("path_length_m", pa.float64(), "metres flown, up to the contact in a collision", "m"),
+    _field("reference_length_m", pa.float64(), "length of the reference route, L", "m"),
+    _EUCLIDEAN,
+    _field("n_actions", pa.int32(), "actions spent, Stop included, refused and unreadable ones too"),
+    _field("n_refused", pa.int32(), "moves that would have left the flight volume: spent, nothing moved"),
+    _field("n_invalid", pa.int32(), "answers that named no action: spent, nothing moved"),
+    _field("n_requests", pa.int32(), "calls of an outside service; null for agents without one", nullable=True),
+    _field("input_tokens", pa.int64(), "tokens sent, where the service says", nullable=True),
+    _field("output_tokens", pa.int64(), "tokens received, where the service says", nullable=True),
+    _field("cost_usd", pa.float64(), "US dollars, where prices are known", nullable=True),
+)  # fmt: skip
+
+STEPS = _table(
+    "steps", ["run_id", "task_id", "step"],
+    _RUN,
+    _TASK_ID,
+    _SCENE,
+    _field("step", pa.int32(), "number of the action in its episode, from 0"),
+    _field("action", pa.int8(), "the action; null for an answer that named none", nullable=True),
+    _field("refused", pa.bool_(), "the move would have left the flight volume: nothing moved"),
+    *_xyz("position of the body's centre after the action"),
+    _field("yaw_rad", pa.float64(), "yaw after the action", "rad"),
+    _field("distance_m", pa.float64(), "distance to the goal after the action", "m"),
+    _field("answer", pa.string(), "what the agent said, word for word, where it says anything", nullable=True),
+)  # fmt: skip
+
+# Apart from the two above, which are the same bytes for a deterministic agent, run after run.
+TIMINGS = _table(
+    "timings", ["run_id", "task_id"],
+    _RUN,
+    _TASK_ID,
+    _SCENE,
+    _field("wall_s", pa.float64(), "wall time of the episode", "s"),
+    _field("agent_s", pa.float64(), "wall time inside the agent", "s"),
+    _field("attempts", pa.int32(), "how often the episode was begun, infrastructure failures and all"),
+)  # fmt: skip
+
+FAILURES = _table(
+    "failures", ["run_id", "task_id"],
+    _RUN,
+    _TASK_ID,
+    _SCENE,
+    _field("attempts", pa.int32(), "how often the episode was tried"),
+    _field("reason", pa.string(), "what was unavailable: time-out, 429, 5xx, connection lost"),
+)  # fmt: skip
+
 TABLES = {
-    t.name: t for t in (SCENES, LANDMARKS, OBJECTS, ANCHORS, PAIRS, PLANS, VERDICTS, REFERENCES, RECORDINGS, FRAMES)
+    t.name: t
+    for t in (
+        SCENES,
+        LANDMARKS,
+        OBJECTS,
+        CHOSEN_ANCHORS,
+        ANCHORS,
+        PAIRS,
+        PLANS,
+        VERDICTS,
+        REFERENCES,
+        RECORDINGS,
+        FRAMES,
+    )
 }

@@ -26,6 +26,7 @@ from aerialdojo_gen import schemas
 from aerialdojo_gen.errors import StoreError
 
 _META = b"aerialdojo"
+_PLAIN = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}")
 _TEMPORARY = re.compile(r"^\..*\.(\d+)\.tmp(\.[A-Za-z0-9]+)?$")
 
 
@@ -40,11 +41,13 @@ class Place:
 
 _STAGED = "{table}/{scene}/part-{part:05d}.parquet"
 _RELEASE = "release/{table}/part-{scene}.parquet"
+_RUN = "{table}/{run}/part-{scene}.parquet"
 
 LAYOUT: dict[str, Place] = {
     "scenes": Place(schemas.SCENES, _STAGED, "build-scenes"),
     "landmarks": Place(schemas.LANDMARKS, _STAGED, "annotate-import"),
     "objects": Place(schemas.OBJECTS, _STAGED, "annotate-import"),
+    "chosen_anchors": Place(schemas.CHOSEN_ANCHORS, _STAGED, "annotate-import"),
     "anchors": Place(schemas.ANCHORS, _STAGED, "anchor-sample"),
     "references": Place(schemas.REFERENCES, _STAGED, "reference-images"),
     "pairs": Place(schemas.PAIRS, _STAGED, "pair-objects"),
@@ -60,6 +63,10 @@ LAYOUT: dict[str, Place] = {
     "release/landmarks": Place(schemas.LANDMARKS, "release/landmarks/part-{scene}.parquet", "split"),
     "release/objects": Place(schemas.RELEASE_OBJECTS, "release/objects/part-{scene}.parquet", "split"),
     "release/anchors": Place(schemas.ANCHORS, "release/anchors/part-{scene}.parquet", "split"),
+    "episodes": Place(schemas.EPISODES, _RUN, "evaluate"),
+    "steps": Place(schemas.STEPS, _RUN, "evaluate"),
+    "timings": Place(schemas.TIMINGS, _RUN, "evaluate"),
+    "failures": Place(schemas.FAILURES, _RUN, "evaluate"),
 }
 
 
@@ -96,21 +103,28 @@ def partition(scene: str) -> str:
 
 def check_scene_name(scene: str) -> str:
     """Return the name if it is a plain one; it becomes part of paths, so StoreError for anything else."""
-    if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}", scene):
+    if not _PLAIN.fullmatch(scene):
         raise StoreError(f"{scene!r} is not a scene name: use letters, digits, _ and - (64 at most)")
     return scene
 
 
-def shard_path(data: Path, table: str, scene: str, part: int = 0) -> Path:
-    """Return the path of a shard under the data directory."""
+def check_run_name(run: str) -> str:
+    """Return the name if it is a plain one; it becomes part of paths, so StoreError for anything else."""
+    if not _PLAIN.fullmatch(run):
+        raise StoreError(f"{run!r} is no name of a run: use letters, digits, _ and - (64 at most)")
+    return run
+
+
+def shard_path(data: Path, table: str, scene: str, part: int = 0, run: str = "default") -> Path:
+    """Return the path of a shard under the data directory; `run` names the run in tables of the benchmark."""
     return data / LAYOUT[table].template.format(
-        table=table, scene=check_scene_name(scene), part=part, partition=partition(scene)
+        table=table, scene=check_scene_name(scene), part=part, partition=partition(scene), run=check_run_name(run)
     )
 
 
-def shards(data: Path, table: str, scene: str) -> list[Path]:
+def shards(data: Path, table: str, scene: str, run: str = "default") -> list[Path]:
     """List the existing shards of a scene, by part."""
-    first = shard_path(data, table, scene)
+    first = shard_path(data, table, scene, run=run)
     if "{part:" not in LAYOUT[table].template:
         return [first] if first.exists() else []
     return sorted(first.parent.glob("part-*.parquet"))
@@ -199,6 +213,7 @@ def write_shard(
     parts: int = 1,
     summary: Mapping[str, Any] | None = None,
     files: Mapping[str, int] | None = None,
+    run: str = "default",
 ) -> Path:
     """Check a table, write it as a shard, and give it its name when it is whole.
 
@@ -223,7 +238,7 @@ def write_shard(
     }
     schema_meta = dict(table.schema.metadata or {})
     schema_meta[_META] = json.dumps(meta, sort_keys=True).encode()
-    path = shard_path(data, table_name, scene, part)
+    path = shard_path(data, table_name, scene, part, run)
     with atomic_file(data, str(path.relative_to(data))) as temporary:
         pq.write_table(
             table.replace_schema_metadata(schema_meta),
@@ -266,8 +281,8 @@ def content(data: Path, table: str, scene: str) -> list[str]:
     return [info.content for info in _infos(data, table, scene)]
 
 
-def _infos(data: Path, table: str, scene: str) -> list[ShardInfo]:
-    paths = shards(data, table, scene)
+def _infos(data: Path, table: str, scene: str, run: str = "default") -> list[ShardInfo]:
+    paths = shards(data, table, scene, run)
     infos = [read_info(path) for path in paths]
     if not infos or infos[0] is None or len(infos) != infos[0].parts:
         command = LAYOUT[table].command
@@ -276,7 +291,9 @@ def _infos(data: Path, table: str, scene: str) -> list[ShardInfo]:
     return [info for info in infos if info is not None]
 
 
-def read_scene(data: Path, table: str, scene: str, columns: Sequence[str] | None = None) -> pa.Table:
+def read_scene(
+    data: Path, table: str, scene: str, columns: Sequence[str] | None = None, run: str = "default"
+) -> pa.Table:
     """Read all of a scene's rows of a table.
 
     Parameters
@@ -289,6 +306,8 @@ def read_scene(data: Path, table: str, scene: str, columns: Sequence[str] | None
         Name of the scene.
     columns : sequence of str, optional
         Read these columns alone.
+    run : str
+        Name of the run, for tables of the benchmark.
 
     Returns
     -------
@@ -300,10 +319,10 @@ def read_scene(data: Path, table: str, scene: str, columns: Sequence[str] | None
     StoreError
         A shard is missing, damaged or of another schema; the message names it and what to run.
     """
-    _infos(data, table, scene)
+    _infos(data, table, scene, run)
     spec = LAYOUT[table].spec
     tables = []
-    for path in shards(data, table, scene):
+    for path in shards(data, table, scene, run):
         try:
             shard = pq.read_table(
                 path,

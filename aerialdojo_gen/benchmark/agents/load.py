@@ -1,0 +1,69 @@
+"""Find an agent by its name and make it."""
+
+from __future__ import annotations
+
+import difflib
+import importlib
+import inspect
+from typing import Any
+
+from aerialdojo_gen.benchmark.agents.base import Agent
+from aerialdojo_gen.errors import AerialDojoError, UsageError
+
+_HERE = "aerialdojo_gen.benchmark.agents"
+# Where the agents of this project are; nothing is imported before one is asked for.
+BUILT_IN = {
+    "oracle": f"{_HERE}.simple:OracleAgent",
+    "random": f"{_HERE}.simple:RandomAgent",
+    "stop": f"{_HERE}.simple:StopAgent",
+    "explorer": f"{_HERE}.explorer:ExplorerAgent",
+}
+
+
+def load_agent(name: str, **options: Any) -> Agent:
+    """Make an agent.
+
+    Parameters
+    ----------
+    name : str
+        One of `BUILT_IN`, or ``package.module:Class`` for one of one's own.
+    **options
+        Keyword arguments of the class.
+
+    Returns
+    -------
+    Agent
+
+    Raises
+    ------
+    UsageError
+        There is no such agent, it has no such option, or it lacks ``reset`` or ``act``.
+    """
+    where = BUILT_IN.get(name, name)
+    module_name, colon, class_name = where.partition(":")
+    if not colon or not module_name or not class_name:
+        near = difflib.get_close_matches(name, BUILT_IN, n=1)
+        hint = f"did you mean {near[0]!r}?" if near else f"there are {', '.join(BUILT_IN)}, or package.module:Class"
+        raise UsageError(f"no agent {name!r}: {hint}")
+    try:
+        cls = getattr(importlib.import_module(module_name), class_name)
+    except ImportError as error:
+        raise UsageError(f"cannot load agent {name!r}: {error}") from None
+    except AttributeError:
+        raise UsageError(f"cannot load agent {name!r}: module {module_name} has no {class_name}") from None
+    if not callable(cls):
+        raise UsageError(f"cannot load agent {name!r}: {class_name} is no class")
+    try:
+        inspect.signature(cls).bind(**options)
+    except TypeError as error:
+        known = ", ".join(inspect.signature(cls).parameters) or "none"
+        raise UsageError(f"agent {name!r}: {error}; its options: {known}") from None
+    try:
+        agent = cls(**options)
+    except AerialDojoError:
+        raise
+    except (TypeError, ValueError) as error:
+        raise UsageError(f"agent {name!r}: {error}") from error
+    if not isinstance(agent, Agent):
+        raise UsageError(f"{name!r} is no agent: it needs reset(goal) and act(observation)")
+    return agent

@@ -1,0 +1,85 @@
+"""Agents that look at nothing: the reference replayed, random actions, and Stop at once."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from aerialdojo_gen import rng
+from aerialdojo_gen.benchmark.agents.base import AgentBase
+from aerialdojo_gen.benchmark.goal import BLIND, Goal, Observation
+from aerialdojo_gen.schemas import APPROACH, STOP
+
+
+class OracleAgent(AgentBase):
+    """Replays the reference trajectory: the upper bound, and the self-test of the data.
+
+    The runner gives it the reference's actions before each episode, and gives them to no other agent.
+    """
+
+    sensors = BLIND
+
+    def __init__(self) -> None:
+        self._actions: list[int] = [STOP]
+
+    def follow(self, actions: Sequence[int]) -> None:
+        """Take the reference's actions for the next episode; Approach is left out, for no agent can choose it."""
+        self._actions = [action for action in actions if action != APPROACH]
+
+    def reset(self, goal: Goal) -> None:
+        """Begin an episode."""
+
+    def act(self, observation: Observation) -> int:
+        """Do what the reference does at this step, and stop where it ends."""
+        return self._actions[observation.step] if observation.step < len(self._actions) else STOP
+
+
+class RandomAgent(AgentBase):
+    """Draws among the 16 actions, Stop as likely as any other.
+
+    Parameters
+    ----------
+    seed : int
+        With the goal's words it fixes the draws: the agent is told nothing that tells two episodes of one goal apart.
+    stop_probability : float, optional
+        Chance of Stop at each step; the other actions share the rest. One in 16 where absent.
+    """
+
+    sensors = BLIND
+
+    def __init__(self, seed: int = 0, stop_probability: float | None = None) -> None:
+        p = 1.0 / STOP_AND_MOVES if stop_probability is None else float(stop_probability)
+        if not 0.0 <= p <= 1.0:
+            raise ValueError(f"stop_probability is between 0 and 1, not {p}")
+        self._seed = int(seed)
+        self._p = np.full(STOP_AND_MOVES, (1.0 - p) / (STOP_AND_MOVES - 1))
+        self._p[STOP] = p
+
+    def reset(self, goal: Goal) -> None:
+        """Begin an episode."""
+        budget = goal.rules.action_budget
+        words = (goal.modality, goal.target_name, goal.landmark, goal.direction, goal.description or "", budget)
+        draws = rng.generator(self._seed, "random-agent", *words)
+        self._actions = draws.choice(STOP_AND_MOVES, size=budget, p=self._p).tolist()
+
+    def act(self, observation: Observation) -> int:
+        """Draw an action."""
+        return int(self._actions[observation.step])
+
+
+class StopAgent(AgentBase):
+    """Stops where it stands: how many tasks are solved by doing nothing."""
+
+    sensors = BLIND
+
+    def reset(self, goal: Goal) -> None:
+        """Begin an episode."""
+
+    def act(self, observation: Observation) -> int:
+        """Stop."""
+        return STOP
+
+
+# Actions that an agent can choose: all but Approach.
+STOP_AND_MOVES = APPROACH
