@@ -1,0 +1,225 @@
+"""The metrics on tables of episodes that were computed by hand."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import fields
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from aerialdojo_gen.benchmark.metrics import (
+    METRICS,
+    Episodes,
+    episodes_of,
+    outcomes,
+    slices,
+    success_curve,
+    summarize,
+)
+from aerialdojo_gen.benchmark.profiles import PROFILES, Profile, profile_named
+from aerialdojo_gen.errors import StoreError, UsageError
+from aerialdojo_gen.schemas import FAMILIES
+
+AT_3, AT_5 = PROFILES["aerialdojo"], PROFILES["aerialdojo-5m"]
+
+# A success: Stop 2 m from the anchor after 12 m, where the reference takes 10 m.
+GOOD: dict[str, Any] = {
+    "scene": "U_Mall_0", "family": "Urban", "setting": "base", "modality": "semantic",
+    "stop_called": True, "collision": False, "n_actions": 9, "action_budget": 90,
+    "final_distance_m": 2.0, "min_distance_m": 1.5, "final_horizontal_distance_m": 1.0,
+    "min_horizontal_distance_m": 0.5, "path_length_m": 12.0, "reference_length_m": 10.0, "euclidean_m": 9.0,
+}  # fmt: skip
+
+
+def log(*rows: dict[str, Any]) -> Episodes:
+    return episodes_of(pa.Table.from_pylist([GOOD | row for row in rows]))
+
+
+def judged(profile: Profile = AT_3, **row: Any) -> tuple[bool, bool, float]:
+    o = outcomes(log(row), profile)
+    return bool(o.success[0]), bool(o.oracle_success[0]), float(o.spl[0])
+
+
+def test_success_is_a_stop_within_the_radius_without_collision_within_the_budget() -> None:
+    assert judged() == (True, True, 10 / 12)
+
+
+@pytest.mark.parametrize(
+    ("row", "expected"),
+    [
+        # Stop outside; it was inside once.
+        ({"final_distance_m": 3.01}, (False, True, 0.0)),
+        # Stop outside, never inside.
+        ({"final_distance_m": 3.01, "min_distance_m": 3.001}, (False, False, 0.0)),
+        # The boundary is inside.
+        ({"final_distance_m": 3.0, "min_distance_m": 3.0}, (True, True, 10 / 12)),
+        # Entered the radius, flew on and hit something: OSR stays true.
+        ({"stop_called": False, "collision": True, "final_distance_m": 8.0}, (False, True, 0.0)),
+        # Hit something within the radius.
+        ({"stop_called": False, "collision": True}, (False, True, 0.0)),
+        # Stop and collision in one step.
+        ({"collision": True}, (False, True, 0.0)),
+        # The budget ran out within the radius, without a Stop.
+        ({"stop_called": False, "n_actions": 90}, (False, True, 0.0)),
+        # Stop as the last action that the budget allows, and one too late.
+        ({"n_actions": 90}, (True, True, 10 / 12)),
+        ({"n_actions": 91}, (False, True, 0.0)),
+        # Shorter than the reference: SPL does not exceed 1.
+        ({"path_length_m": 9.5}, (True, True, 1.0)),
+        # A route without length: not flying is perfect, flying is infinitely worse than nothing.
+        ({"reference_length_m": 0.0, "path_length_m": 0.0}, (True, True, 1.0)),
+        ({"reference_length_m": 0.0, "path_length_m": 2.0}, (True, True, 0.0)),
+        # Stopped at once although there was a way to fly.
+        ({"path_length_m": 0.0}, (True, True, 1.0)),
+    ],
+)
+def test_outcomes_of_single_episodes(row: dict[str, Any], expected: tuple[bool, bool, float]) -> None:
+    assert judged(**row) == expected
+
+
+def test_five_metres_are_reported_beside_three() -> None:
+    row = {"final_distance_m": 4.5, "min_distance_m": 4.0}
+    assert judged(AT_3, **row) == (False, False, 0.0)
+    assert judged(AT_5, **row) == (True, True, 10 / 12)
+
+
+def test_scenes_average_to_families_and_families_to_the_overall_score() -> None:
+    miss = {"final_distance_m": 10.0, "min_distance_m": 6.0, "stop_called": False, "n_actions": 90}
+    crash = {"final_distance_m": 7.0, "min_distance_m": 2.0, "stop_called": False, "collision": True}
+    episodes = log(
+        # U_Mall_0: 1 of 2; U_Park_1: 1 of 1, so that Urban is 0.75 and not 2 of 3.
+        {}, miss, {"scene": "U_Park_1", "path_length_m": 10.0},
+        # N_Desert_0: none of 1, but it was there.
+        crash | {"scene": "N_Desert_0", "family": "Natural"},
+        {"scene": "I_Harbor_0", "family": "Infrastructure", "path_length_m": 20.0},
+        miss | {"scene": "D_Flood_1", "family": "Disaster"},
+    )  # fmt: skip
+    summary = summarize(episodes, AT_3)
+    assert list(summary.families) == ["Urban", "Natural", "Infrastructure", "Disaster"]
+    assert summary.missing_families == []
+    mall, urban = summary.scenes["U_Mall_0"], summary.families["Urban"]
+    assert (mall.episodes, mall.sr, mall.osr, mall.spl, mall.dts_m, mall.cr) == (2, 0.5, 0.5, 5 / 12, 6.0, 0.0)
+    assert (urban.episodes, urban.sr, urban.osr, urban.dts_m) == (3, 0.75, 0.75, 4.0)
+    assert urban.spl == pytest.approx((5 / 12 + 1.0) / 2, abs=1e-15)
+    overall = summary.overall
+    assert overall.episodes == 6
+    assert overall.sr == (0.75 + 0.0 + 1.0 + 0.0) / 4
+    assert overall.osr == (0.75 + 1.0 + 1.0 + 0.0) / 4
+    assert overall.spl == pytest.approx(((5 / 12 + 1.0) / 2 + 0.5) / 4, abs=1e-15)
+    assert overall.dts_m == (4.0 + 7.0 + 2.0 + 10.0) / 4
+    assert overall.cr == 0.25
+    # Over the five scenes: SR 0.5, 1, 0, 1, 0 has mean 0.5 and squared deviations 0, ¼, ¼, ¼, ¼.
+    assert summary.deviation.sr == pytest.approx(math.sqrt(1.0 / 4), abs=1e-15)
+
+
+def test_one_scene_has_no_deviation_and_names_the_families_it_lacks() -> None:
+    summary = summarize(log({}, {}), AT_3)
+    assert math.isnan(summary.deviation.sr)
+    assert summary.missing_families == ["Natural", "Infrastructure", "Disaster"]
+    assert summary.overall.sr == 1.0
+
+
+def test_an_empty_log_scores_nothing() -> None:
+    empty = log({}).where(np.array([False]))
+    summary = summarize(empty, AT_3)
+    assert summary.scenes == {}
+    assert math.isnan(summary.overall.sr)
+
+
+def test_slices_leave_out_what_has_no_episodes() -> None:
+    episodes = log({}, {"setting": "long_horizon"}, {"setting": "long_horizon", "modality": "image"})
+    parts = dict(slices(episodes, "setting", ("base", "standard", "long_horizon")))
+    assert {name: len(part) for name, part in parts.items()} == {"base": 1, "long_horizon": 2}
+    assert [len(part) for _, part in slices(episodes, "modality", ("semantic", "image"))] == [2, 1]
+
+
+def test_profiles_of_others_are_computed_from_the_same_log() -> None:
+    # 18 m away, 12 m above the goal's height, no Stop, hit something: each rule sees it its own way.
+    row = {
+        "final_distance_m": 18.0, "min_distance_m": 16.0, "final_horizontal_distance_m": 13.0,
+        "min_horizontal_distance_m": 13.0,
+    }  # fmt: skip
+    assert judged(profile_named("uav-on"), **row) == (True, True, 10 / 12)
+    assert judged(profile_named("uav-on"), **row, stop_called=False) == (False, True, 0.0)
+    assert judged(profile_named("uav-on"), **row, collision=True) == (False, True, 0.0)
+    assert judged(profile_named("openfly"), **row, stop_called=False, collision=True) == (True, True, 9 / 12)
+    high = row | {"final_distance_m": 25.0, "min_distance_m": 25.0}
+    assert judged(profile_named("uav-on"), **high) == (False, False, 0.0)
+    assert judged(profile_named("aerialvln"), **high) == (True, True, 10 / 12)
+    with pytest.raises(UsageError, match=r"no profile 'uavon': there are aerialdojo, .*uav-on"):
+        profile_named("uavon")
+
+
+@pytest.mark.parametrize(
+    ("row", "message"),
+    [
+        ({"path_length_m": -1.0}, "path_length_m has values that are no length"),
+        ({"final_distance_m": math.nan}, "final_distance_m has values that are no length"),
+        ({"min_distance_m": 2.5}, "a smallest distance exceeds the last one"),
+    ],
+)
+def test_a_log_that_contradicts_itself_is_refused(row: dict[str, Any], message: str) -> None:
+    with pytest.raises(StoreError, match=message):
+        log(row)
+
+
+lengths = st.floats(0.0, 60.0)
+
+
+@st.composite
+def rows(draw: st.DrawFn) -> dict[str, Any]:
+    letter = draw(st.sampled_from("UNID"))
+    final, flat = draw(lengths), draw(lengths)
+    return {
+        "scene": f"{letter}_Scene_{draw(st.integers(0, 2))}", "family": FAMILIES[letter],
+        "stop_called": draw(st.booleans()), "collision": draw(st.booleans()),
+        "n_actions": draw(st.integers(1, 100)), "final_distance_m": final,
+        "min_distance_m": final * draw(st.floats(0.0, 1.0)), "final_horizontal_distance_m": flat,
+        "min_horizontal_distance_m": flat * draw(st.floats(0.0, 1.0)), "path_length_m": draw(lengths),
+        "reference_length_m": draw(lengths), "euclidean_m": draw(lengths),
+    }  # fmt: skip
+
+
+@given(st.lists(rows(), min_size=1, max_size=25), st.sampled_from(list(PROFILES.values())))
+def test_scores_are_bounded_and_ordered(drawn: list[dict[str, Any]], profile: Profile) -> None:
+    episodes = log(*drawn)
+    summary = summarize(episodes, profile)
+    for scored in (*summary.scenes.values(), *summary.families.values(), summary.overall):
+        assert 0.0 <= scored.spl <= scored.sr <= scored.osr <= 1.0
+        assert 0.0 <= scored.cr <= 1.0
+        assert scored.dts_m >= 0.0
+        if profile.fails_on_collision:
+            assert scored.sr + scored.cr <= 1.0 + 1e-12
+    assert sum(s.episodes for s in summary.scenes.values()) == len(drawn) == summary.overall.episodes
+
+
+@given(st.lists(rows(), min_size=1, max_size=25), st.sampled_from(list(PROFILES.values())))
+def test_the_curve_never_falls_and_meets_the_summary(drawn: list[dict[str, Any]], profile: Profile) -> None:
+    episodes = log(*drawn)
+    radii = np.array([0.0, 1.0, profile.radius_m, 30.0, 60.0, np.inf])
+    radii.sort()
+    sr, osr = success_curve(episodes, profile, radii)
+    assert (np.diff(sr) >= 0).all()
+    assert (np.diff(osr) >= 0).all()
+    assert (sr <= osr + 1e-12).all()
+    assert osr[-1] == pytest.approx(1.0)
+    here = int(np.searchsorted(radii, profile.radius_m))
+    overall = summarize(episodes, profile).overall
+    assert (sr[here], osr[here]) == (pytest.approx(overall.sr), pytest.approx(overall.osr))
+
+
+@given(st.lists(rows(), min_size=1, max_size=25), st.randoms(use_true_random=False))
+def test_the_order_of_episodes_does_not_matter(drawn: list[dict[str, Any]], shuffler: Any) -> None:
+    shuffled = list(drawn)
+    shuffler.shuffle(shuffled)
+    one, other = (summarize(log(*rows), AT_3).overall for rows in (drawn, shuffled))
+    assert [getattr(one, m) for m in METRICS] == [getattr(other, m) for m in METRICS]
+
+
+def test_every_column_of_the_log_is_one_of_episodes() -> None:
+    assert {f.name for f in fields(Episodes)} == GOOD.keys()
