@@ -230,11 +230,11 @@ STAGES: tuple[Stage, ...] = (
     ),
     Stage(
         "annotate-import", 1, "Check the annotations against the scenes and import them.",
-        ("scenes",), ("landmarks", "objects"), sources=_annotation_sources,
+        ("scenes",), ("landmarks", "objects", "chosen_anchors"), sources=_annotation_sources,
     ),
     Stage(
         "anchor-sample", 1, "Find viewpoints 1 m from each object that see it.",
-        ("scenes", "objects"), ("anchors",),
+        ("scenes", "objects", "chosen_anchors"), ("anchors",),
     ),
     Stage(
         "reference-images", 1, "Render each object's picture from its selected anchor.",

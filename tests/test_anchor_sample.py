@@ -9,7 +9,7 @@ from handmade import box, instance, mesh_of, scene
 
 from aerialdojo_gen import schemas, store
 from aerialdojo_gen.config import AnchorSampleConfig, Embodiment
-from aerialdojo_gen.errors import StoreError
+from aerialdojo_gen.errors import AnnotationError, StoreError
 from aerialdojo_gen.geometry.frames import wrap_angle_rad
 from aerialdojo_gen.geometry.viewpoints import shortlist
 from aerialdojo_gen.scenes.glb import write_glb
@@ -226,7 +226,7 @@ def test_shortlist_prefers_sides_apart_then_score():
     assert shortlist(np.zeros(0), np.zeros(0), 3, math.radians(45)).tolist() == []
 
 
-def whole_run(place, objects, data, seed=0):
+def whole_run(place, objects, data, seed=0, chosen=()):
     """The stage on real tables and a real mesh file."""
     name = place.name
     write_glb(place, data / "scene.glb")
@@ -246,6 +246,7 @@ def whole_run(place, objects, data, seed=0):
     ]  # fmt: skip
     store.write_shard(data, "scenes", name, 0, store.from_rows(schemas.SCENES, [place_row]))
     store.write_shard(data, "objects", name, 0, store.from_rows(schemas.OBJECTS, rows))
+    store.write_shard(data, "chosen_anchors", name, 0, store.from_rows(schemas.CHOSEN_ANCHORS, chosen))
     return anchor_sample.run(job(data, seed), CONFIG)
 
 
@@ -271,3 +272,52 @@ def test_the_stage_accounts_for_every_candidate_and_names_objects_without_anchor
 def test_an_object_of_another_scene_is_refused_in_one_line(tmp_path):
     with pytest.raises(StoreError, match=r"object 0 \(ball\) has the mesh node 'ball', which is not in the scene"):
         whole_run(scene(BUS), [BALL], tmp_path)
+
+
+def choice(position, yaw_rad, object_id=0):
+    return {"scene": "U_Test_0", "object_id": object_id, "yaw_rad": yaw_rad,
+            **dict(zip(("x_m", "y_m", "z_m"), map(float, position), strict=True))}  # fmt: skip
+
+
+def test_the_anchor_that_a_person_chose_comes_first_and_is_selected(tmp_path):
+    place = scene(BALL, BUS)
+    auto = whole_run(place, [BALL, BUS], tmp_path).tables["anchors"].to_pylist()
+    third = auto[2]
+    rounded = choice([round(v, 3) for v in xyz(third)], math.radians(round(math.degrees(third["yaw_rad"]), 2)))
+    out = whole_run(place, [BALL, BUS], tmp_path, chosen=[rounded])
+    rows = out.tables["anchors"].to_pylist()
+    assert [(r["object_id"], r["anchor_id"]) for r in rows] == [(o, k) for o in (0, 1) for k in range(3)]
+    assert [xyz(r).tolist() for r in rows[:3]] == [xyz(auto[k]).tolist() for k in (2, 0, 1)]
+    assert [(r["selected"], r["selected_by"]) for r in rows[:3]] == [
+        (True, "human"),
+        (False, "auto"),
+        (False, "auto"),
+    ]
+    assert rows[3:] == auto[3:]
+
+    by_hand = choice(BALL.centroid + np.array([0.0, 1.75, 0.0]), -math.pi / 2)
+    out = whole_run(place, [BALL, BUS], tmp_path, chosen=[by_hand])
+    placed, *others = out.tables["anchors"].to_pylist()[:3]
+    assert xyz(placed).tolist() == [by_hand[f"{a}_m"] for a in "xyz"]
+    assert (placed["selected"], placed["selected_by"]) == (True, "human")
+    assert placed["surface_distance_m"] == pytest.approx(1.15, abs=0.02)
+    assert placed["visible_fraction"] > 0.95
+    assert [xyz(r).tolist() for r in others] == [xyz(r).tolist() for r in auto[:2]]
+    # The shortlist's last gave way to the one placed by hand, which is a candidate more.
+    again = whole_run(place, [BALL, BUS], tmp_path)
+    assert out.counts["not_shortlisted"] == again.counts["not_shortlisted"] + 1
+    assert out.rows_in == again.rows_in + 1
+
+
+@pytest.mark.parametrize(
+    ("away", "yaw", "why"),
+    [
+        ((0, 0.8, 0), -math.pi / 2, "in collision: the nearest surface is 0.20 m away"),
+        ((0, 4.0, 0), -math.pi / 2, "too far: 3.40 m"),
+        ((0, 1.6, 0), math.pi / 2, "does not see the object"),
+        ((0, 0, 500.0), 0.0, "outside the flight volume"),
+    ],
+)
+def test_a_chosen_anchor_that_will_not_do_is_named(tmp_path, away, yaw, why):
+    with pytest.raises(AnnotationError, match=rf"object 0 \(ball\) will not do: .*{why}.*annotate --scene U_Test_0"):
+        whole_run(scene(BALL), [BALL], tmp_path, chosen=[choice(BALL.centroid + away, yaw)])

@@ -24,6 +24,7 @@ from aerialdojo_gen.rng import generator
 from aerialdojo_gen.scenes.model import Instance, Scene
 from aerialdojo_gen.schemas import ANCHORS
 from aerialdojo_gen.stage import Job, Output
+from aerialdojo_gen.stages.anchor_choice import with_choice
 
 Floats = NDArray[np.float64]
 log = logging.getLogger(__name__)
@@ -75,12 +76,13 @@ def run(job: Job, config: AnchorSampleConfig) -> Output:
     near the surface), ``out_of_bounds`` (the body leaves the flight volume), ``in_collision`` (a surface within
     the body's radius plus `margin_m`), ``unreachable`` (no way from the open sky: inside a closed room),
     ``not_visible`` (visible fraction below `min_visible_fraction`), ``not_shortlisted`` (`shortlist` others show the
-    object better, or from a side of their own). The rest are the object's anchors, the best of them is selected.
+    object better, or from a side of their own). The rest are the object's anchors, the best of them is selected, or
+    the one that a person chose, which then comes first.
 
     Parameters
     ----------
     job : Job
-        The scene; reads `objects` and the scene's mesh.
+        The scene; reads `objects`, `chosen_anchors` and the scene's mesh.
     config : AnchorSampleConfig
         The stage's section.
 
@@ -94,8 +96,11 @@ def run(job: Job, config: AnchorSampleConfig) -> Output:
     ------
     StoreError
         An object's mesh node is not in the scene: the two tables do not belong together.
+    AnnotationError
+        A viewpoint that a person chose will not do.
     """
     objects = job.read("objects").to_pylist()
+    chosen = {row["object_id"]: row for row in job.read("chosen_anchors").to_pylist()}
     world = World.of(job.scene_model(), job.embodiment.radius_m, config.margin_m)
     rows: list[dict[str, Any]] = []
     counts: Counter[str] = Counter(dict.fromkeys(REASONS, 0))
@@ -107,6 +112,10 @@ def run(job: Job, config: AnchorSampleConfig) -> Output:
                 "which is not in the scene: run annotate-import again"
             )
         found, rejected = anchors_of(item, world, job, config)
+        if item["object_id"] in chosen:
+            sampled = found
+            found = with_choice(sampled, chosen[item["object_id"]], item, world, job, config)
+            rejected["not_shortlisted"] += sum(all(row["x_m"] != f["x_m"] for f in found) for row in sampled)
         rows += found
         counts += rejected
         if not found:

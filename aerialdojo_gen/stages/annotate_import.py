@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +18,7 @@ from aerialdojo_gen.errors import AnnotationError, UsageError
 from aerialdojo_gen.paper import paper_counts
 from aerialdojo_gen.scenes.catalogue import load_catalogue
 from aerialdojo_gen.scenes.model import Scene
-from aerialdojo_gen.schemas import LANDMARKS, OBJECTS
+from aerialdojo_gen.schemas import CHOSEN_ANCHORS, LANDMARKS, OBJECTS
 from aerialdojo_gen.stage import Job, Output
 
 
@@ -34,7 +35,7 @@ def run(job: Job, config: AnnotateImportConfig) -> Output:
     Returns
     -------
     Output
-        `landmarks` and `objects`.
+        `landmarks`, `objects` and `chosen_anchors`.
 
     Raises
     ------
@@ -59,12 +60,13 @@ def run(job: Job, config: AnnotateImportConfig) -> Output:
     if faults:
         raise AnnotationError(_report(path, faults))
     tables = annotation_tables(source.annotations, scene)
-    rows = sum(table.num_rows for table in tables.values())
-    return Output(tables, rows, rows, {"landmarks": tables["landmarks"].num_rows})
+    landmarks, chosen = tables["landmarks"].num_rows, tables["chosen_anchors"].num_rows
+    rows = landmarks + tables["objects"].num_rows
+    return Output(tables, rows, rows, {"landmarks": landmarks, "chosen_anchors": chosen})
 
 
 def annotation_tables(annotations: Annotations, scene: Scene) -> dict[str, pa.Table]:
-    """Make the tables `landmarks` and `objects` of annotations that are right.
+    """Make the tables `landmarks`, `objects` and `chosen_anchors` of annotations that are right.
 
     Parameters
     ----------
@@ -103,9 +105,20 @@ def annotation_tables(annotations: Annotations, scene: Scene) -> dict[str, pa.Ta
                 "direction": bearing.direction,
             }
         )
+    chosen_rows = [
+        {
+            "scene": scene.name,
+            "object_id": entry.id,
+            **_xyz("{}_m", entry.anchor.position_m),
+            "yaw_rad": math.radians(entry.anchor.yaw_deg),
+        }
+        for entry in sorted(annotations.objects, key=lambda entry: entry.id)
+        if entry.anchor is not None
+    ]
     return {
         "landmarks": pa.Table.from_pylist(landmark_rows, schema=LANDMARKS.schema),
         "objects": pa.Table.from_pylist(object_rows, schema=OBJECTS.schema),
+        "chosen_anchors": pa.Table.from_pylist(chosen_rows, schema=CHOSEN_ANCHORS.schema),
     }
 
 

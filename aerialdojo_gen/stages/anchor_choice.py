@@ -1,0 +1,169 @@
+"""Anchors that people chose: whether one will do, and its place among the sampled ones."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aerialdojo_gen.config import AnchorSampleConfig
+from aerialdojo_gen.errors import AnnotationError
+from aerialdojo_gen.geometry.rays import instance_caster
+from aerialdojo_gen.geometry.surface import Surface
+from aerialdojo_gen.geometry.viewpoints import informativeness, look
+from aerialdojo_gen.rng import generator
+from aerialdojo_gen.stage import Job
+
+if TYPE_CHECKING:
+    from aerialdojo_gen.stages.anchor_sample import World
+
+Floats = NDArray[np.float64]
+
+# "About" a metre: a person places by hand, and the surface there may be a branch.
+SLACK_M = 0.5
+# Files hold millimetres and hundredths of a degree.
+_SAME_M, _SAME_RAD = 2e-3, math.radians(0.02)
+
+
+@dataclass(frozen=True)
+class Judged:
+    """A viewpoint as the checks of anchors see it.
+
+    Attributes
+    ----------
+    row : dict
+        Its row of ``anchors``, but for rank and selection; measures are None where they could not be taken.
+    faults : tuple of str
+        Why it will not do, in words; empty where it will.
+    """
+
+    row: dict[str, Any]
+    faults: tuple[str, ...]
+
+
+def judge_anchor(
+    position_m: Floats, yaw_rad: float, item: dict[str, Any], world: World, job: Job, config: AnchorSampleConfig
+) -> Judged:
+    """Hold a viewpoint against what is asked of an anchor (paper: anchors).
+
+    Parameters
+    ----------
+    position_m : (3,) float64
+        The body's centre, metres, world frame.
+    yaw_rad : float
+        Counter-clockwise from +x.
+    item : dict
+        The object's row of ``objects``.
+    world : World
+        The scene.
+    job : Job
+        For its scene's name, seed and embodiment.
+    config : AnchorSampleConfig
+        Of ``anchor-sample``.
+
+    Returns
+    -------
+    Judged
+        All faults, not only the first.
+    """
+    k = world.index[item["mesh_node"]]
+    instance = world.scene.instances[k]
+    surface = Surface.of(instance)
+    place = position_m[None]
+    radius = job.embodiment.radius_m
+    faults = []
+    low, high = world.scene.bounds
+    inside = bool(((position_m >= low + radius) & (position_m <= high - radius)).all())
+    if not inside:
+        faults.append("it is outside the flight volume")
+    clearance = float(world.collisions.distance_m(position_m))
+    if clearance < radius + config.margin_m:
+        faults.append(f"it is in collision: the nearest surface is {clearance:.2f} m away, the body needs "
+                      f"{radius + config.margin_m:.2f} m")  # fmt: skip
+    elif inside and not world.free.reachable(position_m):
+        faults.append("no way leads there from the open sky")
+    distance = float(surface.distance_m(place)[0])
+    if abs(distance - config.standoff_m) > SLACK_M:
+        side = "near" if distance < config.standoff_m else "far"
+        faults.append(f"it is too {side}: {distance:.2f} m from the object's surface, not about "
+                      f"{config.standoff_m:g} m")  # fmt: skip
+    points = surface.sample(config.surface_points, generator(job.seed, "anchor-sample", job.scene, item["object_id"]))
+    views = look(place, np.array([yaw_rad]), points, instance_caster(instance), world.rays, k, config.fov_deg)
+    seen = float(views.visible_fraction[0])
+    if seen <= 0 or seen < config.min_visible_fraction:
+        faults.append(f"it does not see the object: {seen:.0%} of what it faces, {config.min_visible_fraction:.0%} "
+                      "is the least")  # fmt: skip
+    away = position_m - np.array([item["x_m"], item["y_m"], item["z_m"]])
+    elevation = np.degrees(np.arctan2([away[2]], [np.hypot(away[0], away[1])]))
+    score = informativeness(views, elevation, np.array([clearance]), radius, config.standoff_m)
+    row = {
+        "scene": job.scene,
+        "object_id": item["object_id"],
+        **dict(zip(("x_m", "y_m", "z_m"), position_m.tolist(), strict=True)),
+        "yaw_rad": float(yaw_rad),
+        "clearance_m": clearance,
+        "surface_distance_m": distance,
+        "visible_fraction": seen,
+        "score": float(score[0]),
+    }
+    return Judged(row, tuple(faults))
+
+
+def with_choice(
+    rows: list[dict[str, Any]],
+    choice: dict[str, Any],
+    item: dict[str, Any],
+    world: World,
+    job: Job,
+    config: AnchorSampleConfig,
+) -> list[dict[str, Any]]:
+    """Put the anchor that a person chose first among an object's anchors, and select it.
+
+    Parameters
+    ----------
+    rows : list of dict
+        The sampled anchors, the best first.
+    choice : dict
+        The object's row of ``chosen_anchors``: one of the sampled ones, or a viewpoint placed by hand, which then
+        takes the place of the last of a full shortlist.
+    item, world, job, config
+        As for `judge_anchor`.
+
+    Returns
+    -------
+    list of dict
+        Rows of ``anchors``, at most `shortlist`.
+
+    Raises
+    ------
+    AnnotationError
+        The chosen viewpoint will not do (the scene has changed since, say).
+    """
+    same = [row for row in rows if is_same(row, choice)]
+    if same:
+        first = same[0]
+    else:
+        position = np.array([choice["x_m"], choice["y_m"], choice["z_m"]])
+        judged = judge_anchor(position, choice["yaw_rad"], item, world, job, config)
+        if judged.faults:
+            raise AnnotationError(
+                f"{job.scene}: the anchor chosen for object {item['object_id']} ({item['name']}) will not do: "
+                f"{'; '.join(judged.faults)}. Choose another one: aerialdojo-gen annotate --scene {job.scene}"
+            )
+        first = judged.row
+    ordered = [first, *(row for row in rows if row is not first)][: config.shortlist]
+    return [
+        row | {"anchor_id": rank, "selected": rank == 0, "selected_by": "human" if rank == 0 else "auto"}
+        for rank, row in enumerate(ordered)
+    ]
+
+
+def is_same(row: dict[str, Any], choice: dict[str, Any]) -> bool:
+    """Whether a choice is that sampled anchor, as far as the annotation file's digits tell."""
+    turn = abs((row["yaw_rad"] - choice["yaw_rad"] + math.pi) % (2.0 * math.pi) - math.pi)
+    return turn <= _SAME_RAD and math.dist(
+        [row[a] for a in ("x_m", "y_m", "z_m")], [choice[a] for a in ("x_m", "y_m", "z_m")]
+    ) <= _SAME_M  # fmt: skip
