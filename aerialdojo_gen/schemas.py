@@ -58,12 +58,24 @@ class TableSpec:
     schema : pyarrow.Schema
         Fields with unit and meaning in their metadata.
     key : tuple of str
-        Columns that identify a row; rows of a shard are sorted by them.
+        Columns that identify a row.
+    clusters : tuple of str
+        Columns by which the rows of a shard are sorted before the key; a row group holds one value of each, so that a
+        filter on them reads no other rows.
+    plain : tuple of str
+        Columns whose values compress better as they stand than by way of a dictionary.
     """
 
     name: str
     schema: pa.Schema
     key: tuple[str, ...]
+    clusters: tuple[str, ...] = ()
+    plain: tuple[str, ...] = ()
+
+    @property
+    def order(self) -> tuple[str, ...]:
+        """Columns that the rows of a shard are sorted by."""
+        return tuple(dict.fromkeys((*self.clusters, *self.key)))
 
 
 _SCENE = _field("scene", pa.string(), "name of the scene, e.g. U_Mall_0")
@@ -89,8 +101,10 @@ _DETOUR = "length_m / euclidean_m, κ"
 _CLEARANCE = "smallest distance along the route from the body's centre line to any surface, up to 5 m"
 
 
-def _table(name: str, key: Sequence[str], *fields: pa.Field) -> TableSpec:
-    return TableSpec(name, pa.schema(list(fields)), tuple(key))
+def _table(
+    name: str, key: Sequence[str], *fields: pa.Field, clusters: Sequence[str] = (), plain: Sequence[str] = ()
+) -> TableSpec:
+    return TableSpec(name, pa.schema(list(fields)), tuple(key), tuple(clusters), tuple(plain))
 
 
 _OBJECT_FIELDS = [
@@ -257,6 +271,8 @@ TASKS = _table(
     _field("description", pa.string(), "the target's description; null for image goals", nullable=True),
     _field("reference_image_id", pa.string(), "the target's picture in objects; null for semantic goals",
            nullable=True),
+    clusters=["setting", "modality"],
+    plain=["task_id", "nav_id"],
 )  # fmt: skip
 
 ROUTES = _table(
@@ -273,9 +289,14 @@ ROUTES = _table(
     _ROUTE[1],
     _field("min_clearance_m", pa.float64(), _CLEARANCE, "m"),
     *_LISTS,
+    clusters=["setting"],
+    plain=["nav_id", "euclidean_m", "length_m", "detour_ratio", "min_clearance_m",
+           *[field.name for field in _LISTS]],
 )  # fmt: skip
 
-RELEASE_OBJECTS = _table("objects", ["scene", "object_id"], *_OBJECT_FIELDS, *_REFERENCE)
+RELEASE_OBJECTS = _table(
+    "objects", ["scene", "object_id"], *_OBJECT_FIELDS, *_REFERENCE, plain=["reference_image"]
+)  # fmt: skip
 
 # What an agent did (benchmark). All of it is the evaluator's: an agent sees none of these tables.
 _RUN = _field("run_id", pa.string(), "name of the evaluation run")

@@ -253,7 +253,7 @@ STAGES: tuple[Stage, ...] = (
         ("pairs", "plans"), ("verdicts",),
     ),
     Stage(
-        "split", 1, "Write the release: tasks, routes, objects, train and test.",
+        "split", 2, "Write the release: tasks, routes, objects, train and test.",
         _UPSTREAM_OF_SPLIT,
         ("tasks/train", "tasks/test", "routes/train", "routes/test",
          "release/scenes", "release/landmarks", "release/objects", "release/anchors"),

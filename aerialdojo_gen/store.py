@@ -10,6 +10,7 @@ from __future__ import annotations
 import contextlib
 import errno
 import hashlib
+import itertools
 import json
 import os
 import re
@@ -27,6 +28,9 @@ from aerialdojo_gen.errors import StoreError
 
 _META = b"aerialdojo"
 _PLAIN = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}")
+_ROW_GROUP = 65536
+# For what is written without a dictionary; levels above cost five times the time for 2 % (docs/release-format.md).
+_PLAIN_LEVEL = 15
 _TEMPORARY = re.compile(r"^\..*\.(\d+)\.tmp(\.[A-Za-z0-9]+)?$")
 
 
@@ -138,7 +142,7 @@ def from_rows(spec: schemas.TableSpec, rows: Sequence[Mapping[str, Any]]) -> pa.
     spec : TableSpec
         The table.
     rows : sequence of mapping
-        One mapping a row, column name to value; sorted here by the table's key.
+        One mapping a row, column name to value; sorted here into the table's order.
 
     Returns
     -------
@@ -154,7 +158,7 @@ def from_rows(spec: schemas.TableSpec, rows: Sequence[Mapping[str, Any]]) -> pa.
         if row.keys() != names:
             missing, unknown = sorted(names - row.keys()), sorted(row.keys() - names)
             raise StoreError(f"a row of {spec.name} lacks {missing} and has unknown {unknown}")
-    ordered = sorted(rows, key=lambda row: tuple(row[k] for k in spec.key))
+    ordered = sorted(rows, key=lambda row: tuple(row[k] for k in spec.order))
     return pa.Table.from_pylist(ordered, schema=spec.schema)
 
 
@@ -164,7 +168,7 @@ def check_table(spec: schemas.TableSpec, table: pa.Table) -> pa.Table:
     Raises
     ------
     StoreError
-        Names, types, a null in a column without nulls, rows out of the key's order, or a key that stands twice.
+        Names, types, a null in a column without nulls, rows out of the table's order, or a key that stands twice.
     """
     if (table.schema.names, table.schema.types) != (spec.schema.names, spec.schema.types):
         raise StoreError(f"{spec.name}: columns {table.schema.names} are not those of its schema, or types differ")
@@ -177,10 +181,11 @@ def check_table(spec: schemas.TableSpec, table: pa.Table) -> pa.Table:
             nulls += pc.list_flatten(column).null_count
         if nulls and not spec.schema.field(name).nullable:
             raise StoreError(f"{spec.name}: {nulls} nulls in column {name}, which has none by its schema")
-    keys = table.select(list(spec.key))
-    if keys.num_rows > 1:
-        if not keys.equals(keys.sort_by([(k, "ascending") for k in spec.key])):
-            raise StoreError(f"{spec.name}: rows are not sorted by {', '.join(spec.key)}")
+    if table.num_rows > 1:
+        ordered = table.select(list(spec.order))
+        if not ordered.equals(ordered.sort_by([(k, "ascending") for k in spec.order])):
+            raise StoreError(f"{spec.name}: rows are not sorted by {', '.join(spec.order)}")
+        keys = table.select(list(spec.key))
         if keys.group_by(list(spec.key)).aggregate([]).num_rows != keys.num_rows:
             raise StoreError(f"{spec.name}: a key ({', '.join(spec.key)}) stands twice")
     return table
@@ -240,14 +245,37 @@ def write_shard(
     schema_meta[_META] = json.dumps(meta, sort_keys=True).encode()
     path = shard_path(data, table_name, scene, part, run)
     with atomic_file(data, str(path.relative_to(data))) as temporary:
-        pq.write_table(
-            table.replace_schema_metadata(schema_meta),
-            temporary,
-            compression="zstd",
-            row_group_size=65536,
-            write_page_checksum=True,
-        )
+        _write(spec, table.replace_schema_metadata(schema_meta), temporary)
     return path
+
+
+def _write(spec: schemas.TableSpec, table: pa.Table, path: Path) -> None:
+    """Write a Parquet file with the encodings of docs/release-format.md, a row group a cluster."""
+    plain = [field for field in spec.schema if field.name in spec.plain]
+    leaves = {f.name: f"{f.name}.list.element" if pa.types.is_list(f.type) else f.name for f in spec.schema}
+    # A picture is compressed already; all else gains.
+    codec = {leaves[f.name]: "NONE" if pa.types.is_binary(f.type) else "ZSTD" for f in spec.schema}
+    with pq.ParquetWriter(
+        path,
+        table.schema,
+        compression=codec,
+        compression_level={leaves[f.name]: _PLAIN_LEVEL for f in plain if not pa.types.is_binary(f.type)} or None,
+        use_dictionary=[leaf for name, leaf in leaves.items() if name not in spec.plain],
+        # The bounds of a list's elements bound nothing that a reader filters by.
+        write_statistics=[f.name for f in spec.schema if not pa.types.is_list(f.type)],
+        write_page_checksum=True,
+    ) as writer:
+        for begin, end in itertools.pairwise(_cluster_edges(spec, table)):
+            writer.write_table(table.slice(begin, end - begin), row_group_size=_ROW_GROUP)
+
+
+def _cluster_edges(spec: schemas.TableSpec, table: pa.Table) -> list[int]:
+    """Rows at which a cluster begins, and the number of rows; a table without rows has one empty cluster."""
+    changes = pa.array([False] * max(table.num_rows - 1, 0), pa.bool_())
+    for name in spec.clusters:
+        column = table.column(name).combine_chunks()
+        changes = pc.or_(changes, pc.not_equal(column.slice(1), column.slice(0, max(table.num_rows - 1, 0))))
+    return [0, *(i + 1 for i in pc.indices_nonzero(changes).to_pylist()), table.num_rows]
 
 
 def read_info(path: Path) -> ShardInfo | None:

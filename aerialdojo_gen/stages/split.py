@@ -49,7 +49,7 @@ def routes_table(scene: str, kept: pa.Table, pairs: pa.Table, plans: pa.Table, g
     Returns
     -------
     pyarrow.Table
-        Rows of `aerialdojo_gen.schemas.ROUTES`, with ``action_budget`` as a further column, sorted by ``nav_id``.
+        Rows of `aerialdojo_gen.schemas.ROUTES`, with ``action_budget`` as a further column, in its order.
     """
     pairs = _take(pairs, "pair_id", kept.column("pair_id"))
     plans = _take(plans, "pair_id", kept.column("pair_id"))
@@ -65,7 +65,9 @@ def routes_table(scene: str, kept: pa.Table, pairs: pa.Table, plans: pa.Table, g
         **{name: plans.column(name) for name in _LISTS},
     }
     routes = pa.table({name: columns[name] for name in ROUTES.schema.names}, schema=ROUTES.schema)
-    return routes.append_column("action_budget", kept.column("action_budget")).sort_by("nav_id")
+    return routes.append_column("action_budget", kept.column("action_budget")).sort_by(
+        [(key, "ascending") for key in ROUTES.order]
+    )
 
 
 def tasks_table(routes: pa.Table, train: pa.ChunkedArray, scene: dict[str, Any], objects: pa.Table) -> pa.Table:
@@ -85,7 +87,7 @@ def tasks_table(routes: pa.Table, train: pa.ChunkedArray, scene: dict[str, Any],
     Returns
     -------
     pyarrow.Table
-        Rows of `TASKS`, 2n of them, sorted by its key.
+        Rows of `TASKS`, 2n of them, in its order.
     """
     n = routes.num_rows
     target = _take(objects, "object_id", routes.column("target_object_id"))
@@ -109,7 +111,7 @@ def tasks_table(routes: pa.Table, train: pa.ChunkedArray, scene: dict[str, Any],
             "reference_image_id": target.column("reference_image_id") if modality == "image" else nulls,
         }
         instances.append(pa.table(columns, schema=TASKS.schema))
-    return pa.concat_tables(instances).sort_by([(key, "ascending") for key in TASKS.key])
+    return pa.concat_tables(instances).sort_by([(key, "ascending") for key in TASKS.order])
 
 
 def _chosen(routes: pa.Table, paper: PaperScene, seed: int) -> NDArray[np.bool_]:
