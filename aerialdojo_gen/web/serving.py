@@ -1,0 +1,201 @@
+"""A local web page: an app that answers this machine's browser alone, and the loop that serves it.
+
+A page on another site must not reach it: not by a form or a script (``Origin``), not by a name that resolves to
+127.0.0.1 (``Host``). A page may load nothing but what the app serves (``Content-Security-Policy``).
+"""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import re
+import socket
+import threading
+import webbrowser
+from collections.abc import Awaitable, Callable, MutableMapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from aerialdojo_gen.errors import AerialDojoError, UsageError
+
+if TYPE_CHECKING:
+    from fastapi import FastAPI
+
+STATIC = Path(__file__).resolve().parent / "static"
+_LOCAL = ("127.0.0.1", "localhost")
+_IMPORT_MAP = re.compile(rb'<script type="importmap">(.*?)</script>', re.DOTALL)
+
+_Message = MutableMapping[str, Any]
+_Asgi = Callable[
+    [_Message, Callable[[], Awaitable[_Message]], Callable[[_Message], Awaitable[None]]], Awaitable[None]
+]
+
+
+class _LocalOnly:
+    """ASGI middleware: refuses foreign hosts and origins and large bodies, and sets the security headers."""
+
+    def __init__(self, app: _Asgi, policy: str, max_body_bytes: int) -> None:
+        self._app, self._max_body_bytes = app, max_body_bytes
+        self._headers = [
+            (b"content-security-policy", policy.encode()),
+            (b"x-content-type-options", b"nosniff"),
+            (b"referrer-policy", b"no-referrer"),
+            (b"cross-origin-resource-policy", b"same-origin"),
+            (b"cross-origin-opener-policy", b"same-origin"),
+            (b"cache-control", b"no-cache"),
+        ]
+
+    async def __call__(
+        self, scope: _Message, receive: Callable[[], Awaitable[_Message]], send: Callable[[_Message], Awaitable[None]]
+    ) -> None:
+        if scope["type"] == "lifespan":
+            await self._app(scope, receive, send)
+            return
+        refusal = self._refusal(scope)
+
+        async def send_with_headers(message: _Message) -> None:
+            if message["type"] == "http.response.start":
+                message["headers"] = [*message.get("headers", []), *self._headers]
+            await send(message)
+
+        if refusal is None:
+            await self._app(scope, receive, send_with_headers)
+            return
+        status, why = refusal
+        await send_with_headers(
+            {"type": "http.response.start", "status": status, "headers": [(b"content-type", b"text/plain")]}
+        )
+        await send({"type": "http.response.body", "body": why.encode()})
+
+    def _refusal(self, scope: _Message) -> tuple[int, str] | None:
+        if scope["type"] != "http":
+            return 400, "plain HTTP only"
+        headers: dict[bytes, list[bytes]] = {}
+        for name, value in scope["headers"]:
+            headers.setdefault(name.lower(), []).append(value)
+        port = scope["server"][1]
+        hosts = {f"{name}:{port}".encode() for name in _LOCAL}
+        if port == 80:
+            hosts |= {name.encode() for name in _LOCAL}
+        if len(found := headers.get(b"host", [])) != 1 or found[0].lower() not in hosts:
+            return 403, "this page answers to 127.0.0.1 and localhost alone"
+        if any(origin.lower() not in {b"http://" + host for host in hosts} for origin in headers.get(b"origin", [])):
+            return 403, "this page takes no requests from other sites"
+        if headers.get(b"sec-fetch-site", [b"none"])[0] in (b"cross-site", b"same-site"):
+            return 403, "this page takes no requests from other sites"
+        if b"transfer-encoding" in headers:
+            return 411, "send a Content-Length"
+        length = headers.get(b"content-length", [b"0"])[0]
+        if not length.isdigit() or int(length) > self._max_body_bytes:
+            return 413, f"at most {self._max_body_bytes} bytes"
+        return None
+
+
+def local_app(page: str, title: str, max_body_bytes: int = 1 << 20) -> FastAPI:
+    """Make an app that serves a page of ``static/`` at ``/``, the rest of that folder under ``/static/``.
+
+    Parameters
+    ----------
+    page : str
+        File name of the page in ``static/``; its import map, if it has one, is the only inline script it may hold.
+    title : str
+        Of the app.
+    max_body_bytes : int
+        Largest request body that is taken.
+
+    Returns
+    -------
+    fastapi.FastAPI
+        To which the caller adds its routes; an `AerialDojoError` in them becomes ``{"error": message}`` with status
+        400 (404 where it is a `UsageError`).
+
+    Raises
+    ------
+    UsageError
+        FastAPI is not installed.
+    """
+    try:
+        from fastapi import FastAPI, Request
+        from fastapi.responses import JSONResponse, Response
+        from fastapi.staticfiles import StaticFiles
+    except ImportError:
+        raise UsageError("web pages need FastAPI and uvicorn: pip install 'aerialdojo-gen[web]'") from None
+
+    html = (STATIC / page).read_bytes()
+    maps = [base64.b64encode(hashlib.sha256(text).digest()).decode() for text in _IMPORT_MAP.findall(html)]
+    scripts = " ".join(["'self'", *(f"'sha256-{digest}'" for digest in maps)])
+    policy = (
+        f"default-src 'none'; script-src {scripts}; style-src 'self'; img-src 'self' data: blob:; "
+        "connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+    )
+    app = FastAPI(title=title, docs_url=None, redoc_url=None, openapi_url=None)
+    app.add_middleware(_LocalOnly, policy=policy, max_body_bytes=max_body_bytes)
+
+    @app.get("/", include_in_schema=False)
+    def index() -> Response:
+        return Response(html, media_type="text/html")
+
+    @app.get("/favicon.ico", include_in_schema=False)
+    def favicon() -> Response:
+        return Response(status_code=204)
+
+    @app.exception_handler(AerialDojoError)
+    def expected(_: Request, error: Exception) -> JSONResponse:
+        return JSONResponse({"error": str(error)}, status_code=404 if isinstance(error, UsageError) else 400)
+
+    app.mount("/static", StaticFiles(directory=STATIC, follow_symlink=False), name="static")
+    return app
+
+
+def open_socket(port: int) -> socket.socket:
+    """Listen on 127.0.0.1; port 0 takes a free one.
+
+    Raises
+    ------
+    UsageError
+        The port is taken, or not ours to take.
+    """
+    listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+    listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    try:
+        listener.bind(("127.0.0.1", port))
+        listener.listen(64)
+    except (OSError, OverflowError) as error:
+        listener.close()
+        why = getattr(error, "strerror", None) or str(error)
+        raise UsageError(f"port {port}: {why}; leave --port out for a free one") from None
+    return listener
+
+
+def serve(app: FastAPI, listener: socket.socket, browser: bool = False) -> None:
+    """Serve until Ctrl-C, which is a plain end.
+
+    Parameters
+    ----------
+    app : fastapi.FastAPI
+        From `local_app`.
+    listener : socket.socket
+        From `open_socket`; closed at the end.
+    browser : bool
+        Whether to open the page in the user's browser.
+    """
+    import uvicorn
+
+    url = url_of(listener)
+    server = uvicorn.Server(
+        uvicorn.Config(app, log_level="warning", access_log=False, lifespan="off", timeout_graceful_shutdown=1,
+                       proxy_headers=False, server_header=False)
+    )  # fmt: skip
+    if browser:
+        threading.Thread(target=webbrowser.open, args=(url,), daemon=True).start()
+    try:
+        server.run(sockets=[listener])
+    except KeyboardInterrupt:
+        pass  # uvicorn has shut down and passes the signal on
+    finally:
+        listener.close()
+
+
+def url_of(listener: socket.socket) -> str:
+    """Return the address of the page, e.g. ``http://127.0.0.1:8765/``."""
+    return f"http://127.0.0.1:{listener.getsockname()[1]}/"

@@ -1,0 +1,294 @@
+// A scene in the browser: loads the payload into three.js and offers layers, picking and cameras to a page.
+//
+//   const view = await SceneView.load(element, "/api/scene");
+//   view.addMarkers("objects", [{id, position: [x, y, z], colour: "#e6a13c", label}]);
+//   view.addRoutes("routes", [{id, points: [x, y, z, ...], colour: "#3b82f6"}]);
+//   view.onPick((hit) => ...);      // {kind: "marker" | "route" | "node", layer, id, node, point} or null
+//   view.focusOn("delivery_van_003"); view.setVisible("objects", false);
+import * as THREE from "three";
+import { CameraControls } from "./controls.js";
+import { MarkerLayer, RouteLayer } from "./layers.js";
+import { loadPayload } from "./payload.js";
+import { NodePicker } from "./picking.js";
+import { castShadow, groupMesh, lightUniforms, skyMesh, tinted } from "./shading.js";
+
+export class SceneView {
+  /** Load a scene into an element that has a size. */
+  static async load(element, url) {
+    return new SceneView(element, await loadPayload(url));
+  }
+
+  constructor(element, payload) {
+    this.element = element;
+    this.payload = payload;
+    this.nodes = payload.nodes;
+    this.index = new Map(payload.nodes.map((entry, k) => [entry.node, k]));
+    this.layers = new Map();
+    this.frameListeners = [];
+    this.pickListeners = [];
+    this.hoverListeners = [];
+    this.renderer = new THREE.WebGLRenderer({ antialias: true, powerPreference: "high-performance" });
+    this.renderer.outputColorSpace = THREE.LinearSRGBColorSpace;
+    this.renderer.setPixelRatio(Math.min(window.devicePixelRatio, 2));
+    this.canvas = this.renderer.domElement;
+    this.canvas.setAttribute("aria-label", `3D view of ${payload.name}`);
+    this.canvas.setAttribute("role", "application");
+    this.overlay = document.createElement("div");
+    this.overlay.className = "scene-overlay";
+    element.append(this.canvas, this.overlay);
+    this.camera = new THREE.PerspectiveCamera(60, 1, 0.2, 4000);
+    this.camera.up.set(0, 0, 1);
+    this.three = new THREE.Scene();
+    const uniforms = lightUniforms(payload);
+    const anisotropy = Math.min(8, this.renderer.capabilities.getMaxAnisotropy());
+    this.meshes = payload.groups.map((group) => groupMesh(group, uniforms, anisotropy));
+    this.three.add(skyMesh(payload), ...this.meshes);
+    this.extent = this.boxOf(payload.nodes.map((_, k) => k));
+    castShadow(this.renderer, this.meshes, uniforms, this.extent.min, this.extent.max);
+    this.picker = new NodePicker(payload);
+    this.highlighted = new THREE.Group();
+    this.three.add(this.highlighted);
+    this.controls = new CameraControls(this.camera, this.canvas);
+    this.controls.addEventListener("change", () => this.invalidate());
+    this.listen();
+    new ResizeObserver(() => this.resize()).observe(element);
+    this.resize();
+    this.home();
+  }
+
+  // ---- drawing: a frame is made when something changed, and not before ----
+
+  invalidate() {
+    if (this.pending) return;
+    this.pending = requestAnimationFrame((now) => {
+      this.pending = 0;
+      this.controls.update(this.last ? (now - this.last) / 1000 : 1 / 60);
+      this.last = this.controls.moving ? now : 0;
+      this.draw();
+      if (this.controls.moving) this.invalidate();
+    });
+  }
+
+  draw() {
+    this.camera.updateMatrixWorld();
+    this.matrix = new THREE.Matrix4().multiplyMatrices(this.camera.projectionMatrix, this.camera.matrixWorldInverse);
+    this.renderer.render(this.three, this.camera);
+    this.placeLabels();
+    for (const listener of this.frameListeners) listener(this);
+  }
+
+  resize() {
+    this.width = Math.max(1, this.element.clientWidth);
+    this.height = Math.max(1, this.element.clientHeight);
+    this.renderer.setSize(this.width, this.height);
+    this.camera.aspect = this.width / this.height;
+    this.camera.updateProjectionMatrix();
+    for (const layer of this.layers.values()) this.fit(layer);
+    this.draw();
+  }
+
+  fit(layer) { layer.resize(this.width, this.height, this.renderer.getPixelRatio()); }
+
+  // ---- layers ----
+
+  addMarkers(name, markers, options) { this.replace(name, new MarkerLayer(markers, options)); }
+
+  addRoutes(name, routes, options) { this.replace(name, new RouteLayer(routes, options)); }
+
+  replace(name, layer) {
+    const visible = this.layers.get(name)?.object.visible ?? true;
+    this.remove(name);
+    layer.object.visible = visible;
+    this.layers.set(name, layer);
+    this.three.add(layer.object);
+    this.overlay.append(...(layer.labels ?? []).map((label) => label.element));
+    this.fit(layer);
+    this.invalidate();
+  }
+
+  remove(name) {
+    const layer = this.layers.get(name);
+    if (!layer) return;
+    this.three.remove(layer.object);
+    layer.object.geometry.dispose();
+    layer.object.material.dispose();
+    for (const label of layer.labels ?? []) label.element.remove();
+    this.layers.delete(name);
+    this.invalidate();
+  }
+
+  setVisible(name, visible) {
+    if (name === "scene") for (const mesh of this.meshes) mesh.visible = visible;
+    else if (this.layers.has(name)) this.layers.get(name).object.visible = visible;
+    this.invalidate();
+  }
+
+  /** Tint nodes by name; a null or empty list takes the tint away. */
+  highlight(nodes, colour = "#ffd54a", strength = 0.55) {
+    this.highlighted.clear();
+    for (const node of [nodes ?? []].flat()) {
+      for (const [g, first, count] of this.picker.ranges[this.index.get(node)] ?? []) {
+        this.highlighted.add(tinted(this.meshes[g], first, count, colour, strength));
+      }
+    }
+    this.invalidate();
+  }
+
+  placeLabels() {
+    const p = [0, 0, 0];
+    for (const layer of this.layers.values()) {
+      for (const { element, position } of layer.labels ?? []) {
+        const shown = layer.object.visible && this.project(position, 0, p);
+        element.hidden = !shown;
+        if (shown) element.style.transform = `translate(${p[0].toFixed(1)}px, ${p[1].toFixed(1)}px)`;
+      }
+    }
+  }
+
+  // ---- picking ----
+
+  /** Pixel (x, y from the element's top left) and depth of a point; false where it lies behind the camera. */
+  project(points, at, out) {
+    const m = this.matrix.elements, x = points[at], y = points[at + 1], z = points[at + 2];
+    const w = m[3] * x + m[7] * y + m[11] * z + m[15];
+    if (w < 0.2) return false;
+    out[0] = ((m[0] * x + m[4] * y + m[8] * z + m[12]) / w * 0.5 + 0.5) * this.width;
+    out[1] = (0.5 - (m[1] * x + m[5] * y + m[9] * z + m[13]) / w * 0.5) * this.height;
+    out[2] = w;
+    return true;
+  }
+
+  /** Ray through a pixel: [origin, unit direction], arrays of 3. */
+  ray(x, y) {
+    const o = this.camera.position;
+    const d = new THREE.Vector3(2 * x / this.width - 1, 1 - 2 * y / this.height, 0.5).unproject(this.camera)
+      .sub(o).normalize();
+    return [o.toArray(), d.toArray()];
+  }
+
+  /** The node under a pixel: {kind: "node", node, instance, point, distance} or null. */
+  pickNode(x, y) {
+    if (!this.meshes[0].visible) return null;
+    const [o, d] = this.ray(x, y);
+    const hit = this.picker.cast(o, d);
+    if (!hit) return null;
+    return { kind: "node", node: this.nodes[hit.node].node, instance: this.nodes[hit.node], distance: hit.distance,
+      point: o.map((v, k) => v + d[k] * hit.distance) };
+  }
+
+  /** What lies under a pixel: markers before routes before nodes; a route behind a surface is not picked. */
+  pick(x, y) {
+    const node = this.pickNode(x, y);
+    for (const kind of ["marker", "route"]) {
+      let best = null;
+      for (const [name, layer] of this.layers) {
+        if (!layer.object.visible || !layer.pickable || (kind === "marker") !== layer instanceof MarkerLayer) continue;
+        const hit = layer.pick(this, x, y);
+        if (hit && layer.object.material.depthTest && node) {
+          const distance = this.camera.position.distanceTo(new THREE.Vector3(...hit.point));
+          if (distance > node.distance * 1.01 + 0.3) continue;
+        }
+        if (hit && (!best || hit.pixels < best.pixels)) best = { kind, layer: name, ...hit };
+      }
+      if (best) return { ...best, under: node };
+    }
+    return node;
+  }
+
+  onPick(listener) { this.pickListeners.push(listener); }
+
+  onHover(listener) { this.hoverListeners.push(listener); }
+
+  onFrame(listener) { this.frameListeners.push(listener); }
+
+  listen() {
+    let down = null, queued = null;
+    const inside = (event) => {
+      const box = this.canvas.getBoundingClientRect();
+      return [event.clientX - box.left, event.clientY - box.top];
+    };
+    this.canvas.addEventListener("pointerdown", (event) => { down = [event.clientX, event.clientY, event.button]; });
+    this.canvas.addEventListener("pointerup", (event) => {
+      if (down && down[2] === 0 && Math.hypot(event.clientX - down[0], event.clientY - down[1]) < 4) {
+        const hit = this.pick(...inside(event));
+        for (const listener of this.pickListeners) listener(hit, event);
+      }
+      down = null;
+    });
+    this.canvas.addEventListener("pointermove", (event) => {
+      if (!this.hoverListeners.length || event.buttons) return;
+      const first = !queued;
+      queued = event;
+      if (first) requestAnimationFrame(() => {
+        const hit = this.pick(...inside(queued));
+        for (const listener of this.hoverListeners) listener(hit, queued);
+        queued = null;
+      });
+    });
+    this.canvas.addEventListener("pointerleave", (event) => {
+      for (const listener of this.hoverListeners) listener(null, event);
+    });
+  }
+
+  // ---- cameras ----
+
+  boxOf(indices) {
+    const box = new THREE.Box3();
+    for (const k of indices) {
+      box.expandByPoint(new THREE.Vector3(...this.payload.boxes.subarray(6 * k, 6 * k + 3)));
+      box.expandByPoint(new THREE.Vector3(...this.payload.boxes.subarray(6 * k + 3, 6 * k + 6)));
+    }
+    return box;
+  }
+
+  /** The whole flight volume, seen from the south-west. */
+  home() {
+    const [low, high] = this.payload.bounds_m;
+    const centre = low.map((v, k) => (v + high[k]) / 2);
+    const size = Math.hypot(high[0] - low[0], high[1] - low[1]);
+    this.controls.lookFrom([centre[0] - 0.28 * size, centre[1] - 0.42 * size, low[2] + 0.36 * size],
+      [centre[0], centre[1], low[2] + 2]);
+  }
+
+  /** The whole flight volume from above, north at the top. */
+  top() {
+    const [low, high] = this.payload.bounds_m;
+    const half = Math.max(high[1] - low[1], (high[0] - low[0]) / this.camera.aspect) / 2;
+    const x = (low[0] + high[0]) / 2, y = (low[1] + high[1]) / 2;
+    // A hair south of straight down: there the orbit knows which way is up.
+    this.controls.lookFrom([x, y - 0.01, high[2] + 1.05 * half / Math.tan(Math.PI / 6)], [x, y, low[2]]);
+  }
+
+  /** Bring a node (by name), a point, or a list of points (arrays of 3) into the middle, from where one looks now. */
+  focusOn(what, { distance } = {}) {
+    let box;
+    if (typeof what === "string") {
+      if (!this.index.has(what)) return;
+      box = this.boxOf([this.index.get(what)]);
+    } else {
+      const points = typeof what[0] === "number" ? [what] : what;
+      box = new THREE.Box3().setFromPoints(points.map((p) => new THREE.Vector3(...p)));
+    }
+    const centre = box.getCenter(new THREE.Vector3()), radius = box.getSize(new THREE.Vector3()).length() / 2;
+    const back = this.openDirection(centre, distance ?? Math.max(7, 2.4 * radius), radius);
+    this.controls.lookFrom(centre.clone().add(back).toArray(), centre.toArray());
+  }
+
+  /** From where a ball can be seen: nearest to where one looks from now, and always from a little above. */
+  openDirection(centre, distance, radius) {
+    const now = new THREE.Vector3();
+    this.camera.getWorldDirection(now).negate();
+    const azimuth = Math.atan2(now.y, now.x), elevation = Math.max(0.35, Math.asin(Math.min(1, now.z)));
+    const along = (turn, up) => new THREE.Vector3(
+      Math.cos(azimuth + turn) * Math.cos(up), Math.sin(azimuth + turn) * Math.cos(up), Math.sin(up));
+    for (const up of [elevation, 0.35, 0.8, 1.2]) {
+      for (const turn of [0, 0.6, -0.6, 1.2, -1.2, 1.8, -1.8, 2.4, -2.4, Math.PI]) {
+        const direction = along(turn, up);
+        const eye = centre.clone().addScaledVector(direction, distance);
+        const hit = this.picker.cast(eye.toArray(), direction.clone().negate().toArray());
+        if (!hit || hit.distance > distance - radius - 0.2) return direction.multiplyScalar(distance);
+      }
+    }
+    return along(0, elevation).multiplyScalar(distance);
+  }
+}
