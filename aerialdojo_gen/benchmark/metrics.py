@@ -157,7 +157,8 @@ def outcomes(episodes: Episodes, profile: Profile) -> Outcomes:
     longer = np.maximum(shortest, episodes.path_length_m)
     # Nothing to fly and nothing flown is the shortest way there is.
     efficiency = np.divide(shortest, longer, out=np.ones_like(shortest), where=longer > 0.0)
-    return Outcomes(success, nearest <= profile.radius_m, success * efficiency, final, episodes.collision)
+    spl = np.where(success, efficiency, 0.0)
+    return Outcomes(success, nearest <= profile.radius_m, spl, final, episodes.collision)
 
 
 def _distances(episodes: Episodes, profile: Profile) -> tuple[Floats, Floats]:
@@ -308,7 +309,7 @@ def success_curve(episodes: Episodes, profile: Profile, radii_m: Floats) -> tupl
     sr, osr : (r,) float64
         Fractions; neither ever falls.
     """
-    # An episode's share of the overall mean is that of its scene among its family's, of its family among the families.
+    # An episode's share of the overall mean: its scene's among its family's scenes, its family's among the families.
     weight = np.empty(len(episodes))
     families = sorted(set(episodes.family.tolist()))
     for family in families:

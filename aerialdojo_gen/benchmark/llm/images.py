@@ -1,0 +1,91 @@
+"""Pictures for a model: JPEG for colour, grey PNG for depth, as base64."""
+
+from __future__ import annotations
+
+import base64
+from dataclasses import dataclass
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+_JPEG_QUALITY = 90
+
+
+@dataclass(frozen=True)
+class Picture:
+    """An encoded picture.
+
+    Attributes
+    ----------
+    media_type : str
+        ``image/jpeg`` or ``image/png``.
+    base64 : str
+        The file.
+    """
+
+    media_type: str
+    base64: str
+
+    @property
+    def data_url(self) -> str:
+        """The picture as a data URL."""
+        return f"data:{self.media_type};base64,{self.base64}"
+
+
+def colour_picture(rgb: NDArray[np.uint8], size_px: int) -> Picture:
+    """Encode a colour picture as JPEG.
+
+    Parameters
+    ----------
+    rgb : (H, W, 3) uint8
+        sRGB.
+    size_px : int
+        Longest side; a larger picture is scaled down, a smaller one stays.
+
+    Returns
+    -------
+    Picture
+    """
+    scaled = _at_most(rgb, size_px, cv2.INTER_AREA)
+    return _encode(cv2.cvtColor(scaled, cv2.COLOR_RGB2BGR), ".jpg", [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY])
+
+
+def depth_picture(depth_m: NDArray[np.float32], max_depth_m: float, size_px: int) -> Picture:
+    """Encode depth as a grey PNG, as `system_prompt` tells it.
+
+    Parameters
+    ----------
+    depth_m : (H, W) float32
+        Planar depth, metres; 0 or inf where nothing lies within range.
+    max_depth_m : float
+        Depth that is drawn white, 255; 0 m is black.
+    size_px : int
+        Longest side. Scaling takes the nearest sample: a mean over an edge would be a surface that is not there.
+
+    Returns
+    -------
+    Picture
+    """
+    scaled = _at_most(depth_m, size_px, cv2.INTER_NEAREST)
+    seen = np.isfinite(scaled) & (scaled > 0.0)
+    grey = np.where(seen, np.clip(np.where(seen, scaled, 0.0) / max_depth_m, 0.0, 1.0), 1.0)
+    return _encode(np.rint(grey * 255.0).astype(np.uint8), ".png", [])
+
+
+def _at_most(image: NDArray[Any], size_px: int, interpolation: int) -> NDArray[Any]:
+    height, width = image.shape[:2]
+    scale = size_px / max(height, width)
+    if scale >= 1.0:
+        return image
+    shape = (max(1, round(width * scale)), max(1, round(height * scale)))
+    return np.asarray(cv2.resize(image, shape, interpolation=interpolation))
+
+
+def _encode(image: NDArray[Any], suffix: str, flags: list[int]) -> Picture:
+    ok, data = cv2.imencode(suffix, image, flags)
+    assert ok, f"OpenCV cannot encode an image of shape {image.shape} as {suffix}"
+    return Picture(
+        {".jpg": "image/jpeg", ".png": "image/png"}[suffix], base64.b64encode(data.tobytes()).decode("ascii")
+    )

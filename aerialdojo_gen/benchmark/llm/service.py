@@ -1,0 +1,164 @@
+"""Talk to a service over HTTP with bounds: size, time, retries; and tell its failures apart without telling its key."""
+
+from __future__ import annotations
+
+import email.utils
+import os
+import time
+from collections.abc import Callable, Mapping
+from typing import Any, TypeVar
+
+from aerialdojo_gen.benchmark.agents.base import AgentUnavailable
+from aerialdojo_gen.errors import AerialDojoError, UsageError
+
+MAX_BODY_BYTES = 4 << 20
+# A service may say when to come back; beyond this the runner's own schedule is the better one.
+MAX_WAIT_S = 60.0
+_WORTH_ANOTHER_TRY = (408, 409, 425, 429)
+
+Result = TypeVar("Result")
+
+
+class BodyBoundError(Exception):
+    """A service sent more, or took longer, than it may."""
+
+
+def bounded_client(base: Any, timeout_s: float) -> Any:
+    """Make an HTTP client whose responses are bounded.
+
+    The client packages read a body whole, an error's too, however long it is; and their time-out is one a read, which
+    a server that drips never exceeds. Redirects are not followed: they would carry the key elsewhere.
+
+    Parameters
+    ----------
+    base : type
+        The package's own ``DefaultHttpxClient``.
+    timeout_s : float
+        For connecting, for a read, and for a whole response.
+
+    Returns
+    -------
+    object
+        An instance of a subclass of `base`.
+    """
+
+    class BoundedClient(base):  # type: ignore[misc]  # a class that is known at run time alone
+        def send(self, request: Any, *, stream: bool = False, **options: Any) -> Any:  # noqa: ARG002
+            deadline = time.monotonic() + timeout_s
+            response = super().send(request, stream=True, **options)
+            body = bytearray()
+            try:
+                for chunk in response.iter_bytes():
+                    body += chunk
+                    if len(body) > MAX_BODY_BYTES:
+                        raise BodyBoundError(f"its answer is larger than {MAX_BODY_BYTES >> 20} MiB")
+                    if time.monotonic() > deadline:
+                        raise BodyBoundError(f"its answer is not complete after {timeout_s:g} s")
+            finally:
+                response.close()
+            framing = ("content-encoding", "content-length", "transfer-encoding")
+            headers = [(k, v) for k, v in response.headers.items() if k.lower() not in framing]
+            return type(response)(response.status_code, headers=headers, content=bytes(body), request=request)
+
+    return BoundedClient(timeout=timeout_s, follow_redirects=False)
+
+
+def api_key(variable: str, base_url: str | None) -> str:
+    """Read a key from the environment; a service of one's own may do without.
+
+    Raises
+    ------
+    UsageError
+        There is none and the service is the provider's own, or it has characters that no header may have.
+    """
+    key = os.environ.get(variable, "").strip()
+    if not key and base_url is None:
+        raise UsageError(f"no API key: set {variable} in the environment (or base_url, for a service without keys)")
+    if not (key.isascii() and key.isprintable()):
+        raise UsageError(f"{variable} has characters that no key has: copy it again")
+    return key or "none"
+
+
+def call(ask: Callable[[], Result], package: Any, service: str, key: str, timeout_s: float, retries: int) -> Result:
+    """Call a service; try again where that may help.
+
+    Parameters
+    ----------
+    ask : callable
+        The request, by a client whose own retries are off.
+    package : module
+        ``openai`` or ``anthropic``, whose errors are told apart.
+    service : str
+        Name for messages.
+    key : str
+        Never part of a message.
+    timeout_s : float
+        For messages.
+    retries : int
+        How often a failed request is sent again before the episode is given up.
+
+    Returns
+    -------
+    object
+        What `ask` returns.
+
+    Raises
+    ------
+    AgentUnavailable
+        Time-out, 408, 409, 425, 429, 5xx, a lost connection, or an answer too large.
+    UsageError
+        The service refuses the request for good: a wrong key, no such model, an option it does not know.
+    """
+    for attempt in range(retries + 1):
+        try:
+            return ask()
+        except package.APIError as error:
+            failure = _failure(error, package, service, key, timeout_s)
+        if not isinstance(failure, AgentUnavailable):
+            raise failure from None
+        wait_s = failure.retry_after_s if failure.retry_after_s is not None else 2.0**attempt
+        if attempt == retries or wait_s > MAX_WAIT_S:
+            raise failure from None
+        time.sleep(wait_s)
+    raise AssertionError("the last attempt either returns or raises")
+
+
+def _failure(error: Any, package: Any, service: str, key: str, timeout_s: float) -> AerialDojoError:
+    if isinstance(error, package.APIStatusError):
+        said = _line(getattr(error, "body", None) or error.message, key)
+        message = f"{service}: HTTP {error.status_code}: {said}"
+        if error.status_code in _WORTH_ANOTHER_TRY or error.status_code >= 500:
+            return AgentUnavailable(message, retry_after_s(error.response.headers))
+        return UsageError(message)
+    if isinstance(error, package.APITimeoutError):
+        return AgentUnavailable(f"{service}: no answer within {timeout_s:g} s")
+    cause = error.__cause__ or error
+    return AgentUnavailable(f"{service}: {_line(str(cause) or type(cause).__name__, key)}")
+
+
+def retry_after_s(headers: Mapping[str, str]) -> float | None:
+    """Read ``Retry-After``: seconds or an HTTP date; None where there is none that can be read."""
+    value = headers.get("retry-after", "").strip()
+    if not value:
+        return None
+    try:
+        seconds = float(value)
+    except ValueError:
+        try:
+            seconds = email.utils.parsedate_to_datetime(value).timestamp() - time.time()
+        except (ValueError, TypeError, OverflowError):
+            return None
+    return max(0.0, seconds) if seconds < float("inf") else None
+
+
+def without_key(text: str, key: str) -> str:
+    """Return a text without the key, should a service have sent it back."""
+    return text.replace(key, "[key]") if len(key) > 4 else text
+
+
+def _line(value: Any, key: str) -> str:
+    if isinstance(value, dict):
+        inner = value.get("error", value)
+        value = inner.get("message", inner) if isinstance(inner, dict) else inner
+    # The key goes before the text is cut: half a key is too much as well.
+    return " ".join(without_key(str(value), key).split())[:300]
