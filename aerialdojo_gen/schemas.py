@@ -323,6 +323,8 @@ EPISODES = _table(
     _field("final_distance_m", pa.float64(), "distance to the goal where the episode ended", "m"),
     _field("min_distance_m", pa.float64(),
            "smallest distance to the goal at the start, after any action, or where the episode ended", "m"),
+    _field("final_horizontal_distance_m", pa.float64(), "final_distance_m in the plane", "m"),
+    _field("min_horizontal_distance_m", pa.float64(), "smallest such distance at the same poses, in the plane", "m"),
     _field("path_length_m", pa.float64(), "metres flown, up to the contact in a collision", "m"),
     _field("reference_length_m", pa.float64(), "length of the reference route, L", "m"),
     _EUCLIDEAN,

@@ -1,0 +1,143 @@
+"""The body in a scene: the motion of an action, and whether its sweep touches anything.
+
+One motion model in the project: magnitudes and headings are those of `aerialdojo_gen.planning.primitives`. A leg that
+the clearance grid proves free needs no more; FCL is asked about the others, a capsule for the exact sweep. That is what
+`aerialdojo_gen.planning.certify` does for reference trajectories, and what makes tens of thousands of steps a second.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections import OrderedDict
+from functools import cached_property
+from pathlib import Path
+
+from numba import njit
+
+from aerialdojo_gen.planning.clearance import ClearanceGrid
+from aerialdojo_gen.planning.collision import CollisionWorld
+from aerialdojo_gen.planning.grid_kernels import GridArrays, inside, segment_free
+from aerialdojo_gen.scenes.glb import read_glb
+from aerialdojo_gen.scenes.model import Scene
+
+Point = tuple[float, float, float]
+
+_OUTSIDE, _FREE, _UNDECIDED = 0, 1, 2
+# How well the place of a contact is known, metres.
+_CONTACT_M = 1e-3
+
+
+@njit(cache=True)
+def _judge(
+    px: float, py: float, pz: float, qx: float, qy: float, qz: float, radius: float, grid: GridArrays
+) -> int:  # fmt: skip
+    if not inside(qx, qy, qz, grid.lower, grid.upper):
+        return _OUTSIDE
+    return _FREE if segment_free(px, py, pz, qx, qy, qz, radius, grid, True) else _UNDECIDED
+
+
+class FlightSpace:
+    """A scene to fly in.
+
+    Parameters
+    ----------
+    scene : Scene
+        World coordinates, metres.
+    radius_m : float
+        Radius of the body's collision sphere.
+
+    Attributes
+    ----------
+    scene : Scene
+    radius_m : float
+    grid : ClearanceGrid
+        What proves legs free.
+    """
+
+    def __init__(self, scene: Scene, radius_m: float) -> None:
+        self.scene = scene
+        self.radius_m = radius_m
+        self.grid = ClearanceGrid.build(scene, radius_m=radius_m)
+        self._arrays = self.grid.arrays
+
+    @cached_property
+    def world(self) -> CollisionWorld:
+        """FCL's world; built when the grid is first at a loss."""
+        return CollisionWorld(self.scene)
+
+    def in_collision(self, p: Point) -> bool:
+        """Whether the body at `p`, metres, world frame, touches a surface."""
+        return _judge(*p, *p, self.radius_m, self._arrays) != _FREE and self.world.sphere_in_collision(
+            p, self.radius_m
+        )
+
+    def fly(self, p: Point, q: Point) -> tuple[Point, bool, bool]:
+        """Fly straight from `p` towards `q`.
+
+        Parameters
+        ----------
+        p, q : tuple of float
+            Metres, world frame; the body is free at `p`.
+
+        Returns
+        -------
+        position : tuple of float
+            Where the body then is: `q`, the place of the contact (within a millimetre, on the free side), or `p`.
+        collision : bool
+            The sweep touches a surface.
+        refused : bool
+            `q` is outside the flight volume: nothing moved. A geofence holds the drone, for the volume's bounds are
+            no surface that a camera could see.
+        """
+        verdict = _judge(*p, *q, self.radius_m, self._arrays)
+        if verdict == _FREE:
+            return q, False, False
+        if verdict == _OUTSIDE:
+            return p, False, True
+        if not self.world.segment_in_collision(p, q, self.radius_m):
+            return q, False, False
+        return self._contact(p, q), True, False
+
+    def _contact(self, p: Point, q: Point) -> Point:
+        length = sum((b - a) ** 2 for a, b in zip(p, q, strict=True)) ** 0.5
+        free, touching = 0.0, 1.0
+        while (touching - free) * length > _CONTACT_M:
+            middle = 0.5 * (free + touching)
+            if self.world.segment_in_collision(p, _between(p, q, middle), self.radius_m):
+                touching = middle
+            else:
+                free = middle
+        return _between(p, q, free)
+
+
+def _between(p: Point, q: Point, share: float) -> Point:
+    return (p[0] + share * (q[0] - p[0]), p[1] + share * (q[1] - p[1]), p[2] + share * (q[2] - p[2]))
+
+
+# The scenes last used, for all environments of a process; a scene takes up to about 200 MB.
+_KEPT = 3
+_spaces: OrderedDict[tuple[Path, str, float], FlightSpace] = OrderedDict()
+_lock = threading.Lock()
+
+
+def flight_space(mesh: Path, sha256: str, radius_m: float) -> FlightSpace:
+    """Return a scene to fly in, built once a process and kept until others were asked for.
+
+    Parameters
+    ----------
+    mesh : Path
+        The scene's GLB.
+    sha256 : str
+        Of the file, as `scenes` has it.
+    radius_m : float
+        Radius of the body.
+    """
+    key = (mesh, sha256, radius_m)
+    with _lock:
+        space = _spaces.pop(key, None)
+        if space is None:
+            while len(_spaces) >= _KEPT:
+                _spaces.popitem(last=False)
+            space = FlightSpace(read_glb(mesh), radius_m)
+        _spaces[key] = space
+        return space
