@@ -17,6 +17,8 @@ BUILT_IN = {
     "random": f"{_HERE}.simple:RandomAgent",
     "stop": f"{_HERE}.simple:StopAgent",
     "explorer": f"{_HERE}.explorer:ExplorerAgent",
+    "openai": "aerialdojo_gen.benchmark.llm.openai_agent:OpenAIAgent",
+    "anthropic": "aerialdojo_gen.benchmark.llm.anthropic_agent:AnthropicAgent",
 }
 
 
