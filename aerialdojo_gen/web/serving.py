@@ -26,16 +26,16 @@ _LOCAL = ("127.0.0.1", "localhost")
 _IMPORT_MAP = re.compile(rb'<script type="importmap">(.*?)</script>', re.DOTALL)
 
 _Message = MutableMapping[str, Any]
-_Asgi = Callable[
-    [_Message, Callable[[], Awaitable[_Message]], Callable[[_Message], Awaitable[None]]], Awaitable[None]
-]
+_Send = Callable[[_Message], Awaitable[None]]
+_Receive = Callable[[], Awaitable[_Message]]
+_Asgi = Callable[[_Message, _Receive, _Send], Awaitable[None]]
 
 
 class _LocalOnly:
     """ASGI middleware: refuses foreign hosts and origins and large bodies, and sets the security headers."""
 
-    def __init__(self, app: _Asgi, policy: str, max_body_bytes: int) -> None:
-        self._app, self._max_body_bytes = app, max_body_bytes
+    def __init__(self, app: _Asgi, policy: str, max_body_bytes: int, any_host: bool = False) -> None:
+        self._app, self._max_body_bytes, self._any_host = app, max_body_bytes, any_host
         self._headers = [
             (b"content-security-policy", policy.encode()),
             (b"x-content-type-options", b"nosniff"),
@@ -45,9 +45,7 @@ class _LocalOnly:
             (b"cache-control", b"no-cache"),
         ]
 
-    async def __call__(
-        self, scope: _Message, receive: Callable[[], Awaitable[_Message]], send: Callable[[_Message], Awaitable[None]]
-    ) -> None:
+    async def __call__(self, scope: _Message, receive: _Receive, send: _Send) -> None:
         if scope["type"] == "lifespan":
             await self._app(scope, receive, send)
             return
@@ -77,7 +75,10 @@ class _LocalOnly:
         hosts = {f"{name}:{port}".encode() for name in _LOCAL}
         if port == 80:
             hosts |= {name.encode() for name in _LOCAL}
-        if len(found := headers.get(b"host", [])) != 1 or found[0].lower() not in hosts:
+        found = headers.get(b"host", [])
+        if self._any_host:
+            hosts |= {host.lower() for host in found}
+        if len(found) != 1 or found[0].lower() not in hosts:
             return 403, "this page answers to 127.0.0.1 and localhost alone"
         if any(origin.lower() not in {b"http://" + host for host in hosts} for origin in headers.get(b"origin", [])):
             return 403, "this page takes no requests from other sites"
@@ -91,7 +92,7 @@ class _LocalOnly:
         return None
 
 
-def local_app(page: str, title: str, max_body_bytes: int = 1 << 20) -> FastAPI:
+def local_app(page: str, title: str, max_body_bytes: int = 1 << 20, *, any_host: bool = False) -> FastAPI:
     """Make an app that serves a page of ``static/`` at ``/``, the rest of that folder under ``/static/``.
 
     Parameters
@@ -102,6 +103,8 @@ def local_app(page: str, title: str, max_body_bytes: int = 1 << 20) -> FastAPI:
         Of the app.
     max_body_bytes : int
         Largest request body that is taken.
+    any_host : bool
+        Answer to any ``Host``, and to ``Origin`` of that host: for a page that asks for a token besides.
 
     Returns
     -------
@@ -129,7 +132,7 @@ def local_app(page: str, title: str, max_body_bytes: int = 1 << 20) -> FastAPI:
         "connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
     )
     app = FastAPI(title=title, docs_url=None, redoc_url=None, openapi_url=None)
-    app.add_middleware(_LocalOnly, policy=policy, max_body_bytes=max_body_bytes)
+    app.add_middleware(_LocalOnly, policy=policy, max_body_bytes=max_body_bytes, any_host=any_host)
 
     @app.get("/", include_in_schema=False)
     def index() -> Response:
@@ -147,8 +150,8 @@ def local_app(page: str, title: str, max_body_bytes: int = 1 << 20) -> FastAPI:
     return app
 
 
-def open_socket(port: int) -> socket.socket:
-    """Listen on 127.0.0.1; port 0 takes a free one.
+def open_socket(port: int, host: str = "127.0.0.1") -> socket.socket:
+    """Listen on this machine's loopback, or on another IPv4 address of it; port 0 takes a free one.
 
     Raises
     ------
@@ -158,12 +161,13 @@ def open_socket(port: int) -> socket.socket:
     listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
     listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:
-        listener.bind(("127.0.0.1", port))
+        listener.bind((host, port))
         listener.listen(64)
     except (OSError, OverflowError) as error:
         listener.close()
         why = getattr(error, "strerror", None) or str(error)
-        raise UsageError(f"port {port}: {why}; leave --port out for a free one") from None
+        at = "" if host == "127.0.0.1" else f"{host}, "
+        raise UsageError(f"{at}port {port}: {why}; leave --port out for a free one") from None
     return listener
 
 
@@ -198,4 +202,5 @@ def serve(app: FastAPI, listener: socket.socket, browser: bool = False) -> None:
 
 def url_of(listener: socket.socket) -> str:
     """Return the address of the page, e.g. ``http://127.0.0.1:8765/``."""
-    return f"http://127.0.0.1:{listener.getsockname()[1]}/"
+    host, port = listener.getsockname()
+    return f"http://{host}:{port}/"

@@ -123,8 +123,15 @@ export class SceneView {
     this.invalidate();
   }
 
+  /** Share of a layer of routes that covers what is behind it: 0 to 1. */
+  setOpacity(name, opacity) {
+    const uniform = this.layers.get(name)?.object.material.uniforms.opacity;
+    if (uniform) uniform.value = opacity;
+    this.invalidate();
+  }
+
   /** Tint nodes by name; a null or empty list takes the tint away. */
-  highlight(nodes, colour = "#ffd54a", strength = 0.55) {
+  highlight(nodes, colour = "#ffd54a", strength = 0.4) {
     this.highlighted.clear();
     for (const node of [nodes ?? []].flat()) {
       for (const [g, first, count] of this.picker.ranges[this.index.get(node)] ?? []) {
