@@ -8,17 +8,26 @@ import multiprocessing
 import os
 import signal
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from types import TracebackType
-from typing import Any
+from typing import Any, Protocol, TypeVar
 
 from aerialdojo_gen import store
 from aerialdojo_gen.config import Section
 from aerialdojo_gen.errors import AerialDojoError
 from aerialdojo_gen.stage import BY_NAME, Job
+
+
+class _Labelled(Protocol):
+    @property
+    def label(self) -> str: ...
+
+
+T = TypeVar("T", bound=_Labelled)
+R = TypeVar("R")
 
 
 @dataclass(frozen=True)
@@ -133,9 +142,26 @@ class Pool:
         RuntimeError
             A task failed in an unexpected way.
         """
+        yield from self.map(_guarded, tasks)
+
+    def map(self, work: Callable[[T], R], tasks: Sequence[T]) -> Iterator[R]:
+        """Do work on tasks and yield what it returns, in the order of finishing.
+
+        Parameters
+        ----------
+        work : callable
+            A function of a module: other processes import it.
+        tasks : sequence
+            What it is called with; each has a `label` for messages.
+
+        Raises
+        ------
+        AerialDojoError
+            A worker was killed.
+        """
         if self.workers <= 1 or len(tasks) <= 1:
             for task in tasks:
-                yield _guarded(task)
+                yield work(task)
             return
         if self._executor is None:
             # spawn: FCL, PyBullet and numba hold state that does not survive a fork.
@@ -144,7 +170,7 @@ class Pool:
                 self.workers, mp_context=context, initializer=_start_worker, initargs=(os.getpid(),)
             )
         waiting = iter(tasks)
-        running: dict[Future[dict[str, Any] | AerialDojoError], Task] = {}
+        running: dict[Future[R], T] = {}
         try:
             while True:
                 # A short queue keeps a Ctrl-C from waiting for what has not begun.
@@ -153,7 +179,7 @@ class Pool:
                 signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
                 try:
                     for task in waiting:
-                        running[self._executor.submit(_guarded, task)] = task
+                        running[self._executor.submit(work, task)] = task
                         if len(running) > self.workers:
                             break
                 finally:

@@ -1,0 +1,64 @@
+"""``validate``: check a whole release again."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from aerialdojo_gen.commands.common import PipelineFile, Quiet, Scene, Workers, default_workers, home
+
+app = typer.Typer()
+
+
+@app.command("validate")
+def validate(
+    folder: Annotated[
+        Path,
+        typer.Argument(metavar="[RELEASE]", envvar="AERIALDOJO_DATA", help="A release, or a folder with one."),
+    ] = Path("data"),
+    scene: Scene = None,
+    sample: Annotated[
+        int | None, typer.Option("--sample", min=0, help="Routes a scene that FCL is asked about.  (default: all)")
+    ] = None,
+    meshes: Annotated[
+        Path | None, typer.Option("--meshes", help="Folder of the meshes.  (default: meshes/ beside the release)")
+    ] = None,
+    no_meshes: Annotated[
+        bool, typer.Option("--no-meshes", help="Leave unchecked, and say so, what needs a mesh.")
+    ] = False,
+    report: Annotated[
+        Path | None, typer.Option("--report", help="Write every fault to a .jsonl, .json, .csv or .parquet file.")
+    ] = None,
+    lines: Annotated[int, typer.Option("--lines", min=0, help="Faults of a check that are printed.")] = 10,
+    pipeline: PipelineFile = None,
+    workers: Workers = None,
+    quiet: Quiet = False,
+) -> None:
+    """Check a release again from its Parquet files and meshes alone, and name every row at fault."""
+    from aerialdojo_gen.commands.common import DEFAULT_PIPELINE
+    from aerialdojo_gen.config import load_pipeline
+    from aerialdojo_gen.progress import Reporter
+    from aerialdojo_gen.release import validate as validation
+    from aerialdojo_gen.release.validate.report import check_format
+    from aerialdojo_gen.release.validate.run import release_of
+
+    if report is not None:
+        check_format(report)
+    asked = validation.Asked(
+        release=release_of(folder.absolute()),
+        scenes=tuple(scene or ()),
+        meshes=meshes.absolute() if meshes else None,
+        use_meshes=not no_meshes,
+        sample=sample,
+        pipeline=load_pipeline(pipeline or home() / "pipelines" / DEFAULT_PIPELINE),
+    )
+    found = validation.validate(asked, workers=workers or default_workers(), reporter=Reporter(quiet=quiet))
+    if report is not None:
+        validation.write_report(found.faults, report)
+    if not quiet:
+        print("\n".join(found.table_lines()))
+    print("\n".join([*found.fault_lines(lines), found.verdict()]))
+    if found.faults:
+        raise SystemExit(1)
