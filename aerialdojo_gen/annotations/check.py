@@ -24,7 +24,11 @@ _SENTENCES = 3
 
 
 def check_source(
-    source: Source, scene: Scene, names: Mapping[str, str], counts: tuple[int, int] | None = None
+    source: Source,
+    scene: Scene,
+    names: Mapping[str, str],
+    counts: tuple[int, int] | None = None,
+    geometry: SceneGeometry | None = None,
 ) -> list[Fault]:
     """Hold an annotation file against its scene.
 
@@ -35,9 +39,12 @@ def check_source(
     scene : Scene
         The scene that it must be of.
     names : mapping of str to str
-        The catalogue's categories and what a person says for each.
+        The catalogue's categories and what a person says for each. A node has the category that its recipe gave it; in
+        an imported scene, which guesses from the file's names, a person may choose another one.
     counts : (int, int) or None
         How many landmarks and objects there must be; None where any number will do.
+    geometry : SceneGeometry, optional
+        The scene's, where the caller has it: it remembers what it has computed.
 
     Returns
     -------
@@ -54,7 +61,7 @@ def check_source(
             faults += _landmark(source, scene, ("landmarks", i), landmark)
         for i, entry in source.objects.items():
             faults += _object(source, scene, names, ("objects", i), entry)
-        faults += _geometry(source, scene, names)
+        faults += _geometry(source, scene, names, geometry or SceneGeometry(scene))
     return sorted(faults, key=lambda fault: fault.line)
 
 
@@ -103,7 +110,7 @@ def _object(
     if entry.category not in known:
         text = f"no category {entry.category!r}{_near(entry.category, known)}"
         yield source.document.fault((*path, "category"), text)
-    elif entry.node in scene and scene[entry.node].category != entry.category:
+    elif not scene.imported and entry.node in scene and scene[entry.node].category != entry.category:
         text = f"is {entry.category!r}, the node {entry.node!r} is a {scene[entry.node].category!r}"
         yield source.document.fault((*path, "category"), text)
     if entry.anchor is not None and not _inside(scene, entry.anchor.position_m):
@@ -151,7 +158,7 @@ def _near(word: str, known: Sequence[str]) -> str:
     return f": did you mean {' or '.join(repr(n) for n in near)}?" if near else ""
 
 
-def _geometry(source: Source, scene: Scene, names: Mapping[str, str]) -> Iterable[Fault]:
+def _geometry(source: Source, scene: Scene, names: Mapping[str, str], geometry: SceneGeometry) -> Iterable[Fault]:
     """Directions, and descriptions held against the mesh; only where all landmarks are right."""
     nodes = [landmark.node for landmark in sorted(source.landmarks.values(), key=lambda entry: entry.id)]
     raw = source.document.value.get("landmarks") if isinstance(source.document.value, dict) else None
@@ -163,8 +170,7 @@ def _geometry(source: Source, scene: Scene, names: Mapping[str, str]) -> Iterabl
         if source.objects:
             yield source.document.fault(("landmarks",), "there is none: objects need one to be located by")
         return
-    ambiguity = make_ambiguity(scene, names, {e.name: e.node for e in source.landmarks.values()}, nodes)
-    geometry = ambiguity.geometry
+    ambiguity = make_ambiguity(scene, names, {e.name: e.node for e in source.landmarks.values()}, nodes, geometry)
     described: dict[tuple[object, ...], int] = {}
     for k, entry in source.objects.items():
         if entry.node not in scene or entry.node in nodes:
@@ -194,7 +200,11 @@ def _geometry(source: Source, scene: Scene, names: Mapping[str, str]) -> Iterabl
 
 
 def make_ambiguity(
-    scene: Scene, names: Mapping[str, str], landmarks: Mapping[str, str], order: Sequence[str]
+    scene: Scene,
+    names: Mapping[str, str],
+    landmarks: Mapping[str, str],
+    order: Sequence[str],
+    geometry: SceneGeometry | None = None,
 ) -> Ambiguity:
     """Make the check of ambiguity of a scene.
 
@@ -208,7 +218,9 @@ def make_ambiguity(
         Name and node of each landmark.
     order : sequence of str
         The landmarks' nodes in the order of their ids.
+    geometry : SceneGeometry, optional
+        The scene's, where the caller has it.
     """
-    geometry = SceneGeometry(scene)
+    geometry = geometry or SceneGeometry(scene)
     lexicon = Lexicon(geometry, names, {name: geometry.index[node] for name, node in landmarks.items()})
     return Ambiguity(geometry, lexicon, [geometry.index[node] for node in order])

@@ -1,0 +1,296 @@
+"""One scene at the annotation desk: its annotations with everything that the page says about them."""
+
+from __future__ import annotations
+
+import re
+import threading
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from aerialdojo_gen.annotate.anchors import AnchorDesk
+from aerialdojo_gen.annotate.document import Add, Change, ConflictError, Operation, apply, edits_of, find
+from aerialdojo_gen.annotate.history import Record
+from aerialdojo_gen.annotate.storage import Author, State, Storage
+from aerialdojo_gen.annotations.ambiguity import nearest_landmark
+from aerialdojo_gen.annotations.check import check_source
+from aerialdojo_gen.annotations.claims import spoken
+from aerialdojo_gen.annotations.format import Anchor, Annotations, Object, format_annotations, parse_annotations
+from aerialdojo_gen.annotations.relations import SceneGeometry
+from aerialdojo_gen.config import Pipeline
+from aerialdojo_gen.errors import AerialDojoError, UsageError
+from aerialdojo_gen.geometry.rays import RayCaster
+from aerialdojo_gen.paper import paper_counts
+from aerialdojo_gen.scenes.catalogue import load_catalogue
+from aerialdojo_gen.scenes.model import Scene
+from aerialdojo_gen.stage import Job, Roots
+
+_PATH = re.compile(r"^(landmarks|objects)\[(\d+)\](?:\.(\w+))?")
+_MENTION = re.compile(r"\b(landmarks|objects)\[(\d+)\]")
+
+
+class Desk:
+    """What the page's requests come down to.
+
+    Parameters
+    ----------
+    name : str
+        Name of the scene; its table ``scenes`` must be up to date.
+    pipeline, roots
+        Configuration and folders.
+
+    Raises
+    ------
+    AnnotationError
+        There is an annotation file, and it cannot be read.
+    """
+
+    def __init__(self, name: str, pipeline: Pipeline, roots: Roots) -> None:
+        self.scene: Scene = Job("annotate", name, 0, 1, pipeline.seed, pipeline.embodiment, roots).scene_model()
+        self.storage = Storage(roots.annotations, name)
+        self.storage.load()
+        catalogue = load_catalogue(roots.scene_assets)
+        self._names = {category: catalogue[category].name for category in catalogue}
+        self._targets = catalogue.targets
+        self._counts = paper_counts().get(name) if pipeline.annotate_import.paper_counts else None
+        self._geometry = SceneGeometry(self.scene)
+        self._rays = RayCaster(self.scene)
+        self._lock = threading.RLock()  # the geometry remembers as it goes
+        self._described: tuple[str, dict[str, Any]] | None = None
+        self.anchors = AnchorDesk(self.scene, pipeline, roots)
+
+    # What the page shows.
+
+    def facts(self) -> dict[str, Any]:
+        """What stays the same: the scene's name, bounds and categories with the words for them."""
+        there = {instance.category for instance in self.scene.instances}
+        words = {category: self._names.get(category, spoken(category)) for category in there}
+        if self.scene.imported:
+            words |= {category: self._names[category] for category in self._targets}
+        return {
+            "scene": self.scene.name,
+            "imported": self.scene.imported,
+            "bounds_m": self.scene.bounds.tolist(),
+            "categories": dict(sorted(words.items())),
+            "standoff_m": self.anchors.config.standoff_m,
+            "file": self.storage.path.name,
+            "wanted": self._counts,
+        }
+
+    def document(self, client: str = "") -> dict[str, Any]:
+        """The annotations, where each entry is, what it lacks, and what the tab `client` can undo."""
+        return self._document(self.storage.load(), client)
+
+    def _document(self, state: State, client: str) -> dict[str, Any]:
+        with self._lock:
+            self.storage.history.refresh()
+            undo, redo = self.storage.history.stacks(client)
+            if self._described is None or self._described[0] != state.version:
+                self._described = (state.version, self._describe(state.annotations))
+            return {
+                "version": state.version,
+                **self._described[1],
+                "undo": undo[-1].what if undo else None,
+                "redo": redo[-1].what if redo else None,
+            }
+
+    def _describe(self, annotations: Annotations) -> dict[str, Any]:
+        source = parse_annotations(format_annotations(annotations))
+        faults: dict[tuple[str, int], list[dict[str, str]]] = {}
+        general = []
+        for fault in check_source(source, self.scene, self._names, self._counts, self._geometry):
+            message = _MENTION.sub(lambda m: self._called(annotations, m[1], int(m[2])), fault.message)
+            at = _PATH.match(fault.path)
+            if at is None:
+                general.append(message)
+            else:
+                faults.setdefault((at[1], int(at[2])), []).append({"field": at[3] or "", "message": message})
+        landmarks = [
+            {**entry.model_dump(), **self._place(entry.node), "faults": faults.get(("landmarks", k), [])}
+            for k, entry in enumerate(annotations.landmarks)
+        ]
+        objects = [
+            self._object(annotations, entry, faults.get(("objects", k), []))
+            for k, entry in enumerate(annotations.objects)
+        ]
+        return {"landmarks": landmarks, "objects": objects, "faults": general}
+
+    def _object(self, annotations: Annotations, entry: Object, faults: list[dict[str, str]]) -> dict[str, Any]:
+        lacks = [key for key in ("name", "category", "description") if not getattr(entry, key).strip()]
+        lacks += ["anchor"] if entry.anchor is None else []
+        lacks += ["check"] if any(fault["field"] not in lacks for fault in faults) else []
+        return {
+            **entry.model_dump(),
+            **self._place(entry.node),
+            **self.bearing(annotations, entry.node),
+            "faults": faults,
+            "lacks": lacks,
+        }
+
+    def _place(self, node: str) -> dict[str, Any]:
+        there = node in self.scene
+        return {"position_m": self.scene[node].centroid.round(3).tolist() if there else None}
+
+    def bearing(self, annotations: Annotations, node: str) -> dict[str, Any]:
+        """Nearest landmark and direction of a node, as the task will state them; None where there is none."""
+        marks = [m for m in sorted(annotations.landmarks, key=lambda m: m.id) if m.node in self.scene]
+        places = np.array([self.scene[m.node].centroid for m in marks]).reshape(-1, 3)
+        found = nearest_landmark(self.scene[node].centroid, places) if node in self.scene else None
+        if found is None:
+            return {"landmark": None, "direction": None}
+        return {"landmark": marks[found.landmark].name, "direction": found.direction}
+
+    @staticmethod
+    def _called(annotations: Annotations, kind: str, index: int) -> str:
+        entry: Any = getattr(annotations, kind)[index]
+        return f"{kind[:-1]} {entry.id}" + (f" ({entry.name})" if entry.name else "")
+
+    def draft(self, operation: Operation) -> dict[str, Any]:
+        """What would be said of an entry after an operation, which is not done: the check while somebody types."""
+        annotations = self.storage.load().annotations
+        edits = edits_of(operation, annotations, 2**31 - 1)
+        with self._lock:
+            described = self._describe(apply(annotations, edits))
+        entry_id = 2**31 - 1 if isinstance(operation, Add) else operation.id
+        return next((e for e in described[operation.kind] if e["id"] == entry_id), {})
+
+    # What changes them.
+
+    def change(self, version: str, author: Author, operation: Operation) -> dict[str, Any]:
+        """Do an operation and save it; see `Storage.change`.
+
+        Raises
+        ------
+        AerialDojoError
+            Besides those: the node is not in the scene, or the anchor will not do.
+        """
+        fields = {} if operation.do == "remove" else operation.fields.given()
+        if fields.get("node", "") and fields["node"] not in self.scene:
+            raise AerialDojoError(f"no node {fields['node']!r} in the scene")
+        if fields.get("anchor") is not None and isinstance(operation, Change):
+            self._check_anchor(operation.id, fields["anchor"])
+        return self._saved(self.storage.change(version, author, operation), author)
+
+    def undo(self, version: str, author: Author) -> dict[str, Any]:
+        """Take back the author's last change."""
+        return self._saved(self.storage.undo(version, author), author)
+
+    def redo(self, version: str, author: Author) -> dict[str, Any]:
+        """Do again what the author took back."""
+        return self._saved(self.storage.redo(version, author), author)
+
+    def replace(self, version: str, author: Author, raw: bytes) -> dict[str, Any]:
+        """Take over another annotation file."""
+        return self._saved(self.storage.replace(version, author, raw), author)
+
+    def _saved(self, done: tuple[State, Record | None], author: Author) -> dict[str, Any]:
+        state, record = done
+        return self._document(state, author.client) | {"done": _told(record) if record else None}
+
+    def changes_since(self, version: str) -> list[dict[str, Any]]:
+        """What has been changed after a version, by whom."""
+        with self._lock:
+            self.storage.history.refresh()
+            return [_told(record) for record in self.storage.history.since(version)][-50:]
+
+    def history(self, most: int = 200) -> list[dict[str, Any]]:
+        """The last changes, the newest first."""
+        with self._lock:
+            self.storage.history.refresh()
+            return [_told(record) for record in reversed(self.storage.history.records[-most:])]
+
+    # What is under the cursor, and anchors.
+
+    def pick(self, origin_m: Sequence[float], direction: Sequence[float]) -> dict[str, Any] | None:
+        """Find what a ray hits first, on the mesh itself.
+
+        Parameters
+        ----------
+        origin_m : (3,) sequence of float
+            Metres, world frame.
+        direction : (3,) sequence of float
+            Any length but zero.
+
+        Returns
+        -------
+        dict or None
+            Node, category, what the mesh knows of it, the point, and the bearing that a task would state.
+        """
+        ray = np.asarray([direction], dtype=np.float64)
+        if not 1e-9 < float(np.linalg.norm(ray)) < 1e9:
+            raise AerialDojoError("a ray needs a direction")
+        distance, k = self._rays.first_hit(np.asarray(origin_m, dtype=np.float64), ray)
+        if k[0] < 0:
+            return None
+        point = np.asarray(origin_m) + float(distance[0]) * ray[0] / np.linalg.norm(ray[0])
+        return self.about(self._rays.nodes[int(k[0])]) | {"point_m": point.round(3).tolist()}
+
+    def about(self, node: str) -> dict[str, Any]:
+        """What the mesh knows of a node."""
+        instance = self.scene[node]
+        return {
+            "node": node,
+            "category": instance.category,
+            "word": self._names.get(instance.category, spoken(instance.category)),
+            "attributes": instance.attributes,
+            "size_m": np.ptp(instance.bounds, axis=0).round(2).tolist(),
+            **self._place(node),
+            **self.bearing(self.storage.load().annotations, node),
+        }
+
+    def object(self, object_id: int) -> Object:
+        """Look an object up whose node is in the scene; `UsageError` where there is none."""
+        found = find(self.storage.load().annotations, "objects", object_id)
+        if found is None or not isinstance(found[1], Object) or found[1].node not in self.scene:
+            raise UsageError(f"there is no object {object_id} with a node in the scene")
+        return found[1]
+
+    def _check_anchor(self, object_id: int, anchor: Anchor) -> None:
+        try:
+            entry = self.object(object_id)
+        except UsageError as error:
+            raise ConflictError(str(error)) from None
+        _, faults = self.anchors.judge(entry, np.array(anchor.position_m), float(np.radians(anchor.yaw_deg)))
+        if faults:
+            raise AerialDojoError(f"this anchor will not do: {'; '.join(faults)}")
+
+    def export(self) -> bytes:
+        """The annotation file, byte for byte; that of a scene without one."""
+        state = self.storage.load()
+        return (state.text or format_annotations(state.annotations)).encode("utf-8")
+
+
+def _told(record: Record) -> dict[str, Any]:
+    return record.model_dump(mode="json", include={"time", "who", "client", "action", "what", "edits"})
+
+
+def open_desk(name: str, pipeline: Pipeline, roots: Roots) -> Desk:
+    """Open a scene at the desk, building its mesh where that is not up to date.
+
+    Parameters
+    ----------
+    name : str
+        Name of a scene with a recipe.
+    pipeline, roots
+        Configuration and folders.
+
+    Returns
+    -------
+    Desk
+
+    Raises
+    ------
+    UsageError
+        There is no such scene.
+    AnnotationError
+        Its annotation file cannot be read.
+    """
+    from aerialdojo_gen import runner
+    from aerialdojo_gen.progress import Reporter
+
+    scenes = runner.choose_scenes([name], runner.known_scenes(roots.recipes))
+    if len(scenes) > 1:
+        raise UsageError(f"{name} are {len(scenes)} scenes ({', '.join(scenes[:3])}, ...): annotate one at a time")
+    runner.run(runner.stages_named(("build-scenes",)), scenes, pipeline, roots, reporter=Reporter(quiet=True))
+    return Desk(scenes[0], pipeline, roots)

@@ -1,0 +1,85 @@
+"""The twin of ``annotate``: serve a desk's page until Ctrl-C, or write its boxes."""
+
+from __future__ import annotations
+
+import ipaddress
+import os
+import secrets
+import socket
+from collections.abc import Callable
+from pathlib import Path
+
+from aerialdojo_gen.annotate.access import TokenGate
+from aerialdojo_gen.annotate.coco import coco_zip
+from aerialdojo_gen.annotate.desk import Desk
+from aerialdojo_gen.errors import UsageError
+from aerialdojo_gen.store import disk_error
+from aerialdojo_gen.web.serving import open_socket, serve, url_of
+
+
+def serve_desk(desk: Desk, *, port: int, host: str, browser: bool, say: Callable[[str], None]) -> None:
+    """Serve the tool.
+
+    Parameters
+    ----------
+    desk : Desk
+        The scene.
+    port : int
+        0 for a free one.
+    host : str
+        IPv4 address to listen on; any other than loopback makes a token, without which nothing is answered.
+    browser : bool
+        Open the page; not where a token is asked for.
+    say : callable
+        Takes the lines for the user.
+
+    Raises
+    ------
+    UsageError
+        The address is none, the port is taken, or FastAPI is not installed.
+    """
+    try:
+        from aerialdojo_gen.annotate.server import make_app
+    except ImportError:
+        raise UsageError("annotate needs FastAPI and uvicorn: pip install 'aerialdojo-gen[web]'") from None
+    try:
+        loopback = ipaddress.IPv4Address(host).is_loopback
+    except ValueError:
+        raise UsageError(f"--host {host}: give an IPv4 address of this machine, or 0.0.0.0 for all") from None
+    listener = open_socket(port, host)
+    app = make_app(desk, any_host=not loopback)
+    try:
+        if loopback:
+            say(f"annotating {desk.scene.name} at {url_of(listener)}   (Ctrl-C ends; every change is saved at once)")
+        else:
+            token = secrets.token_urlsafe(24)
+            app.add_middleware(TokenGate, token=token)
+            shown = socket.gethostname() if host == "0.0.0.0" else host  # noqa: S104
+            say(f"annotating {desk.scene.name} at http://{shown}:{listener.getsockname()[1]}/?token={token}")
+            say("anybody with this address can change the annotations; the traffic is not encrypted")
+        say(f"annotations: {desk.storage.path}")
+        serve(app, listener, browser and loopback)
+    finally:
+        desk.anchors.close()
+
+
+def write_coco(desk: Desk, path: Path) -> Path:
+    """Write `coco_zip` to a file, whole or not at all.
+
+    Raises
+    ------
+    StoreError
+        The file cannot be written.
+    """
+    content = coco_zip(desk)
+    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        temporary.write_bytes(content)
+        temporary.replace(path)
+    except OSError as error:
+        temporary.unlink(missing_ok=True)
+        raise disk_error(error, path) from error
+    finally:
+        desk.anchors.close()
+    return path

@@ -1,0 +1,38 @@
+"""The annotation tool's command."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from aerialdojo_gen.commands.common import Data, PipelineFile, open_pipeline
+
+app = typer.Typer()
+
+
+@app.command("annotate")
+def annotate(
+    scene: Annotated[str, typer.Option("--scene", help="Scene to annotate, e.g. U_Mall_0.")],
+    data: Data = Path("data"),
+    pipeline: PipelineFile = None,
+    port: Annotated[int, typer.Option(min=0, max=65535, help="Port to listen on.  (default: a free one)")] = 0,
+    host: Annotated[
+        str, typer.Option(help="IPv4 address to listen on; any but loopback asks every visitor for a token.")
+    ] = "127.0.0.1",
+    browser: Annotated[bool, typer.Option("--browser/--no-browser", help="Open the page.")] = True,
+    coco: Annotated[
+        Path | None, typer.Option("--coco", help="Write boxes and pictures as a COCO archive (ZIP) and end.")
+    ] = None,
+) -> None:
+    """Annotate a scene in the browser: landmarks, objects, their anchors."""
+    from aerialdojo_gen.annotate.desk import open_desk
+    from aerialdojo_gen.annotate.serve import serve_desk, write_coco
+
+    config, roots = open_pipeline(pipeline, data)
+    desk = open_desk(scene, config, roots)
+    if coco is not None:
+        print(write_coco(desk, coco))
+    else:
+        serve_desk(desk, port=port, host=host, browser=browser, say=lambda line: print(line, flush=True))
