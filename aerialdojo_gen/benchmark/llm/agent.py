@@ -84,9 +84,9 @@ class Options(BaseModel):
             parts = urlsplit(url)
             if parts.scheme not in ("http", "https") or not parts.hostname:
                 raise ValueError("not a URL like http://127.0.0.1:8000/v1")
-            # Options are written to the log of the run.
+            # Options are written to the log of the run. Not a ValueError: its message would quote the URL.
             if parts.username or parts.password or parts.query:
-                raise ValueError("holds a name, a password or a query: keys come from the environment only")
+                raise UsageError("base_url holds a name, a password or a query: keys come from the environment only")
         return url
 
     @field_validator("views", mode="before")

@@ -12,7 +12,7 @@ from aerialdojo_gen.benchmark.agents.base import InvalidAnswer
 from aerialdojo_gen.benchmark.llm.prompt import CHOICES
 
 MAX_CHARACTERS = 20_000
-# What wraps an answer without being part of it: a reasoning model's thoughts, and a Markdown fence around all the rest.
+# What wraps an answer without being part of it: a reasoning model's thoughts, a Markdown fence around all the rest.
 _THOUGHTS = re.compile(r"\A\s*<think>.*?</think>", re.DOTALL)
 _FENCE = re.compile(r"\A```(?:json)?[ \t]*\n(.*)\n?```\Z", re.DOTALL)
 

@@ -70,13 +70,13 @@ def system_prompt(goal: Goal, views: Sequence[str], depth: bool, max_depth_m: fl
     sensors += f"Each camera has a field of view of {fov_deg:g}°." if views else "You see nothing."
     if views and depth:
         sensors += (
-            " With each comes a depth picture of the same view, in grey: the value of a pixel is its distance along the"
-            f" optical axis, linear from black at 0 m to white at {max_depth_m:g} m; what is farther, or open sky, is"
-            f" white. A pixel of value v is v / 255 x {max_depth_m:g} m away."
+            " With each comes a depth picture of the same view, in grey: the value of a pixel is its distance along"
+            f" the optical axis, linear from black at 0 m to white at {max_depth_m:g} m; what is farther, or open"
+            f" sky, is white. A pixel of value v is v / 255 x {max_depth_m:g} m away."
         )
     return f"""\
-You pilot a small drone that searches for one target object in a large outdoor scene. You know the scene only from the \
-drone's cameras; there is no map, no GPS and no compass. Find the target, fly up to it, and stop in front of it.
+You pilot a small drone that searches for one target object in a large outdoor scene. You know the scene only from \
+the drone's cameras; there is no map, no GPS and no compass. Find the target, fly up to it, and stop in front of it.
 
 BODY
 The drone is a quadrotor with a wheelbase of {rules.wheelbase_m:g} m. It collides with whatever comes within \
@@ -91,15 +91,15 @@ Every action is carried out exactly and completely. A move that would leave the 
 and the drone stays where it is.
 
 THE EPISODE ENDS
-- when you choose Stop: a success if the drone is then within {rules.success_radius_m:g} m of the viewpoint in front of \
-the target (about 1 m from its surface), and a failure anywhere else;
+- when you choose Stop: a success if the drone is then within {rules.success_radius_m:g} m of the viewpoint in front \
+of the target (about 1 m from its surface), and a failure anywhere else;
 - when the drone hits anything: a failure;
-- when the budget of {rules.action_budget} actions is spent without Stop: a failure. Every action counts, and so does \
-an answer that cannot be read.
+- when the budget of {rules.action_budget} actions is spent without Stop: a failure. Every action counts, and so \
+does an answer that cannot be read.
 
 ANSWER
 Answer with one JSON object and nothing else, no text around it:
-{{"thought": "<one or two sentences: what you see, where you are going>", "action": "<one name from the list above>"}}"""
+{{"thought": "<one or two sentences: what you see, where you go>", "action": "<one name from the list above>"}}"""
 
 
 def _action_list() -> str:
@@ -141,7 +141,7 @@ def step_text(observation: Observation, turns: Sequence[Turn]) -> str:
     if observation.refused:
         lines.append("The last move was refused: it would have left the flight area.")
     lines.append(
-        f"NOW: step {observation.step}; {observation.remaining_actions} actions left, Stop included. What the drone sees:"
+        f"NOW: step {observation.step}; {observation.remaining_actions} actions left, Stop included. The drone sees:"
     )
     return "\n".join(lines)
 

@@ -1,8 +1,9 @@
-"""Talk to a service over HTTP with bounds: size, time, retries; and tell its failures apart without telling its key."""
+"""Talk to a service over HTTP within bounds of size, time and retries; tell its failures apart, and never its key."""
 
 from __future__ import annotations
 
 import email.utils
+import json
 import os
 import time
 from collections.abc import Callable, Mapping
@@ -43,7 +44,7 @@ def bounded_client(base: Any, timeout_s: float) -> Any:
     """
 
     class BoundedClient(base):  # type: ignore[misc]  # a class that is known at run time alone
-        def send(self, request: Any, *, stream: bool = False, **options: Any) -> Any:  # noqa: ARG002
+        def send(self, request: Any, *, stream: bool = False, **options: Any) -> Any:
             deadline = time.monotonic() + timeout_s
             response = super().send(request, stream=True, **options)
             body = bytearray()
@@ -114,6 +115,11 @@ def call(ask: Callable[[], Result], package: Any, service: str, key: str, timeou
             return ask()
         except package.APIError as error:
             failure = _failure(error, package, service, key, timeout_s)
+        except BodyBoundError as error:
+            # One of the packages wraps what its client raises, the other lets it through.
+            failure = AgentUnavailable(f"{service}: {error}")
+        except json.JSONDecodeError:
+            failure = AgentUnavailable(f"{service}: its answer is no JSON: is base_url right?")
         if not isinstance(failure, AgentUnavailable):
             raise failure from None
         wait_s = failure.retry_after_s if failure.retry_after_s is not None else 2.0**attempt

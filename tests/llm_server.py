@@ -1,0 +1,187 @@
+"""A server on 127.0.0.1 that speaks OpenAI's chat protocol and Anthropic's messages protocol, and errs on demand."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import threading
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from typing import Any
+
+MOVE = '{"thought": "Nothing here.", "action": "MoveForward3"}'
+
+
+@dataclass(frozen=True)
+class Say:
+    """A proper answer of the model."""
+
+    text: str
+    usage: tuple[int, int] | None = (1000, 20)
+
+
+@dataclass(frozen=True)
+class Status:
+    """An error of the service."""
+
+    code: int
+    message: str = "something is wrong"
+    headers: dict[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Raw:
+    """Any bytes with status 200, or another."""
+
+    body: bytes
+    content_type: str = "application/json"
+    code: int = 200
+
+
+@dataclass(frozen=True)
+class Endless:
+    """A body without end."""
+
+    code: int = 200
+
+
+@dataclass(frozen=True)
+class Drip:
+    """A byte now and then, for ever: no single read takes long."""
+
+
+@dataclass(frozen=True)
+class Hang:
+    """No answer at all."""
+
+
+@dataclass(frozen=True)
+class Cut:
+    """The connection is cut in the middle of an answer."""
+
+
+Act = Say | Status | Raw | Endless | Drip | Hang | Cut
+
+
+@dataclass
+class Service:
+    """What the server does next, and what it was asked.
+
+    Attributes
+    ----------
+    url : str
+        Where it is, without a path.
+    script : list of Act
+        Done one a request; the last one for ever.
+    requests : list of dict
+        Path, headers (lower case) and JSON body of every request.
+    policy : callable, optional
+        Answers instead of the script, from the request's body.
+    """
+
+    url: str
+    script: list[Act]
+    requests: list[dict[str, Any]]
+    stop: threading.Event
+    policy: Callable[[dict[str, Any]], str] | None = None
+
+    def next(self) -> Act:
+        return self.script.pop(0) if len(self.script) > 1 else self.script[0]
+
+
+class _Handler(BaseHTTPRequestHandler):
+    protocol_version = "HTTP/1.1"
+    service: Service
+
+    def do_POST(self) -> None:
+        body = json.loads(self.rfile.read(int(self.headers["content-length"])))
+        headers = {k.lower(): v for k, v in self.headers.items()}
+        self.service.requests.append({"path": self.path, "headers": headers, "body": body})
+        policy = self.service.policy
+        act = Say(policy(body)) if policy else self.service.next()
+        with contextlib.suppress(BrokenPipeError, ConnectionResetError):
+            self.play(act, anthropic=self.path == "/v1/messages")
+
+    def play(self, act: Act, anthropic: bool) -> None:
+        if isinstance(act, Say):
+            self.send(200, _message(act) if anthropic else _completion(act))
+        elif isinstance(act, Status):
+            # A careless service: it sends back all that it was sent.
+            key = self.headers.get("authorization", "") + self.headers.get("x-api-key", "")
+            error = {"type": "error", "message": f"{act.message} (you sent {key})"}
+            self.send(act.code, json.dumps({"type": "error", "error": error}).encode(), act.headers)
+        elif isinstance(act, Raw):
+            self.send(act.code, act.body, {"content-type": act.content_type})
+        elif isinstance(act, Cut):
+            self.send_response(200)
+            self.send_header("content-type", "application/json")
+            self.send_header("content-length", "1000")
+            self.end_headers()
+            self.wfile.write(b'{"id": "x", ')
+            self.close_connection = True
+        elif isinstance(act, Hang):
+            self.service.stop.wait(30)
+            self.close_connection = True
+        else:
+            self.send_response(act.code if isinstance(act, Endless) else 200)
+            self.send_header("content-type", "application/json")
+            self.end_headers()
+            chunk, pause_s = (b" " * 65536, 0.0) if isinstance(act, Endless) else (b" ", 0.05)
+            while not self.service.stop.wait(pause_s):
+                self.wfile.write(chunk)
+                self.wfile.flush()
+            self.close_connection = True
+
+    def send(self, code: int, body: bytes, headers: dict[str, str] | None = None) -> None:
+        self.send_response(code)
+        for name, value in ({"content-type": "application/json"} | (headers or {})).items():
+            self.send_header(name, value)
+        self.send_header("content-length", str(len(body)))
+        self.end_headers()
+        self.wfile.write(body)
+
+    def log_message(self, format: str, *args: Any) -> None:
+        """Say nothing on stderr."""
+
+
+def _completion(say: Say) -> bytes:
+    message = {"role": "assistant", "content": say.text}
+    value: dict[str, Any] = {
+        "id": "chatcmpl-1", "object": "chat.completion", "created": 1, "model": "m",
+        "choices": [{"index": 0, "message": message, "finish_reason": "stop"}],
+    }  # fmt: skip
+    if say.usage:
+        value["usage"] = {
+            "prompt_tokens": say.usage[0], "completion_tokens": say.usage[1], "total_tokens": sum(say.usage)
+        }  # fmt: skip
+    return json.dumps(value).encode()
+
+
+def _message(say: Say) -> bytes:
+    value: dict[str, Any] = {
+        "id": "msg_1", "type": "message", "role": "assistant", "model": "m", "stop_reason": "end_turn",
+        "stop_sequence": None, "content": [{"type": "text", "text": say.text}],
+    }  # fmt: skip
+    if say.usage:
+        value["usage"] = {"input_tokens": say.usage[0], "output_tokens": say.usage[1]}
+    return json.dumps(value).encode()
+
+
+@contextlib.contextmanager
+def serving(*script: Act) -> Iterator[Service]:
+    """Run the server in a thread."""
+    stop = threading.Event()
+    handler = type("Handler", (_Handler,), {})
+    server = ThreadingHTTPServer(("127.0.0.1", 0), handler)
+    service = Service(f"http://127.0.0.1:{server.server_port}", list(script) or [Say(MOVE)], [], stop)
+    handler.service = service  # type: ignore[attr-defined]
+    thread = threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.01}, daemon=True)
+    thread.start()
+    try:
+        yield service
+    finally:
+        stop.set()
+        server.shutdown()
+        server.server_close()
+        thread.join()
