@@ -17,7 +17,6 @@ from aerialdojo_gen.errors import PoolError
 from aerialdojo_gen.paper import inventory, splits
 from aerialdojo_gen.release.pool import pool_lines, pool_of, require_pools
 from aerialdojo_gen.release.quota import apportion, choose, train_quotas
-from aerialdojo_gen.release.stats import Made, made_lines, split_lines
 
 ROOT = Path(__file__).resolve().parents[1]
 SETTINGS = {"base": (5.0, 30.0), "standard": (30.0, 60.0), "long_horizon": (60.0, 100.0)}
@@ -127,21 +126,6 @@ def test_a_pool_that_is_too_small_is_named_and_nothing_else(tmp_path):
     shown = pool_lines([pool_of(tmp_path, name) for name in ("D_Flood_1", "U_Park_0")])
     assert "94/95!" in shown[1]
     assert "173/173 " in shown[2]
-
-
-def test_tables_show_where_the_release_is_not_the_papers():
-    paper = inventory()["U_Park_0"]
-    trains = train_quotas("U_Park_0", inventory(), splits())
-    tasks = {("train", s): n for s, n in trains.items()} | {
-        ("test", s): paper.tasks[s] - n for s, n in trains.items()
-    }
-    right = Made("U_Park_0", paper.landmarks, paper.objects, tasks, 5100.0, paper)
-    assert made_lines([right])[-1] == "every number is the paper's"
-    wrong = Made("U_Park_0", paper.landmarks, 13, tasks | {("test", "base"): 0}, 5100.0, paper)
-    lines = made_lines([wrong])
-    assert "13/14" in lines[1]
-    assert lines[-1] == "3 numbers are not the paper's"
-    assert split_lines([right])[1].split()[2:] == [f"{2 * n:,}" for n in (*trains.values(), sum(trains.values()))]
 
 
 def test_split_writes_nothing_where_a_pool_is_too_small(tmp_path):

@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 
 from aerialdojo_gen import schemas, store
 from aerialdojo_gen.config import Embodiment, FilterConfig, SplitConfig
-from aerialdojo_gen.release.card import counts, write_card
+from aerialdojo_gen.release.card import write_card
+from aerialdojo_gen.release.contents import counts
 from aerialdojo_gen.release.select import nav_id, train_counts, train_mask
 from aerialdojo_gen.stage import Job, Roots
 from aerialdojo_gen.stages import filter as filter_stage
@@ -165,7 +166,7 @@ def test_budget_follows_the_setting(data):
 
 def test_card_counts_what_is_there(data):
     card = write_card(data).read_text()
-    found = counts(data / "release")
+    found = counts(data, [SCENE])
     assert f"| `id_train` | {found['tasks']['id_train']:,} | {found['routes']['id_train']:,} |" in card
     assert found["objects"] == {"all": N_OBJECTS}
     for spec in (schemas.TASKS, schemas.ROUTES, schemas.RELEASE_OBJECTS):

@@ -132,7 +132,7 @@ def run_stages(
     force: list[str],
     quiet: bool,
 ) -> None:
-    """Run stages in their order over the chosen scenes; after `split`, write the release's card."""
+    """Run stages in their order over the chosen scenes; after `split`, write card and croissant.json."""
     from aerialdojo_gen import runner
     from aerialdojo_gen.progress import Reporter
 
@@ -147,6 +147,7 @@ def run_stages(
         raise SystemExit(130) from None
     if any(stage.name == "split" for stage in stages):
         from aerialdojo_gen.release.card import write_card
+        from aerialdojo_gen.release.croissant import write_croissant
         from aerialdojo_gen.store import prune_release
 
         if scene is None:
@@ -154,6 +155,7 @@ def run_stages(
             for gone in prune_release(roots.data, scenes):
                 reporter.line(f"release: {gone} is no scene of this pipeline, removed")
 
+        write_croissant(roots.data)
         reporter.line(f"release: {write_card(roots.data).parent}")
 
 

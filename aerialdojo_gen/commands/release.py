@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from aerialdojo_gen.commands.common import Data, PipelineFile, Scene, open_pipeline
+from aerialdojo_gen.errors import UsageError
 
 app = typer.Typer()
 
@@ -16,17 +17,42 @@ app = typer.Typer()
 def stats(
     data: Data = Path("data"), scene: Scene = None, pipeline: PipelineFile = None,
     pool: Annotated[bool, typer.Option("--pool", help="What filter kept, not the release.")] = False,
+    markdown: Annotated[Path | None, typer.Option("--markdown", help="Write the tables as Markdown.")] = None,
+    csv: Annotated[Path | None, typer.Option("--csv", help="Write the tables as CSV, a line a figure.")] = None,
+    figures: Annotated[
+        Path | None, typer.Option("--figures", help="Draw the figures into this folder, as PNG and SVG.")
+    ] = None,
 ) -> None:  # fmt: skip
     """Set the release beside the paper's tables; before there is one, what filter kept."""
     from aerialdojo_gen import runner, store
-    from aerialdojo_gen.release.pool import pool_lines, pool_of
-    from aerialdojo_gen.release.stats import made_lines, made_of, split_lines
 
-    config, roots = open_pipeline(pipeline, data)
-    scenes = runner.choose_scenes(scene or config.scenes, runner.known_scenes(roots.recipes))
-    released = set(store.release_scenes(roots.data))
-    if pool or not released.issuperset(scenes):
-        print("\n".join(pool_lines([pool_of(roots.data, name) for name in scenes])))
+    released = store.release_scenes(data)
+    if pool or not released:
+        from aerialdojo_gen.release.pool import pool_lines, pool_of
+
+        if markdown or csv or figures:
+            raise UsageError(
+                f"--markdown, --csv and --figures are of a release: run aerialdojo-gen split --data {data}"
+            )
+        config, roots = open_pipeline(pipeline, data)
+        scenes = runner.choose_scenes(scene or config.scenes, runner.known_scenes(roots.recipes))
+        print("\n".join(pool_lines([pool_of(data, name) for name in scenes])))
         return
-    made = [made_of(roots.data, name) for name in scenes]
-    print("\n".join([*made_lines(made), "", *split_lines(made)]))
+
+    from aerialdojo_gen.release.comparison import as_csv, as_markdown
+    from aerialdojo_gen.release.contents import check_release
+    from aerialdojo_gen.release.stats import made_of, tables
+
+    names = check_release(data, runner.choose_scenes(scene, released) if scene else None)
+    compared = tables([made_of(data, name) for name in names])
+    for path, text in ((markdown, as_markdown(compared)), (csv, as_csv(compared))):
+        if path:
+            with store.atomic_file(path.parent, path.name) as temporary:
+                temporary.write_text(text, encoding="utf-8")
+    print("\n\n".join("\n".join(table.terminal()) for table in compared))
+    if figures:
+        from aerialdojo_gen.release.figures import draw_figures
+
+        print()
+        for path in draw_figures(data, names, figures):
+            print(path)

@@ -5,157 +5,111 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import jinja2
+import pyarrow as pa
+import pyarrow.compute as pc
+
 from aerialdojo_gen import __version__, schemas, store
-from aerialdojo_gen.errors import StoreError
+from aerialdojo_gen.paper import inventory
+from aerialdojo_gen.release.contents import TABLES, check_release, counts, meaning, sizes, unit
+from aerialdojo_gen.release.croissant import CITE_AS
+from aerialdojo_gen.release.stats import Made, made_of
 
-_TABLES = ("tasks", "routes")
-_FLAT = {
-    "objects": schemas.RELEASE_OBJECTS,
-    "landmarks": schemas.LANDMARKS,
-    "anchors": schemas.ANCHORS,
-    "scenes": schemas.SCENES,
-}
-_ABOUT = {
-    "tasks": "One row a task instance: what an agent may know. It holds no coordinate of the target and no route.",
-    "routes": "One row a navigation task: the goal and the reference trajectory, for the evaluator.",
-    "objects": "One row a target object, with the picture that image goals show.",
-    "landmarks": "One row a landmark.",
-    "anchors": "One row a viewpoint; three an object, one of them selected as the goal.",
-    "scenes": "One row a scene.",
-}
+_SIZES = ((1_000, "n<1K"), (10_000, "1K<n<10K"), (100_000, "10K<n<100K"), (1_000_000, "100K<n<1M"))
 
 
-def counts(release: Path) -> dict[str, dict[str, int]]:
-    """Count the rows of every table and split from the footers of its parts.
-
-    Parameters
-    ----------
-    release : Path
-        The release's folder.
-
-    Returns
-    -------
-    dict
-        ``{"tasks": {"id_train": 113642, …}, …, "objects": {"all": 2099}, …}``; splits without parts are left out.
-
-    Raises
-    ------
-    StoreError
-        A part is damaged.
-    """
-    result: dict[str, dict[str, int]] = {}
-    for table in _TABLES:
-        result[table] = {s: _rows(release / table / s) for s in schemas.SUBSETS if (release / table / s).is_dir()}
-    for table in _FLAT:
-        result[table] = {"all": _rows(release / table)}
-    return result
+def _column_type(field: pa.Field) -> str:
+    kind = str(field.type).replace("element: ", "").replace(" not null", "").replace("double", "float64")
+    return kind + (", or null" if field.nullable else "")
 
 
-def _rows(folder: Path) -> int:
-    total = 0
-    for path in sorted(folder.glob("part-*.parquet")):
-        info = store.read_info(path)
-        if info is None:
-            raise StoreError(f"{path} was not written by aerialdojo-gen: delete it and run aerialdojo-gen split")
-        total += info.rows
+def _hf_type(field: pa.Field) -> str:
+    """Type of a column in the words of `datasets`; the pictures' bytes become pictures."""
+    return "image" if pa.types.is_binary(field.type) else str(field.type).replace("double", "float64")
+
+
+def _scene_rows(data: Path, made: list[Made]) -> list[dict[str, Any]]:
+    rows = [store.read_scene(data, "release/scenes", m.scene).to_pylist()[0] for m in made]
+    return [
+        row | {"landmarks": m.landmarks, "objects": m.objects, "tasks": m.instances, "km": m.path_m / 1000}
+        for row, m in zip(rows, made, strict=True)
+    ]
+
+
+def _by_setting(made: list[Made], splits: list[str]) -> dict[str, dict[str, int]]:
+    total = {split: dict.fromkeys(schemas.SETTINGS, 0) for split in splits}
+    for m in made:
+        for (subset, setting), n in m.tasks.items():
+            total[f"{store.partition(m.scene)}_{subset}"][setting] += 2 * n
     return total
 
 
-def _yaml(found: dict[str, dict[str, int]]) -> str:
-    lines = [
-        "---",
-        "license: apache-2.0",
-        "pretty_name: AerialDojo",
-        "task_categories:",
-        "- robotics",
-        "tags:",
-        "- embodied-ai",
-        "- aerial-navigation",
-        "- object-goal-navigation",
-        "- uav",
-        "configs:",
-    ]
-    for table in (*_TABLES, *_FLAT):
-        lines.append(f"- config_name: {table}")
-        if table == "tasks":
-            lines.append("  default: true")
-        lines.append("  data_files:")
-        for split in found[table]:
-            folder, name = (table, "train") if split == "all" else (f"{table}/{split}", split)
-            lines += [f"  - split: {name}", f"    path: {folder}/part-*.parquet"]
-    return "\n".join([*lines, "---"])
+def _example(data: Path, scenes: list[str]) -> dict[str, Any] | None:
+    """Return the first task that is told in words, of the shortest setting there is."""
+    for scene in scenes:
+        for subset in ("train", "test"):
+            tasks = store.read_scene(data, f"tasks/{subset}", scene)
+            told: list[dict[str, Any]] = (
+                tasks.filter(pc.equal(tasks.column("modality"), "semantic")).slice(0, 1).to_pylist()
+            )
+            if told:
+                return told[0]
+    return None
 
 
-def _fields(spec: schemas.TableSpec) -> list[str]:
-    lines = ["| column | type | unit | meaning |", "|---|---|---|---|"]
-    for field in spec.schema:
-        meta = {k.decode(): v.decode() for k, v in (field.metadata or {}).items()}
-        kind = str(field.type).replace("element: ", "").replace(" not null", "")
-        null = ", or null" if field.nullable else ""
-        lines.append(f"| `{field.name}` | {kind}{null} | {meta.get('unit', '')} | {meta['meaning']} |")
-    return lines
-
-
-def render_card(found: dict[str, dict[str, int]], scenes: list[dict[str, Any]]) -> str:
-    """Write the card's text.
-
-    Parameters
-    ----------
-    found : dict
-        What `counts` returns.
-    scenes : list of dict
-        Rows of the release's `scenes`.
+def render_card(data: Path) -> str:
+    """Write the card's text from what the release holds.
 
     Returns
     -------
     str
         Markdown with a YAML head.
+
+    Raises
+    ------
+    StoreError
+        The release is missing or damaged.
     """
-    names = ", ".join(f"`{row['scene']}`" for row in scenes)
-    total, routes = sum(found["tasks"].values()), sum(found["routes"].values())
-    lines = [
-        _yaml(found),
-        "",
-        "# AerialDojo",
-        "",
-        f"{total:,} task instances over {routes:,} navigation tasks in {len(scenes)} scenes ({names}), each with a "
-        "certified collision-free reference trajectory. "
-        f"Generated by aerialdojo-gen {__version__} from recipes and annotations; nothing was downloaded.",
-        "",
-        "| split | task instances | navigation tasks |",
-        "|---|---:|---:|",
-        *[f"| `{s}` | {n:,} | {found['routes'].get(s, 0):,} |" for s, n in found["tasks"].items()],
-        "",
-        "```python",
-        "import pandas as pd",
-        "",
-        'tasks = pd.read_parquet("tasks/id_train")',
-        'routes = pd.read_parquet("routes/id_train")   # join on nav_id',
-        "```",
-        "",
-        "## Frames, units and definitions",
-        "",
-        "World: right-handed, x east, y north, z up, metres; yaw in radians, counter-clockwise from +x. "
-        "A position is that of the body's centre; the body is a sphere of 0.25 m radius. "
-        "An episode succeeds when the agent stops within 3 m of the goal, without collision and within its budget. "
-        "`length_m` sums the distances between consecutive positions; turning adds nothing.",
-        "",
-        "Actions: " + ", ".join(f"{i} {name}" for i, name in enumerate(schemas.ACTION_NAMES)) + ". "
-        "Distances are metres, turns degrees. `Approach` (the last straight segment, at most 1 m, onto the anchor) "
-        "stands in reference trajectories only.",
-        "",
-        "## Limits",
-        "",
-        "The scenes are built from recipes, not the Unreal Engine maps of the paper; names and "
-        "definitions are the paper's. Descriptions were drafted from the geometry and are checked to be unambiguous "
-        "within their scene.",
-        "",
-        "## Tables",
-    ]
-    specs = {"tasks": schemas.TASKS, "routes": schemas.ROUTES} | _FLAT
-    for table, spec in specs.items():
-        lines += ["", f"### {table}", "", _ABOUT[table], f"Key: {', '.join(spec.key)}.", "", *_fields(spec)]
-    return "\n".join(lines) + "\n"
+    names = check_release(data)
+    found = counts(data, names)
+    made = [made_of(data, name) for name in names]
+    objects = [store.read_scene(data, "release/objects", name, ["category"]) for name in names]
+    by_setting = _by_setting(made, list(found["tasks"]))
+    n_tasks = sum(found["tasks"].values())
+    scenes = _scene_rows(data, made)
+    environment = jinja2.Environment(
+        loader=jinja2.PackageLoader("aerialdojo_gen.release"),
+        undefined=jinja2.StrictUndefined,
+        keep_trailing_newline=True,
+        autoescape=False,  # noqa: S701 (Markdown, from our own tables)
+    )
+    return environment.get_template("card.md.j2").render(
+        version=__version__,
+        tables=TABLES,
+        found=found,
+        sizes=sizes(data, names),
+        scenes=scenes,
+        n_tasks=n_tasks,
+        n_routes=sum(found["routes"].values()),
+        n_types=len({row["scene_type"] for row in scenes}),
+        n_categories=len(pc.unique(pa.concat_tables(objects).column("category"))),
+        km=sum(m.path_m for m in made) / 1000,
+        settings=schemas.SETTINGS,
+        by_setting=by_setting,
+        totals={s: sum(row[s] for row in by_setting.values()) for s in schemas.SETTINGS},
+        size_category=next((name for most, name in _SIZES if n_tasks < most), "1M<n<10M"),
+        first_split=next((split for split, n in found["tasks"].items() if n), "id_train"),
+        example=_example(data, names),
+        actions=schemas.ACTION_NAMES,
+        of_paper=set(names) == set(inventory()),
+        citation=CITE_AS.replace(", title", ",\n  title")
+        .replace(", author", ",\n  author")
+        .replace(", year", ",\n  year"),
+        hf_type=_hf_type,
+        column_type=_column_type,
+        meaning=meaning,
+        unit=unit,
+    )
 
 
 def write_card(data: Path) -> Path:
@@ -171,11 +125,7 @@ def write_card(data: Path) -> Path:
     StoreError
         The release is missing or damaged, or cannot be written.
     """
-    release = data / "release"
-    names = store.release_scenes(data)
-    if not names:
-        raise StoreError(f"there is no release in {data}: run aerialdojo-gen split")
-    scenes = [row for name in names for row in store.read_scene(data, "release/scenes", name).to_pylist()]
+    text = render_card(data)
     with store.atomic_file(data, "release/README.md") as path:
-        path.write_text(render_card(counts(release), scenes), encoding="utf-8")
-    return release / "README.md"
+        path.write_text(text, encoding="utf-8")
+    return data / "release" / "README.md"

@@ -1,4 +1,4 @@
-"""What the release holds, beside the paper's tables: tasks by scene and setting, metres of route, splits."""
+"""What the release holds, beside the paper's tables: in all, by family, by scene (its Table 10) and by split."""
 
 from __future__ import annotations
 
@@ -11,7 +11,11 @@ import numpy as np
 
 from aerialdojo_gen import store
 from aerialdojo_gen.paper import PaperScene, inventory, splits
-from aerialdojo_gen.schemas import SETTINGS
+from aerialdojo_gen.release.comparison import Column, Comparison, Row
+from aerialdojo_gen.schemas import FAMILIES, SETTINGS
+
+_COUNTS = tuple(Column(name) for name in ("landmarks", "objects", "base", "standard", "long", "instances"))
+_KM = Column("km", "km", exact=False)
 
 
 @dataclass(frozen=True)
@@ -22,8 +26,12 @@ class Made:
     ----------
     scene : str
         Name.
+    family, scene_type : str
+        Of the scene.
     landmarks, objects : int
         How many.
+    categories : frozenset of str
+        Of the objects.
     tasks : dict of (str, str) to int
         Navigation tasks by subset (train, test) and setting.
     path_m : float
@@ -33,15 +41,23 @@ class Made:
     """
 
     scene: str
+    family: str
+    scene_type: str
     landmarks: int
     objects: int
+    categories: frozenset[str]
     tasks: dict[tuple[str, str], int]
     path_m: float
     paper: PaperScene | None
 
-    def of(self, setting: str) -> int:
-        """Navigation tasks of a setting."""
-        return self.tasks.get(("train", setting), 0) + self.tasks.get(("test", setting), 0)
+    def of(self, setting: str, subset: str | None = None) -> int:
+        """Navigation tasks of a setting, and of one subset where that is named."""
+        return sum(n for (part, s), n in self.tasks.items() if s == setting and subset in (None, part))
+
+    @property
+    def instances(self) -> int:
+        """Task instances: a navigation task has two."""
+        return 2 * sum(self.tasks.values())
 
 
 def made_of(data: Path, scene: str) -> Made:
@@ -50,7 +66,7 @@ def made_of(data: Path, scene: str) -> Made:
     Raises
     ------
     StoreError
-        The scene is not in the release.
+        A part of the scene is missing or damaged.
     """
     tasks: Counter[tuple[str, str]] = Counter()
     path = 0.0
@@ -58,60 +74,112 @@ def made_of(data: Path, scene: str) -> Made:
         routes = store.read_scene(data, f"routes/{subset}", scene, ["setting", "length_m"])
         tasks.update((subset, setting) for setting in routes["setting"].to_pylist())
         path += float(np.sum(routes["length_m"].to_numpy()))
-    landmarks, objects = (store.count_rows(data, f"release/{table}", scene) for table in ("landmarks", "objects"))
-    return Made(scene, landmarks, objects, dict(tasks), path, inventory().get(scene))
-
-
-def made_lines(made: Sequence[Made]) -> list[str]:
-    """Set the release beside the paper's Table 10: ``ours`` where they agree, ``ours/paper`` where not.
-
-    Settings count instances, two of which a navigation task has; kilometres are those of the tasks' routes.
-    """
-    head = f"{'scene':<22}{'landmarks':>10}{'objects':>9}"
-    head += "".join(f"{s.replace('_horizon', ''):>15}" for s in (*SETTINGS, "instances")) + f"{'km (paper)':>22}"
-    lines, unlike = [head], 0
-    for m in made:
-        ours = [m.landmarks, m.objects, *(2 * m.of(s) for s in SETTINGS)]
-        paper = [m.paper.landmarks, m.paper.objects, *(2 * m.paper.tasks[s] for s in SETTINGS)] if m.paper else ours
-        ours.append(sum(ours[2:]))
-        paper = [*paper, sum(paper[2:])] if m.paper else ours
-        unlike += sum(a != b for a, b in zip(ours, paper, strict=True))
-        cells = [f"{a:,}" if a == b else f"{a:,}/{b:,}" for a, b in zip(ours, paper, strict=True)]
-        km = f"{m.path_m / 1000:,.1f}" + (f" ({m.paper.path_m / 1000:,.1f})" if m.paper else "")
-        lines.append(_line(m.scene, cells, km))
-    total = [sum(m.landmarks for m in made), sum(m.objects for m in made)]
-    total += [2 * sum(m.of(s) for m in made) for s in SETTINGS]
-    total.append(sum(total[2:]))
-    km = f"{sum(m.path_m for m in made) / 1000:,.1f}"
-    if all(m.paper for m in made):
-        km += f" ({sum(m.paper.path_m for m in made if m.paper) / 1000:,.1f})"
-    widths = (10, 9, 15, 15, 15, 15)
-    lines.append(
-        f"{'all':<22}" + "".join(f"{t:,}".rjust(w) for t, w in zip(total, widths, strict=True)) + f"{km:>22}"
+    row = store.read_scene(data, "release/scenes", scene, ["family", "scene_type"]).to_pylist()[0]
+    categories = store.read_scene(data, "release/objects", scene, ["category"])["category"].to_pylist()
+    return Made(
+        scene=scene,
+        family=row["family"],
+        scene_type=row["scene_type"],
+        landmarks=store.count_rows(data, "release/landmarks", scene),
+        objects=len(categories),
+        categories=frozenset(categories),
+        tasks=dict(tasks),
+        path_m=path,
+        paper=inventory().get(scene),
     )
-    if any(m.paper for m in made):
-        lines.append("every number is the paper's" if not unlike else f"{unlike} numbers are not the paper's")
-    return lines
 
 
-def _line(name: str, cells: Sequence[str], km: str) -> str:
-    widths = (10, 9, 15, 15, 15, 15)
-    return f"{name:<22}" + "".join(c.rjust(w) for c, w in zip(cells, widths, strict=True)) + f"{km:>22}"
+def _figures(made: Sequence[Made]) -> tuple[int | float, ...]:
+    settings = [2 * sum(m.of(s) for m in made) for s in SETTINGS]
+    return (
+        sum(m.landmarks for m in made), sum(m.objects for m in made), *settings, sum(settings),
+        sum(m.path_m for m in made) / 1000,
+    )  # fmt: skip
 
 
-def split_lines(made: Sequence[Made]) -> list[str]:
-    """Set the release beside the paper's table of splits, in instances, as `made_lines` does."""
-    lines = [f"{'partition':<12}{'subset':<8}" + "".join(f"{s:>18}" for s in (*SETTINGS, "instances"))]
+def _paper_figures(made: Sequence[Made]) -> tuple[int | float | None, ...]:
+    """The paper's figures of these scenes; none where it does not have one of them."""
+    rows = [m.paper for m in made if m.paper]
+    if len(rows) < len(made):
+        return (None,) * (len(_COUNTS) + 1)
+    settings = [2 * sum(row.tasks[s] for row in rows) for s in SETTINGS]
+    return (
+        sum(row.landmarks for row in rows), sum(row.objects for row in rows), *settings, sum(settings),
+        sum(row.path_m for row in rows) / 1000,
+    )  # fmt: skip
+
+
+def scene_table(made: Sequence[Made]) -> Comparison:
+    """Set the scenes beside the paper's Table 10; settings count instances."""
+    rows = [Row(m.scene, _figures([m]), _paper_figures([m])) for m in made]
+    rows.append(Row("all", _figures(made), _paper_figures(made)))
+    title = "Scenes (the paper's Table 10)" if any(m.paper for m in made) else "Scenes"
+    return Comparison(title, "scene", (*_COUNTS, _KM), tuple(rows))
+
+
+def family_table(made: Sequence[Made]) -> Comparison:
+    """Sum the scenes, and the paper's Table 10, by family."""
+    groups = [(family, [m for m in made if m.family == family]) for family in FAMILIES.values()]
+    groups += [
+        (f, [m for m in made if m.family == f]) for f in sorted({m.family for m in made} - {*FAMILIES.values()})
+    ]
+    rows = []
+    for name, group in [*(g for g in groups if g[1]), ("all", list(made))]:
+        ours, paper = _figures(group), _paper_figures(group)
+        known = len(group) if paper[0] is not None else None
+        rows.append(Row(name, (len(group), *ours), (known, *paper)))
+    return Comparison("Families", "family", (Column("scenes"), *_COUNTS, _KM), tuple(rows))
+
+
+def split_table(made: Sequence[Made]) -> Comparison:
+    """Set the splits beside the paper's table of them, in instances; a part of the scenes has no paper's figures."""
     whole = {m.scene for m in made} >= set(inventory())
+    rows = []
     for (partition, subset), cells in splits().items():
-        ours = [
-            2 * sum(m.tasks.get((subset, s), 0) for m in made if store.partition(m.scene).upper() == partition)
-            for s in SETTINGS
-        ]
-        paper = [2 * cells[s] for s in SETTINGS] if whole else ours
-        pairs = zip([*ours, sum(ours)], [*paper, sum(paper)], strict=True)
-        lines.append(
-            f"{partition:<12}{subset:<8}"
-            + "".join(f"{a:,}".rjust(18) if a == b else f"{a:,}/{b:,}".rjust(18) for a, b in pairs)
+        group = [m for m in made if store.partition(m.scene).upper() == partition]
+        ours = [2 * sum(m.of(s, subset) for m in group) for s in SETTINGS]
+        paper = [2 * cells[s] for s in SETTINGS]
+        known = (*paper, sum(paper)) if whole else (None,) * 4
+        rows.append(Row(f"{partition} {subset}", (*ours, sum(ours)), known))
+    ours_all = tuple(sum(column) for column in zip(*(row.ours for row in rows), strict=True))
+    paper_all = (
+        tuple(sum(column) for column in zip(*(row.paper for row in rows), strict=True)) if whole else (None,) * 4
+    )
+    return Comparison("Splits", "split", _COUNTS[2:], (*rows, Row("all", ours_all, paper_all)))
+
+
+def total_table(made: Sequence[Made]) -> Comparison:
+    """Say what the benchmark holds as a whole.
+
+    The paper's own summary (its Table 2) is not among the files that come with this program: its figures here are the
+    sums of its Table 10.
+    """
+    ours, paper = _figures(made), _paper_figures(made)
+    known = paper[0] is not None
+    rows = [
+        Row(name, (n,), (n if known else None,))
+        for name, n in (
+            ("families", len({m.family for m in made})),
+            ("scene types", len({m.scene_type for m in made})),
+            ("scenes", len(made)),
         )
-    return lines
+    ]
+    rows += [Row(c.name, (a,), (b,)) for c, a, b in zip(_COUNTS[:2], ours, paper, strict=False)]
+    rows.append(Row("object categories", (len(frozenset().union(*(m.categories for m in made))),), (None,)))
+    names = ("instances, base", "instances, standard", "instances, long-horizon", "instances")
+    rows += [Row(name, (a,), (b,)) for name, a, b in zip(names, ours[2:6], paper[2:6], strict=True)]
+    tasks = [None if n is None else int(n) // 2 for n in (ours[5], paper[5])]
+    rows.append(Row("navigation tasks", (tasks[0],), (tasks[1],)))
+    rows.append(Row("routes in all, km", (ours[6],), (paper[6],)))
+    means = [
+        1000 * km / n if km is not None and n else None for km, n in zip((ours[6], paper[6]), tasks, strict=True)
+    ]
+    rows.append(Row("mean route, m", (means[0],), (means[1],)))
+    return Comparison("The benchmark as a whole", "", (Column("figure", exact=False),), tuple(rows))
+
+
+def tables(made: Sequence[Made]) -> list[Comparison]:
+    """Make all tables: the whole, families, scenes (the paper's in its own order, then others), splits."""
+    order = {name: k for k, name in enumerate(inventory())}
+    made = sorted(made, key=lambda m: (order.get(m.scene, len(order)), m.scene))
+    return [total_table(made), family_table(made), scene_table(made), split_table(made)]
