@@ -39,10 +39,13 @@ class Picture:
         sRGB.
     depth_m : (H, W) float32
         Planar depth, metres; inf where nothing is hit.
+    instance : (H, W) int32 or None
+        Number of the instance in the scene's order, -1 where nothing is hit; None where it was not asked for.
     """
 
     rgb: NDArray[np.uint8]
     depth_m: NDArray[np.float32]
+    instance: NDArray[np.int32] | None = None
 
 
 class RenderWorld:

@@ -1,0 +1,258 @@
+"""The renderers behind one interface, and the choice between them.
+
+- ``gl``: OpenGL over EGL (Mesa's llvmpipe, or a graphics card); needs the package moderngl and libEGL.
+- ``pybullet``: PyBullet's TinyRenderer; runs anywhere, ten times slower.
+
+PyBullet's own EGL plugin is not among them: its 16-bit depth buffer does not pass the check below
+(`docs/recordings.md` has the figures).
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from functools import lru_cache
+from types import TracebackType
+from typing import Literal, Protocol, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aerialdojo_gen.errors import RenderError
+from aerialdojo_gen.geometry.cameras import Camera, view_pose
+from aerialdojo_gen.geometry.rays import RayCaster
+from aerialdojo_gen.rendering.probe import probe_scene
+from aerialdojo_gen.rendering.world import Picture, RenderWorld, ray_caster
+from aerialdojo_gen.scenes.model import Scene
+
+Floats = NDArray[np.float64]
+
+RendererName = Literal["gl", "pybullet"]
+# The fastest first.
+RENDERERS: tuple[RendererName, ...] = ("gl", "pybullet")
+
+_TOLERANCE_M, _SHARE = 0.01, 0.999
+
+
+class Renderer(Protocol):
+    """A scene ready to be rendered; a context manager that frees its memory at its end.
+
+    Attributes
+    ----------
+    name : str
+        One of `RENDERERS`.
+    device : str
+        What draws, in the driver's words.
+    """
+
+    @property
+    def name(self) -> str:
+        """One of `RENDERERS`."""
+        ...
+
+    @property
+    def device(self) -> str:
+        """What draws, in the driver's words."""
+        ...
+
+    def render(self, camera: Camera, world_from_camera: Floats, instances: bool = False) -> Picture:
+        """Take a picture.
+
+        Parameters
+        ----------
+        camera : Camera
+        world_from_camera : (4, 4) float64
+            From `aerialdojo_gen.geometry.cameras.view_pose` or `look_at_pose`.
+        instances : bool
+            Whether the picture has an instance id map.
+
+        Returns
+        -------
+        Picture
+            Arrays of its own: a later call does not change them.
+        """
+        ...
+
+    def close(self) -> None:
+        """Free the memory; a second call does nothing."""
+        ...
+
+    def __enter__(self) -> Self:
+        """Return itself."""
+        ...
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Free the memory."""
+        ...
+
+
+class PyBulletRenderer:
+    """A scene in PyBullet's TinyRenderer; see `Renderer`.
+
+    Parameters
+    ----------
+    scene : Scene
+    """
+
+    name = "pybullet"
+    device = "TinyRenderer"
+
+    def __init__(self, scene: Scene) -> None:
+        self._scene = scene
+        self._world = RenderWorld(scene)
+
+    def render(self, camera: Camera, world_from_camera: Floats, instances: bool = False) -> Picture:
+        """Take a picture; the instance id map is made by casting a ray a pixel."""
+        picture = self._world.render(camera, world_from_camera)
+        if not instances:
+            return picture
+        rays = camera.rays().reshape(-1, 3) @ world_from_camera[:3, :3].T
+        owner = ray_caster(self._scene).first_hit(world_from_camera[:3, 3], rays)[1]
+        return Picture(picture.rgb, picture.depth_m, owner.reshape(camera.height, camera.width))
+
+    def close(self) -> None:
+        """Free the memory."""
+        self._world.close()
+
+    def __enter__(self) -> Self:
+        """Return itself."""
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Free the memory."""
+        self.close()
+
+
+@dataclass(frozen=True)
+class Choice:
+    """Which renderer is taken, and why.
+
+    Attributes
+    ----------
+    name : str
+        One of `RENDERERS`.
+    why : str
+        One line for people.
+    """
+
+    name: RendererName
+    why: str
+
+
+def open_renderer(scene: Scene, name: str = "auto") -> Renderer:
+    """Make a scene ready to be rendered.
+
+    Parameters
+    ----------
+    scene : Scene
+    name : str
+        One of `RENDERERS`, or ``"auto"``: the fastest that works here (`choose_renderer`).
+
+    Returns
+    -------
+    Renderer
+        For the caller to close, e.g. by ``with``.
+
+    Raises
+    ------
+    RenderError
+        The renderer does not work here.
+    """
+    if name == "auto":
+        name = choose_renderer().name
+    if name == "pybullet":
+        return PyBulletRenderer(scene)
+    if name == "gl":
+        from aerialdojo_gen.rendering.gl import GlRenderer
+
+        return GlRenderer(scene)
+    raise RenderError(f"there is no renderer {name!r}: it is one of {', '.join(RENDERERS)}, or auto")
+
+
+@lru_cache
+def choose_renderer(name: str = "auto") -> Choice:
+    """Choose the fastest renderer whose pictures of a known scene are right, or check the one that is named.
+
+    Parameters
+    ----------
+    name : str
+        One of `RENDERERS`, or ``"auto"``.
+
+    Returns
+    -------
+    Choice
+        The same for every call of a process.
+
+    Raises
+    ------
+    RenderError
+        What was asked for does not work here, or draws what is not there.
+    """
+    failures = []
+    for candidate in RENDERERS if name == "auto" else (name,):
+        try:
+            with open_renderer(probe_scene(), candidate) as renderer:
+                said = check(renderer)
+        except RenderError as error:
+            if name != "auto":
+                raise
+            failures.append(str(error))
+            continue
+        known = next(n for n in RENDERERS if n == candidate)
+        return Choice(known, "; ".join([f"renderer {candidate} ({renderer.device}): {said}", *failures]))
+    raise RenderError("; ".join(failures))
+
+
+def check(renderer: Renderer) -> str:
+    """Check a renderer of `probe_scene` against ray casts.
+
+    Parameters
+    ----------
+    renderer : Renderer
+        Of `probe_scene`.
+
+    Returns
+    -------
+    str
+        What was found, for people.
+
+    Raises
+    ------
+    RenderError
+        Fewer than 99.9 % of the pixels have their depth within 1 cm (a pixel of sky has none), or a red cube is not
+        red where it stands.
+    """
+    scene = probe_scene()
+    caster, camera = RayCaster(scene), Camera(192, 192, 90.0)
+    rays = camera.rays().reshape(-1, 3)
+    right = pixels = 0
+    seconds = 0.0
+    for k, view in enumerate(("front", "left", "right", "down")):
+        pose = view_pose((-1.3, 0.4, 2.6), 0.35, view)
+        if k == 0:
+            renderer.render(camera, pose)  # the first picture is slower than all others
+        begun = time.process_time()
+        picture = renderer.render(camera, pose)
+        seconds += time.process_time() - begun
+        along, owner = caster.first_hit(pose[:3, 3], rays @ pose[:3, :3].T)
+        cast = (along / np.linalg.norm(rays, axis=1)).reshape(picture.depth_m.shape)
+        with np.errstate(invalid="ignore"):
+            agrees = np.abs(picture.depth_m - cast) <= _TOLERANCE_M
+        right += int((agrees | (np.isinf(cast) & np.isinf(picture.depth_m))).sum())
+        pixels += agrees.size
+        on_cube = (owner == next(n for n, i in enumerate(scene.instances) if i.node == "cube")).reshape(cast.shape)
+        if on_cube.any():
+            red, green, blue = np.median(picture.rgb[on_cube].astype(float), axis=0)
+            if red < 2.0 * max(green, blue):
+                raise RenderError(
+                    f"the renderer {renderer.name} draws a red cube in ({red:.0f}, {green:.0f}, {blue:.0f})"
+                )
+    share = right / pixels
+    figures = f"depth within 1 cm of ray casts at {100 * share:.2f} % of {pixels:,} pixels"
+    if share < _SHARE:
+        raise RenderError(f"the renderer {renderer.name} ({renderer.device}) is refused: {figures}")
+    return f"{figures}, {1e3 * seconds / 4:.1f} ms CPU a view of {camera.width} x {camera.height}"

@@ -1,0 +1,259 @@
+"""A scene in OpenGL, over EGL and without a window: on Mesa's llvmpipe (a processor) or on a graphics card."""
+
+from __future__ import annotations
+
+import ctypes.util
+import importlib
+import os
+from functools import lru_cache
+from types import TracebackType
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from aerialdojo_gen.errors import RenderError
+from aerialdojo_gen.geometry.cameras import Camera
+from aerialdojo_gen.rendering import gl_shaders as glsl
+from aerialdojo_gen.rendering.gl_geometry import VERTEX, chunks
+from aerialdojo_gen.rendering.lighting import lighting, sun_view
+from aerialdojo_gen.rendering.world import FAR_M, NEAR_M, Picture
+from aerialdojo_gen.scenes.model import Scene
+
+Floats = NDArray[np.float64]
+
+_SHADOW_PX = 2048
+_MEND = "install moderngl (pip install 'aerialdojo-gen[gl]') and Mesa (Debian: libegl1 libgl1 libgl1-mesa-dri)"
+_FORMATS = {
+    "position": "3f", "uv": "2f", "normal": "3f", "colour": "4f1", "texel_m": "1f", "layer": "1f", "instance": "1f",
+}  # fmt: skip
+
+
+@lru_cache(maxsize=1)
+def context() -> Any:
+    """Return this process's OpenGL context.
+
+    Returns
+    -------
+    moderngl.Context
+
+    Raises
+    ------
+    RenderError
+        moderngl or EGL is missing; the message says what to install.
+    """
+    # One thread: several processes share the cores, and more threads would only wait for each other.
+    os.environ.setdefault("LP_NUM_THREADS", "1")
+    try:
+        moderngl: Any = importlib.import_module("moderngl")
+
+        # The libraries' development packages, which have the names without a version, need not be there.
+        found = {"libegl": ctypes.util.find_library("EGL"), "libgl": ctypes.util.find_library("GL")}
+        named = {option: library for option, library in found.items() if library}
+        return moderngl.create_standalone_context(backend="egl", require=430, **named)
+    except ImportError:
+        raise RenderError(f"the renderer gl lacks the package moderngl: {_MEND}") from None
+    except Exception as error:  # glcontext raises plain Exceptions
+        raise RenderError(f"the renderer gl does not start ({error}): {_MEND}") from None
+
+
+def device() -> str:
+    """Name what draws, in the driver's words; RenderError where there is no OpenGL."""
+    return str(context().info["GL_RENDERER"])
+
+
+class GlRenderer:
+    """A scene ready to be rendered by OpenGL; a context manager that frees its memory at its end.
+
+    Parameters
+    ----------
+    scene : Scene
+        Copied into buffers. Front faces alone are drawn (those wound counter-clockwise as the camera sees them).
+
+    Raises
+    ------
+    RenderError
+        There is no OpenGL here; the message says what to install.
+    """
+
+    name = "gl"
+
+    def __init__(self, scene: Scene) -> None:
+        self._gl = context()
+        self.device = device()
+        self._owned: list[Any] = []
+        self._programs: dict[tuple[str, ...], Any] = {}
+        self._arrays: dict[tuple[str, ...], Any] = {}
+        self._targets: dict[tuple[int, int, bool], Any] = {}
+        textured, flat, layers = chunks(scene)
+        self._sets = [
+            (tags, kind, self._own(self._gl.buffer(kind.vertices.tobytes())))
+            for tags, kind in ((("TEXTURED",), textured), ((), flat))
+            if len(kind.low)
+        ]
+        most = max(len(kind.vertices) for _, kind, _ in self._sets)
+        self._indices = self._own(self._gl.buffer(reserve=4 * most, dynamic=True))
+        self._textures = None if layers is None else self._texture_array(layers)
+        self._light = lighting(scene, [])
+        camera, pose, near_m, far_m = sun_view(scene, _SHADOW_PX)
+        self._sun_from_world = clip_from_world(camera, pose, near_m, far_m)
+        self._bias_m = 0.03 + 1.5 * (near_m + far_m) / 2.0 / camera.focal_px
+        self._shadow = self._shadow_map()
+
+    def _own(self, thing: Any) -> Any:
+        self._owned.append(thing)
+        return thing
+
+    def _texture_array(self, layers: NDArray[np.uint8]) -> Any:
+        n, height, width, _ = layers.shape
+        texture = self._own(self._gl.texture_array((width, height, n), 3, layers.tobytes()))
+        texture.build_mipmaps()
+        texture.filter = (self._gl.LINEAR_MIPMAP_LINEAR, self._gl.NEAREST)
+        return texture
+
+    def _shadow_map(self) -> Any:
+        """Draw what the sun sees: a depth texture that is read by comparing, the four nearest values averaged."""
+        gl = self._gl
+        shadow = self._own(gl.depth_texture((_SHADOW_PX, _SHADOW_PX)))
+        target = gl.framebuffer(depth_attachment=shadow)
+        program = gl.program(*glsl.SUN)
+        program["clip_from_world"].write(_columns(self._sun_from_world))
+        self._begin(target)
+        for _, _, buffer in self._sets:
+            array = gl.vertex_array(program, [_content(program, buffer)])
+            array.render()
+            array.release()
+        program.release()
+        target.release()
+        shadow.compare_func = "<="
+        shadow.filter = (gl.LINEAR, gl.LINEAR)
+        return shadow
+
+    def _begin(self, target: Any) -> None:
+        gl = self._gl
+        target.use()
+        gl.enable_only(gl.DEPTH_TEST | gl.CULL_FACE)
+        # Pictures are drawn upside down, so that their first row comes first in memory: that turns the winding.
+        gl.front_face = "cw"
+        gl.depth_func = "<="
+        target.clear(depth=1.0)
+
+    def render(self, camera: Camera, world_from_camera: Floats, instances: bool = False) -> Picture:
+        """Take a picture; see `aerialdojo_gen.rendering.backend.Renderer`."""
+        target = self._target(camera.width, camera.height, instances)
+        clip = clip_from_world(camera, world_from_camera, NEAR_M, FAR_M)
+        eye = world_from_camera[:3, 3]
+        self._begin(target)
+        if self._textures is not None:
+            self._textures.use(0)
+        self._shadow.use(1)
+        tags = ("INSTANCES",) if instances else ()
+        for own_tags, kind, buffer in self._sets:
+            seen = kind.seen(clip, eye, camera.width, camera.height)
+            if not len(seen):
+                continue
+            array = self._array((*own_tags, *tags), buffer)
+            _set(
+                array.program, clip_from_world=_columns(clip), eye=eye, focal_px=camera.focal_px,
+            )  # fmt: skip
+            self._indices.orphan()
+            self._indices.write(seen)
+            array.render(vertices=len(seen))
+        self._gl.disable(self._gl.CULL_FACE)
+        sky = self._array(("SKY", *tags), None)
+        reach = np.array([camera.width, camera.height]) / 2.0 / camera.focal_px
+        _set(sky.program, world_from_camera=_columns(world_from_camera[:3, :3]), reach=reach)
+        sky.render(vertices=3)
+        return _read(target, camera, instances)
+
+    def _array(self, tags: tuple[str, ...], buffer: Any) -> Any:
+        """Return the vertex array of a program and its buffer, made when it is first needed."""
+        if tags not in self._arrays:
+            sky = "SKY" in tags
+            sources = glsl.SKY if sky else glsl.SURFACES
+            program = self._own(self._gl.program(*(glsl.specialise(source, *tags) for source in sources)))
+            _set(
+                program, sun_from_world=_columns(self._sun_from_world), sun=self._light.sun, bias_m=self._bias_m,
+                horizon=self._light.horizon, zenith=self._light.zenith, textures=0, shadow=1,
+            )  # fmt: skip
+            content, indices = ([], None) if sky else ([_content(program, buffer)], self._indices)
+            self._arrays[tags] = self._own(self._gl.vertex_array(program, content, index_buffer=indices))
+        return self._arrays[tags]
+
+    def _target(self, width: int, height: int, instances: bool) -> Any:
+        key = (width, height, instances)
+        if key not in self._targets:
+            gl, size = self._gl, (width, height)
+            colours = [gl.renderbuffer(size, 4), gl.renderbuffer(size, 1, dtype="f4")]
+            if instances:
+                # As floats, exact to 16 million: not every driver clears an attachment of integers.
+                colours.append(gl.renderbuffer(size, 1, dtype="f4"))
+            depth = gl.depth_renderbuffer(size)
+            self._targets[key] = self._own(gl.framebuffer(colours, depth))
+            self._owned += [*colours, depth]
+        return self._targets[key]
+
+    def close(self) -> None:
+        """Free the renderer's memory; a second call does nothing."""
+        while self._owned:
+            self._owned.pop().release()
+        self._arrays, self._targets = {}, {}
+
+    def __enter__(self) -> GlRenderer:
+        """Return itself."""
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Free the renderer's memory."""
+        self.close()
+
+
+def clip_from_world(camera: Camera, world_from_camera: Floats, near_m: float, far_m: float) -> Floats:
+    """OpenGL's matrix for a camera, row-major (4, 4) float64, the picture's first row at the bottom.
+
+    Pixel centres are where OpenGL samples: nothing is to be shifted.
+    """
+    x, y = 2.0 * camera.focal_px / camera.width, 2.0 * camera.focal_px / camera.height
+    span = far_m - near_m
+    projection = np.diag([x, y, (far_m + near_m) / span, 0.0])
+    projection[2, 3], projection[3, 2] = -2.0 * far_m * near_m / span, 1.0
+    return np.asarray(projection @ np.linalg.inv(world_from_camera))
+
+
+def _columns(matrix: Floats) -> bytes:
+    return np.ascontiguousarray(matrix.T, dtype=np.float32).tobytes()
+
+
+def _set(program: Any, **values: Any) -> None:
+    """Set those uniforms that the program has: a compiler drops what a variant does not use."""
+    for name, value in values.items():
+        if name in program:
+            if isinstance(value, bytes):
+                program[name].write(value)
+            else:
+                program[name].value = tuple(value.tolist()) if isinstance(value, np.ndarray) else value
+
+
+def _content(program: Any, buffer: Any) -> tuple[Any, ...]:
+    """Describe the buffer to a vertex array: the fields that the program reads, and gaps for the others."""
+    fields = [(name, name in program) for name in _FORMATS]
+    sizes = {name: VERTEX.fields[name][0].itemsize for name in _FORMATS} if VERTEX.fields else {}
+    layout = " ".join(_FORMATS[name] if used else f"{sizes[name]}x" for name, used in fields)
+    return (buffer, layout, *(name for name, used in fields if used))
+
+
+def _read(target: Any, camera: Camera, instances: bool) -> Picture:
+    shape = (camera.height, camera.width)
+    rgba = np.empty((*shape, 4), dtype=np.uint8)
+    depth = np.empty(shape, dtype=np.float32)
+    target.read_into(rgba, components=4)
+    target.read_into(depth, components=1, attachment=1, dtype="f4")
+    found = None
+    if instances:
+        numbers = np.empty(shape, dtype=np.float32)
+        target.read_into(numbers, components=1, attachment=2, dtype="f4")
+        found = numbers.astype(np.int32) - 1
+    return Picture(np.asarray(cv2.cvtColor(rgba, cv2.COLOR_RGBA2RGB), dtype=np.uint8), depth, found)

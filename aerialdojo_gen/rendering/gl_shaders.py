@@ -1,0 +1,179 @@
+"""The GLSL programs of the OpenGL renderer: the formulas of `aerialdojo_gen.rendering.shading`, a pixel at a time."""
+
+from __future__ import annotations
+
+from aerialdojo_gen.rendering import shading
+
+_HEAD = "#version 330 core\n"
+
+_VERTEX = (
+    _HEAD
+    + """
+uniform mat4 clip_from_world;
+uniform mat4 sun_from_world;
+uniform vec3 eye;
+uniform vec3 sun;
+uniform float bias_m;
+in vec3 position;
+in vec3 normal;
+in vec4 colour;
+#ifdef TEXTURED
+in vec2 uv;
+in float texel_m;
+in float layer;
+out vec2 v_uv;
+flat out vec2 v_texture;
+flat out vec3 v_normal;
+#endif
+#ifdef INSTANCES
+in float instance;
+flat out float v_instance;
+#endif
+out vec3 v_ray;
+out vec4 v_sun;
+flat out vec3 v_colour;
+flat out vec2 v_light;
+void main() {
+    gl_Position = clip_from_world * vec4(position, 1.0);
+    vec3 n = normal;
+    v_ray = position - eye;
+    vec4 s = sun_from_world * vec4(position + n * bias_m, 1.0);
+    v_sun = vec4((s.xyz + s.w) * 0.5, s.w);
+    v_colour = colour.rgb * 255.0;
+    v_light = vec2(AMBIENT + FROM_ABOVE * n.z + FROM_EAST * n.x + FROM_NORTH * n.y, SUN * max(dot(n, sun), 0.0));
+#ifdef TEXTURED
+    v_uv = uv;
+    v_texture = vec2(layer, texel_m);
+    v_normal = n;
+#endif
+#ifdef INSTANCES
+    v_instance = instance + 1.0;
+#endif
+}
+"""
+)
+
+_FRAGMENT = (
+    _HEAD
+    + """
+uniform sampler2DShadow shadow;
+uniform vec3 horizon;
+uniform float focal_px;
+#ifdef TEXTURED
+uniform sampler2DArray textures;
+in vec2 v_uv;
+flat in vec2 v_texture;
+flat in vec3 v_normal;
+#endif
+in vec3 v_ray;
+in vec4 v_sun;
+flat in vec3 v_colour;
+flat in vec2 v_light;
+layout(location = 0) out vec4 out_colour;
+layout(location = 1) out float out_depth;
+#ifdef INSTANCES
+flat in float v_instance;
+layout(location = 2) out float out_instance;
+#endif
+void main() {
+    float range_m = length(v_ray);
+    vec3 base = v_colour;
+#ifdef TEXTURED
+    float facing = -dot(v_normal, v_ray) / range_m;
+    float texels = range_m / (focal_px * v_texture.y * sqrt(max(facing, 0.02)));
+    float keep = clamp((FADE - texels) / (FADE - 1.0), 0.0, 1.0);
+    base = mix(base, texture(textures, vec3(v_uv, v_texture.x)).rgb * 255.0, keep);
+#endif
+    float lit = v_light.y * textureProj(shadow, v_sun);
+    float haze = 1.0 - exp(range_m * (-1.0 / HAZE_RANGE));
+    vec3 value = mix(base * (v_light.x + lit), horizon, haze * haze);
+    out_colour = vec4(value / 255.0, 1.0);
+    out_depth = 1.0 / gl_FragCoord.w;
+#ifdef INSTANCES
+    out_instance = v_instance;
+#endif
+}
+"""
+)
+
+_SUN_VERTEX = (
+    _HEAD
+    + """
+uniform mat4 clip_from_world;
+in vec3 position;
+void main() { gl_Position = clip_from_world * vec4(position, 1.0); }
+"""
+)
+
+_SUN_FRAGMENT = _HEAD + "void main() {}\n"
+
+_SKY_VERTEX = (
+    _HEAD
+    + """
+uniform mat3 world_from_camera;
+uniform vec2 reach;  // half the picture's width and height at a depth of 1
+out vec3 v_ray;
+void main() {
+    // One triangle over the whole picture, at the far end.
+    vec2 p = vec2((gl_VertexID & 1) * 4 - 1, (gl_VertexID >> 1) * 4 - 1);
+    v_ray = world_from_camera * vec3(p * reach, 1.0);
+    gl_Position = vec4(p, 1.0, 1.0);
+}
+"""
+)
+
+_SKY_FRAGMENT = (
+    _HEAD
+    + """
+uniform vec3 horizon;
+uniform vec3 zenith;
+in vec3 v_ray;
+layout(location = 0) out vec4 out_colour;
+layout(location = 1) out float out_depth;
+#ifdef INSTANCES
+layout(location = 2) out float out_instance;
+#endif
+void main() {
+    float up = pow(max(v_ray.z, 0.0) / length(v_ray), 0.55);
+    out_colour = vec4(mix(horizon, zenith, up) / 255.0, 1.0);
+    out_depth = uintBitsToFloat(0x7f800000u);
+#ifdef INSTANCES
+    out_instance = 0.0;
+#endif
+}
+"""
+)
+
+# A vertex and a fragment program each.
+SURFACES = (_VERTEX, _FRAGMENT)
+SUN = (_SUN_VERTEX, _SUN_FRAGMENT)
+SKY = (_SKY_VERTEX, _SKY_FRAGMENT)
+
+
+def specialise(source: str, *defined: str) -> str:
+    """Give a program its constants and its variant.
+
+    Parameters
+    ----------
+    source : str
+        One of this module's programs.
+    *defined : str
+        Of ``TEXTURED`` (samples the texture array) and ``INSTANCES`` (writes the instance id map).
+
+    Returns
+    -------
+    str
+        GLSL that compiles.
+    """
+    constants = {
+        "AMBIENT": shading._AMBIENT,
+        "FROM_ABOVE": shading._FROM_ABOVE,
+        "FROM_EAST": shading._FROM_EAST,
+        "FROM_NORTH": shading._FROM_NORTH,
+        "SUN": shading._SUN,
+        "HAZE_RANGE": shading._HAZE_RANGE_M,
+        "FADE": shading._FADE_TEXELS,
+    }
+    lines = [f"#define {name} {value:.6f}" for name, value in constants.items()]
+    lines += [f"#define {name}" for name in defined]
+    return source.replace(_HEAD, _HEAD + "\n".join(lines) + "\n", 1)
