@@ -1,0 +1,148 @@
+"""Figures of an evaluation: the radar over the families, and success against the radius; PNG and SVG, for print."""
+
+from __future__ import annotations
+
+import io
+import math
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from aerialdojo_gen.benchmark.metrics import Summary, success_curve, summarize
+from aerialdojo_gen.benchmark.profiles import Profile
+from aerialdojo_gen.benchmark.runs import Run
+from aerialdojo_gen.schemas import FAMILIES
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+# Okabe and Ito's colours, which colour-blind readers tell apart too; line styles carry what is left.
+_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#999999")
+_STYLE: dict[Any, Any] = {
+    "font.family": "DejaVu Sans", "font.size": 9, "axes.linewidth": 0.8, "axes.edgecolor": "#444444",
+    "grid.color": "#dddddd", "grid.linewidth": 0.6, "svg.hashsalt": "aerialdojo", "svg.fonttype": "path",
+}  # fmt: skip
+
+
+def family_radar(runs: Sequence[Run], profile: Profile) -> Figure:
+    """Draw SR and SPL of every family, an axis each, a polygon a run.
+
+    Parameters
+    ----------
+    runs : sequence of Run
+        One or more.
+    profile : Profile
+        The rule of success.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        A family without episodes has a gap in the polygon, not a zero.
+    """
+    families = list(FAMILIES.values())
+    angles = np.linspace(0.0, 2.0 * math.pi, len(families), endpoint=False)
+    summaries = [summarize(run.episodes, profile) for run in runs]
+
+    def draw(figure: Figure) -> None:
+        panels: Any = figure.subplots(1, 2, subplot_kw={"projection": "polar"})
+        for axes, metric in zip(panels, ("sr", "spl"), strict=True):
+            for k, (run, summary) in enumerate(zip(runs, summaries, strict=True)):
+                values = _percent(summary, families, metric)
+                colour = _COLOURS[k % len(_COLOURS)]
+                axes.plot(
+                    [*angles, angles[0]], [*values, values[0]], "o-", color=colour, lw=1.6, ms=3.5, label=run.label
+                )
+                axes.fill(angles, values, color=colour, alpha=0.08)
+            axes.set_theta_zero_location("N")
+            axes.set_theta_direction(-1)
+            axes.set_xticks(angles, families)
+            axes.tick_params(axis="x", pad=6)
+            axes.set_ylim(0.0, 100.0)
+            axes.set_yticks([25, 50, 75, 100], ["25", "50", "75", "100"], color="#777777", size=7)
+            axes.set_rlabel_position(45)
+            axes.set_title(f"{metric.upper()}, %", pad=14, size=10)
+        figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=4, frameon=False)
+
+    return _figure(draw, (6.8, 3.7))
+
+
+def radius_curve(runs: Sequence[Run], profile: Profile, largest_m: float = 25.0) -> Figure:
+    """Draw overall SR (solid) and OSR (dashed) against the radius that counts as success.
+
+    Parameters
+    ----------
+    runs : sequence of Run
+        One or more.
+    profile : Profile
+        Everything of the rule but its radius, which is marked.
+    largest_m : float
+        End of the axis, metres.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+    """
+    radii = np.linspace(0.0, largest_m, 501)
+
+    def draw(figure: Figure) -> None:
+        axes = figure.subplots()
+        for k, run in enumerate(runs):
+            sr, osr = success_curve(run.episodes, profile, radii)
+            colour = _COLOURS[k % len(_COLOURS)]
+            axes.plot(radii, 100.0 * sr, "-", color=colour, lw=1.8, label=run.label, zorder=3)
+            axes.plot(radii, 100.0 * osr, "--", color=colour, lw=1.2, zorder=2)
+        for radius in sorted({profile.radius_m, 5.0} if profile.name == "aerialdojo" else {profile.radius_m}):
+            axes.axvline(radius, color="#888888", lw=0.8, ls=":", zorder=1)
+            axes.annotate(
+                f"{radius:g} m", (radius, 1.0), xycoords=("data", "axes fraction"), xytext=(0, 3),
+                textcoords="offset points", ha="center", size=8, color="#555555",
+            )  # fmt: skip
+        axes.plot([], [], "-", color="#555555", lw=1.8, label="SR")
+        axes.plot([], [], "--", color="#555555", lw=1.2, label="OSR")
+        axes.set(xlabel="radius, m", ylabel="episodes, %", xlim=(0.0, largest_m), ylim=(-2.0, 102.0))
+        axes.grid(True)
+        axes.spines[["top", "right"]].set_visible(False)
+        figure.legend(loc="outside right upper", frameon=False)
+
+    return _figure(draw, (6.0, 3.4))
+
+
+def _percent(summary: Summary, families: Sequence[str], metric: str) -> list[float]:
+    scores = [summary.families.get(family) for family in families]
+    return [100.0 * getattr(score, metric) if score else math.nan for score in scores]
+
+
+def _figure(draw: Callable[[Figure], None], size_inches: tuple[float, float]) -> Figure:
+    # Not pyplot: that keeps figures for a screen that nobody looks at.
+    import matplotlib
+    from matplotlib.figure import Figure
+
+    with matplotlib.rc_context(_STYLE):
+        figure = Figure(size_inches, layout="constrained")
+        draw(figure)
+    return figure
+
+
+def encoded(figure: Figure, kind: str) -> bytes:
+    """Encode a figure; the same figure gives the same bytes.
+
+    Parameters
+    ----------
+    figure : matplotlib.figure.Figure
+        From this module.
+    kind : str
+        png (at 200 dots an inch) or svg.
+
+    Returns
+    -------
+    bytes
+    """
+    import matplotlib
+
+    out = io.BytesIO()
+    # Without these the file says when, and by which version, it was made.
+    metadata: dict[str, Any] = {"Date": None, "Creator": None} if kind == "svg" else {"Software": None}
+    with matplotlib.rc_context(_STYLE):
+        figure.savefig(out, format=kind, dpi=200, metadata=metadata)
+    return out.getvalue()

@@ -1,0 +1,133 @@
+"""Runs of an evaluation, read for tables, figures and the report."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import pyarrow as pa
+import pyarrow.compute as pc
+
+from aerialdojo_gen.benchmark.episodes import read_run, runs
+from aerialdojo_gen.benchmark.metrics import Episodes, episodes_of
+from aerialdojo_gen.errors import StoreError
+from aerialdojo_gen.schemas import TERMINATIONS
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """A run and its episodes.
+
+    Attributes
+    ----------
+    name : str
+        The run's id.
+    label : str
+        What tables call it: its agent, with the run's id where two runs have one agent.
+    agent, options : str
+        The agent, and its options as JSON.
+    table : pyarrow.Table
+        The log, all columns.
+    episodes : Episodes
+        What the metrics take from it.
+    """
+
+    name: str
+    label: str
+    agent: str
+    options: str
+    table: pa.Table
+    episodes: Episodes
+
+
+def load_runs(data: Path, names: Sequence[str] = ()) -> list[Run]:
+    """Read runs.
+
+    Parameters
+    ----------
+    data : Path
+        The directory that `evaluate` wrote to.
+    names : sequence of str
+        Their ids, in the order that tables keep; all there are where empty.
+
+    Returns
+    -------
+    list of Run
+
+    Raises
+    ------
+    StoreError
+        There is no such run, or none at all, or a part of one is damaged.
+    """
+    chosen = list(dict.fromkeys(names)) or runs(data)
+    if not chosen:
+        raise StoreError(f"no runs in {data}: run aerialdojo-gen evaluate")
+    tables = [read_run(data, name) for name in chosen]
+    agents = [table["agent"][0].as_py() for table in tables]
+    return [
+        Run(
+            name,
+            agent if agents.count(agent) == 1 else f"{agent} ({name})",
+            agent,
+            table["agent_options"][0].as_py(),
+            table,
+            episodes_of(table),
+        )
+        for name, agent, table in zip(chosen, agents, tables, strict=True)
+    ]
+
+
+@dataclass(frozen=True)
+class Conduct:
+    """How a run's episodes went, whatever they earned.
+
+    Attributes
+    ----------
+    episodes : int
+        How many.
+    ended : dict of str to float
+        Share of the episodes by how they ended: stop, collision, budget.
+    actions : float
+        Mean number of actions.
+    refused, invalid : int
+        Moves out of the flight volume; answers that named no action.
+    requests, input_tokens, output_tokens : int or None
+        Of an outside service, all episodes together; None where it does not say.
+    cost_usd : float or None
+        None where prices are not known.
+    """
+
+    episodes: int
+    ended: dict[str, float]
+    actions: float
+    refused: int
+    invalid: int
+    requests: int | None
+    input_tokens: int | None
+    output_tokens: int | None
+    cost_usd: float | None
+
+
+def conduct(run: Run) -> Conduct:
+    """Count how a run's episodes went."""
+    n = len(run.episodes)
+    ends = run.table["termination"].to_pylist()
+
+    def total(name: str) -> int | None:
+        # A sum with a hole in it is not known.
+        return None if run.table[name].null_count else int(pc.sum(run.table[name]).as_py() or 0)
+
+    costs = run.table["cost_usd"]
+    return Conduct(
+        n,
+        {how: ends.count(how) / n for how in TERMINATIONS},
+        float(run.episodes.n_actions.mean()),
+        total("n_refused") or 0,
+        total("n_invalid") or 0,
+        total("n_requests"),
+        total("input_tokens"),
+        total("output_tokens"),
+        None if costs.null_count else math.fsum(costs.to_pylist()),
+    )
