@@ -47,3 +47,7 @@ class PoolError(AerialDojoError):
 
 class RenderError(AerialDojoError):
     """Rendering or encoding failed."""
+
+
+class ImportRefused(AerialDojoError):
+    """A task file of another benchmark is damaged or has rows that make no sense; the message names each."""

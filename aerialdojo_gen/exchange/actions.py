@@ -1,0 +1,180 @@
+"""Actions of other benchmarks as steps in the body's frame, and as actions of ours.
+
+A step is (forward, left, up, turn): metres and radians, turn counter-clockwise.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aerialdojo_gen.planning.primitives import DISPLACEMENTS, TURN_RAD
+from aerialdojo_gen.schemas import ACTION_NAMES, APPROACH, STOP, TURN_LEFT, TURN_RIGHT
+
+Floats = NDArray[np.float64]
+
+# How far a recorded move may be from one of ours and still be called by its name.
+_SAME_M, _SAME_RAD = 0.25, math.radians(1.0)
+_EXACT_M = 1e-5
+
+
+@dataclass(frozen=True)
+class Move:
+    """What a foreign action does.
+
+    Attributes
+    ----------
+    name : str
+        Its name in the file or, where that has numbers, in the benchmark's documents.
+    step : tuple of 4 float
+        Forward, left, up in metres; turn in radians, counter-clockwise.
+    ours : int or None
+        The action of ours that does the same; None where none does.
+    """
+
+    name: str
+    step: tuple[float, float, float, float]
+    ours: int | None
+
+
+def move(name: str, *, forward: float = 0, left: float = 0, up: float = 0, turn_deg: float = 0) -> Move:
+    """Describe a foreign action and find the one of ours that does the same."""
+    step = (forward, left, up, math.radians(turn_deg))
+    if not any(step):
+        return Move(name, step, STOP)
+    if turn_deg:
+        ours = {15: TURN_LEFT, -15: TURN_RIGHT}.get(round(turn_deg))
+        return Move(name, step, ours)
+    same = [a for a in range(STOP + 1, APPROACH) if tuple(DISPLACEMENTS[a]) == step[:3]]
+    return Move(name, step, same[0] if same else None)
+
+
+def replay(start: Sequence[float] | Floats, steps: Floats) -> Floats:
+    """Fly steps from a start pose, without a map.
+
+    Parameters
+    ----------
+    start : (4,) float
+        x, y, z in metres and yaw in radians, world frame.
+    steps : (n, 4) float64
+        Forward, left, up in metres, turn in radians.
+
+    Returns
+    -------
+    (n + 1, 4) float64
+        Poses before each step and after the last.
+    """
+    x, y, z, yaw = start
+    yaws = yaw + np.concatenate([[0.0], np.cumsum(steps[:, 3])])
+    cos, sin = np.cos(yaws[:-1]), np.sin(yaws[:-1])
+    moves = np.stack(
+        [cos * steps[:, 0] - sin * steps[:, 1], sin * steps[:, 0] + cos * steps[:, 1], steps[:, 2]], axis=1
+    )
+    path = np.concatenate([np.zeros((1, 3)), np.cumsum(moves, axis=0)]) + np.array([x, y, z])
+    return np.column_stack([path, yaws])
+
+
+def body_steps(poses: Floats) -> Floats:
+    """Say what happens between consecutive poses, (n, 4), in the body's frame: (n - 1, 4) steps."""
+    d = np.diff(poses[:, :3], axis=0)
+    cos, sin = np.cos(poses[:-1, 3]), np.sin(poses[:-1, 3])
+    turn = np.diff(poses[:, 3])
+    turn = np.arctan2(np.sin(turn), np.cos(turn))
+    return np.column_stack([cos * d[:, 0] + sin * d[:, 1], cos * d[:, 1] - sin * d[:, 0], d[:, 2], turn])
+
+
+# The words of the authors' layout: the axis of a step, and which way along it.
+WORDS: Mapping[str, tuple[int, int]] = {
+    "forward": (0, 1), "left": (1, 1), "right": (1, -1), "ascend": (2, 1), "descend": (2, -1), "rotl": (3, 1),
+    "rotr": (3, -1),
+}  # fmt: skip
+_PREFIX = {
+    "forward": "MoveForward", "left": "MoveLeft", "right": "MoveRight", "ascend": "MoveUp", "descend": "MoveDown",
+    "rotl": "TurnLeft", "rotr": "TurnRight",
+}  # fmt: skip
+_OURS = {word: [i for i, name in enumerate(ACTION_NAMES) if name.startswith(p)] for word, p in _PREFIX.items()}
+_SIZES = {
+    word: [float(np.abs(DISPLACEMENTS[a]).sum()) or TURN_RAD for a in actions] for word, actions in _OURS.items()
+}
+_WORD_OF = {a: word for word, actions in _OURS.items() for a in actions}
+
+
+def words_of(actions: NDArray[np.int8], poses: Floats) -> list[str]:
+    """Name what led into each pose in the words of the authors' layout.
+
+    Parameters
+    ----------
+    actions : (n,) int8
+        What is done at every pose, the last being Stop.
+    poses : (n, 4) float64
+        x, y, z in metres and yaw in radians.
+
+    Returns
+    -------
+    list of n str
+        ``start``, then a word a pose. The layout has none for Approach: it takes the word of the axis, in the body's
+        frame, along which it goes farthest.
+    """
+    words = ["start"]
+    for k, action in enumerate(actions[:-1].tolist()):
+        if action != APPROACH:
+            words.append(_WORD_OF[action])
+            continue
+        step = body_steps(poses[k : k + 2])[0, :3]
+        # The set has no way back: an approach backwards is named by the next axis.
+        ways = {word: sign * float(step[axis]) for word, (axis, sign) in WORDS.items() if axis < 3}
+        words.append(max(ways, key=lambda word: ways[word]))
+    return words
+
+
+def actions_of(words: Sequence[str], poses: Floats) -> tuple[list[int] | None, float]:
+    """Find the sizes of the authors' actions from the poses between which they stand.
+
+    Parameters
+    ----------
+    words : sequence of n - 1 str
+        The action that led into each pose but the first; keys of `WORDS`.
+    poses : (n, 4) float64
+        x, y, z in metres and yaw in radians, world frame.
+
+    Returns
+    -------
+    list of n int, or None
+        What is done at every pose in our action set, the last Stop; None where a step is none of ours.
+    float
+        Metres between the recorded end and that of a replay of the nearest of our actions. An Approach, which has
+        no size of its own, is left out: the replay is then compared with the pose before it.
+    """
+    found = body_steps(poses)
+    steps = np.zeros_like(found)
+    actions: list[int | None] = []
+    last = len(words) - 1
+    approach = False
+    for k, word in enumerate(words):
+        axis, sign = WORDS[word]
+        sizes = _SIZES[word]
+        nearest = min(range(len(sizes)), key=lambda i: abs(sizes[i] - sign * found[k, axis]))
+        steps[k, axis] = sign * sizes[nearest]
+        off = found[k] - steps[k]
+        off_m, off_rad = float(np.linalg.norm(off[:3])), abs(float(off[3]))
+        turned = abs(float(found[k, 3])) > _EXACT_M
+        if k == last and not turned and off_m > _EXACT_M and float(np.linalg.norm(found[k, :3])) <= 1.0 + _EXACT_M:
+            actions.append(APPROACH)
+            approach = True
+        else:
+            actions.append(_OURS[word][nearest] if off_m <= _SAME_M and off_rad <= _SAME_RAD else None)
+    flown = steps[:-1] if approach else steps
+    end = replay(poses[0], flown)[-1, :3]
+    error = float(np.linalg.norm(end - poses[len(flown), :3]))
+    ours = None if None in actions else [a for a in actions if a is not None] + [STOP]
+    return ours, error
+
+
+def replay_error_m(moves: Sequence[Move], poses: Floats) -> float:
+    """Metres between the recorded end and that of a replay of foreign actions from the recorded start."""
+    steps = np.array([m.step for m in moves], np.float64).reshape(-1, 4)
+    return float(np.linalg.norm(replay(poses[0], steps)[-1, :3] - poses[-1, :3]))

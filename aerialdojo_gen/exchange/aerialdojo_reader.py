@@ -1,0 +1,231 @@
+"""AerialDojo's published layout, read: NED metres, quaternions xyzw, a task file a partition, a file a trajectory."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from aerialdojo_gen.errors import UsageError
+from aerialdojo_gen.exchange.actions import WORDS, actions_of
+from aerialdojo_gen.exchange.aerialdojo_layout import (
+    KINDS,
+    SCHEMA_VERSION,
+    SETTING_OF,
+    SETTING_WORDS,
+    TASK_FILE,
+    TRAJECTORIES,
+    Partition,
+    parse_partition,
+)
+from aerialdojo_gen.exchange.fields import BadField, Fields, shown
+from aerialdojo_gen.exchange.folder import check_picture, inside
+from aerialdojo_gen.exchange.jsonstream import small_document
+from aerialdojo_gen.exchange.task import Context, Instance, Route, Task, digest
+from aerialdojo_gen.release.select import nav_id
+from aerialdojo_gen.stages.build_scenes import parse_name
+
+_PAIR = re.compile(r"(\d{1,9})_(\d{1,9})__(\d{1,9})")
+_START_FAR_M = 0.01
+
+
+def task_files(path: Path) -> list[Path]:
+    """List the task files of a folder of this layout, or the one that is named.
+
+    Raises
+    ------
+    UsageError
+        There is none.
+    """
+    if not path.is_dir():
+        return [path]
+    root = path.resolve()
+    found = [p for p in path.rglob(TASK_FILE) if p.resolve().is_relative_to(root)]
+    if not found:
+        raise UsageError(f"{path} has no {TASK_FILE} below it: name the folder that holds {' and '.join(KINDS)}")
+    # A partition's two files come one after the other, so that its trajectories are read once.
+    return sorted(found, key=lambda p: (p.parent.parts[-3:], p.parts))
+
+
+def label(path: Path) -> str | None:
+    """Name a task file by its place in the layout, whatever part of it is imported; None where it has none."""
+    partition = parse_partition(path.parent)
+    if partition is None or path.parents[3].name not in KINDS:
+        return None
+    return (Path(path.parents[3].name) / partition.path / path.name).as_posix()
+
+
+class Reader:
+    """Reads tasks, and each trajectory once for both of its instances.
+
+    One a whole import: it knows the navigation tasks that it has met.
+    """
+
+    def __init__(self) -> None:
+        self._partition: tuple[str, ...] = ()
+        self._known: dict[str, dict[str, Any]] = {}
+        self._nav_ids: set[str] = set()
+
+    def read(self, record: Fields, context: Context) -> Task:
+        """Read a task and, where there is one, its trajectory."""
+        folder = context.file.absolute().parent
+        partition = parse_partition(folder)
+        kind = KINDS.get(folder.parents[2].name) if partition else None
+        episode = record.name("episode_id")
+        if not re.fullmatch(r"[A-Za-z0-9_-]{1,100}", episode):
+            raise BadField("episode_id", f"{shown(episode)} cannot name a file")
+        scene = record.text("map_name", empty=False)
+        word = record.text("task")
+        if word not in SETTING_OF:
+            raise BadField("task", f"{shown(word)} is none of {', '.join(SETTING_OF)}")
+        trains = record.flag("used-in-train")
+        if partition is not None:
+            _agree(partition, scene, word, trains)
+        pose = record.child("start_pose")
+        quaternion = "start_quaternion_xyzw" if pose.has("start_quaternion_xyzw") else "start_quaternionr"
+        start = context.upright_pose(pose.position("start_position"), pose.quaternion(quaternion))
+        goal = None
+        if record.has("goal_pose"):
+            goal = context.frame.positions_to_world(record.child("goal_pose").position("goal_position"))
+        target = record.text("goal_object_name", empty=False)
+        family, scene_type, by_name = parse_name(scene)
+        known: dict[str, Any] = {
+            "target_name": target,
+            "start_object_name": record.optional_text("start_object_name"),
+            "category": record.optional_text("category"),
+            "landmark": record.optional_text("Landmark"),
+            "direction": record.optional_text("Direction"),
+            "family": family,
+            "scene_type": scene_type,
+            "partition": partition.partition if partition else by_name,
+            "subset": "train" if trains else "test",
+            "setting": SETTING_OF[word],
+        }
+        description = record.optional_text("description")
+        image = record.optional_text("image")
+        modality = kind or ("image" if image else "semantic")
+        if modality == "image":
+            instance = Instance("image", description, self._picture(image, context))
+        else:
+            instance = Instance("semantic", description)
+        task = Task(episode, scene, start=start, goal=goal, instances=[instance], object_key=target, known=known)
+        self._join(task, context, folder, partition)
+        return task
+
+    def _picture(self, image: str | None, context: Context) -> Path | None:
+        if context.pictures is None:
+            return None
+        if image is None:
+            raise BadField("image", "is missing")
+        try:
+            return check_picture(inside(context.file.parent, image))
+        except ValueError as error:
+            raise BadField("image", str(error)) from None
+
+    def _join(self, task: Task, context: Context, folder: Path, partition: Partition | None) -> None:
+        """Give the task its trajectory, or what its other instance brought already."""
+        place = folder.parts[-3:] if partition else folder.parts
+        if place != self._partition:
+            self._partition, self._known = place, {}
+        met = self._known.get(task.source_id)
+        if met is None:
+            met = self._trajectory(task, context, folder, partition)
+            self._known[task.source_id] = met
+        else:
+            task.has_route_row = False
+            self._same_place(task, met, context)
+        task.nav_id, task.goal = met["nav_id"], task.goal if task.goal is not None else met["goal"]
+        task.known |= met["known"]
+        if task.has_route_row:
+            task.route = met.pop("route")
+
+    def _same_place(self, task: Task, met: dict[str, Any], context: Context) -> None:
+        if float(np.linalg.norm(task.start[:3] - met["start"])) > _START_FAR_M:
+            raise BadField("start_pose.start_position", "is not that of the episode's other instance")
+
+    def _trajectory(self, task: Task, context: Context, folder: Path, partition: Partition | None) -> dict[str, Any]:
+        met: dict[str, Any] = {"route": None, "known": {}, "goal": None, "start": task.start[:3]}
+        pair = None
+        if partition is not None:
+            root = folder.parents[3] / TRAJECTORIES
+            if (root / partition.path).is_dir():
+                pair = self._read(root, partition, task, context, met)
+            else:
+                context.notes[f"no folder in {TRAJECTORIES} for its partition: no route"] += 1
+        name = nav_id(task.scene, pair) if pair else None
+        if name is None or name in self._nav_ids:
+            if name is not None:
+                context.notes["task_id stands twice in the scene: named by partition and episode"] += 1
+            name = f"{task.scene}-{digest(*(partition.path.parts if partition else folder.parts), task.source_id)}"
+        self._nav_ids.add(name)
+        return met | {"nav_id": name}
+
+    def _read(
+        self, root: Path, partition: Partition, task: Task, context: Context, met: dict[str, Any]
+    ) -> str | None:
+        """Read a trajectory into `met`; returns its pair of objects where it names one."""
+        relative = partition.path / f"{task.source_id}.json"
+        label = f"{TRAJECTORIES}/{relative.as_posix()}"
+        try:
+            document = Fields(small_document(inside(root, relative.as_posix())), label)
+        except OSError as error:
+            raise BadField("episode_id", f"{label}: {error.strerror}") from None
+        except ValueError as error:
+            raise BadField("episode_id", f"{label}: {error}") from None
+        version = document.text("schema_version")
+        if version != SCHEMA_VERSION:
+            raise BadField(document.path("schema_version"), f"{shown(version)}, expected {SCHEMA_VERSION!r}")
+        if document.text("map_name") != task.scene:
+            raise BadField(document.path("map_name"), f"is not the task's, {task.scene}")
+        if document.has("status") and document.text("status") != "planned":
+            raise BadField(document.path("status"), f"{shown(document.text('status'))}, expected 'planned'")
+        name = document.child("goal").text("Object_name")
+        if name != task.known["target_name"]:
+            raise BadField(document.path("goal.Object_name"), f"{shown(name)} is not the task's goal_object_name")
+        met["route"] = _route(document, context)
+        poses = met["route"].poses
+        if float(np.linalg.norm(poses[0, :3] - task.start[:3])) > _START_FAR_M:
+            context.notes["start_pose is not where its trajectory starts: each is kept as it is"] += 1
+        if task.goal is None:
+            met["goal"] = poses[-1, :3]
+        pair = document.text("task_id")
+        if (match := _PAIR.fullmatch(pair)) is None:
+            context.notes["task_id names no pair of objects: their numbers are null"] += 1
+            return None
+        names = ("start_object_id", "start_anchor_id", "target_object_id")
+        met["known"] = dict(zip(names, map(int, match.groups()), strict=True))
+        return pair
+
+
+def _agree(partition: Partition, scene: str, word: str, trains: bool) -> None:
+    """Refuse a task that is not of the folder in which it stands, as the authors' loader does."""
+    if scene != partition.scene:
+        raise BadField("map_name", f"{shown(scene)} in a folder of {partition.scene}")
+    if word != SETTING_WORDS[partition.setting][2]:
+        raise BadField("task", f"{shown(word)} in {partition.path.as_posix()}")
+    if trains != (partition.subset == "train"):
+        raise BadField("used-in-train", f"{int(trains)} in {partition.path.as_posix()}")
+
+
+def _route(document: Fields, context: Context) -> Route:
+    steps = document.items("trajectory")
+    words, positions, quaternions = [], [], []
+    for k, value in enumerate(steps):
+        step = Fields(value, document.path(f"trajectory[{k}]"))
+        word = step.text("action")
+        if (word != "start" or k > 0) and (word not in WORDS or k == 0):
+            known = "start" if k == 0 else ", ".join(WORDS)
+            raise BadField(step.path("action"), f"unknown action {shown(word)}: known are {known}")
+        words.append(word)
+        positions.append(step.position("position_ned_m"))
+        quaternions.append(step.quaternion("quaternion_xyzw"))
+        for name in step.unread():
+            context.notes[f"{re.sub(r'.*trajectory.[0-9]+..', 'trajectory[].', name)} is not mapped"] += 1
+    yaws = context.frame.quaternion_to_world_yaw(np.array(quaternions))
+    poses = np.column_stack([context.frame.positions_to_world(np.array(positions)), yaws])
+    ours, error = actions_of(words[1:], poses)
+    if ours is None:
+        context.notes["has moves that are none of ours: action is null, source_action has them"] += 1
+    return Route(poses, ours, words, error)

@@ -1,0 +1,220 @@
+"""The release in the layout that AerialDojo's authors publish: NED metres, quaternions xyzw."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shutil
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+from numpy.typing import NDArray
+
+from aerialdojo_gen import store
+from aerialdojo_gen.errors import StoreError
+from aerialdojo_gen.exchange.actions import words_of
+from aerialdojo_gen.exchange.aerialdojo_layout import (
+    IMAGE,
+    SCHEMA_VERSION,
+    SEMANTIC,
+    SETTING_WORDS,
+    TASK_FILE,
+    TRAJECTORIES,
+    Partition,
+    partition_of,
+)
+from aerialdojo_gen.exchange.frames import NED
+
+Floats = NDArray[np.float64]
+
+# What the layout has no field for; sizes of actions are in the poses, nav_id and task_id follow from task_id.
+LOST: Mapping[str, Sequence[str]] = {
+    "routes": ["goal_yaw_rad", "min_clearance_m"],
+    "objects": [
+        "mesh_node", "x_m", "y_m", "z_m", "size_x_m", "size_y_m", "size_z_m", "landmark_id",
+        "box_u0_px", "box_v0_px", "box_u1_px", "box_v1_px", "image_fraction", "all of those that no task names",
+    ],
+    "landmarks": ["all but the names"],
+    "anchors": ["all but the start's number"],
+    "scenes": ["all but the name"],
+}  # fmt: skip
+
+_PICTURES = "images"
+
+
+def write_scene(data: Path, scene: str, root: Path) -> dict[str, int]:
+    """Write a scene's tasks, pictures and trajectories.
+
+    Parameters
+    ----------
+    data : Path
+        The data directory.
+    scene : str
+        A scene of its release.
+    root : Path
+        Folder of the layout.
+
+    Returns
+    -------
+    dict of str to int
+        Task files, tasks, trajectories and pictures written.
+
+    Raises
+    ------
+    StoreError
+        A table is missing or damaged, or an object that an image task names has no picture.
+    """
+    objects = {row["object_id"]: row for row in store.read_scene(data, "release/objects", scene).to_pylist()}
+    pictures = _Pictures(root, scene, objects)
+    counts = dict.fromkeys(("task files", "tasks", "trajectories"), 0)
+    for subset in ("train", "test"):
+        tasks = store.read_scene(data, f"tasks/{subset}", scene)
+        routes = store.read_scene(data, f"routes/{subset}", scene)
+        for setting in SETTING_WORDS:
+            chosen = routes.filter(pa.compute.equal(routes["setting"], setting)).sort_by("nav_id")
+            if not chosen.num_rows:
+                continue
+            episodes = {nav_id: str(k) for k, nav_id in enumerate(chosen["nav_id"].to_pylist())}
+            mine = tasks.filter(pa.compute.equal(tasks["setting"], setting)).sort_by("nav_id").to_pylist()
+            partition = partition_of(scene, setting, mine[0]["partition"], subset)
+            ends = _ends(chosen)
+            for kind, modality in ((SEMANTIC, "semantic"), (IMAGE, "image")):
+                rows = [row for row in mine if row["modality"] == modality]
+                folder = root / kind / partition.path
+                folder.mkdir(parents=True)
+                records = [
+                    _task(row, episodes[row["nav_id"]], ends[row["nav_id"]], objects, pictures, folder)
+                    for row in rows
+                ]
+                _write_list(folder / TASK_FILE, records)
+                counts["task files"] += 1
+                counts["tasks"] += len(records)
+            counts["trajectories"] += _write_trajectories(root, partition, chosen, episodes, objects)
+    return counts | {"pictures": pictures.written}
+
+
+def _ends(routes: pa.Table) -> dict[str, dict[str, Any]]:
+    columns = ["nav_id", "start_object_id", "target_object_id", "goal_x_m", "goal_y_m", "goal_z_m"]
+    return {row["nav_id"]: row for row in routes.select(columns).to_pylist()}
+
+
+def _task(
+    row: Mapping[str, Any],
+    episode: str,
+    ends: Mapping[str, Any],
+    objects: Mapping[int, Mapping[str, Any]],
+    pictures: _Pictures,
+    folder: Path,
+) -> dict[str, Any]:
+    start = NED.positions_from_world([row[f"start_{a}_m"] for a in "xyz"])
+    goal = NED.positions_from_world([ends[f"goal_{a}_m"] for a in "xyz"])
+    record = {
+        "episode_id": episode,
+        "map_name": row["scene"],
+        "task": SETTING_WORDS[row["setting"]][2],
+        "used-in-train": int(row["subset"] == "train"),
+        "start_object_name": objects[ends["start_object_id"]]["name"],
+        "goal_object_name": row["target_name"],
+        "description": row["description"] or "",
+        "category": objects[ends["target_object_id"]]["category"],
+        "Landmark": row["landmark"],
+        "Direction": row["direction"],
+    }
+    if row["modality"] == "image":
+        record["image"] = pictures.place(folder, ends["target_object_id"])
+    record["start_pose"] = {
+        "start_position": start.tolist(),
+        "start_quaternion_xyzw": NED.quaternion_from_world_yaw(row["start_yaw_rad"]).tolist(),
+    }
+    record["goal_pose"] = {"goal_position": goal.tolist()}
+    return record
+
+
+def _write_list(path: Path, records: Sequence[Mapping[str, Any]]) -> None:
+    lines = ",\n".join(json.dumps(record, ensure_ascii=False, allow_nan=False) for record in records)
+    path.write_text(f"[\n{lines}\n]\n", encoding="utf-8")
+
+
+class _Pictures:
+    """Puts an object's picture beside every task file that names it: one file, linked, where the disk can."""
+
+    def __init__(self, root: Path, scene: str, objects: Mapping[int, Mapping[str, Any]]) -> None:
+        self._root, self._scene, self._objects = root, scene, objects
+        self._first: dict[int, Path] = {}
+        self._placed: set[Path] = set()
+
+    @property
+    def written(self) -> int:
+        """Pictures, each counted once."""
+        return len(self._first)
+
+    def place(self, folder: Path, object_id: int) -> str:
+        """Put a picture below a task file's folder; returns its path relative to it."""
+        name = self._objects[object_id]["reference_image_id"]
+        if not re.fullmatch(r"[A-Za-z0-9_-]{1,100}", name):
+            raise StoreError(f"objects of {self._scene}: reference_image_id {name!r} cannot name a file")
+        path = folder / _PICTURES / f"{name}.png"
+        if path not in self._placed:
+            path.parent.mkdir(exist_ok=True)
+            self._put(path, object_id)
+            self._placed.add(path)
+        return f"{_PICTURES}/{path.name}"
+
+    def _put(self, path: Path, object_id: int) -> None:
+        first = self._first.get(object_id)
+        if first is None:
+            picture = self._objects[object_id]["reference_image"]
+            if picture is None:
+                raise StoreError(f"object {object_id} of {self._scene} has no reference image: "
+                                 f"run aerialdojo-gen split --scene {self._scene}")  # fmt: skip
+            path.write_bytes(picture)
+            self._first[object_id] = path
+            return
+        try:
+            os.link(first, path)
+        except OSError:
+            shutil.copyfile(first, path)
+
+
+def _write_trajectories(
+    root: Path,
+    partition: Partition,
+    routes: pa.Table,
+    episodes: Mapping[str, str],
+    objects: Mapping[int, Mapping[str, Any]],
+) -> int:
+    folder = root / TRAJECTORIES / partition.path
+    folder.mkdir(parents=True)
+    for row, poses, actions in _poses(routes):
+        positions = NED.positions_from_world(poses[:, :3]).tolist()
+        quaternions = NED.quaternion_from_world_yaw(poses[:, 3]).tolist()
+        document = {
+            "schema_version": SCHEMA_VERSION,
+            "map_name": partition.scene,
+            "task_id": f"{row['start_object_id']}_{row['start_anchor_id']}__{row['target_object_id']}",
+            "status": "planned",
+            "goal": {"Object_name": objects[row["target_object_id"]]["name"]},
+            "trajectory": [
+                {"action": word, "position_ned_m": position, "quaternion_xyzw": quaternion}
+                for word, position, quaternion in zip(words_of(actions, poses), positions, quaternions, strict=True)
+            ],
+        }
+        text = json.dumps(document, ensure_ascii=False, allow_nan=False)
+        (folder / f"{episodes[row['nav_id']]}.json").write_text(text, encoding="utf-8")
+    return routes.num_rows
+
+
+def _poses(routes: pa.Table) -> Iterator[tuple[dict[str, Any], Floats, NDArray[np.int8]]]:
+    """The routes, each with its poses, (n, 4), and actions, (n,)."""
+    lists = {name: routes[name].combine_chunks() for name in ("x_m", "y_m", "z_m", "yaw_rad", "action")}
+    flat = {name: column.flatten().to_numpy() for name, column in lists.items()}
+    bounds = np.concatenate([[0], np.cumsum(lists["action"].value_lengths().to_numpy())])
+    columns = ["nav_id", "start_object_id", "start_anchor_id", "target_object_id"]
+    for k, row in enumerate(routes.select(columns).to_pylist()):
+        part = slice(bounds[k], bounds[k + 1])
+        poses = np.column_stack([flat[name][part] for name in ("x_m", "y_m", "z_m", "yaw_rad")])
+        yield row, poses, flat["action"][part]

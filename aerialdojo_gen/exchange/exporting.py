@@ -1,0 +1,84 @@
+"""The release in formats of others: whole or not at all."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+
+from aerialdojo_gen import __version__, store
+from aerialdojo_gen.errors import UsageError
+from aerialdojo_gen.exchange import aerialdojo_writer, habitat_writer
+from aerialdojo_gen.exchange.folder import whole_folder, write_json
+
+MARKER = "export.json"
+FORMATS = {
+    "aerialdojo": ("north, east, down, metres; quaternions xyzw; forward +x", aerialdojo_writer.LOST),
+    "habitat": ("east, up, south, metres; quaternions xyzw; forward -z", habitat_writer.LOST),
+}
+
+
+def export_release(
+    format_name: str, data: Path, out: Path, scenes: Sequence[str] | None = None, *, force: bool = False
+) -> dict[str, int]:
+    """Write the release in a format of others.
+
+    Parameters
+    ----------
+    format_name : str
+        A key of `FORMATS`.
+    data : Path
+        The data directory.
+    out : Path
+        Folder to be made; it appears when it is whole. Its ``export.json`` says what is in it and what is lost.
+    scenes : sequence of str, optional
+        Names or globs; all of the release where absent.
+    force : bool
+        Replace an earlier export there.
+
+    Returns
+    -------
+    dict of str to int
+        How many scenes, files and tasks were written.
+
+    Raises
+    ------
+    UsageError
+        The format or a scene does not exist, or the folder is not empty.
+    StoreError
+        The release is missing or damaged, or the disk is full.
+    """
+    from aerialdojo_gen.runner import choose_scenes
+
+    if format_name not in FORMATS:
+        raise UsageError(f"no format {format_name!r}: it is one of {', '.join(FORMATS)}")
+    released = store.release_scenes(data)
+    if not released:
+        raise UsageError(f"there is no release in {data}: run aerialdojo-gen split --data {data}")
+    chosen = choose_scenes(scenes, released) if scenes else released
+    frame, lost = FORMATS[format_name]
+    counts: Counter[str] = Counter(scenes=len(chosen))
+    with whole_folder(out, MARKER, force=force) as root:
+        if format_name == "aerialdojo":
+            for scene in chosen:
+                counts.update(aerialdojo_writer.write_scene(data, scene, root))
+        else:
+            categories = habitat_writer.categories_of(data, chosen)
+            habitat_writer.write_index(root, categories)
+            for scene in chosen:
+                counts.update(habitat_writer.write_scene(data, scene, root, categories))
+        write_json(
+            root / MARKER,
+            {
+                "format": format_name,
+                "written_by": f"aerialdojo-gen {__version__}",
+                "frame": frame,
+                "scenes": list(chosen),
+                "counts": dict(counts),
+                "actions": None
+                if format_name == "aerialdojo"
+                else {str(k): v for k, v in habitat_writer.ACTIONS.items()},
+                "lost": {table: list(columns) for table, columns in lost.items()},
+            },
+        )
+    return dict(counts)

@@ -1,0 +1,137 @@
+"""Folders that appear whole or not at all, and paths that stay in theirs."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import re
+import shutil
+from collections.abc import Iterator, Mapping
+from pathlib import Path, PurePosixPath
+from typing import Any
+
+from aerialdojo_gen.errors import UsageError
+from aerialdojo_gen.store import disk_error
+
+_PICTURES = (b"\x89PNG\r\n\x1a\n", b"\xff\xd8\xff")
+_LARGEST_PICTURE = 32 << 20
+
+
+@contextlib.contextmanager
+def whole_folder(target: Path, marker: str, *, force: bool) -> Iterator[Path]:
+    """Fill a folder under a temporary name beside its own, and rename it at the end.
+
+    Parameters
+    ----------
+    target : Path
+        The folder.
+    marker : str
+        Name of the file by which a folder of ours is known: only such a one is replaced.
+    force : bool
+        Replace it; without, a folder that holds anything is refused.
+
+    Yields
+    ------
+    Path
+        The temporary folder; gone if an error is raised.
+
+    Raises
+    ------
+    UsageError
+        The folder is not empty, or holds what is not ours to replace.
+    StoreError
+        The disk is full or read-only.
+    """
+    target = target.absolute()
+    taken = target.is_file() or (target.is_dir() and any(target.iterdir()))
+    if taken and not (target / marker).is_file():
+        raise UsageError(f"{target} is there already and holds no {marker}: name another folder")
+    if taken and not force:
+        raise UsageError(f"{target} is there already: --force replaces it")
+    temporary = target.with_name(f".{target.name}.{os.getpid()}.tmp")
+    old = target.with_name(f".{target.name}.{os.getpid()}.old")
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        _sweep(target)
+        temporary.mkdir()
+        yield temporary
+        if target.exists():
+            target.rename(old)
+        temporary.rename(target)
+    except OSError as error:
+        if old.exists() and not target.exists():
+            old.rename(target)
+        raise disk_error(error, target) from error
+    finally:
+        for gone in (temporary, old):
+            shutil.rmtree(gone, ignore_errors=True)
+
+
+def _sweep(target: Path) -> None:
+    """Remove what killed runs left under temporary names."""
+    for path in target.parent.glob(f".{target.name}.*"):
+        match = re.fullmatch(re.escape(f".{target.name}.") + r"(\d+)\.tmp", path.name)
+        if match and not Path(f"/proc/{match[1]}").exists():
+            shutil.rmtree(path, ignore_errors=True)
+
+
+def write_json(path: Path, document: Mapping[str, Any]) -> None:
+    """Write a small JSON document for people and programs."""
+    path.write_text(json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False) + "\n", encoding="utf-8")
+
+
+def inside(root: Path, relative: str) -> Path:
+    """Follow a path that a file names, below a folder.
+
+    Parameters
+    ----------
+    root : Path
+        The folder.
+    relative : str
+        The path, with / or backslashes.
+
+    Returns
+    -------
+    Path
+        The file, whether or not it exists.
+
+    Raises
+    ------
+    ValueError
+        It is absolute, or leads out of the folder by ``..`` or by a symbolic link.
+    """
+    name = PurePosixPath(relative.replace("\\", "/"))
+    if not relative or "\0" in relative or name.is_absolute() or re.match(r"[A-Za-z]:", relative):
+        raise ValueError(f"{relative!r} is no path relative to {root}")
+    path = root / name
+    try:
+        resolved = path.resolve()
+    except (OSError, RuntimeError) as error:
+        raise ValueError(f"{relative!r} cannot be followed ({error})") from None
+    if ".." in name.parts or not resolved.is_relative_to(root.resolve()):
+        raise ValueError(f"{relative!r} leads out of {root}")
+    return path
+
+
+def check_picture(path: Path) -> Path:
+    """Return the path if a PNG or JPEG file of a sensible size is there.
+
+    Raises
+    ------
+    ValueError
+        What is wrong with it.
+    """
+    try:
+        if not path.is_file():
+            raise ValueError(f"there is no file {path}")
+        size = path.stat().st_size
+        with path.open("rb") as file:
+            head = file.read(8)
+    except OSError as error:
+        raise ValueError(f"{path} cannot be read ({error.strerror})") from None
+    if size > _LARGEST_PICTURE:
+        raise ValueError(f"{path} is larger than {_LARGEST_PICTURE >> 20} MiB")
+    if not head.startswith(_PICTURES):
+        raise ValueError(f"{path} is neither PNG nor JPEG")
+    return path

@@ -1,0 +1,190 @@
+"""The release as Habitat's ObjectNav-v1: json.gz, y up, forward -z, quaternions xyzw.
+
+A scene's navigation tasks become episodes whose goals are all the objects of the target's category, as ObjectNav has
+it; which of them the task means stands in ``info``.
+"""
+
+from __future__ import annotations
+
+import gzip
+import json
+from collections import defaultdict
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import numpy as np
+import pyarrow as pa
+
+from aerialdojo_gen import store
+from aerialdojo_gen.exchange.frames import world_to_habitat, yaw_to_habitat_quaternion_xyzw
+from aerialdojo_gen.schemas import ACTION_NAMES, SUBSETS
+
+LOST: Mapping[str, Sequence[str]] = {
+    "tasks": [
+        "modality (one episode a navigation task)",
+        "description",
+        "reference_image_id",
+        "landmark",
+        "direction",
+    ],
+    "routes": ["min_clearance_m", "goal_yaw_rad"],
+    "objects": [
+        "description",
+        "mesh_node",
+        "size_x_m",
+        "size_y_m",
+        "size_z_m",
+        "direction",
+        "reference_image",
+        "box",
+    ],
+    "landmarks": ["all"],
+}
+
+
+def categories_of(data: Path, scenes: Sequence[str]) -> dict[str, int]:
+    """Number the categories of the scenes' objects, by name."""
+    found: set[str] = set()
+    for scene in scenes:
+        found.update(store.read_scene(data, "release/objects", scene, ["category"])["category"].to_pylist())
+    return {name: k for k, name in enumerate(sorted(found))}
+
+
+def write_index(root: Path, categories: Mapping[str, int]) -> None:
+    """Write each split's own file, which has no episodes but the categories: those lie by scene below ``content``."""
+    for split in SUBSETS:
+        (root / split / "content").mkdir(parents=True)
+        with _gzip(root / split / f"{split}.json.gz") as file:
+            file.write(json.dumps({**_numbers(categories), "goals_by_category": {}, "episodes": []}).encode())
+
+
+def write_scene(data: Path, scene: str, root: Path, categories: Mapping[str, int]) -> dict[str, int]:
+    """Write a scene's episodes, a file a subset.
+
+    Parameters
+    ----------
+    data : Path
+        The data directory.
+    scene : str
+        A scene of its release.
+    root : Path
+        Folder of the export.
+    categories : mapping of str to int
+        What `categories_of` returns for all scenes of the export.
+
+    Returns
+    -------
+    dict of str to int
+        Episode files and episodes written.
+
+    Raises
+    ------
+    StoreError
+        A table is missing or damaged.
+    """
+    mesh = store.read_scene(data, "release/scenes", scene, ["mesh_path"])["mesh_path"][0].as_py()
+    rows = store.read_scene(data, "release/objects", scene).drop_columns("reference_image").to_pylist()
+    anchors = defaultdict(list)
+    for anchor in store.read_scene(data, "release/anchors", scene).to_pylist():
+        anchors[anchor["object_id"]].append(anchor)
+    goals: dict[str, list[dict[str, Any]]] = {}
+    for row in rows:
+        key = f"{Path(mesh).name}_{row['category']}"
+        goals.setdefault(key, []).append(_goal(row, anchors[row["object_id"]]))
+    category_of = {row["object_id"]: row["category"] for row in rows}
+    counts = {"episode files": 0, "episodes": 0}
+    for subset in ("train", "test"):
+        routes = store.read_scene(data, f"routes/{subset}", scene).sort_by("nav_id")
+        if not routes.num_rows:
+            continue
+        split = f"{store.partition(scene)}_{subset}"
+        head = {**_numbers(categories), "goals_by_category": goals}
+        with _gzip(root / split / "content" / f"{scene}.json.gz") as file:
+            # Streamed: the episodes of a large scene are some hundred megabytes of text.
+            file.write(json.dumps(head, allow_nan=False)[:-1].encode() + b', "episodes": [')
+            for k, episode in enumerate(_episodes(routes, mesh, category_of)):
+                text = json.dumps({"episode_id": str(k), **episode}, allow_nan=False)
+                file.write((",\n" if k else "\n").encode() + text.encode())
+            file.write(b"\n]}")
+        counts["episode files"] += 1
+        counts["episodes"] += routes.num_rows
+    return counts
+
+
+def _numbers(categories: Mapping[str, int]) -> dict[str, Any]:
+    names = ("category_to_task_category_id", "category_to_scene_annotation_category_id")
+    return {name: dict(categories) for name in names}
+
+
+class _gzip:  # noqa: N801 - used as a function
+    """A gzip file without a date or a name in it, so that the same release gives the same bytes."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+
+    def __enter__(self) -> BinaryIO:
+        self._raw = self._path.open("wb")
+        self._file = gzip.GzipFile("", "wb", 6, self._raw, mtime=0)
+        return self._file  # type: ignore[return-value]
+
+    def __exit__(self, *_: object) -> None:
+        self._file.close()
+        self._raw.close()
+
+
+def _goal(row: Mapping[str, Any], anchors: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    views = [
+        {
+            "agent_state": {
+                "position": _position(anchor),
+                "rotation": yaw_to_habitat_quaternion_xyzw(anchor["yaw_rad"]).tolist(),
+            },
+            # Habitat's iou is the share of the view that the object covers: known where there is a picture.
+            "iou": row["image_fraction"] if anchor["selected"] else None,
+        }
+        for anchor in anchors
+    ]
+    return {
+        "object_id": row["object_id"],
+        "object_name": row["name"],
+        "object_category": row["category"],
+        "room_id": None,
+        "position": _position(row),
+        "view_points": views,
+    }
+
+
+def _position(row: Mapping[str, Any], prefix: str = "") -> list[float]:
+    return world_to_habitat([row[f"{prefix}{a}_m"] for a in "xyz"]).tolist()
+
+
+def _episodes(routes: pa.Table, mesh: str, category_of: Mapping[int, str]) -> Iterator[dict[str, Any]]:
+    for batch in routes.to_batches(max_chunksize=1024):
+        for row in batch.to_pylist():
+            positions = world_to_habitat(np.column_stack([row["x_m"], row["y_m"], row["z_m"]])).tolist()
+            rotations = yaw_to_habitat_quaternion_xyzw(row["yaw_rad"]).tolist()
+            points = [
+                {"position": position, "rotation": rotation, "action": action}
+                for position, rotation, action in zip(positions, rotations, row["action"], strict=True)
+            ]
+            yield {
+                "scene_id": mesh,
+                "scene_dataset_config": "default",
+                "start_position": positions[0],
+                "start_rotation": rotations[0],
+                "info": {
+                    "geodesic_distance": row["length_m"],
+                    "euclidean_distance": row["euclidean_m"],
+                    "closest_goal_object_id": row["target_object_id"],
+                    "goal_position": _position(row, "goal_"),
+                    "nav_id": row["nav_id"],
+                    "setting": row["setting"],
+                },
+                "goals": [],
+                "shortest_paths": [points],
+                "object_category": category_of[row["target_object_id"]],
+            }
+
+
+ACTIONS = dict(enumerate(ACTION_NAMES))

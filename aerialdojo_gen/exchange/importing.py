@@ -1,0 +1,245 @@
+"""Others' task files into the release's tables: whole or not at all, every bad record named."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TextIO
+
+from aerialdojo_gen.errors import ImportRefused, StoreError, UsageError
+from aerialdojo_gen.exchange import aerialdojo_reader, aerialvln, cityavos, openfly, uav_on
+from aerialdojo_gen.exchange.fields import BadField, Fields
+from aerialdojo_gen.exchange.folder import whole_folder, write_json
+from aerialdojo_gen.exchange.frames import FRAMES, Frame, frame_named
+from aerialdojo_gen.exchange.jsonstream import RECORD_LIMIT, records
+from aerialdojo_gen.exchange.objects import Objects
+from aerialdojo_gen.exchange.report import Report
+from aerialdojo_gen.exchange.tables import Tables
+from aerialdojo_gen.exchange.task import Context, Task, digest, route_row, task_rows
+from aerialdojo_gen.store import check_scene_name
+
+MARKER = "import.json"
+Read = Callable[[Fields, Context], Task]
+
+
+@dataclass(frozen=True)
+class Format:
+    """A format that can be imported.
+
+    Attributes
+    ----------
+    reader : callable
+        Makes what reads the records of one import.
+    key : str or None
+        Where the list of records stands; None: it is the whole file.
+    frame : str or None
+        Its frame; None where the format does not state it.
+    """
+
+    reader: Callable[[], Read]
+    key: str | None = None
+    frame: str | None = "ned"
+
+
+FORMATS = {
+    "aerialdojo": Format(lambda: aerialdojo_reader.Reader().read),
+    "uav-on": Format(lambda: uav_on.read),
+    "cityavos": Format(lambda: cityavos.read, frame=None),
+    "aerialvln": Format(lambda: aerialvln.read, key="episodes"),
+    "openfly": Format(lambda: openfly.read, frame=None),
+}
+
+
+@dataclass(frozen=True)
+class Options:
+    """What a format leaves open, and what to do with bad records.
+
+    Attributes
+    ----------
+    frame : str or None
+        For formats that do not state theirs.
+    angles : str
+        Unit of CityAVOS's yaws: radians, degrees, or mixed (more than a turn in radians is taken as degrees).
+    pictures : Path or None
+        Folder below which CityAVOS's pictures lie; None: the file's own.
+    with_pictures : bool
+        False: leave pictures aside, and the image instances of CityAVOS with them.
+    skip_bad : bool
+        Keep the good records of files that have bad ones.
+    record_limit : int
+        Most characters of a record.
+    """
+
+    frame: str | None = None
+    angles: str = "radians"
+    pictures: Path | None = None
+    with_pictures: bool = True
+    skip_bad: bool = False
+    record_limit: int = RECORD_LIMIT
+
+
+def import_benchmark(
+    format_name: str,
+    files: Sequence[Path],
+    data: Path,
+    options: Options | None = None,
+    *,
+    name: str | None = None,
+    force: bool = False,
+) -> Report:
+    """Import others' task files.
+
+    Parameters
+    ----------
+    format_name : str
+        A key of `FORMATS`.
+    files : sequence of Path
+        Files of that format; for ``aerialdojo`` also the folder of the layout or of a part of it.
+    data : Path
+        The data directory: tables are written to ``imported/<name>/{tasks,routes,objects}`` in it.
+    options : Options, optional
+        What the format leaves open.
+    name : str, optional
+        Name of the import; the format's where absent.
+    force : bool
+        Replace an import of that name.
+
+    Returns
+    -------
+    Report
+        What could not be mapped, and how well replays meet the recorded poses; also in ``import.json`` there.
+
+    Raises
+    ------
+    UsageError
+        The format, the frame or a name makes no sense, or the import is there already.
+    ImportRefused
+        A file is damaged, or has bad records and they are not to be skipped: nothing is written.
+    StoreError
+        The disk is full or read-only.
+    """
+    options = options or Options()
+    if format_name not in FORMATS:
+        raise UsageError(f"no format {format_name!r}: it is one of {', '.join(FORMATS)}")
+    chosen = FORMATS[format_name]
+    frame = _frame(format_name, chosen, options.frame)
+    if options.angles not in ("radians", "degrees", "mixed"):
+        raise UsageError(f"angles are radians, degrees or mixed, not {options.angles!r}")
+    sources = _sources(format_name, files)
+    report = Report(format_name, frame.name)
+    target = data / "imported" / _plain(name or format_name)
+    with whole_folder(target, MARKER, force=force) as folder, ExitStack() as stack:
+        bad = stack.enter_context((folder / "bad_records.txt").open("w", encoding="utf-8"))
+        tables, objects = Tables(folder), Objects()
+        for task, source in _tasks(sources, chosen, frame, options, report, bad):
+            _write(task, source, tables, objects, report)
+        if report.n_bad and not options.skip_bad:
+            raise _refusal(report)
+        objects.write(tables)
+        tables.close()
+        report.rows = dict(tables.written)
+        report.empty = {column: n for column, n in tables.nulls.items() if n}
+        bad.close()
+        if not report.n_bad:
+            (folder / "bad_records.txt").unlink()
+        write_json(folder / MARKER, report.document())
+    return report
+
+
+def _frame(format_name: str, chosen: Format, asked: str | None) -> Frame:
+    if chosen.frame is not None:
+        if asked not in (None, chosen.frame):
+            raise UsageError(f"{format_name} files are {chosen.frame} by their format: leave --frame out")
+        return frame_named(chosen.frame)
+    if asked is None:
+        raise UsageError(f"{format_name} files do not say which way their axes point: --frame {'|'.join(FRAMES)}")
+    return frame_named(asked)
+
+
+def _plain(name: str) -> str:
+    try:
+        return check_scene_name(name)
+    except StoreError:
+        raise UsageError(f"{name!r} cannot name an import: use letters, digits, _ and - (64 at most)") from None
+
+
+def _sources(format_name: str, files: Sequence[Path]) -> list[tuple[str, Path]]:
+    """The files, each once, by their names relative to the folder that they share."""
+    found: dict[Path, None] = {}
+    for path in files:
+        if not path.exists():
+            raise UsageError(f"there is no file {path}")
+        expanded = aerialdojo_reader.task_files(path) if format_name == "aerialdojo" else [path]
+        for file in expanded:
+            if not file.is_file():
+                raise UsageError(f"{file} is no file")
+            found.setdefault(file.absolute())
+    if not found:
+        raise UsageError("no file is named")
+    common = Path(os.path.commonpath([p.parent for p in found]))
+    named: dict[str, Path] = {}
+    for path in found:
+        label = aerialdojo_reader.label(path) if format_name == "aerialdojo" else None
+        label = label or path.relative_to(common).as_posix()
+        if label in named:
+            raise UsageError(f"{path} and {named[label]} are both {label}: import one of them, or each by its --name")
+        named[label] = path
+    return list(named.items())
+
+
+def _tasks(
+    sources: Sequence[tuple[str, Path]], chosen: Format, frame: Frame, options: Options, report: Report, bad: TextIO
+) -> Iterator[tuple[Task, dict[str, Any]]]:
+    read = chosen.reader()
+    for label, path in sources:
+        report.files.append(label)
+        pictures = (options.pictures or path.parent) if options.with_pictures else None
+        seen: set[str] = set()
+        for row, value in enumerate(records(path, chosen.key, limit=options.record_limit)):
+            report.records += 1
+            # Notes count only if the record turns out good.
+            context = Context(path, label, frame, options.angles, pictures, type(report.notes)())
+            try:
+                record = Fields(value)
+                task = read(record, context)
+                _check(task, seen)
+            except BadField as error:
+                bad.write(report.refuse(label, row, error) + "\n")
+                continue
+            report.unmapped.update(record.unread())
+            report.notes.update(context.notes)
+            yield task, {"source_file": label, "source_row": row, "source_id": task.source_id}
+
+
+def _check(task: Task, seen: set[str]) -> None:
+    try:
+        check_scene_name(task.scene)
+    except StoreError as error:
+        raise BadField("scene", str(error)) from None
+    if task.source_id in seen:
+        raise BadField("id", f"{task.source_id} stands twice in the file")
+    seen.add(task.source_id)
+
+
+def _write(task: Task, source: dict[str, Any], tables: Tables, objects: Objects, report: Report) -> None:
+    nav_id = task.nav_id or f"{task.scene}-{digest(source['source_file'], task.source_id)}"
+    number = objects.number(task)
+    pictures: list[str | None] = [None] * len(task.instances)
+    if number is not None:
+        task.known["target_object_id"] = number
+        pictures = objects.add(task, number)
+    for row in task_rows(task, nav_id, source, pictures):
+        tables.task(row)
+    if task.has_route_row:
+        tables.route(route_row(task, nav_id, source))
+        if task.route is not None:
+            report.replayed(task.route.replay_error_m)
+
+
+def _refusal(report: Report) -> ImportRefused:
+    more = [f"and {report.n_bad - len(report.bad):,} more"] if report.n_bad > len(report.bad) else []
+    head = f"{report.n_bad:,} of {report.records:,} records are bad, nothing is written (--skip-bad keeps the rest):"
+    return ImportRefused("\n  ".join([head, *report.bad, *more]))

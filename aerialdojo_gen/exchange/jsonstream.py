@@ -1,0 +1,180 @@
+"""JSON files of any size, a record at a time, in bounded memory.
+
+The standard library's own scanner reads each record, so that a NaN in one (which is not JSON, but which Python
+writes) is a value to be named in its row, not the end of the file.
+"""
+
+from __future__ import annotations
+
+import codecs
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, BinaryIO
+
+from aerialdojo_gen.errors import ImportRefused
+
+RECORD_LIMIT = 16 << 20
+_CHUNK = 1 << 20
+_SPACE = " \t\r\n"
+
+
+class _Text:
+    """What of a file is read and not yet used."""
+
+    def __init__(self, file: BinaryIO, path: Path, limit: int) -> None:
+        self.path, self.limit = path, limit
+        self.place = "the beginning"
+        self._file = file
+        self._decoder = codecs.getincrementaldecoder("utf-8-sig")()
+        self._json = json.JSONDecoder()
+        self._text, self._at, self._done = "", 0, False
+
+    def fail(self, why: str) -> ImportRefused:
+        return ImportRefused(f"{self.path}: {self.place}: {why}")
+
+    def _more(self) -> bool:
+        if self._done:
+            return False
+        raw = self._file.read(max(_CHUNK, len(self._text) - self._at))
+        try:
+            new = self._decoder.decode(raw, final=not raw)
+        except UnicodeDecodeError:
+            raise self.fail("is not UTF-8: save the file in that encoding") from None
+        self._done = not raw
+        self._text, self._at = self._text[self._at :] + new, 0
+        return True
+
+    def peek(self) -> str:
+        """The next character that is no blank, unused; empty at the end."""
+        while True:
+            while self._at < len(self._text) and self._text[self._at] in _SPACE:
+                self._at += 1
+            if self._at < len(self._text):
+                return self._text[self._at]
+            if not self._more():
+                return ""
+
+    def take(self, wanted: str) -> str:
+        """Use the next character, one of `wanted`."""
+        found = self.peek()
+        if not found or found not in wanted:
+            got = f"{found!r}" if found else "the end of the file (is it truncated?)"
+            raise self.fail(f"expected {' or '.join(wanted)}, found {got}")
+        self._at += 1
+        return found
+
+    def value(self) -> Any:
+        """Use the next value, whole."""
+        self.peek()
+        while True:
+            try:
+                value, end = self._json.raw_decode(self._text, self._at)
+            except (ValueError, RecursionError) as error:
+                why = "nested too deeply" if isinstance(error, RecursionError) else getattr(error, "msg", str(error))
+            else:
+                # A number may go on beyond what is read.
+                if end < len(self._text) or self._done:
+                    self._at = end
+                    return value
+                why = ""
+            if len(self._text) - self._at > self.limit:
+                raise self.fail(f"larger than {self.limit >> 10:,} KiB, or damaged ({why or 'no end'})")
+            if not self._more():
+                raise self.fail(f"damaged or truncated ({why})")
+
+
+def records(path: Path, key: str | None = None, *, limit: int = RECORD_LIMIT) -> Iterator[Any]:
+    """Read a JSON list a record at a time.
+
+    Parameters
+    ----------
+    path : Path
+        A file whose outermost value is a list or, with `key`, an object that has the list under that key.
+    key : str, optional
+        That key; whatever else stands in the object is passed over.
+    limit : int
+        Most characters that a record may have; about as much again is held in memory.
+
+    Yields
+    ------
+    object
+        The records in their order; NaN and infinities as floats.
+
+    Raises
+    ------
+    ImportRefused
+        The file is missing, not JSON, truncated, or a record is larger than `limit`; the message says at which one.
+    """
+    try:
+        with path.open("rb") as file:
+            text = _Text(file, path, limit)
+            if key is None:
+                yield from _list(text)
+            else:
+                yield from _under(text, key)
+            if text.peek():
+                raise text.fail(f"{text.peek()!r} after the end of the value")
+    except OSError as error:
+        raise ImportRefused(f"{path}: {error.strerror or error}") from None
+
+
+def _under(text: _Text, key: str) -> Iterator[Any]:
+    if text.peek() != "{":
+        raise text.fail(f"expected an object that has a list {key!r}")
+    text.take("{")
+    found = False
+    while text.peek() != "}":
+        name = text.value()
+        text.place = f"key {name!r}"
+        text.take(":")
+        if name == key:
+            found = True
+            yield from _list(text)
+        else:
+            text.value()
+        if text.take(",}") == "}":
+            break
+    else:
+        text.take("}")
+    text.place = "the end"
+    if not found:
+        raise text.fail(f"there is no list {key!r}")
+
+
+def _list(text: _Text) -> Iterator[Any]:
+    if text.peek() != "[":
+        raise text.fail(f"expected a list of records, found {text.peek()!r}")
+    text.take("[")
+    row = 0
+    while text.peek() != "]" or row:
+        text.place = f"row {row}"
+        yield text.value()
+        if text.take(",]") == "]":
+            break
+        row += 1
+    else:
+        text.take("]")
+    text.place = "the end"
+
+
+def small_document(path: Path, *, limit: int = RECORD_LIMIT) -> Any:
+    """Read a whole JSON file of at most `limit` bytes.
+
+    Raises
+    ------
+    ValueError
+        It is larger, not UTF-8 or not JSON; the message says which.
+    OSError
+        It cannot be read.
+    """
+    with path.open("rb") as file:
+        raw = file.read(limit + 1)
+    if len(raw) > limit:
+        raise ValueError(f"is larger than {limit >> 10:,} KiB")
+    try:
+        return json.loads(raw)
+    except RecursionError:
+        raise ValueError("is nested too deeply") from None
+    except ValueError as error:
+        raise ValueError(f"is no JSON ({error})") from None

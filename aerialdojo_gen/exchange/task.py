@@ -1,0 +1,192 @@
+"""What a reader makes of one record, whatever its format: poses in the world frame, names, actions."""
+
+from __future__ import annotations
+
+import hashlib
+from collections import Counter
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aerialdojo_gen.config import FilterConfig
+from aerialdojo_gen.exchange.frames import Frame
+from aerialdojo_gen.exchange.tables import IMPORTED_ROUTES
+from aerialdojo_gen.planning.primitives import route_length_m, wrap_rad
+
+Floats = NDArray[np.float64]
+
+
+class Instance(NamedTuple):
+    """One of a task's instances: the goal in words or as a picture."""
+
+    modality: str
+    description: str | None = None
+    picture: Path | None = None
+
+
+@dataclass(frozen=True)
+class Route:
+    """A reference trajectory.
+
+    Attributes
+    ----------
+    poses : (n, 4) float64
+        x, y, z in metres and yaw in radians, world frame.
+    action : list of n int, or None
+        What is done at every pose, in our set; None where a step is none of ours.
+    source_action : list of str or None
+        The file's own names.
+    replay_error_m : float or None
+        Metres between the recorded end and the replayed one.
+    """
+
+    poses: Floats
+    action: list[int] | None = None
+    source_action: list[str] | None = None
+    replay_error_m: float | None = None
+
+
+@dataclass
+class Task:
+    """A navigation task.
+
+    Attributes
+    ----------
+    source_id : str
+        The record's id in its file.
+    scene : str
+        Name of the scene.
+    start : (4,) float64
+        Start pose, world frame.
+    goal : (3,) float64 or None
+        Where success is measured from, world frame.
+    instances : list of Instance
+        How its goal is told.
+    nav_id : str or None
+        None: made of the file's name and the id.
+    object_key : object
+        What tells the target from others of the scene where the file has no number for it; None: there is no object.
+    object_m : (3,) float64 or None
+        Where the object is, world frame.
+    route : Route or None
+        The reference trajectory.
+    has_route_row : bool
+        False where another record of the same navigation task has brought it already.
+    known : dict
+        Further columns of `tasks`, `routes` and `objects` by their name.
+    """
+
+    source_id: str
+    scene: str
+    start: Floats
+    goal: Floats | None
+    instances: list[Instance]
+    nav_id: str | None = None
+    object_key: object = None
+    object_m: Floats | None = None
+    route: Route | None = None
+    has_route_row: bool = True
+    known: dict[str, Any] = field(default_factory=dict)
+
+
+@dataclass
+class Context:
+    """What a reader is told beside the record.
+
+    Attributes
+    ----------
+    file : Path
+        The file.
+    label : str
+        Its name as tables have it.
+    frame : Frame
+        The file's frame.
+    angles : str
+        Unit of angles where the format has both: radians, degrees or mixed.
+    pictures : Path or None
+        Folder below which pictures lie; None: leave them aside.
+    notes : Counter of str
+        What is to be told about the file, and of how many records.
+    """
+
+    file: Path
+    label: str
+    frame: Frame
+    angles: str
+    pictures: Path | None
+    notes: Counter[str]
+
+    def start_pose(self, position: Floats, yaw_rad: float) -> Floats:
+        """Make a world pose, (4,) float64, of a position and a yaw of the file's frame."""
+        return np.append(self.frame.positions_to_world(position), self.frame.yaw_to_world(yaw_rad))
+
+    def upright_pose(self, position: Floats, quaternion_xyzw: Floats) -> Floats:
+        """Make a world pose, (4,) float64; roll and pitch, which the tables lack, are noted."""
+        if abs(quaternion_xyzw[0]) > 1e-6 or abs(quaternion_xyzw[1]) > 1e-6:
+            self.notes["the start's attitude has roll or pitch: only its yaw is kept"] += 1
+        yaw = self.frame.quaternion_to_world_yaw(quaternion_xyzw)
+        return np.append(self.frame.positions_to_world(position), yaw)
+
+
+_BUDGETS = {name: getattr(FilterConfig(), name).action_budget for name in ("base", "standard", "long_horizon")}
+
+
+def digest(*parts: str) -> str:
+    """Twelve hexadecimal digits of some strings."""
+    return hashlib.blake2b("\n".join(parts).encode(), digest_size=6).hexdigest()
+
+
+def task_rows(task: Task, nav_id: str, source: dict[str, Any], pictures: list[str | None]) -> list[dict[str, Any]]:
+    """Make the task's rows of `aerialdojo_gen.exchange.tables.IMPORTED_TASKS`, one an instance."""
+    known = task.known
+    setting = known.get("setting")
+    shared = {
+        "nav_id": nav_id,
+        "scene": task.scene,
+        **{n: known.get(n) for n in ("family", "scene_type", "partition", "subset", "target_name", "landmark")},
+        "direction": known.get("direction"),
+        "setting": setting,
+        "action_budget": _BUDGETS.get(setting) if setting else None,
+        **dict(zip(("start_x_m", "start_y_m", "start_z_m", "start_yaw_rad"), task.start.tolist(), strict=True)),
+        **source,
+    }
+    return [
+        {
+            **shared,
+            "task_id": f"{nav_id}-{instance.modality[0]}",
+            "modality": instance.modality,
+            "description": instance.description,
+            "reference_image_id": picture,
+        }
+        for instance, picture in zip(task.instances, pictures, strict=True)
+    ]
+
+
+def route_row(task: Task, nav_id: str, source: dict[str, Any]) -> dict[str, Any]:
+    """Make the task's row of `aerialdojo_gen.exchange.tables.IMPORTED_ROUTES`; lengths follow from the poses."""
+    row: dict[str, Any] = dict.fromkeys(IMPORTED_ROUTES.schema.names)
+    row |= {name: value for name, value in task.known.items() if name in row} | source
+    row |= {"nav_id": nav_id, "scene": task.scene}
+    if task.goal is not None:
+        row |= dict(zip(("goal_x_m", "goal_y_m", "goal_z_m"), task.goal.tolist(), strict=True))
+        row["euclidean_m"] = float(np.linalg.norm(task.goal - task.start[:3]))
+    if task.route is None:
+        return row
+    poses = task.route.poses
+    length = route_length_m(poses[:, :3])
+    row |= {
+        "length_m": length,
+        "detour_ratio": length / row["euclidean_m"] if row["euclidean_m"] else None,
+        **{name: poses[:, k].tolist() for k, name in enumerate(("x_m", "y_m", "z_m"))},
+        "yaw_rad": wrap_rad(poses[:, 3]).tolist(),
+        "action": task.route.action,
+        "source_action": task.route.source_action,
+        "replay_error_m": task.route.replay_error_m,
+    }
+    if task.route.source_action is not None:
+        # One a pose: what is done there, the last being Stop.
+        row["n_actions"] = len(poses)
+    return row
