@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import math
 
+from aerialdojo_gen.benchmark.goal import N_ACTIONS
 from aerialdojo_gen.benchmark.motion import FlightSpace, Point
 from aerialdojo_gen.planning.primitives import DISPLACEMENTS, TURN_RAD, TURNS
-from aerialdojo_gen.schemas import APPROACH, STOP
-
-# The actions that can be chosen: all but Approach.
-N_ACTIONS = APPROACH
+from aerialdojo_gen.schemas import STOP
 
 # Plain numbers: numpy's scalars would cost more than the motion itself.
 _MOVES = [tuple(row) for row in DISPLACEMENTS.tolist()]
@@ -77,7 +75,7 @@ class Episode:
 
     @property
     def yaw_rad(self) -> float:
-        """Yaw, radians, in (-pi, pi], counted from the start's as `aerialdojo_gen.planning.primitives.replay` does."""
+        """Yaw, radians, in (-pi, pi], counted from the start's as `primitives.replay` does."""
         return math.pi - (math.pi - (self._start_yaw + self._heading * TURN_RAD)) % (2.0 * math.pi)
 
     @property

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from aerialdojo_gen.errors import UsageError
 from aerialdojo_gen.geometry.cameras import Camera
-from aerialdojo_gen.schemas import VIEWS
+from aerialdojo_gen.schemas import APPROACH, VIEWS
+
+# The actions that an agent can choose: all but Approach.
+N_ACTIONS = APPROACH
 
 
 @dataclass(frozen=True)
@@ -142,14 +144,3 @@ class Observation:
     refused: bool = False
     rgb: Mapping[str, NDArray[np.uint8]] = field(default_factory=dict)
     depth_m: Mapping[str, NDArray[np.float32]] = field(default_factory=dict)
-
-    @classmethod
-    def from_env(cls, observation: Mapping[str, Any]) -> Observation:
-        """Make one of what `aerialdojo_gen.benchmark.env.AerialDojoEnv` returns."""
-        return cls(
-            int(observation["step"][0]),
-            int(observation["remaining_actions"][0]),
-            bool(observation["refused"]),
-            observation.get("rgb", {}),
-            observation.get("depth_m", {}),
-        )

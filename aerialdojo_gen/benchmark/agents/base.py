@@ -9,7 +9,7 @@ from aerialdojo_gen.benchmark.goal import Goal, Observation
 from aerialdojo_gen.errors import AerialDojoError
 
 
-class AgentUnavailable(AerialDojoError):
+class AgentUnavailable(AerialDojoError):  # noqa: N818 (it says what is the matter)
     """Something that the agent needs is not there now: a time-out, 429, 5xx, a lost connection.
 
     Never the agent's failure: the runner begins the episode again after a pause, and logs it apart if that does not
@@ -28,7 +28,7 @@ class AgentUnavailable(AerialDojoError):
         self.retry_after_s = retry_after_s
 
 
-class InvalidAnswer(AerialDojoError):
+class InvalidAnswer(AerialDojoError):  # noqa: N818
     """The agent answered, and the answer names no action: it is counted and spends one, and nothing moves."""
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from aerialdojo_gen import rng
 from aerialdojo_gen.benchmark.agents.base import AgentBase
-from aerialdojo_gen.benchmark.goal import BLIND, Goal, Observation
+from aerialdojo_gen.benchmark.goal import BLIND, N_ACTIONS, Goal, Observation
 from aerialdojo_gen.schemas import APPROACH, STOP
 
 
@@ -49,11 +49,11 @@ class RandomAgent(AgentBase):
     sensors = BLIND
 
     def __init__(self, seed: int = 0, stop_probability: float | None = None) -> None:
-        p = 1.0 / STOP_AND_MOVES if stop_probability is None else float(stop_probability)
+        p = 1.0 / N_ACTIONS if stop_probability is None else float(stop_probability)
         if not 0.0 <= p <= 1.0:
             raise ValueError(f"stop_probability is between 0 and 1, not {p}")
         self._seed = int(seed)
-        self._p = np.full(STOP_AND_MOVES, (1.0 - p) / (STOP_AND_MOVES - 1))
+        self._p = np.full(N_ACTIONS, (1.0 - p) / (N_ACTIONS - 1))
         self._p[STOP] = p
 
     def reset(self, goal: Goal) -> None:
@@ -61,7 +61,7 @@ class RandomAgent(AgentBase):
         budget = goal.rules.action_budget
         words = (goal.modality, goal.target_name, goal.landmark, goal.direction, goal.description or "", budget)
         draws = rng.generator(self._seed, "random-agent", *words)
-        self._actions = draws.choice(STOP_AND_MOVES, size=budget, p=self._p).tolist()
+        self._actions = draws.choice(N_ACTIONS, size=budget, p=self._p).tolist()
 
     def act(self, observation: Observation) -> int:
         """Draw an action."""
@@ -79,7 +79,3 @@ class StopAgent(AgentBase):
     def act(self, observation: Observation) -> int:
         """Stop."""
         return STOP
-
-
-# Actions that an agent can choose: all but Approach.
-STOP_AND_MOVES = APPROACH

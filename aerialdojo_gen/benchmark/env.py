@@ -1,0 +1,279 @@
+"""The Gymnasium environment: one released task an episode, closed loop, without a simulator server."""
+
+from __future__ import annotations
+
+import string
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import gymnasium
+import numpy as np
+import pyarrow.compute as pc
+from gymnasium import spaces
+from numpy.typing import NDArray
+
+from aerialdojo_gen.benchmark.episode import Episode
+from aerialdojo_gen.benchmark.eyes import look, mosaic
+from aerialdojo_gen.benchmark.flight import SUCCESS_RADIUS_M, Flight
+from aerialdojo_gen.benchmark.goal import N_ACTIONS, Sensors
+from aerialdojo_gen.benchmark.tasks import (
+    MODALITIES,
+    Selection,
+    read_tasks,
+    reference_image,
+    select,
+)
+from aerialdojo_gen.benchmark.texts import GoalText
+from aerialdojo_gen.config import Embodiment
+from aerialdojo_gen.errors import UsageError
+from aerialdojo_gen.schemas import DIRECTIONS, VIEWS
+
+_TEXT = ("target_name", "landmark", "description")
+_RENDERED = Sensors(depth=False, width=320, height=320)
+
+
+class AerialDojoEnv(gymnasium.Env[dict[str, Any], np.int64]):
+    """Search for an object in a scene, from the start pose of a released task (paper: closed-loop evaluation).
+
+    Actions are `Discrete(16)`: Stop, moves and turns of `aerialdojo_gen.schemas.ACTION_NAMES`, carried out by their
+    exact magnitudes. An episode is `terminated` by Stop or by a collision, and `truncated` where the last action of
+    the budget is neither; ``info["reason"]`` is then ``"stop"``, ``"collision"`` or ``"budget"``, ``""`` before. A
+    move that would leave the flight volume is refused: it is spent, and nothing moves. The reward is 1 for a Stop
+    within the success radius, and 0 otherwise.
+
+    An observation is a dict: ``step`` and ``remaining_actions`` ((1,) int32), ``refused`` (0 or 1), ``goal``
+    (modality, target_name, landmark, direction, and description or image), and, where asked for, ``rgb`` and
+    ``depth_m`` by view. Neither it nor the info holds a pose, a distance, a route or an id (paper: what an agent may
+    know).
+
+    Parameters
+    ----------
+    data : path
+        The data directory: its release and its meshes.
+    split, setting, modality, scene : str or sequence of str, optional
+        Which tasks; all where absent. Scenes may be globs.
+    limit : int, optional
+        Draw so many of them.
+    seed : int
+        Of that draw.
+    sensors : Sensors, optional
+        What is rendered. Keywords do as well: `views`, `rgb`, `depth`, `width`, `height`.
+    views, rgb, depth, width, height
+        In place of `sensors`; ``views=()`` flies blind, tens of thousands of steps a second.
+    success_radius_m : float
+        How near to the goal a Stop must be.
+    embodiment : Embodiment, optional
+        The body.
+    render_mode : str, optional
+        ``"rgb_array"``: `render` returns the four views in one picture.
+
+    Raises
+    ------
+    UsageError
+        No task fits, or a value makes no sense.
+    StoreError
+        There is no release in `data`.
+    """
+
+    metadata = {"render_modes": ["rgb_array"], "render_fps": 4}  # noqa: RUF012 (Gymnasium's own declaration)
+
+    def __init__(
+        self,
+        data: str | Path = "data",
+        *,
+        split: str | Sequence[str] = (),
+        setting: str | Sequence[str] = (),
+        modality: str | Sequence[str] = (),
+        scene: str | Sequence[str] = (),
+        limit: int | None = None,
+        seed: int = 0,
+        sensors: Sensors | None = None,
+        views: Sequence[str] = VIEWS,
+        rgb: bool = True,
+        depth: bool = True,
+        width: int = 640,
+        height: int = 640,
+        success_radius_m: float = SUCCESS_RADIUS_M,
+        embodiment: Embodiment | None = None,
+        render_mode: str | None = None,
+    ) -> None:
+        if render_mode not in (None, "rgb_array"):
+            raise UsageError(f"no render mode {render_mode!r}: there is 'rgb_array'")
+        self.render_mode = render_mode
+        self._data = Path(data).absolute()
+        self._sensors = sensors or Sensors(tuple(views), rgb, depth, width, height)
+        self._flight = Flight(self._data, self._sensors, success_radius_m, embodiment)
+        self._begun = False
+        self._rows = select(
+            self._data, Selection(_names(split), _names(setting), _names(modality), _names(scene), limit, seed)
+        )
+        self._index: dict[str, int] | None = None
+        self._image_shape = self._find_image_shape()
+        self.action_space = spaces.Discrete(N_ACTIONS)
+        self.observation_space: spaces.Dict = self._observations()
+
+    @property
+    def n_tasks(self) -> int:
+        """Number of tasks that episodes are drawn from."""
+        return int(self._rows.num_rows)
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[dict[str, Any], dict[str, Any]]:
+        """Begin an episode.
+
+        Parameters
+        ----------
+        seed : int, optional
+            Of the draws of tasks from now on.
+        options : dict, optional
+            ``{"task_id": …}`` chooses the task; it is drawn where absent.
+
+        Returns
+        -------
+        observation, info : dict
+
+        Raises
+        ------
+        UsageError
+            There is no such task among those chosen, or no such option.
+        """
+        super().reset(seed=seed)
+        unknown = set(options or {}) - {"task_id"}
+        if unknown:
+            raise UsageError(f"reset has no option {sorted(unknown)[0]!r}: there is 'task_id'")
+        at = int(self.np_random.integers(self.n_tasks)) if not options else self._find(options["task_id"])
+        self._flight.begin(read_tasks(self._data, self._rows.slice(at, 1))[0])
+        self._begun = True
+        return self._observe(), {"reason": ""}
+
+    def step(self, action: Any) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
+        """Carry out an action.
+
+        Parameters
+        ----------
+        action : int
+            0 to 15.
+
+        Returns
+        -------
+        observation : dict
+        reward : float
+            1 for success, else 0.
+        terminated, truncated : bool
+            Ended by Stop or collision; ended by the budget.
+        info : dict
+            ``reason``.
+
+        Raises
+        ------
+        ValueError
+            There is no such action.
+        RuntimeError
+            No episode is under way.
+        """
+        episode = self.episode
+        episode.step(int(action))
+        reason = episode.termination or ""
+        return (
+            self._observe(),
+            float(episode.success(self._flight.success_radius_m)),
+            reason in ("stop", "collision"),
+            reason == "budget",
+            {"reason": reason},
+        )
+
+    def render(self) -> NDArray[np.uint8] | None:
+        """Return the four views in one picture, (2 · H, 2 · W, 3) uint8, where the render mode is ``"rgb_array"``."""
+        if self.render_mode is None:
+            return None
+        episode = self.episode
+        return mosaic(look(self._flight.space.scene, _RENDERED, episode.position, episode.yaw_rad)[0])
+
+    @property
+    def episode(self) -> Episode:
+        """The episode under way, with the pose and the distances: the evaluator's, not for agents.
+
+        Raises
+        ------
+        RuntimeError
+            None was begun.
+        """
+        if not self._begun:
+            raise RuntimeError("no episode is under way: call reset first")
+        return self._flight.episode
+
+    def _find(self, task_id: str) -> int:
+        if self._index is None:
+            self._index = {name: i for i, name in enumerate(self._rows["task_id"].to_pylist())}
+        if task_id not in self._index:
+            raise UsageError(f"no task {task_id!r} among the {self.n_tasks:,} chosen")
+        return self._index[task_id]
+
+    def _observations(self) -> spaces.Dict:
+        longest = {name: pc.max(pc.utf8_length(self._rows[name])).as_py() or 1 for name in _TEXT}
+        # Of all texts of the tasks at once: what a text may be made of tells nothing of the one at hand.
+        texts = {text for name in _TEXT for text in pc.unique(self._rows[name]).to_pylist() if text}
+        characters = "".join(sorted(set(string.printable).union(*texts)))
+        goal: dict[str, spaces.Space[Any]] = {
+            "modality": spaces.Discrete(len(MODALITIES)),
+            "direction": spaces.Discrete(len(DIRECTIONS)),
+            **{name: GoalText(longest[name], min_length=0, charset=characters) for name in _TEXT},
+        }
+        if self._image_shape is not None:
+            goal["image"] = spaces.Box(0, 255, self._image_shape, np.uint8)
+        s = self._sensors
+        budget = int(pc.max(self._rows["action_budget"]).as_py())
+        entries: dict[str, spaces.Space[Any]] = {
+            "step": spaces.Box(0, budget, (1,), np.int32),
+            "remaining_actions": spaces.Box(0, budget, (1,), np.int32),
+            "refused": spaces.Discrete(2),
+            "goal": spaces.Dict(goal),
+        }
+        picture = spaces.Box(0, 255, (s.height, s.width, 3), np.uint8)
+        depth = spaces.Box(0.0, s.max_depth_m, (s.height, s.width), np.float32)
+        if s.views and s.rgb:
+            entries["rgb"] = spaces.Dict(dict.fromkeys(s.views, picture))
+        if s.views and s.depth:
+            entries["depth_m"] = spaces.Dict(dict.fromkeys(s.views, depth))
+        return spaces.Dict(entries)
+
+    def _find_image_shape(self) -> tuple[int, ...] | None:
+        at = pc.index(pc.is_valid(self._rows["reference_image_id"]), True).as_py()
+        if at < 0:
+            return None
+        row = self._rows.slice(at, 1).to_pylist()[0]
+        return reference_image(self._data, row["scene"], row["reference_image_id"]).shape
+
+    def _observed_goal(self) -> dict[str, Any]:
+        # Made anew each time: who keeps or changes an observation must not change the next.
+        goal = self._flight.goal
+        seen: dict[str, Any] = {
+            "modality": np.int64(MODALITIES.index(goal.modality)),
+            "target_name": goal.target_name,
+            "landmark": goal.landmark,
+            "direction": np.int64(DIRECTIONS.index(goal.direction)),
+            "description": goal.description or "",
+        }
+        if self._image_shape is not None:
+            seen["image"] = np.zeros(self._image_shape, np.uint8) if goal.image is None else goal.image.copy()
+        return seen
+
+    def _observe(self) -> dict[str, Any]:
+        seen = self._flight.observe()
+        observation: dict[str, Any] = {
+            "step": np.array([seen.step], np.int32),
+            "remaining_actions": np.array([seen.remaining_actions], np.int32),
+            "refused": np.int64(seen.refused),
+            "goal": self._observed_goal(),
+        }
+        if "rgb" in self.observation_space.spaces:
+            observation["rgb"] = seen.rgb
+        if "depth_m" in self.observation_space.spaces:
+            observation["depth_m"] = seen.depth_m
+        return observation
+
+
+def _names(given: str | Sequence[str]) -> tuple[str, ...]:
+    return (given,) if isinstance(given, str) else tuple(given)

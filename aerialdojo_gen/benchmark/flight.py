@@ -1,0 +1,82 @@
+"""Tasks flown one after the other: the scene, the episode, what the cameras see."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from aerialdojo_gen.benchmark.episode import Episode
+from aerialdojo_gen.benchmark.eyes import look
+from aerialdojo_gen.benchmark.goal import Goal, Observation, Rules, Sensors
+from aerialdojo_gen.benchmark.motion import FlightSpace, flight_space
+from aerialdojo_gen.benchmark.tasks import Task, goal_of, mesh_of
+from aerialdojo_gen.config import Embodiment
+
+# Of the paper; other radii are computed from the log of distances.
+SUCCESS_RADIUS_M = 3.0
+
+
+class Flight:
+    """Flies tasks: the evaluator's side of the closed loop.
+
+    An agent never gets this object, only the `goal` and what `observe` returns.
+
+    Parameters
+    ----------
+    data : Path
+        The data directory, with release and meshes.
+    sensors : Sensors
+        What observations hold.
+    success_radius_m : float
+    embodiment : Embodiment
+        The body.
+
+    Attributes
+    ----------
+    sensors : Sensors
+    success_radius_m : float
+    task : Task
+        Under way, from `begin` on; so are the following.
+    goal : Goal
+    episode : Episode
+    space : FlightSpace
+    """
+
+    task: Task
+    goal: Goal
+    episode: Episode
+    space: FlightSpace
+
+    def __init__(
+        self,
+        data: Path,
+        sensors: Sensors,
+        success_radius_m: float = SUCCESS_RADIUS_M,
+        embodiment: Embodiment | None = None,
+    ) -> None:
+        self._data = data.absolute()
+        self._body = embodiment or Embodiment()
+        self.sensors = sensors
+        self.success_radius_m = success_radius_m
+
+    def begin(self, task: Task) -> Episode:
+        """Begin the episode of a task.
+
+        Raises
+        ------
+        StoreError
+            The scene's mesh or the goal's picture is missing.
+        """
+        row = task.row
+        body, budget = self._body, row["action_budget"]
+        rules = Rules(budget, self.success_radius_m, body.radius_m, body.wheelbase_m, self.sensors)
+        self.task = task
+        self.goal = goal_of(self._data, task, rules)
+        self.space = flight_space(*mesh_of(self._data, row["scene"]), body.radius_m)
+        self.episode = Episode(self.space, task.start, task.goal, budget)
+        return self.episode
+
+    def observe(self) -> Observation:
+        """Return what the agent has before its next action."""
+        episode = self.episode
+        rgb, depth_m = look(self.space.scene, self.sensors, episode.position, episode.yaw_rad)
+        return Observation(episode.n_actions, episode.remaining_actions, episode.refused, rgb, depth_m)

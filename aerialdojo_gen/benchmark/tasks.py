@@ -1,0 +1,243 @@
+"""Which episodes are to be flown: tasks of the release, joined with what only the evaluator may know of them."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache, lru_cache
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
+from numpy.typing import NDArray
+
+from aerialdojo_gen import rng, store
+from aerialdojo_gen.benchmark.goal import Goal, Rules
+from aerialdojo_gen.benchmark.motion import Point
+from aerialdojo_gen.errors import StoreError, UsageError
+from aerialdojo_gen.runner import choose_scenes
+from aerialdojo_gen.schemas import SETTINGS, SUBSETS, TASKS
+
+MODALITIES = ("semantic", "image")
+_FACTS = ("nav_id", "goal_x_m", "goal_y_m", "goal_z_m", "euclidean_m", "length_m")
+
+
+@dataclass(frozen=True)
+class Selection:
+    """Which tasks.
+
+    Attributes
+    ----------
+    splits : tuple of str
+        Of `aerialdojo_gen.schemas.SUBSETS`; empty for all, as everywhere here.
+    settings, modalities : tuple of str
+    scenes : tuple of str
+        Names or globs.
+    limit : int or None
+        Draw so many tasks, spread over the scenes as evenly as they go; a larger limit only adds to them.
+    seed : int
+        Of the draw.
+    """
+
+    splits: tuple[str, ...] = ()
+    settings: tuple[str, ...] = ()
+    modalities: tuple[str, ...] = ()
+    scenes: tuple[str, ...] = ()
+    limit: int | None = None
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        """Refuse what does not exist, with the nearest name."""
+        for what, chosen, known in (
+            ("split", self.splits, SUBSETS), ("setting", self.settings, SETTINGS),
+            ("modality", self.modalities, MODALITIES),
+        ):  # fmt: skip
+            for name in chosen:
+                if name not in known:
+                    near = difflib.get_close_matches(name, known, n=1)
+                    hint = f"did you mean {near[0]!r}?" if near else f"there are {', '.join(known)}"
+                    raise UsageError(f"no {what} {name!r}: {hint}")
+        if self.limit is not None and self.limit < 1:
+            raise UsageError(f"a limit is at least 1, not {self.limit}")
+
+
+@dataclass(frozen=True)
+class Task:
+    """A task instance with its goal: the evaluator's, never an agent's.
+
+    Attributes
+    ----------
+    row : dict
+        Its row of `tasks`, with ``split``.
+    goal : tuple of float
+        Position of the goal anchor, metres, world frame.
+    euclidean_m, length_m : float
+        Straight distance from start to goal, and length of the reference trajectory.
+    """
+
+    row: dict[str, Any]
+    goal: Point
+    euclidean_m: float
+    length_m: float
+
+    @property
+    def start(self) -> tuple[float, float, float, float]:
+        """Start pose: x, y, z in metres, world frame, and yaw in radians."""
+        row = self.row
+        return row["start_x_m"], row["start_y_m"], row["start_z_m"], row["start_yaw_rad"]
+
+
+def select(data: Path, selection: Selection) -> pa.Table:
+    """Find the tasks of a selection.
+
+    Parameters
+    ----------
+    data : Path
+        The data directory, with a release.
+    selection : Selection
+
+    Returns
+    -------
+    pyarrow.Table
+        Rows of `tasks` with a column ``split``, sorted by scene, navigation task and modality.
+
+    Raises
+    ------
+    UsageError
+        No such scene, or no task fits.
+    StoreError
+        There is no release, or a part of it is damaged.
+    """
+    released = store.release_scenes(data)
+    if not released:
+        raise StoreError(f"there is no release in {data}: run aerialdojo-gen split, or give its folder by --data")
+    scenes = choose_scenes(selection.scenes, released) if selection.scenes else released
+    tables = []
+    for scene in scenes:
+        for subset in ("train", "test"):
+            split = f"{store.partition(scene)}_{subset}"
+            if split not in (selection.splits or SUBSETS):
+                continue
+            table = store.read_scene(data, f"tasks/{subset}", scene)
+            for column, chosen in (("setting", selection.settings), ("modality", selection.modalities)):
+                if chosen:
+                    table = table.filter(pc.is_in(table[column], pa.array(chosen, pa.string())))
+            tables.append(table.append_column("split", pa.array([split] * table.num_rows, pa.string())))
+    found = pa.concat_tables(tables) if tables else None
+    if found is None or not found.num_rows:
+        raise UsageError("no task of the release fits: widen --split, --setting, --modality or --scene")
+    found = found.sort_by([(key, "ascending") for key in TASKS.key])
+    return found if selection.limit is None else _drawn(found, selection.limit, selection.seed)
+
+
+def _drawn(found: pa.Table, limit: int, seed: int) -> pa.Table:
+    """Take every scene's first by lot, then every scene's second, and so on, up to the limit."""
+    by_scene: dict[str, list[tuple[int, int]]] = {}
+    for i, (scene, task_id) in enumerate(zip(*(found[c].to_pylist() for c in ("scene", "task_id")), strict=True)):
+        by_scene.setdefault(scene, []).append((rng.rank(seed, "evaluate", task_id), i))
+    lots = [
+        (turn, rng.rank(seed, "evaluate", scene), i)
+        for scene, ranked in by_scene.items()
+        for turn, (_, i) in enumerate(sorted(ranked)[:limit])
+    ]
+    return found.take(pa.array(sorted(i for _, _, i in sorted(lots)[:limit])))
+
+
+def read_tasks(data: Path, rows: pa.Table) -> list[Task]:
+    """Join tasks with their goals.
+
+    Parameters
+    ----------
+    data : Path
+        The data directory.
+    rows : pyarrow.Table
+        Of `select`.
+
+    Returns
+    -------
+    list of Task
+        In the order of the rows.
+
+    Raises
+    ------
+    StoreError
+        A task has no route: the two tables do not belong together.
+    """
+    tasks = []
+    for row in rows.to_pylist():
+        fact = _facts(data, row["scene"], row["subset"]).get(row["nav_id"])
+        if fact is None:
+            raise StoreError(f"task {row['task_id']} has no route in {data}/release: run aerialdojo-gen split again")
+        *goal, euclidean_m, length_m = fact
+        tasks.append(Task(row, (goal[0], goal[1], goal[2]), euclidean_m, length_m))
+    return tasks
+
+
+@cache
+def _facts(data: Path, scene: str, subset: str) -> dict[str, tuple[float, ...]]:
+    columns = store.read_scene(data, f"routes/{subset}", scene, _FACTS).to_pydict()
+    return dict(zip(columns["nav_id"], zip(*(columns[name] for name in _FACTS[1:]), strict=True), strict=True))
+
+
+def reference_actions(data: Path, scene: str, subsets: Sequence[str]) -> dict[str, list[int]]:
+    """Read the reference trajectories' actions, by navigation task: for the oracle alone."""
+    return {
+        row["nav_id"]: row["action"]
+        for subset in subsets
+        for row in store.read_scene(data, f"routes/{subset}", scene, ("nav_id", "action")).to_pylist()
+    }
+
+
+def goal_of(data: Path, task: Task, rules: Rules) -> Goal:
+    """Make what the agent is told of a task."""
+    row = task.row
+    image_id = row["reference_image_id"]
+    image = None if image_id is None else reference_image(data, row["scene"], image_id)
+    words = (row["modality"], row["target_name"], row["landmark"], row["direction"], row["description"])
+    return Goal(*words, image, rules)
+
+
+@lru_cache(maxsize=256)
+def reference_image(data: Path, scene: str, image_id: str) -> NDArray[np.uint8]:
+    """Read a goal's picture: (H, W, 3) uint8, sRGB, read-only.
+
+    Raises
+    ------
+    StoreError
+        It is not in the release, or is no picture.
+    """
+    png = _pictures(data, scene).get(image_id)
+    image = None if png is None else cv2.imdecode(np.frombuffer(png, np.uint8), cv2.IMREAD_COLOR_RGB)
+    if image is None:
+        raise StoreError(f"reference image {image_id} of {scene} is not in {data}/release/objects: run split again")
+    picture = np.ascontiguousarray(image, np.uint8)
+    picture.setflags(write=False)
+    return picture
+
+
+@lru_cache(maxsize=4)
+def _pictures(data: Path, scene: str) -> dict[str, bytes]:
+    rows = store.read_scene(data, "release/objects", scene, ("reference_image_id", "reference_image")).to_pylist()
+    return {row["reference_image_id"]: row["reference_image"] for row in rows if row["reference_image"]}
+
+
+@lru_cache(maxsize=64)
+def mesh_of(data: Path, scene: str) -> tuple[Path, str]:
+    """Find a scene's mesh: its path and SHA-256.
+
+    Raises
+    ------
+    StoreError
+        The scene is not in the release, or its mesh is not there.
+    """
+    row = store.read_scene(data, "release/scenes", scene, ("mesh_path", "mesh_sha256")).to_pylist()[0]
+    path = data / row["mesh_path"]
+    if not path.resolve().is_relative_to(data.resolve()):
+        raise StoreError(f"the mesh of {scene}, {row['mesh_path']!r}, leads out of {data}")
+    if not path.is_file():
+        raise StoreError(f"the mesh {path} is missing: run aerialdojo-gen build-scenes --scene {scene}")
+    return path, row["mesh_sha256"]
