@@ -74,6 +74,7 @@ class Desk:
             "bounds_m": self.scene.bounds.tolist(),
             "categories": dict(sorted(words.items())),
             "standoff_m": self.anchors.config.standoff_m,
+            "picture_px": self.anchors.size,
             "file": self.storage.path.name,
             "wanted": self._counts,
         }
@@ -262,7 +263,7 @@ class Desk:
 
 
 def _told(record: Record) -> dict[str, Any]:
-    return record.model_dump(mode="json", include={"time", "who", "client", "action", "what", "edits"})
+    return record.model_dump(mode="json", include={"time", "who", "client", "action", "what", "before", "after", "edits"})
 
 
 def open_desk(name: str, pipeline: Pipeline, roots: Roots) -> Desk:

@@ -1,0 +1,277 @@
+// The annotation page: the scene, the list, the panel, and the keys that connect them.
+import { addCompass } from "/static/compass.js";
+import { SceneView } from "/static/scene.js";
+import { candidatesOf } from "./anchors.js";
+import { askConflict, showHelp, showHistory } from "./dialogs.js";
+import { byId, h, toast } from "./dom.js";
+import { Editor } from "./editor.js";
+import { List, unfinished } from "./list.js";
+import { Sync } from "./sync.js";
+
+class Page {
+  async start() {
+    this.facts = await (await fetch("/api/facts")).json();
+    document.title = `annotate ${this.facts.scene}`;
+    byId("scene-name").textContent = this.facts.scene;
+    byId("export").download = this.facts.file;
+    byId("coco").download = `${this.facts.scene}-coco.zip`;
+    document.body.append(h("datalist", { id: "categories" },
+      ...Object.entries(this.facts.categories).map(([key, word]) => h("option", { value: key }, word))));
+    this.whoAreYou();
+    this.view = await SceneView.load(byId("view"), "/api/scene");
+    addCompass(this.view, this.view.overlay);
+    this.sync = new Sync(this.facts.scene, () => byId("who").value, askConflict);
+    this.list = new List((selection) => this.select(selection));
+    this.editor = new Editor(this);
+    this.sync.addEventListener("document", () => this.documentChanged());
+    this.sync.addEventListener("status", ({ detail }) => this.status(detail));
+    this.sync.addEventListener("other", ({ detail }) => toast(detail));
+    this.sync.addEventListener("refused", ({ detail }) => toast(detail, true));
+    await this.sync.start();
+    if (!this.sync.doc) return;
+    this.status({ status: "saved", text: "saved" });
+    this.editor.show(null);
+    this.buttons();
+    this.keys();
+    this.view.onPick((hit, event) => this.clicked(hit, event));
+    this.view.onHover((hit) => this.hover(hit));
+    document.body.dataset.ready = "true";
+  }
+
+  whoAreYou() {
+    byId("who").value = localStorage.getItem("aerialdojo-annotate-who") ?? "";
+    byId("who").addEventListener("change", () => localStorage.setItem("aerialdojo-annotate-who", byId("who").value));
+  }
+
+  say(text, wrong = false) { toast(text, wrong); }
+
+  status({ status, text }) {
+    byId("saved").textContent = text;
+    byId("saved").className = status === "saved" ? "" : status;
+  }
+
+  // ---- what is selected ----
+
+  select(selection, { go = true, focus = false } = {}) {
+    this.selection = selection;
+    this.editor.show(selection);
+    this.list.render(this.sync.doc, selection);
+    this.list.reveal();
+    const entry = selection?.kind ? this.sync.entry(selection.kind, selection.id) : selection?.node;
+    this.frame(entry?.node);
+    if (entry?.node && go && selection.kind) this.view.focusOn(entry.node);
+    if (focus) this.intoFields();
+    if (selection?.kind === "objects") this.prefetch();
+  }
+
+  /** Draw the selection's box; a tint would hide the colours that people are to describe. */
+  frame(node) {
+    const k = node ? this.view.index.get(node) : undefined;
+    if (k === undefined) {
+      this.view.remove("frame");
+      return;
+    }
+    const [low, high] = [0, 3].map((at) => [...this.view.payload.boxes.subarray(6 * k + at, 6 * k + at + 3)]);
+    const corner = (bits) => [0, 1, 2].map((axis) => (bits >> axis & 1 ? high[axis] + 0.05 : low[axis] - 0.05));
+    const edges = [0, 1, 2, 3, 4, 5, 6, 7].flatMap((a) => [1, 2, 4].filter((bit) => !(a & bit)).map((bit) => [...corner(a), ...corner(a | bit)]));
+    this.view.addRoutes("frame", edges.map((points, id) => ({ id, points, colour: "#38bdf8" })), { width: 2.5, opacity: 1, pickable: false });
+  }
+
+  /** Have the candidates of the next unfinished object ready before somebody asks. */
+  async prefetch() {
+    const current = this.selection && this.sync.entry("objects", this.selection.id);
+    try {
+      if (current) await candidatesOf(current);
+      const next = this.list.nextUnfinished();
+      if (next) for (const { position_m: [x, y, z], yaw_deg } of await candidatesOf(next)) {
+        new Image().src = `/api/picture?${new URLSearchParams({ x, y, z, yaw_deg })}`;
+      }
+    } catch { /* the panel of that object will say what is wrong */ }
+  }
+
+  intoFields() {
+    const empty = [...document.querySelectorAll("#panel input, #panel textarea")].find((field) => !field.readOnly && !field.value && field.type !== "number");
+    (empty ?? document.querySelector("#panel input, #panel textarea") ?? byId("panel")).focus();
+  }
+
+  entryOfNode(node) {
+    for (const kind of ["objects", "landmarks"]) {
+      const entry = this.sync.doc[kind].find((one) => one.node === node);
+      if (entry) return { kind, id: entry.id };
+    }
+    return null;
+  }
+
+  async clicked(hit, event) {
+    if (hit?.kind === "marker") {
+      const [kind, id] = hit.id.split("-");
+      this.select({ kind, id: Number(id) }, { go: false });
+      return;
+    }
+    const box = this.view.canvas.getBoundingClientRect();
+    await this.pickAt(event.clientX - box.left, event.clientY - box.top);
+  }
+
+  /** What the ray through a pixel meets on the mesh is the server's to say. */
+  async pickAt(x, y) {
+    const [origin_m, direction] = this.view.ray(x, y);
+    const response = await fetch("/api/pick", { method: "POST", headers: { "Content-Type": "application/json" },
+      body: JSON.stringify({ origin_m, direction }) });
+    const facts = await response.json();
+    this.select(facts && (this.entryOfNode(facts.node) ?? { node: facts }), { go: false });
+  }
+
+  hover(hit) {
+    const box = byId("hover");
+    const node = hit?.kind === "marker" ? this.sync.entry(...split(hit.id))?.node : hit?.node;
+    const place = node && this.view.nodes[this.view.index.get(node)];
+    box.hidden = !place;
+    if (!place) return;
+    const annotated = this.entryOfNode(node);
+    const entry = annotated && this.sync.entry(annotated.kind, annotated.id);
+    const what = this.facts.categories[place.category] ?? place.category;
+    box.replaceChildren([place.attributes.colour, what].filter(Boolean).join(" "), "  ", h("span", { class: "node" }, node),
+      entry ? `  ${annotated.kind === "objects" ? "object" : "landmark"} ${entry.id}${entry.name ? ` “${entry.name}”` : ""}` : "");
+  }
+
+  // ---- what changes ----
+
+  documentChanged() {
+    const doc = this.sync.doc;
+    for (const [id, what] of [["undo", doc.undo], ["redo", doc.redo]]) {
+      byId(id).disabled = !what;
+      byId(id).title = what ? `${id === "undo" ? "Undo (Ctrl+Z)" : "Redo (Ctrl+Shift+Z)"}: ${what}` : "";
+    }
+    if (!this.editor) return;
+    this.list.render(doc, this.selection);
+    this.editor.refresh();
+    const colour = (entry) => (entry.faults.some((fault) => !entry.lacks.includes(fault.field)) ? "#fb8585" : unfinished(entry) ? "#fbbf24" : "#4ade80");
+    this.view.addMarkers("annotated", [
+      ...doc.landmarks.filter((entry) => entry.position_m).map((entry) => ({ id: `landmarks-${entry.id}`, position: entry.position_m,
+        colour: "#60a5fa", size: 15, label: entry.name || `landmark ${entry.id}` })),
+      ...doc.objects.filter((entry) => entry.position_m).map((entry) => ({ id: `objects-${entry.id}`, position: entry.position_m,
+        colour: colour(entry), size: 11 })),
+    ]);
+  }
+
+  async add(kind) {
+    const facts = this.selection?.node;
+    if (!facts) {
+      this.say("Pick a thing in the scene first.", true);
+      return;
+    }
+    const name = [facts.attributes.colour, facts.word].filter(Boolean).join(" ");
+    const fields = kind === "objects" ? { node: facts.node, category: facts.category, name } : { node: facts.node, name: facts.word };
+    const result = await this.sync.request({ do: "add", kind, fields });
+    const entry = this.sync.doc[kind].find((one) => one.node === facts.node);
+    if (result && entry) this.select({ kind, id: entry.id }, { go: false, focus: true });
+  }
+
+  async remove() {
+    const { kind, id } = this.selection ?? {};
+    if (!kind) return;
+    const entry = structuredClone(this.sync.entry(kind, id));
+    const result = await this.sync.request({ do: "remove", kind, id }, entry);
+    if (result?.done) {
+      this.say(`Removed ${kind === "objects" ? "object" : "landmark"} ${id}. Ctrl+Z brings it back.`);
+      this.select(null);
+    }
+  }
+
+  async turn(which) {
+    this.editor.saveAll();
+    const done = await this.sync.turn(which);
+    if (!done) return;
+    this.say(`${which === "undo" ? "Undone" : "Done again"}: ${done.what}`);
+    const edit = done.edits.find((one) => one.after);
+    if (edit) this.select({ kind: edit.kind, id: edit.id }, { go: false });
+    else this.select(null);
+  }
+
+  next() {
+    this.editor.saveAll();
+    const entry = this.list.nextUnfinished();
+    if (!entry) {
+      this.say(this.sync.doc.objects.length ? "All objects are done." : "There are no objects yet: pick a thing and press O.");
+      return;
+    }
+    this.select({ kind: "objects", id: entry.id });
+  }
+
+  async takeOver(file) {
+    const text = await file.text();
+    await this.sync.flush();
+    const answer = await this.sync.post("/api/import", { text });
+    if (answer?.status === 200) {
+      this.sync.take(answer.body);
+      this.select(null);
+      this.say(answer.body.done ? `Taken over: ${answer.body.done.what}. Ctrl+Z takes it back.` : "The file says what is here already.");
+    } else this.say(answer?.body.error ?? "the server does not answer", true);
+    if (answer?.body.state) this.sync.take(answer.body.state);
+  }
+
+  // ---- buttons and keys ----
+
+  mode() {
+    const fly = this.view.controls.mode !== "fly";
+    this.view.controls.setMode(fly ? "fly" : "orbit");
+    byId("mode").setAttribute("aria-pressed", String(fly));
+    this.view.canvas.focus();
+  }
+
+  goTo() {
+    const entry = this.selection?.kind ? this.sync.entry(this.selection.kind, this.selection.id) : this.selection?.node;
+    if (entry?.node) this.view.focusOn(entry.node);
+  }
+
+  buttons() {
+    const on = { undo: () => this.turn("undo"), redo: () => this.turn("redo"), "show-history": showHistory, "show-help": showHelp,
+      next: () => this.next(), mode: () => this.mode(), go: () => this.goTo(), top: () => this.view.top(), home: () => this.view.home(),
+      aim: () => this.pickAt(this.view.width / 2, this.view.height / 2) };
+    for (const [id, act] of Object.entries(on)) byId(id).addEventListener("click", () => act());
+    byId("import").addEventListener("change", (event) => {
+      if (event.target.files[0]) this.takeOver(event.target.files[0]);
+      event.target.value = "";
+      byId("files").open = false;
+    });
+    this.view.canvas.addEventListener("focus", () => { byId("crosshair").hidden = !this.view.canvas.matches(":focus-visible"); });
+    this.view.canvas.addEventListener("blur", () => { byId("crosshair").hidden = true; });
+    document.addEventListener("pointerdown", (event) => { if (!byId("files").contains(event.target)) byId("files").open = false; });
+  }
+
+  keys() {
+    const act = {
+      o: () => this.add("objects"), l: () => this.add("landmarks"), n: () => this.next(), j: () => this.list.step(1), k: () => this.list.step(-1),
+      g: () => this.goTo(), f: () => this.mode(), t: () => this.view.top(), h: () => this.view.home(), v: () => this.editor.anchors?.fromView(),
+      1: () => this.editor.anchors?.pick(1), 2: () => this.editor.anchors?.pick(2), 3: () => this.editor.anchors?.pick(3),
+      "/": () => byId("find").focus(), "?": showHelp, delete: () => this.remove(), escape: () => this.select(null),
+    };
+    document.addEventListener("keydown", (event) => {
+      if (document.querySelector("dialog[open]")) return;
+      const typing = event.target.matches("input, textarea, select"), key = event.key.toLowerCase();
+      const control = event.ctrlKey || event.metaKey;
+      let done = null;
+      if (control && key === "z") done = () => this.turn(event.shiftKey ? "redo" : "undo");
+      else if (control && key === "y") done = () => this.turn("redo");
+      else if (control && key === "enter") done = () => this.next();
+      else if (event.altKey && "123".includes(key)) done = act[key];
+      else if (control || event.altKey) return;
+      else if (typing && key === "escape") done = () => event.target.blur();
+      else if (typing) return;
+      else if (key === " " && event.target === this.view.canvas) done = () => this.pickAt(this.view.width / 2, this.view.height / 2);
+      else if (key === "enter" && event.target.matches("body, canvas, #panel") && this.selection?.kind) done = () => this.intoFields();
+      else done = act[key];
+      if (!done) return;
+      event.preventDefault();
+      done();
+    });
+  }
+}
+
+const split = (key) => [key.split("-")[0], Number(key.split("-")[1])];
+
+const page = new Page();
+page.start().catch((error) => {
+  byId("saved").textContent = error.message;
+  byId("saved").className = "lost";
+});
