@@ -1,12 +1,19 @@
 """What several test files share."""
 
+from __future__ import annotations
+
 import fcntl
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
+
+if TYPE_CHECKING:
+    from planting import Planted
 
 
 @pytest.fixture(scope="session")
@@ -27,3 +34,13 @@ def smoke(project: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
         done = subprocess.run(command, cwd=project, capture_output=True, text=True, check=False)
         assert done.returncode == 0, done.stderr
     return data
+
+
+@pytest.fixture
+def planted(smoke: Path, tmp_path: Path) -> Planted:
+    """A copy of the smoke run's release and meshes, to plant faults in; its scene is U_Courtyard_0."""
+    from planting import Planted
+
+    shutil.copytree(smoke / "release", tmp_path / "data" / "release")
+    shutil.copytree(smoke / "meshes", tmp_path / "data" / "meshes")
+    return Planted(tmp_path / "data", "U_Courtyard_0")

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from aerialdojo_gen.release.validate.registry import Finding, check
 from aerialdojo_gen.release.validate.rows import Rows, SceneData
@@ -62,7 +63,10 @@ def image_box(data: SceneData, rows: Rows) -> Iterator[Finding]:
     for row, raw in enumerate(rows.column("reference_image")):
         if raw.as_py() is None or damaged[row] or np.isnan(boxes[row]).all():
             continue
-        height, width = _decoded(raw.as_py()).shape[:2]
+        picture = _decoded(raw.as_py())
+        if picture is None:
+            continue
+        height, width = picture.shape
         u0, v0, u1, v1 = boxes[row].tolist()
         if not (0 <= u0 < u1 <= width and 0 <= v0 < v1 <= height):
             yield Finding(row, f"box ({u0:g}, {v0:g}) to ({u1:g}, {v1:g})", f"within {width} x {height} pixels")
@@ -87,5 +91,6 @@ def _chunks(png: bytes) -> Iterator[str]:
         at += 12 + int.from_bytes(png[at : at + 4], "big")
 
 
-def _decoded(png: bytes) -> np.ndarray:
+def _decoded(png: bytes) -> NDArray[np.uint8] | None:
+    """Grey values of a PNG, (H, W); None where it cannot be decoded."""
     return cv2.imdecode(np.frombuffer(png, dtype=np.uint8), cv2.IMREAD_GRAYSCALE)

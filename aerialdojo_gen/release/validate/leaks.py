@@ -30,7 +30,7 @@ def telling_id(data: SceneData, rows: Rows) -> Iterator[Finding]:
             yield Finding(row, f"reference_image_id = {image!r}", "ref_<12 hexadecimal digits>")
 
 
-@check("tasks", needs=("routes", "objects"), after=("task_goal", "goal_of_modality"))
+@check("tasks", needs=("objects",))
 def telling_text(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """Names and descriptions hold no coordinate and no node of the mesh."""
     nodes = {node for node in data["objects"].texts("mesh_node") if node and re.search(r"_\d+$", node)}
@@ -45,7 +45,7 @@ def telling_text(data: SceneData, rows: Rows) -> Iterator[Finding]:
                 yield Finding(row, f"{name} tells {judged[text]!r}", "words alone")
 
 
-@check("tasks", needs=("routes", "anchors", "objects"), after=("task_start",))
+@check("tasks", needs=("routes", "objects"))
 def telling_number(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """No number of a task's row is a coordinate of its goal or of its target, unless the start shares it."""
     routes, paths = data["routes"], data.paths
@@ -78,14 +78,3 @@ def duplicate_route(_data: SceneData, rows: Rows) -> Iterator[Finding]:
         if first.setdefault(key, row) != row:
             pair = f"{key[0]}_{key[1]}__{key[2]}"
             yield Finding(row, f"start and target {pair} as {nav_ids[first[key]]}", "each pair once")
-
-
-@check("routes", after=("duplicate_key", "route_in_both_subsets", "duplicate_route"))
-def duplicate_path(data: SceneData, rows: Rows) -> Iterator[Finding]:
-    """No two routes have the same first and last pose."""
-    paths, nav_ids = data.paths, rows.texts("nav_id")
-    ends = np.column_stack([paths.starts, paths.ends])
-    first: dict[bytes, int] = {}
-    for row, pose in zip(paths.rows.tolist(), ends, strict=True):
-        if (before := first.setdefault(pose.tobytes(), row)) != row:
-            yield Finding(row, f"the start and the goal of {nav_ids[before]}", "each start and goal once")

@@ -20,6 +20,10 @@ _SHARED = (
     "family", "scene_type", "partition", "subset", "setting", "action_budget", "start_x_m", "start_y_m", "start_z_m",
     "start_yaw_rad", "target_name", "landmark", "direction",
 )  # fmt: skip
+_SAID_OF_ROUTE = (
+    "duplicate_key", "task_in_both_subsets", "task_without_route", "task_instances", "task_scene", "task_setting",
+    "task_budget", "task_start", "task_goal", "telling_number", "telling_text", "telling_id",
+)  # fmt: skip
 
 
 def sound(data: SceneData, table: str, rows: Ints) -> Mask:
@@ -103,7 +107,7 @@ def route_without_task(data: SceneData, rows: Rows) -> Iterator[Finding]:
         yield Finding(int(row), "no row of tasks", "two instances")
 
 
-@check("tasks", needs=("routes",))
+@check("tasks", needs=("routes",), after=("duplicate_key", "task_in_both_subsets"))
 def task_without_route(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """A task has its route, on the same side of the split."""
     routes = data["routes"]
@@ -119,15 +123,21 @@ def task_without_route(data: SceneData, rows: Rows) -> Iterator[Finding]:
 
 
 @check("tasks", after=("duplicate_key", "task_in_both_subsets", "task_without_route"))
-def task_instances(_data: SceneData, rows: Rows) -> Iterator[Finding]:
+def task_instances(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """A navigation task has one semantic and one image instance."""
+    copies = data.flagged("tasks", ("duplicate_key", "task_in_both_subsets"))
+    unfit = data.flagged("tasks", ALWAYS_AFTER)
     found: dict[str | None, list[str]] = {}
     first: dict[str | None, int] = {}
+    skip = set()
     for row, (nav_id, modality) in enumerate(zip(rows.texts("nav_id"), rows.texts("modality"), strict=True)):
-        found.setdefault(nav_id, []).append(str(modality))
-        first.setdefault(nav_id, row)
+        if unfit[row]:
+            skip.add(nav_id)
+        if not copies[row]:
+            found.setdefault(nav_id, []).append(str(modality))
+            first.setdefault(nav_id, row)
     for nav_id, modalities in found.items():
-        if sorted(modalities) != ["image", "semantic"]:
+        if nav_id not in skip and sorted(modalities) != ["image", "semantic"]:
             yield Finding(first[nav_id], " and ".join(sorted(modalities)), "image and semantic")
 
 
@@ -162,7 +172,7 @@ def task_budget(data: SceneData, rows: Rows) -> Iterator[Finding]:
         yield Finding(int(row), str(rows.ints("action_budget")[row]), str(wanted[row]))
 
 
-@check("tasks", needs=("routes",))
+@check("tasks", needs=("routes",), after=("telling_number",))
 def task_start(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """A task starts at the first pose of its route."""
     paths, routes = data.paths, data["routes"]
@@ -186,7 +196,7 @@ def goal_of_modality(_data: SceneData, rows: Rows) -> Iterator[Finding]:
                 yield Finding(row, f"{name} = {value!r} in a {own} task", "a text" if own == wanted else "null")
 
 
-@check("tasks", needs=("routes", "objects", "landmarks"), after=("goal_of_modality",))
+@check("tasks", needs=("routes", "objects", "landmarks"), after=("goal_of_modality", "telling_text", "telling_id"))
 def task_goal(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """What a task says of its goal is what stands of the target in objects."""
     objects, landmarks = data["objects"], data["landmarks"]
@@ -207,15 +217,16 @@ def task_goal(data: SceneData, rows: Rows) -> Iterator[Finding]:
             yield Finding(int(row), f"{name} = {own[int(row)].as_py()!r}", repr(wanted[int(row)].as_py()))
 
 
-@check("tasks", after=("duplicate_key", "task_instances", "task_setting", "task_budget", "task_start", "task_scene",
-                       "task_goal", "task_in_both_subsets"))  # fmt: skip
-def instances_agree(_data: SceneData, rows: Rows) -> Iterator[Finding]:
+@check("tasks", after=_SAID_OF_ROUTE)
+def instances_agree(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """Both instances of a navigation task share everything but the goal's representation."""
     first = rows.find("nav_id", rows.column("nav_id"))
+    # A task that does not agree with its route has been named: its twin is not to blame.
+    fit = ~data.flagged("tasks", (*ALWAYS_AFTER, *_SAID_OF_ROUTE))[first]
     for name in _SHARED:
         own = rows.column(name)
         theirs = own.take(_at(first))
-        for row in np.flatnonzero(unequal(own, theirs)):
+        for row in np.flatnonzero(unequal(own, theirs) & fit):
             yield Finding(int(row), f"{name} = {own[int(row)].as_py()}", f"{theirs[int(row)].as_py()}, as its twin")
 
 

@@ -1,0 +1,104 @@
+"""A small release to plant faults in: rows are changed in the Parquet files, as careless hands would change them."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from aerialdojo_gen import store
+from aerialdojo_gen.config import load_pipeline
+from aerialdojo_gen.planning.primitives import replay, wrap_rad
+from aerialdojo_gen.release.validate import Asked, validate
+from aerialdojo_gen.release.validate.parts import part_path
+from aerialdojo_gen.schemas import APPROACH
+
+SMOKE = Path(__file__).resolve().parent.parent / "pipelines" / "smoke.toml"
+LISTS = ("x_m", "y_m", "z_m", "yaw_rad", "action")
+Row = dict[str, object]
+
+
+class Planted:
+    """A release's folder and one of its scenes."""
+
+    def __init__(self, data: Path, scene: str) -> None:
+        self.data, self.scene, self.release = data, scene, data / "release"
+
+    def path(self, key: str) -> Path:
+        return self.release / part_path(key, self.scene)
+
+    def rows(self, key: str) -> list[Row]:
+        return pq.read_table(self.path(key), partitioning=None).to_pylist()
+
+    def write(self, key: str, rows: list[Row], *, sort: bool = True, schema: pa.Schema | None = None) -> None:
+        """Write rows as a part whose footer tells of these rows; nulls and doubles are let through."""
+        spec = store.LAYOUT[key].spec
+        if sort:
+            rows = sorted(rows, key=lambda row: tuple(str(row[k]) if k != "object_id" else row[k] for k in spec.order))
+        loose = schema or pa.schema([f.with_nullable(True) for f in spec.schema])
+        table = pa.Table.from_pylist(rows, schema=loose)
+        meta = {"fingerprint": "", "content": store.content_digest(table), "parts": 1, "summary": {}, "files": {}}
+        pq.write_table(table.replace_schema_metadata({b"aerialdojo": json.dumps(meta).encode()}), self.path(key))
+
+    def edit(self, key: str, change: Callable[[Row], None], wanted: Callable[[Row], bool] = lambda _: True) -> Row:
+        """Change the first row that is wanted; returns it as it then is."""
+        rows = self.rows(key)
+        row = next(row for row in rows if wanted(row))
+        change(row)
+        self.write(key, rows)
+        return row
+
+    def edit_all(self, key: str, change: Callable[[Row], None], wanted: Callable[[Row], bool]) -> list[Row]:
+        rows = self.rows(key)
+        changed = [row for row in rows if wanted(row)]
+        for row in changed:
+            change(row)
+        self.write(key, rows)
+        return changed
+
+
+def poses(row: Row) -> np.ndarray:
+    return np.column_stack([row[name] for name in LISTS[:4]])
+
+
+def refly(row: Row, actions: list[int]) -> Row:
+    """The route with other actions: flown anew, measured anew, ended on the goal by an Approach if it had one."""
+    old = poses(row)
+    flown = replay(old[0], actions[:-1])
+    if APPROACH in actions:
+        flown[-1, :3] = old[-1, :3]
+    return measured(row, flown, actions)
+
+
+def measured(row: Row, path: np.ndarray, actions: list[int]) -> Row:
+    length = float(np.linalg.norm(np.diff(path[:, :3], axis=0), axis=1).sum())
+    euclidean = float(np.linalg.norm(path[-1, :3] - path[0, :3]))
+    return row | {
+        **{name: path[:, k].tolist() for k, name in enumerate(LISTS[:4])},
+        "action": list(actions), "n_actions": len(actions), "length_m": length, "euclidean_m": euclidean,
+        "detour_ratio": length / euclidean,
+    }  # fmt: skip
+
+
+def turned(yaw: float, degrees: float) -> float:
+    return float(wrap_rad(np.array([yaw + math.radians(degrees)]))[0])
+
+
+def faults_of(report) -> dict[str, list[str]]:
+    """What was found: keys of the rows at fault by check."""
+    found: dict[str, list[str]] = {}
+    for fault in report.faults:
+        found.setdefault(fault.check, []).append(fault.key or fault.part)
+    return {name: sorted(set(keys)) for name, keys in found.items()}
+
+
+def check(planted: Planted, **options) -> dict[str, list[str]]:
+    """Validate the scene that was planted in; the whole release with ``whole=True``."""
+    scenes = () if options.pop("whole", False) else (planted.scene,)
+    options = {"pipeline": load_pipeline(SMOKE)} | options
+    return faults_of(validate(Asked(planted.release, scenes=scenes, **options)))

@@ -1,0 +1,217 @@
+"""Faults planted in routes that are otherwise measured anew: each is found by its check and its row, and only it."""
+
+import numpy as np
+import pytest
+from planting import SMOKE, check, measured, poses, refly, turned
+
+from aerialdojo_gen.config import load_pipeline
+from aerialdojo_gen.planning.collision import CollisionWorld
+from aerialdojo_gen.release.validate import collisions
+from aerialdojo_gen.release.validate.parts import read_tables
+from aerialdojo_gen.release.validate.registry import ALWAYS_AFTER, TABLES
+from aerialdojo_gen.release.validate.rows import SceneData
+from aerialdojo_gen.release.validate.run import SCENE_CHECKS
+from aerialdojo_gen.scenes.glb import read_glb
+from aerialdojo_gen.schemas import APPROACH, STOP, TURN_LEFT, TURN_RIGHT
+
+RADIUS = 0.25
+UP_2, DOWN_2, LEFT_5, RIGHT_5 = 11, 13, 6, 9
+KEY = "routes/train"
+
+
+def key(row):
+    return [f"nav_id={row['nav_id']}"]
+
+
+def replace(planted, old, new):
+    rows = [new if row["nav_id"] == old["nav_id"] else row for row in planted.rows(KEY)]
+    assert rows != planted.rows(KEY)
+    planted.write(KEY, rows)
+
+
+@pytest.fixture
+def world(planted):
+    return CollisionWorld(read_glb(planted.data / "meshes" / f"{planted.scene}.glb"))
+
+
+def roomy(row, metres=0.0, actions=0):
+    """Whether a route may grow by so much and keep its setting and its budget."""
+    longest, budget = {"base": (30, 90), "standard": (60, 180), "long_horizon": (100, 300)}[row["setting"]]
+    return row["length_m"] + metres < longest and row["n_actions"] + actions <= budget
+
+
+@pytest.mark.parametrize(
+    ("found_by", "name", "off"),
+    [
+        ("n_actions", "n_actions", 1),
+        ("route_length", "length_m", 0.5),
+        ("euclidean_distance", "euclidean_m", -0.01),
+        ("detour_ratio", "detour_ratio", 0.02),
+        ("min_clearance", "min_clearance_m", 0.01),
+        ("min_clearance", "min_clearance_m", -0.01),
+        ("goal_anchor", "goal_x_m", 0.1),
+        ("goal_anchor", "goal_yaw_rad", 0.01),
+    ],
+)
+def test_a_number_that_is_off(planted, found_by, name, off):
+    def change(row):
+        row[name] += off
+
+    row = planted.edit(KEY, change, lambda row: row["min_clearance_m"] < 0.9)
+    assert check(planted) == {found_by: key(row)}
+
+
+def test_lists_that_do_not_fit_together(planted):
+    row = planted.edit(KEY, lambda row: row["z_m"].pop())
+    assert check(planted) == {"list_lengths_differ": key(row)}
+
+
+def test_a_stop_on_the_way_and_an_approach_in_the_middle(planted):
+    rows = planted.rows(KEY)
+    rows[0]["action"][1] = STOP
+    rows[1]["action"][1] = APPROACH
+    rows[2]["action"][-1] = TURN_LEFT
+    planted.write(KEY, rows)
+    assert check(planted) == {"action_order": sorted(key(rows[k])[0] for k in range(3))}
+
+
+def test_a_route_over_its_budget(planted):
+    old = next(row for row in planted.rows(KEY) if row["setting"] == "base")
+    turns = [TURN_LEFT, TURN_RIGHT] * ((92 - old["n_actions"]) // 2)
+    new = refly(old, [*turns, *old["action"]])
+    assert new["n_actions"] > 90
+    replace(planted, old, new)
+    assert check(planted) == {"keeping_rule": key(old)}
+
+
+def test_a_setting_of_another_length(planted):
+    row = planted.edit(KEY, lambda row: row.update(setting="standard"), lambda row: row["setting"] == "base")
+    planted.edit_all(
+        "tasks/train",
+        lambda task: task.update(setting="standard", action_budget=180),
+        lambda task: task["nav_id"] == row["nav_id"],
+    )
+    assert check(planted) == {"route_setting": key(row)}
+
+
+def test_a_dive_below_the_ground(planted):
+    old = next(row for row in planted.rows(KEY) if roomy(row, 20, 10))
+    dive = int(np.ceil((old["z_m"][0] - RADIUS) / 2)) + 1
+    new = refly(old, [DOWN_2] * dive + [UP_2] * dive + old["action"])
+    replace(planted, old, new)
+    assert check(planted) == {"out_of_bounds": key(old)}
+
+
+def test_a_way_through_a_wall_and_back(planted, world):
+    scene = read_glb(planted.data / "meshes" / f"{planted.scene}.glb")
+    low, high = scene.bounds[0] + RADIUS, scene.bounds[1] - RADIUS
+
+    def through(row):
+        for aside in ([LEFT_5, RIGHT_5], [RIGHT_5, LEFT_5]):
+            new = refly(row, [*aside, *row["action"]])
+            path = poses(new)[:, :3]
+            inside = ((path >= low) & (path <= high)).all()
+            if inside and world.segment_in_collision(path[0], path[1], RADIUS):
+                return new
+        return None
+
+    old, new = next((row, new) for row in planted.rows(KEY) if roomy(row, 10, 2) and (new := through(row)))
+    replace(planted, old, new)
+    assert check(planted) == {"route_collision": key(old)}
+    # Not by its own length of arm: a body that fits through finds nothing.
+    assert "route_collision" not in check(planted, use_meshes=False)
+
+
+def test_an_action_that_leads_elsewhere(planted):
+    def wanted(row):
+        return TURN_LEFT in row["action"]
+
+    def change(row):
+        row["action"][row["action"].index(TURN_LEFT)] = TURN_RIGHT
+
+    row = planted.edit(KEY, change, wanted)
+    assert check(planted) == {"replay_differs": key(row)}
+
+
+def test_an_end_that_faces_away(planted):
+    old = next(row for row in planted.rows(KEY) if roomy(row, 0, 1))
+    last = 2 if old["action"][-2] == APPROACH else 1
+    actions = [*old["action"][:-last], TURN_LEFT, *old["action"][-last:]]
+    new = refly(old, actions)
+    goal = turned(new["goal_yaw_rad"], 0.0)
+    assert abs(turned(new["yaw_rad"][-1] - goal, 0.0)) > np.radians(7.5)
+    replace(planted, old, new)
+    assert check(planted) == {"final_yaw": key(old)}
+
+
+def test_an_end_beside_the_anchor(planted):
+    old = next(row for row in planted.rows(KEY) if row["action"][-2] == APPROACH)
+    path = poses(old)
+    path[-1, 2] += 0.002
+    new = measured(old, path, old["action"])
+    replace(planted, old, new)
+    assert check(planted, use_meshes=False) == {"end_position": key(old)}
+
+
+def test_an_approach_of_more_than_a_metre(planted):
+    for old in planted.rows(KEY):
+        if old["action"][-2] != APPROACH or old["action"][-3] >= TURN_LEFT:
+            continue
+        new = measured(old, np.delete(poses(old), -3, axis=0), [*old["action"][:-3], APPROACH, STOP])
+        new = refly(new, new["action"])
+        gap = float(np.linalg.norm(np.diff(poses(new)[-2:, :3], axis=0)))
+        if gap > 1.001 and new["detour_ratio"] > 1.06 and new["length_m"] > 5 and roomy(new):
+            break
+    else:
+        pytest.fail("no route of the fixture has a last move to leave out")
+    replace(planted, old, new)
+    assert check(planted, use_meshes=False) == {"stops_far": key(old)}
+
+
+def test_a_start_that_is_another_anchor(planted):
+    rows = planted.rows(KEY) + planted.rows("routes/test")
+    taken = {(r["start_object_id"], r["start_anchor_id"], r["target_object_id"]) for r in rows}
+
+    def other(row):
+        free = (a for a in range(3) if (row["start_object_id"], a, row["target_object_id"]) not in taken)
+        return next(free, None)
+
+    row = planted.edit(KEY, lambda row: row.update(start_anchor_id=other(row)), lambda row: other(row) is not None)
+    assert check(planted) == {"start_anchor": key(row)}
+
+
+def scene_data(planted, **options):
+    tables, _ = read_tables(planted.release, planted.scene)
+    return SceneData(planted.scene, planted.release, load_pipeline(SMOKE), tables, **options)
+
+
+def test_replayed_actions_are_swept_for_themselves(planted, world):
+    def change(row):
+        row["action"][:2] = [LEFT_5, RIGHT_5]
+
+    def hits(row):
+        actions = [LEFT_5, RIGHT_5, *row["action"][2:]]
+        return world.segment_in_collision(*poses(refly(row, actions))[:2, :3], RADIUS)
+
+    row = planted.edit(KEY, change, hits)
+    data = scene_data(planted)
+    found = [data["routes"].key(f.row) for f in collisions.replay_collision(data, data["routes"])]
+    assert found == key(row)
+    assert not list(collisions.route_collision(data, data["routes"]))
+
+
+def test_a_sample_asks_fcl_about_so_many_routes_and_always_the_same(planted):
+    asked = collisions.sampled(scene_data(planted, sample=5))
+    assert len(asked) == 5
+    assert (asked == collisions.sampled(scene_data(planted, sample=5))).all()
+    assert len(collisions.sampled(scene_data(planted))) == len(planted.rows(KEY)) + len(planted.rows("routes/test"))
+
+
+def test_checks_stand_after_those_that_they_build_on():
+    seen = {table: set() for table in TABLES}
+    for one in SCENE_CHECKS:
+        for table in TABLES if one.table == "*" else (one.table,):
+            assert set(one.after) <= seen[table], one.name
+            seen[table].add(one.name)
+    assert all(set(ALWAYS_AFTER) <= names for names in seen.values())
+    assert len({one.name for one in SCENE_CHECKS}) == len(SCENE_CHECKS)
