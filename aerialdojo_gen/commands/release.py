@@ -41,10 +41,11 @@ def stats(
 
     from aerialdojo_gen.release.comparison import as_csv, as_markdown
     from aerialdojo_gen.release.contents import check_release
-    from aerialdojo_gen.release.stats import made_of, tables
+    from aerialdojo_gen.release.stats import in_paper_order, made_of, tables
 
     names = check_release(data, runner.choose_scenes(scene, released) if scene else None)
-    compared = tables([made_of(data, name) for name in names])
+    made = in_paper_order([made_of(data, name) for name in names])
+    compared = tables(made)
     for path, text in ((markdown, as_markdown(compared)), (csv, as_csv(compared))):
         if path:
             with store.atomic_file(path.parent, path.name) as temporary:
@@ -54,5 +55,5 @@ def stats(
         from aerialdojo_gen.release.figures import draw_figures
 
         print()
-        for path in draw_figures(data, names, figures):
+        for path in draw_figures(data, [m.scene for m in made], figures):
             print(path)

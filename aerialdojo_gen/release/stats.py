@@ -109,6 +109,12 @@ def _paper_figures(made: Sequence[Made]) -> tuple[int | float | None, ...]:
     )  # fmt: skip
 
 
+def in_paper_order(made: Sequence[Made]) -> list[Made]:
+    """Sort scenes as the paper's Table 10 does, others behind them by name."""
+    order = {name: k for k, name in enumerate(inventory())}
+    return sorted(made, key=lambda m: (order.get(m.scene, len(order)), m.scene))
+
+
 def scene_table(made: Sequence[Made]) -> Comparison:
     """Set the scenes beside the paper's Table 10; settings count instances."""
     rows = [Row(m.scene, _figures([m]), _paper_figures([m])) for m in made]
@@ -179,7 +185,5 @@ def total_table(made: Sequence[Made]) -> Comparison:
 
 
 def tables(made: Sequence[Made]) -> list[Comparison]:
-    """Make all tables: the whole, families, scenes (the paper's in its own order, then others), splits."""
-    order = {name: k for k, name in enumerate(inventory())}
-    made = sorted(made, key=lambda m: (order.get(m.scene, len(order)), m.scene))
+    """Make all tables: the whole, families, scenes, splits."""
     return [total_table(made), family_table(made), scene_table(made), split_table(made)]
