@@ -12,6 +12,28 @@ from aerialdojo_gen.commands.common import Data
 app = typer.Typer()
 
 
+@app.command("show")
+def show(
+    task_id: Annotated[str, typer.Argument(metavar="TASK_ID", help="A task_id or a nav_id of the release.")],
+    data: Data = Path("data"),
+    out: Annotated[Path | None, typer.Option(help="PNG to write.  (default: TASK_ID.png)")] = None,
+    html: Annotated[Path | None, typer.Option(help="Page to write, all in one file.")] = None,
+    frames: Annotated[int, typer.Option(min=0, max=12, help="Front views along the way.")] = 5,
+) -> None:
+    """Picture one task: goal, route in its scene, clearance, reference image, views along the way."""
+    from aerialdojo_gen.release.browse import find_task
+    from aerialdojo_gen.show.figure import write_png
+    from aerialdojo_gen.show.page import write_page
+    from aerialdojo_gen.show.pictured import picture_task
+
+    pictured = picture_task(find_task(data, task_id), "image" if task_id.endswith("-i") else "semantic", frames)
+    print("\n".join([pictured.title, pictured.goal, *(f"{name:20} {value}" for name, value in pictured.facts)]))
+    if out is not None or html is None:
+        print(write_png(pictured, out or Path(f"{task_id}.png")))
+    if html is not None:
+        print(write_page(pictured, html))
+
+
 @app.command("view")
 def view(
     scene: Annotated[str, typer.Option("--scene", help="Scene of the release, e.g. U_Mall_0.")],

@@ -1,0 +1,107 @@
+"""What the front camera sees along a route: from the recording where there is one, else rendered now."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+import pyarrow.compute as pc
+from numpy.typing import NDArray
+
+from aerialdojo_gen import schemas, store
+from aerialdojo_gen.errors import StoreError
+from aerialdojo_gen.geometry.cameras import Camera, view_pose
+from aerialdojo_gen.release.browse import FoundTask
+
+SIZE_PX = 320
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """One picture of the way.
+
+    Attributes
+    ----------
+    step : int
+        Pose of the route.
+    action : str
+        What is done there.
+    rgb : (SIZE_PX, SIZE_PX, 3) uint8
+        Front view, sRGB.
+    recorded : bool
+        Whether it comes from a recording.
+    """
+
+    step: int
+    action: str
+    rgb: NDArray[np.uint8]
+    recorded: bool
+
+
+def frames_along(task: FoundTask, count: int) -> list[Frame]:
+    """Pick poses evenly along a route, start and goal among them, and see what the front camera sees there.
+
+    Parameters
+    ----------
+    task : FoundTask
+    count : int
+        How many; 0 for none.
+
+    Returns
+    -------
+    list of Frame
+        In the route's order; fewer than `count` where the route has fewer poses.
+
+    Raises
+    ------
+    RenderError, StoreError
+        A recording is damaged, or rendering failed.
+    """
+    route = task.route
+    poses = np.column_stack([route["x_m"], route["y_m"], route["z_m"], route["yaw_rad"]])
+    steps = sorted({round(k) for k in np.linspace(0, len(poses) - 1, count)})
+    pictures = _recorded(task, steps)
+    recorded = pictures is not None
+    if pictures is None:
+        pictures = _rendered(task, poses[steps]) if steps else []
+    return [
+        Frame(step, schemas.ACTION_NAMES[route["action"][step]], picture, recorded)
+        for step, picture in zip(steps, pictures, strict=True)
+    ]
+
+
+def _rendered(task: FoundTask, poses: NDArray[np.float64]) -> list[NDArray[np.uint8]]:
+    from aerialdojo_gen.rendering.world import RenderWorld
+
+    camera = Camera(SIZE_PX, SIZE_PX, 90.0)
+    with RenderWorld(task.scene.model) as world:
+        return [world.render(camera, view_pose(pose[:3], pose[3], "front")).rgb for pose in poses]
+
+
+def _recorded(task: FoundTask, steps: list[int]) -> list[NDArray[np.uint8]] | None:
+    """Frames of the recording at some poses; None where the task was not recorded."""
+    data, scene = task.scene.data, task.scene.name
+    if not store.shards(data, "recordings", scene):
+        return None
+    rows = store.read_scene(data, "recordings", scene)
+    rows = rows.filter(pc.equal(rows["nav_id"], task.nav_id)).to_pylist()
+    path = next((row["path"] for row in rows if (row["view"], row["modality"]) == ("front", "rgb")), None)
+    if path is None:
+        return None
+    if not (data / path).resolve().is_relative_to(data.resolve()):
+        raise StoreError(f"recordings: path {path!r} leads out of {data}")
+    from aerialdojo_gen.rendering.reader import Video
+
+    frames = store.read_scene(data, "frames", scene, ["nav_id", "frame", "step"])
+    frames = frames.filter(pc.equal(frames["nav_id"], task.nav_id))
+    first: dict[int, int] = {}
+    for frame, step in zip(frames["frame"].to_pylist(), frames["step"].to_pylist(), strict=True):
+        first[step] = min(frame, first.get(step, frame))
+    if any(step not in first for step in steps):
+        return None
+    video = Video(data / path)
+    return [
+        np.asarray(cv2.resize(video[first[step]], (SIZE_PX, SIZE_PX), interpolation=cv2.INTER_AREA), dtype=np.uint8)
+        for step in steps
+    ]

@@ -1,0 +1,185 @@
+"""Parallel projections of a scene, by ray casts: maps and side views, with everything before a plane cut away."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from aerialdojo_gen.geometry.rays import TriangleRayCaster
+from aerialdojo_gen.scenes.model import Instance, Material, Scene
+
+Floats = NDArray[np.float64]
+
+# As in aerialdojo_gen.rendering.shading: light from everywhere, from above, from east, from north, from the sun.
+_AMBIENT, _FROM_ABOVE, _FROM_EAST, _FROM_NORTH, _SUN = 0.55, 0.11, 0.05, 0.03, 0.47
+# What the plane cuts open shows its inside: the material's colour, darker.
+_CUT_LEVEL = 0.38
+_EARTH = (107.0, 96.0, 84.0)
+_OFF_SURFACE_M = 0.02
+
+
+@dataclass(frozen=True, eq=False)
+class Plane:
+    """Where the picture is taken from, and how large it is: the world's part that lies behind it is shown.
+
+    Attributes
+    ----------
+    origin : (3,) float64
+        A point of the plane, metres, world frame: picture coordinates (0, 0).
+    right, up : (3,) float64
+        Orthogonal unit vectors in the plane.
+    extent_m : tuple of float
+        Left, right, bottom and top in picture coordinates, metres.
+    """
+
+    origin: Floats
+    right: Floats
+    up: Floats
+    extent_m: tuple[float, float, float, float]
+
+    @property
+    def forward(self) -> Floats:
+        """The direction that one looks in, (3,) float64."""
+        return np.cross(self.up, self.right)
+
+    def project(self, points: ArrayLike) -> Floats:
+        """Picture coordinates (n, 2), metres, of points (n, 3) in the world frame."""
+        return np.asarray((np.asarray(points, dtype=np.float64) - self.origin) @ np.stack([self.right, self.up]).T)
+
+
+class OrthographicPictures:
+    """Takes parallel projections of a scene.
+
+    Parameters
+    ----------
+    scene : Scene
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        parts = [part for instance in scene.instances for part in instance.parts]
+        names = sorted({part.material for part in parts})
+        index = {name: k for k, name in enumerate(names)}
+        offsets = np.cumsum([0, *(len(part.vertices) for part in parts[:-1])])
+        self._vertices = np.concatenate([part.vertices for part in parts])
+        self._uv = np.concatenate([part.uv for part in parts]).astype(np.float64)
+        self._faces = np.concatenate([part.faces + np.int32(o) for part, o in zip(parts, offsets, strict=True)])
+        self._material = np.repeat([index[part.material] for part in parts], [len(part.faces) for part in parts])
+        self._materials = [scene.materials[name] for name in names]
+        self._rays = TriangleRayCaster(self._vertices, self._faces)
+        self._sun = np.array(scene.sun, dtype=np.float64) / np.linalg.norm(scene.sun)
+        sky = np.array(scene.sky, dtype=np.float64)
+        ground = [instance for instance in scene.instances if instance.category == "ground"]
+        self._ground = TriangleRayCaster(*_joined(ground)) if ground else None
+        self._floor_m, self._ceiling_m = float(self._vertices[:, 2].min()), float(self._vertices[:, 2].max())
+        self._sky = sky + (np.array([236.0, 238.0, 240.0]) - sky) * 0.6
+
+    def take(self, plane: Plane, pixel_m: float) -> NDArray[np.uint8]:
+        """Take a picture.
+
+        Parameters
+        ----------
+        plane : Plane
+        pixel_m : float
+            Edge of a pixel, metres.
+
+        Returns
+        -------
+        (H, W, 3) uint8
+            sRGB; row 0 is the top.
+        """
+        left, right, bottom, top = plane.extent_m
+        width, height = max(1, round((right - left) / pixel_m)), max(1, round((top - bottom) / pixel_m))
+        a = left + (np.arange(width) + 0.5) * (right - left) / width
+        b = top - (np.arange(height) + 0.5) * (top - bottom) / height
+        origins = (
+            plane.origin + a[None, :, None] * plane.right + b[:, None, None] * plane.up
+        ).reshape(-1, 3)  # fmt: skip
+        forward = plane.forward
+        distance, face = self._rays.first_hit(origins, np.broadcast_to(forward, origins.shape))
+        out = np.tile(self._sky, (len(origins), 1))
+        hit = np.flatnonzero(face >= 0)
+        face, points = face[hit], origins[hit] + distance[hit, None] * forward
+        normal = self._normals(face)
+        cut = normal @ forward > 0.0
+        colour = self._colours(face, points, pixel_m)
+        level = _AMBIENT + normal @ np.array([_FROM_EAST, _FROM_NORTH, _FROM_ABOVE])
+        level += _SUN * self._sunlit(points, normal)
+        out[hit] = colour * np.where(cut, _CUT_LEVEL, level)[:, None]
+        if abs(forward[2]) < 1e-9:
+            # Ground is a sheet without thickness: what the plane cuts of it is filled in.
+            surface = self._ground_height(plane.origin + a[:, None] * plane.right)
+            out[(b[:, None] < surface[None, :]).ravel()] = _EARTH
+        return np.clip(out + 0.5, 0.0, 255.0).astype(np.uint8).reshape(height, width, 3)
+
+    def _ground_height(self, columns: Floats) -> Floats:
+        """Height of the ground at points (n, 3), whose z plays no part; the lowest vertex's where there is none."""
+        from_above = np.column_stack([columns[:, :2], np.full(len(columns), self._ceiling_m + 1.0)])
+        if self._ground is None:
+            return np.full(len(columns), self._floor_m)
+        distance, _ = self._ground.first_hit(from_above, np.tile([0.0, 0.0, -1.0], (len(columns), 1)))
+        return np.where(np.isfinite(distance), self._ceiling_m + 1.0 - distance, self._floor_m)
+
+    def surface_below(self, points: Floats) -> Floats:
+        """Height z of the first surface under each of the points (n, 3), metres; NaN where there is none."""
+        distance, _ = self._rays.first_hit(points, np.tile([0.0, 0.0, -1.0], (len(points), 1)))
+        return np.where(np.isfinite(distance), points[:, 2] - distance, np.nan)
+
+    def _normals(self, face: NDArray[np.int32]) -> Floats:
+        corners = self._vertices[self._faces[face]]
+        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        return np.asarray(normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-30))
+
+    def _sunlit(self, points: Floats, normal: Floats) -> Floats:
+        """Cosine of the sun's light on each point, 0 in shadow."""
+        lit = np.maximum(normal @ self._sun, 0.0)
+        towards = np.flatnonzero(lit > 0.0)
+        start = points[towards] + _OFF_SURFACE_M * normal[towards]
+        distance, _ = self._rays.first_hit(start, np.broadcast_to(self._sun, start.shape))
+        lit[towards[np.isfinite(distance)]] = 0.0
+        return lit
+
+    def _colours(self, face: NDArray[np.int32], points: Floats, pixel_m: float) -> Floats:
+        material = self._material[face]
+        colour = np.array([m.colour for m in self._materials], dtype=np.float64)[material]
+        order = np.argsort(material, kind="stable")
+        starts = np.flatnonzero(np.diff(material[order], prepend=-1))
+        for first, rows in zip(starts, np.split(order, starts[1:]), strict=True):
+            tile = _reduced(self._materials[material[order[first]]], pixel_m)
+            if tile is not None:
+                uv = self._uv_at(face[rows], points[rows])
+                column = np.floor(uv[:, 0] % 1.0 * tile.shape[1]).astype(np.int64) % tile.shape[1]
+                row = np.floor(-uv[:, 1] % 1.0 * tile.shape[0]).astype(np.int64) % tile.shape[0]
+                colour[rows] = tile[row, column]
+        return colour
+
+    def _uv_at(self, face: NDArray[np.int32], points: Floats) -> Floats:
+        index = self._faces[face]
+        a, b, c = (self._vertices[index[:, k]] for k in range(3))
+        ab, ac, ap = b - a, c - a, points - a
+        d00, d01, d11 = (np.einsum("ij,ij->i", x, y) for x, y in ((ab, ab), (ab, ac), (ac, ac)))
+        d20, d21 = np.einsum("ij,ij->i", ap, ab), np.einsum("ij,ij->i", ap, ac)
+        area = np.maximum(d00 * d11 - d01 * d01, 1e-30)
+        v, w = (d11 * d20 - d01 * d21) / area, (d00 * d21 - d01 * d20) / area
+        uv = self._uv[index]
+        return np.asarray((1.0 - v - w)[:, None] * uv[:, 0] + v[:, None] * uv[:, 1] + w[:, None] * uv[:, 2])
+
+
+def _joined(instances: list[Instance]) -> tuple[Floats, NDArray[np.int32]]:
+    """Vertices and faces of several instances together."""
+    offsets = np.cumsum([0, *(len(i.vertices) for i in instances[:-1])])
+    faces = [i.faces + np.int32(o) for i, o in zip(instances, offsets, strict=True)]
+    return np.concatenate([i.vertices for i in instances]), np.concatenate(faces)
+
+
+def _reduced(material: Material, pixel_m: float) -> NDArray[np.uint8] | None:
+    """The texture with texels no smaller than a pixel, so that sampling one of them is enough."""
+    if material.texture is None:
+        return None
+    texels = max(1, min(material.texture.shape[1], round(material.tile_m / pixel_m)))
+    if texels == material.texture.shape[1]:
+        return material.texture
+    height = max(1, round(texels * material.texture.shape[0] / material.texture.shape[1]))
+    return np.asarray(cv2.resize(material.texture, (texels, height), interpolation=cv2.INTER_AREA), dtype=np.uint8)
