@@ -93,7 +93,6 @@ class PlanConfig(Section):
     margin_m: float = Field(0.002, ge=0, description="added to the body's radius in the search alone")
     max_length_m: float = Field(100.0, gt=0, description="longest route worth planning")
     length_slack: float = Field(1.04, ge=1, description="the cost-to-go may exceed it by this: it overestimates")
-    field_slack_m: float = Field(3.0, ge=0, description="how far the cost-to-go reaches beyond the farthest start")
     max_approach_m: float = Field(1.0, gt=0, description="longest straight Approach at the end")
     min_detour_ratio: float = Field(
         0.0, ge=0, description="no search where a grid path is shorter than this times d_E"
@@ -152,11 +151,21 @@ class SplitConfig(Section):
 class RenderConfig(Section):
     """Recordings along the trajectories (paper: sensors)."""
 
-    limit: int | None = Field(2, ge=1, description="trajectories a scene and setting")
-    subset: Literal["train", "test", "all"] = Field("train", description="which side of the split is recorded")
+    limit: int = Field(2, ge=0, description="trajectories a scene and setting; 0 for all")
+    split: Literal["train", "test", "all", "id_train", "id_test", "ood_train", "ood_test"] = Field(
+        "train", description="which tasks are recorded"
+    )
+    renderer: Literal["auto", "gl", "pybullet"] = Field(
+        "auto", description="auto: the fastest that draws a known scene right on this machine"
+    )
+    instances: bool = Field(False, description="record instance id maps too")
+    frames: Literal["video", "png"] = Field("video", description="videos, or a folder of PNG files each")
     sampling: Literal["steps", "time"] = Field("steps", description="a frame a pose, or a constant frame rate")
     views: tuple[Literal["front", "left", "right", "down"], ...] = Field(
         ("front", "left", "right", "down"), min_length=1, description="cameras of the body"
+    )
+    offsets_m: dict[Literal["front", "left", "right", "down"], tuple[float, float, float]] = Field(
+        {}, description="where a view's camera sits: x forward, y left, z up of the body's centre; (0, 0, 0) where absent"
     )
     width: int = Field(640, ge=16, le=4096, multiple_of=2, description="columns, pixels")
     height: int = Field(640, ge=16, le=4096, multiple_of=2, description="rows, pixels")
@@ -165,7 +174,7 @@ class RenderConfig(Section):
     cruise_m_s: float = Field(3.0, gt=0, description="speed along the path, for sampling by time")
     yaw_rate_deg_s: float = Field(90.0, gt=0, description="speed of turns, for sampling by time")
     crf: int = Field(23, ge=0, le=51, description="quality of the pictures' H.264, lower is better")
-    trajectories_per_part: int = Field(2, ge=1, description="recordings that share a shard")
+    trajectories_per_part: int = Field(8, ge=1, description="trajectories that share a shard")
 
 
 class Pipeline(Section):

@@ -77,33 +77,56 @@ def _box_gap2(
     return gx * gx + gy * gy + gz * gz
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
+def _after(node: int) -> int:
+    """The node that a depth-first walk comes to once it is done with a subtree; 0 at the end."""
+    while node & 1:
+        node >>= 1
+    return node + 1 if node else 0
+
+
+@njit(cache=True, inline="always")
+def _clip(p: float, d: float, low: float, high: float, t0: float, t1: float) -> tuple[float, float]:
+    """Cut the stretch t0 to t1 of a segment p + t d down to where it lies between two planes."""
+    if d == 0.0:
+        return (t0, t1) if low <= p <= high else (1.0, 0.0)
+    a, b = (low - p) / d, (high - p) / d
+    return max(t0, min(a, b)), min(t1, max(a, b))
+
+
+@njit(cache=True, error_model="numpy")
 def segment_near(
     px: float, py: float, pz: float, qx: float, qy: float, qz: float,
     radius: float, tri: NDArray[np.float64], boxes: NDArray[np.float64],
 ) -> bool:  # fmt: skip
     """Whether any triangle lies within `radius` of the segment pq: True means collision."""
-    lx, ly, lz = min(px, qx), min(py, qy), min(pz, qz)
-    hx, hy, hz = max(px, qx), max(py, qy), max(pz, qz)
-    leaves = boxes.shape[0] // 2
+    dx, dy, dz = qx - px, qy - py, qz - pz
+    lx, ly, lz = min(px, qx) - radius, min(py, qy) - radius, min(pz, qz) - radius
+    hx, hy, hz = max(px, qx) + radius, max(py, qy) + radius, max(pz, qz) + radius
+    leaves, n = boxes.shape[0] // 2, tri.shape[0]
     r2 = radius * radius
-    stack = np.empty(_STACK, np.int64)
-    stack[0] = 1
-    top = 1
-    while top > 0:
-        top -= 1
-        node = stack[top]
-        if _box_gap2(lx, ly, lz, hx, hy, hz, boxes, node) > r2:
-            continue
-        if node < leaves:
-            stack[top] = 2 * node
-            stack[top + 1] = 2 * node + 1
-            top += 2
-            continue
-        first = (node - leaves) * LEAF
-        for k in range(first, min(first + LEAF, tri.shape[0])):
-            if segment_triangle_d2(px, py, pz, qx, qy, qz, tri, k, radius) <= r2:
-                return True
+    node = 1
+    while node > 0:
+        ax, ay, az, bx, by, bz = (
+            boxes[node, 0], boxes[node, 1], boxes[node, 2], boxes[node, 3], boxes[node, 4], boxes[node, 5]
+        )  # fmt: skip
+        apart = ax > hx or ay > hy or az > hz or bx < lx or by < ly or bz < lz
+        if not apart:
+            # The segment's own box says little where it runs aslant.
+            t0, t1 = _clip(px, dx, ax - radius, bx + radius, 0.0, 1.0)
+            t0, t1 = _clip(py, dy, ay - radius, by + radius, t0, t1)
+            t0, t1 = _clip(pz, dz, az - radius, bz + radius, t0, t1)
+            apart = t0 > t1
+        if apart:
+            node = _after(node)
+        elif node < leaves:
+            node *= 2
+        else:
+            first = (node - leaves) * LEAF
+            for k in range(first, min(first + LEAF, n)):
+                if segment_triangle_d2(px, py, pz, qx, qy, qz, tri, k, radius) <= r2:
+                    return True
+            node = _after(node)
     return False
 
 

@@ -15,8 +15,6 @@ _HALF = ((1, 0, 0), (0, 1, 0), (1, 1, 0), (-1, 1, 0), (2, 1, 0), (1, 2, 0), (-1,
 N_HALF = len(_HALF)
 MOVES = np.array(_HALF + tuple((-x, -y, -z) for x, y, z in _HALF), np.int64)
 MOVE_LENGTHS = np.sqrt((MOVES**2).sum(axis=1))
-# Marks a cell around which a body could make any two moves in any order: nothing is that near.
-OPEN = np.uint32(1 << 31)
 # The two shorter moves that make up a diagonal or knight's move; -1 for the axes.
 _PARTS = np.array([(-1, -1), (-1, -1), (0, 1), (9, 1), (0, 2), (1, 2), (1, 3), (9, 3), (-1, -1)], np.int64)
 _ONE = np.uint32(1)
@@ -67,8 +65,7 @@ def passable_moves(grid: GridArrays, radius: float) -> NDArray[np.uint32]:
     Returns
     -------
     (nx, ny, nz) uint32
-        Bit m stands for ``MOVES[m]``, `OPEN` for a cell far from everything; 0 for a cell in which the body
-        cannot be, or cannot leave.
+        Bit m stands for ``MOVES[m]``; 0 for a cell in which the body cannot be, or cannot leave.
     """
     nx, ny, nz = grid.field.shape
     moves = np.zeros((nx, ny, nz), np.uint32)
@@ -99,13 +96,6 @@ def passable_moves(grid: GridArrays, radius: float) -> NDArray[np.uint32]:
                                 continue
                     moves[i, j, k] |= _ONE << np.uint32(m)
                     moves[i + dx, j + dy, k + dz] |= _ONE << np.uint32(m + N_HALF)
-    # Two moves in either order stay within the longest move of the cell between them.
-    open_m = radius + MOVE_LENGTHS.max() * grid.cell + 1e-4
-    for i in range(nx):
-        for j in range(ny):
-            for k in range(nz):
-                if moves[i, j, k] and grid.field[i, j, k] >= open_m:
-                    moves[i, j, k] |= OPEN
     return moves
 
 

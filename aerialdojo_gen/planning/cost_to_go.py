@@ -2,54 +2,53 @@
 
 The metric is the action set's: horizontal and vertical motion are separate moves, so that up to the grid's 16
 directions the cost of a free displacement is |horizontal| + |vertical| (at most 2.7 % above it).
+
+Cells are relaxed a column at a time, for a column lies together in memory and its cells are computed side by side.
 """
 
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from aerialdojo_gen.planning.connectivity import MOVE_LENGTHS, MOVES, OPEN, cell_centre
+from aerialdojo_gen.planning.connectivity import MOVE_LENGTHS, MOVES, N_HALF, cell_centre
 from aerialdojo_gen.planning.grid_kernels import GridArrays, segment_free
 
-# The longest move is sqrt(5) cells, and levels are a cell wide: what a level pushes lies in the next three.
-_RING = 4
 # Costs are multiples of this, so that float32 adds them without rounding and equal costs compare equal.
 _QUANTUM_M = 2.0**-12
+_UP = N_HALF - 1
+_DOWN = _UP + N_HALF
+_FLAT = np.flatnonzero(MOVES[:, 2] == 0)
 
 
-def _canonical() -> NDArray[np.uint32]:
-    """For every move, as bits, the moves that may follow it where nothing is near.
+@lru_cache(maxsize=4)
+def columns_by_distance(reach: int) -> NDArray[np.int32]:
+    """List the columns around a column, the nearest first.
 
-    Moves commute there, so one order of them is enough: knight's moves, then neighbours in the plane, then the
-    vertical. Two moves in the plane that are not next to each other in angle are never part of a shortest path.
+    Parameters
+    ----------
+    reach : int
+        How far in the grid's metric of 16 directions, cells; a goal's seeds lie up to two Approaches apart.
+
+    Returns
+    -------
+    (n, 2) int32
+        Offsets along x and y.
     """
-    after = np.zeros(len(MOVES), np.uint32)
-    flat = np.flatnonzero(MOVES[:, 2] == 0)
-    angles = np.arctan2(MOVES[flat, 1], MOVES[flat, 0])
-    around = flat[np.argsort(angles)]
-    lifts = np.flatnonzero(MOVES[:, 2] != 0)
-    for position, m in enumerate(around):
-        knight = MOVE_LENGTHS[m] > 2
-        beside = [around[position - 1], around[(position + 1) % len(around)]] if knight else []
-        for follower in (m, *beside, *lifts):
-            after[m] |= np.uint32(1 << int(follower))
-    for m in lifts:
-        after[m] = np.uint32(1 << int(m))
-    return after
-
-
-_AFTER = _canonical()
-
-
-@njit(cache=True)
-def _grown(entries: NDArray[np.int32]) -> NDArray[np.int32]:
-    larger = np.empty((entries.shape[0], 2 * entries.shape[1]), np.int32)
-    larger[:, : entries.shape[1]] = entries
-    return larger
+    i, j = np.meshgrid(np.arange(-reach, reach + 1), np.arange(-reach, reach + 1), indexing="ij")
+    high, low = np.maximum(abs(i), abs(j)), np.minimum(abs(i), abs(j))
+    distance = np.where(
+        2 * low <= high,
+        high - 2 * low + math.sqrt(5) * low,
+        math.sqrt(5) * (high - low) + math.sqrt(2) * (2 * low - high),
+    ).ravel()
+    near = np.flatnonzero(distance <= reach)
+    near = near[np.argsort(distance[near], kind="stable")]
+    return np.stack([i.ravel()[near], j.ravel()[near]], axis=1).astype(np.int32)
 
 
 @njit(cache=True)
@@ -87,34 +86,71 @@ def seed_goal(
     return found[:n]
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
+def _settle(column: NDArray[np.float32], moves: NDArray[np.uint32], length: np.float32) -> None:
+    """Relax the vertical moves within a column, up and then down."""
+    one = np.uint32(1)
+    below = column[0]
+    for k in range(1, column.shape[0]):
+        here, reached = column[k], below + length
+        if reached < here and (moves[k - 1] >> np.uint32(_UP)) & one:
+            column[k] = here = reached
+        below = here
+    above = column[-1]
+    for k in range(column.shape[0] - 2, -1, -1):
+        here, reached = column[k], above + length
+        if reached < here and (moves[k + 1] >> np.uint32(_DOWN)) & one:
+            column[k] = here = reached
+        above = here
+
+
+@njit(cache=True, error_model="numpy")
+def _push(
+    source: NDArray[np.float32], moves: NDArray[np.uint32], target: NDArray[np.float32], move: int,
+    length: np.float32, bound: np.float32,
+) -> bool:  # fmt: skip
+    """Relax one move from a column to another; whether that made anything cheaper.
+
+    Without a branch, so that the compiler turns the loop into vector instructions.
+    """
+    bit, never = np.uint32(1) << np.uint32(move), np.float32(np.inf)
+    improved = np.uint32(0)
+    for k in range(source.shape[0]):
+        reached = source[k] + length
+        reached = reached if (moves[k] & bit) != 0 else never
+        reached = reached if reached <= bound else never
+        here = target[k]
+        improved |= np.uint32(1) if reached < here else np.uint32(0)
+        target[k] = reached if reached < here else here
+    return improved != 0
+
+
+@njit(cache=True, error_model="numpy")
 def expand_cost(
     seeds: NDArray[np.int32],
-    starts: NDArray[np.float64],
+    order: NDArray[np.int32],
     bound: float,
-    slack: float,
-    grid: GridArrays,
+    cell: float,
     moves: NDArray[np.uint32],
     cost: NDArray[np.float32],
-) -> float:
-    """Dijkstra's algorithm over the grid's passable moves, outwards from seeded cells.
+) -> int:
+    """Lengths of the shortest paths over the grid's passable moves, outwards from seeded cells.
 
-    Levels are as wide as the shortest move: whatever stands in the lowest level is final (Dinitz), so that a ring of
-    stacks does in place of a heap. In the open only one of the orders of a path's moves is followed (a canonical
-    ordering, as in jump point search); the costs are the same.
+    A label-correcting search over columns: those that may have something to pass on are visited by their distance
+    from the goal, then in the opposite order, and so on until none is left. In the open one visit to a column is
+    enough, and only where ways lead back round something it takes more. The result is that of Dijkstra's algorithm,
+    to the bit, because sums of multiples of the quantum do not round.
 
     Parameters
     ----------
     seeds : (n,) int32
-        Flat numbers of cells whose `cost` is set.
-    starts : (m, 3) float64
-        The expansion ends when all of them are reached, metres; with none it does not end before the bound.
+        Flat numbers of cells whose `cost` is set, in columns near the goal's.
+    order : (m, 2) int32
+        What `columns_by_distance` returns; columns beyond it are not entered.
     bound : float
-        … or when the cost exceeds this, metres.
-    slack : float
-        How much further to go once all starts are reached, metres.
-    grid : GridArrays
-        The clearance grid.
+        Costs above this are not found, metres.
+    cell : float
+        Edge of a cell, metres.
     moves : (nx, ny, nz) uint32
         Passable moves.
     cost : (nx, ny, nz) float32
@@ -122,69 +158,48 @@ def expand_cost(
 
     Returns
     -------
-    float
-        Costs up to this are final, metres.
+    int
+        Number of visits.
     """
     nx, ny, nz = cost.shape
-    flat_cost, flat_moves = cost.ravel(), moves.ravel()
-    lengths = (np.rint(MOVE_LENGTHS * grid.cell / _QUANTUM_M) * _QUANTUM_M).astype(np.float32)
-    steps = (MOVES[:, 0] * (ny * nz) + MOVES[:, 1] * nz + MOVES[:, 2]).astype(np.int32)
-    n_moves = steps.shape[0]
-    follow = np.empty(nx * ny * nz, np.uint32)
-    entries = np.empty((_RING, 1 << 15), np.int32)
-    tops = np.zeros(_RING, np.int64)
-    inverse = np.float32(1.0 / grid.cell)
-    for c in seeds:
-        slot = int(flat_cost[c] * inverse) % _RING
-        entries[slot, tops[slot]] = c
-        tops[slot] += 1
-        follow[c] = ~np.uint32(0)
-    waiting = np.arange(starts.shape[0])
-    n_waiting = starts.shape[0]
-    end = bound
-    level = 0
-    one = np.uint32(1)
-    idle = 0
-    while level * grid.cell <= end and idle < _RING:
-        slot = level % _RING
-        idle = idle + 1 if tops[slot] == 0 else 0
-        while tops[slot] > 0:
-            tops[slot] -= 1
-            c = entries[slot, tops[slot]]
-            d = flat_cost[c]
-            followers = follow[c]
-            if followers == 0:
-                continue  # done already
-            follow[c] = 0
-            bits = flat_moves[c]
-            if bits & OPEN:
-                bits &= followers
-            for m in range(n_moves):
-                if (bits >> np.uint32(m)) & one:
-                    e = c + steps[m]
-                    reached = d + lengths[m]
-                    if reached < flat_cost[e]:
-                        flat_cost[e] = reached
-                        follow[e] = _AFTER[m]
-                        to = int(reached * inverse) & (_RING - 1)
-                        if tops[to] == entries.shape[1]:
-                            entries = _grown(entries)
-                        entries[to, tops[to]] = e
-                        tops[to] += 1
-                    elif reached == flat_cost[e]:
-                        follow[e] |= _AFTER[m]
-        level += 1
-        if n_waiting > 0:
-            kept = 0
-            for w in range(n_waiting):
-                s = waiting[w]
-                if cost_at(starts[s, 0], starts[s, 1], starts[s, 2], grid, cost) > level * grid.cell:
-                    waiting[kept] = s
-                    kept += 1
-            n_waiting = kept
-            if n_waiting == 0:
-                end = min(end, level * grid.cell + slack)
-    return level * grid.cell
+    lengths = (np.rint(MOVE_LENGTHS * cell / _QUANTUM_M) * _QUANTUM_M).astype(np.float32)
+    limit = np.float32(bound)
+    waiting = np.zeros((nx, ny), np.bool_)
+    left, visits = 0, 0
+    middle_i, middle_j = 0, 0
+    for seed in seeds:
+        middle_i, middle_j = seed // nz // ny, seed // nz % ny
+        if not waiting[middle_i, middle_j]:
+            waiting[middle_i, middle_j] = True
+            left += 1
+    n = order.shape[0]
+    outwards = True
+    while left > 0:
+        before = visits
+        for a in range(n):
+            b = a if outwards else n - 1 - a
+            i, j = middle_i + order[b, 0], middle_j + order[b, 1]
+            if i < 0 or j < 0 or i >= nx or j >= ny or not waiting[i, j]:
+                continue
+            waiting[i, j] = False
+            left -= 1
+            visits += 1
+            column, passable = cost[i, j], moves[i, j]
+            _settle(column, passable, lengths[_UP])
+            for m in _FLAT:
+                u, v = i + MOVES[m, 0], j + MOVES[m, 1]
+                if (
+                    0 <= u < nx
+                    and 0 <= v < ny
+                    and _push(column, passable, cost[u, v], m, lengths[m], limit)
+                    and not waiting[u, v]
+                ):
+                    waiting[u, v] = True
+                    left += 1
+        if visits == before:
+            break  # what still waits lies beyond the reach
+        outwards = not outwards
+    return visits
 
 
 @njit(cache=True)
@@ -193,12 +208,33 @@ def cost_at(x: float, y: float, z: float, grid: GridArrays, cost: NDArray[np.flo
 
     Where a cell is blocked, or the cells lie on two sides of something, it is the cheapest way through one of them.
     """
+    return cost_between(x, y, z, grid.origin[0], grid.origin[1], grid.origin[2], grid.cell, cost)
+
+
+@njit(cache=True, error_model="numpy")
+def cost_between(
+    x: float, y: float, z: float, ox: float, oy: float, oz: float, cell: float, cost: NDArray[np.float32]
+) -> float:  # fmt: skip
+    """`cost_at` for inner loops, where a tuple of arrays costs more to hand over than the work itself.
+
+    Parameters
+    ----------
+    x, y, z : float
+        World frame, metres.
+    ox, oy, oz : float
+        Lower corner of the grid, metres.
+    cell : float
+        Edge of a cell, metres.
+    cost : (nx, ny, nz) float32
+        Cost-to-go of the cells, metres.
+
+    Returns
+    -------
+    float
+        Metres; infinite where all of the cells are unreached.
+    """
     nx, ny, nz = cost.shape
-    fx, fy, fz = (
-        (x - grid.origin[0]) / grid.cell - 0.5,
-        (y - grid.origin[1]) / grid.cell - 0.5,
-        (z - grid.origin[2]) / grid.cell - 0.5,
-    )
+    fx, fy, fz = (x - ox) / cell - 0.5, (y - oy) / cell - 0.5, (z - oz) / cell - 0.5
     i = max(0, min(int(max(fx, 0.0)), nx - 2))
     j = max(0, min(int(max(fy, 0.0)), ny - 2))
     k = max(0, min(int(max(fz, 0.0)), nz - 2))
@@ -211,17 +247,19 @@ def cost_at(x: float, y: float, z: float, grid: GridArrays, cost: NDArray[np.flo
     e, f, g, h = cost[i1, j, k], cost[i1, j, k1], cost[i1, j1, k], cost[i1, j1, k1]
     low = min(min(min(a, b), min(c, d)), min(min(e, f), min(g, h)))
     high = max(max(max(a, b), max(c, d)), max(max(e, f), max(g, h)))
-    if high - low < 4.0 * grid.cell:
+    if high - low < 4.0 * cell:
         p = (a + (b - a) * fz) * (1 - fy) + (c + (d - c) * fz) * fy
         q = (e + (f - e) * fz) * (1 - fy) + (g + (h - g) * fz) * fy
         return p * (1 - fx) + q * fx
     if low == np.inf:
         return np.inf
-    best = np.inf
-    for u in range(2):
-        for v in range(2):
-            for w in range(2):
-                value = cost[min(i + u, nx - 1), min(j + v, ny - 1), min(k + w, nz - 1)]
-                flat = math.sqrt((fx - u) ** 2 + (fy - v) ** 2)
-                best = min(best, value + (flat + abs(fz - w)) * grid.cell)
-    return best
+    # One corner after the other, written out: this runs for every state next to a surface.
+    r00, r01 = math.sqrt(fx * fx + fy * fy), math.sqrt(fx * fx + (1 - fy) * (1 - fy))
+    r10, r11 = math.sqrt((1 - fx) * (1 - fx) + fy * fy), math.sqrt((1 - fx) * (1 - fx) + (1 - fy) * (1 - fy))
+    r00, r01, r10, r11, s, t = (
+        r00 * cell, r01 * cell, r10 * cell, r11 * cell, abs(fz) * cell, abs(fz - 1) * cell
+    )  # fmt: skip
+    return min(
+        min(min(a + r00 + s, b + r00 + t), min(c + r01 + s, d + r01 + t)),
+        min(min(e + r10 + s, f + r10 + t), min(g + r11 + s, h + r11 + t)),
+    )

@@ -50,16 +50,21 @@ def inside(x: float, y: float, z: float, lower: NDArray[np.float64], upper: NDAr
 @njit(cache=True, inline="always")
 def point_bound(x: float, y: float, z: float, grid: GridArrays) -> float:
     """Lower bound of the distance from a point to the nearest surface, metres; may be negative."""
-    i = min(max(int((x - grid.origin[0]) / grid.cell), 0), grid.field.shape[0] - 1)
-    j = min(max(int((y - grid.origin[1]) / grid.cell), 0), grid.field.shape[1] - 1)
-    k = min(max(int((z - grid.origin[2]) / grid.cell), 0), grid.field.shape[2] - 1)
-    dx = x - grid.origin[0] - (i + 0.5) * grid.cell
-    dy = y - grid.origin[1] - (j + 0.5) * grid.cell
-    dz = z - grid.origin[2] - (k + 0.5) * grid.cell
-    return grid.field[i, j, k] - math.sqrt(dx * dx + dy * dy + dz * dz)
+    return _bound_at(x, y, z, grid.origin[0], grid.origin[1], grid.origin[2], grid.cell, grid.field)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
+def _bound_at(
+    x: float, y: float, z: float, ox: float, oy: float, oz: float, cell: float, field: NDArray[np.float32]
+) -> float:  # fmt: skip
+    i = min(max(int((x - ox) / cell), 0), field.shape[0] - 1)
+    j = min(max(int((y - oy) / cell), 0), field.shape[1] - 1)
+    k = min(max(int((z - oz) / cell), 0), field.shape[2] - 1)
+    dx, dy, dz = x - ox - (i + 0.5) * cell, y - oy - (j + 0.5) * cell, z - oz - (k + 0.5) * cell
+    return field[i, j, k] - math.sqrt(dx * dx + dy * dy + dz * dz)
+
+
+@njit(cache=True, error_model="numpy")
 def segment_free(
     px: float, py: float, pz: float, qx: float, qy: float, qz: float,
     radius: float, grid: GridArrays, prove_only: bool,
@@ -85,31 +90,41 @@ def segment_free(
     bool
         True for free.
     """
+    field, cell = grid.field, grid.cell
+    ox, oy, oz = grid.origin[0], grid.origin[1], grid.origin[2]
     dx, dy, dz = qx - px, qy - py, qz - pz
     length = math.sqrt(dx * dx + dy * dy + dz * dz)
     if length == 0.0:
-        if point_bound(px, py, pz, grid) > radius:
+        if _bound_at(px, py, pz, ox, oy, oz, cell, field) > radius:
             return True
         return not prove_only and not segment_near(px, py, pz, qx, qy, qz, radius, grid.tri, grid.boxes)
     ux, uy, uz = dx / length, dy / length, dz / length
-    step = grid.cell
-    t = 0.0
+    t, doubt = 0.0, -1.0  # where the stretch begins that the grid cannot decide, if there is one
     while t < length:
-        slack = point_bound(px + t * ux, py + t * uy, pz + t * uz, grid) - radius
-        if slack > 0.1 * grid.cell:
-            t += slack
-            continue
-        s = min(t + step, length)
-        m = 0.5 * (t + s)
-        if point_bound(px + m * ux, py + m * uy, pz + m * uz, grid) - radius <= 0.5 * (s - t) and (
-            prove_only
-            or segment_near(
-                px + t * ux, py + t * uy, pz + t * uz, px + s * ux, py + s * uy, pz + s * uz,
+        slack = _bound_at(px + t * ux, py + t * uy, pz + t * uz, ox, oy, oz, cell, field) - radius
+        if slack > 0.1 * cell:
+            reached = t + slack
+        else:
+            reached = min(t + cell, length)
+            m = 0.5 * (t + reached)
+            if _bound_at(px + m * ux, py + m * uy, pz + m * uz, ox, oy, oz, cell, field) - radius <= 0.5 * (
+                reached - t
+            ):
+                if prove_only:
+                    return False
+                if doubt < 0.0:
+                    doubt = t
+                t = reached
+                if t < length:
+                    continue
+        if doubt >= 0.0:
+            if segment_near(
+                px + doubt * ux, py + doubt * uy, pz + doubt * uz, px + t * ux, py + t * uy, pz + t * uz,
                 radius, grid.tri, grid.boxes,
-            )
-        ):  # fmt: skip
-            return False
-        t = s
+            ):  # fmt: skip
+                return False
+            doubt = -1.0
+        t = max(t, reached)
     return True
 
 

@@ -18,8 +18,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from aerialdojo_gen.planning.cost_to_go import cost_at
-from aerialdojo_gen.planning.grid_kernels import GridArrays, inside, segment_free
+from aerialdojo_gen.planning.cost_to_go import cost_at, cost_between
+from aerialdojo_gen.planning.grid_kernels import GridArrays, segment_free
 from aerialdojo_gen.planning.primitives import N_HEADINGS, QUARTER, TURN_RAD
 
 # A translation is direction * 3 + step for the horizontal ones, then up 1 and 2 m, down 1 and 2 m, then the Approach.
@@ -34,6 +34,8 @@ FOUND, EXHAUSTED, BUDGET = 0, 1, 2
 
 _BUCKET_M = 0.02
 _N_BUCKETS = 8192
+# As `grid_kernels.inside` allows.
+_ROUNDING_M = 1e-9
 _HASH = np.uint64(0x9E3779B97F4A7C15)
 
 
@@ -125,51 +127,58 @@ def turns_between(a: int, b: int) -> int:
     return min(d, N_HEADINGS - d)
 
 
-@njit(cache=True, inline="always")
-def _heading_for(heading: int, direction: int) -> tuple[int, int]:
-    """Heading, and number of turns, from which a body at `heading` can fly in `direction`; ahead wins ties."""
-    best, turns = direction, turns_between(heading, direction)
-    for side in (-QUARTER, QUARTER):
-        candidate = (direction + side) % N_HEADINGS
-        n = turns_between(heading, candidate)
-        if n < turns:
-            best, turns = candidate, n
-    return best, turns
+def _ways_to_fly() -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """For every direction relative to the heading, the turns to the best heading to fly there from, and how many.
+
+    The body flies ahead, to its left or to its right; ahead wins ties.
+    """
+    by, count = np.zeros(N_HEADINGS, np.int64), np.zeros(N_HEADINGS, np.int64)
+    for direction in range(N_HEADINGS):
+        options = [direction, (direction - QUARTER) % N_HEADINGS, (direction + QUARTER) % N_HEADINGS]
+        turns = [min(d, N_HEADINGS - d) for d in options]
+        best = int(np.argmin(turns))
+        by[direction], count[direction] = options[best], turns[best]
+    return by, count
+
+
+_TURN_BY, _N_TURNS = _ways_to_fly()
 
 
 @njit(cache=True)
-def _close(key: int, s: SearchArrays, insert: bool) -> bool:
-    """Whether a key is closed in this search; with `insert` it is closed afterwards."""
-    mask = s.keys.shape[0] - 1
-    slot = int((np.uint64(key) * _HASH) >> np.uint64(32)) & mask
-    now = s.clock[0]
-    while s.stamps[slot] == now:
-        if s.keys[slot] == key:
-            return True
+def _slot(key: int, now: int, keys: NDArray[np.int64], stamps: NDArray[np.int32]) -> int:
+    """Where in the table of closed states a key stands, as it is written, or ~slot of where it would."""
+    mask = keys.shape[0] - 1
+    # The high bits of the product are the well mixed ones.
+    slot = int((np.uint64(key) * _HASH) >> np.uint64(40)) & mask
+    while stamps[slot] == now:
+        if keys[slot] == key:
+            return slot
         slot = (slot + 1) & mask
-    if insert:
-        s.stamps[slot] = now
-        s.keys[slot] = key
-    return False
+    return ~slot
 
 
 @njit(cache=True, inline="always")
-def _key(x: float, y: float, z: float, heading: int, low: NDArray[np.float64], o: SearchOptions) -> int:
-    i = int((x - low[0]) / o.cell + 1.0)
-    j = int((y - low[1]) / o.cell + 1.0)
-    k = int((z - low[2]) / o.cell + 1.0)
-    return (((i << 20) | j) << 20 | k) * N_HEADINGS + heading * o.sectors // N_HEADINGS
-
-
-@njit(cache=True, inline="always")
-def _step(move: int, cos: NDArray[np.float64], sin: NDArray[np.float64]) -> tuple[float, float, float]:
-    if move < N_FLAT:
-        d, length = move // N_STEPS, STEPS_M[move % N_STEPS]
-        return cos[d] * length, sin[d] * length, 0.0
-    return 0.0, 0.0, LIFTS_M[move - N_FLAT]
+def _around(heading: int) -> int:
+    """Bring a number from -24 to 23 into 0 to 23; a division would take longer than what it is for."""
+    return heading + N_HEADINGS if heading < 0 else heading
 
 
 @njit(cache=True)
+def _moves_to(node: int, parents: NDArray[np.int32], moves: NDArray[np.int8]) -> NDArray[np.int8]:
+    """Translations from the start to an expanded state."""
+    count, last = 0, node
+    while parents[last] >= 0:
+        count += 1
+        last = parents[last]
+    found = np.empty(count, np.int8)
+    while parents[node] >= 0:
+        count -= 1
+        found[count] = moves[node]
+        node = parents[node]
+    return found
+
+
+@njit(cache=True, error_model="numpy")
 def search(
     start: NDArray[np.float64],
     goal: NDArray[np.float64],
@@ -207,86 +216,79 @@ def search(
     moves : (n,) int8
         Translations from the start to within reach of the goal, without the Approach.
     """
-    cos, sin = np.empty(N_HEADINGS), np.empty(N_HEADINGS)
-    for d in range(N_HEADINGS):
-        cos[d], sin[d] = math.cos(start[3] + d * TURN_RAD), math.sin(start[3] + d * TURN_RAD)
+    flights = np.zeros((N_TRANSLATIONS, 4))  # dx, dy, dz and length of every translation
+    for m in range(N_FLAT):
+        angle, length = start[3] + m // N_STEPS * TURN_RAD, STEPS_M[m % N_STEPS]
+        flights[m, 0], flights[m, 1], flights[m, 3] = math.cos(angle) * length, math.sin(angle) * length, length
+    for m in range(N_FLAT, N_TRANSLATIONS):
+        flights[m, 2], flights[m, 3] = LIFTS_M[m - N_FLAT], abs(LIFTS_M[m - N_FLAT])
+    # Scalars and plain arrays: a tuple of arrays costs more to hand over than the inner loop's work.
+    pose, cost, headings, moves, parents = s.pose, s.cost, s.heading, s.move, s.parent
+    edge_parent, edge_move, edge_next, heads, keys, stamps = (
+        s.edge_parent, s.edge_move, s.edge_next, s.heads, s.keys, s.stamps
+    )  # fmt: skip
+    ox, oy, oz, edge = grid.origin[0], grid.origin[1], grid.origin[2], grid.cell
+    lx, ly, lz = grid.lower[0] - _ROUNDING_M, grid.lower[1] - _ROUNDING_M, grid.lower[2] - _ROUNDING_M
+    hx, hy, hz = grid.upper[0] + _ROUNDING_M, grid.upper[1] + _ROUNDING_M, grid.upper[2] + _ROUNDING_M
     s.clock[0] += 1
-    s.heads[:] = -1
+    now = s.clock[0]
+    heads[:] = -1
     f0 = o.weight * cost_at(start[0], start[1], start[2], grid, cost_to_go) - 5.0
-    lowest = _N_BUCKETS
-    n_edges = 0
-    n = 0
+    f_most = (_N_BUCKETS - 1) * _BUCKET_M
     # The start is an edge from nowhere.
-    s.edge_parent[0], s.edge_move[0], s.edge_next[0] = -1, 0, -1
-    s.heads[0] = 0
-    n_edges, lowest = 1, 0
+    edge_parent[0], edge_move[0], edge_next[0], heads[0] = -1, 0, -1, 0
+    n, n_edges, lowest = 0, 1, 0
     none = np.empty(0, np.int8)
     while True:
-        while lowest < _N_BUCKETS and s.heads[lowest] < 0:
+        while lowest < _N_BUCKETS and heads[lowest] < 0:
             lowest += 1
         if lowest == _N_BUCKETS:
             return EXHAUSTED, n, none
-        edge = s.heads[lowest]
-        s.heads[lowest] = s.edge_next[edge]
-        parent, move = s.edge_parent[edge], int(s.edge_move[edge])
+        taken = heads[lowest]
+        heads[lowest] = edge_next[taken]
+        parent, move = edge_parent[taken], int(edge_move[taken])
         if move == _TO_GOAL:
-            count = 0
-            node = parent
-            while s.parent[node] >= 0:
-                count += 1
-                node = s.parent[node]
-            moves = np.empty(count, np.int8)
-            node = parent
-            while s.parent[node] >= 0:
-                count -= 1
-                moves[count] = s.move[node]
-                node = s.parent[node]
-            return FOUND, n, moves
+            return FOUND, n, _moves_to(parent, parents, moves)
         x, y, z, heading, g = start[0], start[1], start[2], 0, 0.0
         if parent >= 0:
-            dx, dy, dz = _step(move, cos, sin)
-            px, py, pz = s.pose[parent, 0], s.pose[parent, 1], s.pose[parent, 2]
-            x, y, z = px + dx, py + dy, pz + dz
-            heading, turns = int(s.heading[parent]), 0
-            length = abs(dz)
+            px, py, pz, heading = pose[parent, 0], pose[parent, 1], pose[parent, 2], int(headings[parent])
+            x, y, z, turns = px + flights[move, 0], py + flights[move, 1], pz + flights[move, 2], 0
             if move < N_FLAT:
-                heading, turns = _heading_for(heading, move // N_STEPS)
-                length = STEPS_M[move % N_STEPS]
-            g = s.cost[parent] + length + o.action_cost * (turns + 1)
-            key = _key(x, y, z, heading, grid.lower, o)
-            if _close(key, s, False) or not segment_free(px, py, pz, x, y, z, o.radius, grid, False):
-                continue
+                relative = _around(move // N_STEPS - heading)
+                turns, heading = _N_TURNS[relative], _around(heading + _TURN_BY[relative] - N_HEADINGS)
+            g = cost[parent] + flights[move, 3] + o.action_cost * (turns + 1)
+        key = int((x - lx) / o.cell + 1.0)
+        key = (key << 20) | int((y - ly) / o.cell + 1.0)
+        key = (key << 20) | int((z - lz) / o.cell + 1.0)
+        key = key * N_HEADINGS + heading * o.sectors // N_HEADINGS
+        slot = ~_slot(key, now, keys, stamps)
+        if slot < 0 or (parent >= 0 and not segment_free(px, py, pz, x, y, z, o.radius, grid, False)):
+            continue
         if n >= o.budget:
             return BUDGET, n, none
-        _close(_key(x, y, z, heading, grid.lower, o), s, True)
-        s.pose[n, 0], s.pose[n, 1], s.pose[n, 2] = x, y, z
-        s.cost[n], s.heading[n], s.move[n], s.parent[n] = g, heading, move, parent
+        keys[slot], stamps[slot] = key, now
+        pose[n, 0], pose[n, 1], pose[n, 2] = x, y, z
+        cost[n], headings[n], moves[n], parents[n] = g, heading, move, parent
         gap = math.sqrt((x - goal[0]) ** 2 + (y - goal[1]) ** 2 + (z - goal[2]) ** 2)
         if gap <= o.approach and segment_free(x, y, z, goal[0], goal[1], goal[2], o.radius, grid, False):
-            f = g + gap + o.action_cost * (turns_between(heading, goal_heading) + 1)
-            bucket = min(_N_BUCKETS - 1, max(0, int((f - f0) / _BUCKET_M)))
-            s.edge_parent[n_edges], s.edge_move[n_edges] = n, _TO_GOAL
-            s.edge_next[n_edges] = s.heads[bucket]
-            s.heads[bucket] = n_edges
+            f = g + gap + o.action_cost * (turns_between(heading, goal_heading) + 1) - f0
+            bucket = max(0, int(min(f, f_most) / _BUCKET_M))
+            edge_parent[n_edges], edge_move[n_edges], edge_next[n_edges] = n, _TO_GOAL, heads[bucket]
+            heads[bucket] = n_edges
             n_edges += 1
             lowest = min(lowest, bucket)
         for m in range(N_TRANSLATIONS):
-            dx, dy, dz = _step(m, cos, sin)
-            u, v, w = x + dx, y + dy, z + dz
-            if not inside(u, v, w, grid.lower, grid.upper):
+            u, v, w = x + flights[m, 0], y + flights[m, 1], z + flights[m, 2]
+            if not (lx <= u <= hx and ly <= v <= hy and lz <= w <= hz):
                 continue
-            turns, length = 0, abs(dz)
-            if m < N_FLAT:
-                _, turns = _heading_for(heading, m // N_STEPS)
-                length = STEPS_M[m % N_STEPS]
-            h = cost_at(u, v, w, grid, cost_to_go)
-            f = g + length + o.action_cost * (turns + 1) + o.weight * h - f0
-            if not f < (_N_BUCKETS - 1) * _BUCKET_M:
+            turns = _N_TURNS[_around(m // N_STEPS - heading)] if m < N_FLAT else 0
+            h = cost_between(u, v, w, ox, oy, oz, edge, cost_to_go)
+            f = g + flights[m, 3] + o.action_cost * (turns + 1) + o.weight * h - f0
+            if not f < f_most:
                 continue
             bucket = max(0, int(f / _BUCKET_M))
-            s.edge_parent[n_edges], s.edge_move[n_edges] = n, m
-            s.edge_next[n_edges] = s.heads[bucket]
-            s.heads[bucket] = n_edges
+            edge_parent[n_edges], edge_move[n_edges], edge_next[n_edges] = n, m, heads[bucket]
+            heads[bucket] = n_edges
             n_edges += 1
             lowest = min(lowest, bucket)
         n += 1

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -11,7 +12,7 @@ from aerialdojo_gen.config import PlanConfig
 from aerialdojo_gen.planning.certify import certify
 from aerialdojo_gen.planning.clearance import ClearanceGrid
 from aerialdojo_gen.planning.collision import CollisionWorld
-from aerialdojo_gen.planning.cost_to_go import cost_at, expand_cost, seed_goal
+from aerialdojo_gen.planning.cost_to_go import columns_by_distance, cost_at, expand_cost, seed_goal
 from aerialdojo_gen.planning.hybrid_astar import (
     EXHAUSTED,
     FOUND,
@@ -91,6 +92,9 @@ class Planner:
             scene, cell_m=config.cell_m, radius_m=radius_m, margin_m=config.margin_m, cap_m=config.clearance_cap_m
         )
         self._cost = np.empty(self.grid.moves.shape, np.float32)
+        self._order = columns_by_distance(
+            math.ceil((config.max_length_m * config.length_slack + 2 * config.max_approach_m) / config.cell_m)
+        )
         self._memory: dict[int, SearchArrays] = {}
 
     def plan_target(self, goal: ArrayLike, starts: ArrayLike) -> list[Route]:
@@ -133,7 +137,7 @@ class Planner:
         c, g = self.config, self.grid
         self._cost.fill(np.inf)
         seeds = seed_goal(*goal, c.max_approach_m, g.radius_m, g.arrays, g.moves, self._cost)
-        expand_cost(seeds, starts, c.max_length_m * c.length_slack, c.field_slack_m, g.arrays, g.moves, self._cost)
+        expand_cost(seeds, self._order, c.max_length_m * c.length_slack, g.arrays.cell, g.moves, self._cost)
 
     def _plan(self, start: NDArray[np.float64], goal: NDArray[np.float64]) -> Route:
         c = self.config
