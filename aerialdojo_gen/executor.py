@@ -87,7 +87,8 @@ def compute(task: Task) -> dict[str, Any]:
     return summary
 
 
-def _start_worker(parent: int) -> None:
+def start_worker(parent: int) -> None:
+    """Make a new worker process leave Ctrl-C to its parent, and end with it."""
     # Ctrl-C goes to the whole process group: the parent alone answers it, and ends the workers itself.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     # A worker must not outlive a parent that was killed with SIGKILL.
@@ -167,7 +168,7 @@ class Pool:
             # spawn: FCL, PyBullet and numba hold state that does not survive a fork.
             context = multiprocessing.get_context("spawn")
             self._executor = ProcessPoolExecutor(
-                self.workers, mp_context=context, initializer=_start_worker, initargs=(os.getpid(),)
+                self.workers, mp_context=context, initializer=start_worker, initargs=(os.getpid(),)
             )
         waiting = iter(tasks)
         running: dict[Future[R], T] = {}

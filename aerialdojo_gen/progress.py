@@ -14,32 +14,32 @@ _PLAIN_EVERY_S = 10.0
 
 
 class Bar:
-    """Counts finished shards; `advance` is called once for each."""
+    """Counts finished shards (or what `unit` says); `advance` counts them."""
 
-    def __init__(self, label: str, total: int, stream: TextIO, quiet: bool) -> None:
-        self._label, self._total, self._stream = label, total, stream
+    def __init__(self, label: str, total: int, stream: TextIO, quiet: bool, unit: str = "shards") -> None:
+        self._label, self._total, self._stream, self._unit = label, total, stream, unit
         self._done, self._started, self._said = 0, time.monotonic(), time.monotonic()
         self._plain = not quiet and not stream.isatty()
         self._tqdm = tqdm(
             total=total,
             desc=label,
-            unit=" shards",
+            unit=f" {unit}",
             file=stream,
             leave=False,
             disable=quiet or self._plain or not total,
         )
 
-    def advance(self) -> None:
-        """Count one more."""
-        self._done += 1
-        self._tqdm.update()
+    def advance(self, n: int = 1) -> None:
+        """Count `n` more."""
+        self._done += n
+        self._tqdm.update(n)
         now = time.monotonic()
         if self._plain and now - self._said >= _PLAIN_EVERY_S:
             self._said = now
             rate = self._done / (now - self._started)
             left = (self._total - self._done) / rate
             print(
-                f"{self._label}: {self._done}/{self._total} shards, {rate:.2f}/s, ETA {left:.0f} s",
+                f"{self._label}: {self._done}/{self._total} {self._unit}, {rate:.2f}/s, ETA {left:.0f} s",
                 file=self._stream,
                 flush=True,
             )
@@ -70,9 +70,9 @@ class Reporter:
             self._stream.flush()
 
     @contextmanager
-    def bar(self, label: str, total: int) -> Iterator[Bar]:
-        """Show progress over `total` shards for the length of the block."""
-        bar = Bar(label, total, self._stream, self._quiet)
+    def bar(self, label: str, total: int, unit: str = "shards") -> Iterator[Bar]:
+        """Show progress over `total` shards, or things of another kind, for the length of the block."""
+        bar = Bar(label, total, self._stream, self._quiet, unit)
         try:
             yield bar
         finally:

@@ -224,17 +224,19 @@ RECORDINGS = _table(
     _SCENE,
     _field("nav_id", pa.string(), "navigation task"),
     _field("view", pa.string(), "front, left, right or down"),
-    _field("modality", pa.string(), "rgb or depth"),
-    _field("path", pa.string(), "video, relative to the data directory"),
+    _field("modality", pa.string(), "rgb, depth or instance"),
+    _field("path", pa.string(), "video, or folder of PNG files; relative to the data directory"),
     _field("sampling", pa.string(), "steps: one frame a trajectory pose; time: constant frame rate"),
     _field("n_frames", pa.int32(), "number of frames"),
     _field("fps", pa.float64(), "frames a second", "1/s"),
     _field("width", pa.int32(), "columns", "px"),
     _field("height", pa.int32(), "rows", "px"),
     _field("fov_deg", pa.float64(), "horizontal field of view", "deg"),
-    _field("codec", pa.string(), "h264 or ffv1"),
-    _field("bytes", pa.int64(), "size of the file", "B"),
-    _field("sha256", pa.string(), "SHA-256 of the file, hexadecimal"),
+    _field("codec", pa.string(), "h264, ffv1 or png"),
+    _field("renderer", pa.string(), "gl or pybullet"),
+    _field("device", pa.string(), "what drew, in the driver's words"),
+    _field("bytes", pa.int64(), "size of the file, or of the folder's files", "B"),
+    _field("sha256", pa.string(), "SHA-256 of the file, hexadecimal; of a folder, of its files one after the other"),
     _field("ok", pa.bool_(), "no quality flag is set"),
     _field("flags", _list(pa.string()), "quality flags, empty where all is well"),
 )  # fmt: skip
@@ -369,6 +371,7 @@ FAILURES = _table(
     _SCENE,
     _field("attempts", pa.int32(), "how often the episode was tried"),
     _field("reason", pa.string(), "what was unavailable: time-out, 429, 5xx, connection lost"),
+    _field("cost_usd", pa.float64(), "US dollars spent all the same, where prices are known", nullable=True),
 )  # fmt: skip
 
 TABLES = {

@@ -1,24 +1,28 @@
-"""The log of a run, read: `episodes`, `steps`, `timings` and `failures` under ``<data>/<table>/<run>/``."""
+"""The log of a run: `episodes`, `steps`, `timings` and `failures` under ``<folder>/<table>/<run>/``."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pyarrow as pa
+import pyarrow.compute as pc
 
-from aerialdojo_gen import store
+from aerialdojo_gen import schemas, store
 from aerialdojo_gen.errors import StoreError
 
 TABLES = ("episodes", "steps", "timings", "failures")
 
 
 def runs(data: Path) -> list[str]:
-    """List the runs that have finished at least one episode, by name."""
+    """List the runs that have written episodes, by name."""
     return sorted({path.parent.name for path in (data / "episodes").glob("*/part-*.parquet")})
 
 
 def run_scenes(data: Path, run: str) -> list[str]:
-    """List the scenes that a run has episodes of, by name."""
+    """List the scenes that a run has written, by name."""
     folder = store.shard_path(data, "episodes", "any", run=run).parent
     return sorted(path.stem.removeprefix("part-") for path in folder.glob("part-*.parquet"))
 
@@ -29,7 +33,7 @@ def read_run(data: Path, run: str, table: str = "episodes") -> pa.Table:
     Parameters
     ----------
     data : Path
-        The directory that `evaluate` wrote to.
+        The folder that `evaluate` wrote to.
     run : str
         Name of the run.
     table : str
@@ -50,3 +54,71 @@ def read_run(data: Path, run: str, table: str = "episodes") -> pa.Table:
         known = ", ".join(runs(data)) or "none"
         raise StoreError(f"no run {run!r} in {data} (there are: {known}): run aerialdojo-gen evaluate --run {run}")
     return pa.concat_tables([store.read_scene(data, table, scene, run=run) for scene in scenes])
+
+
+def fingerprint_of(data: Path, run: str, scene: str) -> str | None:
+    """Return the fingerprint that a scene's episodes were written with; None where there are none."""
+    paths = store.shards(data, "episodes", scene, run)
+    info = store.read_info(paths[0]) if paths else None
+    return info.fingerprint if info else None
+
+
+def add_records(data: Path, run: str, scene: str, records: Sequence[dict[str, Any]], fingerprint: str) -> None:
+    """Add finished episodes of a scene to a run's tables.
+
+    Parameters
+    ----------
+    data : Path
+        The folder to write to.
+    run, scene : str
+    records : sequence of dict
+        Either ``episode``, ``timing`` and ``steps`` (column to list), or ``failure``; ``task_id`` in each. One that
+        stands in the tables already is replaced; of an episode that failed first and was finished later, the failure
+        goes.
+    fingerprint : str
+        Stored with the shards.
+    """
+    by_task = {record["task_id"]: record for record in records}
+    ordered = [by_task[task_id] for task_id in sorted(by_task)]
+    flown = [record for record in ordered if "episode" in record]
+    new = {
+        "episodes": store.from_rows(schemas.EPISODES, [record["episode"] for record in flown]),
+        "steps": _steps(run, scene, flown),
+        "timings": store.from_rows(schemas.TIMINGS, [record["timing"] for record in flown]),
+        "failures": store.from_rows(schemas.FAILURES, [r["failure"] for r in ordered if "failure" in r]),
+    }
+    replaced = pa.array([record["task_id"] for record in flown], pa.string())
+    for table in reversed(TABLES):
+        rows = new[table]
+        if store.shards(data, table, scene, run):
+            # A failure counts for nothing once its episode is there, and neither does an older failure.
+            gone = replaced if table != "failures" else pa.array(list(by_task), pa.string())
+            kept = store.read_scene(data, table, scene, run=run)
+            kept = kept.filter(pc.invert(pc.is_in(kept["task_id"], gone)))
+            rows = pa.concat_tables([kept, rows.replace_schema_metadata(None).cast(kept.schema)])
+            rows = rows.sort_by([(key, "ascending") for key in store.LAYOUT[table].spec.key])
+        store.write_shard(data, table, scene, 0, rows, fingerprint=fingerprint, run=run)
+
+
+def _steps(run: str, scene: str, flown: Sequence[dict[str, Any]]) -> pa.Table:
+    lengths = [len(record["steps"]["action"]) for record in flown]
+    n = sum(lengths)
+    names = [name for name in schemas.STEPS.schema.names if flown and name in flown[0]["steps"]]
+    columns: dict[str, Any] = {
+        name: [value for record in flown for value in record["steps"][name]] for name in names
+    }  # fmt: skip
+    columns |= {
+        "run_id": [run] * n,
+        "scene": [scene] * n,
+        "task_id": np.repeat(np.array([record["task_id"] for record in flown], dtype=object), lengths),
+        "step": np.concatenate([np.arange(k) for k in (0, *lengths)]),
+    }
+    schema = schemas.STEPS.schema
+    return pa.table({f.name: pa.array(columns.get(f.name, []), f.type) for f in schema}, schema=schema)
+
+
+def remove_run(data: Path, run: str) -> None:
+    """Remove a run's tables."""
+    for table in TABLES:
+        for path in store.shard_path(data, table, "any", run=run).parent.glob("part-*.parquet"):
+            path.unlink()

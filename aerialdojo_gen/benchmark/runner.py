@@ -1,0 +1,304 @@
+"""Evaluate an agent: choose tasks, fly them in processes, write the log.
+
+Finished episodes are never flown again: a worker writes each to a journal, the parent brings a scene's journals into the
+tables when the scene is finished, when the run ends, or when the next one begins. The tables of a deterministic agent
+are the same bytes whatever the number of workers and however often the run was killed.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import shutil
+import time
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+import pyarrow as pa
+import pyarrow.compute as pc
+
+from aerialdojo_gen import store
+from aerialdojo_gen.benchmark import episodes, journal
+from aerialdojo_gen.benchmark.goal import Sensors
+from aerialdojo_gen.benchmark.tasks import Selection, select
+from aerialdojo_gen.benchmark.worker import Finished, Unit
+from aerialdojo_gen.benchmark.workers import fly_units
+from aerialdojo_gen.config import Embodiment
+from aerialdojo_gen.errors import UsageError
+from aerialdojo_gen.interrupt import Interrupts
+from aerialdojo_gen.progress import Reporter
+from aerialdojo_gen.runner import data_lock
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """What is evaluated: all that the log depends on, beside the data.
+
+    Attributes
+    ----------
+    run : str
+        Name of the run.
+    agent : str
+        Name of the agent, or ``package.module:Class``.
+    options : dict
+        The agent's keyword arguments; JSON, and no secrets.
+    selection : Selection
+        Which tasks.
+    sensors : Sensors or None
+        In place of those that the agent asks for.
+    embodiment : Embodiment
+        The body.
+    attempts : int
+        How often an episode is begun before it is logged as failed.
+    pause_s : float
+        Before the second attempt, doubled each time.
+    """
+
+    run: str = "default"
+    agent: str = "random"
+    options: Mapping[str, Any] = field(default_factory=dict)
+    selection: Selection = Selection()
+    sensors: Sensors | None = None
+    embodiment: Embodiment = Embodiment()
+    attempts: int = 5
+    pause_s: float = 1.0
+
+    def identity(self) -> dict[str, str]:
+        """Columns of `episodes` that name the run and its agent."""
+        options = json.dumps(dict(self.options), sort_keys=True)
+        return {"run_id": self.run, "agent": self.agent, "agent_options": options}
+
+    def settings(self) -> dict[str, Any]:
+        """What must not change within a run, as JSON; attempts and pauses may."""
+        return {
+            "agent": self.agent,
+            "options": dict(self.options),
+            **asdict(self.selection),
+            "sensors": asdict(self.sensors) if self.sensors else None,
+            "embodiment": self.embodiment.model_dump(),
+        }
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of an evaluation.
+
+    Attributes
+    ----------
+    episodes : int
+        That the evaluation has.
+    finished, failed : int
+        In the tables now: flown, and given up because something outside failed.
+    flown, actions : int
+        Episodes and actions of this call.
+    cost_usd : float
+        Of all calls for this run.
+    seconds : float
+        Of this call.
+    """
+
+    episodes: int
+    finished: int
+    failed: int
+    flown: int
+    actions: int
+    cost_usd: float
+    seconds: float
+
+    def __str__(self) -> str:
+        """One line."""
+        rate = f", {self.actions / self.seconds:,.0f} actions/s" if self.flown else ""
+        cost = f"; {self.cost_usd:.2f} USD" if self.cost_usd else ""
+        failed = f", {self.failed:,} failed for reasons outside the agent" if self.failed else ""
+        return (
+            f"{self.finished:,} of {self.episodes:,} episodes finished{failed}; "
+            f"{self.flown:,} flown now in {self.seconds:.1f} s{rate}{cost}"
+        )
+
+
+def evaluate(
+    data: Path,
+    evaluation: Evaluation,
+    *,
+    out: Path | None = None,
+    workers: int = 1,
+    rerun_failed: bool = False,
+    restart: bool = False,
+    max_cost_usd: float | None = None,
+    reporter: Reporter | None = None,
+) -> Outcome:
+    """Fly an agent through the tasks of a selection; `aerialdojo-gen evaluate` in the library.
+
+    Parameters
+    ----------
+    data : Path
+        The data directory, with a release and its meshes.
+    evaluation : Evaluation
+    out : Path, optional
+        Where the log goes; `data` where absent.
+    workers : int
+        Processes; with 1 everything runs in this one.
+    rerun_failed : bool
+        Fly those again that failed for reasons outside the agent.
+    restart : bool
+        Drop what an earlier run of the name has written.
+    max_cost_usd : float, optional
+        Begin no episode once so much is spent, over all calls for the run.
+    reporter : Reporter, optional
+        Shows progress.
+
+    Returns
+    -------
+    Outcome
+
+    Raises
+    ------
+    UsageError
+        The run was begun with other settings, or with other data.
+    AerialDojoError
+        The agent, the data or the disk will not do; finished episodes are kept.
+    KeyboardInterrupt
+        Finished episodes are kept.
+    """
+    started = time.monotonic()
+    data, out = data.absolute(), (out or data).absolute()
+    reporter = reporter or Reporter(quiet=True)
+    folder = out / "runs" / store.check_run_name(evaluation.run)
+    rows = select(data, evaluation.selection)
+    run = _Run(data, out, folder, evaluation, rows)
+    with data_lock(folder), Interrupts() as interrupts:
+        if restart:
+            run.drop()
+        run.claim()
+        run.bring_in()
+        todo = run.todo(rerun_failed)
+        spent = run.spent()
+        flown = actions = 0
+        with reporter.bar(f"{evaluation.agent} ({evaluation.run})", todo.num_rows, "episodes") as bar:
+
+            def tell(finished: Finished) -> None:
+                nonlocal spent, flown, actions
+                spent += finished.cost_usd
+                flown += finished.episodes
+                actions += finished.actions
+                bar.advance(finished.episodes)
+
+            def stopped() -> bool:
+                interrupts.check()
+                return max_cost_usd is not None and spent >= max_cost_usd
+
+            with run.kept():
+                units = run.units(todo, workers)
+                for scene in fly_units(data, evaluation, units, workers, tell, stopped):
+                    run.bring_in(scene)
+        if stopped() and len(run.todo(False)):
+            reporter.line(f"stopped at --max-cost {max_cost_usd:g}: a higher one goes on from here")
+        finished, failed = run.counts()
+    return Outcome(rows.num_rows, finished, failed, flown, actions, spent, time.monotonic() - started)
+
+
+class _Run:
+    """A run's folder and tables."""
+
+    def __init__(self, data: Path, out: Path, folder: Path, evaluation: Evaluation, rows: pa.Table) -> None:
+        self._out, self._folder, self._name = out, folder, evaluation.run
+        self._journals = folder / "journal"
+        self._rows = rows
+        self._scenes: list[str] = rows["scene"].unique().to_pylist()
+        subsets = rows["subset"].unique().to_pylist()
+        content = {
+            f"{table}/{scene}": store.content(data, table, scene)
+            for scene in self._scenes
+            for table in ("release/scenes", *(f"{kind}/{s}" for kind in ("tasks", "routes") for s in subsets))
+        }
+        digest = hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+        self._settings = json.loads(json.dumps(evaluation.settings() | {"data": digest}))
+        self._fingerprint = hashlib.sha256(json.dumps(self._settings, sort_keys=True).encode()).hexdigest()
+
+    def claim(self) -> None:
+        """Take the folder for these settings; UsageError where it was begun with others."""
+        path, begun = self._folder / "run.json", self._begun()
+        mend = "give another --run, or --restart"
+        # One that has finished nothing may yet become another: an agent's options may have been wrong.
+        if begun and path.is_file():
+            before = json.loads(path.read_text(encoding="utf-8"))
+            for key, value in self._settings.items():
+                if before.get(key) != value:
+                    what = "other data" if key == "data" else f"{key} = {before.get(key)!r}, not {value!r}"
+                    raise UsageError(f"run {self._name!r} was begun with {what}: {mend}")
+        for scene in episodes.run_scenes(self._out, self._name):
+            if episodes.fingerprint_of(self._out, self._name, scene) != self._fingerprint:
+                raise UsageError(f"there are episodes of another run {self._name!r} in {self._out}: {mend}")
+        with store.atomic_file(self._folder, path.name) as temporary:
+            temporary.write_text(json.dumps(self._settings, indent=2, sort_keys=True) + "\n", encoding="utf-8")
+
+    def _begun(self) -> bool:
+        return bool(episodes.run_scenes(self._out, self._name) or any(self._journals.glob("*.jsonl")))
+
+    def drop(self) -> None:
+        """Remove what was written under the name."""
+        episodes.remove_run(self._out, self._name)
+        shutil.rmtree(self._journals, ignore_errors=True)
+        (self._folder / "run.json").unlink(missing_ok=True)
+
+    def bring_in(self, scene: str = "*") -> None:
+        """Bring journals into the tables: of one scene, or all that there are."""
+        paths = sorted(self._journals.glob(f"{scene}.*.jsonl"))
+        by_scene: dict[str, list[Path]] = {}
+        for path in paths:
+            by_scene.setdefault(path.name.split(".", 1)[0], []).append(path)
+        for name, files in by_scene.items():
+            records = [record for path in files for record in journal.read(path)]
+            if records:
+                episodes.add_records(self._out, self._name, name, records, self._fingerprint)
+            for path in files:
+                path.unlink()
+
+    @contextmanager
+    def kept(self) -> Iterator[None]:
+        """Bring in what was finished, however the block ends."""
+        try:
+            yield
+        finally:
+            self.bring_in()
+
+    def todo(self, rerun_failed: bool) -> pa.Table:
+        """Rows that are still to be flown."""
+        done = self._ids("episodes") + ([] if rerun_failed else self._ids("failures"))
+        return self._rows.filter(pc.invert(pc.is_in(self._rows["task_id"], pa.array(done, pa.string()))))
+
+    def counts(self) -> tuple[int, int]:
+        """Episodes in the tables: finished, failed."""
+        return len(self._ids("episodes")), len(self._ids("failures"))
+
+    def spent(self) -> float:
+        """US dollars, so far."""
+        return sum(
+            pc.sum(store.read_scene(self._out, table, scene, ["cost_usd"], self._name)["cost_usd"]).as_py() or 0.0
+            for scene in episodes.run_scenes(self._out, self._name)
+            for table in ("episodes", "failures")
+        )
+
+    def _ids(self, table: str) -> list[str]:
+        return [
+            task_id
+            for scene in episodes.run_scenes(self._out, self._name)
+            for task_id in store.read_scene(self._out, table, scene, ["task_id"], self._name)["task_id"].to_pylist()
+        ]
+
+    def units(self, todo: pa.Table, workers: int) -> list[Unit]:
+        """Share the work: whole scenes where there are many, for a scene takes seconds to make ready."""
+        by_scene = {s: todo.filter(pc.equal(todo["scene"], s)) for s in todo["scene"].unique().to_pylist()}
+        share = -(-todo.num_rows // (4 * workers)) if workers > 1 else todo.num_rows
+        units = []
+        # The largest first, so that the last to finish is a small one.
+        for scene, rows in sorted(by_scene.items(), key=lambda item: -item[1].num_rows):
+            parts = 1 if len(by_scene) >= 4 * workers else -(-rows.num_rows // share)
+            size = -(-rows.num_rows // parts)
+            for k in range(parts):
+                path = self._journals / f"{scene}.{k:04d}.jsonl"
+                units.append(Unit(scene, rows.slice(k * size, size), path))
+        return units

@@ -1,0 +1,129 @@
+"""Fly an agent through released tasks."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from aerialdojo_gen.commands.common import Data, PipelineFile, Quiet, Scene, Workers, default_workers, open_pipeline
+from aerialdojo_gen.errors import UsageError
+
+if TYPE_CHECKING:
+    from aerialdojo_gen.benchmark.goal import Sensors
+
+app = typer.Typer()
+
+
+@app.command("evaluate")
+def evaluate(
+    data: Data = Path("data"),
+    agent: Annotated[
+        str, typer.Option("--agent", help="oracle, random, stop, explorer, …, or package.module:Class.")
+    ] = "random",
+    option: Annotated[
+        list[str] | None, typer.Option("--option", help="An option of the agent, repeatable: --option seed=1.")
+    ] = None,
+    run: Annotated[str | None, typer.Option("--run", help="Name of the run.  (default: the agent's)")] = None,
+    split: Annotated[
+        list[str] | None, typer.Option("--split", help="id_train, id_test, ood_train, ood_test; repeatable.")
+    ] = None,
+    setting: Annotated[
+        list[str] | None, typer.Option("--setting", help="base, standard, long_horizon; repeatable.")
+    ] = None,
+    modality: Annotated[
+        list[str] | None, typer.Option("--modality", help="semantic or image.  (default: both)")
+    ] = None,
+    scene: Scene = None,
+    limit: Annotated[
+        int | None,
+        typer.Option("--limit", min=1, help="So many tasks, drawn evenly over the scenes.  (default: all)"),
+    ] = None,
+    seed: Annotated[int, typer.Option("--seed", min=0, help="Of that draw.")] = 0,
+    view: Annotated[
+        list[str] | None, typer.Option("--view", help="front, left, right, down; in place of the agent's own.")
+    ] = None,
+    width: Annotated[int | None, typer.Option("--width", min=1, help="Columns; in place of the agent's own.")] = None,
+    height: Annotated[int | None, typer.Option("--height", min=1, help="Rows; in place of the agent's own.")] = None,
+    out: Annotated[
+        Path | None, typer.Option("--out", help="Where the log goes.  (default: the data directory)")
+    ] = None,
+    attempts: Annotated[
+        int, typer.Option("--attempts", min=1, help="Tries of an episode where something outside fails.")
+    ] = 5,
+    rerun_failed: Annotated[
+        bool, typer.Option("--rerun-failed", help="Fly those again that failed for reasons outside the agent.")
+    ] = False,
+    restart: Annotated[bool, typer.Option("--restart", help="Drop what the run has written before.")] = False,
+    max_cost: Annotated[
+        float | None, typer.Option("--max-cost", min=0, help="Begin no episode once so many US dollars are spent.")
+    ] = None,
+    workers: Workers = None,
+    pipeline: PipelineFile = None,
+    quiet: Quiet = False,
+) -> None:
+    """Fly an agent through released tasks, closed loop; finished episodes are never flown again."""
+    from aerialdojo_gen.benchmark.runner import Evaluation
+    from aerialdojo_gen.benchmark.runner import evaluate as fly
+    from aerialdojo_gen.benchmark.tasks import Selection
+    from aerialdojo_gen.progress import Reporter
+
+    config, _ = open_pipeline(pipeline, data)
+    chosen = (tuple(names or ()) for names in (split, setting, modality, scene))
+    options = _options(option or [])
+    evaluation = Evaluation(
+        run or agent.replace(".", "-").replace(":", "-"),
+        agent,
+        options,
+        Selection(*chosen, limit, seed),
+        _sensors(agent, options, view, width, height),
+        config.embodiment,
+        attempts,
+    )
+    reporter = Reporter(quiet=quiet)
+    try:
+        outcome = fly(
+            data, evaluation, out=out, workers=workers or default_workers(), rerun_failed=rerun_failed,
+            restart=restart, max_cost_usd=max_cost, reporter=reporter,
+        )  # fmt: skip
+    except KeyboardInterrupt:
+        print("interrupted: finished episodes are kept, the same command goes on from here", file=sys.stderr)
+        raise SystemExit(130) from None
+    reporter.line(f"evaluate {evaluation.run}: {outcome}")
+
+
+def _options(given: list[str]) -> dict[str, Any]:
+    options: dict[str, Any] = {}
+    for item in given:
+        key, equals, value = item.partition("=")
+        if not equals or not key.isidentifier():
+            raise UsageError(f"--option {item!r}: write key=value")
+        try:
+            options[key] = json.loads(value)
+        except ValueError:
+            options[key] = value
+    return options
+
+
+def _sensors(
+    agent: str, options: dict[str, Any], view: list[str] | None, width: int | None, height: int | None
+) -> Sensors | None:
+    """Take the agent's own sensors, with what was asked for instead; None leaves them as they are."""
+    if view is None and width is None and height is None:
+        return None
+    from dataclasses import replace
+
+    from aerialdojo_gen.benchmark.agents import load_agent
+    from aerialdojo_gen.benchmark.goal import Sensors
+
+    wanted = getattr(load_agent(agent, **options), "sensors", None)
+    sensors = wanted if isinstance(wanted, Sensors) else Sensors()
+    return replace(
+        sensors,
+        views=sensors.views if view is None else tuple(view),
+        width=width or sensors.width,
+        height=height or sensors.height,
+    )
