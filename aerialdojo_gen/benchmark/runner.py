@@ -1,8 +1,8 @@
 """Evaluate an agent: choose tasks, fly them in processes, write the log.
 
-Finished episodes are never flown again: a worker writes each to a journal, the parent brings a scene's journals into the
-tables when the scene is finished, when the run ends, or when the next one begins. The tables of a deterministic agent
-are the same bytes whatever the number of workers and however often the run was killed.
+Finished episodes are never flown again: a worker writes each to a journal, the parent brings a scene's journals into
+the tables when the scene is finished, when the run ends, or when the next one begins. The tables of a deterministic
+agent are the same bytes whatever the number of workers and however often the run was killed.
 """
 
 from __future__ import annotations
@@ -60,9 +60,9 @@ class Evaluation:
     run: str = "default"
     agent: str = "random"
     options: Mapping[str, Any] = field(default_factory=dict)
-    selection: Selection = Selection()
+    selection: Selection = field(default_factory=Selection)
     sensors: Sensors | None = None
-    embodiment: Embodiment = Embodiment()
+    embodiment: Embodiment = field(default_factory=Embodiment)
     attempts: int = 5
     pause_s: float = 1.0
 

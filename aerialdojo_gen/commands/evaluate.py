@@ -72,13 +72,13 @@ def evaluate(
     from aerialdojo_gen.progress import Reporter
 
     config, _ = open_pipeline(pipeline, data)
-    chosen = (tuple(names or ()) for names in (split, setting, modality, scene))
+    splits, settings, modalities, scenes = (tuple(names or ()) for names in (split, setting, modality, scene))
     options = _options(option or [])
     evaluation = Evaluation(
         run or agent.replace(".", "-").replace(":", "-"),
         agent,
         options,
-        Selection(*chosen, limit, seed),
+        Selection(splits, settings, modalities, scenes, limit, seed),
         _sensors(agent, options, view, width, height),
         config.embodiment,
         attempts,
