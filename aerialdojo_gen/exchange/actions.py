@@ -151,27 +151,23 @@ def actions_of(words: Sequence[str], poses: Floats) -> tuple[list[int] | None, f
     """
     found = body_steps(poses)
     steps = np.zeros_like(found)
-    actions: list[int | None] = []
-    last = len(words) - 1
-    approach = False
+    actions: list[int] = []
     for k, word in enumerate(words):
         axis, sign = WORDS[word]
-        sizes = _SIZES[word]
-        nearest = min(range(len(sizes)), key=lambda i: abs(sizes[i] - sign * found[k, axis]))
+        sizes, along = _SIZES[word], sign * float(found[k, axis])
+        nearest = min(range(len(sizes)), key=lambda i: abs(sizes[i] - along))
         steps[k, axis] = sign * sizes[nearest]
-        off = found[k] - steps[k]
-        off_m, off_rad = float(np.linalg.norm(off[:3])), abs(float(off[3]))
-        turned = abs(float(found[k, 3])) > _EXACT_M
-        if k == last and not turned and off_m > _EXACT_M and float(np.linalg.norm(found[k, :3])) <= 1.0 + _EXACT_M:
-            actions.append(APPROACH)
-            approach = True
-        else:
-            actions.append(_OURS[word][nearest] if off_m <= _SAME_M and off_rad <= _SAME_RAD else None)
-    flown = steps[:-1] if approach else steps
-    end = replay(poses[0], flown)[-1, :3]
-    error = float(np.linalg.norm(end - poses[len(flown), :3]))
-    ours = None if None in actions else [a for a in actions if a is not None] + [STOP]
-    return ours, error
+        actions.append(_OURS[word][nearest])
+    off = found - steps
+    off_m = np.sqrt((off[:, :3] ** 2).sum(axis=1))
+    same = (off_m <= _SAME_M) & (np.abs(off[:, 3]) <= _SAME_RAD)
+    short = len(words) > 0 and float(np.linalg.norm(found[-1, :3])) <= 1.0 + _EXACT_M
+    if short and off_m[-1] > _EXACT_M and abs(found[-1, 3]) <= _EXACT_M:
+        actions[-1], same[-1] = APPROACH, True
+        steps = steps[:-1]
+    end = replay(poses[0], steps)[-1, :3]
+    error = float(np.linalg.norm(end - poses[len(steps), :3]))
+    return ([*actions, STOP] if same.all() else None), error
 
 
 def replay_error_m(moves: Sequence[Move], poses: Floats) -> float:

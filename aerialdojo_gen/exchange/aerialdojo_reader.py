@@ -20,7 +20,7 @@ from aerialdojo_gen.exchange.aerialdojo_layout import (
     Partition,
     parse_partition,
 )
-from aerialdojo_gen.exchange.fields import BadField, Fields, shown
+from aerialdojo_gen.exchange.fields import BadField, Fields, positions_of, quaternions_of, shown
 from aerialdojo_gen.exchange.folder import check_picture, inside
 from aerialdojo_gen.exchange.jsonstream import small_document
 from aerialdojo_gen.exchange.task import Context, Instance, Route, Task, digest
@@ -28,6 +28,8 @@ from aerialdojo_gen.release.select import nav_id
 from aerialdojo_gen.stages.build_scenes import parse_name
 
 _PAIR = re.compile(r"(\d{1,9})_(\d{1,9})__(\d{1,9})")
+_STEP = ("position_ned_m", "quaternion_xyzw")
+_KNOWN = {"action", *_STEP}
 _START_FAR_M = 0.01
 
 
@@ -184,13 +186,13 @@ class Reader:
         name = document.child("goal").text("Object_name")
         if name != task.known["target_name"]:
             raise BadField(document.path("goal.Object_name"), f"{shown(name)} is not the task's goal_object_name")
+        pair = document.text("task_id")
         met["route"] = _route(document, context)
         poses = met["route"].poses
         if float(np.linalg.norm(poses[0, :3] - task.start[:3])) > _START_FAR_M:
             context.notes["start_pose is not where its trajectory starts: each is kept as it is"] += 1
         if task.goal is None:
             met["goal"] = poses[-1, :3]
-        pair = document.text("task_id")
         if (match := _PAIR.fullmatch(pair)) is None:
             context.notes["task_id names no pair of objects: their numbers are null"] += 1
             return None
@@ -211,20 +213,31 @@ def _agree(partition: Partition, scene: str, word: str, trains: bool) -> None:
 
 def _route(document: Fields, context: Context) -> Route:
     steps = document.items("trajectory")
-    words, positions, quaternions = [], [], []
-    for k, value in enumerate(steps):
-        step = Fields(value, document.path(f"trajectory[{k}]"))
-        word = step.text("action")
-        if (word != "start" or k > 0) and (word not in WORDS or k == 0):
+    words, columns = [], {name: [] for name in _STEP}  # type: tuple[list[str], dict[str, list[Any]]]
+    more: set[str] = set()
+    for k, step in enumerate(steps):
+        where = document.path(f"trajectory[{k}]")
+        if not isinstance(step, dict):
+            raise BadField(where, f"expected an object, found {shown(step)}")
+        word = step.get("action")
+        if (word != "start") if k == 0 else (word not in WORDS):
             known = "start" if k == 0 else ", ".join(WORDS)
-            raise BadField(step.path("action"), f"unknown action {shown(word)}: known are {known}")
-        words.append(word)
-        positions.append(step.position("position_ned_m"))
-        quaternions.append(step.quaternion("quaternion_xyzw"))
-        for name in step.unread():
-            context.notes[f"{re.sub(r'.*trajectory.[0-9]+..', 'trajectory[].', name)} is not mapped"] += 1
-    yaws = context.frame.quaternion_to_world_yaw(np.array(quaternions))
-    poses = np.column_stack([context.frame.positions_to_world(np.array(positions)), yaws])
+            raise BadField(f"{where}.action", f"unknown action {shown(word)}: known are {known}")
+        words.append(str(word))
+        for name in _STEP:
+            if name not in step:
+                raise BadField(f"{where}.{name}", "is missing")
+            columns[name].append(step[name])
+        more.update(step.keys() - _KNOWN)
+    context.notes.update(f"trajectory[].{name} has no place in the tables" for name in sorted(more))
+    context.notes.update(
+        f"trajectory file: {name.split('.')[-1]} has no place in the tables" for name in document.unread()
+    )
+    position, quaternion = _STEP
+    points = positions_of(columns[position], lambda k: document.path(f"trajectory[{k}].{position}"))
+    attitudes = quaternions_of(columns[quaternion], lambda k: document.path(f"trajectory[{k}].{quaternion}"))
+    yaws = context.frame.quaternion_to_world_yaw(attitudes)
+    poses = np.column_stack([context.frame.positions_to_world(points), yaws])
     ours, error = actions_of(words[1:], poses)
     if ours is None:
         context.notes["has moves that are none of ours: action is null, source_action has them"] += 1

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from aerialdojo_gen.exchange.fields import BadField, Fields
+from aerialdojo_gen.exchange.fields import BadField, Fields, rows_of
 from aerialdojo_gen.exchange.folder import check_picture, inside
 from aerialdojo_gen.exchange.task import Context, Instance, Task
 
@@ -13,7 +13,7 @@ _FULL_TURN = 2 * math.pi + 1e-6
 
 def read(record: Fields, context: Context) -> Task:
     """Read a mission: a target in words and as a picture, and no reference trajectory."""
-    *position, pitch, roll, yaw = record.rows_of([record.take("initial_pos")], "initial_pos", 6)[0].tolist()
+    *position, pitch, roll, yaw = rows_of([record.take("initial_pos")], 6, lambda _: "initial_pos")[0].tolist()
     if pitch or roll:
         context.notes["the start's attitude has roll or pitch: only its yaw is kept"] += 1
     start = context.start_pose(record.positions_of([position], "initial_pos")[0], _radians(yaw, context))

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -126,23 +128,8 @@ class Fields:
 
     def positions_of(self, rows: Sequence[Any], key: str) -> Floats:
         """Check rows that stand at `key` as positions: (n, 3) float64, metres."""
-        points = self.rows_of(rows, key, 3)
-        if np.abs(points).max() > _FARTHEST_M:
-            raise BadField(self.path(key), f"{np.abs(points).max():.3g} m is no place on earth")
-        return points
-
-    def rows_of(self, rows: Sequence[Any], key: str, width: int) -> Floats:
-        """Check rows that stand at `key` as lists of so many finite numbers: (n, width) float64."""
         path = self.path(key)
-        flat: list[float] = []
-        for i, row in enumerate(rows):
-            where = f"{path}[{i}]" if len(rows) > 1 else path
-            if not isinstance(row, list):
-                raise BadField(where, f"expected {width} numbers, found {shown(row)}")
-            if len(row) != width:
-                raise BadField(where, f"expected {width} numbers, found {len(row)}")
-            flat += _numbers(row, where)
-        return np.array(flat, np.float64).reshape(-1, width)
+        return positions_of(rows, lambda i: f"{path}[{i}]" if len(rows) > 1 else path)
 
     def numbers(self, key: str) -> Floats:
         """(n,) float64, all finite."""
@@ -167,11 +154,7 @@ class Fields:
 
     def quaternion(self, key: str) -> Floats:
         """(4,) float64 of unit length (to 5 %, as files round), in the file's order."""
-        value = self.rows_of([self.take(key)], key, 4)[0]
-        norm = float(np.linalg.norm(value))
-        if not 0.95 <= norm <= 1.05:
-            raise BadField(self.path(key), f"is no unit quaternion: its length is {norm:.3g}")
-        return value / norm
+        return quaternions_of([self.take(key)], lambda _: self.path(key))[0]
 
     def child(self, key: str) -> Fields:
         """An object in this one."""
@@ -188,6 +171,59 @@ class Fields:
             yield from child.unread()
 
 
+def rows_of(rows: Sequence[Any], width: int, where: Callable[[int], str]) -> Floats:
+    """Check lists of so many finite numbers each.
+
+    Parameters
+    ----------
+    rows : sequence of n
+        What the file has.
+    width : int
+        Numbers that each must have.
+    where : callable
+        Path of a row, by its index.
+
+    Returns
+    -------
+    (n, width) float64
+    """
+    if all(type(row) is list and len(row) == width for row in rows):
+        flat = list(chain.from_iterable(rows))
+        if set(map(type, flat)) <= {float, int}:
+            with contextlib.suppress(OverflowError):
+                values = np.array(flat, np.float64).reshape(-1, width)
+                if np.isfinite(values).all():
+                    return values
+    for i, row in enumerate(rows):
+        if not isinstance(row, list):
+            raise BadField(where(i), f"expected {width} numbers, found {shown(row)}")
+        if len(row) != width:
+            raise BadField(where(i), f"expected {width} numbers, found {len(row)}")
+        _numbers(row, where(i))
+    raise AssertionError("every row is well, and yet not all of them")
+
+
+def positions_of(rows: Sequence[Any], where: Callable[[int], str]) -> Floats:
+    """Check positions as `rows_of` does: (n, 3) float64, metres."""
+    points = rows_of(rows, 3, where)
+    far = np.abs(points).max(axis=1)
+    if (far > _FARTHEST_M).any():
+        k = int(far.argmax())
+        raise BadField(where(k), f"{far[k]:.3g} m is no place on earth")
+    return points
+
+
+def quaternions_of(rows: Sequence[Any], where: Callable[[int], str]) -> Floats:
+    """Check unit quaternions (to 5 %, as files round) as `rows_of` does: (n, 4) float64, of unit length."""
+    values = rows_of(rows, 4, where)
+    norms = np.sqrt((values**2).sum(axis=1))
+    wrong = np.abs(norms - 1) > 0.05
+    if wrong.any():
+        k = int(wrong.argmax())
+        raise BadField(where(k), f"is no unit quaternion: its length is {norms[k]:.3g}")
+    return values / norms[:, None]
+
+
 def _numbers(values: Sequence[Any], path: str) -> list[float]:
     for value in values:
         # A bool is an int to Python, and a string of digits a number to numpy: neither is one here.
@@ -195,6 +231,6 @@ def _numbers(values: Sequence[Any], path: str) -> list[float]:
             raise BadField(path, f"expected a number, found {shown(value)}")
         if type(value) is float and not math.isfinite(value):
             raise BadField(path, f"{value} is no finite number")
-        if type(value) is int and abs(value) > 1e300:
+        if type(value) is int and abs(value) > 10**300:
             raise BadField(path, "is too large a number")
     return [float(value) for value in values]

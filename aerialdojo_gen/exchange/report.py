@@ -94,7 +94,7 @@ class Report:
 
     def lines(self) -> list[str]:
         """All of it, for a person."""
-        rows = ", ".join(f"{n:,} {name}" for name, n in self.rows.items())
+        rows = ", ".join(f"{n:,} {name}" for name, n in sorted(self.rows.items(), reverse=True))
         lines = [f"{self.format}, frame {self.frame}: {self.records:,} records in {len(self.files)} files; {rows}"]
         if self.n_bad:
             fields = ", ".join(f"{name} {n:,}" for name, n in self.bad_fields.most_common())
