@@ -39,7 +39,9 @@ class Planted:
         """Write rows as a part whose footer tells of these rows; nulls and doubles are let through."""
         spec = store.LAYOUT[key].spec
         if sort:
-            rows = sorted(rows, key=lambda row: tuple(str(row[k]) if k != "object_id" else row[k] for k in spec.order))
+            rows = sorted(
+                rows, key=lambda row: tuple(str(row[k]) if k != "object_id" else row[k] for k in spec.order)
+            )
         loose = schema or pa.schema([f.with_nullable(True) for f in spec.schema])
         table = pa.Table.from_pylist(rows, schema=loose)
         meta = {"fingerprint": "", "content": store.content_digest(table), "parts": 1, "summary": {}, "files": {}}
