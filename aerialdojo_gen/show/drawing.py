@@ -12,7 +12,7 @@ from matplotlib.patches import Polygon, Rectangle
 from matplotlib.patheffects import withStroke
 from numpy.typing import NDArray
 
-from aerialdojo_gen.show.orthographic import Plane
+from aerialdojo_gen.rendering.orthographic import Plane
 from aerialdojo_gen.show.pictured import PicturedTask
 
 Floats = NDArray[np.float64]

@@ -72,10 +72,10 @@ def frames_along(task: FoundTask, count: int) -> list[Frame]:
 
 
 def _rendered(task: FoundTask, poses: NDArray[np.float64]) -> list[NDArray[np.uint8]]:
-    from aerialdojo_gen.rendering.world import RenderWorld
+    from aerialdojo_gen.rendering.backend import open_renderer
 
     camera = Camera(SIZE_PX, SIZE_PX, 90.0)
-    with RenderWorld(task.scene.model) as world:
+    with open_renderer(task.scene.model) as world:
         return [world.render(camera, view_pose(pose[:3], pose[3], "front")).rgb for pose in poses]
 
 

@@ -14,8 +14,8 @@ from aerialdojo_gen.benchmark.goal import Goal, Rules
 from aerialdojo_gen.benchmark.llm.prompt import goal_text
 from aerialdojo_gen.release.browse import FoundTask
 from aerialdojo_gen.release.way import sampled
+from aerialdojo_gen.rendering.orthographic import OrthographicPictures
 from aerialdojo_gen.show.frames import Frame, frames_along
-from aerialdojo_gen.show.orthographic import OrthographicPictures
 
 Floats = NDArray[np.float64]
 
