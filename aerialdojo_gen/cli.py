@@ -9,7 +9,7 @@ import sys
 
 import typer
 
-from aerialdojo_gen.commands import annotate, evaluate, exchange, release, show, sources, stages, validate
+from aerialdojo_gen.commands import annotate, evaluate, exchange, release, render, report, show, sources, stages, validate
 from aerialdojo_gen.errors import AerialDojoError
 
 app = typer.Typer(
@@ -20,7 +20,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for _group in (stages, sources, annotate, evaluate, release, show, validate, exchange):
+for _group in (stages, render, sources, annotate, evaluate, release, show, validate, exchange, report):
     app.add_typer(_group.app)
 
 

@@ -56,12 +56,14 @@ def family_radar(runs: Sequence[Run], profile: Profile) -> Figure:
                 axes.fill(angles, values, color=colour, alpha=0.08)
             axes.set_theta_zero_location("N")
             axes.set_theta_direction(-1)
-            axes.set_xticks(angles, families)
-            axes.tick_params(axis="x", pad=6)
+            axes.set_xticks(angles, [""] * len(families))
+            for angle, family, side in zip(angles, families, ("center", "left", "center", "right"), strict=True):
+                level = {"center": "bottom" if angle == 0.0 else "top"}.get(side, "center")
+                axes.text(angle, 106.0, family, ha=side, va=level)
             axes.set_ylim(0.0, 100.0)
             axes.set_yticks([25, 50, 75, 100], ["25", "50", "75", "100"], color="#777777", size=7)
             axes.set_rlabel_position(45)
-            axes.set_title(f"{metric.upper()}, %", pad=14, size=10)
+            axes.set_title(f"{metric.upper()}, %", pad=20, size=10, weight="bold")
         figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=4, frameon=False)
 
     return _figure(draw, (6.8, 3.7))

@@ -11,8 +11,8 @@ from aerialdojo_gen.errors import UsageError
 class Profile:
     """A rule of success.
 
-    Distances are always measured to the goal anchor, which lies 1 m from the target's surface. Benchmarks that measure
-    to the target itself judge by up to that metre and half the target's size differently.
+    Distances are always measured to the goal anchor, which lies 1 m from the target's surface. Benchmarks that
+    measure to the target itself judge by up to that metre and half the target's size differently.
 
     Attributes
     ----------

@@ -65,7 +65,7 @@ def main_table(runs: Sequence[Run], profiles: Sequence[Profile]) -> Table:
             notes.append(f"{run.label}: no episodes of {', '.join(missing)}; overall is the mean of the others.")
     groups = [("", ("episodes",)), *((_profile_head(profile), tuple(HEADS.values())) for profile in profiles)]
     notes.insert(
-        0, "Overall: mean of the four families, each the mean of its scenes; ± standard deviation over scenes."
+        0, "Mean of the four families, each the mean of its scenes; ± is the standard deviation over scenes."
     )
     return Table("Overall", "agent", tuple(groups), tuple(rows), tuple(notes))
 

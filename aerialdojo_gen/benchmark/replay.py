@@ -1,0 +1,259 @@
+"""Episodes to be looked at again: what every run did on one task, on a map.
+
+The evaluator's eyes only: a replay shows the target and the reference route.
+"""
+
+from __future__ import annotations
+
+import base64
+import json
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pyarrow.compute as pc
+from numpy.typing import NDArray
+
+from aerialdojo_gen.benchmark.episodes import read_run
+from aerialdojo_gen.benchmark.eyes import look
+from aerialdojo_gen.benchmark.goal import Sensors
+from aerialdojo_gen.benchmark.runs import Run
+from aerialdojo_gen.benchmark.topdown import TopDown
+from aerialdojo_gen.errors import StoreError
+from aerialdojo_gen.release.browse import ReleasedScene
+from aerialdojo_gen.schemas import ACTION_NAMES
+
+_MAP_PX = 640
+_MARGIN_M = 6.0
+_FRAME = Sensors(("front",), rgb=True, depth=False, width=240, height=240)
+# An episode may have 300 steps: a picture of each would make the page heavy, and hardly say more.
+_MOST_FRAMES = 40
+
+
+@dataclass(frozen=True)
+class Flight:
+    """What one run did on a task.
+
+    Attributes
+    ----------
+    label : str
+        The run's label.
+    outcome : str
+        How it ended, in words.
+    x_m, y_m, z_m, yaw_rad, distance_m : list of float
+        The start, then the pose after every action; world frame, and the distance to the goal.
+    said : list of str
+        What was done to get there: "start", then names of actions.
+    answers : list of str
+        The agent's words, empty where it says nothing.
+    frames : dict of int to str
+        Front pictures as data URLs, by index of the pose.
+    """
+
+    label: str
+    outcome: str
+    x_m: list[float]
+    y_m: list[float]
+    z_m: list[float]
+    yaw_rad: list[float]
+    distance_m: list[float]
+    said: list[str]
+    answers: list[str]
+    frames: dict[int, str]
+
+
+@dataclass(frozen=True)
+class Replay:
+    """A task with its map, its reference, and all flights.
+
+    Attributes
+    ----------
+    task : dict
+        The row of `tasks`.
+    goal : dict
+        Position of the goal (x_m, y_m, z_m) and of the target's centre and size.
+    reference : dict
+        Lists x_m, y_m, z_m of the reference route, and its length_m.
+    low_m, high_m : tuple of float
+        Corners of the map, metres.
+    map_url : str
+        The map as a data URL.
+    flights : list of Flight
+        One a run.
+    """
+
+    task: dict[str, Any]
+    goal: dict[str, float]
+    reference: dict[str, Any]
+    low_m: tuple[float, float]
+    high_m: tuple[float, float]
+    map_url: str
+    flights: list[Flight]
+
+    def data(self) -> str:
+        """Return the flights as JSON, for the page's script."""
+        flights = [
+            {
+                "label": f.label, "z": f.z_m, "x": f.x_m, "y": f.y_m, "yaw": f.yaw_rad, "d": f.distance_m,
+                "said": f.said, "answers": f.answers, "frames": f.frames,
+            }
+            for f in self.flights
+        ]  # fmt: skip
+        return json.dumps({"flights": flights}, ensure_ascii=True, separators=(",", ":"), allow_nan=False)
+
+
+def choose_tasks(runs: Sequence[Run], count: int) -> list[str]:
+    """Choose tasks worth looking at: of every family in turn, those whose flights ended most differently.
+
+    Parameters
+    ----------
+    runs : sequence of Run
+        Tasks that all of them flew are preferred.
+    count : int
+        How many, at most.
+
+    Returns
+    -------
+    list of str
+        Task ids; the same for the same logs.
+    """
+    ends: dict[str, list[str]] = {}
+    families: dict[str, str] = {}
+    for run in runs:
+        columns = [run.table[name].to_pylist() for name in ("task_id", "family", "termination", "success")]
+        for task, family, termination, success in zip(*columns, strict=True):
+            ends.setdefault(task, []).append("success" if success else termination)
+            families[task] = family
+    ranked = sorted(ends, key=lambda task: (-len(ends[task]), -len(set(ends[task])), task))
+    queues = {family: [t for t in ranked if families[t] == family] for family in dict.fromkeys(families.values())}
+    chosen: list[str] = []
+    while len(chosen) < count and any(queues.values()):
+        for family in sorted(queues):
+            if queues[family] and len(chosen) < count:
+                chosen.append(queues[family].pop(0))
+    return chosen
+
+
+def replays(
+    data: Path, log: Path, runs: Sequence[Run], tasks: Sequence[str], frames: bool = False
+) -> Iterator[Replay]:
+    """Make replays.
+
+    Parameters
+    ----------
+    data : Path
+        The data directory, with the release that the runs were made from.
+    log : Path
+        The directory that `evaluate` wrote to.
+    runs : sequence of Run
+        Those that flew a task are shown together.
+    tasks : sequence of str
+        Task ids.
+    frames : bool
+        Whether front pictures are rendered along the flights, 40 a flight at most.
+
+    Yields
+    ------
+    Replay
+
+    Raises
+    ------
+    StoreError, UsageError, AssetError
+        The release or its mesh is missing, or is not the one that the runs were made from.
+    """
+    steps = {run.name: read_run(log, run.name, "steps") for run in runs}
+    for task_id in tasks:
+        flown = []
+        for run in runs:
+            rows = run.table.filter(pc.equal(run.table["task_id"], task_id)).to_pylist()
+            if rows:
+                flown.append((run, rows[0]))
+        episode = flown[0][1]
+        scene = _scene(data, episode["scene"])
+        instances = [t for t in scene.instances(episode["nav_id"]) if t["task_id"] == task_id]
+        if not instances:
+            raise StoreError(f"the release in {data} has no task {task_id}: it is not the one that the runs flew")
+        route = scene.route(episode["nav_id"])
+        target = scene.object(route["target_object_id"])
+        flights = [_flight(scene, run, row, steps[run.name], frames) for run, row in flown]
+        low, high = _extent(flights, route, target)
+        ground = _ground(data, episode["scene"]).picture(low, high, _MAP_PX)
+        yield Replay(
+            instances[0],
+            {f"goal_{a}_m": route[f"goal_{a}_m"] for a in "xyz"}
+            | {f"target_{a}_m": target[f"{a}_m"] for a in "xyz"}
+            | {f"size_{a}_m": target[f"size_{a}_m"] for a in "xyz"},
+            {name: route[name] for name in ("x_m", "y_m", "z_m", "length_m")},
+            (float(low[0]), float(low[1])),
+            (float(high[0]), float(high[1])),
+            _jpeg(ground, 82),
+            flights,
+        )
+
+
+@lru_cache(maxsize=4)
+def _scene(data: Path, name: str) -> ReleasedScene:
+    return ReleasedScene(data, name)
+
+
+@lru_cache(maxsize=4)
+def _ground(data: Path, name: str) -> TopDown:
+    return TopDown(_scene(data, name).model)
+
+
+def _flight(scene: ReleasedScene, run: Run, episode: dict[str, Any], steps: Any, frames: bool) -> Flight:
+    rows = steps.filter(pc.equal(steps["task_id"], episode["task_id"])).to_pylist()
+    start = math.dist(
+        [episode[f"start_{a}_m"] for a in "xyz"],
+        [scene.route(episode["nav_id"])[f"goal_{a}_m"] for a in "xyz"],
+    )
+    lists: dict[str, list[Any]] = {name: [episode[f"start_{name}"]] for name in ("x_m", "y_m", "z_m", "yaw_rad")}
+    lists |= {"distance_m": [start], "said": ["start"], "answers": [""]}
+    for row in rows:
+        for name in ("x_m", "y_m", "z_m", "yaw_rad", "distance_m"):
+            lists[name].append(row[name])
+        done = "unreadable answer" if row["action"] is None else ACTION_NAMES[row["action"]]
+        lists["said"].append(f"{done} (refused)" if row["refused"] else done)
+        lists["answers"].append(row["answer"] or "")
+    pictures = {}
+    if frames:
+        # The last pose may lie in what was hit: a camera there sees the inside of it.
+        last = len(lists["said"]) - (2 if episode["collision"] else 1)
+        for k in sorted({round(k) for k in np.linspace(0, max(last, 0), min(_MOST_FRAMES, last + 1))}):
+            position = tuple(lists[name][k] for name in ("x_m", "y_m", "z_m"))
+            pictures[k] = _jpeg(look(scene.model, _FRAME, position, lists["yaw_rad"][k])[0]["front"], 75)
+    rounded = {name: [round(v, 3) for v in lists[name]] for name in ("x_m", "y_m", "z_m", "yaw_rad", "distance_m")}
+    return Flight(
+        run.label, _outcome(episode), **rounded, said=lists["said"], answers=lists["answers"], frames=pictures
+    )
+
+
+def _outcome(episode: dict[str, Any]) -> str:
+    how = {"stop": "stopped", "collision": "hit something", "budget": "ran out of actions"}[episode["termination"]]
+    verdict = "success" if episode["success"] else "failure"
+    return (
+        f"{verdict}: {how} {episode['final_distance_m']:.1f} m from the goal after {episode['n_actions']} actions, "
+        f"{episode['path_length_m']:.1f} m flown"
+    )
+
+
+def _extent(
+    flights: Sequence[Flight], route: dict[str, Any], target: dict[str, Any]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Corners of a square map that holds all paths and the target."""
+    x = np.array([v for f in flights for v in f.x_m] + route["x_m"] + [target["x_m"]])
+    y = np.array([v for f in flights for v in f.y_m] + route["y_m"] + [target["y_m"]])
+    middle = np.array([x.min() + x.max(), y.min() + y.max()]) / 2.0
+    half = max(float(np.ptp(x)), float(np.ptp(y)), 20.0) / 2.0 + _MARGIN_M
+    return middle - half, middle + half
+
+
+def _jpeg(rgb: NDArray[np.uint8], quality: int) -> str:
+    ok, data = cv2.imencode(".jpg", cv2.cvtColor(rgb, cv2.COLOR_RGB2BGR), [cv2.IMWRITE_JPEG_QUALITY, quality])
+    assert ok, f"OpenCV cannot encode an image of shape {rgb.shape}"
+    return "data:image/jpeg;base64," + base64.b64encode(data.tobytes()).decode("ascii")

@@ -1,0 +1,167 @@
+"""The report of an evaluation: one HTML file with tables, figures and a few episodes, that loads nothing."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+from collections.abc import Sequence
+from importlib import resources
+from itertools import accumulate
+from pathlib import Path
+from typing import Any
+
+import jinja2
+import markupsafe
+
+from aerialdojo_gen import __version__, store
+from aerialdojo_gen.benchmark.figures import encoded, family_radar, radius_curve
+from aerialdojo_gen.benchmark.formats import as_latex, as_markdown
+from aerialdojo_gen.benchmark.profiles import Profile
+from aerialdojo_gen.benchmark.replay import Replay
+from aerialdojo_gen.benchmark.runs import Run
+from aerialdojo_gen.benchmark.tables import Table, as_csv, scene_table, tables_of
+
+
+def write_report(
+    out: Path, runs: Sequence[Run], profiles: Sequence[Profile], replays: Sequence[Replay]
+) -> list[Path]:
+    """Write everything that there is to say of some runs.
+
+    Parameters
+    ----------
+    out : Path
+        Folder, made where there is none; files of these names in it are replaced, each whole or not at all.
+    runs : sequence of Run
+        One or more.
+    profiles : sequence of Profile
+        One or more; tables by family, setting and so on, and the figures, judge by the first.
+    replays : sequence of Replay
+        Episodes to be shown; may be empty.
+
+    Returns
+    -------
+    list of Path
+        ``report.html``, ``metrics.csv``, ``tables.md``, ``tables.tex``, ``families.png``, ``.svg``, ``radius.png``,
+        ``.svg``.
+
+    Raises
+    ------
+    StoreError
+        The folder cannot be written to.
+    """
+    tables = [*tables_of(runs, profiles), scene_table(runs, profiles[0])]
+    drawn = {"families": family_radar(runs, profiles[0]), "radius": radius_curve(runs, profiles[0])}
+    figures = {(name, kind): encoded(f, kind) for name, f in drawn.items() for kind in ("png", "svg")}
+    files = {
+        "report.html": html(runs, profiles, replays, {name: figures[name, "svg"] for name in drawn}).encode(),
+        "metrics.csv": as_csv(runs, profiles).encode(),
+        "tables.md": ("\n\n".join(map(as_markdown, tables)) + "\n").encode(),
+        "tables.tex": ("\n\n".join(map(as_latex, tables)) + "\n").encode(),
+        **{f"{name}.{kind}": data for (name, kind), data in figures.items()},
+    }
+    for name, data in files.items():
+        with store.atomic_file(out, name) as temporary:
+            temporary.write_bytes(data)
+    return [out / name for name in files]
+
+
+def html(
+    runs: Sequence[Run], profiles: Sequence[Profile], replays: Sequence[Replay], figures: dict[str, bytes]
+) -> str:
+    """Write the page.
+
+    Parameters
+    ----------
+    runs, profiles, replays
+        As `write_report` takes them.
+    figures : dict of str to bytes
+        ``families`` and ``radius`` as SVG.
+
+    Returns
+    -------
+    str
+        Self-contained: it loads nothing, and its own policy forbids the browser to load anything; text is escaped.
+    """
+    folder = resources.files("aerialdojo_gen.benchmark").joinpath("templates")
+    style, script = (folder.joinpath(name).read_text("utf-8") for name in ("report.css", "report.js"))
+    environment = jinja2.Environment(
+        loader=jinja2.PackageLoader("aerialdojo_gen.benchmark"),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters["json_in_html"] = _json_in_html
+    environment.globals |= {
+        "points": _points, "cross": _cross, "arrow": _arrow, "starts": _starts, "heights": _heights, "top": _top_m
+    }  # fmt: skip
+    first = profiles[0]
+    captions = {
+        "families": f"SR and SPL by family at {first.radius_m:g} m",
+        "radius": "SR (solid) and OSR (dashed) against the radius that counts as success",
+    }
+    return environment.get_template("report.html.j2").render(
+        version=__version__,
+        runs=runs,
+        profiles=profiles,
+        tables=tables_of(runs, profiles),
+        scenes=scene_table(runs, first),
+        figures=[{"url": _svg_url(figures[name]), "caption": caption} for name, caption in captions.items()],
+        replays=replays,
+        style=style,
+        script=script,
+        style_hash=_hash(style),
+        script_hash=_hash(script),
+    )
+
+
+def _hash(text: str) -> str:
+    return base64.b64encode(hashlib.sha256(text.encode()).digest()).decode("ascii")
+
+
+def _svg_url(svg: bytes) -> str:
+    # An image and not inline: the page's policy has no room for the styles that matplotlib writes.
+    return "data:image/svg+xml;base64," + base64.b64encode(svg).decode("ascii")
+
+
+def _json_in_html(text: str) -> markupsafe.Markup:
+    """Mark JSON as safe within a script element, where ``</script>`` and ``<!--`` would end or bend it."""
+    for sign in "<>&":
+        text = text.replace(sign, f"\\u{ord(sign):04x}")
+    return markupsafe.Markup(text)  # noqa: S704  (no sign that HTML knows is left in it)
+
+
+def _points(x_m: Sequence[float], y_m: Sequence[float]) -> str:
+    # SVG's y points down.
+    return " ".join(f"{x:.2f},{-y:.2f}" for x, y in zip(x_m, y_m, strict=True))
+
+
+def _cross(x: float, y: float, r: float) -> str:
+    return f"M {x - r} {y} h {2 * r} M {x} {y - r} v {2 * r}"
+
+
+def _arrow(r: float) -> str:
+    return f"M {r} 0 L {-0.7 * r} {0.6 * r} L {-0.35 * r} 0 L {-0.7 * r} {-0.6 * r} Z"
+
+
+def _starts(table: Table) -> set[int]:
+    """Return the columns that begin a group."""
+    return {0, *accumulate(len(names) for _, names in table.groups)}
+
+
+def _top_m(replay: Replay) -> float:
+    return max(1.0, *replay.reference["z_m"], *(z for f in replay.flights for z in f.z_m)) * 1.1
+
+
+def _heights(replay: Replay) -> list[dict[str, str]]:
+    """Return the lines of the chart of heights, 400 by 90: the reference, then the flights."""
+    top = _top_m(replay)
+    most = max(1, max(len(f.said) for f in replay.flights) - 1)
+
+    def line(css: str, z_m: Sequence[float]) -> dict[str, str]:
+        points = (f"{400 * k / most:.1f},{90 * (1 - z / top):.1f}" for k, z in enumerate(z_m))
+        return {"css": css, "points": " ".join(points)}
+
+    # The reference's poses are its actions', so that it shares the axis; where it is longer, the axis ends first.
+    reference: Any = replay.reference["z_m"][: most + 1]
+    return [line("reference", reference), *(line(f"c{k % 8}", f.z_m) for k, f in enumerate(replay.flights))]

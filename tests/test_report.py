@@ -1,0 +1,226 @@
+"""Tables, figures and the page of an evaluation."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+import re
+import shutil
+import subprocess
+import sys
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from run_logs import write_run
+from typer.testing import CliRunner
+
+from aerialdojo_gen import cli
+from aerialdojo_gen.benchmark import figures, formats, tables
+from aerialdojo_gen.benchmark.metrics import summarize
+from aerialdojo_gen.benchmark.profiles import PROFILES
+from aerialdojo_gen.benchmark.report import write_report
+from aerialdojo_gen.benchmark.runs import Run, conduct, load_runs
+from aerialdojo_gen.errors import AerialDojoError, StoreError
+
+AT_3, AT_5 = PROFILES["aerialdojo"], PROFILES["aerialdojo-5m"]
+NASTY = "</script><script>alert(1)</script> & <b>$x_1$ | ä"
+
+
+@pytest.fixture(scope="module")
+def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    data = tmp_path_factory.mktemp("runs")
+    for agent in ("oracle", "explorer", "random"):
+        write_run(data, agent, agent)
+    return data
+
+
+@pytest.fixture(scope="module")
+def runs(log: Path) -> list[Run]:
+    return load_runs(log, ["oracle", "random", "explorer"])
+
+
+def test_runs_are_found_named_and_told_apart(log: Path, tmp_path: Path) -> None:
+    assert [run.label for run in load_runs(log)] == ["explorer", "oracle", "random"]
+    write_run(tmp_path, "a", "random", 1, ["U_Mall_0"])
+    write_run(tmp_path, "b", "random", 1, ["N_Coast_1"])
+    assert [run.label for run in load_runs(tmp_path)] == ["random (a)", "random (b)"]
+    assert [run.name for run in load_runs(tmp_path, ["b", "a", "b"])] == ["b", "a"]
+    with pytest.raises(StoreError, match=r"no run 'c' in .* \(there are: a, b\)"):
+        load_runs(tmp_path, ["c"])
+    with pytest.raises(StoreError, match="no runs in .*: run aerialdojo-gen evaluate"):
+        load_runs(tmp_path / "nothing")
+
+
+def test_every_table_says_what_the_metrics_say(runs: list[Run]) -> None:
+    main, family, setting, modality, went = tables.tables_of(runs, [AT_3, AT_5])
+    explorer = runs[2]
+    at_3, at_5 = (summarize(explorer.episodes, p) for p in (AT_3, AT_5))
+    cells = dict(main.rows)["explorer"]
+    assert cells[0] == "252"
+    assert cells[1] == f"{100 * at_3.overall.sr:.1f} ± {100 * at_3.deviation.sr:.1f}"
+    assert cells[4] == f"{at_3.overall.dts_m:.1f} ± {at_3.deviation.dts_m:.1f}"
+    assert cells[6] == f"{100 * at_5.overall.sr:.1f} ± {100 * at_5.deviation.sr:.1f}"
+    assert [group for group, _ in family.groups] == ["Urban", "Natural", "Infrastructure", "Disaster"]
+    assert dict(family.rows)["explorer"][5] == f"{100 * at_3.families['Natural'].sr:.1f}"
+    assert [group for group, _ in setting.groups] == ["Base", "Standard", "Long-Horizon"]
+    image = summarize(explorer.episodes.where(explorer.episodes.modality == "image"), AT_3)
+    assert dict(modality.rows)["explorer"][5:] == tuple(
+        f"{v:.1f}" for v in (100 * image.overall.sr, 100 * image.overall.osr, 100 * image.overall.spl,
+                             image.overall.dts_m, 100 * image.overall.cr)
+    )  # fmt: skip
+    assert dict(went.rows)["explorer"][6:] == ("10,080", "13,104,000", "478,800", "52.92")
+    assert dict(went.rows)["oracle"][6:] == ("–",) * 4
+    scenes = tables.scene_table(runs, AT_3)
+    assert len(scenes.rows) == 42
+    assert dict(scenes.rows)["U_Mall_0"][10] == f"{100 * at_3.scenes['U_Mall_0'].sr:.1f}"
+
+
+def test_tables_of_part_of_the_scenes_say_so(tmp_path: Path) -> None:
+    write_run(tmp_path, "a", "oracle", 2, ["U_Mall_0"])
+    (run,) = load_runs(tmp_path)
+    main, family, *_ = tables.tables_of([run], [AT_3])
+    assert main.notes[1] == "oracle: no episodes of Natural, Infrastructure, Disaster; overall is the mean of the others."
+    assert "±" not in main.rows[0][1][1]
+    assert dict(family.rows)["oracle"][5:] == ("–",) * 15
+
+
+def test_conduct_counts_ends_and_does_not_add_what_is_not_known(runs: list[Run]) -> None:
+    for run in runs:
+        c = conduct(run)
+        assert sum(c.ended.values()) == pytest.approx(1.0)
+        assert c.ended["collision"] == pytest.approx(run.episodes.collision.mean())
+        assert (c.cost_usd is None) == (run.agent != "explorer")
+
+
+def test_the_terminal_has_aligned_columns(runs: list[Run]) -> None:
+    for table in tables.tables_of(runs, [AT_3, AT_5]):
+        lines = formats.as_text(table).splitlines()
+        rule = next(k for k, line in enumerate(lines) if set(line) == {"-"})
+        body = lines[rule - 1 : rule + 1 + len(table.rows)]
+        del body[1]
+        assert len({len(line) for line in body}) == 1, table.title
+        assert len(lines[rule]) == max(map(len, lines[:rule]))
+        for (label, cells), line in zip(table.rows, body[1:], strict=True):
+            assert re.split(r" {2,}", line.strip()) == [label, *cells]
+
+
+def test_markdown_and_latex_have_every_cell_and_escape_the_rest(runs: list[Run]) -> None:
+    table = tables.Table("T_1", "agent", (("", ("n",)), ("50 %", ("a ↑", "b"))), ((NASTY, ("1", "2 ± 3", "–")),), ("N & M",))
+    markdown = formats.as_markdown(table).splitlines()
+    assert markdown[2] == "| agent | n | 50 %: a ↑ | 50 %: b |"
+    assert markdown[3] == "| --- | ---: | ---: | ---: |"
+    assert r"\<script\>" in markdown[4]
+    assert r"\| ä" in markdown[4]
+    latex = formats.as_latex(table)
+    assert r"\begin{tabular}{lrrr}" in latex
+    assert r"\multicolumn{2}{c}{50 \%}" in latex
+    assert r"\cmidrule(lr){3-4}" in latex
+    assert r"\$x\_1\$" in latex
+    assert r"1 & 2 $\pm$ 3 & -- \\" in latex
+    assert r"\caption{T\_1. N \& M}" in latex
+    for real in tables.tables_of(runs, [AT_3]):
+        columns = 1 + sum(len(names) for _, names in real.groups)
+        body = formats.as_latex(real).split(r"\midrule")[1].split(r"\bottomrule")[0]
+        assert [line.count("&") for line in body.strip().splitlines()] == [columns - 1] * len(real.rows)
+        assert {line.count("|") for line in formats.as_markdown(real).splitlines() if "|" in line} == {columns + 1}
+
+
+def test_the_csv_holds_every_score_unrounded(runs: list[Run]) -> None:
+    rows = list(csv.DictReader(io.StringIO(tables.as_csv(runs, [AT_3, AT_5]))))
+    keys = ["run", "profile", "setting", "modality", "scope", "name"]
+    found = {tuple(row[k] for k in keys): row for row in rows}
+    assert len(found) == len(rows)
+    # Two profiles, all and three settings and two modalities: overall, four families, 42 scenes each, where flown.
+    assert len(rows) <= 3 * 2 * 6 * (1 + 4 + 42)
+    summary = summarize(runs[1].episodes, AT_5)
+    row = found["random", "aerialdojo-5m", "all", "all", "overall", "overall"]
+    assert (float(row["spl"]), float(row["spl_sd"])) == (summary.overall.spl, summary.deviation.spl)
+    row = found["random", "aerialdojo-5m", "all", "all", "scene", "N_Coast_1"]
+    assert (float(row["dts_m"]), row["dts_m_sd"]) == (summary.scenes["N_Coast_1"].dts_m, "")
+    assert not any("nan" in value for row in rows for value in row.values())
+
+
+def test_figures_are_the_same_bytes_each_time_and_say_no_date(runs: list[Run]) -> None:
+    for draw in (figures.family_radar, figures.radius_curve):
+        svg, png = (figures.encoded(draw(runs, AT_3), kind) for kind in ("svg", "png"))
+        assert figures.encoded(draw(runs, AT_3), "svg") == svg
+        assert figures.encoded(draw(runs, AT_3), "png") == png
+        assert b"dc:date" not in svg
+        assert ET.fromstring(svg).tag == "{http://www.w3.org/2000/svg}svg"
+        picture = cv2.imdecode(np.frombuffer(png, np.uint8), cv2.IMREAD_COLOR)
+        assert min(picture.shape[:2]) > 600
+        colours = {tuple(c) for c in picture.reshape(-1, 3)[:: 7]}
+        # Every run's line is there, in its own colour (blue, green, red).
+        for colour in ((178, 114, 0), (0, 94, 213), (115, 158, 0)):
+            assert colour in colours
+
+
+def test_a_figure_of_some_families_has_gaps_and_no_zeros(tmp_path: Path) -> None:
+    write_run(tmp_path, "a", "oracle", 2, ["U_Mall_0", "D_Flood_0"])
+    figure = figures.family_radar(load_runs(tmp_path), AT_3)
+    values = figure.axes[0].lines[0].get_ydata()
+    assert [math.isnan(v) for v in values] == [False, True, True, False, False]
+
+
+def test_the_folder_of_a_report_is_whole(runs: list[Run], tmp_path: Path) -> None:
+    written = write_report(tmp_path / "out", runs, [AT_3, AT_5], [])
+    assert sorted(p.name for p in written) == sorted(p.name for p in (tmp_path / "out").iterdir())
+    page = (tmp_path / "out" / "report.html").read_text()
+    for run in runs:
+        assert f'<th scope="row">{run.label}</th>' in page
+    again = write_report(tmp_path / "again", runs, [AT_3, AT_5], [])
+    assert [p.read_bytes() for p in written] == [p.read_bytes() for p in again]
+
+
+def test_a_page_loads_nothing_and_escapes_everything(log: Path, tmp_path: Path) -> None:
+    (run,) = load_runs(log, ["random"])
+    nasty = Run(NASTY, NASTY, NASTY, '{"x": "' + NASTY + '"}', run.table, run.episodes)
+    write_report(tmp_path, [nasty], [AT_3], [])
+    page = (tmp_path / "report.html").read_text()
+    assert "alert(1)</script>" not in page
+    assert page.count("<script") == page.count("</script>") == 1
+    assert not re.search(r'(?:src|href)="(?!data:)', page)
+    assert "url(" not in page
+    assert "default-src 'none'" in page
+
+
+def invoke(*arguments: str) -> str:
+    done = CliRunner().invoke(cli.app, ["report", *arguments])
+    if done.exception is not None and not isinstance(done.exception, SystemExit):
+        raise done.exception
+    return done.stdout
+
+
+def test_the_command_prints_what_is_asked_for(log: Path, tmp_path: Path) -> None:
+    plain = invoke("--data", str(log))
+    assert plain.startswith("Overall\n")
+    assert plain.index("explorer") < plain.index("oracle") < plain.index("random")
+    assert "uav-on, 20 m" in invoke("random", "--data", str(log), "--profile", "uav-on")
+    assert "U_Mall_0" not in plain
+    assert r"U\_Mall\_0" in invoke("--data", str(log), "--by-scene", "--format", "markdown")
+    assert invoke("--data", str(log), "--format", "latex").startswith(r"\begin{table}")
+    assert invoke("random", "--data", str(log), "--format", "csv").startswith("run,agent,profile")
+    invoke("--data", str(tmp_path), "--log", str(log), "--out", str(tmp_path / "out"), "--replays", "0")
+    assert (tmp_path / "out" / "report.html").stat().st_size > 50_000
+
+
+def test_the_command_says_in_one_line_what_is_wrong(log: Path, tmp_path: Path) -> None:
+    for arguments, message in (
+        (["--data", str(tmp_path)], "no runs in"),
+        (["nobody", "--data", str(log)], "no run 'nobody'"),
+        (["--data", str(log), "--profile", "uav"], "no profile 'uav'"),
+    ):
+        with pytest.raises(AerialDojoError, match=message) as failure:
+            invoke(*arguments)
+        assert "\n" not in str(failure.value)
+    shutil.copytree(log, tmp_path / "broken")
+    shard = next((tmp_path / "broken" / "episodes" / "random").glob("*.parquet"))
+    shard.write_bytes(shard.read_bytes()[:100])
+    command = [sys.executable, "-m", "aerialdojo_gen.cli", "report", "--data", str(tmp_path / "broken")]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr.count("\n")) == (1, 1)
+    assert "is damaged" in done.stderr
