@@ -263,7 +263,9 @@ class Desk:
 
 
 def _told(record: Record) -> dict[str, Any]:
-    return record.model_dump(mode="json", include={"time", "who", "client", "action", "what", "before", "after", "edits"})
+    return record.model_dump(
+        mode="json", include={"time", "who", "client", "action", "what", "before", "after", "edits"}
+    )
 
 
 def open_desk(name: str, pipeline: Pipeline, roots: Roots) -> Desk:

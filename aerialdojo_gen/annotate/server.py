@@ -12,6 +12,7 @@ from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse, Response
 from fastapi.staticfiles import StaticFiles
 from pydantic import BaseModel, ConfigDict, Field, StrictFloat, StrictStr, field_validator
+from starlette.exceptions import HTTPException
 
 from aerialdojo_gen.annotate.coco import coco_zip
 from aerialdojo_gen.annotate.desk import Desk
@@ -101,6 +102,11 @@ def make_app(desk: Desk, *, any_host: bool = False) -> FastAPI:
         first = error.errors()[0]
         where = ".".join(str(part) for part in first["loc"])
         return JSONResponse({"error": f"malformed request: {where}: {first['msg']}"[:500]}, status_code=422)
+
+    @app.exception_handler(HTTPException)
+    def refused(_: Request, error: Exception) -> JSONResponse:
+        assert isinstance(error, HTTPException)
+        return JSONResponse({"error": str(error.detail)}, status_code=error.status_code)
 
     @app.exception_handler(ConflictError)
     def conflict(request: Request, error: Exception) -> JSONResponse:
