@@ -8,6 +8,7 @@ the tests hold that against FCL on random segments.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -36,6 +37,27 @@ class Certificate:
     min_clearance_m: float
     legs: int
     asked: int
+
+
+class Examination(NamedTuple):
+    """What the grid and the triangles say of a route.
+
+    Attributes
+    ----------
+    corners : (m, 3) float64
+        Where the route bends, ends included, metres.
+    inside : bool
+        Whether it stays in the flight volume.
+    undecided : (max(1, m - 1),) bool
+        Legs that the grid alone does not prove free.
+    clearance : float
+        Smallest distance from the centre line to any surface, metres, up to the bound asked for.
+    """
+
+    corners: NDArray[np.float64]
+    inside: bool
+    undecided: NDArray[np.bool_]
+    clearance: float
 
 
 @njit(cache=True)
@@ -78,6 +100,30 @@ def _all_inside(points: NDArray[np.float64], grid: GridArrays) -> bool:
     return True
 
 
+@njit(cache=True)
+def examine(points: NDArray[np.float64], radius: float, bound: float, grid: GridArrays) -> Examination:
+    """See what is known of a route without FCL.
+
+    Parameters
+    ----------
+    points : (n, 3) float64
+        Positions along the route, world frame, metres; n at least 1.
+    radius : float
+        The body's radius, metres.
+    bound : float
+        Clearances beyond it need not be known, metres.
+    grid : GridArrays
+        The clearance grid.
+
+    Returns
+    -------
+    Examination
+        See there.
+    """
+    p = corners(points)
+    return Examination(p, _all_inside(p, grid), _undecided(p, radius, grid), polyline_clearance(p, bound, grid))
+
+
 def certify(
     points: NDArray[np.float64], radius_m: float, grid: ClearanceGrid, world: CollisionWorld, prove: bool = True
 ) -> Certificate:
@@ -101,15 +147,19 @@ def certify(
     Certificate
         See there.
     """
-    p = corners(np.ascontiguousarray(points, np.float64))
-    clearance = float(polyline_clearance(p, grid.cap_m, grid.arrays))
+    seen = examine(np.ascontiguousarray(points, np.float64), radius_m, grid.cap_m, grid.arrays)
+    return conclude(seen, radius_m, world, prove)
+
+
+def conclude(seen: Examination, radius_m: float, world: CollisionWorld, prove: bool) -> Certificate:
+    """Ask FCL about what an examination has left open; with `prove` False, about every leg."""
+    p = seen.corners
     legs = max(1, len(p) - 1)
-    if not _all_inside(p, grid.arrays):
-        return Certificate(False, clearance, legs, 0)
-    doubtful = np.flatnonzero(_undecided(p, radius_m, grid.arrays)) if prove else np.arange(legs)
+    if not seen.inside:
+        return Certificate(False, seen.clearance, legs, 0)
     asked = 0
-    for i in doubtful:
+    for i in np.flatnonzero(seen.undecided) if prove else range(legs):
         asked += 1
         if world.segment_in_collision(p[i], p[min(i + 1, len(p) - 1)], radius_m):
-            return Certificate(False, clearance, legs, asked)
-    return Certificate(True, clearance, legs, asked)
+            return Certificate(False, seen.clearance, legs, asked)
+    return Certificate(True, seen.clearance, legs, asked)

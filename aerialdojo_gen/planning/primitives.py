@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from aerialdojo_gen.schemas import ACTION_NAMES, APPROACH, STOP, TURN_LEFT, TURN_RIGHT
@@ -42,6 +43,11 @@ def wrap_rad(yaw: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.asarray(wrapped, np.float64)
 
 
+@njit(cache=True, inline="always")
+def _wrapped(yaw: float) -> float:
+    return math.pi - (math.pi - yaw) % (2 * math.pi)
+
+
 def replay(start: ArrayLike, actions: ArrayLike) -> NDArray[np.float64]:
     """Fly actions from a start pose, without collisions.
 
@@ -65,16 +71,25 @@ def replay(start: ArrayLike, actions: ArrayLike) -> NDArray[np.float64]:
     a = np.asarray(actions, np.int64).reshape(-1)
     if ((a < STOP) | (a > APPROACH)).any():
         raise ValueError(f"actions are numbers from {STOP} to {APPROACH}")
-    x, y, z, yaw = np.asarray(start, np.float64)
-    headings = np.concatenate([[0], np.cumsum(TURNS[a])])
-    yaws = yaw + headings * TURN_RAD
-    cos, sin = np.cos(yaws[:-1]), np.sin(yaws[:-1])
-    d = DISPLACEMENTS[a]
-    steps = np.stack([cos * d[:, 0] - sin * d[:, 1], sin * d[:, 0] + cos * d[:, 1], d[:, 2]], axis=1)
-    poses = np.empty((len(a) + 1, 4))
-    poses[0, :3] = x, y, z
-    poses[1:, :3] = poses[0, :3] + np.cumsum(steps, axis=0)
-    poses[:, 3] = wrap_rad(yaws)
+    return fly(np.asarray(start, np.float64), a.astype(np.int8))
+
+
+@njit(cache=True)
+def fly(start: NDArray[np.float64], actions: NDArray[np.int8]) -> NDArray[np.float64]:
+    """`replay` for kernels: (4,) float64 and (n,) int8 that are known to be actions, to (n + 1, 4) float64."""
+    poses = np.empty((len(actions) + 1, 4))
+    poses[0] = start
+    poses[0, 3] = _wrapped(start[3])
+    heading = 0
+    for k in range(len(actions)):
+        dx, dy, dz = DISPLACEMENTS[actions[k]]
+        yaw = start[3] + heading * TURN_RAD
+        c, s = math.cos(yaw), math.sin(yaw)
+        poses[k + 1, 0] = poses[k, 0] + (c * dx - s * dy)
+        poses[k + 1, 1] = poses[k, 1] + (s * dx + c * dy)
+        poses[k + 1, 2] = poses[k, 2] + dz
+        heading += TURNS[actions[k]]
+        poses[k + 1, 3] = _wrapped(start[3] + heading * TURN_RAD)
     return poses
 
 

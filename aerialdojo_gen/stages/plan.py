@@ -13,7 +13,6 @@ import pyarrow as pa
 import pyarrow.compute as pc
 from numpy.typing import NDArray
 
-from aerialdojo_gen import store
 from aerialdojo_gen.config import PlanConfig
 from aerialdojo_gen.errors import StoreError
 from aerialdojo_gen.planning.planner import Planner, Route
@@ -55,7 +54,7 @@ def run(job: Job, config: PlanConfig) -> Output:
     pairs = job.read("pairs")
     pairs = pairs.filter(pc.is_in(pairs["target_object_id"], pa.array(targets, pa.int32())))
     poses, selected = _anchor_poses(job)
-    rows: list[dict[str, Any]] = []
+    planned: list[tuple[str, Route]] = []
     if pairs.num_rows:
         planner = _planner(job.scene_model(), config, job.embodiment.radius_m)
         for target, candidates in _by_target(pairs):
@@ -68,13 +67,13 @@ def run(job: Job, config: PlanConfig) -> Output:
                     "run pair-objects again"
                 ) from None
             routes = planner.plan_target(goal, starts)
-            rows += [_row(job.scene, p["pair_id"], r) for p, r in zip(candidates, routes, strict=True)]
-    rows.sort(key=lambda row: row["pair_id"])
-    counts = Counter(row["outcome"] for row in rows)
+            planned += [(p["pair_id"], r) for p, r in zip(candidates, routes, strict=True)]
+    planned.sort(key=lambda row: row[0])
+    counts = Counter(route.outcome for _, route in planned)
     return Output(
-        {"plans": store.from_rows(PLANS, rows)},
+        {"plans": _table(job.scene, planned)},
         rows_in=pairs.num_rows,
-        rows_out=len(rows),
+        rows_out=len(planned),
         counts={outcome: counts[outcome] for outcome in OUTCOMES if counts[outcome]},
     )
 
@@ -108,18 +107,27 @@ def _by_target(pairs: pa.Table) -> Iterator[tuple[int, list[dict[str, Any]]]]:
     yield from sorted(groups.items())
 
 
-def _row(scene: str, pair_id: str, route: Route) -> dict[str, Any]:
-    return {
-        "scene": scene,
-        "pair_id": pair_id,
-        "outcome": route.outcome,
-        "length_m": route.length_m,
-        "n_actions": route.n_actions,
-        "expansions": route.expansions,
-        "min_clearance_m": route.min_clearance_m,
-        "x_m": route.poses[:, 0].tolist(),
-        "y_m": route.poses[:, 1].tolist(),
-        "z_m": route.poses[:, 2].tolist(),
-        "yaw_rad": route.poses[:, 3].tolist(),
-        "action": route.actions.tolist(),
+def _table(scene: str, planned: list[tuple[str, Route]]) -> pa.Table:
+    """Put routes into a table; the lists go over as flat arrays, for millions of poses as objects take too long."""
+    routes = [route for _, route in planned]
+    ends = np.cumsum([0, *(len(r.poses) for r in routes)], dtype=np.int32)
+    poses = np.concatenate([np.empty((0, 4)), *(r.poses for r in routes)])
+    actions = np.concatenate([np.empty(0, np.int8), *(r.actions for r in routes)])
+    flat = {**dict(zip(("x_m", "y_m", "z_m", "yaw_rad"), poses.T, strict=True)), "action": actions}
+    columns = {
+        "scene": [scene] * len(planned),
+        "pair_id": [pair_id for pair_id, _ in planned],
+        "outcome": [r.outcome for r in routes],
+        "length_m": [r.length_m for r in routes],
+        "n_actions": [r.n_actions for r in routes],
+        "expansions": [r.expansions for r in routes],
+        "min_clearance_m": [r.min_clearance_m for r in routes],
     }
+    arrays = []
+    for field in PLANS.schema:
+        if field.name in flat:
+            values = pa.array(np.ascontiguousarray(flat[field.name]), field.type.value_type)
+            arrays.append(pa.ListArray.from_arrays(pa.array(ends), values, type=field.type))
+        else:
+            arrays.append(pa.array(columns[field.name], field.type))
+    return pa.Table.from_arrays(arrays, schema=PLANS.schema)

@@ -1,0 +1,120 @@
+"""One attempt at a route as a single kernel: search, refine, fly, examine.
+
+Handing a kernel its arrays takes longer than a short search does, so they are handed over once.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from aerialdojo_gen.planning.certify import Examination, examine
+from aerialdojo_gen.planning.cost_to_go import cost_at
+from aerialdojo_gen.planning.grid_kernels import GridArrays
+from aerialdojo_gen.planning.hybrid_astar import FOUND, SearchArrays, SearchOptions, search
+from aerialdojo_gen.planning.primitives import fly
+from aerialdojo_gen.planning.refine import moves_to_actions
+from aerialdojo_gen.schemas import APPROACH, STOP
+
+# A goal nearer than this is met already, and needs no Approach.
+_ON_GOAL_M = 1e-9
+
+
+class Attempt(NamedTuple):
+    """What came of one search.
+
+    Attributes
+    ----------
+    status, expansions : int
+        As `aerialdojo_gen.planning.hybrid_astar.search` returns them.
+    poses : (K + 1, 4) float64
+        x, y, z in metres and yaw in (-pi, pi]; no rows unless FOUND.
+    actions : (K + 1,) int8
+        What is done at every pose, Stop at the last.
+    length : float
+        The paper's L, metres.
+    seen : Examination
+        Of the route; meaningless unless FOUND.
+    """
+
+    status: int
+    expansions: int
+    poses: NDArray[np.float64]
+    actions: NDArray[np.int8]
+    length: float
+    seen: Examination
+
+
+@njit(cache=True)
+def costs_at(points: NDArray[np.float64], grid: GridArrays, cost: NDArray[np.float32]) -> NDArray[np.float64]:
+    """Cost-to-go of points, (n, 3) float64 metres; (n,) float64 metres."""
+    values = np.empty(len(points))
+    for i in range(len(points)):
+        values[i] = cost_at(points[i, 0], points[i, 1], points[i, 2], grid, cost)
+    return values
+
+
+@njit(cache=True)
+def attempt(
+    start: NDArray[np.float64],
+    goal: NDArray[np.float64],
+    goal_heading: int,
+    cost_to_go: NDArray[np.float32],
+    grid: GridArrays,
+    memory: SearchArrays,
+    options: SearchOptions,
+    radius: float,
+    bound: float,
+) -> Attempt:
+    """Search a route, bring it into its best order, fly it and look how near it comes to surfaces.
+
+    Parameters
+    ----------
+    start : (4,) float64
+        x, y, z in metres, and yaw in radians; free.
+    goal : (3,) float64
+        Metres; free.
+    goal_heading : int
+        Heading to end with, counted from the start's yaw.
+    cost_to_go : (nx, ny, nz) float32
+        Of the goal, metres.
+    grid : GridArrays
+        The clearance grid.
+    memory : SearchArrays
+        Of the search.
+    options : SearchOptions
+        How to search.
+    radius : float
+        The body's radius, metres, without the margins of the search.
+    bound : float
+        Clearances beyond it need not be known, metres.
+
+    Returns
+    -------
+    Attempt
+        See there.
+    """
+    status, expansions, moves = search(start, goal, goal_heading, cost_to_go, grid, memory, options)
+    if status != FOUND:
+        unseen = Examination(np.empty((0, 3)), False, np.empty(0, np.bool_), 0.0)
+        return Attempt(status, expansions, np.empty((0, 4)), np.empty(0, np.int8), 0.0, unseen)
+    flown = moves_to_actions(start, moves, goal_heading, options.radius, grid)
+    poses = fly(start, flown)
+    n = len(flown)
+    dx, dy, dz = goal[0] - poses[n, 0], goal[1] - poses[n, 1], goal[2] - poses[n, 2]
+    approach = 1 if math.sqrt(dx * dx + dy * dy + dz * dz) > _ON_GOAL_M else 0
+    whole = np.empty((n + 1 + approach, 4))
+    actions = np.empty(n + 1 + approach, np.int8)
+    whole[: n + 1], actions[:n], actions[n] = poses, flown, APPROACH
+    whole[n + approach, :3], whole[n + approach, 3] = goal, poses[n, 3]
+    actions[n + approach] = STOP
+    length = 0.0
+    for k in range(n + approach):
+        ax, ay, az = whole[k + 1, 0] - whole[k, 0], whole[k + 1, 1] - whole[k, 1], whole[k + 1, 2] - whole[k, 2]
+        length += math.sqrt(ax * ax + ay * ay + az * az)
+    seen = examine(np.ascontiguousarray(whole[:, :3]), radius, bound, grid)
+    return Attempt(status, expansions, whole, actions, length, seen)
