@@ -31,9 +31,7 @@ def stats(
         from aerialdojo_gen.release.pool import pool_lines, pool_of
 
         if markdown or csv or figures:
-            raise UsageError(
-                f"--markdown, --csv and --figures are of a release: run aerialdojo-gen split --data {data}"
-            )
+            raise UsageError(f"there is no release in {data} to write or draw: run aerialdojo-gen split")
         config, roots = open_pipeline(pipeline, data)
         scenes = runner.choose_scenes(scene or config.scenes, runner.known_scenes(roots.recipes))
         print("\n".join(pool_lines([pool_of(data, name) for name in scenes])))

@@ -109,9 +109,7 @@ def _faults(data: Path, scene: str, present: list[str]) -> list[str]:
         if wanted is not None and wanted != info.rows:
             lines.append(f"{path} has {info.rows:,} rows where {wanted:,} were written: {mend} --force")
     if len(set(prints.values())) > 1:
-        lines.append(
-            f"{scene}: the release's parts are of different runs ({', '.join(sorted(prints))}): {mend} --force"
-        )
+        lines.append(f"the release's parts of {scene} in {data} are of different runs: {mend} --force")
     return lines
 
 

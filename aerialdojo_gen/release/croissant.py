@@ -90,15 +90,14 @@ def croissant(found: dict[str, dict[str, int]]) -> dict[str, Any]:
 
 
 def _file_set(name: str, table: Table, splits: dict[str, int]) -> dict[str, Any]:
+    folders = [f"{name}/{split}" for split in splits] if table.split else [name]
     return {
         "@type": "cr:FileSet",
         "@id": f"{name}-files",
         "name": f"{name}-files",
         "description": f"Parquet parts of {name}, one a scene.",
         "encodingFormat": "application/x-parquet",
-        "includes": [f"{name}/{split}/part-*.parquet" for split in splits]
-        if table.split
-        else f"{name}/part-*.parquet",
+        "includes": [f"{folder}/part-*.parquet" for folder in folders],
     }
 
 

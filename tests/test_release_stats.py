@@ -1,0 +1,208 @@
+"""`stats`: our figures beside the paper's in three forms, and figures that show what the release holds."""
+
+import csv
+import io
+import subprocess
+import sys
+import xml.etree.ElementTree as ET
+
+import cv2
+import numpy as np
+import pytest
+from handmade import box, instance, scene
+
+from aerialdojo_gen import schemas, store
+from aerialdojo_gen.paper import inventory, splits
+from aerialdojo_gen.release.comparison import as_csv, as_markdown
+from aerialdojo_gen.release.contents import check_release
+from aerialdojo_gen.release.figures import draw_figures
+from aerialdojo_gen.release.figures.charts import composition
+from aerialdojo_gen.release.figures.maps import _round_length
+from aerialdojo_gen.release.figures.style import SETTING_COLOURS, read_routes
+from aerialdojo_gen.release.quota import train_quotas
+from aerialdojo_gen.release.stats import Made, in_paper_order, made_of, tables
+from aerialdojo_gen.rendering.orthophoto import orthophoto
+
+
+def as_the_paper(name, **changes):
+    """A scene that holds just what the paper's has."""
+    paper = inventory()[name]
+    trains = train_quotas(name, inventory(), splits())
+    tasks = {("train", s): n for s, n in trains.items()}
+    tasks |= {("test", s): paper.tasks[s] - n for s, n in trains.items()}
+    made = {
+        "scene": name, "family": schemas.FAMILIES[name[0]], "scene_type": name.split("_")[1],
+        "landmarks": paper.landmarks, "objects": paper.objects, "categories": frozenset({"van"}), "tasks": tasks,
+        "path_m": paper.path_m, "paper": paper,
+    }  # fmt: skip
+    return Made(**(made | changes))
+
+
+@pytest.fixture(scope="module")
+def papers():
+    return in_paper_order([as_the_paper(name) for name in sorted(inventory())])
+
+
+def test_what_is_the_papers_is_said_to_be(papers):
+    for table in tables(papers)[1:]:
+        assert table.unlike == 0
+        assert table.terminal()[-1] == f"All {table.compared} counts are the paper's."
+    assert [table.compared for table in tables(papers)] == [0, 5 * 7, 43 * 6, 5 * 4]
+
+
+def test_the_tables_of_42_scenes_fit_a_hundred_columns(papers):
+    for table in tables(papers):
+        lines = table.terminal()
+        assert max(map(len, lines)) <= 100
+    scenes = tables(papers)[2].terminal()
+    assert len(scenes) == 3 + 42 + 1 + 1
+    assert [line.split()[0] for line in scenes[3:45]] == list(inventory())
+    # Numbers stand flush right below their headings.
+    ends = {line.rstrip().rfind(line.split()[-1]) + len(line.split()[-1]) for line in scenes[1:2] + scenes[3:46]}
+    assert len(ends) == 1
+
+
+def test_totals_are_the_papers_own(papers):
+    total = {row.name: row.ours[0] for row in tables(papers)[0].rows}
+    assert total["scenes"] == 42
+    assert total["scene types"] == 21
+    assert total["landmarks"] == 109
+    assert total["objects"] == 2099
+    assert total["instances"] == 205_732
+    assert total["navigation tasks"] == 102_866
+    assert total["instances, base"] + total["instances, standard"] + total["instances, long-horizon"] == 205_732
+    by_split = {row.name: row.ours[-1] for row in tables(papers)[3].rows}
+    assert by_split == {
+        "ID train": 113_642, "ID test": 28_452, "OOD train": 12_712, "OOD test": 50_926, "all": 205_732
+    }  # fmt: skip
+
+
+def test_what_is_not_the_papers_is_shown_with_the_papers_below(papers):
+    wrong = as_the_paper("U_Park_0")
+    wrong = as_the_paper("U_Park_0", objects=13, tasks=wrong.tasks | {("test", "base"): 0})
+    table = tables(in_paper_order([wrong]))[2]
+    lines = table.terminal()
+    assert lines[3].split()[:3] == ["U_Park_0", "2", "13"]
+    assert lines[4].split() == ["in", "the", "paper", "14", "346", "442"]
+    assert lines[4].rfind("442") == lines[3].rfind(f"{wrong.instances}")
+    assert lines[-1] == "6 of 12 counts are not the paper's."
+    assert "| 13 (paper: 14) |" in as_markdown([table])
+
+
+def test_csv_has_every_figure_once_and_to_the_last_digit(papers):
+    made = tables(papers)
+    records = list(csv.DictReader(io.StringIO(as_csv(made))))
+    assert len(records) == sum(len(t.rows) * len(t.columns) for t in made)
+    keys = {(r["table"], r["row"], r["column"]) for r in records}
+    assert len(keys) == len(records)
+    ours = {(r["table"].split()[0], r["row"], r["column"]): r["ours"] for r in records}
+    for name, paper in inventory().items():
+        assert int(ours["Scenes", name, "instances"]) == 2 * sum(paper.tasks.values())
+        assert float(ours["Scenes", name, "km"]) == paper.path_m / 1000
+
+
+def test_markdown_tables_are_regular(papers):
+    for block in as_markdown(tables(papers)).split("### ")[1:]:
+        widths = {line.count("|") for line in block.splitlines() if line.startswith("|")}
+        assert len(widths) == 1
+
+
+def test_scenes_that_the_paper_lacks_have_no_papers_figures(smoke):
+    made = [made_of(smoke, name) for name in check_release(smoke)]
+    for table in tables(made):
+        assert table.compared == 0
+        assert not any("paper" in line for line in table.terminal())
+    total = {row.name: row.ours[0] for row in tables(made)[0].rows}
+    assert total["instances"] == sum(m.instances for m in made) > 0
+
+
+@pytest.fixture(scope="module")
+def drawn(smoke, tmp_path_factory):
+    """The figures of the small release, by way of the command, and what it printed."""
+    out = tmp_path_factory.mktemp("figures")
+    done = subprocess.run(
+        [sys.executable, "-m", "aerialdojo_gen.cli", "stats", "--data", str(smoke), "--figures", str(out / "drawn"),
+         "--markdown", str(out / "stats.md"), "--csv", str(out / "stats.csv")],
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    return out, done.stdout
+
+
+FIGURES = ("composition", "lengths", "detours", "categories", "maps")
+
+
+def test_the_command_writes_what_it_prints(smoke, drawn):
+    out, printed = drawn
+    made = tables(in_paper_order([made_of(smoke, name) for name in check_release(smoke)]))
+    assert (out / "stats.md").read_text() == as_markdown(made)
+    assert (out / "stats.csv").read_text() == as_csv(made)
+    assert "\n\n".join("\n".join(table.terminal()) for table in made) in printed
+    paths = [str(out / "drawn" / f"{name}{suffix}") for name in FIGURES for suffix in (".png", ".svg")]
+    assert printed.splitlines()[-len(paths) :] == paths
+    assert sorted(str(p) for p in (out / "drawn").iterdir()) == sorted(paths)
+
+
+def test_figures_are_pictures_without_a_date_and_the_same_again(smoke, drawn, tmp_path):
+    for path in draw_figures(smoke, check_release(smoke), tmp_path):
+        assert path.read_bytes() == (drawn[0] / "drawn" / path.name).read_bytes()
+        if path.suffix == ".png":
+            picture = cv2.imread(str(path))
+            # Something is drawn, and nothing runs over the edge.
+            assert 0.02 < (picture != 255).any(axis=2).mean() < 0.95
+            edge = np.concatenate([picture[0], picture[-1], picture[:, 0], picture[:, -1]])
+            assert (edge == 255).all(), path.name
+        else:
+            root = ET.fromstring(path.read_text())
+            assert root.tag.endswith("svg")
+            assert "<dc:date>" not in path.read_text()
+            assert not [e for e in root.iter() if e.tag.endswith("}text")], "letters are outlines"
+
+
+def test_bars_are_as_long_as_the_counts(smoke):
+    names = check_release(smoke)
+    axes = composition(read_routes(smoke, names)).axes[0]
+    instances = sum(made_of(smoke, name).instances for name in names)
+    assert sum(bar.get_width() for bar in axes.patches) == instances
+    assert {t.get_text() for t in axes.texts} == {f"{instances:,}"}
+    assert len(SETTING_COLOURS) == len(set(SETTING_COLOURS.values())) == len(axes.containers)
+
+
+def test_a_map_shows_what_stands_where_with_its_shadow():
+    # North-east: a tall grey box on grey ground; the sun is in the south-east, its shadow falls to the north-west.
+    made = scene(instance("tower", box((5, 5, 0), (9, 9, 10))), half=15.0)
+    picture = orthophoto(made, 0.5).astype(int)
+    assert picture.shape == (60, 60, 3)
+
+    def at(x, y):
+        return picture[int((15 - y) / 0.5), int((x + 15) / 0.5)]
+
+    shadow = np.array(made.sun[:2]) / made.sun[2] * -4.0 + [5.2, 8.8]
+    assert (at(*shadow) < at(-10, -10)).all()
+    assert (at(10, 2) == at(-10, -10)).all()
+    assert (at(7, 7) == at(-10, -10)).all(), "a flat roof is as light as the ground"
+
+
+def test_north_is_up_on_a_map():
+    made = scene(instance("wall", box((-15, 0, 0), (15, 1, 5))), half=15.0)
+    # The sun stands in the south: the wall's shadow falls to the north of it, as far as the sun is high.
+    reach = -made.sun[1] / made.sun[2] * 5
+    column = orthophoto(made, 0.25).astype(int)[:, 40].sum(axis=1)
+    dark = np.flatnonzero(column < column.max())
+    assert list(dark) == list(range(dark[0], dark[-1] + 1))
+    assert 15 - 0.25 * (dark[-1] + 1) == pytest.approx(1.0)
+    assert 15 - 0.25 * dark[0] == pytest.approx(1.0 + reach, abs=0.25)
+
+
+@pytest.mark.parametrize(("most", "length"), [(47.0, 20.0), (50.0, 50.0), (9.9, 5.0), (0.3, 0.2), (199, 100)])
+def test_scale_bars_are_round(most, length):
+    assert _round_length(most) == pytest.approx(length)
+
+
+def test_without_a_release_files_are_refused(tmp_path):
+    command = [sys.executable, "-m", "aerialdojo_gen.cli", "stats", "--data", str(tmp_path)]
+    done = subprocess.run([*command, "--csv", str(tmp_path / "x.csv")], capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert f"no release in {tmp_path}" in done.stderr
+    assert not (tmp_path / "x.csv").exists()
+    assert store.release_scenes(tmp_path) == []
