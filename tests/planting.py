@@ -44,7 +44,8 @@ class Planted:
             )
         loose = schema or pa.schema([f.with_nullable(True) for f in spec.schema])
         table = pa.Table.from_pylist(rows, schema=loose)
-        meta = {"fingerprint": "", "content": store.content_digest(table), "parts": 1, "summary": {}, "files": {}}
+        meta = json.loads(pq.read_metadata(self.path(key)).metadata[b"aerialdojo"])
+        meta["content"] = store.content_digest(table)
         pq.write_table(table.replace_schema_metadata({b"aerialdojo": json.dumps(meta).encode()}), self.path(key))
 
     def edit(self, key: str, change: Callable[[Row], None], wanted: Callable[[Row], bool] = lambda _: True) -> Row:

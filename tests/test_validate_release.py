@@ -15,6 +15,7 @@ from aerialdojo_gen import store
 from aerialdojo_gen.config import Pipeline, SplitConfig
 from aerialdojo_gen.errors import StoreError, UsageError
 from aerialdojo_gen.paper import PaperScene
+from aerialdojo_gen.release.contents import check_release
 from aerialdojo_gen.release.validate import Asked, counts, validate, write_report
 from aerialdojo_gen.release.validate.registry import Fault
 from aerialdojo_gen.schemas import SETTINGS
@@ -91,6 +92,41 @@ def test_a_scene_that_the_card_counts_and_nobody_has(planted):
         if place.template.startswith("release/"):
             planted.path(key).unlink()
     assert set(check(planted, whole=True)) == {"card_counts"}
+
+
+def test_parts_of_two_runs(planted):
+    path = planted.path("release/anchors")
+    table = pq.read_table(path, partitioning=None)
+    meta = json.loads(table.schema.metadata[b"aerialdojo"]) | {"fingerprint": "another"}
+    pq.write_table(table.replace_schema_metadata({b"aerialdojo": json.dumps(meta)}), path)
+    assert check(planted) == {"part_of_other_run": [relative(planted, "release/anchors")]}
+
+
+def test_a_card_and_a_croissant_that_tell_other_numbers(planted):
+    card, machine = planted.release / "README.md", planted.release / "croissant.json"
+    rows = len(planted.rows("tasks/train"))
+    assert f"| `id_train` | {rows} |" in card.read_text()
+    card.write_text(card.read_text().replace(f"| `id_train` | {rows} |", "| `id_train` | 7,777 |"))
+    text = machine.read_text()
+    assert f"id_train ({rows} rows)" in text
+    machine.write_text(text.replace(f"id_train ({rows} rows)", "id_train (7,777 rows)"))
+    report = validate(Asked(planted.release, pipeline=Pipeline(), use_meshes=False))
+    assert [(f.check, f.part, f.table, f.found) for f in report.faults] == [
+        ("card_counts", "README.md", "tasks", "7,777 rows told"),
+        ("card_counts", "croissant.json", "tasks", "7,777 rows told"),
+    ]
+    machine.write_text("{")
+    card.unlink()
+    assert check(planted, whole=True) == {"card_counts": ["README.md"]}
+
+
+def test_a_lost_part_is_told_by_whoever_reads_the_release(planted):
+    planted.path("release/scenes").unlink()
+    assert planted.scene in store.release_scenes(planted.data)
+    with pytest.raises(StoreError, match="missing"):
+        check_release(planted.data)
+    with pytest.raises(StoreError, match=f"release/scenes of {planted.scene} is missing"):
+        store.read_scene(planted.data, "release/scenes", planted.scene)
 
 
 def papers(planted, **changes):

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import re
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -155,22 +156,41 @@ def _card(outcome: Outcome, release: Path, tallies: Sequence[Tally], _pipeline: 
         outcome.rows = 1
         outcome.faults.append(Fault("card_counts", "", "", "README.md", "", "no file", "the dataset card"))
         return ""
-    text = path.read_text(encoding="utf-8", errors="replace")
-    for folder in SUBSETS:
-        tasks = sum(tally.tasks[folder] for tally in tallies)
-        routes = sum(n for tally in tallies for (name, _), n in tally.routes.items() if name == folder)
-        for told in _told(text, folder):
-            outcome.rows += 1
-            if told != (tasks, routes):
-                found, wanted = (f"{a:,} instances of {b:,} tasks" for a, b in (told, (tasks, routes)))
-                outcome.faults.append(Fault("card_counts", "", "", "README.md", folder, found, wanted))
-    return "" if outcome.rows else "the card has no table of splits"
+    told = _of_card(path.read_text(encoding="utf-8", errors="replace"))
+    machine = release / "croissant.json"
+    if machine.is_file():
+        try:
+            told += _of_croissant(machine.read_text(encoding="utf-8", errors="replace"))
+        except (ValueError, KeyError, TypeError):
+            outcome.faults.append(
+                Fault("card_counts", "", "", "croissant.json", "", "no record sets", "a Croissant description")
+            )
+    for file, table, folder, n in told:
+        outcome.rows += 1
+        if table == "tasks":
+            found = sum(tally.tasks[folder] for tally in tallies)
+        else:
+            found = sum(k for tally in tallies for (name, _), k in tally.routes.items() if name == folder)
+        if n != found:
+            outcome.faults.append(Fault("card_counts", "", table, file, folder, f"{n:,} rows told", f"{found:,}"))
+    return "" if outcome.rows else "neither card nor croissant.json tells the rows of the splits"
 
 
-def _told(text: str, folder: str) -> Iterator[tuple[int, int]]:
-    """Instances and tasks of a split, as the card's table of splits has them."""
-    for a, b in re.findall(rf"^\| `{folder}` \| ([\d,]+) \| ([\d,]+) \|", text, re.MULTILINE):
-        yield int(a.replace(",", "")), int(b.replace(",", ""))
+def _of_card(text: str) -> list[tuple[str, str, str, int]]:
+    """Rows of `tasks` and `routes` by split, as the card's table of splits has them."""
+    found = re.findall(r"^\| `(\w+)` \| ([\d,]+) \| ([\d,]+) \|", text, re.MULTILINE)
+    counted = [(folder, ("tasks", a), ("routes", b)) for folder, a, b in found if folder in SUBSETS]
+    return [("README.md", t, folder, int(n.replace(",", ""))) for folder, *both in counted for t, n in both]
+
+
+def _of_croissant(text: str) -> list[tuple[str, str, str, int]]:
+    """Rows of `tasks` and `routes` by split, as croissant.json describes its record sets."""
+    described = {one["name"]: one["description"] for one in json.loads(text)["recordSet"]}
+    return [
+        ("croissant.json", table, folder, int(n.replace(",", "")))
+        for table in ("tasks", "routes")
+        for folder, n in re.findall(r"(\w+) \(([\d,]+) rows\)", described.get(table, ""))
+    ]
 
 
 def _images(outcome: Outcome, _release: Path, tallies: Sequence[Tally], _pipeline: Pipeline) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -10,27 +11,26 @@ import pyarrow as pa
 from aerialdojo_gen import store
 from aerialdojo_gen.errors import StoreError
 from aerialdojo_gen.parquet_files import read_file
+from aerialdojo_gen.release.contents import SHARDS
 from aerialdojo_gen.release.validate.registry import Fault, Outcome
 from aerialdojo_gen.release.validate.rows import Rows
 from aerialdojo_gen.schemas import TableSpec
 
 # What lies beside the tables of a release: its cards, its licence, what a hub's client leaves, pictures of it.
 _BESIDE = {"README.md", "croissant.json", "LICENSE", "CITATION.cff", ".gitattributes", "figures", "stats"}
-_PREFIX = "release/"
 
 
 def release_tables() -> dict[str, list[str]]:
     """Return the keys of `store.LAYOUT` that make up each table of a release, by the table's name."""
     keys: dict[str, list[str]] = {}
-    for key, place in store.LAYOUT.items():
-        if place.template.startswith(_PREFIX):
-            keys.setdefault(place.spec.name, []).append(key)
+    for key in SHARDS:
+        keys.setdefault(store.LAYOUT[key].spec.name, []).append(key)
     return keys
 
 
 def part_path(key: str, scene: str) -> str:
     """Return where a scene's part lies, relative to the release."""
-    return store.shard_path(Path(), key, scene).relative_to(_PREFIX.rstrip("/")).as_posix()
+    return store.shard_path(Path(), key, scene).relative_to("release").as_posix()
 
 
 def scenes_of(release: Path) -> list[str]:
@@ -78,18 +78,20 @@ def read_tables(release: Path, scene: str) -> tuple[dict[str, Rows], list[Outcom
     tables : dict of str to Rows
         By name; a table with a part that is missing, damaged or of another schema is left out.
     outcomes : list of Outcome
-        ``part_missing``, ``part_damaged``, ``part_schema``, ``leaking_column`` and ``part_content``.
+        One each of `PART_CHECKS`.
     """
     found = {name: Outcome(name, "files") for name in PART_CHECKS}
+    runs: dict[str, str] = {}
     tables = {}
     for name, keys in release_tables().items():
-        parts = [_read(release, key, scene, found) for key in keys]
+        parts = [_read(release, key, scene, found, runs) for key in keys]
         if any(part is None for part in parts):
             continue
         whole = [part for part in parts if part is not None]
         ends = [sum(t.num_rows for t in whole[: k + 1]) for k in range(len(whole))]
         paths = tuple(part_path(key, scene) for key in keys)
         tables[name] = Rows(name, store.LAYOUT[keys[0]].spec, pa.concat_tables(whole), paths, tuple(ends))
+    _one_run(scene, runs, found["part_of_other_run"])
     return tables, list(found.values())
 
 
@@ -99,10 +101,11 @@ PART_CHECKS = {
     "part_schema": "A part has the declared columns, types and units.",
     "leaking_column": "Tasks have no column beside the declared ones.",
     "part_content": "A part's rows are those that its footer's digest was made of.",
+    "part_of_other_run": "A scene's parts were written by one run of split.",
 }
 
 
-def _read(release: Path, key: str, scene: str, found: dict[str, Outcome]) -> pa.Table | None:
+def _read(release: Path, key: str, scene: str, found: dict[str, Outcome], runs: dict[str, str]) -> pa.Table | None:
     spec = store.LAYOUT[key].spec
     relative = part_path(key, scene)
     path = release / relative
@@ -122,6 +125,7 @@ def _read(release: Path, key: str, scene: str, found: dict[str, Outcome]) -> pa.
         return None
     found["part_schema"].rows += 1
     if info is not None:
+        runs[relative] = info.fingerprint
         found["part_content"].rows += 1
         if store.content_digest(table) != info.content:
             fault("part_content", "other rows than its footer tells of", f"rows of SHA-256 {info.content[:12]}…")
@@ -136,6 +140,15 @@ def _read(release: Path, key: str, scene: str, found: dict[str, Outcome]) -> pa.
         fault("part_schema", "; ".join(wrong), f"the columns of {spec.name}")
         return None
     return table.replace_schema_metadata(None).cast(pa.schema([pa.field(f.name, f.type) for f in spec.schema]))
+
+
+def _one_run(scene: str, runs: dict[str, str], outcome: Outcome) -> None:
+    """Name the parts whose fingerprint is not that of most of the scene's parts."""
+    outcome.rows = len(runs)
+    for fingerprint, _ in Counter(runs.values()).most_common()[1:]:
+        for part in (part for part, own in runs.items() if own == fingerprint):
+            told = f"written by run {fingerprint[:12] or '(none)'}", "the run of the scene's other parts"
+            outcome.faults.append(Fault(outcome.check, scene, "", part, "", *told))
 
 
 def _schema_faults(spec: TableSpec, table: pa.Table, extra: list[str]) -> Iterator[str]:
