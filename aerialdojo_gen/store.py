@@ -448,8 +448,13 @@ def prune(data: Path, table: str, scene: str, parts: int) -> None:
 
 
 def release_scenes(data: Path) -> list[str]:
-    """List the scenes that the release holds, by name."""
-    return sorted(p.stem.removeprefix("part-") for p in (data / "release" / "scenes").glob("part-*.parquet"))
+    """List the scenes that any table of the release has a part of, by name.
+
+    A scene that lacks a part is listed too, so that whoever reads it is told.
+    """
+    patterns = [p.template.format(partition="*", scene="*") for p in LAYOUT.values() if p.template[:8] == "release/"]
+    names = {path.stem.removeprefix("part-") for pattern in patterns for path in data.glob(pattern)}
+    return sorted(name for name in names if _PLAIN.fullmatch(name))
 
 
 def prune_release(data: Path, scenes: Sequence[str]) -> list[str]:
