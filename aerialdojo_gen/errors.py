@@ -45,6 +45,10 @@ class PoolError(AerialDojoError):
     """Scenes have fewer kept candidates than are to be released."""
 
 
+class BudgetSpent(AerialDojoError):  # noqa: N818 - no fault: it says where a run ended
+    """The time that a run was given is over; what is finished is kept."""
+
+
 class RenderError(AerialDojoError):
     """Rendering or encoding failed."""
 

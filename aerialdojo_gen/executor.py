@@ -8,16 +8,18 @@ import multiprocessing
 import os
 import signal
 import sys
+import time
+from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from types import TracebackType
-from typing import Any, Protocol, TypeVar
+from typing import Any, Generic, Protocol, TypeVar
 
 from aerialdojo_gen import store
 from aerialdojo_gen.config import Section
-from aerialdojo_gen.errors import AerialDojoError
+from aerialdojo_gen.errors import AerialDojoError, BudgetSpent
 from aerialdojo_gen.stage import BY_NAME, Job
 
 
@@ -61,6 +63,8 @@ def compute(task: Task) -> dict[str, Any]:
         Anything else, with the shard in its message and the cause chained.
     """
     job = task.job
+    if job.deadline is not None and time.time() >= job.deadline:
+        raise BudgetSpent(f"the budget was spent before {task.label}")
     stage = BY_NAME[job.stage]
     try:
         output = stage.load()(job, task.config)
@@ -114,7 +118,8 @@ class Pool:
 
     def __init__(self, workers: int) -> None:
         self.workers = workers
-        self._executor: ProcessPoolExecutor | None = None
+        # A pool of one process each, so that this side chooses who does what.
+        self._lanes: list[ProcessPoolExecutor] = []
 
     def __enter__(self) -> Pool:
         """Return self."""
@@ -124,14 +129,14 @@ class Pool:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         """End the processes; at once where an error is under way."""
-        if self._executor is None:
-            return
         if kind is not None:
-            for process in list((self._executor._processes or {}).values()):
-                with contextlib.suppress(OSError):
-                    process.terminate()
-        self._executor.shutdown(wait=True, cancel_futures=True)
-        self._executor = None
+            for lane in self._lanes:
+                for process in list((lane._processes or {}).values()):
+                    with contextlib.suppress(OSError):
+                        process.terminate()
+        for lane in self._lanes:
+            lane.shutdown(wait=True, cancel_futures=True)
+        self._lanes.clear()
 
     def imap(self, tasks: Sequence[Task]) -> Iterator[dict[str, Any] | AerialDojoError]:
         """Compute tasks and yield summaries, or the expected errors, in the order of finishing.
@@ -143,9 +148,11 @@ class Pool:
         RuntimeError
             A task failed in an unexpected way.
         """
-        yield from self.map(_guarded, tasks)
+        yield from self.map(_guarded, tasks, lambda task: task.job.scene)
 
-    def map(self, work: Callable[[T], R], tasks: Sequence[T]) -> Iterator[R]:
+    def map(
+        self, work: Callable[[T], R], tasks: Sequence[T], scene_of: Callable[[T], str] | None = None
+    ) -> Iterator[R]:
         """Do work on tasks and yield what it returns, in the order of finishing.
 
         Parameters
@@ -154,6 +161,9 @@ class Pool:
             A function of a module: other processes import it.
         tasks : sequence
             What it is called with; each has a `label` for messages.
+        scene_of : callable, optional
+            A task's scene. A process stays with a scene while there is work, for it keeps what it has read and
+            built of it; tasks of no scene are done in their order.
 
         Raises
         ------
@@ -164,25 +174,27 @@ class Pool:
             for task in tasks:
                 yield work(task)
             return
-        if self._executor is None:
+        if not self._lanes:
             # spawn: FCL, PyBullet and numba hold state that does not survive a fork.
             context = multiprocessing.get_context("spawn")
-            self._executor = ProcessPoolExecutor(
-                self.workers, mp_context=context, initializer=start_worker, initargs=(os.getpid(),)
-            )
-        waiting = iter(tasks)
-        running: dict[Future[R], T] = {}
+            self._lanes = [
+                ProcessPoolExecutor(1, mp_context=context, initializer=start_worker, initargs=(os.getpid(),))
+                for _ in range(self.workers)
+            ]
+        waiting = _Waiting(tasks, scene_of or (lambda _: ""))
+        running: dict[Future[R], tuple[int, T]] = {}
+        idle = list(range(len(self._lanes)))
         try:
             while True:
-                # A short queue keeps a Ctrl-C from waiting for what has not begun.
-                # The first submit starts the processes; they inherit a blocked SIGINT, so that a Ctrl-C while they
-                # start is the parent's alone.
+                # One task a process keeps a Ctrl-C from waiting for what has not begun.
+                # The first submit starts the process; it inherits a blocked SIGINT, so that a Ctrl-C while it
+                # starts is the parent's alone.
                 signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
                 try:
-                    for task in waiting:
-                        running[self._executor.submit(work, task)] = task
-                        if len(running) > self.workers:
-                            break
+                    while idle and waiting:
+                        lane = idle.pop(0)
+                        task = waiting.take(lane)
+                        running[self._lanes[lane].submit(work, task)] = (lane, task)
                 finally:
                     signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
                 if not running:
@@ -190,11 +202,37 @@ class Pool:
                 finished, _ = wait(running, return_when=FIRST_COMPLETED)
                 for future in finished:
                     outcome = future.result()
-                    del running[future]
+                    idle.append(running.pop(future)[0])
                     yield outcome
         except BrokenProcessPool:
-            labels = "; ".join(task.label for task in list(running.values())[: self.workers])
+            labels = "; ".join(task.label for _, task in running.values())
             raise AerialDojoError(
                 f"a worker process was killed at {labels} (out of memory?): "
                 "run again, finished shards are kept; use fewer --workers if memory ran out"
             ) from None
+
+
+class _Waiting(Generic[T]):
+    """Tasks that nobody has begun, by scene."""
+
+    def __init__(self, tasks: Sequence[T], scene_of: Callable[[T], str]) -> None:
+        self._scenes: dict[str, deque[T]] = {}
+        for task in tasks:
+            self._scenes.setdefault(scene_of(task), deque()).append(task)
+        self._at: dict[int, str] = {}
+
+    def __bool__(self) -> bool:
+        return bool(self._scenes)
+
+    def take(self, lane: int) -> T:
+        """Give a process its next task: of its scene, else of one that no other works at, else of the fullest."""
+        scene = self._at.get(lane)
+        if scene not in self._scenes:
+            others = {at for other, at in self._at.items() if other != lane}
+            free = [name for name in self._scenes if name not in others]
+            scene = max(free or self._scenes, key=lambda name: len(self._scenes[name]))
+        self._at[lane] = scene
+        task = self._scenes[scene].popleft()
+        if not self._scenes[scene]:
+            del self._scenes[scene]
+        return task

@@ -18,6 +18,7 @@ class Bar:
 
     def __init__(self, label: str, total: int, stream: TextIO, quiet: bool, unit: str = "shards") -> None:
         self._label, self._total, self._stream, self._unit = label, total, stream, unit
+        self._frames = 0
         self._done, self._started, self._said = 0, time.monotonic(), time.monotonic()
         self._plain = not quiet and not stream.isatty()
         self._tqdm = tqdm(
@@ -29,17 +30,22 @@ class Bar:
             disable=quiet or self._plain or not total,
         )
 
-    def advance(self, n: int = 1) -> None:
-        """Count `n` more."""
+    def advance(self, n: int = 1, frames: int = 0) -> None:
+        """Count `n` more, with as many frames of video."""
         self._done += n
+        self._frames += frames
+        speed = self._frames / max(time.monotonic() - self._started, 1e-9)
+        if self._frames:
+            self._tqdm.set_postfix_str(f"{speed:.1f} frames/s", refresh=False)
         self._tqdm.update(n)
         now = time.monotonic()
         if self._plain and now - self._said >= _PLAIN_EVERY_S:
             self._said = now
             rate = self._done / (now - self._started)
             left = (self._total - self._done) / rate
+            pictures = f", {self._frames:,} frames, {speed:.1f} frames/s" if self._frames else ""
             print(
-                f"{self._label}: {self._done}/{self._total} {self._unit}, {rate:.2f}/s, ETA {left:.0f} s",
+                f"{self._label}: {self._done}/{self._total} {self._unit}, {rate:.2f}/s{pictures}, ETA {left:.0f} s",
                 file=self._stream,
                 flush=True,
             )

@@ -13,13 +13,13 @@ import time
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 from aerialdojo_gen import store
 from aerialdojo_gen.config import Pipeline
-from aerialdojo_gen.errors import AerialDojoError, StoreError, UsageError
+from aerialdojo_gen.errors import AerialDojoError, BudgetSpent, StoreError, UsageError
 from aerialdojo_gen.executor import Pool, Task
 from aerialdojo_gen.fingerprint import scene_fingerprint
 from aerialdojo_gen.interrupt import Interrupts
@@ -65,6 +65,23 @@ class StageSummary:
         )
 
 
+@dataclass(frozen=True)
+class Limits:
+    """How much of a stage is computed now; what is left out is computed when the command is given again.
+
+    Attributes
+    ----------
+    share : (int, int)
+        ``(i, n)``: every n-th shard, from the i-th on. The shares of n machines, copied into one folder, are what one
+        machine writes.
+    deadline : float or None
+        Seconds since the epoch after which nothing further is begun.
+    """
+
+    share: tuple[int, int] = (0, 1)
+    deadline: float | None = None
+
+
 @contextmanager
 def data_lock(data: Path) -> Iterator[None]:
     """Hold the data directory: one run writes to it at a time; a killed run's lock is gone with it."""
@@ -90,6 +107,7 @@ def run(
     workers: int = 1,
     force: Iterable[str] = (),
     reporter: Reporter | None = None,
+    limits: Limits | None = None,
 ) -> list[StageSummary]:
     """Run stages in their order on scenes.
 
@@ -109,6 +127,8 @@ def run(
         Names of stages whose shards are computed even where they are fresh.
     reporter : Reporter, optional
         Shows progress and summaries.
+    limits : Limits, optional
+        How much of the last stage is computed now; all of it where absent.
 
     Returns
     -------
@@ -127,7 +147,9 @@ def run(
     summaries = []
     with data_lock(roots.data), Interrupts() as interrupts, Pool(workers) as pool:
         for stage in stages:
-            summary = _run_stage(stage, scenes, pipeline, roots, pool, stage.name in forced, reporter, interrupts)
+            now = limits if limits and stage is stages[-1] else Limits()
+            forced_now = stage.name in forced
+            summary = _run_stage(stage, scenes, pipeline, roots, pool, forced_now, reporter, interrupts, now)
             interrupts.check()
             reporter.line(str(summary))
             summaries.append(summary)
@@ -143,11 +165,14 @@ def _run_stage(
     force: bool,
     reporter: Reporter,
     interrupts: Interrupts,
+    limits: Limits,
 ) -> StageSummary:
     started = time.monotonic()
-    config = pipeline.section(stage.name)
+    config = stage.settle(pipeline.section(stage.name), reporter.line)
+    pipeline = pipeline.model_copy(update={stage.name.replace("-", "_"): config})
     stage.check(roots.data, scenes, config)
     tasks, fresh, errors = [], [], []
+    shard = -1
     for scene in scenes:
         try:
             fingerprint = scene_fingerprint(stage, pipeline, roots, scene)
@@ -159,27 +184,37 @@ def _run_stage(
             store.prune(roots.data, table, scene, parts)
             store.sweep(store.shard_path(roots.data, table, scene).parent)
         for part in range(parts):
+            shard += 1
+            if shard % limits.share[1] != limits.share[0]:
+                continue
             summary = None if force else _fresh(stage, roots.data, scene, part, parts, fingerprint, reporter)
             if summary is not None:
                 fresh.append(summary)
             else:
-                job = Job(stage.name, scene, part, parts, pipeline.seed, pipeline.embodiment, roots)
+                whole = Job(stage.name, scene, part, parts, pipeline.seed, pipeline.embodiment, roots)
+                job = replace(whole, deadline=limits.deadline, force=force)
                 tasks.append(Task(job, config, fingerprint))
     done = []
     with reporter.bar(stage.name, len(tasks)) as bar:
         for outcome in pool.imap(tasks):
             interrupts.check()
+            if isinstance(outcome, BudgetSpent):
+                continue
             if isinstance(outcome, AerialDojoError):
                 errors.append(outcome)
+                bar.advance()
             else:
                 done.append(outcome)
-            bar.advance()
+                bar.advance(frames=outcome["counts"].get("frames", 0))
     if errors:
         raise _together(errors)
     counts: Counter[str] = Counter()
     for summary in (*fresh, *done):
         counts.update(summary["counts"])
     every = (*fresh, *done)
+    if len(done) < len(tasks):
+        left = f"{len(tasks) - len(done):,} of {len(tasks):,} shards are left"
+        reporter.line(f"{stage.name}: the budget is spent, {left}; the same command goes on from here")
     return StageSummary(
         stage.name,
         sum(s["rows_in"] for s in every),

@@ -81,6 +81,12 @@ class Job:
         The drone's body.
     roots : Roots
         The folders.
+    files : list of str
+        Files that the shard owns, relative to the data directory; the stage adds them.
+    deadline : float, optional
+        Seconds since the epoch after which a stage of long shards begins nothing new, and raises BudgetSpent.
+    force : bool
+        Whether the stage makes anew what it finds finished.
     """
 
     stage: str
@@ -91,6 +97,8 @@ class Job:
     embodiment: Embodiment
     roots: Roots
     files: list[str] = field(default_factory=list, compare=False)
+    deadline: float | None = None
+    force: bool = False
 
     def read(self, table: str) -> pa.Table:
         """Read all of this scene's rows of a table; StoreError names a missing or damaged shard."""
@@ -133,6 +141,10 @@ def _no_check(_data: Path, _scenes: Sequence[str], _config: Any) -> None:
     pass
 
 
+def _as_it_is(config: Any, _say: Callable[[str], None]) -> Any:
+    return config
+
+
 def _no_sources(_roots: Roots, _scene: str) -> list[Path]:
     return []
 
@@ -158,6 +170,9 @@ class Stage:
     check : callable
         ``(data, scenes, config)``: raises an `AerialDojoError` where the inputs of all scenes together will not do,
         before anything is written.
+    settle : callable
+        ``(config, say) -> config``: decides what the configuration leaves to the machine, so that the decision is
+        part of the fingerprint, and says it in a line.
     """
 
     name: str
@@ -168,6 +183,7 @@ class Stage:
     parts: Callable[[Path, str, Any], int] = _one_part
     sources: Callable[[Roots, str], list[Path]] = _no_sources
     check: Callable[[Path, Sequence[str], Any], None] = _no_check
+    settle: Callable[[Any, Callable[[str], None]], Any] = _as_it_is
 
     def load(self) -> Callable[[Job, Any], Output]:
         """Import the stage's module and return its ``run``."""
@@ -222,6 +238,14 @@ def _render_parts(data: Path, scene: str, config: Any) -> int:
     return n_parts(data, scene, config)
 
 
+def _settle_renderer(config: Any, say: Callable[[str], None]) -> Any:
+    from aerialdojo_gen.rendering.backend import choose_renderer
+
+    choice = choose_renderer(config.renderer)
+    say(choice.why)
+    return config.model_copy(update={"renderer": choice.name})
+
+
 _UPSTREAM_OF_SPLIT = ("scenes", "landmarks", "objects", "anchors", "references", "pairs", "plans", "verdicts")
 
 STAGES: tuple[Stage, ...] = (
@@ -260,8 +284,9 @@ STAGES: tuple[Stage, ...] = (
         sources=_paper_sources, check=_enough_for_the_paper,
     ),
     Stage(
-        "render", 1, "Record four RGB-D views along trajectories of the release.",
-        ("scenes", "objects", "routes/train", "routes/test"), ("recordings", "frames"), parts=_render_parts,
+        "render", 2, "Record four RGB-D views along trajectories of the release.",
+        ("scenes", "routes/train", "routes/test"), ("recordings", "frames"), parts=_render_parts,
+        settle=_settle_renderer,
     ),
 )  # fmt: skip
 

@@ -435,7 +435,7 @@ def sweep(folder: Path) -> None:
         return
     for path in folder.iterdir():
         match = _TEMPORARY.match(path.name)
-        if match and not _alive(int(match[1])):
+        if match and not process_alive(int(match[1])):
             path.unlink(missing_ok=True)
 
 
@@ -467,7 +467,8 @@ def prune_release(data: Path, scenes: Sequence[str]) -> list[str]:
     return gone
 
 
-def _alive(pid: int) -> bool:
+def process_alive(pid: int) -> bool:
+    """Whether a process of that number runs."""
     if pid == os.getpid():
         return True
     try:

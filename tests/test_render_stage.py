@@ -25,7 +25,7 @@ from aerialdojo_gen.stage import Job, Roots
 from aerialdojo_gen.stages import reference_images, render
 
 SCENE = "U_Court_0"
-CONFIG = RenderConfig(width=64, height=64, limit=1, trajectories_per_part=1)
+CONFIG = RenderConfig(width=64, height=64, limit=1, trajectories_per_part=1, renderer="pybullet")
 # In the court, from its middle: forward 3 m, up 1 m, a turn to the left, left 1 m, and on to the anchor.
 ROUTE = {
     "x_m": [-3.0, 0.0, 0.0, 0.0, -0.2588190451, -0.5],
@@ -179,7 +179,7 @@ def test_sampling_by_time_renders_frames_between_poses(tmp_path):
 
 
 def test_a_subset_without_routes_gives_empty_tables(data):
-    (output,) = run_all(data, CONFIG.model_copy(update={"subset": "test"}))
+    (output,) = run_all(data, CONFIG.model_copy(update={"split": "test"}))
     assert [t.num_rows for t in output.tables.values()] == [0, 0]
 
 

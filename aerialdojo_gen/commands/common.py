@@ -16,6 +16,7 @@ from aerialdojo_gen.errors import ConfigError
 
 if TYPE_CHECKING:
     from aerialdojo_gen.config import Pipeline
+    from aerialdojo_gen.runner import Limits
     from aerialdojo_gen.stage import Roots, Stage
 
 DEFAULT_PIPELINE = "aerialdojo-200k.toml"
@@ -87,6 +88,7 @@ def run_until(
     workers: int | None = None,
     force: bool = False,
     quiet: bool = False,
+    limits: Limits | None = None,
     **overrides: object,
 ) -> None:
     """Bring a stage's tables up to date, running what it needs upstream; the twin of a stage's command.
@@ -107,6 +109,8 @@ def run_until(
         Compute this stage's shards even where they are fresh (not those of the stages upstream).
     quiet : bool
         No progress and no summary.
+    limits : Limits, optional
+        How much of the stage is computed now; all of it where absent.
     **overrides
         Values of the stage's section that replace the file's; None leaves one as it is.
 
@@ -120,7 +124,7 @@ def run_until(
 
     config, roots = open_pipeline(pipeline, data)
     config = with_overrides(config, stage, **overrides)
-    run_stages(list(upstream(stage)), config, roots, scene, workers, [stage] if force else [], quiet)
+    run_stages(list(upstream(stage)), config, roots, scene, workers, [stage] if force else [], quiet, limits)
 
 
 def run_stages(
@@ -131,6 +135,7 @@ def run_stages(
     workers: int | None,
     force: list[str],
     quiet: bool,
+    limits: Limits | None = None,
 ) -> None:
     """Run stages in their order over the chosen scenes; after `split`, write card and croissant.json."""
     from aerialdojo_gen import runner
@@ -140,7 +145,7 @@ def run_stages(
     scenes = runner.choose_scenes(scene or config.scenes, runner.known_scenes(roots.recipes))
     workers = workers or default_workers()
     try:
-        runner.run(stages, scenes, config, roots, workers=workers, force=force, reporter=reporter)
+        runner.run(stages, scenes, config, roots, workers=workers, force=force, reporter=reporter, limits=limits)
     except KeyboardInterrupt:
         # Said here because Typer turns Ctrl-C into a silent exit.
         print("interrupted: finished shards are kept, the same command goes on from here", file=sys.stderr)

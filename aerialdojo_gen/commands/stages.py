@@ -50,22 +50,6 @@ for _name, _help in PLAIN_STAGES.items():
     app.command(_name, help=_help)(_stage_command(_name))
 
 
-@app.command("render")
-def render(
-    data: Data = Path("data"), scene: Scene = None, pipeline: PipelineFile = None,
-    workers: Workers = None, force: Force = False, quiet: Quiet = False,
-    limit: Annotated[int | None, typer.Option("--limit", min=1, help="Trajectories a scene and setting.")] = None,
-    sampling: Annotated[
-        str | None, typer.Option("--sampling", help="steps: a frame a pose; time: constant frame rate.")
-    ] = None,
-) -> None:  # fmt: skip
-    """Record four RGB-D views along trajectories of the release."""
-    run_until(
-        "render", data=data, scene=scene, pipeline=pipeline, workers=workers, force=force, quiet=quiet,
-        limit=limit, sampling=sampling,
-    )  # fmt: skip
-
-
 @app.command("run")
 def run(
     pipeline: Annotated[Path, typer.Argument(help="Pipeline file, e.g. pipelines/smoke.toml.")],

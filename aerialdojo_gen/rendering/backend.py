@@ -10,6 +10,7 @@ PyBullet's own EGL plugin is not among them: its 16-bit depth buffer does not pa
 from __future__ import annotations
 
 import time
+import weakref
 from dataclasses import dataclass
 from functools import lru_cache
 from types import TracebackType
@@ -171,6 +172,28 @@ def open_renderer(scene: Scene, name: str = "auto") -> Renderer:
 
         return GlRenderer(scene)
     raise RenderError(f"there is no renderer {name!r}: it is one of {', '.join(RENDERERS)}, or auto")
+
+
+# The last scene's renderer: the next trajectory of it is then cheap, and memory stays that of one scene.
+_kept: list[tuple[weakref.ref[Scene], str, Renderer]] = []
+
+
+def kept_renderer(scene: Scene, name: str, anew: bool = False) -> Renderer:
+    """Return a renderer of the scene, kept until another one is asked for; not for the caller to close.
+
+    Parameters
+    ----------
+    scene : Scene
+    name : str
+        As for `open_renderer`.
+    anew : bool
+        Make it anew: one that has gone wrong may be right then.
+    """
+    if anew or not _kept or _kept[0][0]() is not scene or _kept[0][1] != name:
+        while _kept:
+            _kept.pop()[2].close()
+        _kept.append((weakref.ref(scene), name, open_renderer(scene, name)))
+    return _kept[0][2]
 
 
 @lru_cache

@@ -2,6 +2,7 @@
 
 Flags, in the order of `FLAGS`:
 
+- ``missing``: a file lacks frames, or does not open (found by `aerialdojo_gen.rendering.recording.record_view`)
 - ``black``: nearly all of the picture is black
 - ``uniform``: one colour fills the picture
 - ``frozen``: picture and depth equal those of the frame before, though the camera has moved
@@ -12,6 +13,7 @@ Flags, in the order of `FLAGS`:
 
 from __future__ import annotations
 
+import weakref
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -25,9 +27,11 @@ from aerialdojo_gen.scenes.model import Scene
 
 Floats = NDArray[np.float64]
 
-FLAGS = ("black", "uniform", "frozen", "depth_invalid", "depth_mismatch", "camera_inside")
-OF_DEPTH = frozenset({"depth_invalid", "depth_mismatch", "camera_inside"})
-OF_RGB = frozenset({"black", "uniform", "frozen", "camera_inside"})
+FLAGS = ("missing", "black", "uniform", "frozen", "depth_invalid", "depth_mismatch", "camera_inside")
+OF_DEPTH = frozenset({"missing", "depth_invalid", "depth_mismatch", "camera_inside"})
+OF_RGB = frozenset({"missing", "black", "uniform", "frozen", "camera_inside"})
+# An instance id map is drawn with the depth: what is wrong with one is wrong with the other.
+CONCERNS = {"rgb": OF_RGB, "depth": OF_DEPTH, "instance": OF_DEPTH}
 
 _BLACK_LEVEL, _BLACK_SHARE = 8, 0.98
 _UNIFORM_RANGE = 6
@@ -161,6 +165,17 @@ class Solid:
         hit = face >= 0
         away = np.einsum("ij,ij->i", self._normal[face[hit]], directions[hit]) > 0.0
         return distance, float(away.mean()) if hit.any() else 0.0
+
+
+# The last scene's: its next trajectory is then cheap, and memory stays that of one scene.
+_solids: list[tuple[weakref.ref[Scene], Solid]] = []
+
+
+def kept_solid(scene: Scene) -> Solid:
+    """Return the ray caster of a scene, kept until that of another scene is asked for."""
+    if not _solids or _solids[0][0]() is not scene:
+        _solids[:] = [(weakref.ref(scene), Solid(scene))]
+    return _solids[0][1]
 
 
 def picture_flags(picture: Picture) -> set[str]:

@@ -1,7 +1,8 @@
-"""Writers of the recordings: RGB as H.264 in MP4, depth without loss as FFV1 in Matroska.
+"""Writers of the recordings: RGB as H.264 in MP4, depth and instance ids without loss as FFV1 in Matroska; or PNG.
 
 Depth is stored as 16-bit grey: planar depth in whole millimetres, rounded. 0 means that nothing lies within range:
-the sky, or a surface farther than 65.535 m. Both writers give the same bytes for the same frames.
+the sky, or a surface farther than 65.535 m. Instance ids are 16-bit grey too, one more than the instance's number, 0
+where nothing is seen. All writers give the same bytes for the same frames.
 """
 
 from __future__ import annotations
@@ -12,12 +13,14 @@ from types import TracebackType
 from typing import Any
 
 import av
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 MAX_DEPTH_M = 65.535
 RGB_CODEC, DEPTH_CODEC = "h264", "ffv1"
-SUFFIX = {"rgb": "mp4", "depth": "mkv"}
+SUFFIX = {"rgb": "mp4", "depth": "mkv", "instance": "mkv"}
+CODEC = {"rgb": RGB_CODEC, "depth": DEPTH_CODEC, "instance": DEPTH_CODEC}
 
 # A short closed GOP without B-frames: a seek decodes 15 frames at most, and lands on the frame asked for.
 _H264 = {"preset": "veryfast", "g": "15", "bf": "0", "flags": "+bitexact+cgop"}
@@ -56,7 +59,8 @@ class VideoWriter:
     path : Path
         The file; its suffix plays no part.
     modality : str
-        ``"rgb"`` (frames (H, W, 3) uint8, even H and W) or ``"depth"`` (frames (H, W) uint16, millimetres).
+        ``"rgb"`` (frames (H, W, 3) uint8, even H and W), ``"depth"`` (frames (H, W) uint16, millimetres) or
+        ``"instance"`` (frames (H, W) uint16).
     width, height : int
         Pixels.
     fps : float
@@ -110,3 +114,37 @@ class VideoWriter:
             self.close()
         else:
             self._container.close()
+
+
+class PngWriter:
+    """Write frames as loose PNG files, ``000000.png`` and on; a context manager.
+
+    Parameters
+    ----------
+    folder : Path
+        Made here; it must not exist.
+    comment : str
+        Stored beside the frames, in ``camera.json``.
+    """
+
+    def __init__(self, folder: Path, comment: str = "") -> None:
+        self._folder, self._n = folder, 0
+        folder.mkdir()
+        (folder / "camera.json").write_text(comment or "{}", encoding="utf-8")
+
+    def write(self, frame: NDArray[np.uint8] | NDArray[np.uint16]) -> None:
+        """Append a frame: (H, W, 3) uint8 RGB, or (H, W) uint16."""
+        bgr = frame[..., ::-1] if frame.ndim == 3 else frame
+        path = self._folder / f"{self._n:06}.png"
+        if not cv2.imwrite(str(path), np.ascontiguousarray(bgr), [cv2.IMWRITE_PNG_COMPRESSION, 4]):
+            raise OSError(f"{path} was not written")
+        self._n += 1
+
+    def __enter__(self) -> PngWriter:
+        """Return itself."""
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Do nothing: every frame is a file of its own."""

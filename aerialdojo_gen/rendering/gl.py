@@ -109,7 +109,7 @@ class GlRenderer:
         n, height, width, _ = layers.shape
         texture = self._own(self._gl.texture_array((width, height, n), 3, layers.tobytes()))
         texture.build_mipmaps()
-        texture.filter = (self._gl.LINEAR_MIPMAP_LINEAR, self._gl.NEAREST)
+        texture.filter = (self._gl.NEAREST_MIPMAP_LINEAR, self._gl.NEAREST)
         return texture
 
     def _shadow_map(self) -> Any:

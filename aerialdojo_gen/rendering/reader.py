@@ -4,6 +4,8 @@
 >>> recording.rgb["front"][12]        # (640, 640, 3) uint8, decoded now
 >>> recording.depth_m["down"][12]     # (640, 640) float32, metres, inf where nothing lies within range
 >>> recording.cameras["front"]["K"]   # intrinsics; pixel centres are at (column + 0.5, row + 0.5)
+
+The files are plain ones, for any other reader: `docs/recordings.md` has examples for PyAV and OpenCV.
 """
 
 from __future__ import annotations
@@ -15,6 +17,7 @@ from pathlib import Path
 from typing import Any, overload
 
 import av
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -23,12 +26,12 @@ from aerialdojo_gen.rendering.codecs import SUFFIX, to_metres
 
 
 class Video(Sequence[NDArray[Any]]):
-    """The frames of a video file; decoded when asked for, in any order.
+    """The frames of a video file, or of a folder of PNG files; decoded when asked for, in any order.
 
     Parameters
     ----------
     path : Path
-        A file that `aerialdojo_gen.rendering.codecs.VideoWriter` wrote.
+        What `aerialdojo_gen.rendering.codecs.VideoWriter` or `PngWriter` wrote.
 
     Raises
     ------
@@ -38,6 +41,12 @@ class Video(Sequence[NDArray[Any]]):
 
     def __init__(self, path: Path) -> None:
         self.path = path
+        self._frames: Iterator[Any] = iter(())
+        self._next = -1
+        self._files = sorted(path.glob("*.png")) if path.is_dir() else []
+        if path.is_dir():
+            self._open_folder()
+            return
         try:
             with av.open(str(path)) as container:
                 stream = container.streams.video[0]
@@ -48,8 +57,22 @@ class Video(Sequence[NDArray[Any]]):
                 self._pts = sorted(p.pts for p in container.demux(stream) if p.pts is not None)
         except (av.FFmpegError, OSError, IndexError) as error:
             raise RenderError(f"{path} is no video that can be read ({error}): render it again") from None
-        self._frames: Iterator[Any] = iter(())
-        self._next = -1
+
+    def _open_folder(self) -> None:
+        """Take what a video's header says from a folder: `fps` is not known there."""
+        camera = self.path / "camera.json"
+        if not self._files or not camera.is_file():
+            raise RenderError(f"{self.path} holds no frames: render it again")
+        self.metadata = {"comment": camera.read_text(encoding="utf-8")}
+        self.fps = 0.0
+        self._pts = list(range(len(self._files)))
+        self.height, self.width = self._png(0).shape[:2]
+
+    def _png(self, k: int) -> NDArray[Any]:
+        image = cv2.imread(str(self._files[k]), cv2.IMREAD_UNCHANGED)
+        if image is None:
+            raise RenderError(f"{self._files[k]} is no picture that can be read: render it again")
+        return np.ascontiguousarray(image[..., ::-1]) if image.ndim == 3 else np.asarray(image)
 
     def __len__(self) -> int:
         """Return the number of frames."""
@@ -66,6 +89,8 @@ class Video(Sequence[NDArray[Any]]):
         if not -len(self) <= k < len(self):
             raise IndexError(f"{self.path.name} has {len(self)} frames, not {k}")
         k %= len(self)
+        if self._files:
+            return self._png(k)
         if k != self._next:
             self._frames = self._from(self._pts[k])
         try:
@@ -128,13 +153,16 @@ class Recording:
         By view: ``K`` (3 x 3, pixels), ``body_from_camera`` (4 x 4; body x forward, y left, z up), ``fov_deg``,
         ``pixel_centre``.
     fps : float
-        Frames a second.
+        Frames a second; 0 for PNG files, whose frames' times stand in the table ``frames``.
+    instance : dict of str to Video
+        By view, where they were recorded; frames are (H, W) uint16: number of the node in the scene's mesh, plus 1.
     """
 
     rgb: dict[str, Video]
     depth_m: dict[str, DepthVideo]
     cameras: dict[str, dict[str, Any]]
     fps: float
+    instance: dict[str, Video]
 
     def __len__(self) -> int:
         """Return the number of frames, the same in every video."""
@@ -159,13 +187,19 @@ def read_recording(folder: Path) -> Recording:
     RenderError
         There is no recording, a video is missing or damaged, or the videos differ in length.
     """
-    rgb = {p.stem.removesuffix("_rgb"): Video(p) for p in sorted(folder.glob(f"*_rgb.{SUFFIX['rgb']}"))}
-    depth = {p.stem.removesuffix("_depth"): Video(p) for p in sorted(folder.glob(f"*_depth.{SUFFIX['depth']}"))}
-    if not rgb or rgb.keys() != depth.keys():
+    rgb, depth, instance = (_videos(folder, modality) for modality in ("rgb", "depth", "instance"))
+    if not rgb or rgb.keys() != depth.keys() or (instance and instance.keys() != rgb.keys()):
         raise RenderError(f"no complete recording in {folder}: run aerialdojo-gen render")
-    if len({len(v) for v in (*rgb.values(), *depth.values())}) != 1:
+    if len({len(v) for v in (*rgb.values(), *depth.values(), *instance.values())}) != 1:
         raise RenderError(f"the videos in {folder} differ in length: render them again")
     cameras = {view: json.loads(video.metadata.get("comment", "{}")) for view, video in rgb.items()}
-    return Recording(
-        rgb, {v: DepthVideo(d) for v, d in depth.items()}, cameras, next(iter(rgb.values())).fps
-    )  # fmt: skip
+    metres = {view: DepthVideo(video) for view, video in depth.items()}
+    return Recording(rgb, metres, cameras, next(iter(rgb.values())).fps, instance)
+
+
+def _videos(folder: Path, modality: str) -> dict[str, Video]:
+    paths = [
+        *folder.glob(f"*_{modality}.{SUFFIX[modality]}"),
+        *(p for p in folder.glob(f"*_{modality}") if p.is_dir()),
+    ]
+    return {p.stem.removesuffix(f"_{modality}"): Video(p) for p in sorted(paths)}

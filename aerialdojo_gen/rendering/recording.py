@@ -3,19 +3,27 @@
 from __future__ import annotations
 
 import json
+import math
+from contextlib import ExitStack
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from aerialdojo_gen.config import RenderConfig
+from aerialdojo_gen.errors import RenderError
 from aerialdojo_gen.geometry.cameras import Camera, view_pose
+from aerialdojo_gen.rendering.backend import Renderer
 from aerialdojo_gen.rendering.checks import Solid, ViewChecks
-from aerialdojo_gen.rendering.codecs import VideoWriter, to_millimetres
+from aerialdojo_gen.rendering.codecs import PngWriter, VideoWriter, to_millimetres
+from aerialdojo_gen.rendering.reader import Video
 from aerialdojo_gen.rendering.trajectory import FramePoses, by_steps, by_time
-from aerialdojo_gen.rendering.world import RenderWorld
+
+Floats = NDArray[np.float64]
 
 
-def frame_poses(route: dict[str, list[float]], config: RenderConfig) -> FramePoses:
+def frame_poses(route: dict[str, Any], config: RenderConfig) -> FramePoses:
     """Poses of a recording's frames.
 
     Parameters
@@ -37,27 +45,22 @@ def frame_poses(route: dict[str, list[float]], config: RenderConfig) -> FramePos
 
 
 def record_view(
-    world: RenderWorld,
-    solid: Solid,
-    view: str,
-    poses: FramePoses,
-    config: RenderConfig,
-    rgb_path: Path,
-    depth_path: Path,
+    renderer: Renderer, solid: Solid, view: str, poses: FramePoses, config: RenderConfig, files: dict[str, Path]
 ) -> set[str]:
     """Render and encode one view; frames are never held together in memory.
 
     Parameters
     ----------
-    world : RenderWorld
+    renderer : Renderer
     solid : Solid
         The same scene.
     view : str
         One of `aerialdojo_gen.schemas.VIEWS`.
     poses : FramePoses
     config : RenderConfig
-    rgb_path, depth_path : Path
-        Files to write.
+    files : dict of str to Path
+        What to write, by modality: ``rgb``, ``depth``, and ``instance`` where it is wanted. A file each, or with
+        ``frames = "png"`` a folder.
 
     Returns
     -------
@@ -65,32 +68,73 @@ def record_view(
         Quality flags (`aerialdojo_gen.rendering.checks.FLAGS`).
     """
     camera = Camera(config.width, config.height, config.fov_deg)
-    comment = camera_comment(camera, view)
+    comment = camera_comment(camera, view, config)
     checks = ViewChecks(camera, solid)
-    size = (config.width, config.height, config.fps)
-    with (
-        VideoWriter(rgb_path, "rgb", *size, crf=config.crf, comment=comment) as rgb,
-        VideoWriter(depth_path, "depth", *size, comment=comment) as depth,
-    ):
+    with ExitStack() as stack:
+        writers: dict[str, VideoWriter | PngWriter] = {}
+        for modality, path in files.items():
+            writers[modality] = _writer(path, modality, config, comment)
+            stack.enter_context(writers[modality])
         for position, yaw in zip(poses.position, poses.yaw_rad, strict=True):
-            pose = view_pose(position, float(yaw), view)
-            picture = world.render(camera, pose)
+            pose = camera_pose(position, float(yaw), view, config)
+            picture = renderer.render(camera, pose, "instance" in writers)
             checks.add(picture, pose)
-            rgb.write(picture.rgb)
-            depth.write(to_millimetres(picture.depth_m))
+            writers["rgb"].write(picture.rgb)
+            writers["depth"].write(to_millimetres(picture.depth_m))
+            if picture.instance is not None and "instance" in writers:
+                writers["instance"].write((picture.instance + 1).astype(np.uint16))
+    if not all(_complete(path, len(poses.time_s)) for path in files.values()):
+        checks.flags.add("missing")
     return checks.flags
 
 
-def camera_comment(camera: Camera, view: str) -> str:
+def _writer(path: Path, modality: str, config: RenderConfig, comment: str) -> VideoWriter | PngWriter:
+    if config.frames == "png":
+        return PngWriter(path, comment)
+    return VideoWriter(path, modality, config.width, config.height, config.fps, config.crf, comment)
+
+
+def _complete(path: Path, n_frames: int) -> bool:
+    try:
+        return len(Video(path)) == n_frames
+    except RenderError:
+        return False
+
+
+def camera_pose(position: ArrayLike, yaw_rad: float, view: str, config: RenderConfig) -> Floats:
+    """Pose of a view's camera, world_from_camera, with the configured offset from the body's centre.
+
+    Parameters
+    ----------
+    position : (3,) array_like
+        The body's centre, metres, world frame.
+    yaw_rad : float
+    view : str
+    config : RenderConfig
+
+    Returns
+    -------
+    (4, 4) float64
+    """
+    pose = view_pose(position, yaw_rad, view)
+    if view in config.offsets_m:
+        forward, left, up = config.offsets_m[view]
+        c, s = math.cos(yaw_rad), math.sin(yaw_rad)
+        pose[:3, 3] += (c * forward - s * left, s * forward + c * left, up)
+    return pose
+
+
+def camera_comment(camera: Camera, view: str, config: RenderConfig) -> str:
     """Describe a camera in the words that a recording's files carry: JSON."""
     return json.dumps(
         {
             "view": view,
             "K": camera.matrix.round(9).tolist(),
-            "body_from_camera": view_pose((0.0, 0.0, 0.0), 0.0, view).tolist(),
+            "body_from_camera": camera_pose((0.0, 0.0, 0.0), 0.0, view, config).tolist(),
             "fov_deg": camera.fov_deg,
             "pixel_centre": "centre of the top-left pixel is (0.5, 0.5)",
             "axes": "camera x right, y down, z forward; body x forward, y left, z up",
             "depth": "planar, millimetres; 0 = nothing within 65.535 m",
+            "instance": "number of the node in the scene's mesh, plus 1; 0 = nothing",
         }
     )

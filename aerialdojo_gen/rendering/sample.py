@@ -11,20 +11,23 @@ from aerialdojo_gen.config import RenderConfig
 from aerialdojo_gen.schemas import SETTINGS
 
 
-def subsets(config: RenderConfig) -> tuple[str, ...]:
-    """Return the tables of routes that the configuration records."""
-    return ("routes/train", "routes/test") if config.subset == "all" else (f"routes/{config.subset}",)
+def tables(config: RenderConfig, scene: str) -> tuple[str, ...]:
+    """Return the tables of routes that the configuration records of a scene: none where its split has none of it."""
+    *partition, subset = config.split.split("_")
+    if partition and partition[0] != store.partition(scene):
+        return ()
+    return ("routes/train", "routes/test") if subset == "all" else (f"routes/{subset}",)
 
 
-def choose(rows: Iterable[Mapping[str, Any]], limit: int | None, seed: int) -> list[str]:
+def choose(rows: Iterable[Mapping[str, Any]], limit: int, seed: int) -> list[str]:
     """Draw a sample of each length setting.
 
     Parameters
     ----------
     rows : iterable of mapping
         With ``nav_id`` and ``setting``.
-    limit : int or None
-        At most so many a setting; None for all.
+    limit : int
+        At most so many a setting; 0 for all.
     seed : int
         The pipeline's seed.
 
@@ -39,7 +42,7 @@ def choose(rows: Iterable[Mapping[str, Any]], limit: int | None, seed: int) -> l
     return sorted(
         nav_id
         for ids in by_setting.values()
-        for nav_id in sorted(ids, key=lambda i: (rng.rank(seed, "render", i), i))[:limit]
+        for nav_id in sorted(ids, key=lambda i: (rng.rank(seed, "render", i), i))[: limit or None]
     )
 
 
@@ -65,7 +68,7 @@ def n_parts(data: Path, scene: str, config: RenderConfig) -> int:
     """
     rows = [
         row
-        for table in subsets(config)
+        for table in tables(config, scene)
         for row in store.read_scene(data, table, scene).select(["nav_id", "setting"]).to_pylist()
     ]
     # How many are drawn does not depend on the seed; which, does.

@@ -2,24 +2,25 @@
 
 from __future__ import annotations
 
-import hashlib
+import time
 from collections import Counter
-from contextlib import ExitStack
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from aerialdojo_gen import store
 from aerialdojo_gen.config import RenderConfig
-from aerialdojo_gen.rendering.checks import FLAGS, OF_DEPTH, OF_RGB, Solid
-from aerialdojo_gen.rendering.codecs import DEPTH_CODEC, RGB_CODEC, SUFFIX
+from aerialdojo_gen.errors import BudgetSpent
+from aerialdojo_gen.rendering import finished
+from aerialdojo_gen.rendering.backend import kept_renderer
+from aerialdojo_gen.rendering.checks import CONCERNS, FLAGS, kept_solid
+from aerialdojo_gen.rendering.codecs import CODEC, SUFFIX
 from aerialdojo_gen.rendering.recording import frame_poses, record_view
-from aerialdojo_gen.rendering.sample import choose, subsets
+from aerialdojo_gen.rendering.sample import choose, tables
 from aerialdojo_gen.rendering.trajectory import FramePoses
-from aerialdojo_gen.rendering.world import RenderWorld, render_world
+from aerialdojo_gen.scenes.model import Scene
 from aerialdojo_gen.schemas import FRAMES, RECORDINGS
-from aerialdojo_gen.stage import Job, Output
-
-_MODALITIES = {"rgb": (RGB_CODEC, OF_RGB), "depth": (DEPTH_CODEC, OF_DEPTH)}
+from aerialdojo_gen.stage import BY_NAME, Job, Output
 
 
 def run(job: Job, config: RenderConfig) -> Output:
@@ -28,74 +29,97 @@ def run(job: Job, config: RenderConfig) -> Output:
     Parameters
     ----------
     job : Job
-        Reads ``routes/train`` or ``routes/test``; writes ``media/<scene>/<nav_id>/<view>_<modality>``.
+        Reads ``routes/train`` or ``routes/test``; writes ``media/<scene>/<nav_id>/<view>_<modality>``. A trajectory
+        that lies there finished is not recorded again.
     config : RenderConfig
 
     Returns
     -------
     Output
-        ``recordings``, a row a video, and ``frames``, a row a frame; the counts are quality flags.
+        ``recordings``, a row a video, and ``frames``, a row a frame; the counts are quality flags, and frames.
+
+    Raises
+    ------
+    BudgetSpent
+        The job's deadline came; finished trajectories are kept.
     """
-    routes = {row["nav_id"]: row for table in subsets(config) for row in job.read(table).to_pylist()}
+    routes = {row["nav_id"]: row for table in tables(config, job.scene) for row in job.read(table).to_pylist()}
     mine = choose(routes.values(), config.limit, job.seed)[job.part :: job.parts]
+    mesh = job.read("scenes")["mesh_sha256"][0].as_py()
+    finished.sweep(job.roots.data / "media" / job.scene)
     recordings: list[dict[str, Any]] = []
     frames: list[dict[str, Any]] = []
-    if mine:
-        scene = job.scene_model()
-        world, solid = render_world(scene), Solid(scene)
-        for nav_id in mine:
-            poses = frame_poses(routes[nav_id], config)
-            for view in config.views:
-                recordings += _record(job, config, world, solid, nav_id, view, poses)
-            frames += _frame_rows(job.scene, nav_id, poses)
+    for nav_id in mine:
+        poses = frame_poses(routes[nav_id], config)
+        folder = f"media/{job.scene}/{nav_id}"
+        fingerprint = finished.trajectory_fingerprint(BY_NAME["render"].version, mesh, routes[nav_id], config)
+        rows = None if job.force else finished.find(job.roots.data, folder, fingerprint)
+        if rows is None:
+            if job.deadline is not None and time.time() >= job.deadline:
+                raise BudgetSpent(f"the budget was spent in {job.scene}")
+            rows = _Trajectory(job.scene_model(), nav_id, poses, config).record(job.roots.data, folder, fingerprint)
+        job.files.extend(row["path"] for row in rows if config.frames == "video")
+        recordings += rows
+        frames += _frame_rows(job.scene, nav_id, poses)
     counts = Counter(flag for row in recordings for flag in row["flags"])
     counts["frames"] = len(frames)
-    tables = {
+    written = {
         "recordings": store.from_rows(RECORDINGS, recordings),
         "frames": store.from_rows(FRAMES, frames),
     }
-    return Output(tables, len(mine), len(recordings), dict(counts))
+    return Output(written, len(mine), len(recordings), dict(counts))
 
 
-def _record(
-    job: Job,
-    config: RenderConfig,
-    world: RenderWorld,
-    solid: Solid,
-    nav_id: str,
-    view: str,
-    poses: FramePoses,
-) -> list[dict[str, Any]]:
-    paths = {m: f"media/{job.scene}/{nav_id}/{view}_{m}.{SUFFIX[m]}" for m in _MODALITIES}
-    with ExitStack() as stack:
-        files = {m: stack.enter_context(job.output_file(path)) for m, path in paths.items()}
-        flags = record_view(world, solid, view, poses, config, files["rgb"], files["depth"])
+@dataclass(frozen=True)
+class _Trajectory:
+    scene: Scene
+    nav_id: str
+    poses: FramePoses
+    config: RenderConfig
+
+    def record(self, data: Path, folder: str, fingerprint: str) -> list[dict[str, Any]]:
+        """Record all views into a folder that appears when it is whole; returns the rows of `recordings`."""
+        with finished.writing(data, folder) as here:
+            rows = [row for view in self.config.views for row in self._view(view, here, folder)]
+            finished.note(here, fingerprint, rows)
+        return rows
+
+    def _view(self, view: str, here: Path, folder: str) -> list[dict[str, Any]]:
+        config = self.config
+        renderer, solid = kept_renderer(self.scene, config.renderer), kept_solid(self.scene)
+        modalities = ("rgb", "depth", "instance") if config.instances else ("rgb", "depth")
+        png = config.frames == "png"
+        names = {m: f"{view}_{m}" if png else f"{view}_{m}.{SUFFIX[m]}" for m in modalities}
+        files = {m: here / name for m, name in names.items()}
+        flags = record_view(renderer, solid, view, self.poses, config, files)
         if flags:
             # A renderer that has gone wrong may be right when it is built anew; what stays is the view's own fault.
-            with RenderWorld(job.scene_model()) as again:
-                flags = record_view(again, solid, view, poses, config, files["rgb"], files["depth"])
-        facts = {m: (path.stat().st_size, _sha256(path)) for m, path in files.items()}
-    return [
-        {
-            "scene": job.scene,
-            "nav_id": nav_id,
-            "view": view,
-            "modality": modality,
-            "path": paths[modality],
-            "sampling": config.sampling,
-            "n_frames": len(poses.time_s),
-            "fps": config.fps,
-            "width": config.width,
-            "height": config.height,
-            "fov_deg": config.fov_deg,
-            "codec": codec,
-            "bytes": facts[modality][0],
-            "sha256": facts[modality][1],
-            "ok": not flags & concerned,
-            "flags": [flag for flag in FLAGS if flag in flags & concerned],
-        }
-        for modality, (codec, concerned) in _MODALITIES.items()
-    ]
+            finished.remove(*files.values())
+            renderer = kept_renderer(self.scene, config.renderer, anew=True)
+            flags = record_view(renderer, solid, view, self.poses, config, files)
+        return [
+            {
+                "scene": self.scene.name,
+                "nav_id": self.nav_id,
+                "view": view,
+                "modality": m,
+                "path": f"{folder}/{names[m]}",
+                "sampling": config.sampling,
+                "n_frames": len(self.poses.time_s),
+                "fps": config.fps,
+                "width": config.width,
+                "height": config.height,
+                "fov_deg": config.fov_deg,
+                "codec": "png" if png else CODEC[m],
+                "renderer": renderer.name,
+                "device": renderer.device,
+                "bytes": finished.size_of(file),
+                "sha256": finished.sha256_of(file),
+                "ok": not flags & CONCERNS[m],
+                "flags": [flag for flag in FLAGS if flag in flags & CONCERNS[m]],
+            }
+            for m, file in files.items()
+        ]
 
 
 def _frame_rows(scene: str, nav_id: str, poses: FramePoses) -> list[dict[str, Any]]:
@@ -112,8 +136,3 @@ def _frame_rows(scene: str, nav_id: str, poses: FramePoses) -> list[dict[str, An
         }
         for k in range(len(poses.time_s))
     ]
-
-
-def _sha256(path: Path) -> str:
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()

@@ -1,0 +1,114 @@
+"""``render``: recordings along the trajectories of the release."""
+
+from __future__ import annotations
+
+import re
+import time
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from aerialdojo_gen.commands.common import (
+    Data,
+    Force,
+    PipelineFile,
+    Quiet,
+    Scene,
+    Workers,
+    default_workers,
+    open_pipeline,
+    run_until,
+)
+from aerialdojo_gen.errors import UsageError
+
+app = typer.Typer()
+
+_SECONDS = {"s": 1.0, "m": 60.0, "h": 3600.0, "d": 86400.0}
+
+
+@app.command("render")
+def render(
+    data: Data = Path("data"), scene: Scene = None, pipeline: PipelineFile = None,
+    workers: Workers = None, force: Force = False, quiet: Quiet = False,
+    split: Annotated[str | None, typer.Option(
+        "--split", help="train, test, all, id_train, id_test, ood_train or ood_test.")] = None,
+    limit: Annotated[int | None, typer.Option(
+        "--limit", min=0, help="Trajectories a scene and setting; 0 for all.")] = None,
+    renderer: Annotated[str | None, typer.Option(
+        "--renderer", help="auto (the fastest that works here), gl or pybullet.")] = None,
+    sampling: Annotated[str | None, typer.Option(
+        "--sampling", help="steps: a frame a pose; time: constant frame rate.")] = None,
+    frames: Annotated[str | None, typer.Option("--frames", help="video, or png for loose files.")] = None,
+    instances: Annotated[bool, typer.Option("--instances", help="Record instance id maps too.")] = False,
+    shard: Annotated[str | None, typer.Option(
+        "--shard", metavar="I/N", help="Record the I-th of N shares, e.g. 2/8; copied into one folder they are "
+        "what one machine records.")] = None,
+    budget: Annotated[str | None, typer.Option(
+        "--budget", help="Stop after so long, e.g. 90m or 2h; the same command goes on.")] = None,
+    estimate: Annotated[bool, typer.Option(
+        "--estimate", help="Measure a few trajectories, say what all will take, and record nothing.")] = False,
+) -> None:  # fmt: skip
+    """Record four RGB-D views along trajectories of the release."""
+    from aerialdojo_gen.runner import Limits
+
+    limits = Limits(share_of(shard) if shard else (0, 1), time.time() + duration_s(budget) if budget else None)
+    overrides: dict[str, object] = {
+        "split": split, "limit": limit, "renderer": renderer, "sampling": sampling, "frames": frames,
+        "instances": instances or None,
+    }  # fmt: skip
+    if estimate:
+        _estimate(data, scene, pipeline, workers, limits.share, overrides)
+        return
+    chosen = _scenes_of(split, scene, pipeline, data)
+    run_until(
+        "render", data=data, scene=chosen, pipeline=pipeline, workers=workers, force=force, quiet=quiet,
+        limits=limits, **overrides,
+    )  # fmt: skip
+
+
+def _scenes_of(split: str | None, scene: list[str] | None, pipeline: Path | None, data: Path) -> list[str] | None:
+    """Leave out the scenes that a split such as id_train has nothing of: their recordings stay as they are."""
+    if split is None or "_" not in split:
+        return scene
+    from aerialdojo_gen import runner, store
+
+    config, roots = open_pipeline(pipeline, data)
+    scenes = runner.choose_scenes(scene or config.scenes, runner.known_scenes(roots.recipes))
+    chosen = [name for name in scenes if store.partition(name) == split.split("_")[0]]
+    if not chosen:
+        raise UsageError(f"--split {split} has none of the scenes {', '.join(scenes[:5])}")
+    return chosen
+
+
+def _estimate(
+    data: Path,
+    scene: list[str] | None,
+    pipeline: Path | None,
+    workers: int | None,
+    share: tuple[int, int],
+    overrides: dict[str, object],
+) -> None:
+    from aerialdojo_gen import runner
+    from aerialdojo_gen.config import with_overrides
+    from aerialdojo_gen.rendering.estimate import estimate
+
+    config, roots = open_pipeline(pipeline, data)
+    config = with_overrides(config, "render", **overrides)
+    scenes = runner.choose_scenes(scene or config.scenes, runner.known_scenes(roots.recipes))
+    print(estimate(roots.data, scenes, config.render, config.seed, workers or default_workers(), share[1]))
+
+
+def share_of(text: str) -> tuple[int, int]:
+    """Read ``I/N``, I from 1 to N, as (I - 1, N); UsageError for anything else."""
+    match = re.fullmatch(r"(\d+)/(\d+)", text)
+    if not match or not 1 <= int(match[1]) <= int(match[2]):
+        raise UsageError(f"--shard {text}: write I/N with I from 1 to N, e.g. 2/8")
+    return int(match[1]) - 1, int(match[2])
+
+
+def duration_s(text: str) -> float:
+    """Read a duration such as ``2h``, ``90m`` or ``1h30m``, seconds; UsageError for anything else."""
+    if not re.fullmatch(r"(\d+(\.\d+)?[smhd])+", text):
+        raise UsageError(f"--budget {text}: write a duration such as 45s, 90m, 2h or 1h30m")
+    return sum(float(value) * _SECONDS[unit] for value, unit in re.findall(r"(\d+(?:\.\d+)?)([smhd])", text))

@@ -1,0 +1,172 @@
+"""What recording a selection will take: measured on a few of its trajectories, before it starts."""
+
+from __future__ import annotations
+
+import resource
+import sys
+import tempfile
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from aerialdojo_gen import rng, store
+from aerialdojo_gen.config import RenderConfig
+from aerialdojo_gen.errors import UsageError
+from aerialdojo_gen.rendering.backend import choose_renderer, open_renderer
+from aerialdojo_gen.rendering.checks import Solid
+from aerialdojo_gen.rendering.codecs import SUFFIX
+from aerialdojo_gen.rendering.finished import size_of
+from aerialdojo_gen.rendering.recording import frame_poses, record_view
+from aerialdojo_gen.rendering.sample import choose, tables
+from aerialdojo_gen.scenes.glb import read_glb
+
+_MEASURED_SCENES, _MEASURED_POSES = 3, 12
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """What a selection will take.
+
+    Attributes
+    ----------
+    trajectories, poses, videos : int
+        Of the selection; a pose is a frame in every view.
+    cpu_s, wall_s : float
+        Seconds of one core; seconds on `workers` idle ones, where every machine of `machines` has as many.
+    size_bytes : float
+        Of the videos.
+    memory_bytes : float
+        Of all workers of a machine.
+    workers, machines : int
+    measured : int
+        Poses that were rendered, encoded and checked to find out.
+    why : str
+        Which renderer, and why.
+    """
+
+    trajectories: int
+    poses: int
+    videos: int
+    cpu_s: float
+    wall_s: float
+    size_bytes: float
+    memory_bytes: float
+    workers: int
+    machines: int
+    measured: int
+    why: str
+
+    def __str__(self) -> str:
+        """Three lines for people."""
+        shares = f" on each of {self.machines} machines" if self.machines > 1 else ""
+        return (
+            f"{self.why}\n"
+            f"{self.trajectories:,} trajectories, {self.poses:,} poses, {self.videos:,} videos "
+            f"(measured on {self.measured} poses: {1e3 * self.cpu_s / max(self.poses, 1):.0f} ms CPU, "
+            f"{self.size_bytes / max(self.poses, 1) / 1e3:.0f} kB a pose)\n"
+            f"about {_hours(self.wall_s)} with {self.workers} workers{shares} on idle cores, "
+            f"{_size(self.size_bytes)} on disk, {_size(self.memory_bytes)} of memory"
+        )
+
+
+def estimate(
+    data: Path, scenes: list[str], config: RenderConfig, seed: int, workers: int, machines: int = 1
+) -> Estimate:
+    """Measure a few trajectories and extrapolate to the selection.
+
+    Parameters
+    ----------
+    data : Path
+        The data directory, with a release.
+    scenes : list of str
+    config : RenderConfig
+    seed : int
+        The pipeline's seed: the selection is drawn by it.
+    workers : int
+        Processes a machine.
+    machines : int
+        How many share the work.
+
+    Returns
+    -------
+    Estimate
+
+    Raises
+    ------
+    UsageError
+        Nothing is selected.
+    StoreError
+        A scene's routes or mesh are missing.
+    RenderError
+        The renderer does not work here.
+    """
+    choice = choose_renderer(config.renderer)
+    poses = trajectories = 0
+    selected: dict[str, dict[str, Any]] = {}
+    for scene in scenes:
+        routes = {
+            row["nav_id"]: row
+            for table in tables(config, scene)
+            for row in store.read_scene(data, table, scene).to_pylist()
+        }
+        mine = choose(routes.values(), config.limit, seed)
+        trajectories += len(mine)
+        poses += sum(len(frame_poses(routes[nav_id], config).time_s) for nav_id in mine)
+        if mine:
+            selected[scene] = routes[min(mine, key=lambda i: rng.rank(seed, "estimate", i))]
+    if not selected:
+        raise UsageError("there is nothing to record: no trajectory of these scenes is in the split")
+    drawn = sorted(selected, key=lambda scene: rng.rank(seed, "estimate", scene))[:_MEASURED_SCENES]
+    measured = bytes_ = 0
+    seconds = opening = 0.0
+    for scene in drawn:
+        n, cpu, built, size = _measure(data, scene, selected[scene], config, choice.name)
+        measured, seconds, opening, bytes_ = measured + n, seconds + cpu, opening + built, bytes_ + size
+    cpu_s = poses * seconds / measured + len(selected) * workers * opening / len(drawn)
+    # Kilobytes on Linux, bytes on macOS.
+    resident = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (1 if sys.platform == "darwin" else 1024)
+    return Estimate(
+        trajectories,
+        poses,
+        trajectories * len(config.views) * (3 if config.instances else 2),
+        cpu_s,
+        cpu_s / workers / machines,
+        poses * bytes_ / measured / machines,
+        float(resident * workers),
+        workers,
+        machines,
+        measured,
+        choice.why,
+    )
+
+
+def _measure(
+    data: Path, scene: str, route: dict[str, Any], config: RenderConfig, renderer_name: str
+) -> tuple[int, float, float, int]:
+    """Record the first poses of a route; returns poses, CPU seconds for them and for opening the scene, bytes."""
+    begun = time.process_time()
+    mesh = read_glb(data / store.read_scene(data, "scenes", scene)["mesh_path"][0].as_py())
+    solid = Solid(mesh)
+    short = route | {name: route[name][:_MEASURED_POSES] for name in ("x_m", "y_m", "z_m", "yaw_rad", "action")}
+    poses = frame_poses(short, config)
+    size = 0
+    with open_renderer(mesh, renderer_name) as renderer, tempfile.TemporaryDirectory() as folder:
+        built = time.process_time() - begun
+        modalities = ("rgb", "depth", "instance") if config.instances else ("rgb", "depth")
+        begun = time.process_time()
+        for view in config.views:
+            files = {m: Path(folder) / f"{view}_{m}.{SUFFIX[m]}" for m in modalities}
+            record_view(renderer, solid, view, poses, config, files)
+            size += sum(size_of(path) for path in files.values())
+        return len(poses.time_s), time.process_time() - begun, built, size
+
+
+def _hours(seconds: float) -> str:
+    if seconds < 5400.0:
+        return f"{seconds / 60.0:.0f} minutes" if seconds >= 90.0 else f"{seconds:.0f} seconds"
+    return f"{seconds / 3600.0:.1f} hours"
+
+
+def _size(count: float) -> str:
+    return f"{count / 1e9:.1f} GB" if count >= 1e9 else f"{count / 1e6:.0f} MB"

@@ -1,0 +1,146 @@
+"""Finished trajectories: a folder each, whole or not there, so that a killed run loses one trajectory at most.
+
+``media/<scene>/<nav_id>/`` holds the videos and ``recording.json``: the rows of `recordings`, and the fingerprint of
+what they were made from. A run that finds it there and up to date does not render the trajectory again, be it that it
+was killed, that its budget was spent, or that more trajectories are asked for than before.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import json
+import os
+import re
+import shutil
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from aerialdojo_gen import store
+from aerialdojo_gen.config import RenderConfig
+
+_NOTE = "recording.json"
+_TEMPORARY = re.compile(r"^\..+\.(\d+)\.tmp$")
+# What does not change a trajectory's own files: which others are recorded, and how they are shared out.
+_SELECTION = {"limit", "split", "trajectories_per_part"}
+
+
+def trajectory_fingerprint(version: int, mesh_sha256: str, route: Mapping[str, Any], config: RenderConfig) -> str:
+    """Hash what a trajectory's recording depends on.
+
+    Parameters
+    ----------
+    version : int
+        Of the stage.
+    mesh_sha256 : str
+        Of the scene's mesh.
+    route : mapping
+        Row of `routes`.
+    config : RenderConfig
+        Its renderer is one by name, not ``"auto"``.
+
+    Returns
+    -------
+    str
+        SHA-256, hexadecimal.
+    """
+    facts = {
+        "version": version,
+        "mesh": mesh_sha256,
+        "route": {name: route[name] for name in ("nav_id", "x_m", "y_m", "z_m", "yaw_rad", "action")},
+        "config": config.model_dump(mode="json", exclude=_SELECTION),
+    }
+    return hashlib.sha256(json.dumps(facts, sort_keys=True).encode()).hexdigest()
+
+
+def find(data: Path, folder: str, fingerprint: str) -> list[dict[str, Any]] | None:
+    """Return the rows of a finished trajectory; None where there is none, or it is stale or damaged.
+
+    Parameters
+    ----------
+    data : Path
+        The data directory.
+    folder : str
+        The trajectory's, relative to it.
+    fingerprint : str
+        Of `trajectory_fingerprint`.
+    """
+    try:
+        note = json.loads((data / folder / _NOTE).read_text(encoding="utf-8"))
+        if note["fingerprint"] != fingerprint:
+            return None
+        rows: list[dict[str, Any]] = note["recordings"]
+        whole = all(size_of(data / row["path"]) == row["bytes"] for row in rows)
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
+    return rows if whole else None
+
+
+@contextlib.contextmanager
+def writing(data: Path, folder: str) -> Iterator[Path]:
+    """Make a trajectory's folder under another name, and give it its own when the block ends without an error.
+
+    Parameters
+    ----------
+    data : Path
+        The data directory.
+    folder : str
+        Relative to it; an older one of that name is replaced.
+
+    Yields
+    ------
+    Path
+        The folder to write to.
+
+    Raises
+    ------
+    StoreError
+        The disk is full, read-only or not ours to write; nothing is left behind.
+    """
+    path = data / folder
+    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+    try:
+        shutil.rmtree(temporary, ignore_errors=True)
+        temporary.mkdir(parents=True)
+        yield temporary
+        if path.exists():
+            shutil.rmtree(path)
+        temporary.replace(path)
+    except OSError as error:
+        raise store.disk_error(error, path) from error
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)
+
+
+def note(folder: Path, fingerprint: str, rows: list[dict[str, Any]]) -> None:
+    """Write down, in the folder of `writing`, what stands in it."""
+    text = json.dumps({"fingerprint": fingerprint, "recordings": rows}, indent=1)
+    (folder / _NOTE).write_text(text, encoding="utf-8")
+
+
+def sweep(folder: Path) -> None:
+    """Remove what killed processes left half-written in a scene's folder; a living process's stays."""
+    for path in folder.glob(".*.tmp"):
+        match = _TEMPORARY.match(path.name)
+        if match and not store.process_alive(int(match[1])):
+            shutil.rmtree(path, ignore_errors=True)
+
+
+def remove(*paths: Path) -> None:
+    """Remove files and folders; those that are not there are no error."""
+    for path in paths:
+        shutil.rmtree(path) if path.is_dir() else path.unlink(missing_ok=True)
+
+
+def size_of(path: Path) -> int:
+    """Bytes of a file, or of a folder's files."""
+    return sum(p.stat().st_size for p in path.iterdir()) if path.is_dir() else path.stat().st_size
+
+
+def sha256_of(path: Path) -> str:
+    """SHA-256 of a file, or of a folder's files one after the other, hexadecimal."""
+    digest = hashlib.sha256()
+    for file in sorted(path.iterdir()) if path.is_dir() else [path]:
+        digest.update(file.read_bytes())
+    return digest.hexdigest()
