@@ -65,6 +65,8 @@ class AerialDojoEnv(gymnasium.Env[dict[str, Any], np.int64]):
         How near to the goal a Stop must be.
     embodiment : Embodiment, optional
         The body.
+    renderer : str
+        ``"gl"``, ``"pybullet"``, or ``"auto"`` for the fastest that works here.
     render_mode : str, optional
         ``"rgb_array"``: `render` returns the four views in one picture.
 
@@ -96,6 +98,7 @@ class AerialDojoEnv(gymnasium.Env[dict[str, Any], np.int64]):
         height: int = 640,
         success_radius_m: float = SUCCESS_RADIUS_M,
         embodiment: Embodiment | None = None,
+        renderer: str = "auto",
         render_mode: str | None = None,
     ) -> None:
         if render_mode not in (None, "rgb_array"):
@@ -103,7 +106,7 @@ class AerialDojoEnv(gymnasium.Env[dict[str, Any], np.int64]):
         self.render_mode = render_mode
         self._data = Path(data).absolute()
         self._sensors = sensors or Sensors(tuple(views), rgb, depth, width, height)
-        self._flight = Flight(self._data, self._sensors, success_radius_m, embodiment)
+        self._flight = Flight(self._data, self._sensors, success_radius_m, embodiment, renderer)
         self._begun = False
         self._rows = select(
             self._data, Selection(_names(split), _names(setting), _names(modality), _names(scene), limit, seed)
@@ -189,7 +192,8 @@ class AerialDojoEnv(gymnasium.Env[dict[str, Any], np.int64]):
         if self.render_mode is None:
             return None
         episode = self.episode
-        return mosaic(look(self._flight.space.scene, _RENDERED, episode.position, episode.yaw_rad)[0])
+        flight = self._flight
+        return mosaic(look(flight.space.scene, _RENDERED, episode.position, episode.yaw_rad, flight.renderer)[0])
 
     @property
     def episode(self) -> Episode:

@@ -2,20 +2,54 @@
 
 from __future__ import annotations
 
+import os
+import weakref
+
 import numpy as np
 from numpy.typing import NDArray
 
 from aerialdojo_gen.benchmark.goal import Sensors
 from aerialdojo_gen.benchmark.motion import Point
+from aerialdojo_gen.errors import RenderError
 from aerialdojo_gen.geometry.cameras import view_pose
-from aerialdojo_gen.rendering.world import render_world
+from aerialdojo_gen.rendering.backend import Renderer, open_renderer
 from aerialdojo_gen.scenes.model import Scene
 
 Pictures = dict[str, NDArray[np.uint8]]
 Depths = dict[str, NDArray[np.float32]]
 
 
-def look(scene: Scene, sensors: Sensors, position: Point, yaw_rad: float) -> tuple[Pictures, Depths]:
+# Renderers of the scenes last looked at, the newest last: several environments of a process may be in two scenes.
+_KEPT = 2
+_renderers: list[tuple[weakref.ref[Scene], str, Renderer]] = []
+
+
+# The process that has drawn by OpenGL. A fork of it would wait for ever for threads that it does not have.
+_drawn_by_gl: list[int] = []
+
+
+def _renderer(scene: Scene, name: str) -> Renderer:
+    if _drawn_by_gl and os.getpid() not in _drawn_by_gl:
+        raise RenderError(
+            "this process was forked from one that has drawn by OpenGL: start it by spawn "
+            "(gymnasium.make_vec: vector_kwargs={'context': 'spawn'}), or take renderer='pybullet' in both"
+        )
+    for i, (of, its_name, known) in enumerate(_renderers):
+        if of() is scene and its_name == name:
+            _renderers.append(_renderers.pop(i))
+            return known
+    while len(_renderers) >= _KEPT:
+        _renderers.pop(0)[2].close()
+    renderer = open_renderer(scene, name)
+    _renderers.append((weakref.ref(scene), name, renderer))
+    if renderer.name == "gl":
+        _drawn_by_gl[:] = [os.getpid()]
+    return renderer
+
+
+def look(
+    scene: Scene, sensors: Sensors, position: Point, yaw_rad: float, renderer: str = "auto"
+) -> tuple[Pictures, Depths]:
     """Render the views of a body.
 
     Parameters
@@ -25,6 +59,8 @@ def look(scene: Scene, sensors: Sensors, position: Point, yaw_rad: float) -> tup
     position : tuple of float
         The body's centre, metres, world frame.
     yaw_rad : float
+    renderer : str
+        As for `aerialdojo_gen.rendering.backend.open_renderer`.
 
     Returns
     -------
@@ -37,16 +73,14 @@ def look(scene: Scene, sensors: Sensors, position: Point, yaw_rad: float) -> tup
     depth_m: Depths = {}
     if sensors.blind:
         return rgb, depth_m
-    world = render_world(scene)
+    takes = _renderer(scene, renderer)
     for view in sensors.views:
-        pose = view_pose(position, yaw_rad, view)
+        picture = takes.render(sensors.camera, view_pose(position, yaw_rad, view))
         if sensors.rgb:
-            picture = world.render(sensors.camera, pose)
-            rgb[view], depth = np.array(picture.rgb), picture.depth_m
-        else:
-            depth = world.rasterise(sensors.camera, pose)[1]
+            rgb[view] = picture.rgb
         if sensors.depth:
-            depth_m[view] = np.where(depth <= sensors.max_depth_m, depth, np.float32(0.0))
+            within = picture.depth_m <= np.float32(sensors.max_depth_m)
+            depth_m[view] = np.where(within, picture.depth_m, np.float32(0.0))
     return rgb, depth_m
 
 

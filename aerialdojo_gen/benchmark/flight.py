@@ -29,6 +29,9 @@ class Flight:
     success_radius_m : float
     embodiment : Embodiment
         The body.
+    renderer : str
+        ``"gl"``, ``"pybullet"``, or ``"auto"`` for the fastest that works here; what they draw differs by a few
+        grey levels.
 
     Attributes
     ----------
@@ -52,9 +55,11 @@ class Flight:
         sensors: Sensors,
         success_radius_m: float = SUCCESS_RADIUS_M,
         embodiment: Embodiment | None = None,
+        renderer: str = "auto",
     ) -> None:
         self._data = data.absolute()
         self._body = embodiment or Embodiment()
+        self.renderer = renderer
         self.sensors = sensors
         self.success_radius_m = success_radius_m
 
@@ -78,5 +83,5 @@ class Flight:
     def observe(self) -> Observation:
         """Return what the agent has before its next action."""
         episode = self.episode
-        rgb, depth_m = look(self.space.scene, self.sensors, episode.position, episode.yaw_rad)
+        rgb, depth_m = look(self.space.scene, self.sensors, episode.position, episode.yaw_rad, self.renderer)
         return Observation(episode.n_actions, episode.remaining_actions, episode.refused, rgb, depth_m)

@@ -51,6 +51,8 @@ class Evaluation:
         In place of those that the agent asks for.
     embodiment : Embodiment
         The body.
+    renderer : str
+        As for `aerialdojo_gen.rendering.backend.open_renderer`; the log of an agent that looks depends on it.
     attempts : int
         How often an episode is begun before it is logged as failed.
     pause_s : float
@@ -63,6 +65,7 @@ class Evaluation:
     selection: Selection = field(default_factory=Selection)
     sensors: Sensors | None = None
     embodiment: Embodiment = field(default_factory=Embodiment)
+    renderer: str = "auto"
     attempts: int = 5
     pause_s: float = 1.0
 
@@ -78,6 +81,7 @@ class Evaluation:
             "options": dict(self.options),
             **asdict(self.selection),
             "sensors": asdict(self.sensors) if self.sensors else None,
+            "renderer": self.renderer,
             "embodiment": self.embodiment.model_dump(),
         }
 

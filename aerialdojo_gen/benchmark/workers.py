@@ -32,7 +32,7 @@ def worker(data: Path, evaluation: Evaluation) -> Iterator[Worker]:
     agent = load_agent(evaluation.agent, **evaluation.options)
     wanted: Any = getattr(agent, "sensors", None)
     sensors = evaluation.sensors or (wanted if isinstance(wanted, Sensors) else Sensors())
-    flight = Flight(data, sensors, embodiment=evaluation.embodiment)
+    flight = Flight(data, sensors, embodiment=evaluation.embodiment, renderer=evaluation.renderer)
     try:
         yield Worker(agent, flight, data, evaluation.identity(), evaluation.attempts, evaluation.pause_s)
     finally:

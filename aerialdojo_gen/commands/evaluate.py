@@ -48,6 +48,7 @@ def evaluate(
     ] = None,
     width: Annotated[int | None, typer.Option("--width", min=1, help="Columns; in place of the agent's own.")] = None,
     height: Annotated[int | None, typer.Option("--height", min=1, help="Rows; in place of the agent's own.")] = None,
+    renderer: Annotated[str, typer.Option("--renderer", help="auto, gl or pybullet.")] = "auto",
     out: Annotated[
         Path | None, typer.Option("--out", help="Where the log goes.  (default: the data directory)")
     ] = None,
@@ -81,6 +82,7 @@ def evaluate(
         Selection(splits, settings, modalities, scenes, limit, seed),
         _sensors(agent, options, view, width, height),
         config.embodiment,
+        renderer,
         attempts,
     )
     reporter = Reporter(quiet=quiet)
