@@ -83,7 +83,10 @@ def test_tables_of_part_of_the_scenes_say_so(tmp_path: Path) -> None:
     write_run(tmp_path, "a", "oracle", 2, ["U_Mall_0"])
     (run,) = load_runs(tmp_path)
     main, family, *_ = tables.tables_of([run], [AT_3])
-    assert main.notes[1] == "oracle: no episodes of Natural, Infrastructure, Disaster; overall is the mean of the others."
+    assert (
+        main.notes[1]
+        == "oracle: no episodes of Natural, Infrastructure, Disaster; overall is the mean of the others."
+    )
     assert "±" not in main.rows[0][1][1]
     assert dict(family.rows)["oracle"][5:] == ("–",) * 15
 
@@ -109,7 +112,9 @@ def test_the_terminal_has_aligned_columns(runs: list[Run]) -> None:
 
 
 def test_markdown_and_latex_have_every_cell_and_escape_the_rest(runs: list[Run]) -> None:
-    table = tables.Table("T_1", "agent", (("", ("n",)), ("50 %", ("a ↑", "b"))), ((NASTY, ("1", "2 ± 3", "–")),), ("N & M",))
+    table = tables.Table(
+        "T_1", "agent", (("", ("n",)), ("50 %", ("a ↑", "b"))), ((NASTY, ("1", "2 ± 3", "–")),), ("N & M",)
+    )
     markdown = formats.as_markdown(table).splitlines()
     assert markdown[2] == "| agent | n | 50 %: a ↑ | 50 %: b |"
     assert markdown[3] == "| --- | ---: | ---: | ---: |"
@@ -153,7 +158,7 @@ def test_figures_are_the_same_bytes_each_time_and_say_no_date(runs: list[Run]) -
         assert ET.fromstring(svg).tag == "{http://www.w3.org/2000/svg}svg"
         picture = cv2.imdecode(np.frombuffer(png, np.uint8), cv2.IMREAD_COLOR)
         assert min(picture.shape[:2]) > 600
-        colours = {tuple(c) for c in picture.reshape(-1, 3)[:: 7]}
+        colours = {tuple(c) for c in picture.reshape(-1, 3)[::7]}
         # Every run's line is there, in its own colour (blue, green, red).
         for colour in ((178, 114, 0), (0, 94, 213), (115, 158, 0)):
             assert colour in colours

@@ -23,9 +23,9 @@ from aerialdojo_gen.benchmark.episodes import read_run
 from aerialdojo_gen.benchmark.eyes import look
 from aerialdojo_gen.benchmark.goal import Sensors
 from aerialdojo_gen.benchmark.runs import Run
-from aerialdojo_gen.benchmark.topdown import TopDown
 from aerialdojo_gen.errors import StoreError
 from aerialdojo_gen.release.browse import ReleasedScene
+from aerialdojo_gen.rendering.orthographic import OrthographicPictures, Plane
 from aerialdojo_gen.schemas import ACTION_NAMES
 
 _MAP_PX = 640
@@ -182,7 +182,6 @@ def replays(
         target = scene.object(route["target_object_id"])
         flights = [_flight(scene, run, row, steps[run.name], frames) for run, row in flown]
         low, high = _extent(flights, route, target)
-        ground = _ground(data, episode["scene"]).picture(low, high, _MAP_PX)
         yield Replay(
             instances[0],
             {f"goal_{a}_m": route[f"goal_{a}_m"] for a in "xyz"}
@@ -191,7 +190,7 @@ def replays(
             {name: route[name] for name in ("x_m", "y_m", "z_m", "length_m")},
             (float(low[0]), float(low[1])),
             (float(high[0]), float(high[1])),
-            _jpeg(ground, 82),
+            _jpeg(_map(scene, low, high), 82),
             flights,
         )
 
@@ -202,8 +201,15 @@ def _scene(data: Path, name: str) -> ReleasedScene:
 
 
 @lru_cache(maxsize=4)
-def _ground(data: Path, name: str) -> TopDown:
-    return TopDown(_scene(data, name).model)
+def _pictures(scene: ReleasedScene) -> OrthographicPictures:
+    return OrthographicPictures(scene.model)
+
+
+def _map(scene: ReleasedScene, low: NDArray[np.float64], high: NDArray[np.float64]) -> NDArray[np.uint8]:
+    above = max(float(instance.bounds[1, 2]) for instance in scene.model.instances) + 1.0
+    east, north = np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0])
+    plane = Plane(np.array([0.0, 0.0, above]), east, north, (low[0], high[0], low[1], high[1]))
+    return _pictures(scene).take(plane, float(high[0] - low[0]) / _MAP_PX)
 
 
 def _flight(scene: ReleasedScene, run: Run, episode: dict[str, Any], steps: Any, frames: bool) -> Flight:
