@@ -1,0 +1,57 @@
+"""A real browser for the tests of the pages."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import pytest
+
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
+DRIVER = shutil.which("chromedriver")
+
+
+@contextmanager
+def chromium(what: str) -> Iterator[Any]:
+    """Start a headless Chromium with a window of 1280 × 720; skips where there is none, saying what is not tested."""
+    if CHROMIUM is None or DRIVER is None:
+        pytest.skip(f"no Chromium here: {what} is NOT tested (apt-get install chromium chromium-driver)")
+    from selenium import webdriver
+
+    profile = tempfile.mkdtemp(prefix="aerialdojo-chromium-")
+    options = webdriver.ChromeOptions()
+    options.binary_location = CHROMIUM
+    for argument in (
+        "--headless=new", "--disable-background-networking", "--disable-component-update", "--disable-sync",
+        "--no-first-run", "--enable-unsafe-swiftshader", "--window-size=1280,720", f"--user-data-dir={profile}",
+        *(["--no-sandbox"] if os.geteuid() == 0 else []),
+    ):  # fmt: skip
+        options.add_argument(argument)
+    options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
+    driver = webdriver.Chrome(options=options, service=webdriver.ChromeService(DRIVER))
+    try:
+        screen = {"width": 1280, "height": 720, "deviceScaleFactor": 1, "mobile": False}
+        driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", screen)
+        yield driver
+    finally:
+        driver.quit()
+        shutil.rmtree(profile, ignore_errors=True)
+
+
+def until(what: str, test: Callable[[], Any], seconds: float = 60.0) -> Any:
+    """Wait until a test gives something true, and give it."""
+    end = time.monotonic() + seconds
+    while not (found := test()):
+        assert time.monotonic() < end, f"{what}: not within {seconds} s"
+        time.sleep(0.05)
+    return found
+
+
+def errors(driver: Any) -> list[str]:
+    """What the page complained of on the console, less the driver's own performance hints."""
+    return [entry["message"] for entry in driver.get_log("browser") if entry["level"] == "SEVERE"]
