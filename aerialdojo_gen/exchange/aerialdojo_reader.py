@@ -31,6 +31,7 @@ _PAIR = re.compile(r"(\d{1,9})_(\d{1,9})__(\d{1,9})")
 _STEP = ("position_ned_m", "quaternion_xyzw")
 _KNOWN = {"action", *_STEP}
 _START_FAR_M = 0.01
+_EXACT = 1e-6
 
 
 def task_files(path: Path) -> list[Path]:
@@ -220,9 +221,9 @@ def _route(document: Fields, context: Context) -> Route:
         if not isinstance(step, dict):
             raise BadField(where, f"expected an object, found {shown(step)}")
         word = step.get("action")
-        if (word != "start") if k == 0 else (word not in WORDS):
-            known = "start" if k == 0 else ", ".join(WORDS)
-            raise BadField(f"{where}.action", f"unknown action {shown(word)}: known are {known}")
+        known = ["start"] if k == 0 else [*WORDS, "stop"] if k == len(steps) - 1 else list(WORDS)
+        if word not in known:
+            raise BadField(f"{where}.action", f"unknown action {shown(word)}: known here are {', '.join(known)}")
         words.append(str(word))
         for name in _STEP:
             if name not in step:
@@ -238,6 +239,11 @@ def _route(document: Fields, context: Context) -> Route:
     attitudes = quaternions_of(columns[quaternion], lambda k: document.path(f"trajectory[{k}].{quaternion}"))
     yaws = context.frame.quaternion_to_world_yaw(attitudes)
     poses = np.column_stack([context.frame.positions_to_world(points), yaws])
+    if words[-1] == "stop":
+        # The published files leave it out, the recorder appends it: it leads nowhere.
+        if np.abs(poses[-1] - poses[-2]).max() > _EXACT:
+            raise BadField(document.path(f"trajectory[{len(steps) - 1}]"), "stop is not where the trajectory was")
+        words, poses = words[:-1], poses[:-1]
     ours, error = actions_of(words[1:], poses)
     if ours is None:
         context.notes["has moves that are none of ours: action is null, source_action has them"] += 1
