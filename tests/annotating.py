@@ -78,10 +78,15 @@ def chromium() -> Iterator[object]:
 
 
 def until(what, test, seconds: float = 40.0):
-    """Wait until a test gives something true, and give it."""
+    """Wait until a test gives something true, and give it; what the page is just building anew counts as not yet."""
+    from selenium.common.exceptions import NoSuchElementException, StaleElementReferenceException
+
     end = time.monotonic() + seconds
     while True:
-        found = test()
+        try:
+            found = test()
+        except (NoSuchElementException, StaleElementReferenceException):
+            found = None
         if found:
             return found
         assert time.monotonic() < end, f"{what}: not within {seconds} s"

@@ -118,13 +118,12 @@ def test_the_checks_of_the_import_while_typing(client, desk):
     assert said(f"A {other} delivery van.") == [f"it is called {other!r}, and the mesh is not"]
     assert any("full stop" in text for text in said("A red delivery van"))
     assert any("not for people" in text for text in said("The thing delivery_van_000."))
-    # One that fits another bench as well.
-    twins = {}
-    for entry in client.get("/api/document").json()["objects"]:
-        twins.setdefault((entry["category"], entry["landmark"], entry["direction"]), []).append(entry)
-    pair = next(group for group in twins.values() if len(group) > 1)
-    word = client.get("/api/facts").json()["categories"][pair[0]["category"]]
-    assert any(text.startswith("ambiguous: it fits") for text in said(f"A {word}.", pair[0]["id"]))
+    # Two walls stand south-east of the traffic light.
+    wall = {"node": "wall_000", "category": "wall", "name": "wall", "description": "A wall."}
+    operation = {"do": "add", "kind": "objects", "fields": wall}
+    (fault,) = client.post("/api/draft", json=AUTHOR | {"operation": operation}).json()["faults"]
+    assert fault["field"] == "description"
+    assert fault["message"].startswith("ambiguous: it fits wall_007 as well, south-east of the same landmark")
     assert desk.storage.path.read_bytes() == before
 
 

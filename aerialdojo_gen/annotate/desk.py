@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 import threading
 from collections.abc import Sequence
@@ -9,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from aerialdojo_gen.annotate import boxes
 from aerialdojo_gen.annotate.anchors import AnchorDesk
 from aerialdojo_gen.annotate.document import Add, Change, ConflictError, Operation, apply, edits_of, find
 from aerialdojo_gen.annotate.history import Record
@@ -23,8 +25,11 @@ from aerialdojo_gen.errors import AerialDojoError, UsageError
 from aerialdojo_gen.geometry.rays import RayCaster
 from aerialdojo_gen.paper import paper_counts
 from aerialdojo_gen.scenes.catalogue import load_catalogue
+from aerialdojo_gen.scenes.cuts import cut_out
 from aerialdojo_gen.scenes.model import Scene
+from aerialdojo_gen.scenes.recipe import Cut
 from aerialdojo_gen.stage import Job, Roots
+from aerialdojo_gen.web.payload import scene_payload
 
 _PATH = re.compile(r"^(landmarks|objects)\[(\d+)\](?:\.(\w+))?")
 _MENTION = re.compile(r"\b(landmarks|objects)\[(\d+)\]")
@@ -47,18 +52,24 @@ class Desk:
     """
 
     def __init__(self, name: str, pipeline: Pipeline, roots: Roots) -> None:
-        self.scene: Scene = Job("annotate", name, 0, 1, pipeline.seed, pipeline.embodiment, roots).scene_model()
         self.storage = Storage(roots.annotations, name)
         self.storage.load()
+        self._pipeline, self._roots = pipeline, roots
         catalogue = load_catalogue(roots.scene_assets)
         self._names = {category: catalogue[category].name for category in catalogue}
         self._targets = catalogue.targets
         self._counts = paper_counts().get(name) if pipeline.annotate_import.paper_counts else None
+        self._lock = threading.RLock()  # the geometry remembers as it goes
+        self._open_scene()
+
+    def _open_scene(self) -> None:
+        name, pipeline = self.storage.scene, self._pipeline
+        self.scene: Scene = Job("annotate", name, 0, 1, pipeline.seed, pipeline.embodiment, self._roots).scene_model()
+        self.payload = scene_payload(self.scene)
         self._geometry = SceneGeometry(self.scene)
         self._rays = RayCaster(self.scene)
-        self._lock = threading.RLock()  # the geometry remembers as it goes
         self._described: tuple[str, dict[str, Any]] | None = None
-        self.anchors = AnchorDesk(self.scene, pipeline, roots)
+        self.anchors = AnchorDesk(self.scene, pipeline, self._roots)
 
     # What the page shows.
 
@@ -235,6 +246,7 @@ class Desk:
             "category": instance.category,
             "word": self._names.get(instance.category, spoken(instance.category)),
             "attributes": instance.attributes,
+            "boxed": node in boxes.nodes(self._roots.recipes / f"{self.scene.name}.toml"),
             "size_m": np.ptp(instance.bounds, axis=0).round(2).tolist(),
             **self._place(node),
             **self.bearing(self.storage.load().annotations, node),
@@ -246,6 +258,54 @@ class Desk:
         if found is None or not isinstance(found[1], Object) or found[1].node not in self.scene:
             raise UsageError(f"there is no object {object_id} with a node in the scene")
         return found[1]
+
+    # Boxes, where a foreign mesh has no node for a thing.
+
+    def cut(self, low_m: Sequence[float], high_m: Sequence[float], category: str) -> dict[str, Any]:
+        """Make a node of what lies in a box, in the scene's recipe and in the scene.
+
+        Parameters
+        ----------
+        low_m, high_m : (3,) sequence of float
+            Corners, metres, world frame.
+        category : str
+            Of the new node.
+
+        Returns
+        -------
+        dict
+            What is known of the new node.
+
+        Raises
+        ------
+        AerialDojoError
+            The scene is not an imported one, or the box is empty.
+        """
+        slug = re.sub(r"[^a-z0-9]+", "_", category.lower()).strip("_")[:60]
+        if not slug:
+            raise AerialDojoError("give the thing a category")
+        low, high = np.minimum(low_m, high_m).round(3), np.maximum(low_m, high_m).round(3)
+        with self._lock, self.storage.locked():
+            node = next(n for k in itertools.count() if (n := f"{slug}_{k:03d}") not in self.scene)
+            cut = Cut(node=node, category=slug, low_m=tuple(low.tolist()), high_m=tuple(high.tolist()))
+            cut_out(self.scene, (cut,))
+            boxes.add(self._roots.recipes / f"{self.scene.name}.toml", cut)
+            self._rebuild()
+        return self.about(node)
+
+    def uncut(self, node: str) -> None:
+        """Take a box away; `AerialDojoError` where its node is annotated, or no box made it."""
+        annotations = self.storage.load().annotations
+        if node in {e.node for e in annotations.landmarks} | {e.node for e in annotations.objects}:
+            raise AerialDojoError(f"{node} is annotated: remove its entry first")
+        with self._lock, self.storage.locked():
+            boxes.remove(self._roots.recipes / f"{self.scene.name}.toml", node)
+            self._rebuild()
+
+    def _rebuild(self) -> None:
+        build(self.scene.name, self._pipeline, self._roots)
+        self.anchors.close()
+        self._open_scene()
 
     def _check_anchor(self, object_id: int, anchor: Anchor) -> None:
         try:
@@ -290,10 +350,17 @@ def open_desk(name: str, pipeline: Pipeline, roots: Roots) -> Desk:
         Its annotation file cannot be read.
     """
     from aerialdojo_gen import runner
-    from aerialdojo_gen.progress import Reporter
 
     scenes = runner.choose_scenes([name], runner.known_scenes(roots.recipes))
     if len(scenes) > 1:
         raise UsageError(f"{name} are {len(scenes)} scenes ({', '.join(scenes[:3])}, ...): annotate one at a time")
-    runner.run(runner.stages_named(("build-scenes",)), scenes, pipeline, roots, reporter=Reporter(quiet=True))
+    build(scenes[0], pipeline, roots)
     return Desk(scenes[0], pipeline, roots)
+
+
+def build(scene: str, pipeline: Pipeline, roots: Roots) -> None:
+    """Bring a scene's mesh up to date with its recipe."""
+    from aerialdojo_gen import runner
+    from aerialdojo_gen.progress import Reporter
+
+    runner.run(runner.stages_named(("build-scenes",)), [scene], pipeline, roots, reporter=Reporter(quiet=True))

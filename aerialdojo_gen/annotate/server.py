@@ -19,7 +19,6 @@ from aerialdojo_gen.annotate.desk import Desk
 from aerialdojo_gen.annotate.document import ConflictError, Operation
 from aerialdojo_gen.annotate.storage import Author, StaleError
 from aerialdojo_gen.errors import AerialDojoError
-from aerialdojo_gen.web.payload import scene_payload
 from aerialdojo_gen.web.serving import local_app
 
 STATIC = Path(__file__).resolve().parent / "static"
@@ -71,6 +70,14 @@ class Ray(_Body):
     direction: _Triple
 
 
+class Box(_Body):
+    """A box around a thing for which the mesh has no node."""
+
+    low_m: _Triple
+    high_m: _Triple
+    category: Annotated[StrictStr, Field(min_length=1, max_length=60)]
+
+
 class Viewpoint(_Body):
     """A place to look at an object from; without a yaw it faces it, with `snap` it is moved to the standoff."""
 
@@ -94,7 +101,6 @@ def make_app(desk: Desk, *, any_host: bool = False) -> FastAPI:
     fastapi.FastAPI
     """
     app = local_app(str(STATIC / "index.html"), f"annotate {desk.scene.name}", MOST_BYTES, any_host=any_host)
-    payload = scene_payload(desk.scene)
 
     @app.exception_handler(RequestValidationError)
     def malformed(_: Request, error: Exception) -> JSONResponse:
@@ -120,7 +126,7 @@ def make_app(desk: Desk, *, any_host: bool = False) -> FastAPI:
 
     @app.get("/api/scene")
     def scene() -> Response:
-        return Response(payload, media_type="application/octet-stream")
+        return Response(desk.payload, media_type="application/octet-stream")
 
     @app.get("/api/facts")
     def facts() -> dict[str, Any]:
@@ -159,6 +165,15 @@ def make_app(desk: Desk, *, any_host: bool = False) -> FastAPI:
     @app.get("/api/nodes/{node}")
     def about(node: str) -> dict[str, Any]:
         return desk.about(node) if node in desk.scene else {}
+
+    @app.post("/api/boxes")
+    def cut(body: Box) -> dict[str, Any]:
+        return desk.cut(body.low_m, body.high_m, body.category)
+
+    @app.delete("/api/boxes/{node}")
+    def uncut(node: str) -> dict[str, Any]:
+        desk.uncut(node)
+        return {}
 
     @app.get("/api/objects/{object_id}/anchors")
     def anchors(object_id: _Object) -> list[dict[str, Any]]:

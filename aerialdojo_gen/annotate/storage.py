@@ -99,7 +99,7 @@ class Storage:
             It is no annotation file, or one of another scene: nothing can be saved until that is mended.
         """
         if self._temporary.exists():
-            with self._locked():
+            with self.locked():
                 self._recover()
         return self._load()
 
@@ -178,7 +178,7 @@ class Storage:
     def _commit(
         self, version: str, author: Author, action: Action, edits_of_state: Callable[[State], Sequence[Edit]]
     ) -> tuple[State, Record | None]:
-        with self._locked():
+        with self.locked():
             self._recover()
             state = self._load()
             if state.version != version:
@@ -243,7 +243,8 @@ class Storage:
             self._temporary.unlink()
 
     @contextlib.contextmanager
-    def _locked(self) -> Iterator[None]:
+    def locked(self) -> Iterator[None]:
+        """Keep everybody else who changes this scene waiting."""
         # The history file is the lock, too: it is never replaced, so that all see the same one.
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)

@@ -13,6 +13,7 @@ import numpy as np
 from aerialdojo_gen.errors import AssetError
 from aerialdojo_gen.scenes import layouts
 from aerialdojo_gen.scenes.catalogue import Catalogue
+from aerialdojo_gen.scenes.cuts import cut_out
 from aerialdojo_gen.scenes.glb import read_glb
 from aerialdojo_gen.scenes.materials import nearest
 from aerialdojo_gen.scenes.model import Scene
@@ -64,17 +65,18 @@ def build_scene(recipe_path: Path, catalogue: Catalogue) -> Scene:
 
 
 def _imported(recipe_path: Path, imported: Imported) -> Scene:
-    """Read the mesh that ``add-scene`` put beside the recipe; ceiling, sky and sun are the recipe's."""
+    """Read the mesh that ``add-scene`` put beside the recipe; ceiling, sky, sun and boxes are the recipe's."""
     path = recipe_path.with_suffix(".glb")
     scene = read_glb(path)
     bounds = scene.bounds.copy()
     bounds[1, 2] = imported.ceiling_m
     sun = np.asarray(imported.sun) / np.linalg.norm(imported.sun)
     red, green, blue = (int(imported.sky[k : k + 2], 16) for k in (1, 3, 5))
-    return Scene(
+    whole = Scene(
         recipe_path.stem, scene.instances, scene.materials, bounds, (red, green, blue),
         (float(sun[0]), float(sun[1]), float(sun[2])), imported=True,
     )  # fmt: skip
+    return cut_out(whole, imported.cuts) if imported.cuts else whole
 
 
 def _layout(recipe: Recipe, path: Path) -> ModuleType:

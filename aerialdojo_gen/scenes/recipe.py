@@ -67,6 +67,25 @@ class Recipe(BaseModel):
         return float(x), float(y), float(z)
 
 
+class Cut(BaseModel):
+    """A box that a person drew around a thing for which a foreign mesh has no node.
+
+    Attributes
+    ----------
+    node, category : str
+        Of the new node.
+    low_m, high_m : (x, y, z)
+        Corners, metres, world frame.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    node: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_]{0,79}$")
+    category: str = Field(pattern=r"^[a-z0-9][a-z0-9_]{0,59}$")
+    low_m: tuple[float, float, float]
+    high_m: tuple[float, float, float]
+
+
 class Imported(BaseModel):
     """Where a scene comes from that ``add-scene`` made of a mesh, and what may still be set of it.
 
@@ -86,6 +105,8 @@ class Imported(BaseModel):
         ``"#rrggbb"``.
     sun : (float, float, float)
         Direction towards the sun, of any length.
+    cuts : tuple of Cut
+        Things that people boxed out of it, with the annotation tool.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -98,6 +119,7 @@ class Imported(BaseModel):
     ceiling_m: Positive
     sky: Colour = "#96bee6"
     sun: tuple[float, float, float] = (0.45, -0.35, 0.82)
+    cuts: tuple[Cut, ...] = ()
 
 
 def load_imported(path: Path) -> Imported | None:

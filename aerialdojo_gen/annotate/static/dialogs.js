@@ -61,6 +61,7 @@ export async function showHistory() {
 const KEYS = [
   ["O", "make the picked thing an object"], ["L", "make it a landmark"], ["N", "next unfinished object"],
   ["J", "next in the list"], ["K", "one before in the list"], ["1 2 3", "choose an anchor (Alt+1 … in a field)"],
+  ["B", "box out a thing (imported scenes)"],
   ["V", "place an anchor from this view"], ["G", "go to the selection"], ["F", "fly or orbit"], ["T", "look from above"],
   ["H", "the whole scene"], ["Space", "pick what is in the middle of the view"], ["/", "find"], ["Enter", "to the fields"],
   ["Esc", "out of a field; nothing selected"], ["Ctrl+Enter", "next unfinished, from a field"], ["Ctrl+Z", "undo"],

@@ -48,7 +48,9 @@ export class Editor {
         h("dt", {}, "Location"), h("dd", {}, facts.landmark ? `${facts.direction} of the ${facts.landmark}` : "no landmark yet")),
       h("div", { class: "row" },
         h("button", { id: "make-object", class: "main", onclick: () => this.page.add("objects") }, "Make it an object ", h("kbd", {}, "O")),
-        h("button", { id: "make-landmark", onclick: () => this.page.add("landmarks") }, "Make it a landmark ", h("kbd", {}, "L"))));
+        h("button", { id: "make-landmark", onclick: () => this.page.add("landmarks") }, "Make it a landmark ", h("kbd", {}, "L")),
+        this.page.facts.imported && h("button", { id: "box-out", onclick: () => this.page.boxOut() }, "Box out a part ", h("kbd", {}, "B")),
+        facts.boxed && h("button", { id: "uncut", class: "danger", onclick: () => this.page.box.uncut(facts.node) }, "Take the box away")));
   }
 
   form() {

@@ -2,6 +2,7 @@
 import { addCompass } from "/static/compass.js";
 import { SceneView } from "/static/scene.js";
 import { candidatesOf } from "./anchors.js";
+import { BoxDrawer, edges } from "./box.js";
 import { askConflict, showHelp, showHistory } from "./dialogs.js";
 import { byId, h, toast } from "./dom.js";
 import { Editor } from "./editor.js";
@@ -23,6 +24,7 @@ class Page {
     this.sync = new Sync(this.facts.scene, () => byId("who").value, askConflict);
     this.list = new List((selection) => this.select(selection));
     this.editor = new Editor(this);
+    this.box = new BoxDrawer(this);
     this.sync.addEventListener("document", () => this.documentChanged());
     this.sync.addEventListener("status", ({ detail }) => this.status(detail));
     this.sync.addEventListener("other", ({ detail }) => toast(detail));
@@ -33,6 +35,7 @@ class Page {
     this.editor.show(null);
     this.buttons();
     this.keys();
+    await this.selectFromAddress();
     this.view.onPick((hit, event) => this.clicked(hit, event));
     this.view.onHover((hit) => this.hover(hit));
     document.body.dataset.ready = "true";
@@ -41,6 +44,14 @@ class Page {
   whoAreYou() {
     byId("who").value = localStorage.getItem("aerialdojo-annotate-who") ?? "";
     byId("who").addEventListener("change", () => localStorage.setItem("aerialdojo-annotate-who", byId("who").value));
+  }
+
+  /** Select the node that the address names: after a box was cut out, the page is loaded anew. */
+  async selectFromAddress() {
+    const node = decodeURIComponent(location.hash.slice(1));
+    if (!node || !this.view.index.has(node)) return;
+    this.select(this.entryOfNode(node) ?? { node: await (await fetch(`/api/nodes/${encodeURIComponent(node)}`)).json() });
+    this.view.focusOn(node);
   }
 
   say(text, wrong = false) { toast(text, wrong); }
@@ -53,6 +64,7 @@ class Page {
   // ---- what is selected ----
 
   select(selection, { go = true, focus = false } = {}) {
+    this.box.stop();
     this.selection = selection;
     this.editor.show(selection);
     this.list.render(this.sync.doc, selection);
@@ -72,9 +84,8 @@ class Page {
       return;
     }
     const [low, high] = [0, 3].map((at) => [...this.view.payload.boxes.subarray(6 * k + at, 6 * k + at + 3)]);
-    const corner = (bits) => [0, 1, 2].map((axis) => (bits >> axis & 1 ? high[axis] + 0.05 : low[axis] - 0.05));
-    const edges = [0, 1, 2, 3, 4, 5, 6, 7].flatMap((a) => [1, 2, 4].filter((bit) => !(a & bit)).map((bit) => [...corner(a), ...corner(a | bit)]));
-    this.view.addRoutes("frame", edges.map((points, id) => ({ id, points, colour: "#38bdf8" })), { width: 2.5, opacity: 1, pickable: false });
+    const around = [low.map((v) => v - 0.05), high.map((v) => v + 0.05)];
+    this.view.addRoutes("frame", edges(around).map((points, id) => ({ id, points, colour: "#38bdf8" })), { width: 2.5, opacity: 1, pickable: false });
   }
 
   /** Have the candidates of the next unfinished object ready before somebody asks. */
@@ -103,7 +114,7 @@ class Page {
   }
 
   async clicked(hit, event) {
-    if (hit?.kind === "marker") {
+    if (hit?.kind === "marker" && !this.box.active) {
       const [kind, id] = hit.id.split("-");
       this.select({ kind, id: Number(id) }, { go: false });
       return;
@@ -118,6 +129,10 @@ class Page {
     const response = await fetch("/api/pick", { method: "POST", headers: { "Content-Type": "application/json" },
       body: JSON.stringify({ origin_m, direction }) });
     const facts = await response.json();
+    if (this.box.active) {
+      if (facts) this.box.click(facts.point_m);
+      return;
+    }
     this.select(facts && (this.entryOfNode(facts.node) ?? { node: facts }), { go: false });
   }
 
@@ -152,6 +167,17 @@ class Page {
       ...doc.objects.filter((entry) => entry.position_m).map((entry) => ({ id: `objects-${entry.id}`, position: entry.position_m,
         colour: colour(entry), size: 11 })),
     ]);
+  }
+
+  /** Draw a box around a thing without a node; only a mesh of another make lacks nodes. */
+  boxOut() {
+    if (!this.facts.imported) {
+      this.say("Every thing of this scene has a node: pick it.", true);
+      return;
+    }
+    const point = this.selection?.node?.point_m;
+    this.select(null);
+    this.box.start(point);
   }
 
   async add(kind) {
@@ -242,7 +268,7 @@ class Page {
   keys() {
     const act = {
       o: () => this.add("objects"), l: () => this.add("landmarks"), n: () => this.next(), j: () => this.list.step(1), k: () => this.list.step(-1),
-      g: () => this.goTo(), f: () => this.mode(), t: () => this.view.top(), h: () => this.view.home(), v: () => this.editor.anchors?.fromView(),
+      b: () => this.boxOut(), g: () => this.goTo(), f: () => this.mode(), t: () => this.view.top(), h: () => this.view.home(), v: () => this.editor.anchors?.fromView(),
       1: () => this.editor.anchors?.pick(1), 2: () => this.editor.anchors?.pick(2), 3: () => this.editor.anchors?.pick(3),
       "/": () => byId("find").focus(), "?": showHelp, delete: () => this.remove(), escape: () => this.select(null),
     };

@@ -1,0 +1,74 @@
+"""Things that people box out of a foreign mesh, where the file has no node for them."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aerialdojo_gen.errors import AssetError
+from aerialdojo_gen.imports.colours import colour_name
+from aerialdojo_gen.scenes.mesh import areas
+from aerialdojo_gen.scenes.model import Instance, Part, Scene
+from aerialdojo_gen.scenes.recipe import Cut
+
+
+def cut_out(scene: Scene, cuts: tuple[Cut, ...]) -> Scene:
+    """Make nodes of what lies in boxes.
+
+    Parameters
+    ----------
+    scene : Scene
+        An imported one.
+    cuts : tuple of Cut
+        Boxes, one after another: a triangle whose middle lies in one leaves its instance for the box's own.
+
+    Returns
+    -------
+    Scene
+        The same triangles; an instance that lost all of its own is gone.
+
+    Raises
+    ------
+    AssetError
+        A box is empty, or its node's name is taken.
+    """
+    instances = list(scene.instances)
+    for cut in cuts:
+        if any(instance.node == cut.node for instance in instances):
+            raise AssetError(f"scene {scene.name}: the box {cut.node!r} has the name of a node that is there already")
+        kept: list[Instance] = []
+        inside: list[Part] = []
+        for instance in instances:
+            rest = []
+            for part in instance.parts:
+                boxed = _in_box(part, cut)
+                inside += [_some(part, boxed)] if boxed.any() else []
+                rest += [part if not boxed.any() else _some(part, ~boxed)] if not boxed.all() else []
+            if rest:
+                parts = tuple(rest)
+                kept.append(Instance(instance.node, instance.category, instance.variant, instance.attributes, parts))
+        if not inside:
+            raise AssetError(f"scene {scene.name}: the box {cut.node!r} holds no triangle's middle: make it larger")
+        look = {"colour": colour_name(_colour(scene, inside))}
+        instances = [*kept, Instance(cut.node, cut.category, "", look, tuple(inside))]
+    return Scene(
+        scene.name, tuple(instances), scene.materials, scene.bounds, scene.sky, scene.sun, imported=scene.imported
+    )
+
+
+def _in_box(part: Part, cut: Cut) -> NDArray[np.bool_]:
+    middle = part.vertices[part.faces].mean(axis=1)
+    return np.asarray(((middle >= cut.low_m) & (middle <= cut.high_m)).all(axis=1))
+
+
+def _some(part: Part, faces: NDArray[np.bool_]) -> Part:
+    used, index = np.unique(part.faces[faces], return_inverse=True)
+    return Part(part.vertices[used], index.reshape(-1, 3).astype(np.int32), part.uv[used], part.material)
+
+
+def _colour(scene: Scene, parts: list[Part]) -> tuple[int, int, int]:
+    """Colour of the material that shows most."""
+    shown: dict[str, float] = {}
+    for part in parts:
+        shown[part.material] = shown.get(part.material, 0.0) + float(areas(part.vertices, part.faces).sum())
+    return scene.materials[max(shown, key=lambda name: shown[name])].colour
