@@ -13,7 +13,7 @@ from aerialdojo_gen import __version__, schemas, store
 from aerialdojo_gen.paper import inventory
 from aerialdojo_gen.release.contents import TABLES, check_release, counts, meaning, sizes, unit
 from aerialdojo_gen.release.croissant import CITE_AS
-from aerialdojo_gen.release.stats import Made, made_of
+from aerialdojo_gen.release.stats import Made, in_paper_order, made_of
 
 _SIZES = ((1_000, "n<1K"), (10_000, "1K<n<10K"), (100_000, "10K<n<100K"), (1_000_000, "100K<n<1M"))
 
@@ -72,7 +72,8 @@ def render_card(data: Path) -> str:
     """
     names = check_release(data)
     found = counts(data, names)
-    made = [made_of(data, name) for name in names]
+    made = in_paper_order([made_of(data, name) for name in names])
+    names = [m.scene for m in made]
     objects = [store.read_scene(data, "release/objects", name, ["category"]) for name in names]
     by_setting = _by_setting(made, list(found["tasks"]))
     n_tasks = sum(found["tasks"].values())
