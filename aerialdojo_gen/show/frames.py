@@ -58,13 +58,15 @@ def frames_along(task: FoundTask, count: int) -> list[Frame]:
     RenderError, StoreError
         A recording is damaged, or rendering failed.
     """
+    if count == 0:
+        return []
     route = task.route
     poses = np.column_stack([route["x_m"], route["y_m"], route["z_m"], route["yaw_rad"]])
     steps = sorted({round(k) for k in np.linspace(0, len(poses) - 1, count)})
     pictures = _recorded(task, steps)
     recorded = pictures is not None
     if pictures is None:
-        pictures = _rendered(task, poses[steps]) if steps else []
+        pictures = _rendered(task, poses[steps])
     return [
         Frame(step, schemas.ACTION_NAMES[route["action"][step]], picture, recorded)
         for step, picture in zip(steps, pictures, strict=True)
