@@ -13,7 +13,7 @@ import pytest
 
 from aerialdojo_gen.store import read_info
 
-TABLES = ("meshes", "scenes", "landmarks", "objects", "anchors", "pairs", "plans")
+TABLES = ("meshes", "scenes", "landmarks", "objects", "chosen_anchors", "anchors", "pairs", "plans")
 
 
 def start(project, data, *args, verb="plan", workers=2):
