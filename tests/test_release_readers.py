@@ -84,6 +84,10 @@ for table, split in json.loads(sys.argv[3]):
         (out / "kind.txt").write_text(type(data[0]["reference_image"]).__name__)
         data = data.remove_columns("reference_image")
     feather.write_feather(data.with_format("arrow")[:], str(out / f"{table}-{split}.feather"))
+whole = load_dataset(str(release))
+assert {name: set(part.unique("subset")) for name, part in whole.items()} == {
+    "id_train": {"train"}, "id_test": {"test"}, "ood_train": {"train"}, "ood_test": {"test"}
+}
 os.chdir(release)
 for block in json.loads(sys.argv[4]):
     exec(block, {})
@@ -154,6 +158,8 @@ def test_a_filter_on_setting_or_modality_reads_no_row_in_vain(tmp_path_factory, 
     )
     path = store.write_shard(data, "tasks/train", "U_Test_0", 0, made)
     assert store.read_scene(data, "tasks/train", "U_Test_0").equals(made)
+    again = store.from_rows(schemas.TASKS, made.to_pylist()[::-1])
+    assert store.write_shard(data / "again", "tasks/train", "U_Test_0", 0, again).read_bytes() == path.read_bytes()
     fragments = list(pads.dataset(path, format="parquet").get_fragments())
     queries = [pads.field("scene") == "U_Other_0"]
     queries += [pads.field("modality") == m for m in ("semantic", "image")]

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from handmade import box, instance, scene
 
-from aerialdojo_gen import schemas, store
+from aerialdojo_gen import schemas
 from aerialdojo_gen.paper import inventory, splits
 from aerialdojo_gen.release.comparison import as_csv, as_markdown
 from aerialdojo_gen.release.contents import check_release
@@ -116,15 +116,17 @@ def test_scenes_that_the_paper_lacks_have_no_papers_figures(smoke):
     assert total["instances"] == sum(m.instances for m in made) > 0
 
 
+def stats(*arguments):
+    command = [sys.executable, "-m", "aerialdojo_gen.cli", "stats", *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, check=False)
+
+
 @pytest.fixture(scope="module")
 def drawn(smoke, tmp_path_factory):
     """The figures of the small release, by way of the command, and what it printed."""
     out = tmp_path_factory.mktemp("figures")
-    done = subprocess.run(
-        [sys.executable, "-m", "aerialdojo_gen.cli", "stats", "--data", str(smoke), "--figures", str(out / "drawn"),
-         "--markdown", str(out / "stats.md"), "--csv", str(out / "stats.csv")],
-        capture_output=True, text=True, check=False,
-    )  # fmt: skip
+    files = ["--figures", out / "drawn", "--markdown", out / "stats.md", "--csv", out / "stats.csv"]
+    done = stats("--data", smoke, *files)
     assert done.returncode == 0, done.stderr
     return out, done.stdout
 
@@ -199,10 +201,18 @@ def test_scale_bars_are_round(most, length):
     assert _round_length(most) == pytest.approx(length)
 
 
+def test_a_part_of_the_scenes_is_chosen_by_name_or_glob(smoke):
+    done = stats("--data", smoke, "--scene", "*_1")
+    assert done.returncode == 0, done.stderr
+    assert "U_Courtyard_1" in done.stdout
+    assert "U_Courtyard_0" not in done.stdout
+    done = stats("--data", smoke, "--scene", "U_Courtyard_2")
+    assert done.returncode == 2
+    assert done.stderr == "error: no scene 'U_Courtyard_2'; nearest: U_Courtyard_1, U_Courtyard_0\n"
+
+
 def test_without_a_release_files_are_refused(tmp_path):
-    command = [sys.executable, "-m", "aerialdojo_gen.cli", "stats", "--data", str(tmp_path)]
-    done = subprocess.run([*command, "--csv", str(tmp_path / "x.csv")], capture_output=True, text=True, check=False)
+    done = stats("--data", tmp_path, "--csv", tmp_path / "x.csv")
     assert done.returncode == 2
     assert f"no release in {tmp_path}" in done.stderr
     assert not (tmp_path / "x.csv").exists()
-    assert store.release_scenes(tmp_path) == []
