@@ -51,7 +51,7 @@ def test_runs_are_found_named_and_told_apart(log: Path, tmp_path: Path) -> None:
     assert [run.name for run in load_runs(tmp_path, ["b", "a", "b"])] == ["b", "a"]
     with pytest.raises(StoreError, match=r"no run 'c' in .* \(there are: a, b\)"):
         load_runs(tmp_path, ["c"])
-    with pytest.raises(StoreError, match="no runs in .*: run aerialdojo-gen evaluate"):
+    with pytest.raises(StoreError, match=r"no runs in .*: run aerialdojo-gen evaluate"):
         load_runs(tmp_path / "nothing")
 
 

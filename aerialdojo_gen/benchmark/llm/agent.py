@@ -15,6 +15,7 @@ from aerialdojo_gen.benchmark.goal import Goal, Observation, Sensors
 from aerialdojo_gen.benchmark.llm.answer import parse_answer
 from aerialdojo_gen.benchmark.llm.images import Picture, colour_picture, depth_picture
 from aerialdojo_gen.benchmark.llm.prompt import Turn, goal_text, repair_text, step_text, system_prompt
+from aerialdojo_gen.benchmark.llm.service import Connection
 from aerialdojo_gen.config import explain
 from aerialdojo_gen.errors import UsageError
 
@@ -135,7 +136,7 @@ class LanguageModelAgent(AgentBase):
     stays where it is. That is the fairest of the alternatives: an action guessed at would not be the model's, and
     ending the episode would weigh one slip in 300 steps like a crash.
 
-    Subclasses speak a protocol: they make a client and implement `ask`.
+    Subclasses speak a protocol: they name its package and implement `ask`.
 
     Parameters
     ----------
@@ -148,6 +149,8 @@ class LanguageModelAgent(AgentBase):
         An option is wrong or missing, the package is not installed, or there is no key.
     """
 
+    package = ""
+
     def __init__(self, **options: Any) -> None:
         try:
             self.options = Options.model_validate(options)
@@ -155,7 +158,12 @@ class LanguageModelAgent(AgentBase):
             raise UsageError("; ".join(explain(error, Options))) from None
         o = self.options
         self.sensors = Sensors(o.views, depth=o.depth, width=o.image_size_px, height=o.image_size_px)
+        self.service = Connection(self.package, o.base_url, o.timeout_s, o.request_retries)
         self._begin()
+
+    def close(self) -> None:
+        """Close the connections."""
+        self.service.close()
 
     def ask(self, system: str, messages: Sequence[Message]) -> Reply:
         """Send one request.

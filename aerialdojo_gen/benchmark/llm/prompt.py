@@ -15,7 +15,7 @@ from aerialdojo_gen.schemas import ACTION_NAMES, APPROACH
 CHOICES = ACTION_NAMES[:APPROACH]
 
 _EFFECTS = {
-    "Stop": "end the episode here: you are sure that the target is right in front of you, within a few metres",
+    "Stop": "end the episode; choose it when the target is right in front of you, within a few metres",
     "MoveForward": "fly {} m forward, the way the front camera looks",
     "MoveLeft": "fly {} m to the left without turning",
     "MoveRight": "fly {} m to the right without turning",
@@ -87,8 +87,8 @@ SENSORS
 
 ACTIONS
 {_action_list()}
-Every action is carried out exactly and completely. A move that would leave the flight area is refused: it is spent, \
-and the drone stays where it is.
+Every action is carried out exactly, unless something stands in the way. A move that would leave the flight area is \
+refused: it is spent, and the drone stays where it is.
 
 THE EPISODE ENDS
 - when you choose Stop: a success if the drone is then within {rules.success_radius_m:g} m of the viewpoint in front \

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import email.utils
+import importlib
 import json
 import os
 import time
@@ -16,6 +17,8 @@ MAX_BODY_BYTES = 4 << 20
 # A service may say when to come back; beyond this the runner's own schedule is the better one.
 MAX_WAIT_S = 60.0
 _WORTH_ANOTHER_TRY = (408, 409, 425, 429)
+
+_CLIENTS = {"openai": "OpenAI", "anthropic": "Anthropic"}
 
 Result = TypeVar("Result")
 
@@ -80,66 +83,121 @@ def api_key(variable: str, base_url: str | None) -> str:
     return key or "none"
 
 
-def call(ask: Callable[[], Result], package: Any, service: str, key: str, timeout_s: float, retries: int) -> Result:
-    """Call a service; try again where that may help.
+class Connection:
+    """A client of a service, with its key.
 
     Parameters
     ----------
-    ask : callable
-        The request, by a client whose own retries are off.
-    package : module
-        ``openai`` or ``anthropic``, whose errors are told apart.
-    service : str
-        Name for messages.
-    key : str
-        Never part of a message.
+    package : str
+        ``openai`` or ``anthropic``.
+    base_url : str or None
+        Where the service is; ``OPENAI_BASE_URL`` or ``ANTHROPIC_BASE_URL`` where absent, else the provider's own.
     timeout_s : float
-        For messages.
+        Longest wait for an answer.
     retries : int
         How often a failed request is sent again before the episode is given up.
 
-    Returns
-    -------
-    object
-        What `ask` returns.
+    Attributes
+    ----------
+    client : object
+        The package's client; its own retries are off, so that there is one place that tries again.
+    base_url : str or None
+        As found.
+    name : str
+        For messages.
 
     Raises
     ------
-    AgentUnavailable
-        Time-out, 408, 409, 425, 429, 5xx, a lost connection, or an answer too large.
     UsageError
-        The service refuses the request for good: a wrong key, no such model, an option it does not know.
+        The package is not installed, or there is no key.
     """
-    for attempt in range(retries + 1):
+
+    def __init__(self, package: str, base_url: str | None, timeout_s: float, retries: int) -> None:
         try:
-            return ask()
-        except package.APIError as error:
-            failure = _failure(error, package, service, key, timeout_s)
-        except BodyBoundError as error:
-            # One of the packages wraps what its client raises, the other lets it through.
-            failure = AgentUnavailable(f"{service}: {error}")
-        except json.JSONDecodeError:
-            failure = AgentUnavailable(f"{service}: its answer is no JSON: is base_url right?")
-        if not isinstance(failure, AgentUnavailable):
-            raise failure from None
-        wait_s = failure.retry_after_s if failure.retry_after_s is not None else 2.0**attempt
-        if attempt == retries or wait_s > MAX_WAIT_S:
-            raise failure from None
-        time.sleep(wait_s)
-    raise AssertionError("the last attempt either returns or raises")
+            self._package = importlib.import_module(package)
+        except ImportError:
+            extra = "pip install 'aerialdojo-gen[llm]'"
+            raise UsageError(f"the {package} agent needs the package {package}: {extra}") from None
+        self.base_url = base_url or os.environ.get(f"{package.upper()}_BASE_URL") or None
+        self._key = api_key(f"{package.upper()}_API_KEY", self.base_url)
+        self._timeout_s, self._retries = timeout_s, retries
+        self.name = self.base_url or _CLIENTS[package]
+        self.client = getattr(self._package, _CLIENTS[package])(
+            api_key=self._key,
+            base_url=self.base_url,
+            max_retries=0,
+            timeout=timeout_s,
+            http_client=bounded_client(self._package.DefaultHttpxClient, timeout_s),
+        )
 
+    def call(self, ask: Callable[[Any], Result]) -> Result:
+        """Send a request; send it again where that may help.
 
-def _failure(error: Any, package: Any, service: str, key: str, timeout_s: float) -> AerialDojoError:
-    if isinstance(error, package.APIStatusError):
-        said = _line(getattr(error, "body", None) or error.message, key)
-        message = f"{service}: HTTP {error.status_code}: {said}"
-        if error.status_code in _WORTH_ANOTHER_TRY or error.status_code >= 500:
-            return AgentUnavailable(message, retry_after_s(error.response.headers))
-        return UsageError(message)
-    if isinstance(error, package.APITimeoutError):
-        return AgentUnavailable(f"{service}: no answer within {timeout_s:g} s")
-    cause = error.__cause__ or error
-    return AgentUnavailable(f"{service}: {_line(str(cause) or type(cause).__name__, key)}")
+        Parameters
+        ----------
+        ask : callable
+            Takes the client, returns what the package makes of the answer.
+
+        Returns
+        -------
+        object
+            What `ask` returns.
+
+        Raises
+        ------
+        AgentUnavailable
+            Time-out, 408, 409, 425, 429, 5xx, a lost connection, or an answer too large or of another protocol.
+        UsageError
+            The service refuses the request for good: a wrong key, no such model, an option it does not know.
+        """
+        for attempt in range(self._retries + 1):
+            try:
+                return ask(self.client)
+            except self._package.APIError as error:
+                failure = self._failure(error)
+            except BodyBoundError as error:
+                # One of the packages wraps what its client raises, the other lets it through.
+                failure = AgentUnavailable(f"{self.name}: {error}")
+            except json.JSONDecodeError:
+                failure = self.not_understood("JSON")
+            if not isinstance(failure, AgentUnavailable):
+                raise failure from None
+            wait_s = failure.retry_after_s if failure.retry_after_s is not None else 2.0**attempt
+            if attempt == self._retries or wait_s > MAX_WAIT_S:
+                raise failure from None
+            time.sleep(wait_s)
+        raise AssertionError("the last attempt either returns or raises")
+
+    def not_understood(self, what: str) -> AgentUnavailable:
+        """Make the error for an answer that is not what the protocol says."""
+        return AgentUnavailable(f"{self.name}: its answer is no {what}: is base_url right?")
+
+    def without_key(self, text: str) -> str:
+        """Return a text without the key, should the service have sent it back."""
+        return text.replace(self._key, "[key]") if len(self._key) > 4 else text
+
+    def close(self) -> None:
+        """Close the connections."""
+        self.client.close()
+
+    def _failure(self, error: Any) -> AerialDojoError:
+        if isinstance(error, self._package.APIStatusError):
+            said = self._line(getattr(error, "body", None) or error.message)
+            message = f"{self.name}: HTTP {error.status_code}: {said}"
+            if error.status_code in _WORTH_ANOTHER_TRY or error.status_code >= 500:
+                return AgentUnavailable(message, retry_after_s(error.response.headers))
+            return UsageError(message)
+        if isinstance(error, self._package.APITimeoutError):
+            return AgentUnavailable(f"{self.name}: no answer within {self._timeout_s:g} s")
+        cause = error.__cause__ or error
+        return AgentUnavailable(f"{self.name}: {self._line(str(cause) or type(cause).__name__)}")
+
+    def _line(self, value: Any) -> str:
+        if isinstance(value, dict):
+            inner = value.get("error", value)
+            value = inner.get("message", inner) if isinstance(inner, dict) else inner
+        # The key goes before the text is cut: half a key is too much as well.
+        return " ".join(self.without_key(str(value)).split())[:300]
 
 
 def retry_after_s(headers: Mapping[str, str]) -> float | None:
@@ -155,16 +213,3 @@ def retry_after_s(headers: Mapping[str, str]) -> float | None:
         except (ValueError, TypeError, OverflowError):
             return None
     return max(0.0, seconds) if seconds < float("inf") else None
-
-
-def without_key(text: str, key: str) -> str:
-    """Return a text without the key, should a service have sent it back."""
-    return text.replace(key, "[key]") if len(key) > 4 else text
-
-
-def _line(value: Any, key: str) -> str:
-    if isinstance(value, dict):
-        inner = value.get("error", value)
-        value = inner.get("message", inner) if isinstance(inner, dict) else inner
-    # The key goes before the text is cut: half a key is too much as well.
-    return " ".join(without_key(str(value), key).split())[:300]
