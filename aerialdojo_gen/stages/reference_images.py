@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import hashlib
+import math
+from functools import lru_cache
 from typing import Any
 
 import cv2
@@ -12,13 +14,14 @@ from numpy.typing import NDArray
 from aerialdojo_gen import store
 from aerialdojo_gen.config import ReferenceImagesConfig
 from aerialdojo_gen.errors import RenderError
-from aerialdojo_gen.geometry.cameras import Camera, view_pose
+from aerialdojo_gen.geometry.cameras import Camera, project, view_pose
 from aerialdojo_gen.geometry.rays import RayCaster
 from aerialdojo_gen.rendering.world import ray_caster, render_world
 from aerialdojo_gen.schemas import REFERENCES
 from aerialdojo_gen.stage import Job, Output
 
 _BOX = ("box_u0_px", "box_v0_px", "box_u1_px", "box_v1_px")
+_IN_FRONT_M = 0.05
 
 
 def run(job: Job, config: ReferenceImagesConfig) -> Output:
@@ -60,7 +63,8 @@ def run(job: Job, config: ReferenceImagesConfig) -> Output:
             continue
         pose = view_pose((anchor["x_m"], anchor["y_m"], anchor["z_m"]), anchor["yaw_rad"], "front")
         row["reference_image"] = png(world.render(camera, pose).rgb)
-        mask = instance_map(rays, camera, pose) == index[item["mesh_node"]]
+        k = index[item["mesh_node"]]
+        mask = instance_mask(rays, k, scene.instances[k].vertices, camera, pose)
         row["image_fraction"] = float(mask.mean())
         if mask.any():
             row |= zip(_BOX, box_of(mask), strict=True)
@@ -89,8 +93,53 @@ def instance_map(rays: RayCaster, camera: Camera, world_from_camera: NDArray[np.
     (H, W) int32
         Index into ``rays.nodes``, -1 for the sky.
     """
-    directions = camera.rays().reshape(-1, 3) @ world_from_camera[:3, :3].T
-    return rays.first_hit(world_from_camera[:3, 3], directions)[1].reshape(camera.height, camera.width)
+    return _window(rays, camera, world_from_camera, 0, 0, camera.width, camera.height)
+
+
+def instance_mask(
+    rays: RayCaster, instance: int, vertices: NDArray[np.float64], camera: Camera,
+    world_from_camera: NDArray[np.float64],
+) -> NDArray[np.bool_]:  # fmt: skip
+    """Which pixels show an instance: `instance_map` compared with it, looked at only where the instance can be.
+
+    Parameters
+    ----------
+    rays : RayCaster
+    instance : int
+        Index into ``rays.nodes``.
+    vertices : (n, 3) float64
+        The instance's, metres, world frame.
+    camera : Camera
+    world_from_camera : (4, 4) float64
+
+    Returns
+    -------
+    (H, W) bool
+    """
+    mask = np.zeros((camera.height, camera.width), dtype=np.bool_)
+    uv, depth = project(camera, world_from_camera, vertices)
+    u0, v0, u1, v1 = 0, 0, camera.width, camera.height
+    # What reaches behind the camera has no box in the picture.
+    if depth.min() > _IN_FRONT_M:
+        (low_u, low_v), (high_u, high_v) = uv.min(axis=0), uv.max(axis=0)
+        u0, v0 = max(0, math.floor(low_u) - 1), max(0, math.floor(low_v) - 1)
+        u1, v1 = min(camera.width, math.ceil(high_u) + 1), min(camera.height, math.ceil(high_v) + 1)
+    if u0 < u1 and v0 < v1:
+        mask[v0:v1, u0:u1] = _window(rays, camera, world_from_camera, u0, v0, u1, v1) == instance
+    return mask
+
+
+def _window(
+    rays: RayCaster, camera: Camera, world_from_camera: NDArray[np.float64], u0: int, v0: int, u1: int, v1: int
+) -> NDArray[np.int32]:
+    local = _local_rays(camera)[v0:v1, u0:u1]
+    directions = local.reshape(-1, 3) @ world_from_camera[:3, :3].T
+    return rays.first_hit(world_from_camera[:3, 3], directions)[1].reshape(local.shape[:2])
+
+
+@lru_cache(maxsize=2)
+def _local_rays(camera: Camera) -> NDArray[np.float64]:
+    return camera.rays()
 
 
 def box_of(mask: NDArray[np.bool_]) -> tuple[int, int, int, int]:
