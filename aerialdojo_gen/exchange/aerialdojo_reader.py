@@ -69,6 +69,7 @@ class Reader:
     def __init__(self) -> None:
         self._partition: tuple[str, ...] = ()
         self._known: dict[str, dict[str, Any]] = {}
+        self._met: set[tuple[str, str]] = set()
         self._nav_ids: set[str] = set()
 
     def read(self, record: Fields, context: Context) -> Task:
@@ -79,6 +80,8 @@ class Reader:
         episode = record.name("episode_id")
         if not re.fullmatch(r"[A-Za-z0-9_-]{1,100}", episode):
             raise BadField("episode_id", f"{shown(episode)} cannot name a file")
+        if (context.label, episode) in self._met:
+            raise BadField("episode_id", f"{episode} stands twice in the file")
         scene = record.text("map_name", empty=False)
         word = record.text("task")
         if word not in SETTING_OF:
@@ -115,6 +118,7 @@ class Reader:
             instance = Instance("semantic", description)
         task = Task(episode, scene, start=start, goal=goal, instances=[instance], object_key=target, known=known)
         self._join(task, context, folder, partition)
+        self._met.add((context.label, episode))
         return task
 
     def _picture(self, image: str | None, context: Context) -> Path | None:
@@ -132,24 +136,25 @@ class Reader:
         place = folder.parts[-3:] if partition else folder.parts
         if place != self._partition:
             self._partition, self._known = place, {}
+            self._met = {pair for pair in self._met if pair[0] == context.label}
         met = self._known.get(task.source_id)
         if met is None:
             met = self._trajectory(task, context, folder, partition)
             self._known[task.source_id] = met
         else:
             task.has_route_row = False
-            self._same_place(task, met, context)
+            if float(np.linalg.norm(task.start[:3] - met["start"])) > _START_FAR_M:
+                raise BadField("start_pose.start_position", "is not that of the episode's other instance")
+            if task.known["target_name"] != met["target"]:
+                raise BadField("goal_object_name", "is not that of the episode's other instance")
         task.nav_id, task.goal = met["nav_id"], task.goal if task.goal is not None else met["goal"]
         task.known |= met["known"]
         if task.has_route_row:
             task.route = met.pop("route")
 
-    def _same_place(self, task: Task, met: dict[str, Any], context: Context) -> None:
-        if float(np.linalg.norm(task.start[:3] - met["start"])) > _START_FAR_M:
-            raise BadField("start_pose.start_position", "is not that of the episode's other instance")
-
     def _trajectory(self, task: Task, context: Context, folder: Path, partition: Partition | None) -> dict[str, Any]:
         met: dict[str, Any] = {"route": None, "known": {}, "goal": None, "start": task.start[:3]}
+        met["target"] = task.known["target_name"]
         pair = None
         if partition is not None:
             root = folder.parents[3] / TRAJECTORIES

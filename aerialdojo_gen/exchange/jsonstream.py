@@ -17,6 +17,7 @@ from aerialdojo_gen.errors import ImportRefused
 RECORD_LIMIT = 16 << 20
 _CHUNK = 1 << 20
 _SPACE = " \t\r\n"
+_LONGEST_EXPONENT = 8
 
 
 class _Text:
@@ -73,8 +74,9 @@ class _Text:
             except (ValueError, RecursionError) as error:
                 why = "nested too deeply" if isinstance(error, RecursionError) else getattr(error, "msg", str(error))
             else:
-                # A number may go on beyond what is read.
-                if end < len(self._text) or self._done:
+                # A number may go on beyond what is read: 1, 1. and 1.5e+ begin alike.
+                cut = type(value) in (int, float) and len(self._text) - end < _LONGEST_EXPONENT
+                if self._done or (end < len(self._text) and not (cut and self._text[end] in ".eE")):
                     self._at = end
                     return value
                 why = ""

@@ -15,7 +15,7 @@ from aerialdojo_gen.store import check_table, from_rows
 
 _ROWS_A_PART = 8192
 _POSES_A_PART = 1 << 17
-_PICTURE_BYTES_A_PART = 64 << 20
+_PICTURE_BYTES_A_PART = 16 << 20
 
 
 def _field(name: str, kind: pa.DataType, meaning: str, unit: str = "", nullable: bool = True) -> pa.Field:
