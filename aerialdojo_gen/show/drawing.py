@@ -100,7 +100,7 @@ def draw_side(axes: Axes, task: PicturedTask, aspect: float) -> None:
     axes.set_ylabel("height z, m", fontsize=8)
     axes.tick_params(labelsize=7)
     axes.set_xticks([])
-    _scale_bar(axes, extent)
+    _scale_bar(axes, extent, 0.42)
     toward = math.degrees(math.atan2(forward[0], forward[1])) % 360.0
     axes.text(
         0.99, 0.96, f"looking {toward:.0f}° from north", transform=axes.transAxes, ha="right", va="top", fontsize=8,
@@ -239,11 +239,12 @@ def _compass(axes: Axes) -> None:
     box.text(0, 1.32, "N", ha="center", va="center", fontsize=11, weight="bold", color="white", path_effects=_HALO)
 
 
-def _scale_bar(axes: Axes, extent: tuple[float, float, float, float]) -> None:
+def _scale_bar(axes: Axes, extent: tuple[float, float, float, float], share: float = 0.02) -> None:
+    """Draw a bar of a round length at the bottom, from a share of the width on."""
     wish = (extent[1] - extent[0]) / 6.0
     power = 10.0 ** math.floor(math.log10(wish))
     length = max(step * power for step in (1, 2, 5) if step * power <= wish)
-    x, y = extent[0] + 0.02 * (extent[1] - extent[0]), extent[2] + 0.05 * (extent[3] - extent[2])
+    x, y = extent[0] + share * (extent[1] - extent[0]), extent[2] + 0.05 * (extent[3] - extent[2])
     axes.plot(
         [x, x + length], [y, y], color="white", lw=3, path_effects=[withStroke(linewidth=5, foreground="black")]
     )

@@ -10,7 +10,20 @@ import { CameraControls } from "./controls.js";
 import { MarkerLayer, RouteLayer } from "./layers.js";
 import { loadPayload } from "./payload.js";
 import { NodePicker } from "./picking.js";
+import { boxOf, eyeFor, homeEye, topEye } from "./viewpoints.js";
 import { castShadow, groupMesh, lightUniforms, skyMesh, tinted } from "./shading.js";
+
+const FIELD_OF_VIEW_DEG = 60;
+// A pick that takes longer than this waits until the cursor rests.
+const SLOW_MS = 12, REST_MS = 120;
+
+function makeRenderer() {
+  try {
+    return new THREE.WebGLRenderer({ antialias: true, powerPreference: "high-performance" });
+  } catch (error) {
+    throw new Error("this browser shows no WebGL 2: switch hardware acceleration on, or try another browser", { cause: error });
+  }
+}
 
 export class SceneView {
   /** Load a scene into an element that has a size. */
@@ -27,7 +40,7 @@ export class SceneView {
     this.frameListeners = [];
     this.pickListeners = [];
     this.hoverListeners = [];
-    this.renderer = new THREE.WebGLRenderer({ antialias: true, powerPreference: "high-performance" });
+    this.renderer = makeRenderer();
     this.renderer.outputColorSpace = THREE.LinearSRGBColorSpace;
     this.renderer.setPixelRatio(Math.min(window.devicePixelRatio, 2));
     this.canvas = this.renderer.domElement;
@@ -36,15 +49,15 @@ export class SceneView {
     this.overlay = document.createElement("div");
     this.overlay.className = "scene-overlay";
     element.append(this.canvas, this.overlay);
-    this.camera = new THREE.PerspectiveCamera(60, 1, 0.2, 4000);
+    this.camera = new THREE.PerspectiveCamera(FIELD_OF_VIEW_DEG, 1, 0.1, 4000);
     this.camera.up.set(0, 0, 1);
     this.three = new THREE.Scene();
     const uniforms = lightUniforms(payload);
     const anisotropy = Math.min(8, this.renderer.capabilities.getMaxAnisotropy());
     this.meshes = payload.groups.map((group) => groupMesh(group, uniforms, anisotropy));
     this.three.add(skyMesh(payload), ...this.meshes);
-    this.extent = this.boxOf(payload.nodes.map((_, k) => k));
-    castShadow(this.renderer, this.meshes, uniforms, this.extent.min, this.extent.max);
+    const extent = boxOf(payload, payload.nodes.map((_, k) => k));
+    castShadow(this.renderer, this.meshes, uniforms, extent.min, extent.max);
     this.picker = new NodePicker(payload);
     this.highlighted = new THREE.Group();
     this.three.add(this.highlighted);
@@ -209,7 +222,7 @@ export class SceneView {
   onFrame(listener) { this.frameListeners.push(listener); }
 
   listen() {
-    let down = null, queued = null;
+    let down = null, waiting = 0, slow = false;
     const inside = (event) => {
       const box = this.canvas.getBoundingClientRect();
       return [event.clientX - box.left, event.clientY - box.top];
@@ -223,79 +236,45 @@ export class SceneView {
       down = null;
     });
     this.canvas.addEventListener("pointermove", (event) => {
+      clearTimeout(waiting);
       if (!this.hoverListeners.length || event.buttons) return;
-      const first = !queued;
-      queued = event;
-      if (first) requestAnimationFrame(() => {
-        const hit = this.pick(...inside(queued));
-        for (const listener of this.hoverListeners) listener(hit, queued);
-        queued = null;
-      });
+      waiting = setTimeout(() => {
+        const begin = performance.now(), hit = this.pick(...inside(event));
+        slow = performance.now() - begin > SLOW_MS;
+        for (const listener of this.hoverListeners) listener(hit, event);
+      }, slow ? REST_MS : 0);
     });
     this.canvas.addEventListener("pointerleave", (event) => {
+      clearTimeout(waiting);
       for (const listener of this.hoverListeners) listener(null, event);
     });
   }
 
   // ---- cameras ----
 
-  boxOf(indices) {
-    const box = new THREE.Box3();
-    for (const k of indices) {
-      box.expandByPoint(new THREE.Vector3(...this.payload.boxes.subarray(6 * k, 6 * k + 3)));
-      box.expandByPoint(new THREE.Vector3(...this.payload.boxes.subarray(6 * k + 3, 6 * k + 6)));
-    }
-    return box;
+  /** Vertical field of view, degrees; without one, the usual. */
+  setFieldOfView(degrees = FIELD_OF_VIEW_DEG) {
+    this.camera.fov = degrees;
+    this.camera.updateProjectionMatrix();
+    this.invalidate();
   }
 
   /** The whole flight volume, seen from the south-west. */
-  home() {
-    const [low, high] = this.payload.bounds_m;
-    const centre = low.map((v, k) => (v + high[k]) / 2);
-    const size = Math.hypot(high[0] - low[0], high[1] - low[1]);
-    this.controls.lookFrom([centre[0] - 0.28 * size, centre[1] - 0.42 * size, low[2] + 0.36 * size],
-      [centre[0], centre[1], low[2] + 2]);
-  }
+  home() { this.controls.lookFrom(...homeEye(this.payload.bounds_m)); }
 
   /** The whole flight volume from above, north at the top. */
-  top() {
-    const [low, high] = this.payload.bounds_m;
-    const half = Math.max(high[1] - low[1], (high[0] - low[0]) / this.camera.aspect) / 2;
-    const x = (low[0] + high[0]) / 2, y = (low[1] + high[1]) / 2;
-    // A hair south of straight down: there the orbit knows which way is up.
-    this.controls.lookFrom([x, y - 0.01, high[2] + 1.05 * half / Math.tan(Math.PI / 6)], [x, y, low[2]]);
-  }
+  top() { this.controls.lookFrom(...topEye(this.payload.bounds_m, this.camera)); }
 
   /** Bring a node (by name), a point, or a list of points (arrays of 3) into the middle, from where one looks now. */
   focusOn(what, { distance } = {}) {
     let box;
     if (typeof what === "string") {
       if (!this.index.has(what)) return;
-      box = this.boxOf([this.index.get(what)]);
+      box = boxOf(this.payload, [this.index.get(what)]);
     } else {
       const points = typeof what[0] === "number" ? [what] : what;
       box = new THREE.Box3().setFromPoints(points.map((p) => new THREE.Vector3(...p)));
     }
-    const centre = box.getCenter(new THREE.Vector3()), radius = box.getSize(new THREE.Vector3()).length() / 2;
-    const back = this.openDirection(centre, distance ?? Math.max(7, 2.4 * radius), radius);
-    this.controls.lookFrom(centre.clone().add(back).toArray(), centre.toArray());
-  }
-
-  /** From where a ball can be seen: nearest to where one looks from now, and always from a little above. */
-  openDirection(centre, distance, radius) {
-    const now = new THREE.Vector3();
-    this.camera.getWorldDirection(now).negate();
-    const azimuth = Math.atan2(now.y, now.x), elevation = Math.max(0.35, Math.asin(Math.min(1, now.z)));
-    const along = (turn, up) => new THREE.Vector3(
-      Math.cos(azimuth + turn) * Math.cos(up), Math.sin(azimuth + turn) * Math.cos(up), Math.sin(up));
-    for (const up of [elevation, 0.35, 0.8, 1.2]) {
-      for (const turn of [0, 0.6, -0.6, 1.2, -1.2, 1.8, -1.8, 2.4, -2.4, Math.PI]) {
-        const direction = along(turn, up);
-        const eye = centre.clone().addScaledVector(direction, distance);
-        const hit = this.picker.cast(eye.toArray(), direction.clone().negate().toArray());
-        if (!hit || hit.distance > distance - radius - 0.2) return direction.multiplyScalar(distance);
-      }
-    }
-    return along(0, elevation).multiplyScalar(distance);
+    this.controls.lookFrom(...eyeFor(box, this.camera, this.picker, distance));
   }
 }

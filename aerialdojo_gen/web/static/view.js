@@ -4,6 +4,7 @@ import { ANCHOR, clearanceColour, clearanceStops, GOAL, LANDMARK, OBJECT, SETTIN
 import { make, number, words } from "./dom.js";
 import { failure, showLandmark, showNode, showObject, showRoute, welcome } from "./panel.js";
 import { SceneView } from "./scene.js";
+import { addSearch } from "./search.js";
 
 const $ = (id) => document.getElementById(id);
 const panel = $("panel");
@@ -206,6 +207,8 @@ class Page {
   ride(on) {
     this.riding = on;
     $("ride").setAttribute("aria-pressed", on);
+    // The drone's own cameras have a field of view of 90 degrees.
+    this.view.setFieldOfView(on ? 90 : undefined);
     for (const layer of ["selected", "ends"]) this.view.setVisible(layer, !on);
     for (const box of document.querySelectorAll("[data-layer]")) {
       if (box.checked) this.view.setVisible(box.dataset.layer, !on);
@@ -213,22 +216,7 @@ class Page {
     this.step(Number($("step").value));
   }
 
-  // ---- search ----
-
-  search(text) {
-    const wish = text.trim().toLowerCase();
-    const item = (name, note, act) => make("li", {}, make("button", { onclick: act }, name, make("small", {}, ` ${note}`)));
-    const fits = (...texts) => texts.some((t) => t.toLowerCase().includes(wish));
-    const found = !wish ? [] : [
-      ...this.index.landmarks.filter((l) => fits(l.name, l.node)).map((l) => item(l.name, "landmark", () => this.pickLandmark(l, true))),
-      ...this.index.objects.filter((o) => fits(o.name, words(o.category), o.mesh_node))
-        .map((o) => item(o.name, words(o.category), () => this.pickObject(o.object_id, true))),
-      ...(wish.length < 4 ? [] : this.index.routes.nav_id.filter((nav) => fits(nav) || wish.startsWith(nav.toLowerCase())).slice(0, 10)
-        .map((nav) => item(nav, "route", () => this.pickRoute(nav, true)))),
-    ];
-    $("results").replaceChildren(...found.slice(0, 10),
-      ...(wish && !found.length ? [make("li", { class: "soft" }, "nothing of that name")] : []));
-  }
+  // ---- the cursor ----
 
   tooltip(hit, event) {
     const element = $("tooltip");
@@ -269,14 +257,10 @@ class Page {
     for (const [id, press] of Object.entries(act)) $(id).addEventListener("click", press);
     const keys = { o: act.orbit, f: act.fly, h: act.home, t: act.top, Escape: () => this.letGo() };
     document.addEventListener("keydown", (event) => {
-      if (event.key === "Escape" && event.target === $("search")) { $("search").value = ""; this.search(""); view.canvas.focus(); return; }
       if (event.target.matches("input, select, textarea") || event.ctrlKey || event.metaKey || event.altKey) return;
       if (event.key === "/") { event.preventDefault(); $("search").focus(); } else keys[event.key]?.();
     });
-    $("search").addEventListener("input", () => this.search($("search").value));
-    $("search").addEventListener("keydown", (event) => {
-      if (event.key === "Enter") $("results").querySelector("button")?.click();
-    });
+    addSearch(this, $("search"), $("results"));
     view.onPick((hit) => Promise.resolve(this.picked(hit)).catch((error) => failure(panel, error)));
     view.onHover((hit, event) => this.tooltip(hit, event));
   }
