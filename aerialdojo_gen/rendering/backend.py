@@ -271,9 +271,7 @@ def check(renderer: Renderer) -> str:
         if on_cube.any():
             red, green, blue = np.median(picture.rgb[on_cube].astype(float), axis=0)
             if red < 2.0 * max(green, blue):
-                raise RenderError(
-                    f"the renderer {renderer.name} draws a red cube in ({red:.0f}, {green:.0f}, {blue:.0f})"
-                )
+                raise RenderError(f"the renderer {renderer.name} draws red as ({red:.0f}, {green:.0f}, {blue:.0f})")
     share = right / pixels
     figures = f"depth within 1 cm of ray casts at {100 * share:.2f} % of {pixels:,} pixels"
     if share < _SHARE:
