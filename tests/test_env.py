@@ -198,7 +198,7 @@ def test_a_chosen_task_and_what_ends_it(smoke):
     assert schemas.DIRECTIONS[observation["goal"]["direction"]] == row["direction"]
     assert observation["remaining_actions"].tolist() == [row["action_budget"]]
     for k in range(row["action_budget"]):
-        observation, reward, terminated, truncated, info = env.step(schemas.TURN_LEFT)
+        observation, _, terminated, truncated, info = env.step(schemas.TURN_LEFT)
         assert truncated == (k == row["action_budget"] - 1)
         assert not terminated
     assert info == {"reason": "budget"}
@@ -234,7 +234,7 @@ def test_vectorised(smoke, mode):
         alone = [AerialDojoEnv(smoke, views=(), modality="semantic") for _ in range(2)]
         names = [env.reset(seed=s)[0]["goal"]["target_name"] for env, s in zip(alone, (3, 5), strict=True)]
         assert list(first["goal"]["target_name"]) == names
-        observation, reward, terminated, truncated, info = envs.step(np.array([0, 14]))
+        observation, _, terminated, truncated, info = envs.step(np.array([0, 14]))
         assert terminated.tolist() == [True, False]
         assert truncated.tolist() == [False, False]
         assert info["reason"].tolist() == ["stop", ""]

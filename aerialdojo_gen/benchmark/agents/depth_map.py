@@ -108,7 +108,7 @@ class DepthMap:
         i, j = self.cell(x_m, y_m)
         self._barred[max(i - 1, 0) : i + 2, max(j - 1, 0) : j + 2] = 1
 
-    def way_to_frontier(self, x_m: float, y_m: float, least_m: float = 2.0) -> list[tuple[float, float]]:
+    def way_to_frontier(self, x_m: float, y_m: float, least_m: float = 3.0) -> list[tuple[float, float]]:
         """Find the way to the nearest place where the known free space ends.
 
         Parameters

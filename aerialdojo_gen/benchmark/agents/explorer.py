@@ -15,6 +15,8 @@ from aerialdojo_gen.planning.primitives import DISPLACEMENTS, TURN_RAD, TURNS
 from aerialdojo_gen.schemas import ACTION_NAMES, MOVE_UP_1, STOP, TURN_LEFT, TURN_RIGHT
 
 _FORWARD = [(ACTION_NAMES.index(f"MoveForward{m}"), float(m)) for m in (5, 3, 1)]
+# How many points of a way ahead the explorer heads for, and how many ways it considers before a move.
+_LOOK_ON, _REPLANS = 6, 8
 # Edge of the thumbnails that are compared with the goal's picture, pixels.
 _THUMB_PX = 24
 
@@ -91,24 +93,25 @@ class ExplorerAgent(AgentBase):
         return float((thumbnail(observation.rgb["front"]) * self._wanted).mean()) >= self._likeness
 
     def _choose(self, depth_m: NDArray[np.float32]) -> int:
-        way = self._way = self._way or self._map.way_to_frontier(self._x_m, self._y_m)
-        if not way:
-            return MOVE_UP_1
-        # The farthest point of the way within a move that still lies straight ahead of where the way begins.
-        x, y = way[min(6, len(way) - 1)]
-        bearing = math.atan2(y - self._y_m, x - self._x_m) - self._yaw_rad
-        turns = round(math.remainder(bearing, 2.0 * math.pi) / TURN_RAD)
-        if turns:
-            return TURN_LEFT if turns > 0 else TURN_RIGHT
-        # Until here the way stays what it was: the nearest frontier may change sides with every look.
-        self._way = []
-        free = self._free_ahead_m(depth_m)
-        straight = self._straight_m(way)
-        for action, metres in _FORWARD:
-            if metres + self._clearance_m <= free and (metres <= straight or metres == 1.0):
-                return action
-        self._map.bar(self._x_m + math.cos(self._yaw_rad), self._y_m + math.sin(self._yaw_rad))
-        return TURN_LEFT
+        for _ in range(_REPLANS):
+            way = self._way = self._way or self._map.way_to_frontier(self._x_m, self._y_m)
+            if not way:
+                break
+            x, y = way[min(_LOOK_ON, len(way) - 1)]
+            bearing = math.atan2(y - self._y_m, x - self._x_m) - self._yaw_rad
+            turns = round(math.remainder(bearing, 2.0 * math.pi) / TURN_RAD)
+            if turns:
+                return TURN_LEFT if turns > 0 else TURN_RIGHT
+            # Until here the way stays what it was: the nearest frontier may change sides with every look.
+            self._way = []
+            free, straight = self._free_ahead_m(depth_m), self._straight_m(way)
+            for action, metres in _FORWARD:
+                if metres + self._clearance_m <= free and (metres <= straight or metres == 1.0):
+                    return action
+            # Too narrow after all: look for another way.
+            for x, y in way[2 : _LOOK_ON + 1]:
+                self._map.bar(x, y)
+        return MOVE_UP_1
 
     def _straight_m(self, way: list[tuple[float, float]]) -> float:
         """How far the way goes straight ahead."""
