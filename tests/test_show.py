@@ -10,6 +10,7 @@ import sys
 import cv2
 import numpy as np
 import pyarrow as pa
+import pyarrow.compute as pc
 import pytest
 import trimesh
 from browser import chromium, errors
@@ -300,6 +301,25 @@ def test_an_unknown_id_gives_the_nearest(smoke, ids, tmp_path):
     assert (done.returncode, done.stdout, done.stderr.count("\n")) == (2, "", 1)
     assert done.stderr.startswith(f"error: no task '{wrong}'")
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_picture_is_called_png(pictured, tmp_path):
+    with pytest.raises(UsageError, match=r"a\.jpg: the picture is a PNG, call it a\.png"):
+        write_png(pictured, tmp_path / "a.jpg")
+    (tmp_path / "b.png").mkdir()
+    with pytest.raises(StoreError, match=r"cannot write .*b\.png"):
+        write_png(pictured, tmp_path / "b.png")
+    assert [path.name for path in tmp_path.iterdir()] == ["b.png"]
+
+
+def test_a_route_without_an_instance_is_named(copied, ids):
+    for side in ("train", "test"):
+        tasks = store.read_scene(copied, f"tasks/{side}", YARD)
+        kept = tasks.filter(pc.not_equal(tasks["nav_id"], ids[0]))
+        store.write_shard(copied, f"tasks/{side}", YARD, 0, kept)
+    with pytest.raises(StoreError, match=f"release/tasks has no instance of {ids[0]}"):
+        find_task(copied, ids[0])
+    find_task(copied, ids[1])
 
 
 @pytest.fixture

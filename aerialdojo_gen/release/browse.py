@@ -213,4 +213,9 @@ def find_task(data: Path, task_id: str) -> FoundTask:
         near = difflib.get_close_matches(nav_id, ids, n=1, cutoff=0.0)
         hint = f"the nearest is {near[0]}; " if near else ""
         raise UsageError(f"no task {task_id!r} in the release of {scene.name}: {hint}{listing}")
-    return FoundTask(scene, nav_id, scene.route(nav_id), scene.instances(nav_id))
+    instances = scene.instances(nav_id)
+    if not instances:
+        raise StoreError(
+            f"release/tasks has no instance of {nav_id}, which release/routes has: run aerialdojo-gen split"
+        )
+    return FoundTask(scene, nav_id, scene.route(nav_id), instances)
