@@ -44,9 +44,23 @@ def episode(run: str, agent: str, scene: str, k: int, draws: np.random.Generator
     }  # fmt: skip
 
 
-def write_run(data: Path, run: str, agent: str, per_scene: int = 6, scenes: list[str] | None = None) -> None:
-    """Write the episodes of a made-up run."""
+def write_run(
+    data: Path, run: str, agent: str, per_scene: int = 6, scenes: list[str] | None = None, failed: int = 0
+) -> None:
+    """Write the episodes of a made-up run, and so many failures a scene."""
     for scene in scenes or sorted(inventory()):
         draws = rng.generator(0, "made-up-run", agent, scene)
         rows = [episode(run, agent, scene, k, draws) for k in range(per_scene)]
         store.write_shard(data, "episodes", scene, 0, store.from_rows(schemas.EPISODES, rows), run=run)
+        lost = [
+            {
+                "run_id": run,
+                "task_id": f"{scene}_{per_scene + k:04d}s",
+                "scene": scene,
+                "attempts": 5,
+                "reason": "HTTP 503",
+                "cost_usd": 0.0,
+            }
+            for k in range(failed)
+        ]
+        store.write_shard(data, "failures", scene, 0, store.from_rows(schemas.FAILURES, lost), run=run)

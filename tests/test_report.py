@@ -91,6 +91,20 @@ def test_tables_of_part_of_the_scenes_say_so(tmp_path: Path) -> None:
     assert dict(family.rows)["oracle"][5:] == ("–",) * 15
 
 
+def test_what_a_comparison_lacks_is_said_under_the_table(tmp_path: Path) -> None:
+    write_run(tmp_path, "a", "oracle", 2, ["U_Mall_0"])
+    write_run(tmp_path, "b", "random", 3, ["U_Mall_0"], failed=4)
+    write_run(tmp_path, "c", "random", 0, ["U_Mall_0"], failed=2)
+    found = load_runs(tmp_path)
+    assert [(run.name, run.failed) for run in found] == [("a", 0), ("b", 4)]
+    notes = tables.main_table(found, [AT_3]).notes
+    assert "random: 4 more episodes failed for reasons outside the agent." in notes
+    assert notes[-1] == "The runs flew different tasks: their scores are no comparison of agents."
+    assert not any("different" in note for note in tables.main_table(found[:1], [AT_3]).notes)
+    with pytest.raises(StoreError, match="run 'c' has no finished episode"):
+        load_runs(tmp_path, ["a", "c"])
+
+
 def test_conduct_counts_ends_and_does_not_add_what_is_not_known(runs: list[Run]) -> None:
     for run in runs:
         c = conduct(run)

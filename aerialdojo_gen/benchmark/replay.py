@@ -166,7 +166,7 @@ def replays(
     StoreError, UsageError, AssetError
         The release or its mesh is missing, or is not the one that the runs were made from.
     """
-    steps = {run.name: read_run(log, run.name, "steps") for run in runs}
+    steps = {run.name: read_run(log, run.name, "steps") for run in runs if tasks}
     for task_id in tasks:
         flown = []
         for run in runs:

@@ -32,6 +32,8 @@ class Run:
         The log, all columns.
     episodes : Episodes
         What the metrics take from it.
+    failed : int
+        Episodes that are not in it, given up for reasons outside the agent.
     """
 
     name: str
@@ -40,6 +42,7 @@ class Run:
     options: str
     table: pa.Table
     episodes: Episodes
+    failed: int = 0
 
 
 def load_runs(data: Path, names: Sequence[str] = ()) -> list[Run]:
@@ -50,7 +53,7 @@ def load_runs(data: Path, names: Sequence[str] = ()) -> list[Run]:
     data : Path
         The directory that `evaluate` wrote to.
     names : sequence of str
-        Their ids, in the order that tables keep; all there are where empty.
+        Their ids, in the order that tables keep; where empty all that have finished an episode.
 
     Returns
     -------
@@ -59,13 +62,17 @@ def load_runs(data: Path, names: Sequence[str] = ()) -> list[Run]:
     Raises
     ------
     StoreError
-        There is no such run, or none at all, or a part of one is damaged.
+        There is no such run, or none at all, or one without a finished episode, or a part of one is damaged.
     """
-    chosen = list(dict.fromkeys(names)) or runs(data)
-    if not chosen:
+    tables = {name: read_run(data, name) for name in (names or runs(data))}
+    if not names:
+        tables = {name: table for name, table in tables.items() if table.num_rows}
+    if not tables:
         raise StoreError(f"no runs in {data}: run aerialdojo-gen evaluate")
-    tables = [read_run(data, name) for name in chosen]
-    agents = [table["agent"][0].as_py() for table in tables]
+    for name, table in tables.items():
+        if not table.num_rows:
+            raise StoreError(f"run {name!r} has no finished episode: run aerialdojo-gen evaluate --run {name}")
+    agents = [table["agent"][0].as_py() for table in tables.values()]
     return [
         Run(
             name,
@@ -74,8 +81,9 @@ def load_runs(data: Path, names: Sequence[str] = ()) -> list[Run]:
             table["agent_options"][0].as_py(),
             table,
             episodes_of(table),
+            read_run(data, name, "failures").num_rows,
         )
-        for name, agent, table in zip(chosen, agents, tables, strict=True)
+        for (name, table), agent in zip(tables.items(), agents, strict=True)
     ]
 
 

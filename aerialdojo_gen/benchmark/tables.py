@@ -63,6 +63,10 @@ def main_table(runs: Sequence[Run], profiles: Sequence[Profile]) -> Table:
         rows.append((run.label, (f"{len(run.episodes):,}", *cells)))
         if missing := summarize(run.episodes, profiles[0]).missing_families:
             notes.append(f"{run.label}: no episodes of {', '.join(missing)}; overall is the mean of the others.")
+        if run.failed:
+            notes.append(f"{run.label}: {run.failed:,} more episodes failed for reasons outside the agent.")
+    if len({frozenset(run.table["task_id"].to_pylist()) for run in runs}) > 1:
+        notes.append("The runs flew different tasks: their scores are no comparison of agents.")
     groups = [("", ("episodes",)), *((_profile_head(profile), tuple(HEADS.values())) for profile in profiles)]
     notes.insert(
         0, "Mean of the four families, each the mean of its scenes; ± is the standard deviation over scenes."
