@@ -31,12 +31,13 @@ SIZE = (120.0, 120.0, 25.0)
 RADIUS = 0.25
 
 
-def world(n: int = 250) -> Scene:
+def world(n: int = 250, edge: float = SIZE[0]) -> Scene:
     """Houses at any angle, trees, and roofs on posts."""
     rng = np.random.default_rng(0)
-    things = [instance("ground", box((0, 0, -0.5), (SIZE[0], SIZE[1], 0.0)))]
+    size_m = (edge, edge, SIZE[2])
+    things = [instance("ground", box((0, 0, -0.5), (edge, edge, 0.0)))]
     for k in range(n):
-        x, y = rng.uniform(3, SIZE[0] - 3), rng.uniform(3, SIZE[1] - 3)
+        x, y = rng.uniform(3, edge - 3), rng.uniform(3, edge - 3)
         if k % 5 < 3:
             size = rng.uniform([2, 2, 2], [9, 9, 16])
             mesh, z = trimesh.creation.box(extents=size), size[2] / 2
@@ -51,7 +52,18 @@ def world(n: int = 250) -> Scene:
             posts = [box((a - 0.2, b - 0.2, 0), (a + 0.2, b + 0.2, h)) for a, b in corners]
             mesh = trimesh.util.concatenate([*posts, box((-w / 2, -4, h), (w / 2, 4, h + 0.3))])
         things.append(instance(f"thing_{k:03d}", turned(mesh, rng.uniform(0, 6.28), (x, y, z))))
-    return Scene("Bench", tuple(things), {"grey": Material("grey", (128, 128, 128))}, np.array([(0, 0, 0), SIZE]))
+    return Scene("Bench", tuple(things), {"grey": Material("grey", (128, 128, 128))}, np.array([(0, 0, 0), size_m]))
+
+
+def free_pose(planner: Planner, rng: np.random.Generator, near=None, within: float = np.inf) -> np.ndarray:
+    """A pose from which the body can fly to the sky, (4,), at most `within` metres from `near`."""
+    low, high = planner.grid.arrays.lower + 1.75, planner.grid.arrays.upper - 1.75
+    while True:
+        p = rng.uniform([*low[:2], 1.0], [*high[:2], 8.0])
+        if near is not None and np.linalg.norm(p - near[:3]) > within:
+            continue
+        if planner.grid.distance_m(p) >= 0.6 and planner.grid.reachable(p):
+            return np.array([*p, rng.uniform(-3.1, 3.1)])
 
 
 def clock() -> float:
@@ -81,27 +93,22 @@ def main() -> None:
 
     rng = np.random.default_rng(1)
 
-    def pose() -> np.ndarray:
-        while True:
-            p = rng.uniform([2, 2, 1], [SIZE[0] - 2, SIZE[1] - 2, 8])
-            if planner.grid.distance_m(p) >= 0.6 and planner.grid.reachable(p):
-                return np.array([*p, rng.uniform(-3.1, 3.1)])
-
     t_field, plans, routes, certificates, whole = [], [], [], [], 0.0
     exact = Planner(scene, PlanConfig(ladder=(Rung(weight=0.97, budget=400_000, duplicate_cell_m=0.25),)), RADIUS)
     ratios = []
     for _ in range(options.targets):
-        goal, starts = pose(), np.array([pose() for _ in range(options.starts)])
+        goal = free_pose(planner, rng)
+        starts = np.array([free_pose(planner, rng) for _ in range(options.starts)])
         t = clock()
         found = planner.plan_target(goal, starts)
         whole += clock() - t
         routes += found
         t = clock()
-        planner._expand(goal[:3], np.ascontiguousarray(starts[:, :3]))
+        planner._expand(goal[:3])
         t_field.append(clock() - t)
         for start in starts:
             t = clock()
-            planner._plan(start, goal)
+            planner._plan(start, goal, float(planner.cost_to_go(start[:3])[0]))
             plans.append(clock() - t)
         for r in found:
             if r.outcome == "SOLVED":
