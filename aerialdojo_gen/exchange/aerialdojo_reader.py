@@ -20,7 +20,7 @@ from aerialdojo_gen.exchange.aerialdojo_layout import (
     Partition,
     parse_partition,
 )
-from aerialdojo_gen.exchange.fields import BadField, Fields, positions_of, quaternions_of, shown
+from aerialdojo_gen.exchange.fields import BadField, Fields, plain, positions_of, quaternions_of, shown
 from aerialdojo_gen.exchange.folder import check_picture, inside
 from aerialdojo_gen.exchange.jsonstream import small_document
 from aerialdojo_gen.exchange.task import Context, Instance, Route, Task, digest
@@ -101,6 +101,7 @@ class Reader:
             "target_name": target,
             "start_object_name": record.optional_text("start_object_name"),
             "category": record.optional_text("category"),
+            "description": (description := record.optional_text("description")),
             "landmark": record.optional_text("Landmark"),
             "direction": record.optional_text("Direction"),
             "family": family,
@@ -109,11 +110,11 @@ class Reader:
             "subset": "train" if trains else "test",
             "setting": SETTING_OF[word],
         }
-        description = record.optional_text("description")
         image = record.optional_text("image")
         modality = kind or ("image" if image else "semantic")
         if modality == "image":
-            instance = Instance("image", description, self._picture(image, context))
+            # What the picture shows is the object's to say, not the image task's: it would give the goal away.
+            instance = Instance("image", None, self._picture(image, context))
         else:
             instance = Instance("semantic", description)
         task = Task(episode, scene, start=start, goal=goal, instances=[instance], object_key=target, known=known)
@@ -235,7 +236,7 @@ def _route(document: Fields, context: Context) -> Route:
                 raise BadField(f"{where}.{name}", "is missing")
             columns[name].append(step[name])
         more.update(step.keys() - _KNOWN)
-    context.notes.update(f"trajectory[].{name} has no place in the tables" for name in sorted(more))
+    context.notes.update(f"trajectory[].{plain(name)} has no place in the tables" for name in more)
     context.notes.update(
         f"trajectory file: {name.split('.')[-1]} has no place in the tables" for name in document.unread()
     )

@@ -39,6 +39,11 @@ def shown(value: object) -> str:
     return text if len(text) <= 60 else text[:57] + "..."
 
 
+def plain(key: str) -> str:
+    """A key of a file as reports name it: short, and without what a terminal or a file would choke on."""
+    return key if key.isprintable() and len(key) <= 60 else ascii(key)[:60]
+
+
 class Fields:
     """An object of a file.
 
@@ -166,7 +171,7 @@ class Fields:
         """Paths of the fields that nobody asked for, in this object and its children."""
         for key in self._value:
             if key not in self._read:
-                yield self.path(key)
+                yield self.path(plain(key))
         for child in self._children:
             yield from child.unread()
 

@@ -209,7 +209,7 @@ def _tasks(
             except BadField as error:
                 bad.write(report.refuse(label, row, error) + "\n")
                 continue
-            report.unmapped.update(record.unread())
+            report.left(record.unread())
             report.notes.update(context.notes)
             yield task, {"source_file": label, "source_row": row, "source_id": task.source_id}
 

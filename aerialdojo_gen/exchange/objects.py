@@ -48,7 +48,7 @@ class Objects:
             "name": known.get("target_name"),
             "mesh_node": known.get("mesh_node"),
             "category": known.get("category"),
-            "description": texts[0] if texts else None,
+            "description": texts[0] if texts else known.get("description"),
             "direction": known.get("direction"),
             "landmark": known.get("landmark"),
         }

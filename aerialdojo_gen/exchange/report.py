@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from array import array
 from collections import Counter
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -59,6 +60,12 @@ class Report:
             self.bad.append(line)
         return line
 
+    def left(self, names: Iterable[str]) -> None:
+        """Count the fields of a record that found no place."""
+        for name in names:
+            known = name in self.unmapped or len(self.unmapped) < _MOST_NAMED
+            self.unmapped[name if known else "(others)"] += 1
+
     def replayed(self, error_m: float | None) -> None:
         """Count a route's replay error."""
         if error_m is not None:
@@ -94,16 +101,19 @@ class Report:
 
     def lines(self) -> list[str]:
         """All of it, for a person."""
-        rows = ", ".join(f"{n:,} {name}" for name, n in sorted(self.rows.items(), reverse=True))
-        lines = [f"{self.format}, frame {self.frame}: {self.records:,} records in {len(self.files)} files; {rows}"]
+        made = ", ".join(f"{n:,} {name}" for name, n in sorted(self.rows.items(), reverse=True))
+        lines = [f"{self.format}, frame {self.frame}: {self.records:,} records in {len(self.files)} files; {made}"]
         if self.n_bad:
             fields = ", ".join(f"{name} {n:,}" for name, n in self.bad_fields.most_common())
             lines.append(f"left out: {self.n_bad:,} bad records ({fields}): see bad_records.txt")
         if self.unmapped:
             lines.append("not mapped: " + ", ".join(f"{name} {n:,}" for name, n in sorted(self.unmapped.items())))
-        whole = sorted(name for name, n in self.empty.items() if n == self.rows.get(name.split(".")[0]))
-        if whole:
-            lines.append("always null: " + ", ".join(whole))
+        for table, rows in sorted(self.rows.items(), reverse=True):
+            names = [
+                c.split(".")[1] for c, n in sorted(self.empty.items()) if c.startswith(f"{table}.") and n == rows
+            ]
+            if names:
+                lines.append(f"always null in {table}: {', '.join(names)}")
         lines += [f"{n:,} x {note}" for note, n in sorted(self.notes.items())]
         if (replay := self.replay()) is not None:
             lines.append(
