@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import shutil
 import tempfile
@@ -44,12 +45,16 @@ def chromium(what: str) -> Iterator[Any]:
 
 
 def until(what: str, test: Callable[[], Any], seconds: float = 60.0) -> Any:
-    """Wait until a test gives something true, and give it."""
+    """Wait until a test gives something true, and give it; what the page is just building anew counts as not yet."""
+    from selenium.common.exceptions import NoSuchElementException, StaleElementReferenceException
+
     end = time.monotonic() + seconds
-    while not (found := test()):
+    while True:
+        with contextlib.suppress(NoSuchElementException, StaleElementReferenceException):
+            if found := test():
+                return found
         assert time.monotonic() < end, f"{what}: not within {seconds} s"
         time.sleep(0.05)
-    return found
 
 
 def errors(driver: Any) -> list[str]:

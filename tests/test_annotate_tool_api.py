@@ -22,6 +22,7 @@ from aerialdojo_gen.annotate.storage import Storage
 from aerialdojo_gen.commands.common import open_pipeline
 from aerialdojo_gen.errors import UsageError
 from aerialdojo_gen.scenes.model import Scene
+from aerialdojo_gen.stages.annotate_import import annotation_tables
 
 
 @pytest.fixture(scope="module")
@@ -67,8 +68,8 @@ def test_the_document_says_where_everything_is_as_the_task_will(client, desk):
     assert (van["name"], van["landmark"], van["direction"]) == ("red delivery van", "traffic light", "east")
     assert van["lacks"] == ["anchor"]
     assert document["faults"] == []
-    for entry in document["objects"]:
-        assert desk.bearing(desk.storage.load().annotations, entry["node"])["direction"] == entry["direction"]
+    tables = annotation_tables(desk.storage.load().annotations, desk.scene)
+    assert [e["direction"] for e in document["objects"]] == tables["objects"]["direction"].to_pylist()
     answer = client.get("/api/document", headers={"If-None-Match": f'"{document["version"]}"'})
     assert (answer.status_code, answer.content) == (304, b"")
 

@@ -8,10 +8,11 @@ import signal
 import socket
 
 import annotating
+import browser as chrome
 import foreign
 import pyarrow.compute as pc
 import pytest
-from annotating import until
+from browser import until
 
 from aerialdojo_gen import store
 from aerialdojo_gen.commands.common import run_until
@@ -24,7 +25,7 @@ WORDS = ("one", "two", "three")
 
 @pytest.fixture(scope="module")
 def browser():
-    with annotating.chromium() as driver:
+    with chrome.chromium("the annotation page") as driver:
         yield driver
 
 
@@ -108,10 +109,6 @@ def told_apart(scene):
     return [mark, *[i for i, look in zip(others, looks, strict=True) if looks.count(look) == 1][:3]]
 
 
-def errors(driver):
-    return [line for line in driver.get_log("browser") if line["level"] == "SEVERE"]
-
-
 def test_a_foreign_mesh_is_annotated_in_the_browser_and_becomes_tasks(browser, scene, project, tmp_path):
     data = tmp_path / "data"
     mark, *targets = told_apart(scene.scene)
@@ -181,7 +178,7 @@ def test_a_foreign_mesh_is_annotated_in_the_browser_and_becomes_tasks(browser, s
         page.press("\ue009\ue008z\ue000")
         until("redone", lambda: page.text("#progress-text").startswith("3 of 3"))
         assert scene.annotations.read_text() == written
-        assert errors(browser) == []
+        assert chrome.errors(browser) == []
     run_until("filter", data=data, pipeline=scene.pipeline, scene=[NAME], workers=1, quiet=True)
     anchors = store.read_scene(data, "anchors", NAME).to_pylist()
     assert [(a["object_id"], a["selected_by"]) for a in anchors if a["selected"]] == [

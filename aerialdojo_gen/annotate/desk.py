@@ -12,14 +12,12 @@ import numpy as np
 
 from aerialdojo_gen.annotate import boxes
 from aerialdojo_gen.annotate.anchors import AnchorDesk
+from aerialdojo_gen.annotate.describe import Describer
 from aerialdojo_gen.annotate.document import Add, Change, ConflictError, Operation, apply, edits_of, find
 from aerialdojo_gen.annotate.history import Record
 from aerialdojo_gen.annotate.storage import Author, State, Storage
-from aerialdojo_gen.annotations.ambiguity import nearest_landmark
-from aerialdojo_gen.annotations.check import check_source
 from aerialdojo_gen.annotations.claims import spoken
-from aerialdojo_gen.annotations.format import Anchor, Annotations, Object, format_annotations, parse_annotations
-from aerialdojo_gen.annotations.relations import SceneGeometry
+from aerialdojo_gen.annotations.format import Anchor, Object, format_annotations
 from aerialdojo_gen.config import Pipeline
 from aerialdojo_gen.errors import AerialDojoError, UsageError
 from aerialdojo_gen.geometry.rays import RayCaster
@@ -30,9 +28,6 @@ from aerialdojo_gen.scenes.model import Scene
 from aerialdojo_gen.scenes.recipe import Cut
 from aerialdojo_gen.stage import Job, Roots
 from aerialdojo_gen.web.payload import scene_payload
-
-_PATH = re.compile(r"^(landmarks|objects)\[(\d+)\](?:\.(\w+))?")
-_MENTION = re.compile(r"\b(landmarks|objects)\[(\d+)\]")
 
 
 class Desk:
@@ -66,7 +61,7 @@ class Desk:
         name, pipeline = self.storage.scene, self._pipeline
         self.scene: Scene = Job("annotate", name, 0, 1, pipeline.seed, pipeline.embodiment, self._roots).scene_model()
         self.payload = scene_payload(self.scene)
-        self._geometry = SceneGeometry(self.scene)
+        self._describer = Describer(self.scene, self._names, self._counts)
         self._rays = RayCaster(self.scene)
         self._described: tuple[str, dict[str, Any]] | None = None
         self.anchors = AnchorDesk(self.scene, pipeline, self._roots)
@@ -99,7 +94,7 @@ class Desk:
             self.storage.history.refresh()
             undo, redo = self.storage.history.stacks(client)
             if self._described is None or self._described[0] != state.version:
-                self._described = (state.version, self._describe(state.annotations))
+                self._described = (state.version, self._describer.describe(state.annotations))
             return {
                 "version": state.version,
                 **self._described[1],
@@ -107,63 +102,12 @@ class Desk:
                 "redo": redo[-1].what if redo else None,
             }
 
-    def _describe(self, annotations: Annotations) -> dict[str, Any]:
-        source = parse_annotations(format_annotations(annotations))
-        faults: dict[tuple[str, int], list[dict[str, str]]] = {}
-        general = []
-        for fault in check_source(source, self.scene, self._names, self._counts, self._geometry):
-            message = _MENTION.sub(lambda m: self._called(annotations, m[1], int(m[2])), fault.message)
-            at = _PATH.match(fault.path)
-            if at is None:
-                general.append(message)
-            else:
-                faults.setdefault((at[1], int(at[2])), []).append({"field": at[3] or "", "message": message})
-        landmarks = [
-            {**entry.model_dump(), **self._place(entry.node), "faults": faults.get(("landmarks", k), [])}
-            for k, entry in enumerate(annotations.landmarks)
-        ]
-        objects = [
-            self._object(annotations, entry, faults.get(("objects", k), []))
-            for k, entry in enumerate(annotations.objects)
-        ]
-        return {"landmarks": landmarks, "objects": objects, "faults": general}
-
-    def _object(self, annotations: Annotations, entry: Object, faults: list[dict[str, str]]) -> dict[str, Any]:
-        lacks = [key for key in ("name", "category", "description") if not getattr(entry, key).strip()]
-        lacks += ["anchor"] if entry.anchor is None else []
-        lacks += ["check"] if any(fault["field"] not in lacks for fault in faults) else []
-        return {
-            **entry.model_dump(),
-            **self._place(entry.node),
-            **self.bearing(annotations, entry.node),
-            "faults": faults,
-            "lacks": lacks,
-        }
-
-    def _place(self, node: str) -> dict[str, Any]:
-        there = node in self.scene
-        return {"position_m": self.scene[node].centroid.round(3).tolist() if there else None}
-
-    def bearing(self, annotations: Annotations, node: str) -> dict[str, Any]:
-        """Nearest landmark and direction of a node, as the task will state them; None where there is none."""
-        marks = [m for m in sorted(annotations.landmarks, key=lambda m: m.id) if m.node in self.scene]
-        places = np.array([self.scene[m.node].centroid for m in marks]).reshape(-1, 3)
-        found = nearest_landmark(self.scene[node].centroid, places) if node in self.scene else None
-        if found is None:
-            return {"landmark": None, "direction": None}
-        return {"landmark": marks[found.landmark].name, "direction": found.direction}
-
-    @staticmethod
-    def _called(annotations: Annotations, kind: str, index: int) -> str:
-        entry: Any = getattr(annotations, kind)[index]
-        return f"{kind[:-1]} {entry.id}" + (f" ({entry.name})" if entry.name else "")
-
     def draft(self, operation: Operation) -> dict[str, Any]:
         """What would be said of an entry after an operation, which is not done: the check while somebody types."""
         annotations = self.storage.load().annotations
         edits = edits_of(operation, annotations, 2**31 - 1)
         with self._lock:
-            described = self._describe(apply(annotations, edits))
+            described = self._describer.describe(apply(annotations, edits))
         entry_id = 2**31 - 1 if isinstance(operation, Add) else operation.id
         return next((e for e in described[operation.kind] if e["id"] == entry_id), {})
 
@@ -248,8 +192,8 @@ class Desk:
             "attributes": instance.attributes,
             "boxed": node in boxes.nodes(self._roots.recipes / f"{self.scene.name}.toml"),
             "size_m": np.ptp(instance.bounds, axis=0).round(2).tolist(),
-            **self._place(node),
-            **self.bearing(self.storage.load().annotations, node),
+            **self._describer.place(node),
+            **self._describer.bearing(self.storage.load().annotations, node),
         }
 
     def object(self, object_id: int) -> Object:

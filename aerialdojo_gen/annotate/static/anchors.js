@@ -1,5 +1,5 @@
 // The anchors of an object: the candidates as pictures, one to choose, or one placed by hand.
-import { h, picture, same } from "./dom.js";
+import { byId, h, picture, same } from "./dom.js";
 
 const cache = new Map();
 
@@ -47,6 +47,7 @@ export class AnchorChooser {
 
   close() {
     this.closed = true;
+    byId("preview").hidden = true;
     this.page.view.remove("anchors");
     this.page.view.remove("sights");
   }
@@ -87,17 +88,27 @@ export class AnchorChooser {
     const wrong = viewpoint.faults.length ? `It will not do: ${viewpoint.faults.join("; ")}` : null;
     return h("button", {
       "aria-pressed": String(chosen), title: wrong ?? `${viewpoint.surface_distance_m?.toFixed(2)} m from the surface, clearance ${viewpoint.clearance_m?.toFixed(2)} m`,
-      onclick: () => this.choose(poseOf(viewpoint)), onmouseenter: () => this.mark(entry, viewpoint), onfocus: () => this.mark(entry, viewpoint),
+      onclick: () => this.choose(poseOf(viewpoint)), onmouseenter: () => this.regard(entry, viewpoint, title), onfocus: () => this.regard(entry, viewpoint, title),
+      onmouseleave: () => this.regard(entry), onblur: () => this.regard(entry),
     }, picture(viewpoint, this.page.facts.picture_px, `${entry.name || "object"} seen from anchor ${title}`),
     h("span", { class: "caption" }, h("span", {}, key ? h("kbd", {}, title) : title), chosen ? h("span", { class: "chosen" }, "✓ chosen")
       : h("span", { class: "hint" }, seen == null ? "" : `sees ${Math.round(100 * seen)} %`)),
     wrong ? h("span", { class: "faults" }, wrong) : null);
   }
 
+  /** Show a candidate large beside the panel, and where it is. */
+  regard(entry, viewpoint = null, title = "") {
+    const large = byId("preview");
+    large.hidden = !viewpoint;
+    large.replaceChildren(...(viewpoint ? [picture(viewpoint, this.page.facts.picture_px, `seen from anchor ${title}`)] : []));
+    this.mark(entry, viewpoint);
+  }
+
   /** Show the viewpoints in the scene, with a line to the object from the one in hand. */
   mark(entry, viewpoint = null) {
     const view = this.page.view, chosen = viewpoint ?? this.shown.find((card) => card.chosen)?.viewpoint;
-    view.addMarkers("anchors", this.shown.map(({ viewpoint: { position_m }, title, chosen: is }) => (
+    const cards = this.placing.hidden ? this.shown : [...this.shown, { viewpoint: this.facts, title: "here" }];
+    view.addMarkers("anchors", cards.map(({ viewpoint: { position_m }, title, chosen: is }) => (
       { id: title, position: position_m, colour: is ? "#4ade80" : "#7dd3fc", size: 14, label: title })), { pickable: false });
     if (chosen && entry.position_m) {
       view.addRoutes("sights", [{ id: 0, points: [...chosen.position_m, ...entry.position_m], colour: "#fde047" }], { width: 2, pickable: false });
@@ -113,6 +124,7 @@ export class AnchorChooser {
   async choose(anchor) {
     const entry = this.page.sync.entry("objects", this.id);
     this.placing.hidden = true;
+    byId("preview").hidden = true;
     const result = await this.page.sync.request({ do: "change", kind: "objects", id: this.id, fields: { anchor } }, structuredClone(entry));
     if (result?.done && anchor) this.page.say(`Anchor of object ${this.id} chosen.`);
   }

@@ -32,7 +32,7 @@ export function askConflict({ operation, base, theirs, who, time }) {
     dialog.replaceChildren(
       h("h2", { id: "conflict-title" }, "Two people, one entry"),
       h("p", {}, `${story} Nothing has been overwritten. Which do you want to keep?`),
-      h("table", {}, h("thead", {}, h("tr", {}, h("td", {}), h("th", { scope: "col" }, `${who}: on disk now`),
+      h("table", {}, h("thead", {}, h("tr", {}, h("th", { scope: "col" }, "Field"), h("th", { scope: "col" }, `${who}: on disk now`),
         h("th", { scope: "col" }, "You"))), h("tbody", {}, ...keys.map(row))),
       h("div", { class: "row" },
         h("button", { id: "keep-theirs", onclick: () => answer("theirs"), autofocus: true }, "Keep theirs"),
@@ -64,7 +64,7 @@ const KEYS = [
   ["B", "box out a thing (imported scenes)"],
   ["V", "place an anchor from this view"], ["G", "go to the selection"], ["F", "fly or orbit"], ["T", "look from above"],
   ["H", "the whole scene"], ["Space", "pick what is in the middle of the view"], ["/", "find"], ["Enter", "to the fields"],
-  ["Esc", "out of a field; nothing selected"], ["Ctrl+Enter", "next unfinished, from a field"], ["Ctrl+Z", "undo"],
+  ["Esc", "out of a field; nothing selected"], ["Ctrl+Enter", "next unfinished, from a field"], ["Ctrl+Z", "undo (in a field: what you typed)"],
   ["Ctrl+Shift+Z", "redo"], ["Delete", "remove the entry"], ["W A S D", "move (in the view)"], ["Q E", "down, up (in the view)"],
   ["Shift", "with these: faster"], ["?", "these keys"],
 ];

@@ -62,8 +62,9 @@ export class List {
     byId("progress").max = Math.max(1, objects.length);
     byId("progress").value = done;
     const lacking = (key) => objects.filter((entry) => entry.lacks.includes(key)).length;
-    const parts = [["name", "lack a name"], ["description", "lack a description"], ["anchor", "lack an anchor"], ["check", "have a warning"]]
-      .map(([key, words]) => [lacking(key), words]).filter(([n]) => n).map(([n, words]) => `${n} ${words}`);
+    const parts = [["name", "lack", "a name"], ["description", "lack", "a description"], ["anchor", "lack", "an anchor"], ["check", "have", "a warning"]]
+      .map(([key, verb, what]) => [lacking(key), verb, what]).filter(([n]) => n)
+      .map(([n, verb, what]) => `${n} ${n === 1 ? { lack: "lacks", have: "has" }[verb] : verb} ${what}`);
     byId("progress-text").textContent = [`${done} of ${objects.length} objects done`, ...parts].join(" · ");
     byId("progress-text").title = byId("progress-text").textContent;
   }

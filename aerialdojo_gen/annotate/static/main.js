@@ -277,8 +277,8 @@ class Page {
       const typing = event.target.matches("input, textarea, select"), key = event.key.toLowerCase();
       const control = event.ctrlKey || event.metaKey;
       let done = null;
-      if (control && key === "z") done = () => this.turn(event.shiftKey ? "redo" : "undo");
-      else if (control && key === "y") done = () => this.turn("redo");
+      if (control && key === "z" && !event.target.matches("textarea, input")) done = () => this.turn(event.shiftKey ? "redo" : "undo");
+      else if (control && key === "y" && !typing) done = () => this.turn("redo");
       else if (control && key === "enter") done = () => this.next();
       else if (event.altKey && "123".includes(key)) done = act[key];
       else if (control || event.altKey) return;

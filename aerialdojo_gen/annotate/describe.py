@@ -1,0 +1,95 @@
+"""What the page says of annotations: where each entry is, what it lacks, what the checks of the import find."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from aerialdojo_gen.annotations.ambiguity import nearest_landmark
+from aerialdojo_gen.annotations.check import check_source
+from aerialdojo_gen.annotations.format import Annotations, Object, format_annotations, parse_annotations
+from aerialdojo_gen.annotations.relations import SceneGeometry
+from aerialdojo_gen.scenes.model import Scene
+
+_PATH = re.compile(r"^(landmarks|objects)\[(\d+)\](?:\.(\w+))?")
+_MENTION = re.compile(r"\b(landmarks|objects)\[(\d+)\]")
+
+
+class Describer:
+    """Says of annotations of one scene what is to be said; not for several threads at once.
+
+    Parameters
+    ----------
+    scene : Scene
+    names : mapping of str to str
+        What a person says for each category.
+    counts : (int, int) or None
+        How many landmarks and objects there must be.
+    """
+
+    def __init__(self, scene: Scene, names: Mapping[str, str], counts: tuple[int, int] | None) -> None:
+        self._scene, self._names, self._counts = scene, names, counts
+        self._geometry = SceneGeometry(scene)  # remembers as it goes
+
+    def describe(self, annotations: Annotations) -> dict[str, Any]:
+        """Describe all entries.
+
+        Returns
+        -------
+        dict
+            ``landmarks`` and ``objects``, each entry with its keys, ``position_m`` and ``faults`` (field, message);
+            an object with ``landmark``, ``direction`` and what it ``lacks`` besides; ``faults`` of no entry.
+        """
+        source = parse_annotations(format_annotations(annotations))
+        faults: dict[tuple[str, int], list[dict[str, str]]] = {}
+        general = []
+        for fault in check_source(source, self._scene, self._names, self._counts, self._geometry):
+            message = _MENTION.sub(lambda m: _called(annotations, m[1], int(m[2])), fault.message)
+            at = _PATH.match(fault.path)
+            if at is None:
+                general.append(message)
+            else:
+                faults.setdefault((at[1], int(at[2])), []).append({"field": at[3] or "", "message": message})
+        landmarks = [
+            {**entry.model_dump(), **self.place(entry.node), "faults": faults.get(("landmarks", k), [])}
+            for k, entry in enumerate(annotations.landmarks)
+        ]
+        objects = [
+            self._object(annotations, entry, faults.get(("objects", k), []))
+            for k, entry in enumerate(annotations.objects)
+        ]
+        return {"landmarks": landmarks, "objects": objects, "faults": general}
+
+    def _object(self, annotations: Annotations, entry: Object, faults: list[dict[str, str]]) -> dict[str, Any]:
+        lacks = [key for key in ("name", "category", "description") if not getattr(entry, key).strip()]
+        lacks += ["anchor"] if entry.anchor is None else []
+        lacks += ["check"] if any(fault["field"] not in lacks for fault in faults) else []
+        return {
+            **entry.model_dump(),
+            **self.place(entry.node),
+            **self.bearing(annotations, entry.node),
+            "faults": faults,
+            "lacks": lacks,
+        }
+
+    def place(self, node: str) -> dict[str, Any]:
+        """Middle of a node's box, ``position_m``; None where the scene has no such node."""
+        there = node in self._scene
+        return {"position_m": self._scene[node].centroid.round(3).tolist() if there else None}
+
+    def bearing(self, annotations: Annotations, node: str) -> dict[str, Any]:
+        """Nearest ``landmark`` and ``direction`` of a node, as the task will state them; None where there is none."""
+        marks = [m for m in sorted(annotations.landmarks, key=lambda m: m.id) if m.node in self._scene]
+        places = np.array([self._scene[m.node].centroid for m in marks]).reshape(-1, 3)
+        found = nearest_landmark(self._scene[node].centroid, places) if node in self._scene else None
+        if found is None:
+            return {"landmark": None, "direction": None}
+        return {"landmark": marks[found.landmark].name, "direction": found.direction}
+
+
+def _called(annotations: Annotations, kind: str, index: int) -> str:
+    entry: Any = getattr(annotations, kind)[index]
+    return f"{kind[:-1]} {entry.id}" + (f" ({entry.name})" if entry.name else "")
