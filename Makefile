@@ -9,7 +9,7 @@ RUN := .venv/bin/aerialdojo-gen
 RUN_FLAGS := $(if $(WORKERS),--workers $(WORKERS))
 
 .DEFAULT_GOAL := help
-.PHONY: help env dev dataset smoke test lint format gallery bench lock clean
+.PHONY: help env dev dataset smoke evaluate test lint format gallery bench lock clean
 
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-9s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -23,7 +23,7 @@ dev: .venv/.dev  ## the same with what tests and linters need
 	  echo "error: $(PYTHON) is older than Python 3.11: install Python 3.11, or make PYTHON=/path/to/python3.11" >&2; exit 1; }
 	@test -x .venv/bin/python || $(PYTHON) -m venv .venv
 	@echo "installing the packages of constraints.txt into .venv/ (a minute or two the first time)"
-	@.venv/bin/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e . || { \
+	@.venv/bin/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[gl,web]' || { \
 	  $(PYTHON) -c 'import sys; sys.exit(sys.version_info[:2] == (3, 11))' && echo "error: a package could not be installed, see above" >&2 || \
 	  echo "error: a package could not be installed, see above. PyBullet has a wheel for Python 3.11 only and is built from" \
 	       "source on others (C++ compiler and Python headers needed): with Python 3.11, rm -rf .venv and make PYTHON=python3.11" >&2; exit 1; }
@@ -42,6 +42,12 @@ dataset: .venv/.installed  ## generate the dataset: scene_assets/ and annotation
 smoke: .venv/.installed  ## two small scenes through all stages, a rendered video included (DATA=data-smoke)
 	@$(RUN) run pipelines/smoke.toml --data $(SMOKE_DATA) $(RUN_FLAGS)
 
+EPISODES ?= 84
+evaluate: .venv/.installed  ## fly oracle, random and explorer on EPISODES=84 test tasks and print their table
+	@for agent in oracle random explorer; do \
+	  $(RUN) evaluate --agent $$agent --split id_test --split ood_test --limit $(EPISODES) --data $(DATA) $(RUN_FLAGS) || exit 1; done
+	@$(RUN) report oracle random explorer --data $(DATA)
+
 PYTEST_FLAGS ?= -n 2 --dist loadfile
 test: .venv/.dev  ## run the tests (PYTEST_FLAGS='-k planner' for some of them)
 	@.venv/bin/python -m pytest $(PYTEST_FLAGS)
@@ -58,7 +64,7 @@ format: .venv/.dev  ## let ruff format the code
 gallery: .venv/.installed  ## picture every prop and every scene into docs/gallery/
 	@$(RUN) gallery --out docs/gallery
 
-bench: .venv/.dev  ## measure planner and renderer
+bench: .venv/.dev  ## measure planner, renderer and OMPL's planners beside ours
 	@for bench in tests/bench/bench_*.py; do echo "== $$bench"; .venv/bin/python $$bench || exit 1; done
 
 lock: .venv/.dev  ## write constraints.txt anew from the ranges in pyproject.toml
