@@ -34,7 +34,14 @@ def task_figure(task: PicturedTask) -> Figure:
     strip = _FRAMES_IN if task.frames else 0.0
     sheet = _Sheet(_WIDTH_IN, 8.7 + strip)
     figure, top = sheet.figure, sheet.height
-    figure.text(0.45 / _WIDTH_IN, 1 - 0.42 / top, plain(task.title), fontsize=19, weight="bold", va="center")
+    figure.text(
+        0.45 / _WIDTH_IN,
+        1 - 0.42 / top,
+        plain(task.title),
+        fontsize=min(19.0, 1700 / len(task.title)),
+        weight="bold",
+        va="center",
+    )
     figure.text(0.45 / _WIDTH_IN, 1 - 0.80 / top, plain(task.place), fontsize=11, color="#475569", va="center")
 
     draw_map(sheet.axes(0.45, top - 6.25, 8.3, 5.2), task, 8.3 / 5.2)
@@ -50,7 +57,7 @@ def task_figure(task: PicturedTask) -> Figure:
     for name, value in task.facts:
         figure.text(11.6 / _WIDTH_IN, y / top, name, fontsize=9, color="#475569")
         y -= 0.17
-        for line in textwrap.wrap(plain(value), 27)[:2]:
+        for line in textwrap.wrap(plain(value), 27)[:3]:
             figure.text(11.6 / _WIDTH_IN, y / top, line, fontsize=10.5)
             y -= 0.17
     words = "\n".join(line for part in plain(task.goal).splitlines() for line in textwrap.wrap(part, 68))
@@ -88,7 +95,7 @@ def _frames(sheet: _Sheet, task: PicturedTask) -> None:
         return
     count, gap = len(task.frames), 0.12
     edge = min(2.45, (sheet.width - 0.9 - (count - 1) * gap) / count)
-    spare = (sheet.width - 0.9 - count * edge) / max(1, count - 1) if count > 1 else 0.0
+    spare = min(0.25, (sheet.width - 0.9 - count * edge) / max(1, count - 1))
     for k, frame in enumerate(task.frames):
         axes = sheet.axes(0.45 + k * (edge + spare), 0.2, edge, edge)
         axes.imshow(frame.rgb)

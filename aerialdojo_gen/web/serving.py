@@ -134,11 +134,11 @@ def local_app(page: str, title: str, max_body_bytes: int = 1 << 20, *, any_host:
     app = FastAPI(title=title, docs_url=None, redoc_url=None, openapi_url=None)
     app.add_middleware(_LocalOnly, policy=policy, max_body_bytes=max_body_bytes, any_host=any_host)
 
-    @app.get("/", include_in_schema=False)
+    @app.get("/", include_in_schema=False, response_model=None)
     def index() -> Response:
         return Response(html, media_type="text/html")
 
-    @app.get("/favicon.ico", include_in_schema=False)
+    @app.get("/favicon.ico", include_in_schema=False, response_model=None)
     def favicon() -> Response:
         return Response(status_code=204)
 

@@ -50,7 +50,7 @@ def view_app(data: Path, scene: str) -> FastAPI:
     # FCL's manager is no thing for two threads at once, and FastAPI answers in several.
     one_at_a_time = threading.Lock()
 
-    @app.get("/api/scene")
+    @app.get("/api/scene", response_model=None)
     def get_scene() -> Response:
         return Response(payload, media_type="application/octet-stream")
 
@@ -58,7 +58,7 @@ def view_app(data: Path, scene: str) -> FastAPI:
     def get_index() -> dict[str, Any]:
         return index
 
-    @app.get("/api/routes/points")
+    @app.get("/api/routes/points", response_model=None)
     def get_points() -> Response:
         return Response(points, media_type="application/octet-stream")
 
@@ -67,7 +67,7 @@ def view_app(data: Path, scene: str) -> FastAPI:
         with one_at_a_time:
             return route_detail(shown, nav_id)
 
-    @app.get("/api/objects/{object_id}/image")
+    @app.get("/api/objects/{object_id}/image", response_model=None)
     def get_image(object_id: int) -> Response:
         image = shown.object(object_id)["reference_image"]
         if image is None:
