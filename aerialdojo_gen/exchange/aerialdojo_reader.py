@@ -134,7 +134,7 @@ class Reader:
 
     def _join(self, task: Task, context: Context, folder: Path, partition: Partition | None) -> None:
         """Give the task its trajectory, or what its other instance brought already."""
-        place = folder.parts[-3:] if partition else folder.parts
+        place = folder.parts[-3:] if partition else (context.label,)
         if place != self._partition:
             self._partition, self._known = place, {}
             self._met = {pair for pair in self._met if pair[0] == context.label}
@@ -167,7 +167,7 @@ class Reader:
         if name is None or name in self._nav_ids:
             if name is not None:
                 context.notes["task_id stands twice in the scene: named by partition and episode"] += 1
-            name = f"{task.scene}-{digest(*(partition.path.parts if partition else folder.parts), task.source_id)}"
+            name = f"{task.scene}-{digest(*(partition.path.parts if partition else [context.label]), task.source_id)}"
         self._nav_ids.add(name)
         return met | {"nav_id": name}
 
