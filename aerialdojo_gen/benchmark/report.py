@@ -93,7 +93,7 @@ def html(
     )
     environment.filters["json_in_html"] = _json_in_html
     environment.globals |= {
-        "points": _points, "cross": _cross, "arrow": _arrow, "starts": _starts, "heights": _heights, "top": _top_m
+        "points": _points, "cross": _cross, "arrow": _arrow, "starts": _starts, "heights": _heights, "span": _span_m
     }  # fmt: skip
     first = profiles[0]
     captions = {
@@ -149,17 +149,20 @@ def _starts(table: Table) -> set[int]:
     return {0, *accumulate(len(names) for _, names in table.groups)}
 
 
-def _top_m(replay: Replay) -> float:
-    return max(1.0, *replay.reference["z_m"], *(z for f in replay.flights for z in f.z_m)) * 1.1
+def _span_m(replay: Replay) -> tuple[float, float]:
+    """Return the heights that the chart ends at; a gorge lies below 0."""
+    z_m = [*replay.reference["z_m"], *(z for f in replay.flights for z in f.z_m)]
+    margin = max(1.0, 0.08 * (max(z_m) - min(z_m)))
+    return min(z_m) - margin, max(z_m) + margin
 
 
 def _heights(replay: Replay) -> list[dict[str, str]]:
     """Return the lines of the chart of heights, 400 by 90: the reference, then the flights."""
-    top = _top_m(replay)
+    low, high = _span_m(replay)
     most = max(1, max(len(f.said) for f in replay.flights) - 1)
 
     def line(css: str, z_m: Sequence[float]) -> dict[str, str]:
-        points = (f"{400 * k / most:.1f},{90 * (1 - z / top):.1f}" for k, z in enumerate(z_m))
+        points = (f"{400 * k / most:.1f},{90 * (high - z) / (high - low):.1f}" for k, z in enumerate(z_m))
         return {"css": css, "points": " ".join(points)}
 
     # The reference's poses are its actions', so that it shares the axis; where it is longer, the axis ends first.
