@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from aerialdojo_gen.planning.grid_kernels import GridArrays, inside, segment_free
+from aerialdojo_gen.planning.grid_kernels import GridArrays, segment_free
 
 # Half of the moves between cells: neighbours in the plane, knight's moves in the plane, up. Move k + 9 undoes move k.
 _HALF = ((1, 0, 0), (0, 1, 0), (1, 1, 0), (-1, 1, 0), (2, 1, 0), (1, 2, 0), (-1, 2, 0), (-2, 1, 0), (0, 0, 1))
@@ -48,6 +48,20 @@ def _composed(moves: NDArray[np.uint32], i: int, j: int, k: int, m: int) -> bool
 
 
 @njit(cache=True)
+def _passable(
+    moves: NDArray[np.uint32], i: int, j: int, k: int, m: int, radius: float, grid: GridArrays
+) -> bool:  # fmt: skip
+    """Whether a move that the field cannot vouch for is passable."""
+    if _PARTS[m, 0] >= 0 and _composed(moves, i, j, k, m):
+        return True
+    if 4 <= m < 8:
+        return False
+    x, y, z = cell_centre(i, j, k, grid)
+    u, v, w = cell_centre(i + MOVES[m, 0], j + MOVES[m, 1], k + MOVES[m, 2], grid)
+    return segment_free(x, y, z, u, v, w, radius, grid, False)
+
+
+@njit(cache=True)
 def passable_moves(grid: GridArrays, radius: float) -> NDArray[np.uint32]:
     """Find the moves that the body can make from every cell.
 
@@ -67,35 +81,38 @@ def passable_moves(grid: GridArrays, radius: float) -> NDArray[np.uint32]:
     (nx, ny, nz) uint32
         Bit m stands for ``MOVES[m]``; 0 for a cell in which the body cannot be, or cannot leave.
     """
-    nx, ny, nz = grid.field.shape
+    field, cell = grid.field, grid.cell
+    nx, ny, nz = field.shape
     moves = np.zeros((nx, ny, nz), np.uint32)
-    free = np.zeros((nx, ny, nz), np.bool_)
-    for i in range(nx):
-        for j in range(ny):
-            for k in range(nz):
-                x, y, z = cell_centre(i, j, k, grid)
-                free[i, j, k] = grid.field[i, j, k] >= radius and inside(x, y, z, grid.lower, grid.upper)
+    # Where the body can be: no surface near, inside the bounds give or take a nanometre.
+    free = field >= np.float32(radius)
+    for axis in range(3):
+        for c in range(field.shape[axis]):
+            middle = grid.origin[axis] + (c + 0.5) * cell
+            if not grid.lower[axis] - 1e-9 <= middle <= grid.upper[axis] + 1e-9:
+                if axis == 0:
+                    free[c] = False
+                elif axis == 1:
+                    free[:, c] = False
+                else:
+                    free[:, :, c] = False
     # The order matters: diagonals are made of axis moves, knight's moves of both.
     for m in (0, 1, 8, 2, 3, 4, 5, 6, 7):
         dx, dy, dz = MOVES[m]
-        length = MOVE_LENGTHS[m] * grid.cell
+        needed = MOVE_LENGTHS[m] * cell + 2 * radius
+        there, back = _ONE << np.uint32(m), _ONE << np.uint32(m + N_HALF)
         for i in range(max(0, -dx), min(nx, nx - dx)):
             for j in range(ny - dy):
                 for k in range(nz - dz):
                     if not (free[i, j, k] and free[i + dx, j + dy, k + dz]):
                         continue
                     # Both balls together cover the move if the gap between them is no wider than this.
-                    if grid.field[i, j, k] + grid.field[i + dx, j + dy, k + dz] - length < 2 * radius:
-                        composed = _PARTS[m, 0] >= 0 and _composed(moves, i, j, k, m)
-                        if not composed and m >= 4 and m < 8:
-                            continue
-                        if not composed:
-                            x, y, z = cell_centre(i, j, k, grid)
-                            u, v, w = cell_centre(i + dx, j + dy, k + dz, grid)
-                            if not segment_free(x, y, z, u, v, w, radius, grid, False):
-                                continue
-                    moves[i, j, k] |= _ONE << np.uint32(m)
-                    moves[i + dx, j + dy, k + dz] |= _ONE << np.uint32(m + N_HALF)
+                    if field[i, j, k] + field[i + dx, j + dy, k + dz] < needed and not _passable(
+                        moves, i, j, k, m, radius, grid
+                    ):
+                        continue
+                    moves[i, j, k] |= there
+                    moves[i + dx, j + dy, k + dz] |= back
     return moves
 
 
