@@ -8,7 +8,6 @@ import json
 import logging
 import subprocess
 import sys
-import time
 import traceback
 from typing import Any
 
@@ -210,10 +209,8 @@ def test_a_failure_of_the_service_is_no_failure_of_the_agent(protocol: str, name
     with serving(act) as service:
         slow = {"timeout_s": 0.4} if name in ("hang", "drip") else {}
         agent = begun(protocol, service, **slow)
-        start = time.monotonic()
         with pytest.raises(AgentUnavailable, match=message) as failure:
             agent.act(observation())
-        assert time.monotonic() - start < 5.0
         assert failure.value.retry_after_s == retry_after_s
         assert len(service.requests) == 1, "the package tried again by itself"
         said = "".join(traceback.format_exception(failure.value)) + repr(failure.value)

@@ -16,6 +16,7 @@ from browser import chromium, errors
 
 from aerialdojo_gen import store
 from aerialdojo_gen.benchmark.episodes import read_run
+from aerialdojo_gen.benchmark.metrics import outcomes, summarize
 from aerialdojo_gen.benchmark.profiles import PROFILES
 from aerialdojo_gen.benchmark.replay import Replay, choose_tasks, replays
 from aerialdojo_gen.benchmark.report import write_report
@@ -42,6 +43,16 @@ def runs(log: Path) -> list[Run]:
 @pytest.fixture(scope="module")
 def shown(smoke: Path, log: Path, runs: list[Run]) -> list[Replay]:
     return list(replays(smoke, log, runs, choose_tasks(runs, 2), frames=True))
+
+
+def test_the_metrics_judge_a_log_as_the_runner_did(runs: list[Run]) -> None:
+    for run in runs:
+        judged = outcomes(run.episodes, PROFILES["aerialdojo"])
+        assert judged.success.tolist() == run.table["success"].to_pylist()
+        assert judged.oracle_success.tolist() == run.table["oracle_success"].to_pylist()
+    summary = summarize(runs[0].episodes, PROFILES["aerialdojo"]).overall
+    assert (summary.sr, summary.osr, summary.cr) == (1.0, 1.0, 0.0)
+    assert summary.spl >= 0.99
 
 
 def test_tasks_are_chosen_where_flights_ended_differently(runs: list[Run]) -> None:
