@@ -237,6 +237,7 @@ def write_shard(
     meta = {
         "fingerprint": fingerprint,
         "content": content_digest(table),
+        "rows": table.num_rows,
         "parts": parts,
         "summary": summary or {},
         "files": dict(files or {}),
@@ -284,7 +285,7 @@ def read_info(path: Path) -> ShardInfo | None:
     Raises
     ------
     StoreError
-        The file is damaged (truncated, say).
+        The file is damaged (truncated, say), or has other rows than were written.
     """
     try:
         footer = pq.read_metadata(path)
@@ -294,6 +295,12 @@ def read_info(path: Path) -> ShardInfo | None:
     if raw is None:
         return None
     meta = json.loads(raw)
+    # A shard of an earlier version does not say how many rows were written.
+    if meta.get("rows", footer.num_rows) != footer.num_rows:
+        raise StoreError(
+            f"{path} has {footer.num_rows:,} rows where {meta['rows']:,} were written: "
+            "delete it and run the command again"
+        )
     return ShardInfo(
         meta["fingerprint"], meta["content"], footer.num_rows, meta["parts"], meta["summary"], meta["files"]
     )

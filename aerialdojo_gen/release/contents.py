@@ -52,7 +52,7 @@ SHARDS = tuple(name for name, place in store.LAYOUT.items() if place.template.st
 
 
 def check_release(data: Path, scenes: list[str] | None = None) -> list[str]:
-    """Check from the footers that the release's parts are there, whole, of one run and as many rows as were written.
+    """Check from the footers that the release's parts are there, whole and of one run.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ def check_release(data: Path, scenes: list[str] | None = None) -> list[str]:
     Raises
     ------
     StoreError
-        One line a part that is missing, damaged, of another run than its fellows, or of a wrong number of rows.
+        One line a part that is missing, damaged, of a wrong number of rows, or of another run than its fellows.
     """
     there = {name: set(_scenes_with(data, name)) for name in SHARDS}
     known = sorted(set().union(*there.values())) if scenes is None else scenes
@@ -105,20 +105,9 @@ def _faults(data: Path, scene: str, present: list[str]) -> list[str]:
             lines.append(f"{path} was not written by aerialdojo-gen: delete it and {mend}")
             continue
         prints[name] = info.fingerprint
-        wanted = _rows_written(name, info.summary.get("counts", {}))
-        if wanted is not None and wanted != info.rows:
-            lines.append(f"{path} has {info.rows:,} rows where {wanted:,} were written: {mend} --force")
     if len(set(prints.values())) > 1:
         lines.append(f"the release's parts of {scene} in {data} are of different runs: {mend} --force")
     return lines
-
-
-def _rows_written(name: str, counts: dict[str, int]) -> int | None:
-    """Rows that `split` says it wrote to a part; None where its summary does not say."""
-    table, _, subset = name.partition("/")
-    if subset not in counts:
-        return None
-    return counts[subset] if table == "tasks" else counts[subset] // 2
 
 
 def counts(data: Path, scenes: list[str]) -> dict[str, dict[str, int]]:
