@@ -26,6 +26,7 @@ from aerialdojo_gen.errors import StoreError, UsageError
 from aerialdojo_gen.release.browse import ReleasedScene
 from aerialdojo_gen.rendering.preview import look_at
 from aerialdojo_gen.scenes.model import Scene
+from aerialdojo_gen.schemas import ACTION_NAMES
 from aerialdojo_gen.web import serving
 from aerialdojo_gen.web.payload import scene_payload
 from aerialdojo_gen.web.view import route_detail, route_points, scene_index, view_app
@@ -456,6 +457,52 @@ def test_a_route_is_picked_by_a_click(page):
     assert f"{length:.2f} m" in facts
     assert f"{nav}-s" in facts
     assert errors(driver) == []
+
+
+def test_flying_along_looks_as_the_drone_looks(smoke, page):
+    driver, url = page
+    row = ReleasedScene(smoke, YARD).routes.to_pylist()[4]
+    # The address of a route opens it.
+    driver.get(f"{url}#route={row['nav_id']}")
+    driver.refresh()
+    until("the page is ready", lambda: driver.execute_script("return document.body?.dataset.ready"))
+    assert driver.execute_script("return document.getElementById('picked-route').textContent") == row["nav_id"]
+    driver.execute_script("document.getElementById('ride').click()")
+    for k in (0, len(row["action"]) // 2, len(row["action"]) - 1):
+        driver.execute_script(
+            "const s = document.getElementById('step'); s.value = arguments[0];"
+            "s.dispatchEvent(new Event('input'))", k,
+        )  # fmt: skip
+        eye, ahead, fov = driver.execute_script(
+            "const c = page.view.camera, e = c.matrixWorld.elements; c.updateMatrixWorld();"
+            "return [c.position.toArray(), [-e[8], -e[9], -e[10]], c.fov]"
+        )
+        assert eye == pytest.approx([row["x_m"][k], row["y_m"][k], row["z_m"][k]], abs=1e-3)
+        assert ahead == pytest.approx([np.cos(row["yaw_rad"][k]), np.sin(row["yaw_rad"][k]), 0.0], abs=1e-3)
+        assert fov == 90
+        doing = driver.execute_script("return document.getElementById('doing').textContent")
+        assert doing.startswith(ACTION_NAMES[row["action"][k]])
+    driver.execute_script("page.letGo()")
+    assert driver.execute_script("return page.view.camera.fov") == 60
+
+
+def test_dragging_in_fly_mode_turns_the_camera_on_the_spot(page):
+    from selenium.webdriver import ActionChains
+
+    driver, _ = page
+    fresh(driver)
+    driver.execute_script("page.mode('fly'); page.view.controls.lookFrom([0, 0, 12], [0, 20, 12])")
+    canvas_of = driver.execute_script("return page.view.canvas")
+    ActionChains(driver, duration=50).move_to_element(canvas_of).click_and_hold().move_by_offset(100, 0).perform()
+    ActionChains(driver).release().perform()
+    eye, ahead = driver.execute_script(
+        "const c = page.view.camera, e = c.matrixWorld.elements; c.updateMatrixWorld();"
+        "return [c.position.toArray(), [-e[8], -e[9], -e[10]]]"
+    )
+    # The scene follows the hand: pulled to the right, it lets one look to the left, to the west of north.
+    assert eye == pytest.approx([0, 0, 12])
+    assert ahead[0] < -0.2
+    assert ahead[2] == pytest.approx(0.0, abs=1e-6)
 
 
 def test_an_object_is_picked_by_a_click_on_its_mesh(page):
