@@ -1,11 +1,15 @@
 """The annotation page in a real browser: a foreign mesh up to tasks; two tabs at odds; a killed server."""
 
+import contextlib
+import http.client
 import itertools
 import json
 import math
 import os
 import signal
 import socket
+import threading
+import urllib.request
 
 import annotating
 import browser as chrome
@@ -121,9 +125,6 @@ def test_a_foreign_mesh_is_annotated_in_the_browser_and_becomes_tasks(browser, s
         page.click_at(roof(mark), bounds)
         until("the pick", lambda: page.all("#make-landmark"))
         assert page.text("#panel .node") == mark.node
-        page.leave()
-        page.click_at(roof(mark), bounds)
-        until("the pick", lambda: page.all("#make-landmark"))
         page.press("l")
         until("the fields", lambda: page.all("#field-name"))
         page.write("name", "corner house")
@@ -181,12 +182,21 @@ def test_a_foreign_mesh_is_annotated_in_the_browser_and_becomes_tasks(browser, s
         assert chrome.errors(browser) == []
     run_until("filter", data=data, pipeline=scene.pipeline, scene=[NAME], workers=1, quiet=True)
     anchors = store.read_scene(data, "anchors", NAME).to_pylist()
-    assert [(a["object_id"], a["selected_by"]) for a in anchors if a["selected"]] == [
-        (0, "human"),
-        (1, "human"),
-        (2, "human"),
-    ]
+    assert {a["object_id"]: a["selected_by"] for a in anchors if a["selected"]} == dict.fromkeys(range(3), "human")
     assert pc.sum(store.read_scene(data, "verdicts", NAME)["keep"]).as_py() >= 1
+
+
+def rename_on_and_on(url, answered):
+    """Change an object's name again and again, as another program, until nobody answers."""
+    with contextlib.suppress(OSError, http.client.HTTPException):
+        version = json.loads(urllib.request.urlopen(url + "api/document").read())["version"]
+        for n in itertools.count():
+            operation = {"do": "change", "kind": "objects", "id": 1, "fields": {"name": f"thing {n}"}}
+            body = json.dumps({"who": "Robot", "client": "robot", "operation": operation}).encode()
+            headers = {"Content-Type": "application/json", "If-Match": version}
+            answer = urllib.request.urlopen(urllib.request.Request(url + "api/operations", body, headers))
+            version = json.loads(answer.read())["version"]
+            answered.append(n)
 
 
 @pytest.fixture(scope="module")
@@ -251,8 +261,15 @@ def test_two_tabs_at_odds_and_a_server_killed_in_the_middle_of_a_save(browser, y
         # The server is killed; what is typed meanwhile is kept, and saved when there is a server again.
         second.leave()
         begin(second)
+        answered = []
+        saving = threading.Thread(target=rename_on_and_on, args=(url, answered))
+        saving.start()
+        until("saves under way", lambda: len(answered) >= 5)
         os.kill(process.pid, signal.SIGKILL)
+        saving.join()
         process.wait()
+        on_disk = entries(annotations)[1]["name"]
+        assert on_disk in (f"thing {len(answered) - 1}", f"thing {len(answered)}")
         second.write("name", "van of the night")
         second.press("\ue004")
         until("said that it is not saved", lambda: "not saved" in second.text("#saved"))

@@ -27,7 +27,7 @@ def serve_desk(desk: Desk, *, port: int, host: str, browser: bool, say: Callable
     port : int
         0 for a free one.
     host : str
-        IPv4 address to listen on; any other than loopback makes a token, without which nothing is answered.
+        IPv4 address to listen on; any other than 127.0.0.1 makes a token, without which nothing is answered.
     browser : bool
         Open the page; not where a token is asked for.
     say : callable
@@ -43,7 +43,7 @@ def serve_desk(desk: Desk, *, port: int, host: str, browser: bool, say: Callable
     except ImportError:
         raise UsageError("annotate needs FastAPI and uvicorn: pip install 'aerialdojo-gen[web]'") from None
     try:
-        loopback = ipaddress.IPv4Address(host).is_loopback
+        loopback = ipaddress.IPv4Address(host) == ipaddress.IPv4Address("127.0.0.1")
     except ValueError:
         raise UsageError(f"--host {host}: give an IPv4 address of this machine, or 0.0.0.0 for all") from None
     listener = open_socket(port, host)

@@ -196,6 +196,10 @@ class Page {
   async remove() {
     const { kind, id } = this.selection ?? {};
     if (!kind) return;
+    // What was being typed is saved first: it is the person's own change, and no conflict.
+    this.editor.saveAll();
+    await this.sync.flush();
+    if (!this.sync.entry(kind, id)) return;
     const entry = structuredClone(this.sync.entry(kind, id));
     const result = await this.sync.request({ do: "remove", kind, id }, entry);
     if (result?.done) {

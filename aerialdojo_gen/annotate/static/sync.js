@@ -227,6 +227,6 @@ export class Sync extends EventTarget {
 const changedKeys = (base, now) => Object.keys(EMPTY).filter((key) => key in now && base && !same(now[key], base[key]));
 
 const pickKnown = (kind, entry) => {
-  const keys = kind === "landmarks" ? ["name", "node"] : ["name", "category", "description", "node"];
-  return Object.fromEntries(keys.filter((key) => entry && key in entry).map((key) => [key, entry[key]]));
+  const keys = kind === "landmarks" ? ["name", "node"] : ["name", "category", "description", "node", "anchor"];
+  return Object.fromEntries(keys.filter((key) => entry?.[key] != null).map((key) => [key, entry[key]]));
 };
