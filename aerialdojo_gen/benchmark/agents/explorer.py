@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from aerialdojo_gen.benchmark.agents.base import AgentBase
 from aerialdojo_gen.benchmark.agents.depth_map import DepthMap
 from aerialdojo_gen.benchmark.goal import Goal, Observation, Sensors
+from aerialdojo_gen.errors import UsageError
 from aerialdojo_gen.planning.primitives import DISPLACEMENTS, TURN_RAD, TURNS
 from aerialdojo_gen.schemas import ACTION_NAMES, MOVE_UP_1, STOP, TURN_LEFT, TURN_RIGHT
 
@@ -38,7 +39,7 @@ class ExplorerAgent(AgentBase):
 
     sensors = Sensors(views=("front", "left", "right"), width=96, height=96)
 
-    def __init__(self, likeness: float = 0.8, clearance_m: float = 0.8) -> None:
+    def __init__(self, likeness: float = 0.75, clearance_m: float = 0.8) -> None:
         if not -1.0 <= likeness <= 1.0:
             raise ValueError(f"likeness is a correlation, -1 to 1, not {likeness}")
         self._likeness, self._clearance_m = likeness, clearance_m
@@ -47,7 +48,7 @@ class ExplorerAgent(AgentBase):
         """Begin an episode."""
         self._sensors = goal.rules.sensors
         if not {"front", "left", "right"} <= set(self._sensors.views) or not self._sensors.depth:
-            raise ValueError("the explorer needs depth of the front, left and right views")
+            raise UsageError("the explorer needs depth of the front, left and right views")
         self._wanted = None if goal.image is None else thumbnail(goal.image)
         self._radius_m = goal.rules.radius_m
         self._map = DepthMap(self._sensors)
