@@ -199,6 +199,14 @@ def test_an_export_is_replaced_by_force_alone(smoke, tmp_path):
     assert os.listdir(tmp_path) == ["out"]
 
 
+def test_what_a_killed_run_left_is_swept_and_a_living_ones_is_not(smoke, tmp_path):
+    dead, alive = (tmp_path / f".out.{pid}.tmp" for pid in (2**22 + 1, os.getppid()))
+    for left in (dead, alive):
+        left.mkdir()
+    export_release("aerialdojo", smoke, tmp_path / "out", ["U_Courtyard_0"])
+    assert sorted(p.name for p in tmp_path.iterdir()) == sorted([alive.name, "out"])
+
+
 def test_the_command_says_what_it_wrote_and_what_is_wrong(smoke, tmp_path):
     runner = CliRunner()
     done = runner.invoke(

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+import trimesh
 from releases import released
 
 from aerialdojo_gen.exchange.exporting import export_release
@@ -168,3 +169,18 @@ def test_the_same_release_gives_the_same_bytes(habitat, smoke, tmp_path):
     export_release("habitat", smoke, tmp_path / "again")
     for path in habitat.rglob("*.gz"):
         assert path.read_bytes() == (tmp_path / "again" / path.relative_to(habitat)).read_bytes()
+
+
+def test_goals_lie_where_the_meshes_have_their_objects(habitat, smoke):
+    goals, episodes, _ = load(habitat / "id_train/content/U_Courtyard_0.json.gz")
+    mesh = trimesh.load_scene(smoke / episodes[0].scene_id)
+    parents = mesh.graph.transforms.parents
+    objects = pd.read_parquet(smoke / "release/objects").query("scene == 'U_Courtyard_0'").set_index("object_id")
+    for goal in (goal for values in goals.values() for goal in values):
+        points = []
+        for node in mesh.graph.nodes_geometry:
+            if parents[node] == objects.loc[goal.object_id, "mesh_node"]:
+                transform, name = mesh.graph.get(node)
+                points.append(trimesh.transform_points(mesh.geometry[name].vertices, transform))
+        corners = np.vstack(points)
+        assert (corners.min(axis=0) + corners.max(axis=0)) / 2 == pytest.approx(goal.position, abs=1e-3)
