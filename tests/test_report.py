@@ -22,7 +22,7 @@ from aerialdojo_gen import cli
 from aerialdojo_gen.benchmark import figures, formats, tables
 from aerialdojo_gen.benchmark.metrics import summarize
 from aerialdojo_gen.benchmark.profiles import PROFILES
-from aerialdojo_gen.benchmark.report import write_report
+from aerialdojo_gen.benchmark.report import html, write_report
 from aerialdojo_gen.benchmark.runs import Run, conduct, load_runs
 from aerialdojo_gen.errors import AerialDojoError, StoreError
 
@@ -163,11 +163,9 @@ def test_the_csv_holds_every_score_unrounded(runs: list[Run]) -> None:
     assert not any("nan" in value for row in rows for value in row.values())
 
 
-def test_figures_are_the_same_bytes_each_time_and_say_no_date(runs: list[Run]) -> None:
+def test_figures_have_every_run_in_its_colour_and_no_date(runs: list[Run]) -> None:
     for draw in (figures.family_radar, figures.radius_curve):
         svg, png = (figures.encoded(draw(runs, AT_3), kind) for kind in ("svg", "png"))
-        assert figures.encoded(draw(runs, AT_3), "svg") == svg
-        assert figures.encoded(draw(runs, AT_3), "png") == png
         assert b"dc:date" not in svg
         assert ET.fromstring(svg).tag == "{http://www.w3.org/2000/svg}svg"
         picture = cv2.imdecode(np.frombuffer(png, np.uint8), cv2.IMREAD_COLOR)
@@ -185,7 +183,7 @@ def test_a_figure_of_some_families_has_gaps_and_no_zeros(tmp_path: Path) -> None
     assert [math.isnan(v) for v in values] == [False, True, True, False, False]
 
 
-def test_the_folder_of_a_report_is_whole(runs: list[Run], tmp_path: Path) -> None:
+def test_the_folder_of_a_report_is_whole_and_the_same_bytes_each_time(runs: list[Run], tmp_path: Path) -> None:
     written = write_report(tmp_path / "out", runs, [AT_3, AT_5], [])
     assert sorted(p.name for p in written) == sorted(p.name for p in (tmp_path / "out").iterdir())
     page = (tmp_path / "out" / "report.html").read_text()
@@ -195,11 +193,10 @@ def test_the_folder_of_a_report_is_whole(runs: list[Run], tmp_path: Path) -> Non
     assert [p.read_bytes() for p in written] == [p.read_bytes() for p in again]
 
 
-def test_a_page_loads_nothing_and_escapes_everything(log: Path, tmp_path: Path) -> None:
+def test_a_page_loads_nothing_and_escapes_everything(log: Path) -> None:
     (run,) = load_runs(log, ["random"])
     nasty = Run(NASTY, NASTY, NASTY, '{"x": "' + NASTY + '"}', run.table, run.episodes)
-    write_report(tmp_path, [nasty], [AT_3], [])
-    page = (tmp_path / "report.html").read_text()
+    page = html([nasty], [AT_3], [], {"families": b"<svg/>", "radius": b"<svg/>"})
     assert "alert(1)</script>" not in page
     assert page.count("<script") == page.count("</script>") == 1
     assert not re.search(r'(?:src|href)="(?!data:)', page)
