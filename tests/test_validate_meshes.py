@@ -77,6 +77,9 @@ def test_a_mesh_that_is_a_link_out(planted, tmp_path):
         ("anchor_surface", "release/anchors", "surface_distance_m", lambda v: v + 0.01),
         ("anchor_clearance", "release/anchors", "clearance_m", lambda v: v - 0.01),
         ("anchor_yaw", "release/anchors", "yaw_rad", lambda v: v * 0.5),
+        ("anchor_rank", "release/anchors", "score", lambda v: v + 1.0),
+        ("anchor_visibility", "release/anchors", "visible_fraction", lambda v: v / 10),
+        ("object_category", OBJECTS, "category", lambda v: v + "_"),
     ],
 )
 def test_a_value_that_the_mesh_contradicts(planted, found_by, table, name, value):
@@ -98,6 +101,15 @@ def picture(array):
     return cv2.imencode(".png", np.asarray(array, dtype=np.uint8))[1].tobytes()
 
 
+def shifted(row):
+    """A box of the same size a few pixels off, still in the picture."""
+    for low, high in (("box_u0_px", "box_u1_px"), ("box_v0_px", "box_v1_px")):
+        step = 8 if row[high] <= 312 else -8 if row[low] >= 8 else 0
+        if step:
+            return {low: row[low] + step, high: row[high] + step}
+    raise AssertionError("the object fills its picture")
+
+
 def with_words(png):
     """The same picture with a text chunk before its end."""
     text = b"Comment\0goal at 3.5, 2.0"
@@ -116,6 +128,8 @@ def with_words(png):
         ("image_box", lambda row: row.update(box_u1_px=321)),
         ("image_box", lambda row: row.update(box_v0_px=row["box_v1_px"])),
         ("image_box", lambda row: row.update(image_fraction=1.0, box_u0_px=row["box_u1_px"] - 1)),
+        ("image_target", lambda row: row.update(image_fraction=row["image_fraction"] / 2)),
+        ("image_target", lambda row: row.update(shifted(row))),
     ],
 )
 def test_a_reference_image_at_fault(planted, found_by, change):
@@ -137,3 +151,20 @@ def test_two_objects_with_one_picture(planted):
             lambda row: row["reference_image_id"] == second["reference_image_id"],
         )
     assert check(planted) == {"image_id_twice": object_of(second)}
+
+
+def test_an_object_with_anchors_of_ranks_that_do_not_count_up(planted):
+    rows = planted.rows("release/anchors")
+    starts = {
+        (row["start_object_id"], row["start_anchor_id"])
+        for side in ("train", "test")
+        for row in planted.rows(f"routes/{side}")
+    }
+    last = max(row["anchor_id"] for row in rows)
+    changed = next(row for row in rows if row["anchor_id"] == last)
+    old = (changed["object_id"], changed["anchor_id"])
+    changed["anchor_id"] += 1
+    planted.write("release/anchors", rows)
+    found = check(planted)
+    assert found.pop("anchor_rank") == [f"object_id={changed['object_id']} anchor_id={last + 1}"]
+    assert set(found) == ({"unknown_start"} if old in starts else set())

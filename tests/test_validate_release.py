@@ -94,6 +94,12 @@ def test_a_scene_that_the_card_counts_and_nobody_has(planted):
     assert set(check(planted, whole=True)) == {"card_counts"}
 
 
+@pytest.mark.parametrize("table", ["scenes", "landmarks", "objects", "anchors"])
+def test_a_table_without_rows(planted, table):
+    planted.write(f"release/{table}", [])
+    assert check(planted) == {"part_rows": [relative(planted, f"release/{table}")]}
+
+
 def test_parts_of_two_runs(planted):
     path = planted.path("release/anchors")
     table = pq.read_table(path, partitioning=None)

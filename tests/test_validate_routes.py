@@ -201,10 +201,10 @@ def test_replayed_actions_are_swept_for_themselves(planted, world):
 
 
 def test_a_sample_asks_fcl_about_so_many_routes_and_always_the_same(planted):
-    asked = collisions.sampled(scene_data(planted, sample=5))
+    asked = scene_data(planted, sample=5).sampled
     assert len(asked) == 5
-    assert (asked == collisions.sampled(scene_data(planted, sample=5))).all()
-    assert len(collisions.sampled(scene_data(planted))) == len(planted.rows(KEY)) + len(planted.rows("routes/test"))
+    assert (asked == scene_data(planted, sample=5).sampled).all()
+    assert len(scene_data(planted).sampled) == len(planted.rows(KEY)) + len(planted.rows("routes/test"))
 
 
 def test_checks_stand_after_those_that_they_build_on():

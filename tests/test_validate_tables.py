@@ -163,7 +163,7 @@ def test_an_id_that_tells_the_pair(planted):
 
 def test_an_anchor_of_no_object(planted):
     rows = planted.rows("release/anchors")
-    lost = rows[1] | {"object_id": 999, "selected": False}
+    lost = rows[0] | {"object_id": 999, "selected": False}
     planted.write("release/anchors", [*rows, lost], sort=False)
     assert check(planted) == {"unknown_object": [f"object_id=999 anchor_id={lost['anchor_id']}"]}
 

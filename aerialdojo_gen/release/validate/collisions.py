@@ -15,9 +15,8 @@ from aerialdojo_gen.planning.certify import corners
 from aerialdojo_gen.planning.collision import CollisionWorld
 from aerialdojo_gen.planning.primitives import replay
 from aerialdojo_gen.release.validate.registry import Finding, check
-from aerialdojo_gen.release.validate.rows import Floats, Ints, Rows, SceneData
+from aerialdojo_gen.release.validate.rows import Floats, Rows, SceneData
 from aerialdojo_gen.release.validate.scene_mesh import scene_mesh
-from aerialdojo_gen.rng import rank
 
 _FITS = ("list_lengths_differ", "out_of_bounds")
 # FCL's tolerance for a capsule against a triangle is well below this.
@@ -25,34 +24,24 @@ _CLEARANCE_M = 1e-4
 _HALVINGS = 14
 
 
-def sampled(data: SceneData) -> Ints:
-    """Places in `paths` of the routes that FCL is asked about: all, or so many by a draw from their ids."""
-    paths = data.paths
-    if data.sample is None or data.sample >= len(paths.rows):
-        return np.arange(len(paths.rows))
-    nav_ids = data["routes"].texts("nav_id")
-    order = sorted(range(len(paths.rows)), key=lambda k: rank(0, "validate", nav_ids[int(paths.rows[k])]))
-    return np.sort(np.array(order[: data.sample], dtype=np.int64))
-
-
-@check("routes", needs=("mesh",), after=_FITS)
+@check("routes", needs=("mesh",), after=_FITS, samples=True)
 def route_collision(data: SceneData, _rows: Rows) -> Iterator[Finding]:
     """The body's sweep along the stored positions touches no surface (FCL, a capsule a leg)."""
     world, radius = scene_mesh(data).world, data.pipeline.embodiment.radius_m
     paths = data.paths
-    for k in sampled(data):
+    for k in data.sampled:
         hit = _hit(world, corners(paths.xyz[paths.of(k)]), radius)
         if hit:
             yield Finding(int(paths.rows[k]), f"the body touches a surface {hit}", "a free sweep")
 
 
-@check("routes", needs=("mesh",), after=(*_FITS, "action_order", "replay_differs", "route_collision"))
+@check("routes", needs=("mesh",), after=(*_FITS, "action_order", "replay_differs", "route_collision"), samples=True)
 def replay_collision(data: SceneData, _rows: Rows) -> Iterator[Finding]:
     """The body's sweep along the replayed actions touches no surface."""
     world, radius = scene_mesh(data).world, data.pipeline.embodiment.radius_m
     paths = data.paths
     skip = data.flagged("routes", ("list_lengths_differ", "action_order", "replay_differs"))
-    for k in sampled(data):
+    for k in data.sampled:
         if skip[paths.rows[k]]:
             continue
         where = paths.of(k)
@@ -66,14 +55,14 @@ def replay_collision(data: SceneData, _rows: Rows) -> Iterator[Finding]:
             yield Finding(int(paths.rows[k]), f"the body touches a surface {hit}", "a free sweep")
 
 
-@check("routes", needs=("mesh",), after=(*_FITS, "route_collision"))
+@check("routes", needs=("mesh",), after=(*_FITS, "route_collision"), samples=True)
 def min_clearance(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """The stored clearance is right: a body a little thinner passes everywhere, one a little thicker does not."""
     world = scene_mesh(data).world
     cap = data.pipeline.plan.clearance_cap_m
     stored, paths = rows.floats("min_clearance_m"), data.paths
     skip = data.flagged("routes", (*_FITS, "route_collision", "null_value", "not_finite"))
-    for k in sampled(data):
+    for k in data.sampled:
         row = int(paths.rows[k])
         if skip[row]:
             continue

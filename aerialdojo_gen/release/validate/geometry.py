@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from aerialdojo_gen.release.validate.registry import Finding, check
+from aerialdojo_gen.release.validate.registry import Finding, UncheckedError, check
 from aerialdojo_gen.release.validate.rows import Floats, Rows, SceneData, list_lengths
 from aerialdojo_gen.schemas import APPROACH, STOP
 from aerialdojo_gen.stages.filter import KEPT, judge
@@ -85,7 +85,7 @@ def out_of_bounds(data: SceneData, _rows: Rows) -> Iterator[Finding]:
     """The body never leaves the flight volume."""
     paths, scenes = data.paths, data["scenes"]
     if len(scenes) != 1:
-        return
+        raise UncheckedError("the scene's row is at fault")
     radius = data.pipeline.embodiment.radius_m
     low, high = (scenes.floats(*(f"{e}_{a}_m" for a in "xyz"))[0] for e in ("min", "max"))
     outside = ((paths.xyz < low + radius - _LENGTH_M) | (paths.xyz > high - radius + _LENGTH_M)).any(axis=1)

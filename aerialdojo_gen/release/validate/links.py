@@ -10,7 +10,7 @@ import numpy as np
 import pyarrow as pa
 
 from aerialdojo_gen.geometry.frames import compass_direction
-from aerialdojo_gen.release.validate.registry import ALWAYS_AFTER, Finding, check
+from aerialdojo_gen.release.validate.registry import ALWAYS_AFTER, Finding, UncheckedError, check
 from aerialdojo_gen.release.validate.rows import Ints, Mask, Rows, SceneData, pose_text, unequal
 from aerialdojo_gen.schemas import SETTINGS
 from aerialdojo_gen.stages.filter import settings_of
@@ -43,9 +43,9 @@ def unknown_landmark(data: SceneData, rows: Rows) -> Iterator[Finding]:
 def landmark_nearest(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """An object's landmark is the nearest in the plane."""
     landmarks = data["landmarks"]
-    own = landmarks.find("landmark_id", rows.column("landmark_id"))
     if not len(landmarks):
-        return
+        raise UncheckedError("there is no landmark")
+    own = landmarks.find("landmark_id", rows.column("landmark_id"))
     away = rows.floats("x_m", "y_m")[:, None] - landmarks.floats("x_m", "y_m")[None]
     distance = np.linalg.norm(away, axis=2)
     nearest = distance.argmin(axis=1)
@@ -59,7 +59,8 @@ def landmark_direction(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """An object's direction is the one from its landmark."""
     landmarks = data["landmarks"]
     own = landmarks.find("landmark_id", rows.column("landmark_id"))
-    away = rows.floats("x_m", "y_m") - landmarks.floats("x_m", "y_m").reshape(-1, 2)[own]
+    centres = np.vstack([landmarks.floats("x_m", "y_m").reshape(-1, 2), np.full((1, 2), np.nan)])
+    away = rows.floats("x_m", "y_m") - centres[own]
     for row, said in enumerate(rows.texts("direction")):
         dx, dy = away[row].tolist()
         if own[row] >= 0 and math.isfinite(dx + dy) and (dx or dy) and (is_so := compass_direction(dx, dy)) != said:
@@ -145,8 +146,8 @@ def task_instances(data: SceneData, rows: Rows) -> Iterator[Finding]:
 def task_scene(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """A task's family, scene type and partition are its scene's."""
     scenes = data["scenes"]
-    if not len(scenes) or data.flagged("scenes", ALWAYS_AFTER).any():
-        return
+    if len(scenes) != 1 or data.flagged("scenes", ALWAYS_AFTER).any():
+        raise UncheckedError("the scene's row is at fault")
     for name in ("family", "scene_type", "partition"):
         wanted = scenes.texts(name)[0]
         for row in np.flatnonzero(np.asarray(rows.texts(name), dtype=object) != wanted):

@@ -19,6 +19,9 @@ from aerialdojo_gen.schemas import TableSpec
 # What lies beside the tables of a release: its cards, its licence, what a hub's client leaves, pictures of it.
 _BESIDE = {"README.md", "croissant.json", "LICENSE", "CITATION.cff", ".gitattributes", "figures", "stats"}
 
+# Tables without which a scene's tasks mean nothing; a split may have none of a scene's tasks.
+_FEW = ("release/scenes", "release/landmarks", "release/objects", "release/anchors")
+
 
 def release_tables() -> dict[str, list[str]]:
     """Return the keys of `store.LAYOUT` that make up each table of a release, by the table's name."""
@@ -100,6 +103,7 @@ PART_CHECKS = {
     "part_damaged": "A part can be read, checksums included.",
     "part_schema": "A part has the declared columns, types and units.",
     "leaking_column": "Tasks have no column beside the declared ones.",
+    "part_rows": "A scene has one row in scenes, and is not without landmarks, objects or anchors.",
     "part_content": "A part's rows are those that its footer's digest was made of.",
     "part_of_other_run": "A scene's parts were written by one run of split.",
 }
@@ -138,6 +142,10 @@ def _read(release: Path, key: str, scene: str, found: dict[str, Outcome], runs: 
     wrong = list(_schema_faults(spec, table, extra))
     if wrong:
         fault("part_schema", "; ".join(wrong), f"the columns of {spec.name}")
+        return None
+    found["part_rows"].rows += 1
+    if key in _FEW and not (table.num_rows == 1 if key == "release/scenes" else table.num_rows):
+        fault("part_rows", f"{table.num_rows} rows", "one row" if key == "release/scenes" else "at least one")
         return None
     return table.replace_schema_metadata(None).cast(pa.schema([pa.field(f.name, f.type) for f in spec.schema]))
 

@@ -73,6 +73,8 @@ class Check:
         What must be so.
     run : callable
         Yields the rows at fault.
+    samples : bool
+        It judges those routes alone that ``--sample`` draws.
     """
 
     name: str
@@ -81,6 +83,7 @@ class Check:
     after: tuple[str, ...]
     about: str
     run: Function
+    samples: bool = False
 
 
 @dataclass
@@ -109,12 +112,14 @@ class Outcome:
 CHECKS: list[Check] = []
 
 
-def check(table: str, *, needs: tuple[str, ...] = (), after: tuple[str, ...] = ()) -> Callable[[Function], Function]:
+def check(
+    table: str, *, needs: tuple[str, ...] = (), after: tuple[str, ...] = (), samples: bool = False
+) -> Callable[[Function], Function]:
     """Register a function as a check: its name is the check's, its docstring says what must be so."""
 
     def register(function: Function) -> Function:
         about = (function.__doc__ or "").strip().splitlines()[0]
-        CHECKS.append(Check(function.__name__, table, needs, after, about, function))
+        CHECKS.append(Check(function.__name__, table, needs, after, about, function, samples))
         return function
 
     return register
@@ -157,5 +162,5 @@ def _run(data: SceneData, one: Check, table: str) -> Outcome:
     faults = [
         Fault(one.name, data.scene, table, rows.part(f.row), rows.key(f.row), f.found, f.expected) for f in findings
     ]
-    judged = len(rows) - int(left_out.sum())
-    return Outcome(one.name, table, judged, faults)
+    judged = ~left_out[data.paths.rows[data.sampled]] if one.samples else ~left_out
+    return Outcome(one.name, table, int(judged.sum()), faults)

@@ -13,6 +13,7 @@ import pyarrow.compute as pc
 from numpy.typing import ArrayLike, NDArray
 
 from aerialdojo_gen.config import Pipeline
+from aerialdojo_gen.rng import rank
 from aerialdojo_gen.schemas import TableSpec
 
 Floats = NDArray[np.float64]
@@ -227,6 +228,16 @@ class SceneData:
             if (table, name) in self.faulty:
                 mask |= self.faulty[table, name]
         return mask
+
+    @cached_property
+    def sampled(self) -> Ints:
+        """Places in `paths` of the routes that FCL is asked about: all, or so many by a draw from their ids."""
+        rows = self.paths.rows
+        if self.sample is None or self.sample >= len(rows):
+            return np.arange(len(rows))
+        nav_ids = self["routes"].texts("nav_id")
+        order = sorted(range(len(rows)), key=lambda k: rank(0, "validate", nav_ids[int(rows[k])]))
+        return np.sort(np.array(order[: self.sample], dtype=np.int64))
 
     @cached_property
     def route_of_task(self) -> Ints:

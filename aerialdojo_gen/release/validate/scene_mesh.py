@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
+from aerialdojo_gen.geometry.rays import RayCaster
 from aerialdojo_gen.planning.collision import CollisionWorld
 from aerialdojo_gen.release.validate.registry import ALWAYS_AFTER, UncheckedError
 from aerialdojo_gen.release.validate.rows import SceneData
@@ -17,10 +19,19 @@ MESH_CHECKS = ("mesh_outside", "mesh_missing", "mesh_digest", "mesh_damaged")
 
 @dataclass(frozen=True)
 class SceneMesh:
-    """A scene's mesh and its collision world."""
+    """A scene's mesh, and what questions to it are put to; each is made when first asked."""
 
     scene: Scene
-    world: CollisionWorld
+
+    @cached_property
+    def world(self) -> CollisionWorld:
+        """FCL's world."""
+        return CollisionWorld(self.scene)
+
+    @cached_property
+    def rays(self) -> RayCaster:
+        """For first hits."""
+        return RayCaster(self.scene)
 
 
 def mesh_path(data: SceneData) -> Path:
@@ -34,7 +45,7 @@ def want_meshes(data: SceneData) -> None:
     if not data.use_meshes:
         raise UncheckedError("no meshes asked for")
     if "scenes" not in data.tables or len(data["scenes"]) != 1:
-        raise UncheckedError("scenes cannot be read")
+        raise UncheckedError("scenes has not one row of it")
     if data.flagged("scenes", ALWAYS_AFTER).any():
         raise UncheckedError("the scene's row is at fault")
 
@@ -52,6 +63,5 @@ def scene_mesh(data: SceneData) -> SceneMesh:
         raise UncheckedError("no mesh")
     kept = data.kept.get("mesh")
     if not isinstance(kept, SceneMesh):
-        scene = read_glb(mesh_path(data))
-        kept = data.kept["mesh"] = SceneMesh(scene, CollisionWorld(scene))
+        kept = data.kept["mesh"] = SceneMesh(read_glb(mesh_path(data)))
     return kept

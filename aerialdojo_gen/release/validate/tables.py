@@ -103,7 +103,8 @@ def unsorted_rows(_data: SceneData, rows: Rows) -> Iterator[Finding]:
     for end in rows.ends:
         part = rows.table.select(list(rows.spec.order)).slice(begin, end - begin)
         if not part.equals(part.sort_by([(k, "ascending") for k in rows.spec.order])):
-            keys = list(zip(*(part.column(k).to_pylist() for k in rows.spec.order), strict=True))
+            columns = [[(v is None, v) for v in part.column(k).to_pylist()] for k in rows.spec.order]
+            keys = list(zip(*columns, strict=True))
             row = next((i for i in range(1, len(keys)) if keys[i] < keys[i - 1]), 0)
             yield Finding(begin + row, f"stands after a row with greater {', '.join(rows.spec.order)}", "sorted rows")
         begin = end
