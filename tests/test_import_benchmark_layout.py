@@ -9,6 +9,7 @@ import pandas as pd
 import pytest
 import task_files
 
+from aerialdojo_gen.errors import ImportRefused
 from aerialdojo_gen.exchange.importing import import_benchmark
 from aerialdojo_gen.geometry.frames import wrap_angle_rad
 
@@ -104,6 +105,14 @@ def test_a_task_file_out_of_its_tree_has_tasks_without_routes(tmp_path):
     route = pd.read_parquet(tmp_path / "imported/a/routes").iloc[0]
     assert route["x_m"] is None
     assert json.loads((tmp_path / "imported/a/import.json").read_text())["files"] == ["mine.json"]
+
+
+@pytest.mark.parametrize("name", ["../outside", "/etc", "a b", ""])
+def test_a_scene_name_is_a_plain_one_wherever_the_file_lies(tmp_path, name):
+    tasks, _ = document()
+    path = task_files.write(tmp_path / "mine.json", [*tasks, tasks[0] | {"episode_id": "7", "map_name": name}])
+    with pytest.raises(ImportRefused, match=r"mine\.json: row 1: map_name: "):
+        import_benchmark("aerialdojo", [path], tmp_path)
 
 
 def test_tasks_of_one_pair_are_told_apart(tmp_path):

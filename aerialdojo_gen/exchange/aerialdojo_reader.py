@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from aerialdojo_gen.errors import UsageError
+from aerialdojo_gen.errors import StoreError, UsageError
 from aerialdojo_gen.exchange.actions import WORDS, actions_of
 from aerialdojo_gen.exchange.aerialdojo_layout import (
     KINDS,
@@ -83,6 +83,10 @@ class Reader:
         if (context.label, episode) in self._met:
             raise BadField("episode_id", f"{episode} stands twice in the file")
         scene = record.text("map_name", empty=False)
+        try:
+            family, scene_type, by_name = parse_name(scene)
+        except StoreError as error:
+            raise BadField("map_name", str(error)) from None
         word = record.text("task")
         if word not in SETTING_OF:
             raise BadField("task", f"{shown(word)} is none of {', '.join(SETTING_OF)}")
@@ -96,7 +100,6 @@ class Reader:
         if record.has("goal_pose"):
             goal = context.frame.positions_to_world(record.child("goal_pose").position("goal_position"))
         target = record.text("goal_object_name", empty=False)
-        family, scene_type, by_name = parse_name(scene)
         known: dict[str, Any] = {
             "target_name": target,
             "start_object_name": record.optional_text("start_object_name"),
