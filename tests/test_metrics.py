@@ -12,16 +12,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from aerialdojo_gen.benchmark.metrics import (
-    METRICS,
-    Episodes,
-    episodes_of,
-    outcomes,
-    slices,
-    success_curve,
-    summarize,
-)
+from aerialdojo_gen.benchmark.metrics import Episodes, episodes_of, outcomes
 from aerialdojo_gen.benchmark.profiles import PROFILES, Profile, profile_named
+from aerialdojo_gen.benchmark.scores import METRICS, slices, success_curve, summarize
 from aerialdojo_gen.errors import StoreError, UsageError
 from aerialdojo_gen.schemas import FAMILIES
 

@@ -20,10 +20,10 @@ from typer.testing import CliRunner
 
 from aerialdojo_gen import cli
 from aerialdojo_gen.benchmark import figures, formats, tables
-from aerialdojo_gen.benchmark.metrics import summarize
 from aerialdojo_gen.benchmark.profiles import PROFILES
 from aerialdojo_gen.benchmark.report import html, write_report
 from aerialdojo_gen.benchmark.runs import Run, conduct, load_runs
+from aerialdojo_gen.benchmark.scores import summarize
 from aerialdojo_gen.errors import AerialDojoError, StoreError
 
 AT_3, AT_5 = PROFILES["aerialdojo"], PROFILES["aerialdojo-5m"]

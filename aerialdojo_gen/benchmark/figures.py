@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from aerialdojo_gen.benchmark.metrics import Summary, success_curve, summarize
 from aerialdojo_gen.benchmark.profiles import Profile
 from aerialdojo_gen.benchmark.runs import Run
+from aerialdojo_gen.benchmark.scores import Summary, success_curve, summarize
 from aerialdojo_gen.schemas import FAMILIES
 
 if TYPE_CHECKING:

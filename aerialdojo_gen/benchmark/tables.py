@@ -11,9 +11,9 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from aerialdojo_gen.benchmark.metrics import METRICS, Score, Summary, slices, summarize
 from aerialdojo_gen.benchmark.profiles import Profile
 from aerialdojo_gen.benchmark.runs import Run, conduct
+from aerialdojo_gen.benchmark.scores import METRICS, Score, Summary, slices, summarize
 from aerialdojo_gen.schemas import FAMILIES, SETTINGS
 
 HEADS = {"sr": "SR ↑", "osr": "OSR ↑", "spl": "SPL ↑", "dts_m": "DTS ↓", "cr": "CR ↓"}
