@@ -38,12 +38,14 @@ def built(name: str) -> Scene:
 
 
 def route_of(scene: Scene, n: int) -> dict[str, Any]:
-    """A line across the middle of the scene, a little under half its height, turning a little at every pose."""
+    """A line across the middle of the scene, 3 m over whatever stands there, turning a little at every pose."""
     low, high = scene.bounds
-    x, y = (np.linspace(low[a] + s * (high[a] - low[a]), low[a] + (1 - s) * (high[a] - low[a]), n) for a, s in ((0, 0.3), (1, 0.4)))  # fmt: skip  # noqa: E501
-    z = low[2] + 0.45 * (high[2] - low[2])
+    x = np.linspace(0.7 * low[0] + 0.3 * high[0], 0.3 * low[0] + 0.7 * high[0], n)
+    y = np.linspace(0.6 * low[1] + 0.4 * high[1], 0.4 * low[1] + 0.6 * high[1], n)
+    top = np.column_stack([x, y, np.full(n, high[2] + 50.0)])
+    z = top[:, 2] - RayCaster(scene).first_hit(top, np.tile([0.0, 0.0, -1.0], (n, 1)))[0] + 3.0
     return {
-        "x_m": x.tolist(), "y_m": y.tolist(), "z_m": [z] * n, "yaw_rad": np.linspace(0.3, 1.5, n).tolist(),
+        "x_m": x.tolist(), "y_m": y.tolist(), "z_m": z.tolist(), "yaw_rad": np.linspace(0.3, 1.5, n).tolist(),
         "action": [3] * (n - 1) + [0],
     }  # fmt: skip
 
