@@ -12,7 +12,7 @@ PNG = bytes.fromhex(
 )
 
 
-def write(path: Path, document: object, *, ascii_only: bool = False) -> Path:
+def write(path: Path, document: object, *, ascii_only: bool = True) -> Path:
     """A JSON file; NaN is written as Python writes it."""
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(json.dumps(document, ensure_ascii=ascii_only), encoding="utf-8")

@@ -8,9 +8,11 @@ from pathlib import Path
 import pandas as pd
 import pytest
 import task_files
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 
 from aerialdojo_gen.errors import ImportRefused
-from aerialdojo_gen.exchange.importing import import_benchmark
+from aerialdojo_gen.exchange.importing import Options, import_benchmark
 from aerialdojo_gen.geometry.frames import wrap_angle_rad
 
 
@@ -113,6 +115,27 @@ def test_a_scene_name_is_a_plain_one_wherever_the_file_lies(tmp_path, name):
     path = task_files.write(tmp_path / "mine.json", [*tasks, tasks[0] | {"episode_id": "7", "map_name": name}])
     with pytest.raises(ImportRefused, match=r"mine\.json: row 1: map_name: "):
         import_benchmark("aerialdojo", [path], tmp_path)
+
+
+anything = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=5),
+    lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.text(max_size=3), inner, max_size=2),
+    max_leaves=5,
+)
+
+
+@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.data())
+def test_whatever_stands_in_a_task_or_its_trajectory_is_read_or_named(tmp_path, data):
+    tasks, trajectory = document()
+    target = data.draw(st.sampled_from([tasks[0], tasks[0]["start_pose"], trajectory, trajectory["trajectory"][1]]))
+    target[data.draw(st.sampled_from([*sorted(target), "another"]))] = data.draw(anything)
+    root = tmp_path / "any"
+    put(root, tasks, trajectory)
+    report = import_benchmark("aerialdojo", [root], tmp_path, Options(skip_bad=True), force=True)
+    kept = pd.read_parquet(tmp_path / "imported/aerialdojo/tasks")
+    assert (report.records, len(kept)) == (1, 1 - report.n_bad)
+    assert report.n_bad or kept["source_id"][0] == "42"
 
 
 def test_tasks_of_one_pair_are_told_apart(tmp_path):
