@@ -25,6 +25,11 @@ from aerialdojo_gen.imports.command import add_scene
 
 NAME = "Helsinki"
 WORDS = ("one", "two", "three")
+UNLABELLED = """
+  const named = (e) => e.labels?.length || e.getAttribute("aria-label") || e.textContent.trim();
+  return [...document.querySelectorAll("input, select, textarea, button, progress, [role=application]")]
+    .filter((e) => !named(e)).map((e) => e.outerHTML);
+"""
 
 
 @pytest.fixture(scope="module")
@@ -156,6 +161,7 @@ def test_a_foreign_mesh_is_annotated_in_the_browser_and_becomes_tasks(browser, s
             page.saved()
             page.leave()
         assert page.text("#progress-text") == "3 of 3 objects done"
+        assert browser.execute_script(UNLABELLED) == []
         written = scene.annotations.read_text()
         # Reload: it is all there.
         browser.refresh()
@@ -172,7 +178,17 @@ def test_a_foreign_mesh_is_annotated_in_the_browser_and_becomes_tasks(browser, s
         )
         assert page.text("#panel .task").startswith("As the task will say it<b>two</b> house, ")
         assert scene.annotations.read_text() == written
-        # Undo of all outlives the reload, redo brings it back.
+        # By keys alone: to the view, above the middle of the scene, pick what is there.
+        page.leave()
+        assert not page.all("#panel .node")
+        for _ in range(40):
+            page.press("\ue004")
+            if browser.switch_to.active_element.tag_name == "canvas":
+                break
+        page.press("t")
+        page.press(" ")
+        until("a pick by keys", lambda: page.all("#panel .node"))
+        # Undo outlives the reload, redo brings it back.
         page.leave()
         page.press("\ue009z\ue000")
         until("undone", lambda: page.text("#progress-text").startswith("2 of 3"))

@@ -39,8 +39,8 @@ def check_source(
     scene : Scene
         The scene that it must be of.
     names : mapping of str to str
-        The catalogue's categories and what a person says for each. A node has the category that its recipe gave it; in
-        an imported scene, which guesses from the file's names, a person may choose another one.
+        The catalogue's categories and what a person says for each. A node has the category that its recipe gave
+        it; in an imported scene, which guesses from the file's names, a person may choose another one.
     counts : (int, int) or None
         How many landmarks and objects there must be; None where any number will do.
     geometry : SceneGeometry, optional
