@@ -234,7 +234,10 @@ def mix_runs(data):
     [
         (remove, r"routes/id_test/part-{}.parquet is missing: run aerialdojo-gen split --scene {}$"),
         (truncate, r"tasks/id_train/part-{}.parquet is damaged .*delete it and run the command again$"),
-        (drop_row, r"tasks/id_train/part-{}.parquet has 219 rows where 220 were written: delete it and run the command again$"),
+        (
+            drop_row,
+            r"tasks/id_train/part-{}.parquet has 219 rows where 220 were written: delete it and run .* again$",
+        ),
         (lose_scene_row, r"release/scenes/part-{}.parquet is missing: run aerialdojo-gen split --scene {}$"),
         (replace_by_foreign, r"anchors/part-{}.parquet was not written by aerialdojo-gen: delete it and run .*{}$"),
         (mix_runs, r"the release's parts of {} in .* are of different runs: run .* split --scene {} --force$"),
