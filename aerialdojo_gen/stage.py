@@ -261,7 +261,7 @@ STAGES: tuple[Stage, ...] = (
         ("scenes", "objects", "chosen_anchors"), ("anchors",),
     ),
     Stage(
-        "reference-images", 1, "Render each object's picture from its selected anchor.",
+        "reference-images", 2, "Render each object's picture from its selected anchor.",
         ("scenes", "objects", "anchors"), ("references",),
     ),
     Stage(
