@@ -103,25 +103,24 @@ def estimate(
     """
     choice = choose_renderer(config.renderer)
     poses = trajectories = 0
-    selected: dict[str, dict[str, Any]] = {}
+    selected: dict[str, str] = {}
     for scene in scenes:
-        routes = {
-            row["nav_id"]: row
-            for table in tables(config, scene)
-            for row in store.read_scene(data, table, scene).to_pylist()
-        }
-        mine = choose(routes.values(), config.limit, seed)
-        trajectories += len(mine)
-        poses += sum(len(frame_poses(routes[nav_id], config).time_s) for nav_id in mine)
+        keys = [row for table in tables(config, scene) for row in _rows(data, table, scene, ["nav_id", "setting"])]
+        mine = choose(keys, config.limit, seed)
         if mine:
-            selected[scene] = routes[min(mine, key=lambda i: rng.rank(seed, "estimate", i))]
+            frames = _frames(data, scene, config)
+            trajectories += len(mine)
+            poses += sum(frames[nav_id] for nav_id in mine)
+            selected[scene] = min(mine, key=lambda i: rng.rank(seed, "estimate", i))
     if not selected:
         raise UsageError("there is nothing to record: no trajectory of these scenes is in the split")
     drawn = sorted(selected, key=lambda scene: rng.rank(seed, "estimate", scene))[:_MEASURED_SCENES]
     measured = bytes_ = 0
     seconds = opening = 0.0
     for scene in drawn:
-        n, cpu, built, size = _measure(data, scene, selected[scene], config, choice.name)
+        every = (row for table in tables(config, scene) for row in _rows(data, table, scene))
+        route = next(row for row in every if row["nav_id"] == selected[scene])
+        n, cpu, built, size = _measure(data, scene, route, config, choice.name)
         measured, seconds, opening, bytes_ = measured + n, seconds + cpu, opening + built, bytes_ + size
     cpu_s = poses * seconds / measured + len(selected) * workers * opening / len(drawn)
     # Kilobytes on Linux, bytes on macOS.
@@ -139,6 +138,27 @@ def estimate(
         measured,
         choice.why,
     )
+
+
+def _rows(data: Path, table: str, scene: str, columns: list[str] | None = None) -> list[dict[str, Any]]:
+    rows: list[dict[str, Any]] = store.read_scene(data, table, scene, columns).to_pylist()
+    return rows
+
+
+def _frames(data: Path, scene: str, config: RenderConfig) -> dict[str, int]:
+    """Count the frames of every trajectory of a scene."""
+    if config.sampling == "steps":
+        columns = ["nav_id", "n_actions"]
+        return {
+            row["nav_id"]: row["n_actions"]
+            for table in tables(config, scene)
+            for row in _rows(data, table, scene, columns)
+        }
+    return {
+        row["nav_id"]: len(frame_poses(row, config).time_s)
+        for table in tables(config, scene)
+        for row in _rows(data, table, scene)
+    }
 
 
 def _measure(
