@@ -1,6 +1,7 @@
 """The environment: motion, collision, what ends an episode, Gymnasium's contract."""
 
 import math
+import os
 import warnings
 
 import gymnasium
@@ -17,7 +18,7 @@ from aerialdojo_gen.benchmark import AerialDojoEnv
 from aerialdojo_gen.benchmark.episode import Episode
 from aerialdojo_gen.benchmark.goal import N_ACTIONS
 from aerialdojo_gen.benchmark.motion import FlightSpace
-from aerialdojo_gen.errors import StoreError, UsageError
+from aerialdojo_gen.errors import RenderError, StoreError, UsageError
 from aerialdojo_gen.planning.collision import CollisionWorld
 from aerialdojo_gen.planning.primitives import replay, route_length_m
 
@@ -272,3 +273,11 @@ def test_a_task_that_was_not_chosen_is_named(smoke):
         env.reset(options={"task_id": "U_X_0-1-s"})
     with pytest.raises(UsageError, match="no option 'task'"):
         env.reset(options={"task": "x"})
+
+
+def test_a_fork_of_a_process_that_has_drawn_is_told_so_and_does_not_hang(seeing, monkeypatch):
+    from aerialdojo_gen.benchmark import eyes
+
+    monkeypatch.setattr(eyes, "_drawn_by_gl", [os.getppid()])
+    with pytest.raises(RenderError, match="start it by spawn"):
+        seeing.reset(seed=0)

@@ -313,3 +313,26 @@ def test_every_table_has_its_rows(whole):
         assert rows.num_rows == {"steps": pc.sum(episodes["n_actions"]).as_py(), "failures": 0}.get(
             table, episodes.num_rows
         )
+
+
+def test_ctrl_c_keeps_what_was_finished_and_ends_the_workers(project, smoke, tmp_path):
+    (tmp_path / "slowagent.py").write_text(SLOW.replace("0.01", "0.1"))
+    out = tmp_path / "out"
+    command = [
+        sys.executable, "-m", "aerialdojo_gen.cli", "evaluate", "--data", str(smoke), "--out", str(out), "--run", "r",
+        "--agent", "slowagent:Slow", "--pipeline", str(project / "pipelines" / "smoke.toml"), "--workers", "2",
+    ]  # fmt: skip
+    process = subprocess.Popen(
+        command, cwd=tmp_path, env=os.environ | {"PYTHONPATH": str(tmp_path)}, stderr=subprocess.PIPE, text=True,
+        start_new_session=True,
+    )  # fmt: skip
+    journals = out / "runs" / "r" / "journal"
+    while process.poll() is None and sum(p.read_bytes().count(b"\n") for p in journals.glob("*.jsonl")) < 4:
+        time.sleep(0.01)
+    os.killpg(process.pid, signal.SIGINT)
+    _, err = process.communicate(timeout=60)
+    assert process.returncode == 130, err
+    assert err.strip().splitlines()[-1].startswith("interrupted: finished episodes are kept")
+    assert "Traceback" not in err
+    assert read_run(out, "r").num_rows >= 4
+    assert not list(out.rglob("*.jsonl"))
