@@ -16,7 +16,7 @@ app = typer.Typer()
 def validate(
     folder: Annotated[
         Path,
-        typer.Argument(metavar="[RELEASE]", envvar="AERIALDOJO_DATA", help="A release, or a folder with one."),
+        typer.Argument(metavar="RELEASE", envvar="AERIALDOJO_DATA", help="A release, or a folder with one."),
     ] = Path("data"),
     scene: Scene = None,
     sample: Annotated[
