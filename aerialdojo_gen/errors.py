@@ -53,5 +53,11 @@ class RenderError(AerialDojoError):
     """Rendering or encoding failed."""
 
 
-class ImportRefused(AerialDojoError):
+class ImportRefused(AerialDojoError):  # noqa: N818 - named for what is done with the file
     """A task file of another benchmark is damaged or has rows that make no sense; the message names each."""
+
+
+def first_line(error: BaseException) -> str:
+    """Return the first line of an error's text, cut to 160 characters; its type where it has none."""
+    text = str(error).strip().splitlines()
+    return text[0][:160] if text else type(error).__name__

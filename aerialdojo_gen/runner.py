@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from aerialdojo_gen import store
+from aerialdojo_gen.atomic import disk_error, sweep
 from aerialdojo_gen.config import Pipeline
 from aerialdojo_gen.errors import AerialDojoError, BudgetSpent, StoreError, UsageError
 from aerialdojo_gen.executor import Pool, Task
@@ -89,7 +90,7 @@ def data_lock(data: Path) -> Iterator[None]:
         data.mkdir(parents=True, exist_ok=True)
         file = (data / ".lock").open("a")
     except OSError as error:
-        raise store.disk_error(error, data / ".lock") from None
+        raise disk_error(error, data / ".lock") from None
     with file:
         try:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -182,7 +183,7 @@ def _run_stage(
             continue
         for table in stage.writes:
             store.prune(roots.data, table, scene, parts)
-            store.sweep(store.shard_path(roots.data, table, scene).parent)
+            sweep(store.shard_path(roots.data, table, scene).parent)
         for part in range(parts):
             shard += 1
             if shard % limits.share[1] != limits.share[0]:

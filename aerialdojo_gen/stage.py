@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from aerialdojo_gen import store
+from aerialdojo_gen.atomic import atomic_file
 from aerialdojo_gen.config import Embodiment
 
 if TYPE_CHECKING:
@@ -123,7 +124,7 @@ class Job:
             The temporary path to write to, with the same suffix.
         """
         self.files.append(relative)
-        return store.atomic_file(self.roots.data, relative)
+        return atomic_file(self.roots.data, relative)
 
 
 @lru_cache(maxsize=2)

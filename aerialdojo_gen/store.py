@@ -1,4 +1,4 @@
-"""The columnar task store: the only module that touches Parquet.
+"""The columnar task store: which tables there are, where their shards lie, and how a shard is written and read.
 
 A table is a folder, a scene a folder in it, a shard a Parquet file. A shard is written under a temporary name,
 checked against its schema, and renamed; its metadata carries the fingerprint of what it was made from and a digest
@@ -7,31 +7,23 @@ of its content, and no date, so that the same inputs give the same bytes.
 
 from __future__ import annotations
 
-import contextlib
-import errno
-import hashlib
-import itertools
 import json
-import os
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import pyarrow as pa
-import pyarrow.compute as pc
-import pyarrow.parquet as pq
 
 from aerialdojo_gen import schemas
+from aerialdojo_gen.atomic import atomic_file
 from aerialdojo_gen.errors import StoreError
+from aerialdojo_gen.parquet_files import read_file, read_footer, write_clustered
+from aerialdojo_gen.tables import check_table, content_digest
 
 _META = b"aerialdojo"
 _PLAIN = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}")
-_ROW_GROUP = 65536
-# For what is written without a dictionary; levels above cost five times the time for 2 % (docs/release-format.md).
-_PLAIN_LEVEL = 15
-_TEMPORARY = re.compile(r"^\..*\.(\d+)\.tmp(\.[A-Za-z0-9]+)?$")
 
 
 @dataclass(frozen=True)
@@ -44,7 +36,6 @@ class Place:
 
 
 _STAGED = "{table}/{scene}/part-{part:05d}.parquet"
-_RELEASE = "release/{table}/part-{scene}.parquet"
 _RUN = "{table}/{run}/part-{scene}.parquet"
 
 LAYOUT: dict[str, Place] = {
@@ -134,79 +125,6 @@ def shards(data: Path, table: str, scene: str, run: str = "default") -> list[Pat
     return sorted(first.parent.glob("part-*.parquet"))
 
 
-def from_rows(spec: schemas.TableSpec, rows: Sequence[Mapping[str, Any]]) -> pa.Table:
-    """Make a table of rows whose keys are exactly the schema's columns.
-
-    Parameters
-    ----------
-    spec : TableSpec
-        The table.
-    rows : sequence of mapping
-        One mapping a row, column name to value; sorted here into the table's order.
-
-    Returns
-    -------
-    pyarrow.Table
-
-    Raises
-    ------
-    StoreError
-        A row lacks a column or has one that the schema does not know: pyarrow would fill or drop it silently.
-    """
-    names = set(spec.schema.names)
-    for row in rows:
-        if row.keys() != names:
-            missing, unknown = sorted(names - row.keys()), sorted(row.keys() - names)
-            raise StoreError(f"a row of {spec.name} lacks {missing} and has unknown {unknown}")
-    ordered = sorted(rows, key=lambda row: tuple(row[k] for k in spec.order))
-    return pa.Table.from_pylist(ordered, schema=spec.schema)
-
-
-def check_table(spec: schemas.TableSpec, table: pa.Table) -> pa.Table:
-    """Check a table against its schema and attach the schema's metadata.
-
-    Raises
-    ------
-    StoreError
-        Names, types, a null in a column without nulls, rows out of the table's order, or a key that stands twice.
-    """
-    if (table.schema.names, table.schema.types) != (spec.schema.names, spec.schema.types):
-        raise StoreError(f"{spec.name}: columns {table.schema.names} are not those of its schema, or types differ")
-    # Not a cast: that fails with an error of its own on nulls, before they can be counted and named.
-    table = pa.Table.from_arrays(table.columns, schema=spec.schema).combine_chunks()
-    for name in spec.schema.names:
-        column = table.column(name)
-        nulls = column.null_count
-        if pa.types.is_list(column.type):
-            nulls += pc.list_flatten(column).null_count
-        if nulls and not spec.schema.field(name).nullable:
-            raise StoreError(f"{spec.name}: {nulls} nulls in column {name}, which has none by its schema")
-    if table.num_rows > 1:
-        ordered = table.select(list(spec.order))
-        if not ordered.equals(ordered.sort_by([(k, "ascending") for k in spec.order])):
-            raise StoreError(f"{spec.name}: rows are not sorted by {', '.join(spec.order)}")
-        keys = table.select(list(spec.key))
-        if keys.group_by(list(spec.key)).aggregate([]).num_rows != keys.num_rows:
-            raise StoreError(f"{spec.name}: a key ({', '.join(spec.key)}) stands twice")
-    return table
-
-
-def content_digest(table: pa.Table) -> str:
-    """Digest a table's rows (SHA-256, hexadecimal), whatever its metadata and chunks."""
-    digest = hashlib.sha256(str(table.num_rows).encode())
-    for name in table.column_names:
-        column = table.column(name)
-        # What lies under a null is nobody's business: hash where the nulls are, and the values that are there.
-        pieces = [column.is_valid(), column.drop_null()] if column.null_count else [column]
-        for piece in pieces:
-            plain = pa.table([piece], schema=pa.schema([pa.field(name, piece.type)])).combine_chunks()
-            sink = pa.BufferOutputStream()
-            with pa.ipc.new_stream(sink, plain.schema) as writer:
-                writer.write_table(plain)
-            digest.update(sink.getvalue())
-    return digest.hexdigest()
-
-
 def write_shard(
     data: Path,
     table_name: str,
@@ -246,37 +164,8 @@ def write_shard(
     schema_meta[_META] = json.dumps(meta, sort_keys=True).encode()
     path = shard_path(data, table_name, scene, part, run)
     with atomic_file(data, str(path.relative_to(data))) as temporary:
-        _write(spec, table.replace_schema_metadata(schema_meta), temporary)
+        write_clustered(spec, table.replace_schema_metadata(schema_meta), temporary)
     return path
-
-
-def _write(spec: schemas.TableSpec, table: pa.Table, path: Path) -> None:
-    """Write a Parquet file with the encodings of docs/release-format.md, a row group a cluster."""
-    plain = [field for field in spec.schema if field.name in spec.plain]
-    leaves = {f.name: f"{f.name}.list.element" if pa.types.is_list(f.type) else f.name for f in spec.schema}
-    # A picture is compressed already; all else gains.
-    codec = {leaves[f.name]: "NONE" if pa.types.is_binary(f.type) else "ZSTD" for f in spec.schema}
-    with pq.ParquetWriter(
-        path,
-        table.schema,
-        compression=codec,
-        compression_level={leaves[f.name]: _PLAIN_LEVEL for f in plain if not pa.types.is_binary(f.type)} or None,
-        use_dictionary=[leaf for name, leaf in leaves.items() if name not in spec.plain],
-        # The bounds of a list's elements bound nothing that a reader filters by.
-        write_statistics=[f.name for f in spec.schema if not pa.types.is_list(f.type)],
-        write_page_checksum=True,
-    ) as writer:
-        for begin, end in itertools.pairwise(_cluster_edges(spec, table)):
-            writer.write_table(table.slice(begin, end - begin), row_group_size=_ROW_GROUP)
-
-
-def _cluster_edges(spec: schemas.TableSpec, table: pa.Table) -> list[int]:
-    """Rows at which a cluster begins, and the number of rows; a table without rows has one empty cluster."""
-    changes = pa.array([False] * max(table.num_rows - 1, 0), pa.bool_())
-    for name in spec.clusters:
-        column = table.column(name).combine_chunks()
-        changes = pc.or_(changes, pc.not_equal(column.slice(1), column.slice(0, max(table.num_rows - 1, 0))))
-    return [0, *(i + 1 for i in pc.indices_nonzero(changes).to_pylist()), table.num_rows]
 
 
 def read_info(path: Path) -> ShardInfo | None:
@@ -288,22 +177,19 @@ def read_info(path: Path) -> ShardInfo | None:
         The file is damaged (truncated, say), or has other rows than were written.
     """
     try:
-        footer = pq.read_metadata(path)
-    except (pa.ArrowInvalid, OSError) as error:
-        raise StoreError(f"{path} is damaged ({_first_line(error)}): delete it and run the command again") from None
-    raw = (footer.metadata or {}).get(_META)
+        rows, metadata = read_footer(path)
+    except StoreError as error:
+        raise StoreError(f"{error}: delete it and run the command again") from None
+    raw = metadata.get(_META)
     if raw is None:
         return None
     meta = json.loads(raw)
     # A shard of an earlier version does not say how many rows were written.
-    if meta.get("rows", footer.num_rows) != footer.num_rows:
+    if meta.get("rows", rows) != rows:
         raise StoreError(
-            f"{path} has {footer.num_rows:,} rows where {meta['rows']:,} were written: "
-            "delete it and run the command again"
+            f"{path} has {rows:,} rows where {meta['rows']:,} were written: delete it and run the command again"
         )
-    return ShardInfo(
-        meta["fingerprint"], meta["content"], footer.num_rows, meta["parts"], meta["summary"], meta["files"]
-    )
+    return ShardInfo(meta["fingerprint"], meta["content"], rows, meta["parts"], meta["summary"], meta["files"])
 
 
 def count_rows(data: Path, table: str, scene: str) -> int:
@@ -359,16 +245,10 @@ def read_scene(
     tables = []
     for path in shards(data, table, scene, run):
         try:
-            shard = pq.read_table(
-                path,
-                partitioning=None,
-                page_checksum_verification=True,
-                columns=None if columns is None else [*columns],
-            )
-        except (pa.ArrowInvalid, OSError) as error:
+            shard = read_file(path, columns)
+        except StoreError as error:
             raise StoreError(
-                f"{path} is damaged ({_first_line(error)}): delete it and run "
-                f"aerialdojo-gen {LAYOUT[table].command} --scene {scene}"
+                f"{error}: delete it and run aerialdojo-gen {LAYOUT[table].command} --scene {scene}"
             ) from None
         wanted = spec.schema if columns is None else pa.schema([spec.schema.field(name) for name in columns])
         if not shard.schema.equals(wanted):
@@ -378,72 +258,6 @@ def read_scene(
             )
         tables.append(shard.replace_schema_metadata(None))
     return pa.concat_tables(tables)
-
-
-@contextlib.contextmanager
-def atomic_file(data: Path, relative: str) -> Iterator[Path]:
-    """Write a file under the data directory: whole or not at all.
-
-    Parameters
-    ----------
-    data : Path
-        The data directory.
-    relative : str
-        Path below it; StoreError if it leads out of it.
-
-    Yields
-    ------
-    Path
-        A temporary path in the same folder, with the same suffix; renamed at the end, removed on an error.
-
-    Raises
-    ------
-    StoreError
-        The disk is full, read-only or not ours to write.
-    """
-    path = data / relative
-    root = data.resolve()
-    if not path.resolve().is_relative_to(root):
-        raise StoreError(f"{relative!r} leads out of the data directory {data}")
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp{path.suffix}")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        yield temporary
-        with temporary.open("rb+") as file:
-            os.fsync(file.fileno())
-        temporary.replace(path)
-    except OSError as error:
-        raise disk_error(error, path) from error
-    finally:
-        with contextlib.suppress(OSError):
-            temporary.unlink(missing_ok=True)
-
-
-_DISK = {
-    errno.ENOSPC: "no space left on the disk",
-    errno.EDQUOT: "the disk quota is used up",
-    errno.EROFS: "the disk is read-only",
-    errno.EACCES: "permission denied",
-    errno.EPERM: "permission denied",
-    errno.EFBIG: "the file would exceed the allowed size",
-    errno.ENOTDIR: "a part of the path is not a folder",
-}
-
-
-def disk_error(error: OSError, path: Path) -> StoreError:
-    """Turn an operating-system error of writing into one line that names the file."""
-    why = _DISK.get(error.errno or 0, _first_line(error))
-    return StoreError(f"cannot write {path}: {why}; what was finished is kept, nothing half-written")
-
-
-def sweep(folder: Path) -> None:
-    """Remove temporary files that a killed run left in a folder; those of a living process stay."""
-    if not folder.is_dir():
-        return
-    for path in folder.iterdir():
-        match = _TEMPORARY.match(path.name)
-        if match and not process_alive(int(match[1])):
-            path.unlink(missing_ok=True)
 
 
 def prune(data: Path, table: str, scene: str, parts: int) -> None:
@@ -472,21 +286,3 @@ def prune_release(data: Path, scenes: Sequence[str]) -> list[str]:
             if place.template.startswith("release/"):
                 shard_path(data, table, scene).unlink(missing_ok=True)
     return gone
-
-
-def process_alive(pid: int) -> bool:
-    """Whether a process of that number runs."""
-    if pid == os.getpid():
-        return True
-    try:
-        os.kill(pid, 0)
-    except ProcessLookupError:
-        return False
-    except PermissionError:
-        return True
-    return True
-
-
-def _first_line(error: BaseException) -> str:
-    text = str(error).strip().splitlines()
-    return text[0][:160] if text else type(error).__name__

@@ -14,6 +14,7 @@ from aerialdojo_gen.rendering.sample import n_parts
 from aerialdojo_gen.scenes.glb import write_glb
 from aerialdojo_gen.stage import BY_NAME, Job, Roots
 from aerialdojo_gen.stages import render
+from aerialdojo_gen.tables import check_table, from_rows
 
 SCENE = "U_Court_0"
 CONFIG = RenderConfig(width=64, height=64, limit=1, trajectories_per_part=1, renderer="pybullet")
@@ -83,7 +84,7 @@ def write_inputs(data, bad=BAD):
     }  # fmt: skip
     for table, content in rows.items():
         spec = store.LAYOUT[table].spec
-        store.write_shard(data, table, SCENE, 0, store.from_rows(spec, content))
+        store.write_shard(data, table, SCENE, 0, from_rows(spec, content))
 
 
 def run_all(data, config, stage=render, name="render"):
@@ -92,7 +93,7 @@ def run_all(data, config, stage=render, name="render"):
     outputs = [stage.run(Job(name, SCENE, k, parts, 0, Embodiment(), roots), config) for k in range(parts)]
     for output in outputs:
         for table, rows in output.tables.items():
-            store.check_table(store.LAYOUT[table].spec, rows)
+            check_table(store.LAYOUT[table].spec, rows)
     return outputs
 
 

@@ -17,6 +17,7 @@ from aerialdojo_gen.planning.primitives import replay, wrap_rad
 from aerialdojo_gen.release.validate import Asked, validate
 from aerialdojo_gen.release.validate.parts import part_path
 from aerialdojo_gen.schemas import APPROACH
+from aerialdojo_gen.tables import content_digest
 
 SMOKE = Path(__file__).resolve().parent.parent / "pipelines" / "smoke.toml"
 LISTS = ("x_m", "y_m", "z_m", "yaw_rad", "action")
@@ -45,7 +46,7 @@ class Planted:
         loose = schema or pa.schema([f.with_nullable(True) for f in spec.schema])
         table = pa.Table.from_pylist(rows, schema=loose)
         meta = json.loads(pq.read_metadata(self.path(key)).metadata[b"aerialdojo"])
-        meta["content"] = store.content_digest(table)
+        meta |= {"content": content_digest(table), "rows": table.num_rows}
         pq.write_table(table.replace_schema_metadata({b"aerialdojo": json.dumps(meta).encode()}), self.path(key))
 
     def edit(self, key: str, change: Callable[[Row], None], wanted: Callable[[Row], bool] = lambda _: True) -> Row:

@@ -10,6 +10,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from aerialdojo_gen import store
+from aerialdojo_gen.tables import from_rows
 
 LISTS = ("x_m", "y_m", "z_m", "yaw_rad", "action")
 
@@ -29,7 +30,7 @@ def copy_release(data: Path, to: Path, scenes: list[str]) -> Path:
 def replace_rows(data: Path, table: str, scene: str, rows: list[dict]) -> None:
     """Write other rows in place of a scene's."""
     spec = store.LAYOUT[table].spec
-    store.write_shard(data, table, scene, 0, store.from_rows(spec, rows))
+    store.write_shard(data, table, scene, 0, from_rows(spec, rows))
 
 
 def released(data: Path, table: str) -> pd.DataFrame:

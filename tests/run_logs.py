@@ -9,6 +9,7 @@ import numpy as np
 
 from aerialdojo_gen import rng, schemas, store
 from aerialdojo_gen.paper import inventory
+from aerialdojo_gen.tables import from_rows
 
 # Stop called, collision, typical distance at the end: a good agent, a middling one, a bad one.
 AGENTS = {"oracle": (1.0, 0.0, 0.5), "explorer": (0.55, 0.15, 9.0), "random": (0.35, 0.4, 22.0)}
@@ -51,7 +52,7 @@ def write_run(
     for scene in scenes or sorted(inventory()):
         draws = rng.generator(0, "made-up-run", agent, scene)
         rows = [episode(run, agent, scene, k, draws) for k in range(per_scene)]
-        store.write_shard(data, "episodes", scene, 0, store.from_rows(schemas.EPISODES, rows), run=run)
+        store.write_shard(data, "episodes", scene, 0, from_rows(schemas.EPISODES, rows), run=run)
         lost = [
             {
                 "run_id": run,
@@ -63,4 +64,4 @@ def write_run(
             }
             for k in range(failed)
         ]
-        store.write_shard(data, "failures", scene, 0, store.from_rows(schemas.FAILURES, lost), run=run)
+        store.write_shard(data, "failures", scene, 0, from_rows(schemas.FAILURES, lost), run=run)

@@ -16,6 +16,7 @@ from aerialdojo_gen.scenes.glb import write_glb
 from aerialdojo_gen.stage import Job, Roots
 from aerialdojo_gen.stages import anchor_sample
 from aerialdojo_gen.stages.anchor_sample import World, anchors_of
+from aerialdojo_gen.tables import check_table, from_rows
 
 CONFIG = AnchorSampleConfig()
 RADIUS = Embodiment().radius_m
@@ -244,9 +245,9 @@ def whole_run(place, objects, data, seed=0, chosen=()):
         }
         for k, o in enumerate(objects)
     ]  # fmt: skip
-    store.write_shard(data, "scenes", name, 0, store.from_rows(schemas.SCENES, [place_row]))
-    store.write_shard(data, "objects", name, 0, store.from_rows(schemas.OBJECTS, rows))
-    store.write_shard(data, "chosen_anchors", name, 0, store.from_rows(schemas.CHOSEN_ANCHORS, chosen))
+    store.write_shard(data, "scenes", name, 0, from_rows(schemas.SCENES, [place_row]))
+    store.write_shard(data, "objects", name, 0, from_rows(schemas.OBJECTS, rows))
+    store.write_shard(data, "chosen_anchors", name, 0, from_rows(schemas.CHOSEN_ANCHORS, chosen))
     return anchor_sample.run(job(data, seed), CONFIG)
 
 
@@ -256,7 +257,7 @@ def test_the_stage_accounts_for_every_candidate_and_names_objects_without_anchor
     bus = instance("bus", box((-6.0, -1.2, 0.3), (4.0, 1.2, 3.2)))
     with caplog.at_level(logging.WARNING):
         out = whole_run(scene(bus, walled, vault), [bus, walled], tmp_path)
-    table = store.check_table(schemas.ANCHORS, out.tables["anchors"])
+    table = check_table(schemas.ANCHORS, out.tables["anchors"])
     assert table["object_id"].to_pylist() == [0, 0, 0]
     reasons = {k: n for k, n in out.counts.items() if k != "no_anchor"}
     assert out.rows_in == out.rows_out + sum(reasons.values())

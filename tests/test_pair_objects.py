@@ -10,6 +10,7 @@ from aerialdojo_gen import schemas, store
 from aerialdojo_gen.config import Embodiment, PairObjectsConfig
 from aerialdojo_gen.stage import Job, Roots
 from aerialdojo_gen.stages import pair_objects
+from aerialdojo_gen.tables import check_table, from_rows
 
 SCENE = "U_Test_0"
 
@@ -29,10 +30,10 @@ def anchor_rows(places, variants=3):
 
 def pair(data: Path, rows, config=None):
     config = config or PairObjectsConfig()
-    store.write_shard(data, "anchors", SCENE, 0, store.from_rows(schemas.ANCHORS, rows))
+    store.write_shard(data, "anchors", SCENE, 0, from_rows(schemas.ANCHORS, rows))
     job = Job("pair-objects", SCENE, 0, 1, 0, Embodiment(), Roots(data, data, data, data))
     out = pair_objects.run(job, config)
-    store.check_table(schemas.PAIRS, out.tables["pairs"])
+    check_table(schemas.PAIRS, out.tables["pairs"])
     assert out.rows_out == out.tables["pairs"].num_rows
     assert out.rows_in == out.rows_out + sum(out.counts.values())
     return out

@@ -16,6 +16,7 @@ import trimesh
 
 from aerialdojo_gen import schemas, store
 from aerialdojo_gen.scenes.glb import read_glb
+from aerialdojo_gen.tables import content_digest
 
 RADIUS_M = 0.25
 SUCCESS_RADIUS_M = 3.0
@@ -257,7 +258,7 @@ def test_every_shard_says_what_it_was_made_from(smoke):
         info = store.read_info(path)
         assert len(info.fingerprint) == 64
         meta = json.loads(pq.read_schema(path).metadata[b"aerialdojo"])
-        assert meta["content"] == store.content_digest(pq.read_table(path, partitioning=None)), path
+        assert meta["content"] == content_digest(pq.read_table(path, partitioning=None)), path
 
 
 def test_the_card_is_written(smoke, tasks):

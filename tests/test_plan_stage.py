@@ -14,6 +14,7 @@ from aerialdojo_gen.planning.primitives import replay
 from aerialdojo_gen.scenes.glb import write_glb
 from aerialdojo_gen.stage import Job, Roots
 from aerialdojo_gen.stages import pair_objects, plan
+from aerialdojo_gen.tables import check_table, from_rows
 
 SCENE = "U_Test_0"
 CONFIG = PlanConfig(targets_per_part=2)
@@ -25,7 +26,7 @@ def job(data: Path, stage: str, part: int = 0, parts: int = 1) -> Job:
 
 
 def write(data: Path, name: str, spec: schemas.TableSpec, rows) -> None:
-    store.write_shard(data, name, SCENE, 0, store.from_rows(spec, rows))
+    store.write_shard(data, name, SCENE, 0, from_rows(spec, rows))
 
 
 @pytest.fixture(scope="module")
@@ -76,7 +77,7 @@ def shards(data):
 def test_every_candidate_has_one_row_in_one_shard(data, shards):
     ids = []
     for out in shards:
-        table = store.check_table(schemas.PLANS, out.tables["plans"])
+        table = check_table(schemas.PLANS, out.tables["plans"])
         part = table["pair_id"].to_pylist()
         assert part == sorted(part)
         assert out.rows_in == out.rows_out == len(part) == sum(out.counts.values())
@@ -131,7 +132,7 @@ def test_a_shard_does_not_depend_on_what_was_planned_before(data, shards):
 def test_a_part_beyond_the_targets_is_empty(data):
     out = plan.run(job(data, "plan", 3, 4), CONFIG)
     assert (out.rows_in, out.rows_out, out.tables["plans"].num_rows) == (0, 0, 0)
-    store.check_table(schemas.PLANS, out.tables["plans"])
+    check_table(schemas.PLANS, out.tables["plans"])
 
 
 def test_a_pair_without_its_anchor_is_named(data, tmp_path):

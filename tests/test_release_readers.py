@@ -26,6 +26,7 @@ from aerialdojo_gen import schemas, store
 from aerialdojo_gen.errors import StoreError
 from aerialdojo_gen.release.card import render_card, write_card
 from aerialdojo_gen.release.contents import SHARDS, TABLES, check_release, counts, table_and_split
+from aerialdojo_gen.tables import from_rows
 
 FOLDERS = {
     (table, split): f"{table}/{split}" if TABLES[table].split else table
@@ -153,12 +154,10 @@ def task(k, setting, modality):
 @given(picked=st.lists(st.sampled_from(schemas.SETTINGS), max_size=40))
 def test_a_filter_on_setting_or_modality_reads_no_row_in_vain(tmp_path_factory, picked):
     data = tmp_path_factory.mktemp("data")
-    made = store.from_rows(
-        schemas.TASKS, [task(k, s, m) for k, s in enumerate(picked) for m in ("semantic", "image")]
-    )
+    made = from_rows(schemas.TASKS, [task(k, s, m) for k, s in enumerate(picked) for m in ("semantic", "image")])
     path = store.write_shard(data, "tasks/train", "U_Test_0", 0, made)
     assert store.read_scene(data, "tasks/train", "U_Test_0").equals(made)
-    again = store.from_rows(schemas.TASKS, made.to_pylist()[::-1])
+    again = from_rows(schemas.TASKS, made.to_pylist()[::-1])
     assert store.write_shard(data / "again", "tasks/train", "U_Test_0", 0, again).read_bytes() == path.read_bytes()
     fragments = list(pads.dataset(path, format="parquet").get_fragments())
     queries = [pads.field("scene") == "U_Other_0"]

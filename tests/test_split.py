@@ -16,6 +16,7 @@ from aerialdojo_gen.release.select import nav_id, train_counts, train_mask
 from aerialdojo_gen.stage import Job, Roots
 from aerialdojo_gen.stages import filter as filter_stage
 from aerialdojo_gen.stages import split
+from aerialdojo_gen.tables import from_rows
 
 SCENE = "U_Test_0"
 N_OBJECTS = 6
@@ -92,7 +93,7 @@ def data(tmp_path_factory):
         "anchors": list(rows_of_anchors()), "references": references, "pairs": pairs, "plans": plans,
     }.items():  # fmt: skip
         spec = store.LAYOUT[table].spec
-        store.write_shard(data, table, SCENE, 0, store.from_rows(spec, rows))
+        store.write_shard(data, table, SCENE, 0, from_rows(spec, rows))
     roots = Roots(data, data, data, data)
     for name, run, config in (
         ("filter", filter_stage.run, FilterConfig()),

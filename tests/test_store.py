@@ -15,7 +15,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from aerialdojo_gen import schemas, store
+from aerialdojo_gen.atomic import atomic_file, sweep
 from aerialdojo_gen.errors import StoreError
+from aerialdojo_gen.tables import content_digest, from_rows
 
 finite = st.floats(-1e6, 1e6)
 
@@ -36,21 +38,21 @@ def plan(pair_id, n, value):
 
 
 def write(data, rows, **kw):
-    return store.write_shard(data, "pairs", "U_Test_0", 0, store.from_rows(schemas.PAIRS, rows), **kw)
+    return store.write_shard(data, "pairs", "U_Test_0", 0, from_rows(schemas.PAIRS, rows), **kw)
 
 
 @settings(max_examples=30, deadline=None)
 @given(rows=st.lists(st.tuples(st.integers(0, 20), finite), max_size=8, unique_by=lambda r: r[0]))
 def test_round_trip_with_lists(tmp_path_factory, rows):
     data = tmp_path_factory.mktemp("data")
-    table = store.from_rows(schemas.PLANS, [plan(f"p{i:02}", i, v) for i, v in rows])
+    table = from_rows(schemas.PLANS, [plan(f"p{i:02}", i, v) for i, v in rows])
     store.write_shard(data, "plans", "U_Test_0", 0, table)
     assert store.read_scene(data, "plans", "U_Test_0").equals(table)
 
 
 def test_pandas_reads_table_and_scene(tmp_path):
     for scene in ("U_Test_0", "U_Test_1"):
-        table = store.from_rows(schemas.PAIRS, [pair(i, scene) for i in range(3)])
+        table = from_rows(schemas.PAIRS, [pair(i, scene) for i in range(3)])
         store.write_shard(tmp_path, "pairs", scene, 0, table)
     whole = pd.read_parquet(tmp_path / "pairs")
     assert len(whole) == 6
@@ -83,7 +85,7 @@ def test_rows_with_a_missing_or_unknown_column_are_refused():
     row = pair(0)
     row["euclidian_m"] = row.pop("euclidean_m")
     with pytest.raises(StoreError, match=r"lacks \['euclidean_m'\] and has unknown \['euclidian_m'\]"):
-        store.from_rows(schemas.PAIRS, [row])
+        from_rows(schemas.PAIRS, [row])
 
 
 @pytest.mark.parametrize(
@@ -97,14 +99,14 @@ def test_rows_with_a_missing_or_unknown_column_are_refused():
     ],
 )
 def test_tables_that_do_not_fit_are_refused_and_leave_nothing(tmp_path, change, message):
-    table = change(store.from_rows(schemas.PAIRS, [pair(i) for i in range(3)]))
+    table = change(from_rows(schemas.PAIRS, [pair(i) for i in range(3)]))
     with pytest.raises(StoreError, match=message):
         store.write_shard(tmp_path, "pairs", "U_Test_0", 0, table)
     assert not list(tmp_path.rglob("*.parquet"))
 
 
 def test_a_null_inside_a_list_is_refused(tmp_path):
-    table = store.from_rows(schemas.PLANS, [plan("p", 2, 1.0) | {"x_m": [1.0, None]}])
+    table = from_rows(schemas.PLANS, [plan("p", 2, 1.0) | {"x_m": [1.0, None]}])
     with pytest.raises(StoreError, match="1 nulls in column x_m"):
         store.write_shard(tmp_path, "plans", "U_Test_0", 0, table)
 
@@ -144,7 +146,7 @@ def test_file_outputs_cannot_leave_the_folder(tmp_path, relative):
     data = tmp_path / "data"
     data.mkdir()
     (data / "link").symlink_to(tmp_path)
-    with pytest.raises(StoreError, match="leads out of the data directory"), store.atomic_file(data, relative):
+    with pytest.raises(StoreError, match="leads out of the data directory"), atomic_file(data, relative):
         pass
     assert [p.name for p in tmp_path.iterdir()] == ["data"]
 
@@ -153,7 +155,7 @@ def test_an_error_while_writing_leaves_the_old_file_and_no_temporary(tmp_path):
     (tmp_path / "f.bin").write_text("old")
 
     def fail():
-        with store.atomic_file(tmp_path, "f.bin") as path:
+        with atomic_file(tmp_path, "f.bin") as path:
             path.write_text("half")
             _ = 1 / 0
 
@@ -194,24 +196,24 @@ def test_sweep_removes_what_a_killed_run_left_and_nothing_else(tmp_path):
     shard = tmp_path / "part-00000.parquet"
     for path in (left, mine, shard):
         path.write_text("x")
-    store.sweep(tmp_path)
+    sweep(tmp_path)
     assert sorted(p.name for p in tmp_path.iterdir()) == sorted([mine.name, shard.name])
 
 
 def test_digest_sees_every_change_and_no_metadata():
-    table = store.from_rows(schemas.PAIRS, [pair(i) for i in range(5)])
-    digest = store.content_digest(table)
-    assert store.content_digest(table.replace_schema_metadata({"a": "b"})) == digest
-    assert store.content_digest(pa.concat_tables([table[:2], table[2:]])) == digest
+    table = from_rows(schemas.PAIRS, [pair(i) for i in range(5)])
+    digest = content_digest(table)
+    assert content_digest(table.replace_schema_metadata({"a": "b"})) == digest
+    assert content_digest(pa.concat_tables([table[:2], table[2:]])) == digest
     changed = table.set_column(5, "euclidean_m", pa.array([4.5, 5.5, 6.5, 7.5, 8.500001]))
-    assert store.content_digest(changed) != digest
+    assert content_digest(changed) != digest
 
 
 def test_digest_does_not_see_what_lies_under_a_null(tmp_path):
     masked = pa.array(np.array([1.0, 7.0]), mask=np.array([False, True]))
     clean = pa.array([1.0, None])
-    assert store.content_digest(pa.table({"a": masked})) == store.content_digest(pa.table({"a": clean}))
-    assert store.content_digest(pa.table({"a": [1.0, None]})) != store.content_digest(pa.table({"a": [None, 1.0]}))
+    assert content_digest(pa.table({"a": masked})) == content_digest(pa.table({"a": clean}))
+    assert content_digest(pa.table({"a": [1.0, None]})) != content_digest(pa.table({"a": [None, 1.0]}))
 
 
 @pytest.mark.parametrize("table", sorted(store.LAYOUT))

@@ -5,9 +5,9 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+from aerialdojo_gen.atomic import atomic_file
 from aerialdojo_gen.errors import AerialDojoError
 from aerialdojo_gen.scenes.recipe import Cut, load_imported
-from aerialdojo_gen.store import atomic_file
 
 _HEAD = "\n[[imported.cuts]]\n"
 

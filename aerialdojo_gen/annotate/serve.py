@@ -12,8 +12,8 @@ from pathlib import Path
 from aerialdojo_gen.annotate.access import TokenGate
 from aerialdojo_gen.annotate.coco import coco_zip
 from aerialdojo_gen.annotate.desk import Desk
+from aerialdojo_gen.atomic import disk_error
 from aerialdojo_gen.errors import UsageError
-from aerialdojo_gen.store import disk_error
 from aerialdojo_gen.web.serving import open_socket, serve, url_of
 
 

@@ -28,8 +28,9 @@ from aerialdojo_gen.annotate.document import (
 )
 from aerialdojo_gen.annotate.history import Action, History, Record
 from aerialdojo_gen.annotations.format import Annotations, format_annotations, parse_annotations
+from aerialdojo_gen.atomic import disk_error
 from aerialdojo_gen.errors import AnnotationError
-from aerialdojo_gen.store import check_scene_name, disk_error
+from aerialdojo_gen.store import check_scene_name
 
 
 @dataclass(frozen=True)

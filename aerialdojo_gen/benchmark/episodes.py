@@ -12,6 +12,7 @@ import pyarrow.compute as pc
 
 from aerialdojo_gen import schemas, store
 from aerialdojo_gen.errors import StoreError
+from aerialdojo_gen.tables import from_rows
 
 TABLES = ("episodes", "steps", "timings", "failures")
 
@@ -82,10 +83,10 @@ def add_records(data: Path, run: str, scene: str, records: Sequence[dict[str, An
     ordered = [by_task[task_id] for task_id in sorted(by_task)]
     flown = [record for record in ordered if "episode" in record]
     new = {
-        "episodes": store.from_rows(schemas.EPISODES, [record["episode"] for record in flown]),
+        "episodes": from_rows(schemas.EPISODES, [record["episode"] for record in flown]),
         "steps": _steps(run, scene, flown),
-        "timings": store.from_rows(schemas.TIMINGS, [record["timing"] for record in flown]),
-        "failures": store.from_rows(schemas.FAILURES, [r["failure"] for r in ordered if "failure" in r]),
+        "timings": from_rows(schemas.TIMINGS, [record["timing"] for record in flown]),
+        "failures": from_rows(schemas.FAILURES, [r["failure"] for r in ordered if "failure" in r]),
     }
     replaced = pa.array([record["task_id"] for record in flown], pa.string())
     for table in reversed(TABLES):

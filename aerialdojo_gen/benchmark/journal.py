@@ -8,7 +8,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
-from aerialdojo_gen.store import disk_error
+from aerialdojo_gen.atomic import disk_error
 
 
 class Journal:

@@ -13,7 +13,8 @@ from typing import Any
 import jinja2
 import markupsafe
 
-from aerialdojo_gen import __version__, store
+from aerialdojo_gen import __version__
+from aerialdojo_gen.atomic import atomic_file
 from aerialdojo_gen.benchmark.figures import encoded, family_radar, radius_curve
 from aerialdojo_gen.benchmark.formats import as_latex, as_markdown
 from aerialdojo_gen.benchmark.profiles import Profile
@@ -60,7 +61,7 @@ def write_report(
         **{f"{name}.{kind}": data for (name, kind), data in figures.items()},
     }
     for name, data in files.items():
-        with store.atomic_file(out, name) as temporary:
+        with atomic_file(out, name) as temporary:
             temporary.write_bytes(data)
     return [out / name for name in files]
 

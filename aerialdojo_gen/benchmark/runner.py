@@ -21,6 +21,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from aerialdojo_gen import store
+from aerialdojo_gen.atomic import atomic_file
 from aerialdojo_gen.benchmark import episodes, journal
 from aerialdojo_gen.benchmark.goal import Sensors
 from aerialdojo_gen.benchmark.tasks import Selection, select
@@ -236,7 +237,7 @@ class _Run:
         for scene in episodes.run_scenes(self._out, self._name):
             if episodes.fingerprint_of(self._out, self._name, scene) != self._fingerprint:
                 raise UsageError(f"there are episodes of another run {self._name!r} in {self._out}: {mend}")
-        with store.atomic_file(self._folder, path.name) as temporary:
+        with atomic_file(self._folder, path.name) as temporary:
             temporary.write_text(json.dumps(self._settings, indent=2, sort_keys=True) + "\n", encoding="utf-8")
 
     def _begun(self) -> bool:

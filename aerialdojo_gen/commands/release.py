@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from aerialdojo_gen.atomic import atomic_file
 from aerialdojo_gen.commands.common import Data, PipelineFile, Scene, open_pipeline
 from aerialdojo_gen.errors import UsageError
 
@@ -46,7 +47,7 @@ def stats(
     compared = tables(made)
     for path, text in ((markdown, as_markdown(compared)), (csv, as_csv(compared))):
         if path:
-            with store.atomic_file(path.parent, path.name) as temporary:
+            with atomic_file(path.parent, path.name) as temporary:
                 temporary.write_text(text, encoding="utf-8")
     print("\n\n".join("\n".join(table.terminal()) for table in compared))
     if figures:

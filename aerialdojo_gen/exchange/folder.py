@@ -11,8 +11,8 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path, PurePosixPath
 from typing import Any
 
+from aerialdojo_gen.atomic import disk_error
 from aerialdojo_gen.errors import UsageError
-from aerialdojo_gen.store import disk_error
 
 _PICTURES = (b"\x89PNG\r\n\x1a\n", b"\xff\xd8\xff")
 _LARGEST_PICTURE = 32 << 20

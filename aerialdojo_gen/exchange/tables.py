@@ -11,7 +11,7 @@ import pyarrow as pa
 
 from aerialdojo_gen.parquet_files import write_file
 from aerialdojo_gen.schemas import RELEASE_OBJECTS, ROUTES, TASKS, TableSpec
-from aerialdojo_gen.store import check_table, from_rows
+from aerialdojo_gen.tables import check_table, from_rows
 
 _ROWS_A_PART = 8192
 _POSES_A_PART = 1 << 17

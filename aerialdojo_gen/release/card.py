@@ -10,6 +10,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from aerialdojo_gen import __version__, schemas, store
+from aerialdojo_gen.atomic import atomic_file
 from aerialdojo_gen.paper import inventory
 from aerialdojo_gen.release.contents import TABLES, check_release, counts, meaning, sizes, unit
 from aerialdojo_gen.release.croissant import CITE_AS
@@ -127,6 +128,6 @@ def write_card(data: Path) -> Path:
         The release is missing or damaged, or cannot be written.
     """
     text = render_card(data)
-    with store.atomic_file(data, "release/README.md") as path:
+    with atomic_file(data, "release/README.md") as path:
         path.write_text(text, encoding="utf-8")
     return data / "release" / "README.md"

@@ -8,7 +8,8 @@ from typing import Any
 
 import pyarrow as pa
 
-from aerialdojo_gen import __version__, store
+from aerialdojo_gen import __version__
+from aerialdojo_gen.atomic import atomic_file
 from aerialdojo_gen.release.contents import TABLES, Table, check_release, counts, meaning, unit
 
 # Of this version's output. Not the day of the run: the same sources give the same bytes on any day.
@@ -160,6 +161,6 @@ def write_croissant(data: Path) -> Path:
         The release is missing or damaged, or cannot be written.
     """
     found = counts(data, check_release(data))
-    with store.atomic_file(data, "release/croissant.json") as path:
+    with atomic_file(data, "release/croissant.json") as path:
         path.write_text(json.dumps(croissant(found), indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
     return data / "release" / "croissant.json"

@@ -17,7 +17,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from aerialdojo_gen import store
+from aerialdojo_gen.atomic import disk_error, process_alive
 from aerialdojo_gen.config import RenderConfig
 
 _NOTE = "recording.json"
@@ -108,7 +108,7 @@ def writing(data: Path, folder: str) -> Iterator[Path]:
             shutil.rmtree(path)
         temporary.replace(path)
     except OSError as error:
-        raise store.disk_error(error, path) from error
+        raise disk_error(error, path) from error
     finally:
         shutil.rmtree(temporary, ignore_errors=True)
 
@@ -123,7 +123,7 @@ def sweep(folder: Path) -> None:
     """Remove what killed processes left half-written in a scene's folder; a living process's stays."""
     for path in folder.glob(".*.tmp"):
         match = _TEMPORARY.match(path.name)
-        if match and not store.process_alive(int(match[1])):
+        if match and not process_alive(int(match[1])):
             shutil.rmtree(path, ignore_errors=True)
 
 

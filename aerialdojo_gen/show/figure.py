@@ -10,7 +10,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.cm import ScalarMappable
 from matplotlib.figure import Figure
 
-from aerialdojo_gen import store
+from aerialdojo_gen.atomic import atomic_file
 from aerialdojo_gen.errors import UsageError
 from aerialdojo_gen.show.drawing import CLEARANCE_COLOURS, CLEARANCE_SCALE, draw_map, draw_profile, draw_side, plain
 from aerialdojo_gen.show.pictured import PicturedTask
@@ -116,6 +116,6 @@ def write_png(task: PicturedTask, path: Path) -> Path:
     """
     if path.suffix.lower() != ".png":
         raise UsageError(f"{path}: the picture is a PNG, call it {path.with_suffix('.png').name}")
-    with store.atomic_file(path.parent, path.name) as temporary:
+    with atomic_file(path.parent, path.name) as temporary:
         task_figure(task).savefig(temporary, format="png", metadata={"Software": None})
     return path

@@ -15,7 +15,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from aerialdojo_gen import schemas, store
+from aerialdojo_gen import schemas
+from aerialdojo_gen.atomic import atomic_file
 from aerialdojo_gen.show.drawing import CLEARANCE_COLOURS, CLEARANCE_SCALE, draw_map, draw_profile, draw_side
 from aerialdojo_gen.show.pictured import PicturedTask
 
@@ -82,6 +83,6 @@ def write_page(task: PicturedTask, path: Path) -> Path:
     StoreError
         The file cannot be written.
     """
-    with store.atomic_file(path.parent, path.name) as temporary:
+    with atomic_file(path.parent, path.name) as temporary:
         temporary.write_text(render_page(task), encoding="utf-8")
     return path

@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from aerialdojo_gen import store
 from aerialdojo_gen.config import AnchorSampleConfig
 from aerialdojo_gen.errors import StoreError
 from aerialdojo_gen.geometry.frames import yaw_towards
@@ -25,6 +24,7 @@ from aerialdojo_gen.scenes.model import Instance, Scene
 from aerialdojo_gen.schemas import ANCHORS
 from aerialdojo_gen.stage import Job, Output
 from aerialdojo_gen.stages.anchor_choice import with_choice
+from aerialdojo_gen.tables import from_rows
 
 Floats = NDArray[np.float64]
 log = logging.getLogger(__name__)
@@ -124,7 +124,7 @@ def run(job: Job, config: AnchorSampleConfig) -> Output:
             log.warning("%s: object %d (%s) has no anchor: %s", job.scene, item["object_id"], item["name"], why)
     tally = {reason: counts[reason] for reason in REASONS}
     return Output(
-        {"anchors": store.from_rows(ANCHORS, rows)},
+        {"anchors": from_rows(ANCHORS, rows)},
         rows_in=len(rows) + sum(tally.values()),
         rows_out=len(rows),
         counts=tally | {"no_anchor": bare},

@@ -11,7 +11,6 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from aerialdojo_gen import store
 from aerialdojo_gen.config import ReferenceImagesConfig
 from aerialdojo_gen.errors import RenderError
 from aerialdojo_gen.geometry.cameras import Camera, project, view_pose
@@ -19,6 +18,7 @@ from aerialdojo_gen.geometry.rays import RayCaster
 from aerialdojo_gen.rendering.world import ray_caster, render_world
 from aerialdojo_gen.schemas import REFERENCES
 from aerialdojo_gen.stage import Job, Output
+from aerialdojo_gen.tables import from_rows
 
 _BOX = ("box_u0_px", "box_v0_px", "box_u1_px", "box_v1_px")
 _IN_FRONT_M = 0.05
@@ -73,7 +73,7 @@ def run(job: Job, config: ReferenceImagesConfig) -> Output:
         else:
             counts["not_in_view"] += 1
     pictures = sum(row["reference_image"] is not None for row in rows)
-    return Output({"references": store.from_rows(REFERENCES, rows)}, len(objects), pictures, counts)
+    return Output({"references": from_rows(REFERENCES, rows)}, len(objects), pictures, counts)
 
 
 def reference_id(scene: str, object_id: int) -> str:

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from aerialdojo_gen import store
 from aerialdojo_gen.config import RenderConfig
 from aerialdojo_gen.errors import BudgetSpent
 from aerialdojo_gen.rendering import finished
@@ -21,6 +20,7 @@ from aerialdojo_gen.rendering.trajectory import FramePoses
 from aerialdojo_gen.scenes.model import Scene
 from aerialdojo_gen.schemas import FRAMES, RECORDINGS
 from aerialdojo_gen.stage import BY_NAME, Job, Output
+from aerialdojo_gen.tables import from_rows
 
 
 def run(job: Job, config: RenderConfig) -> Output:
@@ -64,8 +64,8 @@ def run(job: Job, config: RenderConfig) -> Output:
     counts = Counter(flag for row in recordings for flag in row["flags"])
     counts["frames"] = len(frames)
     written = {
-        "recordings": store.from_rows(RECORDINGS, recordings),
-        "frames": store.from_rows(FRAMES, frames),
+        "recordings": from_rows(RECORDINGS, recordings),
+        "frames": from_rows(FRAMES, frames),
     }
     return Output(written, len(mine), len(recordings), dict(counts))
 

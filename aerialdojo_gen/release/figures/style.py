@@ -15,6 +15,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from aerialdojo_gen import store
+from aerialdojo_gen.atomic import atomic_file
 from aerialdojo_gen.schemas import FAMILIES, SETTINGS
 
 # Settings are ordered, so they are shades of one colour; families are not (Paul Tol's muted scheme).
@@ -108,7 +109,7 @@ def save(figure: Figure, folder: Path, name: str) -> list[Path]:
     paths = []
     with styled():
         for suffix, metadata in ((".png", {"Software": None}), (".svg", {"Date": None, "Creator": None})):
-            with store.atomic_file(folder, name + suffix) as path:
+            with atomic_file(folder, name + suffix) as path:
                 figure.savefig(path, dpi=_DPI, metadata=metadata, facecolor="white")
             paths.append(folder / (name + suffix))
     return paths

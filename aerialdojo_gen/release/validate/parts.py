@@ -15,6 +15,7 @@ from aerialdojo_gen.release.contents import SHARDS
 from aerialdojo_gen.release.validate.registry import Fault, Outcome
 from aerialdojo_gen.release.validate.rows import Rows
 from aerialdojo_gen.schemas import TableSpec
+from aerialdojo_gen.tables import content_digest
 
 # What lies beside the tables of a release: its cards, its licence, what a hub's client leaves, pictures of it.
 _BESIDE = {"README.md", "croissant.json", "LICENSE", "CITATION.cff", ".gitattributes", "figures", "stats"}
@@ -131,7 +132,7 @@ def _read(release: Path, key: str, scene: str, found: dict[str, Outcome], runs: 
     if info is not None:
         runs[relative] = info.fingerprint
         found["part_content"].rows += 1
-        if store.content_digest(table) != info.content:
+        if content_digest(table) != info.content:
             fault("part_content", "other rows than its footer tells of", f"rows of SHA-256 {info.content[:12]}…")
     extra = [name for name in table.column_names if name not in spec.schema.names]
     if spec.name == "tasks":

@@ -11,10 +11,10 @@ from pathlib import Path
 
 import pyarrow as pa
 
+from aerialdojo_gen.atomic import atomic_file
 from aerialdojo_gen.errors import UsageError
 from aerialdojo_gen.parquet_files import write_file
 from aerialdojo_gen.release.validate.registry import Fault, Outcome
-from aerialdojo_gen.store import atomic_file
 
 FORMATS = (".jsonl", ".json", ".csv", ".parquet")
 
