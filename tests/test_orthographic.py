@@ -22,7 +22,7 @@ def looks(colour, rgb):
 
 
 def test_the_map_is_where_the_world_is(pictures):
-    plane = Plane(np.array([0.0, 0.0, 20.0]), X, Y, (-10.0, 10.0, -10.0, 10.0))
+    plane = Plane.above(20.0, (-10.0, 10.0, -10.0, 10.0))
     picture = pictures.take(plane, 0.05)
     assert picture.shape == (400, 400, 3)
 
@@ -72,7 +72,7 @@ def test_the_suns_shadow_falls_where_rays_say():
     scene = Scene(
         "U_Sun_0", (ground, tower), MATERIALS, np.array([[-20.0, -20, 0], [20, 20, 20]]), sun=(0.0, -0.6, 0.8)
     )
-    picture = OrthographicPictures(scene).take(Plane(30 * Z, X, Y, (-10.0, 10.0, -10.0, 10.0)), 0.1)
+    picture = OrthographicPictures(scene).from_above((-10.0, 10.0, -10.0, 10.0), 0.1)
     grey = picture[..., 0].astype(int)
     # The sun stands in the south at atan(0.8 / 0.6): the tower of 6 m throws 4.5 m of shadow to the north.
     column = grey[::-1, 100]  # from south to north through the tower

@@ -9,7 +9,6 @@ import xml.etree.ElementTree as ET
 import cv2
 import numpy as np
 import pytest
-from handmade import box, instance, scene
 
 from aerialdojo_gen import schemas
 from aerialdojo_gen.paper import inventory, splits
@@ -21,7 +20,6 @@ from aerialdojo_gen.release.figures.maps import _round_length
 from aerialdojo_gen.release.figures.style import SETTING_COLOURS, read_routes
 from aerialdojo_gen.release.quota import train_quotas
 from aerialdojo_gen.release.stats import Made, in_paper_order, made_of, tables
-from aerialdojo_gen.rendering.orthophoto import orthophoto
 
 
 def as_the_paper(name, **changes):
@@ -168,32 +166,6 @@ def test_bars_are_as_long_as_the_counts(smoke):
     assert sum(bar.get_width() for bar in axes.patches) == instances
     assert {t.get_text() for t in axes.texts} == {f"{instances:,}"}
     assert len(SETTING_COLOURS) == len(set(SETTING_COLOURS.values())) == len(axes.containers)
-
-
-def test_a_map_shows_what_stands_where_with_its_shadow():
-    # North-east: a tall grey box on grey ground; the sun is in the south-east, its shadow falls to the north-west.
-    made = scene(instance("tower", box((5, 5, 0), (9, 9, 10))), half=15.0)
-    picture = orthophoto(made, 0.5).astype(int)
-    assert picture.shape == (60, 60, 3)
-
-    def at(x, y):
-        return picture[int((15 - y) / 0.5), int((x + 15) / 0.5)]
-
-    shadow = np.array(made.sun[:2]) / made.sun[2] * -4.0 + [5.2, 8.8]
-    assert (at(*shadow) < at(-10, -10)).all()
-    assert (at(10, 2) == at(-10, -10)).all()
-    assert (at(7, 7) == at(-10, -10)).all(), "a flat roof is as light as the ground"
-
-
-def test_north_is_up_on_a_map():
-    made = scene(instance("wall", box((-15, 0, 0), (15, 1, 5))), half=15.0)
-    # The sun stands in the south: the wall's shadow falls to the north of it, as far as the sun is high.
-    reach = -made.sun[1] / made.sun[2] * 5
-    column = orthophoto(made, 0.25).astype(int)[:, 40].sum(axis=1)
-    dark = np.flatnonzero(column < column.max())
-    assert list(dark) == list(range(dark[0], dark[-1] + 1))
-    assert 15 - 0.25 * (dark[-1] + 1) == pytest.approx(1.0)
-    assert 15 - 0.25 * dark[0] == pytest.approx(1.0 + reach, abs=0.25)
 
 
 @pytest.mark.parametrize(("most", "length"), [(47.0, 20.0), (50.0, 50.0), (9.9, 5.0), (0.3, 0.2), (199, 100)])

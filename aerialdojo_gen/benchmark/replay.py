@@ -25,7 +25,7 @@ from aerialdojo_gen.benchmark.goal import Sensors
 from aerialdojo_gen.benchmark.runs import Run
 from aerialdojo_gen.errors import StoreError
 from aerialdojo_gen.release.browse import ReleasedScene
-from aerialdojo_gen.rendering.orthographic import OrthographicPictures, Plane
+from aerialdojo_gen.rendering.orthographic import OrthographicPictures
 from aerialdojo_gen.schemas import ACTION_NAMES
 
 _MAP_PX = 640
@@ -206,10 +206,7 @@ def _pictures(scene: ReleasedScene) -> OrthographicPictures:
 
 
 def _map(scene: ReleasedScene, low: NDArray[np.float64], high: NDArray[np.float64]) -> NDArray[np.uint8]:
-    above = max(float(instance.bounds[1, 2]) for instance in scene.model.instances) + 1.0
-    east, north = np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0])
-    plane = Plane(np.array([0.0, 0.0, above]), east, north, (low[0], high[0], low[1], high[1]))
-    return _pictures(scene).take(plane, float(high[0] - low[0]) / _MAP_PX)
+    return _pictures(scene).from_above((low[0], high[0], low[1], high[1]), float(high[0] - low[0]) / _MAP_PX)
 
 
 def _flight(scene: ReleasedScene, run: Run, episode: dict[str, Any], steps: Any, frames: bool) -> Flight:

@@ -40,6 +40,11 @@ class Plane:
     up: Floats
     extent_m: tuple[float, float, float, float]
 
+    @classmethod
+    def above(cls, z_m: float, extent_m: tuple[float, float, float, float]) -> Plane:
+        """A map's: from height z straight down, north up; the extent is west, east, south and north, metres."""
+        return cls(np.array([0.0, 0.0, z_m]), np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0]), extent_m)
+
     @property
     def forward(self) -> Floats:
         """The direction that one looks in, (3,) float64."""
@@ -75,6 +80,10 @@ class OrthographicPictures:
         self._ground = TriangleRayCaster(*_joined(ground)) if ground else None
         self._floor_m, self._ceiling_m = float(self._vertices[:, 2].min()), float(self._vertices[:, 2].max())
         self._sky = sky + (np.array([236.0, 238.0, 240.0]) - sky) * 0.6
+
+    def from_above(self, extent_m: tuple[float, float, float, float], pixel_m: float) -> NDArray[np.uint8]:
+        """Take a map of everything: `take` by a plane above the scene; west, east, south and north, metres."""
+        return self.take(Plane.above(self._ceiling_m + 1.0, extent_m), pixel_m)
 
     def take(self, plane: Plane, pixel_m: float) -> NDArray[np.uint8]:
         """Take a picture.

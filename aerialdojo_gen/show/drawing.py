@@ -48,7 +48,7 @@ def draw_map(axes: Axes, task: PicturedTask, aspect: float) -> None:
     near = np.ptp(with_landmark, axis=0).max() <= max(1.7 * np.ptp(corners, axis=0).max(), 45.0)
     extent = _framed(with_landmark if near else corners, aspect)
     height = max(way[:, 2].max(), _box(task.target)[1][2]) + _ABOVE_M
-    plane = Plane(np.array([0.0, 0.0, height]), np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0]), extent)
+    plane = Plane.above(height, extent)
     _picture(axes, task, plane)
     _route(axes, task, plane)
     low, high = _box(task.target)

@@ -13,13 +13,14 @@ from matplotlib.lines import Line2D
 
 from aerialdojo_gen import store
 from aerialdojo_gen.release.figures.style import WIDTH_IN, styled
-from aerialdojo_gen.rendering.orthophoto import orthophoto
+from aerialdojo_gen.rendering.orthographic import OrthographicPictures
 from aerialdojo_gen.scenes.glb import read_glb
 
 _COLUMNS = 6
 _GAP_IN, _TITLE_IN, _LEGEND_IN = 0.07, 0.14, 0.3
 _CELL_IN = (WIDTH_IN - _GAP_IN) / _COLUMNS - _GAP_IN
 _PIXELS = 220
+_OPACITY = 0.75
 _MARKS: dict[str, dict[str, Any]] = {
     "anchor": {"marker": "o", "ms": 0.9, "mfc": "#1f4fd8", "mec": "none"},
     "object": {"marker": "o", "ms": 2.3, "mfc": "#ffd21f", "mec": "#222222", "mew": 0.35},
@@ -71,10 +72,12 @@ def _map(axes: Axes, data: Path, row: dict[str, Any]) -> None:
     scene = row["scene"]
     west, south, east, north = (row[f"{e}_{a}_m"] for e in ("min", "max") for a in "xy")
     mesh = data / row["mesh_path"]
-    axes.set_facecolor("#f2f2f2")
+    axes.set_facecolor("white" if mesh.is_file() else "#f2f2f2")
     if mesh.is_file():
-        picture = orthophoto(read_glb(mesh), max(east - west, north - south) / _PIXELS)
-        axes.imshow(picture, extent=(west, east, south, north), interpolation="none")
+        pixel_m = max(east - west, north - south) / _PIXELS
+        picture = OrthographicPictures(read_glb(mesh)).from_above((west, east, south, north), pixel_m)
+        # A little paled, so that marks stand out.
+        axes.imshow(picture, extent=(west, east, south, north), interpolation="none", alpha=_OPACITY)
     for table, kind in (("anchors", "anchor"), ("objects", "object"), ("landmarks", "landmark")):
         places = store.read_scene(data, f"release/{table}", scene, ["x_m", "y_m"])
         axes.plot(places["x_m"].to_numpy(), places["y_m"].to_numpy(), ls="none", **_MARKS[kind])
