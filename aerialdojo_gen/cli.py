@@ -9,7 +9,18 @@ import sys
 
 import typer
 
-from aerialdojo_gen.commands import annotate, evaluate, exchange, release, render, report, show, sources, stages, validate
+from aerialdojo_gen.commands import (
+    annotate,
+    evaluate,
+    exchange,
+    release,
+    render,
+    report,
+    show,
+    sources,
+    stages,
+    validate,
+)
 from aerialdojo_gen.errors import AerialDojoError
 
 app = typer.Typer(

@@ -165,7 +165,7 @@ class RenderConfig(Section):
         ("front", "left", "right", "down"), min_length=1, description="cameras of the body"
     )
     offsets_m: dict[Literal["front", "left", "right", "down"], tuple[float, float, float]] = Field(
-        {}, description="where a view's camera sits: x forward, y left, z up of the body's centre; (0, 0, 0) where absent"
+        {}, description="where a view's camera sits from the body's centre: x forward, y left, z up; 0 where absent"
     )
     width: int = Field(640, ge=16, le=4096, multiple_of=2, description="columns, pixels")
     height: int = Field(640, ge=16, le=4096, multiple_of=2, description="rows, pixels")
