@@ -8,7 +8,10 @@ import zlib
 import cv2
 import numpy as np
 import pytest
-from planting import check
+from planting import SMOKE, check
+
+from aerialdojo_gen.config import load_pipeline
+from aerialdojo_gen.release.validate import Asked, validate
 
 OBJECTS, SCENES = "release/objects", "release/scenes"
 
@@ -34,7 +37,12 @@ def test_a_mesh_that_is_not_there(planted):
 def test_meshes_that_lie_elsewhere(planted, tmp_path):
     elsewhere = tmp_path / "elsewhere"
     (planted.data / "meshes").rename(elsewhere)
-    assert check(planted, meshes=elsewhere) == {}
+    report = validate(Asked(planted.release, (planted.scene,), meshes=elsewhere, pipeline=load_pipeline(SMOKE)))
+    assert not report.faults
+    assert not [o for o in report.outcomes if o.skipped and "mesh" in o.skipped]
+    assert next(o.rows for o in report.outcomes if o.check == "oracle_fails") == sum(
+        len(planted.rows(f"routes/{subset}")) for subset in ("train", "test")
+    )
     assert check(planted, meshes=tmp_path) == {"mesh_missing": scene_key(planted)}
 
 

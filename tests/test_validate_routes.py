@@ -6,7 +6,7 @@ from planting import SMOKE, check, measured, poses, refly, turned
 
 from aerialdojo_gen.config import load_pipeline
 from aerialdojo_gen.planning.collision import CollisionWorld
-from aerialdojo_gen.release.validate import collisions
+from aerialdojo_gen.release.validate import collisions, oracle
 from aerialdojo_gen.release.validate.parts import read_tables
 from aerialdojo_gen.release.validate.registry import ALWAYS_AFTER, TABLES
 from aerialdojo_gen.release.validate.rows import SceneData
@@ -120,6 +120,8 @@ def test_a_way_through_a_wall_and_back(planted, world):
     assert check(planted) == {"route_collision": key(old)}
     # Not by its own length of arm: a body that fits through finds nothing.
     assert "route_collision" not in check(planted, use_meshes=False)
+    # A sample of FCL's certificates may miss the route; the oracle flies them all.
+    assert check(planted, sample=0) == {"oracle_fails": key(old)}
 
 
 def test_an_action_that_leads_elsewhere(planted):
@@ -198,6 +200,34 @@ def test_replayed_actions_are_swept_for_themselves(planted, world):
     found = [data["routes"].key(f.row) for f in collisions.replay_collision(data, data["routes"])]
     assert found == key(row)
     assert not list(collisions.route_collision(data, data["routes"]))
+
+
+@pytest.mark.parametrize(
+    ("key", "change", "words"),
+    [
+        (KEY, lambda row: row.update(length_m=0.9 * row["length_m"]), "m told: SPL 0.9"),
+        (KEY, lambda row: row.update(goal_z_m=row["goal_z_m"] + 4.5), "m from the goal"),
+        (KEY, lambda row: row["action"].__setitem__(-1, TURN_LEFT), "no Stop in its "),
+        (KEY, lambda row: row["action"].__setitem__(slice(0, 20), [UP_2] * 20), "that would leave the flight volume"),
+        ("tasks/train", lambda task: task.update(action_budget=5), "no Stop within the budget of 5 actions"),
+        ("tasks/train", lambda task: task.update(start_z_m=0.1), "a collision at action 1, at ("),
+    ],
+)
+def test_the_oracle_says_what_a_flight_lacks(planted, world, key, change, words):
+    def wanted(row):
+        # Nothing above the start, so that twenty moves up end at the ceiling.
+        start = [row[f"{axis}_m"][0] for axis in "xyz"]
+        return row["n_actions"] > 25 and not world.segment_in_collision(start, start + 30 * np.eye(3)[2], RADIUS)
+
+    def first_instance(task):
+        return task["nav_id"] in nav_ids and task["modality"] == "image"
+
+    nav_ids = {row["nav_id"] for row in planted.rows(KEY) if wanted(row)}
+    row = planted.edit(key, change, wanted if key == KEY else first_instance)
+    data = scene_data(planted)
+    found = {data["routes"].key(fault.row): fault.found for fault in oracle.oracle_fails(data, data["routes"])}
+    assert list(found) == [f"nav_id={row['nav_id']}"]
+    assert words in found[f"nav_id={row['nav_id']}"]
 
 
 def test_a_sample_asks_fcl_about_so_many_routes_and_always_the_same(planted):

@@ -46,6 +46,8 @@ class FlightSpace:
         World coordinates, metres.
     radius_m : float
         Radius of the body's collision sphere.
+    world : CollisionWorld, optional
+        FCL's world of the scene, where there is one already.
 
     Attributes
     ----------
@@ -55,16 +57,17 @@ class FlightSpace:
         What proves legs free.
     """
 
-    def __init__(self, scene: Scene, radius_m: float) -> None:
+    def __init__(self, scene: Scene, radius_m: float, world: CollisionWorld | None = None) -> None:
         self.scene = scene
         self.radius_m = radius_m
         self.grid = ClearanceGrid.build(scene, radius_m=radius_m)
         self._arrays = self.grid.arrays
+        self._world = world
 
     @cached_property
     def world(self) -> CollisionWorld:
         """FCL's world; built when the grid is first at a loss."""
-        return CollisionWorld(self.scene)
+        return self._world or CollisionWorld(self.scene)
 
     def in_collision(self, p: Point) -> bool:
         """Whether the body at `p`, metres, world frame, touches a surface."""

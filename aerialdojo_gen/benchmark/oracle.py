@@ -2,72 +2,76 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from pathlib import Path
-
-import pyarrow.compute as pc
+from collections.abc import Sequence
+from typing import NamedTuple
 
 from aerialdojo_gen.benchmark.episode import Episode
-from aerialdojo_gen.benchmark.flight import SUCCESS_RADIUS_M
-from aerialdojo_gen.benchmark.motion import flight_space
-from aerialdojo_gen.benchmark.tasks import Selection, mesh_of, read_tasks, reference_actions, select
-from aerialdojo_gen.config import Embodiment
+from aerialdojo_gen.benchmark.motion import FlightSpace, Point
 from aerialdojo_gen.schemas import APPROACH
 
+# A reference that is flown as it is told has the length that it is told to have, but for the Approach.
+LEAST_SPL = 0.99
 
-@dataclass(frozen=True)
-class SelfTest:
-    """What the references of a scene achieve.
+
+class Reference(NamedTuple):
+    """A navigation task with its reference trajectory.
 
     Attributes
     ----------
-    episodes, actions : int
-        Navigation tasks, one episode each, and actions flown.
-    unsuccessful : tuple of str
-        Navigation tasks whose reference does not end in success: it collides, leaves the flight volume, stops too
-        far away, or exceeds the budget.
-    spl_sum : float
-        Sum of the episodes' success weighted by path length; at most `episodes`.
+    start : tuple of float
+        x, y, z in metres, world frame, and yaw in radians.
+    goal : tuple of float
+        Position of the goal anchor, metres, world frame.
+    action_budget : int
+        Most actions, Stop included.
+    length_m : float
+        Told length of the trajectory.
+    actions : sequence of int
+        Of the trajectory; an Approach among them is not flown, for agents have none.
     """
 
-    episodes: int
-    actions: int
-    unsuccessful: tuple[str, ...]
-    spl_sum: float
+    start: tuple[float, float, float, float]
+    goal: Point
+    action_budget: int
+    length_m: float
+    actions: Sequence[int]
 
 
-def self_test(
-    data: Path, scene: str, radius_m: float = SUCCESS_RADIUS_M, embodiment: Embodiment | None = None
-) -> SelfTest:
-    """Fly a scene's reference trajectories without Approach, by the motion and collision of the environment.
+def fly(space: FlightSpace, reference: Reference) -> Episode:
+    """Fly a reference trajectory by the motion and collision of the environment, up to the episode's end."""
+    episode = Episode(space, reference.start, reference.goal, reference.action_budget)
+    for action in reference.actions:
+        if episode.termination is None and action != APPROACH:
+            episode.step(action)
+    return episode
+
+
+def shortcoming(episode: Episode, length_m: float, radius_m: float) -> str:
+    """Say what a flown reference lacks for a success (SR and OSR 100 %, CR 0, SPL of `LEAST_SPL` or more).
 
     Parameters
     ----------
-    data : Path
-        The data directory, with release and meshes.
-    scene : str
+    episode : Episode
+        Of `fly`.
+    length_m : float
+        Told length of the reference, metres.
     radius_m : float
-        How near to the goal a Stop must be.
-    embodiment : Embodiment, optional
+        How near to the goal a Stop must be, metres.
 
     Returns
     -------
-    SelfTest
+    str
+        In words; empty where it lacks nothing.
     """
-    rows = select(data, Selection(scenes=(scene,)))
-    # Both instances of a navigation task share everything but the goal's representation: one episode tells.
-    rows = rows.filter(pc.equal(rows["modality"], "semantic"))
-    actions = reference_actions(data, scene, rows["subset"].unique().to_pylist())
-    space = flight_space(*mesh_of(data, scene), (embodiment or Embodiment()).radius_m)
-    flown, spl, unsuccessful = 0, 0.0, []
-    for task in read_tasks(data, rows):
-        episode = Episode(space, task.start, task.goal, task.row["action_budget"])
-        for action in actions[task.row["nav_id"]]:
-            if episode.termination is None and action != APPROACH:
-                episode.step(action)
-        flown += episode.n_actions
-        if episode.success(radius_m) and not episode.n_refused:
-            spl += task.length_m / max(task.length_m, episode.path_length_m)
-        else:
-            unsuccessful.append(task.row["nav_id"])
-    return SelfTest(rows.num_rows, flown, tuple(unsuccessful), spl)
+    if episode.termination == "collision":
+        x, y, z = episode.position
+        return f"a collision at action {episode.n_actions}, at ({x:.2f}, {y:.2f}, {z:.2f}) m"
+    if episode.n_refused:
+        return f"{episode.n_refused} actions that would leave the flight volume"
+    if episode.termination != "stop":
+        spent = f"{episode.n_actions} actions"
+        return f"no Stop within the budget of {spent}" if episode.termination else f"no Stop in its {spent}"
+    if not episode.success(radius_m):
+        return f"a Stop {episode.distance_m:.3f} m from the goal"
+    spl = length_m / max(length_m, episode.path_length_m)
+    return "" if spl >= LEAST_SPL else f"{episode.path_length_m:.3f} m flown, {length_m:.3f} m told: SPL {spl:.3f}"

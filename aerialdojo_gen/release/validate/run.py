@@ -12,7 +12,18 @@ from aerialdojo_gen.errors import AerialDojoError, UsageError
 from aerialdojo_gen.executor import Pool
 from aerialdojo_gen.interrupt import Interrupts
 from aerialdojo_gen.progress import Reporter
-from aerialdojo_gen.release.validate import anchors, collisions, ends, geometry, images, leaks, links, meshes, tables
+from aerialdojo_gen.release.validate import (
+    anchors,
+    collisions,
+    ends,
+    geometry,
+    images,
+    leaks,
+    links,
+    meshes,
+    oracle,
+    tables,
+)
 from aerialdojo_gen.release.validate.counts import Tally, scene_counts, tally_of, whole_counts
 from aerialdojo_gen.release.validate.parts import foreign_files, read_tables, release_tables, scenes_of
 from aerialdojo_gen.release.validate.registry import CHECKS, Outcome, run_checks
@@ -20,7 +31,7 @@ from aerialdojo_gen.release.validate.report import Report
 from aerialdojo_gen.release.validate.rows import SceneData
 
 # A check looks at what those before it found fault with, so that their order is fixed here.
-_MODULES = (tables, geometry, leaks, links, ends, meshes, anchors, collisions, images)
+_MODULES = (tables, geometry, leaks, links, ends, meshes, anchors, collisions, oracle, images)
 SCENE_CHECKS = tuple(one for module in _MODULES for one in CHECKS if one.run.__module__ == module.__name__)
 
 
