@@ -1,4 +1,4 @@
-"""Files that are whole or not there: written under a temporary name, synced, renamed; errors of the disk in one line.
+"""Files and folders that are whole or not there: made under a temporary name, renamed; errors of the disk in a line.
 
 A temporary name holds the number of the process that writes, so that what a killed run left behind can be told from
 what a living one is about to finish.
@@ -10,6 +10,7 @@ import contextlib
 import errno
 import os
 import re
+import shutil
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -57,6 +58,42 @@ def atomic_file(data: Path, relative: str) -> Iterator[Path]:
             temporary.unlink(missing_ok=True)
 
 
+@contextlib.contextmanager
+def atomic_folder(path: Path) -> Iterator[Path]:
+    """Fill a folder: whole or not at all; one that is there stays until the new one is whole.
+
+    Parameters
+    ----------
+    path : Path
+        The folder.
+
+    Yields
+    ------
+    Path
+        An empty temporary folder beside it; renamed at the end, removed on an error.
+
+    Raises
+    ------
+    StoreError
+        The disk is full, read-only or not ours to write.
+    """
+    temporary, old = (path.with_name(f".{path.name}.{os.getpid()}.{end}") for end in ("tmp", "old"))
+    try:
+        shutil.rmtree(temporary, ignore_errors=True)
+        temporary.mkdir(parents=True)
+        yield temporary
+        if path.exists():
+            path.rename(old)
+        temporary.rename(path)
+    except OSError as error:
+        if old.exists() and not path.exists():
+            old.rename(path)
+        raise disk_error(error, path) from error
+    finally:
+        for gone in (temporary, old):
+            shutil.rmtree(gone, ignore_errors=True)
+
+
 _DISK = {
     errno.ENOSPC: "no space left on the disk",
     errno.EDQUOT: "the disk quota is used up",
@@ -74,14 +111,23 @@ def disk_error(error: OSError, path: Path) -> StoreError:
     return StoreError(f"cannot write {path}: {why}; what was finished is kept, nothing half-written")
 
 
-def sweep(folder: Path) -> None:
-    """Remove temporary files that a killed run left in a folder; those of a living process stay."""
-    if not folder.is_dir():
-        return
-    for path in folder.iterdir():
+def sweep(folder: Path, name: str = "*") -> None:
+    """Remove what killed runs left under temporary names in a folder; what a living process makes stays.
+
+    Parameters
+    ----------
+    folder : Path
+        Where to look, not below it.
+    name : str
+        What was being made, a pattern of `pathlib.Path.glob`.
+    """
+    for path in folder.glob(f".{name}.tmp*"):
         match = _TEMPORARY.match(path.name)
         if match and not process_alive(int(match[1])):
-            path.unlink(missing_ok=True)
+            if path.is_dir():
+                shutil.rmtree(path, ignore_errors=True)
+            else:
+                path.unlink(missing_ok=True)
 
 
 def process_alive(pid: int) -> bool:

@@ -15,7 +15,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from aerialdojo_gen import schemas, store
-from aerialdojo_gen.atomic import atomic_file, sweep
+from aerialdojo_gen.atomic import atomic_file, atomic_folder, sweep
 from aerialdojo_gen.errors import StoreError
 from aerialdojo_gen.tables import content_digest, from_rows
 
@@ -187,6 +187,26 @@ def test_no_room_is_one_line_and_nothing_half_written(tmp_path):
     assert "cannot write" in out
     assert "would exceed the allowed size" in out
     assert not [p for p in tmp_path.rglob("*") if p.is_file()]
+
+
+def test_a_folder_is_replaced_when_the_new_one_is_whole_and_not_before(tmp_path):
+    folder = tmp_path / "f"
+    with atomic_folder(folder) as path:
+        (path / "a").write_text("old")
+
+    def fail():
+        with atomic_folder(folder) as path:
+            (path / "a").write_text("half")
+            _ = 1 / 0
+
+    with pytest.raises(ZeroDivisionError):
+        fail()
+    assert {p.relative_to(tmp_path).as_posix() for p in tmp_path.rglob("*")} == {"f", "f/a"}
+    assert (folder / "a").read_text() == "old"
+    with atomic_folder(folder) as path:
+        (path / "b").write_text("new")
+        assert (folder / "a").read_text() == "old"
+    assert {p.relative_to(tmp_path).as_posix() for p in tmp_path.rglob("*")} == {"f", "f/b"}
 
 
 def test_sweep_removes_what_a_killed_run_left_and_nothing_else(tmp_path):

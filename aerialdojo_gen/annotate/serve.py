@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ipaddress
-import os
 import secrets
 import socket
 from collections.abc import Callable
@@ -12,7 +11,7 @@ from pathlib import Path
 from aerialdojo_gen.annotate.access import TokenGate
 from aerialdojo_gen.annotate.coco import coco_zip
 from aerialdojo_gen.annotate.desk import Desk
-from aerialdojo_gen.atomic import disk_error
+from aerialdojo_gen.atomic import atomic_file
 from aerialdojo_gen.errors import UsageError
 from aerialdojo_gen.web.serving import open_socket, serve, url_of
 
@@ -72,14 +71,7 @@ def write_coco(desk: Desk, path: Path) -> Path:
         The file cannot be written.
     """
     content = coco_zip(desk)
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
+    desk.anchors.close()
+    with atomic_file(path.parent, path.name) as temporary:
         temporary.write_bytes(content)
-        temporary.replace(path)
-    except OSError as error:
-        temporary.unlink(missing_ok=True)
-        raise disk_error(error, path) from error
-    finally:
-        desk.anchors.close()
     return path

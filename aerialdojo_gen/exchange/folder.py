@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import contextlib
+import glob
 import json
-import os
 import re
-import shutil
 from collections.abc import Iterator, Mapping
 from pathlib import Path, PurePosixPath
 from typing import Any
 
-from aerialdojo_gen.atomic import disk_error
+from aerialdojo_gen.atomic import atomic_folder, sweep
 from aerialdojo_gen.errors import UsageError
 
 _PICTURES = (b"\x89PNG\r\n\x1a\n", b"\xff\xd8\xff")
@@ -49,31 +48,9 @@ def whole_folder(target: Path, marker: str, *, force: bool) -> Iterator[Path]:
         raise UsageError(f"{target} is there already and holds no {marker}: name another folder")
     if taken and not force:
         raise UsageError(f"{target} is there already: --force replaces it")
-    temporary = target.with_name(f".{target.name}.{os.getpid()}.tmp")
-    old = target.with_name(f".{target.name}.{os.getpid()}.old")
-    try:
-        target.parent.mkdir(parents=True, exist_ok=True)
-        _sweep(target)
-        temporary.mkdir()
+    sweep(target.parent, f"{glob.escape(target.name)}.*")
+    with atomic_folder(target) as temporary:
         yield temporary
-        if target.exists():
-            target.rename(old)
-        temporary.rename(target)
-    except OSError as error:
-        if old.exists() and not target.exists():
-            old.rename(target)
-        raise disk_error(error, target) from error
-    finally:
-        for gone in (temporary, old):
-            shutil.rmtree(gone, ignore_errors=True)
-
-
-def _sweep(target: Path) -> None:
-    """Remove what killed runs left under temporary names."""
-    for path in target.parent.glob(f".{target.name}.*"):
-        match = re.fullmatch(re.escape(f".{target.name}.") + r"(\d+)\.tmp", path.name)
-        if match and not Path(f"/proc/{match[1]}").exists():
-            shutil.rmtree(path, ignore_errors=True)
 
 
 def write_json(path: Path, document: Mapping[str, Any]) -> None:

@@ -7,21 +7,16 @@ was killed, that its budget was spent, or that more trajectories are asked for t
 
 from __future__ import annotations
 
-import contextlib
 import hashlib
 import json
-import os
-import re
 import shutil
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from aerialdojo_gen.atomic import disk_error, process_alive
 from aerialdojo_gen.config import RenderConfig
 
 _NOTE = "recording.json"
-_TEMPORARY = re.compile(r"^\..+\.(\d+)\.tmp$")
 # What does not change a trajectory's own files: which others are recorded, and how they are shared out.
 _SELECTION = {"limit", "split", "trajectories_per_part"}
 
@@ -77,54 +72,10 @@ def find(data: Path, folder: str, fingerprint: str) -> list[dict[str, Any]] | No
     return rows if whole else None
 
 
-@contextlib.contextmanager
-def writing(data: Path, folder: str) -> Iterator[Path]:
-    """Make a trajectory's folder under another name, and give it its own when the block ends without an error.
-
-    Parameters
-    ----------
-    data : Path
-        The data directory.
-    folder : str
-        Relative to it; an older one of that name is replaced.
-
-    Yields
-    ------
-    Path
-        The folder to write to.
-
-    Raises
-    ------
-    StoreError
-        The disk is full, read-only or not ours to write; nothing is left behind.
-    """
-    path = data / folder
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
-    try:
-        shutil.rmtree(temporary, ignore_errors=True)
-        temporary.mkdir(parents=True)
-        yield temporary
-        if path.exists():
-            shutil.rmtree(path)
-        temporary.replace(path)
-    except OSError as error:
-        raise disk_error(error, path) from error
-    finally:
-        shutil.rmtree(temporary, ignore_errors=True)
-
-
 def note(folder: Path, fingerprint: str, rows: list[dict[str, Any]]) -> None:
-    """Write down, in the folder of `writing`, what stands in it."""
+    """Write down, in a trajectory's folder, what stands in it."""
     text = json.dumps({"fingerprint": fingerprint, "recordings": rows}, indent=1)
     (folder / _NOTE).write_text(text, encoding="utf-8")
-
-
-def sweep(folder: Path) -> None:
-    """Remove what killed processes left half-written in a scene's folder; a living process's stays."""
-    for path in folder.glob(".*.tmp"):
-        match = _TEMPORARY.match(path.name)
-        if match and not process_alive(int(match[1])):
-            shutil.rmtree(path, ignore_errors=True)
 
 
 def remove(*paths: Path) -> None:
