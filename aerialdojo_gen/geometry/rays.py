@@ -7,6 +7,7 @@ from embreex.mesh_construction import TriangleMesh
 from embreex.rtcore_scene import EmbreeScene
 from numpy.typing import ArrayLike, NDArray
 
+from aerialdojo_gen.geometry.soup import soup
 from aerialdojo_gen.scenes.model import Instance, Scene
 
 Floats = NDArray[np.float64]
@@ -123,13 +124,8 @@ class RayCaster:
 
     def __init__(self, scene: Scene) -> None:
         self.nodes = tuple(i.node for i in scene.instances)
-        counts = [len(i.vertices) for i in scene.instances]
-        offsets = np.cumsum([0, *counts[:-1]])
         self._owner = np.repeat(np.arange(len(self.nodes), dtype=np.int32), [len(i.faces) for i in scene.instances])
-        self._triangles = TriangleRayCaster(
-            np.concatenate([i.vertices for i in scene.instances]),
-            np.concatenate([i.faces + np.int32(k) for i, k in zip(scene.instances, offsets, strict=True)]),
-        )
+        self._triangles = TriangleRayCaster(*soup(scene.instances))
 
     def first_hit(self, origins: ArrayLike, directions: ArrayLike) -> tuple[Floats, Ints]:
         """Find what every ray hits first.

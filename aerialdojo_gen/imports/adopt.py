@@ -14,6 +14,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from aerialdojo_gen.errors import AssetError
+from aerialdojo_gen.geometry.soup import soup
 from aerialdojo_gen.imports.raw import RawNode
 from aerialdojo_gen.scenes.catalogue import single
 from aerialdojo_gen.scenes.mesh import areas
@@ -193,13 +194,8 @@ def _gathered(pieces: list[RawNode]) -> list[RawNode]:
 
 
 def _joined(name: str, bodies: Sequence[RawNode]) -> RawNode:
-    offsets = np.cumsum([0, *(len(b.vertices) for b in bodies[:-1])])
-    return RawNode(
-        name,
-        np.concatenate([b.vertices for b in bodies]),
-        np.concatenate([b.faces + o for b, o in zip(bodies, offsets, strict=True)]),
-        np.concatenate([b.colours for b in bodies]),
-    )
+    vertices, faces = soup(bodies)
+    return RawNode(name, vertices, faces.astype(np.int64), np.concatenate([b.colours for b in bodies]))
 
 
 def _middle(body: RawNode) -> Floats:

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from aerialdojo_gen.geometry.cameras import Camera
 from aerialdojo_gen.geometry.rays import TriangleRayCaster
+from aerialdojo_gen.geometry.soup import soup
 from aerialdojo_gen.rendering.codecs import MAX_DEPTH_M
 from aerialdojo_gen.rendering.world import NEAR_M, Picture
 from aerialdojo_gen.scenes.model import Scene
@@ -138,9 +139,7 @@ class Solid:
     """
 
     def __init__(self, scene: Scene) -> None:
-        offsets = np.cumsum([0, *(len(i.vertices) for i in scene.instances[:-1])])
-        vertices = np.concatenate([i.vertices for i in scene.instances])
-        faces = np.concatenate([i.faces + np.int32(o) for i, o in zip(scene.instances, offsets, strict=True)])
+        vertices, faces = soup(scene.instances)
         corners = vertices[faces]
         self._normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         self._caster = TriangleRayCaster(vertices, faces)

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from aerialdojo_gen.geometry.rays import TriangleRayCaster
-from aerialdojo_gen.scenes.model import Instance, Material, Scene
+from aerialdojo_gen.geometry.soup import soup
+from aerialdojo_gen.scenes.model import Material, Scene
 
 Floats = NDArray[np.float64]
 
@@ -67,17 +68,15 @@ class OrthographicPictures:
         parts = [part for instance in scene.instances for part in instance.parts]
         names = sorted({part.material for part in parts})
         index = {name: k for k, name in enumerate(names)}
-        offsets = np.cumsum([0, *(len(part.vertices) for part in parts[:-1])])
-        self._vertices = np.concatenate([part.vertices for part in parts])
+        self._vertices, self._faces = soup(parts)
         self._uv = np.concatenate([part.uv for part in parts]).astype(np.float64)
-        self._faces = np.concatenate([part.faces + np.int32(o) for part, o in zip(parts, offsets, strict=True)])
         self._material = np.repeat([index[part.material] for part in parts], [len(part.faces) for part in parts])
         self._materials = [scene.materials[name] for name in names]
         self._rays = TriangleRayCaster(self._vertices, self._faces)
         self._sun = np.array(scene.sun, dtype=np.float64) / np.linalg.norm(scene.sun)
         sky = np.array(scene.sky, dtype=np.float64)
         ground = [instance for instance in scene.instances if instance.category == "ground"]
-        self._ground = TriangleRayCaster(*_joined(ground)) if ground else None
+        self._ground = TriangleRayCaster(*soup(ground)) if ground else None
         self._floor_m, self._ceiling_m = float(self._vertices[:, 2].min()), float(self._vertices[:, 2].max())
         self._sky = sky + (np.array([236.0, 238.0, 240.0]) - sky) * 0.6
 
@@ -174,13 +173,6 @@ class OrthographicPictures:
         v, w = (d11 * d20 - d01 * d21) / area, (d00 * d21 - d01 * d20) / area
         uv = self._uv[index]
         return np.asarray((1.0 - v - w)[:, None] * uv[:, 0] + v[:, None] * uv[:, 1] + w[:, None] * uv[:, 2])
-
-
-def _joined(instances: list[Instance]) -> tuple[Floats, NDArray[np.int32]]:
-    """Vertices and faces of several instances together."""
-    offsets = np.cumsum([0, *(len(i.vertices) for i in instances[:-1])])
-    faces = [i.faces + np.int32(o) for i, o in zip(instances, offsets, strict=True)]
-    return np.concatenate([i.vertices for i in instances]), np.concatenate(faces)
 
 
 def _reduced(material: Material, pixel_m: float) -> NDArray[np.uint8] | None:

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from aerialdojo_gen.geometry.soup import soup
 from aerialdojo_gen.scenes.model import Part, Scene
 
 # Edges longer than this are halved, metres.
@@ -67,13 +68,9 @@ def surfaces(scene: Scene) -> list[Surface]:
 
 
 def _merge(material: str, parts: list[Part]) -> Surface:
-    offsets = np.cumsum([0, *(len(p.vertices) for p in parts[:-1])])
-    return Surface(
-        material,
-        np.concatenate([p.vertices for p in parts]),
-        np.concatenate([p.uv for p in parts]).astype(np.float64),
-        np.concatenate([p.faces.astype(np.int64) + o for p, o in zip(parts, offsets, strict=True)]),
-    )
+    vertices, faces = soup(parts)
+    uv = np.concatenate([p.uv for p in parts]).astype(np.float64)
+    return Surface(material, vertices, uv, faces.astype(np.int64))
 
 
 def _visible(surface: Surface, room: NDArray[np.float64]) -> Surface:

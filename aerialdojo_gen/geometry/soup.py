@@ -1,0 +1,41 @@
+"""Triangles of several bodies as one soup."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+class Body(Protocol):
+    """What has triangles: an instance, a part of one."""
+
+    @property
+    def vertices(self) -> NDArray[np.float64]:
+        """(n, 3) float64, metres."""
+
+    @property
+    def faces(self) -> NDArray[Any]:
+        """(m, 3) integers, indices into `vertices`."""
+
+
+def soup(bodies: Sequence[Body]) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
+    """Put the triangles of bodies together, one body after the other, none welded.
+
+    Parameters
+    ----------
+    bodies : sequence of Body
+        One at least.
+
+    Returns
+    -------
+    vertices : (n, 3) float64
+        Metres, in the bodies' frame.
+    faces : (m, 3) int32
+        Indices into `vertices`.
+    """
+    offsets = np.cumsum([0, *(len(body.vertices) for body in bodies[:-1])])
+    faces = [body.faces.astype(np.int32) + np.int32(k) for body, k in zip(bodies, offsets, strict=True)]
+    return np.concatenate([body.vertices for body in bodies]), np.concatenate(faces)
