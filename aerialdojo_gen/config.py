@@ -39,6 +39,41 @@ class AnnotateImportConfig(Section):
     paper_counts: bool = Field(False, description="require the paper's numbers of landmarks and objects")
 
 
+class ScorerWeights(Section):
+    """How much each scorer of candidate anchors counts; one that counts nothing is not asked."""
+
+    geometric: float = Field(1.0, ge=0, description="instance mask, contrast and place in the picture")
+    clip: float = Field(0.0, ge=0, description="likeness of picture and name, by a CLIP model in ONNX files")
+    vlm: float = Field(0.0, ge=0, description="order that a multimodal model gives")
+
+    @model_validator(mode="after")
+    def _somebody_scores(self) -> ScorerWeights:
+        if not self.geometric + self.clip + self.vlm:
+            raise ValueError("one weight at least must be more than 0")
+        return self
+
+
+class ClipConfig(Section):
+    """Files of the clip scorer; relative ones lie beside the pipeline's file."""
+
+    vision: Path = Field(description="image encoder, ONNX")
+    text: Path = Field(description="text encoder, ONNX")
+    tokenizer: Path = Field(description="tokenizer.json")
+    sha256: str = Field("", description="of the three files; filled in by the command")
+
+
+class VlmConfig(Section):
+    """The vlm scorer: any endpoint that speaks OpenAI's chat protocol; its key is OPENAI_API_KEY's."""
+
+    model: str = Field(min_length=1, description="the model's name")
+    base_url: str | None = Field(None, description="where the endpoint is; OPENAI_BASE_URL, else OpenAI's own")
+    temperature: float | None = Field(0.0, ge=0, le=2, description="of its answers")
+    picture_px: int = Field(336, ge=32, le=2048, description="longest side of a picture that it is shown")
+    max_tokens: int = Field(1000, ge=16, description="longest answer")
+    timeout_s: float = Field(60.0, gt=0, description="longest wait for an answer")
+    retries: int = Field(4, ge=0, le=20, description="how often a failed request is sent again")
+
+
 class AnchorSampleConfig(Section):
     """Candidate viewpoints around each object (paper: anchors)."""
 
@@ -54,8 +89,13 @@ class AnchorSampleConfig(Section):
     surface_points: int = Field(256, ge=8, description="points of the object's surface that rays are cast to")
     fov_deg: float = Field(90.0, gt=0, lt=180, description="field of view of the front camera")
     min_visible_fraction: float = Field(0.3, ge=0, le=1, description="visible fraction below which nothing is seen")
+    pictured: int = Field(6, ge=1, description="candidates an object that are pictured and scored")
+    picture_px: int = Field(96, ge=16, le=1024, description="edge of those pictures")
     shortlist: int = Field(3, ge=1, description="anchors kept an object")
     separation_deg: float = Field(45.0, gt=0, le=180, description="wanted azimuth between kept anchors")
+    weights: ScorerWeights = ScorerWeights()
+    clip: ClipConfig | None = None
+    vlm: VlmConfig | None = None
 
 
 class ReferenceImagesConfig(Section):
@@ -64,6 +104,9 @@ class ReferenceImagesConfig(Section):
     width: int = Field(320, ge=16, le=4096, description="columns, pixels")
     height: int = Field(320, ge=16, le=4096, description="rows, pixels")
     fov_deg: float = Field(90.0, gt=0, lt=180, description="horizontal field of view, as the drone's camera")
+    renderer: Literal["auto", "gl", "pybullet"] = Field(
+        "auto", description="what draws; auto is the fastest that works, pybullet gives the same bytes anywhere"
+    )
 
 
 class PairObjectsConfig(Section):
@@ -235,6 +278,10 @@ def load_pipeline(path: Path) -> Pipeline:
     for key in ("scene_assets", "recipes", "annotations"):
         if isinstance(raw.get(key), str):
             raw[key] = (path.parent / raw[key]).resolve()
+    clip = raw.get("anchor-sample", {}).get("clip", {}) if isinstance(raw.get("anchor-sample"), dict) else {}
+    for key, value in clip.items() if isinstance(clip, dict) else ():
+        if key != "sha256" and isinstance(value, str):
+            clip[key] = (path.parent / value).resolve()
     try:
         return Pipeline.model_validate(raw)
     except ValidationError as error:

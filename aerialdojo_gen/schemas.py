@@ -164,8 +164,7 @@ CHOSEN_ANCHORS = _table(
     _field("yaw_rad", pa.float64(), "yaw", "rad"),
 )  # fmt: skip
 
-ANCHORS = _table(
-    "anchors", ["scene", "object_id", "anchor_id"],
+_ANCHOR_FIELDS = (
     _SCENE,
     _field("object_id", pa.int32(), "object that the anchor looks at"),
     _field("anchor_id", pa.int32(), "rank among the object's anchors, 0 is the best or the one that a person chose"),
@@ -174,9 +173,29 @@ ANCHORS = _table(
     _field("clearance_m", pa.float64(), "distance to the nearest surface of the scene", "m"),
     _field("surface_distance_m", pa.float64(), "distance to the object's own surface", "m"),
     _field("visible_fraction", pa.float64(), "share of the object's sample points that the anchor sees"),
-    _field("score", pa.float64(), "what the anchors are ranked by, higher is better"),
+    _field("score", pa.float64(), "what the anchors are ranked by, the scorers' weighted mean, higher is better"),
+    *[
+        _field(f"score_{name}", pa.float64(), f"the scorer {name}'s, 0 to 1; null where not asked", "", True)
+        for name in ("geometric", "clip", "vlm")
+    ],
+    _field("part_unoccluded", pa.float64(), "of the pixels that would show the object alone, the share that do"),
+    _field("part_shown", pa.float64(), "share of the object that the picture tells"),
+    _field("part_size", pa.float64(), "edge of the object's box in the picture, 1 from half of the picture's edge"),
+    _field("part_centred", pa.float64(), "how near the object is to the picture's centre, 0 to 1"),
+    _field("part_contrast", pa.float64(), "colour difference to what surrounds it in the picture, 0 to 1"),
+    _field("part_sky", pa.float64(), "share of sky in what surrounds it in the picture"),
+    _field("part_level", pa.float64(), "1 up to 15 degrees above or below the centroid, 0 from 45"),
+    _field("part_clear", pa.float64(), "room around the body, 1 at the standoff"),
     _field("selected", pa.bool_(), "true for one anchor an object: the goal of its tasks"),
     _field("selected_by", pa.string(), "human or auto"),
+)  # fmt: skip
+
+RELEASE_ANCHORS = _table("anchors", ["scene", "object_id", "anchor_id"], *_ANCHOR_FIELDS)
+ANCHORS = _table(
+    "anchors", ["scene", "object_id", "anchor_id"],
+    *_ANCHOR_FIELDS,
+    _field("thumbnail", pa.binary(), "the front view, JPEG"),
+    plain=["thumbnail"],
 )  # fmt: skip
 
 PAIRS = _table(

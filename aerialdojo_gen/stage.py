@@ -247,6 +247,14 @@ def _settle_renderer(config: Any, say: Callable[[str], None]) -> Any:
     return config.model_copy(update={"renderer": choice.name})
 
 
+def _settle_scorers(config: Any, _say: Callable[[str], None]) -> Any:
+    if config.clip is None or not config.weights.clip:
+        return config
+    from aerialdojo_gen.scoring.clip import digest
+
+    return config.model_copy(update={"clip": config.clip.model_copy(update={"sha256": digest(config.clip)})})
+
+
 _UPSTREAM_OF_SPLIT = ("scenes", "landmarks", "objects", "anchors", "references", "pairs", "plans", "verdicts")
 
 STAGES: tuple[Stage, ...] = (
@@ -258,12 +266,12 @@ STAGES: tuple[Stage, ...] = (
         ("scenes",), ("landmarks", "objects", "chosen_anchors"), sources=_annotation_sources,
     ),
     Stage(
-        "anchor-sample", 1, "Find viewpoints 1 m from each object that see it.",
-        ("scenes", "objects", "chosen_anchors"), ("anchors",),
+        "anchor-sample", 2, "Find viewpoints 1 m from each object that see it.",
+        ("scenes", "objects", "chosen_anchors"), ("anchors",), settle=_settle_scorers,
     ),
     Stage(
-        "reference-images", 2, "Render each object's picture from its selected anchor.",
-        ("scenes", "objects", "anchors"), ("references",),
+        "reference-images", 3, "Render each object's picture from its selected anchor.",
+        ("scenes", "objects", "anchors"), ("references",), settle=_settle_renderer,
     ),
     Stage(
         "pair-objects", 1, "Pair start anchors with targets: the candidate tasks.",
@@ -278,7 +286,7 @@ STAGES: tuple[Stage, ...] = (
         ("pairs", "plans"), ("verdicts",),
     ),
     Stage(
-        "split", 2, "Write the release: tasks, routes, objects, train and test.",
+        "split", 3, "Write the release: tasks, routes, objects, train and test.",
         _UPSTREAM_OF_SPLIT,
         ("tasks/train", "tasks/test", "routes/train", "routes/test",
          "release/scenes", "release/landmarks", "release/objects", "release/anchors"),

@@ -6,6 +6,13 @@ import numpy as np
 import trimesh
 
 from aerialdojo_gen.scenes.model import Instance, Material, Part, Scene
+from aerialdojo_gen.scoring.geometric import WEIGHTS
+
+# Columns of anchors that do not matter to what reads them.
+OPINIONS = {
+    "score_geometric": 0.5, "score_clip": None, "score_vlm": None, **{f"part_{name}": 0.5 for name in WEIGHTS},
+    "thumbnail": b"",
+}  # fmt: skip
 
 
 def instance(node: str, *meshes: trimesh.Trimesh, category: str = "thing") -> Instance:

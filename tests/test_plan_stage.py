@@ -5,6 +5,7 @@ import numpy as np
 import pyarrow.compute as pc
 import pytest
 from flying import along, distances, solid, town
+from handmade import OPINIONS
 
 from aerialdojo_gen import schemas, store
 from aerialdojo_gen.config import Embodiment, PairObjectsConfig, PlanConfig
@@ -59,7 +60,8 @@ def data(tmp_path_factory) -> Path:
             anchors.append(
                 {"scene": SCENE, "object_id": k, "anchor_id": a, "x_m": p[0], "y_m": p[1], "z_m": p[2],
                  "yaw_rad": rng.uniform(-math.pi, math.pi), "clearance_m": 1.0, "surface_distance_m": 1.0,
-                 "visible_fraction": 1.0, "score": 1.0 - a / 10, "selected": a == 1, "selected_by": "human"}
+                 "visible_fraction": 1.0, "score": 1.0 - a / 10, "selected": a == 1, "selected_by": "human",
+                 **OPINIONS}
             )  # fmt: skip
     write(root, "anchors", schemas.ANCHORS, anchors)
     pairs = pair_objects.run(job(root, "pair-objects"), PairObjectsConfig()).tables["pairs"]

@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pandas as pd
 import pytest
+from handmade import OPINIONS
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -43,7 +44,7 @@ def rows_of_anchors():
             yield {
                 "scene": SCENE, "object_id": i, "anchor_id": a, "x_m": x, "y_m": y, "z_m": z, "yaw_rad": 0.1 * a,
                 "clearance_m": 1.0, "surface_distance_m": 1.0, "visible_fraction": 0.5, "score": 1.0 - 0.1 * a,
-                "selected": a == 1, "selected_by": "auto",
+                "selected": a == 1, "selected_by": "auto", **OPINIONS,
             }  # fmt: skip
 
 

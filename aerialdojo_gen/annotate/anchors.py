@@ -69,7 +69,7 @@ class AnchorDesk:
         self._lock = threading.Lock()
 
     def _build(self) -> Any:
-        from aerialdojo_gen.stages.anchor_sample import World
+        from aerialdojo_gen.stages.anchor_world import World
 
         return World.of(self.scene, self._job.embodiment.radius_m, self.config.margin_m)
 

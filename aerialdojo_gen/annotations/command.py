@@ -16,7 +16,8 @@ from aerialdojo_gen.scenes.build import build_scene
 from aerialdojo_gen.scenes.catalogue import load_catalogue
 from aerialdojo_gen.scenes.model import Scene
 from aerialdojo_gen.stage import Job, Roots
-from aerialdojo_gen.stages.anchor_sample import World, anchors_of
+from aerialdojo_gen.stages.anchor_sample import anchors_of
+from aerialdojo_gen.stages.anchor_world import World
 
 
 def draft_scene(

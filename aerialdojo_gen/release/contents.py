@@ -43,7 +43,7 @@ TABLES = {
     ),
     "objects": Table(schemas.RELEASE_OBJECTS, "One row a target object, with the picture that image goals show."),
     "landmarks": Table(schemas.LANDMARKS, "One row a landmark."),
-    "anchors": Table(schemas.ANCHORS, "One row a viewpoint; three an object, one of them selected as the goal."),
+    "anchors": Table(schemas.RELEASE_ANCHORS, "One row a viewpoint; three an object, one selected as the goal."),
     "scenes": Table(schemas.SCENES, "One row a scene."),
 }
 

@@ -17,7 +17,7 @@ from aerialdojo_gen.errors import RenderError
 from aerialdojo_gen.geometry.cameras import Camera
 from aerialdojo_gen.rendering import gl_shaders as glsl
 from aerialdojo_gen.rendering.gl_geometry import VERTEX, chunks
-from aerialdojo_gen.rendering.lighting import lighting, sun_view
+from aerialdojo_gen.rendering.lighting import light_of, sun_view
 from aerialdojo_gen.rendering.world import FAR_M, NEAR_M, Picture
 from aerialdojo_gen.scenes.model import Scene
 
@@ -95,7 +95,7 @@ class GlRenderer:
         most = max(len(kind.vertices) for _, kind, _ in self._sets)
         self._indices = self._own(self._gl.buffer(reserve=4 * most, dynamic=True))
         self._textures = None if layers is None else self._texture_array(layers)
-        self._light = lighting(scene, [])
+        self._light = light_of(scene)
         camera, pose, near_m, far_m = sun_view(scene, _SHADOW_PX)
         self._sun_from_world = clip_from_world(camera, pose, near_m, far_m)
         self._bias_m = 0.03 + 1.5 * (near_m + far_m) / 2.0 / camera.focal_px

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -10,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerialdojo_gen.geometry.cameras import Camera, look_at_pose
-from aerialdojo_gen.rendering.surfaces import Surface
 from aerialdojo_gen.scenes.model import Scene
 
 Floats = NDArray[np.float64]
@@ -42,25 +42,25 @@ class Lighting:
     horizon: Floats
 
 
-def lighting(scene: Scene, surfaces: list[Surface]) -> Lighting:
+def light_of(scene: Scene, materials: Sequence[str] = ()) -> Lighting:
     """Collect what shading must know.
 
     Parameters
     ----------
     scene : Scene
-    surfaces : list of Surface
-        As `aerialdojo_gen.rendering.surfaces.surfaces` gives them.
+    materials : sequence of str
+        Material of every surface, by name.
 
     Returns
     -------
     Lighting
     """
-    materials = [scene.materials[s.material] for s in surfaces]
+    found = [scene.materials[name] for name in materials]
     sky = np.array(scene.sky, dtype=np.float64)
     sun = np.array(scene.sun, dtype=np.float64)
     return Lighting(
-        colour=np.array([m.colour for m in materials], dtype=np.float64).reshape(-1, 3),
-        texel_m=np.array([0.0 if m.texture is None else m.tile_m / m.texture.shape[1] for m in materials]),
+        colour=np.array([m.colour for m in found], dtype=np.float64).reshape(-1, 3),
+        texel_m=np.array([0.0 if m.texture is None else m.tile_m / m.texture.shape[1] for m in found]),
         sun=sun / np.linalg.norm(sun),
         zenith=sky * np.array([0.72, 0.84, 0.97]),
         horizon=sky + (np.array([236.0, 238.0, 240.0]) - sky) * 0.6,

@@ -17,7 +17,7 @@ from aerialdojo_gen.errors import RenderError
 from aerialdojo_gen.geometry.cameras import Camera
 from aerialdojo_gen.geometry.rays import RayCaster
 from aerialdojo_gen.rendering.bullet import pybullet
-from aerialdojo_gen.rendering.lighting import Lighting, ShadowMap, lighting, sun_view
+from aerialdojo_gen.rendering.lighting import Lighting, ShadowMap, light_of, sun_view
 from aerialdojo_gen.rendering.shading import shade
 from aerialdojo_gen.rendering.surfaces import Surface, surfaces
 from aerialdojo_gen.scenes.model import Material, Scene
@@ -67,7 +67,7 @@ class RenderWorld:
     def __init__(self, scene: Scene) -> None:
         found = surfaces(scene)
         self._vertices = np.concatenate([s.vertices for s in found])
-        self._light: Lighting = lighting(scene, found)
+        self._light: Lighting = light_of(scene, [s.material for s in found])
         self._client = pybullet.connect(pybullet.DIRECT)
         if self._client < 0:
             raise RenderError("PyBullet's DIRECT client did not start: too many renderers are open in this process")

@@ -4,21 +4,19 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from aerialdojo_gen.config import AnchorSampleConfig
 from aerialdojo_gen.errors import AnnotationError
-from aerialdojo_gen.geometry.rays import instance_caster
 from aerialdojo_gen.geometry.surface import Surface
-from aerialdojo_gen.geometry.viewpoints import informativeness, look
 from aerialdojo_gen.rng import generator
+from aerialdojo_gen.scoring.geometric import judge
+from aerialdojo_gen.scoring.panel import SCORERS
 from aerialdojo_gen.stage import Job
-
-if TYPE_CHECKING:
-    from aerialdojo_gen.stages.anchor_sample import World
+from aerialdojo_gen.stages.anchor_world import Candidates, World
 
 Floats = NDArray[np.float64]
 
@@ -91,23 +89,22 @@ def judge_anchor(
         faults.append(f"it is too {side}: {distance:.2f} m from the object's surface, not about "
                       f"{config.standoff_m:g} m")  # fmt: skip
     points = surface.sample(config.surface_points, generator(job.seed, "anchor-sample", job.scene, item["object_id"]))
-    views = look(place, np.array([yaw_rad]), points, instance_caster(instance), world.rays, k, config.fov_deg)
-    seen = float(views.visible_fraction[0])
+    looked = Candidates.of(world, k, points, place, np.array([yaw_rad]), radius, config)
+    seen = float(looked.views.visible_fraction[0])
     if seen <= 0 or seen < config.min_visible_fraction:
         faults.append(f"it does not see the object: {seen:.0%} of what it faces, {config.min_visible_fraction:.0%} "
                       "is the least")  # fmt: skip
-    away = position_m - np.array([item["x_m"], item["y_m"], item["z_m"]])
-    elevation = np.degrees(np.arctan2([away[2]], [np.hypot(away[0], away[1])]))
-    score = informativeness(views, elevation, np.array([clearance]), radius, config.standoff_m)
+    picture = looked.picture(0, config.picture_px, config.fov_deg)
+    parts = judge(picture, radius, config.standoff_m)
     row = {
         "scene": job.scene,
         "object_id": item["object_id"],
-        **dict(zip(("x_m", "y_m", "z_m"), position_m.tolist(), strict=True)),
-        "yaw_rad": float(yaw_rad),
-        "clearance_m": clearance,
-        "surface_distance_m": distance,
-        "visible_fraction": seen,
-        "score": float(score[0]),
+        **looked.row(0, distance),
+        # The other scorers compare candidates, and this one stands alone.
+        "score": parts.score,
+        **{f"score_{name}": parts.score if name == "geometric" else None for name in SCORERS},
+        **parts.columns,
+        "thumbnail": picture.jpeg(),
     }
     return Judged(row, tuple(faults))
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import logging
 import math
 from collections import Counter
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -14,58 +13,22 @@ from numpy.typing import NDArray
 from aerialdojo_gen.config import AnchorSampleConfig
 from aerialdojo_gen.errors import StoreError
 from aerialdojo_gen.geometry.frames import yaw_towards
-from aerialdojo_gen.geometry.rays import RayCaster, instance_caster
 from aerialdojo_gen.geometry.surface import Surface
-from aerialdojo_gen.geometry.viewpoints import around, informativeness, look, shortlist
-from aerialdojo_gen.planning.clearance import ClearanceGrid
-from aerialdojo_gen.planning.collision import CollisionWorld
+from aerialdojo_gen.geometry.viewpoints import around, shortlist
 from aerialdojo_gen.rng import generator
-from aerialdojo_gen.scenes.model import Instance, Scene
+from aerialdojo_gen.scenes.model import Instance
 from aerialdojo_gen.schemas import ANCHORS
+from aerialdojo_gen.scoring.geometric import judge
+from aerialdojo_gen.scoring.panel import panel
 from aerialdojo_gen.stage import Job, Output
 from aerialdojo_gen.stages.anchor_choice import with_choice
+from aerialdojo_gen.stages.anchor_world import Candidates, World
 from aerialdojo_gen.tables import from_rows
 
 Floats = NDArray[np.float64]
 log = logging.getLogger(__name__)
 
 REASONS = ("no_surface", "out_of_bounds", "in_collision", "unreachable", "not_visible", "not_shortlisted")
-
-
-@dataclass(frozen=True)
-class World:
-    """A scene, and what is asked of it for every object.
-
-    Attributes
-    ----------
-    scene : Scene
-        The scene.
-    collisions : CollisionWorld
-        For collision and clearance.
-    free : ClearanceGrid
-        For what is connected with the open sky.
-    rays : RayCaster
-        For what is seen.
-    index : dict of str to int
-        Index of an instance by its node name.
-    """
-
-    scene: Scene
-    collisions: CollisionWorld
-    free: ClearanceGrid
-    rays: RayCaster
-    index: dict[str, int]
-
-    @classmethod
-    def of(cls, scene: Scene, radius_m: float, margin_m: float) -> World:
-        """Build it all for a body of a radius that keeps a margin to surfaces."""
-        return cls(
-            scene,
-            CollisionWorld(scene),
-            ClearanceGrid.build(scene, radius_m=radius_m, margin_m=margin_m),
-            RayCaster(scene),
-            {i.node: k for k, i in enumerate(scene.instances)},
-        )
 
 
 def run(job: Job, config: AnchorSampleConfig) -> Output:
@@ -76,8 +39,10 @@ def run(job: Job, config: AnchorSampleConfig) -> Output:
     near the surface), ``out_of_bounds`` (the body leaves the flight volume), ``in_collision`` (a surface within
     the body's radius plus `margin_m`), ``unreachable`` (no way from the open sky: inside a closed room),
     ``not_visible`` (visible fraction below `min_visible_fraction`), ``not_shortlisted`` (`shortlist` others show the
-    object better, or from a side of their own). The rest are the object's anchors, the best of them is selected, or
-    the one that a person chose, which then comes first.
+    object better, or from a side of their own). Ray casts to points of its surface put the visible ones in order; the
+    best `pictured`, from different sides, are pictured and scored (`aerialdojo_gen.scoring`). The best of those,
+    again from different sides, are the object's anchors, and the best of all is selected, or the one that a person
+    chose, which then comes first.
 
     Parameters
     ----------
@@ -179,34 +144,33 @@ def anchors_of(
     if not len(places):
         return [], rejected
 
-    clearance = np.array([world.collisions.distance_m(p) for p in places])
-    yaw = yaw_towards(places, centroid)
     points = surface.sample(config.surface_points, generator(job.seed, "anchor-sample", job.scene, item["object_id"]))
-    views = look(places, yaw, points, instance_caster(instance), world.rays, k, config.fov_deg)
-    away = places - centroid
-    elevation = np.degrees(np.arctan2(away[:, 2], np.hypot(away[:, 0], away[:, 1])))
-    score = informativeness(views, elevation, clearance, radius, config.standoff_m)
-
-    seen = np.flatnonzero((views.visible_fraction > 0) & (views.visible_fraction >= config.min_visible_fraction))
-    azimuth = np.arctan2(away[seen, 1], away[seen, 0])
-    best = seen[shortlist(score[seen], azimuth, config.shortlist, math.radians(config.separation_deg))]
+    found = Candidates.of(world, k, points, places, yaw_towards(places, centroid), radius, config)
+    fraction = found.views.visible_fraction
+    seen = np.flatnonzero((fraction > 0) & (fraction >= config.min_visible_fraction))
+    azimuth = np.arctan2(places[:, 1] - centroid[1], places[:, 0] - centroid[0])
+    apart = math.radians(config.separation_deg)
+    few = seen[shortlist(found.rank[seen], azimuth[seen], max(config.pictured, config.shortlist), apart)]
+    pictures = [found.picture(int(i), config.picture_px, config.fov_deg) for i in few]
+    verdicts = panel(config, radius).judge(item["name"], pictures)
+    score = np.array([verdict.score for verdict in verdicts])
+    best = shortlist(score, azimuth[few], config.shortlist, apart)
     rejected["not_visible"] += len(places) - len(seen)
     rejected["not_shortlisted"] += len(seen) - len(best)
-    own_distance = surface.distance_m(places[best])
+    own_distance = surface.distance_m(places[few[best]])
     rows = [
         {
             "scene": job.scene,
             "object_id": item["object_id"],
             "anchor_id": rank,
-            **dict(zip(("x_m", "y_m", "z_m"), places[i].tolist(), strict=True)),
-            "yaw_rad": float(yaw[i]),
-            "clearance_m": float(clearance[i]),
-            "surface_distance_m": float(own_distance[rank]),
-            "visible_fraction": float(views.visible_fraction[i]),
-            "score": float(score[i]),
+            **found.row(int(few[n]), float(own_distance[rank])),
+            "score": verdicts[n].score,
+            **verdicts[n].parts,
+            **judge(pictures[n], radius, config.standoff_m).columns,
+            "thumbnail": pictures[n].jpeg(),
             "selected": rank == 0,
             "selected_by": "auto",
         }
-        for rank, i in enumerate(best)
+        for rank, n in enumerate(best)
     ]
     return rows, rejected

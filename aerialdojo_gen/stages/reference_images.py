@@ -15,7 +15,8 @@ from aerialdojo_gen.config import ReferenceImagesConfig
 from aerialdojo_gen.errors import RenderError
 from aerialdojo_gen.geometry.cameras import Camera, project, view_pose
 from aerialdojo_gen.geometry.rays import RayCaster
-from aerialdojo_gen.rendering.world import ray_caster, render_world
+from aerialdojo_gen.rendering.backend import kept_renderer
+from aerialdojo_gen.rendering.world import ray_caster
 from aerialdojo_gen.schemas import REFERENCES
 from aerialdojo_gen.stage import Job, Output
 from aerialdojo_gen.tables import from_rows
@@ -44,7 +45,7 @@ def run(job: Job, config: ReferenceImagesConfig) -> Output:
     objects = job.read("objects").to_pylist()
     anchors = {row["object_id"]: row for row in job.read("anchors").to_pylist() if row["selected"]}
     scene = job.scene_model()
-    world, rays = render_world(scene), ray_caster(scene)
+    renderer, rays = kept_renderer(scene, config.renderer), ray_caster(scene)
     index = {node: k for k, node in enumerate(rays.nodes)}
     camera = Camera(config.width, config.height, config.fov_deg)
     counts = {"no_anchor": 0, "not_in_view": 0}
@@ -64,7 +65,7 @@ def run(job: Job, config: ReferenceImagesConfig) -> Output:
             counts["no_anchor"] += 1
             continue
         pose = view_pose((anchor["x_m"], anchor["y_m"], anchor["z_m"]), anchor["yaw_rad"], "front")
-        row["reference_image"] = png(world.render(camera, pose).rgb)
+        row["reference_image"] = png(renderer.render(camera, pose).rgb)
         k = index[item["mesh_node"]]
         mask = instance_mask(rays, k, scene.instances[k].vertices, camera, pose)
         row["image_fraction"] = float(mask.mean())

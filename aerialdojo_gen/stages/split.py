@@ -13,7 +13,7 @@ from aerialdojo_gen.config import SplitConfig
 from aerialdojo_gen.paper import PaperScene, inventory, splits
 from aerialdojo_gen.release import quota
 from aerialdojo_gen.release.select import nav_id, train_counts, train_mask
-from aerialdojo_gen.schemas import RELEASE_OBJECTS, ROUTES, TASKS
+from aerialdojo_gen.schemas import RELEASE_ANCHORS, RELEASE_OBJECTS, ROUTES, TASKS
 from aerialdojo_gen.stage import Job, Output
 
 _LISTS = ("x_m", "y_m", "z_m", "yaw_rad", "action")
@@ -165,7 +165,7 @@ def run(job: Job, config: SplitConfig) -> Output:
         "release/scenes": scenes,
         "release/landmarks": landmarks,
         "release/objects": pictured,
-        "release/anchors": anchors,
+        "release/anchors": anchors.select(RELEASE_ANCHORS.schema.names),
     }
     counts = {
         "train": int(np.count_nonzero(train)) * 2,

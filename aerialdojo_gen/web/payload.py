@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerialdojo_gen.errors import AssetError
-from aerialdojo_gen.rendering.lighting import lighting
+from aerialdojo_gen.rendering.lighting import light_of
 from aerialdojo_gen.scenes.model import Material, Part, Scene
 
 VERSION = 1
@@ -54,7 +54,7 @@ def scene_payload(scene: Scene) -> bytes:
     AssetError
         A texture cannot be encoded.
     """
-    light = lighting(scene, [])
+    light = light_of(scene)
     body = _Body()
     groups: dict[tuple[int, int], list[tuple[int, Part]]] = {}
     for k, instance in enumerate(scene.instances):

@@ -1,0 +1,1 @@
+"""How well viewpoints show their objects: scorers behind one interface (paper: anchor shortlist)."""

@@ -1,0 +1,84 @@
+"""What a scorer sees of a viewpoint, and what it says of it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from aerialdojo_gen.errors import RenderError
+
+_JPEG_QUALITY = 88
+
+
+@dataclass(frozen=True, eq=False)
+class AnchorView:
+    """The front view of a candidate anchor.
+
+    Attributes
+    ----------
+    rgb : (H, W, 3) uint8
+        sRGB.
+    visible : (H, W) bool
+        Pixels that show the object.
+    alone : (H, W) bool
+        Pixels that would show it if nothing else were there; a superset of `visible`.
+    sky : (H, W) bool
+        Pixels that show no surface at all.
+    shown : float
+        Share of the object that the picture tells, in [0, 1] (`aerialdojo_gen.geometry.viewpoints.Views`).
+    elevation_deg : float
+        Of the viewpoint, seen from the object's centroid.
+    clearance_m : float
+        From the viewpoint to the nearest surface.
+    """
+
+    rgb: NDArray[np.uint8]
+    visible: NDArray[np.bool_]
+    alone: NDArray[np.bool_]
+    sky: NDArray[np.bool_]
+    shown: float
+    elevation_deg: float
+    clearance_m: float
+
+    def jpeg(self) -> bytes:
+        """The picture as a JPEG file."""
+        done, data = cv2.imencode(".jpg", self.rgb[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY])
+        if not done:
+            raise RenderError(f"a picture of shape {self.rgb.shape} does not encode as JPEG")
+        return data.tobytes()
+
+
+class Scorer(Protocol):
+    """Scores the candidates of one object against each other."""
+
+    @property
+    def name(self) -> str:
+        """One of ``geometric``, ``clip``, ``vlm``; its column is ``score_<name>``."""
+        ...
+
+    def score(self, name: str, views: Sequence[AnchorView]) -> Sequence[float | None]:
+        """Score how well views show an object.
+
+        Parameters
+        ----------
+        name : str
+            What a person would call the object.
+        views : sequence of AnchorView
+            Of its candidates, at least one.
+
+        Returns
+        -------
+        sequence of float or None
+            One a view, in [0, 1], higher is better; None where there is no opinion.
+
+        Raises
+        ------
+        AerialDojoError
+            What the scorer needs is not there: a file, a package, a service.
+        """
+        ...

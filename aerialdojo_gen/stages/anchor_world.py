@@ -1,0 +1,143 @@
+"""A scene as anchors are judged in it: what collides, what is reachable, what is seen."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aerialdojo_gen.config import AnchorSampleConfig
+from aerialdojo_gen.geometry.cameras import Camera
+from aerialdojo_gen.geometry.rays import RayCaster, TriangleRayCaster, instance_caster
+from aerialdojo_gen.geometry.viewpoints import Views, informativeness, look
+from aerialdojo_gen.planning.clearance import ClearanceGrid
+from aerialdojo_gen.planning.collision import CollisionWorld
+from aerialdojo_gen.rendering.raycast import ray_renderer
+from aerialdojo_gen.scenes.model import Scene
+from aerialdojo_gen.scoring.base import AnchorView
+from aerialdojo_gen.scoring.views import take_view
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class World:
+    """A scene, and what is asked of it for every object.
+
+    Attributes
+    ----------
+    scene : Scene
+        The scene.
+    collisions : CollisionWorld
+        For collision and clearance.
+    free : ClearanceGrid
+        For what is connected with the open sky.
+    rays : RayCaster
+        For what is seen.
+    index : dict of str to int
+        Index of an instance by its node name.
+    """
+
+    scene: Scene
+    collisions: CollisionWorld
+    free: ClearanceGrid
+    rays: RayCaster
+    index: dict[str, int]
+
+    @classmethod
+    def of(cls, scene: Scene, radius_m: float, margin_m: float) -> World:
+        """Build it all for a body of a radius that keeps a margin to surfaces."""
+        return cls(
+            scene,
+            CollisionWorld(scene),
+            ClearanceGrid.build(scene, radius_m=radius_m, margin_m=margin_m),
+            RayCaster(scene),
+            {i.node: k for k, i in enumerate(scene.instances)},
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Candidates:
+    """Viewpoints of one object, and what ray casts tell of them.
+
+    Attributes
+    ----------
+    world : World
+    instance : int
+        The object's index in the scene.
+    alone : TriangleRayCaster
+        The object by itself.
+    positions_m : (n, 3) float64
+        The body's centres, world frame.
+    yaw_rad, elevation_deg, clearance_m : (n,) float64
+        Yaw; elevation seen from the object's centroid; distance to the nearest surface.
+    views : Views
+        What they see of the object.
+    rank : (n,) float64
+        Score of the ray casts alone, which decides what is pictured at all.
+    """
+
+    world: World
+    instance: int
+    alone: TriangleRayCaster
+    positions_m: Floats
+    yaw_rad: Floats
+    elevation_deg: Floats
+    clearance_m: Floats
+    views: Views
+    rank: Floats
+
+    @classmethod
+    def of(
+        cls, world: World, instance: int, points: Floats, positions_m: Floats, yaw_rad: Floats, radius_m: float,
+        config: AnchorSampleConfig,
+    ) -> Candidates:  # fmt: skip
+        """Look from viewpoints by ray casts.
+
+        Parameters
+        ----------
+        world : World
+        instance : int
+            The object's index in the scene.
+        points : (m, 3) float64
+            On the object's surface, metres, world frame.
+        positions_m : (n, 3) float64
+        yaw_rad : (n,) float64
+        radius_m : float
+            The body's.
+        config : AnchorSampleConfig
+        """
+        thing = world.scene.instances[instance]
+        alone = instance_caster(thing)
+        views = look(positions_m, yaw_rad, points, alone, world.rays, instance, config.fov_deg)
+        away = positions_m - thing.centroid
+        elevation = np.degrees(np.arctan2(away[:, 2], np.hypot(away[:, 0], away[:, 1])))
+        clearance = np.array([world.collisions.distance_m(p) for p in positions_m])
+        rank = informativeness(views, elevation, clearance, radius_m, config.standoff_m)
+        return cls(world, instance, alone, positions_m, yaw_rad, elevation, clearance, views, rank)
+
+    def picture(self, k: int, size_px: int, fov_deg: float) -> AnchorView:
+        """Take the front view from the k-th viewpoint."""
+        return take_view(
+            ray_renderer(self.world.scene),
+            self.alone,
+            self.instance,
+            Camera(size_px, size_px, fov_deg),
+            self.positions_m[k],
+            float(self.yaw_rad[k]),
+            shown=float(self.views.shown[k]),
+            elevation_deg=float(self.elevation_deg[k]),
+            clearance_m=float(self.clearance_m[k]),
+        )
+
+    def row(self, k: int, surface_distance_m: float) -> dict[str, Any]:
+        """What a row of ``anchors`` says of where the k-th viewpoint is and what it sees."""
+        return {
+            **dict(zip(("x_m", "y_m", "z_m"), self.positions_m[k].tolist(), strict=True)),
+            "yaw_rad": float(self.yaw_rad[k]),
+            "clearance_m": float(self.clearance_m[k]),
+            "surface_distance_m": surface_distance_m,
+            "visible_fraction": float(self.views.visible_fraction[k]),
+        }
