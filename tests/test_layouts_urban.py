@@ -1,51 +1,27 @@
 """Parking lots, neighbourhoods, alleys and communities: each stands up to a look from close by."""
 
 from collections import Counter
-from functools import cache
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 import pytest
 import shapely
 import trimesh
+from layout_checks import catalogue, glb_bytes, props_of, scene_of
 
 from aerialdojo_gen.geometry.rays import RayCaster
 from aerialdojo_gen.paper import paper_counts
-from aerialdojo_gen.scenes.build import build_scene
-from aerialdojo_gen.scenes.catalogue import Catalogue, load_catalogue
 from aerialdojo_gen.scenes.footprints import footprint
-from aerialdojo_gen.scenes.glb import write_glb
 from aerialdojo_gen.scenes.grammar_blocks import Frame, HouseStyle, deal, fence, house, next_variant
 from aerialdojo_gen.scenes.grammar_scatter import Pose
-from aerialdojo_gen.scenes.model import Instance, Scene
+from aerialdojo_gen.scenes.model import Scene
 from aerialdojo_gen.scenes.recipe import Recipe
 from aerialdojo_gen.scenes.site import Site
 
-ASSETS = Path(__file__).parents[1] / "scene_assets"
 SCENES = [
     f"U_{kind}_{k}" for kind in ("ParkingLot", "Neighborhood", "Alley", "Community") for k in (0, 1)
 ]  # fmt: skip
 each_scene = pytest.mark.parametrize("name", SCENES)
-
-
-@cache
-def catalogue() -> Catalogue:
-    return load_catalogue(ASSETS)
-
-
-def recipe_of(name: str) -> Path:
-    """A recipe waits among the drafts until its scene is annotated."""
-    return next(p for folder in ("scenes", "drafts") if (p := ASSETS / folder / f"{name}.toml").exists())
-
-
-@cache
-def scene_of(name: str) -> Scene:
-    return build_scene(recipe_of(name), catalogue())
-
-
-def props_of(scene: Scene) -> list[Instance]:
-    return [i for i in scene.instances if i.category in catalogue()]
 
 
 @each_scene
@@ -124,9 +100,8 @@ def test_props_do_not_stand_in_structure(name):
 
 @pytest.mark.parametrize("name", ["U_ParkingLot_1", "U_Alley_1"])
 def test_bytes_are_the_same_every_time(name, tmp_path):
-    for k in range(2):
-        write_glb(build_scene(recipe_of(name), load_catalogue(ASSETS)), tmp_path / f"{k}.glb")
-    assert (tmp_path / "0.glb").read_bytes() == (tmp_path / "1.glb").read_bytes()
+    first, second = glb_bytes(name, tmp_path)
+    assert first == second
 
 
 @pytest.mark.parametrize("kind", ["ParkingLot", "Neighborhood", "Alley", "Community"])
