@@ -8,6 +8,7 @@ TinyRenderer is the faster one.
 from __future__ import annotations
 
 import weakref
+from functools import lru_cache
 from types import TracebackType
 from typing import Self
 
@@ -70,12 +71,11 @@ class RayRenderer:
 
     def render(self, camera: Camera, world_from_camera: Floats, instances: bool = True) -> Picture:
         """Take a picture; the instance id map comes with it unasked."""
-        local = camera.rays()
+        local, length = pixel_rays(camera)
         shape = (camera.height, camera.width)
-        directions = local.reshape(-1, 3) @ world_from_camera[:3, :3].T
+        directions = local @ world_from_camera[:3, :3].T
         distance, face = self._rays.first_hit(world_from_camera[:3, 3], directions)
         hit = face >= 0
-        length = np.linalg.norm(directions, axis=1)
         points = world_from_camera[:3, 3] + directions[hit] * (distance[hit] / length[hit])[:, None]
         albedo = np.zeros((len(face), 3), np.uint8)
         found = face[hit]
@@ -103,6 +103,13 @@ class RayRenderer:
         """Do nothing."""
 
 
+@lru_cache(maxsize=4)
+def pixel_rays(camera: Camera) -> tuple[Floats, Floats]:
+    """Directions through a camera's pixels, (n, 3) float64, z = 1, camera frame, and their lengths, (n,) float64."""
+    rays = camera.rays().reshape(-1, 3)
+    return rays, np.linalg.norm(rays, axis=1)
+
+
 @njit(cache=True, error_model="numpy")
 def _albedo(
     points: Floats, corners: Floats, uv: Floats, material: Ints, tiles: NDArray[np.int64], texels: NDArray[np.uint8]
@@ -123,20 +130,23 @@ def _albedo(
     """
     out = np.empty((len(points), 3), np.uint8)
     for n in range(len(points)):
-        a, b, c = corners[n, 0], corners[n, 1], corners[n, 2]
-        e, f, p = b - a, c - a, points[n] - a
-        ee, ef, ff = (e * e).sum(), (e * f).sum(), (f * f).sum()
-        ep, fp = (e * p).sum(), (f * p).sum()
+        ee = ef = ff = ep = fp = 0.0
+        for axis in range(3):
+            at = corners[n, 0, axis]
+            e, f, p = corners[n, 1, axis] - at, corners[n, 2, axis] - at, points[n, axis] - at
+            ee, ef, ff, ep, fp = ee + e * e, ef + e * f, ff + f * f, ep + e * p, fp + f * p
         area = ee * ff - ef * ef
+        # Where the point is between the corners; a sliver has its first corner's colour.
         s, t = 0.0, 0.0
         if area > 0.0:
             s, t = (ff * ep - ef * fp) / area, (ee * fp - ef * ep) / area
         u = uv[n, 0, 0] + s * (uv[n, 1, 0] - uv[n, 0, 0]) + t * (uv[n, 2, 0] - uv[n, 0, 0])
         v = uv[n, 0, 1] + s * (uv[n, 1, 1] - uv[n, 0, 1]) + t * (uv[n, 2, 1] - uv[n, 0, 1])
-        first, rows, columns = tiles[material[n]]
+        first, rows, columns = tiles[material[n], 0], tiles[material[n], 1], tiles[material[n], 2]
         column = min(int((u - np.floor(u)) * columns), columns - 1)
         row = min(int((1.0 - (v - np.floor(v))) * rows), rows - 1)
-        out[n] = texels[first + row * columns + column]
+        texel = first + row * columns + column
+        out[n, 0], out[n, 1], out[n, 2] = texels[texel, 0], texels[texel, 1], texels[texel, 2]
     return out
 
 

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from aerialdojo_gen.geometry.cameras import Camera, view_pose
 from aerialdojo_gen.geometry.rays import TriangleRayCaster
-from aerialdojo_gen.rendering.raycast import RayRenderer
+from aerialdojo_gen.rendering.raycast import RayRenderer, pixel_rays
 from aerialdojo_gen.scoring.base import AnchorView
 
 Floats = NDArray[np.float64]
@@ -50,9 +50,11 @@ def take_view(
     pose = view_pose(position_m, yaw_rad, "front")
     picture = renderer.render(camera, pose)
     assert picture.instance is not None
-    directions = camera.rays().reshape(-1, 3) @ pose[:3, :3].T
-    silhouette = (alone.first_hit(position_m, directions)[1] >= 0).reshape(picture.instance.shape)
     visible = picture.instance == own_instance
-    return AnchorView(
-        picture.rgb, visible, silhouette | visible, picture.instance < 0, shown, elevation_deg, clearance_m
-    )
+    # Whether the object is behind what is nearer: where it is seen there is nothing to ask.
+    hidden = np.flatnonzero(~visible & (picture.instance >= 0))
+    silhouette = visible.copy()
+    directions = pixel_rays(camera)[0][hidden] @ pose[:3, :3].T
+    if len(hidden):
+        silhouette.flat[hidden] = alone.first_hit(position_m, directions)[1] >= 0
+    return AnchorView(picture.rgb, visible, silhouette, picture.instance < 0, shown, elevation_deg, clearance_m)
