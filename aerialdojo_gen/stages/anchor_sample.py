@@ -119,10 +119,61 @@ def anchors_of(
     rejected : Counter of str
         How many candidates failed which test; with the rows, all of them.
     """
+    found, rejected = candidates_of(item, world, job, config)
+    if found is None:
+        return [], rejected
+    radius = job.embodiment.radius_m
+    fraction = found.views.visible_fraction
+    seen = np.flatnonzero((fraction > 0) & (fraction >= config.min_visible_fraction))
+    away = found.positions_m - world.scene.instances[found.instance].centroid
+    azimuth = np.arctan2(away[:, 1], away[:, 0])
+    apart = math.radians(config.separation_deg)
+    few = seen[shortlist(found.rank[seen], azimuth[seen], max(config.pictured, config.shortlist), apart)]
+    pictures = [found.picture(int(i), config.picture_px, config.fov_deg) for i in few]
+    verdicts = panel(config, radius).judge(item["name"], pictures)
+    score = np.array([verdict.score for verdict in verdicts])
+    best = shortlist(score, azimuth[few], config.shortlist, apart)
+    rejected["not_visible"] += len(fraction) - len(seen)
+    rejected["not_shortlisted"] += len(seen) - len(best)
+    own_distance = Surface.of(world.scene.instances[found.instance]).distance_m(found.positions_m[few[best]])
+    rows = [
+        {
+            "scene": job.scene,
+            "object_id": item["object_id"],
+            "anchor_id": rank,
+            **found.row(int(few[n]), float(own_distance[rank])),
+            "score": verdicts[n].score,
+            **verdicts[n].parts,
+            **judge(pictures[n], radius, config.standoff_m).columns,
+            "thumbnail": pictures[n].jpeg(),
+            "selected": rank == 0,
+            "selected_by": "auto",
+        }
+        for rank, n in enumerate(best)
+    ]
+    return rows, rejected
+
+
+def candidates_of(
+    item: dict[str, Any], world: World, job: Job, config: AnchorSampleConfig
+) -> tuple[Candidates | None, Counter[str]]:
+    """Find where an object can be looked at from: everywhere around it that a drone can be.
+
+    Parameters
+    ----------
+    item, world, job, config
+        As for `anchors_of`.
+
+    Returns
+    -------
+    found : Candidates or None
+        Viewpoints that are free and reachable, whether or not the object can be seen from them; None without any.
+    rejected : Counter of str
+        How many others failed which test.
+    """
     k = world.index[item["mesh_node"]]
     instance: Instance = world.scene.instances[k]
     surface = Surface.of(instance)
-    centroid = np.array([item["x_m"], item["y_m"], item["z_m"]])
     radius = job.embodiment.radius_m
     rejected: Counter[str] = Counter()
 
@@ -142,35 +193,7 @@ def anchors_of(
     places = keep(places, ~touching, "in_collision")
     places = keep(places, np.array([world.free.reachable(p) for p in places], dtype=np.bool_), "unreachable")
     if not len(places):
-        return [], rejected
-
+        return None, rejected
+    centroid = np.array([item["x_m"], item["y_m"], item["z_m"]])
     points = surface.sample(config.surface_points, generator(job.seed, "anchor-sample", job.scene, item["object_id"]))
-    found = Candidates.of(world, k, points, places, yaw_towards(places, centroid), radius, config)
-    fraction = found.views.visible_fraction
-    seen = np.flatnonzero((fraction > 0) & (fraction >= config.min_visible_fraction))
-    azimuth = np.arctan2(places[:, 1] - centroid[1], places[:, 0] - centroid[0])
-    apart = math.radians(config.separation_deg)
-    few = seen[shortlist(found.rank[seen], azimuth[seen], max(config.pictured, config.shortlist), apart)]
-    pictures = [found.picture(int(i), config.picture_px, config.fov_deg) for i in few]
-    verdicts = panel(config, radius).judge(item["name"], pictures)
-    score = np.array([verdict.score for verdict in verdicts])
-    best = shortlist(score, azimuth[few], config.shortlist, apart)
-    rejected["not_visible"] += len(places) - len(seen)
-    rejected["not_shortlisted"] += len(seen) - len(best)
-    own_distance = surface.distance_m(places[few[best]])
-    rows = [
-        {
-            "scene": job.scene,
-            "object_id": item["object_id"],
-            "anchor_id": rank,
-            **found.row(int(few[n]), float(own_distance[rank])),
-            "score": verdicts[n].score,
-            **verdicts[n].parts,
-            **judge(pictures[n], radius, config.standoff_m).columns,
-            "thumbnail": pictures[n].jpeg(),
-            "selected": rank == 0,
-            "selected_by": "auto",
-        }
-        for rank, n in enumerate(best)
-    ]
-    return rows, rejected
+    return Candidates.of(world, k, points, places, yaw_towards(places, centroid), radius, config), rejected
