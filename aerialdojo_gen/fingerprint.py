@@ -73,6 +73,7 @@ def scene_fingerprint(stage: Stage, pipeline: Pipeline, roots: Roots, scene: str
     return hashlib.sha256(json.dumps(facts, sort_keys=True).encode()).hexdigest()
 
 
+@lru_cache(maxsize=4096)
 def _short(path: Path, roots: Roots, package: Path) -> str:
     for root in (roots.recipes, roots.scene_assets, roots.annotations, package):
         if path.is_relative_to(root):

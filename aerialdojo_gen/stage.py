@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 from aerialdojo_gen import store
 from aerialdojo_gen.atomic import atomic_file
 from aerialdojo_gen.config import Embodiment
+from aerialdojo_gen.scenes.catalogue_files import catalogue_files
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -201,19 +202,13 @@ def _scene_sources(roots: Roots, scene: str) -> list[Path]:
         roots.recipes / f"{scene}.toml",
         *([mesh] if mesh.is_file() else []),
         roots.scene_assets / "materials.toml",
-        *_catalogue_files(roots),
+        *catalogue_files(roots.scene_assets),
         *sorted(package.rglob("*.py")),
     ]
 
 
 def _annotation_sources(roots: Roots, scene: str) -> list[Path]:
-    return [roots.annotations / f"{scene}.json", *_catalogue_files(roots)]
-
-
-def _catalogue_files(roots: Roots) -> list[Path]:
-    from aerialdojo_gen.scenes.catalogue import catalogue_files
-
-    return catalogue_files(roots.scene_assets)
+    return [roots.annotations / f"{scene}.json", *catalogue_files(roots.scene_assets)]
 
 
 def _plan_parts(data: Path, scene: str, config: Any) -> int:

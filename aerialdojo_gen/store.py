@@ -11,6 +11,7 @@ import json
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -176,6 +177,16 @@ def read_info(path: Path) -> ShardInfo | None:
     StoreError
         The file is damaged (truncated, say), or has other rows than were written.
     """
+    try:
+        stat = path.stat()
+    except OSError as error:
+        raise StoreError(f"cannot read {path}: {error.strerror}") from None
+    return _read_info(path, stat.st_ino, stat.st_size, stat.st_mtime_ns)
+
+
+@lru_cache(maxsize=8192)
+def _read_info(path: Path, _inode: int, _size: int, _mtime_ns: int) -> ShardInfo | None:
+    # A shard is never written to, only replaced; a run asks for the same footer half a dozen times.
     try:
         rows, metadata = read_footer(path)
     except StoreError as error:

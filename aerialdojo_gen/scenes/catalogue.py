@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from aerialdojo_gen.errors import AssetError
 from aerialdojo_gen.scenes.builders import builders
+from aerialdojo_gen.scenes.catalogue_files import TARGETS, catalogue_files
 from aerialdojo_gen.scenes.materials import MaterialLibrary, load_materials, nearest, read_toml, refuse_unknown
 from aerialdojo_gen.scenes.mesh import Mesh, areas, merge, rotation, to_part
 from aerialdojo_gen.scenes.model import Instance, Part
@@ -18,9 +19,6 @@ from aerialdojo_gen.scenes.vocabulary import part_mesh
 
 _CACHE_SIZE = 2000
 _CROWN_SHAPES = 6
-# What tasks may ask for, what they are told from, and what else a place is full of.
-TARGETS = "props"
-FOLDERS = ("landmarks", TARGETS, "scenery")
 
 
 class Catalogue:
@@ -212,13 +210,8 @@ def single(vertices: NDArray[np.float64]) -> NDArray[np.float64]:
     return vertices.astype(np.float32).astype(np.float64)
 
 
-def catalogue_files(folder: Path) -> list[Path]:
-    """List the files of a `scene_assets` folder that categories stand in, in a fixed order."""
-    return [path for name in FOLDERS for path in sorted((folder / name).glob("*.toml"))]
-
-
 def load_catalogue(folder: Path) -> Catalogue:
-    """Read a `scene_assets` folder: `materials.toml` and the files of `FOLDERS`.
+    """Read a `scene_assets` folder: `materials.toml` and the files of `catalogue_files`.
 
     Raises
     ------
