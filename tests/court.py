@@ -6,6 +6,7 @@ import hashlib
 import math
 
 import numpy as np
+from handmade import OPINIONS
 from rendered import courtyard
 
 from aerialdojo_gen import runner, schemas, store
@@ -68,7 +69,7 @@ def write_inputs(data, bad=BAD):
         "anchors": [
             {
                 "scene": SCENE, "object_id": k, "anchor_id": a, "x_m": x, "y_m": y, "z_m": z, "yaw_rad": yaw,
-                "clearance_m": 1.0, "surface_distance_m": 1.0, "visible_fraction": 0.5, "score": 1.0 - a,
+                "clearance_m": 1.0, "surface_distance_m": 1.0, "visible_fraction": 0.5, "score": 1.0 - a, **OPINIONS,
                 "selected": selected, "selected_by": "auto",
             }
             for k, a, x, y, z, yaw, selected in (

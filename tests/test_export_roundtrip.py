@@ -79,7 +79,8 @@ def test_the_report_says_what_is_lost(there_and_back):
     said = {f"{table}.{c}" for table in ("routes", "objects") for c in LOST[table] if " " not in c}
     # The layout states no length of its own; a foreign file may.
     assert whole - {"routes.stated_length_m"} == said
-    assert report.replay() == {"routes": 222, "median_m": 0.0, "max_m": 0.0, "over_3_m": 0}
+    assert report.rows["routes"] > 100
+    assert report.replay() == {"routes": report.rows["routes"], "median_m": 0.0, "max_m": 0.0, "over_3_m": 0}
 
 
 letters = st.characters(codec="utf-8", exclude_categories=("Cs", "Cc", "Zs", "Zl", "Zp"))

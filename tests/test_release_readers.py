@@ -235,7 +235,7 @@ def mix_runs(data):
         (truncate, r"tasks/id_train/part-{}.parquet is damaged .*delete it and run the command again$"),
         (
             drop_row,
-            r"tasks/id_train/part-{}.parquet has 219 rows where 220 were written: delete it and run .* again$",
+            r"tasks/id_train/part-{}.parquet has \d+ rows where \d+ were written: delete it and run .* again$",
         ),
         (lose_scene_row, r"release/scenes/part-{}.parquet is missing: run aerialdojo-gen split --scene {}$"),
         (replace_by_foreign, r"anchors/part-{}.parquet was not written by aerialdojo-gen: delete it and run .*{}$"),

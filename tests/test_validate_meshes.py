@@ -87,6 +87,9 @@ def test_a_mesh_that_is_a_link_out(planted, tmp_path):
         ("anchor_yaw", "release/anchors", "yaw_rad", lambda v: v * 0.5),
         ("anchor_rank", "release/anchors", "score", lambda v: v + 1.0),
         ("anchor_visibility", "release/anchors", "visible_fraction", lambda v: v / 10),
+        ("anchor_score", "release/anchors", "part_contrast", lambda v: v / 2 + 0.4),
+        ("anchor_score", "release/anchors", "score_geometric", lambda v: v - 0.01),
+        ("anchor_score", "release/anchors", "score_vlm", lambda _: 0.5),
         ("object_category", OBJECTS, "category", lambda v: v + "_"),
     ],
 )
@@ -94,6 +97,8 @@ def test_a_value_that_the_mesh_contradicts(planted, found_by, table, name, value
     row = planted.edit(table, lambda row: row.update({name: value(row[name])}), lambda row: not row.get("selected"))
     key = {OBJECTS: ["object_id"], "release/anchors": ["object_id", "anchor_id"], SCENES: ["scene"]}
     expected = {found_by: [" ".join(f"{c}={row[c]}" for c in key.get(table, ["landmark_id"]))]}
+    if (found_by, name) == ("anchor_rank", "score"):
+        expected["anchor_score"] = expected["anchor_rank"]
     if found_by == "anchor_yaw":
         # The routes that start there start with another yaw than its own, turned.
         expected["start_anchor"] = sorted(

@@ -16,7 +16,7 @@ from aerialdojo_gen.scenes.build import build_scene
 from aerialdojo_gen.scenes.catalogue import load_catalogue
 from aerialdojo_gen.scenes.model import Scene
 from aerialdojo_gen.stage import Job, Roots
-from aerialdojo_gen.stages.anchor_sample import anchors_of
+from aerialdojo_gen.stages.anchor_sample import candidates_of
 from aerialdojo_gen.stages.anchor_world import World
 
 
@@ -89,6 +89,7 @@ def reachable_nodes(scene: Scene, pipeline: Pipeline, roots: Roots) -> Callable[
     def eligible(node: str) -> bool:
         x, y, z = (float(v) for v in scene[node].centroid)
         item = {"object_id": 0, "mesh_node": node, "x_m": x, "y_m": y, "z_m": z}
-        return len(anchors_of(item, world, job, config)[0]) >= config.shortlist
+        found, _ = candidates_of(item, world, job, config)
+        return found is not None and len(found.seeing(config.min_visible_fraction)) >= config.shortlist
 
     return eligible

@@ -123,8 +123,7 @@ def anchors_of(
     if found is None:
         return [], rejected
     radius = job.embodiment.radius_m
-    fraction = found.views.visible_fraction
-    seen = np.flatnonzero((fraction > 0) & (fraction >= config.min_visible_fraction))
+    seen = found.seeing(config.min_visible_fraction)
     away = found.positions_m - world.scene.instances[found.instance].centroid
     azimuth = np.arctan2(away[:, 1], away[:, 0])
     apart = math.radians(config.separation_deg)
@@ -133,7 +132,7 @@ def anchors_of(
     verdicts = panel(config, radius).judge(item["name"], pictures)
     score = np.array([verdict.score for verdict in verdicts])
     best = shortlist(score, azimuth[few], config.shortlist, apart)
-    rejected["not_visible"] += len(fraction) - len(seen)
+    rejected["not_visible"] += len(found.positions_m) - len(seen)
     rejected["not_shortlisted"] += len(seen) - len(best)
     own_distance = Surface.of(world.scene.instances[found.instance]).distance_m(found.positions_m[few[best]])
     rows = [

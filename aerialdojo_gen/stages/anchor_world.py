@@ -118,6 +118,11 @@ class Candidates:
         rank = informativeness(views, elevation, clearance, radius_m, config.standoff_m)
         return cls(world, instance, alone, positions_m, yaw_rad, elevation, clearance, views, rank)
 
+    def seeing(self, least: float) -> NDArray[np.int64]:
+        """Numbers of the viewpoints that see at least so large a fraction of what faces them, and anything at all."""
+        fraction = self.views.visible_fraction
+        return np.flatnonzero((fraction > 0) & (fraction >= least))
+
     def picture(self, k: int, size_px: int, fov_deg: float) -> AnchorView:
         """Take the front view from the k-th viewpoint."""
         return take_view(

@@ -44,8 +44,7 @@ def scene_figures(name, data, pipeline):
     for item in job.read("objects").to_pylist():
         own = [a for a in anchors if a["object_id"] == item["object_id"]]
         found, _ = candidates_of(item, world, job, config)
-        fraction = found.views.visible_fraction
-        valid = np.flatnonzero((fraction > 0) & (fraction >= config.min_visible_fraction))
+        valid = found.seeing(config.min_visible_fraction)
         best = np.array([next([a["x_m"], a["y_m"], a["z_m"]] for a in own if a["selected"])])
         centroid = world.scene.instances[found.instance].centroid
         away = np.linalg.norm(found.positions_m - centroid, axis=1)

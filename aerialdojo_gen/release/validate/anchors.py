@@ -12,10 +12,13 @@ from aerialdojo_gen.release.validate.links import sound
 from aerialdojo_gen.release.validate.registry import Finding, check
 from aerialdojo_gen.release.validate.rows import Rows, SceneData
 from aerialdojo_gen.release.validate.scene_mesh import scene_mesh
+from aerialdojo_gen.scoring.geometric import WEIGHTS
+from aerialdojo_gen.scoring.panel import SCORERS
 from aerialdojo_gen.stages.anchor_choice import SLACK_M
 
 _SAME_M = 1e-4
 _SAME_RAD = 1e-6
+_SAME_SCORE = 1e-9
 # Anchors are marched to the wanted distance to a tenth of a millimetre; this is what a definition of 1 m bears.
 _STANDOFF_M = 1e-3
 
@@ -43,6 +46,33 @@ def anchor_visibility(data: SceneData, rows: Rows) -> Iterator[Finding]:
     least, seen = data.pipeline.anchor_sample.min_visible_fraction, rows.floats("visible_fraction")
     for row in np.flatnonzero(~((seen >= least) & (seen > 0) & (seen <= 1))):
         yield Finding(int(row), f"visible_fraction = {seen[row]:.6g}", f"{least:g} to 1")
+
+
+@check("anchors")
+def anchor_score(data: SceneData, rows: Rows) -> Iterator[Finding]:
+    """An anchor's score is what its parts make of it: each from 0 to 1, weighed as the pipeline says."""
+    parts = rows.floats(*(f"part_{name}" for name in WEIGHTS))
+    for row, k in zip(*np.nonzero(~((parts >= 0) & (parts <= 1))), strict=True):
+        yield Finding(int(row), f"part_{[*WEIGHTS][k]} = {parts[row, k]:.6g}", "0 to 1")
+    weights = data.pipeline.anchor_sample.weights
+    asked = {name: getattr(weights, name) for name in SCORERS}
+    scores = {name: rows.floats(f"score_{name}") for name in SCORERS}
+    geometric = parts @ np.array([*WEIGHTS.values()])
+    by_hand = np.asarray(rows.texts("selected_by"), dtype=object) == "human"
+    for row, score in enumerate(rows.floats("score")):
+        own = {name: values[row] for name, values in scores.items() if np.isfinite(values[row])}
+        uncalled = sorted(name for name in own if not asked[name] and not by_hand[row])
+        total = sum(asked[name] for name in own)
+        wanted = sum(asked[name] * value for name, value in own.items()) / total if total else 0.0
+        if uncalled:
+            yield Finding(row, f"score_{uncalled[0]} = {own[uncalled[0]]:.6g}", "null: the scorer was not asked")
+        elif "geometric" in own and abs(own["geometric"] - geometric[row]) > _SAME_SCORE:
+            yield Finding(row, f"score_geometric = {own['geometric']:.6g}", f"{geometric[row]:.6g} by its parts")
+        elif not by_hand[row] and asked["geometric"] and "geometric" not in own:
+            yield Finding(row, "score_geometric is null", f"{geometric[row]:.6g} by its parts")
+        # What a person placed was compared with nothing: it has the geometric score alone.
+        elif min(abs(score - s) for s in (wanted, *([geometric[row]] if by_hand[row] else []))) > _SAME_SCORE:
+            yield Finding(row, f"score = {score:.6g}", f"{wanted:.6g} by its parts")
 
 
 @check("anchors", needs=("objects",), after=("unknown_object",))
