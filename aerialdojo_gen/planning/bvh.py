@@ -95,11 +95,11 @@ def _clip(p: float, d: float, low: float, high: float, t0: float, t1: float) -> 
 
 
 @njit(cache=True, error_model="numpy")
-def segment_near(
+def segment_blocker(
     px: float, py: float, pz: float, qx: float, qy: float, qz: float,
     radius: float, tri: NDArray[np.float64], boxes: NDArray[np.float64],
-) -> bool:  # fmt: skip
-    """Whether any triangle lies within `radius` of the segment pq: True means collision."""
+) -> int:  # fmt: skip
+    """Row of a triangle that lies within `radius` of the segment pq, -1 if there is none."""
     dx, dy, dz = qx - px, qy - py, qz - pz
     lx, ly, lz = min(px, qx) - radius, min(py, qy) - radius, min(pz, qz) - radius
     hx, hy, hz = max(px, qx) + radius, max(py, qy) + radius, max(pz, qz) + radius
@@ -125,9 +125,9 @@ def segment_near(
             first = (node - leaves) * LEAF
             for k in range(first, min(first + LEAF, n)):
                 if segment_triangle_d2(px, py, pz, qx, qy, qz, tri, k, radius) <= r2:
-                    return True
+                    return k
             node = _after(node)
-    return False
+    return -1
 
 
 @njit(cache=True)

@@ -9,7 +9,10 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from aerialdojo_gen.planning.bvh import point_distance, segment_distance, segment_near
+from aerialdojo_gen.planning.bvh import point_distance, segment_blocker, segment_distance
+from aerialdojo_gen.planning.triangles import segment_triangle_d2
+
+FREE, UNKNOWN = -1, -2
 
 
 class GridArrays(NamedTuple):
@@ -65,14 +68,83 @@ def _bound_at(
 
 
 @njit(cache=True, error_model="numpy")
+def what_blocks(
+    px: float, py: float, pz: float, qx: float, qy: float, qz: float,
+    radius: float, grid: GridArrays, prove_only: bool, guess: int,
+) -> int:  # fmt: skip
+    """Find a triangle that a ball touches when it moves from p to q.
+
+    The grid's bound is 1-Lipschitz and carries the ball over open space in few steps; where it cannot decide, the
+    triangles do, exactly.
+
+    Parameters
+    ----------
+    px, py, pz, qx, qy, qz : float
+        Ends, metres; inside the flight volume.
+    radius : float
+        Radius of the ball, metres.
+    grid : GridArrays
+        The clearance grid.
+    prove_only : bool
+        Do not ask the triangles.
+    guess : int
+        Row of a triangle that may well be in the way, and is asked first; -1 for none. It changes which of several
+        is found, not whether there is one.
+
+    Returns
+    -------
+    int
+        Row of the triangle; FREE where the ball touches nothing; UNKNOWN where only the triangles could tell.
+    """
+    field, cell = grid.field, grid.cell
+    ox, oy, oz = grid.origin[0], grid.origin[1], grid.origin[2]
+    dx, dy, dz = qx - px, qy - py, qz - pz
+    length = math.sqrt(dx * dx + dy * dy + dz * dz)
+    if length == 0.0:
+        if _bound_at(px, py, pz, ox, oy, oz, cell, field) > radius:
+            return FREE
+        return UNKNOWN if prove_only else segment_blocker(px, py, pz, qx, qy, qz, radius, grid.tri, grid.boxes)
+    ux, uy, uz = dx / length, dy / length, dz / length
+    t, doubt = 0.0, -1.0  # where the stretch begins that the grid cannot decide, if there is one
+    while t < length:
+        slack = _bound_at(px + t * ux, py + t * uy, pz + t * uz, ox, oy, oz, cell, field) - radius
+        if slack > 0.1 * cell:
+            reached = t + slack
+        else:
+            reached = min(t + cell, length)
+            m = 0.5 * (t + reached)
+            if _bound_at(px + m * ux, py + m * uy, pz + m * uz, ox, oy, oz, cell, field) - radius <= 0.5 * (
+                reached - t
+            ):
+                if prove_only:
+                    return UNKNOWN
+                if guess >= 0:
+                    if segment_triangle_d2(px, py, pz, qx, qy, qz, grid.tri, guess, radius) <= radius * radius:
+                        return guess
+                    guess = -1
+                if doubt < 0.0:
+                    doubt = t
+                t = reached
+                if t < length:
+                    continue
+        if doubt >= 0.0:
+            found = segment_blocker(
+                px + doubt * ux, py + doubt * uy, pz + doubt * uz, px + t * ux, py + t * uy, pz + t * uz,
+                radius, grid.tri, grid.boxes,
+            )  # fmt: skip
+            if found >= 0:
+                return found
+            doubt = -1.0
+        t = max(t, reached)
+    return FREE
+
+
+@njit(cache=True, inline="always")
 def segment_free(
     px: float, py: float, pz: float, qx: float, qy: float, qz: float,
     radius: float, grid: GridArrays, prove_only: bool,
 ) -> bool:  # fmt: skip
     """Whether a ball that moves from p to q stays clear of every surface.
-
-    The grid's bound is 1-Lipschitz and carries the ball over open space in few steps; where it cannot decide, the
-    triangles do, exactly.
 
     Parameters
     ----------
@@ -90,42 +162,7 @@ def segment_free(
     bool
         True for free.
     """
-    field, cell = grid.field, grid.cell
-    ox, oy, oz = grid.origin[0], grid.origin[1], grid.origin[2]
-    dx, dy, dz = qx - px, qy - py, qz - pz
-    length = math.sqrt(dx * dx + dy * dy + dz * dz)
-    if length == 0.0:
-        if _bound_at(px, py, pz, ox, oy, oz, cell, field) > radius:
-            return True
-        return not prove_only and not segment_near(px, py, pz, qx, qy, qz, radius, grid.tri, grid.boxes)
-    ux, uy, uz = dx / length, dy / length, dz / length
-    t, doubt = 0.0, -1.0  # where the stretch begins that the grid cannot decide, if there is one
-    while t < length:
-        slack = _bound_at(px + t * ux, py + t * uy, pz + t * uz, ox, oy, oz, cell, field) - radius
-        if slack > 0.1 * cell:
-            reached = t + slack
-        else:
-            reached = min(t + cell, length)
-            m = 0.5 * (t + reached)
-            if _bound_at(px + m * ux, py + m * uy, pz + m * uz, ox, oy, oz, cell, field) - radius <= 0.5 * (
-                reached - t
-            ):
-                if prove_only:
-                    return False
-                if doubt < 0.0:
-                    doubt = t
-                t = reached
-                if t < length:
-                    continue
-        if doubt >= 0.0:
-            if segment_near(
-                px + doubt * ux, py + doubt * uy, pz + doubt * uz, px + t * ux, py + t * uy, pz + t * uz,
-                radius, grid.tri, grid.boxes,
-            ):  # fmt: skip
-                return False
-            doubt = -1.0
-        t = max(t, reached)
-    return True
+    return what_blocks(px, py, pz, qx, qy, qz, radius, grid, prove_only, -1) == FREE
 
 
 @njit(cache=True, error_model="numpy")

@@ -19,7 +19,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from aerialdojo_gen.planning.cost_to_go import cost_at, cost_between
-from aerialdojo_gen.planning.grid_kernels import GridArrays, segment_free
+from aerialdojo_gen.planning.grid_kernels import FREE, GridArrays, segment_free, what_blocks
 from aerialdojo_gen.planning.primitives import N_HEADINGS, QUARTER, TURN_RAD
 
 # A translation is direction * 3 + step for the horizontal ones, then up 1 and 2 m, down 1 and 2 m, then the Approach.
@@ -36,6 +36,8 @@ _BUCKET_M = 0.02
 _N_BUCKETS = 8192
 # As `grid_kernels.inside` allows.
 _ROUNDING_M = 1e-9
+# Most edges that are tested and not proven free are blocked, four in five of them by what blocked one close by before.
+_N_BLOCKERS = 4096
 _HASH = np.uint64(0x9E3779B97F4A7C15)
 
 
@@ -62,6 +64,8 @@ class SearchArrays(NamedTuple):
         Search that wrote a slot of the table.
     clock : (1,) int32
         Number of the search.
+    blockers : (_N_BLOCKERS,) int32
+        Triangle that blocked an edge last, by where the edge's middle is; -1 for none.
     """
 
     pose: NDArray[np.float64]
@@ -76,6 +80,7 @@ class SearchArrays(NamedTuple):
     keys: NDArray[np.int64]
     stamps: NDArray[np.int32]
     clock: NDArray[np.int32]
+    blockers: NDArray[np.int32]
 
 
 class SearchOptions(NamedTuple):
@@ -116,7 +121,7 @@ def make_search_arrays(budget: int) -> SearchArrays:
         np.empty((n, 3)), np.empty(n), np.empty(n, np.int8), np.empty(n, np.int8), np.empty(n, np.int32),
         np.empty(edges, np.int32), np.empty(edges, np.int8), np.empty(edges, np.int32),
         np.full(_N_BUCKETS, -1, np.int32), np.empty(slots, np.int64), np.zeros(slots, np.int32),
-        np.zeros(1, np.int32),
+        np.zeros(1, np.int32), np.empty(_N_BLOCKERS, np.int32),
     )  # fmt: skip
 
 
@@ -155,6 +160,12 @@ def _slot(key: int, now: int, keys: NDArray[np.int64], stamps: NDArray[np.int32]
             return slot
         slot = (slot + 1) & mask
     return ~slot
+
+
+@njit(cache=True, inline="always")
+def _place(x: float, y: float, z: float) -> int:
+    """Where the triangle that blocked an edge is remembered, given the edge's middle in metres."""
+    return (int(x) * 73 + int(y) * 7919 + int(z) * 104729) & (_N_BLOCKERS - 1)
 
 
 @njit(cache=True, inline="always")
@@ -224,15 +235,15 @@ def search(
         flights[m, 2], flights[m, 3] = LIFTS_M[m - N_FLAT], abs(LIFTS_M[m - N_FLAT])
     # Scalars and plain arrays: a tuple of arrays costs more to hand over than the inner loop's work.
     pose, cost, headings, moves, parents = s.pose, s.cost, s.heading, s.move, s.parent
-    edge_parent, edge_move, edge_next, heads, keys, stamps = (
-        s.edge_parent, s.edge_move, s.edge_next, s.heads, s.keys, s.stamps
+    edge_parent, edge_move, edge_next, heads, keys, stamps, blockers = (
+        s.edge_parent, s.edge_move, s.edge_next, s.heads, s.keys, s.stamps, s.blockers
     )  # fmt: skip
     ox, oy, oz, edge = grid.origin[0], grid.origin[1], grid.origin[2], grid.cell
     lx, ly, lz = grid.lower[0] - _ROUNDING_M, grid.lower[1] - _ROUNDING_M, grid.lower[2] - _ROUNDING_M
     hx, hy, hz = grid.upper[0] + _ROUNDING_M, grid.upper[1] + _ROUNDING_M, grid.upper[2] + _ROUNDING_M
     s.clock[0] += 1
     now = s.clock[0]
-    heads[:] = -1
+    heads[:], blockers[:] = -1, -1
     f0 = o.weight * cost_at(start[0], start[1], start[2], grid, cost_to_go) - 5.0
     f_most = (_N_BUCKETS - 1) * _BUCKET_M
     # The start is an edge from nowhere.
@@ -262,8 +273,14 @@ def search(
         key = (key << 20) | int((z - lz) / o.cell + 1.0)
         key = key * N_HEADINGS + heading * o.sectors // N_HEADINGS
         slot = ~_slot(key, now, keys, stamps)
-        if slot < 0 or (parent >= 0 and not segment_free(px, py, pz, x, y, z, o.radius, grid, False)):
+        if slot < 0:
             continue
+        if parent >= 0:
+            place = _place((px + x) / 2 - ox, (py + y) / 2 - oy, (pz + z) / 2 - oz)
+            found = what_blocks(px, py, pz, x, y, z, o.radius, grid, False, blockers[place])
+            if found != FREE:
+                blockers[place] = found
+                continue
         if n >= o.budget:
             return BUDGET, n, none
         keys[slot], stamps[slot] = key, now
