@@ -36,7 +36,7 @@ _BUCKET_M = 0.02
 _N_BUCKETS = 8192
 # As `grid_kernels.inside` allows.
 _ROUNDING_M = 1e-9
-# Most edges that are tested and not proven free are blocked, four in five of them by what blocked one close by before.
+# Most edges that the grid does not prove free are blocked, four in five of them by what blocked one close by before.
 _N_BLOCKERS = 4096
 _HASH = np.uint64(0x9E3779B97F4A7C15)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +18,7 @@ from aerialdojo_gen.scenes.model import Instance, Part
 from aerialdojo_gen.scenes.prop import Category, Variant, parse_category
 from aerialdojo_gen.scenes.vocabulary import part_mesh
 
+_MATERIALS = "materials.toml"
 _CACHE_SIZE = 2000
 _CROWN_SHAPES = 6
 
@@ -213,12 +215,27 @@ def single(vertices: NDArray[np.float64]) -> NDArray[np.float64]:
 def load_catalogue(folder: Path) -> Catalogue:
     """Read a `scene_assets` folder: `materials.toml` and the files of `catalogue_files`.
 
+    A process reads it once, as long as no file changes.
+
     Raises
     ------
     AssetError
         The first thing that is wrong: file, category, part or variant, key, and what was probably meant.
     """
-    materials = load_materials(folder / "materials.toml")
+    return _load(folder, tuple(_state(path) for path in (folder / _MATERIALS, *catalogue_files(folder))))
+
+
+def _state(path: Path) -> tuple[str, int, int, int]:
+    try:
+        status = path.stat()
+    except OSError:
+        return path.name, 0, 0, 0  # who reads it says what is wrong
+    return path.name, status.st_ino, status.st_size, status.st_mtime_ns
+
+
+@lru_cache(maxsize=2)
+def _load(folder: Path, files: tuple[tuple[str, int, int, int], ...]) -> Catalogue:
+    materials = load_materials(folder / _MATERIALS)
     categories: dict[str, Category] = {}
     for path in catalogue_files(folder):
         for name, body in read_toml(path).items():

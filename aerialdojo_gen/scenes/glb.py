@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import struct
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -55,6 +56,16 @@ def write_glb(scene: Scene, path: Path) -> None:
         file.write(head)
         file.write(struct.pack("<II", len(body), _BIN))
         file.write(body)
+
+
+# Scenes of one catalogue share their materials.
+@lru_cache(maxsize=512)
+def _png(material: Material) -> bytes:
+    assert material.texture is not None
+    ok, png = cv2.imencode(".png", material.texture[..., ::-1], [cv2.IMWRITE_PNG_COMPRESSION, 3])
+    if not ok:
+        raise AssetError(f"material {material.name!r}: its texture cannot be encoded")
+    return png.tobytes()
 
 
 def read_glb(path: Path) -> Scene:
@@ -109,10 +120,7 @@ class _Writer:
             surface["baseColorFactor"] = [*(_linear(c) for c in material.colour), 1.0]
         else:
             surface["baseColorTexture"] = {"index": len(self._images)}
-            ok, png = cv2.imencode(".png", material.texture[..., ::-1], [cv2.IMWRITE_PNG_COMPRESSION, 3])
-            if not ok:
-                raise AssetError(f"material {material.name!r}: its texture cannot be encoded")
-            self._images.append({"mimeType": "image/png", "bufferView": self._view(png.tobytes(), None)})
+            self._images.append({"mimeType": "image/png", "bufferView": self._view(_png(material), None)})
         self._materials.append({"name": material.name, "pbrMetallicRoughness": surface, "extras": extras})
 
     def instance(self, instance: Instance, materials: dict[str, int]) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from itertools import pairwise
 from typing import Any, NamedTuple
@@ -172,22 +173,31 @@ def poisson_disc(
     tries = int(30 * max(area.area, 1.0) / radius_m**2)
     candidates = rng.uniform((x0, y0, 0.0), (x1, y1, 360.0), size=(min(tries, 400_000), 3))
     inside = shapely.contains_xy(area, candidates[:, 0], candidates[:, 1])
-    for x, y, yaw in candidates[inside]:
-        share = 1.0 if density is None else float(density(float(x), float(y)))
+
+    def room(x: float, y: float, own: float) -> bool:
+        i, j, reach = int(x // radius_m), int(y // radius_m), math.ceil(max(widest, own) / radius_m)
+        for a in range(i - reach, i + reach + 1):
+            for b in range(j - reach, j + reach + 1):
+                for qx, qy, qr in buckets.get((a, b), ()):
+                    if (x - qx) ** 2 + (y - qy) ** 2 < max(own, qr) ** 2:
+                        return False
+        return True
+
+    for x, y, yaw in candidates[inside].tolist():
+        # Densities take longer to ask than neighbours, and no density makes a disc smaller than this.
+        if not room(x, y, radius_m):
+            continue
+        share = 1.0 if density is None else float(density(x, y))
         if share <= 0.01:
             continue
-        own = radius_m / float(np.sqrt(min(share, 1.0)))
+        own = radius_m / math.sqrt(min(share, 1.0))
+        if own > radius_m and not room(x, y, own):
+            continue
         widest = max(widest, own)
-        i, j, reach = int(x // radius_m), int(y // radius_m), int(np.ceil(widest / radius_m))
-        near = (
-            q for a in range(i - reach, i + reach + 1) for b in range(j - reach, j + reach + 1)
-            for q in buckets.get((a, b), ())
-        )  # fmt: skip
-        if all((x - qx) ** 2 + (y - qy) ** 2 >= max(own, qr) ** 2 for qx, qy, qr in near):
-            buckets.setdefault((i, j), []).append((float(x), float(y), own))
-            poses.append(Pose(float(x), float(y), float(yaw)))
-            if len(poses) >= limit:
-                break
+        buckets.setdefault((int(x // radius_m), int(y // radius_m)), []).append((x, y, own))
+        poses.append(Pose(x, y, yaw))
+        if len(poses) >= limit:
+            break
     return poses
 
 

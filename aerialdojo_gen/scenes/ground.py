@@ -13,6 +13,8 @@ from itertools import groupby
 
 import numpy as np
 import shapely
+from numpy.typing import NDArray
+from shapely import STRtree
 from shapely.geometry import MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 
@@ -77,8 +79,9 @@ def ground_meshes(
     layers = visible_surfaces(extent, base, surfaces)
     flat = bool(np.ptp(terrain.heights_m) == 0.0)
     out: list[tuple[str, Mesh]] = []
+    tiles = None if flat else _Tiles.of(terrain)
     for layer in layers:
-        body = _flat_mesh(layer, terrain) if flat else _draped_mesh(layer, terrain)
+        body = _flat_mesh(layer, terrain) if tiles is None else _draped_mesh(layer, tiles)
         if len(body.faces):
             out.append((layer.material, body))
         if layer.rise_m > 0.0:
@@ -120,17 +123,31 @@ def _flat_mesh(layer: Surface, terrain: Terrain) -> Mesh:
     return merge(pieces) if pieces else mesh([], [])
 
 
-def _draped_mesh(layer: Surface, terrain: Terrain) -> Mesh:
-    corners, faces = terrain.corners(), terrain.triangles()
-    tiles = shapely.polygons(corners[faces][:, :, :2])
+@dataclass(frozen=True, eq=False)
+class _Tiles:
+    """A terrain's triangles: as (n, 3) corners and (m, 3) faces, seen from above, and their (m, 3) normals."""
+
+    corners: Floats
+    faces: NDArray[np.int32]
+    normals: Floats
+    plans: STRtree
+
+    @classmethod
+    def of(cls, terrain: Terrain) -> _Tiles:
+        corners, faces = terrain.corners(), terrain.triangles()
+        a, b, c = (corners[faces[:, k]] for k in range(3))
+        return cls(corners, faces, np.cross(b - a, c - a), STRtree(shapely.polygons(corners[faces][:, :, :2])))
+
+
+def _draped_mesh(layer: Surface, tiles: _Tiles) -> Mesh:
+    corners, faces = tiles.corners, tiles.faces
     shapely.prepare(layer.area)
-    inside = shapely.covers(layer.area, tiles)
-    crossed = shapely.intersects(layer.area, tiles) & ~inside
-    pieces = [Mesh(corners, faces[inside])] if inside.any() else []
-    for k in np.flatnonzero(crossed):
-        a, b, c = corners[faces[k]]
-        normal = np.cross(b - a, c - a)
-        for piece in polygons_of(layer.area.intersection(tiles[k])):
+    touched = np.sort(tiles.plans.query(layer.area, predicate="intersects"))
+    inside = shapely.covers(layer.area, tiles.plans.geometries[touched])
+    pieces = [Mesh(corners, faces[touched[inside]])] if inside.any() else []
+    for k in touched[~inside]:
+        a, normal = corners[faces[k, 0]], tiles.normals[k]
+        for piece in polygons_of(layer.area.intersection(tiles.plans.geometries[k])):
             flat, cut = triangulate(piece)
             z = a[2] - ((flat - a[:2]) @ normal[:2]) / normal[2]
             pieces.append(Mesh(np.column_stack([flat, z]), cut))
