@@ -265,7 +265,7 @@ STAGES: tuple[Stage, ...] = (
         ("scenes", "objects", "chosen_anchors"), ("anchors",), settle=_settle_scorers,
     ),
     Stage(
-        "reference-images", 3, "Render each object's picture from its selected anchor.",
+        "reference-images", 4, "Render each object's picture from its selected anchor.",
         ("scenes", "objects", "anchors"), ("references",), settle=_settle_renderer,
     ),
     Stage(
