@@ -15,6 +15,10 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 
 from aerialdojo_gen.errors import ConfigError
 
+RendererName = Literal["gl", "pybullet"]
+# The fastest first.
+RENDERERS: tuple[RendererName, ...] = ("gl", "pybullet")
+
 
 class Section(BaseModel):
     """Base of every section: frozen, and unknown keys are errors."""

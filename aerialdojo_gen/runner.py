@@ -13,19 +13,17 @@ import time
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
-from aerialdojo_gen import store
-from aerialdojo_gen.atomic import disk_error, sweep
+from aerialdojo_gen.atomic import disk_error
 from aerialdojo_gen.config import Pipeline
 from aerialdojo_gen.errors import AerialDojoError, BudgetSpent, StoreError, UsageError
-from aerialdojo_gen.executor import Pool, Task
-from aerialdojo_gen.fingerprint import scene_fingerprint
+from aerialdojo_gen.executor import Pool
 from aerialdojo_gen.interrupt import Interrupts
 from aerialdojo_gen.progress import Reporter
-from aerialdojo_gen.stage import STAGES, Job, Roots, Stage
+from aerialdojo_gen.shards import Limits, shards_of
+from aerialdojo_gen.stage import STAGES, Roots, Stage
 
 
 @dataclass(frozen=True)
@@ -64,23 +62,6 @@ class StageSummary:
             f"{self.stage}: {self.rows_in:,} rows in, {self.rows_out:,} out"
             f"{f' ({counts})' if counts else ''}; {fresh}; {self.seconds:.1f} s"
         )
-
-
-@dataclass(frozen=True)
-class Limits:
-    """How much of a stage is computed now; what is left out is computed when the command is given again.
-
-    Attributes
-    ----------
-    share : (int, int)
-        ``(i, n)``: every n-th shard, from the i-th on. The shares of n machines, copied into one folder, are what one
-        machine writes.
-    deadline : float or None
-        Seconds since the epoch after which nothing further is begun.
-    """
-
-    share: tuple[int, int] = (0, 1)
-    deadline: float | None = None
 
 
 @contextmanager
@@ -169,32 +150,17 @@ def _run_stage(
     limits: Limits,
 ) -> StageSummary:
     started = time.monotonic()
-    config = stage.settle(pipeline.section(stage.name), reporter.line)
-    pipeline = pipeline.model_copy(update={stage.name.replace("-", "_"): config})
-    stage.check(roots.data, scenes, config)
-    tasks, fresh, errors = [], [], []
-    shard = -1
-    for scene in scenes:
-        try:
-            fingerprint = scene_fingerprint(stage, pipeline, roots, scene)
-            parts = stage.parts(roots.data, scene, config)
-        except AerialDojoError as error:
-            errors.append(error)
-            continue
-        for table in stage.writes:
-            store.prune(roots.data, table, scene, parts)
-            sweep(store.shard_path(roots.data, table, scene).parent)
-        for part in range(parts):
-            shard += 1
-            if shard % limits.share[1] != limits.share[0]:
-                continue
-            summary = None if force else _fresh(stage, roots.data, scene, part, parts, fingerprint, reporter)
-            if summary is not None:
-                fresh.append(summary)
-            else:
-                whole = Job(stage.name, scene, part, parts, pipeline.seed, pipeline.embodiment, roots)
-                job = replace(whole, deadline=limits.deadline, force=force)
-                tasks.append(Task(job, config, fingerprint))
+    section = pipeline.section(stage.name)
+    # What takes time to decide is not decided anew as long as nothing is to be computed.
+    choices = [] if force else stage.choices(section)
+    lots = (shards_of(stage, c, scenes, pipeline, roots, force, Reporter(quiet=True), limits) for c in choices)
+    lot = next((lot for lot in lots if lot.all_fresh), None)
+    if lot is None:
+        config = stage.settle(section, reporter.line)
+        lot = shards_of(stage, config, scenes, pipeline, roots, force, reporter, limits)
+        if lot.tasks:
+            stage.check(roots.data, scenes, config)
+    tasks, fresh, errors = lot.tasks, lot.fresh, lot.errors
     done = []
     with reporter.bar(stage.name, len(tasks)) as bar:
         for outcome in pool.imap(tasks):
@@ -225,31 +191,6 @@ def _run_stage(
         len(done),
         time.monotonic() - started,
     )
-
-
-def _fresh(
-    stage: Stage, data: Path, scene: str, part: int, parts: int, fingerprint: str, reporter: Reporter
-) -> dict[str, Any] | None:
-    """Return the shard's stored summary if all its tables and files are there and up to date."""
-    summary = None
-    for table in stage.writes:
-        path = store.shard_path(data, table, scene, part)
-        if not path.exists():
-            return None
-        try:
-            info = store.read_info(path)
-        except StoreError as error:
-            reporter.line(f"{str(error).split(':', 1)[0]}: computed again")
-            return None
-        if info is None or info.fingerprint != fingerprint or info.parts != parts:
-            return None
-        for relative, size in info.files.items():
-            file = data / relative
-            if not file.is_file() or file.stat().st_size != size:
-                reporter.line(f"{file} is missing or damaged: computed again")
-                return None
-        summary = info.summary
-    return summary
 
 
 def _together(errors: Sequence[AerialDojoError]) -> AerialDojoError:

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 from aerialdojo_gen import store
 from aerialdojo_gen.atomic import atomic_file
-from aerialdojo_gen.config import Embodiment
+from aerialdojo_gen.config import RENDERERS, Embodiment
 from aerialdojo_gen.scenes.catalogue_files import catalogue_files
 
 if TYPE_CHECKING:
@@ -147,6 +147,10 @@ def _as_it_is(config: Any, _say: Callable[[str], None]) -> Any:
     return config
 
 
+def _no_choice(_config: Any) -> list[Any]:
+    return []
+
+
 def _no_sources(_roots: Roots, _scene: str) -> list[Path]:
     return []
 
@@ -175,6 +179,9 @@ class Stage:
     settle : callable
         ``(config, say) -> config``: decides what the configuration leaves to the machine, so that the decision is
         part of the fingerprint, and says it in a line.
+    choices : callable
+        ``config -> list of config``: what `settle` may make of it, where deciding takes time. Where all shards are
+        fresh by one of them nothing is decided anew.
     """
 
     name: str
@@ -186,6 +193,7 @@ class Stage:
     sources: Callable[[Roots, str], list[Path]] = _no_sources
     check: Callable[[Path, Sequence[str], Any], None] = _no_check
     settle: Callable[[Any, Callable[[str], None]], Any] = _as_it_is
+    choices: Callable[[Any], list[Any]] = _no_choice
 
     def load(self) -> Callable[[Job, Any], Output]:
         """Import the stage's module and return its ``run``."""
@@ -242,6 +250,11 @@ def _settle_renderer(config: Any, say: Callable[[str], None]) -> Any:
     return config.model_copy(update={"renderer": choice.name})
 
 
+def _renderers(config: Any) -> list[Any]:
+    names = RENDERERS if config.renderer == "auto" else (config.renderer,)
+    return [config.model_copy(update={"renderer": name}) for name in names]
+
+
 def _settle_scorers(config: Any, _say: Callable[[str], None]) -> Any:
     if config.clip is None or not config.weights.clip:
         return config
@@ -266,7 +279,7 @@ STAGES: tuple[Stage, ...] = (
     ),
     Stage(
         "reference-images", 4, "Render each object's picture from its selected anchor.",
-        ("scenes", "objects", "anchors"), ("references",), settle=_settle_renderer,
+        ("scenes", "objects", "anchors"), ("references",), settle=_settle_renderer, choices=_renderers,
     ),
     Stage(
         "pair-objects", 1, "Pair start anchors with targets: the candidate tasks.",
@@ -290,7 +303,7 @@ STAGES: tuple[Stage, ...] = (
     Stage(
         "render", 2, "Record four RGB-D views along trajectories of the release.",
         ("scenes", "routes/train", "routes/test"), ("recordings", "frames"), parts=_render_parts,
-        settle=_settle_renderer,
+        settle=_settle_renderer, choices=_renderers,
     ),
 )  # fmt: skip
 

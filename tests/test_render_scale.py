@@ -16,13 +16,14 @@ import pytest
 from court import CONFIG, ROUTE, SCENE, files_of, run_whole
 from court import write_inputs as write_some
 
-from aerialdojo_gen import runner, store
+from aerialdojo_gen import store
 from aerialdojo_gen.commands.render import duration_s, share_of
-from aerialdojo_gen.errors import UsageError
-from aerialdojo_gen.rendering import recording
+from aerialdojo_gen.errors import RenderError, UsageError
+from aerialdojo_gen.rendering import backend, recording
 from aerialdojo_gen.rendering.codecs import to_metres
 from aerialdojo_gen.rendering.estimate import estimate
 from aerialdojo_gen.rendering.reader import read_recording
+from aerialdojo_gen.shards import Limits
 from aerialdojo_gen.stages import render
 
 ALL = CONFIG.model_copy(update={"limit": 0, "trajectories_per_part": 5})
@@ -71,7 +72,7 @@ def test_the_shares_of_three_machines_are_what_one_writes(tmp_path, whole):
     together: dict[str, bytes] = {}
     for k, data in enumerate(machines):
         write_inputs(data)
-        (summary,) = run_whole(data, ALL, limits=runner.Limits((k, 3)))
+        (summary,) = run_whole(data, ALL, limits=Limits((k, 3)))
         assert summary.computed in (1, 2)
         written = files_of(data)
         assert not together.keys() & written.keys()
@@ -98,7 +99,7 @@ def test_a_spent_budget_leaves_whole_trajectories_and_the_next_run_goes_on(tmp_p
     clock = [time.time()]
     monkeypatch.setattr(render._Trajectory, "record", slow)
     monkeypatch.setattr(time, "time", lambda: clock[0])
-    (summary,) = run_whole(tmp_path, ALL, limits=runner.Limits(deadline=clock[0] + 65.0))
+    (summary,) = run_whole(tmp_path, ALL, limits=Limits(deadline=clock[0] + 65.0))
     assert len(recorded) == 7
     assert summary.computed == 1
     assert not list((tmp_path / "media" / SCENE).glob(".*"))
@@ -252,6 +253,28 @@ def test_shares_and_durations_are_read_or_refused():
     for text in ("2", "h", "2 h", "-1h"):
         with pytest.raises(UsageError, match=r"--budget .*: write a duration"):
             duration_s(text)
+
+
+def test_auto_chooses_only_where_something_is_to_be_drawn(tmp_path, monkeypatch):
+    write_some(tmp_path)
+    auto = CONFIG.model_copy(update={"renderer": "auto"})
+    run_whole(tmp_path, CONFIG)
+    drawn = files_of(tmp_path)
+
+    def choose(_name):
+        raise RenderError("asked")
+
+    monkeypatch.setattr(backend, "choose_renderer", choose)
+    # What one of the renderers drew is fresh, whichever it is.
+    (summary,) = run_whole(tmp_path, auto)
+    assert (summary.computed, summary.shards) == (0, len(list((tmp_path / "recordings").rglob("*.parquet"))))
+    assert files_of(tmp_path) == drawn
+    # Something is missing, or asked for anew: now it matters which.
+    with pytest.raises(RenderError, match="asked"):
+        run_whole(tmp_path, auto, force=["render"])
+    next((tmp_path / "recordings").rglob("*.parquet")).unlink()
+    with pytest.raises(RenderError, match="asked"):
+        run_whole(tmp_path, auto)
 
 
 def test_the_row_says_what_drew_it(whole):

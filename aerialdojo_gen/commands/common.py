@@ -16,7 +16,7 @@ from aerialdojo_gen.errors import ConfigError
 
 if TYPE_CHECKING:
     from aerialdojo_gen.config import Pipeline
-    from aerialdojo_gen.runner import Limits
+    from aerialdojo_gen.shards import Limits
     from aerialdojo_gen.stage import Roots, Stage
 
 DEFAULT_PIPELINE = "aerialdojo-200k.toml"

@@ -50,7 +50,7 @@ def render(
         "--estimate", help="Measure a few trajectories, say what all will take, and record nothing.")] = False,
 ) -> None:  # fmt: skip
     """Record four RGB-D views along trajectories of the release."""
-    from aerialdojo_gen.runner import Limits
+    from aerialdojo_gen.shards import Limits
 
     limits = Limits(share_of(shard) if shard else (0, 1), time.time() + duration_s(budget) if budget else None)
     overrides: dict[str, object] = {

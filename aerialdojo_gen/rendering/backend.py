@@ -14,11 +14,12 @@ import weakref
 from dataclasses import dataclass
 from functools import lru_cache
 from types import TracebackType
-from typing import Literal, Protocol, Self
+from typing import Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
+from aerialdojo_gen.config import RENDERERS, RendererName
 from aerialdojo_gen.errors import RenderError
 from aerialdojo_gen.geometry.cameras import Camera, view_pose
 from aerialdojo_gen.geometry.rays import RayCaster
@@ -27,10 +28,6 @@ from aerialdojo_gen.rendering.world import Picture, RenderWorld, ray_caster
 from aerialdojo_gen.scenes.model import Scene
 
 Floats = NDArray[np.float64]
-
-RendererName = Literal["gl", "pybullet"]
-# The fastest first.
-RENDERERS: tuple[RendererName, ...] = ("gl", "pybullet")
 
 _TOLERANCE_M, _SHARE, _EDGE_SHARE = 0.01, 0.999, 0.1
 

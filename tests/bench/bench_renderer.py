@@ -18,10 +18,10 @@ from typing import Any
 import cv2
 import numpy as np
 
-from aerialdojo_gen.config import RenderConfig
+from aerialdojo_gen.config import RENDERERS, RenderConfig
 from aerialdojo_gen.geometry.cameras import Camera, view_pose
 from aerialdojo_gen.geometry.rays import RayCaster
-from aerialdojo_gen.rendering.backend import RENDERERS, choose_renderer, open_renderer
+from aerialdojo_gen.rendering.backend import choose_renderer, open_renderer
 from aerialdojo_gen.rendering.checks import Solid
 from aerialdojo_gen.rendering.recording import frame_poses, record_view
 from aerialdojo_gen.scenes.build import build_scene
