@@ -91,8 +91,8 @@ class CollisionWorld:
         bool
             True for a collision.
         """
-        ax, ay, az = (float(v) for v in np.asarray(p, np.float64))
-        bx, by, bz = (float(v) for v in np.asarray(q, np.float64))
+        ax, ay, az = np.asarray(p, np.float64).tolist()
+        bx, by, bz = np.asarray(q, np.float64).tolist()
         dx, dy, dz = bx - ax, by - ay, bz - az
         length = math.sqrt(dx * dx + dy * dy + dz * dz)
         if length < 1e-9:
