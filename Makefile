@@ -47,8 +47,8 @@ SAMPLE := --split id_test --split ood_test --limit 32 $(foreach scene,U_Mall_0 U
   I_Harbor_0 I_Bridge_1 D_Flood_0 D_Earthquake_1,--scene $(scene))
 evaluate: .venv/.installed  ## fly oracle, random and explorer on 32 tasks of all families and print their table
 	@for agent in oracle random explorer; do \
-	  $(RUN) evaluate --agent $$agent $(SAMPLE) --data $(DATA) $(RUN_FLAGS) || exit 1; done
-	@$(RUN) report oracle random explorer --data $(DATA) --out $(DATA)/report
+	  $(RUN) evaluate --agent $$agent --run sample-$$agent $(SAMPLE) --data $(DATA) $(RUN_FLAGS) || exit 1; done
+	@$(RUN) report sample-oracle sample-random sample-explorer --data $(DATA) --out $(DATA)/report
 
 PYTEST_FLAGS ?= -n 2 --dist loadfile
 test: .venv/.dev  ## run the tests (PYTEST_FLAGS='-k planner' for some of them)
