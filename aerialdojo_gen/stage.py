@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 from aerialdojo_gen import store
 from aerialdojo_gen.atomic import atomic_file
 from aerialdojo_gen.config import RENDERERS, Embodiment
+from aerialdojo_gen.errors import AssetError
 from aerialdojo_gen.scenes.catalogue_files import catalogue_files
 
 if TYPE_CHECKING:
@@ -216,7 +217,13 @@ def _scene_sources(roots: Roots, scene: str) -> list[Path]:
 
 
 def _annotation_sources(roots: Roots, scene: str) -> list[Path]:
-    return [roots.annotations / f"{scene}.json", *catalogue_files(roots.scene_assets)]
+    file = roots.annotations / f"{scene}.json"
+    if not file.is_file():
+        raise AssetError(
+            f"{scene} has no annotations: {file} is missing; draft them (aerialdojo-gen annotate-draft {scene}) "
+            f"or make them by hand (aerialdojo-gen annotate --scene {scene})"
+        )
+    return [file, *catalogue_files(roots.scene_assets)]
 
 
 def _plan_parts(data: Path, scene: str, config: Any) -> int:

@@ -198,7 +198,8 @@ class _Drafter:
                     break
         if len(taken) < n:
             raise AnnotationError(
-                f"{self._scene.name}: {n} objects are wanted, {len(taken)} can be chosen and told apart"
+                f"{self._scene.name}: {n} objects are wanted, {len(taken)} can be chosen and told apart: "
+                f"ask for {len(taken)}, and add others by hand (aerialdojo-gen annotate)"
             )
         return tuple(
             Object(

@@ -216,7 +216,10 @@ def _check_extent(size: Floats) -> None:
             f"{text}, too large to plan in: --scale 0.01 if it is in centimetres, --crop X Y RADIUS for a part"
         )
     if wide < SMALLEST_M:
-        raise AssetError(f"{text}, too small to fly in: --scale 100 if its unit is a hectometre, --scale 10, …")
+        larger = 10 ** math.ceil(math.log10(SMALLEST_M / max(wide, 1e-9)))
+        raise AssetError(
+            f"{text}, too small to fly in: give --scale a value {larger:,} times as large, or larger still"
+        )
 
 
 def _merged_clutter(bodies: list[RawNode]) -> list[RawNode]:
