@@ -145,6 +145,9 @@ class PlanConfig(Section):
         0.0, ge=0, description="no search where a grid path is shorter than this times d_E"
     )
     action_cost_m: float = Field(0.02, ge=0, description="what an action costs beside its metres: breaks ties")
+    sideways_actions_per_m: float = Field(
+        1.0, ge=0, description="what a metre flown sideways counts as: the front camera should see the way"
+    )
     clearance_cap_m: float = Field(5.0, gt=0, description="clearances are known up to this distance")
     prove_by_grid: bool = Field(True, description="leave FCL unasked about legs that the grid proves free")
     ladder: tuple[Rung, ...] = Field(

@@ -293,7 +293,7 @@ STAGES: tuple[Stage, ...] = (
         ("objects", "anchors"), ("pairs",),
     ),
     Stage(
-        "plan", 2, "Plan a collision-free reference trajectory for every candidate.",
+        "plan", 3, "Plan a collision-free reference trajectory for every candidate.",
         ("scenes", "objects", "anchors", "pairs"), ("plans",), parts=_plan_parts,
     ),
     Stage(

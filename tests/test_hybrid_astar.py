@@ -95,6 +95,29 @@ def test_actions_fit_the_papers_budgets():
         assert r.n_actions <= (90 if r.length_m < 30 else 180)
 
 
+def metres_ahead_and_sideways(routes):
+    ahead, sideways = (
+        sum(np.abs(DISPLACEMENTS[r.actions][:, axis]).sum() for r in routes if len(r.actions)) for axis in (0, 1)
+    )
+    return float(ahead), float(sideways)
+
+
+def test_the_front_camera_sees_the_way():
+    _, triples = planned()
+    ahead, sideways = metres_ahead_and_sideways([r for *_, r in triples])
+    assert sideways < 0.15 * ahead
+    # Where sideways costs nothing, fewer actions are needed for the same ways: the price is known, and small.
+    careless = Planner(town(), PlanConfig(sideways_actions_per_m=0.0), RADIUS)
+    goal = triples[25][0]
+    seeing = [r for *_, r in triples[25:50]]
+    blind = careless.plan_target(goal, [s for _, s, _ in triples[25:50]])
+    ahead, sideways = metres_ahead_and_sideways(blind)
+    assert sideways > ahead
+    assert [r.length_m for r in seeing] == pytest.approx([r.length_m for r in blind])
+    fewer, more = (sum(r.n_actions for r in routes) for routes in (blind, seeing))
+    assert fewer < more < 1.4 * fewer
+
+
 def legs(r):
     """Directions and lengths of a route's moves before the Approach, equal neighbours joined."""
     out = []

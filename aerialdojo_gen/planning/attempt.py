@@ -102,7 +102,7 @@ def attempt(
     if status != FOUND:
         unseen = Examination(np.empty((0, 3)), False, np.empty(0, np.bool_), 0.0)
         return Attempt(status, expansions, np.empty((0, 4)), np.empty(0, np.int8), 0.0, unseen)
-    flown = moves_to_actions(start, moves, goal_heading, options.radius, grid)
+    flown = moves_to_actions(start, moves, goal_heading, options.sideways, options.radius, grid)
     poses = fly(start, flown)
     n = len(flown)
     dx, dy, dz = goal[0] - poses[n, 0], goal[1] - poses[n, 1], goal[2] - poses[n, 2]

@@ -102,6 +102,8 @@ class SearchOptions(NamedTuple):
         Edge of the cells that tell duplicates, metres.
     sectors : int
         Heading sectors that tell duplicates, a divisor of 24.
+    sideways : float
+        What a metre flown to the left or right counts as, in actions, when the found route's headings are chosen.
     """
 
     radius: float
@@ -111,6 +113,7 @@ class SearchOptions(NamedTuple):
     budget: int
     cell: float
     sectors: int
+    sideways: float
 
 
 def make_search_arrays(budget: int) -> SearchArrays:

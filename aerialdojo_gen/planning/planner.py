@@ -149,7 +149,7 @@ class Planner:
                 memory = self._memory[rung.budget] = make_search_arrays(rung.budget)
             options = SearchOptions(
                 g.radius_m + rung.extra_radius_m, rung.weight, c.action_cost_m, c.max_approach_m, rung.budget,
-                rung.duplicate_cell_m, rung.heading_sectors,
+                rung.duplicate_cell_m, rung.heading_sectors, c.sideways_actions_per_m,
             )  # fmt: skip
             tried = attempt(start, goal[:3], heading, self._cost, g.arrays, memory, options, self.radius_m, g.cap_m)
             expansions += tried.expansions

@@ -1,7 +1,8 @@
 """From translations to actions: put a found route in its best order and fly it with the fewest actions.
 
 Translations commute: flown in another order they end in the same place, after the same length. So equal directions
-are brought together, there and back cancels out, and the headings are chosen by dynamic programming.
+are brought together, there and back cancels out, and the headings are chosen by dynamic programming: few actions, and
+few metres flown sideways, for the front camera should see where the drone is going.
 """
 
 from __future__ import annotations
@@ -63,12 +64,15 @@ def _fewest_moves(direction: int, metres: int) -> int:
 
 
 @njit(cache=True)
-def _headings(direction: NDArray[np.int64], n: int, goal_heading: int, chosen: NDArray[np.int64]) -> int:
-    """Choose the heading of every leg with the fewest turns overall; return that number.
+def _headings(
+    direction: NDArray[np.int64], metres: NDArray[np.int64], n: int, goal_heading: int, sideways: float,
+    chosen: NDArray[np.int64],
+) -> float:  # fmt: skip
+    """Choose the heading of every leg, so that turns and metres flown sideways cost least; return that cost.
 
     A leg is flown ahead, to the left or to the right; on a tie ahead. A vertical leg keeps the heading.
     """
-    best = np.zeros((n + 1, 3), np.int64)
+    best = np.zeros((n + 1, 3))
     back = np.zeros((n + 1, 3), np.int64)
     at = np.zeros((n + 1, 3), np.int64)
     for i in range(1, n + 1):
@@ -79,16 +83,17 @@ def _headings(direction: NDArray[np.int64], n: int, goal_heading: int, chosen: N
                 continue
             offset = 0 if side == 0 else (-QUARTER if side == 1 else QUARTER)
             at[i, side] = (d + offset) % N_HEADINGS
-            best[i, side] = 1 << 40
+            own = 0.0 if side == 0 else sideways * metres[i - 1]
+            best[i, side] = np.inf
             for before in range(3):
-                turns = best[i - 1, before] + turns_between(at[i - 1, before], at[i, side])
-                if turns < best[i, side]:
-                    best[i, side], back[i, side] = turns, before
-    total, side = 1 << 40, 0
+                cost = best[i - 1, before] + turns_between(at[i - 1, before], at[i, side]) + own
+                if cost < best[i, side]:
+                    best[i, side], back[i, side] = cost, before
+    total, side = np.inf, 0
     for last in range(3):
-        turns = best[n, last] + turns_between(at[n, last], goal_heading)
-        if turns < total:
-            total, side = turns, last
+        cost = best[n, last] + turns_between(at[n, last], goal_heading)
+        if cost < total:
+            total, side = cost, last
     for i in range(n, 0, -1):
         chosen[i - 1] = at[i, side]
         side = back[i, side]
@@ -96,9 +101,10 @@ def _headings(direction: NDArray[np.int64], n: int, goal_heading: int, chosen: N
 
 
 @njit(cache=True)
-def _n_actions(direction: NDArray[np.int64], metres: NDArray[np.int64], n: int, goal_heading: int,
-               chosen: NDArray[np.int64]) -> int:  # fmt: skip
-    total = _headings(direction, n, goal_heading, chosen)
+def _effort(direction: NDArray[np.int64], metres: NDArray[np.int64], n: int, goal_heading: int, sideways: float,
+            chosen: NDArray[np.int64]) -> float:  # fmt: skip
+    """Actions, and what metres flown sideways count as."""
+    total = _headings(direction, metres, n, goal_heading, sideways, chosen)
     for i in range(n):
         total += _fewest_moves(direction[i], metres[i])
     return total
@@ -129,11 +135,12 @@ def _legs_free(
 @njit(cache=True)
 def _reorder(
     start: NDArray[np.float64], direction: NDArray[np.int64], metres: NDArray[np.int64], n: int, goal_heading: int,
-    radius: float, grid: GridArrays,
+    sideways: float, radius: float, grid: GridArrays,
 ) -> int:  # fmt: skip
-    """Move single legs elsewhere in the sequence as long as that is free and saves length or actions, in place."""
+    """Move single legs elsewhere in the sequence as long as that is free and saves length or effort, in place."""
     new_direction, new_metres, chosen = np.empty_like(direction), np.empty_like(metres), np.empty_like(direction)
-    length, actions = metres[:n].sum(), _n_actions(direction, metres, n, goal_heading, chosen)
+    length = metres[:n].sum()
+    effort = _effort(direction, metres, n, goal_heading, sideways, chosen)
     for _ in range(_MAX_PASSES):
         improved = False
         for source in range(n):
@@ -156,13 +163,13 @@ def _reorder(
                 new_length = new_metres[:m].sum()
                 if new_length > length:
                     continue
-                new_actions = _n_actions(new_direction, new_metres, m, goal_heading, chosen)
-                if new_length == length and new_actions >= actions:
+                new_effort = _effort(new_direction, new_metres, m, goal_heading, sideways, chosen)
+                if new_length == length and new_effort >= effort:
                     continue
                 if not _legs_free(start, new_direction, new_metres, m, radius, grid):
                     continue
                 direction[:m], metres[:m] = new_direction[:m], new_metres[:m]
-                n, length, actions = m, new_length, new_actions
+                n, length, effort = m, new_length, new_effort
                 improved = True
                 break
             if improved:
@@ -196,6 +203,7 @@ def moves_to_actions(
     start: NDArray[np.float64],
     moves: NDArray[np.int8],
     goal_heading: int,
+    sideways: float,
     radius: float,
     grid: GridArrays,
 ) -> NDArray[np.int8]:
@@ -209,6 +217,8 @@ def moves_to_actions(
         Translations, as `aerialdojo_gen.planning.hybrid_astar.search` returns them.
     goal_heading : int
         Heading to end with, counted from the start's yaw.
+    sideways : float
+        What a metre flown to the left or right counts as, in actions.
     radius : float
         Radius that must stay clear, metres.
     grid : GridArrays
@@ -230,9 +240,9 @@ def moves_to_actions(
             direction[i], metres[i] = (_UP if lift > 0 else _DOWN), int(abs(lift))
         total += metres[i]
     n = _merge(direction, metres, len(moves))
-    n = _reorder(start, direction, metres, n, goal_heading, radius, grid)
+    n = _reorder(start, direction, metres, n, goal_heading, sideways, radius, grid)
     chosen = np.empty(n + 1, np.int64)
-    _headings(direction, n, goal_heading, chosen)
+    _headings(direction, metres, n, goal_heading, sideways, chosen)
     actions = np.empty(total + N_HEADINGS * (n + 1), np.int8)
     k, heading = 0, 0
     for i in range(n):
