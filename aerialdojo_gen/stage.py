@@ -308,7 +308,7 @@ STAGES: tuple[Stage, ...] = (
         sources=_paper_sources, check=_enough_for_the_paper,
     ),
     Stage(
-        "render", 2, "Record four RGB-D views along trajectories of the release.",
+        "render", 3, "Record four RGB-D views along trajectories of the release.",
         ("scenes", "routes/train", "routes/test"), ("recordings", "frames"), parts=_render_parts,
         settle=_settle_renderer, choices=_renderers,
     ),

@@ -65,6 +65,17 @@ def test_frozen_only_where_the_camera_moved(sound, solid):
     assert flags_of(solid, (sound, HERE), (sound, HERE)) == set()
 
 
+def test_the_sky_stands_still_until_the_camera_turns(world, solid):
+    # High above everything, looking level: nothing but sky, from wherever it is seen.
+    low, high, turned = (
+        view_pose((0.0, 0.0, z), yaw, "front") for z, yaw in ((400.0, 0.2), (401.0, 0.2), (400.0, 1.2))
+    )
+    sky = world.render(CAMERA, low)
+    sky = replace(sky, depth_m=np.full_like(sky.depth_m, np.inf))
+    assert "frozen" not in flags_of(solid, (sky, low), (sky, high))
+    assert "frozen" in flags_of(solid, (sky, low), (sky, turned))
+
+
 @pytest.mark.parametrize("value", [np.nan, -0.5, 0.0])
 def test_depth_invalid(sound, solid, value):
     depth = sound.depth_m.copy()
