@@ -165,6 +165,10 @@ def _picture(axes: Axes, task: PicturedTask, plane: Plane) -> None:
         axes.set_yticks([])
 
 
+# As wide as the words at a route's ends, of a picture's width.
+_LABEL_SHARE = 0.09
+
+
 def _coloured(points: Floats, clearance_m: Floats, width: float) -> LineCollection:
     pieces = np.stack([points[:-1], points[1:]], axis=1)
     return LineCollection(
@@ -181,12 +185,16 @@ def _route(axes: Axes, task: PicturedTask, plane: Plane) -> None:
 
 def _ends(axes: Axes, task: PicturedTask, plane: Plane) -> None:
     ends = plane.project(task.way[[0, -1]])
+    low, high = sorted(axes.get_xlim())
     for (a, b), other, text, colour in zip(ends, ends[::-1], ("start", "goal"), (_START, _GOAL), strict=True):
         axes.plot([a], [b], "o", ms=10, mfc=colour, mec="white", mew=1.6, zorder=8)
-        left = a < other[0]
+        # Away from the other end, unless the picture ends there.
+        side = -1 if a < other[0] else 1
+        beside = (a - low if side < 0 else high - a) > _LABEL_SHARE * (high - low)
         axes.annotate(
-            text, (a, b), (-10 if left else 10, 0), textcoords="offset points", ha="right" if left else "left",
-            va="center", fontsize=10, weight="bold", color="white", path_effects=_HALO, zorder=9, clip_on=True,
+            text, (a, b), (10 * side, 0) if beside else (0, 8), textcoords="offset points",
+            ha=("right" if side < 0 else "left") if beside else "center", va="center" if beside else "bottom",
+            fontsize=10, weight="bold", color="white", path_effects=_HALO, zorder=9, clip_on=True,
         )  # fmt: skip
 
 
