@@ -29,6 +29,8 @@ _START, _GOAL, _TARGET = "#0284c7", "#16a34a", "#facc15"
 _HALO = (withStroke(linewidth=3, foreground="black"),)
 _HALO_OF_BAR = (withStroke(linewidth=5, foreground="black"),)
 _AROUND_M, _LEAST_M, _ABOVE_M = 7.0, 26.0, 3.0
+# As wide as the words at a route's ends, of a picture's width.
+_LABEL_SHARE = 0.09
 
 
 def draw_map(axes: Axes, task: PicturedTask, aspect: float) -> None:
@@ -163,10 +165,6 @@ def _picture(axes: Axes, task: PicturedTask, plane: Plane) -> None:
     axes.set_xticks([])
     if plane.up[2] == 0.0:
         axes.set_yticks([])
-
-
-# As wide as the words at a route's ends, of a picture's width.
-_LABEL_SHARE = 0.09
 
 
 def _coloured(points: Floats, clearance_m: Floats, width: float) -> LineCollection:
