@@ -263,3 +263,38 @@ def test_the_monastery_up_to_planned_tasks(tmp_path):
 )  # fmt: skip
 def test_colours_have_everyday_names(rgb, word):
     assert colour_name(rgb) == word
+
+
+def reordered(glb: bytes, order) -> bytes:
+    """The same GLB with its nodes in another order, and its last two meshes as two primitives of one node."""
+    length = int.from_bytes(glb[12:16], "little")
+    document, rest = json.loads(glb[20 : 20 + length]), glb[20 + length :]
+    shown = [n for n in document["nodes"] if "mesh" in n]
+    *singles, keeper, given = sorted(shown, key=lambda n: n["name"])
+    meshes = document["meshes"]
+    both = [dict(p) for n in (keeper, given) for p in meshes[n["mesh"]]["primitives"]]
+    meshes[keeper["mesh"]] = meshes[keeper["mesh"]] | {"primitives": both[:: 1 if order(1) else -1]}
+    nodes = sorted([*singles, keeper], key=lambda n: order(n["mesh"]))
+    document["nodes"] = nodes
+    document["scenes"] = [{"nodes": list(range(len(nodes)))}]
+    document["scene"] = 0
+    text = json.dumps(document).encode()
+    text += b" " * (-len(text) % 4)
+    head = b"glTF" + (2).to_bytes(4, "little") + (20 + len(text) + len(rest)).to_bytes(4, "little")
+    return head + len(text).to_bytes(4, "little") + b"JSON" + text + rest
+
+
+def test_the_same_file_gives_the_same_bytes_in_whatever_order_its_nodes_come(village, tmp_path):
+    glb = (village / "village.glb").read_bytes()
+    made = set()
+    for k, order in enumerate((lambda n: n, lambda n: n, lambda n: -n, lambda n: 7 * n % 5)):
+        file = tmp_path / f"{k}" / "village.glb"
+        file.parent.mkdir()
+        file.write_bytes(reordered(glb, order))
+        # What was two bodies is one node of two materials, and no category is made of a reader's random digits.
+        scene, _ = adopt("Village", read_mesh(file))
+        assert len(things(scene)) == 8
+        assert {i.category for i in things(scene)} <= {"clock_tower", "house"}
+        added = add_scene("Village", file, tmp_path / f"project{k}", up="z")
+        made.add((added.pipeline.parent / "scenes/Village.glb").read_bytes())
+    assert len(made) == 1

@@ -1,5 +1,6 @@
 """The release through the authors' layout and back: nothing is lost but what the layout has no field for."""
 
+import json
 import math
 
 import numpy as np
@@ -14,7 +15,6 @@ from aerialdojo_gen.exchange.aerialdojo_writer import LOST
 from aerialdojo_gen.exchange.exporting import export_release
 from aerialdojo_gen.exchange.importing import import_benchmark
 from aerialdojo_gen.planning.primitives import replay, route_length_m
-from aerialdojo_gen.release.select import nav_id
 from aerialdojo_gen.schemas import APPROACH, RELEASE_OBJECTS, ROUTES, TASKS
 
 # Recomputed from the poses, which come back to the last bit.
@@ -24,7 +24,7 @@ RECOMPUTED = {"euclidean_m": 1e-9, "length_m": 1e-9, "detour_ratio": 1e-9}
 @pytest.fixture(scope="module")
 def there_and_back(smoke, tmp_path_factory):
     folder = tmp_path_factory.mktemp("roundtrip")
-    export_release("aerialdojo", smoke, folder / "layout")
+    export_release("aerialdojo", smoke, folder / "layout", picture_px=0)
     report = import_benchmark("aerialdojo", [folder / "layout"], folder / "data")
     return smoke, folder / "data", report
 
@@ -77,8 +77,7 @@ def test_the_report_says_what_is_lost(there_and_back):
     assert not report.notes
     whole = {name for name, n in report.empty.items() if n == report.rows[name.split(".")[0]]}
     said = {f"{table}.{c}" for table in ("routes", "objects") for c in LOST[table] if " " not in c}
-    # The layout states no length of its own; a foreign file may.
-    assert whole - {"routes.stated_length_m"} == said
+    assert whole == said
     assert report.rows["routes"] > 100
     assert report.replay() == {"routes": report.rows["routes"], "median_m": 0.0, "max_m": 0.0, "over_3_m": 0}
 
@@ -143,7 +142,7 @@ def test_any_flight_and_any_name_come_back(smoke, tmp_path_factory, flown_ones, 
         replace_rows(data, table, scene, rows)
     for table in ("routes/test", "tasks/test"):
         replace_rows(data, table, scene, [])
-    export_release("aerialdojo", data, folder / "layout")
+    export_release("aerialdojo", data, folder / "layout", picture_px=0)
     import_benchmark("aerialdojo", [folder / "layout"], folder / "back")
     for table in ("tasks", "routes"):
         ours, theirs = released(data, table), imported(folder / "back", table)
@@ -162,6 +161,17 @@ def test_a_navigation_task_keeps_its_name_whatever_part_is_imported(smoke, there
         mine.drop(columns=["source_file", "source_row"]),
         all_of_them.loc[mine.index].drop(columns=["source_file", "source_row"]),
     )
-    row = mine.iloc[0]
-    pair = f"{row['start_object_id']}_{row['start_anchor_id']}__{row['target_object_id']}"
-    assert row.name == nav_id("U_Courtyard_1", pair)
+    assert set(mine.index) <= set(released(smoke, "routes").index)
+
+
+def test_without_its_name_a_navigation_task_is_named_by_its_objects(smoke, tmp_path):
+    export_release("aerialdojo", smoke, tmp_path / "layout", ["U_Courtyard_1"], picture_px=0)
+    for path in (tmp_path / "layout").glob("*OGS/*/*/*/Task.json"):
+        tasks = json.loads(path.read_text())
+        path.write_text(json.dumps([{k: v for k, v in task.items() if k != "trajectory_id"} for task in tasks]))
+    import_benchmark("aerialdojo", [tmp_path / "layout"], tmp_path / "all")
+    part = tmp_path / "layout/ImageOGS/OOD_TESTS/1_BaseTasks/U_Courtyard_1_B_Test/Task.json"
+    import_benchmark("aerialdojo", [part], tmp_path / "part")
+    every, some = imported(tmp_path / "all", "routes"), imported(tmp_path / "part", "routes")
+    assert len(some) > 10
+    assert some["x_m"].map(tuple).equals(every.loc[some.index, "x_m"].map(tuple))

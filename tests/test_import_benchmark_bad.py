@@ -160,7 +160,7 @@ def test_whatever_stands_in_a_field_is_read_or_named(tmp_path, format_name, data
 @pytest.fixture(scope="module")
 def exported(smoke, tmp_path_factory) -> Path:
     out = tmp_path_factory.mktemp("exported") / "layout"
-    export_release("aerialdojo", smoke, out, ["U_Courtyard_1"])
+    export_release("aerialdojo", smoke, out, ["U_Courtyard_1"], picture_px=0)
     return out
 
 
@@ -187,6 +187,13 @@ LAYOUT_BAD = [
         "start_pose.start_quaternion_xyzw",
         "expected 4 numbers, found 3",
     ),
+    (
+        "start_pose.start_quaternionr",
+        [1, 0, 0, 0],
+        "start_pose.start_quaternionr",
+        "is not start_quaternion_xyzw",
+    ),
+    ("info.complexity", "high", "info.complexity", "expected"),
 ]
 
 

@@ -19,12 +19,18 @@ def export(
     out: Annotated[Path | None, typer.Option("--out", help="Folder to make.  (default: DATA/exports/FORMAT)")] = None,
     scene: Scene = None,
     force: Annotated[bool, typer.Option("--force", help="Replace an earlier export there.")] = False,
+    picture_size: Annotated[
+        int | None,
+        typer.Option(
+            help="Pixels of aerialdojo's pictures, drawn from the meshes; 0: the release's own.  (default: 640)"
+        ),
+    ] = None,
 ) -> None:
     """Write the release in the layout of AerialDojo's authors, or as Habitat's ObjectNav-v1."""
     from aerialdojo_gen.exchange.exporting import export_release
 
     target = out or data / "exports" / form
-    counts = export_release(form, data, target, scene, force=force)
+    counts = export_release(form, data, target, scene, force=force, picture_px=picture_size)
     print(f"{target}: " + ", ".join(f"{n:,} {name}" for name, n in counts.items()))
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from aerialdojo_gen.errors import StoreError, UsageError
 from aerialdojo_gen.exchange.actions import WORDS, actions_of
@@ -24,7 +25,6 @@ from aerialdojo_gen.exchange.fields import BadField, Fields, plain, positions_of
 from aerialdojo_gen.exchange.folder import check_picture, inside
 from aerialdojo_gen.exchange.jsonstream import small_document
 from aerialdojo_gen.exchange.task import Context, Instance, Route, Task, digest
-from aerialdojo_gen.release.select import nav_id
 from aerialdojo_gen.stages.build_scenes import parse_name
 
 _PAIR = re.compile(r"(\d{1,9})_(\d{1,9})__(\d{1,9})")
@@ -94,15 +94,18 @@ class Reader:
         if partition is not None:
             _agree(partition, scene, word, trains)
         pose = record.child("start_pose")
-        quaternion = "start_quaternion_xyzw" if pose.has("start_quaternion_xyzw") else "start_quaternionr"
-        start = context.upright_pose(pose.position("start_position"), pose.quaternion(quaternion))
+        start = context.upright_pose(pose.position("start_position"), _attitude(pose))
         goal = None
         if record.has("goal_pose"):
             goal = context.frame.positions_to_world(record.child("goal_pose").position("goal_position"))
-        target = record.text("goal_object_name", empty=False)
+        # Where readable names stand beside them, the others are the actors'.
+        actor = record.text("goal_object_name", empty=False)
+        target, start_actor = record.optional_text("goal_true_name"), record.optional_text("start_object_name")
         known: dict[str, Any] = {
-            "target_name": target,
-            "start_object_name": record.optional_text("start_object_name"),
+            "target_name": target or actor,
+            "mesh_node": actor if target else None,
+            "start_object_name": record.optional_text("start_true_name") or start_actor,
+            "start_mesh_node": start_actor if record.has("start_true_name") else None,
             "category": record.optional_text("category"),
             "description": (description := record.optional_text("description")),
             "landmark": record.optional_text("Landmark"),
@@ -113,6 +116,9 @@ class Reader:
             "subset": "train" if trains else "test",
             "setting": SETTING_OF[word],
         }
+        record.optional_text("coordinate_system")
+        if record.has("info"):
+            known |= _stated(record.child("info"))
         image = record.optional_text("image")
         modality = kind or ("image" if image else "semantic")
         if modality == "image":
@@ -120,8 +126,8 @@ class Reader:
             instance = Instance("image", None, self._picture(image, context))
         else:
             instance = Instance("semantic", description)
-        task = Task(episode, scene, start=start, goal=goal, instances=[instance], object_key=target, known=known)
-        self._join(task, context, folder, partition)
+        task = Task(episode, scene, start=start, goal=goal, instances=[instance], object_key=actor, known=known)
+        self._join(task, context, folder, partition, record.optional_text("trajectory_id"))
         self._met.add((context.label, episode))
         return task
 
@@ -135,30 +141,34 @@ class Reader:
         except ValueError as error:
             raise BadField("image", str(error)) from None
 
-    def _join(self, task: Task, context: Context, folder: Path, partition: Partition | None) -> None:
-        """Give the task its trajectory, or what its other instance brought already."""
+    def _join(
+        self, task: Task, context: Context, folder: Path, partition: Partition | None, own: str | None
+    ) -> None:
+        """Give the task its trajectory, or what its other instance brought already; `own` is its trajectory's id."""
         place = folder.parts[-3:] if partition else (context.label,)
         if place != self._partition:
             self._partition, self._known = place, {}
             self._met = {pair for pair in self._met if pair[0] == context.label}
         met = self._known.get(task.source_id)
         if met is None:
-            met = self._trajectory(task, context, folder, partition)
+            met = self._trajectory(task, context, folder, partition, own)
             self._known[task.source_id] = met
         else:
             task.has_route_row = False
             if float(np.linalg.norm(task.start[:3] - met["start"])) > _START_FAR_M:
                 raise BadField("start_pose.start_position", "is not that of the episode's other instance")
-            if task.known["target_name"] != met["target"]:
+            if task.object_key != met["target"]:
                 raise BadField("goal_object_name", "is not that of the episode's other instance")
         task.nav_id, task.goal = met["nav_id"], task.goal if task.goal is not None else met["goal"]
         task.known |= met["known"]
         if task.has_route_row:
             task.route = met.pop("route")
 
-    def _trajectory(self, task: Task, context: Context, folder: Path, partition: Partition | None) -> dict[str, Any]:
+    def _trajectory(
+        self, task: Task, context: Context, folder: Path, partition: Partition | None, own: str | None
+    ) -> dict[str, Any]:
         met: dict[str, Any] = {"route": None, "known": {}, "goal": None, "start": task.start[:3]}
-        met["target"] = task.known["target_name"]
+        met["target"] = task.object_key
         pair = None
         if partition is not None:
             root = folder.parents[3] / TRAJECTORIES
@@ -166,7 +176,10 @@ class Reader:
                 pair = self._read(root, partition, task, context, met)
             else:
                 context.notes[f"no folder in {TRAJECTORIES} for its partition: no route"] += 1
-        name = nav_id(task.scene, pair) if pair else None
+        # Ours bring their name; of others the objects make it, so that any part of a dataset gives the same names.
+        name = f"{task.scene}-{digest(task.scene, pair)}" if pair else None
+        if own and re.fullmatch(rf"{re.escape(task.scene)}-[A-Za-z0-9]{{1,64}}", own):
+            name = own
         if name is None or name in self._nav_ids:
             if name is not None:
                 context.notes["task_id stands twice in the scene: named by partition and episode"] += 1
@@ -194,7 +207,7 @@ class Reader:
         if document.has("status") and document.text("status") != "planned":
             raise BadField(document.path("status"), f"{shown(document.text('status'))}, expected 'planned'")
         name = document.child("goal").text("Object_name")
-        if name != task.known["target_name"]:
+        if name != task.object_key:
             raise BadField(document.path("goal.Object_name"), f"{shown(name)} is not the task's goal_object_name")
         pair = document.text("task_id")
         met["route"] = _route(document, context)
@@ -209,6 +222,25 @@ class Reader:
         names = ("start_object_id", "start_anchor_id", "target_object_id")
         met["known"] = dict(zip(names, map(int, match.groups()), strict=True))
         return pair
+
+
+def _attitude(pose: Fields) -> NDArray[np.float64]:
+    """Return the start's quaternion, xyzw: the recorder's data and the evaluator have a name of their own for it."""
+    names = [name for name in ("start_quaternion_xyzw", "start_quaternionr") if pose.has(name)]
+    found = [pose.quaternion(name) for name in names or ["start_quaternion_xyzw"]]
+    if np.abs(found[-1] - found[0]).max() > _EXACT:
+        raise BadField(pose.path(names[1]), f"is not {names[0]}")
+    return found[0]
+
+
+def _stated(info: Fields) -> dict[str, Any]:
+    """What a task states of its own route; a trajectory's poses overrule it."""
+    names = {
+        "geodesic_distance": "stated_length_m",
+        "euclidean_distance": "euclidean_m",
+        "complexity": "detour_ratio",
+    }
+    return {ours: info.number(theirs) for theirs, ours in names.items() if info.has(theirs)}
 
 
 def _agree(partition: Partition, scene: str, word: str, trains: bool) -> None:

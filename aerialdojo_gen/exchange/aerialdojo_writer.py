@@ -28,14 +28,15 @@ from aerialdojo_gen.exchange.aerialdojo_layout import (
     partition_of,
 )
 from aerialdojo_gen.exchange.frames import NED
+from aerialdojo_gen.exchange.redrawn import Redrawn
 
 Floats = NDArray[np.float64]
 
-# What the layout has no field for; sizes of actions are in the poses, nav_id and task_id follow from task_id.
+# What the layout has no field for; sizes of actions are in the poses, trajectory_id is the nav_id.
 LOST: Mapping[str, Sequence[str]] = {
     "routes": ["goal_yaw_rad", "min_clearance_m"],
     "objects": [
-        "mesh_node", "x_m", "y_m", "z_m", "size_x_m", "size_y_m", "size_z_m", "landmark_id",
+        "x_m", "y_m", "z_m", "size_x_m", "size_y_m", "size_z_m", "landmark_id",
         "box_u0_px", "box_v0_px", "box_u1_px", "box_v1_px", "image_fraction", "all of those that no task names",
     ],
     "landmarks": ["all but the names"],
@@ -43,11 +44,14 @@ LOST: Mapping[str, Sequence[str]] = {
     "scenes": ["all but the name"],
 }  # fmt: skip
 
-_PICTURES = "images"
+_PICTURES = "Images"
+_COORDINATES = "ProjectAirSim NED"
 
 
-def write_scene(data: Path, scene: str, root: Path) -> dict[str, int]:
+def write_scene(data: Path, scene: str, root: Path, picture_px: int = 0) -> dict[str, int]:
     """Write a scene's tasks, pictures and trajectories.
+
+    As in the authors' data every scene has all of its partitions: one without tasks is an empty list.
 
     Parameters
     ----------
@@ -57,6 +61,8 @@ def write_scene(data: Path, scene: str, root: Path) -> dict[str, int]:
         A scene of its release.
     root : Path
         Folder of the layout.
+    picture_px : int
+        Columns and rows of the pictures, drawn anew from the scene's mesh; 0 for the release's own.
 
     Returns
     -------
@@ -67,20 +73,21 @@ def write_scene(data: Path, scene: str, root: Path) -> dict[str, int]:
     ------
     StoreError
         A table is missing or damaged, or an object that an image task names has no picture.
+    AssetError
+        Pictures are to be drawn, and the scene's mesh is missing or another one.
     """
     objects = {row["object_id"]: row for row in store.read_scene(data, "release/objects", scene).to_pylist()}
-    pictures = _Pictures(root, scene, objects)
+    draw = Redrawn(data, scene, picture_px) if picture_px else None
+    pictures = _Pictures(scene, objects, draw)
     counts = dict.fromkeys(("task files", "tasks", "trajectories"), 0)
     for subset in ("train", "test"):
         tasks = store.read_scene(data, f"tasks/{subset}", scene)
         routes = store.read_scene(data, f"routes/{subset}", scene)
         for setting in SETTING_WORDS:
             chosen = routes.filter(pa.compute.equal(routes["setting"], setting)).sort_by("nav_id")
-            if not chosen.num_rows:
-                continue
             episodes = {nav_id: str(k) for k, nav_id in enumerate(chosen["nav_id"].to_pylist())}
             mine = tasks.filter(pa.compute.equal(tasks["setting"], setting)).sort_by("nav_id").to_pylist()
-            partition = partition_of(scene, setting, mine[0]["partition"], subset)
+            partition = partition_of(scene, setting, store.partition(scene).upper(), subset)
             ends = _ends(chosen)
             for kind, modality in ((SEMANTIC, "semantic"), (IMAGE, "image")):
                 rows = [row for row in mine if row["modality"] == modality]
@@ -99,6 +106,7 @@ def write_scene(data: Path, scene: str, root: Path) -> dict[str, int]:
 
 def _ends(routes: pa.Table) -> dict[str, dict[str, Any]]:
     columns = ["nav_id", "start_object_id", "target_object_id", "goal_x_m", "goal_y_m", "goal_z_m"]
+    columns += ["length_m", "euclidean_m", "detour_ratio"]
     return {row["nav_id"]: row for row in routes.select(columns).to_pylist()}
 
 
@@ -112,38 +120,52 @@ def _task(
 ) -> dict[str, Any]:
     start = NED.positions_from_world([row[f"start_{a}_m"] for a in "xyz"])
     goal = NED.positions_from_world([ends[f"goal_{a}_m"] for a in "xyz"])
+    quaternion = NED.quaternion_from_world_yaw(row["start_yaw_rad"]).tolist()
+    start_object, target = objects[ends["start_object_id"]], objects[ends["target_object_id"]]
     record = {
         "episode_id": episode,
+        # By it their replay finds a trajectory, where actors have several.
+        "trajectory_id": row["nav_id"],
         "map_name": row["scene"],
+        "coordinate_system": _COORDINATES,
         "task": SETTING_WORDS[row["setting"]][2],
         "used-in-train": int(row["subset"] == "train"),
-        "start_object_name": objects[ends["start_object_id"]]["name"],
-        "goal_object_name": row["target_name"],
-        "description": row["description"] or "",
-        "category": objects[ends["target_object_id"]]["category"],
-        "Landmark": row["landmark"],
-        "Direction": row["direction"],
+        "start_true_name": start_object["name"],
+        "goal_true_name": row["target_name"],
+        "start_object_name": start_object["mesh_node"],
+        "goal_object_name": target["mesh_node"],
     }
+    # An image task has no description, not an empty one: their loader takes the landmark for one that is absent.
+    if row["modality"] == "semantic":
+        record["description"] = row["description"]
+    record |= {"category": target["category"], "Landmark": row["landmark"], "Direction": row["direction"]}
     if row["modality"] == "image":
         record["image"] = pictures.place(folder, ends["target_object_id"])
     record["start_pose"] = {
         "start_position": start.tolist(),
-        "start_quaternion_xyzw": NED.quaternion_from_world_yaw(row["start_yaw_rad"]).tolist(),
+        "start_quaternion_xyzw": quaternion,
+        # The same numbers under the name that their evaluator reads.
+        "start_quaternionr": quaternion,
     }
     record["goal_pose"] = {"goal_position": goal.tolist()}
+    record["info"] = {
+        "geodesic_distance": ends["length_m"],
+        "euclidean_distance": ends["euclidean_m"],
+        "complexity": ends["detour_ratio"],
+    }
     return record
 
 
 def _write_list(path: Path, records: Sequence[Mapping[str, Any]]) -> None:
     lines = ",\n".join(json.dumps(record, ensure_ascii=False, allow_nan=False) for record in records)
-    path.write_text(f"[\n{lines}\n]\n", encoding="utf-8")
+    path.write_text(f"[\n{lines}\n]\n" if records else "[]\n", encoding="utf-8")
 
 
 class _Pictures:
     """Puts an object's picture beside every task file that names it: one file, linked, where the disk can."""
 
-    def __init__(self, root: Path, scene: str, objects: Mapping[int, Mapping[str, Any]]) -> None:
-        self._root, self._scene, self._objects = root, scene, objects
+    def __init__(self, scene: str, objects: Mapping[int, Mapping[str, Any]], draw: Redrawn | None) -> None:
+        self._scene, self._objects, self._draw = scene, objects, draw
         self._first: dict[int, Path] = {}
         self._placed: set[Path] = set()
 
@@ -171,7 +193,7 @@ class _Pictures:
             if picture is None:
                 raise StoreError(f"object {object_id} of {self._scene} has no reference image: "
                                  f"run aerialdojo-gen split --scene {self._scene}")  # fmt: skip
-            path.write_bytes(picture)
+            path.write_bytes(self._draw.picture(object_id) if self._draw else picture)
             self._first[object_id] = path
             return
         try:
@@ -197,7 +219,7 @@ def _write_trajectories(
             "map_name": partition.scene,
             "task_id": f"{row['start_object_id']}_{row['start_anchor_id']}__{row['target_object_id']}",
             "status": "planned",
-            "goal": {"Object_name": objects[row["target_object_id"]]["name"]},
+            "goal": {"Object_name": objects[row["target_object_id"]]["mesh_node"]},
             "trajectory": [
                 {"action": word, "position_ned_m": position, "quaternion_xyzw": quaternion}
                 for word, position, quaternion in zip(words_of(actions, poses), positions, quaternions, strict=True)

@@ -12,6 +12,7 @@ from aerialdojo_gen.exchange import aerialdojo_writer, habitat_writer
 from aerialdojo_gen.exchange.folder import whole_folder, write_json
 
 MARKER = "export.json"
+PICTURE_PX = 640
 FORMATS = {
     "aerialdojo": ("north, east, down, metres; quaternions xyzw; forward +x", aerialdojo_writer.LOST),
     "habitat": ("east, up, south, metres; quaternions xyzw; forward -z", habitat_writer.LOST),
@@ -19,7 +20,13 @@ FORMATS = {
 
 
 def export_release(
-    format_name: str, data: Path, out: Path, scenes: Sequence[str] | None = None, *, force: bool = False
+    format_name: str,
+    data: Path,
+    out: Path,
+    scenes: Sequence[str] | None = None,
+    *,
+    force: bool = False,
+    picture_px: int | None = None,
 ) -> dict[str, int]:
     """Write the release in a format of others.
 
@@ -35,6 +42,9 @@ def export_release(
         Names or globs; all of the release where absent.
     force : bool
         Replace an earlier export there.
+    picture_px : int, optional
+        Columns and rows of the pictures of ``aerialdojo``, drawn anew from the meshes: 640 as the authors' where
+        absent; 0 for the release's own.
 
     Returns
     -------
@@ -47,11 +57,15 @@ def export_release(
         The format or a scene does not exist, or the folder is not empty.
     StoreError
         The release is missing or damaged, or the disk is full.
+    AssetError
+        Pictures are to be drawn, and a mesh is missing or another one.
     """
     from aerialdojo_gen.runner import choose_scenes
 
     if format_name not in FORMATS:
         raise UsageError(f"no format {format_name!r}: it is one of {', '.join(FORMATS)}")
+    if picture_px is not None and (format_name != "aerialdojo" or not (picture_px == 0 or 16 <= picture_px <= 4096)):
+        raise UsageError("--picture-size is for --format aerialdojo: 16 to 4096 pixels, or 0 for the release's own")
     released = store.release_scenes(data)
     if not released:
         raise UsageError(f"there is no release in {data}: run aerialdojo-gen split --data {data}")
@@ -61,7 +75,7 @@ def export_release(
     with whole_folder(out, MARKER, force=force) as root:
         if format_name == "aerialdojo":
             for scene in chosen:
-                counts.update(aerialdojo_writer.write_scene(data, scene, root))
+                counts.update(aerialdojo_writer.write_scene(data, scene, root, PICTURE_PX if picture_px is None else picture_px))
         else:
             categories = habitat_writer.categories_of(data, chosen)
             habitat_writer.write_index(root, categories)

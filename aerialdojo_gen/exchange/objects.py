@@ -56,7 +56,8 @@ class Objects:
             row |= dict(zip(("x_m", "y_m", "z_m"), task.object_m.tolist(), strict=True))
         self._merge(task.scene, number, row)
         if "start_object_id" in known:
-            self._merge(task.scene, known["start_object_id"], {"name": known.get("start_object_name")})
+            start = {"name": known.get("start_object_name"), "mesh_node": known.get("start_mesh_node")}
+            self._merge(task.scene, known["start_object_id"], start)
         return [self._picture((task.scene, number), i.picture) if i.picture else None for i in task.instances]
 
     def _merge(self, scene: str, number: int, row: dict[str, Any]) -> None:

@@ -14,8 +14,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from aerialdojo_gen.errors import AssetError
-from aerialdojo_gen.geometry.soup import soup
-from aerialdojo_gen.imports.raw import RawNode
+from aerialdojo_gen.imports.raw import RawNode, in_place_order, joined
 from aerialdojo_gen.scenes.catalogue import single
 from aerialdojo_gen.scenes.mesh import areas
 from aerialdojo_gen.scenes.model import Instance, Material, Part, Scene
@@ -97,7 +96,7 @@ def adopt(
     bodies = [b for node in nodes for b in [_sound(_turned(node, up, scale), repairs)] if len(b.faces)]
     if not bodies:
         raise AssetError("no triangle is left after repair: the mesh is empty or degenerate")
-    bodies = _instances(bodies)
+    bodies = in_place_order(_instances(bodies))
     if crop_m is not None:
         x, y, radius = crop_m
         bodies = [b for b in bodies if math.hypot(*(_middle(b)[:2] - (x, y))) <= radius]
@@ -190,12 +189,7 @@ def _gathered(pieces: list[RawNode]) -> list[RawNode]:
     groups: dict[int, list[RawNode]] = {}
     for k, piece in enumerate(pieces):
         groups.setdefault(int(owner[k]), []).append(piece)
-    return [_joined("", members) for _, members in sorted(groups.items())]
-
-
-def _joined(name: str, bodies: Sequence[RawNode]) -> RawNode:
-    vertices, faces = soup(bodies)
-    return RawNode(name, vertices, faces.astype(np.int64), np.concatenate([b.colours for b in bodies]))
+    return [joined("", members) for _, members in sorted(groups.items())]
 
 
 def _middle(body: RawNode) -> Floats:
@@ -231,7 +225,7 @@ def _merged_clutter(bodies: list[RawNode]) -> list[RawNode]:
     if small.sum() < 2:
         return bodies
     scraps = [b for b, s in zip(bodies, small, strict=True) if s]
-    return [*(b for b, s in zip(bodies, small, strict=True) if not s), _joined("clutter", scraps)]
+    return [*(b for b, s in zip(bodies, small, strict=True) if not s), joined("clutter", scraps)]
 
 
 def _parts(body: RawNode, materials: dict[str, Material], repairs: Repairs) -> tuple[Part, ...]:

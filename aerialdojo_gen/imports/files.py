@@ -8,6 +8,7 @@ to is read from beside it or not at all.
 from __future__ import annotations
 
 import json
+import re
 import resource
 import struct
 import subprocess
@@ -21,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerialdojo_gen.errors import AssetError
-from aerialdojo_gen.imports.raw import RawNode, plain
+from aerialdojo_gen.imports.raw import RawNode, joined, plain
 
 SUFFIXES = (".glb", ".obj", ".stl", ".ply", ".3ds")
 MAX_FILE_BYTES = 1 << 30
@@ -113,7 +114,7 @@ def _read(path: Path) -> list[RawNode]:
         path, file_type=suffix[1:], resolver=_beside(path), process=False, split_objects=True, group_material=False,
         maintain_order=True,
     )  # fmt: skip
-    nodes = []
+    nodes: dict[str, list[RawNode]] = {}
     for name in scene.graph.nodes_geometry:
         transform, geometry = scene.graph[name]
         body = scene.geometry[geometry]
@@ -121,9 +122,22 @@ def _read(path: Path) -> list[RawNode]:
             continue
         vertices = trimesh.transform_points(np.asarray(body.vertices, dtype=np.float64), transform)
         faces = np.asarray(body.faces, dtype=np.int64)
-        label = "" if suffix in (".stl", ".ply") else str(name)
-        nodes.append(RawNode(label, vertices, faces, _colours(body)))
-    return nodes
+        owner = _owner(scene, str(name)) if suffix == ".glb" else str(name)
+        label = "" if suffix in (".stl", ".ply") else owner
+        nodes.setdefault(owner, []).append(RawNode(label, vertices, faces, _colours(body)))
+    return [bodies[0] if len(bodies) == 1 else joined(bodies[0].name, bodies) for bodies in nodes.values()]
+
+
+def _owner(scene: Any, name: str) -> str:
+    """Name the file's node that a node of trimesh's belongs to.
+
+    Where a node has several primitives (materials), trimesh makes a node of each and names it by the file's node and
+    six random hexadecimal digits: another name in every run.
+    """
+    parent = scene.graph.transforms.parents.get(name)
+    if parent is not None and re.fullmatch(rf"{re.escape(str(parent))}_[0-9a-f]{{6}}", name):
+        return str(parent)
+    return name
 
 
 def _beside(path: Path) -> Any:

@@ -1,0 +1,97 @@
+"""Reference pictures drawn anew at another size, for formats that want one: the same view of the same mesh."""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from aerialdojo_gen import store
+from aerialdojo_gen.errors import AssetError, StoreError
+from aerialdojo_gen.geometry.cameras import Camera, view_pose
+from aerialdojo_gen.rendering.backend import choose_renderer, kept_renderer
+from aerialdojo_gen.scenes.glb import read_glb
+from aerialdojo_gen.stages.reference_images import png
+
+# Between two sizes and two renderers edges and shadows' rims differ; another view, object or light differs by far more.
+_SAME_VIEW = 12.0
+
+
+class Redrawn:
+    """Draws the front view from a scene's selected anchors, at another size than the release has it.
+
+    Parameters
+    ----------
+    data : Path
+        The data directory: release and meshes.
+    scene : str
+        Name of the scene.
+    size_px : int
+        Columns and rows.
+
+    Raises
+    ------
+    StoreError
+        The release is missing or damaged.
+    AssetError
+        The mesh is missing, or not the one that the release was made from.
+    """
+
+    def __init__(self, data: Path, scene: str, size_px: int) -> None:
+        row = store.read_scene(data, "release/scenes", scene).to_pylist()[0]
+        mesh = data / row["mesh_path"]
+        keep = "--picture-size 0 exports the release's own pictures"
+        if not mesh.is_file():
+            raise AssetError(f"{mesh} is missing, so its pictures cannot be drawn at {size_px} px: {keep}")
+        if hashlib.sha256(mesh.read_bytes()).hexdigest() != row["mesh_sha256"]:
+            raise AssetError(f"{mesh} is not the mesh that the release was made from: {keep}")
+        anchors = store.read_scene(data, "release/anchors", scene).to_pylist()
+        self._scene_name = scene
+        self._anchors = {a["object_id"]: a for a in anchors if a["selected"]}
+        self._pictures = {
+            r["object_id"]: r["reference_image"] for r in store.read_scene(data, "release/objects", scene).to_pylist()
+        }
+        self._camera = Camera(size_px, size_px)
+        # Kept here: the renderer is kept for as long as its scene is.
+        self._scene = read_glb(mesh)
+        self._renderer = kept_renderer(self._scene, choose_renderer("auto").name)
+
+    def picture(self, object_id: int) -> bytes:
+        """Draw an object's picture.
+
+        Parameters
+        ----------
+        object_id : int
+            An object with a selected anchor and a reference image.
+
+        Returns
+        -------
+        bytes
+            PNG, RGB.
+
+        Raises
+        ------
+        StoreError
+            It is not the view that the release shows (another field of view, say).
+        """
+        anchor = self._anchors[object_id]
+        pose = view_pose((anchor["x_m"], anchor["y_m"], anchor["z_m"]), anchor["yaw_rad"], "front")
+        rgb = self._renderer.render(self._camera, pose).rgb
+        if _difference(rgb, self._pictures[object_id]) > _SAME_VIEW:
+            raise StoreError(
+                f"object {object_id} of {self._scene_name} looks otherwise in the release than from its anchor: "
+                "--picture-size 0 exports the release's own pictures"
+            )
+        return png(rgb)
+
+
+def _difference(rgb: NDArray[np.uint8], picture: bytes) -> float:
+    """Mean absolute difference to a PNG, in steps of 255, both at 64 x 64 pixels."""
+    released = cv2.imdecode(np.frombuffer(picture, np.uint8), cv2.IMREAD_COLOR)
+    if released is None:
+        return float("inf")
+    small = [cv2.resize(image, (64, 64), interpolation=cv2.INTER_AREA) for image in (rgb, released[..., ::-1])]
+    return float(np.abs(small[0].astype(np.float32) - small[1].astype(np.float32)).mean())
