@@ -194,7 +194,9 @@ class SplitConfig(Section):
     id_train_fraction: float = Field(0.8, ge=0, le=1, description="share of the tasks of ID scenes that train")
     ood_train_fraction: float = Field(0.2, ge=0, le=1, description="share of the tasks of OOD scenes that train")
     paper_counts: bool = Field(
-        False, description="release the paper's numbers of tasks, of train and test, and its metres of route"
+        False,
+        description="release the paper's numbers of tasks, of train and test, and, as near as the kept candidates "
+        "allow, its metres of route",
     )
 
 

@@ -31,8 +31,11 @@ def _hf_type(field: pa.Field) -> str:
 
 def _scene_rows(data: Path, made: list[Made]) -> list[dict[str, Any]]:
     rows = [store.read_scene(data, "release/scenes", m.scene).to_pylist()[0] for m in made]
+    paper = inventory()
     return [
-        row | {"landmarks": m.landmarks, "objects": m.objects, "tasks": m.instances, "km": m.path_m / 1000}
+        row
+        | {"landmarks": m.landmarks, "objects": m.objects, "tasks": m.instances, "km": m.path_m / 1000}
+        | {"paper_km": paper[m.scene].path_m / 1000 if m.scene in paper else None}
         for row, m in zip(rows, made, strict=True)
     ]
 
