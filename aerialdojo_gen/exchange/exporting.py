@@ -75,7 +75,9 @@ def export_release(
     with whole_folder(out, MARKER, force=force) as root:
         if format_name == "aerialdojo":
             for scene in chosen:
-                counts.update(aerialdojo_writer.write_scene(data, scene, root, PICTURE_PX if picture_px is None else picture_px))
+                counts.update(
+                    aerialdojo_writer.write_scene(data, scene, root, PICTURE_PX if picture_px is None else picture_px)
+                )
         else:
             categories = habitat_writer.categories_of(data, chosen)
             habitat_writer.write_index(root, categories)
