@@ -71,13 +71,12 @@ def export_release(
         raise UsageError(f"there is no release in {data}: run aerialdojo-gen split --data {data}")
     chosen = choose_scenes(scenes, released) if scenes else released
     frame, lost = FORMATS[format_name]
+    size_px = PICTURE_PX if picture_px is None else picture_px
     counts: Counter[str] = Counter(scenes=len(chosen))
     with whole_folder(out, MARKER, force=force) as root:
         if format_name == "aerialdojo":
             for scene in chosen:
-                counts.update(
-                    aerialdojo_writer.write_scene(data, scene, root, PICTURE_PX if picture_px is None else picture_px)
-                )
+                counts.update(aerialdojo_writer.write_scene(data, scene, root, size_px))
         else:
             categories = habitat_writer.categories_of(data, chosen)
             habitat_writer.write_index(root, categories)

@@ -16,7 +16,7 @@ from aerialdojo_gen.rendering.backend import choose_renderer, kept_renderer
 from aerialdojo_gen.scenes.glb import read_glb
 from aerialdojo_gen.stages.reference_images import png
 
-# Between two sizes and two renderers edges and shadows' rims differ; another view, object or light differs by far more.
+# Between two sizes and two renderers edges and shadows' rims differ; another view or object differs by far more.
 _SAME_VIEW = 12.0
 
 
