@@ -89,7 +89,10 @@ def test_a_constant_of_a_module_that_it_uses_makes_it_stale(copied, name):
         other = constant[:-1] + "x" + constant[-1]
     before, after = digests(copied), edited(path, constant, other)
     assert name in changed(before, after)
-    assert edited(path, constant, "# Nothing.\n" + constant if "\n" + constant in path.read_text() else constant) == before
+    assert (
+        edited(path, constant, "# Nothing.\n" + constant if "\n" + constant in path.read_text() else constant)
+        == before
+    )
 
 
 @pytest.mark.parametrize(
@@ -136,7 +139,10 @@ def test_what_is_imported_by_a_name_made_at_run_time_counts():
 
 
 def test_figures_of_the_paper_count_where_they_are_read():
-    assert [name for name in NAMES if "aerialdojo_gen.paper" in stage_code(name).parts] == ["annotate-import", "split"]
+    assert [name for name in NAMES if "aerialdojo_gen.paper" in stage_code(name).parts] == [
+        "annotate-import",
+        "split",
+    ]
 
 
 def test_no_stage_counts_what_only_shows():
@@ -158,7 +164,7 @@ def test_libraries_that_shape_the_bytes_count():
 
 
 def test_imports_are_followed_however_they_are_written():
-    source = b'''
+    source = b"""
 from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING
@@ -175,7 +181,7 @@ def f():
     importlib.import_module(f"{away.__name__}.{np.x}")
     importlib.import_module("moderngl")
     return store.partition, away.x
-'''
+"""
     facts = module_facts(source, "aerialdojo_gen.scenes.here", False)
     found = {(edge.module, edge.name) for edge in facts.edges}
     assert {
