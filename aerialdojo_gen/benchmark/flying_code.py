@@ -15,8 +15,8 @@ from aerialdojo_gen.file_digest import file_digest
 def flying_code(agent: str) -> str:
     """Digest the code that flies an agent.
 
-    Libraries do not count, as they do for stages: an episode may have cost money, and a library's next patch should not
-    end a run of a thousand of them.
+    Libraries do not count, as they do for stages: an episode may have cost money, and a library's next patch should
+    not end a run of a thousand of them.
 
     Parameters
     ----------

@@ -231,10 +231,11 @@ class _Run:
         mend = "give another --run, or --restart"
         # One that has finished nothing may yet become another: an agent's options may have been wrong.
         if begun and path.is_file():
-            before = json.loads(path.read_text(encoding="utf-8"))
+            before, own = json.loads(path.read_text(encoding="utf-8")), ("data", "code")
             for key, value in self._settings.items():
                 if before.get(key) != value:
-                    what = f"other {key}" if key in ("data", "code") else f"{key} = {before.get(key)!r}, not {value!r}"
+                    what = f"{key} = {before.get(key)!r}, not {value!r}"
+                    what = f"other {key}" if key in own else what
                     raise UsageError(f"run {self._name!r} was begun with {what}: {mend}")
         for scene in episodes.run_scenes(self._out, self._name):
             if episodes.fingerprint_of(self._out, self._name, scene) != self._fingerprint:
