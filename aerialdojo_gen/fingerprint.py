@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from functools import lru_cache
+from functools import cache, lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +13,6 @@ from aerialdojo_gen.code_digest import stage_code
 from aerialdojo_gen.config import Pipeline, Section
 from aerialdojo_gen.errors import AssetError
 from aerialdojo_gen.file_digest import file_digest
-from aerialdojo_gen.schemas import TableSpec
 from aerialdojo_gen.stage import Roots, Stage
 
 
@@ -56,7 +55,7 @@ def scene_fingerprint(stage: Stage, pipeline: Pipeline, roots: Roots, scene: str
         "seed": pipeline.seed,
         "embodiment": pipeline.embodiment.model_dump(mode="json"),
         "config": _values(pipeline.section(stage.name)),
-        "schemas": {name: _described(store.LAYOUT[name].spec) for name in (*stage.writes, *stage.reads)},
+        "schemas": {name: _described(name) for name in (*stage.writes, *stage.reads)},
         "inputs": {table: store.content(roots.data, table, scene) for table in stage.reads},
         "assets": [[_short(path, roots), _digest(path)] for path in sources],
     }
@@ -92,7 +91,9 @@ def _values(section: Section) -> dict[str, Any]:
     return values
 
 
-def _described(spec: TableSpec) -> list[Any]:
+@cache
+def _described(table: str) -> list[Any]:
+    spec = store.LAYOUT[table].spec
     fields = [
         [str(field), sorted((k.decode(), v.decode()) for k, v in (field.metadata or {}).items())]
         for field in spec.schema
