@@ -16,6 +16,7 @@ _KEYS = frozenset({"fingerprint", "content", "columns", "rows", "parts", "summar
 # Of a footer that vouches for nothing; logs and releases of then are still read.
 _EARLIER_KEYS = _KEYS - {"columns", "checksum"}
 _DIGEST = re.compile(r"[0-9a-f]{64}")
+_HALF_DIGEST = re.compile(r"[0-9a-f]{32}")
 
 
 @dataclass(frozen=True)
@@ -45,7 +46,7 @@ class ShardInfo:
     content : str
         SHA-256 of the rows.
     columns : dict of str to str
-        SHA-256 of every column; empty where an earlier version wrote it.
+        `aerialdojo_gen.tables.column_digests`; empty where an earlier version wrote it.
     rows, parts : int
         Rows in the shard; shards of the scene.
     summary : dict
@@ -111,7 +112,7 @@ def _well_formed(facts: Mapping[str, Any]) -> bool:
         isinstance(facts["fingerprint"], str)
         and _is_digest(facts["content"])
         and isinstance(facts["columns"], dict)
-        and all(_is_digest(value) for value in facts["columns"].values())
+        and all(_is_digest(value, _HALF_DIGEST) for value in facts["columns"].values())
         and _is_count(facts["rows"])
         and _is_count(facts["parts"])
         and _is_summary(facts["summary"])
@@ -120,8 +121,8 @@ def _well_formed(facts: Mapping[str, Any]) -> bool:
     )
 
 
-def _is_digest(value: Any) -> bool:
-    return isinstance(value, str) and _DIGEST.fullmatch(value) is not None
+def _is_digest(value: Any, pattern: re.Pattern[str] = _DIGEST) -> bool:
+    return isinstance(value, str) and pattern.fullmatch(value) is not None
 
 
 def _is_count(value: Any) -> bool:

@@ -16,7 +16,7 @@ from aerialdojo_gen.tables import check_table, from_rows
 
 SCENE = "U_Test_0"
 INFO = ShardInfo(
-    "f" * 64, "c" * 64, {"scene": "0" * 64, "x_m": "1" * 64}, 3, 2,
+    "f" * 64, "c" * 64, {"scene": "0" * 32, "x_m": "1" * 32}, 3, 2,
     {"rows_in": 3, "rows_out": 2, "counts": {"no_path": 1}},
     {"meshes/a.glb": ShardFile(7, "a" * 64), "b": ShardFile(8)},
 )  # fmt: skip
