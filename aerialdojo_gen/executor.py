@@ -20,6 +20,8 @@ from typing import Any, Generic, Protocol, TypeVar
 from aerialdojo_gen import store
 from aerialdojo_gen.config import Section
 from aerialdojo_gen.errors import AerialDojoError, BudgetSpent
+from aerialdojo_gen.file_digest import file_digest
+from aerialdojo_gen.footers import ShardFile
 from aerialdojo_gen.stage import BY_NAME, Job
 
 
@@ -75,7 +77,7 @@ def compute(task: Task) -> dict[str, Any]:
     if set(output.tables) != set(stage.writes):
         raise RuntimeError(f"{task.label} returned tables {sorted(output.tables)}, not {sorted(stage.writes)}")
     summary = {"rows_in": output.rows_in, "rows_out": output.rows_out, "counts": dict(sorted(output.counts.items()))}
-    files = {name: (job.roots.data / name).stat().st_size for name in sorted(job.files)}
+    files = {name: _described(job, name) for name in sorted(job.files)}
     for name, table in output.tables.items():
         store.write_shard(
             job.roots.data,
@@ -89,6 +91,11 @@ def compute(task: Task) -> dict[str, Any]:
             files=files,
         )
     return summary
+
+
+def _described(job: Job, name: str) -> ShardFile:
+    path = job.roots.data / name
+    return ShardFile(path.stat().st_size, file_digest(path) if name in job.digested else "")
 
 
 def start_worker(parent: int) -> None:

@@ -4,34 +4,24 @@ from __future__ import annotations
 
 import hashlib
 import json
-from functools import lru_cache
+from functools import cache, lru_cache
 from pathlib import Path
+from typing import Any
 
-from aerialdojo_gen import store
-from aerialdojo_gen.config import Pipeline
+from aerialdojo_gen import paper, store
+from aerialdojo_gen.code_digest import stage_code
+from aerialdojo_gen.config import Pipeline, Section
 from aerialdojo_gen.errors import AssetError
+from aerialdojo_gen.file_digest import file_digest
 from aerialdojo_gen.stage import Roots, Stage
-
-
-@lru_cache(maxsize=4096)
-def _file_digest(path: Path, _size: int, _mtime_ns: int) -> str:
-    return hashlib.sha256(path.read_bytes()).hexdigest()
-
-
-def file_digest(path: Path) -> str:
-    """SHA-256 of a file's bytes, hexadecimal; AssetError where it is missing."""
-    try:
-        stat = path.stat()
-    except OSError as error:
-        raise AssetError(f"cannot read {path}: {error.strerror}") from None
-    return _file_digest(path, stat.st_size, stat.st_mtime_ns)
 
 
 def scene_fingerprint(stage: Stage, pipeline: Pipeline, roots: Roots, scene: str) -> str:
     """Hash all that the shards of a scene depend on.
 
     Inputs count by their content, not by their own fingerprint: where an upstream stage ran again and wrote the
-    same rows, nothing downstream is stale.
+    same rows, nothing downstream is stale. The code counts as `aerialdojo_gen.code_digest` finds it, with the
+    versions of the libraries that it imports; no absolute path counts.
 
     Parameters
     ----------
@@ -54,28 +44,58 @@ def scene_fingerprint(stage: Stage, pipeline: Pipeline, roots: Roots, scene: str
     StoreError, AssetError
         An input or an asset is missing or damaged.
     """
-    schemas = {
-        name: [str(field) for field in store.LAYOUT[name].spec.schema] for name in (*stage.writes, *stage.reads)
-    }
-    package = Path(__file__).parent
+    code = stage_code(stage.name)
+    # The paper's figures lie beside the package in a checkout, inside it in a wheel.
+    carried = paper.files() if "aerialdojo_gen.paper" in code.parts else []
+    sources = [*stage.sources(roots, scene), *carried]
     facts = {
         "stage": stage.name,
-        "version": stage.version,
+        "code": code.digest,
         "scene": scene,
         "seed": pipeline.seed,
         "embodiment": pipeline.embodiment.model_dump(mode="json"),
-        "config": pipeline.section(stage.name).model_dump(mode="json"),
-        "schemas": schemas,
+        "config": _values(pipeline.section(stage.name)),
+        "schemas": {name: _described(name) for name in (*stage.writes, *stage.reads)},
         "inputs": {table: store.content(roots.data, table, scene) for table in stage.reads},
-        # Names relative to their folder, so that a checkout elsewhere has the same fingerprints.
-        "assets": [[_short(path, roots, package), file_digest(path)] for path in stage.sources(roots, scene)],
+        "assets": [[_short(path, roots), _digest(path)] for path in sources],
     }
     return hashlib.sha256(json.dumps(facts, sort_keys=True).encode()).hexdigest()
 
 
 @lru_cache(maxsize=4096)
-def _short(path: Path, roots: Roots, package: Path) -> str:
-    for root in (roots.recipes, roots.scene_assets, roots.annotations, package):
-        if path.is_relative_to(root):
-            return str(path.relative_to(root))
+def _short(path: Path, roots: Roots) -> str:
+    """Name a file by its place in its folder: the same in a checkout, in a wheel, and in a checkout elsewhere."""
+    for name in ("recipes", "scene_assets", "annotations"):
+        folder = getattr(roots, name)
+        if path.is_relative_to(folder):
+            return f"{name}/{path.relative_to(folder).as_posix()}"
     return path.name
+
+
+def _digest(path: Path) -> str:
+    try:
+        return file_digest(path)
+    except OSError as error:
+        raise AssetError(f"cannot read {path}: {error.strerror}") from None
+
+
+def _values(section: Section) -> dict[str, Any]:
+    """Values of a section, without its paths: the files behind them count by their bytes."""
+
+    def without_paths(value: Any) -> Any:
+        if isinstance(value, dict):
+            return {key: without_paths(inner) for key, inner in value.items() if not isinstance(inner, Path)}
+        return value
+
+    values: dict[str, Any] = without_paths(section.model_dump())
+    return values
+
+
+@cache
+def _described(table: str) -> list[Any]:
+    spec = store.LAYOUT[table].spec
+    fields = [
+        [str(field), sorted((k.decode(), v.decode()) for k, v in (field.metadata or {}).items())]
+        for field in spec.schema
+    ]
+    return [fields, spec.key, spec.clusters, spec.plain]

@@ -17,6 +17,8 @@ from aerialdojo_gen.schemas import TableSpec
 _ROW_GROUP = 65536
 # For what is written without a dictionary; levels above cost five times the time for 2 % (docs/release-format.md).
 _PLAIN_LEVEL = 15
+# What reading a damaged file raises: a name may be no UTF-8, a count larger than the memory.
+_DAMAGE = (pa.ArrowException, OSError, ValueError, OverflowError, MemoryError)
 
 
 def read_file(path: Path, columns: Sequence[str] | None = None) -> pa.Table:
@@ -41,8 +43,11 @@ def read_file(path: Path, columns: Sequence[str] | None = None) -> pa.Table:
     """
     wanted = None if columns is None else [*columns]
     try:
-        return pq.read_table(path, partitioning=None, page_checksum_verification=True, columns=wanted)
-    except (pa.ArrowException, OSError) as error:
+        table = pq.read_table(path, partitioning=None, page_checksum_verification=True, columns=wanted)
+        # Names are decoded when they are asked for.
+        _ = table.schema.names
+        return table
+    except _DAMAGE as error:
         raise StoreError(f"{path} is damaged ({first_line(error)})") from None
 
 
@@ -56,7 +61,7 @@ def read_footer(path: Path) -> tuple[int, dict[bytes, bytes]]:
     """
     try:
         footer = pq.read_metadata(path)
-    except (pa.ArrowException, OSError) as error:
+    except _DAMAGE as error:
         raise StoreError(f"{path} is damaged ({first_line(error)})") from None
     return footer.num_rows, dict(footer.metadata or {})
 

@@ -17,6 +17,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from aerialdojo_gen.atomic import disk_error
+from aerialdojo_gen.code_digest import stage_code
 from aerialdojo_gen.config import Pipeline
 from aerialdojo_gen.errors import AerialDojoError, BudgetSpent, StoreError, UsageError
 from aerialdojo_gen.executor import Pool
@@ -127,6 +128,9 @@ def run(
     reporter = reporter or Reporter(quiet=True)
     forced = set(force)
     summaries = []
+    for stage in stages:
+        # All of it now: who edits a file while this runs has loaded the old one, and gets all made anew next time.
+        stage_code(stage.name)
     with data_lock(roots.data), Interrupts() as interrupts, Pool(workers) as pool:
         for stage in stages:
             now = limits if limits and stage is stages[-1] else Limits()

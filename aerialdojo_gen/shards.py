@@ -13,10 +13,13 @@ from typing import Any
 
 from aerialdojo_gen import store
 from aerialdojo_gen.atomic import sweep
+from aerialdojo_gen.code_digest import stage_code
 from aerialdojo_gen.config import Pipeline, Section
 from aerialdojo_gen.errors import AerialDojoError, StoreError
 from aerialdojo_gen.executor import Task
+from aerialdojo_gen.file_digest import file_digest
 from aerialdojo_gen.fingerprint import scene_fingerprint
+from aerialdojo_gen.footers import ShardFile
 from aerialdojo_gen.progress import Reporter
 from aerialdojo_gen.stage import Job, Roots, Stage
 
@@ -111,7 +114,8 @@ def shards_of(
                 found.fresh.append(summary)
             else:
                 whole = Job(stage.name, scene, part, parts, pipeline.seed, pipeline.embodiment, roots)
-                job = replace(whole, deadline=limits.deadline, force=force)
+                code = stage_code(stage.name).digest
+                job = replace(whole, deadline=limits.deadline, force=force, code=code)
                 found.tasks.append(Task(job, config, fingerprint))
     return found
 
@@ -132,10 +136,21 @@ def _fresh(
             return None
         if info is None or info.fingerprint != fingerprint or info.parts != parts:
             return None
-        for relative, size in info.files.items():
-            file = data / relative
-            if not file.is_file() or file.stat().st_size != size:
-                reporter.line(f"{file} is missing or damaged: computed again")
+        for relative, written in info.files.items():
+            if not _whole(data / relative, written):
+                reporter.line(f"{data / relative} is missing or damaged: computed again")
                 return None
         summary = info.summary
     return summary
+
+
+def _whole(path: Path, written: ShardFile) -> bool:
+    """Whether a file has the bytes that were written, or their number where the footer says no more."""
+    try:
+        return (
+            path.is_file()
+            and path.stat().st_size == written.size
+            and (not written.sha256 or file_digest(path) == written.sha256)
+        )
+    except OSError:
+        return False

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 from aerialdojo_gen import store
 from aerialdojo_gen.atomic import atomic_file
+from aerialdojo_gen.code_digest import stage_module
 from aerialdojo_gen.config import RENDERERS, Embodiment
 from aerialdojo_gen.errors import AssetError
 from aerialdojo_gen.scenes.catalogue_files import catalogue_files
@@ -86,10 +87,14 @@ class Job:
         The folders.
     files : list of str
         Files that the shard owns, relative to the data directory; the stage adds them.
+    digested : list of str
+        Those of them whose digests the shard's footer keeps, to be fresh by; the others' stand in its rows.
     deadline : float, optional
         Seconds since the epoch after which a stage of long shards begins nothing new, and raises BudgetSpent.
     force : bool
         Whether the stage makes anew what it finds finished.
+    code : str
+        Digest of the stage's code, for what a stage itself finds finished.
     """
 
     stage: str
@@ -100,8 +105,10 @@ class Job:
     embodiment: Embodiment
     roots: Roots
     files: list[str] = field(default_factory=list, compare=False)
+    digested: list[str] = field(default_factory=list, compare=False)
     deadline: float | None = None
     force: bool = False
+    code: str = ""
 
     def read(self, table: str) -> pa.Table:
         """Read all of this scene's rows of a table; StoreError names a missing or damaged shard."""
@@ -126,14 +133,15 @@ class Job:
             The temporary path to write to, with the same suffix.
         """
         self.files.append(relative)
+        self.digested.append(relative)
         return atomic_file(self.roots.data, relative)
 
 
 @lru_cache(maxsize=2)
-def _scene_model(path: Path, _sha256: str) -> Scene:
+def _scene_model(path: Path, sha256: str) -> Scene:
     from aerialdojo_gen.scenes.glb import read_glb
 
-    return read_glb(path)
+    return read_glb(path, sha256)
 
 
 def _one_part(_data: Path, _scene: str, _config: Any) -> int:
@@ -164,8 +172,6 @@ class Stage:
     ----------
     name : str
         The command's name, e.g. ``"anchor-sample"``.
-    version : int
-        Raised when the meaning of what the stage writes changes; part of every fingerprint.
     help : str
         One line for the command line.
     reads, writes : tuple of str
@@ -173,7 +179,7 @@ class Stage:
     parts : callable
         ``(data, scene, config) -> int``: number of shards of a scene; may read upstream tables.
     sources : callable
-        ``(roots, scene) -> list of Path``: files outside the store whose bytes the result depends on.
+        ``(roots, scene) -> list of Path``: files of the scene, outside the store, whose bytes the result depends on.
     check : callable
         ``(data, scenes, config)``: raises an `AerialDojoError` where the inputs of all scenes together will not do,
         before anything is written.
@@ -186,7 +192,6 @@ class Stage:
     """
 
     name: str
-    version: int
     help: str
     reads: tuple[str, ...]
     writes: tuple[str, ...]
@@ -198,21 +203,18 @@ class Stage:
 
     def load(self) -> Callable[[Job, Any], Output]:
         """Import the stage's module and return its ``run``."""
-        module = importlib.import_module(f"aerialdojo_gen.stages.{self.name.replace('-', '_')}")
+        module = importlib.import_module(stage_module(self.name))
         run: Callable[[Job, Any], Output] = module.run
         return run
 
 
 def _scene_sources(roots: Roots, scene: str) -> list[Path]:
-    # A layout is code: the scene package's modules are assets of the scene as much as the recipe is.
-    package = Path(__file__).parent / "scenes"
     mesh = roots.recipes / f"{scene}.glb"
     return [
         roots.recipes / f"{scene}.toml",
         *([mesh] if mesh.is_file() else []),
         roots.scene_assets / "materials.toml",
         *catalogue_files(roots.scene_assets),
-        *sorted(package.rglob("*.py")),
     ]
 
 
@@ -228,12 +230,6 @@ def _annotation_sources(roots: Roots, scene: str) -> list[Path]:
 
 def _plan_parts(data: Path, scene: str, config: Any) -> int:
     return -(-store.count_rows(data, "objects", scene) // config.targets_per_part)
-
-
-def _paper_sources(_roots: Roots, _scene: str) -> list[Path]:
-    from aerialdojo_gen.paper import files
-
-    return files()
 
 
 def _enough_for_the_paper(data: Path, scenes: Sequence[str], config: Any) -> None:
@@ -274,41 +270,41 @@ _UPSTREAM_OF_SPLIT = ("scenes", "landmarks", "objects", "anchors", "references",
 
 STAGES: tuple[Stage, ...] = (
     Stage(
-        "build-scenes", 1, "Build the scenes' meshes from their recipes.", (), ("scenes",), sources=_scene_sources
+        "build-scenes", "Build the scenes' meshes from their recipes.", (), ("scenes",), sources=_scene_sources
     ),
     Stage(
-        "annotate-import", 1, "Check the annotations against the scenes and import them.",
+        "annotate-import", "Check the annotations against the scenes and import them.",
         ("scenes",), ("landmarks", "objects", "chosen_anchors"), sources=_annotation_sources,
     ),
     Stage(
-        "anchor-sample", 2, "Find viewpoints 1 m from each object that see it.",
+        "anchor-sample", "Find viewpoints 1 m from each object that see it.",
         ("scenes", "objects", "chosen_anchors"), ("anchors",), settle=_settle_scorers,
     ),
     Stage(
-        "reference-images", 4, "Render each object's picture from its selected anchor.",
+        "reference-images", "Render each object's picture from its selected anchor.",
         ("scenes", "objects", "anchors"), ("references",), settle=_settle_renderer, choices=_renderers,
     ),
     Stage(
-        "pair-objects", 1, "Pair start anchors with targets: the candidate tasks.",
+        "pair-objects", "Pair start anchors with targets: the candidate tasks.",
         ("objects", "anchors"), ("pairs",),
     ),
     Stage(
-        "plan", 3, "Plan a collision-free reference trajectory for every candidate.",
+        "plan", "Plan a collision-free reference trajectory for every candidate.",
         ("scenes", "objects", "anchors", "pairs"), ("plans",), parts=_plan_parts,
     ),
     Stage(
-        "filter", 1, "Keep the candidates that make tasks, with a reason for every rejection.",
+        "filter", "Keep the candidates that make tasks, with a reason for every rejection.",
         ("pairs", "plans"), ("verdicts",),
     ),
     Stage(
-        "split", 3, "Write the release: tasks, routes, objects, train and test.",
+        "split", "Write the release: tasks, routes, objects, train and test.",
         _UPSTREAM_OF_SPLIT,
         ("tasks/train", "tasks/test", "routes/train", "routes/test",
          "release/scenes", "release/landmarks", "release/objects", "release/anchors"),
-        sources=_paper_sources, check=_enough_for_the_paper,
+        check=_enough_for_the_paper,
     ),
     Stage(
-        "render", 3, "Record four RGB-D views along trajectories of the release.",
+        "render", "Record four RGB-D views along trajectories of the release.",
         ("scenes", "routes/train", "routes/test"), ("recordings", "frames"), parts=_render_parts,
         settle=_settle_renderer, choices=_renderers,
     ),

@@ -7,7 +7,6 @@ of its content, and no date, so that the same inputs give the same bytes.
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -20,10 +19,11 @@ import pyarrow as pa
 from aerialdojo_gen import schemas
 from aerialdojo_gen.atomic import atomic_file
 from aerialdojo_gen.errors import StoreError
+from aerialdojo_gen.footers import ShardFile, ShardInfo, decode, encode
 from aerialdojo_gen.parquet_files import read_file, read_footer, write_clustered
-from aerialdojo_gen.tables import check_table, content_digest
+from aerialdojo_gen.tables import check_table, column_digests, content_digest
 
-_META = b"aerialdojo"
+META = b"aerialdojo"
 _PLAIN = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}")
 
 
@@ -64,32 +64,6 @@ LAYOUT: dict[str, Place] = {
     "timings": Place(schemas.TIMINGS, _RUN, "evaluate"),
     "failures": Place(schemas.FAILURES, _RUN, "evaluate"),
 }
-
-
-@dataclass(frozen=True)
-class ShardInfo:
-    """What a shard's footer says.
-
-    Attributes
-    ----------
-    fingerprint : str
-        Of the stage's version, config, inputs and assets that it was made from.
-    content : str
-        SHA-256 of the rows.
-    rows, parts : int
-        Rows in the shard; shards of the scene.
-    summary : dict
-        The stage's ``rows_in``, ``rows_out`` and ``counts`` of the shard.
-    files : dict of str to int
-        Files that were written with it, relative to the data directory, and their sizes in bytes.
-    """
-
-    fingerprint: str
-    content: str
-    rows: int
-    parts: int
-    summary: dict[str, Any]
-    files: dict[str, int]
 
 
 def partition(scene: str) -> str:
@@ -136,7 +110,7 @@ def write_shard(
     fingerprint: str = "",
     parts: int = 1,
     summary: Mapping[str, Any] | None = None,
-    files: Mapping[str, int] | None = None,
+    files: Mapping[str, ShardFile] | None = None,
     run: str = "default",
 ) -> Path:
     """Check a table, write it as a shard, and give it its name when it is whole.
@@ -153,16 +127,17 @@ def write_shard(
     """
     spec = LAYOUT[table_name].spec
     table = check_table(spec, table)
-    meta = {
-        "fingerprint": fingerprint,
-        "content": content_digest(table),
-        "rows": table.num_rows,
-        "parts": parts,
-        "summary": summary or {},
-        "files": dict(files or {}),
-    }
+    info = ShardInfo(
+        fingerprint,
+        content_digest(table),
+        column_digests(table),
+        table.num_rows,
+        parts,
+        dict(summary or {}),
+        dict(files or {}),
+    )
     schema_meta = dict(table.schema.metadata or {})
-    schema_meta[_META] = json.dumps(meta, sort_keys=True).encode()
+    schema_meta[META] = encode(info)
     path = shard_path(data, table_name, scene, part, run)
     with atomic_file(data, str(path.relative_to(data))) as temporary:
         write_clustered(spec, table.replace_schema_metadata(schema_meta), temporary)
@@ -191,16 +166,18 @@ def _read_info(path: Path, _inode: int, _size: int, _mtime_ns: int) -> ShardInfo
         rows, metadata = read_footer(path)
     except StoreError as error:
         raise StoreError(f"{error}: delete it and run the command again") from None
-    raw = metadata.get(_META)
+    raw = metadata.get(META)
     if raw is None:
         return None
-    meta = json.loads(raw)
-    # A shard of an earlier version does not say how many rows were written.
-    if meta.get("rows", rows) != rows:
+    try:
+        info = decode(raw)
+    except ValueError as error:
+        raise StoreError(f"{path} is damaged ({error}): delete it and run the command again") from None
+    if info.rows != rows:
         raise StoreError(
-            f"{path} has {rows:,} rows where {meta['rows']:,} were written: delete it and run the command again"
+            f"{path} has {rows:,} rows where {info.rows:,} were written: delete it and run the command again"
         )
-    return ShardInfo(meta["fingerprint"], meta["content"], rows, meta["parts"], meta["summary"], meta["files"])
+    return info
 
 
 def count_rows(data: Path, table: str, scene: str) -> int:
@@ -251,23 +228,22 @@ def read_scene(
     StoreError
         A shard is missing, damaged or of another schema; the message names it and what to run.
     """
-    _infos(data, table, scene, run)
+    infos = _infos(data, table, scene, run)
     spec = LAYOUT[table].spec
+    wanted = spec.schema if columns is None else pa.schema([spec.schema.field(name) for name in columns])
+    mend = f"delete it and run aerialdojo-gen {LAYOUT[table].command} --scene {scene}"
     tables = []
-    for path in shards(data, table, scene, run):
+    for path, info in zip(shards(data, table, scene, run), infos, strict=True):
         try:
             shard = read_file(path, columns)
         except StoreError as error:
-            raise StoreError(
-                f"{error}: delete it and run aerialdojo-gen {LAYOUT[table].command} --scene {scene}"
-            ) from None
-        wanted = spec.schema if columns is None else pa.schema([spec.schema.field(name) for name in columns])
+            raise StoreError(f"{error}: {mend}") from None
         if not shard.schema.equals(wanted):
-            raise StoreError(
-                f"{path} has other columns than this version's {spec.name}: delete it and run "
-                f"aerialdojo-gen {LAYOUT[table].command} --scene {scene}"
-            )
-        tables.append(shard.replace_schema_metadata(None))
+            raise StoreError(f"{path} has other columns than this version's {spec.name}: {mend}")
+        # The checksums of Parquet's pages do not say which column a page is of, nor what its values mean.
+        if info.columns and any(info.columns.get(name) != own for name, own in column_digests(shard).items()):
+            raise StoreError(f"{path} is damaged (other rows than were written): {mend}")
+        tables.append(pa.Table.from_arrays(shard.columns, schema=wanted.remove_metadata()))
     return pa.concat_tables(tables)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import json
+import dataclasses
 import math
 from collections.abc import Callable
 from pathlib import Path
@@ -13,11 +13,12 @@ import pyarrow.parquet as pq
 
 from aerialdojo_gen import store
 from aerialdojo_gen.config import load_pipeline
+from aerialdojo_gen.footers import decode, encode
 from aerialdojo_gen.planning.primitives import replay, wrap_rad
 from aerialdojo_gen.release.validate import Asked, validate
 from aerialdojo_gen.release.validate.parts import part_path
 from aerialdojo_gen.schemas import APPROACH
-from aerialdojo_gen.tables import content_digest
+from aerialdojo_gen.tables import column_digests, content_digest
 
 SMOKE = Path(__file__).resolve().parent.parent / "pipelines" / "smoke.toml"
 LISTS = ("x_m", "y_m", "z_m", "yaw_rad", "action")
@@ -45,9 +46,14 @@ class Planted:
             )
         loose = schema or pa.schema([f.with_nullable(True) for f in spec.schema])
         table = pa.Table.from_pylist(rows, schema=loose)
-        meta = json.loads(pq.read_metadata(self.path(key)).metadata[b"aerialdojo"])
-        meta |= {"content": content_digest(table), "rows": table.num_rows}
-        pq.write_table(table.replace_schema_metadata({b"aerialdojo": json.dumps(meta).encode()}), self.path(key))
+        self.write_table(key, table)
+
+    def write_table(self, key: str, table: pa.Table, **footer: object) -> None:
+        """Write a table as a part whose footer tells of it, but for what is given of the footer."""
+        info = decode(pq.read_metadata(self.path(key)).metadata[store.META])
+        told = {"content": content_digest(table), "columns": column_digests(table), "rows": table.num_rows} | footer
+        meta = encode(dataclasses.replace(info, **told))
+        pq.write_table(table.replace_schema_metadata({store.META: meta}), self.path(key))
 
     def edit(self, key: str, change: Callable[[Row], None], wanted: Callable[[Row], bool] = lambda _: True) -> Row:
         """Change the first row that is wanted; returns it as it then is."""

@@ -210,6 +210,19 @@ def test_other_settings_do_not_mix_with_a_run(smoke, tmp_path):
     assert evaluate(smoke, job("stop", limit=3), out=tmp_path).flown == 0
 
 
+def test_a_run_is_not_gone_on_with_by_other_code(smoke, tmp_path, monkeypatch):
+    mine = tmp_path / "flyer_of_a_test.py"
+    text = "from aerialdojo_gen.benchmark.agents.simple import StopAgent\n\n\nclass Flyer(StopAgent):\n    pass\n"
+    mine.write_text(text)
+    monkeypatch.syspath_prepend(tmp_path)
+    flyer = job("flyer_of_a_test:Flyer", limit=1)
+    assert evaluate(smoke, flyer, out=tmp_path / "out").flown == 1
+    assert evaluate(smoke, flyer, out=tmp_path / "out").flown == 0
+    mine.write_text(text + "    colour = 'red'\n")
+    with pytest.raises(UsageError, match=r"run 'r' was begun with other code: give another --run, or --restart"):
+        evaluate(smoke, flyer, out=tmp_path / "out")
+
+
 def test_an_agent_that_cannot_be_made_does_not_take_the_name(smoke, tmp_path):
     with pytest.raises(UsageError, match="its options: seed, stop_probability"):
         evaluate(smoke, job(limit=2, options={"sead": 1}), out=tmp_path)

@@ -1,3 +1,4 @@
+import hashlib
 import math
 from pathlib import Path
 
@@ -37,10 +38,11 @@ def data(tmp_path_factory) -> Path:
     world = town()
     (root / "meshes").mkdir()
     write_glb(world, root / "meshes" / f"{SCENE}.glb")
+    digest = hashlib.sha256((root / "meshes" / f"{SCENE}.glb").read_bytes()).hexdigest()
     low, high = world.bounds.tolist()
     write(root, "scenes", schemas.SCENES, [
         {"scene": SCENE, "family": "Urban", "scene_type": "Test", "partition": "ID",
-         "mesh_path": f"meshes/{SCENE}.glb", "mesh_sha256": "0" * 64, "ceiling_m": high[2],
+         "mesh_path": f"meshes/{SCENE}.glb", "mesh_sha256": digest, "ceiling_m": high[2],
          **{f"{e}_{a}_m": v for e, c in (("min", low), ("max", high)) for a, v in zip("xyz", c, strict=True)},
          "n_triangles": world.n_triangles, "n_instances": len(world.instances), "n_categories": 2}])  # fmt: skip
     write(root, "objects", schemas.OBJECTS, [

@@ -3,6 +3,7 @@
 import os
 import shutil
 import signal
+import struct
 import subprocess
 import sys
 import time
@@ -11,6 +12,9 @@ from pathlib import Path
 import pyarrow.parquet as pq
 import pytest
 
+from aerialdojo_gen import store
+from aerialdojo_gen.errors import AssetError
+from aerialdojo_gen.scenes.glb import read_glb
 from aerialdojo_gen.store import read_info
 
 TABLES = ("meshes", "scenes", "landmarks", "objects", "chosen_anchors", "anchors", "pairs", "plans")
@@ -155,6 +159,43 @@ def test_a_missing_or_cut_mesh_is_built_again(project, smoke, copy):
     code, err = run(project, copy, *plan_args(copy))
     assert code == 0
     assert all(str(mesh) in err for mesh in meshes)
+    assert snapshot(copy) == snapshot(smoke)
+
+
+def test_a_mesh_with_a_vertex_moved_is_built_again(project, smoke, copy):
+    mesh = sorted(copy.glob("meshes/*.glb"))[0]
+    before = mesh.stat()
+    raw = bytearray(mesh.read_bytes())
+    # The first coordinates of the binary chunk: a vertex goes 1.5 m to the east; size and time stay.
+    at = 28 + struct.unpack_from("<I", raw, 12)[0]
+    struct.pack_into("<f", raw, at, struct.unpack_from("<f", raw, at)[0] + 1.5)
+    mesh.write_bytes(raw)
+    os.utime(mesh, ns=(before.st_atime_ns, before.st_mtime_ns))
+    assert mesh.stat().st_size == before.st_size
+    scene = mesh.stem
+    sha256 = store.read_scene(copy, "scenes", scene)["mesh_sha256"][0].as_py()
+    with pytest.raises(AssetError, match="is not the mesh that the tables were made from"):
+        read_glb(mesh, sha256)
+    code, err = run(project, copy, *plan_args(copy))
+    assert code == 0
+    assert f"{mesh} is missing or damaged: computed again" in err
+    assert snapshot(copy) == snapshot(smoke)
+
+
+@pytest.mark.parametrize("text", [b"null", b"[]", b"x", None])
+def test_a_shard_with_a_damaged_footer_is_made_again(project, smoke, copy, text):
+    path = sorted(copy.glob("pairs/*/part-00000.parquet"))[0]
+    raw = path.read_bytes()
+    at = raw.index(b'{"checksum"')
+    if text is None:
+        path.write_bytes(raw[: at + 20] + bytes([raw[at + 20] ^ 1]) + raw[at + 21 :])
+    else:
+        end = raw.index(b"}}", at) + 2
+        path.write_bytes(raw[:at] + text.ljust(end - at) + raw[end:])
+    code, err = run(project, copy, *plan_args(copy))
+    assert code == 0, err
+    assert f"{path} is damaged (its footer" in err
+    assert "computed again" in err
     assert snapshot(copy) == snapshot(smoke)
 
 

@@ -254,7 +254,7 @@ def set_mesh_path(data, value):
 def test_another_mesh_is_refused(copied, ids):
     mesh = copied / "meshes" / f"{YARD}.glb"
     shutil.copy(copied / "meshes" / "U_Courtyard_1.glb", mesh)
-    with pytest.raises(AssetError, match="is not the mesh that the release was made from"):
+    with pytest.raises(AssetError, match="is not the mesh that the tables were made from"):
         picture_task(find_task(copied, ids[0]), frames=0)
     mesh.unlink()
     with pytest.raises(AssetError, match=f"{YARD}.glb: cannot be read"):

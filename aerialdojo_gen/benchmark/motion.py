@@ -142,6 +142,6 @@ def flight_space(mesh: Path, sha256: str, radius_m: float) -> FlightSpace:
         if space is None:
             while len(_spaces) >= _KEPT:
                 _spaces.popitem(last=False)
-            space = FlightSpace(read_glb(mesh), radius_m)
+            space = FlightSpace(read_glb(mesh, sha256), radius_m)
         _spaces[key] = space
         return space

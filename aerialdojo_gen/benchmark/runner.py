@@ -23,6 +23,7 @@ import pyarrow.compute as pc
 from aerialdojo_gen import store
 from aerialdojo_gen.atomic import atomic_file
 from aerialdojo_gen.benchmark import episodes, journal
+from aerialdojo_gen.benchmark.flying_code import flying_code
 from aerialdojo_gen.benchmark.goal import Sensors
 from aerialdojo_gen.benchmark.tasks import Selection, select
 from aerialdojo_gen.benchmark.worker import Finished, Unit
@@ -220,7 +221,8 @@ class _Run:
             for table in ("release/scenes", *(f"{kind}/{s}" for kind in ("tasks", "routes") for s in subsets))
         }
         digest = hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
-        self._settings = json.loads(json.dumps(evaluation.settings() | {"data": digest}))
+        own = {"data": digest, "code": flying_code(evaluation.agent)}
+        self._settings = json.loads(json.dumps(evaluation.settings() | own))
         self._fingerprint = hashlib.sha256(json.dumps(self._settings, sort_keys=True).encode()).hexdigest()
 
     def claim(self) -> None:
@@ -229,10 +231,11 @@ class _Run:
         mend = "give another --run, or --restart"
         # One that has finished nothing may yet become another: an agent's options may have been wrong.
         if begun and path.is_file():
-            before = json.loads(path.read_text(encoding="utf-8"))
+            before, own = json.loads(path.read_text(encoding="utf-8")), ("data", "code")
             for key, value in self._settings.items():
                 if before.get(key) != value:
-                    what = "other data" if key == "data" else f"{key} = {before.get(key)!r}, not {value!r}"
+                    what = f"{key} = {before.get(key)!r}, not {value!r}"
+                    what = f"other {key}" if key in own else what
                     raise UsageError(f"run {self._name!r} was begun with {what}: {mend}")
         for scene in episodes.run_scenes(self._out, self._name):
             if episodes.fingerprint_of(self._out, self._name, scene) != self._fingerprint:

@@ -166,7 +166,8 @@ def _measure(
 ) -> tuple[int, float, float, int]:
     """Record the first poses of a route; returns poses, CPU seconds for them and for opening the scene, bytes."""
     begun = time.process_time()
-    mesh = read_glb(data / store.read_scene(data, "scenes", scene)["mesh_path"][0].as_py())
+    row = store.read_scene(data, "scenes", scene).to_pylist()[0]
+    mesh = read_glb(data / row["mesh_path"], row["mesh_sha256"])
     solid = Solid(mesh)
     short = route | {name: route[name][:_MEASURED_POSES] for name in ("x_m", "y_m", "z_m", "yaw_rad", "action")}
     poses = frame_poses(short, config)

@@ -21,13 +21,13 @@ _NOTE = "recording.json"
 _SELECTION = {"limit", "split", "trajectories_per_part"}
 
 
-def trajectory_fingerprint(version: int, mesh_sha256: str, route: Mapping[str, Any], config: RenderConfig) -> str:
+def trajectory_fingerprint(code: str, mesh_sha256: str, route: Mapping[str, Any], config: RenderConfig) -> str:
     """Hash what a trajectory's recording depends on.
 
     Parameters
     ----------
-    version : int
-        Of the stage.
+    code : str
+        Digest of the stage's code.
     mesh_sha256 : str
         Of the scene's mesh.
     route : mapping
@@ -41,7 +41,7 @@ def trajectory_fingerprint(version: int, mesh_sha256: str, route: Mapping[str, A
         SHA-256, hexadecimal.
     """
     facts = {
-        "version": version,
+        "code": code,
         "mesh": mesh_sha256,
         "route": {name: route[name] for name in ("nav_id", "x_m", "y_m", "z_m", "yaw_rad", "action")},
         "config": config.model_dump(mode="json", exclude=_SELECTION),

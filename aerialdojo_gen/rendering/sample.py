@@ -69,7 +69,7 @@ def n_parts(data: Path, scene: str, config: RenderConfig) -> int:
     rows = [
         row
         for table in tables(config, scene)
-        for row in store.read_scene(data, table, scene).select(["nav_id", "setting"]).to_pylist()
+        for row in store.read_scene(data, table, scene, ["nav_id", "setting"]).to_pylist()
     ]
     # How many are drawn does not depend on the seed; which, does.
     return max(1, -(-len(choose(rows, config.limit, 0)) // config.trajectories_per_part))

@@ -6,6 +6,7 @@ coordinates are the world's own, in float32. The model's v points up and glTF's 
 
 from __future__ import annotations
 
+import hashlib
 import json
 import struct
 from functools import lru_cache
@@ -68,16 +69,29 @@ def _png(material: Material) -> bytes:
     return png.tobytes()
 
 
-def read_glb(path: Path) -> Scene:
+def read_glb(path: Path, sha256: str = "") -> Scene:
     """Read a scene that `write_glb` wrote; it equals the written one to the last bit.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    sha256 : str
+        What its bytes must have, hexadecimal: ``mesh_sha256`` of the scene's row. Not asked for where empty.
 
     Raises
     ------
     AssetError
-        The file is missing, cut short, or no scene of this program (other meshes come in through ``add-scene``).
+        The file is missing, cut short, no scene of this program (other meshes come in through ``add-scene``), or not
+        the one that is asked for.
     """
     try:
-        document, data = _chunks(path)
+        raw = path.read_bytes()
+        if sha256 and hashlib.sha256(raw).hexdigest() != sha256:
+            raise AssetError(
+                f"{path} is not the mesh that the tables were made from: run aerialdojo-gen split --scene {path.stem}"
+            )
+        document, data = _chunks(raw)
         extras = document["extras"]["aerialdojo"]
         if extras["version"] != _VERSION:
             raise AssetError(f"{path}: scene format {extras['version']} is not {_VERSION}; run build-scenes again")
@@ -187,8 +201,8 @@ class _Writer:
         return len(self._views) - 1
 
 
-def _chunks(path: Path) -> tuple[dict[str, Any], memoryview]:
-    raw = memoryview(path.read_bytes())
+def _chunks(whole: bytes) -> tuple[dict[str, Any], memoryview]:
+    raw = memoryview(whole)
     magic, version, length = struct.unpack_from("<4sII", raw)
     if magic != _MAGIC or version != 2 or length != len(raw):
         raise ValueError("no whole GLB 2 file")

@@ -20,7 +20,7 @@ from aerialdojo_gen.rendering.sample import choose, tables
 from aerialdojo_gen.rendering.trajectory import FramePoses
 from aerialdojo_gen.scenes.model import Scene
 from aerialdojo_gen.schemas import FRAMES, RECORDINGS
-from aerialdojo_gen.stage import BY_NAME, Job, Output
+from aerialdojo_gen.stage import Job, Output
 from aerialdojo_gen.tables import from_rows
 
 
@@ -53,7 +53,7 @@ def run(job: Job, config: RenderConfig) -> Output:
     for nav_id in mine:
         poses = frame_poses(routes[nav_id], config)
         folder = f"media/{job.scene}/{nav_id}"
-        fingerprint = finished.trajectory_fingerprint(BY_NAME["render"].version, mesh, routes[nav_id], config)
+        fingerprint = finished.trajectory_fingerprint(job.code, mesh, routes[nav_id], config)
         rows = None if job.force else finished.find(job.roots.data, folder, fingerprint)
         if rows is None:
             if job.deadline is not None and time.time() >= job.deadline:

@@ -75,7 +75,9 @@ def _map(axes: Axes, data: Path, row: dict[str, Any]) -> None:
     axes.set_facecolor("white" if mesh.is_file() else "#f2f2f2")
     if mesh.is_file():
         pixel_m = max(east - west, north - south) / _PIXELS
-        picture = OrthographicPictures(read_glb(mesh)).from_above((west, east, south, north), pixel_m)
+        picture = OrthographicPictures(read_glb(mesh, row["mesh_sha256"])).from_above(
+            (west, east, south, north), pixel_m
+        )
         # A little paled, so that marks stand out.
         axes.imshow(picture, extent=(west, east, south, north), interpolation="none", alpha=_OPACITY)
     for table, kind in (("anchors", "anchor"), ("objects", "object"), ("landmarks", "landmark")):

@@ -63,5 +63,6 @@ def scene_mesh(data: SceneData) -> SceneMesh:
         raise UncheckedError("no mesh")
     kept = data.kept.get("mesh")
     if not isinstance(kept, SceneMesh):
-        kept = data.kept["mesh"] = SceneMesh(read_glb(mesh_path(data)))
+        digest = str(data["scenes"].texts("mesh_sha256")[0])
+        kept = data.kept["mesh"] = SceneMesh(read_glb(mesh_path(data), digest))
     return kept

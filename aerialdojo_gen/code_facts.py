@@ -1,0 +1,274 @@
+"""What one module's source says: a digest that comments, docstrings and layout do not change, and what it imports."""
+
+from __future__ import annotations
+
+import ast
+import hashlib
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+# Neither what an expression is used for nor how a string was written changes what the code does.
+_UNCOUNTED = frozenset({"ctx", "kind", "type_comment", "type_ignores"})
+_IMPORTERS = frozenset({"import_module", "__import__"})
+
+
+@dataclass(frozen=True, order=True)
+class Edge:
+    """Something that is imported.
+
+    Attributes
+    ----------
+    module : str
+        Absolute name of the module.
+    name : str
+        What is taken from it; ``""`` is the module itself, ``"*"`` all names, ``"**"`` every module of a package.
+    uses : tuple of str
+        Where the name may be a module: the attributes that are asked of it; ``("*",)`` where that cannot be told.
+    """
+
+    module: str
+    name: str = ""
+    uses: tuple[str, ...] = ("*",)
+
+
+@dataclass(frozen=True)
+class Definition:
+    """A name that a module binds at its top level.
+
+    Attributes
+    ----------
+    digest : str
+        Of the statements that bind it, hexadecimal.
+    names : tuple of str
+        Names of the module that it refers to.
+    edges : tuple of Edge
+        What it imports, and what it uses of the module's imports.
+    """
+
+    digest: str
+    names: tuple[str, ...]
+    edges: tuple[Edge, ...]
+
+
+@dataclass(frozen=True)
+class Facts:
+    """What a module's source says.
+
+    Attributes
+    ----------
+    digest : str
+        Of the whole module, hexadecimal.
+    edges : tuple of Edge
+        All that it imports, also inside functions; not what it imports for type checkers alone.
+    definitions : dict of str to Definition
+        By name; empty where they were not asked for.
+    unknown : tuple of str
+        Imports whose module is known only when the code runs.
+    """
+
+    digest: str
+    edges: tuple[Edge, ...]
+    definitions: dict[str, Definition] = field(default_factory=dict)
+    unknown: tuple[str, ...] = ()
+
+
+def module_facts(source: bytes, module: str, is_package: bool, by_definition: bool = False) -> Facts:
+    """Read a module's source.
+
+    Parameters
+    ----------
+    source : bytes
+        Of the module's file.
+    module : str
+        Its absolute name.
+    is_package : bool
+        Whether the file is an ``__init__.py``.
+    by_definition : bool
+        Whether `Facts.definitions` is filled in.
+
+    Returns
+    -------
+    Facts
+
+    Raises
+    ------
+    SyntaxError
+        The source is no Python.
+    """
+    tree = ast.parse(source)
+    package = module if is_package else module.rpartition(".")[0]
+    imports = _Imports(tree, module, package)
+    edges = imports.edges([tree])
+    if not by_definition:
+        return Facts(_digest([tree]), edges, {}, tuple(sorted(imports.unknown)))
+    statements: dict[str, list[ast.stmt]] = {}
+    for statement in tree.body:
+        for name in _bound(statement):
+            statements.setdefault(name, []).append(statement)
+    definitions = {
+        name: Definition(
+            _digest(nodes),
+            tuple(sorted(_read_names(nodes) & set(statements))),
+            imports.edges(nodes),
+        )
+        for name, nodes in statements.items()
+        if name not in imports.bound
+    }
+    return Facts(_digest([tree]), edges, definitions, tuple(sorted(imports.unknown)))
+
+
+def _bound(statement: ast.stmt) -> Iterator[str]:
+    """Names that a statement at the top level binds."""
+    if isinstance(statement, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef):
+        yield statement.name
+    elif isinstance(statement, ast.Import | ast.ImportFrom):
+        for alias in statement.names:
+            yield alias.asname or alias.name.split(".")[0]
+    elif isinstance(statement, ast.Assign | ast.AnnAssign | ast.AugAssign):
+        targets = statement.targets if isinstance(statement, ast.Assign) else [statement.target]
+        for node in (inner for target in targets for inner in ast.walk(target)):
+            if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
+                yield node.id
+
+
+def _read_names(nodes: Sequence[ast.AST]) -> set[str]:
+    return {n.id for node in nodes for n in ast.walk(node) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Load)}
+
+
+class _Imports:
+    """The import statements of a module, wherever they stand."""
+
+    def __init__(self, tree: ast.Module, module: str, package: str) -> None:
+        self._module, self._package = module, package
+        typing_only = {
+            id(inner)
+            for node in ast.walk(tree)
+            if isinstance(node, ast.If) and _type_checking(node.test)
+            for statement in node.body
+            for inner in ast.walk(statement)
+        }
+        self._typing_only = typing_only
+        # What the names mean that import statements bind, anywhere in the module.
+        self.bound: dict[str, list[Edge]] = {}
+        self.unknown: set[str] = set()
+        for node in ast.walk(tree):
+            if isinstance(node, ast.Import | ast.ImportFrom) and id(node) not in typing_only:
+                for name, edge in self._pairs(node):
+                    self.bound.setdefault(name, []).append(edge)
+
+    def _pairs(self, node: ast.Import | ast.ImportFrom) -> Iterator[tuple[str, Edge]]:
+        if isinstance(node, ast.Import):
+            for alias in node.names:
+                yield alias.asname or alias.name.split(".")[0], Edge(alias.name)
+            return
+        origin = node.module or ""
+        if node.level:
+            above = self._package.split(".")[: len(self._package.split(".")) - node.level + 1]
+            origin = ".".join([*above, *([node.module] if node.module else [])])
+        if origin == "__future__":
+            return
+        for alias in node.names:
+            yield alias.asname or alias.name, Edge(origin, alias.name)
+
+    def edges(self, nodes: Sequence[ast.AST]) -> tuple[Edge, ...]:
+        """What these nodes import, statically or by `importlib`, and what they use of what the module imports."""
+        found: set[Edge] = set()
+        attributes: dict[str, set[str]] = {}
+        mentions: dict[str, int] = {}
+        for node in (inner for outer in nodes for inner in ast.walk(outer)):
+            if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name):
+                attributes.setdefault(node.value.id, set()).add(node.attr)
+                mentions[node.value.id] = mentions.get(node.value.id, 0) - 1
+            elif isinstance(node, ast.Name) and isinstance(node.ctx, ast.Load):
+                mentions[node.id] = mentions.get(node.id, 0) + 1
+            elif isinstance(node, ast.Import | ast.ImportFrom) and id(node) not in self._typing_only:
+                for name, _ in self._pairs(node):
+                    mentions.setdefault(name, 0)
+            elif isinstance(node, ast.Call) and _called(node) in _IMPORTERS and node.args:
+                target = self._dynamic(node.args[0])
+                found |= {target} if target else set()
+                self.unknown |= set() if target else {ast.unparse(node.args[0])}
+        for name in mentions.keys() & self.bound.keys():
+            # A name that also stands alone, and not before a dot, may be asked for anything.
+            uses = ("*",) if mentions[name] > 0 else tuple(sorted(attributes.get(name, ())))
+            found |= {Edge(edge.module, edge.name, uses) for edge in self.bound[name]}
+        own = self._module.split(".")[0]
+        inside = {edge for edge in found if edge.module.split(".")[0] == own}
+        # Of another package nothing counts but which one it is.
+        return tuple(sorted(inside | {Edge(edge.module.split(".")[0], "", ()) for edge in found - inside}))
+
+    def _dynamic(self, argument: ast.expr) -> Edge | None:
+        if isinstance(argument, ast.Constant) and isinstance(argument.value, str):
+            return Edge(argument.value)
+        if not isinstance(argument, ast.JoinedStr):
+            return None
+        head = ""
+        for part in argument.values:
+            if isinstance(part, ast.Constant):
+                head += str(part.value)
+            elif isinstance(part, ast.FormattedValue) and (known := self._own_name(part.value)) is not None:
+                head += known
+            else:
+                break
+        # Only the last part of the module's name is known when the code runs: any module of the package, then.
+        return Edge(head[:-1], "**") if head.endswith(".") else None
+
+    def _own_name(self, node: ast.expr) -> str | None:
+        if isinstance(node, ast.Name) and node.id == "__name__":
+            return self._module
+        if isinstance(node, ast.Attribute) and node.attr == "__name__" and isinstance(node.value, ast.Name):
+            for edge in self.bound.get(node.value.id, []):
+                return f"{edge.module}.{edge.name}" if edge.name else edge.module
+        return None
+
+
+def _type_checking(test: ast.expr) -> bool:
+    return (isinstance(test, ast.Name) and test.id == "TYPE_CHECKING") or (
+        isinstance(test, ast.Attribute) and test.attr == "TYPE_CHECKING"
+    )
+
+
+def _called(call: ast.Call) -> str:
+    function = call.func
+    return function.attr if isinstance(function, ast.Attribute) else getattr(function, "id", "")
+
+
+def _digest(nodes: list[Any]) -> str:
+    words: list[str] = []
+    for node in nodes:
+        _say(node, words)
+    return hashlib.sha256("\x00".join(words).encode("utf-8", "surrogatepass")).hexdigest()
+
+
+def _say(node: Any, words: list[str]) -> None:
+    """Write a tree as words; what is empty is left out, so that Python versions agree that know further fields."""
+    if isinstance(node, ast.AST):
+        words.append(f"({type(node).__name__}")
+        for name, value in ast.iter_fields(node):
+            if name in _UNCOUNTED or value is None or value == []:
+                continue
+            if name == "body" and _has_docstring(node):
+                value = value[1:]
+            if isinstance(node, ast.Constant) and name == "value":
+                words.append(f"{type(value).__name__} {value!r}")
+                continue
+            words.append(name)
+            _say(value, words)
+        words.append(")")
+    elif isinstance(node, list):
+        words.append("[")
+        for item in node:
+            _say(item, words)
+        words.append("]")
+    else:
+        words.append(f"{type(node).__name__} {node!r}")
+
+
+def _has_docstring(node: ast.AST) -> bool:
+    if not isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef) or not node.body:
+        return False
+    first = node.body[0]
+    return (
+        isinstance(first, ast.Expr) and isinstance(first.value, ast.Constant) and isinstance(first.value.value, str)
+    )
