@@ -24,6 +24,7 @@ from aerialdojo_gen.interrupt import Interrupts
 from aerialdojo_gen.progress import Reporter
 from aerialdojo_gen.shards import Limits, shards_of
 from aerialdojo_gen.stage import STAGES, Roots, Stage
+from aerialdojo_gen.staging import sweep
 
 
 @dataclass(frozen=True)
@@ -66,7 +67,10 @@ class StageSummary:
 
 @contextmanager
 def data_lock(data: Path) -> Iterator[None]:
-    """Hold the data directory: one run writes to it at a time; a killed run's lock is gone with it."""
+    """Hold the data directory: one run writes to it at a time; a killed run's lock is gone with it.
+
+    What killed runs left half-made in it is removed.
+    """
     try:
         data.mkdir(parents=True, exist_ok=True)
         file = (data / ".lock").open("a")
@@ -77,7 +81,14 @@ def data_lock(data: Path) -> Iterator[None]:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
             raise StoreError(f"another run is writing to {data}: wait for it, or use another --data") from None
-        yield
+        except OSError as error:
+            raise disk_error(error, data / ".lock") from None
+        sweep(data)
+        try:
+            yield
+        finally:
+            # What workers were at when an error or Ctrl-C ended them.
+            sweep(data)
 
 
 def run(

@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import Any
 
 from aerialdojo_gen import store
-from aerialdojo_gen.atomic import sweep
 from aerialdojo_gen.config import Pipeline, Section
 from aerialdojo_gen.errors import AerialDojoError, StoreError
 from aerialdojo_gen.executor import Task
@@ -101,7 +100,6 @@ def shards_of(
             continue
         for table in stage.writes:
             store.prune(roots.data, table, scene, parts)
-            sweep(store.shard_path(roots.data, table, scene).parent)
         for part in range(parts):
             shard += 1
             if shard % limits.share[1] != limits.share[0]:

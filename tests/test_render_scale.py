@@ -25,6 +25,7 @@ from aerialdojo_gen.rendering.estimate import estimate
 from aerialdojo_gen.rendering.reader import read_recording
 from aerialdojo_gen.shards import Limits
 from aerialdojo_gen.stages import render
+from aerialdojo_gen.staging import AREA
 
 ALL = CONFIG.model_copy(update={"limit": 0, "trajectories_per_part": 5})
 FEW = CONFIG.model_copy(update={"limit": 2, "trajectories_per_part": 2})
@@ -58,13 +59,15 @@ def test_a_killed_run_goes_on_at_the_trajectory_and_ends_with_the_same_bytes(tmp
     kept = {p: p.stat().st_mtime_ns for p in media.glob("nav_*/recording.json")}
     assert 4 <= len(kept) < 22
     # As if it had been killed in the middle of a file, whenever it was.
-    half = media / f".nav_05.{process.pid}.tmp"
-    half.mkdir(exist_ok=True)
-    (half / "front_rgb.mp4").write_bytes(b"half")
+    half = tmp_path / AREA / "dead"
+    (half / "new").mkdir(parents=True)
+    (half / "new" / "front_rgb.mp4").write_bytes(b"half")
+    (half / "lease").write_text(f"media/{SCENE}/nav_05")
 
     run_whole(tmp_path, ALL)
     assert {p: p.stat().st_mtime_ns for p in kept} == kept
     assert files_of(tmp_path) == files_of(whole)
+    assert not (tmp_path / AREA).exists()
 
 
 def test_the_shares_of_three_machines_are_what_one_writes(tmp_path, whole):

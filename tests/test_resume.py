@@ -11,6 +11,7 @@ from pathlib import Path
 import pyarrow.parquet as pq
 import pytest
 
+from aerialdojo_gen.staging import AREA
 from aerialdojo_gen.store import read_info
 
 TABLES = ("meshes", "scenes", "landmarks", "objects", "chosen_anchors", "anchors", "pairs", "plans")
@@ -85,7 +86,7 @@ def test_killed_again_and_again_ends_with_the_same_bytes(project, smoke, tmp_pat
     assert code == 0, err
     assert snapshot(data) == {k: v for k, v in snapshot(smoke).items() if k in snapshot(data)}
     assert snapshot(data).keys() == snapshot(smoke).keys()
-    assert not list(data.rglob(".*.tmp*")), "temporary files of killed runs are swept"
+    assert not list(data.rglob(f"{AREA}*")), "what killed runs left half-made is swept"
 
 
 def test_one_worker_gives_the_same_bytes_as_two(project, smoke, tmp_path):
@@ -107,7 +108,7 @@ def test_ctrl_c_keeps_what_was_finished_and_ends_the_workers(project, smoke, tmp
     finished = snapshot(data)
     assert len([name for name in finished if name.endswith(".parquet")]) >= 8
     assert finished.items() <= snapshot(smoke).items()
-    assert not list(data.rglob(".*.tmp*"))
+    assert not list(data.rglob(f"{AREA}*"))
 
 
 @pytest.fixture

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from aerialdojo_gen.atomic import atomic_folder, sweep
+from aerialdojo_gen.atomic import atomic_folder
 from aerialdojo_gen.config import RenderConfig
 from aerialdojo_gen.errors import BudgetSpent
 from aerialdojo_gen.rendering import finished
@@ -47,7 +47,6 @@ def run(job: Job, config: RenderConfig) -> Output:
     routes = {row["nav_id"]: row for table in tables(config, job.scene) for row in job.read(table).to_pylist()}
     mine = choose(routes.values(), config.limit, job.seed)[job.part :: job.parts]
     mesh = job.read("scenes")["mesh_sha256"][0].as_py()
-    sweep(job.roots.data / "media" / job.scene)
     recordings: list[dict[str, Any]] = []
     frames: list[dict[str, Any]] = []
     for nav_id in mine:
@@ -80,7 +79,7 @@ class _Trajectory:
 
     def record(self, data: Path, folder: str, fingerprint: str) -> list[dict[str, Any]]:
         """Record all views into a folder that appears when it is whole; returns the rows of `recordings`."""
-        with atomic_folder(data / folder) as here:
+        with atomic_folder(data / folder, root=data) as here:
             rows = [row for view in self.config.views for row in self._view(view, here, folder)]
             finished.note(here, fingerprint, rows)
         return rows
