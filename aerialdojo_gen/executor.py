@@ -20,6 +20,7 @@ from typing import Any, Generic, Protocol, TypeVar
 from aerialdojo_gen import store
 from aerialdojo_gen.config import Section
 from aerialdojo_gen.errors import AerialDojoError, BudgetSpent
+from aerialdojo_gen.files import size_of
 from aerialdojo_gen.stage import BY_NAME, Job
 
 
@@ -75,7 +76,7 @@ def compute(task: Task) -> dict[str, Any]:
     if set(output.tables) != set(stage.writes):
         raise RuntimeError(f"{task.label} returned tables {sorted(output.tables)}, not {sorted(stage.writes)}")
     summary = {"rows_in": output.rows_in, "rows_out": output.rows_out, "counts": dict(sorted(output.counts.items()))}
-    files = {name: (job.roots.data / name).stat().st_size for name in sorted(job.files)}
+    files = {name: size_of(job.roots.data / name) for name in sorted(job.files)}
     for name, table in output.tables.items():
         store.write_shard(
             job.roots.data,

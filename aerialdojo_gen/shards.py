@@ -15,14 +15,18 @@ from aerialdojo_gen import store
 from aerialdojo_gen.config import Pipeline, Section
 from aerialdojo_gen.errors import AerialDojoError, StoreError
 from aerialdojo_gen.executor import Task
+from aerialdojo_gen.files import is_whole, sha256_of
 from aerialdojo_gen.fingerprint import scene_fingerprint
+from aerialdojo_gen.parquet_files import read_file
 from aerialdojo_gen.progress import Reporter
 from aerialdojo_gen.stage import Job, Roots, Stage
 
 
 @dataclass(frozen=True)
 class Limits:
-    """How much of a stage is computed now; what is left out is computed when the command is given again.
+    """How much of a stage is computed now, and how closely what is there is looked at.
+
+    What is left out is computed when the command is given again.
 
     Attributes
     ----------
@@ -31,10 +35,13 @@ class Limits:
         machine writes.
     deadline : float or None
         Seconds since the epoch after which nothing further is begun.
+    verify : bool
+        Files count as whole if their digests are right, not their sizes alone.
     """
 
     share: tuple[int, int] = (0, 1)
     deadline: float | None = None
+    verify: bool = False
 
 
 @dataclass(frozen=True)
@@ -104,12 +111,15 @@ def shards_of(
             shard += 1
             if shard % limits.share[1] != limits.share[0]:
                 continue
-            summary = None if force else _fresh(stage, roots.data, scene, part, parts, fingerprint, reporter)
+            here = (stage, roots.data, scene, part)
+            summary = None if force else _fresh(*here, parts, fingerprint, reporter)
+            if summary is not None and limits.verify and not _verified(*here, reporter):
+                summary = None
             if summary is not None:
                 found.fresh.append(summary)
             else:
                 whole = Job(stage.name, scene, part, parts, pipeline.seed, pipeline.embodiment, roots)
-                job = replace(whole, deadline=limits.deadline, force=force)
+                job = replace(whole, deadline=limits.deadline, force=force, verify=limits.verify)
                 found.tasks.append(Task(job, config, fingerprint))
     return found
 
@@ -132,8 +142,25 @@ def _fresh(
             return None
         for relative, size in info.files.items():
             file = data / relative
-            if not file.is_file() or file.stat().st_size != size:
+            if not is_whole(file, size):
                 reporter.line(f"{file} is missing or damaged: computed again")
                 return None
         summary = info.summary
     return summary
+
+
+def _verified(stage: Stage, data: Path, scene: str, part: int, reporter: Reporter) -> bool:
+    """Whether the files that a fresh shard names have the digests that it says."""
+    if stage.digests is None:
+        return True
+    table, *columns = stage.digests
+    try:
+        rows = read_file(store.shard_path(data, table, scene, part), columns)
+    except StoreError as error:
+        reporter.line(f"{error}: computed again")
+        return False
+    for relative, digest in zip(*(rows.column(name).to_pylist() for name in columns), strict=True):
+        if sha256_of(data / relative) != digest:
+            reporter.line(f"{data / relative} has other content than was written: computed again")
+            return False
+    return True

@@ -90,6 +90,8 @@ class Job:
         Seconds since the epoch after which a stage of long shards begins nothing new, and raises BudgetSpent.
     force : bool
         Whether the stage makes anew what it finds finished.
+    verify : bool
+        Whether it compares the digests of the files that it finds finished.
     """
 
     stage: str
@@ -102,6 +104,7 @@ class Job:
     files: list[str] = field(default_factory=list, compare=False)
     deadline: float | None = None
     force: bool = False
+    verify: bool = False
 
     def read(self, table: str) -> pa.Table:
         """Read all of this scene's rows of a table; StoreError names a missing or damaged shard."""
@@ -183,6 +186,8 @@ class Stage:
     choices : callable
         ``config -> list of config``: what `settle` may make of it, where deciding takes time. Where all shards are
         fresh by one of them nothing is decided anew.
+    digests : (str, str, str), optional
+        A table that the stage writes and its columns with the path of a file (or folder) and the SHA-256 of it.
     """
 
     name: str
@@ -195,6 +200,7 @@ class Stage:
     check: Callable[[Path, Sequence[str], Any], None] = _no_check
     settle: Callable[[Any, Callable[[str], None]], Any] = _as_it_is
     choices: Callable[[Any], list[Any]] = _no_choice
+    digests: tuple[str, str, str] | None = None
 
     def load(self) -> Callable[[Job, Any], Output]:
         """Import the stage's module and return its ``run``."""
@@ -274,7 +280,8 @@ _UPSTREAM_OF_SPLIT = ("scenes", "landmarks", "objects", "anchors", "references",
 
 STAGES: tuple[Stage, ...] = (
     Stage(
-        "build-scenes", 1, "Build the scenes' meshes from their recipes.", (), ("scenes",), sources=_scene_sources
+        "build-scenes", 1, "Build the scenes' meshes from their recipes.", (), ("scenes",), sources=_scene_sources,
+        digests=("scenes", "mesh_path", "mesh_sha256"),
     ),
     Stage(
         "annotate-import", 1, "Check the annotations against the scenes and import them.",
@@ -310,7 +317,7 @@ STAGES: tuple[Stage, ...] = (
     Stage(
         "render", 3, "Record four RGB-D views along trajectories of the release.",
         ("scenes", "routes/train", "routes/test"), ("recordings", "frames"), parts=_render_parts,
-        settle=_settle_renderer, choices=_renderers,
+        settle=_settle_renderer, choices=_renderers, digests=("recordings", "path", "sha256"),
     ),
 )  # fmt: skip
 

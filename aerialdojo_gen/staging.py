@@ -1,10 +1,10 @@
 """Where files and folders are made before they take their names, and whose they are.
 
-What is being made for a place below ROOT lies in a folder of its own, ``ROOT/.aerialdojo-staging/<item>/``: ``new`` is
-the thing itself, ``lease`` a file that its writer holds locked and that says where the thing belongs. The kernel lets go
-of the lock when the writer ends, however it ends, in whatever PID namespace or on whichever host it ran: an item whose
-lease can be locked belongs to nobody and is removed, one whose lease cannot is being written. Where the file system
-knows no locks nobody can tell, and nothing is removed.
+What is being made for a place below ROOT lies in a folder of its own, ``ROOT/.aerialdojo-staging/<item>/``: ``new``
+is the thing itself, ``lease`` a file that its writer holds locked and that says where the thing belongs. The kernel
+lets go of the lock when the writer ends, however it ends, in whatever PID namespace or on whichever host it ran: an
+item whose lease can be locked belongs to nobody and is removed, one whose lease cannot is being written. Where the
+file system knows no locks nobody can tell, and nothing is removed.
 """
 
 from __future__ import annotations

@@ -59,7 +59,11 @@ static void count(const char *what, const char *path) {
 #define REAL(name) __typeof__(&name) real = (__typeof__(&name))dlsym(RTLD_NEXT, #name)
 
 int rename(const char *a, const char *b) { REAL(rename); count("rename", b); return real(a, b); }
-int renameat(int x, const char *a, int y, const char *b) { REAL(renameat); count("rename", b); return real(x, a, y, b); }
+int renameat(int x, const char *a, int y, const char *b) {
+    REAL(renameat);
+    count("rename", b);
+    return real(x, a, y, b);
+}
 int renameat2(int x, const char *a, int y, const char *b, unsigned f) {
     REAL(renameat2);
     if (getenv("PRELOAD_NO_EXCHANGE")) { errno = EINVAL; return -1; }

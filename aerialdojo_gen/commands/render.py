@@ -46,13 +46,15 @@ def render(
         "what one machine records.")] = None,
     budget: Annotated[str | None, typer.Option(
         "--budget", help="Stop after so long, e.g. 90m or 2h; the same command goes on.")] = None,
+    verify: Annotated[bool, typer.Option(
+        "--verify", help="Read every recording and record again those whose content has changed.")] = False,
     estimate: Annotated[bool, typer.Option(
         "--estimate", help="Measure a few trajectories, say what all will take, and record nothing.")] = False,
 ) -> None:  # fmt: skip
     """Record four RGB-D views along trajectories of the release."""
     from aerialdojo_gen.shards import Limits
 
-    limits = Limits(share_of(shard) if shard else (0, 1), time.time() + duration_s(budget) if budget else None)
+    limits = Limits(share_of(shard) if shard else (0, 1), time.time() + duration_s(budget) if budget else None, verify)
     overrides: dict[str, object] = {
         "split": split, "limit": limit, "renderer": renderer, "sampling": sampling, "frames": frames,
         "instances": instances or None,

@@ -12,10 +12,10 @@ from typing import Any
 from aerialdojo_gen import rng, store
 from aerialdojo_gen.config import RenderConfig
 from aerialdojo_gen.errors import UsageError
+from aerialdojo_gen.files import size_of
 from aerialdojo_gen.rendering.backend import choose_renderer, open_renderer
 from aerialdojo_gen.rendering.checks import Solid
 from aerialdojo_gen.rendering.codecs import SUFFIX
-from aerialdojo_gen.rendering.finished import size_of
 from aerialdojo_gen.rendering.recording import frame_poses, record_view
 from aerialdojo_gen.rendering.sample import choose, tables
 from aerialdojo_gen.scenes.glb import read_glb

@@ -11,6 +11,7 @@ from typing import Any
 from aerialdojo_gen.atomic import atomic_folder
 from aerialdojo_gen.config import RenderConfig
 from aerialdojo_gen.errors import BudgetSpent
+from aerialdojo_gen.files import sha256_of, size_of
 from aerialdojo_gen.rendering import finished
 from aerialdojo_gen.rendering.backend import kept_renderer
 from aerialdojo_gen.rendering.checks import CONCERNS, FLAGS, kept_solid
@@ -21,6 +22,7 @@ from aerialdojo_gen.rendering.trajectory import FramePoses
 from aerialdojo_gen.scenes.model import Scene
 from aerialdojo_gen.schemas import FRAMES, RECORDINGS
 from aerialdojo_gen.stage import BY_NAME, Job, Output
+from aerialdojo_gen.staging import remove
 from aerialdojo_gen.tables import from_rows
 
 
@@ -53,12 +55,12 @@ def run(job: Job, config: RenderConfig) -> Output:
         poses = frame_poses(routes[nav_id], config)
         folder = f"media/{job.scene}/{nav_id}"
         fingerprint = finished.trajectory_fingerprint(BY_NAME["render"].version, mesh, routes[nav_id], config)
-        rows = None if job.force else finished.find(job.roots.data, folder, fingerprint)
+        rows = None if job.force else finished.find(job.roots.data, folder, fingerprint, verify=job.verify)
         if rows is None:
             if job.deadline is not None and time.time() >= job.deadline:
                 raise BudgetSpent(f"the budget was spent in {job.scene}")
             rows = _Trajectory(job.scene_model(), nav_id, poses, config).record(job.roots.data, folder, fingerprint)
-        job.files.extend(row["path"] for row in rows if config.frames == "video")
+        job.files.extend([f"{folder}/{finished.NOTE}", *(row["path"] for row in rows)])
         recordings += rows
         frames += _frame_rows(job.scene, nav_id, poses)
     counts = Counter(flag for row in recordings for flag in row["flags"])
@@ -94,7 +96,8 @@ class _Trajectory:
         flags = record_view(renderer, solid, view, self.poses, config, files)
         if flags:
             # A renderer that has gone wrong may be right when it is built anew; what stays is the view's own fault.
-            finished.remove(*files.values())
+            for file in files.values():
+                remove(file)
             renderer = kept_renderer(self.scene, config.renderer, anew=True)
             flags = record_view(renderer, solid, view, self.poses, config, files)
         return [
@@ -113,8 +116,8 @@ class _Trajectory:
                 "codec": "png" if png else CODEC[m],
                 "renderer": renderer.name,
                 "device": renderer.device,
-                "bytes": finished.size_of(file),
-                "sha256": finished.sha256_of(file),
+                "bytes": size_of(file),
+                "sha256": sha256_of(file),
                 "ok": not flags & CONCERNS[m],
                 "flags": [flag for flag in FLAGS if flag in flags & CONCERNS[m]],
             }
