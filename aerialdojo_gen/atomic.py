@@ -14,7 +14,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from aerialdojo_gen.errors import StoreError, first_line
-from aerialdojo_gen.staging import remove, replace_folder, staged
+from aerialdojo_gen.staging import replace_folder, staged
 
 # Beyond so many files one sync of the file system is quicker than one of each.
 _FEW_FILES = 32
@@ -86,10 +86,18 @@ def atomic_folder(path: Path, root: Path | None = None) -> Iterator[Path]:
             temporary = item / "new"
             temporary.mkdir()
             yield temporary
-            sync_folder(temporary)
+            _sync_folder(temporary)
             _place(temporary, path)
     except OSError as error:
         raise disk_error(error, path) from error
+
+
+def make_folder(folder: Path) -> None:
+    """Make a folder and those above it that are missing, on the disk; StoreError where that cannot be."""
+    try:
+        _make_folders(folder)
+    except OSError as error:
+        raise disk_error(error, folder) from error
 
 
 def _staging_root(root: Path, path: Path) -> Path:
@@ -111,7 +119,7 @@ def _place(temporary: Path, path: Path) -> None:
             copy = item / temporary.name
             if temporary.is_dir():
                 shutil.copytree(temporary, copy)
-                sync_folder(copy)
+                _sync_folder(copy)
                 replace_folder(copy, path)
             else:
                 shutil.copyfile(temporary, copy)
@@ -121,7 +129,6 @@ def _place(temporary: Path, path: Path) -> None:
 
 
 def _make_folders(folder: Path) -> None:
-    """Make a folder and those above it that are missing, on the disk."""
     missing = []
     while not folder.exists():
         missing.append(folder)
@@ -131,7 +138,7 @@ def _make_folders(folder: Path) -> None:
         _sync(path.parent)
 
 
-def sync_folder(folder: Path) -> None:
+def _sync_folder(folder: Path) -> None:
     """Wait until a folder and all that is in it is on the disk."""
     folders, files = [folder], []
     for found, names, inside in os.walk(folder):
@@ -193,6 +200,3 @@ def disk_error(error: OSError, path: Path) -> StoreError:
     """Turn an operating-system error of writing into one line that names the file."""
     why = _DISK.get(error.errno or 0, first_line(error))
     return StoreError(f"cannot write {path}: {why}; what was finished is kept, nothing half-written")
-
-
-__all__ = ["atomic_file", "atomic_folder", "disk_error", "remove", "sync_folder"]

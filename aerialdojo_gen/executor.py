@@ -22,6 +22,7 @@ from aerialdojo_gen.config import Section
 from aerialdojo_gen.errors import AerialDojoError, BudgetSpent
 from aerialdojo_gen.files import size_of
 from aerialdojo_gen.stage import BY_NAME, Job
+from aerialdojo_gen.trouble import explained
 
 
 class _Labelled(Protocol):
@@ -72,6 +73,8 @@ def compute(task: Task) -> dict[str, Any]:
     except AerialDojoError:
         raise
     except Exception as error:
+        if why := explained(error):
+            raise AerialDojoError(f"{task.label}: {why}") from error
         raise RuntimeError(f"{task.label} failed: {type(error).__name__}: {error}") from error
     if set(output.tables) != set(stage.writes):
         raise RuntimeError(f"{task.label} returned tables {sorted(output.tables)}, not {sorted(stage.writes)}")

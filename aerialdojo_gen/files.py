@@ -16,7 +16,7 @@ def size_of(path: Path) -> int:
 
 
 def sha256_of(path: Path) -> str:
-    """SHA-256 of a file, or of a folder's files one after the other by name, hexadecimal; OSError where it is missing."""
+    """SHA-256 of a file, or of a folder's files one after the other by name; OSError where it is missing."""
     digest = hashlib.sha256()
     for file in sorted(path.iterdir()) if path.is_dir() else [path]:
         with file.open("rb") as opened:

@@ -11,7 +11,7 @@ import fcntl
 import fnmatch
 import time
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -101,6 +101,8 @@ def run(
     force: Iterable[str] = (),
     reporter: Reporter | None = None,
     limits: Limits | None = None,
+    prepare: Callable[[], None] | None = None,
+    finish: Callable[[], None] | None = None,
 ) -> list[StageSummary]:
     """Run stages in their order on scenes.
 
@@ -123,6 +125,9 @@ def run(
     limits : Limits, optional
         How much of the last stage is computed now; all of it where absent.
 
+    prepare, finish : callable, optional
+        Called before the first stage and after the last one, while the data directory is held.
+
     Returns
     -------
     list of StageSummary
@@ -139,6 +144,8 @@ def run(
     forced = set(force)
     summaries = []
     with data_lock(roots.data), Interrupts() as interrupts, Pool(workers) as pool:
+        if prepare:
+            prepare()
         for stage in stages:
             now = limits if limits and stage is stages[-1] else Limits()
             forced_now = stage.name in forced
@@ -146,6 +153,9 @@ def run(
             interrupts.check()
             reporter.line(str(summary))
             summaries.append(summary)
+        if finish:
+            finish()
+            interrupts.check()
     return summaries
 
 

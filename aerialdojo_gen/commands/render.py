@@ -14,6 +14,7 @@ from aerialdojo_gen.commands.common import (
     Force,
     PipelineFile,
     Quiet,
+    Replace,
     Scene,
     Workers,
     default_workers,
@@ -30,7 +31,7 @@ _SECONDS = {"s": 1.0, "m": 60.0, "h": 3600.0, "d": 86400.0}
 @app.command("render")
 def render(
     data: Data = Path("data"), scene: Scene = None, pipeline: PipelineFile = None,
-    workers: Workers = None, force: Force = False, quiet: Quiet = False,
+    workers: Workers = None, force: Force = False, quiet: Quiet = False, replace: Replace = False,
     split: Annotated[str | None, typer.Option(
         "--split", help="train, test, all, id_train, id_test, ood_train or ood_test.")] = None,
     limit: Annotated[int | None, typer.Option(
@@ -54,7 +55,9 @@ def render(
     """Record four RGB-D views along trajectories of the release."""
     from aerialdojo_gen.shards import Limits
 
-    limits = Limits(share_of(shard) if shard else (0, 1), time.time() + duration_s(budget) if budget else None, verify)
+    limits = Limits(
+        share_of(shard) if shard else (0, 1), time.time() + duration_s(budget) if budget else None, verify
+    )
     overrides: dict[str, object] = {
         "split": split, "limit": limit, "renderer": renderer, "sampling": sampling, "frames": frames,
         "instances": instances or None,
@@ -65,7 +68,7 @@ def render(
     chosen = _scenes_of(split, scene, pipeline, data)
     run_until(
         "render", data=data, scene=chosen, pipeline=pipeline, workers=workers, force=force, quiet=quiet,
-        limits=limits, **overrides,
+        limits=limits, replace=replace, **overrides,
     )  # fmt: skip
 
 

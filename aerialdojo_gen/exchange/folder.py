@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path, PurePosixPath
 from typing import Any
 
-from aerialdojo_gen.atomic import atomic_folder
+from aerialdojo_gen.atomic import atomic_folder, disk_error
 from aerialdojo_gen.errors import UsageError
 from aerialdojo_gen.staging import sweep
 
@@ -45,8 +45,12 @@ def whole_folder(target: Path, marker: str, *, force: bool) -> Iterator[Path]:
     target = target.absolute()
     # Before anything is decided: it may bring back what a kill between two renames took away.
     sweep(target.parent)
-    taken = target.is_file() or (target.is_dir() and any(target.iterdir()))
-    if taken and not (target / marker).is_file():
+    try:
+        taken = target.is_file() or (target.is_dir() and any(target.iterdir()))
+        ours = (target / marker).is_file()
+    except OSError as error:
+        raise disk_error(error, target) from None
+    if taken and not ours:
         raise UsageError(f"{target} is there already and holds no {marker}: name another folder")
     if taken and not force:
         raise UsageError(f"{target} is there already: --force replaces it")
