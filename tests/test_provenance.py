@@ -83,9 +83,8 @@ def test_replace_puts_the_other_pipeline_s_release_in_its_place(data, pipeline):
 
 def test_the_same_pipeline_on_some_scenes_keeps_the_others(data, project):
     before = release(data)
-    shutil.rmtree(data / "release" / "tasks")
+    shutil.rmtree(data / "release" / "tasks" / "id_train")
     split(data, project / "pipelines" / "smoke.toml", scene=[A])
-    split(data, project / "pipelines" / "smoke.toml", scene=[B])
     assert release(data) == before
 
 
