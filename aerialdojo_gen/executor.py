@@ -74,7 +74,8 @@ def compute(task: Task) -> dict[str, Any]:
         raise
     except Exception as error:
         if why := explained(error):
-            raise AerialDojoError(f"{task.label}: {why}") from error
+            # Without the shard: it is no fault of its own, and all of them say the same.
+            raise AerialDojoError(why) from error
         raise RuntimeError(f"{task.label} failed: {type(error).__name__}: {error}") from error
     if set(output.tables) != set(stage.writes):
         raise RuntimeError(f"{task.label} returned tables {sorted(output.tables)}, not {sorted(stage.writes)}")

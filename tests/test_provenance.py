@@ -30,8 +30,8 @@ def pipeline(project, tmp_path):
 
     def write(name="other", scenes=(B,), more=""):
         text = (project / "pipelines" / "smoke.toml").read_text().replace('"../', f'"{project}/')
-        text = text.replace('name = "smoke"', f'name = "{name}"\nscenes = {json.dumps(list(scenes))}\n{more}')
-        (tmp_path / "mine.toml").write_text(text)
+        text = text.replace('name = "smoke"', f'name = "{name}"\nscenes = {json.dumps(list(scenes))}')
+        (tmp_path / "mine.toml").write_text(f"{text}\n{more}")
         return tmp_path / "mine.toml"
 
     return write

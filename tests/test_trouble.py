@@ -107,7 +107,9 @@ def test_targets_that_cannot_be_written(smoke, tmp_path):
     """As somebody who may not write there, be it that the tests run as root: a file is where a folder is to be."""
     file = tmp_path / "file"
     file.write_text("mine")
-    (tmp_path / "box.obj").write_text("v 0 0 0\nv 9 0 0\nv 9 9 0\nv 0 9 0\nv 4 4 5\nf 1 2 3\nf 3 4 1\nf 1 2 5\nf 2 3 5\n")
+    (tmp_path / "box.obj").write_text(
+        "v 0 0 0\nv 9 0 0\nv 9 9 0\nv 0 9 0\nv 4 4 5\nf 1 2 3\nf 3 4 1\nf 1 2 5\nf 2 3 5\n"
+    )
     add = ["add-scene", "Box", str(tmp_path / "box.obj"), "--up", "z", "--project"]
     smoke_pipeline = ["--pipeline", "pipelines/smoke.toml"]
     for target, why in ((file / "out", "a part of the path is not a folder"), ("/proc/out", "")):
@@ -129,7 +131,9 @@ def test_a_target_of_somebody_else(smoke, tmp_path):
     closed.mkdir(mode=0o700)
     args = ["export", "--format", "habitat", "--data", str(smoke), "--out", str(closed / "out")]
     command = [sys.executable, "-m", "aerialdojo_gen.cli", *args]
-    script = "import os, sys; os.setgroups([]); os.setgid(65534); os.setuid(65534); os.execv(sys.argv[1], sys.argv[1:])"
+    script = (
+        "import os, sys; os.setgroups([]); os.setgid(65534); os.setuid(65534); os.execv(sys.argv[1], sys.argv[1:])"
+    )
     for folder in (tmp_path, *tmp_path.parents):
         if folder.stat().st_mode & 0o001 == 0 and folder != closed:
             pytest.skip(f"nobody else can reach {folder}")
