@@ -2,23 +2,28 @@
 
     python tests/torture.py -n 100 [--seed 0] [--kind export] [--base DIR]
 
-A case copies a data directory, runs a command in a session of its own, kills the whole session with SIGKILL, and gives
-the same command again. The directory then has to hold the files of an undisturbed run, byte for byte, and no other. An
-odd case is killed after a random time, an even one at a random call, of those that an undisturbed run makes, of write,
-rename, renameat2, fsync, syncfs, mkdir, rmdir, unlink, link or flock (tests/preload.py).
+A case copies a data directory, runs a command in a session of its own, kills the whole session with SIGKILL, and
+gives the same command again. The directory then has to hold the files of an undisturbed run, byte for byte, and no
+other. Every other case is killed after a random time, the rest at a random one of the calls that an undisturbed run
+makes of write, rename, renameat2, fsync, syncfs, mkdir, rmdir, unlink, link and flock (tests/preload.py).
 """
 
 from __future__ import annotations
 
 import argparse
+import contextlib
+import functools
+import importlib
+import json
 import os
-import random
+import random  # noqa: TID251 - which kills, not what is generated
 import shutil
 import signal
 import subprocess
 import sys
 import tempfile
 import time
+import traceback
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -28,7 +33,7 @@ from preload import library
 
 ROOT = Path(__file__).resolve().parent.parent
 SCENE, OTHER = "U_Courtyard_0", "U_Courtyard_1"
-# Small pictures by the renderer that needs no graphics stack: what is tried is how files come to be, not what they show.
+# Small pictures by the renderer that needs no graphics stack: it is tried how files come to be, not what they show.
 SMALL = """
 width = 64
 height = 64
@@ -95,9 +100,9 @@ def _lose_stages(data: Path, rng: random.Random) -> None:
             shutil.rmtree(data / table)
 
 
-def _lose_recordings(data: Path, _rng: random.Random) -> None:
+def _lose_recordings(data: Path, _rng: random.Random, scene: str = SCENE) -> None:
     for table in ("recordings", "frames", "media"):
-        shutil.rmtree(data / table / SCENE, ignore_errors=True)
+        shutil.rmtree(data / table / scene)
 
 
 def _older(folder: str, marker: str) -> Callable[[Path, random.Random], None]:
@@ -126,6 +131,69 @@ KINDS = {
 }
 
 
+class Server:
+    """A process that has imported everything and becomes the command in a child of its own: imports are not tried."""
+
+    def __init__(self) -> None:
+        self._process = subprocess.Popen(
+            [sys.executable, __file__, "--serve"], cwd=ROOT, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
+            env=os.environ | {"LD_PRELOAD": str(library()), "PYTHONPATH": str(ROOT)},
+        )  # fmt: skip
+
+    def run(self, arguments: list[str], env: dict[str, str], said: Path, kill_after: float) -> int:
+        """Run a command in a session of its own; returns its exit status, negative for a signal."""
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
+        print(json.dumps([arguments, env, str(said)]), file=self._process.stdin, flush=True)
+        session = int(self._process.stdout.readline())
+        if kill_after >= 0:
+            # The server reaps it when it is asked to go on: until then its number is nobody else's.
+            time.sleep(kill_after)
+            with contextlib.suppress(ProcessLookupError):
+                os.killpg(session, signal.SIGKILL)
+        print(file=self._process.stdin, flush=True)
+        code = int(self._process.stdout.readline())
+        wait_until_empty(session)
+        return code
+
+    def close(self) -> None:
+        """End it."""
+        assert self._process.stdin is not None
+        self._process.stdin.close()
+        self._process.wait()
+
+
+def serve() -> None:
+    """Be a `Server`'s process."""
+    for name in ("stages.render", "stages.plan", "stages.anchor_sample", "benchmark.runner", "exchange.importing"):
+        importlib.import_module(f"aerialdojo_gen.{name}")
+    cli = importlib.import_module("aerialdojo_gen.cli")
+    for line in iter(sys.stdin.readline, ""):
+        arguments, env, said = json.loads(line)
+        child = os.fork()
+        if not child:
+            os.setsid()
+            os.environ.update(env)
+            output = os.open(said, os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
+            for number in (1, 2):
+                os.dup2(output, number)
+            os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
+            sys.argv[:] = ["aerialdojo-gen", *arguments]
+            try:
+                cli.main()
+                code = 0
+            except SystemExit as error:
+                code = error.code if isinstance(error.code, int) else bool(error.code)
+            except BaseException:
+                traceback.print_exc()
+                code = 70
+            sys.stderr.flush()
+            os._exit(code)
+        print(child, flush=True)
+        sys.stdin.readline()
+        print(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), flush=True)
+
+
 class Bench:
     """Where cases are tried: a finished data directory, and what undisturbed runs make of it.
 
@@ -141,37 +209,43 @@ class Bench:
         self._folder = folder
         text = (ROOT / "pipelines" / "smoke.toml").read_text(encoding="utf-8").replace('"../', f'"{ROOT}/')
         (folder / "torture.toml").write_text(text + SMALL, encoding="utf-8")
-        self._base = folder / "base"
-        shutil.copytree(base, self._base)
-        _lose_recordings(self._base, random.Random(0))
-        self._command(_run(self._base, 2))
-        export = ["export", "--format", "aerialdojo", "--data", str(self._base), "--out", str(folder / "exported")]
-        self._command(export)
+        self._base = base
+        self._server = Server()
         self._whole: dict[str, dict[str, bytes]] = {}
         self._seconds: dict[str, float] = {}
         self._calls: dict[str, int] = {}
 
     def _command(self, arguments: list[str], env: dict[str, str] | None = None, kill_after: float = -1.0) -> int:
         """Run a command, killed after so many seconds where that is not negative; returns its exit status."""
-        process = subprocess.Popen(
-            [sys.executable, "-m", "aerialdojo_gen.cli", *arguments, *([] if _is_quiet(arguments) else ["--quiet"])],
-            cwd=ROOT, env=os.environ | (env or {}), stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
-            start_new_session=True,
-        )  # fmt: skip
-        try:
-            _, said = process.communicate(timeout=kill_after if kill_after >= 0 else 900)
-        except subprocess.TimeoutExpired:
-            os.killpg(process.pid, signal.SIGKILL)
-            _, said = process.communicate()
-        wait_until_empty(process.pid)
-        if process.returncode not in (0, -signal.SIGKILL):
-            raise AssertionError(f"{' '.join(arguments)} ended with {process.returncode}: {said}")
-        return process.returncode
+        said = self._folder / "stderr"
+        code = self._server.run(arguments, env or {}, said, kill_after)
+        if code not in (0, -signal.SIGKILL):
+            raise AssertionError(f"{' '.join(arguments)} ended with {code}: {said.read_text(encoding='utf-8')}")
+        return code
+
+    @functools.cached_property
+    def _small(self) -> Path:
+        """The finished data with small recordings."""
+        small = self._folder / "small"
+        shutil.copytree(self._base, small)
+        for scene in SCENE, OTHER:
+            _lose_recordings(small, random.Random(0), scene)
+        self._command(_run(small, 2))
+        return small
+
+    @functools.cached_property
+    def exported(self) -> Path:
+        """What there is to import."""
+        out = self._folder / "exported"
+        self._command(["export", "--format", "aerialdojo", "--data", str(self._base), "--out", str(out)])
+        return out
 
     def _copy(self, name: str, rng: random.Random) -> Path:
         data = self._folder / "data"
         shutil.rmtree(data, ignore_errors=True)
-        shutil.copytree(self._base, data)
+        shutil.copytree(self._small if name.startswith("r") else self._base, data)
+        if name == "import":
+            assert self.exported.is_dir()
         KINDS[name].prepare(data, rng)
         return data
 
@@ -203,7 +277,7 @@ class Bench:
         """
         self.undisturbed(name)
         data = self._copy(name, rng)
-        arguments = KINDS[name].arguments(data, rng.choice((1, 2)))
+        arguments = KINDS[name].arguments(data, rng.choice((1, 1, 1, 2)))
         if aimed:
             counter = self._folder / "counter"
             counter.unlink(missing_ok=True)
@@ -221,13 +295,9 @@ class Bench:
         return "killed" if code else "finished"
 
 
-def _is_quiet(arguments: list[str]) -> bool:
-    return arguments[0] in ("export", "import-benchmark")
-
-
 def _aimed(counter: Path, at: int) -> dict[str, str]:
     return {
-        "LD_PRELOAD": str(library()), "PRELOAD_COUNTER": str(counter), "PRELOAD_KILL_AT": str(at),
+        "PRELOAD_COUNTER": str(counter), "PRELOAD_KILL_AT": str(at),
         "PRELOAD_KILL_GROUP": "1", "PRELOAD_WRITES": "1",
     }  # fmt: skip
 
@@ -254,7 +324,8 @@ def files_of(data: Path) -> dict[str, bytes]:
     for path in data.rglob("*"):
         name = path.relative_to(data).as_posix()
         if path.is_file() and path.name != ".lock":
-            found[name] = path.read_bytes()
+            # How long an episode took is another time every time.
+            found[name] = b"" if name.startswith("timings/") else path.read_bytes()
         elif path.is_dir() and not any(path.iterdir()):
             found[f"{name}/"] = b""
     return found
@@ -267,10 +338,14 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--kind", action="append", choices=KINDS, help="these alone, repeatable")
     parser.add_argument("--base", type=Path, help="a finished run of pipelines/smoke.toml; made where absent")
+    parser.add_argument("--serve", action="store_true", help=argparse.SUPPRESS)
     asked = parser.parse_args()
+    if asked.serve:
+        serve()
+        return
     kinds = asked.kind or list(KINDS)
     with tempfile.TemporaryDirectory(prefix="aerialdojo-torture-") as folder:
-        base = asked.base
+        base: Path | None = asked.base
         if base is None:
             base = Path(folder) / "smoke"
             command = [sys.executable, "-m", "aerialdojo_gen.cli", "run", "pipelines/smoke.toml", "--data", str(base)]
