@@ -223,6 +223,10 @@ class Bench:
             raise AssertionError(f"{' '.join(arguments)} ended with {code}: {said.read_text(encoding='utf-8')}")
         return code
 
+    def close(self) -> None:
+        """End its processes."""
+        self._server.close()
+
     @functools.cached_property
     def _small(self) -> Path:
         """The finished data with small recordings."""
@@ -361,6 +365,7 @@ def main() -> None:
                 print(f"case {k}: {error}", flush=True)
             became[name, outcome] += 1
             print(f"{k + 1}/{asked.n} {name} {'aimed' if aimed else 'random'}: {outcome}", flush=True)
+        bench.close()
     for name in kinds:
         print(f"{name}: " + ", ".join(f"{n} {what}" for (of, what), n in sorted(became.items()) if of == name))
     failed = sum(n for (_, what), n in became.items() if what == "FAILED")
