@@ -206,8 +206,8 @@ def scratch_folder() -> Iterator[Path]:
     root.mkdir(mode=0o700, exist_ok=True)
     if root.is_symlink() or root.stat().st_uid != os.getuid():
         # Somebody else made it: what stands there is not to be trusted.
-        with tempfile.TemporaryDirectory(prefix="aerialdojo-") as folder:
-            yield Path(folder)
+        with tempfile.TemporaryDirectory(prefix="aerialdojo-") as own:
+            yield Path(own)
         return
     with staged(root, root / "scratch") as item:
         folder = item / "scratch"

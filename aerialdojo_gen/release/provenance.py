@@ -15,10 +15,7 @@ from aerialdojo_gen.errors import StoreError, UsageError
 
 RECORD = "release/pipeline.json"
 # What does not change the release: folders of this machine, which scenes and stages are asked for, recordings.
-_BESIDE = {
-    "name": True, "scenes": True, "stages": True, "render": True, "scene_assets": True, "recipes": True,
-    "annotations": True, "anchor_sample": {"clip"},
-}  # fmt: skip
+_BESIDE = {"name", "scenes", "stages", "render", "scene_assets", "recipes", "annotations"}
 
 
 @dataclass(frozen=True)
@@ -43,7 +40,8 @@ class Maker:
 
 def maker_of(pipeline: Pipeline) -> Maker:
     """Return what a release remembers of a pipeline."""
-    settings = pipeline.model_dump(mode="json", by_alias=True, exclude=_BESIDE)
+    settings = pipeline.model_dump(mode="json", exclude=_BESIDE)
+    settings["anchor_sample"].pop("clip")  # where the model's files lie
     return Maker(pipeline.name, hashlib.sha256(json.dumps(settings, sort_keys=True).encode()).hexdigest())
 
 
