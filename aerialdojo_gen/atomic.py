@@ -179,7 +179,7 @@ def _opened(path: Path) -> Iterator[int]:
         os.close(number)
 
 
-_DISK = {
+DISK_ERRORS = {
     errno.ENOSPC: "no space left on the disk",
     errno.EDQUOT: "the disk quota is used up",
     errno.EROFS: "the disk is read-only",
@@ -189,6 +189,7 @@ _DISK = {
     errno.ENOTDIR: "a part of the path is not a folder",
     errno.EISDIR: "a folder is in its place",
     errno.ENAMETOOLONG: "the name is too long",
+    errno.EIO: "the disk reports an error",
     errno.EMFILE: "too few file descriptors (ulimit -n)",
     errno.ENFILE: "the machine has too few file descriptors",
     errno.ENOLCK: "the file system gives no locks (ENOLCK): use a folder on a local disk",
@@ -198,5 +199,5 @@ _DISK = {
 
 def disk_error(error: OSError, path: Path) -> StoreError:
     """Turn an operating-system error of writing into one line that names the file."""
-    why = _DISK.get(error.errno or 0, first_line(error))
+    why = DISK_ERRORS.get(error.errno or 0, first_line(error))
     return StoreError(f"cannot write {path}: {why}; what was finished is kept, nothing half-written")

@@ -15,6 +15,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TextIO
 
 from aerialdojo_gen.atomic import disk_error
 from aerialdojo_gen.config import Pipeline
@@ -24,7 +25,7 @@ from aerialdojo_gen.interrupt import Interrupts
 from aerialdojo_gen.progress import Reporter
 from aerialdojo_gen.shards import Limits, shards_of
 from aerialdojo_gen.stage import STAGES, Roots, Stage
-from aerialdojo_gen.staging import sweep
+from aerialdojo_gen.staging import sweep, sweep_unstaged
 
 
 @dataclass(frozen=True)
@@ -73,7 +74,7 @@ def data_lock(data: Path) -> Iterator[None]:
     """
     try:
         data.mkdir(parents=True, exist_ok=True)
-        file = (data / ".lock").open("a")
+        file = (data / ".lock").open("a+")
     except OSError as error:
         raise disk_error(error, data / ".lock") from None
     with file:
@@ -83,12 +84,22 @@ def data_lock(data: Path) -> Iterator[None]:
             raise StoreError(f"another run is writing to {data}: wait for it, or use another --data") from None
         except OSError as error:
             raise disk_error(error, data / ".lock") from None
+        _sweep_once(file, data)
         sweep(data)
         try:
             yield
         finally:
             # What workers were at when an error or Ctrl-C ended them.
             sweep(data)
+
+
+def _sweep_once(lock: TextIO, data: Path) -> None:
+    """Remove what killed runs of earlier versions left, once in a data directory's life."""
+    lock.seek(0)
+    if not lock.read():
+        sweep_unstaged(data)
+        lock.write("staged\n")
+        lock.flush()
 
 
 def run(

@@ -10,6 +10,7 @@ import os
 import resource
 from collections.abc import Iterator, Sequence
 
+from aerialdojo_gen.atomic import DISK_ERRORS
 from aerialdojo_gen.errors import AerialDojoError, UsageError
 
 # Python with the libraries of a command has about 20 open, every worker process some more.
@@ -20,16 +21,6 @@ _NO_MEMORY = (
     "out of memory", "unable to allocate",
 )  # fmt: skip
 _NO_FILES = ("too many open files",)
-_DISK = {
-    errno.ENOSPC: "no space left on the disk",
-    errno.EDQUOT: "the disk quota is used up",
-    errno.EROFS: "the disk is read-only",
-    errno.EACCES: "permission denied",
-    errno.EPERM: "permission denied",
-    errno.ENOTDIR: "a part of the path is not a folder",
-    errno.ENAMETOOLONG: "the name is too long",
-    errno.EIO: "the disk reports an error",
-}
 
 
 def check_arguments(arguments: Sequence[str]) -> None:
@@ -95,8 +86,8 @@ def explained(error: BaseException) -> str | None:
             or (isinstance(cause, OSError | ImportError | RuntimeError) and any(w in said for w in _NO_MEMORY))
         ):
             return f"not enough memory{_address_space()}: give it more, or use fewer --workers"
-        if number in _DISK and isinstance(cause, OSError) and cause.filename is not None:
-            return f"{os.fsdecode(cause.filename)}: {_DISK[number]}"
+        if number in DISK_ERRORS and isinstance(cause, OSError) and cause.filename is not None:
+            return f"{os.fsdecode(cause.filename)}: {DISK_ERRORS[number]}"
     return None
 
 

@@ -197,3 +197,23 @@ def test_a_read_only_directory_is_one_line(project, copy):
     lines = [line for line in err.splitlines() if line.startswith("error:")]
     assert len(lines) == 1
     assert "Traceback" not in err
+
+
+def test_what_versions_before_left_is_removed_once_and_an_old_recording_comes_back(project, smoke, copy):
+    (copy / ".lock").write_text("")
+    (recording,) = (copy / "media" / "U_Courtyard_0").iterdir()
+    recording.rename(recording.with_name(f".{recording.name}.4242.old"))
+    for left in (
+        "meshes/.U_Courtyard_0.glb.4242.tmp.glb", "release/.README.md.4242.tmp.md",
+        "plans/U_Courtyard_0/.part-00000.parquet.4242.tmp.parquet", "media/U_Gone_0/.nav.4242.tmp/front_rgb.mp4",
+        "release/tasks/id_test/.part-U_Courtyard_0.parquet.4242.tmp.parquet",
+    ):  # fmt: skip
+        (copy / left).parent.mkdir(parents=True, exist_ok=True)
+        (copy / left).write_bytes(b"half")
+    code, err = run(project, copy, *plan_args(copy))
+    assert code == 0, err
+    assert recording.is_dir()
+    assert not [p for p in copy.rglob(".*") if p.name != ".lock"]
+    (copy / "meshes" / ".mine.1.tmp").write_text("not looked for again")
+    code, err = run(project, copy, *plan_args(copy))
+    assert (copy / "meshes" / ".mine.1.tmp").is_file()
