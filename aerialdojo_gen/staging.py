@@ -23,6 +23,7 @@ from typing import TextIO
 
 AREA = ".aerialdojo-staging"
 _LEASE, _OLD = "lease", "old"
+_TRIES = 100
 _UNSTAGED = re.compile(r"\.(?P<name>.+)\.\d+\.(?P<kind>tmp|old)(\.[A-Za-z0-9]+)?")
 NO_LOCKS = (errno.ENOLCK, errno.EOPNOTSUPP, errno.ENOTSUP, errno.ENOSYS, errno.EINVAL)
 
@@ -65,17 +66,20 @@ def staged(root: Path, target: Path) -> Iterator[Path]:
 
 def _claim(area: Path) -> tuple[Path, TextIO]:
     """Make an item and lock its lease; whoever sweeps in between takes it away, and another one is made."""
-    while True:
+    for left in reversed(range(_TRIES)):
         item = area / secrets.token_hex(8)
         try:
             area.mkdir(parents=True, exist_ok=True)
             item.mkdir()
             lease = (item / _LEASE).open("x+", encoding="utf-8", errors="surrogateescape")
         except FileNotFoundError:
+            if not left:
+                raise
             continue
         if _lock(lease, unknown=True) and _is_at(lease, item / _LEASE):
             return item, lease
         lease.close()
+    raise OSError(errno.EBUSY, "it is swept again and again", str(area))
 
 
 def sweep(root: Path) -> None:

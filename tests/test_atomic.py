@@ -247,3 +247,8 @@ def test_a_place_that_cannot_be_written_is_one_line(tmp_path, place):
         path.write_text("y")
     assert names(tmp_path) == before
     assert sorted(p.name for p in tmp_path.iterdir()) == ["file", "folder"]
+
+
+def test_a_place_where_nothing_can_be_made_is_one_line_and_no_endless_try():
+    with pytest.raises(StoreError, match="cannot write /proc/out"), atomic_file(Path("/proc"), "out"):
+        pass
