@@ -13,6 +13,8 @@ import subprocess
 import tempfile
 from pathlib import Path
 
+import pytest
+
 SOURCE = r"""
 #define _GNU_SOURCE
 #include <dlfcn.h>
@@ -136,3 +138,11 @@ def killing_environment(n: int, *, exchange: bool = True, group: bool = False) -
     if group:
         environment["PRELOAD_KILL_GROUP"] = "1"
     return environment
+
+
+def unshared(*namespaces: str) -> list[str]:
+    """Command that runs another one in namespaces of its own."""
+    command = ["unshare", "--user", "--map-root-user", *namespaces]
+    if subprocess.run([*command, "true"], capture_output=True, check=False).returncode:
+        pytest.skip("this machine lets nobody make namespaces")
+    return command

@@ -10,7 +10,7 @@ import textwrap
 from pathlib import Path
 
 import pytest
-from preload import killing_environment
+from preload import killing_environment, unshared
 
 from aerialdojo_gen import staging
 from aerialdojo_gen.atomic import atomic_file, atomic_folder
@@ -38,14 +38,6 @@ REPLACING = """
 
 def names(folder):
     return {p.relative_to(folder).as_posix(): p.read_text() for p in folder.rglob("*") if p.is_file()}
-
-
-def unshared(*namespaces):
-    """Command that runs another one in namespaces of its own."""
-    command = ["unshare", "--user", "--map-root-user", *namespaces]
-    if subprocess.run([*command, "true"], capture_output=True, check=False).returncode:
-        pytest.skip("this machine lets nobody make namespaces")
-    return command
 
 
 def holder(folder, *before):
