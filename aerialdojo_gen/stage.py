@@ -280,8 +280,7 @@ _UPSTREAM_OF_SPLIT = ("scenes", "landmarks", "objects", "anchors", "references",
 
 STAGES: tuple[Stage, ...] = (
     Stage(
-        "build-scenes", 1, "Build the scenes' meshes from their recipes.", (), ("scenes",), sources=_scene_sources,
-        digests=("scenes", "mesh_path", "mesh_sha256"),
+        "build-scenes", 1, "Build the scenes' meshes from their recipes.", (), ("scenes",), sources=_scene_sources
     ),
     Stage(
         "annotate-import", 1, "Check the annotations against the scenes and import them.",
