@@ -41,6 +41,10 @@ def release(data):
     return {p.relative_to(data): p.read_bytes() for p in (data / "release").rglob("*") if p.is_file()}
 
 
+def times(data):
+    return {p: p.stat().st_mtime_ns for p in data.rglob("*") if p.is_file() and p.name != ".lock"}
+
+
 def split(data, pipeline, scene=None, **options):
     run_until("split", data=data, pipeline=pipeline, scene=scene, workers=1, quiet=True, **options)
 
@@ -54,7 +58,7 @@ def test_a_release_names_its_pipeline(smoke):
 
 @pytest.mark.parametrize("verb", ["split", "render", "run"])
 def test_another_pipeline_is_refused_at_once_and_nothing_is_lost(data, pipeline, verb):
-    before = {p: p.stat().st_mtime_ns for p in data.rglob("*") if p.is_file()}
+    before = times(data)
     file = str(pipeline())
     command = [verb, file] if verb == "run" else [verb, "--pipeline", file]
     done = subprocess.run(
@@ -69,7 +73,7 @@ def test_another_pipeline_is_refused_at_once_and_nothing_is_lost(data, pipeline,
         f"remove 1 scene with {tasks[A]} tasks ({A})", f"replace 1 scene with {tasks[B]} tasks ({B})", "--replace",
     ):  # fmt: skip
         assert words in done.stderr
-    assert {p: p.stat().st_mtime_ns for p in data.rglob("*") if p.is_file()} == before
+    assert times(data) == before
 
 
 def test_replace_puts_the_other_pipeline_s_release_in_its_place(data, pipeline):

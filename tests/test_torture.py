@@ -17,8 +17,8 @@ def bench(smoke, tmp_path_factory):
 
 @pytest.mark.parametrize("name", ["export", "import"])
 def test_a_killed_command_that_is_repeated_leaves_what_an_undisturbed_one_does(bench, name):
-    outcomes = [bench.case(name, random.Random(f"{name}/{k}"), aimed=k % 2 == 1) for k in range(4)]
-    assert "killed" in outcomes
+    assert bench.case(name, random.Random(name), aimed=True) == "killed"
+    assert bench.case(name, random.Random(name), aimed=False) in ("killed", "finished")
 
 
 def test_a_file_that_is_left_over_is_noticed(bench, monkeypatch):
