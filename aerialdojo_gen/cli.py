@@ -9,6 +9,7 @@ import sys
 
 import typer
 
+from aerialdojo_gen import trouble
 from aerialdojo_gen.commands import (
     annotate,
     evaluate,
@@ -38,10 +39,18 @@ for _group in (stages, render, sources, annotate, evaluate, release, show, valid
 def main() -> None:
     """Run the command line; an expected error becomes one line and an exit code."""
     try:
+        trouble.check_arguments(sys.argv[1:])
+        trouble.check_limits(sys.argv[1:])
         app(standalone_mode=True)
     except AerialDojoError as error:
         print(f"error: {error}", file=sys.stderr)
         raise SystemExit(error.exit_code) from None
+    except Exception as error:
+        line = trouble.explained(error)
+        if line is None:
+            raise
+        print(f"error: {line}", file=sys.stderr)
+        raise SystemExit(1) from None
 
 
 if __name__ == "__main__":

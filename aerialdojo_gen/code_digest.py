@@ -31,7 +31,7 @@ PLUMBING: dict[str, tuple[str, ...]] = {
     "aerialdojo_gen.config": (),
     "aerialdojo_gen.errors": (),
     "aerialdojo_gen.executor": (),
-    "aerialdojo_gen.file_digest": (),
+    "aerialdojo_gen.files": (),
     "aerialdojo_gen.fingerprint": (),
     "aerialdojo_gen.footers": (),
     "aerialdojo_gen.interrupt": (),
@@ -41,7 +41,9 @@ PLUMBING: dict[str, tuple[str, ...]] = {
     "aerialdojo_gen.schemas": ("*",),
     "aerialdojo_gen.shards": (),
     "aerialdojo_gen.stage": ("Job",),
+    "aerialdojo_gen.staging": (),
     "aerialdojo_gen.store": ("partition", "check_scene_name"),
+    "aerialdojo_gen.trouble": (),
 }
 # What writes every stage's rows.
 _WRITERS = (Edge("aerialdojo_gen.parquet_files", "write_clustered"), Edge("aerialdojo_gen.tables"))

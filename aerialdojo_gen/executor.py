@@ -20,9 +20,10 @@ from typing import Any, Generic, Protocol, TypeVar
 from aerialdojo_gen import store
 from aerialdojo_gen.config import Section
 from aerialdojo_gen.errors import AerialDojoError, BudgetSpent
-from aerialdojo_gen.file_digest import file_digest
+from aerialdojo_gen.files import file_digest, size_of
 from aerialdojo_gen.footers import ShardFile
 from aerialdojo_gen.stage import BY_NAME, Job
+from aerialdojo_gen.trouble import explained
 
 
 class _Labelled(Protocol):
@@ -73,6 +74,9 @@ def compute(task: Task) -> dict[str, Any]:
     except AerialDojoError:
         raise
     except Exception as error:
+        if why := explained(error):
+            # Without the shard: it is no fault of its own, and all of them say the same.
+            raise AerialDojoError(why) from error
         raise RuntimeError(f"{task.label} failed: {type(error).__name__}: {error}") from error
     if set(output.tables) != set(stage.writes):
         raise RuntimeError(f"{task.label} returned tables {sorted(output.tables)}, not {sorted(stage.writes)}")
@@ -95,7 +99,7 @@ def compute(task: Task) -> dict[str, Any]:
 
 def _described(job: Job, name: str) -> ShardFile:
     path = job.roots.data / name
-    return ShardFile(path.stat().st_size, file_digest(path) if name in job.digested else "")
+    return ShardFile(size_of(path), file_digest(path) if name in job.digested else "")
 
 
 def start_worker(parent: int) -> None:

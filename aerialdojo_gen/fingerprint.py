@@ -12,7 +12,7 @@ from aerialdojo_gen import paper, store
 from aerialdojo_gen.code_digest import stage_code
 from aerialdojo_gen.config import Pipeline, Section
 from aerialdojo_gen.errors import AssetError
-from aerialdojo_gen.file_digest import file_digest
+from aerialdojo_gen.files import file_digest
 from aerialdojo_gen.stage import Roots, Stage
 
 

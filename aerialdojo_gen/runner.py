@@ -11,10 +11,11 @@ import fcntl
 import fnmatch
 import time
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TextIO
 
 from aerialdojo_gen.atomic import disk_error
 from aerialdojo_gen.code_digest import stage_code
@@ -25,6 +26,7 @@ from aerialdojo_gen.interrupt import Interrupts
 from aerialdojo_gen.progress import Reporter
 from aerialdojo_gen.shards import Limits, shards_of
 from aerialdojo_gen.stage import STAGES, Roots, Stage
+from aerialdojo_gen.staging import sweep, sweep_unstaged
 
 
 @dataclass(frozen=True)
@@ -67,10 +69,13 @@ class StageSummary:
 
 @contextmanager
 def data_lock(data: Path) -> Iterator[None]:
-    """Hold the data directory: one run writes to it at a time; a killed run's lock is gone with it."""
+    """Hold the data directory: one run writes to it at a time; a killed run's lock is gone with it.
+
+    What killed runs left half-made in it is removed.
+    """
     try:
         data.mkdir(parents=True, exist_ok=True)
-        file = (data / ".lock").open("a")
+        file = (data / ".lock").open("a+")
     except OSError as error:
         raise disk_error(error, data / ".lock") from None
     with file:
@@ -78,7 +83,24 @@ def data_lock(data: Path) -> Iterator[None]:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
             raise StoreError(f"another run is writing to {data}: wait for it, or use another --data") from None
-        yield
+        except OSError as error:
+            raise disk_error(error, data / ".lock") from None
+        _sweep_once(file, data)
+        sweep(data)
+        try:
+            yield
+        finally:
+            # What workers were at when an error or Ctrl-C ended them.
+            sweep(data)
+
+
+def _sweep_once(lock: TextIO, data: Path) -> None:
+    """Remove what killed runs of earlier versions left, once in a data directory's life."""
+    lock.seek(0)
+    if not lock.read():
+        sweep_unstaged(data)
+        lock.write("staged\n")
+        lock.flush()
 
 
 def run(
@@ -91,6 +113,8 @@ def run(
     force: Iterable[str] = (),
     reporter: Reporter | None = None,
     limits: Limits | None = None,
+    prepare: Callable[[], None] | None = None,
+    finish: Callable[[], None] | None = None,
 ) -> list[StageSummary]:
     """Run stages in their order on scenes.
 
@@ -113,6 +137,9 @@ def run(
     limits : Limits, optional
         How much of the last stage is computed now; all of it where absent.
 
+    prepare, finish : callable, optional
+        Called before the first stage and after the last one, while the data directory is held.
+
     Returns
     -------
     list of StageSummary
@@ -132,6 +159,8 @@ def run(
         # All of it now: who edits a file while this runs has loaded the old one, and gets all made anew next time.
         stage_code(stage.name)
     with data_lock(roots.data), Interrupts() as interrupts, Pool(workers) as pool:
+        if prepare:
+            prepare()
         for stage in stages:
             now = limits if limits and stage is stages[-1] else Limits()
             forced_now = stage.name in forced
@@ -139,6 +168,9 @@ def run(
             interrupts.check()
             reporter.line(str(summary))
             summaries.append(summary)
+        if finish:
+            finish()
+            interrupts.check()
     return summaries
 
 

@@ -12,21 +12,23 @@ from pathlib import Path
 from typing import Any
 
 from aerialdojo_gen import store
-from aerialdojo_gen.atomic import sweep
 from aerialdojo_gen.code_digest import stage_code
 from aerialdojo_gen.config import Pipeline, Section
 from aerialdojo_gen.errors import AerialDojoError, StoreError
 from aerialdojo_gen.executor import Task
-from aerialdojo_gen.file_digest import file_digest
+from aerialdojo_gen.files import file_digest, is_whole, sha256_of
 from aerialdojo_gen.fingerprint import scene_fingerprint
 from aerialdojo_gen.footers import ShardFile
+from aerialdojo_gen.parquet_files import read_file
 from aerialdojo_gen.progress import Reporter
 from aerialdojo_gen.stage import Job, Roots, Stage
 
 
 @dataclass(frozen=True)
 class Limits:
-    """How much of a stage is computed now; what is left out is computed when the command is given again.
+    """How much of a stage is computed now, and how closely what is there is looked at.
+
+    What is left out is computed when the command is given again.
 
     Attributes
     ----------
@@ -35,10 +37,13 @@ class Limits:
         machine writes.
     deadline : float or None
         Seconds since the epoch after which nothing further is begun.
+    verify : bool
+        Files count as whole if their digests are right, not their sizes alone.
     """
 
     share: tuple[int, int] = (0, 1)
     deadline: float | None = None
+    verify: bool = False
 
 
 @dataclass(frozen=True)
@@ -104,18 +109,20 @@ def shards_of(
             continue
         for table in stage.writes:
             store.prune(roots.data, table, scene, parts)
-            sweep(store.shard_path(roots.data, table, scene).parent)
         for part in range(parts):
             shard += 1
             if shard % limits.share[1] != limits.share[0]:
                 continue
-            summary = None if force else _fresh(stage, roots.data, scene, part, parts, fingerprint, reporter)
+            here = (stage, roots.data, scene, part)
+            summary = None if force else _fresh(*here, parts, fingerprint, reporter)
+            if summary is not None and limits.verify and not _verified(*here, reporter):
+                summary = None
             if summary is not None:
                 found.fresh.append(summary)
             else:
                 whole = Job(stage.name, scene, part, parts, pipeline.seed, pipeline.embodiment, roots)
                 code = stage_code(stage.name).digest
-                job = replace(whole, deadline=limits.deadline, force=force, code=code)
+                job = replace(whole, deadline=limits.deadline, force=force, verify=limits.verify, code=code)
                 found.tasks.append(Task(job, config, fingerprint))
     return found
 
@@ -147,10 +154,27 @@ def _fresh(
 def _whole(path: Path, written: ShardFile) -> bool:
     """Whether a file has the bytes that were written, or their number where the footer says no more."""
     try:
-        return (
-            path.is_file()
-            and path.stat().st_size == written.size
-            and (not written.sha256 or file_digest(path) == written.sha256)
-        )
+        return is_whole(path, written.size) and (not written.sha256 or file_digest(path) == written.sha256)
     except OSError:
         return False
+
+
+def _verified(stage: Stage, data: Path, scene: str, part: int, reporter: Reporter) -> bool:
+    """Whether the files that a fresh shard names have the digests that it says."""
+    if stage.digests is None:
+        return True
+    table, *columns = stage.digests
+    try:
+        rows = read_file(store.shard_path(data, table, scene, part), columns)
+    except StoreError as error:
+        reporter.line(f"{error}: computed again")
+        return False
+    for relative, digest in zip(*(rows.column(name).to_pylist() for name in columns), strict=True):
+        try:
+            same = sha256_of(data / relative) == digest
+        except OSError:
+            same = False
+        if not same:
+            reporter.line(f"{data / relative} has other content than was written: computed again")
+            return False
+    return True

@@ -95,6 +95,8 @@ class Job:
         Whether the stage makes anew what it finds finished.
     code : str
         Digest of the stage's code, for what a stage itself finds finished.
+    verify : bool
+        Whether it compares the digests of the files that it finds finished.
     """
 
     stage: str
@@ -109,6 +111,7 @@ class Job:
     deadline: float | None = None
     force: bool = False
     code: str = ""
+    verify: bool = False
 
     def read(self, table: str) -> pa.Table:
         """Read all of this scene's rows of a table; StoreError names a missing or damaged shard."""
@@ -189,6 +192,8 @@ class Stage:
     choices : callable
         ``config -> list of config``: what `settle` may make of it, where deciding takes time. Where all shards are
         fresh by one of them nothing is decided anew.
+    digests : (str, str, str), optional
+        A table that the stage writes and its columns with the path of a file (or folder) and the SHA-256 of it.
     """
 
     name: str
@@ -200,6 +205,7 @@ class Stage:
     check: Callable[[Path, Sequence[str], Any], None] = _no_check
     settle: Callable[[Any, Callable[[str], None]], Any] = _as_it_is
     choices: Callable[[Any], list[Any]] = _no_choice
+    digests: tuple[str, str, str] | None = None
 
     def load(self) -> Callable[[Job, Any], Output]:
         """Import the stage's module and return its ``run``."""
@@ -306,7 +312,7 @@ STAGES: tuple[Stage, ...] = (
     Stage(
         "render", "Record four RGB-D views along trajectories of the release.",
         ("scenes", "routes/train", "routes/test"), ("recordings", "frames"), parts=_render_parts,
-        settle=_settle_renderer, choices=_renderers,
+        settle=_settle_renderer, choices=_renderers, digests=("recordings", "path", "sha256"),
     ),
 )  # fmt: skip
 

@@ -106,9 +106,9 @@ def test_plumbing_is_what_it_is_said_to_be():
     """Whoever lists a module here has thought about whether it decides what is written."""
     assert set(PLUMBING) == {
         f"aerialdojo_gen{name}"
-        for name in ("", ".atomic", ".benchmark", ".code_digest", ".config", ".errors", ".executor", ".file_digest",
+        for name in ("", ".atomic", ".benchmark", ".code_digest", ".config", ".errors", ".executor", ".files",
                      ".fingerprint", ".footers", ".interrupt", ".parquet_files", ".progress", ".runner", ".schemas",
-                     ".shards", ".stage", ".store")
+                     ".shards", ".stage", ".staging", ".store", ".trouble")
     }  # fmt: skip
     assert {name: counted for name, counted in PLUMBING.items() if counted} == {
         "aerialdojo_gen.parquet_files": ("write_clustered",),

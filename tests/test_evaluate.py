@@ -176,7 +176,7 @@ def test_killed_again_and_again_ends_with_the_same_bytes(project, smoke, tmp_pat
     assert again.returncode == 0
     assert snapshot(out) == snapshot(fresh)
     assert not list(out.rglob("*.jsonl"))
-    assert not list(out.rglob(".*.tmp*"))
+    assert not list(out.rglob(".aerialdojo-staging"))
 
 
 def test_a_sample_is_even_over_the_scenes_and_grows(smoke):

@@ -15,9 +15,11 @@ from releases import copy_release, released, replace_rows
 from typer.testing import CliRunner
 
 from aerialdojo_gen import store
+from aerialdojo_gen.atomic import atomic_folder
 from aerialdojo_gen.cli import app
 from aerialdojo_gen.errors import AssetError, StoreError, UsageError
 from aerialdojo_gen.exchange.exporting import export_release
+from aerialdojo_gen.staging import AREA
 
 
 @pytest.fixture(scope="module")
@@ -317,12 +319,29 @@ def test_an_export_is_replaced_by_force_alone(smoke, tmp_path):
     assert os.listdir(tmp_path) == ["out"]
 
 
-def test_what_a_killed_run_left_is_swept_and_a_living_ones_is_not(smoke, tmp_path):
-    dead, alive = (tmp_path / f".out.{pid}.tmp" for pid in (2**22 + 1, os.getppid()))
-    for left in (dead, alive):
-        left.mkdir()
-    export_release("aerialdojo", smoke, tmp_path / "out", ["U_Courtyard_0"])
-    assert sorted(p.name for p in tmp_path.iterdir()) == sorted([alive.name, "out"])
+def test_what_a_killed_export_left_is_swept_and_a_living_one_s_is_not(smoke, tmp_path):
+    left = tmp_path / AREA / "dead"
+    left.mkdir(parents=True)
+    (left / "lease").write_text("out")
+    (left / "new").mkdir()
+    with atomic_folder(tmp_path / "other") as living:
+        export_release("aerialdojo", smoke, tmp_path / "out", ["U_Courtyard_0"])
+        assert living.is_dir()
+        assert not left.exists()
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["other", "out"]
+
+
+def test_an_export_killed_while_it_replaced_another_is_there_again(smoke, tmp_path):
+    out, item = tmp_path / "out", tmp_path / AREA / "dead"
+    export_release("aerialdojo", smoke, out, ["U_Courtyard_0"])
+    # As a kill leaves it where two names cannot be exchanged.
+    item.mkdir(parents=True)
+    (item / "lease").write_text("out")
+    out.rename(item / "old")
+    with pytest.raises(UsageError, match="--force replaces it"):
+        export_release("aerialdojo", smoke, out, ["U_Courtyard_1"])
+    assert list(out.rglob("U_Courtyard_0*"))
+    assert os.listdir(tmp_path) == ["out"]
 
 
 def test_the_command_says_what_it_wrote_and_what_is_wrong(smoke, tmp_path):

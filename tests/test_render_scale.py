@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import os
 import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -25,6 +27,7 @@ from aerialdojo_gen.rendering.estimate import estimate
 from aerialdojo_gen.rendering.reader import read_recording
 from aerialdojo_gen.shards import Limits
 from aerialdojo_gen.stages import render
+from aerialdojo_gen.staging import AREA
 
 ALL = CONFIG.model_copy(update={"limit": 0, "trajectories_per_part": 5})
 FEW = CONFIG.model_copy(update={"limit": 2, "trajectories_per_part": 2})
@@ -58,13 +61,15 @@ def test_a_killed_run_goes_on_at_the_trajectory_and_ends_with_the_same_bytes(tmp
     kept = {p: p.stat().st_mtime_ns for p in media.glob("nav_*/recording.json")}
     assert 4 <= len(kept) < 22
     # As if it had been killed in the middle of a file, whenever it was.
-    half = media / f".nav_05.{process.pid}.tmp"
-    half.mkdir(exist_ok=True)
-    (half / "front_rgb.mp4").write_bytes(b"half")
+    half = tmp_path / AREA / "dead"
+    (half / "new").mkdir(parents=True)
+    (half / "new" / "front_rgb.mp4").write_bytes(b"half")
+    (half / "lease").write_text(f"media/{SCENE}/nav_05")
 
     run_whole(tmp_path, ALL)
     assert {p: p.stat().st_mtime_ns for p in kept} == kept
     assert files_of(tmp_path) == files_of(whole)
+    assert not (tmp_path / AREA).exists()
 
 
 def test_the_shares_of_three_machines_are_what_one_writes(tmp_path, whole):
@@ -285,3 +290,66 @@ def test_the_row_says_what_drew_it(whole):
     assert {tuple(r[k] for k in key) for r in note["recordings"]} == {
         tuple(r[k] for k in key) for r in rows if r["nav_id"] == rows[0]["nav_id"]
     }
+
+
+@pytest.fixture(scope="module")
+def loose(tmp_path_factory):
+    """Recordings as loose pictures."""
+    data = tmp_path_factory.mktemp("loose")
+    write_inputs(data)
+    run_whole(data, LOOSE)
+    return data
+
+
+LOOSE = CONFIG.model_copy(update={"frames": "png", "views": ("front",), "limit": 2, "trajectories_per_part": 2})
+
+
+def damage_picture(folder):
+    raw = bytearray((folder / "front_rgb" / "000002.png").read_bytes())
+    raw[len(raw) // 2] ^= 1
+    (folder / "front_rgb" / "000002.png").write_bytes(raw)
+
+
+DAMAGE = {
+    "a picture lost": lambda folder: (folder / "front_depth" / "000003.png").unlink(),
+    "a picture cut": lambda folder: os.truncate(folder / "front_rgb" / "000001.png", 100),
+    "the camera lost": lambda folder: (folder / "front_rgb" / "camera.json").unlink(),
+    "the note lost": lambda folder: (folder / "recording.json").unlink(),
+    "a folder lost": lambda folder: shutil.rmtree(folder / "front_rgb"),
+    "all lost": lambda folder: shutil.rmtree(folder.parents[1]),
+    "a file in a folder's place": lambda folder: (
+        shutil.rmtree(folder / "front_rgb"), (folder / "front_rgb").write_text("x")
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("damage", DAMAGE.values(), ids=DAMAGE)
+def test_loose_pictures_that_are_lost_or_cut_are_recorded_again(tmp_path, loose, damage):
+    data = shutil.copytree(loose, tmp_path / "data")
+    (summary,) = run_whole(data, LOOSE)
+    assert summary.computed == 0
+    damage(data / "media" / SCENE / "nav_b")
+    (summary,) = run_whole(data, LOOSE)
+    assert summary.computed >= 1
+    assert files_of(data) == files_of(loose)
+
+
+def test_verify_finds_a_flipped_bit_and_records_that_trajectory_alone_again(tmp_path, loose, whole):
+    for source, config in ((loose, LOOSE), (whole, ALL)):
+        data = shutil.copytree(source, tmp_path / config.frames)
+        media = data / "media" / SCENE
+        if config.frames == "png":
+            damage_picture(media / "nav_b")
+        else:
+            raw = bytearray((media / "nav_b" / "left_rgb.mp4").read_bytes())
+            raw[-200] ^= 1
+            (media / "nav_b" / "left_rgb.mp4").write_bytes(raw)
+        kept = {p: p.stat().st_mtime_ns for p in media.rglob("*") if p.is_file() and "nav_b" not in p.parts}
+        (summary,) = run_whole(data, config)
+        assert summary.computed == 0
+        (summary,) = run_whole(data, config, limits=Limits(verify=True))
+        assert summary.computed == 1
+        assert files_of(data) == files_of(source)
+        assert {p: p.stat().st_mtime_ns for p in kept} == kept
+        (summary,) = run_whole(data, config, limits=Limits(verify=True))
+        assert summary.computed == 0

@@ -15,6 +15,7 @@ import pytest
 from aerialdojo_gen import store
 from aerialdojo_gen.errors import AssetError
 from aerialdojo_gen.scenes.glb import read_glb
+from aerialdojo_gen.staging import AREA
 from aerialdojo_gen.store import read_info
 
 TABLES = ("meshes", "scenes", "landmarks", "objects", "chosen_anchors", "anchors", "pairs", "plans")
@@ -89,7 +90,7 @@ def test_killed_again_and_again_ends_with_the_same_bytes(project, smoke, tmp_pat
     assert code == 0, err
     assert snapshot(data) == {k: v for k, v in snapshot(smoke).items() if k in snapshot(data)}
     assert snapshot(data).keys() == snapshot(smoke).keys()
-    assert not list(data.rglob(".*.tmp*")), "temporary files of killed runs are swept"
+    assert not list(data.rglob(f"{AREA}*")), "what killed runs left half-made is swept"
 
 
 def test_one_worker_gives_the_same_bytes_as_two(project, smoke, tmp_path):
@@ -111,7 +112,7 @@ def test_ctrl_c_keeps_what_was_finished_and_ends_the_workers(project, smoke, tmp
     finished = snapshot(data)
     assert len([name for name in finished if name.endswith(".parquet")]) >= 8
     assert finished.items() <= snapshot(smoke).items()
-    assert not list(data.rglob(".*.tmp*"))
+    assert not list(data.rglob(f"{AREA}*"))
 
 
 @pytest.fixture
@@ -237,3 +238,23 @@ def test_a_read_only_directory_is_one_line(project, copy):
     lines = [line for line in err.splitlines() if line.startswith("error:")]
     assert len(lines) == 1
     assert "Traceback" not in err
+
+
+def test_what_versions_before_left_is_removed_once_and_an_old_recording_comes_back(project, smoke, copy):
+    (copy / ".lock").write_text("")
+    (recording,) = (copy / "media" / "U_Courtyard_0").iterdir()
+    recording.rename(recording.with_name(f".{recording.name}.4242.old"))
+    for left in (
+        "meshes/.U_Courtyard_0.glb.4242.tmp.glb", "release/.README.md.4242.tmp.md",
+        "plans/U_Courtyard_0/.part-00000.parquet.4242.tmp.parquet", "media/U_Gone_0/.nav.4242.tmp/front_rgb.mp4",
+        "release/tasks/id_test/.part-U_Courtyard_0.parquet.4242.tmp.parquet",
+    ):  # fmt: skip
+        (copy / left).parent.mkdir(parents=True, exist_ok=True)
+        (copy / left).write_bytes(b"half")
+    code, err = run(project, copy, *plan_args(copy))
+    assert code == 0, err
+    assert recording.is_dir()
+    assert not [p for p in copy.rglob(".*") if p.name != ".lock"]
+    (copy / "meshes" / ".mine.1.tmp").write_text("not looked for again")
+    code, err = run(project, copy, *plan_args(copy))
+    assert (copy / "meshes" / ".mine.1.tmp").is_file()

@@ -15,7 +15,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from aerialdojo_gen import schemas, store
-from aerialdojo_gen.atomic import atomic_file, atomic_folder, sweep
+from aerialdojo_gen.atomic import atomic_file, atomic_folder
 from aerialdojo_gen.errors import StoreError
 from aerialdojo_gen.tables import content_digest, from_rows
 
@@ -207,17 +207,6 @@ def test_a_folder_is_replaced_when_the_new_one_is_whole_and_not_before(tmp_path)
         (path / "b").write_text("new")
         assert (folder / "a").read_text() == "old"
     assert {p.relative_to(tmp_path).as_posix() for p in tmp_path.rglob("*")} == {"f", "f/b"}
-
-
-def test_sweep_removes_what_a_killed_run_left_and_nothing_else(tmp_path):
-    dead = subprocess.run([sys.executable, "-c", "import os; print(os.getpid())"], capture_output=True, check=True)
-    left = tmp_path / f".part-00000.parquet.{int(dead.stdout)}.tmp.parquet"
-    mine = tmp_path / f".part-00001.parquet.{os.getpid()}.tmp.parquet"
-    shard = tmp_path / "part-00000.parquet"
-    for path in (left, mine, shard):
-        path.write_text("x")
-    sweep(tmp_path)
-    assert sorted(p.name for p in tmp_path.iterdir()) == sorted([mine.name, shard.name])
 
 
 def test_digest_sees_every_change_and_no_metadata():

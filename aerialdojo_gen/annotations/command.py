@@ -74,7 +74,6 @@ def draft_scene(
     scene = build_scene(roots.recipes / f"{name}.toml", catalogue)
     choice = replace(choice or Choice(), eligible=reachable_nodes(scene, pipeline, roots))
     annotations = draft_annotations(scene, catalogue, wanted[0], wanted[1], seed, choice, landmarks)
-    path.parent.mkdir(parents=True, exist_ok=True)
     write_annotations(annotations, path)
     return path
 

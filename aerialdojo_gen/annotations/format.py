@@ -11,6 +11,7 @@ from typing import Annotated, Any, TypeVar
 from pydantic import BaseModel, ConfigDict, Field, StrictFloat, StrictInt, StrictStr, ValidationError
 
 from aerialdojo_gen.annotations.positions import Document, Fault, read_json
+from aerialdojo_gen.atomic import atomic_file
 
 FORMAT = "aerialdojo-annotations"
 VERSION = 1
@@ -185,9 +186,8 @@ def format_annotations(annotations: Annotations) -> str:
 
 def write_annotations(annotations: Annotations, path: Path) -> None:
     """Write an annotation file, replacing one that is there only when the whole text is on disk."""
-    temporary = path.with_name(f".{path.name}.tmp")
-    temporary.write_text(format_annotations(annotations), encoding="utf-8")
-    temporary.replace(path)
+    with atomic_file(path.parent, path.name) as temporary:
+        temporary.write_text(format_annotations(annotations), encoding="utf-8")
 
 
 def _entries(document: Document, key: str, raw: Any, kind: type[_E], faults: list[Fault]) -> dict[int, _E]:

@@ -16,6 +16,7 @@ from aerialdojo_gen.errors import ConfigError
 
 if TYPE_CHECKING:
     from aerialdojo_gen.config import Pipeline
+    from aerialdojo_gen.progress import Reporter
     from aerialdojo_gen.shards import Limits
     from aerialdojo_gen.stage import Roots, Stage
 
@@ -32,6 +33,9 @@ PipelineFile = Annotated[
 ]
 Workers = Annotated[int | None, typer.Option("--workers", min=1, help="Processes.  (default: all cores)")]
 Force = Annotated[bool, typer.Option("--force", help="Compute this stage's shards even where they are fresh.")]
+Replace = Annotated[
+    bool, typer.Option("--replace", help="Put this release in the place of another pipeline's, which is lost.")
+]
 Quiet = Annotated[bool, typer.Option("--quiet", help="No progress and no summary.")]
 
 
@@ -89,6 +93,7 @@ def run_until(
     force: bool = False,
     quiet: bool = False,
     limits: Limits | None = None,
+    replace: bool = False,
     **overrides: object,
 ) -> None:
     """Bring a stage's tables up to date, running what it needs upstream; the twin of a stage's command.
@@ -111,6 +116,8 @@ def run_until(
         No progress and no summary.
     limits : Limits, optional
         How much of the stage is computed now; all of it where absent.
+    replace : bool
+        Whether scenes of the release that another pipeline made may be lost.
     **overrides
         Values of the stage's section that replace the file's; None leaves one as it is.
 
@@ -124,7 +131,7 @@ def run_until(
 
     config, roots = open_pipeline(pipeline, data)
     config = with_overrides(config, stage, **overrides)
-    run_stages(list(upstream(stage)), config, roots, scene, workers, [stage] if force else [], quiet, limits)
+    run_stages(list(upstream(stage)), config, roots, scene, workers, [stage] if force else [], quiet, limits, replace)
 
 
 def run_stages(
@@ -136,32 +143,56 @@ def run_stages(
     force: list[str],
     quiet: bool,
     limits: Limits | None = None,
+    replace: bool = False,
 ) -> None:
-    """Run stages in their order over the chosen scenes; after `split`, write card and croissant.json."""
+    """Run stages in their order over the chosen scenes; after `split`, write card and croissant.json.
+
+    Raises
+    ------
+    UsageError
+        The release would lose scenes that another pipeline made, and `replace` is not given; nothing was run.
+    """
     from aerialdojo_gen import runner
     from aerialdojo_gen.progress import Reporter
+    from aerialdojo_gen.release.provenance import check_replaced
 
     reporter = Reporter(quiet=quiet)
     scenes = runner.choose_scenes(scene or config.scenes, runner.known_scenes(roots.recipes))
-    workers = workers or default_workers()
+    releases = any(stage.name == "split" for stage in stages)
+
+    def prepare() -> None:
+        if releases and not replace:
+            check_replaced(roots.data, config, scenes, whole=scene is None)
+
+    def finish() -> None:
+        if releases:
+            _finish_release(config, roots.data, scenes, scene is None, reporter)
+
     try:
-        runner.run(stages, scenes, config, roots, workers=workers, force=force, reporter=reporter, limits=limits)
+        runner.run(
+            stages, scenes, config, roots, workers=workers or default_workers(), force=force, reporter=reporter,
+            limits=limits, prepare=prepare, finish=finish,
+        )  # fmt: skip
     except KeyboardInterrupt:
         # Said here because Typer turns Ctrl-C into a silent exit.
         print("interrupted: finished shards are kept, the same command goes on from here", file=sys.stderr)
         raise SystemExit(130) from None
-    if any(stage.name == "split" for stage in stages):
-        from aerialdojo_gen.release.card import write_card
-        from aerialdojo_gen.release.croissant import write_croissant
-        from aerialdojo_gen.store import prune_release
 
-        if scene is None:
-            # The whole pipeline was asked for: the release holds its scenes and no others.
-            for gone in prune_release(roots.data, scenes):
-                reporter.line(f"release: {gone} is no scene of this pipeline, removed")
 
-        write_croissant(roots.data)
-        reporter.line(f"release: {write_card(roots.data).parent}")
+def _finish_release(config: Pipeline, data: Path, scenes: list[str], whole: bool, reporter: Reporter) -> None:
+    """Bring what stands beside the tables of a release up to date with them."""
+    from aerialdojo_gen.release.card import write_card
+    from aerialdojo_gen.release.croissant import write_croissant
+    from aerialdojo_gen.release.provenance import record_makers
+    from aerialdojo_gen.store import prune_release
+
+    if whole:
+        # The whole pipeline was asked for: the release holds its scenes and no others.
+        for gone in prune_release(data, scenes):
+            reporter.line(f"release: {gone} is no scene of this pipeline, removed")
+    record_makers(data, config, scenes)
+    write_croissant(data)
+    reporter.line(f"release: {write_card(data).parent}")
 
 
 def default_workers() -> int:

@@ -14,6 +14,7 @@ from aerialdojo_gen.commands.common import (
     Force,
     PipelineFile,
     Quiet,
+    Replace,
     Scene,
     Workers,
     default_workers,
@@ -30,7 +31,7 @@ _SECONDS = {"s": 1.0, "m": 60.0, "h": 3600.0, "d": 86400.0}
 @app.command("render")
 def render(
     data: Data = Path("data"), scene: Scene = None, pipeline: PipelineFile = None,
-    workers: Workers = None, force: Force = False, quiet: Quiet = False,
+    workers: Workers = None, force: Force = False, quiet: Quiet = False, replace: Replace = False,
     split: Annotated[str | None, typer.Option(
         "--split", help="train, test, all, id_train, id_test, ood_train or ood_test.")] = None,
     limit: Annotated[int | None, typer.Option(
@@ -46,13 +47,17 @@ def render(
         "what one machine records.")] = None,
     budget: Annotated[str | None, typer.Option(
         "--budget", help="Stop after so long, e.g. 90m or 2h; the same command goes on.")] = None,
+    verify: Annotated[bool, typer.Option(
+        "--verify", help="Read every recording and record again those whose content has changed.")] = False,
     estimate: Annotated[bool, typer.Option(
         "--estimate", help="Measure a few trajectories, say what all will take, and record nothing.")] = False,
 ) -> None:  # fmt: skip
     """Record four RGB-D views along trajectories of the release."""
     from aerialdojo_gen.shards import Limits
 
-    limits = Limits(share_of(shard) if shard else (0, 1), time.time() + duration_s(budget) if budget else None)
+    limits = Limits(
+        share_of(shard) if shard else (0, 1), time.time() + duration_s(budget) if budget else None, verify
+    )
     overrides: dict[str, object] = {
         "split": split, "limit": limit, "renderer": renderer, "sampling": sampling, "frames": frames,
         "instances": instances or None,
@@ -63,7 +68,7 @@ def render(
     chosen = _scenes_of(split, scene, pipeline, data)
     run_until(
         "render", data=data, scene=chosen, pipeline=pipeline, workers=workers, force=force, quiet=quiet,
-        limits=limits, **overrides,
+        limits=limits, replace=replace, **overrides,
     )  # fmt: skip
 
 

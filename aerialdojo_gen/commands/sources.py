@@ -90,11 +90,13 @@ def gallery(
 ) -> None:  # fmt: skip
     """Picture every prop and every scene as contact sheets."""
     from aerialdojo_gen import runner
+    from aerialdojo_gen.atomic import make_folder
     from aerialdojo_gen.rendering.gallery import props_sheet, scene_sheet, write_picture
     from aerialdojo_gen.scenes.build import build_scene
     from aerialdojo_gen.scenes.catalogue import load_catalogue
 
     config, roots = open_pipeline(pipeline, out)
+    make_folder(out)  # before anything is drawn
     catalogue = load_catalogue(roots.scene_assets)
     suffix, width = ("jpg", 1280) if small else ("png", None)
     for name in runner.choose_scenes(scene or config.scenes, runner.known_scenes(roots.recipes)):

@@ -13,6 +13,7 @@ from aerialdojo_gen.commands.common import (
     Force,
     PipelineFile,
     Quiet,
+    Replace,
     Scene,
     Workers,
     open_pipeline,
@@ -32,8 +33,8 @@ PLAIN_STAGES = {
     "pair-objects": "Pair start anchors with targets: the candidate tasks.",
     "plan": "Plan a collision-free reference trajectory for every candidate.",
     "filter": "Keep the candidates that make tasks, with a reason for every rejection.",
-    "split": "Write the release: tasks, routes, objects, train and test.",
 }
+SPLIT = "Write the release: tasks, routes, objects, train and test."
 
 
 def _stage_command(name: str) -> Callable[..., None]:
@@ -50,15 +51,27 @@ for _name, _help in PLAIN_STAGES.items():
     app.command(_name, help=_help)(_stage_command(_name))
 
 
+@app.command("split", help=SPLIT)
+def split(
+    data: Data = Path("data"), scene: Scene = None, pipeline: PipelineFile = None,
+    workers: Workers = None, force: Force = False, quiet: Quiet = False, replace: Replace = False,
+) -> None:  # fmt: skip
+    """Write the release, with what it needs upstream."""
+    run_until(
+        "split", data=data, scene=scene, pipeline=pipeline, workers=workers, force=force, quiet=quiet, replace=replace
+    )
+
+
 @app.command("run")
 def run(
     pipeline: Annotated[Path, typer.Argument(help="Pipeline file, e.g. pipelines/smoke.toml.")],
     data: Data = Path("data"), scene: Scene = None,
-    workers: Workers = None, force: Force = False, quiet: Quiet = False,
+    workers: Workers = None, force: Force = False, quiet: Quiet = False, replace: Replace = False,
 ) -> None:  # fmt: skip
     """Run a pipeline's stages, from recipes and annotations to the release."""
     from aerialdojo_gen.runner import stages_named
 
     config, roots = open_pipeline(pipeline, data)
     stages = stages_named(config.stages)
-    run_stages(stages, config, roots, scene, workers, [stage.name for stage in stages] if force else [], quiet)
+    forced = [stage.name for stage in stages] if force else []
+    run_stages(stages, config, roots, scene, workers, forced, quiet, replace=replace)

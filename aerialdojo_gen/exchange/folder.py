@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import contextlib
-import glob
 import json
 import re
 from collections.abc import Iterator, Mapping
 from pathlib import Path, PurePosixPath
 from typing import Any
 
-from aerialdojo_gen.atomic import atomic_folder, sweep
+from aerialdojo_gen.atomic import atomic_folder, disk_error
 from aerialdojo_gen.errors import UsageError
+from aerialdojo_gen.staging import sweep
 
 _PICTURES = (b"\x89PNG\r\n\x1a\n", b"\xff\xd8\xff")
 _LARGEST_PICTURE = 32 << 20
@@ -19,7 +19,7 @@ _LARGEST_PICTURE = 32 << 20
 
 @contextlib.contextmanager
 def whole_folder(target: Path, marker: str, *, force: bool) -> Iterator[Path]:
-    """Fill a folder under a temporary name beside its own, and rename it at the end.
+    """Fill a folder beside its place, and give it its name at the end.
 
     Parameters
     ----------
@@ -43,12 +43,17 @@ def whole_folder(target: Path, marker: str, *, force: bool) -> Iterator[Path]:
         The disk is full or read-only.
     """
     target = target.absolute()
-    taken = target.is_file() or (target.is_dir() and any(target.iterdir()))
-    if taken and not (target / marker).is_file():
+    # Before anything is decided: it may bring back what a kill between two renames took away.
+    sweep(target.parent)
+    try:
+        taken = target.is_file() or (target.is_dir() and any(target.iterdir()))
+        ours = (target / marker).is_file()
+    except OSError as error:
+        raise disk_error(error, target) from None
+    if taken and not ours:
         raise UsageError(f"{target} is there already and holds no {marker}: name another folder")
     if taken and not force:
         raise UsageError(f"{target} is there already: --force replaces it")
-    sweep(target.parent, f"{glob.escape(target.name)}.*")
     with atomic_folder(target) as temporary:
         yield temporary
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from aerialdojo_gen.annotations.format import parse_annotations
-from aerialdojo_gen.atomic import atomic_file
+from aerialdojo_gen.atomic import atomic_file, make_folder
 from aerialdojo_gen.errors import AnnotationError, AssetError, UsageError
 from aerialdojo_gen.imports.adopt import Repairs, adopt
 from aerialdojo_gen.imports.files import read_mesh
@@ -104,7 +104,7 @@ def add_scene(
         message = str(error)
         raise AssetError(message if message.startswith(str(mesh)) else f"{mesh}: {message}") from None
     for folder in ("scenes", "annotations"):
-        (project / folder).mkdir(parents=True, exist_ok=True)
+        make_folder(project / folder)
     with atomic_file(project, f"scenes/{name}.glb") as path:
         write_glb(scene, path)
     with atomic_file(project, f"scenes/{name}.toml") as path:

@@ -13,7 +13,6 @@ import resource
 import struct
 import subprocess
 import sys
-import tempfile
 import warnings
 from pathlib import Path
 from typing import Any
@@ -23,6 +22,7 @@ from numpy.typing import NDArray
 
 from aerialdojo_gen.errors import AssetError
 from aerialdojo_gen.imports.raw import RawNode, joined, plain
+from aerialdojo_gen.staging import scratch_folder
 
 SUFFIXES = (".glb", ".obj", ".stl", ".ply", ".3ds")
 MAX_FILE_BYTES = 1 << 30
@@ -61,8 +61,8 @@ def read_mesh(path: Path, max_memory_bytes: int = MAX_MEMORY_BYTES) -> list[RawN
         raise AssetError(f"{path}: {error.strerror}") from None
     if size > MAX_FILE_BYTES:
         raise AssetError(f"{path}: {size >> 20} MiB, the most is {MAX_FILE_BYTES >> 20}: simplify or split the mesh")
-    with tempfile.TemporaryDirectory(prefix="aerialdojo-") as folder:
-        out = Path(folder) / "nodes.npz"
+    with scratch_folder() as folder:
+        out = folder / "nodes.npz"
         # Not multiprocessing, which would run a caller's unguarded script a second time.
         command = [sys.executable, "-m", __name__, str(path.resolve()), str(out), str(max_memory_bytes)]
         try:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import resource
 import sys
-import tempfile
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,13 +12,14 @@ from typing import Any
 from aerialdojo_gen import rng, store
 from aerialdojo_gen.config import RenderConfig
 from aerialdojo_gen.errors import UsageError
+from aerialdojo_gen.files import size_of
 from aerialdojo_gen.rendering.backend import choose_renderer, open_renderer
 from aerialdojo_gen.rendering.checks import Solid
 from aerialdojo_gen.rendering.codecs import SUFFIX
-from aerialdojo_gen.rendering.finished import size_of
 from aerialdojo_gen.rendering.recording import frame_poses, record_view
 from aerialdojo_gen.rendering.sample import choose, tables
 from aerialdojo_gen.scenes.glb import read_glb
+from aerialdojo_gen.staging import scratch_folder
 
 _MEASURED_SCENES, _MEASURED_POSES = 3, 12
 
@@ -172,12 +172,12 @@ def _measure(
     short = route | {name: route[name][:_MEASURED_POSES] for name in ("x_m", "y_m", "z_m", "yaw_rad", "action")}
     poses = frame_poses(short, config)
     size = 0
-    with open_renderer(mesh, renderer_name) as renderer, tempfile.TemporaryDirectory() as folder:
+    with open_renderer(mesh, renderer_name) as renderer, scratch_folder() as folder:
         built = time.process_time() - begun
         modalities = ("rgb", "depth", "instance") if config.instances else ("rgb", "depth")
         begun = time.process_time()
         for view in config.views:
-            files = {m: Path(folder) / f"{view}_{m}.{SUFFIX[m]}" for m in modalities}
+            files = {m: folder / f"{view}_{m}.{SUFFIX[m]}" for m in modalities}
             record_view(renderer, solid, view, poses, config, files)
             size += sum(size_of(path) for path in files.values())
         return len(poses.time_s), time.process_time() - begun, built, size

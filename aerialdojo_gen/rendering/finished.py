@@ -9,14 +9,14 @@ from __future__ import annotations
 
 import hashlib
 import json
-import shutil
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from aerialdojo_gen.config import RenderConfig
+from aerialdojo_gen.files import is_whole
 
-_NOTE = "recording.json"
+NOTE = "recording.json"
 # What does not change a trajectory's own files: which others are recorded, and how they are shared out.
 _SELECTION = {"limit", "split", "trajectories_per_part"}
 
@@ -49,7 +49,7 @@ def trajectory_fingerprint(code: str, mesh_sha256: str, route: Mapping[str, Any]
     return hashlib.sha256(json.dumps(facts, sort_keys=True).encode()).hexdigest()
 
 
-def find(data: Path, folder: str, fingerprint: str) -> list[dict[str, Any]] | None:
+def find(data: Path, folder: str, fingerprint: str, *, verify: bool = False) -> list[dict[str, Any]] | None:
     """Return the rows of a finished trajectory; None where there is none, or it is stale or damaged.
 
     Parameters
@@ -60,13 +60,15 @@ def find(data: Path, folder: str, fingerprint: str) -> list[dict[str, Any]] | No
         The trajectory's, relative to it.
     fingerprint : str
         Of `trajectory_fingerprint`.
+    verify : bool
+        Compare the files' digests too, not their sizes alone.
     """
     try:
-        note = json.loads((data / folder / _NOTE).read_text(encoding="utf-8"))
+        note = json.loads((data / folder / NOTE).read_text(encoding="utf-8"))
         if note["fingerprint"] != fingerprint:
             return None
         rows: list[dict[str, Any]] = note["recordings"]
-        whole = all(size_of(data / row["path"]) == row["bytes"] for row in rows)
+        whole = all(is_whole(data / row["path"], row["bytes"], row["sha256"] if verify else None) for row in rows)
     except (OSError, ValueError, KeyError, TypeError):
         return None
     return rows if whole else None
@@ -75,23 +77,4 @@ def find(data: Path, folder: str, fingerprint: str) -> list[dict[str, Any]] | No
 def note(folder: Path, fingerprint: str, rows: list[dict[str, Any]]) -> None:
     """Write down, in a trajectory's folder, what stands in it."""
     text = json.dumps({"fingerprint": fingerprint, "recordings": rows}, indent=1)
-    (folder / _NOTE).write_text(text, encoding="utf-8")
-
-
-def remove(*paths: Path) -> None:
-    """Remove files and folders; those that are not there are no error."""
-    for path in paths:
-        shutil.rmtree(path) if path.is_dir() else path.unlink(missing_ok=True)
-
-
-def size_of(path: Path) -> int:
-    """Bytes of a file, or of a folder's files."""
-    return sum(p.stat().st_size for p in path.iterdir()) if path.is_dir() else path.stat().st_size
-
-
-def sha256_of(path: Path) -> str:
-    """SHA-256 of a file, or of a folder's files one after the other, hexadecimal."""
-    digest = hashlib.sha256()
-    for file in sorted(path.iterdir()) if path.is_dir() else [path]:
-        digest.update(file.read_bytes())
-    return digest.hexdigest()
+    (folder / NOTE).write_text(text, encoding="utf-8")

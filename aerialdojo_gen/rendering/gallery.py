@@ -175,7 +175,6 @@ def write_picture(image: Image, folder: Path, name: str, max_width: int | None =
     done, data = cv2.imencode(suffix, image[..., ::-1], options)
     if not done:
         raise RenderError(f"cannot encode {name}")
-    folder.mkdir(parents=True, exist_ok=True)
     with atomic_file(folder, name) as path:
         path.write_bytes(data.tobytes())
     return folder / name

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
 import weakref
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,6 +20,7 @@ from aerialdojo_gen.rendering.lighting import Lighting, ShadowMap, light_of, sun
 from aerialdojo_gen.rendering.shading import shade
 from aerialdojo_gen.rendering.surfaces import Surface, surfaces
 from aerialdojo_gen.scenes.model import Material, Scene
+from aerialdojo_gen.staging import scratch_folder
 
 Floats = NDArray[np.float64]
 
@@ -74,10 +74,10 @@ class RenderWorld:
         # A reused file name would otherwise bring back the mesh that it once held.
         pybullet.setPhysicsEngineParameter(enableFileCaching=0, physicsClientId=self._client)
         # Meshes go through OBJ files: inline vertices leak about 50 MB a scene in PyBullet.
-        with tempfile.TemporaryDirectory(prefix="aerialdojo-render-") as folder:
+        with scratch_folder() as folder:
             textures: dict[str, int] = {}
             for k, surface in enumerate(found):
-                self._add(surface, k, scene.materials[surface.material], textures, Path(folder))
+                self._add(surface, k, scene.materials[surface.material], textures, folder)
         camera, pose, near_m, far_m = sun_view(scene)
         self._shadow = ShadowMap(camera, pose, self.rasterise(camera, pose, near_m, far_m)[1])
 

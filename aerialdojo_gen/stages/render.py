@@ -8,9 +8,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from aerialdojo_gen.atomic import atomic_folder, sweep
+from aerialdojo_gen.atomic import atomic_folder
 from aerialdojo_gen.config import RenderConfig
 from aerialdojo_gen.errors import BudgetSpent
+from aerialdojo_gen.files import sha256_of, size_of
 from aerialdojo_gen.rendering import finished
 from aerialdojo_gen.rendering.backend import kept_renderer
 from aerialdojo_gen.rendering.checks import CONCERNS, FLAGS, kept_solid
@@ -21,6 +22,7 @@ from aerialdojo_gen.rendering.trajectory import FramePoses
 from aerialdojo_gen.scenes.model import Scene
 from aerialdojo_gen.schemas import FRAMES, RECORDINGS
 from aerialdojo_gen.stage import Job, Output
+from aerialdojo_gen.staging import remove
 from aerialdojo_gen.tables import from_rows
 
 
@@ -47,19 +49,18 @@ def run(job: Job, config: RenderConfig) -> Output:
     routes = {row["nav_id"]: row for table in tables(config, job.scene) for row in job.read(table).to_pylist()}
     mine = choose(routes.values(), config.limit, job.seed)[job.part :: job.parts]
     mesh = job.read("scenes")["mesh_sha256"][0].as_py()
-    sweep(job.roots.data / "media" / job.scene)
     recordings: list[dict[str, Any]] = []
     frames: list[dict[str, Any]] = []
     for nav_id in mine:
         poses = frame_poses(routes[nav_id], config)
         folder = f"media/{job.scene}/{nav_id}"
         fingerprint = finished.trajectory_fingerprint(job.code, mesh, routes[nav_id], config)
-        rows = None if job.force else finished.find(job.roots.data, folder, fingerprint)
+        rows = None if job.force else finished.find(job.roots.data, folder, fingerprint, verify=job.verify)
         if rows is None:
             if job.deadline is not None and time.time() >= job.deadline:
                 raise BudgetSpent(f"the budget was spent in {job.scene}")
             rows = _Trajectory(job.scene_model(), nav_id, poses, config).record(job.roots.data, folder, fingerprint)
-        job.files.extend(row["path"] for row in rows if config.frames == "video")
+        job.files.extend([f"{folder}/{finished.NOTE}", *(row["path"] for row in rows)])
         recordings += rows
         frames += _frame_rows(job.scene, nav_id, poses)
     counts = Counter(flag for row in recordings for flag in row["flags"])
@@ -80,7 +81,7 @@ class _Trajectory:
 
     def record(self, data: Path, folder: str, fingerprint: str) -> list[dict[str, Any]]:
         """Record all views into a folder that appears when it is whole; returns the rows of `recordings`."""
-        with atomic_folder(data / folder) as here:
+        with atomic_folder(data / folder, root=data) as here:
             rows = [row for view in self.config.views for row in self._view(view, here, folder)]
             finished.note(here, fingerprint, rows)
         return rows
@@ -95,7 +96,8 @@ class _Trajectory:
         flags = record_view(renderer, solid, view, self.poses, config, files)
         if flags:
             # A renderer that has gone wrong may be right when it is built anew; what stays is the view's own fault.
-            finished.remove(*files.values())
+            for file in files.values():
+                remove(file)
             renderer = kept_renderer(self.scene, config.renderer, anew=True)
             flags = record_view(renderer, solid, view, self.poses, config, files)
         return [
@@ -114,8 +116,8 @@ class _Trajectory:
                 "codec": "png" if png else CODEC[m],
                 "renderer": renderer.name,
                 "device": renderer.device,
-                "bytes": finished.size_of(file),
-                "sha256": finished.sha256_of(file),
+                "bytes": size_of(file),
+                "sha256": sha256_of(file),
                 "ok": not flags & CONCERNS[m],
                 "flags": [flag for flag in FLAGS if flag in flags & CONCERNS[m]],
             }

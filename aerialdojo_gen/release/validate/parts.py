@@ -18,7 +18,16 @@ from aerialdojo_gen.schemas import TableSpec
 from aerialdojo_gen.tables import content_digest
 
 # What lies beside the tables of a release: its cards, its licence, what a hub's client leaves, pictures of it.
-_BESIDE = {"README.md", "croissant.json", "LICENSE", "CITATION.cff", ".gitattributes", "figures", "stats"}
+_BESIDE = {
+    "README.md",
+    "croissant.json",
+    "pipeline.json",
+    "LICENSE",
+    "CITATION.cff",
+    ".gitattributes",
+    "figures",
+    "stats",
+}
 
 # Tables without which a scene's tasks mean nothing; a split may have none of a scene's tasks.
 _FEW = ("release/scenes", "release/landmarks", "release/objects", "release/anchors")

@@ -1,0 +1,123 @@
+"""Which pipeline made which scenes of a release, so that another one does not replace them unasked."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from aerialdojo_gen import store
+from aerialdojo_gen.atomic import atomic_file
+from aerialdojo_gen.config import Pipeline
+from aerialdojo_gen.errors import StoreError, UsageError
+
+RECORD = "release/pipeline.json"
+# What does not change the release: folders of this machine, which scenes and stages are asked for, recordings.
+_BESIDE = {"name", "scenes", "stages", "render", "scene_assets", "recipes", "annotations"}
+
+
+@dataclass(frozen=True)
+class Maker:
+    """A pipeline as a release knows it.
+
+    Attributes
+    ----------
+    name : str
+        The pipeline's name; empty where the release does not say.
+    sha256 : str
+        Of its settings, hexadecimal.
+    """
+
+    name: str = ""
+    sha256: str = ""
+
+    def __str__(self) -> str:
+        """In words, for messages."""
+        return f"pipeline {self.name!r}" if self.name else "a pipeline that it does not name"
+
+
+def maker_of(pipeline: Pipeline) -> Maker:
+    """Return what a release remembers of a pipeline."""
+    settings = pipeline.model_dump(mode="json", exclude=_BESIDE)
+    settings["anchor_sample"].pop("clip")  # where the model's files lie
+    return Maker(pipeline.name, hashlib.sha256(json.dumps(settings, sort_keys=True).encode()).hexdigest())
+
+
+def makers(data: Path) -> dict[str, Maker]:
+    """Return the makers of a release's scenes, by scene; one that the release does not know is `Maker()`."""
+    known: dict[str, Maker] = {}
+    try:
+        for entry in json.loads((data / RECORD).read_text(encoding="utf-8"))["pipelines"]:
+            known |= dict.fromkeys(entry["scenes"], Maker(str(entry["name"]), str(entry["sha256"])))
+    except FileNotFoundError:
+        pass
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
+        known = {}  # damaged: as if nothing were known, which is the cautious side
+    return {scene: known.get(scene, Maker()) for scene in store.release_scenes(data)}
+
+
+def record_makers(data: Path, pipeline: Pipeline, scenes: Sequence[str]) -> None:
+    """Write down that a pipeline made these scenes of the release."""
+    found = makers(data)
+    found |= {scene: maker_of(pipeline) for scene in scenes if scene in found}
+    entries = [
+        {"name": maker.name, "sha256": maker.sha256, "scenes": sorted(s for s in found if found[s] == maker)}
+        for maker in sorted(set(found.values()) - {Maker()}, key=lambda maker: (maker.name, maker.sha256))
+    ]
+    with atomic_file(data, RECORD) as path:
+        path.write_text(json.dumps({"pipelines": entries}, indent=1) + "\n", encoding="utf-8")
+
+
+def check_replaced(data: Path, pipeline: Pipeline, scenes: Sequence[str], *, whole: bool) -> None:
+    """Refuse to put a pipeline's release in the place of another one's.
+
+    Parameters
+    ----------
+    data : Path
+        The data directory.
+    pipeline : Pipeline
+        What is about to run.
+    scenes : sequence of str
+        The scenes that it is about to release.
+    whole : bool
+        Whether these are all of it, so that others are removed.
+
+    Raises
+    ------
+    UsageError
+        Scenes would be removed that another pipeline made, or other settings of this one; or scenes replaced that a
+        pipeline of another name made.
+    """
+    mine = maker_of(pipeline)
+    found = makers(data)
+    removed = [scene for scene, maker in found.items() if whole and scene not in scenes and maker != mine]
+    replaced = [scene for scene, maker in found.items() if scene in scenes and maker.name not in ("", mine.name)]
+    lost = removed + replaced
+    if not lost:
+        return
+    others = sorted({found[scene] for scene in lost}, key=lambda maker: maker.name)
+    named = " and ".join(
+        dict.fromkeys(str(m) + (" with other settings" if m.name == mine.name else "") for m in others)
+    )
+    what = " and ".join(
+        f"{verb} {_listed(data, part)}" for verb, part in (("remove", removed), ("replace", replaced)) if part
+    )
+    raise UsageError(
+        f"the release in {data} was made by {named}: {mine} would {what}; use another --data, "
+        "or lose them with --replace"
+    )
+
+
+def _listed(data: Path, scenes: list[str]) -> str:
+    names = ", ".join(scenes[:4]) + (", …" if len(scenes) > 4 else "")
+    tasks = sum(_tasks(data, scene) for scene in scenes)
+    return f"{len(scenes)} scene{'s' * (len(scenes) > 1)} with {tasks:,} tasks ({names})"
+
+
+def _tasks(data: Path, scene: str) -> int:
+    try:
+        return sum(store.count_rows(data, table, scene) for table in ("tasks/train", "tasks/test"))
+    except StoreError:
+        return 0

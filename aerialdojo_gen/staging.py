@@ -1,0 +1,235 @@
+"""Where files and folders are made before they take their names, and whose they are.
+
+What is being made for a place below ROOT lies in a folder of its own, ``ROOT/.aerialdojo-staging/<item>/``: ``new``
+is the thing itself, ``lease`` a file that its writer holds locked and that says where the thing belongs. The kernel
+lets go of the lock when the writer ends, however it ends, in whatever PID namespace or on whichever host it ran: an
+item whose lease can be locked belongs to nobody and is removed, one whose lease cannot is being written. Where the
+file system knows no locks nobody can tell, and nothing is removed.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import fcntl
+import os
+import re
+import secrets
+import shutil
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TextIO
+
+AREA = ".aerialdojo-staging"
+_LEASE, _OLD = "lease", "old"
+_TRIES = 100
+_UNSTAGED = re.compile(r"\.(?P<name>.+)\.\d+\.(?P<kind>tmp|old)(\.[A-Za-z0-9]+)?")
+NO_LOCKS = (errno.ENOLCK, errno.EOPNOTSUPP, errno.ENOTSUP, errno.ENOSYS, errno.EINVAL)
+
+
+@contextlib.contextmanager
+def staged(root: Path, target: Path) -> Iterator[Path]:
+    """Hold an item of a staging folder; what dead writers left there is removed first.
+
+    Parameters
+    ----------
+    root : Path
+        The folder that has the staging folder; made where it is missing.
+    target : Path
+        What the item is to become, below `root`.
+
+    Yields
+    ------
+    Path
+        The item: an empty folder but for its lease. It is removed with all that is in it at the end.
+
+    Raises
+    ------
+    OSError
+        The folder cannot be written.
+    """
+    sweep(root)
+    item, lease = _claim(root / AREA)
+    try:
+        with lease:
+            try:
+                lease.write(os.path.relpath(target, root))
+                lease.flush()
+                yield item
+            finally:
+                _discard(item)
+    finally:
+        with contextlib.suppress(OSError):
+            item.parent.rmdir()
+
+
+def _claim(area: Path) -> tuple[Path, TextIO]:
+    """Make an item and lock its lease; whoever sweeps in between takes it away, and another one is made."""
+    for left in reversed(range(_TRIES)):
+        item = area / secrets.token_hex(8)
+        try:
+            area.mkdir(parents=True, exist_ok=True)
+            item.mkdir()
+            lease = (item / _LEASE).open("x+", encoding="utf-8", errors="surrogateescape")
+        except FileNotFoundError:
+            if not left:
+                raise
+            continue
+        if _lock(lease, unknown=True) and _is_at(lease, item / _LEASE):
+            return item, lease
+        lease.close()
+    raise OSError(errno.EBUSY, "it is swept again and again", str(area))
+
+
+def sweep(root: Path) -> None:
+    """Remove what dead writers left in a folder's staging folder; what a living one makes stays.
+
+    A folder that was to be replaced, where a kill came between its two renames, gets what belongs there.
+    """
+    area = root / AREA
+    try:
+        items = sorted(area.iterdir())
+    except OSError:
+        return
+    for item in items:
+        with contextlib.suppress(OSError):
+            _sweep_item(root, item)
+    with contextlib.suppress(OSError):
+        area.rmdir()
+
+
+def _sweep_item(root: Path, item: Path) -> None:
+    path = item / _LEASE
+    try:
+        lease = path.open("r+", encoding="utf-8", errors="surrogateescape")
+    except FileNotFoundError:
+        item.rmdir()  # killed before it had a lease, or after it had given it up: empty
+        return
+    with lease:
+        if _lock(lease, unknown=False) and _is_at(lease, path):
+            _recover(root, item, lease.read())
+            _discard(item)
+
+
+def _recover(root: Path, item: Path, relative: str) -> None:
+    old, target = item / _OLD, root / relative
+    if not os.path.lexists(old) or os.path.lexists(target) or not relative or ".." in Path(relative).parts:
+        return
+    # The old one is moved away only when the new one is whole and on the disk.
+    new = next((path for path in item.iterdir() if path.name not in (_LEASE, _OLD)), old)
+    new.rename(target)
+
+
+def sweep_unstaged(data: Path) -> None:
+    """Remove from a data directory what was being made there when nothing was staged: ``.NAME.PID.tmp`` and ``.old``.
+
+    Only while the directory is held: then nobody makes anything in these places.
+    """
+    for pattern in ("meshes/.*", "release/.*", "release/*/.*", "release/*/*/.*", "*/*/.*"):
+        for path in data.glob(pattern):
+            match = _UNSTAGED.fullmatch(path.name)
+            if match and match["kind"] == "old" and not os.path.lexists(path.with_name(match["name"])):
+                path.rename(path.with_name(match["name"]))
+            elif match:
+                remove(path)
+
+
+def _discard(item: Path) -> None:
+    """Remove an item; its lease last, so that a kill on the way leaves something that can be told to be dead."""
+    with contextlib.suppress(OSError):
+        for path in item.iterdir():
+            if path.name != _LEASE:
+                remove(path)
+        (item / _LEASE).unlink(missing_ok=True)
+        item.rmdir()
+
+
+def remove(path: Path) -> None:
+    """Remove a file or a folder with all that is in it; one that is not there is no error."""
+    if path.is_dir() and not path.is_symlink():
+        shutil.rmtree(path, ignore_errors=True)
+    else:
+        path.unlink(missing_ok=True)
+
+
+def _lock(file: TextIO, *, unknown: bool) -> bool:
+    """Lock a file if nobody else has; `unknown` is returned where the file system knows no locks."""
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    except OSError as error:
+        if error.errno in NO_LOCKS:
+            return unknown
+        raise
+    return True
+
+
+def _is_at(file: TextIO, path: Path) -> bool:
+    try:
+        return os.path.samestat(os.fstat(file.fileno()), path.stat())
+    except FileNotFoundError:
+        return False
+
+
+def replace_folder(new: Path, target: Path) -> None:
+    """Give a folder its name; what has it goes to the item of the new one.
+
+    In one step where the file system can exchange two names. Elsewhere there are two, and what a kill between them
+    leaves is put right by the next `sweep`.
+    """
+    try:
+        new.rename(target)
+        return
+    except OSError as error:
+        if error.errno not in (errno.ENOTEMPTY, errno.EEXIST, errno.ENOTDIR):
+            raise
+    if exchange(new, target):
+        return
+    old = new.with_name(_OLD)
+    target.rename(old)
+    try:
+        new.rename(target)
+    except OSError:
+        old.rename(target)
+        raise
+
+
+def exchange(one: Path, other: Path) -> bool:
+    """Exchange two names at once; False where the operating or the file system cannot."""
+    import ctypes
+
+    at_cwd, rename_exchange = -100, 2
+    renameat2 = getattr(ctypes.CDLL(None, use_errno=True), "renameat2", None)
+    if renameat2 is None:
+        return False
+    paths = [ctypes.c_char_p(os.fsencode(path)) for path in (one, other)]
+    if renameat2(at_cwd, paths[0], at_cwd, paths[1], ctypes.c_uint(rename_exchange)) == 0:
+        return True
+    number = ctypes.get_errno()
+    if number in (errno.EINVAL, errno.ENOSYS, errno.EOPNOTSUPP):
+        return False
+    raise OSError(number, os.strerror(number), str(other))
+
+
+@contextlib.contextmanager
+def scratch_folder() -> Iterator[Path]:
+    """Hold an empty folder in the system's folder for temporary files; what killed runs left there is removed.
+
+    Raises
+    ------
+    OSError
+        There is no such folder that can be written.
+    """
+    root = Path(tempfile.gettempdir()) / f"aerialdojo-gen-{os.getuid()}"
+    root.mkdir(mode=0o700, exist_ok=True)
+    if root.is_symlink() or root.stat().st_uid != os.getuid():
+        # Somebody else made it: what stands there is not to be trusted.
+        with tempfile.TemporaryDirectory(prefix="aerialdojo-") as own:
+            yield Path(own)
+        return
+    with staged(root, root / "scratch") as item:
+        folder = item / "scratch"
+        folder.mkdir()
+        yield folder

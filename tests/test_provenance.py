@@ -1,0 +1,136 @@
+"""A release knows which pipeline made it; another one does not take its place unasked."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+
+import pytest
+
+from aerialdojo_gen import runner, store
+from aerialdojo_gen.commands.common import open_pipeline, run_until
+from aerialdojo_gen.errors import StoreError, UsageError
+from aerialdojo_gen.runner import data_lock
+
+A, B = "U_Courtyard_0", "U_Courtyard_1"
+
+
+@pytest.fixture
+def data(smoke, tmp_path):
+    """A copy of the smoke run."""
+    return shutil.copytree(smoke, tmp_path / "data")
+
+
+@pytest.fixture
+def pipeline(project, tmp_path):
+    """Writer of pipelines like smoke.toml."""
+
+    def write(name="other", scenes=(B,), more=""):
+        text = (project / "pipelines" / "smoke.toml").read_text().replace('"../', f'"{project}/')
+        text = text.replace('name = "smoke"', f'name = "{name}"\nscenes = {json.dumps(list(scenes))}')
+        (tmp_path / "mine.toml").write_text(f"{text}\n{more}")
+        return tmp_path / "mine.toml"
+
+    return write
+
+
+def release(data):
+    return {p.relative_to(data): p.read_bytes() for p in (data / "release").rglob("*") if p.is_file()}
+
+
+def times(data):
+    return {p: p.stat().st_mtime_ns for p in data.rglob("*") if p.is_file() and p.name != ".lock"}
+
+
+def split(data, pipeline, scene=None, **options):
+    run_until("split", data=data, pipeline=pipeline, scene=scene, workers=1, quiet=True, **options)
+
+
+def test_a_release_names_its_pipeline(smoke):
+    (entry,) = json.loads((smoke / "release" / "pipeline.json").read_text())["pipelines"]
+    assert entry["name"] == "smoke"
+    assert entry["scenes"] == [A, B]
+    assert len(entry["sha256"]) == 64
+
+
+@pytest.mark.parametrize("verb", ["split", "render", "run"])
+def test_another_pipeline_is_refused_at_once_and_nothing_is_lost(data, pipeline, verb):
+    before = times(data)
+    file = str(pipeline())
+    command = [verb, file] if verb == "run" else [verb, "--pipeline", file]
+    done = subprocess.run(
+        [sys.executable, "-m", "aerialdojo_gen.cli", *command, "--data", str(data)],
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 2
+    assert done.stderr.count("\n") == 1
+    tasks = {s: sum(store.count_rows(data, f"tasks/{k}", s) for k in ("train", "test")) for s in (A, B)}
+    for words in (
+        f"error: the release in {data} was made by pipeline 'smoke': pipeline 'other' would ",
+        f"remove 1 scene with {tasks[A]} tasks ({A})", f"replace 1 scene with {tasks[B]} tasks ({B})", "--replace",
+    ):  # fmt: skip
+        assert words in done.stderr
+    assert times(data) == before
+
+
+def test_replace_puts_the_other_pipeline_s_release_in_its_place(data, pipeline):
+    split(data, pipeline(), replace=True)
+    assert store.release_scenes(data) == [B]
+    (entry,) = json.loads((data / "release" / "pipeline.json").read_text())["pipelines"]
+    assert (entry["name"], entry["scenes"]) == ("other", [B])
+    split(data, pipeline())
+    assert f"| `{A}` |" not in (data / "release" / "README.md").read_text()
+
+
+def test_the_same_pipeline_on_some_scenes_keeps_the_others(data, project):
+    before = release(data)
+    shutil.rmtree(data / "release" / "tasks" / "id_train")
+    split(data, project / "pipelines" / "smoke.toml", scene=[A])
+    assert release(data) == before
+
+
+def test_a_scene_is_added_beside_another_pipeline_s_and_not_put_in_its_place(data, project, pipeline):
+    split(data, pipeline(), scene=[B], replace=True)
+    found = json.loads((data / "release" / "pipeline.json").read_text())["pipelines"]
+    assert [(entry["name"], entry["scenes"]) for entry in found] == [("other", [B]), ("smoke", [A])]
+    split(data, project / "pipelines" / "smoke.toml", scene=[A])
+    with pytest.raises(UsageError, match=f"made by pipeline 'other': pipeline 'smoke' would replace 1 .*{B}"):
+        split(data, project / "pipelines" / "smoke.toml", scene=["*"])
+
+
+def test_a_copy_with_the_same_name_and_other_settings_removes_nothing(data, pipeline):
+    before = release(data)
+    with pytest.raises(UsageError, match=f"'smoke' with other settings: pipeline 'smoke' would remove 1 .*{A}"):
+        split(data, pipeline("smoke", more="[filter]\nmin_detour_ratio = 1.1\n"))
+    assert release(data) == before
+    # Narrowed and nothing else: the release holds what the pipeline asks for, as ever.
+    split(data, pipeline("smoke"))
+    assert store.release_scenes(data) == [B]
+
+
+@pytest.mark.parametrize("record", [None, "{", '{"pipelines": [{"name": 3}]}'])
+def test_a_release_that_does_not_say_is_not_thinned_out_but_made_again(data, project, pipeline, record):
+    path = data / "release" / "pipeline.json"
+    before = release(data)
+    path.unlink()
+    if record is not None:
+        path.write_text(record)
+    with pytest.raises(UsageError, match="made by a pipeline that it does not name: pipeline 'other' would remove 1"):
+        split(data, pipeline())
+    split(data, project / "pipelines" / "smoke.toml")
+    assert release(data) == before
+
+
+def test_what_stands_beside_the_tables_is_written_while_the_data_is_held(tmp_path):
+    def other():
+        with pytest.raises(StoreError, match="another run is writing"), data_lock(tmp_path / "data"):
+            pass
+        asked.append(os.getpid())
+
+    asked = []
+    config, roots = open_pipeline(None, tmp_path / "data")
+    runner.run([], [], config, roots, prepare=other, finish=other)
+    assert len(asked) == 2
