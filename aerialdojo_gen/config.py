@@ -331,6 +331,10 @@ def explain(error: ValidationError, model: type[BaseModel]) -> list[str]:
     """
     lines = []
     for fault in error.errors():
+        if not fault["loc"]:
+            # Of the whole: what it says names its keys itself.
+            lines += str(fault["ctx"]["error"]).split("; ") if "ctx" in fault else [fault["msg"]]
+            continue
         *where, last = [str(part) for part in fault["loc"]] or [""]
         table = f"[{'.'.join(where)}] " if where else ""
         if fault["type"] == "extra_forbidden":

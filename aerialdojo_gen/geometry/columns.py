@@ -15,6 +15,8 @@ Ints = NDArray[np.int64]
 # Where in its cell a column stands: not on the edges and diagonals that meshes on round coordinates have.
 _AT = (0.4371, 0.5573)
 _SAME_HEIGHT_M = 1e-3
+_SAME_LAYER_M = 0.01
+_OWN_LAYER_M = 0.05
 _BIN_M = 2.0
 _MOST_BINS = 1000
 
@@ -127,6 +129,31 @@ class ColumnIndex:
             )
         )  # fmt: skip
 
+    def layers(self, points: Floats) -> tuple[Ints, Floats, Floats]:
+        """Look at the triangles in the columns of points.
+
+        Parameters
+        ----------
+        points : (n, 3) float64
+            Metres, world frame.
+
+        Returns
+        -------
+        below : (n,) int64
+            Layers lower than the point by more than 5 cm; what lies within a centimetre is one layer.
+        next_m : (n,) float64
+            Height of the highest of them, NaN where is none.
+        away_m : (n,) float64
+            Height of the layer nearest to the point above it, negative below it; infinite where is none.
+        """
+        n = len(points)
+        below, next_m, away_m = np.zeros(n, np.int64), np.full(n, np.nan), np.full(n, np.inf)
+        _look(
+            np.ascontiguousarray(points), self.triangles, self.low[0], self.low[1], self.bin_m, self.shape[0],
+            self.shape[1], self.first, self.member, below, next_m, away_m,
+        )  # fmt: skip
+        return below, next_m, away_m
+
 
 @njit(cache=True, inline="always")
 def _height(x: float, y: float, t: Floats, k: int) -> float:
@@ -226,3 +253,33 @@ def _lowest_at(
         if best < np.inf:
             out[p] = best
     return out
+
+
+@njit(cache=True)
+def _look(
+    points: Floats, t: Floats, x0: float, y0: float, edge: float, nx: int, ny: int, first: Ints, member: Ints,
+    below: Ints, next_m: Floats, away_m: Floats,
+) -> None:  # fmt: skip
+    heights = np.empty(t.shape[0])
+    for p in range(len(points)):
+        x, y, z = points[p, 0], points[p, 1], points[p, 2]
+        if not (x >= x0 and y >= y0):
+            continue
+        i, j = int((x - x0) / edge), int((y - y0) / edge)
+        if i >= nx or j >= ny:
+            continue
+        n = 0
+        for m in range(first[i * ny + j], first[i * ny + j + 1]):
+            h = _height(x, y, t, member[m])
+            if not math.isnan(h):
+                heights[n] = h
+                n += 1
+        last = -np.inf
+        for h in np.sort(heights[:n]):
+            # An edge that two triangles share is met twice.
+            if h < z - _OWN_LAYER_M and h > last + _SAME_LAYER_M:
+                below[p] += 1
+                next_m[p] = h
+            last = h
+            if abs(h - z) < abs(away_m[p]):
+                away_m[p] = h - z

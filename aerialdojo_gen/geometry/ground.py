@@ -39,7 +39,6 @@ _WELD_M = 1e-3
 _BELOW_M = 1e-3
 _PIECE_M = 0.5
 _BESIDE_M = 0.02
-_SAME_HEIGHT_M = 0.05
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,6 +137,9 @@ class Ground:
     def curtain(self, low: Floats, high: Floats, radius_m: float) -> Floats:
         """Walls from the rim straight down, which close the sheet's underside to a body in the flight volume.
 
+        From an edge that overhangs the sheet they go down to the next layer, and only from every other one: between
+        the first layer and the second there is air, above that there is rock again.
+
         Parameters
         ----------
         low, high : (3,) float64
@@ -159,15 +161,19 @@ class Ground:
         near = ((np.minimum(a, b)[:, :2] < inner_high) & (np.maximum(a, b)[:, :2] > inner_low)).all(axis=1)
         near &= np.maximum(a, b)[:, 2] > low[2]
         a, b, inwards, middle = a[near], b[near], inwards[near], middle[near]
-        own = self.lowest_m(middle[:, :2])
-        beside = self.lowest_m(middle[:, :2] - _BESIDE_M * inwards)
-        roofed = own < middle[:, 2] - _SAME_HEIGHT_M
-        goes_on = beside >= middle[:, 2] - 2 * radius_m
-        hangs = ~(roofed | goes_on)
-        a, b = a[hangs], b[hangs]
-        # Through the floor, so that no edge of the curtain lies in it.
+        below, floor, _ = self._columns.layers(middle)
+        # The floor of the flight volume is gone through, so that no edge of the curtain lies in it.
+        floor = np.where(below > 0, floor, low[2] - radius_m)
+        beside = middle.copy()
+        beside[:, :2] -= _BESIDE_M * inwards
+        _, _, away = self._columns.layers(beside)
+        lowest = self.lowest_m(beside[:, :2])
+        # What lies higher beyond the rim has a rim of its own.
+        goes_on = (np.abs(away) <= 2 * radius_m) | (lowest > middle[:, 2])
+        hangs = (below % 2 == 0) & ~goes_on
+        a, b, floor = a[hangs], b[hangs], floor[hangs]
         c, d = a.copy(), b.copy()
-        c[:, 2], d[:, 2] = np.minimum(a[:, 2], low[2]) - radius_m, np.minimum(b[:, 2], low[2]) - radius_m
+        c[:, 2], d[:, 2] = np.minimum(a[:, 2], floor), np.minimum(b[:, 2], floor)
         return np.concatenate([np.concatenate([a, b, c], axis=1), np.concatenate([b, d, c], axis=1)])
 
     def _covers(self, low: Floats, high: Floats) -> bool:
