@@ -168,7 +168,9 @@ def test_ground_that_fills_the_flight_volume_has_no_curtain():
         np.array([[-15.0, -15, 0], [15, 15, 12]]),
     )  # fmt: skip
     grid = ClearanceGrid.build(scene)
-    assert grid.ground is not None
+    ground = Ground.of(scene)
+    assert ground is not None
+    assert not len(ground.curtain(*scene.bounds, 0.25))
     assert not grid.has_curtain
     plain_grid = ClearanceGrid.build(scene, closed_ground=False)
     assert grid.arrays.field.tobytes() == plain_grid.arrays.field.tobytes()

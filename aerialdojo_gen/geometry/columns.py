@@ -45,6 +45,10 @@ class Plan:
         nx, ny = (max(1, math.ceil(v / step_m)) for v in (high - low))
         return cls(np.asarray(low, np.float64), step_m, (nx, ny))
 
+    def places(self, chosen: NDArray[np.bool_]) -> Floats:
+        """Places in plan of columns that are marked in a (nx, ny) array, (n, 2) float64, metres."""
+        return self.low + (np.argwhere(chosen) + np.array(_AT)) * self.step_m
+
 
 def lowest_of(triangles: Floats, plan: Plan) -> Floats:
     """Find the lowest point of triangles, (n, 9), in every column of a plan: float64 metres, NaN where is none."""

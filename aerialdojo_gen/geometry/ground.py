@@ -51,13 +51,16 @@ class Ground:
         Metres, world frame; each once, whatever its winding.
     rim : (m, 9) float64
         Edges that one triangle alone has: their two ends, and that triangle's third corner.
+    bare : (k, 2) float64
+        Where in the plan of the flight volume nothing of the scene lies, on a lattice, metres.
     """
 
     triangles: Floats
     rim: Floats
+    bare: Floats
 
     @classmethod
-    def of(cls, scene: Scene) -> Ground | None:
+    def of(cls, scene: Scene, radius_m: float | None = None) -> Ground | None:
         """Find a scene's ground by its form alone.
 
         A connected body of triangles is ground if it has a rim; is level rather than steep, or most of the scene;
@@ -69,6 +72,9 @@ class Ground:
         ----------
         scene : Scene
             World coordinates, metres.
+        radius_m : float, optional
+            Of a body: ground that it cannot get past, because something lies in every column that it can fly in, is
+            not looked for.
 
         Returns
         -------
@@ -81,10 +87,13 @@ class Ground:
         if not inside:
             return None
         own = [i.vertices[i.faces] for i in inside]
+        lowest = lowest_of(np.concatenate(own).reshape(-1, 9), plan)
+        bare = plan.places(np.isnan(lowest))
+        if radius_m is not None and not _within(bare, low, high, radius_m):
+            return None
         large = [k for k, i in enumerate(inside) if np.prod(np.ptp(i.bounds[:, :2], axis=0)) >= _LEAST_AREA_M2]
         if not large:
             return None
-        lowest = lowest_of(np.concatenate(own).reshape(-1, 9), plan)
         faces, corners = _welded(np.concatenate([own[k] for k in large]))
         body = _bodies(faces, len(corners))
         order = np.argsort(body, kind="stable")
@@ -106,7 +115,7 @@ class Ground:
         sheet = triangles[chosen]
         if not len(sheet) or np.isfinite(lowest_of(sheet, plan)).sum() < _COVER * all_columns:
             return None
-        return cls(sheet, _rim(faces[chosen], corners))
+        return cls(sheet, _rim(faces[chosen], corners), bare)
 
     @cached_property
     def _columns(self) -> ColumnIndex:
@@ -151,11 +160,12 @@ class Ground:
         -------
         (n, 9) float64
             Triangles, metres. None where the body cannot get past the rim: it lies outside the volume, nearer to its
-            bounds than the body, or ground of about the same height goes on beyond it.
+            bounds than the body, or ground of about the same height goes on beyond it; and none at all where
+            something lies in every column, for then the ground has its walls, if it has holes.
         """
-        inner_low, inner_high = low[:2] + radius_m, high[:2] - radius_m
-        if not len(self.rim) or (inner_low >= inner_high).any() or self._covers(inner_low, inner_high):
+        if not _within(self.bare, low, high, radius_m):
             return np.empty((0, 9))
+        inner_low, inner_high = low[:2] + radius_m, high[:2] - radius_m
         a, b, inwards = _pieces(self.rim, _PIECE_M)
         middle = (a + b) / 2
         near = ((np.minimum(a, b)[:, :2] < inner_high) & (np.maximum(a, b)[:, :2] > inner_low)).all(axis=1)
@@ -176,9 +186,10 @@ class Ground:
         c[:, 2], d[:, 2] = np.minimum(a[:, 2], floor), np.minimum(b[:, 2], floor)
         return np.concatenate([np.concatenate([a, b, c], axis=1), np.concatenate([b, d, c], axis=1)])
 
-    def _covers(self, low: Floats, high: Floats) -> bool:
-        plan = Plan.over(low, high, _COLUMN_M)
-        return bool(np.isfinite(lowest_of(self.triangles, plan)).all())
+
+def _within(places: Floats, low: Floats, high: Floats, radius_m: float) -> bool:
+    """Whether a body's centre can be over any of some places, (n, 2)."""
+    return bool(((places > low[:2] + radius_m) & (places < high[:2] - radius_m)).all(axis=1).any())
 
 
 def _reaches(bounds: Floats, low: Floats, high: Floats) -> bool:

@@ -40,7 +40,7 @@ class ClearanceGrid:
     cap_m : float
         Distances are known up to this.
     ground : Ground or None
-        The scene's ground where that is an open sheet.
+        The scene's ground where that is an open sheet that the body could get past.
     has_curtain : bool
         Whether the body could get below it but for the curtain.
     """
@@ -94,7 +94,7 @@ class ClearanceGrid:
         triangles = np.concatenate(parts) if parts else np.empty((0, 9))
         triangles = split_triangles(triangles, _LONGEST_EDGE_M, low - reach, high + reach)
         real, real_boxes = build_bvh(triangles)
-        ground = Ground.of(scene) if closed_ground else None
+        ground = Ground.of(scene, radius_m) if closed_ground else None
         curtain = np.empty((0, 9)) if ground is None else ground.curtain(low, high, radius_m)
         solid, boxes = real, real_boxes
         if len(curtain):
