@@ -201,18 +201,24 @@ def _reaches(bounds: Floats, low: Floats, high: Floats) -> bool:
 def _welded(triangles: Floats) -> tuple[Ints, Floats]:
     """Give triangles (n, 3, 3) common corners: faces (m, 3) without doubles and slivers, and corners (k, 3)."""
     points = triangles.reshape(-1, 3)
-    low = points.min(axis=0)
-    cells = np.round((points - low) / _WELD_M).astype(np.int64)
-    extent = cells.max(axis=0) + 1
-    key = (cells[:, 0] * extent[1] + cells[:, 1]) * extent[2] + cells[:, 2]
-    _, first, same = np.unique(key, return_index=True, return_inverse=True)
+    cells = np.round((points - points.min(axis=0)) / _WELD_M).astype(np.int64)
+    same = _numbered(*cells.T)
+    _, first = np.unique(same, return_index=True)
     faces = same.reshape(-1, 3)
     faces = faces[(faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])]
     # An open surface of an import is there twice, once from each side.
-    ordered = np.sort(faces, axis=1)
-    n = len(first)
-    _, once = np.unique((ordered[:, 0] * n + ordered[:, 1]) * n + ordered[:, 2], return_index=True)
+    _, once = np.unique(_numbered(*np.sort(faces, axis=1).T), return_index=True)
     return faces[np.sort(once)], points[first]
+
+
+def _numbered(*columns: Ints) -> Ints:
+    """Number rows of integers, (n,) each: equal rows alike, from 0 without gaps."""
+    number = np.zeros(len(columns[0]), np.int64)
+    for column in columns:
+        # Numbers instead of values, so that no product overflows however wide a scene is.
+        _, own = np.unique(column, return_inverse=True)
+        _, number = np.unique(number * (int(own.max(initial=0)) + 1) + own.reshape(-1), return_inverse=True)
+    return number.reshape(-1).astype(np.int64)
 
 
 def _bodies(faces: Ints, n: int) -> Ints:

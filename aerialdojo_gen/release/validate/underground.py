@@ -76,6 +76,8 @@ def _place(p: Floats) -> str:
 
 def _along(xyz: Floats, first: np.ndarray) -> tuple[Floats, np.ndarray]:
     """Points of polylines no further apart than the sample, and the pose that each comes after."""
+    # Poses that are no numbers are other checks' business.
+    xyz = np.where(np.isfinite(xyz), xyz, np.nan)
     step = np.zeros_like(xyz)
     step[:-1] = np.diff(xyz, axis=0)
     step[first[1:] - 1] = 0.0
