@@ -221,9 +221,13 @@ def test_validate_finds_what_is_planted_below_the_ground(surveyed, tmp_path):
 
     anchor = planted.edit("release/anchors", lambda a: a.update(z_m=under(a["x_m"], a["y_m"])))
     goal = planted.edit("routes/train", lambda r: r.update(goal_z_m=under(r["goal_x_m"], r["goal_y_m"])))
+
+    def middle(r: dict) -> tuple[int, float]:
+        k = len(r["z_m"]) // 2
+        return k, under(r["x_m"][k], r["y_m"][k])
+
     route = planted.edit(
-        "routes/test",
-        lambda r: r["z_m"].__setitem__(len(r["z_m"]) // 2, under(*(r[f"{a}_m"][len(r["z_m"]) // 2] for a in "xy"))),
+        "routes/test", lambda r: r["z_m"].__setitem__(*middle(r)), lambda r: 0.5 < middle(r)[1] < 20.0
     )
     found = check(planted, pipeline=pipeline)
     assert found["anchor_below_ground"] == [f"object_id={anchor['object_id']} anchor_id={anchor['anchor_id']}"]

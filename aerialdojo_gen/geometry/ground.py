@@ -52,7 +52,7 @@ class Ground:
     rim : (m, 9) float64
         Edges that one triangle alone has: their two ends, and that triangle's third corner.
     bare : (k, 2) float64
-        Where in the plan of the flight volume nothing of the scene lies, on a lattice, metres.
+        Where in the plan of the flight volume nothing of the scene lies, nor half a metre north and east, metres.
     """
 
     triangles: Floats
@@ -88,7 +88,9 @@ class Ground:
             return None
         own = [i.vertices[i.faces] for i in inside]
         lowest = lowest_of(np.concatenate(own).reshape(-1, 9), plan)
-        bare = plan.places(np.isnan(lowest))
+        empty = np.isnan(lowest)
+        # Four in a square: a body does not fit through a slit between two surfaces.
+        bare = plan.places(empty[:-1, :-1] & empty[1:, :-1] & empty[:-1, 1:] & empty[1:, 1:])
         if radius_m is not None and not _within(bare, low, high, radius_m):
             return None
         large = [k for k, i in enumerate(inside) if np.prod(np.ptp(i.bounds[:, :2], axis=0)) >= _LEAST_AREA_M2]

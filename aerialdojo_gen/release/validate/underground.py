@@ -45,7 +45,7 @@ def goal_below_ground(data: SceneData, rows: Rows) -> Iterator[Finding]:
     yield from _buried(data, rows.floats("goal_x_m", "goal_y_m", "goal_z_m"))
 
 
-@check("routes", needs=("mesh",), after=("list_lengths_differ",))
+@check("routes", needs=("mesh",), after=("list_lengths_differ", "out_of_bounds"))
 def route_below_ground(data: SceneData, _rows: Rows) -> Iterator[Finding]:
     """A route stays above the ground, between its poses too."""
     ground = _ground(data)
