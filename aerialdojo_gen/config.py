@@ -13,6 +13,7 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
+from aerialdojo_gen.agreement import disagreements
 from aerialdojo_gen.errors import ConfigError
 
 RendererName = Literal["gl", "pybullet"]
@@ -168,6 +169,14 @@ class Setting(Section):
     max_length_m: float = Field(gt=0, description="smallest length that is too long for it")
     action_budget: int = Field(ge=1, description="most actions an episode may take, Stop included")
 
+    @model_validator(mode="after")
+    def _has_room(self) -> Setting:
+        if self.min_length_m >= self.max_length_m:
+            raise ValueError(
+                f"min_length_m = {self.min_length_m:g} must be less than max_length_m = {self.max_length_m:g}"
+            )
+        return self
+
 
 class FilterConfig(Section):
     """Which candidates become tasks (paper, section on filtering)."""
@@ -185,6 +194,9 @@ class FilterConfig(Section):
             self.long_horizon.min_length_m,
         ):
             raise ValueError("the settings must join: base.max_length_m = standard.min_length_m, and so on")
+        budgets = (self.base.action_budget, self.standard.action_budget, self.long_horizon.action_budget)
+        if budgets != tuple(sorted(budgets)):
+            raise ValueError(f"longer routes need more actions: action_budget falls in {budgets}")
         return self
 
 
@@ -250,6 +262,13 @@ class Pipeline(Section):
     split: SplitConfig = SplitConfig()
     render: RenderConfig = RenderConfig()
 
+    @model_validator(mode="after")
+    def _sections_agree(self) -> Pipeline:
+        faults = disagreements(self)
+        if faults:
+            raise ValueError("; ".join(faults))
+        return self
+
     def section(self, stage: str) -> Section:
         """Return the section of a stage, by the stage's name (``"anchor-sample"``)."""
         section = getattr(self, stage.replace("-", "_"))
@@ -273,8 +292,8 @@ def load_pipeline(path: Path) -> Pipeline:
     Raises
     ------
     ConfigError
-        The file does not exist, is not TOML, has a key that does not exist or a value out of range; every
-        fault is named.
+        The file does not exist, is not TOML, has a key that does not exist, a value out of range, or sections that
+        contradict each other; every fault is named.
     """
     try:
         raw = tomllib.loads(path.read_text(encoding="utf-8"))
@@ -314,6 +333,10 @@ def explain(error: ValidationError, model: type[BaseModel]) -> list[str]:
     """
     lines = []
     for fault in error.errors():
+        if not fault["loc"]:
+            # Of the whole: what it says names its keys itself.
+            lines += str(fault["ctx"]["error"]).split("; ") if "ctx" in fault else [fault["msg"]]
+            continue
         *where, last = [str(part) for part in fault["loc"]] or [""]
         table = f"[{'.'.join(where)}] " if where else ""
         if fault["type"] == "extra_forbidden":
@@ -347,7 +370,7 @@ def with_overrides(pipeline: Pipeline, stage: str, **values: Any) -> Pipeline:
     Raises
     ------
     ConfigError
-        A value is out of range.
+        A value is out of range, or contradicts another section's.
     """
     section = pipeline.section(stage)
     given = {key: value for key, value in values.items() if value is not None}
@@ -355,4 +378,8 @@ def with_overrides(pipeline: Pipeline, stage: str, **values: Any) -> Pipeline:
         changed = type(section).model_validate(section.model_dump() | given)
     except ValidationError as error:
         raise ConfigError("; ".join(explain(error, type(section)))) from None
-    return pipeline.model_copy(update={stage.replace("-", "_"): changed})
+    whole = pipeline.model_copy(update={stage.replace("-", "_"): changed})
+    faults = disagreements(whole)
+    if faults:
+        raise ConfigError("; ".join(faults))
+    return whole

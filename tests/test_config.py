@@ -72,3 +72,57 @@ def test_overrides_replace_only_what_is_given(tmp_path):
     assert with_overrides(pipeline, "render", sampling="time").render.sampling == "time"
     with pytest.raises(ConfigError, match="sampling"):
         with_overrides(pipeline, "render", sampling="tiem")
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("[embodiment]\nradius_m = 0.1\n", r"wheelbase_m = 0.25 must be at most twice radius_m = 0.1"),
+        ("[anchor-sample]\nstandoff_m = 0.3\n", r"standoff_m = 0.3 must be more than .* = 0.3: every anchor"),
+        ("[embodiment]\nradius_m = 1.2\n", r"standoff_m = 1 must be more than \[embodiment\] radius_m"),
+        ("[plan]\nmargin_m = 0.06\n", r"margin_m = 0.05 must be at least \[plan\] margin_m .* = 0.06"),
+        ("[anchor-sample]\nmargin_m = 0\n", r"margin_m = 0 must be at least \[plan\] margin_m .* = 0.002"),
+        ("[plan]\nclearance_cap_m = 0.25\n", r"clearance_cap_m = 0.25 must be more than .* = 0.272"),
+        ("[filter]\nmin_euclidean_m = 2\n", r"\[pair-objects\] min_euclidean_m = 3 must be at most .* = 2"),
+        (
+            "[filter]\nlong_horizon = { min_length_m = 60, max_length_m = 120, action_budget = 300 }\n",
+            r"\[pair-objects\] max_length_m = 100 must be at least .* = 120.*; .*"
+            r"\[plan\] max_length_m = 100 must be at least .* = 120",
+        ),
+        ("[plan]\nmin_detour_ratio = 1.2\n", r"\[plan\] min_detour_ratio = 1.2 must be at most .* = 1.05"),
+        ("[pair-objects]\nmax_approach_m = 0.5\n", r"\[plan\] max_approach_m = 1 must be at most .* = 0.5"),
+        (
+            "[plan]\nmax_approach_m = 2\n[pair-objects]\nmax_approach_m = 2\n",
+            r"\[plan\] max_approach_m = 2 must be at most 1: agents cannot fly the Approach",
+        ),
+        (
+            "[filter]\nmin_euclidean_m = 2\n[pair-objects]\nmin_euclidean_m = 2\n",
+            r"min_euclidean_m = 2 must be at least the success radius, 3",
+        ),
+        ("[render]\nfov_deg = 75\n", r"fov_deg differs: \[anchor-sample\] 90, .* 90, \[render\] 75"),
+        (
+            "[filter]\nbase = { min_length_m = 40, max_length_m = 30, action_budget = 90 }\n",
+            "min_length_m = 40 must be less than max_length_m = 30",
+        ),
+        (
+            "[filter]\nbase = { min_length_m = 5, max_length_m = 30, action_budget = 200 }\n",
+            "action_budget falls in",
+        ),
+    ],
+)
+def test_sections_that_contradict_each_other(tmp_path, text, message):
+    with pytest.raises(ConfigError, match=message) as error:
+        load_pipeline(write(tmp_path, text))
+    assert "\n" not in str(error.value)
+    assert "p.toml: " in str(error.value)
+
+
+def test_an_override_may_not_contradict_the_file(tmp_path):
+    pipeline = load_pipeline(write(tmp_path, ""))
+    with pytest.raises(ConfigError, match=r"^\[plan\] max_length_m = 50 must be at least"):
+        with_overrides(pipeline, "plan", max_length_m=50.0)
+
+
+def test_stricter_stages_later_on_are_no_contradiction(tmp_path):
+    text = "[filter]\nmin_euclidean_m = 6\nmin_detour_ratio = 1.3\n[embodiment]\nradius_m = 0.2\nwheelbase_m = 0.3\n"
+    assert load_pipeline(write(tmp_path, text)).filter.min_euclidean_m == 6

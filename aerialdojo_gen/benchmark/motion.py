@@ -60,7 +60,8 @@ class FlightSpace:
     def __init__(self, scene: Scene, radius_m: float, world: CollisionWorld | None = None) -> None:
         self.scene = scene
         self.radius_m = radius_m
-        self.grid = ClearanceGrid.build(scene, radius_m=radius_m)
+        # An episode ends by a touch, and below open ground there is none.
+        self.grid = ClearanceGrid.build(scene, radius_m=radius_m, closed_ground=False)
         self._arrays = self.grid.arrays
         self._world = world
 

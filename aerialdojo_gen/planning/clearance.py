@@ -1,4 +1,8 @@
-"""The clearance grid of a scene: how far the nearest surface is, and what is connected with the open sky."""
+"""The clearance grid of a scene: how far the nearest surface is, and what is connected with the open sky.
+
+Where the ground is an open sheet, the body is kept from below it: a curtain closes the sheet at its rim, as walls
+would.
+"""
 
 from __future__ import annotations
 
@@ -7,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from aerialdojo_gen.geometry.ground import Ground
 from aerialdojo_gen.planning.bvh import build_bvh, crossings_above, point_distance
 from aerialdojo_gen.planning.connectivity import connected_with_ceiling, linked_cell, passable_moves
 from aerialdojo_gen.planning.distance_field import build_distance_field
@@ -34,6 +39,10 @@ class ClearanceGrid:
         The body's radius, with the planner's margin.
     cap_m : float
         Distances are known up to this.
+    ground : Ground or None
+        The scene's ground where that is an open sheet that the body could get past.
+    has_curtain : bool
+        Whether the body could get below it but for the curtain.
     """
 
     arrays: GridArrays
@@ -41,6 +50,8 @@ class ClearanceGrid:
     sky: NDArray[np.bool_]
     radius_m: float
     cap_m: float
+    ground: Ground | None = None
+    has_curtain: bool = False
 
     @classmethod
     def build(
@@ -51,6 +62,7 @@ class ClearanceGrid:
         band_m: float = 1.0,
         cap_m: float = 5.0,
         margin_m: float = 0.0,
+        closed_ground: bool = True,
     ) -> ClearanceGrid:
         """Build the grid over a scene's flight volume.
 
@@ -68,6 +80,8 @@ class ClearanceGrid:
             The field is never above this.
         margin_m : float
             Added to the radius against surfaces, not against the bounds of the flight volume.
+        closed_ground : bool
+            Keep the body from below open ground; False knows surfaces alone.
 
         Returns
         -------
@@ -78,12 +92,24 @@ class ClearanceGrid:
         reach = cap_m + 1.0
         parts = [i.vertices[i.faces].reshape(-1, 9) for i in scene.instances]
         triangles = np.concatenate(parts) if parts else np.empty((0, 9))
-        triangles, boxes = build_bvh(split_triangles(triangles, _LONGEST_EDGE_M, low - reach, high + reach))
+        triangles = split_triangles(triangles, _LONGEST_EDGE_M, low - reach, high + reach)
+        real, real_boxes = build_bvh(triangles)
+        ground = Ground.of(scene, radius_m) if closed_ground else None
+        curtain = np.empty((0, 9)) if ground is None else ground.curtain(low, high, radius_m)
+        solid, boxes = real, real_boxes
+        if len(curtain):
+            curtain = split_triangles(curtain, _LONGEST_EDGE_M, low - reach, high + reach)
+            solid, boxes = build_bvh(np.concatenate([triangles, curtain]))
         nx, ny, nz = (max(1, int(n)) for n in np.ceil((high - low) / cell_m - 1e-9))
-        field = build_distance_field(triangles, low, (nx, ny, nz), cell_m, band_m, cap_m)
-        arrays = GridArrays(field, low.copy(), cell_m, triangles, boxes, low + radius_m, high - radius_m)
+        # The bound beyond the band needs half a diagonal of a cell, however large cells are.
+        band_m = max(band_m, 0.87 * cell_m)
+        field = build_distance_field(solid, low, (nx, ny, nz), cell_m, band_m, cap_m)
+        arrays = GridArrays(
+            field, low.copy(), cell_m, solid, boxes, real, real_boxes, low + radius_m, high - radius_m
+        )
         moves = passable_moves(arrays, radius_m + margin_m)
-        return cls(arrays, moves, connected_with_ceiling(moves), radius_m + margin_m, cap_m)
+        sky = connected_with_ceiling(moves)
+        return cls(arrays, moves, sky, radius_m + margin_m, cap_m, ground, len(curtain) > 0)
 
     def distance_m(self, p: ArrayLike) -> float:
         """Exact distance from a point to the nearest surface, up to `cap_m`; metres.
@@ -94,7 +120,7 @@ class ClearanceGrid:
             World frame, metres.
         """
         x, y, z = np.asarray(p, np.float64)
-        return float(point_distance(x, y, z, self.cap_m, self.arrays.tri, self.arrays.boxes))
+        return float(point_distance(x, y, z, self.cap_m, self.arrays.real_tri, self.arrays.real_boxes))
 
     def in_collision(self, p: ArrayLike) -> bool:
         """Whether the body cannot be at a point: it would touch a surface, leave the bounds, or sit in a solid.
@@ -107,17 +133,20 @@ class ClearanceGrid:
         Returns
         -------
         bool
-            True for a collision. A point that cannot reach the sky counts as inside a solid if a ray straight up
-            leaves more surfaces than it enters; the air in a sealed room is no collision.
+            True for a collision. A point that cannot reach the sky counts as inside a solid if it is below open
+            ground, or if a ray straight up leaves more surfaces than it enters; the air in a sealed room is no
+            collision.
         """
         x, y, z = np.asarray(p, np.float64)
         a = self.arrays
         if not inside(x, y, z, a.lower, a.upper) or self.distance_m(p) <= self.radius_m:
             return True
-        return not self.reachable(p) and crossings_above(x, y, z, a.tri, a.boxes) > 0
+        return not self.reachable(p) and (
+            self.below_ground(p) or crossings_above(x, y, z, a.real_tri, a.real_boxes) > 0
+        )
 
     def reachable(self, p: ArrayLike) -> bool:
-        """Whether the body can be at a point and fly from there to the ceiling.
+        """Whether the body can be at a point above ground and fly from there to the ceiling.
 
         Parameters
         ----------
@@ -125,9 +154,13 @@ class ClearanceGrid:
             World frame, metres.
         """
         x, y, z = np.asarray(p, np.float64)
-        if not inside(x, y, z, self.arrays.lower, self.arrays.upper):
+        if not inside(x, y, z, self.arrays.lower, self.arrays.upper) or self.below_ground(p):
             return False
         return bool(linked_cell(x, y, z, self.radius_m, self.sky, self.arrays))
+
+    def below_ground(self, points: ArrayLike) -> bool:
+        """Whether any of some points, (n, 3) float metres, lies below open ground; (3,) is one."""
+        return self.ground is not None and bool(self.ground.below(points).any())
 
     def segment_proven_free(self, p: ArrayLike, q: ArrayLike, radius_m: float) -> bool:
         """Whether the grid alone proves that a ball moving from `p` to `q` touches nothing; False is undecided.

@@ -52,10 +52,12 @@ def _passable(
     moves: NDArray[np.uint32], i: int, j: int, k: int, m: int, radius: float, grid: GridArrays
 ) -> bool:  # fmt: skip
     """Whether a move that the field cannot vouch for is passable."""
-    if _PARTS[m, 0] >= 0 and _composed(moves, i, j, k, m):
-        return True
-    if 4 <= m < 8:
-        return False
+    # The middle of a square of cells is half a cell from both ways round it: a thinner body leaves room for a pole.
+    if 2.0 * radius >= grid.cell:
+        if _PARTS[m, 0] >= 0 and _composed(moves, i, j, k, m):
+            return True
+        if 4 <= m < 8:
+            return False
     x, y, z = cell_centre(i, j, k, grid)
     u, v, w = cell_centre(i + MOVES[m, 0], j + MOVES[m, 1], k + MOVES[m, 2], grid)
     return segment_free(x, y, z, u, v, w, radius, grid, False)
@@ -65,9 +67,9 @@ def _passable(
 def passable_moves(grid: GridArrays, radius: float) -> NDArray[np.uint32]:
     """Find the moves that the body can make from every cell.
 
-    Axis moves are exact. A diagonal or knight's move is passable where both ways round it are, for what is left
-    between them is too small to hold a surface that keeps its distance from both; another diagonal is passable
-    where the triangles say so.
+    Axis moves are exact. A diagonal or knight's move of a body at least as wide as a cell is passable where both ways
+    round it are, for what is left between them is too small to hold a surface that keeps its distance from both;
+    another diagonal is passable where the triangles say so. A thinner body's moves are all exact.
 
     Parameters
     ----------

@@ -8,6 +8,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from aerialdojo_gen.planning.triangles import point_triangle_d2
+
 # float32 rounds either way: take off more than it can add, so that a bound stays a bound.
 _ROUNDING_M = 1e-5
 
@@ -76,44 +78,98 @@ def _splat(
 
 
 @njit(cache=True)
-def _beyond(field: NDArray[np.float32], cell: float, band: float, cap: float) -> None:
+def _seed_around(
+    tri: NDArray[np.float64],
+    origin: NDArray[np.float64],
+    cell: float,
+    before: NDArray[np.int64],
+    n: NDArray[np.int64],
+    seeds: NDArray[np.bool_],
+) -> None:
+    """Mark the cells around the grid of `n` cells that hold a surface point, and some whose centre is as near to one.
+
+    `seeds` begins `before` cells below the grid's first one, and is as large as there are cells that matter.
+    """
+    half2 = 0.75 * cell * cell
+    low, high, at = np.empty(3, np.int64), np.empty(3, np.int64), np.empty(3, np.int64)
+    for t in range(tri.shape[0]):
+        within = True
+        for a in range(3):
+            least = min(tri[t, a], tri[t, a + 3], tri[t, a + 6]) - origin[a]
+            most = max(tri[t, a], tri[t, a + 3], tri[t, a + 6]) - origin[a]
+            within = within and least >= 0.0 and most <= n[a] * cell
+            low[a] = max(0, math.floor(least / cell) + before[a])
+            high[a] = min(seeds.shape[a] - 1, math.floor(most / cell) + before[a])
+        if within:
+            continue
+        for i in range(low[0], high[0] + 1):
+            at[0] = i - before[0]
+            for j in range(low[1], high[1] + 1):
+                at[1] = j - before[1]
+                flat = 0 <= at[0] < n[0] and 0 <= at[1] < n[1]
+                for k in range(low[2], high[2] + 1):
+                    at[2] = k - before[2]
+                    if seeds[i, j, k] or (flat and 0 <= at[2] < n[2]):
+                        continue
+                    x, y, z = (
+                        origin[0] + (at[0] + 0.5) * cell,
+                        origin[1] + (at[1] + 0.5) * cell,
+                        origin[2] + (at[2] + 0.5) * cell,
+                    )
+                    seeds[i, j, k] = point_triangle_d2(x, y, z, tri, t) <= half2 * (1.0 + 1e-6)
+
+
+@njit(cache=True)
+def _beyond(
+    field: NDArray[np.float32],
+    cell: float,
+    band: float,
+    cap: float,
+    seeds: NDArray[np.bool_],
+    before: NDArray[np.int64],
+) -> None:
     """Turn squared distances into distances, and fill in lower bounds where the band ends.
 
     The cell that holds the nearest surface point has its centre within half a cell's diagonal of it: so a cell's
-    distance is at least that to the nearest such cell, less half a diagonal.
+    distance is at least that to the nearest such cell, less half a diagonal. `seeds` are such cells, those around
+    the grid included: it begins `before` cells below the grid's first one.
     """
     nx, ny, nz = field.shape
+    mx, my, mz = seeds.shape
+    bx, by, bz = before[0], before[1], before[2]
     half = cell * math.sqrt(3.0) / 2
     reach = math.ceil((cap + half) / cell) + 1
     far = np.float32(1e6)
     # Distances in cells, squared, one axis after the other (separable Euclidean distance transform).
-    along_z = np.empty((nx, ny, nz), np.float32)
-    for i in range(nx):
-        for j in range(ny):
+    along_z = np.empty((mx, my, nz), np.float32)
+    for i in range(mx):
+        for j in range(my):
             last = -100000
-            for k in range(nz):
-                if field[i, j, k] <= half * half:
+            for k in range(mz):
+                if seeds[i, j, k]:
                     last = k
-                along_z[i, j, k] = min(far, np.float32((k - last) * (k - last)))
+                if bz <= k < bz + nz:
+                    along_z[i, j, k - bz] = min(far, np.float32((k - last) * (k - last)))
             last = 100000
-            for k in range(nz - 1, -1, -1):
-                if field[i, j, k] <= half * half:
+            for k in range(mz - 1, -1, -1):
+                if seeds[i, j, k]:
                     last = k
-                along_z[i, j, k] = min(along_z[i, j, k], np.float32(min(1e6, (last - k) * (last - k))))
-    along_y = np.empty((nx, ny, nz), np.float32)
-    for i in range(nx):
+                if bz <= k < bz + nz:
+                    along_z[i, j, k - bz] = min(along_z[i, j, k - bz], np.float32(min(1e6, (last - k) * (last - k))))
+    along_y = np.empty((mx, ny, nz), np.float32)
+    for i in range(mx):
         for j in range(ny):
-            along_y[i, j] = along_z[i, j]
-            for m in range(max(0, j - reach), min(ny, j + reach + 1)):
-                add = np.float32((m - j) * (m - j))
+            along_y[i, j] = along_z[i, j + by]
+            for m in range(max(0, j + by - reach), min(my, j + by + reach + 1)):
+                add = np.float32((m - j - by) * (m - j - by))
                 for k in range(nz):
                     along_y[i, j, k] = min(along_y[i, j, k], along_z[i, m, k] + add)
     row = np.empty(nz, np.float32)
     for i in range(nx):
         for j in range(ny):
             row[:] = far
-            for m in range(max(0, i - reach), min(nx, i + reach + 1)):
-                add = np.float32((m - i) * (m - i))
+            for m in range(max(0, i + bx - reach), min(mx, i + bx + reach + 1)):
+                add = np.float32((m - i - bx) * (m - i - bx))
                 for k in range(nz):
                     row[k] = min(row[k], along_y[m, j, k] + add)
             for k in range(nz):
@@ -122,6 +178,37 @@ def _beyond(field: NDArray[np.float32], cell: float, band: float, cap: float) ->
                 else:
                     bound = max(band, math.sqrt(row[k]) * cell - half)
                     field[i, j, k] = min(bound, cap) - _ROUNDING_M
+
+
+def _seeds(
+    triangles: NDArray[np.float64], origin: NDArray[np.float64], field: NDArray[np.float32], cell: float, cap: float
+) -> tuple[NDArray[np.bool_], NDArray[np.int64]]:
+    """Cells of the grid and, as far as surfaces reach, around it that are near enough to one to hold its points.
+
+    Returns
+    -------
+    seeds : (mx, my, mz) bool
+    before : (3,) int64
+        How many cells it begins below the grid's first one.
+    """
+    half = cell * math.sqrt(3.0) / 2
+    n = np.array(field.shape, np.int64)
+    # In float32 the corners of a cell may seem a little further from its centre.
+    near = field <= half * half * (1.0 + 1e-6)
+    if not len(triangles):
+        return near, np.zeros(3, np.int64)
+    corners = (triangles.reshape(-1, 3) - origin) / cell
+    # What is further out than the cap is of no matter.
+    most = math.ceil((cap + half) / cell) + 1
+    before = np.clip(np.ceil(-corners.min(axis=0)), 0, most).astype(np.int64)
+    after = np.clip(np.floor(corners.max(axis=0)) + 1 - n, 0, most).astype(np.int64)
+    if not (before.any() or after.any()):
+        return near, before
+    seeds = np.zeros(tuple(before + n + after), np.bool_)
+    inner = tuple(slice(b, b + m) for b, m in zip(before.tolist(), n.tolist(), strict=True))
+    seeds[inner] = near
+    _seed_around(triangles, np.asarray(origin, np.float64), cell, before, n, seeds)
+    return seeds, before
 
 
 def build_distance_field(
@@ -137,7 +224,7 @@ def build_distance_field(
     Parameters
     ----------
     triangles : (n, 9) float64
-        Metres, world frame.
+        Metres, world frame; those around the grid count too.
     origin : (3,) float64
         Lower corner of the grid; the centre of cell (i, j, k) is ``origin + (i + 0.5, j + 0.5, k + 0.5) * cell_m``.
     shape : tuple of int
@@ -163,5 +250,5 @@ def build_distance_field(
         raise ValueError(f"band_m = {band_m} is less than half the diagonal of a cell of {cell_m} m")
     field = np.full(shape, np.float32(4e12))
     _splat(triangles, origin, cell_m, band_m, field)
-    _beyond(field, cell_m, band_m, cap_m)
+    _beyond(field, cell_m, band_m, cap_m, *_seeds(triangles, origin, field, cell_m, cap_m))
     return field

@@ -27,7 +27,10 @@ class GridArrays(NamedTuple):
     cell : float
         Edge of a cell, metres.
     tri, boxes : arrays
-        Triangles and their tree (`aerialdojo_gen.planning.bvh.build_bvh`).
+        Triangles that stop a body and their tree (`aerialdojo_gen.planning.bvh.build_bvh`): the scene's surfaces, and
+        the curtain that closes open ground at its rim.
+    real_tri, real_boxes : arrays
+        The surfaces alone, for distances that are told; the same arrays where there is no curtain.
     lower, upper : (3,) float64
         Where the body's centre may be, metres.
     """
@@ -37,6 +40,8 @@ class GridArrays(NamedTuple):
     cell: float
     tri: NDArray[np.float64]
     boxes: NDArray[np.float64]
+    real_tri: NDArray[np.float64]
+    real_boxes: NDArray[np.float64]
     lower: NDArray[np.float64]
     upper: NDArray[np.float64]
 
@@ -191,7 +196,7 @@ def polyline_clearance(points: NDArray[np.float64], bound: float, grid: GridArra
         n += _pieces(points, i, longest)
     if n == 0:
         p = points[last]
-        return point_distance(p[0], p[1], p[2], bound, grid.tri, grid.boxes)
+        return point_distance(p[0], p[1], p[2], bound, grid.real_tri, grid.real_boxes)
     ends, least = np.empty((n, 6)), np.empty(n)
     k = 0
     for i in range(last):
@@ -210,7 +215,7 @@ def polyline_clearance(points: NDArray[np.float64], bound: float, grid: GridArra
         if least[k] >= best:
             break
         e = ends[k]
-        best = segment_distance(e[0], e[1], e[2], e[3], e[4], e[5], best, grid.tri, grid.boxes)
+        best = segment_distance(e[0], e[1], e[2], e[3], e[4], e[5], best, grid.real_tri, grid.real_boxes)
     return best
 
 

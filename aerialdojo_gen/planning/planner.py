@@ -156,6 +156,9 @@ class Planner:
             if tried.status != FOUND:
                 continue
             certificate = conclude(tried.seen, self.radius_m, self.world, c.prove_by_grid)
+            # A curtain hangs from the rim; a tear in the floor of a cave, say, has none.
+            if g.has_curtain and g.below_ground(tried.poses[:, :3]):
+                continue
             if certificate.collision_free:
                 return Route(
                     "SOLVED", tried.poses, tried.actions, tried.length, expansions, certificate.min_clearance_m,

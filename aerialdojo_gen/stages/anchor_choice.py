@@ -81,6 +81,8 @@ def judge_anchor(
     if clearance < radius + config.margin_m:
         faults.append(f"it is in collision: the nearest surface is {clearance:.2f} m away, the body needs "
                       f"{radius + config.margin_m:.2f} m")  # fmt: skip
+    elif inside and world.free.below_ground(position_m):
+        faults.append("it is below the ground")
     elif inside and not world.free.reachable(position_m):
         faults.append("no way leads there from the open sky")
     distance = float(surface.distance_m(place)[0])

@@ -37,12 +37,12 @@ def run(job: Job, config: AnchorSampleConfig) -> Output:
     A candidate lies `standoff_m` from the object's surface (its mesh, not its box) and faces its centroid in yaw. It
     goes through these tests, and is counted under the first that it fails: ``no_surface`` (its line comes nowhere
     near the surface), ``out_of_bounds`` (the body leaves the flight volume), ``in_collision`` (a surface within
-    the body's radius plus `margin_m`), ``unreachable`` (no way from the open sky: inside a closed room),
-    ``not_visible`` (visible fraction below `min_visible_fraction`), ``not_shortlisted`` (`shortlist` others show the
-    object better, or from a side of their own). Ray casts to points of its surface put the visible ones in order; the
-    best `pictured`, from different sides, are pictured and scored (`aerialdojo_gen.scoring`). The best of those,
-    again from different sides, are the object's anchors, and the best of all is selected, or the one that a person
-    chose, which then comes first.
+    the body's radius plus `margin_m`), ``unreachable`` (no way from the open sky: inside a closed room, or below
+    ground that is an open sheet), ``not_visible`` (visible fraction below `min_visible_fraction`),
+    ``not_shortlisted`` (`shortlist` others show the object better, or from a side of their own). Ray casts to points
+    of its surface put the visible ones in order; the best `pictured`, from different sides, are pictured and scored
+    (`aerialdojo_gen.scoring`). The best of those, again from different sides, are the object's anchors, and the best
+    of all is selected, or the one that a person chose, which then comes first.
 
     Parameters
     ----------

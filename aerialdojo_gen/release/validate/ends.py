@@ -7,6 +7,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from aerialdojo_gen.agreement import NEAR_GOAL_M
 from aerialdojo_gen.geometry.frames import wrap_angle_rad
 from aerialdojo_gen.planning.primitives import TURN_RAD, replay
 from aerialdojo_gen.release.validate.links import sound
@@ -18,7 +19,6 @@ _SAME_M = 1e-6
 _SAME_RAD = 1e-6
 # A replay adds up a few hundred rounded steps; what it may be off by stands in the README.
 _REPLAY = 1e-5
-_NEAR_GOAL_M = 1.0
 _POSE = ("x_m", "y_m", "z_m", "yaw_rad")
 
 
@@ -86,8 +86,8 @@ def stops_far(data: SceneData, _rows: Rows) -> Iterator[Finding]:
     # The replay is the stored poses by the check above: the Approach is all that it leaves out.
     last -= paths.action[last - 1] == APPROACH
     off = np.linalg.norm(paths.xyz[last] - anchor[:, :3], axis=1)
-    for k in np.flatnonzero(off > _NEAR_GOAL_M + _REPLAY):
-        yield Finding(int(paths.rows[rows[k]]), f"{off[k]:.3f} m from the anchor", f"{_NEAR_GOAL_M:g} m at most")
+    for k in np.flatnonzero(off > NEAR_GOAL_M + _REPLAY):
+        yield Finding(int(paths.rows[rows[k]]), f"{off[k]:.3f} m from the anchor", f"{NEAR_GOAL_M:g} m at most")
 
 
 def _anchor_poses(data: SceneData, anchor_of_route: Ints) -> tuple[Ints, Floats]:

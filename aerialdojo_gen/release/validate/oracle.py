@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from aerialdojo_gen.benchmark.flight import SUCCESS_RADIUS_M
+from aerialdojo_gen.agreement import SUCCESS_RADIUS_M
 from aerialdojo_gen.benchmark.motion import FlightSpace
 from aerialdojo_gen.benchmark.oracle import LEAST_SPL, Reference, fly, shortcoming
 from aerialdojo_gen.release.validate.registry import ALWAYS_AFTER, Finding, check

@@ -23,6 +23,7 @@ from aerialdojo_gen.release.validate import (
     meshes,
     oracle,
     tables,
+    underground,
 )
 from aerialdojo_gen.release.validate.counts import Tally, scene_counts, tally_of, whole_counts
 from aerialdojo_gen.release.validate.parts import foreign_files, read_tables, release_tables, scenes_of
@@ -31,7 +32,7 @@ from aerialdojo_gen.release.validate.report import Report
 from aerialdojo_gen.release.validate.rows import SceneData
 
 # A check looks at what those before it found fault with, so that their order is fixed here.
-_MODULES = (tables, geometry, leaks, links, ends, meshes, anchors, collisions, oracle, images)
+_MODULES = (tables, geometry, leaks, links, ends, meshes, anchors, collisions, underground, oracle, images)
 SCENE_CHECKS = tuple(one for module in _MODULES for one in CHECKS if one.run.__module__ == module.__name__)
 
 

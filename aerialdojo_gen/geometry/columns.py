@@ -1,0 +1,289 @@
+"""Where plumb lines meet triangles: over a lattice of columns at once, or at any point of the plan."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+# Where in its cell a column stands: not on the edges and diagonals that meshes on round coordinates have.
+_AT = (0.4371, 0.5573)
+_SAME_HEIGHT_M = 1e-3
+_SAME_LAYER_M = 0.01
+_OWN_LAYER_M = 0.05
+_BIN_M = 2.0
+_MOST_BINS = 1000
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """A lattice of columns over a rectangle.
+
+    Attributes
+    ----------
+    low : (2,) float64
+        Its corner, metres, world frame.
+    step_m : float
+        From a column to the next one.
+    shape : tuple of int
+        Columns along x and y.
+    """
+
+    low: Floats
+    step_m: float
+    shape: tuple[int, int]
+
+    @classmethod
+    def over(cls, low: Floats, high: Floats, step_m: float) -> Plan:
+        """Lay columns over a rectangle, (2,) float64 corners in metres; one column at least along each axis."""
+        nx, ny = (max(1, math.ceil(v / step_m)) for v in (high - low))
+        return cls(np.asarray(low, np.float64), step_m, (nx, ny))
+
+    def places(self, chosen: NDArray[np.bool_]) -> Floats:
+        """Places in plan of columns that are marked in a (nx, ny) array, (n, 2) float64, metres."""
+        return self.low + (np.argwhere(chosen) + np.array(_AT)) * self.step_m
+
+
+def lowest_of(triangles: Floats, plan: Plan) -> Floats:
+    """Find the lowest point of triangles, (n, 9), in every column of a plan: float64 metres, NaN where is none."""
+    found = np.full(plan.shape, np.inf)
+    _lower(np.ascontiguousarray(triangles), plan.low[0], plan.low[1], plan.step_m, found)
+    found[np.isinf(found)] = np.nan
+    return found
+
+
+def shares_of(triangles: Floats, body: Ints, n: int, lowest: Floats, plan: Plan) -> tuple[Ints, Ints, Ints]:
+    """Count columns of bodies.
+
+    Parameters
+    ----------
+    triangles : (k, 9) float64
+        Metres, body by body.
+    body : (k,) int64
+        What body they belong to, 0 to n - 1, ascending.
+    n : int
+        Number of bodies.
+    lowest : (nx, ny) float64
+        What `lowest_of` returns for a whole scene.
+    plan : Plan
+
+    Returns
+    -------
+    covered, single, bottom : (n,) int64
+        Columns that meet the body; that meet it once; in which nothing lies lower than it.
+    """
+    counts = np.zeros((3, n), np.int64)
+    _count(np.ascontiguousarray(triangles), body, plan.low[0], plan.low[1], plan.step_m, lowest, counts)
+    return counts[0], counts[1], counts[2]
+
+
+@dataclass(frozen=True, eq=False)
+class ColumnIndex:
+    """Triangles by the squares of the plan that they lie over.
+
+    Attributes
+    ----------
+    triangles : (n, 9) float64
+    low : (2,) float64
+        Corner of the first square, metres.
+    bin_m : float
+        Edge of a square.
+    shape : tuple of int
+        Squares along x and y.
+    first : (nx * ny + 1,) int64
+        Where each square's triangles begin in `member`.
+    member : (m,) int64
+        Rows of `triangles`.
+    """
+
+    triangles: Floats
+    low: Floats
+    bin_m: float
+    shape: tuple[int, int]
+    first: Ints
+    member: Ints
+
+    @classmethod
+    def of(cls, triangles: Floats) -> ColumnIndex:
+        """Sort triangles, (n, 9) float64, at least one."""
+        t = np.ascontiguousarray(triangles)
+        corners = t.reshape(-1, 3, 3)[:, :, :2]
+        low, high = corners.min(axis=(0, 1)), corners.max(axis=(0, 1))
+        bin_m = max(_BIN_M, float((high - low).max()) / _MOST_BINS)
+        nx, ny = (int(v / bin_m) + 1 for v in high - low)
+        first = np.zeros(nx * ny + 1, np.int64)
+        _fill(t, low[0], low[1], bin_m, nx, ny, first[1:], np.empty(0, np.int64))
+        first = np.cumsum(first)
+        member = np.empty(int(first[-1]), np.int64)
+        _fill(t, low[0], low[1], bin_m, nx, ny, first[:-1].copy(), member)
+        return cls(t, low, bin_m, (nx, ny), first, member)
+
+    def lowest_m(self, xy: Floats) -> Floats:
+        """Height of the lowest triangle at points in plan, (n, 2) float64; (n,) float64 metres, NaN where is none."""
+        return np.asarray(
+            _lowest_at(
+                np.ascontiguousarray(xy), self.triangles, self.low[0], self.low[1], self.bin_m, self.shape[0],
+                self.shape[1], self.first, self.member,
+            )
+        )  # fmt: skip
+
+    def layers(self, points: Floats) -> tuple[Ints, Floats, Floats]:
+        """Look at the triangles in the columns of points.
+
+        Parameters
+        ----------
+        points : (n, 3) float64
+            Metres, world frame.
+
+        Returns
+        -------
+        below : (n,) int64
+            Layers lower than the point by more than 5 cm; what lies within a centimetre is one layer.
+        next_m : (n,) float64
+            Height of the highest of them, NaN where is none.
+        away_m : (n,) float64
+            Height of the layer nearest to the point above it, negative below it; infinite where is none.
+        """
+        n = len(points)
+        below, next_m, away_m = np.zeros(n, np.int64), np.full(n, np.nan), np.full(n, np.inf)
+        _look(
+            np.ascontiguousarray(points), self.triangles, self.low[0], self.low[1], self.bin_m, self.shape[0],
+            self.shape[1], self.first, self.member, below, next_m, away_m,
+        )  # fmt: skip
+        return below, next_m, away_m
+
+
+@njit(cache=True, inline="always")
+def _height(x: float, y: float, t: Floats, k: int) -> float:
+    """Height of triangle k above a point of the plan; NaN beside it, and for one that stands upright."""
+    ax, ay = t[k, 0] - x, t[k, 1] - y
+    bx, by = t[k, 3] - x, t[k, 4] - y
+    cx, cy = t[k, 6] - x, t[k, 7] - y
+    u, v, w = bx * cy - by * cx, cx * ay - cy * ax, ax * by - ay * bx
+    if not ((u >= 0.0 and v >= 0.0 and w >= 0.0) or (u <= 0.0 and v <= 0.0 and w <= 0.0)):
+        return np.nan
+    area = u + v + w
+    if area == 0.0:
+        return np.nan
+    return (u * t[k, 2] + v * t[k, 5] + w * t[k, 8]) / area
+
+
+@njit(cache=True, inline="always")
+def _span(a: float, b: float, c: float, low: float, step: float, at: float, n: int) -> tuple[int, int]:
+    """First and last column along an axis that a triangle can meet."""
+    first = math.ceil((min(a, b, c) - low) / step - at)
+    last = math.floor((max(a, b, c) - low) / step - at)
+    return max(0, first), min(n - 1, last)
+
+
+@njit(cache=True)
+def _lower(t: Floats, x0: float, y0: float, step: float, found: Floats) -> None:
+    nx, ny = found.shape
+    for k in range(t.shape[0]):
+        i0, i1 = _span(t[k, 0], t[k, 3], t[k, 6], x0, step, _AT[0], nx)
+        j0, j1 = _span(t[k, 1], t[k, 4], t[k, 7], y0, step, _AT[1], ny)
+        for i in range(i0, i1 + 1):
+            for j in range(j0, j1 + 1):
+                z = _height(x0 + (i + _AT[0]) * step, y0 + (j + _AT[1]) * step, t, k)
+                if z < found[i, j]:
+                    found[i, j] = z
+
+
+@njit(cache=True)
+def _count(t: Floats, body: Ints, x0: float, y0: float, step: float, lowest: Floats, counts: Ints) -> None:
+    nx, ny = lowest.shape
+    seen, twice, low = np.full((nx, ny), -1), np.full((nx, ny), -1), np.full((nx, ny), -1)
+    for k in range(t.shape[0]):
+        own = body[k]
+        i0, i1 = _span(t[k, 0], t[k, 3], t[k, 6], x0, step, _AT[0], nx)
+        j0, j1 = _span(t[k, 1], t[k, 4], t[k, 7], y0, step, _AT[1], ny)
+        for i in range(i0, i1 + 1):
+            for j in range(j0, j1 + 1):
+                z = _height(x0 + (i + _AT[0]) * step, y0 + (j + _AT[1]) * step, t, k)
+                if math.isnan(z):
+                    continue
+                if seen[i, j] != own:
+                    seen[i, j] = own
+                    counts[0, own] += 1
+                    counts[1, own] += 1
+                elif twice[i, j] != own:
+                    twice[i, j] = own
+                    counts[1, own] -= 1
+                if z <= lowest[i, j] + _SAME_HEIGHT_M and low[i, j] != own:
+                    low[i, j] = own
+                    counts[2, own] += 1
+
+
+@njit(cache=True)
+def _fill(t: Floats, x0: float, y0: float, edge: float, nx: int, ny: int, place: Ints, member: Ints) -> None:
+    """Count the triangles of every square into `place`, or, given room in `member`, put them there."""
+    counting = len(member) == 0
+    for k in range(t.shape[0]):
+        i0 = max(0, int((min(t[k, 0], t[k, 3], t[k, 6]) - x0) / edge))
+        i1 = min(nx - 1, int((max(t[k, 0], t[k, 3], t[k, 6]) - x0) / edge))
+        j0 = max(0, int((min(t[k, 1], t[k, 4], t[k, 7]) - y0) / edge))
+        j1 = min(ny - 1, int((max(t[k, 1], t[k, 4], t[k, 7]) - y0) / edge))
+        for i in range(i0, i1 + 1):
+            for j in range(j0, j1 + 1):
+                if not counting:
+                    member[place[i * ny + j]] = k
+                place[i * ny + j] += 1
+
+
+@njit(cache=True)
+def _lowest_at(
+    xy: Floats, t: Floats, x0: float, y0: float, edge: float, nx: int, ny: int, first: Ints, member: Ints
+) -> Floats:  # fmt: skip
+    out = np.full(len(xy), np.nan)
+    for p in range(len(xy)):
+        x, y = xy[p, 0], xy[p, 1]
+        # Below 0 int() rounds up, and a NaN has no place at all.
+        if not (x >= x0 and y >= y0):
+            continue
+        i, j = int((x - x0) / edge), int((y - y0) / edge)
+        if i >= nx or j >= ny:
+            continue
+        best = np.inf
+        for m in range(first[i * ny + j], first[i * ny + j + 1]):
+            z = _height(x, y, t, member[m])
+            if z < best:
+                best = z
+        if best < np.inf:
+            out[p] = best
+    return out
+
+
+@njit(cache=True)
+def _look(
+    points: Floats, t: Floats, x0: float, y0: float, edge: float, nx: int, ny: int, first: Ints, member: Ints,
+    below: Ints, next_m: Floats, away_m: Floats,
+) -> None:  # fmt: skip
+    heights = np.empty(t.shape[0])
+    for p in range(len(points)):
+        x, y, z = points[p, 0], points[p, 1], points[p, 2]
+        if not (x >= x0 and y >= y0):
+            continue
+        i, j = int((x - x0) / edge), int((y - y0) / edge)
+        if i >= nx or j >= ny:
+            continue
+        n = 0
+        for m in range(first[i * ny + j], first[i * ny + j + 1]):
+            h = _height(x, y, t, member[m])
+            if not math.isnan(h):
+                heights[n] = h
+                n += 1
+        last = -np.inf
+        for h in np.sort(heights[:n]):
+            # An edge that two triangles share is met twice.
+            if h < z - _OWN_LAYER_M and h > last + _SAME_LAYER_M:
+                below[p] += 1
+                next_m[p] = h
+            last = h
+            if abs(h - z) < abs(away_m[p]):
+                away_m[p] = h - z

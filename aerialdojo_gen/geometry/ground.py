@@ -1,0 +1,277 @@
+"""Ground that is an open sheet: what of a scene it is, what lies below it, and what closes it at its rim.
+
+Imported terrain (a survey's heightfield, a photogrammetric model) is mostly a sheet without an underside: surfaces
+alone do not keep a body out of the earth, for it can go round the rim, or through a hole, and be below it without a
+touch. What lies below a sheet cannot be told from its winding either, which imports often have wrong. It is told
+here, once for all who ask: a point is below ground where a plumb line meets ground above it and none below it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from aerialdojo_gen.geometry.columns import ColumnIndex, Plan, lowest_of, shares_of
+from aerialdojo_gen.scenes.model import Scene
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+# Columns that decide what is ground are this far apart.
+_COLUMN_M = 0.5
+# A body that is smaller in plan is nobody's terrain.
+_LEAST_AREA_M2 = 4.0
+# A sheet has one layer, but for overhangs; walls with a floor and a roof have two or more.
+_SINGLE_LAYER = 2 / 3
+# Things stand with their feet in the ground, and so lie lower in their columns.
+_LOWEST = 1 / 2
+# Steeper than 60 degrees all over is a wall, unless it makes up most of the scene.
+_LEVEL = 1 / 2
+# Roofs without walls over a scene without any ground would pass for sheets: together they are not its larger part.
+_COVER = 1 / 2
+_WELD_M = 1e-3
+# What ends this far below the flight volume is not in it: the level ground that add-scene lays under everything.
+_BELOW_M = 1e-3
+_PIECE_M = 0.5
+_BESIDE_M = 0.02
+
+
+@dataclass(frozen=True, eq=False)
+class Ground:
+    """The sheets of a scene that are its ground.
+
+    Attributes
+    ----------
+    triangles : (n, 9) float64
+        Metres, world frame; each once, whatever its winding.
+    rim : (m, 9) float64
+        Edges that one triangle alone has: their two ends, and that triangle's third corner.
+    bare : (k, 2) float64
+        Where in the plan of the flight volume nothing of the scene lies, nor half a metre north and east, metres.
+    """
+
+    triangles: Floats
+    rim: Floats
+    bare: Floats
+
+    @classmethod
+    def of(cls, scene: Scene, radius_m: float | None = None) -> Ground | None:
+        """Find a scene's ground by its form alone.
+
+        A connected body of triangles is ground if it has a rim; is level rather than steep, or most of the scene;
+        mostly has a single layer; and is mostly the lowest thing in its columns, but for what lies below the flight
+        volume. Roofs, canopies and bridges have ground below them, houses and rocks are closed. All such bodies
+        together must be at least half of what the scene has in plan.
+
+        Parameters
+        ----------
+        scene : Scene
+            World coordinates, metres.
+        radius_m : float, optional
+            Of a body: ground that it cannot get past, because something lies in every column that it can fly in, is
+            not looked for.
+
+        Returns
+        -------
+        Ground or None
+            None for a scene whose ground is a solid, or that has none.
+        """
+        low, high = np.asarray(scene.bounds, np.float64)
+        plan = Plan.over(low[:2], high[:2], _COLUMN_M)
+        inside = [i for i in scene.instances if _reaches(i.bounds, low, high)]
+        if not inside:
+            return None
+        own = [i.vertices[i.faces] for i in inside]
+        lowest = lowest_of(np.concatenate(own).reshape(-1, 9), plan)
+        empty = np.isnan(lowest)
+        # Four in a square: a body does not fit through a slit between two surfaces.
+        bare = plan.places(empty[:-1, :-1] & empty[1:, :-1] & empty[:-1, 1:] & empty[1:, 1:])
+        if radius_m is not None and not _within(bare, low, high, radius_m):
+            return None
+        large = [k for k, i in enumerate(inside) if np.prod(np.ptp(i.bounds[:, :2], axis=0)) >= _LEAST_AREA_M2]
+        if not large:
+            return None
+        faces, corners = _welded(np.concatenate([own[k] for k in large]))
+        body = _bodies(faces, len(corners))
+        order = np.argsort(body, kind="stable")
+        faces, body = faces[order], body[order]
+        triangles = corners[faces].reshape(-1, 9)
+        n = int(body[-1]) + 1 if len(body) else 0
+        covered, single, bottom = shares_of(triangles, body, n, lowest, plan)
+        up, area = _areas(triangles)
+        level = np.bincount(body, up, n) >= _LEVEL * np.bincount(body, area, n)
+        all_columns = int(np.isfinite(lowest).sum())
+        is_ground = (
+            _has_rim(faces, body, n)
+            & (covered * plan.step_m**2 >= _LEAST_AREA_M2)
+            & (single >= _SINGLE_LAYER * covered)
+            & (bottom >= _LOWEST * covered)
+            & (level | (covered >= _COVER * all_columns))
+        )
+        chosen = is_ground[body]
+        sheet = triangles[chosen]
+        if not len(sheet) or np.isfinite(lowest_of(sheet, plan)).sum() < _COVER * all_columns:
+            return None
+        return cls(sheet, _rim(faces[chosen], corners), bare)
+
+    @cached_property
+    def _columns(self) -> ColumnIndex:
+        return ColumnIndex.of(self.triangles)
+
+    def lowest_m(self, xy: ArrayLike) -> Floats:
+        """Height of the lowest ground at points in plan, (n, 2) float; (n,) float64, metres, NaN where is none."""
+        return self._columns.lowest_m(np.asarray(xy, np.float64).reshape(-1, 2))
+
+    def below(self, points: ArrayLike) -> NDArray[np.bool_]:
+        """Whether points lie below ground.
+
+        Parameters
+        ----------
+        points : (n, 3) float
+            Metres, world frame.
+
+        Returns
+        -------
+        (n,) bool
+            True where a plumb line meets ground above the point and none below it. Below an overhang, a bridge that
+            belongs to the sheet, or in a cave's mouth there is ground below: such points are in the open.
+        """
+        p = np.asarray(points, np.float64).reshape(-1, 3)
+        # A comparison with NaN is False: where there is no ground nothing lies below it.
+        return np.asarray(p[:, 2] < self.lowest_m(p[:, :2]))
+
+    def curtain(self, low: Floats, high: Floats, radius_m: float) -> Floats:
+        """Walls from the rim straight down, which close the sheet's underside to a body in the flight volume.
+
+        From an edge that overhangs the sheet they go down to the next layer, and only from every other one: between
+        the first layer and the second there is air, above that there is rock again.
+
+        Parameters
+        ----------
+        low, high : (3,) float64
+            Corners of the flight volume, metres.
+        radius_m : float
+            The body's radius: its centre keeps that from the volume's bounds.
+
+        Returns
+        -------
+        (n, 9) float64
+            Triangles, metres. None where the body cannot get past the rim: it lies outside the volume, nearer to its
+            bounds than the body, or ground of about the same height goes on beyond it; and none at all where
+            something lies in every column, for then the ground has its walls, if it has holes.
+        """
+        if not _within(self.bare, low, high, radius_m):
+            return np.empty((0, 9))
+        inner_low, inner_high = low[:2] + radius_m, high[:2] - radius_m
+        a, b, inwards = _pieces(self.rim, _PIECE_M)
+        middle = (a + b) / 2
+        near = ((np.minimum(a, b)[:, :2] < inner_high) & (np.maximum(a, b)[:, :2] > inner_low)).all(axis=1)
+        near &= np.maximum(a, b)[:, 2] > low[2]
+        a, b, inwards, middle = a[near], b[near], inwards[near], middle[near]
+        below, floor, _ = self._columns.layers(middle)
+        # The floor of the flight volume is gone through, so that no edge of the curtain lies in it.
+        floor = np.where(below > 0, floor, low[2] - radius_m)
+        beside = middle.copy()
+        beside[:, :2] -= _BESIDE_M * inwards
+        _, _, away = self._columns.layers(beside)
+        lowest = self.lowest_m(beside[:, :2])
+        # What lies higher beyond the rim has a rim of its own.
+        goes_on = (np.abs(away) <= 2 * radius_m) | (lowest > middle[:, 2])
+        hangs = (below % 2 == 0) & ~goes_on
+        a, b, floor = a[hangs], b[hangs], floor[hangs]
+        c, d = a.copy(), b.copy()
+        c[:, 2], d[:, 2] = np.minimum(a[:, 2], floor), np.minimum(b[:, 2], floor)
+        return np.concatenate([np.concatenate([a, b, c], axis=1), np.concatenate([b, d, c], axis=1)])
+
+
+def _within(places: Floats, low: Floats, high: Floats, radius_m: float) -> bool:
+    """Whether a body's centre can be over any of some places, (n, 2)."""
+    return bool(((places > low[:2] + radius_m) & (places < high[:2] - radius_m)).all(axis=1).any())
+
+
+def _reaches(bounds: Floats, low: Floats, high: Floats) -> bool:
+    return bool(
+        bounds[1, 2] >= low[2] - _BELOW_M and (bounds[0, :2] < high[:2]).all() and (bounds[1, :2] > low[:2]).all()
+    )
+
+
+def _welded(triangles: Floats) -> tuple[Ints, Floats]:
+    """Give triangles (n, 3, 3) common corners: faces (m, 3) without doubles and slivers, and corners (k, 3)."""
+    points = triangles.reshape(-1, 3)
+    cells = np.round((points - points.min(axis=0)) / _WELD_M).astype(np.int64)
+    same = _numbered(*cells.T)
+    _, first = np.unique(same, return_index=True)
+    faces = same.reshape(-1, 3)
+    faces = faces[(faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])]
+    # An open surface of an import is there twice, once from each side.
+    _, once = np.unique(_numbered(*np.sort(faces, axis=1).T), return_index=True)
+    return faces[np.sort(once)], points[first]
+
+
+def _numbered(*columns: Ints) -> Ints:
+    """Number rows of integers, (n,) each: equal rows alike, from 0 without gaps."""
+    number = np.zeros(len(columns[0]), np.int64)
+    for column in columns:
+        # Numbers instead of values, so that no product overflows however wide a scene is.
+        _, own = np.unique(column, return_inverse=True)
+        _, number = np.unique(number * (int(own.max(initial=0)) + 1) + own.reshape(-1), return_inverse=True)
+    return number.reshape(-1).astype(np.int64)
+
+
+def _bodies(faces: Ints, n: int) -> Ints:
+    """Number of the connected body that every face belongs to, counted from 0 without gaps."""
+    rows, columns = np.repeat(faces[:, 0], 2), faces[:, 1:].reshape(-1)
+    graph = coo_array((np.ones(len(rows), np.int8), (rows, columns)), shape=(n, n))
+    _, label = connected_components(graph, directed=False)
+    _, body = np.unique(label[faces[:, 0]], return_inverse=True)
+    return body.reshape(-1).astype(np.int64)
+
+
+def _edges(faces: Ints) -> tuple[Ints, NDArray[np.bool_]]:
+    """Edges of faces, (3 n, 2), lower corner first, edge k of all faces before edge k + 1; and which are single."""
+    edges = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
+    _, same, count = np.unique(
+        edges[:, 0] * (int(faces.max(initial=0)) + 1) + edges[:, 1], return_inverse=True, return_counts=True
+    )
+    return edges, count[same.reshape(-1)] == 1
+
+
+def _has_rim(faces: Ints, body: Ints, n: int) -> NDArray[np.bool_]:
+    _, single = _edges(faces)
+    return np.bincount(np.tile(body, 3), single, n) > 0
+
+
+def _rim(faces: Ints, corners: Floats) -> Floats:
+    edges, single = _edges(faces)
+    third = np.concatenate([faces[:, 2], faces[:, 0], faces[:, 1]])
+    return np.concatenate([corners[edges[single, 0]], corners[edges[single, 1]], corners[third[single]]], axis=1)
+
+
+def _areas(triangles: Floats) -> tuple[Floats, Floats]:
+    """Areas of triangles in plan and in space, square metres."""
+    a, b, c = triangles[:, :3], triangles[:, 3:6], triangles[:, 6:]
+    cross = np.cross(b - a, c - a)
+    return np.abs(cross[:, 2]) / 2, np.linalg.norm(cross, axis=1) / 2
+
+
+def _pieces(rim: Floats, longest_m: float) -> tuple[Floats, Floats, Floats]:
+    """Cut edges into pieces: their ends, (n, 3) each, and the unit vectors in plan towards their triangle, (n, 2)."""
+    a, b, third = rim[:, :3], rim[:, 3:6], rim[:, 6:]
+    along = (b - a)[:, :2]
+    length = np.linalg.norm(along, axis=1)
+    towards = (third - a)[:, :2]
+    square = np.maximum(length**2, 1e-18)
+    towards = towards - along * ((towards * along).sum(axis=1) / square)[:, None]
+    towards /= np.maximum(np.linalg.norm(towards, axis=1), 1e-12)[:, None]
+    n = np.maximum(1, np.ceil(length / longest_m)).astype(np.int64)
+    which = np.repeat(np.arange(len(a)), n)
+    k = np.arange(len(which)) - np.repeat(np.cumsum(n) - n, n)
+    at = (k / n[which])[:, None]
+    to = ((k + 1) / n[which])[:, None]
+    way = (b - a)[which]
+    return a[which] + at * way, a[which] + to * way, towards[which]
