@@ -7,12 +7,12 @@ default, so that a stage can be called as a library function without a file.
 from __future__ import annotations
 
 import difflib
-import tomllib
 from pathlib import Path
 from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
+from aerialdojo_gen.bounded import read_toml
 from aerialdojo_gen.errors import ConfigError
 
 RendererName = Literal["gl", "pybullet"]
@@ -275,13 +275,11 @@ def load_pipeline(path: Path) -> Pipeline:
         fault is named.
     """
     try:
-        raw = tomllib.loads(path.read_text(encoding="utf-8"))
+        raw = read_toml(path, ConfigError)
     except FileNotFoundError:
         known = sorted(p.name for p in path.parent.glob("*.toml")) if path.parent.is_dir() else []
         hint = f"; there are {', '.join(known)} in {path.parent}" if known else ""
         raise ConfigError(f"no pipeline file {path}{hint}") from None
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise ConfigError(f"{path}: {error}") from None
     for key in ("scene_assets", "recipes", "annotations"):
         if isinstance(raw.get(key), str):
             raw[key] = (path.parent / raw[key]).resolve()

@@ -57,6 +57,14 @@ class ImportRefused(AerialDojoError):  # noqa: N818 - named for what is done wit
     """A task file of another benchmark is damaged or has rows that make no sense; the message names each."""
 
 
+class Malformed(AerialDojoError, ValueError):  # noqa: N818 - it says what the text is
+    """A text is not TOML or JSON; the message names the place."""
+
+
+class BeyondBounds(Malformed):
+    """A text is TOML or JSON, but larger, deeper or with other numbers or characters than anything here can use."""
+
+
 def first_line(error: BaseException) -> str:
     """Return the first line of an error's text, cut to 160 characters; its type where it has none."""
     text = str(error).strip().splitlines()

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import json
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from aerialdojo_gen.bounded import loads_json
 from aerialdojo_gen.commands.common import Data, PipelineFile, Quiet, Scene, Workers, default_workers, open_pipeline
-from aerialdojo_gen.errors import UsageError
+from aerialdojo_gen.errors import BeyondBounds, Malformed, UsageError
 
 if TYPE_CHECKING:
     from aerialdojo_gen.benchmark.goal import Sensors
@@ -104,8 +104,10 @@ def _options(given: list[str]) -> dict[str, Any]:
         if not equals or not key.isidentifier():
             raise UsageError(f"--option {item!r}: write key=value")
         try:
-            options[key] = json.loads(value)
-        except ValueError:
+            options[key] = loads_json(value)
+        except BeyondBounds as error:
+            raise UsageError(f"--option {key}: {error}") from None
+        except Malformed:
             options[key] = value
     return options
 

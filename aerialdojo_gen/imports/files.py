@@ -7,7 +7,6 @@ to is read from beside it or not at all.
 
 from __future__ import annotations
 
-import json
 import resource
 import struct
 import subprocess
@@ -20,6 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from aerialdojo_gen.bounded import loads_json
 from aerialdojo_gen.errors import AssetError
 from aerialdojo_gen.imports.raw import RawNode, plain
 
@@ -193,7 +193,7 @@ def look_over_glb(path: Path) -> None:
         if version != 2 or kind != 0x4E4F534A or length > MAX_FILE_BYTES // 4:
             raise AssetError("is no GLB 2 file")
         try:
-            document = json.loads(file.read(length))
+            document = loads_json(file.read(length), finite=False)
             accessors = document.get("accessors", [])
             counts = [int(a["count"]) for a in accessors]
             shown = sum(

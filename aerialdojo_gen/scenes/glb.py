@@ -16,6 +16,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from aerialdojo_gen.bounded import loads_json
 from aerialdojo_gen.errors import AssetError
 from aerialdojo_gen.scenes.model import Instance, Material, Part, Scene
 
@@ -196,7 +197,7 @@ def _chunks(path: Path) -> tuple[dict[str, Any], memoryview]:
     body, kind2 = struct.unpack_from("<II", raw, 20 + head)
     if kind != _JSON or kind2 != _BIN or 28 + head + body != length:
         raise ValueError("chunks do not fit")
-    document = json.loads(bytes(raw[20 : 20 + head]))
+    document = loads_json(bytes(raw[20 : 20 + head]))
     return document, raw[28 + head :]
 
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import difflib
 import re
-import tomllib
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
+from aerialdojo_gen import bounded
 from aerialdojo_gen.errors import AssetError
 from aerialdojo_gen.scenes.model import Material
 from aerialdojo_gen.scenes.textures import TEXTURES, make_texture
@@ -107,8 +107,6 @@ def refuse_unknown(body: Iterable[str], known: Iterable[str], where: str) -> Non
 def read_toml(path: Path) -> dict[str, Any]:
     """Read a TOML file; an `AssetError` names it and the line that cannot be read."""
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise AssetError(f"{path}: cannot be read ({error.strerror})") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise AssetError(f"{path}: {error}") from error
+        return bounded.read_toml(path, AssetError)
+    except FileNotFoundError as error:
+        raise AssetError(f"{path}: cannot be read ({error.strerror})") from None
