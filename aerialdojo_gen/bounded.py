@@ -42,7 +42,7 @@ _TOML_TOKEN = re.compile(
 _JSON_TOKEN = re.compile(r'"(?:[^"\\]|\\.)*+"|(?P<number>[0-9]++)|(?P<mark>[\[\]{}])|(?P<open>")', re.DOTALL)
 
 
-def read_toml(path: Path, error: type[AerialDojoError] = StoreError) -> dict[str, Any]:
+def read_toml(path: Path, error: type[AerialDojoError] = StoreError, *, finite: bool = True) -> dict[str, Any]:
     """Read a TOML file.
 
     Parameters
@@ -51,6 +51,8 @@ def read_toml(path: Path, error: type[AerialDojoError] = StoreError) -> dict[str
         At most `MAX_TOML_BYTES`, UTF-8.
     error : type of AerialDojoError
         What is raised.
+    finite : bool
+        False: nan and inf are let through, the caller refuses them.
 
     Returns
     -------
@@ -66,12 +68,12 @@ def read_toml(path: Path, error: type[AerialDojoError] = StoreError) -> dict[str
     """
     text = _text(path, MAX_TOML_BYTES, error)
     try:
-        return loads_toml(text)
+        return loads_toml(text, finite=finite)
     except Malformed as fault:
         raise error(f"{path}: {fault}") from None
 
 
-def loads_toml(text: str) -> dict[str, Any]:
+def loads_toml(text: str, *, finite: bool = True) -> dict[str, Any]:
     """Parse TOML as `read_toml` does; `Malformed` names the place."""
     _scan(text, _TOML_TOKEN)
     try:
@@ -80,7 +82,7 @@ def loads_toml(text: str) -> dict[str, Any]:
         raise Malformed(str(error)) from None
     except (ValueError, OverflowError, RecursionError) as error:
         raise Malformed(f"is no TOML ({error})") from None
-    check_value(value)
+    check_value(value, finite=finite)
     return value
 
 

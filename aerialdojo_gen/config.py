@@ -275,7 +275,7 @@ def load_pipeline(path: Path) -> Pipeline:
         fault is named.
     """
     try:
-        raw = read_toml(path, ConfigError)
+        raw = read_toml(path, ConfigError, finite=False)
     except FileNotFoundError:
         known = sorted(p.name for p in path.parent.glob("*.toml")) if path.parent.is_dir() else []
         hint = f"; there are {', '.join(known)} in {path.parent}" if known else ""
