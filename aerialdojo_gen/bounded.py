@@ -23,6 +23,7 @@ JsonPath = tuple[str | int, ...]
 MAX_DEPTH = 64
 MAX_INTEGER = 2**63 - 1
 MAX_TOML_BYTES = 4 << 20
+MAX_TOML_TEXT = 2000
 MAX_JSON_BYTES = 64 << 20
 # Integers within MAX_INTEGER have 19, and a float has no more than its precision, its exponent and some zeros.
 _MAX_DIGITS = 400
@@ -82,7 +83,7 @@ def loads_toml(text: str, *, finite: bool = True) -> dict[str, Any]:
         raise Malformed(str(error)) from None
     except (ValueError, OverflowError, RecursionError) as error:
         raise Malformed(f"is no TOML ({error})") from None
-    check_value(value, finite=finite)
+    check_value(value, finite=finite, longest=MAX_TOML_TEXT)
     return value
 
 
@@ -170,15 +171,17 @@ def scan_json(text: str) -> None:
     _scan(text, _JSON_TOKEN)
 
 
-def check_value(value: Any, *, finite: bool = True) -> None:
+def check_value(value: Any, *, finite: bool = True, longest: int = MAX_JSON_BYTES) -> None:
     """Hold a parsed value against the bounds; `BeyondBounds` names the path of a value that breaks one."""
-    found = beyond(value, finite=finite)
+    found = beyond(value, finite=finite, longest=longest)
     if found is not None:
         path, why = found
         raise BeyondBounds(f"{_dotted(path)}: {why}" if path else why)
 
 
-def beyond(value: Any, *, finite: bool = True, integers: bool = True) -> tuple[JsonPath, str] | None:
+def beyond(
+    value: Any, *, finite: bool = True, integers: bool = True, longest: int = MAX_JSON_BYTES
+) -> tuple[JsonPath, str] | None:
     """Find a value that is beyond the bounds.
 
     Parameters
@@ -187,6 +190,8 @@ def beyond(value: Any, *, finite: bool = True, integers: bool = True) -> tuple[J
         Of dicts, lists, strings and numbers.
     finite, integers : bool
         False: NaN and infinities, or integers of any size, are let through.
+    longest : int
+        Most characters of a string or key.
 
     Returns
     -------
@@ -201,7 +206,7 @@ def beyond(value: Any, *, finite: bool = True, integers: bool = True) -> tuple[J
         item, path, depth = stack.pop()
         kind = type(item)
         if kind is str:
-            why = _wrong_text(item)
+            why = _wrong_text(item, longest)
         elif kind is int and integers:
             why = "" if -MAX_INTEGER - 1 <= item <= MAX_INTEGER else "is an integer beyond 64 bits"
         elif kind is float and finite:
@@ -212,7 +217,7 @@ def beyond(value: Any, *, finite: bool = True, integers: bool = True) -> tuple[J
                 pairs = item.items() if kind is dict else enumerate(item)
                 stack += [(inner, (path, key), depth + 1) for key, inner in pairs]
             if not why and kind is dict:
-                why = next((f"has a key that {wrong}" for key in item if (wrong := _wrong_text(key))), "")
+                why = next((f"has a key that {wrong}" for key in item if (wrong := _wrong_text(key, longest))), "")
         else:
             why = ""
         if why:
@@ -285,7 +290,9 @@ def _no_number(name: str) -> Any:
     raise Malformed(f"is not JSON: {name} is no finite number")
 
 
-def _wrong_text(text: Any) -> str:
+def _wrong_text(text: Any, longest: int) -> str:
+    if type(text) is str and len(text) > longest:
+        return f"has {len(text):,} characters, the most is {longest:,}"
     if type(text) is not str or text.isascii():
         return "has a NUL character" if type(text) is str and "\0" in text else ""
     try:

@@ -33,6 +33,10 @@ class AssetError(AerialDojoError):
     """A recipe, a prop or a mesh is missing or wrong."""
 
 
+class ShapeError(AssetError, ValueError):
+    """Sizes or counts of a shape make no body, or one that is too large; who knows its file names that too."""
+
+
 class AnnotationError(AerialDojoError):
     """An annotation file is wrong; the message lists every error in it."""
 

@@ -19,7 +19,8 @@ import pyarrow as pa
 
 from aerialdojo_gen import schemas
 from aerialdojo_gen.atomic import atomic_file
-from aerialdojo_gen.errors import StoreError
+from aerialdojo_gen.bounded import loads_json
+from aerialdojo_gen.errors import Malformed, StoreError
 from aerialdojo_gen.parquet_files import read_file, read_footer, write_clustered
 from aerialdojo_gen.tables import check_table, content_digest
 
@@ -90,6 +91,16 @@ class ShardInfo:
     parts: int
     summary: dict[str, Any]
     files: dict[str, int]
+
+    def is_sound(self) -> bool:
+        """Whether every value is of its type: a footer's JSON can rot while the rows are whole."""
+        return (
+            all(type(text) is str for text in (self.fingerprint, self.content))
+            and type(self.parts) is int
+            and type(self.summary) is dict
+            and type(self.files) is dict
+            and all(type(size) is int for size in self.files.values())
+        )
 
 
 def partition(scene: str) -> str:
@@ -194,13 +205,20 @@ def _read_info(path: Path, _inode: int, _size: int, _mtime_ns: int) -> ShardInfo
     raw = metadata.get(_META)
     if raw is None:
         return None
-    meta = json.loads(raw)
+    try:
+        meta = loads_json(raw)
+        info = ShardInfo(meta["fingerprint"], meta["content"], rows, meta["parts"], meta["summary"], meta["files"])
+    except (Malformed, KeyError, TypeError):
+        info = None
+    if info is None or not info.is_sound():
+        raise StoreError(f"{path} is damaged (its footer): delete it and run the command again")
     # A shard of an earlier version does not say how many rows were written.
-    if meta.get("rows", rows) != rows:
+    written = meta.get("rows", rows)
+    if written != rows:
         raise StoreError(
-            f"{path} has {rows:,} rows where {meta['rows']:,} were written: delete it and run the command again"
+            f"{path} has {rows:,} rows where {written!r} were written: delete it and run the command again"
         )
-    return ShardInfo(meta["fingerprint"], meta["content"], rows, meta["parts"], meta["summary"], meta["files"])
+    return info
 
 
 def count_rows(data: Path, table: str, scene: str) -> int:

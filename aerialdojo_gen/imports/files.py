@@ -102,7 +102,8 @@ def read_into(path: Path, out: Path) -> str:
     except AssetError as error:
         return str(error)
     except (MemoryError, ImportError):
-        return f"needs more than {resource.getrlimit(resource.RLIMIT_AS)[0] >> 20} MiB to read: simplify or split the mesh"
+        most = resource.getrlimit(resource.RLIMIT_AS)[0] >> 20
+        return f"needs more than {most} MiB to read: simplify or split the mesh"
     except Exception as error:  # a foreign file may make a reader fail in any way: it is named, never let through
         first = (str(error).splitlines() or [""])[0]
         return f"cannot be read ({type(error).__name__}{': ' + first[:120] if first else ''})"

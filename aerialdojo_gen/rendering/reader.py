@@ -51,12 +51,14 @@ class Video(Sequence[NDArray[Any]]):
         try:
             with av.open(str(path)) as container:
                 stream = container.streams.video[0]
+                if stream.format is None:
+                    raise RenderError(f"{path} says nothing of its pictures: render it again")
                 self.metadata = {k.lower(): v for k, v in container.metadata.items()}
                 self.fps = float(stream.average_rate or 0)
                 self.width, self.height = stream.width, stream.height
                 self._depth = stream.format.name.startswith("gray16")
                 self._pts = sorted(p.pts for p in container.demux(stream) if p.pts is not None)
-        except (av.FFmpegError, OSError, IndexError) as error:
+        except (av.FFmpegError, OSError, IndexError, UnicodeDecodeError) as error:
             raise RenderError(f"{path} is no video that can be read ({error}): render it again") from None
 
     def _open_folder(self) -> None:
@@ -64,7 +66,8 @@ class Video(Sequence[NDArray[Any]]):
         camera = self.path / "camera.json"
         if not self._files or not camera.is_file():
             raise RenderError(f"{self.path} holds no frames: render it again")
-        self.metadata = {"comment": camera.read_text(encoding="utf-8")}
+        # What is not UTF-8 is no JSON either, and `read_recording` says so.
+        self.metadata = {"comment": camera.read_text(encoding="utf-8", errors="surrogateescape")}
         self.fps = 0.0
         self._pts = list(range(len(self._files)))
         self.height, self.width = self._png(0).shape[:2]

@@ -139,7 +139,7 @@ def save(name: str, seed: int, outcome: Outcome, folder: Path) -> None:
         key = fault["kind"], fault["where"]
         met[key] += 1
         if met[key] <= _SAVED_EACH:
-            (_, case), = mutants(name, seed, fault["index"], fault["index"] + 1)
+            ((_, case),) = mutants(name, seed, fault["index"], fault["index"] + 1)
             here = folder / name / f"{fault['index']:06}"
             laid_out(case, here)
             here.with_suffix(".txt").write_text(json.dumps(fault, indent=1), encoding="utf-8")

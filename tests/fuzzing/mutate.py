@@ -133,7 +133,9 @@ def changed(value: Any, rng: Rng, nothing: bool = True) -> Any:
                 at = int(rng.integers(len(old)))
                 holder[key] = old[:at] + _pick(TEXTS, rng) + old[at:]
             case _:
-                holder[key] = _pick((True, False, [], {}, [[]], [{}], {"a": 1}, {"": []}, [1, 2], [1, 2, 3], "a"), rng)
+                holder[key] = _pick(
+                    (True, False, [], {}, [[]], [{}], {"a": 1}, {"": []}, [1, 2], [1, 2, 3], "a"), rng
+                )
     return box[0]
 
 
@@ -184,9 +186,12 @@ def toml_dumped(value: Any, top: bool = True) -> str:
     if isinstance(value, Raw):
         return str(value)
     if isinstance(value, dict) and top:
-        plain = [f"{json.dumps(str(k))} = {toml_dumped(v, False)}" for k, v in value.items() if not isinstance(v, dict)]
+        plain = [
+            f"{json.dumps(str(k))} = {toml_dumped(v, False)}" for k, v in value.items() if not isinstance(v, dict)
+        ]
         tables = [
-            f"[{json.dumps(str(k))}]\n" + "\n".join(f"{json.dumps(str(a))} = {toml_dumped(b, False)}" for a, b in v.items())
+            f"[{json.dumps(str(k))}]\n"
+            + "\n".join(f"{json.dumps(str(a))} = {toml_dumped(b, False)}" for a, b in v.items())
             for k, v in value.items()
             if isinstance(v, dict)
         ]

@@ -15,11 +15,10 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TextIO
 
-from fuzzing.mutate import mutant
-from fuzzing.targets import TARGETS, Case, Target, case_of, laid_out
-
 from aerialdojo_gen.errors import AerialDojoError
 from aerialdojo_gen.rng import generator
+from fuzzing.mutate import mutant
+from fuzzing.targets import TARGETS, Case, Target, case_of, laid_out
 
 HANG_S = 10.0
 MEMORY_BYTES = 2 << 30
