@@ -9,7 +9,7 @@ RUN := .venv/bin/aerialdojo-gen
 RUN_FLAGS := $(if $(WORKERS),--workers $(WORKERS))
 
 .DEFAULT_GOAL := help
-.PHONY: help env dev dataset smoke evaluate test lint format gallery bench lock clean
+.PHONY: help env dev dataset smoke evaluate test fuzz lint format gallery bench lock clean
 
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-9s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -53,6 +53,10 @@ evaluate: .venv/.installed  ## fly oracle, random and explorer on 32 tasks of al
 PYTEST_FLAGS ?= -n 2 --dist loadfile
 test: .venv/.dev  ## run the tests (PYTEST_FLAGS='-k planner' for some of them)
 	@.venv/bin/python -m pytest $(PYTEST_FLAGS)
+
+N ?= 500
+fuzz: .venv/.dev  ## mutants of every input into every parser, N=500 each (nightly: make fuzz N=10000 SEED=$$RANDOM)
+	@PYTHONPATH=tests .venv/bin/python -m fuzzing -n $(N) $(if $(SEED),--seed $(SEED)) $(foreach t,$(TARGET),--target $(t))
 
 lint: .venv/.dev  ## ruff and mypy --strict
 	@.venv/bin/ruff check .

@@ -46,14 +46,18 @@ def evaluate(
     view: Annotated[
         list[str] | None, typer.Option("--view", help="front, left, right, down; in place of the agent's own.")
     ] = None,
-    width: Annotated[int | None, typer.Option("--width", min=1, help="Columns; in place of the agent's own.")] = None,
-    height: Annotated[int | None, typer.Option("--height", min=1, help="Rows; in place of the agent's own.")] = None,
+    width: Annotated[
+        int | None, typer.Option("--width", min=1, max=4096, help="Columns; in place of the agent's own.")
+    ] = None,
+    height: Annotated[
+        int | None, typer.Option("--height", min=1, max=4096, help="Rows; in place of the agent's own.")
+    ] = None,
     renderer: Annotated[str, typer.Option("--renderer", help="auto, gl or pybullet.")] = "auto",
     out: Annotated[
         Path | None, typer.Option("--out", help="Where the log goes.  (default: the data directory)")
     ] = None,
     attempts: Annotated[
-        int, typer.Option("--attempts", min=1, help="Tries of an episode where something outside fails.")
+        int, typer.Option("--attempts", min=1, max=1000, help="Tries of an episode where something outside fails.")
     ] = 5,
     rerun_failed: Annotated[
         bool, typer.Option("--rerun-failed", help="Fly those again that failed for reasons outside the agent.")

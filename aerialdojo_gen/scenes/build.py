@@ -10,7 +10,7 @@ from types import ModuleType
 
 import numpy as np
 
-from aerialdojo_gen.errors import AssetError, ShapeError
+from aerialdojo_gen.errors import AssetError
 from aerialdojo_gen.scenes import layouts
 from aerialdojo_gen.scenes.catalogue import Catalogue
 from aerialdojo_gen.scenes.cuts import cut_out
@@ -60,7 +60,7 @@ def build_scene(recipe_path: Path, catalogue: Catalogue) -> Scene:
     site = Site(recipe_path.stem, recipe, catalogue, parameters)
     try:
         layout.build(site)
-    except ShapeError as error:
+    except AssetError as error:
         raise AssetError(f"{recipe_path}: layout {recipe.layout!r}: {error}") from error
     scene = site.scene()
     _check_inventory(scene, recipe, recipe_path)

@@ -87,7 +87,7 @@ def read_glb(path: Path) -> Scene:
         instances = tuple(
             _read_instance(document["nodes"][k], document, data, names) for k in document["nodes"][0]["children"]
         )
-        return Scene(
+        scene = Scene(
             name=extras["name"],
             instances=instances,
             materials={m.name: m for m in materials},
@@ -96,9 +96,11 @@ def read_glb(path: Path) -> Scene:
             sun=tuple(extras["sun"]),
             imported=bool(extras.get("imported", False)),
         )
+        _check(scene)
+        return scene
     except OSError as error:
         raise AssetError(f"{path}: cannot be read ({error.strerror}); run build-scenes first") from error
-    except (KeyError, IndexError, TypeError, ValueError, struct.error) as error:
+    except (KeyError, IndexError, TypeError, AttributeError, ValueError, OverflowError, struct.error) as error:
         raise AssetError(f"{path}: is no scene file of this program or is damaged; run build-scenes again") from error
 
 
@@ -199,6 +201,27 @@ def _chunks(path: Path) -> tuple[dict[str, Any], memoryview]:
         raise ValueError("chunks do not fit")
     document = loads_json(bytes(raw[20 : 20 + head]))
     return document, raw[28 + head :]
+
+
+def _check(scene: Scene) -> None:
+    """Raise ValueError for values that no scene has: what reads as JSON may still say anything."""
+    texts = [scene.name, *(t for i in scene.instances for t in (i.node, i.category, i.variant))]
+    words = [w for i in scene.instances for pair in i.attributes.items() for w in pair]
+    if not all(isinstance(text, str) for text in (*texts, *words, *scene.materials)):
+        raise ValueError("a name is no text")
+    for colour in (scene.sky, *(m.colour for m in scene.materials.values())):
+        if len(colour) != 3 or not all(type(c) is int and 0 <= c <= 255 for c in colour):
+            raise ValueError("a colour is none")
+    numbers = [*scene.sun, *(m.tile_m for m in scene.materials.values())]
+    if len(scene.sun) != 3 or not all(isinstance(n, int | float) and abs(n) < 1e9 for n in numbers):
+        raise ValueError("sun or tiles are no numbers")
+    arrays = [scene.bounds, *(a for i in scene.instances for p in i.parts for a in (p.vertices, p.uv))]
+    if scene.bounds.shape != (2, 3) or not all(np.isfinite(a).all() for a in arrays):
+        raise ValueError("a coordinate is no finite number")
+    if not all(
+        i.parts and all(len(p.faces) and len(p.uv) == len(p.vertices) for p in i.parts) for i in scene.instances
+    ):
+        raise ValueError("a node has no triangle")
 
 
 def _read_material(entry: dict[str, Any], document: dict[str, Any], data: memoryview) -> Material:

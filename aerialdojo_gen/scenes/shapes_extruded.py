@@ -90,7 +90,7 @@ def sweep(
     Mesh
         Watertight, mitred at the path's corners; textures run along the path.
     """
-    line = np.array(rows_of("path", path, 3))
+    line = np.array(rows_of("path", path, 3, 1))
     line = line[np.concatenate([[True], np.linalg.norm(np.diff(line, axis=0), axis=1) > 1e-9])]
     if len(line) < (3 if closed else 2):
         raise ShapeError("a sweep needs a path of two distinct points, three where it is closed")

@@ -21,6 +21,7 @@ from fuzzing.worker import mutants
 
 TESTS = Path(__file__).resolve().parents[1]
 CORPUS = Path(__file__).resolve().parent / "corpus"
+COMMAND = ["-m", "fuzzing.worker"]
 # A process that waits for something has no seconds of its own to count.
 _STUCK_S = 120.0
 _SAVED_EACH = 3
@@ -35,7 +36,8 @@ class Outcome:
     ran : int
         Mutants, the valid inputs included.
     faults : list of dict
-        ``index``, ``kind``, ``message`` and ``where`` of each mutant that did not end in an `AerialDojoError` or well.
+        ``index``, ``kind``, ``message`` and ``where`` of each mutant that did not end in an `AerialDojoError` or
+        well.
     seconds : float
         On the clock.
     peak_mib : int
@@ -89,7 +91,7 @@ def _process(plan: dict, outcomes: dict[str, Outcome]) -> tuple[str, Any] | None
         "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1",
         "PYTHONPATH": os.pathsep.join([str(TESTS), str(TESTS.parent), os.environ.get("PYTHONPATH", "")]),
     }  # fmt: skip
-    command = [sys.executable, "-m", "fuzzing.worker", json.dumps(plan)]
+    command = [sys.executable, *COMMAND, json.dumps(plan)]
     name, at, done, since = "", None, False, time.monotonic()
     with (
         tempfile.TemporaryFile() as errors,

@@ -135,10 +135,12 @@ def _utterable(lines) -> None:
 
 def _pipelines() -> list[Case]:
     whole = {
-        "name": "all", "seed": 3, "scenes": ["U_*"], "stages": ["plan", "filter"], "scene_assets": "a", "recipes": "b",
+        "name": "all", "seed": 3, "scenes": ["U_*"], "stages": ["plan", "filter"], "scene_assets": "a",
+        "recipes": "b",
         "annotations": "c", "embodiment": {"radius_m": 0.3},
         "anchor-sample": {"azimuths": 8, "elevations_deg": [0.0, 10.0], "weights": {"clip": 1.0},
-                          "clip": {"vision": "v.onnx", "text": "t.onnx", "tokenizer": "t.json"}, "vlm": {"model": "m"}},
+                          "clip": {"vision": "v.onnx", "text": "t.onnx", "tokenizer": "t.json"},
+                          "vlm": {"model": "m"}},
         "reference-images": {"width": 64}, "pair-objects": {"start_variants": 2},
         "plan": {"cell_m": 0.5, "ladder": [{"weight": 1.1, "budget": 1000, "heading_sectors": 4}]},
         "filter": {"base": {"min_length_m": 5, "max_length_m": 30, "action_budget": 90}},
@@ -153,10 +155,12 @@ def _read_pipeline(folder: Path) -> None:
 
 
 _COURT = {
-    "layout": "courtyard", "seed": 5, "size_m": [36.0, 36.0], "ceiling_m": 15.0, "sky": "#96bee6", "sun": [0.4, -0.3, 0.8],
+    "layout": "courtyard", "seed": 5, "size_m": [36.0, 36.0], "ceiling_m": 15.0, "sky": "#96bee6", "sun": [0.4,
+    -0.3, 0.8],
     "palette": {"wall": "brick", "path": "paving"}, "inventory": {"bench": 1},
     "parameters": {"walls": [[-16, -16, 16, -16, 3.0]], "roofs": [[-6, -6, 0, 0, 4.0]], "paths": [[-2, -9, 2, 9]],
-                   "things": [{"category": "bench", "at": [3.0, 4.0], "yaw": 30.0}, {"category": "mailbox", "at": [5, 5], "z": 1.0}]},
+                   "things": [{"category": "bench", "at": [3.0, 4.0], "yaw": 30.0}, {"category": "mailbox",
+                   "at": [5, 5], "z": 1.0}]},
 }  # fmt: skip
 
 
@@ -280,7 +284,7 @@ def _read_mesh(folder: Path) -> None:
 def _aerialdojo() -> list[Case]:
     from test_import_benchmark_layout import document, put
 
-    return [_made(lambda folder: put(folder, *document(turn))) for turn in (15, 60)]
+    return [_made(lambda folder, turn=turn: put(folder, *document(turn))) for turn in (15, 60)]
 
 
 def _written(document: Callable[[Path], object]) -> Callable[[], list[Case]]:
@@ -356,8 +360,10 @@ _NAV = f"media/{court.SCENE}/nav_a"
 def _recording_rows() -> list[dict]:
     return [
         {
-            "scene": court.SCENE, "nav_id": "nav_a", "view": "front", "modality": modality, "path": f"{_NAV}/front_{modality}.{suffix}",
-            "sampling": "steps", "n_frames": 3, "fps": 15.0, "width": 16, "height": 16, "fov_deg": 90.0, "codec": "h264",
+            "scene": court.SCENE, "nav_id": "nav_a", "view": "front", "modality": modality,
+            "path": f"{_NAV}/front_{modality}.{suffix}",
+            "sampling": "steps", "n_frames": 3, "fps": 15.0, "width": 16, "height": 16, "fov_deg": 90.0,
+            "codec": "h264",
             "renderer": "gl", "device": "llvmpipe", "bytes": 4, "sha256": "0" * 64, "ok": True, "flags": ["dark"],
         }
         for modality, suffix in (("depth", "mkv"), ("rgb", "mp4"))
@@ -430,12 +436,16 @@ TARGETS: dict[str, Target] = {
     "prop": Target(_props, _instantiate, "x.toml"),
     "materials": Target(_materials, _instantiate),
     "glb": Target(lambda: [{"U_Court_0.glb": _court_glb()}], _read_own),
-    **{f"mesh-{s}": Target(_village(s), _read_mesh, names_the_file=False) for s in ("glb", "obj", "stl", "ply", "3ds")},
+    **{f"mesh-{s}": Target(_village(s), _read_mesh, names_the_file=False) for s in ("glb", "obj", "stl", "ply",
+    "3ds")},
     "import-aerialdojo": Target(_aerialdojo, _import("aerialdojo", "."), ".json", names_the_file=False),
-    "import-uav-on": Target(_written(lambda _: task_files.uav_on(2)), _import("uav-on"), ".json", names_the_file=False),
+    "import-uav-on": Target(_written(lambda _: task_files.uav_on(2)), _import("uav-on"), ".json",
+    names_the_file=False),
     "import-cityavos": Target(_written(task_files.cityavos), _import("cityavos"), ".json", names_the_file=False),
-    "import-aerialvln": Target(_written(lambda _: task_files.aerialvln()), _import("aerialvln"), ".json", names_the_file=False),
-    "import-openfly": Target(_written(lambda _: task_files.openfly()), _import("openfly"), ".json", names_the_file=False),
+    "import-aerialvln": Target(_written(lambda _: task_files.aerialvln()), _import("aerialvln"), ".json",
+    names_the_file=False),
+    "import-openfly": Target(_written(lambda _: task_files.openfly()), _import("openfly"), ".json",
+    names_the_file=False),
     "answer": Target(_answers, _read_answer, names_the_file=False),
     "shard": Target(_shards, _read_shard),
     "recording-note": Target(_notes, _find, ".json"),
