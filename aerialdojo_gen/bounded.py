@@ -232,7 +232,7 @@ def beyond(
 def too_deep(value: Any) -> bool:
     """Whether a parsed value is nested more than `MAX_DEPTH` deep; by levels, so that it costs little."""
     level = [value]
-    for _ in range(MAX_DEPTH + 1):
+    for _ in range(MAX_DEPTH):
         level = [
             inner
             for item in level

@@ -185,7 +185,8 @@ ROW = {
     [
         [], {}, "x", [1], [[]], [{}], [ROW | {"more": 1}],
         [{k: v for k, v in ROW.items() if k != "fps"}],
-        [ROW | {"bytes": "4"}], [ROW | {"bytes": 4.5}], [ROW | {"width": 10**30}], [ROW | {"flags": 5}],
+        [ROW | {"bytes": "4"}], [ROW | {"bytes": 4.5}], [ROW | {"width": 10**30}],
+        [ROW | {"flags": 5}],
         [ROW | {"ok": None}],
         [ROW | {"path": "../../front_rgb.mp4"}], [ROW | {"path": "media/U_A_0/n/.."}], [ROW | {"path": 5}], [ROW, ROW],
         [ROW | {"device": "\ud800"}], [ROW | {"view": ["front"]}],
