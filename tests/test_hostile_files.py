@@ -188,7 +188,8 @@ ROW = {
         [ROW | {"bytes": "4"}], [ROW | {"bytes": 4.5}], [ROW | {"width": 10**30}],
         [ROW | {"flags": 5}],
         [ROW | {"ok": None}],
-        [ROW | {"path": "../../front_rgb.mp4"}], [ROW | {"path": "media/U_A_0/n/.."}], [ROW | {"path": 5}], [ROW, ROW],
+        [ROW | {"path": "../../front_rgb.mp4"}], [ROW | {"path": "media/U_A_0/n/.."}], [ROW | {"path": 5}],
+        [ROW, ROW],
         [ROW | {"device": "\ud800"}], [ROW | {"view": ["front"]}],
     ],
 )  # fmt: skip
