@@ -100,7 +100,8 @@ def _process(plan: dict, outcomes: dict[str, Outcome]) -> tuple[str, Any] | None
         assert process.stdout is not None
         pending = b""
         while True:
-            if not select.select([process.stdout], [], [], _STUCK_S)[0]:
+            # Until the first input it imports, on a busy machine for minutes.
+            if not select.select([process.stdout], [], [], _STUCK_S if name else 3 * _STUCK_S)[0]:
                 process.kill()
                 break
             new = os.read(process.stdout.fileno(), 1 << 16)
