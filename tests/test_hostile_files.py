@@ -8,6 +8,7 @@ import tomllib
 import annotating
 import numpy as np
 import pytest
+import rendered
 from annotating import AUTHOR, YARD
 from fuzzing.mutate import Raw, toml_dumped
 from starlette.testclient import TestClient
@@ -22,6 +23,8 @@ from aerialdojo_gen.rendering import finished
 from aerialdojo_gen.rendering.codecs import PngWriter
 from aerialdojo_gen.rendering.reader import read_recording
 from aerialdojo_gen.scenes.catalogue import load_catalogue
+from aerialdojo_gen.scenes.glb import read_glb, write_glb
+from aerialdojo_gen.scenes.model import Material, Scene
 from aerialdojo_gen.scenes.recipe import load_imported, load_recipe
 
 COURT = {"layout": "courtyard", "size_m": [30, 30], "ceiling_m": 12, "parameters": {"things": []}}
@@ -216,3 +219,15 @@ def test_a_recording_is_read_by_its_path_as_text(tmp_path):
         recording = read_recording(path)
         assert recording.cameras == {"front": {"fov_deg": 90.0}}
         assert recording.rgb["front"][0].shape == (16, 16, 3)
+
+
+def test_a_texture_that_asks_for_far_more_pixels_than_bytes_is_not_decoded(tmp_path):
+    wide = Material("grass", (90, 130, 70), np.zeros((2, 5000, 3), np.uint8), 2.0)
+    scene = rendered.courtyard()
+    path = tmp_path / "x.glb"
+    write_glb(scene, path)
+    assert len(read_glb(path).instances) == len(scene.instances)
+    write_glb(Scene(scene.name, scene.instances, scene.materials | {"grass": wide}, scene.bounds), path)
+    with pytest.raises(AssetError, match="is no scene file of this program or is damaged") as refused:
+        read_glb(path)
+    assert "texture is too large" in str(refused.value.__cause__)

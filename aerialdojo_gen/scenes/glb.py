@@ -28,6 +28,7 @@ _WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3}
 # Quaternion (x, y, z, w) of a quarter turn about x: z up becomes y up.
 _Z_UP_TO_Y_UP = [-0.7071067811865476, 0.0, 0.0, 0.7071067811865476]
 _VERSION = 1
+_LARGEST_TEXTURE_PX = 4096
 
 
 def write_glb(scene: Scene, path: Path) -> None:
@@ -229,8 +230,11 @@ def _read_material(entry: dict[str, Any], document: dict[str, Any], data: memory
     source = entry["pbrMetallicRoughness"].get("baseColorTexture")
     if source is not None:
         image = document["images"][document["textures"][source["index"]]["source"]]
-        png = np.frombuffer(_view_bytes(image["bufferView"], document, data), dtype=np.uint8)
-        decoded = cv2.imdecode(png, cv2.IMREAD_COLOR)
+        png = _view_bytes(image["bufferView"], document, data)
+        # A kilobyte of PNG can ask for a gigabyte of pixels.
+        if max(struct.unpack_from(">II", png, 16)) > _LARGEST_TEXTURE_PX:
+            raise ValueError("texture is too large")
+        decoded = cv2.imdecode(np.frombuffer(png, dtype=np.uint8), cv2.IMREAD_COLOR)
         if decoded is None:
             raise ValueError("texture cannot be decoded")
         texture = np.ascontiguousarray(decoded[..., ::-1]).astype(np.uint8)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 import trimesh
@@ -212,7 +213,7 @@ def _numbers(key: str, values: Numbers, count: int) -> tuple[float, ...]:
     return tuple(number(key, v) for v in values)
 
 
-def number(key: str, value: object) -> float:
+def number(key: str, value: Any) -> float:
     """Hold a shape's number, metres or a fraction, against its bounds."""
     if isinstance(value, bool) or not isinstance(value, int | float | np.number):
         raise ShapeError(f"{key} must be a number, got {str(value)[:40]!r}")
@@ -221,18 +222,18 @@ def number(key: str, value: object) -> float:
     return float(value)
 
 
-def whole(key: str, value: object, low: int, high: int) -> int:
+def whole(key: str, value: Any, low: int, high: int) -> int:
     """Hold a count that makes vertices against its bounds; expressions give floats, whose fraction is cut."""
     if isinstance(value, bool) or not isinstance(value, int | float | np.number) or not low <= value < high + 1:
         raise ShapeError(f"{key} must be {low} to {high}, got {str(value)[:40]}")
     return int(value)
 
 
-def rows_of(key: str, rows: object, width: int, least: int = 2) -> list[tuple[float, ...]]:
+def rows_of(key: str, rows: Any, width: int, least: int = 2) -> list[tuple[float, ...]]:
     """Hold a shape's list of points against its bounds."""
     if isinstance(rows, str | dict) or not hasattr(rows, "__len__") or not least <= len(rows) <= MAX_POINTS:
         raise ShapeError(f"{key} must be {least} to {MAX_POINTS:,} points")
-    return [_numbers(key, row, width) for row in rows]  # type: ignore[attr-defined]
+    return [_numbers(key, row, width) for row in rows]
 
 
 def _positive(key: str, values: Numbers, count: int) -> tuple[float, ...]:
