@@ -217,9 +217,10 @@ def number(key: str, value: Any) -> float:
     """Hold a shape's number, metres or a fraction, against its bounds."""
     if isinstance(value, bool) or not isinstance(value, int | float | np.number):
         raise ShapeError(f"{key} must be a number, got {str(value)[:40]!r}")
-    if not abs(value) <= _FARTHEST_M:
-        raise ShapeError(f"{key} must lie within {_FARTHEST_M:,.0f}, got {float(value):g}")
-    return float(value)
+    held = float(value)
+    if not -_FARTHEST_M <= held <= _FARTHEST_M:
+        raise ShapeError(f"{key} must lie within {_FARTHEST_M:,.0f}, got {held:g}")
+    return held
 
 
 def whole(key: str, value: Any, low: int, high: int) -> int:
