@@ -9,7 +9,7 @@ RUN := .venv/bin/aerialdojo-gen
 RUN_FLAGS := $(if $(WORKERS),--workers $(WORKERS))
 
 .DEFAULT_GOAL := help
-.PHONY: help env dev dataset smoke evaluate test lint format gallery bench torture lock clean
+.PHONY: help env dev dataset smoke evaluate test fuzz torture lint format gallery bench lock clean
 
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-9s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -54,9 +54,10 @@ PYTEST_FLAGS ?= -n 2 --dist loadfile
 test: .venv/.dev  ## run the tests (PYTEST_FLAGS='-k planner' for some of them)
 	@.venv/bin/python -m pytest $(PYTEST_FLAGS)
 
-N ?= 100
-torture: .venv/.dev  ## kill run, render, export, import and evaluate N times and compare what repeating them leaves
-	@.venv/bin/python tests/torture.py -n $(N)
+fuzz: .venv/.dev  ## mutants of every input into every parser, N=500 each (nightly: make fuzz N=10000 SEED=$$RANDOM)
+	@PYTHONPATH=tests .venv/bin/python -m fuzzing -n $(or $(N),500) $(if $(SEED),--seed $(SEED)) $(foreach t,$(TARGET),--target $(t))
+torture: .venv/.dev  ## kill run, render, export, import and evaluate N=100 times and compare what repeating them leaves
+	@.venv/bin/python tests/torture.py -n $(or $(N),100)
 
 lint: .venv/.dev  ## ruff and mypy --strict
 	@.venv/bin/ruff check .

@@ -7,13 +7,13 @@ default, so that a stage can be called as a library function without a file.
 from __future__ import annotations
 
 import difflib
-import tomllib
 from pathlib import Path
 from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from aerialdojo_gen.agreement import disagreements
+from aerialdojo_gen.bounded import read_toml
 from aerialdojo_gen.errors import ConfigError
 
 RendererName = Literal["gl", "pybullet"]
@@ -30,8 +30,8 @@ class Section(BaseModel):
 class Embodiment(Section):
     """The drone's body (paper, section on the embodiment)."""
 
-    radius_m: float = Field(0.25, gt=0, description="radius of the collision sphere")
-    wheelbase_m: float = Field(0.25, gt=0, description="distance between opposite rotors; told to agents")
+    radius_m: float = Field(0.25, gt=0, le=10, description="radius of the collision sphere")
+    wheelbase_m: float = Field(0.25, gt=0, le=10, description="distance between opposite rotors; told to agents")
 
 
 class BuildScenesConfig(Section):
@@ -74,29 +74,38 @@ class VlmConfig(Section):
     base_url: str | None = Field(None, description="where the endpoint is; OPENAI_BASE_URL, else OpenAI's own")
     temperature: float | None = Field(0.0, ge=0, le=2, description="of its answers")
     picture_px: int = Field(336, ge=32, le=2048, description="longest side of a picture that it is shown")
-    max_tokens: int = Field(1000, ge=16, description="longest answer")
-    timeout_s: float = Field(60.0, gt=0, description="longest wait for an answer")
+    max_tokens: int = Field(1000, ge=16, le=1_000_000, description="longest answer")
+    timeout_s: float = Field(60.0, gt=0, le=86_400, description="longest wait for an answer")
     retries: int = Field(4, ge=0, le=20, description="how often a failed request is sent again")
 
 
 class AnchorSampleConfig(Section):
     """Candidate viewpoints around each object (paper: anchors)."""
 
-    standoff_m: float = Field(1.0, gt=0, description="distance from the object's surface")
-    azimuths: int = Field(16, ge=3, description="directions in the plane that candidates are placed in")
+    standoff_m: float = Field(1.0, gt=0, le=100, description="distance from the object's surface")
+    azimuths: int = Field(16, ge=3, le=720, description="directions in the plane that candidates are placed in")
     elevations_deg: tuple[float, ...] = Field(
-        (-15.0, 0.0, 15.0, 30.0), min_length=1, description="elevations of the candidates, seen from the centroid"
+        (-15.0, 0.0, 15.0, 30.0),
+        min_length=1,
+        max_length=64,
+        description="elevations of the candidates, seen from the centroid",
     )
     level_heights: tuple[float, ...] = Field(
-        (0.2, 0.8), description="heights of more level candidates around a tall object, 0 bottom, 1 top"
+        (0.2, 0.8),
+        max_length=64,
+        description="heights of more level candidates around a tall object, 0 bottom, 1 top",
     )
-    margin_m: float = Field(0.05, ge=0, description="free space that a candidate needs beyond the body's radius")
-    surface_points: int = Field(256, ge=8, description="points of the object's surface that rays are cast to")
+    margin_m: float = Field(
+        0.05, ge=0, le=10, description="free space that a candidate needs beyond the body's radius"
+    )
+    surface_points: int = Field(
+        256, ge=8, le=100_000, description="points of the object's surface that rays are cast to"
+    )
     fov_deg: float = Field(90.0, gt=0, lt=180, description="field of view of the front camera")
     min_visible_fraction: float = Field(0.3, ge=0, le=1, description="visible fraction below which nothing is seen")
-    pictured: int = Field(6, ge=1, description="candidates an object that are pictured and scored")
+    pictured: int = Field(6, ge=1, le=1000, description="candidates an object that are pictured and scored")
     picture_px: int = Field(96, ge=16, le=1024, description="edge of those pictures")
-    shortlist: int = Field(3, ge=1, description="anchors kept an object")
+    shortlist: int = Field(3, ge=1, le=1000, description="anchors kept an object")
     separation_deg: float = Field(45.0, gt=0, le=180, description="wanted azimuth between kept anchors")
     weights: ScorerWeights = ScorerWeights()
     clip: ClipConfig | None = None
@@ -117,39 +126,45 @@ class ReferenceImagesConfig(Section):
 class PairObjectsConfig(Section):
     """Candidate tasks: ordered pairs of objects times the start object's anchors."""
 
-    start_variants: int = Field(3, ge=1, description="how many anchors of the start object may start a task")
+    start_variants: int = Field(3, ge=1, le=1000, description="how many anchors of the start object may start a task")
     min_euclidean_m: float = Field(3.0, ge=0, description="d_E at or below which no task is kept")
-    max_length_m: float = Field(100.0, gt=0, description="L at or above which no task is kept")
-    max_approach_m: float = Field(1.0, ge=0, description="longest straight Approach at the end of a route")
+    max_length_m: float = Field(100.0, gt=0, le=10_000, description="L at or above which no task is kept")
+    max_approach_m: float = Field(1.0, ge=0, le=100, description="longest straight Approach at the end of a route")
 
 
 class Rung(Section):
     """One search of the planner's ladder."""
 
-    weight: float = Field(gt=0, description="of the cost-to-go; 1 is plain A*")
+    weight: float = Field(gt=0, le=1000, description="of the cost-to-go; 1 is plain A*")
     budget: int = Field(ge=1, le=2_000_000, description="most expansions")
-    duplicate_cell_m: float = Field(0.5, gt=0, description="edge of the cells in which states are duplicates")
+    duplicate_cell_m: float = Field(
+        0.5, ge=0.01, le=100, description="edge of the cells in which states are duplicates"
+    )
     heading_sectors: Literal[1, 2, 3, 4, 6, 8, 12, 24] = Field(1, description="headings told apart in a cell")
-    extra_radius_m: float = Field(0.0, ge=0, description="added to the radius while searching")
+    extra_radius_m: float = Field(0.0, ge=0, le=10, description="added to the radius while searching")
 
 
 class PlanConfig(Section):
     """Reference trajectories."""
 
-    targets_per_part: int = Field(8, ge=1, description="targets whose plans share a shard")
-    cell_m: float = Field(0.5, gt=0, description="edge of the cells of clearance grid and cost-to-go")
-    margin_m: float = Field(0.002, ge=0, description="added to the body's radius in the search alone")
-    max_length_m: float = Field(100.0, gt=0, description="longest route worth planning")
-    length_slack: float = Field(1.04, ge=1, description="the cost-to-go may exceed it by this: it overestimates")
-    max_approach_m: float = Field(1.0, gt=0, description="longest straight Approach at the end")
+    targets_per_part: int = Field(8, ge=1, le=100_000, description="targets whose plans share a shard")
+    cell_m: float = Field(0.5, ge=0.05, le=10, description="edge of the cells of clearance grid and cost-to-go")
+    margin_m: float = Field(0.002, ge=0, le=10, description="added to the body's radius in the search alone")
+    max_length_m: float = Field(100.0, gt=0, le=10_000, description="longest route worth planning")
+    length_slack: float = Field(
+        1.04, ge=1, le=100, description="the cost-to-go may exceed it by this: it overestimates"
+    )
+    max_approach_m: float = Field(1.0, gt=0, le=100, description="longest straight Approach at the end")
     min_detour_ratio: float = Field(
         0.0, ge=0, description="no search where a grid path is shorter than this times d_E"
     )
-    action_cost_m: float = Field(0.02, ge=0, description="what an action costs beside its metres: breaks ties")
-    sideways_actions_per_m: float = Field(
-        1.0, ge=0, description="what a metre flown sideways counts as: the front camera should see the way"
+    action_cost_m: float = Field(
+        0.02, ge=0, le=100, description="what an action costs beside its metres: breaks ties"
     )
-    clearance_cap_m: float = Field(5.0, gt=0, description="clearances are known up to this distance")
+    sideways_actions_per_m: float = Field(
+        1.0, ge=0, le=1000, description="what a metre flown sideways counts as: the front camera should see the way"
+    )
+    clearance_cap_m: float = Field(5.0, gt=0, le=100, description="clearances are known up to this distance")
     prove_by_grid: bool = Field(True, description="leave FCL unasked about legs that the grid proves free")
     ladder: tuple[Rung, ...] = Field(
         (
@@ -158,6 +173,7 @@ class PlanConfig(Section):
             Rung(weight=1.15, budget=40_000, duplicate_cell_m=0.25, heading_sectors=4),
         ),
         min_length=1,
+        max_length=16,
         description="searches tried in turn until FCL accepts what one of them finds",
     )
 
@@ -234,11 +250,11 @@ class RenderConfig(Section):
     width: int = Field(640, ge=16, le=4096, multiple_of=2, description="columns, pixels")
     height: int = Field(640, ge=16, le=4096, multiple_of=2, description="rows, pixels")
     fov_deg: float = Field(90.0, gt=0, lt=180, description="horizontal field of view")
-    fps: float = Field(15.0, gt=0, le=240, description="frames a second; for steps, how fast the video plays")
-    cruise_m_s: float = Field(3.0, gt=0, description="speed along the path, for sampling by time")
-    yaw_rate_deg_s: float = Field(90.0, gt=0, description="speed of turns, for sampling by time")
+    fps: float = Field(15.0, ge=0.01, le=240, description="frames a second; for steps, how fast the video plays")
+    cruise_m_s: float = Field(3.0, ge=0.01, le=1000, description="speed along the path, for sampling by time")
+    yaw_rate_deg_s: float = Field(90.0, ge=0.1, le=36_000, description="speed of turns, for sampling by time")
     crf: int = Field(23, ge=0, le=51, description="quality of the pictures' H.264, lower is better")
-    trajectories_per_part: int = Field(8, ge=1, description="trajectories that share a shard")
+    trajectories_per_part: int = Field(8, ge=1, le=100_000, description="trajectories that share a shard")
 
 
 class Pipeline(Section):
@@ -296,13 +312,11 @@ def load_pipeline(path: Path) -> Pipeline:
         contradict each other; every fault is named.
     """
     try:
-        raw = tomllib.loads(path.read_text(encoding="utf-8"))
+        raw = read_toml(path, ConfigError, finite=False)
     except FileNotFoundError:
         known = sorted(p.name for p in path.parent.glob("*.toml")) if path.parent.is_dir() else []
         hint = f"; there are {', '.join(known)} in {path.parent}" if known else ""
         raise ConfigError(f"no pipeline file {path}{hint}") from None
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise ConfigError(f"{path}: {error}") from None
     for key in ("scene_assets", "recipes", "annotations"):
         if isinstance(raw.get(key), str):
             raw[key] = (path.parent / raw[key]).resolve()

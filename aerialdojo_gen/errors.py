@@ -33,6 +33,10 @@ class AssetError(AerialDojoError):
     """A recipe, a prop or a mesh is missing or wrong."""
 
 
+class ShapeError(AssetError, ValueError):
+    """Sizes or counts of a shape make no body, or one that is too large; who knows its file names that too."""
+
+
 class AnnotationError(AerialDojoError):
     """An annotation file is wrong; the message lists every error in it."""
 
@@ -55,6 +59,14 @@ class RenderError(AerialDojoError):
 
 class ImportRefused(AerialDojoError):  # noqa: N818 - named for what is done with the file
     """A task file of another benchmark is damaged or has rows that make no sense; the message names each."""
+
+
+class Malformed(AerialDojoError, ValueError):  # noqa: N818 - it says what the text is
+    """A text is not TOML or JSON; the message names the place."""
+
+
+class BeyondBounds(Malformed):
+    """A text is TOML or JSON, but larger, deeper or with other numbers or characters than anything here can use."""
 
 
 def first_line(error: BaseException) -> str:

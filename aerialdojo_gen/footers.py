@@ -12,6 +12,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from aerialdojo_gen.bounded import loads_json
+from aerialdojo_gen.errors import Malformed
+
 _KEYS = frozenset({"fingerprint", "content", "columns", "rows", "parts", "summary", "files", "checksum"})
 # Of a footer that vouches for nothing; logs and releases of then are still read.
 _EARLIER_KEYS = _KEYS - {"columns", "checksum"}
@@ -87,8 +90,8 @@ def decode(raw: bytes) -> ShardInfo:
         It is damaged, or somebody else's.
     """
     try:
-        facts = json.loads(raw)
-    except (ValueError, RecursionError):
+        facts = loads_json(raw)
+    except Malformed:
         raise ValueError("its footer is no JSON") from None
     if not isinstance(facts, dict):
         raise ValueError("its footer is no JSON object")

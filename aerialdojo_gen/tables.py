@@ -9,7 +9,7 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from aerialdojo_gen.errors import StoreError
+from aerialdojo_gen.errors import StoreError, first_line
 from aerialdojo_gen.schemas import TableSpec
 
 
@@ -30,15 +30,21 @@ def from_rows(spec: TableSpec, rows: Sequence[Mapping[str, Any]]) -> pa.Table:
     Raises
     ------
     StoreError
-        A row lacks a column or has one that the schema does not know: pyarrow would fill or drop it silently.
+        A row lacks a column or has one that the schema does not know (pyarrow would fill or drop it silently), or a
+        value that its column cannot hold.
     """
     names = set(spec.schema.names)
     for row in rows:
+        if not isinstance(row, Mapping):
+            raise StoreError(f"a row of {spec.name} is no mapping of columns to values: {type(row).__name__}")
         if row.keys() != names:
             missing, unknown = sorted(names - row.keys()), sorted(row.keys() - names)
             raise StoreError(f"a row of {spec.name} lacks {missing} and has unknown {unknown}")
-    ordered = sorted(rows, key=lambda row: tuple(row[k] for k in spec.order))
-    return pa.Table.from_pylist(ordered, schema=spec.schema)
+    try:
+        ordered = sorted(rows, key=lambda row: tuple(row[k] for k in spec.order))
+        return pa.Table.from_pylist(ordered, schema=spec.schema)
+    except (pa.ArrowException, TypeError, ValueError, OverflowError) as error:
+        raise StoreError(f"a row of {spec.name} has a value of another type: {first_line(error)}") from error
 
 
 def check_table(spec: TableSpec, table: pa.Table) -> pa.Table:

@@ -48,7 +48,7 @@ def test_records_are_what_json_reads_whatever_the_chunks(tmp_path_factory, rows,
         ('[{"a": 1} {"a": 2}]', r"row 0: expected , or \], found '{'"),
         ('[{"a": 1},]', "row 1: damaged or truncated"),
         ('[{"a": 1}] x', "the end: 'x' after the end of the value"),
-        ("[" * 100_000, "row 0: damaged or truncated|row 0: .*nested too deeply"),
+        ("[" * 100_000, "row 0: nested more than 64 deep"),
         ('[{"a": ' + "9" * 5000 + "}]", "row 0: damaged or truncated"),
     ],
 )

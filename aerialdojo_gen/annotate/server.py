@@ -107,7 +107,9 @@ def make_app(desk: Desk, *, any_host: bool = False) -> FastAPI:
         assert isinstance(error, RequestValidationError)
         first = error.errors()[0]
         where = ".".join(str(part) for part in first["loc"])
-        return JSONResponse({"error": f"malformed request: {where}: {first['msg']}"[:500]}, status_code=422)
+        # A key of the request may be half a character, which no answer can be written with.
+        said = f"malformed request: {where}: {first['msg']}"[:500].encode("utf-8", "replace").decode()
+        return JSONResponse({"error": said}, status_code=422)
 
     @app.exception_handler(HTTPException)
     def refused(_: Request, error: Exception) -> JSONResponse:

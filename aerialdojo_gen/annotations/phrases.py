@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import tomllib
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
 from aerialdojo_gen.annotations.claims import spoken
+from aerialdojo_gen.bounded import read_toml
 from aerialdojo_gen.errors import AnnotationError
 from aerialdojo_gen.scenes.model import Instance
 
@@ -54,7 +54,7 @@ class Words:
 def _tables() -> tuple[dict[str, dict[str, object]], dict[str, str]]:
     tables: dict[str, dict[str, object]] = {}
     for path in _files():
-        for name, entry in tomllib.loads(path.read_text(encoding="utf-8")).items():
+        for name, entry in read_toml(path, AnnotationError).items():
             if name in tables:
                 raise AnnotationError(f"{path}: [{name}] stands in another file of its folder already")
             tables[name] = entry
@@ -70,7 +70,7 @@ def _files() -> list[Path]:
 @cache
 def _colours() -> frozenset[str]:
     path = Path(__file__).parent / "phrases" / "common.toml"
-    return frozenset(tomllib.loads(path.read_text(encoding="utf-8"))["colours"])
+    return frozenset(read_toml(path, AnnotationError)["colours"])
 
 
 def words_of(category: str, name: str | None, kind: str, looks: tuple[str, ...] = (), target: bool = True) -> Words:

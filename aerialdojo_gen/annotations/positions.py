@@ -9,7 +9,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, cast
 
-JsonPath = tuple[str | int, ...]
+from aerialdojo_gen.bounded import JsonPath, beyond, scan_json
+from aerialdojo_gen.errors import BeyondBounds
 
 
 @dataclass(frozen=True)
@@ -112,15 +113,23 @@ def read_json(text: str) -> Document:
         A syntax error is a fault in it, with ``value`` None; of a key that stands twice the last value is kept.
     """
     try:
+        scan_json(text)
         root = cast(_Located, _Decoder().decode(text))
     except json.JSONDecodeError as error:
         return Document(None, {}, (Fault(error.lineno, "", f"not JSON: {error.msg} (column {error.colno})"),))
+    except BeyondBounds as error:
+        return Document(None, {}, (Fault(0, "", str(error)),))
     except (RecursionError, ValueError) as error:
         return Document(None, {}, (Fault(0, "", f"not readable as JSON: {error}"),))
     starts = [i for i, c in enumerate(text) if c == "\n"]
     lines: dict[JsonPath, int] = {}
     faults: list[Fault] = []
     value = _unwrap(root, (), starts, lines, faults)
+    found = beyond(value, finite=False, integers=False)
+    if found is not None:
+        # What holds such a text can be neither shown nor written: nothing of the file is used.
+        path, why = found
+        return Document(None, lines, (Document(None, lines, ()).fault(path, why),))
     return Document(value, lines, tuple(faults))
 
 

@@ -9,6 +9,8 @@ from types import TracebackType
 from typing import Any
 
 from aerialdojo_gen.atomic import disk_error
+from aerialdojo_gen.bounded import loads_json
+from aerialdojo_gen.errors import Malformed, StoreError
 
 
 class Journal:
@@ -48,10 +50,23 @@ class Journal:
 
 
 def read(path: Path) -> Iterator[dict[str, Any]]:
-    """Yield the records of a journal; a line that a kill cut short is no record."""
+    """Yield the records of a journal; a line that a kill cut short is no record.
+
+    Raises
+    ------
+    StoreError
+        Another line is no record: the message names it.
+    """
     with path.open("rb") as file:
-        for line in file:
+        for number, line in enumerate(file, start=1):
             if not line.endswith(b"\n"):
                 return
-            record: dict[str, Any] = json.loads(line)
+            try:
+                record = loads_json(line, finite=False)
+            except Malformed as error:
+                raise StoreError(
+                    f"{path}: line {number} is damaged ({error}): delete the file, or --restart"
+                ) from None
+            if not isinstance(record, dict):
+                raise StoreError(f"{path}: line {number} is no record: delete the file, or --restart")
             yield record

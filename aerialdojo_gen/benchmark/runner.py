@@ -28,6 +28,7 @@ from aerialdojo_gen.benchmark.goal import Sensors
 from aerialdojo_gen.benchmark.tasks import Selection, select
 from aerialdojo_gen.benchmark.worker import Finished, Unit
 from aerialdojo_gen.benchmark.workers import fly_units
+from aerialdojo_gen.bounded import read_json
 from aerialdojo_gen.config import Embodiment
 from aerialdojo_gen.errors import UsageError
 from aerialdojo_gen.interrupt import Interrupts
@@ -231,7 +232,9 @@ class _Run:
         mend = "give another --run, or --restart"
         # One that has finished nothing may yet become another: an agent's options may have been wrong.
         if begun and path.is_file():
-            before, own = json.loads(path.read_text(encoding="utf-8")), ("data", "code")
+            before, own = read_json(path, UsageError), ("data", "code")
+            if not isinstance(before, dict):
+                raise UsageError(f"{path} holds no settings of a run: {mend}")
             for key, value in self._settings.items():
                 if before.get(key) != value:
                     what = f"{key} = {before.get(key)!r}, not {value!r}"

@@ -31,7 +31,7 @@ Scene = Annotated[
 PipelineFile = Annotated[
     Path | None, typer.Option("--pipeline", help=f"Pipeline file.  (default: pipelines/{DEFAULT_PIPELINE})")
 ]
-Workers = Annotated[int | None, typer.Option("--workers", min=1, help="Processes.  (default: all cores)")]
+Workers = Annotated[int | None, typer.Option("--workers", min=1, max=1024, help="Processes.  (default: all cores)")]
 Force = Annotated[bool, typer.Option("--force", help="Compute this stage's shards even where they are fresh.")]
 Replace = Annotated[
     bool, typer.Option("--replace", help="Put this release in the place of another pipeline's, which is lost.")

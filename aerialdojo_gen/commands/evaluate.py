@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import json
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from aerialdojo_gen.bounded import loads_json
 from aerialdojo_gen.commands.common import Data, PipelineFile, Quiet, Scene, Workers, default_workers, open_pipeline
-from aerialdojo_gen.errors import UsageError
+from aerialdojo_gen.errors import BeyondBounds, Malformed, UsageError
 
 if TYPE_CHECKING:
     from aerialdojo_gen.benchmark.goal import Sensors
@@ -46,14 +46,18 @@ def evaluate(
     view: Annotated[
         list[str] | None, typer.Option("--view", help="front, left, right, down; in place of the agent's own.")
     ] = None,
-    width: Annotated[int | None, typer.Option("--width", min=1, help="Columns; in place of the agent's own.")] = None,
-    height: Annotated[int | None, typer.Option("--height", min=1, help="Rows; in place of the agent's own.")] = None,
+    width: Annotated[
+        int | None, typer.Option("--width", min=1, max=4096, help="Columns; in place of the agent's own.")
+    ] = None,
+    height: Annotated[
+        int | None, typer.Option("--height", min=1, max=4096, help="Rows; in place of the agent's own.")
+    ] = None,
     renderer: Annotated[str, typer.Option("--renderer", help="auto, gl or pybullet.")] = "auto",
     out: Annotated[
         Path | None, typer.Option("--out", help="Where the log goes.  (default: the data directory)")
     ] = None,
     attempts: Annotated[
-        int, typer.Option("--attempts", min=1, help="Tries of an episode where something outside fails.")
+        int, typer.Option("--attempts", min=1, max=1000, help="Tries of an episode where something outside fails.")
     ] = 5,
     rerun_failed: Annotated[
         bool, typer.Option("--rerun-failed", help="Fly those again that failed for reasons outside the agent.")
@@ -104,8 +108,10 @@ def _options(given: list[str]) -> dict[str, Any]:
         if not equals or not key.isidentifier():
             raise UsageError(f"--option {item!r}: write key=value")
         try:
-            options[key] = json.loads(value)
-        except ValueError:
+            options[key] = loads_json(value)
+        except BeyondBounds as error:
+            raise UsageError(f"--option {key}: {error}") from None
+        except Malformed:
             options[key] = value
     return options
 

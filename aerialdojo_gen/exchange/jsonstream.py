@@ -12,6 +12,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, BinaryIO
 
+from aerialdojo_gen.bounded import MAX_DEPTH, loads_json, too_deep
 from aerialdojo_gen.errors import ImportRefused
 
 RECORD_LIMIT = 16 << 20
@@ -71,12 +72,16 @@ class _Text:
         while True:
             try:
                 value, end = self._json.raw_decode(self._text, self._at)
-            except (ValueError, RecursionError) as error:
-                why = "nested too deeply" if isinstance(error, RecursionError) else getattr(error, "msg", str(error))
+            except RecursionError:
+                raise self.fail(f"nested more than {MAX_DEPTH} deep") from None
+            except ValueError as error:
+                why = getattr(error, "msg", str(error))
             else:
                 # A number may go on beyond what is read: 1, 1. and 1.5e+ begin alike.
                 cut = type(value) in (int, float) and len(self._text) - end < _LONGEST_EXPONENT
                 if self._done or (end < len(self._text) and not (cut and self._text[end] in ".eE")):
+                    if too_deep(value):
+                        raise self.fail(f"nested more than {MAX_DEPTH} deep")
                     self._at = end
                     return value
                 why = ""
@@ -166,7 +171,7 @@ def small_document(path: Path, *, limit: int = RECORD_LIMIT) -> Any:
     Raises
     ------
     ValueError
-        It is larger, not UTF-8 or not JSON; the message says which.
+        It is larger, not UTF-8, not JSON or beyond the bounds of `aerialdojo_gen.bounded`; the message says which.
     OSError
         It cannot be read.
     """
@@ -174,9 +179,5 @@ def small_document(path: Path, *, limit: int = RECORD_LIMIT) -> Any:
         raw = file.read(limit + 1)
     if len(raw) > limit:
         raise ValueError(f"is larger than {limit >> 10:,} KiB")
-    try:
-        return json.loads(raw)
-    except RecursionError:
-        raise ValueError("is nested too deeply") from None
-    except ValueError as error:
-        raise ValueError(f"is no JSON ({error})") from None
+    # NaN is a value to be named in its row.
+    return loads_json(raw, finite=False)

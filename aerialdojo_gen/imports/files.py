@@ -7,7 +7,6 @@ to is read from beside it or not at all.
 
 from __future__ import annotations
 
-import json
 import re
 import resource
 import struct
@@ -20,6 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from aerialdojo_gen.bounded import loads_json
 from aerialdojo_gen.errors import AssetError
 from aerialdojo_gen.imports.raw import RawNode, joined, plain
 from aerialdojo_gen.staging import scratch_folder
@@ -72,15 +72,26 @@ def read_mesh(path: Path, max_memory_bytes: int = MAX_MEMORY_BYTES) -> list[RawN
         if ended.returncode:
             said = ended.stdout.strip().splitlines()
             raise AssetError(f"{path}: {said[-1] if said else 'its reader crashed: damaged, or too large'}")
-        return _unpacked(out)
+        return unpacked(out)
 
 
-def _work(path: Path, out: Path, max_memory_bytes: int) -> str:
-    """Read in a process of its own; returns an empty string, or what is wrong."""
+def read_into(path: Path, out: Path) -> str:
+    """Read a mesh file without bounds on memory and time: for a process of its own that has them.
+
+    Parameters
+    ----------
+    path : Path
+        The mesh file.
+    out : Path
+        Where the nodes go; `read_mesh` reads them from there.
+
+    Returns
+    -------
+    str
+        What is wrong with the file; empty where nothing is.
+    """
     # What readers grumble about is repaired and reported later.
     warnings.simplefilter("ignore")
-    resource.setrlimit(resource.RLIMIT_AS, (max_memory_bytes, max_memory_bytes))
-    resource.setrlimit(resource.RLIMIT_CPU, (MAX_SECONDS, MAX_SECONDS))
     try:
         nodes = [n for n in _read(path) if len(n.faces)]
         total = sum(len(n.faces) for n in nodes)
@@ -92,7 +103,8 @@ def _work(path: Path, out: Path, max_memory_bytes: int) -> str:
     except AssetError as error:
         return str(error)
     except (MemoryError, ImportError):
-        return f"needs more than {max_memory_bytes >> 20} MiB to read: simplify or split the mesh"
+        most = resource.getrlimit(resource.RLIMIT_AS)[0] >> 20
+        return f"needs more than {most} MiB to read: simplify or split the mesh"
     except Exception as error:  # a foreign file may make a reader fail in any way: it is named, never let through
         first = (str(error).splitlines() or [""])[0]
         return f"cannot be read ({type(error).__name__}{': ' + first[:120] if first else ''})"
@@ -207,7 +219,7 @@ def look_over_glb(path: Path) -> None:
         if version != 2 or kind != 0x4E4F534A or length > MAX_FILE_BYTES // 4:
             raise AssetError("is no GLB 2 file")
         try:
-            document = json.loads(file.read(length))
+            document = loads_json(file.read(length), finite=False)
             accessors = document.get("accessors", [])
             counts = [int(a["count"]) for a in accessors]
             shown = sum(
@@ -236,7 +248,8 @@ def _pack(nodes: list[RawNode], out: Path) -> None:
     np.savez(out, **arrays)
 
 
-def _unpacked(path: Path) -> list[RawNode]:
+def unpacked(path: Path) -> list[RawNode]:
+    """Return the nodes that `read_into` wrote."""
     with np.load(path, allow_pickle=False) as file:
         return [
             RawNode(str(name), file[f"v{k}"], file[f"f{k}"], file[f"c{k}"]) for k, name in enumerate(file["names"])
@@ -244,6 +257,9 @@ def _unpacked(path: Path) -> list[RawNode]:
 
 
 if __name__ == "__main__":
-    fault = _work(Path(sys.argv[1]), Path(sys.argv[2]), int(sys.argv[3]))
+    memory = int(sys.argv[3])
+    resource.setrlimit(resource.RLIMIT_AS, (memory, memory))
+    resource.setrlimit(resource.RLIMIT_CPU, (MAX_SECONDS, MAX_SECONDS))
+    fault = read_into(Path(sys.argv[1]), Path(sys.argv[2]))
     print(fault)
     raise SystemExit(1 if fault else 0)

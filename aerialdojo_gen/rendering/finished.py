@@ -13,8 +13,12 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from aerialdojo_gen.bounded import read_json
 from aerialdojo_gen.config import RenderConfig
+from aerialdojo_gen.errors import StoreError
 from aerialdojo_gen.files import is_whole
+from aerialdojo_gen.schemas import RECORDINGS
+from aerialdojo_gen.tables import check_table, from_rows
 
 NOTE = "recording.json"
 # What does not change a trajectory's own files: which others are recorded, and how they are shared out.
@@ -64,14 +68,26 @@ def find(data: Path, folder: str, fingerprint: str, *, verify: bool = False) -> 
         Compare the files' digests too, not their sizes alone.
     """
     try:
-        note = json.loads((data / folder / NOTE).read_text(encoding="utf-8"))
-        if note["fingerprint"] != fingerprint:
-            return None
-        rows: list[dict[str, Any]] = note["recordings"]
-        whole = all(is_whole(data / row["path"], row["bytes"], row["sha256"] if verify else None) for row in rows)
-    except (OSError, ValueError, KeyError, TypeError):
+        note = read_json(data / folder / NOTE)
+    except (OSError, StoreError):
         return None
+    if not isinstance(note, dict) or note.get("fingerprint") != fingerprint:
+        return None
+    rows = note.get("recordings")
+    if not isinstance(rows, list) or not _are_recordings(rows, folder):
+        return None
+    whole = all(is_whole(data / row["path"], row["bytes"], row["sha256"] if verify else None) for row in rows)
     return rows if whole else None
+
+
+def _are_recordings(rows: list[Any], folder: str) -> bool:
+    """Whether these are rows of `recordings`, each of a file in the trajectory's own folder."""
+    try:
+        table = check_table(RECORDINGS, from_rows(RECORDINGS, rows))
+    except StoreError:
+        return False
+    paths = [path.rpartition("/") for path in table["path"].to_pylist()]
+    return bool(rows) and all(own == folder and name not in ("", ".", "..") for own, _, name in paths)
 
 
 def note(folder: Path, fingerprint: str, rows: list[dict[str, Any]]) -> None:

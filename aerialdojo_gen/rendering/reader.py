@@ -10,7 +10,6 @@ The files are plain ones, for any other reader: `docs/recordings.md` has example
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,7 +20,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from aerialdojo_gen.errors import RenderError
+from aerialdojo_gen.bounded import loads_json
+from aerialdojo_gen.errors import Malformed, RenderError
 from aerialdojo_gen.rendering.codecs import SUFFIX, to_metres
 
 
@@ -30,7 +30,7 @@ class Video(Sequence[NDArray[Any]]):
 
     Parameters
     ----------
-    path : Path
+    path : str or Path
         What `aerialdojo_gen.rendering.codecs.VideoWriter` or `PngWriter` wrote.
 
     Raises
@@ -39,7 +39,8 @@ class Video(Sequence[NDArray[Any]]):
         The file cannot be read, or is cut off: the message names it.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: str | Path) -> None:
+        path = Path(path)
         self.path = path
         self._frames: Iterator[Any] = iter(())
         self._next = -1
@@ -50,12 +51,14 @@ class Video(Sequence[NDArray[Any]]):
         try:
             with av.open(str(path)) as container:
                 stream = container.streams.video[0]
+                if stream.format is None:
+                    raise RenderError(f"{path} says nothing of its pictures: render it again")
                 self.metadata = {k.lower(): v for k, v in container.metadata.items()}
                 self.fps = float(stream.average_rate or 0)
                 self.width, self.height = stream.width, stream.height
                 self._depth = stream.format.name.startswith("gray16")
                 self._pts = sorted(p.pts for p in container.demux(stream) if p.pts is not None)
-        except (av.FFmpegError, OSError, IndexError) as error:
+        except (av.FFmpegError, OSError, IndexError, UnicodeDecodeError) as error:
             raise RenderError(f"{path} is no video that can be read ({error}): render it again") from None
 
     def _open_folder(self) -> None:
@@ -63,7 +66,8 @@ class Video(Sequence[NDArray[Any]]):
         camera = self.path / "camera.json"
         if not self._files or not camera.is_file():
             raise RenderError(f"{self.path} holds no frames: render it again")
-        self.metadata = {"comment": camera.read_text(encoding="utf-8")}
+        # What is not UTF-8 is no JSON either, and `read_recording` says so.
+        self.metadata = {"comment": camera.read_text(encoding="utf-8", errors="surrogateescape")}
         self.fps = 0.0
         self._pts = list(range(len(self._files)))
         self.height, self.width = self._png(0).shape[:2]
@@ -169,12 +173,12 @@ class Recording:
         return len(next(iter(self.rgb.values())))
 
 
-def read_recording(folder: Path) -> Recording:
+def read_recording(folder: str | Path) -> Recording:
     """Open a recording.
 
     Parameters
     ----------
-    folder : Path
+    folder : str or Path
         ``<data>/media/<scene>/<nav_id>``.
 
     Returns
@@ -187,14 +191,25 @@ def read_recording(folder: Path) -> Recording:
     RenderError
         There is no recording, a video is missing or damaged, or the videos differ in length.
     """
+    folder = Path(folder)
     rgb, depth, instance = (_videos(folder, modality) for modality in ("rgb", "depth", "instance"))
     if not rgb or rgb.keys() != depth.keys() or (instance and instance.keys() != rgb.keys()):
         raise RenderError(f"no complete recording in {folder}: run aerialdojo-gen render")
     if len({len(v) for v in (*rgb.values(), *depth.values(), *instance.values())}) != 1:
         raise RenderError(f"the videos in {folder} differ in length: render them again")
-    cameras = {view: json.loads(video.metadata.get("comment", "{}")) for view, video in rgb.items()}
+    cameras = {view: _camera(video) for view, video in rgb.items()}
     metres = {view: DepthVideo(video) for view, video in depth.items()}
     return Recording(rgb, metres, cameras, next(iter(rgb.values())).fps, instance)
+
+
+def _camera(video: Video) -> dict[str, Any]:
+    try:
+        camera = loads_json(video.metadata.get("comment", "{}"))
+    except Malformed as error:
+        raise RenderError(f"{video.path}: what it says of its camera {error}: render it again") from None
+    if not isinstance(camera, dict):
+        raise RenderError(f"{video.path}: what it says of its camera is no object: render it again")
+    return camera
 
 
 def _videos(folder: Path, modality: str) -> dict[str, Video]:

@@ -58,7 +58,10 @@ def build_scene(recipe_path: Path, catalogue: Catalogue) -> Scene:
             f"{recipe_path}: parameters: unknown key {key!r}: layout {recipe.layout!r} has no parameters"
         )
     site = Site(recipe_path.stem, recipe, catalogue, parameters)
-    layout.build(site)
+    try:
+        layout.build(site)
+    except AssetError as error:
+        raise AssetError(f"{recipe_path}: layout {recipe.layout!r}: {error}") from error
     scene = site.scene()
     _check_inventory(scene, recipe, recipe_path)
     return scene

@@ -9,14 +9,14 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from aerialdojo_gen.errors import AssetError
+from aerialdojo_gen.errors import AssetError, ShapeError
 from aerialdojo_gen.scenes.builders import builders
 from aerialdojo_gen.scenes.catalogue_files import TARGETS, catalogue_files
 from aerialdojo_gen.scenes.materials import MaterialLibrary, load_materials, nearest, read_toml, refuse_unknown
 from aerialdojo_gen.scenes.mesh import Mesh, areas, merge, rotation, to_part
 from aerialdojo_gen.scenes.model import Instance, Part
 from aerialdojo_gen.scenes.prop import Category, Variant, parse_category
-from aerialdojo_gen.scenes.vocabulary import part_mesh
+from aerialdojo_gen.scenes.vocabulary import MAX_TRIANGLES, part_mesh
 
 _MATERIALS = "materials.toml"
 _CACHE_SIZE = 2000
@@ -124,7 +124,10 @@ class Catalogue:
                     self._parts.clear()
                 self._parts[key] = self._assembled(prop, look, sizes, surfaces, words, shape_seed)
             parts = self._parts[key]
-        return Instance(node, category, look.name, words, placed(parts, position, yaw_deg, scale))
+        there = placed(parts, position, yaw_deg, scale)
+        if not there:
+            raise AssetError(f"{prop.source}: no triangle of variant {look.name!r} has an area")
+        return Instance(node, category, look.name, words, there)
 
     def _draw_variant(self, prop: Category, name: str | None, rng: np.random.Generator) -> Variant:
         weights = np.array([v.weight for v in prop.variants])
@@ -162,8 +165,11 @@ class Catalogue:
                 own = {**part, "seed": shape_seed + k * _CROWN_SHAPES}
             try:
                 meshes.append((part["role"], part_mesh(own, sizes, words)))
-            except (ValueError, TypeError) as error:
+            except ShapeError as error:
                 raise AssetError(f"{prop.source} parts[{k}] ({part['shape']}): {error}") from error
+        total = sum(len(body.faces) for _, body in meshes)
+        if total > MAX_TRIANGLES:
+            raise AssetError(f"{prop.source} has {total:,} triangles, {MAX_TRIANGLES:,} are the most")
         return self._textured(prop, meshes, surfaces)
 
     def _built(

@@ -8,6 +8,9 @@ import operator
 from collections.abc import Callable, Mapping
 from functools import lru_cache
 
+from aerialdojo_gen.errors import ShapeError
+
+_LONGEST = 200
 _BINARY: dict[type[ast.operator], Callable[[float, float], float]] = {
     ast.Add: operator.add,
     ast.Sub: operator.sub,
@@ -17,11 +20,19 @@ _BINARY: dict[type[ast.operator], Callable[[float, float], float]] = {
     ast.Mod: operator.mod,
 }
 _UNARY: dict[type[ast.unaryop], Callable[[float], float]] = {ast.UAdd: operator.pos, ast.USub: operator.neg}
+
+
+def _round(value: float, digits: float = 0) -> float:
+    return round(value, int(digits)) if digits else round(value)
+
+
 _FUNCTIONS: dict[str, Callable[..., float]] = {
-    "min": min, "max": max, "abs": abs, "sqrt": math.sqrt, "round": round, "floor": math.floor, "ceil": math.ceil,
+    "min": min, "max": max, "abs": abs, "sqrt": math.sqrt, "round": _round, "floor": math.floor, "ceil": math.ceil,
     "sin": lambda d: math.sin(math.radians(d)), "cos": lambda d: math.cos(math.radians(d)),
     "tan": lambda d: math.tan(math.radians(d)), "atan2": lambda y, x: math.degrees(math.atan2(y, x)),
 }  # fmt: skip
+# Least and most arguments of those that do not take one.
+_ARITY = {"min": (2, 99), "max": (2, 99), "round": (1, 2), "atan2": (2, 2)}
 _CONSTANTS = {"pi": math.pi}
 
 
@@ -30,7 +41,7 @@ def names_in(text: str) -> frozenset[str]:
 
     Raises
     ------
-    ValueError
+    ShapeError
         The text is no arithmetic of numbers, names, ``+ - * / // %``, brackets and the functions min, max, abs, sqrt,
         round, floor, ceil, sin, cos, tan, atan2 (degrees).
     """
@@ -38,23 +49,28 @@ def names_in(text: str) -> frozenset[str]:
 
 
 def evaluate(text: str, names: Mapping[str, float]) -> float:
-    """Compute an expression; `ValueError` for what `names_in` refuses, an unknown name or a division by zero."""
+    """Compute an expression; `ShapeError` for what `names_in` refuses, an unknown name or no finite result."""
     tree, used = _parse(text)
     unknown = sorted(used - names.keys())
     if unknown:
-        raise ValueError(f"{text!r} speaks of the unknown parameter {unknown[0]!r}")
+        raise ShapeError(f"{text!r} speaks of the unknown parameter {unknown[0]!r}")
     try:
-        return float(_value(tree, names))
-    except ArithmeticError as error:
-        raise ValueError(f"{text!r}: {error}") from error
+        value = float(_value(tree, names))
+    except (ArithmeticError, ValueError) as error:
+        raise ShapeError(f"{text!r}: {error}") from error
+    if not math.isfinite(value):
+        raise ShapeError(f"{text!r} is {value}, no finite number")
+    return value
 
 
 @lru_cache(maxsize=4096)
 def _parse(text: str) -> tuple[ast.expr, frozenset[str]]:
+    if len(text) > _LONGEST:
+        raise ShapeError(f"{text[:40] + '...'!r} has {len(text):,} characters, an expression {_LONGEST} at most")
     try:
         tree = ast.parse(text, mode="eval").body
-    except SyntaxError as error:
-        raise ValueError(f"{text!r} is no arithmetic expression") from error
+    except (SyntaxError, ValueError, MemoryError, RecursionError) as error:
+        raise ShapeError(f"{text!r} is no arithmetic expression") from error
     used: set[str] = set()
     _check(tree, text, used)
     return tree, frozenset(used)
@@ -73,10 +89,13 @@ def _check(node: ast.expr, text: str, used: set[str]) -> None:
         case ast.UnaryOp() if type(node.op) in _UNARY:
             _check(node.operand, text, used)
         case ast.Call(func=ast.Name(id=name), keywords=[]) if name in _FUNCTIONS:
+            least, most = _ARITY.get(name, (1, 1))
+            if not least <= len(node.args) <= most:
+                raise ShapeError(f"{text!r}: {name} does not take {len(node.args)} arguments")
             for argument in node.args:
                 _check(argument, text, used)
         case _:
-            raise ValueError(f"{text!r} is no arithmetic expression: {ast.unparse(node)!r} is not allowed")
+            raise ShapeError(f"{text!r} is no arithmetic expression: {ast.unparse(node)!r} is not allowed")
 
 
 def _value(node: ast.expr, names: Mapping[str, float]) -> float:
@@ -91,4 +110,4 @@ def _value(node: ast.expr, names: Mapping[str, float]) -> float:
             return _UNARY[type(node.op)](_value(node.operand, names))
         case ast.Call(func=ast.Name(id=name)):
             return _FUNCTIONS[name](*(_value(a, names) for a in node.args))
-    raise ValueError(f"{ast.unparse(node)!r} is not allowed")
+    raise ShapeError(f"{ast.unparse(node)!r} is not allowed")

@@ -17,6 +17,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from aerialdojo_gen.bounded import loads_json
 from aerialdojo_gen.errors import AssetError
 from aerialdojo_gen.scenes.model import Instance, Material, Part, Scene
 
@@ -28,6 +29,7 @@ _WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3}
 # Quaternion (x, y, z, w) of a quarter turn about x: z up becomes y up.
 _Z_UP_TO_Y_UP = [-0.7071067811865476, 0.0, 0.0, 0.7071067811865476]
 _VERSION = 1
+_LARGEST_TEXTURE_PX = 4096
 
 
 def write_glb(scene: Scene, path: Path) -> None:
@@ -100,7 +102,7 @@ def read_glb(path: Path, sha256: str = "") -> Scene:
         instances = tuple(
             _read_instance(document["nodes"][k], document, data, names) for k in document["nodes"][0]["children"]
         )
-        return Scene(
+        scene = Scene(
             name=extras["name"],
             instances=instances,
             materials={m.name: m for m in materials},
@@ -109,9 +111,11 @@ def read_glb(path: Path, sha256: str = "") -> Scene:
             sun=tuple(extras["sun"]),
             imported=bool(extras.get("imported", False)),
         )
+        _check(scene)
+        return scene
     except OSError as error:
         raise AssetError(f"{path}: cannot be read ({error.strerror}); run build-scenes first") from error
-    except (KeyError, IndexError, TypeError, ValueError, struct.error) as error:
+    except (KeyError, IndexError, TypeError, AttributeError, ValueError, OverflowError, struct.error) as error:
         raise AssetError(f"{path}: is no scene file of this program or is damaged; run build-scenes again") from error
 
 
@@ -210,8 +214,29 @@ def _chunks(whole: bytes) -> tuple[dict[str, Any], memoryview]:
     body, kind2 = struct.unpack_from("<II", raw, 20 + head)
     if kind != _JSON or kind2 != _BIN or 28 + head + body != length:
         raise ValueError("chunks do not fit")
-    document = json.loads(bytes(raw[20 : 20 + head]))
+    document = loads_json(bytes(raw[20 : 20 + head]))
     return document, raw[28 + head :]
+
+
+def _check(scene: Scene) -> None:
+    """Raise ValueError for values that no scene has: what reads as JSON may still say anything."""
+    texts = [scene.name, *(t for i in scene.instances for t in (i.node, i.category, i.variant))]
+    words = [w for i in scene.instances for pair in i.attributes.items() for w in pair]
+    if not all(isinstance(text, str) for text in (*texts, *words, *scene.materials)):
+        raise ValueError("a name is no text")
+    for colour in (scene.sky, *(m.colour for m in scene.materials.values())):
+        if len(colour) != 3 or not all(type(c) is int and 0 <= c <= 255 for c in colour):
+            raise ValueError("a colour is none")
+    numbers = [*scene.sun, *(m.tile_m for m in scene.materials.values())]
+    if len(scene.sun) != 3 or not all(isinstance(n, int | float) and abs(n) < 1e9 for n in numbers):
+        raise ValueError("sun or tiles are no numbers")
+    arrays = [scene.bounds, *(a for i in scene.instances for p in i.parts for a in (p.vertices, p.uv))]
+    if scene.bounds.shape != (2, 3) or not all(np.isfinite(a).all() for a in arrays):
+        raise ValueError("a coordinate is no finite number")
+    if not all(
+        i.parts and all(len(p.faces) and len(p.uv) == len(p.vertices) for p in i.parts) for i in scene.instances
+    ):
+        raise ValueError("a node has no triangle")
 
 
 def _read_material(entry: dict[str, Any], document: dict[str, Any], data: memoryview) -> Material:
@@ -219,8 +244,11 @@ def _read_material(entry: dict[str, Any], document: dict[str, Any], data: memory
     source = entry["pbrMetallicRoughness"].get("baseColorTexture")
     if source is not None:
         image = document["images"][document["textures"][source["index"]]["source"]]
-        png = np.frombuffer(_view_bytes(image["bufferView"], document, data), dtype=np.uint8)
-        decoded = cv2.imdecode(png, cv2.IMREAD_COLOR)
+        png = _view_bytes(image["bufferView"], document, data)
+        # A kilobyte of PNG can ask for a gigabyte of pixels.
+        if max(struct.unpack_from(">II", png, 16)) > _LARGEST_TEXTURE_PX:
+            raise ValueError("texture is too large")
+        decoded = cv2.imdecode(np.frombuffer(png, dtype=np.uint8), cv2.IMREAD_COLOR)
         if decoded is None:
             raise ValueError("texture cannot be decoded")
         texture = np.ascontiguousarray(decoded[..., ::-1]).astype(np.uint8)

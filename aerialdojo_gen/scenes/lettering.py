@@ -8,8 +8,9 @@ import numpy as np
 from shapely.geometry import LineString, MultiPolygon, Polygon
 from shapely.ops import unary_union
 
+from aerialdojo_gen.errors import ShapeError
 from aerialdojo_gen.scenes.mesh import Mesh, merge, mesh, translated
-from aerialdojo_gen.scenes.shapes import _positive
+from aerialdojo_gen.scenes.shapes import _positive, number
 from aerialdojo_gen.scenes.shapes_extruded import extrude, triangulate
 
 # Strokes are parted by blanks; every point is two digits, x 0-4 and y 0-6.
@@ -32,6 +33,7 @@ _STROKES = {
 _THICKNESS = 0.85
 _GAP = 1.5
 _SPACE = 3.0
+_LONGEST = 120
 
 
 def text(*, text: str, height: float, depth: float = 0.0) -> Mesh:
@@ -53,10 +55,13 @@ def text(*, text: str, height: float, depth: float = 0.0) -> Mesh:
 
     Raises
     ------
-    ValueError
+    ShapeError
         Names a character that the font lacks, or says that no letter is left.
     """
     _positive("height", (height,), 1)
+    depth = number("depth", depth)
+    if len(text) > _LONGEST:
+        raise ShapeError(f"text {text[:40] + '...'!r} has {len(text):,} letters, a sign {_LONGEST} at most")
     letters: list[Mesh] = []
     x = 0.0
     for character in text.upper():
@@ -68,7 +73,7 @@ def text(*, text: str, height: float, depth: float = 0.0) -> Mesh:
             letters.append(translated(_plate(plate, depth / height * 6.0), (x, 0.0, 0.0)))
         x += width + _GAP
     if not letters:
-        raise ValueError(f"text {text!r} has no letter")
+        raise ShapeError(f"text {text!r} has no letter")
     body = merge(letters)
     width = x - _GAP
     across, up, out = (body.vertices * (height / 6.0)).T
@@ -94,7 +99,7 @@ def _plate(plan: Polygon, depth: float) -> Mesh:
 @lru_cache(maxsize=128)
 def _glyph(character: str) -> tuple[tuple[Polygon, ...], float]:
     if character not in _STROKES:
-        raise ValueError(f"the sign font has no letter {character!r}")
+        raise ShapeError(f"the sign font has no letter {character!r}")
     half = _THICKNESS / 2
     bodies = []
     for stroke in _STROKES[character].split():

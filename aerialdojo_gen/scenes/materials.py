@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import difflib
 import re
-import tomllib
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
+from aerialdojo_gen import bounded
 from aerialdojo_gen.errors import AssetError
 from aerialdojo_gen.scenes.model import Material
 from aerialdojo_gen.scenes.textures import TEXTURES, make_texture
 
 _COLOUR = re.compile(r"#[0-9a-fA-F]{6}")
 _KEYS = {"texture", "colour", "tile_m"}
+_SMALLEST_TILE_M, _LARGEST_TILE_M = 0.01, 1000.0
 
 
 class MaterialLibrary:
@@ -75,12 +76,12 @@ def load_materials(path: Path) -> MaterialLibrary:
             raise AssetError(f"{where} is no table")
         refuse_unknown(body, _KEYS, where)
         texture, colour, tile_m = body.get("texture"), body.get("colour"), body.get("tile_m", 1.0)
-        if texture is not None and texture not in TEXTURES:
+        if texture is not None and (not isinstance(texture, str) or texture not in TEXTURES):
             raise AssetError(f"{where}: unknown texture {texture!r}{nearest(str(texture), TEXTURES)}")
         if not isinstance(colour, str) or not _COLOUR.fullmatch(colour):
             raise AssetError(f"{where}: colour must be of the form #rrggbb, got {colour!r}")
-        if not isinstance(tile_m, int | float) or tile_m <= 0:
-            raise AssetError(f"{where}: tile_m must be a positive number of metres, got {tile_m!r}")
+        if not isinstance(tile_m, int | float) or not _SMALLEST_TILE_M <= tile_m <= _LARGEST_TILE_M:
+            raise AssetError(f"{where}: tile_m must be {_SMALLEST_TILE_M:g} to {_LARGEST_TILE_M:g} m, got {tile_m!r}")
         entries[name] = (texture, colour, float(tile_m))
     return MaterialLibrary(entries, path.name)
 
@@ -107,8 +108,6 @@ def refuse_unknown(body: Iterable[str], known: Iterable[str], where: str) -> Non
 def read_toml(path: Path) -> dict[str, Any]:
     """Read a TOML file; an `AssetError` names it and the line that cannot be read."""
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise AssetError(f"{path}: cannot be read ({error.strerror})") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise AssetError(f"{path}: {error}") from error
+        return bounded.read_toml(path, AssetError)
+    except FileNotFoundError as error:
+        raise AssetError(f"{path}: cannot be read ({error.strerror})") from None

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from aerialdojo_gen.errors import AssetError
+from aerialdojo_gen.errors import AssetError, ShapeError
 from aerialdojo_gen.scenes.builders import builders
 from aerialdojo_gen.scenes.materials import MaterialLibrary, nearest, refuse_unknown
 from aerialdojo_gen.scenes.vocabulary import ARRAY_KEYS, PLACEMENT_KEYS, RING_KEYS, SHAPES, names_used, shape_keys
@@ -17,6 +17,8 @@ Range = tuple[float, float]
 _CATEGORY_KEYS = ("name", "kind", "params", "roles", "parts", "builder", "variants", "looks")
 _VARIANT_KEYS = ("name", "attributes", "roles", "params", "without", "weight")
 _MIRRORS = ("x", "y", "xy")
+_MOST_PARTS = 1000
+_LARGEST = 10_000.0
 
 
 @dataclass(frozen=True)
@@ -109,12 +111,14 @@ def parse_category(path: Path, category: str, body: Any, materials: MaterialLibr
     builder, parts = body.get("builder"), body.get("parts", [])
     if (builder is None) == (not parts):
         raise AssetError(f"{where}: give parts or a builder, one of them")
-    if builder is not None and builder not in builders():
+    if builder is not None and (not isinstance(builder, str) or builder not in builders()):
         raise AssetError(f"{where}: unknown builder {builder!r}{nearest(str(builder), builders())}")
     if not isinstance(parts, list):
         raise AssetError(f"{where}: parts must be an array of tables, [[{category}.parts]]")
     for k, part in enumerate(parts):
         _check_part(part, params, roles, materials, f"{where} parts[{k}]")
+    if len(parts) > _MOST_PARTS:
+        raise AssetError(f"{where}: {len(parts):,} parts, {_MOST_PARTS} are the most")
     tags = {p["tag"] for p in parts if "tag" in p}
     raw = body.get("variants", [])
     if not isinstance(raw, list):
@@ -137,7 +141,7 @@ def _check_part(
     if not isinstance(part, dict) or "shape" not in part:
         raise AssetError(f"{where}: shape is missing")
     shape = part["shape"]
-    if shape not in SHAPES:
+    if not isinstance(shape, str) or shape not in SHAPES:
         raise AssetError(f"{where}: unknown shape {shape!r}{nearest(str(shape), SHAPES)}")
     where = f"{where} ({shape})"
     required, known = shape_keys(shape)
@@ -153,6 +157,8 @@ def _check_part(
         raise AssetError(f"{where} ring: axis must be x, y or z")
     if part.get("mirror", "x") not in _MIRRORS:
         raise AssetError(f"{where}: mirror must be x, y or xy, got {part['mirror']!r}")
+    if not isinstance(part.get("tag", ""), str):
+        raise AssetError(f"{where}: tag must be a word, got {part['tag']!r}")
     role = part.get("role")
     if not isinstance(role, str):
         raise AssetError(f"{where}: role is missing: a role of the category or a material")
@@ -160,7 +166,7 @@ def _check_part(
         _check_material(role, roles, materials, where)
     try:
         unknown = sorted(names_used(part) - params.keys())
-    except ValueError as error:
+    except ShapeError as error:
         raise AssetError(f"{where}: {error}") from error
     if unknown:
         raise AssetError(f"{where}: unknown parameter {unknown[0]!r}{nearest(unknown[0], params)}")
@@ -184,8 +190,10 @@ def _variant(
     own_params = _params(body.get("params", {}), f"{where} params")
     refuse_unknown(own_params, params, f"{where} params")
     without = body.get("without", [])
+    if not isinstance(without, list):
+        raise AssetError(f"{where}: without must be a list of tags, got {without!r}")
     for tag in without:
-        if tag not in tags:
+        if not isinstance(tag, str) or tag not in tags:
             raise AssetError(f"{where}: without names the unknown tag {tag!r}{nearest(str(tag), tags)}")
     weight = body.get("weight", 1)
     if not isinstance(weight, int | float) or weight <= 0:
@@ -202,6 +210,8 @@ def _params(body: Any, where: str) -> dict[str, Range]:
         ends = value if isinstance(value, list) else [value, value]
         if len(ends) != 2 or not all(isinstance(v, int | float) for v in ends) or ends[0] > ends[1]:
             raise AssetError(f"{where}: {key} must be a number or [low, high], got {value!r}")
+        if not -_LARGEST <= ends[0] <= ends[1] <= _LARGEST:
+            raise AssetError(f"{where}: {key} must lie within {_LARGEST:,.0f}, got {value!r}")
         out[key] = (float(ends[0]), float(ends[1]))
     return out
 

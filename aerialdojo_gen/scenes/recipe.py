@@ -6,14 +6,30 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 
 from aerialdojo_gen.errors import AssetError
 from aerialdojo_gen.scenes.materials import nearest, read_toml
 
 Model = TypeVar("Model", bound=BaseModel)
-Positive = Annotated[float, Field(gt=0)]
+# Of a layout's parameters: metres, degrees and counts all stay far below.
+_LARGEST, _MOST_ENTRIES, _LONGEST = 2000.0, 1000, 200
+Positive = Annotated[float, Field(gt=0, le=1e6)]
+# Ground is cut into cells of a metre or so: larger sites than this take gigabytes, and more than a drone can fly.
+Extent = Annotated[float, Field(ge=2, le=1000)]
+Height = Annotated[float, Field(gt=0, le=1000)]
+Place = Annotated[float, Field(ge=-1e5, le=1e5)]
 Colour = Annotated[str, Field(pattern=r"^#[0-9a-fA-F]{6}$")]
+
+
+def _above(sun: tuple[float, float, float]) -> tuple[float, float, float]:
+    if sun[2] <= 0.0:
+        raise ValueError("the sun must stand above the horizon (z > 0)")
+    return sun
+
+
+_Direction = Annotated[float, Field(ge=-1e6, le=1e6)]
+Sun = Annotated[tuple[_Direction, _Direction, _Direction], AfterValidator(_above)]
 
 
 class Recipe(BaseModel):
@@ -45,20 +61,13 @@ class Recipe(BaseModel):
 
     layout: str
     seed: int = 0
-    size_m: tuple[Positive, Positive]
-    ceiling_m: Positive
+    size_m: tuple[Extent, Extent]
+    ceiling_m: Height
     sky: Colour = "#96bee6"
-    sun: tuple[float, float, float] = (0.45, -0.35, 0.82)
+    sun: Sun = (0.45, -0.35, 0.82)
     palette: dict[str, str] = {}
     parameters: dict[str, Any] = {}
-    inventory: dict[str, Annotated[int, Field(ge=0)]] = {}
-
-    @field_validator("sun")
-    @classmethod
-    def _sun_stands_above(cls, sun: tuple[float, float, float]) -> tuple[float, float, float]:
-        if sun[2] <= 0.0:
-            raise ValueError("the sun must stand above the horizon (z > 0)")
-        return sun
+    inventory: dict[str, Annotated[int, Field(ge=0, le=100_000)]] = {}
 
     @property
     def sun_direction(self) -> tuple[float, float, float]:
@@ -82,8 +91,8 @@ class Cut(BaseModel):
 
     node: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_]{0,79}$")
     category: str = Field(pattern=r"^[a-z0-9][a-z0-9_]{0,59}$")
-    low_m: tuple[float, float, float]
-    high_m: tuple[float, float, float]
+    low_m: tuple[Place, Place, Place]
+    high_m: tuple[Place, Place, Place]
 
 
 class Imported(BaseModel):
@@ -115,11 +124,11 @@ class Imported(BaseModel):
     source_sha256: str
     up: Literal["y", "z"]
     scale: Positive
-    crop_m: tuple[float, float, Positive] | None = None
+    crop_m: tuple[Place, Place, Positive] | None = None
     ceiling_m: Positive
     sky: Colour = "#96bee6"
-    sun: tuple[float, float, float] = (0.45, -0.35, 0.82)
-    cuts: tuple[Cut, ...] = ()
+    sun: Sun = (0.45, -0.35, 0.82)
+    cuts: Annotated[tuple[Cut, ...], Field(max_length=1000)] = ()
 
 
 def load_imported(path: Path) -> Imported | None:
@@ -134,7 +143,29 @@ def load_imported(path: Path) -> Imported | None:
 
 def load_recipe(path: Path) -> Recipe:
     """Read a recipe; an `AssetError` names the file, the key, and the nearest known key."""
-    return validated(Recipe, read_toml(path), str(path))
+    body = read_toml(path)
+    recipe = validated(Recipe, body, str(path))
+    _check_parameters(recipe.parameters, (), path)
+    return recipe
+
+
+def _check_parameters(value: Any, keys: tuple[str, ...], path: Path) -> None:
+    """Hold whatever a layout takes against bounds, before it becomes a count of things, a length or an array."""
+    where = f"{path}: parameters: {'.'.join(keys)}"
+    if isinstance(value, dict | list):
+        if len(value) > _MOST_ENTRIES:
+            raise AssetError(f"{where} has {len(value):,} entries, {_MOST_ENTRIES:,} are the most")
+        for key, inner in value.items() if isinstance(value, dict) else enumerate(value):
+            _check_parameters(inner, (*keys, str(key)), path)
+    elif isinstance(value, int | float) and abs(value) > _LARGEST:
+        raise AssetError(f"{where} must lie within {_LARGEST:,.0f}, got {value:g}")
+    elif isinstance(value, str) and len(value) > _LONGEST:
+        raise AssetError(f"{where} has {len(value):,} characters, {_LONGEST} are the most")
+
+
+def _short(value: Any) -> str:
+    text = repr(value)
+    return text if len(text) <= 60 else text[:57] + "..."
 
 
 def validated(model: type[Model], body: dict[str, Any], where: str) -> Model:
@@ -149,5 +180,5 @@ def validated(model: type[Model], body: dict[str, Any], where: str) -> Model:
         elif first["type"] == "missing":
             message = f"key {key!r} is missing"
         else:
-            message = f"{key}: {first['msg']}, got {first['input']!r}"
+            message = f"{key}: {first['msg']}, got {_short(first['input'])}"
         raise AssetError(f"{where}: {message}") from error

@@ -1,21 +1,28 @@
 """Solids of the prop vocabulary: boxes, turned bodies and rough ellipsoids.
 
 Every function returns a `Mesh` with outward faces in the prop's own frame; lengths are metres, and the base centre is
-what scene_assets/README.md says of the shape. A `ValueError` names a size that makes no body.
+what scene_assets/README.md says of the shape. A `ShapeError` names a size that makes no body, or a count that makes
+too large a one.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 import trimesh
 
+from aerialdojo_gen.errors import ShapeError
 from aerialdojo_gen.rng import generator
 from aerialdojo_gen.scenes.mesh import Floats, Ints, Mesh, mesh, outward
 
 Numbers = Sequence[float]
+
+# What makes vertices is bounded: the largest of the catalogue are 32 segments, 10 sides, 41 points, 119 m.
+MAX_SEGMENTS, MAX_SIDES, MAX_POINTS = 256, 64, 2000
+_FARTHEST_M = 10_000.0
 
 _BOX_FACES = (
     (0, 3, 2), (0, 2, 1), (4, 5, 6), (4, 6, 7), (0, 1, 5), (0, 5, 4),
@@ -57,7 +64,7 @@ def sphere(
 ) -> Mesh:
     """Make an ellipsoid about its centre; `half` keeps the upper half, closed by a flat bottom."""
     x, y, z = _radii(radius, radii)
-    level = int(subdivisions)
+    level = whole("subdivisions", subdivisions, 0, 4)
     if half:
         angles = np.linspace(0.0, np.pi / 2, 3 + level)
         body = lathe(points=tuple((float(np.cos(a)), float(np.sin(a))) for a in angles), segments=8 + 4 * level)
@@ -69,6 +76,7 @@ def sphere(
 def capsule(*, radius: float, height: float, segments: float = 8) -> Mesh:
     """Make an upright capsule; the straight part runs from z = 0 to `height`."""
     _positive("radius", (radius,), 1)
+    number("height", height)
     angles = np.linspace(0.0, np.pi / 2, 3)
     lower = [(radius * float(np.sin(a)), -radius * float(np.cos(a))) for a in angles]
     upper = [(radius * float(np.cos(a)), height + radius * float(np.sin(a))) for a in angles]
@@ -78,7 +86,8 @@ def capsule(*, radius: float, height: float, segments: float = 8) -> Mesh:
 def torus(*, radius: float, tube: float, segments: float = 16, sides: float = 6) -> Mesh:
     """Make a ring about the z axis; `radius` is that of the tube's middle line, `tube` that of the tube."""
     _positive("radius, tube", (radius, tube), 2)
-    angles = np.arange(int(sides)) * 2 * np.pi / int(sides)
+    n = whole("sides", sides, 3, MAX_SIDES)
+    angles = np.arange(n) * 2 * np.pi / n
     ring = [(radius + tube * float(np.cos(a)), tube * float(np.sin(a))) for a in angles]
     return lathe(points=(*ring, ring[0]), segments=segments)
 
@@ -99,11 +108,11 @@ def lathe(*, points: Sequence[Numbers], segments: float = 12) -> Mesh:
     Mesh
         Watertight. Textures wrap around (u) and run along the profile (v).
     """
-    profile = np.array([_numbers("points", p, 2) for p in points])
+    profile = np.array(rows_of("points", points, 2))
     profile[np.abs(profile[:, 0]) < 1e-9, 0] = 0.0
-    n = int(segments)
-    if len(profile) < 2 or n < 3 or (profile[:, 0] < 0).any() or not (profile[:, 0] > 0).any():
-        raise ValueError("a lathe needs two or more points of radius >= 0, one of them > 0, and 3 or more segments")
+    n = whole("segments", segments, 3, MAX_SEGMENTS)
+    if (profile[:, 0] < 0).any() or not (profile[:, 0] > 0).any():
+        raise ShapeError("a lathe needs points of radius >= 0, one of them > 0")
     profile = profile[np.concatenate([[True], np.any(np.diff(profile, axis=0) != 0.0, axis=1)])]
     closed = len(profile) > 3 and bool(np.all(profile[0] == profile[-1]))
     rows = profile[:-1] if closed else profile
@@ -157,10 +166,10 @@ def crown(
         Which of the random shapes; a whole number.
     """
     scale = _radii(radius, radii)
-    if not 0.0 <= noise <= 0.6:
-        raise ValueError(f"noise {noise:g} is outside 0 to 0.6")
-    vertices, faces = _icosphere(int(subdivisions))
-    rng = generator(int(seed), "shape-crown")
+    if not 0.0 <= number("noise", noise) <= 0.6:
+        raise ShapeError(f"noise {noise:g} is outside 0 to 0.6")
+    vertices, faces = _icosphere(whole("subdivisions", subdivisions, 0, 4))
+    rng = generator(whole("seed", seed, 0, 2**31), "shape-crown")
     waves = rng.normal(size=(10, 3)) * np.repeat([2.0, 4.0], 5)[:, None]
     phases = rng.uniform(0, 2 * np.pi, size=10)
     weights = np.repeat([1.0, 0.6], 5)
@@ -188,26 +197,48 @@ def _ring_vertices(rows: Floats, n: int) -> tuple[Floats, list[list[int]]]:
 
 @lru_cache(maxsize=8)
 def _icosphere(subdivisions: int) -> tuple[Floats, Ints]:
-    if not 0 <= subdivisions <= 4:
-        raise ValueError(f"subdivisions {subdivisions} is outside 0 to 4")
     ball = trimesh.creation.icosphere(subdivisions=subdivisions)
     return np.asarray(ball.vertices, dtype=np.float64), np.asarray(ball.faces, dtype=np.int32)
 
 
 def _radii(radius: float | None, radii: Numbers | None) -> tuple[float, ...]:
     if (radius is None) == (radii is None):
-        raise ValueError("give radius or radii, one of them")
+        raise ShapeError("give radius or radii, one of them")
     return _positive("radii", (radius,) * 3 if radius is not None else radii or (), 3)
 
 
 def _numbers(key: str, values: Numbers, count: int) -> tuple[float, ...]:
-    if isinstance(values, int | float) or len(values) != count:
-        raise ValueError(f"{key} needs {count} numbers")
-    return tuple(float(v) for v in values)
+    if isinstance(values, str | dict) or not hasattr(values, "__len__") or len(values) != count:
+        raise ShapeError(f"{key} needs {count} numbers")
+    return tuple(number(key, v) for v in values)
+
+
+def number(key: str, value: Any) -> float:
+    """Hold a shape's number, metres or a fraction, against its bounds."""
+    if isinstance(value, bool) or not isinstance(value, int | float | np.number):
+        raise ShapeError(f"{key} must be a number, got {str(value)[:40]!r}")
+    held = float(value)
+    if not -_FARTHEST_M <= held <= _FARTHEST_M:
+        raise ShapeError(f"{key} must lie within {_FARTHEST_M:,.0f}, got {held:g}")
+    return held
+
+
+def whole(key: str, value: Any, low: int, high: int) -> int:
+    """Hold a count that makes vertices against its bounds; expressions give floats, whose fraction is cut."""
+    if isinstance(value, bool) or not isinstance(value, int | float | np.number) or not low <= value < high + 1:
+        raise ShapeError(f"{key} must be {low} to {high}, got {str(value)[:40]}")
+    return int(value)
+
+
+def rows_of(key: str, rows: Any, width: int, least: int = 2) -> list[tuple[float, ...]]:
+    """Hold a shape's list of points against its bounds."""
+    if isinstance(rows, str | dict) or not hasattr(rows, "__len__") or not least <= len(rows) <= MAX_POINTS:
+        raise ShapeError(f"{key} must be {least} to {MAX_POINTS:,} points")
+    return [_numbers(key, row, width) for row in rows]
 
 
 def _positive(key: str, values: Numbers, count: int) -> tuple[float, ...]:
     numbers = _numbers(key, values, count)
     if min(numbers) <= 0.0:
-        raise ValueError(f"{key} must be positive, got {', '.join(f'{n:g}' for n in numbers)}")
+        raise ShapeError(f"{key} must be positive, got {', '.join(f'{n:g}' for n in numbers)}")
     return numbers

@@ -12,8 +12,9 @@ import shapely
 from shapely.geometry import Polygon
 from shapely.geometry.polygon import orient
 
+from aerialdojo_gen.errors import ShapeError
 from aerialdojo_gen.scenes.mesh import Floats, Ints, Mesh, mesh, outward
-from aerialdojo_gen.scenes.shapes import Numbers, _numbers, _positive
+from aerialdojo_gen.scenes.shapes import MAX_SIDES, Numbers, _positive, number, rows_of, whole
 
 _SECTIONS = ("gable", "wedge", "trapezoid")
 
@@ -31,8 +32,9 @@ def prism(*, size: Numbers, section: str = "gable", top: float = 0.5) -> Mesh:
         Width of the trapezoid's top as a fraction of its bottom.
     """
     x, y, z = _positive("size", size, 3)
+    top = number("top", top)
     if section not in _SECTIONS:
-        raise ValueError(f"section {section!r} is none of {', '.join(_SECTIONS)}")
+        raise ShapeError(f"section {section!r} is none of {', '.join(_SECTIONS)}")
     w = y / 2
     outline = {
         "gable": [(-w, 0.0), (w, 0.0), (0.0, z)],
@@ -46,15 +48,17 @@ def prism(*, size: Numbers, section: str = "gable", top: float = 0.5) -> Mesh:
 def polygon(*, points: Sequence[Numbers], height: float, holes: Sequence[Sequence[Numbers]] = ()) -> Mesh:
     """Extrude a plan upwards from z = 0; `points` are (x, y), metres, in either sense of rotation."""
     _positive("height", (height,), 1)
-    outline = [_numbers("points", p, 2) for p in points]
-    inner = [[_numbers("holes", p, 2) for p in hole] for hole in holes]
+    outline = rows_of("points", points, 2, 0)
+    if isinstance(holes, str | dict) or not hasattr(holes, "__len__") or len(holes) > 100:
+        raise ShapeError("holes must be 0 to 100 lists of points")
+    inner = [rows_of("holes", hole, 2, 3) for hole in holes]
     return extrude(_checked(Polygon(outline, inner) if len(outline) > 2 else None), height)
 
 
 def profile(*, points: Sequence[Numbers], width: float) -> Mesh:
     """Extrude a side view along y, centred on y = 0; `points` are (x, z), metres."""
     _positive("width", (width,), 1)
-    outline = [_numbers("points", p, 2) for p in points]
+    outline = rows_of("points", points, 2, 0)
     body = extrude(_checked(Polygon(outline) if len(outline) > 2 else None), width)
     a, b, c = body.vertices.T
     return Mesh(np.column_stack([a, width / 2 - c, b]), body.faces)
@@ -86,18 +90,19 @@ def sweep(
     Mesh
         Watertight, mitred at the path's corners; textures run along the path.
     """
-    line = np.array([_numbers("path", p, 3) for p in path])
+    line = np.array(rows_of("path", path, 3, 1))
     line = line[np.concatenate([[True], np.linalg.norm(np.diff(line, axis=0), axis=1) > 1e-9])]
     if len(line) < (3 if closed else 2):
-        raise ValueError("a sweep needs a path of two distinct points, three where it is closed")
+        raise ShapeError("a sweep needs a path of two distinct points, three where it is closed")
     if (radius is None) == (section is None):
-        raise ValueError("give radius or section, one of them")
+        raise ShapeError("give radius or section, one of them")
     if section is not None:
         w, h = _positive("section", section, 2)
         ring = np.array([(-w, -h), (w, -h), (w, h), (-w, h)]) / 2
     else:
-        _positive("radius", (radius or 0.0,), 1)
-        angles = (np.arange(int(sides)) + 0.5) * 2 * np.pi / int(sides)
+        _positive("radius", (0.0 if radius is None else radius,), 1)
+        n = whole("sides", sides, 3, MAX_SIDES)
+        angles = (np.arange(n) + 0.5) * 2 * np.pi / n
         ring = np.column_stack([np.cos(angles), np.sin(angles)]) * radius
     rings = _swept_rings(line, ring, closed)
     return _skin(rings, closed)
@@ -162,7 +167,7 @@ def _without_straight_corners(plan: Polygon) -> Polygon:
 
 def _checked(plan: Polygon | None) -> Polygon:
     if plan is None or not plan.is_valid or plan.area <= 0.0:
-        raise ValueError("the outline is no simple polygon of three or more points")
+        raise ShapeError("the outline is no simple polygon of three or more points")
     return plan
 
 
@@ -179,7 +184,7 @@ def _swept_rings(line: Floats, ring: Floats, closed: bool) -> Floats:
     for p, t0, t1 in zip(line, behind, ahead, strict=True):
         middle = t0 + t1
         if np.linalg.norm(middle) < 1e-6:
-            raise ValueError("the path turns back on itself")
+            raise ShapeError("the path turns back on itself")
         middle /= np.linalg.norm(middle)
         level = np.cross(middle, (0.0, 0.0, 1.0))
         # Nearly vertical stretches have no level direction of their own: carry the last one on.

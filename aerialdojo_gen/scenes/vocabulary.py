@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from aerialdojo_gen.errors import ShapeError
 from aerialdojo_gen.scenes import lettering, shapes, shapes_extruded
 from aerialdojo_gen.scenes.expressions import evaluate, names_in
 from aerialdojo_gen.scenes.mesh import Mesh, merge, mirrored, rotated, rotation, translated
@@ -26,6 +27,8 @@ RING_KEYS = frozenset({"count", "radius", "axis", "arc", "start"})
 _WORDS = frozenset({("prism", "section"), ("text", "text"), ("ring", "axis")})
 _AXES = {"x": 0, "y": 1, "z": 2}
 _MAX_COPIES = 2000
+# A hundred times what the largest prop of the catalogue has.
+MAX_TRIANGLES = 300_000
 
 
 def shape_keys(shape: str) -> tuple[frozenset[str], frozenset[str]]:
@@ -36,7 +39,7 @@ def shape_keys(shape: str) -> tuple[frozenset[str], frozenset[str]]:
 
 
 def names_used(part: Mapping[str, Any]) -> frozenset[str]:
-    """List the parameters that a part's expressions speak of; `ValueError` for what is no expression."""
+    """List the parameters that a part's expressions speak of; `ShapeError` for what is no expression."""
     shape = part["shape"]
     found: set[str] = set()
     for key, value in part.items():
@@ -70,7 +73,7 @@ def part_mesh(part: Mapping[str, Any], names: Mapping[str, float], words: Mappin
 
     Raises
     ------
-    ValueError
+    ShapeError
         Sizes that make no body, or an expression that cannot be computed.
     """
     shape = part["shape"]
@@ -96,19 +99,19 @@ def _arrayed(body: Mesh, array: Mapping[str, Any], names: Mapping[str, float]) -
     for count_key, step_key in (("count", "step"), ("count2", "step2")):
         if count_key not in array:
             continue
-        count = _count(array[count_key], names)
+        count = _count(array[count_key], names, len(copies) * len(body.faces))
         step = np.array(_triple(step_key, array.get(step_key), names))
         copies = [translated(c, step * k) for k in range(count) for c in copies]
     return merge(copies)
 
 
 def _ringed(body: Mesh, ring: Mapping[str, Any], names: Mapping[str, float]) -> Mesh:
-    count = _count(ring["count"], names)
+    count = _count(ring["count"], names, len(body.faces))
     axis = _AXES[ring.get("axis", "z")]
-    arc = float(_number(ring.get("arc", 360.0), names))
-    start = float(_number(ring.get("start", 0.0), names))
+    arc = shapes.number("arc", _number(ring.get("arc", 360.0), names))
+    start = shapes.number("start", _number(ring.get("start", 0.0), names))
     offset = np.zeros(3)
-    offset[1 if axis == 0 else 0] = float(_number(ring.get("radius", 0.0), names))
+    offset[1 if axis == 0 else 0] = shapes.number("radius", _number(ring.get("radius", 0.0), names))
     body = translated(body, offset)
     step = arc / count if arc == 360.0 else arc / max(count - 1, 1)
     copies = []
@@ -119,18 +122,21 @@ def _ringed(body: Mesh, ring: Mapping[str, Any], names: Mapping[str, float]) -> 
     return merge(copies)
 
 
-def _count(value: Any, names: Mapping[str, float]) -> int:
-    count = round(float(_number(value, names)))
+def _count(value: Any, names: Mapping[str, float], triangles: int) -> int:
+    """Read how often so many triangles are repeated."""
+    count = round(shapes.number("count", _number(value, names)))
     if not 1 <= count <= _MAX_COPIES:
-        raise ValueError(f"count must be 1 to {_MAX_COPIES}, got {count}")
+        raise ShapeError(f"count must be 1 to {_MAX_COPIES}, got {count}")
+    if count * triangles > MAX_TRIANGLES:
+        raise ShapeError(f"count {count} makes {count * triangles:,} triangles, {MAX_TRIANGLES:,} are the most")
     return count
 
 
 def _triple(key: str, value: Any, names: Mapping[str, float]) -> tuple[float, float, float]:
     numbers = _number(value, names)
     if not isinstance(numbers, list) or len(numbers) != 3:
-        raise ValueError(f"{key} needs three numbers")
-    x, y, z = (float(n) for n in numbers)
+        raise ShapeError(f"{key} needs three numbers")
+    x, y, z = (shapes.number(key, n) for n in numbers)
     return x, y, z
 
 
@@ -139,6 +145,8 @@ def _number(value: Any, names: Mapping[str, float]) -> Any:
         return evaluate(value, names)
     if isinstance(value, list):
         return [_number(v, names) for v in value]
+    if not isinstance(value, int | float):
+        raise ShapeError(f"{str(value)[:40]!r} is neither a number nor an expression")
     return value
 
 
@@ -149,10 +157,12 @@ def _collect(value: Any, found: set[str]) -> None:
         for item in value:
             _collect(item, found)
     elif not isinstance(value, int | float):
-        raise ValueError(f"{value!r} is neither a number nor an expression")
+        raise ShapeError(f"{value!r} is neither a number nor an expression")
 
 
-def _fill(text: str, words: Mapping[str, str]) -> str:
+def _fill(text: Any, words: Mapping[str, str]) -> str:
+    if not isinstance(text, str):
+        raise ShapeError(f"text must be letters, got {str(text)[:40]!r}")
     for key, word in words.items():
         text = text.replace("{" + key + "}", word)
     return text

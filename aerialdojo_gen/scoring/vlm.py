@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import logging
 import re
 from collections.abc import Sequence
@@ -10,6 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 from aerialdojo_gen.benchmark.llm.images import colour_picture
 from aerialdojo_gen.benchmark.llm.service import Connection
+from aerialdojo_gen.bounded import loads_json
+from aerialdojo_gen.errors import Malformed
 from aerialdojo_gen.scoring.base import AnchorView
 
 if TYPE_CHECKING:
@@ -130,8 +131,8 @@ def read_order(text: str, n: int) -> list[int]:
     """
     wrapped = _WRAPPED.match(text)
     try:
-        value = json.loads(wrapped[1] if wrapped else text)
-    except (json.JSONDecodeError, RecursionError):
+        value = loads_json(wrapped[1] if wrapped else text)
+    except Malformed:
         raise ValueError("it is not one JSON object") from None
     if not isinstance(value, dict) or set(value) != {"order"} or not isinstance(value["order"], list):
         raise ValueError('it is no object with the one key "order" and a list in it')

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 from collections import Counter
 from collections.abc import Sequence
@@ -10,6 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from aerialdojo_gen import store
+from aerialdojo_gen.bounded import loads_json
 from aerialdojo_gen.config import Pipeline
 from aerialdojo_gen.paper import inventory, splits
 from aerialdojo_gen.release.validate.registry import Fault, Outcome
@@ -185,7 +185,7 @@ def _of_card(text: str) -> list[tuple[str, str, str, int]]:
 
 def _of_croissant(text: str) -> list[tuple[str, str, str, int]]:
     """Rows of `tasks` and `routes` by split, as croissant.json describes its record sets."""
-    described = {one["name"]: one["description"] for one in json.loads(text)["recordSet"]}
+    described = {one["name"]: one["description"] for one in loads_json(text)["recordSet"]}
     return [
         ("croissant.json", table, folder, int(n.replace(",", "")))
         for table in ("tasks", "routes")

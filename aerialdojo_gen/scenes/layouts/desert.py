@@ -41,9 +41,9 @@ class Pond(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     at: tuple[float, float]
-    radius_m: Annotated[float, Field(gt=0)]
-    green_m: Annotated[float, Field(ge=0)] = 5.0
-    palms: Annotated[int, Field(ge=0)] = 24
+    radius_m: Annotated[float, Field(gt=0, le=500)]
+    green_m: Annotated[float, Field(ge=0, le=500)] = 5.0
+    palms: Annotated[int, Field(ge=0, le=1000)] = 24
 
 
 class Crop(BaseModel):
@@ -53,7 +53,7 @@ class Crop(BaseModel):
 
     at: tuple[float, float]
     size_m: tuple[float, float]
-    rows: Annotated[int, Field(ge=1)] = 6
+    rows: Annotated[int, Field(ge=1, le=1000)] = 6
 
 
 class Parameters(BaseModel):
@@ -99,9 +99,9 @@ class Parameters(BaseModel):
     houses: tuple[House, ...] = ()
     walls: tuple[Wall, ...] = ()
     groups: tuple[Group, ...] = ()
-    stones: Annotated[int, Field(ge=0)] = 40
-    shrubs: Annotated[int, Field(ge=0)] = 30
-    trees: Annotated[int, Field(ge=0)] = 6
+    stones: Annotated[int, Field(ge=0, le=1000)] = 40
+    shrubs: Annotated[int, Field(ge=0, le=1000)] = 30
+    trees: Annotated[int, Field(ge=0, le=1000)] = 6
 
 
 def build(site: Site) -> None:

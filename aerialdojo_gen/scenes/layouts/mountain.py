@@ -36,7 +36,7 @@ class Tarn(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     at: tuple[float, float]
-    radius_m: Annotated[float, Field(gt=0)]
+    radius_m: Annotated[float, Field(gt=0, le=500)]
 
 
 class Parameters(BaseModel):
@@ -93,7 +93,7 @@ class Parameters(BaseModel):
     snow_z_m: float = 1000.0
     trees_z_m: float = 8.0
     tree_spacing_m: Annotated[float, Field(ge=2, le=12)] = 4.6
-    boulders: Annotated[int, Field(ge=0)] = 60
+    boulders: Annotated[int, Field(ge=0, le=1000)] = 60
     stone: str = "grey"
     groups: tuple[Group, ...] = ()
 

@@ -66,7 +66,7 @@ class Group(BaseModel):
 
     name: str
     at: tuple[float, float]
-    radius_m: Annotated[float, Field(gt=0)] = 8.0
+    radius_m: Annotated[float, Field(gt=0, le=500)] = 8.0
     place: str = ""
     things: tuple[str, ...]
     yaw_deg: float = 0.0

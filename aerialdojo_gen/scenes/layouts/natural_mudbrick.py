@@ -76,8 +76,8 @@ class Wall(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     path: tuple[tuple[float, float], ...]
-    height_m: Annotated[float, Field(gt=0)] = 3.0
-    thickness_m: Annotated[float, Field(gt=0)] = 0.7
+    height_m: Annotated[float, Field(gt=0, le=500)] = 3.0
+    thickness_m: Annotated[float, Field(gt=0, le=500)] = 0.7
     decay: Annotated[float, Field(ge=0, le=1)] = 0.6
 
 

@@ -36,7 +36,7 @@ class Ridge(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     line: tuple[tuple[float, float, float], ...]
-    width_m: Annotated[float, Field(gt=0)]
+    width_m: Annotated[float, Field(gt=0, le=500)]
     hollow: Annotated[float, Field(gt=0, le=4)] = 1.3
 
 
@@ -46,8 +46,8 @@ class Crag(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     at: tuple[float, float]
-    radius_m: Annotated[float, Field(gt=0)]
-    height_m: Annotated[float, Field(gt=0)]
+    radius_m: Annotated[float, Field(gt=0, le=500)]
+    height_m: Annotated[float, Field(gt=0, le=500)]
     blocks: Annotated[int, Field(ge=1, le=12)] = 5
 
     def area(self) -> BaseGeometry:

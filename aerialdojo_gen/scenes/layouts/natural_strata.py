@@ -49,9 +49,9 @@ class Rock(BaseModel):
 
     name: str
     at: tuple[float, float]
-    radius_m: Annotated[float, Field(gt=0)]
-    height_m: Annotated[float, Field(gt=0)]
-    long: Annotated[float, Field(ge=1)] = 1.0
+    radius_m: Annotated[float, Field(gt=0, le=500)]
+    height_m: Annotated[float, Field(gt=0, le=500)]
+    long: Annotated[float, Field(ge=1, le=500)] = 1.0
     yaw_deg: float = 0.0
     ragged: Annotated[float, Field(ge=0, le=0.5)] = 0.2
     batter: Annotated[float, Field(ge=0, le=1)] = 0.14

@@ -43,7 +43,7 @@ class Parameters(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     plan: Literal["turning_circle", "green"] = "turning_circle"
-    tree_every_m: float = Field(default=9.0, gt=3.0)
+    tree_every_m: float = Field(default=9.0, gt=3.0, le=500.0)
 
 
 def build(site: Site) -> None:

@@ -54,10 +54,10 @@ class Piste(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     path: Points
-    width_m: Annotated[float, Field(gt=1)] = 9.0
-    bank_m: Annotated[float, Field(ge=0)] = 0.7
-    gates: Annotated[int, Field(ge=0)] = 0
-    moguls_m: Annotated[float, Field(ge=0)] = 0.0
+    width_m: Annotated[float, Field(gt=1, le=500)] = 9.0
+    bank_m: Annotated[float, Field(ge=0, le=500)] = 0.7
+    gates: Annotated[int, Field(ge=0, le=1000)] = 0
+    moguls_m: Annotated[float, Field(ge=0, le=500)] = 0.0
 
 
 class Parameters(BaseModel):
@@ -100,15 +100,15 @@ class Parameters(BaseModel):
     groups: tuple[Group, ...] = ()
     lift: Points = ()
     lift_variant: str = "red"
-    cabins: Annotated[int, Field(ge=0)] = 8
+    cabins: Annotated[int, Field(ge=0, le=1000)] = 8
     rink: Rink | None = None
     lake: tuple[float, float, float] | None = None
     roads: tuple[Points, ...] = ()
     road_m: Annotated[float, Field(ge=1, le=9)] = 4.0
     ridges: tuple[Points, ...] = ()
     ridge_m: Annotated[float, Field(ge=0.3, le=5)] = 1.8
-    spruces: Annotated[int, Field(ge=0)] = 60
-    boulders: Annotated[int, Field(ge=0)] = 24
+    spruces: Annotated[int, Field(ge=0, le=1000)] = 60
+    boulders: Annotated[int, Field(ge=0, le=1000)] = 24
 
 
 def build(site: Site) -> None:

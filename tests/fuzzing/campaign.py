@@ -1,0 +1,158 @@
+"""Campaigns: so many mutants of each target, in processes that may die; what they died of, and its input."""
+
+from __future__ import annotations
+
+import json
+import os
+import select
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from fuzzing.targets import TARGETS, laid_out
+from fuzzing.worker import mutants
+
+TESTS = Path(__file__).resolve().parents[1]
+CORPUS = Path(__file__).resolve().parent / "corpus"
+COMMAND = ["-m", "fuzzing.worker"]
+# A process that waits for something has no seconds of its own to count.
+_STUCK_S = 300.0
+_SAVED_EACH = 3
+
+
+@dataclass
+class Outcome:
+    """What became of a target's mutants.
+
+    Attributes
+    ----------
+    ran : int
+        Mutants, the valid inputs included.
+    faults : list of dict
+        ``index``, ``kind``, ``message`` and ``where`` of each mutant that did not end in an `AerialDojoError` or
+        well.
+    seconds : float
+        On the clock.
+    peak_mib : int
+        Most resident memory of a process.
+    """
+
+    ran: int = 0
+    faults: list[dict] = field(default_factory=list)
+    seconds: float = 0.0
+    peak_mib: int = 0
+
+    @property
+    def kinds(self) -> Counter[tuple[str, str]]:
+        """How often each fault was met: by kind and place."""
+        return Counter((fault["kind"], fault["where"]) for fault in self.faults)
+
+
+Plan = dict[str, range]
+
+
+def run(plan: Plan, seed: int = 0) -> dict[str, Outcome]:
+    """Run mutants of targets, by their numbers."""
+    outcomes = {name: Outcome() for name in plan}
+    left = [[name, numbers.start, numbers.stop] for name, numbers in plan.items()]
+    while left:
+        last = _process({"seed": seed, "mutants": left, "inputs": []}, outcomes)
+        if last is None:
+            break
+        name, index = last
+        while left[0][0] != name:
+            left.pop(0)
+        left[0][1] = index + 1
+    return outcomes
+
+
+def replay(inputs: Sequence[tuple[str, Path]]) -> dict[str, Outcome]:
+    """Run inputs of targets, a folder each; the faults' ``index`` is the folder."""
+    outcomes = {name: Outcome() for name, _ in inputs}
+    left = [(name, str(path)) for name, path in inputs]
+    while left:
+        last = _process({"seed": 0, "mutants": [], "inputs": left}, outcomes)
+        if last is None:
+            break
+        left = left[left.index(last) + 1 :]
+    return outcomes
+
+
+def _process(plan: dict, outcomes: dict[str, Outcome]) -> tuple[str, Any] | None:
+    """Run a process until it ends, None, or dies: then it returns the target and the input that it died of."""
+    environment = os.environ | {
+        "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1",
+        "PYTHONPATH": os.pathsep.join([str(TESTS), str(TESTS.parent), os.environ.get("PYTHONPATH", "")]),
+    }  # fmt: skip
+    command = [sys.executable, *COMMAND, json.dumps(plan)]
+    name, at, done, since = "", None, False, time.monotonic()
+    with (
+        tempfile.TemporaryFile() as errors,
+        subprocess.Popen(command, stdout=subprocess.PIPE, stderr=errors, env=environment) as process,
+    ):
+        assert process.stdout is not None
+        pending = b""
+        while True:
+            # Until the first input it imports, on a busy machine for minutes.
+            if not select.select([process.stdout], [], [], _STUCK_S if name else 3 * _STUCK_S)[0]:
+                process.kill()
+                break
+            new = os.read(process.stdout.fileno(), 1 << 16)
+            if not new:
+                break
+            *lines, pending = (pending + new).split(b"\n")
+            for line in map(json.loads, lines):
+                if "at" in line:
+                    if name and line["target"] != name:
+                        outcomes[name].seconds += time.monotonic() - since
+                        since = time.monotonic()
+                    name, at = line["target"], line["at"]
+                    outcomes[name].ran += 1
+                elif "fault" in line:
+                    outcomes[name].faults.append({**line, "index": line["fault"]})
+                else:
+                    done = True
+                    for outcome in outcomes.values():
+                        outcome.peak_mib = max(outcome.peak_mib, line["done"])
+        code = process.wait()
+        errors.seek(0)
+        said = errors.read().decode(errors="replace")
+    if name:
+        outcomes[name].seconds += time.monotonic() - since
+    if done:
+        return None
+    if not name or (code == 1 and "Traceback" in said):
+        raise RuntimeError(f"the worker cannot run: {said[-2000:]}")
+    kind = {-signal.SIGPROF: "hang", -signal.SIGKILL: "stuck"}.get(code, f"died of {code}")
+    outcomes[name].faults.append({"index": at, "kind": kind, "message": said[-300:], "where": ""})
+    return name, at
+
+
+def save(name: str, seed: int, outcome: Outcome, folder: Path) -> None:
+    """Keep the inputs of a few faults of each kind."""
+    met: Counter[tuple[str, str]] = Counter()
+    for fault in outcome.faults:
+        key = fault["kind"], fault["where"]
+        met[key] += 1
+        if met[key] <= _SAVED_EACH:
+            ((_, case),) = mutants(name, seed, fault["index"], fault["index"] + 1)
+            here = folder / name / f"{fault['index']:06}"
+            laid_out(case, here)
+            here.with_suffix(".txt").write_text(json.dumps(fault, indent=1), encoding="utf-8")
+
+
+def corpus(name: str) -> list[Path]:
+    """The inputs that once broke a target, a folder each."""
+    return sorted(p for p in (CORPUS / name).glob("*") if p.is_dir())
+
+
+def number_for(name: str, n: int) -> int:
+    """How many mutants of a target a campaign of n has."""
+    return max(int(n * TARGETS[name].share), 1)
