@@ -37,10 +37,13 @@ class LimitedProtocol(H11Protocol):
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
         """Take the connection, and close another one where there are too many."""
         super().connection_made(transport)
-        self._phase, self._timer, self._stall = "", None, None
+        self._phase = ""
+        self._timer: asyncio.TimerHandle | None = None
+        self._stall: asyncio.TimerHandle | None = None
         self._waits_since = time.monotonic()
         self._follow()
-        others = [c for c in self.connections if isinstance(c, LimitedProtocol)]
+        # Of those accepted at one go, the ones closed before are still in the set.
+        others = [c for c in self.connections if isinstance(c, LimitedProtocol) and not c.transport.is_closing()]
         mine = [c for c in others if c.host == self.host]
         if len(mine) > MOST_PER_CLIENT:
             self._make_room(mine)
