@@ -1,4 +1,4 @@
-"""The annotation page where things go wrong: servers that die at the worst moment, texts that are too long, a reload."""
+"""The annotation page where things go wrong: servers that die at the worst moment, long texts, a reload."""
 
 import contextlib
 import json
@@ -82,17 +82,16 @@ def test_nothing_says_saved_while_a_conflict_is_open_and_servers_die(browser, ya
         page.write("name", "scarlet van")
         page.press("\ue004")
         until("the conflict", lambda: opened(browser))
-    for _ in range(2):
-        with served() as (url, process):
-            # The page sees that there is a server again, several times.
-            seen = browser.execute_script("return performance.getEntriesByType('resource').length")
-            time.sleep(4)
-            assert browser.execute_script("return performance.getEntriesByType('resource').length") >= seen
-            assert page.text("#saved") != "saved"
-            assert entries(annotations)[0]["name"] == "crimson van"
-            assert opened(browser)
-            os.kill(process.pid, signal.SIGKILL)
-            process.wait()
+    with served() as (url, process):
+        # The page sees that there is a server again, several times.
+        seen = browser.execute_script("return performance.getEntriesByType('resource').length")
+        time.sleep(4)
+        assert browser.execute_script("return performance.getEntriesByType('resource').length") >= seen
+        assert page.text("#saved") != "saved"
+        assert entries(annotations)[0]["name"] == "crimson van"
+        assert opened(browser)
+        os.kill(process.pid, signal.SIGKILL)
+        process.wait()
     page.one("#use-mine").click()
     until("said that it is not saved", lambda: "not saved" in page.text("#saved"))
     with served():
@@ -148,6 +147,7 @@ def test_the_page_keeps_its_shape_its_selection_and_what_is_typed(browser, yard,
     pipeline, data, annotations = yard
     with annotating.served(project, annotating.YARD, pipeline, data) as (url, _):
         page = Page(browser, url)
+        chrome.errors(browser)  # those of servers that died before
         # No anchor is lacking: the sampler chooses it, and the page says so.
         count = len(entries(annotations))
         assert page.text("#progress-text") == f"{count} of {count} objects done · anchors chosen by the sampler"

@@ -242,6 +242,31 @@ def test_an_object_is_picked_by_a_click_on_its_mesh(page):
         assert until("the reference image", lambda: driver.execute_script(picture)) >= 300
 
 
+def test_what_is_picked_keeps_its_colours(page):
+    driver, _ = page
+    fresh(driver)
+    for layer in ("routes", "objects", "landmarks"):
+        driver.execute_script(f"page.view.setVisible('{layer}', false)")
+    item = driver.execute_script("return page.index.objects[0]")
+    driver.execute_script("page.view.focusOn(arguments[0])", item["mesh_node"])
+    before = view_of(driver, canvas(driver))
+    own = driver.execute_script(
+        """const found = [];
+           for (let y = 4; y < page.view.height; y += 6) for (let x = 4; x < page.view.width; x += 6)
+             if (page.view.pickNode(x, y)?.node === arguments[0]) found.push([x, y]);
+           return found;""",
+        item["mesh_node"],
+    )
+    driver.execute_script("page.pickObject(arguments[0])", item["object_id"])
+    after = view_of(driver, canvas(driver))
+    changed = (before != after).any(axis=2)
+    # The frame is there, and only its edges lie over the object.
+    assert changed.sum() > 300
+    assert np.mean([changed[y, x] for x, y in own]) < 0.12
+    driver.execute_script("page.letGo()")
+    assert np.array_equal(view_of(driver, canvas(driver)), before)
+
+
 def test_filters_count_as_the_release_does(smoke, page):
     driver, _ = page
     fresh(driver)

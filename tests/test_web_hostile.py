@@ -183,7 +183,7 @@ HEADERS = [
 
 
 def test_no_address_is_more_than_refused(desk, smoke):
-    with served(smoke, YARD) as url:
+    with served(smoke, YARD, silent=False) as url:
         for port, addresses in ((desk[0], ADDRESSES), (port_of(url), VIEWED)):
             for address in addresses:
                 for part in PARTS:

@@ -100,6 +100,7 @@ class Desk:
             if self._described is None or self._described[0] != state.version:
                 self._described = (state.version, self._describer.describe(state.annotations))
             return {
+                "scene": self.scene.name,
                 "version": state.version,
                 **self._described[1],
                 "undo": undo[-1].what if undo else None,

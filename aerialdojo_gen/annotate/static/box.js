@@ -1,4 +1,5 @@
 // Drawing a box around a thing for which a foreign mesh has no node: two corners by clicks or numbers, and a category.
+import { edges } from "/static/frame.js";
 import { byId, h } from "./dom.js";
 
 const AXES = ["x", "y", "z"];
@@ -84,10 +85,4 @@ export class BoxDrawer {
       location.reload();
     }
   }
-}
-
-/** The twelve edges of a box, each a flat list of two points. */
-export function edges([low, high]) {
-  const corner = (bits) => [0, 1, 2].map((axis) => (bits >> axis & 1 ? high[axis] : low[axis]));
-  return [0, 1, 2, 3, 4, 5, 6, 7].flatMap((a) => [1, 2, 4].filter((bit) => !(a & bit)).map((bit) => [...corner(a), ...corner(a | bit)]));
 }

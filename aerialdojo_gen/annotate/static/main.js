@@ -1,8 +1,9 @@
 // The annotation page: the scene, the list, the panel, and the keys that connect them.
 import { addCompass } from "/static/compass.js";
+import { frameNode } from "/static/frame.js";
 import { SceneView } from "/static/scene.js";
 import { candidatesOf } from "./anchors.js";
-import { BoxDrawer, edges } from "./box.js";
+import { BoxDrawer } from "./box.js";
 import { askConflict, showHelp, showHistory } from "./dialogs.js";
 import { ask, byId, h, toast } from "./dom.js";
 import { Editor } from "./editor.js";
@@ -87,22 +88,10 @@ class Page {
     this.list.render(this.sync.doc, selection);
     this.list.reveal();
     const entry = selection?.kind ? this.sync.entry(selection.kind, selection.id) : selection?.node;
-    this.frame(entry?.node);
+    frameNode(this.view, entry?.node);
     if (entry?.node && go && selection.kind) this.view.focusOn(entry.node);
     if (focus) this.intoFields();
     if (selection?.kind === "objects") this.prefetch();
-  }
-
-  /** Draw the selection's box; a tint would hide the colours that people are to describe. */
-  frame(node) {
-    const k = node ? this.view.index.get(node) : undefined;
-    if (k === undefined) {
-      this.view.remove("frame");
-      return;
-    }
-    const [low, high] = [0, 3].map((at) => [...this.view.payload.boxes.subarray(6 * k + at, 6 * k + at + 3)]);
-    const around = [low.map((v) => v - 0.05), high.map((v) => v + 0.05)];
-    this.view.addRoutes("frame", edges(around).map((points, id) => ({ id, points, colour: "#38bdf8" })), { width: 2.5, opacity: 1, pickable: false });
   }
 
   /** Have the candidates of the next unfinished object ready before somebody asks. */

@@ -4,8 +4,8 @@ import { same } from "./dom.js";
 
 const EMPTY = { name: "", category: "", description: "", node: "", anchor: null };
 const RETRY_MS = 1000;
-// Answers that say nothing about the operation: it stays in the queue until there is another one.
-const LATER = new Set([401, 403, 408, 429]);
+// Answers that say something about the operation; with any other one it stays in the queue.
+const VERDICTS = new Set([200, 400, 409, 412, 413, 422]);
 
 const kept = (key) => {
   try {
@@ -22,6 +22,7 @@ export class Sync extends EventTarget {
     super();
     this.who = who;
     this.ask = ask;
+    this.scene = scene;
     this.key = `aerialdojo-annotate-queue-${scene}`;
     this.client = sessionStorage.getItem("aerialdojo-annotate-client") ?? crypto.getRandomValues(new Uint32Array(3)).join("-");
     sessionStorage.setItem("aerialdojo-annotate-client", this.client);
@@ -66,8 +67,8 @@ export class Sync extends EventTarget {
     }
     if (this.sending) return;
     const body = response.status === 304 ? null : await read(response);
-    if (body && !response.ok) {
-      this.say("lost", body.error);
+    if (body && (!response.ok || this.strange(body))) {
+      this.say("lost", response.ok ? this.strange(body) : body.error);
       return;
     }
     if (this.status === "lost") this.say("saved", "saved");
@@ -77,6 +78,12 @@ export class Sync extends EventTarget {
     const before = this.doc;
     this.take(body);
     if (before) this.others(before);
+  }
+
+  /** Why a document is not this page's, in words: another server may have taken the port. */
+  strange(doc) {
+    if (doc.scene === this.scene) return "";
+    return doc.scene ? `another scene is served here, ${doc.scene}` : "something else answers here";
   }
 
   /** The last changes; none where the server does not answer: what they are asked for is of no weight. */
@@ -179,7 +186,9 @@ export class Sync extends EventTarget {
     const answer = await this.post("/api/operations", { operation: item.operation });
     if (answer === null) return { lost: "the server does not answer" };
     const { status, body } = answer;
-    if (status >= 500 || LATER.has(status)) return { lost: body.error };
+    if (!VERDICTS.has(status) || body.unread) return { lost: body.error };
+    const doc = status === 200 ? body : body.state;
+    if (doc && this.strange(doc)) return { lost: this.strange(doc) };
     if (status === 200) {
       this.take(body);
       return { done: body.done, doc: body };
@@ -286,7 +295,7 @@ const read = async (response) => {
     return response.ok ? body : { ...body, error: body?.error ?? `the server answers ${response.status}` };
   } catch (error) {
     if (response.ok) throw error;
-    return { error: text.length && text.length < 200 && !text.startsWith("<") ? text : `the server answers ${response.status}` };
+    return { unread: true, error: text.length && text.length < 200 && !text.startsWith("<") ? text : `the server answers ${response.status}` };
   }
 };
 
