@@ -13,13 +13,13 @@ from aerialdojo_gen.annotations.claims import plural, spoken
 from aerialdojo_gen.scenes.model import Instance
 
 _TOKEN = re.compile(r"[a-z0-9']+|[,.;:!?()]")
-# What ends the noun phrase that a text begins with.
-_ENDS = frozenset(
-    "with of in on at by near next beside behind under above over from to and or for between without along against "
-    "is are stands lies sits has have that which who where".split()
+# What ends the noun phrase that a text begins with; "-ing" does unless the catalogue has it, like a building.
+_END = re.compile(
+    r"[,.;:!?()]|with|of|in|on|at|by|near|next|beside|behind|under|above|over|from|to|and|or|for|between|without|along|"
+    r"against|is|are|stands|lies|sits|has|have|that|which|who|where|.*ing"
 )
-_COLOURS = frozenset(
-    "white black grey red orange yellow green turquoise blue purple pink brown beige teal cream silver gold".split()
+_COLOUR = re.compile(
+    r"white|black|grey|red|orange|yellow|green|turquoise|blue|purple|pink|brown|beige|teal|cream|silver|gold"
 )
 # Colours that one person calls this and another one that.
 _NEAR = {
@@ -97,7 +97,7 @@ class Callings:
             length = next(lengths, 0)
             if length:
                 thing, colours, pending = tokens[at : at + length], colours + pending, []
-            elif tokens[at] in _ENDS or not tokens[at][0].isalnum() or tokens[at].endswith("ing"):
+            elif _END.fullmatch(tokens[at]):
                 break
             else:
                 pending += _colours([tokens[at]])
@@ -111,4 +111,4 @@ def _words(text: str) -> tuple[str, ...]:
 
 def _colours(words: Iterable[str]) -> list[str]:
     spelt = (_SPELT.get(word, word) for word in words)
-    return [word for word in spelt if word in _COLOURS]
+    return [word for word in spelt if _COLOUR.fullmatch(word)]
