@@ -135,9 +135,9 @@ def test_a_foreign_mesh_is_annotated_in_the_browser_and_becomes_tasks(browser, s
         # Undo outlives the reload, redo brings it back.
         page.leave()
         page.press("\ue009z\ue000")
-        until("undone", lambda: page.text("#progress-text").startswith("2 of 3"))
+        until("undone", lambda: page.text("#progress-text").endswith(" · 1 anchor chosen by the sampler"))
         page.press("\ue009\ue008z\ue000")
-        until("redone", lambda: page.text("#progress-text").startswith("3 of 3"))
+        until("redone", lambda: page.text("#progress-text") == "3 of 3 objects done")
         assert scene.annotations.read_text() == written
         assert chrome.errors(browser) == []
     run_until("filter", data=data, pipeline=scene.pipeline, scene=[NAME], workers=1, quiet=True)

@@ -14,8 +14,8 @@ from aerialdojo_gen.scenes.catalogue import load_catalogue
 from aerialdojo_gen.scenes.model import Instance, Part
 
 NAMES = {
-    "storefront": "storefront", "sedan": "sedan", "garden_wall": "garden wall", "wall": "wall", "building": "building",
-    "traffic_light": "traffic light", "tram": "tram",
+    "storefront": "storefront", "sedan": "sedan", "garden_wall": "garden wall", "wall": "wall",
+    "building": "building", "traffic_light": "traffic light", "tram": "tram",
 }  # fmt: skip
 
 

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import hashlib
 import hmac
 import time
 from collections import OrderedDict
 from collections.abc import Awaitable, Callable, MutableMapping
+from dataclasses import dataclass, field
 from http.cookies import CookieError, SimpleCookie
 from typing import Any
 from urllib.parse import parse_qs
@@ -38,7 +40,7 @@ class TokenGate:
 
     def __init__(self, app: _Asgi, token: str) -> None:
         self._app, self._token = app, token
-        self._guesses: OrderedDict[str, tuple[float, float]] = OrderedDict()
+        self._guesses: OrderedDict[str, _Guesses] = OrderedDict()
         self._known: set[str] = set()
 
     async def __call__(
@@ -63,8 +65,8 @@ class TokenGate:
             return
         cookie = _cookie(headers.get(b"cookie", ""))
         if not self._right(cookie):
-            if token or cookie:
-                self._note(address)
+            for given in filter(None, (token, cookie)):
+                self._note(address, given)
             await _answer(send, 401, "open the address that the command printed: it carries the token")
             return
         origin = headers.get(b"origin")
@@ -77,17 +79,36 @@ class TokenGate:
         return hmac.compare_digest(given.encode("utf-8", "replace"), self._token.encode())
 
     def _wait(self, address: str) -> float:
-        """Seconds until an address may try again: a bucket of guesses that drains one every `SECONDS_A_GUESS`."""
-        level, since = self._guesses.get(address, (0.0, 0.0))
-        return (level - MOST_GUESSES + 1) * SECONDS_A_GUESS - (time.monotonic() - since)
+        """Seconds until an address may try again."""
+        guesses = self._guesses.get(address)
+        return 0.0 if guesses is None else guesses.wait(time.monotonic())
 
-    def _note(self, address: str) -> None:
-        level, since = self._guesses.pop(address, (0.0, 0.0))
-        now = time.monotonic()
-        left = max(0.0, level - (now - since) / SECONDS_A_GUESS)
-        self._guesses[address] = (left + 1.0, now)
+    def _note(self, address: str, given: str) -> None:
+        guesses = self._guesses.pop(address, None) or _Guesses()
+        guesses.add(given, time.monotonic())
+        self._guesses[address] = guesses
         while len(self._guesses) > _MOST_ADDRESSES:
             self._guesses.popitem(last=False)
+
+
+@dataclass
+class _Guesses:
+    """An address's wrong tokens: a bucket that drains one every `SECONDS_A_GUESS`."""
+
+    level: float = 0.0
+    since: float = 0.0
+    # A tab that was open when the server began anew sends its old token on and on: that is no guess.
+    seen: set[str] = field(default_factory=set)
+
+    def wait(self, now: float) -> float:
+        return (self.level - MOST_GUESSES + 1) * SECONDS_A_GUESS - (now - self.since)
+
+    def add(self, given: str, now: float) -> None:
+        digest = hashlib.sha256(given.encode("utf-8", "replace")).hexdigest()
+        left = max(0.0, self.level - (now - self.since) / SECONDS_A_GUESS)
+        self.seen = self.seen if left > 0.0 else set()
+        self.level, self.since = left + (digest not in self.seen), now
+        self.seen.add(digest)
 
 
 def _token_of(scope: _Message) -> str:

@@ -134,7 +134,7 @@ export class Editor {
       if (this.entry) this.tell(this.entry);
       return;
     }
-    this.drafts.delete(state.draft);
+    if (this.drafts.delete(state.draft) && this.entry) this.tell(this.entry);
     if (!base || same(base[state.key], value)) {
       if (this.page.sync.status === "busy") this.page.sync.say("saved", "saved");
       return;

@@ -34,6 +34,7 @@ export class Name {
     byId("who-field").hidden = !asking;
     this.button.hidden = asking;
     this.button.textContent = this.value;
+    this.button.title = `${this.value}: who you are in the history; click to change it`;
   }
 }
 
