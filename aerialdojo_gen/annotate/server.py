@@ -16,7 +16,7 @@ from aerialdojo_gen.annotate.coco import coco_zip
 from aerialdojo_gen.annotate.desk import Desk
 from aerialdojo_gen.annotate.document import ConflictError, Operation
 from aerialdojo_gen.annotate.storage import Author, StaleError
-from aerialdojo_gen.errors import AerialDojoError
+from aerialdojo_gen.errors import AerialDojoError, AnnotationError, StoreError
 from aerialdojo_gen.web.serving import local_app, one_line
 
 STATIC = Path(__file__).resolve().parent / "static"
@@ -126,7 +126,12 @@ def make_app(desk: Desk, *, any_host: bool = False) -> FastAPI:
 
     @app.post("/api/operations")
     def operate(body: Asked, if_match: _Match = None) -> Response:
-        return _with_version(desk.change(_required(if_match), body.author, body.operation))
+        version = _required(if_match)
+        try:
+            return _with_version(desk.change(version, body.author, body.operation))
+        except (StoreError, AnnotationError) as error:
+            # A full disk, a file that an editor has left half: no fault of what is asked, which the page sends again.
+            return JSONResponse({"error": one_line(str(error))}, status_code=503)
 
     @app.post("/api/undo")
     def undo(body: Signed, if_match: _Match = None) -> Response:
