@@ -13,9 +13,10 @@ from pathlib import Path
 
 import annotating
 import pytest
+from browser import until
 from viewing import YARD, served
 
-from aerialdojo_gen.web.limits import HEAD_S, MOST_PER_CLIENT
+from aerialdojo_gen.web.limits import MOST_PER_CLIENT
 
 
 def port_of(url):
@@ -272,9 +273,8 @@ def test_half_requests_lock_nobody_out_and_end(outside, begun):
         # From another address, too.
         assert ask(port, "GET", "/api/facts", headers=cookie, host="127.0.0.2")[0] == 200
         assert sum(not closed(client) for client in half) <= MOST_PER_CLIENT
-        if b"POST" not in begun:
-            time.sleep(HEAD_S + 2)
-            assert all(closed(client) for client in half)
+        if begun.startswith(b"GET"):
+            until("all of them are closed", lambda: all(closed(client) for client in half))
         assert ask(port, "GET", "/api/facts", headers=cookie)[0] == 200
     assert log.stat().st_size < 20_000, log.read_text()[:3000]
 
@@ -282,7 +282,7 @@ def test_half_requests_lock_nobody_out_and_end(outside, begun):
 def test_a_request_that_comes_drop_by_drop_is_given_up(outside):
     port, _, _ = outside
     with socket.create_connection(("127.0.0.1", port), timeout=30) as slow:
-        begun, said = time.monotonic(), b""
+        said = b""
         slow.settimeout(0.5)
         with contextlib.suppress(ConnectionError):
             for byte in b"GET / HTTP/1.1\r\nHost: x\r\nX: " + b"x" * 200:
@@ -290,8 +290,8 @@ def test_a_request_that_comes_drop_by_drop_is_given_up(outside):
                 with contextlib.suppress(TimeoutError):
                     said = slow.recv(200)
                     break
+        # Long before all of it is sent.
         assert said.startswith(b"HTTP/1.1 408 ")
-        assert time.monotonic() - begun < 4 * HEAD_S
 
 
 def test_rubbish_does_not_fill_the_log(outside):
