@@ -66,7 +66,7 @@ def test_the_document_says_where_everything_is_as_the_task_will(client, desk):
     document = client.get("/api/document").json()
     van = document["objects"][0]
     assert (van["name"], van["landmark"], van["direction"]) == ("red delivery van", "traffic light", "east")
-    assert van["lacks"] == ["anchor"]
+    assert (van["lacks"], van["anchor"]) == ([], None)
     assert document["faults"] == []
     tables = annotation_tables(desk.storage.load().annotations, desk.scene)
     assert [e["direction"] for e in document["objects"]] == tables["objects"]["direction"].to_pylist()
@@ -84,6 +84,15 @@ def test_a_change_is_answered_when_it_is_on_disk(client, desk):
     undone = client.post("/api/undo", json=AUTHOR, headers={"If-Match": answer.json()["version"]})
     assert undone.json()["version"] == first
     assert (undone.json()["undo"], undone.json()["redo"]) == (None, "name of object 0 (crimson van)")
+
+
+def test_a_change_that_the_disk_does_not_take_may_be_sent_again(client, desk):
+    seen, text = version_of(client), desk.storage.path.read_bytes()
+    desk.storage.path.write_bytes(text[: len(text) // 2])  # as an editor leaves it for a moment
+    answer = operate(client, seen, do="change", kind="objects", id=0, fields={"name": "crimson van"})
+    assert (answer.status_code, "not JSON" in answer.json()["error"]) == (503, True)
+    desk.storage.path.write_bytes(text)
+    assert operate(client, seen, do="change", kind="objects", id=0, fields={"name": "crimson van"}).status_code == 200
 
 
 def test_the_second_is_shown_the_conflict(client, desk):

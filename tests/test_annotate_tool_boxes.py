@@ -1,8 +1,25 @@
 """Boxes: how a thing gets a node where a foreign mesh has none."""
 
+import contextlib
+import fcntl
+import http.client
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import threading
+import time
+import urllib.error
+import urllib.request
+from pathlib import Path
+
+import annotating
 import numpy as np
 import pytest
 import trimesh
+from browser import until
 from starlette.testclient import TestClient
 
 from aerialdojo_gen.annotate.desk import open_desk
@@ -102,3 +119,118 @@ def test_what_is_boxed_out_is_annotated_becomes_an_object_and_can_be_put_back(te
     assert (empty.status_code, "holds no triangle" in empty.json()["error"]) == (400, True)
     assert recipe.read_bytes() == before
     desk.anchors.close()
+
+
+HOLDER = """
+import fcntl, sys
+with open(sys.argv[1], "a") as file:
+    fcntl.flock(file, fcntl.LOCK_EX)
+    print("held", flush=True)
+    sys.stdin.read()
+"""
+
+
+@contextlib.contextmanager
+def held_by_another(path: Path):
+    """Have another process hold a lock."""
+    command = [sys.executable, "-c", HOLDER, str(path)]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as holder:
+        assert holder.stdout.readline() == "held\n"
+        yield
+        holder.stdin.close()
+
+
+def asked(url, path, body=None, method=None):
+    """Ask a real server; gives status and answer."""
+    data = None if body is None else json.dumps(body).encode()
+    request = urllib.request.Request(url + path, data, {"Content-Type": "application/json"}, method=method)
+    try:
+        with urllib.request.urlopen(request) as answer:
+            return answer.status, json.loads(answer.read())
+    except urllib.error.HTTPError as error:
+        return error.code, json.loads(error.read())
+
+
+def test_a_box_that_cannot_be_built_leaves_the_recipe_as_it_was(terrain, project, tmp_path):
+    data, recipe = tmp_path / "data", terrain.pipeline.parent / "scenes" / "Scan.toml"
+    before = recipe.read_bytes()
+    box = {"low_m": SHED[0], "high_m": SHED[1], "category": "shed"}
+    with annotating.served(project, "Scan", terrain.pipeline, data) as (url, _):
+        with held_by_another(data / ".lock"):
+            for _ in range(2):
+                status, answer = asked(url, "api/boxes", box)
+                assert (status, "another run is writing" in answer["error"]) == (400, True), answer
+                assert recipe.read_bytes() == before
+        made = asked(url, "api/boxes", box)
+        assert (made[0], made[1]["node"]) == (200, "shed_000")
+        boxed = recipe.read_bytes()
+        with held_by_another(data / ".lock"):
+            assert asked(url, "api/boxes/shed_000", method="DELETE")[0] == 400
+        assert recipe.read_bytes() == boxed
+        # The scene that the page has is still the one of the recipe.
+        top = {"origin_m": [5.0, 5.0, 20.0], "direction": [0.0, 0.0, -1.0]}
+        assert asked(url, "api/pick", top)[1]["node"] == "shed_000"
+        assert asked(url, "api/boxes/shed_000", method="DELETE") == (200, {})
+    assert recipe.read_bytes() == before
+    assert not list(data.glob(".boxes-*"))
+
+
+def taken(path: Path):
+    """Whether somebody holds a lock."""
+    with path.open("a") as file:
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            return True
+    return False
+
+
+def test_a_server_killed_while_it_builds_a_box_leaves_the_recipe_as_it_was(terrain, project, tmp_path):
+    data, recipe, assets = (
+        tmp_path / "data",
+        terrain.pipeline.parent / "scenes" / "Scan.toml",
+        tmp_path / "scene_assets",
+    )
+    shutil.copytree(project / "scene_assets", assets, ignore=shutil.ignore_patterns("scenes", "smoke"))
+    pipeline, shard = tmp_path / "pipeline.toml", data / "scenes" / "Scan" / "part-00000.parquet"
+    pipeline.write_text(
+        f'name = "mine"\nseed = 7\nscene_assets = "{assets}"\nrecipes = "{recipe.parent}"\n'
+        f'annotations = "{tmp_path / "annotations"}"\n[annotate-import]\npaper_counts = false\n'
+    )
+    materials, before = assets / "materials.toml", recipe.read_bytes()
+    box = {"low_m": SHED[0], "high_m": SHED[1], "category": "shed"}
+
+    def ask(url):
+        with contextlib.suppress(OSError, http.client.HTTPException):
+            asked(url, "api/boxes", box)
+
+    def kill(process, asking):
+        os.kill(process.pid, signal.SIGKILL)
+        asking.join()
+
+    # In the middle of the build: it hangs, for want of somebody who writes into the pipe that it reads.
+    with annotating.served(project, "Scan", pipeline, data) as (url, process):
+        materials.rename(tmp_path / "kept.toml")
+        os.mkfifo(materials)
+        asking = threading.Thread(target=ask, args=(url,))
+        asking.start()
+        until("the build", lambda: taken(data / ".lock"))
+        kill(process, asking)
+    (tmp_path / "kept.toml").replace(materials)
+    assert recipe.read_bytes() == before
+    # As soon as the new scene is in the store: whole or not at all, and the next server begins with that.
+    with annotating.served(project, "Scan", pipeline, data) as (url, process):
+        was = shard.stat().st_ino
+        asking = threading.Thread(target=ask, args=(url,))
+        asking.start()
+        end = time.monotonic() + 60
+        while shard.stat().st_ino == was:
+            assert time.monotonic() < end
+        kill(process, asking)
+    assert recipe.read_bytes() == before or recipe.read_bytes().count(b"shed_000") == 1
+    recipe.write_bytes(before)
+    with annotating.served(project, "Scan", pipeline, data) as (url, _):
+        assert asked(url, "api/boxes", box)[1]["node"] == "shed_000"
+        assert asked(url, "api/boxes/shed_000", method="DELETE") == (200, {})
+    assert recipe.read_bytes() == before
+    assert not list(data.glob(".boxes-*"))

@@ -16,6 +16,7 @@ import browser as chrome
 import foreign
 import pyarrow.compute as pc
 import pytest
+from annotate_page import Page, entries
 from browser import until
 
 from aerialdojo_gen import store
@@ -44,63 +45,6 @@ def scene(tmp_path_factory):
     folder = tmp_path_factory.mktemp("helsinki")
     foreign.helsinki(folder / "helsinki.glb")
     return add_scene(NAME, folder / "helsinki.glb", folder / "mine", up="z", crop_m=(628.0, 97.0, 70.0))
-
-
-class Page:
-    """What a person does on the page, with mouse and keys."""
-
-    def __init__(self, driver, url):
-        self.driver = driver
-        driver.get(url)
-        self.ready()
-
-    def ready(self):
-        until("the page", lambda: self.one("body").get_attribute("data-ready") == "true")
-
-    def one(self, selector):
-        return self.driver.find_element("css selector", selector)
-
-    def all(self, selector):
-        return self.driver.find_elements("css selector", selector)
-
-    def text(self, selector):
-        return self.one(selector).get_property("textContent")
-
-    def click(self, selector):
-        until(selector, lambda: self.one(selector).click() is None)
-
-    def press(self, keys):
-        self.driver.switch_to.active_element.send_keys(keys)
-
-    def saved(self):
-        until("saved", lambda: self.text("#saved") == "saved")
-
-    def leave(self):
-        """Out of any field, nothing selected."""
-        self.press("\ue00c")
-        self.press("\ue00c")
-
-    def write(self, field, words):
-        element = self.one(f"#field-{field}")
-        element.send_keys("\ue009" + "a" + "\ue000", words)
-
-    def click_at(self, point, bounds):
-        """Click a point of the scene, seen from above."""
-        from selenium.webdriver import ActionChains
-
-        self.press("t")
-        canvas = self.one("#view canvas")
-        width, height = canvas.size["width"], canvas.size["height"]
-        (x0, y0, _), (x1, y1, top) = bounds
-        half = max(y1 - y0, (x1 - x0) / (width / height)) / 2
-        away = top + 1.05 * half / math.tan(math.pi / 6) - point[2]
-        scale = height / 2 / (away * math.tan(math.pi / 6))
-        dx, dy = (point[0] - (x0 + x1) / 2) * scale, ((y0 + y1) / 2 - point[1]) * scale
-        ActionChains(self.driver).move_to_element_with_offset(canvas, round(dx), round(dy)).click().perform()
-
-
-def entries(annotations, kind="objects"):
-    return json.loads(annotations.read_text())[kind]
 
 
 def roof(house):
@@ -191,9 +135,9 @@ def test_a_foreign_mesh_is_annotated_in_the_browser_and_becomes_tasks(browser, s
         # Undo outlives the reload, redo brings it back.
         page.leave()
         page.press("\ue009z\ue000")
-        until("undone", lambda: page.text("#progress-text").startswith("2 of 3"))
+        until("undone", lambda: page.text("#progress-text").endswith(" · 1 anchor chosen by the sampler"))
         page.press("\ue009\ue008z\ue000")
-        until("redone", lambda: page.text("#progress-text").startswith("3 of 3"))
+        until("redone", lambda: page.text("#progress-text") == "3 of 3 objects done")
         assert scene.annotations.read_text() == written
         assert chrome.errors(browser) == []
     run_until("filter", data=data, pipeline=scene.pipeline, scene=[NAME], workers=1, quiet=True)

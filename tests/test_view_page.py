@@ -74,7 +74,7 @@ def test_the_page_asks_nobody_else_and_has_no_errors(page):
         if '"Network.requestWillBeSent"' in entry["message"]
     ]
     # The browser's own empty tab, before the page was asked for, is not the page's doing.
-    asked = [event["request"]["url"] for event in sent if not event["documentURL"].startswith("chrome:")]
+    asked = [event["request"]["url"] for event in sent if not event["documentURL"].startswith("chrome")]
     assert {f"{url}api/scene", f"{url}api/index", f"{url}static/three/three.module.min.js"} <= set(asked)
     assert [other for other in asked if not other.startswith((url, "data:", "blob:"))] == []
 
@@ -240,6 +240,32 @@ def test_an_object_is_picked_by_a_click_on_its_mesh(page):
         assert item["name"] in panel
         assert item["description"] in panel
         assert until("the reference image", lambda: driver.execute_script(picture)) >= 300
+
+
+def test_what_is_picked_keeps_its_colours(page):
+    driver, _ = page
+    fresh(driver)
+    for layer in ("routes", "objects", "landmarks"):
+        driver.execute_script(f"page.view.setVisible('{layer}', false)")
+    item = driver.execute_script("return page.index.objects[0]")
+    driver.execute_script("page.view.focusOn(arguments[0])", item["mesh_node"])
+    before = view_of(driver, canvas(driver))
+    own = driver.execute_script(
+        """const found = [];
+           for (let y = 4; y < page.view.height; y += 6) for (let x = 4; x < page.view.width; x += 6)
+             if (page.view.pickNode(x, y)?.node === arguments[0]) found.push([x, y]);
+           return found;""",
+        item["mesh_node"],
+    )
+    driver.execute_script("page.pickObject(arguments[0])", item["object_id"])
+    after = view_of(driver, canvas(driver))
+    changed = (before != after).any(axis=2)
+    # The frame is there, and only its edges lie over the object.
+    assert changed.sum() > 300
+    assert np.mean([changed[y, x] for x, y in own]) < 0.12
+    assert driver.execute_script("return page.view.layers.has('frame')")
+    driver.execute_script("page.letGo()")
+    assert not driver.execute_script("return page.view.layers.has('frame')")
 
 
 def test_filters_count_as_the_release_does(smoke, page):

@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+import hashlib
 import hmac
+import time
+from collections import OrderedDict
 from collections.abc import Awaitable, Callable, MutableMapping
+from dataclasses import dataclass, field
 from http.cookies import CookieError, SimpleCookie
 from typing import Any
 from urllib.parse import parse_qs
 
 COOKIE = "aerialdojo-annotate"
+# Wrong tokens of one address: so many at once, then one every few seconds.
+MOST_GUESSES, SECONDS_A_GUESS = 10, 6.0
+_MOST_ADDRESSES = 4096
 
 _Message = MutableMapping[str, Any]
 _Asgi = Callable[
@@ -21,7 +28,9 @@ class TokenGate:
 
     The address that the command prints carries it; the answer moves it into a cookie that no script and no other
     site sees, and leads to the address without it. A request whose ``Origin`` is not the ``Host`` that it is sent to
-    is refused: the page's own scripts always have both alike.
+    is refused: the page's own scripts always have both alike. An address that has sent `MOST_GUESSES` wrong tokens is
+    answered without a look at what it sends, until its time is up; not so one from which somebody has come in before,
+    lest a neighbour behind the same router locks them out.
 
     Parameters
     ----------
@@ -31,21 +40,33 @@ class TokenGate:
 
     def __init__(self, app: _Asgi, token: str) -> None:
         self._app, self._token = app, token
+        self._guesses: OrderedDict[str, _Guesses] = OrderedDict()
+        self._known: set[str] = set()
 
     async def __call__(
         self, scope: _Message, receive: Callable[[], Awaitable[_Message]], send: Callable[[_Message], Awaitable[None]]
     ) -> None:
-        """Answer 401, 403 or 303 itself, or hand the request on."""
+        """Answer 401, 403, 429 or 303 itself, or hand the request on."""
         if scope["type"] != "http":
             await self._app(scope, receive, send)
             return
         headers = {name.lower(): value.decode("latin-1") for name, value in scope["headers"]}
-        query = parse_qs(scope.get("query_string", b"").decode("latin-1"))
-        if scope["path"] == "/" and self._right(query.get("token", [""])[0]):
-            cookie = f"{COOKIE}={self._token}; HttpOnly; SameSite=Strict; Path=/"
-            await _answer(send, 303, "", [(b"location", b"/"), (b"set-cookie", cookie.encode())])
+        address = (scope.get("client") or ("", 0))[0]
+        wait = self._wait(address)
+        if wait > 0.0 and address not in self._known:
+            after = [(b"retry-after", str(int(wait) + 1).encode())]
+            await _answer(send, 429, f"too many wrong tokens: try again in {int(wait) + 1} seconds", after)
             return
-        if not self._right(_cookie(headers.get(b"cookie", ""))):
+        token = _token_of(scope)
+        if scope["path"] == "/" and self._right(token):
+            self._known.add(address)
+            kept = f"{COOKIE}={self._token}; HttpOnly; SameSite=Strict; Path=/"
+            await _answer(send, 303, "", [(b"location", b"/"), (b"set-cookie", kept.encode())])
+            return
+        cookie = _cookie(headers.get(b"cookie", ""))
+        if not self._right(cookie):
+            for given in filter(None, (token, cookie)):
+                self._note(address, given)
             await _answer(send, 401, "open the address that the command printed: it carries the token")
             return
         origin = headers.get(b"origin")
@@ -56,6 +77,46 @@ class TokenGate:
 
     def _right(self, given: str) -> bool:
         return hmac.compare_digest(given.encode("utf-8", "replace"), self._token.encode())
+
+    def _wait(self, address: str) -> float:
+        """Seconds until an address may try again."""
+        guesses = self._guesses.get(address)
+        return 0.0 if guesses is None else guesses.wait(time.monotonic())
+
+    def _note(self, address: str, given: str) -> None:
+        guesses = self._guesses.pop(address, None) or _Guesses()
+        guesses.add(given, time.monotonic())
+        self._guesses[address] = guesses
+        while len(self._guesses) > _MOST_ADDRESSES:
+            self._guesses.popitem(last=False)
+
+
+@dataclass
+class _Guesses:
+    """An address's wrong tokens: a bucket that drains one every `SECONDS_A_GUESS`."""
+
+    level: float = 0.0
+    since: float = 0.0
+    # A tab that was open when the server began anew sends its old token on and on: that is no guess.
+    seen: set[str] = field(default_factory=set)
+
+    def wait(self, now: float) -> float:
+        return (self.level - MOST_GUESSES + 1) * SECONDS_A_GUESS - (now - self.since)
+
+    def add(self, given: str, now: float) -> None:
+        digest = hashlib.sha256(given.encode("utf-8", "replace")).hexdigest()
+        left = max(0.0, self.level - (now - self.since) / SECONDS_A_GUESS)
+        self.seen = self.seen if left > 0.0 else set()
+        self.level, self.since = left + (digest not in self.seen), now
+        self.seen.add(digest)
+
+
+def _token_of(scope: _Message) -> str:
+    try:
+        query = parse_qs(scope.get("query_string", b"").decode("latin-1"), max_num_fields=8)
+    except ValueError:
+        return ""
+    return query.get("token", [""])[0]
 
 
 def _cookie(header: str) -> str:

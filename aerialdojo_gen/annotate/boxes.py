@@ -1,13 +1,23 @@
-"""Boxes in an imported scene's recipe: what the annotation tool adds to it and takes from it."""
+"""Boxes in an imported scene's recipe: what the annotation tool adds to it and takes from it.
+
+A recipe with a box that could not be built would be a trap for every later run. So a changed recipe is built first,
+in a folder of its own, and takes the place of the old one when the scene is whole; after a crash in between, the old
+recipe stands, and the next run builds the scene that it describes.
+"""
 
 from __future__ import annotations
 
+import contextlib
 import json
+import shutil
+from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
-from aerialdojo_gen.atomic import atomic_file
+from aerialdojo_gen.atomic import atomic_file, disk_error
 from aerialdojo_gen.errors import AerialDojoError
 from aerialdojo_gen.scenes.recipe import Cut, load_imported
+from aerialdojo_gen.stage import Roots
 
 _HEAD = "\n[[imported.cuts]]\n"
 
@@ -18,8 +28,8 @@ def nodes(recipe: Path) -> list[str]:
     return [cut.node for cut in imported.cuts] if imported else []
 
 
-def add(recipe: Path, cut: Cut) -> None:
-    """Add a box to a recipe.
+def with_box(recipe: Path, cut: Cut) -> str:
+    """Return a recipe's text with a box more.
 
     Raises
     ------
@@ -36,18 +46,58 @@ def add(recipe: Path, cut: Cut) -> None:
         f"low_m = {list(cut.low_m)}",
         f"high_m = {list(cut.high_m)}",
     ]
-    _write(recipe, recipe.read_text(encoding="utf-8") + _HEAD + "\n".join(lines) + "\n")
+    return recipe.read_text(encoding="utf-8") + _HEAD + "\n".join(lines) + "\n"
 
 
-def remove(recipe: Path, node: str) -> None:
-    """Take a box out of a recipe; `AerialDojoError` where there is none of that node."""
+def without_box(recipe: Path, node: str) -> str:
+    """Return a recipe's text without the box of a node; `AerialDojoError` where there is none."""
     head, *blocks = recipe.read_text(encoding="utf-8").split(_HEAD)
     kept = [block for block in blocks if f"node = {json.dumps(node)}\n" not in block]
     if len(kept) == len(blocks):
         raise AerialDojoError(f"{node} was not made by a box")
-    _write(recipe, _HEAD.join([head, *kept]))
+    return _HEAD.join([head, *kept])
 
 
-def _write(recipe: Path, text: str) -> None:
+@contextlib.contextmanager
+def staged(roots: Roots, scene: str, text: str) -> Iterator[Roots]:
+    """Lay a changed recipe out for a build, with the scene's own mesh beside it.
+
+    Parameters
+    ----------
+    roots : Roots
+        The folders; the recipe in them stays as it is.
+    scene : str
+        Name of the scene.
+    text : str
+        The changed recipe.
+
+    Yields
+    ------
+    Roots
+        The same, but for the folder of recipes.
+
+    Raises
+    ------
+    StoreError
+        The data directory cannot be written.
+    """
+    # One name a scene: whoever changes its boxes holds its lock, and what a crash left is replaced by the next.
+    folder = roots.data / f".boxes-{scene}"
+    try:
+        shutil.rmtree(folder, ignore_errors=True)
+        folder.mkdir(parents=True)
+        (folder / f"{scene}.toml").write_text(text, encoding="utf-8")
+        (folder / f"{scene}.glb").symlink_to((roots.recipes / f"{scene}.glb").resolve())
+    except OSError as error:
+        shutil.rmtree(folder, ignore_errors=True)
+        raise disk_error(error, folder) from error
+    try:
+        yield replace(roots, recipes=folder)
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+def write(recipe: Path, text: str) -> None:
+    """Write a recipe, whole or not at all."""
     with atomic_file(recipe.parent, recipe.name) as path:
         path.write_text(text, encoding="utf-8")

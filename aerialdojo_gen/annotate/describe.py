@@ -65,7 +65,6 @@ class Describer:
 
     def _object(self, annotations: Annotations, entry: Object, faults: list[dict[str, str]]) -> dict[str, Any]:
         lacks = [key for key in ("name", "category", "description") if not getattr(entry, key).strip()]
-        lacks += ["anchor"] if entry.anchor is None else []
         lacks += ["check"] if any(fault["field"] not in lacks for fault in faults) else []
         return {
             **entry.model_dump(),

@@ -5,7 +5,8 @@ from __future__ import annotations
 import itertools
 import re
 import threading
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -57,14 +58,17 @@ class Desk:
         self._lock = threading.RLock()  # the geometry remembers as it goes
         self._open_scene()
 
-    def _open_scene(self) -> None:
+    def _open_scene(self, commit: Callable[[], None] = lambda: None) -> None:
+        """Read the scene, do what makes it the desk's, and only then let go of the one before."""
         name, pipeline = self.storage.scene, self._pipeline
-        self.scene: Scene = Job("annotate", name, 0, 1, pipeline.seed, pipeline.embodiment, self._roots).scene_model()
-        self.payload = scene_payload(self.scene)
-        self._describer = Describer(self.scene, self._names, self._counts)
-        self._rays = RayCaster(self.scene)
+        scene = Job("annotate", name, 0, 1, pipeline.seed, pipeline.embodiment, self._roots).scene_model()
+        payload, describer = scene_payload(scene), Describer(scene, self._names, self._counts)
+        rays = RayCaster(scene)
+        commit()
+        self.scene: Scene = scene
+        self.payload, self._describer, self._rays = payload, describer, rays
         self._described: tuple[str, dict[str, Any]] | None = None
-        self.anchors = AnchorDesk(self.scene, pipeline, self._roots)
+        self.anchors = AnchorDesk(scene, pipeline, self._roots)
 
     # What the page shows.
 
@@ -96,6 +100,7 @@ class Desk:
             if self._described is None or self._described[0] != state.version:
                 self._described = (state.version, self._describer.describe(state.annotations))
             return {
+                "scene": self.scene.name,
                 "version": state.version,
                 **self._described[1],
                 "undo": undo[-1].what if undo else None,
@@ -190,7 +195,7 @@ class Desk:
             "category": instance.category,
             "word": self._names.get(instance.category, spoken(instance.category)),
             "attributes": instance.attributes,
-            "boxed": node in boxes.nodes(self._roots.recipes / f"{self.scene.name}.toml"),
+            "boxed": node in boxes.nodes(self._recipe),
             "size_m": np.ptp(instance.bounds, axis=0).round(2).tolist(),
             **self._describer.place(node),
             **self._describer.bearing(self.storage.load().annotations, node),
@@ -233,8 +238,7 @@ class Desk:
             node = next(n for k in itertools.count() if (n := f"{slug}_{k:03d}") not in self.scene)
             cut = Cut(node=node, category=slug, low_m=tuple(low.tolist()), high_m=tuple(high.tolist()))
             cut_out(self.scene, (cut,))
-            boxes.add(self._roots.recipes / f"{self.scene.name}.toml", cut)
-            self._rebuild()
+            self._rebuild(boxes.with_box(self._recipe, cut))
         return self.about(node)
 
     def uncut(self, node: str) -> None:
@@ -243,13 +247,18 @@ class Desk:
         if node in {e.node for e in annotations.landmarks} | {e.node for e in annotations.objects}:
             raise AerialDojoError(f"{node} is annotated: remove its entry first")
         with self._lock, self.storage.locked():
-            boxes.remove(self._roots.recipes / f"{self.scene.name}.toml", node)
-            self._rebuild()
+            self._rebuild(boxes.without_box(self._recipe, node))
 
-    def _rebuild(self) -> None:
-        build(self.scene.name, self._pipeline, self._roots)
-        self.anchors.close()
-        self._open_scene()
+    @property
+    def _recipe(self) -> Path:
+        return self._roots.recipes / f"{self.storage.scene}.toml"
+
+    def _rebuild(self, recipe: str) -> None:
+        with boxes.staged(self._roots, self.storage.scene, recipe) as roots:
+            build(self.storage.scene, self._pipeline, roots)
+        before = self.anchors
+        self._open_scene(commit=lambda: boxes.write(self._recipe, recipe))
+        before.close()
 
     def _check_anchor(self, object_id: int, anchor: Anchor) -> None:
         try:

@@ -35,12 +35,10 @@ def serve_desk(desk: Desk, *, port: int, host: str, browser: bool, say: Callable
     Raises
     ------
     UsageError
-        The address is none, the port is taken, or FastAPI is not installed.
+        The address is none, or the port is taken.
     """
-    try:
-        from aerialdojo_gen.annotate.server import make_app
-    except ImportError:
-        raise UsageError("annotate needs FastAPI and uvicorn: pip install 'aerialdojo-gen[web]'") from None
+    from aerialdojo_gen.annotate.server import make_app
+
     try:
         loopback = ipaddress.IPv4Address(host) == ipaddress.IPv4Address("127.0.0.1")
     except ValueError:

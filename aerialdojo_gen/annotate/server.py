@@ -8,18 +8,16 @@ from typing import Annotated, Any
 
 import numpy as np
 from fastapi import FastAPI, Header, Query, Request
-from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse, Response
 from fastapi.staticfiles import StaticFiles
 from pydantic import BaseModel, ConfigDict, Field, StrictFloat, StrictStr, field_validator
-from starlette.exceptions import HTTPException
 
 from aerialdojo_gen.annotate.coco import coco_zip
 from aerialdojo_gen.annotate.desk import Desk
 from aerialdojo_gen.annotate.document import ConflictError, Operation
 from aerialdojo_gen.annotate.storage import Author, StaleError
-from aerialdojo_gen.errors import AerialDojoError
-from aerialdojo_gen.web.serving import local_app
+from aerialdojo_gen.errors import AerialDojoError, AnnotationError, StoreError
+from aerialdojo_gen.web.serving import local_app, one_line
 
 STATIC = Path(__file__).resolve().parent / "static"
 MOST_BYTES = 8 << 20
@@ -102,24 +100,10 @@ def make_app(desk: Desk, *, any_host: bool = False) -> FastAPI:
     """
     app = local_app(str(STATIC / "index.html"), f"annotate {desk.scene.name}", MOST_BYTES, any_host=any_host)
 
-    @app.exception_handler(RequestValidationError)
-    def malformed(_: Request, error: Exception) -> JSONResponse:
-        assert isinstance(error, RequestValidationError)
-        first = error.errors()[0]
-        where = ".".join(str(part) for part in first["loc"])
-        # A key of the request may be half a character, which no answer can be written with.
-        said = f"malformed request: {where}: {first['msg']}"[:500].encode("utf-8", "replace").decode()
-        return JSONResponse({"error": said}, status_code=422)
-
-    @app.exception_handler(HTTPException)
-    def refused(_: Request, error: Exception) -> JSONResponse:
-        assert isinstance(error, HTTPException)
-        return JSONResponse({"error": str(error.detail)}, status_code=error.status_code)
-
     @app.exception_handler(ConflictError)
     def conflict(request: Request, error: Exception) -> JSONResponse:
         body: dict[str, Any] = {
-            "error": str(error),
+            "error": one_line(str(error)),
             "state": desk.document(request.query_params.get("client", "")[:40]),
         }
         if isinstance(error, StaleError):
@@ -142,7 +126,12 @@ def make_app(desk: Desk, *, any_host: bool = False) -> FastAPI:
 
     @app.post("/api/operations")
     def operate(body: Asked, if_match: _Match = None) -> Response:
-        return _with_version(desk.change(_required(if_match), body.author, body.operation))
+        version = _required(if_match)
+        try:
+            return _with_version(desk.change(version, body.author, body.operation))
+        except (StoreError, AnnotationError) as error:
+            # A full disk, a file that an editor has left half: no fault of what is asked, which the page sends again.
+            return JSONResponse({"error": one_line(str(error))}, status_code=503)
 
     @app.post("/api/undo")
     def undo(body: Signed, if_match: _Match = None) -> Response:

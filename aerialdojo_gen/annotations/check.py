@@ -9,6 +9,7 @@ from collections.abc import Iterable, Mapping, Sequence
 import numpy as np
 
 from aerialdojo_gen.annotations.ambiguity import Ambiguity, nearest_landmark
+from aerialdojo_gen.annotations.calling import Callings
 from aerialdojo_gen.annotations.claims import Lexicon
 from aerialdojo_gen.annotations.format import Landmark, Object, Source
 from aerialdojo_gen.annotations.positions import Fault
@@ -59,10 +60,12 @@ def check_source(
         faults += _unique(source)
         for i, landmark in source.landmarks.items():
             faults += _landmark(source, scene, ("landmarks", i), landmark)
+        callings = Callings(names)
         for i, entry in source.objects.items():
             faults += _object(source, scene, names, ("objects", i), entry)
+            faults += _called(source, scene, callings, ("objects", i), entry)
         faults += _geometry(source, scene, names, geometry or SceneGeometry(scene))
-    return sorted(faults, key=lambda fault: fault.line)
+    return sorted(dict.fromkeys(faults), key=lambda fault: fault.line)
 
 
 def _counts(source: Source, counts: tuple[int, int] | None) -> Iterable[Fault]:
@@ -115,6 +118,17 @@ def _object(
         yield source.document.fault((*path, "category"), text)
     if entry.anchor is not None and not _inside(scene, entry.anchor.position_m):
         yield source.document.fault((*path, "anchor", "position_m"), "outside the scene's bounds")
+
+
+def _called(
+    source: Source, scene: Scene, callings: Callings, path: tuple[str | int, ...], entry: Object
+) -> Iterable[Fault]:
+    """What the object is called, where the mesh is no guess at it: an imported one's names are."""
+    if scene.imported or entry.node not in scene:
+        return
+    for key in ("name", "description"):
+        for message in callings.contradictions(getattr(entry, key), scene[entry.node]):
+            yield source.document.fault((*path, key), message)
 
 
 def _name(source: Source, path: tuple[str | int, ...], name: str) -> Iterable[Fault]:

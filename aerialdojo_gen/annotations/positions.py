@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import json.scanner
+import re
 from bisect import bisect_left
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -11,6 +12,9 @@ from typing import Any, cast
 
 from aerialdojo_gen.bounded import JsonPath, beyond, scan_json
 from aerialdojo_gen.errors import BeyondBounds
+
+MOST_VALUES = 200_000
+_HALF = re.compile("[\ud800-\udfff]")
 
 
 @dataclass(frozen=True)
@@ -110,8 +114,11 @@ def read_json(text: str) -> Document:
     Returns
     -------
     Document
-        A syntax error is a fault in it, with ``value`` None; of a key that stands twice the last value is kept.
+        A syntax error is a fault in it, with ``value`` None, and so is a text of more than `MOST_VALUES` values; of a
+        key that stands twice the last value is kept; half of a surrogate pair is a fault, and U+FFFD in the value.
     """
+    if text.count(",") + text.count("[") + text.count("{") > MOST_VALUES:
+        return Document(None, {}, (Fault(0, "", f"holds more than {MOST_VALUES} values"),))
     try:
         scan_json(text)
         root = cast(_Located, _Decoder().decode(text))
@@ -139,7 +146,8 @@ def _unwrap(
     lines[path] = bisect_left(newlines, node.offset) + 1
     if isinstance(node.value, _Pairs):
         plain: dict[str, Any] = {}
-        for key, child in node.value:
+        for raw, child in node.value:
+            key = _whole(raw, path, lines, faults)
             inner = _unwrap(child, (*path, key), newlines, lines, faults)
             if key in plain:
                 fault = Fault(lines[*path, key], dotted((*path, key)), f"the key {key!r} stands twice in one object")
@@ -148,4 +156,15 @@ def _unwrap(
         return plain
     if isinstance(node.value, list):
         return [_unwrap(child, (*path, i), newlines, lines, faults) for i, child in enumerate(node.value)]
-    return node.value
+    return _whole(node.value, path, lines, faults) if isinstance(node.value, str) else node.value
+
+
+def _whole(text: str, path: JsonPath, lines: dict[JsonPath, int], faults: list[Fault]) -> str:
+    """Pass a text on that can be written as UTF-8: JSON can spell half of a surrogate pair, UTF-8 cannot."""
+    half = _HALF.search(text)
+    if half is None:
+        return text
+    faults.append(
+        Fault(lines[path], dotted(path), f"\\u{ord(half[0]):04x} is half of a surrogate pair: no character")
+    )
+    return _HALF.sub("\N{REPLACEMENT CHARACTER}", text)

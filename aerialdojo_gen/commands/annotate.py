@@ -29,7 +29,10 @@ def annotate(
     """Annotate a scene in the browser: landmarks, objects, their anchors."""
     from aerialdojo_gen.annotate.desk import open_desk
     from aerialdojo_gen.annotate.serve import serve_desk, write_coco
+    from aerialdojo_gen.web.serving import require_web
 
+    if coco is None:
+        require_web()
     config, roots = open_pipeline(pipeline, data)
     desk = open_desk(scene, config, roots)
     if coco is not None:

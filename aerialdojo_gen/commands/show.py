@@ -42,9 +42,10 @@ def view(
     browser: Annotated[bool, typer.Option("--browser/--no-browser", help="Open the page.")] = True,
 ) -> None:
     """Show a scene in the browser: landmarks, objects, anchors, routes."""
-    from aerialdojo_gen.web.serving import open_socket, serve, url_of
+    from aerialdojo_gen.web.serving import open_socket, require_web, serve, url_of
     from aerialdojo_gen.web.view import view_app
 
+    require_web()
     page = view_app(data, scene)
     listener = open_socket(port)
     print(f"{scene}: {url_of(listener)}  (Ctrl-C ends it)", flush=True)

@@ -35,7 +35,10 @@ def cut_out(scene: Scene, cuts: tuple[Cut, ...]) -> Scene:
     instances = list(scene.instances)
     for cut in cuts:
         if any(instance.node == cut.node for instance in instances):
-            raise AssetError(f"scene {scene.name}: the box {cut.node!r} has the name of a node that is there already")
+            raise AssetError(
+                f"scene {scene.name}: the box {cut.node!r} has the name of a node that is there already: "
+                "take one of the two out of the recipe's [[imported.cuts]]"
+            )
         kept: list[Instance] = []
         inside: list[Part] = []
         for instance in instances:

@@ -87,9 +87,30 @@ class _LocalOnly:
         if b"transfer-encoding" in headers:
             return 411, "send a Content-Length"
         length = headers.get(b"content-length", [b"0"])[0]
-        if not length.isdigit() or int(length) > self._max_body_bytes:
+        if not length.isdigit() or len(length) > 18 or int(length) > self._max_body_bytes:
             return 413, f"at most {self._max_body_bytes} bytes"
         return None
+
+
+def require_web() -> None:
+    """Say what is missing before anything else is done.
+
+    Raises
+    ------
+    UsageError
+        FastAPI or uvicorn is not installed.
+    """
+    try:
+        import fastapi  # noqa: F401
+        import uvicorn  # noqa: F401
+    except ImportError as error:
+        raise UsageError(f"web pages need {error.name}: pip install 'aerialdojo-gen[web]'") from None
+
+
+def one_line(text: str, most: int = 500) -> str:
+    """Make a line for people of a text that may hold what a client sent."""
+    shown = "".join(c if c.isprintable() else f"\\u{ord(c):04x}" if c not in "\t\n\r" else " " for c in text)
+    return shown if len(shown) <= most else f"{shown[: most - 4]} ..."
 
 
 def local_app(page: str, title: str, max_body_bytes: int = 1 << 20, *, any_host: bool = False) -> FastAPI:
@@ -110,19 +131,19 @@ def local_app(page: str, title: str, max_body_bytes: int = 1 << 20, *, any_host:
     -------
     fastapi.FastAPI
         To which the caller adds its routes; an `AerialDojoError` in them becomes ``{"error": message}`` with status
-        400 (404 where it is a `UsageError`).
+        400 (404 where it is a `UsageError`), a malformed request one with status 422; a message is one line.
 
     Raises
     ------
     UsageError
         FastAPI is not installed.
     """
-    try:
-        from fastapi import FastAPI, Request
-        from fastapi.responses import JSONResponse, Response
-        from fastapi.staticfiles import StaticFiles
-    except ImportError:
-        raise UsageError("web pages need FastAPI and uvicorn: pip install 'aerialdojo-gen[web]'") from None
+    require_web()
+    from fastapi import FastAPI, Request
+    from fastapi.exceptions import RequestValidationError
+    from fastapi.responses import JSONResponse, Response
+    from fastapi.staticfiles import StaticFiles
+    from starlette.exceptions import HTTPException
 
     html = (STATIC / page).read_bytes()
     maps = [base64.b64encode(hashlib.sha256(text).digest()).decode() for text in _IMPORT_MAP.findall(html)]
@@ -144,7 +165,22 @@ def local_app(page: str, title: str, max_body_bytes: int = 1 << 20, *, any_host:
 
     @app.exception_handler(AerialDojoError)
     def expected(_: Request, error: Exception) -> JSONResponse:
-        return JSONResponse({"error": str(error)}, status_code=404 if isinstance(error, UsageError) else 400)
+        return said(error, 404 if isinstance(error, UsageError) else 400)
+
+    @app.exception_handler(RequestValidationError)
+    def malformed(_: Request, error: Exception) -> JSONResponse:
+        assert isinstance(error, RequestValidationError)
+        first = error.errors()[0]
+        where = ".".join(str(part) for part in first["loc"])
+        return said(f"malformed request: {where}: {first['msg']}", 422)
+
+    @app.exception_handler(HTTPException)
+    def refused(_: Request, error: Exception) -> JSONResponse:
+        assert isinstance(error, HTTPException)
+        return said(error.detail, error.status_code)
+
+    def said(what: object, status: int) -> JSONResponse:
+        return JSONResponse({"error": one_line(str(what))}, status_code=status)
 
     app.mount("/static", StaticFiles(directory=STATIC, follow_symlink=False), name="static")
     return app
@@ -185,11 +221,13 @@ def serve(app: FastAPI, listener: socket.socket, browser: bool = False) -> None:
     """
     import uvicorn
 
+    from aerialdojo_gen.web.limits import bound_log, limits
+
     url = url_of(listener)
-    server = uvicorn.Server(
-        uvicorn.Config(app, log_level="warning", access_log=False, lifespan="off", timeout_graceful_shutdown=1,
-                       proxy_headers=False, server_header=False)
-    )  # fmt: skip
+    config = uvicorn.Config(app, log_level="warning", access_log=False, lifespan="off", timeout_graceful_shutdown=1,
+                            proxy_headers=False, server_header=False, **limits())  # fmt: skip
+    server = uvicorn.Server(config)
+    bound_log()
     if browser:
         threading.Thread(target=webbrowser.open, args=(url,), daemon=True).start()
     try:

@@ -42,9 +42,9 @@ def view_app(data: Path, scene: str) -> FastAPI:
     UsageError, StoreError, AssetError
         The scene, its tables or its mesh are missing or damaged.
     """
+    app = local_app("view.html", f"aerialdojo-gen view {scene}")
     from fastapi import Response
 
-    app = local_app("view.html", f"aerialdojo-gen view {scene}")
     shown = ReleasedScene(data, scene)
     payload, index, points = scene_payload(shown.model), scene_index(shown), route_points(shown)
     # FCL's manager is no thing for two threads at once, and FastAPI answers in several.

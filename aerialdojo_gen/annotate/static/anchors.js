@@ -1,24 +1,13 @@
 // The anchors of an object: the candidates as pictures, one to choose, or one placed by hand.
-import { byId, h, picture, same } from "./dom.js";
+import { ask, byId, h, picture, same } from "./dom.js";
 
 const cache = new Map();
-
-const post = async (url, body) => {
-  const response = await fetch(url, { method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify(body) });
-  const answer = await response.json();
-  if (!response.ok) throw new Error(answer.error);
-  return answer;
-};
 
 /** The candidates of an object, computed once; a promise. */
 export function candidatesOf(entry) {
   const key = `${entry.id} ${entry.node}`;
   if (!cache.has(key)) {
-    cache.set(key, fetch(`/api/objects/${entry.id}/anchors`).then(async (response) => {
-      const body = await response.json();
-      if (!response.ok) throw new Error(body.error);
-      return body;
-    }).catch((error) => { cache.delete(key); throw error; }));
+    cache.set(key, ask(`/api/objects/${entry.id}/anchors`).catch((error) => { cache.delete(key); throw error; }));
   }
   return cache.get(key);
 }
@@ -56,8 +45,10 @@ export class AnchorChooser {
   refresh(entry) {
     if (!entry || this.closed) return;
     this.clear.disabled = !entry.anchor;
+    if (this.candidates.length) this.note.textContent = entry.anchor ? "" : "Chosen by the sampler: its best candidate. Choose one yourself with a click or 1, 2, 3.";
     const at = entry.anchor ? this.candidates.findIndex((c) => same(poseOf(c), poseOf(entry.anchor))) : -1;
     const cards = this.candidates.map((candidate, k) => ({ viewpoint: candidate, title: String(k + 1), chosen: k === at, key: k + 1 }));
+    if (!entry.anchor && cards.length) cards[0].sampled = true;
     if (entry.anchor && at < 0) cards.push({ viewpoint: this.own(entry.anchor), title: "by hand", chosen: true });
     this.shown = cards;
     const state = JSON.stringify(cards);
@@ -75,7 +66,7 @@ export class AnchorChooser {
     if (this.ownKey !== key) {
       this.ownKey = key;
       this.ownFacts = { ...anchor, faults: [] };
-      post(`/api/objects/${this.id}/viewpoint`, anchor).then((facts) => {
+      ask(`/api/objects/${this.id}/viewpoint`, anchor).then((facts) => {
         this.ownFacts = facts;
         this.refresh(this.page.sync.entry("objects", this.id));
       }, () => {});
@@ -83,7 +74,7 @@ export class AnchorChooser {
     return this.ownFacts;
   }
 
-  card({ viewpoint, title, chosen, key }, entry) {
+  card({ viewpoint, title, chosen, sampled, key }, entry) {
     const seen = viewpoint.visible_fraction;
     const wrong = viewpoint.faults.length ? `It will not do: ${viewpoint.faults.join("; ")}` : null;
     return h("button", {
@@ -92,6 +83,7 @@ export class AnchorChooser {
       onmouseleave: () => this.regard(entry), onblur: () => this.regard(entry),
     }, picture(viewpoint, this.page.facts.picture_px, `${entry.name || "object"} seen from anchor ${title}`),
     h("span", { class: "caption" }, h("span", {}, key ? h("kbd", {}, title) : title), chosen ? h("span", { class: "chosen" }, "✓ chosen")
+      : sampled ? h("span", { class: "sampled", title: "Nobody has chosen one: the sampler takes the best candidate" }, "sampler’s")
       : h("span", { class: "hint" }, seen == null ? "" : `sees ${Math.round(100 * seen)} %`)),
     wrong ? h("span", { class: "faults" }, wrong) : null);
   }
@@ -145,7 +137,7 @@ export class AnchorChooser {
   async judge(asked) {
     let facts;
     try {
-      facts = await post(`/api/objects/${this.id}/viewpoint`, asked);
+      facts = await ask(`/api/objects/${this.id}/viewpoint`, asked);
     } catch (error) {
       this.page.say(error.message, true);
       return;
@@ -154,7 +146,7 @@ export class AnchorChooser {
     const focused = document.activeElement?.dataset?.number;
     const number = (label, value, step, k) => h("label", { class: "field" }, h("span", {}, label),
       h("input", { type: "number", step, value: value.toFixed(k === 3 ? 1 : 2), "data-number": k, onchange: () => this.typed(k === 3) }));
-    const verdict = facts.faults.length ? h("ul", { class: "faults", role: "status" }, ...facts.faults.map((text) => h("li", {}, `${text}.`)))
+    const verdict = facts.faults.length ? h("div", { role: "status" }, h("ul", { class: "faults" }, ...facts.faults.map((text) => h("li", {}, `${text}.`))))
       : h("p", { class: "ok", role: "status" }, `It will do: ${facts.surface_distance_m.toFixed(2)} m from the surface, sees ${Math.round(100 * facts.visible_fraction)} %, clearance ${facts.clearance_m.toFixed(2)} m.`);
     this.facts = facts;
     this.placing.replaceChildren(

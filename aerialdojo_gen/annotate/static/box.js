@@ -1,4 +1,5 @@
 // Drawing a box around a thing for which a foreign mesh has no node: two corners by clicks or numbers, and a category.
+import { edges } from "/static/frame.js";
 import { byId, h } from "./dom.js";
 
 const AXES = ["x", "y", "z"];
@@ -58,7 +59,7 @@ export class BoxDrawer {
       h("p", { class: "hint" }, "Click two opposite corners on the surface, or type them. What lies in the box, by the middle of its triangles, becomes "
         + "a thing of its own that can be annotated."),
       h("div", { class: "placing" }, h("div", { class: "numbers three" }, ...[0, 1, 2].flatMap((k) => [number(0, k), number(1, k)]))),
-      h("label", { class: "field" }, h("span", {}, "Category"), h("input", { id: "box-category", list: "categories", maxlength: 60, value: category })),
+      h("label", { class: "field" }, h("span", {}, "Category"), h("input", { id: "box-category", list: "categories", value: category })),
       h("div", { class: "row" }, h("button", { id: "cut", class: "main", onclick: () => this.cut() }, "Make it a thing"),
         h("button", { onclick: () => this.page.select(null) }, "Cancel")));
   }
@@ -66,31 +67,22 @@ export class BoxDrawer {
   async cut() {
     const [low_m, high_m] = this.corners, category = byId("box-category").value;
     byId("cut").disabled = true;
-    const response = await fetch("/api/boxes", { method: "POST", headers: { "Content-Type": "application/json" },
-      body: JSON.stringify({ low_m, high_m, category }) });
-    const answer = await response.json();
-    if (response.ok) {
+    const made = await this.page.ask("/api/boxes", { low_m, high_m, category });
+    if (made) {
       // The scene is another one now: load it anew, and go on with the new thing.
-      location.hash = answer.node;
+      location.hash = encodeURIComponent(made.node);
       location.reload();
       return;
     }
-    byId("cut").disabled = false;
-    this.page.say(answer.error, true);
+    // Somebody may have turned to something else meanwhile.
+    if (byId("cut")) byId("cut").disabled = false;
   }
 
   /** Undo a box: what it held goes back to where it was. */
   async uncut(node) {
-    const response = await fetch(`/api/boxes/${encodeURIComponent(node)}`, { method: "DELETE" });
-    if (response.ok) {
+    if (await this.page.ask(`/api/boxes/${encodeURIComponent(node)}`, null, "DELETE")) {
       location.hash = "";
       location.reload();
-    } else this.page.say((await response.json()).error, true);
+    }
   }
-}
-
-/** The twelve edges of a box, each a flat list of two points. */
-export function edges([low, high]) {
-  const corner = (bits) => [0, 1, 2].map((axis) => (bits >> axis & 1 ? high[axis] : low[axis]));
-  return [0, 1, 2, 3, 4, 5, 6, 7].flatMap((a) => [1, 2, 4].filter((bit) => !(a & bit)).map((bit) => [...corner(a), ...corner(a | bit)]));
 }

@@ -1,6 +1,8 @@
 // The dialogs: a conflict, the history, the keys.
 import { byId, h, same } from "./dom.js";
 
+// As many as the server tells.
+const MOST_LINES = 200;
 const LABELS = { name: "Name", category: "Category", description: "Description", node: "Node", anchor: "Anchor" };
 
 const shown = (value) => {
@@ -44,12 +46,11 @@ export function askConflict({ operation, base, theirs, who, time }) {
   });
 }
 
-export async function showHistory() {
-  const lines = await (await fetch("/api/history")).json();
+export function showHistory(lines) {
   const words = { undo: "undone: ", redo: "redone: ", import: "taken over from a file: ", do: "", outside: "" };
   const dialog = byId("history");
   dialog.replaceChildren(
-    h("h2", { id: "history-title" }, "History"),
+    h("h2", { id: "history-title" }, lines.length < MOST_LINES ? "History" : `History: the last ${MOST_LINES} changes`),
     lines.length ? h("table", {}, h("thead", {}, h("tr", {}, ...["When", "Who", "What"].map((t) => h("th", { scope: "col" }, t)))),
       h("tbody", {}, ...lines.map((line) => h("tr", {}, h("td", {}, new Date(line.time).toLocaleString()),
         h("td", {}, line.who), h("td", {}, words[line.action] + line.what)))))
@@ -59,7 +60,7 @@ export async function showHistory() {
 }
 
 const KEYS = [
-  ["O", "make the picked thing an object"], ["L", "make it a landmark"], ["N", "next unfinished object"],
+  ["O", "make the picked thing an object"], ["L", "make it a landmark"], ["N", "next unfinished object, then next anchor to choose"],
   ["J", "next in the list"], ["K", "one before in the list"], ["1 2 3", "choose an anchor (Alt+1 … in a field)"],
   ["B", "box out a thing (imported scenes)"],
   ["V", "place an anchor from this view"], ["G", "go to the selection"], ["F", "fly or orbit"], ["T", "look from above"],

@@ -42,3 +42,16 @@ export function toast(text, wrong = false) {
 
 export const byId = (id) => document.getElementById(id);
 export const same = (a, b) => JSON.stringify(a) === JSON.stringify(b);
+
+/** Ask the server; throws an Error that can be shown to a person. */
+export async function ask(url, body = null, method = body ? "POST" : "GET") {
+  let response, answer;
+  try {
+    response = await fetch(url, { method, ...(body && { headers: { "Content-Type": "application/json" }, body: JSON.stringify(body) }) });
+    answer = await response.json();
+  } catch {
+    throw new Error(response ? `the server answers ${response.status}` : "the server does not answer");
+  }
+  if (!response.ok) throw new Error(answer.error ?? `the server answers ${response.status}`);
+  return answer;
+}

@@ -3,11 +3,15 @@ import { AnchorChooser } from "./anchors.js";
 import { byId, h, same } from "./dom.js";
 
 const CHECK_MS = 250, SAVE_MS = 800;
+const MOST = { name: 120, category: 120, description: 2000 };
 
 export class Editor {
   constructor(page) {
     this.page = page;
     this.panel = byId("panel");
+    // Texts that are too long to be saved, by entry and field: they stay until somebody shortens them.
+    this.drafts = new Map();
+    page.sync.typing = () => this.typing();
     window.addEventListener("pagehide", () => this.saveAll());
   }
 
@@ -60,33 +64,37 @@ export class Editor {
       h("button", { onclick: () => this.page.view.focusOn(entry.node) }, "Go to ", h("kbd", {}, "G")),
       h("button", { id: "remove", class: "danger", onclick: () => this.page.remove() }, "Remove"));
     this.task = h("div", { class: "task" });
-    this.other = h("ul", { class: "faults", role: "status" });
-    const name = this.field("name", "Name", h("input", { maxlength: 120, spellcheck: "true",
+    this.other = h("ul", { class: "faults" });
+    const name = this.field("name", "Name", h("input", { spellcheck: "true",
       title: object ? "What a person would call it" : "What a person would call it, unique in the scene" }));
     this.panel.replaceChildren(head, h("p", { class: "node" }, entry.node));
     if (!object) this.panel.append(name);
     else {
-      const category = h("input", { maxlength: 120, list: "categories", readonly: !this.page.facts.imported,
+      const category = h("input", { list: "categories", readonly: !this.page.facts.imported,
         title: this.page.facts.imported ? "Of the catalogue, or the scene's own" : "The mesh says what it is" });
       this.panel.append(
         h("div", { class: "pair" }, name, this.field("category", "Category", category)),
-        this.field("description", "Description", h("textarea", { maxlength: 2000, rows: 5, spellcheck: "true" }),
+        this.field("description", "Description", h("textarea", { rows: 5, spellcheck: "true" }),
           "what it looks like, what stands by it"),
         this.task);
       this.anchors = new AnchorChooser(this.page, entry);
       this.panel.append(this.anchors.element);
     }
-    this.panel.append(this.other);
+    this.panel.append(h("div", { role: "status" }, this.other));
     this.refresh();
   }
 
   field(key, label, control, hint) {
-    const faults = h("ul", { class: "faults", id: `faults-${key}`, role: "status" });
+    const faults = h("ul", { class: "faults", id: `faults-${key}` });
     control.id = `field-${key}`;
     control.setAttribute("aria-describedby", faults.id);
-    const state = { key, control, faults, base: null, timers: [] };
+    const state = { key, control, faults, base: null, timers: [], draft: `${this.selection.kind}-${this.selection.id}-${key}` };
     this.fields[key] = state;
-    control.addEventListener("focus", () => { state.base = structuredClone(this.entry); });
+    if (this.drafts.has(state.draft)) {
+      control.value = this.drafts.get(state.draft);
+      state.base = structuredClone(this.entry);
+    }
+    control.addEventListener("focus", () => { if (!this.drafts.has(state.draft)) state.base = structuredClone(this.entry); });
     control.addEventListener("input", () => {
       this.page.sync.say("busy", "typing…");
       state.timers.forEach(clearTimeout);
@@ -96,7 +104,19 @@ export class Editor {
     control.addEventListener("keydown", (event) => {
       if (event.key === "Enter" && control.tagName === "INPUT") this.save(state);
     });
-    return h("label", { class: "field" }, h("span", {}, label, hint ? ` (${hint})` : ""), control, faults);
+    return h("div", { class: "field" }, h("label", {}, h("span", {}, label, hint ? ` (${hint})` : ""), control), h("div", { role: "status" }, faults));
+  }
+
+  /** What stands in the fields and is not on its way to the disk, in words; empty where there is nothing of the kind. */
+  typing() {
+    if (this.drafts.size) return `not saved: ${[...this.drafts.keys()].map((key) => key.replace("s-", " ").replace("-", ", ")).join("; ")} too long`;
+    return Object.values(this.fields ?? {}).some((state) => state.timers.length) ? "typing…" : "";
+  }
+
+  /** How much too long a text is, in words; empty where it is not. */
+  excess(state) {
+    const length = [...this.value(state)].length;
+    return length > MOST[state.key] ? `too long to be saved: ${length} characters, ${MOST[state.key]} at most` : "";
   }
 
   value(state) { return state.control.value.split(/\s+/).filter(Boolean).join(" "); }
@@ -108,8 +128,15 @@ export class Editor {
     state.timers = [];
     const value = this.value(state), { kind, id } = this.selection;
     const base = state.base;
+    if (base && this.excess(state)) {
+      this.drafts.set(state.draft, state.control.value);
+      this.page.sync.say("saved", "saved");
+      if (this.entry) this.tell(this.entry);
+      return;
+    }
+    if (this.drafts.delete(state.draft) && this.entry) this.tell(this.entry);
     if (!base || same(base[state.key], value)) {
-      if (this.page.sync.status === "busy" && !this.page.sync.queue.length) this.page.sync.say("saved", "saved");
+      if (this.page.sync.status === "busy") this.page.sync.say("saved", "saved");
       return;
     }
     state.base = { ...base, [state.key]: value };
@@ -122,6 +149,10 @@ export class Editor {
 
   /** Ask what the checks of annotate-import would say of what stands in the fields now. */
   async check(state) {
+    if (this.excess(state)) {
+      this.tell(this.entry);
+      return;
+    }
     const { kind, id } = this.selection;
     const operation = { do: "change", kind, id, fields: { [state.key]: this.value(state) } };
     const answer = await this.page.sync.post("/api/draft", { operation });
@@ -137,7 +168,7 @@ export class Editor {
       return;
     }
     for (const state of Object.values(this.fields)) {
-      const used = document.activeElement === state.control || state.timers.length;
+      const used = document.activeElement === state.control || state.timers.length || this.drafts.has(state.draft);
       if (!used) state.control.value = entry[state.key];
     }
     if (!Object.values(this.fields).some((state) => state.timers.length)) this.tell(entry);
@@ -147,7 +178,8 @@ export class Editor {
   tell(entry) {
     const rest = [];
     for (const state of Object.values(this.fields)) {
-      const own = entry.faults.filter((fault) => fault.field === state.key);
+      const excess = this.excess(state);
+      const own = excess ? [{ message: excess }] : entry.faults.filter((fault) => fault.field === state.key);
       const empty = own.length && !this.value(state);
       // An empty field says by itself that something is to be written into it.
       fill(state.faults, empty ? [] : own.map((fault) => fault.message));

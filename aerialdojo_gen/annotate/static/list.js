@@ -3,15 +3,18 @@ import { byId, h } from "./dom.js";
 
 export const unfinished = (entry) => entry.lacks.length > 0;
 
+/** Whether the sampler chooses the anchor: it takes the best candidate where no person has chosen one. */
+const sampled = (entry) => entry.anchor === null;
+
 const FILTERS = {
   all: () => true,
   unfinished,
   text: (entry) => ["name", "category", "description"].some((key) => entry.lacks.includes(key)),
   check: (entry) => entry.faults.length > 0,
-  anchor: (entry) => entry.lacks.includes("anchor"),
+  anchor: sampled,
 };
 
-const WORDS = { name: "name", category: "category", description: "description", anchor: "anchor", check: "check" };
+const WORDS = { name: "name", category: "category", description: "description", check: "check" };
 
 export class List {
   constructor(select) {
@@ -47,8 +50,9 @@ export class List {
       const where = entry.landmark ? `${entry.direction} of the ${entry.landmark}` : "";
       const more = lacks.length ? `lacks ${lacks.map((key) => WORDS[key]).join(", ")}`.replace(/lacks check$/, "see the warning")
         .replace(", check", "; see the warning") : where;
+      const whole = [entry.name || "no name yet", more, kind === "objects" && sampled(entry) ? "anchor chosen by the sampler" : "", entry.node];
       return h("li", { "data-key": `${kind}-${entry.id}` },
-        h("button", { "aria-current": current ? "true" : null, onclick: () => this.select({ kind, id: entry.id }), title: entry.node },
+        h("button", { "aria-current": current ? "true" : null, onclick: () => this.select({ kind, id: entry.id }), title: whole.filter(Boolean).join("\n") },
           h("span", { class: `dot ${state}`, role: "img", "aria-label": wrong ? "warning" : state || "unfinished" }),
           h("span", { class: "id" }, String(entry.id)),
           h("span", { class: entry.name ? "name" : "name none" }, entry.name || "no name yet"),
@@ -62,9 +66,11 @@ export class List {
     byId("progress").max = Math.max(1, objects.length);
     byId("progress").value = done;
     const lacking = (key) => objects.filter((entry) => entry.lacks.includes(key)).length;
-    const parts = [["name", "lack", "a name"], ["description", "lack", "a description"], ["anchor", "lack", "an anchor"], ["check", "have", "a warning"]]
+    const parts = [["name", "lack", "a name"], ["description", "lack", "a description"], ["check", "have", "a warning"]]
       .map(([key, verb, what]) => [lacking(key), verb, what]).filter(([n]) => n)
       .map(([n, verb, what]) => `${n} ${n === 1 ? { lack: "lacks", have: "has" }[verb] : verb} ${what}`);
+    const left = objects.filter(sampled).length;
+    if (left) parts.push(left === objects.length ? "anchors chosen by the sampler" : `${left} ${left === 1 ? "anchor" : "anchors"} chosen by the sampler`);
     byId("progress-text").textContent = [`${done} of ${objects.length} objects done`, ...parts].join(" · ");
     byId("progress-text").title = byId("progress-text").textContent;
   }
@@ -77,13 +83,14 @@ export class List {
     this.select({ kind: this.shown[next][0], id: this.shown[next][1] });
   }
 
-  /** The next unfinished object after the current one, around the end; null where all are done. */
+  /** The next unfinished object after the current one, around the end; where all are done, the next whose anchor nobody has chosen. */
   nextUnfinished() {
     const objects = this.doc.objects;
     const at = this.current?.kind === "objects" ? objects.findIndex((entry) => entry.id === this.current.id) : -1;
     const order = [...objects.slice(at + 1), ...objects.slice(0, at + 1)];
-    return order.find((entry) => unfinished(entry) && entry.id !== (this.current?.kind === "objects" ? this.current.id : null))
-      ?? order.find(unfinished) ?? null;
+    const other = (entry) => entry.id !== (this.current?.kind === "objects" ? this.current.id : null);
+    return order.find((entry) => unfinished(entry) && other(entry)) ?? order.find(unfinished)
+      ?? order.find((entry) => sampled(entry) && other(entry)) ?? order.find(sampled) ?? null;
   }
 
   reveal() {

@@ -1,12 +1,14 @@
 // The annotation page: the scene, the list, the panel, and the keys that connect them.
 import { addCompass } from "/static/compass.js";
+import { frameNode } from "/static/frame.js";
 import { SceneView } from "/static/scene.js";
 import { candidatesOf } from "./anchors.js";
-import { BoxDrawer, edges } from "./box.js";
+import { BoxDrawer } from "./box.js";
 import { askConflict, showHelp, showHistory } from "./dialogs.js";
-import { byId, h, toast } from "./dom.js";
+import { ask, byId, h, toast } from "./dom.js";
 import { Editor } from "./editor.js";
 import { List, unfinished } from "./list.js";
+import { Name } from "./name.js";
 import { Sync } from "./sync.js";
 
 class Page {
@@ -18,10 +20,10 @@ class Page {
     byId("coco").download = `${this.facts.scene}-coco.zip`;
     document.body.append(h("datalist", { id: "categories" },
       ...Object.entries(this.facts.categories).map(([key, word]) => h("option", { value: key }, word))));
-    this.whoAreYou();
     this.view = await SceneView.load(byId("view"), "/api/scene");
     addCompass(this.view, this.view.overlay);
-    this.sync = new Sync(this.facts.scene, () => byId("who").value, askConflict);
+    const name = new Name((text) => this.say(text, true));
+    this.sync = new Sync(this.facts.scene, () => name.value, askConflict);
     this.list = new List((selection) => this.select(selection));
     this.editor = new Editor(this);
     this.box = new BoxDrawer(this);
@@ -30,8 +32,7 @@ class Page {
     this.sync.addEventListener("other", ({ detail }) => toast(detail));
     this.sync.addEventListener("refused", ({ detail }) => toast(detail, true));
     await this.sync.start();
-    if (!this.sync.doc) return;
-    this.status({ status: "saved", text: "saved" });
+    this.sync.say("saved", "saved");
     this.editor.show(null);
     this.buttons();
     this.keys();
@@ -41,23 +42,39 @@ class Page {
     document.body.dataset.ready = "true";
   }
 
-  whoAreYou() {
-    byId("who").value = localStorage.getItem("aerialdojo-annotate-who") ?? "";
-    byId("who").addEventListener("change", () => localStorage.setItem("aerialdojo-annotate-who", byId("who").value));
+  /** Select what the address names, as before the page was loaded anew. */
+  async selectFromAddress() {
+    const [what, id] = location.hash.slice(1).split("/"), node = decodeURIComponent(what);
+    if (id !== undefined) {
+      if (["landmarks", "objects"].includes(what) && this.sync.entry(what, Number(id))) this.select({ kind: what, id: Number(id) });
+      return;
+    }
+    if (!node || !this.view.index.has(node)) return;
+    const facts = await this.ask(`/api/nodes/${encodeURIComponent(node)}`);
+    if (facts) this.select(this.entryOfNode(node) ?? { node: facts });
+    this.view.focusOn(node);
   }
 
-  /** Select the node that the address names: after a box was cut out, the page is loaded anew. */
-  async selectFromAddress() {
-    const node = decodeURIComponent(location.hash.slice(1));
-    if (!node || !this.view.index.has(node)) return;
-    this.select(this.entryOfNode(node) ?? { node: await (await fetch(`/api/nodes/${encodeURIComponent(node)}`)).json() });
-    this.view.focusOn(node);
+  remember(selection) {
+    const place = selection?.kind ? `${selection.kind}/${selection.id}` : encodeURIComponent(selection?.node?.node ?? "");
+    history.replaceState(null, "", place ? `#${place}` : location.pathname);
+  }
+
+  /** Ask the server for what is shown; undefined, and a word to the person, where it gives none. */
+  async ask(url, body, method) {
+    try {
+      return await ask(url, body, method);
+    } catch (error) {
+      this.say(error.message, true);
+      return undefined;
+    }
   }
 
   say(text, wrong = false) { toast(text, wrong); }
 
   status({ status, text }) {
     byId("saved").textContent = text;
+    byId("saved").title = text;
     byId("saved").className = status === "saved" ? "" : status;
   }
 
@@ -66,26 +83,15 @@ class Page {
   select(selection, { go = true, focus = false } = {}) {
     this.box.stop();
     this.selection = selection;
+    this.remember(selection);
     this.editor.show(selection);
     this.list.render(this.sync.doc, selection);
     this.list.reveal();
     const entry = selection?.kind ? this.sync.entry(selection.kind, selection.id) : selection?.node;
-    this.frame(entry?.node);
+    frameNode(this.view, entry?.node);
     if (entry?.node && go && selection.kind) this.view.focusOn(entry.node);
     if (focus) this.intoFields();
     if (selection?.kind === "objects") this.prefetch();
-  }
-
-  /** Draw the selection's box; a tint would hide the colours that people are to describe. */
-  frame(node) {
-    const k = node ? this.view.index.get(node) : undefined;
-    if (k === undefined) {
-      this.view.remove("frame");
-      return;
-    }
-    const [low, high] = [0, 3].map((at) => [...this.view.payload.boxes.subarray(6 * k + at, 6 * k + at + 3)]);
-    const around = [low.map((v) => v - 0.05), high.map((v) => v + 0.05)];
-    this.view.addRoutes("frame", edges(around).map((points, id) => ({ id, points, colour: "#38bdf8" })), { width: 2.5, opacity: 1, pickable: false });
   }
 
   /** Have the candidates of the next unfinished object ready before somebody asks. */
@@ -126,9 +132,8 @@ class Page {
   /** What the ray through a pixel meets on the mesh is the server's to say. */
   async pickAt(x, y) {
     const [origin_m, direction] = this.view.ray(x, y);
-    const response = await fetch("/api/pick", { method: "POST", headers: { "Content-Type": "application/json" },
-      body: JSON.stringify({ origin_m, direction }) });
-    const facts = await response.json();
+    const facts = await this.ask("/api/pick", { origin_m, direction });
+    if (facts === undefined) return;
     if (this.box.active) {
       if (facts) this.box.click(facts.point_m);
       return;
@@ -222,7 +227,7 @@ class Page {
     this.editor.saveAll();
     const entry = this.list.nextUnfinished();
     if (!entry) {
-      this.say(this.sync.doc.objects.length ? "All objects are done." : "There are no objects yet: pick a thing and press O.");
+      this.say(this.sync.doc.objects.length ? "All objects are done, and their anchors chosen." : "There are no objects yet: pick a thing and press O.");
       return;
     }
     this.select({ kind: "objects", id: entry.id });
@@ -240,6 +245,11 @@ class Page {
     if (answer?.body.state) this.sync.take(answer.body.state);
   }
 
+  async history() {
+    const lines = await this.ask("/api/history");
+    if (lines) showHistory(lines);
+  }
+
   // ---- buttons and keys ----
 
   mode() {
@@ -255,7 +265,7 @@ class Page {
   }
 
   buttons() {
-    const on = { undo: () => this.turn("undo"), redo: () => this.turn("redo"), "show-history": showHistory, "show-help": showHelp,
+    const on = { undo: () => this.turn("undo"), redo: () => this.turn("redo"), "show-history": () => this.history(), "show-help": showHelp,
       next: () => this.next(), mode: () => this.mode(), go: () => this.goTo(), top: () => this.view.top(), home: () => this.view.home(),
       aim: () => this.pickAt(this.view.width / 2, this.view.height / 2) };
     for (const [id, act] of Object.entries(on)) byId(id).addEventListener("click", () => act());

@@ -3,6 +3,18 @@
 import { same } from "./dom.js";
 
 const EMPTY = { name: "", category: "", description: "", node: "", anchor: null };
+const RETRY_MS = 1000;
+// Answers that say something about the operation; with any other one it stays in the queue.
+const VERDICTS = new Set([200, 400, 409, 412, 413, 422]);
+
+const kept = (key) => {
+  try {
+    const queue = JSON.parse(sessionStorage.getItem(key) ?? "[]");
+    return Array.isArray(queue) ? queue.filter((item) => item?.operation) : [];
+  } catch {
+    return [];
+  }
+};
 
 export class Sync extends EventTarget {
   /** ask(conflict) shows both sides and resolves to "mine" or "theirs". */
@@ -10,20 +22,31 @@ export class Sync extends EventTarget {
     super();
     this.who = who;
     this.ask = ask;
+    this.scene = scene;
     this.key = `aerialdojo-annotate-queue-${scene}`;
     this.client = sessionStorage.getItem("aerialdojo-annotate-client") ?? crypto.getRandomValues(new Uint32Array(3)).join("-");
     sessionStorage.setItem("aerialdojo-annotate-client", this.client);
-    this.queue = JSON.parse(sessionStorage.getItem(this.key) ?? "[]");
+    this.queue = kept(this.key);
     this.doc = null;
     this.sending = null;
     this.status = "saved";
+    /** What a person has typed and is not in the queue yet, in words; the page's to say. */
+    this.typing = () => "";
   }
 
   async start() {
     await this.poll();
+    while (!this.doc) {
+      await pause();
+      await this.poll();
+    }
     if (this.queue.length) this.flush();
     const tick = async () => {
-      if (!this.sending && !document.hidden) await this.poll();
+      try {
+        if (!this.sending && !document.hidden) await this.poll();
+      } catch (error) {
+        console.warn(error);
+      }
       this.timer = setTimeout(tick, 1500);
     };
     this.timer = setTimeout(tick, 1500);
@@ -42,22 +65,40 @@ export class Sync extends EventTarget {
       this.say("lost", "the server does not answer; what you do is kept here");
       return;
     }
-    if (this.status === "lost") this.say("saved", "saved");
-    if (response.status === 304 || this.sending) return;
-    const body = await response.json().catch(() => ({}));
-    if (!response.ok) {
-      this.say("lost", body.error ?? `the server answers ${response.status}`);
+    if (this.sending) return;
+    const body = response.status === 304 ? null : await read(response);
+    if (body && (!response.ok || this.strange(body))) {
+      this.say("lost", response.ok ? this.strange(body) : body.error);
       return;
     }
+    if (this.status === "lost") this.say("saved", "saved");
+    if (this.queue.length) this.flush();
+    if (!body || this.sending) return;
     if (this.doc?.version === body.version) return;
     const before = this.doc;
     this.take(body);
     if (before) this.others(before);
   }
 
+  /** Why a document is not this page's, in words: another server may have taken the port. */
+  strange(doc) {
+    if (doc.scene === this.scene) return "";
+    return doc.scene ? `another scene is served here, ${doc.scene}` : "something else answers here";
+  }
+
+  /** The last changes; none where the server does not answer: what they are asked for is of no weight. */
+  async history() {
+    try {
+      const lines = await (await fetch("/api/history")).json();
+      return Array.isArray(lines) ? lines : [];
+    } catch {
+      return [];
+    }
+  }
+
   /** Tell of what others have changed. */
   async others(before) {
-    const history = await (await fetch("/api/history")).json();
+    const history = await this.history();
     const lines = [];
     for (const line of history) {
       if (line.after === before.version) break;
@@ -75,7 +116,10 @@ export class Sync extends EventTarget {
     this.dispatchEvent(new Event("document"));
   }
 
+  /** Say how things stand; "saved" is never said while anything is not. */
   say(status, text) {
+    if (status === "saved" && this.queue.length) [status, text] = ["busy", "saving…"];
+    else if (status === "saved" && this.typing()) [status, text] = ["busy", this.typing()];
     this.status = status;
     this.dispatchEvent(new CustomEvent("status", { detail: { status, text } }));
   }
@@ -92,23 +136,37 @@ export class Sync extends EventTarget {
   }
 
   keep() {
-    sessionStorage.setItem(this.key, JSON.stringify(this.queue.map(({ operation, base }) => ({ operation, base }))));
+    try {
+      sessionStorage.setItem(this.key, JSON.stringify(this.queue.map(({ operation, base }) => ({ operation, base }))));
+    } catch (error) {
+      console.warn("what is not saved yet would not survive a reload", error);
+    }
   }
 
   flush() {
-    this.sending ??= this.work().finally(() => { this.sending = null; });
+    this.sending ??= this.work().finally(() => {
+      this.sending = null;
+      if (this.queue.length) this.flush();
+    });
     return this.sending;
   }
 
+  /** Send what is in the queue, until there is nothing in it: whatever happens, an item leaves it only when answered. */
   async work() {
     while (this.queue.length) {
       const item = this.queue[0];
       this.say("busy", "saving…");
-      const result = await this.attempt(item);
+      let result;
+      try {
+        result = await this.attempt(item);
+      } catch (error) {
+        console.warn(error);
+        result = { lost: error.message };
+      }
       if (result === "again") continue;
-      if (result === "lost") {
-        this.say("lost", "not saved: the server does not answer; trying again");
-        await new Promise((resolve) => setTimeout(resolve, 1000));
+      if (result?.lost) {
+        this.say("lost", `not saved: ${result.lost}; trying again`);
+        await pause();
         continue;
       }
       this.queue.shift();
@@ -126,8 +184,11 @@ export class Sync extends EventTarget {
     }
     if (verdict === "conflict") return this.settle(item);
     const answer = await this.post("/api/operations", { operation: item.operation });
-    if (answer === null) return "lost";
+    if (answer === null) return { lost: "the server does not answer" };
     const { status, body } = answer;
+    if (!VERDICTS.has(status) || body.unread) return { lost: body.error };
+    const doc = status === 200 ? body : body.state;
+    if (doc && this.strange(doc)) return { lost: this.strange(doc) };
     if (status === 200) {
       this.take(body);
       return { done: body.done, doc: body };
@@ -144,7 +205,7 @@ export class Sync extends EventTarget {
     }
     if (body.state) this.take(body.state);
     else this.take(this.doc);
-    this.dispatchEvent(new CustomEvent("refused", { detail: body.error ?? `the server answers ${status}` }));
+    this.dispatchEvent(new CustomEvent("refused", { detail: body.error }));
     return null;
   }
 
@@ -167,7 +228,7 @@ export class Sync extends EventTarget {
   async settle(item) {
     const { do: what, kind, id, fields } = item.operation;
     const theirs = what === "add" ? this.doc[kind].find((entry) => entry.node === fields.node) : this.entry(kind, id);
-    const changes = item.changes ?? (await (await fetch("/api/history")).json());
+    const changes = item.changes ?? await this.history();
     const last = changes.find((line) => line.client !== this.client
       && line.edits.some((edit) => edit.kind === kind && edit.id === (theirs?.id ?? id)));
     const choice = await this.ask({ operation: item.operation, base: item.base, theirs, who: last?.who || "Somebody else",
@@ -217,12 +278,26 @@ export class Sync extends EventTarget {
         body: JSON.stringify({ who: this.who(), client: this.client, ...body }),
         keepalive: true,
       });
-      return { status: response.status, body: await response.json() };
+      return { status: response.status, body: await read(response) };
     } catch {
       return null;
     }
   }
 }
+
+const pause = () => new Promise((resolve) => setTimeout(resolve, RETRY_MS));
+
+/** The answer's JSON; of one without, what it says as an error. */
+const read = async (response) => {
+  const text = await response.text();
+  try {
+    const body = JSON.parse(text);
+    return response.ok ? body : { ...body, error: body?.error ?? `the server answers ${response.status}` };
+  } catch (error) {
+    if (response.ok) throw error;
+    return { unread: true, error: text.length && text.length < 200 && !text.startsWith("<") ? text : `the server answers ${response.status}` };
+  }
+};
 
 const changedKeys = (base, now) => Object.keys(EMPTY).filter((key) => key in now && base && !same(now[key], base[key]));
 

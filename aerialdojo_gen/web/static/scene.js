@@ -11,7 +11,7 @@ import { MarkerLayer, RouteLayer } from "./layers.js";
 import { loadPayload } from "./payload.js";
 import { NodePicker } from "./picking.js";
 import { boxOf, eyeFor, homeEye, topEye } from "./viewpoints.js";
-import { castShadow, groupMesh, lightUniforms, skyMesh, tinted } from "./shading.js";
+import { castShadow, groupMesh, lightUniforms, skyMesh } from "./shading.js";
 
 const FIELD_OF_VIEW_DEG = 60;
 // A pick that takes longer than this waits until the cursor rests.
@@ -59,8 +59,6 @@ export class SceneView {
     const extent = boxOf(payload, payload.nodes.map((_, k) => k));
     castShadow(this.renderer, this.meshes, uniforms, extent.min, extent.max);
     this.picker = new NodePicker(payload);
-    this.highlighted = new THREE.Group();
-    this.three.add(this.highlighted);
     this.controls = new CameraControls(this.camera, this.canvas);
     this.controls.addEventListener("change", () => this.invalidate());
     this.listen();
@@ -140,17 +138,6 @@ export class SceneView {
   setOpacity(name, opacity) {
     const uniform = this.layers.get(name)?.object.material.uniforms.opacity;
     if (uniform) uniform.value = opacity;
-    this.invalidate();
-  }
-
-  /** Tint nodes by name; a null or empty list takes the tint away. */
-  highlight(nodes, colour = "#ffd54a", strength = 0.4) {
-    this.highlighted.clear();
-    for (const node of [nodes ?? []].flat()) {
-      for (const [g, first, count] of this.picker.ranges[this.index.get(node)] ?? []) {
-        this.highlighted.add(tinted(this.meshes[g], first, count, colour, strength));
-      }
-    }
     this.invalidate();
   }
 

@@ -53,7 +53,6 @@ const FRAGMENT = /* glsl */ `
   #else
     in vec3 vColour;
   #endif
-  uniform vec4 tint;
   out vec4 pixel;
   ${LIGHT}
   void main() {
@@ -62,8 +61,7 @@ const FRAGMENT = /* glsl */ `
     #else
       vec3 base = vColour;
     #endif
-    vec3 lit = min(shade(base, rel), vec3(1.0));
-    pixel = vec4(mix(lit, tint.rgb, tint.a), 1.0);
+    pixel = vec4(min(shade(base, rel), vec3(1.0)), 1.0);
   }`;
 
 /** What all materials of a scene share; the shadow map is filled in by castShadow. */
@@ -84,7 +82,7 @@ export function groupMesh(group, uniforms, anisotropy) {
   const geometry = new THREE.BufferGeometry();
   geometry.setAttribute("position", new THREE.BufferAttribute(group.position, 3));
   geometry.setIndex(new THREE.BufferAttribute(group.index, 1));
-  const own = { ...uniforms, tint: { value: new THREE.Vector4(0, 0, 0, 0) } };
+  const own = { ...uniforms };
   if (group.uv) {
     geometry.setAttribute("uvl", new THREE.BufferAttribute(group.uv, 3));
     const [height, width] = group.size;
@@ -106,23 +104,6 @@ export function groupMesh(group, uniforms, anisotropy) {
   const mesh = new THREE.Mesh(geometry, material);
   mesh.matrixAutoUpdate = false;
   return mesh;
-}
-
-/** The same mesh drawn again over itself for some of its faces, tinted: a highlighted node. */
-export function tinted(mesh, first, count, colour, strength) {
-  const geometry = new THREE.BufferGeometry();
-  for (const [name, attribute] of Object.entries(mesh.geometry.attributes)) geometry.setAttribute(name, attribute);
-  geometry.setIndex(mesh.geometry.index);
-  geometry.setDrawRange(first * 3, count * 3);
-  const material = mesh.material.clone();
-  for (const [name, uniform] of Object.entries(mesh.material.uniforms)) material.uniforms[name] = uniform;
-  const { r, g, b } = new THREE.Color().setStyle(colour, THREE.LinearSRGBColorSpace);
-  material.uniforms.tint = { value: new THREE.Vector4(r, g, b, strength) };
-  material.polygonOffset = true;
-  material.polygonOffsetFactor = material.polygonOffsetUnits = -1;
-  const copy = new THREE.Mesh(geometry, material);
-  copy.frustumCulled = false;
-  return copy;
 }
 
 export function skyMesh(payload) {

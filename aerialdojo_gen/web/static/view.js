@@ -2,6 +2,7 @@
 import { addCompass } from "./compass.js";
 import { ANCHOR, clearanceColour, clearanceStops, GOAL, LANDMARK, OBJECT, SETTING, START } from "./colours.js";
 import { make, number, words } from "./dom.js";
+import { frameNode } from "./frame.js";
 import { failure, showLandmark, showNode, showObject, showRoute, welcome } from "./panel.js";
 import { SceneView } from "./scene.js";
 import { addSearch } from "./search.js";
@@ -132,7 +133,7 @@ class Page {
   clear(node) {
     this.selection++;
     for (const layer of ["selected", "ends", "drone"]) this.view.remove(layer);
-    this.view.highlight(node);
+    frameNode(this.view, node);
     if (this.riding) this.ride(false);
     this.picture = null;
     this.fade();
@@ -209,7 +210,7 @@ class Page {
     $("ride").setAttribute("aria-pressed", on);
     // The drone's own cameras have a field of view of 90 degrees.
     this.view.setFieldOfView(on ? 90 : undefined);
-    for (const layer of ["selected", "ends"]) this.view.setVisible(layer, !on);
+    for (const layer of ["selected", "ends", "frame"]) this.view.setVisible(layer, !on);
     for (const box of document.querySelectorAll("[data-layer]")) {
       if (box.checked) this.view.setVisible(box.dataset.layer, !on);
     }

@@ -1,0 +1,172 @@
+"""What a client may cost the server of a page: connections, time for a request, lines in the log.
+
+uvicorn bounds none of them by itself: a connection that sends half a request stays for ever, and where there are as
+many of them as the process may open files nobody else is let in, and every refused connection is logged at length.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import resource
+import time
+from typing import Any
+
+import h11
+from uvicorn.protocols.http.h11_impl import H11Protocol
+
+# A request line and headers within HEAD_S of the connection (or of the answer before), a body within BODY_S.
+HEAD_S, BODY_S = 10.0, 60.0
+# An answer of which nothing is taken for so long is given up.
+STALL_S = 30.0
+MOST_CONNECTIONS, MOST_PER_CLIENT = 256, 64
+MOST_LINES, WINDOW_S = 20, 60.0
+
+_TOO_LATE = b"HTTP/1.1 408 Request Timeout\r\nconnection: close\r\ncontent-length: 0\r\n\r\n"
+
+
+class LimitedProtocol(H11Protocol):
+    """A connection that is closed when it keeps the server waiting, or when others need its place.
+
+    Where there are too many, all in all or of one address, the one goes that has waited longest for the rest of a
+    request: half requests crowd each other out, and whoever sends a whole one is served.
+    """
+
+    transport: asyncio.Transport
+
+    def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
+        """Take the connection, and close another one where there are too many."""
+        super().connection_made(transport)
+        self._phase = ""
+        self._timer: asyncio.TimerHandle | None = None
+        self._stall: asyncio.TimerHandle | None = None
+        self._waits_since = time.monotonic()
+        self._follow()
+        # Of those accepted at one go, the ones closed before are still in the set.
+        others = [c for c in self.connections if isinstance(c, LimitedProtocol) and not c.transport.is_closing()]
+        mine = [c for c in others if c.host == self.host]
+        if len(mine) > MOST_PER_CLIENT:
+            self._make_room(mine)
+        elif len(others) > most_connections():
+            self._make_room(others)
+
+    def _make_room(self, others: list[LimitedProtocol]) -> None:
+        waiting = [c for c in others if c._phase and c is not self]
+        victim = min(waiting, key=lambda c: (c._idle, c._waits_since), default=self)
+        victim.transport.abort()
+
+    @property
+    def _idle(self) -> bool:
+        """Whether it has been served, and has not begun to ask for more."""
+        return self._phase == "head" and self.cycle is not None and not self.conn.trailing_data[0]
+
+    @property
+    def host(self) -> str:
+        """Address of the client."""
+        return self.client[0] if self.client else ""
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        """Stop the clocks."""
+        super().connection_lost(exc)
+        for timer in (self._timer, self._stall):
+            if timer is not None:
+                timer.cancel()
+
+    def data_received(self, data: bytes) -> None:
+        """Read on, and see what is waited for now."""
+        super().data_received(data)
+        self._follow()
+
+    def on_response_complete(self) -> None:
+        """Answered: the next request, if there is one, has its own time."""
+        super().on_response_complete()
+        self._follow()
+
+    def _follow(self) -> None:
+        # An answer may be complete before the request is: what was refused unread is still waited for.
+        if self.conn.their_state is h11.SEND_BODY:
+            phase = "body"
+        elif self.cycle is None or self.cycle.response_complete:
+            phase = "head"
+        else:
+            phase = ""
+        if phase == self._phase:
+            return
+        self._phase, self._waits_since = phase, time.monotonic()
+        if self._timer is not None:
+            self._timer.cancel()
+        seconds = {"head": HEAD_S, "body": BODY_S}.get(phase)
+        self._timer = self.loop.call_later(seconds, self._late) if seconds else None
+
+    def _late(self) -> None:
+        begun = self.cycle is not None and not self.cycle.response_complete and self.cycle.response_started
+        if not begun and not self.transport.is_closing() and (self._phase == "body" or self.conn.trailing_data[0]):
+            self.transport.write(_TOO_LATE)
+        self.transport.close()
+
+    def pause_writing(self) -> None:
+        """Wait for the client to take what it asked for, as long as it takes any of it."""
+        super().pause_writing()
+        self._watch(self.transport.get_write_buffer_size())
+
+    def resume_writing(self) -> None:
+        """Go on."""
+        super().resume_writing()
+        if self._stall is not None:
+            self._stall.cancel()
+
+    def _watch(self, left: int) -> None:
+        self._stall = self.loop.call_later(STALL_S, self._stalled, left)
+
+    def _stalled(self, left: int) -> None:
+        now = self.transport.get_write_buffer_size()
+        if now < left:
+            self._watch(now)
+        else:
+            self.transport.abort()
+
+
+def most_connections() -> int:
+    """How many connections are held at a time: never more than half the files that the process may open."""
+    files = resource.getrlimit(resource.RLIMIT_NOFILE)[0]
+    return MOST_CONNECTIONS if files == resource.RLIM_INFINITY else max(8, min(MOST_CONNECTIONS, files // 2))
+
+
+class BoundedLog(logging.Filter):
+    """Lets so many lines through a minute, and says how many it has kept back when there is room again."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._since, self._passed, self._kept = -WINDOW_S, 0, 0
+
+    def filter(self, record: logging.LogRecord) -> bool:
+        """Whether the line is written."""
+        now = time.monotonic()
+        if now - self._since >= WINDOW_S:
+            if self._kept:
+                record.msg = f"({self._kept} messages left out) {record.getMessage()}"
+                record.args = None
+            self._since, self._passed, self._kept = now, 0, 0
+        if self._passed >= MOST_LINES:
+            self._kept += 1
+            return False
+        self._passed += 1
+        return True
+
+
+def limits() -> dict[str, Any]:
+    """Settings of `uvicorn.Config` that hold clients to these limits.
+
+    Returns
+    -------
+    dict
+        To be passed as keywords; `bound_log` is to be called after the configuration is made.
+    """
+    # uvicorn's own limit_concurrency counts every connection, so that half requests would lock all others out.
+    return {"http": LimitedProtocol, "ws": "none", "backlog": 128, "timeout_keep_alive": 5}
+
+
+def bound_log() -> None:
+    """Bound what the server and the event loop may log."""
+    for name in ("uvicorn.error", "asyncio"):
+        logging.getLogger(name).addFilter(BoundedLog())
