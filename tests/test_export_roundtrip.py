@@ -14,7 +14,6 @@ from aerialdojo_gen.exchange.aerialdojo_writer import LOST
 from aerialdojo_gen.exchange.exporting import export_release
 from aerialdojo_gen.exchange.importing import import_benchmark
 from aerialdojo_gen.planning.primitives import replay, route_length_m
-from aerialdojo_gen.release.select import nav_id
 from aerialdojo_gen.schemas import APPROACH, RELEASE_OBJECTS, ROUTES, TASKS
 
 # Recomputed from the poses, which come back to the last bit.
@@ -162,6 +161,4 @@ def test_a_navigation_task_keeps_its_name_whatever_part_is_imported(smoke, there
         mine.drop(columns=["source_file", "source_row"]),
         all_of_them.loc[mine.index].drop(columns=["source_file", "source_row"]),
     )
-    row = mine.iloc[0]
-    pair = f"{row['start_object_id']}_{row['start_anchor_id']}__{row['target_object_id']}"
-    assert row.name == nav_id("U_Courtyard_1", pair)
+    assert set(mine.index) <= set(released(smoke, "routes").index)

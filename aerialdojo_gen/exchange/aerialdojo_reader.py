@@ -24,7 +24,6 @@ from aerialdojo_gen.exchange.fields import BadField, Fields, plain, positions_of
 from aerialdojo_gen.exchange.folder import check_picture, inside
 from aerialdojo_gen.exchange.jsonstream import small_document
 from aerialdojo_gen.exchange.task import Context, Instance, Route, Task, digest
-from aerialdojo_gen.release.select import nav_id
 from aerialdojo_gen.stages.build_scenes import parse_name
 
 _PAIR = re.compile(r"(\d{1,9})_(\d{1,9})__(\d{1,9})")
@@ -121,7 +120,7 @@ class Reader:
         else:
             instance = Instance("semantic", description)
         task = Task(episode, scene, start=start, goal=goal, instances=[instance], object_key=target, known=known)
-        self._join(task, context, folder, partition)
+        self._join(task, context, folder, partition, record.optional_text("trajectory_id"))
         self._met.add((context.label, episode))
         return task
 
@@ -135,15 +134,17 @@ class Reader:
         except ValueError as error:
             raise BadField("image", str(error)) from None
 
-    def _join(self, task: Task, context: Context, folder: Path, partition: Partition | None) -> None:
-        """Give the task its trajectory, or what its other instance brought already."""
+    def _join(
+        self, task: Task, context: Context, folder: Path, partition: Partition | None, own: str | None
+    ) -> None:
+        """Give the task its trajectory, or what its other instance brought already; `own` is its trajectory's id."""
         place = folder.parts[-3:] if partition else (context.label,)
         if place != self._partition:
             self._partition, self._known = place, {}
             self._met = {pair for pair in self._met if pair[0] == context.label}
         met = self._known.get(task.source_id)
         if met is None:
-            met = self._trajectory(task, context, folder, partition)
+            met = self._trajectory(task, context, folder, partition, own)
             self._known[task.source_id] = met
         else:
             task.has_route_row = False
@@ -156,7 +157,9 @@ class Reader:
         if task.has_route_row:
             task.route = met.pop("route")
 
-    def _trajectory(self, task: Task, context: Context, folder: Path, partition: Partition | None) -> dict[str, Any]:
+    def _trajectory(
+        self, task: Task, context: Context, folder: Path, partition: Partition | None, own: str | None
+    ) -> dict[str, Any]:
         met: dict[str, Any] = {"route": None, "known": {}, "goal": None, "start": task.start[:3]}
         met["target"] = task.known["target_name"]
         pair = None
@@ -166,7 +169,10 @@ class Reader:
                 pair = self._read(root, partition, task, context, met)
             else:
                 context.notes[f"no folder in {TRAJECTORIES} for its partition: no route"] += 1
-        name = nav_id(task.scene, pair) if pair else None
+        # Ours bring their name; of others the objects make it, so that any part of a dataset gives the same names.
+        name = f"{task.scene}-{digest(task.scene, pair)}" if pair else None
+        if own and re.fullmatch(rf"{re.escape(task.scene)}-[A-Za-z0-9]{{1,64}}", own):
+            name = own
         if name is None or name in self._nav_ids:
             if name is not None:
                 context.notes["task_id stands twice in the scene: named by partition and episode"] += 1

@@ -31,7 +31,7 @@ from aerialdojo_gen.exchange.frames import NED
 
 Floats = NDArray[np.float64]
 
-# What the layout has no field for; sizes of actions are in the poses, nav_id and task_id follow from task_id.
+# What the layout has no field for; sizes of actions are in the poses, trajectory_id is the nav_id.
 LOST: Mapping[str, Sequence[str]] = {
     "routes": ["goal_yaw_rad", "min_clearance_m"],
     "objects": [
@@ -114,6 +114,7 @@ def _task(
     goal = NED.positions_from_world([ends[f"goal_{a}_m"] for a in "xyz"])
     record = {
         "episode_id": episode,
+        "trajectory_id": row["nav_id"],
         "map_name": row["scene"],
         "task": SETTING_WORDS[row["setting"]][2],
         "used-in-train": int(row["subset"] == "train"),
