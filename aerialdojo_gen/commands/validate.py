@@ -10,6 +10,7 @@ import typer
 from aerialdojo_gen.commands.common import PipelineFile, Quiet, Scene, Workers, default_workers, home
 
 app = typer.Typer()
+_MANY_DIGITS = 10
 
 
 @app.command("validate")
@@ -22,6 +23,9 @@ def validate(
     sample: Annotated[
         int | None, typer.Option("--sample", min=0, help="Routes a scene that FCL is asked about.  (default: all)")
     ] = None,
+    pictures: Annotated[
+        str, typer.Option("--pictures", metavar="N|all", help="Reference images a scene that are drawn anew.")
+    ] = "all",
     meshes: Annotated[
         Path | None, typer.Option("--meshes", help="Folder of the meshes.  (default: meshes/ beside the release)")
     ] = None,
@@ -39,6 +43,7 @@ def validate(
     """Check a release again from its Parquet files and meshes alone, and name every row at fault."""
     from aerialdojo_gen.commands.common import DEFAULT_PIPELINE
     from aerialdojo_gen.config import load_pipeline
+    from aerialdojo_gen.errors import UsageError
     from aerialdojo_gen.progress import Reporter
     from aerialdojo_gen.release import validate as validation
     from aerialdojo_gen.release.validate.report import check_format
@@ -46,12 +51,15 @@ def validate(
 
     if report is not None:
         check_format(report)
+    if pictures != "all" and not (pictures.isascii() and pictures.isdigit() and len(pictures) < _MANY_DIGITS):
+        raise UsageError(f"--pictures {pictures}: a number, or all")
     asked = validation.Asked(
         release=release_of(folder.absolute()),
         scenes=tuple(scene or ()),
         meshes=meshes.absolute() if meshes else None,
         use_meshes=not no_meshes,
         sample=sample,
+        pictures=None if pictures == "all" else int(pictures),
         pipeline=load_pipeline(pipeline or home() / "pipelines" / DEFAULT_PIPELINE),
     )
     found = validation.validate(asked, workers=workers or default_workers(), reporter=Reporter(quiet=quiet))
