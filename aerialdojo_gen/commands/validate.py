@@ -16,8 +16,10 @@ _MANY_DIGITS = 10
 @app.command("validate")
 def validate(
     folder: Annotated[
-        Path,
-        typer.Argument(metavar="RELEASE", envvar="AERIALDOJO_DATA", help="A release, or a folder with one."),
+        Path | None, typer.Argument(metavar="RELEASE", help="A release, or a folder with one; as --data.")
+    ] = None,
+    data: Annotated[
+        Path, typer.Option("--data", envvar="AERIALDOJO_DATA", help="Data directory, or the release itself.")
     ] = Path("data"),
     scene: Scene = None,
     sample: Annotated[
@@ -53,14 +55,17 @@ def validate(
         check_format(report)
     if pictures != "all" and not (pictures.isascii() and pictures.isdigit() and len(pictures) < _MANY_DIGITS):
         raise UsageError(f"--pictures {pictures}: a number, or all")
+    definitions = load_pipeline(pipeline or home() / "pipelines" / DEFAULT_PIPELINE)
+    if definitions.scene_assets is None:
+        definitions = definitions.model_copy(update={"scene_assets": home() / "scene_assets"})
     asked = validation.Asked(
-        release=release_of(folder.absolute()),
+        release=release_of((folder or data).absolute()),
         scenes=tuple(scene or ()),
         meshes=meshes.absolute() if meshes else None,
         use_meshes=not no_meshes,
         sample=sample,
         pictures=None if pictures == "all" else int(pictures),
-        pipeline=load_pipeline(pipeline or home() / "pipelines" / DEFAULT_PIPELINE),
+        pipeline=definitions,
     )
     found = validation.validate(asked, workers=workers or default_workers(), reporter=Reporter(quiet=quiet))
     if report is not None:

@@ -15,6 +15,7 @@ from aerialdojo_gen.progress import Reporter
 from aerialdojo_gen.release.validate import (
     anchors,
     collisions,
+    detours,
     ends,
     geometry,
     gltf,
@@ -25,6 +26,7 @@ from aerialdojo_gen.release.validate import (
     oracle,
     pictures,
     tables,
+    words,
 )
 from aerialdojo_gen.release.validate.counts import Tally, scene_counts, tally_of, whole_counts
 from aerialdojo_gen.release.validate.parts import foreign_files, read_tables, release_tables, scenes_of
@@ -33,7 +35,7 @@ from aerialdojo_gen.release.validate.report import Report
 from aerialdojo_gen.release.validate.rows import SceneData
 
 # A check looks at what those before it found fault with, so that their order is fixed here.
-_MODULES = (tables, geometry, leaks, links, ends, meshes, gltf, anchors, collisions, oracle, images, pictures)
+_MODULES = (tables, geometry, leaks, links, ends, meshes, gltf, words, anchors, collisions, detours, oracle, images, pictures)
 SCENE_CHECKS = tuple(one for module in _MODULES for one in CHECKS if one.run.__module__ == module.__name__)
 
 
