@@ -179,7 +179,10 @@ def test_card_counts_what_is_there(data):
 
 
 def test_ids_hang_on_the_salt_and_tell_no_pair():
-    keys = [key_of(salt, seed) for salt, seed in (("a salt of one's own", 0), ("another of one's own", 0), (None, 0), (None, 1))]
+    keys = [
+        key_of(salt, seed)
+        for salt, seed in (("a salt of one's own", 0), ("another of one's own", 0), (None, 0), (None, 1))
+    ]
     names = {nav_id("U_A_0", pair, key) for key in keys for pair in ("1_0__2", "2_0__1")}
     assert len(names) == 8
     assert all(re.fullmatch(r"U_A_0-[0-9a-f]{12}", name) for name in names)
@@ -199,7 +202,9 @@ def test_another_salt_renames_the_same_tasks(data, tmp_path):
         assert not set(ours["nav_id"]) & set(theirs["nav_id"])
         pd.testing.assert_frame_equal(ours.drop(columns="nav_id"), theirs.drop(columns="nav_id"), check_dtype=False)
     ours = pd.read_parquet(data / "release" / "objects")
-    assert not set(ours["reference_image_id"]) & set(output.tables["release/objects"]["reference_image_id"].to_pylist())
+    assert not set(ours["reference_image_id"]) & set(
+        output.tables["release/objects"]["reference_image_id"].to_pylist()
+    )
     for table, rows in output.tables.items():
         store.write_shard(tmp_path / "data", table, SCENE, 0, rows)
     write_card(tmp_path / "data")

@@ -134,9 +134,7 @@ class Reader:
         except ValueError as error:
             raise BadField("image", str(error)) from None
 
-    def _join(
-        self, task: Task, context: Context, folder: Path, partition: Partition | None, own: str | None
-    ) -> None:
+    def _join(self, task: Task, context: Context, folder: Path, partition: Partition | None, own: str | None) -> None:
         """Give the task its trajectory, or what its other instance brought already; `own` is its trajectory's id."""
         place = folder.parts[-3:] if partition else (context.label,)
         if place != self._partition:

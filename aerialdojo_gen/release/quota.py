@@ -80,14 +80,14 @@ def choose(
 ) -> NDArray[np.bool_]:
     """Choose so many tasks of each setting that their lengths sum to a given total.
 
-    Every task draws a number from its own lot; the largest are taken, after the numbers have been tilted towards short
-    or long routes by as little as the total needs (weighted sampling without replacement with weights exp(tilt · L),
+    Every task draws a number from its own lot; the largest are taken, after the numbers have been tilted towards
+    short or long routes by as little as the total needs (weighted sampling without replacement with weights exp(tilt · L),
     by Gumbel's trick). A task's chance hangs on its lot and its length alone, never on its row.
 
     Parameters
     ----------
     lots, settings : sequences of n str
-        What the kept candidates draw with (`aerialdojo_gen.release.select.lot`), and their length settings.
+        What the kept candidates draw with (`release.select.lot`), and their length settings.
     length_m : (n,) float64
         L, metres.
     wanted : mapping of str to int

@@ -28,7 +28,9 @@ _FACTOR, _MEAN = 2e-6, 1.0
 _MOVING = ("animations", "skins")
 
 
-def _whole(function: Callable[[SceneData, Rows], Iterator[Finding]]) -> Callable[[SceneData, Rows], Iterator[Finding]]:
+def _whole(
+    function: Callable[[SceneData, Rows], Iterator[Finding]],
+) -> Callable[[SceneData, Rows], Iterator[Finding]]:
     """Make a fault of a document that a viewer stumbles over, and this program's reader does not."""
 
     @wraps(function)
@@ -36,7 +38,9 @@ def _whole(function: Callable[[SceneData, Rows], Iterator[Finding]]) -> Callable
         try:
             yield from function(data, rows)
         except (KeyError, IndexError, TypeError, ValueError) as error:
-            yield Finding(0, f"glTF that does not hold together ({type(error).__name__}: {error})", "a whole document")
+            yield Finding(
+                0, f"glTF that does not hold together ({type(error).__name__}: {error})", "a whole document"
+            )
 
     return run
 
@@ -59,7 +63,9 @@ def mesh_moved(data: SceneData, _rows: Rows) -> Iterator[Finding]:
     if off:
         name, world = off[0]
         others = f" and {len(off) - 1:,} more" if len(off) > 1 else ""
-        yield Finding(0, f"node {name}{others} moved by {_told(world)}", "z up turned into y up, and no other transform")
+        yield Finding(
+            0, f"node {name}{others} moved by {_told(world)}", "z up turned into y up, and no other transform"
+        )
     wanted = Counter(instance.node for instance in scene_mesh(data).scene.instances)
     if shown != wanted:
         odd = sorted(((shown - wanted) + (wanted - shown)).elements())

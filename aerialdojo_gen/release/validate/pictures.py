@@ -74,7 +74,9 @@ def image_redrawn(data: SceneData, rows: Rows) -> Iterator[Finding]:
             found = f"a picture {off:.1f} of 255 off on average, {share:.1%} of it by more than {_BLOCK:g}"
             yield Finding(row, found, f"less than {_MEAN:g} and {_BLOCK_SHARE:.0%}")
         elif exact and changed[row] > _PIXEL_SHARE * stored[row].shape[0] * stored[row].shape[1]:
-            found = f"{changed[row]:,} pixels that are drawn otherwise here, where most pictures are the same to the bit"
+            found = (
+                f"{changed[row]:,} pixels that are drawn otherwise here, where most pictures are the same to the bit"
+            )
             yield Finding(row, found, "the same pixels")
 
 

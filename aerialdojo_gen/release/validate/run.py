@@ -36,7 +36,23 @@ from aerialdojo_gen.release.validate.report import Report
 from aerialdojo_gen.release.validate.rows import SceneData
 
 # A check looks at what those before it found fault with, so that their order is fixed here.
-_MODULES = (tables, geometry, leaks, links, ends, meshes, gltf, words, anchors, collisions, detours, oracle, images, pictures, id_leaks)
+_MODULES = (
+    tables,
+    geometry,
+    leaks,
+    links,
+    ends,
+    meshes,
+    gltf,
+    words,
+    anchors,
+    collisions,
+    detours,
+    oracle,
+    images,
+    pictures,
+    id_leaks,
+)
 SCENE_CHECKS = tuple(one for module in _MODULES for one in CHECKS if one.run.__module__ == module.__name__)
 
 

@@ -33,14 +33,16 @@ _FAULTS = ("object_node", "object_category")
 _SIDES = {"northern": (0, 1), "southern": (0, -1), "eastern": (1, 0), "western": (-1, 0)}
 # What people call a colour, and what `colour_name` may call it: one word is a shade of several.
 _COLOURS = {
-    "red": {"red", "brown", "pink", "orange"}, "maroon": {"red", "brown", "purple"}, "russet": {"red", "brown", "orange"},
-    "pink": {"pink", "red", "purple", "beige"}, "purple": {"purple", "pink", "blue"}, "blue": {"blue", "turquoise", "purple"},
-    "teal": {"turquoise", "green", "blue"}, "turquoise": {"turquoise", "green", "blue"}, "green": {"green", "turquoise", "yellow"},
-    "yellow": {"yellow", "orange", "beige", "brown"}, "orange": {"orange", "red", "yellow", "brown"},
-    "gold": {"yellow", "orange", "brown", "beige"}, "golden": {"yellow", "orange", "brown", "beige"},
-    "brown": {"brown", "orange", "beige", "red"}, "beige": {"beige", "white", "orange", "yellow", "brown", "grey"},
-    "cream": {"beige", "white", "yellow", "grey"}, "white": {"white", "beige", "grey"}, "silver": {"grey", "white"},
-    "grey": {"grey", "white", "black"}, "gray": {"grey", "white", "black"}, "black": {"black", "grey"},
+    "red": {"red", "brown", "pink", "orange"}, "maroon": {"red", "brown", "purple"},
+    "russet": {"red", "brown", "orange"}, "pink": {"pink", "red", "purple", "beige"},
+    "purple": {"purple", "pink", "blue"}, "blue": {"blue", "turquoise", "purple"},
+    "teal": {"turquoise", "green", "blue"}, "turquoise": {"turquoise", "green", "blue"},
+    "green": {"green", "turquoise", "yellow"}, "yellow": {"yellow", "orange", "beige", "brown"},
+    "orange": {"orange", "red", "yellow", "brown"}, "gold": {"yellow", "orange", "brown", "beige"},
+    "golden": {"yellow", "orange", "brown", "beige"}, "brown": {"brown", "orange", "beige", "red"},
+    "beige": {"beige", "white", "orange", "yellow", "brown", "grey"}, "cream": {"beige", "white", "yellow", "grey"},
+    "white": {"white", "beige", "grey"}, "silver": {"grey", "white"}, "grey": {"grey", "white", "black"},
+    "gray": {"grey", "white", "black"}, "black": {"black", "grey"},
 }  # fmt: skip
 _ANY_COLOUR = f"({'|'.join(_COLOURS)})"
 
