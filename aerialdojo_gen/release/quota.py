@@ -81,8 +81,8 @@ def choose(
     """Choose so many tasks of each setting that their lengths sum to a given total.
 
     Every task draws a number from its own lot; the largest are taken, after the numbers have been tilted towards
-    short or long routes by as little as the total needs (weighted sampling without replacement with weights exp(tilt · L),
-    by Gumbel's trick). A task's chance hangs on its lot and its length alone, never on its row.
+    short or long routes by as little as the total needs (weighted sampling without replacement with weights
+    exp(tilt · L), by Gumbel's trick). A task's chance hangs on its lot and its length alone, never on its row.
 
     Parameters
     ----------
