@@ -260,7 +260,7 @@ def turns(digits, where):
         lambda row, rest: f"{rest[:-1]}{row['target_object_id'] % 16:x}",
         lambda row, rest: f"{rest[:5]}{row['start_object_id'] % 16:x}{rest[6:]}",
         lambda row, rest: f"{int(row['length_m']) % 256:02x}{rest[2:]}",
-        lambda row, rest: f"{row['target_object_id'] * 1000 + int(rest[:2], 16):012x}",
+        lambda row, rest: f"{row['target_object_id'] * 2**32 + int(rest[:8], 16):012x}",
         lambda row, rest: f"{rest[:9]}{row['target_object_id'] * 17:03x}",
     ],
     ids=["target first", "target last", "start within", "length first", "counted by target", "target at the end"],
