@@ -221,6 +221,10 @@ class SplitConfig(Section):
 
     id_train_fraction: float = Field(0.8, ge=0, le=1, description="share of the tasks of ID scenes that train")
     ood_train_fraction: float = Field(0.2, ge=0, le=1, description="share of the tasks of OOD scenes that train")
+    salt: str | None = Field(
+        None, min_length=16, max_length=256,
+        description="what ids of tasks and pictures are hashed with; made from the seed where absent",
+    )  # fmt: skip
     paper_counts: bool = Field(
         False,
         description="release the paper's numbers of tasks, of train and test, and, as near as the kept candidates "

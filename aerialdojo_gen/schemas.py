@@ -119,8 +119,8 @@ _OBJECT_FIELDS = [
     _field("landmark_id", pa.int32(), "nearest landmark in the plane"),
     _field("direction", pa.string(), "compass direction from that landmark to the object, one of eight"),
 ]
+_REFERENCE_ID = _field("reference_image_id", pa.string(), "opaque id that image tasks name")
 _REFERENCE = [
-    _field("reference_image_id", pa.string(), "opaque id that image tasks name"),
     _field("reference_image", pa.binary(), "PNG: front view from the selected anchor", nullable=True),
     _field("box_u0_px", pa.int32(), "object's box in the image, left column", "px", True),
     _field("box_v0_px", pa.int32(), "object's box in the image, top row", "px", True),
@@ -316,7 +316,7 @@ ROUTES = _table(
 )  # fmt: skip
 
 RELEASE_OBJECTS = _table(
-    "objects", ["scene", "object_id"], *_OBJECT_FIELDS, *_REFERENCE, plain=["reference_image"]
+    "objects", ["scene", "object_id"], *_OBJECT_FIELDS, _REFERENCE_ID, *_REFERENCE, plain=["reference_image"]
 )  # fmt: skip
 
 # What an agent did (benchmark). All of it is the evaluator's: an agent sees none of these tables.

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import dataclasses
+import hashlib
+import json
 import math
+import struct
 from collections.abc import Callable
 from pathlib import Path
 
@@ -107,8 +110,60 @@ def faults_of(report) -> dict[str, list[str]]:
     return {name: sorted(set(keys)) for name, keys in found.items()}
 
 
+def definitions():
+    """The smoke pipeline's, with the props whose names descriptions use."""
+    return load_pipeline(SMOKE).model_copy(update={"scene_assets": SMOKE.parent.parent / "scene_assets"})
+
+
+def edit_mesh(planted: Planted, change: Callable[[dict], None]) -> None:
+    """Change the glTF document of the scene's mesh, and put the new digest into `scenes`, as a bad author would."""
+    path = planted.data / "meshes" / f"{planted.scene}.glb"
+    raw = path.read_bytes()
+    (length,) = struct.unpack_from("<I", raw, 12)
+    document = json.loads(raw[20 : 20 + length])
+    change(document)
+    head = json.dumps(document, separators=(",", ":")).encode()
+    head += b" " * (-len(head) % 4)
+    rest = raw[20 + length :]
+    path.write_bytes(
+        struct.pack("<4sII", b"glTF", 2, 20 + len(head) + len(rest))
+        + struct.pack("<II", len(head), 0x4E4F534A) + head + rest
+    )  # fmt: skip
+    digest = hashlib.sha256(path.read_bytes()).hexdigest()
+    planted.edit("release/scenes", lambda row: row.update(mesh_sha256=digest))
+
+
+def retell(planted: Planted, object_id: int, **said: str) -> None:
+    """Say something else of an object, in `objects` and in every task that asks for it."""
+    planted.edit("release/objects", lambda row: row.update(said), lambda row: row["object_id"] == object_id)
+    named = {"target_name" if name == "name" else name: text for name, text in said.items()}
+    for side in ("train", "test"):
+        asked = {r["nav_id"] for r in planted.rows(f"routes/{side}") if r["target_object_id"] == object_id}
+
+        def change(task: Row) -> None:
+            task.update({name: text for name, text in named.items() if task[name] is not None})
+
+        planted.edit_all(f"tasks/{side}", change, lambda task, asked=asked: task["nav_id"] in asked)
+
+
+def rename(planted: Planted, new: Callable[[Row], str]) -> list[str]:
+    """Give routes other nav_ids, in `routes` and `tasks`; returns the keys of those that have one."""
+    keys = []
+    for side in ("train", "test"):
+        routes = planted.rows(f"routes/{side}")
+        names = {row["nav_id"]: new(row) for row in routes}
+        tasks = planted.rows(f"tasks/{side}")
+        for task in tasks:
+            task["nav_id"] = names[task["nav_id"]]
+            task["task_id"] = f"{task['nav_id']}-{task['modality'][0]}"
+        keys += [f"nav_id={name}" for old, name in names.items() if old != name]
+        planted.write(f"routes/{side}", [row | {"nav_id": names[row["nav_id"]]} for row in routes])
+        planted.write(f"tasks/{side}", tasks)
+    return sorted(keys)
+
+
 def check(planted: Planted, **options) -> dict[str, list[str]]:
     """Validate the scene that was planted in; the whole release with ``whole=True``."""
     scenes = () if options.pop("whole", False) else (planted.scene,)
-    options = {"pipeline": load_pipeline(SMOKE)} | options
+    options = {"pipeline": definitions()} | options
     return faults_of(validate(Asked(planted.release, scenes=scenes, **options)))

@@ -1,6 +1,8 @@
 """The release of a hand-made scene: counts, both instances together, and nothing about the target in `tasks`."""
 
 import math
+import re
+import shutil
 
 import numpy as np
 import pandas as pd
@@ -13,7 +15,8 @@ from aerialdojo_gen import schemas, store
 from aerialdojo_gen.config import Embodiment, FilterConfig, SplitConfig
 from aerialdojo_gen.release.card import write_card
 from aerialdojo_gen.release.contents import counts
-from aerialdojo_gen.release.select import nav_id, train_counts, train_mask
+from aerialdojo_gen.release.ids import key_of, nav_id, reference_id
+from aerialdojo_gen.release.select import train_counts, train_mask
 from aerialdojo_gen.stage import Job, Roots
 from aerialdojo_gen.stages import filter as filter_stage
 from aerialdojo_gen.stages import split
@@ -84,7 +87,7 @@ def data(tmp_path_factory):
     }  # fmt: skip
     references = [
         {
-            "scene": SCENE, "object_id": i, "reference_image_id": f"ref_{i * 7919:012x}", "reference_image": b"png",
+            "scene": SCENE, "object_id": i, "reference_image": b"png",
             "box_u0_px": 1, "box_v0_px": 2, "box_u1_px": 30, "box_v1_px": 40, "image_fraction": 0.1,
         }
         for i in range(N_OBJECTS)
@@ -175,9 +178,38 @@ def test_card_counts_what_is_there(data):
         assert all(f"| `{name}` |" in card for name in spec.schema.names)
 
 
-def test_nav_ids_do_not_tell_the_pair():
-    assert nav_id("U_A_0", "1_0__2") != nav_id("U_A_0", "2_0__1")
-    assert "1_0__2" not in nav_id("U_A_0", "1_0__2")
+def test_ids_hang_on_the_salt_and_tell_no_pair():
+    keys = [
+        key_of(salt, seed)
+        for salt, seed in (("a salt of one's own", 0), ("another of one's own", 0), (None, 0), (None, 1))
+    ]
+    names = {nav_id("U_A_0", pair, key) for key in keys for pair in ("1_0__2", "2_0__1")}
+    assert len(names) == 8
+    assert all(re.fullmatch(r"U_A_0-[0-9a-f]{12}", name) for name in names)
+    assert len({reference_id("U_A_0", 1, key) for key in keys}) == 4
+    assert key_of("a salt of one's own", 0) == key_of("a salt of one's own", 1)
+
+
+def test_another_salt_renames_the_same_tasks(data, tmp_path):
+    """Which candidates are released, and on which side, hangs on the pairs alone; the salt stands nowhere."""
+    shutil.copytree(data, tmp_path / "data", ignore=shutil.ignore_patterns("release"))
+    roots, salt = Roots(*[tmp_path / "data"] * 4), "nobody is to know this"
+    output = split.run(Job("split", SCENE, 0, 1, 0, Embodiment(), roots), SplitConfig(salt=salt))
+    pair = ["start_object_id", "start_anchor_id", "target_object_id"]
+    for subset in ("train", "test"):
+        ours = pd.read_parquet(data / "release" / "routes" / f"id_{subset}").sort_values(pair, ignore_index=True)
+        theirs = output.tables[f"routes/{subset}"].to_pandas().sort_values(pair, ignore_index=True)
+        assert not set(ours["nav_id"]) & set(theirs["nav_id"])
+        pd.testing.assert_frame_equal(ours.drop(columns="nav_id"), theirs.drop(columns="nav_id"), check_dtype=False)
+    ours = pd.read_parquet(data / "release" / "objects")
+    assert not set(ours["reference_image_id"]) & set(
+        output.tables["release/objects"]["reference_image_id"].to_pylist()
+    )
+    for table, rows in output.tables.items():
+        store.write_shard(tmp_path / "data", table, SCENE, 0, rows)
+    write_card(tmp_path / "data")
+    for path in (tmp_path / "data/release").rglob("*"):
+        assert path.is_dir() or salt.encode() not in path.read_bytes()
 
 
 @given(

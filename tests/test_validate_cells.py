@@ -4,10 +4,9 @@ import math
 
 import pyarrow as pa
 import pytest
-from planting import SMOKE, check
+from planting import check, definitions
 
 from aerialdojo_gen import store
-from aerialdojo_gen.config import load_pipeline
 from aerialdojo_gen.release.contents import SHARDS
 from aerialdojo_gen.release.validate import Asked, validate
 from aerialdojo_gen.release.validate.parts import read_tables
@@ -52,7 +51,7 @@ def test_every_cell_is_held_to_something(planted, key):
             row[field.name] = other(row[field.name], field.type)
             wanted[field.name] = {names(planted, key, r) for r in (before, row)}
         planted.write(key, rows)
-        asked = Asked(planted.release, (planted.scene,), sample=sample, pipeline=load_pipeline(SMOKE))
+        asked = Asked(planted.release, (planted.scene,), sample=sample, pipeline=definitions())
         faults = validate(asked).faults
         named = {fault.key for fault in faults if fault.table == spec.name}
         untold = {name for name, keys in wanted.items() if not keys & named}

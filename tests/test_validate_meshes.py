@@ -8,9 +8,8 @@ import zlib
 import cv2
 import numpy as np
 import pytest
-from planting import SMOKE, check
+from planting import check, definitions
 
-from aerialdojo_gen.config import load_pipeline
 from aerialdojo_gen.release.validate import Asked, validate
 
 OBJECTS, SCENES = "release/objects", "release/scenes"
@@ -37,7 +36,7 @@ def test_a_mesh_that_is_not_there(planted):
 def test_meshes_that_lie_elsewhere(planted, tmp_path):
     elsewhere = tmp_path / "elsewhere"
     (planted.data / "meshes").rename(elsewhere)
-    report = validate(Asked(planted.release, (planted.scene,), meshes=elsewhere, pipeline=load_pipeline(SMOKE)))
+    report = validate(Asked(planted.release, (planted.scene,), meshes=elsewhere, pipeline=definitions()))
     assert not report.faults
     assert not [o for o in report.outcomes if o.skipped and "mesh" in o.skipped]
     assert next(o.rows for o in report.outcomes if o.check == "oracle_fails") == sum(

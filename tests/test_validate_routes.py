@@ -2,9 +2,8 @@
 
 import numpy as np
 import pytest
-from planting import SMOKE, check, measured, poses, refly, turned
+from planting import check, definitions, measured, poses, refly, turned
 
-from aerialdojo_gen.config import load_pipeline
 from aerialdojo_gen.planning.collision import CollisionWorld
 from aerialdojo_gen.release.validate import collisions, oracle
 from aerialdojo_gen.release.validate.parts import read_tables
@@ -184,7 +183,7 @@ def test_a_start_that_is_another_anchor(planted):
 
 def scene_data(planted, **options):
     tables, _ = read_tables(planted.release, planted.scene)
-    return SceneData(planted.scene, planted.release, load_pipeline(SMOKE), tables, **options)
+    return SceneData(planted.scene, planted.release, definitions(), tables, **options)
 
 
 def test_replayed_actions_are_swept_for_themselves(planted, world):

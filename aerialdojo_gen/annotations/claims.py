@@ -110,11 +110,14 @@ class Reading:
         Those that stand directly before the subject's own name: what it is called.
     claims : tuple of Claim
         Relations asserted of the subject.
+    subjects : tuple of str
+        Names of things that stand in no relation: what the text calls the subject.
     """
 
     values: tuple[str, ...]
     named: tuple[str, ...]
     claims: tuple[Claim, ...]
+    subjects: tuple[str, ...] = ()
 
 
 @dataclass
@@ -127,6 +130,7 @@ class _State:
     first: frozenset[int] | None = None
     adjacent: bool = False
     claims: list[Claim] = field(default_factory=list)
+    subjects: list[str] = field(default_factory=list)
 
     def end_clause(self) -> None:
         # After "beside a bench with ..." values are the bench's: said of the subject they would be guesswork.
@@ -172,6 +176,24 @@ class Lexicon:
             for form in (plural(name), name):
                 self._add(form, "thing", name)
         self._longest = max(map(len, self._phrases), default=0)
+        self._general: frozenset[str] = frozenset()
+
+    def add_values(self, key: str, words: Iterable[str]) -> None:
+        """Know words as values of an attribute though no instance has them.
+
+        Such a word is denied of an instance whose attribute says something else, unless it is a part of what it
+        says: a dark green van is green.
+        """
+        new = {word for word in words if (word,) not in self._phrases}
+        for word in new:
+            self._add(word, "value", word)
+            self._keys_of.setdefault(word, set()).add(key)
+        self._general |= new
+        self._longest = max(self._longest, 1)
+
+    def members(self, name: str) -> frozenset[int]:
+        """Instances that answer to the name of a thing."""
+        return self._things.get(name, frozenset())
 
     def _add(self, phrase: str, kind: str, meaning: str) -> None:
         tokens = tuple(_TOKEN.findall(phrase.lower()))
@@ -215,7 +237,7 @@ class Lexicon:
             state.adjacent = kind == "value" or (state.adjacent and tokens[at] == "and")
             at += length
         state.end_clause()
-        return Reading(tuple(state.values), tuple(state.named), tuple(state.claims))
+        return Reading(tuple(state.values), tuple(state.named), tuple(state.claims), tuple(state.subjects))
 
     def _match(self, tokens: list[str], at: int) -> tuple[int, str, str]:
         for length in range(min(self._longest, len(tokens) - at), 0, -1):
@@ -237,7 +259,9 @@ class Lexicon:
                 state.claims.append(Claim("between", (state.first, chosen), text))
                 state.first = None
             state.words = [*state.words, *words]
-        elif subject in members:
+        else:
+            state.subjects.append(name)
+        if not state.relation and subject in members:
             state.values += state.pending
             state.named += state.pending if state.adjacent else []
         state.pending = []
@@ -250,6 +274,8 @@ class Lexicon:
         """Whether an instance has attributes of that value's kind, and none of them is that value."""
         attributes = self._attributes[i]
         own = [attributes[key].lower() for key in self._keys_of.get(value, ()) if key in attributes]
+        if value in self._general:
+            own = [word for words in own for word in _TOKEN.findall(words)]
         return bool(own) and value not in own
 
     def has(self, i: int, value: str) -> bool:

@@ -10,18 +10,24 @@ import typer
 from aerialdojo_gen.commands.common import PipelineFile, Quiet, Scene, Workers, default_workers, home
 
 app = typer.Typer()
+_MANY_DIGITS = 10
 
 
 @app.command("validate")
 def validate(
     folder: Annotated[
-        Path,
-        typer.Argument(metavar="RELEASE", envvar="AERIALDOJO_DATA", help="A release, or a folder with one."),
+        Path | None, typer.Argument(metavar="RELEASE", help="A release, or a folder with one; as --data.")
+    ] = None,
+    data: Annotated[
+        Path, typer.Option("--data", envvar="AERIALDOJO_DATA", help="Data directory, or the release itself.")
     ] = Path("data"),
     scene: Scene = None,
     sample: Annotated[
         int | None, typer.Option("--sample", min=0, help="Routes a scene that FCL is asked about.  (default: all)")
     ] = None,
+    pictures: Annotated[
+        str, typer.Option("--pictures", metavar="N|all", help="Reference images a scene that are drawn anew.")
+    ] = "all",
     meshes: Annotated[
         Path | None, typer.Option("--meshes", help="Folder of the meshes.  (default: meshes/ beside the release)")
     ] = None,
@@ -39,6 +45,7 @@ def validate(
     """Check a release again from its Parquet files and meshes alone, and name every row at fault."""
     from aerialdojo_gen.commands.common import DEFAULT_PIPELINE
     from aerialdojo_gen.config import load_pipeline
+    from aerialdojo_gen.errors import UsageError
     from aerialdojo_gen.progress import Reporter
     from aerialdojo_gen.release import validate as validation
     from aerialdojo_gen.release.validate.report import check_format
@@ -46,13 +53,19 @@ def validate(
 
     if report is not None:
         check_format(report)
+    if pictures != "all" and not (pictures.isascii() and pictures.isdigit() and len(pictures) < _MANY_DIGITS):
+        raise UsageError(f"--pictures {pictures}: a number, or all")
+    definitions = load_pipeline(pipeline or home() / "pipelines" / DEFAULT_PIPELINE)
+    if definitions.scene_assets is None:
+        definitions = definitions.model_copy(update={"scene_assets": home() / "scene_assets"})
     asked = validation.Asked(
-        release=release_of(folder.absolute()),
+        release=release_of((folder or data).absolute()),
         scenes=tuple(scene or ()),
         meshes=meshes.absolute() if meshes else None,
         use_meshes=not no_meshes,
         sample=sample,
-        pipeline=load_pipeline(pipeline or home() / "pipelines" / DEFAULT_PIPELINE),
+        pictures=None if pictures == "all" else int(pictures),
+        pipeline=definitions,
     )
     found = validation.validate(asked, workers=workers or default_workers(), reporter=Reporter(quiet=quiet))
     if report is not None:

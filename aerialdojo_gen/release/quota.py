@@ -71,7 +71,7 @@ def train_quotas(
 
 
 def choose(
-    nav_ids: Sequence[str],
+    lots: Sequence[str],
     settings: Sequence[str],
     length_m: Floats,
     wanted: Mapping[str, int],
@@ -80,14 +80,14 @@ def choose(
 ) -> NDArray[np.bool_]:
     """Choose so many tasks of each setting that their lengths sum to a given total.
 
-    Every task draws a number from its own id; the largest are taken, after the numbers have been tilted towards short
-    or long routes by as little as the total needs (weighted sampling without replacement with weights exp(tilt · L),
-    by Gumbel's trick). A task's chance hangs on its id and its length alone, never on its row.
+    Every task draws a number from its own lot; the largest are taken, after the numbers have been tilted towards
+    short or long routes by as little as the total needs (weighted sampling without replacement with weights
+    exp(tilt · L), by Gumbel's trick). A task's chance hangs on its lot and its length alone, never on its row.
 
     Parameters
     ----------
-    nav_ids, settings : sequences of n str
-        The kept candidates' ids and length settings.
+    lots, settings : sequences of n str
+        What the kept candidates draw with (`release.select.lot`), and their length settings.
     length_m : (n,) float64
         L, metres.
     wanted : mapping of str to int
@@ -102,13 +102,13 @@ def choose(
     (n,) bool
         True for the chosen.
     """
-    luck = np.array([_gumbel(seed, nav_id) for nav_id in nav_ids])
-    # Ties are broken by the id, so that the order of rows decides nothing.
-    place = np.argsort(np.argsort(np.asarray(nav_ids)))
+    luck = np.array([_gumbel(seed, lot) for lot in lots])
+    # Ties are broken by the lot, so that the order of rows decides nothing.
+    place = np.argsort(np.argsort(np.asarray(lots)))
     groups = [(np.flatnonzero(np.asarray(settings) == s), n) for s, n in sorted(wanted.items())]
 
     def chosen(tilt: float) -> NDArray[np.bool_]:
-        mask = np.zeros(len(nav_ids), dtype=bool)
+        mask = np.zeros(len(lots), dtype=bool)
         for rows, n in groups:
             score = luck[rows] + tilt * length_m[rows] / _SCALE_M
             mask[rows[np.lexsort((place[rows], -score))[:n]]] = True
@@ -131,6 +131,6 @@ def choose(
     return best
 
 
-def _gumbel(seed: int, nav_id: str) -> float:
-    uniform = (rank(seed, "quota", nav_id) + 0.5) / 2**64
+def _gumbel(seed: int, lot: str) -> float:
+    uniform = (rank(seed, "quota", lot) + 0.5) / 2**64
     return -math.log(-math.log(uniform))

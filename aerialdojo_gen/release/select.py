@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 from aerialdojo_gen.rng import rank
 
 
-def nav_id(scene: str, pair_id: str) -> str:
-    """Name a navigation task without telling its target: the pair's id would.
+def lot(scene: str, pair_id: str) -> str:
+    """Return what a candidate draws with: it hangs on the pair alone, so that no salt changes which are released.
 
     Returns
     -------
     str
-        The scene and 12 hexadecimal digits of a hash of the pair, e.g. ``"U_Mall_0-3f0c51d2a9be"``.
+        The scene and 12 hexadecimal digits of a hash of the pair. It is in no table, for it tells the pair.
     """
     return f"{scene}-{hashlib.blake2b(f'{scene}/{pair_id}'.encode(), digest_size=6).hexdigest()}"
 
@@ -29,27 +29,27 @@ def train_counts(settings: Sequence[str], fraction: float) -> dict[str, int]:
 
 
 def train_mask(
-    nav_ids: Sequence[str], settings: Sequence[str], trains: Mapping[str, int], seed: int
+    lots: Sequence[str], settings: Sequence[str], trains: Mapping[str, int], seed: int
 ) -> NDArray[np.bool_]:
     """Choose the navigation tasks that train.
 
     Parameters
     ----------
-    nav_ids, settings : sequences of n str
-        The tasks and their length settings.
+    lots, settings : sequences of n str
+        What the tasks draw with, and their length settings.
     trains : mapping of str to int
         How many of each setting train.
     seed : int
-        Of the pipeline. A task's place depends on the seed and its id, not on its row.
+        Of the pipeline. A task's place depends on the seed and its lot, not on its row.
 
     Returns
     -------
     (n,) bool
         True for training. Both instances of a task follow it.
     """
-    mask = np.zeros(len(nav_ids), dtype=bool)
+    mask = np.zeros(len(lots), dtype=bool)
     for setting, n in trains.items():
         rows = [i for i, s in enumerate(settings) if s == setting]
-        rows.sort(key=lambda i: rank(seed, "split", nav_ids[i]))
+        rows.sort(key=lambda i: rank(seed, "split", lots[i]))
         mask[rows[:n]] = True
     return mask

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import math
 from functools import lru_cache
 from typing import Any
@@ -55,7 +54,6 @@ def run(job: Job, config: ReferenceImagesConfig) -> Output:
         row: dict[str, Any] = {
             "scene": job.scene,
             "object_id": item["object_id"],
-            "reference_image_id": reference_id(job.scene, item["object_id"]),
             "reference_image": None,
             **dict.fromkeys(_BOX),
             "image_fraction": None,
@@ -76,11 +74,6 @@ def run(job: Job, config: ReferenceImagesConfig) -> Output:
             counts["not_in_view"] += 1
     pictures = sum(row["reference_image"] is not None for row in rows)
     return Output({"references": from_rows(REFERENCES, rows)}, len(objects), pictures, counts)
-
-
-def reference_id(scene: str, object_id: int) -> str:
-    """Name an object's picture without giving the object away: ``ref_`` and 12 hexadecimal digits."""
-    return "ref_" + hashlib.blake2b(f"{scene}/{object_id}".encode(), digest_size=6).hexdigest()
 
 
 def instance_map(rays: RayCaster, camera: Camera, world_from_camera: NDArray[np.float64]) -> NDArray[np.int32]:

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from aerialdojo_gen.config import SplitConfig
 from aerialdojo_gen.paper import PaperScene, inventory, splits
 from aerialdojo_gen.release import quota
-from aerialdojo_gen.release.select import nav_id, train_counts, train_mask
+from aerialdojo_gen.release.ids import key_of, nav_id, reference_id
+from aerialdojo_gen.release.select import lot, train_counts, train_mask
 from aerialdojo_gen.schemas import RELEASE_ANCHORS, RELEASE_OBJECTS, ROUTES, TASKS
 from aerialdojo_gen.stage import Job, Output
 
@@ -32,7 +33,9 @@ def _take(table: pa.Table, key: str, ids: pa.ChunkedArray) -> pa.Table:
     return table.take(pc.index_in(ids, value_set=table.column(key).combine_chunks()))
 
 
-def routes_table(scene: str, kept: pa.Table, pairs: pa.Table, plans: pa.Table, goals: pa.Table) -> pa.Table:
+def routes_table(
+    scene: str, kept: pa.Table, pairs: pa.Table, plans: pa.Table, goals: pa.Table, key: bytes
+) -> pa.Table:
     """Make the routes of the kept candidates.
 
     Parameters
@@ -45,17 +48,20 @@ def routes_table(scene: str, kept: pa.Table, pairs: pa.Table, plans: pa.Table, g
         All rows of the scene.
     goals : pyarrow.Table
         The selected anchors, one an object.
+    key : bytes
+        Of `aerialdojo_gen.release.ids.key_of`.
 
     Returns
     -------
     pyarrow.Table
-        Rows of `aerialdojo_gen.schemas.ROUTES`, with ``action_budget`` as a further column, in its order.
+        Rows of `aerialdojo_gen.schemas.ROUTES`, in its order, with ``action_budget`` and ``lot`` as further columns.
     """
     pairs = _take(pairs, "pair_id", kept.column("pair_id"))
     plans = _take(plans, "pair_id", kept.column("pair_id"))
     goal = _take(goals, "object_id", pairs.column("target_object_id"))
+    pair_ids = kept.column("pair_id").to_pylist()
     columns: dict[str, Any] = {
-        "nav_id": pa.array([nav_id(scene, p) for p in kept.column("pair_id").to_pylist()], pa.string()),
+        "nav_id": pa.array([nav_id(scene, p, key) for p in pair_ids], pa.string()),
         "scene": _constant(scene, kept.num_rows),
         "setting": kept.column("setting"),
         **{name: pairs.column(name) for name in ("start_object_id", "start_anchor_id", "target_object_id")},
@@ -65,9 +71,9 @@ def routes_table(scene: str, kept: pa.Table, pairs: pa.Table, plans: pa.Table, g
         **{name: plans.column(name) for name in _LISTS},
     }
     routes = pa.table({name: columns[name] for name in ROUTES.schema.names}, schema=ROUTES.schema)
-    return routes.append_column("action_budget", kept.column("action_budget")).sort_by(
-        [(key, "ascending") for key in ROUTES.order]
-    )
+    routes = routes.append_column("action_budget", kept.column("action_budget"))
+    routes = routes.append_column("lot", pa.array([lot(scene, p) for p in pair_ids], pa.string()))
+    return routes.sort_by([(column, "ascending") for column in ROUTES.order])
 
 
 def tasks_table(routes: pa.Table, train: pa.ChunkedArray, scene: dict[str, Any], objects: pa.Table) -> pa.Table:
@@ -116,7 +122,7 @@ def tasks_table(routes: pa.Table, train: pa.ChunkedArray, scene: dict[str, Any],
 
 def _chosen(routes: pa.Table, paper: PaperScene, seed: int) -> NDArray[np.bool_]:
     return quota.choose(
-        routes.column("nav_id").to_pylist(),
+        routes.column("lot").to_pylist(),
         routes.column("setting").to_pylist(),
         routes.column("length_m").to_numpy(),
         paper.tasks,
@@ -131,10 +137,13 @@ def run(job: Job, config: SplitConfig) -> Output:
     scene = scenes.to_pylist()[0]
     verdicts = job.read("verdicts")
     kept = verdicts.filter(verdicts.column("keep"))
+    key = key_of(config.salt, job.seed)
     routes = routes_table(
-        job.scene, kept, job.read("pairs"), job.read("plans"), anchors.filter(anchors.column("selected"))
+        job.scene, kept, job.read("pairs"), job.read("plans"), anchors.filter(anchors.column("selected")), key
     )
     references = _take(job.read("references"), "object_id", objects.column("object_id"))
+    names = [reference_id(job.scene, k, key) for k in objects.column("object_id").to_pylist()]
+    references = references.append_column("reference_image_id", pa.array(names, pa.string()))
     pictured = pa.table(
         {
             name: (objects if name in objects.column_names else references).column(name)
@@ -153,9 +162,9 @@ def run(job: Job, config: SplitConfig) -> Output:
     else:
         fraction = config.ood_train_fraction if scene["partition"] == "OOD" else config.id_train_fraction
         trains = train_counts(routes.column("setting").to_pylist(), fraction)
-    train = train_mask(routes.column("nav_id").to_pylist(), routes.column("setting").to_pylist(), trains, job.seed)
+    train = train_mask(routes.column("lot").to_pylist(), routes.column("setting").to_pylist(), trains, job.seed)
     tasks = tasks_table(routes, pa.chunked_array([pa.array(train)]), scene, named)
-    routes = routes.drop_columns("action_budget")
+    routes = routes.drop_columns(["action_budget", "lot"])
     is_train = pc.equal(tasks.column("subset"), "train")
     tables = {
         "tasks/train": tasks.filter(is_train),

@@ -62,8 +62,20 @@ def scenes_of(release: Path) -> list[str]:
         if _is_scene(path.stem.removeprefix("part-"))
     }
     if not names:
-        raise StoreError(f"there is no release in {release}: run aerialdojo-gen split, or name another folder")
+        raise StoreError(f"there is no release in {release.absolute()}: {_lack(release, list(tables))}; "
+                         "name its folder with --data, or make one with make dataset")  # fmt: skip
     return sorted(names)
+
+
+def _lack(release: Path, tables: list[str]) -> str:
+    if not release.exists():
+        return "the folder does not exist"
+    if not release.is_dir():
+        return "it is a file, not a folder"
+    there = [table for table in tables if (release / table).is_dir()]
+    if there:
+        return f"{', '.join(there)} without a file part-<scene>.parquet"
+    return f"it has no folder release, nor {', '.join(tables[:-1])} or {tables[-1]}"
 
 
 def foreign_files(release: Path, scenes: list[str]) -> Outcome:

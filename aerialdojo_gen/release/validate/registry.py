@@ -74,7 +74,7 @@ class Check:
     run : callable
         Yields the rows at fault.
     samples : bool
-        It judges those routes alone that ``--sample`` draws.
+        It judges those routes alone that ``--sample`` draws, or those objects that ``--pictures`` does.
     """
 
     name: str
@@ -162,5 +162,5 @@ def _run(data: SceneData, one: Check, table: str) -> Outcome:
     faults = [
         Fault(one.name, data.scene, table, rows.part(f.row), rows.key(f.row), f.found, f.expected) for f in findings
     ]
-    judged = ~left_out[data.paths.rows[data.sampled]] if one.samples else ~left_out
+    judged = ~left_out[data.sampled_rows(table)] if one.samples else ~left_out
     return Outcome(one.name, table, int(judged.sum()), faults)

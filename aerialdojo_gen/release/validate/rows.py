@@ -200,6 +200,8 @@ class SceneData:
         False leaves everything that needs a mesh unchecked.
     sample : int or None
         How many routes FCL is asked about; None for all.
+    pictures : int or None
+        How many reference images are drawn anew; None for all.
     """
 
     scene: str
@@ -209,6 +211,7 @@ class SceneData:
     meshes: Path | None = None
     use_meshes: bool = True
     sample: int | None = None
+    pictures: int | None = None
     faulty: dict[tuple[str, str], Mask] = field(default_factory=dict)
     kept: dict[str, object] = field(default_factory=dict)
 
@@ -238,6 +241,17 @@ class SceneData:
         nav_ids = self["routes"].texts("nav_id")
         order = sorted(range(len(rows)), key=lambda k: rank(0, "validate", nav_ids[int(rows[k])]))
         return np.sort(np.array(order[: self.sample], dtype=np.int64))
+
+    @cached_property
+    def sampled_objects(self) -> Ints:
+        """Rows of `objects` whose pictures are drawn anew: all, or so many by a draw from their ids."""
+        ids = self["objects"].ints("object_id").tolist()
+        order = sorted(range(len(ids)), key=lambda row: rank(0, "validate", self.scene, ids[row]))
+        return np.sort(np.array(order[: self.pictures], dtype=np.int64))
+
+    def sampled_rows(self, table: str) -> Ints:
+        """Rows of `routes` or `objects` that a check judges which looks at a sample."""
+        return self.sampled_objects if table == "objects" else self.paths.rows[self.sampled]
 
     @cached_property
     def route_of_task(self) -> Ints:

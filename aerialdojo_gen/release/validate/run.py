@@ -15,15 +15,20 @@ from aerialdojo_gen.progress import Reporter
 from aerialdojo_gen.release.validate import (
     anchors,
     collisions,
+    detours,
     ends,
     geometry,
+    gltf,
+    id_leaks,
     images,
     leaks,
     links,
     meshes,
     oracle,
+    pictures,
     tables,
     underground,
+    words,
 )
 from aerialdojo_gen.release.validate.counts import Tally, scene_counts, tally_of, whole_counts
 from aerialdojo_gen.release.validate.parts import foreign_files, read_tables, release_tables, scenes_of
@@ -32,7 +37,24 @@ from aerialdojo_gen.release.validate.report import Report
 from aerialdojo_gen.release.validate.rows import SceneData
 
 # A check looks at what those before it found fault with, so that their order is fixed here.
-_MODULES = (tables, geometry, leaks, links, ends, meshes, anchors, collisions, underground, oracle, images)
+_MODULES = (
+    tables,
+    geometry,
+    leaks,
+    links,
+    ends,
+    meshes,
+    gltf,
+    words,
+    anchors,
+    collisions,
+    underground,
+    detours,
+    oracle,
+    images,
+    pictures,
+    id_leaks,
+)
 SCENE_CHECKS = tuple(one for module in _MODULES for one in CHECKS if one.run.__module__ == module.__name__)
 
 
@@ -52,6 +74,8 @@ class Asked:
         False leaves everything that needs a mesh unchecked, and the report says so.
     sample : int or None
         Routes a scene that FCL is asked about; None for all.
+    pictures : int or None
+        Reference images a scene that are drawn anew; None for all.
     pipeline : Pipeline
         Whose definitions the release is held to.
     """
@@ -61,6 +85,7 @@ class Asked:
     meshes: Path | None = None
     use_meshes: bool = True
     sample: int | None = None
+    pictures: int | None = None
     pipeline: Pipeline = field(default_factory=Pipeline)
 
 
@@ -124,7 +149,8 @@ def validate(asked: Asked, *, workers: int = 1, reporter: Reporter | None = None
 def check_scene(asked: Asked, scene: str) -> tuple[list[Outcome], Tally]:
     """Check one scene of a release."""
     found, outcomes = read_tables(asked.release, scene)
-    data = SceneData(scene, asked.release, asked.pipeline, found, asked.meshes, asked.use_meshes, asked.sample)
+    data = SceneData(scene, asked.release, asked.pipeline, found, asked.meshes, asked.use_meshes, asked.sample,
+                     asked.pictures)  # fmt: skip
     tally = tally_of(data, len(found) == len(release_tables()))
     outcomes += run_checks(data, SCENE_CHECKS)
     outcomes.append(scene_counts(data, tally))
