@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from aerialdojo_gen.commands.common import Data, PipelineFile, Quiet, Scene, Workers, default_workers, open_pipeline
-from aerialdojo_gen.errors import UsageError
+from aerialdojo_gen.errors import AerialDojoError, UsageError
 
 if TYPE_CHECKING:
     from aerialdojo_gen.benchmark.goal import Sensors
@@ -56,20 +56,37 @@ def evaluate(
         int, typer.Option("--attempts", min=1, help="Tries of an episode where something outside fails.")
     ] = 5,
     rerun_failed: Annotated[
-        bool, typer.Option("--rerun-failed", help="Fly those again that failed for reasons outside the agent.")
+        bool, typer.Option("--rerun-failed", help="Fly exactly those again that failed for reasons outside the agent.")
+    ] = False,
+    tolerate: Annotated[
+        bool,
+        typer.Option("--tolerate", help="Log episodes in which the agent raises as failed; count no-actions; go on."),
     ] = False,
     restart: Annotated[bool, typer.Option("--restart", help="Drop what the run has written before.")] = False,
     max_cost: Annotated[
         float | None, typer.Option("--max-cost", min=0, help="Begin no episode once so many US dollars are spent.")
     ] = None,
+    max_tokens: Annotated[
+        int | None, typer.Option("--max-tokens", min=0, help="Begin no episode once so many tokens are spent.")
+    ] = None,
+    requests_per_minute: Annotated[
+        float | None,
+        typer.Option("--requests-per-minute", min=0.001, help="Send no more requests, all workers together."),
+    ] = None,
+    failures_in_row: Annotated[
+        int,
+        typer.Option("--failures-in-row", min=1, help="End after so many failed episodes of one kind in a row."),
+    ] = 5,
     workers: Workers = None,
     pipeline: PipelineFile = None,
     quiet: Quiet = False,
 ) -> None:
     """Fly an agent through released tasks, closed loop; finished episodes are never flown again."""
+    from aerialdojo_gen.benchmark.limits import Limits
     from aerialdojo_gen.benchmark.runner import Evaluation
     from aerialdojo_gen.benchmark.runner import evaluate as fly
     from aerialdojo_gen.benchmark.tasks import Selection
+    from aerialdojo_gen.benchmark.worker import Conditions
     from aerialdojo_gen.progress import Reporter
 
     config, _ = open_pipeline(pipeline, data)
@@ -83,29 +100,37 @@ def evaluate(
         _sensors(agent, options, view, width, height),
         config.embodiment,
         renderer,
-        attempts,
+        Conditions(attempts, tolerate=tolerate),
+        requests_per_minute,
     )
     reporter = Reporter(quiet=quiet)
     try:
         outcome = fly(
             data, evaluation, out=out, workers=workers or default_workers(), rerun_failed=rerun_failed,
-            restart=restart, max_cost_usd=max_cost, reporter=reporter,
+            restart=restart, limits=Limits(max_cost, max_tokens, failures_in_row), reporter=reporter,
         )  # fmt: skip
     except KeyboardInterrupt:
         print("interrupted: finished episodes are kept, the same command goes on from here", file=sys.stderr)
         raise SystemExit(130) from None
     reporter.line(f"evaluate {evaluation.run}: {outcome}")
+    if outcome.stopped or (outcome.failed and not outcome.finished):
+        raise AerialDojoError(outcome.last_line)
+    if outcome.last_line:
+        # Not the reporter's: a failure is told under --quiet too.
+        print(outcome.last_line, file=sys.stderr)
 
 
 def _options(given: list[str]) -> dict[str, Any]:
+    from aerialdojo_gen.benchmark.secrets import Secrets
+
     options: dict[str, Any] = {}
     for item in given:
         key, equals, value = item.partition("=")
         if not equals or not key.isidentifier():
-            raise UsageError(f"--option {item!r}: write key=value")
+            raise UsageError(f"--option {Secrets().text(item)[:60]!r}: write key=value")
         try:
             options[key] = json.loads(value)
-        except ValueError:
+        except (ValueError, RecursionError):
             options[key] = value
     return options
 

@@ -105,7 +105,7 @@ class VlmScorer:
         choices = getattr(completion, "choices", None)
         if not choices or getattr(choices[0], "message", None) is None:
             raise self._service.not_understood("chat completion")
-        return self._service.without_key(choices[0].message.content or "")
+        return self._service.clean(choices[0].message.content or "")
 
 
 def read_order(text: str, n: int) -> list[int]:
