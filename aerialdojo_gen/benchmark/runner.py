@@ -219,7 +219,9 @@ def evaluate(
 
             def tell(finished: Finished) -> None:
                 tally.add(finished)
-                bar.advance(finished.episodes)
+                # A worker that has nothing to tell says so too, and a rate of nothing is no rate.
+                if finished.episodes:
+                    bar.advance(finished.episodes)
 
             def stopped() -> bool:
                 interrupts.check()

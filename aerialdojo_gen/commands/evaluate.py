@@ -22,12 +22,21 @@ app = typer.Typer()
 def evaluate(
     data: Data = Path("data"),
     agent: Annotated[
-        str, typer.Option("--agent", help="oracle, random, stop, explorer, …, or package.module:Class.")
-    ] = "random",
+        str | None,
+        typer.Option(
+            "--agent", help="oracle, random, stop, explorer, …, or package.module:Class.  (default: random)"
+        ),
+    ] = None,
+    preset: Annotated[
+        str | None,
+        typer.Option("--preset", help="A language model by name, in place of --agent: qwen3-vl-4b, …"),
+    ] = None,
     option: Annotated[
         list[str] | None, typer.Option("--option", help="An option of the agent, repeatable: --option seed=1.")
     ] = None,
-    run: Annotated[str | None, typer.Option("--run", help="Name of the run.  (default: the agent's)")] = None,
+    run: Annotated[
+        str | None, typer.Option("--run", help="Name of the run.  (default: the agent's or preset's)")
+    ] = None,
     split: Annotated[
         list[str] | None, typer.Option("--split", help="id_train, id_test, ood_train, ood_test; repeatable.")
     ] = None,
@@ -56,13 +65,18 @@ def evaluate(
         int, typer.Option("--attempts", min=1, help="Tries of an episode where something outside fails.")
     ] = 5,
     rerun_failed: Annotated[
-        bool, typer.Option("--rerun-failed", help="Fly exactly those again that failed for reasons outside the agent.")
+        bool,
+        typer.Option("--rerun-failed", help="Fly exactly those again that failed for reasons outside the agent."),
     ] = False,
     tolerate: Annotated[
         bool,
         typer.Option("--tolerate", help="Log episodes in which the agent raises as failed; count no-actions; go on."),
     ] = False,
     restart: Annotated[bool, typer.Option("--restart", help="Drop what the run has written before.")] = False,
+    estimate: Annotated[
+        bool,
+        typer.Option("--estimate", help="Fly nothing: say what a language model would take, by a few requests."),
+    ] = False,
     max_cost: Annotated[
         float | None, typer.Option("--max-cost", min=0, help="Begin no episode once so many US dollars are spent.")
     ] = None,
@@ -92,8 +106,10 @@ def evaluate(
     config, _ = open_pipeline(pipeline, data)
     splits, settings, modalities, scenes = (tuple(names or ()) for names in (split, setting, modality, scene))
     options = _options(option or [])
+    name = preset or agent or "random"
+    agent, options = _agent(agent, preset, options)
     evaluation = Evaluation(
-        run or agent.replace(".", "-").replace(":", "-"),
+        run or name.replace(".", "-").replace(":", "-"),
         agent,
         options,
         Selection(splits, settings, modalities, scenes, limit, seed),
@@ -103,6 +119,11 @@ def evaluate(
         Conditions(attempts, tolerate=tolerate),
         requests_per_minute,
     )
+    if estimate:
+        from aerialdojo_gen.benchmark.llm.estimate import estimate as reckon
+
+        print("\n".join(reckon(data, evaluation).lines(workers or default_workers())))
+        return
     reporter = Reporter(quiet=quiet)
     try:
         outcome = fly(
@@ -118,6 +139,18 @@ def evaluate(
     if outcome.last_line:
         # Not the reporter's: a failure is told under --quiet too.
         print(outcome.last_line, file=sys.stderr)
+
+
+def _agent(agent: str | None, preset: str | None, options: dict[str, Any]) -> tuple[str, dict[str, Any]]:
+    """Take the agent, or a preset's with its options under those that are given."""
+    if preset is None:
+        return agent or "random", options
+    from aerialdojo_gen.benchmark.llm.presets import preset as find
+
+    found = find(preset)
+    if agent is not None and agent != found.agent:
+        raise UsageError(f"preset {preset!r} is of the agent {found.agent!r}: leave --agent {agent} out")
+    return found.agent, found.options | options
 
 
 def _options(given: list[str]) -> dict[str, Any]:

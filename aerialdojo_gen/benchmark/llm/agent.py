@@ -273,6 +273,13 @@ class LanguageModelAgent(AgentBase):
                 parts += [f"{view} camera, depth (black 0 m, white {o.max_depth_m:g} m or more):", depth]
         return parts
 
+    def reckoned_tokens(self, observation: Observation) -> int:
+        """Reckon what a request would have without sending it: four letters a token, and its pictures."""
+        o = self.options
+        parts = [self._system, *self._goal, *self._report(observation)]
+        a_picture = o.tokens_per_picture or round(o.image_size_px**2 / 750)
+        return sum(a_picture if isinstance(part, Picture) else -(-len(part) // 4) for part in parts)
+
     def usage(self) -> Usage:
         """Return requests, tokens, cost and times since `reset`."""
         tokens_in, tokens_out = self._tokens

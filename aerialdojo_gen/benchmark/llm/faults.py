@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 from aerialdojo_gen.benchmark.agents.base import AgentUnavailable
@@ -62,7 +63,7 @@ def refusal(status: int, body: Any, said: str, name: str, model: str, retry_afte
 
 def _is_of_all(words: str, model: str) -> bool:
     """Whether a 404 is the model's or the address's, rather than that of something in the request."""
-    if "model_not_found" in words or (model and model.lower() in words):
+    if "model_not_found" in words or (model and re.search(rf"(?<!\w){re.escape(model.lower())}(?!\w)", words)):
         return True
     return not _has(words, _OF_A_PICTURE)
 

@@ -30,7 +30,7 @@ class OpenAIAgent(LanguageModelAgent):
         body: dict[str, Any] = {limit: o.max_tokens} | self._form() | o.extra_body
         if o.temperature is not None:
             body["temperature"] = o.temperature
-        said = [{"role": "system", "content": system}, *map(_as_message, messages)]
+        said = [{"role": o.system_role, "content": system}, *map(_as_message, messages)]
         completion = service.call(
             lambda client: client.chat.completions.create(model=o.model, messages=said, extra_body=body), retries
         )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, field_validator
+from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
 from aerialdojo_gen.benchmark.llm.actions import SIXTEEN, ActionSet, eight
 from aerialdojo_gen.benchmark.llm.service import check_url
@@ -54,6 +54,10 @@ class Options(BaseModel):
         How many earlier steps are told again: the action and what the model said of it.
     history_images : int
         Of how many earlier steps the colour picture of the first view is sent again.
+    max_pictures : int or None
+        Most pictures that a request may have, where the model or its server has a limit.
+    system_role : str
+        Who says the prompt: ``system``, or ``user`` for models without such a role (OpenAI's protocol alone).
     extra_body : dict
         Anything else that the service takes, e.g. ``{"seed": 1}``.
     input_usd_per_million, output_usd_per_million : float or None
@@ -81,6 +85,8 @@ class Options(BaseModel):
     max_depth_m: float = Field(default=50.0, gt=0.0)
     history: int = Field(default=8, ge=0)
     history_images: int = Field(default=1, ge=0, le=20)
+    max_pictures: int | None = Field(default=None, ge=2)
+    system_role: Literal["system", "developer", "user"] = "system"
     extra_body: dict[str, Any] = {}
     input_usd_per_million: float | None = Field(default=None, ge=0.0)
     output_usd_per_million: float | None = Field(default=None, ge=0.0)
@@ -97,6 +103,21 @@ class Options(BaseModel):
     @classmethod
     def _several(cls, views: Any) -> Any:
         return views.split(",") if isinstance(views, str) else views
+
+    @model_validator(mode="after")
+    def _few_pictures(self) -> Options:
+        n = self.pictures
+        if self.max_pictures is not None and n > self.max_pictures:
+            raise ValueError(
+                f"a request of an image goal has {n} pictures, more than max_pictures = {self.max_pictures}: "
+                "fewer views or history_images, or depth = false"
+            )
+        return self
+
+    @property
+    def pictures(self) -> int:
+        """Pictures of a request, at most: the goal's, past ones, and what is seen now."""
+        return 1 + self.history_images + len(self.views) * (2 if self.depth else 1)
 
     @property
     def action_set(self) -> ActionSet:
