@@ -166,7 +166,7 @@ def striking(left: set[int]) -> Callable[[dict[str, Any]], str | Act]:
 
 
 def test_whatever_a_service_does_a_run_of_thirty_ends_with_thirty_rows(smoke: Path, tmp_path: Path) -> None:
-    more = ("--limit", "30", "--attempts", "1", "--option", "timeout_s=1.0")
+    more = ("--limit", "30", "--attempts", "1", "--option", "timeout_s=4.0")
     with serving() as service:
         service.policy = striking(set(STRUCK))
         done = fly(smoke, tmp_path, "openai", service.url, *more)
