@@ -26,7 +26,7 @@ STOP, MOVE_UP_1, MOVE_DOWN_1, TURN_LEFT, TURN_RIGHT, APPROACH = 0, 10, 12, 14, 1
 OUTCOMES = ("SOLVED", "START_IN_COLLISION", "GOAL_IN_COLLISION", "NO_PATH", "NEAR_STRAIGHT", "BUDGET_EXHAUSTED")
 SETTINGS = ("base", "standard", "long_horizon")
 SUBSETS = ("id_train", "id_test", "ood_train", "ood_test")
-DIRECTIONS = ("east", "north-east", "north", "north-west", "west", "south-west", "south", "south-east")
+DIRECTIONS = ("east", "northeast", "north", "northwest", "west", "southwest", "south", "southeast")
 VIEWS = ("front", "left", "right", "down")
 # What ends an episode (benchmark): an agent's Stop, a collision, or the last action of the budget.
 TERMINATIONS = ("stop", "collision", "budget")

@@ -89,8 +89,8 @@ def test_no_text_is_guessed_at(text: str) -> None:
 
 
 RULES = Rules(180, 3.0, 0.25, 0.25, Sensors(("front",)))
-SEMANTIC = Goal("semantic", "red van", "clock tower", "north-east", "A red van by a hedge.", None, RULES)
-IMAGE = Goal("image", "red van", "clock tower", "north-east", None, np.zeros((4, 4, 3), np.uint8), RULES)
+SEMANTIC = Goal("semantic", "red van", "clock tower", "northeast", "A red van by a hedge.", None, RULES)
+IMAGE = Goal("image", "red van", "clock tower", "northeast", None, np.zeros((4, 4, 3), np.uint8), RULES)
 
 
 def test_the_prompt_holds_what_appendix_a_asks_for() -> None:
@@ -135,7 +135,7 @@ def test_the_papers_eight_actions_have_common_magnitudes() -> None:
 def test_the_goal_is_told_as_its_modality_has_it() -> None:
     assert goal_text(SEMANTIC).endswith("Description: A red van by a hedge.")
     for goal in (SEMANTIC, IMAGE):
-        assert "TARGET: red van. It lies north-east of the landmark nearest to it: clock tower." in goal_text(goal)
+        assert "TARGET: red van. It lies northeast of the landmark nearest to it: clock tower." in goal_text(goal)
     assert "None" not in goal_text(IMAGE)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import time
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -65,8 +66,10 @@ class Estimate:
             if self.measured
             else f"not measured ({self.why_not}); reckoned from prompt and pictures, answer and time assumed: {each}"
         )
-        a_step_s = self.request_s + self.render_s
-        hours = [n * a_step_s / 3600.0 / workers for n in self.requests]
+        # Requests wait side by side; pictures are drawn by as many cores as there are.
+        cores = max(1, min(workers, len(os.sched_getaffinity(0))))
+        a_step_s = max((self.request_s + self.render_s) / workers, self.render_s / cores)
+        hours = [n * a_step_s / 3600.0 for n in self.requests]
         millions = [n * (self.tokens_in + self.tokens_out) / 1e6 for n in self.requests]
         cost = "" if self.cost_usd is None else f", {self.cost_usd[0]:,.2f} to {self.cost_usd[1]:,.2f} USD"
         return [
