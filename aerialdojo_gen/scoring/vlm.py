@@ -52,7 +52,7 @@ class VlmScorer:
 
     def __init__(self, config: VlmConfig) -> None:
         self._config = config
-        self._service = Connection("openai", config.base_url, config.timeout_s, config.retries)
+        self._service = Connection("openai", config.base_url, config.timeout_s, config.retries, model=config.model)
 
     def score(self, name: str, views: Sequence[AnchorView]) -> list[float | None]:
         """Score views by the model's order.
@@ -103,9 +103,11 @@ class VlmScorer:
             lambda client: client.chat.completions.create(model=self._config.model, messages=said, extra_body=body)
         )
         choices = getattr(completion, "choices", None)
-        if not choices or getattr(choices[0], "message", None) is None:
+        message = getattr(choices[0], "message", None) if isinstance(choices, list) and choices else None
+        content = getattr(message, "content", None)
+        if message is None or not (content is None or isinstance(content, str)):
             raise self._service.not_understood("chat completion")
-        return self._service.clean(choices[0].message.content or "")
+        return self._service.clean(content or "")
 
 
 def read_order(text: str, n: int) -> list[int]:
@@ -131,7 +133,7 @@ def read_order(text: str, n: int) -> list[int]:
     wrapped = _WRAPPED.match(text)
     try:
         value = json.loads(wrapped[1] if wrapped else text)
-    except (json.JSONDecodeError, RecursionError):
+    except (ValueError, RecursionError):
         raise ValueError("it is not one JSON object") from None
     if not isinstance(value, dict) or set(value) != {"order"} or not isinstance(value["order"], list):
         raise ValueError('it is no object with the one key "order" and a list in it')
