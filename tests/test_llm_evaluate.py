@@ -215,7 +215,9 @@ def test_failures_of_one_kind_in_a_row_end_the_run(smoke: Path, tmp_path: Path) 
         assert "stopped at --max-tokens 2100" in done.stderr
     done = fly(smoke, tmp_path, "openai", service.url, "--limit", "20", "--option", "request_retries=1")
     assert done.returncode == 1
-    assert "refused" in done.stderr.splitlines()[-1]
+    last = done.stderr.splitlines()[-1]
+    assert last.startswith("error: checked before the run, nothing flown: ")
+    assert "refused" in last
     assert "Traceback" not in done.stderr
     assert read_run(tmp_path, "openai").num_rows == 3
 

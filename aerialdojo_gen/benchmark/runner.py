@@ -24,6 +24,7 @@ import pyarrow.compute as pc
 from aerialdojo_gen import store
 from aerialdojo_gen.atomic import atomic_file
 from aerialdojo_gen.benchmark import episodes, journal
+from aerialdojo_gen.benchmark.agents import ServiceDown
 from aerialdojo_gen.benchmark.goal import Sensors
 from aerialdojo_gen.benchmark.limits import Limits, Tally
 from aerialdojo_gen.benchmark.preflight import checked
@@ -227,10 +228,13 @@ def evaluate(
                 interrupts.check()
                 return bool(tally.spent or tally.failing)
 
-            with run.kept():
-                units = run.units(todo, workers)
-                for scene in fly_units(data, evaluation, units, workers, tell, stopped):
-                    run.bring_in(scene)
+            try:
+                with run.kept():
+                    units = run.units(todo, workers)
+                    for scene in fly_units(data, evaluation, units, workers, tell, stopped):
+                        run.bring_in(scene)
+            except ServiceDown as error:
+                raise ServiceDown(f"{error} Finished episodes are kept: the same command goes on from here") from None
         if tally.spent and len(run.todo(False)):
             reporter.line(f"stopped at {tally.spent}: a higher one goes on from here")
         finished, failed = run.counts()

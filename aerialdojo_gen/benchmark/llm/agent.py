@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from pydantic import ValidationError
 
-from aerialdojo_gen.benchmark.agents.base import AgentBase, AgentUnavailable, InvalidAnswer, Usage
+from aerialdojo_gen.benchmark.agents.base import AgentBase, AgentUnavailable, InvalidAnswer, ServiceDown, Usage
 from aerialdojo_gen.benchmark.goal import Goal, Observation, Sensors
 from aerialdojo_gen.benchmark.llm.answer import parse_answer
 from aerialdojo_gen.benchmark.llm.images import Picture, colour_picture, depth_picture
@@ -170,6 +170,8 @@ class LanguageModelAgent(AgentBase):
             self.form = form
             try:
                 reply = self.ask(text, [Message("user", ("A grey picture:", grey))], retries=1)
+            except ServiceDown as error:
+                raise ServiceDown(f"checked before the run, nothing flown: {error}") from None
             except AgentUnavailable as error:
                 if form != forms[-1] and error.kind in _NOT_TAKEN:
                     continue
