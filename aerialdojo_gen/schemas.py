@@ -26,7 +26,7 @@ STOP, MOVE_UP_1, MOVE_DOWN_1, TURN_LEFT, TURN_RIGHT, APPROACH = 0, 10, 12, 14, 1
 OUTCOMES = ("SOLVED", "START_IN_COLLISION", "GOAL_IN_COLLISION", "NO_PATH", "NEAR_STRAIGHT", "BUDGET_EXHAUSTED")
 SETTINGS = ("base", "standard", "long_horizon")
 SUBSETS = ("id_train", "id_test", "ood_train", "ood_test")
-DIRECTIONS = ("east", "north-east", "north", "north-west", "west", "south-west", "south", "south-east")
+DIRECTIONS = ("east", "northeast", "north", "northwest", "west", "southwest", "south", "southeast")
 VIEWS = ("front", "left", "right", "down")
 # What ends an episode (benchmark): an agent's Stop, a collision, or the last action of the budget.
 TERMINATIONS = ("stop", "collision", "budget")
@@ -381,6 +381,9 @@ TIMINGS = _table(
     _field("wall_s", pa.float64(), "wall time of the episode", "s"),
     _field("agent_s", pa.float64(), "wall time inside the agent", "s"),
     _field("attempts", pa.int32(), "how often the episode was begun, infrastructure failures and all"),
+    _field("request_s", pa.float64(), "time of all requests to an outside service; null without one", "s",
+           nullable=True),
+    _field("longest_request_s", pa.float64(), "time of the longest of them", "s", nullable=True),
 )  # fmt: skip
 
 FAILURES = _table(
@@ -389,7 +392,13 @@ FAILURES = _table(
     _TASK_ID,
     _SCENE,
     _field("attempts", pa.int32(), "how often the episode was tried"),
-    _field("reason", pa.string(), "what was unavailable: time-out, 429, 5xx, connection lost"),
+    _field("kind", pa.string(),
+           "what failed: rate limit, server error, time-out, connection lost, malformed answer, content filter, "
+           "context too long, bad request, not found, renderer, agent error, unavailable"),
+    _field("reason", pa.string(), "in words: of a service's answer its first line"),
+    _field("n_requests", pa.int32(), "calls of an outside service all the same", nullable=True),
+    _field("input_tokens", pa.int64(), "tokens sent all the same, where the service says", nullable=True),
+    _field("output_tokens", pa.int64(), "tokens received all the same, where the service says", nullable=True),
     _field("cost_usd", pa.float64(), "US dollars spent all the same, where prices are known", nullable=True),
 )  # fmt: skip
 

@@ -30,7 +30,7 @@ def box(
 
 
 def street() -> Scene:
-    """A clock tower; north-east of it two red vans and a blue one, with a mailbox, a bench and a lamp by them."""
+    """A clock tower; northeast of it two red vans and a blue one, with a mailbox, a bench and a lamp by them."""
     van, small = (5.0, 2.0, 2.5), (0.6, 0.6, 1.2)
     instances = (
         box("ground_000", (0, 0, -0.1), (200, 200, 0.1)),

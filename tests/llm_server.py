@@ -22,12 +22,25 @@ class Say:
 
 
 @dataclass(frozen=True)
+class Call:
+    """A tool call: the model answers by arguments."""
+
+    arguments: str
+
+
+@dataclass(frozen=True)
+class Filtered:
+    """A content filter has taken the answer away."""
+
+
+@dataclass(frozen=True)
 class Status:
     """An error of the service."""
 
     code: int
     message: str = "something is wrong"
     headers: dict[str, str] = field(default_factory=dict)
+    error: str = "error"
 
 
 @dataclass(frozen=True)
@@ -61,7 +74,7 @@ class Cut:
     """The connection is cut in the middle of an answer."""
 
 
-Act = Say | Status | Raw | Endless | Drip | Hang | Cut
+Act = Say | Call | Filtered | Status | Raw | Endless | Drip | Hang | Cut
 
 
 @dataclass
@@ -75,16 +88,22 @@ class Service:
     script : list of Act
         Done one a request; the last one for ever.
     requests : list of dict
-        Path, headers (lower case) and JSON body of every request.
+        Path, headers (lower case) and JSON body of every request of a flight.
+    checks : list of dict
+        The same of the checks before a run.
     policy : callable, optional
-        Answers instead of the script, from the request's body.
+        Answers instead of the script, from the request's body: by a text, or by an act.
+    refuses : callable, optional
+        What a check is answered with, from its body, in place of a proper answer.
     """
 
     url: str
     script: list[Act]
     requests: list[dict[str, Any]]
     stop: threading.Event
-    policy: Callable[[dict[str, Any]], str] | None = None
+    policy: Callable[[dict[str, Any]], str | Act] | None = None
+    checks: list[dict[str, Any]] = field(default_factory=list)
+    refuses: Callable[[dict[str, Any]], Act | None] | None = None
 
     def next(self) -> Act:
         return self.script.pop(0) if len(self.script) > 1 else self.script[0]
@@ -97,19 +116,26 @@ class _Handler(BaseHTTPRequestHandler):
     def do_POST(self) -> None:
         body = json.loads(self.rfile.read(int(self.headers["content-length"])))
         headers = {k.lower(): v for k, v in self.headers.items()}
-        self.service.requests.append({"path": self.path, "headers": headers, "body": body})
-        policy = self.service.policy
-        act = Say(policy(body)) if policy else self.service.next()
+        seen = {"path": self.path, "headers": headers, "body": body}
+        if "This is a test of the connection" in json.dumps(body):
+            self.service.checks.append(seen)
+            refuses = self.service.refuses
+            act: Act = (refuses(body) if refuses else None) or _checked(body)
+        else:
+            self.service.requests.append(seen)
+            policy = self.service.policy
+            said = policy(body) if policy else self.service.next()
+            act = Say(said) if isinstance(said, str) else said
         with contextlib.suppress(BrokenPipeError, ConnectionResetError):
             self.play(act, anthropic=self.path == "/v1/messages")
 
     def play(self, act: Act, anthropic: bool) -> None:
-        if isinstance(act, Say):
+        if isinstance(act, Say | Call | Filtered):
             self.send(200, _message(act) if anthropic else _completion(act))
         elif isinstance(act, Status):
             # A careless service: it sends back all that it was sent.
             key = self.headers.get("authorization", "") + self.headers.get("x-api-key", "")
-            error = {"type": "error", "message": f"{act.message} (you sent {key})"}
+            error = {"type": act.error, "message": f"{act.message} (you sent {key})"}
             self.send(act.code, json.dumps({"type": "error", "error": error}).encode(), act.headers)
         elif isinstance(act, Raw):
             self.send(act.code, act.body, {"content-type": act.content_type})
@@ -145,26 +171,40 @@ class _Handler(BaseHTTPRequestHandler):
         """Say nothing on stderr."""
 
 
-def _completion(say: Say) -> bytes:
-    message = {"role": "assistant", "content": say.text}
+def _checked(body: dict[str, Any]) -> Act:
+    answer = '{"thought": "a test", "action": "Stop"}'
+    return Call(answer) if "tools" in body else Say(answer)
+
+
+def _completion(said: Say | Call | Filtered) -> bytes:
+    message: dict[str, Any] = {"role": "assistant", "content": said.text if isinstance(said, Say) else None}
+    if isinstance(said, Call):
+        function = {"name": "act", "arguments": said.arguments}
+        message["tool_calls"] = [{"id": "call_1", "type": "function", "function": function}]
+    reason = "content_filter" if isinstance(said, Filtered) else "stop"
     value: dict[str, Any] = {
         "id": "chatcmpl-1", "object": "chat.completion", "created": 1, "model": "m",
-        "choices": [{"index": 0, "message": message, "finish_reason": "stop"}],
+        "choices": [{"index": 0, "message": message, "finish_reason": reason}],
     }  # fmt: skip
-    if say.usage:
-        value["usage"] = {
-            "prompt_tokens": say.usage[0], "completion_tokens": say.usage[1], "total_tokens": sum(say.usage)
-        }  # fmt: skip
+    usage = said.usage if isinstance(said, Say) else (1000, 20)
+    if usage:
+        value["usage"] = {"prompt_tokens": usage[0], "completion_tokens": usage[1], "total_tokens": sum(usage)}
     return json.dumps(value).encode()
 
 
-def _message(say: Say) -> bytes:
+def _message(said: Say | Call | Filtered) -> bytes:
+    content: list[dict[str, Any]] = []
+    if isinstance(said, Say):
+        content = [{"type": "text", "text": said.text}]
+    elif isinstance(said, Call):
+        content = [{"type": "tool_use", "id": "toolu_1", "name": "act", "input": json.loads(said.arguments)}]
     value: dict[str, Any] = {
         "id": "msg_1", "type": "message", "role": "assistant", "model": "m", "stop_reason": "end_turn",
-        "stop_sequence": None, "content": [{"type": "text", "text": say.text}],
+        "stop_sequence": None, "content": content,
     }  # fmt: skip
-    if say.usage:
-        value["usage"] = {"input_tokens": say.usage[0], "output_tokens": say.usage[1]}
+    usage = said.usage if isinstance(said, Say) else (1000, 20)
+    if usage:
+        value["usage"] = {"input_tokens": usage[0], "output_tokens": usage[1]}
     return json.dumps(value).encode()
 
 

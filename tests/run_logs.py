@@ -59,7 +59,11 @@ def write_run(
                 "task_id": f"{scene}_{per_scene + k:04d}s",
                 "scene": scene,
                 "attempts": 5,
+                "kind": "server error",
                 "reason": "HTTP 503",
+                "n_requests": 5,
+                "input_tokens": None,
+                "output_tokens": None,
                 "cost_usd": 0.0,
             }
             for k in range(failed)

@@ -60,7 +60,7 @@ def test_tables_of_a_right_file(tmp_path):
         size = np.array([row[f"size_{a}_m"] for a in "xyz"])
         np.testing.assert_array_equal(centre - size / 2, instance.bounds[0])
         np.testing.assert_array_equal(centre + size / 2, instance.bounds[1])
-    assert objects["direction"].to_pylist() == ["north-east", "north-east", "north-east", "west"]
+    assert objects["direction"].to_pylist() == ["northeast", "northeast", "northeast", "west"]
     assert objects["object_id"].to_pylist() == [0, 1, 2, 3]
     assert output.rows_out == 5
 

@@ -128,12 +128,12 @@ def test_the_checks_of_the_import_while_typing(client, desk):
     assert said(f"A {other} delivery van.") == [f"it is called {other!r}, and the mesh is not"]
     assert any("full stop" in text for text in said("A red delivery van"))
     assert any("not for people" in text for text in said("The thing delivery_van_000."))
-    # Two walls stand south-east of the traffic light.
+    # Two walls stand southeast of the traffic light.
     wall = {"node": "wall_000", "category": "wall", "name": "wall", "description": "A wall."}
     operation = {"do": "add", "kind": "objects", "fields": wall}
     (fault,) = client.post("/api/draft", json=AUTHOR | {"operation": operation}).json()["faults"]
     assert fault["field"] == "description"
-    assert fault["message"].startswith("ambiguous: it fits wall_007 as well, south-east of the same landmark")
+    assert fault["message"].startswith("ambiguous: it fits wall_007 as well, southeast of the same landmark")
     assert desk.storage.path.read_bytes() == before
 
 

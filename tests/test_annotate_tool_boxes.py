@@ -97,7 +97,7 @@ def test_what_is_boxed_out_is_annotated_becomes_an_object_and_can_be_put_back(te
         body = {"who": "Ada", "client": "a", "operation": {"do": "add", "kind": kind, "fields": fields}}
         document = client.post("/api/operations", json=body, headers={"If-Match": document["version"]}).json()
     assert document["objects"][0]["faults"] == []
-    assert (document["objects"][0]["landmark"], document["objects"][0]["direction"]) == ("tower", "north-east")
+    assert (document["objects"][0]["landmark"], document["objects"][0]["direction"]) == ("tower", "northeast")
     assert len(client.get("/api/objects/0/anchors").json()) == 3
     run_until("anchor-sample", data=roots.data, pipeline=terrain.pipeline, scene=["Scan"], workers=1, quiet=True)
     refused = client.delete("/api/boxes/garden_shed_000")

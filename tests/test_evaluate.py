@@ -18,8 +18,10 @@ from aerialdojo_gen.benchmark import journal
 from aerialdojo_gen.benchmark.agents import AgentBase, AgentUnavailable, InvalidAnswer, Usage
 from aerialdojo_gen.benchmark.episodes import TABLES, read_run, runs
 from aerialdojo_gen.benchmark.goal import BLIND
+from aerialdojo_gen.benchmark.limits import Limits
 from aerialdojo_gen.benchmark.runner import Evaluation, evaluate
 from aerialdojo_gen.benchmark.tasks import Selection, select
+from aerialdojo_gen.benchmark.worker import Conditions
 from aerialdojo_gen.errors import AerialDojoError, StoreError, UsageError
 from aerialdojo_gen.planning.primitives import replay
 
@@ -64,8 +66,9 @@ class Broken(AgentBase):
         return self._nothing["map"]
 
 
-def job(agent="random", limit=12, run="r", **kw):
-    return Evaluation(run, agent, kw.pop("options", {}), Selection(limit=limit, **kw), pause_s=0.0)
+def job(agent="random", limit=12, run="r", tolerate=True, **kw):
+    conditions = Conditions(pause_s=0.0, tolerate=tolerate)
+    return Evaluation(run, agent, kw.pop("options", {}), Selection(limit=limit, **kw), conditions=conditions)
 
 
 def snapshot(out, run="r", tables=("episodes", "steps")):
@@ -265,17 +268,17 @@ def test_answers_that_name_no_action_are_counted(smoke, tmp_path):
 
 def test_no_more_than_the_maximal_cost(smoke, tmp_path):
     flaky = job(f"{HERE}:Flaky", limit=6)
-    outcome = evaluate(smoke, flaky, out=tmp_path, max_cost_usd=0.12)
+    outcome = evaluate(smoke, flaky, out=tmp_path, limits=Limits(cost_usd=0.12))
     assert (outcome.finished, outcome.cost_usd) == (3, pytest.approx(0.15))
-    assert evaluate(smoke, flaky, out=tmp_path, max_cost_usd=0.12).flown == 0
-    assert evaluate(smoke, flaky, out=tmp_path, max_cost_usd=1.0).finished == 6
+    assert evaluate(smoke, flaky, out=tmp_path, limits=Limits(cost_usd=0.12)).flown == 0
+    assert evaluate(smoke, flaky, out=tmp_path, limits=Limits(cost_usd=1.0)).finished == 6
 
 
 def test_a_defect_of_the_agents_is_one_line_with_its_place(smoke, tmp_path):
     with pytest.raises(
         AerialDojoError, match=rf"agent {HERE}:Broken failed at task .*KeyError at {HERE}.py:\d+: 'map'"
     ):
-        evaluate(smoke, job(f"{HERE}:Broken", limit=2), out=tmp_path)
+        evaluate(smoke, job(f"{HERE}:Broken", limit=2, tolerate=False), out=tmp_path)
     assert not runs(tmp_path)
 
 

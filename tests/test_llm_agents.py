@@ -14,14 +14,15 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
-from llm_server import MOVE, Cut, Drip, Endless, Hang, Raw, Say, Service, Status, serving
+from llm_server import MOVE, Call, Cut, Drip, Endless, Filtered, Hang, Raw, Say, Service, Status, serving
 
-from aerialdojo_gen.benchmark.agents import AgentUnavailable, InvalidAnswer, load_agent
+from aerialdojo_gen.benchmark.agents import AgentUnavailable, InvalidAnswer, ServiceDown, load_agent
 from aerialdojo_gen.benchmark.goal import Goal, Observation, Rules
-from aerialdojo_gen.benchmark.llm import service as http
+from aerialdojo_gen.benchmark.llm import service as services
 from aerialdojo_gen.benchmark.llm.agent import LanguageModelAgent
 from aerialdojo_gen.benchmark.llm.answer import parse_answer
-from aerialdojo_gen.errors import UsageError
+from aerialdojo_gen.benchmark.llm.http import retry_after_s
+from aerialdojo_gen.errors import AerialDojoError, UsageError
 from aerialdojo_gen.schemas import ACTION_NAMES, STOP
 
 KEY = "sk-test-51f0c1e7a9b24d6e8f30"
@@ -128,7 +129,7 @@ def test_what_is_sent_follows_the_options(protocol: str) -> None:
     with serving(Say(MOVE)) as service:
         views = ("front", "down")
         agent = agent_of(
-            protocol, service, views="front,down", depth=False, image_size_px=32, history=2, history_images=1,
+            protocol, service, views="front,down", depth=False, image_size_px=32, history=2,
             max_tokens=99, extra_body={"seed": 7},
         )  # fmt: skip
         assert (agent.sensors.views, agent.sensors.depth, agent.sensors.width) == (views, False, 32)
@@ -185,33 +186,48 @@ def test_without_counts_or_prices_there_is_no_cost(protocol: str) -> None:
     assert usage.input_tokens == (None if protocol == "openai" else 7)
 
 
+LARGE = b'{"choices": [], "usage": {"prompt_tokens": ' + b"9" * 5_000 + b"}}"
+DEEP = b'{"a":' * 100_000 + b"1" + b"}" * 100_000
+TOO_LONG = "This model's maximum context length is 4096 tokens"
+# What the server does; what is said of it, its kind, and how long the service asks to wait.
 FAILURES = {
-    "429": (Status(429, "slow down", {"retry-after": "7"}), r"HTTP 429: slow down", 7.0),
-    "500": (Status(500), r"HTTP 500: something is wrong", None),
-    "503": (Status(503, "later", {"retry-after": "0.5"}), r"HTTP 503: later", 0.5),
-    "529": (Status(529, "overloaded"), r"HTTP 529: overloaded", None),
-    "cut": (Cut(), r"http://127\.0\.0\.1:\d+.*: \w+", None),
-    "hang": (Hang(), r"no answer within 0\.4 s", None),
-    "drip": (Drip(), r"not complete after 0\.4 s", None),
-    "huge": (Endless(), r"larger than 4 MiB", None),
-    "huge error": (Endless(500), r"larger than 4 MiB", None),
-    "no json": (Raw(b"<html>hello</html>", "text/html"), r"base_url right", None),
-    "broken json": (Raw(b'{"choices": ['), r"its answer is no JSON", None),
-    "empty": (Raw(b"{}"), r"base_url right", None),
-    "other json": (Raw(b'{"choices": null, "content": null}'), r"base_url right", None),
+    "429": (Status(429, "slow down", {"retry-after": "7"}), r"HTTP 429: slow down", "rate limit", 7.0),
+    "500": (Status(500), r"HTTP 500: something is wrong", "server error", None),
+    "503": (Status(503, "later", {"retry-after": "0.5"}), r"HTTP 503: later", "server error", 0.5),
+    "529": (Status(529, "overloaded"), r"HTTP 529: overloaded", "server error", None),
+    "cut": (Cut(), r"http://127\.0\.0\.1:\d+.*: \w+", "connection lost", None),
+    "hang": (Hang(), r"no answer within 0\.4 s", "time-out", None),
+    "drip": (Drip(), r"not complete after 0\.4 s", "time-out", None),
+    "huge": (Endless(), r"larger than 4 MiB", "malformed answer", None),
+    "huge error": (Endless(500), r"larger than 4 MiB", "malformed answer", None),
+    "no json": (Raw(b"<html>hello</html>", "text/html"), r"base_url right.*hello", "malformed answer", None),
+    "broken json": (Raw(b'{"choices": ['), r"its answer is no JSON", "malformed answer", None),
+    "large number": (Raw(LARGE), r"its answer is no JSON", "malformed answer", None),
+    "deep json": (Raw(DEEP), r"its answer is no JSON", "malformed answer", None),
+    "empty": (Raw(b"{}"), r"base_url right", "malformed answer", None),
+    "other json": (Raw(b'{"choices": null, "content": null}'), r"base_url right", "malformed answer", None),
+    "choices no list": (Raw(b'{"choices": {"0": 1}, "content": {}}'), r"base_url right", "malformed answer", None),
+    "400": (Status(400, "bad picture"), r"HTTP 400: bad picture", "bad request", None),
+    "filtered": (Status(400, "no", {}, "content_filter"), r"HTTP 400: no", "content filter", None),
+    "too long": (Status(400, TOO_LONG), r"maximum context", "context too long", None),
+    "413": (Status(413, "large"), r"HTTP 413", "context too long", None),
+    "422": (Status(422, "what"), r"HTTP 422: what", "bad request", None),
+    "404 of a picture": (Status(404, "the image was not found"), r"HTTP 404", "not found", None),
 }
+WITHOUT_AGAIN = ("malformed answer", "bad request", "content filter", "context too long", "not found")
 
 
 @pytest.mark.parametrize("protocol", PROTOCOLS)
 @pytest.mark.parametrize("name", FAILURES)
 def test_a_failure_of_the_service_is_no_failure_of_the_agent(protocol: str, name: str) -> None:
-    act, message, retry_after_s = FAILURES[name]
+    act, message, kind, asked_s = FAILURES[name]
     with serving(act) as service:
         slow = {"timeout_s": 0.4} if name in ("hang", "drip") else {}
         agent = begun(protocol, service, **slow)
         with pytest.raises(AgentUnavailable, match=message) as failure:
             agent.act(observation())
-        assert failure.value.retry_after_s == retry_after_s
+        assert failure.value.retry_after_s == asked_s
+        assert (failure.value.kind, failure.value.again) == (kind, kind not in WITHOUT_AGAIN)
         assert len(service.requests) == 1, "the package tried again by itself"
         said = "".join(traceback.format_exception(failure.value)) + repr(failure.value)
         assert KEY not in said
@@ -219,18 +235,95 @@ def test_a_failure_of_the_service_is_no_failure_of_the_agent(protocol: str, name
 
 
 @pytest.mark.parametrize("protocol", PROTOCOLS)
-def test_a_service_that_is_not_there_is_unavailable(protocol: str) -> None:
+def test_a_service_that_is_not_there_ends_the_run(protocol: str) -> None:
     with serving() as service:
         pass
     agent = begun(protocol, service)
-    with pytest.raises(AgentUnavailable, match=r"refused"):
+    with pytest.raises(ServiceDown, match=r"refused.*is the service there"):
         agent.act(observation())
+    nowhere = agent_of(protocol, service, base_url="http://no-such-host.invalid/v1")
+    with pytest.raises(ServiceDown, match=r"no-such-host\.invalid.*is the service there"):
+        nowhere.check()
+
+
+@pytest.mark.parametrize("protocol", PROTOCOLS)
+def test_an_answer_that_the_filter_took_is_the_services(protocol: str) -> None:
+    with serving(Filtered()) as service:
+        agent = begun(protocol, service)
+        error = AgentUnavailable if protocol == "openai" else InvalidAnswer
+        with pytest.raises(error):
+            agent.act(observation())
+
+
+@pytest.mark.parametrize("protocol", PROTOCOLS)
+def test_half_a_surrogate_pair_goes_nowhere(protocol: str) -> None:
+    with serving(Say("\ud800 lost"), Say(MOVE)) as service:
+        agent = begun(protocol, service)
+        assert agent.act(observation()) == FORWARD_3
+        # It was shown again for repair.
+        assert "lost" in json.dumps(service.requests[1]["body"])
+    bad = Raw(b'{"choices": [{"message": {"content": "x"}}], "usage": {"prompt_tokens": 1e400}}')
+    with serving(bad) as service:
+        agent = begun("openai", service)
+        with pytest.raises(InvalidAnswer):
+            agent.act(observation())
+        assert agent.usage().input_tokens is None, "that is no count"
+
+
+@pytest.mark.parametrize("protocol", PROTOCOLS)
+@pytest.mark.parametrize("form", ["json", "tool", "text"])
+def test_the_answer_is_asked_for_as_the_option_says(protocol: str, form: str) -> None:
+    answer = '{"thought": "so", "action": "MoveUp"}'
+    with serving(Call(answer) if form == "tool" else Say(answer)) as service:
+        agent = begun(protocol, service, answer=form, actions="eight", climb_m=2)
+        assert agent.act(observation()) == ACTION_NAMES.index("MoveUp2")
+        body = service.requests[0]["body"]
+    schema = agent.options.action_set.schema()
+    assert schema["properties"]["action"]["enum"][0] == "Stop"
+    asked = {
+        ("openai", "json"): lambda: body["response_format"]["json_schema"]["schema"],
+        ("openai", "tool"): lambda: body["tools"][0]["function"]["parameters"],
+        ("anthropic", "json"): lambda: body["output_config"]["format"]["schema"],
+        ("anthropic", "tool"): lambda: body["tools"][0]["input_schema"],
+    }
+    if form == "text":
+        assert not {"response_format", "tools", "output_config"} & set(body)
+    else:
+        assert asked[protocol, form]() == schema
+
+
+@pytest.mark.parametrize("protocol", PROTOCOLS)
+def test_the_check_settles_how_answers_are_asked_for(protocol: str) -> None:
+    def only(*refused: str) -> Any:
+        return lambda body: Status(400, "unknown field") if set(refused) & set(body) else None
+
+    with serving() as service:
+        first = {"openai": "json", "anthropic": "tool"}[protocol]
+        agent = agent_of(protocol, service)
+        assert agent.check().endswith(f"by {first}")
+        assert agent.settled() == {"answer": first}
+        service.refuses = only("response_format", "output_config", "tools")
+        agent = agent_of(protocol, service)
+        assert "by text" in agent.check()
+        assert agent.used_options()["answer"] == "text"
+        assert agent.used_options()["history_images"] == 1
+        # What was asked for by name is not exchanged for something else.
+        service.refuses = only("tools")
+        with pytest.raises(AerialDojoError, match=r"checked before the run, nothing flown: .*HTTP 400"):
+            agent_of(protocol, service, answer="tool").check()
+        service.refuses = lambda _: Status(503, "loading")
+        with pytest.raises(AerialDojoError, match="HTTP 503: loading"):
+            agent_of(protocol, service).check()
+        service.refuses = lambda _: Say("Hello!", usage=None if protocol == "openai" else (1, 1))
+        agent = agent_of(protocol, service)
+        assert "by text" in agent.check(), "a service that ignores the form is asked by text"
+        assert agent.tells_tokens == (protocol == "anthropic")
 
 
 @pytest.mark.parametrize("protocol", PROTOCOLS)
 def test_requests_are_sent_again_as_often_as_asked(protocol: str, monkeypatch: pytest.MonkeyPatch) -> None:
     waits: list[float] = []
-    monkeypatch.setattr(http.time, "sleep", waits.append)
+    monkeypatch.setattr(services.time, "sleep", waits.append)
     with serving(Status(500), Status(429, "m", {"retry-after": "11"}), Status(502), Say(MOVE)) as service:
         agent = begun(protocol, service, request_retries=3)
         assert agent.act(observation()) == FORWARD_3
@@ -245,10 +338,15 @@ def test_requests_are_sent_again_as_often_as_asked(protocol: str, monkeypatch: p
 
 
 @pytest.mark.parametrize("protocol", PROTOCOLS)
-@pytest.mark.parametrize("code", [400, 401, 403, 404, 422, 307])
-def test_a_refusal_for_good_ends_the_run_with_one_line(protocol: str, code: int) -> None:
+@pytest.mark.parametrize(
+    ("code", "error"),
+    [(401, "x"), (402, "x"), (403, "x"), (404, "x"), (404, "model_not_found"), (307, "x"),
+     (429, "insufficient_quota"), (400, "api_key_invalid")],
+)  # fmt: skip
+def test_a_refusal_for_good_ends_the_run_with_one_line(protocol: str, code: int, error: str) -> None:
     # 307: a redirect would carry the key to wherever it points.
-    with serving(Status(code, "no such thing", {"location": "http://127.0.0.1:1/elsewhere"})) as service:
+    location = {"location": "http://127.0.0.1:1/elsewhere"}
+    with serving(Status(code, "no such thing", location, error)) as service:
         agent = begun(protocol, service, request_retries=3)
         with pytest.raises(UsageError, match=rf"HTTP {code}: .*no such thing \(you sent .*\[key\]\)") as failure:
             agent.act(observation())
@@ -294,6 +392,9 @@ def test_keys_come_from_the_environment(protocol: str, monkeypatch: pytest.Monke
     ("options", "message"),
     [
         ({}, "model"),
+        ({"model": "m", "extra_body": "sk-live-0123456789abcdef0123"}, r"extra_body = .*\[redacted\]"),
+        ({"model": "m", "move_m": 2}, "move_m"),
+        ({"model": "m", "base_url": "http://[::1/v1"}, "base_url.*not a URL"),
         ({"model": "m", "modle": "x"}, "unknown key 'modle': did you mean 'model'"),
         ({"model": "m", "temperature": 3}, "temperature"),
         ({"model": "m", "views": "front,back"}, "views"),
@@ -310,12 +411,12 @@ def test_wrong_options_are_named_in_one_line(options: dict[str, Any], message: s
 
 
 def test_retry_after_is_read_in_both_of_its_forms() -> None:
-    assert http.retry_after_s({"retry-after": "12.5"}) == 12.5
+    assert retry_after_s({"retry-after": "12.5"}) == 12.5
     later = email.utils.format_datetime(email.utils.localtime().replace(microsecond=0), usegmt=False)
-    assert http.retry_after_s({"retry-after": later}) == pytest.approx(0.0, abs=1.0)
-    assert http.retry_after_s({"retry-after": "-3"}) == 0.0
+    assert retry_after_s({"retry-after": later}) == pytest.approx(0.0, abs=1.0)
+    assert retry_after_s({"retry-after": "-3"}) == 0.0
     for nonsense in ("", "soon", "inf", "nan"):
-        assert http.retry_after_s({"retry-after": nonsense}) is None
+        assert retry_after_s({"retry-after": nonsense}) is None
 
 
 @pytest.fixture

@@ -14,16 +14,18 @@ from hypothesis.extra.numpy import arrays
 
 from aerialdojo_gen.benchmark.agents.base import InvalidAnswer
 from aerialdojo_gen.benchmark.goal import Goal, Observation, Rules, Sensors
+from aerialdojo_gen.benchmark.llm.actions import SIXTEEN, eight
 from aerialdojo_gen.benchmark.llm.answer import parse_answer
 from aerialdojo_gen.benchmark.llm.images import Picture, colour_picture, depth_picture
-from aerialdojo_gen.benchmark.llm.prompt import CHOICES, Turn, goal_text, step_text, system_prompt
+from aerialdojo_gen.benchmark.llm.prompt import Sight, Turn, goal_text, repair_text, step_text, system_prompt
 from aerialdojo_gen.schemas import ACTION_NAMES, APPROACH
 
 
 @pytest.mark.parametrize("k", range(16))
 def test_every_action_is_read_and_approach_is_none(k: int) -> None:
-    assert parse_answer(json.dumps({"thought": "so", "action": ACTION_NAMES[k]})).action_id == k
-    assert ACTION_NAMES[APPROACH] not in CHOICES
+    said = parse_answer(json.dumps({"thought": "so", "action": ACTION_NAMES[k]}))
+    assert SIXTEEN.ids[said.action] == k
+    assert ACTION_NAMES[APPROACH] not in SIXTEEN.names
 
 
 @pytest.mark.parametrize(
@@ -62,12 +64,22 @@ def test_wrappings_that_are_not_part_of_the_answer_come_off(text: str) -> None:
         ('{"action": "Stop", "confidence": 1}', "confidence: Extra inputs are not permitted"),
         ('{"action": "Stop", "action": "MoveUp1"}', "a key stands twice"),
         ("[" * 10_000, "not one JSON object"),
+        ('{"a":' * 3_000 + "1" + "}" * 3_000, "not one JSON object|a: Extra inputs"),
+        ('{"thought": ' + "9" * 5_000 + ', "action": "Stop"}', "not one JSON object .*digits"),
+        ('{"thought": 1e999, "action": "Stop"}', "thought: Input should be a valid string"),
+        ('{"thought": NaN, "action": "Stop"}', "NaN is no number of JSON"),
+        ('{"thought": -Infinity, "action": "Stop"}', "Infinity is no number of JSON"),
+        ('{"thought": "\\ud800", "action": "Stop"}', "half of a surrogate pair|valid string"),
+        ('{"action": "\\udfff"}', "surrogate|none of the actions|valid string"),
+        ('{"\\ud800": 1, "action": "Stop"}', "Extra inputs|surrogate|valid string"),
         (" " * 20_001, "20,001 characters"),
     ],
 )
 def test_anything_else_is_refused_with_the_reason(text: str, why: str) -> None:
-    with pytest.raises(InvalidAnswer, match=why.replace("(", r"\(")):
+    with pytest.raises(InvalidAnswer, match=why.replace("(", r"\(")) as refused:
         parse_answer(text)
+    # The reason goes back to the model, over HTTP.
+    assert len(repair_text(str(refused.value)).encode("utf-8")) < 2_000
 
 
 @given(st.text(max_size=60) | st.recursive(st.none() | st.text(), st.lists, max_leaves=5).map(json.dumps))
@@ -77,13 +89,13 @@ def test_no_text_is_guessed_at(text: str) -> None:
 
 
 RULES = Rules(180, 3.0, 0.25, 0.25, Sensors(("front",)))
-SEMANTIC = Goal("semantic", "red van", "clock tower", "north-east", "A red van by a hedge.", None, RULES)
-IMAGE = Goal("image", "red van", "clock tower", "north-east", None, np.zeros((4, 4, 3), np.uint8), RULES)
+SEMANTIC = Goal("semantic", "red van", "clock tower", "northeast", "A red van by a hedge.", None, RULES)
+IMAGE = Goal("image", "red van", "clock tower", "northeast", None, np.zeros((4, 4, 3), np.uint8), RULES)
 
 
 def test_the_prompt_holds_what_appendix_a_asks_for() -> None:
-    told = system_prompt(SEMANTIC, ("front",), True, 50.0, 90.0)
-    for name in CHOICES:
+    told = system_prompt(SEMANTIC, Sight(past_pictures=1))
+    for name in SIXTEEN.names:
         assert f"- {name}: " in told
     assert "fly 5 m forward" in told
     assert "turn 15° to the left" in told
@@ -92,18 +104,38 @@ def test_the_prompt_holds_what_appendix_a_asks_for() -> None:
     assert "within 3 m" in told
     assert "budget of 180 actions" in told
     assert "black at 0 m to white at 50 m" in told
+    assert "640 x 640 pixels" in told
+    assert "picture of the step before is shown again" in told
+    assert "few metres" not in told
+    assert json.dumps(SIXTEEN.schema()) in told
     assert "left (looks" not in told
     assert "Approach" not in told
-    assert "depth" not in system_prompt(SEMANTIC, ("front",), False, 50.0, 90.0)
+    assert "depth" not in system_prompt(SEMANTIC, Sight(depth=False))
+    assert "shown again" not in system_prompt(SEMANTIC, Sight())
     # Its own example of an answer is one, once the blanks are filled.
     example = told.splitlines()[-1].replace("<one name from the list above>", "TurnLeft15")
     assert parse_answer(example).action == "TurnLeft15"
 
 
+def test_the_papers_eight_actions_have_common_magnitudes() -> None:
+    actions = eight(5, 2)
+    assert {name: ACTION_NAMES[k] for name, k in actions.ids.items()} == {
+        "Stop": "Stop", "MoveForward": "MoveForward5", "MoveLeft": "MoveLeft5", "MoveRight": "MoveRight5",
+        "MoveUp": "MoveUp2", "MoveDown": "MoveDown2", "TurnLeft": "TurnLeft15", "TurnRight": "TurnRight15",
+    }  # fmt: skip
+    told = system_prompt(SEMANTIC, Sight(), actions)
+    assert "- MoveForward: fly 5 m forward" in told
+    assert "MoveForward5" not in told
+    assert parse_answer('{"action": "MoveUp"}', actions.names).action == "MoveUp"
+    with pytest.raises(InvalidAnswer, match="'MoveUp2' is none of the actions"):
+        parse_answer('{"action": "MoveUp2"}', actions.names)
+    assert 'Call the tool "act"' in system_prompt(SEMANTIC, Sight(), actions, "tool")
+
+
 def test_the_goal_is_told_as_its_modality_has_it() -> None:
     assert goal_text(SEMANTIC).endswith("Description: A red van by a hedge.")
     for goal in (SEMANTIC, IMAGE):
-        assert "TARGET: red van. It lies north-east of the landmark nearest to it: clock tower." in goal_text(goal)
+        assert "TARGET: red van. It lies northeast of the landmark nearest to it: clock tower." in goal_text(goal)
     assert "None" not in goal_text(IMAGE)
 
 

@@ -19,6 +19,8 @@ from aerialdojo_gen.schemas import DIRECTIONS
 RIVAL_SLACK = 1.35
 
 _TOKEN = re.compile(r"[a-z0-9']+|[,.;:!?()]")
+# A corner of the compass is one word, as the tables spell it; people write it in two.
+_CORNER = re.compile(r"\b(north|south)[- ](east|west)")
 _STOPS = frozenset(".;:!?")
 _VERBS = frozenset(
     {
@@ -64,6 +66,10 @@ def _relations() -> dict[str, str]:
 
 
 RELATIONS: Mapping[str, str] = _relations()
+
+
+def _tokens(text: str) -> list[str]:
+    return _TOKEN.findall(_CORNER.sub(r"\1\2", text.lower()))
 
 
 @dataclass(frozen=True)
@@ -196,7 +202,7 @@ class Lexicon:
         return self._things.get(name, frozenset())
 
     def _add(self, phrase: str, kind: str, meaning: str) -> None:
-        tokens = tuple(_TOKEN.findall(phrase.lower()))
+        tokens = tuple(_tokens(phrase))
         if tokens:
             self._phrases[tokens] = (kind, meaning)
 
@@ -215,7 +221,7 @@ class Lexicon:
         Reading
             What the text says of it.
         """
-        tokens = _TOKEN.findall(text.lower())
+        tokens = _tokens(text)
         state, at = _State(), 0
         while at < len(tokens):
             if tokens[at] in _STOPS or (tokens[at] in ",()" and state.first is None):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import weakref
 
@@ -45,6 +46,13 @@ def _renderer(scene: Scene, name: str) -> Renderer:
     if renderer.name == "gl":
         _drawn_by_gl[:] = [os.getpid()]
     return renderer
+
+
+def forget_renderers() -> None:
+    """Close what draws, as far as it lets itself be closed; the next picture opens it anew."""
+    while _renderers:
+        with contextlib.suppress(Exception):
+            _renderers.pop()[2].close()
 
 
 def look(

@@ -11,6 +11,7 @@ import hashlib
 import json
 import shutil
 import time
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field
@@ -23,10 +24,14 @@ import pyarrow.compute as pc
 from aerialdojo_gen import store
 from aerialdojo_gen.atomic import atomic_file
 from aerialdojo_gen.benchmark import episodes, journal
+from aerialdojo_gen.benchmark.agents import ServiceDown
 from aerialdojo_gen.benchmark.flying_code import flying_code
 from aerialdojo_gen.benchmark.goal import Sensors
+from aerialdojo_gen.benchmark.limits import Limits, Tally
+from aerialdojo_gen.benchmark.preflight import checked
+from aerialdojo_gen.benchmark.secrets import Secrets
 from aerialdojo_gen.benchmark.tasks import Selection, select
-from aerialdojo_gen.benchmark.worker import Finished, Unit
+from aerialdojo_gen.benchmark.worker import Conditions, Finished, Unit
 from aerialdojo_gen.benchmark.workers import fly_units
 from aerialdojo_gen.bounded import read_json
 from aerialdojo_gen.config import Embodiment
@@ -47,7 +52,7 @@ class Evaluation:
     agent : str
         Name of the agent, or ``package.module:Class``.
     options : dict
-        The agent's keyword arguments; JSON, and no secrets.
+        The agent's keyword arguments, JSON. Secrets among them are kept out of the log.
     selection : Selection
         Which tasks.
     sensors : Sensors or None
@@ -56,10 +61,12 @@ class Evaluation:
         The body.
     renderer : str
         As for `aerialdojo_gen.rendering.backend.open_renderer`; the log of an agent that looks depends on it.
-    attempts : int
-        How often an episode is begun before it is logged as failed.
-    pause_s : float
-        Before the second attempt, doubled each time.
+    conditions : Conditions
+        What a worker bears.
+    requests_per_minute : float or None
+        Of an agent that asks a service, all workers together.
+    used : dict or None
+        The options as the agent says that it uses them, for the log.
     """
 
     run: str = "default"
@@ -69,24 +76,29 @@ class Evaluation:
     sensors: Sensors | None = None
     embodiment: Embodiment = field(default_factory=Embodiment)
     renderer: str = "auto"
-    attempts: int = 5
-    pause_s: float = 1.0
+    conditions: Conditions = field(default_factory=Conditions)
+    requests_per_minute: float | None = None
+    used: Mapping[str, Any] | None = None
 
     def identity(self) -> dict[str, str]:
         """Columns of `episodes` that name the run and its agent."""
-        options = json.dumps(dict(self.options), sort_keys=True)
+        options = json.dumps(self._logged(self.options if self.used is None else self.used), sort_keys=True)
         return {"run_id": self.run, "agent": self.agent, "agent_options": options}
 
     def settings(self) -> dict[str, Any]:
-        """What must not change within a run, as JSON; attempts and pauses may."""
+        """What must not change within a run, as JSON without secrets; attempts, pauses and the pace may."""
         return {
             "agent": self.agent,
-            "options": dict(self.options),
+            "options": self._logged(self.options),
             **asdict(self.selection),
             "sensors": asdict(self.sensors) if self.sensors else None,
             "renderer": self.renderer,
             "embodiment": self.embodiment.model_dump(),
         }
+
+    def _logged(self, options: Mapping[str, Any]) -> dict[str, Any]:
+        cleaned: dict[str, Any] = Secrets(self.options).options(options)
+        return cleaned
 
 
 @dataclass(frozen=True)
@@ -103,8 +115,14 @@ class Outcome:
         Episodes and actions of this call.
     cost_usd : float
         Of all calls for this run.
+    tokens : int
+        Both ways, of all calls for this run.
     seconds : float
         Of this call.
+    stopped : str
+        Why it ended early: too many failures in a row; empty otherwise.
+    failures : tuple of str
+        What failed: how often, of which kind, and why the first did.
     """
 
     episodes: int
@@ -113,17 +131,31 @@ class Outcome:
     flown: int
     actions: int
     cost_usd: float
+    tokens: int
     seconds: float
+    stopped: str = ""
+    failures: tuple[str, ...] = ()
 
     def __str__(self) -> str:
         """One line."""
         rate = f", {self.actions / self.seconds:,.0f} actions/s" if self.flown else ""
         cost = f"; {self.cost_usd:.2f} USD" if self.cost_usd else ""
-        failed = f", {self.failed:,} failed for reasons outside the agent" if self.failed else ""
+        tokens = f"; {self.tokens:,} tokens" if self.tokens else ""
+        failed = f", {self.failed:,} failed" if self.failed else ""
         return (
             f"{self.finished:,} of {self.episodes:,} episodes finished{failed}; "
-            f"{self.flown:,} flown now in {self.seconds:.1f} s{rate}{cost}"
+            f"{self.flown:,} flown now in {self.seconds:.1f} s{rate}{tokens}{cost}"
         )
+
+    @property
+    def last_line(self) -> str:
+        """What to know and do about failures; empty where there are none."""
+        if not self.failures:
+            return self.stopped
+        left = self.episodes - self.finished - self.failed
+        rest = f"; {left:,} not begun, which the same command goes on with" if left else ""
+        what = f"{self.failed:,} failed, which count as no episodes: {'; '.join(self.failures)}"
+        return " ".join(filter(None, (self.stopped, f"{what}. --rerun-failed flies them again{rest}")))
 
 
 def evaluate(
@@ -134,7 +166,7 @@ def evaluate(
     workers: int = 1,
     rerun_failed: bool = False,
     restart: bool = False,
-    max_cost_usd: float | None = None,
+    limits: Limits | None = None,
     reporter: Reporter | None = None,
 ) -> Outcome:
     """Fly an agent through the tasks of a selection; `aerialdojo-gen evaluate` in the library.
@@ -149,11 +181,11 @@ def evaluate(
     workers : int
         Processes; with 1 everything runs in this one.
     rerun_failed : bool
-        Fly those again that failed for reasons outside the agent.
+        Fly exactly those again that failed for reasons outside the agent.
     restart : bool
         Drop what an earlier run of the name has written.
-    max_cost_usd : float, optional
-        Begin no episode once so much is spent, over all calls for the run.
+    limits : Limits, optional
+        What the run may spend and bear.
     reporter : Reporter, optional
         Shows progress.
 
@@ -171,6 +203,7 @@ def evaluate(
         Finished episodes are kept.
     """
     started = time.monotonic()
+    limits = limits or Limits()
     data, out = data.absolute(), (out or data).absolute()
     reporter = reporter or Reporter(quiet=True)
     folder = out / "runs" / store.check_run_name(evaluation.run)
@@ -182,29 +215,39 @@ def evaluate(
         run.claim()
         run.bring_in()
         todo = run.todo(rerun_failed)
-        spent = run.spent()
-        flown = actions = 0
+        if todo.num_rows:
+            evaluation = checked(evaluation, limits, reporter)
+        tally = Tally(limits, *run.spent())
         with reporter.bar(f"{evaluation.agent} ({evaluation.run})", todo.num_rows, "episodes") as bar:
 
             def tell(finished: Finished) -> None:
-                nonlocal spent, flown, actions
-                spent += finished.cost_usd
-                flown += finished.episodes
-                actions += finished.actions
-                bar.advance(finished.episodes)
+                tally.add(finished)
+                # A worker that has nothing to tell says so too, and a rate of nothing is no rate.
+                if finished.episodes:
+                    bar.advance(finished.episodes)
 
             def stopped() -> bool:
                 interrupts.check()
-                return max_cost_usd is not None and spent >= max_cost_usd
+                return bool(tally.spent or tally.failing)
 
-            with run.kept():
-                units = run.units(todo, workers)
-                for scene in fly_units(data, evaluation, units, workers, tell, stopped):
-                    run.bring_in(scene)
-        if stopped() and len(run.todo(False)):
-            reporter.line(f"stopped at --max-cost {max_cost_usd:g}: a higher one goes on from here")
+            try:
+                with run.kept():
+                    units = run.units(todo, workers)
+                    for scene in fly_units(data, evaluation, units, workers, tell, stopped):
+                        run.bring_in(scene)
+            except ServiceDown as error:
+                raise ServiceDown(f"{error} Finished episodes are kept: the same command goes on from here") from None
+        if tally.spent and len(run.todo(False)):
+            reporter.line(f"stopped at {tally.spent}: a higher one goes on from here")
         finished, failed = run.counts()
-    return Outcome(rows.num_rows, finished, failed, flown, actions, spent, time.monotonic() - started)
+    why = ""
+    if tally.failing is not None:
+        why = f"stopped after {limits.failures_in_row} failures in a row of one kind ({tally.failing.kind})."
+    flown, seconds = tally.episodes, time.monotonic() - started
+    told = run.failures()
+    return Outcome(
+        rows.num_rows, finished, failed, flown, tally.actions, tally.cost_usd, tally.tokens, seconds, why, told
+    )
 
 
 class _Run:
@@ -277,26 +320,48 @@ class _Run:
             self.bring_in()
 
     def todo(self, rerun_failed: bool) -> pa.Table:
-        """Rows that are still to be flown."""
-        done = self._ids("episodes") + ([] if rerun_failed else self._ids("failures"))
-        return self._rows.filter(pc.invert(pc.is_in(self._rows["task_id"], pa.array(done, pa.string()))))
+        """Rows that are still to be flown, or exactly those that failed."""
+        ids = self._rows["task_id"]
+        if rerun_failed:
+            return self._rows.filter(pc.is_in(ids, pa.array(self._ids("failures"), pa.string())))
+        done = self._ids("episodes") + self._ids("failures")
+        return self._rows.filter(pc.invert(pc.is_in(ids, pa.array(done, pa.string()))))
 
     def counts(self) -> tuple[int, int]:
         """Episodes in the tables: finished, failed."""
         return len(self._ids("episodes")), len(self._ids("failures"))
 
-    def spent(self) -> float:
-        """US dollars, so far."""
-        return sum(
-            pc.sum(store.read_scene(self._out, table, scene, ["cost_usd"], self._name)["cost_usd"]).as_py() or 0.0
-            for scene in episodes.run_scenes(self._out, self._name)
+    def failures(self) -> tuple[str, ...]:
+        """Say what failed, the most frequent kind first."""
+        rows = [row for scene in self._scenes_written() for row in self._read("failures", scene, ["kind", "reason"])]
+        first: dict[str, str] = {}
+        for row in rows:
+            first.setdefault(row["kind"], row["reason"])
+        return tuple(f"{n} × {k} ({first[k]})" for k, n in Counter(row["kind"] for row in rows).most_common())
+
+    def spent(self) -> tuple[float, int]:
+        """US dollars and tokens, so far."""
+        columns = ["cost_usd", "input_tokens", "output_tokens"]
+        rows = [
+            row
+            for scene in self._scenes_written()
             for table in ("episodes", "failures")
-        )
+            for row in self._read(table, scene, columns)
+        ]
+        tokens = sum((row["input_tokens"] or 0) + (row["output_tokens"] or 0) for row in rows)
+        return sum(row["cost_usd"] or 0.0 for row in rows), tokens
+
+    def _scenes_written(self) -> list[str]:
+        return episodes.run_scenes(self._out, self._name)
+
+    def _read(self, table: str, scene: str, columns: list[str]) -> list[dict[str, Any]]:
+        rows: list[dict[str, Any]] = store.read_scene(self._out, table, scene, columns, self._name).to_pylist()
+        return rows
 
     def _ids(self, table: str) -> list[str]:
         return [
             task_id
-            for scene in episodes.run_scenes(self._out, self._name)
+            for scene in self._scenes_written()
             for task_id in store.read_scene(self._out, table, scene, ["task_id"], self._name)["task_id"].to_pylist()
         ]
 

@@ -2,30 +2,30 @@
 
 from __future__ import annotations
 
-import operator
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import pyarrow as pa
 
-from aerialdojo_gen.benchmark.agents import Agent, AgentUnavailable, InvalidAnswer, Usage
+from aerialdojo_gen.benchmark import billing
+from aerialdojo_gen.benchmark.agents import Agent, AgentUnavailable, Usage
+from aerialdojo_gen.benchmark.agents.load import place
 from aerialdojo_gen.benchmark.agents.simple import OracleAgent
+from aerialdojo_gen.benchmark.asking import AgentError, Asked
+from aerialdojo_gen.benchmark.eyes import forget_renderers
 from aerialdojo_gen.benchmark.flight import Flight
-from aerialdojo_gen.benchmark.goal import N_ACTIONS, Observation
+from aerialdojo_gen.benchmark.goal import Observation
 from aerialdojo_gen.benchmark.journal import Journal
+from aerialdojo_gen.benchmark.secrets import Secrets
 from aerialdojo_gen.benchmark.tasks import Task, read_tasks, reference_actions
-from aerialdojo_gen.errors import AerialDojoError
+from aerialdojo_gen.errors import RenderError
 from aerialdojo_gen.schemas import STEPS
 
 _LONGEST_PAUSE_S = 600.0
 _COLUMNS = [name for name in STEPS.schema.names if name not in ("run_id", "task_id", "scene", "step")]
-
-
-class AgentError(AerialDojoError):
-    """An agent raised what it may not: a defect of the agent's."""
 
 
 @dataclass(frozen=True)
@@ -47,18 +47,65 @@ class Unit:
 
 
 @dataclass(frozen=True)
+class Failed:
+    """An episode that failed for reasons outside the agent's choices."""
+
+    kind: str
+    reason: str
+
+
+@dataclass(frozen=True)
 class Finished:
-    """What was finished, for progress and for the bill; sums add up."""
+    """What was finished, for progress and for the bill; sums add up.
+
+    Attributes
+    ----------
+    episodes, actions : int
+        Failed ones too.
+    cost_usd : float
+    tokens : int
+    flown : int
+        Episodes that did not fail.
+    streak : tuple of Failed
+        Failures since the last episode that did not fail.
+    """
 
     episodes: int = 0
     actions: int = 0
     cost_usd: float = 0.0
+    tokens: int = 0
+    flown: int = 0
+    streak: tuple[Failed, ...] = ()
 
     def __add__(self, other: Finished) -> Finished:
-        """Add two counts."""
+        """Add what was finished later."""
         return Finished(
-            self.episodes + other.episodes, self.actions + other.actions, self.cost_usd + other.cost_usd
-        )  # fmt: skip
+            self.episodes + other.episodes,
+            self.actions + other.actions,
+            self.cost_usd + other.cost_usd,
+            self.tokens + other.tokens,
+            self.flown + other.flown,
+            other.streak if other.flown else self.streak + other.streak,
+        )
+
+
+@dataclass(frozen=True)
+class Conditions:
+    """What a worker bears.
+
+    Attributes
+    ----------
+    attempts : int
+        How often an episode is begun before it is logged as failed.
+    pause_s : float
+        Before the second attempt; doubled each time, unless the service says how long to wait.
+    tolerate : bool
+        Log an episode in which the agent failed in a way of its own, instead of ending the run.
+    """
+
+    attempts: int = 5
+    pause_s: float = 1.0
+    tolerate: bool = False
 
 
 class Worker:
@@ -71,17 +118,23 @@ class Worker:
     data : Path
     identity : dict
         Columns ``run_id``, ``agent`` and ``agent_options`` of `episodes`.
-    attempts : int
-        How often an episode is begun before it is logged as failed.
-    pause_s : float
-        Before the second attempt; doubled each time, unless the service says how long to wait.
+    conditions : Conditions
+    secrets : Secrets
+        Kept out of the log.
     """
 
     def __init__(
-        self, agent: Agent, flight: Flight, data: Path, identity: dict[str, str], attempts: int, pause_s: float
+        self,
+        agent: Agent,
+        flight: Flight,
+        data: Path,
+        identity: dict[str, str],
+        conditions: Conditions,
+        secrets: Secrets,
     ) -> None:
         self._agent, self._flight, self._data = agent, flight, data
-        self._identity, self._attempts, self._pause_s = identity, attempts, pause_s
+        self._identity, self._conditions, self._secrets = identity, conditions, secrets
+        self._asked = Asked(agent, identity["agent"], secrets, conditions.tolerate)
 
     def fly(self, unit: Unit, tell: Callable[[Finished], None], stopped: Callable[[], bool]) -> None:
         """Fly a unit's episodes, each into the journal when it is finished.
@@ -92,7 +145,7 @@ class Worker:
         tell : callable
             Called after each episode.
         stopped : callable
-            Asked before each; True ends the unit.
+            Asked before each, and while one waits to be tried again; True ends the unit.
 
         Raises
         ------
@@ -109,89 +162,94 @@ class Worker:
                     return
                 if isinstance(self._agent, OracleAgent):
                     self._agent.follow(actions[task.row["nav_id"]])
-                record, finished = self._finish(task)
-                journal.add(record)
-                tell(finished)
+                done = self._finish(task, stopped)
+                if done is None:
+                    return
+                journal.add(done[0])
+                tell(done[1])
 
-    def _finish(self, task: Task) -> tuple[dict[str, Any], Finished]:
-        """Fly one episode, again where something outside failed."""
+    def _finish(self, task: Task, stopped: Callable[[], bool]) -> tuple[dict[str, Any], Finished] | None:
+        """Fly one episode, again where something outside failed; None if the run is stopped meanwhile."""
         used: Usage | None = None
-        for attempt in range(1, self._attempts + 1):
+        attempt, failed = 0, Failed("", "")
+        while attempt < self._conditions.attempts:
+            attempt += 1
             try:
                 record = self._episode(task)
             except AgentUnavailable as error:
-                used = _sum(used, self._usage())
-                reason = " ".join(str(error).split())[:300]
-                if attempt < self._attempts:
-                    pause = (
-                        error.retry_after_s if error.retry_after_s is not None else self._pause_s * 2 ** (attempt - 1)
-                    )
-                    time.sleep(min(max(pause, 0.0), _LONGEST_PAUSE_S))
+                used = billing.sum_of(used, self._asked.usage())
+                failed = Failed(error.kind, self._line(error))
+                if not error.again:
+                    break
+                if attempt < self._conditions.attempts and not self._pause(attempt, error.retry_after_s, stopped):
+                    return None
                 continue
-            used = _sum(used, self._usage())
-            record["episode"] |= _bill(used)
-            record["timing"]["attempts"] = attempt
-            return record, Finished(1, record["episode"]["n_actions"], _cost(used))
-        key = {"run_id": self._identity["run_id"], "task_id": task.row["task_id"], "scene": task.row["scene"]}
-        failure = key | {"attempts": self._attempts, "reason": reason, "cost_usd": used.cost_usd if used else None}
-        return {"task_id": task.row["task_id"], "failure": failure}, Finished(1, 0, _cost(used))
+            except AgentError as error:
+                if not self._conditions.tolerate:
+                    raise
+                failed = Failed("agent error", self._line(error))
+                break
+            used = billing.sum_of(used, self._asked.usage())
+            record["episode"] |= billing.columns(used)
+            record["timing"] |= {"attempts": attempt} | billing.times(used)
+            actions = record["episode"]["n_actions"]
+            return record, Finished(1, actions, billing.cost(used), billing.tokens(used), 1)
+        row = {"attempts": attempt, "kind": failed.kind, "reason": failed.reason} | billing.columns(used)
+        record = {"task_id": task.row["task_id"], "failure": self._key(task) | row}
+        return record, Finished(1, 0, billing.cost(used), billing.tokens(used), 0, (failed,))
+
+    def _pause(self, attempt: int, asked_s: float | None, stopped: Callable[[], bool]) -> bool:
+        """Wait before the next attempt; False if the run is stopped meanwhile."""
+        seconds = asked_s if asked_s is not None else self._conditions.pause_s * 2 ** (attempt - 1)
+        until = time.monotonic() + min(max(seconds, 0.0), _LONGEST_PAUSE_S)
+        while (left := until - time.monotonic()) > 0.0:
+            if stopped():
+                return False
+            time.sleep(min(left, 0.2))
+        return True
+
+    def _line(self, error: Exception) -> str:
+        text = str(error).encode("utf-8", "replace").decode("utf-8")
+        return self._secrets.text(" ".join(text.split()))[:300]
+
+    def _key(self, task: Task) -> dict[str, Any]:
+        return {"run_id": self._identity["run_id"], "task_id": task.row["task_id"], "scene": task.row["scene"]}
 
     def _episode(self, task: Task) -> dict[str, Any]:
         started = time.perf_counter()
         thinking = 0.0
         episode = self._flight.begin(task)
-        agent = self._agent
-        answer_of: Callable[[], str | None] | None = getattr(agent, "answer", None)
+        asked = self._asked
         before = time.perf_counter()
-        self._ask(task, agent.reset, self._flight.goal)
+        asked.reset(task.row["task_id"], self._flight.goal)
         thinking += time.perf_counter() - before
         columns: dict[str, list[Any]] = {name: [] for name in _COLUMNS}
         while episode.termination is None:
-            observation = self._flight.observe()
+            observation = self._look()
             before = time.perf_counter()
-            action = self._choose(task, observation)
-            answer = answer_of() if answer_of is not None else None
+            action = asked.act(observation)
+            answer = asked.answer()
             thinking += time.perf_counter() - before
             episode.step(action)
             values = (action, episode.refused, *episode.position, episode.yaw_rad, episode.distance_m, answer)
             for name, value in zip(_COLUMNS, values, strict=True):
                 columns[name].append(value)
-        key = {"run_id": self._identity["run_id"], "task_id": task.row["task_id"], "scene": task.row["scene"]}
         seconds = {"wall_s": time.perf_counter() - started, "agent_s": thinking}
         return {
             "task_id": task.row["task_id"],
             "episode": self._row(task),
             "steps": columns,
-            "timing": key | seconds,
+            "timing": self._key(task) | seconds,
         }
 
-    def _choose(self, task: Task, observation: Observation) -> int | None:
+    def _look(self) -> Observation:
         try:
-            answer = self._ask(task, self._agent.act, observation)
-        except InvalidAnswer:
-            return None
-        if isinstance(answer, bool):
-            return None
-        try:
-            action = operator.index(answer)
-        except TypeError:
-            return None
-        return action if 0 <= action < N_ACTIONS else None
-
-    def _ask(self, task: Task, question: Callable[[Any], Any], about: Any) -> Any:
-        try:
-            return question(about)
-        except AerialDojoError:
-            raise
+            return self._flight.observe()
         except Exception as error:
-            at = error.__traceback__
-            while at is not None and at.tb_next is not None:
-                at = at.tb_next
-            where = f" at {Path(at.tb_frame.f_code.co_filename).name}:{at.tb_lineno}" if at is not None else ""
-            raise AgentError(
-                f"agent {self._identity['agent']} failed at task {task.row['task_id']}: "
-                f"{type(error).__name__}{where}: {error}"
-            ) from error
+            # A context that is lost stays lost: the next attempt opens another.
+            forget_renderers()
+            said = str(error) if isinstance(error, RenderError) else place(error)
+            raise AgentUnavailable(f"the renderer failed: {said}", kind="renderer") from error
 
     def _row(self, task: Task) -> dict[str, Any]:
         row, episode = task.row, self._flight.episode
@@ -217,33 +275,3 @@ class Worker:
             "n_refused": episode.n_refused,
             "n_invalid": episode.n_invalid,
         }
-
-    def _usage(self) -> Usage | None:
-        usage: Callable[[], Usage | None] | None = getattr(self._agent, "usage", None)
-        return usage() if usage is not None else None
-
-
-def _sum(a: Usage | None, b: Usage | None) -> Usage | None:
-    """Add what two attempts used; what neither knows stays unknown."""
-    if a is None or b is None:
-        return a or b
-    both = {}
-    for name in ("input_tokens", "output_tokens", "cost_usd"):
-        known = [v for v in (getattr(a, name), getattr(b, name)) if v is not None]
-        both[name] = sum(known) if known else None
-    return replace(a, requests=a.requests + b.requests, **both)
-
-
-def _bill(used: Usage | None) -> dict[str, Any]:
-    if used is None:
-        return dict.fromkeys(("n_requests", "input_tokens", "output_tokens", "cost_usd"))
-    return {
-        "n_requests": used.requests,
-        "input_tokens": used.input_tokens,
-        "output_tokens": used.output_tokens,
-        "cost_usd": used.cost_usd,
-    }
-
-
-def _cost(used: Usage | None) -> float:
-    return (used.cost_usd or 0.0) if used is not None else 0.0

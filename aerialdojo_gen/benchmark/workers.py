@@ -18,8 +18,10 @@ from typing import TYPE_CHECKING, Any
 from aerialdojo_gen.benchmark.agents import load_agent
 from aerialdojo_gen.benchmark.flight import Flight
 from aerialdojo_gen.benchmark.goal import Sensors
+from aerialdojo_gen.benchmark.pace import Pace
+from aerialdojo_gen.benchmark.secrets import Secrets
 from aerialdojo_gen.benchmark.worker import Finished, Unit, Worker
-from aerialdojo_gen.errors import AerialDojoError
+from aerialdojo_gen.errors import AerialDojoError, UsageError
 from aerialdojo_gen.executor import start_worker
 
 if TYPE_CHECKING:
@@ -27,18 +29,31 @@ if TYPE_CHECKING:
 
 
 @contextlib.contextmanager
-def worker(data: Path, evaluation: Evaluation) -> Iterator[Worker]:
-    """Make an agent and what it flies in; the agent is closed at the end."""
-    agent = load_agent(evaluation.agent, **evaluation.options)
+def worker(data: Path, evaluation: Evaluation, pace: Pace | None = None) -> Iterator[Worker]:
+    """Make an agent and what it flies in; the agent is closed at the end.
+
+    Raises
+    ------
+    UsageError
+        There is no such agent, or its requests are to be paced and it does not let them.
+    """
+    agent: Any = load_agent(evaluation.agent, **evaluation.options)
+    if pace is not None:
+        if not hasattr(agent, "pace"):
+            raise UsageError(f"agent {evaluation.agent!r} has no pace to be set: leave --requests-per-minute out")
+        agent.pace = pace.wait
     wanted: Any = getattr(agent, "sensors", None)
     sensors = evaluation.sensors or (wanted if isinstance(wanted, Sensors) else Sensors())
     flight = Flight(data, sensors, embodiment=evaluation.embodiment, renderer=evaluation.renderer)
+    secrets = Secrets(evaluation.options)
     try:
-        yield Worker(agent, flight, data, evaluation.identity(), evaluation.attempts, evaluation.pause_s)
+        yield Worker(agent, flight, data, evaluation.identity(), evaluation.conditions, secrets)
     finally:
         close: Any = getattr(agent, "close", None)
         if close is not None:
-            close()
+            # What it raises now is of no episode: all of them are in the log.
+            with contextlib.suppress(Exception):
+                close()
 
 
 def fly_units(
@@ -84,7 +99,7 @@ def _here(
     tell: Callable[[Finished], None],
     stopped: Callable[[], bool],
 ) -> Iterator[Unit]:
-    with worker(data, evaluation) as mine:
+    with worker(data, evaluation, Pace.of(evaluation.requests_per_minute)) as mine:
         for unit in units:
             mine.fly(unit, tell, stopped)
             yield unit
@@ -94,9 +109,9 @@ def _here(
 _ours: dict[str, Any] = {}
 
 
-def _start(parent: int, data: Path, evaluation: Evaluation, told: Any, stop: Any) -> None:
+def _start(parent: int, data: Path, evaluation: Evaluation, told: Any, stop: Any, pace: Pace | None) -> None:
     start_worker(parent)
-    _ours.update(data=data, evaluation=evaluation, told=told, stop=stop)
+    _ours.update(data=data, evaluation=evaluation, told=told, stop=stop, pace=pace)
 
 
 def _fly(unit: Unit) -> AerialDojoError | None:
@@ -104,7 +119,7 @@ def _fly(unit: Unit) -> AerialDojoError | None:
         if "worker" not in _ours:
             # Kept for the process's life: an agent may hold a model, and the flight holds scenes.
             stack = contextlib.ExitStack()
-            _ours["worker"] = stack.enter_context(worker(_ours["data"], _ours["evaluation"]))
+            _ours["worker"] = stack.enter_context(worker(_ours["data"], _ours["evaluation"], _ours["pace"]))
             Finalize(None, stack.close, exitpriority=1)
         with _Teller(_ours["told"]) as teller:
             _ours["worker"].fly(unit, teller.tell, _ours["stop"].is_set)
@@ -149,7 +164,7 @@ def _in_processes(
         min(workers, len(units)),
         mp_context=context,
         initializer=_start,
-        initargs=(os.getpid(), data, evaluation, told, stop),
+        initargs=(os.getpid(), data, evaluation, told, stop, Pace.of(evaluation.requests_per_minute, context)),
     )
 
     def hear() -> None:

@@ -10,7 +10,7 @@ import typer
 
 from aerialdojo_gen.bounded import loads_json
 from aerialdojo_gen.commands.common import Data, PipelineFile, Quiet, Scene, Workers, default_workers, open_pipeline
-from aerialdojo_gen.errors import BeyondBounds, Malformed, UsageError
+from aerialdojo_gen.errors import AerialDojoError, BeyondBounds, Malformed, UsageError
 
 if TYPE_CHECKING:
     from aerialdojo_gen.benchmark.goal import Sensors
@@ -22,12 +22,21 @@ app = typer.Typer()
 def evaluate(
     data: Data = Path("data"),
     agent: Annotated[
-        str, typer.Option("--agent", help="oracle, random, stop, explorer, …, or package.module:Class.")
-    ] = "random",
+        str | None,
+        typer.Option(
+            "--agent", help="oracle, random, stop, explorer, …, or package.module:Class.  (default: random)"
+        ),
+    ] = None,
+    preset: Annotated[
+        str | None,
+        typer.Option("--preset", help="A language model by name, in place of --agent: qwen3-vl-4b, …"),
+    ] = None,
     option: Annotated[
         list[str] | None, typer.Option("--option", help="An option of the agent, repeatable: --option seed=1.")
     ] = None,
-    run: Annotated[str | None, typer.Option("--run", help="Name of the run.  (default: the agent's)")] = None,
+    run: Annotated[
+        str | None, typer.Option("--run", help="Name of the run.  (default: the agent's or preset's)")
+    ] = None,
     split: Annotated[
         list[str] | None, typer.Option("--split", help="id_train, id_test, ood_train, ood_test; repeatable.")
     ] = None,
@@ -60,53 +69,102 @@ def evaluate(
         int, typer.Option("--attempts", min=1, max=1000, help="Tries of an episode where something outside fails.")
     ] = 5,
     rerun_failed: Annotated[
-        bool, typer.Option("--rerun-failed", help="Fly those again that failed for reasons outside the agent.")
+        bool,
+        typer.Option("--rerun-failed", help="Fly exactly those again that failed for reasons outside the agent."),
+    ] = False,
+    tolerate: Annotated[
+        bool,
+        typer.Option("--tolerate", help="Log episodes in which the agent raises as failed; count no-actions; go on."),
     ] = False,
     restart: Annotated[bool, typer.Option("--restart", help="Drop what the run has written before.")] = False,
+    estimate: Annotated[
+        bool,
+        typer.Option("--estimate", help="Fly nothing: say what a language model would take, by a few requests."),
+    ] = False,
     max_cost: Annotated[
         float | None, typer.Option("--max-cost", min=0, help="Begin no episode once so many US dollars are spent.")
     ] = None,
+    max_tokens: Annotated[
+        int | None, typer.Option("--max-tokens", min=0, help="Begin no episode once so many tokens are spent.")
+    ] = None,
+    requests_per_minute: Annotated[
+        float | None,
+        typer.Option("--requests-per-minute", min=0.001, help="Send no more requests, all workers together."),
+    ] = None,
+    failures_in_row: Annotated[
+        int,
+        typer.Option("--failures-in-row", min=1, help="End after so many failed episodes of one kind in a row."),
+    ] = 5,
     workers: Workers = None,
     pipeline: PipelineFile = None,
     quiet: Quiet = False,
 ) -> None:
     """Fly an agent through released tasks, closed loop; finished episodes are never flown again."""
+    from aerialdojo_gen.benchmark.limits import Limits
     from aerialdojo_gen.benchmark.runner import Evaluation
     from aerialdojo_gen.benchmark.runner import evaluate as fly
     from aerialdojo_gen.benchmark.tasks import Selection
+    from aerialdojo_gen.benchmark.worker import Conditions
     from aerialdojo_gen.progress import Reporter
 
     config, _ = open_pipeline(pipeline, data)
     splits, settings, modalities, scenes = (tuple(names or ()) for names in (split, setting, modality, scene))
     options = _options(option or [])
+    name = preset or agent or "random"
+    agent, options = _agent(agent, preset, options)
     evaluation = Evaluation(
-        run or agent.replace(".", "-").replace(":", "-"),
+        run or name.replace(".", "-").replace(":", "-"),
         agent,
         options,
         Selection(splits, settings, modalities, scenes, limit, seed),
         _sensors(agent, options, view, width, height),
         config.embodiment,
         renderer,
-        attempts,
+        Conditions(attempts, tolerate=tolerate),
+        requests_per_minute,
     )
+    if estimate:
+        from aerialdojo_gen.benchmark.llm.estimate import estimate as reckon
+
+        print("\n".join(reckon(data, evaluation).lines(workers or default_workers())))
+        return
     reporter = Reporter(quiet=quiet)
     try:
         outcome = fly(
             data, evaluation, out=out, workers=workers or default_workers(), rerun_failed=rerun_failed,
-            restart=restart, max_cost_usd=max_cost, reporter=reporter,
+            restart=restart, limits=Limits(max_cost, max_tokens, failures_in_row), reporter=reporter,
         )  # fmt: skip
     except KeyboardInterrupt:
         print("interrupted: finished episodes are kept, the same command goes on from here", file=sys.stderr)
         raise SystemExit(130) from None
     reporter.line(f"evaluate {evaluation.run}: {outcome}")
+    if outcome.stopped or (outcome.failed and not outcome.finished):
+        raise AerialDojoError(outcome.last_line)
+    if outcome.last_line:
+        # Not the reporter's: a failure is told under --quiet too.
+        print(outcome.last_line, file=sys.stderr)
+
+
+def _agent(agent: str | None, preset: str | None, options: dict[str, Any]) -> tuple[str, dict[str, Any]]:
+    """Take the agent, or a preset's with its options under those that are given."""
+    if preset is None:
+        return agent or "random", options
+    from aerialdojo_gen.benchmark.llm.presets import preset as find
+
+    found = find(preset)
+    if agent is not None and agent != found.agent:
+        raise UsageError(f"preset {preset!r} is of the agent {found.agent!r}: leave --agent {agent} out")
+    return found.agent, found.options | options
 
 
 def _options(given: list[str]) -> dict[str, Any]:
+    from aerialdojo_gen.benchmark.secrets import Secrets
+
     options: dict[str, Any] = {}
     for item in given:
         key, equals, value = item.partition("=")
         if not equals or not key.isidentifier():
-            raise UsageError(f"--option {item!r}: write key=value")
+            raise UsageError(f"--option {Secrets().text(item)[:60]!r}: write key=value")
         try:
             options[key] = loads_json(value)
         except BeyondBounds as error:

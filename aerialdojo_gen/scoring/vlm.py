@@ -53,7 +53,7 @@ class VlmScorer:
 
     def __init__(self, config: VlmConfig) -> None:
         self._config = config
-        self._service = Connection("openai", config.base_url, config.timeout_s, config.retries)
+        self._service = Connection("openai", config.base_url, config.timeout_s, config.retries, model=config.model)
 
     def score(self, name: str, views: Sequence[AnchorView]) -> list[float | None]:
         """Score views by the model's order.
@@ -104,9 +104,11 @@ class VlmScorer:
             lambda client: client.chat.completions.create(model=self._config.model, messages=said, extra_body=body)
         )
         choices = getattr(completion, "choices", None)
-        if not choices or getattr(choices[0], "message", None) is None:
+        message = getattr(choices[0], "message", None) if isinstance(choices, list) and choices else None
+        content = getattr(message, "content", None)
+        if message is None or not (content is None or isinstance(content, str)):
             raise self._service.not_understood("chat completion")
-        return self._service.without_key(choices[0].message.content or "")
+        return self._service.clean(content or "")
 
 
 def read_order(text: str, n: int) -> list[int]:

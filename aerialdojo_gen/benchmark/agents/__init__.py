@@ -1,6 +1,16 @@
 """Agents: `load_agent` makes one by name, or by ``package.module:Class``."""
 
-from aerialdojo_gen.benchmark.agents.base import Agent, AgentBase, AgentUnavailable, InvalidAnswer, Usage
-from aerialdojo_gen.benchmark.agents.load import BUILT_IN, load_agent
+from aerialdojo_gen.benchmark.agents.base import Agent, AgentBase, AgentUnavailable, InvalidAnswer, ServiceDown, Usage
+from aerialdojo_gen.benchmark.agents.load import BUILT_IN, agent_class, load_agent
 
-__all__ = ["BUILT_IN", "Agent", "AgentBase", "AgentUnavailable", "InvalidAnswer", "Usage", "load_agent"]
+__all__ = [
+    "BUILT_IN",
+    "Agent",
+    "AgentBase",
+    "AgentUnavailable",
+    "InvalidAnswer",
+    "ServiceDown",
+    "Usage",
+    "agent_class",
+    "load_agent",
+]

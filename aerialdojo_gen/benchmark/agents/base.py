@@ -10,10 +10,10 @@ from aerialdojo_gen.errors import AerialDojoError
 
 
 class AgentUnavailable(AerialDojoError):  # noqa: N818 (it says what is the matter)
-    """Something that the agent needs is not there now: a time-out, 429, 5xx, a lost connection.
+    """Something that the agent needs is not there now: a time-out, 429, 5xx, a lost connection, a refused request.
 
-    Never the agent's failure: the runner begins the episode again after a pause, and logs it apart if that does not
-    help. The message must hold no key.
+    Never the agent's failure: the runner begins the episode again after a pause where that may help, and logs it
+    apart in `failures` if it does not. The message must hold no key.
 
     Parameters
     ----------
@@ -21,11 +21,24 @@ class AgentUnavailable(AerialDojoError):  # noqa: N818 (it says what is the matt
         One line.
     retry_after_s : float, optional
         How long to wait, where the service said so, seconds.
+    kind : str
+        What failed, in a word or two; the runner ends a run after several failures of one kind in a row.
+    again : bool
+        Whether the episode may succeed if it is begun again. False where the same request would be refused again
+        (a content filter, a context that is too long), though the next episode's may pass.
     """
 
-    def __init__(self, message: str, retry_after_s: float | None = None) -> None:
+    def __init__(
+        self, message: str, retry_after_s: float | None = None, *, kind: str = "unavailable", again: bool = True
+    ) -> None:
         super().__init__(message)
         self.retry_after_s = retry_after_s
+        self.kind = kind
+        self.again = again
+
+
+class ServiceDown(AerialDojoError):  # noqa: N818
+    """A service will answer no request of the run: there is no route to it, or nobody listens. The run ends."""
 
 
 class InvalidAnswer(AerialDojoError):  # noqa: N818
@@ -44,12 +57,16 @@ class Usage:
         Where the service says.
     cost_usd : float or None
         Where prices are known.
+    request_s, longest_request_s : float or None
+        Time from sending a request to having its answer, seconds: of all requests together, and of the longest.
     """
 
     requests: int = 0
     input_tokens: int | None = None
     output_tokens: int | None = None
     cost_usd: float | None = None
+    request_s: float | None = None
+    longest_request_s: float | None = None
 
 
 @runtime_checkable
@@ -62,6 +79,11 @@ class Agent(Protocol):
     - ``close()``: called once, at the end of the run.
     - ``usage() -> Usage or None``: what it has used since `reset`.
     - ``answer() -> str or None``: the words behind the last action, kept in `steps`.
+    - ``check() -> str``: called once before a run, in a process of its own instance: raises an `AerialDojoError` if
+      the agent cannot work (nobody listens, a wrong key), else returns what is worth telling.
+    - ``settled() -> dict``: options that ``check`` has settled, given to the instances that fly.
+    - ``used_options() -> dict``: its options with their defaults, JSON and no secrets, for the log.
+    - ``pace``: a callable that the runner sets under ``--requests-per-minute``, to be called before each request.
 
     A run has one instance a worker. Episodes come in any order, so that what an agent does must depend on nothing but
     its options, the goal and the observations since `reset`.
@@ -76,7 +98,9 @@ class Agent(Protocol):
         Raises
         ------
         AgentUnavailable
-            An outside service failed: the episode will be begun again.
+            An outside service failed: the episode is begun again, or logged in `failures`.
+        ServiceDown, UsageError
+            No request will be answered: the run ends.
         InvalidAnswer
             There is an answer, and it names no action.
         """

@@ -3,97 +3,30 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
-from urllib.parse import urlsplit
+from typing import Any
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
+import numpy as np
+from pydantic import ValidationError
 
-from aerialdojo_gen.benchmark.agents.base import AgentBase, InvalidAnswer, Usage
+from aerialdojo_gen.benchmark.agents.base import AgentBase, AgentUnavailable, InvalidAnswer, ServiceDown, Usage
 from aerialdojo_gen.benchmark.goal import Goal, Observation, Sensors
 from aerialdojo_gen.benchmark.llm.answer import parse_answer
 from aerialdojo_gen.benchmark.llm.images import Picture, colour_picture, depth_picture
-from aerialdojo_gen.benchmark.llm.prompt import Turn, goal_text, repair_text, step_text, system_prompt
+from aerialdojo_gen.benchmark.llm.options import Form, Options
+from aerialdojo_gen.benchmark.llm.prompt import Sight, Turn, goal_text, repair_text, step_text, system_prompt
 from aerialdojo_gen.benchmark.llm.service import Connection
+from aerialdojo_gen.benchmark.secrets import Secrets
 from aerialdojo_gen.config import explain
-from aerialdojo_gen.errors import UsageError
+from aerialdojo_gen.errors import AerialDojoError, UsageError
 
-View = Literal["front", "left", "right", "down"]
 # An answer that is shown again for repair, or kept in the log: enough to see what is wrong with it.
 _KEPT_CHARACTERS = 4_000
-
-
-class Options(BaseModel):
-    """Options of a language-model agent; none of them is a secret, keys come from the environment.
-
-    Attributes
-    ----------
-    model : str
-        Name of the model at the service.
-    base_url : str or None
-        Where the service is; the provider's own where absent.
-    temperature : float or None
-        None leaves it to the service; some models take no other.
-    max_tokens : int
-        Most tokens of an answer.
-    timeout_s : float
-        Longest wait for an answer.
-    request_retries : int
-        How often a request that failed for the service's sake is sent again before the episode is given up. A
-        repeated request changes nothing for the agent; an episode begun again costs all of its requests anew.
-    views : tuple of str
-        Cameras whose pictures are sent; the paper's is the front one alone.
-    depth : bool
-        Whether their depth is sent too.
-    image_size_px : int
-        Width and height of the pictures.
-    max_depth_m : float
-        Depth that is drawn white.
-    history : int
-        How many earlier steps are told again: the action and what the model said of it.
-    history_images : int
-        Of how many earlier steps the colour picture of the first view is sent again.
-    extra_body : dict
-        Anything else that the service takes, e.g. ``{"seed": 1}``.
-    input_usd_per_million, output_usd_per_million : float or None
-        Prices of tokens; without them no cost is reported.
-    """
-
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
-
-    model: str = Field(min_length=1)
-    base_url: str | None = None
-    temperature: float | None = Field(default=None, ge=0.0, le=2.0)
-    max_tokens: int = Field(default=1024, ge=16)
-    timeout_s: float = Field(default=60.0, gt=0.0)
-    request_retries: int = Field(default=3, ge=0, le=10)
-    views: tuple[View, ...] = Field(default=("front",), min_length=1)
-    depth: bool = True
-    image_size_px: int = Field(default=448, ge=32, le=2048)
-    max_depth_m: float = Field(default=50.0, gt=0.0)
-    history: int = Field(default=8, ge=0)
-    history_images: int = Field(default=0, ge=0, le=20)
-    extra_body: dict[str, Any] = {}
-    input_usd_per_million: float | None = Field(default=None, ge=0.0)
-    output_usd_per_million: float | None = Field(default=None, ge=0.0)
-
-    @field_validator("base_url")
-    @classmethod
-    def _plain_url(cls, url: str | None) -> str | None:
-        if url is not None:
-            parts = urlsplit(url)
-            if parts.scheme not in ("http", "https") or not parts.hostname:
-                raise ValueError("not a URL like http://127.0.0.1:8000/v1")
-            # Options are written to the log of the run. Not a ValueError: its message would quote the URL.
-            if parts.username or parts.password or parts.query:
-                raise UsageError("base_url holds a name, a password or a query: keys come from the environment only")
-        return url
-
-    @field_validator("views", mode="before")
-    @classmethod
-    def _several(cls, views: Any) -> Any:
-        return views.split(",") if isinstance(views, str) else views
+# More tokens than any request has: what a service counts beyond this it has not counted.
+_MOST_TOKENS = 1 << 40
+# What a service answers that does not know structured outputs, or tool calls.
+_NOT_TAKEN = ("bad request", "not found", "malformed answer", "server error")
 
 
 @dataclass(frozen=True)
@@ -119,7 +52,7 @@ class Reply:
     Attributes
     ----------
     text : str
-        All the text of it.
+        All the text of it, or the arguments of its tool call.
     input_tokens, output_tokens : int or None
         Where the service says.
     """
@@ -127,6 +60,11 @@ class Reply:
     text: str
     input_tokens: int | None = None
     output_tokens: int | None = None
+
+
+def token_count(value: Any) -> int | None:
+    """Return a service's count of tokens; None where it is no count."""
+    return value if isinstance(value, int) and 0 <= value < _MOST_TOKENS and not isinstance(value, bool) else None
 
 
 class LanguageModelAgent(AgentBase):
@@ -150,39 +88,130 @@ class LanguageModelAgent(AgentBase):
     """
 
     package = ""
+    # In the order in which the check before a run tries them.
+    forms: tuple[Form, ...] = ("json", "tool", "text")
 
     def __init__(self, **options: Any) -> None:
+        self._secrets = Secrets(options)
         try:
             self.options = Options.model_validate(options)
         except ValidationError as error:
-            raise UsageError("; ".join(explain(error, Options))) from None
+            raise UsageError(self._secrets.text("; ".join(explain(error, Options)))) from None
         o = self.options
+        self.form: Form = "text" if o.answer == "auto" else o.answer
+        self.tells_tokens = True
         self.sensors = Sensors(o.views, depth=o.depth, width=o.image_size_px, height=o.image_size_px)
-        self.service = Connection(self.package, o.base_url, o.timeout_s, o.request_retries)
+        self.service = Connection(
+            self.package,
+            o.base_url,
+            o.timeout_s,
+            o.request_retries,
+            secrets=self._secrets,
+            key_variable=o.key_env,
+            model=o.model,
+        )
         self._begin()
+
+    @property
+    def pace(self) -> Callable[[], None] | None:
+        """Called before each request; waits until one may be sent."""
+        return self.service.meter.pace
+
+    @pace.setter
+    def pace(self, pace: Callable[[], None] | None) -> None:
+        self.service.meter.pace = pace
 
     def close(self) -> None:
         """Close the connections."""
         self.service.close()
 
-    def ask(self, system: str, messages: Sequence[Message]) -> Reply:
+    def used_options(self) -> dict[str, Any]:
+        """Return all options as used, defaults too, without secrets."""
+        used = self.options.model_dump(mode="json") | {"answer": self.form}
+        cleaned: dict[str, Any] = self._secrets.options(used)
+        return cleaned
+
+    def ask(self, system: str, messages: Sequence[Message], retries: int | None = None) -> Reply:
         """Send one request.
+
+        Parameters
+        ----------
+        system : str
+        messages : sequence of Message
+        retries : int, optional
+            In place of the option's.
 
         Raises
         ------
         AgentUnavailable
-            The service failed; nothing of it is the model's doing.
-        UsageError
-            The service refuses the request for good.
+            The request failed; nothing of it is the model's doing.
+        ServiceDown, UsageError
+            Every request would fail.
         """
         raise NotImplementedError
+
+    def check(self) -> str:
+        """Send one small request as the run will send them; settles how answers are asked for.
+
+        Returns
+        -------
+        str
+            What was found, one line.
+
+        Raises
+        ------
+        AerialDojoError
+            The service does not answer, or refuses; one line.
+        """
+        grey = colour_picture(np.full((32, 32, 3), 128, np.uint8), 32)
+        text = f"{self._example()} This is a test of the connection: choose Stop."
+        forms = self.forms if self.options.answer == "auto" else (self.options.answer,)
+        for form in forms:
+            self.form = form
+            try:
+                reply = self.ask(text, [Message("user", ("A grey picture:", grey))], retries=1)
+            except ServiceDown as error:
+                raise ServiceDown(f"checked before the run, nothing flown: {error}") from None
+            except AgentUnavailable as error:
+                if form != forms[-1] and error.kind in _NOT_TAKEN:
+                    continue
+                raise AerialDojoError(f"checked before the run, nothing flown: {error}") from None
+            if form != forms[-1] and not self._readable(reply.text):
+                continue
+            self.tells_tokens = reply.input_tokens is not None and reply.output_tokens is not None
+            counted = "" if self.tells_tokens else ", tells no tokens"
+            seconds = self.service.meter.longest_s
+            return f"{self.service.name} answers in {seconds:.1f} s, by {form}{counted}"
+        raise AssertionError("the last form either answers or raises")
+
+    def settled(self) -> dict[str, Any]:
+        """Return options that `check` has settled, for the agents that fly."""
+        return {"answer": self.form}
+
+    @property
+    def priced(self) -> bool:
+        """Whether the cost of an episode will be known, if the service tells tokens."""
+        return self.options.priced
+
+    def _readable(self, text: str) -> bool:
+        try:
+            parse_answer(text, self.options.action_set.names)
+        except InvalidAnswer:
+            return False
+        return True
+
+    def _example(self) -> str:
+        return f'Answer with one JSON object: {{"thought": "...", "action": "{self.options.action_set.names[0]}"}}.'
 
     def reset(self, goal: Goal) -> None:
         """Begin an episode."""
         self._begin()
         o = self.options
-        fov_deg = goal.rules.sensors.fov_deg
-        self._system = system_prompt(goal, o.views, o.depth, o.max_depth_m, fov_deg)
+        sensors = goal.rules.sensors
+        scale = min(1.0, o.image_size_px / max(sensors.width, sensors.height))
+        size = round(sensors.width * scale), round(sensors.height * scale)
+        sight = Sight(o.views, o.depth, o.max_depth_m, sensors.fov_deg, *size, o.history_images)
+        self._system = system_prompt(goal, sight, o.action_set, self.form)
         self._goal: tuple[str | Picture, ...] = (goal_text(goal),)
         if goal.image is not None:
             self._goal += (colour_picture(goal.image, o.image_size_px),)
@@ -190,9 +219,9 @@ class LanguageModelAgent(AgentBase):
     def _begin(self) -> None:
         self._turns: deque[Turn] = deque(maxlen=self.options.history)
         self._seen: deque[tuple[int, Picture]] = deque(maxlen=self.options.history_images)
-        self._requests = 0
         self._tokens: list[int | None] = [0, 0]
         self._answer: str | None = None
+        self.service.meter.reset()
 
     def act(self, observation: Observation) -> int:
         """Ask for an action.
@@ -201,26 +230,27 @@ class LanguageModelAgent(AgentBase):
         ------
         InvalidAnswer
             Neither the answer nor its repair names one.
-        AgentUnavailable, UsageError
+        AgentUnavailable, ServiceDown, UsageError
             As `ask` does.
         """
+        actions = self.options.action_set
         messages = [Message("user", (*self._goal, *self._report(observation)))]
         said = self._ask(messages)
         try:
             try:
-                answer = parse_answer(said)
+                answer = parse_answer(said, actions.names)
             except InvalidAnswer as error:
                 shown = said[:_KEPT_CHARACTERS].strip() or "(nothing)"
-                messages += [Message("assistant", (shown,)), Message("user", (repair_text(str(error)),))]
-                answer = parse_answer(self._ask(messages))
+                again = repair_text(str(error), actions)
+                messages += [Message("assistant", (shown,)), Message("user", (again,))]
+                answer = parse_answer(self._ask(messages), actions.names)
         except InvalidAnswer:
             self._turns.append(Turn(observation.step, None))
             raise
         self._turns.append(Turn(observation.step, answer.action, " ".join(answer.thought.split())[:300]))
-        return answer.action_id
+        return actions.ids[answer.action]
 
     def _ask(self, messages: Sequence[Message]) -> str:
-        self._requests += 1
         reply = self.ask(self._system, messages)
         for k, count in enumerate((reply.input_tokens, reply.output_tokens)):
             so_far = self._tokens[k]
@@ -245,14 +275,19 @@ class LanguageModelAgent(AgentBase):
                 parts += [f"{view} camera, depth (black 0 m, white {o.max_depth_m:g} m or more):", depth]
         return parts
 
+    def reckoned_tokens(self, observation: Observation) -> int:
+        """Reckon what a request would have without sending it: four letters a token, and its pictures."""
+        o = self.options
+        parts = [self._system, *self._goal, *self._report(observation)]
+        a_picture = o.tokens_per_picture or round(o.image_size_px**2 / 750)
+        return sum(a_picture if isinstance(part, Picture) else -(-len(part) // 4) for part in parts)
+
     def usage(self) -> Usage:
-        """Return requests, tokens and cost since `reset`."""
+        """Return requests, tokens, cost and times since `reset`."""
         tokens_in, tokens_out = self._tokens
-        prices = self.options.input_usd_per_million, self.options.output_usd_per_million
-        cost = None
-        if tokens_in is not None and tokens_out is not None and prices[0] is not None and prices[1] is not None:
-            cost = (tokens_in * prices[0] + tokens_out * prices[1]) / 1e6
-        return Usage(self._requests, tokens_in, tokens_out, cost)
+        meter = self.service.meter
+        cost = self.options.cost_usd(tokens_in, tokens_out)
+        return Usage(meter.requests, tokens_in, tokens_out, cost, meter.seconds, meter.longest_s)
 
     def answer(self) -> str | None:
         """Return what the model said last, cut to 4,000 characters."""

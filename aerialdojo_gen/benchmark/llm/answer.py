@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import json
 import re
+from collections.abc import Sequence
 from typing import Any
 
-from pydantic import BaseModel, ConfigDict, ValidationError, field_validator
+from pydantic import BaseModel, ConfigDict, ValidationError
 
 from aerialdojo_gen.benchmark.agents.base import InvalidAnswer
-from aerialdojo_gen.benchmark.llm.prompt import CHOICES
+from aerialdojo_gen.benchmark.llm.actions import SIXTEEN
 
 MAX_CHARACTERS = 20_000
 # What wraps an answer without being part of it: a reasoning model's thoughts, a Markdown fence around all the rest.
@@ -23,7 +24,7 @@ class Answer(BaseModel):
     Attributes
     ----------
     action : str
-        One of the 16 names.
+        One of the names that were told.
     thought : str
         What the model says of it.
     """
@@ -33,26 +34,16 @@ class Answer(BaseModel):
     action: str
     thought: str = ""
 
-    @field_validator("action")
-    @classmethod
-    def _known(cls, name: str) -> str:
-        if name not in CHOICES:
-            raise ValueError(f"{name[:40]!r} is none of the actions")
-        return name
 
-    @property
-    def action_id(self) -> int:
-        """The action's id, 0 to 15."""
-        return CHOICES.index(self.action)
-
-
-def parse_answer(text: str) -> Answer:
+def parse_answer(text: str, names: Sequence[str] = SIXTEEN.names) -> Answer:
     """Read an answer.
 
     Parameters
     ----------
     text : str
         All that the model said. A leading ``<think>`` block and a Markdown fence around the whole are taken off.
+    names : sequence of str
+        Of the actions.
 
     Returns
     -------
@@ -71,18 +62,40 @@ def parse_answer(text: str) -> Answer:
     if not body.strip():
         raise InvalidAnswer("it is empty")
     try:
-        value = json.loads(body, object_pairs_hook=_without_doubles)
-    except (json.JSONDecodeError, RecursionError) as error:
-        raise InvalidAnswer(f"it is not one JSON object ({error})") from None
+        value = json.loads(body, object_pairs_hook=_without_doubles, parse_constant=_no_number)
+    except (ValueError, RecursionError) as error:
+        # A number of 4,300 digits or more is a ValueError of its own kind.
+        raise _refused(f"it is not one JSON object ({error})") from None
     if not isinstance(value, dict):
         raise InvalidAnswer(f"it is JSON, but no object: {type(value).__name__}")
     try:
-        return Answer.model_validate(value)
-    except ValidationError as error:
-        problems = (
-            f"{'.'.join(map(str, e['loc']))}: {e['msg'].removeprefix('Value error, ')}" for e in error.errors()
-        )
-        raise InvalidAnswer("; ".join(problems)[:500]) from None
+        answer = Answer.model_validate(value)
+    except (ValidationError, ValueError) as error:
+        raise _refused(_problems(error)) from None
+    if answer.action not in names:
+        raise _refused(f"action: {answer.action[:40]!r} is none of the actions")
+    try:
+        answer.thought.encode("utf-8")
+    except UnicodeEncodeError:
+        raise InvalidAnswer("thought: it holds half of a surrogate pair, which is no character") from None
+    return answer
+
+
+def _problems(error: ValueError) -> str:
+    if not isinstance(error, ValidationError):
+        return "it holds half of a surrogate pair, which is no character"
+    return "; ".join(
+        f"{'.'.join(map(str, e['loc']))}: {e['msg']}" for e in error.errors(include_input=False, include_url=False)
+    )
+
+
+def _refused(why: str) -> InvalidAnswer:
+    # The reason is sent back to the model and kept: no lone surrogates in it, and no more than it takes.
+    return InvalidAnswer(why.encode("utf-8", "backslashreplace").decode("utf-8")[:500])
+
+
+def _no_number(name: str) -> Any:
+    raise ValueError(f"{name} is no number of JSON")
 
 
 def _without_doubles(pairs: list[tuple[str, Any]]) -> dict[str, Any]:

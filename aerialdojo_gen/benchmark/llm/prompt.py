@@ -6,24 +6,13 @@ termination, remaining budget, and one action as JSON.
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 from aerialdojo_gen.benchmark.goal import Goal, Observation
-from aerialdojo_gen.schemas import ACTION_NAMES, APPROACH
+from aerialdojo_gen.benchmark.llm.actions import SIXTEEN, ActionSet
 
-CHOICES = ACTION_NAMES[:APPROACH]
-
-_EFFECTS = {
-    "Stop": "end the episode; choose it when the target is right in front of you, within a few metres",
-    "MoveForward": "fly {} m forward, the way the front camera looks",
-    "MoveLeft": "fly {} m to the left without turning",
-    "MoveRight": "fly {} m to the right without turning",
-    "MoveUp": "climb {} m",
-    "MoveDown": "sink {} m",
-    "TurnLeft": "turn {}° to the left on the spot",
-    "TurnRight": "turn {}° to the right on the spot",
-}
 _LOOKS = {"front": "ahead", "left": "to the left", "right": "to the right", "down": "straight down"}
 
 
@@ -46,34 +35,52 @@ class Turn:
     thought: str = ""
 
 
-def system_prompt(goal: Goal, views: Sequence[str], depth: bool, max_depth_m: float, fov_deg: float) -> str:
-    """Write what holds for the whole episode.
+@dataclass(frozen=True)
+class Sight:
+    """What is sent of what the cameras see.
 
-    Parameters
+    Attributes
     ----------
-    goal : Goal
-        Its rules are told; the object itself stands in `goal_text`.
-    views : sequence of str
+    views : tuple of str
         Cameras whose pictures are sent.
     depth : bool
         Whether depth pictures go with them.
     max_depth_m, fov_deg : float
         Depth that is drawn white; horizontal field of view.
+    width, height : int
+        Of the pictures, pixels.
+    past_pictures : int
+        Of how many earlier steps the first camera's colour picture is sent again.
+    """
+
+    views: tuple[str, ...] = ("front",)
+    depth: bool = True
+    max_depth_m: float = 50.0
+    fov_deg: float = 90.0
+    width: int = 640
+    height: int = 640
+    past_pictures: int = 0
+
+
+def system_prompt(goal: Goal, sight: Sight, actions: ActionSet = SIXTEEN, form: str = "text") -> str:
+    """Write what holds for the whole episode (paper, Appendix A).
+
+    Parameters
+    ----------
+    goal : Goal
+        Its rules are told; the object itself stands in `goal_text`.
+    sight : Sight
+        The pictures.
+    actions : ActionSet
+        What may be chosen.
+    form : str
+        How it is to be answered: ``text``, ``json`` (the service holds the answer to the schema) or ``tool``.
 
     Returns
     -------
     str
     """
     rules = goal.rules
-    cameras = ", ".join(f"{view} (looks {_LOOKS[view]})" for view in views)
-    sensors = f"Before every action you see a colour picture from each of these cameras: {cameras}. " if views else ""
-    sensors += f"Each camera has a field of view of {fov_deg:g}°." if views else "You see nothing."
-    if views and depth:
-        sensors += (
-            " With each comes a depth picture of the same view, in grey: the value of a pixel is its distance along"
-            f" the optical axis, linear from black at 0 m to white at {max_depth_m:g} m; what is farther, or open"
-            f" sky, is white. A pixel of value v is v / 255 x {max_depth_m:g} m away."
-        )
     return f"""\
 You pilot a small drone that searches for one target object in a large outdoor scene. You know the scene only from \
 the drone's cameras; there is no map, no GPS and no compass. Find the target, fly up to it, and stop in front of it.
@@ -83,10 +90,10 @@ The drone is a quadrotor with a wheelbase of {rules.wheelbase_m:g} m. It collide
 {rules.radius_m:g} m of its centre, also while it moves from one place to the next. It always hovers level.
 
 SENSORS
-{sensors}
+{_sensors(sight)}
 
 ACTIONS
-{_action_list()}
+{actions.described()}
 Every action is carried out exactly, unless something stands in the way. A move that would leave the flight area is \
 refused: it is spent, and the drone stays where it is.
 
@@ -98,16 +105,39 @@ of the target (about 1 m from its surface), and a failure anywhere else;
 does an answer that cannot be read.
 
 ANSWER
-Answer with one JSON object and nothing else, no text around it:
-{{"thought": "<one or two sentences: what you see, where you go>", "action": "<one name from the list above>"}}"""
+{_form(actions, form)}"""
 
 
-def _action_list() -> str:
-    lines = []
-    for name in CHOICES:
-        kind = name.rstrip("0123456789")
-        lines.append(f"- {name}: {_EFFECTS[kind].format(name.removeprefix(kind))}")
-    return "\n".join(lines)
+def _sensors(sight: Sight) -> str:
+    if not sight.views:
+        return "You see nothing."
+    cameras = ", ".join(f"{view} (looks {_LOOKS[view]})" for view in sight.views)
+    text = (
+        f"Before every action you see a colour picture from each of these cameras: {cameras}. Each picture has "
+        f"{sight.width} x {sight.height} pixels and a horizontal field of view of {sight.fov_deg:g}°."
+    )
+    if sight.depth:
+        text += (
+            " With each comes a depth map of the same view and size, in grey: the value of a pixel is its distance"
+            f" along the optical axis, linear from black at 0 m to white at {sight.max_depth_m:g} m; what is farther,"
+            f" or open sky, is white. A pixel of value v is v / 255 x {sight.max_depth_m:g} m away."
+        )
+    if sight.past_pictures:
+        steps = "the step before" if sight.past_pictures == 1 else f"up to {sight.past_pictures} earlier steps"
+        text += f" The {sight.views[0]} camera's colour picture of {steps} is shown again."
+    return text
+
+
+def _form(actions: ActionSet, form: str) -> str:
+    if form == "tool":
+        return 'Call the tool "act" once, with one name from the list above as its action.'
+    return (
+        "Answer with one JSON object and nothing else, no text around it. Its JSON schema:\n"
+        f"{json.dumps(actions.schema())}\n"
+        "That is:\n"
+        '{"thought": "<one or two sentences: what you see, where you go>", '
+        '"action": "<one name from the list above>"}'
+    )
 
 
 def goal_text(goal: Goal) -> str:
@@ -146,9 +176,9 @@ def step_text(observation: Observation, turns: Sequence[Turn]) -> str:
     return "\n".join(lines)
 
 
-def repair_text(why: str) -> str:
+def repair_text(why: str, actions: ActionSet = SIXTEEN) -> str:
     """Ask for a readable answer, once."""
     return (
         f"This answer cannot be read: {why}. Answer again, with the JSON object alone: "
-        '{"thought": "...", "action": "<one of ' + ", ".join(CHOICES) + '>"}'
+        '{"thought": "...", "action": "<one of ' + ", ".join(actions.names) + '>"}'
     )

@@ -1,0 +1,116 @@
+"""An agent, asked with care: what it may raise or return, and what it is told when it does something else."""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Callable
+from typing import Any
+
+from aerialdojo_gen.benchmark.agents import Agent, InvalidAnswer, Usage
+from aerialdojo_gen.benchmark.agents.load import place
+from aerialdojo_gen.benchmark.goal import N_ACTIONS, Goal, Observation
+from aerialdojo_gen.benchmark.secrets import Secrets
+from aerialdojo_gen.errors import AerialDojoError
+
+_TOLERATED = "--tolerate logs such episodes as failures and goes on"
+
+
+class AgentError(AerialDojoError):
+    """An agent raised or returned what it may not: a defect of the agent's."""
+
+
+class Asked:
+    """Asks an agent.
+
+    Parameters
+    ----------
+    agent : Agent
+    name : str
+        For messages.
+    secrets : Secrets
+        Kept out of messages and answers.
+    tolerate : bool
+        Take a value that is no action for an answer that names none, instead of raising.
+    """
+
+    def __init__(self, agent: Agent, name: str, secrets: Secrets, tolerate: bool = False) -> None:
+        self._agent, self._name, self._secrets, self._tolerate = agent, name, secrets, tolerate
+        # Looked up once: they are asked at every step.
+        self._answer: Any = getattr(agent, "answer", None)
+        self._used: Any = getattr(agent, "usage", None)
+        self.task = ""
+
+    def reset(self, task_id: str, goal: Goal) -> None:
+        """Begin an episode.
+
+        Raises
+        ------
+        AgentError
+            The agent raised what it may not.
+        """
+        self.task = task_id
+        try:
+            self._call("reset", self._agent.reset, goal)
+        except InvalidAnswer as error:
+            raise self._wrong(f"raised InvalidAnswer in reset, where there is nothing to answer: {error}") from error
+
+    def act(self, observation: Observation) -> int | None:
+        """Ask for an action; None for an answer that names none.
+
+        Raises
+        ------
+        AgentError
+            The agent raised what it may not, or returned what is no action.
+        """
+        try:
+            answer = self._call("act", self._agent.act, observation)
+        except InvalidAnswer:
+            return None
+        try:
+            action = None if isinstance(answer, bool) else operator.index(answer)
+        except TypeError:
+            action = None
+        if action is not None and 0 <= action < N_ACTIONS:
+            return action
+        if self._tolerate:
+            return None
+        raise self._wrong(
+            f"returned {_short(answer)} from act, where an action is expected: a whole number from 0 (Stop) to "
+            f"{N_ACTIONS - 1}; an agent whose answer names none raises InvalidAnswer. --tolerate counts it as that"
+        )
+
+    def answer(self) -> str | None:
+        """Return the words behind the last action, without secrets."""
+        if self._answer is None:
+            return None
+        said = self._call("answer", self._answer)
+        # No file can hold half of a surrogate pair.
+        return self._secrets.text(said.encode("utf-8", "replace").decode("utf-8")) if isinstance(said, str) else None
+
+    def usage(self) -> Usage | None:
+        """Return what was used since the last `reset`."""
+        used = self._call("usage", self._used) if self._used is not None else None
+        if used is None or isinstance(used, Usage):
+            return used
+        raise self._wrong(f"returned {_short(used)} from usage, where Usage or None is expected")
+
+    def _call(self, what: str, question: Callable[..., Any], *about: Any) -> Any:
+        try:
+            return question(*about)
+        except AerialDojoError:
+            raise
+        except (Exception, SystemExit) as error:
+            # SystemExit too: an agent that gives up ends its episode, not the run without a word.
+            raise self._wrong(f"{place(error)} (in {what}); {_TOLERATED}") from error
+
+    def _wrong(self, what: str) -> AgentError:
+        line = " ".join(f"agent {self._name} failed at task {self.task}: {what}".split())
+        return AgentError(self._secrets.text(line.encode("utf-8", "replace").decode("utf-8"))[:600])
+
+
+def _short(value: Any) -> str:
+    try:
+        text = repr(value)
+    except Exception:
+        text = "something"
+    return f"{text[:60]} ({type(value).__name__})"

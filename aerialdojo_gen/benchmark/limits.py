@@ -1,0 +1,69 @@
+"""When a run ends before its tasks do: money, tokens, and failures in a row."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from aerialdojo_gen.benchmark.worker import Failed, Finished
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What a run may spend and bear, over all calls for it.
+
+    Attributes
+    ----------
+    cost_usd : float or None
+        Begin no episode once so much is spent.
+    tokens : int or None
+        Begin no episode once so many are spent, both ways.
+    failures_in_row : int
+        Begin no episode once so many have failed of one kind, one after the other: what fails for all tasks should
+        not use all of them up.
+    """
+
+    cost_usd: float | None = None
+    tokens: int | None = None
+    failures_in_row: int = 5
+
+
+class Tally:
+    """Counts what is finished, and says when it is enough.
+
+    Parameters
+    ----------
+    limits : Limits
+    cost_usd, tokens : float, int
+        Spent by earlier calls.
+    """
+
+    def __init__(self, limits: Limits, cost_usd: float, tokens: int) -> None:
+        self._limits = limits
+        self.cost_usd, self.tokens = cost_usd, tokens
+        self.episodes = self.actions = 0
+        self.streak: tuple[Failed, ...] = ()
+
+    def add(self, finished: Finished) -> None:
+        """Count what was finished."""
+        self.cost_usd += finished.cost_usd
+        self.tokens += finished.tokens
+        self.episodes += finished.episodes
+        self.actions += finished.actions
+        self.streak = finished.streak if finished.flown else self.streak + finished.streak
+
+    @property
+    def failing(self) -> Failed | None:
+        """What has failed too often in a row; None where nothing has."""
+        n = self._limits.failures_in_row
+        last = self.streak[-n:]
+        return last[-1] if len(last) == n and len({failed.kind for failed in last}) == 1 else None
+
+    @property
+    def spent(self) -> str:
+        """The limit that is reached, as its option; empty where none is."""
+        limits = self._limits
+        if limits.cost_usd is not None and self.cost_usd >= limits.cost_usd:
+            return f"--max-cost {limits.cost_usd:g}"
+        if limits.tokens is not None and self.tokens >= limits.tokens:
+            return f"--max-tokens {limits.tokens}"
+        return ""

@@ -1,0 +1,128 @@
+"""An HTTP client for the client packages: bounded in size and time, paced, and timed."""
+
+from __future__ import annotations
+
+import email.utils
+import json
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+MAX_BODY_BYTES = 4 << 20
+# Longest wait for a connection: whoever listens accepts one long before it has an answer.
+CONNECT_S = 10.0
+
+
+class BodyBoundError(Exception):
+    """A service sent more, or took longer, than it may, or something that is no JSON."""
+
+
+@dataclass
+class Meter:
+    """Counts requests, and the time that they take.
+
+    Attributes
+    ----------
+    requests : int
+        Sent, repeated ones too.
+    seconds, longest_s : float
+        From sending a request to having its answer whole: of all together, and of the longest.
+    pace : callable, optional
+        Called before each request; waits until one may be sent.
+    """
+
+    requests: int = 0
+    seconds: float = 0.0
+    longest_s: float = 0.0
+    pace: Callable[[], None] | None = None
+
+    def reset(self) -> None:
+        """Begin to count anew."""
+        self.requests, self.seconds, self.longest_s = 0, 0.0, 0.0
+
+    def add(self, seconds: float) -> None:
+        """Count a request."""
+        self.requests += 1
+        self.seconds += seconds
+        self.longest_s = max(self.longest_s, seconds)
+
+
+def bounded_client(base: Any, timeout: Any, whole_s: float, meter: Meter) -> Any:
+    """Make an HTTP client whose responses are bounded.
+
+    The client packages read a body whole, an error's too, however long it is; and their time-out is one a read, which
+    a server that drips never exceeds. Redirects are not followed: they would carry the key elsewhere.
+
+    Parameters
+    ----------
+    base : type
+        The package's own ``DefaultHttpxClient``.
+    timeout : object
+        The package's own ``Timeout``, for connecting and for a read.
+    whole_s : float
+        For a whole response, seconds.
+    meter : Meter
+        Counts the requests, and paces them.
+
+    Returns
+    -------
+    object
+        An instance of a subclass of `base`.
+    """
+
+    class BoundedClient(base):  # type: ignore[misc]  # a class that is known at run time alone
+        def send(self, request: Any, *, stream: bool = False, **options: Any) -> Any:
+            if meter.pace is not None:
+                meter.pace()
+            began = time.monotonic()
+            try:
+                response = super().send(request, stream=True, **options)
+                body = _whole(response, began + whole_s, whole_s)
+            finally:
+                meter.add(time.monotonic() - began)
+            if response.status_code == 200:
+                _check_json(body)
+            framing = ("content-encoding", "content-length", "transfer-encoding")
+            headers = [(k, v) for k, v in response.headers.items() if k.lower() not in framing]
+            return type(response)(response.status_code, headers=headers, content=body, request=request)
+
+    return BoundedClient(timeout=timeout, follow_redirects=False)
+
+
+def _whole(response: Any, deadline: float, whole_s: float) -> bytes:
+    body = bytearray()
+    try:
+        for chunk in response.iter_bytes():
+            body += chunk
+            if len(body) > MAX_BODY_BYTES:
+                raise BodyBoundError(f"its answer is larger than {MAX_BODY_BYTES >> 20} MiB")
+            if time.monotonic() > deadline:
+                raise BodyBoundError(f"its answer is not complete after {whole_s:g} s")
+    finally:
+        response.close()
+    return bytes(body)
+
+
+def _check_json(body: bytes) -> None:
+    # Here, so that the packages never parse what makes their parser raise: 5,000-digit numbers, deep nesting.
+    try:
+        json.loads(body)
+    except (ValueError, RecursionError):
+        said = body[:200].decode("utf-8", "replace").split("\n", 1)[0].strip()
+        raise BodyBoundError(f"its answer is no JSON: is base_url right? It begins with {said[:80]!r}") from None
+
+
+def retry_after_s(headers: Mapping[str, str]) -> float | None:
+    """Read ``Retry-After``: seconds or an HTTP date; None where there is none that can be read."""
+    value = headers.get("retry-after", "").strip()
+    if not value:
+        return None
+    try:
+        seconds = float(value)
+    except ValueError:
+        try:
+            seconds = email.utils.parsedate_to_datetime(value).timestamp() - time.time()
+        except (ValueError, TypeError, OverflowError):
+            return None
+    return max(0.0, seconds) if seconds < float("inf") else None

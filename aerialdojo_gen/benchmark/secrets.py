@@ -1,0 +1,84 @@
+"""Keys stay out of what is written: options, answers and messages are cleaned by name and by value."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any
+
+REDACTED = "[redacted]"
+
+_SECRET_WORDS = frozenset((
+    "apikey", "auth", "authorization", "bearer", "cookie", "credential", "credentials", "key", "passphrase", "passwd",
+    "password", "pwd", "secret", "secrets", "sig", "signature", "token",
+))  # fmt: skip
+_WORD = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+")
+# Shorter values of environment variables are words like "true", which stand anywhere.
+_LEAST_CHARACTERS = 8
+_PATTERNS = (
+    (re.compile(r"(?i)\b(bearer|basic)\s+[\w.~+/=-]{8,}"), rf"\1 {REDACTED}"),
+    (re.compile(r"\b(?:(?:sk|pk|xai|gsk|hf|gh[pousr])[-_]|AIza)(?=[\w-]*\d)[\w-]{16,}"), REDACTED),
+    # A name and a password in a URL, and a key in its query.
+    (re.compile(r"(\b[a-zA-Z][\w+.-]*://)[^/\s@\"']+@"), rf"\1{REDACTED}@"),
+    (re.compile(r"(?i)([?&][\w.-]*(?:key|token|secret|password|sig|signature)=)[^&\s\"']+"), rf"\1{REDACTED}"),
+)
+
+
+def is_secret_name(name: str) -> bool:
+    """Whether a thing of this name (an option, a header, a variable) holds a secret: ``api_key``, ``X-Auth-Token``.
+
+    ``key_env`` and the like name a variable and hold none.
+    """
+    return not name.endswith("_env") and any(word.lower() in _SECRET_WORDS for word in _WORD.findall(name))
+
+
+class Secrets:
+    """The secrets that a run knows of, to be kept out of what it writes.
+
+    Parameters
+    ----------
+    options : mapping
+        Options of an agent: strings in them whose name, or that of what they stand in, is a secret's.
+    values : iterable of str
+        Known secrets besides. Those of the environment's variables with a secret's name are always among them.
+    """
+
+    def __init__(self, options: Mapping[str, Any] | None = None, values: Iterable[str] = ()) -> None:
+        found = {value for name, value in os.environ.items() if is_secret_name(name)}
+        found |= set(_under_secret_names(options or {})) | set(values)
+        # The longest first: one may be the beginning of another.
+        known = sorted({v for v in found if len(v.strip()) >= _LEAST_CHARACTERS}, key=len, reverse=True)
+        self._known = known
+
+    def text(self, text: str) -> str:
+        """Return a text without secrets."""
+        for value in self._known:
+            text = text.replace(value, REDACTED)
+        for pattern, instead in _PATTERNS:
+            text = pattern.sub(instead, text)
+        return text
+
+    def options(self, value: Any) -> Any:
+        """Return options, or a part of them, without secrets: by their names, and by what they look like."""
+        return self._clean(value, hidden=False)
+
+    def _clean(self, value: Any, hidden: bool) -> Any:
+        if isinstance(value, Mapping):
+            return {self.text(str(k)): self._clean(v, hidden or is_secret_name(str(k))) for k, v in value.items()}
+        if isinstance(value, (list, tuple)):
+            return [self._clean(item, hidden) for item in value]
+        if isinstance(value, str):
+            return REDACTED if hidden and value else self.text(value)
+        return value
+
+
+def _under_secret_names(value: Any, hidden: bool = False) -> Iterator[str]:
+    if isinstance(value, Mapping):
+        for key, inner in value.items():
+            yield from _under_secret_names(inner, hidden or is_secret_name(str(key)))
+    elif isinstance(value, (list, tuple)):
+        for inner in value:
+            yield from _under_secret_names(inner, hidden)
+    elif isinstance(value, str) and hidden:
+        yield value
