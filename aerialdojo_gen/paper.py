@@ -1,6 +1,6 @@
 """The paper's own figures, carried as CSV files beside the pipelines.
 
-Its Tables 1, 2, 4, 5 and 10, its table of splits, and the shares that its appendix C names; each file names its source.
+Its Tables 1, 2, 4, 5 and 10, its table of splits, and the shares that its appendix C names.
 """
 
 from __future__ import annotations
@@ -135,7 +135,7 @@ def benchmarks() -> tuple[dict[str, str], ...]:
 
 @cache
 def family_counts() -> dict[str, dict[str, float]]:
-    """Read the paper's Table 2 by family: types, scenes, landmarks, objects, anchors, instances by setting, path_km."""
+    """Read the paper's Table 2 by family: types, scenes, landmarks, objects, anchors, instances, path_km."""
     return {
         row["family"]: {name: float(value) for name, value in row.items() if name not in ("family", "source")}
         for row in _rows("families.csv")

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pyarrow as pa
 
 from aerialdojo_gen import store
 from aerialdojo_gen.benchmark.breakdowns import part_table
@@ -54,10 +54,7 @@ def difficulty_tables(data: Path, runs: Sequence[Run], profile: Profile) -> list
         values = [_values(run, name, released) for run in runs]
         if all(v is not None for v in values):
             bounds = [-np.inf, *edges, np.inf]
-            parts = [
-                (_range(low, high), [_within(v, low, high) for v in values])
-                for low, high in zip(bounds[:-1], bounds[1:], strict=True)
-            ]
+            parts = [(_range(low, high), [_within(v, low, high) for v in values]) for low, high in pairwise(bounds)]
             tables.append(part_table(title, runs, profile, parts))
     return [table for table in tables if table is not None]
 
@@ -82,9 +79,8 @@ def _values(run: Run, name: str, released: _Released) -> list[Any] | None:
         return list(run.table[name].to_pylist())
     keys = run.table.select(["scene", "subset", "nav_id"]).to_pylist()
     if name == "detour_ratio":
-        straight = run.episodes.euclidean_m
-        ratios = np.divide(run.episodes.reference_length_m, straight, out=np.full_like(straight, np.inf), where=straight > 0)
-        return list(ratios.tolist())
+        straight, flown = run.episodes.euclidean_m, run.episodes.reference_length_m
+        return list(np.divide(flown, straight, out=np.full_like(flown, np.inf), where=straight > 0.0).tolist())
     found = [released.value(row["scene"], row["subset"], row["nav_id"], name) for row in keys]
     return found if any(value is not None for value in found) else None
 
@@ -105,22 +101,18 @@ class _Released:
     def _read(self, scene: str, subset: str, name: str) -> dict[str, Any]:
         for table in ("routes", "tasks"):
             if name in store.LAYOUT[f"{table}/{subset}"].spec.schema.names:
-                return _by_task(lambda t=table: self._table(t, scene, subset, name), name)
+                return self._column(table, scene, subset, name)
         if name != "target_seen_in_train":
             return {}
         # Not every release says it; the targets of its routes do.
-        shown = set(_by_task(lambda: self._table("routes", scene, "train", "target_object_id"), "target_object_id").values())
-        asked = _by_task(lambda: self._table("routes", scene, subset, "target_object_id"), "target_object_id")
+        shown = set(self._column("routes", scene, "train", "target_object_id").values())
+        asked = self._column("routes", scene, subset, "target_object_id")
         return {nav_id: target in shown for nav_id, target in asked.items()}
 
-    def _table(self, table: str, scene: str, subset: str, name: str) -> pa.Table:
-        return store.read_scene(self._data, f"{table}/{subset}", scene, ["nav_id", name])
-
-
-def _by_task(read: Callable[[], pa.Table], name: str) -> dict[str, Any]:
-    try:
-        table = read()
-    except StoreError:
-        # No release, or one of another version: the log speaks for itself.
-        return {}
-    return dict(zip(table["nav_id"].to_pylist(), table[name].to_pylist(), strict=True))
+    def _column(self, table: str, scene: str, subset: str, name: str) -> dict[str, Any]:
+        try:
+            found = store.read_scene(self._data, f"{table}/{subset}", scene, ["nav_id", name])
+        except StoreError:
+            # No release, or one of another version: the log speaks for itself.
+            return {}
+        return dict(zip(found["nav_id"].to_pylist(), found[name].to_pylist(), strict=True))

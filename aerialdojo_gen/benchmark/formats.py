@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 from aerialdojo_gen.benchmark.grid import BEST, SECOND, Table
 
@@ -31,22 +31,29 @@ def as_text(table: Table, width: int | None = None, ansi: bool = False) -> str:
     heads = [name for _, names in table.groups for name in names]
     over = [group for group, names in table.groups for _ in names]
     lines: list[list[str]] = [heads, *(list(cells) for _, cells in table.rows)]
-    marked = {k for _, k in table.marks}
     if not ansi:
+        bare = {k for i, k in table.marks if " ± " not in lines[i + 1][k]}
         for i, line in enumerate(lines):
-            for k in marked:
-                line[k] += _SIGNS.get(table.marks.get((i - 1, k), ""), " ")
+            for k in range(len(heads)):
+                sign = _SIGNS.get(table.marks.get((i - 1, k), ""), " ")
+                # The mean is what is marked: the sign takes the place of the blank behind it.
+                line[k] = line[k].replace(" ± ", f"{sign}± ") if " ± " in line[k] else line[k] + sign * (k in bare)
     widths = [max(len(line[k]) for line in lines) for k in range(len(heads))]
     indent = "  " if table.sections else ""
-    stub = max(len(table.stub), *(len(indent + label) for label, _ in table.rows), 0) if table.rows else 0
-    stub = max(stub, len(table.stub))
+    stub = max(len(table.stub), *(len(indent + label) for label, _ in table.rows), 0)
     out = [table.title]
-    for columns in _blocks(over, widths, stub, width):
+    for n, columns in enumerate(_blocks(over, widths, stub, width)):
+        out += [""] if n else []
         out += _block(table, columns, heads, over, lines[1:], list(widths), stub, indent, ansi)
-    notes = [*table.notes]
-    if table.marks:
-        notes.append("Bold: best; underlined: second." if ansi else "¹ best, ² second.")
-    return "\n".join([*out, *(part for note in notes for part in _wrapped(note, width))])
+    return "\n".join([*out, *(part for note in table.notes for part in _wrapped(note, width))])
+
+
+def legend(tables: Sequence[Table], ansi: bool = False) -> str:
+    """Say what the marks in tables for a terminal mean; empty where there are none."""
+    if not any(table.marks for table in tables):
+        return ""
+    what = "Bold: best; underlined: second" if ansi else "¹ best, ² second"
+    return f"{what} of those compared; the oracle, which is given the way, is not."
 
 
 def _blocks(over: list[str], widths: list[int], stub: int, width: int | None) -> Iterable[list[int]]:
@@ -62,11 +69,11 @@ def _blocks(over: list[str], widths: list[int], stub: int, width: int | None) ->
         return width is None or _breadth(columns, over, widths, stub) <= width
 
     block: list[int] = []
-    for group in groups:
-        if block and not fits(block + group):
+    for together in groups:
+        if block and not fits(block + together):
             yield block
             block = []
-        for k in group:
+        for k in together:
             if block and not fits([*block, k]):
                 yield block
                 block = []
@@ -116,7 +123,8 @@ def _block(
 
     out = [top.rstrip()] if top.strip() else []
     out.append(line(table.stub, heads, None))
-    shown = [(f"{indent}{label}", cells, i) for i, ((label, _), cells) in enumerate(zip(table.rows, body, strict=True))]
+    labels = [f"{indent}{label}" for label, _ in table.rows]
+    shown = [(label, cells, i) for i, (label, cells) in enumerate(zip(labels, body, strict=True))]
     rule = "-" * max(map(len, [*out, *(line(label, cells, None) for label, cells, _ in shown)]))
     out.append(rule)
     for label, cells, i in shown:
@@ -135,7 +143,8 @@ def _wrapped(note: str, width: int | None) -> list[str]:
 def as_markdown(table: Table) -> str:
     """Write a table in Markdown; a column's head has its group's, for Markdown knows no groups."""
     heads = [table.stub, *(f"{group}: {name}" if group else name for group, names in table.groups for name in names)]
-    lines = [f"**{_plain(table.title)}**", "", _pipes(map(_plain, heads)), _pipes(["---", *["---:"] * (len(heads) - 1)])]
+    rule = ["---", *["---:"] * (len(heads) - 1)]
+    lines = [f"**{_plain(table.title)}**", "", _pipes(map(_plain, heads)), _pipes(rule)]
     marks = {BEST: "**{}**", SECOND: "<ins>{}</ins>"}
     for i, (label, cells) in enumerate(table.rows):
         if i in table.sections:

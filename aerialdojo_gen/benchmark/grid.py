@@ -175,7 +175,7 @@ def score_table(
 
 
 def _interval(measure: Measure, low: float, high: float) -> str:
-    return NONE if math.isnan(low) else f"[{measure.text(low)}, {measure.text(high)}]"
+    return NONE if math.isnan(low) else f"{measure.text(low)}–{measure.text(high)}"
 
 
 def _marks(measure: Measure, lines: Sequence[Line], k: int) -> dict[int, str]:

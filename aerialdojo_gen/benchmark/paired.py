@@ -34,8 +34,8 @@ def paired_tables(runs: Sequence[Run], profiles: Sequence[Profile]) -> list[Tabl
 
 def _same_tasks(first: Run, second: Run) -> tuple[Run, Run]:
     """Cut two runs down to the tasks that both have flown, in one order."""
-    tasks = [np.array(run.table["task_id"].to_pylist()) for run in (first, second)]
-    both = np.intersect1d(*tasks)
+    tasks = [np.array(run.table["task_id"].to_pylist(), dtype=np.str_) for run in (first, second)]
+    both = np.intersect1d(tasks[0], tasks[1])
     if not len(both):
         raise UsageError(f"{first.name} and {second.name} have no task in common: fly both on the same ones")
     cut = []
@@ -50,8 +50,8 @@ def _table(first: Run, second: Run, profile: Profile) -> Table:
     result = paired(first.episodes, second.episodes, success, profile)
     rows = [(HEADS[metric], _cells(result, k, metric)) for k, metric in enumerate(METRICS)]
     notes = [
-        f"{result.tasks:,} tasks of {result.scenes} scenes, flown by both. The interval draws scenes anew within their "
-        "family; p is that of a permutation test which exchanges the two agents scene by scene, two-sided.",
+        f"{result.tasks:,} tasks of {result.scenes} scenes, flown by both. The interval draws scenes anew within "
+        "their family; p is that of a permutation test which exchanges the two agents scene by scene, two-sided.",
         f"Solved by {first.label} alone: {result.only_first:,}; by {second.label} alone: {result.only_second:,} "
         f"(McNemar's exact p {_p(result.p_mcnemar)}, which takes episodes for independent).",
     ]

@@ -75,7 +75,7 @@ def _result_table(
     lines += [_paper_line(result, shown) for result in beside]
     notes = ["Mean of the families, each the mean of its scenes; ± is the standard deviation over scenes."]
     if any(not math.isnan(low) for line in lines for low, _ in line.intervals):
-        notes[0] += " In brackets: 95 % bootstrap interval, scenes drawn anew within their family."
+        notes[0] += " Below: 95 % bootstrap interval, scenes drawn anew within their family."
     counts = {len(run.episodes) for run in runs}
     if len(counts) == 1:
         notes.append(f"{counts.pop():,} episodes each.")

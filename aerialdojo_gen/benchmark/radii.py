@@ -27,7 +27,8 @@ def at_radius(profile: Profile, radius_m: float) -> Profile:
     if radius_m == profile.radius_m:
         return profile
     name = "aerialdojo" if profile.name.startswith("aerialdojo") else profile.name
-    return replace(profile, name=f"{name}-{radius_m:g}m", radius_m=radius_m, about=f"{profile.name} at {radius_m:g} m")
+    about = f"{profile.name} at {radius_m:g} m"
+    return replace(profile, name=f"{name}-{radius_m:g}m", radius_m=radius_m, about=about)
 
 
 def radius_table(runs: Sequence[Run], profile: Profile, radii_m: Sequence[float] = DEFAULT_RADII_M) -> Table:
@@ -61,11 +62,12 @@ def radius_table(runs: Sequence[Run], profile: Profile, radii_m: Sequence[float]
         lines.append(line_of(run, tuple(float(v) for v in values), rivals=section, section=section))
         rates.setdefault(section, []).append((run.label, sr))
     heads = [f"{radius:g} m" for radius in radii]
+    gains = [Measure(f"{near:g}→{far:g} m", "sr", signed=True) for near, far in pairwise(radii)]
     groups = [
         ("SR ↑", [Measure(h, "sr") for h in heads]),
         ("OSR, at poses ↑", [Measure(h, "osr") for h in heads]),
         *([("OSR, along the way ↑", [Measure(h, "osr") for h in heads])] if swept else []),
-        *([("SR gain, points", [Measure(f"{a:g}→{b:g} m", "sr", True) for a, b in pairwise(radii)])] if radii[1:] else []),
+        *([("SR gain, points", gains)] if gains else []),
         ("OSR − SR, points", [Measure(h, "sr", True) for h in heads]),
     ]
     notes = ["OSR at poses is the paper's: the distance is taken after every action."]
@@ -94,7 +96,9 @@ def _reversals(section: str, radii: Sequence[float], ranked: Sequence[tuple[str,
 
 def visit_table(runs: Sequence[Run], profile: Profile) -> Table:
     """Say where visits are lost: episodes that were within the radius and are no success, by how they ended."""
-    rows, sections, above = [], {}, ""
+    rows: list[tuple[str, tuple[str, ...]]] = []
+    sections: dict[int, str] = {}
+    above = ""
     for setting in SETTINGS:
         for run in runs:
             part = run.where(run.episodes.setting == setting)
@@ -108,8 +112,9 @@ def visit_table(runs: Sequence[Run], profile: Profile) -> Table:
         ("lost: how they ended, %", ("too far", "collided", "ran out", "no Stop")),
     )
     notes = (
-        f"Visited: within {profile.radius_m:g} m at some pose. Lost: visited and no success. Too far: stopped outside; "
-        "ran out: of actions, outside; no Stop: ran out of actions within the radius. Episodes, not means of families.",
+        f"Visited: within {profile.radius_m:g} m at some pose. Lost: visited and no success. Too far: "
+        "stopped outside; ran out: of actions, outside; no Stop: ran out of actions within the radius. Episodes are "
+        "counted, families not averaged.",
     )
     return Table(f"Where visits are lost, {profile.radius_m:g} m", "agent", groups, tuple(rows), notes, sections)
 

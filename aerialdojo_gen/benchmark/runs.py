@@ -19,7 +19,6 @@ from aerialdojo_gen.benchmark.swept import STEP_COLUMNS, swept_distances
 from aerialdojo_gen.errors import StoreError
 from aerialdojo_gen.schemas import TERMINATIONS
 
-
 # What is no contender: the one that knows the way, and those that look at nothing.
 UPPER_BOUND, FLOORS = "upper bound", "floors"
 GROUP_OF = {"oracle": UPPER_BOUND, "stop": FLOORS, "constant": FLOORS, "random": FLOORS}

@@ -10,7 +10,7 @@ import io
 import math
 from collections.abc import Callable, Iterable, Sequence
 
-from aerialdojo_gen.benchmark.grid import HEADS, MEASURES, NONE, Line, Measure, Table, score_table, values_of
+from aerialdojo_gen.benchmark.grid import MEASURES, NONE, Line, Measure, Table, score_table, values_of
 from aerialdojo_gen.benchmark.intervals import score_intervals
 from aerialdojo_gen.benchmark.metrics import Episodes
 from aerialdojo_gen.benchmark.profiles import Profile
@@ -18,8 +18,6 @@ from aerialdojo_gen.benchmark.runs import GROUP_OF, UPPER_BOUND, Run, conduct
 from aerialdojo_gen.benchmark.scores import METRICS, Score, Summary, slices, summarize, weighted_score
 from aerialdojo_gen.paper import PaperResult
 from aerialdojo_gen.schemas import FAMILIES, SETTINGS
-
-__all__ = ["HEADS", "Table"]
 
 MODALITIES = ("semantic", "image")
 PARTITIONS = ("ID", "OOD")
@@ -61,19 +59,19 @@ def run_table(
 
 def main_table(runs: Sequence[Run], profiles: Sequence[Profile]) -> Table:
     """Set overall scores side by side, with their deviation over scenes, a group of columns a profile."""
+    # Another radius changes neither the distance at the end nor the collisions.
+    shown = [(p, MEASURES[:3] if k and p.planar == profiles[0].planar else MEASURES) for k, p in enumerate(profiles)]
     lines, notes = [], []
     for run in runs:
         values: tuple[float, ...] = ()
         spreads: tuple[float, ...] = ()
-        for profile in profiles:
+        for profile, measures in shown:
             summary = summarize(run.episodes, profile)
-            values += values_of(summary.overall)
-            spreads += values_of(summary.deviation)
+            values += values_of(summary.overall, measures)
+            spreads += values_of(summary.deviation, measures)
         line = line_of(run, values)
-        lines.append(
-            Line(line.label, values, line.section, line.rivals, spreads, before=(f"{len(run.episodes):,}",))
-        )
-    groups = [(profile_head(profile), MEASURES) for profile in profiles]
+        lines.append(Line(line.label, values, line.section, line.rivals, spreads, before=(f"{len(run.episodes):,}",)))
+    groups = [(profile_head(profile), measures) for profile, measures in shown]
     notes.append("Mean of the four families, each the mean of its scenes; ± is the standard deviation over scenes.")
     return score_table("Overall", "agent", groups, lines, [*notes, *caveats(runs)], ("episodes",))
 
@@ -132,8 +130,8 @@ def scene_table(runs: Sequence[Run], profile: Profile) -> Table:
 
 def conduct_table(runs: Sequence[Run]) -> Table:
     """Say how episodes ended, and what an outside service was asked."""
-    rows = []
-    sections = {}
+    rows: list[tuple[str, tuple[str, ...]]] = []
+    sections: dict[int, str] = {}
     above = ""
     for run in runs:
         c = conduct(run)
@@ -150,13 +148,6 @@ def conduct_table(runs: Sequence[Run]) -> Table:
         ("service", ("requests", "tokens in", "tokens out", "USD")),
     )
     return Table("How episodes went", "agent", groups, tuple(rows), sections=sections)
-
-
-def tables_of(runs: Sequence[Run], profiles: Sequence[Profile]) -> list[Table]:
-    """Make the tables of all episodes; all but the first judge by the first profile."""
-    first = profiles[0]
-    by_part = [family_table(runs, first), slice_table(runs, first, "setting"), slice_table(runs, first, "modality")]
-    return [main_table(runs, profiles), *by_part, conduct_table(runs)]
 
 
 _CSV_HEAD = ("run", "agent", "profile", "radius_m", "setting", "modality", "scope", "name", "episodes")

@@ -52,14 +52,15 @@ def report(
     table: Annotated[
         list[str] | None,
         typer.Option("--table", help="Print these tables, repeatable: overall, results, partition, family, averages, "
-                                     "setting, goal, modality, radius, visits, difficulty, conduct, type, scene, all."),
+                                     "setting, goal, modality, radius, visits, difficulty, conduct, type, "
+                                     "scene, all."),
     ] = None,
     radius: Annotated[
         list[float] | None,
         typer.Option("--radius", min=0.0, help="Radii of the table of radii, m: --radius 1 3 5 10.  (default: 3 5)"),
     ] = None,
     beside: Annotated[
-        Literal["paper"] | None, typer.Option("--beside", help="paper: set the paper's results below, from its simulator.")
+        Literal["paper"] | None, typer.Option("--beside", help="paper: set its own results below, of its simulator.")
     ] = None,
     paired: Annotated[
         bool, typer.Option("--paired", help="Compare two runs on the tasks that both have flown.")
@@ -72,7 +73,7 @@ def report(
         bool, typer.Option("--intervals/--no-intervals", help="Print 95 % intervals below the results.")
     ] = True,
     floors: Annotated[
-        bool, typer.Option("--floors/--no-floors", help="Add stop, constant and random where they flew the same tasks.")
+        bool, typer.Option("--floors/--no-floors", help="Add stop, constant, random where they flew the same tasks.")
     ] = True,
     style: Annotated[
         Literal["terminal", "markdown", "latex", "csv"], typer.Option("--format", help="What is printed.")
@@ -85,7 +86,7 @@ def report(
     frames: Annotated[bool, typer.Option("--frames", help="Render front pictures along the replays.")] = False,
 ) -> None:  # fmt: skip
     """Score runs of evaluate: SR, OSR, SPL, DTS, CR as tables, figures, a page."""
-    from aerialdojo_gen.benchmark import contents, formats, tables
+    from aerialdojo_gen.benchmark import contents, tables
     from aerialdojo_gen.benchmark.floors import arranged, with_floors
     from aerialdojo_gen.benchmark.paired import paired_tables
     from aerialdojo_gen.benchmark.profiles import DEFAULT_PROFILES, profile_named
@@ -123,7 +124,8 @@ def _show(tables: Any, style: str) -> None:
     if style == "terminal":
         ansi = sys.stdout.isatty()
         width = shutil.get_terminal_size((_WIDTH, 24)).columns
-        print("\n\n".join(formats.as_text(table, width, ansi) for table in tables))
+        parts = [*(formats.as_text(table, width, ansi) for table in tables), formats.legend(tables, ansi)]
+        print("\n\n".join(filter(None, parts)))
     else:
         print("\n\n".join(formats.FORMATS[style](table) for table in tables))
 
