@@ -40,11 +40,11 @@ def stats(
 
     from aerialdojo_gen.release.comparison import as_csv, as_markdown
     from aerialdojo_gen.release.contents import check_release
-    from aerialdojo_gen.release.stats import in_paper_order, made_of, tables
+    from aerialdojo_gen.release.stats import benchmark_table, in_paper_order, made_of, tables
 
     names = check_release(data, runner.choose_scenes(scene, released) if scene else None)
     made = in_paper_order([made_of(data, name) for name in names])
-    compared = tables(made)
+    compared = [*tables(made), benchmark_table(made)]
     for path, text in ((markdown, as_markdown(compared)), (csv, as_csv(compared))):
         if path:
             with atomic_file(path.parent, path.name) as temporary:
