@@ -1,4 +1,4 @@
-"""Figures of a release, as PNG and SVG: composition, shares, lengths, detours, categories, names, maps of the scenes."""
+"""Figures of a release, as PNG and SVG: what it consists of, lengths, detours, categories, names, maps."""
 
 from __future__ import annotations
 
