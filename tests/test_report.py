@@ -27,6 +27,7 @@ from aerialdojo_gen.benchmark.report import html, write_report
 from aerialdojo_gen.benchmark.runs import Run, conduct, load_runs
 from aerialdojo_gen.benchmark.scores import summarize
 from aerialdojo_gen.errors import AerialDojoError, StoreError
+from aerialdojo_gen.paper import results
 
 AT_3, AT_5 = PROFILES["aerialdojo"], PROFILES["aerialdojo-5m"]
 NASTY = "</script><script>alert(1)</script> & <b>$x_1$ | ä"
@@ -204,6 +205,68 @@ def test_markdown_and_latex_have_every_cell_and_escape_the_rest(runs: list[Run])
         assert {line.count("|") for line in formats.as_markdown(real).splitlines() if "|" in line} == {columns + 1}
 
 
+def test_latex_compiles_or_parses(runs: list[Run], tmp_path: Path) -> None:
+    labelled = [dataclasses.replace(run, label=f"{NASTY} 50% #{k} ~^[{{}}]") for k, run in enumerate(runs)]
+    made = contents.Wanted(Path("no-release"), labelled, [AT_3, AT_5], (1.0, 3.0, 5.0, 10.0), beside=results())
+    text = "\n\n".join(map(formats.as_latex, contents.report_tables(made, ["all"])))
+    if compiler := shutil.which("pdflatex"):
+        head = "\\documentclass{article}\n\\usepackage[a0paper,landscape]{geometry}\n\\usepackage{booktabs}\n"
+        (tmp_path / "t.tex").write_text(f"{head}\\begin{{document}}\n{text}\n\\end{{document}}\n")
+        command = [compiler, "-interaction=nonstopmode", "-halt-on-error", "t.tex"]
+        done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stdout[-2000:]
+        assert (tmp_path / "t.pdf").stat().st_size > 10_000
+    # Without it, what TeX would stumble over: signs that it has no glyph for, braces, environments, columns.
+    assert {c for c in text if ord(c) > 126} <= set("ä")
+    bare = re.sub(r"\\[\\{}&%$#_]", "", text)
+    depth = 0
+    for sign in bare:
+        depth += (sign == "{") - (sign == "}")
+        assert depth >= 0
+    assert depth == 0
+    assert "%" not in bare
+    assert "#" not in bare
+    assert bare.count("$") % 2 == 0
+    assert re.findall(r"\\(begin|end)\{(\w+)\}", text) == [
+        ("begin", "table"), ("begin", "tabular"), ("end", "tabular"), ("end", "table")
+    ] * text.count(r"\toprule")  # fmt: skip
+    for block in re.findall(r"\\begin\{tabular\}.*?\\end\{tabular\}", text, re.DOTALL):
+        columns = len(re.match(r"\\begin\{tabular\}\{(\w+)\}", block)[1])  # type: ignore[index]
+        for row in re.findall(r"^(.*) \\\\$", block, re.MULTILINE):
+            spanned = sum(int(n) - 1 for n in re.findall(r"\\multicolumn\{(\d+)\}", row))
+            assert len(re.findall(r"(?<!\\)&", row)) + spanned == columns - 1, row
+
+
+def test_a_radar_of_agents_that_hardly_solve_anything_is_no_dot(tmp_path: Path) -> None:
+    write_run(tmp_path, "a", "weak", 20)
+    write_run(tmp_path, "b", "oracle", 20)
+    runs = load_runs(tmp_path, ["a", "b"])
+    weak = summarize(runs[0].episodes, AT_3)
+    assert 0.0 < weak.overall.sr < 0.01
+    for draw in (radar.metric_radars, radar.family_radars):
+        figure = draw(runs, AT_3)
+        axes = figure.axes
+        assert [line.get_label() for line in axes[0].lines] == ["weak"]
+        reached = [max(v for v in line.get_ydata() if not math.isnan(v)) for ax in axes for line in ax.lines]
+        # The best family's value lies in the outer half of some axis, and none beyond its end.
+        assert max(reached) > 0.5
+        assert all(0.0 <= value <= 1.0 for value in reached)
+    sr = radar.metric_radars(runs, AT_3).axes[0].lines[0].get_ydata()[:4]
+    ends = radar.axis_end(100.0 * max(s.sr for s in weak.families.values()))
+    assert list(sr) == pytest.approx([100.0 * s.sr / ends for s in weak.families.values()])
+    # Few metres are better than many: outwards.
+    dts = radar.metric_radars(runs, AT_3).axes[3].lines[0].get_ydata()[:4]
+    order = [s.dts_m for s in weak.families.values()]
+    assert np.argsort(dts).tolist() == np.argsort(order)[::-1].tolist()
+
+
+@pytest.mark.parametrize(
+    ("largest", "end"), [(0.0, 1.0), (0.53, 0.6), (0.6, 0.6), (3.2, 4.0), (7.84, 8.0), (58.96, 60.0), (96.0, 100.0)]
+)
+def test_axes_end_at_round_numbers(largest: float, end: float) -> None:
+    assert radar.axis_end(largest, 100.0) == pytest.approx(end)
+
+
 def test_the_csv_holds_every_score_unrounded(runs: list[Run]) -> None:
     rows = list(csv.DictReader(io.StringIO(tables.as_csv(runs, [AT_3, AT_5]))))
     keys = ["run", "profile", "setting", "modality", "scope", "name"]
@@ -275,6 +338,19 @@ def test_the_command_prints_what_is_asked_for(log: Path, tmp_path: Path) -> None
     assert plain.index("explorer") < plain.index("oracle") < plain.index("random")
     assert "uav-on, 20 m" in invoke("random", "--data", str(log), "--profile", "uav-on")
     assert "U_Mall_0" not in plain
+    for part in ("Base (the form of the paper's Table 4)", "ID and OOD scenes, 3 m", "Where visits are lost, 3 m"):
+        assert f"\n{part}\n" in plain
+    assert max(map(len, plain.splitlines())) <= 120
+    only = invoke("random", "explorer", "--data", str(log), "--radius", "1", "3", "5", "10", "--table", "radius")
+    assert re.search(r" {2}1 m +3 m +5 m +10 m", only)
+    assert "1→3 m" in only
+    assert "10m" in invoke("random", "--data", str(log), "--radius", "10", "--format", "csv")
+    assert "Claude Opus 5" in invoke("--data", str(log), "--beside", "paper")
+    assert "Claude Opus 5" not in plain
+    pair = invoke("random", "explorer", "--data", str(log), "--paired")
+    assert pair.startswith("explorer against random, 3 m\n")
+    grouped = invoke("--data", str(log), "--table", "overall", "--group", "open-source=explorer,random")
+    assert "open-source\n  explorer" in grouped
     assert r"U\_Mall\_0" in invoke("--data", str(log), "--by-scene", "--format", "markdown")
     assert invoke("--data", str(log), "--format", "latex").startswith(r"\begin{table}")
     assert invoke("random", "--data", str(log), "--format", "csv").startswith("run,agent,profile")
@@ -287,6 +363,9 @@ def test_the_command_says_in_one_line_what_is_wrong(log: Path, tmp_path: Path) -
         (["--data", str(tmp_path)], "no runs in"),
         (["nobody", "--data", str(log)], "no run 'nobody'"),
         (["--data", str(log), "--profile", "uav"], "no profile 'uav'"),
+        (["--data", str(log), "--table", "visit"], "no table 'visit': did you mean 'visits'"),
+        (["--data", str(log), "--group", "open"], "write heading=run,run"),
+        (["--data", str(log), "--paired"], "compares two runs, not 3"),
     ):
         with pytest.raises(AerialDojoError, match=message) as failure:
             invoke(*arguments)

@@ -17,6 +17,7 @@ from aerialdojo_gen import store
 from aerialdojo_gen.release.figures.style import FAMILY_COLOURS, OTHER_COLOUR, WIDTH_IN, styled
 
 _SIZE_PX = (1440, 720)
+_MARGIN_PX = 8
 # More would be too small to be read in print.
 _MOST_NAMES = 160
 
@@ -69,8 +70,9 @@ def _cloud(homes: Mapping[str, Counter[str]]) -> Figure:
     with styled():
         figure = Figure(figsize=(WIDTH_IN, WIDTH_IN * height / width + 0.3))
         axes = figure.add_axes((0.0, 0.0, 1.0, 1.0 - 0.3 / figure.get_figheight()))
-        axes.set_xlim(0, width)
-        axes.set_ylim(height, 0)
+        # A word may begin at the very edge, and its outline reach over it.
+        axes.set_xlim(-_MARGIN_PX, width + _MARGIN_PX)
+        axes.set_ylim(height + _MARGIN_PX, -_MARGIN_PX)
         axes.set_axis_off()
         shown = set()
         for (word, _), size, (row, column), _, _ in cloud.layout_:

@@ -61,9 +61,13 @@ def _grouped(axes: Axes, names: list[str], counts: list[list[int]], kinds: list[
     for k, (kind, colour) in enumerate(kinds):
         places = np.arange(len(names)) + (k - (len(kinds) - 1) / 2) * width
         bars = axes.bar(places, [row[k] for row in counts], width=0.92 * width, color=colour, label=kind)
-        axes.bar_label(bars, [f"{row[k] / 1000:.3g}k" if row[k] >= 1000 else f"{row[k]}" for row in counts],
-                       padding=1.5, fontsize=5)  # fmt: skip
+        axes.bar_label(bars, [_short(row[k]) for row in counts], padding=1.5, fontsize=5)
     axes.set_xticks(range(len(names)), names)
     axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:,.0f}"))
     axes.set_ylim(0.0, 1.1 * max((max(row) for row in counts), default=1) or 1.0)
     axes.legend(loc="upper right")
+
+
+def _short(count: int) -> str:
+    """Write a count in the little room above a bar: 286, 7.1k, 42k, 114k."""
+    return f"{count}" if count < 1000 else f"{count / 1000:.{3 if count >= 100_000 else 2}g}k"
