@@ -317,7 +317,9 @@ def test_the_folder_of_a_report_is_whole_and_the_same_bytes_each_time(runs: list
 def test_a_page_loads_nothing_and_escapes_everything(log: Path) -> None:
     (run,) = load_runs(log, ["random"])
     nasty = Run(NASTY, NASTY, NASTY, '{"x": "' + NASTY + '"}', run.table, run.episodes)
-    page = html(wanted([nasty], AT_3), [], dict.fromkeys(("families", "radar", "radius"), b"<svg/>"))
+    made = wanted([nasty], AT_3)
+    figures = dict.fromkeys(("families", "radar", "radius"), b"<svg/>")
+    page = html(made, [], figures, contents.named_tables(made, ["all"]))
     assert "alert(1)</script>" not in page
     assert page.count("<script") == page.count("</script>") == 1
     assert not re.search(r'(?:src|href)="(?!data:)', page)

@@ -90,10 +90,15 @@ def report_tables(wanted: Wanted, names: Sequence[str] = DEFAULT) -> list[Table]
     UsageError
         There is no table of that name.
     """
+    return [table for made in named_tables(wanted, names).values() for table in made]
+
+
+def named_tables(wanted: Wanted, names: Sequence[str]) -> dict[str, list[Table]]:
+    """Make tables as `report_tables` does, by the names that they go by."""
     for name in names:
         if name not in (*NAMES, "all"):
             near = difflib.get_close_matches(name, NAMES, n=1)
             hint = f"did you mean {near[0]!r}?" if near else f"there are {', '.join(NAMES)}, all"
             raise UsageError(f"no table {name!r}: {hint}")
     chosen = NAMES if "all" in names else [name for name in NAMES if name in names]
-    return [table for name in chosen for table in _TABLES[name](wanted)]
+    return {name: _TABLES[name](wanted) for name in chosen}

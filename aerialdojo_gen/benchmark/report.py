@@ -15,7 +15,7 @@ import markupsafe
 
 from aerialdojo_gen import __version__
 from aerialdojo_gen.atomic import atomic_file
-from aerialdojo_gen.benchmark.contents import NAMES, Wanted, report_tables
+from aerialdojo_gen.benchmark.contents import Wanted, named_tables
 from aerialdojo_gen.benchmark.figures import encoded, radius_curve
 from aerialdojo_gen.benchmark.formats import as_latex, as_markdown
 from aerialdojo_gen.benchmark.grid import Table
@@ -52,7 +52,8 @@ def write_report(out: Path, wanted: Wanted, replays: Sequence[Replay]) -> list[P
     StoreError
         The folder cannot be written to.
     """
-    tables = report_tables(wanted, ["all"])
+    named = named_tables(wanted, ["all"])
+    tables = [table for made in named.values() for table in made]
     drawn_runs, _ = _of_the_radar(wanted.runs)
     drawn = {
         "families": metric_radars(drawn_runs, wanted.profiles[0]),
@@ -61,7 +62,7 @@ def write_report(out: Path, wanted: Wanted, replays: Sequence[Replay]) -> list[P
     }
     figures = {(name, kind): encoded(f, kind) for name, f in drawn.items() for kind in ("png", "svg")}
     files = {
-        "report.html": html(wanted, replays, {name: figures[name, "svg"] for name in drawn}).encode(),
+        "report.html": html(wanted, replays, {name: figures[name, "svg"] for name in drawn}, named).encode(),
         "metrics.csv": as_csv(wanted.runs, wanted.profiles, wanted.beside).encode(),
         "tables.md": ("\n\n".join(map(as_markdown, tables)) + "\n").encode(),
         "tables.tex": ("\n\n".join(map(as_latex, tables)) + "\n").encode(),
@@ -79,7 +80,7 @@ def _of_the_radar(runs: Sequence[Run]) -> tuple[Sequence[Run], str]:
     return (base, "Base tasks") if len(base) == len(runs) else (runs, "all tasks")
 
 
-def html(wanted: Wanted, replays: Sequence[Replay], figures: dict[str, bytes]) -> str:
+def html(wanted: Wanted, replays: Sequence[Replay], figures: dict[str, bytes], tables: dict[str, list[Table]]) -> str:
     """Write the page.
 
     Parameters
@@ -88,6 +89,8 @@ def html(wanted: Wanted, replays: Sequence[Replay], figures: dict[str, bytes]) -
         As `write_report` takes them.
     figures : dict of str to bytes
         ``families``, ``radar`` and ``radius`` as SVG.
+    tables : dict of str to list of Table
+        By their names; the long ones are folded away.
 
     Returns
     -------
@@ -114,13 +117,12 @@ def html(wanted: Wanted, replays: Sequence[Replay], figures: dict[str, bytes]) -
         "radar": f"{tasks} at {first.radius_m:g} m, a chart a family; outwards is better",
         "radius": "SR (solid) and OSR (dashed) against the radius that counts as success",
     }
-    shown = [name for name in NAMES if name not in _FOLDED]
     return environment.get_template("report.html.j2").render(
         version=__version__,
         runs=wanted.runs,
         profiles=wanted.profiles,
-        tables=report_tables(wanted, shown),
-        folded=report_tables(wanted, _FOLDED),
+        tables=[table for name, made in tables.items() if name not in _FOLDED for table in made],
+        folded=[table for name in _FOLDED for table in tables.get(name, [])],
         figures=[{"url": _svg_url(figures[name]), "caption": caption} for name, caption in captions.items()],
         replays=replays,
         style=style,
