@@ -88,12 +88,12 @@ def read_routes(data: Path, scenes: Sequence[str]) -> Routes:
             tables.append(store.read_scene(data, f"routes/{subset}", scene, columns))
             keys += [(*(row[name] for name in belongs), subset)] * tables[-1].num_rows
     table = pa.concat_tables(tables)
-    family, scene_type, partition, subset = np.array(keys, dtype=np.str_).reshape(-1, 4).T
+    family, scene_type, partition, side = np.array(keys, dtype=np.str_).reshape(-1, 4).T
     return Routes(
         family,
         scene_type,
         partition,
-        subset,
+        side,
         np.array(table.column("setting").to_pylist(), dtype=np.str_),
         *(table.column(name).to_numpy() for name in columns[1:]),
     )
