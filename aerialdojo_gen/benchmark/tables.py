@@ -78,12 +78,19 @@ def main_table(runs: Sequence[Run], profiles: Sequence[Profile]) -> Table:
 
 def caveats(runs: Sequence[Run]) -> list[str]:
     """Say what a comparison of runs lacks: families, episodes, common tasks."""
-    notes = []
+    lacking: dict[tuple[str, ...], list[str]] = {}
     for run in runs:
-        if missing := [f for f in FAMILIES.values() if not (run.episodes.family == f).any()]:
-            notes.append(f"{run.label}: no episodes of {', '.join(missing)}; overall is the mean of the others.")
-        if run.failed:
-            notes.append(f"{run.label}: {run.failed:,} more episodes failed for reasons outside the agent.")
+        if missing := tuple(f for f in FAMILIES.values() if not (run.episodes.family == f).any()):
+            lacking.setdefault(missing, []).append(run.label)
+    notes = [
+        f"{', '.join(labels)}: no episodes of {', '.join(missing)}; overall is the mean of the others."
+        for missing, labels in lacking.items()
+    ]
+    notes += [
+        f"{run.label}: {run.failed:,} more episodes failed for reasons outside the agent."
+        for run in runs
+        if run.failed
+    ]
     if len({frozenset(run.table["task_id"].to_pylist()) for run in runs}) > 1:
         notes.append("The runs flew different tasks: their scores are no comparison of agents.")
     return notes
