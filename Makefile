@@ -43,12 +43,13 @@ dataset: .venv/.installed  ## generate the dataset: scene_assets/ and annotation
 smoke: .venv/.installed  ## two small scenes through all stages, a rendered video included (DATA=data-smoke)
 	@$(RUN) run pipelines/smoke.toml --data $(SMOKE_DATA) $(RUN_FLAGS)
 
-SAMPLE := --split id_test --split ood_test --limit 32 $(foreach scene,U_Mall_0 U_Park_1 N_Forest_0 N_Island_1 \
-  I_Harbor_0 I_Bridge_1 D_Flood_0 D_Earthquake_1,--scene $(scene))
-evaluate: .venv/.installed  ## fly oracle, random and explorer on 32 tasks of all families and print their table
-	@for agent in oracle random explorer; do \
-	  $(RUN) evaluate --agent $$agent --run sample-$$agent $(SAMPLE) --data $(DATA) $(RUN_FLAGS) || exit 1; done
-	@$(RUN) report sample-oracle sample-random sample-explorer --data $(DATA) --out $(DATA)/report
+SAMPLE_AGENTS := oracle stop constant random explorer
+SAMPLE := --split id_test --split ood_test --setting base --setting standard --limit 64 $(foreach scene,U_Mall_0 U_Park_1 \
+  N_Forest_0 N_Island_1 I_Harbor_0 I_Bridge_1 D_Flood_0 D_Earthquake_1,--scene $(scene))
+evaluate: .venv/.installed  ## fly oracle, stop, constant, random, explorer on 64 tasks; print the paper's tables, ID and OOD
+	@for agent in $(SAMPLE_AGENTS); do \
+	  $(RUN) evaluate --agent $$agent --run tables-$$agent $(SAMPLE) --data $(DATA) $(RUN_FLAGS) || exit 1; done
+	@$(RUN) report $(SAMPLE_AGENTS:%=tables-%) --table results --table partition --data $(DATA) --out $(DATA)/report
 
 PYTEST_FLAGS ?= -n 2 --dist loadfile
 test: .venv/.dev  ## run the tests (PYTEST_FLAGS='-k planner' for some of them)

@@ -11,8 +11,10 @@ from aerialdojo_gen import rng, schemas, store
 from aerialdojo_gen.paper import inventory
 from aerialdojo_gen.tables import from_rows
 
-# Stop called, collision, typical distance at the end: a good agent, a middling one, a bad one.
-AGENTS = {"oracle": (1.0, 0.0, 0.5), "explorer": (0.55, 0.15, 9.0), "random": (0.35, 0.4, 22.0)}
+# Stop called, collision, typical distance at the end: a good agent, a middling one, a bad one, a hopeless one.
+AGENTS = {
+    "oracle": (1.0, 0.0, 0.5), "explorer": (0.55, 0.15, 9.0), "random": (0.35, 0.4, 22.0), "weak": (0.04, 0.4, 15.0)
+}  # fmt: skip
 
 
 def episode(run: str, agent: str, scene: str, k: int, draws: np.random.Generator) -> dict[str, Any]:

@@ -11,7 +11,7 @@ from aerialdojo_gen import schemas
 from aerialdojo_gen.benchmark.agents import AgentBase, load_agent
 from aerialdojo_gen.benchmark.agents.depth_map import DepthMap
 from aerialdojo_gen.benchmark.agents.explorer import ExplorerAgent, thumbnail
-from aerialdojo_gen.benchmark.agents.simple import OracleAgent, RandomAgent, StopAgent
+from aerialdojo_gen.benchmark.agents.simple import BEST_CONSTANT, ConstantAgent, OracleAgent, RandomAgent, StopAgent
 from aerialdojo_gen.benchmark.episode import Episode
 from aerialdojo_gen.benchmark.goal import BLIND, Goal, Observation, Rules, Sensors
 from aerialdojo_gen.benchmark.motion import FlightSpace
@@ -52,6 +52,7 @@ def test_built_in_agents_are_made_by_name():
     assert isinstance(load_agent("oracle"), OracleAgent)
     assert isinstance(load_agent("random", seed=3), RandomAgent)
     assert isinstance(load_agent("stop"), StopAgent)
+    assert isinstance(load_agent("constant"), ConstantAgent)
     assert isinstance(load_agent("explorer", likeness=0.9), ExplorerAgent)
     assert isinstance(load_agent("test_agents:Mine", gain=2), Mine)
 
@@ -67,6 +68,8 @@ def test_built_in_agents_are_made_by_name():
         ("test_agents:EYES", {}, "EYES is no class"),
         ("random", {"sead": 1}, "its options: seed, stop_probability"),
         ("random", {"stop_probability": 2}, "between 0 and 1"),
+        ("constant", {"actions": "MoveForward5,MoveBack1"}, "no action 'MoveBack1': there are Stop, MoveForward1, "),
+        ("constant", {"actions": [16]}, "no action '16'"),
         ("test_agents:Mine", {"gain": -1}, "gain is not negative"),
     ],
 )
@@ -74,6 +77,20 @@ def test_what_cannot_be_made_is_said_in_one_line(name, options, message):
     with pytest.raises(UsageError, match=message) as error:
         load_agent(name, **options)
     assert "\n" not in str(error.value)
+
+
+def test_the_constant_agent_does_the_same_whatever_it_is_told_and_then_stops():
+    names = schemas.ACTION_NAMES
+    for agent, expected in (
+        (load_agent("constant"), [names.index(name) for name in BEST_CONSTANT]),
+        (load_agent("constant", actions="moveup1, 14,MoveForward3"), [10, 14, 2]),
+        (load_agent("constant", actions=[9, "TurnRight15"]), [9, 15]),
+    ):
+        flights = []
+        for told in (goal(), goal(name="blue bench", budget=300)):
+            agent.reset(told)
+            flights.append(flown(agent, 6))
+        assert flights[0] == flights[1] == (expected + [schemas.STOP] * 6)[:6]
 
 
 def test_the_oracle_leaves_the_approach_out_and_stops_at_the_end():

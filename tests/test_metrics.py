@@ -22,7 +22,8 @@ AT_3, AT_5 = PROFILES["aerialdojo"], PROFILES["aerialdojo-5m"]
 
 # A success: Stop 2 m from the anchor after 12 m, where the reference takes 10 m.
 GOOD: dict[str, Any] = {
-    "scene": "U_Mall_0", "family": "Urban", "setting": "base", "modality": "semantic",
+    "scene": "U_Mall_0", "family": "Urban", "scene_type": "Mall", "partition": "ID", "setting": "base",
+    "modality": "semantic",
     "stop_called": True, "collision": False, "n_actions": 9, "action_budget": 90,
     "final_distance_m": 2.0, "min_distance_m": 1.5, "final_horizontal_distance_m": 1.0,
     "min_horizontal_distance_m": 0.5, "path_length_m": 12.0, "reference_length_m": 10.0, "euclidean_m": 9.0,

@@ -19,7 +19,7 @@ from aerialdojo_gen.release.figures.charts import composition
 from aerialdojo_gen.release.figures.maps import _round_length
 from aerialdojo_gen.release.figures.style import SETTING_COLOURS, read_routes
 from aerialdojo_gen.release.quota import train_quotas
-from aerialdojo_gen.release.stats import Made, in_paper_order, made_of, tables
+from aerialdojo_gen.release.stats import Made, benchmark_table, in_paper_order, made_of, tables
 
 
 def as_the_paper(name, **changes):
@@ -31,7 +31,7 @@ def as_the_paper(name, **changes):
     made = {
         "scene": name, "family": schemas.FAMILIES[name[0]], "scene_type": name.split("_")[1],
         "landmarks": paper.landmarks, "objects": paper.objects, "categories": frozenset({"van"}), "tasks": tasks,
-        "path_m": paper.path_m, "paper": paper,
+        "path_m": paper.path_m, "paper": paper, "anchors": paper.objects,
     }  # fmt: skip
     return Made(**(made | changes))
 
@@ -42,16 +42,17 @@ def papers():
 
 
 def test_what_is_the_papers_is_said_to_be(papers):
-    for table in tables(papers)[1:]:
+    for table in tables(papers)[1:4]:
         assert table.unlike == 0
         assert table.terminal()[-1] == f"All {table.compared} counts are the paper's."
-    assert [table.compared for table in tables(papers)] == [0, 5 * 7, 43 * 6, 5 * 4]
+    assert [table.compared for table in tables(papers)] == [0, 5 * 9, 43 * 6, 5 * 4, 0, 0]
 
 
-def test_the_tables_of_42_scenes_fit_a_hundred_columns(papers):
+def test_the_tables_of_42_scenes_fit_a_terminal(papers):
     for table in tables(papers):
         lines = table.terminal()
-        assert max(map(len, lines)) <= 100
+        # The paper's Table 2 is the widest.
+        assert max(map(len, lines)) <= (115 if table.key == "family" else 100)
     scenes = tables(papers)[2].terminal()
     assert len(scenes) == 3 + 42 + 1 + 1
     assert [line.split()[0] for line in scenes[3:45]] == list(inventory())
@@ -87,6 +88,50 @@ def test_what_is_not_the_papers_is_shown_with_the_papers_below(papers):
     assert "| 13 (paper: 14) |" in as_markdown([table])
 
 
+def test_shares_and_lengths_are_those_of_the_appendix(papers):
+    shares = {row.name: (row.ours[0], row.paper[0]) for row in tables(papers)[4].rows}
+    assert len(shares) == 12
+    # The paper prints two digits; a release of its counts has its shares to half of the last one.
+    for name, (ours, paper) in shares.items():
+        assert ours == pytest.approx(paper, abs=0.0051), name
+    assert shares["malls"][1] == 28.82
+    lengths = {row.name: row.ours[0] for row in tables(papers)[5].rows}
+    # Table 2: 2,607.253 km of 125,064 instances, two a route.
+    assert lengths["Urban"] == pytest.approx(2_607_253 / 62_532)
+    assert list(lengths) == ["Urban", "Natural", "Infrastructure", "Disaster", "all"]
+
+
+def test_types_and_anchors_are_those_of_table_2(papers):
+    table = tables(papers)[1]
+    columns = [column.name for column in table.columns]
+    urban = dict(zip(columns, table.rows[0].ours, strict=True))
+    assert (urban["types"], urban["scenes"], urban["anchors"]) == (9, 18, 1030)
+    some = tables([m for m in papers if m.scene != "U_Mall_0"])[1]
+    assert (some.rows[0].paper[0], some.rows[1].paper[0]) == (None, 6)
+
+
+def test_the_release_stands_below_the_benchmarks_of_table_1(papers):
+    table = benchmark_table(papers)
+    assert [row[0] for row in table.rows] == [
+        "AerialVLN", "CityNav", "OpenUAV", "OpenFly", "UAV-ON", "CityAVOS", "AerialDojo-200K", "this release"
+    ]  # fmt: skip
+    assert table.rows[-1] == (
+        "this release",
+        "",
+        "OGS",
+        "4",
+        "instance",
+        "semantic or image",
+        "205,732",
+        "U N I D",
+        "42",
+    )
+    lines = table.terminal()
+    assert max(map(len, lines)) <= 100
+    assert table.markdown()[4] == "| AerialVLN | 2023 | VLN | 4 | location | movement instruction | 25.3K | U | 25 |"
+    assert len(table.records()) == 8 * 8
+
+
 def test_csv_has_every_figure_once_and_to_the_last_digit(papers):
     made = tables(papers)
     records = list(csv.DictReader(io.StringIO(as_csv(made))))
@@ -110,6 +155,8 @@ def test_scenes_that_the_paper_lacks_have_no_papers_figures(smoke):
     for table in tables(made):
         assert table.compared == 0
         assert not any("paper" in line for line in table.terminal())
+    names = [row.name for row in tables(made)[1].rows]
+    assert names == ["Urban", "all"]
     total = {row.name: row.ours[0] for row in tables(made)[0].rows}
     assert total["instances"] == sum(m.instances for m in made) > 0
 
@@ -129,12 +176,13 @@ def drawn(smoke, tmp_path_factory):
     return out, done.stdout
 
 
-FIGURES = ("composition", "lengths", "detours", "categories", "maps")
+FIGURES = ("composition", "shares", "lengths", "detours", "categories", "names", "maps")
 
 
 def test_the_command_writes_what_it_prints(smoke, drawn):
     out, printed = drawn
-    made = tables(in_paper_order([made_of(smoke, name) for name in check_release(smoke)]))
+    scenes = in_paper_order([made_of(smoke, name) for name in check_release(smoke)])
+    made = [*tables(scenes), benchmark_table(scenes)]
     assert (out / "stats.md").read_text() == as_markdown(made)
     assert (out / "stats.csv").read_text() == as_csv(made)
     assert "\n\n".join("\n".join(table.terminal()) for table in made) in printed

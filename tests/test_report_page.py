@@ -15,6 +15,7 @@ import pytest
 from browser import chromium, errors
 
 from aerialdojo_gen import store
+from aerialdojo_gen.benchmark.contents import Wanted
 from aerialdojo_gen.benchmark.episodes import read_run
 from aerialdojo_gen.benchmark.metrics import outcomes
 from aerialdojo_gen.benchmark.profiles import PROFILES
@@ -109,11 +110,12 @@ def test_a_release_that_is_not_the_runs_own_is_refused(log: Path, runs: list[Run
 
 
 def test_the_page_works_in_a_browser_and_asks_for_nothing(
-    runs: list[Run], shown: list[Replay], tmp_path: Path
+    smoke: Path, runs: list[Run], shown: list[Replay], tmp_path: Path
 ) -> None:
     shown[0].task["target_name"] = "</h3><script>alert(1)</script>"
     shown[0].flights[1].answers[1] = '</script><img src=x onerror="document.title=1">'
-    page = write_report(tmp_path, runs, [PROFILES["aerialdojo"], PROFILES["aerialdojo-5m"]], shown)[0]
+    wanted = Wanted(smoke, runs, [PROFILES["aerialdojo"], PROFILES["aerialdojo-5m"]])
+    page = write_report(tmp_path, wanted, shown)[0]
     text = page.read_text()
     assert text.count("</script>") == 1 + len(shown)
     assert not re.search(r'(?:src|href)="(?!data:)', text)
@@ -151,6 +153,6 @@ def test_the_page_works_in_a_browser_and_asks_for_nothing(
         assert driver.title.startswith("Evaluation")
         # The figures and the maps are pictures that the browser could read.
         sizes = driver.execute_script("return [...document.images].map(i => i.naturalWidth)")
-        assert len(sizes) >= 2 + len(shown)
+        assert len(sizes) >= 3 + len(shown)
         assert min(sizes) > 0
         assert errors(driver) == []

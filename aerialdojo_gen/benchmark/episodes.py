@@ -28,7 +28,7 @@ def run_scenes(data: Path, run: str) -> list[str]:
     return sorted(path.stem.removeprefix("part-") for path in folder.glob("part-*.parquet"))
 
 
-def read_run(data: Path, run: str, table: str = "episodes") -> pa.Table:
+def read_run(data: Path, run: str, table: str = "episodes", columns: Sequence[str] | None = None) -> pa.Table:
     """Read a table of a run, all its scenes.
 
     Parameters
@@ -39,6 +39,8 @@ def read_run(data: Path, run: str, table: str = "episodes") -> pa.Table:
         Name of the run.
     table : str
         One of `TABLES`.
+    columns : sequence of str, optional
+        Read these columns alone.
 
     Returns
     -------
@@ -54,7 +56,12 @@ def read_run(data: Path, run: str, table: str = "episodes") -> pa.Table:
     if not scenes:
         known = ", ".join(runs(data)) or "none"
         raise StoreError(f"no run {run!r} in {data} (there are: {known}): run aerialdojo-gen evaluate --run {run}")
-    return pa.concat_tables([store.read_scene(data, table, scene, run=run) for scene in scenes])
+    return pa.concat_tables([store.read_scene(data, table, scene, columns, run=run) for scene in scenes])
+
+
+def has_table(data: Path, run: str, table: str) -> bool:
+    """Tell whether a run has a table for every scene that it has episodes of."""
+    return all(store.shards(data, table, scene, run) for scene in run_scenes(data, run))
 
 
 def fingerprint_of(data: Path, run: str, scene: str) -> str | None:

@@ -1,9 +1,8 @@
-"""Figures of an evaluation: the radar over the families, and success against the radius; PNG and SVG, for print."""
+"""Figures of an evaluation, PNG and SVG, for print: success against the radius, and what all of them share."""
 
 from __future__ import annotations
 
 import io
-import math
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -11,62 +10,17 @@ import numpy as np
 
 from aerialdojo_gen.benchmark.profiles import Profile
 from aerialdojo_gen.benchmark.runs import Run
-from aerialdojo_gen.benchmark.scores import Summary, success_curve, summarize
-from aerialdojo_gen.schemas import FAMILIES
+from aerialdojo_gen.benchmark.scores import success_curve
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 # Okabe and Ito's colours, which colour-blind readers tell apart too; line styles carry what is left.
-_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#999999")
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#999999")
 _STYLE: dict[Any, Any] = {
     "font.family": "DejaVu Sans", "font.size": 9, "axes.linewidth": 0.8, "axes.edgecolor": "#444444",
     "grid.color": "#dddddd", "grid.linewidth": 0.6, "svg.hashsalt": "aerialdojo", "svg.fonttype": "path",
 }  # fmt: skip
-
-
-def family_radar(runs: Sequence[Run], profile: Profile) -> Figure:
-    """Draw SR and SPL of every family, an axis each, a polygon a run.
-
-    Parameters
-    ----------
-    runs : sequence of Run
-        One or more.
-    profile : Profile
-        The rule of success.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        A family without episodes has a gap in the polygon, not a zero.
-    """
-    families = list(FAMILIES.values())
-    angles = np.linspace(0.0, 2.0 * math.pi, len(families), endpoint=False)
-    summaries = [summarize(run.episodes, profile) for run in runs]
-
-    def draw(figure: Figure) -> None:
-        panels: Any = figure.subplots(1, 2, subplot_kw={"projection": "polar"})
-        for axes, metric in zip(panels, ("sr", "spl"), strict=True):
-            for k, (run, summary) in enumerate(zip(runs, summaries, strict=True)):
-                values = _percent(summary, families, metric)
-                colour = _COLOURS[k % len(_COLOURS)]
-                axes.plot(
-                    [*angles, angles[0]], [*values, values[0]], "o-", color=colour, lw=1.6, ms=3.5, label=run.label
-                )
-                axes.fill(angles, values, color=colour, alpha=0.08)
-            axes.set_theta_zero_location("N")
-            axes.set_theta_direction(-1)
-            axes.set_xticks(angles, [""] * len(families))
-            for angle, family, side in zip(angles, families, ("center", "left", "center", "right"), strict=True):
-                level = {"center": "bottom" if angle == 0.0 else "top"}.get(side, "center")
-                axes.text(angle, 106.0, family, ha=side, va=level)
-            axes.set_ylim(0.0, 100.0)
-            axes.set_yticks([25, 50, 75, 100], ["25", "50", "75", "100"], color="#777777", size=7)
-            axes.set_rlabel_position(45)
-            axes.set_title(f"{metric.upper()}, %", pad=20, size=10, weight="bold")
-        figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=4, frameon=False)
-
-    return _figure(draw, (6.8, 3.7))
 
 
 def radius_curve(runs: Sequence[Run], profile: Profile, largest_m: float = 25.0) -> Figure:
@@ -91,7 +45,7 @@ def radius_curve(runs: Sequence[Run], profile: Profile, largest_m: float = 25.0)
         axes = figure.subplots()
         for k, run in enumerate(runs):
             sr, osr = success_curve(run.episodes, profile, radii)
-            colour = _COLOURS[k % len(_COLOURS)]
+            colour = COLOURS[k % len(COLOURS)]
             axes.plot(radii, 100.0 * sr, "-", color=colour, lw=1.8, label=run.label, zorder=3)
             axes.plot(radii, 100.0 * osr, "--", color=colour, lw=1.2, zorder=2)
         for radius in sorted({profile.radius_m, 5.0} if profile.name == "aerialdojo" else {profile.radius_m}):
@@ -107,15 +61,11 @@ def radius_curve(runs: Sequence[Run], profile: Profile, largest_m: float = 25.0)
         axes.spines[["top", "right"]].set_visible(False)
         figure.legend(loc="outside right upper", frameon=False)
 
-    return _figure(draw, (6.0, 3.4))
+    return figure_of(draw, (6.0, 3.4))
 
 
-def _percent(summary: Summary, families: Sequence[str], metric: str) -> list[float]:
-    scores = [summary.families.get(family) for family in families]
-    return [100.0 * getattr(score, metric) if score else math.nan for score in scores]
-
-
-def _figure(draw: Callable[[Figure], None], size_inches: tuple[float, float]) -> Figure:
+def figure_of(draw: Callable[[Figure], None], size_inches: tuple[float, float]) -> Figure:
+    """Draw a figure in the common style; nothing of it stays behind."""
     # Not pyplot: that keeps figures for a screen that nobody looks at.
     import matplotlib
     from matplotlib.figure import Figure

@@ -26,7 +26,7 @@ class Episodes:
 
     Attributes
     ----------
-    scene, family, setting, modality : (n,) str
+    scene, family, scene_type, partition, setting, modality : (n,) str
         What the episode belongs to.
     stop_called, collision : (n,) bool
         How it ended; both may hold in one step.
@@ -46,6 +46,8 @@ class Episodes:
 
     scene: Strings
     family: Strings
+    scene_type: Strings
+    partition: Strings
     setting: Strings
     modality: Strings
     stop_called: Bools
@@ -64,13 +66,13 @@ class Episodes:
         """Return the number of episodes."""
         return len(self.scene)
 
-    def where(self, mask: Bools) -> Episodes:
-        """Return the episodes that a mask selects."""
+    def where(self, mask: Bools | NDArray[np.int64]) -> Episodes:
+        """Return the episodes that a mask or indices select."""
         return replace(self, **{f.name: getattr(self, f.name)[mask] for f in fields(self)})
 
 
 _KINDS: dict[str, Any] = {
-    **dict.fromkeys(("scene", "family", "setting", "modality"), np.str_),
+    **dict.fromkeys(("scene", "family", "scene_type", "partition", "setting", "modality"), np.str_),
     **dict.fromkeys(("stop_called", "collision"), np.bool_),
     **dict.fromkeys(("n_actions", "action_budget"), np.int64),
 }

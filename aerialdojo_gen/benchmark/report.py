@@ -15,47 +15,55 @@ import markupsafe
 
 from aerialdojo_gen import __version__
 from aerialdojo_gen.atomic import atomic_file
-from aerialdojo_gen.benchmark.figures import encoded, family_radar, radius_curve
+from aerialdojo_gen.benchmark.contents import Wanted, named_tables
+from aerialdojo_gen.benchmark.figures import encoded, radius_curve
 from aerialdojo_gen.benchmark.formats import as_latex, as_markdown
-from aerialdojo_gen.benchmark.profiles import Profile
+from aerialdojo_gen.benchmark.grid import Table
+from aerialdojo_gen.benchmark.paper_tables import in_setting
+from aerialdojo_gen.benchmark.radar import family_radars, metric_radars
 from aerialdojo_gen.benchmark.replay import Replay
 from aerialdojo_gen.benchmark.runs import Run
-from aerialdojo_gen.benchmark.tables import Table, as_csv, scene_table, tables_of
+from aerialdojo_gen.benchmark.tables import as_csv
+
+# Long tables, folded away on the page.
+_FOLDED = ("type", "scene")
 
 
-def write_report(
-    out: Path, runs: Sequence[Run], profiles: Sequence[Profile], replays: Sequence[Replay]
-) -> list[Path]:
+def write_report(out: Path, wanted: Wanted, replays: Sequence[Replay]) -> list[Path]:
     """Write everything that there is to say of some runs.
 
     Parameters
     ----------
     out : Path
         Folder, made where there is none; files of these names in it are replaced, each whole or not at all.
-    runs : sequence of Run
-        One or more.
-    profiles : sequence of Profile
-        One or more; tables by family, setting and so on, and the figures, judge by the first.
+    wanted : Wanted
+        Runs, rules and what else tables and figures are made of.
     replays : sequence of Replay
         Episodes to be shown; may be empty.
 
     Returns
     -------
     list of Path
-        ``report.html``, ``metrics.csv``, ``tables.md``, ``tables.tex``, ``families.png``, ``.svg``, ``radius.png``,
-        ``.svg``.
+        ``report.html``, ``metrics.csv``, ``tables.md``, ``tables.tex``, and of ``families`` (a radar a metric),
+        ``radar`` (one a family) and ``radius`` a ``.png`` and a ``.svg``.
 
     Raises
     ------
     StoreError
         The folder cannot be written to.
     """
-    tables = [*tables_of(runs, profiles), scene_table(runs, profiles[0])]
-    drawn = {"families": family_radar(runs, profiles[0]), "radius": radius_curve(runs, profiles[0])}
+    named = named_tables(wanted, ["all"])
+    tables = [table for made in named.values() for table in made]
+    drawn_runs, _ = _of_the_radar(wanted.runs)
+    drawn = {
+        "families": metric_radars(drawn_runs, wanted.profiles[0]),
+        "radar": family_radars(drawn_runs, wanted.profiles[0]),
+        "radius": radius_curve(wanted.runs, wanted.profiles[0]),
+    }
     figures = {(name, kind): encoded(f, kind) for name, f in drawn.items() for kind in ("png", "svg")}
     files = {
-        "report.html": html(runs, profiles, replays, {name: figures[name, "svg"] for name in drawn}).encode(),
-        "metrics.csv": as_csv(runs, profiles).encode(),
+        "report.html": html(wanted, replays, {name: figures[name, "svg"] for name in drawn}, named).encode(),
+        "metrics.csv": as_csv(wanted.runs, wanted.profiles, wanted.beside).encode(),
         "tables.md": ("\n\n".join(map(as_markdown, tables)) + "\n").encode(),
         "tables.tex": ("\n\n".join(map(as_latex, tables)) + "\n").encode(),
         **{f"{name}.{kind}": data for (name, kind), data in figures.items()},
@@ -66,17 +74,23 @@ def write_report(
     return [out / name for name in files]
 
 
-def html(
-    runs: Sequence[Run], profiles: Sequence[Profile], replays: Sequence[Replay], figures: dict[str, bytes]
-) -> str:
+def _of_the_radar(runs: Sequence[Run]) -> tuple[Sequence[Run], str]:
+    """Return what the radars show: the Base tasks, as the paper's do, where every run has flown some."""
+    base = in_setting(runs, "base")
+    return (base, "Base tasks") if len(base) == len(runs) else (runs, "all tasks")
+
+
+def html(wanted: Wanted, replays: Sequence[Replay], figures: dict[str, bytes], tables: dict[str, list[Table]]) -> str:
     """Write the page.
 
     Parameters
     ----------
-    runs, profiles, replays
+    wanted, replays
         As `write_report` takes them.
     figures : dict of str to bytes
-        ``families`` and ``radius`` as SVG.
+        ``families``, ``radar`` and ``radius`` as SVG.
+    tables : dict of str to list of Table
+        By their names; the long ones are folded away.
 
     Returns
     -------
@@ -96,17 +110,19 @@ def html(
     environment.globals |= {
         "points": _points, "cross": _cross, "arrow": _arrow, "starts": _starts, "heights": _heights, "span": _span_m
     }  # fmt: skip
-    first = profiles[0]
+    first = wanted.profiles[0]
+    _, tasks = _of_the_radar(wanted.runs)
     captions = {
-        "families": f"SR and SPL by family at {first.radius_m:g} m",
+        "families": f"{tasks} at {first.radius_m:g} m, a chart a metric: axes end where the data does",
+        "radar": f"{tasks} at {first.radius_m:g} m, a chart a family; outwards is better",
         "radius": "SR (solid) and OSR (dashed) against the radius that counts as success",
     }
     return environment.get_template("report.html.j2").render(
         version=__version__,
-        runs=runs,
-        profiles=profiles,
-        tables=tables_of(runs, profiles),
-        scenes=scene_table(runs, first),
+        runs=wanted.runs,
+        profiles=wanted.profiles,
+        tables=[table for name, made in tables.items() if name not in _FOLDED for table in made],
+        folded=[table for name in _FOLDED for table in tables.get(name, [])],
         figures=[{"url": _svg_url(figures[name]), "caption": caption} for name, caption in captions.items()],
         replays=replays,
         style=style,

@@ -4,16 +4,24 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 
+import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
+from numpy.typing import NDArray
 
-from aerialdojo_gen.benchmark.episodes import read_run, runs
-from aerialdojo_gen.benchmark.metrics import Episodes, episodes_of
+from aerialdojo_gen.benchmark.episodes import has_table, read_run, runs
+from aerialdojo_gen.benchmark.metrics import Bools, Episodes, Floats, episodes_of
+from aerialdojo_gen.benchmark.swept import STEP_COLUMNS, swept_distances
 from aerialdojo_gen.errors import StoreError
 from aerialdojo_gen.schemas import TERMINATIONS
+
+# What is no contender: the one that knows the way, and those that look at nothing.
+UPPER_BOUND, FLOORS = "upper bound", "floors"
+GROUP_OF = {"oracle": UPPER_BOUND, "stop": FLOORS, "constant": FLOORS, "random": FLOORS}
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,6 +42,10 @@ class Run:
         What the metrics take from it.
     failed : int
         Episodes that are not in it, given up for reasons outside the agent.
+    log : Path or None
+        The directory that `evaluate` wrote to, where its steps are.
+    group : str
+        Heading that tables set it under; empty for an agent like any other.
     """
 
     name: str
@@ -43,6 +55,20 @@ class Run:
     table: pa.Table
     episodes: Episodes
     failed: int = 0
+    log: Path | None = None
+    group: str = ""
+
+    def where(self, mask: Bools | NDArray[np.int64]) -> Run:
+        """Return the run with the episodes that a mask selects, or with those at some indices in their order."""
+        chosen = np.flatnonzero(mask) if mask.dtype == np.bool_ else mask
+        return replace(self, table=self.table.take(pa.array(chosen)), episodes=self.episodes.where(chosen))
+
+    @cached_property
+    def swept_distance_m(self) -> Floats | None:
+        """Smallest distance to the goal anywhere on the way, (n,) float64, metres; None where no steps are logged."""
+        if self.log is None or not has_table(self.log, self.name, "steps"):
+            return None
+        return swept_distances(self.table, read_run(self.log, self.name, "steps", STEP_COLUMNS))
 
 
 def load_runs(data: Path, names: Sequence[str] = ()) -> list[Run]:
@@ -82,6 +108,7 @@ def load_runs(data: Path, names: Sequence[str] = ()) -> list[Run]:
             table,
             episodes_of(table),
             read_run(data, name, "failures").num_rows,
+            data,
         )
         for (name, table), agent in zip(tables.items(), agents, strict=True)
     ]

@@ -122,8 +122,13 @@ def summarize(episodes: Episodes, profile: Profile) -> Summary:
     return Summary(profile, scenes, families, mean_score(list(families.values())), deviation(list(scenes.values())))
 
 
+def weighted_score(episodes: Episodes, profile: Profile) -> Score:
+    """Average a log over all its episodes, each with the same weight: the paper's appendix C's other population."""
+    return score(outcomes(episodes, profile))
+
+
 def slices(episodes: Episodes, column: str, order: Sequence[str]) -> Iterator[tuple[str, Episodes]]:
-    """Yield the parts of a log by a column's value (``setting``, ``modality``), those that have episodes."""
+    """Yield the parts of a log by a column's value (``setting``, ``scene_type``, …), those that have episodes."""
     values = getattr(episodes, column)
     for value in order:
         if (values == value).any():

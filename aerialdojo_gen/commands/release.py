@@ -38,13 +38,13 @@ def stats(
         print("\n".join(pool_lines([pool_of(data, name) for name in scenes])))
         return
 
-    from aerialdojo_gen.release.comparison import as_csv, as_markdown
+    from aerialdojo_gen.release.comparison import Comparison, Listing, as_csv, as_markdown
     from aerialdojo_gen.release.contents import check_release
-    from aerialdojo_gen.release.stats import in_paper_order, made_of, tables
+    from aerialdojo_gen.release.stats import benchmark_table, in_paper_order, made_of, tables
 
     names = check_release(data, runner.choose_scenes(scene, released) if scene else None)
     made = in_paper_order([made_of(data, name) for name in names])
-    compared = tables(made)
+    compared: list[Comparison | Listing] = [*tables(made), benchmark_table(made)]
     for path, text in ((markdown, as_markdown(compared)), (csv, as_csv(compared))):
         if path:
             with atomic_file(path.parent, path.name) as temporary:

@@ -2,17 +2,42 @@
 
 from __future__ import annotations
 
+import re
+import shutil
+import sys
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import typer
+from typer.core import TyperCommand
 
 from aerialdojo_gen.commands.common import Data
+from aerialdojo_gen.errors import UsageError
 
 app = typer.Typer()
 
+_NUMBER = re.compile(r"\d+(\.\d+)?")
+# Of output that goes nowhere in particular: a page in landscape.
+_WIDTH = 120
 
-@app.command("report")
+
+class _Command(TyperCommand):
+    """Takes several numbers after one ``--radius``."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Repeat the option before every number that follows it."""
+        spread: list[str] = []
+        after = False
+        for arg in args:
+            number = _NUMBER.fullmatch(arg) is not None
+            if after and number and spread[-1] != "--radius":
+                spread.append("--radius")
+            spread.append(arg)
+            after = arg == "--radius" or (after and number)
+        return super().parse_args(ctx, spread)
+
+
+@app.command("report", cls=_Command)
 def report(
     runs: Annotated[list[str] | None, typer.Argument(help="Runs of evaluate.  (default: all)")] = None,
     data: Data = Path("data"),
@@ -24,6 +49,32 @@ def report(
         typer.Option("--profile", help="Rule of success, repeatable: aerialdojo, aerialdojo-5m, uav-on, aerialvln, "
                                        "openfly.  (default: the first two)"),
     ] = None,
+    table: Annotated[
+        list[str] | None,
+        typer.Option("--table", help="Print these tables, repeatable: overall, results, partition, family, averages, "
+                                     "setting, goal, modality, radius, visits, difficulty, conduct, type, "
+                                     "scene, all."),
+    ] = None,
+    radius: Annotated[
+        list[float] | None,
+        typer.Option("--radius", min=0.0, help="Radii of the table of radii, m: --radius 1 3 5 10.  (default: 3 5)"),
+    ] = None,
+    beside: Annotated[
+        Literal["paper"] | None, typer.Option("--beside", help="paper: set its own results below, of its simulator.")
+    ] = None,
+    paired: Annotated[
+        bool, typer.Option("--paired", help="Compare two runs on the tasks that both have flown.")
+    ] = False,
+    group: Annotated[
+        list[str] | None,
+        typer.Option("--group", help="Heading of some runs, repeatable: --group open=qwen,phi --group closed=gpt."),
+    ] = None,
+    intervals: Annotated[
+        bool, typer.Option("--intervals/--no-intervals", help="Print 95 % intervals below the results.")
+    ] = True,
+    floors: Annotated[
+        bool, typer.Option("--floors/--no-floors", help="Add stop, constant, random where they flew the same tasks.")
+    ] = True,
     style: Annotated[
         Literal["terminal", "markdown", "latex", "csv"], typer.Option("--format", help="What is printed.")
     ] = "terminal",
@@ -35,21 +86,55 @@ def report(
     frames: Annotated[bool, typer.Option("--frames", help="Render front pictures along the replays.")] = False,
 ) -> None:  # fmt: skip
     """Score runs of evaluate: SR, OSR, SPL, DTS, CR as tables, figures, a page."""
-    from aerialdojo_gen.benchmark import formats, tables
+    from aerialdojo_gen.benchmark import contents, tables
+    from aerialdojo_gen.benchmark.floors import arranged, with_floors
+    from aerialdojo_gen.benchmark.paired import paired_tables
     from aerialdojo_gen.benchmark.profiles import DEFAULT_PROFILES, profile_named
+    from aerialdojo_gen.benchmark.radii import DEFAULT_RADII_M, at_radius
     from aerialdojo_gen.benchmark.runs import load_runs
+    from aerialdojo_gen.paper import results
 
     rules = [profile_named(name) for name in dict.fromkeys(profile or DEFAULT_PROFILES)]
-    loaded = load_runs(log or data, runs or ())
+    named = load_runs(log or data, runs or ())
+    loaded = arranged(with_floors(log or data, named) if floors else named, _groups(group or []))
+    wanted = contents.Wanted(
+        data, loaded, rules, tuple(radius or DEFAULT_RADII_M), intervals, results() if beside else ()
+    )
     if style == "csv":
-        print(tables.as_csv(loaded, rules), end="")
+        further = [at_radius(rules[0], r) for r in radius or () if r not in {rule.radius_m for rule in rules}]
+        print(tables.as_csv(loaded, [*rules, *further], wanted.beside), end="")
+    elif paired and table is None:
+        _show(paired_tables(named, rules), style)
     else:
-        chosen = tables.tables_of(loaded, rules) + ([tables.scene_table(loaded, rules[0])] if by_scene else [])
-        print("\n\n".join(formats.FORMATS[style](table) for table in chosen))
+        names = list(table or contents.DEFAULT) + (["scene"] if by_scene else [])
+        chosen = contents.report_tables(wanted, names)
+        _show([*chosen, *(paired_tables(named, rules) if paired else [])], style)
     if out is not None:
         from aerialdojo_gen.benchmark import replay
         from aerialdojo_gen.benchmark.report import write_report
 
         shown = list(replay.replays(data, log or data, loaded, replay.choose_tasks(loaded, replays), frames))
-        written = write_report(out, loaded, rules, shown)
+        written = write_report(out, wanted, shown)
         typer.echo(f"{written[0]} and {len(written) - 1} more files", err=True)
+
+
+def _show(tables: Any, style: str) -> None:
+    from aerialdojo_gen.benchmark import formats
+
+    if style == "terminal":
+        ansi = sys.stdout.isatty()
+        width = shutil.get_terminal_size((_WIDTH, 24)).columns
+        parts = [*(formats.as_text(table, width, ansi) for table in tables), formats.legend(tables, ansi)]
+        print("\n\n".join(filter(None, parts)))
+    else:
+        print("\n\n".join(formats.FORMATS[style](table) for table in tables))
+
+
+def _groups(given: list[str]) -> dict[str, list[str]]:
+    groups: dict[str, list[str]] = {}
+    for item in given:
+        heading, equals, names = item.partition("=")
+        if not equals or not heading.strip() or not names.strip():
+            raise UsageError(f"--group {item!r}: write heading=run,run")
+        groups.setdefault(heading.strip(), []).extend(name.strip() for name in names.split(","))
+    return groups

@@ -22,18 +22,20 @@ class Column:
         Unit of the figures, empty for counts.
     exact : bool
         Whether the figures are to be the paper's to the last digit; the others are shown side by side.
+    digits : int
+        Of a measure, after the point.
     """
 
     name: str
     unit: str = ""
     exact: bool = True
+    digits: int = 1
 
-
-def _show(figure: Figure) -> str:
-    """Format a figure, a measure to one digit after the point; a dash where there is none."""
-    if figure is None:
-        return "–"
-    return f"{figure:,}" if isinstance(figure, int) else f"{figure:,.1f}"
+    def show(self, figure: Figure) -> str:
+        """Format a figure; a dash where there is none."""
+        if figure is None:
+            return "–"
+        return f"{figure:,}" if isinstance(figure, int) else f"{figure:,.{self.digits}f}"
 
 
 @dataclass(frozen=True)
@@ -98,10 +100,11 @@ class Comparison:
     def _cells(self, row: Row, bracket: bool = False) -> list[str]:
         differing, cells = self._differing(row), [row.name]
         for k, (ours, paper) in enumerate(zip(row.ours, row.paper, strict=True)):
+            show = self.columns[k].show
             if self._beside(k):
-                cells += [_show(ours), _show(paper)]
+                cells += [show(ours), show(paper)]
             else:
-                cells.append(_show(ours) + (f" (paper: {_show(paper)})" if bracket and k in differing else ""))
+                cells.append(show(ours) + (f" (paper: {show(paper)})" if bracket and k in differing else ""))
         return cells
 
     def terminal(self) -> list[str]:
@@ -112,7 +115,7 @@ class Comparison:
             if differing := self._differing(row):
                 below = ["  in the paper"]
                 for k, paper in enumerate(row.paper):
-                    below += ["", ""] if self._beside(k) else [_show(paper) if k in differing else ""]
+                    below += ["", ""] if self._beside(k) else [self.columns[k].show(paper) if k in differing else ""]
                 lines.append(below)
         widths = [max(len(line[k]) for line in lines) for k in range(len(lines[0]))]
         shown = [
@@ -145,7 +148,48 @@ class Comparison:
         ]
 
 
-def as_csv(tables: Sequence[Comparison]) -> str:
+@dataclass(frozen=True)
+class Listing:
+    """A table of words, as the paper prints it.
+
+    Attributes
+    ----------
+    title : str
+        What it shows.
+    heads : tuple of str
+        Headings; the first column names the rows.
+    rows : tuple of tuple of str
+    notes : tuple of str
+        What must be known to read it.
+    """
+
+    title: str
+    heads: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    notes: tuple[str, ...] = ()
+
+    def terminal(self) -> list[str]:
+        """Lines for a terminal."""
+        lines = [self.heads, *self.rows]
+        widths = [max(len(line[k]) for line in lines) for k in range(len(self.heads))]
+        shown = ["  ".join(cell.ljust(w) for cell, w in zip(line, widths, strict=True)).rstrip() for line in lines]
+        return [self.title, shown[0], "-" * max(map(len, shown)), *shown[1:], *self.notes]
+
+    def markdown(self) -> list[str]:
+        """Lines of Markdown."""
+        lines = [f"### {self.title}", "", "| " + " | ".join(self.heads) + " |", "|---" * len(self.heads) + "|"]
+        return [*lines, *("| " + " | ".join(row) + " |" for row in self.rows), "", *self.notes]
+
+    def records(self) -> list[list[str]]:
+        """One record a cell, as `Comparison.records` has them; all of it is the paper's but the last row."""
+        return [
+            [self.title, row[0], head, "", *((cell, "") if row is self.rows[-1] else ("", cell))]
+            for row in self.rows
+            for head, cell in zip(self.heads[1:], row[1:], strict=True)
+        ]
+
+
+def as_csv(tables: Sequence[Comparison | Listing]) -> str:
     """Write tables as one CSV text in long form: a line a figure."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
@@ -155,6 +199,6 @@ def as_csv(tables: Sequence[Comparison]) -> str:
     return text.getvalue()
 
 
-def as_markdown(tables: Sequence[Comparison]) -> str:
+def as_markdown(tables: Sequence[Comparison | Listing]) -> str:
     """Write tables one below the other as Markdown."""
     return "\n\n".join("\n".join(table.markdown()).rstrip() for table in tables) + "\n"

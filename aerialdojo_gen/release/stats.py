@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from aerialdojo_gen import store
-from aerialdojo_gen.paper import PaperScene, inventory, splits
-from aerialdojo_gen.release.comparison import Column, Comparison, Row
+from aerialdojo_gen.paper import PaperScene, benchmarks, family_counts, inventory, shares, splits
+from aerialdojo_gen.release.comparison import Column, Comparison, Listing, Row
 from aerialdojo_gen.schemas import FAMILIES, SETTINGS
 
 _COUNTS = tuple(Column(name) for name in ("landmarks", "objects", "base", "standard", "long", "instances"))
@@ -28,8 +28,8 @@ class Made:
         Name.
     family, scene_type : str
         Of the scene.
-    landmarks, objects : int
-        How many.
+    landmarks, objects, anchors : int
+        How many; of the anchors those that end a search.
     categories : frozenset of str
         Of the objects.
     tasks : dict of (str, str) to int
@@ -49,6 +49,7 @@ class Made:
     tasks: dict[tuple[str, str], int]
     path_m: float
     paper: PaperScene | None
+    anchors: int = 0
 
     def of(self, setting: str, subset: str | None = None) -> int:
         """Navigation tasks of a setting, and of one subset where that is named."""
@@ -86,6 +87,7 @@ def made_of(data: Path, scene: str) -> Made:
         tasks=dict(tasks),
         path_m=path,
         paper=inventory().get(scene),
+        anchors=sum(store.read_scene(data, "release/anchors", scene, ["selected"])["selected"].to_pylist()),
     )
 
 
@@ -124,7 +126,7 @@ def scene_table(made: Sequence[Made]) -> Comparison:
 
 
 def family_table(made: Sequence[Made]) -> Comparison:
-    """Sum the scenes, and the paper's Table 10, by family."""
+    """Sum the scenes by family, beside the paper's Table 2 (its Types and Anchors) and the sums of its Table 10."""
     groups = [(family, [m for m in made if m.family == family]) for family in FAMILIES.values()]
     groups += [
         (f, [m for m in made if m.family == f]) for f in sorted({m.family for m in made} - {*FAMILIES.values()})
@@ -133,8 +135,69 @@ def family_table(made: Sequence[Made]) -> Comparison:
     for name, group in [*(g for g in groups if g[1]), ("all", list(made))]:
         ours, paper = _figures(group), _paper_figures(group)
         known = len(group) if paper[0] is not None else None
-        rows.append(Row(name, (len(group), *ours), (known, *paper)))
-    return Comparison("Families", "family", (Column("scenes"), *_COUNTS, _KM), tuple(rows))
+        types, anchors = len({m.scene_type for m in group}), sum(m.anchors for m in group)
+        # The paper counts these by family: of a part of a family's scenes it says nothing.
+        named = [f for n, f in family_counts().items() if name in (n, "all")]
+        whole = bool(named) and known == sum(int(f["scenes"]) for f in named)
+        told = [sum(int(f[column]) for f in named) if whole else None for column in ("types", "anchors")]
+        theirs = (told[0], known, *paper[:2], told[1], *paper[2:])
+        rows.append(Row(name, (types, len(group), *ours[:2], anchors, *ours[2:]), theirs))
+    columns = (Column("types"), Column("scenes"), *_COUNTS[:2], Column("anchors"), *_COUNTS[2:], _KM)
+    title = "Families (the paper's Table 2)" if any(m.paper for m in made) else "Families"
+    return Comparison(title, "family", columns, tuple(rows))
+
+
+def share_table(made: Sequence[Made]) -> Comparison:
+    """Say which share of the instances has what (the paper's appendix C)."""
+    total = sum(m.instances for m in made)
+    whole = {m.scene for m in made} >= set(inventory())
+
+    def share(part: Iterable[int], of: int = total) -> float | None:
+        return 100.0 * sum(part) / of if of else None
+
+    ours: dict[str, float | None] = {s: share(2 * m.of(s) for m in made) for s in SETTINGS}
+    ours |= {family: share(m.instances for m in made if m.family == family) for family in FAMILIES.values()}
+    ours["Mall"] = share(m.instances for m in made if m.scene_type == "Mall")
+    for partition in ("ID", "OOD"):
+        group = [m for m in made if store.partition(m.scene).upper() == partition]
+        n = sum(m.instances for m in group)
+        ours[partition] = share([n])
+        ours[f"{partition} train"] = share((2 * m.of(s, "train") for m in group for s in SETTINGS), n)
+    names = {
+        **dict(zip(SETTINGS, ("base", "standard", "long-horizon"), strict=True)), "Mall": "malls",
+        "ID train": "ID: of these, train", "OOD train": "OOD: of these, train",
+    }  # fmt: skip
+    order = [*SETTINGS, *FAMILIES.values(), "Mall", "ID", "ID train", "OOD", "OOD train"]
+    rows = [Row(names.get(key, key), (ours[key],), (shares()[key] if whole else None,)) for key in order]
+    title = "Shares of the task instances (the paper's appendix C)" if whole else "Shares of the task instances"
+    return Comparison(title, "share of", (Column("%", "%", exact=False, digits=2),), tuple(rows))
+
+
+def mean_length_table(made: Sequence[Made]) -> Comparison:
+    """Say how long routes are in the mean, every navigation task counted once (the paper's appendix C)."""
+    rows = []
+    for name in (*FAMILIES.values(), "all"):
+        group = [m for m in made if name in (m.family, "all")]
+        n = sum(m.instances for m in group) // 2
+        if not n:
+            continue
+        paper, whole = _paper_figures(group), {m.scene for m in made} >= set(inventory())
+        theirs = 1000.0 * paper[6] / (paper[5] / 2) if whole and paper[5] and paper[6] is not None else None
+        rows.append(Row(name, (sum(m.path_m for m in group) / n,), (theirs,)))
+    column = Column("m", "m", exact=False, digits=2)
+    return Comparison("Mean length of the reference trajectories", "family", (column,), tuple(rows))
+
+
+def benchmark_table(made: Sequence[Made]) -> Listing:
+    """Set the release below the benchmarks of the paper's Table 1."""
+    heads = ("benchmark", "year", "task", "DoF", "goal type", "goal specification", "tasks", "families", "scenes")
+    rows = [tuple(value for key, value in row.items() if key != "source") for row in benchmarks()]
+    there = {m.family for m in made}
+    letters = " ".join(letter for letter, family in FAMILIES.items() if family in there)
+    n = sum(m.instances for m in made)
+    rows.append(("this release", "", "OGS", "4", "instance", "semantic or image", f"{n:,}", letters, f"{len(made)}"))
+    notes = ("Families: U(rban), N(atural), I(nfrastructure), D(isaster).",)
+    return Listing("Aerial benchmarks (the paper's Table 1)", heads, tuple(rows), notes)
 
 
 def split_table(made: Sequence[Made]) -> Comparison:
@@ -155,11 +218,7 @@ def split_table(made: Sequence[Made]) -> Comparison:
 
 
 def total_table(made: Sequence[Made]) -> Comparison:
-    """Say what the benchmark holds as a whole.
-
-    The paper's own summary (its Table 2) is not among the files that come with this program: its figures here are the
-    sums of its Table 10.
-    """
+    """Say what the benchmark holds as a whole; the paper's figures are the sums of its Table 10."""
     ours, paper = _figures(made), _paper_figures(made)
     known = paper[0] is not None
     rows = [
@@ -185,5 +244,8 @@ def total_table(made: Sequence[Made]) -> Comparison:
 
 
 def tables(made: Sequence[Made]) -> list[Comparison]:
-    """Make all tables: the whole, families, scenes, splits."""
-    return [total_table(made), family_table(made), scene_table(made), split_table(made)]
+    """Make all tables of figures: the whole, families, scenes, splits, shares, lengths."""
+    return [
+        total_table(made), family_table(made), scene_table(made), split_table(made), share_table(made),
+        mean_length_table(made),
+    ]  # fmt: skip

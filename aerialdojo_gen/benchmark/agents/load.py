@@ -18,6 +18,7 @@ BUILT_IN = {
     "oracle": f"{_HERE}.simple:OracleAgent",
     "random": f"{_HERE}.simple:RandomAgent",
     "stop": f"{_HERE}.simple:StopAgent",
+    "constant": f"{_HERE}.simple:ConstantAgent",
     "explorer": f"{_HERE}.explorer:ExplorerAgent",
     "openai": "aerialdojo_gen.benchmark.llm.openai_agent:OpenAIAgent",
     "anthropic": "aerialdojo_gen.benchmark.llm.anthropic_agent:AnthropicAgent",

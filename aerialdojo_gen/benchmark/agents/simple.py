@@ -1,4 +1,4 @@
-"""Agents that look at nothing: the reference replayed, random actions, and Stop at once."""
+"""Agents that look at nothing: the reference replayed, random actions, the same flight always, and Stop at once."""
 
 from __future__ import annotations
 
@@ -9,7 +9,12 @@ import numpy as np
 from aerialdojo_gen import rng
 from aerialdojo_gen.benchmark.agents.base import AgentBase
 from aerialdojo_gen.benchmark.goal import BLIND, N_ACTIONS, Goal, Observation
-from aerialdojo_gen.schemas import APPROACH, STOP
+from aerialdojo_gen.schemas import ACTION_NAMES, APPROACH, STOP
+
+# A short flight ahead ends about as near to as many goals as any blind flight does. Of the ID scenes' pairs of Base
+# length, obstacles left out, 1.04 % have their goal within 3 m of its end and 3.59 % within 5 m; of all places that
+# could be flown to, the best have 1.23 and 3.75 %.
+BEST_CONSTANT = ("MoveForward5", "MoveForward3", "Stop")
 
 
 class OracleAgent(AgentBase):
@@ -79,3 +84,37 @@ class StopAgent(AgentBase):
     def act(self, observation: Observation) -> int:
         """Stop."""
         return STOP
+
+
+class ConstantAgent(AgentBase):
+    """Flies the same few actions in every episode, and stops: how many tasks are solved without looking.
+
+    Parameters
+    ----------
+    actions : str or sequence of str or int
+        Names or numbers of actions, in a string separated by commas. Where they end it stops. The default is the
+        best blind flight that is known.
+
+    Raises
+    ------
+    ValueError
+        There is no such action.
+    """
+
+    sensors = BLIND
+
+    def __init__(self, actions: str | Sequence[str | int] = BEST_CONSTANT) -> None:
+        given = actions.split(",") if isinstance(actions, str) else [str(action) for action in actions]
+        known = {name.lower(): k for k, name in enumerate(ACTION_NAMES[:N_ACTIONS])}
+        known |= {str(k): k for k in range(N_ACTIONS)}
+        for action in given:
+            if action.strip().lower() not in known:
+                raise ValueError(f"no action {action.strip()!r}: there are {', '.join(ACTION_NAMES[:N_ACTIONS])}")
+        self._actions = [known[action.strip().lower()] for action in given]
+
+    def reset(self, goal: Goal) -> None:
+        """Begin an episode."""
+
+    def act(self, observation: Observation) -> int:
+        """Do what is done at this step of every episode."""
+        return self._actions[observation.step] if observation.step < len(self._actions) else STOP

@@ -1,4 +1,4 @@
-"""Figures of a release, as PNG and SVG: composition, lengths, detours, categories, maps of the scenes."""
+"""Figures of a release, as PNG and SVG: what it consists of, lengths, detours, categories, names, maps."""
 
 from __future__ import annotations
 
@@ -6,8 +6,9 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from aerialdojo_gen.release.figures.charts import composition, detours, lengths
-from aerialdojo_gen.release.figures.cloud import categories
+from aerialdojo_gen.release.figures.cloud import categories, names
 from aerialdojo_gen.release.figures.maps import maps
+from aerialdojo_gen.release.figures.shares import shares
 from aerialdojo_gen.release.figures.style import Routes, read_routes, save
 
 __all__ = ["draw_figures"]
@@ -38,9 +39,11 @@ def draw_figures(data: Path, scenes: Sequence[str], folder: Path) -> list[Path]:
     routes: Routes = read_routes(data, scenes)
     figures = {
         "composition": composition(routes),
+        "shares": shares(routes),
         "lengths": lengths(routes),
         "detours": detours(routes),
         "categories": categories(data, scenes),
+        "names": names(data, scenes),
         "maps": maps(data, scenes),
     }
     return [path for name, figure in figures.items() for path in save(figure, folder, name)]

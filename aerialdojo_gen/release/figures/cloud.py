@@ -1,9 +1,9 @@
-"""The objects' categories as a word cloud."""
+"""The objects' categories and names as word clouds."""
 
 from __future__ import annotations
 
 from collections import Counter, defaultdict
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from matplotlib import font_manager
@@ -17,6 +17,9 @@ from aerialdojo_gen import store
 from aerialdojo_gen.release.figures.style import FAMILY_COLOURS, OTHER_COLOUR, WIDTH_IN, styled
 
 _SIZE_PX = (1440, 720)
+_MARGIN_PX = 8
+# More would be too small to be read in print.
+_MOST_NAMES = 160
 
 
 def categories(data: Path, scenes: Sequence[str]) -> Figure:
@@ -27,27 +30,49 @@ def categories(data: Path, scenes: Sequence[str]) -> Figure:
     StoreError
         A part of the release is missing or damaged.
     """
-    objects: Counter[str] = Counter()
     homes: defaultdict[str, Counter[str]] = defaultdict(Counter)
     for scene in scenes:
         family = store.read_scene(data, "release/scenes", scene, ["family"]).to_pylist()[0]["family"]
         for category in store.read_scene(data, "release/objects", scene, ["category"])["category"].to_pylist():
-            name = category.replace("_", " ")
-            objects[name] += 1
-            homes[name][family] += 1
+            homes[category.replace("_", " ")][family] += 1
+    return _cloud(homes)
+
+
+def names(data: Path, scenes: Sequence[str]) -> Figure:
+    """Draw the names of the objects (paper, Fig. 2), each as large as it is sought by tasks, the most sought ones.
+
+    Raises
+    ------
+    StoreError
+        A part of the release is missing or damaged.
+    """
+    homes: defaultdict[str, Counter[str]] = defaultdict(Counter)
+    for scene in scenes:
+        for subset in ("train", "test"):
+            table = store.read_scene(data, f"tasks/{subset}", scene, ["family", "target_name"])
+            for family, name in zip(table["family"].to_pylist(), table["target_name"].to_pylist(), strict=True):
+                homes[name][family] += 1
+    sought = sorted(homes, key=lambda name: (-homes[name].total(), name))[:_MOST_NAMES]
+    return _cloud({name: homes[name] for name in sought})
+
+
+def _cloud(homes: Mapping[str, Counter[str]]) -> Figure:
+    """Draw words as large as they are counted, in the colour of the family that counts most of them."""
+    counts = {word: found.total() for word, found in homes.items()}
     width, height = _SIZE_PX
     font = font_manager.FontProperties(family="DejaVu Sans")
     path = font_manager.findfont(font)
     # Sorted first: words of one size take their places by name, not by where they were met.
     cloud = WordCloud(
-        width=width, height=height, font_path=path, max_words=len(objects), prefer_horizontal=1.0,
+        width=width, height=height, font_path=path, max_words=len(counts), prefer_horizontal=1.0,
         relative_scaling=0.4, min_font_size=9, max_font_size=64, margin=3, random_state=0,
-    ).generate_from_frequencies(dict(sorted(objects.items())))  # fmt: skip
+    ).generate_from_frequencies(dict(sorted(counts.items())))  # fmt: skip
     with styled():
         figure = Figure(figsize=(WIDTH_IN, WIDTH_IN * height / width + 0.3))
         axes = figure.add_axes((0.0, 0.0, 1.0, 1.0 - 0.3 / figure.get_figheight()))
-        axes.set_xlim(0, width)
-        axes.set_ylim(height, 0)
+        # A word may begin at the very edge, and its outline reach over it.
+        axes.set_xlim(-_MARGIN_PX, width + _MARGIN_PX)
+        axes.set_ylim(height + _MARGIN_PX, -_MARGIN_PX)
         axes.set_axis_off()
         shown = set()
         for (word, _), size, (row, column), _, _ in cloud.layout_:

@@ -55,13 +55,15 @@ class Routes:
 
     Attributes
     ----------
-    family, scene_type, setting : (n,) arrays of str
+    family, scene_type, partition, subset, setting : (n,) arrays of str
     length_m, detour_ratio : (n,) float64
     n_actions : (n,) int32
     """
 
     family: NDArray[np.str_]
     scene_type: NDArray[np.str_]
+    partition: NDArray[np.str_]
+    subset: NDArray[np.str_]
     setting: NDArray[np.str_]
     length_m: NDArray[np.float64]
     detour_ratio: NDArray[np.float64]
@@ -77,17 +79,21 @@ def read_routes(data: Path, scenes: Sequence[str]) -> Routes:
         A part is missing or damaged.
     """
     columns = ["setting", "length_m", "detour_ratio", "n_actions"]
-    tables, family, scene_type = [], [], []
+    belongs = ("family", "scene_type", "partition")
+    tables: list[pa.Table] = []
+    keys: list[tuple[str, ...]] = []
     for scene in scenes:
-        row = store.read_scene(data, "release/scenes", scene, ["family", "scene_type"]).to_pylist()[0]
-        table = pa.concat_tables([store.read_scene(data, f"routes/{s}", scene, columns) for s in ("train", "test")])
-        tables.append(table)
-        family += [row["family"]] * table.num_rows
-        scene_type += [row["scene_type"]] * table.num_rows
+        row = store.read_scene(data, "release/scenes", scene, belongs).to_pylist()[0]
+        for subset in ("train", "test"):
+            tables.append(store.read_scene(data, f"routes/{subset}", scene, columns))
+            keys += [(*(row[name] for name in belongs), subset)] * tables[-1].num_rows
     table = pa.concat_tables(tables)
+    family, scene_type, partition, side = np.array(keys, dtype=np.str_).reshape(-1, 4).T
     return Routes(
-        np.array(family, dtype=np.str_),
-        np.array(scene_type, dtype=np.str_),
+        family,
+        scene_type,
+        partition,
+        side,
         np.array(table.column("setting").to_pylist(), dtype=np.str_),
         *(table.column(name).to_numpy() for name in columns[1:]),
     )

@@ -1,0 +1,120 @@
+"""Scores by what tasks differ in: partition, goal, scene type, averaging, seen targets, difficulty."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+
+from aerialdojo_gen.benchmark.grid import MEASURES, Line, Measure, Table, score_table, values_of
+from aerialdojo_gen.benchmark.metrics import Bools
+from aerialdojo_gen.benchmark.paper_tables import in_setting
+from aerialdojo_gen.benchmark.profiles import Profile
+from aerialdojo_gen.benchmark.runs import Run
+from aerialdojo_gen.benchmark.scores import Score, slices, summarize, weighted_score
+from aerialdojo_gen.benchmark.tables import (
+    MODALITIES,
+    NAMES,
+    PARTITIONS,
+    line_of,
+    profile_head,
+    run_table,
+    stacked_table,
+)
+from aerialdojo_gen.schemas import FAMILIES, SETTINGS
+
+_DIFFERENCES = (Measure("SR", "sr", signed=True), Measure("OSR", "osr", signed=True))
+_SHORT = MEASURES[:3]
+
+
+def by_setting(runs: Sequence[Run]) -> Iterable[tuple[str, Run]]:
+    """Yield the parts of runs by length setting, with the heading that they stand under."""
+    for setting in SETTINGS:
+        for run in in_setting(runs, setting):
+            yield NAMES[setting], run
+
+
+def partition_table(runs: Sequence[Run], profile: Profile) -> Table:
+    """Set scenes of the training's distribution beside those out of it, in every length setting."""
+    lines = []
+    for section, run in by_setting(runs):
+        parts = {name: summarize(p, profile).overall for name, p in slices(run.episodes, "partition", PARTITIONS)}
+        known, other = (values_of(parts.get(name)) for name in PARTITIONS)
+        gap = tuple(b - a for a, b in zip(known[:2], other[:2], strict=True))
+        lines.append(line_of(run, (*known, *other, *gap), rivals=section, section=section))
+    groups = [("ID", MEASURES), ("OOD", MEASURES), ("OOD − ID, points", _DIFFERENCES)]
+    return score_table(f"ID and OOD scenes, {profile_head(profile)}", "agent", groups, lines)
+
+
+def goal_table(runs: Sequence[Run], profile: Profile) -> Table:
+    """Set semantic goals beside image goals, in every length setting."""
+    lines = []
+    for section, run in by_setting(runs):
+        parts = {name: summarize(p, profile).overall for name, p in slices(run.episodes, "modality", MODALITIES)}
+        words, picture = (values_of(parts.get(name)) for name in MODALITIES)
+        gap = tuple(b - a for a, b in zip(words[:2], picture[:2], strict=True))
+        lines.append(line_of(run, (*words, *picture, *gap), rivals=section, section=section))
+    groups = [("Semantic goal", MEASURES), ("Image goal", MEASURES), ("image − semantic, points", _DIFFERENCES)]
+    return score_table(f"Goal type, {profile_head(profile)}", "agent", groups, lines)
+
+
+def type_table(runs: Sequence[Run], profile: Profile) -> Table:
+    """Set the scene types below one another, by family, a group of columns a run."""
+    scores = []
+    home: dict[str, str] = {}
+    for run in runs:
+        home |= dict(zip(run.episodes.scene_type.tolist(), run.episodes.family.tolist(), strict=True))
+        found: dict[str, Score] = {}
+        for name, part in slices(run.episodes, "scene_type", sorted(home)):
+            found[name] = summarize(part, profile).overall
+        scores.append(found)
+    order = list(FAMILIES.values())
+    types = sorted(home, key=lambda t: (order.index(home[t]) if home[t] in order else len(order), t))
+    table = stacked_table(f"By scene type, {profile_head(profile)}", "scene type", runs, types, scores)
+    heads = {i: home[t] for i, t in enumerate(types) if not i or home[t] != home[types[i - 1]]}
+    return Table(table.title, table.stub, table.groups, table.rows, table.notes, heads, table.marks)
+
+
+def average_table(runs: Sequence[Run], profile: Profile) -> Table:
+    """Set the mean of the families beside the mean of all episodes (paper, appendix C: different populations)."""
+
+    def values(run: Run) -> Iterable[float]:
+        return values_of(summarize(run.episodes, profile).overall) + values_of(weighted_score(run.episodes, profile))
+
+    groups = [("mean of the families", MEASURES), ("mean of the tasks", MEASURES)]
+    note = "A family counts a quarter on the left, as much as it has tasks on the right: two different populations."
+    return run_table(f"Two averages, {profile_head(profile)}", runs, groups, values, [note])
+
+
+def part_table(
+    title: str, runs: Sequence[Run], profile: Profile, parts: Sequence[tuple[str, Sequence[Bools]]], note: str = ""
+) -> Table | None:
+    """Set parts of the episodes beside one another: SR, OSR, SPL.
+
+    Parameters
+    ----------
+    title : str
+    runs : sequence of Run
+    profile : Profile
+    parts : sequence of (str, sequence of (n,) bool)
+        Heading of a part, and which episodes of every run belong to it.
+    note : str
+        What the parts are.
+
+    Returns
+    -------
+    Table or None
+        None where not two parts have episodes.
+    """
+    there = [(head, masks) for head, masks in parts if any(np.any(mask) for mask in masks)]
+    if len(there) < 2:
+        return None
+    lines: list[Line] = []
+    for k, run in enumerate(runs):
+        values: tuple[float, ...] = ()
+        for _, masks in there:
+            part = run.episodes.where(masks[k])
+            values += values_of(summarize(part, profile).overall if len(part) else None, _SHORT)
+        lines.append(line_of(run, values))
+    groups = [(head, _SHORT) for head, _ in there]
+    return score_table(f"{title}, {profile_head(profile)}", "agent", groups, lines, [note] if note else [])

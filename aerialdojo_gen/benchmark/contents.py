@@ -1,0 +1,104 @@
+"""What a report holds: its tables by name, in their order."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from aerialdojo_gen.benchmark import breakdowns, radii, tables
+from aerialdojo_gen.benchmark.difficulty import difficulty_tables
+from aerialdojo_gen.benchmark.grid import Table
+from aerialdojo_gen.benchmark.paper_tables import result_tables
+from aerialdojo_gen.benchmark.profiles import Profile
+from aerialdojo_gen.benchmark.runs import Run
+from aerialdojo_gen.errors import UsageError
+from aerialdojo_gen.paper import PaperResult
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What a report is made of.
+
+    Attributes
+    ----------
+    data : Path
+        The data directory, whose release says more of the tasks; the runs need not lie in it.
+    runs : sequence of Run
+        In the order and the groups of the lines.
+    profiles : sequence of Profile
+        Rules of success; what has room for one judges by the first.
+    radii_m : sequence of float
+        Of the table of radii, metres.
+    intervals : bool
+        Whether 95 % intervals are shown.
+    beside : sequence of PaperResult
+        The paper's results, to be set beside ours.
+    """
+
+    data: Path
+    runs: Sequence[Run]
+    profiles: Sequence[Profile]
+    radii_m: Sequence[float] = radii.DEFAULT_RADII_M
+    intervals: bool = True
+    beside: Sequence[PaperResult] = ()
+
+
+def _sliced(column: str) -> Callable[[Wanted], list[Table]]:
+    return lambda w: [tables.slice_table(w.runs, w.profiles[0], column)]
+
+
+_TABLES: dict[str, Callable[[Wanted], list[Table]]] = {
+    "overall": lambda w: [tables.main_table(w.runs, w.profiles)],
+    "results": lambda w: result_tables(w.runs, w.profiles, w.intervals, w.beside),
+    "partition": lambda w: [breakdowns.partition_table(w.runs, w.profiles[0])],
+    "family": lambda w: [tables.family_table(w.runs, w.profiles[0])],
+    "averages": lambda w: [breakdowns.average_table(w.runs, w.profiles[0])],
+    "setting": _sliced("setting"),
+    "goal": lambda w: [breakdowns.goal_table(w.runs, w.profiles[0])],
+    "modality": _sliced("modality"),
+    "radius": lambda w: [radii.radius_table(w.runs, w.profiles[0], w.radii_m)],
+    "visits": lambda w: [radii.visit_table(w.runs, w.profiles[0])],
+    "difficulty": lambda w: difficulty_tables(w.data, w.runs, w.profiles[0]),
+    "conduct": lambda w: [tables.conduct_table(w.runs)],
+    "type": lambda w: [breakdowns.type_table(w.runs, w.profiles[0])],
+    "scene": lambda w: [tables.scene_table(w.runs, w.profiles[0])],
+}
+NAMES = tuple(_TABLES)
+# The long ones, and what others say in more detail, are printed where they are asked for.
+DEFAULT = tuple(name for name in NAMES if name not in ("setting", "modality", "type", "scene"))
+
+
+def report_tables(wanted: Wanted, names: Sequence[str] = DEFAULT) -> list[Table]:
+    """Make tables.
+
+    Parameters
+    ----------
+    wanted : Wanted
+        What they are made of.
+    names : sequence of str
+        Of `NAMES`; ``all`` for all of them.
+
+    Returns
+    -------
+    list of Table
+        In the report's order, each once.
+
+    Raises
+    ------
+    UsageError
+        There is no table of that name.
+    """
+    return [table for made in named_tables(wanted, names).values() for table in made]
+
+
+def named_tables(wanted: Wanted, names: Sequence[str]) -> dict[str, list[Table]]:
+    """Make tables as `report_tables` does, by the names that they go by."""
+    for name in names:
+        if name not in (*NAMES, "all"):
+            near = difflib.get_close_matches(name, NAMES, n=1)
+            hint = f"did you mean {near[0]!r}?" if near else f"there are {', '.join(NAMES)}, all"
+            raise UsageError(f"no table {name!r}: {hint}")
+    chosen = NAMES if "all" in names else [name for name in NAMES if name in names]
+    return {name: _TABLES[name](wanted) for name in chosen}

@@ -1,0 +1,158 @@
+"""How sure a score is, and a difference of two: intervals and tests that take the scene for the unit.
+
+Episodes of one scene are alike, so they are no independent draws: what is drawn anew is the scene, within its family.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy import stats
+
+from aerialdojo_gen import rng
+from aerialdojo_gen.benchmark.metrics import Episodes, Floats
+from aerialdojo_gen.benchmark.profiles import Profile
+from aerialdojo_gen.benchmark.scores import METRICS, summarize
+from aerialdojo_gen.errors import UsageError
+
+RESAMPLES = 9_999
+LEVEL = 0.95
+
+
+def bootstrap(scenes: Sequence[Floats], resamples: int = RESAMPLES, level: float = LEVEL) -> tuple[Floats, Floats]:
+    """Percentile intervals of the mean of the families, scenes drawn anew within their family.
+
+    Parameters
+    ----------
+    scenes : sequence of (n, m) float64
+        An array a family: a row a scene, a column a measure.
+    resamples : int
+        How often is drawn.
+    level : float
+        Share of the resamples within the interval.
+
+    Returns
+    -------
+    low, high : (m,) float64
+        NaN where a family has a single scene: how far scenes differ is then not known.
+    """
+    width = scenes[0].shape[1] if scenes else len(METRICS)
+    if not scenes or min(map(len, scenes)) < 2:
+        return np.full(width, math.nan), np.full(width, math.nan)
+
+    def mean_of_families(*parts: Any, axis: int) -> Any:
+        return sum(np.mean(part, axis=axis) for part in parts) / len(parts)
+
+    draws = rng.generator(0, "bootstrap", *(len(part) for part in scenes))
+    found = stats.bootstrap(
+        tuple(scenes), mean_of_families, n_resamples=resamples, confidence_level=level, axis=0,
+        method="percentile", rng=draws,
+    ).confidence_interval  # fmt: skip
+    return np.asarray(found.low, np.float64), np.asarray(found.high, np.float64)
+
+
+def scene_scores(episodes: Episodes, profile: Profile) -> dict[str, dict[str, Floats]]:
+    """Score scenes: family, then scene, to the `METRICS` as (5,) float64."""
+    summary = summarize(episodes, profile)
+    family_of = dict(zip(episodes.scene.tolist(), episodes.family.tolist(), strict=True))
+    found: dict[str, dict[str, Floats]] = {family: {} for family in summary.families}
+    for name, score in summary.scenes.items():
+        found[family_of[name]][name] = np.array([getattr(score, metric) for metric in METRICS])
+    return found
+
+
+def score_intervals(episodes: Episodes, profile: Profile) -> tuple[tuple[float, float], ...]:
+    """Return the 95 % interval of every overall metric, in the order of `METRICS`; NaN where it is not known."""
+    low, high = bootstrap([np.stack([*part.values()]) for part in scene_scores(episodes, profile).values()])
+    return tuple(zip(low.tolist(), high.tolist(), strict=True))
+
+
+@dataclass(frozen=True)
+class Paired:
+    """Two runs on the same tasks, the second against the first.
+
+    Attributes
+    ----------
+    first, second, difference : (5,) float64
+        Overall `METRICS`; fractions and metres.
+    low, high : (5,) float64
+        95 % interval of the difference, by scene; NaN where a family has a single scene.
+    p : (5,) float64
+        Two-sided: how often a difference as large arises where the two runs are exchanged scene by scene.
+    tasks, scenes : int
+        Flown by both.
+    only_first, only_second : int
+        Tasks that one of them solves, the other not.
+    p_mcnemar : float
+        Of these two counts, exact (binomial), two-sided; it takes episodes for independent.
+    """
+
+    first: Floats
+    second: Floats
+    difference: Floats
+    low: Floats
+    high: Floats
+    p: Floats
+    tasks: int
+    scenes: int
+    only_first: int
+    only_second: int
+    p_mcnemar: float
+
+
+def paired(
+    first: Episodes, second: Episodes, success: tuple[Any, Any], profile: Profile, resamples: int = RESAMPLES
+) -> Paired:
+    """Compare two logs of the same tasks in the same order.
+
+    Parameters
+    ----------
+    first, second : Episodes
+        Row by row the same task.
+    success : tuple of (n,) bool
+        Successes of the two under the profile.
+    profile : Profile
+        The rule.
+    resamples : int
+        Of the interval and of the test; where there are fewer exchanges in all, the test is exact.
+
+    Returns
+    -------
+    Paired
+
+    Raises
+    ------
+    UsageError
+        There are no tasks.
+    """
+    if not len(first):
+        raise UsageError("the runs have no task in common: a paired test needs runs on the same tasks")
+    one, other = scene_scores(first, profile), scene_scores(second, profile)
+    families = [np.stack([other[family][name] - one[family][name] for name in part]) for family, part in one.items()]
+    low, high = bootstrap(families, resamples)
+    # A scene's share of the overall mean: its family's among the families, its own within its family.
+    weight = np.concatenate([np.full(len(part), 1.0 / (len(part) * len(families))) for part in families])
+    a, b = (np.concatenate([np.stack([*p.values()]) for p in scores.values()]) for scores in (one, other))
+
+    def weighted(x: Any, y: Any, axis: int) -> Any:
+        # Rounded: sums in another order differ in their last digits, and would count as other differences.
+        return np.round(np.sum((y - x) * weight, axis=axis), 12)
+
+    p = np.ones(len(METRICS))
+    if len(a) > 1:
+        for k in range(len(METRICS)):
+            p[k] = stats.permutation_test(
+                (a[:, k], b[:, k]), weighted, permutation_type="samples", vectorized=True, n_resamples=resamples,
+                rng=rng.generator(0, "permutation"),
+            ).pvalue  # fmt: skip
+    only_first, only_second = (int(np.sum(x & ~y)) for x, y in (success, success[::-1]))
+    torn = only_first + only_second
+    exact = float(stats.binomtest(only_first, torn).pvalue) if torn else 1.0
+    means = [np.array([getattr(summarize(e, profile).overall, m) for m in METRICS]) for e in (first, second)]
+    return Paired(
+        means[0], means[1], means[1] - means[0], low, high, p, len(first), len(a), only_first, only_second, exact
+    )  # fmt: skip

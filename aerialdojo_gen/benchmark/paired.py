@@ -1,0 +1,79 @@
+"""Two runs on the same tasks: the difference of their scores, and whether it may be chance."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from aerialdojo_gen.benchmark.grid import HEADS, NONE, Measure, Table
+from aerialdojo_gen.benchmark.intervals import Paired, paired
+from aerialdojo_gen.benchmark.metrics import outcomes
+from aerialdojo_gen.benchmark.profiles import Profile
+from aerialdojo_gen.benchmark.runs import Run
+from aerialdojo_gen.benchmark.scores import METRICS
+from aerialdojo_gen.benchmark.tables import profile_head
+from aerialdojo_gen.errors import UsageError
+
+
+def paired_tables(runs: Sequence[Run], profiles: Sequence[Profile]) -> list[Table]:
+    """Compare the second run with the first, on the tasks that both have flown, a table a profile.
+
+    Raises
+    ------
+    UsageError
+        There are not two runs, or they have no task in common.
+    """
+    if len(runs) != 2:
+        named = ", ".join(run.name for run in runs)
+        raise UsageError(f"--paired compares two runs, not {len(runs)} ({named}): name two")
+    first, second = _same_tasks(*runs)
+    return [_table(first, second, profile) for profile in profiles]
+
+
+def _same_tasks(first: Run, second: Run) -> tuple[Run, Run]:
+    """Cut two runs down to the tasks that both have flown, in one order."""
+    tasks = [np.array(run.table["task_id"].to_pylist(), dtype=np.str_) for run in (first, second)]
+    both = np.intersect1d(tasks[0], tasks[1])
+    if not len(both):
+        raise UsageError(f"{first.name} and {second.name} have no task in common: fly both on the same ones")
+    cut = []
+    for run, ids in zip((first, second), tasks, strict=True):
+        order = np.argsort(ids)
+        cut.append(run.where(order[np.searchsorted(ids[order], both)]))
+    return cut[0], cut[1]
+
+
+def _table(first: Run, second: Run, profile: Profile) -> Table:
+    success = (outcomes(first.episodes, profile).success, outcomes(second.episodes, profile).success)
+    result = paired(first.episodes, second.episodes, success, profile)
+    rows = [(HEADS[metric], _cells(result, k, metric)) for k, metric in enumerate(METRICS)]
+    notes = [
+        f"{result.tasks:,} tasks of {result.scenes} scenes, flown by both. The interval draws scenes anew within "
+        "their family; p is that of a permutation test which exchanges the two agents scene by scene, two-sided.",
+        f"Solved by {first.label} alone: {result.only_first:,}; by {second.label} alone: {result.only_second:,} "
+        f"(McNemar's exact p {_p(result.p_mcnemar)}, which takes episodes for independent).",
+    ]
+    groups = (
+        ("", (first.label, second.label)),
+        (f"{second.label} − {first.label}", ("difference", "95 % interval", "p")),
+    )
+    title = f"{second.label} against {first.label}, {profile_head(profile)}"
+    return Table(title, "measure", groups, tuple(rows), tuple(notes))
+
+
+def _cells(result: Paired, k: int, metric: str) -> tuple[str, ...]:
+    plain, signed = Measure("", metric), Measure("", metric, signed=True)
+    low, high = float(result.low[k]), float(result.high[k])
+    return (
+        plain.text(float(result.first[k])),
+        plain.text(float(result.second[k])),
+        signed.text(float(result.difference[k])),
+        NONE if math.isnan(low) else f"[{signed.text(low)}, {signed.text(high)}]",
+        _p(float(result.p[k])),
+    )
+
+
+def _p(p: float) -> str:
+    return "< 0.001" if p < 0.001 else f"{p:.3f}"
