@@ -30,7 +30,7 @@ _THIN_M = 0.01
 _ODD_M = (0.3183, 0.2718)
 _SAMPLE_M = 0.5
 _UP, _DOWN = np.array([[0.0, 0.0, 1.0]]), np.array([[0.0, 0.0, -1.0]])
-_FAR_M = 1000.0
+_FAR_M = 10_000.0
 
 
 @check("anchors", needs=("mesh",))
@@ -65,7 +65,7 @@ def _buried(data: SceneData, places: Floats) -> Iterator[Finding]:
     ground = _ground(data)
     if ground is None:
         return
-    fit = np.flatnonzero(np.isfinite(places).all(axis=1))
+    fit = np.flatnonzero((np.abs(places) < _FAR_M).all(axis=1))
     for row in fit[_below(ground, places[fit])]:
         yield Finding(int(row), f"below ground at {_place(places[row])}", "above ground")
 
@@ -76,13 +76,13 @@ def _place(p: Floats) -> str:
 
 def _along(xyz: Floats, first: np.ndarray) -> tuple[Floats, np.ndarray]:
     """Points of polylines no further apart than the sample, and the pose that each comes after."""
-    # Poses that are no numbers are other checks' business.
-    xyz = np.where(np.isfinite(xyz), xyz, np.nan)
+    # Poses that are no places are other checks' business.
+    xyz = np.where(np.abs(xyz) < _FAR_M, xyz, np.nan)
     step = np.zeros_like(xyz)
     step[:-1] = np.diff(xyz, axis=0)
     step[first[1:] - 1] = 0.0
     length = np.nan_to_num(np.linalg.norm(step, axis=1))
-    n = np.maximum(1, np.ceil(np.minimum(length, _FAR_M) / _SAMPLE_M)).astype(np.int64)
+    n = np.maximum(1, np.ceil(length / _SAMPLE_M)).astype(np.int64)
     pose = np.repeat(np.arange(len(xyz)), n)
     share = (np.arange(len(pose)) - np.repeat(np.cumsum(n) - n, n)) / n[pose]
     points = xyz[pose] + share[:, None] * step[pose]
