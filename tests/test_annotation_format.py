@@ -23,7 +23,7 @@ from aerialdojo_gen.annotations.positions import read_json
 _number = st.floats(-1e6, 1e6)
 _anchor = st.builds(Anchor, position_m=st.tuples(_number, _number, _number), yaw_deg=_number)
 _id = st.integers(0, 2**31 - 1)
-_text = st.text(st.characters(exclude_categories=["Cs"]))
+_text = st.text(st.characters(exclude_categories=["Cs"], exclude_characters="\0"))
 _annotations = st.builds(
     Annotations,
     scene=_text,

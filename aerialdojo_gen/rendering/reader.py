@@ -51,7 +51,8 @@ class Video(Sequence[NDArray[Any]]):
         try:
             with av.open(str(path)) as container:
                 stream = container.streams.video[0]
-                if stream.format is None:
+                # A stream of a codec that FFmpeg does not know has none, and then no format either.
+                if stream.codec_context is None or stream.format is None:
                     raise RenderError(f"{path} says nothing of its pictures: render it again")
                 self.metadata = {k.lower(): v for k, v in container.metadata.items()}
                 self.fps = float(stream.average_rate or 0)

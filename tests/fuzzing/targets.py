@@ -5,6 +5,7 @@ A target's call raises what it raises; nothing but an `AerialDojoError` is right
 
 from __future__ import annotations
 
+import contextlib
 import json
 import shutil
 import tempfile
@@ -108,9 +109,10 @@ def _read_annotations(folder: Path) -> None:
     try:
         annotations = parse_whole(raw, "U_Street_0", str(path))
     except AerialDojoError:
-        source = parse_annotations(raw.decode("utf-8", "replace"))
-        assert source.faults or source.scene != "U_Street_0" or _twice(source)
-        _utterable(map(str, source.faults))
+        with contextlib.suppress(UnicodeDecodeError):
+            source = parse_annotations(raw.decode())
+            assert source.faults or source.scene != "U_Street_0" or _twice(source)
+            _utterable(map(str, source.faults))
         raise
     source = parse_annotations(format_annotations(annotations).encode().decode())
     assert source.annotations == annotations
