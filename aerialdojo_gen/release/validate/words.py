@@ -187,8 +187,10 @@ def _unborne(words: _Words, i: int, text: str) -> str:
 def _recoloured(instance: Instance, text: str) -> str:
     """Say which of a thing's attributes with a colour in it stands in a text with another colour alone."""
     said = " ".join(_split(text))
-    for value in instance.attributes.values():
+    for key, value in instance.attributes.items():
         words = _split(value)
+        # Said of a part that the attribute is called after: a green poster, yellow flowers.
+        words += _split(key) if len(words) == 1 and key != "colour" else []
         for k, word in enumerate(words):
             rest = [*words[:k], *words[k + 1 :]]
             if word not in _COLOURS or {*rest} <= {*_COLOURS, "and"}:
