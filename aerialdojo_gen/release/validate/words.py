@@ -129,7 +129,7 @@ def landmark_name(data: SceneData, rows: Rows) -> Iterator[Finding]:
 
 
 def _words(data: SceneData, landmarks: bool = True) -> _Words:
-    kept = data.kept.get(("words", landmarks))
+    kept = data.kept.get(f"words {landmarks}")
     if isinstance(kept, _Words):
         return kept
     scene = scene_mesh(data).scene
@@ -148,7 +148,7 @@ def _words(data: SceneData, landmarks: bool = True) -> _Words:
     ambiguity = make_ambiguity(scene, names, called if landmarks else {}, order, geometry)
     # A colour that nothing in the scene has is a colour all the same.
     ambiguity.lexicon.add_values("colour", _COLOURS)
-    made = data.kept["words", landmarks] = _Words(ambiguity, names, catalogue)
+    made = data.kept[f"words {landmarks}"] = _Words(ambiguity, names, catalogue)
     return made
 
 
