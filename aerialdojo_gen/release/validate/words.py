@@ -129,7 +129,7 @@ def landmark_name(data: SceneData, rows: Rows) -> Iterator[Finding]:
 
 
 def _words(data: SceneData, landmarks: bool = True) -> _Words:
-    kept = data.kept.get(("words", landmarks))
+    kept = data.kept.get(f"words {landmarks}")
     if isinstance(kept, _Words):
         return kept
     scene = scene_mesh(data).scene
@@ -148,7 +148,7 @@ def _words(data: SceneData, landmarks: bool = True) -> _Words:
     ambiguity = make_ambiguity(scene, names, called if landmarks else {}, order, geometry)
     # A colour that nothing in the scene has is a colour all the same.
     ambiguity.lexicon.add_values("colour", _COLOURS)
-    made = data.kept["words", landmarks] = _Words(ambiguity, names, catalogue)
+    made = data.kept[f"words {landmarks}"] = _Words(ambiguity, names, catalogue)
     return made
 
 
@@ -187,8 +187,10 @@ def _unborne(words: _Words, i: int, text: str) -> str:
 def _recoloured(instance: Instance, text: str) -> str:
     """Say which of a thing's attributes with a colour in it stands in a text with another colour alone."""
     said = " ".join(_split(text))
-    for value in instance.attributes.values():
+    for key, value in instance.attributes.items():
         words = _split(value)
+        # Said of a part that the attribute is called after: a green poster, yellow flowers.
+        words += _split(key) if len(words) == 1 and key != "colour" else []
         for k, word in enumerate(words):
             rest = [*words[:k], *words[k + 1 :]]
             if word not in _COLOURS or {*rest} <= {*_COLOURS, "and"}:
