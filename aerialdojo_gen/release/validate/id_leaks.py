@@ -27,7 +27,8 @@ _FEW = 40
 _LENGTH_BINS = 8
 # A route whose ends are not its own has been named: its id is another pair's for that reason.
 _OTHER_PAIR = (
-    "duplicate_key", "duplicate_route", "unknown_target", "unknown_start", "start_anchor", "goal_anchor", "end_position"
+    "duplicate_key", "duplicate_route", "unknown_target", "unknown_start", "start_anchor", "goal_anchor",
+    "end_position",
 )  # fmt: skip
 _HASHES: tuple[Callable[[bytes], str], ...] = (
     lambda raw: hashlib.blake2b(raw, digest_size=6).hexdigest(),
