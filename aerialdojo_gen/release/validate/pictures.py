@@ -57,8 +57,8 @@ def image_redrawn(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """A picture is what is seen from its object's selected anchor, as drawn anew: no other's, no channel swapped."""
     skip = data.flagged("objects", ("image_missing", "image_damaged", "image_blank", "image_format"))
     asked = [row for row in data.sampled_objects.tolist() if not skip[row]]
-    stored = {row: _decoded(rows.column("reference_image")[row].as_py()) for row in asked}
-    stored = {row: picture for row, picture in stored.items() if picture is not None}
+    decoded = {row: _decoded(rows.column("reference_image")[row].as_py()) for row in asked}
+    stored = {row: picture for row, picture in decoded.items() if picture is not None}
     drawn = _drawn(data, rows, stored)
     own = {row: _blocks(stored[row]) for row in drawn}
     anew = {row: _blocks(picture) for row, picture in drawn.items()}
