@@ -1,0 +1,131 @@
+"""What is evaluated, and what became of it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+from aerialdojo_gen.benchmark.goal import Sensors
+from aerialdojo_gen.benchmark.secrets import Secrets
+from aerialdojo_gen.benchmark.tasks import Selection
+from aerialdojo_gen.benchmark.worker import Conditions
+from aerialdojo_gen.config import Embodiment
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """What is evaluated: all that the log depends on, beside the data.
+
+    Attributes
+    ----------
+    run : str
+        Name of the run.
+    agent : str
+        Name of the agent, or ``package.module:Class``.
+    options : dict
+        The agent's keyword arguments, JSON. Secrets among them are kept out of the log.
+    selection : Selection
+        Which tasks.
+    sensors : Sensors or None
+        In place of those that the agent asks for.
+    embodiment : Embodiment
+        The body.
+    renderer : str
+        As for `aerialdojo_gen.rendering.backend.open_renderer`; the log of an agent that looks depends on it.
+    conditions : Conditions
+        What a worker bears.
+    requests_per_minute : float or None
+        Of an agent that asks a service, all workers together.
+    used : dict or None
+        The options as the agent says that it uses them, for the log.
+    """
+
+    run: str = "default"
+    agent: str = "random"
+    options: Mapping[str, Any] = field(default_factory=dict)
+    selection: Selection = field(default_factory=Selection)
+    sensors: Sensors | None = None
+    embodiment: Embodiment = field(default_factory=Embodiment)
+    renderer: str = "auto"
+    conditions: Conditions = field(default_factory=Conditions)
+    requests_per_minute: float | None = None
+    used: Mapping[str, Any] | None = None
+
+    def identity(self) -> dict[str, str]:
+        """Columns of `episodes` that name the run and its agent."""
+        options = json.dumps(self._logged(self.options if self.used is None else self.used), sort_keys=True)
+        return {"run_id": self.run, "agent": self.agent, "agent_options": options}
+
+    def settings(self) -> dict[str, Any]:
+        """What must not change within a run, as JSON without secrets; attempts, pauses and the pace may."""
+        return {
+            "agent": self.agent,
+            "options": self._logged(self.options),
+            **asdict(self.selection),
+            "sensors": asdict(self.sensors) if self.sensors else None,
+            "renderer": self.renderer,
+            "embodiment": self.embodiment.model_dump(),
+        }
+
+    def _logged(self, options: Mapping[str, Any]) -> dict[str, Any]:
+        cleaned: dict[str, Any] = Secrets(self.options).options(options)
+        return cleaned
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of an evaluation.
+
+    Attributes
+    ----------
+    episodes : int
+        That the evaluation has.
+    finished, failed : int
+        In the tables now: flown, and given up because something outside failed.
+    flown, actions : int
+        Episodes and actions of this call.
+    cost_usd : float
+        Of all calls for this run.
+    tokens : int
+        Both ways, of all calls for this run.
+    seconds : float
+        Of this call.
+    stopped : str
+        Why it ended early: too many failures in a row; empty otherwise.
+    failures : tuple of str
+        What failed: how often, of which kind, and why the first did.
+    """
+
+    episodes: int
+    finished: int
+    failed: int
+    flown: int
+    actions: int
+    cost_usd: float
+    tokens: int
+    seconds: float
+    stopped: str = ""
+    failures: tuple[str, ...] = ()
+
+    def __str__(self) -> str:
+        """One line."""
+        rate = f", {self.actions / self.seconds:,.0f} actions/s" if self.flown else ""
+        cost = f"; {self.cost_usd:.2f} USD" if self.cost_usd else ""
+        tokens = f"; {self.tokens:,} tokens" if self.tokens else ""
+        failed = f", {self.failed:,} failed" if self.failed else ""
+        return (
+            f"{self.finished:,} of {self.episodes:,} episodes finished{failed}; "
+            f"{self.flown:,} flown now in {self.seconds:.1f} s{rate}{tokens}{cost}"
+        )
+
+    @property
+    def last_line(self) -> str:
+        """What to know and do about failures; empty where there are none."""
+        if not self.failures:
+            return self.stopped
+        left = self.episodes - self.finished - self.failed
+        rest = f"; {left:,} not begun, which the same command goes on with" if left else ""
+        what = f"{self.failed:,} failed, which count as no episodes: {'; '.join(self.failures)}"
+        return " ".join(filter(None, (self.stopped, f"{what}. --rerun-failed flies them again{rest}")))
