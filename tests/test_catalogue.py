@@ -120,7 +120,7 @@ def test_category_that_stands_twice_names_both_files(assets):
     ("old", "new", "says"),
     [
         ('texture = "brick"', 'texture = "brck"', "material 'brick': unknown texture 'brck', did you mean 'brick'?"),
-        ("tile_m = 0.5", "tile_m = -1", "material 'brick': tile_m must be a positive number of metres, got -1"),
+        ("tile_m = 0.5", "tile_m = -1", "material 'brick': tile_m must be 0.01 to 1000 m, got -1"),
         ("tile_m = 0.5", "tile = 1", "material 'brick': unknown key 'tile', did you mean 'tile_m'?"),
         ('"#808080"', '"grey"', "material 'metal': colour must be of the form #rrggbb, got 'grey'"),
     ],

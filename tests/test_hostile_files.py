@@ -150,7 +150,7 @@ def test_annotations_with_half_characters_are_refused_by_the_server_and_never_sh
     bad = good.replace('"name": "', '"name": "\\ud800', 1)
     source = parse_annotations(bad)
     assert [str(f) for f in source.faults] == [
-        f"line {source.faults[0].line}: landmarks[0].name: has half a Unicode character (a lone surrogate)"
+        f"line {source.faults[0].line}: landmarks[0].name: \\ud800 is half of a surrogate pair: no character"
     ]
     assert '"name"' in bad.splitlines()[source.faults[0].line - 1]
     headers = {"If-Match": version}
@@ -171,7 +171,7 @@ def test_annotations_with_half_characters_are_refused_by_the_server_and_never_sh
     desk.storage.path.write_text(bad)
     answer = client.get("/api/document")
     assert answer.status_code == 400
-    assert "half a Unicode character" in answer.json()["error"]
+    assert "half of a surrogate pair" in answer.json()["error"]
     desk.anchors.close()
 
 

@@ -120,7 +120,10 @@ def test_a_way_through_a_wall_and_back(planted, world):
     # Not by its own length of arm: a body that fits through finds nothing.
     assert "route_collision" not in check(planted, use_meshes=False)
     # A sample of FCL's certificates may miss the route; the oracle flies them all.
-    assert check(planted, sample=0) == {"oracle_fails": key(old)}
+    found = check(planted, sample=0)
+    # Out and back through the wall may be a long way round besides.
+    found.pop("long_way_round", None)
+    assert found == {"oracle_fails": key(old)}
 
 
 def test_an_action_that_leads_elsewhere(planted):
@@ -135,12 +138,12 @@ def test_an_action_that_leads_elsewhere(planted):
 
 
 def test_an_end_that_faces_away(planted):
-    old = next(row for row in planted.rows(KEY) if roomy(row, 0, 1))
-    last = 2 if old["action"][-2] == APPROACH else 1
-    actions = [*old["action"][:-last], TURN_LEFT, *old["action"][-last:]]
-    new = refly(old, actions)
-    goal = turned(new["goal_yaw_rad"], 0.0)
-    assert abs(turned(new["yaw_rad"][-1] - goal, 0.0)) > np.radians(7.5)
+    def away(row):
+        last = 2 if row["action"][-2] == APPROACH else 1
+        new = refly(row, [*row["action"][:-last], TURN_LEFT, *row["action"][-last:]])
+        return new if abs(turned(new["yaw_rad"][-1] - new["goal_yaw_rad"], 0.0)) > np.radians(7.6) else None
+
+    old, new = next((row, new) for row in planted.rows(KEY) if roomy(row, 0, 1) and (new := away(row)))
     replace(planted, old, new)
     assert check(planted) == {"final_yaw": key(old)}
 
