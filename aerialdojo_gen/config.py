@@ -334,6 +334,10 @@ def load_pipeline(path: Path) -> Pipeline:
         raise ConfigError("; ".join(f"{path}: {line}" for line in explain(error, Pipeline))) from None
 
 
+# What people read; a file may have thousands of faults, and keys and values of any length.
+_MOST_FAULTS, _LONGEST_LINE = 20, 300
+
+
 def explain(error: ValidationError, model: type[BaseModel]) -> list[str]:
     """Turn a validation error into one line a fault, with the nearest known key for an unknown one.
 
@@ -347,9 +351,9 @@ def explain(error: ValidationError, model: type[BaseModel]) -> list[str]:
     Returns
     -------
     list of str
-        E.g. ``["[plan] unknown key 'wieght': did you mean 'weight'?"]``.
+        E.g. ``["[plan] unknown key 'wieght': did you mean 'weight'?"]``; of many faults the first and how many more.
     """
-    lines = []
+    lines: list[str] = []
     for fault in error.errors():
         if not fault["loc"]:
             # Of the whole: what it says names its keys itself.
@@ -364,7 +368,8 @@ def explain(error: ValidationError, model: type[BaseModel]) -> list[str]:
             lines.append(f"{table}unknown key {last!r}: {hint}")
         else:
             lines.append(f"{table}{last} = {_short(fault.get('input'))}: {fault['msg']}")
-    return lines
+    told = [line if len(line) <= _LONGEST_LINE else f"{line[: _LONGEST_LINE - 3]}..." for line in lines[:_MOST_FAULTS]]
+    return [*told, f"and {len(lines) - _MOST_FAULTS} more faults"] if len(lines) > _MOST_FAULTS else told
 
 
 def _keys_at(model: type[BaseModel], where: list[str]) -> list[str]:

@@ -1,5 +1,7 @@
 """A pipeline file says what is wrong with it, in one line a fault."""
 
+import re
+
 import pytest
 
 from aerialdojo_gen.config import load_pipeline, with_overrides
@@ -126,3 +128,15 @@ def test_an_override_may_not_contradict_the_file(tmp_path):
 def test_stricter_stages_later_on_are_no_contradiction(tmp_path):
     text = "[filter]\nmin_euclidean_m = 6\nmin_detour_ratio = 1.3\n[embodiment]\nradius_m = 0.2\nwheelbase_m = 0.3\n"
     assert load_pipeline(write(tmp_path, text)).filter.min_euclidean_m == 6
+
+
+def test_a_file_of_many_faults_is_told_in_few_words(tmp_path):
+    path = tmp_path / "p.toml"
+    rung = f'[[plan.ladder]]\nheading_sectors = "{"é" * 1900}"\n'
+    path.write_text(rung * 200 + f"[plan]\n{'k' * 60} = 1\n".replace("[plan]", "[render]"), encoding="utf-8")
+    with pytest.raises(ConfigError) as error:
+        load_pipeline(path)
+    said = str(error.value)
+    assert "[plan.ladder.0] heading_sectors = 'éééé" in said
+    assert re.search(r"and \d+ more faults$", said)
+    assert len(said) < 20 * (300 + len(str(path)) + 4)
