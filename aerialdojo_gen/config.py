@@ -14,7 +14,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 
 from aerialdojo_gen.agreement import disagreements
 from aerialdojo_gen.bounded import read_toml
-from aerialdojo_gen.errors import ConfigError
+from aerialdojo_gen.errors import ConfigError, brief
 
 RendererName = Literal["gl", "pybullet"]
 # The fastest first.
@@ -334,8 +334,8 @@ def load_pipeline(path: Path) -> Pipeline:
         raise ConfigError("; ".join(f"{path}: {line}" for line in explain(error, Pipeline))) from None
 
 
-# What people read; a file may have thousands of faults, and keys and values of any length.
-_MOST_FAULTS, _LONGEST_LINE = 20, 300
+# What people read; a file may have thousands of faults.
+_MOST_FAULTS = 20
 
 
 def explain(error: ValidationError, model: type[BaseModel]) -> list[str]:
@@ -368,7 +368,7 @@ def explain(error: ValidationError, model: type[BaseModel]) -> list[str]:
             lines.append(f"{table}unknown key {last!r}: {hint}")
         else:
             lines.append(f"{table}{last} = {_short(fault.get('input'))}: {fault['msg']}")
-    told = [line if len(line) <= _LONGEST_LINE else f"{line[: _LONGEST_LINE - 3]}..." for line in lines[:_MOST_FAULTS]]
+    told = [brief(line) for line in lines[:_MOST_FAULTS]]
     return [*told, f"and {len(lines) - _MOST_FAULTS} more faults"] if len(lines) > _MOST_FAULTS else told
 
 
@@ -383,8 +383,7 @@ def _keys_at(model: type[BaseModel], where: list[str]) -> list[str]:
 
 
 def _short(value: Any) -> str:
-    text = repr(value)
-    return text if len(text) <= 60 else text[:57] + "..."
+    return brief(repr(value), 60)
 
 
 def with_overrides(pipeline: Pipeline, stage: str, **values: Any) -> Pipeline:

@@ -73,3 +73,8 @@ def first_line(error: BaseException) -> str:
     """Return the first line of an error's text, cut to 160 characters; its type where it has none."""
     text = str(error).strip().splitlines()
     return text[0][:160] if text else type(error).__name__
+
+
+def brief(text: str, most: int = 300) -> str:
+    """Cut a text that may be of any length, being a file's, to what a message has room for."""
+    return text if len(text) <= most else f"{text[: most - 3]}..."

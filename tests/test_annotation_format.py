@@ -125,3 +125,10 @@ def test_every_fault_of_form_is_listed():
     assert any("did you mean 'node'?" in f.message for f in source.faults)
     assert any(f.path == "landmarks[0].node" and "missing" in f.message for f in source.faults)
     assert sorted(source.objects) == [0, 3]
+
+
+@pytest.mark.parametrize("text", ['{"%s": 1, "%s": 2}', '{"version": 1, "%s": 0, "scene": "%s"}'])
+def test_a_fault_is_told_in_few_words_whatever_stands_in_the_file(text):
+    faults = parse_annotations(text % ("a" * 100_000, "a" * 100_000)).faults
+    assert faults
+    assert max(len(str(fault)) for fault in faults) < 700

@@ -29,7 +29,7 @@ from aerialdojo_gen.annotate.document import (
 from aerialdojo_gen.annotate.history import Action, History, Record
 from aerialdojo_gen.annotations.format import Annotations, format_annotations, parse_annotations
 from aerialdojo_gen.atomic import disk_error
-from aerialdojo_gen.errors import AnnotationError
+from aerialdojo_gen.errors import AnnotationError, brief
 from aerialdojo_gen.store import check_scene_name
 
 
@@ -272,7 +272,7 @@ def parse_whole(raw: bytes, scene: str, name: str) -> Annotations:
         more = f" (and {len(source.faults) - 1} more)" if len(source.faults) > 1 else ""
         raise AnnotationError(f"{name}: {source.faults[0]}{more}")
     if source.scene != scene:
-        raise AnnotationError(f"{name} is of scene {source.scene!r}, not of {scene!r}")
+        raise AnnotationError(f"{name} is of scene {brief(repr(source.scene), 60)}, not of {scene!r}")
     for kind in ("landmarks", "objects"):
         ids = [entry.id for entry in getattr(source.annotations, kind)]
         if len(set(ids)) < len(ids):

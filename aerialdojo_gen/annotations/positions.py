@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Any, cast
 
 from aerialdojo_gen.bounded import JsonPath, beyond, scan_json
-from aerialdojo_gen.errors import BeyondBounds
+from aerialdojo_gen.errors import BeyondBounds, brief
 
 MOST_VALUES = 200_000
 _HALF = re.compile("[\ud800-\udfff]")
@@ -37,7 +37,7 @@ class Fault:
 
     def __str__(self) -> str:
         where = f"line {self.line}: " if self.line else ""
-        return f"{where}{self.path + ': ' if self.path else ''}{self.message}"
+        return f"{where}{brief(self.path) + ': ' if self.path else ''}{brief(self.message)}"
 
 
 @dataclass(frozen=True)

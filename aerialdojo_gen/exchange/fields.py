@@ -11,6 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from aerialdojo_gen.errors import brief
+
 Floats = NDArray[np.float64]
 
 # Farther than half the earth's circumference is no place in metres.
@@ -35,8 +37,7 @@ class BadField(Exception):  # noqa: N818 - it is caught where rows are read, and
 
 def shown(value: object) -> str:
     """A value as an error names it: short."""
-    text = repr(value)
-    return text if len(text) <= 60 else text[:57] + "..."
+    return brief(repr(value), 60)
 
 
 def plain(key: str) -> str:

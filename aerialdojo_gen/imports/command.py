@@ -9,7 +9,7 @@ from pathlib import Path
 
 from aerialdojo_gen.annotations.format import parse_annotations
 from aerialdojo_gen.atomic import atomic_file, make_folder
-from aerialdojo_gen.errors import AnnotationError, AssetError, UsageError
+from aerialdojo_gen.errors import AnnotationError, AssetError, UsageError, brief
 from aerialdojo_gen.imports.adopt import Repairs, adopt
 from aerialdojo_gen.imports.files import read_mesh
 from aerialdojo_gen.scenes.glb import write_glb
@@ -125,7 +125,8 @@ def _annotations(path: Path, name: str) -> str:
         raise AnnotationError(f"{path} cannot be read: {error}") from None
     source = parse_annotations(text)
     if source.scene and source.scene != name:
-        raise AnnotationError(f"{path} is of scene {source.scene!r}, not of {name!r}: its key scene says so")
+        found = brief(repr(source.scene), 60)
+        raise AnnotationError(f"{path} is of scene {found}, not of {name!r}: its key scene says so")
     if source.faults:
         raise AnnotationError(f"{path}: {source.faults[0]}")
     return text
