@@ -1,9 +1,9 @@
 """Checks that routes are no longer than they need be: their own corners cut short, and a way over a grid.
 
 L is measured in the action set's metric: a free displacement costs |horizontal| + |vertical|. A straight way,
-or a way over a grid, may be free and yet none that the actions can fly: steps of a metre and turns of 15° do not lead through
-every gap. So a route that either of them faults is only suspected, until a search far wider than the planner's own
-finds a shorter one that can be flown. The limits lie beyond what a sound release of 42 scenes has.
+or a way over a grid, may be free and yet none that the actions can fly: steps of a metre and turns of 15° do not lead
+through every gap. So a route that either of them faults is only suspected, until a search far wider than the planner's
+own finds a shorter one that can be flown. The limits lie beyond what a sound release of 42 scenes has.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ def needless_piece(data: SceneData, _rows: Rows) -> Iterator[Finding]:
             continue
         for first, last, flown, straight in _pieces(positions):
             if _straight_is_free(world, positions[first], positions[last], room):
-                if _flown_shorter(data, k) is None:
+                if _flown_shorter(data, k, 0.0) is None:
                     break
                 found = f"{flown:.2f} m from pose {first} to pose {last}"
                 yield Finding(row, found, f"{straight:.2f} m: the straight way is free")
@@ -82,14 +82,17 @@ def long_way_round(data: SceneData, rows: Rows) -> Iterator[Finding]:
         ways = np.asarray(costs_at(np.ascontiguousarray(paths.starts[own, :3]), grid.arrays, cost))
         over = paths.length_m[own] - ways
         for k in np.flatnonzero(over > np.maximum(_LONGER_M, _LONGER_SHARE * ways)):
-            shorter = _flown_shorter(data, int(own[k]))
+            shorter = _flown_shorter(data, int(own[k]), _SHORTER_SHARE)
             if shorter is not None:
                 found = f"L = {paths.length_m[own[k]]:.2f} m"
                 yield Finding(int(paths.rows[own[k]]), found, f"{shorter:.2f} m, by a wider search")
 
 
-def _flown_shorter(data: SceneData, k: int) -> float | None:
-    """Metres of a route that the wide search finds, where it is clearly shorter than path `k`; else None."""
+def _flown_shorter(data: SceneData, k: int, share: float) -> float | None:
+    """Metres of a route that the wide search finds, where it is clearly shorter than path `k`; else None.
+
+    Clearly is by `_SHORTER_M`, and by a share of the path.
+    """
     planner = data.kept.get("wide")
     if not isinstance(planner, Planner):
         config = data.pipeline.plan.model_copy(update={"ladder": (_WIDE,), "min_detour_ratio": 1.0})
@@ -101,7 +104,7 @@ def _flown_shorter(data: SceneData, k: int) -> float | None:
     goal = [*paths.xyz[where][-1], paths.yaw[where][-1]]
     (route,) = planner.plan_target(goal, [start])
     length = float(paths.length_m[k])
-    worse = route.outcome != "SOLVED" or length - route.length_m <= max(_SHORTER_M, _SHORTER_SHARE * length)
+    worse = route.outcome != "SOLVED" or length - route.length_m <= max(_SHORTER_M, share * length)
     return None if worse else float(route.length_m)
 
 
