@@ -1,9 +1,9 @@
 """Checks that routes are no longer than they need be: their own corners cut short, and a way over a grid.
 
-L is measured in the action set's metric: a free displacement costs |horizontal| + |vertical|. A straight way,
-or a way over a grid, may be free and yet none that the actions can fly: steps of a metre and turns of 15° do not lead
-through every gap. So a route that either of them faults is only suspected, until a search far wider than the planner's
-own finds a shorter one that can be flown. The limits lie beyond what a sound release of 42 scenes has.
+L is measured in the action set's metric: a free displacement costs |horizontal| + |vertical|. A straight way, or one
+over a grid, may be free and yet none that the actions can fly: steps of a metre and turns of 15° do not lead through
+every gap. So a route that either of them faults is only suspected, until a search far wider than the planner's own
+finds a shorter one that can be flown. The limits lie beyond what a sound release of 42 scenes has.
 """
 
 from __future__ import annotations
