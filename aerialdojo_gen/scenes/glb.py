@@ -220,6 +220,8 @@ def _chunks(whole: bytes) -> tuple[dict[str, Any], memoryview]:
 
 def _check(scene: Scene) -> None:
     """Raise ValueError for values that no scene has: what reads as JSON may still say anything."""
+    if not scene.instances:
+        raise ValueError("a scene shows at least one instance")
     texts = [scene.name, *(t for i in scene.instances for t in (i.node, i.category, i.variant))]
     words = [w for i in scene.instances for pair in i.attributes.items() for w in pair]
     if not all(isinstance(text, str) for text in (*texts, *words, *scene.materials)):
