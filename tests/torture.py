@@ -207,6 +207,7 @@ class Bench:
 
     def __init__(self, folder: Path, base: Path) -> None:
         self._folder = folder
+        # Its last section is that of recordings, which SMALL goes on with.
         text = (ROOT / "pipelines" / "smoke.toml").read_text(encoding="utf-8").replace('"../', f'"{ROOT}/')
         (folder / "torture.toml").write_text(text + SMALL, encoding="utf-8")
         self._base = base
