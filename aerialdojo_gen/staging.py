@@ -126,7 +126,7 @@ def sweep_unstaged(data: Path) -> None:
 
     Only while the directory is held: then nobody makes anything in these places.
     """
-    for pattern in ("meshes/.*", "release/.*", "release/*/.*", "release/*/*/.*", "*/*/.*"):
+    for pattern in ("meshes/.*", "release/.*", "release/*/.*", "release/*/*/.*", "[!.]*/*/.*"):
         for path in data.glob(pattern):
             match = _UNSTAGED.fullmatch(path.name)
             if match and match["kind"] == "old" and not os.path.lexists(path.with_name(match["name"])):

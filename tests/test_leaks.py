@@ -12,8 +12,9 @@ from aerialdojo_gen.benchmark.agents import AgentBase
 from aerialdojo_gen.benchmark.flight import Flight
 from aerialdojo_gen.benchmark.goal import Sensors
 from aerialdojo_gen.benchmark.runner import Evaluation
+from aerialdojo_gen.benchmark.secrets import Secrets as Redactor
 from aerialdojo_gen.benchmark.tasks import Selection, read_tasks, select
-from aerialdojo_gen.benchmark.worker import Unit, Worker
+from aerialdojo_gen.benchmark.worker import Conditions, Unit, Worker
 
 SENSORS = Sensors(("front", "down"), width=24, height=16)
 # What belongs to the program, not to what was handed out.
@@ -114,7 +115,7 @@ def test_an_agent_gets_nothing_of_the_evaluators(smoke, tmp_path, modality):
     task = read_tasks(smoke, rows)[0]
     spy = Spy()
     flight = Flight(smoke, SENSORS)
-    Worker(spy, flight, smoke, Evaluation().identity(), 1, 0.0).fly(
+    Worker(spy, flight, smoke, Evaluation().identity(), Conditions(1, 0.0), Redactor()).fly(
         Unit(task.row["scene"], rows, tmp_path / "j.jsonl"), lambda _: None, lambda: False
     )
     assert len(spy.handed) >= 3

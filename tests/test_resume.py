@@ -66,7 +66,7 @@ def wait_until_empty(session):
 
 
 def wait_for_shards(data, n, process):
-    while process.poll() is None and len(list(data.glob("*/*/part-*.parquet"))) < n:
+    while process.poll() is None and len(list(data.glob("[!.]*/*/part-*.parquet"))) < n:
         time.sleep(0.01)
 
 

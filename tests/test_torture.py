@@ -23,6 +23,7 @@ def test_a_killed_command_that_is_repeated_leaves_what_an_undisturbed_one_does(b
 
 def test_a_file_that_is_left_over_is_noticed(bench, monkeypatch):
     kind = torture.KINDS["export"]
+    bench.undisturbed("export")
 
     def litter(data, rng):
         kind.prepare(data, rng)
