@@ -121,9 +121,8 @@ def test_a_way_through_a_wall_and_back(planted, world):
     assert "route_collision" not in check(planted, use_meshes=False)
     # A sample of FCL's certificates may miss the route; the oracle flies them all.
     found = check(planted, sample=0)
-    # Out and back through the wall may be a long way round besides.
-    found.pop("long_way_round", None)
-    assert found == {"oracle_fails": key(old)}
+    # Out and back through the wall may be a long way round besides, and nothing else.
+    assert found in ({"oracle_fails": key(old)}, {"oracle_fails": key(old), "long_way_round": key(old)})
 
 
 def test_an_action_that_leads_elsewhere(planted):
