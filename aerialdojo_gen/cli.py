@@ -9,7 +9,6 @@ import sys
 
 import typer
 
-from aerialdojo_gen import trouble
 from aerialdojo_gen.commands import (
     annotate,
     evaluate,
@@ -22,6 +21,7 @@ from aerialdojo_gen.commands import (
     stages,
     validate,
 )
+from aerialdojo_gen.common import trouble
 from aerialdojo_gen.errors import AerialDojoError
 
 app = typer.Typer(

@@ -9,13 +9,17 @@ import numpy as np
 from handmade import OPINIONS
 from rendered import courtyard
 
-from aerialdojo_gen import runner, schemas, store
-from aerialdojo_gen.config import Embodiment, Pipeline, RenderConfig
+from aerialdojo_gen.config.pipeline import Pipeline
+from aerialdojo_gen.config.sections import Embodiment, RenderConfig
+from aerialdojo_gen.pipeline import runner
+from aerialdojo_gen.pipeline.registry import BY_NAME
+from aerialdojo_gen.pipeline.stage import Job, Roots
 from aerialdojo_gen.rendering.sample import n_parts
 from aerialdojo_gen.scenes.glb import write_glb
-from aerialdojo_gen.stage import BY_NAME, Job, Roots
 from aerialdojo_gen.stages import render
-from aerialdojo_gen.tables import check_table, from_rows
+from aerialdojo_gen.store import schemas
+from aerialdojo_gen.store import shards as store
+from aerialdojo_gen.store.tables import check_table, from_rows
 
 SCENE = "U_Court_0"
 CONFIG = RenderConfig(width=64, height=64, limit=1, trajectories_per_part=1, renderer="pybullet")

@@ -14,14 +14,14 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from aerialdojo_gen import store
-from aerialdojo_gen.config import load_pipeline
-from aerialdojo_gen.footers import decode, encode
+from aerialdojo_gen.config.pipeline import load_pipeline
 from aerialdojo_gen.planning.primitives import replay, wrap_rad
-from aerialdojo_gen.release.validate import Asked, validate
-from aerialdojo_gen.release.validate.parts import part_path
-from aerialdojo_gen.schemas import APPROACH
-from aerialdojo_gen.tables import column_digests, content_digest
+from aerialdojo_gen.store import shards as store
+from aerialdojo_gen.store.footers import decode, encode
+from aerialdojo_gen.store.schemas import APPROACH
+from aerialdojo_gen.store.tables import column_digests, content_digest
+from aerialdojo_gen.validate import Asked, validate
+from aerialdojo_gen.validate.parts import part_path
 
 SMOKE = Path(__file__).resolve().parent.parent / "pipelines" / "smoke.toml"
 LISTS = ("x_m", "y_m", "z_m", "yaw_rad", "action")

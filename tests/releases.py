@@ -9,8 +9,8 @@ import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from aerialdojo_gen import store
-from aerialdojo_gen.tables import from_rows
+from aerialdojo_gen.store import shards as store
+from aerialdojo_gen.store.tables import from_rows
 
 LISTS = ("x_m", "y_m", "z_m", "yaw_rad", "action")
 

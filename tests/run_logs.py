@@ -7,9 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from aerialdojo_gen import rng, schemas, store
-from aerialdojo_gen.paper import inventory
-from aerialdojo_gen.tables import from_rows
+from aerialdojo_gen.common import rng
+from aerialdojo_gen.common.paper import inventory
+from aerialdojo_gen.store import schemas
+from aerialdojo_gen.store import shards as store
+from aerialdojo_gen.store.tables import from_rows
 
 # Stop called, collision, typical distance at the end: a good agent, a middling one, a bad one, a hopeless one.
 AGENTS = {

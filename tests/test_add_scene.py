@@ -10,7 +10,6 @@ import pyarrow.compute as pc
 import pytest
 import trimesh
 
-from aerialdojo_gen import store
 from aerialdojo_gen.annotations.command import draft_scene
 from aerialdojo_gen.annotations.draft import Choice
 from aerialdojo_gen.commands.common import open_pipeline, run_until
@@ -22,6 +21,7 @@ from aerialdojo_gen.imports.files import look_over_glb, read_mesh
 from aerialdojo_gen.imports.raw import RawNode, plain
 from aerialdojo_gen.imports.three_ds import read_3ds
 from aerialdojo_gen.scenes.glb import read_glb
+from aerialdojo_gen.store import shards as store
 
 
 def raw(mesh: trimesh.Trimesh, name: str = "") -> RawNode:

@@ -10,8 +10,8 @@ from typing import Any
 
 import pytest
 
+from aerialdojo_gen.agents import AgentBase, InvalidAnswer, load_agent
 from aerialdojo_gen.benchmark import eyes
-from aerialdojo_gen.benchmark.agents import AgentBase, InvalidAnswer, load_agent
 from aerialdojo_gen.benchmark.asking import AgentError
 from aerialdojo_gen.benchmark.episodes import read_run, runs
 from aerialdojo_gen.benchmark.goal import BLIND, Goal, Observation, Sensors

@@ -7,17 +7,17 @@ import pytest
 from flying import town
 from handmade import box, instance, scene
 
-from aerialdojo_gen import schemas
-from aerialdojo_gen.benchmark.agents import AgentBase, load_agent
-from aerialdojo_gen.benchmark.agents.depth_map import DepthMap
-from aerialdojo_gen.benchmark.agents.explorer import ExplorerAgent, thumbnail
-from aerialdojo_gen.benchmark.agents.simple import BEST_CONSTANT, ConstantAgent, OracleAgent, RandomAgent, StopAgent
+from aerialdojo_gen.agents import AgentBase, load_agent
+from aerialdojo_gen.agents.depth_map import DepthMap
+from aerialdojo_gen.agents.explorer import ExplorerAgent, thumbnail
+from aerialdojo_gen.agents.simple import BEST_CONSTANT, ConstantAgent, OracleAgent, RandomAgent, StopAgent
 from aerialdojo_gen.benchmark.episode import Episode
 from aerialdojo_gen.benchmark.goal import BLIND, Goal, Observation, Rules, Sensors
 from aerialdojo_gen.benchmark.motion import FlightSpace
 from aerialdojo_gen.errors import UsageError
 from aerialdojo_gen.geometry.cameras import view_pose
 from aerialdojo_gen.geometry.rays import RayCaster
+from aerialdojo_gen.store import schemas
 
 EYES = Sensors(("front", "left", "right"), rgb=False, width=48, height=48)
 

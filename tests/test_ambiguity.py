@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from aerialdojo_gen.annotations.ambiguity import nearest_landmark
 from aerialdojo_gen.annotations.check import make_ambiguity
 from aerialdojo_gen.annotations.relations import SceneGeometry
-from aerialdojo_gen.schemas import DIRECTIONS
+from aerialdojo_gen.store.schemas import DIRECTIONS
 
 
 def _street_check(scene=None):

@@ -11,13 +11,13 @@ from annotation_scenes import NAMES, street, street_annotations
 
 from aerialdojo_gen.annotations.check import check_source
 from aerialdojo_gen.annotations.format import Anchor, Landmark, format_annotations, parse_annotations
-from aerialdojo_gen.config import AnnotateImportConfig, Embodiment
+from aerialdojo_gen.common.paper import paper_counts
+from aerialdojo_gen.config.sections import AnnotateImportConfig, Embodiment
 from aerialdojo_gen.errors import AnnotationError, UsageError
-from aerialdojo_gen.paper import paper_counts
+from aerialdojo_gen.pipeline.stage import Job, Roots
 from aerialdojo_gen.scenes.model import Scene
-from aerialdojo_gen.schemas import LANDMARKS, OBJECTS
-from aerialdojo_gen.stage import Job, Roots
 from aerialdojo_gen.stages import annotate_import
+from aerialdojo_gen.store.schemas import LANDMARKS, OBJECTS
 
 ROOT = Path(__file__).resolve().parents[1]
 

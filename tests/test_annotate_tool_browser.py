@@ -19,10 +19,10 @@ import pytest
 from annotate_page import Page, entries
 from browser import until
 
-from aerialdojo_gen import store
 from aerialdojo_gen.commands.common import run_until
 from aerialdojo_gen.geometry.frames import compass_direction
 from aerialdojo_gen.imports.command import add_scene
+from aerialdojo_gen.store import shards as store
 
 NAME = "Helsinki"
 WORDS = ("one", "two", "three")

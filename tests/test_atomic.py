@@ -12,10 +12,10 @@ from pathlib import Path
 import pytest
 from preload import killing_environment, unshared
 
-from aerialdojo_gen import staging
-from aerialdojo_gen.atomic import atomic_file, atomic_folder
 from aerialdojo_gen.errors import StoreError
-from aerialdojo_gen.staging import AREA, scratch_folder, sweep
+from aerialdojo_gen.store import staging
+from aerialdojo_gen.store.atomic import atomic_file, atomic_folder
+from aerialdojo_gen.store.staging import AREA, scratch_folder, sweep
 
 HOLDING = """
     import sys, time

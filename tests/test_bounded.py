@@ -7,8 +7,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from aerialdojo_gen import bounded
-from aerialdojo_gen.bounded import MAX_DEPTH, MAX_INTEGER, loads_json, loads_toml, read_json, read_toml, too_deep
+from aerialdojo_gen.common import bounded
+from aerialdojo_gen.common.bounded import (
+    MAX_DEPTH,
+    MAX_INTEGER,
+    loads_json,
+    loads_toml,
+    read_json,
+    read_toml,
+    too_deep,
+)
 from aerialdojo_gen.errors import AssetError, BeyondBounds, ConfigError, Malformed, StoreError
 
 HOSTILE_TOML = {

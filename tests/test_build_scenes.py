@@ -13,10 +13,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from shapely.geometry import Point, Polygon
 
-from aerialdojo_gen.config import BuildScenesConfig, Embodiment
+from aerialdojo_gen import layouts
+from aerialdojo_gen.config.sections import BuildScenesConfig, Embodiment
 from aerialdojo_gen.errors import AssetError
 from aerialdojo_gen.geometry.rays import RayCaster
-from aerialdojo_gen.scenes import layouts
+from aerialdojo_gen.pipeline.stage import Job, Roots
 from aerialdojo_gen.scenes.build import build_scene
 from aerialdojo_gen.scenes.catalogue import load_catalogue
 from aerialdojo_gen.scenes.glb import read_glb
@@ -26,7 +27,6 @@ from aerialdojo_gen.scenes.ground import Surface, disc, ground_meshes, rectangle
 from aerialdojo_gen.scenes.recipe import Recipe
 from aerialdojo_gen.scenes.site import Site
 from aerialdojo_gen.scenes.terrain import flat_terrain, mound, rolling_terrain
-from aerialdojo_gen.stage import Job, Roots
 from aerialdojo_gen.stages import build_scenes
 
 ASSETS = Path(__file__).parents[1] / "scene_assets"
@@ -94,7 +94,7 @@ def assets(tmp_path, monkeypatch):
     (tmp_path / "code").mkdir()
     (tmp_path / "code" / "testplace.py").write_text(LAYOUT)
     monkeypatch.setattr(layouts, "__path__", [*layouts.__path__, str(tmp_path / "code")])
-    monkeypatch.delitem(sys.modules, "aerialdojo_gen.scenes.layouts.testplace", raising=False)
+    monkeypatch.delitem(sys.modules, "aerialdojo_gen.layouts.testplace", raising=False)
     return folder
 
 

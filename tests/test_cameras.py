@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from aerialdojo_gen.geometry.cameras import Camera, look_at_pose, project, unproject, view_pose
-from aerialdojo_gen.schemas import VIEWS
+from aerialdojo_gen.store.schemas import VIEWS
 
 metres = st.floats(-100, 100)
 yaws = st.floats(-math.pi, math.pi)

@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from aerialdojo_gen.common.rng import generator
 from aerialdojo_gen.errors import AssetError
-from aerialdojo_gen.rng import generator
 from aerialdojo_gen.scenes.catalogue import load_catalogue
 
 ASSETS = Path(__file__).parents[1] / "scene_assets"

@@ -6,9 +6,9 @@ import sys
 
 import pytest
 
-from aerialdojo_gen import runner, stage
 from aerialdojo_gen.commands.stages import PLAIN_STAGES, SPLIT
 from aerialdojo_gen.errors import UsageError
+from aerialdojo_gen.pipeline import runner, stage
 
 HEAVY = ("numpy", "pyarrow", "numba", "fcl", "pybullet", "trimesh", "cv2", "scipy", "av")
 

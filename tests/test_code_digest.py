@@ -7,13 +7,13 @@ from pathlib import Path
 import pytest
 
 import aerialdojo_gen
-from aerialdojo_gen import code_digest
 from aerialdojo_gen.benchmark.flying_code import flying_code
-from aerialdojo_gen.code_digest import PLUMBING, Package, code_of, stage_code, stage_module
-from aerialdojo_gen.code_facts import module_facts
-from aerialdojo_gen.config import AnchorSampleConfig, ClipConfig
-from aerialdojo_gen.fingerprint import _values
-from aerialdojo_gen.stage import STAGES
+from aerialdojo_gen.config.sections import AnchorSampleConfig, ClipConfig
+from aerialdojo_gen.pipeline import code_digest
+from aerialdojo_gen.pipeline.code_digest import PLUMBING, Package, code_of, stage_code, stage_module
+from aerialdojo_gen.pipeline.code_facts import module_facts
+from aerialdojo_gen.pipeline.fingerprint import _values
+from aerialdojo_gen.pipeline.registry import STAGES
 
 NAMES = [stage.name for stage in STAGES]
 SOURCES = Path(aerialdojo_gen.__file__).parent
@@ -111,10 +111,10 @@ def test_plumbing_is_what_it_is_said_to_be():
                      ".shards", ".stage", ".staging", ".store", ".trouble")
     }  # fmt: skip
     assert {name: counted for name, counted in PLUMBING.items() if counted} == {
-        "aerialdojo_gen.parquet_files": ("write_clustered",),
-        "aerialdojo_gen.schemas": ("*",),
-        "aerialdojo_gen.stage": ("Job",),
-        "aerialdojo_gen.store": ("partition", "check_scene_name"),
+        "aerialdojo_gen.store.parquet_files": ("write_clustered",),
+        "aerialdojo_gen.store.schemas": ("*",),
+        "aerialdojo_gen.pipeline.stage": ("Job",),
+        "aerialdojo_gen.store.shards": ("partition", "check_scene_name"),
     }
     for name, counted in PLUMBING.items():
         known = code_digest._running().facts(name)
@@ -139,7 +139,7 @@ def test_what_is_imported_by_a_name_made_at_run_time_counts():
 
 
 def test_figures_of_the_paper_count_where_they_are_read():
-    assert [name for name in NAMES if "aerialdojo_gen.paper" in stage_code(name).parts] == [
+    assert [name for name in NAMES if "aerialdojo_gen.common.paper" in stage_code(name).parts] == [
         "annotate-import",
         "split",
     ]
@@ -186,7 +186,7 @@ def f():
     found = {(edge.module, edge.name) for edge in facts.edges}
     assert {
         ("aerialdojo_gen.scenes", "near"), ("aerialdojo_gen", "far"), ("aerialdojo_gen.geometry.rays", "RayCaster"),
-        ("aerialdojo_gen", "store"), ("aerialdojo_gen.rng", "generator"), ("aerialdojo_gen.scenes.here", "**"),
+        ("aerialdojo_gen", "store"), ("aerialdojo_gen.common.rng", "generator"), ("aerialdojo_gen.scenes.here", "**"),
         ("aerialdojo_gen.far", "**"), ("moderngl", ""), ("numpy", ""),
     } <= found  # fmt: skip
     assert "page" not in {name for _, name in found}

@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from aerialdojo_gen.config import load_pipeline, with_overrides
+from aerialdojo_gen.config.pipeline import load_pipeline, with_overrides
 from aerialdojo_gen.errors import ConfigError
 
 

@@ -7,9 +7,10 @@ import mlcroissant
 import pyarrow.parquet as pq
 import pytest
 
-from aerialdojo_gen import schemas, store
 from aerialdojo_gen.release.contents import TABLES, check_release
 from aerialdojo_gen.release.croissant import write_croissant
+from aerialdojo_gen.store import schemas
+from aerialdojo_gen.store import shards as store
 
 
 @pytest.fixture(scope="module")

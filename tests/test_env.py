@@ -13,7 +13,6 @@ from handmade import box, instance, scene
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from aerialdojo_gen import schemas
 from aerialdojo_gen.benchmark import AerialDojoEnv
 from aerialdojo_gen.benchmark.episode import Episode
 from aerialdojo_gen.benchmark.goal import N_ACTIONS
@@ -21,6 +20,7 @@ from aerialdojo_gen.benchmark.motion import FlightSpace
 from aerialdojo_gen.errors import RenderError, StoreError, UsageError
 from aerialdojo_gen.planning.collision import CollisionWorld
 from aerialdojo_gen.planning.primitives import replay, route_length_m
+from aerialdojo_gen.store import schemas
 
 RADIUS = 0.25
 ID = {name: i for i, name in enumerate(schemas.ACTION_NAMES)}

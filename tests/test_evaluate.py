@@ -13,9 +13,8 @@ import numpy as np
 import pyarrow.compute as pc
 import pytest
 
-from aerialdojo_gen import schemas
+from aerialdojo_gen.agents import AgentBase, AgentUnavailable, InvalidAnswer, Usage
 from aerialdojo_gen.benchmark import journal
-from aerialdojo_gen.benchmark.agents import AgentBase, AgentUnavailable, InvalidAnswer, Usage
 from aerialdojo_gen.benchmark.episodes import TABLES, read_run, runs
 from aerialdojo_gen.benchmark.goal import BLIND
 from aerialdojo_gen.benchmark.limits import Limits
@@ -24,6 +23,7 @@ from aerialdojo_gen.benchmark.tasks import Selection, select
 from aerialdojo_gen.benchmark.worker import Conditions
 from aerialdojo_gen.errors import AerialDojoError, StoreError, UsageError
 from aerialdojo_gen.planning.primitives import replay
+from aerialdojo_gen.store import schemas
 
 HERE = "test_evaluate"
 
@@ -215,7 +215,7 @@ def test_other_settings_do_not_mix_with_a_run(smoke, tmp_path):
 
 def test_a_run_is_not_gone_on_with_by_other_code(smoke, tmp_path, monkeypatch):
     mine = tmp_path / "flyer_of_a_test.py"
-    text = "from aerialdojo_gen.benchmark.agents.simple import StopAgent\n\n\nclass Flyer(StopAgent):\n    pass\n"
+    text = "from aerialdojo_gen.agents.simple import StopAgent\n\n\nclass Flyer(StopAgent):\n    pass\n"
     mine.write_text(text)
     monkeypatch.syspath_prepend(tmp_path)
     flyer = job("flyer_of_a_test:Flyer", limit=1)

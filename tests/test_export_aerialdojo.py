@@ -14,12 +14,12 @@ import pytest
 from releases import copy_release, released, replace_rows
 from typer.testing import CliRunner
 
-from aerialdojo_gen import store
-from aerialdojo_gen.atomic import atomic_folder
 from aerialdojo_gen.cli import app
 from aerialdojo_gen.errors import AssetError, StoreError, UsageError
 from aerialdojo_gen.exchange.exporting import export_release
-from aerialdojo_gen.staging import AREA
+from aerialdojo_gen.store import shards as store
+from aerialdojo_gen.store.atomic import atomic_folder
+from aerialdojo_gen.store.staging import AREA
 
 
 @pytest.fixture(scope="module")

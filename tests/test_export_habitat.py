@@ -14,7 +14,7 @@ import trimesh
 from releases import released
 
 from aerialdojo_gen.exchange.exporting import export_release
-from aerialdojo_gen.schemas import ACTION_NAMES
+from aerialdojo_gen.store.schemas import ACTION_NAMES
 
 
 @dataclass(kw_only=True)

@@ -10,12 +10,12 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from releases import LISTS, assert_same, copy_release, imported, released, replace_rows, schema_of
 
-from aerialdojo_gen import store
 from aerialdojo_gen.exchange.aerialdojo_writer import LOST
 from aerialdojo_gen.exchange.exporting import export_release
 from aerialdojo_gen.exchange.importing import import_benchmark
 from aerialdojo_gen.planning.primitives import replay, route_length_m
-from aerialdojo_gen.schemas import APPROACH, RELEASE_OBJECTS, ROUTES, TASKS
+from aerialdojo_gen.store import shards as store
+from aerialdojo_gen.store.schemas import APPROACH, RELEASE_OBJECTS, ROUTES, TASKS
 
 # Recomputed from the poses, which come back to the last bit.
 RECOMPUTED = {"euclidean_m": 1e-9, "length_m": 1e-9, "detour_ratio": 1e-9}

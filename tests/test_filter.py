@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from aerialdojo_gen.config import FilterConfig
+from aerialdojo_gen.config.sections import FilterConfig
 from aerialdojo_gen.stages.filter import judge
 
 CONFIG = FilterConfig()

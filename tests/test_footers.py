@@ -6,13 +6,14 @@ import shutil
 import pytest
 from typer.testing import CliRunner
 
-from aerialdojo_gen import schemas, store
 from aerialdojo_gen.cli import app
+from aerialdojo_gen.common.rng import generator
 from aerialdojo_gen.errors import StoreError
-from aerialdojo_gen.footers import ShardFile, ShardInfo, _checksum, decode, encode
-from aerialdojo_gen.parquet_files import write_clustered
-from aerialdojo_gen.rng import generator
-from aerialdojo_gen.tables import check_table, from_rows
+from aerialdojo_gen.store import schemas
+from aerialdojo_gen.store import shards as store
+from aerialdojo_gen.store.footers import ShardFile, ShardInfo, _checksum, decode, encode
+from aerialdojo_gen.store.parquet_files import write_clustered
+from aerialdojo_gen.store.tables import check_table, from_rows
 
 SCENE = "U_Test_0"
 INFO = ShardInfo(

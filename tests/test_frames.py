@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from aerialdojo_gen.geometry import frames
-from aerialdojo_gen.schemas import DIRECTIONS
+from aerialdojo_gen.store.schemas import DIRECTIONS
 
 angles = st.floats(-1e4, 1e4)
 metres = st.floats(-1e3, 1e3)

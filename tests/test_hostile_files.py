@@ -17,7 +17,7 @@ from aerialdojo_gen.annotate.desk import open_desk
 from aerialdojo_gen.annotate.server import make_app
 from aerialdojo_gen.annotations.format import parse_annotations
 from aerialdojo_gen.commands.common import open_pipeline
-from aerialdojo_gen.config import Pipeline
+from aerialdojo_gen.config.pipeline import Pipeline
 from aerialdojo_gen.errors import AssetError
 from aerialdojo_gen.rendering import finished
 from aerialdojo_gen.rendering.codecs import PngWriter

@@ -7,10 +7,10 @@ import pytest
 from flying import along, distances, solid, town
 from handmade import box, instance, scene
 
-from aerialdojo_gen.config import PlanConfig, Rung
+from aerialdojo_gen.config.sections import PlanConfig, Rung
 from aerialdojo_gen.planning.planner import Planner
 from aerialdojo_gen.planning.primitives import DISPLACEMENTS, TURNS, replay
-from aerialdojo_gen.schemas import APPROACH, STOP
+from aerialdojo_gen.store.schemas import APPROACH, STOP
 
 RADIUS = 0.25
 

@@ -12,7 +12,7 @@ from aerialdojo_gen.geometry.cameras import Camera, view_pose
 from aerialdojo_gen.rendering.checks import Solid, ViewChecks, picture_flags
 from aerialdojo_gen.rendering.world import RenderWorld
 from aerialdojo_gen.scenes.model import Scene
-from aerialdojo_gen.schemas import VIEWS
+from aerialdojo_gen.store.schemas import VIEWS
 
 CAMERA = Camera(320, 320, 90.0)
 HERE, THERE = view_pose((1.0, 0.4, 3.0), 0.3, "front"), view_pose((2.0, 0.4, 3.0), 0.3, "front")

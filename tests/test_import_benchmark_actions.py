@@ -11,7 +11,7 @@ from aerialdojo_gen.exchange.actions import actions_of, move, replay, words_of
 from aerialdojo_gen.exchange.aerialvln import MOVES as AERIALVLN
 from aerialdojo_gen.exchange.openfly import MOVES as OPENFLY
 from aerialdojo_gen.planning import primitives
-from aerialdojo_gen.schemas import ACTION_NAMES, APPROACH
+from aerialdojo_gen.store.schemas import ACTION_NAMES, APPROACH
 
 starts = st.tuples(st.floats(-500, 500), st.floats(-500, 500), st.floats(0, 60), st.floats(-math.pi, math.pi))
 action_lists = st.lists(st.integers(1, APPROACH - 1), min_size=1, max_size=40)

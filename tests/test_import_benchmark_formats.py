@@ -16,7 +16,7 @@ from aerialdojo_gen.cli import app
 from aerialdojo_gen.errors import UsageError
 from aerialdojo_gen.exchange.importing import Options, import_benchmark
 from aerialdojo_gen.planning.primitives import replay
-from aerialdojo_gen.schemas import ACTION_NAMES
+from aerialdojo_gen.store.schemas import ACTION_NAMES
 
 
 def tables(data: Path, name: str) -> tuple[pd.DataFrame, pd.DataFrame, pd.DataFrame]:

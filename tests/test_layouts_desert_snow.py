@@ -5,12 +5,12 @@ import pytest
 import shapely
 from layout_checks import catalogue, clashes, floating, glb_bytes, kinds_of, looks_of, props_of, scene_of, walled_in
 
+from aerialdojo_gen.common.paper import paper_counts
 from aerialdojo_gen.errors import AssetError
-from aerialdojo_gen.paper import paper_counts
-from aerialdojo_gen.scenes.layouts.natural_groups import Group, level_ground, plan_groups, set_out
-from aerialdojo_gen.scenes.layouts.natural_sands import dunes, wash
-from aerialdojo_gen.scenes.layouts.natural_strata import Rock, put_up
-from aerialdojo_gen.scenes.layouts.natural_winter import banked, moguls, slope_ground
+from aerialdojo_gen.layouts.natural_groups import Group, level_ground, plan_groups, set_out
+from aerialdojo_gen.layouts.natural_sands import dunes, wash
+from aerialdojo_gen.layouts.natural_strata import Rock, put_up
+from aerialdojo_gen.layouts.natural_winter import banked, moguls, slope_ground
 from aerialdojo_gen.scenes.recipe import Recipe
 from aerialdojo_gen.scenes.site import Site
 from aerialdojo_gen.scenes.terrain import rolling_terrain

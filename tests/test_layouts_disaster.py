@@ -6,15 +6,15 @@ import shapely
 from layout_checks import catalogue, clashes, floating, glb_bytes, kinds_of, looks_of, props_of, scene_of, walled_in
 from shapely.geometry import Polygon
 
+from aerialdojo_gen.common.paper import paper_counts
 from aerialdojo_gen.errors import AssetError
-from aerialdojo_gen.paper import paper_counts
+from aerialdojo_gen.layouts.disaster_buildings import put_up
+from aerialdojo_gen.layouts.disaster_ground import crater, faulted, heaped, slab_pile
+from aerialdojo_gen.layouts.disaster_relief import stand, stand_on_floor, strew_things
+from aerialdojo_gen.layouts.disaster_wreckage import Bite, broken_edge, torn_floor, torn_wall
+from aerialdojo_gen.layouts.disaster_wrecks import Style, Wreck
 from aerialdojo_gen.scenes.grammar_blocks import Frame
 from aerialdojo_gen.scenes.ground import rectangle
-from aerialdojo_gen.scenes.layouts.disaster_buildings import put_up
-from aerialdojo_gen.scenes.layouts.disaster_ground import crater, faulted, heaped, slab_pile
-from aerialdojo_gen.scenes.layouts.disaster_relief import stand, stand_on_floor, strew_things
-from aerialdojo_gen.scenes.layouts.disaster_wreckage import Bite, broken_edge, torn_floor, torn_wall
-from aerialdojo_gen.scenes.layouts.disaster_wrecks import Style, Wreck
 from aerialdojo_gen.scenes.recipe import Recipe
 from aerialdojo_gen.scenes.site import Site
 from aerialdojo_gen.scenes.terrain import rolling_terrain

@@ -13,7 +13,7 @@ from layout_checks import (
     walled_in,
 )
 
-from aerialdojo_gen.paper import paper_counts
+from aerialdojo_gen.common.paper import paper_counts
 
 SCENES = ["D_Flood_0", "D_Flood_1"]
 each_scene = pytest.mark.parametrize("name", SCENES)

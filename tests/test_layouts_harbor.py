@@ -17,10 +17,10 @@ from layout_checks import (
     walled_in,
 )
 
-from aerialdojo_gen.paper import paper_counts
+from aerialdojo_gen.common.paper import paper_counts
+from aerialdojo_gen.layouts.infra_harbour import HIGH_M, LONG_M, QUAY_M, container_block, quay
 from aerialdojo_gen.scenes.footprints import footprint
 from aerialdojo_gen.scenes.ground import rectangle
-from aerialdojo_gen.scenes.layouts.infra_harbour import HIGH_M, LONG_M, QUAY_M, container_block, quay
 from aerialdojo_gen.scenes.recipe import Recipe
 from aerialdojo_gen.scenes.site import Site
 

@@ -8,11 +8,11 @@ import pytest
 import shapely
 from layout_checks import catalogue, clashes, floating, glb_bytes, kinds_of, looks_of, props_of, scene_of
 
+from aerialdojo_gen.common.paper import paper_counts
 from aerialdojo_gen.geometry.rays import RayCaster
-from aerialdojo_gen.paper import paper_counts
+from aerialdojo_gen.layouts.urban_stand_shells import platform
+from aerialdojo_gen.layouts.urban_stands import Tier, gangways, passage, tier_parts
 from aerialdojo_gen.scenes.ground import rectangle
-from aerialdojo_gen.scenes.layouts.urban_stand_shells import platform
-from aerialdojo_gen.scenes.layouts.urban_stands import Tier, gangways, passage, tier_parts
 from aerialdojo_gen.scenes.model import Scene
 
 SCENES = ["U_Stadium_0", "U_Stadium_1", "U_Park_0", "U_Park_1"]

@@ -5,10 +5,10 @@ import pytest
 from layout_checks import catalogue, clashes, floating, glb_bytes, kinds_of, looks_of, props_of, scene_of, walled_in
 from shapely.geometry import Polygon
 
+from aerialdojo_gen.common.paper import paper_counts
 from aerialdojo_gen.geometry.rays import RayCaster
-from aerialdojo_gen.paper import paper_counts
-from aerialdojo_gen.scenes.layouts.infra_bridge_parts import Deck
-from aerialdojo_gen.scenes.layouts.infra_rail import RAIL_M, arcade, ballast, s_curve, track, upright
+from aerialdojo_gen.layouts.infra_bridge_parts import Deck
+from aerialdojo_gen.layouts.infra_rail import RAIL_M, arcade, ballast, s_curve, track, upright
 from aerialdojo_gen.scenes.model import Scene
 from aerialdojo_gen.scenes.recipe import Recipe
 from aerialdojo_gen.scenes.site import Site

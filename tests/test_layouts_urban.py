@@ -9,8 +9,8 @@ import shapely
 import trimesh
 from layout_checks import catalogue, glb_bytes, props_of, scene_of
 
+from aerialdojo_gen.common.paper import paper_counts
 from aerialdojo_gen.geometry.rays import RayCaster
-from aerialdojo_gen.paper import paper_counts
 from aerialdojo_gen.scenes.footprints import footprint
 from aerialdojo_gen.scenes.grammar_blocks import Frame, HouseStyle, deal, fence, house, next_variant
 from aerialdojo_gen.scenes.grammar_scatter import Pose

@@ -16,14 +16,14 @@ import numpy as np
 import pytest
 from llm_server import MOVE, Call, Cut, Drip, Endless, Filtered, Hang, Raw, Say, Service, Status, serving
 
-from aerialdojo_gen.benchmark.agents import AgentUnavailable, InvalidAnswer, ServiceDown, load_agent
+from aerialdojo_gen.agents import AgentUnavailable, InvalidAnswer, ServiceDown, load_agent
 from aerialdojo_gen.benchmark.goal import Goal, Observation, Rules
-from aerialdojo_gen.benchmark.llm import service as services
-from aerialdojo_gen.benchmark.llm.agent import LanguageModelAgent
-from aerialdojo_gen.benchmark.llm.answer import parse_answer
-from aerialdojo_gen.benchmark.llm.http import retry_after_s
 from aerialdojo_gen.errors import AerialDojoError, UsageError
-from aerialdojo_gen.schemas import ACTION_NAMES, STOP
+from aerialdojo_gen.llm import service as services
+from aerialdojo_gen.llm.agent import LanguageModelAgent
+from aerialdojo_gen.llm.answer import parse_answer
+from aerialdojo_gen.llm.http import retry_after_s
+from aerialdojo_gen.store.schemas import ACTION_NAMES, STOP
 
 KEY = "sk-test-51f0c1e7a9b24d6e8f30"
 FORWARD_3 = ACTION_NAMES.index("MoveForward3")
@@ -434,8 +434,8 @@ def test_a_missing_package_is_named_with_the_extra_that_has_it(protocol: str) ->
 
 def test_nothing_imports_the_packages_before_they_are_asked_for() -> None:
     code = (
-        "import sys, aerialdojo_gen.cli, aerialdojo_gen.benchmark.llm.openai_agent, "
-        "aerialdojo_gen.benchmark.llm.anthropic_agent; print({'openai', 'anthropic'} & set(sys.modules))"
+        "import sys, aerialdojo_gen.cli, aerialdojo_gen.llm.openai_agent, "
+        "aerialdojo_gen.llm.anthropic_agent; print({'openai', 'anthropic'} & set(sys.modules))"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "set()"

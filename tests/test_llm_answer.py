@@ -12,13 +12,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from aerialdojo_gen.benchmark.agents.base import InvalidAnswer
+from aerialdojo_gen.agents.base import InvalidAnswer
 from aerialdojo_gen.benchmark.goal import Goal, Observation, Rules, Sensors
-from aerialdojo_gen.benchmark.llm.actions import SIXTEEN, eight
-from aerialdojo_gen.benchmark.llm.answer import parse_answer
-from aerialdojo_gen.benchmark.llm.images import Picture, colour_picture, depth_picture
-from aerialdojo_gen.benchmark.llm.prompt import Sight, Turn, goal_text, repair_text, step_text, system_prompt
-from aerialdojo_gen.schemas import ACTION_NAMES, APPROACH
+from aerialdojo_gen.llm.actions import SIXTEEN, eight
+from aerialdojo_gen.llm.answer import parse_answer
+from aerialdojo_gen.llm.images import Picture, colour_picture, depth_picture
+from aerialdojo_gen.llm.prompt import Sight, Turn, goal_text, repair_text, step_text, system_prompt
+from aerialdojo_gen.store.schemas import ACTION_NAMES, APPROACH
 
 
 @pytest.mark.parametrize("k", range(16))

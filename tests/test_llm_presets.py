@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 from llm_server import Say, Status, serving
 
-from aerialdojo_gen.benchmark.agents import load_agent
+from aerialdojo_gen.agents import load_agent
 from aerialdojo_gen.benchmark.goal import Goal, Observation, Rules
-from aerialdojo_gen.benchmark.llm.agent import LanguageModelAgent
-from aerialdojo_gen.benchmark.llm.estimate import estimate
-from aerialdojo_gen.benchmark.llm.presets import preset, presets
 from aerialdojo_gen.benchmark.runner import Evaluation
 from aerialdojo_gen.benchmark.tasks import Selection
 from aerialdojo_gen.errors import UsageError
-from aerialdojo_gen.schemas import ACTION_NAMES
+from aerialdojo_gen.llm.agent import LanguageModelAgent
+from aerialdojo_gen.llm.estimate import estimate
+from aerialdojo_gen.llm.presets import preset, presets
+from aerialdojo_gen.store.schemas import ACTION_NAMES
 
 MOVE_UP = '{"thought": "Higher.", "action": "MoveUp"}'
 # Of Table 4.

@@ -12,19 +12,19 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from planting import Planted, check, poses
 
-from aerialdojo_gen import store
 from aerialdojo_gen.annotations.command import draft_scene
 from aerialdojo_gen.annotations.draft import Choice
 from aerialdojo_gen.commands.common import open_pipeline, run_until
-from aerialdojo_gen.config import PlanConfig
+from aerialdojo_gen.config.sections import PlanConfig
 from aerialdojo_gen.geometry.ground import Ground
 from aerialdojo_gen.imports.adopt import adopt
 from aerialdojo_gen.imports.command import add_scene
 from aerialdojo_gen.imports.raw import RawNode, plain
 from aerialdojo_gen.planning.clearance import ClearanceGrid
 from aerialdojo_gen.planning.planner import Planner
-from aerialdojo_gen.release.validate.underground import open_ground
 from aerialdojo_gen.scenes.model import Material, Scene
+from aerialdojo_gen.store import shards as store
+from aerialdojo_gen.validate.underground import open_ground
 
 NAME = "Hills_0"
 

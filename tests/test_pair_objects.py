@@ -7,11 +7,12 @@ from handmade import OPINIONS
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from aerialdojo_gen import schemas, store
-from aerialdojo_gen.config import Embodiment, PairObjectsConfig
-from aerialdojo_gen.stage import Job, Roots
+from aerialdojo_gen.config.sections import Embodiment, PairObjectsConfig
+from aerialdojo_gen.pipeline.stage import Job, Roots
 from aerialdojo_gen.stages import pair_objects
-from aerialdojo_gen.tables import check_table, from_rows
+from aerialdojo_gen.store import schemas
+from aerialdojo_gen.store import shards as store
+from aerialdojo_gen.store.tables import check_table, from_rows
 
 SCENE = "U_Test_0"
 

@@ -14,9 +14,10 @@ import pyarrow.parquet as pq
 import pytest
 import trimesh
 
-from aerialdojo_gen import schemas, store
 from aerialdojo_gen.scenes.glb import read_glb
-from aerialdojo_gen.tables import content_digest
+from aerialdojo_gen.store import schemas
+from aerialdojo_gen.store import shards as store
+from aerialdojo_gen.store.tables import content_digest
 
 RADIUS_M = 0.25
 SUCCESS_RADIUS_M = 3.0

@@ -8,15 +8,16 @@ import pytest
 from flying import along, distances, solid, town
 from handmade import OPINIONS
 
-from aerialdojo_gen import schemas, store
-from aerialdojo_gen.config import Embodiment, PairObjectsConfig, PlanConfig
+from aerialdojo_gen.config.sections import Embodiment, PairObjectsConfig, PlanConfig
 from aerialdojo_gen.errors import StoreError
+from aerialdojo_gen.pipeline.stage import Job, Roots
 from aerialdojo_gen.planning.clearance import ClearanceGrid
 from aerialdojo_gen.planning.primitives import replay
 from aerialdojo_gen.scenes.glb import write_glb
-from aerialdojo_gen.stage import Job, Roots
 from aerialdojo_gen.stages import pair_objects, plan
-from aerialdojo_gen.tables import check_table, from_rows
+from aerialdojo_gen.store import schemas
+from aerialdojo_gen.store import shards as store
+from aerialdojo_gen.store.tables import check_table, from_rows
 
 SCENE = "U_Test_0"
 CONFIG = PlanConfig(targets_per_part=2)

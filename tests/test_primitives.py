@@ -5,7 +5,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from aerialdojo_gen import schemas
 from aerialdojo_gen.planning.primitives import (
     DISPLACEMENTS,
     N_HEADINGS,
@@ -15,6 +14,7 @@ from aerialdojo_gen.planning.primitives import (
     route_length_m,
     wrap_rad,
 )
+from aerialdojo_gen.store import schemas
 
 action = st.integers(0, 16)
 pose = st.tuples(st.floats(-50, 50), st.floats(-50, 50), st.floats(0, 30), st.floats(-math.pi, math.pi))

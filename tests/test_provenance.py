@@ -10,10 +10,11 @@ import sys
 
 import pytest
 
-from aerialdojo_gen import runner, store
 from aerialdojo_gen.commands.common import open_pipeline, run_until
 from aerialdojo_gen.errors import StoreError, UsageError
-from aerialdojo_gen.runner import data_lock
+from aerialdojo_gen.pipeline import runner
+from aerialdojo_gen.pipeline.runner import data_lock
+from aerialdojo_gen.store import shards as store
 
 A, B = "U_Courtyard_0", "U_Courtyard_1"
 

@@ -10,13 +10,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from aerialdojo_gen import schemas, store
 from aerialdojo_gen.annotations.command import draft_scene
 from aerialdojo_gen.commands.common import open_pipeline, run_until
+from aerialdojo_gen.common.paper import inventory, splits
 from aerialdojo_gen.errors import PoolError
-from aerialdojo_gen.paper import inventory, splits
 from aerialdojo_gen.release.pool import pool_lines, pool_of, require_pools
 from aerialdojo_gen.release.quota import apportion, choose, train_quotas
+from aerialdojo_gen.store import schemas
+from aerialdojo_gen.store import shards as store
 
 ROOT = Path(__file__).resolve().parents[1]
 SETTINGS = {"base": (5.0, 30.0), "standard": (30.0, 60.0), "long_horizon": (60.0, 100.0)}

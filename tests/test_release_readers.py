@@ -22,11 +22,12 @@ import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from aerialdojo_gen import schemas, store
 from aerialdojo_gen.errors import StoreError
 from aerialdojo_gen.release.card import render_card, write_card
 from aerialdojo_gen.release.contents import SHARDS, TABLES, check_release, counts, table_and_split
-from aerialdojo_gen.tables import from_rows
+from aerialdojo_gen.store import schemas
+from aerialdojo_gen.store import shards as store
+from aerialdojo_gen.store.tables import from_rows
 
 FOLDERS = {
     (table, split): f"{table}/{split}" if TABLES[table].split else table

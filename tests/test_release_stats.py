@@ -10,16 +10,16 @@ import cv2
 import numpy as np
 import pytest
 
-from aerialdojo_gen import schemas
-from aerialdojo_gen.paper import inventory, splits
-from aerialdojo_gen.release.comparison import as_csv, as_markdown
+from aerialdojo_gen.common.paper import inventory, splits
 from aerialdojo_gen.release.contents import check_release
-from aerialdojo_gen.release.figures import draw_figures
-from aerialdojo_gen.release.figures.charts import composition
-from aerialdojo_gen.release.figures.maps import _round_length
-from aerialdojo_gen.release.figures.style import SETTING_COLOURS, read_routes
 from aerialdojo_gen.release.quota import train_quotas
-from aerialdojo_gen.release.stats import Made, benchmark_table, in_paper_order, made_of, tables
+from aerialdojo_gen.stats.comparison import as_csv, as_markdown
+from aerialdojo_gen.stats.figures import draw_figures
+from aerialdojo_gen.stats.figures.charts import composition
+from aerialdojo_gen.stats.figures.maps import _round_length
+from aerialdojo_gen.stats.figures.style import SETTING_COLOURS, read_routes
+from aerialdojo_gen.stats.tables import Made, benchmark_table, in_paper_order, made_of, tables
+from aerialdojo_gen.store import schemas
 
 
 def as_the_paper(name, **changes):

@@ -18,16 +18,16 @@ import pytest
 from court import CONFIG, ROUTE, SCENE, files_of, run_whole
 from court import write_inputs as write_some
 
-from aerialdojo_gen import store
 from aerialdojo_gen.commands.render import duration_s, share_of
 from aerialdojo_gen.errors import RenderError, UsageError
+from aerialdojo_gen.pipeline.freshness import Limits
 from aerialdojo_gen.rendering import backend, recording
 from aerialdojo_gen.rendering.codecs import to_metres
 from aerialdojo_gen.rendering.estimate import estimate
 from aerialdojo_gen.rendering.reader import read_recording
-from aerialdojo_gen.shards import Limits
 from aerialdojo_gen.stages import render
-from aerialdojo_gen.staging import AREA
+from aerialdojo_gen.store import shards as store
+from aerialdojo_gen.store.staging import AREA
 
 ALL = CONFIG.model_copy(update={"limit": 0, "trajectories_per_part": 5})
 FEW = CONFIG.model_copy(update={"limit": 2, "trajectories_per_part": 2})

@@ -14,14 +14,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from rendered import courtyard
 
-from aerialdojo_gen import schemas
-from aerialdojo_gen.config import ReferenceImagesConfig
+from aerialdojo_gen.config.sections import ReferenceImagesConfig
 from aerialdojo_gen.geometry.cameras import Camera, project, view_pose
 from aerialdojo_gen.rendering.reader import read_recording
 from aerialdojo_gen.rendering.sample import choose
 from aerialdojo_gen.rendering.trajectory import by_steps, by_time
 from aerialdojo_gen.rendering.world import render_world
 from aerialdojo_gen.stages import reference_images
+from aerialdojo_gen.store import schemas
 
 
 @pytest.fixture(scope="module")

@@ -19,7 +19,7 @@ from aerialdojo_gen.rendering import backend
 from aerialdojo_gen.rendering.backend import check, choose_renderer, open_renderer
 from aerialdojo_gen.rendering.probe import probe_scene
 from aerialdojo_gen.scenes.model import Scene
-from aerialdojo_gen.schemas import VIEWS
+from aerialdojo_gen.store.schemas import VIEWS
 
 CAMERA = Camera(160, 160, 90.0)
 

@@ -11,7 +11,7 @@ from aerialdojo_gen.geometry.rays import RayCaster
 from aerialdojo_gen.rendering.preview import contact_sheet, look_at
 from aerialdojo_gen.rendering.world import RenderWorld, render_world
 from aerialdojo_gen.scenes.model import Scene
-from aerialdojo_gen.schemas import VIEWS
+from aerialdojo_gen.store.schemas import VIEWS
 
 CAMERA = Camera(320, 320, 90.0)
 

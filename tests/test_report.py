@@ -26,8 +26,8 @@ from aerialdojo_gen.benchmark.profiles import PROFILES, Profile
 from aerialdojo_gen.benchmark.report import html, write_report
 from aerialdojo_gen.benchmark.runs import Run, conduct, load_runs
 from aerialdojo_gen.benchmark.scores import summarize
+from aerialdojo_gen.common.paper import results
 from aerialdojo_gen.errors import AerialDojoError, StoreError
-from aerialdojo_gen.paper import results
 
 AT_3, AT_5 = PROFILES["aerialdojo"], PROFILES["aerialdojo-5m"]
 NASTY = "</script><script>alert(1)</script> & <b>$x_1$ | ä"

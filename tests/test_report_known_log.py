@@ -12,7 +12,6 @@ import pytest
 from run_logs import episode
 from scipy import stats
 
-from aerialdojo_gen import rng, schemas, store
 from aerialdojo_gen.benchmark import breakdowns, contents, difficulty, intervals, paired, radii, tables
 from aerialdojo_gen.benchmark.floors import arranged, with_floors
 from aerialdojo_gen.benchmark.formats import as_text
@@ -20,9 +19,12 @@ from aerialdojo_gen.benchmark.grid import BEST, SECOND, Table
 from aerialdojo_gen.benchmark.paper_tables import result_tables
 from aerialdojo_gen.benchmark.profiles import PROFILES
 from aerialdojo_gen.benchmark.runs import Run, load_runs
+from aerialdojo_gen.common import rng
+from aerialdojo_gen.common.paper import results
 from aerialdojo_gen.errors import UsageError
-from aerialdojo_gen.paper import results
-from aerialdojo_gen.tables import from_rows
+from aerialdojo_gen.store import schemas
+from aerialdojo_gen.store import shards as store
+from aerialdojo_gen.store.tables import from_rows
 
 AT_3, AT_5 = PROFILES["aerialdojo"], PROFILES["aerialdojo-5m"]
 

@@ -14,7 +14,6 @@ import pyarrow.compute as pc
 import pytest
 from browser import chromium, errors
 
-from aerialdojo_gen import store
 from aerialdojo_gen.benchmark.contents import Wanted
 from aerialdojo_gen.benchmark.episodes import read_run
 from aerialdojo_gen.benchmark.metrics import outcomes
@@ -26,7 +25,8 @@ from aerialdojo_gen.benchmark.runs import Run, load_runs
 from aerialdojo_gen.benchmark.scores import summarize
 from aerialdojo_gen.benchmark.tasks import Selection
 from aerialdojo_gen.errors import AerialDojoError
-from aerialdojo_gen.schemas import ACTION_NAMES
+from aerialdojo_gen.store import shards as store
+from aerialdojo_gen.store.schemas import ACTION_NAMES
 
 
 @pytest.fixture(scope="module")

@@ -12,11 +12,11 @@ from pathlib import Path
 import pyarrow.parquet as pq
 import pytest
 
-from aerialdojo_gen import store
 from aerialdojo_gen.errors import AssetError
 from aerialdojo_gen.scenes.glb import read_glb
-from aerialdojo_gen.staging import AREA
-from aerialdojo_gen.store import read_info
+from aerialdojo_gen.store import shards as store
+from aerialdojo_gen.store.shards import read_info
+from aerialdojo_gen.store.staging import AREA
 
 TABLES = ("meshes", "scenes", "landmarks", "objects", "chosen_anchors", "anchors", "pairs", "plans")
 

@@ -6,7 +6,7 @@ import sys
 from hypothesis import given
 from hypothesis import strategies as st
 
-from aerialdojo_gen.rng import generator, rank
+from aerialdojo_gen.common.rng import generator, rank
 
 keys = st.lists(st.one_of(st.integers(), st.text(max_size=8)), max_size=4).map(tuple)
 
@@ -30,7 +30,7 @@ def test_seed_zero_stage_and_key_boundaries_matter():
 
 
 def test_draws_are_the_same_in_another_process():
-    code = "from aerialdojo_gen.rng import rank; print(rank(7, 'split', 'U_Mall_0', 3))"
+    code = "from aerialdojo_gen.common.rng import rank; print(rank(7, 'split', 'U_Mall_0', 3))"
     for hash_seed in ("1", "2"):
         out = subprocess.run(
             [sys.executable, "-c", code], env={"PYTHONHASHSEED": hash_seed}, capture_output=True, check=True

@@ -11,7 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from two_coloured import EMBODIMENT, POST, directions, item_of, job_in, part, plain_view, sign, world_of, yard
 
-from aerialdojo_gen.config import AnchorSampleConfig, ScorerWeights, load_pipeline
+from aerialdojo_gen.config.pipeline import load_pipeline
+from aerialdojo_gen.config.sections import AnchorSampleConfig, ScorerWeights
 from aerialdojo_gen.errors import ConfigError
 from aerialdojo_gen.geometry.cameras import Camera, view_pose
 from aerialdojo_gen.geometry.surface import Surface

@@ -12,12 +12,12 @@ import pytest
 from llm_server import Say, Status, serving
 from two_coloured import POST, item_of, job_in, plain_view, redness, world_of, yard
 
-from aerialdojo_gen.config import AnchorSampleConfig, ClipConfig, ScorerWeights, VlmConfig
+from aerialdojo_gen.config.sections import AnchorSampleConfig, ClipConfig, ScorerWeights, VlmConfig
 from aerialdojo_gen.errors import AssetError, UsageError
+from aerialdojo_gen.pipeline.registry import BY_NAME
 from aerialdojo_gen.scoring.clip import ClipScorer, digest
 from aerialdojo_gen.scoring.panel import panel
 from aerialdojo_gen.scoring.vlm import VlmScorer, read_order
-from aerialdojo_gen.stage import BY_NAME
 from aerialdojo_gen.stages.anchor_sample import anchors_of
 
 WORDS = {"[UNK]": 0, "a": 1, "photo": 2, "of": 3, "red": 4, "blue": 5, "post": 6}

@@ -16,14 +16,14 @@ import trimesh
 from browser import chromium, errors
 from typer.testing import CliRunner
 
-from aerialdojo_gen import store
+from aerialdojo_gen.browse.lookup import ReleasedScene, find_task
 from aerialdojo_gen.cli import app
 from aerialdojo_gen.errors import AssetError, StoreError, UsageError
-from aerialdojo_gen.release.browse import ReleasedScene, find_task
 from aerialdojo_gen.release.way import sampled
 from aerialdojo_gen.show.figure import write_png
 from aerialdojo_gen.show.page import render_page
 from aerialdojo_gen.show.pictured import picture_task
+from aerialdojo_gen.store import shards as store
 
 YARD = "U_Courtyard_0"
 

@@ -11,16 +11,17 @@ from handmade import OPINIONS
 from hypothesis import given
 from hypothesis import strategies as st
 
-from aerialdojo_gen import schemas, store
-from aerialdojo_gen.config import Embodiment, FilterConfig, SplitConfig
+from aerialdojo_gen.config.sections import Embodiment, FilterConfig, SplitConfig
+from aerialdojo_gen.pipeline.stage import Job, Roots
 from aerialdojo_gen.release.card import write_card
 from aerialdojo_gen.release.contents import counts
 from aerialdojo_gen.release.ids import key_of, nav_id, reference_id
 from aerialdojo_gen.release.select import train_counts, train_mask
-from aerialdojo_gen.stage import Job, Roots
 from aerialdojo_gen.stages import filter as filter_stage
 from aerialdojo_gen.stages import split
-from aerialdojo_gen.tables import from_rows
+from aerialdojo_gen.store import schemas
+from aerialdojo_gen.store import shards as store
+from aerialdojo_gen.store.tables import from_rows
 
 SCENE = "U_Test_0"
 N_OBJECTS = 6

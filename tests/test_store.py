@@ -14,10 +14,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from aerialdojo_gen import schemas, store
-from aerialdojo_gen.atomic import atomic_file, atomic_folder
 from aerialdojo_gen.errors import StoreError
-from aerialdojo_gen.tables import content_digest, from_rows
+from aerialdojo_gen.store import schemas
+from aerialdojo_gen.store import shards as store
+from aerialdojo_gen.store.atomic import atomic_file, atomic_folder
+from aerialdojo_gen.store.tables import content_digest, from_rows
 
 finite = st.floats(-1e6, 1e6)
 

@@ -74,7 +74,7 @@ def test_too_few_file_descriptors(tmp_path, files):
 
 
 def test_a_low_number_of_file_descriptors_is_raised_where_it_may_be():
-    code = "from resource import *; from aerialdojo_gen.trouble import check_limits; check_limits([])"
+    code = "from resource import *; from aerialdojo_gen.common.trouble import check_limits; check_limits([])"
     done = subprocess.run(
         [sys.executable, "-c", f"{code}; print(getrlimit(RLIMIT_NOFILE)[0])"], capture_output=True, check=True,
         preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_NOFILE, (32, 1024)),

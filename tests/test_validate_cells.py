@@ -6,10 +6,10 @@ import pyarrow as pa
 import pytest
 from planting import check, definitions
 
-from aerialdojo_gen import store
 from aerialdojo_gen.release.contents import SHARDS
-from aerialdojo_gen.release.validate import Asked, validate
-from aerialdojo_gen.release.validate.parts import read_tables
+from aerialdojo_gen.store import shards as store
+from aerialdojo_gen.validate import Asked, validate
+from aerialdojo_gen.validate.parts import read_tables
 
 # Every fourth pixel is looked at: a box that is off by one is within what that can tell.
 UNTOLD = {"box_u0_px", "box_v0_px", "box_u1_px", "box_v1_px"}

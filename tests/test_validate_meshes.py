@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from planting import check, definitions
 
-from aerialdojo_gen.release.validate import Asked, validate
+from aerialdojo_gen.validate import Asked, validate
 
 OBJECTS, SCENES = "release/objects", "release/scenes"
 

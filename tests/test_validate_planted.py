@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from planting import check, definitions, edit_mesh, poses, refly, rename, retell
 
-from aerialdojo_gen.config import Pipeline
+from aerialdojo_gen.config.pipeline import Pipeline
 from aerialdojo_gen.release.ids import key_of, nav_id
-from aerialdojo_gen.release.validate import Asked, validate
-from aerialdojo_gen.release.validate.detours import _pieces
-from aerialdojo_gen.schemas import APPROACH
+from aerialdojo_gen.store.schemas import APPROACH
+from aerialdojo_gen.validate import Asked, validate
+from aerialdojo_gen.validate.detours import _pieces
 
 OBJECTS = "release/objects"
 LEFT_1, RIGHT_1, UP_1, UP_2, DOWN_1, DOWN_2 = 4, 7, 10, 11, 12, 13

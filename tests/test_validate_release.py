@@ -11,14 +11,15 @@ import pyarrow.parquet as pq
 import pytest
 from planting import SMOKE, check, faults_of
 
-from aerialdojo_gen import store
-from aerialdojo_gen.config import Pipeline, SplitConfig
+from aerialdojo_gen.common.paper import PaperScene
+from aerialdojo_gen.config.pipeline import Pipeline
+from aerialdojo_gen.config.sections import SplitConfig
 from aerialdojo_gen.errors import StoreError, UsageError
-from aerialdojo_gen.paper import PaperScene
 from aerialdojo_gen.release.contents import check_release
-from aerialdojo_gen.release.validate import Asked, counts, validate, write_report
-from aerialdojo_gen.release.validate.registry import Fault
-from aerialdojo_gen.schemas import SETTINGS
+from aerialdojo_gen.store import shards as store
+from aerialdojo_gen.store.schemas import SETTINGS
+from aerialdojo_gen.validate import Asked, counts, validate, write_report
+from aerialdojo_gen.validate.registry import Fault
 
 
 def relative(planted, key):

@@ -5,13 +5,13 @@ import pytest
 from planting import check, definitions, measured, poses, refly, turned
 
 from aerialdojo_gen.planning.collision import CollisionWorld
-from aerialdojo_gen.release.validate import collisions, oracle
-from aerialdojo_gen.release.validate.parts import read_tables
-from aerialdojo_gen.release.validate.registry import ALWAYS_AFTER, TABLES
-from aerialdojo_gen.release.validate.rows import SceneData
-from aerialdojo_gen.release.validate.run import SCENE_CHECKS
 from aerialdojo_gen.scenes.glb import read_glb
-from aerialdojo_gen.schemas import APPROACH, STOP, TURN_LEFT, TURN_RIGHT
+from aerialdojo_gen.store.schemas import APPROACH, STOP, TURN_LEFT, TURN_RIGHT
+from aerialdojo_gen.validate import collisions, oracle
+from aerialdojo_gen.validate.parts import read_tables
+from aerialdojo_gen.validate.registry import ALWAYS_AFTER, TABLES
+from aerialdojo_gen.validate.rows import SceneData
+from aerialdojo_gen.validate.run import SCENE_CHECKS
 
 RADIUS = 0.25
 UP_2, DOWN_2, LEFT_5, RIGHT_5 = 11, 13, 6, 9

@@ -18,12 +18,12 @@ from rendered import MATERIALS, block
 from starlette.testclient import TestClient
 from viewing import YARD, served
 
+from aerialdojo_gen.browse.lookup import ReleasedScene
 from aerialdojo_gen.errors import StoreError, UsageError
-from aerialdojo_gen.release.browse import ReleasedScene
 from aerialdojo_gen.scenes.model import Scene
+from aerialdojo_gen.view.server import route_detail, route_points, scene_index, view_app
 from aerialdojo_gen.web import serving
 from aerialdojo_gen.web.payload import scene_payload
-from aerialdojo_gen.web.view import route_detail, route_points, scene_index, view_app
 
 
 def unpacked(payload):

@@ -10,9 +10,9 @@ import pytest
 from browser import chromium, errors, until
 from viewing import YARD, served
 
-from aerialdojo_gen.release.browse import ReleasedScene
+from aerialdojo_gen.browse.lookup import ReleasedScene
 from aerialdojo_gen.rendering.preview import look_at
-from aerialdojo_gen.schemas import ACTION_NAMES
+from aerialdojo_gen.store.schemas import ACTION_NAMES
 
 
 @pytest.fixture(scope="module")

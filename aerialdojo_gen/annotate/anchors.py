@@ -14,13 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerialdojo_gen.annotations.format import Object
-from aerialdojo_gen.config import Pipeline
+from aerialdojo_gen.config.pipeline import Pipeline
 from aerialdojo_gen.errors import AerialDojoError
 from aerialdojo_gen.geometry.cameras import Camera, view_pose
 from aerialdojo_gen.geometry.frames import yaw_towards
 from aerialdojo_gen.geometry.surface import Surface
+from aerialdojo_gen.pipeline.stage import Job, Roots
 from aerialdojo_gen.scenes.model import Scene
-from aerialdojo_gen.stage import Job, Roots
 
 Floats = NDArray[np.float64]
 _T = TypeVar("_T")

@@ -19,15 +19,15 @@ from aerialdojo_gen.annotate.history import Record
 from aerialdojo_gen.annotate.storage import Author, State, Storage
 from aerialdojo_gen.annotations.claims import spoken
 from aerialdojo_gen.annotations.format import Anchor, Object, format_annotations
-from aerialdojo_gen.config import Pipeline
+from aerialdojo_gen.common.paper import paper_counts
+from aerialdojo_gen.config.pipeline import Pipeline
 from aerialdojo_gen.errors import AerialDojoError, UsageError
 from aerialdojo_gen.geometry.rays import RayCaster
-from aerialdojo_gen.paper import paper_counts
+from aerialdojo_gen.pipeline.stage import Job, Roots
 from aerialdojo_gen.scenes.catalogue import load_catalogue
 from aerialdojo_gen.scenes.cuts import cut_out
 from aerialdojo_gen.scenes.model import Scene
 from aerialdojo_gen.scenes.recipe import Cut
-from aerialdojo_gen.stage import Job, Roots
 from aerialdojo_gen.web.payload import scene_payload
 
 
@@ -302,7 +302,7 @@ def open_desk(name: str, pipeline: Pipeline, roots: Roots) -> Desk:
     AnnotationError
         Its annotation file cannot be read.
     """
-    from aerialdojo_gen import runner
+    from aerialdojo_gen.pipeline import runner
 
     scenes = runner.choose_scenes([name], runner.known_scenes(roots.recipes))
     if len(scenes) > 1:
@@ -313,7 +313,7 @@ def open_desk(name: str, pipeline: Pipeline, roots: Roots) -> Desk:
 
 def build(scene: str, pipeline: Pipeline, roots: Roots) -> None:
     """Bring a scene's mesh up to date with its recipe."""
-    from aerialdojo_gen import runner
-    from aerialdojo_gen.progress import Reporter
+    from aerialdojo_gen.pipeline import runner
+    from aerialdojo_gen.pipeline.progress import Reporter
 
     runner.run(runner.stages_named(("build-scenes",)), [scene], pipeline, roots, reporter=Reporter(quiet=True))

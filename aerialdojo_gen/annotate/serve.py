@@ -11,8 +11,8 @@ from pathlib import Path
 from aerialdojo_gen.annotate.access import TokenGate
 from aerialdojo_gen.annotate.coco import coco_zip
 from aerialdojo_gen.annotate.desk import Desk
-from aerialdojo_gen.atomic import atomic_file
 from aerialdojo_gen.errors import UsageError
+from aerialdojo_gen.store.atomic import atomic_file
 from aerialdojo_gen.web.serving import open_socket, serve, url_of
 
 

@@ -28,9 +28,9 @@ from aerialdojo_gen.annotate.document import (
 )
 from aerialdojo_gen.annotate.history import Action, History, Record
 from aerialdojo_gen.annotations.format import Annotations, format_annotations, parse_annotations
-from aerialdojo_gen.atomic import disk_error
 from aerialdojo_gen.errors import AnnotationError, brief
-from aerialdojo_gen.store import check_scene_name
+from aerialdojo_gen.store.atomic import disk_error
+from aerialdojo_gen.store.shards import check_scene_name
 
 
 @dataclass(frozen=True)

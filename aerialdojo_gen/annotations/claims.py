@@ -14,7 +14,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
 from aerialdojo_gen.annotations.relations import SceneGeometry
-from aerialdojo_gen.schemas import DIRECTIONS
+from aerialdojo_gen.store.schemas import DIRECTIONS
 
 RIVAL_SLACK = 1.35
 

@@ -19,9 +19,9 @@ from aerialdojo_gen.annotations.compose import compose
 from aerialdojo_gen.annotations.facts import Fact, FactFinder
 from aerialdojo_gen.annotations.format import Annotations, Landmark, Object
 from aerialdojo_gen.annotations.phrases import Words, noun_of, place_of, words_of
+from aerialdojo_gen.common.rng import generator, rank
 from aerialdojo_gen.errors import AnnotationError
 from aerialdojo_gen.geometry.frames import compass_direction
-from aerialdojo_gen.rng import generator, rank
 from aerialdojo_gen.scenes.catalogue import Catalogue
 from aerialdojo_gen.scenes.model import Instance, Scene
 

@@ -11,7 +11,7 @@ from typing import Annotated, Any, TypeVar
 from pydantic import BaseModel, ConfigDict, Field, StrictFloat, StrictInt, StrictStr, ValidationError
 
 from aerialdojo_gen.annotations.positions import Document, Fault, read_json
-from aerialdojo_gen.atomic import atomic_file
+from aerialdojo_gen.store.atomic import atomic_file
 
 FORMAT = "aerialdojo-annotations"
 VERSION = 1

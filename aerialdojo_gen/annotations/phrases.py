@@ -7,7 +7,7 @@ from functools import cache
 from pathlib import Path
 
 from aerialdojo_gen.annotations.claims import spoken
-from aerialdojo_gen.bounded import read_toml
+from aerialdojo_gen.common.bounded import read_toml
 from aerialdojo_gen.errors import AnnotationError
 from aerialdojo_gen.scenes.model import Instance
 

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, cast
 
-from aerialdojo_gen.bounded import JsonPath, beyond, scan_json
+from aerialdojo_gen.common.bounded import JsonPath, beyond, scan_json
 from aerialdojo_gen.errors import BeyondBounds, brief
 
 MOST_VALUES = 200_000

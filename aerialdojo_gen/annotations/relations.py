@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from aerialdojo_gen.geometry.frames import wrap_angle_rad
 from aerialdojo_gen.scenes.model import Scene
-from aerialdojo_gen.schemas import DIRECTIONS
+from aerialdojo_gen.store.schemas import DIRECTIONS
 
 Floats = NDArray[np.float64]
 

@@ -6,8 +6,8 @@ import operator
 from collections.abc import Callable
 from typing import Any
 
-from aerialdojo_gen.benchmark.agents import Agent, InvalidAnswer, Usage
-from aerialdojo_gen.benchmark.agents.load import place
+from aerialdojo_gen.agents import Agent, InvalidAnswer, Usage
+from aerialdojo_gen.agents.load import place
 from aerialdojo_gen.benchmark.goal import N_ACTIONS, Goal, Observation
 from aerialdojo_gen.benchmark.secrets import Secrets
 from aerialdojo_gen.errors import AerialDojoError

@@ -21,7 +21,7 @@ from aerialdojo_gen.benchmark.tables import (
     run_table,
     stacked_table,
 )
-from aerialdojo_gen.schemas import FAMILIES, SETTINGS
+from aerialdojo_gen.store.schemas import FAMILIES, SETTINGS
 
 _DIFFERENCES = (Measure("SR", "sr", signed=True), Measure("OSR", "osr", signed=True))
 _SHORT = MEASURES[:3]

@@ -13,8 +13,8 @@ from aerialdojo_gen.benchmark.grid import Table
 from aerialdojo_gen.benchmark.paper_tables import result_tables
 from aerialdojo_gen.benchmark.profiles import Profile
 from aerialdojo_gen.benchmark.runs import Run
+from aerialdojo_gen.common.paper import PaperResult
 from aerialdojo_gen.errors import UsageError
-from aerialdojo_gen.paper import PaperResult
 
 
 @dataclass(frozen=True)

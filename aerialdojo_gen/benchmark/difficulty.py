@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from aerialdojo_gen import store
 from aerialdojo_gen.benchmark.breakdowns import part_table
 from aerialdojo_gen.benchmark.grid import Table
 from aerialdojo_gen.benchmark.profiles import Profile
 from aerialdojo_gen.benchmark.runs import Run
 from aerialdojo_gen.errors import StoreError
+from aerialdojo_gen.store import shards as store
 
 # Columns that a release or a log may have; one that is in neither has no table.
 _YES_NO = {

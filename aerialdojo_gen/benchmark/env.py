@@ -13,22 +13,16 @@ import pyarrow.compute as pc
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from aerialdojo_gen.agreement import SUCCESS_RADIUS_M
 from aerialdojo_gen.benchmark.episode import Episode
 from aerialdojo_gen.benchmark.eyes import look, mosaic
 from aerialdojo_gen.benchmark.flight import Flight
 from aerialdojo_gen.benchmark.goal import N_ACTIONS, Sensors
-from aerialdojo_gen.benchmark.tasks import (
-    MODALITIES,
-    Selection,
-    read_tasks,
-    reference_image,
-    select,
-)
+from aerialdojo_gen.benchmark.tasks import MODALITIES, Selection, read_tasks, reference_image, select
 from aerialdojo_gen.benchmark.texts import GoalText
-from aerialdojo_gen.config import Embodiment
+from aerialdojo_gen.config.agreement import SUCCESS_RADIUS_M
+from aerialdojo_gen.config.sections import Embodiment
 from aerialdojo_gen.errors import UsageError
-from aerialdojo_gen.schemas import DIRECTIONS, VIEWS
+from aerialdojo_gen.store.schemas import DIRECTIONS, VIEWS
 
 _TEXT = ("target_name", "landmark", "description")
 _RENDERED = Sensors(depth=False, width=320, height=320)
@@ -37,8 +31,8 @@ _RENDERED = Sensors(depth=False, width=320, height=320)
 class AerialDojoEnv(gymnasium.Env[dict[str, Any], np.int64]):
     """Search for an object in a scene, from the start pose of a released task (paper: closed-loop evaluation).
 
-    Actions are `Discrete(16)`: Stop, moves and turns of `aerialdojo_gen.schemas.ACTION_NAMES`, carried out by their
-    exact magnitudes. An episode is `terminated` by Stop or by a collision, and `truncated` where the last action of
+    Actions are `Discrete(16)`: Stop, moves and turns of `aerialdojo_gen.store.schemas.ACTION_NAMES`, carried out by
+    their exact magnitudes. An episode is `terminated` by Stop or by a collision, and `truncated` where the last action of
     the budget is neither; ``info["reason"]`` is then ``"stop"``, ``"collision"`` or ``"budget"``, ``""`` before. A
     move that would leave the flight volume is refused: it is spent, and nothing moves. The reward is 1 for a Stop
     within the success radius, and 0 otherwise.

@@ -7,7 +7,7 @@ import math
 from aerialdojo_gen.benchmark.goal import N_ACTIONS
 from aerialdojo_gen.benchmark.motion import FlightSpace, Point
 from aerialdojo_gen.planning.primitives import DISPLACEMENTS, TURN_RAD, TURNS
-from aerialdojo_gen.schemas import STOP
+from aerialdojo_gen.store.schemas import STOP
 
 # Plain numbers: numpy's scalars would cost more than the motion itself.
 _MOVES = [tuple(row) for row in DISPLACEMENTS.tolist()]
@@ -44,7 +44,7 @@ class Episode:
     horizontal_distance_m, min_horizontal_distance_m : float
         The same in the plane.
     termination : str or None
-        None while it goes on, then one of `aerialdojo_gen.schemas.TERMINATIONS`.
+        None while it goes on, then one of `aerialdojo_gen.store.schemas.TERMINATIONS`.
     stop_called : bool
         The agent chose Stop.
     refused : bool

@@ -10,9 +10,10 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from aerialdojo_gen import schemas, store
 from aerialdojo_gen.errors import StoreError
-from aerialdojo_gen.tables import from_rows
+from aerialdojo_gen.store import schemas
+from aerialdojo_gen.store import shards as store
+from aerialdojo_gen.store.tables import from_rows
 
 TABLES = ("episodes", "steps", "timings", "failures")
 

@@ -11,7 +11,7 @@ from aerialdojo_gen.benchmark.goal import Sensors
 from aerialdojo_gen.benchmark.secrets import Secrets
 from aerialdojo_gen.benchmark.tasks import Selection
 from aerialdojo_gen.benchmark.worker import Conditions
-from aerialdojo_gen.config import Embodiment
+from aerialdojo_gen.config.sections import Embodiment
 
 
 @dataclass(frozen=True)

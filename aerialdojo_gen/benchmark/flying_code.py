@@ -7,9 +7,9 @@ import importlib.util
 import json
 from pathlib import Path
 
-from aerialdojo_gen.benchmark.agents.load import BUILT_IN
-from aerialdojo_gen.code_digest import code_of
-from aerialdojo_gen.files import file_digest
+from aerialdojo_gen.agents.load import BUILT_IN
+from aerialdojo_gen.pipeline.code_digest import code_of
+from aerialdojo_gen.store.files import file_digest
 
 
 def flying_code(agent: str) -> str:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from aerialdojo_gen.errors import UsageError
 from aerialdojo_gen.geometry.cameras import Camera
-from aerialdojo_gen.schemas import APPROACH, VIEWS
+from aerialdojo_gen.store.schemas import APPROACH, VIEWS
 
 # The actions that an agent can choose: all but Approach.
 N_ACTIONS = APPROACH
@@ -23,7 +23,7 @@ class Sensors:
     Attributes
     ----------
     views : tuple of str
-        Of `aerialdojo_gen.schemas.VIEWS`; empty for an agent that flies blind, and then nothing is rendered.
+        Of `aerialdojo_gen.store.schemas.VIEWS`; empty for an agent that flies blind, and then nothing is rendered.
     rgb, depth : bool
         Whether pictures, and whether depth, are handed out.
     width, height : int

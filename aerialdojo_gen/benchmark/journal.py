@@ -8,9 +8,9 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
-from aerialdojo_gen.atomic import disk_error
-from aerialdojo_gen.bounded import loads_json
+from aerialdojo_gen.common.bounded import loads_json
 from aerialdojo_gen.errors import Malformed, StoreError
+from aerialdojo_gen.store.atomic import disk_error
 
 
 class Journal:

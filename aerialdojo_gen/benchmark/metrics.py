@@ -84,7 +84,7 @@ def episodes_of(table: pa.Table) -> Episodes:
     Parameters
     ----------
     table : pyarrow.Table
-        Rows of `aerialdojo_gen.schemas` ``episodes``.
+        Rows of `aerialdojo_gen.store.schemas` ``episodes``.
 
     Returns
     -------

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from aerialdojo_gen.benchmark.episode import Episode
 from aerialdojo_gen.benchmark.motion import FlightSpace, Point
-from aerialdojo_gen.schemas import APPROACH
+from aerialdojo_gen.store.schemas import APPROACH
 
 # A reference that is flown as it is told has the length that it is told to have, but for the Approach.
 LEAST_SPL = 0.99

@@ -11,8 +11,8 @@ from aerialdojo_gen.benchmark.profiles import Profile
 from aerialdojo_gen.benchmark.runs import Run
 from aerialdojo_gen.benchmark.scores import METRICS, summarize
 from aerialdojo_gen.benchmark.tables import NAMES, caveats, line_of, profile_head
-from aerialdojo_gen.paper import PaperResult
-from aerialdojo_gen.schemas import SETTINGS
+from aerialdojo_gen.common.paper import PaperResult
+from aerialdojo_gen.store.schemas import SETTINGS
 
 _TABLES = {"base": "the form of the paper's Table 4", "standard": "the form of the paper's Table 5"}
 # At every radius but the first, as in the paper.

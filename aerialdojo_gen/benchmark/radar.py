@@ -15,7 +15,7 @@ from aerialdojo_gen.benchmark.figures import COLOURS, figure_of
 from aerialdojo_gen.benchmark.profiles import Profile
 from aerialdojo_gen.benchmark.runs import GROUP_OF, UPPER_BOUND, Run
 from aerialdojo_gen.benchmark.scores import METRICS, summarize
-from aerialdojo_gen.schemas import FAMILIES
+from aerialdojo_gen.store.schemas import FAMILIES
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -15,7 +15,7 @@ from aerialdojo_gen.benchmark.profiles import Profile
 from aerialdojo_gen.benchmark.runs import Run
 from aerialdojo_gen.benchmark.scores import success_curve
 from aerialdojo_gen.benchmark.tables import NAMES, line_of
-from aerialdojo_gen.schemas import SETTINGS
+from aerialdojo_gen.store.schemas import SETTINGS
 
 DEFAULT_RADII_M = (3.0, 5.0)
 # Beyond these a reader looks at the ranks' own columns.

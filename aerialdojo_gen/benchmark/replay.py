@@ -23,10 +23,10 @@ from aerialdojo_gen.benchmark.episodes import read_run
 from aerialdojo_gen.benchmark.eyes import look
 from aerialdojo_gen.benchmark.goal import Sensors
 from aerialdojo_gen.benchmark.runs import Run
+from aerialdojo_gen.browse.lookup import ReleasedScene
 from aerialdojo_gen.errors import StoreError
-from aerialdojo_gen.release.browse import ReleasedScene
 from aerialdojo_gen.rendering.orthographic import OrthographicPictures
-from aerialdojo_gen.schemas import ACTION_NAMES
+from aerialdojo_gen.store.schemas import ACTION_NAMES
 
 _MAP_PX = 640
 _MARGIN_M = 6.0

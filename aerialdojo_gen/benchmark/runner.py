@@ -20,10 +20,8 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from aerialdojo_gen import store
-from aerialdojo_gen.atomic import atomic_file
+from aerialdojo_gen.agents import ServiceDown
 from aerialdojo_gen.benchmark import episodes, journal
-from aerialdojo_gen.benchmark.agents import ServiceDown
 from aerialdojo_gen.benchmark.evaluation import Evaluation, Outcome
 from aerialdojo_gen.benchmark.flying_code import flying_code
 from aerialdojo_gen.benchmark.limits import Limits, Tally
@@ -31,11 +29,13 @@ from aerialdojo_gen.benchmark.preflight import checked
 from aerialdojo_gen.benchmark.tasks import select
 from aerialdojo_gen.benchmark.worker import Finished, Unit
 from aerialdojo_gen.benchmark.workers import fly_units
-from aerialdojo_gen.bounded import read_json
+from aerialdojo_gen.common.bounded import read_json
 from aerialdojo_gen.errors import UsageError
-from aerialdojo_gen.interrupt import Interrupts
-from aerialdojo_gen.progress import Reporter
-from aerialdojo_gen.runner import data_lock
+from aerialdojo_gen.pipeline.interrupt import Interrupts
+from aerialdojo_gen.pipeline.progress import Reporter
+from aerialdojo_gen.pipeline.runner import data_lock
+from aerialdojo_gen.store import shards as store
+from aerialdojo_gen.store.atomic import atomic_file
 
 __all__ = ["Evaluation", "Outcome", "evaluate"]
 

@@ -17,7 +17,7 @@ from aerialdojo_gen.benchmark.episodes import has_table, read_run, runs
 from aerialdojo_gen.benchmark.metrics import Bools, Episodes, Floats, episodes_of
 from aerialdojo_gen.benchmark.swept import STEP_COLUMNS, swept_distances
 from aerialdojo_gen.errors import StoreError
-from aerialdojo_gen.schemas import TERMINATIONS
+from aerialdojo_gen.store.schemas import TERMINATIONS
 
 # What is no contender: the one that knows the way, and those that look at nothing.
 UPPER_BOUND, FLOORS = "upper bound", "floors"

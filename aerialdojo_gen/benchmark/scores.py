@@ -14,7 +14,7 @@ import numpy as np
 
 from aerialdojo_gen.benchmark.metrics import Bools, Episodes, Floats, Outcomes, distances, may_succeed, outcomes
 from aerialdojo_gen.benchmark.profiles import Profile
-from aerialdojo_gen.schemas import FAMILIES
+from aerialdojo_gen.store.schemas import FAMILIES
 
 
 @dataclass(frozen=True)

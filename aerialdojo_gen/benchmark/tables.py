@@ -16,8 +16,8 @@ from aerialdojo_gen.benchmark.metrics import Episodes
 from aerialdojo_gen.benchmark.profiles import Profile
 from aerialdojo_gen.benchmark.runs import GROUP_OF, UPPER_BOUND, Run, conduct
 from aerialdojo_gen.benchmark.scores import METRICS, Score, Summary, slices, summarize, weighted_score
-from aerialdojo_gen.paper import PaperResult
-from aerialdojo_gen.schemas import FAMILIES, SETTINGS
+from aerialdojo_gen.common.paper import PaperResult
+from aerialdojo_gen.store.schemas import FAMILIES, SETTINGS
 
 MODALITIES = ("semantic", "image")
 PARTITIONS = ("ID", "OOD")

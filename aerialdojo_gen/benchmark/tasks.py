@@ -15,12 +15,13 @@ import pyarrow as pa
 import pyarrow.compute as pc
 from numpy.typing import NDArray
 
-from aerialdojo_gen import rng, store
 from aerialdojo_gen.benchmark.goal import Goal, Rules
 from aerialdojo_gen.benchmark.motion import Point
+from aerialdojo_gen.common import rng
 from aerialdojo_gen.errors import StoreError, UsageError
-from aerialdojo_gen.runner import choose_scenes
-from aerialdojo_gen.schemas import SETTINGS, SUBSETS, TASKS
+from aerialdojo_gen.pipeline.runner import choose_scenes
+from aerialdojo_gen.store import shards as store
+from aerialdojo_gen.store.schemas import SETTINGS, SUBSETS, TASKS
 
 MODALITIES = ("semantic", "image")
 _FACTS = ("nav_id", "goal_x_m", "goal_y_m", "goal_z_m", "euclidean_m", "length_m")
@@ -33,7 +34,7 @@ class Selection:
     Attributes
     ----------
     splits : tuple of str
-        Of `aerialdojo_gen.schemas.SUBSETS`; empty for all, as everywhere here.
+        Of `aerialdojo_gen.store.schemas.SUBSETS`; empty for all, as everywhere here.
     settings, modalities : tuple of str
     scenes : tuple of str
         Names or globs.

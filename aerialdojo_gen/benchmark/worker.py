@@ -10,10 +10,10 @@ from typing import Any
 
 import pyarrow as pa
 
+from aerialdojo_gen.agents import Agent, AgentUnavailable, Usage
+from aerialdojo_gen.agents.load import place
+from aerialdojo_gen.agents.simple import OracleAgent
 from aerialdojo_gen.benchmark import billing
-from aerialdojo_gen.benchmark.agents import Agent, AgentUnavailable, Usage
-from aerialdojo_gen.benchmark.agents.load import place
-from aerialdojo_gen.benchmark.agents.simple import OracleAgent
 from aerialdojo_gen.benchmark.asking import AgentError, Asked
 from aerialdojo_gen.benchmark.eyes import forget_renderers
 from aerialdojo_gen.benchmark.flight import Flight
@@ -22,7 +22,7 @@ from aerialdojo_gen.benchmark.journal import Journal
 from aerialdojo_gen.benchmark.secrets import Secrets
 from aerialdojo_gen.benchmark.tasks import Task, read_tasks, reference_actions
 from aerialdojo_gen.errors import RenderError
-from aerialdojo_gen.schemas import STEPS
+from aerialdojo_gen.store.schemas import STEPS
 
 _LONGEST_PAUSE_S = 600.0
 _COLUMNS = [name for name in STEPS.schema.names if name not in ("run_id", "task_id", "scene", "step")]

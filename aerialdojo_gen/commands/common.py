@@ -15,10 +15,10 @@ import typer
 from aerialdojo_gen.errors import ConfigError
 
 if TYPE_CHECKING:
-    from aerialdojo_gen.config import Pipeline
-    from aerialdojo_gen.progress import Reporter
-    from aerialdojo_gen.shards import Limits
-    from aerialdojo_gen.stage import Roots, Stage
+    from aerialdojo_gen.config.pipeline import Pipeline
+    from aerialdojo_gen.pipeline.freshness import Limits
+    from aerialdojo_gen.pipeline.progress import Reporter
+    from aerialdojo_gen.pipeline.stage import Roots, Stage
 
 DEFAULT_PIPELINE = "aerialdojo-200k.toml"
 
@@ -67,8 +67,8 @@ def open_pipeline(path: Path | None, data: Path) -> tuple[Pipeline, Roots]:
     ConfigError
         The file is missing or wrong.
     """
-    from aerialdojo_gen.config import load_pipeline
-    from aerialdojo_gen.stage import Roots
+    from aerialdojo_gen.config.pipeline import load_pipeline
+    from aerialdojo_gen.pipeline.stage import Roots
 
     pipeline = load_pipeline(path or home() / "pipelines" / DEFAULT_PIPELINE)
     roots = Roots(
@@ -126,8 +126,8 @@ def run_until(
     AerialDojoError
         An expected failure.
     """
-    from aerialdojo_gen.config import with_overrides
-    from aerialdojo_gen.stage import upstream
+    from aerialdojo_gen.config.pipeline import with_overrides
+    from aerialdojo_gen.pipeline.registry import upstream
 
     config, roots = open_pipeline(pipeline, data)
     config = with_overrides(config, stage, **overrides)
@@ -152,8 +152,8 @@ def run_stages(
     UsageError
         The release would lose scenes that another pipeline made, and `replace` is not given; nothing was run.
     """
-    from aerialdojo_gen import runner
-    from aerialdojo_gen.progress import Reporter
+    from aerialdojo_gen.pipeline import runner
+    from aerialdojo_gen.pipeline.progress import Reporter
     from aerialdojo_gen.release.provenance import check_replaced
 
     reporter = Reporter(quiet=quiet)
@@ -184,7 +184,7 @@ def _finish_release(config: Pipeline, data: Path, scenes: list[str], whole: bool
     from aerialdojo_gen.release.card import write_card
     from aerialdojo_gen.release.croissant import write_croissant
     from aerialdojo_gen.release.provenance import record_makers
-    from aerialdojo_gen.store import prune_release
+    from aerialdojo_gen.store.shards import prune_release
 
     if whole:
         # The whole pipeline was asked for: the release holds its scenes and no others.

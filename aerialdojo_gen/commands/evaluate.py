@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from aerialdojo_gen.bounded import loads_json
 from aerialdojo_gen.commands.common import Data, PipelineFile, Quiet, Scene, Workers, default_workers, open_pipeline
+from aerialdojo_gen.common.bounded import loads_json
 from aerialdojo_gen.errors import AerialDojoError, BeyondBounds, Malformed, UsageError
 
 if TYPE_CHECKING:
@@ -105,7 +105,7 @@ def evaluate(
     from aerialdojo_gen.benchmark.runner import evaluate as fly
     from aerialdojo_gen.benchmark.tasks import Selection
     from aerialdojo_gen.benchmark.worker import Conditions
-    from aerialdojo_gen.progress import Reporter
+    from aerialdojo_gen.pipeline.progress import Reporter
 
     config, _ = open_pipeline(pipeline, data)
     splits, settings, modalities, scenes = (tuple(names or ()) for names in (split, setting, modality, scene))
@@ -124,7 +124,7 @@ def evaluate(
         requests_per_minute,
     )
     if estimate:
-        from aerialdojo_gen.benchmark.llm.estimate import estimate as reckon
+        from aerialdojo_gen.llm.estimate import estimate as reckon
 
         print("\n".join(reckon(data, evaluation).lines(workers or default_workers())))
         return
@@ -149,7 +149,7 @@ def _agent(agent: str | None, preset: str | None, options: dict[str, Any]) -> tu
     """Take the agent, or a preset's with its options under those that are given."""
     if preset is None:
         return agent or "random", options
-    from aerialdojo_gen.benchmark.llm.presets import preset as find
+    from aerialdojo_gen.llm.presets import preset as find
 
     found = find(preset)
     if agent is not None and agent != found.agent:
@@ -182,7 +182,7 @@ def _sensors(
         return None
     from dataclasses import replace
 
-    from aerialdojo_gen.benchmark.agents import load_agent
+    from aerialdojo_gen.agents import load_agent
     from aerialdojo_gen.benchmark.goal import Sensors
 
     wanted = getattr(load_agent(agent, **options), "sensors", None)

@@ -7,9 +7,9 @@ from typing import Annotated
 
 import typer
 
-from aerialdojo_gen.atomic import atomic_file
 from aerialdojo_gen.commands.common import Data, PipelineFile, Scene, open_pipeline
 from aerialdojo_gen.errors import UsageError
+from aerialdojo_gen.store.atomic import atomic_file
 
 app = typer.Typer()
 
@@ -25,7 +25,8 @@ def stats(
     ] = None,
 ) -> None:  # fmt: skip
     """Set the release beside the paper's tables; before there is one, what filter kept."""
-    from aerialdojo_gen import runner, store
+    from aerialdojo_gen.pipeline import runner
+    from aerialdojo_gen.store import shards as store
 
     released = store.release_scenes(data)
     if pool or not released:
@@ -38,9 +39,9 @@ def stats(
         print("\n".join(pool_lines([pool_of(data, name) for name in scenes])))
         return
 
-    from aerialdojo_gen.release.comparison import Comparison, Listing, as_csv, as_markdown
     from aerialdojo_gen.release.contents import check_release
-    from aerialdojo_gen.release.stats import benchmark_table, in_paper_order, made_of, tables
+    from aerialdojo_gen.stats.comparison import Comparison, Listing, as_csv, as_markdown
+    from aerialdojo_gen.stats.tables import benchmark_table, in_paper_order, made_of, tables
 
     names = check_release(data, runner.choose_scenes(scene, released) if scene else None)
     made = in_paper_order([made_of(data, name) for name in names])
@@ -51,7 +52,7 @@ def stats(
                 temporary.write_text(text, encoding="utf-8")
     print("\n\n".join("\n".join(table.terminal()) for table in compared))
     if figures:
-        from aerialdojo_gen.release.figures import draw_figures
+        from aerialdojo_gen.stats.figures import draw_figures
 
         print()
         for path in draw_figures(data, [m.scene for m in made], figures):

@@ -53,7 +53,7 @@ def render(
         "--estimate", help="Measure a few trajectories, say what all will take, and record nothing.")] = False,
 ) -> None:  # fmt: skip
     """Record four RGB-D views along trajectories of the release."""
-    from aerialdojo_gen.shards import Limits
+    from aerialdojo_gen.pipeline.freshness import Limits
 
     limits = Limits(
         share_of(shard) if shard else (0, 1), time.time() + duration_s(budget) if budget else None, verify
@@ -76,7 +76,8 @@ def _scenes_of(split: str | None, scene: list[str] | None, pipeline: Path | None
     """Leave out the scenes that a split such as id_train has nothing of: their recordings stay as they are."""
     if split is None or "_" not in split:
         return scene
-    from aerialdojo_gen import runner, store
+    from aerialdojo_gen.pipeline import runner
+    from aerialdojo_gen.store import shards as store
 
     config, roots = open_pipeline(pipeline, data)
     scenes = runner.choose_scenes(scene or config.scenes, runner.known_scenes(roots.recipes))
@@ -94,8 +95,8 @@ def _estimate(
     share: tuple[int, int],
     overrides: dict[str, object],
 ) -> None:
-    from aerialdojo_gen import runner
-    from aerialdojo_gen.config import with_overrides
+    from aerialdojo_gen.config.pipeline import with_overrides
+    from aerialdojo_gen.pipeline import runner
     from aerialdojo_gen.rendering.estimate import estimate
 
     config, roots = open_pipeline(pipeline, data)

@@ -92,7 +92,7 @@ def report(
     from aerialdojo_gen.benchmark.profiles import DEFAULT_PROFILES, profile_named
     from aerialdojo_gen.benchmark.radii import DEFAULT_RADII_M, at_radius
     from aerialdojo_gen.benchmark.runs import load_runs
-    from aerialdojo_gen.paper import results
+    from aerialdojo_gen.common.paper import results
 
     rules = [profile_named(name) for name in dict.fromkeys(profile or DEFAULT_PROFILES)]
     named = load_runs(log or data, runs or ())

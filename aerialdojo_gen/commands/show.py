@@ -21,7 +21,7 @@ def show(
     frames: Annotated[int, typer.Option(min=0, max=12, help="Front views along the way.")] = 5,
 ) -> None:
     """Picture one task: goal, route in its scene, clearance, reference image, views along the way."""
-    from aerialdojo_gen.release.browse import find_task
+    from aerialdojo_gen.browse.lookup import find_task
     from aerialdojo_gen.show.figure import write_png
     from aerialdojo_gen.show.page import write_page
     from aerialdojo_gen.show.pictured import picture_task
@@ -42,8 +42,8 @@ def view(
     browser: Annotated[bool, typer.Option("--browser/--no-browser", help="Open the page.")] = True,
 ) -> None:
     """Show a scene in the browser: landmarks, objects, anchors, routes."""
+    from aerialdojo_gen.view.server import view_app
     from aerialdojo_gen.web.serving import open_socket, require_web, serve, url_of
-    from aerialdojo_gen.web.view import view_app
 
     require_web()
     page = view_app(data, scene)

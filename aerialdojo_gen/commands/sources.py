@@ -67,7 +67,7 @@ def annotate_draft(
     """Draft a scene's annotations, to be checked and owned as sources."""
     from aerialdojo_gen.annotations.command import draft_scene
     from aerialdojo_gen.annotations.draft import Choice
-    from aerialdojo_gen.runner import choose_scenes, known_scenes
+    from aerialdojo_gen.pipeline.runner import choose_scenes, known_scenes
 
     config, roots = open_pipeline(pipeline, Path("data"))
     choose_scenes([scene], known_scenes(roots.recipes))
@@ -89,11 +89,11 @@ def gallery(
     small: Annotated[bool, typer.Option("--small", help="JPEGs of 1280 columns, for pages.")] = False,
 ) -> None:  # fmt: skip
     """Picture every prop and every scene as contact sheets."""
-    from aerialdojo_gen import runner
-    from aerialdojo_gen.atomic import make_folder
+    from aerialdojo_gen.pipeline import runner
     from aerialdojo_gen.rendering.gallery import props_sheet, scene_sheet, write_picture
     from aerialdojo_gen.scenes.build import build_scene
     from aerialdojo_gen.scenes.catalogue import load_catalogue
+    from aerialdojo_gen.store.atomic import make_folder
 
     config, roots = open_pipeline(pipeline, out)
     make_folder(out)  # before anything is drawn

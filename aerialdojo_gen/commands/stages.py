@@ -23,8 +23,8 @@ from aerialdojo_gen.commands.common import (
 
 app = typer.Typer()
 
-# The stages whose command has no option of its own; their texts are those of `aerialdojo_gen.stage`, which is
-# not imported here because it brings pyarrow.
+# The stages whose command has no option of its own; their texts are those of `aerialdojo_gen.pipeline.registry`, which
+# is not imported here because it brings pyarrow.
 PLAIN_STAGES = {
     "build-scenes": "Build the scenes' meshes from their recipes.",
     "annotate-import": "Check the annotations against the scenes and import them.",
@@ -69,7 +69,7 @@ def run(
     workers: Workers = None, force: Force = False, quiet: Quiet = False, replace: Replace = False,
 ) -> None:  # fmt: skip
     """Run a pipeline's stages, from recipes and annotations to the release."""
-    from aerialdojo_gen.runner import stages_named
+    from aerialdojo_gen.pipeline.runner import stages_named
 
     config, roots = open_pipeline(pipeline, data)
     stages = stages_named(config.stages)

@@ -43,13 +43,13 @@ def validate(
     quiet: Quiet = False,
 ) -> None:
     """Check a release again from its Parquet files and meshes alone, and name every row at fault."""
+    from aerialdojo_gen import validate as validation
     from aerialdojo_gen.commands.common import DEFAULT_PIPELINE
-    from aerialdojo_gen.config import load_pipeline
+    from aerialdojo_gen.config.pipeline import load_pipeline
     from aerialdojo_gen.errors import UsageError
-    from aerialdojo_gen.progress import Reporter
-    from aerialdojo_gen.release import validate as validation
-    from aerialdojo_gen.release.validate.report import check_format
-    from aerialdojo_gen.release.validate.run import release_of
+    from aerialdojo_gen.pipeline.progress import Reporter
+    from aerialdojo_gen.validate.report import check_format
+    from aerialdojo_gen.validate.run import release_of
 
     if report is not None:
         check_format(report)

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerialdojo_gen.planning.primitives import DISPLACEMENTS, TURN_RAD
-from aerialdojo_gen.schemas import ACTION_NAMES, APPROACH, STOP, TURN_LEFT, TURN_RIGHT
+from aerialdojo_gen.store.schemas import ACTION_NAMES, APPROACH, STOP, TURN_LEFT, TURN_RIGHT
 
 Floats = NDArray[np.float64]
 

@@ -14,7 +14,6 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from aerialdojo_gen import store
 from aerialdojo_gen.errors import StoreError
 from aerialdojo_gen.exchange.actions import words_of
 from aerialdojo_gen.exchange.aerialdojo_layout import (
@@ -29,6 +28,7 @@ from aerialdojo_gen.exchange.aerialdojo_layout import (
 )
 from aerialdojo_gen.exchange.frames import NED
 from aerialdojo_gen.exchange.redrawn import Redrawn
+from aerialdojo_gen.store import shards as store
 
 Floats = NDArray[np.float64]
 

@@ -6,10 +6,11 @@ from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
-from aerialdojo_gen import __version__, store
+from aerialdojo_gen import __version__
 from aerialdojo_gen.errors import UsageError
 from aerialdojo_gen.exchange import aerialdojo_writer, habitat_writer
 from aerialdojo_gen.exchange.folder import whole_folder, write_json
+from aerialdojo_gen.store import shards as store
 
 MARKER = "export.json"
 PICTURE_PX = 640
@@ -60,7 +61,7 @@ def export_release(
     AssetError
         Pictures are to be drawn, and a mesh is missing or another one.
     """
-    from aerialdojo_gen.runner import choose_scenes
+    from aerialdojo_gen.pipeline.runner import choose_scenes
 
     if format_name not in FORMATS:
         raise UsageError(f"no format {format_name!r}: it is one of {', '.join(FORMATS)}")

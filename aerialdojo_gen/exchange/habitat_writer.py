@@ -16,9 +16,9 @@ from typing import Any, BinaryIO
 import numpy as np
 import pyarrow as pa
 
-from aerialdojo_gen import store
 from aerialdojo_gen.exchange.frames import world_to_habitat, yaw_to_habitat_quaternion_xyzw
-from aerialdojo_gen.schemas import ACTION_NAMES, SUBSETS
+from aerialdojo_gen.store import shards as store
+from aerialdojo_gen.store.schemas import ACTION_NAMES, SUBSETS
 
 LOST: Mapping[str, Sequence[str]] = {
     "tasks": [

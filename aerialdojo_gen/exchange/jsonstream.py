@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from aerialdojo_gen.bounded import MAX_DEPTH, loads_json, too_deep
+from aerialdojo_gen.common.bounded import MAX_DEPTH, loads_json, too_deep
 from aerialdojo_gen.errors import ImportRefused
 
 RECORD_LIMIT = 16 << 20
@@ -171,7 +171,8 @@ def small_document(path: Path, *, limit: int = RECORD_LIMIT) -> Any:
     Raises
     ------
     ValueError
-        It is larger, not UTF-8, not JSON or beyond the bounds of `aerialdojo_gen.bounded`; the message says which.
+        It is larger, not UTF-8, not JSON or beyond the bounds of `aerialdojo_gen.common.bounded`; the message says
+        which.
     OSError
         It cannot be read.
     """

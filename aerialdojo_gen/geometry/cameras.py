@@ -80,7 +80,7 @@ def view_pose(position: ArrayLike, yaw_rad: float, view: str) -> Floats:
     yaw_rad : float
         The body's yaw, counter-clockwise from +x.
     view : str
-        One of `aerialdojo_gen.schemas.VIEWS`.
+        One of `aerialdojo_gen.store.schemas.VIEWS`.
 
     Returns
     -------

@@ -8,14 +8,14 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from aerialdojo_gen.annotations.format import parse_annotations
-from aerialdojo_gen.atomic import atomic_file, make_folder
 from aerialdojo_gen.errors import AnnotationError, AssetError, UsageError, brief
 from aerialdojo_gen.imports.adopt import Repairs, adopt
 from aerialdojo_gen.imports.files import read_mesh
+from aerialdojo_gen.pipeline.registry import STAGES
 from aerialdojo_gen.scenes.glb import write_glb
 from aerialdojo_gen.scenes.model import Scene
-from aerialdojo_gen.stage import STAGES
-from aerialdojo_gen.store import check_scene_name
+from aerialdojo_gen.store.atomic import atomic_file, make_folder
+from aerialdojo_gen.store.shards import check_scene_name
 
 PIPELINE = "pipeline.toml"
 

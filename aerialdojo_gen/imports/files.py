@@ -19,10 +19,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from aerialdojo_gen.bounded import loads_json
+from aerialdojo_gen.common.bounded import loads_json
 from aerialdojo_gen.errors import AssetError
 from aerialdojo_gen.imports.raw import RawNode, joined, plain
-from aerialdojo_gen.staging import scratch_folder
+from aerialdojo_gen.store.staging import scratch_folder
 
 SUFFIXES = (".glb", ".obj", ".stl", ".ply", ".3ds")
 MAX_FILE_BYTES = 1 << 30

@@ -18,7 +18,7 @@ from aerialdojo_gen.planning.grid_kernels import GridArrays
 from aerialdojo_gen.planning.hybrid_astar import FOUND, SearchArrays, SearchOptions, search
 from aerialdojo_gen.planning.primitives import fly
 from aerialdojo_gen.planning.refine import moves_to_actions
-from aerialdojo_gen.schemas import APPROACH, STOP
+from aerialdojo_gen.store.schemas import APPROACH, STOP
 
 # A goal nearer than this is met already, and needs no Approach.
 _ON_GOAL_M = 1e-9

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from aerialdojo_gen.config import PlanConfig
+from aerialdojo_gen.config.sections import PlanConfig
 from aerialdojo_gen.planning.attempt import attempt, costs_at
 from aerialdojo_gen.planning.certify import conclude
 from aerialdojo_gen.planning.clearance import ClearanceGrid
@@ -29,7 +29,7 @@ class Route:
     Attributes
     ----------
     outcome : str
-        One of `aerialdojo_gen.schemas.OUTCOMES`.
+        One of `aerialdojo_gen.store.schemas.OUTCOMES`.
     poses : (K + 1, 4) float64
         x, y, z in metres and yaw in (-pi, pi], world frame; no rows unless SOLVED.
     actions : (K + 1,) int8

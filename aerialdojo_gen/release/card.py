@@ -9,12 +9,14 @@ import jinja2
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from aerialdojo_gen import __version__, schemas, store
-from aerialdojo_gen.atomic import atomic_file
-from aerialdojo_gen.paper import inventory
+from aerialdojo_gen import __version__
+from aerialdojo_gen.common.paper import inventory
 from aerialdojo_gen.release.contents import TABLES, check_release, counts, meaning, sizes, unit
 from aerialdojo_gen.release.croissant import CITE_AS
-from aerialdojo_gen.release.stats import Made, in_paper_order, made_of
+from aerialdojo_gen.stats.tables import Made, in_paper_order, made_of
+from aerialdojo_gen.store import schemas
+from aerialdojo_gen.store import shards as store
+from aerialdojo_gen.store.atomic import atomic_file
 
 _SIZES = ((1_000, "n<1K"), (10_000, "1K<n<10K"), (100_000, "10K<n<100K"), (1_000_000, "100K<n<1M"))
 

@@ -7,8 +7,9 @@ from pathlib import Path
 
 import pyarrow as pa
 
-from aerialdojo_gen import schemas, store
 from aerialdojo_gen.errors import StoreError
+from aerialdojo_gen.store import schemas
+from aerialdojo_gen.store import shards as store
 
 
 @dataclass(frozen=True)

@@ -9,8 +9,8 @@ from typing import Any
 import pyarrow as pa
 
 from aerialdojo_gen import __version__
-from aerialdojo_gen.atomic import atomic_file
 from aerialdojo_gen.release.contents import TABLES, Table, check_release, counts, meaning, unit
+from aerialdojo_gen.store.atomic import atomic_file
 
 # Of this version's output. Not the day of the run: the same sources give the same bytes on any day.
 PUBLISHED = "2026-11-21"

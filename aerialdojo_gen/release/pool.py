@@ -8,10 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
-from aerialdojo_gen import store
+from aerialdojo_gen.common.paper import PaperScene, inventory
 from aerialdojo_gen.errors import PoolError
-from aerialdojo_gen.paper import PaperScene, inventory
-from aerialdojo_gen.schemas import SETTINGS
+from aerialdojo_gen.store import shards as store
+from aerialdojo_gen.store.schemas import SETTINGS
 
 
 @dataclass(frozen=True)

@@ -8,10 +8,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from aerialdojo_gen import store
-from aerialdojo_gen.atomic import atomic_file
-from aerialdojo_gen.config import Pipeline
+from aerialdojo_gen.config.pipeline import Pipeline
 from aerialdojo_gen.errors import StoreError, UsageError
+from aerialdojo_gen.store import shards as store
+from aerialdojo_gen.store.atomic import atomic_file
 
 RECORD = "release/pipeline.json"
 # What does not change the release: folders of this machine, which scenes and stages are asked for, recordings.

@@ -8,9 +8,9 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from aerialdojo_gen.paper import PaperScene
-from aerialdojo_gen.rng import rank
-from aerialdojo_gen.store import partition
+from aerialdojo_gen.common.paper import PaperScene
+from aerialdojo_gen.common.rng import rank
+from aerialdojo_gen.store.shards import partition
 
 Floats = NDArray[np.float64]
 _HALVINGS = 60
@@ -56,9 +56,9 @@ def train_quotas(
     scene : str
         Name of the scene.
     scenes : mapping of str to PaperScene
-        What `aerialdojo_gen.paper.inventory` returns.
+        What `aerialdojo_gen.common.paper.inventory` returns.
     splits : mapping
-        What `aerialdojo_gen.paper.splits` returns.
+        What `aerialdojo_gen.common.paper.splits` returns.
 
     Returns
     -------

@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from aerialdojo_gen.rng import rank
+from aerialdojo_gen.common.rng import rank
 
 
 def lot(scene: str, pair_id: str) -> str:

@@ -9,17 +9,18 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from aerialdojo_gen import rng, store
-from aerialdojo_gen.config import RenderConfig
+from aerialdojo_gen.common import rng
+from aerialdojo_gen.config.sections import RenderConfig
 from aerialdojo_gen.errors import UsageError
-from aerialdojo_gen.files import size_of
 from aerialdojo_gen.rendering.backend import choose_renderer, open_renderer
 from aerialdojo_gen.rendering.checks import Solid
 from aerialdojo_gen.rendering.codecs import SUFFIX
 from aerialdojo_gen.rendering.recording import frame_poses, record_view
 from aerialdojo_gen.rendering.sample import choose, tables
 from aerialdojo_gen.scenes.glb import read_glb
-from aerialdojo_gen.staging import scratch_folder
+from aerialdojo_gen.store import shards as store
+from aerialdojo_gen.store.files import size_of
+from aerialdojo_gen.store.staging import scratch_folder
 
 _MEASURED_SCENES, _MEASURED_POSES = 3, 12
 

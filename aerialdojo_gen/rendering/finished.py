@@ -13,12 +13,12 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from aerialdojo_gen.bounded import read_json
-from aerialdojo_gen.config import RenderConfig
+from aerialdojo_gen.common.bounded import read_json
+from aerialdojo_gen.config.sections import RenderConfig
 from aerialdojo_gen.errors import StoreError
-from aerialdojo_gen.files import is_whole
-from aerialdojo_gen.schemas import RECORDINGS
-from aerialdojo_gen.tables import check_table, from_rows
+from aerialdojo_gen.store.files import is_whole
+from aerialdojo_gen.store.schemas import RECORDINGS
+from aerialdojo_gen.store.tables import check_table, from_rows
 
 NOTE = "recording.json"
 # What does not change a trajectory's own files: which others are recorded, and how they are shared out.

@@ -10,16 +10,16 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from aerialdojo_gen.atomic import atomic_file
+from aerialdojo_gen.common.rng import generator
 from aerialdojo_gen.errors import RenderError
 from aerialdojo_gen.geometry.rays import RayCaster
 from aerialdojo_gen.rendering.preview import contact_sheet, look_at
-from aerialdojo_gen.rng import generator
 from aerialdojo_gen.scenes.catalogue import Catalogue
 from aerialdojo_gen.scenes.ground import rectangle
 from aerialdojo_gen.scenes.mesh import to_part
 from aerialdojo_gen.scenes.model import Instance, Scene
 from aerialdojo_gen.scenes.shapes_extruded import extrude
+from aerialdojo_gen.store.atomic import atomic_file
 
 Image = NDArray[np.uint8]
 _FLYING_HEIGHT_M = 3.0

@@ -20,7 +20,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from aerialdojo_gen.bounded import loads_json
+from aerialdojo_gen.common.bounded import loads_json
 from aerialdojo_gen.errors import Malformed, RenderError
 from aerialdojo_gen.rendering.codecs import SUFFIX, to_metres
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from aerialdojo_gen.config import RenderConfig
+from aerialdojo_gen.config.sections import RenderConfig
 from aerialdojo_gen.errors import RenderError
 from aerialdojo_gen.geometry.cameras import Camera, view_pose
 from aerialdojo_gen.rendering.backend import Renderer
@@ -55,7 +55,7 @@ def record_view(
     solid : Solid
         The same scene.
     view : str
-        One of `aerialdojo_gen.schemas.VIEWS`.
+        One of `aerialdojo_gen.store.schemas.VIEWS`.
     poses : FramePoses
     config : RenderConfig
     files : dict of str to Path

@@ -6,9 +6,10 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from aerialdojo_gen import rng, store
-from aerialdojo_gen.config import RenderConfig
-from aerialdojo_gen.schemas import SETTINGS
+from aerialdojo_gen.common import rng
+from aerialdojo_gen.config.sections import RenderConfig
+from aerialdojo_gen.store import shards as store
+from aerialdojo_gen.store.schemas import SETTINGS
 
 
 def tables(config: RenderConfig, scene: str) -> tuple[str, ...]:

@@ -47,7 +47,7 @@ def by_steps(position: ArrayLike, yaw_rad: ArrayLike, action: ArrayLike, fps: fl
     yaw_rad : (n,) array_like
         Radians.
     action : (n,) array_like
-        Ids of `aerialdojo_gen.schemas.ACTION_NAMES`.
+        Ids of `aerialdojo_gen.store.schemas.ACTION_NAMES`.
     fps : float
         At which the video plays: time is a matter of display here.
 

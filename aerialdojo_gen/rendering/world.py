@@ -20,7 +20,7 @@ from aerialdojo_gen.rendering.lighting import Lighting, ShadowMap, light_of, sun
 from aerialdojo_gen.rendering.shading import shade
 from aerialdojo_gen.rendering.surfaces import Surface, surfaces
 from aerialdojo_gen.scenes.model import Material, Scene
-from aerialdojo_gen.staging import scratch_folder
+from aerialdojo_gen.store.staging import scratch_folder
 
 Floats = NDArray[np.float64]
 

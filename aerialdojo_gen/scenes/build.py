@@ -10,8 +10,8 @@ from types import ModuleType
 
 import numpy as np
 
+from aerialdojo_gen import layouts
 from aerialdojo_gen.errors import AssetError
-from aerialdojo_gen.scenes import layouts
 from aerialdojo_gen.scenes.catalogue import Catalogue
 from aerialdojo_gen.scenes.cuts import cut_out
 from aerialdojo_gen.scenes.glb import read_glb

@@ -17,7 +17,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from aerialdojo_gen.bounded import loads_json
+from aerialdojo_gen.common.bounded import loads_json
 from aerialdojo_gen.errors import AssetError
 from aerialdojo_gen.scenes.model import Instance, Material, Part, Scene
 

@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from aerialdojo_gen import bounded
+from aerialdojo_gen.common import bounded
 from aerialdojo_gen.errors import AssetError
 from aerialdojo_gen.scenes.model import Material
 from aerialdojo_gen.scenes.textures import TEXTURES, make_texture

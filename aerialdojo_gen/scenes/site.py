@@ -10,8 +10,8 @@ import shapely
 from shapely.geometry import Polygon
 from shapely.geometry.base import BaseGeometry
 
+from aerialdojo_gen.common.rng import generator
 from aerialdojo_gen.errors import AssetError
-from aerialdojo_gen.rng import generator
 from aerialdojo_gen.scenes.catalogue import Catalogue, placed
 from aerialdojo_gen.scenes.footprints import Footprints, around, footprint
 from aerialdojo_gen.scenes.ground import Surface, ground_meshes, rectangle

@@ -15,7 +15,7 @@ from aerialdojo_gen.errors import AssetError, UsageError
 from aerialdojo_gen.scoring.base import AnchorView
 
 if TYPE_CHECKING:
-    from aerialdojo_gen.config import ClipConfig
+    from aerialdojo_gen.config.sections import ClipConfig
 
 # CLIP's own preprocessing (Radford et al. 2021, its published code).
 _MEAN = np.array([0.48145466, 0.4578275, 0.40821073], np.float32)

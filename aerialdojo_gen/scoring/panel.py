@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
-from aerialdojo_gen.config import AnchorSampleConfig
+from aerialdojo_gen.config.sections import AnchorSampleConfig
 from aerialdojo_gen.errors import ConfigError
 from aerialdojo_gen.scoring.base import AnchorView, Scorer
 from aerialdojo_gen.scoring.geometric import GeometricScorer

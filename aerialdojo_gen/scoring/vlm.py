@@ -7,14 +7,14 @@ import re
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from aerialdojo_gen.benchmark.llm.images import colour_picture
-from aerialdojo_gen.benchmark.llm.service import Connection
-from aerialdojo_gen.bounded import loads_json
+from aerialdojo_gen.common.bounded import loads_json
 from aerialdojo_gen.errors import Malformed
+from aerialdojo_gen.llm.images import colour_picture
+from aerialdojo_gen.llm.service import Connection
 from aerialdojo_gen.scoring.base import AnchorView
 
 if TYPE_CHECKING:
-    from aerialdojo_gen.config import VlmConfig
+    from aerialdojo_gen.config.sections import VlmConfig
 
 log = logging.getLogger(__name__)
 

@@ -10,10 +10,10 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.cm import ScalarMappable
 from matplotlib.figure import Figure
 
-from aerialdojo_gen.atomic import atomic_file
 from aerialdojo_gen.errors import UsageError
 from aerialdojo_gen.show.drawing import CLEARANCE_COLOURS, CLEARANCE_SCALE, draw_map, draw_profile, draw_side, plain
 from aerialdojo_gen.show.pictured import PicturedTask
+from aerialdojo_gen.store.atomic import atomic_file
 
 _WIDTH_IN, _DPI = 14.0, 120
 _FRAMES_IN = 2.95

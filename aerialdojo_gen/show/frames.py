@@ -9,10 +9,11 @@ import numpy as np
 import pyarrow.compute as pc
 from numpy.typing import NDArray
 
-from aerialdojo_gen import schemas, store
+from aerialdojo_gen.browse.lookup import FoundTask
 from aerialdojo_gen.errors import StoreError
 from aerialdojo_gen.geometry.cameras import Camera, view_pose
-from aerialdojo_gen.release.browse import FoundTask
+from aerialdojo_gen.store import schemas
+from aerialdojo_gen.store import shards as store
 
 SIZE_PX = 320
 

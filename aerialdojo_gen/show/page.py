@@ -15,10 +15,10 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from aerialdojo_gen import schemas
-from aerialdojo_gen.atomic import atomic_file
 from aerialdojo_gen.show.drawing import CLEARANCE_COLOURS, CLEARANCE_SCALE, draw_map, draw_profile, draw_side
 from aerialdojo_gen.show.pictured import PicturedTask
+from aerialdojo_gen.store import schemas
+from aerialdojo_gen.store.atomic import atomic_file
 
 _STOPS_M = (0.25, 0.5, 1.0, 2.0, 5.0)
 

@@ -9,13 +9,13 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from aerialdojo_gen import schemas
 from aerialdojo_gen.benchmark.goal import Goal, Rules
-from aerialdojo_gen.benchmark.llm.prompt import goal_text
-from aerialdojo_gen.release.browse import FoundTask
+from aerialdojo_gen.browse.lookup import FoundTask
+from aerialdojo_gen.llm.prompt import goal_text
 from aerialdojo_gen.release.way import sampled
 from aerialdojo_gen.rendering.orthographic import OrthographicPictures
 from aerialdojo_gen.show.frames import Frame, frames_along
+from aerialdojo_gen.store import schemas
 
 Floats = NDArray[np.float64]
 

@@ -1,1 +1,1 @@
-"""One module a stage; what a stage is stands in `aerialdojo_gen.stage`."""
+"""One module a stage; what a stage is stands in `aerialdojo_gen.pipeline.stage`."""

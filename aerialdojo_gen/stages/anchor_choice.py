@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from aerialdojo_gen.config import AnchorSampleConfig
+from aerialdojo_gen.common.rng import generator
+from aerialdojo_gen.config.sections import AnchorSampleConfig
 from aerialdojo_gen.errors import AnnotationError
 from aerialdojo_gen.geometry.surface import Surface
-from aerialdojo_gen.rng import generator
+from aerialdojo_gen.pipeline.stage import Job
 from aerialdojo_gen.scoring.geometric import judge
 from aerialdojo_gen.scoring.panel import SCORERS
-from aerialdojo_gen.stage import Job
 from aerialdojo_gen.stages.anchor_world import Candidates, World
 
 Floats = NDArray[np.float64]

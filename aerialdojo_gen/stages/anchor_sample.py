@@ -10,20 +10,20 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from aerialdojo_gen.config import AnchorSampleConfig
+from aerialdojo_gen.common.rng import generator
+from aerialdojo_gen.config.sections import AnchorSampleConfig
 from aerialdojo_gen.errors import StoreError
 from aerialdojo_gen.geometry.frames import yaw_towards
 from aerialdojo_gen.geometry.surface import Surface
 from aerialdojo_gen.geometry.viewpoints import around, shortlist
-from aerialdojo_gen.rng import generator
+from aerialdojo_gen.pipeline.stage import Job, Output
 from aerialdojo_gen.scenes.model import Instance
-from aerialdojo_gen.schemas import ANCHORS
 from aerialdojo_gen.scoring.geometric import judge
 from aerialdojo_gen.scoring.panel import panel
-from aerialdojo_gen.stage import Job, Output
 from aerialdojo_gen.stages.anchor_choice import with_choice
 from aerialdojo_gen.stages.anchor_world import Candidates, World
-from aerialdojo_gen.tables import from_rows
+from aerialdojo_gen.store.schemas import ANCHORS
+from aerialdojo_gen.store.tables import from_rows
 
 Floats = NDArray[np.float64]
 log = logging.getLogger(__name__)

@@ -13,13 +13,13 @@ from aerialdojo_gen.annotations.ambiguity import nearest_landmark
 from aerialdojo_gen.annotations.check import check_source
 from aerialdojo_gen.annotations.format import Annotations, parse_annotations
 from aerialdojo_gen.annotations.positions import Fault
-from aerialdojo_gen.config import AnnotateImportConfig
+from aerialdojo_gen.common.paper import paper_counts
+from aerialdojo_gen.config.sections import AnnotateImportConfig
 from aerialdojo_gen.errors import AnnotationError, UsageError
-from aerialdojo_gen.paper import paper_counts
+from aerialdojo_gen.pipeline.stage import Job, Output
 from aerialdojo_gen.scenes.catalogue import load_catalogue
 from aerialdojo_gen.scenes.model import Scene
-from aerialdojo_gen.schemas import CHOSEN_ANCHORS, LANDMARKS, OBJECTS
-from aerialdojo_gen.stage import Job, Output
+from aerialdojo_gen.store.schemas import CHOSEN_ANCHORS, LANDMARKS, OBJECTS
 
 
 def run(job: Job, config: AnnotateImportConfig) -> Output:

@@ -8,16 +8,16 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from aerialdojo_gen.config import FilterConfig, Setting
+from aerialdojo_gen.config.sections import FilterConfig, Setting
 from aerialdojo_gen.errors import StoreError
-from aerialdojo_gen.schemas import SETTINGS, VERDICTS
-from aerialdojo_gen.stage import Job, Output
+from aerialdojo_gen.pipeline.stage import Job, Output
+from aerialdojo_gen.store.schemas import SETTINGS, VERDICTS
 
 KEPT = "kept"
 
 
 def settings_of(config: FilterConfig) -> tuple[Setting, Setting, Setting]:
-    """Return the length settings in the order of `aerialdojo_gen.schemas.SETTINGS`."""
+    """Return the length settings in the order of `aerialdojo_gen.store.schemas.SETTINGS`."""
     return config.base, config.standard, config.long_horizon
 
 
@@ -33,7 +33,7 @@ def judge(
     Parameters
     ----------
     outcome : (n,) str
-        One of `aerialdojo_gen.schemas.OUTCOMES`.
+        One of `aerialdojo_gen.store.schemas.OUTCOMES`.
     euclidean_m, length_m : (n,) float64
         d_E and L, metres; the length of an unsolved plan does not matter.
     n_actions : (n,) int32

@@ -9,9 +9,9 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from aerialdojo_gen.config import PairObjectsConfig
-from aerialdojo_gen.schemas import PAIRS
-from aerialdojo_gen.stage import Job, Output
+from aerialdojo_gen.config.sections import PairObjectsConfig
+from aerialdojo_gen.pipeline.stage import Job, Output
+from aerialdojo_gen.store.schemas import PAIRS
 
 Floats = NDArray[np.float64]
 

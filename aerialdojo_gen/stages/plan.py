@@ -13,13 +13,13 @@ import pyarrow as pa
 import pyarrow.compute as pc
 from numpy.typing import NDArray
 
-from aerialdojo_gen.config import PlanConfig
+from aerialdojo_gen.config.sections import PlanConfig
 from aerialdojo_gen.errors import StoreError
+from aerialdojo_gen.pipeline.stage import Job, Output
 from aerialdojo_gen.planning.planner import Planner, Route
 from aerialdojo_gen.planning.primitives import wrap_rad
 from aerialdojo_gen.scenes.model import Scene
-from aerialdojo_gen.schemas import OUTCOMES, PLANS
-from aerialdojo_gen.stage import Job, Output
+from aerialdojo_gen.store.schemas import OUTCOMES, PLANS
 
 Floats = NDArray[np.float64]
 

@@ -10,15 +10,15 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from aerialdojo_gen.config import ReferenceImagesConfig
+from aerialdojo_gen.config.sections import ReferenceImagesConfig
 from aerialdojo_gen.errors import RenderError
 from aerialdojo_gen.geometry.cameras import Camera, project, view_pose
 from aerialdojo_gen.geometry.rays import RayCaster
+from aerialdojo_gen.pipeline.stage import Job, Output
 from aerialdojo_gen.rendering.backend import kept_renderer
 from aerialdojo_gen.rendering.world import ray_caster
-from aerialdojo_gen.schemas import REFERENCES
-from aerialdojo_gen.stage import Job, Output
-from aerialdojo_gen.tables import from_rows
+from aerialdojo_gen.store.schemas import REFERENCES
+from aerialdojo_gen.store.tables import from_rows
 
 _BOX = ("box_u0_px", "box_v0_px", "box_u1_px", "box_v1_px")
 _IN_FRONT_M = 0.05

@@ -8,10 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from aerialdojo_gen.atomic import atomic_folder
-from aerialdojo_gen.config import RenderConfig
+from aerialdojo_gen.config.sections import RenderConfig
 from aerialdojo_gen.errors import BudgetSpent
-from aerialdojo_gen.files import sha256_of, size_of
+from aerialdojo_gen.pipeline.stage import Job, Output
 from aerialdojo_gen.rendering import finished
 from aerialdojo_gen.rendering.backend import kept_renderer
 from aerialdojo_gen.rendering.checks import CONCERNS, FLAGS, kept_solid
@@ -20,10 +19,11 @@ from aerialdojo_gen.rendering.recording import frame_poses, record_view
 from aerialdojo_gen.rendering.sample import choose, tables
 from aerialdojo_gen.rendering.trajectory import FramePoses
 from aerialdojo_gen.scenes.model import Scene
-from aerialdojo_gen.schemas import FRAMES, RECORDINGS
-from aerialdojo_gen.stage import Job, Output
-from aerialdojo_gen.staging import remove
-from aerialdojo_gen.tables import from_rows
+from aerialdojo_gen.store.atomic import atomic_folder
+from aerialdojo_gen.store.files import sha256_of, size_of
+from aerialdojo_gen.store.schemas import FRAMES, RECORDINGS
+from aerialdojo_gen.store.staging import remove
+from aerialdojo_gen.store.tables import from_rows
 
 
 def run(job: Job, config: RenderConfig) -> Output:

@@ -9,13 +9,13 @@ import pyarrow as pa
 import pyarrow.compute as pc
 from numpy.typing import NDArray
 
-from aerialdojo_gen.config import SplitConfig
-from aerialdojo_gen.paper import PaperScene, inventory, splits
+from aerialdojo_gen.common.paper import PaperScene, inventory, splits
+from aerialdojo_gen.config.sections import SplitConfig
+from aerialdojo_gen.pipeline.stage import Job, Output
 from aerialdojo_gen.release import quota
 from aerialdojo_gen.release.ids import key_of, nav_id, reference_id
 from aerialdojo_gen.release.select import lot, train_counts, train_mask
-from aerialdojo_gen.schemas import RELEASE_ANCHORS, RELEASE_OBJECTS, ROUTES, TASKS
-from aerialdojo_gen.stage import Job, Output
+from aerialdojo_gen.store.schemas import RELEASE_ANCHORS, RELEASE_OBJECTS, ROUTES, TASKS
 
 _LISTS = ("x_m", "y_m", "z_m", "yaw_rad", "action")
 
@@ -54,7 +54,8 @@ def routes_table(
     Returns
     -------
     pyarrow.Table
-        Rows of `aerialdojo_gen.schemas.ROUTES`, in its order, with ``action_budget`` and ``lot`` as further columns.
+        Rows of `aerialdojo_gen.store.schemas.ROUTES`, in its order, with ``action_budget`` and ``lot`` as further
+        columns.
     """
     pairs = _take(pairs, "pair_id", kept.column("pair_id"))
     plans = _take(plans, "pair_id", kept.column("pair_id"))

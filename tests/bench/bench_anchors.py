@@ -17,12 +17,12 @@ from pathlib import Path
 
 import numpy as np
 
-from aerialdojo_gen import store
-from aerialdojo_gen.config import load_pipeline
-from aerialdojo_gen.rng import generator
-from aerialdojo_gen.stage import Job, Roots
+from aerialdojo_gen.common.rng import generator
+from aerialdojo_gen.config.pipeline import load_pipeline
+from aerialdojo_gen.pipeline.stage import Job, Roots
 from aerialdojo_gen.stages.anchor_sample import candidates_of
 from aerialdojo_gen.stages.anchor_world import World
+from aerialdojo_gen.store import shards as store
 
 ROOT = Path(__file__).resolve().parents[2]
 WHO = ("selected", "random", "nearest")

@@ -25,9 +25,10 @@ from ompl import base, geometric, util
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 from bench_planner import RADIUS, SIZE, free_pose, world
 
-from aerialdojo_gen.config import PlanConfig, load_pipeline
+from aerialdojo_gen.config.pipeline import load_pipeline
+from aerialdojo_gen.config.sections import PlanConfig
+from aerialdojo_gen.pipeline.stage import Job, Roots
 from aerialdojo_gen.planning.planner import Planner
-from aerialdojo_gen.stage import Job, Roots
 from aerialdojo_gen.stages import plan
 
 ROOT = Path(__file__).resolve().parents[2]

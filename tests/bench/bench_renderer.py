@@ -18,7 +18,7 @@ from typing import Any
 import cv2
 import numpy as np
 
-from aerialdojo_gen.config import RENDERERS, RenderConfig
+from aerialdojo_gen.config.sections import RENDERERS, RenderConfig
 from aerialdojo_gen.geometry.cameras import Camera, view_pose
 from aerialdojo_gen.geometry.rays import RayCaster
 from aerialdojo_gen.rendering.backend import choose_renderer, open_renderer
@@ -27,7 +27,7 @@ from aerialdojo_gen.rendering.recording import frame_poses, record_view
 from aerialdojo_gen.scenes.build import build_scene
 from aerialdojo_gen.scenes.catalogue import load_catalogue
 from aerialdojo_gen.scenes.model import Scene
-from aerialdojo_gen.schemas import VIEWS
+from aerialdojo_gen.store.schemas import VIEWS
 
 ASSETS = Path(__file__).resolve().parents[2] / "scene_assets"
 CAMERA = Camera(640, 640, 90.0)

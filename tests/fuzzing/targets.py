@@ -22,18 +22,17 @@ import numpy as np
 import rendered
 import task_files
 
-from aerialdojo_gen import store
 from aerialdojo_gen.annotate.storage import parse_whole
 from aerialdojo_gen.annotations.check import check_source
 from aerialdojo_gen.annotations.format import format_annotations, parse_annotations
 from aerialdojo_gen.annotations.relations import SceneGeometry
 from aerialdojo_gen.benchmark import journal
-from aerialdojo_gen.benchmark.llm.answer import parse_answer
-from aerialdojo_gen.config import load_pipeline
+from aerialdojo_gen.config.pipeline import load_pipeline
 from aerialdojo_gen.errors import AerialDojoError
 from aerialdojo_gen.exchange.importing import Options, import_benchmark
 from aerialdojo_gen.imports.adopt import adopt
 from aerialdojo_gen.imports.files import read_into, unpacked
+from aerialdojo_gen.llm.answer import parse_answer
 from aerialdojo_gen.rendering import finished
 from aerialdojo_gen.rendering.codecs import PngWriter, VideoWriter
 from aerialdojo_gen.rendering.reader import read_recording
@@ -43,6 +42,7 @@ from aerialdojo_gen.scenes.catalogue_files import FOLDERS, catalogue_files
 from aerialdojo_gen.scenes.glb import read_glb, write_glb
 from aerialdojo_gen.scoring.vlm import read_order
 from aerialdojo_gen.stages.annotate_import import annotation_tables
+from aerialdojo_gen.store import shards as store
 from fuzzing.mutate import toml_dumped
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -379,8 +379,8 @@ def _notes() -> list[Case]:
 
 
 def _find(folder: Path) -> None:
-    from aerialdojo_gen.schemas import RECORDINGS
-    from aerialdojo_gen.tables import check_table, from_rows
+    from aerialdojo_gen.store.schemas import RECORDINGS
+    from aerialdojo_gen.store.tables import check_table, from_rows
 
     rows = finished.find(folder, _NAV, _FINGERPRINT)
     if rows is not None:

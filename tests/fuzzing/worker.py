@@ -15,8 +15,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TextIO
 
+from aerialdojo_gen.common.rng import generator
 from aerialdojo_gen.errors import AerialDojoError
-from aerialdojo_gen.rng import generator
 from fuzzing.mutate import mutant
 from fuzzing.targets import TARGETS, Case, Target, case_of, laid_out
 

@@ -1,0 +1,16 @@
+"""Agents: `load_agent` makes one by name, or by ``package.module:Class``."""
+
+from aerialdojo_gen.agents.base import Agent, AgentBase, AgentUnavailable, InvalidAnswer, ServiceDown, Usage
+from aerialdojo_gen.agents.load import BUILT_IN, agent_class, load_agent
+
+__all__ = [
+    "BUILT_IN",
+    "Agent",
+    "AgentBase",
+    "AgentUnavailable",
+    "InvalidAnswer",
+    "ServiceDown",
+    "Usage",
+    "agent_class",
+    "load_agent",
+]

@@ -1,0 +1,108 @@
+"""Find an agent by its name and make it."""
+
+from __future__ import annotations
+
+import difflib
+import importlib
+import inspect
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from aerialdojo_gen.agents.base import Agent
+from aerialdojo_gen.errors import AerialDojoError, UsageError, first_line
+
+_HERE = "aerialdojo_gen.agents"
+# Where the agents of this project are; nothing is imported before one is asked for.
+BUILT_IN = {
+    "oracle": f"{_HERE}.simple:OracleAgent",
+    "random": f"{_HERE}.simple:RandomAgent",
+    "stop": f"{_HERE}.simple:StopAgent",
+    "constant": f"{_HERE}.simple:ConstantAgent",
+    "explorer": f"{_HERE}.explorer:ExplorerAgent",
+    "openai": "aerialdojo_gen.llm.openai_agent:OpenAIAgent",
+    "anthropic": "aerialdojo_gen.llm.anthropic_agent:AnthropicAgent",
+}
+
+
+def agent_class(name: str) -> Callable[..., Any]:
+    """Find an agent's class; nothing is made of it.
+
+    Parameters
+    ----------
+    name : str
+        One of `BUILT_IN`, or ``package.module:Class`` for one of one's own.
+
+    Raises
+    ------
+    UsageError
+        There is no such agent, or its module raises.
+    """
+    where = BUILT_IN.get(name, name)
+    module_name, colon, class_name = where.partition(":")
+    if not colon or not module_name or not class_name:
+        near = difflib.get_close_matches(name, BUILT_IN, n=1)
+        hint = f"did you mean {near[0]!r}?" if near else f"there are {', '.join(BUILT_IN)}, or package.module:Class"
+        raise UsageError(f"no agent {name!r}: {hint}")
+    try:
+        module = importlib.import_module(module_name)
+    except ImportError as error:
+        raise UsageError(f"cannot load agent {name!r}: {first_line(error)}") from None
+    except AerialDojoError:
+        raise
+    except Exception as error:
+        raise UsageError(f"cannot load agent {name!r}: {place(error)}") from error
+    cls = getattr(module, class_name, None)
+    if cls is None:
+        raise UsageError(f"cannot load agent {name!r}: module {module_name} has no {class_name}")
+    if not callable(cls):
+        raise UsageError(f"cannot load agent {name!r}: {class_name} is no class")
+    made: Callable[..., Any] = cls
+    return made
+
+
+def load_agent(name: str, **options: Any) -> Agent:
+    """Make an agent.
+
+    Parameters
+    ----------
+    name : str
+        One of `BUILT_IN`, or ``package.module:Class`` for one of one's own.
+    **options
+        Keyword arguments of the class.
+
+    Returns
+    -------
+    Agent
+
+    Raises
+    ------
+    UsageError
+        There is no such agent, it has no such option, or it lacks ``reset`` or ``act``.
+    """
+    cls = agent_class(name)
+    try:
+        inspect.signature(cls).bind(**options)
+    except TypeError as error:
+        known = ", ".join(inspect.signature(cls).parameters) or "none"
+        raise UsageError(f"agent {name!r}: {error}; its options: {known}") from None
+    try:
+        agent = cls(**options)
+    except AerialDojoError:
+        raise
+    except (TypeError, ValueError) as error:
+        raise UsageError(f"agent {name!r}: {first_line(error)}") from error
+    except Exception as error:
+        raise UsageError(f"agent {name!r} cannot be made: {place(error)}") from error
+    if not isinstance(agent, Agent):
+        raise UsageError(f"{name!r} is no agent: it needs reset(goal) and act(observation)")
+    return agent
+
+
+def place(error: BaseException) -> str:
+    """Say what was raised and where, in one line: ``KeyError at mine.py:12: 'map'``."""
+    at = error.__traceback__
+    while at is not None and at.tb_next is not None:
+        at = at.tb_next
+    where = f" at {Path(at.tb_frame.f_code.co_filename).name}:{at.tb_lineno}" if at is not None else ""
+    return f"{type(error).__name__}{where}: {first_line(error)}"

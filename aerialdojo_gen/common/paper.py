@@ -1,0 +1,168 @@
+"""The paper's own figures, carried as CSV files beside the pipelines.
+
+Its Tables 1, 2, 4, 5 and 10, its table of splits, and the shares that its appendix C names.
+"""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+
+@dataclass(frozen=True)
+class PaperScene:
+    """One row of the paper's Table 10.
+
+    Attributes
+    ----------
+    scene : str
+        Name.
+    landmarks, objects : int
+        How many are annotated.
+    base, standard, long_horizon : int
+        Navigation tasks of each length setting; a task has two instances.
+    path_m : float
+        Summed length of the reference trajectories, metres.
+    """
+
+    scene: str
+    landmarks: int
+    objects: int
+    base: int
+    standard: int
+    long_horizon: int
+    path_m: float
+
+    @property
+    def tasks(self) -> dict[str, int]:
+        """Navigation tasks by setting."""
+        return {"base": self.base, "standard": self.standard, "long_horizon": self.long_horizon}
+
+
+@cache
+def inventory() -> dict[str, PaperScene]:
+    """Read the paper's Table 10: 42 scenes by name."""
+    rows = _rows("inventory.csv")
+    return {
+        row["scene"]: PaperScene(
+            scene=row["scene"],
+            landmarks=int(row["landmarks"]),
+            objects=int(row["objects"]),
+            base=int(row["base"]) // 2,
+            standard=int(row["standard"]) // 2,
+            long_horizon=int(row["long_horizon"]) // 2,
+            path_m=1000.0 * float(row["path_km"]),
+        )
+        for row in rows
+    }
+
+
+def paper_counts() -> dict[str, tuple[int, int]]:
+    """Return the numbers of landmarks and objects by scene."""
+    return {name: (row.landmarks, row.objects) for name, row in inventory().items()}
+
+
+@cache
+def splits() -> dict[tuple[str, str], dict[str, int]]:
+    """Read the paper's table of splits.
+
+    Returns
+    -------
+    dict
+        ``{("ID", "train"): {"base": 20320, "standard": 24199, "long_horizon": 12302}, …}``, navigation tasks.
+    """
+    settings = ("base", "standard", "long_horizon")
+    return {(r["partition"], r["subset"]): {s: int(r[s]) // 2 for s in settings} for r in _rows("splits.csv")}
+
+
+@dataclass(frozen=True)
+class PaperResult:
+    """A row of the paper's Table 4 (Base) or 5 (Standard): flown in its simulator, Unreal Engine.
+
+    Attributes
+    ----------
+    setting, group, model : str
+        ``base`` or ``standard``; ``open`` or ``closed`` (source); the model.
+    mean, spread : dict of (str, float) to float
+        By metric (``sr``, ``osr``, ``spl``, ``dts_m``, ``cr``) and radius, metres: fractions and metres. What the
+        paper's ± is, it does not say.
+    source : str
+        Table of the paper.
+    """
+
+    setting: str
+    group: str
+    model: str
+    mean: dict[tuple[str, float], float]
+    spread: dict[tuple[str, float], float]
+    source: str
+
+
+_MEASURED = {
+    ("sr", 3.0): "sr_3m", ("osr", 3.0): "osr_3m", ("spl", 3.0): "spl_3m", ("dts_m", 3.0): "dts_3m",
+    ("cr", 3.0): "cr_3m", ("sr", 5.0): "sr_5m", ("osr", 5.0): "osr_5m",
+}  # fmt: skip
+
+
+@cache
+def results() -> tuple[PaperResult, ...]:
+    """Read the paper's Tables 4 and 5, in their order."""
+
+    def values(row: dict[str, str], kind: str) -> dict[tuple[str, float], float]:
+        return {
+            (metric, radius_m): float(row[f"{column}_{kind}"]) / (1.0 if metric == "dts_m" else 100.0)
+            for (metric, radius_m), column in _MEASURED.items()
+        }
+
+    return tuple(
+        PaperResult(
+            row["setting"], row["group"], row["model"], values(row, "mean"), values(row, "std"), row["source"]
+        )
+        for row in _rows("results.csv")
+    )
+
+
+@cache
+def benchmarks() -> tuple[dict[str, str], ...]:
+    """Read the paper's Table 1, cells as they are printed: ``benchmark``, ``year``, ``task``, ``dof``, ….
+
+    Families are letters: U(rban), N(atural), I(nfrastructure), D(isaster).
+    """
+    return tuple(_rows("benchmarks.csv"))
+
+
+@cache
+def family_counts() -> dict[str, dict[str, float]]:
+    """Read the paper's Table 2 by family: types, scenes, landmarks, objects, anchors, instances, path_km."""
+    return {
+        row["family"]: {name: float(value) for name, value in row.items() if name not in ("family", "source")}
+        for row in _rows("families.csv")
+    }
+
+
+@cache
+def shares() -> dict[str, float]:
+    """Read the shares that the paper's appendix C names, per cent of all task instances.
+
+    ``ID train`` and ``OOD train`` are shares of that partition's instances.
+    """
+    return {row["share"]: float(row["percent"]) for row in _rows("shares.csv")}
+
+
+def files() -> list[Path]:
+    """Return the CSV files that stages take quotas from."""
+    return [_folder() / name for name in ("inventory.csv", "splits.csv")]
+
+
+def _folder() -> Path:
+    # In a checkout the pipelines lie beside the package, in a wheel within it.
+    package = Path(__file__).resolve().parents[1]
+    root = package.parent if (package.parent / "pipelines").is_dir() else package / "_shipped"
+    return root / "pipelines" / "paper"
+
+
+def _rows(name: str) -> list[dict[str, str]]:
+    with (_folder() / name).open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))

@@ -1,0 +1,105 @@
+"""What the machine or the caller can get wrong anywhere in a command, in one line each.
+
+Nothing heavy is imported: this is asked before a command's own imports, which are the first to meet a limit.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import resource
+from collections.abc import Iterator, Sequence
+
+from aerialdojo_gen.errors import AerialDojoError, UsageError
+from aerialdojo_gen.store.atomic import DISK_ERRORS
+
+# Python with the libraries of a command has about 20 open, every worker process some more.
+_LEAST_FILES = 64
+_LEAST_MEMORY = 1 << 30
+_NO_MEMORY = (
+    "cannot allocate memory", "failed to map segment", "bad_alloc", "can't start new thread", "insufficient memory",
+    "out of memory", "unable to allocate",
+)  # fmt: skip
+_NO_FILES = ("too many open files",)
+
+
+def check_arguments(arguments: Sequence[str]) -> None:
+    """Refuse arguments that are no text, and empty ones.
+
+    Raises
+    ------
+    UsageError
+        An argument, the data directory in the environment or the working directory is not UTF-8, or one is empty.
+    """
+    for before, text in zip(("", *arguments), arguments, strict=False):
+        option = before if before.startswith("--") else ""
+        if not text:
+            raise UsageError(f"{option or 'an argument'} is empty: give a value, or leave it out")
+        if text.startswith("--") and text.find("=") == len(text) - 1:
+            raise UsageError(f"{text[:-1]} is empty: give a value, or leave it out")
+        _check_text(text, option)
+    _check_text(os.environ.get("AERIALDOJO_DATA", ""), "AERIALDOJO_DATA")
+    _check_text(os.fsdecode(os.getcwdb()), "the working directory")
+
+
+def _check_text(text: str, option: str) -> None:
+    try:
+        text.encode("utf-8")
+    except UnicodeEncodeError:
+        shown = os.fsencode(text).decode("utf-8", "backslashreplace")
+        raise UsageError(f"{f'{option} ' if option else ''}{shown} is not UTF-8: rename it") from None
+
+
+def check_limits(arguments: Sequence[str]) -> None:
+    """Raise the number of file descriptors to what is allowed.
+
+    Raises
+    ------
+    AerialDojoError
+        That is too few, or there is so little memory that libraries would crash before they can say so.
+    """
+    memory = resource.getrlimit(resource.RLIMIT_AS)[0]
+    if memory != resource.RLIM_INFINITY and memory < _LEAST_MEMORY and not {"-h", "--help"} & set(arguments):
+        raise AerialDojoError(
+            f"not enough memory{_address_space()}: at least {_LEAST_MEMORY >> 20} MB of address space are needed"
+        )
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    wanted = 4096 if hard == resource.RLIM_INFINITY else min(4096, hard)
+    if soft != resource.RLIM_INFINITY and soft < wanted:
+        resource.setrlimit(resource.RLIMIT_NOFILE, (wanted, hard))
+        soft = wanted
+    if soft != resource.RLIM_INFINITY and soft < _LEAST_FILES:
+        raise AerialDojoError(f"too few file descriptors: ulimit -n is {soft}, at least {_LEAST_FILES} are needed")
+
+
+def explained(error: BaseException) -> str | None:
+    """Return the line to print for an error that the machine's limits or its disk caused; None for any other."""
+    for cause in _chain(error):
+        said = str(cause).lower()
+        number = cause.errno if isinstance(cause, OSError) else None
+        if number in (errno.EMFILE, errno.ENFILE) or any(words in said for words in _NO_FILES):
+            soft = resource.getrlimit(resource.RLIMIT_NOFILE)[0]
+            return f"too few file descriptors: ulimit -n is {soft}; raise it, or use fewer --workers"
+        if (
+            isinstance(cause, MemoryError)
+            or number == errno.ENOMEM
+            or (isinstance(cause, OSError | ImportError | RuntimeError) and any(w in said for w in _NO_MEMORY))
+        ):
+            return f"not enough memory{_address_space()}: give it more, or use fewer --workers"
+        if number in DISK_ERRORS and isinstance(cause, OSError) and cause.filename is not None:
+            return f"{os.fsdecode(cause.filename)}: {DISK_ERRORS[number]}"
+    return None
+
+
+def _address_space() -> str:
+    soft = resource.getrlimit(resource.RLIMIT_AS)[0]
+    return "" if soft == resource.RLIM_INFINITY else f" (ulimit -v is {soft >> 10} kB, {soft >> 20} MB)"
+
+
+def _chain(error: BaseException) -> Iterator[BaseException]:
+    seen: set[int] = set()
+    cause: BaseException | None = error
+    while cause is not None and id(cause) not in seen:
+        seen.add(id(cause))
+        yield cause
+        cause = cause.__cause__ or cause.__context__

@@ -1,0 +1,256 @@
+"""Configuration: one frozen, validated section a stage, read from a pipeline's TOML file.
+
+A key that does not exist is an error that names the file, the key and what was probably meant. Every value has a
+default, so that a stage can be called as a library function without a file.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Literal
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+RendererName = Literal["gl", "pybullet"]
+# The fastest first.
+RENDERERS: tuple[RendererName, ...] = ("gl", "pybullet")
+
+
+class Section(BaseModel):
+    """Base of every section: frozen, and unknown keys are errors."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+
+class Embodiment(Section):
+    """The drone's body (paper, section on the embodiment)."""
+
+    radius_m: float = Field(0.25, gt=0, le=10, description="radius of the collision sphere")
+    wheelbase_m: float = Field(0.25, gt=0, le=10, description="distance between opposite rotors; told to agents")
+
+
+class BuildScenesConfig(Section):
+    """`build-scenes` has nothing to set: a scene is its recipe."""
+
+
+class AnnotateImportConfig(Section):
+    """Checks of the annotation files."""
+
+    paper_counts: bool = Field(False, description="require the paper's numbers of landmarks and objects")
+
+
+class ScorerWeights(Section):
+    """How much each scorer of candidate anchors counts; one that counts nothing is not asked."""
+
+    geometric: float = Field(1.0, ge=0, description="instance mask, contrast and place in the picture")
+    clip: float = Field(0.0, ge=0, description="likeness of picture and name, by a CLIP model in ONNX files")
+    vlm: float = Field(0.0, ge=0, description="order that a multimodal model gives")
+
+    @model_validator(mode="after")
+    def _somebody_scores(self) -> ScorerWeights:
+        if not self.geometric + self.clip + self.vlm:
+            raise ValueError("one weight at least must be more than 0")
+        return self
+
+
+class ClipConfig(Section):
+    """Files of the clip scorer; relative ones lie beside the pipeline's file."""
+
+    vision: Path = Field(description="image encoder, ONNX")
+    text: Path = Field(description="text encoder, ONNX")
+    tokenizer: Path = Field(description="tokenizer.json")
+    sha256: str = Field("", description="of the three files; filled in by the command")
+
+
+class VlmConfig(Section):
+    """The vlm scorer: any endpoint that speaks OpenAI's chat protocol; its key is OPENAI_API_KEY's."""
+
+    model: str = Field(min_length=1, description="the model's name")
+    base_url: str | None = Field(None, description="where the endpoint is; OPENAI_BASE_URL, else OpenAI's own")
+    temperature: float | None = Field(0.0, ge=0, le=2, description="of its answers")
+    picture_px: int = Field(336, ge=32, le=2048, description="longest side of a picture that it is shown")
+    max_tokens: int = Field(1000, ge=16, le=1_000_000, description="longest answer")
+    timeout_s: float = Field(60.0, gt=0, le=86_400, description="longest wait for an answer")
+    retries: int = Field(4, ge=0, le=20, description="how often a failed request is sent again")
+
+
+class AnchorSampleConfig(Section):
+    """Candidate viewpoints around each object (paper: anchors)."""
+
+    standoff_m: float = Field(1.0, gt=0, le=100, description="distance from the object's surface")
+    azimuths: int = Field(16, ge=3, le=720, description="directions in the plane that candidates are placed in")
+    elevations_deg: tuple[float, ...] = Field(
+        (-15.0, 0.0, 15.0, 30.0),
+        min_length=1,
+        max_length=64,
+        description="elevations of the candidates, seen from the centroid",
+    )
+    level_heights: tuple[float, ...] = Field(
+        (0.2, 0.8),
+        max_length=64,
+        description="heights of more level candidates around a tall object, 0 bottom, 1 top",
+    )
+    margin_m: float = Field(
+        0.05, ge=0, le=10, description="free space that a candidate needs beyond the body's radius"
+    )
+    surface_points: int = Field(
+        256, ge=8, le=100_000, description="points of the object's surface that rays are cast to"
+    )
+    fov_deg: float = Field(90.0, gt=0, lt=180, description="field of view of the front camera")
+    min_visible_fraction: float = Field(0.3, ge=0, le=1, description="visible fraction below which nothing is seen")
+    pictured: int = Field(6, ge=1, le=1000, description="candidates an object that are pictured and scored")
+    picture_px: int = Field(96, ge=16, le=1024, description="edge of those pictures")
+    shortlist: int = Field(3, ge=1, le=1000, description="anchors kept an object")
+    separation_deg: float = Field(45.0, gt=0, le=180, description="wanted azimuth between kept anchors")
+    weights: ScorerWeights = ScorerWeights()
+    clip: ClipConfig | None = None
+    vlm: VlmConfig | None = None
+
+
+class ReferenceImagesConfig(Section):
+    """Pictures of the objects for image goals."""
+
+    width: int = Field(320, ge=16, le=4096, description="columns, pixels")
+    height: int = Field(320, ge=16, le=4096, description="rows, pixels")
+    fov_deg: float = Field(90.0, gt=0, lt=180, description="horizontal field of view, as the drone's camera")
+    renderer: Literal["auto", "gl", "pybullet"] = Field(
+        "auto", description="what draws; auto is the fastest that works, pybullet gives the same bytes anywhere"
+    )
+
+
+class PairObjectsConfig(Section):
+    """Candidate tasks: ordered pairs of objects times the start object's anchors."""
+
+    start_variants: int = Field(3, ge=1, le=1000, description="how many anchors of the start object may start a task")
+    min_euclidean_m: float = Field(3.0, ge=0, description="d_E at or below which no task is kept")
+    max_length_m: float = Field(100.0, gt=0, le=10_000, description="L at or above which no task is kept")
+    max_approach_m: float = Field(1.0, ge=0, le=100, description="longest straight Approach at the end of a route")
+
+
+class Rung(Section):
+    """One search of the planner's ladder."""
+
+    weight: float = Field(gt=0, le=1000, description="of the cost-to-go; 1 is plain A*")
+    budget: int = Field(ge=1, le=2_000_000, description="most expansions")
+    duplicate_cell_m: float = Field(
+        0.5, ge=0.01, le=100, description="edge of the cells in which states are duplicates"
+    )
+    heading_sectors: Literal[1, 2, 3, 4, 6, 8, 12, 24] = Field(1, description="headings told apart in a cell")
+    extra_radius_m: float = Field(0.0, ge=0, le=10, description="added to the radius while searching")
+
+
+class PlanConfig(Section):
+    """Reference trajectories."""
+
+    targets_per_part: int = Field(8, ge=1, le=100_000, description="targets whose plans share a shard")
+    cell_m: float = Field(0.5, ge=0.05, le=10, description="edge of the cells of clearance grid and cost-to-go")
+    margin_m: float = Field(0.002, ge=0, le=10, description="added to the body's radius in the search alone")
+    max_length_m: float = Field(100.0, gt=0, le=10_000, description="longest route worth planning")
+    length_slack: float = Field(
+        1.04, ge=1, le=100, description="the cost-to-go may exceed it by this: it overestimates"
+    )
+    max_approach_m: float = Field(1.0, gt=0, le=100, description="longest straight Approach at the end")
+    min_detour_ratio: float = Field(
+        0.0, ge=0, description="no search where a grid path is shorter than this times d_E"
+    )
+    action_cost_m: float = Field(
+        0.02, ge=0, le=100, description="what an action costs beside its metres: breaks ties"
+    )
+    sideways_actions_per_m: float = Field(
+        1.0, ge=0, le=1000, description="what a metre flown sideways counts as: the front camera should see the way"
+    )
+    clearance_cap_m: float = Field(5.0, gt=0, le=100, description="clearances are known up to this distance")
+    prove_by_grid: bool = Field(True, description="leave FCL unasked about legs that the grid proves free")
+    ladder: tuple[Rung, ...] = Field(
+        (
+            Rung(weight=1.05, budget=20_000),
+            Rung(weight=1.15, budget=40_000, duplicate_cell_m=0.25, heading_sectors=4, extra_radius_m=0.02),
+            Rung(weight=1.15, budget=40_000, duplicate_cell_m=0.25, heading_sectors=4),
+        ),
+        min_length=1,
+        max_length=16,
+        description="searches tried in turn until FCL accepts what one of them finds",
+    )
+
+
+class Setting(Section):
+    """One length setting (paper: Base, Standard, Long-Horizon)."""
+
+    min_length_m: float = Field(ge=0, description="smallest length that belongs to it")
+    max_length_m: float = Field(gt=0, description="smallest length that is too long for it")
+    action_budget: int = Field(ge=1, description="most actions an episode may take, Stop included")
+
+    @model_validator(mode="after")
+    def _has_room(self) -> Setting:
+        if self.min_length_m >= self.max_length_m:
+            raise ValueError(
+                f"min_length_m = {self.min_length_m:g} must be less than max_length_m = {self.max_length_m:g}"
+            )
+        return self
+
+
+class FilterConfig(Section):
+    """Which candidates become tasks (paper, section on filtering)."""
+
+    min_euclidean_m: float = Field(3.0, ge=0, description="kept: d_E greater than this")
+    min_detour_ratio: float = Field(1.05, ge=1, description="kept: κ at least this")
+    base: Setting = Setting(min_length_m=5, max_length_m=30, action_budget=90)
+    standard: Setting = Setting(min_length_m=30, max_length_m=60, action_budget=180)
+    long_horizon: Setting = Setting(min_length_m=60, max_length_m=100, action_budget=300)
+
+    @model_validator(mode="after")
+    def _settings_join(self) -> FilterConfig:
+        if (self.base.max_length_m, self.standard.max_length_m) != (
+            self.standard.min_length_m,
+            self.long_horizon.min_length_m,
+        ):
+            raise ValueError("the settings must join: base.max_length_m = standard.min_length_m, and so on")
+        budgets = (self.base.action_budget, self.standard.action_budget, self.long_horizon.action_budget)
+        if budgets != tuple(sorted(budgets)):
+            raise ValueError(f"longer routes need more actions: action_budget falls in {budgets}")
+        return self
+
+
+class SplitConfig(Section):
+    """Train and test, and which tasks the release holds."""
+
+    id_train_fraction: float = Field(0.8, ge=0, le=1, description="share of the tasks of ID scenes that train")
+    ood_train_fraction: float = Field(0.2, ge=0, le=1, description="share of the tasks of OOD scenes that train")
+    salt: str | None = Field(
+        None, min_length=16, max_length=256,
+        description="what ids of tasks and pictures are hashed with; made from the seed where absent",
+    )  # fmt: skip
+    paper_counts: bool = Field(
+        False,
+        description="release the paper's numbers of tasks, of train and test, and, as near as the kept candidates "
+        "allow, its metres of route",
+    )
+
+
+class RenderConfig(Section):
+    """Recordings along the trajectories (paper: sensors)."""
+
+    limit: int = Field(2, ge=0, description="trajectories a scene and setting; 0 for all")
+    split: Literal["train", "test", "all", "id_train", "id_test", "ood_train", "ood_test"] = Field(
+        "train", description="which tasks are recorded"
+    )
+    renderer: Literal["auto", "gl", "pybullet"] = Field(
+        "auto", description="auto: the fastest that draws a known scene right on this machine"
+    )
+    instances: bool = Field(False, description="record instance id maps too")
+    frames: Literal["video", "png"] = Field("video", description="videos, or a folder of PNG files each")
+    sampling: Literal["steps", "time"] = Field("steps", description="a frame a pose, or a constant frame rate")
+    views: tuple[Literal["front", "left", "right", "down"], ...] = Field(
+        ("front", "left", "right", "down"), min_length=1, description="cameras of the body"
+    )
+    offsets_m: dict[Literal["front", "left", "right", "down"], tuple[float, float, float]] = Field(
+        {}, description="where a view's camera sits from the body's centre: x forward, y left, z up; 0 where absent"
+    )
+    width: int = Field(640, ge=16, le=4096, multiple_of=2, description="columns, pixels")
+    height: int = Field(640, ge=16, le=4096, multiple_of=2, description="rows, pixels")
+    fov_deg: float = Field(90.0, gt=0, lt=180, description="horizontal field of view")
+    fps: float = Field(15.0, ge=0.01, le=240, description="frames a second; for steps, how fast the video plays")
+    cruise_m_s: float = Field(3.0, ge=0.01, le=1000, description="speed along the path, for sampling by time")
+    yaw_rate_deg_s: float = Field(90.0, ge=0.1, le=36_000, description="speed of turns, for sampling by time")
+    crf: int = Field(23, ge=0, le=51, description="quality of the pictures' H.264, lower is better")
+    trajectories_per_part: int = Field(8, ge=1, le=100_000, description="trajectories that share a shard")

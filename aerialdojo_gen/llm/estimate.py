@@ -1,0 +1,184 @@
+"""What an evaluation by a language model will take: requests, tokens, hours, dollars."""
+
+from __future__ import annotations
+
+import os
+import time
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pyarrow as pa
+import pyarrow.compute as pc
+
+from aerialdojo_gen.agents import InvalidAnswer, agent_class, load_agent
+from aerialdojo_gen.benchmark.flight import Flight
+from aerialdojo_gen.benchmark.tasks import read_tasks, select
+from aerialdojo_gen.errors import AerialDojoError, UsageError
+from aerialdojo_gen.llm.agent import LanguageModelAgent
+from aerialdojo_gen.store import shards as store
+
+if TYPE_CHECKING:
+    from aerialdojo_gen.benchmark.runner import Evaluation
+
+# Where nobody listens: an agent is made for its prompt alone.
+_NOBODY = "http://127.0.0.1:9/v1"
+_TASKS, _STEPS = 3, 3
+# Without a service: what an answer of a thought and an action has, and what a request takes.
+_ASSUMED_OUT, _ASSUMED_S = 60.0, 2.0
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """What an evaluation will take.
+
+    Attributes
+    ----------
+    episodes : int
+    requests : tuple of int
+        If every episode takes as many actions as its reference, and if every one spends its budget.
+    tokens_in, tokens_out, request_s, render_s : float
+        Of a request; the last is what drawing its pictures takes.
+    measured : int
+        On so many requests; 0 where nobody answered and figures are reckoned or assumed.
+    why_not : str
+        Why nothing was measured.
+    cost_usd : tuple of float, or None
+        For the two numbers of requests.
+    """
+
+    episodes: int
+    requests: tuple[int, int]
+    tokens_in: float
+    tokens_out: float
+    request_s: float
+    render_s: float
+    measured: int
+    why_not: str
+    cost_usd: tuple[float, float] | None
+
+    def lines(self, workers: int) -> list[str]:
+        """Return what to print."""
+        least, most = self.requests
+        each = f"{self.tokens_in:,.0f} tokens in, {self.tokens_out:,.0f} out, {self.request_s:.2f} s"
+        how = (
+            f"measured on {self.measured} requests: {each} each"
+            if self.measured
+            else f"not measured ({self.why_not}); reckoned from prompt and pictures, answer and time assumed: {each}"
+        )
+        # Requests wait side by side; pictures are drawn by as many cores as there are.
+        cores = max(1, min(workers, len(os.sched_getaffinity(0))))
+        a_step_s = max((self.request_s + self.render_s) / workers, self.render_s / cores)
+        hours = [n * a_step_s / 3600.0 for n in self.requests]
+        millions = [n * (self.tokens_in + self.tokens_out) / 1e6 for n in self.requests]
+        cost = "" if self.cost_usd is None else f", {self.cost_usd[0]:,.2f} to {self.cost_usd[1]:,.2f} USD"
+        return [
+            f"{self.episodes:,} episodes: {least:,} requests if each takes as many actions as its reference, "
+            f"{most:,} if each spends its budget",
+            f"{how}; pictures {self.render_s:.2f} s",
+            f"{millions[0]:,.1f} to {millions[1]:,.1f} million tokens, {hours[0]:,.1f} to {hours[1]:,.1f} hours with "
+            f"{workers} at a time{cost}",
+        ]
+
+
+def estimate(data: Path, evaluation: Evaluation) -> Estimate:
+    """Estimate an evaluation: by a few real requests where the service answers, else by reckoning.
+
+    Parameters
+    ----------
+    data : Path
+        The data directory.
+    evaluation : Evaluation
+        Of an agent that asks a language model.
+
+    Raises
+    ------
+    UsageError
+        The agent asks none, or no task fits.
+    """
+    cls = agent_class(evaluation.agent)
+    if not (isinstance(cls, type) and issubclass(cls, LanguageModelAgent)):
+        raise UsageError(f"--estimate is for agents that ask a language model, not {evaluation.agent!r}")
+    rows = select(data.absolute(), evaluation.selection)
+    agent, why_not = _made(evaluation)
+    try:
+        if not why_not:
+            try:
+                agent.check()
+            except AerialDojoError as error:
+                why_not = str(error).removeprefix("checked before the run, nothing flown: ")
+        figures = _sampled(data.absolute(), evaluation, rows, agent, asks=not why_not)
+        requests = _references(data.absolute(), rows), int(pc.sum(rows["action_budget"]).as_py())
+        tokens_in, tokens_out, request_s, render_s, n = figures
+        costs = [agent.options.cost_usd(k * tokens_in, k * tokens_out) for k in requests]
+        cost = None if costs[0] is None or costs[1] is None else (costs[0], costs[1])
+    finally:
+        agent.close()
+    return Estimate(rows.num_rows, requests, tokens_in, tokens_out, request_s, render_s, n, why_not, cost)
+
+
+def _made(evaluation: Evaluation) -> tuple[LanguageModelAgent, str]:
+    try:
+        agent, why_not = load_agent(evaluation.agent, **evaluation.options), ""
+    except UsageError as error:
+        if "no API key" not in str(error):
+            raise
+        offline = {**evaluation.options, "base_url": _NOBODY, "key_env": None}
+        agent, why_not = load_agent(evaluation.agent, **offline), str(error)
+    assert isinstance(agent, LanguageModelAgent)
+    return agent, why_not
+
+
+def _sampled(
+    data: Path, evaluation: Evaluation, rows: pa.Table, agent: LanguageModelAgent, asks: bool
+) -> tuple[float, float, float, float, int]:
+    """Fly the first steps of a few tasks; tokens in and out, seconds of a request and of its pictures, how many."""
+    sensors = evaluation.sensors or agent.sensors
+    flight = Flight(data, replace(sensors), embodiment=evaluation.embodiment, renderer=evaluation.renderer)
+    # Of one scene: making another ready takes longer than all the requests.
+    few = rows.filter(pc.equal(rows["scene"], rows["scene"][0].as_py())).slice(0, _TASKS)
+    sums = [0.0, 0.0, 0.0, 0.0]
+    requests = looks = 0
+    for task in read_tasks(data, few):
+        episode = flight.begin(task)
+        agent.reset(flight.goal)
+        for _ in range(_STEPS):
+            began = time.perf_counter()
+            observation = flight.observe()
+            # The first picture of a scene takes what making it ready takes.
+            if looks:
+                sums[3] += time.perf_counter() - began
+            looks += 1
+            if not asks:
+                sums[0] += agent.reckoned_tokens(observation)
+                continue
+            try:
+                action: int | None = agent.act(observation)
+            except InvalidAnswer:
+                action = None
+            episode.step(action)
+            if episode.termination is not None:
+                break
+        if asks:
+            used = agent.usage()
+            requests += used.requests
+            sums[0] += used.input_tokens or 0
+            sums[1] += used.output_tokens or 0
+            sums[2] += used.request_s or 0.0
+    render_s = sums[3] / max(1, looks - 1)
+    if not asks:
+        return sums[0] / looks, _ASSUMED_OUT, _ASSUMED_S, render_s, 0
+    return sums[0] / requests, sums[1] / requests, sums[2] / requests, render_s, requests
+
+
+def _references(data: Path, rows: pa.Table) -> int:
+    """Sum the actions of the references of all instances."""
+    total = 0
+    for scene in rows["scene"].unique().to_pylist():
+        mine = rows.filter(pc.equal(rows["scene"], scene))
+        for subset in mine["subset"].unique().to_pylist():
+            routes = store.read_scene(data, f"routes/{subset}", scene, ("nav_id", "n_actions"))
+            counts = dict(zip(routes["nav_id"].to_pylist(), routes["n_actions"].to_pylist(), strict=True))
+            of_subset = mine.filter(pc.equal(mine["subset"], subset))
+            total += sum(counts[nav_id] for nav_id in of_subset["nav_id"].to_pylist())
+    return total

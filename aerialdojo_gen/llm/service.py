@@ -1,0 +1,250 @@
+"""Talk to a service over HTTP within bounds of size, time and retries; tell its failures apart, and never its key."""
+
+from __future__ import annotations
+
+import importlib
+import os
+import time
+from collections.abc import Callable
+from typing import Any, TypeVar
+from urllib.parse import urlsplit
+
+from tenacity import RetryCallState, Retrying, retry_if_exception, stop_after_attempt
+
+from aerialdojo_gen.agents.base import AgentUnavailable, ServiceDown
+from aerialdojo_gen.benchmark.secrets import Secrets
+from aerialdojo_gen.errors import AerialDojoError, UsageError
+from aerialdojo_gen.llm.faults import refusal
+from aerialdojo_gen.llm.http import CONNECT_S, BodyBoundError, Meter, bounded_client, retry_after_s
+
+# A service may say when to come back; beyond this the runner's own schedule is the better one.
+MAX_WAIT_S = 60.0
+
+_CLIENTS = {"openai": "OpenAI", "anthropic": "Anthropic"}
+# By name, for the packages bring one of two generations of httpx with them.
+_NO_ROUTE = ("ConnectError", "ConnectTimeout", "ProxyError", "UnsupportedProtocol", "InvalidURL")
+
+Result = TypeVar("Result")
+
+
+def check_url(url: str) -> None:
+    """Refuse a URL that no service has, or that holds a key.
+
+    Raises
+    ------
+    ValueError
+        It is no HTTP URL.
+    UsageError
+        It holds a name, a password or a query; the message does not repeat them.
+    """
+    try:
+        parts = urlsplit(url)
+        wrong = parts.scheme not in ("http", "https") or not parts.hostname or parts.port == 0
+    except ValueError:
+        wrong = True
+    if wrong:
+        raise ValueError("not a URL like http://127.0.0.1:8000/v1")
+    # Options are written to the log of the run. Not a ValueError: its message would quote the URL.
+    if parts.username or parts.password or parts.query:
+        raise UsageError("base_url holds a name, a password or a query: keys come from the environment only")
+
+
+def api_key(variable: str, base_url: str | None) -> str:
+    """Read a key from the environment; a service of one's own may do without.
+
+    Raises
+    ------
+    UsageError
+        There is none and the service is the provider's own, or it has characters that no header may have.
+    """
+    key = os.environ.get(variable, "").strip()
+    if not key and base_url is None:
+        raise UsageError(f"no API key: set {variable} in the environment (or base_url, for a service without keys)")
+    if not (key.isascii() and key.isprintable()):
+        raise UsageError(f"{variable} has characters that no key has: copy it again")
+    return key or "none"
+
+
+class Connection:
+    """A client of a service, with its key.
+
+    Parameters
+    ----------
+    package : str
+        ``openai`` or ``anthropic``.
+    base_url : str or None
+        Where the service is; ``OPENAI_BASE_URL`` or ``ANTHROPIC_BASE_URL`` where absent, else the provider's own.
+    timeout_s : float
+        Longest wait for an answer.
+    retries : int
+        How often a failed request is sent again before the episode is given up.
+    secrets : Secrets, optional
+        What is kept out of texts besides the key.
+    key_variable : str, optional
+        Environment variable of the key, in place of the package's own.
+    model : str
+        Its model, to tell an unknown model from a picture that is not found.
+
+    Attributes
+    ----------
+    client : object
+        The package's client; its own retries are off, so that there is one place that tries again.
+    base_url : str or None
+        As found.
+    name : str
+        For messages.
+    meter : Meter
+        Requests and their times since it was last reset.
+
+    Raises
+    ------
+    UsageError
+        The package is not installed, there is no key, or the address holds one.
+    """
+
+    def __init__(
+        self,
+        package: str,
+        base_url: str | None,
+        timeout_s: float,
+        retries: int,
+        *,
+        secrets: Secrets | None = None,
+        key_variable: str | None = None,
+        model: str = "",
+    ) -> None:
+        try:
+            self._package = importlib.import_module(package)
+        except ImportError:
+            extra = "pip install 'aerialdojo-gen[llm]'"
+            raise UsageError(f"the {package} agent needs the package {package}: {extra}") from None
+        variable = f"{package.upper()}_BASE_URL"
+        self.base_url = base_url or os.environ.get(variable) or None
+        if self.base_url:
+            try:
+                check_url(self.base_url)
+            except ValueError as error:
+                raise UsageError(f"{'base_url' if base_url else variable} is {error}") from None
+        self._key = api_key(key_variable or f"{package.upper()}_API_KEY", self.base_url if not key_variable else None)
+        self._secrets = secrets or Secrets()
+        self._timeout_s, self._retries, self._model = timeout_s, retries, model
+        self.name = self.base_url or _CLIENTS[package]
+        self.meter = Meter()
+        timeout = self._package.Timeout(timeout_s, connect=min(timeout_s, CONNECT_S))
+        self.client = getattr(self._package, _CLIENTS[package])(
+            api_key=self._key,
+            base_url=self.base_url,
+            max_retries=0,
+            timeout=timeout,
+            http_client=bounded_client(self._package.DefaultHttpxClient, timeout, timeout_s, self.meter),
+        )
+
+    def call(self, ask: Callable[[Any], Result], retries: int | None = None) -> Result:
+        """Send a request; send it again where that may help.
+
+        Parameters
+        ----------
+        ask : callable
+            Takes the client, returns what the package makes of the answer.
+        retries : int, optional
+            In place of the connection's own.
+
+        Returns
+        -------
+        object
+            What `ask` returns.
+
+        Raises
+        ------
+        AgentUnavailable
+            This request failed: time-out, 429, 5xx, a lost connection, a content filter, a context too long, a
+            request that is refused, an answer too large or of another protocol.
+        ServiceDown
+            Nobody listens, or there is no route.
+        UsageError
+            Every request would be refused: a wrong key, no such model.
+        """
+        again = Retrying(
+            stop=stop_after_attempt(1 + (self._retries if retries is None else retries)),
+            wait=_wait_s,
+            retry=retry_if_exception(_worth_another_try),
+            sleep=lambda seconds: time.sleep(seconds),
+            reraise=True,
+        )
+        return again(self._once, ask)
+
+    def _once(self, ask: Callable[[Any], Result]) -> Result:
+        try:
+            return ask(self.client)
+        except self._package.APIError as error:
+            failure = self._failure(error)
+        except BodyBoundError as error:
+            # One of the packages wraps what its client raises, the other lets it through.
+            failure = self._bound(error)
+        raise failure from None
+
+    def not_understood(self, what: str) -> AgentUnavailable:
+        """Make the error for an answer that is not what the protocol says."""
+        return AgentUnavailable(
+            f"{self.name}: its answer is no {what}: is base_url right?", kind="malformed answer", again=False
+        )
+
+    def filtered(self) -> AgentUnavailable:
+        """Make the error for an answer that the service's content filter has taken away."""
+        return AgentUnavailable(
+            f"{self.name}: its content filter took the answer away", kind="content filter", again=False
+        )
+
+    def clean(self, text: str) -> str:
+        """Return a text without keys, should the service have sent one back, and without lone surrogates."""
+        # No file and no request can hold half of a surrogate pair.
+        text = text.encode("utf-8", "replace").decode("utf-8")
+        text = text.replace(self._key, "[key]") if len(self._key) > 4 else text
+        return self._secrets.text(text)
+
+    def close(self) -> None:
+        """Close the connections."""
+        self.client.close()
+
+    def _bound(self, error: BodyBoundError) -> AgentUnavailable:
+        late = "complete" in str(error)
+        kind = "time-out" if late else "malformed answer"
+        return AgentUnavailable(f"{self.name}: {self.clean(str(error))}", kind=kind, again=late)
+
+    def _failure(self, error: Any) -> AerialDojoError:
+        if isinstance(error, self._package.APIStatusError):
+            body = getattr(error, "body", None)
+            said = self._line(body or error.message)
+            after_s = retry_after_s(error.response.headers)
+            return refusal(error.status_code, body, said, self.name, self._model, after_s)
+        cause = error.__cause__ or error
+        if isinstance(cause, BodyBoundError):
+            return self._bound(cause)
+        said = self._line(str(cause) or type(cause).__name__)
+        if type(cause).__name__ in _NO_ROUTE:
+            return ServiceDown(f"{self.name}: {said}: is the service there, and is base_url right?")
+        if isinstance(error, self._package.APITimeoutError):
+            return AgentUnavailable(f"{self.name}: no answer within {self._timeout_s:g} s", kind="time-out")
+        return AgentUnavailable(f"{self.name}: {said}", kind="connection lost")
+
+    def _line(self, value: Any) -> str:
+        if isinstance(value, dict):
+            inner = value.get("error", value)
+            value = inner.get("message", inner) if isinstance(inner, dict) else inner
+        # The key goes before the text is cut: half a key is too much as well.
+        lines = self.clean(str(value)).strip().splitlines()
+        return " ".join((lines[0] if lines else "").split())[:300]
+
+
+def _worth_another_try(error: BaseException) -> bool:
+    if isinstance(error, AgentUnavailable):
+        # An answer cut on its way may come whole the next time; a refusal is one for good.
+        worth = error.again or error.kind == "malformed answer"
+        return worth and (error.retry_after_s or 0.0) <= MAX_WAIT_S
+    return isinstance(error, ServiceDown)
+
+
+def _wait_s(state: RetryCallState) -> float:
+    error = state.outcome.exception() if state.outcome is not None else None
+    asked = error.retry_after_s if isinstance(error, AgentUnavailable) else None
+    return asked if asked is not None else min(2.0 ** (state.attempt_number - 1), MAX_WAIT_S)

@@ -1,0 +1,1 @@
+"""How stages run: what a stage is, their order, which shards are stale, executors, progress, Ctrl-C."""

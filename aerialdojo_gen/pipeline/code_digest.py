@@ -1,0 +1,306 @@
+"""Digests of the code that makes something: what a module imports of this package, and the libraries' versions.
+
+A module counts as a whole, with everything that it imports, however far away. Comments, docstrings and the layout of
+the source do not. What merely carries rows about (`PLUMBING`) ends the search, except for the definitions in it that
+decide what is written: those are listed, and count with what they refer to.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import json
+import os
+import sys
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from functools import cache, cached_property
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+from aerialdojo_gen.errors import AssetError
+from aerialdojo_gen.pipeline.code_facts import Definition, Edge, Facts, module_facts
+
+# Modules of which the named definitions count, and nothing else. A configuration's values count, not its classes.
+PLUMBING: dict[str, tuple[str, ...]] = {
+    "aerialdojo_gen": (),
+    "aerialdojo_gen.benchmark": (),
+    "aerialdojo_gen.common": (),
+    "aerialdojo_gen.common.trouble": (),
+    "aerialdojo_gen.config": (),
+    "aerialdojo_gen.config.agreement": (),
+    "aerialdojo_gen.config.explain": (),
+    "aerialdojo_gen.config.pipeline": (),
+    "aerialdojo_gen.config.sections": (),
+    "aerialdojo_gen.errors": (),
+    "aerialdojo_gen.pipeline": (),
+    "aerialdojo_gen.pipeline.code_digest": (),
+    "aerialdojo_gen.pipeline.code_facts": (),
+    "aerialdojo_gen.pipeline.executors": (),
+    "aerialdojo_gen.pipeline.executors.local": (),
+    "aerialdojo_gen.pipeline.fingerprint": (),
+    "aerialdojo_gen.pipeline.freshness": (),
+    "aerialdojo_gen.pipeline.interrupt": (),
+    "aerialdojo_gen.pipeline.progress": (),
+    "aerialdojo_gen.pipeline.registry": (),
+    "aerialdojo_gen.pipeline.runner": (),
+    "aerialdojo_gen.pipeline.stage": ("Job",),
+    "aerialdojo_gen.store": (),
+    "aerialdojo_gen.store.atomic": (),
+    "aerialdojo_gen.store.files": (),
+    "aerialdojo_gen.store.footers": (),
+    "aerialdojo_gen.store.parquet_files": ("write_clustered",),
+    "aerialdojo_gen.store.schemas": ("*",),
+    "aerialdojo_gen.store.shards": ("partition", "check_scene_name"),
+    "aerialdojo_gen.store.staging": (),
+}
+# What writes every stage's rows.
+_WRITERS = (Edge("aerialdojo_gen.store.parquet_files", "write_clustered"), Edge("aerialdojo_gen.store.tables"))
+
+# Modules that import what their caller names; what that can be stands in the configuration.
+DYNAMIC = frozenset({"aerialdojo_gen.llm.service", "aerialdojo_gen.agents.load"})
+
+# Files that modules read, relative to the package. Those outside of it are sources of the stages.
+DATA_FILES = {"aerialdojo_gen.annotations.phrases": "annotations/phrases/*.toml"}
+
+# Where the package that is installed is not called what is imported; several may provide it.
+_DISTRIBUTIONS = {
+    "cv2": ("opencv-python-headless", "opencv-python", "opencv-contrib-python-headless", "opencv-contrib-python"),
+    "fcl": ("python-fcl",),
+    # Numba's code generator rounds as it likes; what PyBullet and moderngl draw with stands in their pictures' rows.
+    "numba": ("numba", "llvmlite"),
+}
+# They check values or show progress: what passes through them is the same in every version.
+_SHAPELESS = frozenset({"pydantic", "pydantic_core", "tqdm", "typer", "typing_extensions"})
+
+
+@dataclass(frozen=True)
+class Code:
+    """The code that makes something.
+
+    Attributes
+    ----------
+    parts : dict of str to str
+        Digests by module, or by ``module:definition`` where the module is plumbing, or by file.
+    libraries : dict of str to str
+        Versions of the third-party packages imported by it; empty where one is not installed.
+    """
+
+    parts: dict[str, str]
+    libraries: dict[str, str]
+
+    @cached_property
+    def digest(self) -> str:
+        """SHA-256 of it all, hexadecimal."""
+        return hashlib.sha256(json.dumps(asdict(self), sort_keys=True).encode()).hexdigest()
+
+
+@cache
+def code_of(module: str) -> Code:
+    """Return the code that a module of the running package consists of, as it is when first asked in this process."""
+    return _running().of(module)
+
+
+@cache
+def _running() -> Package:
+    return Package(Path(__file__).parents[1])
+
+
+def stage_code(stage: str) -> Code:
+    """Return the code of a stage, by the stage's name."""
+    return code_of(stage_module(stage))
+
+
+def stage_module(stage: str) -> str:
+    """Name the module of a stage."""
+    return f"aerialdojo_gen.stages.{stage.replace('-', '_')}"
+
+
+class Package:
+    """The sources of a copy of this package.
+
+    Parameters
+    ----------
+    folder : Path
+        The package's; ``__pycache__`` in it keeps what reading the sources gave, by their content.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self._folder, self._name = folder, folder.name
+        self._cache = _Cache(folder / "__pycache__" / "code-facts.json")
+        self._facts: dict[str, Facts] = {}
+        self._paths = {_module_name(path.relative_to(folder.parent)): path for path in sorted(folder.rglob("*.py"))}
+
+    def of(self, module: str) -> Code:
+        """Return the code that a module consists of.
+
+        Raises
+        ------
+        AssetError
+            A source is missing.
+        RuntimeError
+            A module imports what cannot be told from its source.
+        """
+        search = _Search(self)
+        for edge in (Edge(module), *_WRITERS):
+            search.follow(edge)
+        self._cache.save()
+        return Code(dict(sorted(search.parts.items())), {name: _version(name) for name in sorted(search.libraries)})
+
+    def contains(self, module: str) -> bool:
+        """Whether a module is one of the package's, by its absolute name."""
+        return module in self._paths
+
+    def belongs(self, module: str) -> bool:
+        """Whether a name is that of a module of the package, be it there or not."""
+        return module.split(".")[0] == self._name
+
+    def modules_in(self, package: str) -> list[str]:
+        """Name the modules right below a package."""
+        return [module for module in self._paths if module.rpartition(".")[0] == package]
+
+    def facts(self, module: str) -> Facts:
+        """Read a module; AssetError where its source is missing."""
+        if module not in self._facts:
+            path = self._paths.get(module)
+            if path is None:
+                raise AssetError(f"the source of {module} is missing from {self._folder}: install the package again")
+            source = path.read_bytes()
+            self._facts[module] = self._cache.facts(source, module, path.stem == "__init__")
+        return self._facts[module]
+
+    def data_files(self, module: str) -> Iterator[tuple[str, str]]:
+        """Yield name and SHA-256 of the files in the package that a module reads."""
+        for path in sorted(self._folder.glob(DATA_FILES[module])) if module in DATA_FILES else ():
+            yield path.relative_to(self._folder).as_posix(), hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def _module_name(path: Path) -> str:
+    return ".".join((path.parent if path.stem == "__init__" else path.with_suffix("")).parts)
+
+
+class _Search:
+    """Follows imports from where it is put."""
+
+    def __init__(self, package: Package) -> None:
+        self._package = package
+        self.parts: dict[str, str] = {}
+        self.libraries: set[str] = set()
+        self._seen: set[Edge] = set()
+
+    def follow(self, first: Edge) -> None:
+        """Count what is imported, and what that imports."""
+        waiting = [first]
+        while waiting:
+            edge = waiting.pop()
+            if edge in self._seen:
+                continue
+            self._seen.add(edge)
+            if not self._package.belongs(edge.module):
+                if edge.module not in sys.stdlib_module_names and edge.module not in _SHAPELESS:
+                    self.libraries.add(edge.module)
+            elif edge.name == "**":
+                waiting += [Edge(module) for module in self._package.modules_in(edge.module)]
+            elif edge.name and self._package.contains(f"{edge.module}.{edge.name}"):
+                waiting += [Edge(edge.module), Edge(f"{edge.module}.{edge.name}", "", edge.uses)]
+            else:
+                names = (edge.name,) if edge.name else edge.uses
+                waiting += self._enter(edge.module, names)
+
+    def _enter(self, module: str, names: tuple[str, ...]) -> Iterator[Edge]:
+        above = module.rpartition(".")[0]
+        if above:
+            yield Edge(above)
+        if module in PLUMBING:
+            yield from self._definitions(module, names)
+        elif module not in self.parts:
+            facts = self._package.facts(module)
+            if facts.unknown and module not in DYNAMIC:
+                raise RuntimeError(f"{module} imports {', '.join(facts.unknown)}: its source does not tell what")
+            self.parts[module] = facts.digest
+            self.parts.update(self._package.data_files(module))
+            yield from facts.edges
+
+    def _definitions(self, module: str, names: tuple[str, ...]) -> Iterator[Edge]:
+        counted = PLUMBING[module]
+        if not counted:
+            return
+        known = self._package.facts(module).definitions
+        allowed = set(known) if counted == ("*",) else set(counted)
+        waiting = sorted(allowed if "*" in names else allowed & set(names))
+        while waiting:
+            name = waiting.pop()
+            if name in known and f"{module}:{name}" not in self.parts:
+                self.parts[f"{module}:{name}"] = known[name].digest
+                waiting += known[name].names
+                yield from known[name].edges
+
+
+class _Cache:
+    """Facts of sources that were read before, in a file; one that is damaged, or cannot be written, is none."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        # Facts that another reader of sources gave would be other facts.
+        self._reader = hashlib.sha256(Path(__file__).with_name("code_facts.py").read_bytes()).digest()
+        self._entries: dict[str, Any] = {}
+        self._changed = False
+        with contextlib.suppress(OSError, ValueError):
+            checksum, text = path.read_bytes().split(b"\n", 1)
+            if checksum == self._checksum(text):
+                self._entries = json.loads(text)
+
+    def facts(self, source: bytes, module: str, is_package: bool) -> Facts:
+        """Return a source's facts."""
+        digest = hashlib.sha256(source).hexdigest()
+        by_definition = bool(PLUMBING.get(module))
+        key = [digest, by_definition]
+        entry = self._entries.get(module)
+        if entry is None or entry["key"] != key:
+            facts = module_facts(source, module, is_package, by_definition)
+            self._entries[module] = {"key": key, "facts": asdict(facts)}
+            self._changed = True
+            return facts
+        return _facts(entry["facts"])
+
+    def save(self) -> None:
+        """Write the file, where something came to it."""
+        if not self._changed:
+            return
+        self._changed = False
+        text = json.dumps(self._entries).encode()
+        temporary = self._path.with_name(f".{self._path.name}.{os.getpid()}.tmp")
+        with contextlib.suppress(OSError):
+            self._path.parent.mkdir(exist_ok=True)
+            temporary.write_bytes(self._checksum(text) + b"\n" + text)
+            temporary.replace(self._path)
+
+    def _checksum(self, text: bytes) -> bytes:
+        return hashlib.sha256(self._reader + text).hexdigest().encode()
+
+
+def _facts(raw: dict[str, Any]) -> Facts:
+    return Facts(
+        raw["digest"],
+        _edges(raw["edges"]),
+        {
+            name: Definition(d["digest"], tuple(d["names"]), _edges(d["edges"]))
+            for name, d in raw["definitions"].items()
+        },
+        tuple(raw["unknown"]),
+    )
+
+
+def _edges(raw: list[dict[str, Any]]) -> tuple[Edge, ...]:
+    return tuple(Edge(edge["module"], edge["name"], tuple(edge["uses"])) for edge in raw)
+
+
+@cache
+def _version(library: str) -> str:
+    """Version of a library, by the name that is imported; empty where it is not installed."""
+    found = []
+    for name in _DISTRIBUTIONS.get(library, (library,)):
+        with contextlib.suppress(metadata.PackageNotFoundError):
+            found.append(f"{name} {metadata.version(name)}")
+    return ", ".join(found)

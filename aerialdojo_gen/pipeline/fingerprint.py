@@ -1,0 +1,103 @@
+"""Fingerprints: what a shard was made from, as one hash."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from functools import cache, lru_cache
+from pathlib import Path
+from typing import Any
+
+from aerialdojo_gen.common import paper
+from aerialdojo_gen.config.pipeline import Pipeline
+from aerialdojo_gen.config.sections import Section
+from aerialdojo_gen.errors import AssetError
+from aerialdojo_gen.pipeline.code_digest import stage_code
+from aerialdojo_gen.pipeline.stage import Roots, Stage
+from aerialdojo_gen.store import shards as store
+from aerialdojo_gen.store.files import file_digest
+
+
+def scene_fingerprint(stage: Stage, pipeline: Pipeline, roots: Roots, scene: str) -> str:
+    """Hash all that the shards of a scene depend on.
+
+    Inputs count by their content, not by their own fingerprint: where an upstream stage ran again and wrote the
+    same rows, nothing downstream is stale. The code counts as `aerialdojo_gen.pipeline.code_digest` finds it, with
+    the versions of the libraries that it imports; no absolute path counts.
+
+    Parameters
+    ----------
+    stage : Stage
+        The stage that writes.
+    pipeline : Pipeline
+        Its section, the seed and the embodiment count.
+    roots : Roots
+        Where the inputs and assets are.
+    scene : str
+        Name of the scene.
+
+    Returns
+    -------
+    str
+        Hexadecimal SHA-256.
+
+    Raises
+    ------
+    StoreError, AssetError
+        An input or an asset is missing or damaged.
+    """
+    code = stage_code(stage.name)
+    # The paper's figures lie beside the package in a checkout, inside it in a wheel.
+    carried = paper.files() if "aerialdojo_gen.common.paper" in code.parts else []
+    sources = [*stage.sources(roots, scene), *carried]
+    facts = {
+        "stage": stage.name,
+        "code": code.digest,
+        "scene": scene,
+        "seed": pipeline.seed,
+        "embodiment": pipeline.embodiment.model_dump(mode="json"),
+        "config": _values(pipeline.section(stage.name)),
+        "schemas": {name: _described(name) for name in (*stage.writes, *stage.reads)},
+        "inputs": {table: store.content(roots.data, table, scene) for table in stage.reads},
+        "assets": [[_short(path, roots), _digest(path)] for path in sources],
+    }
+    return hashlib.sha256(json.dumps(facts, sort_keys=True).encode()).hexdigest()
+
+
+@lru_cache(maxsize=4096)
+def _short(path: Path, roots: Roots) -> str:
+    """Name a file by its place in its folder: the same in a checkout, in a wheel, and in a checkout elsewhere."""
+    for name in ("recipes", "scene_assets", "annotations"):
+        folder = getattr(roots, name)
+        if path.is_relative_to(folder):
+            return f"{name}/{path.relative_to(folder).as_posix()}"
+    return path.name
+
+
+def _digest(path: Path) -> str:
+    try:
+        return file_digest(path)
+    except OSError as error:
+        raise AssetError(f"cannot read {path}: {error.strerror}") from None
+
+
+def _values(section: Section) -> dict[str, Any]:
+    """Values of a section, without its paths: the files behind them count by their bytes."""
+
+    def without_paths(value: Any) -> Any:
+        if isinstance(value, dict):
+            return {key: without_paths(inner) for key, inner in value.items() if not isinstance(inner, Path)}
+        return value
+
+    values: dict[str, Any] = without_paths(section.model_dump())
+    return values
+
+
+@cache
+def _described(table: str) -> list[Any]:
+    spec = store.LAYOUT[table].spec
+    fields = [
+        [str(field), sorted((k.decode(), v.decode()) for k, v in (field.metadata or {}).items())]
+        for field in spec.schema
+    ]
+    return [fields, spec.key, spec.clusters, spec.plain]

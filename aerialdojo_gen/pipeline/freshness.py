@@ -1,0 +1,181 @@
+"""Which shards of a stage are fresh, and which are to be computed.
+
+A shard is fresh if all its tables and files are there, whole, and were made by the same code from the same inputs and
+configuration: its fingerprint tells.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from aerialdojo_gen.config.pipeline import Pipeline
+from aerialdojo_gen.config.sections import Section
+from aerialdojo_gen.errors import AerialDojoError, StoreError
+from aerialdojo_gen.pipeline.code_digest import stage_code
+from aerialdojo_gen.pipeline.executors.local import Task
+from aerialdojo_gen.pipeline.fingerprint import scene_fingerprint
+from aerialdojo_gen.pipeline.progress import Reporter
+from aerialdojo_gen.pipeline.stage import Job, Roots, Stage
+from aerialdojo_gen.store import shards as store
+from aerialdojo_gen.store.files import file_digest, is_whole, sha256_of
+from aerialdojo_gen.store.footers import ShardFile
+from aerialdojo_gen.store.parquet_files import read_file
+
+
+@dataclass(frozen=True)
+class Limits:
+    """How much of a stage is computed now, and how closely what is there is looked at.
+
+    What is left out is computed when the command is given again.
+
+    Attributes
+    ----------
+    share : (int, int)
+        ``(i, n)``: every n-th shard, from the i-th on. The shares of n machines, copied into one folder, are what one
+        machine writes.
+    deadline : float or None
+        Seconds since the epoch after which nothing further is begun.
+    verify : bool
+        Files count as whole if their digests are right, not their sizes alone.
+    """
+
+    share: tuple[int, int] = (0, 1)
+    deadline: float | None = None
+    verify: bool = False
+
+
+@dataclass(frozen=True)
+class Shards:
+    """A stage's shards under one configuration.
+
+    Attributes
+    ----------
+    tasks : list of Task
+        What is to be computed.
+    fresh : list of dict
+        The summaries of what need not be.
+    errors : list of AerialDojoError
+        Scenes whose inputs are missing or damaged.
+    """
+
+    tasks: list[Task]
+    fresh: list[dict[str, Any]]
+    errors: list[AerialDojoError]
+
+    @property
+    def all_fresh(self) -> bool:
+        """Whether nothing is to be computed."""
+        return not self.tasks and not self.errors
+
+
+def shards_of(
+    stage: Stage,
+    config: Section,
+    scenes: Sequence[str],
+    pipeline: Pipeline,
+    roots: Roots,
+    force: bool,
+    reporter: Reporter,
+    limits: Limits,
+) -> Shards:
+    """Find out which of a stage's shards are fresh, and remove what is none of them.
+
+    Parameters
+    ----------
+    stage, config : Stage, Section
+        The stage, and its section as it is settled.
+    scenes : sequence of str
+        Names of the scenes.
+    pipeline, roots : Pipeline, Roots
+        The other sections, the seed, the folders.
+    force : bool
+        None counts as fresh.
+    reporter : Reporter
+        Is told of what is damaged.
+    limits : Limits
+        Shards beyond the share are left out.
+    """
+    pipeline = pipeline.model_copy(update={stage.name.replace("-", "_"): config})
+    found = Shards([], [], [])
+    shard = -1
+    for scene in scenes:
+        try:
+            fingerprint = scene_fingerprint(stage, pipeline, roots, scene)
+            parts = stage.parts(roots.data, scene, config)
+        except AerialDojoError as error:
+            found.errors.append(error)
+            continue
+        for table in stage.writes:
+            store.prune(roots.data, table, scene, parts)
+        for part in range(parts):
+            shard += 1
+            if shard % limits.share[1] != limits.share[0]:
+                continue
+            here = (stage, roots.data, scene, part)
+            summary = None if force else _fresh(*here, parts, fingerprint, reporter)
+            if summary is not None and limits.verify and not _verified(*here, reporter):
+                summary = None
+            if summary is not None:
+                found.fresh.append(summary)
+            else:
+                whole = Job(stage.name, scene, part, parts, pipeline.seed, pipeline.embodiment, roots)
+                code = stage_code(stage.name).digest
+                job = replace(whole, deadline=limits.deadline, force=force, verify=limits.verify, code=code)
+                found.tasks.append(Task(job, config, fingerprint))
+    return found
+
+
+def _fresh(
+    stage: Stage, data: Path, scene: str, part: int, parts: int, fingerprint: str, reporter: Reporter
+) -> dict[str, Any] | None:
+    """Return the shard's stored summary if all its tables and files are there and up to date."""
+    summary = None
+    for table in stage.writes:
+        path = store.shard_path(data, table, scene, part)
+        if not path.exists():
+            return None
+        try:
+            info = store.read_info(path)
+        except StoreError as error:
+            reporter.line(f"{str(error).split(':', 1)[0]}: computed again")
+            return None
+        if info is None or info.fingerprint != fingerprint or info.parts != parts:
+            return None
+        for relative, written in info.files.items():
+            if not _whole(data / relative, written):
+                reporter.line(f"{data / relative} is missing or damaged: computed again")
+                return None
+        summary = info.summary
+    return summary
+
+
+def _whole(path: Path, written: ShardFile) -> bool:
+    """Whether a file has the bytes that were written, or their number where the footer says no more."""
+    try:
+        return is_whole(path, written.size) and (not written.sha256 or file_digest(path) == written.sha256)
+    except OSError:
+        return False
+
+
+def _verified(stage: Stage, data: Path, scene: str, part: int, reporter: Reporter) -> bool:
+    """Whether the files that a fresh shard names have the digests that it says."""
+    if stage.digests is None:
+        return True
+    table, *columns = stage.digests
+    try:
+        rows = read_file(store.shard_path(data, table, scene, part), columns)
+    except StoreError as error:
+        reporter.line(f"{error}: computed again")
+        return False
+    for relative, digest in zip(*(rows.column(name).to_pylist() for name in columns), strict=True):
+        try:
+            same = sha256_of(data / relative) == digest
+        except OSError:
+            same = False
+        if not same:
+            reporter.line(f"{data / relative} has other content than was written: computed again")
+            return False
+    return True

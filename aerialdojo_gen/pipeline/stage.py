@@ -1,0 +1,212 @@
+"""What a stage is, and the stages in their order.
+
+A stage's work is a plain function ``run(job, config) -> Output`` in its module under `aerialdojo_gen.stages`. What
+the runner must know without importing that module (and with it numba, FCL or PyBullet) stands here.
+"""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager
+from dataclasses import dataclass, field
+from functools import lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from aerialdojo_gen.config.sections import Embodiment
+from aerialdojo_gen.pipeline.code_digest import stage_module
+from aerialdojo_gen.store import shards as store
+from aerialdojo_gen.store.atomic import atomic_file
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+    from aerialdojo_gen.scenes.model import Scene
+
+
+@dataclass(frozen=True)
+class Roots:
+    """The folders that a run works with.
+
+    Attributes
+    ----------
+    data : Path
+        The data directory: every table and file that stages write.
+    scene_assets : Path
+        Props and materials.
+    recipes : Path
+        Recipes, one TOML file a scene.
+    annotations : Path
+        Annotation files.
+    """
+
+    data: Path
+    scene_assets: Path
+    recipes: Path
+    annotations: Path
+
+
+@dataclass(frozen=True)
+class Output:
+    """What a stage's function returns for one shard.
+
+    Attributes
+    ----------
+    tables : dict of str to pyarrow.Table
+        Every table that the stage writes, also where it has no rows; rows sorted by the table's key.
+    rows_in, rows_out : int
+        For the summary line.
+    counts : dict of str to int
+        Why rows were rejected, or what became of them: stable words, for the summary line.
+    """
+
+    tables: dict[str, pa.Table]
+    rows_in: int
+    rows_out: int
+    counts: dict[str, int] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Job:
+    """One shard's work: where it reads, what it is a part of, and the pipeline's seed.
+
+    Attributes
+    ----------
+    stage, scene : str
+        Name of the stage and of the scene.
+    part, parts : int
+        Which part of the scene's work this is, and how many there are.
+    seed : int
+        Seed of the pipeline, for `aerialdojo_gen.common.rng.generator`.
+    embodiment : Embodiment
+        The drone's body.
+    roots : Roots
+        The folders.
+    files : list of str
+        Files that the shard owns, relative to the data directory; the stage adds them.
+    digested : list of str
+        Those of them whose digests the shard's footer keeps, to be fresh by; the others' stand in its rows.
+    deadline : float, optional
+        Seconds since the epoch after which a stage of long shards begins nothing new, and raises BudgetSpent.
+    force : bool
+        Whether the stage makes anew what it finds finished.
+    code : str
+        Digest of the stage's code, for what a stage itself finds finished.
+    verify : bool
+        Whether it compares the digests of the files that it finds finished.
+    """
+
+    stage: str
+    scene: str
+    part: int
+    parts: int
+    seed: int
+    embodiment: Embodiment
+    roots: Roots
+    files: list[str] = field(default_factory=list, compare=False)
+    digested: list[str] = field(default_factory=list, compare=False)
+    deadline: float | None = None
+    force: bool = False
+    code: str = ""
+    verify: bool = False
+
+    def read(self, table: str) -> pa.Table:
+        """Read all of this scene's rows of a table; StoreError names a missing or damaged shard."""
+        return store.read_scene(self.roots.data, table, self.scene)
+
+    def scene_model(self) -> Scene:
+        """Read the scene's mesh (kept in memory between the jobs of a process)."""
+        row = self.read("scenes").to_pylist()[0]
+        return _scene_model(self.roots.data / row["mesh_path"], row["mesh_sha256"])
+
+    def output_file(self, relative: str) -> AbstractContextManager[Path]:
+        """Open a file output: a temporary path that takes its name when the block ends without an error.
+
+        Parameters
+        ----------
+        relative : str
+            Path relative to the data directory; it must stay inside it.
+
+        Returns
+        -------
+        context manager of Path
+            The temporary path to write to, with the same suffix.
+        """
+        self.files.append(relative)
+        self.digested.append(relative)
+        return atomic_file(self.roots.data, relative)
+
+
+@lru_cache(maxsize=2)
+def _scene_model(path: Path, sha256: str) -> Scene:
+    from aerialdojo_gen.scenes.glb import read_glb
+
+    return read_glb(path, sha256)
+
+
+def _one_part(_data: Path, _scene: str, _config: Any) -> int:
+    return 1
+
+
+def _no_check(_data: Path, _scenes: Sequence[str], _config: Any) -> None:
+    pass
+
+
+def _as_it_is(config: Any, _say: Callable[[str], None]) -> Any:
+    return config
+
+
+def _no_choice(_config: Any) -> list[Any]:
+    return []
+
+
+def _no_sources(_roots: Roots, _scene: str) -> list[Path]:
+    return []
+
+
+@dataclass(frozen=True)
+class Stage:
+    """A stage of the pipeline.
+
+    Attributes
+    ----------
+    name : str
+        The command's name, e.g. ``"anchor-sample"``.
+    help : str
+        One line for the command line.
+    reads, writes : tuple of str
+        Tables (keys of `aerialdojo_gen.store.shards.LAYOUT`), one scene of each.
+    parts : callable
+        ``(data, scene, config) -> int``: number of shards of a scene; may read upstream tables.
+    sources : callable
+        ``(roots, scene) -> list of Path``: files of the scene, outside the store, whose bytes the result depends on.
+    check : callable
+        ``(data, scenes, config)``: raises an `AerialDojoError` where the inputs of all scenes together will not do,
+        before anything is written.
+    settle : callable
+        ``(config, say) -> config``: decides what the configuration leaves to the machine, so that the decision is
+        part of the fingerprint, and says it in a line.
+    choices : callable
+        ``config -> list of config``: what `settle` may make of it, where deciding takes time. Where all shards are
+        fresh by one of them nothing is decided anew.
+    digests : (str, str, str), optional
+        A table that the stage writes and its columns with the path of a file (or folder) and the SHA-256 of it.
+    """
+
+    name: str
+    help: str
+    reads: tuple[str, ...]
+    writes: tuple[str, ...]
+    parts: Callable[[Path, str, Any], int] = _one_part
+    sources: Callable[[Roots, str], list[Path]] = _no_sources
+    check: Callable[[Path, Sequence[str], Any], None] = _no_check
+    settle: Callable[[Any, Callable[[str], None]], Any] = _as_it_is
+    choices: Callable[[Any], list[Any]] = _no_choice
+    digests: tuple[str, str, str] | None = None
+
+    def load(self) -> Callable[[Job, Any], Output]:
+        """Import the stage's module and return its ``run``."""
+        module = importlib.import_module(stage_module(self.name))
+        run: Callable[[Job, Any], Output] = module.run
+        return run

@@ -1,0 +1,49 @@
+"""Figures of a release, as PNG and SVG: what it consists of, lengths, detours, categories, names, maps."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from aerialdojo_gen.stats.figures.charts import composition, detours, lengths
+from aerialdojo_gen.stats.figures.cloud import categories, names
+from aerialdojo_gen.stats.figures.maps import maps
+from aerialdojo_gen.stats.figures.shares import shares
+from aerialdojo_gen.stats.figures.style import Routes, read_routes, save
+
+__all__ = ["draw_figures"]
+
+
+def draw_figures(data: Path, scenes: Sequence[str], folder: Path) -> list[Path]:
+    """Draw all figures.
+
+    Parameters
+    ----------
+    data : Path
+        The data directory; without a scene's mesh its map has no ground.
+    scenes : sequence of str
+        Scenes of the release.
+    folder : Path
+        Where they are written; made where it is missing.
+
+    Returns
+    -------
+    list of Path
+        ``<figure>.png`` and ``<figure>.svg``; the same release gives the same bytes.
+
+    Raises
+    ------
+    StoreError
+        A part of the release is missing or damaged, or the folder cannot be written.
+    """
+    routes: Routes = read_routes(data, scenes)
+    figures = {
+        "composition": composition(routes),
+        "shares": shares(routes),
+        "lengths": lengths(routes),
+        "detours": detours(routes),
+        "categories": categories(data, scenes),
+        "names": names(data, scenes),
+        "maps": maps(data, scenes),
+    }
+    return [path for name, figure in figures.items() for path in save(figure, folder, name)]

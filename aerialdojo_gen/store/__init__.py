@@ -1,0 +1,1 @@
+"""Tables on the disk: schemas, places, shards, and writes that are whole or not there."""

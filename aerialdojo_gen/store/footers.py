@@ -1,0 +1,152 @@
+"""What a shard's footer says of it, as JSON with a checksum of its own: a damaged one is told from a true one.
+
+Parquet's page checksums cover the rows and not the footer, so that what stands there must vouch for itself.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from aerialdojo_gen.common.bounded import loads_json
+from aerialdojo_gen.errors import Malformed
+
+_KEYS = frozenset({"fingerprint", "content", "columns", "rows", "parts", "summary", "files", "checksum"})
+# Of a footer that vouches for nothing; logs and releases of then are still read.
+_EARLIER_KEYS = _KEYS - {"columns", "checksum"}
+_DIGEST = re.compile(r"[0-9a-f]{64}")
+_HALF_DIGEST = re.compile(r"[0-9a-f]{32}")
+
+
+@dataclass(frozen=True)
+class ShardFile:
+    """A file that was written with a shard.
+
+    Attributes
+    ----------
+    size : int
+        Bytes.
+    sha256 : str
+        Hexadecimal; empty where the shard's rows have it.
+    """
+
+    size: int
+    sha256: str = ""
+
+
+@dataclass(frozen=True)
+class ShardInfo:
+    """What a shard's footer says.
+
+    Attributes
+    ----------
+    fingerprint : str
+        Of the code, configuration, inputs and assets that it was made from.
+    content : str
+        SHA-256 of the rows.
+    columns : dict of str to str
+        `aerialdojo_gen.store.tables.column_digests`; empty where an earlier version wrote it.
+    rows, parts : int
+        Rows in the shard; shards of the scene.
+    summary : dict
+        The stage's ``rows_in``, ``rows_out`` and ``counts`` of the shard.
+    files : dict of str to ShardFile
+        Files that were written with it, by their path relative to the data directory.
+    """
+
+    fingerprint: str
+    content: str
+    columns: dict[str, str]
+    rows: int
+    parts: int
+    summary: dict[str, Any]
+    files: dict[str, ShardFile]
+
+
+def encode(info: ShardInfo) -> bytes:
+    """Write it as JSON; the same says the same bytes."""
+    facts = {
+        "fingerprint": info.fingerprint,
+        "content": info.content,
+        "columns": info.columns,
+        "rows": info.rows,
+        "parts": info.parts,
+        "summary": info.summary,
+        "files": {name: [file.size, file.sha256] for name, file in info.files.items()},
+    }
+    return json.dumps(facts | {"checksum": _checksum(facts)}, sort_keys=True).encode()
+
+
+def decode(raw: bytes) -> ShardInfo:
+    """Read what `encode` wrote, or an earlier version, whose footers have no checksums.
+
+    Raises
+    ------
+    ValueError
+        It is damaged, or somebody else's.
+    """
+    try:
+        facts = loads_json(raw)
+    except Malformed:
+        raise ValueError("its footer is no JSON") from None
+    if not isinstance(facts, dict):
+        raise ValueError("its footer is no JSON object")
+    if facts.keys() == _EARLIER_KEYS and isinstance(facts["files"], dict):
+        facts = facts | {"columns": {}, "files": {name: [size, ""] for name, size in facts["files"].items()}}
+    elif facts.keys() != _KEYS or facts.pop("checksum") != _checksum(facts):
+        raise ValueError("its footer's checksum is wrong")
+    if not _well_formed(facts):
+        raise ValueError("its footer has values that none can have")
+    files = {name: ShardFile(*pair) for name, pair in facts.pop("files").items()}
+    return ShardInfo(**facts, files=files)
+
+
+def _checksum(facts: Mapping[str, Any]) -> str:
+    return hashlib.sha256(json.dumps(facts, sort_keys=True).encode()).hexdigest()
+
+
+def _well_formed(facts: Mapping[str, Any]) -> bool:
+    """Whether all values are of their types: a right checksum says only that some program wrote them."""
+    return (
+        isinstance(facts["fingerprint"], str)
+        and _is_digest(facts["content"])
+        and isinstance(facts["columns"], dict)
+        and all(_is_digest(value, _HALF_DIGEST) for value in facts["columns"].values())
+        and _is_count(facts["rows"])
+        and _is_count(facts["parts"])
+        and _is_summary(facts["summary"])
+        and isinstance(facts["files"], dict)
+        and all(_is_file(value) for value in facts["files"].values())
+    )
+
+
+def _is_digest(value: Any, pattern: re.Pattern[str] = _DIGEST) -> bool:
+    return isinstance(value, str) and pattern.fullmatch(value) is not None
+
+
+def _is_count(value: Any) -> bool:
+    return type(value) is int and value >= 0
+
+
+def _is_summary(value: Any) -> bool:
+    if value == {}:
+        return True
+    return (
+        isinstance(value, dict)
+        and value.keys() == {"rows_in", "rows_out", "counts"}
+        and _is_count(value["rows_in"])
+        and _is_count(value["rows_out"])
+        and isinstance(value["counts"], dict)
+        and all(_is_count(number) for number in value["counts"].values())
+    )
+
+
+def _is_file(value: Any) -> bool:
+    if not isinstance(value, list) or len(value) != 2:
+        return False
+    size, sha256 = value
+    return _is_count(size) and (sha256 == "" or _is_digest(sha256))

@@ -1,0 +1,117 @@
+"""Parquet files by their path, whatever table they are: the only module that reads and writes them."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from pathlib import Path
+
+import pyarrow as pa
+import pyarrow.compute as pc
+import pyarrow.parquet as pq
+
+from aerialdojo_gen.errors import StoreError, first_line
+from aerialdojo_gen.store.atomic import atomic_file
+from aerialdojo_gen.store.schemas import TableSpec
+
+_ROW_GROUP = 65536
+# For what is written without a dictionary; levels above cost five times the time for 2 % (docs/release-format.md).
+_PLAIN_LEVEL = 15
+# What reading a damaged file raises: a name may be no UTF-8, a count larger than the memory.
+_DAMAGE = (pa.ArrowException, OSError, ValueError, OverflowError, MemoryError)
+
+
+def read_file(path: Path, columns: Sequence[str] | None = None) -> pa.Table:
+    """Read one Parquet file as it is, its page checksums verified.
+
+    Parameters
+    ----------
+    path : Path
+        The file; whatever folders are named, no column is made of them.
+    columns : sequence of str, optional
+        Read these columns alone.
+
+    Returns
+    -------
+    pyarrow.Table
+        With the schema and the metadata that the file has.
+
+    Raises
+    ------
+    StoreError
+        The file is damaged.
+    """
+    wanted = None if columns is None else [*columns]
+    try:
+        table = pq.read_table(path, partitioning=None, page_checksum_verification=True, columns=wanted)
+        # Names are decoded when they are asked for.
+        _ = table.schema.names
+        return table
+    except _DAMAGE as error:
+        raise StoreError(f"{path} is damaged ({first_line(error)})") from None
+
+
+def read_footer(path: Path) -> tuple[int, dict[bytes, bytes]]:
+    """Return how many rows a Parquet file says it has, and its metadata.
+
+    Raises
+    ------
+    StoreError
+        The file is damaged (truncated, say).
+    """
+    try:
+        footer = pq.read_metadata(path)
+    except _DAMAGE as error:
+        raise StoreError(f"{path} is damaged ({first_line(error)})") from None
+    return footer.num_rows, dict(footer.metadata or {})
+
+
+def write_file(path: Path, table: pa.Table) -> None:
+    """Write a table that is no shard (a report, say) as one Parquet file, whole or not at all.
+
+    Raises
+    ------
+    StoreError
+        The disk is full, read-only or not ours to write.
+    """
+    with atomic_file(path.parent, path.name) as temporary:
+        pq.write_table(table, temporary, compression="zstd")
+
+
+def write_clustered(spec: TableSpec, table: pa.Table, path: Path) -> None:
+    """Write a Parquet file with the encodings of docs/release-format.md, a row group a cluster.
+
+    Parameters
+    ----------
+    spec : TableSpec
+        Says which columns have no dictionary, and which ones' changes begin a cluster.
+    table : pyarrow.Table
+        Of that schema; its metadata goes into the file.
+    path : Path
+        Written in place: give a temporary name.
+    """
+    plain = [field for field in spec.schema if field.name in spec.plain]
+    leaves = {f.name: f"{f.name}.list.element" if pa.types.is_list(f.type) else f.name for f in spec.schema}
+    # A picture is compressed already; all else gains.
+    codec = {leaves[f.name]: "NONE" if pa.types.is_binary(f.type) else "ZSTD" for f in spec.schema}
+    with pq.ParquetWriter(
+        path,
+        table.schema,
+        compression=codec,
+        compression_level={leaves[f.name]: _PLAIN_LEVEL for f in plain if not pa.types.is_binary(f.type)} or None,
+        use_dictionary=[leaf for name, leaf in leaves.items() if name not in spec.plain],
+        # The bounds of a list's elements bound nothing that a reader filters by.
+        write_statistics=[f.name for f in spec.schema if not pa.types.is_list(f.type)],
+        write_page_checksum=True,
+    ) as writer:
+        for begin, end in itertools.pairwise(_cluster_edges(spec, table)):
+            writer.write_table(table.slice(begin, end - begin), row_group_size=_ROW_GROUP)
+
+
+def _cluster_edges(spec: TableSpec, table: pa.Table) -> list[int]:
+    """Rows at which a cluster begins, and the number of rows; a table without rows has one empty cluster."""
+    changes = pa.array([False] * max(table.num_rows - 1, 0), pa.bool_())
+    for name in spec.clusters:
+        column = table.column(name).combine_chunks()
+        changes = pc.or_(changes, pc.not_equal(column.slice(1), column.slice(0, max(table.num_rows - 1, 0))))
+    return [0, *(i + 1 for i in pc.indices_nonzero(changes).to_pylist()), table.num_rows]

@@ -1,0 +1,124 @@
+"""Checks of anchors: their ranks, where they look, how far the surfaces are, and whether the body can be there."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from aerialdojo_gen.geometry.frames import wrap_angle_rad, yaw_towards
+from aerialdojo_gen.geometry.surface import Surface
+from aerialdojo_gen.scoring.geometric import WEIGHTS
+from aerialdojo_gen.scoring.panel import SCORERS
+from aerialdojo_gen.stages.anchor_choice import SLACK_M
+from aerialdojo_gen.validate.links import sound
+from aerialdojo_gen.validate.registry import Finding, check
+from aerialdojo_gen.validate.rows import Rows, SceneData
+from aerialdojo_gen.validate.scene_mesh import scene_mesh
+
+_SAME_M = 1e-4
+_SAME_RAD = 1e-6
+_SAME_SCORE = 1e-9
+# Anchors are marched to the wanted distance to a tenth of a millimetre; this is what a definition of 1 m bears.
+_STANDOFF_M = 1e-3
+
+
+@check("anchors", after=("duplicate_key",))
+def anchor_rank(_data: SceneData, rows: Rows) -> Iterator[Finding]:
+    """Ranks of an object's anchors count from 0, the better score first, but for a person's choice."""
+    ids, ranks, score = rows.ints("object_id"), rows.ints("anchor_id"), rows.floats("score")
+    by_hand = np.asarray(rows.texts("selected_by"), dtype=object) == "human"
+    for object_id in np.unique(ids):
+        own = np.flatnonzero(ids == object_id)
+        own = own[np.argsort(ranks[own], kind="stable")]
+        for wanted, row in enumerate(own.tolist()):
+            before = own[wanted - 1] if wanted else row
+            if ranks[row] != wanted:
+                yield Finding(row, f"rank {ranks[row]}", f"rank {wanted}")
+                break
+            if score[row] > score[before] and not by_hand[before]:
+                yield Finding(row, f"score {score[row]:.6g}", f"{score[before]:.6g} at most, the rank before")
+
+
+@check("anchors")
+def anchor_visibility(data: SceneData, rows: Rows) -> Iterator[Finding]:
+    """An anchor sees enough of its object, by its own account."""
+    least, seen = data.pipeline.anchor_sample.min_visible_fraction, rows.floats("visible_fraction")
+    for row in np.flatnonzero(~((seen >= least) & (seen > 0) & (seen <= 1))):
+        yield Finding(int(row), f"visible_fraction = {seen[row]:.6g}", f"{least:g} to 1")
+
+
+@check("anchors")
+def anchor_score(data: SceneData, rows: Rows) -> Iterator[Finding]:
+    """An anchor's score is what its parts make of it: each from 0 to 1, weighed as the pipeline says."""
+    parts = rows.floats(*(f"part_{name}" for name in WEIGHTS))
+    for row, k in zip(*np.nonzero(~((parts >= 0) & (parts <= 1))), strict=True):
+        yield Finding(int(row), f"part_{[*WEIGHTS][k]} = {parts[row, k]:.6g}", "0 to 1")
+    weights = data.pipeline.anchor_sample.weights
+    asked = {name: getattr(weights, name) for name in SCORERS}
+    scores = {name: rows.floats(f"score_{name}") for name in SCORERS}
+    geometric = parts @ np.array([*WEIGHTS.values()])
+    by_hand = np.asarray(rows.texts("selected_by"), dtype=object) == "human"
+    for row, score in enumerate(rows.floats("score")):
+        own = {name: values[row] for name, values in scores.items() if np.isfinite(values[row])}
+        uncalled = sorted(name for name in own if not asked[name] and not by_hand[row])
+        total = sum(asked[name] for name in own)
+        wanted = sum(asked[name] * value for name, value in own.items()) / total if total else 0.0
+        if uncalled:
+            yield Finding(row, f"score_{uncalled[0]} = {own[uncalled[0]]:.6g}", "null: the scorer was not asked")
+        elif "geometric" in own and abs(own["geometric"] - geometric[row]) > _SAME_SCORE:
+            yield Finding(row, f"score_geometric = {own['geometric']:.6g}", f"{geometric[row]:.6g} by its parts")
+        elif not by_hand[row] and asked["geometric"] and "geometric" not in own:
+            yield Finding(row, "score_geometric is null", f"{geometric[row]:.6g} by its parts")
+        # What a person placed was compared with nothing: it has the geometric score alone.
+        elif min(abs(score - s) for s in (wanted, *([geometric[row]] if by_hand[row] else []))) > _SAME_SCORE:
+            yield Finding(row, f"score = {score:.6g}", f"{wanted:.6g} by its parts")
+
+
+@check("anchors", needs=("objects",), after=("unknown_object",))
+def anchor_yaw(data: SceneData, rows: Rows) -> Iterator[Finding]:
+    """An anchor faces its object's centre, unless a person placed it."""
+    objects = data["objects"]
+    item = objects.find("object_id", rows.column("object_id"))
+    by_hand = np.asarray(rows.texts("selected_by"), dtype=object) == "human"
+    fit = np.flatnonzero(sound(data, "objects", item) & ~by_hand)
+    centre = objects.floats("x_m", "y_m", "z_m")[item[fit]]
+    yaw = yaw_towards(rows.floats("x_m", "y_m", "z_m")[fit], centre)
+    off = np.abs(wrap_angle_rad(rows.floats("yaw_rad")[fit] - yaw))
+    for k in np.flatnonzero(off > _SAME_RAD):
+        yield Finding(int(fit[k]), f"{rows.floats('yaw_rad')[fit[k]]:.6f} rad", f"{yaw[k]:.6f} rad")
+
+
+@check("anchors", needs=("objects", "mesh"), after=("unknown_object",))
+def anchor_surface(data: SceneData, rows: Rows) -> Iterator[Finding]:
+    """An anchor is 1 m from its object's surface (about that, where a person placed it), and says how far."""
+    scene = scene_mesh(data).scene
+    by_hand = np.asarray(rows.texts("selected_by"), dtype=object) == "human"
+    slack = np.where(by_hand, SLACK_M + _SAME_M, _STANDOFF_M)
+    wanted = data.pipeline.anchor_sample.standoff_m
+    nodes = data["objects"].texts("mesh_node")
+    item = data["objects"].find("object_id", rows.column("object_id"))
+    place, stored = rows.floats("x_m", "y_m", "z_m"), rows.floats("surface_distance_m")
+    for k in np.unique(item[item >= 0]).tolist():
+        if nodes[k] not in scene:
+            continue
+        own = np.flatnonzero((item == k) & np.isfinite(place).all(axis=1))
+        found = Surface.of(scene[str(nodes[k])]).distance_m(place[own]) if len(own) else np.empty(0)
+        for row, distance in zip(own.tolist(), found.tolist(), strict=True):
+            if abs(distance - wanted) > slack[row]:
+                yield Finding(row, f"{distance:.4f} m from the object's surface", f"{wanted:g} m")
+            elif abs(distance - stored[row]) > _SAME_M:
+                yield Finding(row, f"surface_distance_m = {stored[row]:.6g}", f"{distance:.6g}")
+
+
+@check("anchors", needs=("mesh",), after=("anchor_surface",))
+def anchor_clearance(data: SceneData, rows: Rows) -> Iterator[Finding]:
+    """An anchor is free of collision, and says how far the nearest surface is."""
+    world, radius = scene_mesh(data).world, data.pipeline.embodiment.radius_m
+    stored = rows.floats("clearance_m")
+    for row, place in enumerate(rows.floats("x_m", "y_m", "z_m")):
+        distance = world.distance_m(place) if np.isfinite(place).all() else np.nan
+        if distance <= radius:
+            yield Finding(row, f"a surface at {distance:.4f} m", f"more than the body's radius, {radius:g} m")
+        elif abs(distance - stored[row]) > _STANDOFF_M:
+            yield Finding(row, f"clearance_m = {stored[row]:.6g}", f"{distance:.6g}")

@@ -1,0 +1,140 @@
+"""Checks of the reference images: there, whole, showing something, and named once."""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Iterator
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from aerialdojo_gen.geometry.cameras import Camera, view_pose
+from aerialdojo_gen.validate.registry import Finding, check
+from aerialdojo_gen.validate.rows import Rows, SceneData
+from aerialdojo_gen.validate.scene_mesh import scene_mesh
+
+_BOX = ("box_u0_px", "box_v0_px", "box_u1_px", "box_v1_px")
+# Standard deviation of the grey values, of 255, below which a picture is a single surface or none at all.
+_BLANK = 2.0
+# Rays are cast through every so many pixels: all of them take a tenth of a second a picture.
+_EVERY = 4
+_SHARE, _EDGE = 0.002, 0.03
+_SIGNATURE = b"\x89PNG\r\n\x1a\n"
+# Chunks of a PNG that carry words, and could carry where the picture was taken.
+_TELLING = frozenset({"tEXt", "zTXt", "iTXt", "eXIf"})
+
+
+@check("objects", needs=("routes",))
+def image_missing(data: SceneData, rows: Rows) -> Iterator[Finding]:
+    """An object that tasks ask for has a picture."""
+    asked = set(data["routes"].ints("target_object_id").tolist())
+    held = rows.column("reference_image").is_valid().to_numpy(zero_copy_only=False)
+    for row, object_id in enumerate(rows.ints("object_id").tolist()):
+        if object_id in asked and not held[row]:
+            yield Finding(row, "no reference_image", "a PNG: tasks ask for the object")
+
+
+@check("objects", after=("image_missing",))
+def image_damaged(_data: SceneData, rows: Rows) -> Iterator[Finding]:
+    """A picture is a whole PNG."""
+    for row, raw in enumerate(rows.column("reference_image")):
+        png = raw.as_py()
+        if png is None:
+            continue
+        # OpenCV fills in what a cut file lacks: the chunks' own checksums say whether it is whole.
+        kinds = _chunks(png)
+        if kinds[-1:] != ["IEND"] or _decoded(png) is None:
+            yield Finding(row, f"{len(png):,} bytes that are no whole PNG", "a PNG")
+        elif told := _TELLING & set(kinds):
+            yield Finding(row, f"a PNG with words in it ({', '.join(sorted(told))})", "pixels alone")
+
+
+@check("objects", after=("image_missing", "image_damaged"))
+def image_blank(data: SceneData, rows: Rows) -> Iterator[Finding]:
+    """A picture shows something."""
+    damaged = data.flagged("objects", ("image_damaged",))
+    for row, raw in enumerate(rows.column("reference_image")):
+        if raw.as_py() is None or damaged[row]:
+            continue
+        picture = _decoded(raw.as_py())
+        if picture is not None and float(picture.std()) < _BLANK:
+            yield Finding(row, f"grey values with a deviation of {float(picture.std()):.2f}", f"{_BLANK:g} at least")
+
+
+@check("objects", after=("image_missing", "image_damaged"))
+def image_box(data: SceneData, rows: Rows) -> Iterator[Finding]:
+    """The object's box lies in its picture and is not empty, and its share of the pixels fits into it."""
+    damaged = data.flagged("objects", ("image_damaged",))
+    boxes, fraction = rows.floats(*_BOX).reshape(-1, 4), rows.floats("image_fraction")
+    for row, raw in enumerate(rows.column("reference_image")):
+        if raw.as_py() is None or damaged[row] or np.isnan(boxes[row]).all():
+            continue
+        picture = _decoded(raw.as_py())
+        if picture is None:
+            continue
+        height, width = picture.shape
+        u0, v0, u1, v1 = boxes[row].tolist()
+        if not (0 <= u0 < u1 <= width and 0 <= v0 < v1 <= height):
+            yield Finding(row, f"box ({u0:g}, {v0:g}) to ({u1:g}, {v1:g})", f"within {width} x {height} pixels")
+        elif not 0 < fraction[row] <= (u1 - u0) * (v1 - v0) / (width * height) + 1e-9:
+            yield Finding(row, f"image_fraction = {fraction[row]:.4g}", "more than 0, no more than the box's share")
+
+
+@check("objects", needs=("anchors", "mesh"), after=("image_missing", "image_damaged", "image_box", "object_node"))
+def image_target(data: SceneData, rows: Rows) -> Iterator[Finding]:
+    """Box and share of pixels are those of the object as rays from its selected anchor find it."""
+    mesh, anchors = scene_mesh(data), data["anchors"]
+    index = {node: k for k, node in enumerate(mesh.rays.nodes)}
+    skip = data.flagged("objects", ("image_damaged", "image_box", "object_node"))
+    nodes, boxes, fraction = rows.texts("mesh_node"), rows.floats(*_BOX).reshape(-1, 4), rows.floats("image_fraction")
+    places = anchors.floats("x_m", "y_m", "z_m", "yaw_rad").reshape(-1, 4)
+    for row, object_id in enumerate(rows.ints("object_id").tolist()):
+        anchor = data.selected_of_object.get(object_id)
+        png = rows.column("reference_image")[row].as_py()
+        if anchor is None or png is None or skip[row] or not np.isfinite(places[anchor]).all():
+            continue
+        picture = _decoded(png)
+        if picture is None:
+            continue
+        camera = Camera(picture.shape[1], picture.shape[0], data.pipeline.reference_images.fov_deg)
+        pose = view_pose(places[anchor, :3], float(places[anchor, 3]), "front")
+        directions = camera.rays()[::_EVERY, ::_EVERY].reshape(-1, 3) @ pose[:3, :3].T
+        seen = mesh.rays.first_hit(pose[:3, 3], directions)[1] == index[str(nodes[row])]
+        v, u = (k * _EVERY for k in np.unravel_index(np.flatnonzero(seen), picture[::_EVERY, ::_EVERY].shape))
+        u0, v0, u1, v1 = boxes[row].tolist()
+        share = float(seen.mean())
+        told = 0.0 if np.isnan(fraction[row]) else float(fraction[row])
+        # A pixel stands for the rays around it: along the object's edge that is a pixel more or less.
+        if abs(share - told) > _SHARE + _EDGE * told**0.5:
+            yield Finding(row, f"image_fraction = {told:.4f}", f"about {share:.4f}")
+        elif len(u) and not (u0 <= u.min() and v0 <= v.min() and u1 > u.max() and v1 > v.max()):
+            box = f"({u.min()}, {v.min()}) to ({u.max() + 1}, {v.max() + 1})"
+            yield Finding(row, f"box ({u0:g}, {v0:g}) to ({u1:g}, {v1:g})", f"one that holds {box}")
+
+
+@check("objects")
+def image_id_twice(_data: SceneData, rows: Rows) -> Iterator[Finding]:
+    """A picture's id names one object."""
+    first: dict[str | None, int] = {}
+    for row, image_id in enumerate(rows.texts("reference_image_id")):
+        if first.setdefault(image_id, row) != row:
+            yield Finding(row, f"reference_image_id = {image_id!r}, as {rows.key(first[image_id])}", "its own")
+
+
+def _chunks(png: bytes) -> list[str]:
+    """Kinds of a PNG's chunks, in their order; none at all where one is cut or has a wrong checksum."""
+    kinds: list[str] = []
+    at = len(_SIGNATURE)
+    while png.startswith(_SIGNATURE) and at < len(png):
+        end = at + 12 + int.from_bytes(png[at : at + 4], "big")
+        if end > len(png) or zlib.crc32(png[at + 4 : end - 4]) != int.from_bytes(png[end - 4 : end], "big"):
+            return []
+        kinds.append(png[at + 4 : at + 8].decode("latin-1"))
+        at = end
+    return kinds
+
+
+def _decoded(png: bytes) -> NDArray[np.uint8] | None:
+    """Grey values of a PNG, (H, W); None where it cannot be decoded."""
+    return cv2.imdecode(np.frombuffer(png, dtype=np.uint8), cv2.IMREAD_GRAYSCALE) if png else None

@@ -1,0 +1,181 @@
+"""Run every check over a release, a scene at a time, in one process or several."""
+
+from __future__ import annotations
+
+import fnmatch
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from aerialdojo_gen.config.pipeline import Pipeline
+from aerialdojo_gen.errors import AerialDojoError, UsageError
+from aerialdojo_gen.pipeline.executors.local import Pool
+from aerialdojo_gen.pipeline.interrupt import Interrupts
+from aerialdojo_gen.pipeline.progress import Reporter
+from aerialdojo_gen.validate import (
+    anchors,
+    collisions,
+    detours,
+    ends,
+    geometry,
+    gltf,
+    id_leaks,
+    images,
+    leaks,
+    links,
+    meshes,
+    oracle,
+    pictures,
+    tables,
+    underground,
+    words,
+)
+from aerialdojo_gen.validate.counts import Tally, scene_counts, tally_of, whole_counts
+from aerialdojo_gen.validate.parts import foreign_files, read_tables, release_tables, scenes_of
+from aerialdojo_gen.validate.registry import CHECKS, Outcome, run_checks
+from aerialdojo_gen.validate.report import Report
+from aerialdojo_gen.validate.rows import SceneData
+
+# A check looks at what those before it found fault with, so that their order is fixed here.
+_MODULES = (
+    tables,
+    geometry,
+    leaks,
+    links,
+    ends,
+    meshes,
+    gltf,
+    words,
+    anchors,
+    collisions,
+    underground,
+    detours,
+    oracle,
+    images,
+    pictures,
+    id_leaks,
+)
+SCENE_CHECKS = tuple(one for module in _MODULES for one in CHECKS if one.run.__module__ == module.__name__)
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What to check.
+
+    Attributes
+    ----------
+    release : Path
+        The release's folder.
+    scenes : tuple of str
+        Names or globs; empty for all.
+    meshes : Path or None
+        Folder of the meshes; None for where `scenes` says, relative to the folder that the release lies in.
+    use_meshes : bool
+        False leaves everything that needs a mesh unchecked, and the report says so.
+    sample : int or None
+        Routes a scene that FCL is asked about; None for all.
+    pictures : int or None
+        Reference images a scene that are drawn anew; None for all.
+    pipeline : Pipeline
+        Whose definitions the release is held to.
+    """
+
+    release: Path
+    scenes: tuple[str, ...] = ()
+    meshes: Path | None = None
+    use_meshes: bool = True
+    sample: int | None = None
+    pictures: int | None = None
+    pipeline: Pipeline = field(default_factory=Pipeline)
+
+
+@dataclass(frozen=True)
+class _Work:
+    asked: Asked
+    scene: str
+
+    @property
+    def label(self) -> str:
+        return f"validate {self.scene}"
+
+
+def release_of(folder: Path) -> Path:
+    """Find the release in a data directory; a release is its own."""
+    return folder / "release" if (folder / "release").is_dir() else folder
+
+
+def validate(asked: Asked, *, workers: int = 1, reporter: Reporter | None = None) -> Report:
+    """Check a release.
+
+    Parameters
+    ----------
+    asked : Asked
+        What to check.
+    workers : int
+        Processes; with 1 everything runs in this one. A process holds one scene at a time.
+    reporter : Reporter, optional
+        Shows progress.
+
+    Returns
+    -------
+    Report
+        Every check, and every row at fault.
+
+    Raises
+    ------
+    StoreError
+        The folder holds no release.
+    UsageError
+        A name or a glob fits no scene of the release.
+    """
+    reporter = reporter or Reporter(quiet=True)
+    every = scenes_of(asked.release)
+    chosen = _chosen(asked.scenes, every)
+    by_scene: dict[str, tuple[list[Outcome], Tally]] = {}
+    with Interrupts() as interrupts, Pool(workers) as pool, reporter.bar("validate", len(chosen)) as bar:
+        for done in pool.map(_guarded, [_Work(asked, scene) for scene in _large_first(asked.release, chosen)]):
+            interrupts.check()
+            if isinstance(done, AerialDojoError):
+                raise done
+            by_scene[done[1].scene] = done
+            bar.advance()
+    outcomes = [foreign_files(asked.release, every)]
+    outcomes += [outcome for scene in chosen for outcome in by_scene[scene][0]]
+    tallies = [by_scene[scene][1] for scene in chosen]
+    outcomes += whole_counts(asked.release, tallies, asked.pipeline, len(chosen) == len(every))
+    return Report(tuple(chosen), tuple(outcomes))
+
+
+def check_scene(asked: Asked, scene: str) -> tuple[list[Outcome], Tally]:
+    """Check one scene of a release."""
+    found, outcomes = read_tables(asked.release, scene)
+    data = SceneData(scene, asked.release, asked.pipeline, found, asked.meshes, asked.use_meshes, asked.sample,
+                     asked.pictures)  # fmt: skip
+    tally = tally_of(data, len(found) == len(release_tables()))
+    outcomes += run_checks(data, SCENE_CHECKS)
+    outcomes.append(scene_counts(data, tally))
+    return outcomes, tally
+
+
+def _guarded(work: _Work) -> tuple[list[Outcome], Tally] | AerialDojoError:
+    try:
+        return check_scene(work.asked, work.scene)
+    except AerialDojoError as error:
+        return error
+
+
+def _chosen(patterns: Sequence[str], every: list[str]) -> list[str]:
+    for pattern in patterns:
+        if not fnmatch.filter(every, pattern):
+            raise UsageError(f"no scene {pattern!r} in the release; it holds {', '.join(every[:5])}"
+                             f"{' and others' if len(every) > 5 else ''}")  # fmt: skip
+    return [scene for scene in every if not patterns or any(fnmatch.fnmatch(scene, p) for p in patterns)]
+
+
+def _large_first(release: Path, scenes: Sequence[str]) -> list[str]:
+    """Order scenes so that no process is left alone with a large one at the end."""
+
+    def size(scene: str) -> int:
+        return sum(path.stat().st_size for path in release.glob(f"routes/*/part-{scene}.parquet"))
+
+    return sorted(scenes, key=lambda scene: (-size(scene), scene))

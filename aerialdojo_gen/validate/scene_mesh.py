@@ -1,0 +1,68 @@
+"""The scene's mesh, as the checks that need it get it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+from aerialdojo_gen.geometry.rays import RayCaster
+from aerialdojo_gen.planning.collision import CollisionWorld
+from aerialdojo_gen.scenes.glb import read_glb
+from aerialdojo_gen.scenes.model import Scene
+from aerialdojo_gen.validate.registry import ALWAYS_AFTER, UncheckedError
+from aerialdojo_gen.validate.rows import SceneData
+
+# A fault of these leaves nothing to judge the rest by.
+MESH_CHECKS = ("mesh_outside", "mesh_missing", "mesh_digest", "mesh_damaged")
+
+
+@dataclass(frozen=True)
+class SceneMesh:
+    """A scene's mesh, and what questions to it are put to; each is made when first asked."""
+
+    scene: Scene
+
+    @cached_property
+    def world(self) -> CollisionWorld:
+        """FCL's world."""
+        return CollisionWorld(self.scene)
+
+    @cached_property
+    def rays(self) -> RayCaster:
+        """For first hits."""
+        return RayCaster(self.scene)
+
+
+def mesh_path(data: SceneData) -> Path:
+    """Where the scene's mesh should lie."""
+    told = Path(str(data["scenes"].texts("mesh_path")[0]))
+    return data.meshes / told.name if data.meshes is not None else data.release.parent / told
+
+
+def want_meshes(data: SceneData) -> None:
+    """Raise `UncheckedError` where meshes are to be left alone, or the scene's row is not one row."""
+    if not data.use_meshes:
+        raise UncheckedError("no meshes asked for")
+    if "scenes" not in data.tables or len(data["scenes"]) != 1:
+        raise UncheckedError("scenes has not one row of it")
+    if data.flagged("scenes", ALWAYS_AFTER).any():
+        raise UncheckedError("the scene's row is at fault")
+
+
+def scene_mesh(data: SceneData) -> SceneMesh:
+    """Return the scene's mesh, read once.
+
+    Raises
+    ------
+    UncheckedError
+        There is none, or it is not the release's: checks have said so.
+    """
+    want_meshes(data)
+    if data.flagged("scenes", MESH_CHECKS).any():
+        raise UncheckedError("no mesh")
+    kept = data.kept.get("mesh")
+    if not isinstance(kept, SceneMesh):
+        digest = str(data["scenes"].texts("mesh_sha256")[0])
+        kept = data.kept["mesh"] = SceneMesh(read_glb(mesh_path(data), digest))
+    return kept
