@@ -23,8 +23,8 @@ from aerialdojo_gen.commands.common import (
 
 app = typer.Typer()
 
-# The stages whose command has no option of its own; their texts are those of `aerialdojo_gen.pipeline.registry`, which
-# is not imported here because it brings pyarrow.
+# The stages whose command has no option of its own; their texts are those of `aerialdojo_gen.pipeline.registry`,
+# which is not imported here because it brings pyarrow.
 PLAIN_STAGES = {
     "build-scenes": "Build the scenes' meshes from their recipes.",
     "annotate-import": "Check the annotations against the scenes and import them.",
