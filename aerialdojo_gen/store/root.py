@@ -1,0 +1,173 @@
+"""The data root: where tables, meshes, pictures and recordings lie, a directory or an object store.
+
+Everything that a stage or a reader touches below the data root goes through `DataRoot`, by paths relative to it with
+forward slashes. Libraries that want a file of this machine (PyArrow, OpenCV, FFmpeg, our GLB reader) get one from
+`DataRoot.local_copy`; what is written is made in a local file or folder and committed whole, or not at all.
+"""
+
+from __future__ import annotations
+
+import os
+from abc import ABC, abstractmethod
+from collections.abc import Iterator
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import dataclass
+from pathlib import Path, PurePosixPath
+
+from aerialdojo_gen.errors import StoreError
+from aerialdojo_gen.store import files
+from aerialdojo_gen.store.atomic import atomic_file, atomic_folder
+from aerialdojo_gen.store.staging import remove
+
+
+class DataRoot(ABC):
+    """A place for tables and files; picklable, cheap to make, without an open connection until it is used.
+
+    Attributes
+    ----------
+    url : str
+        The place as it is said in messages and to other processes: an absolute path, or ``s3://bucket/prefix``.
+    """
+
+    url: str
+
+    def __str__(self) -> str:
+        return self.url
+
+    @abstractmethod
+    def local_copy(self, relative: str) -> Path:
+        """Return a file, or a folder with all that is in it, on this machine; its bytes must not be changed.
+
+        Raises
+        ------
+        FileNotFoundError
+            There is none of that name.
+        StoreError
+            The store does not answer, or refuses.
+        """
+
+    @abstractmethod
+    def size(self, relative: str) -> int:
+        """Bytes of a file, or of a folder's files together; FileNotFoundError where there is none."""
+
+    @abstractmethod
+    def digest(self, relative: str) -> str:
+        """SHA-256 of a file's bytes, hexadecimal; FileNotFoundError where there is none."""
+
+    @abstractmethod
+    def list(self, folder: str, pattern: str = "*") -> list[str]:
+        """Paths, relative to the root and sorted, of what matches a glob in a folder; none where there is no folder."""
+
+    @abstractmethod
+    def commit(self, relative: str) -> AbstractContextManager[Path]:
+        """Yield an empty local path to write a file to; at the end it is there whole, on an error not at all.
+
+        Raises
+        ------
+        StoreError
+            The path leads out of the root, or the store is full, read-only or does not answer.
+        """
+
+    @abstractmethod
+    def commit_folder(self, relative: str) -> AbstractContextManager[Path]:
+        """Yield an empty local folder to fill; at the end it takes the place of what was there."""
+
+    @abstractmethod
+    def delete(self, relative: str) -> None:
+        """Remove a file, or a folder with all that is in it; one that is not there is no error."""
+
+    @abstractmethod
+    def lock(self) -> AbstractContextManager[None]:
+        """Hold the root: one run at a time writes to it. StoreError where somebody else holds it."""
+
+    def exists(self, relative: str) -> bool:
+        """Whether there is a file or a folder of that name."""
+        try:
+            self.size(relative)
+        except FileNotFoundError:
+            return False
+        return True
+
+
+@dataclass(frozen=True)
+class LocalRoot(DataRoot):
+    """A directory of this machine, or of a file system that several machines mount.
+
+    Attributes
+    ----------
+    path : Path
+        Absolute.
+    """
+
+    path: Path
+
+    @property
+    def url(self) -> str:  # type: ignore[override]
+        """The directory's absolute path."""
+        return str(self.path)
+
+    def local_copy(self, relative: str) -> Path:
+        """Return the file itself."""
+        path = self._at(relative)
+        if not path.exists():
+            raise FileNotFoundError(2, os.strerror(2), str(path))
+        return path
+
+    def size(self, relative: str) -> int:
+        """Bytes of a file, or of a folder's files together."""
+        return files.size_of(self._at(relative))
+
+    def digest(self, relative: str) -> str:
+        """SHA-256 of a file's bytes, read once in a process as long as it is not written to."""
+        return files.file_digest(self._at(relative))
+
+    def list(self, folder: str, pattern: str = "*") -> list[str]:
+        """Paths of what in a folder matches a glob."""
+        return sorted(path.relative_to(self.path).as_posix() for path in self._at(folder).glob(pattern))
+
+    def commit(self, relative: str) -> AbstractContextManager[Path]:
+        """Make a file in the staging folder and rename it."""
+        return atomic_file(self.path, relative)
+
+    @contextmanager
+    def commit_folder(self, relative: str) -> Iterator[Path]:
+        """Make a folder in the staging folder and exchange it with what is there."""
+        with atomic_folder(self._at(relative), self.path) as folder:
+            yield folder
+
+    def delete(self, relative: str) -> None:
+        """Remove a file or a folder."""
+        remove(self._at(relative))
+
+    def lock(self) -> AbstractContextManager[None]:
+        """Hold the directory by flock."""
+        raise NotImplementedError
+
+    def _at(self, relative: str) -> Path:
+        return self.path / inside(relative)
+
+
+def inside(relative: str) -> str:
+    """Return a path if it stays below the root; StoreError otherwise."""
+    path = PurePosixPath(relative)
+    if path.is_absolute() or ".." in path.parts:
+        raise StoreError(f"{relative!r} leads out of the data directory")
+    return relative
+
+
+def open_root(where: DataRoot | Path | str) -> DataRoot:
+    """Open a data root.
+
+    Parameters
+    ----------
+    where : DataRoot, Path or str
+        A directory, which need not be there yet, or a URL of an object store; a data root is returned as it is.
+
+    Raises
+    ------
+    StoreError
+        A URL of a kind that nothing here reads, or the extra for it is not installed.
+    """
+    if isinstance(where, DataRoot):
+        return where
+    return LocalRoot(Path(where).absolute())
