@@ -18,12 +18,16 @@ help:  ## list the targets
 env: .venv/.installed  ## make the environment in .venv/
 dev: .venv/.dev  ## the same with what tests and linters need
 
+# uv installs in seconds what takes pip two minutes. Where it cannot (a mirror that only pip is told of), pip does.
+PIP := .venv/bin/python -m pip install --quiet --disable-pip-version-check -c constraints.txt
+UV := $(PIP) uv 2>/dev/null && .venv/bin/uv pip install --quiet --python .venv/bin/python -c constraints.txt
+
 .venv/.installed: pyproject.toml constraints.txt
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { \
 	  echo "error: $(PYTHON) is older than Python 3.11: install Python 3.11, or make PYTHON=/path/to/python3.11" >&2; exit 1; }
 	@test -x .venv/bin/python || $(PYTHON) -m venv .venv
-	@echo "installing the packages of constraints.txt into .venv/ (a minute or two the first time)"
-	@.venv/bin/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[gl,web]' || { \
+	@echo "installing the packages of constraints.txt into .venv/ (seconds by uv, minutes by pip)"
+	@{ $(UV) -e '.[gl,web]' 2>/dev/null; } || $(PIP) -e '.[gl,web]' || { \
 	  $(PYTHON) -c 'import sys; sys.exit(sys.version_info[:2] == (3, 11))' && echo "error: a package could not be installed, see above" >&2 || \
 	  echo "error: a package could not be installed, see above. PyBullet has a wheel for Python 3.11 only and is built from" \
 	       "source on others (C++ compiler and Python headers needed): with Python 3.11, rm -rf .venv and make PYTHON=python3.11" >&2; exit 1; }
@@ -33,7 +37,7 @@ dev: .venv/.dev  ## the same with what tests and linters need
 	@touch $@
 
 .venv/.dev: .venv/.installed
-	@.venv/bin/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[dev]'
+	@{ $(UV) -e '.[dev]' 2>/dev/null; } || $(PIP) -e '.[dev]'
 	@touch $@
 
 dataset: .venv/.installed  ## generate the dataset: scene_assets/ and annotations/ to $(DATA)/release/
@@ -76,7 +80,6 @@ bench: .venv/.dev  ## measure planner, renderer and OMPL's planners beside ours
 	@for bench in tests/bench/bench_*.py; do echo "== $$bench"; .venv/bin/python $$bench || exit 1; done
 
 lock: .venv/.dev  ## write constraints.txt anew from the ranges in pyproject.toml
-	@.venv/bin/python -m pip install --quiet uv
 	@.venv/bin/uv pip compile pyproject.toml --all-extras --python-version 3.11 --upgrade --no-header \
 	  --no-annotate --no-emit-index-url --no-emit-find-links --quiet -o constraints.txt
 
