@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 if TYPE_CHECKING:
-    from planting import Planted
+    from support.planting import Planted
 
 
 @pytest.fixture(scope="session")
@@ -39,7 +39,7 @@ def smoke(project: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture
 def planted(smoke: Path, tmp_path: Path) -> Planted:
     """A copy of the smoke run's release and meshes, to plant faults in; its scene is U_Courtyard_0."""
-    from planting import Planted
+    from support.planting import Planted
 
     shutil.copytree(smoke / "release", tmp_path / "data" / "release")
     shutil.copytree(smoke / "meshes", tmp_path / "data" / "meshes")
