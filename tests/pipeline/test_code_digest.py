@@ -115,8 +115,8 @@ def test_plumbing_is_what_it_is_said_to_be():
     assert set(PLUMBING) == {
         f"aerialdojo_gen{name}"
         for name in ("", ".benchmark", ".common", ".common.trouble", ".config", ".config.agreement",
-                     ".config.explain", ".config.pipeline", ".config.sections", ".errors", ".pipeline", ".pipeline.code_digest",
-                     ".pipeline.code_facts", ".pipeline.executors", ".pipeline.executors.local",
+                     ".config.explain", ".config.pipeline", ".config.sections", ".errors", ".pipeline",
+                     ".pipeline.code_digest", ".pipeline.code_facts", ".pipeline.executors", ".pipeline.executors.local",
                      ".pipeline.fingerprint", ".pipeline.freshness", ".pipeline.interrupt", ".pipeline.progress",
                      ".pipeline.registry", ".pipeline.runner", ".pipeline.stage", ".store", ".store.atomic",
                      ".store.files", ".store.footers", ".store.parquet_files", ".store.schemas", ".store.shards",
