@@ -116,11 +116,11 @@ def test_plumbing_is_what_it_is_said_to_be():
         f"aerialdojo_gen{name}"
         for name in ("", ".benchmark", ".common", ".common.trouble", ".config", ".config.agreement",
                      ".config.explain", ".config.pipeline", ".config.sections", ".errors", ".pipeline",
-                     ".pipeline.code_digest", ".pipeline.code_facts", ".pipeline.executors", ".pipeline.executors.local",
-                     ".pipeline.fingerprint", ".pipeline.freshness", ".pipeline.interrupt", ".pipeline.progress",
-                     ".pipeline.registry", ".pipeline.runner", ".pipeline.stage", ".store", ".store.atomic",
-                     ".store.files", ".store.footers", ".store.parquet_files", ".store.schemas", ".store.shards",
-                     ".store.staging")
+                     ".pipeline.code_digest", ".pipeline.code_facts", ".pipeline.executors",
+                     ".pipeline.executors.local", ".pipeline.fingerprint", ".pipeline.freshness",
+                     ".pipeline.interrupt", ".pipeline.progress", ".pipeline.registry", ".pipeline.runner",
+                     ".pipeline.stage", ".store", ".store.atomic", ".store.files", ".store.footers",
+                     ".store.parquet_files", ".store.schemas", ".store.shards", ".store.staging")
     }  # fmt: skip
     assert {name: counted for name, counted in PLUMBING.items() if counted} == {
         "aerialdojo_gen.store.parquet_files": ("write_clustered",),
