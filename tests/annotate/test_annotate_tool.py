@@ -310,6 +310,7 @@ def test_a_line_of_the_history_that_a_crash_cut_is_passed_over(storage):
     assert state.annotations.objects[0].name == "first"
 
 
+@pytest.mark.kill
 def test_killed_in_the_middle_of_saves_nothing_that_was_answered_is_lost(storage):
     for k in range(4):
         command = [sys.executable, "-c", CRASH, str(storage.path.parent), "anywhere"]

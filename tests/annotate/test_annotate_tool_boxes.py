@@ -71,6 +71,7 @@ def test_a_box_takes_its_triangles_and_no_others(terrain):
         cut_out(scene, (Cut(node="air_000", category="air", low_m=(0, 0, 50), high_m=(1, 1, 51)),))
 
 
+@pytest.mark.pipeline
 def test_what_is_boxed_out_is_annotated_becomes_an_object_and_can_be_put_back(terrain, tmp_path):
     pipeline, roots = open_pipeline(terrain.pipeline, tmp_path / "data")
     recipe = roots.recipes / "Scan.toml"
@@ -151,6 +152,7 @@ def asked(url, path, body=None, method=None):
         return error.code, json.loads(error.read())
 
 
+@pytest.mark.slow
 def test_a_box_that_cannot_be_built_leaves_the_recipe_as_it_was(terrain, project, tmp_path):
     data, recipe = tmp_path / "data", terrain.pipeline.parent / "scenes" / "Scan.toml"
     before = recipe.read_bytes()
@@ -185,6 +187,7 @@ def taken(path: Path):
     return False
 
 
+@pytest.mark.kill
 def test_a_server_killed_while_it_builds_a_box_leaves_the_recipe_as_it_was(terrain, project, tmp_path):
     data, recipe, assets = (
         tmp_path / "data",

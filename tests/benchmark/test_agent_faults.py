@@ -21,7 +21,7 @@ from aerialdojo_gen.benchmark.tasks import Selection
 from aerialdojo_gen.benchmark.worker import Conditions
 from aerialdojo_gen.errors import UsageError
 
-HERE = __name__
+HERE, FILE = __name__, Path(__file__).stem
 
 
 class Faulty(AgentBase):
@@ -82,10 +82,10 @@ def job(how: str, limit: int = 3, tolerate: bool = False, attempts: int = 2, **o
 
 
 SAID = {
-    "reset": rf"KeyError at {HERE}\.py:\d+: 'map' \(in reset\); --tolerate logs",
-    "exit": rf"SystemExit at {HERE}\.py:\d+: no more \(in reset\)",
+    "reset": rf"KeyError at {FILE}\.py:\d+: 'map' \(in reset\); --tolerate logs",
+    "exit": rf"SystemExit at {FILE}\.py:\d+: no more \(in reset\)",
     "invalid": r"raised InvalidAnswer in reset.*nothing to answer yet",
-    "act": rf"OSError at {HERE}\.py:\d+: disk \(in act\)",
+    "act": rf"OSError at {FILE}\.py:\d+: disk \(in act\)",
     "float": r"returned 2\.5 \(float\) from act, where an action is expected: a whole number from 0 \(Stop\) to 15;",
     "none": r"returned None \(NoneType\) from act",
     "far": r"returned 16 \(int\) from act",
@@ -140,7 +140,7 @@ def test_keys_among_an_agents_options_are_not_logged(smoke: Path, tmp_path: Path
 
 
 def test_an_agent_that_cannot_be_made_is_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    with pytest.raises(UsageError, match=rf"cannot be made: RuntimeError at {HERE}\.py:\d+: two$"):
+    with pytest.raises(UsageError, match=rf"cannot be made: RuntimeError at {FILE}\.py:\d+: two$"):
         load_agent(f"{HERE}:Faulty", how="init")
     (tmp_path / "sick_module.py").write_text("import math\nmath.nothing\n")
     monkeypatch.syspath_prepend(tmp_path)

@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import numpy as np
 import pyarrow.compute as pc
@@ -25,7 +26,7 @@ from aerialdojo_gen.errors import AerialDojoError, StoreError, UsageError
 from aerialdojo_gen.planning.primitives import replay
 from aerialdojo_gen.store import schemas
 
-HERE = __name__
+HERE, FILE = __name__, Path(__file__).stem
 
 
 class Flaky(AgentBase):
@@ -138,6 +139,7 @@ class Slow(RandomAgent):
 """
 
 
+@pytest.mark.kill
 def test_killed_again_and_again_ends_with_the_same_bytes(project, smoke, tmp_path):
     (tmp_path / "slowagent.py").write_text(SLOW)
     env = os.environ | {"PYTHONPATH": str(tmp_path)}
@@ -276,7 +278,7 @@ def test_no_more_than_the_maximal_cost(smoke, tmp_path):
 
 def test_a_defect_of_the_agents_is_one_line_with_its_place(smoke, tmp_path):
     with pytest.raises(
-        AerialDojoError, match=rf"agent {HERE}:Broken failed at task .*KeyError at {HERE}.py:\d+: 'map'"
+        AerialDojoError, match=rf"agent {HERE}:Broken failed at task .*KeyError at {FILE}\.py:\d+: 'map'"
     ):
         evaluate(smoke, job(f"{HERE}:Broken", limit=2, tolerate=False), out=tmp_path)
     assert not runs(tmp_path)
@@ -325,6 +327,7 @@ def test_every_table_has_its_rows(whole):
         )
 
 
+@pytest.mark.kill
 def test_ctrl_c_keeps_what_was_finished_and_ends_the_workers(project, smoke, tmp_path):
     (tmp_path / "slowagent.py").write_text(SLOW.replace("0.01", "0.1"))
     out = tmp_path / "out"

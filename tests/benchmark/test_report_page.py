@@ -109,6 +109,7 @@ def test_a_release_that_is_not_the_runs_own_is_refused(log: Path, runs: list[Run
         list(replays(tmp_path, log, runs, choose_tasks(runs, 1)))
 
 
+@pytest.mark.browser
 def test_the_page_works_in_a_browser_and_asks_for_nothing(
     smoke: Path, runs: list[Run], shown: list[Replay], tmp_path: Path
 ) -> None:

@@ -11,6 +11,8 @@ from fuzzing.mutate import mutant
 from aerialdojo_gen.common.rng import generator
 from aerialdojo_gen.errors import AssetError
 
+pytestmark = pytest.mark.slow
+
 EACH = 40
 
 

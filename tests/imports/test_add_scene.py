@@ -237,6 +237,7 @@ def planned(tmp_path, name, mesh, n_objects, **options):
     return added, store.read_scene(data, "verdicts", name)
 
 
+@pytest.mark.pipeline
 def test_helsinki_up_to_planned_tasks(tmp_path):
     assert foreign.helsinki(tmp_path / "helsinki.glb") == 486
     with pytest.raises(AssetError, match=r"too large to plan in.*--crop"):
@@ -247,6 +248,7 @@ def test_helsinki_up_to_planned_tasks(tmp_path):
     assert pc.sum(verdicts["keep"]).as_py() > 10
 
 
+@pytest.mark.pipeline
 def test_the_monastery_up_to_planned_tasks(tmp_path):
     whole, _ = adopt("Monastery", read_mesh(foreign.monastery()), up="y")
     assert whole.n_triangles > 100_000

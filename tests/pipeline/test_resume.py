@@ -18,6 +18,8 @@ from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.shards import read_info
 from aerialdojo_gen.store.staging import AREA
 
+pytestmark = pytest.mark.kill
+
 TABLES = ("meshes", "scenes", "landmarks", "objects", "chosen_anchors", "anchors", "pairs", "plans")
 
 

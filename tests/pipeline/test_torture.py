@@ -7,6 +7,8 @@ import random  # noqa: TID251 - which kills, not what is generated
 import pytest
 import torture
 
+pytestmark = pytest.mark.kill
+
 
 @pytest.fixture(scope="module")
 def bench(smoke, tmp_path_factory):

@@ -195,6 +195,7 @@ def surveyed(tmp_path_factory):
     return found
 
 
+@pytest.mark.pipeline
 @pytest.mark.parametrize("seed", [1, 2])
 def test_from_import_to_release_nothing_is_below_the_ground(surveyed, seed):
     data, pipeline, field, shift = surveyed[seed]
@@ -210,6 +211,7 @@ def test_from_import_to_release_nothing_is_below_the_ground(surveyed, seed):
     assert check(Planted(data, NAME), pipeline=pipeline) == {}
 
 
+@pytest.mark.pipeline
 def test_validate_finds_what_is_planted_below_the_ground(surveyed, tmp_path):
     data, pipeline, field, shift = surveyed[1]
     shutil.copytree(data / "release", tmp_path / "data" / "release")

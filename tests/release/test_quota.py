@@ -129,6 +129,7 @@ def test_a_pool_that_is_too_small_is_named_and_nothing_else(tmp_path):
     assert "173/173 " in shown[2]
 
 
+@pytest.mark.pipeline
 def test_split_writes_nothing_where_a_pool_is_too_small(tmp_path):
     project = tmp_path / "project"
     (project / "scenes").mkdir(parents=True)

@@ -169,6 +169,7 @@ def test_a_dollar_in_a_name_is_no_mathematics(pictured, tmp_path):
     assert cv2.imread(str(write_png(task, tmp_path / "p.png"))) is not None
 
 
+@pytest.mark.browser
 def test_the_page_opens_in_a_browser_without_a_network(pictured, page, tmp_path):
     path = tmp_path / "task.html"
     path.write_text(page, encoding="utf-8")

@@ -48,6 +48,7 @@ def whole(tmp_path_factory):
     return data
 
 
+@pytest.mark.kill
 def test_a_killed_run_goes_on_at_the_trajectory_and_ends_with_the_same_bytes(tmp_path, whole):
     write_inputs(tmp_path)
     code = f"from support.court import *; from pathlib import Path; run_whole(Path({str(tmp_path)!r}), CONFIG.model_copy(update={{'limit': 0, 'trajectories_per_part': 5}}))"  # noqa: E501

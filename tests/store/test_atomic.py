@@ -86,6 +86,7 @@ def test_a_number_that_is_taken_again_keeps_no_rubbish(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.kill
 @pytest.mark.parametrize("exchange", [True, False], ids=["exchange", "two renames"])
 def test_a_folder_killed_at_any_step_is_the_old_one_or_the_new_one(tmp_path, exchange):
     seen = set()
@@ -114,6 +115,7 @@ def test_a_folder_killed_at_any_step_is_the_old_one_or_the_new_one(tmp_path, exc
     assert seen == {"old", "new"}
 
 
+@pytest.mark.kill
 def test_a_file_killed_at_any_step_is_the_old_one_or_the_new_one(tmp_path):
     code = """
         import sys
@@ -213,6 +215,7 @@ def test_the_same_disk_mounted_twice(tmp_path):
     assert names(tmp_path) == {"far/f/a": "two", "far/b": "two"}
 
 
+@pytest.mark.kill
 def test_scratch_folders_of_killed_runs_are_gone_at_the_next(tmp_path, monkeypatch):
     code = textwrap.dedent("""
         import os, signal

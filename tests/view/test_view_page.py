@@ -14,6 +14,8 @@ from aerialdojo_gen.browse.lookup import ReleasedScene
 from aerialdojo_gen.rendering.preview import look_at
 from aerialdojo_gen.store.schemas import ACTION_NAMES
 
+pytestmark = pytest.mark.browser
+
 
 @pytest.fixture(scope="module")
 def page(smoke):

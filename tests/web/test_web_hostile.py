@@ -18,6 +18,8 @@ from support.viewing import YARD, served
 
 from aerialdojo_gen.web.limits import MOST_PER_CLIENT
 
+pytestmark = pytest.mark.slow
+
 
 def port_of(url):
     return int(url.rstrip("/").rpartition(":")[2])
