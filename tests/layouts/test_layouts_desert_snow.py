@@ -3,19 +3,8 @@
 import numpy as np
 import pytest
 import shapely
-from support.layout_checks import (
-    catalogue,
-    clashes,
-    floating,
-    glb_bytes,
-    kinds_of,
-    looks_of,
-    props_of,
-    scene_of,
-    walled_in,
-)
+from support.layout_checks import catalogue, props_of
 
-from aerialdojo_gen.common.paper import paper_counts
 from aerialdojo_gen.errors import AssetError
 from aerialdojo_gen.layouts.natural_groups import Group, level_ground, plan_groups, set_out
 from aerialdojo_gen.layouts.natural_sands import dunes, wash
@@ -26,7 +15,6 @@ from aerialdojo_gen.scenes.site import Site
 from aerialdojo_gen.scenes.terrain import rolling_terrain
 
 SCENES = [f"N_{kind}_{k}" for kind in ("Desert", "Snowfield") for k in (0, 1)]
-STRUCTURE = ("rock", "mudbrick_house", "hut", "ruin_wall", "ice_ridge")
 each_scene = pytest.mark.parametrize("name", SCENES)
 
 
@@ -35,45 +23,13 @@ def blank(size: float = 60.0) -> Site:
 
 
 @each_scene
-def test_scenes_are_as_rich_as_the_paper_asks(name):
-    scene = scene_of(name)
-    n_landmarks, n_objects = paper_counts()[name]
-    assert 30_000 <= scene.n_triangles <= 200_000
-    assert kinds_of(scene)["landmark"] >= n_landmarks
-    assert len(looks_of(scene)) >= 1.1 * n_objects
-    assert 12 <= scene.ceiling_m <= 30
-
-
-@each_scene
-def test_things_stand_on_something_and_not_in_anything(name):
-    scene = scene_of(name)
-    # Boulders lie up to half their height in the ground.
-    assert not floating(scene, reach_m=1.4)
-    assert not clashes(scene)
-    assert not walled_in(scene, STRUCTURE)
-
-
-@each_scene
-def test_things_keep_clear_of_rocks_and_houses(name):
+def test_things_keep_clear_of_rocks_and_houses(scene_of, name):
     scene = scene_of(name)
     hulls = [(i, shapely.MultiPoint(i.vertices[:, :2]).convex_hull) for i in scene.instances if i.category == "hut"]
     for prop in props_of(scene):
         for i, hull in hulls:
             if prop.bounds[0, 2] < i.bounds[1, 2] - 0.5 and prop.bounds[1, 2] > i.bounds[0, 2] + 1.0:
                 assert not hull.buffer(-0.3).contains(shapely.Point(prop.centroid[:2])), (prop.node, i.node)
-
-
-def test_bytes_are_the_same_every_time(tmp_path):
-    first, second = glb_bytes("N_Desert_1", tmp_path)
-    assert first == second
-
-
-@pytest.mark.parametrize("kind", ["Desert", "Snowfield"])
-def test_the_two_scenes_of_a_type_differ(kind):
-    first, second = (scene_of(f"N_{kind}_{k}") for k in (0, 1))
-    assert not np.array_equal(first.bounds, second.bounds)
-    things = [{(i.category, i.variant) for i in props_of(s)} for s in (first, second)]
-    assert len(things[0] ^ things[1]) > 0.5 * len(things[0] | things[1])
 
 
 def test_dunes_are_steeper_in_the_lee():

@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 import shapely
-from support.layout_checks import catalogue, clashes, floating, glb_bytes, kinds_of, looks_of, props_of, scene_of
+from support.layout_checks import catalogue
 
-from aerialdojo_gen.common.paper import paper_counts
 from aerialdojo_gen.geometry.rays import RayCaster
 from aerialdojo_gen.layouts.natural_peaks import Ridge, above, massif, steep
 from aerialdojo_gen.scenes.model import Scene
@@ -15,24 +14,7 @@ each_scene = pytest.mark.parametrize("name", SCENES)
 
 
 @each_scene
-def test_scenes_are_as_rich_as_the_paper_asks(name):
-    scene = scene_of(name)
-    n_landmarks, n_objects = paper_counts()[name]
-    assert 30_000 <= scene.n_triangles <= 200_000
-    assert kinds_of(scene)["landmark"] >= n_landmarks
-    assert len(looks_of(scene)) >= n_objects
-    assert all(i.bounds[1, 2] < scene.ceiling_m for i in scene.instances)
-
-
-@each_scene
-def test_props_stand_on_something(name):
-    # A chair may stand on a cabin's porch, which is a prop itself; boulders are half sunk in steep slopes.
-    apart = ("rocking_chair", "boulder")
-    assert not floating(scene_of(name), hung=apart, reach_m=2.2)
-
-
-@each_scene
-def test_boulders_touch_the_ground(name):
+def test_boulders_touch_the_ground(scene_of, name):
     scene = scene_of(name)
     ground = RayCaster(Scene(name, (scene["ground"],), scene.materials, scene.bounds))
     for boulder in (i for i in scene.instances if i.category == "boulder"):
@@ -43,25 +25,7 @@ def test_boulders_touch_the_ground(name):
         assert above.min() < 0.0 < above.max(), boulder.node
 
 
-@each_scene
-def test_props_do_not_stand_in_one_another(name):
-    chairs = {i.node for i in props_of(scene_of(name)) if i.category == "rocking_chair"}
-    assert [pair for pair in clashes(scene_of(name), 0.3) if not chairs & set(pair)] == []
-
-
-def test_bytes_are_the_same_every_time(tmp_path):
-    first, second = glb_bytes("N_Mountain_1", tmp_path)
-    assert first == second
-
-
-def test_the_two_mountains_differ():
-    first, second = (scene_of(f"N_Mountain_{k}") for k in (0, 1))
-    assert not np.array_equal(first.bounds, second.bounds)
-    things = [{(i.category, i.variant) for i in props_of(s)} for s in (first, second)]
-    assert len(things[0] ^ things[1]) > 0.3 * len(things[0] | things[1])
-
-
-def test_the_summit_is_reached_on_foot_and_crowned():
+def test_the_summit_is_reached_on_foot_and_crowned(scene_of):
     scene = scene_of("N_Mountain_0")
     ground, cross = scene["ground"], scene["summit_cross_000"]
     assert np.ptp(ground.vertices[:, 2]) > 25.0

@@ -3,19 +3,8 @@
 import numpy as np
 import pytest
 import shapely
-from support.layout_checks import (
-    catalogue,
-    clashes,
-    floating,
-    glb_bytes,
-    kinds_of,
-    looks_of,
-    props_of,
-    scene_of,
-    walled_in,
-)
+from support.layout_checks import catalogue, props_of
 
-from aerialdojo_gen.common.paper import paper_counts
 from aerialdojo_gen.errors import AssetError
 from aerialdojo_gen.geometry.rays import RayCaster
 from aerialdojo_gen.layouts.urban_concrete import Frame, put_up_frame, scaffold
@@ -27,7 +16,6 @@ from aerialdojo_gen.scenes.recipe import Recipe
 from aerialdojo_gen.scenes.site import Site
 
 SCENES = [f"U_{kind}_{k}" for kind in ("Factory", "ConstructionSite") for k in (0, 1)]
-STRUCTURE = ("power_house", "turbine_hall", "office_block", "canteen", "substation", "coal_bunker", "brick_stack")
 each_scene = pytest.mark.parametrize("name", SCENES)
 
 
@@ -36,43 +24,11 @@ def blank(size: float = 60.0) -> Site:
 
 
 @each_scene
-def test_scenes_are_as_rich_as_the_paper_asks(name):
-    scene = scene_of(name)
-    n_landmarks, n_objects = paper_counts()[name]
-    assert 30_000 <= scene.n_triangles <= 200_000
-    assert kinds_of(scene)["landmark"] >= n_landmarks
-    assert len(looks_of(scene)) >= n_objects
-    assert 12 <= scene.ceiling_m <= 30
-
-
-@each_scene
-def test_things_stand_on_something_and_not_in_anything(name):
-    scene = scene_of(name)
-    assert not floating(scene, bearers=("shipping_container",))
-    # A gantry crane straddles what it lifts.
-    assert not clashes(scene, bearers=("gantry_crane",))
-    assert not walled_in(scene, STRUCTURE)
-
-
-@each_scene
-def test_things_stand_at_many_heights(name):
+def test_things_stand_at_many_heights(scene_of, name):
     scene = scene_of(name)
     targets = set(catalogue().targets)
     heights = np.array([p.bounds[0, 2] for p in props_of(scene) if p.category in targets])
     assert np.percentile(heights, 95) - np.percentile(heights, 5) > 3.5
-
-
-@pytest.mark.parametrize("kind", ["Factory", "ConstructionSite"])
-def test_the_two_scenes_of_a_type_differ(kind):
-    first, second = (scene_of(f"U_{kind}_{k}") for k in (0, 1))
-    assert not np.array_equal(first.bounds, second.bounds)
-    a, b = ({i.category for i in s.instances if i.category not in catalogue()} for s in (first, second))
-    assert len(a ^ b) > 0.5 * len(a | b)
-
-
-def test_bytes_are_the_same_every_time(tmp_path):
-    first, second = glb_bytes("U_Factory_1", tmp_path)
-    assert first == second
 
 
 def test_a_frame_bears_on_every_floor_and_is_open_between():

@@ -75,7 +75,9 @@ def wait_for_shards(data, n, process):
 def test_killed_again_and_again_ends_with_the_same_bytes(project, smoke, tmp_path):
     data = tmp_path / "data"
     kills = 0
-    for shards in (1, 3, 6, 8, 9, 11, 13):
+    # In build-scenes, between two stages, in anchor-sample, in plan. What a kill at any one call leaves, test_atomic
+    # and the torture try.
+    for shards in (1, 6, 9, 13):
         process = start(project, data, *plan_args(data))
         wait_for_shards(data, shards, process)
         # Somewhere after the shard's commit, most often within the next one's work or write.
@@ -135,14 +137,19 @@ def test_nothing_changed_nothing_is_written(project, copy):
     assert err.count("nothing to do") == 5
 
 
-@pytest.mark.parametrize("keep", [0, 100, -9])
-def test_a_truncated_shard_is_named_and_made_again(project, smoke, copy, keep):
-    path = sorted(copy.glob("plans/*/part-00000.parquet"))[0]
-    path.write_bytes(path.read_bytes()[:keep])
+def shard(data, table, number):
+    return sorted(data.glob(f"{table}/*/part-00000.parquet"))[number]
+
+
+def test_truncated_shards_are_named_and_made_again(project, smoke, copy):
+    cut = {shard(copy, "plans", 0): 0, shard(copy, "pairs", 0): 100, shard(copy, "landmarks", 1): -9}
+    for path, keep in cut.items():
+        path.write_bytes(path.read_bytes()[:keep])
     code, err = run(project, copy, *plan_args(copy))
-    assert code == 0
-    assert f"{path} is damaged" in err
-    assert "computed again" in err
+    assert code == 0, err
+    for path in cut:
+        assert f"{path} is damaged" in err
+    assert err.count("computed again") >= 3
     assert snapshot(copy) == snapshot(smoke)
 
 
@@ -185,20 +192,24 @@ def test_a_mesh_with_a_vertex_moved_is_built_again(project, smoke, copy):
     assert snapshot(copy) == snapshot(smoke)
 
 
-@pytest.mark.parametrize("text", [b"null", b"[]", b"x", None])
-def test_a_shard_with_a_damaged_footer_is_made_again(project, smoke, copy, text):
-    path = sorted(copy.glob("pairs/*/part-00000.parquet"))[0]
-    raw = path.read_bytes()
-    at = raw.index(b'{"checksum"')
-    if text is None:
-        path.write_bytes(raw[: at + 20] + bytes([raw[at + 20] ^ 1]) + raw[at + 21 :])
-    else:
-        end = raw.index(b"}}", at) + 2
-        path.write_bytes(raw[:at] + text.ljust(end - at) + raw[end:])
+def test_shards_with_a_damaged_footer_are_made_again(project, smoke, copy):
+    damage = {
+        shard(copy, "pairs", 0): b"null", shard(copy, "pairs", 1): b"[]", shard(copy, "objects", 0): b"x",
+        shard(copy, "landmarks", 1): None,
+    }  # fmt: skip
+    for path, text in damage.items():
+        raw = path.read_bytes()
+        at = raw.index(b'{"checksum"')
+        if text is None:
+            path.write_bytes(raw[: at + 20] + bytes([raw[at + 20] ^ 1]) + raw[at + 21 :])
+        else:
+            end = raw.index(b"}}", at) + 2
+            path.write_bytes(raw[:at] + text.ljust(end - at) + raw[end:])
     code, err = run(project, copy, *plan_args(copy))
     assert code == 0, err
-    assert f"{path} is damaged (its footer" in err
-    assert "computed again" in err
+    for path in damage:
+        assert f"{path} is damaged (its footer" in err
+    assert err.count("computed again") >= 4
     assert snapshot(copy) == snapshot(smoke)
 
 

@@ -10,10 +10,8 @@ import shapely
 import trimesh
 
 from aerialdojo_gen.geometry.rays import RayCaster
-from aerialdojo_gen.scenes.build import build_scene
 from aerialdojo_gen.scenes.catalogue import Catalogue, load_catalogue
 from aerialdojo_gen.scenes.footprints import footprint
-from aerialdojo_gen.scenes.glb import write_glb
 from aerialdojo_gen.scenes.model import Instance, Scene
 
 ASSETS = Path(__file__).parents[2] / "scene_assets"
@@ -27,11 +25,6 @@ def catalogue() -> Catalogue:
 def recipe_of(name: str) -> Path:
     """A recipe waits among the drafts until its scene is annotated."""
     return next(p for folder in ("scenes", "drafts") if (p := ASSETS / folder / f"{name}.toml").exists())
-
-
-@cache
-def scene_of(name: str) -> Scene:
-    return build_scene(recipe_of(name), catalogue())
 
 
 def props_of(scene: Scene) -> list[Instance]:
@@ -106,13 +99,3 @@ def walled_in(scene: Scene, structure: Collection[str]) -> list[str]:
             if len(hits) % 2:
                 out.append(props[int(k)].node)
     return out
-
-
-def glb_bytes(name: str, folder: Path) -> tuple[bytes, bytes]:
-    """Build a scene twice, from a catalogue read anew, and give the bytes of both."""
-    out = []
-    for k in range(2):
-        path = folder / f"{k}.glb"
-        write_glb(build_scene(recipe_of(name), load_catalogue(ASSETS)), path)
-        out.append(path.read_bytes())
-    return out[0], out[1]
