@@ -149,6 +149,7 @@ def test_a_pick_is_the_first_thing_on_the_mesh(client, desk):
     assert client.post("/api/pick", json={"origin_m": [0, 0, 5], "direction": [0, 0, 0]}).status_code == 400
 
 
+@pytest.mark.slow
 def test_candidates_are_those_that_the_stage_will_find_and_one_is_chosen(client, desk):
     found = client.get("/api/objects/0/anchors").json()
     assert len(found) == 3
