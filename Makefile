@@ -9,7 +9,7 @@ RUN := .venv/bin/aerialdojo-gen
 RUN_FLAGS := $(if $(WORKERS),--workers $(WORKERS))
 
 .DEFAULT_GOAL := help
-.PHONY: help env dev dataset smoke evaluate test fuzz torture lint format gallery bench lock clean
+.PHONY: help env dev dataset smoke evaluate test test-fast fuzz torture lint format gallery bench lock clean
 
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-9s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -58,6 +58,9 @@ evaluate: .venv/.installed  ## fly oracle, stop, constant, random, explorer on 6
 PYTEST_FLAGS ?= -n 2 --dist loadfile
 test: .venv/.dev  ## run the tests (PYTEST_FLAGS='-k planner' for some of them)
 	@.venv/bin/python -m pytest $(PYTEST_FLAGS)
+
+test-fast: .venv/.dev  ## unit and property tests alone: no whole pipeline, browser, kill, scene, cluster or object store
+	@.venv/bin/python -m pytest $(PYTEST_FLAGS) -m fast
 
 fuzz: .venv/.dev  ## mutants of every input into every parser, N=500 each (nightly: make fuzz N=10000 SEED=$$RANDOM)
 	@PYTHONPATH=tests .venv/bin/python -m fuzzing -n $(or $(N),500) $(if $(SEED),--seed $(SEED)) $(foreach t,$(TARGET),--target $(t))

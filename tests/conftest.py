@@ -1,4 +1,4 @@
-"""What several test files share."""
+"""What several test files share: the tiers, the smoke run, a browser."""
 
 from __future__ import annotations
 
@@ -13,7 +13,22 @@ from typing import TYPE_CHECKING
 import pytest
 
 if TYPE_CHECKING:
-    from planting import Planted
+    from support.planting import Planted
+
+# A test with one of these marks is left out of `make test-fast`; every other gets the mark "fast".
+NOT_FAST = frozenset({"pipeline", "browser", "kill", "scenes", "ray", "s3", "slow"})
+# Marks that go with a fixture.
+BY_FIXTURE = {"smoke": "pipeline", "browser": "browser", "mesh_of": "scenes"}
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Put every test into its tier."""
+    for item in items:
+        for fixture in BY_FIXTURE.keys() & set(getattr(item, "fixturenames", ())):
+            item.add_marker(BY_FIXTURE[fixture])
+        if not NOT_FAST & {mark.name for mark in item.iter_markers()}:
+            item.add_marker("fast")
 
 
 @pytest.fixture(scope="session")
@@ -23,23 +38,32 @@ def project() -> Path:
 
 
 @pytest.fixture(scope="session")
-def smoke(project: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The data directory of a whole run of pipelines/smoke.toml, shared by the test processes of a session."""
-    # xdist's processes have one parent folder in common: the first to come makes the data, the others wait.
-    shared = tmp_path_factory.getbasetemp().parent if os.environ.get("PYTEST_XDIST_WORKER") else None
-    data = (shared or tmp_path_factory.getbasetemp()) / "smoke-data"
-    with data.with_suffix(".lock").open("w") as lock:
+def shared(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder that the session's test processes have in common: make a thing in it once, under a lock."""
+    base = tmp_path_factory.getbasetemp()
+    folder = (base.parent if os.environ.get("PYTEST_XDIST_WORKER") else base) / "shared"
+    folder.mkdir(exist_ok=True)
+    return folder
+
+
+@pytest.fixture(scope="session")
+def smoke(project: Path, shared: Path) -> Path:
+    """The data directory of a whole run of pipelines/smoke.toml: read it; what a test changes is a copy of it."""
+    data, whole = shared / "smoke", shared / "smoke.whole"
+    with (shared / "smoke.lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
-        command = [sys.executable, "-m", "aerialdojo_gen.cli", "run", "pipelines/smoke.toml", "--data", str(data)]
-        done = subprocess.run(command, cwd=project, capture_output=True, text=True, check=False)
-        assert done.returncode == 0, done.stderr
+        if not whole.exists():
+            command = [sys.executable, "-m", "aerialdojo_gen.cli", "run", "pipelines/smoke.toml", "--data", str(data)]
+            done = subprocess.run(command, cwd=project, capture_output=True, text=True, check=False)
+            assert done.returncode == 0, done.stderr
+            whole.touch()
     return data
 
 
 @pytest.fixture
 def planted(smoke: Path, tmp_path: Path) -> Planted:
     """A copy of the smoke run's release and meshes, to plant faults in; its scene is U_Courtyard_0."""
-    from planting import Planted
+    from support.planting import Planted
 
     shutil.copytree(smoke / "release", tmp_path / "data" / "release")
     shutil.copytree(smoke / "meshes", tmp_path / "data" / "meshes")

@@ -5,7 +5,7 @@
 A case copies a data directory, runs a command in a session of its own, kills the whole session with SIGKILL, and
 gives the same command again. The directory then has to hold the files of an undisturbed run, byte for byte, and no
 other. Every other case is killed after a random time, the rest at a random one of the calls that an undisturbed run
-makes of write, rename, renameat2, fsync, syncfs, mkdir, rmdir, unlink, link and flock (tests/preload.py).
+makes of write, rename, renameat2, fsync, syncfs, mkdir, rmdir, unlink, link and flock (tests/support/preload.py).
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from preload import library
+from support.preload import library
 
 ROOT = Path(__file__).resolve().parent.parent
 SCENE, OTHER = "U_Courtyard_0", "U_Courtyard_1"

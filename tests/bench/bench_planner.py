@@ -17,8 +17,8 @@ import numpy as np
 import trimesh
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
-from flying import turned
-from handmade import box, instance
+from support.flying import turned
+from support.handmade import box, instance
 
 from aerialdojo_gen.config.sections import PlanConfig, Rung
 from aerialdojo_gen.planning.certify import certify

@@ -15,12 +15,9 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
-import annotation_scenes
-import court
-import foreign
 import numpy as np
-import rendered
-import task_files
+from fuzzing.mutate import toml_dumped
+from support import annotation_scenes, court, foreign, rendered, task_files
 
 from aerialdojo_gen.annotate.storage import parse_whole
 from aerialdojo_gen.annotations.check import check_source
@@ -43,7 +40,6 @@ from aerialdojo_gen.scenes.glb import read_glb, write_glb
 from aerialdojo_gen.scoring.vlm import read_order
 from aerialdojo_gen.stages.annotate_import import annotation_tables
 from aerialdojo_gen.store import shards as store
-from fuzzing.mutate import toml_dumped
 
 ROOT = Path(__file__).resolve().parents[2]
 ASSETS = ROOT / "scene_assets"
@@ -284,7 +280,7 @@ def _read_mesh(folder: Path) -> None:
 
 
 def _aerialdojo() -> list[Case]:
-    from test_import_benchmark_layout import document, put
+    from tests.exchange.test_import_benchmark_layout import document, put
 
     return [_made(lambda folder, turn=turn: put(folder, *document(turn))) for turn in (15, 60)]
 

@@ -15,10 +15,11 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TextIO
 
-from aerialdojo_gen.common.rng import generator
-from aerialdojo_gen.errors import AerialDojoError
 from fuzzing.mutate import mutant
 from fuzzing.targets import TARGETS, Case, Target, case_of, laid_out
+
+from aerialdojo_gen.common.rng import generator
+from aerialdojo_gen.errors import AerialDojoError
 
 HANG_S = 10.0
 MEMORY_BYTES = 2 << 30

@@ -1,0 +1,138 @@
+"""Reading descriptions, relations computed from meshes, and the check that no description fits two things."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from support.annotation_scenes import GOOD, NAMES, box, street
+
+from aerialdojo_gen.annotations.ambiguity import nearest_landmark
+from aerialdojo_gen.annotations.check import make_ambiguity
+from aerialdojo_gen.annotations.relations import SceneGeometry
+from aerialdojo_gen.store.schemas import DIRECTIONS
+
+
+def _street_check(scene=None):
+    return make_ambiguity(scene or street(), NAMES, {"clock tower": "clock_tower_000"}, ["clock_tower_000"])
+
+
+def _at(check, node):
+    return check.geometry.index[node]
+
+
+@pytest.mark.parametrize("node", sorted(GOOD))
+def test_good_descriptions_are_true_and_fit_nothing_else(node):
+    check = _street_check()
+    assert check.untruths(_at(check, node), GOOD[node]) == []
+    assert check.rivals(_at(check, node), GOOD[node]) == []
+
+
+@pytest.mark.parametrize(
+    ("text", "fits"),
+    [
+        ("A delivery van.", {"delivery_van_001", "delivery_van_002"}),
+        ("A red delivery van.", {"delivery_van_001"}),
+        ("A red delivery van in the yard, north-east of here.", {"delivery_van_001"}),
+        ("A delivery van with big wheels. It is red.", {"delivery_van_001"}),
+        ("A delivery van beside a yellow mailbox.", set()),
+        ("A delivery van with a mailbox to be seen somewhere.", {"delivery_van_001", "delivery_van_002"}),
+        ("A delivery van that stands south of a yellow mailbox.", set()),
+    ],
+)
+def test_planted_ambiguities_are_found(text, fits):
+    check = _street_check()
+    rivals = check.rivals(_at(check, "delivery_van_000"), text)
+    assert {check.geometry.scene.instances[j].node for j in rivals} == fits
+
+
+def test_a_rival_that_is_almost_as_near_counts():
+    scene = street()
+    # 3.4 m from the second van: too far to be said "beside", near enough to be taken for it.
+    extra = box("mailbox_002", (40, 40 - 1 - 3.4 - 0.3, 0), (0.6, 0.6, 1.2), colour="yellow")
+    check = _street_check(dataclasses.replace(scene, instances=(*scene.instances, extra)))
+    text = GOOD["delivery_van_000"]
+    assert check.rivals(_at(check, "delivery_van_000"), text) == [_at(check, "delivery_van_001")]
+    assert check.untruths(_at(check, "delivery_van_001"), text) != []
+
+
+@pytest.mark.parametrize(
+    ("node", "text"),
+    [
+        ("delivery_van_000", "A blue delivery van in the yard."),
+        ("delivery_van_000", "A red delivery van beside a bench."),
+        ("delivery_van_000", "A red delivery van beside a red mailbox."),
+        ("delivery_van_000", "A red delivery van on the north side of a mailbox."),
+        ("delivery_van_000", "A red delivery van under the canopy."),
+        ("mailbox_001", "A red mailbox on the canopy."),
+        ("delivery_van_001", "A red delivery van between the bench and the clock tower."),
+    ],
+)
+def test_untruths_are_found(node, text):
+    check = _street_check()
+    assert len(check.untruths(_at(check, node), text)) == 1
+
+
+def test_colours_of_other_things_are_not_the_subjects():
+    check = _street_check()
+    i = _at(check, "delivery_van_000")
+    reading = check.lexicon.read("In the yard, next to a yellow mailbox, stands a red delivery van.", i)
+    assert reading.named == ("red",)
+    assert set(reading.values) == {"in the yard", "red"}
+    (claim,) = reading.claims
+    assert claim.relation == "beside"
+    assert claim.things == (frozenset({_at(check, "mailbox_000")}),)
+
+
+def test_vertical_relations():
+    check = _street_check()
+    g = check.geometry
+    mailbox, canopy, ground = (g.index[n] for n in ("mailbox_001", "canopy_000", "ground_000"))
+    assert g.under(mailbox, canopy)
+    assert g.above(canopy, mailbox)
+    assert not g.beside(mailbox, canopy)
+    assert g.support(mailbox) == ground
+    assert g.support(canopy) is None
+
+
+_spot = st.tuples(st.floats(-30, 30), st.floats(-30, 30))
+
+
+@given(_spot, _spot)
+def test_relations_grow_with_slack_and_near_is_mutual(a, b):
+    scene = dataclasses.replace(
+        street(), instances=(box("bench_000", (*a, 0), (2, 0.6, 0.8)), box("mailbox_000", (*b, 0), (0.6, 0.6, 1.2)))
+    )
+    g = SceneGeometry(scene)
+    assert g.near(0, 1) == g.near(1, 0)
+    assert g.gap_m(0, 1) == pytest.approx(g.gap_m(1, 0), abs=1e-9)
+    for relation in (g.near, g.beside):
+        assert not relation(0, 1) or relation(0, 1, 1.35)
+    sides = [d for d in DIRECTIONS if g.side(0, 1, d)]
+    assert len(sides) <= 2
+    assert all(g.side(0, 1, d, 1.35) for d in sides)
+
+
+@given(st.lists(_spot, min_size=1, max_size=6), _spot)
+def test_nearest_landmark_is_nearest_and_its_direction_points_there(places, here):
+    bearing = nearest_landmark(np.array(here), np.array(places))
+    offsets = np.array(here) - np.array(places)
+    away = np.hypot(*offsets.T)
+    if bearing is None:
+        assert away.min() < 1e-3
+        return
+    assert away[bearing.landmark] <= away.min() + 1e-3
+    angle = np.deg2rad(45 * DIRECTIONS.index(bearing.direction))
+    along = offsets[bearing.landmark] @ [np.cos(angle), np.sin(angle)]
+    assert along >= np.cos(np.deg2rad(22.5)) * away[bearing.landmark] - 1e-9
+
+
+def test_the_first_of_equally_near_landmarks_is_taken():
+    bearing = nearest_landmark(np.array([0.0, 0.0]), np.array([[3.0, 4.0], [5.0, 0.0], [0.0, -5.0]]))
+    assert bearing is not None
+    assert bearing.landmark == 0
+    assert nearest_landmark(np.array([1.0, 1.0]), np.array([[1.0, 1.0]])) is None
+    assert nearest_landmark(np.array([1.0, 1.0]), np.zeros((0, 2))) is None

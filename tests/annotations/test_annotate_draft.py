@@ -1,0 +1,126 @@
+"""Drafted annotations: they pass the checks, say what a person would say, and are the same each time."""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+from pathlib import Path
+
+import pytest
+from support.annotation_scenes import box, street
+
+from aerialdojo_gen.annotations.check import check_source
+from aerialdojo_gen.annotations.draft import Choice, draft_annotations
+from aerialdojo_gen.annotations.format import format_annotations, parse_annotations
+from aerialdojo_gen.annotations.phrases import article, noun_of, words_of
+from aerialdojo_gen.common.rng import generator
+from aerialdojo_gen.errors import AnnotationError
+from aerialdojo_gen.scenes.catalogue import load_catalogue
+from aerialdojo_gen.scenes.model import Instance, Scene
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+@pytest.fixture(scope="module")
+def catalogue():
+    return load_catalogue(ROOT / "scene_assets")
+
+
+@pytest.fixture(scope="module")
+def plaza(catalogue) -> Scene:
+    """Real props: a clock tower and rows of street things round it, many of them alike."""
+    rng = generator(0, "test", "plaza")
+    categories = ("bench", "mailbox", "litter_bin", "fire_hydrant", "sedan", "delivery_van", "bicycle", "boulder")
+    instances = [
+        box("ground_000", (0, 0, -0.1), (100, 100, 0.1)),
+        catalogue.instantiate("clock_tower", "clock_tower_000", rng),
+    ]
+    for k in range(48):
+        category = categories[int(rng.integers(len(categories)))]
+        spot = (-30.0 + 8.0 * (k % 8) + float(rng.uniform(0, 2)), -21.0 + 9.0 * (k // 8), 0.0)
+        instances.append(catalogue.instantiate(category, f"{category}_{k:03d}", rng, spot, 15.0 * k))
+    materials = street().materials
+    return Scene("U_Plaza_0", tuple(instances), materials, street().bounds)
+
+
+def test_drafts_pass_the_checks_and_are_the_same_each_time(plaza, catalogue):
+    draft = draft_annotations(plaza, catalogue, 1, 20, seed=3)
+    text = format_annotations(draft)
+    assert text == format_annotations(draft_annotations(plaza, catalogue, 1, 20, seed=3))
+    assert text != format_annotations(draft_annotations(plaza, catalogue, 1, 20, seed=4))
+    names = {category: catalogue[category].name for category in catalogue}
+    assert check_source(parse_annotations(text), plaza, names, (1, 20)) == []
+
+
+def test_drafts_are_varied_english(plaza, catalogue):
+    draft = draft_annotations(plaza, catalogue, 1, 20, seed=3)
+    texts = [entry.description for entry in draft.objects]
+    # The boulders are scenery: nobody is sent to look for one of many alike.
+    assert {entry.category for entry in draft.objects} == {i.category for i in plaza.instances} & set(
+        catalogue.targets
+    )
+    assert len(set(texts)) == len(texts)
+    assert len({" ".join(text.split()[:2]) for text in texts}) > 8
+    for text in texts:
+        assert re.fullmatch(r"[A-Z][^_{}\d]*[.]", text), text
+        assert "  " not in text
+        assert not re.search(r"\ba [aeio]|\ban [^aeiouASh]|\b(\w+) \1\b", text), text
+
+
+def test_choice_limits_objects(plaza, catalogue):
+    allowed = {i.node for i in plaza.instances if i.category in ("bench", "sedan", "mailbox", "bicycle")}
+    choice = Choice(eligible=allowed.__contains__, centre_m=(0.0, 0.0), within_m=25.0)
+    draft = draft_annotations(plaza, catalogue, 1, 8, 0, choice)
+    for entry in draft.objects:
+        assert entry.node in allowed
+        x, y, _ = plaza[entry.node].centroid
+        assert x * x + y * y <= 25.0**2
+
+
+def test_too_few_things_is_an_error(plaza, catalogue):
+    with pytest.raises(AnnotationError, match="500 objects are wanted"):
+        draft_annotations(plaza, catalogue, 1, 500, 0)
+    with pytest.raises(AnnotationError, match="2 landmarks are wanted"):
+        draft_annotations(plaza, catalogue, 2, 5, 0)
+
+
+def test_things_that_cannot_be_told_apart_are_not_drafted(catalogue):
+    rng = generator(0, "test", "twins")
+    tower = catalogue.instantiate("clock_tower", "clock_tower_000", rng)
+    twins = [
+        catalogue.instantiate("mailbox", f"mailbox_{k:03d}", rng, (30.0, 30.0 + 30.0 * k, 0.0), variant="red")
+        for k in range(2)
+    ]
+    scene = dataclasses.replace(street(), name="U_Twins_0", instances=(tower, *twins))
+    with pytest.raises(AnnotationError, match="can be chosen and told apart"):
+        draft_annotations(scene, catalogue, 1, 1, 0)
+
+
+def _thing(catalogue, category: str, **attributes: str) -> str:
+    part = street().instances[0].parts
+    words = words_of(category, catalogue[category].name, catalogue[category].kind)
+    return noun_of(Instance("x_000", category, "", attributes, part), words).a()
+
+
+@pytest.mark.parametrize(
+    ("category", "attributes", "said"),
+    [
+        ("delivery_van", {"colour": "red", "pattern": "white stripe"}, "a red delivery van with a white stripe"),
+        ("hatchback", {"colour": "orange", "pattern": "black roof"}, "an orange hatchback with a black roof"),
+        ("suv", {"colour": ""}, "an SUV"),
+        ("bush", {"pattern": "red berries"}, "a bush with red berries"),
+        ("forklift", {"colour": "red", "state": "forks raised"}, "a red forklift with its forks raised"),
+        ("traffic_light", {"state": "showing red"}, "a traffic light showing red"),
+        ("wildflowers", {"colour": "purple"}, "a patch of purple wildflowers"),
+        ("deer", {"state": "with antlers", "place": "at the pond"}, "a deer with antlers"),
+        ("kiosk", {"colour": "teal", "sign": "news"}, "a teal kiosk with a sign reading “NEWS”"),
+    ],
+)
+def test_noun_phrases(catalogue, category, attributes, said):
+    assert _thing(catalogue, category, **attributes) == said
+
+
+def test_articles():
+    assert [article(w) for w in ("unicycle", "umbrella", "oak", "SUV", "one-armed lamp", "red oak")] == [
+        "a", "an", "an", "an", "a", "a",
+    ]  # fmt: skip

@@ -1,0 +1,283 @@
+"""The environment: motion, collision, what ends an episode, Gymnasium's contract."""
+
+import math
+import os
+import warnings
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from support.flying import town
+from support.handmade import box, instance, scene
+
+from aerialdojo_gen.benchmark import AerialDojoEnv
+from aerialdojo_gen.benchmark.episode import Episode
+from aerialdojo_gen.benchmark.goal import N_ACTIONS
+from aerialdojo_gen.benchmark.motion import FlightSpace
+from aerialdojo_gen.errors import RenderError, StoreError, UsageError
+from aerialdojo_gen.planning.collision import CollisionWorld
+from aerialdojo_gen.planning.primitives import replay, route_length_m
+from aerialdojo_gen.store import schemas
+
+RADIUS = 0.25
+ID = {name: i for i, name in enumerate(schemas.ACTION_NAMES)}
+
+
+@pytest.fixture(scope="module")
+def yard():
+    """A wall of 1 m across x = 5, and a thin one across x = -5."""
+    wall = instance("wall", box((5, -3, 0), (6, 3, 4)))
+    sheet = instance("sheet", box((-5.001, -3, 0), (-5, 3, 4)))
+    return FlightSpace(scene(wall, sheet, half=10.0, ceiling=8.0), RADIUS)
+
+
+@pytest.fixture(scope="module")
+def village():
+    return FlightSpace(town(), RADIUS)
+
+
+def fly(space, *names, start=(0.0, 0.0, 2.0, 0.0), goal=(3.0, 0.0, 2.0), budget=90):
+    episode = Episode(space, start, goal, budget)
+    for name in names:
+        episode.step(None if name is None else ID[name])
+    return episode
+
+
+def test_stop_inside_the_radius_is_success_and_outside_is_not(yard):
+    near = fly(yard, "MoveForward3", "Stop")
+    assert (near.termination, near.stop_called, near.success(3.0)) == ("stop", True, True)
+    assert near.distance_m == 0.0
+    far = fly(yard, "MoveLeft1", "Stop", goal=(3.0, 0.0, 2.0))
+    assert (far.termination, far.stop_called, far.success(3.0)) == ("stop", True, False)
+    assert far.success(3.2)
+    assert far.min_distance_m == 3.0, "the start counts"
+
+
+def test_a_wall_stops_the_body_where_it_touches(yard):
+    hit = fly(yard, "MoveForward5")
+    assert (hit.termination, hit.stop_called, hit.success(3.0)) == ("collision", False, False)
+    assert hit.position == pytest.approx((5.0 - RADIUS, 0.0, 2.0), abs=2e-3)
+    assert hit.path_length_m == pytest.approx(4.75, abs=2e-3)
+    assert hit.position[0] <= 5.0 - RADIUS, "on the free side"
+    assert hit.min_distance_m == pytest.approx(1.75, abs=2e-3), "the contact counts"
+
+
+def test_a_thin_sheet_cannot_be_jumped_over(yard):
+    back = (0.0, 0.0, 2.0, math.pi)
+    assert fly(yard, "MoveForward3", "MoveForward3", start=back).termination == "collision"
+    assert fly(yard, "MoveUp2", "MoveUp2", "MoveForward5", "MoveForward3", start=back).termination is None
+
+
+def test_collision_after_the_radius_keeps_the_smallest_distance(yard):
+    late = fly(yard, "MoveForward3", "MoveForward3", goal=(3.0, 0.0, 2.0))
+    assert late.termination == "collision"
+    assert late.min_distance_m == 0.0
+    assert late.distance_m == pytest.approx(1.75, abs=2e-3)
+
+
+def test_the_last_action_may_be_a_stop_a_collision_or_neither(yard):
+    assert fly(yard, "MoveForward1", "Stop", budget=2).termination == "stop"
+    assert fly(yard, "MoveForward1", "MoveForward5", budget=2).termination == "collision"
+    over = fly(yard, "MoveForward1", "MoveForward1", budget=2)
+    assert (over.termination, over.stop_called, over.remaining_actions) == ("budget", False, 0)
+    assert not over.success(3.0), "within the radius, but no Stop"
+    with pytest.raises(RuntimeError, match="budget"):
+        over.step(0)
+
+
+@pytest.mark.parametrize("first", ["Stop", "TurnLeft15", "MoveUp1", None])
+def test_a_start_in_collision_ends_so_at_the_first_action(yard, first):
+    episode = fly(yard, first, start=(5.1, 0.0, 2.0, 0.0), goal=(5.1, 0.0, 2.0))
+    assert episode.termination == "collision"
+    assert not episode.success(3.0)
+    assert episode.stop_called == (first == "Stop")
+    assert episode.position == (5.1, 0.0, 2.0)
+
+
+def test_the_fence_refuses_and_spends(yard):
+    start = (0.0, 9.0, 2.0, math.pi / 2)
+    episode = fly(yard, "MoveForward5", start=start)
+    assert (episode.refused, episode.n_refused, episode.n_actions) == (True, 1, 1)
+    assert (episode.position, episode.path_length_m, episode.termination) == ((0.0, 9.0, 2.0), 0.0, None)
+    episode.step(ID["MoveRight1"])
+    assert not episode.refused
+    assert fly(yard, "MoveForward5", start=start, budget=1).termination == "budget"
+
+
+def test_an_answer_without_an_action_spends_one(yard):
+    episode = fly(yard, None, None, budget=2)
+    assert (episode.n_invalid, episode.n_actions, episode.termination) == (2, 2, "budget")
+    with pytest.raises(ValueError, match="0 to 15"):
+        fly(yard).step(schemas.APPROACH)
+    with pytest.raises(ValueError, match="0 to 15"):
+        fly(yard).step(-1)
+
+
+free_starts = st.tuples(st.floats(-17, 17), st.floats(-17, 17), st.floats(0.5, 11), st.floats(-math.pi, math.pi))
+
+
+@settings(max_examples=60, deadline=None)
+@given(start=free_starts, actions=st.lists(st.integers(1, N_ACTIONS - 1), min_size=1, max_size=30))
+def test_flying_is_replaying_up_to_the_first_touch(village, start, actions):
+    world = CollisionWorld(village.scene)
+    episode = Episode(village, start, (0.0, 0.0, 5.0), 300)
+    touched = world.sphere_in_collision(start[:3], RADIUS)
+    low, high = village.grid.arrays.lower - 1e-9, village.grid.arrays.upper + 1e-9
+    poses, flown = [np.array(start)], 0.0
+    for action in actions:
+        here = replay(poses[-1], [action])[-1]
+        inside = bool((here[:3] >= low).all() and (here[:3] <= high).all())
+        episode.step(action)
+        if touched or (inside and world.segment_in_collision(poses[-1][:3], here[:3], RADIUS)):
+            assert episode.termination == "collision"
+            return
+        assert episode.termination is None
+        assert episode.refused == (not inside)
+        if inside:
+            flown += float(np.linalg.norm(here[:3] - poses[-1][:3]))
+            poses.append(here)
+        assert episode.position == pytest.approx(tuple(poses[-1][:3]), abs=1e-9)
+        assert math.cos(episode.yaw_rad - poses[-1][3]) == pytest.approx(1.0, abs=1e-12)
+        assert -math.pi < episode.yaw_rad <= math.pi
+    assert episode.path_length_m == pytest.approx(flown, abs=1e-9)
+    distances = np.linalg.norm(np.array(poses)[:, :3] - [0.0, 0.0, 5.0], axis=1)
+    assert episode.min_distance_m == pytest.approx(distances.min(), abs=1e-9)
+    assert episode.path_length_m == pytest.approx(route_length_m(np.array(poses)[:, :3]), abs=1e-9)
+
+
+@pytest.fixture(scope="module")
+def seeing(smoke):
+    return gymnasium.make("AerialDojo-v0", data=smoke, width=24, height=16, render_mode="rgb_array").unwrapped
+
+
+def test_gymnasium_finds_nothing_to_complain_of(smoke, seeing):
+    blind = AerialDojoEnv(smoke, views=(), modality="semantic")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        warnings.filterwarnings("ignore", message=".*not.*unwrapped|.*spec.*|.*render_modes.*")
+        check_env(blind, skip_render_check=True)
+        check_env(seeing, skip_render_check=True)
+    assert "image" not in blind.observation_space["goal"].spaces
+    assert set(blind.observation_space.spaces) == {"step", "remaining_actions", "refused", "goal"}
+
+
+def test_what_is_seen_is_what_is_asked_for(seeing):
+    observation, info = seeing.reset(seed=4)
+    assert info == {"reason": ""}
+    assert list(observation["rgb"]) == list(observation["depth_m"]) == list(schemas.VIEWS)
+    for view in schemas.VIEWS:
+        rgb, depth = observation["rgb"][view], observation["depth_m"][view]
+        assert (rgb.shape, rgb.dtype) == ((16, 24, 3), np.uint8)
+        assert (depth.shape, depth.dtype) == ((16, 24), np.float32)
+        assert np.isfinite(depth).all(), "nothing within range is 0"
+        assert ((depth == 0) | ((depth > 0.1) & (depth <= 65.535))).all()
+    assert any(observation["depth_m"][view].any() for view in schemas.VIEWS)
+    picture = seeing.render()
+    assert picture.shape == (640, 640, 3)
+    assert picture.std() > 5
+
+
+def test_turning_around_shows_the_left_view_in_front(seeing):
+    observation, _ = seeing.reset(seed=4)
+    left = observation["depth_m"]["left"]
+    for _ in range(6):
+        observation, reward, terminated, truncated, info = seeing.step(schemas.TURN_LEFT)
+        assert (reward, terminated, truncated, info) == (0.0, False, False, {"reason": ""})
+    assert observation["depth_m"]["front"] == pytest.approx(left, abs=1e-3)
+    assert observation["step"].tolist() == [6]
+
+
+def test_a_chosen_task_and_what_ends_it(smoke):
+    env = AerialDojoEnv(smoke, views=(), modality="semantic", setting="base")
+    row = env._rows.slice(0, 1).to_pylist()[0]
+    observation, _ = env.reset(options={"task_id": row["task_id"]})
+    assert observation["goal"]["target_name"] == row["target_name"]
+    assert observation["goal"]["description"] == row["description"]
+    assert schemas.DIRECTIONS[observation["goal"]["direction"]] == row["direction"]
+    assert observation["remaining_actions"].tolist() == [row["action_budget"]]
+    for k in range(row["action_budget"]):
+        observation, _, terminated, truncated, info = env.step(schemas.TURN_LEFT)
+        assert truncated == (k == row["action_budget"] - 1)
+        assert not terminated
+    assert info == {"reason": "budget"}
+    env.reset(options={"task_id": row["task_id"]})
+    assert env.step(0)[1:] == (0.0, True, False, {"reason": "stop"}), "the start is never within 3 m of the goal"
+    with pytest.raises(RuntimeError, match="stop"):
+        env.step(0)
+
+
+def test_the_same_seed_draws_the_same_tasks(smoke):
+    def drawn(seed):
+        env = AerialDojoEnv(smoke, views=())
+        env.reset(seed=seed)
+        return [env.reset()[0]["goal"]["target_name"] for _ in range(6)]
+
+    assert drawn(1) == drawn(1)
+    assert drawn(1) != drawn(2)
+
+
+def test_reward_is_one_for_success(smoke):
+    env = AerialDojoEnv(smoke, views=(), success_radius_m=1000.0)
+    env.reset(seed=0)
+    assert env.step(0)[1:] == (1.0, True, False, {"reason": "stop"})
+
+
+@pytest.mark.parametrize("mode", ["sync", "async"])
+def test_vectorised(smoke, mode):
+    envs = gymnasium.make_vec(
+        "AerialDojo-v0", num_envs=2, vectorization_mode=mode, data=smoke, views=(), modality="semantic"
+    )
+    try:
+        first, _ = envs.reset(seed=[3, 5])
+        alone = [AerialDojoEnv(smoke, views=(), modality="semantic") for _ in range(2)]
+        names = [env.reset(seed=s)[0]["goal"]["target_name"] for env, s in zip(alone, (3, 5), strict=True)]
+        assert list(first["goal"]["target_name"]) == names
+        observation, _, terminated, truncated, info = envs.step(np.array([0, 14]))
+        assert terminated.tolist() == [True, False]
+        assert truncated.tolist() == [False, False]
+        assert info["reason"].tolist() == ["stop", ""]
+        assert observation["step"].tolist() == [[1], [1]]
+        assert list(first["goal"]["target_name"]) == names, "an observation that was kept stays what it was"
+    finally:
+        envs.close()
+
+
+@pytest.mark.parametrize(
+    ("keywords", "message"),
+    [
+        ({"split": "ood_tset"}, "did you mean 'ood_test'"),
+        ({"setting": "short"}, "there are base, standard, long_horizon"),
+        ({"views": ("front", "up")}, "no view 'up'"),
+        ({"scene": "U_Nowhere"}, "no scene 'U_Nowhere'"),
+        ({"width": 0}, "no camera has 0"),
+        ({"limit": 0}, "a limit is at least 1"),
+        ({"render_mode": "human"}, "no render mode 'human'"),
+    ],
+)
+def test_what_does_not_exist_is_named(smoke, keywords, message):
+    with pytest.raises(UsageError, match=message):
+        AerialDojoEnv(smoke, **keywords)
+
+
+def test_without_a_release_it_says_so(tmp_path):
+    with pytest.raises(StoreError, match="there is no release in"):
+        AerialDojoEnv(tmp_path)
+
+
+def test_a_task_that_was_not_chosen_is_named(smoke):
+    env = AerialDojoEnv(smoke, views=())
+    with pytest.raises(UsageError, match="no task 'U_X_0-1-s'"):
+        env.reset(options={"task_id": "U_X_0-1-s"})
+    with pytest.raises(UsageError, match="no option 'task'"):
+        env.reset(options={"task": "x"})
+
+
+def test_a_fork_of_a_process_that_has_drawn_is_told_so_and_does_not_hang(seeing, monkeypatch):
+    from aerialdojo_gen.benchmark import eyes
+
+    monkeypatch.setattr(eyes, "_drawn_by_gl", [os.getppid()])
+    with pytest.raises(RenderError, match="start it by spawn"):
+        seeing.reset(seed=0)

@@ -1,0 +1,351 @@
+"""The runner: samples, the log, kills, workers, infrastructure failures, costs."""
+
+import contextlib
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pyarrow.compute as pc
+import pytest
+
+from aerialdojo_gen.agents import AgentBase, AgentUnavailable, InvalidAnswer, Usage
+from aerialdojo_gen.benchmark import journal
+from aerialdojo_gen.benchmark.episodes import TABLES, read_run, runs
+from aerialdojo_gen.benchmark.goal import BLIND
+from aerialdojo_gen.benchmark.limits import Limits
+from aerialdojo_gen.benchmark.runner import Evaluation, evaluate
+from aerialdojo_gen.benchmark.tasks import Selection, select
+from aerialdojo_gen.benchmark.worker import Conditions
+from aerialdojo_gen.errors import AerialDojoError, StoreError, UsageError
+from aerialdojo_gen.planning.primitives import replay
+from aerialdojo_gen.store import schemas
+
+HERE, FILE = __name__, Path(__file__).stem
+
+
+class Flaky(AgentBase):
+    """Its service fails at the first `failures` calls of the process, and counts cents."""
+
+    sensors = BLIND
+    left = 0
+
+    def __init__(self, note=""):
+        self._note = note
+
+    def reset(self, goal):
+        self._calls = 0
+
+    def act(self, observation):
+        self._calls += 1
+        if type(self).left:
+            type(self).left -= 1
+            raise AgentUnavailable("429 from the service", retry_after_s=0.0)
+        if observation.step == 0:
+            raise InvalidAnswer("no action in it")
+        return [99, "north", True, 14][observation.step] if observation.step < 4 else 0
+
+    def usage(self):
+        return Usage(self._calls, 10 * self._calls, self._calls, 0.01 * self._calls)
+
+    def answer(self):
+        return f"call {self._calls}"
+
+
+class Broken(AgentBase):
+    sensors = BLIND
+
+    def reset(self, goal):
+        self._nothing = {}
+
+    def act(self, observation):
+        return self._nothing["map"]
+
+
+def job(agent="random", limit=12, run="r", tolerate=True, **kw):
+    conditions = Conditions(pause_s=0.0, tolerate=tolerate)
+    return Evaluation(run, agent, kw.pop("options", {}), Selection(limit=limit, **kw), conditions=conditions)
+
+
+def snapshot(out, run="r", tables=("episodes", "steps")):
+    return {p.name + t: p.read_bytes() for t in tables for p in (out / t / run).glob("*.parquet")}
+
+
+@pytest.fixture(scope="module")
+def whole(smoke, tmp_path_factory):
+    """An uninterrupted run of the random agent over everything."""
+    out = tmp_path_factory.mktemp("whole")
+    evaluate(smoke, job(limit=None, modalities=("semantic",)), out=out)
+    return out
+
+
+def test_the_oracle_succeeds_everywhere(smoke, tmp_path):
+    outcome = evaluate(smoke, job("oracle", None, modalities=("semantic",)), out=tmp_path)
+    rows = read_run(tmp_path, "r").to_pandas()
+    assert outcome.finished == len(rows) == select(smoke, Selection(modalities=("semantic",))).num_rows
+    assert rows.success.all()
+    assert rows.oracle_success.all()
+    assert not rows.collision.any()
+    assert (rows.final_distance_m <= 1.0).all(), "an Approach is at most 1 m"
+    assert (rows.n_actions <= rows.action_budget).all()
+    assert (rows.reference_length_m / np.maximum(rows.path_length_m, rows.reference_length_m)).mean() >= 0.99
+
+
+def test_the_log_tells_what_happened(whole):
+    rows = read_run(whole, "r").to_pandas().set_index("task_id")
+    steps = read_run(whole, "r", "steps").to_pandas()
+    assert steps.groupby("task_id").size().to_dict() == rows.n_actions.to_dict()
+    assert set(rows.termination) <= set(schemas.TERMINATIONS)
+    assert len(set(rows.termination)) >= 2
+    for task_id, mine in list(steps.groupby("task_id"))[:40]:
+        row = rows.loc[task_id]
+        start = [row.start_x_m, row.start_y_m, row.start_z_m, row.start_yaw_rad]
+        assert mine.step.tolist() == list(range(len(mine)))
+        moved = mine[~mine.refused]
+        flown = replay(start, moved.action.astype(int).tolist())
+        last = -2 if row.collision else -1
+        if len(flown) + last > 0:
+            x_m, y_m, z_m = flown[last, :3]
+            at = moved.iloc[last if row.collision else -1]
+            assert (at.x_m, at.y_m, at.z_m) == pytest.approx((x_m, y_m, z_m), abs=1e-9)
+        assert row.n_refused == mine.refused.sum()
+        assert row.stop_called == (mine.action.iloc[-1] == 0) == (row.termination == "stop")
+        assert row.collision == (row.termination == "collision")
+        assert mine.distance_m.iloc[-1] == row.final_distance_m
+        assert row.min_distance_m == pytest.approx(min(row.euclidean_m, mine.distance_m.min()), abs=1e-6)
+        assert row.min_horizontal_distance_m <= row.min_distance_m
+        assert row.success == (row.stop_called and not row.collision and row.final_distance_m <= 3.0)
+    assert rows[["n_requests", "input_tokens", "cost_usd"]].isna().all(axis=None)
+
+
+def test_several_workers_give_the_same_bytes(smoke, whole, tmp_path):
+    outcome = evaluate(smoke, job(limit=None, modalities=("semantic",)), out=tmp_path, workers=2)
+    assert outcome.flown == outcome.episodes
+    assert snapshot(tmp_path) == snapshot(whole)
+
+
+SLOW = """
+import time
+from aerialdojo_gen.agents.simple import RandomAgent
+class Slow(RandomAgent):
+    def reset(self, goal):
+        time.sleep(0.01)
+        super().reset(goal)
+"""
+
+
+@pytest.mark.kill
+def test_killed_again_and_again_ends_with_the_same_bytes(project, smoke, tmp_path):
+    (tmp_path / "slowagent.py").write_text(SLOW)
+    env = os.environ | {"PYTHONPATH": str(tmp_path)}
+    out = tmp_path / "out"
+    command = [
+        sys.executable, "-m", "aerialdojo_gen.cli", "evaluate", "--data", str(smoke), "--out", str(out), "--run", "r",
+        "--agent", "slowagent:Slow", "--limit", "120", "--pipeline", str(project / "pipelines" / "smoke.toml"),
+        "--workers", "1",
+    ]  # fmt: skip
+
+    def finished():
+        ids = set(read_run(out, "r")["task_id"].to_pylist()) if runs(out) else set()
+        for path in (out / "runs" / "r" / "journal").glob("*.jsonl"):
+            with contextlib.suppress(FileNotFoundError):
+                ids |= {record["task_id"] for record in journal.read(path)}
+        return ids
+
+    kept = set()
+    for _ in range(2):
+        process = subprocess.Popen(command, cwd=tmp_path, env=env, stderr=subprocess.DEVNULL, start_new_session=True)
+        while process.poll() is None and len(finished()) < len(kept) + 15:
+            time.sleep(0.005)
+        assert process.poll() is None, "killed in the middle"
+        os.killpg(process.pid, signal.SIGKILL)
+        process.wait()
+        assert finished() > kept, "what was finished stays"
+        kept = finished()
+    # What a kill in the middle of a line leaves.
+    with max((out / "runs" / "r" / "journal").glob("*.jsonl")).open("a") as file:
+        file.write('{"task_id":"U_')
+    done = subprocess.run(command, cwd=tmp_path, env=env, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    flown = int(done.stderr.split(" flown now")[0].rsplit(" ", 1)[1])
+    assert flown == 120 - len(kept), "no finished episode is flown again"
+    fresh = tmp_path / "fresh"
+    again = subprocess.run(
+        [fresh if c == str(out) else c for c in command], cwd=tmp_path, env=env, capture_output=True, check=False
+    )
+    assert again.returncode == 0
+    assert snapshot(out) == snapshot(fresh)
+    assert not list(out.rglob("*.jsonl"))
+    assert not list(out.rglob(".aerialdojo-staging"))
+
+
+def test_a_sample_is_even_over_the_scenes_and_grows(smoke):
+    small, large = (select(smoke, Selection(limit=n)) for n in (7, 20))
+    assert (small.num_rows, large.num_rows) == (7, 20)
+    counts = large["scene"].value_counts().to_pylist()
+    assert max(c["counts"] for c in counts) - min(c["counts"] for c in counts) <= 1
+    assert set(small["task_id"].to_pylist()) < set(large["task_id"].to_pylist())
+    assert set(select(smoke, Selection(limit=7, seed=1))["task_id"].to_pylist()) != set(small["task_id"].to_pylist())
+    some = select(smoke, Selection(splits=("id_test",), settings=("base",), modalities=("image",)))
+    assert some["split"].unique().to_pylist() == ["id_test"]
+    assert some["setting"].unique().to_pylist() == ["base"]
+    assert pc.sum(pc.is_valid(some["description"])).as_py() == 0
+
+
+def test_other_settings_do_not_mix_with_a_run(smoke, tmp_path):
+    evaluate(smoke, job(limit=2), out=tmp_path)
+    before = snapshot(tmp_path)
+    with pytest.raises(
+        UsageError, match=r"run 'r' was begun with limit = 2, not 3: give another --run, or --restart"
+    ):
+        evaluate(smoke, job(limit=3), out=tmp_path)
+    with pytest.raises(UsageError, match="agent = 'random', not 'stop'"):
+        evaluate(smoke, job("stop", limit=2), out=tmp_path)
+    assert snapshot(tmp_path) == before
+    shutil.rmtree(tmp_path / "runs")
+    with pytest.raises(UsageError, match="there are episodes of another run 'r'"):
+        evaluate(smoke, job("stop", limit=2), out=tmp_path)
+    assert evaluate(smoke, job("stop", limit=3), out=tmp_path, restart=True).flown == 3
+    assert read_run(tmp_path, "r")["agent"].unique().to_pylist() == ["stop"]
+    assert evaluate(smoke, job("stop", limit=3), out=tmp_path).flown == 0
+
+
+def test_a_run_is_not_gone_on_with_by_other_code(smoke, tmp_path, monkeypatch):
+    mine = tmp_path / "flyer_of_a_test.py"
+    text = "from aerialdojo_gen.agents.simple import StopAgent\n\n\nclass Flyer(StopAgent):\n    pass\n"
+    mine.write_text(text)
+    monkeypatch.syspath_prepend(tmp_path)
+    flyer = job("flyer_of_a_test:Flyer", limit=1)
+    assert evaluate(smoke, flyer, out=tmp_path / "out").flown == 1
+    assert evaluate(smoke, flyer, out=tmp_path / "out").flown == 0
+    mine.write_text(text + "    colour = 'red'\n")
+    with pytest.raises(UsageError, match=r"run 'r' was begun with other code: give another --run, or --restart"):
+        evaluate(smoke, flyer, out=tmp_path / "out")
+
+
+def test_an_agent_that_cannot_be_made_does_not_take_the_name(smoke, tmp_path):
+    with pytest.raises(UsageError, match="its options: seed, stop_probability"):
+        evaluate(smoke, job(limit=2, options={"sead": 1}), out=tmp_path)
+    assert evaluate(smoke, job(limit=2, options={"seed": 1}), out=tmp_path).finished == 2
+
+
+def test_infrastructure_failures_are_tried_again_and_logged_apart(smoke, tmp_path):
+    flaky = f"{HERE}:Flaky"
+    Flaky.left = 2
+    outcome = evaluate(smoke, job(flaky, limit=3), out=tmp_path)
+    assert (outcome.finished, outcome.failed) == (3, 0)
+    tries = read_run(tmp_path, "r", "timings")["attempts"].to_pylist()
+    assert sorted(tries) == [1, 1, 3]
+    first = tries.index(3)
+    rows = read_run(tmp_path, "r").to_pylist()
+    assert rows[first]["n_requests"] == 5 + 2, "what the failed attempts cost is on the bill"
+    assert rows[first]["cost_usd"] == pytest.approx(0.07)
+
+    Flaky.left = 5 + 1
+    outcome = evaluate(smoke, job(flaky, limit=3, run="s"), out=tmp_path)
+    assert (outcome.finished, outcome.failed) == (2, 1)
+    failure = read_run(tmp_path, "s", "failures").to_pylist()[0]
+    assert (failure["attempts"], failure["reason"]) == (5, "429 from the service")
+    assert failure["task_id"] not in read_run(tmp_path, "s")["task_id"].to_pylist()
+    assert evaluate(smoke, job(flaky, limit=3, run="s"), out=tmp_path).flown == 0, "not without being asked"
+    outcome = evaluate(smoke, job(flaky, limit=3, run="s"), out=tmp_path, rerun_failed=True)
+    assert (outcome.flown, outcome.finished, outcome.failed) == (1, 3, 0)
+    assert read_run(tmp_path, "s", "failures").num_rows == 0
+
+
+def test_answers_that_name_no_action_are_counted(smoke, tmp_path):
+    evaluate(smoke, job(f"{HERE}:Flaky", limit=1), out=tmp_path)
+    row = read_run(tmp_path, "r").to_pylist()[0]
+    assert (row["n_invalid"], row["n_actions"], row["termination"], row["path_length_m"]) == (3, 5, "stop", 0.0)
+    steps = read_run(tmp_path, "r", "steps").to_pylist()
+    assert [s["action"] for s in steps] == [None, None, None, 14, 0]
+    assert [s["answer"] for s in steps] == [f"call {k}" for k in range(1, 6)]
+    assert (row["input_tokens"], row["output_tokens"]) == (50, 5)
+
+
+def test_no_more_than_the_maximal_cost(smoke, tmp_path):
+    flaky = job(f"{HERE}:Flaky", limit=6)
+    outcome = evaluate(smoke, flaky, out=tmp_path, limits=Limits(cost_usd=0.12))
+    assert (outcome.finished, outcome.cost_usd) == (3, pytest.approx(0.15))
+    assert evaluate(smoke, flaky, out=tmp_path, limits=Limits(cost_usd=0.12)).flown == 0
+    assert evaluate(smoke, flaky, out=tmp_path, limits=Limits(cost_usd=1.0)).finished == 6
+
+
+def test_a_defect_of_the_agents_is_one_line_with_its_place(smoke, tmp_path):
+    with pytest.raises(
+        AerialDojoError, match=rf"agent {HERE}:Broken failed at task .*KeyError at {FILE}\.py:\d+: 'map'"
+    ):
+        evaluate(smoke, job(f"{HERE}:Broken", limit=2, tolerate=False), out=tmp_path)
+    assert not runs(tmp_path)
+
+
+def test_the_command_in_one_line(project, smoke, tmp_path):
+    def call(*args):
+        command = [
+            sys.executable,
+            "-m",
+            "aerialdojo_gen.cli",
+            "evaluate",
+            "--data",
+            str(smoke),
+            "--out",
+            str(tmp_path),
+        ]
+        return subprocess.run([*command, *args], cwd=project, capture_output=True, text=True, check=False)
+
+    done = call("--agent", "random", "--option", "seed=3", "--limit", "4", "--setting", "base", "--workers", "1")
+    assert done.returncode == 0, done.stderr
+    assert "evaluate random: 4 of 4 episodes finished" in done.stderr
+    assert json.loads(read_run(tmp_path, "random")["agent_options"][0].as_py()) == {"seed": 3}
+    for args, said in (
+        (("--agent", "oracel"), "no agent 'oracel': did you mean 'oracle'?"),
+        (("--split", "ood"), "no split 'ood'"),
+        (("--run", "../x"), "'../x' is no name of a run"),
+        (("--option", "seed"), "--option 'seed': write key=value"),
+    ):
+        wrong = call(*args)
+        assert wrong.returncode in (1, 2)
+        assert wrong.stderr.splitlines()[-1].startswith(f"error: {said}"), wrong.stderr
+
+
+def test_no_run_of_that_name(tmp_path):
+    with pytest.raises(StoreError, match=r"no run 'x' in .*there are: none"):
+        read_run(tmp_path, "x")
+
+
+def test_every_table_has_its_rows(whole):
+    episodes = read_run(whole, "r")
+    for table in TABLES:
+        rows = read_run(whole, "r", table)
+        assert rows.num_rows == {"steps": pc.sum(episodes["n_actions"]).as_py(), "failures": 0}.get(
+            table, episodes.num_rows
+        )
+
+
+@pytest.mark.kill
+def test_ctrl_c_keeps_what_was_finished_and_ends_the_workers(project, smoke, tmp_path):
+    (tmp_path / "slowagent.py").write_text(SLOW.replace("0.01", "0.1"))
+    out = tmp_path / "out"
+    command = [
+        sys.executable, "-m", "aerialdojo_gen.cli", "evaluate", "--data", str(smoke), "--out", str(out), "--run", "r",
+        "--agent", "slowagent:Slow", "--pipeline", str(project / "pipelines" / "smoke.toml"), "--workers", "2",
+    ]  # fmt: skip
+    process = subprocess.Popen(
+        command, cwd=tmp_path, env=os.environ | {"PYTHONPATH": str(tmp_path)}, stderr=subprocess.PIPE, text=True,
+        start_new_session=True,
+    )  # fmt: skip
+    journals = out / "runs" / "r" / "journal"
+    while process.poll() is None and sum(p.read_bytes().count(b"\n") for p in journals.glob("*.jsonl")) < 4:
+        time.sleep(0.01)
+    os.killpg(process.pid, signal.SIGINT)
+    _, err = process.communicate(timeout=60)
+    assert process.returncode == 130, err
+    assert err.strip().splitlines()[-1].startswith("interrupted: finished episodes are kept")
+    assert "Traceback" not in err
+    assert read_run(out, "r").num_rows >= 4
+    assert not list(out.rglob("*.jsonl"))

@@ -1,0 +1,384 @@
+"""Tables, figures and the page of an evaluation."""
+
+from __future__ import annotations
+
+import csv
+import dataclasses
+import io
+import math
+import re
+import shutil
+import subprocess
+import sys
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from support.run_logs import write_run
+from typer.testing import CliRunner
+
+from aerialdojo_gen import cli
+from aerialdojo_gen.benchmark import contents, figures, formats, radar, tables
+from aerialdojo_gen.benchmark.grid import BEST, SECOND, Table
+from aerialdojo_gen.benchmark.profiles import PROFILES, Profile
+from aerialdojo_gen.benchmark.report import html, write_report
+from aerialdojo_gen.benchmark.runs import Run, conduct, load_runs
+from aerialdojo_gen.benchmark.scores import summarize
+from aerialdojo_gen.common.paper import results
+from aerialdojo_gen.errors import AerialDojoError, StoreError
+
+AT_3, AT_5 = PROFILES["aerialdojo"], PROFILES["aerialdojo-5m"]
+NASTY = "</script><script>alert(1)</script> & <b>$x_1$ | ä"
+
+
+@pytest.fixture(scope="module")
+def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    data = tmp_path_factory.mktemp("runs")
+    for agent in ("oracle", "explorer", "random"):
+        write_run(data, agent, agent)
+    return data
+
+
+@pytest.fixture(scope="module")
+def runs(log: Path) -> list[Run]:
+    return load_runs(log, ["oracle", "random", "explorer"])
+
+
+def test_runs_are_found_named_and_told_apart(log: Path, tmp_path: Path) -> None:
+    assert [run.label for run in load_runs(log)] == ["explorer", "oracle", "random"]
+    write_run(tmp_path, "a", "random", 1, ["U_Mall_0"])
+    write_run(tmp_path, "b", "random", 1, ["N_Coast_1"])
+    assert [run.label for run in load_runs(tmp_path)] == ["random (a)", "random (b)"]
+    assert [run.name for run in load_runs(tmp_path, ["b", "a", "b"])] == ["b", "a"]
+    with pytest.raises(StoreError, match=r"no run 'c' in .* \(there are: a, b\)"):
+        load_runs(tmp_path, ["c"])
+    with pytest.raises(StoreError, match=r"no runs in .*: run aerialdojo-gen evaluate"):
+        load_runs(tmp_path / "nothing")
+
+
+def wanted(runs: list[Run], *profiles: Profile) -> contents.Wanted:
+    return contents.Wanted(Path("no-release"), runs, list(profiles))
+
+
+def all_tables(runs: list[Run], *profiles: Profile) -> list[Table]:
+    return contents.report_tables(wanted(runs, *profiles), ["all"])
+
+
+def test_every_table_says_what_the_metrics_say(runs: list[Run]) -> None:
+    main, family = tables.main_table(runs, [AT_3, AT_5]), tables.family_table(runs, AT_3)
+    setting, modality = (tables.slice_table(runs, AT_3, column) for column in ("setting", "modality"))
+    went = tables.conduct_table(runs)
+    explorer = runs[2]
+    at_3, at_5 = (summarize(explorer.episodes, p) for p in (AT_3, AT_5))
+    cells = dict(main.rows)["explorer"]
+    assert cells[0] == "252"
+    assert cells[1] == f"{100 * at_3.overall.sr:.2f} ± {100 * at_3.deviation.sr:.2f}"
+    assert cells[4] == f"{at_3.overall.dts_m:.2f} ± {at_3.deviation.dts_m:.2f}"
+    assert cells[6] == f"{100 * at_5.overall.sr:.2f} ± {100 * at_5.deviation.sr:.2f}"
+    assert main.groups[2] == ("5 m", ("SR ↑", "OSR ↑", "SPL ↑"))
+    assert [group for group, _ in family.groups] == ["Urban", "Natural", "Infrastructure", "Disaster"]
+    assert dict(family.rows)["explorer"][5] == f"{100 * at_3.families['Natural'].sr:.2f}"
+    assert [group for group, _ in setting.groups] == ["Base", "Standard", "Long-Horizon"]
+    image = summarize(explorer.episodes.where(explorer.episodes.modality == "image"), AT_3)
+    assert dict(modality.rows)["explorer"][5:] == tuple(
+        f"{v:.2f}" for v in (100 * image.overall.sr, 100 * image.overall.osr, 100 * image.overall.spl,
+                             image.overall.dts_m, 100 * image.overall.cr)
+    )  # fmt: skip
+    assert dict(went.rows)["explorer"][6:] == ("10,080", "13,104,000", "478,800", "52.92")
+    assert dict(went.rows)["oracle"][6:] == ("–",) * 4
+    scenes = tables.scene_table(runs, AT_3)
+    assert len(scenes.rows) == 42
+    assert dict(scenes.rows)["U_Mall_0"][10] == f"{100 * at_3.scenes['U_Mall_0'].sr:.2f}"
+
+
+def test_tables_of_part_of_the_scenes_say_so(tmp_path: Path) -> None:
+    write_run(tmp_path, "a", "oracle", 2, ["U_Mall_0"])
+    (run,) = load_runs(tmp_path)
+    main, family = tables.main_table([run], [AT_3]), tables.family_table([run], AT_3)
+    assert (
+        main.notes[1]
+        == "oracle: no episodes of Natural, Infrastructure, Disaster; overall is the mean of the others."
+    )
+    assert "±" not in main.rows[0][1][1]
+    assert dict(family.rows)["oracle"][5:] == ("–",) * 15
+
+
+def test_what_a_comparison_lacks_is_said_under_the_table(tmp_path: Path) -> None:
+    write_run(tmp_path, "a", "oracle", 2, ["U_Mall_0"])
+    write_run(tmp_path, "b", "random", 3, ["U_Mall_0"], failed=4)
+    write_run(tmp_path, "c", "random", 0, ["U_Mall_0"], failed=2)
+    found = load_runs(tmp_path)
+    assert [(run.name, run.failed) for run in found] == [("a", 0), ("b", 4)]
+    notes = tables.main_table(found, [AT_3]).notes
+    assert "random: 4 more episodes failed for reasons outside the agent." in notes
+    assert notes[-1] == "The runs flew different tasks: their scores are no comparison of agents."
+    assert not any("different" in note for note in tables.main_table(found[:1], [AT_3]).notes)
+    with pytest.raises(StoreError, match="run 'c' has no finished episode"):
+        load_runs(tmp_path, ["a", "c"])
+
+
+def test_conduct_counts_ends_and_does_not_add_what_is_not_known(runs: list[Run]) -> None:
+    for run in runs:
+        c = conduct(run)
+        assert sum(c.ended.values()) == pytest.approx(1.0)
+        assert c.ended["collision"] == pytest.approx(run.episodes.collision.mean())
+        assert (c.cost_usd is None) == (run.agent != "explorer")
+
+
+def test_the_terminal_has_aligned_columns(runs: list[Run]) -> None:
+    for table in all_tables(runs, AT_3, AT_5):
+        plain = dataclasses.replace(table, marks={}, sections={})
+        lines = formats.as_text(plain).splitlines()
+        rule = next(k for k, line in enumerate(lines) if set(line) == {"-"})
+        body = lines[rule - 1 : rule + 1 + len(table.rows)]
+        del body[1]
+        assert len({len(line) for line in body}) == 1, table.title
+        assert len(lines[rule]) == max(map(len, lines[1:rule]))
+        for (label, cells), line in zip(table.rows, body[1:], strict=True):
+            assert re.split(r" {2,}", line.strip()) == [cell for cell in (label, *cells) if cell]
+
+
+@pytest.mark.parametrize("width", [80, 100, 120])
+def test_a_terminal_of_any_width_has_every_cell_once(runs: list[Run], width: int) -> None:
+    for table in all_tables(runs, AT_3, AT_5):
+        text = formats.as_text(dataclasses.replace(table, marks={}), width)
+        assert max(map(len, text.splitlines()[1:])) <= width, table.title
+        body = text.replace("\n\n", "\n").splitlines()
+        for i, (label, cells) in enumerate(table.rows):
+            if not label or [row[0] for row in table.rows].count(label) > 1 or table.sections.get(i) == label:
+                continue
+            found = [re.split(r" {2,}", line.strip()) for line in body if line.strip().startswith(f"{label}  ")]
+            assert [cell for parts in found for cell in parts[1:]] == list(cells), table.title
+
+
+def test_the_best_and_the_second_are_marked_in_every_format() -> None:
+    rows = (("a", ("3.20 ± 1.00", "7")), ("", ("2.00–4.00", "")), ("b", ("2.00 ± 1.00", "7")), ("c", ("1.00", "7")))
+    table = Table("T", "agent", (("", ("SR", "n")),), rows, sections={0: "open", 3: "closed"},
+                  marks={(0, 0): BEST, (2, 0): SECOND})  # fmt: skip
+    assert formats.as_text(table).splitlines()[1:] == [
+        "agent            SR  n",
+        "----------------------",
+        "open",
+        "  a     3.20¹± 1.00  7",
+        "          2.00–4.00",
+        "  b     2.00²± 1.00  7",
+        "closed",
+        "  c            1.00  7",
+    ]
+    ansi = formats.as_text(table, ansi=True)
+    assert "\x1b[1m3.20 ± 1.00\x1b[0m  7" in ansi
+    assert "\x1b[4m2.00 ± 1.00\x1b[0m  7" in ansi
+    assert formats.as_markdown(table).splitlines()[4:7] == [
+        "| *open* |  |  |", "| a | **3.20 ± 1.00** | 7 |", "|  | 2.00–4.00 |  |"
+    ]  # fmt: skip
+    assert "<ins>2.00 ± 1.00</ins>" in formats.as_markdown(table)
+    latex = formats.as_latex(table)
+    assert r"a & \textbf{3.20 $\pm$ 1.00} & 7 \\" in latex
+    assert r"b & \underline{2.00 $\pm$ 1.00} & 7 \\" in latex
+    assert "\\midrule\n\\multicolumn{3}{l}{\\emph{closed}} \\\\\n" in latex
+
+
+def test_markdown_and_latex_have_every_cell_and_escape_the_rest(runs: list[Run]) -> None:
+    table = tables.Table(
+        "T_1", "agent", (("", ("n",)), ("50 %", ("a ↑", "b"))), ((NASTY, ("1", "2 ± 3", "–")),), ("N & M",)
+    )
+    markdown = formats.as_markdown(table).splitlines()
+    assert markdown[2] == "| agent | n | 50 %: a ↑ | 50 %: b |"
+    assert markdown[3] == "| --- | ---: | ---: | ---: |"
+    assert r"\<script\>" in markdown[4]
+    assert r"\| ä" in markdown[4]
+    latex = formats.as_latex(table)
+    assert r"\begin{tabular}{lrrr}" in latex
+    assert r"\multicolumn{2}{c}{50 \%}" in latex
+    assert r"\cmidrule(lr){3-4}" in latex
+    assert r"\$x\_1\$" in latex
+    assert r"1 & 2 $\pm$ 3 & -- \\" in latex
+    assert r"\caption{T\_1. N \& M}" in latex
+    for real in all_tables(runs, AT_3):
+        columns = 1 + sum(len(names) for _, names in real.groups)
+        body = formats.as_latex(real).split(r"\midrule", 1)[1].split(r"\bottomrule")[0]
+        lines = [line for line in body.strip().splitlines() if not line.startswith(("\\multi", "\\midrule"))]
+        cells = [line.count("&") for line in lines]
+        assert cells == [columns - 1] * len(real.rows)
+        assert {line.count("|") for line in formats.as_markdown(real).splitlines() if "|" in line} == {columns + 1}
+
+
+def test_latex_compiles_or_parses(runs: list[Run], tmp_path: Path) -> None:
+    labelled = [dataclasses.replace(run, label=f"{NASTY} 50% #{k} ~^[{{}}]") for k, run in enumerate(runs)]
+    made = contents.Wanted(Path("no-release"), labelled, [AT_3, AT_5], (1.0, 3.0, 5.0, 10.0), beside=results())
+    text = "\n\n".join(map(formats.as_latex, contents.report_tables(made, ["all"])))
+    if compiler := shutil.which("pdflatex"):
+        head = "\\documentclass{article}\n\\usepackage[a0paper,landscape]{geometry}\n\\usepackage{booktabs}\n"
+        (tmp_path / "t.tex").write_text(f"{head}\\begin{{document}}\n{text}\n\\end{{document}}\n")
+        command = [compiler, "-interaction=nonstopmode", "-halt-on-error", "t.tex"]
+        done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stdout[-2000:]
+        assert (tmp_path / "t.pdf").stat().st_size > 10_000
+    # Without it, what TeX would stumble over: signs that it has no glyph for, braces, environments, columns.
+    assert {c for c in text if ord(c) > 126} <= set("ä")
+    bare = re.sub(r"\\[\\{}&%$#_]", "", text)
+    depth = 0
+    for sign in bare:
+        depth += (sign == "{") - (sign == "}")
+        assert depth >= 0
+    assert depth == 0
+    assert "%" not in bare
+    assert "#" not in bare
+    assert bare.count("$") % 2 == 0
+    assert re.findall(r"\\(begin|end)\{(\w+)\}", text) == [
+        ("begin", "table"), ("begin", "tabular"), ("end", "tabular"), ("end", "table")
+    ] * text.count(r"\toprule")  # fmt: skip
+    for block in re.findall(r"\\begin\{tabular\}.*?\\end\{tabular\}", text, re.DOTALL):
+        columns = len(re.match(r"\\begin\{tabular\}\{(\w+)\}", block)[1])  # type: ignore[index]
+        for row in re.findall(r"^(.*) \\\\$", block, re.MULTILINE):
+            spanned = sum(int(n) - 1 for n in re.findall(r"\\multicolumn\{(\d+)\}", row))
+            assert len(re.findall(r"(?<!\\)&", row)) + spanned == columns - 1, row
+
+
+def test_a_radar_of_agents_that_hardly_solve_anything_is_no_dot(tmp_path: Path) -> None:
+    write_run(tmp_path, "a", "weak", 20)
+    write_run(tmp_path, "b", "oracle", 20)
+    runs = load_runs(tmp_path, ["a", "b"])
+    weak = summarize(runs[0].episodes, AT_3)
+    assert 0.0 < weak.overall.sr < 0.01
+    for draw in (radar.metric_radars, radar.family_radars):
+        figure = draw(runs, AT_3)
+        axes = figure.axes
+        assert [line.get_label() for line in axes[0].lines] == ["weak"]
+        reached = [max(v for v in line.get_ydata() if not math.isnan(v)) for ax in axes for line in ax.lines]
+        # The best family's value lies in the outer half of some axis, and none beyond its end.
+        assert max(reached) > 0.5
+        assert all(0.0 <= value <= 1.0 for value in reached)
+    sr = radar.metric_radars(runs, AT_3).axes[0].lines[0].get_ydata()[:4]
+    ends = radar.axis_end(100.0 * max(s.sr for s in weak.families.values()))
+    assert list(sr) == pytest.approx([100.0 * s.sr / ends for s in weak.families.values()])
+    # Few metres are better than many: outwards.
+    dts = radar.metric_radars(runs, AT_3).axes[3].lines[0].get_ydata()[:4]
+    order = [s.dts_m for s in weak.families.values()]
+    assert np.argsort(dts).tolist() == np.argsort(order)[::-1].tolist()
+
+
+@pytest.mark.parametrize(
+    ("largest", "end"), [(0.0, 1.0), (0.53, 0.6), (0.6, 0.6), (3.2, 4.0), (7.84, 8.0), (58.96, 60.0), (96.0, 100.0)]
+)
+def test_axes_end_at_round_numbers(largest: float, end: float) -> None:
+    assert radar.axis_end(largest, 100.0) == pytest.approx(end)
+
+
+def test_the_csv_holds_every_score_unrounded(runs: list[Run]) -> None:
+    rows = list(csv.DictReader(io.StringIO(tables.as_csv(runs, [AT_3, AT_5]))))
+    keys = ["run", "profile", "setting", "modality", "scope", "name"]
+    found = {tuple(row[k] for k in keys): row for row in rows}
+    assert len(found) == len(rows)
+    # Two profiles, all and three settings and two modalities: overall, four families, 42 scenes each, where flown.
+    # … and the three settings by the two modalities; task-weighted, two partitions and 21 types besides.
+    assert len(rows) <= 3 * 2 * 12 * (2 + 4 + 2 + 21 + 42)
+    summary = summarize(runs[1].episodes, AT_5)
+    row = found["random", "aerialdojo-5m", "all", "all", "overall", "overall"]
+    assert (float(row["spl"]), float(row["spl_sd"])) == (summary.overall.spl, summary.deviation.spl)
+    row = found["random", "aerialdojo-5m", "all", "all", "scene", "N_Coast_1"]
+    assert (float(row["dts_m"]), row["dts_m_sd"]) == (summary.scenes["N_Coast_1"].dts_m, "")
+    assert not any("nan" in value for row in rows for value in row.values())
+
+
+def test_figures_have_every_run_in_its_colour_and_no_date(runs: list[Run]) -> None:
+    for draw in (radar.metric_radars, radar.family_radars, figures.radius_curve):
+        svg, png = (figures.encoded(draw(runs, AT_3), kind) for kind in ("svg", "png"))
+        assert b"dc:date" not in svg
+        assert ET.fromstring(svg).tag == "{http://www.w3.org/2000/svg}svg"
+        picture = cv2.imdecode(np.frombuffer(png, np.uint8), cv2.IMREAD_COLOR)
+        assert min(picture.shape[:2]) > 600
+        colours = {tuple(c) for c in picture.reshape(-1, 3)[::7]}
+        # Every run's line is there, in its own colour (green, red; blue is the oracle's, of which no radar is drawn).
+        oracle = [(178, 114, 0)] if draw is figures.radius_curve else []
+        for colour in ((0, 94, 213), (115, 158, 0), *oracle):
+            assert colour in colours
+
+
+def test_a_figure_of_some_families_has_gaps_and_no_zeros(tmp_path: Path) -> None:
+    write_run(tmp_path, "a", "oracle", 2, ["U_Mall_0", "D_Flood_0"])
+    figure = radar.metric_radars(load_runs(tmp_path), AT_3)
+    values = figure.axes[0].lines[0].get_ydata()
+    assert [math.isnan(v) for v in values] == [False, True, True, False, False]
+
+
+@pytest.mark.slow
+def test_the_folder_of_a_report_is_whole_and_the_same_bytes_each_time(runs: list[Run], tmp_path: Path) -> None:
+    written = write_report(tmp_path / "out", wanted(runs, AT_3, AT_5), [])
+    assert sorted(p.name for p in written) == sorted(p.name for p in (tmp_path / "out").iterdir())
+    page = (tmp_path / "out" / "report.html").read_text()
+    for run in runs:
+        assert f'<th scope="row">{run.label}</th>' in page
+    again = write_report(tmp_path / "again", wanted(runs, AT_3, AT_5), [])
+    assert [p.read_bytes() for p in written] == [p.read_bytes() for p in again]
+
+
+def test_a_page_loads_nothing_and_escapes_everything(log: Path) -> None:
+    (run,) = load_runs(log, ["random"])
+    nasty = Run(NASTY, NASTY, NASTY, '{"x": "' + NASTY + '"}', run.table, run.episodes)
+    made = wanted([nasty], AT_3)
+    figures = dict.fromkeys(("families", "radar", "radius"), b"<svg/>")
+    page = html(made, [], figures, contents.named_tables(made, ["all"]))
+    assert "alert(1)</script>" not in page
+    assert page.count("<script") == page.count("</script>") == 1
+    assert not re.search(r'(?:src|href)="(?!data:)', page)
+    assert "url(" not in page
+    assert "default-src 'none'" in page
+
+
+def invoke(*arguments: str) -> str:
+    done = CliRunner().invoke(cli.app, ["report", *arguments])
+    if done.exception is not None and not isinstance(done.exception, SystemExit):
+        raise done.exception
+    return done.stdout
+
+
+@pytest.mark.slow
+def test_the_command_prints_what_is_asked_for(log: Path, tmp_path: Path) -> None:
+    plain = invoke("--data", str(log))
+    assert plain.startswith("Overall\n")
+    assert plain.index("explorer") < plain.index("oracle") < plain.index("random")
+    assert "uav-on, 20 m" in invoke("random", "--data", str(log), "--profile", "uav-on")
+    assert "U_Mall_0" not in plain
+    for part in ("Base (the form of the paper's Table 4)", "ID and OOD scenes, 3 m", "Where visits are lost, 3 m"):
+        assert f"\n{part}\n" in plain
+    assert max(map(len, plain.splitlines())) <= 120
+    only = invoke("random", "explorer", "--data", str(log), "--radius", "1", "3", "5", "10", "--table", "radius")
+    assert re.search(r" {2}1 m +3 m +5 m +10 m", only)
+    assert "1→3 m" in only
+    assert "10m" in invoke("random", "--data", str(log), "--radius", "10", "--format", "csv")
+    assert "Claude Opus 5" in invoke("--data", str(log), "--beside", "paper")
+    assert "Claude Opus 5" not in plain
+    pair = invoke("random", "explorer", "--data", str(log), "--paired")
+    assert pair.startswith("explorer against random, 3 m\n")
+    grouped = invoke("--data", str(log), "--table", "overall", "--group", "open-source=explorer,random")
+    assert "open-source\n  explorer" in grouped
+    assert r"U\_Mall\_0" in invoke("--data", str(log), "--by-scene", "--format", "markdown")
+    assert invoke("--data", str(log), "--format", "latex").startswith(r"\begin{table}")
+    assert invoke("random", "--data", str(log), "--format", "csv").startswith("run,agent,profile")
+    invoke("--data", str(tmp_path), "--log", str(log), "--out", str(tmp_path / "out"), "--replays", "0")
+    assert (tmp_path / "out" / "report.html").stat().st_size > 50_000
+
+
+@pytest.mark.slow
+def test_the_command_says_in_one_line_what_is_wrong(log: Path, tmp_path: Path) -> None:
+    for arguments, message in (
+        (["--data", str(tmp_path)], "no runs in"),
+        (["nobody", "--data", str(log)], "no run 'nobody'"),
+        (["--data", str(log), "--profile", "uav"], "no profile 'uav'"),
+        (["--data", str(log), "--table", "visit"], "no table 'visit': did you mean 'visits'"),
+        (["--data", str(log), "--group", "open"], "write heading=run,run"),
+        (["--data", str(log), "--paired"], "compares two runs, not 3"),
+    ):
+        with pytest.raises(AerialDojoError, match=message) as failure:
+            invoke(*arguments)
+        assert "\n" not in str(failure.value)
+    shutil.copytree(log, tmp_path / "broken")
+    shard = next((tmp_path / "broken" / "episodes" / "random").glob("*.parquet"))
+    shard.write_bytes(shard.read_bytes()[:100])
+    command = [sys.executable, "-m", "aerialdojo_gen.cli", "report", "--data", str(tmp_path / "broken")]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr.count("\n")) == (1, 1)
+    assert "is damaged" in done.stderr

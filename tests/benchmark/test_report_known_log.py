@@ -1,0 +1,297 @@
+"""The report of a log written by hand: two agents and a floor, four families, both partitions; figures by hand."""
+
+from __future__ import annotations
+
+import math
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy import stats
+from support.run_logs import episode
+
+from aerialdojo_gen.benchmark import breakdowns, contents, difficulty, intervals, paired, radii, tables
+from aerialdojo_gen.benchmark.floors import arranged, with_floors
+from aerialdojo_gen.benchmark.formats import as_text
+from aerialdojo_gen.benchmark.grid import BEST, SECOND, Table
+from aerialdojo_gen.benchmark.paper_tables import result_tables
+from aerialdojo_gen.benchmark.profiles import PROFILES
+from aerialdojo_gen.benchmark.runs import Run, load_runs
+from aerialdojo_gen.common import rng
+from aerialdojo_gen.common.paper import results
+from aerialdojo_gen.errors import UsageError
+from aerialdojo_gen.store import schemas
+from aerialdojo_gen.store import shards as store
+from aerialdojo_gen.store.tables import from_rows
+
+AT_3, AT_5 = PROFILES["aerialdojo"], PROFILES["aerialdojo-5m"]
+
+# How an episode may end: distance at the end, smallest distance, termination.
+ENDS = {
+    "S": (2.0, 2.0, "stop"),  # a success
+    "F": (4.0, 4.0, "stop"),  # a success at 5 m only
+    "M": (10.0, 10.0, "stop"),  # a miss
+    "T": (6.0, 2.5, "stop"),  # was there, stopped too far
+    "C": (8.0, 2.9, "collision"),  # was there, collided
+    "R": (7.0, 1.0, "budget"),  # was there, ran out elsewhere
+    "N": (2.0, 2.0, "budget"),  # is there, never stopped
+    "P": (10.0, math.hypot(2.0, 2.8), "stop"),  # flew past at 2.8 m, between two poses
+    "0": (9.0, 9.0, "stop"),  # did nothing
+}
+# Scene by scene; episodes in turn have a semantic and an image goal.
+LOG = {
+    "alpha": ["SFMM", "MC", "ST", "PM", "RN", "SS", "CC", "FF"],
+    "beta": ["FFFF", "FF", "SM", "SM", "MM", "FM", "MM", "MM"],
+    "stop": ["0000", "00", "00", "00", "00", "00", "00", "00"],
+}
+SCENES = ["U_Mall_0", "U_Mall_1", "N_Coast_0", "N_Coast_1", "I_Harbor_0", "I_Harbor_1", "D_Flood_0", "D_Flood_1"]
+
+
+def write(data: Path, run: str, agent: str, ends: list[str], more: str = "") -> None:
+    for scene, codes in zip(SCENES, ends, strict=True):
+        rows: list[dict[str, Any]] = []
+        steps: list[dict[str, Any]] = []
+        for k, code in enumerate(codes + more):
+            final_m, least_m, how = ENDS[code]
+            row = episode(run, "random", scene, k, rng.generator(0, "known-log"))
+            euclidean_m = 8.0 if scene.endswith("_0") else 9.0
+            row |= {
+                "agent": agent, "setting": "base", "action_budget": 90, "stop_called": how == "stop",
+                "collision": how == "collision", "termination": how, "final_distance_m": final_m,
+                "min_distance_m": least_m, "final_horizontal_distance_m": final_m,
+                "min_horizontal_distance_m": least_m, "path_length_m": 12.5, "reference_length_m": 10.0,
+                "euclidean_m": euclidean_m, "n_actions": 90 if how == "budget" else 7,
+                "success": how == "stop" and final_m <= 3.0, "oracle_success": least_m <= 3.0,
+            }  # fmt: skip
+            # The goal is at the origin: from (−2, 2.8) to (2, 2.8), then away to (10, 0).
+            start = (0.0, 0.0, euclidean_m)
+            ways = [(-2.0, 2.8, 0.0), (2.0, 2.8, 0.0), (10.0, 0.0, 0.0)] if code == "P" else [start]
+            row |= dict(zip(("start_x_m", "start_y_m", "start_z_m"), start, strict=True))
+            rows.append(row)
+            steps += [
+                {
+                    "run_id": run, "task_id": row["task_id"], "scene": scene, "step": n, "action": 1,
+                    "refused": False,
+                    "x_m": x, "y_m": y, "z_m": z, "yaw_rad": 0.0, "distance_m": math.hypot(x, y, z),
+                    "answer": None,
+                }
+                for n, (x, y, z) in enumerate(ways)
+            ]  # fmt: skip
+        for table, spec, written in (
+            ("episodes", schemas.EPISODES, rows), ("steps", schemas.STEPS, steps), ("failures", schemas.FAILURES, [])
+        ):  # fmt: skip
+            store.write_shard(data, table, scene, 0, from_rows(spec, written), run=run)
+
+
+@pytest.fixture(scope="module")
+def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    data = tmp_path_factory.mktemp("known")
+    write(data, "alpha", "package:Alpha", LOG["alpha"])
+    write(data, "beta", "package:Beta", LOG["beta"])
+    # The floor has flown more than these tasks.
+    write(data, "floor", "stop", LOG["stop"], more="S")
+    return data
+
+
+@pytest.fixture(scope="module")
+def runs(log: Path) -> list[Run]:
+    return arranged(with_floors(log, load_runs(log, ["alpha", "beta"])))
+
+
+def cells(table: Table, label: str) -> tuple[str, ...]:
+    return dict(table.rows)[label]
+
+
+def test_the_floors_that_flew_the_same_tasks_are_added_and_cut_down(log: Path, runs: list[Run]) -> None:
+    assert [(run.name, run.group, len(run.episodes)) for run in runs] == [
+        ("alpha", "agents", 18), ("beta", "agents", 18), ("floor", "floors", 18)
+    ]  # fmt: skip
+    # Of the floor's own tasks, alpha has flown a part: it is no floor's business.
+    alone = with_floors(log, load_runs(log, ["floor"]))
+    assert [run.name for run in alone] == ["floor"]
+    write(log.parent / "other", "alpha", "package:Alpha", LOG["alpha"], more="M")
+    write(log.parent / "other", "floor", "stop", LOG["stop"])
+    assert [run.name for run in with_floors(log.parent / "other", load_runs(log.parent / "other", ["alpha"]))] == [
+        "alpha"
+    ]
+    groups = {"open": ["alpha"], "closed": ["package:Beta"]}
+    assert [run.group for run in arranged(runs, groups)] == ["open", "closed", "floors"]
+    with pytest.raises(UsageError, match="group 'open': no run 'gamma' among alpha, beta, floor"):
+        arranged(runs, {"open": ["gamma"]})
+
+
+def test_tables_4_and_5(runs: list[Run]) -> None:
+    (table,) = result_tables(runs, [AT_3, AT_5], beside=[r for r in results() if r.setting == "base"])
+    assert table.title.startswith("Base")
+    assert [head for head, _ in table.groups] == ["3 m", "5 m"]
+    # alpha at 3 m: Urban (¼ + 0)/2, Natural (½ + 0)/2, Infrastructure (0 + 1)/2, Disaster 0: 21.875 % in the mean.
+    # OSR: Urban (¼ + ½)/2, Natural (1 + 0)/2, Infrastructure (1 + 1)/2, Disaster (1 + 0)/2: 59.375 %.
+    # SPL is 0.8 a success. DTS: Urban (6.5 + 9)/2, Natural (4 + 10)/2, (4.5 + 2)/2, (8 + 4)/2: 6 m.
+    # CR: Urban (0 + ½)/2, Disaster (1 + 0)/2: 18.75 %. At 5 m: SR ¼, ¼, ½, ½; OSR ½, ¾, 1, 1.
+    means = [cell.split(" ± ")[0] for cell in cells(table, "package:Alpha")]
+    assert means == ["21.88", "59.38", "17.50", "6.00", "18.75", "37.50", "81.25"]
+    # Scenes' SR: ¼, 0, ½, 0, 0, 1, 0, 0; squares 1.3125, less 8 · 0.21875², by 7: the square of 0.36443.
+    assert cells(table, "package:Alpha")[0] == "21.88 ± 36.44"
+    means = [cell.split(" ± ")[0] for cell in cells(table, "package:Beta")]
+    # DTS: Urban 4, Natural 6, Infrastructure (10 + 7)/2, Disaster 10.
+    assert means == ["12.50", "12.50", "10.00", "7.12", "0.00", "43.75", "43.75"]
+    assert cells(table, "stop")[3] == "9.00 ± 0.00"
+    rows = [label for label, _ in table.rows]
+    order = [rows.index(name) for name in ("package:Alpha", "package:Beta", "stop")]
+    assert table.sections[order[0]] == "agents"
+    assert table.sections[order[2]] == "floors"
+    marks = [[table.marks.get((row, k)) for k in range(7)] for row in order]
+    assert marks[0] == [BEST, BEST, BEST, BEST, None, SECOND, BEST]
+    assert marks[1] == [SECOND, SECOND, SECOND, SECOND, BEST, BEST, SECOND]
+    assert marks[2] == [None, None, None, None, BEST, None, None]
+    # Below ours, the paper's: ranked among themselves, named as another simulator's.
+    opus = rows.index("Claude Opus 5")
+    assert table.rows[opus][1][0] == "3.20 ± 2.04"
+    assert table.marks[opus, 0] == BEST
+    assert "Unreal Engine" in table.sections[rows.index("Qwen3-VL-4B")]
+    assert any("no comparison" in note for note in table.notes)
+    # One line more each has the intervals, but for the paper's.
+    assert [rows[row + 1] for row in order] == ["", "", ""]
+    assert table.rows[order[2] + 1][1][0] == "0.00–0.00"
+    assert result_tables(runs, [AT_3], intervals=False)[0].rows[1][0] == "package:Beta"
+    text = as_text(table, 120)
+    assert max(map(len, text.splitlines())) <= 120
+
+
+def test_partitions_goals_averages_and_difficulty(runs: list[Run], log: Path) -> None:
+    # ID scenes: ¼, ½, 0, 0; OOD scenes: 0, 0, 1, 0.
+    partition = cells(breakdowns.partition_table(runs, AT_3), "package:Alpha")
+    assert (partition[0], partition[5], partition[10]) == ("18.75", "25.00", "+6.25")
+    # OSR ¼, 1, 1, 1 and ½, 0, 1, 0.
+    assert (partition[1], partition[6], partition[11]) == ("81.25", "37.50", "−43.75")
+    # Semantic goals: Mall_0 1 of 2, Coast_0 1, Harbor_1 1; image goals: Harbor_1 1.
+    goal = cells(breakdowns.goal_table(runs, AT_3), "package:Alpha")
+    assert (goal[0], goal[5], goal[10]) == ("31.25", "12.50", "−18.75")
+    # 4 of 18 tasks, 10 of 18 visits.
+    average = cells(breakdowns.average_table(runs, AT_3), "package:Alpha")
+    assert (average[0], average[5], average[1], average[6]) == ("21.88", "22.22", "59.38", "55.56")
+    types = breakdowns.type_table(runs, AT_3)
+    assert [label for label, _ in types.rows] == ["Mall", "Coast", "Harbor", "Flood"]
+    assert list(types.sections.values()) == ["Urban", "Natural", "Infrastructure", "Disaster"]
+    assert [row[0] for _, row in types.rows] == ["12.50", "25.00", "50.00", "0.00"]
+    # L / d_E is 10 / 8 in ID scenes and 10 / 9 in the others.
+    (detour,) = difficulty.difficulty_tables(log, runs, AT_3)
+    assert [head for head, _ in detour.groups] == ["1.1 to 1.25", "1.25 to 1.5"]
+    assert cells(detour, "package:Alpha")[::3] == ("25.00", "18.75")
+    # A log or a release that has the column has the table.
+    shown = [
+        Run(
+            **{
+                **vars(run),
+                "table": run.table.append_column("target_seen_in_train", [[k % 2 == 0 for k in range(18)]]),
+            }
+        )
+        for run in load_runs(log, ["alpha", "beta"])
+    ]
+    seen, _ = difficulty.difficulty_tables(log, shown, AT_3)
+    assert [head for head, _ in seen.groups] == ["seen in training", "unseen"]
+    # Every second task is one with a semantic goal.
+    assert cells(seen, "package:Alpha")[0] == "31.25"
+
+
+def test_radii_gains_reversals_and_what_lies_between_poses(runs: list[Run]) -> None:
+    table = radii.radius_table(runs, AT_3, (5.0, 3.0))
+    heads = [f"{group} {name}" for group, names in table.groups for name in names]
+    alpha, beta = (dict(zip(heads, cells(table, f"package:{name}"), strict=True)) for name in ("Alpha", "Beta"))
+    assert (alpha["SR ↑ 3 m"], alpha["SR ↑ 5 m"], alpha["SR gain, points 3→5 m"]) == ("21.88", "37.50", "+15.62")
+    assert beta["SR gain, points 3→5 m"] == "+31.25"
+    assert (alpha["OSR − SR, points 3 m"], alpha["OSR − SR, points 5 m"]) == ("+37.50", "+43.75")
+    # One flight more of Coast_1 passes at 2.8 m: Natural ¾ instead of ½.
+    assert (alpha["OSR, at poses ↑ 3 m"], alpha["OSR, along the way ↑ 3 m"]) == ("59.38", "65.62")
+    assert alpha["OSR, at poses ↑ 5 m"] == alpha["OSR, along the way ↑ 5 m"] == "81.25"
+    assert "Base, from 3 to 5 m: package:Beta overtakes package:Alpha." in table.notes
+    four = radii.radius_table(runs, AT_3, (1.0, 3.0, 5.0, 10.0))
+    at_10 = dict(zip([name for _, names in four.groups for name in names][:4], cells(four, "stop"), strict=False))
+    assert at_10 == {"1 m": "0.00", "3 m": "0.00", "5 m": "0.00", "10 m": "100.00"}
+    lost = cells(radii.visit_table(runs, AT_3), "package:Alpha")
+    # T; C of Mall_1 and twice of Flood_0; R; N.
+    assert lost == ("18", "10", "4", "6", "16.7", "50.0", "16.7", "16.7")
+    assert cells(radii.visit_table(runs, AT_3), "stop") == ("18", "0", "0", "0", "–", "–", "–", "–")
+    assert runs[0].swept_distance_m is not None
+    assert min(runs[0].swept_distance_m[runs[0].episodes.scene == "N_Coast_1"]) == pytest.approx(2.8)
+
+
+def test_a_log_without_steps_has_no_distances_along_the_way(log: Path, tmp_path: Path) -> None:
+    write(tmp_path, "alpha", "package:Alpha", LOG["alpha"])
+    store.shard_path(tmp_path, "steps", "U_Mall_1", run="alpha").unlink()
+    (run,) = load_runs(tmp_path)
+    assert run.swept_distance_m is None
+    assert not any("along the way" in group for group, _ in radii.radius_table([run], AT_3).groups)
+
+
+def test_a_paired_comparison_is_of_common_tasks_and_exact(log: Path, runs: list[Run]) -> None:
+    table = paired.paired_tables(runs[:2], [AT_3])[0]
+    row = cells(table, "SR ↑")
+    # Scene by scene beta solves ¼ less, ½ more and 1 less: of the eight signs of these, six make as much as 0.75.
+    assert row[:3] == ("21.88", "12.50", "−9.38")
+    assert row[4] == "0.750"
+    # alpha alone solves three, beta alone one: 2 · (1 + 4) / 16.
+    assert "alone: 3; by package:Beta alone: 1 (McNemar's exact p 0.625" in table.notes[1]
+    assert table.notes[0].startswith("18 tasks of 8 scenes")
+    # In the other order the same with the sign turned round.
+    back = paired.paired_tables(runs[1::-1], [AT_3])[0]
+    assert cells(back, "SR ↑")[2] == "+9.38"
+    assert cells(back, "SR ↑")[4] == "0.750"
+    whole = load_runs(log, ["floor", "alpha"])
+    assert paired.paired_tables(whole, [AT_3])[0].notes[0].startswith("18 tasks")
+    with pytest.raises(UsageError, match="two runs, not 3"):
+        paired.paired_tables(runs, [AT_3])
+    apart = [runs[0].where(runs[0].episodes.scene == "U_Mall_0"), runs[1].where(runs[1].episodes.scene == "U_Mall_1")]
+    with pytest.raises(UsageError, match="alpha and beta have no task in common"):
+        paired.paired_tables(apart, [AT_3])
+
+
+def test_intervals_are_scipys_and_the_exact_ones(runs: list[Run]) -> None:
+    found = intervals.score_intervals(runs[0].episodes, AT_3)
+    scores = intervals.scene_scores(runs[0].episodes, AT_3)
+    families = [[float(values[0]) for values in part.values()] for part in scores.values()]
+    assert families == [[0.25, 0.0], [0.5, 0.0], [0.0, 1.0], [0.0, 0.0]]
+    # Every draw of two scenes a family, all alike likely.
+    means = sorted(
+        sum(sum(draw) / 2 for draw in drawn) / 4
+        for drawn in product(*(list(product(scenes, repeat=2)) for scenes in families))
+    )
+    low, high = found[0]
+    assert np.mean(np.array(means) < low - 1e-9) <= 0.03 <= 0.2
+    assert low == pytest.approx(np.quantile(means, 0.025), abs=0.016)
+    assert high == pytest.approx(np.quantile(means, 0.975), abs=0.016)
+    theirs = stats.bootstrap(
+        tuple(np.array(part) for part in families), lambda *parts: sum(np.mean(p) for p in parts) / len(parts),
+        method="percentile", n_resamples=4000, vectorized=False, rng=np.random.default_rng(5),
+    ).confidence_interval  # fmt: skip
+    assert (low, high) == (pytest.approx(theirs.low, abs=0.016), pytest.approx(theirs.high, abs=0.016))
+    assert found == intervals.score_intervals(runs[0].episodes, AT_3)
+    # How far scenes differ is not known of a family with one of them.
+    one = runs[0].episodes.where(runs[0].episodes.scene != "U_Mall_1")
+    assert all(math.isnan(end) for ends in intervals.score_intervals(one, AT_3) for end in ends)
+
+
+def test_tables_are_chosen_by_name(log: Path, runs: list[Run]) -> None:
+    wanted = contents.Wanted(log, runs, [AT_3, AT_5])
+    titles = [table.title for table in contents.report_tables(wanted, ["visits", "overall", "visits"])]
+    assert titles == ["Overall", "Where visits are lost, 3 m"]
+    assert len(contents.report_tables(wanted, ["all"])) == 14
+    with pytest.raises(UsageError, match="no table 'visit': did you mean 'visits'"):
+        contents.report_tables(wanted, ["visit"])
+
+
+def test_the_csv_has_the_papers_rows_beside_ours(runs: list[Run]) -> None:
+    lines = tables.as_csv(runs, [AT_3, AT_5], results()).splitlines()
+    head = lines[0].split(",")
+    (row,) = [line.split(",") for line in lines if line.startswith("paper,Claude Opus 5,aerialdojo,3.0,base")]
+    assert dict(zip(head, row, strict=True))["osr"] == "0.0784"
+    assert dict(zip(head, row, strict=True))["dts_m_sd"] == "5.97"
+    assert sum(line.startswith("paper,") for line in lines) == 22
+    (row,) = [
+        line.split(",")
+        for line in lines
+        if line.startswith("alpha,package:Alpha,aerialdojo,3.0,all,all,partition,OOD")
+    ]
+    assert dict(zip(head, row, strict=True))["sr"] == "0.25"

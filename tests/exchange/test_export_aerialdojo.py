@@ -1,0 +1,369 @@
+"""The authors' layout: its folders, its words, its numbers."""
+
+import json
+import math
+import os
+import re
+import shutil
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pandas as pd
+import pytest
+from support.releases import copy_release, released, replace_rows
+from typer.testing import CliRunner
+
+from aerialdojo_gen.cli import app
+from aerialdojo_gen.errors import AssetError, StoreError, UsageError
+from aerialdojo_gen.exchange.exporting import export_release
+from aerialdojo_gen.store import shards as store
+from aerialdojo_gen.store.atomic import atomic_folder
+from aerialdojo_gen.store.staging import AREA
+
+
+@pytest.fixture(scope="module")
+def layout(smoke, tmp_path_factory) -> Path:
+    out = tmp_path_factory.mktemp("layout") / "out"
+    export_release("aerialdojo", smoke, out)
+    return out
+
+
+def task_files(layout: Path) -> list[Path]:
+    return sorted(layout.glob("*OGS/*/*/*/Task.json"))
+
+
+def test_folders_are_those_of_the_authors(layout):
+    shape = re.compile(
+        r"(Semantic|Image)OGS/(IID|OOD)_(TRAINS|TESTS)/(1_BaseTasks|2_StandardTasks|3_LongHorizonTasks)/"
+        r"U_Courtyard_[01]_[BSL]_(Train|Test)/Task\.json"
+    )
+    found = [path.relative_to(layout).as_posix() for path in task_files(layout)]
+    # Two kinds, two scenes, three settings, train and test: those without tasks too, as in the authors' data.
+    assert len(found) == 24
+    assert len(list(layout.glob("TrajectoryDATA/*/*/*"))) == 12
+    empty = [path for path in found if json.loads((layout / path).read_text()) == []]
+    assert len(empty) == 16
+    assert all("/1_BaseTasks/" not in path for path in empty)
+    assert all(shape.fullmatch(path) for path in found), found
+    for path in found:
+        assert ("_1_" in path.split("/")[3]) == path.split("/")[1].startswith("OOD")
+        assert path.split("/")[1].endswith("TRAINS") == path.split("/")[3].endswith("Train")
+
+
+def test_episodes_are_numbered_and_each_has_its_trajectory(layout):
+    for path in task_files(layout):
+        tasks = json.loads(path.read_text())
+        assert [task["episode_id"] for task in tasks] == [str(k) for k in range(len(tasks))]
+        trajectories = layout / "TrajectoryDATA" / path.parent.relative_to(layout / path.relative_to(layout).parts[0])
+        assert {p.name for p in trajectories.iterdir()} == {f"{k}.json" for k in range(len(tasks))}
+
+
+def test_both_instances_are_the_same_episode(layout):
+    for path in sorted(layout.glob("SemanticOGS/*/*/*/Task.json")):
+        other = layout / "ImageOGS" / path.relative_to(layout / "SemanticOGS")
+        pairs = zip(json.loads(path.read_text()), json.loads(other.read_text()), strict=True)
+        for semantic, image in pairs:
+            assert semantic.pop("description")
+            assert "description" not in image
+            picture = other.parent / image.pop("image")
+            assert picture.read_bytes().startswith(b"\x89PNG")
+            assert semantic == image
+
+
+def test_a_task_has_the_fields_of_the_authors(layout):
+    for path in task_files(layout):
+        train = path.parent.name.endswith("Train")
+        for task in json.loads(path.read_text()):
+            goal = {"image"} if "ImageOGS" in path.parts else {"description"}
+            assert set(task) == {
+                "episode_id", "trajectory_id", "map_name", "coordinate_system", "task", "used-in-train",
+                "start_true_name", "goal_true_name", "start_object_name", "goal_object_name",
+                "category", "Landmark", "Direction", "start_pose", "goal_pose", "info",
+            } | goal  # fmt: skip
+            assert task["coordinate_system"] == "ProjectAirSim NED"
+            assert set(task["info"]) == {"geodesic_distance", "euclidean_distance", "complexity"}
+            assert task["map_name"] == path.parent.name.rsplit("_", 2)[0]
+            assert task["task"] == "base_task"
+            assert task["used-in-train"] == int(train)
+            pose = task["start_pose"]
+            assert set(pose) == {"start_position", "start_quaternion_xyzw", "start_quaternionr"}
+            assert pose["start_quaternionr"] == pose["start_quaternion_xyzw"]
+
+
+def evaluator_reads(task: dict) -> dict:
+    """What the authors' online evaluator makes of a task: it refuses one without these fields.
+
+    Written after the public client's task loader: the first non-empty one of several names, and a text for a
+    description, which is the landmark's where there is none.
+    """
+    start, goal = task.get("start_pose", {}), task.get("goal_pose", {})
+    quaternion = start.get("start_quaternionr") or task.get("start_quaternionr") or task.get("start_orientation")
+    position = start.get("start_position") or task.get("start_position")
+    end = goal.get("goal_position") or task.get("object_position") or task.get("pose")
+    assert position is not None
+    assert quaternion is not None
+    assert end is not None
+    return {
+        "position": [float(v) for v in position[:3]],
+        "quaternion": [float(v) for v in quaternion[:4]],
+        "goal": end,
+        "description": str(task.get("description", task.get("Landmark", ""))),
+    }
+
+
+def test_the_authors_evaluator_reads_every_task(layout, smoke):
+    tasks = released(smoke, "tasks")
+    read = 0
+    for path in task_files(layout):
+        for task in json.loads(path.read_text()):
+            seen = evaluator_reads(task)
+            row = tasks.loc[f"{task['trajectory_id']}-{'i' if 'ImageOGS' in path.parts else 's'}"]
+            told = row["description"] if row["modality"] == "semantic" else row["landmark"]
+            assert seen["description"] == told
+            assert np.linalg.norm(seen["quaternion"]) == pytest.approx(1)
+            read += 1
+    assert read == len(tasks)
+
+
+def test_actors_are_the_mesh_nodes_and_readable_names_stand_beside_them(layout, smoke):
+    objects = pd.read_parquet(smoke / "release/objects").set_index(["scene", "mesh_node"])["name"]
+    for path in task_files(layout):
+        for task in json.loads(path.read_text()):
+            assert objects[task["map_name"], task["goal_object_name"]] == task["goal_true_name"]
+            assert objects[task["map_name"], task["start_object_name"]] == task["start_true_name"]
+
+
+def test_what_a_task_states_of_its_route_is_the_routes(layout, smoke):
+    routes = released(smoke, "routes")
+    for path in task_files(layout):
+        for task in json.loads(path.read_text()):
+            route = routes.loc[task["trajectory_id"]]
+            assert task["info"] == {
+                "geodesic_distance": route["length_m"],
+                "euclidean_distance": route["euclidean_m"],
+                "complexity": route["detour_ratio"],
+            }
+
+
+def test_pictures_are_as_large_as_the_authors_and_show_the_same_view(layout, smoke):
+    objects = pd.read_parquet(smoke / "release/objects").set_index("reference_image_id")
+    pictures = {p.stem: p for p in layout.glob("ImageOGS/**/Images/*.png")}
+    assert len(pictures) > 10
+    small = {
+        name: cv2.imdecode(np.frombuffer(objects["reference_image"][name], np.uint8), cv2.IMREAD_COLOR)
+        for name in pictures
+    }
+    for name, path in pictures.items():
+        large = cv2.imread(str(path))
+        assert large.shape == (640, 640, 3)
+        shrunk = cv2.resize(large, (320, 320), interpolation=cv2.INTER_AREA).astype(float)
+        off = {other: np.abs(shrunk - picture).mean() for other, picture in small.items()}
+        # As like its own as a picture at another size can be, and more like it than any other.
+        assert off[name] < 6
+        assert min(off, key=off.get) == name
+        # Drawn at that size, not enlarged: an enlarged picture has nothing that shrinking loses.
+        again = cv2.resize(shrunk, (640, 640), interpolation=cv2.INTER_CUBIC)
+        assert np.abs(again - large).mean() > 0.3
+
+
+def test_the_releases_own_pictures_are_exported_on_demand(smoke, tmp_path):
+    export_release("aerialdojo", smoke, tmp_path / "out", ["U_Courtyard_0"], picture_px=0)
+    objects = pd.read_parquet(smoke / "release/objects").set_index("reference_image_id")["reference_image"]
+    pictures = list((tmp_path / "out").glob("ImageOGS/**/Images/*.png"))
+    assert pictures
+    assert all(path.read_bytes() == objects[path.stem] for path in pictures)
+
+
+def test_pictures_of_another_mesh_are_refused(smoke, tmp_path):
+    data = copy_release(smoke, tmp_path / "data", ["U_Courtyard_0"])
+    with pytest.raises(AssetError, match=r"U_Courtyard_0\.glb is missing.*--picture-size 0"):
+        export_release("aerialdojo", data, tmp_path / "out")
+    shutil.copytree(smoke / "meshes", data / "meshes")
+    mesh = data / "meshes/U_Courtyard_0.glb"
+    raw = bytearray(mesh.read_bytes())
+    raw[-5] ^= 1
+    mesh.write_bytes(raw)
+    with pytest.raises(AssetError, match=r"is not the mesh that the release was made from"):
+        export_release("aerialdojo", data, tmp_path / "out")
+    # The right mesh, and another object's picture in the release.
+    shutil.copy(smoke / "meshes/U_Courtyard_0.glb", mesh)
+    rows = store.read_scene(data, "release/objects", "U_Courtyard_0").to_pylist()
+    rows[0]["reference_image"], rows[3]["reference_image"] = rows[3]["reference_image"], rows[0]["reference_image"]
+    replace_rows(data, "release/objects", "U_Courtyard_0", rows)
+    with pytest.raises(StoreError, match=r"looks otherwise in the release than from its anchor"):
+        export_release("aerialdojo", data, tmp_path / "out")
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["data"]
+
+
+def rotate_x(q):
+    """The body's x axis in the frame of a quaternion xyzw, by the rotation matrix's first column."""
+    x, y, z, w = q
+    return np.array([1 - 2 * (y * y + z * z), 2 * (x * y + z * w), 2 * (x * z - y * w)])
+
+
+def test_trajectories_fly_as_their_words_say_in_ned(layout, smoke):
+    routes = released(smoke, "routes")
+    lengths = []
+    for path in sorted(layout.glob("TrajectoryDATA/*/*/*/*.json")):
+        document = json.loads(path.read_text())
+        assert document["schema_version"] == "hybrid_astar_trajectory_v6"
+        assert document["status"] == "planned"
+        assert re.fullmatch(r"\d+_\d+__\d+", document["task_id"])
+        steps = document["trajectory"]
+        assert steps[0]["action"] == "start"
+        positions = np.array([s["position_ned_m"] for s in steps])
+        ahead = np.array([rotate_x(s["quaternion_xyzw"]) for s in steps])
+        assert np.allclose(np.linalg.norm([s["quaternion_xyzw"] for s in steps], axis=1), 1)
+        # z points down: above the ground it is negative.
+        assert (positions[:, 2] < 0).all()
+        right = np.cross([0, 0, 1], ahead)
+        for k, step in enumerate(steps[1:], 1):
+            moved, word = positions[k] - positions[k - 1], step["action"]
+            turned = math.atan2(np.cross(ahead[k - 1], ahead[k])[2], ahead[k - 1] @ ahead[k])
+            if word in ("rotl", "rotr"):
+                # rotr is +yaw.
+                assert math.degrees(turned) == pytest.approx(15 if word == "rotr" else -15)
+                assert np.allclose(moved, 0)
+                continue
+            ways = {
+                "forward": ahead[k],
+                "left": -right[k],
+                "right": right[k],
+                "ascend": [0, 0, -1],
+                "descend": [0, 0, 1],
+            }
+            along = {name: float(moved @ np.asarray(way)) for name, way in ways.items()}
+            assert turned == pytest.approx(0, abs=1e-9)
+            # None of the others goes farther: a move along an axis is called by it, an approach by its longest.
+            assert along[word] == pytest.approx(max(along.values()), abs=1e-9)
+            if k < len(steps) - 1:
+                assert np.linalg.norm(moved - along[word] * np.asarray(ways[word])) < 1e-6
+                assert min(abs(along[word] - size) for size in (1, 2, 3, 5)) < 1e-5
+            else:
+                assert np.linalg.norm(moved) <= 1 + 1e-9
+        lengths.append(np.linalg.norm(np.diff(positions, axis=0), axis=1).sum())
+    assert sorted(lengths) == pytest.approx(sorted(routes["length_m"]), abs=1e-9)
+
+
+def test_numbers_are_ours_turned(layout, smoke):
+    routes, tasks = released(smoke, "routes"), released(smoke, "tasks")
+    path = layout / "SemanticOGS/IID_TRAINS/1_BaseTasks/U_Courtyard_0_B_Train/Task.json"
+    mine = tasks[
+        (tasks["scene"] == "U_Courtyard_0") & (tasks["subset"] == "train") & (tasks["modality"] == "semantic")
+    ]
+    mine = mine.sort_values("nav_id")
+    for task, (_, row) in zip(json.loads(path.read_text()), mine.iterrows(), strict=True):
+        route = routes.loc[row["nav_id"]]
+        assert task["start_pose"]["start_position"] == [row["start_y_m"], row["start_x_m"], -row["start_z_m"]]
+        assert task["goal_pose"]["goal_position"] == [route["goal_y_m"], route["goal_x_m"], -route["goal_z_m"]]
+        assert task["goal_true_name"] == row["target_name"]
+        assert (task["Landmark"], task["Direction"]) == (row["landmark"], row["direction"])
+        north, east, _ = rotate_x(task["start_pose"]["start_quaternion_xyzw"])
+        assert [east, north] == pytest.approx([math.cos(row["start_yaw_rad"]), math.sin(row["start_yaw_rad"])])
+
+
+def test_the_same_release_gives_the_same_bytes(layout, smoke, tmp_path):
+    export_release("aerialdojo", smoke, tmp_path / "again")
+    first = {p.relative_to(layout): p.read_bytes() for p in layout.rglob("*") if p.is_file()}
+    second = {
+        p.relative_to(tmp_path / "again"): p.read_bytes() for p in (tmp_path / "again").rglob("*") if p.is_file()
+    }
+    assert first == second
+
+
+def test_a_picture_is_on_the_disk_once(layout):
+    pictures = list(layout.glob("ImageOGS/**/*.png"))
+    assert len({p.stat().st_ino for p in pictures}) == len({p.name for p in pictures}) < len(pictures)
+
+
+def test_nothing_is_there_when_a_picture_is_missing(smoke, tmp_path):
+    data = copy_release(smoke, tmp_path / "data", ["U_Courtyard_0"])
+    rows = store.read_scene(data, "release/objects", "U_Courtyard_0").to_pylist()
+    replace_rows(data, "release/objects", "U_Courtyard_0", [row | {"reference_image": None} for row in rows])
+    with pytest.raises(StoreError, match=r"object \d+ of U_Courtyard_0 has no reference image"):
+        export_release("aerialdojo", data, tmp_path / "out", picture_px=0)
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["data"]
+
+
+@pytest.mark.parametrize("name", ["../../outside", "/etc/x", "a/b", ""])
+def test_a_picture_name_does_not_leave_its_folder(smoke, tmp_path, name):
+    data = copy_release(smoke, tmp_path / "data", ["U_Courtyard_0"])
+    rows = store.read_scene(data, "release/objects", "U_Courtyard_0").to_pylist()
+    replace_rows(data, "release/objects", "U_Courtyard_0", [row | {"reference_image_id": name} for row in rows])
+    with pytest.raises(StoreError, match="cannot name a file"):
+        export_release("aerialdojo", data, tmp_path / "out", picture_px=0)
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["data"]
+
+
+def test_a_folder_of_others_is_never_replaced(smoke, tmp_path):
+    out = tmp_path / "out"
+    out.mkdir()
+    (out / "thesis.tex").write_text("mine")
+    for force in (False, True):
+        with pytest.raises(UsageError, match=r"holds no export\.json"):
+            export_release("aerialdojo", smoke, out, force=force)
+    assert [p.name for p in out.iterdir()] == ["thesis.tex"]
+    assert os.listdir(tmp_path) == ["out"]
+
+
+def test_an_export_is_replaced_by_force_alone(smoke, tmp_path):
+    out = tmp_path / "out"
+    export_release("aerialdojo", smoke, out, ["U_Courtyard_0"])
+    before = {p.relative_to(out) for p in out.rglob("*")}
+    with pytest.raises(UsageError, match="--force replaces it"):
+        export_release("aerialdojo", smoke, out, ["U_Courtyard_1"])
+    assert {p.relative_to(out) for p in out.rglob("*")} == before
+    export_release("aerialdojo", smoke, out, ["U_Courtyard_1"], force=True)
+    assert not list(out.rglob("U_Courtyard_0*"))
+    assert os.listdir(tmp_path) == ["out"]
+
+
+def test_what_a_killed_export_left_is_swept_and_a_living_one_s_is_not(smoke, tmp_path):
+    left = tmp_path / AREA / "dead"
+    left.mkdir(parents=True)
+    (left / "lease").write_text("out")
+    (left / "new").mkdir()
+    with atomic_folder(tmp_path / "other") as living:
+        export_release("aerialdojo", smoke, tmp_path / "out", ["U_Courtyard_0"])
+        assert living.is_dir()
+        assert not left.exists()
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["other", "out"]
+
+
+def test_an_export_killed_while_it_replaced_another_is_there_again(smoke, tmp_path):
+    out, item = tmp_path / "out", tmp_path / AREA / "dead"
+    export_release("aerialdojo", smoke, out, ["U_Courtyard_0"])
+    # As a kill leaves it where two names cannot be exchanged.
+    item.mkdir(parents=True)
+    (item / "lease").write_text("out")
+    out.rename(item / "old")
+    with pytest.raises(UsageError, match="--force replaces it"):
+        export_release("aerialdojo", smoke, out, ["U_Courtyard_1"])
+    assert list(out.rglob("U_Courtyard_0*"))
+    assert os.listdir(tmp_path) == ["out"]
+
+
+def test_the_command_says_what_it_wrote_and_what_is_wrong(smoke, tmp_path):
+    runner = CliRunner()
+    done = runner.invoke(
+        app, ["export", "--format", "aerialdojo", "--data", str(smoke), "--out", str(tmp_path / "o")]
+    )
+    assert done.exit_code == 0
+    scenes = store.release_scenes(smoke)
+    n = sum(store.count_rows(smoke, table, scene) for table in ("routes/train", "routes/test") for scene in scenes)
+    assert n > 100
+    assert done.output.strip().endswith(f"2 scenes, 24 task files, {2 * n} tasks, {n} trajectories, 16 pictures")
+    lost = json.loads((tmp_path / "o/export.json").read_text())["lost"]
+    assert "min_clearance_m" in lost["routes"]
+    for arguments, error in (
+        (["--format", "xml", "--data", str(smoke)], "no format 'xml': it is one of aerialdojo, habitat"),
+        (["--format", "habitat", "--data", str(tmp_path)], "there is no release in"),
+        (["--format", "habitat", "--data", str(smoke), "--scene", "Nowhere"], "Nowhere"),
+        (["--format", "habitat", "--data", str(smoke), "--picture-size", "64"], "is for --format aerialdojo"),
+        (["--format", "aerialdojo", "--data", str(smoke), "--picture-size", "9"], "16 to 4096 pixels, or 0"),
+    ):
+        failed = runner.invoke(app, ["export", *arguments, "--out", str(tmp_path / "p")])
+        assert isinstance(failed.exception, UsageError)
+        assert error in str(failed.exception)
+        assert not (tmp_path / "p").exists()

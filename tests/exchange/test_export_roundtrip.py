@@ -1,0 +1,177 @@
+"""The release through the authors' layout and back: nothing is lost but what the layout has no field for."""
+
+import json
+import math
+
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from support.releases import LISTS, assert_same, copy_release, imported, released, replace_rows, schema_of
+
+from aerialdojo_gen.exchange.aerialdojo_writer import LOST
+from aerialdojo_gen.exchange.exporting import export_release
+from aerialdojo_gen.exchange.importing import import_benchmark
+from aerialdojo_gen.planning.primitives import replay, route_length_m
+from aerialdojo_gen.store import shards as store
+from aerialdojo_gen.store.schemas import APPROACH, RELEASE_OBJECTS, ROUTES, TASKS
+
+# Recomputed from the poses, which come back to the last bit.
+RECOMPUTED = {"euclidean_m": 1e-9, "length_m": 1e-9, "detour_ratio": 1e-9}
+
+
+@pytest.fixture(scope="module")
+def there_and_back(smoke, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("roundtrip")
+    export_release("aerialdojo", smoke, folder / "layout", picture_px=0)
+    report = import_benchmark("aerialdojo", [folder / "layout"], folder / "data")
+    return smoke, folder / "data", report
+
+
+@pytest.mark.parametrize("table", ["tasks", "routes"])
+def test_tasks_and_routes_come_back(there_and_back, table):
+    data, back, _ = there_and_back
+    ours, theirs = released(data, table), imported(back, table)
+    assert len(ours) > 100
+    assert ours.index.tolist() == theirs.index.tolist()
+    lost = set(LOST.get(table, ()))
+    for column in ours.columns:
+        if column in lost:
+            assert theirs[column].isna().all(), f"{column} is said to be lost"
+        else:
+            assert_same(column, ours[column], theirs[column], RECOMPUTED.get(column, 0.0))
+
+
+def test_no_column_is_missing_or_of_another_type(there_and_back):
+    _, back, _ = there_and_back
+    for spec in (TASKS, ROUTES, RELEASE_OBJECTS):
+        schema = schema_of(back / "imported/aerialdojo" / spec.name)
+        for field in spec.schema:
+            mine = schema.field(field.name)
+            assert (mine.type, mine.metadata) == (field.type, field.metadata)
+
+
+def test_objects_come_back_as_far_as_tasks_name_them(there_and_back):
+    data, back, _ = there_and_back
+    landmarks = pd.read_parquet(data / "release/landmarks").set_index(["scene", "landmark_id"])["name"]
+    routes = released(data, "routes")
+    targets = set(zip(routes["scene"], routes["target_object_id"], strict=True))
+    ours = pd.read_parquet(data / "release/objects").set_index(["scene", "object_id"])
+    ours = ours[[key in targets for key in ours.index]].sort_index()
+    theirs = pd.read_parquet(back / "imported/aerialdojo/objects").set_index(["scene", "object_id"]).loc[ours.index]
+    lost = {name for name in LOST["objects"] if name in ours.columns}
+    for column in ours.columns:
+        if column in lost:
+            assert theirs[column].isna().all(), f"{column} is said to be lost"
+        else:
+            assert ours[column].tolist() == theirs[column].tolist(), column
+    named = [landmarks[scene, k] for (scene, _), k in zip(ours.index, ours["landmark_id"], strict=True)]
+    assert theirs["landmark"].tolist() == named
+
+
+def test_the_report_says_what_is_lost(there_and_back):
+    _, _, report = there_and_back
+    assert report.n_bad == 0
+    assert not report.unmapped
+    assert not report.notes
+    whole = {name for name, n in report.empty.items() if n == report.rows[name.split(".")[0]]}
+    said = {f"{table}.{c}" for table in ("routes", "objects") for c in LOST[table] if " " not in c}
+    assert whole == said
+    assert report.rows["routes"] > 100
+    assert report.replay() == {"routes": report.rows["routes"], "median_m": 0.0, "max_m": 0.0, "over_3_m": 0}
+
+
+letters = st.characters(codec="utf-8", exclude_categories=("Cs", "Cc", "Zs", "Zl", "Zp"))
+names = st.text(letters, min_size=1, max_size=12)
+flights = st.lists(
+    st.tuples(
+        st.tuples(st.floats(-400, 400), st.floats(-400, 400), st.floats(0, 80), st.floats(-math.pi, math.pi)),
+        st.lists(st.integers(1, APPROACH - 1), min_size=1, max_size=15),
+        st.tuples(st.floats(0.06, 0.5), st.floats(-0.5, 0.5), st.floats(-0.5, 0.5)),
+    ),
+    min_size=1,
+    max_size=6,
+)
+
+
+def flown(rows: dict, start, actions, approach) -> dict:
+    """A route of the release with another flight in it: a replay of the actions and an approach."""
+    poses = replay(start, actions)
+    end = poses[-1].copy()
+    end[:3] += approach
+    poses = np.vstack([poses, end])
+    length, distance = route_length_m(poses[:, :3]), float(np.linalg.norm(end[:3] - poses[0, :3]))
+    lists = {name: poses[:, k].tolist() for k, name in enumerate(LISTS[:4])}
+    goal = dict(zip(("goal_x_m", "goal_y_m", "goal_z_m"), end[:3].tolist(), strict=True))
+    return (
+        rows
+        | lists
+        | goal
+        | {
+            "action": [*actions, APPROACH, 0],
+            "n_actions": len(actions) + 2,
+            "length_m": length,
+            "euclidean_m": distance,
+            "detour_ratio": length / distance if distance else 0.0,
+        }
+    )
+
+
+@settings(max_examples=10, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(flights, names, names)
+def test_any_flight_and_any_name_come_back(smoke, tmp_path_factory, flown_ones, target, description):
+    folder = tmp_path_factory.mktemp("any")
+    scene = "U_Courtyard_0"
+    data = copy_release(smoke, folder / "data", [scene])
+    routes = store.read_scene(data, "routes/train", scene).to_pylist()[: len(flown_ones)]
+    routes = [flown(row, *flight) for row, flight in zip(routes, flown_ones, strict=True)]
+    by_id = {row["nav_id"]: row for row in routes}
+    tasks = [t for t in store.read_scene(data, "tasks/train", scene).to_pylist() if t["nav_id"] in by_id]
+    for task in tasks:
+        route = by_id[task["nav_id"]]
+        for column in ("x_m", "y_m", "z_m", "yaw_rad"):
+            task[f"start_{column}"] = route[column][0]
+        task["target_name"] = target
+        task["description"] = description if task["modality"] == "semantic" else None
+    objects = [
+        row | {"name": target, "description": description}
+        for row in store.read_scene(data, "release/objects", scene).to_pylist()
+    ]
+    for table, rows in (("routes/train", routes), ("tasks/train", tasks), ("release/objects", objects)):
+        replace_rows(data, table, scene, rows)
+    for table in ("routes/test", "tasks/test"):
+        replace_rows(data, table, scene, [])
+    export_release("aerialdojo", data, folder / "layout", picture_px=0)
+    import_benchmark("aerialdojo", [folder / "layout"], folder / "back")
+    for table in ("tasks", "routes"):
+        ours, theirs = released(data, table), imported(folder / "back", table)
+        assert ours.index.tolist() == theirs.index.tolist()
+        for column in set(ours.columns) - set(LOST.get(table, ())) - {"detour_ratio"}:
+            assert_same(column, ours[column], theirs[column], RECOMPUTED.get(column, 0.0))
+
+
+def test_a_navigation_task_keeps_its_name_whatever_part_is_imported(smoke, there_and_back, tmp_path):
+    _, back, _ = there_and_back
+    export_release("aerialdojo", smoke, tmp_path / "layout", ["U_Courtyard_1"])
+    part = tmp_path / "layout/ImageOGS/OOD_TESTS/1_BaseTasks/U_Courtyard_1_B_Test/Task.json"
+    import_benchmark("aerialdojo", [part], tmp_path / "data")
+    mine, all_of_them = imported(tmp_path / "data", "routes"), imported(back, "routes")
+    pd.testing.assert_frame_equal(
+        mine.drop(columns=["source_file", "source_row"]),
+        all_of_them.loc[mine.index].drop(columns=["source_file", "source_row"]),
+    )
+    assert set(mine.index) <= set(released(smoke, "routes").index)
+
+
+def test_without_its_name_a_navigation_task_is_named_by_its_objects(smoke, tmp_path):
+    export_release("aerialdojo", smoke, tmp_path / "layout", ["U_Courtyard_1"], picture_px=0)
+    for path in (tmp_path / "layout").glob("*OGS/*/*/*/Task.json"):
+        tasks = json.loads(path.read_text())
+        path.write_text(json.dumps([{k: v for k, v in task.items() if k != "trajectory_id"} for task in tasks]))
+    import_benchmark("aerialdojo", [tmp_path / "layout"], tmp_path / "all")
+    part = tmp_path / "layout/ImageOGS/OOD_TESTS/1_BaseTasks/U_Courtyard_1_B_Test/Task.json"
+    import_benchmark("aerialdojo", [part], tmp_path / "part")
+    every, some = imported(tmp_path / "all", "routes"), imported(tmp_path / "part", "routes")
+    assert len(some) > 10
+    assert some["x_m"].map(tuple).equals(every.loc[some.index, "x_m"].map(tuple))

@@ -1,0 +1,351 @@
+"""Bad task files: each record named with file, row and field; the rest kept only on request; paths stay in theirs."""
+
+import json
+import os
+import shutil
+from pathlib import Path
+
+import pandas as pd
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from support import task_files
+from typer.testing import CliRunner
+
+from aerialdojo_gen.cli import app
+from aerialdojo_gen.errors import ImportRefused, UsageError
+from aerialdojo_gen.exchange.exporting import export_release
+from aerialdojo_gen.exchange.folder import inside
+from aerialdojo_gen.exchange.importing import FORMATS, Options, import_benchmark
+
+NAN = float("nan")
+FRAME = {"openfly": "enu", "cityavos": "ned"}
+
+
+def records_of(format_name: str, folder: Path, n: int = 3) -> tuple[object, list[dict]]:
+    """A good file's document, and the records in it."""
+    if format_name == "aerialvln":
+        document = task_files.aerialvln(n=n)
+        return document, document["episodes"]
+    rows = {"uav-on": task_files.uav_on, "openfly": lambda n: task_files.openfly(n=n),
+            "cityavos": lambda n: task_files.cityavos(folder, n)}[format_name](n)  # fmt: skip
+    return rows, rows
+
+
+def put(record: dict, path: str, value: object) -> None:
+    """Set a field by its path; a number is an index."""
+    *parents, last = [int(key) if key.isdigit() else key for key in path.split(".")]
+    for key in parents:
+        record = record[key]
+    if value is KeyError:
+        del record[last]
+    else:
+        record[last] = value
+
+
+BAD = [
+    # format, field, value, the field that is named, why
+    ("uav-on", "start_pose.start_position", [1, 2, 3, 4], "start_pose.start_position", "expected 3 numbers, found 4"),
+    ("uav-on", "start_pose.start_position", [1, NAN, 3], "start_pose.start_position", "nan is no finite number"),
+    ("uav-on", "start_pose.start_position.1", "307", "start_pose.start_position", "expected a number, found '307'"),
+    ("uav-on", "start_pose.start_position.1", True, "start_pose.start_position", "expected a number, found True"),
+    ("uav-on", "start_pose.start_position.1", 10**400, "start_pose.start_position", "is too large a number"),
+    ("uav-on", "start_pose.start_position.1", 1e9, "start_pose.start_position", "1e+09 m is no place on earth"),
+    ("uav-on", "start_pose.start_quaternionr", [0, 0, 0, 0], "start_pose.start_quaternionr", "length is 0"),
+    ("uav-on", "start_pose.start_quaternionr", [0, 0, 90, 0], "start_pose.start_quaternionr", "length is 90"),
+    ("uav-on", "start_pose", KeyError, "start_pose", "is missing"),
+    ("uav-on", "start_pose", None, "start_pose", "expected an object, found None"),
+    ("uav-on", "pose", [], "pose", "is empty"),
+    ("uav-on", "pose", [[0, 0, 0], [1, 2]], "pose[1]", "expected 3 numbers, found 2"),
+    ("uav-on", "used-in-train", 2, "used-in-train", "expected 0 or 1, found 2"),
+    ("uav-on", "true_name", 5, "true_name", "expected a text, found 5"),
+    ("uav-on", "true_name", "\ud800", "true_name", "half a Unicode character"),
+    ("uav-on", "map_name", "../outside", "scene", "'../outside' is not a scene name"),
+    ("uav-on", "map_name", "/etc", "scene", "'/etc' is not a scene name"),
+    ("uav-on", "episode_id", "0", "id", "BrushifyRoad_test/0 stands twice"),
+    ("cityavos", "initial_pos.5", 90, "initial_pos[5]", "yaw 90 is more than a turn in radians"),
+    ("cityavos", "initial_pos", [1, 2, 3], "initial_pos", "expected 6 numbers, found 3"),
+    ("cityavos", "target_pos", [1, 2, NAN], "target_pos", "nan is no finite number"),
+    ("cityavos", "target_image_path", "data/target_image/none.png", "target_image_path", "there is no file"),
+    ("cityavos", "target_image_path", "../secret.png", "target_image_path", "'../secret.png' leads out of"),
+    ("cityavos", "target_image_path", "/etc/passwd", "target_image_path", "is no path relative to"),
+    ("cityavos", "target_image_path", "C:\\x.png", "target_image_path", "is no path relative to"),
+    ("cityavos", "target_text", " ", "target_text", "is empty"),
+    ("cityavos", "mission_id", 1, "id", "1 stands twice"),
+    ("aerialvln", "actions.2", 9, "actions[2]", "unknown action 9: known are 0, 1, 2, 3, 4, 5, 6, 7"),
+    ("aerialvln", "actions.2", 1.5, "actions", "expected whole numbers, found 1.5"),
+    ("aerialvln", "actions.2", 0, "actions[2]", "stop before the end"),
+    ("aerialvln", "start_rotation", [1, 0, 0], "start_rotation", "expected 4 numbers, found 3"),
+    ("aerialvln", "reference_path.1", [1, 2, 3, 4], "reference_path[1]", "expected x, y, z"),
+    ("aerialvln", "reference_path.1.2", NAN, "reference_path[1]", "nan is no finite number"),
+    ("aerialvln", "goals", [], "goals", "is empty"),
+    ("aerialvln", "goals.0", 7, "goals[0]", "expected an object, found 7"),
+    (
+        "aerialvln",
+        "instruction.instruction_text",
+        None,
+        "instruction.instruction_text",
+        "expected a text",
+    ),
+    ("aerialvln", "episode_id", "A0", "id", "A0 stands twice"),
+    ("openfly", "action.1", -1, "action[1]", "unknown action -1"),
+    ("openfly", "pos.2", [1, 2, 3, 4], "pos[2]", "expected 3 numbers, found 4"),
+    ("openfly", "yaw.3", 90.0, "yaw[3]", "90 is more than a turn in radians"),
+    ("openfly", "yaw", [0.0], "yaw", "has 1 values for 6 positions"),
+    ("openfly", "image_path", "../../etc/x", "scene", "'..' is not a scene name"),
+]
+
+
+@pytest.mark.parametrize(("format_name", "field", "value", "named", "why"), BAD, ids=lambda v: str(v)[:40])
+def test_a_bad_record_is_named_and_the_others_are_kept_on_request(tmp_path, format_name, field, value, named, why):
+    document, rows = records_of(format_name, tmp_path / "in")
+    put(rows[1], field, value)
+    path = task_files.write(tmp_path / "in/file.json", document, ascii_only=True)
+    frame = FRAME.get(format_name)
+    with pytest.raises(ImportRefused) as refused:
+        import_benchmark(format_name, [path], tmp_path / "data", Options(frame=frame))
+    head, line = str(refused.value).splitlines()
+    assert head == "1 of 3 records are bad, nothing is written (--skip-bad keeps the rest):"
+    assert line.startswith(f"  file.json: row 1: {named}: ")
+    assert why in line
+    assert not list((tmp_path / "data").rglob("*.parquet"))
+    assert not list((tmp_path / "data/imported").iterdir())
+    report = import_benchmark(format_name, [path], tmp_path / "data", Options(frame=frame, skip_bad=True))
+    folder = tmp_path / "data/imported" / format_name
+    assert sorted(set(pd.read_parquet(folder / "tasks")["source_row"])) == [0, 2]
+    assert sorted(set(pd.read_parquet(folder / "routes")["source_row"])) == [0, 2]
+    assert (report.n_bad, report.records) == (1, 3)
+    assert (folder / "bad_records.txt").read_text() == line.removeprefix("  ") + "\n"
+    assert json.loads((folder / "import.json").read_text())["bad_fields"] == {named.split("[")[0]: 1}
+
+
+@pytest.mark.parametrize("value", [None, 3, "x", [], NAN])
+@pytest.mark.parametrize("format_name", ["uav-on", "cityavos", "aerialvln", "openfly"])
+def test_a_record_of_the_wrong_kind_is_named(tmp_path, format_name, value):
+    document, rows = records_of(format_name, tmp_path)
+    rows[2] = value
+    path = task_files.write(tmp_path / "file.json", document)
+    with pytest.raises(ImportRefused, match=r"file\.json: row 2: the row: expected an object, found"):
+        import_benchmark(format_name, [path], tmp_path, Options(frame=FRAME.get(format_name)))
+
+
+anything = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=5),
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=3), inner, max_size=2),
+    max_leaves=4,
+)
+
+
+@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.sampled_from(["uav-on", "cityavos", "aerialvln", "openfly"]), st.data())
+def test_whatever_stands_in_a_field_is_read_or_named(tmp_path, format_name, data):
+    document, rows = records_of(format_name, tmp_path, 2)
+    key = data.draw(st.sampled_from(sorted(rows[1])))
+    target = rows[1]
+    if isinstance(target[key], dict) and data.draw(st.booleans()):
+        target = target[key]
+        key = data.draw(st.sampled_from(sorted(target)))
+    elif isinstance(target[key], list) and data.draw(st.booleans()):
+        target, key = target[key], data.draw(st.integers(0, len(target[key]) - 1))
+    target[key] = data.draw(anything)
+    rows[0][data.draw(st.text(st.characters(), min_size=1), label="a key")] = 1
+    path = task_files.write(tmp_path / "file.json", document, ascii_only=True)
+    options = Options(frame=FRAME.get(format_name), skip_bad=True)
+    report = import_benchmark(format_name, [path], tmp_path, options, name="any", force=True)
+    assert report.records == 2
+    kept = set(pd.read_parquet(tmp_path / "imported/any/tasks")["source_row"])
+    assert kept == ({0} if report.n_bad else {0, 1})
+
+
+@pytest.fixture(scope="module")
+def exported(smoke, tmp_path_factory) -> Path:
+    out = tmp_path_factory.mktemp("exported") / "layout"
+    export_release("aerialdojo", smoke, out, ["U_Courtyard_1"], picture_px=0)
+    return out
+
+
+@pytest.fixture
+def layout(exported, tmp_path) -> Path:
+    """A copy of an export that a test may spoil."""
+    return shutil.copytree(exported, tmp_path / "layout")
+
+
+PART = "OOD_TESTS/1_BaseTasks/U_Courtyard_1_B_Test"
+LAYOUT_BAD = [
+    ("episode_id", "../0", "episode_id", "'../0' cannot name a file"),
+    ("episode_id", "0", "episode_id", "0 stands twice"),
+    ("episode_id", "100000", "episode_id", f"TrajectoryDATA/{PART}/100000.json: No such file"),
+    ("map_name", "U_Courtyard_0", "map_name", "in a folder of U_Courtyard_1"),
+    ("task", "long_task", "task", f"'long_task' in {PART}"),
+    ("task", "easy", "task", "'easy' is none of base_task, standard_task, long_task"),
+    ("used-in-train", 1, "used-in-train", f"1 in {PART}"),
+    ("goal_object_name", "another", "goal_object_name", "is not that of the episode's other instance"),
+    ("goal_pose.goal_position", [1, 2], "goal_pose.goal_position", "expected 3 numbers, found 2"),
+    (
+        "start_pose.start_quaternion_xyzw",
+        [0, 0, 1],
+        "start_pose.start_quaternion_xyzw",
+        "expected 4 numbers, found 3",
+    ),
+    (
+        "start_pose.start_quaternionr",
+        [1, 0, 0, 0],
+        "start_pose.start_quaternionr",
+        "is not start_quaternion_xyzw",
+    ),
+    ("info.complexity", "high", "info.complexity", "expected"),
+]
+
+
+@pytest.mark.parametrize(("field", "value", "named", "why"), LAYOUT_BAD, ids=lambda v: str(v)[:30])
+def test_a_bad_task_of_the_authors_layout_is_named(layout, tmp_path, field, value, named, why):
+    path = layout / "SemanticOGS" / PART / "Task.json"
+    tasks = json.loads(path.read_text())
+    put(tasks[1], field, value)
+    path.write_text(json.dumps(tasks))
+    with pytest.raises(ImportRefused) as refused:
+        import_benchmark("aerialdojo", [layout], tmp_path / "data")
+    line = str(refused.value).splitlines()[1]
+    assert line.startswith(f"  SemanticOGS/{PART}/Task.json: row 1: {named}")
+    assert why in line
+
+
+def test_a_task_and_its_trajectory_agree_on_the_target(layout, tmp_path):
+    shutil.rmtree(layout / "ImageOGS")
+    path = layout / "SemanticOGS" / PART / "Task.json"
+    tasks = json.loads(path.read_text())
+    tasks[1]["goal_object_name"] = "another"
+    task_files.write(path, tasks)
+    why = rf"TrajectoryDATA/{PART}/1\.json\.goal\.Object_name: .* is not the task's goal_object_name"
+    with pytest.raises(ImportRefused, match=why):
+        import_benchmark("aerialdojo", [layout], tmp_path / "data")
+
+
+def spoil_trajectory(layout: Path, change) -> None:
+    path = layout / "TrajectoryDATA" / PART / "3.json"
+    document = json.loads(path.read_text())
+    change(document)
+    path.write_text(json.dumps(document))
+
+
+STEP = "trajectory[1]"
+TRAJECTORY_BAD = [
+    (lambda d: put(d, "trajectory.1.action", "hover"), f"{STEP}.action", "unknown action 'hover'"),
+    (lambda d: put(d, "trajectory.1.action", "stop"), f"{STEP}.action", "unknown action 'stop'"),
+    (lambda d: put(d, "trajectory.1.action", ["forward"]), f"{STEP}.action", "unknown action ['forward']"),
+    (lambda d: put(d, "trajectory.0.action", "forward"), "trajectory[0].action", "known here are start"),
+    (lambda d: put(d, "trajectory.1.position_ned_m", [0, 0, NAN]), f"{STEP}.position_ned_m", "no finite number"),
+    (
+        lambda d: put(d, "trajectory.1.position_ned_m", [0] * 4),
+        f"{STEP}.position_ned_m",
+        "expected 3 numbers, found 4",
+    ),
+    (lambda d: put(d, "trajectory.1.quaternion_xyzw", KeyError), f"{STEP}.quaternion_xyzw", "is missing"),
+    (lambda d: put(d, "trajectory.1", 1), STEP, "expected an object, found 1"),
+    (lambda d: put(d, "trajectory", []), "trajectory", "is empty"),
+    (lambda d: put(d, "schema_version", "v7"), "schema_version", "'v7', expected 'hybrid_astar_trajectory_v6'"),
+    (lambda d: put(d, "status", "failed"), "status", "'failed', expected 'planned'"),
+    (lambda d: put(d, "map_name", "N_Island_0"), "map_name", "is not the task's, U_Courtyard_1"),
+]
+
+
+@pytest.mark.parametrize(("change", "field", "why"), TRAJECTORY_BAD, ids=range(len(TRAJECTORY_BAD)))
+def test_a_bad_trajectory_is_named_for_both_instances(layout, tmp_path, change, field, why):
+    spoil_trajectory(layout, change)
+    report = import_benchmark("aerialdojo", [layout], tmp_path / "data", Options(skip_bad=True))
+    lines = (tmp_path / "data/imported/aerialdojo/bad_records.txt").read_text().splitlines()
+    assert report.n_bad == len(lines) == 2
+    for line, kind in zip(lines, ("ImageOGS", "SemanticOGS"), strict=True):
+        assert line.startswith(f"{kind}/{PART}/Task.json: row 3: TrajectoryDATA/{PART}/3.json.{field}: ")
+        assert why in line
+    tasks = pd.read_parquet(tmp_path / "data/imported/aerialdojo/tasks")
+    assert not ((tasks["source_row"] == 3) & tasks["source_file"].str.contains(PART)).any()
+
+
+def test_trajectories_may_be_missing_altogether_or_stop_where_they_are(layout, tmp_path):
+    spoil_trajectory(layout, lambda d: d["trajectory"].append(d["trajectory"][-1] | {"action": "stop"}))
+    import_benchmark("aerialdojo", [layout], tmp_path / "data")
+    with_stop = pd.read_parquet(tmp_path / "data/imported/aerialdojo/routes").set_index("nav_id")
+    shutil.rmtree(layout / "TrajectoryDATA")
+    report = import_benchmark("aerialdojo", [layout], tmp_path / "data", force=True)
+    without = pd.read_parquet(tmp_path / "data/imported/aerialdojo/routes")
+    assert len(without) == len(with_stop)
+    assert without["x_m"].isna().all()
+    assert without["euclidean_m"].notna().all()
+    assert with_stop["action"].map(lambda a: a[-1] == 0 and (a[:-1] > 0).all()).all()
+    assert report.notes == {"no folder in TrajectoryDATA for its partition: no route": len(without)}
+
+
+@pytest.mark.parametrize("how", ["absent", "link", "dotdot", "text"])
+def test_pictures_stay_in_their_folder_and_are_pictures(layout, tmp_path, how):
+    folder = layout / "ImageOGS" / PART
+    tasks = json.loads((folder / "Task.json").read_text())
+    picture = folder / tasks[0]["image"]
+    secret = tmp_path / "secret.png"
+    secret.write_bytes(task_files.PNG)
+    picture.unlink()
+    if how == "link":
+        picture.symlink_to(secret)
+    elif how == "text":
+        picture.write_text("no picture")
+    elif how == "dotdot":
+        relative = os.path.relpath(secret, folder)
+        tasks = [task | {"image": relative} if task["image"] == tasks[0]["image"] else task for task in tasks]
+        (folder / "Task.json").write_text(json.dumps(tasks))
+    why = {
+        "absent": "there is no file",
+        "link": "leads out of",
+        "dotdot": "leads out of",
+        "text": "neither PNG nor JPEG",
+    }
+    with pytest.raises(ImportRefused) as refused:
+        import_benchmark("aerialdojo", [layout], tmp_path / "data")
+    lines = str(refused.value).splitlines()[1:]
+    wanted = {k for k, task in enumerate(tasks) if task["image"] == tasks[0]["image"]}
+    assert {int(line.split("row ")[1].split(":")[0]) for line in lines} == wanted
+    assert all(line.startswith(f"  ImageOGS/{PART}/Task.json: ") and why[how] in line for line in lines)
+    # Without the pictures there is nothing wrong.
+    import_benchmark("aerialdojo", [layout], tmp_path / "data", Options(with_pictures=False))
+    assert pd.read_parquet(tmp_path / "data/imported/aerialdojo/objects")["reference_image"].isna().all()
+
+
+def test_task_files_behind_links_out_of_the_folder_are_not_read(layout, tmp_path):
+    outside = tmp_path / "outside.json"
+    source = layout / "SemanticOGS" / PART / "Task.json"
+    shutil.move(source, outside)
+    source.symlink_to(outside)
+    report = import_benchmark("aerialdojo", [layout], tmp_path / "data")
+    assert f"SemanticOGS/{PART}/Task.json" not in report.files
+    assert len(report.files) == 11
+
+
+@given(st.text(alphabet="ab./\\:\0 C", max_size=12))
+def test_no_path_leaves_its_folder(name):
+    root = Path("/tmp/root")
+    try:
+        path = inside(root, name)
+    except ValueError:
+        return
+    assert path.resolve().is_relative_to(root)
+    assert ".." not in path.parts
+
+
+def test_what_is_no_task_file_is_said_in_one_line(tmp_path):
+    good = task_files.write(tmp_path / "good.json", task_files.uav_on(1))
+    (tmp_path / "empty").mkdir()
+    runner = CliRunner()
+    for arguments, error in (
+        ([str(tmp_path / "none.json"), "--format", "uav-on"], "there is no file"),
+        ([str(tmp_path / "empty"), "--format", "uav-on"], "is no file"),
+        ([str(tmp_path / "empty"), "--format", "aerialdojo"], "has no Task.json below it"),
+        ([str(good), "--format", "habitat"], "no format 'habitat': it is one of " + ", ".join(FORMATS)),
+        (
+            [str(good), "--format", "cityavos", "--frame", "ned", "--angles", "turns"],
+            "angles are radians",
+        ),
+    ):
+        failed = runner.invoke(app, ["import-benchmark", *arguments, "--data", str(tmp_path)])
+        assert isinstance(failed.exception, UsageError), failed.output
+        assert error in str(failed.exception)
+        assert "\n" not in str(failed.exception)
+    assert not (tmp_path / "imported").exists()

@@ -1,0 +1,127 @@
+"""JSON of any size in bounded memory: records whole, damage named, no record beyond the limit."""
+
+import json
+import subprocess
+import sys
+
+import pandas as pd
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from support import task_files
+
+from aerialdojo_gen.errors import ImportRefused
+from aerialdojo_gen.exchange import jsonstream
+from aerialdojo_gen.exchange.importing import Options, import_benchmark
+from aerialdojo_gen.exchange.jsonstream import records, small_document
+
+values = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False) | st.text(),
+    lambda inner: st.lists(inner, max_size=5) | st.dictionaries(st.text(), inner, max_size=5),
+    max_leaves=20,
+)
+
+
+@settings(deadline=None, max_examples=50)
+@given(st.lists(values, max_size=8), st.sampled_from([1, 2, 7, 64]), st.sampled_from([None, 0, 3]), st.booleans())
+def test_records_are_what_json_reads_whatever_the_chunks(tmp_path_factory, rows, chunk, indent, ascii_only):
+    path = tmp_path_factory.mktemp("json") / "rows.json"
+    path.write_text(json.dumps(rows, indent=indent, ensure_ascii=ascii_only), "utf-8", errors="surrogatepass") if (
+        ascii_only
+    ) else path.write_bytes(json.dumps(rows, indent=indent, ensure_ascii=False).encode("utf-8", "replace"))
+    expected = json.loads(path.read_bytes())
+    under = path.with_name("under.json")
+    under.write_text(json.dumps({"before": [1, {"episodes": 2}], "episodes": expected, "after": "x"}))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(jsonstream, "_CHUNK", chunk)
+        assert list(records(path)) == expected
+        assert list(records(under, "episodes")) == expected
+
+
+@pytest.mark.parametrize(
+    ("text", "error"),
+    [
+        ("", "the beginning: expected a list of records, found ''"),
+        ("{}", "the beginning: expected a list of records, found '{'"),
+        ('[{"a": 1}, {"a": ', r"row 1: damaged or truncated"),
+        ('[{"a": 1}', r"row 0: expected , or \], found the end of the file \(is it truncated\?\)"),
+        ('[{"a": 1} {"a": 2}]', r"row 0: expected , or \], found '{'"),
+        ('[{"a": 1},]', "row 1: damaged or truncated"),
+        ('[{"a": 1}] x', "the end: 'x' after the end of the value"),
+        ("[" * 100_000, "row 0: nested more than 64 deep"),
+        ('[{"a": ' + "9" * 5000 + "}]", "row 0: damaged or truncated"),
+    ],
+)
+def test_damage_is_named_by_its_row(tmp_path, text, error):
+    path = tmp_path / "bad.json"
+    path.write_text(text)
+    with pytest.raises(ImportRefused, match=error) as refused:
+        list(records(path))
+    assert str(refused.value).startswith(f"{path}: ")
+    assert "\n" not in str(refused.value)
+
+
+def test_a_list_that_is_not_there_is_named(tmp_path):
+    path = tmp_path / "bad.json"
+    path.write_text('{"data": []}')
+    with pytest.raises(ImportRefused, match="there is no list 'episodes'"):
+        list(records(path, "episodes"))
+    path.write_text("[]")
+    with pytest.raises(ImportRefused, match="expected an object that has a list 'episodes'"):
+        list(records(path, "episodes"))
+    path.write_bytes(b'["\xff"]')
+    with pytest.raises(ImportRefused, match="is not UTF-8"):
+        list(records(path))
+
+
+def test_a_record_beyond_the_limit_is_refused_by_name(tmp_path):
+    rows = task_files.uav_on(3)
+    rows[1]["description"] = "x" * 5_000_000
+    path = task_files.write(tmp_path / "long.json", rows)
+    with pytest.raises(ImportRefused, match=r"long\.json: row 1: larger than 1,024 KiB"):
+        import_benchmark("uav-on", [path], tmp_path, Options(record_limit=1 << 20, skip_bad=True))
+    assert not (tmp_path / "imported/uav-on").exists()
+    # The record before it was read already: the limit is one of a record, not of the file.
+    taken = records(path, limit=1 << 20)
+    assert next(taken)["episode_id"] == "0"
+    with pytest.raises(ImportRefused, match="row 1: larger than"):
+        next(taken)
+    import_benchmark("uav-on", [path], tmp_path)
+    assert pd.read_parquet(tmp_path / "imported/uav-on/tasks")["description"].str.len().max() == 5_000_000
+
+
+def test_a_document_beyond_the_limit_is_refused(tmp_path):
+    path = task_files.write(tmp_path / "t.json", {"a": "x" * 2000})
+    with pytest.raises(ValueError, match="is larger than 1 KiB"):
+        small_document(path, limit=1024)
+    assert small_document(path, limit=4096) == {"a": "x" * 2000}
+
+
+MEASURE = """
+import resource, sys
+from pathlib import Path
+from aerialdojo_gen.exchange.importing import Options, import_benchmark
+for path in sys.argv[2:]:
+    import_benchmark("openfly", [Path(path)], Path(sys.argv[1]), Options(frame="nwu"), force=True)
+    print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
+"""
+
+
+def test_memory_does_not_grow_with_the_file(tmp_path):
+    sizes = {}
+    record = task_files.openfly((1, 1, 0), 1)[0] | {"index_list": ["20250109_131812_2"] * 1500}
+    for n in (100, 2000):
+        path = tmp_path / f"{n}.json"
+        with path.open("w") as file:
+            for i in range(n):
+                record["image_path"] = f"env_airsim_16/astar_data/high_long/{i}"
+                file.write(("," if i else "[") + json.dumps(record))
+            file.write("]")
+        sizes[path] = path.stat().st_size
+    done = subprocess.run(
+        [sys.executable, "-c", MEASURE, tmp_path, *sizes], capture_output=True, text=True, check=True
+    )
+    small, large = (int(line) * 1024 for line in done.stdout.split())
+    grown = max(sizes.values()) - min(sizes.values())
+    assert grown > 50e6
+    assert large - small < grown / 4

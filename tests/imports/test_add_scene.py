@@ -1,0 +1,302 @@
+"""add-scene: meshes that nobody here made, whole, broken and hostile; two real ones up to planned tasks."""
+
+import json
+import tracemalloc
+from pathlib import Path
+
+import numpy as np
+import pyarrow.compute as pc
+import pytest
+import trimesh
+from support import foreign
+
+from aerialdojo_gen.annotations.command import draft_scene
+from aerialdojo_gen.annotations.draft import Choice
+from aerialdojo_gen.commands.common import open_pipeline, run_until
+from aerialdojo_gen.errors import AnnotationError, AssetError, StoreError, UsageError
+from aerialdojo_gen.imports.adopt import adopt
+from aerialdojo_gen.imports.colours import colour_name
+from aerialdojo_gen.imports.command import add_scene
+from aerialdojo_gen.imports.files import look_over_glb, read_mesh
+from aerialdojo_gen.imports.raw import RawNode, plain
+from aerialdojo_gen.imports.three_ds import read_3ds
+from aerialdojo_gen.scenes.glb import read_glb
+from aerialdojo_gen.store import shards as store
+
+
+def raw(mesh: trimesh.Trimesh, name: str = "") -> RawNode:
+    return RawNode(name, np.asarray(mesh.vertices), np.asarray(mesh.faces, dtype=np.int64), plain(len(mesh.faces)))
+
+
+def things(scene):
+    return [i for i in scene.instances if i.category not in ("ground", "clutter")]
+
+
+@pytest.fixture(scope="module")
+def village(tmp_path_factory) -> Path:
+    folder = tmp_path_factory.mktemp("meshes")
+    scene = foreign.village()
+    scene.export(folder / "village.glb")
+    whole = scene.to_mesh()
+    for suffix in ("stl", "ply", "obj"):
+        whole.export(folder / f"village.{suffix}")
+    bodies = foreign.bodies(scene)
+    (folder / "village.3ds").write_bytes(
+        foreign.three_ds([(f"House{k}", b) for k, b in enumerate(bodies)], (9, 90, 200))
+    )
+    return folder
+
+
+@pytest.mark.parametrize("suffix", ["glb", "obj", "stl", "ply", "3ds"])
+def test_every_format_gives_the_same_nine_bodies(village, suffix):
+    scene, _ = adopt("Village", read_mesh(village / f"village.{suffix}"))
+    assert len(things(scene)) == 9
+    ground = [i for i in scene.instances if i.category == "ground"]
+    assert len(ground) == 1
+    solid = np.concatenate([i.vertices for i in things(scene)])
+    np.testing.assert_allclose(solid.max(axis=0) - solid.min(axis=0), [32.0, 13.0, 14.0], atol=0.05)
+    np.testing.assert_allclose(solid.min(axis=0)[2], 0.0, atol=1e-5)
+    np.testing.assert_allclose((solid.max(axis=0) + solid.min(axis=0))[:2], 0.0, atol=1e-4)
+    assert scene.ceiling_m == pytest.approx(20.0, abs=0.1)
+
+
+def test_names_and_colours_come_along(village):
+    scene, _ = adopt("Village", read_mesh(village / "village.glb"))
+    assert sorted({i.category for i in things(scene)}) == ["clock_tower", "house"]
+    assert {i.attributes["colour"] for i in things(scene) if i.category == "house"} == {"red", "blue", "green"}
+    painted, _ = adopt("Village", read_mesh(village / "village.3ds"))
+    assert {i.attributes["colour"] for i in things(painted)} == {"blue"}
+
+
+def test_axes_and_units():
+    box = trimesh.creation.box((2000, 300, 1000))
+    scene, _ = adopt("Box", [raw(box)], up="y", scale=0.01)
+    (body,) = things(scene)
+    np.testing.assert_allclose(body.bounds[1] - body.bounds[0], [20, 10, 3], atol=1e-4)
+    with pytest.raises(AssetError, match=r"--up 'x'"):
+        adopt("Box", [raw(box)], up="x")
+    with pytest.raises(AssetError, match="--scale"):
+        adopt("Box", [raw(box)], scale=float("nan"))
+
+
+def test_what_is_inside_out_is_turned_and_what_is_open_is_doubled():
+    closed = trimesh.creation.box((10, 10, 4))
+    closed.invert()
+    scene, repairs = adopt("Box", [raw(closed)])
+    (body,) = things(scene)
+    assert trimesh.Trimesh(body.vertices, body.faces).volume == pytest.approx(400, rel=1e-4)
+    assert any("inside out" in line for line in repairs.lines)
+    open_box = trimesh.Trimesh(closed.vertices, closed.faces[2:], process=False)
+    scene, _ = adopt("Box", [raw(open_box)])
+    assert sum(len(i.faces) for i in things(scene)) == 2 * len(open_box.faces)
+
+
+def test_what_has_no_place_is_dropped_and_said():
+    box = trimesh.creation.box((10, 10, 4))
+    vertices = np.vstack([box.vertices, [[np.nan, 0, 0], [np.inf, 1, 1]]])
+    faces = np.vstack([box.faces, [[8, 0, 1], [9, 0, 1], [0, 0, 1]]])
+    scene, repairs = adopt("Box", [RawNode("", vertices, faces, plain(len(faces)))])
+    assert np.isfinite(np.concatenate([i.vertices for i in scene.instances])).all()
+    assert sum(len(i.faces) for i in things(scene)) == 12
+    text = "\n".join(repairs.lines)
+    assert "2 triangles of the mesh with no place" in text
+    assert "1 triangles of the mesh without area" in text
+
+
+def test_nothing_left_is_an_error():
+    empty = RawNode("", np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64), plain(0))
+    for node in (empty, RawNode("", np.full((3, 3), np.nan), np.array([[0, 1, 2]]), plain(1))):
+        with pytest.raises(AssetError, match="empty or degenerate"):
+            adopt("Nothing", [node])
+
+
+def test_a_million_degenerate_triangles_take_bounded_memory():
+    n = 1_000_000
+    vertices = np.zeros((n + 8, 3))
+    vertices[:n, 0] = np.arange(n) % 7
+    box = trimesh.creation.box((20, 20, 5))
+    vertices[n:] = box.vertices
+    faces = np.vstack([np.column_stack([np.arange(n), np.arange(n), np.arange(n)]), box.faces + n])
+    node = RawNode("", vertices, faces, plain(len(faces)))
+    tracemalloc.start()
+    scene, repairs = adopt("Slivers", [node])
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert sum(len(i.faces) for i in things(scene)) == 12
+    assert "1,000,000 triangles of the mesh without area dropped" in repairs.lines
+    assert peak < 600e6
+
+
+@pytest.mark.parametrize(("edge", "word"), [(40_000.0, "too large"), (0.5, "too small")])
+def test_an_extent_that_cannot_be_metres(edge, word):
+    with pytest.raises(AssetError, match=rf"{word}.*--scale"):
+        adopt("Odd", [raw(trimesh.creation.box((edge, edge, edge / 10)))])
+
+
+def test_a_part_can_be_kept(village):
+    nodes = read_mesh(village / "village.glb")
+    scene, _ = adopt("Village", nodes, crop_m=(0.0, 0.0, 12.0))
+    assert 1 < len(things(scene)) < 9
+    with pytest.raises(AssetError, match="nothing of the mesh lies there"):
+        adopt("Village", nodes, crop_m=(900.0, 900.0, 5.0))
+
+
+def test_a_glb_that_asks_for_terabytes_is_refused_before_it_gets_them(tmp_path):
+    document = {
+        "asset": {"version": "2.0"},
+        "scene": 0,
+        "scenes": [{"nodes": [0]}],
+        "nodes": [{"mesh": 0}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
+        "accessors": [{"componentType": 5126, "count": 2_000_000_000, "type": "VEC3"}],
+    }
+    path = tmp_path / "bomb.glb"
+    path.write_bytes(foreign.glb(json.dumps(document).encode()))
+    with pytest.raises(AssetError, match="asks for"):
+        look_over_glb(path)
+    # One small mesh that a hundred thousand nodes show.
+    document["accessors"] = [{"componentType": 5126, "count": 3000, "type": "VEC3"}]
+    document["nodes"] = [{"mesh": 0}] * 100_000
+    path.write_bytes(foreign.glb(json.dumps(document).encode()))
+    with pytest.raises(AssetError, match=r"100,000,000 triangles"):
+        read_mesh(path)
+
+
+def test_a_reader_that_wants_too_much_is_ended(village):
+    with pytest.raises(AssetError, match=r"MiB to read|crashed"):
+        read_mesh(village / "village.glb", max_memory_bytes=64 << 20)
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "message"),
+    [
+        ("a.glb", b"glTF", "no GLB"),
+        ("a.glb", b"PK\x03\x04" + b"\0" * 60, "no GLB"),
+        ("a.3ds", b"MM\xff\xff\xff\xff", "damaged 3DS"),
+        ("a.3ds", b"hello, this is text", "3DS"),
+        ("a.obj", b"# nothing\n", "a.obj"),
+        ("a.ply", b"ply\nformat ascii 1.0\nelement vertex 99999999999\nend_header\n", "a.ply"),
+        ("a.fbx", b"x", "read from GLB"),
+    ],
+)
+def test_no_mesh_at_all(tmp_path, name, content, message):
+    path = tmp_path / name
+    path.write_bytes(content)
+    with pytest.raises(AssetError, match=message) as error:
+        add_scene("Odd", path, tmp_path / "mine", up="z")
+    assert "\n" not in str(error.value)
+    assert not (tmp_path / "mine" / "scenes" / "Odd.toml").exists()
+
+
+def test_a_cut_3ds_is_named(village):
+    data = (village / "village.3ds").read_bytes()
+    for cut in (7, 30, len(data) // 2, len(data) - 3):
+        with pytest.raises(AssetError):
+            read_3ds(data[:cut])
+
+
+def test_a_file_reads_nothing_outside_its_folder(tmp_path):
+    secret = tmp_path / "secret.mtl"
+    secret.write_text("newmtl wall\nKd 1 0 0\n")
+    folder = tmp_path / "mesh"
+    folder.mkdir()
+    box = trimesh.creation.box((10, 10, 5)).export(file_type="obj", include_normals=False)
+    (folder / "box.obj").write_text("mtllib ../secret.mtl\nusemtl wall\n" + box)
+    outside, _ = adopt("Box", read_mesh(folder / "box.obj"))
+    (folder / "secret.mtl").write_text(secret.read_text())
+    (folder / "box.obj").write_text("mtllib secret.mtl\nusemtl wall\n" + box)
+    inside, _ = adopt("Box", read_mesh(folder / "box.obj"))
+    assert things(inside)[0].attributes["colour"] == "red"
+    assert things(outside)[0].attributes["colour"] != "red"
+
+
+def test_a_scene_is_added_once_and_whole(village, tmp_path):
+    added = add_scene("Village", village / "village.glb", tmp_path / "mine", up="z")
+    assert read_glb(tmp_path / "mine" / "scenes" / "Village.glb").n_triangles == added.scene.n_triangles
+    before = (tmp_path / "mine" / "scenes" / "Village.glb").read_bytes()
+    with pytest.raises(UsageError, match="--force"):
+        add_scene("Village", village / "village.stl", tmp_path / "mine", up="z")
+    assert (tmp_path / "mine" / "scenes" / "Village.glb").read_bytes() == before
+    add_scene("Village", village / "village.glb", tmp_path / "mine", up="z", force=True)
+    assert (tmp_path / "mine" / "scenes" / "Village.glb").read_bytes() == before
+    with pytest.raises(StoreError, match="not a scene name"):
+        add_scene("../Village", village / "village.glb", tmp_path / "mine", up="z")
+    other = tmp_path / "other.json"
+    other.write_text('{"scene": "Elsewhere", "landmarks": [], "objects": []}')
+    with pytest.raises(AnnotationError, match="Elsewhere"):
+        add_scene("V2", village / "village.glb", tmp_path / "mine", up="z", annotations=other)
+
+
+def planned(tmp_path, name, mesh, n_objects, **options):
+    """Add a scene, draft its annotations, plan its tasks; gives the verdicts."""
+    project, data = tmp_path / "mine", tmp_path / "data"
+    added = add_scene(name, mesh, project, **options)
+    pipeline, roots = open_pipeline(added.pipeline, data)
+    draft_scene(name, pipeline, roots, n_landmarks=2, n_objects=n_objects, choice=Choice(most=30))
+    run_until("filter", data=data, pipeline=added.pipeline, scene=[name], workers=1, quiet=True)
+    return added, store.read_scene(data, "verdicts", name)
+
+
+@pytest.mark.pipeline
+def test_helsinki_up_to_planned_tasks(tmp_path):
+    assert foreign.helsinki(tmp_path / "helsinki.glb") == 486
+    with pytest.raises(AssetError, match=r"too large to plan in.*--crop"):
+        add_scene("Helsinki", tmp_path / "helsinki.glb", tmp_path / "mine", up="z")
+    added, verdicts = planned(tmp_path, "Helsinki", tmp_path / "helsinki.glb", 8, up="z", crop_m=(628.0, 97.0, 110.0))
+    assert {i.category for i in things(added.scene)} == {"building"}
+    assert verdicts.num_rows > 50
+    assert pc.sum(verdicts["keep"]).as_py() > 10
+
+
+@pytest.mark.pipeline
+def test_the_monastery_up_to_planned_tasks(tmp_path):
+    whole, _ = adopt("Monastery", read_mesh(foreign.monastery()), up="y")
+    assert whole.n_triangles > 100_000
+    # The middle of it: drafting asks every one of its 1,400 bodies for viewpoints.
+    added, verdicts = planned(tmp_path, "Monastery", foreign.monastery(), 5, up="y", crop_m=(-7.0, 1.0, 32.0))
+    assert len(things(added.scene)) > 20
+    assert pc.sum(verdicts["keep"]).as_py() > 10
+
+
+@pytest.mark.parametrize(
+    ("rgb", "word"),
+    [((200, 30, 30), "red"), ((250, 250, 250), "white"), ((20, 20, 20), "black"), ((130, 130, 130), "grey"),
+     ((40, 80, 200), "blue"), ((60, 150, 60), "green"), ((120, 80, 50), "brown"), ((230, 210, 170), "beige")],
+)  # fmt: skip
+def test_colours_have_everyday_names(rgb, word):
+    assert colour_name(rgb) == word
+
+
+def reordered(glb: bytes, order) -> bytes:
+    """The same GLB with its nodes in another order, and its last two meshes as two primitives of one node."""
+    length = int.from_bytes(glb[12:16], "little")
+    document, rest = json.loads(glb[20 : 20 + length]), glb[20 + length :]
+    shown = [n for n in document["nodes"] if "mesh" in n]
+    *singles, keeper, given = sorted(shown, key=lambda n: n["name"])
+    meshes = document["meshes"]
+    both = [dict(p) for n in (keeper, given) for p in meshes[n["mesh"]]["primitives"]]
+    meshes[keeper["mesh"]] = meshes[keeper["mesh"]] | {"primitives": both[:: 1 if order(1) else -1]}
+    nodes = sorted([*singles, keeper], key=lambda n: order(n["mesh"]))
+    document["nodes"] = nodes
+    document["scenes"] = [{"nodes": list(range(len(nodes)))}]
+    document["scene"] = 0
+    text = json.dumps(document).encode()
+    text += b" " * (-len(text) % 4)
+    head = b"glTF" + (2).to_bytes(4, "little") + (20 + len(text) + len(rest)).to_bytes(4, "little")
+    return head + len(text).to_bytes(4, "little") + b"JSON" + text + rest
+
+
+def test_the_same_file_gives_the_same_bytes_in_whatever_order_its_nodes_come(village, tmp_path):
+    glb = (village / "village.glb").read_bytes()
+    made = set()
+    for k, order in enumerate((lambda n: n, lambda n: n, lambda n: -n, lambda n: 7 * n % 5)):
+        file = tmp_path / f"{k}" / "village.glb"
+        file.parent.mkdir()
+        file.write_bytes(reordered(glb, order))
+        # What was two bodies is one node of two materials, and no category is made of a reader's random digits.
+        scene, _ = adopt("Village", read_mesh(file))
+        assert len(things(scene)) == 8
+        assert {i.category for i in things(scene)} <= {"clock_tower", "house"}
+        added = add_scene("Village", file, tmp_path / f"project{k}", up="z")
+        made.add((added.pipeline.parent / "scenes/Village.glb").read_bytes())
+    assert len(made) == 1

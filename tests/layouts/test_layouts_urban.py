@@ -1,0 +1,72 @@
+"""Parking lots, neighbourhoods, alleys and communities: each stands up to a look from close by."""
+
+from collections import Counter
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from support.layout_checks import catalogue
+
+from aerialdojo_gen.geometry.rays import RayCaster
+from aerialdojo_gen.scenes.grammar_blocks import Frame, HouseStyle, deal, fence, house, next_variant
+from aerialdojo_gen.scenes.grammar_scatter import Pose
+from aerialdojo_gen.scenes.recipe import Recipe
+from aerialdojo_gen.scenes.site import Site
+
+
+def blank() -> Site:
+    return Site("U_T_0", Recipe(layout="none", size_m=(60, 60), ceiling_m=20), catalogue())
+
+
+def test_frames_agree_with_turned_coordinates():
+    frame = Frame(3.0, -2.0, 90.0)
+    assert frame.at(1.0, 0.0) == pytest.approx((3.0, -1.0))
+    assert frame.at(0.0, 1.0) == pytest.approx((2.0, -2.0))
+    assert frame.pose(1.0, 0.0, -90.0) == pytest.approx((3.0, -1.0, 0.0))
+
+
+@pytest.mark.parametrize("yaw", [0.0, 37.0, 180.0])
+@pytest.mark.parametrize("garage", [-1, 0, 1])
+def test_houses_take_their_ground_and_face_their_street(yaw, garage):
+    site = blank()
+    style = HouseStyle(garage=garage, porch_m=2.0, door="#123456")
+    frame = Frame(1.0, 2.0, yaw)
+    built = house(site, frame, style)
+    assert not site.is_free(1.0, 2.0, 0.2)
+    assert not site.is_free(*frame.at(style.depth_m / 2 + 1.0, 3.0), 0.2)
+    assert site.is_free(*frame.at(style.depth_m / 2 + 1.0, garage * (style.width_m / 2 + 1.8) or 6.0), 0.2)
+    if garage:
+        assert not site.is_free(*frame.at(1.0, garage * (style.width_m / 2 + 1.8)), 0.2)
+    door = next(p for p in built.parts if p.material == "#123456")
+    assert door.vertices[:, :2].mean(axis=0) == pytest.approx(frame.at(style.depth_m / 2 + 0.06, 0.0), abs=0.05)
+
+
+@pytest.mark.parametrize("kind", ["picket", "board", "hedge", "wall", "railing"])
+def test_fences_bar_the_way_along_their_whole_path(kind):
+    site = blank()
+    path = [(-6.0, -3.0), (4.0, -3.0), (4.0, 5.0)]
+    fence(site, path, kind)
+    cast = RayCaster(site.scene())
+    for (ax, ay), (bx, by) in pairwise(path):
+        t = np.linspace(0.05, 0.95, 40)
+        middle = np.column_stack(
+            [ax + (bx - ax) * t, ay + (by - ay) * t, np.full(40, 0.8 if kind == "picket" else 0.6)]
+        )
+        if kind == "railing":
+            middle[:, 2] = 1.15
+        across = np.array([by - ay, ax - bx, 0.0]) / np.hypot(bx - ax, by - ay)
+        distance, _ = cast.first_hit(middle - across, np.tile(across, (40, 1)))
+        assert (distance < 2.0).mean() > 0.95
+
+
+def test_dealing_takes_categories_in_turn_and_rare_variants_first():
+    site = blank()
+    poses = [Pose(-20.0 + 5.0 * k, 0.0, 0.0) for k in range(8)]
+    out = deal(site, ["bench", "litter_bin"], poses, "in the yard")
+    assert [i.category for i in out] == ["bench", "litter_bin"] * 4
+    variants = [i.variant for i in out if i.category == "bench"]
+    assert len(set(variants)) == min(4, len(catalogue()["bench"].variants))
+    assert all(i.attributes["place"] == "in the yard" for i in out)
+    assert deal(site, ["bench"], poses) == []
+    used = Counter(variants)
+    assert used[next_variant(site, "bench")] == min(used[v.name] for v in catalogue()["bench"].variants)

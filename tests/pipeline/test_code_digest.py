@@ -1,0 +1,248 @@
+"""Fingerprints follow the code: what it does changes them, what is said about it does not."""
+
+import re
+import shutil
+from pathlib import Path
+
+import pytest
+
+import aerialdojo_gen
+from aerialdojo_gen.benchmark.flying_code import flying_code
+from aerialdojo_gen.config.sections import AnchorSampleConfig, ClipConfig
+from aerialdojo_gen.pipeline import code_digest
+from aerialdojo_gen.pipeline.code_digest import PLUMBING, Package, code_of, stage_code, stage_module
+from aerialdojo_gen.pipeline.code_facts import module_facts
+from aerialdojo_gen.pipeline.fingerprint import _values
+from aerialdojo_gen.pipeline.registry import STAGES
+
+NAMES = [stage.name for stage in STAGES]
+SOURCES = Path(aerialdojo_gen.__file__).parent
+# A module that the stage uses by way of others, and a constant of it.
+USED = {
+    "build-scenes": ("layouts/courtyard.py", None),
+    "annotate-import": ("annotations/relations.py", None),
+    "anchor-sample": ("geometry/viewpoints.py", None),
+    "reference-images": ("rendering/gl_shaders.py", "#version 330 core"),
+    "pair-objects": ("store/tables.py", '"ascending"'),
+    "plan": ("planning/primitives.py", None),
+    "filter": ("store/schemas.py", '"long_horizon"'),
+    "split": ("release/quota.py", None),
+    "render": ("rendering/codecs.py", None),
+}
+
+
+@pytest.fixture(scope="module")
+def copied(tmp_path_factory):
+    """A copy of the package's sources, with what reading them gave before."""
+    folder = tmp_path_factory.mktemp("copy") / "aerialdojo_gen"
+    for path in [*SOURCES.rglob("*.py"), *SOURCES.rglob("*.toml"), *SOURCES.glob("__pycache__/code-facts.json")]:
+        target = folder / path.relative_to(SOURCES)
+        target.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copyfile(path, target)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def before(copied):
+    """The digests of the copy as it is: every test puts back what it edits."""
+    return digests(copied)
+
+
+def digests(folder):
+    package = Package(folder)
+    return {name: package.of(stage_module(name)).digest for name in NAMES}
+
+
+def edited(path, old, new):
+    """What the stages' digests are while a source is another; it is put back."""
+    text = path.read_text()
+    assert old in text, (path, old)
+    path.write_text(text.replace(old, new, 1))
+    try:
+        return digests(path.parents[len(path.parts) - path.parts.index("aerialdojo_gen") - 2])
+    finally:
+        path.write_text(text)
+
+
+def changed(before, after):
+    return {name for name in NAMES if before[name] != after[name]}
+
+
+def test_a_copy_elsewhere_has_the_same_digests(before):
+    assert before == {name: stage_code(name).digest for name in NAMES}
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_line_in_the_stages_own_module_makes_it_stale(copied, before, name):
+    path = copied / "stages" / f"{name.replace('-', '_')}.py"
+    run = re.search(r"^def run\(.*?\n    \"\"\"(.*?)\"\"\"\n", path.read_text(), re.DOTALL | re.MULTILINE)
+    assert changed(before, edited(path, run[0], run[0] + "    raise RuntimeError\n")) == {name}
+    # What is said: a comment, other blank lines, another docstring.
+    told = run[0].replace(run[1], "Something else.")
+    assert edited(path, run[0], "\n\n" + told + "    # A comment.\n\n") == before
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_constant_of_a_module_that_it_uses_makes_it_stale(copied, before, name):
+    relative, constant = USED[name]
+    path = copied / relative
+    if constant is None:
+        # The first number that is given a name.
+        constant = re.search(r"^_?[A-Z][A-Z_0-9]*(?:: .*)? = .*?\d.*$", path.read_text(), re.MULTILINE)[0]
+        other = re.sub(r"\d(?=\D*$)", lambda digit: str((int(digit[0]) + 1) % 10), constant)
+    else:
+        other = constant[:-1] + "x" + constant[-1]
+    assert name in changed(before, edited(path, constant, other))
+    assert (
+        edited(path, constant, "# Nothing.\n" + constant if "\n" + constant in path.read_text() else constant)
+        == before
+    )
+
+
+@pytest.mark.parametrize(
+    "relative",
+    [
+        "cli.py",
+        "commands/stages.py",
+        "pipeline/progress.py",
+        "pipeline/runner.py",
+        "benchmark/report.py",
+        "release/card.py",
+    ],
+)
+def test_messages_and_plumbing_make_nothing_stale(copied, before, relative):
+    assert edited(copied / relative, "\n\n", "\nSAID = 'another message'\n\n") == before
+
+
+def test_plumbing_is_what_it_is_said_to_be():
+    """Whoever lists a module here has thought about whether it decides what is written."""
+    assert set(PLUMBING) == {
+        f"aerialdojo_gen{name}"
+        for name in ("", ".benchmark", ".common", ".common.trouble", ".config", ".config.agreement",
+                     ".config.explain", ".config.pipeline", ".config.sections", ".errors", ".pipeline",
+                     ".pipeline.code_digest", ".pipeline.code_facts", ".pipeline.executors",
+                     ".pipeline.executors.local", ".pipeline.fingerprint", ".pipeline.freshness",
+                     ".pipeline.interrupt", ".pipeline.progress", ".pipeline.registry", ".pipeline.runner",
+                     ".pipeline.stage", ".store", ".store.atomic", ".store.files", ".store.footers",
+                     ".store.parquet_files", ".store.schemas", ".store.shards", ".store.staging")
+    }  # fmt: skip
+    assert {name: counted for name, counted in PLUMBING.items() if counted} == {
+        "aerialdojo_gen.store.parquet_files": ("write_clustered",),
+        "aerialdojo_gen.store.schemas": ("*",),
+        "aerialdojo_gen.pipeline.stage": ("Job",),
+        "aerialdojo_gen.store.shards": ("partition", "check_scene_name"),
+    }
+    for name, counted in PLUMBING.items():
+        known = code_digest._running().facts(name)
+        assert set(counted) - {"*"} <= set(known.definitions), name
+
+
+def test_an_edit_of_a_table_counts_for_who_uses_it(copied, before):
+    # `verdicts` is written by filter; split copies its rows by the names of others' columns.
+    after = edited(copied / "store" / "schemas.py", "VERDICTS = _table(\n", "VERDICTS = _table(  # here\n")
+    assert after == before
+    after = edited(
+        copied / "store" / "schemas.py", 'EPISODES = _table(\n    "episodes"', 'EPISODES = _table(\n    "episodez"'
+    )
+    assert after == before, "evaluate's tables are no stage's"
+
+
+def test_what_is_imported_by_a_name_made_at_run_time_counts():
+    parts = stage_code("build-scenes").parts
+    for folder in ("layouts", "scenes/builders"):
+        paths = [path for path in (SOURCES / folder).rglob("*.py") if path.stem != "__init__"]
+        assert paths
+        for path in paths:
+            assert ".".join(("aerialdojo_gen", *path.relative_to(SOURCES).with_suffix("").parts)) in parts
+
+
+def test_figures_of_the_paper_count_where_they_are_read():
+    assert [name for name in NAMES if "aerialdojo_gen.common.paper" in stage_code(name).parts] == [
+        "annotate-import",
+        "split",
+    ]
+
+
+def test_no_stage_counts_what_only_shows():
+    for name in NAMES:
+        for part in stage_code(name).parts:
+            assert part.split(".")[1] not in ("annotate", "cli", "commands", "exchange", "show", "web"), (name, part)
+
+
+def test_libraries_that_shape_the_bytes_count():
+    libraries = {name: set(stage_code(name).libraries) for name in NAMES}
+    assert {"numpy", "scipy", "trimesh", "shapely", "cv2", "pyarrow"} <= libraries["build-scenes"]
+    assert {"numba", "fcl", "numpy", "pyarrow"} <= libraries["plan"]
+    assert {"moderngl", "pybullet", "av", "cv2"} <= libraries["render"]
+    assert not {"av", "moderngl", "pybullet", "numba"} & libraries["filter"]
+    assert all(not {"pydantic", "tqdm", "typer", "gymnasium"} & found for found in libraries.values())
+    for name in NAMES:
+        assert all(re.search(r" \d+(\.\d+)+", version) for version in stage_code(name).libraries.values()), name
+    assert "llvmlite" in stage_code("plan").libraries["numba"]
+
+
+def test_imports_are_followed_however_they_are_written():
+    source = b"""
+from __future__ import annotations
+import importlib
+from typing import TYPE_CHECKING
+import numpy as np
+from . import near
+from .. import far as away
+from ..geometry.rays import RayCaster
+from aerialdojo_gen import store
+if TYPE_CHECKING:
+    from aerialdojo_gen.show import page
+def f():
+    from aerialdojo_gen.common.rng import generator
+    importlib.import_module(f"{__name__}.{np.x}")
+    importlib.import_module(f"{away.__name__}.{np.x}")
+    importlib.import_module("moderngl")
+    return store.partition, away.x
+"""
+    facts = module_facts(source, "aerialdojo_gen.scenes.here", False)
+    found = {(edge.module, edge.name) for edge in facts.edges}
+    assert {
+        ("aerialdojo_gen.scenes", "near"), ("aerialdojo_gen", "far"), ("aerialdojo_gen.geometry.rays", "RayCaster"),
+        ("aerialdojo_gen", "store"), ("aerialdojo_gen.common.rng", "generator"), ("aerialdojo_gen.scenes.here", "**"),
+        ("aerialdojo_gen.far", "**"), ("moderngl", ""), ("numpy", ""),
+    } <= found  # fmt: skip
+    assert "page" not in {name for _, name in found}
+    assert next(edge.uses for edge in facts.edges if edge.name == "store") == ("partition",)
+    assert not facts.unknown
+    unknown = module_facts(b"import importlib\nimportlib.import_module(name)\n", "aerialdojo_gen.x", False)
+    assert unknown.unknown == ("name",)
+
+
+def test_an_import_that_cannot_be_told_is_a_defect(copied):
+    path = copied / "stages" / "filter.py"
+    with pytest.raises(RuntimeError, match=r"aerialdojo_gen\.stages\.filter imports name: its source does not tell"):
+        edited(path, "\n\n", "\nimport importlib\ndef f(name): importlib.import_module(name)\n\n")
+
+
+@pytest.mark.parametrize("damage", [b"", b"{}", b"null", b"x" * 64 + b"\n{}", None])
+def test_a_damaged_cache_is_none(copied, before, damage):
+    cache = copied / "__pycache__" / "code-facts.json"
+    raw = cache.read_bytes()
+    cache.write_bytes(raw[:-1000] + b"f" + raw[-999:] if damage is None else damage)
+    package = Package(copied)
+    assert package.of(stage_module("filter")).digest == before["filter"]
+    cache.write_bytes(raw)
+
+
+def test_absolute_paths_are_in_no_fingerprint(tmp_path):
+    clip = ClipConfig(vision=tmp_path / "v", text=tmp_path / "t", tokenizer=tmp_path / "k", sha256="0" * 64)
+    values = _values(AnchorSampleConfig(clip=clip))
+    assert values["clip"] == {"sha256": "0" * 64}
+    assert str(tmp_path) not in str(values)
+
+
+def test_an_evaluation_counts_the_agents_code(tmp_path, monkeypatch):
+    assert flying_code("random") == flying_code("stop") != flying_code("explorer")
+    assert "aerialdojo_gen.benchmark.report" not in code_of("aerialdojo_gen.benchmark.worker").parts
+    mine = tmp_path / "my_agent_of_digest.py"
+    mine.write_text("A = 1\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    before = flying_code("my_agent_of_digest:Agent")
+    mine.write_text("A = 22\n")
+    assert flying_code("my_agent_of_digest:Agent") != before

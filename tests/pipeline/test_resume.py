@@ -1,0 +1,273 @@
+"""Kills, resumes, workers and damage: the tables end with the same bytes."""
+
+import os
+import shutil
+import signal
+import struct
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pyarrow.parquet as pq
+import pytest
+
+from aerialdojo_gen.errors import AssetError
+from aerialdojo_gen.scenes.glb import read_glb
+from aerialdojo_gen.store import shards as store
+from aerialdojo_gen.store.shards import read_info
+from aerialdojo_gen.store.staging import AREA
+
+pytestmark = pytest.mark.kill
+
+TABLES = ("meshes", "scenes", "landmarks", "objects", "chosen_anchors", "anchors", "pairs", "plans")
+
+
+def start(project, data, *args, verb="plan", workers=2):
+    # A session of its own, so that what it leaves behind can be found, and Ctrl-C can be sent to all of it.
+    return subprocess.Popen(
+        [sys.executable, "-m", "aerialdojo_gen.cli", verb, *args, "--data", str(data), "--workers", str(workers)],
+        cwd=project, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True,
+    )  # fmt: skip
+
+
+def run(project, data, *args, **kw):
+    process = start(project, data, *args, **kw)
+    _, err = process.communicate(timeout=300)
+    return process.returncode, err
+
+
+def plan_args(_data):
+    return ["--pipeline", "pipelines/smoke.toml"]
+
+
+def snapshot(data):
+    files = (p for table in TABLES for p in (data / table).rglob("*") if p.is_file())
+    return {str(p.relative_to(data)): p.read_bytes() for p in files}
+
+
+def members(session):
+    """Processes of a session that are alive (not zombies)."""
+    found = []
+    for stat in Path("/proc").glob("[0-9]*/stat"):
+        try:
+            fields = stat.read_text().rsplit(")", 1)[1].split()
+        except OSError:
+            continue
+        if int(fields[3]) == session and fields[0] != "Z":
+            found.append(int(stat.parent.name))
+    return found
+
+
+def wait_until_empty(session):
+    for _ in range(200):
+        if not members(session):
+            return
+        time.sleep(0.05)
+    raise AssertionError(f"processes outlived their parent: {members(session)}")
+
+
+def wait_for_shards(data, n, process):
+    while process.poll() is None and len(list(data.glob("[!.]*/*/part-*.parquet"))) < n:
+        time.sleep(0.01)
+
+
+def test_killed_again_and_again_ends_with_the_same_bytes(project, smoke, tmp_path):
+    data = tmp_path / "data"
+    kills = 0
+    # In build-scenes, between two stages, in anchor-sample, in plan. What a kill at any one call leaves, test_atomic
+    # and the torture try.
+    for shards in (1, 6, 9, 13):
+        process = start(project, data, *plan_args(data))
+        wait_for_shards(data, shards, process)
+        # Somewhere after the shard's commit, most often within the next one's work or write.
+        time.sleep(0.02 * shards)
+        if process.poll() is None:
+            process.send_signal(signal.SIGKILL)
+            kills += 1
+        process.communicate()
+        wait_until_empty(process.pid)
+        for path in data.rglob("part-*.parquet"):
+            assert read_info(path) is not None, "a reader saw half a shard"
+    assert kills >= 3
+    code, err = run(project, data, *plan_args(data))
+    assert code == 0, err
+    assert snapshot(data) == {k: v for k, v in snapshot(smoke).items() if k in snapshot(data)}
+    assert snapshot(data).keys() == snapshot(smoke).keys()
+    assert not list(data.rglob(f"{AREA}*")), "what killed runs left half-made is swept"
+
+
+def test_one_worker_gives_the_same_bytes_as_two(project, smoke, tmp_path):
+    code, err = run(project, tmp_path / "data", *plan_args(tmp_path), workers=1)
+    assert code == 0, err
+    assert snapshot(tmp_path / "data") == snapshot(smoke)
+
+
+def test_ctrl_c_keeps_what_was_finished_and_ends_the_workers(project, smoke, tmp_path):
+    data = tmp_path / "data"
+    process = start(project, data, *plan_args(data))
+    wait_for_shards(data, 8, process)
+    os.killpg(process.pid, signal.SIGINT)
+    _, err = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert err.strip().splitlines()[-1].startswith("interrupted: finished shards are kept")
+    assert "Traceback" not in err
+    wait_until_empty(process.pid)
+    finished = snapshot(data)
+    assert len([name for name in finished if name.endswith(".parquet")]) >= 8
+    assert finished.items() <= snapshot(smoke).items()
+    assert not list(data.rglob(f"{AREA}*"))
+
+
+@pytest.fixture
+def copy(smoke, tmp_path):
+    """A copy of the smoke data that a test may damage."""
+    return shutil.copytree(smoke, tmp_path / "copy")
+
+
+def mtimes(data):
+    return {p: p.stat().st_mtime_ns for p in data.rglob("*") if p.is_file() and p.name != ".lock"}
+
+
+def test_nothing_changed_nothing_is_written(project, copy):
+    before = mtimes(copy)
+    code, err = run(project, copy, *plan_args(copy))
+    assert code == 0
+    assert mtimes(copy) == before
+    assert err.count("nothing to do") == 5
+
+
+def shard(data, table, number):
+    return sorted(data.glob(f"{table}/*/part-00000.parquet"))[number]
+
+
+def test_truncated_shards_are_named_and_made_again(project, smoke, copy):
+    cut = {shard(copy, "plans", 0): 0, shard(copy, "pairs", 0): 100, shard(copy, "landmarks", 1): -9}
+    for path, keep in cut.items():
+        path.write_bytes(path.read_bytes()[:keep])
+    code, err = run(project, copy, *plan_args(copy))
+    assert code == 0, err
+    for path in cut:
+        assert f"{path} is damaged" in err
+    assert err.count("computed again") >= 3
+    assert snapshot(copy) == snapshot(smoke)
+
+
+def test_a_shard_that_something_else_rewrote_is_made_again(project, smoke, copy):
+    path = sorted(copy.glob("anchors/*/part-00000.parquet"))[0]
+    table = pq.read_table(path, partitioning=None)
+    pq.write_table(table.slice(0, 3).replace_schema_metadata(None), path)
+    code, err = run(project, copy, *plan_args(copy))
+    assert code == 0, err
+    assert snapshot(copy) == snapshot(smoke)
+
+
+def test_a_missing_or_cut_mesh_is_built_again(project, smoke, copy):
+    meshes = sorted(copy.glob("meshes/*.glb"))
+    meshes[0].unlink()
+    meshes[1].write_bytes(meshes[1].read_bytes()[:1000])
+    code, err = run(project, copy, *plan_args(copy))
+    assert code == 0
+    assert all(str(mesh) in err for mesh in meshes)
+    assert snapshot(copy) == snapshot(smoke)
+
+
+def test_a_mesh_with_a_vertex_moved_is_built_again(project, smoke, copy):
+    mesh = sorted(copy.glob("meshes/*.glb"))[0]
+    before = mesh.stat()
+    raw = bytearray(mesh.read_bytes())
+    # The first coordinates of the binary chunk: a vertex goes 1.5 m to the east; size and time stay.
+    at = 28 + struct.unpack_from("<I", raw, 12)[0]
+    struct.pack_into("<f", raw, at, struct.unpack_from("<f", raw, at)[0] + 1.5)
+    mesh.write_bytes(raw)
+    os.utime(mesh, ns=(before.st_atime_ns, before.st_mtime_ns))
+    assert mesh.stat().st_size == before.st_size
+    scene = mesh.stem
+    sha256 = store.read_scene(copy, "scenes", scene)["mesh_sha256"][0].as_py()
+    with pytest.raises(AssetError, match="is not the mesh that the tables were made from"):
+        read_glb(mesh, sha256)
+    code, err = run(project, copy, *plan_args(copy))
+    assert code == 0
+    assert f"{mesh} is missing or damaged: computed again" in err
+    assert snapshot(copy) == snapshot(smoke)
+
+
+def test_shards_with_a_damaged_footer_are_made_again(project, smoke, copy):
+    damage = {
+        shard(copy, "pairs", 0): b"null", shard(copy, "pairs", 1): b"[]", shard(copy, "objects", 0): b"x",
+        shard(copy, "landmarks", 1): None,
+    }  # fmt: skip
+    for path, text in damage.items():
+        raw = path.read_bytes()
+        at = raw.index(b'{"checksum"')
+        if text is None:
+            path.write_bytes(raw[: at + 20] + bytes([raw[at + 20] ^ 1]) + raw[at + 21 :])
+        else:
+            end = raw.index(b"}}", at) + 2
+            path.write_bytes(raw[:at] + text.ljust(end - at) + raw[end:])
+    code, err = run(project, copy, *plan_args(copy))
+    assert code == 0, err
+    for path in damage:
+        assert f"{path} is damaged (its footer" in err
+    assert err.count("computed again") >= 4
+    assert snapshot(copy) == snapshot(smoke)
+
+
+def test_a_changed_config_makes_its_stage_stale_and_only_what_follows(project, copy, tmp_path):
+    before = mtimes(copy)
+    text = (project / "pipelines" / "smoke.toml").read_text()
+    text = text.replace('"../', f'"{project}/') + "\n[pair-objects]\nstart_variants = 1\n"
+    mine = tmp_path / "mine.toml"
+    mine.write_text(text)
+    code, err = run(project, copy, "--pipeline", str(mine))
+    assert code == 0, err
+    changed = {p.relative_to(copy).parts[0] for p, t in mtimes(copy).items() if before.get(p) != t}
+    assert changed == {"pairs", "plans"}
+
+
+def test_two_runs_on_one_directory_do_not_mix(project, tmp_path):
+    data = tmp_path / "data"
+    first = start(project, data, *plan_args(data))
+    wait_for_shards(data, 1, first)
+    code, err = run(project, data, *plan_args(data))
+    assert code == 1
+    assert err == f"error: another run is writing to {data}: wait for it, or use another --data\n"
+    first.kill()
+    first.communicate()
+
+
+def test_a_read_only_directory_is_one_line(project, copy):
+    if os.geteuid() == 0:
+        # Root writes through permission bits: a folder in the shard's place stops it all the same.
+        path = sorted(copy.glob("pairs/*/part-00000.parquet"))[0]
+        path.unlink()
+        path.mkdir()
+    else:
+        folder = sorted(copy.glob("pairs/*"))[0]
+        sorted(folder.iterdir())[0].unlink()
+        folder.chmod(0o555)
+    code, err = run(project, copy, *plan_args(copy))
+    assert code == 1
+    lines = [line for line in err.splitlines() if line.startswith("error:")]
+    assert len(lines) == 1
+    assert "Traceback" not in err
+
+
+def test_what_versions_before_left_is_removed_once_and_an_old_recording_comes_back(project, smoke, copy):
+    (copy / ".lock").write_text("")
+    (recording,) = (copy / "media" / "U_Courtyard_0").iterdir()
+    recording.rename(recording.with_name(f".{recording.name}.4242.old"))
+    for left in (
+        "meshes/.U_Courtyard_0.glb.4242.tmp.glb", "release/.README.md.4242.tmp.md",
+        "plans/U_Courtyard_0/.part-00000.parquet.4242.tmp.parquet", "media/U_Gone_0/.nav.4242.tmp/front_rgb.mp4",
+        "release/tasks/id_test/.part-U_Courtyard_0.parquet.4242.tmp.parquet",
+    ):  # fmt: skip
+        (copy / left).parent.mkdir(parents=True, exist_ok=True)
+        (copy / left).write_bytes(b"half")
+    code, err = run(project, copy, *plan_args(copy))
+    assert code == 0, err
+    assert recording.is_dir()
+    assert not [p for p in copy.rglob(".*") if p.name != ".lock"]
+    (copy / "meshes" / ".mine.1.tmp").write_text("not looked for again")
+    code, err = run(project, copy, *plan_args(copy))
+    assert (copy / "meshes" / ".mine.1.tmp").is_file()

@@ -1,0 +1,164 @@
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from support.rendered import MATERIALS, block, courtyard
+
+from aerialdojo_gen.geometry.cameras import Camera, project, view_pose
+from aerialdojo_gen.geometry.rays import RayCaster
+from aerialdojo_gen.rendering.preview import contact_sheet, look_at
+from aerialdojo_gen.rendering.world import RenderWorld, render_world
+from aerialdojo_gen.scenes.model import Scene
+from aerialdojo_gen.store.schemas import VIEWS
+
+CAMERA = Camera(320, 320, 90.0)
+
+
+@pytest.fixture(scope="module")
+def scene():
+    return courtyard()
+
+
+@pytest.fixture(scope="module")
+def world(scene):
+    with RenderWorld(scene) as world:
+        yield world
+
+
+@pytest.mark.parametrize(
+    ("view", "distance"), [("front", 8 - 1.3), ("left", 8 - 0.4), ("right", 8 + 0.4), ("down", 5.25)]
+)
+def test_depth_of_a_wall_is_its_distance(world, view, distance):
+    """The court's walls stand at 8 m, the ground at 0: planar depth is one number all over a wall."""
+    depth = world.render(CAMERA, view_pose((1.3, 0.4, 5.25), 0.0, view)).depth_m
+    middle = depth[150:170, 150:170]
+    assert middle == pytest.approx(np.full_like(middle, distance), abs=1e-3)
+    assert depth[160, 40:280] == pytest.approx(np.full(240, distance), abs=1e-3)
+
+
+@pytest.mark.parametrize("view", VIEWS)
+def test_depth_agrees_with_ray_casts_at_every_pixel(scene, world, view):
+    pose = view_pose((-1.0, 2.0, 3.1), 0.4, view)
+    depth = world.render(CAMERA, pose).depth_m.astype(np.float64)
+    rays = CAMERA.rays().reshape(-1, 3)
+    along, _ = RayCaster(scene).first_hit(pose[:3, 3], rays @ pose[:3, :3].T)
+    cast = (along / np.linalg.norm(rays, axis=1)).reshape(depth.shape)
+    assert np.isinf(cast).any() == (view != "down")
+    assert np.mean(np.isinf(cast) == np.isinf(depth)) > 0.9999
+    both = np.isfinite(cast) & np.isfinite(depth)
+    assert np.mean(np.abs(cast[both] - depth[both]) < 0.01) > 0.999
+
+
+def test_neighbouring_views_see_the_same_at_their_shared_edge(world):
+    """The last columns either side of the 45° line: half a pixel apart, so rows and depths match to that."""
+    position, yaw = (0.7, -0.4, 4.0), 0.3
+    depth = {v: world.render(CAMERA, view_pose(position, yaw, v)).depth_m for v in VIEWS}
+    for left, right in (("left", "front"), ("front", "right")):
+        a, b = depth[left][:, -1].astype(np.float64), depth[right][:, 0].astype(np.float64)
+        both = np.isfinite(a) & np.isfinite(b)
+        assert both.sum() > 250
+        assert np.mean(np.isfinite(a) == np.isfinite(b)) > 0.98
+        assert np.median(np.abs(a[both] - b[both]) / a[both]) < 0.01
+    # The lowest row of the front view continues in the top row of the view down.
+    assert np.median(np.abs(depth["front"][-1] - depth["down"][0])) < 0.02
+
+
+@pytest.mark.parametrize(("view", "yaw"), [("front", 0.3), ("left", 0.3 - math.pi / 2), ("right", 0.3 + math.pi / 2)])
+def test_a_red_cube_appears_where_projection_says(scene, world, view, yaw):
+    pose = view_pose((-2.0, 0.5, 2.0), yaw, view)
+    rgb = world.render(CAMERA, pose).rgb.astype(int)
+    red = (rgb[..., 0] > 2 * rgb[..., 1]) & (rgb[..., 0] > 2 * rgb[..., 2])
+    rows, columns = np.nonzero(red)
+    uv, _ = project(CAMERA, pose, scene["red_cube"].vertices)
+    assert (columns.min(), columns.max() + 1) == pytest.approx((uv[:, 0].min(), uv[:, 0].max()), abs=1.0)
+    assert (rows.min(), rows.max() + 1) == pytest.approx((uv[:, 1].min(), uv[:, 1].max()), abs=1.0)
+    assert not ((np.abs(rgb - [210, 30, 30]).sum(axis=-1) < 60) & ~red).any()
+
+
+def test_textures_lie_on_surfaces_in_perspective():
+    """A checkered ground of 1 m squares: their colours along a row change where the geometry says."""
+    flat = Scene("flat", (block("ground", (-50, -50, -1), (50, 50, 0), "grass"),), MATERIALS, np.array([[-50.0] * 3, [50.0] * 3]))  # fmt: skip  # noqa: E501
+    camera, pose = Camera(320, 320, 90.0), view_pose((0.0, 0.0, 4.0), 0.0, "front")
+    with RenderWorld(flat) as world:
+        albedo, depth, surface = world.rasterise(camera, pose)
+    row = 300
+    points = np.array([(depth[row, c], -(c + 0.5 - 160) / 160 * depth[row, c], 0.0) for c in range(320)])
+    u, v = points[:, 0] / 2.0, points[:, 1] / 2.0
+    dark = (np.floor(2 * u) + np.floor(2 * v)) % 2 == 1
+    clear = (np.abs(2 * v - np.rint(2 * v)) > 0.05) & (np.abs(2 * u - np.rint(2 * u)) > 0.05)
+    shade = albedo[row, :, 0] > 90
+    assert surface[row].min() >= 0
+    assert clear.sum() > 250
+    assert len(set(shade[clear] == dark[clear])) == 1
+
+
+def test_shadows_fall_away_from_the_sun(scene):
+    sun = np.asarray(scene.sun)
+    cube = block("cube", (-1, -1, 0), (1, 1, 2), "grey")
+    plain = Scene("plain", (block("ground", (-20, -20, -1), (20, 20, 0), "blue"), cube), MATERIALS, scene.bounds)
+    camera, pose = Camera(320, 320, 90.0), view_pose((0.0, 0.0, 10.0), 0.0, "down")
+    with RenderWorld(plain) as world:
+        rgb = world.render(camera, pose).rgb.astype(int)
+    # The sun stands in the south-east: 1.7 m west and 0.9 m north of the cube's middle, the way to it meets the cube.
+    assert sun[0] > 0 > sun[1]
+    (shadow, light), _ = project(camera, pose, [(-1.7, 0.9, 0.0), (1.7, -0.9, 0.0)])
+    in_shadow, in_light = (rgb[int(p[1]), int(p[0])] for p in (shadow, light))
+    assert in_shadow[2] < 0.75 * in_light[2]
+
+
+def test_the_sky_is_the_scene_s_and_not_white(scene, world):
+    picture = world.render(CAMERA, view_pose((0, 0, 7.5), 0.0, "front"))
+    sky = picture.rgb[np.isinf(picture.depth_m)]
+    assert len(sky) > 1000
+    assert sky[:, 2].mean() > sky[:, 0].mean() + 20
+    assert np.ptp(picture.rgb[:100, 160].astype(int), axis=0).max() > 20
+
+
+def test_pictures_are_the_same_from_a_world_built_again(scene, world):
+    pose = view_pose((1, 1, 3), 2.0, "front")
+    first = world.render(CAMERA, pose)
+    with RenderWorld(scene) as again:
+        second = again.render(CAMERA, pose)
+    assert np.array_equal(first.rgb, second.rgb)
+    assert np.array_equal(first.depth_m, second.depth_m)
+
+
+def test_many_worlds_one_after_the_other(scene):
+    """PyBullet has 1,024 clients at most and once leaked meshes: a world must give back what it took."""
+    small = Scene("small", scene.instances[:1], MATERIALS, scene.bounds)
+    for _ in range(5):
+        with RenderWorld(small) as world:
+            assert np.isfinite(world.render(CAMERA, view_pose((0, 0, 3), 0, "down")).depth_m).all()
+
+
+def test_previews_keep_the_latest_scene_and_sheets_hold_all_pictures(scene):
+    image = look_at(scene, (-6, -6, 6), (5.5, 1.5, 1.5), 200, 120)
+    assert image.shape == (120, 200, 3)
+    assert render_world(scene) is render_world(scene)
+    sheet = contact_sheet([image] * 5, list("abcde"), columns=3)
+    assert sheet.shape[0] > 2 * 120
+    assert sheet.shape[1] > 3 * 200
+    found = sum(
+        np.array_equal(sheet[r : r + 120, c : c + 200], image)
+        for r in range(sheet.shape[0] - 119)
+        for c in (4, 208, 412)
+        if np.array_equal(sheet[r, c : c + 200], image[0])
+    )
+    assert found == 5
+    with pytest.raises(ValueError, match="labels"):
+        contact_sheet([image], ["a", "b"])
+
+
+@pytest.mark.parametrize("view", VIEWS)
+def test_vertices_in_the_camera_s_own_plane_do_no_harm(scene, view):
+    """TinyRenderer divides by zero there; routes on whole metres meet such vertices often."""
+    long = Scene(
+        "long", (*scene.instances, block("curb", (-24, -1, 0), (24, 1, 0.5), "blue")), MATERIALS, scene.bounds
+    )
+    with RenderWorld(long) as world:
+        for position in ((0.0, 0.0, 3.0), (0.0, 0.0, 0.75), (6.0, 0.0, 2.0), (-6.0, 3.0, 2.0)):
+            depth = world.render(CAMERA, view_pose(position, 0.0, view)).depth_m
+            assert not np.isnan(depth).any()
+            assert depth.min() > 0.1

@@ -1,0 +1,359 @@
+"""From recipe to scene file: ground, footprints, errors, and the same bytes in every process."""
+
+import hashlib
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from shapely.geometry import Point, Polygon
+
+from aerialdojo_gen import layouts
+from aerialdojo_gen.config.sections import BuildScenesConfig, Embodiment
+from aerialdojo_gen.errors import AssetError
+from aerialdojo_gen.geometry.rays import RayCaster
+from aerialdojo_gen.pipeline.stage import Job, Roots
+from aerialdojo_gen.scenes.build import build_scene
+from aerialdojo_gen.scenes.catalogue import load_catalogue
+from aerialdojo_gen.scenes.glb import read_glb
+from aerialdojo_gen.scenes.grammar_scatter import along, grid, poisson_disc, smooth_path
+from aerialdojo_gen.scenes.grammar_streets import crossing, parking_row, streets
+from aerialdojo_gen.scenes.ground import Surface, disc, ground_meshes, rectangle, ribbon
+from aerialdojo_gen.scenes.recipe import Recipe
+from aerialdojo_gen.scenes.site import Site
+from aerialdojo_gen.scenes.terrain import flat_terrain, mound, rolling_terrain
+from aerialdojo_gen.stages import build_scenes
+
+ASSETS = Path(__file__).parents[2] / "scene_assets"
+LAYOUT = """
+from pydantic import BaseModel, ConfigDict
+from aerialdojo_gen.scenes.grammar_scatter import poisson_disc, slab
+from aerialdojo_gen.scenes.grammar_streets import streets
+from aerialdojo_gen.scenes.ground import disc, rectangle
+from aerialdojo_gen.scenes.terrain import rolling_terrain
+
+
+class Parameters(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid")
+    posts: int = 5
+
+
+def build(site):
+    site.set_ground(rolling_terrain((40, 30), 1.0, site.recipe.seed, 2.0, 20.0), "grass")
+    streets(site, [[(-20, 0), (20, 0)]])
+    site.add(None, "hall", [(site.material("wall", "brick"), slab(rectangle(5, 5, 12, 10), -3, 6))],
+             footprint=rectangle(5, 5, 12, 10))
+    done = 0
+    for p in poisson_disc(disc(-8, 8, 6), 1.5, site.rng_for("posts")):
+        if done < site.parameters.posts and site.try_place("post", p.x, p.y, p.yaw_deg) is not None:
+            done += 1
+"""
+POST = """
+[post]
+name = "post"
+params = { h = [1.0, 2.0] }
+[[post.parts]]
+shape = "cylinder"
+radius = 0.1
+height = "h"
+role = "#884422"
+[[post.parts]]
+shape = "crown"
+radius = 0.3
+at = [0, 0, "h"]
+role = "foliage"
+"""
+RECIPE = """
+layout = "testplace"
+seed = 3
+size_m = [40, 30]
+ceiling_m = 12
+sky = "#a9c6e8"
+sun = [3, 0, 4]
+palette = { wall = "brick:#804020" }
+[parameters]
+posts = 4
+[inventory]
+post = 4
+"""
+
+
+@pytest.fixture
+def assets(tmp_path, monkeypatch):
+    folder = tmp_path / "assets"
+    (folder / "props").mkdir(parents=True)
+    (folder / "scenes").mkdir()
+    (folder / "materials.toml").write_bytes((ASSETS / "materials.toml").read_bytes())
+    (folder / "props" / "post.toml").write_text(POST)
+    (folder / "scenes" / "U_Test_0.toml").write_text(RECIPE)
+    (tmp_path / "code").mkdir()
+    (tmp_path / "code" / "testplace.py").write_text(LAYOUT)
+    monkeypatch.setattr(layouts, "__path__", [*layouts.__path__, str(tmp_path / "code")])
+    monkeypatch.delitem(sys.modules, "aerialdojo_gen.layouts.testplace", raising=False)
+    return folder
+
+
+def build(assets: Path):
+    return build_scene(assets / "scenes" / "U_Test_0.toml", load_catalogue(assets))
+
+
+def test_stage_writes_mesh_and_row(assets, tmp_path):
+    roots = Roots(tmp_path / "data", assets, assets / "scenes", tmp_path)
+    job = Job("build-scenes", "U_Test_0", 0, 1, 0, Embodiment(), roots)
+    output = build_scenes.run(job, BuildScenesConfig())
+    row = output.tables["scenes"].to_pylist()[0]
+    path = roots.data / row["mesh_path"]
+    scene = read_glb(path)
+    assert row["mesh_path"] == "meshes/U_Test_0.glb"
+    assert row["mesh_sha256"] == hashlib.sha256(path.read_bytes()).hexdigest()
+    assert (row["family"], row["scene_type"], row["partition"]) == ("Urban", "Test", "ID")
+    assert row["n_triangles"] == scene.n_triangles
+    assert row["n_instances"] == len(scene.instances) == 6
+    assert row["n_categories"] == 3
+    assert (row["min_x_m"], row["max_y_m"], row["max_z_m"], row["ceiling_m"]) == (-20, 15, 12, 12)
+    assert row["min_z_m"] == scene["ground"].bounds[0, 2]
+    assert scene.sun == pytest.approx((0.6, 0, 0.8))
+    assert scene.sky == (0xA9, 0xC6, 0xE8)
+    assert {i.node for i in scene.instances} == {"ground", "hall_000", *(f"post_{k:03d}" for k in range(4))}
+    assert "brick:#804020" in scene.materials
+
+
+def test_file_holds_the_built_scene_exactly(assets, tmp_path):
+    roots = Roots(tmp_path / "data", assets, assets / "scenes", tmp_path)
+    build_scenes.run(Job("build-scenes", "U_Test_0", 0, 1, 0, Embodiment(), roots), BuildScenesConfig())
+    stored, built = read_glb(roots.data / "meshes/U_Test_0.glb"), build(assets)
+    for a, b in zip(stored.instances, built.instances, strict=True):
+        assert np.array_equal(a.vertices, b.vertices)
+        assert np.array_equal(a.faces, b.faces)
+
+
+def test_same_bytes_in_processes_that_hash_differently(assets, tmp_path):
+    script = (
+        "import sys, hashlib, pathlib\n"
+        "from aerialdojo_gen.scenes import layouts\n"
+        "layouts.__path__.append(sys.argv[2])\n"
+        "from aerialdojo_gen.scenes.build import build_scene\n"
+        "from aerialdojo_gen.scenes.catalogue import load_catalogue\n"
+        "from aerialdojo_gen.scenes.glb import write_glb\n"
+        "a = pathlib.Path(sys.argv[1])\n"
+        "write_glb(build_scene(a / 'scenes' / 'U_Test_0.toml', load_catalogue(a)), pathlib.Path(sys.argv[3]))\n"
+    )
+    digests = set()
+    for seed in ("0", "1", "4242"):
+        out = tmp_path / f"{seed}.glb"
+        environment = {**os.environ, "PYTHONHASHSEED": seed}
+        command = [sys.executable, "-c", script, str(assets), str(tmp_path / "code"), str(out)]
+        subprocess.run(command, check=True, env=environment)
+        digests.add(hashlib.sha256(out.read_bytes()).hexdigest())
+    assert len(digests) == 1
+
+
+def test_another_seed_makes_another_scene(assets):
+    first = build(assets)
+    path = assets / "scenes" / "U_Test_0.toml"
+    path.write_text(RECIPE.replace("seed = 3", "seed = 4"))
+    assert not np.array_equal(build(assets)["ground"].vertices[:, 2], first["ground"].vertices[:, 2])
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [
+        ("seed = 3", "sead = 3", "unknown key 'sead', did you mean 'seed'?"),
+        ('layout = "testplace"\n', "", "key 'layout' is missing"),
+        ('"testplace"', '"testplaces"', "unknown layout 'testplaces', did you mean 'testplace'?"),
+        ("posts = 4", "post = 4", "parameters: unknown key 'post', did you mean 'posts'?"),
+        ("posts = 4", 'posts = "many"', "parameters: posts: "),
+        ("[40, 30]", "[40, -30]", "size_m.1: "),
+        ('"#a9c6e8"', '"blue"', "sky: "),
+        ('"brick:#804020"', '"brik"', "palette wall: unknown material 'brik', did you mean 'brick'?"),
+        ("post = 4\n", "pots = 4\n", "inventory: unknown category 'pots', did you mean 'post'?"),
+        (
+            "[inventory]\npost = 4",
+            "[inventory]\npost = 9",
+            "inventory: the layout placed too few of post (needs 9, has 4)",
+        ),
+        ("seed = 3", "seed = ", "Invalid value"),
+    ],
+)
+def test_recipe_errors_name_file_and_key(assets, old, new, says):
+    path = assets / "scenes" / "U_Test_0.toml"
+    assert old in RECIPE
+    path.write_text(new.join(RECIPE.rsplit(old, 1)))
+    with pytest.raises(AssetError) as caught:
+        build(assets)
+    assert says in str(caught.value)
+    assert str(path) in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("name", "parsed"),
+    [
+        ("U_Mall_0", ("Urban", "Mall", "ID")),
+        ("D_Flood_1", ("Disaster", "Flood", "OOD")),
+        ("Campus", ("Custom", "Campus", "ID")),
+        ("Campus_1", ("Custom", "Campus", "OOD")),
+        ("X_Mall_0", ("Custom", "X_Mall", "ID")),
+    ],
+)
+def test_scene_names_tell_family_type_and_partition(name, parsed):
+    assert build_scenes.parse_name(name) == parsed
+
+
+def site(width: float = 60.0, height: float = 40.0) -> Site:
+    return Site("U_Test_0", Recipe(layout="none", size_m=(width, height), ceiling_m=20), load_catalogue(ASSETS))
+
+
+def test_ground_covers_the_site_once_and_ground_z_tells_its_height():
+    place = site()
+    place.set_ground(mound(rolling_terrain((60, 40), 2.0, 5, 3.0, 25.0), (10, 5), 8, 4), "meadow")
+    streets(place, [[(-30, -5), (0, 3), (30, -5)], [(0, -20), (4, 20)]])
+    place.paint(disc(-15, 10, 4), "paving", 0.3)
+    crossing(place, 10, 0, 80, 6)
+    scene = place.scene()
+    ground = scene["ground"]
+    corners = ground.vertices[ground.faces]
+    up = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])[:, 2] / 2
+    assert up.min() > -1e-6
+    assert up.sum() == pytest.approx(60 * 40, rel=1e-5)
+    xy = np.random.default_rng(1).uniform((-29.9, -19.9), (29.9, 19.9), size=(4000, 2))
+    origins = np.column_stack([xy, np.full(len(xy), 50.0)])
+    distance, index = RayCaster(scene).first_hit(origins, np.tile([0.0, 0.0, -1.0], (len(xy), 1)))
+    assert np.all(index == 0), "the ground has a hole"
+    told = np.array([place.ground_z(x, y) for x, y in xy])
+    # A point on a kerb's very edge may fall to either side.
+    assert np.mean(np.abs(50.0 - distance - told) < 1e-4) > 0.999
+
+
+def test_later_paint_covers_earlier_and_kerbs_face_outwards():
+    terrain = flat_terrain((20, 20))
+    square = rectangle(-5, -5, 5, 5)
+    surfaces = [
+        Surface(square, "paving", 0.2),
+        Surface(rectangle(-1, -9, 1, 9), "asphalt"),
+        Surface(disc(3, 3, 1), "grass"),
+    ]
+    meshes = ground_meshes(terrain, rectangle(-10, -10, 10, 10), "grass", surfaces)
+    area = {}
+    for material, m in meshes:
+        c = m.vertices[m.faces]
+        normal = np.cross(c[:, 1] - c[:, 0], c[:, 2] - c[:, 0])
+        area[material] = area.get(material, 0.0) + normal[:, 2].sum() / 2
+        if material == "concrete":
+            normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+            outside = c.mean(axis=1) + 0.01 * normal
+            inside = c.mean(axis=1) - 0.01 * normal
+            paved = square.difference(surfaces[1].area).difference(surfaces[2].area)
+            assert not shapely.contains_xy(paved, outside[:, 0], outside[:, 1]).any()
+            assert shapely.contains_xy(paved, inside[:, 0], inside[:, 1]).all()
+    round_ = surfaces[2].area.area
+    assert area["asphalt"] == pytest.approx(36)
+    assert area["paving"] == pytest.approx(100 - 20 - round_, abs=1e-2)
+    assert area["grass"] == pytest.approx(400 - 36 - 80 + round_, abs=1e-2)
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.integers(0, 50), st.floats(-12, 12), st.floats(-8, 8))
+def test_terrain_height_is_that_of_its_triangles(seed, x, y):
+    terrain = rolling_terrain((25, 17), 1.3, seed, 4.0, 15.0)
+    corners, faces = terrain.corners(), terrain.triangles()
+    for a, b, c in corners[faces]:
+        m = np.column_stack([b[:2] - a[:2], c[:2] - a[:2]])
+        u, v = np.linalg.solve(m, np.array([x, y]) - a[:2])
+        if u >= 0 and v >= 0 and u + v <= 1:
+            assert float(terrain.z(x, y)) == pytest.approx(a[2] + u * (b[2] - a[2]) + v * (c[2] - a[2]))
+            return
+    pytest.fail("no triangle holds the point")
+
+
+def test_terrain_is_level_where_flattened_and_gentle_along_a_path():
+    rough = rolling_terrain((80, 60), 1.0, 2, 6.0, 18.0)
+    area = Point(10, 5).buffer(6)
+    level = rough.flattened(area, blend_m=4)
+    xy = np.random.default_rng(0).uniform(-60, 60, size=(3000, 2))
+    near = shapely.contains_xy(area, xy[:, 0], xy[:, 1])
+    assert np.ptp(level.z(*xy[near].T)) < 1e-9
+    far = ~shapely.contains_xy(area.buffer(8), xy[:, 0], xy[:, 1])
+    np.testing.assert_array_equal(level.z(*xy[far].T), rough.z(*xy[far].T))
+    path = smooth_path([(-35, -10), (-10, 15), (20, -15), (38, 20)])
+    graded = rough.graded(path, 2.0)
+    line = shapely.LineString(path)
+    points = shapely.get_coordinates(line.interpolate(np.arange(1.0, line.length - 1, 0.5)))
+    climb = np.abs(np.diff(graded.z(*points.T)))
+    assert climb.max() < 0.7 * np.abs(np.diff(rough.z(*points.T))).max()
+
+
+def test_lowered_ground_is_deep_inside_and_unchanged_outside():
+    flat = rolling_terrain((40, 40), 1.0, 1, 0.0, 10.0)
+    bed = flat.lowered(Point(0, 0).buffer(10), 2.0, 3.0)
+    assert float(bed.z(0, 0)) == pytest.approx(-2.0)
+    assert float(bed.z(11.5, 0)) == 0.0
+
+
+def test_footprints_know_height_and_ground():
+    place = site()
+    category = next(iter(place.catalogue))
+    post = place.place(category, 0, 0)
+    assert post.node == f"{category}_000"
+    assert not place.is_free(0, 0, 0.3)
+    assert place.is_free(0, 0, 0.3, z=float(post.bounds[1, 2]) + 0.1)
+    assert place.try_place(category, 0, 0) is None
+    assert place.is_free(20, 10, 1.0)
+    assert not place.is_free(29.5, 0, 1.0), "partly outside the site"
+    place.occupy(rectangle(15, 5, 25, 15))
+    assert not place.is_free(20, 10, 1.0)
+    assert place.place(category, -20, 0).node == f"{category}_001"
+    with pytest.raises(AssetError, match="stands twice"):
+        place.place(category, 5, 5, node=f"{category}_000")
+
+
+def test_adding_one_thing_does_not_change_another():
+    """A prop draws from its own name: what stands before it in the layout leaves it as it is."""
+    one, two = site(), site()
+    categories = sorted(one.catalogue)[:2]
+    two.rng.random(100)
+    two.place(categories[1], 10, 10)
+    a, b = one.place(categories[0], 0, 0), two.place(categories[0], 0, 0)
+    assert a.variant == b.variant
+    assert np.array_equal(a.vertices, b.vertices)
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.integers(0, 1000), st.floats(0.8, 3.0))
+def test_poisson_discs_keep_their_distance_and_fill_the_area(seed, radius):
+    area = Polygon([(0, 0), (20, 0), (20, 10), (10, 15), (0, 10)])
+    points = np.array(poisson_disc(area, radius, np.random.default_rng(seed)))[:, :2]
+    assert shapely.contains_xy(area, *points.T).all()
+    gaps = np.linalg.norm(points[:, None] - points[None], axis=2) + 1e9 * np.eye(len(points))
+    assert gaps.min() >= radius
+    # Thrown until nearly full: a maximal set covers the area by discs of its radius.
+    assert len(points) * radius**2 > 0.5 * area.area
+
+
+def test_poses_along_a_path_reach_both_ends_and_face_along_it():
+    poses = along([(0, 0), (10, 0), (10, 10)], 2.5, offset_m=1.0)
+    assert len(poses) == 9
+    assert poses[0] == pytest.approx((0, 1, 0))
+    assert poses[-1] == pytest.approx((9, 10, 90))
+
+
+def test_grid_points_lie_in_their_area():
+    area = ribbon([(0, 0), (20, 20)], 8)
+    poses = grid(area, (2, 3), np.random.default_rng(0), yaw_deg=45)
+    assert len(poses) == pytest.approx(area.area / 6, rel=0.2)
+    assert all(area.contains(Point(p.x, p.y)) for p in poses)
+
+
+def test_parking_bays_lie_side_by_side_before_their_closed_side():
+    place = site()
+    bays = parking_row(place, 10, 5, 90, 6)
+    assert np.allclose([b.y for b in bays], 5 - 2.6)
+    assert np.allclose(np.abs(np.diff([b.x for b in bays])), 2.6)
+    assert np.mean([b.x for b in bays]) == pytest.approx(10)
+    marks = next(p for p in place.scene()["ground"].parts if p.material == "marking")
+    assert marks.vertices[:, 1].max() == pytest.approx(5)

@@ -1,0 +1,100 @@
+"""Buildings from a plan: whole windows, closed roofs, openings that one can fly through."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import shapely
+import trimesh
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from shapely.affinity import rotate, translate
+from shapely.geometry import Point, Polygon
+
+from aerialdojo_gen.geometry.rays import RayCaster
+from aerialdojo_gen.scenes.catalogue import load_catalogue
+from aerialdojo_gen.scenes.grammar_buildings import before_walls, building, facade, pitched_roof, wall_with_openings
+from aerialdojo_gen.scenes.ground import rectangle
+from aerialdojo_gen.scenes.mesh import to_part
+from aerialdojo_gen.scenes.recipe import Recipe
+from aerialdojo_gen.scenes.site import Site
+
+ASSETS = Path(__file__).parents[2] / "scene_assets"
+
+
+@given(st.floats(5, 40), st.floats(5, 40), st.integers(1, 6), st.floats(0, 360))
+def test_facades_show_whole_windows_on_every_wall(x, y, storeys, turn):
+    plan = rotate(rectangle(0, 0, x, y), turn)
+    walls = facade(plan, 1.0, 1.0 + 3.1 * storeys, 6.4)
+    part = to_part(walls, "facade", 6.4)
+    corners = part.uv[part.faces].reshape(-1, 2)
+    # Tiles are two windows wide and two storeys high: corners lie on whole tiles across, on half tiles up.
+    np.testing.assert_allclose(corners[:, 0], np.rint(corners[:, 0]), atol=1e-5)
+    np.testing.assert_allclose(corners[:, 1] * 2, np.rint(corners[:, 1] * 2), atol=1e-5)
+    assert corners[:, 1].max() * 2 == pytest.approx(storeys, abs=1)
+    c = walls.vertices[walls.faces]
+    normals = np.cross(c[:, 1] - c[:, 0], c[:, 2] - c[:, 0])
+    assert np.linalg.norm(normals, axis=1).sum() / 2 == pytest.approx(2 * (x + y) * 3.1 * storeys)
+    outside = c.mean(axis=1) + 0.01 * normals / np.linalg.norm(normals, axis=1, keepdims=True)
+    assert not shapely.contains_xy(plan, outside[:, 0], outside[:, 1]).any()
+
+
+@settings(deadline=None)
+@given(st.floats(6, 30), st.floats(4, 6), st.floats(0, 180), st.booleans())
+def test_pitched_roofs_are_closed_and_as_high_as_asked(length, width, turn, hip):
+    plan = translate(rotate(rectangle(0, 0, length, width), turn), 30, -20)
+    parts = pitched_roof(plan, 6.0, 2.0, "wall", "roof", hip=hip)
+    for _, m in parts:
+        body = trimesh.Trimesh(m.vertices, m.faces, process=False)
+        assert body.is_watertight
+        assert body.is_winding_consistent
+        assert m.volume_m3 > 0
+    top = max(float(m.vertices[:, 2].max()) for _, m in parts)
+    assert top == pytest.approx(8.0 + (0.0 if hip else 0.18))
+    # The eaves reach beyond every wall.
+    roof = shapely.MultiPoint(parts[0][1].vertices[:, :2]).convex_hull
+    assert roof.buffer(1e-6).contains(plan)
+
+
+@pytest.mark.parametrize("roof_kind", ["flat", "gable", "hip"])
+@pytest.mark.parametrize("parapet", [0.0, 0.6])
+def test_buildings_leave_no_gap_to_the_sky(roof_kind, parapet):
+    site = Site("U_T_0", Recipe(layout="none", size_m=(60, 60), ceiling_m=30), load_catalogue(ASSETS))
+    plan = rotate(rectangle(-8, -5, 8, 5), 20)
+    house = building(site, plan, wall="facade_brick", roof="roof_tiles", roof_kind=roof_kind, parapet_m=parapet)
+    assert not site.is_free(0, 0, 0.5)
+    inside = np.array([(x, y) for x in np.arange(-9, 9, 0.37) for y in np.arange(-9, 9, 0.37)])
+    inside = inside[shapely.contains_xy(plan.buffer(-0.03), inside[:, 0], inside[:, 1])]
+    origins = np.column_stack([inside, np.full(len(inside), 1.0)])
+    distance, _ = RayCaster(site.scene()).first_hit(origins, np.tile([0.0, 0.0, 1.0], (len(inside), 1)))
+    assert np.isfinite(distance).all()
+    assert house.bounds[0, 2] == 0.0
+
+
+def test_openings_let_rays_through_and_walls_do_not():
+    site = Site("U_T_0", Recipe(layout="none", size_m=(60, 60), ceiling_m=30), load_catalogue(ASSETS))
+    openings = [(2.0, 4.0, 0.0, 2.5), (6.0, 7.0, 1.0, 2.0)]
+    wall = wall_with_openings((0, 0), (6, 8), 0.0, 4.0, openings, 0.4)
+    site.add(None, "wall", [("brick", wall)])
+    assert wall.volume_m3 == pytest.approx((10 * 4 - 5 - 1) * 0.4)
+    along, across = np.array([0.6, 0.8, 0.0]), np.array([0.8, -0.6, 0.0])
+    rng = np.random.default_rng(0)
+    u, v = rng.uniform(0.01, 9.99, 500), rng.uniform(0.01, 3.99, 500)
+    origins = u[:, None] * along + v[:, None] * np.array([0, 0, 1.0]) + 3 * across
+    distance, _ = RayCaster(site.scene()).first_hit(origins, np.tile(-across, (500, 1)))
+    hit = distance < 4.0
+    free = np.zeros(500, dtype=bool)
+    for u0, u1, sill, head in openings:
+        free |= (u > u0) & (u < u1) & (v > sill) & (v < head)
+    assert np.array_equal(hit, ~free)
+    np.testing.assert_allclose(distance[hit], 2.8, atol=1e-4)
+
+
+def test_poses_before_walls_stand_outside_and_face_away():
+    plan = Polygon([(0, 0), (20, 0), (20, 10), (8, 10), (8, 20), (0, 20)])
+    poses = before_walls(plan, 3.0, 1.5)
+    assert len(poses) >= 15
+    for p in poses:
+        assert plan.distance(Point(p.x, p.y)) == pytest.approx(1.5)
+        back = Point(p.x - 1.6 * np.cos(np.radians(p.yaw_deg)), p.y - 1.6 * np.sin(np.radians(p.yaw_deg)))
+        assert plan.contains(back)

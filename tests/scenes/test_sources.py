@@ -1,0 +1,69 @@
+"""The sources of the 42 scenes together: the paper's scenes, counts and categories, each of them used."""
+
+import json
+import re
+from collections import Counter
+from pathlib import Path
+
+import pytest
+
+from aerialdojo_gen.common.paper import inventory
+from aerialdojo_gen.scenes.catalogue import load_catalogue
+from aerialdojo_gen.scenes.recipe import load_recipe
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+@pytest.fixture(scope="module")
+def catalogue():
+    return load_catalogue(ROOT / "scene_assets")
+
+
+@pytest.fixture(scope="module")
+def annotations():
+    return {path.stem: json.loads(path.read_text(encoding="utf-8")) for path in (ROOT / "annotations").glob("*.json")}
+
+
+def test_every_scene_of_the_paper_has_a_recipe_and_annotations(annotations):
+    recipes = {path.stem for path in (ROOT / "scene_assets" / "scenes").glob("*.toml")}
+    assert recipes == set(inventory()) == set(annotations)
+
+
+def test_landmarks_and_objects_are_as_many_as_the_papers(annotations):
+    found = {name: (len(body["landmarks"]), len(body["objects"])) for name, body in annotations.items()}
+    assert found == {name: (row.landmarks, row.objects) for name, row in inventory().items()}
+    assert tuple(map(sum, zip(*found.values(), strict=True))) == (109, 2099)
+
+
+def test_there_are_254_categories_and_each_is_looked_for(annotations, catalogue):
+    used = Counter(entry["category"] for body in annotations.values() for entry in body["objects"])
+    assert len(catalogue.targets) == 254
+    assert set(used) == set(catalogue.targets)
+
+
+def test_categories_are_told_apart_by_name(catalogue):
+    names = Counter(catalogue[category].name for category in catalogue.targets)
+    assert [name for name, n in names.items() if n > 1] == []
+
+
+def test_the_two_instances_of_a_type_differ_in_more_than_the_seed():
+    folder = ROOT / "scene_assets" / "scenes"
+    for name in inventory():
+        if name.endswith("_0"):
+            one, two = (load_recipe(folder / f"{stem}.toml") for stem in (name, f"{name[:-1]}1"))
+            assert one.layout == two.layout
+            assert one.size_m != two.size_m, name
+            # A plan of its own may bring colours of its own.
+            assert (one.palette, one.sky) != (two.palette, two.sky), name
+            assert one.parameters != two.parameters, name
+
+
+def test_descriptions_are_sentences_of_people(annotations):
+    texts = [entry["description"] for body in annotations.values() for entry in body["objects"]]
+    assert len(set(texts)) > 0.99 * len(texts)
+    for text in texts:
+        assert re.match(r"[A-Z]", text), text
+        assert not re.search(r"\b(a|an|the) (a|an|the)\b|\ba (?!one\b)[aeio]\w|  |_|\d\.\d", text), text
+        assert 5 <= len(text.split()) <= 70, text
+    openings = Counter(" ".join(text.split()[:2]) for text in texts)
+    assert max(openings.values()) < 0.15 * len(texts)

@@ -1,0 +1,249 @@
+"""Kills at every step of an atomic write, leases that tell the living from the dead, and recovery."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import textwrap
+from pathlib import Path
+
+import pytest
+from support.preload import killing_environment, unshared
+
+from aerialdojo_gen.errors import StoreError
+from aerialdojo_gen.store import staging
+from aerialdojo_gen.store.atomic import atomic_file, atomic_folder
+from aerialdojo_gen.store.staging import AREA, scratch_folder, sweep
+
+HOLDING = """
+    import sys, time
+    from pathlib import Path
+    from aerialdojo_gen.store.atomic import atomic_file
+    with atomic_file(Path(sys.argv[1]), "f.bin") as path:
+        path.write_text("x")
+        print(path, flush=True)
+        time.sleep(300)
+"""
+REPLACING = """
+    import sys
+    from pathlib import Path
+    from aerialdojo_gen.store.atomic import atomic_folder
+    with atomic_folder(Path(sys.argv[1]) / "f") as path:
+        (path / "a").write_text("new")
+        (path / "b").write_text("new")
+"""
+
+
+def names(folder):
+    return {p.relative_to(folder).as_posix(): p.read_text() for p in folder.rglob("*") if p.is_file()}
+
+
+def holder(folder, *before):
+    """Start a process that is in the middle of a file, and return it when it is."""
+    command = [*before, sys.executable, "-c", textwrap.dedent(HOLDING), str(folder)]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+    assert process.stdout is not None
+    assert Path(process.stdout.readline().strip()).is_file()
+    return process
+
+
+def test_a_killed_writer_s_file_is_swept_while_it_is_still_a_zombie_and_a_living_one_s_is_not(tmp_path):
+    process = holder(tmp_path)
+    sweep(tmp_path)
+    assert len(list((tmp_path / AREA).iterdir())) == 1
+    process.send_signal(signal.SIGKILL)
+    # Not waited for: its number is still taken, and it holds nothing any more.
+    os.waitid(os.P_PID, process.pid, os.WEXITED | os.WNOWAIT)
+    sweep(tmp_path)
+    assert list(tmp_path.iterdir()) == []
+    process.wait()
+
+
+def test_a_writer_in_another_pid_namespace_is_seen_to_live_and_to_be_dead(tmp_path):
+    process = holder(tmp_path, *unshared("--pid", "--fork", "--kill-child"))
+    sweep(tmp_path)
+    assert len(list((tmp_path / AREA).iterdir())) == 1
+    process.kill()
+    process.wait()
+    for _ in range(1000):
+        sweep(tmp_path)
+        if not list(tmp_path.iterdir()):
+            return
+        os.sched_yield()
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_number_that_is_taken_again_keeps_no_rubbish(tmp_path):
+    # What a killed writer left, whose number this very process has now: no lease is held.
+    item = tmp_path / AREA / str(os.getpid())
+    item.mkdir(parents=True)
+    (item / "lease").write_text("f.bin")
+    (item / "new.bin").write_text("half")
+    (tmp_path / AREA / "born").mkdir()
+    sweep(tmp_path)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.kill
+@pytest.mark.parametrize("exchange", [True, False], ids=["exchange", "two renames"])
+def test_a_folder_killed_at_any_step_is_the_old_one_or_the_new_one(tmp_path, exchange):
+    seen = set()
+    for n in range(1, 60):
+        root = tmp_path / str(n)
+        (root / "f").mkdir(parents=True)
+        for name in ("a", "c"):
+            (root / "f" / name).write_text("old")
+        environment = killing_environment(n, exchange=exchange)
+        command = [sys.executable, "-c", textwrap.dedent(REPLACING), str(root)]
+        code = subprocess.run(command, env=environment, check=False).returncode
+        if exchange:
+            # A reader that comes at any time finds one of the two.
+            assert (root / "f" / "a").is_file()
+        sweep(root)
+        found = names(root)
+        assert found in ({"f/a": "old", "f/c": "old"}, {"f/a": "new", "f/b": "new"})
+        seen.add(found["f/a"])
+        if code == 0:
+            assert found["f/a"] == "new"
+            break
+        assert code == -signal.SIGKILL
+    else:
+        raise AssertionError("there are more steps than that")
+    assert n > 8
+    assert seen == {"old", "new"}
+
+
+@pytest.mark.kill
+def test_a_file_killed_at_any_step_is_the_old_one_or_the_new_one(tmp_path):
+    code = """
+        import sys
+        from pathlib import Path
+        from aerialdojo_gen.store.atomic import atomic_file
+        with atomic_file(Path(sys.argv[1]), "deep/er/f.txt") as path:
+            path.write_text("new")
+    """
+    for n in range(1, 60):
+        root = tmp_path / str(n)
+        root.mkdir()
+        command = [sys.executable, "-c", textwrap.dedent(code), str(root)]
+        ended = subprocess.run(command, env=killing_environment(n), check=False).returncode
+        sweep(root)
+        assert names(root) in ({}, {"deep/er/f.txt": "new"})
+        if ended == 0:
+            break
+    assert n > 8
+    assert names(root) == {"deep/er/f.txt": "new"}
+
+
+def test_what_is_renamed_is_on_the_disk_before_and_its_folder_after(tmp_path):
+    log = tmp_path / "log"
+    environment = killing_environment(0) | {"PRELOAD_LOG": str(log)}
+    command = [sys.executable, "-c", textwrap.dedent(REPLACING), str(tmp_path / "root")]
+    (tmp_path / "root" / "f").mkdir(parents=True)
+    (tmp_path / "root" / "f" / "a").write_text("old")
+    subprocess.run(command, env=environment, check=True)
+    calls = [line.split()[0] for line in log.read_text().splitlines()]
+    renamed = next(k for k, call in enumerate(calls) if call == "renameat2")
+    assert calls[:renamed].count("fsync") >= 3  # two files and their folder
+    assert "fsync" in calls[renamed:]
+
+
+def test_where_there_are_no_locks_files_are_written_and_nobody_s_are_removed(tmp_path):
+    code = HOLDING.replace("time.sleep(300)", "pass")
+    left = tmp_path / AREA / "unknown"
+    left.mkdir(parents=True)
+    (left / "lease").write_text("g.bin")
+    environment = killing_environment(0) | {"PRELOAD_FLOCK_ERRNO": "37"}
+    command = [sys.executable, "-c", textwrap.dedent(code), str(tmp_path)]
+    subprocess.run(command, env=environment, check=True, stdout=subprocess.DEVNULL)
+    assert (tmp_path / "f.bin").read_text() == "x"
+    assert (left / "lease").is_file()
+
+
+def test_a_lease_that_names_a_place_elsewhere_moves_nothing_there(tmp_path):
+    root = tmp_path / "root"
+    item = root / AREA / "item"
+    (item / "new").mkdir(parents=True)
+    (item / "old").mkdir()
+    (item / "lease").write_text("../stolen")
+    sweep(root)
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["root"]
+    assert list(root.iterdir()) == []
+
+
+def test_two_writers_of_one_folder_do_not_mix(tmp_path):
+    processes = [
+        subprocess.Popen([sys.executable, "-c", textwrap.dedent(REPLACING).replace('"new"', f'"{k}"'), str(tmp_path)])
+        for k in range(4)
+    ]
+    assert [p.wait() for p in processes] == [0] * 4
+    found = names(tmp_path)
+    assert found.keys() == {"f/a", "f/b"}
+    assert len(set(found.values())) == 1
+
+
+def test_another_disk_below_the_root_gets_what_it_is_to_have(tmp_path):
+    # A folder of another disk under a staging root of this one, as a mount is: /dev/shm is a disk of its own.
+    with staging.tempfile.TemporaryDirectory(dir="/dev/shm") as other:
+        (tmp_path / "media").symlink_to(other)
+        for text in ("one", "two"):
+            with atomic_folder(tmp_path / "media" / "f", root=tmp_path) as path:
+                (path / "a").write_text(text)
+        assert names(Path(other)) == {"f/a": "two"}
+        assert sorted(p.name for p in tmp_path.iterdir()) == ["media"]
+
+
+def test_the_same_disk_mounted_twice(tmp_path):
+    (tmp_path / "root" / "media").mkdir(parents=True)
+    (tmp_path / "far").mkdir()
+    code = textwrap.dedent("""
+        import sys
+        from pathlib import Path
+        from aerialdojo_gen.store.atomic import atomic_file, atomic_folder
+        root = Path(sys.argv[1])
+        for text in ("one", "two"):
+            with atomic_folder(root / "media" / "f", root=root) as path:
+                (path / "a").write_text(text)
+            with atomic_file(root, "media/b") as path:
+                path.write_text(text)
+    """)
+    script = f'mount --bind {tmp_path / "far"} {tmp_path / "root" / "media"} && exec "$@"'
+    command = [*unshared("--mount"), "sh", "-c", script, "sh", sys.executable, "-c", code, str(tmp_path / "root")]
+    subprocess.run(command, check=True)
+    assert names(tmp_path) == {"far/f/a": "two", "far/b": "two"}
+
+
+@pytest.mark.kill
+def test_scratch_folders_of_killed_runs_are_gone_at_the_next(tmp_path, monkeypatch):
+    code = textwrap.dedent("""
+        import os, signal
+        from aerialdojo_gen.store.staging import scratch_folder
+        with scratch_folder() as folder:
+            (folder / "0.obj").write_text("v")
+            os.kill(os.getpid(), signal.SIGKILL)
+    """)
+    subprocess.run([sys.executable, "-c", code], env=os.environ | {"TMPDIR": str(tmp_path)}, check=False)
+    assert len(list(tmp_path.rglob("*.obj"))) == 1
+    monkeypatch.setattr(staging.tempfile, "tempdir", str(tmp_path))
+    with scratch_folder() as folder:
+        assert list(folder.iterdir()) == []
+        assert list(tmp_path.rglob("*.obj")) == []
+    assert not [p for p in tmp_path.rglob("*") if p.is_file()]
+
+
+@pytest.mark.parametrize("place", ["file/f", "folder"])
+def test_a_place_that_cannot_be_written_is_one_line(tmp_path, place):
+    (tmp_path / "file").write_text("x")
+    (tmp_path / "folder" / "full").mkdir(parents=True)
+    before = names(tmp_path)
+    with pytest.raises(StoreError, match=f"cannot write {tmp_path / place}: a"), atomic_file(tmp_path, place) as path:
+        path.write_text("y")
+    assert names(tmp_path) == before
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["file", "folder"]
+
+
+def test_a_place_where_nothing_can_be_made_is_one_line_and_no_endless_try():
+    with pytest.raises(StoreError, match="cannot write /proc/out"), atomic_file(Path("/proc"), "out"):
+        pass

@@ -1,0 +1,239 @@
+"""Shards are whole, checked, the same bytes every time, and never outside their folder."""
+
+import resource
+import subprocess
+import sys
+import textwrap
+
+import numpy as np
+import pandas as pd
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from aerialdojo_gen.errors import StoreError
+from aerialdojo_gen.store import schemas
+from aerialdojo_gen.store import shards as store
+from aerialdojo_gen.store.atomic import atomic_file, atomic_folder
+from aerialdojo_gen.store.tables import content_digest, from_rows
+
+finite = st.floats(-1e6, 1e6)
+
+
+def pair(i, scene="U_Test_0"):
+    return {
+        "scene": scene, "pair_id": f"{i}_0__{i + 1}", "start_object_id": i, "start_anchor_id": 0,
+        "target_object_id": i + 1, "euclidean_m": 4.5 + i,
+    }  # fmt: skip
+
+
+def plan(pair_id, n, value):
+    lists = {name: [value] * n for name in ("x_m", "y_m", "z_m", "yaw_rad")}
+    return {
+        "scene": "U_Test_0", "pair_id": pair_id, "outcome": "SOLVED" if n else "NO_PATH", "length_m": float(n),
+        "n_actions": n, "expansions": 3, "min_clearance_m": 0.5 if n else None, **lists, "action": [1] * n,
+    }  # fmt: skip
+
+
+def write(data, rows, **kw):
+    return store.write_shard(data, "pairs", "U_Test_0", 0, from_rows(schemas.PAIRS, rows), **kw)
+
+
+@settings(max_examples=30, deadline=None)
+@given(rows=st.lists(st.tuples(st.integers(0, 20), finite), max_size=8, unique_by=lambda r: r[0]))
+def test_round_trip_with_lists(tmp_path_factory, rows):
+    data = tmp_path_factory.mktemp("data")
+    table = from_rows(schemas.PLANS, [plan(f"p{i:02}", i, v) for i, v in rows])
+    store.write_shard(data, "plans", "U_Test_0", 0, table)
+    assert store.read_scene(data, "plans", "U_Test_0").equals(table)
+
+
+def test_pandas_reads_table_and_scene(tmp_path):
+    for scene in ("U_Test_0", "U_Test_1"):
+        table = from_rows(schemas.PAIRS, [pair(i, scene) for i in range(3)])
+        store.write_shard(tmp_path, "pairs", scene, 0, table)
+    whole = pd.read_parquet(tmp_path / "pairs")
+    assert len(whole) == 6
+    assert set(whole["scene"]) == {"U_Test_0", "U_Test_1"}
+    assert len(pd.read_parquet(tmp_path / "pairs" / "U_Test_1")) == 3
+
+
+def test_units_and_meanings_stand_in_the_file(tmp_path):
+    field = pq.read_schema(write(tmp_path, [pair(0)])).field("euclidean_m")
+    assert field.metadata[b"unit"] == b"m"
+    assert b"d_E" in field.metadata[b"meaning"]
+
+
+def test_every_column_is_described():
+    for place in store.LAYOUT.values():
+        for field in place.spec.schema:
+            assert field.metadata[b"meaning"], field.name
+            for suffix, unit in (("_m", b"m"), ("_rad", b"rad"), ("_px", b"px"), ("_s", b"s"), ("_deg", b"deg")):
+                if field.name.endswith(suffix):
+                    assert field.metadata[b"unit"] == unit, field.name
+
+
+def test_same_rows_same_bytes_in_any_order_and_process(tmp_path):
+    rows = [pair(i) for i in range(50)]
+    first = write(tmp_path / "a", rows, fingerprint="f").read_bytes()
+    assert write(tmp_path / "b", rows[::-1], fingerprint="f").read_bytes() == first
+
+
+def test_rows_with_a_missing_or_unknown_column_are_refused():
+    row = pair(0)
+    row["euclidian_m"] = row.pop("euclidean_m")
+    with pytest.raises(StoreError, match=r"lacks \['euclidean_m'\] and has unknown \['euclidian_m'\]"):
+        from_rows(schemas.PAIRS, [row])
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda t: t.set_column(5, "euclidean_m", pa.array([1.0, None, 2.0])), "1 nulls in column euclidean_m"),
+        (lambda t: t.take([1, 0, 2]), "not sorted by scene, pair_id"),
+        (lambda t: t.take([0, 0, 1]), r"key \(scene, pair_id\) stands twice"),
+        (lambda t: t.drop_columns("euclidean_m"), "columns .* are not those"),
+        (lambda t: t.set_column(5, "euclidean_m", pa.array([1, 2, 3])), "types differ"),
+    ],
+)
+def test_tables_that_do_not_fit_are_refused_and_leave_nothing(tmp_path, change, message):
+    table = change(from_rows(schemas.PAIRS, [pair(i) for i in range(3)]))
+    with pytest.raises(StoreError, match=message):
+        store.write_shard(tmp_path, "pairs", "U_Test_0", 0, table)
+    assert not list(tmp_path.rglob("*.parquet"))
+
+
+def test_a_null_inside_a_list_is_refused(tmp_path):
+    table = from_rows(schemas.PLANS, [plan("p", 2, 1.0) | {"x_m": [1.0, None]}])
+    with pytest.raises(StoreError, match="1 nulls in column x_m"):
+        store.write_shard(tmp_path, "plans", "U_Test_0", 0, table)
+
+
+@pytest.mark.parametrize("keep", [0, 3, 200, -1])
+def test_a_truncated_shard_is_named(tmp_path, keep):
+    path = write(tmp_path, [pair(i) for i in range(20)])
+    path.write_bytes(path.read_bytes()[:keep])
+    with pytest.raises(StoreError, match=f"{path} is damaged"):
+        store.read_scene(tmp_path, "pairs", "U_Test_0")
+
+
+def test_flipped_bits_in_the_data_are_found(tmp_path):
+    path = write(tmp_path, [pair(i) for i in range(500)])
+    raw = bytearray(path.read_bytes())
+    for i in range(200, 260):
+        raw[i] ^= 0xFF
+    path.write_bytes(raw)
+    with pytest.raises(StoreError, match="is damaged"):
+        store.read_scene(tmp_path, "pairs", "U_Test_0")
+
+
+def test_a_missing_part_says_what_to_run(tmp_path):
+    write(tmp_path, [pair(0)], parts=2)
+    with pytest.raises(StoreError, match=r"missing or incomplete.*run aerialdojo-gen pair-objects --scene U_Test_0"):
+        store.read_scene(tmp_path, "pairs", "U_Test_0")
+
+
+@pytest.mark.parametrize("scene", ["../outside", "/etc", "a/b", "", ".hidden", "x" * 65, "a\n"])
+def test_scene_names_cannot_leave_the_folder(tmp_path, scene):
+    with pytest.raises(StoreError, match="not a scene name"):
+        store.shard_path(tmp_path, "pairs", scene)
+
+
+@pytest.mark.parametrize("relative", ["../x", "/tmp/x", "a/../../x", "link/x"])
+def test_file_outputs_cannot_leave_the_folder(tmp_path, relative):
+    data = tmp_path / "data"
+    data.mkdir()
+    (data / "link").symlink_to(tmp_path)
+    with pytest.raises(StoreError, match="leads out of the data directory"), atomic_file(data, relative):
+        pass
+    assert [p.name for p in tmp_path.iterdir()] == ["data"]
+
+
+def test_an_error_while_writing_leaves_the_old_file_and_no_temporary(tmp_path):
+    (tmp_path / "f.bin").write_text("old")
+
+    def fail():
+        with atomic_file(tmp_path, "f.bin") as path:
+            path.write_text("half")
+            _ = 1 / 0
+
+    with pytest.raises(ZeroDivisionError):
+        fail()
+    assert {p.name: p.read_text() for p in tmp_path.iterdir()} == {"f.bin": "old"}
+
+
+def test_no_room_is_one_line_and_nothing_half_written(tmp_path):
+    # A process that may not write files beyond 4 kB stands for a full disk: the write fails half-way for real.
+    code = f"""
+        import resource, signal
+        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (4096, 4096))
+        import sys; sys.path[:0] = {sys.path!r}
+        from pathlib import Path
+        from {__name__} import pair, write
+        from aerialdojo_gen.errors import StoreError
+        try:
+            write(Path({str(tmp_path)!r}), [pair(i) for i in range(5000)])
+        except StoreError as error:
+            print(error)
+    """
+    assert resource.RLIMIT_FSIZE is not None
+    out = subprocess.run(
+        [sys.executable, "-c", textwrap.dedent(code)], capture_output=True, text=True, check=True
+    ).stdout
+    assert out.count("\n") == 1
+    assert "cannot write" in out
+    assert "would exceed the allowed size" in out
+    assert not [p for p in tmp_path.rglob("*") if p.is_file()]
+
+
+def test_a_folder_is_replaced_when_the_new_one_is_whole_and_not_before(tmp_path):
+    folder = tmp_path / "f"
+    with atomic_folder(folder) as path:
+        (path / "a").write_text("old")
+
+    def fail():
+        with atomic_folder(folder) as path:
+            (path / "a").write_text("half")
+            _ = 1 / 0
+
+    with pytest.raises(ZeroDivisionError):
+        fail()
+    assert {p.relative_to(tmp_path).as_posix() for p in tmp_path.rglob("*")} == {"f", "f/a"}
+    assert (folder / "a").read_text() == "old"
+    with atomic_folder(folder) as path:
+        (path / "b").write_text("new")
+        assert (folder / "a").read_text() == "old"
+    assert {p.relative_to(tmp_path).as_posix() for p in tmp_path.rglob("*")} == {"f", "f/b"}
+
+
+def test_digest_sees_every_change_and_no_metadata():
+    table = from_rows(schemas.PAIRS, [pair(i) for i in range(5)])
+    digest = content_digest(table)
+    assert content_digest(table.replace_schema_metadata({"a": "b"})) == digest
+    assert content_digest(pa.concat_tables([table[:2], table[2:]])) == digest
+    changed = table.set_column(5, "euclidean_m", pa.array([4.5, 5.5, 6.5, 7.5, 8.500001]))
+    assert content_digest(changed) != digest
+
+
+def test_digest_does_not_see_what_lies_under_a_null(tmp_path):
+    masked = pa.array(np.array([1.0, 7.0]), mask=np.array([False, True]))
+    clean = pa.array([1.0, None])
+    assert content_digest(pa.table({"a": masked})) == content_digest(pa.table({"a": clean}))
+    assert content_digest(pa.table({"a": [1.0, None]})) != content_digest(pa.table({"a": [None, 1.0]}))
+
+
+@pytest.mark.parametrize("table", sorted(store.LAYOUT))
+def test_pruning_one_scene_leaves_the_others(tmp_path, table):
+    mine, other = (store.shard_path(tmp_path, table, scene) for scene in ("U_A_0", "U_B_0"))
+    for path in (mine, other):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text("x")
+    extra = mine.with_name("part-00001.parquet")
+    extra.write_text("x")
+    store.prune(tmp_path, table, "U_A_0", 1)
+    assert mine.exists()
+    assert other.exists()
+    assert extra.exists() == ("{part:" not in store.LAYOUT[table].template)

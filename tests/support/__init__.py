@@ -1,0 +1,1 @@
+"""What tests share: hand-made scenes and tables, servers, browsers, faults."""

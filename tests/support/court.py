@@ -1,0 +1,115 @@
+"""The court of `rendered` as a data directory with routes, and runs of the stage `render` on it."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+
+import numpy as np
+from support.handmade import OPINIONS
+from support.rendered import courtyard
+
+from aerialdojo_gen.config.pipeline import Pipeline
+from aerialdojo_gen.config.sections import Embodiment, RenderConfig
+from aerialdojo_gen.pipeline import runner
+from aerialdojo_gen.pipeline.registry import BY_NAME
+from aerialdojo_gen.pipeline.stage import Job, Roots
+from aerialdojo_gen.rendering.sample import n_parts
+from aerialdojo_gen.scenes.glb import write_glb
+from aerialdojo_gen.stages import render
+from aerialdojo_gen.store import schemas
+from aerialdojo_gen.store import shards as store
+from aerialdojo_gen.store.tables import check_table, from_rows
+
+SCENE = "U_Court_0"
+CONFIG = RenderConfig(width=64, height=64, limit=1, trajectories_per_part=1, renderer="pybullet")
+# In the court, from its middle: forward 3 m, up 1 m, a turn to the left, left 1 m, and on to the anchor.
+ROUTE = {
+    "x_m": [-3.0, 0.0, 0.0, 0.0, -0.2588190451, -0.5],
+    "y_m": [0.0, 0.0, 0.0, 0.0, 0.9659258263, 1.2],
+    "z_m": [2.0, 2.0, 3.0, 3.0, 3.0, 3.2],
+    "yaw_rad": [0.0, 0.0, 0.0, math.radians(15), math.radians(15), math.radians(15)],
+    "action": [2, schemas.MOVE_UP_1, schemas.TURN_LEFT, 4, schemas.APPROACH, schemas.STOP],
+}
+# Into the blue cube and out again.
+BAD = ROUTE | {"x_m": [-5.0, -2.0, -2.0, -2.0, -2.0, 1.0], "y_m": [-5.0] * 6, "z_m": [1.0] * 6, "yaw_rad": [0.0] * 6}
+
+
+def route_row(nav_id, setting, lists):
+    p = np.stack([lists["x_m"], lists["y_m"], lists["z_m"]], axis=1)
+    return {
+        "nav_id": nav_id, "scene": SCENE, "setting": setting, "start_object_id": 0, "start_anchor_id": 0,
+        "target_object_id": 1, **dict(zip(("goal_x_m", "goal_y_m", "goal_z_m"), p[-1].tolist(), strict=True)),
+        "goal_yaw_rad": 0.0, "euclidean_m": 4.0, "length_m": 5.0, "detour_ratio": 1.25, "n_actions": 6,
+        "min_clearance_m": 1.0, **lists,
+    }  # fmt: skip
+
+
+def write_inputs(data, bad=BAD):
+    """Write the tables that recording reads; the route nav_b is `bad`."""
+    scene = courtyard()
+    mesh = data / "meshes" / f"{SCENE}.glb"
+    mesh.parent.mkdir(parents=True)
+    write_glb(scene, mesh)
+    low, high = scene.bounds.tolist()
+    rows = {
+        "scenes": [
+            {
+                "scene": SCENE, "family": "Urban", "scene_type": "Court", "partition": "ID",
+                "mesh_path": f"meshes/{SCENE}.glb", "mesh_sha256": hashlib.sha256(mesh.read_bytes()).hexdigest(),
+                **{f"{e}_{a}_m": v for e, p in (("min", low), ("max", high)) for a, v in zip("xyz", p, strict=True)},
+                "ceiling_m": high[2], "n_triangles": scene.n_triangles, "n_instances": len(scene.instances),
+                "n_categories": 1,
+            }
+        ],
+        "objects": [
+            {
+                "scene": SCENE, "object_id": k, "name": node, "category": "thing", "description": "A cube.",
+                "mesh_node": node, **dict(zip(("x_m", "y_m", "z_m"), scene[node].centroid.tolist(), strict=True)),
+                "size_x_m": 1.0, "size_y_m": 1.0, "size_z_m": 1.0, "landmark_id": 0, "direction": "north",
+            }
+            for k, node in enumerate(("red_cube", "blue_cube", "west"))
+        ],
+        "anchors": [
+            {
+                "scene": SCENE, "object_id": k, "anchor_id": a, "x_m": x, "y_m": y, "z_m": z, "yaw_rad": yaw,
+                "clearance_m": 1.0, "surface_distance_m": 1.0, "visible_fraction": 0.5, "score": 1.0 - a, **OPINIONS,
+                "selected": selected, "selected_by": "auto",
+            }
+            for k, a, x, y, z, yaw, selected in (
+                (0, 0, 4.0, 1.5, 1.5, 0.0, True), (0, 1, 4.0, 1.0, 1.5, 0.0, False),
+                (1, 0, 0.0, -5.0, 1.0, 0.0, True),  # looks away from its object
+            )
+        ],
+        "routes/train": [
+            route_row("nav_a", "base", ROUTE), route_row("nav_b", "standard", bad),
+            *(route_row(f"nav_{k:02}", "long_horizon", ROUTE) for k in range(20)),
+        ],
+        "routes/test": [],
+    }  # fmt: skip
+    for table, content in rows.items():
+        spec = store.LAYOUT[table].spec
+        store.write_shard(data, table, SCENE, 0, from_rows(spec, content))
+
+
+def run_all(data, config, stage=render, name="render"):
+    parts = n_parts(data, SCENE, config) if name == "render" else 1
+    roots = Roots(data=data, scene_assets=data, recipes=data, annotations=data)
+    outputs = [stage.run(Job(name, SCENE, k, parts, 0, Embodiment(), roots), config) for k in range(parts)]
+    for output in outputs:
+        for table, rows in output.tables.items():
+            check_table(store.LAYOUT[table].spec, rows)
+    return outputs
+
+
+def run_whole(data, config, workers=1, **options):
+    """Run the stage as the command does."""
+    roots = Roots(data=data, scene_assets=data, recipes=data, annotations=data)
+    pipeline = Pipeline(render=config)
+    return runner.run([BY_NAME["render"]], [SCENE], pipeline, roots, workers=workers, **options)
+
+
+def files_of(data):
+    """Every file that recording wrote, by its path in the data directory, and its bytes."""
+    found = (p for folder in ("recordings", "frames", "media") for p in sorted((data / folder).rglob("*")))
+    return {str(p.relative_to(data)): p.read_bytes() for p in found if p.is_file()}

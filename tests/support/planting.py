@@ -1,0 +1,169 @@
+"""A small release to plant faults in: rows are changed in the Parquet files, as careless hands would change them."""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import json
+import math
+import struct
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from aerialdojo_gen.config.pipeline import load_pipeline
+from aerialdojo_gen.planning.primitives import replay, wrap_rad
+from aerialdojo_gen.store import shards as store
+from aerialdojo_gen.store.footers import decode, encode
+from aerialdojo_gen.store.schemas import APPROACH
+from aerialdojo_gen.store.tables import column_digests, content_digest
+from aerialdojo_gen.validate import Asked, validate
+from aerialdojo_gen.validate.parts import part_path
+
+SMOKE = Path(__file__).resolve().parents[2] / "pipelines" / "smoke.toml"
+LISTS = ("x_m", "y_m", "z_m", "yaw_rad", "action")
+Row = dict[str, object]
+
+
+class Planted:
+    """A release's folder and one of its scenes."""
+
+    def __init__(self, data: Path, scene: str) -> None:
+        self.data, self.scene, self.release = data, scene, data / "release"
+
+    def path(self, key: str) -> Path:
+        return self.release / part_path(key, self.scene)
+
+    def rows(self, key: str) -> list[Row]:
+        return pq.read_table(self.path(key), partitioning=None).to_pylist()
+
+    def write(self, key: str, rows: list[Row], *, sort: bool = True, schema: pa.Schema | None = None) -> None:
+        """Write rows as a part whose footer tells of these rows; nulls and doubles are let through."""
+        spec = store.LAYOUT[key].spec
+        if sort:
+            rows = sorted(
+                rows, key=lambda row: tuple(str(row[k]) if k != "object_id" else row[k] for k in spec.order)
+            )
+        loose = schema or pa.schema([f.with_nullable(True) for f in spec.schema])
+        table = pa.Table.from_pylist(rows, schema=loose)
+        self.write_table(key, table)
+
+    def write_table(self, key: str, table: pa.Table, **footer: object) -> None:
+        """Write a table as a part whose footer tells of it, but for what is given of the footer."""
+        info = decode(pq.read_metadata(self.path(key)).metadata[store.META])
+        told = {"content": content_digest(table), "columns": column_digests(table), "rows": table.num_rows} | footer
+        meta = encode(dataclasses.replace(info, **told))
+        pq.write_table(table.replace_schema_metadata({store.META: meta}), self.path(key))
+
+    def edit(self, key: str, change: Callable[[Row], None], wanted: Callable[[Row], bool] = lambda _: True) -> Row:
+        """Change the first row that is wanted; returns it as it then is."""
+        rows = self.rows(key)
+        row = next(row for row in rows if wanted(row))
+        change(row)
+        self.write(key, rows)
+        return row
+
+    def edit_all(self, key: str, change: Callable[[Row], None], wanted: Callable[[Row], bool]) -> list[Row]:
+        rows = self.rows(key)
+        changed = [row for row in rows if wanted(row)]
+        for row in changed:
+            change(row)
+        self.write(key, rows)
+        return changed
+
+
+def poses(row: Row) -> np.ndarray:
+    return np.column_stack([row[name] for name in LISTS[:4]])
+
+
+def refly(row: Row, actions: list[int]) -> Row:
+    """The route with other actions: flown anew, measured anew, ended on the goal by an Approach if it had one."""
+    old = poses(row)
+    flown = replay(old[0], actions[:-1])
+    if APPROACH in actions:
+        flown[-1, :3] = old[-1, :3]
+    return measured(row, flown, actions)
+
+
+def measured(row: Row, path: np.ndarray, actions: list[int]) -> Row:
+    length = float(np.linalg.norm(np.diff(path[:, :3], axis=0), axis=1).sum())
+    euclidean = float(np.linalg.norm(path[-1, :3] - path[0, :3]))
+    return row | {
+        **{name: path[:, k].tolist() for k, name in enumerate(LISTS[:4])},
+        "action": list(actions), "n_actions": len(actions), "length_m": length, "euclidean_m": euclidean,
+        "detour_ratio": length / euclidean,
+    }  # fmt: skip
+
+
+def turned(yaw: float, degrees: float) -> float:
+    return float(wrap_rad(np.array([yaw + math.radians(degrees)]))[0])
+
+
+def faults_of(report) -> dict[str, list[str]]:
+    """What was found: keys of the rows at fault by check."""
+    found: dict[str, list[str]] = {}
+    for fault in report.faults:
+        found.setdefault(fault.check, []).append(fault.key or fault.part)
+    return {name: sorted(set(keys)) for name, keys in found.items()}
+
+
+def definitions():
+    """The smoke pipeline's, with the props whose names descriptions use."""
+    return load_pipeline(SMOKE).model_copy(update={"scene_assets": SMOKE.parent.parent / "scene_assets"})
+
+
+def edit_mesh(planted: Planted, change: Callable[[dict], None]) -> None:
+    """Change the glTF document of the scene's mesh, and put the new digest into `scenes`, as a bad author would."""
+    path = planted.data / "meshes" / f"{planted.scene}.glb"
+    raw = path.read_bytes()
+    (length,) = struct.unpack_from("<I", raw, 12)
+    document = json.loads(raw[20 : 20 + length])
+    change(document)
+    head = json.dumps(document, separators=(",", ":")).encode()
+    head += b" " * (-len(head) % 4)
+    rest = raw[20 + length :]
+    path.write_bytes(
+        struct.pack("<4sII", b"glTF", 2, 20 + len(head) + len(rest))
+        + struct.pack("<II", len(head), 0x4E4F534A) + head + rest
+    )  # fmt: skip
+    digest = hashlib.sha256(path.read_bytes()).hexdigest()
+    planted.edit("release/scenes", lambda row: row.update(mesh_sha256=digest))
+
+
+def retell(planted: Planted, object_id: int, **said: str) -> None:
+    """Say something else of an object, in `objects` and in every task that asks for it."""
+    planted.edit("release/objects", lambda row: row.update(said), lambda row: row["object_id"] == object_id)
+    named = {"target_name" if name == "name" else name: text for name, text in said.items()}
+    for side in ("train", "test"):
+        asked = {r["nav_id"] for r in planted.rows(f"routes/{side}") if r["target_object_id"] == object_id}
+
+        def change(task: Row) -> None:
+            task.update({name: text for name, text in named.items() if task[name] is not None})
+
+        planted.edit_all(f"tasks/{side}", change, lambda task, asked=asked: task["nav_id"] in asked)
+
+
+def rename(planted: Planted, new: Callable[[Row], str]) -> list[str]:
+    """Give routes other nav_ids, in `routes` and `tasks`; returns the keys of those that have one."""
+    keys = []
+    for side in ("train", "test"):
+        routes = planted.rows(f"routes/{side}")
+        names = {row["nav_id"]: new(row) for row in routes}
+        tasks = planted.rows(f"tasks/{side}")
+        for task in tasks:
+            task["nav_id"] = names[task["nav_id"]]
+            task["task_id"] = f"{task['nav_id']}-{task['modality'][0]}"
+        keys += [f"nav_id={name}" for old, name in names.items() if old != name]
+        planted.write(f"routes/{side}", [row | {"nav_id": names[row["nav_id"]]} for row in routes])
+        planted.write(f"tasks/{side}", tasks)
+    return sorted(keys)
+
+
+def check(planted: Planted, **options) -> dict[str, list[str]]:
+    """Validate the scene that was planted in; the whole release with ``whole=True``."""
+    scenes = () if options.pop("whole", False) else (planted.scene,)
+    options = {"pipeline": definitions()} | options
+    return faults_of(validate(Asked(planted.release, scenes=scenes, **options)))
