@@ -21,6 +21,9 @@ from aerialdojo_gen.scenes.model import Instance, Part, Scene
 from aerialdojo_gen.scenes.recipe import Recipe
 from aerialdojo_gen.scenes.terrain import Terrain, flat_terrain
 
+# The largest scene of the dataset has 1/10 of this.
+_MOST_NODES = 20_000
+
 
 class Site:
     """What a layout builds on; the origin lies in the middle, x east, y north, z up, metres.
@@ -272,6 +275,8 @@ class Site:
     def _claim(self, node: str) -> str:
         if node in self._nodes:
             raise AssetError(f"{self.name}: node {node!r} stands twice; choose another name")
+        if len(self._nodes) >= _MOST_NODES:
+            raise AssetError(f"{self.name}: more than {_MOST_NODES:,} things stand in the scene")
         self._nodes.add(node)
         return node
 
