@@ -177,5 +177,5 @@ def validated(model: type[Model], body: dict[str, Any], where: str) -> Model:
         elif first["type"] == "missing":
             message = f"key {key!r} is missing"
         else:
-            message = f"{key}: {first['msg']}, got {brief(repr(first['input']), 60)}"
+            message = f"{key}: {first['msg'].removeprefix('Value error, ')}, got {brief(repr(first['input']), 60)}"
         raise AssetError(f"{where}: {message}") from error

@@ -1,4 +1,4 @@
-"""Small recipes of the layouts whose parameters draw a scene: each parameter stands in one, and a build takes a second."""
+"""Small recipes of the layouts whose parameters draw a scene: each stands in one, and builds in a second or two."""
 
 from __future__ import annotations
 

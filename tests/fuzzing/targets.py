@@ -43,6 +43,7 @@ from aerialdojo_gen.scenes.glb import read_glb, write_glb
 from aerialdojo_gen.scoring.vlm import read_order
 from aerialdojo_gen.stages.annotate_import import annotation_tables
 from aerialdojo_gen.store import shards as store
+from fuzzing import layouts
 from fuzzing.mutate import toml_dumped
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -190,7 +191,12 @@ def _build_imported(folder: Path) -> None:
 
 
 def _layouts() -> list[Case]:
-    return [{f"scenes/{p.name}": p.read_bytes()} for p in sorted((ASSETS / "scenes").glob("*.toml"))]
+    return [{f"scenes/{name}.toml": toml_dumped(recipe).encode()} for name, recipe in layouts.RECIPES.items()]
+
+
+def _build_layout(folder: Path) -> None:
+    (path,) = (folder / "scenes").iterdir()
+    build_scene(path, load_catalogue(ASSETS))
 
 
 def _props() -> list[Case]:
@@ -434,6 +440,7 @@ TARGETS: dict[str, Target] = {
     "annotations": Target(_annotations, _read_annotations),
     "pipeline": Target(_pipelines, _read_pipeline),
     "recipe": Target(_recipes, _build),
+    "recipe-layouts": Target(_layouts, _build_layout, share=0.05),
     "recipe-imported": Target(_imported_recipes, _build_imported, ".toml", names_the_file=False),
     "prop": Target(_props, _instantiate, "x.toml"),
     "materials": Target(_materials, _instantiate),
