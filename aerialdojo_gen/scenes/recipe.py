@@ -152,7 +152,7 @@ def load_recipe(path: Path) -> Recipe:
 
 def _check_parameters(value: Any, keys: tuple[str, ...], path: Path) -> None:
     """Hold whatever a layout takes against bounds, before it becomes a count of things, a length or an array."""
-    where = f"{path}: parameters: {'.'.join(keys)}"
+    where = f"{path}: parameters: {brief('.'.join(keys))}"
     if isinstance(value, dict | list):
         if len(value) > _MOST_ENTRIES:
             raise AssetError(f"{where} has {len(value):,} entries, {_MOST_ENTRIES:,} are the most")
@@ -171,7 +171,7 @@ def validated(model: type[Model], body: dict[str, Any], where: str) -> Model:
         return model.model_validate_json(pydantic_core.to_json(body), strict=True)
     except ValidationError as error:
         first = error.errors()[0]
-        key = ".".join(str(k) for k in first["loc"])
+        key = brief(".".join(str(k) for k in first["loc"]))
         if first["type"] == "extra_forbidden":
             message = f"unknown key {key!r}{nearest(key, model.model_fields)}"
         elif first["type"] == "missing":

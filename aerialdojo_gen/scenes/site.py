@@ -21,8 +21,8 @@ from aerialdojo_gen.scenes.model import Instance, Part, Scene
 from aerialdojo_gen.scenes.recipe import Recipe
 from aerialdojo_gen.scenes.terrain import Terrain, flat_terrain
 
-# The largest scene of the dataset has 1/10 of this.
-_MOST_NODES = 20_000
+# The largest scene of the dataset has 479.
+_MOST_NODES = 5_000
 
 
 class Site:

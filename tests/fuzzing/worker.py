@@ -17,8 +17,9 @@ from typing import TextIO
 
 from aerialdojo_gen.common.rng import generator
 from aerialdojo_gen.errors import AerialDojoError
+from fuzzing.cases import Case, Target, case_of, laid_out
 from fuzzing.mutate import mutant
-from fuzzing.targets import TARGETS, Case, Target, case_of, laid_out
+from fuzzing.targets import TARGETS
 
 HANG_S = 10.0
 MEMORY_BYTES = 2 << 30
