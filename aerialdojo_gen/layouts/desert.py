@@ -5,10 +5,10 @@ The recipe says what stands where; the layout shapes the ground, makes room, and
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
 import shapely
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 from shapely.geometry import LineString, Point
 from shapely.geometry.base import BaseGeometry
 
@@ -22,7 +22,7 @@ from aerialdojo_gen.scenes.grammar_scatter import smooth_path
 from aerialdojo_gen.scenes.ground import disc, rectangle, ribbon
 from aerialdojo_gen.scenes.site import Site
 from aerialdojo_gen.scenes.terrain import Terrain, mound
-from aerialdojo_gen.scenes.values import At, Degrees, Hill, Length, Line, LineOrNone, Metres, Rise, Size2
+from aerialdojo_gen.scenes.values import At, Degrees, Hill, Length, Line, LineOrNone, Size2, Step
 
 _CELL_M = 1.4
 
@@ -82,7 +82,7 @@ class Parameters(BaseModel):
     hills: tuple[Hill, ...] = ()
     bed: LineOrNone = ()
     bed_m: Annotated[float, Field(ge=1, le=30)] = 7.0
-    steps: tuple[tuple[Metres, Metres, Rise], ...] = ()
+    steps: tuple[Step, ...] = ()
     tracks: tuple[Line, ...] = ()
     track_m: Annotated[float, Field(ge=1, le=8)] = 3.2
     pond: Pond | None = None
@@ -94,6 +94,12 @@ class Parameters(BaseModel):
     stones: Annotated[int, Field(ge=0, le=1000)] = 40
     shrubs: Annotated[int, Field(ge=0, le=1000)] = 30
     trees: Annotated[int, Field(ge=0, le=1000)] = 6
+
+    @model_validator(mode="after")
+    def _wash_has_a_bed(self) -> Self:
+        if self.ground == "wash" and not self.bed:
+            raise ValueError("a wash needs the middle line of its bed: bed = [[x, y], ...]")
+        return self
 
 
 def build(site: Site) -> None:

@@ -16,7 +16,7 @@ from aerialdojo_gen.scenes.mesh import Floats, Mesh, merge, rotated, rotation, t
 from aerialdojo_gen.scenes.shapes import crown
 from aerialdojo_gen.scenes.site import Site
 from aerialdojo_gen.scenes.terrain import Terrain, flat_terrain, rolling_terrain
-from aerialdojo_gen.scenes.values import At, At3, Length
+from aerialdojo_gen.scenes.values import At, Crest, Length
 
 _SMOOTH_MAX = 5.0
 
@@ -36,7 +36,7 @@ class Ridge(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    line: Annotated[tuple[At3, ...], Field(min_length=1)]
+    line: Crest
     width_m: Length
     hollow: Annotated[float, Field(ge=0.1, le=4)] = 1.3
 

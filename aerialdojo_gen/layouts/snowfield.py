@@ -248,6 +248,8 @@ def _gates(site: Site, p: Parameters, runs: list[list[tuple[float, float]]]) -> 
             side = 1.0 if k % 2 else -1.0
             yaw = pose.yaw_deg
             line = LineString(run).offset_curve(side * 1.6)
+            if line.is_empty:
+                continue
             at = line.interpolate(line.project(Point(pose.x, pose.y)))
             variant = "start" if k == piste.gates - 1 else "red" if k % 2 else "blue"
             site.try_place("ski_gate", float(at.x), float(at.y), yaw + 180.0, variant=variant)

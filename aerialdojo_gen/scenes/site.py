@@ -219,6 +219,8 @@ class Site:
         """
         name = self._claim(node or self.node(category))
         instance = Instance(name, category, variant, dict(attributes or {}), placed(self._as_parts(parts), (0, 0, 0)))
+        if not any(part.faces.size for part in instance.parts):
+            raise AssetError(f"{self.name}: {name} has no body: it is too small, or lies off the site")
         self.instances.append(instance)
         if footprint is not None:
             low, high = instance.bounds[:, 2]

@@ -20,7 +20,6 @@ Degrees = Annotated[float, Field(ge=-3600, le=3600)]
 Length = Annotated[float, Field(ge=0.1, le=500)]
 Rise = Annotated[float, Field(ge=-200, le=200)]
 At = tuple[Metres, Metres]
-At3 = tuple[Metres, Metres, Metres]
 Size2 = tuple[Length, Length]
 Hill = tuple[Metres, Metres, Length, Rise]
 """Middle x and y, radius and rise, metres."""
@@ -41,6 +40,18 @@ def _line(points: tuple[tuple[float, float], ...]) -> tuple[tuple[float, float],
 
 def _line_or_none(points: tuple[tuple[float, float], ...]) -> tuple[tuple[float, float], ...]:
     return _line(points) if points else points
+
+
+def _crest(points: tuple[tuple[float, float, float], ...]) -> tuple[tuple[float, float, float], ...]:
+    if len(points) > 1:
+        _line(tuple((x, y) for x, y, _ in points))
+    return points
+
+
+def _apart(step: tuple[float, float, float]) -> tuple[float, float, float]:
+    if step[1] - step[0] < _SHORTEST_M:
+        raise ValueError(f"a step ends {_SHORTEST_M:g} m or more beyond where it begins")
+    return step
 
 
 def _with_length(wall: tuple[float, ...]) -> tuple[float, ...]:
@@ -66,3 +77,8 @@ Roof = Annotated[tuple[Metres, Metres, Metres, Metres, Annotated[float, Field(ge
 """x0, y0, x1, y1 of a rectangle, and its height, metres."""
 Stretch = Annotated[tuple[Metres, Metres, Metres, Metres, Length], AfterValidator(_with_length)]
 """x0, y0, x1, y1 of a straight wall, and its height, metres."""
+Crest = Annotated[tuple[tuple[Metres, Metres, Annotated[float, Field(ge=0, le=500)]], ...],
+                  Field(min_length=1, max_length=1000), AfterValidator(_crest)]  # fmt: skip
+"""A line of points x, y, z, or a peak alone, metres."""
+Step = Annotated[tuple[Metres, Metres, Rise], AfterValidator(_apart)]
+"""From and to, distances from a line, and the rise between them, metres."""
