@@ -31,8 +31,8 @@ class BadField(Exception):  # noqa: N818 - it is caught where rows are read, and
     """
 
     def __init__(self, field: str, why: str) -> None:
-        super().__init__(f"{field}: {why}")
-        self.field, self.why = field, why
+        self.field, self.why = brief(field, 120), brief(why)
+        super().__init__(f"{self.field}: {self.why}")
 
 
 def shown(value: object) -> str:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TextIO
 
-from aerialdojo_gen.errors import ImportRefused, StoreError, UsageError
+from aerialdojo_gen.errors import ImportRefused, StoreError, UsageError, brief
 from aerialdojo_gen.exchange import aerialdojo_reader, aerialvln, cityavos, openfly, uav_on
 from aerialdojo_gen.exchange.fields import BadField, Fields
 from aerialdojo_gen.exchange.folder import whole_folder, write_json
@@ -220,7 +220,7 @@ def _check(task: Task, seen: set[str]) -> None:
     except StoreError as error:
         raise BadField("scene", str(error)) from None
     if task.source_id in seen:
-        raise BadField("id", f"{task.source_id} stands twice in the file")
+        raise BadField("id", f"{brief(task.source_id, 60)} stands twice in the file")
     seen.add(task.source_id)
 
 

@@ -13,7 +13,8 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from aerialdojo_gen.common.bounded import MAX_DEPTH, loads_json, too_deep
-from aerialdojo_gen.errors import ImportRefused
+from aerialdojo_gen.errors import ImportRefused, brief
+from aerialdojo_gen.exchange.fields import shown
 
 RECORD_LIMIT = 16 << 20
 _CHUNK = 1 << 20
@@ -33,7 +34,7 @@ class _Text:
         self._text, self._at, self._done = "", 0, False
 
     def fail(self, why: str) -> ImportRefused:
-        return ImportRefused(f"{self.path}: {self.place}: {why}")
+        return ImportRefused(f"{self.path}: {self.place}: {brief(why)}")
 
     def _more(self) -> bool:
         if self._done:
@@ -133,7 +134,7 @@ def _under(text: _Text, key: str) -> Iterator[Any]:
     found = False
     while text.peek() != "}":
         name = text.value()
-        text.place = f"key {name!r}"
+        text.place = f"key {shown(name)}"
         text.take(":")
         if name == key:
             found = True

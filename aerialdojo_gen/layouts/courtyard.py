@@ -12,6 +12,7 @@ from aerialdojo_gen.scenes.ground import rectangle
 from aerialdojo_gen.scenes.mesh import translated
 from aerialdojo_gen.scenes.shapes import cylinder
 from aerialdojo_gen.scenes.site import Site
+from aerialdojo_gen.scenes.values import At, Box, Degrees, Metres, Roof, Stretch
 
 _POST_RADIUS_M = 0.12
 _ROOF_M = 0.2
@@ -23,9 +24,9 @@ class Thing(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     category: str
-    at: tuple[float, float]
-    yaw: float = 0.0
-    z: float | None = None
+    at: At
+    yaw: Degrees = 0.0
+    z: Metres | None = None
     variant: str | None = None
 
 
@@ -46,9 +47,9 @@ class Parameters(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    walls: tuple[tuple[float, float, float, float, float], ...] = ()
-    roofs: tuple[tuple[float, float, float, float, float], ...] = ()
-    paths: tuple[tuple[float, float, float, float], ...] = ()
+    walls: tuple[Stretch, ...] = ()
+    roofs: tuple[Roof, ...] = ()
+    paths: tuple[Box, ...] = ()
     things: tuple[Thing, ...] = Field(min_length=1)
 
 

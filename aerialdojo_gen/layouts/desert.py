@@ -5,10 +5,10 @@ The recipe says what stands where; the layout shapes the ground, makes room, and
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
 import shapely
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 from shapely.geometry import LineString, Point
 from shapely.geometry.base import BaseGeometry
 
@@ -22,9 +22,9 @@ from aerialdojo_gen.scenes.grammar_scatter import smooth_path
 from aerialdojo_gen.scenes.ground import disc, rectangle, ribbon
 from aerialdojo_gen.scenes.site import Site
 from aerialdojo_gen.scenes.terrain import Terrain, mound
+from aerialdojo_gen.scenes.values import At, Degrees, Hill, Length, Line, LineOrNone, Size2, Step
 
 _CELL_M = 1.4
-Points = tuple[tuple[float, float], ...]
 
 
 class Pond(BaseModel):
@@ -32,8 +32,8 @@ class Pond(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    at: tuple[float, float]
-    radius_m: Annotated[float, Field(gt=0, le=500)]
+    at: At
+    radius_m: Length
     green_m: Annotated[float, Field(ge=0, le=500)] = 5.0
     palms: Annotated[int, Field(ge=0, le=1000)] = 24
 
@@ -43,8 +43,8 @@ class Crop(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    at: tuple[float, float]
-    size_m: tuple[float, float]
+    at: At
+    size_m: Size2
     rows: Annotated[int, Field(ge=1, le=1000)] = 6
 
 
@@ -78,12 +78,12 @@ class Parameters(BaseModel):
     ground: Literal["dunes", "wash"] = "dunes"
     height_m: Annotated[float, Field(ge=0, le=9)] = 4.0
     wavelength_m: Annotated[float, Field(ge=8, le=80)] = 24.0
-    wind_deg: float = 20.0
-    hills: tuple[tuple[float, float, float, float], ...] = ()
-    bed: Points = ()
+    wind_deg: Degrees = 20.0
+    hills: tuple[Hill, ...] = ()
+    bed: LineOrNone = ()
     bed_m: Annotated[float, Field(ge=1, le=30)] = 7.0
-    steps: tuple[tuple[float, float, float], ...] = ()
-    tracks: tuple[Points, ...] = ()
+    steps: tuple[Step, ...] = ()
+    tracks: tuple[Line, ...] = ()
     track_m: Annotated[float, Field(ge=1, le=8)] = 3.2
     pond: Pond | None = None
     crops: tuple[Crop, ...] = ()
@@ -94,6 +94,12 @@ class Parameters(BaseModel):
     stones: Annotated[int, Field(ge=0, le=1000)] = 40
     shrubs: Annotated[int, Field(ge=0, le=1000)] = 30
     trees: Annotated[int, Field(ge=0, le=1000)] = 6
+
+    @model_validator(mode="after")
+    def _wash_has_a_bed(self) -> Self:
+        if self.ground == "wash" and not self.bed:
+            raise ValueError("a wash needs the middle line of its bed: bed = [[x, y], ...]")
+        return self
 
 
 def build(site: Site) -> None:

@@ -25,9 +25,9 @@ from aerialdojo_gen.scenes.grammar_scatter import smooth_path
 from aerialdojo_gen.scenes.ground import ribbon
 from aerialdojo_gen.scenes.site import Site
 from aerialdojo_gen.scenes.terrain import Terrain, mound
+from aerialdojo_gen.scenes.values import At, Bridge, Hill, Length, Line, LineOrNone, Metres
 
 _CELL_M = 1.6
-Line = tuple[tuple[float, float], ...]
 
 
 class Tarn(BaseModel):
@@ -35,8 +35,8 @@ class Tarn(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    at: tuple[float, float]
-    radius_m: Annotated[float, Field(gt=0, le=500)]
+    at: At
+    radius_m: Length
 
 
 class Parameters(BaseModel):
@@ -82,16 +82,16 @@ class Parameters(BaseModel):
     bench_m: Annotated[float, Field(ge=0, le=12)] = 4.5
     rough_m: Annotated[float, Field(ge=0, le=8)] = 2.0
     fall_m: Annotated[float, Field(ge=0, le=30)] = 0.0
-    hills: tuple[tuple[float, float, float, float], ...] = ()
-    stream: Line = ()
+    hills: tuple[Hill, ...] = ()
+    stream: LineOrNone = ()
     stream_m: Annotated[float, Field(gt=0, le=8)] = 2.2
     gully_m: Annotated[float, Field(ge=0, le=12)] = 1.2
     tarn: Tarn | None = None
     paths: tuple[Line, ...] = ()
-    bridges: tuple[tuple[float, float, float, float], ...] = ()
+    bridges: tuple[Bridge, ...] = ()
     crags: tuple[Crag, ...] = ()
-    snow_z_m: float = 1000.0
-    trees_z_m: float = 8.0
+    snow_z_m: Metres = 1000.0
+    trees_z_m: Metres = 8.0
     tree_spacing_m: Annotated[float, Field(ge=2, le=12)] = 4.6
     boulders: Annotated[int, Field(ge=0, le=1000)] = 60
     stone: str = "grey"

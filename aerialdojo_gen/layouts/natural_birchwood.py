@@ -20,10 +20,10 @@ from aerialdojo_gen.scenes.ground import ribbon
 from aerialdojo_gen.scenes.mesh import Mesh, merge
 from aerialdojo_gen.scenes.site import Site
 from aerialdojo_gen.scenes.terrain import Terrain, mound, rolling_terrain
+from aerialdojo_gen.scenes.values import Bridge, Degrees, Hill, Line, Metres
 
 _CELL_M = 1.7
 _WALL_M = 0.7
-Line = tuple[tuple[float, float], ...]
 
 # The abbey's walls in its own frame: from, to, height at both ends, and openings (from, to, sill, head).
 _ABBEY: list[tuple[tuple[float, float], tuple[float, float], float, list[tuple[float, float, float, float]]]] = [
@@ -63,9 +63,9 @@ class BirchWood(BaseModel):
     creek_m: Annotated[float, Field(gt=0, le=8)] = 2.4
     ravine_m: Annotated[float, Field(ge=0, le=5)] = 1.8
     paths: tuple[Line, ...] = ()
-    hills: tuple[tuple[float, float, float, float], ...] = ()
-    bridges: tuple[tuple[float, float, float, float], ...] = ()
-    abbey: tuple[float, float, float] | None = None
+    hills: tuple[Hill, ...] = ()
+    bridges: tuple[Bridge, ...] = ()
+    abbey: tuple[Metres, Metres, Degrees] | None = None
     groups: tuple[Group, ...] = ()
 
 

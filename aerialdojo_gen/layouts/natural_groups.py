@@ -24,11 +24,15 @@ from aerialdojo_gen.scenes.ground import disc
 from aerialdojo_gen.scenes.model import Instance
 from aerialdojo_gen.scenes.site import Site
 from aerialdojo_gen.scenes.terrain import Terrain
+from aerialdojo_gen.scenes.values import At, Degrees, Length
 
 _TRIES = 500
 _ATTEMPTS = 6
+_NUMBER = r"-?\d{1,4}(?:\.\d{0,6})?"
 _THING = re.compile(
-    r"(?P<category>\w+)(?: (?P<variant>\w+))?(?: @ (?P<at>[-\d. ]+))?(?: \^ (?P<lift>[\d.]+))?(?: \| (?P<place>.+))?"
+    rf"(?P<category>\w+)(?: (?P<variant>\w+))?(?: @ (?P<at>{_NUMBER}(?: +{_NUMBER}){{1,2}} *))?"
+    rf"(?: \^ (?P<lift>\d{{1,3}}(?:\.\d{{0,6}})?))?(?: \| (?P<place>.+))?",
+    re.ASCII,
 )
 
 
@@ -65,12 +69,12 @@ class Group(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     name: str
-    at: tuple[float, float]
-    radius_m: Annotated[float, Field(gt=0, le=500)] = 8.0
+    at: At
+    radius_m: Length = 8.0
     place: str = ""
     things: tuple[str, ...]
-    yaw_deg: float = 0.0
-    gap_m: float = 1.9
+    yaw_deg: Degrees = 0.0
+    gap_m: Annotated[float, Field(ge=0, le=100)] = 1.9
     facing: Literal["middle", "out", "any"] = "any"
     level: bool = False
     where: Literal["any", "high", "low"] = "any"

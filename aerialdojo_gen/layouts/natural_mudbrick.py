@@ -17,8 +17,10 @@ from aerialdojo_gen.scenes.mesh import Mesh, rotated, rotation, translated
 from aerialdojo_gen.scenes.shapes import box, cylinder
 from aerialdojo_gen.scenes.shapes_extruded import profile
 from aerialdojo_gen.scenes.site import Site
+from aerialdojo_gen.scenes.values import At, Degrees, Length, Line
 
 _PARAPET_M = 0.45
+_Side = Annotated[float, Field(ge=2, le=100)]
 
 
 class House(BaseModel):
@@ -41,9 +43,9 @@ class House(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     name: str
-    at: tuple[float, float]
-    size_m: tuple[float, float, float] = (6.0, 7.0, 3.4)
-    yaw_deg: float = 0.0
+    at: At
+    size_m: tuple[_Side, _Side, _Side] = (6.0, 7.0, 3.4)
+    yaw_deg: Degrees = 0.0
     wall: str = "plaster:#c2966a"
 
     def area(self) -> shapely.Polygon:
@@ -75,9 +77,9 @@ class Wall(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    path: tuple[tuple[float, float], ...]
-    height_m: Annotated[float, Field(gt=0, le=500)] = 3.0
-    thickness_m: Annotated[float, Field(gt=0, le=500)] = 0.7
+    path: Line
+    height_m: Length = 3.0
+    thickness_m: Length = 0.7
     decay: Annotated[float, Field(ge=0, le=1)] = 0.6
 
 

@@ -16,6 +16,7 @@ from aerialdojo_gen.scenes.mesh import Floats, Mesh, merge, rotated, rotation, t
 from aerialdojo_gen.scenes.shapes import crown
 from aerialdojo_gen.scenes.site import Site
 from aerialdojo_gen.scenes.terrain import Terrain, flat_terrain, rolling_terrain
+from aerialdojo_gen.scenes.values import At, Crest, Length
 
 _SMOOTH_MAX = 5.0
 
@@ -35,9 +36,9 @@ class Ridge(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    line: tuple[tuple[float, float, float], ...]
-    width_m: Annotated[float, Field(gt=0, le=500)]
-    hollow: Annotated[float, Field(gt=0, le=4)] = 1.3
+    line: Crest
+    width_m: Length
+    hollow: Annotated[float, Field(ge=0.1, le=4)] = 1.3
 
 
 class Crag(BaseModel):
@@ -45,9 +46,9 @@ class Crag(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    at: tuple[float, float]
-    radius_m: Annotated[float, Field(gt=0, le=500)]
-    height_m: Annotated[float, Field(gt=0, le=500)]
+    at: At
+    radius_m: Length
+    height_m: Length
     blocks: Annotated[int, Field(ge=1, le=12)] = 5
 
     def area(self) -> BaseGeometry:

@@ -20,6 +20,7 @@ from aerialdojo_gen.scenes.ground import polygons_of
 from aerialdojo_gen.scenes.mesh import Mesh
 from aerialdojo_gen.scenes.site import Site
 from aerialdojo_gen.scenes.terrain import Terrain
+from aerialdojo_gen.scenes.values import At, Degrees, Length
 
 _CAP_M = 0.22
 
@@ -48,11 +49,11 @@ class Rock(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     name: str
-    at: tuple[float, float]
-    radius_m: Annotated[float, Field(gt=0, le=500)]
-    height_m: Annotated[float, Field(gt=0, le=500)]
-    long: Annotated[float, Field(ge=1, le=500)] = 1.0
-    yaw_deg: float = 0.0
+    at: At
+    radius_m: Length
+    height_m: Length
+    long: Annotated[float, Field(ge=1, le=50)] = 1.0
+    yaw_deg: Degrees = 0.0
     ragged: Annotated[float, Field(ge=0, le=0.5)] = 0.2
     batter: Annotated[float, Field(ge=0, le=1)] = 0.14
 

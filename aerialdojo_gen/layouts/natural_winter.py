@@ -24,8 +24,12 @@ from aerialdojo_gen.scenes.shapes import box, crown, cylinder
 from aerialdojo_gen.scenes.shapes_extruded import sweep
 from aerialdojo_gen.scenes.site import Site
 from aerialdojo_gen.scenes.terrain import Terrain
+from aerialdojo_gen.scenes.values import At, Degrees
 
 _STILT_M = 1.3
+_Side = Annotated[float, Field(ge=2, le=100)]
+# Its corners are rounded by 3 m.
+_RinkSide = Annotated[float, Field(ge=6.5, le=200)]
 _RAIL_M = 1.0
 
 
@@ -50,9 +54,9 @@ class Hut(BaseModel):
 
     name: str
     kind: Annotated[str, Field(pattern="^(stilts|gable)$")] = "stilts"
-    at: tuple[float, float]
-    size_m: tuple[float, float, float] = (4.2, 9.0, 2.8)
-    yaw_deg: float = 0.0
+    at: At
+    size_m: tuple[_Side, _Side, _Side] = (4.2, 9.0, 2.8)
+    yaw_deg: Degrees = 0.0
     wall: str = "sheet_metal:#c8502e"
 
     def plan(self, ahead_m: float = 0.0) -> Polygon:
@@ -74,9 +78,9 @@ class Rink(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    at: tuple[float, float]
-    size_m: tuple[float, float] = (18.0, 11.0)
-    yaw_deg: float = 0.0
+    at: At
+    size_m: tuple[_RinkSide, _RinkSide] = (18.0, 11.0)
+    yaw_deg: Degrees = 0.0
 
     def area(self) -> Polygon:
         """Plan with round corners, world frame, metres."""

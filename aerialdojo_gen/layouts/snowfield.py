@@ -32,12 +32,12 @@ from aerialdojo_gen.scenes.grammar_scatter import along, smooth_path
 from aerialdojo_gen.scenes.ground import disc, rectangle, ribbon
 from aerialdojo_gen.scenes.site import Site
 from aerialdojo_gen.scenes.terrain import Terrain, mound, rolling_terrain
+from aerialdojo_gen.scenes.values import Hill, Length, Line, LineOrNone, Metres
 
 _CELL_M = 1.4
 _MAST_HEAD_M = 11.6
 _TERMINAL_M = 5.6
 _GAUGE_M = 6.4
-Points = tuple[tuple[float, float], ...]
 
 
 class Piste(BaseModel):
@@ -45,11 +45,11 @@ class Piste(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    path: Points
-    width_m: Annotated[float, Field(gt=1, le=500)] = 9.0
-    bank_m: Annotated[float, Field(ge=0, le=500)] = 0.7
+    path: Line
+    width_m: Annotated[float, Field(gt=1, le=100)] = 9.0
+    bank_m: Annotated[float, Field(ge=0, le=10)] = 0.7
     gates: Annotated[int, Field(ge=0, le=1000)] = 0
-    moguls_m: Annotated[float, Field(ge=0, le=500)] = 0.0
+    moguls_m: Annotated[float, Field(ge=0, le=10)] = 0.0
 
 
 class Parameters(BaseModel):
@@ -81,23 +81,23 @@ class Parameters(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    profile: tuple[tuple[float, float], ...] = ((0.0, 0.0),)
-    lean: float = 0.0
+    profile: Annotated[tuple[tuple[Metres, Metres], ...], Field(min_length=1)] = ((0.0, 0.0),)
+    lean: Annotated[float, Field(ge=-2, le=2)] = 0.0
     drift_m: Annotated[float, Field(ge=0, le=5)] = 1.0
     drift_length_m: Annotated[float, Field(ge=5, le=90)] = 22.0
-    hills: tuple[tuple[float, float, float, float], ...] = ()
+    hills: tuple[Hill, ...] = ()
     pistes: tuple[Piste, ...] = ()
     huts: tuple[Hut, ...] = ()
     rocks: tuple[Rock, ...] = ()
     groups: tuple[Group, ...] = ()
-    lift: Points = ()
+    lift: LineOrNone = ()
     lift_variant: str = "red"
     cabins: Annotated[int, Field(ge=0, le=1000)] = 8
     rink: Rink | None = None
-    lake: tuple[float, float, float] | None = None
-    roads: tuple[Points, ...] = ()
+    lake: tuple[Metres, Metres, Length] | None = None
+    roads: tuple[Line, ...] = ()
     road_m: Annotated[float, Field(ge=1, le=9)] = 4.0
-    ridges: tuple[Points, ...] = ()
+    ridges: tuple[Line, ...] = ()
     ridge_m: Annotated[float, Field(ge=0.3, le=5)] = 1.8
     spruces: Annotated[int, Field(ge=0, le=1000)] = 60
     boulders: Annotated[int, Field(ge=0, le=1000)] = 24
@@ -248,6 +248,8 @@ def _gates(site: Site, p: Parameters, runs: list[list[tuple[float, float]]]) -> 
             side = 1.0 if k % 2 else -1.0
             yaw = pose.yaw_deg
             line = LineString(run).offset_curve(side * 1.6)
+            if line.is_empty:
+                continue
             at = line.interpolate(line.project(Point(pose.x, pose.y)))
             variant = "start" if k == piste.gates - 1 else "red" if k % 2 else "blue"
             site.try_place("ski_gate", float(at.x), float(at.y), yaw + 180.0, variant=variant)

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pydantic import BaseModel, ConfigDict, Field
 
 from aerialdojo_gen.scenes.site import Site
+from aerialdojo_gen.scenes.values import At, Degrees, Metres
 
 
 class Thing(BaseModel):
@@ -34,11 +35,11 @@ class Thing(BaseModel):
 
     category: str
     variant: str | None = None
-    at: tuple[float, float]
-    yaw: float = 0.0
-    z: float | None = None
-    count: int = Field(default=1, ge=1)
-    step: tuple[float, float] = (0.0, 0.0)
+    at: At
+    yaw: Degrees = 0.0
+    z: Metres | None = None
+    count: int = Field(default=1, ge=1, le=1000)
+    step: At = (0.0, 0.0)
 
 
 class Furniture(BaseModel):
@@ -57,7 +58,7 @@ class Furniture(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     place: str
-    z: float | None = None
+    z: Metres | None = None
     things: tuple[Thing, ...]
 
 

@@ -22,6 +22,7 @@ from aerialdojo_gen.scenes.mesh import Mesh, merge, rotated, rotation, translate
 from aerialdojo_gen.scenes.shapes import box
 from aerialdojo_gen.scenes.shapes_extruded import sweep
 from aerialdojo_gen.scenes.site import Site
+from aerialdojo_gen.scenes.values import Degrees, Metres
 
 Point3 = tuple[float, float, float]
 
@@ -44,9 +45,9 @@ class Place(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     place: str = ""
-    z: float | None = None
+    z: Metres | None = None
     roof: bool = False
-    things: tuple[tuple[str, float, float, float], ...]
+    things: tuple[tuple[str, Metres, Metres, Degrees], ...]
 
 
 def set_out(site: Site, places: Sequence[Place]) -> None:

@@ -123,6 +123,8 @@ def grid(
     yaw_deg: float = 0.0,
 ) -> list[Pose]:
     """List the points of a turned grid about an area's centre that lie in the area, moved by up to `jitter_m`."""
+    if area.is_empty:
+        return []
     c, s = np.cos(np.radians(yaw_deg)), np.sin(np.radians(yaw_deg))
     x0, y0, x1, y1 = area.bounds
     reach = float(np.hypot(x1 - x0, y1 - y0)) / 2
@@ -165,6 +167,8 @@ def poisson_disc(
     list of Pose
         With random yaws, in the order they were found.
     """
+    if area.is_empty:
+        return []
     shapely.prepare(area)
     x0, y0, x1, y1 = area.bounds
     buckets: dict[tuple[int, int], list[tuple[float, float, float]]] = {}

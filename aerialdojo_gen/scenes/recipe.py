@@ -6,9 +6,10 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar
 
 import numpy as np
+import pydantic_core
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 
-from aerialdojo_gen.errors import AssetError
+from aerialdojo_gen.errors import AssetError, brief
 from aerialdojo_gen.scenes.materials import nearest, read_toml
 
 Model = TypeVar("Model", bound=BaseModel)
@@ -60,7 +61,7 @@ class Recipe(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     layout: str
-    seed: int = 0
+    seed: Annotated[int, Field(ge=-(2**31), lt=2**31)] = 0
     size_m: tuple[Extent, Extent]
     ceiling_m: Height
     sky: Colour = "#96bee6"
@@ -151,7 +152,7 @@ def load_recipe(path: Path) -> Recipe:
 
 def _check_parameters(value: Any, keys: tuple[str, ...], path: Path) -> None:
     """Hold whatever a layout takes against bounds, before it becomes a count of things, a length or an array."""
-    where = f"{path}: parameters: {'.'.join(keys)}"
+    where = f"{path}: parameters: {brief('.'.join(keys))}"
     if isinstance(value, dict | list):
         if len(value) > _MOST_ENTRIES:
             raise AssetError(f"{where} has {len(value):,} entries, {_MOST_ENTRIES:,} are the most")
@@ -163,22 +164,18 @@ def _check_parameters(value: Any, keys: tuple[str, ...], path: Path) -> None:
         raise AssetError(f"{where} has {len(value):,} characters, {_LONGEST} are the most")
 
 
-def _short(value: Any) -> str:
-    text = repr(value)
-    return text if len(text) <= 60 else text[:57] + "..."
-
-
 def validated(model: type[Model], body: dict[str, Any], where: str) -> Model:
-    """Check a table against its model; an `AssetError` says what is wrong at which key."""
+    """Check a table against its model, a number a number; an `AssetError` says what is wrong at which key."""
     try:
-        return model.model_validate(body)
+        # As JSON, because only there a list is a strict tuple: "nan" and false are numbers to a lenient model.
+        return model.model_validate_json(pydantic_core.to_json(body), strict=True)
     except ValidationError as error:
         first = error.errors()[0]
-        key = ".".join(str(k) for k in first["loc"])
+        key = brief(".".join(str(k) for k in first["loc"]))
         if first["type"] == "extra_forbidden":
             message = f"unknown key {key!r}{nearest(key, model.model_fields)}"
         elif first["type"] == "missing":
             message = f"key {key!r} is missing"
         else:
-            message = f"{key}: {first['msg']}, got {_short(first['input'])}"
+            message = f"{key}: {first['msg'].removeprefix('Value error, ')}, got {brief(repr(first['input']), 60)}"
         raise AssetError(f"{where}: {message}") from error

@@ -110,6 +110,8 @@ def sweep(
 
 def extrude(plan: Polygon, height: float) -> Mesh:
     """Extrude a shapely polygon from z = 0 to `height` metres; wall textures run on around the corners."""
+    if not isinstance(plan, Polygon) or plan.is_empty:
+        raise ShapeError("the outline has no area, or is in pieces")
     plan = _without_straight_corners(orient(plan))
     flat, top = triangulate(plan)
     n = len(flat)
@@ -161,7 +163,10 @@ def _without_straight_corners(plan: Polygon) -> Polygon:
         xy = np.array(ring.coords)[:-1, :2]
         a, b = xy - np.roll(xy, 1, axis=0), np.roll(xy, -1, axis=0) - xy
         turn = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
-        rings.append(xy[np.abs(turn) > 1e-9 * (1.0 + np.linalg.norm(a, axis=1) * np.linalg.norm(b, axis=1))])
+        corners = xy[np.abs(turn) > 1e-9 * (1.0 + np.linalg.norm(a, axis=1) * np.linalg.norm(b, axis=1))]
+        if len(corners) < 3:
+            raise ShapeError("the outline has no area")
+        rings.append(corners)
     return Polygon(rings[0], rings[1:])
 
 

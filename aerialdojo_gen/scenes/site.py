@@ -21,6 +21,9 @@ from aerialdojo_gen.scenes.model import Instance, Part, Scene
 from aerialdojo_gen.scenes.recipe import Recipe
 from aerialdojo_gen.scenes.terrain import Terrain, flat_terrain
 
+# The largest scene of the dataset has 479.
+_MOST_NODES = 5_000
+
 
 class Site:
     """What a layout builds on; the origin lies in the middle, x east, y north, z up, metres.
@@ -216,6 +219,8 @@ class Site:
         """
         name = self._claim(node or self.node(category))
         instance = Instance(name, category, variant, dict(attributes or {}), placed(self._as_parts(parts), (0, 0, 0)))
+        if not any(part.faces.size for part in instance.parts):
+            raise AssetError(f"{self.name}: {name} has no body: it is too small, or lies off the site")
         self.instances.append(instance)
         if footprint is not None:
             low, high = instance.bounds[:, 2]
@@ -272,6 +277,8 @@ class Site:
     def _claim(self, node: str) -> str:
         if node in self._nodes:
             raise AssetError(f"{self.name}: node {node!r} stands twice; choose another name")
+        if len(self._nodes) >= _MOST_NODES:
+            raise AssetError(f"{self.name}: more than {_MOST_NODES:,} things stand in the scene")
         self._nodes.add(node)
         return node
 

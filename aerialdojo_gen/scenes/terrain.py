@@ -11,6 +11,7 @@ from opensimplex import OpenSimplex
 from shapely.geometry import LineString, Point
 from shapely.geometry.base import BaseGeometry
 
+from aerialdojo_gen.errors import AssetError
 from aerialdojo_gen.scenes.mesh import Floats, Ints
 
 
@@ -74,9 +75,18 @@ class Terrain:
             The level; by default the mean height of the area.
         blend_m : float
             Width of the slope back to the old ground, metres.
+
+        Raises
+        ------
+        AssetError
+            The area lies off the terrain, so that there is no mean height; where `z_m` is given, nothing is levelled.
         """
+        if area.is_empty:
+            return self
         near = self._distance(area)
         inside = near <= self.cell_m * 1.5
+        if z_m is None and not inside.any():
+            raise AssetError(f"the ground about ({area.centroid.x:g}, {area.centroid.y:g}) lies off the site")
         level = float(self.heights_m[inside].mean()) if z_m is None else z_m
         return self._blended(np.full_like(self.heights_m, level), near, blend_m)
 

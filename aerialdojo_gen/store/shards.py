@@ -16,7 +16,7 @@ from typing import Any
 
 import pyarrow as pa
 
-from aerialdojo_gen.errors import StoreError
+from aerialdojo_gen.errors import StoreError, brief
 from aerialdojo_gen.store import schemas
 from aerialdojo_gen.store.atomic import atomic_file
 from aerialdojo_gen.store.footers import ShardFile, ShardInfo, decode, encode
@@ -74,14 +74,14 @@ def partition(scene: str) -> str:
 def check_scene_name(scene: str) -> str:
     """Return the name if it is a plain one; it becomes part of paths, so StoreError for anything else."""
     if not _PLAIN.fullmatch(scene):
-        raise StoreError(f"{scene!r} is not a scene name: use letters, digits, _ and - (64 at most)")
+        raise StoreError(f"{brief(repr(scene), 60)} is not a scene name: use letters, digits, _ and - (64 at most)")
     return scene
 
 
 def check_run_name(run: str) -> str:
     """Return the name if it is a plain one; it becomes part of paths, so StoreError for anything else."""
     if not _PLAIN.fullmatch(run):
-        raise StoreError(f"{run!r} is no name of a run: use letters, digits, _ and - (64 at most)")
+        raise StoreError(f"{brief(repr(run), 60)} is no name of a run: use letters, digits, _ and - (64 at most)")
     return run
 
 

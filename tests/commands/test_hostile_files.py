@@ -8,6 +8,7 @@ import tomllib
 import numpy as np
 import pytest
 from fuzzing.mutate import Raw, toml_dumped
+from shapely.geometry import Polygon
 from starlette.testclient import TestClient
 from support import annotating, rendered
 from support.annotating import AUTHOR, YARD
@@ -21,10 +22,14 @@ from aerialdojo_gen.errors import AssetError
 from aerialdojo_gen.rendering import finished
 from aerialdojo_gen.rendering.codecs import PngWriter
 from aerialdojo_gen.rendering.reader import read_recording
+from aerialdojo_gen.scenes.build import build_scene
 from aerialdojo_gen.scenes.catalogue import load_catalogue
 from aerialdojo_gen.scenes.glb import read_glb, write_glb
+from aerialdojo_gen.scenes.grammar_scatter import grid, poisson_disc
+from aerialdojo_gen.scenes.ground import disc
 from aerialdojo_gen.scenes.model import Material, Scene
 from aerialdojo_gen.scenes.recipe import load_imported, load_recipe
+from aerialdojo_gen.scenes.terrain import rolling_terrain
 
 COURT = {"layout": "courtyard", "size_m": [30, 30], "ceiling_m": 12, "parameters": {"things": []}}
 POST = {"name": "post", "roles": {"body": "#808080"}, "params": {"h": 2}}
@@ -83,6 +88,81 @@ def test_a_recipe_s_numbers_are_bounded_before_anything_is_made_of_them(tmp_path
         load_recipe(path)
     assert str(refused.value).startswith(str(path))
     assert place in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("drawing", "place"),
+    [
+        ({"roofs": [["nan", -6, 0, 0, 4]]}, "roofs.0.0: Input should be a valid number, got 'nan'"),
+        ({"paths": [[0, 0, "inf", 9]]}, "paths.0.2: Input should be a valid number, got 'inf'"),
+        ({"roofs": [[-6, False, 0, 0, 4]]}, "roofs.0.1: Input should be a valid number, got False"),
+        (
+            {"roofs": [[-6, -1e-300, 0, 0, 4]]},
+            "roofs.0: a rectangle must be 0.05 m wide and deep or more, got [-6, -1",
+        ),
+        ({"roofs": [[-6, -6, 0, 0, 0.1]]}, "roofs.0.4: Input should be greater than or equal to 0.3, got 0.1"),
+        ({"walls": [[1, 1, 1, 1, 3]]}, "walls.0: points of a line must lie 0.05 m apart or more"),
+        (
+            {"things": [{"category": "bench", "at": [0, 0], "yaw": "inf"}]},
+            "things.0.yaw: Input should be a valid number",
+        ),
+    ],
+)
+def test_a_courtyard_s_walls_and_roofs_have_a_length_and_an_area(project, tmp_path, drawing, place):
+    things = {"things": [{"category": "bench", "at": [0, 0]}]}
+    path = recipe(tmp_path, COURT | {"parameters": things | drawing})
+    with pytest.raises(AssetError) as refused:
+        build_scene(path, load_catalogue(project / "scene_assets"))
+    assert str(refused.value).startswith(f"{path}: parameters: {place}")
+
+
+@pytest.mark.parametrize(
+    ("layout", "parameters", "place"),
+    [
+        ("desert", {"tracks": [[[0, 0]]]}, "tracks.0: a line needs two points or more"),
+        ("desert", {"bed": [[0, 0], [5, 0], [5, 0]]}, "bed: points of a line must lie 0.05 m apart"),
+        ("desert", {"hills": [[0, 0, 0, 1]]}, "hills.0.2: Input should be greater than or equal to 0.1"),
+        ("desert", {"houses": [{"name": "a", "at": [0, 0], "size_m": [0.5, 5, 3]}]}, "houses.0.size_m.0: Input"),
+        ("desert", {"ground": "wash"}, "a wash needs the middle line of its bed"),
+        ("desert", {"steps": [[5, 5, 1]]}, "steps.0: a step ends 0.05 m or more beyond where it begins"),
+        ("mountain", {"ridges": [{"line": [], "width_m": 9}]}, "ridges.0.line: "),
+        ("mountain", {"ridges": [{"line": [[0, 0, -1]], "width_m": 9}]}, "ridges.0.line.0.2: Input should"),
+        ("mountain", {"ridges": [], "paths": [[[-2000, 0], [2000, 0]] * 2]}, "paths.0: a line may be 5,000 m long"),
+        ("snowfield", {"profile": []}, "profile: "),
+        ("snowfield", {"rink": {"at": [0, 0], "size_m": [6, 11]}}, "rink.size_m.0: Input should be greater"),
+        ("forest", {"birch_wood": {"creek": []}}, "birch_wood.creek: a line needs two points or more"),
+        ("park", {"furniture": [{"place": "", "things": [{"category": "bench", "at": [0, 0], "count": 1001}]}]},
+         "furniture.0.things.0.count: Input should be less than or equal to 1000, got 1001"),
+    ],
+)  # fmt: skip
+def test_a_layout_s_lines_and_sizes_are_bounded_at_their_key(project, tmp_path, layout, parameters, place):
+    path = recipe(tmp_path, COURT | {"layout": layout, "parameters": parameters})
+    with pytest.raises(AssetError) as refused:
+        build_scene(path, load_catalogue(project / "scene_assets"))
+    assert str(refused.value).startswith(f"{path}: parameters: {place}")
+
+
+@pytest.mark.parametrize(
+    ("parameters", "says"),
+    [
+        ({"houses": [{"name": "far", "at": [200, 100]}]}, "the ground about (200, 100) lies off the site"),
+        ({"rocks": [{"name": "far", "at": [200, 100], "radius_m": 4, "height_m": 3}]}, "rock_000 has no body"),
+        ({"groups": [{"name": "far", "at": [200, 100], "things": ["bench"]}]}, "'far' has no room for 'bench'"),
+        ({"groups": [{"name": "odd", "at": [0, 0], "things": ["bench @ 1-2 ."]}]}, "'bench @ 1-2 .' is no thing"),
+    ],
+)
+def test_what_a_layout_cannot_place_is_an_error_of_its_recipe(project, tmp_path, parameters, says):
+    path = recipe(tmp_path, COURT | {"layout": "desert", "parameters": parameters})
+    with pytest.raises(AssetError) as refused:
+        build_scene(path, load_catalogue(project / "scene_assets"))
+    assert str(refused.value).startswith(f"{path}: layout 'desert': ")
+    assert says in str(refused.value)
+
+
+def test_ground_stays_a_number_where_an_area_to_be_levelled_has_shrunk_to_nothing():
+    ground = rolling_terrain((20.0, 20.0), 2.0, 1, 1.0, 9.0)
+    assert ground.flattened(disc(0, 0, 1.0).buffer(-1.2), 0.5).heights_m.tolist() == ground.heights_m.tolist()
+    assert poisson_disc(Polygon(), 1.0, np.random.default_rng(0)) == grid(Polygon(), (1, 1), np.random.default_rng(0))
 
 
 def test_the_sun_of_an_imported_scene_stands_above_too(tmp_path):

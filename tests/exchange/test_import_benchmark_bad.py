@@ -349,3 +349,15 @@ def test_what_is_no_task_file_is_said_in_one_line(tmp_path):
         assert error in str(failed.exception)
         assert "\n" not in str(failed.exception)
     assert not (tmp_path / "imported").exists()
+
+
+@pytest.mark.parametrize("what", ["key", "broken", "value"])
+def test_a_key_and_a_value_of_any_length_are_named_short(tmp_path, what):
+    whole = task_files.aerialvln(n=2)
+    whole["episodes"][0]["scene_id"] = "x" * 50_000
+    long = '{"' + "e" * 50_000 + '": '
+    text = {"key": long + "[]}", "broken": long + "[1,}", "value": json.dumps(whole)}[what]
+    (tmp_path / "tasks.json").write_text(text)
+    with pytest.raises(ImportRefused, match=r"tasks\.json") as refused:
+        import_benchmark("aerialvln", [tmp_path / "tasks.json"], tmp_path / "d")
+    assert len(str(refused.value)) < 1000

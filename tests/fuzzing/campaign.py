@@ -16,7 +16,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from fuzzing.targets import TARGETS, laid_out
+from fuzzing.cases import laid_out
+from fuzzing.targets import TARGETS
 from fuzzing.worker import mutants
 
 TESTS = Path(__file__).resolve().parents[1]

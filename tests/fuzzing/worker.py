@@ -15,8 +15,9 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TextIO
 
+from fuzzing.cases import Case, Target, case_of, laid_out
 from fuzzing.mutate import mutant
-from fuzzing.targets import TARGETS, Case, Target, case_of, laid_out
+from fuzzing.targets import TARGETS
 
 from aerialdojo_gen.common.rng import generator
 from aerialdojo_gen.errors import AerialDojoError

@@ -1,0 +1,144 @@
+"""Models' answers, shards, recordings, journals."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+from fuzzing.cases import Case, Target, made
+from support import court
+
+from aerialdojo_gen.benchmark import journal
+from aerialdojo_gen.llm.answer import parse_answer
+from aerialdojo_gen.rendering import finished
+from aerialdojo_gen.rendering.codecs import PngWriter, VideoWriter
+from aerialdojo_gen.rendering.reader import read_recording
+from aerialdojo_gen.scoring.vlm import read_order
+from aerialdojo_gen.store import shards as store
+
+
+def _answers() -> list[Case]:
+    texts = (
+        '{"thought": "Nothing here.", "action": "MoveForward3"}',
+        '<think>It is there.</think>\n```json\n{"action": "Stop"}\n```',
+        '{"order": [3, 1, 2, 5, 4]}',
+        '```\n{"order": [1, 2, 3, 4, 5]}\n```',
+    )
+    return [{"answer.json": text.encode()} if text[0] == "{" else {"answer.txt": text.encode()} for text in texts]
+
+
+def _read_answer(folder: Path) -> None:
+    text = next(folder.iterdir()).read_bytes().decode("utf-8", "surrogateescape")
+    try:
+        read_order(text, 5)
+    except ValueError as error:  # what it is to raise: it asks the model again, in these words
+        str(error).encode()
+    answer = parse_answer(text)
+    json.dumps(answer.model_dump()).encode()
+    answer.thought.encode()
+
+
+_TABLES = ("scenes", "objects", "anchors", "routes/train")
+
+
+def _shards() -> list[Case]:
+    whole = made(court.write_inputs)
+    paths = {str(store.shard_path(Path(), table, court.SCENE)) for table in _TABLES}
+    return [{path: raw} for path, raw in whole.items() if path in paths]
+
+
+def _read_shard(folder: Path) -> None:
+    path = next(p for p in folder.rglob("*.parquet"))
+    table = next(t for t in _TABLES if store.shard_path(folder, t, court.SCENE) == path)
+    info = store.read_info(path)
+    if info is not None:
+        assert isinstance(info.fingerprint, str)
+        assert isinstance(info.parts, int)
+        assert all(isinstance(k, str) and isinstance(v, int) for k, v in info.files.items())
+        json.dumps(info.summary)
+    store.read_scene(folder, table, court.SCENE).to_pylist()
+
+
+_FINGERPRINT = "f" * 64
+_NAV = f"media/{court.SCENE}/nav_a"
+
+
+def _recording_rows() -> list[dict]:
+    return [
+        {
+            "scene": court.SCENE, "nav_id": "nav_a", "view": "front", "modality": modality,
+            "path": f"{_NAV}/front_{modality}.{suffix}",
+            "sampling": "steps", "n_frames": 3, "fps": 15.0, "width": 16, "height": 16, "fov_deg": 90.0,
+            "codec": "h264",
+            "renderer": "gl", "device": "llvmpipe", "bytes": 4, "sha256": "0" * 64, "ok": True, "flags": ["dark"],
+        }
+        for modality, suffix in (("depth", "mkv"), ("rgb", "mp4"))
+    ]  # fmt: skip
+
+
+def _notes() -> list[Case]:
+    rows = _recording_rows()
+    note = json.dumps({"fingerprint": _FINGERPRINT, "recordings": rows}).encode()
+    return [{f"{_NAV}/recording.json": note, **{row["path"]: b"xxxx" for row in rows}}]
+
+
+def _find(folder: Path) -> None:
+    from aerialdojo_gen.store.schemas import RECORDINGS
+    from aerialdojo_gen.store.tables import check_table, from_rows
+
+    rows = finished.find(folder, _NAV, _FINGERPRINT)
+    if rows is not None:
+        check_table(RECORDINGS, from_rows(RECORDINGS, rows))
+        assert all((folder / row["path"]).resolve().is_relative_to(folder.resolve()) for row in rows)
+
+
+def _recordings() -> list[Case]:
+    camera = json.dumps(
+        {"K": [[8, 0, 8], [0, 8, 8], [0, 0, 1]], "body_from_camera": np.eye(4).tolist(), "fov_deg": 90.0}
+    )
+    colour = np.arange(16 * 16 * 3, dtype=np.uint8).reshape(16, 16, 3)
+
+    def videos(folder: Path) -> None:
+        for modality, suffix in (("rgb", "mp4"), ("depth", "mkv")):
+            with VideoWriter(folder / f"front_{modality}.{suffix}", modality, 16, 16, 15.0, comment=camera) as writer:
+                for k in range(3):
+                    writer.write(colour + k if modality == "rgb" else colour[..., 0].astype(np.uint16) + k)
+
+    def pictures(folder: Path) -> None:
+        for modality in ("rgb", "depth"):
+            with PngWriter(folder / f"front_{modality}", comment=camera) as writer:
+                for k in range(2):
+                    writer.write(colour + k if modality == "rgb" else colour[..., 0].astype(np.uint16) + k)
+
+    return [made(videos), made(pictures)]
+
+
+def _read_recording(folder: Path) -> None:
+    recording = read_recording(str(folder))
+    for video in (*recording.rgb.values(), *recording.depth_m.values()):
+        for k in range(min(len(video), 5)):
+            assert np.asarray(video[k]).size
+    json.dumps(recording.cameras)
+
+
+def _journals() -> list[Case]:
+    records = [
+        {"task_id": f"t{k}", "episode": {"success": True, "spl": 0.5}, "steps": {"action": [1, 2, 0]}}
+        for k in range(3)
+    ]
+    return [{"x.jsonl": b"".join(json.dumps(r).encode() + b"\n" for r in records)}]
+
+
+def _read_journal(folder: Path) -> None:
+    for record in journal.read(folder / "x.jsonl"):
+        json.dumps(record).encode()
+
+
+TARGETS = {
+    "answer": Target(_answers, _read_answer, names_the_file=False),
+    "shard": Target(_shards, _read_shard),
+    "recording-note": Target(_notes, _find, ".json"),
+    "recording": Target(_recordings, _read_recording),
+    "journal": Target(_journals, _read_journal),
+}
