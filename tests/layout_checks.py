@@ -10,7 +10,7 @@ import shapely
 import trimesh
 
 from aerialdojo_gen.geometry.rays import RayCaster
-from aerialdojo_gen.scenes.build import build_scene
+from aerialdojo_gen.layouts.build import build_scene
 from aerialdojo_gen.scenes.catalogue import Catalogue, load_catalogue
 from aerialdojo_gen.scenes.footprints import footprint
 from aerialdojo_gen.scenes.glb import write_glb

@@ -13,9 +13,9 @@ from handmade import box, instance, scene
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from aerialdojo_gen.agents.goal import N_ACTIONS
 from aerialdojo_gen.benchmark import AerialDojoEnv
 from aerialdojo_gen.benchmark.episode import Episode
-from aerialdojo_gen.benchmark.goal import N_ACTIONS
 from aerialdojo_gen.benchmark.motion import FlightSpace
 from aerialdojo_gen.errors import RenderError, StoreError, UsageError
 from aerialdojo_gen.planning.collision import CollisionWorld

@@ -14,9 +14,9 @@ import pyarrow.compute as pc
 import pytest
 
 from aerialdojo_gen.agents import AgentBase, AgentUnavailable, InvalidAnswer, Usage
+from aerialdojo_gen.agents.goal import BLIND
 from aerialdojo_gen.benchmark import journal
 from aerialdojo_gen.benchmark.episodes import TABLES, read_run, runs
-from aerialdojo_gen.benchmark.goal import BLIND
 from aerialdojo_gen.benchmark.limits import Limits
 from aerialdojo_gen.benchmark.runner import Evaluation, evaluate
 from aerialdojo_gen.benchmark.tasks import Selection, select

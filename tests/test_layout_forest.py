@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 import trimesh
 
+from aerialdojo_gen.layouts.build import build_scene
 from aerialdojo_gen.layouts.forest import _SPOTS
 from aerialdojo_gen.layouts.natural_ground import blob
 from aerialdojo_gen.planning.clearance import ClearanceGrid
-from aerialdojo_gen.scenes.build import build_scene
 from aerialdojo_gen.scenes.catalogue import Catalogue, load_catalogue
 from aerialdojo_gen.scenes.model import Instance, Scene
 

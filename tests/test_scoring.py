@@ -24,8 +24,8 @@ from aerialdojo_gen.scenes.model import Instance
 from aerialdojo_gen.scoring.base import AnchorView
 from aerialdojo_gen.scoring.geometric import WEIGHTS, judge
 from aerialdojo_gen.scoring.panel import Panel, panel
-from aerialdojo_gen.stages.anchor_sample import anchors_of
-from aerialdojo_gen.stages.anchor_world import Candidates
+from aerialdojo_gen.stages.work.anchor_sample import anchors_of
+from aerialdojo_gen.stages.work.anchor_world import Candidates
 
 CONFIG = AnchorSampleConfig()
 RADIUS = EMBODIMENT.radius_m

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from aerialdojo_gen.benchmark.goal import N_ACTIONS
+from aerialdojo_gen.agents.goal import N_ACTIONS
 from aerialdojo_gen.benchmark.motion import FlightSpace, Point
 from aerialdojo_gen.planning.primitives import DISPLACEMENTS, TURN_RAD, TURNS
 from aerialdojo_gen.store.schemas import STOP

@@ -114,7 +114,7 @@ def stage_code(stage: str) -> Code:
 
 def stage_module(stage: str) -> str:
     """Name the module of a stage."""
-    return f"aerialdojo_gen.stages.{stage.replace('-', '_')}"
+    return f"aerialdojo_gen.stages.work.{stage.replace('-', '_')}"
 
 
 class Package:

@@ -32,16 +32,16 @@ from aerialdojo_gen.errors import AerialDojoError
 from aerialdojo_gen.exchange.importing import Options, import_benchmark
 from aerialdojo_gen.imports.adopt import adopt
 from aerialdojo_gen.imports.files import read_into, unpacked
+from aerialdojo_gen.layouts.build import build_scene
 from aerialdojo_gen.llm.answer import parse_answer
 from aerialdojo_gen.rendering import finished
 from aerialdojo_gen.rendering.codecs import PngWriter, VideoWriter
 from aerialdojo_gen.rendering.reader import read_recording
-from aerialdojo_gen.scenes.build import build_scene
 from aerialdojo_gen.scenes.catalogue import load_catalogue
 from aerialdojo_gen.scenes.catalogue_files import FOLDERS, catalogue_files
 from aerialdojo_gen.scenes.glb import read_glb, write_glb
 from aerialdojo_gen.scoring.vlm import read_order
-from aerialdojo_gen.stages.annotate_import import annotation_tables
+from aerialdojo_gen.stages.work.annotate_import import annotation_tables
 from aerialdojo_gen.store import shards as store
 from fuzzing.mutate import toml_dumped
 

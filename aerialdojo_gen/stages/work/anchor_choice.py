@@ -16,7 +16,7 @@ from aerialdojo_gen.geometry.surface import Surface
 from aerialdojo_gen.pipeline.stage import Job
 from aerialdojo_gen.scoring.geometric import judge
 from aerialdojo_gen.scoring.panel import SCORERS
-from aerialdojo_gen.stages.anchor_world import Candidates, World
+from aerialdojo_gen.stages.work.anchor_world import Candidates, World
 
 Floats = NDArray[np.float64]
 

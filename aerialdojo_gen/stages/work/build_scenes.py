@@ -8,8 +8,8 @@ import re
 import pyarrow as pa
 
 from aerialdojo_gen.config.sections import BuildScenesConfig
+from aerialdojo_gen.layouts.build import build_scene
 from aerialdojo_gen.pipeline.stage import Job, Output
-from aerialdojo_gen.scenes.build import build_scene
 from aerialdojo_gen.scenes.catalogue import load_catalogue
 from aerialdojo_gen.scenes.glb import write_glb
 from aerialdojo_gen.scenes.model import Scene

@@ -20,8 +20,8 @@ from aerialdojo_gen.pipeline.stage import Job, Output
 from aerialdojo_gen.scenes.model import Instance
 from aerialdojo_gen.scoring.geometric import judge
 from aerialdojo_gen.scoring.panel import panel
-from aerialdojo_gen.stages.anchor_choice import with_choice
-from aerialdojo_gen.stages.anchor_world import Candidates, World
+from aerialdojo_gen.stages.work.anchor_choice import with_choice
+from aerialdojo_gen.stages.work.anchor_world import Candidates, World
 from aerialdojo_gen.store.schemas import ANCHORS
 from aerialdojo_gen.store.tables import from_rows
 
