@@ -46,6 +46,8 @@ PLUMBING: dict[str, tuple[str, ...]] = {
     "aerialdojo_gen.pipeline.registry": (),
     "aerialdojo_gen.pipeline.runner": (),
     "aerialdojo_gen.pipeline.stage": ("Job",),
+    "aerialdojo_gen.stages": (),
+    "aerialdojo_gen.stages.work": (),
     "aerialdojo_gen.store": (),
     "aerialdojo_gen.store.atomic": (),
     "aerialdojo_gen.store.files": (),
@@ -55,6 +57,9 @@ PLUMBING: dict[str, tuple[str, ...]] = {
     "aerialdojo_gen.store.shards": ("partition", "check_scene_name"),
     "aerialdojo_gen.store.staging": (),
 }
+# Of a stage's module, which declares it, and which says more: these definitions count, and nothing else. What it
+# decides about the configuration (`settle`) or refuses (`check`) shapes no bytes that the configuration does not.
+_DECLARED = ("run", "parts", "sources")
 # What writes every stage's rows.
 _WRITERS = (Edge("aerialdojo_gen.store.parquet_files", "write_clustered"), Edge("aerialdojo_gen.store.tables"))
 
@@ -114,7 +119,14 @@ def stage_code(stage: str) -> Code:
 
 def stage_module(stage: str) -> str:
     """Name the module of a stage."""
-    return f"aerialdojo_gen.stages.work.{stage.replace('-', '_')}"
+    return f"aerialdojo_gen.stages.{stage.replace('-', '_')}"
+
+
+def counted(module: str) -> tuple[str, ...] | None:
+    """Return which of a module's definitions count, ``("*",)`` for all that are asked for; None if all of it does."""
+    if module in PLUMBING:
+        return PLUMBING[module]
+    return _DECLARED if module.rpartition(".")[0] == "aerialdojo_gen.stages" else None
 
 
 class Package:
@@ -212,7 +224,7 @@ class _Search:
         above = module.rpartition(".")[0]
         if above:
             yield Edge(above)
-        if module in PLUMBING:
+        if counted(module) is not None:
             yield from self._definitions(module, names)
         elif module not in self.parts:
             facts = self._package.facts(module)
@@ -223,11 +235,11 @@ class _Search:
             yield from facts.edges
 
     def _definitions(self, module: str, names: tuple[str, ...]) -> Iterator[Edge]:
-        counted = PLUMBING[module]
-        if not counted:
+        listed = counted(module)
+        if not listed:
             return
         known = self._package.facts(module).definitions
-        allowed = set(known) if counted == ("*",) else set(counted)
+        allowed = set(known) if listed == ("*",) else set(listed)
         waiting = sorted(allowed if "*" in names else allowed & set(names))
         while waiting:
             name = waiting.pop()
@@ -254,7 +266,7 @@ class _Cache:
     def facts(self, source: bytes, module: str, is_package: bool) -> Facts:
         """Return a source's facts."""
         digest = hashlib.sha256(source).hexdigest()
-        by_definition = bool(PLUMBING.get(module))
+        by_definition = bool(counted(module))
         key = [digest, by_definition]
         entry = self._entries.get(module)
         if entry is None or entry["key"] != key:

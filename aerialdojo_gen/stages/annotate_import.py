@@ -1,0 +1,41 @@
+"""`annotate-import`: an annotation file becomes tables, where it is right."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from aerialdojo_gen.errors import AssetError
+from aerialdojo_gen.pipeline.stage import Job, Output, Roots, Stage
+from aerialdojo_gen.scenes.catalogue_files import catalogue_files
+
+if TYPE_CHECKING:
+    from aerialdojo_gen.config.sections import AnnotateImportConfig
+
+
+def run(job: Job, config: AnnotateImportConfig) -> Output:
+    """Do a shard's work: `aerialdojo_gen.stages.work.annotate_import.run`."""
+    from aerialdojo_gen.stages.work import annotate_import
+
+    return annotate_import.run(job, config)
+
+
+def sources(roots: Roots, scene: str) -> list[Path]:
+    """List the annotation file and the catalogue; AssetError where there is no such file."""
+    file = roots.annotations / f"{scene}.json"
+    if not file.is_file():
+        raise AssetError(
+            f"{scene} has no annotations: {file} is missing; draft them (aerialdojo-gen annotate-draft {scene}) "
+            f"or make them by hand (aerialdojo-gen annotate --scene {scene})"
+        )
+    return [file, *catalogue_files(roots.scene_assets)]
+
+
+STAGE = Stage(
+    "annotate-import",
+    "Check the annotations against the scenes and import them.",
+    reads=("scenes",),
+    writes=("landmarks", "objects", "chosen_anchors"),
+    run=run,
+    sources=sources,
+)

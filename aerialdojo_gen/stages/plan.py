@@ -1,0 +1,35 @@
+"""`plan`: a certified reference trajectory for every candidate, or the reason why there is none (paper: routes)."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from aerialdojo_gen.pipeline.stage import Job, Output, Stage
+
+if TYPE_CHECKING:
+    from aerialdojo_gen.config.sections import PlanConfig
+
+
+def run(job: Job, config: PlanConfig) -> Output:
+    """Do a shard's work: `aerialdojo_gen.stages.work.plan.run`."""
+    from aerialdojo_gen.stages.work import plan
+
+    return plan.run(job, config)
+
+
+def parts(data: Path, scene: str, config: PlanConfig) -> int:
+    """Count the shards of a scene: `targets_per_part` targets each."""
+    from aerialdojo_gen.store import shards
+
+    return -(-shards.count_rows(data, "objects", scene) // config.targets_per_part)
+
+
+STAGE = Stage(
+    "plan",
+    "Plan a collision-free reference trajectory for every candidate.",
+    reads=("scenes", "objects", "anchors", "pairs"),
+    writes=("plans",),
+    run=run,
+    parts=parts,
+)
