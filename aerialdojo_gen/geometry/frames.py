@@ -11,7 +11,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from aerialdojo_gen.store.schemas import DIRECTIONS
+from aerialdojo_gen.common.terms import DIRECTIONS
 
 Floats = NDArray[np.float64]
 
@@ -70,7 +70,7 @@ def compass_direction(dx_m: float, dy_m: float) -> str:
     Returns
     -------
     str
-        One of `aerialdojo_gen.store.schemas.DIRECTIONS`.
+        One of `aerialdojo_gen.common.terms.DIRECTIONS`.
 
     Raises
     ------

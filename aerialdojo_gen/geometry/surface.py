@@ -10,7 +10,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
-from aerialdojo_gen.scenes.model import Instance
+from aerialdojo_gen.geometry.soup import Body
 
 Floats = NDArray[np.float64]
 
@@ -133,7 +133,7 @@ class Surface:
         self._spheres = np.ascontiguousarray(np.column_stack([centre, radius * (1 + 1e-9) + 1e-9]))
 
     @classmethod
-    def of(cls, instance: Instance) -> Surface:
+    def of(cls, instance: Body) -> Surface:
         """Take the surface of an instance."""
         return cls(instance.vertices, instance.faces)
 

@@ -27,7 +27,10 @@ PLUMBING: dict[str, tuple[str, ...]] = {
     "aerialdojo_gen": (),
     "aerialdojo_gen.benchmark": (),
     "aerialdojo_gen.common": (),
+    "aerialdojo_gen.common.disk": (),
+    "aerialdojo_gen.common.terms": ("*",),
     "aerialdojo_gen.common.trouble": (),
+    "aerialdojo_gen.common.version": (),
     "aerialdojo_gen.config": (),
     "aerialdojo_gen.config.agreement": (),
     "aerialdojo_gen.config.explain": (),
@@ -54,6 +57,11 @@ PLUMBING: dict[str, tuple[str, ...]] = {
     "aerialdojo_gen.store.footers": (),
     "aerialdojo_gen.store.parquet_files": ("write_clustered",),
     "aerialdojo_gen.store.schemas": ("*",),
+    "aerialdojo_gen.store.schemas.benchmark": ("*",),
+    "aerialdojo_gen.store.schemas.columns": ("*",),
+    "aerialdojo_gen.store.schemas.recordings": ("*",),
+    "aerialdojo_gen.store.schemas.release": ("*",),
+    "aerialdojo_gen.store.schemas.staged": ("*",),
     "aerialdojo_gen.store.shards": ("partition", "check_scene_name"),
     "aerialdojo_gen.store.staging": (),
 }
@@ -215,7 +223,7 @@ class _Search:
             elif edge.name == "**":
                 waiting += [Edge(module) for module in self._package.modules_in(edge.module)]
             elif edge.name and self._package.contains(f"{edge.module}.{edge.name}"):
-                waiting += [Edge(edge.module), Edge(f"{edge.module}.{edge.name}", "", edge.uses)]
+                waiting += [Edge(edge.module, "", ()), Edge(f"{edge.module}.{edge.name}", "", edge.uses)]
             else:
                 names = (edge.name,) if edge.name else edge.uses
                 waiting += self._enter(edge.module, names)
@@ -223,7 +231,8 @@ class _Search:
     def _enter(self, module: str, names: tuple[str, ...]) -> Iterator[Edge]:
         above = module.rpartition(".")[0]
         if above:
-            yield Edge(above)
+            # Its ``__init__`` runs; of plumbing nothing is asked by that.
+            yield Edge(above, "", ())
         if counted(module) is not None:
             yield from self._definitions(module, names)
         elif module not in self.parts:
@@ -238,9 +247,12 @@ class _Search:
         listed = counted(module)
         if not listed:
             return
-        known = self._package.facts(module).definitions
-        allowed = set(known) if listed == ("*",) else set(listed)
+        facts = self._package.facts(module)
+        known = facts.definitions
+        allowed = {*known, *facts.handed_on} if listed == ("*",) else set(listed)
         waiting = sorted(allowed if "*" in names else allowed & set(names))
+        for name in waiting:
+            yield from facts.handed_on.get(name, ())
         while waiting:
             name = waiting.pop()
             if name in known and f"{module}:{name}" not in self.parts:
@@ -301,6 +313,7 @@ def _facts(raw: dict[str, Any]) -> Facts:
             for name, d in raw["definitions"].items()
         },
         tuple(raw["unknown"]),
+        {name: _edges(edges) for name, edges in raw["handed_on"].items()},
     )
 
 

@@ -29,7 +29,7 @@ class Route:
     Attributes
     ----------
     outcome : str
-        One of `aerialdojo_gen.store.schemas.OUTCOMES`.
+        One of `aerialdojo_gen.common.terms.OUTCOMES`.
     poses : (K + 1, 4) float64
         x, y, z in metres and yaw in (-pi, pi], world frame; no rows unless SOLVED.
     actions : (K + 1,) int8

@@ -12,7 +12,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
-from aerialdojo_gen.store.schemas import ACTION_NAMES, APPROACH, STOP, TURN_LEFT, TURN_RIGHT
+from aerialdojo_gen.common.terms import ACTION_NAMES, APPROACH, STOP, TURN_LEFT, TURN_RIGHT
 
 N_HEADINGS = 24
 TURN_RAD = 2 * math.pi / N_HEADINGS
