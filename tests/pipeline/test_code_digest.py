@@ -19,13 +19,13 @@ NAMES = [stage.name for stage in STAGES]
 SOURCES = Path(aerialdojo_gen.__file__).parent
 # A module that the stage uses by way of others, and a constant of it.
 USED = {
-    "build-scenes": ("scenes/layouts/courtyard.py", None),
+    "build-scenes": ("layouts/courtyard.py", None),
     "annotate-import": ("annotations/relations.py", None),
     "anchor-sample": ("geometry/viewpoints.py", None),
     "reference-images": ("rendering/gl_shaders.py", "#version 330 core"),
-    "pair-objects": ("tables.py", '"ascending"'),
+    "pair-objects": ("store/tables.py", '"ascending"'),
     "plan": ("planning/primitives.py", None),
-    "filter": ("schemas.py", '"long_horizon"'),
+    "filter": ("common/terms.py", '"long_horizon"'),
     "split": ("release/quota.py", None),
     "render": ("rendering/codecs.py", None),
 }
@@ -70,8 +70,10 @@ def test_a_copy_elsewhere_has_the_same_digests(copied):
 def test_a_line_in_the_stages_own_module_makes_it_stale(copied, name):
     before = digests(copied)
     path = copied / "stages" / f"{name.replace('-', '_')}.py"
+    work = path.parent / "work" / path.name
     run = re.search(r"^def run\(.*?\n    \"\"\"(.*?)\"\"\"\n", path.read_text(), re.DOTALL | re.MULTILINE)
     assert changed(before, edited(path, run[0], run[0] + "    raise RuntimeError\n")) == {name}
+    assert changed(before, edited(work, "\n\n", "\nNEW = 1\n\n")) == {name}
     # What is said: a comment, other blank lines, another docstring.
     assert edited(path, run[0], "\n\n" + run[0] + "    # A comment.\n\n") == before
     assert edited(path, run[1], "Something else.") == before
@@ -96,7 +98,15 @@ def test_a_constant_of_a_module_that_it_uses_makes_it_stale(copied, name):
 
 
 @pytest.mark.parametrize(
-    "relative", ["cli.py", "commands/stages.py", "progress.py", "runner.py", "benchmark/report.py", "release/card.py"]
+    "relative",
+    [
+        "cli.py",
+        "commands/stages.py",
+        "pipeline/progress.py",
+        "pipeline/runner.py",
+        "benchmark/report.py",
+        "release/card.py",
+    ],
 )
 def test_messages_and_plumbing_make_nothing_stale(copied, relative):
     assert edited(copied / relative, "\n\n", "\nSAID = 'another message'\n\n") == digests(copied)
@@ -106,13 +116,25 @@ def test_plumbing_is_what_it_is_said_to_be():
     """Whoever lists a module here has thought about whether it decides what is written."""
     assert set(PLUMBING) == {
         f"aerialdojo_gen{name}"
-        for name in ("", ".atomic", ".benchmark", ".code_digest", ".config", ".errors", ".executor", ".files",
-                     ".fingerprint", ".footers", ".interrupt", ".parquet_files", ".progress", ".runner", ".schemas",
-                     ".shards", ".stage", ".staging", ".store", ".trouble")
+        for name in ("", ".benchmark", ".common", ".common.disk", ".common.terms", ".common.trouble",
+                     ".common.version", ".config", ".config.agreement", ".config.explain", ".config.pipeline",
+                     ".config.sections", ".errors", ".pipeline", ".pipeline.code_digest", ".pipeline.code_facts",
+                     ".pipeline.executors", ".pipeline.executors.local", ".pipeline.fingerprint",
+                     ".pipeline.freshness", ".pipeline.interrupt", ".pipeline.progress", ".pipeline.registry",
+                     ".pipeline.runner", ".pipeline.stage", ".stages", ".stages.work", ".store", ".store.atomic",
+                     ".store.files", ".store.footers", ".store.parquet_files", ".store.schemas",
+                     ".store.schemas.benchmark", ".store.schemas.columns", ".store.schemas.recordings",
+                     ".store.schemas.release", ".store.schemas.staged", ".store.shards", ".store.staging")
     }  # fmt: skip
     assert {name: counted for name, counted in PLUMBING.items() if counted} == {
         "aerialdojo_gen.store.parquet_files": ("write_clustered",),
+        "aerialdojo_gen.common.terms": ("*",),
         "aerialdojo_gen.store.schemas": ("*",),
+        "aerialdojo_gen.store.schemas.benchmark": ("*",),
+        "aerialdojo_gen.store.schemas.columns": ("*",),
+        "aerialdojo_gen.store.schemas.recordings": ("*",),
+        "aerialdojo_gen.store.schemas.release": ("*",),
+        "aerialdojo_gen.store.schemas.staged": ("*",),
         "aerialdojo_gen.pipeline.stage": ("Job",),
         "aerialdojo_gen.store.shards": ("partition", "check_scene_name"),
     }
@@ -123,19 +145,35 @@ def test_plumbing_is_what_it_is_said_to_be():
 
 def test_an_edit_of_a_table_counts_for_who_uses_it(copied):
     before = digests(copied)
+    staged, benchmark = copied / "store" / "schemas" / "staged.py", copied / "store" / "schemas" / "benchmark.py"
+    assert edited(staged, "VERDICTS = table(\n", "VERDICTS = table(  # here\n") == before
     # `verdicts` is written by filter; split copies its rows by the names of others' columns.
-    after = edited(copied / "schemas.py", "VERDICTS = _table(\n", "VERDICTS = _table(  # here\n")
-    assert after == before
-    after = edited(copied / "schemas.py", 'EPISODES = _table(\n    "episodes"', 'EPISODES = _table(\n    "episodez"')
+    after = edited(staged, 'VERDICTS = table(\n    "verdicts"', 'VERDICTS = table(\n    "verdictz"')
+    assert changed(before, after) == {"filter"}
+    after = edited(benchmark, 'EPISODES = table(\n    "episodes"', 'EPISODES = table(\n    "episodez"')
     assert after == before, "evaluate's tables are no stage's"
+
+
+def test_a_declaration_counts_by_what_it_computes(copied):
+    """What a stage runs, its parts and its sources; not its help, nor what it settles or refuses."""
+    before = digests(copied)
+    plan, split = copied / "stages" / "plan.py", copied / "stages" / "split.py"
+    assert changed(before, edited(plan, "// config.targets_per_part", "// 2")) == {"plan"}
+    assert changed(before, edited(copied / "stages" / "build_scenes.py", "materials.toml", "other.toml")) == {
+        "build-scenes"
+    }
+    assert edited(plan, "Plan a collision-free", "Plan another") == before
+    assert edited(split, "config.paper_counts", "not config.paper_counts") == before
+    assert edited(copied / "rendering" / "settle.py", "say(choice.why)", "pass") == before
 
 
 def test_what_is_imported_by_a_name_made_at_run_time_counts():
     parts = stage_code("build-scenes").parts
-    for folder in ("layouts", "builders"):
-        for path in (SOURCES / "scenes" / folder).glob("*.py"):
-            if path.stem != "__init__":
-                assert f"aerialdojo_gen.scenes.{folder}.{path.stem}" in parts
+    for folder in ("layouts", "scenes/builders"):
+        paths = [path for path in (SOURCES / folder).rglob("*.py") if path.stem != "__init__"]
+        assert paths
+        for path in paths:
+            assert ".".join(("aerialdojo_gen", *path.relative_to(SOURCES).with_suffix("").parts)) in parts
 
 
 def test_figures_of_the_paper_count_where_they_are_read():
@@ -176,7 +214,7 @@ from aerialdojo_gen import store
 if TYPE_CHECKING:
     from aerialdojo_gen.show import page
 def f():
-    from aerialdojo_gen.rng import generator
+    from aerialdojo_gen.common.rng import generator
     importlib.import_module(f"{__name__}.{np.x}")
     importlib.import_module(f"{away.__name__}.{np.x}")
     importlib.import_module("moderngl")
@@ -197,8 +235,10 @@ def f():
 
 
 def test_an_import_that_cannot_be_told_is_a_defect(copied):
-    path = copied / "stages" / "filter.py"
-    with pytest.raises(RuntimeError, match=r"aerialdojo_gen\.stages\.filter imports name: its source does not tell"):
+    path = copied / "stages" / "work" / "filter.py"
+    with pytest.raises(
+        RuntimeError, match=r"aerialdojo_gen\.stages\.work\.filter imports name: its source does not tell"
+    ):
         edited(path, "\n\n", "\nimport importlib\ndef f(name): importlib.import_module(name)\n\n")
 
 
