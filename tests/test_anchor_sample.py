@@ -9,7 +9,7 @@ from handmade import box, instance, mesh_of, scene
 
 from aerialdojo_gen.config.sections import AnchorSampleConfig, Embodiment
 from aerialdojo_gen.errors import AnnotationError, StoreError
-from aerialdojo_gen.geometry.frames import wrap_angle_rad
+from aerialdojo_gen.geometry.angles import wrap_angle_rad
 from aerialdojo_gen.geometry.viewpoints import shortlist
 from aerialdojo_gen.pipeline.stage import Job, Roots
 from aerialdojo_gen.scenes.glb import write_glb

@@ -18,8 +18,8 @@ from aerialdojo_gen.benchmark import AerialDojoEnv
 from aerialdojo_gen.benchmark.episode import Episode
 from aerialdojo_gen.benchmark.motion import FlightSpace
 from aerialdojo_gen.errors import RenderError, StoreError, UsageError
+from aerialdojo_gen.geometry.motion import replay, route_length_m
 from aerialdojo_gen.planning.collision import CollisionWorld
-from aerialdojo_gen.planning.primitives import replay, route_length_m
 from aerialdojo_gen.store import schemas
 
 RADIUS = 0.25

@@ -22,7 +22,7 @@ from aerialdojo_gen.benchmark.runner import Evaluation, evaluate
 from aerialdojo_gen.benchmark.tasks import Selection, select
 from aerialdojo_gen.benchmark.worker import Conditions
 from aerialdojo_gen.errors import AerialDojoError, StoreError, UsageError
-from aerialdojo_gen.planning.primitives import replay
+from aerialdojo_gen.geometry.motion import replay
 from aerialdojo_gen.store import schemas
 
 HERE = "test_evaluate"

@@ -99,3 +99,16 @@ def test_libraries_are_imported_where_they_belong():
     assert found["fcl"] == {"planning/collision.py"}
     assert found["moderngl"]
     assert found["pyarrow.parquet"]
+
+
+def test_pybullet_is_loaded_by_who_draws_with_it():
+    code = (
+        "import sys\n"
+        "from aerialdojo_gen.rendering import backend, casters, checks, gl, picture, raycast\n"
+        "from aerialdojo_gen.stages.work import anchor_sample, reference_images, render\n"
+        "from aerialdojo_gen.benchmark import eyes\n"
+        "assert 'pybullet' not in sys.modules\n"
+        "from aerialdojo_gen.rendering import world\n"
+        "assert 'pybullet' in sys.modules\n"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)

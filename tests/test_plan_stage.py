@@ -10,9 +10,9 @@ from handmade import OPINIONS
 
 from aerialdojo_gen.config.sections import Embodiment, PairObjectsConfig, PlanConfig
 from aerialdojo_gen.errors import StoreError
+from aerialdojo_gen.geometry.motion import replay
 from aerialdojo_gen.pipeline.stage import Job, Roots
 from aerialdojo_gen.planning.clearance import ClearanceGrid
-from aerialdojo_gen.planning.primitives import replay
 from aerialdojo_gen.scenes.glb import write_glb
 from aerialdojo_gen.stages.work import pair_objects, plan
 from aerialdojo_gen.store import schemas

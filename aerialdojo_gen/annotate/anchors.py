@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from aerialdojo_gen.annotations.format import Object
 from aerialdojo_gen.config.pipeline import Pipeline
 from aerialdojo_gen.errors import AerialDojoError
+from aerialdojo_gen.geometry.angles import yaw_towards
 from aerialdojo_gen.geometry.cameras import Camera, view_pose
-from aerialdojo_gen.geometry.frames import yaw_towards
 from aerialdojo_gen.geometry.surface import Surface
 from aerialdojo_gen.pipeline.stage import Job, Roots
 from aerialdojo_gen.scenes.model import Scene
@@ -191,7 +191,8 @@ class AnchorDesk:
         return view
 
     def _look(self, position_m: Floats, yaw_rad: float) -> View:
-        from aerialdojo_gen.rendering.world import ray_caster, render_world
+        from aerialdojo_gen.rendering.casters import ray_caster
+        from aerialdojo_gen.rendering.world import render_world
         from aerialdojo_gen.stages.work.reference_images import box_of, instance_map, png
 
         camera = Camera(self._pictures.width, self._pictures.height, self._pictures.fov_deg)

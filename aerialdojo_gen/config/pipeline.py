@@ -55,7 +55,7 @@ class Pipeline(Section):
         return self
 
     def section(self, stage: str) -> Section:
-        """Return the section of a stage, by the stage's name (``"anchor-sample"``); an empty one where it has none."""
+        """Return the section of a stage, by the stage's name (``"anchor-sample"``); else an empty one."""
         section = getattr(self, stage.replace("-", "_"), Section())
         assert isinstance(section, Section)
         return section

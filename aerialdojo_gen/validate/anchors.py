@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from aerialdojo_gen.geometry.frames import wrap_angle_rad, yaw_towards
+from aerialdojo_gen.geometry.angles import wrap_angle_rad, yaw_towards
 from aerialdojo_gen.geometry.surface import Surface
 from aerialdojo_gen.scoring.geometric import WEIGHTS
 from aerialdojo_gen.scoring.panel import SCORERS

@@ -24,7 +24,7 @@ USED = {
     "anchor-sample": ("geometry/viewpoints.py", None),
     "reference-images": ("rendering/gl_shaders.py", "#version 330 core"),
     "pair-objects": ("store/tables.py", '"ascending"'),
-    "plan": ("planning/primitives.py", None),
+    "plan": ("geometry/motion.py", None),
     "filter": ("common/terms.py", '"long_horizon"'),
     "split": ("release/quota.py", None),
     "render": ("rendering/codecs.py", None),

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from aerialdojo_gen.common.rng import generator
 from aerialdojo_gen.config.sections import AnchorSampleConfig
 from aerialdojo_gen.errors import StoreError
-from aerialdojo_gen.geometry.frames import yaw_towards
+from aerialdojo_gen.geometry.angles import yaw_towards
 from aerialdojo_gen.geometry.surface import Surface
 from aerialdojo_gen.geometry.viewpoints import around, shortlist
 from aerialdojo_gen.pipeline.stage import Job, Output

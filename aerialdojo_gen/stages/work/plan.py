@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 from aerialdojo_gen.config.sections import PlanConfig
 from aerialdojo_gen.errors import StoreError
+from aerialdojo_gen.geometry.angles import wrap_one_rad
 from aerialdojo_gen.pipeline.stage import Job, Output
 from aerialdojo_gen.planning.planner import Planner, Route
-from aerialdojo_gen.planning.primitives import wrap_rad
 from aerialdojo_gen.scenes.model import Scene
 from aerialdojo_gen.store.schemas import OUTCOMES, PLANS
 
@@ -97,7 +97,7 @@ def _anchor_poses(job: Job) -> tuple[dict[tuple[int, int], Floats], dict[int, tu
 
 def _turned(anchor: Floats) -> Floats:
     """Start pose: the start object's anchor, its yaw turned by 180° (paper: start poses)."""
-    return np.array([*anchor[:3], wrap_rad(anchor[3] + math.pi)])
+    return np.array([*anchor[:3], wrap_one_rad(float(anchor[3]) + math.pi)])
 
 
 def _by_target(pairs: pa.Table) -> Iterator[tuple[int, list[dict[str, Any]]]]:

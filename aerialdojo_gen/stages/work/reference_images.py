@@ -16,7 +16,7 @@ from aerialdojo_gen.geometry.cameras import Camera, project, view_pose
 from aerialdojo_gen.geometry.rays import RayCaster
 from aerialdojo_gen.pipeline.stage import Job, Output
 from aerialdojo_gen.rendering.backend import kept_renderer
-from aerialdojo_gen.rendering.world import ray_caster
+from aerialdojo_gen.rendering.casters import ray_caster
 from aerialdojo_gen.store.schemas import REFERENCES
 from aerialdojo_gen.store.tables import from_rows
 
