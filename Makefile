@@ -67,9 +67,10 @@ fuzz: .venv/.dev  ## mutants of every input into every parser, N=500 each (night
 torture: .venv/.dev  ## kill run, render, export, import and evaluate N=100 times and compare what repeating them leaves
 	@.venv/bin/python tests/torture.py -n $(or $(N),100)
 
-lint: .venv/.dev  ## ruff and mypy --strict
+lint: .venv/.dev  ## ruff, the import contracts and mypy --strict
 	@.venv/bin/ruff check .
 	@.venv/bin/ruff format --check .
+	@.venv/bin/lint-imports --no-cache --no-logo
 	@.venv/bin/mypy
 
 format: .venv/.dev  ## let ruff format the code

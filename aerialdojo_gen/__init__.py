@@ -4,4 +4,6 @@ The package is a staged pipeline: every stage reads and writes Parquet tables (s
 and is both a command of `aerialdojo-gen` and a plain function over tables.
 """
 
-__version__ = "0.1.0"
+from aerialdojo_gen.common.version import __version__
+
+__all__ = ["__version__"]

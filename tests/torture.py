@@ -165,7 +165,13 @@ class Server:
 
 def serve() -> None:
     """Be a `Server`'s process."""
-    for name in ("stages.render", "stages.plan", "stages.anchor_sample", "benchmark.runner", "exchange.importing"):
+    for name in (
+        "stages.work.render",
+        "stages.work.plan",
+        "stages.work.anchor_sample",
+        "benchmark.runner",
+        "exchange.importing",
+    ):
         importlib.import_module(f"aerialdojo_gen.{name}")
     cli = importlib.import_module("aerialdojo_gen.cli")
     for line in iter(sys.stdin.readline, ""):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
-from aerialdojo_gen.benchmark.goal import Goal, Observation
+from aerialdojo_gen.agents.goal import Goal, Observation
 from aerialdojo_gen.errors import AerialDojoError
 
 
@@ -75,7 +75,7 @@ class Agent(Protocol):
 
     Besides, an agent may have (and `AgentBase` gives):
 
-    - ``sensors``, a `aerialdojo_gen.benchmark.goal.Sensors`: what it wants to see; all four views where absent.
+    - ``sensors``, a `aerialdojo_gen.agents.goal.Sensors`: what it wants to see; all four views where absent.
     - ``close()``: called once, at the end of the run.
     - ``usage() -> Usage or None``: what it has used since `reset`.
     - ``answer() -> str or None``: the words behind the last action, kept in `steps`.

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from aerialdojo_gen.benchmark.goal import Sensors
+from aerialdojo_gen.agents.goal import Sensors
 
 _UNKNOWN, _FREE, _OCCUPIED = 0, 1, 2
 # Directions of the level views in the body's frame, radians, counter-clockwise.

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from aerialdojo_gen.agents.base import AgentBase
 from aerialdojo_gen.agents.depth_map import DepthMap
-from aerialdojo_gen.benchmark.goal import Goal, Observation, Sensors
+from aerialdojo_gen.agents.goal import Goal, Observation, Sensors
 from aerialdojo_gen.errors import UsageError
-from aerialdojo_gen.planning.primitives import DISPLACEMENTS, TURN_RAD, TURNS
+from aerialdojo_gen.geometry.motion import DISPLACEMENTS, TURN_RAD, TURNS
 from aerialdojo_gen.store.schemas import ACTION_NAMES, MOVE_UP_1, STOP, TURN_LEFT, TURN_RIGHT
 
 _FORWARD = [(ACTION_NAMES.index(f"MoveForward{m}"), float(m)) for m in (5, 3, 1)]

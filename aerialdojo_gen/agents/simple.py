@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from aerialdojo_gen.agents.base import AgentBase
-from aerialdojo_gen.benchmark.goal import BLIND, N_ACTIONS, Goal, Observation
+from aerialdojo_gen.agents.goal import BLIND, N_ACTIONS, Goal, Observation
 from aerialdojo_gen.common import rng
 from aerialdojo_gen.store.schemas import ACTION_NAMES, APPROACH, STOP
 

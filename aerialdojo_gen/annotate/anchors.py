@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from aerialdojo_gen.annotations.format import Object
 from aerialdojo_gen.config.pipeline import Pipeline
 from aerialdojo_gen.errors import AerialDojoError
+from aerialdojo_gen.geometry.angles import yaw_towards
 from aerialdojo_gen.geometry.cameras import Camera, view_pose
-from aerialdojo_gen.geometry.frames import yaw_towards
 from aerialdojo_gen.geometry.surface import Surface
 from aerialdojo_gen.pipeline.stage import Job, Roots
 from aerialdojo_gen.scenes.model import Scene
@@ -69,7 +69,7 @@ class AnchorDesk:
         self._lock = threading.Lock()
 
     def _build(self) -> Any:
-        from aerialdojo_gen.stages.anchor_world import World
+        from aerialdojo_gen.stages.work.anchor_world import World
 
         return World.of(self.scene, self._job.embodiment.radius_m, self.config.margin_m)
 
@@ -103,7 +103,7 @@ class AnchorDesk:
         list of dict
             Rows of the table ``anchors``, the best first; empty where nothing can be reached that sees the object.
         """
-        from aerialdojo_gen.stages.anchor_sample import anchors_of
+        from aerialdojo_gen.stages.work.anchor_sample import anchors_of
 
         key = (entry.id, entry.node)
         with self._lock:
@@ -163,7 +163,7 @@ class AnchorDesk:
         faults : list of str
             Why it will not do; empty where it will.
         """
-        from aerialdojo_gen.stages.anchor_choice import is_same, judge_anchor
+        from aerialdojo_gen.stages.work.anchor_choice import is_same, judge_anchor
 
         yaw = float(yaw_towards(position_m, self.scene[entry.node].centroid)) if yaw_rad is None else yaw_rad
         yaw = math.radians(round(math.degrees(yaw), 2))
@@ -191,8 +191,9 @@ class AnchorDesk:
         return view
 
     def _look(self, position_m: Floats, yaw_rad: float) -> View:
-        from aerialdojo_gen.rendering.world import ray_caster, render_world
-        from aerialdojo_gen.stages.reference_images import box_of, instance_map, png
+        from aerialdojo_gen.rendering.casters import ray_caster
+        from aerialdojo_gen.rendering.world import render_world
+        from aerialdojo_gen.stages.work.reference_images import box_of, instance_map, png
 
         camera = Camera(self._pictures.width, self._pictures.height, self._pictures.fov_deg)
         pose = view_pose(position_m, yaw_rad, "front")

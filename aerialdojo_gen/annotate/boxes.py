@@ -14,10 +14,11 @@ from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
+from aerialdojo_gen.common.disk import disk_error
 from aerialdojo_gen.errors import AerialDojoError
 from aerialdojo_gen.pipeline.stage import Roots
 from aerialdojo_gen.scenes.recipe import Cut, load_imported
-from aerialdojo_gen.store.atomic import atomic_file, disk_error
+from aerialdojo_gen.store.atomic import atomic_file
 
 _HEAD = "\n[[imported.cuts]]\n"
 

@@ -7,9 +7,9 @@ from collections.abc import Callable
 from typing import Any
 
 from aerialdojo_gen.agents import Agent, InvalidAnswer, Usage
+from aerialdojo_gen.agents.goal import N_ACTIONS, Goal, Observation
 from aerialdojo_gen.agents.load import place
-from aerialdojo_gen.benchmark.goal import N_ACTIONS, Goal, Observation
-from aerialdojo_gen.benchmark.secrets import Secrets
+from aerialdojo_gen.common.secrets import Secrets
 from aerialdojo_gen.errors import AerialDojoError
 
 _TOLERATED = "--tolerate logs such episodes as failures and goes on"

@@ -13,10 +13,10 @@ import pyarrow.compute as pc
 from gymnasium import spaces
 from numpy.typing import NDArray
 
+from aerialdojo_gen.agents.goal import N_ACTIONS, Sensors
 from aerialdojo_gen.benchmark.episode import Episode
 from aerialdojo_gen.benchmark.eyes import look, mosaic
 from aerialdojo_gen.benchmark.flight import Flight
-from aerialdojo_gen.benchmark.goal import N_ACTIONS, Sensors
 from aerialdojo_gen.benchmark.tasks import MODALITIES, Selection, read_tasks, reference_image, select
 from aerialdojo_gen.benchmark.texts import GoalText
 from aerialdojo_gen.config.agreement import SUCCESS_RADIUS_M

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 
-from aerialdojo_gen.benchmark.goal import N_ACTIONS
+from aerialdojo_gen.agents.goal import N_ACTIONS
 from aerialdojo_gen.benchmark.motion import FlightSpace, Point
-from aerialdojo_gen.planning.primitives import DISPLACEMENTS, TURN_RAD, TURNS
+from aerialdojo_gen.geometry.angles import wrap_one_rad
+from aerialdojo_gen.geometry.motion import DISPLACEMENTS, TURN_RAD, TURNS
 from aerialdojo_gen.store.schemas import STOP
 
 # Plain numbers: numpy's scalars would cost more than the motion itself.
@@ -75,8 +76,8 @@ class Episode:
 
     @property
     def yaw_rad(self) -> float:
-        """Yaw, radians, in (-pi, pi], counted from the start's as `primitives.replay` does."""
-        return math.pi - (math.pi - (self._start_yaw + self._heading * TURN_RAD)) % (2.0 * math.pi)
+        """Yaw, radians, in (-pi, pi], counted from the start's as `aerialdojo_gen.geometry.motion.replay` does."""
+        return wrap_one_rad(self._start_yaw + self._heading * TURN_RAD)
 
     @property
     def remaining_actions(self) -> int:

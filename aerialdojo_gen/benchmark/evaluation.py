@@ -7,10 +7,10 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
-from aerialdojo_gen.benchmark.goal import Sensors
-from aerialdojo_gen.benchmark.secrets import Secrets
+from aerialdojo_gen.agents.goal import Sensors
 from aerialdojo_gen.benchmark.tasks import Selection
 from aerialdojo_gen.benchmark.worker import Conditions
+from aerialdojo_gen.common.secrets import Secrets
 from aerialdojo_gen.config.sections import Embodiment
 
 

@@ -9,7 +9,7 @@ import weakref
 import numpy as np
 from numpy.typing import NDArray
 
-from aerialdojo_gen.benchmark.goal import Sensors
+from aerialdojo_gen.agents.goal import Sensors
 from aerialdojo_gen.benchmark.motion import Point
 from aerialdojo_gen.errors import RenderError
 from aerialdojo_gen.geometry.cameras import view_pose

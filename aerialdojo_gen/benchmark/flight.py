@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from aerialdojo_gen.agents.goal import Goal, Observation, Rules, Sensors
 from aerialdojo_gen.benchmark.episode import Episode
 from aerialdojo_gen.benchmark.eyes import look
-from aerialdojo_gen.benchmark.goal import Goal, Observation, Rules, Sensors
 from aerialdojo_gen.benchmark.motion import FlightSpace, flight_space
 from aerialdojo_gen.benchmark.tasks import Task, goal_of, mesh_of
 from aerialdojo_gen.config.agreement import SUCCESS_RADIUS_M

@@ -9,8 +9,8 @@ from types import TracebackType
 from typing import Any
 
 from aerialdojo_gen.common.bounded import loads_json
+from aerialdojo_gen.common.disk import disk_error
 from aerialdojo_gen.errors import Malformed, StoreError
-from aerialdojo_gen.store.atomic import disk_error
 
 
 class Journal:

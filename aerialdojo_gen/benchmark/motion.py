@@ -1,6 +1,6 @@
 """The body in a scene: the motion of an action, and whether its sweep touches anything.
 
-One motion model in the project: magnitudes and headings are those of `aerialdojo_gen.planning.primitives`. A leg
+One motion model in the project: magnitudes and headings are those of `aerialdojo_gen.geometry.motion`. A leg
 that the clearance grid proves free needs no more; FCL is asked about the others, a capsule for the exact sweep. That
 is what `aerialdojo_gen.planning.certify` does for reference trajectories, and what makes tens of thousands of steps a
 second.

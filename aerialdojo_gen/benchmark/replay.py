@@ -19,9 +19,9 @@ import numpy as np
 import pyarrow.compute as pc
 from numpy.typing import NDArray
 
+from aerialdojo_gen.agents.goal import Sensors
 from aerialdojo_gen.benchmark.episodes import read_run
 from aerialdojo_gen.benchmark.eyes import look
-from aerialdojo_gen.benchmark.goal import Sensors
 from aerialdojo_gen.benchmark.runs import Run
 from aerialdojo_gen.browse.lookup import ReleasedScene
 from aerialdojo_gen.errors import StoreError

@@ -15,7 +15,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 from numpy.typing import NDArray
 
-from aerialdojo_gen.benchmark.goal import Goal, Rules
+from aerialdojo_gen.agents.goal import Goal, Rules
 from aerialdojo_gen.benchmark.motion import Point
 from aerialdojo_gen.common import rng
 from aerialdojo_gen.errors import StoreError, UsageError

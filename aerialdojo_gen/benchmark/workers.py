@@ -16,11 +16,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from aerialdojo_gen.agents import load_agent
+from aerialdojo_gen.agents.goal import Sensors
 from aerialdojo_gen.benchmark.flight import Flight
-from aerialdojo_gen.benchmark.goal import Sensors
 from aerialdojo_gen.benchmark.pace import Pace
-from aerialdojo_gen.benchmark.secrets import Secrets
 from aerialdojo_gen.benchmark.worker import Finished, Unit, Worker
+from aerialdojo_gen.common.secrets import Secrets
 from aerialdojo_gen.errors import AerialDojoError, UsageError
 from aerialdojo_gen.pipeline.executors.local import start_worker
 

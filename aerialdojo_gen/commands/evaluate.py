@@ -13,7 +13,7 @@ from aerialdojo_gen.common.bounded import loads_json
 from aerialdojo_gen.errors import AerialDojoError, BeyondBounds, Malformed, UsageError
 
 if TYPE_CHECKING:
-    from aerialdojo_gen.benchmark.goal import Sensors
+    from aerialdojo_gen.agents.goal import Sensors
 
 app = typer.Typer()
 
@@ -124,7 +124,7 @@ def evaluate(
         requests_per_minute,
     )
     if estimate:
-        from aerialdojo_gen.llm.estimate import estimate as reckon
+        from aerialdojo_gen.benchmark.estimate import estimate as reckon
 
         print("\n".join(reckon(data, evaluation).lines(workers or default_workers())))
         return
@@ -158,7 +158,7 @@ def _agent(agent: str | None, preset: str | None, options: dict[str, Any]) -> tu
 
 
 def _options(given: list[str]) -> dict[str, Any]:
-    from aerialdojo_gen.benchmark.secrets import Secrets
+    from aerialdojo_gen.common.secrets import Secrets
 
     options: dict[str, Any] = {}
     for item in given:
@@ -183,7 +183,7 @@ def _sensors(
     from dataclasses import replace
 
     from aerialdojo_gen.agents import load_agent
-    from aerialdojo_gen.benchmark.goal import Sensors
+    from aerialdojo_gen.agents.goal import Sensors
 
     wanted = getattr(load_agent(agent, **options), "sensors", None)
     sensors = wanted if isinstance(wanted, Sensors) else Sensors()

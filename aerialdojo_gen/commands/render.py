@@ -22,13 +22,14 @@ from aerialdojo_gen.commands.common import (
     run_until,
 )
 from aerialdojo_gen.errors import UsageError
+from aerialdojo_gen.pipeline.registry import BY_NAME
 
 app = typer.Typer()
 
 _SECONDS = {"s": 1.0, "m": 60.0, "h": 3600.0, "d": 86400.0}
 
 
-@app.command("render")
+@app.command("render", help=BY_NAME["render"].help)
 def render(
     data: Data = Path("data"), scene: Scene = None, pipeline: PipelineFile = None,
     workers: Workers = None, force: Force = False, quiet: Quiet = False, replace: Replace = False,

@@ -65,7 +65,7 @@ def annotate_draft(
     force: Annotated[bool, typer.Option("--force", help="Overwrite an existing file.")] = False,
 ) -> None:
     """Draft a scene's annotations, to be checked and owned as sources."""
-    from aerialdojo_gen.annotations.command import draft_scene
+    from aerialdojo_gen.annotate.drafting import draft_scene
     from aerialdojo_gen.annotations.draft import Choice
     from aerialdojo_gen.pipeline.runner import choose_scenes, known_scenes
 
@@ -89,9 +89,9 @@ def gallery(
     small: Annotated[bool, typer.Option("--small", help="JPEGs of 1280 columns, for pages.")] = False,
 ) -> None:  # fmt: skip
     """Picture every prop and every scene as contact sheets."""
+    from aerialdojo_gen.layouts.build import build_scene
     from aerialdojo_gen.pipeline import runner
     from aerialdojo_gen.rendering.gallery import props_sheet, scene_sheet, write_picture
-    from aerialdojo_gen.scenes.build import build_scene
     from aerialdojo_gen.scenes.catalogue import load_catalogue
     from aerialdojo_gen.store.atomic import make_folder
 

@@ -20,21 +20,12 @@ from aerialdojo_gen.commands.common import (
     run_stages,
     run_until,
 )
+from aerialdojo_gen.pipeline.registry import BY_NAME, STAGES
 
 app = typer.Typer()
 
-# The stages whose command has no option of its own; their texts are those of `aerialdojo_gen.pipeline.registry`,
-# which is not imported here because it brings pyarrow.
-PLAIN_STAGES = {
-    "build-scenes": "Build the scenes' meshes from their recipes.",
-    "annotate-import": "Check the annotations against the scenes and import them.",
-    "anchor-sample": "Find viewpoints 1 m from each object that see it.",
-    "reference-images": "Render each object's picture from its selected anchor.",
-    "pair-objects": "Pair start anchors with targets: the candidate tasks.",
-    "plan": "Plan a collision-free reference trajectory for every candidate.",
-    "filter": "Keep the candidates that make tasks, with a reason for every rejection.",
-}
-SPLIT = "Write the release: tasks, routes, objects, train and test."
+# Stages whose command has options of its own.
+_WITH_OPTIONS = ("split", "render")
 
 
 def _stage_command(name: str) -> Callable[..., None]:
@@ -47,11 +38,12 @@ def _stage_command(name: str) -> Callable[..., None]:
     return command
 
 
-for _name, _help in PLAIN_STAGES.items():
-    app.command(_name, help=_help)(_stage_command(_name))
+for _stage in STAGES:
+    if _stage.name not in _WITH_OPTIONS:
+        app.command(_stage.name, help=_stage.help)(_stage_command(_stage.name))
 
 
-@app.command("split", help=SPLIT)
+@app.command("split", help=BY_NAME["split"].help)
 def split(
     data: Data = Path("data"), scene: Scene = None, pipeline: PipelineFile = None,
     workers: Workers = None, force: Force = False, quiet: Quiet = False, replace: Replace = False,

@@ -10,8 +10,8 @@ import os
 import resource
 from collections.abc import Iterator, Sequence
 
+from aerialdojo_gen.common.disk import DISK_ERRORS
 from aerialdojo_gen.errors import AerialDojoError, UsageError
-from aerialdojo_gen.store.atomic import DISK_ERRORS
 
 # Python with the libraries of a command has about 20 open, every worker process some more.
 _LEAST_FILES = 64

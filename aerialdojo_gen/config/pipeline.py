@@ -55,8 +55,8 @@ class Pipeline(Section):
         return self
 
     def section(self, stage: str) -> Section:
-        """Return the section of a stage, by the stage's name (``"anchor-sample"``)."""
-        section = getattr(self, stage.replace("-", "_"))
+        """Return the section of a stage, by the stage's name (``"anchor-sample"``); else an empty one."""
+        section = getattr(self, stage.replace("-", "_"), Section())
         assert isinstance(section, Section)
         return section
 

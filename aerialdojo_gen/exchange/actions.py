@@ -12,7 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from aerialdojo_gen.planning.primitives import DISPLACEMENTS, TURN_RAD
+from aerialdojo_gen.geometry.angles import wrap_angle_rad
+from aerialdojo_gen.geometry.motion import DISPLACEMENTS, TURN_RAD
 from aerialdojo_gen.store.schemas import ACTION_NAMES, APPROACH, STOP, TURN_LEFT, TURN_RIGHT
 
 Floats = NDArray[np.float64]
@@ -82,8 +83,7 @@ def body_steps(poses: Floats) -> Floats:
     """Say what happens between consecutive poses, (n, 4), in the body's frame: (n - 1, 4) steps."""
     d = np.diff(poses[:, :3], axis=0)
     cos, sin = np.cos(poses[:-1, 3]), np.sin(poses[:-1, 3])
-    turn = np.diff(poses[:, 3])
-    turn = np.arctan2(np.sin(turn), np.cos(turn))
+    turn = wrap_angle_rad(np.diff(poses[:, 3]))
     return np.column_stack([cos * d[:, 0] + sin * d[:, 1], cos * d[:, 1] - sin * d[:, 0], d[:, 2], turn])
 
 

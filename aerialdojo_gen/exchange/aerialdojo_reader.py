@@ -25,7 +25,7 @@ from aerialdojo_gen.exchange.fields import BadField, Fields, plain, positions_of
 from aerialdojo_gen.exchange.folder import check_picture, inside
 from aerialdojo_gen.exchange.jsonstream import small_document
 from aerialdojo_gen.exchange.task import Context, Instance, Route, Task, digest
-from aerialdojo_gen.stages.build_scenes import parse_name
+from aerialdojo_gen.stages.work.build_scenes import parse_name
 
 _PAIR = re.compile(r"(\d{1,9})_(\d{1,9})__(\d{1,9})")
 _STEP = ("position_ned_m", "quaternion_xyzw")

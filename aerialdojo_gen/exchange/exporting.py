@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
-from aerialdojo_gen import __version__
+from aerialdojo_gen.common.version import __version__
 from aerialdojo_gen.errors import UsageError
 from aerialdojo_gen.exchange import aerialdojo_writer, habitat_writer
 from aerialdojo_gen.exchange.folder import whole_folder, write_json

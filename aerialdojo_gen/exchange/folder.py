@@ -9,8 +9,9 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path, PurePosixPath
 from typing import Any
 
+from aerialdojo_gen.common.disk import disk_error
 from aerialdojo_gen.errors import UsageError
-from aerialdojo_gen.store.atomic import atomic_folder, disk_error
+from aerialdojo_gen.store.atomic import atomic_folder
 from aerialdojo_gen.store.staging import sweep
 
 _PICTURES = (b"\x89PNG\r\n\x1a\n", b"\xff\xd8\xff")

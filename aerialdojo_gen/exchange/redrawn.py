@@ -13,7 +13,7 @@ from aerialdojo_gen.errors import AssetError, StoreError
 from aerialdojo_gen.geometry.cameras import Camera, view_pose
 from aerialdojo_gen.rendering.backend import choose_renderer, kept_renderer
 from aerialdojo_gen.scenes.glb import read_glb
-from aerialdojo_gen.stages.reference_images import png
+from aerialdojo_gen.stages.work.reference_images import png
 from aerialdojo_gen.store import shards as store
 
 # Between two sizes and two renderers edges and shadows' rims differ; another view or object differs by far more.

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from aerialdojo_gen.config.sections import FilterConfig
 from aerialdojo_gen.exchange.frames import Frame
 from aerialdojo_gen.exchange.tables import IMPORTED_ROUTES
-from aerialdojo_gen.planning.primitives import route_length_m, wrap_rad
+from aerialdojo_gen.geometry.angles import wrap_turned_rad
+from aerialdojo_gen.geometry.motion import route_length_m
 
 Floats = NDArray[np.float64]
 
@@ -181,7 +182,7 @@ def route_row(task: Task, nav_id: str, source: dict[str, Any]) -> dict[str, Any]
         "length_m": length,
         "detour_ratio": length / row["euclidean_m"] if row["euclidean_m"] else None,
         **{name: poses[:, k].tolist() for k, name in enumerate(("x_m", "y_m", "z_m"))},
-        "yaw_rad": wrap_rad(poses[:, 3]).tolist(),
+        "yaw_rad": wrap_turned_rad(poses[:, 3]).tolist(),
         "action": task.route.action,
         "source_action": task.route.source_action,
         "replay_error_m": task.route.replay_error_m,

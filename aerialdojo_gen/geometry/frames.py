@@ -1,4 +1,4 @@
-"""Frames and angles.
+"""Frames, and how an orientation is said in them.
 
 World (ENU): right-handed, x east, y north, z up, metres; yaw in radians, counter-clockwise from +x.
 NED, the frame of most autopilots and of AirSim: x north, y east, z down; yaw clockwise from north.
@@ -11,49 +11,10 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from aerialdojo_gen.store.schemas import DIRECTIONS
+from aerialdojo_gen.common.terms import DIRECTIONS
+from aerialdojo_gen.geometry.angles import wrap_angle_rad
 
 Floats = NDArray[np.float64]
-
-
-def wrap_angle_rad(angle_rad: ArrayLike) -> Floats:
-    """Bring angles into (-π, π].
-
-    Parameters
-    ----------
-    angle_rad : array_like
-        Angles in radians, any shape.
-
-    Returns
-    -------
-    ndarray of float64
-        The same directions in (-π, π], the shape of the input; a 0-d array for a number.
-    """
-    angle = np.asarray(angle_rad, dtype=np.float64)
-    inside = (angle > -math.pi) & (angle <= math.pi)
-    wrapped = math.pi - np.mod(math.pi - angle, 2.0 * math.pi)
-    # np.mod may round up to the modulus itself, which would give -π; angles already inside stay exact.
-    wrapped = np.where(wrapped <= -math.pi, math.pi, wrapped)
-    return np.asarray(np.where(inside, angle, wrapped))
-
-
-def yaw_towards(position: ArrayLike, target: ArrayLike) -> Floats:
-    """Yaw that faces a target.
-
-    Parameters
-    ----------
-    position, target : (..., 2) or (..., 3) array_like
-        Metres, world frame; z plays no part. They broadcast against each other.
-
-    Returns
-    -------
-    (...) ndarray of float64
-        Radians in (-π, π], counter-clockwise from +x; 0 where the two stand on one vertical line.
-    """
-    p, q = np.asarray(position, dtype=np.float64), np.asarray(target, dtype=np.float64)
-    yaw = np.arctan2(q[..., 1] - p[..., 1], q[..., 0] - p[..., 0])
-    # A difference of -0.0 makes arctan2 answer -π for due west.
-    return np.asarray(np.where(yaw <= -math.pi, math.pi, yaw))
 
 
 def compass_direction(dx_m: float, dy_m: float) -> str:
@@ -70,7 +31,7 @@ def compass_direction(dx_m: float, dy_m: float) -> str:
     Returns
     -------
     str
-        One of `aerialdojo_gen.store.schemas.DIRECTIONS`.
+        One of `aerialdojo_gen.common.terms.DIRECTIONS`.
 
     Raises
     ------

@@ -17,7 +17,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from aerialdojo_gen.geometry.columns import ColumnIndex, Plan, lowest_of, shares_of
-from aerialdojo_gen.scenes.model import Scene
+from aerialdojo_gen.geometry.soup import Things
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -60,7 +60,7 @@ class Ground:
     bare: Floats
 
     @classmethod
-    def of(cls, scene: Scene, radius_m: float | None = None) -> Ground | None:
+    def of(cls, scene: Things, radius_m: float | None = None) -> Ground | None:
         """Find a scene's ground by its form alone.
 
         A connected body of triangles is ground if it has a rim; is level rather than steep, or most of the scene;
@@ -70,7 +70,7 @@ class Ground:
 
         Parameters
         ----------
-        scene : Scene
+        scene : Things
             World coordinates, metres.
         radius_m : float, optional
             Of a body: ground that it cannot get past, because something lies in every column that it can fly in, is

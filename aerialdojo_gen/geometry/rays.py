@@ -7,8 +7,7 @@ from embreex.mesh_construction import TriangleMesh
 from embreex.rtcore_scene import EmbreeScene
 from numpy.typing import ArrayLike, NDArray
 
-from aerialdojo_gen.geometry.soup import soup
-from aerialdojo_gen.scenes.model import Instance, Scene
+from aerialdojo_gen.geometry.soup import Body, Things, soup
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
@@ -113,7 +112,7 @@ class RayCaster:
 
     Parameters
     ----------
-    scene : Scene
+    scene : Things
         All its instances are hit, from both sides.
 
     Attributes
@@ -122,7 +121,7 @@ class RayCaster:
         Node names in the scene's order: what `first_hit`'s indices mean.
     """
 
-    def __init__(self, scene: Scene) -> None:
+    def __init__(self, scene: Things) -> None:
         self.nodes = tuple(i.node for i in scene.instances)
         self._owner = np.repeat(np.arange(len(self.nodes), dtype=np.int32), [len(i.faces) for i in scene.instances])
         self._triangles = TriangleRayCaster(*soup(scene.instances))
@@ -178,12 +177,12 @@ class RayCaster:
         return seen
 
 
-def instance_caster(instance: Instance) -> TriangleRayCaster:
+def instance_caster(instance: Body) -> TriangleRayCaster:
     """Cast rays at one instance as if it stood alone.
 
     Parameters
     ----------
-    instance : Instance
+    instance : Body
         In world coordinates.
 
     Returns

@@ -1,4 +1,4 @@
-"""Triangles of several bodies as one soup."""
+"""Triangles of several bodies as one soup, and what geometry asks of a scene."""
 
 from __future__ import annotations
 
@@ -19,6 +19,30 @@ class Body(Protocol):
     @property
     def faces(self) -> NDArray[Any]:
         """(m, 3) integers, indices into `vertices`."""
+
+
+class Thing(Body, Protocol):
+    """A named body that stands in the world, as `aerialdojo_gen.scenes.model.Instance` is."""
+
+    @property
+    def node(self) -> str:
+        """Name, unique among the things."""
+
+    @property
+    def bounds(self) -> NDArray[np.float64]:
+        """Axis-aligned box, (2, 3) float64, metres, world frame: lower corner, upper corner."""
+
+
+class Things(Protocol):
+    """Things and the volume that a drone may fly in among them, as `aerialdojo_gen.scenes.model.Scene` is."""
+
+    @property
+    def instances(self) -> Sequence[Thing]:
+        """In a stable order."""
+
+    @property
+    def bounds(self) -> NDArray[np.float64]:
+        """Flight volume, (2, 3) float64, metres, world frame: lower corner, upper corner."""
 
 
 def soup(bodies: Sequence[Body]) -> tuple[NDArray[np.float64], NDArray[np.int32]]:

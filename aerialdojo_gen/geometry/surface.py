@@ -10,7 +10,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
-from aerialdojo_gen.scenes.model import Instance
+from aerialdojo_gen.geometry.soup import Body
+from aerialdojo_gen.geometry.triangles import closest_point_d2
 
 Floats = NDArray[np.float64]
 
@@ -18,52 +19,16 @@ _LEAST_AREA_M2 = 1e-12
 
 
 @njit(cache=True)
-def _triangle_distance_sq(p: Floats, t: Floats) -> float:
-    """Squared distance from p to a triangle (Ericson, Real-Time Collision Detection, 5.1.5)."""
-    a0, a1, a2 = t[0], t[1], t[2]
-    ab0, ab1, ab2 = t[3] - a0, t[4] - a1, t[5] - a2
-    ac0, ac1, ac2 = t[6] - a0, t[7] - a1, t[8] - a2
-    ap0, ap1, ap2 = p[0] - a0, p[1] - a1, p[2] - a2
-    d1 = ab0 * ap0 + ab1 * ap1 + ab2 * ap2
-    d2 = ac0 * ap0 + ac1 * ap1 + ac2 * ap2
-    d3 = d1 - (ab0 * ab0 + ab1 * ab1 + ab2 * ab2)
-    d4 = d2 - (ab0 * ac0 + ab1 * ac1 + ab2 * ac2)
-    d5 = d1 - (ab0 * ac0 + ab1 * ac1 + ab2 * ac2)
-    d6 = d2 - (ac0 * ac0 + ac1 * ac1 + ac2 * ac2)
-    va, vb, vc = d3 * d6 - d5 * d4, d5 * d2 - d1 * d6, d1 * d4 - d3 * d2
-    if d1 <= 0.0 and d2 <= 0.0:
-        v, w = 0.0, 0.0
-    elif d3 >= 0.0 and d4 <= d3:
-        v, w = 1.0, 0.0
-    elif vc <= 0.0 and d1 >= 0.0 and d3 <= 0.0:
-        v, w = d1 / (d1 - d3), 0.0
-    elif d6 >= 0.0 and d5 <= d6:
-        v, w = 0.0, 1.0
-    elif vb <= 0.0 and d2 >= 0.0 and d6 <= 0.0:
-        v, w = 0.0, d2 / (d2 - d6)
-    elif va <= 0.0 and d4 - d3 >= 0.0 and d5 - d6 >= 0.0:
-        w = (d4 - d3) / ((d4 - d3) + (d5 - d6))
-        v = 1.0 - w
-    else:
-        total = va + vb + vc
-        v, w = vb / total, vc / total
-    x = ap0 - v * ab0 - w * ac0
-    y = ap1 - v * ab1 - w * ac1
-    z = ap2 - v * ab2 - w * ac2
-    return x * x + y * y + z * z
-
-
-@njit(cache=True)
 def _distance(p: Floats, triangles: Floats, spheres: Floats, guess: int) -> tuple[float, int]:
     """Distance to the nearest triangle and its index, searched from a guess that prunes the rest."""
     nearest = guess
-    best_sq = _triangle_distance_sq(p, triangles[guess])
+    best_sq = closest_point_d2(p, triangles[guess])
     best = np.sqrt(best_sq)
     for k in range(len(triangles)):
         x, y, z = p[0] - spheres[k, 0], p[1] - spheres[k, 1], p[2] - spheres[k, 2]
         reach = best + spheres[k, 3]
         if x * x + y * y + z * z < reach * reach:
-            d_sq = _triangle_distance_sq(p, triangles[k])
+            d_sq = closest_point_d2(p, triangles[k])
             if d_sq < best_sq:
                 best_sq, nearest = d_sq, k
                 best = np.sqrt(d_sq)
@@ -133,7 +98,7 @@ class Surface:
         self._spheres = np.ascontiguousarray(np.column_stack([centre, radius * (1 + 1e-9) + 1e-9]))
 
     @classmethod
-    def of(cls, instance: Instance) -> Surface:
+    def of(cls, instance: Body) -> Surface:
         """Take the surface of an instance."""
         return cls(instance.vertices, instance.faces)
 

@@ -283,7 +283,7 @@ def _category(body: RawNode) -> str:
 
 
 def _looks(body: RawNode, tall: float, low: float) -> dict[str, str]:
-    from aerialdojo_gen.imports.colours import colour_name
+    from aerialdojo_gen.scenes.colour_names import colour_name
 
     size = body.vertices.max(axis=0) - body.vertices.min(axis=0)
     looks = {"colour": colour_name(np.median(body.colours, axis=0))}

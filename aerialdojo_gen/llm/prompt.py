@@ -10,7 +10,7 @@ import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from aerialdojo_gen.benchmark.goal import Goal, Observation
+from aerialdojo_gen.agents.goal import Goal, Observation
 from aerialdojo_gen.llm.actions import SIXTEEN, ActionSet
 
 _LOOKS = {"front": "ahead", "left": "to the left", "right": "to the right", "down": "straight down"}

@@ -12,7 +12,7 @@ from urllib.parse import urlsplit
 from tenacity import RetryCallState, Retrying, retry_if_exception, stop_after_attempt
 
 from aerialdojo_gen.agents.base import AgentUnavailable, ServiceDown
-from aerialdojo_gen.benchmark.secrets import Secrets
+from aerialdojo_gen.common.secrets import Secrets
 from aerialdojo_gen.errors import AerialDojoError, UsageError
 from aerialdojo_gen.llm.faults import refusal
 from aerialdojo_gen.llm.http import CONNECT_S, BodyBoundError, Meter, bounded_client, retry_after_s

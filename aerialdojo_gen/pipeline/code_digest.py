@@ -27,7 +27,10 @@ PLUMBING: dict[str, tuple[str, ...]] = {
     "aerialdojo_gen": (),
     "aerialdojo_gen.benchmark": (),
     "aerialdojo_gen.common": (),
+    "aerialdojo_gen.common.disk": (),
+    "aerialdojo_gen.common.terms": ("*",),
     "aerialdojo_gen.common.trouble": (),
+    "aerialdojo_gen.common.version": (),
     "aerialdojo_gen.config": (),
     "aerialdojo_gen.config.agreement": (),
     "aerialdojo_gen.config.explain": (),
@@ -46,15 +49,25 @@ PLUMBING: dict[str, tuple[str, ...]] = {
     "aerialdojo_gen.pipeline.registry": (),
     "aerialdojo_gen.pipeline.runner": (),
     "aerialdojo_gen.pipeline.stage": ("Job",),
+    "aerialdojo_gen.stages": (),
+    "aerialdojo_gen.stages.work": (),
     "aerialdojo_gen.store": (),
     "aerialdojo_gen.store.atomic": (),
     "aerialdojo_gen.store.files": (),
     "aerialdojo_gen.store.footers": (),
     "aerialdojo_gen.store.parquet_files": ("write_clustered",),
     "aerialdojo_gen.store.schemas": ("*",),
+    "aerialdojo_gen.store.schemas.benchmark": ("*",),
+    "aerialdojo_gen.store.schemas.columns": ("*",),
+    "aerialdojo_gen.store.schemas.recordings": ("*",),
+    "aerialdojo_gen.store.schemas.release": ("*",),
+    "aerialdojo_gen.store.schemas.staged": ("*",),
     "aerialdojo_gen.store.shards": ("partition", "check_scene_name"),
     "aerialdojo_gen.store.staging": (),
 }
+# Of a stage's module, which declares it, and which says more: these definitions count, and nothing else. What it
+# decides about the configuration (`settle`) or refuses (`check`) shapes no bytes that the configuration does not.
+_DECLARED = ("run", "parts", "sources")
 # What writes every stage's rows.
 _WRITERS = (Edge("aerialdojo_gen.store.parquet_files", "write_clustered"), Edge("aerialdojo_gen.store.tables"))
 
@@ -115,6 +128,13 @@ def stage_code(stage: str) -> Code:
 def stage_module(stage: str) -> str:
     """Name the module of a stage."""
     return f"aerialdojo_gen.stages.{stage.replace('-', '_')}"
+
+
+def counted(module: str) -> tuple[str, ...] | None:
+    """Return which of a module's definitions count, ``("*",)`` for all that are asked for; None if all of it does."""
+    if module in PLUMBING:
+        return PLUMBING[module]
+    return _DECLARED if module.rpartition(".")[0] == "aerialdojo_gen.stages" else None
 
 
 class Package:
@@ -203,7 +223,7 @@ class _Search:
             elif edge.name == "**":
                 waiting += [Edge(module) for module in self._package.modules_in(edge.module)]
             elif edge.name and self._package.contains(f"{edge.module}.{edge.name}"):
-                waiting += [Edge(edge.module), Edge(f"{edge.module}.{edge.name}", "", edge.uses)]
+                waiting += [Edge(edge.module, "", ()), Edge(f"{edge.module}.{edge.name}", "", edge.uses)]
             else:
                 names = (edge.name,) if edge.name else edge.uses
                 waiting += self._enter(edge.module, names)
@@ -211,8 +231,9 @@ class _Search:
     def _enter(self, module: str, names: tuple[str, ...]) -> Iterator[Edge]:
         above = module.rpartition(".")[0]
         if above:
-            yield Edge(above)
-        if module in PLUMBING:
+            # Its ``__init__`` runs; of plumbing nothing is asked by that.
+            yield Edge(above, "", ())
+        if counted(module) is not None:
             yield from self._definitions(module, names)
         elif module not in self.parts:
             facts = self._package.facts(module)
@@ -223,12 +244,15 @@ class _Search:
             yield from facts.edges
 
     def _definitions(self, module: str, names: tuple[str, ...]) -> Iterator[Edge]:
-        counted = PLUMBING[module]
-        if not counted:
+        listed = counted(module)
+        if not listed:
             return
-        known = self._package.facts(module).definitions
-        allowed = set(known) if counted == ("*",) else set(counted)
+        facts = self._package.facts(module)
+        known = facts.definitions
+        allowed = {*known, *facts.handed_on} if listed == ("*",) else set(listed)
         waiting = sorted(allowed if "*" in names else allowed & set(names))
+        for name in waiting:
+            yield from facts.handed_on.get(name, ())
         while waiting:
             name = waiting.pop()
             if name in known and f"{module}:{name}" not in self.parts:
@@ -254,7 +278,7 @@ class _Cache:
     def facts(self, source: bytes, module: str, is_package: bool) -> Facts:
         """Return a source's facts."""
         digest = hashlib.sha256(source).hexdigest()
-        by_definition = bool(PLUMBING.get(module))
+        by_definition = bool(counted(module))
         key = [digest, by_definition]
         entry = self._entries.get(module)
         if entry is None or entry["key"] != key:
@@ -289,6 +313,7 @@ def _facts(raw: dict[str, Any]) -> Facts:
             for name, d in raw["definitions"].items()
         },
         tuple(raw["unknown"]),
+        {name: _edges(edges) for name, edges in raw["handed_on"].items()},
     )
 
 

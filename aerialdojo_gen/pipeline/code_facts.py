@@ -65,12 +65,16 @@ class Facts:
         By name; empty where they were not asked for.
     unknown : tuple of str
         Imports whose module is known only when the code runs.
+    handed_on : dict of str to tuple of Edge
+        Names that the module binds at its top level by importing them from this package, and where they are from;
+        empty where definitions were not asked for.
     """
 
     digest: str
     edges: tuple[Edge, ...]
     definitions: dict[str, Definition] = field(default_factory=dict)
     unknown: tuple[str, ...] = ()
+    handed_on: dict[str, tuple[Edge, ...]] = field(default_factory=dict)
 
 
 def module_facts(source: bytes, module: str, is_package: bool, by_definition: bool = False) -> Facts:
@@ -115,7 +119,19 @@ def module_facts(source: bytes, module: str, is_package: bool, by_definition: bo
         for name, nodes in statements.items()
         if name not in imports.bound
     }
-    return Facts(_digest([tree]), edges, definitions, tuple(sorted(imports.unknown)))
+    own = module.split(".")[0]
+    handed_on = {
+        name: tuple(sorted(edge for edge in imports.bound[name] if edge.module.split(".")[0] == own))
+        for name in statements
+        if name in imports.bound
+    }
+    return Facts(
+        _digest([tree]),
+        edges,
+        definitions,
+        tuple(sorted(imports.unknown)),
+        {name: edges for name, edges in handed_on.items() if edges},
+    )
 
 
 def _bound(statement: ast.stmt) -> Iterator[str]:

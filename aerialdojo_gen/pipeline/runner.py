@@ -17,6 +17,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TextIO
 
+from aerialdojo_gen.common.disk import disk_error
 from aerialdojo_gen.config.pipeline import Pipeline
 from aerialdojo_gen.errors import AerialDojoError, BudgetSpent, StoreError, UsageError
 from aerialdojo_gen.pipeline.code_digest import stage_code
@@ -26,7 +27,6 @@ from aerialdojo_gen.pipeline.interrupt import Interrupts
 from aerialdojo_gen.pipeline.progress import Reporter
 from aerialdojo_gen.pipeline.registry import STAGES
 from aerialdojo_gen.pipeline.stage import Roots, Stage
-from aerialdojo_gen.store.atomic import disk_error
 from aerialdojo_gen.store.staging import sweep, sweep_unstaged
 
 

@@ -1,12 +1,11 @@
-"""What a stage is, and the stages in their order.
+"""What a stage is, and what its work is given and gives.
 
-A stage's work is a plain function ``run(job, config) -> Output`` in its module under `aerialdojo_gen.stages`. What
-the runner must know without importing that module (and with it numba, FCL or PyBullet) stands here.
+A stage is declared by its module in `aerialdojo_gen.stages`; its work is a plain function
+``run(job, config) -> Output``. Nothing heavy is imported here: the command line reads the declarations.
 """
 
 from __future__ import annotations
 
-import importlib
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
@@ -14,14 +13,10 @@ from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from aerialdojo_gen.config.sections import Embodiment
-from aerialdojo_gen.pipeline.code_digest import stage_module
-from aerialdojo_gen.store import shards as store
-from aerialdojo_gen.store.atomic import atomic_file
-
 if TYPE_CHECKING:
     import pyarrow as pa
 
+    from aerialdojo_gen.config.sections import Embodiment
     from aerialdojo_gen.scenes.model import Scene
 
 
@@ -113,7 +108,9 @@ class Job:
 
     def read(self, table: str) -> pa.Table:
         """Read all of this scene's rows of a table; StoreError names a missing or damaged shard."""
-        return store.read_scene(self.roots.data, table, self.scene)
+        from aerialdojo_gen.store import shards
+
+        return shards.read_scene(self.roots.data, table, self.scene)
 
     def scene_model(self) -> Scene:
         """Read the scene's mesh (kept in memory between the jobs of a process)."""
@@ -133,6 +130,8 @@ class Job:
         context manager of Path
             The temporary path to write to, with the same suffix.
         """
+        from aerialdojo_gen.store.atomic import atomic_file
+
         self.files.append(relative)
         self.digested.append(relative)
         return atomic_file(self.roots.data, relative)
@@ -177,6 +176,8 @@ class Stage:
         One line for the command line.
     reads, writes : tuple of str
         Tables (keys of `aerialdojo_gen.store.shards.LAYOUT`), one scene of each.
+    run : callable
+        ``(job, config) -> Output``: computes a shard. It imports what it needs when it is called.
     parts : callable
         ``(data, scene, config) -> int``: number of shards of a scene; may read upstream tables.
     sources : callable
@@ -198,15 +199,10 @@ class Stage:
     help: str
     reads: tuple[str, ...]
     writes: tuple[str, ...]
+    run: Callable[[Job, Any], Output]
     parts: Callable[[Path, str, Any], int] = _one_part
     sources: Callable[[Roots, str], list[Path]] = _no_sources
     check: Callable[[Path, Sequence[str], Any], None] = _no_check
     settle: Callable[[Any, Callable[[str], None]], Any] = _as_it_is
     choices: Callable[[Any], list[Any]] = _no_choice
     digests: tuple[str, str, str] | None = None
-
-    def load(self) -> Callable[[Job, Any], Output]:
-        """Import the stage's module and return its ``run``."""
-        module = importlib.import_module(stage_module(self.name))
-        run: Callable[[Job, Any], Output] = module.run
-        return run

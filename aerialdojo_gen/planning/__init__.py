@@ -1,1 +1,1 @@
-"""Collision world, clearance grid, motion primitives, cost-to-go and Hybrid A*."""
+"""Collision world, clearance grid, cost-to-go and Hybrid A*."""

@@ -12,13 +12,13 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from aerialdojo_gen.common.terms import APPROACH, STOP
+from aerialdojo_gen.geometry.motion import fly
 from aerialdojo_gen.planning.certify import Examination, examine
 from aerialdojo_gen.planning.cost_to_go import cost_at
 from aerialdojo_gen.planning.grid_kernels import GridArrays
 from aerialdojo_gen.planning.hybrid_astar import FOUND, SearchArrays, SearchOptions, search
-from aerialdojo_gen.planning.primitives import fly
 from aerialdojo_gen.planning.refine import moves_to_actions
-from aerialdojo_gen.store.schemas import APPROACH, STOP
 
 # A goal nearer than this is met already, and needs no Approach.
 _ON_GOAL_M = 1e-9

@@ -10,22 +10,11 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from aerialdojo_gen.planning.triangles import point_triangle_d2, segment_triangle_d2
+from aerialdojo_gen.geometry.morton import morton_codes
+from aerialdojo_gen.geometry.triangles import point_triangle_d2, segment_triangle_d2
 
 LEAF = 4
 _STACK = 64
-
-
-def _morton(points: NDArray[np.float64]) -> NDArray[np.uint64]:
-    """Interleave the bits of 21-bit coordinates, (n, 3) float64 to (n,) uint64."""
-    low = points.min(axis=0)
-    extent = max(float((points.max(axis=0) - low).max()), 1e-9)
-    cells = ((points - low) / extent * (2**21 - 1)).astype(np.uint64)
-    code = np.zeros(len(points), np.uint64)
-    for bit in range(21):
-        for axis in range(3):
-            code |= ((cells[:, axis] >> np.uint64(bit)) & np.uint64(1)) << np.uint64(3 * bit + axis)
-    return code
 
 
 def build_bvh(triangles: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -47,7 +36,7 @@ def build_bvh(triangles: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDAr
     n = len(triangles)
     if n:
         centres = triangles.reshape(-1, 3, 3).mean(axis=1)
-        triangles = np.ascontiguousarray(triangles[np.argsort(_morton(centres), kind="stable")])
+        triangles = np.ascontiguousarray(triangles[np.argsort(morton_codes(centres), kind="stable")])
     leaves = 1
     while leaves * LEAF < n:
         leaves *= 2

@@ -12,11 +12,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from aerialdojo_gen.geometry.ground import Ground
+from aerialdojo_gen.geometry.triangles import split_triangles
 from aerialdojo_gen.planning.bvh import build_bvh, crossings_above, point_distance
 from aerialdojo_gen.planning.connectivity import connected_with_ceiling, linked_cell, passable_moves
 from aerialdojo_gen.planning.distance_field import build_distance_field
 from aerialdojo_gen.planning.grid_kernels import GridArrays, inside, segment_free
-from aerialdojo_gen.planning.triangles import split_triangles
 from aerialdojo_gen.scenes.model import Scene
 
 # Longer triangles would have boxes full of nothing.

@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from aerialdojo_gen.planning.triangles import point_triangle_d2
+from aerialdojo_gen.geometry.triangles import point_triangle_d2
 
 # float32 rounds either way: take off more than it can add, so that a bound stays a bound.
 _ROUNDING_M = 1e-5
@@ -28,7 +28,7 @@ def _splat(
 ) -> None:
     """Lower `field` (squared distances) to every triangle's, in the triangle's box grown by `band`.
 
-    The distance is that of `aerialdojo_gen.planning.triangles.point_triangle_d2`, with what depends on the triangle
+    The distance is that of `aerialdojo_gen.geometry.triangles.point_triangle_d2`, with what depends on the triangle
     alone taken out of the loop over cells.
     """
     nx, ny, nz = field.shape

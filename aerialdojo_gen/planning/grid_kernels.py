@@ -9,8 +9,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from aerialdojo_gen.geometry.triangles import segment_triangle_d2
 from aerialdojo_gen.planning.bvh import point_distance, segment_blocker, segment_distance
-from aerialdojo_gen.planning.triangles import segment_triangle_d2
 
 FREE, UNKNOWN = -1, -2
 

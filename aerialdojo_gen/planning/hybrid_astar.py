@@ -18,9 +18,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from aerialdojo_gen.geometry.motion import N_HEADINGS, QUARTER, TURN_RAD
 from aerialdojo_gen.planning.cost_to_go import cost_at, cost_between
 from aerialdojo_gen.planning.grid_kernels import FREE, GridArrays, segment_free, what_blocks
-from aerialdojo_gen.planning.primitives import N_HEADINGS, QUARTER, TURN_RAD
 
 # A translation is direction * 3 + step for the horizontal ones, then up 1 and 2 m, down 1 and 2 m, then the Approach.
 STEPS_M = np.array([1.0, 3.0, 5.0])

@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from aerialdojo_gen.config.sections import PlanConfig
+from aerialdojo_gen.geometry.motion import nearest_heading
 from aerialdojo_gen.planning.attempt import attempt, costs_at
 from aerialdojo_gen.planning.certify import conclude
 from aerialdojo_gen.planning.clearance import ClearanceGrid
 from aerialdojo_gen.planning.collision import CollisionWorld
 from aerialdojo_gen.planning.cost_to_go import columns_by_distance, expand_cost, seed_goal
 from aerialdojo_gen.planning.hybrid_astar import EXHAUSTED, FOUND, SearchArrays, SearchOptions, make_search_arrays
-from aerialdojo_gen.planning.primitives import nearest_heading
 from aerialdojo_gen.scenes.model import Scene
 
 # Between cells the cost-to-go is interpolated: a little more than it is taken for what it promises.
@@ -29,7 +29,7 @@ class Route:
     Attributes
     ----------
     outcome : str
-        One of `aerialdojo_gen.store.schemas.OUTCOMES`.
+        One of `aerialdojo_gen.common.terms.OUTCOMES`.
     poses : (K + 1, 4) float64
         x, y, z in metres and yaw in (-pi, pi], world frame; no rows unless SOLVED.
     actions : (K + 1,) int8

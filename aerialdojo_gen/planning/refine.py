@@ -13,10 +13,10 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from aerialdojo_gen.common.terms import MOVE_DOWN_1, MOVE_UP_1, TURN_LEFT, TURN_RIGHT
+from aerialdojo_gen.geometry.motion import N_HEADINGS, QUARTER, TURN_RAD
 from aerialdojo_gen.planning.grid_kernels import GridArrays, inside, segment_free
 from aerialdojo_gen.planning.hybrid_astar import LIFTS_M, N_FLAT, N_STEPS, STEPS_M, turns_between
-from aerialdojo_gen.planning.primitives import N_HEADINGS, QUARTER, TURN_RAD
-from aerialdojo_gen.store.schemas import MOVE_DOWN_1, MOVE_UP_1, TURN_LEFT, TURN_RIGHT
 
 # Directions of a leg beyond the horizontal ones.
 _UP, _DOWN = N_HEADINGS, N_HEADINGS + 1

@@ -9,8 +9,8 @@ import jinja2
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from aerialdojo_gen import __version__
 from aerialdojo_gen.common.paper import inventory
+from aerialdojo_gen.common.version import __version__
 from aerialdojo_gen.release.contents import TABLES, check_release, counts, meaning, sizes, unit
 from aerialdojo_gen.release.croissant import CITE_AS
 from aerialdojo_gen.stats.tables import Made, in_paper_order, made_of

@@ -8,7 +8,7 @@ from typing import Any
 
 import pyarrow as pa
 
-from aerialdojo_gen import __version__
+from aerialdojo_gen.common.version import __version__
 from aerialdojo_gen.release.contents import TABLES, Table, check_release, counts, meaning, unit
 from aerialdojo_gen.store.atomic import atomic_file
 

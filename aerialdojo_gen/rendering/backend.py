@@ -23,8 +23,9 @@ from aerialdojo_gen.config.sections import RENDERERS, RendererName
 from aerialdojo_gen.errors import RenderError
 from aerialdojo_gen.geometry.cameras import Camera, view_pose
 from aerialdojo_gen.geometry.rays import RayCaster
+from aerialdojo_gen.rendering.casters import ray_caster
+from aerialdojo_gen.rendering.picture import Picture
 from aerialdojo_gen.rendering.probe import probe_scene
-from aerialdojo_gen.rendering.world import Picture, RenderWorld, ray_caster
 from aerialdojo_gen.scenes.model import Scene
 
 Floats = NDArray[np.float64]
@@ -98,6 +99,9 @@ class PyBulletRenderer:
     device = "TinyRenderer"
 
     def __init__(self, scene: Scene) -> None:
+        # Here alone, so that who draws with something else loads no PyBullet.
+        from aerialdojo_gen.rendering.world import RenderWorld
+
         self._scene = scene
         self._world = RenderWorld(scene)
 

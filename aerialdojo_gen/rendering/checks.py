@@ -23,7 +23,7 @@ from aerialdojo_gen.geometry.cameras import Camera
 from aerialdojo_gen.geometry.rays import TriangleRayCaster
 from aerialdojo_gen.geometry.soup import soup
 from aerialdojo_gen.rendering.codecs import MAX_DEPTH_M
-from aerialdojo_gen.rendering.world import NEAR_M, Picture
+from aerialdojo_gen.rendering.picture import NEAR_M, Picture
 from aerialdojo_gen.scenes.model import Scene
 
 Floats = NDArray[np.float64]

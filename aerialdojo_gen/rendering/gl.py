@@ -18,7 +18,7 @@ from aerialdojo_gen.geometry.cameras import Camera
 from aerialdojo_gen.rendering import gl_shaders as glsl
 from aerialdojo_gen.rendering.gl_geometry import VERTEX, chunks
 from aerialdojo_gen.rendering.lighting import light_of, sun_view
-from aerialdojo_gen.rendering.world import FAR_M, NEAR_M, Picture
+from aerialdojo_gen.rendering.picture import FAR_M, NEAR_M, Picture
 from aerialdojo_gen.scenes.model import Scene
 
 Floats = NDArray[np.float64]

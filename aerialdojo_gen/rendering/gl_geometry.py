@@ -15,6 +15,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from aerialdojo_gen.geometry.morton import morton_codes
 from aerialdojo_gen.scenes.model import Scene
 
 Floats = NDArray[np.float64]
@@ -22,6 +23,7 @@ Floats = NDArray[np.float64]
 CHUNK_TRIANGLES = 96
 _LARGEST_TEXTURE = 512
 # Corners nearer than this are not projected; and how far OpenGL may round a corner, pixels.
+_MORTON_BITS = 16
 _NEAR_W, _ROUNDING_PX = 0.05, 0.02
 
 # Three vertices a triangle, none shared: normal, colour and instance are those of the face.
@@ -186,7 +188,7 @@ def _cut(parts: list[NDArray[np.void]]) -> Chunks:
     extent = (high - low).max(axis=1)
     # Large triangles apart from small ones, or every chunk's box would be as large as the largest in it.
     size = np.floor(np.log2(np.maximum(extent, 1.0)) / 1.5).astype(np.int64)
-    order = np.lexsort((_morton((low + high) / 2.0), size))
+    order = np.lexsort((morton_codes((low + high) / 2.0, _MORTON_BITS), size))
     triangles, corners = triangles[order], corners[order]
     starts = np.arange(0, len(triangles), CHUNK_TRIANGLES)
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -198,18 +200,6 @@ def _cut(parts: list[NDArray[np.void]]) -> Chunks:
         np.maximum.reduceat(high[order], starts),
         np.column_stack([normal, offset]),
     )
-
-
-def _morton(points: Floats) -> NDArray[np.uint64]:
-    """Number points along a curve that keeps neighbours together: 16 bits an axis, interleaved."""
-    low, high = points.min(axis=0), points.max(axis=0)
-    span = max(float((high - low).max()), 1e-9)
-    cells = ((points - low) / span * 65535.0).astype(np.uint64)
-    code = np.zeros(len(points), dtype=np.uint64)
-    for bit in range(16):
-        for axis in range(3):
-            code |= ((cells[:, axis] >> np.uint64(bit)) & np.uint64(1)) << np.uint64(3 * bit + axis)
-    return code
 
 
 def _layers(scene: Scene, names: list[str]) -> NDArray[np.uint8] | None:

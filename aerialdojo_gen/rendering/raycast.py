@@ -18,9 +18,10 @@ from numpy.typing import NDArray
 
 from aerialdojo_gen.geometry.cameras import Camera
 from aerialdojo_gen.geometry.rays import TriangleRayCaster
+from aerialdojo_gen.geometry.soup import soup
 from aerialdojo_gen.rendering.lighting import Lighting, ShadowMap, light_of
+from aerialdojo_gen.rendering.picture import Picture
 from aerialdojo_gen.rendering.shading import shade
-from aerialdojo_gen.rendering.world import Picture
 from aerialdojo_gen.scenes.model import Scene
 
 Floats = NDArray[np.float64]
@@ -44,9 +45,7 @@ class RayRenderer:
         number = {name: k for k, name in enumerate(materials)}
         parts = [(k, part) for k, instance in enumerate(scene.instances) for part in instance.parts]
         counts = [len(part.faces) for _, part in parts]
-        offsets = np.cumsum([0, *(len(part.vertices) for _, part in parts[:-1])])
-        vertices = np.concatenate([part.vertices for _, part in parts])
-        faces = np.concatenate([part.faces + np.int32(o) for (_, part), o in zip(parts, offsets, strict=True)])
+        vertices, faces = soup([part for _, part in parts])
         self._owner = np.repeat(np.array([k for k, _ in parts], np.int32), counts)
         self._material = np.repeat(np.array([number[part.material] for _, part in parts], np.int32), counts)
         self._corners = vertices[faces]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import weakref
-from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 
@@ -14,9 +13,9 @@ from numpy.typing import NDArray
 
 from aerialdojo_gen.errors import RenderError
 from aerialdojo_gen.geometry.cameras import Camera
-from aerialdojo_gen.geometry.rays import RayCaster
 from aerialdojo_gen.rendering.bullet import pybullet
 from aerialdojo_gen.rendering.lighting import Lighting, ShadowMap, light_of, sun_view
+from aerialdojo_gen.rendering.picture import FAR_M, NEAR_M, Picture
 from aerialdojo_gen.rendering.shading import shade
 from aerialdojo_gen.rendering.surfaces import Surface, surfaces
 from aerialdojo_gen.scenes.model import Material, Scene
@@ -24,28 +23,8 @@ from aerialdojo_gen.store.staging import scratch_folder
 
 Floats = NDArray[np.float64]
 
-NEAR_M, FAR_M = 0.1, 2000.0
 # Steps by which a camera gives way to a vertex in its own plane, and the gap that float32 needs, metres.
 _NUDGE_M, _GAP_M = 1.3e-4, 3e-5
-
-
-@dataclass(frozen=True, eq=False)
-class Picture:
-    """What a camera sees.
-
-    Attributes
-    ----------
-    rgb : (H, W, 3) uint8
-        sRGB.
-    depth_m : (H, W) float32
-        Planar depth, metres; inf where nothing is hit.
-    instance : (H, W) int32 or None
-        Number of the instance in the scene's order, -1 where nothing is hit; None where it was not asked for.
-    """
-
-    rgb: NDArray[np.uint8]
-    depth_m: NDArray[np.float32]
-    instance: NDArray[np.int32] | None = None
 
 
 class RenderWorld:
@@ -220,9 +199,8 @@ def _projection(camera: Camera, near_m: float, far_m: float) -> Floats:
     )
 
 
-# The last scene's renderer and ray caster: the next view of it is then cheap, and memory stays that of one scene.
+# The last scene's renderer: the next view of it is then cheap, and memory stays that of one scene.
 _worlds: list[tuple[weakref.ref[Scene], RenderWorld]] = []
-_casters: list[tuple[weakref.ref[Scene], RayCaster]] = []
 
 
 def render_world(scene: Scene) -> RenderWorld:
@@ -232,13 +210,6 @@ def render_world(scene: Scene) -> RenderWorld:
             _worlds.pop()[1].close()
         _worlds.append((weakref.ref(scene), RenderWorld(scene)))
     return _worlds[0][1]
-
-
-def ray_caster(scene: Scene) -> RayCaster:
-    """Return a ray caster of the scene, kept until that of another scene is asked for."""
-    if not _casters or _casters[0][0]() is not scene:
-        _casters[:] = [(weakref.ref(scene), RayCaster(scene))]
-    return _casters[0][1]
 
 
 def write_obj(path: Path, surface: Surface) -> None:

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerialdojo_gen.errors import AssetError
-from aerialdojo_gen.imports.colours import colour_name
+from aerialdojo_gen.scenes.colour_names import colour_name
 from aerialdojo_gen.scenes.mesh import areas
 from aerialdojo_gen.scenes.model import Instance, Part, Scene
 from aerialdojo_gen.scenes.recipe import Cut

@@ -11,6 +11,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from aerialdojo_gen.geometry.soup import soup
+
 
 @dataclass(frozen=True, eq=False)
 class Material:
@@ -80,16 +82,19 @@ class Instance:
     attributes: dict[str, str]
     parts: tuple[Part, ...]
 
-    @cached_property
+    @property
     def vertices(self) -> NDArray[np.float64]:
         """Vertices of all parts, (n, 3) float64, metres, world frame."""
-        return np.concatenate([p.vertices for p in self.parts])
+        return self._soup[0]
 
-    @cached_property
+    @property
     def faces(self) -> NDArray[np.int32]:
         """Faces of all parts, (m, 3) int32, indices into `vertices`."""
-        offsets = np.cumsum([0, *(len(p.vertices) for p in self.parts[:-1])])
-        return np.concatenate([p.faces + np.int32(o) for p, o in zip(self.parts, offsets, strict=True)])
+        return self._soup[1]
+
+    @cached_property
+    def _soup(self) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
+        return soup(self.parts)
 
     @cached_property
     def bounds(self) -> NDArray[np.float64]:

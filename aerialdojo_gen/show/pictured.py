@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from aerialdojo_gen.benchmark.goal import Goal, Rules
+from aerialdojo_gen.agents.goal import Goal, Rules
 from aerialdojo_gen.browse.lookup import FoundTask
 from aerialdojo_gen.llm.prompt import goal_text
 from aerialdojo_gen.release.way import sampled

@@ -2,197 +2,36 @@
 
 from __future__ import annotations
 
-import logging
-import math
-from collections import Counter
-from typing import Any
+from collections.abc import Callable
+from typing import TYPE_CHECKING
 
-import numpy as np
-from numpy.typing import NDArray
+from aerialdojo_gen.pipeline.stage import Job, Output, Stage
 
-from aerialdojo_gen.common.rng import generator
-from aerialdojo_gen.config.sections import AnchorSampleConfig
-from aerialdojo_gen.errors import StoreError
-from aerialdojo_gen.geometry.frames import yaw_towards
-from aerialdojo_gen.geometry.surface import Surface
-from aerialdojo_gen.geometry.viewpoints import around, shortlist
-from aerialdojo_gen.pipeline.stage import Job, Output
-from aerialdojo_gen.scenes.model import Instance
-from aerialdojo_gen.scoring.geometric import judge
-from aerialdojo_gen.scoring.panel import panel
-from aerialdojo_gen.stages.anchor_choice import with_choice
-from aerialdojo_gen.stages.anchor_world import Candidates, World
-from aerialdojo_gen.store.schemas import ANCHORS
-from aerialdojo_gen.store.tables import from_rows
-
-Floats = NDArray[np.float64]
-log = logging.getLogger(__name__)
-
-REASONS = ("no_surface", "out_of_bounds", "in_collision", "unreachable", "not_visible", "not_shortlisted")
+if TYPE_CHECKING:
+    from aerialdojo_gen.config.sections import AnchorSampleConfig
 
 
 def run(job: Job, config: AnchorSampleConfig) -> Output:
-    """Find, judge and rank the anchors of every object of a scene.
+    """Do a shard's work: `aerialdojo_gen.stages.work.anchor_sample.run`."""
+    from aerialdojo_gen.stages.work import anchor_sample
 
-    A candidate lies `standoff_m` from the object's surface (its mesh, not its box) and faces its centroid in yaw. It
-    goes through these tests, and is counted under the first that it fails: ``no_surface`` (its line comes nowhere
-    near the surface), ``out_of_bounds`` (the body leaves the flight volume), ``in_collision`` (a surface within
-    the body's radius plus `margin_m`), ``unreachable`` (no way from the open sky: inside a closed room, or below
-    ground that is an open sheet), ``not_visible`` (visible fraction below `min_visible_fraction`),
-    ``not_shortlisted`` (`shortlist` others show the object better, or from a side of their own). Ray casts to points
-    of its surface put the visible ones in order; the best `pictured`, from different sides, are pictured and scored
-    (`aerialdojo_gen.scoring`). The best of those, again from different sides, are the object's anchors, and the best
-    of all is selected, or the one that a person chose, which then comes first.
-
-    Parameters
-    ----------
-    job : Job
-        The scene; reads `objects`, `chosen_anchors` and the scene's mesh.
-    config : AnchorSampleConfig
-        The stage's section.
-
-    Returns
-    -------
-    Output
-        `anchors`. Rows in are the candidates, and rows in is rows out plus the counts above; ``no_anchor`` besides
-        counts the objects that have none, each of which is named in a warning.
-
-    Raises
-    ------
-    StoreError
-        An object's mesh node is not in the scene: the two tables do not belong together.
-    AnnotationError
-        A viewpoint that a person chose will not do.
-    """
-    objects = job.read("objects").to_pylist()
-    chosen = {row["object_id"]: row for row in job.read("chosen_anchors").to_pylist()}
-    world = World.of(job.scene_model(), job.embodiment.radius_m, config.margin_m)
-    rows: list[dict[str, Any]] = []
-    counts: Counter[str] = Counter(dict.fromkeys(REASONS, 0))
-    bare = 0
-    for item in objects:
-        if item["mesh_node"] not in world.index:
-            raise StoreError(
-                f"{job.scene}: object {item['object_id']} ({item['name']}) has the mesh node {item['mesh_node']!r}, "
-                "which is not in the scene: run annotate-import again"
-            )
-        found, rejected = anchors_of(item, world, job, config)
-        if item["object_id"] in chosen:
-            sampled = found
-            found = with_choice(sampled, chosen[item["object_id"]], item, world, job, config)
-            rejected["not_shortlisted"] += sum(all(row["x_m"] != f["x_m"] for f in found) for row in sampled)
-        rows += found
-        counts += rejected
-        if not found:
-            bare += 1
-            why = ", ".join(f"{reason} {n}" for reason, n in rejected.items() if n)
-            log.warning("%s: object %d (%s) has no anchor: %s", job.scene, item["object_id"], item["name"], why)
-    tally = {reason: counts[reason] for reason in REASONS}
-    return Output(
-        {"anchors": from_rows(ANCHORS, rows)},
-        rows_in=len(rows) + sum(tally.values()),
-        rows_out=len(rows),
-        counts=tally | {"no_anchor": bare},
-    )
+    return anchor_sample.run(job, config)
 
 
-def anchors_of(
-    item: dict[str, Any], world: World, job: Job, config: AnchorSampleConfig
-) -> tuple[list[dict[str, Any]], Counter[str]]:
-    """Find one object's anchors.
+def settle(config: AnchorSampleConfig, _say: Callable[[str], None]) -> AnchorSampleConfig:
+    """Put the digest of the CLIP model's files in the place of their names, where they are asked."""
+    if config.clip is None or not config.weights.clip:
+        return config
+    from aerialdojo_gen.scoring.clip import digest
 
-    Parameters
-    ----------
-    item : dict
-        The object's row of `objects`.
-    world : World
-        The scene.
-    job : Job
-        For its scene's name, seed and embodiment.
-    config : AnchorSampleConfig
-        The stage's section.
-
-    Returns
-    -------
-    rows : list of dict
-        Rows of `anchors`, the best first, at most `shortlist`.
-    rejected : Counter of str
-        How many candidates failed which test; with the rows, all of them.
-    """
-    found, rejected = candidates_of(item, world, job, config)
-    if found is None:
-        return [], rejected
-    radius = job.embodiment.radius_m
-    seen = found.seeing(config.min_visible_fraction)
-    away = found.positions_m - world.scene.instances[found.instance].centroid
-    azimuth = np.arctan2(away[:, 1], away[:, 0])
-    apart = math.radians(config.separation_deg)
-    few = seen[shortlist(found.rank[seen], azimuth[seen], max(config.pictured, config.shortlist), apart)]
-    pictures = [found.picture(int(i), config.picture_px, config.fov_deg) for i in few]
-    verdicts = panel(config, radius).judge(item["name"], pictures)
-    score = np.array([verdict.score for verdict in verdicts])
-    best = shortlist(score, azimuth[few], config.shortlist, apart)
-    rejected["not_visible"] += len(found.positions_m) - len(seen)
-    rejected["not_shortlisted"] += len(seen) - len(best)
-    own_distance = Surface.of(world.scene.instances[found.instance]).distance_m(found.positions_m[few[best]])
-    rows = [
-        {
-            "scene": job.scene,
-            "object_id": item["object_id"],
-            "anchor_id": rank,
-            **found.row(int(few[n]), float(own_distance[rank])),
-            "score": verdicts[n].score,
-            **verdicts[n].parts,
-            **judge(pictures[n], radius, config.standoff_m).columns,
-            "thumbnail": pictures[n].jpeg(),
-            "selected": rank == 0,
-            "selected_by": "auto",
-        }
-        for rank, n in enumerate(best)
-    ]
-    return rows, rejected
+    return config.model_copy(update={"clip": config.clip.model_copy(update={"sha256": digest(config.clip)})})
 
 
-def candidates_of(
-    item: dict[str, Any], world: World, job: Job, config: AnchorSampleConfig
-) -> tuple[Candidates | None, Counter[str]]:
-    """Find where an object can be looked at from: everywhere around it that a drone can be.
-
-    Parameters
-    ----------
-    item, world, job, config
-        As for `anchors_of`.
-
-    Returns
-    -------
-    found : Candidates or None
-        Viewpoints that are free and reachable, whether or not the object can be seen from them; None without any.
-    rejected : Counter of str
-        How many others failed which test.
-    """
-    k = world.index[item["mesh_node"]]
-    instance: Instance = world.scene.instances[k]
-    surface = Surface.of(instance)
-    radius = job.embodiment.radius_m
-    rejected: Counter[str] = Counter()
-
-    places = around(
-        surface, instance.bounds, config.standoff_m, config.azimuths, config.elevations_deg, config.level_heights
-    )
-
-    def keep(places: Floats, passed: NDArray[np.bool_], reason: str) -> Floats:
-        rejected[reason] += int((~passed).sum())
-        return places[passed]
-
-    places = keep(places, ~np.isnan(places[:, 0]), "no_surface")
-    low, high = world.scene.bounds
-    places = keep(places, ((places >= low + radius) & (places <= high - radius)).all(axis=1), "out_of_bounds")
-    body = radius + config.margin_m
-    touching = np.array([world.collisions.sphere_in_collision(p, body) for p in places], dtype=np.bool_)
-    places = keep(places, ~touching, "in_collision")
-    places = keep(places, np.array([world.free.reachable(p) for p in places], dtype=np.bool_), "unreachable")
-    if not len(places):
-        return None, rejected
-    centroid = np.array([item["x_m"], item["y_m"], item["z_m"]])
-    points = surface.sample(config.surface_points, generator(job.seed, "anchor-sample", job.scene, item["object_id"]))
-    return Candidates.of(world, k, points, places, yaw_towards(places, centroid), radius, config), rejected
+STAGE = Stage(
+    "anchor-sample",
+    "Find viewpoints 1 m from each object that see it.",
+    reads=("scenes", "objects", "chosen_anchors"),
+    writes=("anchors",),
+    run=run,
+    settle=settle,
+)

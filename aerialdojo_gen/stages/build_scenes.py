@@ -1,85 +1,40 @@
-"""Stage ``build-scenes``: a recipe becomes a GLB file and a row of the `scenes` table."""
+"""`build-scenes`: a recipe becomes a mesh and a row of `scenes`."""
 
 from __future__ import annotations
 
-import hashlib
-import re
+from pathlib import Path
+from typing import TYPE_CHECKING
 
-import pyarrow as pa
+from aerialdojo_gen.pipeline.stage import Job, Output, Roots, Stage
+from aerialdojo_gen.scenes.catalogue_files import catalogue_files
 
-from aerialdojo_gen.config.sections import BuildScenesConfig
-from aerialdojo_gen.pipeline.stage import Job, Output
-from aerialdojo_gen.scenes.build import build_scene
-from aerialdojo_gen.scenes.catalogue import load_catalogue
-from aerialdojo_gen.scenes.glb import write_glb
-from aerialdojo_gen.scenes.model import Scene
-from aerialdojo_gen.store.schemas import FAMILIES, SCENES
-from aerialdojo_gen.store.shards import check_scene_name
-from aerialdojo_gen.store.shards import partition as store_partition
-
-_NAME = re.compile(r"([UNID])_([A-Za-z0-9]+)_([01])")
-_PARTITIONS = {"0": "ID", "1": "OOD"}
+if TYPE_CHECKING:
+    from aerialdojo_gen.config.sections import BuildScenesConfig
 
 
 def run(job: Job, config: BuildScenesConfig) -> Output:
-    """Build one scene (paper, section on scene preparation).
+    """Do a shard's work: `aerialdojo_gen.stages.work.build_scenes.run`."""
+    from aerialdojo_gen.stages.work import build_scenes
 
-    Parameters
-    ----------
-    job : Job
-        Names the scene; its recipe is ``<recipes>/<scene>.toml``.
-    config : BuildScenesConfig
-        Nothing to set.
-
-    Returns
-    -------
-    Output
-        One row of `scenes`; the mesh is written to ``meshes/<scene>.glb``.
-
-    Raises
-    ------
-    AssetError
-        The recipe or the catalogue is wrong.
-    """
-    catalogue = load_catalogue(job.roots.scene_assets)
-    scene = build_scene(job.roots.recipes / f"{job.scene}.toml", catalogue)
-    relative = f"meshes/{job.scene}.glb"
-    with job.output_file(relative) as path:
-        write_glb(scene, path)
-        digest = hashlib.sha256(path.read_bytes()).hexdigest()
-    table = pa.Table.from_pylist([scene_row(scene, relative, digest)], schema=SCENES.schema)
-    return Output(tables={"scenes": table}, rows_in=1, rows_out=1, counts={"triangles": scene.n_triangles})
+    return build_scenes.run(job, config)
 
 
-def scene_row(scene: Scene, mesh_path: str, mesh_sha256: str) -> dict[str, object]:
-    """Make a scene's row of the `scenes` table."""
-    family, scene_type, partition = parse_name(scene.name)
-    bounds = {
-        f"{e}_{a}_m": float(scene.bounds[i, k]) for i, e in enumerate(("min", "max")) for k, a in enumerate("xyz")
-    }
-    return {
-        "scene": scene.name,
-        "family": family,
-        "scene_type": scene_type,
-        "partition": partition,
-        "mesh_path": mesh_path,
-        "mesh_sha256": mesh_sha256,
-        **bounds,
-        "ceiling_m": scene.ceiling_m,
-        "n_triangles": scene.n_triangles,
-        "n_instances": len(scene.instances),
-        "n_categories": len({i.category for i in scene.instances}),
-    }
+def sources(roots: Roots, scene: str) -> list[Path]:
+    """List recipe, mesh beside it, materials and catalogue."""
+    mesh = roots.recipes / f"{scene}.glb"
+    return [
+        roots.recipes / f"{scene}.toml",
+        *([mesh] if mesh.is_file() else []),
+        roots.scene_assets / "materials.toml",
+        *catalogue_files(roots.scene_assets),
+    ]
 
 
-def parse_name(scene: str) -> tuple[str, str, str]:
-    """Split a scene's name into family, type and partition.
-
-    ``U_Mall_0`` is ``("Urban", "Mall", "ID")``; a name of another form is of the family Custom, and in the ID
-    partition unless it ends in ``_1``.
-    """
-    match = _NAME.fullmatch(scene)
-    if match is None:
-        return "Custom", re.sub(r"_[01]$", "", check_scene_name(scene)), store_partition(scene).upper()
-    family, scene_type, suffix = match.groups()
-    return FAMILIES[family], scene_type, _PARTITIONS[suffix]
+STAGE = Stage(
+    "build-scenes",
+    "Build the scenes' meshes from their recipes.",
+    reads=(),
+    writes=("scenes",),
+    run=run,
+    sources=sources,
+)

@@ -1,114 +1,26 @@
-"""filter: which candidates become tasks, and a stable reason for every other one."""
+"""`filter`: which candidates become tasks, and a stable reason for every other one."""
 
 from __future__ import annotations
 
-from collections import Counter
+from typing import TYPE_CHECKING
 
-import numpy as np
-import pyarrow as pa
-from numpy.typing import NDArray
+from aerialdojo_gen.pipeline.stage import Job, Output, Stage
 
-from aerialdojo_gen.config.sections import FilterConfig, Setting
-from aerialdojo_gen.errors import StoreError
-from aerialdojo_gen.pipeline.stage import Job, Output
-from aerialdojo_gen.store.schemas import SETTINGS, VERDICTS
-
-KEPT = "kept"
-
-
-def settings_of(config: FilterConfig) -> tuple[Setting, Setting, Setting]:
-    """Return the length settings in the order of `aerialdojo_gen.store.schemas.SETTINGS`."""
-    return config.base, config.standard, config.long_horizon
-
-
-def judge(
-    outcome: NDArray[np.str_],
-    euclidean_m: NDArray[np.float64],
-    length_m: NDArray[np.float64],
-    n_actions: NDArray[np.int32],
-    config: FilterConfig,
-) -> tuple[NDArray[np.str_], NDArray[np.str_]]:
-    """Judge candidates by the paper's rules (section on filtering).
-
-    Parameters
-    ----------
-    outcome : (n,) str
-        One of `aerialdojo_gen.store.schemas.OUTCOMES`.
-    euclidean_m, length_m : (n,) float64
-        d_E and L, metres; the length of an unsolved plan does not matter.
-    n_actions : (n,) int32
-        Actions of the route, Stop included.
-    config : FilterConfig
-        Thresholds and settings.
-
-    Returns
-    -------
-    reason : (n,) str
-        ``"kept"``, or the first rule that fails: the outcome in lower case (``"no_path"``), ``"too_close"``,
-        ``"too_short"``, ``"too_long"``, ``"near_straight"``, ``"over_budget"``.
-    setting : (n,) str
-        ``"base"``, ``"standard"``, ``"long_horizon"``, or ``""`` where the length fits none.
-    """
-    solved = outcome == "SOLVED"
-    # Fixed widths: numpy would cut a longer word to the width of the first ones.
-    setting = np.full(len(outcome), "", dtype="U24")
-    over = np.zeros(len(outcome), dtype=bool)
-    for name, rule in zip(SETTINGS, settings_of(config), strict=True):
-        inside = solved & (length_m >= rule.min_length_m) & (length_m < rule.max_length_m)
-        setting[inside] = name
-        over |= inside & (n_actions > rule.action_budget)
-    # A product, not a ratio: it has no division by a d_E of zero.
-    near_straight = length_m < config.min_detour_ratio * euclidean_m
-    rules = [
-        ("too_close", euclidean_m <= config.min_euclidean_m),
-        ("too_short", length_m < config.base.min_length_m),
-        ("too_long", length_m >= config.long_horizon.max_length_m),
-        ("near_straight", near_straight),
-        ("over_budget", over),
-    ]
-    reason = np.full(len(outcome), KEPT, dtype="U24")
-    for word, fails in reversed(rules):
-        reason[fails] = word
-    reason[~solved] = np.char.lower(outcome[~solved])
-    return reason, setting
+if TYPE_CHECKING:
+    from aerialdojo_gen.config.sections import FilterConfig
 
 
 def run(job: Job, config: FilterConfig) -> Output:
-    """Judge every candidate of a scene.
+    """Do a shard's work: `aerialdojo_gen.stages.work.filter.run`."""
+    from aerialdojo_gen.stages.work import filter
 
-    Raises
-    ------
-    StoreError
-        Plans and pairs are not of the same candidates.
-    """
-    pairs = job.read("pairs")
-    plans = job.read("plans").select(["pair_id", "outcome", "length_m", "n_actions"]).sort_by("pair_id")
-    if not plans.column("pair_id").combine_chunks().equals(pairs.column("pair_id").combine_chunks()):
-        raise StoreError(f"plans of {job.scene} are not those of its pairs: run aerialdojo-gen plan --force")
-    outcome = np.asarray(plans.column("outcome").to_pylist(), dtype="U24")
-    euclidean = pairs.column("euclidean_m").to_numpy()
-    length = plans.column("length_m").to_numpy()
-    n_actions = plans.column("n_actions").to_numpy()
-    reason, setting = judge(outcome, euclidean, length, n_actions, config)
-    solved = outcome == "SOLVED"
-    budgets = {name: rule.action_budget for name, rule in zip(SETTINGS, settings_of(config), strict=True)}
-    n = len(outcome)
-    table = pa.table(
-        {
-            "scene": pa.array([job.scene] * n, pa.string()),
-            "pair_id": pairs.column("pair_id"),
-            "euclidean_m": euclidean,
-            "length_m": pa.array(length, mask=~solved),
-            "detour_ratio": pa.array(length / np.maximum(euclidean, 1e-12), mask=~solved),
-            "n_actions": pa.array(n_actions, pa.int32(), mask=~solved),
-            "keep": reason == KEPT,
-            "reason": pa.array(reason.tolist(), pa.string()),
-            "setting": pa.array([s or None for s in setting.tolist()], pa.string()),
-            "action_budget": pa.array([budgets.get(s) for s in setting.tolist()], pa.int32()),
-        },
-        schema=VERDICTS.schema,
-    )
-    counts = Counter(reason.tolist())
-    kept = counts.pop(KEPT, 0)
-    counts.update(Counter(f"{s} kept" for s, r in zip(setting.tolist(), reason.tolist(), strict=True) if r == KEPT))
-    return Output({"verdicts": table}, rows_in=n, rows_out=kept, counts=dict(counts))
+    return filter.run(job, config)
+
+
+STAGE = Stage(
+    "filter",
+    "Keep the candidates that make tasks, with a reason for every rejection.",
+    reads=("pairs", "plans"),
+    writes=("verdicts",),
+    run=run,
+)

@@ -2,92 +2,25 @@
 
 from __future__ import annotations
 
-import math
-from itertools import compress
+from typing import TYPE_CHECKING
 
-import numpy as np
-import pyarrow as pa
-from numpy.typing import NDArray
+from aerialdojo_gen.pipeline.stage import Job, Output, Stage
 
-from aerialdojo_gen.config.sections import PairObjectsConfig
-from aerialdojo_gen.pipeline.stage import Job, Output
-from aerialdojo_gen.store.schemas import PAIRS
-
-Floats = NDArray[np.float64]
+if TYPE_CHECKING:
+    from aerialdojo_gen.config.sections import PairObjectsConfig
 
 
 def run(job: Job, config: PairObjectsConfig) -> Output:
-    """Pair the shortlisted anchors of every object with the selected anchor of every other one.
+    """Do a shard's work: `aerialdojo_gen.stages.work.pair_objects.run`."""
+    from aerialdojo_gen.stages.work import pair_objects
 
-    Left out are only pairs that no route could make a task, whatever the scene: see `length_bound_m`.
-
-    Parameters
-    ----------
-    job : Job
-        The scene; reads `anchors`.
-    config : PairObjectsConfig
-        The stage's section.
-
-    Returns
-    -------
-    Output
-        `pairs`, sorted by pair_id as a string. Rows in are all ordered pairs of a start anchor and another object's
-        selected anchor; counts are ``too_close`` (d_E at most `min_euclidean_m`) and ``too_far`` (no route of less
-        than `max_length_m`), and rows in is rows out plus the two.
-    """
-    anchors = job.read("anchors")
-    object_id = anchors["object_id"].to_numpy()
-    anchor_id = anchors["anchor_id"].to_numpy()
-    position = np.column_stack([anchors[f"{a}_m"].to_numpy() for a in "xyz"])
-    selected = np.flatnonzero(anchors["selected"].to_numpy(zero_copy_only=False))
-    starting = np.flatnonzero(anchor_id < config.start_variants)
-
-    s, t = (k.ravel() for k in np.meshgrid(starting, selected, indexing="ij"))
-    distinct = object_id[s] != object_id[t]
-    s, t = s[distinct], t[distinct]
-    euclidean = np.linalg.norm(position[t] - position[s], axis=1)
-    too_close = euclidean <= config.min_euclidean_m
-    bound = length_bound_m(position[s], position[t], config.max_approach_m)
-    too_far = ~too_close & (bound >= config.max_length_m)
-    keep = ~(too_close | too_far)
-
-    starts = zip(object_id[s].tolist(), anchor_id[s].tolist(), object_id[t].tolist(), strict=True)
-    ids = [f"{start}_{anchor}__{target}" for start, anchor, target in compress(starts, keep.tolist())]
-    order = np.array(sorted(range(len(ids)), key=ids.__getitem__), dtype=np.int64)
-    s, t = s[keep][order], t[keep][order]
-    table = pa.table(
-        {
-            "scene": pa.array([job.scene] * len(order), pa.string()),
-            "pair_id": pa.array([ids[k] for k in order], pa.string()),
-            "start_object_id": object_id[s],
-            "start_anchor_id": anchor_id[s],
-            "target_object_id": object_id[t],
-            "euclidean_m": euclidean[keep][order],
-        },
-        schema=PAIRS.schema,
-    )
-    counts = {"too_close": int(too_close.sum()), "too_far": int(too_far.sum())}
-    return Output({"pairs": table}, rows_in=len(keep), rows_out=table.num_rows, counts=counts)
+    return pair_objects.run(job, config)
 
 
-def length_bound_m(start: Floats, goal: Floats, max_approach_m: float) -> Floats:
-    """Bound the length of every route from below.
-
-    A route's moves are horizontal or vertical, so that up to the Approach it is at least as long as the horizontal
-    plus the vertical distance that it covers. The Approach alone goes straight, a metre at most, where the two
-    together would be up to √2 times as long: that much less is certain.
-
-    Parameters
-    ----------
-    start, goal : (n, 3) float64
-        Metres, world frame.
-    max_approach_m : float
-        Longest Approach.
-
-    Returns
-    -------
-    (n,) float64
-        Metres; no route is shorter.
-    """
-    way = np.abs(goal - start)
-    return np.asarray(np.hypot(way[:, 0], way[:, 1]) + way[:, 2] - (math.sqrt(2.0) - 1.0) * max_approach_m)
+STAGE = Stage(
+    "pair-objects",
+    "Pair start anchors with targets: the candidate tasks.",
+    reads=("objects", "anchors"),
+    writes=("pairs",),
+    run=run,
+)

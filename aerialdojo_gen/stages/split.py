@@ -1,185 +1,40 @@
-"""split: write one scene's part of the release (DESIGN: `tasks` an agent may know, `routes` only the evaluator)."""
+"""`split`: the release, `tasks` that an agent may know and `routes` that only the evaluator may."""
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
 
-import numpy as np
-import pyarrow as pa
-import pyarrow.compute as pc
-from numpy.typing import NDArray
+from aerialdojo_gen.pipeline.stage import Job, Output, Stage
 
-from aerialdojo_gen.common.paper import PaperScene, inventory, splits
-from aerialdojo_gen.config.sections import SplitConfig
-from aerialdojo_gen.pipeline.stage import Job, Output
-from aerialdojo_gen.release import quota
-from aerialdojo_gen.release.ids import key_of, nav_id, reference_id
-from aerialdojo_gen.release.select import lot, train_counts, train_mask
-from aerialdojo_gen.store.schemas import RELEASE_ANCHORS, RELEASE_OBJECTS, ROUTES, TASKS
-
-_LISTS = ("x_m", "y_m", "z_m", "yaw_rad", "action")
-
-
-def _constant(value: str, n: int) -> pa.Array:
-    return pa.array([value] * n, pa.string())
-
-
-def _first(lists: pa.ChunkedArray) -> pa.ChunkedArray:
-    return pc.list_element(lists, 0)
-
-
-def _take(table: pa.Table, key: str, ids: pa.ChunkedArray) -> pa.Table:
-    """Rows of `table` whose `key` is `ids`, in the order of `ids`."""
-    return table.take(pc.index_in(ids, value_set=table.column(key).combine_chunks()))
-
-
-def routes_table(
-    scene: str, kept: pa.Table, pairs: pa.Table, plans: pa.Table, goals: pa.Table, key: bytes
-) -> pa.Table:
-    """Make the routes of the kept candidates.
-
-    Parameters
-    ----------
-    scene : str
-        Name of the scene.
-    kept : pyarrow.Table
-        Kept rows of `verdicts`.
-    pairs, plans : pyarrow.Table
-        All rows of the scene.
-    goals : pyarrow.Table
-        The selected anchors, one an object.
-    key : bytes
-        Of `aerialdojo_gen.release.ids.key_of`.
-
-    Returns
-    -------
-    pyarrow.Table
-        Rows of `aerialdojo_gen.store.schemas.ROUTES`, in its order, with ``action_budget`` and ``lot`` as further
-        columns.
-    """
-    pairs = _take(pairs, "pair_id", kept.column("pair_id"))
-    plans = _take(plans, "pair_id", kept.column("pair_id"))
-    goal = _take(goals, "object_id", pairs.column("target_object_id"))
-    pair_ids = kept.column("pair_id").to_pylist()
-    columns: dict[str, Any] = {
-        "nav_id": pa.array([nav_id(scene, p, key) for p in pair_ids], pa.string()),
-        "scene": _constant(scene, kept.num_rows),
-        "setting": kept.column("setting"),
-        **{name: pairs.column(name) for name in ("start_object_id", "start_anchor_id", "target_object_id")},
-        **{f"goal_{name}": goal.column(name) for name in ("x_m", "y_m", "z_m", "yaw_rad")},
-        **{name: kept.column(name) for name in ("euclidean_m", "length_m", "detour_ratio", "n_actions")},
-        "min_clearance_m": plans.column("min_clearance_m"),
-        **{name: plans.column(name) for name in _LISTS},
-    }
-    routes = pa.table({name: columns[name] for name in ROUTES.schema.names}, schema=ROUTES.schema)
-    routes = routes.append_column("action_budget", kept.column("action_budget"))
-    routes = routes.append_column("lot", pa.array([lot(scene, p) for p in pair_ids], pa.string()))
-    return routes.sort_by([(column, "ascending") for column in ROUTES.order])
-
-
-def tasks_table(routes: pa.Table, train: pa.ChunkedArray, scene: dict[str, Any], objects: pa.Table) -> pa.Table:
-    """Make both instances of every navigation task: what an agent may know.
-
-    Parameters
-    ----------
-    routes : pyarrow.Table
-        What `routes_table` returns.
-    train : (n,) bool
-        Which of them train.
-    scene : dict
-        The scene's row of `scenes`.
-    objects : pyarrow.Table
-        The scene's objects, with the landmark's name as ``landmark`` and ``reference_image_id``.
-
-    Returns
-    -------
-    pyarrow.Table
-        Rows of `TASKS`, 2n of them, in its order.
-    """
-    n = routes.num_rows
-    target = _take(objects, "object_id", routes.column("target_object_id"))
-    nulls = pa.nulls(n, pa.string())
-    instances = []
-    for modality in ("image", "semantic"):
-        columns: dict[str, Any] = {
-            "task_id": pc.binary_join_element_wise(routes.column("nav_id"), modality[0], "-"),
-            "nav_id": routes.column("nav_id"),
-            "scene": routes.column("scene"),
-            **{name: _constant(scene[name], n) for name in ("family", "scene_type", "partition")},
-            "subset": pc.if_else(train, "train", "test"),
-            "setting": routes.column("setting"),
-            "modality": _constant(modality, n),
-            "action_budget": routes.column("action_budget"),
-            **{f"start_{name}": _first(routes.column(name)) for name in ("x_m", "y_m", "z_m", "yaw_rad")},
-            "target_name": target.column("name"),
-            "landmark": target.column("landmark"),
-            "direction": target.column("direction"),
-            "description": target.column("description") if modality == "semantic" else nulls,
-            "reference_image_id": target.column("reference_image_id") if modality == "image" else nulls,
-        }
-        instances.append(pa.table(columns, schema=TASKS.schema))
-    return pa.concat_tables(instances).sort_by([(key, "ascending") for key in TASKS.order])
-
-
-def _chosen(routes: pa.Table, paper: PaperScene, seed: int) -> NDArray[np.bool_]:
-    return quota.choose(
-        routes.column("lot").to_pylist(),
-        routes.column("setting").to_pylist(),
-        routes.column("length_m").to_numpy(),
-        paper.tasks,
-        paper.path_m,
-        seed,
-    )
+if TYPE_CHECKING:
+    from aerialdojo_gen.config.sections import SplitConfig
 
 
 def run(job: Job, config: SplitConfig) -> Output:
-    """Write a scene's tasks, routes, objects, landmarks, anchors and scene row to the release."""
-    scenes, landmarks, objects, anchors = (job.read(t) for t in ("scenes", "landmarks", "objects", "anchors"))
-    scene = scenes.to_pylist()[0]
-    verdicts = job.read("verdicts")
-    kept = verdicts.filter(verdicts.column("keep"))
-    key = key_of(config.salt, job.seed)
-    routes = routes_table(
-        job.scene, kept, job.read("pairs"), job.read("plans"), anchors.filter(anchors.column("selected")), key
-    )
-    references = _take(job.read("references"), "object_id", objects.column("object_id"))
-    names = [reference_id(job.scene, k, key) for k in objects.column("object_id").to_pylist()]
-    references = references.append_column("reference_image_id", pa.array(names, pa.string()))
-    pictured = pa.table(
-        {
-            name: (objects if name in objects.column_names else references).column(name)
-            for name in RELEASE_OBJECTS.schema.names
-        },
-        schema=RELEASE_OBJECTS.schema,
-    )
-    # Without the pictures: every task takes its target's row, and would take a copy of the picture with it.
-    named = pictured.drop_columns("reference_image").append_column(
-        "landmark", _take(landmarks, "landmark_id", objects.column("landmark_id")).column("name")
-    )
-    paper = inventory().get(job.scene) if config.paper_counts else None
-    if paper is not None:
-        routes = routes.filter(pa.array(_chosen(routes, paper, job.seed)))
-        trains = quota.train_quotas(job.scene, inventory(), splits())
-    else:
-        fraction = config.ood_train_fraction if scene["partition"] == "OOD" else config.id_train_fraction
-        trains = train_counts(routes.column("setting").to_pylist(), fraction)
-    train = train_mask(routes.column("lot").to_pylist(), routes.column("setting").to_pylist(), trains, job.seed)
-    tasks = tasks_table(routes, pa.chunked_array([pa.array(train)]), scene, named)
-    routes = routes.drop_columns(["action_budget", "lot"])
-    is_train = pc.equal(tasks.column("subset"), "train")
-    tables = {
-        "tasks/train": tasks.filter(is_train),
-        "tasks/test": tasks.filter(pc.invert(is_train)),
-        "routes/train": routes.filter(pa.array(train)),
-        "routes/test": routes.filter(pa.array(~train)),
-        "release/scenes": scenes,
-        "release/landmarks": landmarks,
-        "release/objects": pictured,
-        "release/anchors": anchors.select(RELEASE_ANCHORS.schema.names),
-    }
-    counts = {
-        "train": int(np.count_nonzero(train)) * 2,
-        "test": int(np.count_nonzero(~train)) * 2,
-        "navigation tasks": routes.num_rows,
-    }
-    return Output(tables, rows_in=kept.num_rows, rows_out=tasks.num_rows, counts=counts)
+    """Do a shard's work: `aerialdojo_gen.stages.work.split.run`."""
+    from aerialdojo_gen.stages.work import split
+
+    return split.run(job, config)
+
+
+def check(data: Path, scenes: Sequence[str], config: SplitConfig) -> None:
+    """Raise a PoolError where the paper's numbers are wanted and there are too few candidates for them."""
+    if config.paper_counts:
+        from aerialdojo_gen.release.pool import require_pools
+
+        require_pools(data, scenes)
+
+
+STAGE = Stage(
+    "split",
+    "Write the release: tasks, routes, objects, train and test.",
+    reads=("scenes", "landmarks", "objects", "anchors", "references", "pairs", "plans", "verdicts"),
+    writes=(
+        "tasks/train", "tasks/test", "routes/train", "routes/test",
+        "release/scenes", "release/landmarks", "release/objects", "release/anchors",
+    ),
+    run=run,
+    check=check,
+)  # fmt: skip

@@ -40,17 +40,7 @@ _STAGED = "{table}/{scene}/part-{part:05d}.parquet"
 _RUN = "{table}/{run}/part-{scene}.parquet"
 
 LAYOUT: dict[str, Place] = {
-    "scenes": Place(schemas.SCENES, _STAGED, "build-scenes"),
-    "landmarks": Place(schemas.LANDMARKS, _STAGED, "annotate-import"),
-    "objects": Place(schemas.OBJECTS, _STAGED, "annotate-import"),
-    "chosen_anchors": Place(schemas.CHOSEN_ANCHORS, _STAGED, "annotate-import"),
-    "anchors": Place(schemas.ANCHORS, _STAGED, "anchor-sample"),
-    "references": Place(schemas.REFERENCES, _STAGED, "reference-images"),
-    "pairs": Place(schemas.PAIRS, _STAGED, "pair-objects"),
-    "plans": Place(schemas.PLANS, _STAGED, "plan"),
-    "verdicts": Place(schemas.VERDICTS, _STAGED, "filter"),
-    "recordings": Place(schemas.RECORDINGS, _STAGED, "render"),
-    "frames": Place(schemas.FRAMES, _STAGED, "render"),
+    **{name: Place(spec, _STAGED, spec.command) for name, spec in schemas.TABLES.items()},
     "tasks/train": Place(schemas.TASKS, "release/tasks/{partition}_train/part-{scene}.parquet", "split"),
     "tasks/test": Place(schemas.TASKS, "release/tasks/{partition}_test/part-{scene}.parquet", "split"),
     "routes/train": Place(schemas.ROUTES, "release/routes/{partition}_train/part-{scene}.parquet", "split"),

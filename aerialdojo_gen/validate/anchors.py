@@ -6,11 +6,11 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from aerialdojo_gen.geometry.frames import wrap_angle_rad, yaw_towards
+from aerialdojo_gen.geometry.angles import wrap_angle_rad, yaw_towards
 from aerialdojo_gen.geometry.surface import Surface
 from aerialdojo_gen.scoring.geometric import WEIGHTS
 from aerialdojo_gen.scoring.panel import SCORERS
-from aerialdojo_gen.stages.anchor_choice import SLACK_M
+from aerialdojo_gen.stages.work.anchor_choice import SLACK_M
 from aerialdojo_gen.validate.links import sound
 from aerialdojo_gen.validate.registry import Finding, check
 from aerialdojo_gen.validate.rows import Rows, SceneData

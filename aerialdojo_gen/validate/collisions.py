@@ -11,9 +11,9 @@ from itertools import pairwise
 
 import numpy as np
 
+from aerialdojo_gen.geometry.motion import replay
 from aerialdojo_gen.planning.certify import corners
 from aerialdojo_gen.planning.collision import CollisionWorld
-from aerialdojo_gen.planning.primitives import replay
 from aerialdojo_gen.validate.registry import Finding, check
 from aerialdojo_gen.validate.rows import Floats, Rows, SceneData
 from aerialdojo_gen.validate.scene_mesh import scene_mesh

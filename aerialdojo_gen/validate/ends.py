@@ -8,8 +8,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from aerialdojo_gen.config.agreement import NEAR_GOAL_M
-from aerialdojo_gen.geometry.frames import wrap_angle_rad
-from aerialdojo_gen.planning.primitives import TURN_RAD, replay
+from aerialdojo_gen.geometry.angles import wrap_angle_rad
+from aerialdojo_gen.geometry.motion import TURN_RAD, replay
 from aerialdojo_gen.store.schemas import APPROACH
 from aerialdojo_gen.validate.links import sound
 from aerialdojo_gen.validate.registry import Finding, check

@@ -2,6 +2,7 @@
 
 `aerialdojo_gen.scenes.glb` reads what `build-scenes` writes, and passes over what that never says: transforms of
 nodes, a second account of the colours, data in other files. A careless hand, or another program, may have said it.
+The file is parsed here by code of its own, on purpose: a reader in common would hide its own faults from this check.
 """
 
 from __future__ import annotations

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from aerialdojo_gen.errors import AssetError
-from aerialdojo_gen.stages.build_scenes import scene_row
+from aerialdojo_gen.stages.work.build_scenes import scene_row
 from aerialdojo_gen.validate.registry import Finding, check
 from aerialdojo_gen.validate.rows import Rows, SceneData
 from aerialdojo_gen.validate.scene_mesh import mesh_path, scene_mesh, want_meshes

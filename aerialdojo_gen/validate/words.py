@@ -22,8 +22,8 @@ from aerialdojo_gen.annotations.claims import Lexicon
 from aerialdojo_gen.annotations.phrases import words_of
 from aerialdojo_gen.annotations.relations import SceneGeometry
 from aerialdojo_gen.errors import AerialDojoError
-from aerialdojo_gen.imports.colours import colour_name
 from aerialdojo_gen.scenes.catalogue import Catalogue, load_catalogue
+from aerialdojo_gen.scenes.colour_names import colour_name
 from aerialdojo_gen.scenes.model import Instance
 from aerialdojo_gen.validate.registry import Finding, UncheckedError, check
 from aerialdojo_gen.validate.rows import Rows, SceneData

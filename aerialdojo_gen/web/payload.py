@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerialdojo_gen.errors import AssetError
+from aerialdojo_gen.geometry.soup import soup
 from aerialdojo_gen.rendering.lighting import light_of
 from aerialdojo_gen.scenes.model import Material, Part, Scene
 
@@ -89,12 +90,11 @@ def _group(
     body: _Body, size: tuple[int, int], parts: list[tuple[int, Part]], materials: dict[str, Material]
 ) -> dict[str, Any]:
     """Merge parts that draw together; within the group they stay in the order of the scene's instances."""
-    offsets = np.cumsum([0, *(len(p.vertices) for _, p in parts[:-1])])
-    index = np.concatenate([p.faces + o for (_, p), o in zip(parts, offsets, strict=True)])
+    vertices, index = soup([p for _, p in parts])
     counts = [len(p.vertices) for _, p in parts]
     group: dict[str, Any] = {
         "size": list(size),
-        "position": body.add(np.concatenate([p.vertices for _, p in parts]).astype("<f4").tobytes()),
+        "position": body.add(vertices.astype("<f4").tobytes()),
         "index": body.add(index.astype("<u4").tobytes()),
         "ranges": body.add(_ranges(parts).astype("<u4").tobytes()),
     }

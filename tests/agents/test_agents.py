@@ -10,9 +10,9 @@ from support.handmade import box, instance, scene
 from aerialdojo_gen.agents import AgentBase, load_agent
 from aerialdojo_gen.agents.depth_map import DepthMap
 from aerialdojo_gen.agents.explorer import ExplorerAgent, thumbnail
+from aerialdojo_gen.agents.goal import BLIND, Goal, Observation, Rules, Sensors
 from aerialdojo_gen.agents.simple import BEST_CONSTANT, ConstantAgent, OracleAgent, RandomAgent, StopAgent
 from aerialdojo_gen.benchmark.episode import Episode
-from aerialdojo_gen.benchmark.goal import BLIND, Goal, Observation, Rules, Sensors
 from aerialdojo_gen.benchmark.motion import FlightSpace
 from aerialdojo_gen.errors import UsageError
 from aerialdojo_gen.geometry.cameras import view_pose

@@ -22,7 +22,7 @@ from aerialdojo_gen.annotate.storage import Storage
 from aerialdojo_gen.commands.common import open_pipeline
 from aerialdojo_gen.errors import UsageError
 from aerialdojo_gen.scenes.model import Scene
-from aerialdojo_gen.stages.annotate_import import annotation_tables
+from aerialdojo_gen.stages.work.annotate_import import annotation_tables
 
 
 @pytest.fixture(scope="module")

@@ -27,7 +27,7 @@ from aerialdojo_gen.annotate.server import make_app
 from aerialdojo_gen.commands.common import open_pipeline, run_until
 from aerialdojo_gen.errors import AssetError
 from aerialdojo_gen.imports.command import add_scene
-from aerialdojo_gen.scenes.build import build_scene
+from aerialdojo_gen.layouts.build import build_scene
 from aerialdojo_gen.scenes.catalogue import load_catalogue
 from aerialdojo_gen.scenes.cuts import cut_out
 from aerialdojo_gen.scenes.recipe import Cut

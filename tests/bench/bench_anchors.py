@@ -20,8 +20,8 @@ import numpy as np
 from aerialdojo_gen.common.rng import generator
 from aerialdojo_gen.config.pipeline import load_pipeline
 from aerialdojo_gen.pipeline.stage import Job, Roots
-from aerialdojo_gen.stages.anchor_sample import candidates_of
-from aerialdojo_gen.stages.anchor_world import World
+from aerialdojo_gen.stages.work.anchor_sample import candidates_of
+from aerialdojo_gen.stages.work.anchor_world import World
 from aerialdojo_gen.store import shards as store
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -29,7 +29,7 @@ from aerialdojo_gen.config.pipeline import load_pipeline
 from aerialdojo_gen.config.sections import PlanConfig
 from aerialdojo_gen.pipeline.stage import Job, Roots
 from aerialdojo_gen.planning.planner import Planner
-from aerialdojo_gen.stages import plan
+from aerialdojo_gen.stages.work import plan
 
 ROOT = Path(__file__).resolve().parents[2]
 SCENES = ("U_Mall_0", "N_Forest_0", "U_ConstructionSite_0")

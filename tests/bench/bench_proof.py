@@ -15,10 +15,10 @@ from pathlib import Path
 import numpy as np
 from numba import njit
 
+from aerialdojo_gen.layouts.build import build_scene
 from aerialdojo_gen.planning.clearance import ClearanceGrid
 from aerialdojo_gen.planning.collision import CollisionWorld
 from aerialdojo_gen.planning.grid_kernels import segment_free
-from aerialdojo_gen.scenes.build import build_scene
 from aerialdojo_gen.scenes.catalogue import load_catalogue
 
 RADIUS = 0.25

@@ -11,10 +11,10 @@ from typing import Any
 import pytest
 
 from aerialdojo_gen.agents import AgentBase, InvalidAnswer, load_agent
+from aerialdojo_gen.agents.goal import BLIND, Goal, Observation, Sensors
 from aerialdojo_gen.benchmark import eyes
 from aerialdojo_gen.benchmark.asking import AgentError
 from aerialdojo_gen.benchmark.episodes import read_run, runs
-from aerialdojo_gen.benchmark.goal import BLIND, Goal, Observation, Sensors
 from aerialdojo_gen.benchmark.limits import Limits
 from aerialdojo_gen.benchmark.runner import Evaluation, evaluate
 from aerialdojo_gen.benchmark.tasks import Selection

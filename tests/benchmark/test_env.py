@@ -13,13 +13,13 @@ from hypothesis import strategies as st
 from support.flying import town
 from support.handmade import box, instance, scene
 
+from aerialdojo_gen.agents.goal import N_ACTIONS
 from aerialdojo_gen.benchmark import AerialDojoEnv
 from aerialdojo_gen.benchmark.episode import Episode
-from aerialdojo_gen.benchmark.goal import N_ACTIONS
 from aerialdojo_gen.benchmark.motion import FlightSpace
 from aerialdojo_gen.errors import RenderError, StoreError, UsageError
+from aerialdojo_gen.geometry.motion import replay, route_length_m
 from aerialdojo_gen.planning.collision import CollisionWorld
-from aerialdojo_gen.planning.primitives import replay, route_length_m
 from aerialdojo_gen.store import schemas
 
 RADIUS = 0.25

@@ -15,15 +15,15 @@ import pyarrow.compute as pc
 import pytest
 
 from aerialdojo_gen.agents import AgentBase, AgentUnavailable, InvalidAnswer, Usage
+from aerialdojo_gen.agents.goal import BLIND
 from aerialdojo_gen.benchmark import journal
 from aerialdojo_gen.benchmark.episodes import TABLES, read_run, runs
-from aerialdojo_gen.benchmark.goal import BLIND
 from aerialdojo_gen.benchmark.limits import Limits
 from aerialdojo_gen.benchmark.runner import Evaluation, evaluate
 from aerialdojo_gen.benchmark.tasks import Selection, select
 from aerialdojo_gen.benchmark.worker import Conditions
 from aerialdojo_gen.errors import AerialDojoError, StoreError, UsageError
-from aerialdojo_gen.planning.primitives import replay
+from aerialdojo_gen.geometry.motion import replay
 from aerialdojo_gen.store import schemas
 
 HERE, FILE = __name__, Path(__file__).stem

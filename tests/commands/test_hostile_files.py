@@ -19,10 +19,10 @@ from aerialdojo_gen.annotations.format import parse_annotations
 from aerialdojo_gen.commands.common import open_pipeline
 from aerialdojo_gen.config.pipeline import Pipeline
 from aerialdojo_gen.errors import AssetError
+from aerialdojo_gen.layouts.build import build_scene
 from aerialdojo_gen.rendering import finished
 from aerialdojo_gen.rendering.codecs import PngWriter
 from aerialdojo_gen.rendering.reader import read_recording
-from aerialdojo_gen.scenes.build import build_scene
 from aerialdojo_gen.scenes.catalogue import load_catalogue
 from aerialdojo_gen.scenes.glb import read_glb, write_glb
 from aerialdojo_gen.scenes.grammar_scatter import grid, poisson_disc

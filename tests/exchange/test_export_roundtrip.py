@@ -13,7 +13,7 @@ from support.releases import LISTS, assert_same, copy_release, imported, release
 from aerialdojo_gen.exchange.aerialdojo_writer import LOST
 from aerialdojo_gen.exchange.exporting import export_release
 from aerialdojo_gen.exchange.importing import import_benchmark
-from aerialdojo_gen.planning.primitives import replay, route_length_m
+from aerialdojo_gen.geometry.motion import replay, route_length_m
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.schemas import APPROACH, RELEASE_OBJECTS, ROUTES, TASKS
 

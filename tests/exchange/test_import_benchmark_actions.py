@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from aerialdojo_gen.exchange.actions import actions_of, move, replay, words_of
 from aerialdojo_gen.exchange.aerialvln import MOVES as AERIALVLN
 from aerialdojo_gen.exchange.openfly import MOVES as OPENFLY
-from aerialdojo_gen.planning import primitives
+from aerialdojo_gen.geometry import motion
 from aerialdojo_gen.store.schemas import ACTION_NAMES, APPROACH
 
 starts = st.tuples(st.floats(-500, 500), st.floats(-500, 500), st.floats(0, 60), st.floats(-math.pi, math.pi))
@@ -23,7 +23,7 @@ directions = st.tuples(st.floats(-1, 1), st.floats(-1, 1), st.floats(-1, 1)).fil
 @settings(deadline=None)
 @given(starts, action_lists)
 def test_words_and_poses_give_the_actions_back(start, actions):
-    poses = primitives.replay(start, actions)
+    poses = motion.replay(start, actions)
     words = words_of(np.array([*actions, 0], np.int8), poses)
     assert words[0] == "start"
     found, error = actions_of(words[1:], poses)
@@ -34,14 +34,14 @@ def test_words_and_poses_give_the_actions_back(start, actions):
 @settings(deadline=None)
 @given(starts, action_lists, directions)
 def test_an_approach_comes_back_as_one(start, actions, direction):
-    poses = primitives.replay(start, actions)
+    poses = motion.replay(start, actions)
     end = poses[-1].copy()
     end[:3] += direction
     poses = np.vstack([poses, end])
     words = words_of(np.array([*actions, APPROACH, 0], np.int8), poses)
     found, error = actions_of(words[1:], poses)
     # A straight metre forward, left, right, up or down is the move of that size, and is called so.
-    replayed = primitives.replay(poses[-2], [found[-2]])[-1]
+    replayed = motion.replay(poses[-2], [found[-2]])[-1]
     assert found[:-2] == actions
     assert found[-2] == APPROACH or np.allclose(replayed[:3], end[:3], atol=1e-4)
     assert error < 1e-4
@@ -75,7 +75,7 @@ def test_actions_that_do_the_same_are_found():
 @settings(deadline=None)
 @given(starts, action_lists)
 def test_replay_agrees_with_that_of_the_planner(start, actions):
-    steps = np.column_stack([primitives.DISPLACEMENTS[actions], primitives.TURNS[actions] * primitives.TURN_RAD])
-    mine, theirs = replay(start, steps), primitives.replay(start, actions)
+    steps = np.column_stack([motion.DISPLACEMENTS[actions], motion.TURNS[actions] * motion.TURN_RAD])
+    mine, theirs = replay(start, steps), motion.replay(start, actions)
     assert np.abs(mine[:, :3] - theirs[:, :3]).max() < 1e-9
     assert np.abs(np.exp(1j * mine[:, 3]) - np.exp(1j * theirs[:, 3])).max() < 1e-9

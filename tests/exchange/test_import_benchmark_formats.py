@@ -15,7 +15,7 @@ from typer.testing import CliRunner
 from aerialdojo_gen.cli import app
 from aerialdojo_gen.errors import UsageError
 from aerialdojo_gen.exchange.importing import Options, import_benchmark
-from aerialdojo_gen.planning.primitives import replay
+from aerialdojo_gen.geometry.motion import replay
 from aerialdojo_gen.store.schemas import ACTION_NAMES
 
 

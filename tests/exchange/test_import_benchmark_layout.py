@@ -13,7 +13,7 @@ from support import task_files
 
 from aerialdojo_gen.errors import ImportRefused
 from aerialdojo_gen.exchange.importing import Options, import_benchmark
-from aerialdojo_gen.geometry.frames import wrap_angle_rad
+from aerialdojo_gen.geometry.angles import wrap_angle_rad
 
 
 def document(turn_deg: float = 60) -> tuple[list[dict], dict]:

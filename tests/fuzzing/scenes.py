@@ -21,11 +21,11 @@ from aerialdojo_gen.annotations.format import format_annotations, parse_annotati
 from aerialdojo_gen.annotations.relations import SceneGeometry
 from aerialdojo_gen.config.pipeline import load_pipeline
 from aerialdojo_gen.errors import AerialDojoError
-from aerialdojo_gen.scenes.build import build_scene
+from aerialdojo_gen.layouts.build import build_scene
 from aerialdojo_gen.scenes.catalogue import load_catalogue
 from aerialdojo_gen.scenes.catalogue_files import FOLDERS, catalogue_files
 from aerialdojo_gen.scenes.glb import write_glb
-from aerialdojo_gen.stages.annotate_import import annotation_tables
+from aerialdojo_gen.stages.work.annotate_import import annotation_tables
 
 
 def _annotations() -> list[Case]:

@@ -62,7 +62,7 @@ CLOSED = {
 BUILD = """
 import sys
 from pathlib import Path
-from aerialdojo_gen.scenes.build import build_scene
+from aerialdojo_gen.layouts.build import build_scene
 from aerialdojo_gen.scenes.catalogue import load_catalogue
 from aerialdojo_gen.scenes.glb import write_glb
 recipe, assets, out = map(Path, sys.argv[1:])

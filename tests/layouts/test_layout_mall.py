@@ -11,8 +11,8 @@ import pytest
 
 from aerialdojo_gen.common.rng import generator
 from aerialdojo_gen.errors import AssetError
+from aerialdojo_gen.layouts.build import build_scene
 from aerialdojo_gen.planning.collision import CollisionWorld
-from aerialdojo_gen.scenes.build import build_scene
 from aerialdojo_gen.scenes.catalogue import Catalogue, load_catalogue
 from aerialdojo_gen.scenes.model import Instance, Scene
 

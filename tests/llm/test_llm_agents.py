@@ -17,7 +17,7 @@ import pytest
 from support.llm_server import MOVE, Call, Cut, Drip, Endless, Filtered, Hang, Raw, Say, Service, Status, serving
 
 from aerialdojo_gen.agents import AgentUnavailable, InvalidAnswer, ServiceDown, load_agent
-from aerialdojo_gen.benchmark.goal import Goal, Observation, Rules
+from aerialdojo_gen.agents.goal import Goal, Observation, Rules
 from aerialdojo_gen.errors import AerialDojoError, UsageError
 from aerialdojo_gen.llm import service as services
 from aerialdojo_gen.llm.agent import LanguageModelAgent

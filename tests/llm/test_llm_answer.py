@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from aerialdojo_gen.agents.base import InvalidAnswer
-from aerialdojo_gen.benchmark.goal import Goal, Observation, Rules, Sensors
+from aerialdojo_gen.agents.goal import Goal, Observation, Rules, Sensors
 from aerialdojo_gen.llm.actions import SIXTEEN, eight
 from aerialdojo_gen.llm.answer import parse_answer
 from aerialdojo_gen.llm.images import Picture, colour_picture, depth_picture

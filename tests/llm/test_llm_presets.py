@@ -9,12 +9,12 @@ import pytest
 from support.llm_server import Say, Status, serving
 
 from aerialdojo_gen.agents import load_agent
-from aerialdojo_gen.benchmark.goal import Goal, Observation, Rules
+from aerialdojo_gen.agents.goal import Goal, Observation, Rules
+from aerialdojo_gen.benchmark.estimate import estimate
 from aerialdojo_gen.benchmark.runner import Evaluation
 from aerialdojo_gen.benchmark.tasks import Selection
 from aerialdojo_gen.errors import UsageError
 from aerialdojo_gen.llm.agent import LanguageModelAgent
-from aerialdojo_gen.llm.estimate import estimate
 from aerialdojo_gen.llm.presets import preset, presets
 from aerialdojo_gen.store.schemas import ACTION_NAMES
 

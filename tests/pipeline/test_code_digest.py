@@ -24,8 +24,8 @@ USED = {
     "anchor-sample": ("geometry/viewpoints.py", None),
     "reference-images": ("rendering/gl_shaders.py", "#version 330 core"),
     "pair-objects": ("store/tables.py", '"ascending"'),
-    "plan": ("planning/primitives.py", None),
-    "filter": ("store/schemas.py", '"long_horizon"'),
+    "plan": ("geometry/motion.py", None),
+    "filter": ("common/terms.py", '"long_horizon"'),
     "split": ("release/quota.py", None),
     "render": ("rendering/codecs.py", None),
 }
@@ -40,12 +40,6 @@ def copied(tmp_path_factory):
         target.parent.mkdir(parents=True, exist_ok=True)
         shutil.copyfile(path, target)
     return folder
-
-
-@pytest.fixture(scope="module")
-def before(copied):
-    """The digests of the copy as it is: every test puts back what it edits."""
-    return digests(copied)
 
 
 def digests(folder):
@@ -68,22 +62,25 @@ def changed(before, after):
     return {name for name in NAMES if before[name] != after[name]}
 
 
-def test_a_copy_elsewhere_has_the_same_digests(before):
-    assert before == {name: stage_code(name).digest for name in NAMES}
+def test_a_copy_elsewhere_has_the_same_digests(copied):
+    assert digests(copied) == {name: stage_code(name).digest for name in NAMES}
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_a_line_in_the_stages_own_module_makes_it_stale(copied, before, name):
+def test_a_line_in_the_stages_own_module_makes_it_stale(copied, name):
+    before = digests(copied)
     path = copied / "stages" / f"{name.replace('-', '_')}.py"
+    work = path.parent / "work" / path.name
     run = re.search(r"^def run\(.*?\n    \"\"\"(.*?)\"\"\"\n", path.read_text(), re.DOTALL | re.MULTILINE)
     assert changed(before, edited(path, run[0], run[0] + "    raise RuntimeError\n")) == {name}
+    assert changed(before, edited(work, "\n\n", "\nNEW = 1\n\n")) == {name}
     # What is said: a comment, other blank lines, another docstring.
-    told = run[0].replace(run[1], "Something else.")
-    assert edited(path, run[0], "\n\n" + told + "    # A comment.\n\n") == before
+    assert edited(path, run[0], "\n\n" + run[0] + "    # A comment.\n\n") == before
+    assert edited(path, run[1], "Something else.") == before
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_a_constant_of_a_module_that_it_uses_makes_it_stale(copied, before, name):
+def test_a_constant_of_a_module_that_it_uses_makes_it_stale(copied, name):
     relative, constant = USED[name]
     path = copied / relative
     if constant is None:
@@ -92,7 +89,8 @@ def test_a_constant_of_a_module_that_it_uses_makes_it_stale(copied, before, name
         other = re.sub(r"\d(?=\D*$)", lambda digit: str((int(digit[0]) + 1) % 10), constant)
     else:
         other = constant[:-1] + "x" + constant[-1]
-    assert name in changed(before, edited(path, constant, other))
+    before, after = digests(copied), edited(path, constant, other)
+    assert name in changed(before, after)
     assert (
         edited(path, constant, "# Nothing.\n" + constant if "\n" + constant in path.read_text() else constant)
         == before
@@ -110,25 +108,33 @@ def test_a_constant_of_a_module_that_it_uses_makes_it_stale(copied, before, name
         "release/card.py",
     ],
 )
-def test_messages_and_plumbing_make_nothing_stale(copied, before, relative):
-    assert edited(copied / relative, "\n\n", "\nSAID = 'another message'\n\n") == before
+def test_messages_and_plumbing_make_nothing_stale(copied, relative):
+    assert edited(copied / relative, "\n\n", "\nSAID = 'another message'\n\n") == digests(copied)
 
 
 def test_plumbing_is_what_it_is_said_to_be():
     """Whoever lists a module here has thought about whether it decides what is written."""
     assert set(PLUMBING) == {
         f"aerialdojo_gen{name}"
-        for name in ("", ".benchmark", ".common", ".common.trouble", ".config", ".config.agreement",
-                     ".config.explain", ".config.pipeline", ".config.sections", ".errors", ".pipeline",
-                     ".pipeline.code_digest", ".pipeline.code_facts", ".pipeline.executors",
-                     ".pipeline.executors.local", ".pipeline.fingerprint", ".pipeline.freshness",
-                     ".pipeline.interrupt", ".pipeline.progress", ".pipeline.registry", ".pipeline.runner",
-                     ".pipeline.stage", ".store", ".store.atomic", ".store.files", ".store.footers",
-                     ".store.parquet_files", ".store.schemas", ".store.shards", ".store.staging")
+        for name in ("", ".benchmark", ".common", ".common.disk", ".common.terms", ".common.trouble",
+                     ".common.version", ".config", ".config.agreement", ".config.explain", ".config.pipeline",
+                     ".config.sections", ".errors", ".pipeline", ".pipeline.code_digest", ".pipeline.code_facts",
+                     ".pipeline.executors", ".pipeline.executors.local", ".pipeline.fingerprint",
+                     ".pipeline.freshness", ".pipeline.interrupt", ".pipeline.progress", ".pipeline.registry",
+                     ".pipeline.runner", ".pipeline.stage", ".stages", ".stages.work", ".store", ".store.atomic",
+                     ".store.files", ".store.footers", ".store.parquet_files", ".store.schemas",
+                     ".store.schemas.benchmark", ".store.schemas.columns", ".store.schemas.recordings",
+                     ".store.schemas.release", ".store.schemas.staged", ".store.shards", ".store.staging")
     }  # fmt: skip
     assert {name: counted for name, counted in PLUMBING.items() if counted} == {
         "aerialdojo_gen.store.parquet_files": ("write_clustered",),
+        "aerialdojo_gen.common.terms": ("*",),
         "aerialdojo_gen.store.schemas": ("*",),
+        "aerialdojo_gen.store.schemas.benchmark": ("*",),
+        "aerialdojo_gen.store.schemas.columns": ("*",),
+        "aerialdojo_gen.store.schemas.recordings": ("*",),
+        "aerialdojo_gen.store.schemas.release": ("*",),
+        "aerialdojo_gen.store.schemas.staged": ("*",),
         "aerialdojo_gen.pipeline.stage": ("Job",),
         "aerialdojo_gen.store.shards": ("partition", "check_scene_name"),
     }
@@ -137,14 +143,28 @@ def test_plumbing_is_what_it_is_said_to_be():
         assert set(counted) - {"*"} <= set(known.definitions), name
 
 
-def test_an_edit_of_a_table_counts_for_who_uses_it(copied, before):
+def test_an_edit_of_a_table_counts_for_who_uses_it(copied):
+    before = digests(copied)
+    staged, benchmark = copied / "store" / "schemas" / "staged.py", copied / "store" / "schemas" / "benchmark.py"
+    assert edited(staged, "VERDICTS = table(\n", "VERDICTS = table(  # here\n") == before
     # `verdicts` is written by filter; split copies its rows by the names of others' columns.
-    after = edited(copied / "store" / "schemas.py", "VERDICTS = _table(\n", "VERDICTS = _table(  # here\n")
-    assert after == before
-    after = edited(
-        copied / "store" / "schemas.py", 'EPISODES = _table(\n    "episodes"', 'EPISODES = _table(\n    "episodez"'
-    )
+    after = edited(staged, 'VERDICTS = table(\n    "verdicts"', 'VERDICTS = table(\n    "verdictz"')
+    assert changed(before, after) == {"filter"}
+    after = edited(benchmark, 'EPISODES = table(\n    "episodes"', 'EPISODES = table(\n    "episodez"')
     assert after == before, "evaluate's tables are no stage's"
+
+
+def test_a_declaration_counts_by_what_it_computes(copied):
+    """What a stage runs, its parts and its sources; not its help, nor what it settles or refuses."""
+    before = digests(copied)
+    plan, split = copied / "stages" / "plan.py", copied / "stages" / "split.py"
+    assert changed(before, edited(plan, "// config.targets_per_part", "// 2")) == {"plan"}
+    assert changed(before, edited(copied / "stages" / "build_scenes.py", "materials.toml", "other.toml")) == {
+        "build-scenes"
+    }
+    assert edited(plan, "Plan a collision-free", "Plan another") == before
+    assert edited(split, "config.paper_counts", "not config.paper_counts") == before
+    assert edited(copied / "rendering" / "settle.py", "say(choice.why)", "pass") == before
 
 
 def test_what_is_imported_by_a_name_made_at_run_time_counts():
@@ -215,15 +235,17 @@ def f():
 
 
 def test_an_import_that_cannot_be_told_is_a_defect(copied):
-    path = copied / "stages" / "filter.py"
-    with pytest.raises(RuntimeError, match=r"aerialdojo_gen\.stages\.filter imports name: its source does not tell"):
+    path = copied / "stages" / "work" / "filter.py"
+    with pytest.raises(
+        RuntimeError, match=r"aerialdojo_gen\.stages\.work\.filter imports name: its source does not tell"
+    ):
         edited(path, "\n\n", "\nimport importlib\ndef f(name): importlib.import_module(name)\n\n")
 
 
 @pytest.mark.parametrize("damage", [b"", b"{}", b"null", b"x" * 64 + b"\n{}", None])
-def test_a_damaged_cache_is_none(copied, before, damage):
+def test_a_damaged_cache_is_none(copied, damage):
     cache = copied / "__pycache__" / "code-facts.json"
-    raw = cache.read_bytes()
+    before, raw = digests(copied), cache.read_bytes()
     cache.write_bytes(raw[:-1000] + b"f" + raw[-999:] if damage is None else damage)
     package = Package(copied)
     assert package.of(stage_module("filter")).digest == before["filter"]

@@ -5,12 +5,12 @@ from hypothesis import strategies as st
 from support.flying import distances, solid, town
 from support.handmade import box, instance, scene
 
+from aerialdojo_gen.geometry.triangles import segment_triangle_d2, split_triangles
 from aerialdojo_gen.planning.bvh import build_bvh
 from aerialdojo_gen.planning.clearance import ClearanceGrid
 from aerialdojo_gen.planning.collision import CollisionWorld
 from aerialdojo_gen.planning.distance_field import build_distance_field
 from aerialdojo_gen.planning.grid_kernels import polyline_clearance
-from aerialdojo_gen.planning.triangles import segment_triangle_d2, split_triangles
 
 WORLD = town()
 GRID = ClearanceGrid.build(WORLD)

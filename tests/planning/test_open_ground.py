@@ -12,7 +12,7 @@ from support.handmade import box, instance
 from support.hills import Hills, hills, standing, write_hills
 from support.planting import Planted, check, poses
 
-from aerialdojo_gen.annotations.command import draft_scene
+from aerialdojo_gen.annotate.drafting import draft_scene
 from aerialdojo_gen.annotations.draft import Choice
 from aerialdojo_gen.commands.common import open_pipeline, run_until
 from aerialdojo_gen.config.sections import PlanConfig

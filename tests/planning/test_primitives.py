@@ -5,14 +5,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from aerialdojo_gen.planning.primitives import (
+from aerialdojo_gen.geometry.angles import wrap_turned_rad
+from aerialdojo_gen.geometry.motion import (
     DISPLACEMENTS,
     N_HEADINGS,
     TURNS,
     nearest_heading,
     replay,
     route_length_m,
-    wrap_rad,
 )
 from aerialdojo_gen.store import schemas
 
@@ -73,7 +73,7 @@ def test_nearest_heading_is_within_seven_and_a_half_degrees(start, wanted):
 
 
 def test_pi_stays_pi():
-    assert wrap_rad(np.array([math.pi, -math.pi, 3 * math.pi])).tolist() == [math.pi] * 3
+    assert wrap_turned_rad(np.array([math.pi, -math.pi, 3 * math.pi])).tolist() == [math.pi] * 3
 
 
 @pytest.mark.parametrize("wrong", [-1, 17])

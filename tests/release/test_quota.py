@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from aerialdojo_gen.annotations.command import draft_scene
+from aerialdojo_gen.annotate.drafting import draft_scene
 from aerialdojo_gen.commands.common import open_pipeline, run_until
 from aerialdojo_gen.common.paper import inventory, splits
 from aerialdojo_gen.errors import PoolError

@@ -17,15 +17,15 @@ from aerialdojo_gen.errors import ConfigError
 from aerialdojo_gen.geometry.cameras import Camera, view_pose
 from aerialdojo_gen.geometry.surface import Surface
 from aerialdojo_gen.rendering.backend import check, open_renderer
+from aerialdojo_gen.rendering.casters import ray_caster
 from aerialdojo_gen.rendering.probe import probe_scene
 from aerialdojo_gen.rendering.raycast import RayRenderer
-from aerialdojo_gen.rendering.world import ray_caster
 from aerialdojo_gen.scenes.model import Instance
 from aerialdojo_gen.scoring.base import AnchorView
 from aerialdojo_gen.scoring.geometric import WEIGHTS, judge
 from aerialdojo_gen.scoring.panel import Panel, panel
-from aerialdojo_gen.stages.anchor_sample import anchors_of
-from aerialdojo_gen.stages.anchor_world import Candidates
+from aerialdojo_gen.stages.work.anchor_sample import anchors_of
+from aerialdojo_gen.stages.work.anchor_world import Candidates
 
 CONFIG = AnchorSampleConfig()
 RADIUS = EMBODIMENT.radius_m

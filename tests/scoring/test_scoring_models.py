@@ -18,7 +18,7 @@ from aerialdojo_gen.pipeline.registry import BY_NAME
 from aerialdojo_gen.scoring.clip import ClipScorer, digest
 from aerialdojo_gen.scoring.panel import panel
 from aerialdojo_gen.scoring.vlm import VlmScorer, read_order
-from aerialdojo_gen.stages.anchor_sample import anchors_of
+from aerialdojo_gen.stages.work.anchor_sample import anchors_of
 
 WORDS = {"[UNK]": 0, "a": 1, "photo": 2, "of": 3, "red": 4, "blue": 5, "post": 6}
 KEY = "sk-test-0123456789"

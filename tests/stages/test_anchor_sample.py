@@ -9,12 +9,12 @@ from support.handmade import box, instance, mesh_of, scene
 
 from aerialdojo_gen.config.sections import AnchorSampleConfig, Embodiment
 from aerialdojo_gen.errors import AnnotationError, StoreError
-from aerialdojo_gen.geometry.frames import wrap_angle_rad
+from aerialdojo_gen.geometry.angles import wrap_angle_rad
 from aerialdojo_gen.geometry.viewpoints import shortlist
 from aerialdojo_gen.pipeline.stage import Job, Roots
 from aerialdojo_gen.scenes.glb import write_glb
-from aerialdojo_gen.stages import anchor_sample
-from aerialdojo_gen.stages.anchor_sample import World, anchors_of
+from aerialdojo_gen.stages.work import anchor_sample
+from aerialdojo_gen.stages.work.anchor_sample import World, anchors_of
 from aerialdojo_gen.store import schemas
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.tables import check_table, from_rows

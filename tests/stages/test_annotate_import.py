@@ -16,7 +16,7 @@ from aerialdojo_gen.config.sections import AnnotateImportConfig, Embodiment
 from aerialdojo_gen.errors import AnnotationError, UsageError
 from aerialdojo_gen.pipeline.stage import Job, Roots
 from aerialdojo_gen.scenes.model import Scene
-from aerialdojo_gen.stages import annotate_import
+from aerialdojo_gen.stages.work import annotate_import
 from aerialdojo_gen.store.schemas import LANDMARKS, OBJECTS
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -9,7 +9,7 @@ from support.handmade import OPINIONS
 
 from aerialdojo_gen.config.sections import Embodiment, PairObjectsConfig
 from aerialdojo_gen.pipeline.stage import Job, Roots
-from aerialdojo_gen.stages import pair_objects
+from aerialdojo_gen.stages.work import pair_objects
 from aerialdojo_gen.store import schemas
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.tables import check_table, from_rows

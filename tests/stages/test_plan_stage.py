@@ -10,11 +10,11 @@ from support.handmade import OPINIONS
 
 from aerialdojo_gen.config.sections import Embodiment, PairObjectsConfig, PlanConfig
 from aerialdojo_gen.errors import StoreError
+from aerialdojo_gen.geometry.motion import replay
 from aerialdojo_gen.pipeline.stage import Job, Roots
 from aerialdojo_gen.planning.clearance import ClearanceGrid
-from aerialdojo_gen.planning.primitives import replay
 from aerialdojo_gen.scenes.glb import write_glb
-from aerialdojo_gen.stages import pair_objects, plan
+from aerialdojo_gen.stages.work import pair_objects, plan
 from aerialdojo_gen.store import schemas
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.tables import check_table, from_rows

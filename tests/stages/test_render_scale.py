@@ -25,7 +25,7 @@ from aerialdojo_gen.rendering import backend, recording
 from aerialdojo_gen.rendering.codecs import to_metres
 from aerialdojo_gen.rendering.estimate import estimate
 from aerialdojo_gen.rendering.reader import read_recording
-from aerialdojo_gen.stages import render
+from aerialdojo_gen.stages.work import render
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.staging import AREA
 

@@ -20,7 +20,7 @@ from aerialdojo_gen.rendering.reader import read_recording
 from aerialdojo_gen.rendering.sample import choose
 from aerialdojo_gen.rendering.trajectory import by_steps, by_time
 from aerialdojo_gen.rendering.world import render_world
-from aerialdojo_gen.stages import reference_images
+from aerialdojo_gen.stages.work import reference_images
 from aerialdojo_gen.store import schemas
 
 

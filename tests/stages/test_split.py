@@ -17,8 +17,8 @@ from aerialdojo_gen.release.card import write_card
 from aerialdojo_gen.release.contents import counts
 from aerialdojo_gen.release.ids import key_of, nav_id, reference_id
 from aerialdojo_gen.release.select import train_counts, train_mask
-from aerialdojo_gen.stages import filter as filter_stage
-from aerialdojo_gen.stages import split
+from aerialdojo_gen.stages.work import filter as filter_stage
+from aerialdojo_gen.stages.work import split
 from aerialdojo_gen.store import schemas
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.tables import from_rows

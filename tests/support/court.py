@@ -16,7 +16,7 @@ from aerialdojo_gen.pipeline.registry import BY_NAME
 from aerialdojo_gen.pipeline.stage import Job, Roots
 from aerialdojo_gen.rendering.sample import n_parts
 from aerialdojo_gen.scenes.glb import write_glb
-from aerialdojo_gen.stages import render
+from aerialdojo_gen.stages.work import render
 from aerialdojo_gen.store import schemas
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.tables import check_table, from_rows

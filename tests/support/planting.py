@@ -15,7 +15,8 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from aerialdojo_gen.config.pipeline import load_pipeline
-from aerialdojo_gen.planning.primitives import replay, wrap_rad
+from aerialdojo_gen.geometry.angles import wrap_turned_rad
+from aerialdojo_gen.geometry.motion import replay
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.footers import decode, encode
 from aerialdojo_gen.store.schemas import APPROACH
@@ -99,7 +100,7 @@ def measured(row: Row, path: np.ndarray, actions: list[int]) -> Row:
 
 
 def turned(yaw: float, degrees: float) -> float:
-    return float(wrap_rad(np.array([yaw + math.radians(degrees)]))[0])
+    return float(wrap_turned_rad(np.array([yaw + math.radians(degrees)]))[0])
 
 
 def faults_of(report) -> dict[str, list[str]]:

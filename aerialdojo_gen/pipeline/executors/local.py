@@ -71,7 +71,7 @@ def compute(task: Task) -> dict[str, Any]:
         raise BudgetSpent(f"the budget was spent before {task.label}")
     stage = BY_NAME[job.stage]
     try:
-        output = stage.load()(job, task.config)
+        output = stage.run(job, task.config)
     except AerialDojoError:
         raise
     except Exception as error:

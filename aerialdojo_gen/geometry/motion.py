@@ -12,7 +12,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
-from aerialdojo_gen.store.schemas import ACTION_NAMES, APPROACH, STOP, TURN_LEFT, TURN_RIGHT
+from aerialdojo_gen.common.terms import ACTION_NAMES, APPROACH, STOP, TURN_LEFT, TURN_RIGHT
+from aerialdojo_gen.geometry.angles import wrap_kernel_rad
 
 N_HEADINGS = 24
 TURN_RAD = 2 * math.pi / N_HEADINGS
@@ -35,17 +36,6 @@ def _displacement(name: str) -> tuple[float, float, float]:
 DISPLACEMENTS = np.array([_displacement(name) for name in ACTION_NAMES])
 # (17,) int64: how many headings an action turns to the left.
 TURNS = np.array([(a == TURN_LEFT) - (a == TURN_RIGHT) for a in range(len(ACTION_NAMES))], np.int64)
-
-
-def wrap_rad(yaw: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Bring angles into (-pi, pi], element by element."""
-    wrapped = math.pi - np.mod(math.pi - yaw, 2 * math.pi)
-    return np.asarray(wrapped, np.float64)
-
-
-@njit(cache=True, inline="always")
-def _wrapped(yaw: float) -> float:
-    return math.pi - (math.pi - yaw) % (2 * math.pi)
 
 
 def replay(start: ArrayLike, actions: ArrayLike) -> NDArray[np.float64]:
@@ -79,7 +69,7 @@ def fly(start: NDArray[np.float64], actions: NDArray[np.int8]) -> NDArray[np.flo
     """`replay` for kernels: (4,) float64 and (n,) int8 that are known to be actions, to (n + 1, 4) float64."""
     poses = np.empty((len(actions) + 1, 4))
     poses[0] = start
-    poses[0, 3] = _wrapped(start[3])
+    poses[0, 3] = wrap_kernel_rad(start[3])
     heading = 0
     for k in range(len(actions)):
         dx, dy, dz = DISPLACEMENTS[actions[k]]
@@ -89,7 +79,7 @@ def fly(start: NDArray[np.float64], actions: NDArray[np.int8]) -> NDArray[np.flo
         poses[k + 1, 1] = poses[k, 1] + (s * dx + c * dy)
         poses[k + 1, 2] = poses[k, 2] + dz
         heading += TURNS[actions[k]]
-        poses[k + 1, 3] = _wrapped(start[3] + heading * TURN_RAD)
+        poses[k + 1, 3] = wrap_kernel_rad(start[3] + heading * TURN_RAD)
     return poses
 
 

@@ -12,12 +12,12 @@ from aerialdojo_gen.annotations.format import write_annotations
 from aerialdojo_gen.common.paper import paper_counts
 from aerialdojo_gen.config.pipeline import Pipeline
 from aerialdojo_gen.errors import UsageError
+from aerialdojo_gen.layouts.build import build_scene
 from aerialdojo_gen.pipeline.stage import Job, Roots
-from aerialdojo_gen.scenes.build import build_scene
 from aerialdojo_gen.scenes.catalogue import load_catalogue
 from aerialdojo_gen.scenes.model import Scene
-from aerialdojo_gen.stages.anchor_sample import candidates_of
-from aerialdojo_gen.stages.anchor_world import World
+from aerialdojo_gen.stages.work.anchor_sample import candidates_of
+from aerialdojo_gen.stages.work.anchor_world import World
 
 
 def draft_scene(

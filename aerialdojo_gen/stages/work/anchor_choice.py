@@ -12,11 +12,12 @@ from numpy.typing import NDArray
 from aerialdojo_gen.common.rng import generator
 from aerialdojo_gen.config.sections import AnchorSampleConfig
 from aerialdojo_gen.errors import AnnotationError
+from aerialdojo_gen.geometry.angles import wrap_angle_rad
 from aerialdojo_gen.geometry.surface import Surface
 from aerialdojo_gen.pipeline.stage import Job
 from aerialdojo_gen.scoring.geometric import judge
 from aerialdojo_gen.scoring.panel import SCORERS
-from aerialdojo_gen.stages.anchor_world import Candidates, World
+from aerialdojo_gen.stages.work.anchor_world import Candidates, World
 
 Floats = NDArray[np.float64]
 
@@ -162,7 +163,7 @@ def with_choice(
 
 def is_same(row: dict[str, Any], choice: dict[str, Any]) -> bool:
     """Whether a choice is that sampled anchor, as far as the annotation file's digits tell."""
-    turn = abs((row["yaw_rad"] - choice["yaw_rad"] + math.pi) % (2.0 * math.pi) - math.pi)
+    turn = abs(float(wrap_angle_rad(row["yaw_rad"] - choice["yaw_rad"])))
     return turn <= _SAME_RAD and math.dist(
         [row[a] for a in ("x_m", "y_m", "z_m")], [choice[a] for a in ("x_m", "y_m", "z_m")]
     ) <= _SAME_M  # fmt: skip

@@ -51,6 +51,46 @@ def point_triangle_d2(px: float, py: float, pz: float, tri: NDArray[np.float64],
     return min(d, point_segment_d2(px, py, pz, cx, cy, cz, ax, ay, az))
 
 
+@njit(cache=True)
+def closest_point_d2(p: NDArray[np.float64], t: NDArray[np.float64]) -> float:
+    """Squared distance from point p, (3,), to the triangle t, (9,), by its closest point (Ericson, 5.1.5).
+
+    Not `point_triangle_d2`, which differs from it in the last bits: the distances that anchors are stored with are
+    this one's, and certified routes' clearances that one's.
+    """
+    a0, a1, a2 = t[0], t[1], t[2]
+    ab0, ab1, ab2 = t[3] - a0, t[4] - a1, t[5] - a2
+    ac0, ac1, ac2 = t[6] - a0, t[7] - a1, t[8] - a2
+    ap0, ap1, ap2 = p[0] - a0, p[1] - a1, p[2] - a2
+    d1 = ab0 * ap0 + ab1 * ap1 + ab2 * ap2
+    d2 = ac0 * ap0 + ac1 * ap1 + ac2 * ap2
+    d3 = d1 - (ab0 * ab0 + ab1 * ab1 + ab2 * ab2)
+    d4 = d2 - (ab0 * ac0 + ab1 * ac1 + ab2 * ac2)
+    d5 = d1 - (ab0 * ac0 + ab1 * ac1 + ab2 * ac2)
+    d6 = d2 - (ac0 * ac0 + ac1 * ac1 + ac2 * ac2)
+    va, vb, vc = d3 * d6 - d5 * d4, d5 * d2 - d1 * d6, d1 * d4 - d3 * d2
+    if d1 <= 0.0 and d2 <= 0.0:
+        v, w = 0.0, 0.0
+    elif d3 >= 0.0 and d4 <= d3:
+        v, w = 1.0, 0.0
+    elif vc <= 0.0 and d1 >= 0.0 and d3 <= 0.0:
+        v, w = d1 / (d1 - d3), 0.0
+    elif d6 >= 0.0 and d5 <= d6:
+        v, w = 0.0, 1.0
+    elif vb <= 0.0 and d2 >= 0.0 and d6 <= 0.0:
+        v, w = 0.0, d2 / (d2 - d6)
+    elif va <= 0.0 and d4 - d3 >= 0.0 and d5 - d6 >= 0.0:
+        w = (d4 - d3) / ((d4 - d3) + (d5 - d6))
+        v = 1.0 - w
+    else:
+        total = va + vb + vc
+        v, w = vb / total, vc / total
+    x = ap0 - v * ab0 - w * ac0
+    y = ap1 - v * ab1 - w * ac1
+    z = ap2 - v * ab2 - w * ac2
+    return x * x + y * y + z * z
+
+
 @njit(cache=True, inline="always")
 def segment_segment_d2(
     px: float, py: float, pz: float, qx: float, qy: float, qz: float,

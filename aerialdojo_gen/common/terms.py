@@ -1,0 +1,24 @@
+"""Words and numbers that tables, planner, cameras and agents share: actions, outcomes, settings, views."""
+
+from __future__ import annotations
+
+# The action set (paper, section on the action space); `APPROACH` stands in reference trajectories only.
+ACTION_NAMES = (
+    "Stop",
+    "MoveForward1", "MoveForward3", "MoveForward5",
+    "MoveLeft1", "MoveLeft3", "MoveLeft5",
+    "MoveRight1", "MoveRight3", "MoveRight5",
+    "MoveUp1", "MoveUp2", "MoveDown1", "MoveDown2",
+    "TurnLeft15", "TurnRight15",
+    "Approach",
+)  # fmt: skip
+STOP, MOVE_UP_1, MOVE_DOWN_1, TURN_LEFT, TURN_RIGHT, APPROACH = 0, 10, 12, 14, 15, 16
+
+OUTCOMES = ("SOLVED", "START_IN_COLLISION", "GOAL_IN_COLLISION", "NO_PATH", "NEAR_STRAIGHT", "BUDGET_EXHAUSTED")
+SETTINGS = ("base", "standard", "long_horizon")
+SUBSETS = ("id_train", "id_test", "ood_train", "ood_test")
+DIRECTIONS = ("east", "northeast", "north", "northwest", "west", "southwest", "south", "southeast")
+VIEWS = ("front", "left", "right", "down")
+# What ends an episode (benchmark): an agent's Stop, a collision, or the last action of the budget.
+TERMINATIONS = ("stop", "collision", "budget")
+FAMILIES = {"U": "Urban", "N": "Natural", "I": "Infrastructure", "D": "Disaster"}

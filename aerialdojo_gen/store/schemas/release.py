@@ -1,0 +1,71 @@
+"""The tables of the release: what an agent may know, and what only the evaluator may."""
+
+from __future__ import annotations
+
+import pyarrow as pa
+
+from aerialdojo_gen.store.schemas.columns import (
+    CLEARANCE,
+    DETOUR,
+    EUCLIDEAN,
+    LISTS,
+    PAIR,
+    ROUTE,
+    SCENE,
+    SETTING,
+    column,
+    table,
+    xyz,
+)
+from aerialdojo_gen.store.schemas.staged import ANCHOR_COLUMNS, OBJECT_COLUMNS, REFERENCE
+
+RELEASE_ANCHORS = table("anchors", ["scene", "object_id", "anchor_id"], *ANCHOR_COLUMNS)
+
+TASKS = table(
+    "tasks", ["scene", "nav_id", "modality"],
+    column("task_id", pa.string(), "the instance: nav_id and the modality's letter"),
+    column("nav_id", pa.string(), "the navigation task, shared by its two instances"),
+    SCENE,
+    column("family", pa.string(), "Urban, Natural, Infrastructure or Disaster"),
+    column("scene_type", pa.string(), "one of the 21 types"),
+    column("partition", pa.string(), "ID or OOD"),
+    column("subset", pa.string(), "train or test"),
+    SETTING,
+    column("modality", pa.string(), "semantic or image"),
+    column("action_budget", pa.int32(), "most actions an episode may take, Stop included"),
+    *xyz("start position of the body's centre", "start_"),
+    column("start_yaw_rad", pa.float64(), "yaw at the start", "rad"),
+    column("target_name", pa.string(), "name of the object to be found"),
+    column("landmark", pa.string(), "name of the landmark nearest to the target"),
+    column("direction", pa.string(), "compass direction from that landmark to the target"),
+    column("description", pa.string(), "the target's description; null for image goals", nullable=True),
+    column("reference_image_id", pa.string(), "the target's picture in objects; null for semantic goals",
+           nullable=True),
+    clusters=["setting", "modality"],
+    plain=["task_id", "nav_id"],
+)  # fmt: skip
+
+ROUTES = table(
+    "routes", ["scene", "nav_id"],
+    column("nav_id", pa.string(), "the navigation task"),
+    SCENE,
+    SETTING,
+    *PAIR,
+    *xyz("goal: the target's selected anchor", "goal_"),
+    column("goal_yaw_rad", pa.float64(), "yaw of the goal anchor", "rad"),
+    EUCLIDEAN,
+    ROUTE[0],
+    column("detour_ratio", pa.float64(), DETOUR),
+    ROUTE[1],
+    column("min_clearance_m", pa.float64(), CLEARANCE, "m"),
+    *LISTS,
+    clusters=["setting"],
+    plain=["nav_id", "euclidean_m", "length_m", "detour_ratio", "min_clearance_m",
+           *[field.name for field in LISTS]],
+)  # fmt: skip
+
+REFERENCE_ID = column("reference_image_id", pa.string(), "opaque id that image tasks name")
+
+RELEASE_OBJECTS = table(
+    "objects", ["scene", "object_id"], *OBJECT_COLUMNS, REFERENCE_ID, *REFERENCE, plain=["reference_image"]
+)  # fmt: skip

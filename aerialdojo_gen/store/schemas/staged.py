@@ -1,0 +1,158 @@
+"""The tables of the stages before the release."""
+
+from __future__ import annotations
+
+import pyarrow as pa
+
+from aerialdojo_gen.store.schemas.columns import (
+    CLEARANCE,
+    DETOUR,
+    EUCLIDEAN,
+    LISTS,
+    PAIR,
+    ROUTE,
+    SCENE,
+    column,
+    table,
+    xyz,
+)
+
+OBJECT_COLUMNS = [
+    SCENE,
+    column("object_id", pa.int32(), "id of the target object within its scene"),
+    column("name", pa.string(), "what a person would call it, e.g. red delivery van"),
+    column("category", pa.string(), "semantic category, one of the catalogue's"),
+    column("description", pa.string(), "what it looks like and what stands by it"),
+    column("mesh_node", pa.string(), "node of the scene's mesh"),
+    *xyz("centre of the object's axis-aligned box"),
+    *[column(f"size_{a}_m", pa.float64(), f"extent of the box along {a}", "m") for a in "xyz"],
+    column("landmark_id", pa.int32(), "nearest landmark in the plane"),
+    column("direction", pa.string(), "compass direction from that landmark to the object, one of eight"),
+]
+REFERENCE = [
+    column("reference_image", pa.binary(), "PNG: front view from the selected anchor", nullable=True),
+    column("box_u0_px", pa.int32(), "object's box in the image, left column", "px", True),
+    column("box_v0_px", pa.int32(), "object's box in the image, top row", "px", True),
+    column("box_u1_px", pa.int32(), "object's box in the image, one past the right column", "px", True),
+    column("box_v1_px", pa.int32(), "object's box in the image, one past the bottom row", "px", True),
+    column("image_fraction", pa.float64(), "share of the image's pixels that show the object", nullable=True),
+]
+
+SCENES = table(
+    "scenes", ["scene"],
+    SCENE,
+    column("family", pa.string(), "Urban, Natural, Infrastructure or Disaster"),
+    column("scene_type", pa.string(), "one of the 21 types, e.g. Mall"),
+    column("partition", pa.string(), "ID (suffix _0) or OOD (suffix _1)"),
+    column("mesh_path", pa.string(), "GLB, relative to the data directory"),
+    column("mesh_sha256", pa.string(), "SHA-256 of the GLB's bytes, hexadecimal"),
+    *[column(f"{e}_{a}_m", pa.float64(), f"{e} bound of the flight volume along {a}", "m")
+      for e in ("min", "max") for a in "xyz"],
+    column("ceiling_m", pa.float64(), "highest z of the flight volume", "m"),
+    column("n_triangles", pa.int64(), "triangles of all instances"),
+    column("n_instances", pa.int32(), "named nodes"),
+    column("n_categories", pa.int32(), "distinct categories among the nodes"),
+    command="build-scenes",
+)  # fmt: skip
+
+LANDMARKS = table(
+    "landmarks", ["scene", "landmark_id"],
+    SCENE,
+    column("landmark_id", pa.int32(), "id of the landmark within its scene"),
+    column("name", pa.string(), "what a person would call it, e.g. clock tower"),
+    column("mesh_node", pa.string(), "node of the scene's mesh"),
+    *xyz("centre of the landmark's axis-aligned box"),
+    command="annotate-import",
+)  # fmt: skip
+
+OBJECTS = table("objects", ["scene", "object_id"], *OBJECT_COLUMNS, command="annotate-import")
+
+CHOSEN_ANCHORS = table(
+    "chosen_anchors", ["scene", "object_id"],
+    SCENE,
+    column("object_id", pa.int32(), "object that a person chose an anchor for; the others have no row"),
+    *xyz("position of the body's centre"),
+    column("yaw_rad", pa.float64(), "yaw", "rad"),
+    command="annotate-import",
+)  # fmt: skip
+
+ANCHOR_COLUMNS = (
+    SCENE,
+    column("object_id", pa.int32(), "object that the anchor looks at"),
+    column("anchor_id", pa.int32(), "rank among the object's anchors, 0 is the best or the one that a person chose"),
+    *xyz("position of the body's centre"),
+    column("yaw_rad", pa.float64(), "yaw that faces the object's centroid", "rad"),
+    column("clearance_m", pa.float64(), "distance to the nearest surface of the scene", "m"),
+    column("surface_distance_m", pa.float64(), "distance to the object's own surface", "m"),
+    column("visible_fraction", pa.float64(), "share of the object's sample points that the anchor sees"),
+    column("score", pa.float64(), "what the anchors are ranked by, the scorers' weighted mean, higher is better"),
+    *[
+        column(f"score_{name}", pa.float64(), f"the scorer {name}'s, 0 to 1; null where not asked", "", True)
+        for name in ("geometric", "clip", "vlm")
+    ],
+    column("part_unoccluded", pa.float64(), "of the pixels that would show the object alone, the share that do"),
+    column("part_shown", pa.float64(), "share of the object that the picture tells"),
+    column("part_size", pa.float64(), "edge of the object's box in the picture, 1 from half of the picture's edge"),
+    column("part_centred", pa.float64(), "how near the object is to the picture's centre, 0 to 1"),
+    column("part_contrast", pa.float64(), "colour difference to what surrounds it in the picture, 0 to 1"),
+    column("part_sky", pa.float64(), "share of sky in what surrounds it in the picture"),
+    column("part_level", pa.float64(), "1 up to 15 degrees above or below the centroid, 0 from 45"),
+    column("part_clear", pa.float64(), "room around the body, 1 at the standoff"),
+    column("selected", pa.bool_(), "true for one anchor an object: the goal of its tasks"),
+    column("selected_by", pa.string(), "human or auto"),
+)  # fmt: skip
+
+ANCHORS = table(
+    "anchors", ["scene", "object_id", "anchor_id"],
+    *ANCHOR_COLUMNS,
+    column("thumbnail", pa.binary(), "the front view, JPEG"),
+    plain=["thumbnail"],
+    command="anchor-sample",
+)  # fmt: skip
+
+PAIRS = table(
+    "pairs", ["scene", "pair_id"],
+    SCENE,
+    column("pair_id", pa.string(), "<start object>_<start anchor>__<target object>"),
+    *PAIR,
+    EUCLIDEAN,
+    command="pair-objects",
+)  # fmt: skip
+
+PLANS = table(
+    "plans", ["scene", "pair_id"],
+    SCENE,
+    column("pair_id", pa.string(), "candidate task"),
+    column("outcome", pa.string(), "SOLVED, START_IN_COLLISION, GOAL_IN_COLLISION, NO_PATH or BUDGET_EXHAUSTED"),
+    *ROUTE,
+    column("expansions", pa.int64(), "nodes that the search expanded, all attempts together"),
+    column("min_clearance_m", pa.float64(), CLEARANCE, "m", True),
+    *LISTS,
+    command="plan",
+)  # fmt: skip
+
+VERDICTS = table(
+    "verdicts", ["scene", "pair_id"],
+    SCENE,
+    column("pair_id", pa.string(), "candidate task"),
+    EUCLIDEAN,
+    column("length_m", pa.float64(), "length of the planned route", "m", True),
+    column("detour_ratio", pa.float64(), DETOUR, nullable=True),
+    column("n_actions", pa.int32(), "number of actions, Stop included", nullable=True),
+    column("keep", pa.bool_(), "whether the candidate becomes a task"),
+    column("reason", pa.string(), "kept, or why not: a stable word"),
+    column("setting", pa.string(), "length setting, null where the length fits none", nullable=True),
+    column("action_budget", pa.int32(), "most actions an episode of that setting may take", nullable=True),
+    command="filter",
+)  # fmt: skip
+
+REFERENCES = table(
+    "references", ["scene", "object_id"],
+    SCENE,
+    column("object_id", pa.int32(), "object that the image shows"),
+    *REFERENCE,
+    command="reference-images",
+)  # fmt: skip
+
+# What lies in a folder of its own, by scene and part; a new stage's table is listed here.
+STAGED = (SCENES, LANDMARKS, OBJECTS, CHOSEN_ANCHORS, ANCHORS, REFERENCES, PAIRS, PLANS, VERDICTS)

@@ -1,0 +1,102 @@
+"""A new stage touches its module, its schema and the registry, and nothing else: CONTRIBUTING's example, run."""
+
+import os
+import shutil
+import subprocess
+import sys
+from collections import Counter
+from pathlib import Path
+
+import pyarrow.parquet as pq
+import pytest
+
+import aerialdojo_gen
+
+PACKAGE = Path(aerialdojo_gen.__file__).parent
+CHECKOUT = next(folder for folder in Path(__file__).parents if (folder / "pyproject.toml").is_file())
+SCENE = "U_Courtyard_0"
+
+MODULE = '''"""`tally`: how many things of each category stand in a scene."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+from aerialdojo_gen.pipeline.stage import Job, Output, Stage
+
+
+def run(job: Job, config: object) -> Output:
+    """Count the instances of a scene's mesh."""
+    from aerialdojo_gen.store.schemas.staged import TALLIES
+    from aerialdojo_gen.store.tables import from_rows
+
+    things = Counter(instance.category for instance in job.scene_model().instances)
+    rows = [{"scene": job.scene, "category": name, "things": n} for name, n in sorted(things.items())]
+    return Output({"tallies": from_rows(TALLIES, rows)}, rows_in=sum(things.values()), rows_out=len(rows))
+
+
+STAGE = Stage("tally", "Count a scene's things by category.", reads=("scenes",), writes=("tallies",), run=run)
+'''
+SCHEMA = """TALLIES = table(
+    "tallies", ["scene", "category"],
+    SCENE,
+    column("category", pa.string(), "category of the catalogue or of the structure"),
+    column("things", pa.int32(), "instances of it"),
+    command="tally",
+)  # fmt: skip
+
+STAGED = ("""
+
+
+@pytest.fixture
+def checkout(tmp_path):
+    """A checkout of which only the package is a copy, with one stage more."""
+    for path in PACKAGE.rglob("*"):
+        if path.is_file() and path.suffix in (".py", ".toml", ".csv"):
+            target = tmp_path / "aerialdojo_gen" / path.relative_to(PACKAGE)
+            target.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(path, target)
+    for folder in ("scene_assets", "annotations", "pipelines"):
+        (tmp_path / folder).symlink_to(CHECKOUT / folder)
+    package = tmp_path / "aerialdojo_gen"
+    (package / "stages" / "tally.py").write_text(MODULE)
+    replaced(package / "store" / "schemas" / "staged.py", "STAGED = (", SCHEMA)
+    replaced(package / "store" / "schemas" / "staged.py", "VERDICTS)", "VERDICTS, TALLIES)")
+    replaced(package / "pipeline" / "registry.py", "    split,\n)", "    split,\n    tally,\n)")
+    replaced(package / "pipeline" / "registry.py", "    render.STAGE,\n", "    render.STAGE,\n    tally.STAGE,\n")
+    return tmp_path
+
+
+def replaced(path, old, new):
+    text = path.read_text()
+    assert text.count(old) == 1, (path, old)
+    path.write_text(text.replace(old, new))
+
+
+def call(checkout, *args):
+    command = [sys.executable, "-m", "aerialdojo_gen.cli", *args]
+    env = os.environ | {"PYTHONPATH": str(checkout), "COLUMNS": "200"}
+    done = subprocess.run(command, cwd=checkout, env=env, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return done.stdout + done.stderr
+
+
+def test_a_new_stage_is_a_module_a_table_and_a_line(checkout):
+    assert "Count a scene's things by category." in call(checkout, "--help")
+    tally = ("tally", "--scene", SCENE, "--data", "data", "--workers", "1", "--pipeline", "pipelines/smoke.toml")
+    assert "1 of 1 shards computed" in call(checkout, *tally)
+    rows = pq.read_table(checkout / "data" / "tallies" / SCENE).to_pylist()
+    scenes = pq.read_table(checkout / "data" / "scenes" / SCENE).to_pylist()
+    assert sum(row["things"] for row in rows) == scenes[0]["n_instances"]
+    assert len(rows) == scenes[0]["n_categories"] == len(Counter(row["category"] for row in rows))
+    # It follows its own code: a word that is shown makes nothing stale, a line that is run does.
+    module = checkout / "aerialdojo_gen" / "stages" / "tally.py"
+    replaced(module, "Count a scene's things", "Count things")
+    assert "tally" in (said := call(checkout, *tally))
+    assert "shards computed" not in said
+    replaced(module, '"things": n}', '"things": n + 1}')
+    assert "tally: " in (said := call(checkout, *tally))
+    assert said.count("1 of 1 shards computed") == 1
+    assert pq.read_table(checkout / "data" / "tallies" / SCENE)["things"].to_pylist() == [
+        r["things"] + 1 for r in rows
+    ]
