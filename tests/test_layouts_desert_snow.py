@@ -7,10 +7,10 @@ from layout_checks import catalogue, clashes, floating, glb_bytes, kinds_of, loo
 
 from aerialdojo_gen.common.paper import paper_counts
 from aerialdojo_gen.errors import AssetError
-from aerialdojo_gen.layouts.natural_groups import Group, level_ground, plan_groups, set_out
-from aerialdojo_gen.layouts.natural_sands import dunes, wash
-from aerialdojo_gen.layouts.natural_strata import Rock, put_up
-from aerialdojo_gen.layouts.natural_winter import banked, moguls, slope_ground
+from aerialdojo_gen.layouts.natural.desert.sands import dunes, wash
+from aerialdojo_gen.layouts.natural.parts.groups import Group, level_ground, plan_groups, set_out
+from aerialdojo_gen.layouts.natural.parts.strata import Rock, put_up
+from aerialdojo_gen.layouts.natural.snowfield.winter import banked, moguls, slope_ground
 from aerialdojo_gen.scenes.recipe import Recipe
 from aerialdojo_gen.scenes.site import Site
 from aerialdojo_gen.scenes.terrain import rolling_terrain

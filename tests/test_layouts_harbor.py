@@ -18,7 +18,7 @@ from layout_checks import (
 )
 
 from aerialdojo_gen.common.paper import paper_counts
-from aerialdojo_gen.layouts.infra_harbour import HIGH_M, LONG_M, QUAY_M, container_block, quay
+from aerialdojo_gen.layouts.infrastructure.harbor.quays import HIGH_M, LONG_M, QUAY_M, container_block, quay
 from aerialdojo_gen.scenes.footprints import footprint
 from aerialdojo_gen.scenes.ground import rectangle
 from aerialdojo_gen.scenes.recipe import Recipe

@@ -10,8 +10,8 @@ from layout_checks import catalogue, clashes, floating, glb_bytes, kinds_of, loo
 
 from aerialdojo_gen.common.paper import paper_counts
 from aerialdojo_gen.geometry.rays import RayCaster
-from aerialdojo_gen.layouts.urban_stand_shells import platform
-from aerialdojo_gen.layouts.urban_stands import Tier, gangways, passage, tier_parts
+from aerialdojo_gen.layouts.urban.stadium.stand_shells import platform
+from aerialdojo_gen.layouts.urban.stadium.stands import Tier, gangways, passage, tier_parts
 from aerialdojo_gen.scenes.ground import rectangle
 from aerialdojo_gen.scenes.model import Scene
 

@@ -7,8 +7,8 @@ from shapely.geometry import Polygon
 
 from aerialdojo_gen.common.paper import paper_counts
 from aerialdojo_gen.geometry.rays import RayCaster
-from aerialdojo_gen.layouts.infra_bridge_parts import Deck
-from aerialdojo_gen.layouts.infra_rail import RAIL_M, arcade, ballast, s_curve, track, upright
+from aerialdojo_gen.layouts.infrastructure.bridge.decks import Deck
+from aerialdojo_gen.layouts.infrastructure.parts.rail import RAIL_M, arcade, ballast, s_curve, track, upright
 from aerialdojo_gen.scenes.model import Scene
 from aerialdojo_gen.scenes.recipe import Recipe
 from aerialdojo_gen.scenes.site import Site

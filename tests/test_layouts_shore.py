@@ -7,12 +7,12 @@ import shapely
 
 from aerialdojo_gen.common.paper import paper_counts
 from aerialdojo_gen.geometry.rays import RayCaster
-from aerialdojo_gen.layouts.natural_quays import flight, groyne, pier, retaining_wall
-from aerialdojo_gen.layouts.natural_shore import inland_m, ragged, rise, shaped, steep_area
+from aerialdojo_gen.layouts.natural.parts.quays import flight, groyne, pier, retaining_wall
+from aerialdojo_gen.layouts.natural.parts.shore import inland_m, ragged, rise, shaped, steep_area
 from aerialdojo_gen.scenes.build import build_scene
 from aerialdojo_gen.scenes.catalogue import load_catalogue
 from aerialdojo_gen.scenes.glb import write_glb
-from aerialdojo_gen.scenes.grammar_blocks import Frame
+from aerialdojo_gen.scenes.grammar_frames import Frame
 from aerialdojo_gen.scenes.recipe import Recipe
 from aerialdojo_gen.scenes.site import Site
 

@@ -12,7 +12,10 @@ from layout_checks import catalogue, glb_bytes, props_of, scene_of
 from aerialdojo_gen.common.paper import paper_counts
 from aerialdojo_gen.geometry.rays import RayCaster
 from aerialdojo_gen.scenes.footprints import footprint
-from aerialdojo_gen.scenes.grammar_blocks import Frame, HouseStyle, deal, fence, house, next_variant
+from aerialdojo_gen.scenes.grammar_fences import fence
+from aerialdojo_gen.scenes.grammar_frames import Frame
+from aerialdojo_gen.scenes.grammar_houses import HouseStyle, house
+from aerialdojo_gen.scenes.grammar_props import deal, next_variant
 from aerialdojo_gen.scenes.grammar_scatter import Pose
 from aerialdojo_gen.scenes.model import Scene
 from aerialdojo_gen.scenes.recipe import Recipe

@@ -6,8 +6,11 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
+from aerialdojo_gen import layouts
+from aerialdojo_gen.common.bounded import read_toml
 from aerialdojo_gen.config.sections import RENDERERS
 from aerialdojo_gen.errors import AssetError
+from aerialdojo_gen.pipeline.code_digest import Choice
 from aerialdojo_gen.pipeline.stage import Roots, Stage
 from aerialdojo_gen.scenes.catalogue_files import catalogue_files
 from aerialdojo_gen.store import shards as store
@@ -21,6 +24,18 @@ def _scene_sources(roots: Roots, scene: str) -> list[Path]:
         roots.scene_assets / "materials.toml",
         *catalogue_files(roots.scene_assets),
     ]
+
+
+def _scene_layout(roots: Roots, scene: str) -> Choice | None:
+    """Choose the layout that the recipe names; of a recipe that is wrong the stage itself says what is."""
+    try:
+        recipe = read_toml(roots.recipes / f"{scene}.toml", AssetError)
+    except (AssetError, OSError):
+        return None
+    if "imported" in recipe:
+        return Choice(layouts.__name__, ())
+    module = layouts.layout_modules().get(str(recipe.get("layout")))
+    return Choice(layouts.__name__, (f"{layouts.__name__}.{module}",)) if module else None
 
 
 def _annotation_sources(roots: Roots, scene: str) -> list[Path]:
@@ -75,7 +90,8 @@ _UPSTREAM_OF_SPLIT = ("scenes", "landmarks", "objects", "anchors", "references",
 
 STAGES: tuple[Stage, ...] = (
     Stage(
-        "build-scenes", "Build the scenes' meshes from their recipes.", (), ("scenes",), sources=_scene_sources
+        "build-scenes", "Build the scenes' meshes from their recipes.", (), ("scenes",),
+        sources=_scene_sources, imports=_scene_layout,
     ),
     Stage(
         "annotate-import", "Check the annotations against the scenes and import them.",

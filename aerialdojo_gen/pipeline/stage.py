@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from aerialdojo_gen.config.sections import Embodiment
-from aerialdojo_gen.pipeline.code_digest import stage_module
+from aerialdojo_gen.pipeline.code_digest import Choice, stage_module
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.atomic import atomic_file
 
@@ -165,6 +165,10 @@ def _no_sources(_roots: Roots, _scene: str) -> list[Path]:
     return []
 
 
+def _any_module(_roots: Roots, _scene: str) -> Choice | None:
+    return None
+
+
 @dataclass(frozen=True)
 class Stage:
     """A stage of the pipeline.
@@ -181,6 +185,9 @@ class Stage:
         ``(data, scene, config) -> int``: number of shards of a scene; may read upstream tables.
     sources : callable
         ``(roots, scene) -> list of Path``: files of the scene, outside the store, whose bytes the result depends on.
+    imports : callable
+        ``(roots, scene) -> Choice or None``: which modules the scene's work imports of a package by a name made
+        at run time; the others' code makes nothing of the scene stale. None where that is not known: all count.
     check : callable
         ``(data, scenes, config)``: raises an `AerialDojoError` where the inputs of all scenes together will not do,
         before anything is written.
@@ -200,6 +207,7 @@ class Stage:
     writes: tuple[str, ...]
     parts: Callable[[Path, str, Any], int] = _one_part
     sources: Callable[[Roots, str], list[Path]] = _no_sources
+    imports: Callable[[Roots, str], Choice | None] = _any_module
     check: Callable[[Path, Sequence[str], Any], None] = _no_check
     settle: Callable[[Any, Callable[[str], None]], Any] = _as_it_is
     choices: Callable[[Any], list[Any]] = _no_choice
