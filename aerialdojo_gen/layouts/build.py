@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import importlib
-import pkgutil
 from collections import Counter
 from pathlib import Path
 from types import ModuleType
@@ -83,13 +82,10 @@ def _imported(recipe_path: Path, imported: Imported) -> Scene:
 
 
 def _layout(recipe: Recipe, path: Path) -> ModuleType:
-    known = [m.name for m in pkgutil.iter_modules(layouts.__path__)]
+    known = layouts.layout_modules()
     if recipe.layout not in known:
         raise AssetError(f"{path}: unknown layout {recipe.layout!r}{nearest(recipe.layout, known)}")
-    module = importlib.import_module(f"{layouts.__name__}.{recipe.layout}")
-    if not hasattr(module, "build"):
-        raise AssetError(f"{path}: {recipe.layout!r} is a helper of layouts, not a layout")
-    return module
+    return importlib.import_module(f"{layouts.__name__}.{known[recipe.layout]}")
 
 
 def _check_names(recipe: Recipe, path: Path, catalogue: Catalogue) -> None:

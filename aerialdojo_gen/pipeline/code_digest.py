@@ -12,7 +12,7 @@ import hashlib
 import json
 import os
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from functools import cache, cached_property
 from importlib import metadata
@@ -89,6 +89,22 @@ _SHAPELESS = frozenset({"pydantic", "pydantic_core", "tqdm", "typer", "typing_ex
 
 
 @dataclass(frozen=True)
+class Choice:
+    """Which modules of a package are imported by a name that is made at run time, where a recipe tells.
+
+    Attributes
+    ----------
+    package : str
+        Absolute name of the package. Where nothing is known of it, all of its modules count.
+    modules : tuple of str
+        Absolute names of the modules; they count, with what they import.
+    """
+
+    package: str
+    modules: tuple[str, ...]
+
+
+@dataclass(frozen=True)
 class Code:
     """The code that makes something.
 
@@ -110,9 +126,9 @@ class Code:
 
 
 @cache
-def code_of(module: str) -> Code:
+def code_of(module: str, chosen: Choice | None = None) -> Code:
     """Return the code that a module of the running package consists of, as it is when first asked in this process."""
-    return _running().of(module)
+    return _running().of(module, chosen)
 
 
 @cache
@@ -120,9 +136,9 @@ def _running() -> Package:
     return Package(Path(__file__).parents[1])
 
 
-def stage_code(stage: str) -> Code:
+def stage_code(stage: str, chosen: Choice | None = None) -> Code:
     """Return the code of a stage, by the stage's name."""
-    return code_of(stage_module(stage))
+    return code_of(stage_module(stage), chosen)
 
 
 def stage_module(stage: str) -> str:
@@ -152,8 +168,15 @@ class Package:
         self._facts: dict[str, Facts] = {}
         self._paths = {_module_name(path.relative_to(folder.parent)): path for path in sorted(folder.rglob("*.py"))}
 
-    def of(self, module: str) -> Code:
+    def of(self, module: str, chosen: Choice | None = None) -> Code:
         """Return the code that a module consists of.
+
+        Parameters
+        ----------
+        module : str
+            Its absolute name.
+        chosen : Choice, optional
+            What is known of a package whose modules it imports by a name made at run time.
 
         Raises
         ------
@@ -162,7 +185,7 @@ class Package:
         RuntimeError
             A module imports what cannot be told from its source.
         """
-        search = _Search(self)
+        search = _Search(self, chosen)
         for edge in (Edge(module), *_WRITERS):
             search.follow(edge)
         self._cache.save()
@@ -177,8 +200,8 @@ class Package:
         return module.split(".")[0] == self._name
 
     def modules_in(self, package: str) -> list[str]:
-        """Name the modules right below a package."""
-        return [module for module in self._paths if module.rpartition(".")[0] == package]
+        """Name the modules below a package, however deep."""
+        return [module for module in self._paths if module.startswith(f"{package}.")]
 
     def facts(self, module: str) -> Facts:
         """Read a module; AssetError where its source is missing."""
@@ -203,8 +226,8 @@ def _module_name(path: Path) -> str:
 class _Search:
     """Follows imports from where it is put."""
 
-    def __init__(self, package: Package) -> None:
-        self._package = package
+    def __init__(self, package: Package, chosen: Choice | None) -> None:
+        self._package, self._chosen = package, chosen
         self.parts: dict[str, str] = {}
         self.libraries: set[str] = set()
         self._seen: set[Edge] = set()
@@ -221,12 +244,17 @@ class _Search:
                 if edge.module not in sys.stdlib_module_names and edge.module not in _SHAPELESS:
                     self.libraries.add(edge.module)
             elif edge.name == "**":
-                waiting += [Edge(module) for module in self._package.modules_in(edge.module)]
+                waiting += [Edge(module) for module in self._any_of(edge.module)]
             elif edge.name and self._package.contains(f"{edge.module}.{edge.name}"):
                 waiting += [Edge(edge.module, "", ()), Edge(f"{edge.module}.{edge.name}", "", edge.uses)]
             else:
                 names = (edge.name,) if edge.name else edge.uses
                 waiting += self._enter(edge.module, names)
+
+    def _any_of(self, package: str) -> Sequence[str]:
+        if self._chosen is not None and self._chosen.package == package:
+            return self._chosen.modules
+        return self._package.modules_in(package)
 
     def _enter(self, module: str, names: tuple[str, ...]) -> Iterator[Edge]:
         above = module.rpartition(".")[0]

@@ -22,7 +22,7 @@ class Edge:
     module : str
         Absolute name of the module.
     name : str
-        What is taken from it; ``""`` is the module itself, ``"*"`` all names, ``"**"`` every module of a package.
+        What is taken from it; ``""`` is the module itself, ``"*"`` all names, ``"**"`` every module below a package.
     uses : tuple of str
         Where the name may be a module: the attributes that are asked of it; ``("*",)`` where that cannot be told.
     """
@@ -227,7 +227,7 @@ class _Imports:
                 head += known
             else:
                 break
-        # Only the last part of the module's name is known when the code runs: any module of the package, then.
+        # The rest of the module's name is known only when the code runs: any module below the package, then.
         return Edge(head[:-1], "**") if head.endswith(".") else None
 
     def _own_name(self, node: ast.expr) -> str | None:

@@ -12,7 +12,7 @@ from aerialdojo_gen.common import paper
 from aerialdojo_gen.config.pipeline import Pipeline
 from aerialdojo_gen.config.sections import Section
 from aerialdojo_gen.errors import AssetError
-from aerialdojo_gen.pipeline.code_digest import stage_code
+from aerialdojo_gen.pipeline.code_digest import Code, stage_code
 from aerialdojo_gen.pipeline.stage import Roots, Stage
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.files import file_digest
@@ -46,7 +46,7 @@ def scene_fingerprint(stage: Stage, pipeline: Pipeline, roots: Roots, scene: str
     StoreError, AssetError
         An input or an asset is missing or damaged.
     """
-    code = stage_code(stage.name)
+    code = scene_code(stage, roots, scene)
     # The paper's figures lie beside the package in a checkout, inside it in a wheel.
     carried = paper.files() if "aerialdojo_gen.common.paper" in code.parts else []
     sources = [*stage.sources(roots, scene), *carried]
@@ -62,6 +62,11 @@ def scene_fingerprint(stage: Stage, pipeline: Pipeline, roots: Roots, scene: str
         "assets": [[_short(path, roots), _digest(path)] for path in sources],
     }
     return hashlib.sha256(json.dumps(facts, sort_keys=True).encode()).hexdigest()
+
+
+def scene_code(stage: Stage, roots: Roots, scene: str) -> Code:
+    """Return the code that a stage runs for a scene."""
+    return stage_code(stage.name, stage.imports(roots, scene))
 
 
 @lru_cache(maxsize=4096)

@@ -14,9 +14,8 @@ from typing import Any
 from aerialdojo_gen.config.pipeline import Pipeline
 from aerialdojo_gen.config.sections import Section
 from aerialdojo_gen.errors import AerialDojoError, StoreError
-from aerialdojo_gen.pipeline.code_digest import stage_code
 from aerialdojo_gen.pipeline.executors.local import Task
-from aerialdojo_gen.pipeline.fingerprint import scene_fingerprint
+from aerialdojo_gen.pipeline.fingerprint import scene_code, scene_fingerprint
 from aerialdojo_gen.pipeline.progress import Reporter
 from aerialdojo_gen.pipeline.stage import Job, Roots, Stage
 from aerialdojo_gen.store import shards as store
@@ -122,7 +121,7 @@ def shards_of(
                 found.fresh.append(summary)
             else:
                 whole = Job(stage.name, scene, part, parts, pipeline.seed, pipeline.embodiment, roots)
-                code = stage_code(stage.name).digest
+                code = scene_code(stage, roots, scene).digest
                 job = replace(whole, deadline=limits.deadline, force=force, verify=limits.verify, code=code)
                 found.tasks.append(Task(job, config, fingerprint))
     return found

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
     from aerialdojo_gen.config.sections import Embodiment
+    from aerialdojo_gen.pipeline.code_digest import Choice
     from aerialdojo_gen.scenes.model import Scene
 
 
@@ -164,6 +165,10 @@ def _no_sources(_roots: Roots, _scene: str) -> list[Path]:
     return []
 
 
+def _any_module(_roots: Roots, _scene: str) -> Choice | None:
+    return None
+
+
 @dataclass(frozen=True)
 class Stage:
     """A stage of the pipeline.
@@ -182,6 +187,9 @@ class Stage:
         ``(data, scene, config) -> int``: number of shards of a scene; may read upstream tables.
     sources : callable
         ``(roots, scene) -> list of Path``: files of the scene, outside the store, whose bytes the result depends on.
+    imports : callable
+        ``(roots, scene) -> Choice or None``: which modules the scene's work imports of a package by a name made
+        at run time; the others' code makes nothing of the scene stale. None where that is not known: all count.
     check : callable
         ``(data, scenes, config)``: raises an `AerialDojoError` where the inputs of all scenes together will not do,
         before anything is written.
@@ -202,6 +210,7 @@ class Stage:
     run: Callable[[Job, Any], Output]
     parts: Callable[[Path, str, Any], int] = _one_part
     sources: Callable[[Roots, str], list[Path]] = _no_sources
+    imports: Callable[[Roots, str], Choice | None] = _any_module
     check: Callable[[Path, Sequence[str], Any], None] = _no_check
     settle: Callable[[Any, Callable[[str], None]], Any] = _as_it_is
     choices: Callable[[Any], list[Any]] = _no_choice

@@ -39,7 +39,7 @@ class Recipe(BaseModel):
     Attributes
     ----------
     layout : str
-        Module of `aerialdojo_gen.layouts`.
+        Type of `aerialdojo_gen.layouts`.
     seed : int
         Of everything drawn in the scene.
     size_m : (float, float)

@@ -5,11 +5,15 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from aerialdojo_gen import layouts
+from aerialdojo_gen.common.bounded import read_toml
+from aerialdojo_gen.errors import AssetError
 from aerialdojo_gen.pipeline.stage import Job, Output, Roots, Stage
 from aerialdojo_gen.scenes.catalogue_files import catalogue_files
 
 if TYPE_CHECKING:
     from aerialdojo_gen.config.sections import BuildScenesConfig
+    from aerialdojo_gen.pipeline.code_digest import Choice
 
 
 def run(job: Job, config: BuildScenesConfig) -> Output:
@@ -30,6 +34,20 @@ def sources(roots: Roots, scene: str) -> list[Path]:
     ]
 
 
+def imports(roots: Roots, scene: str) -> Choice | None:
+    """Choose the layout that the recipe names; of a recipe that is wrong the stage itself says what is."""
+    from aerialdojo_gen.pipeline.code_digest import Choice
+
+    try:
+        recipe = read_toml(roots.recipes / f"{scene}.toml", AssetError)
+    except (AssetError, OSError):
+        return None
+    if "imported" in recipe:
+        return Choice(layouts.__name__, ())
+    module = layouts.layout_modules().get(str(recipe.get("layout")))
+    return Choice(layouts.__name__, (f"{layouts.__name__}.{module}",)) if module else None
+
+
 STAGE = Stage(
     "build-scenes",
     "Build the scenes' meshes from their recipes.",
@@ -37,4 +55,5 @@ STAGE = Stage(
     writes=("scenes",),
     run=run,
     sources=sources,
+    imports=imports,
 )

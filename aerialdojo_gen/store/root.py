@@ -56,7 +56,7 @@ class DataRoot(ABC):
 
     @abstractmethod
     def list(self, folder: str, pattern: str = "*") -> list[str]:
-        """Paths, relative to the root and sorted, of what matches a glob in a folder; none where there is no folder."""
+        """Paths, relative to the root and sorted, of what matches a glob in a folder; none without a folder."""
 
     @abstractmethod
     def commit(self, relative: str) -> AbstractContextManager[Path]:

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 import trimesh
 
-from aerialdojo_gen.layouts.forest import _SPOTS
-from aerialdojo_gen.layouts.natural_ground import blob
+from aerialdojo_gen.layouts.natural.forest.layout import _SPOTS
+from aerialdojo_gen.layouts.parts.natural_ground import blob
 from aerialdojo_gen.planning.clearance import ClearanceGrid
 from aerialdojo_gen.scenes.model import Instance, Scene
 

@@ -6,10 +6,10 @@ import shapely
 from support.layout_checks import catalogue, props_of
 
 from aerialdojo_gen.errors import AssetError
-from aerialdojo_gen.layouts.natural_groups import Group, level_ground, plan_groups, set_out
-from aerialdojo_gen.layouts.natural_sands import dunes, wash
-from aerialdojo_gen.layouts.natural_strata import Rock, put_up
-from aerialdojo_gen.layouts.natural_winter import banked, moguls, slope_ground
+from aerialdojo_gen.layouts.natural.desert.sands import dunes, wash
+from aerialdojo_gen.layouts.natural.parts.groups import Group, level_ground, plan_groups, set_out
+from aerialdojo_gen.layouts.natural.parts.strata import Rock, put_up
+from aerialdojo_gen.layouts.natural.snowfield.winter import banked, moguls, slope_ground
 from aerialdojo_gen.scenes.recipe import Recipe
 from aerialdojo_gen.scenes.site import Site
 from aerialdojo_gen.scenes.terrain import rolling_terrain

@@ -7,12 +7,12 @@ from shapely.geometry import Polygon
 from support.layout_checks import catalogue, clashes, floating, props_of
 
 from aerialdojo_gen.errors import AssetError
-from aerialdojo_gen.layouts.disaster_buildings import put_up
-from aerialdojo_gen.layouts.disaster_ground import crater, faulted, heaped, slab_pile
-from aerialdojo_gen.layouts.disaster_relief import stand, stand_on_floor, strew_things
-from aerialdojo_gen.layouts.disaster_wreckage import Bite, broken_edge, torn_floor, torn_wall
-from aerialdojo_gen.layouts.disaster_wrecks import Style, Wreck
-from aerialdojo_gen.scenes.grammar_blocks import Frame
+from aerialdojo_gen.layouts.disaster.parts.buildings import put_up
+from aerialdojo_gen.layouts.disaster.parts.ground import crater, faulted, heaped, slab_pile
+from aerialdojo_gen.layouts.disaster.parts.relief import stand, stand_on_floor, strew_things
+from aerialdojo_gen.layouts.disaster.parts.wreckage import Bite, broken_edge, torn_floor, torn_wall
+from aerialdojo_gen.layouts.disaster.parts.wrecks import Style, Wreck
+from aerialdojo_gen.scenes.grammar_frames import Frame
 from aerialdojo_gen.scenes.ground import rectangle
 from aerialdojo_gen.scenes.recipe import Recipe
 from aerialdojo_gen.scenes.site import Site

@@ -5,7 +5,7 @@ import pytest
 import shapely
 from support.layout_checks import catalogue, props_of
 
-from aerialdojo_gen.layouts.infra_harbour import HIGH_M, LONG_M, QUAY_M, container_block, quay
+from aerialdojo_gen.layouts.infrastructure.harbor.quays import HIGH_M, LONG_M, QUAY_M, container_block, quay
 from aerialdojo_gen.scenes.footprints import footprint
 from aerialdojo_gen.scenes.ground import rectangle
 from aerialdojo_gen.scenes.model import Scene

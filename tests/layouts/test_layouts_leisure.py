@@ -9,8 +9,8 @@ from support import layout_checks
 from support.layout_checks import props_of
 
 from aerialdojo_gen.geometry.rays import RayCaster
-from aerialdojo_gen.layouts.urban_stand_shells import platform
-from aerialdojo_gen.layouts.urban_stands import Tier, gangways, passage, tier_parts
+from aerialdojo_gen.layouts.urban.stadium.stand_shells import platform
+from aerialdojo_gen.layouts.urban.stadium.stands import Tier, gangways, passage, tier_parts
 from aerialdojo_gen.scenes.ground import rectangle
 from aerialdojo_gen.scenes.model import Scene
 

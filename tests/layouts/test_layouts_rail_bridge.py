@@ -6,8 +6,8 @@ from shapely.geometry import Polygon
 from support.layout_checks import catalogue, props_of
 
 from aerialdojo_gen.geometry.rays import RayCaster
-from aerialdojo_gen.layouts.infra_bridge_parts import Deck
-from aerialdojo_gen.layouts.infra_rail import RAIL_M, arcade, ballast, s_curve, track, upright
+from aerialdojo_gen.layouts.infrastructure.bridge.decks import Deck
+from aerialdojo_gen.layouts.infrastructure.parts.rail import RAIL_M, arcade, ballast, s_curve, track, upright
 from aerialdojo_gen.scenes.model import Scene
 from aerialdojo_gen.scenes.recipe import Recipe
 from aerialdojo_gen.scenes.site import Site

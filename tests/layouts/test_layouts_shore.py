@@ -6,9 +6,9 @@ import shapely
 from support import layout_checks as look
 
 from aerialdojo_gen.geometry.rays import RayCaster
-from aerialdojo_gen.layouts.natural_quays import flight, groyne, pier, retaining_wall
-from aerialdojo_gen.layouts.natural_shore import inland_m, ragged, rise, shaped, steep_area
-from aerialdojo_gen.scenes.grammar_blocks import Frame
+from aerialdojo_gen.layouts.natural.parts.quays import flight, groyne, pier, retaining_wall
+from aerialdojo_gen.layouts.natural.parts.shore import inland_m, ragged, rise, shaped, steep_area
+from aerialdojo_gen.scenes.grammar_frames import Frame
 from aerialdojo_gen.scenes.recipe import Recipe
 from aerialdojo_gen.scenes.site import Site
 

@@ -8,7 +8,10 @@ import pytest
 from support.layout_checks import catalogue
 
 from aerialdojo_gen.geometry.rays import RayCaster
-from aerialdojo_gen.scenes.grammar_blocks import Frame, HouseStyle, deal, fence, house, next_variant
+from aerialdojo_gen.scenes.grammar_fences import fence
+from aerialdojo_gen.scenes.grammar_frames import Frame
+from aerialdojo_gen.scenes.grammar_houses import HouseStyle, house
+from aerialdojo_gen.scenes.grammar_props import deal, next_variant
 from aerialdojo_gen.scenes.grammar_scatter import Pose
 from aerialdojo_gen.scenes.recipe import Recipe
 from aerialdojo_gen.scenes.site import Site

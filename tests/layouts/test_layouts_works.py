@@ -7,10 +7,10 @@ from support.layout_checks import catalogue, props_of
 
 from aerialdojo_gen.errors import AssetError
 from aerialdojo_gen.geometry.rays import RayCaster
-from aerialdojo_gen.layouts.urban_concrete import Frame, put_up_frame, scaffold
-from aerialdojo_gen.layouts.urban_earthworks import grid_terrain, ramped, shaped
-from aerialdojo_gen.layouts.urban_halls import Hall, flat_roof, put_up_hall
-from aerialdojo_gen.layouts.urban_industry import Place, guard_rails, set_out
+from aerialdojo_gen.layouts.urban.construction_site.concrete import Frame, put_up_frame, scaffold
+from aerialdojo_gen.layouts.urban.parts.earthworks import grid_terrain, ramped, shaped
+from aerialdojo_gen.layouts.urban.parts.halls import Hall, flat_roof, put_up_hall
+from aerialdojo_gen.layouts.urban.parts.industry import Place, guard_rails, set_out
 from aerialdojo_gen.scenes.ground import rectangle
 from aerialdojo_gen.scenes.recipe import Recipe
 from aerialdojo_gen.scenes.site import Site

@@ -19,7 +19,7 @@ NAMES = [stage.name for stage in STAGES]
 SOURCES = Path(aerialdojo_gen.__file__).parent
 # A module that the stage uses by way of others, and a constant of it.
 USED = {
-    "build-scenes": ("layouts/courtyard.py", None),
+    "build-scenes": ("layouts/urban/courtyard/layout.py", None),
     "annotate-import": ("annotations/relations.py", None),
     "anchor-sample": ("geometry/viewpoints.py", None),
     "reference-images": ("rendering/gl_shaders.py", "#version 330 core"),

@@ -91,10 +91,12 @@ def assets(tmp_path, monkeypatch):
     (folder / "materials.toml").write_bytes((ASSETS / "materials.toml").read_bytes())
     (folder / "props" / "post.toml").write_text(POST)
     (folder / "scenes" / "U_Test_0.toml").write_text(RECIPE)
-    (tmp_path / "code").mkdir()
-    (tmp_path / "code" / "testplace.py").write_text(LAYOUT)
+    code = tmp_path / "code" / "test_family" / "testplace" / "layout.py"
+    code.parent.mkdir(parents=True)
+    code.write_text(LAYOUT)
     monkeypatch.setattr(layouts, "__path__", [*layouts.__path__, str(tmp_path / "code")])
-    monkeypatch.delitem(sys.modules, "aerialdojo_gen.layouts.testplace", raising=False)
+    for name in ("test_family", "test_family.testplace", "test_family.testplace.layout"):
+        monkeypatch.delitem(sys.modules, f"aerialdojo_gen.layouts.{name}", raising=False)
     return folder
 
 
@@ -135,7 +137,7 @@ def test_file_holds_the_built_scene_exactly(assets, tmp_path):
 def test_same_bytes_in_processes_that_hash_differently(assets, tmp_path):
     script = (
         "import sys, hashlib, pathlib\n"
-        "from aerialdojo_gen.scenes import layouts\n"
+        "from aerialdojo_gen import layouts\n"
         "layouts.__path__.append(sys.argv[2])\n"
         "from aerialdojo_gen.layouts.build import build_scene\n"
         "from aerialdojo_gen.scenes.catalogue import load_catalogue\n"

@@ -1,0 +1,1 @@
+"""Layouts of disasters, one folder a type."""

@@ -1,0 +1,1 @@
+"""Layouts of infrastructure, one folder a type."""

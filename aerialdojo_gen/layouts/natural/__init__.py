@@ -1,0 +1,1 @@
+"""Natural layouts, one folder a type."""

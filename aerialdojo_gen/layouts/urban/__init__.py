@@ -1,0 +1,1 @@
+"""Urban layouts, one folder a type."""

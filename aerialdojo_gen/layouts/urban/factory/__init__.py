@@ -1,0 +1,1 @@
+"""A factory: a big steel and chemical works, or a brickworks beside its clay pit."""
