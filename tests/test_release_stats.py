@@ -228,7 +228,7 @@ def test_a_part_of_the_scenes_is_chosen_by_name_or_glob(smoke):
     assert "U_Courtyard_0" not in done.stdout
     done = stats("--data", smoke, "--scene", "U_Courtyard_2")
     assert done.returncode == 2
-    assert done.stderr == "error: no scene 'U_Courtyard_2'; nearest: U_Courtyard_1, U_Courtyard_0\n"
+    assert done.stderr == "error: no scene 'U_Courtyard_2': did you mean 'U_Courtyard_1' or 'U_Courtyard_0'?\n"
 
 
 def test_without_a_release_files_are_refused(tmp_path):

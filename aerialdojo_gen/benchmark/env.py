@@ -19,6 +19,7 @@ from aerialdojo_gen.benchmark.flight import Flight
 from aerialdojo_gen.benchmark.goal import N_ACTIONS, Sensors
 from aerialdojo_gen.benchmark.tasks import MODALITIES, Selection, read_tasks, reference_image, select
 from aerialdojo_gen.benchmark.texts import GoalText
+from aerialdojo_gen.common.names import unknown
 from aerialdojo_gen.config.agreement import SUCCESS_RADIUS_M
 from aerialdojo_gen.config.sections import Embodiment
 from aerialdojo_gen.errors import UsageError
@@ -207,7 +208,7 @@ class AerialDojoEnv(gymnasium.Env[dict[str, Any], np.int64]):
         if self._index is None:
             self._index = {name: i for i, name in enumerate(self._rows["task_id"].to_pylist())}
         if task_id not in self._index:
-            raise UsageError(f"no task {task_id!r} among the {self.n_tasks:,} chosen")
+            raise UsageError(unknown(f"among the {self.n_tasks:,} chosen there is no task", task_id, self._index))
         return self._index[task_id]
 
     def _observations(self) -> spaces.Dict:

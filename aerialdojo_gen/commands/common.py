@@ -157,7 +157,7 @@ def run_stages(
     from aerialdojo_gen.release.provenance import check_replaced
 
     reporter = Reporter(quiet=quiet)
-    scenes = runner.choose_scenes(scene or config.scenes, runner.known_scenes(roots.recipes))
+    scenes = runner.chosen_scenes(config, roots, scene)
     releases = any(stage.name == "split" for stage in stages)
 
     def prepare() -> None:

@@ -8,8 +8,9 @@ from typing import Annotated, Any, Literal, TypeVar
 import numpy as np
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 
+from aerialdojo_gen.common.explain import explain
 from aerialdojo_gen.errors import AssetError
-from aerialdojo_gen.scenes.materials import nearest, read_toml
+from aerialdojo_gen.scenes.materials import read_toml
 
 Model = TypeVar("Model", bound=BaseModel)
 # Of a layout's parameters: metres, degrees and counts all stay far below.
@@ -163,22 +164,9 @@ def _check_parameters(value: Any, keys: tuple[str, ...], path: Path) -> None:
         raise AssetError(f"{where} has {len(value):,} characters, {_LONGEST} are the most")
 
 
-def _short(value: Any) -> str:
-    text = repr(value)
-    return text if len(text) <= 60 else text[:57] + "..."
-
-
 def validated(model: type[Model], body: dict[str, Any], where: str) -> Model:
     """Check a table against its model; an `AssetError` says what is wrong at which key."""
     try:
         return model.model_validate(body)
     except ValidationError as error:
-        first = error.errors()[0]
-        key = ".".join(str(k) for k in first["loc"])
-        if first["type"] == "extra_forbidden":
-            message = f"unknown key {key!r}{nearest(key, model.model_fields)}"
-        elif first["type"] == "missing":
-            message = f"key {key!r} is missing"
-        else:
-            message = f"{key}: {first['msg']}, got {_short(first['input'])}"
-        raise AssetError(f"{where}: {message}") from error
+        raise AssetError(f"{where}: {'; '.join(explain(error, model))}") from error
