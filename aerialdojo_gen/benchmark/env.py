@@ -23,6 +23,7 @@ from aerialdojo_gen.common.names import unknown
 from aerialdojo_gen.config.agreement import SUCCESS_RADIUS_M
 from aerialdojo_gen.config.sections import Embodiment
 from aerialdojo_gen.errors import UsageError
+from aerialdojo_gen.store.root import DataRoot, open_root
 from aerialdojo_gen.store.schemas import DIRECTIONS, VIEWS
 
 _TEXT = ("target_name", "landmark", "description")
@@ -273,6 +274,26 @@ class AerialDojoEnv(gymnasium.Env[dict[str, Any], np.int64]):
         if "depth_m" in self.observation_space.spaces:
             observation["depth_m"] = seen.depth_m
         return observation
+
+
+def make_env(data: str | Path | DataRoot = "data", **options: Any) -> AerialDojoEnv:
+    """Make the environment of a release; ``gymnasium.make("AerialDojo-v0", data=data)`` without Gymnasium's checks.
+
+    Parameters
+    ----------
+    data : str, Path or DataRoot
+        The data directory.
+    **options
+        As for `AerialDojoEnv`: ``split="id_train"``, ``views=("front",)``, ``width=128``, …
+
+    Raises
+    ------
+    UsageError
+        No task fits, or a value makes no sense.
+    StoreError
+        There is no release in `data`.
+    """
+    return AerialDojoEnv(open_root(data).url, **options)
 
 
 def _names(given: str | Sequence[str]) -> tuple[str, ...]:

@@ -32,11 +32,14 @@ class Column:
         Heading over this column and its neighbours of the same group; empty for none.
     words : bool
         Whether it holds words, which stand to the left and are wrapped; figures stand to the right and are not.
+    joined : bool
+        Whether it says something of the column before it, and is shown beside that.
     """
 
     head: str
     group: str = ""
     words: bool = False
+    joined: bool = False
 
 
 @dataclass(frozen=True)
@@ -129,7 +132,7 @@ class _Body:
         """Share columns out over blocks that fit; groups are kept together where they fit by themselves."""
         together: list[list[int]] = []
         for k, column in enumerate(self.table.columns):
-            if k and column.group and column.group == self.table.columns[k - 1].group:
+            if k and (column.joined or (column.group and column.group == self.table.columns[k - 1].group)):
                 together[-1].append(k)
             else:
                 together.append([k])

@@ -96,14 +96,15 @@ def require_pools(data: Path, scenes: Sequence[str]) -> None:
 
 def pool_lines(pools: Sequence[Pool], width: int | None = None) -> list[str]:
     """Set pools as a table for the terminal: kept / wanted, and kilometres that a choice can reach."""
-    heads = ["candidates", *(s.replace("_horizon", "") for s in SETTINGS), "km reachable", "paper km"]
+    heads = ["candidates", *(s.replace("_horizon", "") for s in SETTINGS), "km reachable/paper"]
     rows = []
     for pool in pools:
-        cells = [f"{pool.candidates:,}"]
+        cells = [f"{pool.candidates}"]
         for s in SETTINGS:
-            wanted = f"/{pool.paper.tasks[s]:,}" if pool.paper else ""
-            cells.append(f"{pool.kept[s]:,}{wanted}{'!' if s in pool.short else ' '}")
-        cells.append(f"{pool.path_m[0] / 1000:.1f}-{pool.path_m[1] / 1000:.1f}" if pool.path_m else "-")
-        cells.append(f"{pool.paper.path_m / 1000:.1f}{' ' if pool.reaches_path else '!'}" if pool.paper else "-")
+            wanted = f"/{pool.paper.tasks[s]}" if pool.paper else ""
+            cells.append(f"{pool.kept[s]}{wanted}{'!' if s in pool.short else ' '}")
+        reach = f"{pool.path_m[0] / 1000:.1f}-{pool.path_m[1] / 1000:.1f}" if pool.path_m else "-"
+        paper = f"/{pool.paper.path_m / 1000:.1f}{' ' if pool.reaches_path else '!'}" if pool.paper else " "
+        cells.append(reach + paper)
         rows.append((pool.scene, cells))
     return TextTable("scene", [Column(head) for head in heads], rows).lines(width)

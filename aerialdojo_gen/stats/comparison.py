@@ -11,6 +11,7 @@ from aerialdojo_gen.common import text_table
 from aerialdojo_gen.common.text_table import TextTable
 
 Figure = int | float | None
+_PAPERS = "paper's"
 
 
 @dataclass(frozen=True)
@@ -97,7 +98,7 @@ class Comparison:
     def _heads(self) -> list[str]:
         heads = [self.key]
         for k, column in enumerate(self.columns):
-            heads += [column.name, "paper's"] if self._beside(k) else [column.name]
+            heads += [column.name, _PAPERS] if self._beside(k) else [column.name]
         return heads
 
     def _cells(self, row: Row, bracket: bool = False) -> list[str]:
@@ -111,7 +112,7 @@ class Comparison:
         return cells
 
     def terminal(self, width: int | None = None) -> list[str]:
-        """Lines for a terminal of so many columns; under a row that is not the paper's, the paper's figures that differ."""
+        """Lines for a terminal of so many columns; below a row the figures in which the paper differs."""
         rows = []
         for row in self.rows:
             rows.append(self._cells(row))
@@ -121,10 +122,9 @@ class Comparison:
                     below += ["", ""] if self._beside(k) else [self.columns[k].show(paper) if k in differing else ""]
                 rows.append(below)
         stub, *heads = self._heads()
+        columns = [text_table.Column(head, joined=head == _PAPERS) for head in heads]
         named = [(name, cells) for name, *cells in rows]
-        return TextTable(stub, [text_table.Column(head) for head in heads], named, self.title, self._verdict()).lines(
-            width
-        )
+        return TextTable(stub, columns, named, self.title, self._verdict()).lines(width)
 
     def _verdict(self) -> list[str]:
         if not self.compared:
