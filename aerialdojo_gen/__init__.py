@@ -1,8 +1,8 @@
 """Generate aerial object-goal-search datasets from 3D scenes, on an ordinary machine.
 
 The package is a staged pipeline: every stage reads and writes Parquet tables (see `aerialdojo_gen.store.schemas`)
-and is both a command of `aerialdojo-gen` and a plain function over tables. What is listed here is the public API, with
-examples in docs/api.md; all else may change between versions.
+and is both a command of `aerialdojo-gen` and a plain function over tables. What is listed here is the public API,
+with examples in docs/api.md; all else may change between versions.
 """
 
 from __future__ import annotations

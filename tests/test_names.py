@@ -31,7 +31,7 @@ def test_what_is_like_nothing_is_told_what_there_is():
 def test_scenes_by_name_and_glob():
     assert choose_scenes(["*_0", "U_Mall_0"], SCENES) == ["N_Forest_0", "U_Mall_0"]
     assert choose_scenes(None, SCENES) == choose_scenes((), SCENES) == SCENES
-    with pytest.raises(UsageError, match="no scene 'U_Mal_0': did you mean 'U_Mall_0', 'U_Mall_1'"):
+    with pytest.raises(UsageError, match="no scene 'U_Mal_0': did you mean 'U_Mall_0' or 'U_Mall_1'"):
         choose_scenes(["N_*", "U_Mal_0"], SCENES)
     with pytest.raises(UsageError, match="no scene 'u_mall_0'"):
         choose_scenes(["u_mall_0"], SCENES)
@@ -70,6 +70,7 @@ def refused(value):
         ({"name": "a", "inner": {"wieght": 1}}, ["[inner] unknown key 'wieght': did you mean 'weight'?"]),
         ({"name": "a", "several": [{}, {"wieght": 1}]}, ["[several.1] unknown key 'wieght': did you mean 'weight'?"]),
         ({"name": "a", "inner": {"weight": "x" * 900}}, ["[inner] weight = 'xxx"]),
+        ({"name": "a", "several": [1]}, ["several.0 = 1: Input should be a valid dict"]),
         ({"name": "bad"}, ["name contradicts inner", "inner contradicts name"]),
     ],
 )

@@ -185,7 +185,7 @@ def test_the_command_writes_what_it_prints(smoke, drawn):
     made = [*tables(scenes), benchmark_table(scenes)]
     assert (out / "stats.md").read_text() == as_markdown(made)
     assert (out / "stats.csv").read_text() == as_csv(made)
-    assert "\n\n".join("\n".join(table.terminal()) for table in made) in printed
+    assert "\n\n".join("\n".join(table.terminal(80)) for table in made) in printed
     paths = [str(out / "drawn" / f"{name}{suffix}") for name in FIGURES for suffix in (".png", ".svg")]
     assert printed.splitlines()[-len(paths) :] == paths
     assert sorted(str(p) for p in (out / "drawn").iterdir()) == sorted(paths)

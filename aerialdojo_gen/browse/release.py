@@ -170,6 +170,10 @@ class Release:
         found = self.task(task_id)
         return decode_rgb(found.scene.object(found.route["target_object_id"])["reference_image"])
 
+    def recorded(self) -> list[str]:
+        """List the ``nav_id`` of the trajectories that were rendered, sorted."""
+        return sorted(path.split("/")[-2] for path in open_root(self._data).list("media", "*/*/recording.json"))
+
     def recording(self, task_id: str) -> Recording:
         """Open the recording of a task's reference trajectory; RenderError where it was not rendered."""
         found = self.task(task_id)

@@ -53,7 +53,7 @@ def faults_of(error: ValidationError, model: type[BaseModel]) -> list[ModelFault
             texts = str(raw["ctx"]["error"]).split("; ") if "ctx" in raw else [raw["msg"]]
             faults += [ModelFault(path, text, text) for text in texts]
             continue
-        key = str(path[-1])
+        key = ".".join(map(str, path[_owner(path) :]))
         if raw["type"] == "extra_forbidden":
             said = line = unknown("unknown key", key, _keys_at(model, path[:-1]))
         elif raw["type"] == "missing":
@@ -81,8 +81,13 @@ def explain(error: ValidationError, model: type[BaseModel]) -> list[str]:
         E.g. ``["[plan] unknown key 'wieght': did you mean 'weight'?"]``; of many faults the first and how many more.
     """
     faults = faults_of(error, model)
-    told = [brief(f"{_table(fault.path[:-1])}{fault.line}") for fault in faults[:_MOST_FAULTS]]
+    told = [brief(f"{_table(fault.path[: _owner(fault.path)])}{fault.line}") for fault in faults[:_MOST_FAULTS]]
     return [*told, f"and {len(faults) - _MOST_FAULTS} more faults"] if len(faults) > _MOST_FAULTS else told
+
+
+def _owner(path: Sequence[str | int]) -> int:
+    """Find the last key of a path: indices behind it belong to its value."""
+    return max((k for k, step in enumerate(path) if isinstance(step, str)), default=0)
 
 
 def _table(path: Sequence[str | int]) -> str:
