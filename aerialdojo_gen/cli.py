@@ -6,8 +6,10 @@ Nothing heavy is imported before a command runs, so that ``--help`` answers at o
 from __future__ import annotations
 
 import sys
+from typing import Any
 
 import typer
+from typer.core import TyperGroup
 
 from aerialdojo_gen.commands import (
     annotate,
@@ -24,12 +26,25 @@ from aerialdojo_gen.commands import (
 from aerialdojo_gen.common import trouble
 from aerialdojo_gen.errors import AerialDojoError
 
+
+class _Commands(TyperGroup):
+    """Lists the commands with all of what they do, not as much as fits on a line."""
+
+    def format_commands(self, ctx: Any, formatter: Any) -> None:
+        """Write the names and their help, wrapped."""
+        rows = [(name, (self.commands[name].help or "").partition("\n\n")[0]) for name in self.list_commands(ctx)]
+        with formatter.section("Commands"):
+            formatter.write_dl(rows)
+
+
 app = typer.Typer(
+    cls=_Commands,
     name="aerialdojo-gen",
     help="Generate aerial object-goal-search datasets: scenes, tasks, certified routes, RGB-D recordings.",
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
+    rich_markup_mode=None,  # half of the time that --help takes is importing what draws boxes
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 for _group in (stages, render, sources, annotate, evaluate, release, show, validate, exchange, report):

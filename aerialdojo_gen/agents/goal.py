@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from aerialdojo_gen.common.names import unknown
 from aerialdojo_gen.errors import UsageError
 from aerialdojo_gen.geometry.cameras import Camera
 from aerialdojo_gen.store.schemas import APPROACH, VIEWS
@@ -46,7 +47,7 @@ class Sensors:
         """Refuse what no body carries."""
         for view in self.views:
             if view not in VIEWS:
-                raise UsageError(f"no view {view!r}: there are {', '.join(VIEWS)}")
+                raise UsageError(unknown("no view", view, VIEWS))
         if len(set(self.views)) != len(self.views):
             raise UsageError(f"a view stands twice in {', '.join(self.views)}")
         if self.max_depth_m <= 0.0:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import importlib
 import inspect
 from collections.abc import Callable
@@ -10,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from aerialdojo_gen.agents.base import Agent
+from aerialdojo_gen.common.names import unknown
 from aerialdojo_gen.errors import AerialDojoError, UsageError, first_line
 
 _HERE = "aerialdojo_gen.agents"
@@ -41,9 +41,7 @@ def agent_class(name: str) -> Callable[..., Any]:
     where = BUILT_IN.get(name, name)
     module_name, colon, class_name = where.partition(":")
     if not colon or not module_name or not class_name:
-        near = difflib.get_close_matches(name, BUILT_IN, n=1)
-        hint = f"did you mean {near[0]!r}?" if near else f"there are {', '.join(BUILT_IN)}, or package.module:Class"
-        raise UsageError(f"no agent {name!r}: {hint}")
+        raise UsageError(unknown("no agent", name, BUILT_IN, besides=("or package.module:Class",)))
     try:
         module = importlib.import_module(module_name)
     except ImportError as error:

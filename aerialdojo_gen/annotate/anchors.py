@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerialdojo_gen.annotations.format import Object
+from aerialdojo_gen.common.pictures import REFERENCE_PNG, encode_png
 from aerialdojo_gen.config.pipeline import Pipeline
 from aerialdojo_gen.errors import AerialDojoError
 from aerialdojo_gen.geometry.angles import yaw_towards
@@ -193,7 +194,7 @@ class AnchorDesk:
     def _look(self, position_m: Floats, yaw_rad: float) -> View:
         from aerialdojo_gen.rendering.casters import ray_caster
         from aerialdojo_gen.rendering.world import render_world
-        from aerialdojo_gen.stages.work.reference_images import box_of, instance_map, png
+        from aerialdojo_gen.stages.work.reference_images import box_of, instance_map
 
         camera = Camera(self._pictures.width, self._pictures.height, self._pictures.fov_deg)
         pose = view_pose(position_m, yaw_rad, "front")
@@ -202,7 +203,7 @@ class AnchorDesk:
         shown = instance_map(rays, camera, pose)
         found, counts = np.unique(shown[shown >= 0], return_counts=True)
         return View(
-            png(picture.rgb),
+            encode_png(picture.rgb, REFERENCE_PNG),
             {rays.nodes[k]: box_of(shown == k) for k in found},
             {rays.nodes[k]: int(n) for k, n in zip(found, counts, strict=True)},
         )

@@ -302,9 +302,9 @@ def open_desk(name: str, pipeline: Pipeline, roots: Roots) -> Desk:
     AnnotationError
         Its annotation file cannot be read.
     """
-    from aerialdojo_gen.pipeline import runner
+    from aerialdojo_gen.pipeline.runner import chosen_scenes
 
-    scenes = runner.choose_scenes([name], runner.known_scenes(roots.recipes))
+    scenes = chosen_scenes(pipeline, roots, [name])
     if len(scenes) > 1:
         raise UsageError(f"{name} are {len(scenes)} scenes ({', '.join(scenes[:3])}, ...): annotate one at a time")
     build(scenes[0], pipeline, roots)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import re
 from collections.abc import Iterable, Mapping, Sequence
 
@@ -14,6 +13,7 @@ from aerialdojo_gen.annotations.claims import Lexicon
 from aerialdojo_gen.annotations.format import Landmark, Object, Source
 from aerialdojo_gen.annotations.positions import Fault
 from aerialdojo_gen.annotations.relations import SceneGeometry
+from aerialdojo_gen.common.names import nearest
 from aerialdojo_gen.scenes.model import Scene
 
 # What a mesh or a map says and a person does not: node names, decimals, number pairs, measured lengths.
@@ -111,7 +111,7 @@ def _object(
     yield from _description(source, (*path, "description"), entry.description)
     known = sorted({*names, *(instance.category for instance in scene.instances)})
     if entry.category not in known:
-        text = f"no category {entry.category!r}{_near(entry.category, known)}"
+        text = f"no category {entry.category!r}{nearest(entry.category, known, 2)}"
         yield source.document.fault((*path, "category"), text)
     elif not scene.imported and entry.node in scene and scene[entry.node].category != entry.category:
         text = f"is {entry.category!r}, the node {entry.node!r} is a {scene[entry.node].category!r}"
@@ -142,7 +142,7 @@ def _name(source: Source, path: tuple[str | int, ...], name: str) -> Iterable[Fa
 
 def _node(source: Source, scene: Scene, path: tuple[str | int, ...], node: str) -> Iterable[Fault]:
     if node not in scene:
-        text = f"no node {node!r} in the scene{_near(node, [i.node for i in scene.instances])}"
+        text = f"no node {node!r} in the scene{nearest(node, (i.node for i in scene.instances), 2)}"
         yield source.document.fault((*path, "node"), text)
     elif not _inside(scene, scene[node].centroid):
         yield source.document.fault((*path, "node"), f"the middle of {node!r} is outside the scene's bounds")
@@ -165,11 +165,6 @@ def _description(source: Source, path: tuple[str | int, ...], text: str) -> Iter
 
 def _inside(scene: Scene, point: Sequence[float] | np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> bool:
     return bool(np.all(np.asarray(point) >= scene.bounds[0]) and np.all(np.asarray(point) <= scene.bounds[1]))
-
-
-def _near(word: str, known: Sequence[str]) -> str:
-    near = difflib.get_close_matches(word, known, n=2)
-    return f": did you mean {' or '.join(repr(n) for n in near)}?" if near else ""
 
 
 def _geometry(source: Source, scene: Scene, names: Mapping[str, str], geometry: SceneGeometry) -> Iterable[Fault]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import json
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,6 +10,8 @@ from typing import Annotated, Any, TypeVar
 from pydantic import BaseModel, ConfigDict, Field, StrictFloat, StrictInt, StrictStr, ValidationError
 
 from aerialdojo_gen.annotations.positions import Document, Fault, read_json
+from aerialdojo_gen.common.explain import faults_of
+from aerialdojo_gen.common.names import unknown
 from aerialdojo_gen.store.atomic import atomic_file
 
 FORMAT = "aerialdojo-annotations"
@@ -143,7 +144,7 @@ def parse_annotations(text: str) -> Source:
         if not faults:
             faults.append(document.fault((), f"must be an object with the keys {', '.join(_KEYS)}"))
         return Source(document, "", {}, {}, tuple(faults))
-    faults += [document.fault((key,), _unknown(key, _KEYS)) for key in raw if key not in _KEYS]
+    faults += [document.fault((key,), unknown("unknown key", key, _KEYS)) for key in raw if key not in _KEYS]
     faults += [document.fault((), f"the key {key!r} is missing") for key in _KEYS if key not in raw]
     if "format" in raw and raw["format"] != FORMAT:
         faults.append(document.fault(("format",), f"must be {FORMAT!r}, is {raw['format']!r}"))
@@ -199,21 +200,5 @@ def _entries(document: Document, key: str, raw: Any, kind: type[_E], faults: lis
         try:
             entries[i] = kind.model_validate(item)
         except ValidationError as error:
-            for fault in error.errors():
-                path = (key, i, *fault["loc"])
-                faults.append(document.fault(path, _explain(fault["type"], fault["msg"], path, kind)))
+            faults += [document.fault((key, i, *fault.path), fault.said) for fault in faults_of(error, kind)]
     return entries
-
-
-def _explain(kind: str, message: str, path: tuple[str | int, ...], model: type[_Entry]) -> str:
-    if kind == "extra_forbidden":
-        owner = Anchor if "anchor" in path[2:-1] else model
-        return _unknown(str(path[-1]), tuple(owner.model_fields))
-    if kind == "missing":
-        return "the key is missing"
-    return message
-
-
-def _unknown(key: str, known: tuple[str, ...]) -> str:
-    near = difflib.get_close_matches(key, known, n=1)
-    return f"unknown key {key!r}: " + (f"did you mean {near[0]!r}?" if near else f"known are {', '.join(known)}")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,6 +12,7 @@ from aerialdojo_gen.benchmark.grid import Table
 from aerialdojo_gen.benchmark.paper_tables import result_tables
 from aerialdojo_gen.benchmark.profiles import Profile
 from aerialdojo_gen.benchmark.runs import Run
+from aerialdojo_gen.common.names import unknown
 from aerialdojo_gen.common.paper import PaperResult
 from aerialdojo_gen.errors import UsageError
 
@@ -97,8 +97,6 @@ def named_tables(wanted: Wanted, names: Sequence[str]) -> dict[str, list[Table]]
     """Make tables as `report_tables` does, by the names that they go by."""
     for name in names:
         if name not in (*NAMES, "all"):
-            near = difflib.get_close_matches(name, NAMES, n=1)
-            hint = f"did you mean {near[0]!r}?" if near else f"there are {', '.join(NAMES)}, all"
-            raise UsageError(f"no table {name!r}: {hint}")
+            raise UsageError(unknown("no table", name, NAMES, besides=("all",)))
     chosen = NAMES if "all" in names else [name for name in NAMES if name in names]
     return {name: _TABLES[name](wanted) for name in chosen}

@@ -19,9 +19,11 @@ from aerialdojo_gen.benchmark.eyes import look, mosaic
 from aerialdojo_gen.benchmark.flight import Flight
 from aerialdojo_gen.benchmark.tasks import MODALITIES, Selection, read_tasks, reference_image, select
 from aerialdojo_gen.benchmark.texts import GoalText
+from aerialdojo_gen.common.names import unknown
 from aerialdojo_gen.config.agreement import SUCCESS_RADIUS_M
 from aerialdojo_gen.config.sections import Embodiment
 from aerialdojo_gen.errors import UsageError
+from aerialdojo_gen.store.root import DataRoot, open_root
 from aerialdojo_gen.store.schemas import DIRECTIONS, VIEWS
 
 _TEXT = ("target_name", "landmark", "description")
@@ -207,7 +209,7 @@ class AerialDojoEnv(gymnasium.Env[dict[str, Any], np.int64]):
         if self._index is None:
             self._index = {name: i for i, name in enumerate(self._rows["task_id"].to_pylist())}
         if task_id not in self._index:
-            raise UsageError(f"no task {task_id!r} among the {self.n_tasks:,} chosen")
+            raise UsageError(unknown(f"among the {self.n_tasks:,} chosen there is no task", task_id, self._index))
         return self._index[task_id]
 
     def _observations(self) -> spaces.Dict:
@@ -272,6 +274,26 @@ class AerialDojoEnv(gymnasium.Env[dict[str, Any], np.int64]):
         if "depth_m" in self.observation_space.spaces:
             observation["depth_m"] = seen.depth_m
         return observation
+
+
+def make_env(data: str | Path | DataRoot = "data", **options: Any) -> AerialDojoEnv:
+    """Make the environment of a release; ``gymnasium.make("AerialDojo-v0", data=data)`` without Gymnasium's checks.
+
+    Parameters
+    ----------
+    data : str, Path or DataRoot
+        The data directory.
+    **options
+        As for `AerialDojoEnv`: ``split="id_train"``, ``views=("front",)``, ``width=128``, …
+
+    Raises
+    ------
+    UsageError
+        No task fits, or a value makes no sense.
+    StoreError
+        There is no release in `data`.
+    """
+    return AerialDojoEnv(open_root(data).url, **options)
 
 
 def _names(given: str | Sequence[str]) -> tuple[str, ...]:

@@ -10,6 +10,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
+from aerialdojo_gen.common.names import unknown
 from aerialdojo_gen.errors import StoreError
 from aerialdojo_gen.store import schemas
 from aerialdojo_gen.store import shards as store
@@ -55,8 +56,8 @@ def read_run(data: Path, run: str, table: str = "episodes", columns: Sequence[st
     """
     scenes = run_scenes(data, run)
     if not scenes:
-        known = ", ".join(runs(data)) or "none"
-        raise StoreError(f"no run {run!r} in {data} (there are: {known}): run aerialdojo-gen evaluate --run {run}")
+        raise StoreError(f"{unknown(f'in {data} there is no run', run, runs(data))}; "
+                         f"aerialdojo-gen evaluate --run {run} makes it")  # fmt: skip
     return pa.concat_tables([store.read_scene(data, table, scene, columns, run=run) for scene in scenes])
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from aerialdojo_gen.benchmark.episodes import read_run
 from aerialdojo_gen.benchmark.episodes import runs as run_names
 from aerialdojo_gen.benchmark.runs import FLOORS, GROUP_OF, UPPER_BOUND, Run, load_runs
+from aerialdojo_gen.common.names import unknown
 from aerialdojo_gen.errors import StoreError, UsageError
 
 _FLOOR_AGENTS = tuple(agent for agent, group in GROUP_OF.items() if group == FLOORS)
@@ -79,7 +80,7 @@ def arranged(runs: Sequence[Run], groups: Mapping[str, Sequence[str]] | None = N
     for heading, names in chosen.items():
         for name in names:
             if name not in {n for run in runs for n in (run.name, run.agent)}:
-                raise UsageError(f"group {heading!r}: no run {name!r} among {', '.join(r.name for r in runs)}")
+                raise UsageError(f"group {heading!r}: {unknown('no run', name, [run.name for run in runs])}")
 
     others = "other agents" if chosen else "agents"
     order = [*chosen, others, UPPER_BOUND, FLOORS]

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import textwrap
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 
 from aerialdojo_gen.benchmark.grid import BEST, SECOND, Table
+from aerialdojo_gen.common.text_table import Column, TextTable
 
 _SIGNS = {BEST: "¹", SECOND: "²"}
 _ANSI = {BEST: "\x1b[1m", SECOND: "\x1b[4m"}
-_OFF = "\x1b[0m"
 
 
 def as_text(table: Table, width: int | None = None, ansi: bool = False) -> str:
@@ -28,24 +28,27 @@ def as_text(table: Table, width: int | None = None, ansi: bool = False) -> str:
     str
         Lines without an end of the last.
     """
-    heads = [name for _, names in table.groups for name in names]
-    over = [group for group, names in table.groups for _ in names]
-    lines: list[list[str]] = [heads, *(list(cells) for _, cells in table.rows)]
+    columns = [Column(name, group) for group, names in table.groups for name in names]
+    heads = [column.head for column in columns]
+    cells = [list(row) for _, row in table.rows]
     if not ansi:
-        bare = {k for i, k in table.marks if " ± " not in lines[i + 1][k]}
-        for i, line in enumerate(lines):
+        bare = {k for i, k in table.marks if " ± " not in cells[i][k]}
+        for i, line in enumerate([heads, *cells]):
             for k in range(len(heads)):
                 sign = _SIGNS.get(table.marks.get((i - 1, k), ""), " ")
                 # The mean is what is marked: the sign takes the place of the blank behind it.
                 line[k] = line[k].replace(" ± ", f"{sign}± ") if " ± " in line[k] else line[k] + sign * (k in bare)
-    widths = [max(len(line[k]) for line in lines) for k in range(len(heads))]
-    indent = "  " if table.sections else ""
-    stub = max(len(table.stub), *(len(indent + label) for label, _ in table.rows), 0)
-    out = [table.title]
-    for n, columns in enumerate(_blocks(over, widths, stub, width)):
-        out += [""] if n else []
-        out += _block(table, columns, heads, over, lines[1:], list(widths), stub, indent, ansi)
-    return "\n".join([*out, *(part for note in table.notes for part in _wrapped(note, width))])
+    return "\n".join(
+        TextTable(
+            table.stub,
+            [replace(column, head=head) for column, head in zip(columns, heads, strict=True)],
+            [(label, row) for (label, _), row in zip(table.rows, cells, strict=True)],
+            table.title,
+            table.notes,
+            table.sections,
+            {at: _ANSI[mark] for at, mark in table.marks.items()} if ansi else {},
+        ).lines(width)
+    )
 
 
 def legend(tables: Sequence[Table], ansi: bool = False) -> str:
@@ -54,90 +57,6 @@ def legend(tables: Sequence[Table], ansi: bool = False) -> str:
         return ""
     what = "Bold: best; underlined: second" if ansi else "¹ best, ² second"
     return f"{what} of those compared; the oracle, which is given the way, is not."
-
-
-def _blocks(over: list[str], widths: list[int], stub: int, width: int | None) -> Iterable[list[int]]:
-    """Share columns out over blocks that fit; groups are kept together where they fit by themselves."""
-    groups: list[list[int]] = []
-    for k, group in enumerate(over):
-        if k and group == over[k - 1]:
-            groups[-1].append(k)
-        else:
-            groups.append([k])
-
-    def fits(columns: list[int]) -> bool:
-        return width is None or _breadth(columns, over, widths, stub) <= width
-
-    block: list[int] = []
-    for together in groups:
-        if block and not fits(block + together):
-            yield block
-            block = []
-        for k in together:
-            if block and not fits([*block, k]):
-                yield block
-                block = []
-            block.append(k)
-    if block:
-        yield block
-
-
-def _spans(columns: list[int], over: list[str]) -> list[list[int]]:
-    """Divide columns by the group that they belong to."""
-    spans: list[list[int]] = []
-    for n, k in enumerate(columns):
-        if n and over[k] == over[columns[n - 1]]:
-            spans[-1].append(k)
-        else:
-            spans.append([k])
-    return spans
-
-
-def _breadth(columns: list[int], over: list[str], widths: list[int], stub: int) -> int:
-    total = stub
-    for span in _spans(columns, over):
-        total += 3 + max(sum(widths[k] for k in span) + 2 * (len(span) - 1), len(over[span[0]]))
-    return total
-
-
-def _block(
-    table: Table, columns: list[int], heads: list[str], over: list[str], body: list[list[str]], widths: list[int],
-    stub: int, indent: str, ansi: bool,
-) -> list[str]:  # fmt: skip
-    top, first = " " * stub, set()
-    for span in _spans(columns, over):
-        first.add(span[0])
-        # A group's head may be wider than its columns together: the last of them gives way.
-        inner = sum(widths[k] for k in span) + 2 * (len(span) - 1)
-        widths[span[-1]] += max(0, len(over[span[0]]) - inner)
-        top += "   " + over[span[0]].center(max(inner, len(over[span[0]])))
-
-    def line(label: str, cells: list[str], row: int | None) -> str:
-        text = label.ljust(stub)
-        for k in columns:
-            cell = cells[k].rjust(widths[k])
-            if ansi and row is not None and (mark := table.marks.get((row, k))):
-                cell = " " * (widths[k] - len(cells[k])) + _ANSI[mark] + cells[k] + _OFF
-            text += ("   " if k in first else "  ") + cell
-        return text.rstrip()
-
-    out = [top.rstrip()] if top.strip() else []
-    out.append(line(table.stub, heads, None))
-    labels = [f"{indent}{label}" for label, _ in table.rows]
-    shown = [(label, cells, i) for i, (label, cells) in enumerate(zip(labels, body, strict=True))]
-    rule = "-" * max(map(len, [*out, *(line(label, cells, None) for label, cells, _ in shown)]))
-    out.append(rule)
-    for label, cells, i in shown:
-        if i in table.sections:
-            out.append(table.sections[i])
-        # A row whose cells all went to another block says nothing here.
-        if label.strip() or any(cells[k].strip() for k in columns):
-            out.append(line(label, cells, i))
-    return out
-
-
-def _wrapped(note: str, width: int | None) -> list[str]:
-    return [note] if width is None else textwrap.wrap(note, width) or [""]
 
 
 def as_markdown(table: Table) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from aerialdojo_gen.common.names import unknown
 from aerialdojo_gen.errors import UsageError
 
 
@@ -72,5 +73,5 @@ def profile_named(name: str) -> Profile:
         There is none of that name; the message lists those there are.
     """
     if name not in PROFILES:
-        raise UsageError(f"no profile {name!r}: there are {', '.join(PROFILES)}")
+        raise UsageError(unknown("no profile", name, PROFILES))
     return PROFILES[name]

@@ -5,7 +5,6 @@ The evaluator's eyes only: a replay shows the target and the reference route.
 
 from __future__ import annotations
 
-import base64
 import json
 import math
 from collections.abc import Iterator, Sequence
@@ -14,7 +13,6 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 import pyarrow.compute as pc
 from numpy.typing import NDArray
@@ -24,6 +22,7 @@ from aerialdojo_gen.benchmark.episodes import read_run
 from aerialdojo_gen.benchmark.eyes import look
 from aerialdojo_gen.benchmark.runs import Run
 from aerialdojo_gen.browse.lookup import ReleasedScene
+from aerialdojo_gen.common.pictures import MAP_JPEG, REPLAY_JPEG, data_url, encode_jpeg
 from aerialdojo_gen.errors import StoreError
 from aerialdojo_gen.rendering.orthographic import OrthographicPictures
 from aerialdojo_gen.store.schemas import ACTION_NAMES
@@ -190,7 +189,7 @@ def replays(
             {name: route[name] for name in ("x_m", "y_m", "z_m", "length_m")},
             (float(low[0]), float(low[1])),
             (float(high[0]), float(high[1])),
-            _jpeg(_map(scene, low, high), 82),
+            data_url(encode_jpeg(_map(scene, low, high), MAP_JPEG)),
             flights,
         )
 
@@ -229,7 +228,8 @@ def _flight(scene: ReleasedScene, run: Run, episode: dict[str, Any], steps: Any,
         last = len(lists["said"]) - (2 if episode["collision"] else 1)
         for k in sorted({round(k) for k in np.linspace(0, max(last, 0), min(_MOST_FRAMES, last + 1))}):
             position = tuple(lists[name][k] for name in ("x_m", "y_m", "z_m"))
-            pictures[k] = _jpeg(look(scene.model, _FRAME, position, lists["yaw_rad"][k])[0]["front"], 75)
+            views, *_ = look(scene.model, _FRAME, position, lists["yaw_rad"][k])
+            pictures[k] = data_url(encode_jpeg(views["front"], REPLAY_JPEG))
     rounded = {name: [round(v, 3) for v in lists[name]] for name in ("x_m", "y_m", "z_m", "yaw_rad", "distance_m")}
     return Flight(
         run.label, _outcome(episode), **rounded, said=lists["said"], answers=lists["answers"], frames=pictures
@@ -254,9 +254,3 @@ def _extent(
     middle = np.array([x.min() + x.max(), y.min() + y.max()]) / 2.0
     half = max(float(np.ptp(x)), float(np.ptp(y)), 20.0) / 2.0 + _MARGIN_M
     return middle - half, middle + half
-
-
-def _jpeg(rgb: NDArray[np.uint8], quality: int) -> str:
-    ok, data = cv2.imencode(".jpg", cv2.cvtColor(rgb, cv2.COLOR_RGB2BGR), [cv2.IMWRITE_JPEG_QUALITY, quality])
-    assert ok, f"OpenCV cannot encode an image of shape {rgb.shape}"
-    return "data:image/jpeg;base64," + base64.b64encode(data.tobytes()).decode("ascii")

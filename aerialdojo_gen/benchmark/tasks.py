@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache, lru_cache
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
@@ -18,8 +16,9 @@ from numpy.typing import NDArray
 from aerialdojo_gen.agents.goal import Goal, Rules
 from aerialdojo_gen.benchmark.motion import Point
 from aerialdojo_gen.common import rng
+from aerialdojo_gen.common.names import unknown
+from aerialdojo_gen.common.pictures import decode_rgb
 from aerialdojo_gen.errors import StoreError, UsageError
-from aerialdojo_gen.pipeline.runner import choose_scenes
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.schemas import SETTINGS, SUBSETS, TASKS
 
@@ -59,9 +58,7 @@ class Selection:
         ):  # fmt: skip
             for name in chosen:
                 if name not in known:
-                    near = difflib.get_close_matches(name, known, n=1)
-                    hint = f"did you mean {near[0]!r}?" if near else f"there are {', '.join(known)}"
-                    raise UsageError(f"no {what} {name!r}: {hint}")
+                    raise UsageError(unknown(f"no {what}", name, known))
         if self.limit is not None and self.limit < 1:
             raise UsageError(f"a limit is at least 1, not {self.limit}")
 
@@ -113,12 +110,8 @@ def select(data: Path, selection: Selection) -> pa.Table:
     StoreError
         There is no release, or a part of it is damaged.
     """
-    released = store.release_scenes(data)
-    if not released:
-        raise StoreError(f"there is no release in {data}: run aerialdojo-gen split, or give its folder by --data")
-    scenes = choose_scenes(selection.scenes, released) if selection.scenes else released
     tables = []
-    for scene in scenes:
+    for scene in store.scenes_in_release(data, selection.scenes):
         for subset in ("train", "test"):
             split = f"{store.partition(scene)}_{subset}"
             if split not in (selection.splits or SUBSETS):
@@ -211,11 +204,9 @@ def reference_image(data: Path, scene: str, image_id: str) -> NDArray[np.uint8]:
     StoreError
         It is not in the release, or is no picture.
     """
-    png = _pictures(data, scene).get(image_id)
-    image = None if png is None else cv2.imdecode(np.frombuffer(png, np.uint8), cv2.IMREAD_COLOR_RGB)
-    if image is None:
+    picture = decode_rgb(_pictures(data, scene).get(image_id))
+    if picture is None:
         raise StoreError(f"reference image {image_id} of {scene} is not in {data}/release/objects: run split again")
-    picture = np.ascontiguousarray(image, np.uint8)
     picture.setflags(write=False)
     return picture
 

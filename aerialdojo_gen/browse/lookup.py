@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -15,6 +14,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 from numpy.typing import NDArray
 
+from aerialdojo_gen.common.names import closest, unknown
 from aerialdojo_gen.errors import AssetError, StoreError, UsageError
 from aerialdojo_gen.planning.collision import CollisionWorld
 from aerialdojo_gen.scenes.glb import read_glb
@@ -44,13 +44,9 @@ class ReleasedScene:
     """
 
     def __init__(self, data: Path, name: str) -> None:
-        known = store.release_scenes(data)
-        if not known:
-            raise StoreError(f"there is no release in {data}: run aerialdojo-gen split, or give --data")
+        known = store.scenes_in_release(data)
         if name not in known:
-            near = difflib.get_close_matches(name, known, n=1)
-            hint = f"did you mean {near[0]}?" if near else f"it has {', '.join(known)}"
-            raise UsageError(f"the release in {data} has no scene {name!r}: {hint}")
+            raise UsageError(unknown(f"the release in {data} has no scene", name, known, most=3))
         self.data, self.name = data, name
 
     @cached_property
@@ -116,7 +112,7 @@ class ReleasedScene:
         """Return the row of `routes`, with ``split``; UsageError where there is none."""
         found = self.routes.filter(pc.equal(self.routes["nav_id"], nav_id)).to_pylist()
         if not found:
-            raise UsageError(f"no navigation task {nav_id!r} in the release")
+            raise UsageError(unknown("no navigation task", nav_id, self.routes["nav_id"].to_pylist()))
         return dict(found[0])
 
     def instances(self, nav_id: str) -> list[dict[str, Any]]:
@@ -189,9 +185,7 @@ def find_task(data: Path, task_id: str) -> FoundTask:
     StoreError
         There is no release, or a part of it is missing or damaged.
     """
-    known = store.release_scenes(data)
-    if not known:
-        raise StoreError(f"there is no release in {data}: run aerialdojo-gen split, or give --data")
+    known = store.scenes_in_release(data)
     match = _TASK_ID.fullmatch(task_id)
     listing = f'tasks are listed by pandas.read_parquet({str(data / "release" / "tasks")!r})["task_id"]'
     if match is None:
@@ -204,7 +198,7 @@ def find_task(data: Path, task_id: str) -> FoundTask:
     ids = scene.routes["nav_id"].to_pylist()
     nav_id = match["nav"]
     if nav_id not in ids:
-        near = difflib.get_close_matches(nav_id, ids, n=1, cutoff=0.0)
+        near = closest(nav_id, ids, cutoff=0.0)
         hint = f"the nearest is {near[0]}; " if near else ""
         raise UsageError(f"no task {task_id!r} in the release of {scene.name}: {hint}{listing}")
     instances = scene.instances(nav_id)

@@ -5,22 +5,20 @@ Nothing heavy is imported before a command runs, so that ``--help`` answers at o
 
 from __future__ import annotations
 
-import os
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from aerialdojo_gen.errors import ConfigError
+from aerialdojo_gen.pipeline.run import DEFAULT_PIPELINE, default_workers, home, open_pipeline, run_stages
 
 if TYPE_CHECKING:
     from aerialdojo_gen.config.pipeline import Pipeline
     from aerialdojo_gen.pipeline.freshness import Limits
-    from aerialdojo_gen.pipeline.progress import Reporter
     from aerialdojo_gen.pipeline.stage import Roots, Stage
 
-DEFAULT_PIPELINE = "aerialdojo-200k.toml"
+__all__ = ["DEFAULT_PIPELINE", "default_workers", "home", "open_pipeline", "run_chosen", "run_until"]
 
 Data = Annotated[
     Path, typer.Option("--data", envvar="AERIALDOJO_DATA", help="Data directory: tables, meshes, release.")
@@ -37,50 +35,6 @@ Replace = Annotated[
     bool, typer.Option("--replace", help="Put this release in the place of another pipeline's, which is lost.")
 ]
 Quiet = Annotated[bool, typer.Option("--quiet", help="No progress and no summary.")]
-
-
-def home() -> Path:
-    """Return the folder that holds scene_assets/, annotations/ and pipelines/.
-
-    A checkout's own folder where the package lies in one, else what the wheel carries.
-    """
-    package = Path(__file__).resolve().parents[1]
-    return package.parent if (package.parent / "scene_assets").is_dir() else package / "_shipped"
-
-
-def open_pipeline(path: Path | None, data: Path) -> tuple[Pipeline, Roots]:
-    """Read the pipeline file and find the folders.
-
-    Parameters
-    ----------
-    path : Path or None
-        The pipeline file; None for the default one.
-    data : Path
-        The data directory.
-
-    Returns
-    -------
-    Pipeline, Roots
-
-    Raises
-    ------
-    ConfigError
-        The file is missing or wrong.
-    """
-    from aerialdojo_gen.config.pipeline import load_pipeline
-    from aerialdojo_gen.pipeline.stage import Roots
-
-    pipeline = load_pipeline(path or home() / "pipelines" / DEFAULT_PIPELINE)
-    roots = Roots(
-        data=data.absolute(),
-        scene_assets=(assets := pipeline.scene_assets or home() / "scene_assets"),
-        recipes=pipeline.recipes or assets / "scenes",
-        annotations=pipeline.annotations or home() / "annotations",
-    )
-    for key, folder in (("scene_assets", roots.scene_assets), ("recipes", roots.recipes)):
-        if not folder.is_dir():
-            raise ConfigError(f"no folder {folder}: set {key} in the pipeline file")
-    return pipeline, roots
 
 
 def run_until(
@@ -131,10 +85,10 @@ def run_until(
 
     config, roots = open_pipeline(pipeline, data)
     config = with_overrides(config, stage, **overrides)
-    run_stages(list(upstream(stage)), config, roots, scene, workers, [stage] if force else [], quiet, limits, replace)
+    run_chosen(list(upstream(stage)), config, roots, scene, workers, [stage] if force else [], quiet, limits, replace)
 
 
-def run_stages(
+def run_chosen(
     stages: list[Stage],
     config: Pipeline,
     roots: Roots,
@@ -145,56 +99,15 @@ def run_stages(
     limits: Limits | None = None,
     replace: bool = False,
 ) -> None:
-    """Run stages in their order over the chosen scenes; after `split`, write card and croissant.json.
-
-    Raises
-    ------
-    UsageError
-        The release would lose scenes that another pipeline made, and `replace` is not given; nothing was run.
-    """
-    from aerialdojo_gen.pipeline import runner
+    """Run stages as `aerialdojo_gen.pipeline.run.run_stages` does, with progress, and say what Ctrl-C leaves."""
     from aerialdojo_gen.pipeline.progress import Reporter
-    from aerialdojo_gen.release.provenance import check_replaced
-
-    reporter = Reporter(quiet=quiet)
-    scenes = runner.choose_scenes(scene or config.scenes, runner.known_scenes(roots.recipes))
-    releases = any(stage.name == "split" for stage in stages)
-
-    def prepare() -> None:
-        if releases and not replace:
-            check_replaced(roots.data, config, scenes, whole=scene is None)
-
-    def finish() -> None:
-        if releases:
-            _finish_release(config, roots.data, scenes, scene is None, reporter)
 
     try:
-        runner.run(
-            stages, scenes, config, roots, workers=workers or default_workers(), force=force, reporter=reporter,
-            limits=limits, prepare=prepare, finish=finish,
+        run_stages(
+            stages, config, roots, scene, workers=workers, force=force, reporter=Reporter(quiet=quiet), limits=limits,
+            replace=replace,
         )  # fmt: skip
     except KeyboardInterrupt:
         # Said here because Typer turns Ctrl-C into a silent exit.
         print("interrupted: finished shards are kept, the same command goes on from here", file=sys.stderr)
         raise SystemExit(130) from None
-
-
-def _finish_release(config: Pipeline, data: Path, scenes: list[str], whole: bool, reporter: Reporter) -> None:
-    """Bring what stands beside the tables of a release up to date with them."""
-    from aerialdojo_gen.release.card import write_card
-    from aerialdojo_gen.release.croissant import write_croissant
-    from aerialdojo_gen.release.provenance import record_makers
-    from aerialdojo_gen.store.shards import prune_release
-
-    if whole:
-        # The whole pipeline was asked for: the release holds its scenes and no others.
-        for gone in prune_release(data, scenes):
-            reporter.line(f"release: {gone} is no scene of this pipeline, removed")
-    record_makers(data, config, scenes)
-    write_croissant(data)
-    reporter.line(f"release: {write_card(data).parent}")
-
-
-def default_workers() -> int:
-    """Count the cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from aerialdojo_gen.commands.common import Data, PipelineFile, Scene, open_pipeline
+from aerialdojo_gen.common.text_table import terminal_width
 from aerialdojo_gen.errors import UsageError
 from aerialdojo_gen.store.atomic import atomic_file
 
@@ -35,22 +36,22 @@ def stats(
         if markdown or csv or figures:
             raise UsageError(f"there is no release in {data} to write or draw: run aerialdojo-gen split")
         config, roots = open_pipeline(pipeline, data)
-        scenes = runner.choose_scenes(scene or config.scenes, runner.known_scenes(roots.recipes))
-        print("\n".join(pool_lines([pool_of(data, name) for name in scenes])))
+        scenes = runner.chosen_scenes(config, roots, scene)
+        print("\n".join(pool_lines([pool_of(data, name) for name in scenes], terminal_width())))
         return
 
     from aerialdojo_gen.release.contents import check_release
     from aerialdojo_gen.stats.comparison import Comparison, Listing, as_csv, as_markdown
     from aerialdojo_gen.stats.tables import benchmark_table, in_paper_order, made_of, tables
 
-    names = check_release(data, runner.choose_scenes(scene, released) if scene else None)
+    names = check_release(data, store.scenes_in_release(data, scene) if scene else None)
     made = in_paper_order([made_of(data, name) for name in names])
     compared: list[Comparison | Listing] = [*tables(made), benchmark_table(made)]
     for path, text in ((markdown, as_markdown(compared)), (csv, as_csv(compared))):
         if path:
             with atomic_file(path.parent, path.name) as temporary:
                 temporary.write_text(text, encoding="utf-8")
-    print("\n\n".join("\n".join(table.terminal()) for table in compared))
+    print("\n\n".join("\n".join(table.terminal(terminal_width())) for table in compared))
     if figures:
         from aerialdojo_gen.stats.figures import draw_figures
 

@@ -81,7 +81,7 @@ def _scenes_of(split: str | None, scene: list[str] | None, pipeline: Path | None
     from aerialdojo_gen.store import shards as store
 
     config, roots = open_pipeline(pipeline, data)
-    scenes = runner.choose_scenes(scene or config.scenes, runner.known_scenes(roots.recipes))
+    scenes = runner.chosen_scenes(config, roots, scene)
     chosen = [name for name in scenes if store.partition(name) == split.split("_")[0]]
     if not chosen:
         raise UsageError(f"--split {split} has none of the scenes {', '.join(scenes[:5])}")
@@ -102,7 +102,7 @@ def _estimate(
 
     config, roots = open_pipeline(pipeline, data)
     config = with_overrides(config, "render", **overrides)
-    scenes = runner.choose_scenes(scene or config.scenes, runner.known_scenes(roots.recipes))
+    scenes = runner.chosen_scenes(config, roots, scene)
     print(estimate(roots.data, scenes, config.render, config.seed, workers or default_workers(), share[1]))
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import shutil
 import sys
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -12,13 +11,12 @@ import typer
 from typer.core import TyperCommand
 
 from aerialdojo_gen.commands.common import Data
+from aerialdojo_gen.common.text_table import terminal_width
 from aerialdojo_gen.errors import UsageError
 
 app = typer.Typer()
 
 _NUMBER = re.compile(r"\d+(\.\d+)?")
-# Of output that goes nowhere in particular: a page in landscape.
-_WIDTH = 120
 
 
 class _Command(TyperCommand):
@@ -123,7 +121,7 @@ def _show(tables: Any, style: str) -> None:
 
     if style == "terminal":
         ansi = sys.stdout.isatty()
-        width = shutil.get_terminal_size((_WIDTH, 24)).columns
+        width = terminal_width()
         parts = [*(formats.as_text(table, width, ansi) for table in tables), formats.legend(tables, ansi)]
         print("\n\n".join(filter(None, parts)))
     else:

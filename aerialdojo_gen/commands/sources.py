@@ -67,10 +67,10 @@ def annotate_draft(
     """Draft a scene's annotations, to be checked and owned as sources."""
     from aerialdojo_gen.annotate.drafting import draft_scene
     from aerialdojo_gen.annotations.draft import Choice
-    from aerialdojo_gen.pipeline.runner import choose_scenes, known_scenes
+    from aerialdojo_gen.pipeline.runner import chosen_scenes
 
     config, roots = open_pipeline(pipeline, Path("data"))
-    choose_scenes([scene], known_scenes(roots.recipes))
+    chosen_scenes(config, roots, [scene])
     choice = Choice(
         centre_m=centre, within_m=within, core_share=core_share, aloft_share=aloft, most_vegetation=plants, most=most
     )
@@ -99,7 +99,7 @@ def gallery(
     make_folder(out)  # before anything is drawn
     catalogue = load_catalogue(roots.scene_assets)
     suffix, width = ("jpg", 1280) if small else ("png", None)
-    for name in runner.choose_scenes(scene or config.scenes, runner.known_scenes(roots.recipes)):
+    for name in runner.chosen_scenes(config, roots, scene):
         sheet = scene_sheet(build_scene(roots.recipes / f"{name}.toml", catalogue))
         print(write_picture(sheet, out, f"{name}.{suffix}", width))
     if props:

@@ -17,7 +17,7 @@ from aerialdojo_gen.commands.common import (
     Scene,
     Workers,
     open_pipeline,
-    run_stages,
+    run_chosen,
     run_until,
 )
 from aerialdojo_gen.pipeline.registry import BY_NAME, STAGES
@@ -66,4 +66,4 @@ def run(
     config, roots = open_pipeline(pipeline, data)
     stages = stages_named(config.stages)
     forced = [stage.name for stage in stages] if force else []
-    run_stages(stages, config, roots, scene, workers, forced, quiet, replace=replace)
+    run_chosen(stages, config, roots, scene, workers, forced, quiet, replace=replace)

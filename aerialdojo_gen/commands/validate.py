@@ -45,6 +45,7 @@ def validate(
     """Check a release again from its Parquet files and meshes alone, and name every row at fault."""
     from aerialdojo_gen import validate as validation
     from aerialdojo_gen.commands.common import DEFAULT_PIPELINE
+    from aerialdojo_gen.common.text_table import terminal_width
     from aerialdojo_gen.config.pipeline import load_pipeline
     from aerialdojo_gen.errors import UsageError
     from aerialdojo_gen.pipeline.progress import Reporter
@@ -71,7 +72,7 @@ def validate(
     if report is not None:
         validation.write_report(found.faults, report)
     if not quiet:
-        print("\n".join(found.table_lines()))
+        print("\n".join(found.table_lines(terminal_width())))
     print("\n".join([*found.fault_lines(lines), found.verdict()]))
     if found.faults:
         raise SystemExit(1)

@@ -8,8 +8,8 @@ from typing import Any
 from pydantic import Field, ValidationError, model_validator
 
 from aerialdojo_gen.common.bounded import read_toml
+from aerialdojo_gen.common.explain import explain
 from aerialdojo_gen.config.agreement import disagreements
-from aerialdojo_gen.config.explain import explain
 from aerialdojo_gen.config.sections import (
     AnchorSampleConfig,
     AnnotateImportConfig,

@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
+from aerialdojo_gen.common.names import unknown
 from aerialdojo_gen.common.version import __version__
 from aerialdojo_gen.errors import UsageError
 from aerialdojo_gen.exchange import aerialdojo_writer, habitat_writer
@@ -61,16 +62,11 @@ def export_release(
     AssetError
         Pictures are to be drawn, and a mesh is missing or another one.
     """
-    from aerialdojo_gen.pipeline.runner import choose_scenes
-
     if format_name not in FORMATS:
-        raise UsageError(f"no format {format_name!r}: it is one of {', '.join(FORMATS)}")
+        raise UsageError(unknown("no format", format_name, FORMATS))
     if picture_px is not None and (format_name != "aerialdojo" or not (picture_px == 0 or 16 <= picture_px <= 4096)):
         raise UsageError("--picture-size is for --format aerialdojo: 16 to 4096 pixels, or 0 for the release's own")
-    released = store.release_scenes(data)
-    if not released:
-        raise UsageError(f"there is no release in {data}: run aerialdojo-gen split --data {data}")
-    chosen = choose_scenes(scenes, released) if scenes else released
+    chosen = store.scenes_in_release(data, scenes)
     frame, lost = FORMATS[format_name]
     size_px = PICTURE_PX if picture_px is None else picture_px
     counts: Counter[str] = Counter(scenes=len(chosen))

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TextIO
 
+from aerialdojo_gen.common.names import unknown
 from aerialdojo_gen.errors import ImportRefused, StoreError, UsageError, brief
 from aerialdojo_gen.exchange import aerialdojo_reader, aerialvln, cityavos, openfly, uav_on
 from aerialdojo_gen.exchange.fields import BadField, Fields
@@ -123,7 +124,7 @@ def import_benchmark(
     """
     options = options or Options()
     if format_name not in FORMATS:
-        raise UsageError(f"no format {format_name!r}: it is one of {', '.join(FORMATS)}")
+        raise UsageError(unknown("no format", format_name, FORMATS))
     chosen = FORMATS[format_name]
     frame = _frame(format_name, chosen, options.frame)
     if options.angles not in ("radians", "degrees", "mixed"):

@@ -9,11 +9,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from aerialdojo_gen.common.pictures import REFERENCE_PNG, decode_rgb, encode_png
 from aerialdojo_gen.errors import AssetError, StoreError
 from aerialdojo_gen.geometry.cameras import Camera, view_pose
 from aerialdojo_gen.rendering.backend import choose_renderer, kept_renderer
 from aerialdojo_gen.scenes.glb import read_glb
-from aerialdojo_gen.stages.work.reference_images import png
 from aerialdojo_gen.store import shards as store
 
 # Between two sizes and two renderers edges and shadows' rims differ; another view or object differs by far more.
@@ -85,13 +85,13 @@ class Redrawn:
                 f"object {object_id} of {self._scene_name} looks otherwise in the release than from its anchor: "
                 "--picture-size 0 exports the release's own pictures"
             )
-        return png(rgb)
+        return encode_png(rgb, REFERENCE_PNG)
 
 
 def _difference(rgb: NDArray[np.uint8], picture: bytes) -> float:
     """Mean absolute difference to a PNG, in steps of 255, both at 64 x 64 pixels."""
-    released = cv2.imdecode(np.frombuffer(picture, np.uint8), cv2.IMREAD_COLOR)
+    released = decode_rgb(picture)
     if released is None:
         return float("inf")
-    small = [cv2.resize(image, (64, 64), interpolation=cv2.INTER_AREA) for image in (rgb, released[..., ::-1])]
+    small = [cv2.resize(image, (64, 64), interpolation=cv2.INTER_AREA) for image in (rgb, released)]
     return float(np.abs(small[0].astype(np.float32) - small[1].astype(np.float32)).mean())

@@ -10,11 +10,11 @@ from types import ModuleType
 import numpy as np
 
 from aerialdojo_gen import layouts
+from aerialdojo_gen.common.names import nearest
 from aerialdojo_gen.errors import AssetError
 from aerialdojo_gen.scenes.catalogue import Catalogue
 from aerialdojo_gen.scenes.cuts import cut_out
 from aerialdojo_gen.scenes.glb import read_glb
-from aerialdojo_gen.scenes.materials import nearest
 from aerialdojo_gen.scenes.model import Scene
 from aerialdojo_gen.scenes.recipe import Imported, Recipe, load_imported, load_recipe, validated
 from aerialdojo_gen.scenes.site import Site

@@ -12,8 +12,8 @@ from pydantic import ValidationError
 
 from aerialdojo_gen.agents.base import AgentBase, AgentUnavailable, InvalidAnswer, ServiceDown, Usage
 from aerialdojo_gen.agents.goal import Goal, Observation, Sensors
+from aerialdojo_gen.common.explain import explain
 from aerialdojo_gen.common.secrets import Secrets
-from aerialdojo_gen.config.explain import explain
 from aerialdojo_gen.errors import AerialDojoError, UsageError
 from aerialdojo_gen.llm.answer import parse_answer
 from aerialdojo_gen.llm.images import Picture, colour_picture, depth_picture

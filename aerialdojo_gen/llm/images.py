@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-_JPEG_QUALITY = 90
+from aerialdojo_gen.common.pictures import ASKED_JPEG, encode_jpeg, encode_png, media_type
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ def colour_picture(rgb: NDArray[np.uint8], size_px: int) -> Picture:
     Picture
     """
     scaled = _at_most(rgb, size_px, cv2.INTER_AREA)
-    return _encode(cv2.cvtColor(scaled, cv2.COLOR_RGB2BGR), ".jpg", [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY])
+    return _picture(encode_jpeg(scaled, ASKED_JPEG))
 
 
 def depth_picture(depth_m: NDArray[np.float32], max_depth_m: float, size_px: int) -> Picture:
@@ -71,7 +71,7 @@ def depth_picture(depth_m: NDArray[np.float32], max_depth_m: float, size_px: int
     scaled = _at_most(depth_m, size_px, cv2.INTER_NEAREST)
     seen = np.isfinite(scaled) & (scaled > 0.0)
     grey = np.where(seen, np.clip(np.where(seen, scaled, 0.0) / max_depth_m, 0.0, 1.0), 1.0)
-    return _encode(np.rint(grey * 255.0).astype(np.uint8), ".png", [])
+    return _picture(encode_png(np.rint(grey * 255.0).astype(np.uint8)))
 
 
 def _at_most(image: NDArray[Any], size_px: int, interpolation: int) -> NDArray[Any]:
@@ -83,9 +83,5 @@ def _at_most(image: NDArray[Any], size_px: int, interpolation: int) -> NDArray[A
     return np.asarray(cv2.resize(image, shape, interpolation=interpolation))
 
 
-def _encode(image: NDArray[Any], suffix: str, flags: list[int]) -> Picture:
-    ok, data = cv2.imencode(suffix, image, flags)
-    assert ok, f"OpenCV cannot encode an image of shape {image.shape} as {suffix}"
-    return Picture(
-        {".jpg": "image/jpeg", ".png": "image/png"}[suffix], base64.b64encode(data.tobytes()).decode("ascii")
-    )
+def _picture(file: bytes) -> Picture:
+    return Picture(media_type(file), base64.b64encode(file).decode("ascii"))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import tomllib
 from functools import cache
 from importlib.resources import files
@@ -10,6 +9,7 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict
 
+from aerialdojo_gen.common.names import unknown
 from aerialdojo_gen.errors import UsageError
 
 
@@ -59,7 +59,5 @@ def preset(name: str) -> Preset:
     """
     known = presets()
     if name not in known:
-        near = difflib.get_close_matches(name, known, n=1)
-        hint = f"did you mean {near[0]!r}?" if near else f"there are {', '.join(known)}"
-        raise UsageError(f"no preset {name!r}: {hint}")
+        raise UsageError(unknown("no preset", name, known))
     return known[name]

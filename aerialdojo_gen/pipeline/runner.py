@@ -6,9 +6,7 @@ where it stopped, and the tables do not depend on the number of workers, their o
 
 from __future__ import annotations
 
-import difflib
 import fcntl
-import fnmatch
 import time
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -18,6 +16,7 @@ from pathlib import Path
 from typing import TextIO
 
 from aerialdojo_gen.common.disk import disk_error
+from aerialdojo_gen.common.names import choose_scenes, unknown
 from aerialdojo_gen.config.pipeline import Pipeline
 from aerialdojo_gen.errors import AerialDojoError, BudgetSpent, StoreError, UsageError
 from aerialdojo_gen.pipeline.code_digest import stage_code
@@ -241,26 +240,15 @@ def known_scenes(recipes: Path) -> list[str]:
     return sorted(path.stem for path in recipes.glob("*.toml"))
 
 
-def choose_scenes(patterns: Sequence[str], known: Sequence[str]) -> list[str]:
-    """Resolve names and globs to scenes, in the order of `known`.
+def chosen_scenes(pipeline: Pipeline, roots: Roots, patterns: Sequence[str] | None = None) -> list[str]:
+    """Resolve names and globs to scenes with a recipe; the pipeline's own scenes where there are none.
 
     Raises
     ------
     UsageError
         A pattern matches nothing; the message gives the nearest names.
     """
-    if not known:
-        raise UsageError("there are no scenes: the folder of recipes is empty")
-    chosen = set()
-    for pattern in patterns:
-        matches = fnmatch.filter(known, pattern)
-        if not matches:
-            folded = {name.lower(): name for name in known}
-            near = difflib.get_close_matches(pattern.lower(), list(folded), n=3, cutoff=0.3)
-            names = ", ".join(folded[n] for n in near) or ", ".join(known[:5])
-            raise UsageError(f"no scene {pattern!r}; nearest: {names}")
-        chosen.update(matches)
-    return [name for name in known if name in chosen]
+    return choose_scenes(patterns or pipeline.scenes, known_scenes(roots.recipes))
 
 
 def stages_named(names: Sequence[str] | None) -> list[Stage]:
@@ -273,8 +261,8 @@ def stages_named(names: Sequence[str] | None) -> list[Stage]:
     """
     if names is None:
         return list(STAGES)
-    unknown = set(names) - {stage.name for stage in STAGES}
-    if unknown:
-        known = ", ".join(stage.name for stage in STAGES)
-        raise UsageError(f"unknown stage {sorted(unknown)[0]!r}; stages: {known}")
+    known = [stage.name for stage in STAGES]
+    for name in names:
+        if name not in known:
+            raise UsageError(unknown("no stage", name, known))
     return [stage for stage in STAGES if stage.name in names]

@@ -68,13 +68,14 @@ class Planner:
     ----------
     scene : Scene
         World coordinates, metres.
-    config : PlanConfig
-        How to plan.
+    config : PlanConfig, optional
+        How to plan; as the paper's dataset was planned where absent.
     radius_m : float
         The body's radius.
     """
 
-    def __init__(self, scene: Scene, config: PlanConfig, radius_m: float) -> None:
+    def __init__(self, scene: Scene, config: PlanConfig | None = None, radius_m: float = 0.25) -> None:
+        config = config or PlanConfig()
         self.config = config
         self.radius_m = radius_m
         self.world = CollisionWorld(scene)
@@ -166,3 +167,28 @@ class Planner:
                 )  # fmt: skip
         outcome = "NO_PATH" if tried.status == EXHAUSTED else "BUDGET_EXHAUSTED"
         return Route(outcome, expansions=expansions, cost_to_go_m=value, attempts=len(c.ladder))
+
+
+def plan(
+    scene: Scene, start: ArrayLike, goal: ArrayLike, *, config: PlanConfig | None = None, radius_m: float = 0.25
+) -> Route:
+    """Plan one trajectory; for several in one scene make a `Planner`, which is where the time goes.
+
+    Parameters
+    ----------
+    scene : Scene
+        World coordinates, metres.
+    start, goal : (4,) float
+        x, y, z in metres and yaw in radians, world frame.
+    config : PlanConfig, optional
+        How to plan; as the paper's dataset was planned where absent.
+    radius_m : float
+        The body's radius.
+
+    Returns
+    -------
+    Route
+        Its outcome says whether there is one; no route is an outcome, not an error.
+    """
+    (route,) = Planner(scene, config, radius_m).plan_target(goal, [start])
+    return route

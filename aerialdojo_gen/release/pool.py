@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from aerialdojo_gen.common.paper import PaperScene, inventory
+from aerialdojo_gen.common.text_table import Column, TextTable
 from aerialdojo_gen.errors import PoolError
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.schemas import SETTINGS
@@ -93,16 +94,17 @@ def require_pools(data: Path, scenes: Sequence[str]) -> None:
         raise PoolError("\n".join([*lacking, f"nothing is released; {mend}"]))
 
 
-def pool_lines(pools: Sequence[Pool]) -> list[str]:
+def pool_lines(pools: Sequence[Pool], width: int | None = None) -> list[str]:
     """Set pools as a table for the terminal: kept / wanted, and kilometres that a choice can reach."""
-    head = f"{'scene':<22}{'candidates':>10}" + "".join(f"{s.replace('_horizon', ''):>16}" for s in SETTINGS)
-    lines = [head + f"{'km reachable':>18}{'paper km':>10}"]
+    heads = ["candidates", *(s.replace("_horizon", "") for s in SETTINGS), "km reachable/paper"]
+    rows = []
     for pool in pools:
-        cells = ""
+        cells = [f"{pool.candidates}"]
         for s in SETTINGS:
             wanted = f"/{pool.paper.tasks[s]}" if pool.paper else ""
-            cells += f"{pool.kept[s]}{wanted}{'!' if s in pool.short else ' '}".rjust(16)
+            cells.append(f"{pool.kept[s]}{wanted}{'!' if s in pool.short else ' '}")
         reach = f"{pool.path_m[0] / 1000:.1f}-{pool.path_m[1] / 1000:.1f}" if pool.path_m else "-"
-        paper = f"{pool.paper.path_m / 1000:.1f}{' ' if pool.reaches_path else '!'}" if pool.paper else "-"
-        lines.append(f"{pool.scene:<22}{pool.candidates:>10}{cells}{reach:>18}{paper:>10}")
-    return lines
+        paper = f"/{pool.paper.path_m / 1000:.1f}{' ' if pool.reaches_path else '!'}" if pool.paper else " "
+        cells.append(reach + paper)
+        rows.append((pool.scene, cells))
+    return TextTable("scene", [Column(head) for head in heads], rows).lines(width)

@@ -13,9 +13,10 @@ from types import TracebackType
 from typing import Any
 
 import av
-import cv2
 import numpy as np
 from numpy.typing import NDArray
+
+from aerialdojo_gen.common.pictures import FRAME_PNG, encode_png
 
 MAX_DEPTH_M = 65.535
 RGB_CODEC, DEPTH_CODEC = "h264", "ffv1"
@@ -134,10 +135,7 @@ class PngWriter:
 
     def write(self, frame: NDArray[np.uint8] | NDArray[np.uint16]) -> None:
         """Append a frame: (H, W, 3) uint8 RGB, or (H, W) uint16."""
-        bgr = frame[..., ::-1] if frame.ndim == 3 else frame
-        path = self._folder / f"{self._n:06}.png"
-        if not cv2.imwrite(str(path), np.ascontiguousarray(bgr), [cv2.IMWRITE_PNG_COMPRESSION, 4]):
-            raise OSError(f"{path} was not written")
+        (self._folder / f"{self._n:06}.png").write_bytes(encode_png(frame, FRAME_PNG))
         self._n += 1
 
     def __enter__(self) -> PngWriter:

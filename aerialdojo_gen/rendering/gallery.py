@@ -10,8 +10,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from aerialdojo_gen.common.pictures import GALLERY_JPEG, SMALLEST_PNG, encode_jpeg, encode_png
 from aerialdojo_gen.common.rng import generator
-from aerialdojo_gen.errors import RenderError
 from aerialdojo_gen.geometry.rays import RayCaster
 from aerialdojo_gen.rendering.preview import contact_sheet, look_at
 from aerialdojo_gen.scenes.catalogue import Catalogue
@@ -170,11 +170,8 @@ def write_picture(image: Image, folder: Path, name: str, max_width: int | None =
     if max_width is not None and image.shape[1] > max_width:
         height = round(image.shape[0] * max_width / image.shape[1])
         image = np.asarray(cv2.resize(image, (max_width, height), interpolation=cv2.INTER_AREA), dtype=np.uint8)
-    suffix = Path(name).suffix
-    options = [cv2.IMWRITE_PNG_COMPRESSION, 9] if suffix == ".png" else [cv2.IMWRITE_JPEG_QUALITY, 82]
-    done, data = cv2.imencode(suffix, image[..., ::-1], options)
-    if not done:
-        raise RenderError(f"cannot encode {name}")
+    as_png = Path(name).suffix == ".png"
+    data = encode_png(image, SMALLEST_PNG) if as_png else encode_jpeg(image, GALLERY_JPEG)
     with atomic_file(folder, name) as path:
-        path.write_bytes(data.tobytes())
+        path.write_bytes(data)
     return folder / name

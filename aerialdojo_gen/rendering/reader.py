@@ -16,11 +16,11 @@ from pathlib import Path
 from typing import Any, overload
 
 import av
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from aerialdojo_gen.common.bounded import loads_json
+from aerialdojo_gen.common.pictures import decode_as_stored
 from aerialdojo_gen.errors import Malformed, RenderError
 from aerialdojo_gen.rendering.codecs import SUFFIX, to_metres
 
@@ -74,10 +74,10 @@ class Video(Sequence[NDArray[Any]]):
         self.height, self.width = self._png(0).shape[:2]
 
     def _png(self, k: int) -> NDArray[Any]:
-        image = cv2.imread(str(self._files[k]), cv2.IMREAD_UNCHANGED)
+        image = decode_as_stored(self._files[k].read_bytes())
         if image is None:
             raise RenderError(f"{self._files[k]} is no picture that can be read: render it again")
-        return np.ascontiguousarray(image[..., ::-1]) if image.ndim == 3 else np.asarray(image)
+        return image
 
     def __len__(self) -> int:
         """Return the number of frames."""

@@ -6,11 +6,11 @@ import weakref
 from pathlib import Path
 from types import TracebackType
 
-import cv2
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from aerialdojo_gen.common.pictures import encode_png
 from aerialdojo_gen.errors import RenderError
 from aerialdojo_gen.geometry.cameras import Camera
 from aerialdojo_gen.rendering.bullet import pybullet
@@ -77,7 +77,7 @@ class RenderWorld:
         if material.texture is not None:
             if material.name not in textures:
                 picture = folder / f"texture{len(textures)}.png"
-                cv2.imwrite(str(picture), material.texture[..., ::-1])
+                picture.write_bytes(encode_png(material.texture))
                 textures[material.name] = pybullet.loadTexture(str(picture), physicsClientId=client)
             pybullet.changeVisualShape(body, -1, textureUniqueId=textures[material.name], physicsClientId=client)
 

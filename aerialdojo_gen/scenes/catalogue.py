@@ -9,10 +9,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from aerialdojo_gen.common.names import nearest
 from aerialdojo_gen.errors import AssetError, ShapeError
 from aerialdojo_gen.scenes.builders import builders
 from aerialdojo_gen.scenes.catalogue_files import TARGETS, catalogue_files
-from aerialdojo_gen.scenes.materials import MaterialLibrary, load_materials, nearest, read_toml, refuse_unknown
+from aerialdojo_gen.scenes.materials import MaterialLibrary, load_materials, read_toml, refuse_unknown
 from aerialdojo_gen.scenes.mesh import Mesh, areas, merge, rotation, to_part
 from aerialdojo_gen.scenes.model import Instance, Part
 from aerialdojo_gen.scenes.prop import Category, Variant, parse_category

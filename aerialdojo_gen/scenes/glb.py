@@ -13,11 +13,11 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from aerialdojo_gen.common.bounded import loads_json
+from aerialdojo_gen.common.pictures import TEXTURE_PNG, decode_rgb, encode_png
 from aerialdojo_gen.errors import AssetError
 from aerialdojo_gen.scenes.model import Instance, Material, Part, Scene
 
@@ -65,10 +65,7 @@ def write_glb(scene: Scene, path: Path) -> None:
 @lru_cache(maxsize=512)
 def _png(material: Material) -> bytes:
     assert material.texture is not None
-    ok, png = cv2.imencode(".png", material.texture[..., ::-1], [cv2.IMWRITE_PNG_COMPRESSION, 3])
-    if not ok:
-        raise AssetError(f"material {material.name!r}: its texture cannot be encoded")
-    return png.tobytes()
+    return encode_png(material.texture, TEXTURE_PNG)
 
 
 def read_glb(path: Path, sha256: str = "") -> Scene:
@@ -250,10 +247,9 @@ def _read_material(entry: dict[str, Any], document: dict[str, Any], data: memory
         # A kilobyte of PNG can ask for a gigabyte of pixels.
         if max(struct.unpack_from(">II", png, 16)) > _LARGEST_TEXTURE_PX:
             raise ValueError("texture is too large")
-        decoded = cv2.imdecode(np.frombuffer(png, dtype=np.uint8), cv2.IMREAD_COLOR)
-        if decoded is None:
+        texture = decode_rgb(png)
+        if texture is None:
             raise ValueError("texture cannot be decoded")
-        texture = np.ascontiguousarray(decoded[..., ::-1]).astype(np.uint8)
     red, green, blue = entry["extras"]["colour"]
     return Material(entry["name"], (red, green, blue), texture, float(entry["extras"]["tile_m"]))
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import difflib
 import re
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
 from aerialdojo_gen.common import bounded
+from aerialdojo_gen.common.names import nearest
 from aerialdojo_gen.errors import AssetError
 from aerialdojo_gen.scenes.model import Material
 from aerialdojo_gen.scenes.textures import TEXTURES, make_texture
@@ -89,12 +89,6 @@ def load_materials(path: Path) -> MaterialLibrary:
 def parse_colour(text: str) -> tuple[int, int, int]:
     """Read ``"#rrggbb"`` as sRGB, 0-255."""
     return int(text[1:3], 16), int(text[3:5], 16), int(text[5:7], 16)
-
-
-def nearest(name: str, known: Iterable[str]) -> str:
-    """Say what was probably meant: ``", did you mean 'box'?"``, or nothing."""
-    close = difflib.get_close_matches(name, list(known), n=1)
-    return f", did you mean {close[0]!r}?" if close else ""
 
 
 def refuse_unknown(body: Iterable[str], known: Iterable[str], where: str) -> None:

@@ -7,9 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from aerialdojo_gen.common.names import nearest
 from aerialdojo_gen.errors import AssetError, ShapeError
 from aerialdojo_gen.scenes.builders import builders
-from aerialdojo_gen.scenes.materials import MaterialLibrary, nearest, refuse_unknown
+from aerialdojo_gen.scenes.materials import MaterialLibrary, refuse_unknown
 from aerialdojo_gen.scenes.vocabulary import ARRAY_KEYS, PLACEMENT_KEYS, RING_KEYS, SHAPES, names_used, shape_keys
 
 KINDS = ("prop", "vegetation", "vehicle", "building", "landmark")

@@ -9,8 +9,9 @@ import numpy as np
 import pydantic_core
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 
+from aerialdojo_gen.common.explain import explain
 from aerialdojo_gen.errors import AssetError, brief
-from aerialdojo_gen.scenes.materials import nearest, read_toml
+from aerialdojo_gen.scenes.materials import read_toml
 
 Model = TypeVar("Model", bound=BaseModel)
 # Of a layout's parameters: metres, degrees and counts all stay far below.
@@ -170,12 +171,4 @@ def validated(model: type[Model], body: dict[str, Any], where: str) -> Model:
         # As JSON, because only there a list is a strict tuple: "nan" and false are numbers to a lenient model.
         return model.model_validate_json(pydantic_core.to_json(body), strict=True)
     except ValidationError as error:
-        first = error.errors()[0]
-        key = brief(".".join(str(k) for k in first["loc"]))
-        if first["type"] == "extra_forbidden":
-            message = f"unknown key {key!r}{nearest(key, model.model_fields)}"
-        elif first["type"] == "missing":
-            message = f"key {key!r} is missing"
-        else:
-            message = f"{key}: {first['msg'].removeprefix('Value error, ')}, got {brief(repr(first['input']), 60)}"
-        raise AssetError(f"{where}: {message}") from error
+        raise AssetError(f"{where}: {'; '.join(explain(error, model))}") from error

@@ -6,13 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from aerialdojo_gen.errors import RenderError
-
-_JPEG_QUALITY = 88
+from aerialdojo_gen.common.pictures import SCORED_JPEG, encode_jpeg
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,10 +44,7 @@ class AnchorView:
 
     def jpeg(self) -> bytes:
         """The picture as a JPEG file."""
-        done, data = cv2.imencode(".jpg", self.rgb[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY])
-        if not done:
-            raise RenderError(f"a picture of shape {self.rgb.shape} does not encode as JPEG")
-        return data.tobytes()
+        return encode_jpeg(self.rgb, SCORED_JPEG)
 
 
 class Scorer(Protocol):

@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-import base64
 import io
 from collections.abc import Callable
 from pathlib import Path
 
-import cv2
-import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
+from aerialdojo_gen.common.pictures import PAGE_JPEG, data_url, encode_jpeg, encode_png
 from aerialdojo_gen.show.drawing import CLEARANCE_COLOURS, CLEARANCE_SCALE, draw_map, draw_profile, draw_side
 from aerialdojo_gen.show.pictured import PicturedTask
 from aerialdojo_gen.store import schemas
@@ -45,8 +42,8 @@ def render_page(task: PicturedTask) -> str:
         map=_drawn(lambda axes: draw_map(axes, task, 1.6), 9.6, 6.0),
         side=_drawn(lambda axes: draw_side(axes, task, 4.0), 9.6, 2.4, left=0.055),
         profile=_drawn(lambda axes: draw_profile(axes, task), 9.6, 2.2, left=0.055, bottom=0.2),
-        reference=None if task.reference is None else _uri(task.reference, ".png"),
-        frames=[(frame, _uri(frame.rgb, ".jpg")) for frame in task.frames],
+        reference=None if task.reference is None else data_url(encode_png(task.reference)),
+        frames=[(frame, data_url(encode_jpeg(frame.rgb, PAGE_JPEG))) for frame in task.frames],
         poses=[
             (k, schemas.ACTION_NAMES[action], *pose)
             for k, (action, pose) in enumerate(zip(route["action"], task.poses.tolist(), strict=True))
@@ -61,14 +58,7 @@ def _drawn(draw: Callable[[Axes], None], width: float, height: float, left: floa
     draw(figure.add_axes((left, bottom, 1.0 - left, 1.0 - bottom - (0.03 if bottom else 0.0))))
     buffer = io.BytesIO()
     figure.savefig(buffer, format="jpeg", pil_kwargs={"quality": 86})
-    return "data:image/jpeg;base64," + base64.b64encode(buffer.getvalue()).decode()
-
-
-def _uri(rgb: NDArray[np.uint8], suffix: str) -> str:
-    done, data = cv2.imencode(suffix, rgb[..., ::-1])
-    assert done
-    kind = "png" if suffix == ".png" else "jpeg"
-    return f"data:image/{kind};base64," + base64.b64encode(data.tobytes()).decode()
+    return data_url(buffer.getvalue())
 
 
 def _hex(rgba: tuple[float, float, float, float]) -> str:

@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from aerialdojo_gen.agents.goal import Goal, Rules
 from aerialdojo_gen.browse.lookup import FoundTask
+from aerialdojo_gen.common.pictures import decode_rgb
 from aerialdojo_gen.llm.prompt import goal_text
 from aerialdojo_gen.release.way import sampled
 from aerialdojo_gen.rendering.orthographic import OrthographicPictures
@@ -156,14 +156,7 @@ def picture_task(task: FoundTask, modality: str = "semantic", frames: int = 5) -
         along_m=np.concatenate([[0.0], np.cumsum(steps)]),
         clearance_m=scene.clearance(way),
         below_m=pictures.surface_below(way),
-        reference=_decoded(target["reference_image"]),
+        reference=decode_rgb(target["reference_image"]),
         frames=frames_along(task, frames),
         pictures=pictures,
     )
-
-
-def _decoded(png: bytes | None) -> NDArray[np.uint8] | None:
-    if png is None:
-        return None
-    image = cv2.imdecode(np.frombuffer(png, dtype=np.uint8), cv2.IMREAD_COLOR)
-    return None if image is None else np.ascontiguousarray(image[..., ::-1]).astype(np.uint8)

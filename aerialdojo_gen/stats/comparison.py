@@ -7,7 +7,11 @@ import io
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from aerialdojo_gen.common import text_table
+from aerialdojo_gen.common.text_table import TextTable
+
 Figure = int | float | None
+_PAPERS = "paper's"
 
 
 @dataclass(frozen=True)
@@ -94,7 +98,7 @@ class Comparison:
     def _heads(self) -> list[str]:
         heads = [self.key]
         for k, column in enumerate(self.columns):
-            heads += [column.name, "paper's"] if self._beside(k) else [column.name]
+            heads += [column.name, _PAPERS] if self._beside(k) else [column.name]
         return heads
 
     def _cells(self, row: Row, bracket: bool = False) -> list[str]:
@@ -107,23 +111,20 @@ class Comparison:
                 cells.append(show(ours) + (f" (paper: {show(paper)})" if bracket and k in differing else ""))
         return cells
 
-    def terminal(self) -> list[str]:
-        """Lines for a terminal; under a row that is not the paper's, the paper's figures that differ."""
-        lines = [self._heads()]
+    def terminal(self, width: int | None = None) -> list[str]:
+        """Lines for a terminal of so many columns; below a row the figures in which the paper differs."""
+        rows = []
         for row in self.rows:
-            lines.append(self._cells(row))
+            rows.append(self._cells(row))
             if differing := self._differing(row):
                 below = ["  in the paper"]
                 for k, paper in enumerate(row.paper):
                     below += ["", ""] if self._beside(k) else [self.columns[k].show(paper) if k in differing else ""]
-                lines.append(below)
-        widths = [max(len(line[k]) for line in lines) for k in range(len(lines[0]))]
-        shown = [
-            (line[0].ljust(widths[0]) + "".join(c.rjust(w + 2) for c, w in zip(line[1:], widths[1:], strict=True)))
-            for line in lines
-        ]
-        rule = "-" * len(shown[0])
-        return [self.title, shown[0].rstrip(), rule, *(line.rstrip() for line in shown[1:]), *self._verdict()]
+                rows.append(below)
+        stub, *heads = self._heads()
+        columns = [text_table.Column(head, joined=head == _PAPERS) for head in heads]
+        named = [(name, cells) for name, *cells in rows]
+        return TextTable(stub, columns, named, self.title, self._verdict()).lines(width)
 
     def _verdict(self) -> list[str]:
         if not self.compared:
@@ -168,12 +169,11 @@ class Listing:
     rows: tuple[tuple[str, ...], ...]
     notes: tuple[str, ...] = ()
 
-    def terminal(self) -> list[str]:
-        """Lines for a terminal."""
-        lines = [self.heads, *self.rows]
-        widths = [max(len(line[k]) for line in lines) for k in range(len(self.heads))]
-        shown = ["  ".join(cell.ljust(w) for cell, w in zip(line, widths, strict=True)).rstrip() for line in lines]
-        return [self.title, shown[0], "-" * max(map(len, shown)), *shown[1:], *self.notes]
+    def terminal(self, width: int | None = None) -> list[str]:
+        """Lines for a terminal of so many columns."""
+        columns = [text_table.Column(head, words=True) for head in self.heads[1:]]
+        named = [(name, cells) for name, *cells in self.rows]
+        return TextTable(self.heads[0], columns, named, self.title, self.notes).lines(width)
 
     def markdown(self) -> list[str]:
         """Lines of Markdown."""

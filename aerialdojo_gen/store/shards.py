@@ -16,6 +16,7 @@ from typing import Any
 
 import pyarrow as pa
 
+from aerialdojo_gen.common.names import choose_scenes
 from aerialdojo_gen.errors import StoreError, brief
 from aerialdojo_gen.store import schemas
 from aerialdojo_gen.store.atomic import atomic_file
@@ -253,6 +254,22 @@ def release_scenes(data: Path) -> list[str]:
     patterns = [p.template.format(partition="*", scene="*") for p in LAYOUT.values() if p.template[:8] == "release/"]
     names = {path.stem.removeprefix("part-") for pattern in patterns for path in data.glob(pattern)}
     return sorted(name for name in names if _PLAIN.fullmatch(name))
+
+
+def scenes_in_release(data: Path, patterns: Sequence[str] | None = None) -> list[str]:
+    """Resolve names and globs to scenes of the release, by name; all of them where there are no patterns.
+
+    Raises
+    ------
+    StoreError
+        There is no release.
+    UsageError
+        A pattern matches nothing; the message gives the nearest names.
+    """
+    known = release_scenes(data)
+    if not known:
+        raise StoreError(f"there is no release in {data}: run aerialdojo-gen split, or give --data")
+    return choose_scenes(patterns, known)
 
 
 def prune_release(data: Path, scenes: Sequence[str]) -> list[str]:

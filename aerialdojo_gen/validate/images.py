@@ -5,10 +5,9 @@ from __future__ import annotations
 import zlib
 from collections.abc import Iterator
 
-import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from aerialdojo_gen.common.pictures import decode_grey
 from aerialdojo_gen.geometry.cameras import Camera, view_pose
 from aerialdojo_gen.validate.registry import Finding, check
 from aerialdojo_gen.validate.rows import Rows, SceneData
@@ -44,7 +43,7 @@ def image_damaged(_data: SceneData, rows: Rows) -> Iterator[Finding]:
             continue
         # OpenCV fills in what a cut file lacks: the chunks' own checksums say whether it is whole.
         kinds = _chunks(png)
-        if kinds[-1:] != ["IEND"] or _decoded(png) is None:
+        if kinds[-1:] != ["IEND"] or decode_grey(png) is None:
             yield Finding(row, f"{len(png):,} bytes that are no whole PNG", "a PNG")
         elif told := _TELLING & set(kinds):
             yield Finding(row, f"a PNG with words in it ({', '.join(sorted(told))})", "pixels alone")
@@ -57,7 +56,7 @@ def image_blank(data: SceneData, rows: Rows) -> Iterator[Finding]:
     for row, raw in enumerate(rows.column("reference_image")):
         if raw.as_py() is None or damaged[row]:
             continue
-        picture = _decoded(raw.as_py())
+        picture = decode_grey(raw.as_py())
         if picture is not None and float(picture.std()) < _BLANK:
             yield Finding(row, f"grey values with a deviation of {float(picture.std()):.2f}", f"{_BLANK:g} at least")
 
@@ -70,7 +69,7 @@ def image_box(data: SceneData, rows: Rows) -> Iterator[Finding]:
     for row, raw in enumerate(rows.column("reference_image")):
         if raw.as_py() is None or damaged[row] or np.isnan(boxes[row]).all():
             continue
-        picture = _decoded(raw.as_py())
+        picture = decode_grey(raw.as_py())
         if picture is None:
             continue
         height, width = picture.shape
@@ -94,7 +93,7 @@ def image_target(data: SceneData, rows: Rows) -> Iterator[Finding]:
         png = rows.column("reference_image")[row].as_py()
         if anchor is None or png is None or skip[row] or not np.isfinite(places[anchor]).all():
             continue
-        picture = _decoded(png)
+        picture = decode_grey(png)
         if picture is None:
             continue
         camera = Camera(picture.shape[1], picture.shape[0], data.pipeline.reference_images.fov_deg)
@@ -133,8 +132,3 @@ def _chunks(png: bytes) -> list[str]:
         kinds.append(png[at + 4 : at + 8].decode("latin-1"))
         at = end
     return kinds
-
-
-def _decoded(png: bytes) -> NDArray[np.uint8] | None:
-    """Grey values of a PNG, (H, W); None where it cannot be decoded."""
-    return cv2.imdecode(np.frombuffer(png, dtype=np.uint8), cv2.IMREAD_GRAYSCALE) if png else None

@@ -15,6 +15,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from aerialdojo_gen.common.pictures import decode_rgb
 from aerialdojo_gen.errors import RenderError
 from aerialdojo_gen.geometry.cameras import Camera, view_pose
 from aerialdojo_gen.rendering.backend import open_renderer
@@ -60,7 +61,7 @@ def image_redrawn(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """A picture is what is seen from its object's selected anchor, as drawn anew: no other's, no channel swapped."""
     skip = data.flagged("objects", ("image_missing", "image_damaged", "image_blank", "image_format"))
     asked = [row for row in data.sampled_objects.tolist() if not skip[row]]
-    decoded = {row: _decoded(rows.column("reference_image")[row].as_py()) for row in asked}
+    decoded = {row: decode_rgb(rows.column("reference_image")[row].as_py()) for row in asked}
     stored = {row: picture for row, picture in decoded.items() if picture is not None}
     drawn = _drawn(data, rows, stored)
     own = {row: _blocks(stored[row]) for row in drawn}
@@ -134,9 +135,3 @@ def _off(a: NDArray[np.float32], b: NDArray[np.float32]) -> float:
 
 def _blocks(picture: NDArray[np.uint8]) -> NDArray[np.float32]:
     return np.asarray(cv2.resize(picture.astype(np.float32), (_BLOCKS, _BLOCKS), interpolation=cv2.INTER_AREA))
-
-
-def _decoded(png: bytes) -> NDArray[np.uint8] | None:
-    """RGB of a PNG, (H, W, 3); None where it cannot be decoded."""
-    picture = cv2.imdecode(np.frombuffer(png, dtype=np.uint8), cv2.IMREAD_COLOR) if png else None
-    return None if picture is None else np.ascontiguousarray(picture[..., ::-1]).astype(np.uint8)

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pyarrow as pa
 
+from aerialdojo_gen.common.text_table import Column, TextTable
 from aerialdojo_gen.errors import UsageError
 from aerialdojo_gen.store.atomic import atomic_file
 from aerialdojo_gen.store.parquet_files import write_file
@@ -62,17 +63,18 @@ class Report:
                 total.skipped[outcome.skipped] += 1
         return list(totals.values())
 
-    def table_lines(self) -> list[str]:
+    def table_lines(self, width: int | None = None) -> list[str]:
         """Set every check as a line: rows checked, faults, what was not checked and why."""
-        lines = [f"{'check':<24}{'of':<12}{'checked':>10}{'faults':>9}"]
-        for total in self.totals():
+        totals = self.totals()
+        columns = [Column("of", words=True), Column("checked"), Column("faults")]
+        if any(total.skipped for total in totals):
+            columns.append(Column("not checked", words=True))
+        rows = []
+        for total in totals:
             of = next(iter(total.tables)) if len(total.tables) == 1 else "every table"
-            text = f"{total.check:<24}{of:<12}{total.judged:>10,}{total.faults:>9,}"
-            if total.skipped:
-                reasons = "; ".join(f"{why}{f' ({n} times)' if n > 1 else ''}" for why, n in total.skipped.items())
-                text += f"   not checked: {reasons}"
-            lines.append(text)
-        return lines
+            why = "; ".join(f"{why}{f' ({n} times)' if n > 1 else ''}" for why, n in total.skipped.items())
+            rows.append((total.check, [of, f"{total.judged:,}", f"{total.faults:,}", why]))
+        return TextTable("check", columns, rows).lines(width)
 
     def fault_lines(self, limit: int) -> list[str]:
         """Name the first faults of every check, and how many there are."""

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import fnmatch
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from aerialdojo_gen.common.names import choose_scenes
 from aerialdojo_gen.config.pipeline import Pipeline
-from aerialdojo_gen.errors import AerialDojoError, UsageError
+from aerialdojo_gen.errors import AerialDojoError
 from aerialdojo_gen.pipeline.executors.local import Pool
 from aerialdojo_gen.pipeline.interrupt import Interrupts
 from aerialdojo_gen.pipeline.progress import Reporter
@@ -130,7 +130,7 @@ def validate(asked: Asked, *, workers: int = 1, reporter: Reporter | None = None
     """
     reporter = reporter or Reporter(quiet=True)
     every = scenes_of(asked.release)
-    chosen = _chosen(asked.scenes, every)
+    chosen = choose_scenes(asked.scenes, every)
     by_scene: dict[str, tuple[list[Outcome], Tally]] = {}
     with Interrupts() as interrupts, Pool(workers) as pool, reporter.bar("validate", len(chosen)) as bar:
         for done in pool.map(_guarded, [_Work(asked, scene) for scene in _large_first(asked.release, chosen)]):
@@ -162,14 +162,6 @@ def _guarded(work: _Work) -> tuple[list[Outcome], Tally] | AerialDojoError:
         return check_scene(work.asked, work.scene)
     except AerialDojoError as error:
         return error
-
-
-def _chosen(patterns: Sequence[str], every: list[str]) -> list[str]:
-    for pattern in patterns:
-        if not fnmatch.filter(every, pattern):
-            raise UsageError(f"no scene {pattern!r} in the release; it holds {', '.join(every[:5])}"
-                             f"{' and others' if len(every) > 5 else ''}")  # fmt: skip
-    return [scene for scene in every if not patterns or any(fnmatch.fnmatch(scene, p) for p in patterns)]
 
 
 def _large_first(release: Path, scenes: Sequence[str]) -> list[str]:

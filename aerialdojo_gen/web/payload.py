@@ -12,11 +12,10 @@ import json
 import struct
 from typing import Any
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from aerialdojo_gen.errors import AssetError
+from aerialdojo_gen.common.pictures import TEXTURE_PNG, encode_png
 from aerialdojo_gen.geometry.soup import soup
 from aerialdojo_gen.rendering.lighting import light_of
 from aerialdojo_gen.scenes.model import Material, Part, Scene
@@ -127,7 +126,4 @@ def _ranges(parts: list[tuple[int, Part]]) -> NDArray[np.int64]:
 
 def _png(body: _Body, material: Material) -> dict[str, int]:
     assert material.texture is not None
-    done, png = cv2.imencode(".png", material.texture[..., ::-1], [cv2.IMWRITE_PNG_COMPRESSION, 3])
-    if not done:
-        raise AssetError(f"material {material.name!r}: its texture cannot be encoded")
-    return body.add(png.tobytes())
+    return body.add(encode_png(material.texture, TEXTURE_PNG))

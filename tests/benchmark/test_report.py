@@ -52,7 +52,7 @@ def test_runs_are_found_named_and_told_apart(log: Path, tmp_path: Path) -> None:
     write_run(tmp_path, "b", "random", 1, ["N_Coast_1"])
     assert [run.label for run in load_runs(tmp_path)] == ["random (a)", "random (b)"]
     assert [run.name for run in load_runs(tmp_path, ["b", "a", "b"])] == ["b", "a"]
-    with pytest.raises(StoreError, match=r"no run 'c' in .* \(there are: a, b\)"):
+    with pytest.raises(StoreError, match=r"there is no run 'c': there are a, b"):
         load_runs(tmp_path, ["c"])
     with pytest.raises(StoreError, match=r"no runs in .*: run aerialdojo-gen evaluate"):
         load_runs(tmp_path / "nothing")

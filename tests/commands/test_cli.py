@@ -6,8 +6,8 @@ import sys
 
 import pytest
 
+from aerialdojo_gen.common.names import choose_scenes
 from aerialdojo_gen.errors import UsageError
-from aerialdojo_gen.pipeline import runner
 from aerialdojo_gen.pipeline.registry import STAGES, upstream
 
 HEAVY = ("numpy", "pyarrow", "numba", "fcl", "pybullet", "trimesh", "cv2", "scipy", "av")
@@ -69,7 +69,9 @@ def test_unknown_key_in_a_pipeline(tmp_path):
 def test_unknown_stage_and_missing_folder(tmp_path):
     path = tmp_path / "mine.toml"
     path.write_text("stages = ['plann']\n")
-    assert_one_line(call("run", str(path), "--data", str(tmp_path / "d")), 2, "unknown stage 'plann'")
+    assert_one_line(
+        call("run", str(path), "--data", str(tmp_path / "d")), 2, "no stage 'plann': did you mean 'plan'?"
+    )
     path.write_text("recipes = 'nowhere'\n")
     assert_one_line(call("run", str(path), "--data", str(tmp_path / "d")), 2, "nowhere", "set recipes")
 
@@ -82,10 +84,10 @@ def test_data_directory_that_cannot_be_written(tmp_path):
 
 def test_scene_patterns():
     known = ["N_Forest_0", "U_Mall_0", "U_Mall_1"]
-    assert runner.choose_scenes(["U_*"], known) == ["U_Mall_0", "U_Mall_1"]
-    assert runner.choose_scenes(["U_Mall_1", "*_0"], known) == known
-    with pytest.raises(UsageError, match="no scene 'u_mall_0'; nearest: U_Mall_0"):
-        runner.choose_scenes(["u_mall_0"], known)
+    assert choose_scenes(["U_*"], known) == ["U_Mall_0", "U_Mall_1"]
+    assert choose_scenes(["U_Mall_1", "*_0"], known) == known
+    with pytest.raises(UsageError, match="no scene 'u_mall_0': did you mean 'U_Mall_0'"):
+        choose_scenes(["u_mall_0"], known)
 
 
 def test_upstream_of_each_stage_is_all_it_reads():

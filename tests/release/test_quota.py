@@ -125,8 +125,8 @@ def test_a_pool_that_is_too_small_is_named_and_nothing_else(tmp_path):
     assert "nothing is released" in lines[1]
     require_pools(tmp_path, ["U_Park_0"])
     shown = pool_lines([pool_of(tmp_path, name) for name in ("D_Flood_1", "U_Park_0")])
-    assert "94/95!" in shown[1]
-    assert "173/173 " in shown[2]
+    assert "94/95!" in shown[2]
+    assert "173/173 " in shown[3]
 
 
 @pytest.mark.pipeline

@@ -165,15 +165,15 @@ def test_another_seed_makes_another_scene(assets):
 @pytest.mark.parametrize(
     ("old", "new", "says"),
     [
-        ("seed = 3", "sead = 3", "unknown key 'sead', did you mean 'seed'?"),
+        ("seed = 3", "sead = 3", "unknown key 'sead': did you mean 'seed'?"),
         ('layout = "testplace"\n', "", "key 'layout' is missing"),
-        ('"testplace"', '"testplaces"', "unknown layout 'testplaces', did you mean 'testplace'?"),
-        ("posts = 4", "post = 4", "parameters: unknown key 'post', did you mean 'posts'?"),
-        ("posts = 4", 'posts = "many"', "parameters: posts: "),
-        ("[40, 30]", "[40, -30]", "size_m.1: "),
-        ('"#a9c6e8"', '"blue"', "sky: "),
-        ('"brick:#804020"', '"brik"', "palette wall: unknown material 'brik', did you mean 'brick'?"),
-        ("post = 4\n", "pots = 4\n", "inventory: unknown category 'pots', did you mean 'post'?"),
+        ('"testplace"', '"testplaces"', "unknown layout 'testplaces': did you mean 'testplace'?"),
+        ("posts = 4", "post = 4", "parameters: unknown key 'post': did you mean 'posts'?"),
+        ("posts = 4", 'posts = "many"', "parameters: posts = "),
+        ("[40, 30]", "[40, -30]", "size_m.1 = "),
+        ('"#a9c6e8"', '"blue"', "sky = "),
+        ('"brick:#804020"', '"brik"', "palette wall: unknown material 'brik': did you mean 'brick'?"),
+        ("post = 4\n", "pots = 4\n", "inventory: unknown category 'pots': did you mean 'post'?"),
         (
             "[inventory]\npost = 4",
             "[inventory]\npost = 9",

@@ -74,25 +74,25 @@ def spoil(assets: Path, old: str, new: str) -> str:
 @pytest.mark.parametrize(
     ("old", "new", "says"),
     [
-        ("height = ", "hight = ", "[mailbox] parts[1] (cylinder): unknown key 'hight', did you mean 'height'?"),
+        ("height = ", "hight = ", "[mailbox] parts[1] (cylinder): unknown key 'hight': did you mean 'height'?"),
         ("radius = 0.05\n", "", "[mailbox] parts[1] (cylinder): key 'radius' is missing"),
-        ('shape = "cylinder"', 'shape = "cylindre"', "parts[1]: unknown shape 'cylindre', did you mean 'cylinder'?"),
-        ('role = "pole"', 'role = "pol"', "parts[1] (cylinder): unknown role 'pol', did you mean 'pole'?"),
-        ('role = "brick"', 'role = "brik"', "parts[2] (box): unknown material 'brik', did you mean 'brick'?"),
-        ('pole = "metal"', 'pole = "metall"', "roles pole: unknown material 'metall', did you mean 'metal'?"),
+        ('shape = "cylinder"', 'shape = "cylindre"', "parts[1]: unknown shape 'cylindre': did you mean 'cylinder'?"),
+        ('role = "pole"', 'role = "pol"', "parts[1] (cylinder): unknown role 'pol': did you mean 'pole'?"),
+        ('role = "brick"', 'role = "brik"', "parts[2] (box): unknown material 'brik': did you mean 'brick'?"),
+        ('pole = "metal"', 'pole = "metall"', "roles pole: unknown material 'metall': did you mean 'metal'?"),
         ("#b02020", "#b0202", "roles body: colour of material 'paint:#b0202' is not of the form #rrggbb"),
-        ('"body_h"]', '"body_hh"]', "parts[0] (box): unknown parameter 'body_hh', did you mean 'body_h'?"),
+        ('"body_h"]', '"body_hh"]', "parts[0] (box): unknown parameter 'body_hh': did you mean 'body_h'?"),
         ('"body_h"]', '"body_h**2"]', "parts[0] (box): 'body_h**2' is no arithmetic expression"),
         ("[0.9, 1.1]", "[1.1, 0.9]", "params: body_h must be a number or [low, high], got [1.1, 0.9]"),
-        ("weight = 3", "weigth = 3", "variants[0] (red): unknown key 'weigth', did you mean 'weight'?"),
+        ("weight = 3", "weigth = 3", "variants[0] (red): unknown key 'weigth': did you mean 'weight'?"),
         ("weight = 3", "weight = 0", "variants[0] (red): weight must be a positive number, got 0"),
         ('name = "blue"', 'name = "red"', "variants[1]: variant 'red' stands twice"),
-        ('["flag"]', '["flagg"]', "without names the unknown tag 'flagg', did you mean 'flag'?"),
+        ('["flag"]', '["flagg"]', "without names the unknown tag 'flagg': did you mean 'flag'?"),
         ("{ body = \"paint:#2020b0\" }", "{ bod = \"metal\" }", "variants[1] (blue) roles: unknown key 'bod'"),
-        ("{ body_h = 2.0 }", "{ bodyh = 2.0 }", "(blue) params: unknown key 'bodyh', did you mean 'body_h'?"),
-        ('kind = "prop"', 'kind = "prob"', "[mailbox]: unknown kind 'prob', did you mean 'prop'?"),
+        ("{ body_h = 2.0 }", "{ bodyh = 2.0 }", "(blue) params: unknown key 'bodyh': did you mean 'body_h'?"),
+        ('kind = "prop"', 'kind = "prob"', "[mailbox]: unknown kind 'prob': did you mean 'prop'?"),
         ('name = "mailbox"', "", "[mailbox]: name is missing"),
-        ('kind = "prop"', 'kinds = "prop"', "[mailbox]: unknown key 'kinds', did you mean 'kind'?"),
+        ('kind = "prop"', 'kinds = "prop"', "[mailbox]: unknown key 'kinds': did you mean 'kind'?"),
         ('kind = "prop"', 'kind = "prop"\nbuilder = "x"', "[mailbox]: give parts or a builder, one of them"),
         ('kind = "prop"', 'kind = "prop', "Illegal character"),
         ('tag = "flag"', 'tag = "flag"\nring = { number = 3 }', "parts[2] (box): ring must be a table with a count"),
@@ -119,9 +119,9 @@ def test_category_that_stands_twice_names_both_files(assets):
 @pytest.mark.parametrize(
     ("old", "new", "says"),
     [
-        ('texture = "brick"', 'texture = "brck"', "material 'brick': unknown texture 'brck', did you mean 'brick'?"),
+        ('texture = "brick"', 'texture = "brck"', "material 'brick': unknown texture 'brck': did you mean 'brick'?"),
         ("tile_m = 0.5", "tile_m = -1", "material 'brick': tile_m must be 0.01 to 1000 m, got -1"),
-        ("tile_m = 0.5", "tile = 1", "material 'brick': unknown key 'tile', did you mean 'tile_m'?"),
+        ("tile_m = 0.5", "tile = 1", "material 'brick': unknown key 'tile': did you mean 'tile_m'?"),
         ('"#808080"', '"grey"', "material 'metal': colour must be of the form #rrggbb, got 'grey'"),
     ],
 )
@@ -136,11 +136,11 @@ def test_errors_in_materials(assets, old, new, says):
 def test_what_was_asked_for_but_is_unknown(assets):
     catalogue = load_catalogue(assets)
     rng = generator(0, "t")
-    with pytest.raises(AssetError, match="unknown category 'mailbux', did you mean 'mailbox'"):
+    with pytest.raises(AssetError, match="unknown category 'mailbux': did you mean 'mailbox'"):
         catalogue["mailbux"]
-    with pytest.raises(AssetError, match="unknown variant 'blu', did you mean 'blue'"):
+    with pytest.raises(AssetError, match="unknown variant 'blu': did you mean 'blue'"):
         catalogue.instantiate("mailbox", "n", rng, variant="blu")
-    with pytest.raises(AssetError, match="params: unknown key 'body', did you mean 'body_h'"):
+    with pytest.raises(AssetError, match="params: unknown key 'body': did you mean 'body_h'"):
         catalogue.instantiate("mailbox", "n", rng, params={"body": 1})
     with pytest.raises(AssetError, match=r"parts\[0\] \(box\): size must be positive, got 0\.4, 0\.5, -1"):
         catalogue.instantiate("mailbox", "n", rng, params={"body_h": -1})

@@ -207,7 +207,7 @@ def test_an_unknown_id_gives_the_nearest(smoke, ids, tmp_path):
         find_task(smoke, f"{wrong}-s")
     with pytest.raises(UsageError, match=rf"'nonsense' is no task id.*e\.g\. {min(ids)}-s.*read_parquet"):
         find_task(smoke, "nonsense")
-    with pytest.raises(UsageError, match="has no scene 'U_Courtyard_7': did you mean U_Courtyard_"):
+    with pytest.raises(UsageError, match="has no scene 'U_Courtyard_7': did you mean 'U_Courtyard_"):
         find_task(smoke, "U_Courtyard_7-0123456789ab")
     with pytest.raises(UsageError, match="is no task id"):
         find_task(smoke, "../../etc/passwd")

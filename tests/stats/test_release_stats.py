@@ -185,7 +185,7 @@ def test_the_command_writes_what_it_prints(smoke, drawn):
     made = [*tables(scenes), benchmark_table(scenes)]
     assert (out / "stats.md").read_text() == as_markdown(made)
     assert (out / "stats.csv").read_text() == as_csv(made)
-    assert "\n\n".join("\n".join(table.terminal()) for table in made) in printed
+    assert "\n\n".join("\n".join(table.terminal(80)) for table in made) in printed
     paths = [str(out / "drawn" / f"{name}{suffix}") for name in FIGURES for suffix in (".png", ".svg")]
     assert printed.splitlines()[-len(paths) :] == paths
     assert sorted(str(p) for p in (out / "drawn").iterdir()) == sorted(paths)
@@ -228,7 +228,7 @@ def test_a_part_of_the_scenes_is_chosen_by_name_or_glob(smoke):
     assert "U_Courtyard_0" not in done.stdout
     done = stats("--data", smoke, "--scene", "U_Courtyard_2")
     assert done.returncode == 2
-    assert done.stderr == "error: no scene 'U_Courtyard_2'; nearest: U_Courtyard_1, U_Courtyard_0\n"
+    assert done.stderr == "error: no scene 'U_Courtyard_2': did you mean 'U_Courtyard_1' or 'U_Courtyard_0'?\n"
 
 
 def test_without_a_release_files_are_refused(tmp_path):

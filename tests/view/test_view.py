@@ -222,7 +222,7 @@ def test_a_routes_clearance_is_its_certificates(smoke, client):
 
 
 def test_what_is_missing_is_named(smoke, tmp_path):
-    with pytest.raises(UsageError, match="did you mean U_Courtyard_0"):
+    with pytest.raises(UsageError, match="did you mean 'U_Courtyard_0'"):
         view_app(smoke, "U_Courtyard0")
     with pytest.raises(StoreError, match="there is no release in"):
         view_app(tmp_path, YARD)

@@ -1,0 +1,192 @@
+"""Run a whole pipeline, or stages with what they need upstream, from sources to the release.
+
+Nothing heavy is imported before something runs: the command line imports this for its ``--help`` too.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from aerialdojo_gen.errors import ConfigError
+
+if TYPE_CHECKING:
+    from aerialdojo_gen.config.pipeline import Pipeline
+    from aerialdojo_gen.pipeline.freshness import Limits
+    from aerialdojo_gen.pipeline.progress import Reporter
+    from aerialdojo_gen.pipeline.runner import StageSummary
+    from aerialdojo_gen.pipeline.stage import Roots, Stage
+    from aerialdojo_gen.store.root import DataRoot
+
+DEFAULT_PIPELINE = "aerialdojo-200k.toml"
+
+
+def run_pipeline(
+    pipeline: str | Path | Pipeline | None = None,
+    data: str | Path | DataRoot = "data",
+    *,
+    stages: Sequence[str] | None = None,
+    scenes: Sequence[str] | None = None,
+    workers: int | None = None,
+    force: Iterable[str] = (),
+    replace: bool = False,
+    limits: Limits | None = None,
+    reporter: Reporter | None = None,
+) -> list[StageSummary]:
+    """Bring the tables of a pipeline up to date; the twin of ``aerialdojo-gen run`` and of the stages' commands.
+
+    Parameters
+    ----------
+    pipeline : str, Path or Pipeline, optional
+        A TOML file, or what `aerialdojo_gen.config.pipeline.load_pipeline` read of one; the paper's where absent.
+    data : str, Path or DataRoot
+        The data directory.
+    stages : sequence of str, optional
+        Stages to run, each with what it needs upstream, e.g. ``["plan"]``; the pipeline's own where absent.
+    scenes : sequence of str, optional
+        Names or globs; the pipeline's own where absent.
+    workers : int, optional
+        Processes; all cores where absent. With 1 everything runs in this one.
+    force : iterable of str
+        Stages whose shards are computed even where they are fresh.
+    replace : bool
+        Whether scenes of the release that another pipeline made may be lost.
+    limits : Limits, optional
+        How much of the last stage is computed now; all of it where absent.
+    reporter : Reporter, optional
+        Shows progress and summaries; nothing is shown where absent.
+
+    Returns
+    -------
+    list of StageSummary
+        One a stage, in their order: rows in and out, reasons, shards computed, seconds.
+
+    Raises
+    ------
+    AerialDojoError
+        An expected failure, in one line that names the thing and the mend; finished shards stay.
+    """
+    from aerialdojo_gen.pipeline.registry import upstream
+    from aerialdojo_gen.pipeline.runner import stages_named
+
+    config, roots = open_pipeline(pipeline, data)
+    if stages is None:
+        chosen = stages_named(config.stages)
+    else:
+        needed = {stage.name for asked in stages_named(stages) for stage in upstream(asked.name)}
+        chosen = stages_named([*needed])
+    return run_stages(
+        chosen, config, roots, scenes, workers=workers, force=force, reporter=reporter, limits=limits, replace=replace
+    )
+
+
+def home() -> Path:
+    """Return the folder that holds scene_assets/, annotations/ and pipelines/.
+
+    A checkout's own folder where the package lies in one, else what the wheel carries.
+    """
+    package = Path(__file__).resolve().parents[1]
+    return package.parent if (package.parent / "scene_assets").is_dir() else package / "_shipped"
+
+
+def open_pipeline(pipeline: str | Path | Pipeline | None, data: str | Path | DataRoot) -> tuple[Pipeline, Roots]:
+    """Read the pipeline file and find the folders.
+
+    Parameters
+    ----------
+    pipeline : str, Path, Pipeline or None
+        The pipeline file, or what was read of one; None for the default one.
+    data : str, Path or DataRoot
+        The data directory.
+
+    Returns
+    -------
+    Pipeline, Roots
+
+    Raises
+    ------
+    ConfigError
+        The file is missing or wrong.
+    """
+    from aerialdojo_gen.config.pipeline import Pipeline, load_pipeline
+    from aerialdojo_gen.pipeline.stage import Roots
+    from aerialdojo_gen.store.root import open_root
+
+    if not isinstance(pipeline, Pipeline):
+        pipeline = load_pipeline(Path(pipeline) if pipeline else home() / "pipelines" / DEFAULT_PIPELINE)
+    roots = Roots(
+        data=Path(open_root(data).url),
+        scene_assets=(assets := pipeline.scene_assets or home() / "scene_assets"),
+        recipes=pipeline.recipes or assets / "scenes",
+        annotations=pipeline.annotations or home() / "annotations",
+    )
+    for key, folder in (("scene_assets", roots.scene_assets), ("recipes", roots.recipes)):
+        if not folder.is_dir():
+            raise ConfigError(f"no folder {folder}: set {key} in the pipeline file")
+    return pipeline, roots
+
+
+def run_stages(
+    stages: Sequence[Stage],
+    config: Pipeline,
+    roots: Roots,
+    scenes: Sequence[str] | None = None,
+    *,
+    workers: int | None = None,
+    force: Iterable[str] = (),
+    reporter: Reporter | None = None,
+    limits: Limits | None = None,
+    replace: bool = False,
+) -> list[StageSummary]:
+    """Run exactly these stages over the chosen scenes; after `split`, bring card and croissant.json up to date.
+
+    Parameters as for `run_pipeline`; `scenes` are names or globs, the pipeline's own where absent.
+
+    Raises
+    ------
+    UsageError
+        The release would lose scenes that another pipeline made, and `replace` is not given; nothing was run.
+    """
+    from aerialdojo_gen.pipeline import runner
+    from aerialdojo_gen.pipeline.progress import Reporter
+    from aerialdojo_gen.release.provenance import check_replaced
+
+    reporter = reporter or Reporter(quiet=True)
+    names = runner.chosen_scenes(config, roots, scenes)
+    releases = any(stage.name == "split" for stage in stages)
+
+    def prepare() -> None:
+        if releases and not replace:
+            check_replaced(roots.data, config, names, whole=not scenes)
+
+    def finish() -> None:
+        if releases:
+            _finish_release(config, roots.data, names, not scenes, reporter)
+
+    return runner.run(
+        stages, names, config, roots, workers=workers or default_workers(), force=force, reporter=reporter,
+        limits=limits, prepare=prepare, finish=finish,
+    )  # fmt: skip
+
+
+def _finish_release(config: Pipeline, data: Path, scenes: list[str], whole: bool, reporter: Reporter) -> None:
+    """Bring what stands beside the tables of a release up to date with them."""
+    from aerialdojo_gen.release.card import write_card
+    from aerialdojo_gen.release.croissant import write_croissant
+    from aerialdojo_gen.release.provenance import record_makers
+    from aerialdojo_gen.store.shards import prune_release
+
+    if whole:
+        # The whole pipeline was asked for: the release holds its scenes and no others.
+        for gone in prune_release(data, scenes):
+            reporter.line(f"release: {gone} is no scene of this pipeline, removed")
+    record_makers(data, config, scenes)
+    write_croissant(data)
+    reporter.line(f"release: {write_card(data).parent}")
+
+
+def default_workers() -> int:
+    """Count the cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
