@@ -22,6 +22,7 @@ from aerialdojo_gen.benchmark.texts import GoalText
 from aerialdojo_gen.config.agreement import SUCCESS_RADIUS_M
 from aerialdojo_gen.config.sections import Embodiment
 from aerialdojo_gen.errors import UsageError
+from aerialdojo_gen.store.root import DataRoot, open_root
 from aerialdojo_gen.store.schemas import DIRECTIONS, VIEWS
 
 _TEXT = ("target_name", "landmark", "description")
@@ -44,8 +45,8 @@ class AerialDojoEnv(gymnasium.Env[dict[str, Any], np.int64]):
 
     Parameters
     ----------
-    data : path
-        The data directory: its release and its meshes.
+    data : DataRoot, path or str
+        The data root, a directory or a URL: its release and its meshes.
     split, setting, modality, scene : str or sequence of str, optional
         Which tasks; all where absent. Scenes may be globs.
     limit : int, optional
@@ -77,7 +78,7 @@ class AerialDojoEnv(gymnasium.Env[dict[str, Any], np.int64]):
 
     def __init__(
         self,
-        data: str | Path = "data",
+        data: DataRoot | Path | str = "data",
         *,
         split: str | Sequence[str] = (),
         setting: str | Sequence[str] = (),
@@ -99,7 +100,7 @@ class AerialDojoEnv(gymnasium.Env[dict[str, Any], np.int64]):
         if render_mode not in (None, "rgb_array"):
             raise UsageError(f"no render mode {render_mode!r}: there is 'rgb_array'")
         self.render_mode = render_mode
-        self._data = Path(data).absolute()
+        self._data = open_root(data)
         self._sensors = sensors or Sensors(tuple(views), rgb, depth, width, height)
         self._flight = Flight(self._data, self._sensors, success_radius_m, embodiment, renderer)
         self._begun = False

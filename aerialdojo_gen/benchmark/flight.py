@@ -11,6 +11,7 @@ from aerialdojo_gen.benchmark.motion import FlightSpace, flight_space
 from aerialdojo_gen.benchmark.tasks import Task, goal_of, mesh_of
 from aerialdojo_gen.config.agreement import SUCCESS_RADIUS_M
 from aerialdojo_gen.config.sections import Embodiment
+from aerialdojo_gen.store.root import DataRoot, open_root
 
 
 class Flight:
@@ -20,8 +21,8 @@ class Flight:
 
     Parameters
     ----------
-    data : Path
-        The data directory, with release and meshes.
+    data : DataRoot, Path or str
+        The data root, with release and meshes.
     sensors : Sensors
         What observations hold.
     success_radius_m : float
@@ -49,13 +50,13 @@ class Flight:
 
     def __init__(
         self,
-        data: Path,
+        data: DataRoot | Path | str,
         sensors: Sensors,
         success_radius_m: float = SUCCESS_RADIUS_M,
         embodiment: Embodiment | None = None,
         renderer: str = "auto",
     ) -> None:
-        self._data = data.absolute()
+        self._data = open_root(data)
         self._body = embodiment or Embodiment()
         self.renderer = renderer
         self.sensors = sensors

@@ -13,6 +13,7 @@ from aerialdojo_gen.browse.lookup import ReleasedScene
 from aerialdojo_gen.errors import UsageError
 from aerialdojo_gen.release.way import sampled
 from aerialdojo_gen.store import schemas
+from aerialdojo_gen.store.root import DataRoot
 from aerialdojo_gen.web.payload import scene_payload
 from aerialdojo_gen.web.serving import local_app
 
@@ -23,13 +24,13 @@ _OBJECT = ("object_id", "name", "category", "description", "mesh_node", "directi
 _NUMBERS = ("euclidean_m", "length_m", "detour_ratio", "min_clearance_m")
 
 
-def view_app(data: Path, scene: str) -> FastAPI:
+def view_app(data: DataRoot | Path | str, scene: str) -> FastAPI:
     """Make the app that shows a scene.
 
     Parameters
     ----------
-    data : Path
-        The data directory; its release and its meshes are all that is read.
+    data : DataRoot, Path or str
+        The data root; its release and its meshes are all that is read.
     scene : str
         Name of the scene.
 
