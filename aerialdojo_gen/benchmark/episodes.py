@@ -68,7 +68,7 @@ def has_table(data: Path, run: str, table: str) -> bool:
 def fingerprint_of(data: Path, run: str, scene: str) -> str | None:
     """Return the fingerprint that a scene's episodes were written with; None where there are none."""
     paths = store.shards(data, "episodes", scene, run)
-    info = store.read_info(paths[0]) if paths else None
+    info = store.read_info(data, paths[0]) if paths else None
     return info.fingerprint if info else None
 
 

@@ -19,7 +19,7 @@ from aerialdojo_gen.exchange.objects import Objects
 from aerialdojo_gen.exchange.report import Report
 from aerialdojo_gen.exchange.tables import Tables
 from aerialdojo_gen.exchange.task import Context, Task, digest, route_row, task_rows
-from aerialdojo_gen.store.shards import check_scene_name
+from aerialdojo_gen.store.layout import check_scene_name
 
 MARKER = "import.json"
 Read = Callable[[Fields, Context], Task]

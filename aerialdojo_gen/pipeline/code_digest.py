@@ -50,9 +50,11 @@ PLUMBING: dict[str, tuple[str, ...]] = {
     "aerialdojo_gen.store.atomic": (),
     "aerialdojo_gen.store.files": (),
     "aerialdojo_gen.store.footers": (),
+    "aerialdojo_gen.store.layout": ("partition", "check_scene_name"),
     "aerialdojo_gen.store.parquet_files": ("write_clustered",),
     "aerialdojo_gen.store.schemas": ("*",),
-    "aerialdojo_gen.store.shards": ("partition", "check_scene_name"),
+    "aerialdojo_gen.store.root": (),
+    "aerialdojo_gen.store.shards": (),
     "aerialdojo_gen.store.staging": (),
 }
 # What writes every stage's rows.

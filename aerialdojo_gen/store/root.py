@@ -7,17 +7,19 @@ forward slashes. Libraries that want a file of this machine (PyArrow, OpenCV, FF
 
 from __future__ import annotations
 
+import fcntl
 import os
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
+from typing import BinaryIO, TextIO, TypeAlias
 
 from aerialdojo_gen.errors import StoreError
 from aerialdojo_gen.store import files
-from aerialdojo_gen.store.atomic import atomic_file, atomic_folder
-from aerialdojo_gen.store.staging import remove
+from aerialdojo_gen.store.atomic import atomic_file, atomic_folder, disk_error
+from aerialdojo_gen.store.staging import remove, sweep, sweep_unstaged
 
 
 class DataRoot(ABC):
@@ -55,8 +57,27 @@ class DataRoot(ABC):
         """SHA-256 of a file's bytes, hexadecimal; FileNotFoundError where there is none."""
 
     @abstractmethod
+    def version(self, relative: str) -> str:
+        """Return what tells a file from any other of its name; FileNotFoundError where there is none.
+
+        It says nothing by itself, and nothing on another root.
+        """
+
+    @abstractmethod
+    def open(self, relative: str) -> BinaryIO:
+        """Open a file for reading, from any place of it; FileNotFoundError where there is none."""
+
+    @abstractmethod
+    def at(self, relative: str) -> str:
+        """Return where a file lies, as messages say it: an absolute path or a URL."""
+
+    @abstractmethod
+    def below(self, folder: str) -> DataRoot:
+        """Return a folder as a root of its own, with a lock of its own; it need not be there yet."""
+
+    @abstractmethod
     def list(self, folder: str, pattern: str = "*") -> list[str]:
-        """Paths, relative to the root and sorted, of what matches a glob in a folder; none where there is no folder."""
+        """Paths, relative to the root and sorted, of what in a folder matches a glob; none where it is not there."""
 
     @abstractmethod
     def commit(self, relative: str) -> AbstractContextManager[Path]:
@@ -78,7 +99,13 @@ class DataRoot(ABC):
 
     @abstractmethod
     def lock(self) -> AbstractContextManager[None]:
-        """Hold the root: one run at a time writes to it. StoreError where somebody else holds it."""
+        """Hold the root: one run at a time writes to it. StoreError where somebody else holds it.
+
+        What killed runs left half-made in it is removed.
+        """
+
+    def refresh(self) -> None:  # noqa: B027 - a directory remembers nothing
+        """Forget what was found where; a root that is pickled afterwards makes other processes forget it too."""
 
     def exists(self, relative: str) -> bool:
         """Whether there is a file or a folder of that name."""
@@ -121,6 +148,23 @@ class LocalRoot(DataRoot):
         """SHA-256 of a file's bytes, read once in a process as long as it is not written to."""
         return files.file_digest(self._at(relative))
 
+    def version(self, relative: str) -> str:
+        """Inode, size and times of the file: one that is replaced or written to is another."""
+        stat = self._at(relative).stat()
+        return f"{stat.st_ino}-{stat.st_size}-{stat.st_mtime_ns}"
+
+    def open(self, relative: str) -> BinaryIO:
+        """Open the file itself."""
+        return self._at(relative).open("rb")
+
+    def at(self, relative: str) -> str:
+        """Return the file's absolute path."""
+        return str(self._at(relative))
+
+    def below(self, folder: str) -> LocalRoot:
+        """Return a directory in this one."""
+        return LocalRoot(self._at(folder))
+
     def list(self, folder: str, pattern: str = "*") -> list[str]:
         """Paths of what in a folder matches a glob."""
         return sorted(path.relative_to(self.path).as_posix() for path in self._at(folder).glob(pattern))
@@ -139,9 +183,39 @@ class LocalRoot(DataRoot):
         """Remove a file or a folder."""
         remove(self._at(relative))
 
-    def lock(self) -> AbstractContextManager[None]:
-        """Hold the directory by flock."""
-        raise NotImplementedError
+    @contextmanager
+    def lock(self) -> Iterator[None]:
+        """Hold the directory by flock: a killed run's lock is gone with it."""
+        path = self.path / ".lock"
+        try:
+            self.path.mkdir(parents=True, exist_ok=True)
+            file = path.open("a+")
+        except OSError as error:
+            raise disk_error(error, path) from None
+        with file:
+            try:
+                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                raise StoreError(
+                    f"another run is writing to {self.path}: wait for it, or use another --data"
+                ) from None
+            except OSError as error:
+                raise disk_error(error, path) from None
+            self._sweep_once(file)
+            sweep(self.path)
+            try:
+                yield
+            finally:
+                # What workers were at when an error or Ctrl-C ended them.
+                sweep(self.path)
+
+    def _sweep_once(self, lock: TextIO) -> None:
+        """Remove what killed runs of earlier versions left, once in a data directory's life."""
+        lock.seek(0)
+        if not lock.read():
+            sweep_unstaged(self.path)
+            lock.write("staged\n")
+            lock.flush()
 
     def _at(self, relative: str) -> Path:
         return self.path / inside(relative)
@@ -155,7 +229,10 @@ def inside(relative: str) -> str:
     return relative
 
 
-def open_root(where: DataRoot | Path | str) -> DataRoot:
+Where: TypeAlias = DataRoot | Path | str
+
+
+def open_root(where: Where) -> DataRoot:
     """Open a data root.
 
     Parameters
