@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import string
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 import gymnasium
@@ -22,7 +21,7 @@ from aerialdojo_gen.benchmark.texts import GoalText
 from aerialdojo_gen.config.agreement import SUCCESS_RADIUS_M
 from aerialdojo_gen.config.sections import Embodiment
 from aerialdojo_gen.errors import UsageError
-from aerialdojo_gen.store.root import DataRoot, open_root
+from aerialdojo_gen.store.root import Where, open_root
 from aerialdojo_gen.store.schemas import DIRECTIONS, VIEWS
 
 _TEXT = ("target_name", "landmark", "description")
@@ -34,9 +33,9 @@ class AerialDojoEnv(gymnasium.Env[dict[str, Any], np.int64]):
 
     Actions are `Discrete(16)`: Stop, moves and turns of `aerialdojo_gen.store.schemas.ACTION_NAMES`, carried out by
     their exact magnitudes. An episode is `terminated` by Stop or by a collision, and `truncated` where the last
-    action of the budget is neither; ``info["reason"]`` is then ``"stop"``, ``"collision"`` or ``"budget"``, ``""`` before. A
-    move that would leave the flight volume is refused: it is spent, and nothing moves. The reward is 1 for a Stop
-    within the success radius, and 0 otherwise.
+    action of the budget is neither; ``info["reason"]`` is then ``"stop"``, ``"collision"`` or ``"budget"``, ``""``
+    before. A move that would leave the flight volume is refused: it is spent, and nothing moves. The reward is 1 for
+    a Stop within the success radius, and 0 otherwise.
 
     An observation is a dict: ``step`` and ``remaining_actions`` ((1,) int32), ``refused`` (0 or 1), ``goal``
     (modality, target_name, landmark, direction, and description or image), and, where asked for, ``rgb`` and
@@ -78,7 +77,7 @@ class AerialDojoEnv(gymnasium.Env[dict[str, Any], np.int64]):
 
     def __init__(
         self,
-        data: DataRoot | Path | str = "data",
+        data: Where = "data",
         *,
         split: str | Sequence[str] = (),
         setting: str | Sequence[str] = (),

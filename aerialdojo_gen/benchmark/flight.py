@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 from aerialdojo_gen.benchmark.episode import Episode
 from aerialdojo_gen.benchmark.eyes import look
 from aerialdojo_gen.benchmark.goal import Goal, Observation, Rules, Sensors
@@ -11,7 +9,7 @@ from aerialdojo_gen.benchmark.motion import FlightSpace, flight_space
 from aerialdojo_gen.benchmark.tasks import Task, goal_of, mesh_of
 from aerialdojo_gen.config.agreement import SUCCESS_RADIUS_M
 from aerialdojo_gen.config.sections import Embodiment
-from aerialdojo_gen.store.root import DataRoot, open_root
+from aerialdojo_gen.store.root import Where, open_root
 
 
 class Flight:
@@ -50,7 +48,7 @@ class Flight:
 
     def __init__(
         self,
-        data: DataRoot | Path | str,
+        data: Where,
         sensors: Sensors,
         success_radius_m: float = SUCCESS_RADIUS_M,
         embodiment: Embodiment | None = None,

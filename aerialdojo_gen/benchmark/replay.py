@@ -11,7 +11,6 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from pathlib import Path
 from typing import Any
 
 import cv2
@@ -26,6 +25,7 @@ from aerialdojo_gen.benchmark.runs import Run
 from aerialdojo_gen.browse.lookup import ReleasedScene
 from aerialdojo_gen.errors import StoreError
 from aerialdojo_gen.rendering.orthographic import OrthographicPictures
+from aerialdojo_gen.store.root import DataRoot, Where, open_root
 from aerialdojo_gen.store.schemas import ACTION_NAMES
 
 _MAP_PX = 640
@@ -140,7 +140,7 @@ def choose_tasks(runs: Sequence[Run], count: int) -> list[str]:
 
 
 def replays(
-    data: DataRoot | Path | str, log: DataRoot | Path | str, runs: Sequence[Run], tasks: Sequence[str], frames: bool = False
+    data: Where, log: Where, runs: Sequence[Run], tasks: Sequence[str], frames: bool = False
 ) -> Iterator[Replay]:
     """Make replays.
 

@@ -6,7 +6,6 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
@@ -17,6 +16,7 @@ from aerialdojo_gen.benchmark.episodes import has_table, read_run, runs
 from aerialdojo_gen.benchmark.metrics import Bools, Episodes, Floats, episodes_of
 from aerialdojo_gen.benchmark.swept import STEP_COLUMNS, swept_distances
 from aerialdojo_gen.errors import StoreError
+from aerialdojo_gen.store.root import DataRoot, Where, open_root
 from aerialdojo_gen.store.schemas import TERMINATIONS
 
 # What is no contender: the one that knows the way, and those that look at nothing.
@@ -71,7 +71,7 @@ class Run:
         return swept_distances(self.table, read_run(self.log, self.name, "steps", STEP_COLUMNS))
 
 
-def load_runs(data: DataRoot | Path | str, names: Sequence[str] = ()) -> list[Run]:
+def load_runs(data: Where, names: Sequence[str] = ()) -> list[Run]:
     """Read runs.
 
     Parameters

@@ -22,7 +22,7 @@ from aerialdojo_gen.errors import StoreError, UsageError
 from aerialdojo_gen.pipeline.runner import choose_scenes
 from aerialdojo_gen.release.contents import mesh_copy, release_scenes
 from aerialdojo_gen.store import shards as store
-from aerialdojo_gen.store.root import DataRoot, open_root
+from aerialdojo_gen.store.root import DataRoot, Where, open_root
 from aerialdojo_gen.store.schemas import SETTINGS, SUBSETS, TASKS
 
 MODALITIES = ("semantic", "image")
@@ -94,7 +94,7 @@ class Task:
         return row["start_x_m"], row["start_y_m"], row["start_z_m"], row["start_yaw_rad"]
 
 
-def select(data: DataRoot | Path | str, selection: Selection) -> pa.Table:
+def select(data: Where, selection: Selection) -> pa.Table:
     """Find the tasks of a selection.
 
     Parameters
@@ -149,7 +149,7 @@ def _drawn(found: pa.Table, limit: int, seed: int) -> pa.Table:
     return found.take(pa.array(sorted(i for _, _, i in sorted(lots)[:limit])))
 
 
-def read_tasks(data: DataRoot | Path | str, rows: pa.Table) -> list[Task]:
+def read_tasks(data: Where, rows: pa.Table) -> list[Task]:
     """Join tasks with their goals.
 
     Parameters

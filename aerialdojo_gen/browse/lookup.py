@@ -7,7 +7,6 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -21,7 +20,7 @@ from aerialdojo_gen.release.contents import mesh_copy, release_scenes
 from aerialdojo_gen.scenes.glb import read_glb
 from aerialdojo_gen.scenes.model import Scene
 from aerialdojo_gen.store import shards as store
-from aerialdojo_gen.store.root import DataRoot, open_root
+from aerialdojo_gen.store.root import Where, open_root
 
 _TASK_ID = re.compile(r"(?P<nav>(?P<scene>[A-Za-z0-9][A-Za-z0-9_-]*)-(?P<key>[0-9a-f]{12}))(?:-[si])?")
 _SIDES = ("train", "test")
@@ -45,7 +44,7 @@ class ReleasedScene:
         There is no release.
     """
 
-    def __init__(self, data: DataRoot | Path | str, name: str) -> None:
+    def __init__(self, data: Where, name: str) -> None:
         self.root = open_root(data)
         known = release_scenes(self.root)
         if name not in known:
@@ -173,7 +172,7 @@ class FoundTask:
     instances: list[dict[str, Any]]
 
 
-def find_task(data: DataRoot | Path | str, task_id: str) -> FoundTask:
+def find_task(data: Where, task_id: str) -> FoundTask:
     """Find a task of the release.
 
     Parameters

@@ -19,12 +19,17 @@ if TYPE_CHECKING:
     from aerialdojo_gen.pipeline.freshness import Limits
     from aerialdojo_gen.pipeline.progress import Reporter
     from aerialdojo_gen.pipeline.stage import Roots, Stage
+    from aerialdojo_gen.store.root import Where
 
 DEFAULT_PIPELINE = "aerialdojo-200k.toml"
 
 Data = Annotated[
-    Path, typer.Option("--data", envvar="AERIALDOJO_DATA", help="Data directory: tables, meshes, release.")
-]
+    str,
+    typer.Option(
+        "--data", metavar="DIR|URL", envvar="AERIALDOJO_DATA",
+        help="Data directory or s3://bucket/prefix: tables, meshes, release.",
+    ),
+]  # fmt: skip
 Scene = Annotated[
     list[str] | None, typer.Option("--scene", help="Scene or glob, repeatable: --scene 'U_*'.  (default: all)")
 ]
@@ -48,7 +53,7 @@ def home() -> Path:
     return package.parent if (package.parent / "scene_assets").is_dir() else package / "_shipped"
 
 
-def open_pipeline(path: Path | None, data: Path) -> tuple[Pipeline, Roots]:
+def open_pipeline(path: Path | None, data: Where) -> tuple[Pipeline, Roots]:
     """Read the pipeline file and find the folders.
 
     Parameters
@@ -72,7 +77,7 @@ def open_pipeline(path: Path | None, data: Path) -> tuple[Pipeline, Roots]:
 
     pipeline = load_pipeline(path or home() / "pipelines" / DEFAULT_PIPELINE)
     roots = Roots(
-        data=data.absolute(),
+        data=Path(str(data)).absolute(),
         scene_assets=(assets := pipeline.scene_assets or home() / "scene_assets"),
         recipes=pipeline.recipes or assets / "scenes",
         annotations=pipeline.annotations or home() / "annotations",
@@ -86,7 +91,7 @@ def open_pipeline(path: Path | None, data: Path) -> tuple[Pipeline, Roots]:
 def run_until(
     stage: str,
     *,
-    data: Path,
+    data: Where,
     scene: list[str] | None = None,
     pipeline: Path | None = None,
     workers: int | None = None,
@@ -179,7 +184,7 @@ def run_stages(
         raise SystemExit(130) from None
 
 
-def _finish_release(config: Pipeline, data: Path, scenes: list[str], whole: bool, reporter: Reporter) -> None:
+def _finish_release(config: Pipeline, data: Where, scenes: list[str], whole: bool, reporter: Reporter) -> None:
     """Bring what stands beside the tables of a release up to date with them."""
     from aerialdojo_gen.release.card import write_card
     from aerialdojo_gen.release.croissant import write_croissant
@@ -192,7 +197,7 @@ def _finish_release(config: Pipeline, data: Path, scenes: list[str], whole: bool
             reporter.line(f"release: {gone} is no scene of this pipeline, removed")
     record_makers(data, config, scenes)
     write_croissant(data)
-    reporter.line(f"release: {write_card(data).parent}")
+    reporter.line(f"release: {write_card(data).removesuffix('/README.md')}")
 
 
 def default_workers() -> int:

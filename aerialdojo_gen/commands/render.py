@@ -30,7 +30,7 @@ _SECONDS = {"s": 1.0, "m": 60.0, "h": 3600.0, "d": 86400.0}
 
 @app.command("render")
 def render(
-    data: Data = Path("data"), scene: Scene = None, pipeline: PipelineFile = None,
+    data: Data = "data", scene: Scene = None, pipeline: PipelineFile = None,
     workers: Workers = None, force: Force = False, quiet: Quiet = False, replace: Replace = False,
     split: Annotated[str | None, typer.Option(
         "--split", help="train, test, all, id_train, id_test, ood_train or ood_test.")] = None,

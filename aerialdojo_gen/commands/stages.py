@@ -39,7 +39,7 @@ SPLIT = "Write the release: tasks, routes, objects, train and test."
 
 def _stage_command(name: str) -> Callable[..., None]:
     def command(
-        data: Data = Path("data"), scene: Scene = None, pipeline: PipelineFile = None,
+        data: Data = "data", scene: Scene = None, pipeline: PipelineFile = None,
         workers: Workers = None, force: Force = False, quiet: Quiet = False,
     ) -> None:  # fmt: skip
         run_until(name, data=data, scene=scene, pipeline=pipeline, workers=workers, force=force, quiet=quiet)
@@ -53,7 +53,7 @@ for _name, _help in PLAIN_STAGES.items():
 
 @app.command("split", help=SPLIT)
 def split(
-    data: Data = Path("data"), scene: Scene = None, pipeline: PipelineFile = None,
+    data: Data = "data", scene: Scene = None, pipeline: PipelineFile = None,
     workers: Workers = None, force: Force = False, quiet: Quiet = False, replace: Replace = False,
 ) -> None:  # fmt: skip
     """Write the release, with what it needs upstream."""
@@ -65,7 +65,7 @@ def split(
 @app.command("run")
 def run(
     pipeline: Annotated[Path, typer.Argument(help="Pipeline file, e.g. pipelines/smoke.toml.")],
-    data: Data = Path("data"), scene: Scene = None,
+    data: Data = "data", scene: Scene = None,
     workers: Workers = None, force: Force = False, quiet: Quiet = False, replace: Replace = False,
 ) -> None:  # fmt: skip
     """Run a pipeline's stages, from recipes and annotations to the release."""

@@ -11,7 +11,7 @@ from aerialdojo_gen.errors import UsageError
 from aerialdojo_gen.exchange import aerialdojo_writer, habitat_writer
 from aerialdojo_gen.exchange.folder import whole_folder, write_json
 from aerialdojo_gen.release.contents import release_scenes
-from aerialdojo_gen.store.root import DataRoot, open_root
+from aerialdojo_gen.store.root import Where, open_root
 
 MARKER = "export.json"
 PICTURE_PX = 640
@@ -23,7 +23,7 @@ FORMATS = {
 
 def export_release(
     format_name: str,
-    data: DataRoot | Path | str,
+    data: Where,
     out: Path,
     scenes: Sequence[str] | None = None,
     *,

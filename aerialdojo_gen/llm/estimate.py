@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import time
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pyarrow as pa
@@ -17,7 +16,7 @@ from aerialdojo_gen.benchmark.tasks import read_tasks, select
 from aerialdojo_gen.errors import AerialDojoError, UsageError
 from aerialdojo_gen.llm.agent import LanguageModelAgent
 from aerialdojo_gen.store import shards as store
-from aerialdojo_gen.store.root import DataRoot, open_root
+from aerialdojo_gen.store.root import DataRoot, Where, open_root
 
 if TYPE_CHECKING:
     from aerialdojo_gen.benchmark.runner import Evaluation
@@ -82,7 +81,7 @@ class Estimate:
         ]
 
 
-def estimate(data: DataRoot | Path | str, evaluation: Evaluation) -> Estimate:
+def estimate(data: Where, evaluation: Evaluation) -> Estimate:
     """Estimate an evaluation: by a few real requests where the service answers, else by reckoning.
 
     Parameters

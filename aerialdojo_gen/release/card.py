@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import jinja2
@@ -16,7 +15,7 @@ from aerialdojo_gen.release.croissant import CITE_AS
 from aerialdojo_gen.stats.tables import Made, in_paper_order, made_of
 from aerialdojo_gen.store import schemas
 from aerialdojo_gen.store import shards as store
-from aerialdojo_gen.store.root import DataRoot, open_root
+from aerialdojo_gen.store.root import DataRoot, Where, open_root
 
 _SIZES = ((1_000, "n<1K"), (10_000, "1K<n<10K"), (100_000, "10K<n<100K"), (1_000_000, "100K<n<1M"))
 
@@ -63,7 +62,7 @@ def _example(root: DataRoot, scenes: list[str]) -> dict[str, Any] | None:
     return None
 
 
-def render_card(data: DataRoot | Path | str) -> str:
+def render_card(data: Where) -> str:
     """Write the card's text from what the release holds.
 
     Returns
@@ -120,7 +119,7 @@ def render_card(data: DataRoot | Path | str) -> str:
     )
 
 
-def write_card(data: DataRoot | Path | str) -> str:
+def write_card(data: Where) -> str:
     """Write ``release/README.md`` from what the release holds.
 
     Returns
@@ -137,4 +136,4 @@ def write_card(data: DataRoot | Path | str) -> str:
     text = render_card(root)
     with root.commit("release/README.md") as path:
         path.write_text(text, encoding="utf-8")
-    return f"{root}/release/README.md"
+    return root.at("release/README.md")

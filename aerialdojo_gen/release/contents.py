@@ -11,7 +11,8 @@ import pyarrow as pa
 from aerialdojo_gen.errors import StoreError
 from aerialdojo_gen.store import schemas
 from aerialdojo_gen.store import shards as store
-from aerialdojo_gen.store.root import DataRoot, LocalRoot, open_root
+from aerialdojo_gen.store.layout import LAYOUT, is_plain, partition, shard_name
+from aerialdojo_gen.store.root import DataRoot, LocalRoot, Where, open_root
 
 
 @dataclass(frozen=True)
@@ -50,46 +51,36 @@ TABLES = {
     "scenes": Table(schemas.SCENES, "One row a scene."),
 }
 
-# Keys of `store.LAYOUT` that make up a scene's part of the release.
-SHARDS = tuple(name for name, place in store.LAYOUT.items() if place.template.startswith("release/"))
+# Keys of `LAYOUT` that make up a scene's part of the release.
+SHARDS = tuple(name for name, place in LAYOUT.items() if place.in_release)
 FOLDER = "release"
 
 
-def part_path(name: str, scene: str, folder: str = FOLDER) -> str:
-    """Return where a scene's part of a shard key lies, relative to the data root; `folder` is the release's there."""
-    template = store.LAYOUT[name].template.removeprefix("release/")
-    within = template.format(scene=store.check_scene_name(scene), partition=store.partition(scene))
-    return f"{folder}/{within}" if folder else within
+def part_name(name: str, scene: str, folder: str = FOLDER) -> str:
+    """Return where a scene's part of one of `SHARDS` lies, relative to the data root; `folder` is the release's."""
+    return f"{folder}/{shard_name(name, scene).partition('/')[2]}".lstrip("/")
 
 
-def parts_there(root: DataRoot, folder: str = FOLDER) -> dict[str, list[str]]:
+def parts_there(where: Where, folder: str = FOLDER) -> dict[str, list[str]]:
     """List what a release holds: the scenes, by name, that each of `SHARDS` has a part of."""
+    root = open_root(where)
     found: dict[str, list[str]] = {}
     for name in SHARDS:
-        folders = sorted({part_path(name, scene, folder).rpartition("/")[0] for scene in ("X_0", "X_1")})
+        folders = sorted({part_name(name, scene, folder).rpartition("/")[0] for scene in ("X_0", "X_1")})
         stems = (PurePosixPath(path).stem for at in folders for path in root.list(at, "part-*.parquet"))
-        scenes = (stem.removeprefix("part-") for stem in stems)
-        found[name] = sorted(scene for scene in scenes if _is_scene(scene))
+        found[name] = sorted(filter(is_plain, (stem.removeprefix("part-") for stem in stems)))
     return found
 
 
-def _is_scene(name: str) -> bool:
-    try:
-        store.check_scene_name(name)
-    except StoreError:
-        return False
-    return True
-
-
-def scenes_there(where: DataRoot | Path | str, folder: str = FOLDER) -> list[str]:
+def scenes_there(where: Where, folder: str = FOLDER) -> list[str]:
     """List the scenes that any table of a release has a part of, by name; none where there is no release.
 
     A scene that lacks a part is listed too, so that whoever reads it is told.
     """
-    return sorted(set().union(*parts_there(open_root(where), folder).values()))
+    return sorted(set().union(*parts_there(where, folder).values()))
 
 
-def release_scenes(where: DataRoot | Path | str, folder: str = FOLDER) -> list[str]:
+def release_scenes(where: Where, folder: str = FOLDER) -> list[str]:
     """List the scenes of a release, by name; one that lacks a part is listed too.
 
     Raises
@@ -104,10 +95,10 @@ def release_scenes(where: DataRoot | Path | str, folder: str = FOLDER) -> list[s
     return scenes
 
 
-def no_release(where: DataRoot | Path | str, folder: str = FOLDER) -> StoreError:
+def no_release(where: Where, folder: str = FOLDER) -> StoreError:
     """Say where no release is, what lacks there, and what to do: an error to be raised."""
     root = open_root(where)
-    place = root.url if folder in ("", FOLDER) else f"{root.url.rstrip('/')}/{folder}"
+    place = root.url if folder in ("", FOLDER) else root.at(folder)
     return StoreError(
         f"there is no release in {place}: {_lack(root, folder)}; "
         "name its folder with --data, or make one with make dataset"
@@ -126,12 +117,12 @@ def _lack(root: DataRoot, folder: str) -> str:
     if there:
         return f"{', '.join(there)} without a file part-<scene>.parquet"
     if folder == FOLDER:
-        return "its folder release is empty" if names else "it has no folder release"
+        return "its folder release holds no tables" if root.exists(FOLDER) else "it has no folder release"
     tables = list(TABLES)
     return f"it has no folder release, nor {', '.join(tables[:-1])} or {tables[-1]}"
 
 
-def mesh_copy(root: DataRoot, told: str) -> Path:
+def mesh_copy(where: Where, told: str) -> Path:
     """Return the mesh that a row of `scenes` names, on this machine.
 
     Raises
@@ -141,6 +132,7 @@ def mesh_copy(root: DataRoot, told: str) -> Path:
     FileNotFoundError
         It is not there.
     """
+    root = open_root(where)
     try:
         path = root.local_copy(told)
     except StoreError:
@@ -152,7 +144,7 @@ def mesh_copy(root: DataRoot, told: str) -> Path:
     return path
 
 
-def check_release(where: DataRoot | Path | str, scenes: list[str] | None = None) -> list[str]:
+def check_release(where: Where, scenes: list[str] | None = None) -> list[str]:
     """Check from the footers that the release's parts are there, whole and of one run.
 
     Parameters
@@ -189,17 +181,17 @@ def _faults(root: DataRoot, scene: str, present: list[str]) -> list[str]:
         return [f"{scene} is not in the release in {root}: {mend}"]
     lines, prints = [], {}
     for name in SHARDS:
-        part = part_path(name, scene)
+        part = part_name(name, scene)
         if name not in present:
-            lines.append(f"{root}/{part} is missing: {mend}")
+            lines.append(f"{root.at(part)} is missing: {mend}")
             continue
         try:
-            info = store.read_info(root.local_copy(part))
+            info = store.read_info(root, part)
         except StoreError as error:
             lines.append(str(error))
             continue
         if info is None:
-            lines.append(f"{root}/{part} was not written by aerialdojo-gen: delete it and {mend}")
+            lines.append(f"{root.at(part)} was not written by aerialdojo-gen: delete it and {mend}")
             continue
         prints[name] = info.fingerprint
     if len(set(prints.values())) > 1:
@@ -236,7 +228,7 @@ def sizes(root: DataRoot, scenes: list[str]) -> dict[str, int]:
     total = dict.fromkeys(TABLES, 0)
     for scene in scenes:
         for name in SHARDS:
-            total[table_and_split(name, scene)[0]] += root.size(part_path(name, scene))
+            total[table_and_split(name, scene)[0]] += root.size(part_name(name, scene))
     return total
 
 
@@ -245,7 +237,7 @@ def table_and_split(name: str, scene: str) -> tuple[str, str]:
     ``("tasks", "ood_train")``, ``"release/objects"`` is ``("objects", "all")``.
     """  # noqa: D205
     first, second = name.split("/")
-    return (second, "all") if first == "release" else (first, f"{store.partition(scene)}_{second}")
+    return (second, "all") if first == "release" else (first, f"{partition(scene)}_{second}")
 
 
 def meaning(field: pa.Field) -> str:

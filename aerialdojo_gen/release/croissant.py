@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import json
-from pathlib import Path
 from typing import Any
 
 import pyarrow as pa
 
 from aerialdojo_gen import __version__
 from aerialdojo_gen.release.contents import TABLES, Table, check_release, counts, meaning, unit
-from aerialdojo_gen.store.root import DataRoot, open_root
+from aerialdojo_gen.store.root import Where, open_root
 
 # Of this version's output. Not the day of the run: the same sources give the same bytes on any day.
 PUBLISHED = "2026-11-21"
@@ -147,7 +146,7 @@ def _field(table: str, field: pa.Field) -> dict[str, Any]:
     }
 
 
-def write_croissant(data: DataRoot | Path | str) -> str:
+def write_croissant(data: Where) -> str:
     """Write ``release/croissant.json`` from what the release holds.
 
     Returns
@@ -164,4 +163,4 @@ def write_croissant(data: DataRoot | Path | str) -> str:
     found = counts(root, check_release(root))
     with root.commit("release/croissant.json") as path:
         path.write_text(json.dumps(croissant(found), indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
-    return f"{root}/release/croissant.json"
+    return root.at("release/croissant.json")

@@ -5,14 +5,13 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
 from aerialdojo_gen.common.paper import PaperScene, benchmarks, family_counts, inventory, shares, splits
 from aerialdojo_gen.stats.comparison import Column, Comparison, Listing, Row
 from aerialdojo_gen.store import shards as store
-from aerialdojo_gen.store.root import DataRoot, open_root
+from aerialdojo_gen.store.root import Where, open_root
 from aerialdojo_gen.store.schemas import FAMILIES, SETTINGS
 
 _COUNTS = tuple(Column(name) for name in ("landmarks", "objects", "base", "standard", "long", "instances"))
@@ -62,7 +61,7 @@ class Made:
         return 2 * sum(self.tasks.values())
 
 
-def made_of(data: DataRoot | Path | str, scene: str) -> Made:
+def made_of(data: Where, scene: str) -> Made:
     """Read what the release holds of a scene.
 
     Raises

@@ -10,12 +10,12 @@ from aerialdojo_gen.stats.figures.cloud import categories, names
 from aerialdojo_gen.stats.figures.maps import maps
 from aerialdojo_gen.stats.figures.shares import shares
 from aerialdojo_gen.stats.figures.style import Routes, read_routes, save
-from aerialdojo_gen.store.root import DataRoot, open_root
+from aerialdojo_gen.store.root import Where, open_root
 
 __all__ = ["draw_figures"]
 
 
-def draw_figures(data: DataRoot | Path | str, scenes: Sequence[str], folder: Path) -> list[Path]:
+def draw_figures(data: Where, scenes: Sequence[str], folder: Path) -> list[Path]:
     """Draw all figures.
 
     Parameters

@@ -15,8 +15,8 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from aerialdojo_gen.store import shards as store
-from aerialdojo_gen.store.root import DataRoot
 from aerialdojo_gen.store.atomic import atomic_file
+from aerialdojo_gen.store.root import DataRoot
 from aerialdojo_gen.store.schemas import FAMILIES, SETTINGS
 
 # Settings are ordered, so they are shades of one colour; families are not (Paul Tol's muted scheme).
