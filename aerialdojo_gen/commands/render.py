@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import time
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -22,6 +22,9 @@ from aerialdojo_gen.commands.common import (
     run_until,
 )
 from aerialdojo_gen.errors import UsageError
+
+if TYPE_CHECKING:
+    from aerialdojo_gen.store.root import Where
 
 app = typer.Typer()
 
@@ -72,7 +75,7 @@ def render(
     )  # fmt: skip
 
 
-def _scenes_of(split: str | None, scene: list[str] | None, pipeline: Path | None, data: Path) -> list[str] | None:
+def _scenes_of(split: str | None, scene: list[str] | None, pipeline: Path | None, data: Where) -> list[str] | None:
     """Leave out the scenes that a split such as id_train has nothing of: their recordings stay as they are."""
     if split is None or "_" not in split:
         return scene
@@ -88,7 +91,7 @@ def _scenes_of(split: str | None, scene: list[str] | None, pipeline: Path | None
 
 
 def _estimate(
-    data: Path,
+    data: Where,
     scene: list[str] | None,
     pipeline: Path | None,
     workers: int | None,

@@ -199,7 +199,7 @@ def _faults(root: DataRoot, scene: str, present: list[str]) -> list[str]:
     return lines
 
 
-def counts(root: DataRoot, scenes: list[str]) -> dict[str, dict[str, int]]:
+def counts(root: Where, scenes: list[str]) -> dict[str, dict[str, int]]:
     """Count the rows of every table and split of these scenes, from the footers.
 
     Returns
@@ -223,9 +223,9 @@ def counts(root: DataRoot, scenes: list[str]) -> dict[str, dict[str, int]]:
     }  # fmt: skip
 
 
-def sizes(root: DataRoot, scenes: list[str]) -> dict[str, int]:
+def sizes(where: Where, scenes: list[str]) -> dict[str, int]:
     """Bytes of every table of these scenes."""
-    total = dict.fromkeys(TABLES, 0)
+    root, total = open_root(where), dict.fromkeys(TABLES, 0)
     for scene in scenes:
         for name in SHARDS:
             total[table_and_split(name, scene)[0]] += root.size(part_name(name, scene))

@@ -10,7 +10,7 @@ import numpy as np
 from aerialdojo_gen.common.paper import PaperScene, inventory
 from aerialdojo_gen.errors import PoolError
 from aerialdojo_gen.store import shards as store
-from aerialdojo_gen.store.root import DataRoot
+from aerialdojo_gen.store.root import Where
 from aerialdojo_gen.store.schemas import SETTINGS
 
 
@@ -52,7 +52,7 @@ class Pool:
         return self.path_m[0] <= 1.01 * self.paper.path_m and self.path_m[1] >= 0.99 * self.paper.path_m
 
 
-def pool_of(root: DataRoot, scene: str) -> Pool:
+def pool_of(root: Where, scene: str) -> Pool:
     """Read what `filter` kept of a scene.
 
     Raises
@@ -74,7 +74,7 @@ def pool_of(root: DataRoot, scene: str) -> Pool:
     return Pool(scene, verdicts.num_rows, {s: len(v) for s, v in lengths.items()}, paper, path)
 
 
-def require_pools(root: DataRoot, scenes: Sequence[str]) -> None:
+def require_pools(root: Where, scenes: Sequence[str]) -> None:
     """Raise a `PoolError` that names every scene and setting with fewer kept candidates than the paper has tasks.
 
     Raises

@@ -11,7 +11,7 @@ from aerialdojo_gen.config.pipeline import Pipeline
 from aerialdojo_gen.errors import StoreError, UsageError
 from aerialdojo_gen.release.contents import scenes_there
 from aerialdojo_gen.store import shards as store
-from aerialdojo_gen.store.root import DataRoot
+from aerialdojo_gen.store.root import DataRoot, Where, open_root
 
 RECORD = "release/pipeline.json"
 # What does not change the release: folders of this machine, which scenes and stages are asked for, recordings.
@@ -45,8 +45,9 @@ def maker_of(pipeline: Pipeline) -> Maker:
     return Maker(pipeline.name, hashlib.sha256(json.dumps(settings, sort_keys=True).encode()).hexdigest())
 
 
-def makers(root: DataRoot) -> dict[str, Maker]:
+def makers(data: Where) -> dict[str, Maker]:
     """Return the makers of a release's scenes, by scene; one that the release does not know is `Maker()`."""
+    root = open_root(data)
     known: dict[str, Maker] = {}
     try:
         for entry in json.loads(root.local_copy(RECORD).read_text(encoding="utf-8"))["pipelines"]:
@@ -58,8 +59,9 @@ def makers(root: DataRoot) -> dict[str, Maker]:
     return {scene: known.get(scene, Maker()) for scene in scenes_there(root)}
 
 
-def record_makers(root: DataRoot, pipeline: Pipeline, scenes: Sequence[str]) -> None:
+def record_makers(data: Where, pipeline: Pipeline, scenes: Sequence[str]) -> None:
     """Write down that a pipeline made these scenes of the release."""
+    root = open_root(data)
     found = makers(root)
     found |= {scene: maker_of(pipeline) for scene in scenes if scene in found}
     entries = [
@@ -70,12 +72,13 @@ def record_makers(root: DataRoot, pipeline: Pipeline, scenes: Sequence[str]) -> 
         path.write_text(json.dumps({"pipelines": entries}, indent=1) + "\n", encoding="utf-8")
 
 
-def check_replaced(root: DataRoot, pipeline: Pipeline, scenes: Sequence[str], *, whole: bool) -> None:
+def check_replaced(data: Where, pipeline: Pipeline, scenes: Sequence[str], *, whole: bool) -> None:
     """Refuse to put a pipeline's release in the place of another one's.
 
     Parameters
     ----------
-    root : DataRoot
+    data : DataRoot, Path or str
+        The data root.
     pipeline : Pipeline
         What is about to run.
     scenes : sequence of str
@@ -89,7 +92,7 @@ def check_replaced(root: DataRoot, pipeline: Pipeline, scenes: Sequence[str], *,
         Scenes would be removed that another pipeline made, or other settings of this one; or scenes replaced that a
         pipeline of another name made.
     """
-    mine = maker_of(pipeline)
+    root, mine = open_root(data), maker_of(pipeline)
     found = makers(root)
     removed = [scene for scene, maker in found.items() if whole and scene not in scenes and maker != mine]
     replaced = [scene for scene, maker in found.items() if scene in scenes and maker.name not in ("", mine.name)]
