@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 
 import pytest
+
 from aerialdojo_gen import cli
 
 TASK = "U_Courtyard_0-0123456789ab"
