@@ -241,5 +241,5 @@ def mesh_of(root: DataRoot, scene: str) -> tuple[Path, str]:
     try:
         return mesh_copy(root, row["mesh_path"]), row["mesh_sha256"]
     except FileNotFoundError:
-        told = f"{root}/{row['mesh_path']}"
+        told = root.at(row["mesh_path"])
         raise StoreError(f"the mesh {told} is missing: run aerialdojo-gen build-scenes --scene {scene}") from None

@@ -107,7 +107,7 @@ class ReleasedScene:
             path = mesh_copy(self.root, told)
         except FileNotFoundError:
             raise AssetError(
-                f"the mesh {self.root}/{told} is missing: run aerialdojo-gen build-scenes --scene {self.name}"
+                f"the mesh {self.root.at(told)} is missing: run aerialdojo-gen build-scenes --scene {self.name}"
             ) from None
         return read_glb(path, self.row["mesh_sha256"])
 

@@ -47,7 +47,7 @@ class Redrawn:
         try:
             mesh = mesh_copy(root, row["mesh_path"])
         except FileNotFoundError:
-            missing = f"{root}/{row['mesh_path']}"
+            missing = root.at(row["mesh_path"])
             raise AssetError(
                 f"{missing} is missing, so its pictures cannot be drawn at {size_px} px: {keep}"
             ) from None

@@ -132,16 +132,29 @@ def mesh_copy(where: Where, told: str) -> Path:
     FileNotFoundError
         It is not there.
     """
-    root = open_root(where)
-    try:
-        path = root.local_copy(told)
-    except StoreError:
-        raise StoreError(f"release/scenes: mesh_path {told!r} leads out of {root}") from None
-    if isinstance(root, LocalRoot) and not path.resolve().is_relative_to(root.path.resolve()):
-        raise StoreError(f"release/scenes: mesh_path {told!r} leads out of {root}")
+    path = copy_below(where, told, "release/scenes: mesh_path")
     if not path.is_file():
         raise FileNotFoundError(2, os.strerror(2), str(path))
     return path
+
+
+def copy_below(where: Where, told: str, column: str) -> Path:
+    """Return what a table's column names, on this machine.
+
+    Raises
+    ------
+    StoreError
+        The column names a path outside of the data root, by dots or by a symbolic link.
+    FileNotFoundError
+        It is not there.
+    """
+    root = open_root(where)
+    away = PurePosixPath(told).is_absolute() or ".." in PurePosixPath(told).parts
+    if isinstance(root, LocalRoot):
+        away = away or not (root.path / told).resolve().is_relative_to(root.path.resolve())
+    if away:
+        raise StoreError(f"{column} {told!r} leads out of {root}")
+    return root.local_copy(told)
 
 
 def check_release(where: Where, scenes: list[str] | None = None) -> list[str]:

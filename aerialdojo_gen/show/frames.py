@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 from aerialdojo_gen.browse.lookup import FoundTask
 from aerialdojo_gen.errors import StoreError
 from aerialdojo_gen.geometry.cameras import Camera, view_pose
+from aerialdojo_gen.release.contents import copy_below
 from aerialdojo_gen.store import schemas
 from aerialdojo_gen.store import shards as store
-from aerialdojo_gen.store.root import DataRoot, LocalRoot
+from aerialdojo_gen.store.root import DataRoot
 
 SIZE_PX = 320
 
@@ -111,13 +112,7 @@ def _recorded(task: FoundTask, steps: list[int]) -> list[NDArray[np.uint8]] | No
 
 
 def _copy(root: DataRoot, told: str) -> Path:
-    """Return a recording on this machine; StoreError where it is not there, or not below the root."""
     try:
-        path = root.local_copy(told)
+        return copy_below(root, told, "recordings: path")
     except FileNotFoundError:
-        raise StoreError(f"the recording {root}/{told} is missing: run aerialdojo-gen render") from None
-    except StoreError:
-        raise StoreError(f"recordings: path {told!r} leads out of {root}") from None
-    if isinstance(root, LocalRoot) and not path.resolve().is_relative_to(root.path.resolve()):
-        raise StoreError(f"recordings: path {told!r} leads out of {root}")
-    return path
+        raise StoreError(f"the recording {root.at(told)} is missing: run aerialdojo-gen render") from None
