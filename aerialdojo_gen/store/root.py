@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import BinaryIO, TextIO, TypeAlias
 
-from aerialdojo_gen.errors import StoreError
+from aerialdojo_gen.errors import StoreError, UsageError
 from aerialdojo_gen.store import files
 from aerialdojo_gen.store.atomic import atomic_file, atomic_folder, disk_error
 from aerialdojo_gen.store.staging import remove, sweep, sweep_unstaged
@@ -53,8 +53,21 @@ class DataRoot(ABC):
         """Bytes of a file, or of a folder's files together; FileNotFoundError where there is none."""
 
     @abstractmethod
-    def digest(self, relative: str) -> str:
-        """SHA-256 of a file's bytes, hexadecimal; FileNotFoundError where there is none."""
+    def digest(self, relative: str, *, anew: bool = False) -> str:
+        """SHA-256 of a file's bytes, or of a folder's files one after the other by name; hexadecimal.
+
+        Parameters
+        ----------
+        relative : str
+            The file or folder.
+        anew : bool
+            Read the bytes also where their digest is known.
+
+        Raises
+        ------
+        FileNotFoundError
+            There is none of that name.
+        """
 
     @abstractmethod
     def version(self, relative: str) -> str:
@@ -107,6 +120,13 @@ class DataRoot(ABC):
     def refresh(self) -> None:  # noqa: B027 - a directory remembers nothing
         """Forget what was found where; a root that is pickled afterwards makes other processes forget it too."""
 
+    def is_whole(self, relative: str, size: int, sha256: str = "", *, anew: bool = False) -> bool:
+        """Whether a file or folder is there, of a size, and of a digest where one is given (see `digest`)."""
+        try:
+            return self.size(relative) == size and (not sha256 or self.digest(relative, anew=anew) == sha256)
+        except OSError:
+            return False
+
     def exists(self, relative: str) -> bool:
         """Whether there is a file or a folder of that name."""
         try:
@@ -144,9 +164,10 @@ class LocalRoot(DataRoot):
         """Bytes of a file, or of a folder's files together."""
         return files.size_of(self._at(relative))
 
-    def digest(self, relative: str) -> str:
+    def digest(self, relative: str, *, anew: bool = False) -> str:
         """SHA-256 of a file's bytes, read once in a process as long as it is not written to."""
-        return files.file_digest(self._at(relative))
+        path = self._at(relative)
+        return files.sha256_of(path) if anew or path.is_dir() else files.file_digest(path)
 
     def version(self, relative: str) -> str:
         """Inode, size and times of the file: one that is replaced or written to is another."""
@@ -238,13 +259,36 @@ def open_root(where: Where) -> DataRoot:
     Parameters
     ----------
     where : DataRoot, Path or str
-        A directory, which need not be there yet, or a URL of an object store; a data root is returned as it is.
+        A directory, which need not be there yet, or a URL of an object store (``s3://bucket/prefix``); a data root is
+        returned as it is.
 
     Raises
     ------
+    UsageError
+        A URL of a kind that nothing here reads, without a bucket, or with credentials in it.
     StoreError
-        A URL of a kind that nothing here reads, or the extra for it is not installed.
+        The extra for it is not installed.
     """
     if isinstance(where, DataRoot):
         return where
-    return LocalRoot(Path(where).absolute())
+    scheme, separator, rest = str(where).partition("://")
+    if isinstance(where, Path) or not separator:
+        return LocalRoot(Path(where).absolute())
+    bucket, _, prefix = rest.partition("/")
+    if "@" in bucket:
+        raise UsageError(
+            f"credentials do not belong in a URL (that of bucket {bucket.rpartition('@')[2]}): set AWS_ACCESS_KEY_ID "
+            "and AWS_SECRET_ACCESS_KEY, or AWS_PROFILE"
+        )
+    if scheme == "file":
+        if not rest.startswith("/"):
+            raise UsageError(f"{where} names no directory of this machine: write file:///path, or the path alone")
+        return LocalRoot(Path(rest))
+    if scheme not in ("s3", "s3a"):
+        raise UsageError(f"--data {where}: write a directory, or s3://bucket/prefix")
+    if not bucket or "?" in rest or "#" in rest:
+        raise UsageError(f"--data {where} is no URL of a bucket: write s3://bucket/prefix")
+    # Nothing of it is imported where data lie in a directory.
+    from aerialdojo_gen.store.object_root import ObjectRoot
+
+    return ObjectRoot(bucket, inside("/".join(part for part in prefix.split("/") if part not in ("", "."))))
