@@ -30,7 +30,7 @@ from aerialdojo_gen.annotate.history import Action, History, Record
 from aerialdojo_gen.annotations.format import Annotations, format_annotations, parse_annotations
 from aerialdojo_gen.common.disk import disk_error
 from aerialdojo_gen.errors import AnnotationError, brief
-from aerialdojo_gen.store.shards import check_scene_name
+from aerialdojo_gen.store.layout import check_scene_name
 
 
 @dataclass(frozen=True)

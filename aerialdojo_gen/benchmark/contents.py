@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 from aerialdojo_gen.benchmark import breakdowns, radii, tables
 from aerialdojo_gen.benchmark.difficulty import difficulty_tables
@@ -15,6 +14,7 @@ from aerialdojo_gen.benchmark.runs import Run
 from aerialdojo_gen.common.names import unknown
 from aerialdojo_gen.common.paper import PaperResult
 from aerialdojo_gen.errors import UsageError
+from aerialdojo_gen.store.root import DataRoot
 
 
 @dataclass(frozen=True)
@@ -23,8 +23,8 @@ class Wanted:
 
     Attributes
     ----------
-    data : Path
-        The data directory, whose release says more of the tasks; the runs need not lie in it.
+    data : DataRoot
+        The data root, whose release says more of the tasks; the runs need not lie in it.
     runs : sequence of Run
         In the order and the groups of the lines.
     profiles : sequence of Profile
@@ -37,7 +37,7 @@ class Wanted:
         The paper's results, to be set beside ours.
     """
 
-    data: Path
+    data: DataRoot
     runs: Sequence[Run]
     profiles: Sequence[Profile]
     radii_m: Sequence[float] = radii.DEFAULT_RADII_M

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import pairwise
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,6 +14,7 @@ from aerialdojo_gen.benchmark.profiles import Profile
 from aerialdojo_gen.benchmark.runs import Run
 from aerialdojo_gen.errors import StoreError
 from aerialdojo_gen.store import shards as store
+from aerialdojo_gen.store.root import DataRoot
 
 # Columns that a release or a log may have; one that is in neither has no table.
 _YES_NO = {
@@ -28,13 +28,13 @@ _MEASURED = {
 }
 
 
-def difficulty_tables(data: Path, runs: Sequence[Run], profile: Profile) -> list[Table]:
+def difficulty_tables(root: DataRoot, runs: Sequence[Run], profile: Profile) -> list[Table]:
     """Make a table for every measure of difficulty that the release has, or the log.
 
     Parameters
     ----------
-    data : Path
-        The data directory. Without a release only what the log says is shown.
+    root : DataRoot
+        The data root. Without a release only what the log says is shown.
     runs : sequence of Run
     profile : Profile
 
@@ -43,7 +43,7 @@ def difficulty_tables(data: Path, runs: Sequence[Run], profile: Profile) -> list
     list of Table
         Seen and unseen targets first. A measure by which all episodes are alike has none.
     """
-    released = _Released(data)
+    released = _Released(root)
     tables = []
     for name, (title, yes, no) in _YES_NO.items():
         values = [_values(run, name, released) for run in runs]
@@ -88,8 +88,8 @@ def _values(run: Run, name: str, released: _Released) -> list[Any] | None:
 class _Released:
     """What a release says of navigation tasks, a scene at a time, nothing where there is no release."""
 
-    def __init__(self, data: Path) -> None:
-        self._data = data
+    def __init__(self, root: DataRoot) -> None:
+        self._root = root
         self._columns: dict[tuple[str, str, str], dict[str, Any]] = {}
 
     def value(self, scene: str, subset: str, nav_id: str, name: str) -> Any:
@@ -111,7 +111,7 @@ class _Released:
 
     def _column(self, table: str, scene: str, subset: str, name: str) -> dict[str, Any]:
         try:
-            found = store.read_scene(self._data, f"{table}/{subset}", scene, ["nav_id", name])
+            found = store.read_scene(self._root, f"{table}/{subset}", scene, ["nav_id", name])
         except StoreError:
             # No release, or one of another version: the log speaks for itself.
             return {}

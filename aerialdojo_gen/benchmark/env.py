@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import string
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 import gymnasium
@@ -23,7 +22,7 @@ from aerialdojo_gen.common.names import unknown
 from aerialdojo_gen.config.agreement import SUCCESS_RADIUS_M
 from aerialdojo_gen.config.sections import Embodiment
 from aerialdojo_gen.errors import UsageError
-from aerialdojo_gen.store.root import DataRoot, open_root
+from aerialdojo_gen.store.root import Where, open_root
 from aerialdojo_gen.store.schemas import DIRECTIONS, VIEWS
 
 _TEXT = ("target_name", "landmark", "description")
@@ -46,8 +45,8 @@ class AerialDojoEnv(gymnasium.Env[dict[str, Any], np.int64]):
 
     Parameters
     ----------
-    data : path
-        The data directory: its release and its meshes.
+    data : DataRoot, path or str
+        The data root, a directory or a URL: its release and its meshes.
     split, setting, modality, scene : str or sequence of str, optional
         Which tasks; all where absent. Scenes may be globs.
     limit : int, optional
@@ -79,7 +78,7 @@ class AerialDojoEnv(gymnasium.Env[dict[str, Any], np.int64]):
 
     def __init__(
         self,
-        data: str | Path = "data",
+        data: Where = "data",
         *,
         split: str | Sequence[str] = (),
         setting: str | Sequence[str] = (),
@@ -101,7 +100,7 @@ class AerialDojoEnv(gymnasium.Env[dict[str, Any], np.int64]):
         if render_mode not in (None, "rgb_array"):
             raise UsageError(f"no render mode {render_mode!r}: there is 'rgb_array'")
         self.render_mode = render_mode
-        self._data = Path(data).absolute()
+        self._data = open_root(data)
         self._sensors = sensors or Sensors(tuple(views), rgb, depth, width, height)
         self._flight = Flight(self._data, self._sensors, success_radius_m, embodiment, renderer)
         self._begun = False
@@ -276,7 +275,7 @@ class AerialDojoEnv(gymnasium.Env[dict[str, Any], np.int64]):
         return observation
 
 
-def make_env(data: str | Path | DataRoot = "data", **options: Any) -> AerialDojoEnv:
+def make_env(data: Where = "data", **options: Any) -> AerialDojoEnv:
     """Make the environment of a release; ``gymnasium.make("AerialDojo-v0", data=data)`` without Gymnasium's checks.
 
     Parameters

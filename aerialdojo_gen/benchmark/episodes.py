@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
+from pathlib import PurePosixPath
 from typing import Any
 
 import numpy as np
@@ -14,29 +14,31 @@ from aerialdojo_gen.common.names import unknown
 from aerialdojo_gen.errors import StoreError
 from aerialdojo_gen.store import schemas
 from aerialdojo_gen.store import shards as store
+from aerialdojo_gen.store.layout import shard_folder
+from aerialdojo_gen.store.root import Where, open_root
 from aerialdojo_gen.store.tables import from_rows
 
 TABLES = ("episodes", "steps", "timings", "failures")
 
 
-def runs(data: Path) -> list[str]:
+def runs(data: Where) -> list[str]:
     """List the runs that have written episodes, by name."""
-    return sorted({path.parent.name for path in (data / "episodes").glob("*/part-*.parquet")})
+    return sorted({PurePosixPath(name).parent.name for name in open_root(data).list("episodes", "*/part-*.parquet")})
 
 
-def run_scenes(data: Path, run: str) -> list[str]:
+def run_scenes(data: Where, run: str) -> list[str]:
     """List the scenes that a run has written, by name."""
-    folder = store.shard_path(data, "episodes", "any", run=run).parent
-    return sorted(path.stem.removeprefix("part-") for path in folder.glob("part-*.parquet"))
+    names = open_root(data).list(shard_folder("episodes", "any", run), "part-*.parquet")
+    return sorted(PurePosixPath(name).stem.removeprefix("part-") for name in names)
 
 
-def read_run(data: Path, run: str, table: str = "episodes", columns: Sequence[str] | None = None) -> pa.Table:
+def read_run(data: Where, run: str, table: str = "episodes", columns: Sequence[str] | None = None) -> pa.Table:
     """Read a table of a run, all its scenes.
 
     Parameters
     ----------
-    data : Path
-        The folder that `evaluate` wrote to.
+    data : DataRoot, Path or str
+        The root that `evaluate` wrote to.
     run : str
         Name of the run.
     table : str
@@ -54,32 +56,33 @@ def read_run(data: Path, run: str, table: str = "episodes", columns: Sequence[st
     StoreError
         There is no such run, or a part of it is damaged.
     """
-    scenes = run_scenes(data, run)
+    root = open_root(data)
+    scenes = run_scenes(root, run)
     if not scenes:
-        raise StoreError(f"{unknown(f'in {data} there is no run', run, runs(data))}; "
+        raise StoreError(f"{unknown(f'in {root} there is no run', run, runs(root))}; "
                          f"aerialdojo-gen evaluate --run {run} makes it")  # fmt: skip
-    return pa.concat_tables([store.read_scene(data, table, scene, columns, run=run) for scene in scenes])
+    return pa.concat_tables([store.read_scene(root, table, scene, columns, run=run) for scene in scenes])
 
 
-def has_table(data: Path, run: str, table: str) -> bool:
+def has_table(data: Where, run: str, table: str) -> bool:
     """Tell whether a run has a table for every scene that it has episodes of."""
     return all(store.shards(data, table, scene, run) for scene in run_scenes(data, run))
 
 
-def fingerprint_of(data: Path, run: str, scene: str) -> str | None:
+def fingerprint_of(data: Where, run: str, scene: str) -> str | None:
     """Return the fingerprint that a scene's episodes were written with; None where there are none."""
     paths = store.shards(data, "episodes", scene, run)
-    info = store.read_info(paths[0]) if paths else None
+    info = store.read_info(data, paths[0]) if paths else None
     return info.fingerprint if info else None
 
 
-def add_records(data: Path, run: str, scene: str, records: Sequence[dict[str, Any]], fingerprint: str) -> None:
+def add_records(data: Where, run: str, scene: str, records: Sequence[dict[str, Any]], fingerprint: str) -> None:
     """Add finished episodes of a scene to a run's tables.
 
     Parameters
     ----------
-    data : Path
-        The folder to write to.
+    data : DataRoot, Path or str
+        The root to write to.
     run, scene : str
     records : sequence of dict
         Either ``episode``, ``timing`` and ``steps`` (column to list), or ``failure``; ``task_id`` in each. One that
@@ -127,8 +130,9 @@ def _steps(run: str, scene: str, flown: Sequence[dict[str, Any]]) -> pa.Table:
     return pa.table({f.name: pa.array(columns.get(f.name, []), f.type) for f in schema}, schema=schema)
 
 
-def remove_run(data: Path, run: str) -> None:
+def remove_run(data: Where, run: str) -> None:
     """Remove a run's tables."""
+    root = open_root(data)
     for table in TABLES:
-        for path in store.shard_path(data, table, "any", run=run).parent.glob("part-*.parquet"):
-            path.unlink()
+        for name in root.list(shard_folder(table, "any", run), "part-*.parquet"):
+            root.delete(name)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import time
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pyarrow as pa
@@ -17,6 +16,7 @@ from aerialdojo_gen.benchmark.tasks import read_tasks, select
 from aerialdojo_gen.errors import AerialDojoError, UsageError
 from aerialdojo_gen.llm.agent import LanguageModelAgent
 from aerialdojo_gen.store import shards as store
+from aerialdojo_gen.store.root import DataRoot, Where, open_root
 
 if TYPE_CHECKING:
     from aerialdojo_gen.benchmark.runner import Evaluation
@@ -81,13 +81,13 @@ class Estimate:
         ]
 
 
-def estimate(data: Path, evaluation: Evaluation) -> Estimate:
+def estimate(data: Where, evaluation: Evaluation) -> Estimate:
     """Estimate an evaluation: by a few real requests where the service answers, else by reckoning.
 
     Parameters
     ----------
-    data : Path
-        The data directory.
+    data : DataRoot, Path or str
+        The data root.
     evaluation : Evaluation
         Of an agent that asks a language model.
 
@@ -99,7 +99,8 @@ def estimate(data: Path, evaluation: Evaluation) -> Estimate:
     cls = agent_class(evaluation.agent)
     if not (isinstance(cls, type) and issubclass(cls, LanguageModelAgent)):
         raise UsageError(f"--estimate is for agents that ask a language model, not {evaluation.agent!r}")
-    rows = select(data.absolute(), evaluation.selection)
+    root = open_root(data)
+    rows = select(root, evaluation.selection)
     agent, why_not = _made(evaluation)
     try:
         if not why_not:
@@ -107,8 +108,8 @@ def estimate(data: Path, evaluation: Evaluation) -> Estimate:
                 agent.check()
             except AerialDojoError as error:
                 why_not = str(error).removeprefix("checked before the run, nothing flown: ")
-        figures = _sampled(data.absolute(), evaluation, rows, agent, asks=not why_not)
-        requests = _references(data.absolute(), rows), int(pc.sum(rows["action_budget"]).as_py())
+        figures = _sampled(root, evaluation, rows, agent, asks=not why_not)
+        requests = _references(root, rows), int(pc.sum(rows["action_budget"]).as_py())
         tokens_in, tokens_out, request_s, render_s, n = figures
         costs = [agent.options.cost_usd(k * tokens_in, k * tokens_out) for k in requests]
         cost = None if costs[0] is None or costs[1] is None else (costs[0], costs[1])
@@ -130,16 +131,16 @@ def _made(evaluation: Evaluation) -> tuple[LanguageModelAgent, str]:
 
 
 def _sampled(
-    data: Path, evaluation: Evaluation, rows: pa.Table, agent: LanguageModelAgent, asks: bool
+    root: DataRoot, evaluation: Evaluation, rows: pa.Table, agent: LanguageModelAgent, asks: bool
 ) -> tuple[float, float, float, float, int]:
     """Fly the first steps of a few tasks; tokens in and out, seconds of a request and of its pictures, how many."""
     sensors = evaluation.sensors or agent.sensors
-    flight = Flight(data, replace(sensors), embodiment=evaluation.embodiment, renderer=evaluation.renderer)
+    flight = Flight(root, replace(sensors), embodiment=evaluation.embodiment, renderer=evaluation.renderer)
     # Of one scene: making another ready takes longer than all the requests.
     few = rows.filter(pc.equal(rows["scene"], rows["scene"][0].as_py())).slice(0, _TASKS)
     sums = [0.0, 0.0, 0.0, 0.0]
     requests = looks = 0
-    for task in read_tasks(data, few):
+    for task in read_tasks(root, few):
         episode = flight.begin(task)
         agent.reset(flight.goal)
         for _ in range(_STEPS):
@@ -171,13 +172,13 @@ def _sampled(
     return sums[0] / requests, sums[1] / requests, sums[2] / requests, render_s, requests
 
 
-def _references(data: Path, rows: pa.Table) -> int:
+def _references(root: DataRoot, rows: pa.Table) -> int:
     """Sum the actions of the references of all instances."""
     total = 0
     for scene in rows["scene"].unique().to_pylist():
         mine = rows.filter(pc.equal(rows["scene"], scene))
         for subset in mine["subset"].unique().to_pylist():
-            routes = store.read_scene(data, f"routes/{subset}", scene, ("nav_id", "n_actions"))
+            routes = store.read_scene(root, f"routes/{subset}", scene, ("nav_id", "n_actions"))
             counts = dict(zip(routes["nav_id"].to_pylist(), routes["n_actions"].to_pylist(), strict=True))
             of_subset = mine.filter(pc.equal(mine["subset"], subset))
             total += sum(counts[nav_id] for nav_id in of_subset["nav_id"].to_pylist())

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 from aerialdojo_gen.agents.goal import Goal, Observation, Rules, Sensors
 from aerialdojo_gen.benchmark.episode import Episode
 from aerialdojo_gen.benchmark.eyes import look
@@ -11,6 +9,7 @@ from aerialdojo_gen.benchmark.motion import FlightSpace, flight_space
 from aerialdojo_gen.benchmark.tasks import Task, goal_of, mesh_of
 from aerialdojo_gen.config.agreement import SUCCESS_RADIUS_M
 from aerialdojo_gen.config.sections import Embodiment
+from aerialdojo_gen.store.root import Where, open_root
 
 
 class Flight:
@@ -20,8 +19,8 @@ class Flight:
 
     Parameters
     ----------
-    data : Path
-        The data directory, with release and meshes.
+    data : DataRoot, Path or str
+        The data root, with release and meshes.
     sensors : Sensors
         What observations hold.
     success_radius_m : float
@@ -49,13 +48,13 @@ class Flight:
 
     def __init__(
         self,
-        data: Path,
+        data: Where,
         sensors: Sensors,
         success_radius_m: float = SUCCESS_RADIUS_M,
         embodiment: Embodiment | None = None,
         renderer: str = "auto",
     ) -> None:
-        self._data = data.absolute()
+        self._data = open_root(data)
         self._body = embodiment or Embodiment()
         self.renderer = renderer
         self.sensors = sensors

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 
@@ -13,17 +12,18 @@ from aerialdojo_gen.benchmark.episodes import runs as run_names
 from aerialdojo_gen.benchmark.runs import FLOORS, GROUP_OF, UPPER_BOUND, Run, load_runs
 from aerialdojo_gen.common.names import unknown
 from aerialdojo_gen.errors import StoreError, UsageError
+from aerialdojo_gen.store.root import DataRoot
 
 _FLOOR_AGENTS = tuple(agent for agent, group in GROUP_OF.items() if group == FLOORS)
 
 
-def with_floors(log: Path, runs: Sequence[Run]) -> list[Run]:
+def with_floors(log: DataRoot, runs: Sequence[Run]) -> list[Run]:
     """Add the floors that were flown on the same tasks and are not among the runs.
 
     Parameters
     ----------
-    log : Path
-        The directory that `evaluate` wrote to.
+    log : DataRoot
+        The root that `evaluate` wrote to.
     runs : sequence of Run
         Those to be reported.
 
@@ -48,7 +48,7 @@ def with_floors(log: Path, runs: Sequence[Run]) -> list[Run]:
     return [*runs, *(added[agent] for agent in _FLOOR_AGENTS if agent in added)]
 
 
-def _is_floor(log: Path, name: str) -> bool:
+def _is_floor(log: DataRoot, name: str) -> bool:
     try:
         agents = read_run(log, name, columns=["agent"])["agent"]
     except StoreError:

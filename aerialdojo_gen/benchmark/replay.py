@@ -10,7 +10,6 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -25,6 +24,7 @@ from aerialdojo_gen.browse.lookup import ReleasedScene
 from aerialdojo_gen.common.pictures import MAP_JPEG, REPLAY_JPEG, data_url, encode_jpeg
 from aerialdojo_gen.errors import StoreError
 from aerialdojo_gen.rendering.orthographic import OrthographicPictures
+from aerialdojo_gen.store.root import DataRoot, Where, open_root
 from aerialdojo_gen.store.schemas import ACTION_NAMES
 
 _MAP_PX = 640
@@ -139,16 +139,16 @@ def choose_tasks(runs: Sequence[Run], count: int) -> list[str]:
 
 
 def replays(
-    data: Path, log: Path, runs: Sequence[Run], tasks: Sequence[str], frames: bool = False
+    data: Where, log: Where, runs: Sequence[Run], tasks: Sequence[str], frames: bool = False
 ) -> Iterator[Replay]:
     """Make replays.
 
     Parameters
     ----------
-    data : Path
-        The data directory, with the release that the runs were made from.
-    log : Path
-        The directory that `evaluate` wrote to.
+    data : DataRoot, Path or str
+        The data root, with the release that the runs were made from.
+    log : DataRoot, Path or str
+        The root that `evaluate` wrote to.
     runs : sequence of Run
         Those that flew a task are shown together.
     tasks : sequence of str
@@ -165,6 +165,7 @@ def replays(
     StoreError, UsageError, AssetError
         The release or its mesh is missing, or is not the one that the runs were made from.
     """
+    root = open_root(data)
     steps = {run.name: read_run(log, run.name, "steps") for run in runs if tasks}
     for task_id in tasks:
         flown = []
@@ -173,10 +174,10 @@ def replays(
             if rows:
                 flown.append((run, rows[0]))
         episode = flown[0][1]
-        scene = _scene(data, episode["scene"])
+        scene = _scene(root, episode["scene"])
         instances = [t for t in scene.instances(episode["nav_id"]) if t["task_id"] == task_id]
         if not instances:
-            raise StoreError(f"the release in {data} has no task {task_id}: it is not the one that the runs flew")
+            raise StoreError(f"the release in {root} has no task {task_id}: it is not the one that the runs flew")
         route = scene.route(episode["nav_id"])
         target = scene.object(route["target_object_id"])
         flights = [_flight(scene, run, row, steps[run.name], frames) for run, row in flown]
@@ -195,8 +196,8 @@ def replays(
 
 
 @lru_cache(maxsize=4)
-def _scene(data: Path, name: str) -> ReleasedScene:
-    return ReleasedScene(data, name)
+def _scene(root: DataRoot, name: str) -> ReleasedScene:
+    return ReleasedScene(root, name)
 
 
 @lru_cache(maxsize=4)

@@ -9,42 +9,43 @@ from __future__ import annotations
 
 import hashlib
 import json
-import shutil
 import time
 from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
 from typing import Any
 
 import pyarrow as pa
 import pyarrow.compute as pc
 
 from aerialdojo_gen.agents import ServiceDown
-from aerialdojo_gen.benchmark import episodes, journal
+from aerialdojo_gen.benchmark import episodes
 from aerialdojo_gen.benchmark.evaluation import Evaluation, Outcome
 from aerialdojo_gen.benchmark.flying_code import flying_code
+from aerialdojo_gen.benchmark.journals import Journals
 from aerialdojo_gen.benchmark.limits import Limits, Tally
 from aerialdojo_gen.benchmark.preflight import checked
 from aerialdojo_gen.benchmark.tasks import select
 from aerialdojo_gen.benchmark.worker import Finished, Unit
 from aerialdojo_gen.benchmark.workers import fly_units
 from aerialdojo_gen.common.bounded import read_json
-from aerialdojo_gen.errors import UsageError
+from aerialdojo_gen.errors import StoreError, UsageError
 from aerialdojo_gen.pipeline.interrupt import Interrupts
 from aerialdojo_gen.pipeline.progress import Reporter
-from aerialdojo_gen.pipeline.runner import data_lock
 from aerialdojo_gen.store import shards as store
-from aerialdojo_gen.store.atomic import atomic_file
+from aerialdojo_gen.store.layout import check_run_name
+from aerialdojo_gen.store.root import DataRoot, Where, open_root
 
 __all__ = ["Evaluation", "Outcome", "evaluate"]
 
+_SETTINGS = "run.json"
+
 
 def evaluate(
-    data: Path,
+    data: Where,
     evaluation: Evaluation,
     *,
-    out: Path | None = None,
+    out: Where | None = None,
     workers: int = 1,
     rerun_failed: bool = False,
     restart: bool = False,
@@ -55,10 +56,10 @@ def evaluate(
 
     Parameters
     ----------
-    data : Path
-        The data directory, with a release and its meshes.
+    data : DataRoot, Path or str
+        The data root, with a release and its meshes.
     evaluation : Evaluation
-    out : Path, optional
+    out : DataRoot, Path or str, optional
         Where the log goes; `data` where absent.
     workers : int
         Processes; with 1 everything runs in this one.
@@ -86,12 +87,12 @@ def evaluate(
     """
     started = time.monotonic()
     limits = limits or Limits()
-    data, out = data.absolute(), (out or data).absolute()
+    root, log = open_root(data), open_root(data if out is None else out)
     reporter = reporter or Reporter(quiet=True)
-    folder = out / "runs" / store.check_run_name(evaluation.run)
-    rows = select(data, evaluation.selection)
-    run = _Run(data, out, folder, evaluation, rows)
-    with data_lock(folder), Interrupts() as interrupts:
+    folder = log.below(f"runs/{check_run_name(evaluation.run)}")
+    rows = select(root, evaluation.selection)
+    run = _Run(root, log, folder, evaluation, rows)
+    with folder.lock(), Interrupts() as interrupts:
         if restart:
             run.drop()
         run.claim()
@@ -110,12 +111,13 @@ def evaluate(
 
             def stopped() -> bool:
                 interrupts.check()
+                run.checkpoint(reporter)
                 return bool(tally.spent or tally.failing)
 
             try:
                 with run.kept():
                     units = run.units(todo, workers)
-                    for scene in fly_units(data, evaluation, units, workers, tell, stopped):
+                    for scene in fly_units(root, evaluation, units, workers, tell, stopped):
                         run.bring_in(scene)
             except ServiceDown as error:
                 raise ServiceDown(f"{error} Finished episodes are kept: the same command goes on from here") from None
@@ -135,9 +137,12 @@ def evaluate(
 class _Run:
     """A run's folder and tables."""
 
-    def __init__(self, data: Path, out: Path, folder: Path, evaluation: Evaluation, rows: pa.Table) -> None:
+    def __init__(
+        self, data: DataRoot, out: DataRoot, folder: DataRoot, evaluation: Evaluation, rows: pa.Table
+    ) -> None:
         self._out, self._folder, self._name = out, folder, evaluation.run
-        self._journals = folder / "journal"
+        self._journals = Journals(out, evaluation.run)
+        self._uncommitted = ""
         self._rows = rows
         self._scenes: list[str] = rows["scene"].unique().to_pylist()
         subsets = rows["subset"].unique().to_pylist()
@@ -153,13 +158,13 @@ class _Run:
 
     def claim(self) -> None:
         """Take the folder for these settings; UsageError where it was begun with others."""
-        path, begun = self._folder / "run.json", self._begun()
+        begun = self._begun()
         mend = "give another --run, or --restart"
         # One that has finished nothing may yet become another: an agent's options may have been wrong.
-        if begun and path.is_file():
-            before, own = read_json(path, UsageError), ("data", "code")
+        if begun and self._folder.exists(_SETTINGS):
+            before, own = read_json(self._folder.local_copy(_SETTINGS), UsageError), ("data", "code")
             if not isinstance(before, dict):
-                raise UsageError(f"{path} holds no settings of a run: {mend}")
+                raise UsageError(f"{self._folder.at(_SETTINGS)} holds no settings of a run: {mend}")
             for key, value in self._settings.items():
                 if before.get(key) != value:
                     what = f"{key} = {before.get(key)!r}, not {value!r}"
@@ -168,30 +173,35 @@ class _Run:
         for scene in episodes.run_scenes(self._out, self._name):
             if episodes.fingerprint_of(self._out, self._name, scene) != self._fingerprint:
                 raise UsageError(f"there are episodes of another run {self._name!r} in {self._out}: {mend}")
-        with atomic_file(self._folder, path.name) as temporary:
+        with self._folder.commit(_SETTINGS) as temporary:
             temporary.write_text(json.dumps(self._settings, indent=2, sort_keys=True) + "\n", encoding="utf-8")
 
     def _begun(self) -> bool:
-        return bool(episodes.run_scenes(self._out, self._name) or any(self._journals.glob("*.jsonl")))
+        return bool(episodes.run_scenes(self._out, self._name) or self._journals)
 
     def drop(self) -> None:
         """Remove what was written under the name."""
         episodes.remove_run(self._out, self._name)
-        shutil.rmtree(self._journals, ignore_errors=True)
-        (self._folder / "run.json").unlink(missing_ok=True)
+        self._journals.drop()
+        self._folder.delete(_SETTINGS)
 
     def bring_in(self, scene: str = "*") -> None:
         """Bring journals into the tables: of one scene, or all that there are."""
-        paths = sorted(self._journals.glob(f"{scene}.*.jsonl"))
-        by_scene: dict[str, list[Path]] = {}
-        for path in paths:
-            by_scene.setdefault(path.name.split(".", 1)[0], []).append(path)
-        for name, files in by_scene.items():
-            records = [record for path in files for record in journal.read(path)]
+        for name in self._journals.scenes(scene):
+            records = self._journals.records(name)
             if records:
                 episodes.add_records(self._out, self._name, name, records, self._fingerprint)
-            for path in files:
-                path.unlink()
+            self._journals.remove(name)
+
+    def checkpoint(self, reporter: Reporter) -> None:
+        """Commit what was finished to an object store now and then; a store that does not answer is told of once."""
+        try:
+            self._journals.checkpoint()
+            self._uncommitted = ""
+        except StoreError as error:
+            if not self._uncommitted:
+                reporter.line(f"{error}; finished episodes are kept in {self._journals.folder} meanwhile")
+            self._uncommitted = str(error)
 
     @contextmanager
     def kept(self) -> Iterator[None]:
@@ -257,6 +267,5 @@ class _Run:
             parts = 1 if len(by_scene) >= 4 * workers else -(-rows.num_rows // share)
             size = -(-rows.num_rows // parts)
             for k in range(parts):
-                path = self._journals / f"{scene}.{k:04d}.jsonl"
-                units.append(Unit(scene, rows.slice(k * size, size), path))
+                units.append(Unit(scene, rows.slice(k * size, size), self._journals.path(scene, k)))
         return units

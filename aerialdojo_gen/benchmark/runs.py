@@ -6,7 +6,6 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
@@ -17,6 +16,7 @@ from aerialdojo_gen.benchmark.episodes import has_table, read_run, runs
 from aerialdojo_gen.benchmark.metrics import Bools, Episodes, Floats, episodes_of
 from aerialdojo_gen.benchmark.swept import STEP_COLUMNS, swept_distances
 from aerialdojo_gen.errors import StoreError
+from aerialdojo_gen.store.root import DataRoot, Where, open_root
 from aerialdojo_gen.store.schemas import TERMINATIONS
 
 # What is no contender: the one that knows the way, and those that look at nothing.
@@ -42,8 +42,8 @@ class Run:
         What the metrics take from it.
     failed : int
         Episodes that are not in it, given up for reasons outside the agent.
-    log : Path or None
-        The directory that `evaluate` wrote to, where its steps are.
+    log : DataRoot or None
+        The root that `evaluate` wrote to, where its steps are.
     group : str
         Heading that tables set it under; empty for an agent like any other.
     """
@@ -55,7 +55,7 @@ class Run:
     table: pa.Table
     episodes: Episodes
     failed: int = 0
-    log: Path | None = None
+    log: DataRoot | None = None
     group: str = ""
 
     def where(self, mask: Bools | NDArray[np.int64]) -> Run:
@@ -71,13 +71,13 @@ class Run:
         return swept_distances(self.table, read_run(self.log, self.name, "steps", STEP_COLUMNS))
 
 
-def load_runs(data: Path, names: Sequence[str] = ()) -> list[Run]:
+def load_runs(data: Where, names: Sequence[str] = ()) -> list[Run]:
     """Read runs.
 
     Parameters
     ----------
-    data : Path
-        The directory that `evaluate` wrote to.
+    data : DataRoot, Path or str
+        The root that `evaluate` wrote to.
     names : sequence of str
         Their ids, in the order that tables keep; where empty all that have finished an episode.
 
@@ -90,11 +90,12 @@ def load_runs(data: Path, names: Sequence[str] = ()) -> list[Run]:
     StoreError
         There is no such run, or none at all, or one without a finished episode, or a part of one is damaged.
     """
-    tables = {name: read_run(data, name) for name in (names or runs(data))}
+    root = open_root(data)
+    tables = {name: read_run(root, name) for name in (names or runs(root))}
     if not names:
         tables = {name: table for name, table in tables.items() if table.num_rows}
     if not tables:
-        raise StoreError(f"no runs in {data}: run aerialdojo-gen evaluate")
+        raise StoreError(f"no runs in {root}: run aerialdojo-gen evaluate")
     for name, table in tables.items():
         if not table.num_rows:
             raise StoreError(f"run {name!r} has no finished episode: run aerialdojo-gen evaluate --run {name}")
@@ -107,8 +108,8 @@ def load_runs(data: Path, names: Sequence[str] = ()) -> list[Run]:
             table["agent_options"][0].as_py(),
             table,
             episodes_of(table),
-            read_run(data, name, "failures").num_rows,
-            data,
+            read_run(root, name, "failures").num_rows,
+            root,
         )
         for (name, table), agent in zip(tables.items(), agents, strict=True)
     ]

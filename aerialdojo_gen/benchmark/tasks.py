@@ -19,7 +19,9 @@ from aerialdojo_gen.common import rng
 from aerialdojo_gen.common.names import unknown
 from aerialdojo_gen.common.pictures import decode_rgb
 from aerialdojo_gen.errors import StoreError, UsageError
+from aerialdojo_gen.release.contents import mesh_copy, scenes_in_release
 from aerialdojo_gen.store import shards as store
+from aerialdojo_gen.store.root import DataRoot, Where, open_root
 from aerialdojo_gen.store.schemas import SETTINGS, SUBSETS, TASKS
 
 MODALITIES = ("semantic", "image")
@@ -89,13 +91,13 @@ class Task:
         return row["start_x_m"], row["start_y_m"], row["start_z_m"], row["start_yaw_rad"]
 
 
-def select(data: Path, selection: Selection) -> pa.Table:
+def select(data: Where, selection: Selection) -> pa.Table:
     """Find the tasks of a selection.
 
     Parameters
     ----------
-    data : Path
-        The data directory, with a release.
+    data : DataRoot, Path or str
+        The data root, with a release.
     selection : Selection
 
     Returns
@@ -110,13 +112,14 @@ def select(data: Path, selection: Selection) -> pa.Table:
     StoreError
         There is no release, or a part of it is damaged.
     """
+    root = open_root(data)
     tables = []
-    for scene in store.scenes_in_release(data, selection.scenes):
+    for scene in scenes_in_release(root, selection.scenes):
         for subset in ("train", "test"):
             split = f"{store.partition(scene)}_{subset}"
             if split not in (selection.splits or SUBSETS):
                 continue
-            table = store.read_scene(data, f"tasks/{subset}", scene)
+            table = store.read_scene(root, f"tasks/{subset}", scene)
             for column, chosen in (("setting", selection.settings), ("modality", selection.modalities)):
                 if chosen:
                     table = table.filter(pc.is_in(table[column], pa.array(chosen, pa.string())))
@@ -141,13 +144,13 @@ def _drawn(found: pa.Table, limit: int, seed: int) -> pa.Table:
     return found.take(pa.array(sorted(i for _, _, i in sorted(lots)[:limit])))
 
 
-def read_tasks(data: Path, rows: pa.Table) -> list[Task]:
+def read_tasks(data: Where, rows: pa.Table) -> list[Task]:
     """Join tasks with their goals.
 
     Parameters
     ----------
-    data : Path
-        The data directory.
+    data : DataRoot, Path or str
+        The data root.
     rows : pyarrow.Table
         Of `select`.
 
@@ -161,42 +164,43 @@ def read_tasks(data: Path, rows: pa.Table) -> list[Task]:
     StoreError
         A task has no route: the two tables do not belong together.
     """
+    root = open_root(data)
     tasks = []
     for row in rows.to_pylist():
-        fact = _facts(data, row["scene"], row["subset"]).get(row["nav_id"])
+        fact = _facts(root, row["scene"], row["subset"]).get(row["nav_id"])
         if fact is None:
-            raise StoreError(f"task {row['task_id']} has no route in {data}/release: run aerialdojo-gen split again")
+            raise StoreError(f"task {row['task_id']} has no route in {root}/release: run aerialdojo-gen split again")
         *goal, euclidean_m, length_m = fact
         tasks.append(Task(row, (goal[0], goal[1], goal[2]), euclidean_m, length_m))
     return tasks
 
 
 @cache
-def _facts(data: Path, scene: str, subset: str) -> dict[str, tuple[float, ...]]:
-    columns = store.read_scene(data, f"routes/{subset}", scene, _FACTS).to_pydict()
+def _facts(root: DataRoot, scene: str, subset: str) -> dict[str, tuple[float, ...]]:
+    columns = store.read_scene(root, f"routes/{subset}", scene, _FACTS).to_pydict()
     return dict(zip(columns["nav_id"], zip(*(columns[name] for name in _FACTS[1:]), strict=True), strict=True))
 
 
-def reference_actions(data: Path, scene: str, subsets: Sequence[str]) -> dict[str, list[int]]:
+def reference_actions(root: DataRoot, scene: str, subsets: Sequence[str]) -> dict[str, list[int]]:
     """Read the reference trajectories' actions, by navigation task: for the oracle alone."""
     return {
         row["nav_id"]: row["action"]
         for subset in subsets
-        for row in store.read_scene(data, f"routes/{subset}", scene, ("nav_id", "action")).to_pylist()
+        for row in store.read_scene(root, f"routes/{subset}", scene, ("nav_id", "action")).to_pylist()
     }
 
 
-def goal_of(data: Path, task: Task, rules: Rules) -> Goal:
+def goal_of(root: DataRoot, task: Task, rules: Rules) -> Goal:
     """Make what the agent is told of a task."""
     row = task.row
     image_id = row["reference_image_id"]
-    image = None if image_id is None else reference_image(data, row["scene"], image_id)
+    image = None if image_id is None else reference_image(root, row["scene"], image_id)
     words = (row["modality"], row["target_name"], row["landmark"], row["direction"], row["description"])
     return Goal(*words, image, rules)
 
 
 @lru_cache(maxsize=256)
-def reference_image(data: Path, scene: str, image_id: str) -> NDArray[np.uint8]:
+def reference_image(root: DataRoot, scene: str, image_id: str) -> NDArray[np.uint8]:
     """Read a goal's picture: (H, W, 3) uint8, sRGB, read-only.
 
     Raises
@@ -204,21 +208,21 @@ def reference_image(data: Path, scene: str, image_id: str) -> NDArray[np.uint8]:
     StoreError
         It is not in the release, or is no picture.
     """
-    picture = decode_rgb(_pictures(data, scene).get(image_id))
+    picture = decode_rgb(_pictures(root, scene).get(image_id))
     if picture is None:
-        raise StoreError(f"reference image {image_id} of {scene} is not in {data}/release/objects: run split again")
+        raise StoreError(f"reference image {image_id} of {scene} is not in {root}/release/objects: run split again")
     picture.setflags(write=False)
     return picture
 
 
 @lru_cache(maxsize=4)
-def _pictures(data: Path, scene: str) -> dict[str, bytes]:
-    rows = store.read_scene(data, "release/objects", scene, ("reference_image_id", "reference_image")).to_pylist()
+def _pictures(root: DataRoot, scene: str) -> dict[str, bytes]:
+    rows = store.read_scene(root, "release/objects", scene, ("reference_image_id", "reference_image")).to_pylist()
     return {row["reference_image_id"]: row["reference_image"] for row in rows if row["reference_image"]}
 
 
 @lru_cache(maxsize=64)
-def mesh_of(data: Path, scene: str) -> tuple[Path, str]:
+def mesh_of(root: DataRoot, scene: str) -> tuple[Path, str]:
     """Find a scene's mesh: its path and SHA-256.
 
     Raises
@@ -226,10 +230,9 @@ def mesh_of(data: Path, scene: str) -> tuple[Path, str]:
     StoreError
         The scene is not in the release, or its mesh is not there.
     """
-    row = store.read_scene(data, "release/scenes", scene, ("mesh_path", "mesh_sha256")).to_pylist()[0]
-    path = data / row["mesh_path"]
-    if not path.resolve().is_relative_to(data.resolve()):
-        raise StoreError(f"the mesh of {scene}, {row['mesh_path']!r}, leads out of {data}")
-    if not path.is_file():
-        raise StoreError(f"the mesh {path} is missing: run aerialdojo-gen build-scenes --scene {scene}")
-    return path, row["mesh_sha256"]
+    row = store.read_scene(root, "release/scenes", scene, ("mesh_path", "mesh_sha256")).to_pylist()[0]
+    try:
+        return mesh_copy(root, row["mesh_path"]), row["mesh_sha256"]
+    except FileNotFoundError:
+        told = root.at(row["mesh_path"])
+        raise StoreError(f"the mesh {told} is missing: run aerialdojo-gen build-scenes --scene {scene}") from None

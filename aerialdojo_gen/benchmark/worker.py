@@ -22,6 +22,7 @@ from aerialdojo_gen.benchmark.journal import Journal
 from aerialdojo_gen.benchmark.tasks import Task, read_tasks, reference_actions
 from aerialdojo_gen.common.secrets import Secrets
 from aerialdojo_gen.errors import RenderError
+from aerialdojo_gen.store.root import DataRoot
 from aerialdojo_gen.store.schemas import STEPS
 
 _LONGEST_PAUSE_S = 600.0
@@ -115,7 +116,7 @@ class Worker:
     ----------
     agent : Agent
     flight : Flight
-    data : Path
+    data : DataRoot
     identity : dict
         Columns ``run_id``, ``agent`` and ``agent_options`` of `episodes`.
     conditions : Conditions
@@ -127,7 +128,7 @@ class Worker:
         self,
         agent: Agent,
         flight: Flight,
-        data: Path,
+        data: DataRoot,
         identity: dict[str, str],
         conditions: Conditions,
         secrets: Secrets,

@@ -12,7 +12,6 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from multiprocessing.util import Finalize
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from aerialdojo_gen.agents import load_agent
@@ -23,13 +22,14 @@ from aerialdojo_gen.benchmark.worker import Finished, Unit, Worker
 from aerialdojo_gen.common.secrets import Secrets
 from aerialdojo_gen.errors import AerialDojoError, UsageError
 from aerialdojo_gen.pipeline.executors.local import start_worker
+from aerialdojo_gen.store.root import DataRoot
 
 if TYPE_CHECKING:
     from aerialdojo_gen.benchmark.runner import Evaluation
 
 
 @contextlib.contextmanager
-def worker(data: Path, evaluation: Evaluation, pace: Pace | None = None) -> Iterator[Worker]:
+def worker(data: DataRoot, evaluation: Evaluation, pace: Pace | None = None) -> Iterator[Worker]:
     """Make an agent and what it flies in; the agent is closed at the end.
 
     Raises
@@ -57,7 +57,7 @@ def worker(data: Path, evaluation: Evaluation, pace: Pace | None = None) -> Iter
 
 
 def fly_units(
-    data: Path,
+    data: DataRoot,
     evaluation: Evaluation,
     units: Sequence[Unit],
     workers: int,
@@ -68,7 +68,7 @@ def fly_units(
 
     Parameters
     ----------
-    data : Path
+    data : DataRoot
     evaluation : Evaluation
     units : sequence of Unit
     workers : int
@@ -92,7 +92,7 @@ def fly_units(
 
 
 def _here(
-    data: Path,
+    data: DataRoot,
     evaluation: Evaluation,
     units: Sequence[Unit],
     _workers: int,
@@ -109,7 +109,7 @@ def _here(
 _ours: dict[str, Any] = {}
 
 
-def _start(parent: int, data: Path, evaluation: Evaluation, told: Any, stop: Any, pace: Pace | None) -> None:
+def _start(parent: int, data: DataRoot, evaluation: Evaluation, told: Any, stop: Any, pace: Pace | None) -> None:
     start_worker(parent)
     _ours.update(data=data, evaluation=evaluation, told=told, stop=stop, pace=pace)
 
@@ -151,7 +151,7 @@ class _Teller:
 
 
 def _in_processes(
-    data: Path,
+    data: DataRoot,
     evaluation: Evaluation,
     units: Sequence[Unit],
     workers: int,

@@ -6,7 +6,6 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,9 +16,11 @@ from numpy.typing import NDArray
 from aerialdojo_gen.common.names import closest, unknown
 from aerialdojo_gen.errors import AssetError, StoreError, UsageError
 from aerialdojo_gen.planning.collision import CollisionWorld
+from aerialdojo_gen.release.contents import mesh_copy, release_scenes
 from aerialdojo_gen.scenes.glb import read_glb
 from aerialdojo_gen.scenes.model import Scene
 from aerialdojo_gen.store import shards as store
+from aerialdojo_gen.store.root import Where, open_root
 
 _TASK_ID = re.compile(r"(?P<nav>(?P<scene>[A-Za-z0-9][A-Za-z0-9_-]*)-(?P<key>[0-9a-f]{12}))(?:-[si])?")
 _SIDES = ("train", "test")
@@ -30,8 +31,8 @@ class ReleasedScene:
 
     Parameters
     ----------
-    data : Path
-        The data directory.
+    data : DataRoot, Path or str
+        The data root.
     name : str
         Name of the scene.
 
@@ -43,11 +44,12 @@ class ReleasedScene:
         There is no release.
     """
 
-    def __init__(self, data: Path, name: str) -> None:
-        known = store.scenes_in_release(data)
+    def __init__(self, data: Where, name: str) -> None:
+        self.root = open_root(data)
+        known = release_scenes(self.root)
         if name not in known:
-            raise UsageError(unknown(f"the release in {data} has no scene", name, known, most=3))
-        self.data, self.name = data, name
+            raise UsageError(unknown(f"the release in {self.root} has no scene", name, known, most=3))
+        self.name = name
 
     @cached_property
     def row(self) -> dict[str, Any]:
@@ -73,13 +75,13 @@ class ReleasedScene:
         return self._rows("anchors")
 
     def _rows(self, table: str) -> list[dict[str, Any]]:
-        return store.read_scene(self.data, f"release/{table}", self.name).to_pylist()
+        return store.read_scene(self.root, f"release/{table}", self.name).to_pylist()
 
     def both_sides(self, table: str, columns: Sequence[str] | None = None) -> pa.Table:
         """Read ``tasks`` or ``routes`` of train and test together, with the column ``split`` (``id_train``, …)."""
         parts = []
         for side in _SIDES:
-            part = store.read_scene(self.data, f"{table}/{side}", self.name, columns)
+            part = store.read_scene(self.root, f"{table}/{side}", self.name, columns)
             split = f"{store.partition(self.name)}_{side}"
             parts.append(part.append_column("split", pa.array([split] * part.num_rows, pa.string())))
         return pa.concat_tables(parts)
@@ -98,9 +100,13 @@ class ReleasedScene:
         AssetError
             The mesh is missing, leads out of the data directory, or is not the one that the release was made from.
         """
-        path = self.data / self.row["mesh_path"]
-        if not path.resolve().is_relative_to(self.data.resolve()):
-            raise AssetError(f"release/scenes: mesh_path {self.row['mesh_path']!r} leads out of {self.data}")
+        told = self.row["mesh_path"]
+        try:
+            path = mesh_copy(self.root, told)
+        except FileNotFoundError:
+            raise AssetError(
+                f"the mesh {self.root.at(told)} is missing: run aerialdojo-gen build-scenes --scene {self.name}"
+            ) from None
         return read_glb(path, self.row["mesh_sha256"])
 
     @cached_property
@@ -164,13 +170,13 @@ class FoundTask:
     instances: list[dict[str, Any]]
 
 
-def find_task(data: Path, task_id: str) -> FoundTask:
+def find_task(data: Where, task_id: str) -> FoundTask:
     """Find a task of the release.
 
     Parameters
     ----------
-    data : Path
-        The data directory.
+    data : DataRoot, Path or str
+        The data root.
     task_id : str
         A ``task_id`` or a ``nav_id``.
 
@@ -185,16 +191,17 @@ def find_task(data: Path, task_id: str) -> FoundTask:
     StoreError
         There is no release, or a part of it is missing or damaged.
     """
-    known = store.scenes_in_release(data)
+    root = open_root(data)
+    known = release_scenes(root)
     match = _TASK_ID.fullmatch(task_id)
-    listing = f'tasks are listed by pandas.read_parquet({str(data / "release" / "tasks")!r})["task_id"]'
+    listing = f'tasks are listed by pandas.read_parquet({f"{root}/release/tasks"!r})["task_id"]'
     if match is None:
-        example = ReleasedScene(data, known[0]).routes["nav_id"].to_pylist()
+        example = ReleasedScene(root, known[0]).routes["nav_id"].to_pylist()
         like = f", e.g. {min(example)}-s" if example else ""
         raise UsageError(
             f"{task_id!r} is no task id: <scene>-<12 hexadecimal digits>, or with -s or -i{like}; {listing}"
         )
-    scene = ReleasedScene(data, match["scene"])
+    scene = ReleasedScene(root, match["scene"])
     ids = scene.routes["nav_id"].to_pylist()
     nav_id = match["nav"]
     if nav_id not in ids:

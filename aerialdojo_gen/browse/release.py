@@ -14,6 +14,7 @@ from aerialdojo_gen.browse.lookup import FoundTask, ReleasedScene, find_task
 from aerialdojo_gen.common.names import unknown
 from aerialdojo_gen.common.pictures import decode_rgb
 from aerialdojo_gen.errors import UsageError
+from aerialdojo_gen.release.contents import scenes_in_release
 from aerialdojo_gen.rendering.reader import Recording, read_recording
 from aerialdojo_gen.scenes.model import Scene
 from aerialdojo_gen.store import shards as store
@@ -46,8 +47,8 @@ class Release:
     """
 
     def __init__(self, data: str | Path | DataRoot) -> None:
-        self._data = Path(open_root(data).url)
-        self.scenes = store.scenes_in_release(self._data)
+        self._data = open_root(data)
+        self.scenes = scenes_in_release(self._data)
         self._scene = lru_cache(maxsize=_MOST_SCENES)(lambda name: ReleasedScene(self._data, name))
 
     def __repr__(self) -> str:
@@ -104,7 +105,7 @@ class Release:
             if column not in schema.names:
                 raise UsageError(unknown(f"no column of {name}", column, schema.names))
         parts = []
-        for scene_name in store.scenes_in_release(self._data, _names(scene)):
+        for scene_name in scenes_in_release(self._data, _names(scene)):
             if name not in _SPLIT:
                 parts.append(store.read_scene(self._data, key, scene_name, read))
                 continue
@@ -177,7 +178,7 @@ class Release:
     def recording(self, task_id: str) -> Recording:
         """Open the recording of a task's reference trajectory; RenderError where it was not rendered."""
         found = self.task(task_id)
-        return read_recording(self._data / "media" / found.scene.name / found.nav_id)
+        return read_recording(self._data.local_copy(f"media/{found.scene.name}/{found.nav_id}"))
 
 
 def open_release(data: str | Path | DataRoot = "data") -> Release:

@@ -15,7 +15,7 @@ app = typer.Typer()
 @app.command("annotate")
 def annotate(
     scene: Annotated[str, typer.Option("--scene", help="Scene to annotate, e.g. U_Mall_0.")],
-    data: Data = Path("data"),
+    data: Data = "data",
     pipeline: PipelineFile = None,
     port: Annotated[int, typer.Option(min=0, max=65535, help="Port to listen on.  (default: a free one)")] = 0,
     host: Annotated[

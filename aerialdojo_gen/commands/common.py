@@ -17,12 +17,17 @@ if TYPE_CHECKING:
     from aerialdojo_gen.config.pipeline import Pipeline
     from aerialdojo_gen.pipeline.freshness import Limits
     from aerialdojo_gen.pipeline.stage import Roots, Stage
+    from aerialdojo_gen.store.root import Where
 
 __all__ = ["DEFAULT_PIPELINE", "default_workers", "home", "open_pipeline", "run_chosen", "run_until"]
 
 Data = Annotated[
-    Path, typer.Option("--data", envvar="AERIALDOJO_DATA", help="Data directory: tables, meshes, release.")
-]
+    str,
+    typer.Option(
+        "--data", metavar="DIR|URL", envvar="AERIALDOJO_DATA",
+        help="Data directory or s3://bucket/prefix: tables, meshes, release.",
+    ),
+]  # fmt: skip
 Scene = Annotated[
     list[str] | None, typer.Option("--scene", help="Scene or glob, repeatable: --scene 'U_*'.  (default: all)")
 ]
@@ -40,7 +45,7 @@ Quiet = Annotated[bool, typer.Option("--quiet", help="No progress and no summary
 def run_until(
     stage: str,
     *,
-    data: Path,
+    data: Where,
     scene: list[str] | None = None,
     pipeline: Path | None = None,
     workers: int | None = None,

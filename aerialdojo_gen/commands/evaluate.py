@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -20,7 +19,7 @@ app = typer.Typer()
 
 @app.command("evaluate")
 def evaluate(
-    data: Data = Path("data"),
+    data: Data = "data",
     agent: Annotated[
         str | None,
         typer.Option(
@@ -63,7 +62,8 @@ def evaluate(
     ] = None,
     renderer: Annotated[str, typer.Option("--renderer", help="auto, gl or pybullet.")] = "auto",
     out: Annotated[
-        Path | None, typer.Option("--out", help="Where the log goes.  (default: the data directory)")
+        str | None,
+        typer.Option("--out", metavar="DIR|URL", help="Where the log goes.  (default: the data directory)"),
     ] = None,
     attempts: Annotated[
         int, typer.Option("--attempts", min=1, max=1000, help="Tries of an episode where something outside fails.")

@@ -15,7 +15,7 @@ app = typer.Typer()
 @app.command("export")
 def export(
     form: Annotated[str, typer.Option("--format", help="aerialdojo or habitat.")],
-    data: Data = Path("data"),
+    data: Data = "data",
     out: Annotated[Path | None, typer.Option("--out", help="Folder to make.  (default: DATA/exports/FORMAT)")] = None,
     scene: Scene = None,
     force: Annotated[bool, typer.Option("--force", help="Replace an earlier export there.")] = False,
@@ -27,10 +27,15 @@ def export(
     ] = None,
 ) -> None:
     """Write the release in the layout of AerialDojo's authors, or as Habitat's ObjectNav-v1."""
+    from aerialdojo_gen.errors import UsageError
     from aerialdojo_gen.exchange.exporting import export_release
+    from aerialdojo_gen.store.root import LocalRoot, open_root
 
-    target = out or data / "exports" / form
-    counts = export_release(form, data, target, scene, force=force, picture_px=picture_size)
+    root = open_root(data)
+    if out is None and not isinstance(root, LocalRoot):
+        raise UsageError("an export is a folder of this machine: name it with --out")
+    target = out or Path(root.at(f"exports/{form}"))
+    counts = export_release(form, root, target, scene, force=force, picture_px=picture_size)
     print(f"{target}: " + ", ".join(f"{n:,} {name}" for name, n in counts.items()))
 
 
@@ -38,7 +43,7 @@ def export(
 def import_benchmark(
     files: Annotated[list[Path], typer.Argument(metavar="FILE...", help="Task files; for aerialdojo also a folder.")],
     form: Annotated[str, typer.Option("--format", help="aerialdojo, uav-on, cityavos, aerialvln or openfly.")],
-    data: Data = Path("data"),
+    data: Data = "data",
     frame: Annotated[
         str | None,
         typer.Option(help="Where x, y, z point, for cityavos and openfly: enu, nwu, ned or esd (east, south, down)."),
@@ -56,9 +61,11 @@ def import_benchmark(
 ) -> None:
     """Read another benchmark's task files into tables like the release's, under DATA/imported/NAME."""
     from aerialdojo_gen.exchange import importing
+    from aerialdojo_gen.store.root import open_root
 
     options = importing.Options(
         frame=frame, angles=angles, pictures=images, with_pictures=pictures, skip_bad=skip_bad
     )
-    report = importing.import_benchmark(form, files, data, options, name=name, force=force)
-    print("\n".join([str(data / "imported" / (name or form)), *(f"  {line}" for line in report.lines())]))
+    root = open_root(data)
+    report = importing.import_benchmark(form, files, root, options, name=name, force=force)
+    print("\n".join([root.at(f"imported/{name or form}"), *(f"  {line}" for line in report.lines())]))

@@ -17,7 +17,7 @@ app = typer.Typer()
 
 @app.command("stats")
 def stats(
-    data: Data = Path("data"), scene: Scene = None, pipeline: PipelineFile = None,
+    data: Data = "data", scene: Scene = None, pipeline: PipelineFile = None,
     pool: Annotated[bool, typer.Option("--pool", help="What filter kept, not the release.")] = False,
     markdown: Annotated[Path | None, typer.Option("--markdown", help="Write the tables as Markdown.")] = None,
     csv: Annotated[Path | None, typer.Option("--csv", help="Write the tables as CSV, a line a figure.")] = None,
@@ -27,25 +27,28 @@ def stats(
 ) -> None:  # fmt: skip
     """Set the release beside the paper's tables; before there is one, what filter kept."""
     from aerialdojo_gen.pipeline import runner
-    from aerialdojo_gen.store import shards as store
+    from aerialdojo_gen.release.contents import check_release, no_release, scenes_in_release, scenes_there
+    from aerialdojo_gen.store.root import open_root
 
-    released = store.release_scenes(data)
+    root = open_root(data)
+    released = scenes_there(root)
+    if pool and (markdown or csv or figures):
+        raise UsageError("--pool is printed only: leave --markdown, --csv and --figures out")
     if pool or not released:
         from aerialdojo_gen.release.pool import pool_lines, pool_of
 
-        if markdown or csv or figures:
-            raise UsageError(f"there is no release in {data} to write or draw: run aerialdojo-gen split")
+        if markdown or csv or figures or not (pool or root.list("verdicts")):
+            raise no_release(root)
         config, roots = open_pipeline(pipeline, data)
         scenes = runner.chosen_scenes(config, roots, scene)
-        print("\n".join(pool_lines([pool_of(data, name) for name in scenes], terminal_width())))
+        print("\n".join(pool_lines([pool_of(root, name) for name in scenes], terminal_width())))
         return
 
-    from aerialdojo_gen.release.contents import check_release
     from aerialdojo_gen.stats.comparison import Comparison, Listing, as_csv, as_markdown
     from aerialdojo_gen.stats.tables import benchmark_table, in_paper_order, made_of, tables
 
-    names = check_release(data, store.scenes_in_release(data, scene) if scene else None)
-    made = in_paper_order([made_of(data, name) for name in names])
+    names = check_release(root, scenes_in_release(root, scene) if scene else None)
+    made = in_paper_order([made_of(root, name) for name in names])
     compared: list[Comparison | Listing] = [*tables(made), benchmark_table(made)]
     for path, text in ((markdown, as_markdown(compared)), (csv, as_csv(compared))):
         if path:
@@ -56,5 +59,5 @@ def stats(
         from aerialdojo_gen.stats.figures import draw_figures
 
         print()
-        for path in draw_figures(data, [m.scene for m in made], figures):
+        for path in draw_figures(root, [m.scene for m in made], figures):
             print(path)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import time
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -24,6 +24,9 @@ from aerialdojo_gen.commands.common import (
 from aerialdojo_gen.errors import UsageError
 from aerialdojo_gen.pipeline.registry import BY_NAME
 
+if TYPE_CHECKING:
+    from aerialdojo_gen.store.root import Where
+
 app = typer.Typer()
 
 _SECONDS = {"s": 1.0, "m": 60.0, "h": 3600.0, "d": 86400.0}
@@ -31,7 +34,7 @@ _SECONDS = {"s": 1.0, "m": 60.0, "h": 3600.0, "d": 86400.0}
 
 @app.command("render", help=BY_NAME["render"].help)
 def render(
-    data: Data = Path("data"), scene: Scene = None, pipeline: PipelineFile = None,
+    data: Data = "data", scene: Scene = None, pipeline: PipelineFile = None,
     workers: Workers = None, force: Force = False, quiet: Quiet = False, replace: Replace = False,
     split: Annotated[str | None, typer.Option(
         "--split", help="train, test, all, id_train, id_test, ood_train or ood_test.")] = None,
@@ -73,7 +76,7 @@ def render(
     )  # fmt: skip
 
 
-def _scenes_of(split: str | None, scene: list[str] | None, pipeline: Path | None, data: Path) -> list[str] | None:
+def _scenes_of(split: str | None, scene: list[str] | None, pipeline: Path | None, data: Where) -> list[str] | None:
     """Leave out the scenes that a split such as id_train has nothing of: their recordings stay as they are."""
     if split is None or "_" not in split:
         return scene
@@ -89,7 +92,7 @@ def _scenes_of(split: str | None, scene: list[str] | None, pipeline: Path | None
 
 
 def _estimate(
-    data: Path,
+    data: Where,
     scene: list[str] | None,
     pipeline: Path | None,
     workers: int | None,

@@ -38,9 +38,10 @@ class _Command(TyperCommand):
 @app.command("report", cls=_Command)
 def report(
     runs: Annotated[list[str] | None, typer.Argument(help="Runs of evaluate.  (default: all)")] = None,
-    data: Data = Path("data"),
+    data: Data = "data",
     log: Annotated[
-        Path | None, typer.Option("--log", help="Where evaluate wrote to, if not to the data directory.")
+        str | None,
+        typer.Option("--log", metavar="DIR|URL", help="Where evaluate wrote to, if not to the data directory."),
     ] = None,
     profile: Annotated[
         list[str] | None,
@@ -91,12 +92,14 @@ def report(
     from aerialdojo_gen.benchmark.radii import DEFAULT_RADII_M, at_radius
     from aerialdojo_gen.benchmark.runs import load_runs
     from aerialdojo_gen.common.paper import results
+    from aerialdojo_gen.store.root import open_root
 
     rules = [profile_named(name) for name in dict.fromkeys(profile or DEFAULT_PROFILES)]
-    named = load_runs(log or data, runs or ())
-    loaded = arranged(with_floors(log or data, named) if floors else named, _groups(group or []))
+    root, written = open_root(data), open_root(log or data)
+    named = load_runs(written, runs or ())
+    loaded = arranged(with_floors(written, named) if floors else named, _groups(group or []))
     wanted = contents.Wanted(
-        data, loaded, rules, tuple(radius or DEFAULT_RADII_M), intervals, results() if beside else ()
+        root, loaded, rules, tuple(radius or DEFAULT_RADII_M), intervals, results() if beside else ()
     )
     if style == "csv":
         further = [at_radius(rules[0], r) for r in radius or () if r not in {rule.radius_m for rule in rules}]
@@ -111,9 +114,9 @@ def report(
         from aerialdojo_gen.benchmark import replay
         from aerialdojo_gen.benchmark.report import write_report
 
-        shown = list(replay.replays(data, log or data, loaded, replay.choose_tasks(loaded, replays), frames))
-        written = write_report(out, wanted, shown)
-        typer.echo(f"{written[0]} and {len(written) - 1} more files", err=True)
+        shown = list(replay.replays(root, written, loaded, replay.choose_tasks(loaded, replays), frames))
+        made = write_report(out, wanted, shown)
+        typer.echo(f"{made[0]} and {len(made) - 1} more files", err=True)
 
 
 def _show(tables: Any, style: str) -> None:

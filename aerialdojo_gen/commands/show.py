@@ -15,7 +15,7 @@ app = typer.Typer()
 @app.command("show")
 def show(
     task_id: Annotated[str, typer.Argument(metavar="TASK_ID", help="A task_id or a nav_id of the release.")],
-    data: Data = Path("data"),
+    data: Data = "data",
     out: Annotated[Path | None, typer.Option(help="PNG to write.  (default: TASK_ID.png)")] = None,
     html: Annotated[Path | None, typer.Option(help="Page to write, all in one file.")] = None,
     frames: Annotated[int, typer.Option(min=0, max=12, help="Front views along the way.")] = 5,
@@ -37,7 +37,7 @@ def show(
 @app.command("view")
 def view(
     scene: Annotated[str, typer.Option("--scene", help="Scene of the release, e.g. U_Mall_0.")],
-    data: Data = Path("data"),
+    data: Data = "data",
     port: Annotated[int, typer.Option(min=0, max=65535, help="Port on 127.0.0.1; 0 takes a free one.")] = 0,
     browser: Annotated[bool, typer.Option("--browser/--no-browser", help="Open the page.")] = True,
 ) -> None:

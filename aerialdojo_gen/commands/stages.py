@@ -30,7 +30,7 @@ _WITH_OPTIONS = ("split", "render")
 
 def _stage_command(name: str) -> Callable[..., None]:
     def command(
-        data: Data = Path("data"), scene: Scene = None, pipeline: PipelineFile = None,
+        data: Data = "data", scene: Scene = None, pipeline: PipelineFile = None,
         workers: Workers = None, force: Force = False, quiet: Quiet = False,
     ) -> None:  # fmt: skip
         run_until(name, data=data, scene=scene, pipeline=pipeline, workers=workers, force=force, quiet=quiet)
@@ -45,7 +45,7 @@ for _stage in STAGES:
 
 @app.command("split", help=BY_NAME["split"].help)
 def split(
-    data: Data = Path("data"), scene: Scene = None, pipeline: PipelineFile = None,
+    data: Data = "data", scene: Scene = None, pipeline: PipelineFile = None,
     workers: Workers = None, force: Force = False, quiet: Quiet = False, replace: Replace = False,
 ) -> None:  # fmt: skip
     """Write the release, with what it needs upstream."""
@@ -57,7 +57,7 @@ def split(
 @app.command("run")
 def run(
     pipeline: Annotated[Path, typer.Argument(help="Pipeline file, e.g. pipelines/smoke.toml.")],
-    data: Data = Path("data"), scene: Scene = None,
+    data: Data = "data", scene: Scene = None,
     workers: Workers = None, force: Force = False, quiet: Quiet = False, replace: Replace = False,
 ) -> None:  # fmt: skip
     """Run a pipeline's stages, from recipes and annotations to the release."""

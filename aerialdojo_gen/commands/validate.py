@@ -16,11 +16,15 @@ _MANY_DIGITS = 10
 @app.command("validate")
 def validate(
     folder: Annotated[
-        Path | None, typer.Argument(metavar="RELEASE", help="A release, or a folder with one; as --data.")
+        str | None, typer.Argument(metavar="RELEASE", help="A release, or a folder or URL with one; as --data.")
     ] = None,
     data: Annotated[
-        Path, typer.Option("--data", envvar="AERIALDOJO_DATA", help="Data directory, or the release itself.")
-    ] = Path("data"),
+        str,
+        typer.Option(
+            "--data", metavar="DIR|URL", envvar="AERIALDOJO_DATA",
+            help="Data directory or s3://bucket/prefix, or the release itself.",
+        ),
+    ] = "data",
     scene: Scene = None,
     sample: Annotated[
         int | None, typer.Option("--sample", min=0, help="Routes a scene that FCL is asked about.  (default: all)")
@@ -41,7 +45,7 @@ def validate(
     pipeline: PipelineFile = None,
     workers: Workers = None,
     quiet: Quiet = False,
-) -> None:
+) -> None:  # fmt: skip
     """Check a release again from its Parquet files and meshes alone, and name every row at fault."""
     from aerialdojo_gen import validate as validation
     from aerialdojo_gen.commands.common import DEFAULT_PIPELINE
@@ -49,8 +53,8 @@ def validate(
     from aerialdojo_gen.config.pipeline import load_pipeline
     from aerialdojo_gen.errors import UsageError
     from aerialdojo_gen.pipeline.progress import Reporter
+    from aerialdojo_gen.validate.parts import release_of
     from aerialdojo_gen.validate.report import check_format
-    from aerialdojo_gen.validate.run import release_of
 
     if report is not None:
         check_format(report)
@@ -60,7 +64,7 @@ def validate(
     if definitions.scene_assets is None:
         definitions = definitions.model_copy(update={"scene_assets": home() / "scene_assets"})
     asked = validation.Asked(
-        release=release_of((folder or data).absolute()),
+        release=release_of(folder or data),
         scenes=tuple(scene or ()),
         meshes=meshes.absolute() if meshes else None,
         use_meshes=not no_meshes,

@@ -29,6 +29,7 @@ from aerialdojo_gen.exchange.aerialdojo_layout import (
 from aerialdojo_gen.exchange.frames import NED
 from aerialdojo_gen.exchange.redrawn import Redrawn
 from aerialdojo_gen.store import shards as store
+from aerialdojo_gen.store.root import DataRoot
 
 Floats = NDArray[np.float64]
 
@@ -48,15 +49,15 @@ _PICTURES = "Images"
 _COORDINATES = "ProjectAirSim NED"
 
 
-def write_scene(data: Path, scene: str, root: Path, picture_px: int = 0) -> dict[str, int]:
+def write_scene(data: DataRoot, scene: str, root: Path, picture_px: int = 0) -> dict[str, int]:
     """Write a scene's tasks, pictures and trajectories.
 
     As in the authors' data every scene has all of its partitions: one without tasks is an empty list.
 
     Parameters
     ----------
-    data : Path
-        The data directory.
+    data : DataRoot
+        The data root.
     scene : str
         A scene of its release.
     root : Path

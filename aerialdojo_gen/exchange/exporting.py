@@ -11,7 +11,8 @@ from aerialdojo_gen.common.version import __version__
 from aerialdojo_gen.errors import UsageError
 from aerialdojo_gen.exchange import aerialdojo_writer, habitat_writer
 from aerialdojo_gen.exchange.folder import whole_folder, write_json
-from aerialdojo_gen.store import shards as store
+from aerialdojo_gen.release.contents import scenes_in_release
+from aerialdojo_gen.store.root import Where, open_root
 
 MARKER = "export.json"
 PICTURE_PX = 640
@@ -23,7 +24,7 @@ FORMATS = {
 
 def export_release(
     format_name: str,
-    data: Path,
+    data: Where,
     out: Path,
     scenes: Sequence[str] | None = None,
     *,
@@ -36,8 +37,8 @@ def export_release(
     ----------
     format_name : str
         A key of `FORMATS`.
-    data : Path
-        The data directory.
+    data : DataRoot, Path or str
+        The data root.
     out : Path
         Folder to be made; it appears when it is whole. Its ``export.json`` says what is in it and what is lost.
     scenes : sequence of str, optional
@@ -66,21 +67,22 @@ def export_release(
         raise UsageError(unknown("no format", format_name, FORMATS))
     if picture_px is not None and (format_name != "aerialdojo" or not (picture_px == 0 or 16 <= picture_px <= 4096)):
         raise UsageError("--picture-size is for --format aerialdojo: 16 to 4096 pixels, or 0 for the release's own")
-    chosen = store.scenes_in_release(data, scenes)
+    root = open_root(data)
+    chosen = scenes_in_release(root, scenes)
     frame, lost = FORMATS[format_name]
     size_px = PICTURE_PX if picture_px is None else picture_px
     counts: Counter[str] = Counter(scenes=len(chosen))
-    with whole_folder(out, MARKER, force=force) as root:
+    with whole_folder(out, MARKER, force=force) as folder:
         if format_name == "aerialdojo":
             for scene in chosen:
-                counts.update(aerialdojo_writer.write_scene(data, scene, root, size_px))
+                counts.update(aerialdojo_writer.write_scene(root, scene, folder, size_px))
         else:
-            categories = habitat_writer.categories_of(data, chosen)
-            habitat_writer.write_index(root, categories)
+            categories = habitat_writer.categories_of(root, chosen)
+            habitat_writer.write_index(folder, categories)
             for scene in chosen:
-                counts.update(habitat_writer.write_scene(data, scene, root, categories))
+                counts.update(habitat_writer.write_scene(root, scene, folder, categories))
         write_json(
-            root / MARKER,
+            folder / MARKER,
             {
                 "format": format_name,
                 "written_by": f"aerialdojo-gen {__version__}",

@@ -12,6 +12,7 @@ from typing import Any
 from aerialdojo_gen.common.disk import disk_error
 from aerialdojo_gen.errors import UsageError
 from aerialdojo_gen.store.atomic import atomic_folder
+from aerialdojo_gen.store.root import DataRoot, LocalRoot
 from aerialdojo_gen.store.staging import sweep
 
 _PICTURES = (b"\x89PNG\r\n\x1a\n", b"\xff\xd8\xff")
@@ -56,6 +57,22 @@ def whole_folder(target: Path, marker: str, *, force: bool) -> Iterator[Path]:
     if taken and not force:
         raise UsageError(f"{target} is there already: --force replaces it")
     with atomic_folder(target) as temporary:
+        yield temporary
+
+
+@contextlib.contextmanager
+def whole_folder_below(root: DataRoot, relative: str, marker: str, *, force: bool) -> Iterator[Path]:
+    """Fill a folder below a data root as `whole_folder` does."""
+    if isinstance(root, LocalRoot):
+        with whole_folder(root.path / relative, marker, force=force) as temporary:
+            yield temporary
+        return
+    if root.exists(relative):
+        if not root.exists(f"{relative}/{marker}"):
+            raise UsageError(f"{root.at(relative)} is there already and holds no {marker}: name another folder")
+        if not force:
+            raise UsageError(f"{root.at(relative)} is there already: --force replaces it")
+    with root.commit_folder(relative) as temporary:
         yield temporary
 
 

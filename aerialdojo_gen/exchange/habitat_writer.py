@@ -18,6 +18,7 @@ import pyarrow as pa
 
 from aerialdojo_gen.exchange.frames import world_to_habitat, yaw_to_habitat_quaternion_xyzw
 from aerialdojo_gen.store import shards as store
+from aerialdojo_gen.store.root import DataRoot
 from aerialdojo_gen.store.schemas import ACTION_NAMES, SUBSETS
 
 LOST: Mapping[str, Sequence[str]] = {
@@ -43,7 +44,7 @@ LOST: Mapping[str, Sequence[str]] = {
 }
 
 
-def categories_of(data: Path, scenes: Sequence[str]) -> dict[str, int]:
+def categories_of(data: DataRoot, scenes: Sequence[str]) -> dict[str, int]:
     """Number the categories of the scenes' objects, by name."""
     found: set[str] = set()
     for scene in scenes:
@@ -59,13 +60,13 @@ def write_index(root: Path, categories: Mapping[str, int]) -> None:
             file.write(json.dumps({**_numbers(categories), "goals_by_category": {}, "episodes": []}).encode())
 
 
-def write_scene(data: Path, scene: str, root: Path, categories: Mapping[str, int]) -> dict[str, int]:
+def write_scene(data: DataRoot, scene: str, root: Path, categories: Mapping[str, int]) -> dict[str, int]:
     """Write a scene's episodes, a file a subset.
 
     Parameters
     ----------
-    data : Path
-        The data directory.
+    data : DataRoot
+        The data root.
     scene : str
         A scene of its release.
     root : Path

@@ -13,14 +13,15 @@ from aerialdojo_gen.common.names import unknown
 from aerialdojo_gen.errors import ImportRefused, StoreError, UsageError, brief
 from aerialdojo_gen.exchange import aerialdojo_reader, aerialvln, cityavos, openfly, uav_on
 from aerialdojo_gen.exchange.fields import BadField, Fields
-from aerialdojo_gen.exchange.folder import whole_folder, write_json
+from aerialdojo_gen.exchange.folder import whole_folder_below, write_json
 from aerialdojo_gen.exchange.frames import FRAMES, Frame, frame_named
 from aerialdojo_gen.exchange.jsonstream import RECORD_LIMIT, records
 from aerialdojo_gen.exchange.objects import Objects
 from aerialdojo_gen.exchange.report import Report
 from aerialdojo_gen.exchange.tables import Tables
 from aerialdojo_gen.exchange.task import Context, Task, digest, route_row, task_rows
-from aerialdojo_gen.store.shards import check_scene_name
+from aerialdojo_gen.store.layout import check_scene_name
+from aerialdojo_gen.store.root import Where, open_root
 
 MARKER = "import.json"
 Read = Callable[[Fields, Context], Task]
@@ -85,7 +86,7 @@ class Options:
 def import_benchmark(
     format_name: str,
     files: Sequence[Path],
-    data: Path,
+    data: Where,
     options: Options | None = None,
     *,
     name: str | None = None,
@@ -99,8 +100,8 @@ def import_benchmark(
         A key of `FORMATS`.
     files : sequence of Path
         Files of that format; for ``aerialdojo`` also the folder of the layout or of a part of it.
-    data : Path
-        The data directory: tables are written to ``imported/<name>/{tasks,routes,objects}`` in it.
+    data : DataRoot, Path or str
+        The data root: tables are written to ``imported/<name>/{tasks,routes,objects}`` in it.
     options : Options, optional
         What the format leaves open.
     name : str, optional
@@ -131,8 +132,8 @@ def import_benchmark(
         raise UsageError(f"angles are radians, degrees or mixed, not {options.angles!r}")
     sources = _sources(format_name, files)
     report = Report(format_name, frame.name)
-    target = data / "imported" / _plain(name or format_name)
-    with whole_folder(target, MARKER, force=force) as folder, ExitStack() as stack:
+    root, target = open_root(data), f"imported/{_plain(name or format_name)}"
+    with whole_folder_below(root, target, MARKER, force=force) as folder, ExitStack() as stack:
         bad = stack.enter_context((folder / "bad_records.txt").open("w", encoding="utf-8"))
         tables, objects = Tables(folder), Objects()
         for task, source in _tasks(sources, chosen, frame, options, report, bad):

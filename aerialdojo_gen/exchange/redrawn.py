@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-from pathlib import Path
 
 import cv2
 import numpy as np
@@ -12,9 +11,11 @@ from numpy.typing import NDArray
 from aerialdojo_gen.common.pictures import REFERENCE_PNG, decode_rgb, encode_png
 from aerialdojo_gen.errors import AssetError, StoreError
 from aerialdojo_gen.geometry.cameras import Camera, view_pose
+from aerialdojo_gen.release.contents import mesh_copy
 from aerialdojo_gen.rendering.backend import choose_renderer, kept_renderer
 from aerialdojo_gen.scenes.glb import read_glb
 from aerialdojo_gen.store import shards as store
+from aerialdojo_gen.store.root import DataRoot
 
 # Between two sizes and two renderers edges and shadows' rims differ; another view or object differs by far more.
 _SAME_VIEW = 12.0
@@ -25,8 +26,8 @@ class Redrawn:
 
     Parameters
     ----------
-    data : Path
-        The data directory: release and meshes.
+    root : DataRoot
+        The data root: release and meshes.
     scene : str
         Name of the scene.
     size_px : int
@@ -40,19 +41,23 @@ class Redrawn:
         The mesh is missing, or not the one that the release was made from.
     """
 
-    def __init__(self, data: Path, scene: str, size_px: int) -> None:
-        row = store.read_scene(data, "release/scenes", scene).to_pylist()[0]
-        mesh = data / row["mesh_path"]
+    def __init__(self, root: DataRoot, scene: str, size_px: int) -> None:
+        row = store.read_scene(root, "release/scenes", scene).to_pylist()[0]
         keep = "--picture-size 0 exports the release's own pictures"
-        if not mesh.is_file():
-            raise AssetError(f"{mesh} is missing, so its pictures cannot be drawn at {size_px} px: {keep}")
+        try:
+            mesh = mesh_copy(root, row["mesh_path"])
+        except FileNotFoundError:
+            missing = root.at(row["mesh_path"])
+            raise AssetError(
+                f"{missing} is missing, so its pictures cannot be drawn at {size_px} px: {keep}"
+            ) from None
         if hashlib.sha256(mesh.read_bytes()).hexdigest() != row["mesh_sha256"]:
             raise AssetError(f"{mesh} is not the mesh that the release was made from: {keep}")
-        anchors = store.read_scene(data, "release/anchors", scene).to_pylist()
+        anchors = store.read_scene(root, "release/anchors", scene).to_pylist()
         self._scene_name = scene
         self._anchors = {a["object_id"]: a for a in anchors if a["selected"]}
         self._pictures = {
-            r["object_id"]: r["reference_image"] for r in store.read_scene(data, "release/objects", scene).to_pylist()
+            r["object_id"]: r["reference_image"] for r in store.read_scene(root, "release/objects", scene).to_pylist()
         }
         self._camera = Camera(size_px, size_px)
         # Kept here: the renderer is kept for as long as its scene is.

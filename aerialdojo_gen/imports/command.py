@@ -15,7 +15,7 @@ from aerialdojo_gen.pipeline.registry import STAGES
 from aerialdojo_gen.scenes.glb import write_glb
 from aerialdojo_gen.scenes.model import Scene
 from aerialdojo_gen.store.atomic import atomic_file, make_folder
-from aerialdojo_gen.store.shards import check_scene_name
+from aerialdojo_gen.store.layout import check_scene_name
 
 PIPELINE = "pipeline.toml"
 

@@ -57,14 +57,16 @@ PLUMBING: dict[str, tuple[str, ...]] = {
     "aerialdojo_gen.store.atomic": (),
     "aerialdojo_gen.store.files": (),
     "aerialdojo_gen.store.footers": (),
+    "aerialdojo_gen.store.layout": ("partition", "check_scene_name"),
     "aerialdojo_gen.store.parquet_files": ("write_clustered",),
     "aerialdojo_gen.store.schemas": ("*",),
+    "aerialdojo_gen.store.root": (),
     "aerialdojo_gen.store.schemas.benchmark": ("*",),
     "aerialdojo_gen.store.schemas.columns": ("*",),
     "aerialdojo_gen.store.schemas.recordings": ("*",),
     "aerialdojo_gen.store.schemas.release": ("*",),
     "aerialdojo_gen.store.schemas.staged": ("*",),
-    "aerialdojo_gen.store.shards": ("partition", "check_scene_name"),
+    "aerialdojo_gen.store.shards": (),
     "aerialdojo_gen.store.staging": (),
 }
 # Of a stage's module, which declares it, and which says more: these definitions count, and nothing else. What it

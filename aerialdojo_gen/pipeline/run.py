@@ -184,7 +184,7 @@ def _finish_release(config: Pipeline, data: Path, scenes: list[str], whole: bool
             reporter.line(f"release: {gone} is no scene of this pipeline, removed")
     record_makers(data, config, scenes)
     write_croissant(data)
-    reporter.line(f"release: {write_card(data).parent}")
+    reporter.line(f"release: {write_card(data).removesuffix('/README.md')}")
 
 
 def default_workers() -> int:

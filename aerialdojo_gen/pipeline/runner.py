@@ -6,19 +6,16 @@ where it stopped, and the tables do not depend on the number of workers, their o
 
 from __future__ import annotations
 
-import fcntl
 import time
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TextIO
 
-from aerialdojo_gen.common.disk import disk_error
 from aerialdojo_gen.common.names import choose_scenes, unknown
 from aerialdojo_gen.config.pipeline import Pipeline
-from aerialdojo_gen.errors import AerialDojoError, BudgetSpent, StoreError, UsageError
+from aerialdojo_gen.errors import AerialDojoError, BudgetSpent, UsageError
 from aerialdojo_gen.pipeline.code_digest import stage_code
 from aerialdojo_gen.pipeline.executors.local import Pool
 from aerialdojo_gen.pipeline.freshness import Limits, shards_of
@@ -26,7 +23,7 @@ from aerialdojo_gen.pipeline.interrupt import Interrupts
 from aerialdojo_gen.pipeline.progress import Reporter
 from aerialdojo_gen.pipeline.registry import STAGES
 from aerialdojo_gen.pipeline.stage import Roots, Stage
-from aerialdojo_gen.store.staging import sweep, sweep_unstaged
+from aerialdojo_gen.store.root import Where, open_root
 
 
 @dataclass(frozen=True)
@@ -67,40 +64,9 @@ class StageSummary:
         )
 
 
-@contextmanager
-def data_lock(data: Path) -> Iterator[None]:
-    """Hold the data directory: one run writes to it at a time; a killed run's lock is gone with it.
-
-    What killed runs left half-made in it is removed.
-    """
-    try:
-        data.mkdir(parents=True, exist_ok=True)
-        file = (data / ".lock").open("a+")
-    except OSError as error:
-        raise disk_error(error, data / ".lock") from None
-    with file:
-        try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            raise StoreError(f"another run is writing to {data}: wait for it, or use another --data") from None
-        except OSError as error:
-            raise disk_error(error, data / ".lock") from None
-        _sweep_once(file, data)
-        sweep(data)
-        try:
-            yield
-        finally:
-            # What workers were at when an error or Ctrl-C ended them.
-            sweep(data)
-
-
-def _sweep_once(lock: TextIO, data: Path) -> None:
-    """Remove what killed runs of earlier versions left, once in a data directory's life."""
-    lock.seek(0)
-    if not lock.read():
-        sweep_unstaged(data)
-        lock.write("staged\n")
-        lock.flush()
+def data_lock(data: Where) -> AbstractContextManager[None]:
+    """Hold a data root: `aerialdojo_gen.store.root.DataRoot.lock`."""
+    return open_root(data).lock()
 
 
 def run(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import jinja2
@@ -16,7 +15,7 @@ from aerialdojo_gen.release.croissant import CITE_AS
 from aerialdojo_gen.stats.tables import Made, in_paper_order, made_of
 from aerialdojo_gen.store import schemas
 from aerialdojo_gen.store import shards as store
-from aerialdojo_gen.store.atomic import atomic_file
+from aerialdojo_gen.store.root import DataRoot, Where, open_root
 
 _SIZES = ((1_000, "n<1K"), (10_000, "1K<n<10K"), (100_000, "10K<n<100K"), (1_000_000, "100K<n<1M"))
 
@@ -31,8 +30,8 @@ def _hf_type(field: pa.Field) -> str:
     return "image" if pa.types.is_binary(field.type) else str(field.type).replace("double", "float64")
 
 
-def _scene_rows(data: Path, made: list[Made]) -> list[dict[str, Any]]:
-    rows = [store.read_scene(data, "release/scenes", m.scene).to_pylist()[0] for m in made]
+def _scene_rows(root: DataRoot, made: list[Made]) -> list[dict[str, Any]]:
+    rows = [store.read_scene(root, "release/scenes", m.scene).to_pylist()[0] for m in made]
     paper = inventory()
     return [
         row
@@ -50,11 +49,11 @@ def _by_setting(made: list[Made], splits: list[str]) -> dict[str, dict[str, int]
     return total
 
 
-def _example(data: Path, scenes: list[str]) -> dict[str, Any] | None:
+def _example(root: DataRoot, scenes: list[str]) -> dict[str, Any] | None:
     """Return the first task that is told in words, of the shortest setting there is."""
     for scene in scenes:
         for subset in ("train", "test"):
-            tasks = store.read_scene(data, f"tasks/{subset}", scene)
+            tasks = store.read_scene(root, f"tasks/{subset}", scene)
             told: list[dict[str, Any]] = (
                 tasks.filter(pc.equal(tasks.column("modality"), "semantic")).slice(0, 1).to_pylist()
             )
@@ -63,7 +62,7 @@ def _example(data: Path, scenes: list[str]) -> dict[str, Any] | None:
     return None
 
 
-def render_card(data: Path) -> str:
+def render_card(data: Where) -> str:
     """Write the card's text from what the release holds.
 
     Returns
@@ -76,14 +75,15 @@ def render_card(data: Path) -> str:
     StoreError
         The release is missing or damaged.
     """
-    names = check_release(data)
-    found = counts(data, names)
-    made = in_paper_order([made_of(data, name) for name in names])
+    root = open_root(data)
+    names = check_release(root)
+    found = counts(root, names)
+    made = in_paper_order([made_of(root, name) for name in names])
     names = [m.scene for m in made]
-    objects = [store.read_scene(data, "release/objects", name, ["category"]) for name in names]
+    objects = [store.read_scene(root, "release/objects", name, ["category"]) for name in names]
     by_setting = _by_setting(made, list(found["tasks"]))
     n_tasks = sum(found["tasks"].values())
-    scenes = _scene_rows(data, made)
+    scenes = _scene_rows(root, made)
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("aerialdojo_gen.release"),
         undefined=jinja2.StrictUndefined,
@@ -94,7 +94,7 @@ def render_card(data: Path) -> str:
         version=__version__,
         tables=TABLES,
         found=found,
-        sizes=sizes(data, names),
+        sizes=sizes(root, names),
         scenes=scenes,
         n_tasks=n_tasks,
         n_routes=sum(found["routes"].values()),
@@ -106,7 +106,7 @@ def render_card(data: Path) -> str:
         totals={s: sum(row[s] for row in by_setting.values()) for s in schemas.SETTINGS},
         size_category=next((name for most, name in _SIZES if n_tasks < most), "1M<n<10M"),
         first_split=next((split for split, n in found["tasks"].items() if n), "id_train"),
-        example=_example(data, names),
+        example=_example(root, names),
         actions=schemas.ACTION_NAMES,
         of_paper=set(names) == set(inventory()),
         citation=CITE_AS.replace(", title", ",\n  title")
@@ -119,20 +119,21 @@ def render_card(data: Path) -> str:
     )
 
 
-def write_card(data: Path) -> Path:
+def write_card(data: Where) -> str:
     """Write ``release/README.md`` from what the release holds.
 
     Returns
     -------
-    Path
-        The card.
+    str
+        Where the card is.
 
     Raises
     ------
     StoreError
         The release is missing or damaged, or cannot be written.
     """
-    text = render_card(data)
-    with atomic_file(data, "release/README.md") as path:
+    root = open_root(data)
+    text = render_card(root)
+    with root.commit("release/README.md") as path:
         path.write_text(text, encoding="utf-8")
-    return data / "release" / "README.md"
+    return root.at("release/README.md")

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import os
+from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 
 import pyarrow as pa
 
+from aerialdojo_gen.common.names import choose_scenes
 from aerialdojo_gen.errors import StoreError
 from aerialdojo_gen.store import schemas
 from aerialdojo_gen.store import shards as store
+from aerialdojo_gen.store.layout import LAYOUT, is_plain, partition, shard_name
+from aerialdojo_gen.store.root import DataRoot, LocalRoot, Where, open_root
 
 
 @dataclass(frozen=True)
@@ -48,17 +53,132 @@ TABLES = {
     "scenes": Table(schemas.SCENES, "One row a scene."),
 }
 
-# Keys of `store.LAYOUT` that make up a scene's part of the release.
-SHARDS = tuple(name for name, place in store.LAYOUT.items() if place.template.startswith("release/"))
+# Keys of `LAYOUT` that make up a scene's part of the release.
+SHARDS = tuple(name for name, place in LAYOUT.items() if place.in_release)
+FOLDER = "release"
 
 
-def check_release(data: Path, scenes: list[str] | None = None) -> list[str]:
+def part_name(name: str, scene: str, folder: str = FOLDER) -> str:
+    """Return where a scene's part of one of `SHARDS` lies, relative to the data root; `folder` is the release's."""
+    return f"{folder}/{shard_name(name, scene).partition('/')[2]}".lstrip("/")
+
+
+def parts_there(where: Where, folder: str = FOLDER) -> dict[str, list[str]]:
+    """List what a release holds: the scenes, by name, that each of `SHARDS` has a part of."""
+    root = open_root(where)
+    found: dict[str, list[str]] = {}
+    for name in SHARDS:
+        folders = sorted({part_name(name, scene, folder).rpartition("/")[0] for scene in ("X_0", "X_1")})
+        stems = (PurePosixPath(path).stem for at in folders for path in root.list(at, "part-*.parquet"))
+        found[name] = sorted(filter(is_plain, (stem.removeprefix("part-") for stem in stems)))
+    return found
+
+
+def scenes_there(where: Where, folder: str = FOLDER) -> list[str]:
+    """List the scenes that any table of a release has a part of, by name; none where there is no release.
+
+    A scene that lacks a part is listed too, so that whoever reads it is told.
+    """
+    return sorted(set().union(*parts_there(where, folder).values()))
+
+
+def release_scenes(where: Where, folder: str = FOLDER) -> list[str]:
+    """List the scenes of a release, by name; one that lacks a part is listed too.
+
+    Raises
+    ------
+    StoreError
+        There is no release: the line that every command says.
+    """
+    root = open_root(where)
+    scenes = scenes_there(root, folder)
+    if not scenes:
+        raise no_release(root, folder)
+    return scenes
+
+
+def scenes_in_release(where: Where, patterns: Sequence[str] | None = None, folder: str = FOLDER) -> list[str]:
+    """Resolve names and globs to scenes of a release, by name; all of them where there are no patterns.
+
+    Raises
+    ------
+    StoreError
+        There is no release.
+    UsageError
+        A pattern matches nothing; the message gives the nearest names.
+    """
+    return choose_scenes(patterns, release_scenes(where, folder))
+
+
+def no_release(where: Where, folder: str = FOLDER) -> StoreError:
+    """Say where no release is, what lacks there, and what to do: an error to be raised."""
+    root = open_root(where)
+    place = root.url if folder in ("", FOLDER) else root.at(folder)
+    return StoreError(
+        f"there is no release in {place}: {_lack(root, folder)}; "
+        "name its folder with --data, or make one with make dataset"
+    )
+
+
+def _lack(root: DataRoot, folder: str) -> str:
+    if isinstance(root, LocalRoot):
+        at = root.path if folder == FOLDER else root.path / folder
+        if not at.exists():
+            return "the folder does not exist"
+        if not at.is_dir():
+            return "it is a file, not a folder"
+    names = {PurePosixPath(path).name for path in root.list(folder, "*")}
+    there = [table for table in TABLES if table in names]
+    if there:
+        return f"{', '.join(there)} without a file part-<scene>.parquet"
+    if folder == FOLDER:
+        return "its folder release holds no tables" if root.exists(FOLDER) else "it has no folder release"
+    tables = list(TABLES)
+    return f"it has no folder release, nor {', '.join(tables[:-1])} or {tables[-1]}"
+
+
+def mesh_copy(where: Where, told: str) -> Path:
+    """Return the mesh that a row of `scenes` names, on this machine.
+
+    Raises
+    ------
+    StoreError
+        The row names one outside of the data root.
+    FileNotFoundError
+        It is not there.
+    """
+    path = copy_below(where, told, "release/scenes: mesh_path")
+    if not path.is_file():
+        raise FileNotFoundError(2, os.strerror(2), str(path))
+    return path
+
+
+def copy_below(where: Where, told: str, column: str) -> Path:
+    """Return what a table's column names, on this machine.
+
+    Raises
+    ------
+    StoreError
+        The column names a path outside of the data root, by dots or by a symbolic link.
+    FileNotFoundError
+        It is not there.
+    """
+    root = open_root(where)
+    away = PurePosixPath(told).is_absolute() or ".." in PurePosixPath(told).parts
+    if isinstance(root, LocalRoot):
+        away = away or not (root.path / told).resolve().is_relative_to(root.path.resolve())
+    if away:
+        raise StoreError(f"{column} {told!r} leads out of {root}")
+    return root.local_copy(told)
+
+
+def check_release(where: Where, scenes: list[str] | None = None) -> list[str]:
     """Check from the footers that the release's parts are there, whole and of one run.
 
     Parameters
     ----------
-    data : Path
-        The data directory.
+    where : DataRoot, Path or str
+        The data root.
     scenes : list of str, optional
         Look at these alone; every scene of the release where absent.
 
@@ -72,46 +192,42 @@ def check_release(data: Path, scenes: list[str] | None = None) -> list[str]:
     StoreError
         One line a part that is missing, damaged, of a wrong number of rows, or of another run than its fellows.
     """
-    there = {name: set(_scenes_with(data, name)) for name in SHARDS}
+    root = open_root(where)
+    there = parts_there(root)
     known = sorted(set().union(*there.values())) if scenes is None else scenes
     if not known:
-        raise StoreError(f"there is no release in {data}: run aerialdojo-gen split")
-    wrong = [line for scene in known for line in _faults(data, scene, [n for n in SHARDS if scene in there[n]])]
+        raise no_release(root)
+    wrong = [line for scene in known for line in _faults(root, scene, [n for n in SHARDS if scene in there[n]])]
     if wrong:
         raise StoreError("\n".join(wrong))
     return known
 
 
-def _scenes_with(data: Path, name: str) -> list[str]:
-    paths = {store.shard_path(data, name, scene).parent for scene in ("X_0", "X_1")}
-    return [p.stem.removeprefix("part-") for folder in paths for p in folder.glob("part-*.parquet")]
-
-
-def _faults(data: Path, scene: str, present: list[str]) -> list[str]:
+def _faults(root: DataRoot, scene: str, present: list[str]) -> list[str]:
     mend = f"run aerialdojo-gen split --scene {scene}"
     if not present:
-        return [f"{scene} is not in the release in {data}: {mend}"]
+        return [f"{scene} is not in the release in {root}: {mend}"]
     lines, prints = [], {}
     for name in SHARDS:
-        path = store.shard_path(data, name, scene)
+        part = part_name(name, scene)
         if name not in present:
-            lines.append(f"{path} is missing: {mend}")
+            lines.append(f"{root.at(part)} is missing: {mend}")
             continue
         try:
-            info = store.read_info(path)
+            info = store.read_info(root, part)
         except StoreError as error:
             lines.append(str(error))
             continue
         if info is None:
-            lines.append(f"{path} was not written by aerialdojo-gen: delete it and {mend}")
+            lines.append(f"{root.at(part)} was not written by aerialdojo-gen: delete it and {mend}")
             continue
         prints[name] = info.fingerprint
     if len(set(prints.values())) > 1:
-        lines.append(f"the release's parts of {scene} in {data} are of different runs: {mend} --force")
+        lines.append(f"the release's parts of {scene} in {root} are of different runs: {mend} --force")
     return lines
 
 
-def counts(data: Path, scenes: list[str]) -> dict[str, dict[str, int]]:
+def counts(root: Where, scenes: list[str]) -> dict[str, dict[str, int]]:
     """Count the rows of every table and split of these scenes, from the footers.
 
     Returns
@@ -129,18 +245,18 @@ def counts(data: Path, scenes: list[str]) -> dict[str, dict[str, int]]:
         for name in SHARDS:
             table, split = table_and_split(name, scene)
             rows = found[table]
-            rows[split] = rows.get(split, 0) + store.count_rows(data, name, scene)
+            rows[split] = rows.get(split, 0) + store.count_rows(root, name, scene)
     return {
         table: {s: rows[s] for s in (*schemas.SUBSETS, "all") if s in rows} for table, rows in found.items()
     }  # fmt: skip
 
 
-def sizes(data: Path, scenes: list[str]) -> dict[str, int]:
+def sizes(where: Where, scenes: list[str]) -> dict[str, int]:
     """Bytes of every table of these scenes."""
-    total = dict.fromkeys(TABLES, 0)
+    root, total = open_root(where), dict.fromkeys(TABLES, 0)
     for scene in scenes:
         for name in SHARDS:
-            total[table_and_split(name, scene)[0]] += store.shard_path(data, name, scene).stat().st_size
+            total[table_and_split(name, scene)[0]] += root.size(part_name(name, scene))
     return total
 
 
@@ -149,7 +265,7 @@ def table_and_split(name: str, scene: str) -> tuple[str, str]:
     ``("tasks", "ood_train")``, ``"release/objects"`` is ``("objects", "all")``.
     """  # noqa: D205
     first, second = name.split("/")
-    return (second, "all") if first == "release" else (first, f"{store.partition(scene)}_{second}")
+    return (second, "all") if first == "release" else (first, f"{partition(scene)}_{second}")
 
 
 def meaning(field: pa.Field) -> str:

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import json
-from pathlib import Path
 from typing import Any
 
 import pyarrow as pa
 
 from aerialdojo_gen.common.version import __version__
 from aerialdojo_gen.release.contents import TABLES, Table, check_release, counts, meaning, unit
-from aerialdojo_gen.store.atomic import atomic_file
+from aerialdojo_gen.store.root import Where, open_root
 
 # Of this version's output. Not the day of the run: the same sources give the same bytes on any day.
 PUBLISHED = "2026-11-21"
@@ -147,20 +146,21 @@ def _field(table: str, field: pa.Field) -> dict[str, Any]:
     }
 
 
-def write_croissant(data: Path) -> Path:
+def write_croissant(data: Where) -> str:
     """Write ``release/croissant.json`` from what the release holds.
 
     Returns
     -------
-    Path
-        The file.
+    str
+        Where the file is.
 
     Raises
     ------
     StoreError
         The release is missing or damaged, or cannot be written.
     """
-    found = counts(data, check_release(data))
-    with atomic_file(data, "release/croissant.json") as path:
+    root = open_root(data)
+    found = counts(root, check_release(root))
+    with root.commit("release/croissant.json") as path:
         path.write_text(json.dumps(croissant(found), indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
-    return data / "release" / "croissant.json"
+    return root.at("release/croissant.json")

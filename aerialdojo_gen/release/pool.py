@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
@@ -12,6 +11,7 @@ from aerialdojo_gen.common.paper import PaperScene, inventory
 from aerialdojo_gen.common.text_table import Column, TextTable
 from aerialdojo_gen.errors import PoolError
 from aerialdojo_gen.store import shards as store
+from aerialdojo_gen.store.root import Where
 from aerialdojo_gen.store.schemas import SETTINGS
 
 
@@ -53,7 +53,7 @@ class Pool:
         return self.path_m[0] <= 1.01 * self.paper.path_m and self.path_m[1] >= 0.99 * self.paper.path_m
 
 
-def pool_of(data: Path, scene: str) -> Pool:
+def pool_of(root: Where, scene: str) -> Pool:
     """Read what `filter` kept of a scene.
 
     Raises
@@ -61,7 +61,7 @@ def pool_of(data: Path, scene: str) -> Pool:
     StoreError
         There are no verdicts of the scene.
     """
-    verdicts = store.read_scene(data, "verdicts", scene)
+    verdicts = store.read_scene(root, "verdicts", scene)
     keep = verdicts["keep"].to_numpy(zero_copy_only=False)
     setting = np.asarray(verdicts["setting"].to_pylist(), dtype=object)
     length = verdicts["length_m"].to_numpy(zero_copy_only=False)
@@ -75,7 +75,7 @@ def pool_of(data: Path, scene: str) -> Pool:
     return Pool(scene, verdicts.num_rows, {s: len(v) for s, v in lengths.items()}, paper, path)
 
 
-def require_pools(data: Path, scenes: Sequence[str]) -> None:
+def require_pools(root: Where, scenes: Sequence[str]) -> None:
     """Raise a `PoolError` that names every scene and setting with fewer kept candidates than the paper has tasks.
 
     Raises
@@ -86,7 +86,7 @@ def require_pools(data: Path, scenes: Sequence[str]) -> None:
     lacking = [
         f"{pool.scene}: {n} {setting} tasks short: {pool.kept[setting]} are kept, "
         f"the paper has {pool.kept[setting] + n}"
-        for pool in (pool_of(data, scene) for scene in scenes)
+        for pool in (pool_of(root, scene) for scene in scenes)
         for setting, n in pool.short.items()
     ]
     if lacking:

@@ -6,12 +6,12 @@ import hashlib
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 from aerialdojo_gen.config.pipeline import Pipeline
 from aerialdojo_gen.errors import StoreError, UsageError
+from aerialdojo_gen.release.contents import scenes_there
 from aerialdojo_gen.store import shards as store
-from aerialdojo_gen.store.atomic import atomic_file
+from aerialdojo_gen.store.root import DataRoot, Where, open_root
 
 RECORD = "release/pipeline.json"
 # What does not change the release: folders of this machine, which scenes and stages are asked for, recordings.
@@ -45,38 +45,40 @@ def maker_of(pipeline: Pipeline) -> Maker:
     return Maker(pipeline.name, hashlib.sha256(json.dumps(settings, sort_keys=True).encode()).hexdigest())
 
 
-def makers(data: Path) -> dict[str, Maker]:
+def makers(data: Where) -> dict[str, Maker]:
     """Return the makers of a release's scenes, by scene; one that the release does not know is `Maker()`."""
+    root = open_root(data)
     known: dict[str, Maker] = {}
     try:
-        for entry in json.loads((data / RECORD).read_text(encoding="utf-8"))["pipelines"]:
+        for entry in json.loads(root.local_copy(RECORD).read_text(encoding="utf-8"))["pipelines"]:
             known |= dict.fromkeys(entry["scenes"], Maker(str(entry["name"]), str(entry["sha256"])))
     except FileNotFoundError:
         pass
     except (OSError, ValueError, KeyError, TypeError, RecursionError):
         known = {}  # damaged: as if nothing were known, which is the cautious side
-    return {scene: known.get(scene, Maker()) for scene in store.release_scenes(data)}
+    return {scene: known.get(scene, Maker()) for scene in scenes_there(root)}
 
 
-def record_makers(data: Path, pipeline: Pipeline, scenes: Sequence[str]) -> None:
+def record_makers(data: Where, pipeline: Pipeline, scenes: Sequence[str]) -> None:
     """Write down that a pipeline made these scenes of the release."""
-    found = makers(data)
+    root = open_root(data)
+    found = makers(root)
     found |= {scene: maker_of(pipeline) for scene in scenes if scene in found}
     entries = [
         {"name": maker.name, "sha256": maker.sha256, "scenes": sorted(s for s in found if found[s] == maker)}
         for maker in sorted(set(found.values()) - {Maker()}, key=lambda maker: (maker.name, maker.sha256))
     ]
-    with atomic_file(data, RECORD) as path:
+    with root.commit(RECORD) as path:
         path.write_text(json.dumps({"pipelines": entries}, indent=1) + "\n", encoding="utf-8")
 
 
-def check_replaced(data: Path, pipeline: Pipeline, scenes: Sequence[str], *, whole: bool) -> None:
+def check_replaced(data: Where, pipeline: Pipeline, scenes: Sequence[str], *, whole: bool) -> None:
     """Refuse to put a pipeline's release in the place of another one's.
 
     Parameters
     ----------
-    data : Path
-        The data directory.
+    data : DataRoot, Path or str
+        The data root.
     pipeline : Pipeline
         What is about to run.
     scenes : sequence of str
@@ -90,8 +92,8 @@ def check_replaced(data: Path, pipeline: Pipeline, scenes: Sequence[str], *, who
         Scenes would be removed that another pipeline made, or other settings of this one; or scenes replaced that a
         pipeline of another name made.
     """
-    mine = maker_of(pipeline)
-    found = makers(data)
+    root, mine = open_root(data), maker_of(pipeline)
+    found = makers(root)
     removed = [scene for scene, maker in found.items() if whole and scene not in scenes and maker != mine]
     replaced = [scene for scene, maker in found.items() if scene in scenes and maker.name not in ("", mine.name)]
     lost = removed + replaced
@@ -102,22 +104,22 @@ def check_replaced(data: Path, pipeline: Pipeline, scenes: Sequence[str], *, who
         dict.fromkeys(str(m) + (" with other settings" if m.name == mine.name else "") for m in others)
     )
     what = " and ".join(
-        f"{verb} {_listed(data, part)}" for verb, part in (("remove", removed), ("replace", replaced)) if part
+        f"{verb} {_listed(root, part)}" for verb, part in (("remove", removed), ("replace", replaced)) if part
     )
     raise UsageError(
-        f"the release in {data} was made by {named}: {mine} would {what}; use another --data, "
+        f"the release in {root} was made by {named}: {mine} would {what}; use another --data, "
         "or lose them with --replace"
     )
 
 
-def _listed(data: Path, scenes: list[str]) -> str:
+def _listed(root: DataRoot, scenes: list[str]) -> str:
     names = ", ".join(scenes[:4]) + (", …" if len(scenes) > 4 else "")
-    tasks = sum(_tasks(data, scene) for scene in scenes)
+    tasks = sum(_tasks(root, scene) for scene in scenes)
     return f"{len(scenes)} scene{'s' * (len(scenes) > 1)} with {tasks:,} tasks ({names})"
 
 
-def _tasks(data: Path, scene: str) -> int:
+def _tasks(root: DataRoot, scene: str) -> int:
     try:
-        return sum(store.count_rows(data, table, scene) for table in ("tasks/train", "tasks/test"))
+        return sum(store.count_rows(root, table, scene) for table in ("tasks/train", "tasks/test"))
     except StoreError:
         return 0

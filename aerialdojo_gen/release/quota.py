@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from aerialdojo_gen.common.paper import PaperScene
 from aerialdojo_gen.common.rng import rank
-from aerialdojo_gen.store.shards import partition
+from aerialdojo_gen.store.layout import partition
 
 Floats = NDArray[np.float64]
 _HALVINGS = 60

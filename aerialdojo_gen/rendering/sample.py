@@ -9,13 +9,14 @@ from typing import Any
 from aerialdojo_gen.common import rng
 from aerialdojo_gen.config.sections import RenderConfig
 from aerialdojo_gen.store import shards as store
+from aerialdojo_gen.store.layout import partition as partition_of
 from aerialdojo_gen.store.schemas import SETTINGS
 
 
 def tables(config: RenderConfig, scene: str) -> tuple[str, ...]:
     """Return the tables of routes that the configuration records of a scene: none where its split has none of it."""
     *partition, subset = config.split.split("_")
-    if partition and partition[0] != store.partition(scene):
+    if partition and partition[0] != partition_of(scene):
         return ()
     return ("routes/train", "routes/test") if subset == "all" else (f"routes/{subset}",)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 
 import cv2
 import numpy as np
@@ -12,8 +13,10 @@ from numpy.typing import NDArray
 from aerialdojo_gen.browse.lookup import FoundTask
 from aerialdojo_gen.errors import StoreError
 from aerialdojo_gen.geometry.cameras import Camera, view_pose
+from aerialdojo_gen.release.contents import copy_below
 from aerialdojo_gen.store import schemas
 from aerialdojo_gen.store import shards as store
+from aerialdojo_gen.store.root import DataRoot
 
 SIZE_PX = 320
 
@@ -84,27 +87,32 @@ def _rendered(task: FoundTask, poses: NDArray[np.float64]) -> list[NDArray[np.ui
 
 def _recorded(task: FoundTask, steps: list[int]) -> list[NDArray[np.uint8]] | None:
     """Frames of the recording at some poses; None where the task was not recorded."""
-    data, scene = task.scene.data, task.scene.name
-    if not store.shards(data, "recordings", scene):
+    root, scene = task.scene.root, task.scene.name
+    if not store.shards(root, "recordings", scene):
         return None
-    rows = store.read_scene(data, "recordings", scene)
+    rows = store.read_scene(root, "recordings", scene)
     rows = rows.filter(pc.equal(rows["nav_id"], task.nav_id)).to_pylist()
     path = next((row["path"] for row in rows if (row["view"], row["modality"]) == ("front", "rgb")), None)
     if path is None:
         return None
-    if not (data / path).resolve().is_relative_to(data.resolve()):
-        raise StoreError(f"recordings: path {path!r} leads out of {data}")
     from aerialdojo_gen.rendering.reader import Video
 
-    frames = store.read_scene(data, "frames", scene, ["nav_id", "frame", "step"])
+    frames = store.read_scene(root, "frames", scene, ["nav_id", "frame", "step"])
     frames = frames.filter(pc.equal(frames["nav_id"], task.nav_id))
     first: dict[int, int] = {}
     for frame, step in zip(frames["frame"].to_pylist(), frames["step"].to_pylist(), strict=True):
         first[step] = min(frame, first.get(step, frame))
     if any(step not in first for step in steps):
         return None
-    video = Video(data / path)
+    video = Video(_copy(root, path))
     return [
         np.asarray(cv2.resize(video[first[step]], (SIZE_PX, SIZE_PX), interpolation=cv2.INTER_AREA), dtype=np.uint8)
         for step in steps
     ]
+
+
+def _copy(root: DataRoot, told: str) -> Path:
+    try:
+        return copy_below(root, told, "recordings: path")
+    except FileNotFoundError:
+        raise StoreError(f"the recording {root.at(told)} is missing: run aerialdojo-gen render") from None

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
 from aerialdojo_gen.common.paper import PaperScene, benchmarks, family_counts, inventory, shares, splits
 from aerialdojo_gen.stats.comparison import Column, Comparison, Listing, Row
 from aerialdojo_gen.store import shards as store
+from aerialdojo_gen.store.root import Where, open_root
 from aerialdojo_gen.store.schemas import FAMILIES, SETTINGS
 
 _COUNTS = tuple(Column(name) for name in ("landmarks", "objects", "base", "standard", "long", "instances"))
@@ -61,7 +61,7 @@ class Made:
         return 2 * sum(self.tasks.values())
 
 
-def made_of(data: Path, scene: str) -> Made:
+def made_of(data: Where, scene: str) -> Made:
     """Read what the release holds of a scene.
 
     Raises
@@ -69,25 +69,26 @@ def made_of(data: Path, scene: str) -> Made:
     StoreError
         A part of the scene is missing or damaged.
     """
+    root = open_root(data)
     tasks: Counter[tuple[str, str]] = Counter()
     path = 0.0
     for subset in ("train", "test"):
-        routes = store.read_scene(data, f"routes/{subset}", scene, ["setting", "length_m"])
+        routes = store.read_scene(root, f"routes/{subset}", scene, ["setting", "length_m"])
         tasks.update((subset, setting) for setting in routes["setting"].to_pylist())
         path += float(np.sum(routes["length_m"].to_numpy()))
-    row = store.read_scene(data, "release/scenes", scene, ["family", "scene_type"]).to_pylist()[0]
-    categories = store.read_scene(data, "release/objects", scene, ["category"])["category"].to_pylist()
+    row = store.read_scene(root, "release/scenes", scene, ["family", "scene_type"]).to_pylist()[0]
+    categories = store.read_scene(root, "release/objects", scene, ["category"])["category"].to_pylist()
     return Made(
         scene=scene,
         family=row["family"],
         scene_type=row["scene_type"],
-        landmarks=store.count_rows(data, "release/landmarks", scene),
+        landmarks=store.count_rows(root, "release/landmarks", scene),
         objects=len(categories),
         categories=frozenset(categories),
         tasks=dict(tasks),
         path_m=path,
         paper=inventory().get(scene),
-        anchors=sum(store.read_scene(data, "release/anchors", scene, ["selected"])["selected"].to_pylist()),
+        anchors=sum(store.read_scene(root, "release/anchors", scene, ["selected"])["selected"].to_pylist()),
     )
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Sequence
 from pathlib import Path
+from typing import BinaryIO
 
 import pyarrow as pa
 import pyarrow.compute as pc
@@ -21,7 +22,7 @@ _PLAIN_LEVEL = 15
 _DAMAGE = (pa.ArrowException, OSError, ValueError, OverflowError, MemoryError)
 
 
-def read_file(path: Path, columns: Sequence[str] | None = None) -> pa.Table:
+def read_file(path: Path, columns: Sequence[str] | None = None, called: str = "") -> pa.Table:
     """Read one Parquet file as it is, its page checksums verified.
 
     Parameters
@@ -30,6 +31,8 @@ def read_file(path: Path, columns: Sequence[str] | None = None) -> pa.Table:
         The file; whatever folders are named, no column is made of them.
     columns : sequence of str, optional
         Read these columns alone.
+    called : str, optional
+        What messages call the file; its path where absent.
 
     Returns
     -------
@@ -48,11 +51,18 @@ def read_file(path: Path, columns: Sequence[str] | None = None) -> pa.Table:
         _ = table.schema.names
         return table
     except _DAMAGE as error:
-        raise StoreError(f"{path} is damaged ({first_line(error)})") from None
+        raise StoreError(f"{called or path} is damaged ({first_line(error)})") from None
 
 
-def read_footer(path: Path) -> tuple[int, dict[bytes, bytes]]:
+def read_footer(file: Path | BinaryIO, called: str = "") -> tuple[int, dict[bytes, bytes]]:
     """Return how many rows a Parquet file says it has, and its metadata.
+
+    Parameters
+    ----------
+    file : Path or binary file
+        It is read from its end, no more than the footer.
+    called : str, optional
+        What messages call the file; its path where absent.
 
     Raises
     ------
@@ -60,9 +70,9 @@ def read_footer(path: Path) -> tuple[int, dict[bytes, bytes]]:
         The file is damaged (truncated, say).
     """
     try:
-        footer = pq.read_metadata(path)
+        footer = pq.read_metadata(file)
     except _DAMAGE as error:
-        raise StoreError(f"{path} is damaged ({first_line(error)})") from None
+        raise StoreError(f"{called or file} is damaged ({first_line(error)})") from None
     return footer.num_rows, dict(footer.metadata or {})
 
 

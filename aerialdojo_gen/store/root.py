@@ -7,17 +7,20 @@ forward slashes. Libraries that want a file of this machine (PyArrow, OpenCV, FF
 
 from __future__ import annotations
 
+import fcntl
 import os
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
+from typing import BinaryIO, TextIO, TypeAlias
 
-from aerialdojo_gen.errors import StoreError
+from aerialdojo_gen.common.disk import disk_error
+from aerialdojo_gen.errors import StoreError, UsageError
 from aerialdojo_gen.store import files
 from aerialdojo_gen.store.atomic import atomic_file, atomic_folder
-from aerialdojo_gen.store.staging import remove
+from aerialdojo_gen.store.staging import remove, sweep, sweep_unstaged
 
 
 class DataRoot(ABC):
@@ -51,12 +54,44 @@ class DataRoot(ABC):
         """Bytes of a file, or of a folder's files together; FileNotFoundError where there is none."""
 
     @abstractmethod
-    def digest(self, relative: str) -> str:
-        """SHA-256 of a file's bytes, hexadecimal; FileNotFoundError where there is none."""
+    def digest(self, relative: str, *, anew: bool = False) -> str:
+        """SHA-256 of a file's bytes, or of a folder's files one after the other by name; hexadecimal.
+
+        Parameters
+        ----------
+        relative : str
+            The file or folder.
+        anew : bool
+            Read the bytes also where their digest is known.
+
+        Raises
+        ------
+        FileNotFoundError
+            There is none of that name.
+        """
+
+    @abstractmethod
+    def version(self, relative: str) -> str:
+        """Return what tells a file from any other of its name; FileNotFoundError where there is none.
+
+        It says nothing by itself, and nothing on another root.
+        """
+
+    @abstractmethod
+    def open(self, relative: str) -> BinaryIO:
+        """Open a file for reading, from any place of it; FileNotFoundError where there is none."""
+
+    @abstractmethod
+    def at(self, relative: str) -> str:
+        """Return where a file lies, as messages say it: an absolute path or a URL."""
+
+    @abstractmethod
+    def below(self, folder: str) -> DataRoot:
+        """Return a folder as a root of its own, with a lock of its own; it need not be there yet."""
 
     @abstractmethod
     def list(self, folder: str, pattern: str = "*") -> list[str]:
-        """Paths, relative to the root and sorted, of what matches a glob in a folder; none without a folder."""
+        """Paths, relative to the root and sorted, of what in a folder matches a glob; none where it is not there."""
 
     @abstractmethod
     def commit(self, relative: str) -> AbstractContextManager[Path]:
@@ -78,7 +113,20 @@ class DataRoot(ABC):
 
     @abstractmethod
     def lock(self) -> AbstractContextManager[None]:
-        """Hold the root: one run at a time writes to it. StoreError where somebody else holds it."""
+        """Hold the root: one run at a time writes to it. StoreError where somebody else holds it.
+
+        What killed runs left half-made in it is removed.
+        """
+
+    def refresh(self) -> None:  # noqa: B027 - a directory remembers nothing
+        """Forget what was found where; a root that is pickled afterwards makes other processes forget it too."""
+
+    def is_whole(self, relative: str, size: int, sha256: str = "", *, anew: bool = False) -> bool:
+        """Whether a file or folder is there, of a size, and of a digest where one is given (see `digest`)."""
+        try:
+            return self.size(relative) == size and (not sha256 or self.digest(relative, anew=anew) == sha256)
+        except OSError:
+            return False
 
     def exists(self, relative: str) -> bool:
         """Whether there is a file or a folder of that name."""
@@ -117,9 +165,27 @@ class LocalRoot(DataRoot):
         """Bytes of a file, or of a folder's files together."""
         return files.size_of(self._at(relative))
 
-    def digest(self, relative: str) -> str:
+    def digest(self, relative: str, *, anew: bool = False) -> str:
         """SHA-256 of a file's bytes, read once in a process as long as it is not written to."""
-        return files.file_digest(self._at(relative))
+        path = self._at(relative)
+        return files.sha256_of(path) if anew or path.is_dir() else files.file_digest(path)
+
+    def version(self, relative: str) -> str:
+        """Inode, size and times of the file: one that is replaced or written to is another."""
+        stat = self._at(relative).stat()
+        return f"{stat.st_ino}-{stat.st_size}-{stat.st_mtime_ns}"
+
+    def open(self, relative: str) -> BinaryIO:
+        """Open the file itself."""
+        return self._at(relative).open("rb")
+
+    def at(self, relative: str) -> str:
+        """Return the file's absolute path."""
+        return str(self._at(relative))
+
+    def below(self, folder: str) -> LocalRoot:
+        """Return a directory in this one."""
+        return LocalRoot(self._at(folder))
 
     def list(self, folder: str, pattern: str = "*") -> list[str]:
         """Paths of what in a folder matches a glob."""
@@ -139,9 +205,39 @@ class LocalRoot(DataRoot):
         """Remove a file or a folder."""
         remove(self._at(relative))
 
-    def lock(self) -> AbstractContextManager[None]:
-        """Hold the directory by flock."""
-        raise NotImplementedError
+    @contextmanager
+    def lock(self) -> Iterator[None]:
+        """Hold the directory by flock: a killed run's lock is gone with it."""
+        path = self.path / ".lock"
+        try:
+            self.path.mkdir(parents=True, exist_ok=True)
+            file = path.open("a+")
+        except OSError as error:
+            raise disk_error(error, path) from None
+        with file:
+            try:
+                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                raise StoreError(
+                    f"another run is writing to {self.path}: wait for it, or use another --data"
+                ) from None
+            except OSError as error:
+                raise disk_error(error, path) from None
+            self._sweep_once(file)
+            sweep(self.path)
+            try:
+                yield
+            finally:
+                # What workers were at when an error or Ctrl-C ended them.
+                sweep(self.path)
+
+    def _sweep_once(self, lock: TextIO) -> None:
+        """Remove what killed runs of earlier versions left, once in a data directory's life."""
+        lock.seek(0)
+        if not lock.read():
+            sweep_unstaged(self.path)
+            lock.write("staged\n")
+            lock.flush()
 
     def _at(self, relative: str) -> Path:
         return self.path / inside(relative)
@@ -155,19 +251,45 @@ def inside(relative: str) -> str:
     return relative
 
 
-def open_root(where: DataRoot | Path | str) -> DataRoot:
+Where: TypeAlias = DataRoot | Path | str
+
+
+def open_root(where: Where) -> DataRoot:
     """Open a data root.
 
     Parameters
     ----------
     where : DataRoot, Path or str
-        A directory, which need not be there yet, or a URL of an object store; a data root is returned as it is.
+        A directory, which need not be there yet, or a URL of an object store (``s3://bucket/prefix``); a data root is
+        returned as it is.
 
     Raises
     ------
+    UsageError
+        A URL of a kind that nothing here reads, without a bucket, or with credentials in it.
     StoreError
-        A URL of a kind that nothing here reads, or the extra for it is not installed.
+        The extra for it is not installed.
     """
     if isinstance(where, DataRoot):
         return where
-    return LocalRoot(Path(where).absolute())
+    scheme, separator, rest = str(where).partition("://")
+    if isinstance(where, Path) or not separator:
+        return LocalRoot(Path(where).absolute())
+    bucket, _, prefix = rest.partition("/")
+    if "@" in bucket:
+        raise UsageError(
+            f"credentials do not belong in a URL (that of bucket {bucket.rpartition('@')[2]}): set AWS_ACCESS_KEY_ID "
+            "and AWS_SECRET_ACCESS_KEY, or AWS_PROFILE"
+        )
+    if scheme == "file":
+        if not rest.startswith("/"):
+            raise UsageError(f"{where} names no directory of this machine: write file:///path, or the path alone")
+        return LocalRoot(Path(rest))
+    if scheme not in ("s3", "s3a"):
+        raise UsageError(f"--data {where}: write a directory, or s3://bucket/prefix")
+    if not bucket or "?" in rest or "#" in rest:
+        raise UsageError(f"--data {where} is no URL of a bucket: write s3://bucket/prefix")
+    # Nothing of it is imported where data lie in a directory.
+    from aerialdojo_gen.store.object_root import ObjectRoot
+
+    return ObjectRoot(bucket, inside("/".join(part for part in prefix.split("/") if part not in ("", "."))))

@@ -6,13 +6,13 @@ import re
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 
 from aerialdojo_gen.common.bounded import loads_json
 from aerialdojo_gen.common.paper import inventory, splits
 from aerialdojo_gen.config.pipeline import Pipeline
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.schemas import SETTINGS, SUBSETS
+from aerialdojo_gen.validate.parts import Release
 from aerialdojo_gen.validate.registry import Fault, Outcome
 from aerialdojo_gen.validate.rows import SceneData
 
@@ -93,13 +93,13 @@ def scene_counts(data: SceneData, tally: Tally) -> Outcome:
     return outcome
 
 
-def whole_counts(release: Path, tallies: Sequence[Tally], pipeline: Pipeline, every_scene: bool) -> list[Outcome]:
+def whole_counts(release: Release, tallies: Sequence[Tally], pipeline: Pipeline, every_scene: bool) -> list[Outcome]:
     """Check what only all scenes together can tell.
 
     Parameters
     ----------
-    release : Path
-        The release's folder.
+    release : Release
+        Where the release lies.
     tallies : sequence of Tally
         One a scene.
     pipeline : Pipeline
@@ -124,7 +124,7 @@ WHOLE_CHECKS = {
 }
 
 
-def _splits(outcome: Outcome, _release: Path, tallies: Sequence[Tally], pipeline: Pipeline) -> str:
+def _splits(outcome: Outcome, _release: Release, tallies: Sequence[Tally], pipeline: Pipeline) -> str:
     if why := _not_the_papers(tallies, pipeline):
         return why
     for (side, subset), settings in splits().items():
@@ -139,7 +139,7 @@ def _splits(outcome: Outcome, _release: Path, tallies: Sequence[Tally], pipeline
     return ""
 
 
-def _path(outcome: Outcome, _release: Path, tallies: Sequence[Tally], pipeline: Pipeline) -> str:
+def _path(outcome: Outcome, _release: Release, tallies: Sequence[Tally], pipeline: Pipeline) -> str:
     if why := _not_the_papers(tallies, pipeline):
         return why
     found, wanted = (sum(x) for x in ((t.path_m for t in tallies), (p.path_m for p in inventory().values())))
@@ -150,17 +150,17 @@ def _path(outcome: Outcome, _release: Path, tallies: Sequence[Tally], pipeline: 
     return ""
 
 
-def _card(outcome: Outcome, release: Path, tallies: Sequence[Tally], _pipeline: Pipeline) -> str:
-    path = release / "README.md"
-    if not path.is_file():
+def _card(outcome: Outcome, release: Release, tallies: Sequence[Tally], _pipeline: Pipeline) -> str:
+    card = _text(release, "README.md")
+    if card is None:
         outcome.rows = 1
         outcome.faults.append(Fault("card_counts", "", "", "README.md", "", "no file", "the dataset card"))
         return ""
-    told = _of_card(path.read_text(encoding="utf-8", errors="replace"))
-    machine = release / "croissant.json"
-    if machine.is_file():
+    told = _of_card(card)
+    machine = _text(release, "croissant.json")
+    if machine is not None:
         try:
-            told += _of_croissant(machine.read_text(encoding="utf-8", errors="replace"))
+            told += _of_croissant(machine)
         except (ValueError, KeyError, TypeError):
             outcome.faults.append(
                 Fault("card_counts", "", "", "croissant.json", "", "no record sets", "a Croissant description")
@@ -174,6 +174,14 @@ def _card(outcome: Outcome, release: Path, tallies: Sequence[Tally], _pipeline: 
         if n != found:
             outcome.faults.append(Fault("card_counts", "", table, file, folder, f"{n:,} rows told", f"{found:,}"))
     return "" if outcome.rows else "neither card nor croissant.json tells the rows of the splits"
+
+
+def _text(release: Release, relative: str) -> str | None:
+    try:
+        path = release.root.local_copy(release.name(relative))
+    except FileNotFoundError:
+        return None
+    return path.read_text(encoding="utf-8", errors="replace") if path.is_file() else None
 
 
 def _of_card(text: str) -> list[tuple[str, str, str, int]]:
@@ -193,7 +201,7 @@ def _of_croissant(text: str) -> list[tuple[str, str, str, int]]:
     ]
 
 
-def _images(outcome: Outcome, _release: Path, tallies: Sequence[Tally], _pipeline: Pipeline) -> str:
+def _images(outcome: Outcome, _release: Release, tallies: Sequence[Tally], _pipeline: Pipeline) -> str:
     first: dict[str, str] = {}
     for tally in tallies:
         for image_id in tally.images:

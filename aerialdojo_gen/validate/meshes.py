@@ -10,9 +10,10 @@ import numpy as np
 
 from aerialdojo_gen.errors import AssetError
 from aerialdojo_gen.stages.work.build_scenes import scene_row
+from aerialdojo_gen.store.root import LocalRoot
 from aerialdojo_gen.validate.registry import Finding, check
 from aerialdojo_gen.validate.rows import Rows, SceneData
-from aerialdojo_gen.validate.scene_mesh import mesh_path, scene_mesh, want_meshes
+from aerialdojo_gen.validate.scene_mesh import mesh_path, mesh_place, scene_mesh, want_meshes
 
 _SAME_M = 1e-4
 
@@ -22,10 +23,12 @@ def mesh_outside(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """A mesh's path stays in the data directory."""
     want_meshes(data)
     told = str(rows.texts("mesh_path")[0])
-    root = data.release.parent.resolve()
     away = Path(told).is_absolute() or ".." in Path(told).parts
     # A folder that the user names may be a link to anywhere, the release's own path may not.
-    if away or (data.meshes is None and not (root / told).resolve().is_relative_to(root)):
+    if data.meshes is None and isinstance(data.release.root, LocalRoot):
+        root = data.release.root.path.resolve()
+        away = away or not (root / told).resolve().is_relative_to(root)
+    if away:
         yield Finding(0, f"mesh_path = {told!r}", "a path below the data directory")
 
 
@@ -33,8 +36,12 @@ def mesh_outside(data: SceneData, rows: Rows) -> Iterator[Finding]:
 def mesh_missing(data: SceneData, _rows: Rows) -> Iterator[Finding]:
     """Every scene's mesh is there."""
     want_meshes(data)
-    if not mesh_path(data).is_file():
-        yield Finding(0, f"no file {mesh_path(data)}", "the mesh (elsewhere: --meshes DIR; none: --no-meshes)")
+    try:
+        there = mesh_path(data).is_file()
+    except FileNotFoundError:
+        there = False
+    if not there:
+        yield Finding(0, f"no file {mesh_place(data)}", "the mesh (elsewhere: --meshes DIR; none: --no-meshes)")
 
 
 @check("scenes", needs=("mesh",), after=("mesh_outside", "mesh_missing"))

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator
-from pathlib import Path
+from dataclasses import dataclass
+from pathlib import PurePosixPath
 
 import pyarrow as pa
 
 from aerialdojo_gen.errors import StoreError
-from aerialdojo_gen.release.contents import SHARDS
+from aerialdojo_gen.release.contents import FOLDER, SHARDS, part_name
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.parquet_files import read_file
+from aerialdojo_gen.store.root import DataRoot, LocalRoot, Where, open_root
 from aerialdojo_gen.store.schemas import TableSpec
 from aerialdojo_gen.store.tables import content_digest
 from aerialdojo_gen.validate.registry import Fault, Outcome
@@ -41,50 +43,58 @@ def release_tables() -> dict[str, list[str]]:
     return keys
 
 
+@dataclass(frozen=True)
+class Release:
+    """Where a release lies.
+
+    Attributes
+    ----------
+    root : DataRoot
+        What holds it: meshes are named relative to this.
+    folder : str
+        The release's folder there; empty where it is the root itself.
+    """
+
+    root: DataRoot
+    folder: str = FOLDER
+
+    def name(self, relative: str) -> str:
+        """Return the name of a file of the release, relative to the root."""
+        return f"{self.folder}/{relative}" if self.folder else relative
+
+    def at(self, relative: str) -> str:
+        """Return where a file of the release lies, as messages say it."""
+        return self.root.at(self.name(relative))
+
+
+def release_of(where: Release | Where) -> Release:
+    """Find the release in a data root; a release by itself, with or without meshes beside it, is one too."""
+    if isinstance(where, Release):
+        return where
+    root = open_root(where)
+    if root.exists(FOLDER):
+        return Release(root)
+    above, _, name = root.url.rstrip("/").rpartition("/")
+    # The root of a disk, or a whole bucket, lies in nothing.
+    if not name or above.endswith(":/"):
+        return Release(root, "")
+    return Release(open_root(above or "/"), name)
+
+
 def part_path(key: str, scene: str) -> str:
     """Return where a scene's part lies, relative to the release."""
-    return store.shard_path(Path(), key, scene).relative_to("release").as_posix()
+    return part_name(key, scene, "")
 
 
-def scenes_of(release: Path) -> list[str]:
-    """List the scenes that any part of a release is named after.
-
-    Raises
-    ------
-    StoreError
-        There is none: the folder is no release.
-    """
-    tables = release_tables()
-    names = {
-        path.stem.removeprefix("part-")
-        for table in tables
-        for path in (release / table).rglob("part-*.parquet")
-        if _is_scene(path.stem.removeprefix("part-"))
-    }
-    if not names:
-        raise StoreError(f"there is no release in {release.absolute()}: {_lack(release, list(tables))}; "
-                         "name its folder with --data, or make one with make dataset")  # fmt: skip
-    return sorted(names)
-
-
-def _lack(release: Path, tables: list[str]) -> str:
-    if not release.exists():
-        return "the folder does not exist"
-    if not release.is_dir():
-        return "it is a file, not a folder"
-    there = [table for table in tables if (release / table).is_dir()]
-    if there:
-        return f"{', '.join(there)} without a file part-<scene>.parquet"
-    return f"it has no folder release, nor {', '.join(tables[:-1])} or {tables[-1]}"
-
-
-def foreign_files(release: Path, scenes: list[str]) -> Outcome:
+def foreign_files(release: Release, scenes: list[str]) -> Outcome:
     """Find what does not belong: no part of a scene, no card."""
     wanted = {part_path(key, scene) for keys in release_tables().values() for key in keys for scene in scenes}
     outcome = Outcome("foreign_file", "files")
-    for path in sorted(release.rglob("*")):
-        relative = path.relative_to(release)
-        if path.is_dir() and not path.is_symlink():
+    names = release.root.list(release.folder, "**/*")
+    folders = {str(parent) for name in names for parent in PurePosixPath(name).parents}
+    for name in names:
+        relative = PurePosixPath(name).relative_to(release.folder)
+        if name in folders or _is_empty_folder(release.root, name):
             continue
         outcome.rows += 1
         if relative.as_posix() in wanted or relative.parts[0] in _BESIDE:
@@ -95,7 +105,15 @@ def foreign_files(release: Path, scenes: list[str]) -> Outcome:
     return outcome
 
 
-def read_tables(release: Path, scene: str) -> tuple[dict[str, Rows], list[Outcome]]:
+def _is_empty_folder(root: DataRoot, name: str) -> bool:
+    """Whether it is a folder without anything in it, which only a file system has."""
+    if not isinstance(root, LocalRoot):
+        return False
+    path = root.path / name
+    return path.is_dir() and not path.is_symlink()
+
+
+def read_tables(release: Release, scene: str) -> tuple[dict[str, Rows], list[Outcome]]:
     """Read a scene's tables, as far as they can be read.
 
     Returns
@@ -131,23 +149,27 @@ PART_CHECKS = {
 }
 
 
-def _read(release: Path, key: str, scene: str, found: dict[str, Outcome], runs: dict[str, str]) -> pa.Table | None:
+def _read(release: Release, key: str, scene: str, found: dict[str, Outcome], runs: dict[str, str]) -> pa.Table | None:
     spec = store.LAYOUT[key].spec
     relative = part_path(key, scene)
-    path = release / relative
+    name, where = release.name(relative), release.at(relative)
 
     def fault(check: str, what: str, expected: str) -> None:
         found[check].faults.append(Fault(check, scene, spec.name, relative, "", what, expected))
 
     found["part_missing"].rows += 1
-    if not path.is_file():
+    try:
+        path = release.root.local_copy(name)
+    except FileNotFoundError:
+        path = None
+    if path is None or not path.is_file():
         fault("part_missing", "no file", f"the {spec.name} of {scene}")
         return None
     found["part_damaged"].rows += 1
     try:
-        table, info = read_file(path), store.read_info(path)
+        table, info = read_file(path, None, where), store.read_info(release.root, name)
     except StoreError as error:
-        fault("part_damaged", str(error).removeprefix(f"{path} ").split(": delete")[0], "a whole Parquet file")
+        fault("part_damaged", str(error).removeprefix(f"{where} ").split(": delete")[0], "a whole Parquet file")
         return None
     found["part_schema"].rows += 1
     if info is not None:
@@ -196,11 +218,3 @@ def _schema_faults(spec: TableSpec, table: pa.Table, extra: list[str]) -> Iterat
             yield f"{field.name} is in another unit than {(field.metadata or {}).get(b'unit', b'none').decode()}"
     if not extra and table.column_names != spec.schema.names:
         yield "columns in another order"
-
-
-def _is_scene(name: str) -> bool:
-    try:
-        store.check_scene_name(name)
-    except StoreError:
-        return False
-    return True

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pyarrow as pa
@@ -15,6 +16,9 @@ from numpy.typing import ArrayLike, NDArray
 from aerialdojo_gen.common.rng import rank
 from aerialdojo_gen.config.pipeline import Pipeline
 from aerialdojo_gen.store.schemas import TableSpec
+
+if TYPE_CHECKING:
+    from aerialdojo_gen.validate.parts import Release
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -188,8 +192,8 @@ class SceneData:
     ----------
     scene : str
         Name.
-    release : Path
-        The release's folder.
+    release : Release
+        Where the release lies.
     pipeline : Pipeline
         Whose definitions the release is held to: the body, the rules of `filter`, the paper's counts.
     tables : mapping of str to Rows
@@ -205,7 +209,7 @@ class SceneData:
     """
 
     scene: str
-    release: Path
+    release: Release
     pipeline: Pipeline
     tables: Mapping[str, Rows]
     meshes: Path | None = None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from aerialdojo_gen.common.names import choose_scenes
@@ -12,6 +12,8 @@ from aerialdojo_gen.errors import AerialDojoError
 from aerialdojo_gen.pipeline.executors.local import Pool
 from aerialdojo_gen.pipeline.interrupt import Interrupts
 from aerialdojo_gen.pipeline.progress import Reporter
+from aerialdojo_gen.release.contents import release_scenes
+from aerialdojo_gen.store.root import Where
 from aerialdojo_gen.validate import (
     anchors,
     collisions,
@@ -31,7 +33,7 @@ from aerialdojo_gen.validate import (
     words,
 )
 from aerialdojo_gen.validate.counts import Tally, scene_counts, tally_of, whole_counts
-from aerialdojo_gen.validate.parts import foreign_files, read_tables, release_tables, scenes_of
+from aerialdojo_gen.validate.parts import Release, foreign_files, part_path, read_tables, release_of, release_tables
 from aerialdojo_gen.validate.registry import CHECKS, Outcome, run_checks
 from aerialdojo_gen.validate.report import Report
 from aerialdojo_gen.validate.rows import SceneData
@@ -64,8 +66,8 @@ class Asked:
 
     Attributes
     ----------
-    release : Path
-        The release's folder.
+    release : Release, DataRoot, Path or str
+        The data root, or the release's own folder.
     scenes : tuple of str
         Names or globs; empty for all.
     meshes : Path or None
@@ -80,7 +82,7 @@ class Asked:
         Whose definitions the release is held to.
     """
 
-    release: Path
+    release: Release | Where
     scenes: tuple[str, ...] = ()
     meshes: Path | None = None
     use_meshes: bool = True
@@ -97,11 +99,6 @@ class _Work:
     @property
     def label(self) -> str:
         return f"validate {self.scene}"
-
-
-def release_of(folder: Path) -> Path:
-    """Find the release in a data directory; a release is its own."""
-    return folder / "release" if (folder / "release").is_dir() else folder
 
 
 def validate(asked: Asked, *, workers: int = 1, reporter: Reporter | None = None) -> Report:
@@ -129,27 +126,30 @@ def validate(asked: Asked, *, workers: int = 1, reporter: Reporter | None = None
         A name or a glob fits no scene of the release.
     """
     reporter = reporter or Reporter(quiet=True)
-    every = scenes_of(asked.release)
+    release = release_of(asked.release)
+    asked = replace(asked, release=release)
+    every = release_scenes(release.root, release.folder)
     chosen = choose_scenes(asked.scenes, every)
     by_scene: dict[str, tuple[list[Outcome], Tally]] = {}
     with Interrupts() as interrupts, Pool(workers) as pool, reporter.bar("validate", len(chosen)) as bar:
-        for done in pool.map(_guarded, [_Work(asked, scene) for scene in _large_first(asked.release, chosen)]):
+        for done in pool.map(_guarded, [_Work(asked, scene) for scene in _large_first(release, chosen)]):
             interrupts.check()
             if isinstance(done, AerialDojoError):
                 raise done
             by_scene[done[1].scene] = done
             bar.advance()
-    outcomes = [foreign_files(asked.release, every)]
+    outcomes = [foreign_files(release, every)]
     outcomes += [outcome for scene in chosen for outcome in by_scene[scene][0]]
     tallies = [by_scene[scene][1] for scene in chosen]
-    outcomes += whole_counts(asked.release, tallies, asked.pipeline, len(chosen) == len(every))
+    outcomes += whole_counts(release, tallies, asked.pipeline, len(chosen) == len(every))
     return Report(tuple(chosen), tuple(outcomes))
 
 
 def check_scene(asked: Asked, scene: str) -> tuple[list[Outcome], Tally]:
     """Check one scene of a release."""
-    found, outcomes = read_tables(asked.release, scene)
-    data = SceneData(scene, asked.release, asked.pipeline, found, asked.meshes, asked.use_meshes, asked.sample,
+    release = release_of(asked.release)
+    found, outcomes = read_tables(release, scene)
+    data = SceneData(scene, release, asked.pipeline, found, asked.meshes, asked.use_meshes, asked.sample,
                      asked.pictures)  # fmt: skip
     tally = tally_of(data, len(found) == len(release_tables()))
     outcomes += run_checks(data, SCENE_CHECKS)
@@ -164,10 +164,11 @@ def _guarded(work: _Work) -> tuple[list[Outcome], Tally] | AerialDojoError:
         return error
 
 
-def _large_first(release: Path, scenes: Sequence[str]) -> list[str]:
+def _large_first(release: Release, scenes: Sequence[str]) -> list[str]:
     """Order scenes so that no process is left alone with a large one at the end."""
 
     def size(scene: str) -> int:
-        return sum(path.stat().st_size for path in release.glob(f"routes/*/part-{scene}.parquet"))
+        names = [release.name(part_path(key, scene)) for key in ("routes/train", "routes/test")]
+        return sum(release.root.size(name) for name in names if release.root.exists(name))
 
     return sorted(scenes, key=lambda scene: (-size(scene), scene))

@@ -10,6 +10,7 @@ from aerialdojo_gen.geometry.rays import RayCaster
 from aerialdojo_gen.planning.collision import CollisionWorld
 from aerialdojo_gen.scenes.glb import read_glb
 from aerialdojo_gen.scenes.model import Scene
+from aerialdojo_gen.store.root import LocalRoot
 from aerialdojo_gen.validate.registry import ALWAYS_AFTER, UncheckedError
 from aerialdojo_gen.validate.rows import SceneData
 
@@ -34,10 +35,18 @@ class SceneMesh:
         return RayCaster(self.scene)
 
 
+def mesh_place(data: SceneData) -> str:
+    """Where the scene's mesh should lie, as messages say it."""
+    told = str(data["scenes"].texts("mesh_path")[0])
+    return str(data.meshes / Path(told).name) if data.meshes is not None else data.release.root.at(told)
+
+
 def mesh_path(data: SceneData) -> Path:
-    """Where the scene's mesh should lie."""
-    told = Path(str(data["scenes"].texts("mesh_path")[0]))
-    return data.meshes / told.name if data.meshes is not None else data.release.parent / told
+    """Return the scene's mesh on this machine; FileNotFoundError where it is not there."""
+    told = str(data["scenes"].texts("mesh_path")[0])
+    if data.meshes is None:
+        return data.release.root.local_copy(told)
+    return LocalRoot(data.meshes).local_copy(Path(told).name)
 
 
 def want_meshes(data: SceneData) -> None:

@@ -8,8 +8,8 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
+from aerialdojo_gen.store.layout import partition
 from aerialdojo_gen.store.schemas import DIRECTIONS, FAMILIES, SETTINGS
-from aerialdojo_gen.store.shards import partition
 from aerialdojo_gen.validate.registry import Finding, check
 from aerialdojo_gen.validate.rows import Rows, SceneData
 

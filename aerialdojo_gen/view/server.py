@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import struct
 import threading
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,6 +12,7 @@ from aerialdojo_gen.browse.lookup import ReleasedScene
 from aerialdojo_gen.errors import UsageError
 from aerialdojo_gen.release.way import sampled
 from aerialdojo_gen.store import schemas
+from aerialdojo_gen.store.root import Where
 from aerialdojo_gen.web.payload import scene_payload
 from aerialdojo_gen.web.serving import local_app
 
@@ -23,13 +23,13 @@ _OBJECT = ("object_id", "name", "category", "description", "mesh_node", "directi
 _NUMBERS = ("euclidean_m", "length_m", "detour_ratio", "min_clearance_m")
 
 
-def view_app(data: Path, scene: str) -> FastAPI:
+def view_app(data: Where, scene: str) -> FastAPI:
     """Make the app that shows a scene.
 
     Parameters
     ----------
-    data : Path
-        The data directory; its release and its meshes are all that is read.
+    data : DataRoot, Path or str
+        The data root; its release and its meshes are all that is read.
     scene : str
         Name of the scene.
 

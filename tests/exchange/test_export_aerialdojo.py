@@ -358,7 +358,6 @@ def test_the_command_says_what_it_wrote_and_what_is_wrong(smoke, tmp_path):
     assert "min_clearance_m" in lost["routes"]
     for arguments, error in (
         (["--format", "xml", "--data", str(smoke)], "no format 'xml': it is one of aerialdojo, habitat"),
-        (["--format", "habitat", "--data", str(tmp_path)], "there is no release in"),
         (["--format", "habitat", "--data", str(smoke), "--scene", "Nowhere"], "Nowhere"),
         (["--format", "habitat", "--data", str(smoke), "--picture-size", "64"], "is for --format aerialdojo"),
         (["--format", "aerialdojo", "--data", str(smoke), "--picture-size", "9"], "16 to 4096 pixels, or 0"),
@@ -367,3 +366,5 @@ def test_the_command_says_what_it_wrote_and_what_is_wrong(smoke, tmp_path):
         assert isinstance(failed.exception, UsageError)
         assert error in str(failed.exception)
         assert not (tmp_path / "p").exists()
+    absent = runner.invoke(app, ["export", "--format", "habitat", "--data", str(tmp_path / "no"), "--out", "p"])
+    assert isinstance(absent.exception, StoreError)

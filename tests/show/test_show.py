@@ -211,7 +211,9 @@ def test_an_unknown_id_gives_the_nearest(smoke, ids, tmp_path):
         find_task(smoke, "U_Courtyard_7-0123456789ab")
     with pytest.raises(UsageError, match="is no task id"):
         find_task(smoke, "../../etc/passwd")
-    with pytest.raises(StoreError, match=r"there is no release in .*run aerialdojo-gen split, or give --data"):
+    with pytest.raises(
+        StoreError, match=r"there is no release in .*: it has no folder release; name its folder with --data"
+    ):
         find_task(tmp_path, ids[0])
     command = [sys.executable, "-m", "aerialdojo_gen.cli", "show", wrong, "--data", str(smoke)]
     done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=tmp_path)

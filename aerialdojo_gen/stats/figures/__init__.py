@@ -10,17 +10,18 @@ from aerialdojo_gen.stats.figures.cloud import categories, names
 from aerialdojo_gen.stats.figures.maps import maps
 from aerialdojo_gen.stats.figures.shares import shares
 from aerialdojo_gen.stats.figures.style import Routes, read_routes, save
+from aerialdojo_gen.store.root import Where, open_root
 
 __all__ = ["draw_figures"]
 
 
-def draw_figures(data: Path, scenes: Sequence[str], folder: Path) -> list[Path]:
+def draw_figures(data: Where, scenes: Sequence[str], folder: Path) -> list[Path]:
     """Draw all figures.
 
     Parameters
     ----------
-    data : Path
-        The data directory; without a scene's mesh its map has no ground.
+    data : DataRoot, Path or str
+        The data root; without a scene's mesh its map has no ground.
     scenes : sequence of str
         Scenes of the release.
     folder : Path
@@ -36,14 +37,15 @@ def draw_figures(data: Path, scenes: Sequence[str], folder: Path) -> list[Path]:
     StoreError
         A part of the release is missing or damaged, or the folder cannot be written.
     """
-    routes: Routes = read_routes(data, scenes)
+    root = open_root(data)
+    routes: Routes = read_routes(root, scenes)
     figures = {
         "composition": composition(routes),
         "shares": shares(routes),
         "lengths": lengths(routes),
         "detours": detours(routes),
-        "categories": categories(data, scenes),
-        "names": names(data, scenes),
-        "maps": maps(data, scenes),
+        "categories": categories(root, scenes),
+        "names": names(root, scenes),
+        "maps": maps(root, scenes),
     }
     return [path for name, figure in figures.items() for path in save(figure, folder, name)]

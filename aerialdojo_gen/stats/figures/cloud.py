@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import Counter, defaultdict
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 
 from matplotlib import font_manager
 from matplotlib.figure import Figure
@@ -15,6 +14,7 @@ from wordcloud import WordCloud
 
 from aerialdojo_gen.stats.figures.style import FAMILY_COLOURS, OTHER_COLOUR, WIDTH_IN, styled
 from aerialdojo_gen.store import shards as store
+from aerialdojo_gen.store.root import DataRoot
 
 _SIZE_PX = (1440, 720)
 _MARGIN_PX = 8
@@ -22,7 +22,7 @@ _MARGIN_PX = 8
 _MOST_NAMES = 160
 
 
-def categories(data: Path, scenes: Sequence[str]) -> Figure:
+def categories(root: DataRoot, scenes: Sequence[str]) -> Figure:
     """Draw every category as large as it has objects, in the colour of the family where most of them stand.
 
     Raises
@@ -32,13 +32,13 @@ def categories(data: Path, scenes: Sequence[str]) -> Figure:
     """
     homes: defaultdict[str, Counter[str]] = defaultdict(Counter)
     for scene in scenes:
-        family = store.read_scene(data, "release/scenes", scene, ["family"]).to_pylist()[0]["family"]
-        for category in store.read_scene(data, "release/objects", scene, ["category"])["category"].to_pylist():
+        family = store.read_scene(root, "release/scenes", scene, ["family"]).to_pylist()[0]["family"]
+        for category in store.read_scene(root, "release/objects", scene, ["category"])["category"].to_pylist():
             homes[category.replace("_", " ")][family] += 1
     return _cloud(homes)
 
 
-def names(data: Path, scenes: Sequence[str]) -> Figure:
+def names(root: DataRoot, scenes: Sequence[str]) -> Figure:
     """Draw the names of the objects (paper, Fig. 2), each as large as it is sought by tasks, the most sought ones.
 
     Raises
@@ -49,7 +49,7 @@ def names(data: Path, scenes: Sequence[str]) -> Figure:
     homes: defaultdict[str, Counter[str]] = defaultdict(Counter)
     for scene in scenes:
         for subset in ("train", "test"):
-            table = store.read_scene(data, f"tasks/{subset}", scene, ["family", "target_name"])
+            table = store.read_scene(root, f"tasks/{subset}", scene, ["family", "target_name"])
             for family, name in zip(table["family"].to_pylist(), table["target_name"].to_pylist(), strict=True):
                 homes[name][family] += 1
     sought = sorted(homes, key=lambda name: (-homes[name].total(), name))[:_MOST_NAMES]

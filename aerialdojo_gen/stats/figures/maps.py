@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from aerialdojo_gen.release.contents import mesh_copy
 from aerialdojo_gen.rendering.orthographic import OrthographicPictures
 from aerialdojo_gen.scenes.glb import read_glb
 from aerialdojo_gen.stats.figures.style import WIDTH_IN, styled
 from aerialdojo_gen.store import shards as store
+from aerialdojo_gen.store.root import DataRoot
 
 _COLUMNS = 6
 _GAP_IN, _TITLE_IN, _LEGEND_IN = 0.07, 0.14, 0.3
@@ -28,7 +29,7 @@ _MARKS: dict[str, dict[str, Any]] = {
 }
 
 
-def maps(data: Path, scenes: Sequence[str]) -> Figure:
+def maps(root: DataRoot, scenes: Sequence[str]) -> Figure:
     """Draw a small map of every scene, north up, each with a scale of its own.
 
     Raises
@@ -36,7 +37,7 @@ def maps(data: Path, scenes: Sequence[str]) -> Figure:
     StoreError
         A part of the release is missing or damaged.
     """
-    rows = [store.read_scene(data, "release/scenes", scene).to_pylist()[0] for scene in scenes]
+    rows = [store.read_scene(root, "release/scenes", scene).to_pylist()[0] for scene in scenes]
     lines = [rows[k : k + _COLUMNS] for k in range(0, len(rows), _COLUMNS)]
     sizes = [[_size_in(row) for row in line] for line in lines]
     heights = [max(height for _, height in line) + _TITLE_IN + _GAP_IN for line in sizes]
@@ -49,7 +50,7 @@ def maps(data: Path, scenes: Sequence[str]) -> Figure:
                 left = _GAP_IN + k * (_CELL_IN + _GAP_IN) + (_CELL_IN - w) / 2
                 low = height - top - _TITLE_IN - h
                 axes = figure.add_axes((left / width, low / height, w / width, h / height))
-                _map(axes, data, row)
+                _map(axes, root, row)
             top += line_height
         handles = [
             Line2D([], [], ls="none", label=name, **style)
@@ -68,12 +69,15 @@ def _size_in(row: dict[str, Any]) -> tuple[float, float]:
     return scale * east_west, scale * north_south
 
 
-def _map(axes: Axes, data: Path, row: dict[str, Any]) -> None:
+def _map(axes: Axes, root: DataRoot, row: dict[str, Any]) -> None:
     scene = row["scene"]
     west, south, east, north = (row[f"{e}_{a}_m"] for e in ("min", "max") for a in "xy")
-    mesh = data / row["mesh_path"]
-    axes.set_facecolor("white" if mesh.is_file() else "#f2f2f2")
-    if mesh.is_file():
+    try:
+        mesh = mesh_copy(root, row["mesh_path"])
+    except FileNotFoundError:
+        mesh = None
+    axes.set_facecolor("white" if mesh else "#f2f2f2")
+    if mesh:
         pixel_m = max(east - west, north - south) / _PIXELS
         picture = OrthographicPictures(read_glb(mesh, row["mesh_sha256"])).from_above(
             (west, east, south, north), pixel_m
@@ -81,7 +85,7 @@ def _map(axes: Axes, data: Path, row: dict[str, Any]) -> None:
         # A little paled, so that marks stand out.
         axes.imshow(picture, extent=(west, east, south, north), interpolation="none", alpha=_OPACITY)
     for table, kind in (("anchors", "anchor"), ("objects", "object"), ("landmarks", "landmark")):
-        places = store.read_scene(data, f"release/{table}", scene, ["x_m", "y_m"])
+        places = store.read_scene(root, f"release/{table}", scene, ["x_m", "y_m"])
         axes.plot(places["x_m"].to_numpy(), places["y_m"].to_numpy(), ls="none", **_MARKS[kind])
     axes.set_xlim(west, east)
     axes.set_ylim(south, north)

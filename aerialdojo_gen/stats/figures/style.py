@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.atomic import atomic_file
+from aerialdojo_gen.store.root import DataRoot
 from aerialdojo_gen.store.schemas import FAMILIES, SETTINGS
 
 # Settings are ordered, so they are shades of one colour; families are not (Paul Tol's muted scheme).
@@ -70,7 +71,7 @@ class Routes:
     n_actions: NDArray[np.int32]
 
 
-def read_routes(data: Path, scenes: Sequence[str]) -> Routes:
+def read_routes(root: DataRoot, scenes: Sequence[str]) -> Routes:
     """Read what the charts show of the scenes' routes.
 
     Raises
@@ -83,9 +84,9 @@ def read_routes(data: Path, scenes: Sequence[str]) -> Routes:
     tables: list[pa.Table] = []
     keys: list[tuple[str, ...]] = []
     for scene in scenes:
-        row = store.read_scene(data, "release/scenes", scene, belongs).to_pylist()[0]
+        row = store.read_scene(root, "release/scenes", scene, belongs).to_pylist()[0]
         for subset in ("train", "test"):
-            tables.append(store.read_scene(data, f"routes/{subset}", scene, columns))
+            tables.append(store.read_scene(root, f"routes/{subset}", scene, columns))
             keys += [(*(row[name] for name in belongs), subset)] * tables[-1].num_rows
     table = pa.concat_tables(tables)
     family, scene_type, partition, side = np.array(keys, dtype=np.str_).reshape(-1, 4).T

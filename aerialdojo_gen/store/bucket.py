@@ -1,0 +1,273 @@
+"""Requests to an S3 bucket: get, put, list, delete and conditional puts, tried again where that helps.
+
+Credentials, region, endpoint, retries and checksums are configured as for every AWS tool: by environment variables and
+by the files that `aws configure` writes, never by the URL. What a request cannot mend becomes one line, in
+`aerialdojo_gen.store.cloud_errors`.
+"""
+
+from __future__ import annotations
+
+import os
+import threading
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
+from dataclasses import dataclass
+from functools import lru_cache
+from io import BytesIO
+from pathlib import Path
+from typing import Any, BinaryIO
+
+from aerialdojo_gen.errors import StoreError
+from aerialdojo_gen.store.cloud_errors import Changed, cloud_error, code_of, is_transient
+
+# A file of more bytes goes up in parts, several at a time; S3 takes 10,000 of them at most.
+_SINGLE, _PART, _MOST_PARTS, _AT_ONCE = 16 << 20, 8 << 20, 9_000, 4
+_BLOCK = 1 << 20
+_TRIES = 6
+
+
+@dataclass(frozen=True)
+class Entry:
+    """An object as a listing has it: bytes, and the tag that changes with them."""
+
+    size: int
+    etag: str
+
+
+@dataclass(frozen=True)
+class Content:
+    """A small object, read whole; `age_s` is the time since it was written, by the store's own clock."""
+
+    data: bytes
+    etag: str
+    age_s: float
+
+
+class Bucket:
+    """A bucket of an S3 store.
+
+    Parameters
+    ----------
+    name : str
+        The bucket's.
+
+    Raises
+    ------
+    StoreError
+        The extra ``cloud`` is not installed, or the AWS configuration is wrong. All methods raise it where the store
+        refuses or does not answer, FileNotFoundError where there is no object of that key, and `Changed` where a
+        condition does not hold.
+    """
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+        self._client = _client()
+        self.endpoint = str(self._client.meta.endpoint_url)
+
+    def read(self, key: str, begin: int, end: int, etag: str) -> bytes:
+        """Read an object's bytes from `begin` to before `end`, of the version with this tag."""
+        sink = BytesIO()
+        self._fetch(key, sink, begin, end, etag)
+        return sink.getvalue()
+
+    def read_small(self, key: str) -> Content:
+        """Read an object with its tag and its age."""
+        with self._told(key):
+            answer = self._client.get_object(Bucket=self.name, Key=key)
+            data = answer["Body"].read()
+        return Content(data, answer["ETag"], _age_s(answer))
+
+    def download(self, key: str, file: BinaryIO, entry: Entry) -> None:
+        """Write an object to a file; where the connection drops, the rest is asked for."""
+        self._fetch(key, file, 0, entry.size, entry.etag, whole=True)
+
+    def _fetch(self, key: str, sink: BinaryIO, begin: int, end: int, etag: str, *, whole: bool = False) -> None:
+        at, tries = begin, 0
+        while at < end:
+            # Of a whole object the client compares the checksum that the store has of it.
+            part = {} if whole and at == 0 else {"Range": f"bytes={at}-{end - 1}"}
+            with self._told(key):
+                try:
+                    answer = self._client.get_object(Bucket=self.name, Key=key, IfMatch=etag, **part)
+                    for block in answer["Body"].iter_chunks(_BLOCK):
+                        sink.write(block)
+                        at += len(block)
+                except Exception as error:
+                    if not is_transient(error) or tries + 1 >= _TRIES:
+                        raise
+            tries += 1
+            if at < end:
+                if tries >= _TRIES:
+                    raise StoreError(f"s3://{self.name}/{key} ends at {at:,} bytes of {end:,}: run the command again")
+                time.sleep(min(0.1 * 2.0**tries, 10.0))
+
+    def head(self, key: str) -> tuple[Entry, Mapping[str, str]]:
+        """Return an object's entry, and what was said with it when it was put."""
+        with self._told(key):
+            answer = self._client.head_object(Bucket=self.name, Key=key)
+        return Entry(answer["ContentLength"], answer["ETag"]), answer.get("Metadata", {})
+
+    def put(self, key: str, path: Path, said: Mapping[str, str]) -> Entry:
+        """Put a file as an object: it is there whole or not at all, also where this process is killed."""
+        size = path.stat().st_size
+        with self._told(key):
+            if size <= _SINGLE:
+                with path.open("rb") as file:
+                    answer = self._client.put_object(Bucket=self.name, Key=key, Body=file, Metadata=dict(said))
+                return Entry(size, answer["ETag"])
+            for _ in range(2):
+                # A run that holds another part of the bucket may take our upload for one that was left.
+                with suppress(_UploadGone):
+                    return Entry(size, self._put_parts(key, path, size, said))
+            return Entry(size, self._put_parts(key, path, size, said))
+
+    def _put_parts(self, key: str, path: Path, size: int, said: Mapping[str, str]) -> str:
+        length = max(_PART, -(-size // _MOST_PARTS))
+        where = {"Bucket": self.name, "Key": key}
+        upload = self._client.create_multipart_upload(**where, Metadata=dict(said))["UploadId"]
+
+        def put_part(number: int) -> dict[str, Any]:
+            with path.open("rb") as file:
+                file.seek((number - 1) * length)
+                part = self._client.upload_part(**where, UploadId=upload, PartNumber=number, Body=file.read(length))
+            return {"PartNumber": number, "ETag": part["ETag"]}
+
+        try:
+            with ThreadPoolExecutor(_AT_ONCE) as pool:
+                parts = list(pool.map(put_part, range(1, -(-size // length) + 1)))
+            done = self._client.complete_multipart_upload(**where, UploadId=upload, MultipartUpload={"Parts": parts})
+        except BaseException as error:
+            with suppress(Exception):
+                self._client.abort_multipart_upload(**where, UploadId=upload)
+            if code_of(error) == "NoSuchUpload":
+                raise _UploadGone from error
+            raise
+        return str(done["ETag"])
+
+    def put_bytes(self, key: str, data: bytes, *, new: bool = False, etag: str = "") -> Entry:
+        """Put a small object; only where there is none (`new`), or where its tag is the one given."""
+        condition = {"IfNoneMatch": "*"} if new else {"IfMatch": etag} if etag else {}
+        with self._told(key):
+            answer = self._client.put_object(Bucket=self.name, Key=key, Body=data, **condition)
+        return Entry(len(data), answer["ETag"])
+
+    def copy(self, key: str, to: str) -> Entry:
+        """Copy an object inside the store."""
+        with self._told(to):
+            size = self._client.head_object(Bucket=self.name, Key=key)["ContentLength"]
+            answer = self._client.copy_object(
+                Bucket=self.name, Key=to, CopySource={"Bucket": self.name, "Key": key}, MetadataDirective="COPY"
+            )
+        return Entry(size, answer["CopyObjectResult"]["ETag"])
+
+    def list(self, prefix: str) -> dict[str, Entry]:
+        """Return the objects whose keys begin with a prefix, by key."""
+        return {
+            item["Key"]: Entry(item["Size"], item["ETag"])
+            for page in self._pages("list_objects_v2", prefix, Prefix=prefix)
+            for item in page.get("Contents", [])
+        }
+
+    def list_names(self, prefix: str) -> Iterator[str]:
+        """Yield what lies right below a prefix, objects and folders, without their contents."""
+        for page in self._pages("list_objects_v2", prefix, Prefix=prefix, Delimiter="/"):
+            yield from (item["Key"].removeprefix(prefix) for item in page.get("Contents", []))
+            yield from (item["Prefix"].removeprefix(prefix).rstrip("/") for item in page.get("CommonPrefixes", []))
+
+    def delete(self, keys: Sequence[str]) -> None:
+        """Remove objects; those that are not there are no error."""
+        for begin in range(0, len(keys), 1000):
+            lot = keys[begin : begin + 1000]
+            with self._told(lot[0]):
+                if len(lot) == 1:
+                    self._client.delete_object(Bucket=self.name, Key=lot[0])
+                    continue
+                objects = [{"Key": key} for key in lot]
+                answer = self._client.delete_objects(Bucket=self.name, Delete={"Objects": objects, "Quiet": True})
+            for failed in answer.get("Errors", []):
+                raise StoreError(f"cannot delete s3://{self.name}/{failed.get('Key')}: {failed.get('Message')}")
+
+    def abort_uploads(self, prefix: str) -> int:
+        """Abort the uploads in parts under a prefix that nobody completed; returns how many."""
+        count = 0
+        for page in self._pages("list_multipart_uploads", prefix, Prefix=prefix):
+            for upload in page.get("Uploads", []):
+                with self._told(upload["Key"]), suppress(self._client.exceptions.NoSuchUpload):
+                    self._client.abort_multipart_upload(
+                        Bucket=self.name, Key=upload["Key"], UploadId=upload["UploadId"]
+                    )
+                count += 1
+        return count
+
+    def _pages(self, request: str, prefix: str, **asked: Any) -> Iterator[dict[str, Any]]:
+        with self._told(prefix):
+            yield from self._client.get_paginator(request).paginate(Bucket=self.name, **asked)
+
+    def _told(self, key: str) -> _Told:
+        return _Told(f"s3://{self.name}/{key}", self.endpoint)
+
+
+class _UploadGone(Exception):  # noqa: N818 - it says what happened
+    pass
+
+
+class _Told:
+    """Turns what the client raises into one line, FileNotFoundError or `Changed`."""
+
+    def __init__(self, url: str, endpoint: str) -> None:
+        self._url, self._endpoint = url, endpoint
+
+    def __enter__(self) -> None:
+        pass
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, _trace: Any) -> None:
+        if isinstance(error, Exception) and not isinstance(error, StoreError | FileNotFoundError | Changed):
+            told = cloud_error(error, self._url, self._endpoint)
+            if told is not None:
+                raise told from error
+
+
+def _age_s(answer: Mapping[str, Any]) -> float:
+    from email.utils import parsedate_to_datetime
+
+    said = answer["ResponseMetadata"]["HTTPHeaders"].get("date")
+    now = parsedate_to_datetime(said).timestamp() if said else time.time()
+    return now - float(answer["LastModified"].timestamp())
+
+
+_making = threading.Lock()
+
+
+def _client() -> Any:
+    # Clients may be shared by threads, sessions that make them may not.
+    with _making:
+        return _made_client(os.getpid())
+
+
+@lru_cache(maxsize=1)
+def _made_client(_process: int) -> Any:
+    try:
+        import botocore.session
+        from botocore.config import Config
+    except ImportError:
+        raise StoreError(
+            "s3:// needs the extra cloud, which is not installed: pip install 'aerialdojo-gen[cloud]'"
+        ) from None
+    retries: dict[str, Any] = {} if "AWS_RETRY_MODE" in os.environ else {"mode": "standard"}
+    if "AWS_MAX_ATTEMPTS" not in os.environ:
+        retries["total_max_attempts"] = _TRIES
+    # Stores other than AWS's have one host name for all buckets.
+    own = any(os.environ.get(name) for name in ("AWS_ENDPOINT_URL", "AWS_ENDPOINT_URL_S3"))
+    config = Config(
+        retries=retries or None, connect_timeout=10, read_timeout=60, max_pool_connections=2 * _AT_ONCE,
+        s3={"addressing_style": "path"} if own else None,
+    )  # fmt: skip
+    try:
+        return botocore.session.Session().create_client("s3", config=config)
+    except Exception as error:
+        told = cloud_error(
+            error, "s3://", os.environ.get("AWS_ENDPOINT_URL_S3") or os.environ.get("AWS_ENDPOINT_URL")
+        )
+        raise told or error from error

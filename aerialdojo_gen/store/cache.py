@@ -1,0 +1,170 @@
+"""Copies of objects on this machine, by their content: bounded, and shared by all processes of a user.
+
+``$AERIALDOJO_CACHE`` (default ``~/.cache/aerialdojo-gen``) holds at most ``$AERIALDOJO_CACHE_GB`` gigabytes (default
+20); what was used longest ago goes first, except for what a living process uses. An item is a folder under a name that
+is a digest of where the object lies and of its tag; it is made in the staging folder and renamed, so that it is whole
+or not there, whoever is killed and however many processes make the same one.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl
+import os
+import threading
+from collections import OrderedDict
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+from aerialdojo_gen.common.disk import disk_error
+from aerialdojo_gen.errors import ConfigError
+from aerialdojo_gen.store.staging import AREA, remove, staged
+
+_DEFAULT_GB = 20.0
+# Items that this process keeps from being removed: the last ones it asked for.
+_HELD = 256
+# The cache is measured when so large a share of its bound came to it through this process.
+_MEASURED_SHARE = 0.02
+
+
+class Cache:
+    """A folder of copies.
+
+    Parameters
+    ----------
+    folder : Path, optional
+        ``$AERIALDOJO_CACHE`` where absent.
+    """
+
+    def __init__(self, folder: Path | None = None) -> None:
+        self.folder = folder or cache_folder()
+        self._most = _bound_bytes()
+        self._unmeasured = self._most  # measured at the first item
+        self._held: OrderedDict[Path, int] = OrderedDict()
+        self._lock = threading.Lock()
+
+    @contextlib.contextmanager
+    def scratch(self) -> Iterator[Path]:
+        """Hold an empty folder on the cache's disk; it is removed at the end, or when its process has died."""
+        try:
+            self.folder.mkdir(parents=True, exist_ok=True)
+            with staged(self.folder, self.folder / "item") as item:
+                inner = item / "new"
+                inner.mkdir()
+                yield inner
+        except OSError as error:
+            raise disk_error(error, self.folder) from error
+
+    def find(self, name: str) -> Path | None:
+        """Return an item's folder and keep it; None where there is none."""
+        path = self._place(name)
+        try:
+            number = os.open(path, os.O_RDONLY)
+        except OSError:
+            return None
+        with contextlib.suppress(OSError):
+            # Where the file system knows no locks, what is used lately is what stays.
+            fcntl.flock(number, fcntl.LOCK_SH | fcntl.LOCK_NB)
+        try:
+            same = os.path.samestat(os.fstat(number), path.stat())
+            os.utime(path)
+        except OSError:
+            same = False
+        if not same:
+            os.close(number)
+            return None
+        with self._lock:
+            self._drop(path)
+            self._held[path] = number
+            while len(self._held) > _HELD:
+                self._drop(next(iter(self._held)))
+        return path
+
+    def make(self, name: str, fill: Callable[[Path], None]) -> Path:
+        """Return an item's folder; where there is none, one is filled first."""
+        while (found := self.find(name)) is None:
+            with self.scratch() as folder:
+                fill(folder)
+                self.add(name, folder)
+        return found
+
+    def add(self, name: str, folder: Path) -> None:
+        """Let a folder of `scratch` become an item; where it is there already, nothing changes."""
+        size = _size(folder)
+        path = self._place(name)
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            with contextlib.suppress(FileExistsError):
+                if not path.exists():
+                    folder.rename(path)
+        except OSError as error:
+            if not path.exists():
+                raise disk_error(error, path) from error
+        self._unmeasured += size
+        if self._unmeasured >= _MEASURED_SHARE * self._most:
+            self._unmeasured = 0
+            self._shrink(path)
+
+    def _shrink(self, latest: Path) -> None:
+        """Remove what was used longest ago, until the rest fits."""
+        items = []
+        for path in self.folder.glob("[0-9a-f][0-9a-f]/*"):
+            with contextlib.suppress(OSError):
+                items.append((path.stat().st_mtime, _size(path), path))
+        total = sum(size for _, size, _ in items)
+        for _, size, path in sorted(items):
+            if total <= self._most:
+                return
+            if path != latest and self._remove(path):
+                total -= size
+
+    def _remove(self, path: Path) -> bool:
+        with contextlib.suppress(OSError):
+            number = os.open(path, os.O_RDONLY)
+            try:
+                fcntl.flock(number, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                with self.scratch() as folder:
+                    path.rename(folder / "old")
+                    remove(folder / "old")
+                return True
+            finally:
+                os.close(number)
+        return False
+
+    def _drop(self, path: Path) -> None:
+        number = self._held.pop(path, None)
+        if number is not None:
+            os.close(number)
+
+    def _place(self, name: str) -> Path:
+        return self.folder / name[:2] / name
+
+
+def cache_folder() -> Path:
+    """Return where copies are kept: ``$AERIALDOJO_CACHE``, or the user's cache folder."""
+    said = os.environ.get("AERIALDOJO_CACHE")
+    if said:
+        return Path(said).expanduser().absolute()
+    base = os.environ.get("XDG_CACHE_HOME")
+    return (Path(base) if base else Path.home() / ".cache") / "aerialdojo-gen"
+
+
+def _bound_bytes() -> int:
+    said = os.environ.get("AERIALDOJO_CACHE_GB", str(_DEFAULT_GB))
+    try:
+        bound = float(said)
+    except ValueError:
+        bound = -1.0
+    if not 0.0 <= bound < 1e9:
+        raise ConfigError(f"AERIALDOJO_CACHE_GB={said!r}: write a number of gigabytes, e.g. 20")
+    return int(bound * 1e9)
+
+
+def _size(folder: Path) -> int:
+    total = 0
+    for found, _, names in os.walk(folder):
+        if AREA not in found:
+            for name in names:
+                with contextlib.suppress(OSError):
+                    total += (Path(found) / name).stat().st_size
+    return total

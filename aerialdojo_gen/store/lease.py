@@ -1,0 +1,217 @@
+"""A lock in an object store: a small object that its holder renews, taken over when it was not for too long.
+
+Whoever puts it first has it (a conditional put); a holder puts it anew, under the condition that nobody else did, every
+quarter of the lease. Its age is told by the store's clock alone. A holder that was killed leaves it to grow old: the
+next one waits for that, and takes it under the condition that it is still the old one, so that of two takers one gets
+it. A holder that could not renew it in time has lost it and writes nothing more; so do its workers, on whatever
+machine, which look whose it is before they commit, at most a quarter of a lease ago. What such a worker is putting in
+that moment still comes to stand; being made from the same inputs it is what the next holder would write.
+"""
+
+from __future__ import annotations
+
+import getpass
+import json
+import logging
+import os
+import platform
+import secrets
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from datetime import UTC, datetime, timedelta
+
+from aerialdojo_gen.common.bounded import loads_json
+from aerialdojo_gen.errors import ConfigError, Malformed, StoreError
+from aerialdojo_gen.store.bucket import Bucket, Content
+from aerialdojo_gen.store.cloud_errors import Changed
+
+_DEFAULT_S = 60.0
+_TIMES = 4
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class _Note:
+    """What the object says: who holds it, in words and by a token; released when the lease is 0."""
+
+    token: str
+    holder: str
+    lease_s: float
+
+
+def lease_s() -> float:
+    """Seconds that a lock is held without being renewed: ``$AERIALDOJO_LEASE_S``, or a minute."""
+    said = os.environ.get("AERIALDOJO_LEASE_S", str(_DEFAULT_S))
+    try:
+        seconds = float(said)
+    except ValueError:
+        seconds = 0.0
+    if not 1.0 <= seconds <= 86400.0:
+        raise ConfigError(f"AERIALDOJO_LEASE_S={said!r}: write a number of seconds, 1 or more")
+    return seconds
+
+
+class Lease:
+    """A lock that is held, and renewed by a thread until `release`.
+
+    Parameters
+    ----------
+    bucket, key : Bucket, str
+        Where the object lies.
+    url : str
+        The data root, for messages.
+
+    Raises
+    ------
+    StoreError
+        Somebody else holds it.
+    """
+
+    def __init__(self, bucket: Bucket, key: str, url: str) -> None:
+        self._bucket, self._key, self._url = bucket, key, url
+        self._lease_s = lease_s()
+        self.token = secrets.token_hex(16)
+        self._etag = self._take()
+        self._renewed = time.monotonic()
+        self._lost = ""
+        self._ended = threading.Event()
+        self._thread = threading.Thread(target=self._renew, name="lease", daemon=True)
+        self._thread.start()
+
+    def check(self) -> None:
+        """Raise StoreError if the lock is no longer held."""
+        if not self._lost and time.monotonic() - self._renewed > self._lease_s:
+            self._lost = "it could not be renewed in time"
+        if self._lost:
+            raise lost(self._url, self._lost)
+
+    def release(self) -> None:
+        """Give the lock back, where it is still held."""
+        self._ended.set()
+        self._thread.join()
+        if not self._lost:
+            with suppress(Changed, StoreError, FileNotFoundError):
+                self._bucket.put_bytes(self._key, _said(_Note(self.token, "", 0.0)), etag=self._etag)
+
+    def _mine(self) -> bytes:
+        return _said(_Note(self.token, _here(), self._lease_s))
+
+    def _take(self) -> str:
+        with suppress(Changed):
+            return self._bucket.put_bytes(self._key, self._mine(), new=True).etag
+        told = False
+        first: Content | None = None
+        while True:
+            try:
+                found = self._bucket.read_small(self._key)
+            except FileNotFoundError:
+                with suppress(Changed):
+                    return self._bucket.put_bytes(self._key, self._mine(), new=True).etag
+                continue
+            note = _read(found.data)
+            left = (note.lease_s if note else self._lease_s) - found.age_s
+            if left <= 0.0:
+                with suppress(Changed):
+                    return self._bucket.put_bytes(self._key, self._mine(), etag=found.etag).etag
+                continue
+            if first is not None and found.etag != first.etag:
+                raise StoreError(_held(self._url, note, left))
+            first = first or found
+            if not told and left > 1.0:
+                log.warning("%s; waiting whether it is renewed", _held(self._url, note, left).partition(": wait")[0])
+            told = True
+            time.sleep(min(left + 0.05, self._lease_s / _TIMES / 2, 2.0))
+
+    def _renew(self) -> None:
+        while not self._ended.wait(self._lease_s / _TIMES):
+            begun = time.monotonic()
+            try:
+                self._etag = self._bucket.put_bytes(self._key, self._mine(), etag=self._etag).etag
+                self._renewed = begun
+            except (Changed, FileNotFoundError):
+                if not self._still_mine():
+                    return
+                self._renewed = begun
+            except StoreError as error:
+                # It may answer again before the lease is over: `check` says when it is too late.
+                log.warning("the lock of %s is not renewed: %s", self._url, error)
+
+    def _still_mine(self) -> bool:
+        """Whether the put that renewed it was done after all, its answer being lost on the way."""
+        try:
+            found = self._bucket.read_small(self._key)
+            note = _read(found.data)
+        except FileNotFoundError:
+            self._lost = "somebody removed it"
+            return False
+        except StoreError:
+            return True
+        if note is not None and note.token == self.token:
+            self._etag = found.etag
+            return True
+        self._lost = f"{note.holder or 'another run'} has it now" if note else "somebody changed it"
+        return False
+
+
+def token_of(bucket: Bucket, key: str) -> str:
+    """Return the token of who holds a lock; empty where nobody does."""
+    try:
+        note = _read(bucket.read_small(key).data)
+    except FileNotFoundError:
+        return ""
+    return note.token if note and note.lease_s else ""
+
+
+def lost(url: str, why: str) -> StoreError:
+    """Make the error of a run that holds its lock no longer."""
+    return StoreError(
+        f"this run has lost the lock of {url} ({why}): nothing more is written; what was finished is kept"
+    )
+
+
+@contextmanager
+def leased(bucket: Bucket, key: str, url: str) -> Iterator[Lease]:
+    """Hold a lock for the length of the block."""
+    lease = Lease(bucket, key, url)
+    try:
+        yield lease
+    finally:
+        lease.release()
+
+
+def _held(url: str, note: _Note | None, left_s: float) -> str:
+    until = (datetime.now(UTC) + timedelta(seconds=left_s)).strftime("%H:%M:%S UTC")
+    holder = note.holder if note else "somebody"
+    return (
+        f"another run is writing to {url}: {holder} holds it until {until}, longer if it is renewed: "
+        "wait for it, or use another --data"
+    )
+
+
+def _here() -> str:
+    try:
+        user = getpass.getuser()
+    except (OSError, KeyError):
+        user = "somebody"
+    return f"{user} on {platform.node() or 'a machine'} (process {os.getpid()})"
+
+
+def _said(note: _Note) -> bytes:
+    # The time makes each one another object: a tag is of the bytes.
+    facts = {"token": note.token, "holder": note.holder, "lease_s": note.lease_s, "put": secrets.token_hex(4)}
+    return json.dumps(facts).encode()
+
+
+def _read(data: bytes) -> _Note | None:
+    """Read what a holder put; None for what nobody here put."""
+    try:
+        facts = loads_json(data)
+    except Malformed:
+        return None
+    try:
+        return _Note(str(facts["token"]), str(facts["holder"])[:200], min(max(float(facts["lease_s"]), 0.0), 86400.0))
+    except (KeyError, TypeError, ValueError):
+        return None

@@ -1,0 +1,164 @@
+"""Folders in an object store that appear, and are replaced, all at once: what `object_root` says of manifests."""
+
+from __future__ import annotations
+
+import json
+import secrets
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+from aerialdojo_gen.common.bounded import loads_json
+from aerialdojo_gen.errors import Malformed, StoreError
+from aerialdojo_gen.store.bucket import Entry
+from aerialdojo_gen.store.files import sha256_of
+from aerialdojo_gen.store.object_state import State
+
+MANIFEST = ".aerialdojo-folder.json"
+_NEW = ".aerialdojo-new-"
+_AT_ONCE = 4
+Files = dict[str, tuple[str, Entry]]
+
+
+class Folders:
+    """Folders of a bucket.
+
+    Parameters
+    ----------
+    state : State
+        Of the bucket.
+    """
+
+    def __init__(self, state: State) -> None:
+        self._state, self._bucket = state, state.bucket
+
+    def put(self, key: str, folder: Path, may_write: Callable[[], None]) -> None:
+        """Put a folder's files under a key, in the place of what is there."""
+        paths = {p.relative_to(folder).as_posix(): p for p in sorted(folder.rglob("*")) if p.is_file()}
+        before = self._bucket.list(f"{key}/")
+        own = before.get(f"{key}/{MANIFEST}")
+        there = self._manifest(f"{key}/{MANIFEST}", own) is not None if own else bool(before)
+        if there:
+            base = f"{key}/{_NEW}{secrets.token_hex(8)}"
+            new = self._put_all(base, paths)
+            may_write()
+            self._say(key, new)
+            with ThreadPoolExecutor(_AT_ONCE) as pool:
+                copied = pool.map(lambda name: (name, self._copied(new[name][0], f"{key}/{name}")), paths)
+                new_plain = dict(copied)
+            self._say(key, new_plain)
+        else:
+            self._say(key, None)
+            new_plain = self._put_all(key, paths)
+            may_write()
+            self._say(key, new_plain)
+        kept = {name for name, _ in new_plain.values()} | {f"{key}/{MANIFEST}"}
+        self._remove([name for name in self._bucket.list(f"{key}/") if name not in kept])
+
+    def delete(self, key: str) -> None:
+        """Remove a folder that has a manifest."""
+        self._say(key, None)
+        names = list(self._bucket.list(f"{key}/"))
+        self._remove([name for name in names if name != f"{key}/{MANIFEST}"])
+        self._remove([f"{key}/{MANIFEST}"])
+
+    def find(self, key: str, found: dict[str, Entry], first: str = "") -> Files:
+        """Find a file, or all files of a folder, as the manifests say.
+
+        Parameters
+        ----------
+        key : str
+            The file's or the folder's.
+        found : dict
+            A listing that has it, and the manifests of the folders that it lies in.
+        first : str
+            The outermost folder above it that may have a manifest which was put after the listing was made.
+
+        Returns
+        -------
+        dict
+            Keys and entries, by the names in the folder; a file's name is ``""``. Empty where there is none.
+        """
+        if first and f"{first}/{MANIFEST}" not in found:
+            # What a listing has of a folder that is being written was put after the folder's manifest.
+            found = found | self._bucket.list(f"{first}/{MANIFEST}")
+        above = key
+        while above:
+            if (entry := found.get(f"{above}/{MANIFEST}")) is not None:
+                files = self._manifest(f"{above}/{MANIFEST}", entry) or {}
+                inner = key[len(above) + 1 :]
+                if inner in files:
+                    return {"": files[inner]}
+                return {
+                    n.removeprefix(f"{inner}/"): at
+                    for n, at in files.items()
+                    if not inner or n.startswith(f"{inner}/")
+                }
+            above = above.rpartition("/")[0]
+        if key in found:
+            return {"": (key, found[key])}
+        plain = {name: at for name, at in found.items() if name.startswith(f"{key}/")}
+        tops = [name.removesuffix(f"/{MANIFEST}") for name in plain if name.endswith(f"/{MANIFEST}")]
+        files = {
+            n[len(key) + 1 :]: (n, at) for n, at in plain.items() if not any(n.startswith(f"{t}/") for t in tops)
+        }
+        for top in tops:
+            inside = self._manifest(f"{top}/{MANIFEST}", plain[f"{top}/{MANIFEST}"]) or {}
+            files |= {f"{top[len(key) + 1 :]}/{name}": at for name, at in inside.items()}
+        return files
+
+    def _manifest(self, key: str, entry: Entry) -> Files | None:
+        """Read which files a folder has, relative to it; None where it is being written."""
+        known = self._state.manifests
+        if (key, entry.etag) not in known:
+            try:
+                found = self._bucket.read_small(key)
+            except FileNotFoundError:
+                return None
+            known[key, found.etag] = known[key, entry.etag] = _parsed(found.data, key)
+        files: Files | None = known[key, entry.etag]
+        return files
+
+    def _say(self, key: str, files: Files | None) -> None:
+        # Relative to the folder: a whole prefix may be copied elsewhere.
+        said = {name: [at.removeprefix(f"{key}/"), e.size, e.etag] for name, (at, e) in (files or {}).items()}
+        facts = {"state": "writing" if files is None else "whole", "files": said, "put": secrets.token_hex(4)}
+        text = json.dumps(facts, sort_keys=True)
+        entry = self._bucket.put_bytes(f"{key}/{MANIFEST}", text.encode())
+        self._state.manifests[f"{key}/{MANIFEST}", entry.etag] = files
+        self._state.wrote(f"{key}/{MANIFEST}", entry)
+
+    def _put_all(self, base: str, paths: dict[str, Path]) -> Files:
+        def put(name: str) -> tuple[str, tuple[str, Entry]]:
+            entry = self._bucket.put(f"{base}/{name}", paths[name], {"sha256": sha256_of(paths[name])})
+            self._state.wrote(f"{base}/{name}", entry)
+            return name, (f"{base}/{name}", entry)
+
+        with ThreadPoolExecutor(_AT_ONCE) as pool:
+            return dict(pool.map(put, paths))
+
+    def _copied(self, key: str, to: str) -> tuple[str, Entry]:
+        entry = self._bucket.copy(key, to)
+        self._state.wrote(to, entry)
+        return to, entry
+
+    def _remove(self, names: list[str]) -> None:
+        self._bucket.delete(names)
+        for name in names:
+            self._state.wrote(name, None)
+
+
+def _parsed(data: bytes, key: str) -> Files | None:
+    try:
+        facts = loads_json(data)
+        if facts["state"] != "whole":
+            return None
+        folder = key.rpartition("/")[0]
+        return {
+            str(name): (f"{folder}/{at}", Entry(int(size), str(etag)))
+            for name, (at, size, etag) in facts["files"].items()
+        }
+    except (Malformed, KeyError, TypeError, ValueError, AttributeError):
+        raise StoreError(
+            f"the manifest {key} is damaged: delete it, and the folder counts as what lies in it"
+        ) from None

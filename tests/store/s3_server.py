@@ -1,0 +1,140 @@
+"""A real S3 server on loopback, and a proxy before it that answers with faults."""
+
+from __future__ import annotations
+
+import contextlib
+import re
+import socket
+import subprocess
+import sys
+import threading
+import time
+import urllib.request
+from collections.abc import Iterator
+
+CREDENTIALS = {"AWS_ACCESS_KEY_ID": "testing", "AWS_SECRET_ACCESS_KEY": "testing", "AWS_DEFAULT_REGION": "us-east-1"}
+
+
+@contextlib.contextmanager
+def s3_server() -> Iterator[str]:
+    """Run moto's server in a process of its own; yields its URL."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    program = [sys.executable, "-m", "moto.server", "-H", "127.0.0.1", "-p", str(port)]
+    server = subprocess.Popen(program, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    url = f"http://127.0.0.1:{port}"
+    try:
+        for _ in range(600):
+            with contextlib.suppress(OSError):
+                urllib.request.urlopen(url, timeout=1).close()
+                break
+            assert server.poll() is None, "moto's server ended"
+            time.sleep(0.05)
+        yield url
+    finally:
+        server.kill()
+        server.wait()
+
+
+class Proxy:
+    """Hands requests on to a server, but for those that match a rule: each rule is used up by its number of times.
+
+    Rules are added by `fail`: a number is answered as an HTTP error, ``"drop"`` closes the connection after part of the
+    request was taken, ``"cut"`` closes it in the middle of the answer, a float waits for so many seconds.
+    """
+
+    def __init__(self, server: str) -> None:
+        self._to = int(server.rpartition(":")[2])
+        self._listener = socket.create_server(("127.0.0.1", 0))
+        self.url = f"http://127.0.0.1:{self._listener.getsockname()[1]}"
+        self._rules: list[list] = []
+        self.seen: list[str] = []
+        self._lock = threading.Lock()
+        threading.Thread(target=self._serve, daemon=True).start()
+
+    def fail(self, pattern: str, how: int | str | float, times: int = 1) -> None:
+        """Let requests whose first line matches fail."""
+        with self._lock:
+            self._rules.append([re.compile(pattern), how, times])
+
+    def left(self) -> int:
+        """How many faults have not happened."""
+        return sum(rule[2] for rule in self._rules)
+
+    def close(self) -> None:
+        self._listener.close()
+
+    def _serve(self) -> None:
+        while True:
+            try:
+                client, _ = self._listener.accept()
+            except OSError:
+                return
+            threading.Thread(target=self._client, args=(client,), daemon=True).start()
+
+    def _client(self, client: socket.socket) -> None:
+        with contextlib.suppress(OSError), client:
+            while self._request(client):
+                pass
+
+    def _request(self, client: socket.socket) -> bool:
+        head = _head(client)
+        if not head:
+            return False
+        line = head.split(b"\r\n", 1)[0].decode()
+        self.seen.append(line)
+        how = self._rule(line)
+        if how == "drop":
+            client.recv(1000)
+            client.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, b"\1\0\0\0\0\0\0\0")
+            return False
+        if b"100-continue" in head.lower():
+            client.sendall(b"HTTP/1.1 100 Continue\r\n\r\n")
+            head = re.sub(rb"(?i)\r\nexpect:[^\r]*", b"", head)
+        length = int((re.search(rb"(?i)\r\ncontent-length: *(\d+)", head) or [0, 0])[1])
+        body = _exactly(client, length)
+        if isinstance(how, int):
+            code = {500: "InternalError", 503: "SlowDown"}[how]
+            text = f"<Error><Code>{code}</Code><Message>{code}</Message></Error>".encode()
+            client.sendall(b"HTTP/1.1 %d X\r\nContent-Type: application/xml\r\nContent-Length: %d\r\n\r\n%s"
+                           % (how, len(text), text))  # fmt: skip
+            return True
+        if isinstance(how, float):
+            time.sleep(how)
+        head = re.sub(rb"(?i)\r\nconnection:[^\r]*", b"", head).replace(b"\r\n\r\n", b"\r\nConnection: close\r\n\r\n")
+        with socket.create_connection(("127.0.0.1", self._to)) as server:
+            server.sendall(head + body)
+            answer = b""
+            while block := server.recv(1 << 16):
+                answer += block
+        client.sendall(answer if how != "cut" else answer[: answer.index(b"\r\n\r\n") + 4 + len(answer) // 3])
+        return False
+
+    def _rule(self, line: str) -> int | str | float | None:
+        with self._lock:
+            for rule in self._rules:
+                if rule[2] and rule[0].search(line):
+                    rule[2] -= 1
+                    return rule[1]
+        return None
+
+
+def _head(client: socket.socket) -> bytes:
+    head = b""
+    while not head.endswith(b"\r\n\r\n"):
+        byte = client.recv(1)
+        if not byte:
+            return b""
+        head += byte
+    return head
+
+
+def _exactly(client: socket.socket, length: int) -> bytes:
+    body = b""
+    while len(body) < length:
+        block = client.recv(min(1 << 16, length - len(body)))
+        if not block:
+            break
+        body += block
+    return body

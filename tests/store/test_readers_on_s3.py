@@ -1,0 +1,194 @@
+"""Readers of a release say the same of it in a bucket as in a directory; what they write there is there whole."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from task_files import uav_on, write
+
+from aerialdojo_gen import cli
+from aerialdojo_gen.agents.goal import Sensors
+from aerialdojo_gen.benchmark import episodes, journals
+from aerialdojo_gen.benchmark.evaluation import Evaluation
+from aerialdojo_gen.benchmark.runner import evaluate
+from aerialdojo_gen.benchmark.tasks import Selection
+from aerialdojo_gen.errors import StoreError
+from aerialdojo_gen.store.root import open_root
+
+_BLIND = Sensors(views=())
+
+
+@pytest.fixture
+def uploaded(cloud: str, smoke: Path) -> str:
+    """The smoke run's release and meshes, and what filter kept, in a bucket."""
+    root = open_root(cloud)
+    for folder in ("release", "meshes", "verdicts"):
+        for path in sorted((smoke / folder).rglob("*")):
+            if path.is_file():
+                with root.commit(path.relative_to(smoke).as_posix()) as copy:
+                    shutil.copyfile(path, copy)
+    return cloud
+
+
+def said(capsys, *arguments) -> tuple[int, str]:
+    """What a command prints, and its exit code."""
+    before, sys.argv = sys.argv, ["aerialdojo-gen", *map(str, arguments)]
+    try:
+        with pytest.raises(SystemExit) as ended:
+            cli.main()
+    finally:
+        sys.argv = before
+    told = capsys.readouterr()
+    return ended.value.code or 0, told.out + told.err
+
+
+def files(folder: Path) -> dict[str, bytes]:
+    return {p.relative_to(folder).as_posix(): p.read_bytes() for p in sorted(folder.rglob("*")) if p.is_file()}
+
+
+def both(capsys, smoke, uploaded, tmp_path, *arguments) -> dict[str, bytes]:
+    """Run a command on the directory and on the bucket; the outputs, which must be the same, are returned."""
+    made = {}
+    for kind, data in (("directory", str(smoke)), ("bucket", uploaded)):
+        out = tmp_path / kind
+        out.mkdir()
+        code, text = said(capsys, *(str(a).format(out=out) for a in arguments), "--data", data)
+        assert code == 0, text
+        made[kind] = {"": text.replace(str(out), "OUT").replace(data, "DATA").encode()} | files(out)
+    assert made["bucket"] == made["directory"]
+    return made["bucket"]
+
+
+def test_statistics_are_the_same(capsys, smoke, uploaded, tmp_path):
+    made = both(capsys, smoke, uploaded, tmp_path, "stats", "--csv", "{out}/s.csv", "--markdown", "{out}/s.md")
+    assert made.keys() == {"", "s.csv", "s.md"}
+    assert (
+        said(capsys, "stats", "--pool", "--scene", "U_Courtyard_0", "--data", uploaded)[1]
+        == said(capsys, "stats", "--pool", "--scene", "U_Courtyard_0", "--data", smoke)[1]
+    )
+
+
+@pytest.mark.parametrize("release", ["", "/release"])
+def test_validate_finds_the_same(capsys, smoke, uploaded, tmp_path, release):
+    arguments = ["validate", "--sample", 2, "--pictures", 1, "--scene", "U_Courtyard_0", "--workers", 1]
+    with open_root(uploaded).commit("release/stray.txt") as path:
+        path.write_text("no part of a release")
+    found = {}
+    for kind, data in (("directory", shutil.copytree(smoke, tmp_path / "data")), ("bucket", uploaded)):
+        if kind == "directory":
+            (data / "release/stray.txt").write_text("no part of a release")
+        report = tmp_path / f"{kind}.csv"
+        code, text = said(capsys, *arguments, "--report", report, "--quiet", "--data", f"{data}{release}")
+        found[kind] = code, text, report.read_bytes()
+    assert found["bucket"] == found["directory"]
+    assert found["bucket"][0] == 1
+    assert b"foreign_file" in found["bucket"][2]
+    assert b"stray.txt" in found["bucket"][2]
+    assert found["bucket"][2].count(b"\n") == 2
+
+
+def test_a_task_is_pictured_the_same(capsys, smoke, uploaded, tmp_path):
+    name = episodes_of_one(smoke)
+    made = both(
+        capsys, smoke, uploaded, tmp_path, "show", name, "--frames", 0, "--out", "{out}/t.png", "--html", "{out}/t.html"
+    )  # fmt: skip
+    assert made.keys() == {"", "t.png", "t.html"}
+
+
+def episodes_of_one(data: Path) -> str:
+    from aerialdojo_gen.browse.lookup import ReleasedScene
+
+    return str(min(ReleasedScene(data, "U_Courtyard_0").routes["nav_id"].to_pylist()))
+
+
+@pytest.mark.parametrize("form", [["habitat"], ["aerialdojo", "--picture-size", "0"]], ids=lambda form: form[0])
+def test_exports_are_the_same(capsys, smoke, uploaded, tmp_path, form):
+    made = both(capsys, smoke, uploaded, tmp_path, "export", "--format", *form, "--out", "{out}/e")
+    assert "e/export.json" in made
+    assert len(made) > 5
+    code, text = said(capsys, "export", "--format", "habitat", "--data", uploaded)
+    assert (code, text) == (2, "error: an export is a folder of this machine: name it with --out\n")
+
+
+def test_episodes_are_the_same_rows_and_lie_in_the_bucket(capsys, smoke, uploaded, tmp_path):
+    job = Evaluation("r", "random", {}, Selection(limit=6), _BLIND)
+    here = evaluate(smoke, job, out=tmp_path / "log")
+    there = evaluate(uploaded, job)
+    assert (there.finished, there.flown) == (here.finished, here.flown) == (6, 6)
+    for table in ("episodes", "steps"):
+        assert episodes.read_run(uploaded, "r", table).equals(episodes.read_run(tmp_path / "log", "r", table))
+    assert evaluate(uploaded, job).flown == 0
+    assert not journals.Journals(open_root(uploaded), "r")
+    told = [said(capsys, "report", "--data", d, "--log", log, "--format", "csv") for d, log in
+            ((smoke, tmp_path / "log"), (uploaded, uploaded))]  # fmt: skip
+    assert told[0] == told[1]
+    evaluate(uploaded, job, restart=True)
+    assert evaluate(uploaded, Evaluation("r", "stop", {}, Selection(limit=2), _BLIND), restart=True).finished == 2
+    assert len(episodes.read_run(uploaded, "r")) == 2
+
+
+def test_another_machine_goes_on_from_the_last_checkpoint(uploaded, tmp_path, monkeypatch):
+    """A killed run's journals of this machine are gone: what was committed is not flown again."""
+    program = f"""
+from aerialdojo_gen.benchmark import journals, worker
+from aerialdojo_gen.benchmark.evaluation import Evaluation
+from aerialdojo_gen.agents.goal import Sensors
+from aerialdojo_gen.benchmark.runner import evaluate
+from aerialdojo_gen.benchmark.tasks import Selection
+import os, signal
+journals.CHECKPOINT_S = 0.0
+fly, flown = worker.Worker._episode, []
+def killed(self, task):
+    flown.append(task)
+    if len(flown) == 5:
+        os.kill(os.getpid(), signal.SIGKILL)
+    return fly(self, task)
+worker.Worker._episode = killed
+evaluate({uploaded!r}, Evaluation("k", "random", {{}}, Selection(limit=8), Sensors(views=())))
+"""
+    first = dict(os.environ, AERIALDOJO_CACHE=str(tmp_path / "first"), AERIALDOJO_LEASE_S="1")
+    done = subprocess.run([sys.executable, "-c", program], env=first, capture_output=True, text=True, check=False)
+    assert done.returncode == -signal.SIGKILL, done.stderr
+    assert list((tmp_path / "first" / "journals").rglob("*.jsonl"))
+    monkeypatch.setenv("AERIALDOJO_LEASE_S", "1")
+    open_root(uploaded).refresh()
+    job = Evaluation("k", "random", {}, Selection(limit=8), _BLIND)
+    for _ in range(60):
+        try:
+            outcome = evaluate(uploaded, job)
+            break
+        except StoreError as error:
+            assert "another run" in str(error)
+            time.sleep(0.5)
+    assert (outcome.finished, outcome.flown) == (8, 4)
+    whole = evaluate(uploaded, Evaluation("w", "random", {}, Selection(limit=8), _BLIND))
+    assert whole.flown == 8
+    for table in ("episodes", "steps"):
+        rows = [episodes.read_run(uploaded, run, table).drop_columns("run_id") for run in ("k", "w")]
+        assert rows[0].equals(rows[1])
+
+
+def test_a_bucket_without_a_release_is_one_line(capsys, cloud):
+    told = "it has no folder release; name its folder with --data, or make one with make dataset\n"
+    for command in (["stats"], ["show", "U_Courtyard_0-0123456789ab"], ["evaluate", "--agent", "stop"]):
+        assert said(capsys, *command, "--data", cloud) == (1, f"error: there is no release in {cloud}: {told}")
+
+
+def test_an_import_lies_in_the_bucket_whole(capsys, cloud, tmp_path):
+    path = write(tmp_path / "tasks.json", uav_on())
+    code, text = said(capsys, "import-benchmark", path, "--format", "uav-on", "--data", cloud)
+    assert code == 0, text
+    assert text.startswith(f"{cloud}/imported/uav-on\n")
+    code, text = said(capsys, "import-benchmark", path, "--format", "uav-on", "--data", cloud)
+    assert (code, text) == (2, f"error: {cloud}/imported/uav-on is there already: --force replaces it\n")
+    root = open_root(cloud)
+    root.refresh()
+    assert root.exists("imported/uav-on/import.json")
+    assert root.list("imported/uav-on/tasks", "part-*.parquet")
