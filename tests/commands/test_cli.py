@@ -8,7 +8,7 @@ import pytest
 
 from aerialdojo_gen.commands.stages import PLAIN_STAGES, SPLIT
 from aerialdojo_gen.errors import UsageError
-from aerialdojo_gen.pipeline import runner, stage
+from aerialdojo_gen.pipeline import registry, runner
 
 HEAVY = ("numpy", "pyarrow", "numba", "fcl", "pybullet", "trimesh", "cv2", "scipy", "av")
 
@@ -31,7 +31,7 @@ def test_help_imports_nothing_heavy(args):
 
 
 def test_every_stage_has_a_command_with_the_common_options():
-    for one in stage.STAGES:
+    for one in registry.STAGES:
         text = call(one.name, "--help").stdout
         assert one.help.split()[0] in text
         for option in ("--data", "--scene", "--pipeline", "--workers", "--force", "--quiet"):
@@ -40,7 +40,7 @@ def test_every_stage_has_a_command_with_the_common_options():
 
 def test_help_texts_are_the_stages_own():
     ours = PLAIN_STAGES | {"split": SPLIT}
-    assert {s.name: s.help for s in stage.STAGES if s.name in ours} == ours
+    assert {s.name: s.help for s in registry.STAGES if s.name in ours} == ours
 
 
 def assert_one_line(result, code, *words):
@@ -88,8 +88,8 @@ def test_scene_patterns():
 
 
 def test_upstream_of_each_stage_is_all_it_reads():
-    for one in stage.STAGES:
-        chain = list(stage.upstream(one.name))
+    for one in registry.STAGES:
+        chain = list(registry.upstream(one.name))
         assert chain[-1] is one
         written = set()
         for s in chain:
@@ -98,6 +98,6 @@ def test_upstream_of_each_stage_is_all_it_reads():
 
 
 def test_upstream_leaves_out_what_is_not_needed():
-    assert [s.name for s in stage.upstream("plan")] == [
+    assert [s.name for s in registry.upstream("plan")] == [
         "build-scenes", "annotate-import", "anchor-sample", "pair-objects", "plan"
     ]  # fmt: skip
