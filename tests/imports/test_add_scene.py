@@ -286,6 +286,7 @@ def reordered(glb: bytes, order) -> bytes:
     return head + len(text).to_bytes(4, "little") + b"JSON" + text + rest
 
 
+@pytest.mark.slow
 def test_the_same_file_gives_the_same_bytes_in_whatever_order_its_nodes_come(village, tmp_path):
     glb = (village / "village.glb").read_bytes()
     made = set()
