@@ -47,6 +47,7 @@ def village(tmp_path_factory) -> Path:
     return folder
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("suffix", ["glb", "obj", "stl", "ply", "3ds"])
 def test_every_format_gives_the_same_nine_bodies(village, suffix):
     scene, _ = adopt("Village", read_mesh(village / f"village.{suffix}"))
