@@ -10,6 +10,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import hypothesis
 import pytest
 
 if TYPE_CHECKING:
@@ -19,6 +20,11 @@ if TYPE_CHECKING:
 NOT_FAST = frozenset({"pipeline", "browser", "kill", "scenes", "ray", "s3", "slow"})
 # Marks that go with a fixture.
 BY_FIXTURE = {"smoke": "pipeline", "browser": "browser", "mesh_of": "scenes"}
+
+
+# How long an example takes is the machine's affair: no test fails for that.
+hypothesis.settings.register_profile("untimed", deadline=None)
+hypothesis.settings.load_profile("untimed")
 
 
 @pytest.hookimpl(tryfirst=True)

@@ -146,7 +146,7 @@ def test_killed_again_and_again_ends_with_the_same_bytes(project, smoke, tmp_pat
     out = tmp_path / "out"
     command = [
         sys.executable, "-m", "aerialdojo_gen.cli", "evaluate", "--data", str(smoke), "--out", str(out), "--run", "r",
-        "--agent", "slowagent:Slow", "--limit", "120", "--pipeline", str(project / "pipelines" / "smoke.toml"),
+        "--agent", "slowagent:Slow", "--limit", "60", "--pipeline", str(project / "pipelines" / "smoke.toml"),
         "--workers", "1",
     ]  # fmt: skip
 
@@ -160,7 +160,7 @@ def test_killed_again_and_again_ends_with_the_same_bytes(project, smoke, tmp_pat
     kept = set()
     for _ in range(2):
         process = subprocess.Popen(command, cwd=tmp_path, env=env, stderr=subprocess.DEVNULL, start_new_session=True)
-        while process.poll() is None and len(finished()) < len(kept) + 15:
+        while process.poll() is None and len(finished()) < len(kept) + 8:
             time.sleep(0.005)
         assert process.poll() is None, "killed in the middle"
         os.killpg(process.pid, signal.SIGKILL)
@@ -173,7 +173,7 @@ def test_killed_again_and_again_ends_with_the_same_bytes(project, smoke, tmp_pat
     done = subprocess.run(command, cwd=tmp_path, env=env, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     flown = int(done.stderr.split(" flown now")[0].rsplit(" ", 1)[1])
-    assert flown == 120 - len(kept), "no finished episode is flown again"
+    assert flown == 60 - len(kept), "no finished episode is flown again"
     fresh = tmp_path / "fresh"
     again = subprocess.run(
         [fresh if c == str(out) else c for c in command], cwd=tmp_path, env=env, capture_output=True, check=False

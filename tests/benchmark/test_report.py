@@ -29,6 +29,8 @@ from aerialdojo_gen.benchmark.scores import summarize
 from aerialdojo_gen.common.paper import results
 from aerialdojo_gen.errors import AerialDojoError, StoreError
 
+pytestmark = pytest.mark.slow
+
 AT_3, AT_5 = PROFILES["aerialdojo"], PROFILES["aerialdojo-5m"]
 NASTY = "</script><script>alert(1)</script> & <b>$x_1$ | ä"
 
@@ -304,7 +306,6 @@ def test_a_figure_of_some_families_has_gaps_and_no_zeros(tmp_path: Path) -> None
     assert [math.isnan(v) for v in values] == [False, True, True, False, False]
 
 
-@pytest.mark.slow
 def test_the_folder_of_a_report_is_whole_and_the_same_bytes_each_time(runs: list[Run], tmp_path: Path) -> None:
     written = write_report(tmp_path / "out", wanted(runs, AT_3, AT_5), [])
     assert sorted(p.name for p in written) == sorted(p.name for p in (tmp_path / "out").iterdir())
@@ -335,7 +336,6 @@ def invoke(*arguments: str) -> str:
     return done.stdout
 
 
-@pytest.mark.slow
 def test_the_command_prints_what_is_asked_for(log: Path, tmp_path: Path) -> None:
     plain = invoke("--data", str(log))
     assert plain.startswith("Overall\n")
@@ -362,7 +362,6 @@ def test_the_command_prints_what_is_asked_for(log: Path, tmp_path: Path) -> None
     assert (tmp_path / "out" / "report.html").stat().st_size > 50_000
 
 
-@pytest.mark.slow
 def test_the_command_says_in_one_line_what_is_wrong(log: Path, tmp_path: Path) -> None:
     for arguments, message in (
         (["--data", str(tmp_path)], "no runs in"),

@@ -59,6 +59,8 @@ CLOSED = {
     "ruin_wall", "sea_wall", "station_building", "station_house", "substation", "thatched_hut", "ticket_office",
     "toll_house", "toll_office", "town_block", "town_house", "turbine_hall", "warehouse", "workshop", "yard_wall",
 }  # fmt: skip
+# How much of the smaller of two outlines may lie in the other's: planters stand close to shop windows.
+SHARE = {"D_Flood": 0.2, "I_Bridge": 0.05, "I_RailCorridor": 0.05, "U_Alley": 0.2, "U_ParkingLot": 0.2}
 BUILD = """
 import sys
 from pathlib import Path
@@ -119,14 +121,12 @@ def test_its_names_are_unique_and_its_triangles_sound(scene: Scene) -> None:
             assert len(part.uv) == len(part.vertices)
             assert part.faces.min() >= 0
             assert part.faces.max() < len(part.vertices)
-    annotated = {thing["node"] for thing in read_annotations(scene.name)["objects"]}
-    assert [node for node in annotated if not scene[node].attributes.get("place", "").strip()] == []
 
 
 def test_it_keeps_to_its_bounds_and_its_budget(scene: Scene) -> None:
     low, high = scene.bounds
     # What is looked for can be flown around; towers rise above the ceiling, and crowns hang over the edge.
-    targets = [p for p in props_of(scene) if p.category in catalogue().targets]
+    targets = [scene[thing["node"]] for thing in read_annotations(scene.name)["objects"]]
     assert [t.node for t in targets if (t.centroid < low - [0.0, 0.0, 2.0]).any() or (t.centroid > high).any()] == []
     assert [i.node for i in scene.instances if ((i.bounds[1] < low) | (i.bounds[0] > high)).any()] == []
     assert 30_000 <= scene.n_triangles <= 200_000
@@ -143,7 +143,7 @@ def test_its_props_stand_on_something(scene: Scene) -> None:
 
 
 def test_its_props_do_not_stand_in_one_another(scene: Scene) -> None:
-    assert clashes(scene, share=0.1, bearers=SPANNING) == []
+    assert clashes(scene, SHARE.get(type_of(scene.name), 0.1), SPANNING) == []
 
 
 def test_its_props_are_not_walled_in(scene: Scene) -> None:

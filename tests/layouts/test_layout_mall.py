@@ -41,6 +41,11 @@ def props(scene: Scene, catalogue: Catalogue) -> list[Instance]:
     return [i for i in scene.instances if i.category in catalogue]
 
 
+def test_every_prop_says_where_it_stands(mall: Scene, catalogue: Catalogue) -> None:
+    for i in props(mall, catalogue):
+        assert i.attributes.get("place", "").strip(), i.node
+
+
 def test_props_do_not_stand_in_each_other(mall: Scene, catalogue: Catalogue) -> None:
     owners: dict[int, Instance] = {}
     bodies = []

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pyarrow.parquet as pq
 import pytest
+import torture
 
 from aerialdojo_gen.errors import AssetError
 from aerialdojo_gen.scenes.glb import read_glb
@@ -31,10 +32,19 @@ def start(project, data, *args, verb="plan", workers=2):
     )  # fmt: skip
 
 
-def run(project, data, *args, **kw):
-    process = start(project, data, *args, **kw)
-    _, err = process.communicate(timeout=300)
-    return process.returncode, err
+@pytest.fixture(scope="module")
+def server():
+    """A process that has imported everything and becomes a command in a child: imports are not what is tried here."""
+    one = torture.Server()
+    yield one
+    one.close()
+
+
+def run(server, data, *args, verb="plan", workers=2):
+    """Run a command to its end; gives its exit status and what it said."""
+    said = data.parent / "said"
+    code = server.run([verb, *args, "--data", str(data), "--workers", str(workers)], {}, said, -1.0)
+    return code, said.read_text()
 
 
 def plan_args(_data):
@@ -72,7 +82,7 @@ def wait_for_shards(data, n, process):
         time.sleep(0.01)
 
 
-def test_killed_again_and_again_ends_with_the_same_bytes(project, smoke, tmp_path):
+def test_killed_again_and_again_ends_with_the_same_bytes(project, server, smoke, tmp_path):
     data = tmp_path / "data"
     kills = 0
     # In build-scenes, between two stages, in anchor-sample, in plan. What a kill at any one call leaves, test_atomic
@@ -90,15 +100,15 @@ def test_killed_again_and_again_ends_with_the_same_bytes(project, smoke, tmp_pat
         for path in data.rglob("part-*.parquet"):
             assert read_info(path) is not None, "a reader saw half a shard"
     assert kills >= 3
-    code, err = run(project, data, *plan_args(data))
+    code, err = run(server, data, *plan_args(data))
     assert code == 0, err
     assert snapshot(data) == {k: v for k, v in snapshot(smoke).items() if k in snapshot(data)}
     assert snapshot(data).keys() == snapshot(smoke).keys()
     assert not list(data.rglob(f"{AREA}*")), "what killed runs left half-made is swept"
 
 
-def test_one_worker_gives_the_same_bytes_as_two(project, smoke, tmp_path):
-    code, err = run(project, tmp_path / "data", *plan_args(tmp_path), workers=1)
+def test_one_worker_gives_the_same_bytes_as_two(server, smoke, tmp_path):
+    code, err = run(server, tmp_path / "data", *plan_args(tmp_path), workers=1)
     assert code == 0, err
     assert snapshot(tmp_path / "data") == snapshot(smoke)
 
@@ -129,9 +139,9 @@ def mtimes(data):
     return {p: p.stat().st_mtime_ns for p in data.rglob("*") if p.is_file() and p.name != ".lock"}
 
 
-def test_nothing_changed_nothing_is_written(project, copy):
+def test_nothing_changed_nothing_is_written(server, copy):
     before = mtimes(copy)
-    code, err = run(project, copy, *plan_args(copy))
+    code, err = run(server, copy, *plan_args(copy))
     assert code == 0
     assert mtimes(copy) == before
     assert err.count("nothing to do") == 5
@@ -141,11 +151,11 @@ def shard(data, table, number):
     return sorted(data.glob(f"{table}/*/part-00000.parquet"))[number]
 
 
-def test_truncated_shards_are_named_and_made_again(project, smoke, copy):
+def test_truncated_shards_are_named_and_made_again(server, smoke, copy):
     cut = {shard(copy, "plans", 0): 0, shard(copy, "pairs", 0): 100, shard(copy, "landmarks", 1): -9}
     for path, keep in cut.items():
         path.write_bytes(path.read_bytes()[:keep])
-    code, err = run(project, copy, *plan_args(copy))
+    code, err = run(server, copy, *plan_args(copy))
     assert code == 0, err
     for path in cut:
         assert f"{path} is damaged" in err
@@ -153,26 +163,26 @@ def test_truncated_shards_are_named_and_made_again(project, smoke, copy):
     assert snapshot(copy) == snapshot(smoke)
 
 
-def test_a_shard_that_something_else_rewrote_is_made_again(project, smoke, copy):
+def test_a_shard_that_something_else_rewrote_is_made_again(server, smoke, copy):
     path = sorted(copy.glob("anchors/*/part-00000.parquet"))[0]
     table = pq.read_table(path, partitioning=None)
     pq.write_table(table.slice(0, 3).replace_schema_metadata(None), path)
-    code, err = run(project, copy, *plan_args(copy))
+    code, err = run(server, copy, *plan_args(copy))
     assert code == 0, err
     assert snapshot(copy) == snapshot(smoke)
 
 
-def test_a_missing_or_cut_mesh_is_built_again(project, smoke, copy):
+def test_a_missing_or_cut_mesh_is_built_again(server, smoke, copy):
     meshes = sorted(copy.glob("meshes/*.glb"))
     meshes[0].unlink()
     meshes[1].write_bytes(meshes[1].read_bytes()[:1000])
-    code, err = run(project, copy, *plan_args(copy))
+    code, err = run(server, copy, *plan_args(copy))
     assert code == 0
     assert all(str(mesh) in err for mesh in meshes)
     assert snapshot(copy) == snapshot(smoke)
 
 
-def test_a_mesh_with_a_vertex_moved_is_built_again(project, smoke, copy):
+def test_a_mesh_with_a_vertex_moved_is_built_again(server, smoke, copy):
     mesh = sorted(copy.glob("meshes/*.glb"))[0]
     before = mesh.stat()
     raw = bytearray(mesh.read_bytes())
@@ -186,13 +196,13 @@ def test_a_mesh_with_a_vertex_moved_is_built_again(project, smoke, copy):
     sha256 = store.read_scene(copy, "scenes", scene)["mesh_sha256"][0].as_py()
     with pytest.raises(AssetError, match="is not the mesh that the tables were made from"):
         read_glb(mesh, sha256)
-    code, err = run(project, copy, *plan_args(copy))
+    code, err = run(server, copy, *plan_args(copy))
     assert code == 0
     assert f"{mesh} is missing or damaged: computed again" in err
     assert snapshot(copy) == snapshot(smoke)
 
 
-def test_shards_with_a_damaged_footer_are_made_again(project, smoke, copy):
+def test_shards_with_a_damaged_footer_are_made_again(server, smoke, copy):
     damage = {
         shard(copy, "pairs", 0): b"null", shard(copy, "pairs", 1): b"[]", shard(copy, "objects", 0): b"x",
         shard(copy, "landmarks", 1): None,
@@ -205,7 +215,7 @@ def test_shards_with_a_damaged_footer_are_made_again(project, smoke, copy):
         else:
             end = raw.index(b"}}", at) + 2
             path.write_bytes(raw[:at] + text.ljust(end - at) + raw[end:])
-    code, err = run(project, copy, *plan_args(copy))
+    code, err = run(server, copy, *plan_args(copy))
     assert code == 0, err
     for path in damage:
         assert f"{path} is damaged (its footer" in err
@@ -213,30 +223,30 @@ def test_shards_with_a_damaged_footer_are_made_again(project, smoke, copy):
     assert snapshot(copy) == snapshot(smoke)
 
 
-def test_a_changed_config_makes_its_stage_stale_and_only_what_follows(project, copy, tmp_path):
+def test_a_changed_config_makes_its_stage_stale_and_only_what_follows(project, server, copy, tmp_path):
     before = mtimes(copy)
     text = (project / "pipelines" / "smoke.toml").read_text()
     text = text.replace('"../', f'"{project}/') + "\n[pair-objects]\nstart_variants = 1\n"
     mine = tmp_path / "mine.toml"
     mine.write_text(text)
-    code, err = run(project, copy, "--pipeline", str(mine))
+    code, err = run(server, copy, "--pipeline", str(mine))
     assert code == 0, err
     changed = {p.relative_to(copy).parts[0] for p, t in mtimes(copy).items() if before.get(p) != t}
     assert changed == {"pairs", "plans"}
 
 
-def test_two_runs_on_one_directory_do_not_mix(project, tmp_path):
+def test_two_runs_on_one_directory_do_not_mix(project, server, tmp_path):
     data = tmp_path / "data"
     first = start(project, data, *plan_args(data))
     wait_for_shards(data, 1, first)
-    code, err = run(project, data, *plan_args(data))
+    code, err = run(server, data, *plan_args(data))
     assert code == 1
     assert err == f"error: another run is writing to {data}: wait for it, or use another --data\n"
     first.kill()
     first.communicate()
 
 
-def test_a_read_only_directory_is_one_line(project, copy):
+def test_a_read_only_directory_is_one_line(server, copy):
     if os.geteuid() == 0:
         # Root writes through permission bits: a folder in the shard's place stops it all the same.
         path = sorted(copy.glob("pairs/*/part-00000.parquet"))[0]
@@ -246,14 +256,14 @@ def test_a_read_only_directory_is_one_line(project, copy):
         folder = sorted(copy.glob("pairs/*"))[0]
         sorted(folder.iterdir())[0].unlink()
         folder.chmod(0o555)
-    code, err = run(project, copy, *plan_args(copy))
+    code, err = run(server, copy, *plan_args(copy))
     assert code == 1
     lines = [line for line in err.splitlines() if line.startswith("error:")]
     assert len(lines) == 1
     assert "Traceback" not in err
 
 
-def test_what_versions_before_left_is_removed_once_and_an_old_recording_comes_back(project, smoke, copy):
+def test_what_versions_before_left_is_removed_once_and_an_old_recording_comes_back(server, smoke, copy):
     (copy / ".lock").write_text("")
     (recording,) = (copy / "media" / "U_Courtyard_0").iterdir()
     recording.rename(recording.with_name(f".{recording.name}.4242.old"))
@@ -264,10 +274,10 @@ def test_what_versions_before_left_is_removed_once_and_an_old_recording_comes_ba
     ):  # fmt: skip
         (copy / left).parent.mkdir(parents=True, exist_ok=True)
         (copy / left).write_bytes(b"half")
-    code, err = run(project, copy, *plan_args(copy))
+    code, err = run(server, copy, *plan_args(copy))
     assert code == 0, err
     assert recording.is_dir()
     assert not [p for p in copy.rglob(".*") if p.name != ".lock"]
     (copy / "meshes" / ".mine.1.tmp").write_text("not looked for again")
-    code, err = run(project, copy, *plan_args(copy))
+    code, err = run(server, copy, *plan_args(copy))
     assert (copy / "meshes" / ".mine.1.tmp").is_file()

@@ -125,6 +125,7 @@ def test_pictures_are_the_same_from_a_world_built_again(scene, world):
     assert np.array_equal(first.depth_m, second.depth_m)
 
 
+@pytest.mark.slow
 def test_many_worlds_one_after_the_other(scene):
     """PyBullet has 1,024 clients at most and once leaked meshes: a world must give back what it took."""
     small = Scene("small", scene.instances[:1], MATERIALS, scene.bounds)

@@ -208,6 +208,7 @@ def shipped():
     return load_catalogue(ASSETS)
 
 
+@pytest.mark.slow
 def test_every_shipped_variant_is_a_body_of_sensible_size(shipped):
     faults = []
     for category in shipped:

@@ -29,6 +29,8 @@ from aerialdojo_gen.stages.work import render
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.staging import AREA
 
+pytestmark = pytest.mark.slow
+
 ALL = CONFIG.model_copy(update={"limit": 0, "trajectories_per_part": 5})
 FEW = CONFIG.model_copy(update={"limit": 2, "trajectories_per_part": 2})
 
