@@ -9,7 +9,6 @@ import typer
 
 from aerialdojo_gen.commands.common import Data, PipelineFile, Scene, open_pipeline
 from aerialdojo_gen.errors import UsageError
-from aerialdojo_gen.store.atomic import atomic_file
 
 app = typer.Typer()
 
@@ -42,6 +41,7 @@ def stats(
     from aerialdojo_gen.release.contents import check_release
     from aerialdojo_gen.stats.comparison import Comparison, Listing, as_csv, as_markdown
     from aerialdojo_gen.stats.tables import benchmark_table, in_paper_order, made_of, tables
+    from aerialdojo_gen.store.atomic import atomic_file
 
     names = check_release(data, runner.choose_scenes(scene, released) if scene else None)
     made = in_paper_order([made_of(data, name) for name in names])
