@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from aerialdojo_gen.commands.common import Data, PipelineFile, Quiet, Scene, Workers, default_workers, open_pipeline
-from aerialdojo_gen.common.bounded import loads_json
 from aerialdojo_gen.errors import AerialDojoError, BeyondBounds, Malformed, UsageError
 
 if TYPE_CHECKING:
@@ -158,6 +157,7 @@ def _agent(agent: str | None, preset: str | None, options: dict[str, Any]) -> tu
 
 
 def _options(given: list[str]) -> dict[str, Any]:
+    from aerialdojo_gen.common.bounded import loads_json
     from aerialdojo_gen.common.secrets import Secrets
 
     options: dict[str, Any] = {}

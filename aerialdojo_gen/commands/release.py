@@ -10,7 +10,6 @@ import typer
 from aerialdojo_gen.commands.common import Data, PipelineFile, Scene, open_pipeline
 from aerialdojo_gen.common.text_table import terminal_width
 from aerialdojo_gen.errors import UsageError
-from aerialdojo_gen.store.atomic import atomic_file
 
 app = typer.Typer()
 
@@ -46,6 +45,7 @@ def stats(
 
     from aerialdojo_gen.stats.comparison import Comparison, Listing, as_csv, as_markdown
     from aerialdojo_gen.stats.tables import benchmark_table, in_paper_order, made_of, tables
+    from aerialdojo_gen.store.atomic import atomic_file
 
     names = check_release(root, scenes_in_release(root, scene) if scene else None)
     made = in_paper_order([made_of(root, name) for name in names])

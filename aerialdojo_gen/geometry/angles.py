@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 Floats = NDArray[np.float64]
@@ -63,7 +62,3 @@ def wrap_turned_rad(yaw_rad: Floats) -> Floats:
 def wrap_one_rad(yaw_rad: float) -> float:
     """`wrap_turned_rad` of a number, for loops that step a pose."""
     return math.pi - (math.pi - yaw_rad) % (2.0 * math.pi)
-
-
-# The same for kernels.
-wrap_kernel_rad = njit(cache=True, inline="always")(wrap_one_rad)

@@ -13,7 +13,7 @@ from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from aerialdojo_gen.common.terms import ACTION_NAMES, APPROACH, STOP, TURN_LEFT, TURN_RIGHT
-from aerialdojo_gen.geometry.angles import wrap_kernel_rad
+from aerialdojo_gen.geometry.angles import wrap_one_rad
 
 N_HEADINGS = 24
 TURN_RAD = 2 * math.pi / N_HEADINGS
@@ -36,6 +36,9 @@ def _displacement(name: str) -> tuple[float, float, float]:
 DISPLACEMENTS = np.array([_displacement(name) for name in ACTION_NAMES])
 # (17,) int64: how many headings an action turns to the left.
 TURNS = np.array([(a == TURN_LEFT) - (a == TURN_RIGHT) for a in range(len(ACTION_NAMES))], np.int64)
+
+
+_wrapped = njit(cache=True, inline="always")(wrap_one_rad)
 
 
 def replay(start: ArrayLike, actions: ArrayLike) -> NDArray[np.float64]:
@@ -69,7 +72,7 @@ def fly(start: NDArray[np.float64], actions: NDArray[np.int8]) -> NDArray[np.flo
     """`replay` for kernels: (4,) float64 and (n,) int8 that are known to be actions, to (n + 1, 4) float64."""
     poses = np.empty((len(actions) + 1, 4))
     poses[0] = start
-    poses[0, 3] = wrap_kernel_rad(start[3])
+    poses[0, 3] = _wrapped(start[3])
     heading = 0
     for k in range(len(actions)):
         dx, dy, dz = DISPLACEMENTS[actions[k]]
@@ -79,7 +82,7 @@ def fly(start: NDArray[np.float64], actions: NDArray[np.int8]) -> NDArray[np.flo
         poses[k + 1, 1] = poses[k, 1] + (s * dx + c * dy)
         poses[k + 1, 2] = poses[k, 2] + dz
         heading += TURNS[actions[k]]
-        poses[k + 1, 3] = wrap_kernel_rad(start[3] + heading * TURN_RAD)
+        poses[k + 1, 3] = _wrapped(start[3] + heading * TURN_RAD)
     return poses
 
 

@@ -6,6 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from aerialdojo_gen.geometry import frames
+from aerialdojo_gen.geometry.angles import wrap_angle_rad, yaw_towards
 from aerialdojo_gen.store.schemas import DIRECTIONS
 
 angles = st.floats(-1e4, 1e4)
@@ -15,7 +16,7 @@ points = st.tuples(metres, metres, metres)
 
 @given(angles)
 def test_wrapped_angle_is_the_same_direction_in_range(a):
-    w = float(frames.wrap_angle_rad(a))
+    w = float(wrap_angle_rad(a))
     assert -math.pi < w <= math.pi
     assert math.cos(w) == pytest.approx(math.cos(a), abs=1e-9)
     assert math.sin(w) == pytest.approx(math.sin(a), abs=1e-9)
@@ -23,28 +24,28 @@ def test_wrapped_angle_is_the_same_direction_in_range(a):
 
 @given(st.floats(-math.pi, math.pi, exclude_min=True))
 def test_angle_in_range_is_left_bit_for_bit(a):
-    assert float(frames.wrap_angle_rad(a)) == a
+    assert float(wrap_angle_rad(a)) == a
 
 
 def test_half_turns_wrap_to_plus_pi():
     turns = np.array([math.pi, -math.pi, np.nextafter(-math.pi, -4), -3 * math.pi])
-    assert (frames.wrap_angle_rad(turns) > 0).tolist() == [True] * 4
-    assert frames.wrap_angle_rad(turns[:2]).tolist() == [math.pi, math.pi]
+    assert (wrap_angle_rad(turns) > 0).tolist() == [True] * 4
+    assert wrap_angle_rad(turns[:2]).tolist() == [math.pi, math.pi]
 
 
 @given(points, points)
 def test_yaw_towards_leads_to_the_target(p, q):
     distance = math.hypot(q[0] - p[0], q[1] - p[1])
-    yaw = float(frames.yaw_towards(p, q))
+    yaw = float(yaw_towards(p, q))
     assert -math.pi < yaw <= math.pi
     assert p[0] + distance * math.cos(yaw) == pytest.approx(q[0], abs=1e-6)
     assert p[1] + distance * math.sin(yaw) == pytest.approx(q[1], abs=1e-6)
 
 
 def test_yaw_towards_broadcasts_and_faces_west_with_plus_pi():
-    yaw = frames.yaw_towards([[1.0, 0.0, 5.0], [0.0, -2.0, 0.0]], [0.0, 0.0, 0.0])
+    yaw = yaw_towards([[1.0, 0.0, 5.0], [0.0, -2.0, 0.0]], [0.0, 0.0, 0.0])
     assert yaw.tolist() == [math.pi, math.pi / 2]
-    assert float(frames.yaw_towards([1.0, 0.0], [0.0, -0.0])) == math.pi
+    assert float(yaw_towards([1.0, 0.0], [0.0, -0.0])) == math.pi
 
 
 @pytest.mark.parametrize(("k", "name"), list(enumerate(DIRECTIONS)))
@@ -81,7 +82,7 @@ def test_ned_heading_points_the_same_way(yaw):
     ahead = frames.enu_to_ned([math.cos(yaw), math.sin(yaw), 0.0])
     assert ahead[:2] == pytest.approx([math.cos(heading), math.sin(heading)], abs=1e-9)
     again = float(frames.yaw_ned_to_enu(heading))
-    assert float(frames.wrap_angle_rad(again - yaw)) == pytest.approx(0.0, abs=1e-9)
+    assert float(wrap_angle_rad(again - yaw)) == pytest.approx(0.0, abs=1e-9)
 
 
 @given(angles, st.sampled_from([-3.0, -1.0, 0.5, 1.0]))
@@ -90,7 +91,7 @@ def test_quaternion_round_trip_whatever_its_length_and_sign(yaw, length):
     assert q[3] >= 0.0
     assert np.linalg.norm(q) == pytest.approx(1.0)
     again = float(frames.quaternion_xyzw_to_yaw(length * q))
-    assert float(frames.wrap_angle_rad(again - yaw)) == pytest.approx(0.0, abs=1e-9)
+    assert float(wrap_angle_rad(again - yaw)) == pytest.approx(0.0, abs=1e-9)
 
 
 def test_quaternion_yaw_of_a_pitched_body_is_where_its_nose_points():
