@@ -15,11 +15,11 @@ from aerialdojo_gen.config.pipeline import load_pipeline
 from aerialdojo_gen.config.sections import AnchorSampleConfig, ScorerWeights
 from aerialdojo_gen.errors import ConfigError
 from aerialdojo_gen.geometry.cameras import Camera, view_pose
+from aerialdojo_gen.geometry.rays import ray_caster
 from aerialdojo_gen.geometry.surface import Surface
 from aerialdojo_gen.rendering.backend import check, open_renderer
 from aerialdojo_gen.rendering.probe import probe_scene
 from aerialdojo_gen.rendering.raycast import RayRenderer
-from aerialdojo_gen.rendering.world import ray_caster
 from aerialdojo_gen.scenes.model import Instance
 from aerialdojo_gen.scoring.base import AnchorView
 from aerialdojo_gen.scoring.geometric import WEIGHTS, judge

@@ -191,7 +191,8 @@ class AnchorDesk:
         return view
 
     def _look(self, position_m: Floats, yaw_rad: float) -> View:
-        from aerialdojo_gen.rendering.world import ray_caster, render_world
+        from aerialdojo_gen.geometry.rays import ray_caster
+        from aerialdojo_gen.rendering.world import render_world
         from aerialdojo_gen.stages.reference_images import box_of, instance_map, png
 
         camera = Camera(self._pictures.width, self._pictures.height, self._pictures.fov_deg)

@@ -25,7 +25,7 @@ from aerialdojo_gen.benchmark.goal import Sensors
 from aerialdojo_gen.benchmark.runs import Run
 from aerialdojo_gen.browse.lookup import ReleasedScene
 from aerialdojo_gen.errors import StoreError
-from aerialdojo_gen.rendering.orthographic import OrthographicPictures
+from aerialdojo_gen.rendering.orthographic import orthographic_pictures
 from aerialdojo_gen.store.schemas import ACTION_NAMES
 
 _MAP_PX = 640
@@ -200,13 +200,10 @@ def _scene(data: Path, name: str) -> ReleasedScene:
     return ReleasedScene(data, name)
 
 
-@lru_cache(maxsize=4)
-def _pictures(scene: ReleasedScene) -> OrthographicPictures:
-    return OrthographicPictures(scene.model)
-
-
 def _map(scene: ReleasedScene, low: NDArray[np.float64], high: NDArray[np.float64]) -> NDArray[np.uint8]:
-    return _pictures(scene).from_above((low[0], high[0], low[1], high[1]), float(high[0] - low[0]) / _MAP_PX)
+    return orthographic_pictures(scene.model).from_above(
+        (low[0], high[0], low[1], high[1]), float(high[0] - low[0]) / _MAP_PX
+    )
 
 
 def _flight(scene: ReleasedScene, run: Run, episode: dict[str, Any], steps: Any, frames: bool) -> Flight:

@@ -15,13 +15,13 @@ from aerialdojo_gen.agents.load import place
 from aerialdojo_gen.agents.simple import OracleAgent
 from aerialdojo_gen.benchmark import billing
 from aerialdojo_gen.benchmark.asking import AgentError, Asked
-from aerialdojo_gen.benchmark.eyes import forget_renderers
 from aerialdojo_gen.benchmark.flight import Flight
 from aerialdojo_gen.benchmark.goal import Observation
 from aerialdojo_gen.benchmark.journal import Journal
 from aerialdojo_gen.benchmark.secrets import Secrets
 from aerialdojo_gen.benchmark.tasks import Task, read_tasks, reference_actions
 from aerialdojo_gen.errors import RenderError
+from aerialdojo_gen.rendering.backend import forget_renderers
 from aerialdojo_gen.store.schemas import STEPS
 
 _LONGEST_PAUSE_S = 600.0

@@ -16,8 +16,8 @@ import pyarrow.compute as pc
 from numpy.typing import NDArray
 
 from aerialdojo_gen.errors import AssetError, StoreError, UsageError
-from aerialdojo_gen.planning.collision import CollisionWorld
-from aerialdojo_gen.scenes.glb import read_glb
+from aerialdojo_gen.planning.collision import collision_world
+from aerialdojo_gen.scenes.context import SEVERAL, open_scene
 from aerialdojo_gen.scenes.model import Scene
 from aerialdojo_gen.store import shards as store
 
@@ -93,9 +93,9 @@ class ReleasedScene:
         """All of `routes`, with the column ``split``."""
         return self.both_sides("routes")
 
-    @cached_property
+    @property
     def model(self) -> Scene:
-        """The scene's mesh.
+        """The scene's mesh, of its context: read again where that had to go.
 
         Raises
         ------
@@ -105,12 +105,7 @@ class ReleasedScene:
         path = self.data / self.row["mesh_path"]
         if not path.resolve().is_relative_to(self.data.resolve()):
             raise AssetError(f"release/scenes: mesh_path {self.row['mesh_path']!r} leads out of {self.data}")
-        return read_glb(path, self.row["mesh_sha256"])
-
-    @cached_property
-    def collision(self) -> CollisionWorld:
-        """FCL's world of the scene."""
-        return CollisionWorld(self.model)
+        return open_scene(path, self.row["mesh_sha256"], SEVERAL).scene
 
     def route(self, nav_id: str) -> dict[str, Any]:
         """Return the row of `routes`, with ``split``; UsageError where there is none."""
@@ -145,7 +140,8 @@ class ReleasedScene:
 
     def clearance(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Distances from points (n, 3), world frame, to the nearest surface (n,), metres, by FCL."""
-        return np.array([self.collision.distance_m(p) for p in points], dtype=np.float64)
+        world = collision_world(self.model)
+        return np.array([world.distance_m(p) for p in points], dtype=np.float64)
 
 
 @dataclass(frozen=True)

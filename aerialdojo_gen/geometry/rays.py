@@ -8,6 +8,7 @@ from embreex.rtcore_scene import EmbreeScene
 from numpy.typing import ArrayLike, NDArray
 
 from aerialdojo_gen.geometry.soup import soup
+from aerialdojo_gen.scenes.context import context_of
 from aerialdojo_gen.scenes.model import Instance, Scene
 
 Floats = NDArray[np.float64]
@@ -115,6 +116,8 @@ class RayCaster:
     ----------
     scene : Scene
         All its instances are hit, from both sides.
+    triangles : TriangleRayCaster, optional
+        Over the triangles of its instances in their order, where there is one already.
 
     Attributes
     ----------
@@ -122,10 +125,10 @@ class RayCaster:
         Node names in the scene's order: what `first_hit`'s indices mean.
     """
 
-    def __init__(self, scene: Scene) -> None:
+    def __init__(self, scene: Scene, triangles: TriangleRayCaster | None = None) -> None:
         self.nodes = tuple(i.node for i in scene.instances)
         self._owner = np.repeat(np.arange(len(self.nodes), dtype=np.int32), [len(i.faces) for i in scene.instances])
-        self._triangles = TriangleRayCaster(*soup(scene.instances))
+        self._triangles = triangles or TriangleRayCaster(*soup(scene.instances))
 
     def first_hit(self, origins: ArrayLike, directions: ArrayLike) -> tuple[Floats, Ints]:
         """Find what every ray hits first.
@@ -176,6 +179,16 @@ class RayCaster:
         reached = distance >= length[far] - tolerance_m
         seen[far] = reached if own_instance is None else reached | (instance == own_instance)
         return seen
+
+
+def triangle_caster(scene: Scene) -> TriangleRayCaster:
+    """Return the scene's one Embree scene: the triangles of its instances in their order, and that of their parts."""
+    return context_of(scene).part("triangle caster", lambda: TriangleRayCaster(*soup(scene.instances)))
+
+
+def ray_caster(scene: Scene) -> RayCaster:
+    """Return the scene's ray caster, over its one Embree scene."""
+    return context_of(scene).part("ray caster", lambda: RayCaster(scene, triangle_caster(scene)))
 
 
 def instance_caster(instance: Instance) -> TriangleRayCaster:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import weakref
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
@@ -14,11 +13,11 @@ from numpy.typing import NDArray
 
 from aerialdojo_gen.errors import RenderError
 from aerialdojo_gen.geometry.cameras import Camera
-from aerialdojo_gen.geometry.rays import RayCaster
 from aerialdojo_gen.rendering.bullet import pybullet
 from aerialdojo_gen.rendering.lighting import Lighting, ShadowMap, light_of, sun_view
 from aerialdojo_gen.rendering.shading import shade
 from aerialdojo_gen.rendering.surfaces import Surface, surfaces
+from aerialdojo_gen.scenes.context import context_of
 from aerialdojo_gen.scenes.model import Material, Scene
 from aerialdojo_gen.store.staging import scratch_folder
 
@@ -220,25 +219,9 @@ def _projection(camera: Camera, near_m: float, far_m: float) -> Floats:
     )
 
 
-# The last scene's renderer and ray caster: the next view of it is then cheap, and memory stays that of one scene.
-_worlds: list[tuple[weakref.ref[Scene], RenderWorld]] = []
-_casters: list[tuple[weakref.ref[Scene], RayCaster]] = []
-
-
 def render_world(scene: Scene) -> RenderWorld:
-    """Return a renderer of the scene, kept until that of another scene is asked for; not for the caller to close."""
-    if not _worlds or _worlds[0][0]() is not scene:
-        while _worlds:
-            _worlds.pop()[1].close()
-        _worlds.append((weakref.ref(scene), RenderWorld(scene)))
-    return _worlds[0][1]
-
-
-def ray_caster(scene: Scene) -> RayCaster:
-    """Return a ray caster of the scene, kept until that of another scene is asked for."""
-    if not _casters or _casters[0][0]() is not scene:
-        _casters[:] = [(weakref.ref(scene), RayCaster(scene))]
-    return _casters[0][1]
+    """Return the scene's world in TinyRenderer: its context's, not for the caller to close."""
+    return context_of(scene).part("render world", lambda: RenderWorld(scene))
 
 
 def write_obj(path: Path, surface: Surface) -> None:

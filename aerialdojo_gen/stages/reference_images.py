@@ -13,10 +13,9 @@ from numpy.typing import NDArray
 from aerialdojo_gen.config.sections import ReferenceImagesConfig
 from aerialdojo_gen.errors import RenderError
 from aerialdojo_gen.geometry.cameras import Camera, project, view_pose
-from aerialdojo_gen.geometry.rays import RayCaster
+from aerialdojo_gen.geometry.rays import RayCaster, ray_caster
 from aerialdojo_gen.pipeline.stage import Job, Output
 from aerialdojo_gen.rendering.backend import kept_renderer
-from aerialdojo_gen.rendering.world import ray_caster
 from aerialdojo_gen.store.schemas import REFERENCES
 from aerialdojo_gen.store.tables import from_rows
 
