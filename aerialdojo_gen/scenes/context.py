@@ -103,7 +103,8 @@ def open_scene(mesh: Path, sha256: str, keep: int = 1) -> SceneContext:
         _release_down_to(keep - 1)
         if context is None:
             context = SceneContext(read_glb(mesh, sha256))
-        _contexts[sha256] = context
+        # Of a file without a digest nothing tells whether it is the same the next time.
+        _contexts[sha256 or id(context.scene)] = context
         return context
 
 

@@ -57,6 +57,8 @@ def test_the_same_content_has_one_context_wherever_it_lies(meshes, tmp_path):
     # What is kept is not asked for again: the file may be gone.
     copy.unlink()
     assert open_scene(copy, digest) is context
+    unknown = open_scene(path, "", keep=3)
+    assert context_of(unknown.scene) is unknown is not open_scene(meshes[1][0], "", keep=3)
     release_scenes()
     with pytest.raises(AssetError, match=r"copy\.glb"):
         open_scene(copy, digest)
