@@ -22,8 +22,8 @@ from aerialdojo_gen.annotations.format import Anchor, Object, format_annotations
 from aerialdojo_gen.common.paper import paper_counts
 from aerialdojo_gen.config.pipeline import Pipeline
 from aerialdojo_gen.errors import AerialDojoError, UsageError
-from aerialdojo_gen.geometry.rays import RayCaster
 from aerialdojo_gen.pipeline.stage import Job, Roots
+from aerialdojo_gen.rendering.casters import ray_caster
 from aerialdojo_gen.scenes.catalogue import load_catalogue
 from aerialdojo_gen.scenes.cuts import cut_out
 from aerialdojo_gen.scenes.model import Scene
@@ -61,9 +61,10 @@ class Desk:
     def _open_scene(self, commit: Callable[[], None] = lambda: None) -> None:
         """Read the scene, do what makes it the desk's, and only then let go of the one before."""
         name, pipeline = self.storage.scene, self._pipeline
-        scene = Job("annotate", name, 0, 1, pipeline.seed, pipeline.embodiment, self._roots).scene_model()
+        job = Job("annotate", name, 0, 1, pipeline.seed, pipeline.embodiment, self._roots)
+        scene = job.scene_model(keep=2)  # a picture of the scene before may be under way
         payload, describer = scene_payload(scene), Describer(scene, self._names, self._counts)
-        rays = RayCaster(scene)
+        rays = ray_caster(scene)
         commit()
         self.scene: Scene = scene
         self.payload, self._describer, self._rays = payload, describer, rays

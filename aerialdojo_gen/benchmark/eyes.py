@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import contextlib
 import os
-import weakref
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,16 +11,11 @@ from aerialdojo_gen.agents.goal import Sensors
 from aerialdojo_gen.benchmark.motion import Point
 from aerialdojo_gen.errors import RenderError
 from aerialdojo_gen.geometry.cameras import view_pose
-from aerialdojo_gen.rendering.backend import Renderer, open_renderer
+from aerialdojo_gen.rendering.backend import Renderer, kept_renderer
 from aerialdojo_gen.scenes.model import Scene
 
 Pictures = dict[str, NDArray[np.uint8]]
 Depths = dict[str, NDArray[np.float32]]
-
-
-# Renderers of the scenes last looked at, the newest last: several environments of a process may be in two scenes.
-_KEPT = 2
-_renderers: list[tuple[weakref.ref[Scene], str, Renderer]] = []
 
 
 # The process that has drawn by OpenGL. A fork of it would wait for ever for threads that it does not have.
@@ -35,24 +28,10 @@ def _renderer(scene: Scene, name: str) -> Renderer:
             "this process was forked from one that has drawn by OpenGL: start it by spawn "
             "(gymnasium.make_vec: vector_kwargs={'context': 'spawn'}), or take renderer='pybullet' in both"
         )
-    for i, (of, its_name, known) in enumerate(_renderers):
-        if of() is scene and its_name == name:
-            _renderers.append(_renderers.pop(i))
-            return known
-    while len(_renderers) >= _KEPT:
-        _renderers.pop(0)[2].close()
-    renderer = open_renderer(scene, name)
-    _renderers.append((weakref.ref(scene), name, renderer))
+    renderer = kept_renderer(scene, name)
     if renderer.name == "gl":
         _drawn_by_gl[:] = [os.getpid()]
     return renderer
-
-
-def forget_renderers() -> None:
-    """Close what draws, as far as it lets itself be closed; the next picture opens it anew."""
-    while _renderers:
-        with contextlib.suppress(Exception):
-            _renderers.pop()[2].close()
 
 
 def look(

@@ -8,17 +8,15 @@ second.
 
 from __future__ import annotations
 
-import threading
-from collections import OrderedDict
 from functools import cached_property
 from pathlib import Path
 
 from numba import njit
 
 from aerialdojo_gen.planning.clearance import ClearanceGrid
-from aerialdojo_gen.planning.collision import CollisionWorld
+from aerialdojo_gen.planning.collision import CollisionWorld, collision_world
 from aerialdojo_gen.planning.grid_kernels import GridArrays, inside, segment_free
-from aerialdojo_gen.scenes.glb import read_glb
+from aerialdojo_gen.scenes.context import SEVERAL, open_scene
 from aerialdojo_gen.scenes.model import Scene
 
 Point = tuple[float, float, float]
@@ -61,14 +59,14 @@ class FlightSpace:
         self.scene = scene
         self.radius_m = radius_m
         # An episode ends by a touch, and below open ground there is none.
-        self.grid = ClearanceGrid.build(scene, radius_m=radius_m, closed_ground=False)
+        self.grid = ClearanceGrid.of(scene, radius_m=radius_m, closed_ground=False)
         self._arrays = self.grid.arrays
         self._world = world
 
     @cached_property
     def world(self) -> CollisionWorld:
         """FCL's world; built when the grid is first at a loss."""
-        return self._world or CollisionWorld(self.scene)
+        return self._world or collision_world(self.scene)
 
     def in_collision(self, p: Point) -> bool:
         """Whether the body at `p`, metres, world frame, touches a surface."""
@@ -119,14 +117,8 @@ def _between(p: Point, q: Point, share: float) -> Point:
     return (p[0] + share * (q[0] - p[0]), p[1] + share * (q[1] - p[1]), p[2] + share * (q[2] - p[2]))
 
 
-# The scenes last used, for all environments of a process; a scene takes up to about 200 MB.
-_KEPT = 3
-_spaces: OrderedDict[tuple[Path, str, float], FlightSpace] = OrderedDict()
-_lock = threading.Lock()
-
-
 def flight_space(mesh: Path, sha256: str, radius_m: float) -> FlightSpace:
-    """Return a scene to fly in, built once a process and kept until others were asked for.
+    """Return a scene to fly in, a part of the scene's context: for all environments of a process.
 
     Parameters
     ----------
@@ -137,12 +129,5 @@ def flight_space(mesh: Path, sha256: str, radius_m: float) -> FlightSpace:
     radius_m : float
         Radius of the body.
     """
-    key = (mesh, sha256, radius_m)
-    with _lock:
-        space = _spaces.pop(key, None)
-        if space is None:
-            while len(_spaces) >= _KEPT:
-                _spaces.popitem(last=False)
-            space = FlightSpace(read_glb(mesh, sha256), radius_m)
-        _spaces[key] = space
-        return space
+    context = open_scene(mesh, sha256, SEVERAL)
+    return context.part("flight space", lambda: FlightSpace(context.scene, radius_m), radius_m)

@@ -23,7 +23,7 @@ from aerialdojo_gen.benchmark.runs import Run
 from aerialdojo_gen.browse.lookup import ReleasedScene
 from aerialdojo_gen.common.pictures import MAP_JPEG, REPLAY_JPEG, data_url, encode_jpeg
 from aerialdojo_gen.errors import StoreError
-from aerialdojo_gen.rendering.orthographic import OrthographicPictures
+from aerialdojo_gen.rendering.orthographic import orthographic_pictures
 from aerialdojo_gen.store.root import DataRoot, Where, open_root
 from aerialdojo_gen.store.schemas import ACTION_NAMES
 
@@ -200,13 +200,10 @@ def _scene(root: DataRoot, name: str) -> ReleasedScene:
     return ReleasedScene(root, name)
 
 
-@lru_cache(maxsize=4)
-def _pictures(scene: ReleasedScene) -> OrthographicPictures:
-    return OrthographicPictures(scene.model)
-
-
 def _map(scene: ReleasedScene, low: NDArray[np.float64], high: NDArray[np.float64]) -> NDArray[np.uint8]:
-    return _pictures(scene).from_above((low[0], high[0], low[1], high[1]), float(high[0] - low[0]) / _MAP_PX)
+    return orthographic_pictures(scene.model).from_above(
+        (low[0], high[0], low[1], high[1]), float(high[0] - low[0]) / _MAP_PX
+    )
 
 
 def _flight(scene: ReleasedScene, run: Run, episode: dict[str, Any], steps: Any, frames: bool) -> Flight:

@@ -16,12 +16,12 @@ from aerialdojo_gen.agents.load import place
 from aerialdojo_gen.agents.simple import OracleAgent
 from aerialdojo_gen.benchmark import billing
 from aerialdojo_gen.benchmark.asking import AgentError, Asked
-from aerialdojo_gen.benchmark.eyes import forget_renderers
 from aerialdojo_gen.benchmark.flight import Flight
 from aerialdojo_gen.benchmark.journal import Journal
 from aerialdojo_gen.benchmark.tasks import Task, read_tasks, reference_actions
 from aerialdojo_gen.common.secrets import Secrets
 from aerialdojo_gen.errors import RenderError
+from aerialdojo_gen.rendering.backend import forget_renderers
 from aerialdojo_gen.store.root import DataRoot
 from aerialdojo_gen.store.schemas import STEPS
 

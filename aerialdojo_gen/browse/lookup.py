@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 from aerialdojo_gen.common.names import closest, unknown
 from aerialdojo_gen.errors import AssetError, StoreError, UsageError
-from aerialdojo_gen.planning.collision import CollisionWorld
+from aerialdojo_gen.planning.collision import collision_world
 from aerialdojo_gen.release.contents import mesh_copy, release_scenes
-from aerialdojo_gen.scenes.glb import read_glb
+from aerialdojo_gen.scenes.context import SEVERAL, open_scene
 from aerialdojo_gen.scenes.model import Scene
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.root import Where, open_root
@@ -91,9 +91,9 @@ class ReleasedScene:
         """All of `routes`, with the column ``split``."""
         return self.both_sides("routes")
 
-    @cached_property
+    @property
     def model(self) -> Scene:
-        """The scene's mesh.
+        """The scene's mesh, of its context: read again where that had to go.
 
         Raises
         ------
@@ -107,12 +107,7 @@ class ReleasedScene:
             raise AssetError(
                 f"the mesh {self.root.at(told)} is missing: run aerialdojo-gen build-scenes --scene {self.name}"
             ) from None
-        return read_glb(path, self.row["mesh_sha256"])
-
-    @cached_property
-    def collision(self) -> CollisionWorld:
-        """FCL's world of the scene."""
-        return CollisionWorld(self.model)
+        return open_scene(path, self.row["mesh_sha256"], SEVERAL).scene
 
     def route(self, nav_id: str) -> dict[str, Any]:
         """Return the row of `routes`, with ``split``; UsageError where there is none."""
@@ -147,7 +142,8 @@ class ReleasedScene:
 
     def clearance(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Distances from points (n, 3), world frame, to the nearest surface (n,), metres, by FCL."""
-        return np.array([self.collision.distance_m(p) for p in points], dtype=np.float64)
+        world = collision_world(self.model)
+        return np.array([world.distance_m(p) for p in points], dtype=np.float64)
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from aerialdojo_gen.errors import AssetError, StoreError
 from aerialdojo_gen.geometry.cameras import Camera, view_pose
 from aerialdojo_gen.release.contents import mesh_copy
 from aerialdojo_gen.rendering.backend import choose_renderer, kept_renderer
-from aerialdojo_gen.scenes.glb import read_glb
+from aerialdojo_gen.scenes.context import open_scene
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.root import DataRoot
 
@@ -60,9 +60,8 @@ class Redrawn:
             r["object_id"]: r["reference_image"] for r in store.read_scene(root, "release/objects", scene).to_pylist()
         }
         self._camera = Camera(size_px, size_px)
-        # Kept here: the renderer is kept for as long as its scene is.
-        self._scene = read_glb(mesh)
-        self._renderer = kept_renderer(self._scene, choose_renderer("auto").name)
+        self._scene = open_scene(mesh, row["mesh_sha256"]).scene
+        self._renderer_name = choose_renderer("auto").name
 
     def picture(self, object_id: int) -> bytes:
         """Draw an object's picture.
@@ -84,7 +83,7 @@ class Redrawn:
         """
         anchor = self._anchors[object_id]
         pose = view_pose((anchor["x_m"], anchor["y_m"], anchor["z_m"]), anchor["yaw_rad"], "front")
-        rgb = self._renderer.render(self._camera, pose).rgb
+        rgb = kept_renderer(self._scene, self._renderer_name).render(self._camera, pose).rgb
         if _difference(rgb, self._pictures[object_id]) > _SAME_VIEW:
             raise StoreError(
                 f"object {object_id} of {self._scene_name} looks otherwise in the release than from its anchor: "

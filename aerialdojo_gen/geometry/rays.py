@@ -114,6 +114,8 @@ class RayCaster:
     ----------
     scene : Things
         All its instances are hit, from both sides.
+    triangles : TriangleRayCaster, optional
+        Over the triangles of its instances in their order, where there is one already.
 
     Attributes
     ----------
@@ -121,10 +123,10 @@ class RayCaster:
         Node names in the scene's order: what `first_hit`'s indices mean.
     """
 
-    def __init__(self, scene: Things) -> None:
+    def __init__(self, scene: Things, triangles: TriangleRayCaster | None = None) -> None:
         self.nodes = tuple(i.node for i in scene.instances)
         self._owner = np.repeat(np.arange(len(self.nodes), dtype=np.int32), [len(i.faces) for i in scene.instances])
-        self._triangles = TriangleRayCaster(*soup(scene.instances))
+        self._triangles = triangles or TriangleRayCaster(*soup(scene.instances))
 
     def first_hit(self, origins: ArrayLike, directions: ArrayLike) -> tuple[Floats, Ints]:
         """Find what every ray hits first.

@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
-from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -113,10 +112,12 @@ class Job:
 
         return shards.read_scene(self.roots.data, table, self.scene)
 
-    def scene_model(self) -> Scene:
-        """Read the scene's mesh (kept in memory between the jobs of a process)."""
+    def scene_model(self, keep: int = 1) -> Scene:
+        """Read the scene's mesh; it is kept between the jobs of a process, as `keep` of `open_scene` says."""
+        from aerialdojo_gen.scenes.context import open_scene
+
         row = self.read("scenes").to_pylist()[0]
-        return _scene_model(self.roots.data / row["mesh_path"], row["mesh_sha256"])
+        return open_scene(self.roots.data / row["mesh_path"], row["mesh_sha256"], keep).scene
 
     def output_file(self, relative: str) -> AbstractContextManager[Path]:
         """Open a file output: a temporary path that takes its name when the block ends without an error.
@@ -136,13 +137,6 @@ class Job:
         self.files.append(relative)
         self.digested.append(relative)
         return atomic_file(self.roots.data, relative)
-
-
-@lru_cache(maxsize=2)
-def _scene_model(path: Path, sha256: str) -> Scene:
-    from aerialdojo_gen.scenes.glb import read_glb
-
-    return read_glb(path, sha256)
 
 
 def _one_part(_data: Path, _scene: str, _config: Any) -> int:

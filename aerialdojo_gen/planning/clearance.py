@@ -7,6 +7,7 @@ would.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,6 +18,7 @@ from aerialdojo_gen.planning.bvh import build_bvh, crossings_above, point_distan
 from aerialdojo_gen.planning.connectivity import connected_with_ceiling, linked_cell, passable_moves
 from aerialdojo_gen.planning.distance_field import build_distance_field
 from aerialdojo_gen.planning.grid_kernels import GridArrays, inside, segment_free
+from aerialdojo_gen.scenes.context import context_of
 from aerialdojo_gen.scenes.model import Scene
 
 # Longer triangles would have boxes full of nothing.
@@ -110,6 +112,12 @@ class ClearanceGrid:
         moves = passable_moves(arrays, radius_m + margin_m)
         sky = connected_with_ceiling(moves)
         return cls(arrays, moves, sky, radius_m + margin_m, cap_m, ground, len(curtain) > 0)
+
+    @classmethod
+    def of(cls, scene: Scene, **how: Any) -> ClearanceGrid:
+        """Return the grid of a scene's context, by the parameters of `build`; one of others takes its place."""
+        key = tuple(sorted(how.items()))
+        return context_of(scene).part("clearance grid", lambda: cls.build(scene, **how), key)
 
     def distance_m(self, p: ArrayLike) -> float:
         """Exact distance from a point to the nearest surface, up to `cap_m`; metres.

@@ -9,12 +9,14 @@ from __future__ import annotations
 
 import itertools
 import math
+import threading
 from collections.abc import Sequence
 
 import fcl
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from aerialdojo_gen.scenes.context import context_of
 from aerialdojo_gen.scenes.model import Instance, Scene
 
 # A ball of no size: FCL measures distances between shapes, and has no point.
@@ -39,6 +41,14 @@ def _along_z(ux: float, uy: float, uz: float) -> NDArray[np.float64]:
     return np.array([[cx, -uz * cy, ux], [cy, uz * cx, uy], [0.0, h, uz]])
 
 
+class _Shapes(threading.local):
+    """What queries move about: a thread's own, for two threads may ask one world."""
+
+    def __init__(self) -> None:
+        self.spheres: dict[float, fcl.CollisionObject] = {}
+        self.capsules: dict[tuple[float, float], fcl.CollisionObject] = {}
+
+
 class CollisionWorld:
     """Collision and distance queries against all instances of a scene.
 
@@ -54,8 +64,7 @@ class CollisionWorld:
         self._manager.registerObjects(list(self._objects.values()))
         self._manager.setup()
         self._request = fcl.CollisionRequest(num_max_contacts=1, enable_contact=False)
-        self._spheres: dict[float, fcl.CollisionObject] = {}
-        self._capsules: dict[tuple[float, float], fcl.CollisionObject] = {}
+        self._shapes = _Shapes()
 
     def sphere_in_collision(self, p: ArrayLike, radius_m: float) -> bool:
         """Whether a ball touches a surface.
@@ -98,11 +107,12 @@ class CollisionWorld:
         if length < 1e-9:
             return self.sphere_in_collision(p, radius_m)
         key = (radius_m, round(length, 9))
-        capsule = self._capsules.get(key)
+        capsules = self._shapes.capsules
+        capsule = capsules.get(key)
         if capsule is None:
-            if len(self._capsules) > 256:
-                self._capsules.clear()
-            capsule = self._capsules[key] = fcl.CollisionObject(fcl.Capsule(radius_m, key[1]))
+            if len(capsules) > 256:
+                capsules.clear()
+            capsule = capsules[key] = fcl.CollisionObject(fcl.Capsule(radius_m, key[1]))
         capsule.setRotation(_along_z(dx / length, dy / length, dz / length))
         capsule.setTranslation(np.array([(ax + bx) / 2, (ay + by) / 2, (az + bz) / 2]))
         return self._collides(capsule)
@@ -161,9 +171,10 @@ class CollisionWorld:
         return any(self.segment_in_collision(a, b, radius_m) for a, b in itertools.pairwise(p))
 
     def _sphere(self, p: ArrayLike, radius_m: float) -> fcl.CollisionObject:
-        sphere = self._spheres.get(radius_m)
+        spheres = self._shapes.spheres
+        sphere = spheres.get(radius_m)
         if sphere is None:
-            sphere = self._spheres[radius_m] = fcl.CollisionObject(fcl.Sphere(radius_m))
+            sphere = spheres[radius_m] = fcl.CollisionObject(fcl.Sphere(radius_m))
         sphere.setTranslation(np.asarray(p, np.float64))
         return sphere
 
@@ -171,3 +182,8 @@ class CollisionWorld:
         data = fcl.CollisionData(self._request, fcl.CollisionResult())
         self._manager.collide(shape, data, fcl.defaultCollisionCallback)
         return bool(data.result.is_collision)
+
+
+def collision_world(scene: Scene) -> CollisionWorld:
+    """Return the scene's one collision world; two threads may ask it."""
+    return context_of(scene).part("collision world", lambda: CollisionWorld(scene))

@@ -13,7 +13,7 @@ from aerialdojo_gen.geometry.motion import nearest_heading
 from aerialdojo_gen.planning.attempt import attempt, costs_at
 from aerialdojo_gen.planning.certify import conclude
 from aerialdojo_gen.planning.clearance import ClearanceGrid
-from aerialdojo_gen.planning.collision import CollisionWorld
+from aerialdojo_gen.planning.collision import collision_world
 from aerialdojo_gen.planning.cost_to_go import columns_by_distance, expand_cost, seed_goal
 from aerialdojo_gen.planning.hybrid_astar import EXHAUSTED, FOUND, SearchArrays, SearchOptions, make_search_arrays
 from aerialdojo_gen.scenes.model import Scene
@@ -78,8 +78,8 @@ class Planner:
         config = config or PlanConfig()
         self.config = config
         self.radius_m = radius_m
-        self.world = CollisionWorld(scene)
-        self.grid = ClearanceGrid.build(
+        self.world = collision_world(scene)
+        self.grid = ClearanceGrid.of(
             scene, cell_m=config.cell_m, radius_m=radius_m, margin_m=config.margin_m, cap_m=config.clearance_cap_m
         )
         self._cost = np.empty(self.grid.moves.shape, np.float32)

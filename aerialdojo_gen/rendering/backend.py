@@ -9,8 +9,8 @@ PyBullet's own EGL plugin is not among them: its 16-bit depth buffer does not pa
 
 from __future__ import annotations
 
+import contextlib
 import time
-import weakref
 from dataclasses import dataclass
 from functools import lru_cache
 from types import TracebackType
@@ -26,6 +26,7 @@ from aerialdojo_gen.geometry.rays import RayCaster
 from aerialdojo_gen.rendering.casters import ray_caster
 from aerialdojo_gen.rendering.picture import Picture
 from aerialdojo_gen.rendering.probe import probe_scene
+from aerialdojo_gen.scenes.context import context_of, open_contexts
 from aerialdojo_gen.scenes.model import Scene
 
 Floats = NDArray[np.float64]
@@ -175,12 +176,8 @@ def open_renderer(scene: Scene, name: str = "auto") -> Renderer:
     raise RenderError(f"there is no renderer {name!r}: it is one of {', '.join(RENDERERS)}, or auto")
 
 
-# The last scene's renderer: the next trajectory of it is then cheap, and memory stays that of one scene.
-_kept: list[tuple[weakref.ref[Scene], str, Renderer]] = []
-
-
 def kept_renderer(scene: Scene, name: str, anew: bool = False) -> Renderer:
-    """Return a renderer of the scene, kept until another one is asked for; not for the caller to close.
+    """Return the scene's renderer: its context's, kept until one of another name is asked for; not to be closed.
 
     Parameters
     ----------
@@ -190,11 +187,17 @@ def kept_renderer(scene: Scene, name: str, anew: bool = False) -> Renderer:
     anew : bool
         Make it anew: one that has gone wrong may be right then.
     """
-    if anew or not _kept or _kept[0][0]() is not scene or _kept[0][1] != name:
-        while _kept:
-            _kept.pop()[2].close()
-        _kept.append((weakref.ref(scene), name, open_renderer(scene, name)))
-    return _kept[0][2]
+    context = context_of(scene)
+    if anew:
+        context.drop("renderer")
+    return context.part("renderer", lambda: open_renderer(scene, name), name)
+
+
+def forget_renderers() -> None:
+    """Close what draws, as far as it lets itself be closed; the next picture opens it anew."""
+    for context in open_contexts():
+        with contextlib.suppress(Exception):
+            context.drop("renderer")
 
 
 @lru_cache

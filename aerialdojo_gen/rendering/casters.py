@@ -1,18 +1,18 @@
-"""The ray caster of the scene that is drawn."""
+"""The ray casters of a scene: its context has one Embree scene, and all rays are cast at that."""
 
 from __future__ import annotations
 
-import weakref
-
-from aerialdojo_gen.geometry.rays import RayCaster
+from aerialdojo_gen.geometry.rays import RayCaster, TriangleRayCaster
+from aerialdojo_gen.geometry.soup import soup
+from aerialdojo_gen.scenes.context import context_of
 from aerialdojo_gen.scenes.model import Scene
 
-# Of the last scene: the next rays are then cheap, and memory stays that of one scene.
-_casters: list[tuple[weakref.ref[Scene], RayCaster]] = []
+
+def triangle_caster(scene: Scene) -> TriangleRayCaster:
+    """Return the scene's one Embree scene: the triangles of its instances in their order, and that of their parts."""
+    return context_of(scene).part("triangle caster", lambda: TriangleRayCaster(*soup(scene.instances)))
 
 
 def ray_caster(scene: Scene) -> RayCaster:
-    """Return a ray caster of the scene, kept until that of another scene is asked for."""
-    if not _casters or _casters[0][0]() is not scene:
-        _casters[:] = [(weakref.ref(scene), RayCaster(scene))]
-    return _casters[0][1]
+    """Return the scene's ray caster, over its one Embree scene."""
+    return context_of(scene).part("ray caster", lambda: RayCaster(scene, triangle_caster(scene)))

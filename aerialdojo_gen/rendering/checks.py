@@ -13,7 +13,6 @@ Flags, in the order of `FLAGS`:
 
 from __future__ import annotations
 
-import weakref
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -22,8 +21,10 @@ from numpy.typing import NDArray
 from aerialdojo_gen.geometry.cameras import Camera
 from aerialdojo_gen.geometry.rays import TriangleRayCaster
 from aerialdojo_gen.geometry.soup import soup
+from aerialdojo_gen.rendering.casters import triangle_caster
 from aerialdojo_gen.rendering.codecs import MAX_DEPTH_M
 from aerialdojo_gen.rendering.picture import NEAR_M, Picture
+from aerialdojo_gen.scenes.context import context_of
 from aerialdojo_gen.scenes.model import Scene
 
 Floats = NDArray[np.float64]
@@ -142,13 +143,15 @@ class Solid:
     Parameters
     ----------
     scene : Scene
+    caster : TriangleRayCaster, optional
+        Over the triangles of its instances in their order, where there is one already.
     """
 
-    def __init__(self, scene: Scene) -> None:
+    def __init__(self, scene: Scene, caster: TriangleRayCaster | None = None) -> None:
         vertices, faces = soup(scene.instances)
         corners = vertices[faces]
         self._normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        self._caster = TriangleRayCaster(vertices, faces)
+        self._caster = caster or TriangleRayCaster(vertices, faces)
 
     def first_hit(self, origin: Floats, directions: Floats) -> tuple[Floats, float]:
         """Find what rays hit first.
@@ -172,15 +175,9 @@ class Solid:
         return distance, float(away.mean()) if hit.any() else 0.0
 
 
-# The last scene's: its next trajectory is then cheap, and memory stays that of one scene.
-_solids: list[tuple[weakref.ref[Scene], Solid]] = []
-
-
 def kept_solid(scene: Scene) -> Solid:
-    """Return the ray caster of a scene, kept until that of another scene is asked for."""
-    if not _solids or _solids[0][0]() is not scene:
-        _solids[:] = [(weakref.ref(scene), Solid(scene))]
-    return _solids[0][1]
+    """Return the scene's solid, over its one Embree scene."""
+    return context_of(scene).part("solid", lambda: Solid(scene, triangle_caster(scene)))
 
 
 def picture_flags(picture: Picture) -> set[str]:

@@ -10,6 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from aerialdojo_gen.geometry.rays import TriangleRayCaster
 from aerialdojo_gen.geometry.soup import soup
+from aerialdojo_gen.rendering.casters import triangle_caster
+from aerialdojo_gen.scenes.context import context_of
 from aerialdojo_gen.scenes.model import Material, Scene
 
 Floats = NDArray[np.float64]
@@ -62,9 +64,11 @@ class OrthographicPictures:
     Parameters
     ----------
     scene : Scene
+    caster : TriangleRayCaster, optional
+        Over the triangles of its instances in their order, where there is one already.
     """
 
-    def __init__(self, scene: Scene) -> None:
+    def __init__(self, scene: Scene, caster: TriangleRayCaster | None = None) -> None:
         parts = [part for instance in scene.instances for part in instance.parts]
         names = sorted({part.material for part in parts})
         index = {name: k for k, name in enumerate(names)}
@@ -72,7 +76,7 @@ class OrthographicPictures:
         self._uv = np.concatenate([part.uv for part in parts]).astype(np.float64)
         self._material = np.repeat([index[part.material] for part in parts], [len(part.faces) for part in parts])
         self._materials = [scene.materials[name] for name in names]
-        self._rays = TriangleRayCaster(self._vertices, self._faces)
+        self._rays = caster or TriangleRayCaster(self._vertices, self._faces)
         self._sun = np.array(scene.sun, dtype=np.float64) / np.linalg.norm(scene.sun)
         sky = np.array(scene.sky, dtype=np.float64)
         ground = [instance for instance in scene.instances if instance.category == "ground"]
@@ -184,3 +188,10 @@ def _reduced(material: Material, pixel_m: float) -> NDArray[np.uint8] | None:
         return material.texture
     height = max(1, round(texels * material.texture.shape[0] / material.texture.shape[1]))
     return np.asarray(cv2.resize(material.texture, (texels, height), interpolation=cv2.INTER_AREA), dtype=np.uint8)
+
+
+def orthographic_pictures(scene: Scene) -> OrthographicPictures:
+    """Return what takes parallel projections of a scene: its context's, over its one Embree scene."""
+    return context_of(scene).part(
+        "orthographic pictures", lambda: OrthographicPictures(scene, triangle_caster(scene))
+    )

@@ -7,7 +7,6 @@ TinyRenderer is the faster one.
 
 from __future__ import annotations
 
-import weakref
 from functools import lru_cache
 from types import TracebackType
 from typing import Self
@@ -19,9 +18,11 @@ from numpy.typing import NDArray
 from aerialdojo_gen.geometry.cameras import Camera
 from aerialdojo_gen.geometry.rays import TriangleRayCaster
 from aerialdojo_gen.geometry.soup import soup
+from aerialdojo_gen.rendering.casters import triangle_caster
 from aerialdojo_gen.rendering.lighting import Lighting, ShadowMap, light_of
 from aerialdojo_gen.rendering.picture import Picture
 from aerialdojo_gen.rendering.shading import shade
+from aerialdojo_gen.scenes.context import context_of
 from aerialdojo_gen.scenes.model import Scene
 
 Floats = NDArray[np.float64]
@@ -35,12 +36,14 @@ class RayRenderer:
     ----------
     scene : Scene
         Both sides of its triangles are seen.
+    caster : TriangleRayCaster, optional
+        Over the triangles of its instances in their order, where there is one already.
     """
 
     name = "rays"
     device = "Embree"
 
-    def __init__(self, scene: Scene) -> None:
+    def __init__(self, scene: Scene, caster: TriangleRayCaster | None = None) -> None:
         materials = sorted(scene.materials)
         number = {name: k for k, name in enumerate(materials)}
         parts = [(k, part) for k, instance in enumerate(scene.instances) for part in instance.parts]
@@ -50,7 +53,7 @@ class RayRenderer:
         self._material = np.repeat(np.array([number[part.material] for _, part in parts], np.int32), counts)
         self._corners = vertices[faces]
         self._uv = np.concatenate([part.uv for _, part in parts]).astype(np.float64)[faces]
-        self._rays = TriangleRayCaster(vertices, faces)
+        self._rays = caster or TriangleRayCaster(vertices, faces)
         self._light: Lighting = light_of(scene, materials)
         textures = [scene.materials[name].texture for name in materials]
         flat = [np.array([[scene.materials[name].colour]], np.uint8) for name in materials]
@@ -149,12 +152,6 @@ def _albedo(
     return out
 
 
-# As for the other renderers: the last scene's, so that its next picture is cheap.
-_kept: list[tuple[weakref.ref[Scene], RayRenderer]] = []
-
-
 def ray_renderer(scene: Scene) -> RayRenderer:
-    """Return a ray renderer of the scene, kept until that of another scene is asked for."""
-    if not _kept or _kept[0][0]() is not scene:
-        _kept[:] = [(weakref.ref(scene), RayRenderer(scene))]
-    return _kept[0][1]
+    """Return the scene's ray renderer."""
+    return context_of(scene).part("ray renderer", lambda: RayRenderer(scene, triangle_caster(scene)))

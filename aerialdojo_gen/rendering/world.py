@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import weakref
 from pathlib import Path
 from types import TracebackType
 
@@ -18,6 +17,7 @@ from aerialdojo_gen.rendering.lighting import Lighting, ShadowMap, light_of, sun
 from aerialdojo_gen.rendering.picture import FAR_M, NEAR_M, Picture
 from aerialdojo_gen.rendering.shading import shade
 from aerialdojo_gen.rendering.surfaces import Surface, surfaces
+from aerialdojo_gen.scenes.context import context_of
 from aerialdojo_gen.scenes.model import Material, Scene
 from aerialdojo_gen.store.staging import scratch_folder
 
@@ -199,17 +199,9 @@ def _projection(camera: Camera, near_m: float, far_m: float) -> Floats:
     )
 
 
-# The last scene's renderer: the next view of it is then cheap, and memory stays that of one scene.
-_worlds: list[tuple[weakref.ref[Scene], RenderWorld]] = []
-
-
 def render_world(scene: Scene) -> RenderWorld:
-    """Return a renderer of the scene, kept until that of another scene is asked for; not for the caller to close."""
-    if not _worlds or _worlds[0][0]() is not scene:
-        while _worlds:
-            _worlds.pop()[1].close()
-        _worlds.append((weakref.ref(scene), RenderWorld(scene)))
-    return _worlds[0][1]
+    """Return the scene's world in TinyRenderer: its context's, not for the caller to close."""
+    return context_of(scene).part("render world", lambda: RenderWorld(scene))
 
 
 def write_obj(path: Path, surface: Surface) -> None:

@@ -13,7 +13,7 @@ from aerialdojo_gen.browse.lookup import FoundTask
 from aerialdojo_gen.common.pictures import decode_rgb
 from aerialdojo_gen.llm.prompt import goal_text
 from aerialdojo_gen.release.way import sampled
-from aerialdojo_gen.rendering.orthographic import OrthographicPictures
+from aerialdojo_gen.rendering.orthographic import OrthographicPictures, orthographic_pictures
 from aerialdojo_gen.show.frames import Frame, frames_along
 from aerialdojo_gen.store import schemas
 
@@ -143,7 +143,7 @@ def picture_task(task: FoundTask, modality: str = "semantic", frames: int = 5) -
     poses = np.column_stack([route["x_m"], route["y_m"], route["z_m"], route["yaw_rad"]])
     moved = np.concatenate([[True], np.any(np.diff(poses[:, :3], axis=0) != 0.0, axis=1)])
     way, _ = sampled(poses[moved, :3])
-    pictures = OrthographicPictures(scene.model)
+    pictures = orthographic_pictures(scene.model)
     steps = np.linalg.norm(np.diff(way, axis=0), axis=1)
     return PicturedTask(
         task=task,

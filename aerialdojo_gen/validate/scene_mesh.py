@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path
 
 from aerialdojo_gen.geometry.rays import RayCaster
-from aerialdojo_gen.planning.collision import CollisionWorld
-from aerialdojo_gen.scenes.glb import read_glb
+from aerialdojo_gen.planning.collision import CollisionWorld, collision_world
+from aerialdojo_gen.rendering.casters import ray_caster
+from aerialdojo_gen.scenes.context import open_scene
 from aerialdojo_gen.scenes.model import Scene
 from aerialdojo_gen.store.root import LocalRoot
 from aerialdojo_gen.validate.registry import ALWAYS_AFTER, UncheckedError
@@ -20,19 +20,19 @@ MESH_CHECKS = ("mesh_outside", "mesh_missing", "mesh_digest", "mesh_damaged")
 
 @dataclass(frozen=True)
 class SceneMesh:
-    """A scene's mesh, and what questions to it are put to; each is made when first asked."""
+    """A scene's mesh, and what questions to it are put to: parts of its context, made when first asked."""
 
     scene: Scene
 
-    @cached_property
+    @property
     def world(self) -> CollisionWorld:
         """FCL's world."""
-        return CollisionWorld(self.scene)
+        return collision_world(self.scene)
 
-    @cached_property
+    @property
     def rays(self) -> RayCaster:
         """For first hits."""
-        return RayCaster(self.scene)
+        return ray_caster(self.scene)
 
 
 def mesh_place(data: SceneData) -> str:
@@ -73,5 +73,5 @@ def scene_mesh(data: SceneData) -> SceneMesh:
     kept = data.kept.get("mesh")
     if not isinstance(kept, SceneMesh):
         digest = str(data["scenes"].texts("mesh_sha256")[0])
-        kept = data.kept["mesh"] = SceneMesh(read_glb(mesh_path(data), digest))
+        kept = data.kept["mesh"] = SceneMesh(open_scene(mesh_path(data), digest).scene)
     return kept

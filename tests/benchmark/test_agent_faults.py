@@ -12,7 +12,6 @@ import pytest
 
 from aerialdojo_gen.agents import AgentBase, InvalidAnswer, load_agent
 from aerialdojo_gen.agents.goal import BLIND, Goal, Observation, Sensors
-from aerialdojo_gen.benchmark import eyes
 from aerialdojo_gen.benchmark.asking import AgentError
 from aerialdojo_gen.benchmark.episodes import read_run, runs
 from aerialdojo_gen.benchmark.limits import Limits
@@ -20,6 +19,7 @@ from aerialdojo_gen.benchmark.runner import Evaluation, evaluate
 from aerialdojo_gen.benchmark.tasks import Selection
 from aerialdojo_gen.benchmark.worker import Conditions
 from aerialdojo_gen.errors import UsageError
+from aerialdojo_gen.scenes.context import open_contexts
 
 HERE, FILE = __name__, Path(__file__).stem
 
@@ -71,7 +71,7 @@ class Breaking(AgentBase):
 
     def act(self, observation: Observation) -> int:
         if self._n == 2:
-            eyes._renderers[-1][2].close()
+            open_contexts()[-1]._parts["renderer"][1].close()
         return 0 if observation.step else 14
 
 

@@ -13,7 +13,8 @@ from aerialdojo_gen.geometry.cameras import Camera
 from aerialdojo_gen.geometry.rays import RayCaster, TriangleRayCaster, instance_caster
 from aerialdojo_gen.geometry.viewpoints import Views, informativeness, look
 from aerialdojo_gen.planning.clearance import ClearanceGrid
-from aerialdojo_gen.planning.collision import CollisionWorld
+from aerialdojo_gen.planning.collision import CollisionWorld, collision_world
+from aerialdojo_gen.rendering.casters import ray_caster
 from aerialdojo_gen.rendering.raycast import ray_renderer
 from aerialdojo_gen.scenes.model import Scene
 from aerialdojo_gen.scoring.base import AnchorView
@@ -51,9 +52,9 @@ class World:
         """Build it all for a body of a radius that keeps a margin to surfaces."""
         return cls(
             scene,
-            CollisionWorld(scene),
-            ClearanceGrid.build(scene, radius_m=radius_m, margin_m=margin_m),
-            RayCaster(scene),
+            collision_world(scene),
+            ClearanceGrid.of(scene, radius_m=radius_m, margin_m=margin_m),
+            ray_caster(scene),
             {i.node: k for k, i in enumerate(scene.instances)},
         )
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterator
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -18,6 +17,7 @@ from aerialdojo_gen.errors import StoreError
 from aerialdojo_gen.geometry.angles import wrap_one_rad
 from aerialdojo_gen.pipeline.stage import Job, Output
 from aerialdojo_gen.planning.planner import Planner, Route
+from aerialdojo_gen.scenes.context import context_of
 from aerialdojo_gen.scenes.model import Scene
 from aerialdojo_gen.store.schemas import OUTCOMES, PLANS
 
@@ -78,9 +78,8 @@ def run(job: Job, config: PlanConfig) -> Output:
     )
 
 
-@lru_cache(maxsize=1)
 def _planner(scene: Scene, config: PlanConfig, radius_m: float) -> Planner:
-    return Planner(scene, config, radius_m)
+    return context_of(scene).part("planner", lambda: Planner(scene, config, radius_m), config, radius_m)
 
 
 def _anchor_poses(job: Job) -> tuple[dict[tuple[int, int], Floats], dict[int, tuple[int, int]]]:

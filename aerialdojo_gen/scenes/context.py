@@ -1,0 +1,138 @@
+"""One context a scene: its mesh, and what is built on it, shared by all who work on the scene in a process.
+
+A ray caster, a collision world, a clearance grid or a renderer takes tens of megabytes and seconds to build. Each is
+a part of the scene's context: made when it is first asked for, and gone when the context is. Contexts are found by
+the mesh's digest, few are kept, and the oldest goes before the next scene is read, so that memory stays that of so
+many scenes however many are worked on.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections import OrderedDict
+from collections.abc import Callable, Hashable
+from pathlib import Path
+from typing import Any, TypeVar
+
+from aerialdojo_gen.scenes.glb import read_glb
+from aerialdojo_gen.scenes.model import Scene
+
+_T = TypeVar("_T")
+
+# For who goes back and forth between scenes: environments, people. A scene takes up to about 200 MB.
+SEVERAL = 3
+# A scene that was made in memory comes beside the one that is worked on.
+_BESIDE = 2
+
+# One lock for all: making a part may ask for another, of this scene or (a renderer's check) of another one.
+_lock = threading.RLock()
+_contexts: OrderedDict[Hashable, SceneContext] = OrderedDict()
+
+
+class SceneContext:
+    """A scene, and what is built on it.
+
+    Parameters
+    ----------
+    scene : Scene
+
+    Attributes
+    ----------
+    scene : Scene
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        self.scene = scene
+        self._parts: dict[str, tuple[tuple[Hashable, ...], Any]] = {}
+
+    def part(self, kind: str, make: Callable[[], _T], *given: Hashable) -> _T:
+        """Return a part, made by the first who asks; who asks meanwhile waits for it.
+
+        Parameters
+        ----------
+        kind : str
+            What it is, e.g. ``"ray caster"``. There is one of a kind.
+        make : callable
+            Makes it; what it raises is passed on, and nothing is kept then. Where the part has a method ``close``,
+            that is called at its end: it belongs to the context, not to who asked.
+        *given : hashable
+            What else than the scene it is made from. Another part of its kind goes first.
+        """
+        with _lock:
+            known = self._parts.get(kind)
+            if known is None or known[0] != given:
+                self.drop(kind)
+                known = self._parts[kind] = (given, make())
+            part: _T = known[1]
+            return part
+
+    def drop(self, kind: str) -> None:
+        """Let go of a part, where there is one."""
+        with _lock:
+            _, part = self._parts.pop(kind, ((), None))
+            if hasattr(part, "close"):
+                part.close()
+
+    def release(self) -> None:
+        """Let go of all parts; who asks again gets new ones."""
+        with _lock:
+            while self._parts:
+                self.drop(next(reversed(self._parts)))
+
+
+def open_scene(mesh: Path, sha256: str, keep: int = 1) -> SceneContext:
+    """Return the context of a scene's mesh; it is read where it is not among those kept.
+
+    Parameters
+    ----------
+    mesh : Path
+        The scene's GLB.
+    sha256 : str
+        Of its bytes, as `scenes` has it: the same content has the same context, wherever it lies.
+    keep : int
+        How many contexts there are at most, with this one; those that were not asked for longest go, and before the
+        mesh is read.
+
+    Raises
+    ------
+    AssetError
+        The mesh is missing, damaged, or another one.
+    """
+    with _lock:
+        context = _contexts.pop(sha256, None)
+        _release_down_to(keep - 1)
+        if context is None:
+            context = SceneContext(read_glb(mesh, sha256))
+        # Of a file without a digest nothing tells whether it is the same the next time.
+        _contexts[sha256 or id(context.scene)] = context
+        return context
+
+
+def context_of(scene: Scene) -> SceneContext:
+    """Return the context of a scene in memory: that of `open_scene`, or one of its own."""
+    with _lock:
+        for key, context in _contexts.items():
+            if context.scene is scene:
+                _contexts.move_to_end(key)
+                return context
+        _release_down_to(_BESIDE - 1)
+        # The context holds the scene, so that nothing else gets its id as long as this stands.
+        context = _contexts[id(scene)] = SceneContext(scene)
+        return context
+
+
+def open_contexts() -> tuple[SceneContext, ...]:
+    """Those that are kept, the one last asked for at the end."""
+    with _lock:
+        return tuple(_contexts.values())
+
+
+def release_scenes() -> None:
+    """Let go of all scenes."""
+    with _lock:
+        _release_down_to(0)
+
+
+def _release_down_to(number: int) -> None:
+    while len(_contexts) > number:
+        _contexts.popitem(last=False)[1].release()
