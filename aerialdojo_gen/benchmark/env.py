@@ -35,9 +35,9 @@ class AerialDojoEnv(gymnasium.Env[dict[str, Any], np.int64]):
 
     Actions are `Discrete(16)`: Stop, moves and turns of `aerialdojo_gen.store.schemas.ACTION_NAMES`, carried out by
     their exact magnitudes. An episode is `terminated` by Stop or by a collision, and `truncated` where the last
-    action of the budget is neither; ``info["reason"]`` is then ``"stop"``, ``"collision"`` or ``"budget"``, ``""`` before. A
-    move that would leave the flight volume is refused: it is spent, and nothing moves. The reward is 1 for a Stop
-    within the success radius, and 0 otherwise.
+    action of the budget is neither; ``info["reason"]`` is then ``"stop"``, ``"collision"`` or ``"budget"``, ``""``
+    before. A move that would leave the flight volume is refused: it is spent, and nothing moves. The reward is 1 for
+    a Stop within the success radius, and 0 otherwise.
 
     An observation is a dict: ``step`` and ``remaining_actions`` ((1,) int32), ``refused`` (0 or 1), ``goal``
     (modality, target_name, landmark, direction, and description or image), and, where asked for, ``rgb`` and

@@ -190,5 +190,5 @@ def plan(
     Route
         Its outcome says whether there is one; no route is an outcome, not an error.
     """
-    (route,) = Planner(scene, config, radius_m).plan_target(goal, [start])
+    (route,) = Planner(scene, config, radius_m).plan_target(goal, np.asarray(start, np.float64))
     return route
