@@ -67,11 +67,12 @@ fuzz: .venv/.dev  ## mutants of every input into every parser, N=500 each (night
 torture: .venv/.dev  ## kill run, render, export, import and evaluate N=100 times and compare what repeating them leaves
 	@.venv/bin/python tests/torture.py -n $(or $(N),100)
 
-lint: .venv/.dev  ## ruff, the import contracts and mypy --strict
+lint: .venv/.dev  ## ruff, the import contracts, mypy --strict, and vulture for what nothing uses
 	@.venv/bin/ruff check .
 	@.venv/bin/ruff format --check .
 	@.venv/bin/lint-imports --no-cache --no-logo
 	@.venv/bin/mypy
+	@! .venv/bin/vulture | grep '^aerialdojo_gen/'
 
 format: .venv/.dev  ## let ruff format the code
 	@.venv/bin/ruff check --fix-only --quiet .

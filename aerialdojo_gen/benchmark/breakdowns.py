@@ -36,26 +36,27 @@ def by_setting(runs: Sequence[Run]) -> Iterable[tuple[str, Run]]:
 
 def partition_table(runs: Sequence[Run], profile: Profile) -> Table:
     """Set scenes of the training's distribution beside those out of it, in every length setting."""
-    lines = []
-    for section, run in by_setting(runs):
-        parts = {name: summarize(p, profile).overall for name, p in slices(run.episodes, "partition", PARTITIONS)}
-        known, other = (values_of(parts.get(name)) for name in PARTITIONS)
-        gap = tuple(b - a for a, b in zip(known[:2], other[:2], strict=True))
-        lines.append(line_of(run, (*known, *other, *gap), rivals=section, section=section))
-    groups = [("ID", MEASURES), ("OOD", MEASURES), ("OOD − ID, points", _DIFFERENCES)]
-    return score_table(f"ID and OOD scenes, {profile_head(profile)}", "agent", groups, lines)
+    return _halves(runs, profile, "ID and OOD scenes", "partition", PARTITIONS, ("ID", "OOD", "OOD − ID, points"))
 
 
 def goal_table(runs: Sequence[Run], profile: Profile) -> Table:
     """Set semantic goals beside image goals, in every length setting."""
+    heads = ("Semantic goal", "Image goal", "image − semantic, points")
+    return _halves(runs, profile, "Goal type", "modality", MODALITIES, heads)
+
+
+def _halves(
+    runs: Sequence[Run], profile: Profile, title: str, column: str, names: Sequence[str], heads: tuple[str, str, str]
+) -> Table:
+    """Set the episodes of one value of a column beside those of the other, and the difference of their rates."""
     lines = []
     for section, run in by_setting(runs):
-        parts = {name: summarize(p, profile).overall for name, p in slices(run.episodes, "modality", MODALITIES)}
-        words, picture = (values_of(parts.get(name)) for name in MODALITIES)
-        gap = tuple(b - a for a, b in zip(words[:2], picture[:2], strict=True))
-        lines.append(line_of(run, (*words, *picture, *gap), rivals=section, section=section))
-    groups = [("Semantic goal", MEASURES), ("Image goal", MEASURES), ("image − semantic, points", _DIFFERENCES)]
-    return score_table(f"Goal type, {profile_head(profile)}", "agent", groups, lines)
+        parts = {name: summarize(p, profile).overall for name, p in slices(run.episodes, column, names)}
+        one, other = (values_of(parts.get(name)) for name in names)
+        gap = tuple(b - a for a, b in zip(one[:2], other[:2], strict=True))
+        lines.append(line_of(run, (*one, *other, *gap), rivals=section, section=section))
+    groups = list(zip(heads, (MEASURES, MEASURES, _DIFFERENCES), strict=True))
+    return score_table(f"{title}, {profile_head(profile)}", "agent", groups, lines)
 
 
 def type_table(runs: Sequence[Run], profile: Profile) -> Table:

@@ -22,12 +22,13 @@ def show(
 ) -> None:
     """Picture one task: goal, route in its scene, clearance, reference image, views along the way."""
     from aerialdojo_gen.browse.lookup import find_task
+    from aerialdojo_gen.common.text_table import facts, terminal_width
     from aerialdojo_gen.show.figure import write_png
     from aerialdojo_gen.show.page import write_page
     from aerialdojo_gen.show.pictured import picture_task
 
     pictured = picture_task(find_task(data, task_id), "image" if task_id.endswith("-i") else "semantic", frames)
-    print("\n".join([pictured.title, pictured.goal, *(f"{name:20} {value}" for name, value in pictured.facts)]))
+    print("\n".join([pictured.title, pictured.goal, *facts(pictured.facts, terminal_width())]))
     if out is not None or html is None:
         print(write_png(pictured, out or Path(f"{task_id}.png")))
     if html is not None:

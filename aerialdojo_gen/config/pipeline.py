@@ -61,12 +61,12 @@ class Pipeline(Section):
         return section
 
 
-def load_pipeline(path: Path) -> Pipeline:
+def load_pipeline(file: str | Path) -> Pipeline:
     """Read and validate a pipeline file.
 
     Parameters
     ----------
-    path : Path
+    file : str or Path
         A TOML file; relative folders in it are relative to its own folder.
 
     Returns
@@ -80,6 +80,7 @@ def load_pipeline(path: Path) -> Pipeline:
         The file does not exist, is not TOML, has a key that does not exist, a value out of range, or sections that
         contradict each other; every fault is named.
     """
+    path = Path(file)
     try:
         raw = read_toml(path, ConfigError, finite=False)
     except FileNotFoundError:

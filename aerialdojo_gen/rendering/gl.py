@@ -83,7 +83,6 @@ class GlRenderer:
         self._gl = context()
         self.device = device()
         self._owned: list[Any] = []
-        self._programs: dict[tuple[str, ...], Any] = {}
         self._arrays: dict[tuple[str, ...], Any] = {}
         self._targets: dict[tuple[int, int, bool], Any] = {}
         textured, flat, layers = chunks(scene)

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import shapely
-from shapely.geometry import LineString, Point
+from shapely.geometry import LineString
 from shapely.geometry.base import BaseGeometry
 
 from aerialdojo_gen.scenes.mesh import Mesh
@@ -203,10 +203,3 @@ def poisson_disc(
         if len(poses) >= limit:
             break
     return poses
-
-
-def nearest_on(path: Polyline, x: float, y: float) -> Pose:
-    """Give the point of a path nearest to (x, y), with the yaw that looks from (x, y) towards it."""
-    line = LineString(path)
-    p = line.interpolate(line.project(Point(x, y)))
-    return Pose(float(p.x), float(p.y), float(np.degrees(np.arctan2(p.y - y, p.x - x))))

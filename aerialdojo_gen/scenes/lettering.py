@@ -83,12 +83,6 @@ def text(*, text: str, height: float, depth: float = 0.0) -> Mesh:
     return Mesh(placed, body.faces)
 
 
-def text_width_m(line: str, height: float) -> float:
-    """Width of a line of letters `height` metres tall, in metres."""
-    advance = sum(_SPACE if c == " " else _glyph(c)[1] + _GAP for c in line.upper())
-    return (advance - _GAP) * height / 6.0
-
-
 def _plate(plan: Polygon, depth: float) -> Mesh:
     if depth > 0:
         return extrude(plan, depth)

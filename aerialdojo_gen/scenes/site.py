@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 import shapely
-from shapely.geometry import Polygon
 from shapely.geometry.base import BaseGeometry
 
 from aerialdojo_gen.common.rng import generator
@@ -243,10 +242,6 @@ class Site:
         area = around(x, y, radius_m)
         return bool(self.extent.contains(area)) and self._footprints.is_free(area, base, base + height_m)
 
-    def is_free_area(self, area: BaseGeometry, z0_m: float = 0.0, z1_m: float = 3.0) -> bool:
-        """Whether an area inside the site is free between two heights, metres."""
-        return bool(self.extent.contains(area)) and self._footprints.is_free(area, z0_m, z1_m)
-
     def scene(self) -> Scene:
         """Finish: cut the ground, check that everything has its material, and make the scene."""
         ground = self._ground()
@@ -281,8 +276,3 @@ class Site:
             raise AssetError(f"{self.name}: more than {_MOST_NODES:,} things stand in the scene")
         self._nodes.add(node)
         return node
-
-
-def corners_of(area: Polygon) -> list[tuple[float, float]]:
-    """Corners of a polygon's exterior without the closing point, metres."""
-    return [(float(x), float(y)) for x, y in list(area.exterior.coords)[:-1]]

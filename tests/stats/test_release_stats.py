@@ -53,6 +53,7 @@ def test_the_tables_of_42_scenes_fit_a_terminal(papers):
         lines = table.terminal()
         # The paper's Table 2 is the widest.
         assert max(map(len, lines)) <= (115 if table.key == "family" else 100)
+        assert max(map(len, table.terminal(80))) <= 80
     scenes = tables(papers)[2].terminal()
     assert len(scenes) == 3 + 42 + 1 + 1
     assert [line.split()[0] for line in scenes[3:45]] == list(inventory())

@@ -14,7 +14,6 @@ from aerialdojo_gen.scenes.ground import rectangle
 from aerialdojo_gen.scenes.site import Site
 
 STOREY_M = 5.0
-SHOP_M = 6.0
 _SHOPS = (
     "books", "shoes", "bakery", "sport", "pharmacy", "toys", "flowers", "phones", "fashion", "coffee", "games",
     "jewels",
@@ -100,16 +99,3 @@ def shop_names(start: int = 0) -> Iterator[str]:
     while True:
         yield _SHOPS[k % len(_SHOPS)]
         k += 1
-
-
-def roof_services(
-    site: Site, items: Sequence[tuple[str, str | None, float, float, float]], z_m: float, place: str
-) -> None:
-    """Set equipment on a flat roof: rows of (category, variant or None, x, y, yaw in degrees)."""
-    for category, variant, x, y, yaw in items:
-        site.place(category, x, y, yaw, z=z_m, variant=variant, attributes={"place": place})
-
-
-def kerbed(site: Site, area: BaseGeometry, surface: str, rise_m: float = 0.12) -> None:
-    """Paint an area that stands a kerb's height over the ground."""
-    site.paint(area, surface, rise_m)
