@@ -189,6 +189,7 @@ def _finish_release(config: Pipeline, data: Where, scenes: list[str], whole: boo
     from aerialdojo_gen.release.card import write_card
     from aerialdojo_gen.release.croissant import write_croissant
     from aerialdojo_gen.release.provenance import record_makers
+    from aerialdojo_gen.store.root import open_root
     from aerialdojo_gen.store.shards import prune_release
 
     if whole:
@@ -197,7 +198,8 @@ def _finish_release(config: Pipeline, data: Where, scenes: list[str], whole: boo
             reporter.line(f"release: {gone} is no scene of this pipeline, removed")
     record_makers(data, config, scenes)
     write_croissant(data)
-    reporter.line(f"release: {write_card(data).removesuffix('/README.md')}")
+    write_card(data)
+    reporter.line(f"release: {open_root(data).at('release')}")
 
 
 def default_workers() -> int:

@@ -69,9 +69,10 @@ def both(capsys, smoke, uploaded, tmp_path, *arguments) -> dict[str, bytes]:
 def test_statistics_are_the_same(capsys, smoke, uploaded, tmp_path):
     made = both(capsys, smoke, uploaded, tmp_path, "stats", "--csv", "{out}/s.csv", "--markdown", "{out}/s.md")
     assert made.keys() == {"", "s.csv", "s.md"}
-    assert said(capsys, "stats", "--pool", "--scene", "U_Courtyard_0", "--data", uploaded)[1] == said(
-        capsys, "stats", "--pool", "--scene", "U_Courtyard_0", "--data", smoke
-    )[1]
+    assert (
+        said(capsys, "stats", "--pool", "--scene", "U_Courtyard_0", "--data", uploaded)[1]
+        == said(capsys, "stats", "--pool", "--scene", "U_Courtyard_0", "--data", smoke)[1]
+    )
 
 
 @pytest.mark.parametrize("release", ["", "/release"])

@@ -147,7 +147,7 @@ def test_the_release_knows_its_scenes(root):
 
 def test_a_root_travels(root):
     write(root, "t/a/x", b"1")
-    other = pickle.loads(pickle.dumps(root))  # noqa: S301 - what executors do
+    other = pickle.loads(pickle.dumps(root))
     assert other == root
     assert hash(other) == hash(root)
     assert other.local_copy("t/a/x").read_bytes() == b"1"
