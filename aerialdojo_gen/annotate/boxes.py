@@ -10,6 +10,7 @@ from __future__ import annotations
 import contextlib
 import json
 import shutil
+import tempfile
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -79,17 +80,16 @@ def staged(roots: Roots, scene: str, text: str) -> Iterator[Roots]:
     Raises
     ------
     StoreError
-        The data directory cannot be written.
+        The disk for temporary files cannot be written.
     """
-    # One name a scene: whoever changes its boxes holds its lock, and what a crash left is replaced by the next.
-    folder = roots.data / f".boxes-{scene}"
+    folder = Path(tempfile.gettempdir())
     try:
-        shutil.rmtree(folder, ignore_errors=True)
-        folder.mkdir(parents=True)
+        folder = Path(tempfile.mkdtemp(prefix=f"aerialdojo-boxes-{scene}-"))
         (folder / f"{scene}.toml").write_text(text, encoding="utf-8")
         (folder / f"{scene}.glb").symlink_to((roots.recipes / f"{scene}.glb").resolve())
     except OSError as error:
-        shutil.rmtree(folder, ignore_errors=True)
+        if folder.name.startswith("aerialdojo-boxes-"):
+            shutil.rmtree(folder, ignore_errors=True)
         raise disk_error(error, folder) from error
     try:
         yield replace(roots, recipes=folder)
