@@ -74,10 +74,11 @@ def open_pipeline(path: Path | None, data: Where) -> tuple[Pipeline, Roots]:
     """
     from aerialdojo_gen.config.pipeline import load_pipeline
     from aerialdojo_gen.pipeline.stage import Roots
+    from aerialdojo_gen.store.root import open_root
 
     pipeline = load_pipeline(path or home() / "pipelines" / DEFAULT_PIPELINE)
     roots = Roots(
-        data=Path(str(data)).absolute(),
+        data=open_root(data),
         scene_assets=(assets := pipeline.scene_assets or home() / "scene_assets"),
         recipes=pipeline.recipes or assets / "scenes",
         annotations=pipeline.annotations or home() / "annotations",

@@ -11,6 +11,7 @@ from aerialdojo_gen.errors import AssetError
 from aerialdojo_gen.pipeline.stage import Roots, Stage
 from aerialdojo_gen.scenes.catalogue_files import catalogue_files
 from aerialdojo_gen.store import shards as store
+from aerialdojo_gen.store.root import DataRoot
 
 
 def _scene_sources(roots: Roots, scene: str) -> list[Path]:
@@ -33,18 +34,18 @@ def _annotation_sources(roots: Roots, scene: str) -> list[Path]:
     return [file, *catalogue_files(roots.scene_assets)]
 
 
-def _plan_parts(data: Path, scene: str, config: Any) -> int:
+def _plan_parts(data: DataRoot, scene: str, config: Any) -> int:
     return -(-store.count_rows(data, "objects", scene) // config.targets_per_part)
 
 
-def _enough_for_the_paper(data: Path, scenes: Sequence[str], config: Any) -> None:
+def _enough_for_the_paper(data: DataRoot, scenes: Sequence[str], config: Any) -> None:
     if config.paper_counts:
         from aerialdojo_gen.release.pool import require_pools
 
         require_pools(data, scenes)
 
 
-def _render_parts(data: Path, scene: str, config: Any) -> int:
+def _render_parts(data: DataRoot, scene: str, config: Any) -> int:
     from aerialdojo_gen.rendering.sample import n_parts
 
     return n_parts(data, scene, config)

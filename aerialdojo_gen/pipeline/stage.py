@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 from aerialdojo_gen.config.sections import Embodiment
 from aerialdojo_gen.pipeline.code_digest import stage_module
 from aerialdojo_gen.store import shards as store
-from aerialdojo_gen.store.atomic import atomic_file
+from aerialdojo_gen.store.root import DataRoot, open_root
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -31,8 +31,8 @@ class Roots:
 
     Attributes
     ----------
-    data : Path
-        The data directory: every table and file that stages write.
+    data : DataRoot
+        Every table and file that stages write; made of a path or URL where one is given.
     scene_assets : Path
         Props and materials.
     recipes : Path
@@ -41,10 +41,13 @@ class Roots:
         Annotation files.
     """
 
-    data: Path
+    data: DataRoot
     scene_assets: Path
     recipes: Path
     annotations: Path
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "data", open_root(self.data))
 
 
 @dataclass(frozen=True)
@@ -118,7 +121,7 @@ class Job:
     def scene_model(self) -> Scene:
         """Read the scene's mesh (kept in memory between the jobs of a process)."""
         row = self.read("scenes").to_pylist()[0]
-        return _scene_model(self.roots.data / row["mesh_path"], row["mesh_sha256"])
+        return _scene_model(self.roots.data, row["mesh_path"], row["mesh_sha256"])
 
     def output_file(self, relative: str) -> AbstractContextManager[Path]:
         """Open a file output: a temporary path that takes its name when the block ends without an error.
@@ -135,21 +138,21 @@ class Job:
         """
         self.files.append(relative)
         self.digested.append(relative)
-        return atomic_file(self.roots.data, relative)
+        return self.roots.data.commit(relative)
 
 
 @lru_cache(maxsize=2)
-def _scene_model(path: Path, sha256: str) -> Scene:
-    from aerialdojo_gen.scenes.glb import read_glb
+def _scene_model(data: DataRoot, relative: str, sha256: str) -> Scene:
+    from aerialdojo_gen.scenes.stored import read_scene_mesh
 
-    return read_glb(path, sha256)
+    return read_scene_mesh(data, relative, sha256)
 
 
-def _one_part(_data: Path, _scene: str, _config: Any) -> int:
+def _one_part(_data: DataRoot, _scene: str, _config: Any) -> int:
     return 1
 
 
-def _no_check(_data: Path, _scenes: Sequence[str], _config: Any) -> None:
+def _no_check(_data: DataRoot, _scenes: Sequence[str], _config: Any) -> None:
     pass
 
 
@@ -198,9 +201,9 @@ class Stage:
     help: str
     reads: tuple[str, ...]
     writes: tuple[str, ...]
-    parts: Callable[[Path, str, Any], int] = _one_part
+    parts: Callable[[DataRoot, str, Any], int] = _one_part
     sources: Callable[[Roots, str], list[Path]] = _no_sources
-    check: Callable[[Path, Sequence[str], Any], None] = _no_check
+    check: Callable[[DataRoot, Sequence[str], Any], None] = _no_check
     settle: Callable[[Any, Callable[[str], None]], Any] = _as_it_is
     choices: Callable[[Any], list[Any]] = _no_choice
     digests: tuple[str, str, str] | None = None
