@@ -9,7 +9,6 @@ another machine goes on, it flies again what was finished since the last checkpo
 from __future__ import annotations
 
 import hashlib
-import os
 import secrets
 import shutil
 import time
@@ -19,6 +18,7 @@ from typing import Any
 
 from aerialdojo_gen.benchmark import journal
 from aerialdojo_gen.store.atomic import make_folder
+from aerialdojo_gen.store.cache import cache_folder
 from aerialdojo_gen.store.layout import check_run_name
 from aerialdojo_gen.store.root import DataRoot, LocalRoot
 
@@ -122,7 +122,6 @@ def _whole_lines(path: Path, begun: int) -> Iterator[bytes]:
 
 def _working_folder(root: DataRoot, run: str) -> Path:
     """Return the folder of this machine that a run's journals lie in, made: the same for the same URL and name."""
-    cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
-    folder = cache / "aerialdojo-gen" / "journals" / hashlib.sha256(root.url.encode()).hexdigest()[:16] / run
+    folder = cache_folder() / "journals" / hashlib.sha256(root.url.encode()).hexdigest()[:16] / run
     make_folder(folder)
     return folder

@@ -229,6 +229,8 @@ def mesh_of(root: DataRoot, scene: str) -> tuple[Path, str]:
     ------
     StoreError
         The scene is not in the release, or its mesh is not there.
+    AssetError
+        The release names a mesh outside of the data root.
     """
     row = store.read_scene(root, "release/scenes", scene, ("mesh_path", "mesh_sha256")).to_pylist()[0]
     try:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any
 
 from aerialdojo_gen.config.pipeline import Pipeline
@@ -19,9 +18,8 @@ from aerialdojo_gen.pipeline.fingerprint import scene_code, scene_fingerprint
 from aerialdojo_gen.pipeline.progress import Reporter
 from aerialdojo_gen.pipeline.stage import Job, Roots, Stage
 from aerialdojo_gen.store import shards as store
-from aerialdojo_gen.store.files import file_digest, is_whole, sha256_of
-from aerialdojo_gen.store.footers import ShardFile
 from aerialdojo_gen.store.parquet_files import read_file
+from aerialdojo_gen.store.root import DataRoot
 
 
 @dataclass(frozen=True)
@@ -128,53 +126,46 @@ def shards_of(
 
 
 def _fresh(
-    stage: Stage, data: Path, scene: str, part: int, parts: int, fingerprint: str, reporter: Reporter
+    stage: Stage, data: DataRoot, scene: str, part: int, parts: int, fingerprint: str, reporter: Reporter
 ) -> dict[str, Any] | None:
     """Return the shard's stored summary if all its tables and files are there and up to date."""
     summary = None
     for table in stage.writes:
-        path = store.shard_path(data, table, scene, part)
-        if not path.exists():
+        name = store.shard_name(table, scene, part)
+        if not data.exists(name):
             return None
         try:
-            info = store.read_info(path)
+            info = store.read_info(data, name)
         except StoreError as error:
             reporter.line(f"{str(error).split(':', 1)[0]}: computed again")
             return None
         if info is None or info.fingerprint != fingerprint or info.parts != parts:
             return None
         for relative, written in info.files.items():
-            if not _whole(data / relative, written):
-                reporter.line(f"{data / relative} is missing or damaged: computed again")
+            if not data.is_whole(relative, written.size, written.sha256):
+                reporter.line(f"{data.at(relative)} is missing or damaged: computed again")
                 return None
         summary = info.summary
     return summary
 
 
-def _whole(path: Path, written: ShardFile) -> bool:
-    """Whether a file has the bytes that were written, or their number where the footer says no more."""
-    try:
-        return is_whole(path, written.size) and (not written.sha256 or file_digest(path) == written.sha256)
-    except OSError:
-        return False
-
-
-def _verified(stage: Stage, data: Path, scene: str, part: int, reporter: Reporter) -> bool:
+def _verified(stage: Stage, data: DataRoot, scene: str, part: int, reporter: Reporter) -> bool:
     """Whether the files that a fresh shard names have the digests that it says."""
     if stage.digests is None:
         return True
     table, *columns = stage.digests
     try:
-        rows = read_file(store.shard_path(data, table, scene, part), columns)
+        name = store.shard_name(table, scene, part)
+        rows = read_file(data.local_copy(name), columns, data.at(name))
     except StoreError as error:
         reporter.line(f"{error}: computed again")
         return False
     for relative, digest in zip(*(rows.column(name).to_pylist() for name in columns), strict=True):
         try:
-            same = sha256_of(data / relative) == digest
+            same = data.digest(relative, anew=True) == digest
         except OSError:
             same = False
         if not same:
-            reporter.line(f"{data / relative} has other content than was written: computed again")
+            reporter.line(f"{data.at(relative)} has other content than was written: computed again")
             return False
     return True

@@ -128,6 +128,8 @@ def run(
         if prepare:
             prepare()
         for stage in stages:
+            # What the stage before wrote, in whatever process, is to be found.
+            roots.data.refresh()
             now = limits if limits and stage is stages[-1] else Limits()
             forced_now = stage.name in forced
             summary = _run_stage(stage, scenes, pipeline, roots, pool, forced_now, reporter, interrupts, now)
@@ -135,6 +137,7 @@ def run(
             reporter.line(str(summary))
             summaries.append(summary)
         if finish:
+            roots.data.refresh()
             finish()
             interrupts.check()
     return summaries

@@ -12,6 +12,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from aerialdojo_gen.store.root import DataRoot, open_root
+
 if TYPE_CHECKING:
     import pyarrow as pa
 
@@ -26,8 +28,8 @@ class Roots:
 
     Attributes
     ----------
-    data : Path
-        The data directory: every table and file that stages write.
+    data : DataRoot
+        Every table and file that stages write; made of a path or URL where one is given.
     scene_assets : Path
         Props and materials.
     recipes : Path
@@ -36,10 +38,13 @@ class Roots:
         Annotation files.
     """
 
-    data: Path
+    data: DataRoot
     scene_assets: Path
     recipes: Path
     annotations: Path
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "data", open_root(self.data))
 
 
 @dataclass(frozen=True)
@@ -115,9 +120,10 @@ class Job:
     def scene_model(self, keep: int = 1) -> Scene:
         """Read the scene's mesh; it is kept between the jobs of a process, as `keep` of `open_scene` says."""
         from aerialdojo_gen.scenes.context import open_scene
+        from aerialdojo_gen.scenes.stored import mesh_file
 
         row = self.read("scenes").to_pylist()[0]
-        return open_scene(self.roots.data / row["mesh_path"], row["mesh_sha256"], keep).scene
+        return open_scene(mesh_file(self.roots.data, row["mesh_path"]), row["mesh_sha256"], keep).scene
 
     def output_file(self, relative: str) -> AbstractContextManager[Path]:
         """Open a file output: a temporary path that takes its name when the block ends without an error.
@@ -132,18 +138,16 @@ class Job:
         context manager of Path
             The temporary path to write to, with the same suffix.
         """
-        from aerialdojo_gen.store.atomic import atomic_file
-
         self.files.append(relative)
         self.digested.append(relative)
-        return atomic_file(self.roots.data, relative)
+        return self.roots.data.commit(relative)
 
 
-def _one_part(_data: Path, _scene: str, _config: Any) -> int:
+def _one_part(_data: DataRoot, _scene: str, _config: Any) -> int:
     return 1
 
 
-def _no_check(_data: Path, _scenes: Sequence[str], _config: Any) -> None:
+def _no_check(_data: DataRoot, _scenes: Sequence[str], _config: Any) -> None:
     pass
 
 
@@ -202,10 +206,10 @@ class Stage:
     reads: tuple[str, ...]
     writes: tuple[str, ...]
     run: Callable[[Job, Any], Output]
-    parts: Callable[[Path, str, Any], int] = _one_part
+    parts: Callable[[DataRoot, str, Any], int] = _one_part
     sources: Callable[[Roots, str], list[Path]] = _no_sources
     imports: Callable[[Roots, str], Choice | None] = _any_module
-    check: Callable[[Path, Sequence[str], Any], None] = _no_check
+    check: Callable[[DataRoot, Sequence[str], Any], None] = _no_check
     settle: Callable[[Any, Callable[[str], None]], Any] = _as_it_is
     choices: Callable[[Any], list[Any]] = _no_choice
     digests: tuple[str, str, str] | None = None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import jinja2
@@ -119,13 +120,13 @@ def render_card(data: Where) -> str:
     )
 
 
-def write_card(data: Where) -> str:
+def write_card(data: Where) -> Path:
     """Write ``release/README.md`` from what the release holds.
 
     Returns
     -------
-    str
-        Where the card is.
+    Path
+        The card, or a copy of it on this machine.
 
     Raises
     ------
@@ -136,4 +137,4 @@ def write_card(data: Where) -> str:
     text = render_card(root)
     with root.commit("release/README.md") as path:
         path.write_text(text, encoding="utf-8")
-    return root.at("release/README.md")
+    return root.local_copy("release/README.md")

@@ -10,7 +10,7 @@ from pathlib import Path, PurePosixPath
 import pyarrow as pa
 
 from aerialdojo_gen.common.names import choose_scenes
-from aerialdojo_gen.errors import StoreError
+from aerialdojo_gen.errors import AssetError, StoreError
 from aerialdojo_gen.store import schemas
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.layout import LAYOUT, is_plain, partition, shard_name
@@ -142,34 +142,26 @@ def mesh_copy(where: Where, told: str) -> Path:
 
     Raises
     ------
-    StoreError
+    AssetError
         The row names one outside of the data root.
     FileNotFoundError
         It is not there.
     """
-    path = copy_below(where, told, "release/scenes: mesh_path")
+    root = open_root(where)
+    if leads_out(root, told):
+        raise AssetError(f"release/scenes: mesh_path {told!r} leads out of {root}")
+    path = root.local_copy(told)
     if not path.is_file():
         raise FileNotFoundError(2, os.strerror(2), str(path))
     return path
 
 
-def copy_below(where: Where, told: str, column: str) -> Path:
-    """Return what a table's column names, on this machine.
-
-    Raises
-    ------
-    StoreError
-        The column names a path outside of the data root, by dots or by a symbolic link.
-    FileNotFoundError
-        It is not there.
-    """
-    root = open_root(where)
-    away = PurePosixPath(told).is_absolute() or ".." in PurePosixPath(told).parts
-    if isinstance(root, LocalRoot):
-        away = away or not (root.path / told).resolve().is_relative_to(root.path.resolve())
-    if away:
-        raise StoreError(f"{column} {told!r} leads out of {root}")
-    return root.local_copy(told)
+def leads_out(root: DataRoot, told: str) -> bool:
+    """Whether a path that a table names leads out of the data root, by dots or by a symbolic link."""
+    path = PurePosixPath(told)
+    if path.is_absolute() or ".." in path.parts:
+        return True
+    return isinstance(root, LocalRoot) and not (root.path / told).resolve().is_relative_to(root.path.resolve())
 
 
 def check_release(where: Where, scenes: list[str] | None = None) -> list[str]:

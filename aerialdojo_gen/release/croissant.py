@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 from typing import Any
 
 import pyarrow as pa
@@ -146,13 +147,13 @@ def _field(table: str, field: pa.Field) -> dict[str, Any]:
     }
 
 
-def write_croissant(data: Where) -> str:
+def write_croissant(data: Where) -> Path:
     """Write ``release/croissant.json`` from what the release holds.
 
     Returns
     -------
-    str
-        Where the file is.
+    Path
+        The file, or a copy of it on this machine.
 
     Raises
     ------
@@ -163,4 +164,4 @@ def write_croissant(data: Where) -> str:
     found = counts(root, check_release(root))
     with root.commit("release/croissant.json") as path:
         path.write_text(json.dumps(croissant(found), indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
-    return root.at("release/croissant.json")
+    return root.local_copy("release/croissant.json")

@@ -6,7 +6,6 @@ import resource
 import sys
 import time
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 from aerialdojo_gen.common import rng
@@ -17,9 +16,10 @@ from aerialdojo_gen.rendering.checks import Solid
 from aerialdojo_gen.rendering.codecs import SUFFIX
 from aerialdojo_gen.rendering.recording import frame_poses, record_view
 from aerialdojo_gen.rendering.sample import choose, tables
-from aerialdojo_gen.scenes.glb import read_glb
+from aerialdojo_gen.scenes.stored import read_scene_mesh
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.files import size_of
+from aerialdojo_gen.store.root import Where, open_root
 from aerialdojo_gen.store.staging import scratch_folder
 
 _MEASURED_SCENES, _MEASURED_POSES = 3, 12
@@ -72,14 +72,14 @@ class Estimate:
 
 
 def estimate(
-    data: Path, scenes: list[str], config: RenderConfig, seed: int, workers: int, machines: int = 1
+    data: Where, scenes: list[str], config: RenderConfig, seed: int, workers: int, machines: int = 1
 ) -> Estimate:
     """Measure a few trajectories and extrapolate to the selection.
 
     Parameters
     ----------
-    data : Path
-        The data directory, with a release.
+    data : DataRoot, Path or str
+        The data root, with a release.
     scenes : list of str
     config : RenderConfig
     seed : int
@@ -141,12 +141,12 @@ def estimate(
     )
 
 
-def _rows(data: Path, table: str, scene: str, columns: list[str] | None = None) -> list[dict[str, Any]]:
+def _rows(data: Where, table: str, scene: str, columns: list[str] | None = None) -> list[dict[str, Any]]:
     rows: list[dict[str, Any]] = store.read_scene(data, table, scene, columns).to_pylist()
     return rows
 
 
-def _frames(data: Path, scene: str, config: RenderConfig) -> dict[str, int]:
+def _frames(data: Where, scene: str, config: RenderConfig) -> dict[str, int]:
     """Count the frames of every trajectory of a scene."""
     if config.sampling == "steps":
         columns = ["nav_id", "n_actions"]
@@ -163,12 +163,12 @@ def _frames(data: Path, scene: str, config: RenderConfig) -> dict[str, int]:
 
 
 def _measure(
-    data: Path, scene: str, route: dict[str, Any], config: RenderConfig, renderer_name: str
+    data: Where, scene: str, route: dict[str, Any], config: RenderConfig, renderer_name: str
 ) -> tuple[int, float, float, int]:
     """Record the first poses of a route; returns poses, CPU seconds for them and for opening the scene, bytes."""
     begun = time.process_time()
     row = store.read_scene(data, "scenes", scene).to_pylist()[0]
-    mesh = read_glb(data / row["mesh_path"], row["mesh_sha256"])
+    mesh = read_scene_mesh(open_root(data), row["mesh_path"], row["mesh_sha256"])
     solid = Solid(mesh)
     short = route | {name: route[name][:_MEASURED_POSES] for name in ("x_m", "y_m", "z_m", "yaw_rad", "action")}
     poses = frame_poses(short, config)

@@ -16,7 +16,7 @@ from typing import Any
 from aerialdojo_gen.common.bounded import read_json
 from aerialdojo_gen.config.sections import RenderConfig
 from aerialdojo_gen.errors import StoreError
-from aerialdojo_gen.store.files import is_whole
+from aerialdojo_gen.store.root import DataRoot
 from aerialdojo_gen.store.schemas import RECORDINGS
 from aerialdojo_gen.store.tables import check_table, from_rows
 
@@ -53,13 +53,13 @@ def trajectory_fingerprint(code: str, mesh_sha256: str, route: Mapping[str, Any]
     return hashlib.sha256(json.dumps(facts, sort_keys=True).encode()).hexdigest()
 
 
-def find(data: Path, folder: str, fingerprint: str, *, verify: bool = False) -> list[dict[str, Any]] | None:
+def find(data: DataRoot, folder: str, fingerprint: str, *, verify: bool = False) -> list[dict[str, Any]] | None:
     """Return the rows of a finished trajectory; None where there is none, or it is stale or damaged.
 
     Parameters
     ----------
-    data : Path
-        The data directory.
+    data : DataRoot
+        The data root.
     folder : str
         The trajectory's, relative to it.
     fingerprint : str
@@ -68,7 +68,7 @@ def find(data: Path, folder: str, fingerprint: str, *, verify: bool = False) -> 
         Compare the files' digests too, not their sizes alone.
     """
     try:
-        note = read_json(data / folder / NOTE)
+        note = read_json(data.local_copy(f"{folder}/{NOTE}"))
     except (OSError, StoreError):
         return None
     if not isinstance(note, dict) or note.get("fingerprint") != fingerprint:
@@ -76,7 +76,7 @@ def find(data: Path, folder: str, fingerprint: str, *, verify: bool = False) -> 
     rows = note.get("recordings")
     if not isinstance(rows, list) or not _are_recordings(rows, folder):
         return None
-    whole = all(is_whole(data / row["path"], row["bytes"], row["sha256"] if verify else None) for row in rows)
+    whole = all(data.is_whole(row["path"], row["bytes"], row["sha256"] if verify else "", anew=True) for row in rows)
     return rows if whole else None
 
 

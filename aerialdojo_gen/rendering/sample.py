@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from pathlib import Path
 from typing import Any
 
 from aerialdojo_gen.common import rng
 from aerialdojo_gen.config.sections import RenderConfig
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.layout import partition as partition_of
+from aerialdojo_gen.store.root import Where
 from aerialdojo_gen.store.schemas import SETTINGS
 
 
@@ -48,13 +48,13 @@ def choose(rows: Iterable[Mapping[str, Any]], limit: int, seed: int) -> list[str
     )
 
 
-def n_parts(data: Path, scene: str, config: RenderConfig) -> int:
+def n_parts(data: Where, scene: str, config: RenderConfig) -> int:
     """Count the shards of a scene: `trajectories_per_part` recordings each, at least one shard.
 
     Parameters
     ----------
-    data : Path
-        The data directory.
+    data : DataRoot, Path or str
+        The data root.
     scene : str
         Name of the scene.
     config : RenderConfig

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from aerialdojo_gen.browse.lookup import FoundTask
 from aerialdojo_gen.errors import StoreError
 from aerialdojo_gen.geometry.cameras import Camera, view_pose
-from aerialdojo_gen.release.contents import copy_below
+from aerialdojo_gen.release.contents import leads_out
 from aerialdojo_gen.store import schemas
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.root import DataRoot
@@ -112,7 +112,9 @@ def _recorded(task: FoundTask, steps: list[int]) -> list[NDArray[np.uint8]] | No
 
 
 def _copy(root: DataRoot, told: str) -> Path:
+    if leads_out(root, told):
+        raise StoreError(f"recordings: path {told!r} leads out of {root}")
     try:
-        return copy_below(root, told, "recordings: path")
+        return root.local_copy(told)
     except FileNotFoundError:
         raise StoreError(f"the recording {root.at(told)} is missing: run aerialdojo-gen render") from None

@@ -1,7 +1,7 @@
 """Requests to an S3 bucket: get, put, list, delete and conditional puts, tried again where that helps.
 
-Credentials, region, endpoint, retries and checksums are configured as for every AWS tool: by environment variables and
-by the files that `aws configure` writes, never by the URL. What a request cannot mend becomes one line, in
+Credentials, region, endpoint, retries and checksums are configured as for every AWS tool: by environment variables
+and by the files that `aws configure` writes, never by the URL. What asking again cannot mend becomes one line, in
 `aerialdojo_gen.store.cloud_errors`.
 """
 

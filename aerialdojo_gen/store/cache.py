@@ -1,9 +1,9 @@
 """Copies of objects on this machine, by their content: bounded, and shared by all processes of a user.
 
-``$AERIALDOJO_CACHE`` (default ``~/.cache/aerialdojo-gen``) holds at most ``$AERIALDOJO_CACHE_GB`` gigabytes (default
-20); what was used longest ago goes first, except for what a living process uses. An item is a folder under a name that
-is a digest of where the object lies and of its tag; it is made in the staging folder and renamed, so that it is whole
-or not there, whoever is killed and however many processes make the same one.
+``$AERIALDOJO_CACHE`` (default ``~/.cache/aerialdojo-gen``) holds at most ``$AERIALDOJO_CACHE_GB`` gigabytes
+(default 20); what was used longest ago goes first, except for what a living process uses. An item is a folder under a
+name that is a digest of where the object lies and of its tag; it is made in the staging folder and renamed, so that
+it is whole or not there, whoever is killed and however many processes make the same one.
 """
 
 from __future__ import annotations

@@ -2,15 +2,15 @@
 
 What holds there:
 
-- A file is put in one request, or in parts that are completed when all are there: a reader sees the old one or the new
-  one. It is read under the condition that it still has the tag that was looked up; where it has not, it is looked up
-  anew.
-- A folder (a trajectory's recording, say) has a manifest beside its files, ``.aerialdojo-folder.json``, with the tag of
-  each. A first folder's manifest says ``writing`` until all files are put, and until then there is no folder. What
-  replaces one is put under other keys, and the manifest names those in one put: that is the moment at which readers see
-  the new one, all of it. Then the files are copied to their own keys, for readers of the plain files, and the manifest
-  names these. Who reads plain files without manifests compares the digests in the table `recordings`. A folder that
-  somebody uploaded has no manifest and is what lies there.
+- A file is put in one request, or in parts that are completed when all are there: a reader sees the old one or the
+  new one. It is read under the condition that it still has the tag that was looked up; where it has not, it is looked
+  up anew.
+- A folder (a trajectory's recording, say) has a manifest beside its files, ``.aerialdojo-folder.json``, with the tag
+  of each. A first folder's manifest says ``writing`` until all files are put, and until then there is no folder. What
+  replaces one is put under other keys, and the manifest names those in one put: that is the moment at which readers
+  see the new one, all of it. Then the files are copied to their own keys, for readers of the plain files, and the
+  manifest names these. Who reads plain files without manifests compares the digests in the table `recordings`. A
+  folder that somebody uploaded has no manifest and is what lies there.
 - The Parquet shard that names files is committed after them.
 - What lies where is listed by table, once, and kept: until `refresh` in a run that holds the lock, else for a minute;
   what this process writes is known to it at once.
@@ -58,7 +58,7 @@ class ObjectRoot(DataRoot):
     def __init__(self, bucket: str, prefix: str = "") -> None:
         self._name, self._prefix = bucket, prefix
         self.url = f"s3://{bucket}/{prefix}" if prefix else f"s3://{bucket}"
-        # Of a run: when it last began to look anew, and the token of the lock that it holds. Workers get them pickled.
+        # Of a run: when it last began to look anew, and the token of its lock. Workers get them with the root.
         self._epoch, self._token = 0, ""
 
     def __eq__(self, other: object) -> bool:
@@ -267,7 +267,7 @@ class ObjectRoot(DataRoot):
         return self._key("".join(f"{part}/" for part in parts[:depth]))
 
     def _files(self, relative: str) -> dict[str, tuple[str, Entry]]:
-        """Find a file (under the name ``""``), or all files of a folder: their keys and entries, by their names in it.
+        """Find a file (under the name ``""``), or all files of a folder: keys and entries, by their names in it.
 
         Raises
         ------

@@ -109,7 +109,7 @@ def test_stage_writes_mesh_and_row(assets, tmp_path):
     job = Job("build-scenes", "U_Test_0", 0, 1, 0, Embodiment(), roots)
     output = build_scenes.run(job, BuildScenesConfig())
     row = output.tables["scenes"].to_pylist()[0]
-    path = roots.data / row["mesh_path"]
+    path = tmp_path / "data" / row["mesh_path"]
     scene = read_glb(path)
     assert row["mesh_path"] == "meshes/U_Test_0.glb"
     assert row["mesh_sha256"] == hashlib.sha256(path.read_bytes()).hexdigest()
@@ -128,7 +128,7 @@ def test_stage_writes_mesh_and_row(assets, tmp_path):
 def test_file_holds_the_built_scene_exactly(assets, tmp_path):
     roots = Roots(tmp_path / "data", assets, assets / "scenes", tmp_path)
     build_scenes.run(Job("build-scenes", "U_Test_0", 0, 1, 0, Embodiment(), roots), BuildScenesConfig())
-    stored, built = read_glb(roots.data / "meshes/U_Test_0.glb"), build(assets)
+    stored, built = read_glb(tmp_path / "data/meshes/U_Test_0.glb"), build(assets)
     for a, b in zip(stored.instances, built.instances, strict=True):
         assert np.array_equal(a.vertices, b.vertices)
         assert np.array_equal(a.faces, b.faces)

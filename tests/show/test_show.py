@@ -260,7 +260,7 @@ def test_another_mesh_is_refused(copied, ids):
     with pytest.raises(AssetError, match="is not the mesh that the tables were made from"):
         picture_task(find_task(copied, ids[0]), frames=0)
     mesh.unlink()
-    with pytest.raises(AssetError, match=f"{YARD}.glb: cannot be read"):
+    with pytest.raises(AssetError, match=f"{YARD}.glb is missing: run aerialdojo-gen build-scenes --scene {YARD}"):
         picture_task(find_task(copied, ids[0]), frames=0)
 
 

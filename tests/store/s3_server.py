@@ -40,8 +40,8 @@ def s3_server() -> Iterator[str]:
 class Proxy:
     """Hands requests on to a server, but for those that match a rule: each rule is used up by its number of times.
 
-    Rules are added by `fail`: a number is answered as an HTTP error, ``"drop"`` closes the connection after part of the
-    request was taken, ``"cut"`` closes it in the middle of the answer, a float waits for so many seconds.
+    Rules are added by `fail`: a number is answered as an HTTP error, ``"drop"`` closes the connection after part of
+    the request was taken, ``"cut"`` closes it in the middle of the answer, a float waits for so many seconds.
     """
 
     def __init__(self, server: str) -> None:

@@ -23,7 +23,6 @@ from aerialdojo_gen.errors import AerialDojoError, BudgetSpent
 from aerialdojo_gen.pipeline.registry import BY_NAME
 from aerialdojo_gen.pipeline.stage import Job
 from aerialdojo_gen.store import shards as store
-from aerialdojo_gen.store.files import file_digest, size_of
 from aerialdojo_gen.store.footers import ShardFile
 
 
@@ -99,8 +98,8 @@ def compute(task: Task) -> dict[str, Any]:
 
 
 def _described(job: Job, name: str) -> ShardFile:
-    path = job.roots.data / name
-    return ShardFile(size_of(path), file_digest(path) if name in job.digested else "")
+    data = job.roots.data
+    return ShardFile(data.size(name), data.digest(name) if name in job.digested else "")
 
 
 def start_worker(parent: int) -> None:

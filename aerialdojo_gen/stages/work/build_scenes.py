@@ -13,9 +13,9 @@ from aerialdojo_gen.pipeline.stage import Job, Output
 from aerialdojo_gen.scenes.catalogue import load_catalogue
 from aerialdojo_gen.scenes.glb import write_glb
 from aerialdojo_gen.scenes.model import Scene
+from aerialdojo_gen.store.layout import check_scene_name
+from aerialdojo_gen.store.layout import partition as store_partition
 from aerialdojo_gen.store.schemas import FAMILIES, SCENES
-from aerialdojo_gen.store.shards import check_scene_name
-from aerialdojo_gen.store.shards import partition as store_partition
 
 _NAME = re.compile(r"([UNID])_([A-Za-z0-9]+)_([01])")
 _PARTITIONS = {"0": "ID", "1": "OOD"}

@@ -19,8 +19,8 @@ from aerialdojo_gen.rendering.recording import frame_poses, record_view
 from aerialdojo_gen.rendering.sample import choose, tables
 from aerialdojo_gen.rendering.trajectory import FramePoses
 from aerialdojo_gen.scenes.model import Scene
-from aerialdojo_gen.store.atomic import atomic_folder
 from aerialdojo_gen.store.files import sha256_of, size_of
+from aerialdojo_gen.store.root import DataRoot
 from aerialdojo_gen.store.schemas import FRAMES, RECORDINGS
 from aerialdojo_gen.store.staging import remove
 from aerialdojo_gen.store.tables import from_rows
@@ -79,9 +79,9 @@ class _Trajectory:
     poses: FramePoses
     config: RenderConfig
 
-    def record(self, data: Path, folder: str, fingerprint: str) -> list[dict[str, Any]]:
+    def record(self, data: DataRoot, folder: str, fingerprint: str) -> list[dict[str, Any]]:
         """Record all views into a folder that appears when it is whole; returns the rows of `recordings`."""
-        with atomic_folder(data / folder, root=data) as here:
+        with data.commit_folder(folder) as here:
             rows = [row for view in self.config.views for row in self._view(view, here, folder)]
             finished.note(here, fingerprint, rows)
         return rows

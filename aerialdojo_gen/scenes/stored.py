@@ -1,0 +1,41 @@
+"""A scene's mesh from a data root."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from aerialdojo_gen.errors import AssetError
+from aerialdojo_gen.scenes.glb import read_glb
+from aerialdojo_gen.scenes.model import Scene
+from aerialdojo_gen.store.root import DataRoot
+
+
+def mesh_file(data: DataRoot, relative: str) -> Path:
+    """Return the mesh that a row of `scenes` names, on this machine.
+
+    Raises
+    ------
+    AssetError
+        It is missing.
+    StoreError
+        The store does not answer, or the path leads out of it.
+    """
+    try:
+        return data.local_copy(relative)
+    except FileNotFoundError:
+        missing = f"{data.at(relative)}: cannot be read ({os.strerror(2)}); run build-scenes first"
+        raise AssetError(missing) from None
+
+
+def read_scene_mesh(data: DataRoot, relative: str, sha256: str) -> Scene:
+    """Read the mesh that a row of `scenes` names: its ``mesh_path``, and its ``mesh_sha256``.
+
+    Raises
+    ------
+    AssetError
+        It is missing, damaged, or another one (see `aerialdojo_gen.scenes.glb.read_glb`).
+    StoreError
+        The store does not answer, or the path leads out of it.
+    """
+    return read_glb(mesh_file(data, relative), sha256)
