@@ -109,9 +109,9 @@ def test_who_lost_the_lock_writes_nothing_more(cloud: str):
 
     root = open_root(cloud)
     bucket = Bucket(cloud.split("/")[2])
-    with pytest.raises(StoreError, match="lost the lock"), root.lock():  # noqa: PT012 - losing it shows at the end too
+    with pytest.raises(StoreError, match="lost the lock"), root.lock():  # noqa: PT012 - it shows at the end too
         write(root, "t/a/x", b"mine")
-        worker = pickle.loads(pickle.dumps(root))  # noqa: S301
+        worker = pickle.loads(pickle.dumps(root))
         taken = b'{"token": "another", "holder": "another", "lease_s": 60}'
         bucket.put_bytes("data/.aerialdojo-lock.json", taken)
         code = "import pickle, sys; from test_roots import write; write(pickle.load(sys.stdin.buffer), 't/a/x', b'y')"
