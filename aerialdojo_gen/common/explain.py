@@ -59,7 +59,7 @@ def faults_of(error: ValidationError, model: type[BaseModel]) -> list[ModelFault
         elif raw["type"] == "missing":
             said, line = "the key is missing", f"key {brief(key, 60)!r} is missing"
         else:
-            said = raw["msg"]
+            said = raw["msg"].removeprefix("Value error, ")
             line = f"{brief(key, 60)} = {brief(repr(raw.get('input')), 60)}: {said}"
         faults.append(ModelFault(path, said, line))
     return faults

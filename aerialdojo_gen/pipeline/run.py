@@ -117,7 +117,7 @@ def open_pipeline(pipeline: str | Path | Pipeline | None, data: str | Path | Dat
     if not isinstance(pipeline, Pipeline):
         pipeline = load_pipeline(Path(pipeline) if pipeline else home() / "pipelines" / DEFAULT_PIPELINE)
     roots = Roots(
-        data=Path(open_root(data).url),
+        data=open_root(data),
         scene_assets=(assets := pipeline.scene_assets or home() / "scene_assets"),
         recipes=pipeline.recipes or assets / "scenes",
         annotations=pipeline.annotations or home() / "annotations",
@@ -171,7 +171,7 @@ def run_stages(
     )  # fmt: skip
 
 
-def _finish_release(config: Pipeline, data: Path, scenes: list[str], whole: bool, reporter: Reporter) -> None:
+def _finish_release(config: Pipeline, data: DataRoot, scenes: list[str], whole: bool, reporter: Reporter) -> None:
     """Bring what stands beside the tables of a release up to date with them."""
     from aerialdojo_gen.release.card import write_card
     from aerialdojo_gen.release.croissant import write_croissant
@@ -184,7 +184,8 @@ def _finish_release(config: Pipeline, data: Path, scenes: list[str], whole: bool
             reporter.line(f"release: {gone} is no scene of this pipeline, removed")
     record_makers(data, config, scenes)
     write_croissant(data)
-    reporter.line(f"release: {write_card(data).removesuffix('/README.md')}")
+    write_card(data)
+    reporter.line(f"release: {data.at('release')}")
 
 
 def default_workers() -> int:

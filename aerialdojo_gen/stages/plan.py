@@ -9,6 +9,7 @@ from aerialdojo_gen.pipeline.stage import Job, Output, Stage
 
 if TYPE_CHECKING:
     from aerialdojo_gen.config.sections import PlanConfig
+    from aerialdojo_gen.store.root import DataRoot
 
 
 def run(job: Job, config: PlanConfig) -> Output:
@@ -18,7 +19,7 @@ def run(job: Job, config: PlanConfig) -> Output:
     return plan.run(job, config)
 
 
-def parts(data: Path, scene: str, config: PlanConfig) -> int:
+def parts(data: DataRoot, scene: str, config: PlanConfig) -> int:
     """Count the shards of a scene: `targets_per_part` targets each."""
     from aerialdojo_gen.store import shards
 

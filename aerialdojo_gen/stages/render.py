@@ -10,6 +10,7 @@ from aerialdojo_gen.rendering.settle import renderer_choices, settle_renderer
 
 if TYPE_CHECKING:
     from aerialdojo_gen.config.sections import RenderConfig
+    from aerialdojo_gen.store.root import DataRoot
 
 
 def run(job: Job, config: RenderConfig) -> Output:
@@ -19,7 +20,7 @@ def run(job: Job, config: RenderConfig) -> Output:
     return render.run(job, config)
 
 
-def parts(data: Path, scene: str, config: RenderConfig) -> int:
+def parts(data: DataRoot, scene: str, config: RenderConfig) -> int:
     """Count the shards of a scene: `trajectories_per_part` recordings each."""
     from aerialdojo_gen.rendering.sample import n_parts
 

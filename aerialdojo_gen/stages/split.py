@@ -10,6 +10,7 @@ from aerialdojo_gen.pipeline.stage import Job, Output, Stage
 
 if TYPE_CHECKING:
     from aerialdojo_gen.config.sections import SplitConfig
+    from aerialdojo_gen.store.root import DataRoot
 
 
 def run(job: Job, config: SplitConfig) -> Output:
@@ -19,7 +20,7 @@ def run(job: Job, config: SplitConfig) -> Output:
     return split.run(job, config)
 
 
-def check(data: Path, scenes: Sequence[str], config: SplitConfig) -> None:
+def check(data: DataRoot, scenes: Sequence[str], config: SplitConfig) -> None:
     """Raise a PoolError where the paper's numbers are wanted and there are too few candidates for them."""
     if config.paper_counts:
         from aerialdojo_gen.release.pool import require_pools
