@@ -31,6 +31,7 @@ from aerialdojo_gen.benchmark.worker import Finished, Unit
 from aerialdojo_gen.benchmark.workers import fly_units
 from aerialdojo_gen.common.bounded import read_json
 from aerialdojo_gen.errors import UsageError
+from aerialdojo_gen.pipeline.executors import Folders, make_executor
 from aerialdojo_gen.pipeline.interrupt import Interrupts
 from aerialdojo_gen.pipeline.progress import Reporter
 from aerialdojo_gen.pipeline.runner import data_lock
@@ -45,7 +46,9 @@ def evaluate(
     evaluation: Evaluation,
     *,
     out: Path | None = None,
-    workers: int = 1,
+    workers: int | None = 1,
+    executor: str = "local",
+    address: str | None = None,
     rerun_failed: bool = False,
     restart: bool = False,
     limits: Limits | None = None,
@@ -60,8 +63,10 @@ def evaluate(
     evaluation : Evaluation
     out : Path, optional
         Where the log goes; `data` where absent.
-    workers : int
-        Processes; with 1 everything runs in this one.
+    workers : int, optional
+        Processes; with 1 everything runs in this one, with None on all cores there are.
+    executor, address : str
+        As for `aerialdojo_gen.pipeline.executors.make_executor`.
     rerun_failed : bool
         Fly exactly those again that failed for reasons outside the agent.
     restart : bool
@@ -89,6 +94,7 @@ def evaluate(
     data, out = data.absolute(), (out or data).absolute()
     reporter = reporter or Reporter(quiet=True)
     folder = out / "runs" / store.check_run_name(evaluation.run)
+    made = make_executor(executor, workers, address, Folders((data, out), (), folder))
     rows = select(data, evaluation.selection)
     run = _Run(data, out, folder, evaluation, rows)
     with data_lock(folder), Interrupts() as interrupts:
@@ -104,18 +110,17 @@ def evaluate(
 
             def tell(finished: Finished) -> None:
                 tally.add(finished)
-                # A worker that has nothing to tell says so too, and a rate of nothing is no rate.
-                if finished.episodes:
-                    bar.advance(finished.episodes)
+                bar.advance(finished.episodes)
 
             def stopped() -> bool:
                 interrupts.check()
                 return bool(tally.spent or tally.failing)
 
             try:
-                with run.kept():
-                    units = run.units(todo, workers)
-                    for scene in fly_units(data, evaluation, units, workers, tell, stopped):
+                # The processes are gone when their journals are brought in.
+                with run.kept(), made as pool:
+                    units = run.units(todo, pool.workers if todo.num_rows else 1)
+                    for scene in fly_units(data, evaluation, units, pool, tell, stopped):
                         run.bring_in(scene)
             except ServiceDown as error:
                 raise ServiceDown(f"{error} Finished episodes are kept: the same command goes on from here") from None

@@ -15,10 +15,10 @@ from aerialdojo_gen.config.pipeline import Pipeline
 from aerialdojo_gen.config.sections import Section
 from aerialdojo_gen.errors import AerialDojoError, StoreError
 from aerialdojo_gen.pipeline.code_digest import stage_code
-from aerialdojo_gen.pipeline.executors.local import Task
 from aerialdojo_gen.pipeline.fingerprint import scene_fingerprint
 from aerialdojo_gen.pipeline.progress import Reporter
 from aerialdojo_gen.pipeline.stage import Job, Roots, Stage
+from aerialdojo_gen.pipeline.task import Task
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.files import file_digest, is_whole, sha256_of
 from aerialdojo_gen.store.footers import ShardFile
