@@ -31,7 +31,7 @@ from aerialdojo_gen.benchmark.worker import Finished, Unit
 from aerialdojo_gen.benchmark.workers import fly_units
 from aerialdojo_gen.common.bounded import read_json
 from aerialdojo_gen.errors import UsageError
-from aerialdojo_gen.pipeline.executors import Folders, make_executor
+from aerialdojo_gen.pipeline.executors import Folders, make_executor, on_disk
 from aerialdojo_gen.pipeline.interrupt import Interrupts
 from aerialdojo_gen.pipeline.progress import Reporter
 from aerialdojo_gen.pipeline.runner import data_lock
@@ -94,7 +94,9 @@ def evaluate(
     data, out = data.absolute(), (out or data).absolute()
     reporter = reporter or Reporter(quiet=True)
     folder = out / "runs" / store.check_run_name(evaluation.run)
-    made = make_executor(executor, workers, address, Folders((data, out), (), folder))
+    made = make_executor(
+        executor, workers, address, Folders(on_disk(data, below="release"), (), on_disk(folder), reporter.line)
+    )
     rows = select(data, evaluation.selection)
     run = _Run(data, out, folder, evaluation, rows)
     with data_lock(folder), Interrupts() as interrupts:

@@ -5,7 +5,6 @@ Nothing heavy is imported before a command runs, so that ``--help`` answers at o
 
 from __future__ import annotations
 
-import os
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -32,6 +31,13 @@ PipelineFile = Annotated[
     Path | None, typer.Option("--pipeline", help=f"Pipeline file.  (default: pipelines/{DEFAULT_PIPELINE})")
 ]
 Workers = Annotated[int | None, typer.Option("--workers", min=1, max=1024, help="Processes.  (default: all cores)")]
+ExecutorName = Annotated[
+    str, typer.Option("--executor", metavar="local|ray", help="Processes of this machine, or of a Ray cluster.")
+]
+Address = Annotated[
+    str | None,
+    typer.Option("--address", metavar="HOST:PORT", help="Of a running Ray cluster.  (default: one on this machine)"),
+]
 Force = Annotated[bool, typer.Option("--force", help="Compute this stage's shards even where they are fresh.")]
 Replace = Annotated[
     bool, typer.Option("--replace", help="Put this release in the place of another pipeline's, which is lost.")
@@ -94,6 +100,8 @@ def run_until(
     quiet: bool = False,
     limits: Limits | None = None,
     replace: bool = False,
+    executor: str = "local",
+    address: str | None = None,
     **overrides: object,
 ) -> None:
     """Bring a stage's tables up to date, running what it needs upstream; the twin of a stage's command.
@@ -118,6 +126,8 @@ def run_until(
         How much of the stage is computed now; all of it where absent.
     replace : bool
         Whether scenes of the release that another pipeline made may be lost.
+    executor, address : str
+        As for `aerialdojo_gen.pipeline.executors.make_executor`.
     **overrides
         Values of the stage's section that replace the file's; None leaves one as it is.
 
@@ -131,7 +141,10 @@ def run_until(
 
     config, roots = open_pipeline(pipeline, data)
     config = with_overrides(config, stage, **overrides)
-    run_stages(list(upstream(stage)), config, roots, scene, workers, [stage] if force else [], quiet, limits, replace)
+    run_stages(
+        list(upstream(stage)), config, roots, scene, workers, [stage] if force else [], quiet, limits, replace,
+        executor, address,
+    )  # fmt: skip
 
 
 def run_stages(
@@ -144,6 +157,8 @@ def run_stages(
     quiet: bool,
     limits: Limits | None = None,
     replace: bool = False,
+    executor: str = "local",
+    address: str | None = None,
 ) -> None:
     """Run stages in their order over the chosen scenes; after `split`, write card and croissant.json.
 
@@ -170,8 +185,8 @@ def run_stages(
 
     try:
         runner.run(
-            stages, scenes, config, roots, workers=workers or default_workers(), force=force, reporter=reporter,
-            limits=limits, prepare=prepare, finish=finish,
+            stages, scenes, config, roots, workers=workers, executor=executor, address=address, force=force,
+            reporter=reporter, limits=limits, prepare=prepare, finish=finish,
         )  # fmt: skip
     except KeyboardInterrupt:
         # Said here because Typer turns Ctrl-C into a silent exit.
@@ -197,4 +212,6 @@ def _finish_release(config: Pipeline, data: Path, scenes: list[str], whole: bool
 
 def default_workers() -> int:
     """Count the cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    from aerialdojo_gen.pipeline.executors.local import own_cores
+
+    return own_cores()

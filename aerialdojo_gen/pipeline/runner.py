@@ -20,7 +20,7 @@ from typing import TextIO
 from aerialdojo_gen.config.pipeline import Pipeline
 from aerialdojo_gen.errors import AerialDojoError, BudgetSpent, StoreError, UsageError
 from aerialdojo_gen.pipeline.code_digest import stage_code
-from aerialdojo_gen.pipeline.executors import Executor, Folders, make_executor
+from aerialdojo_gen.pipeline.executors import Executor, Folders, make_executor, on_disk
 from aerialdojo_gen.pipeline.freshness import Limits, shards_of
 from aerialdojo_gen.pipeline.interrupt import Interrupts
 from aerialdojo_gen.pipeline.progress import Reporter
@@ -164,7 +164,8 @@ def run(
     for stage in stages:
         # All of it now: who edits a file while this runs has loaded the old one, and gets all made anew next time.
         stage_code(stage.name)
-    folders = Folders((roots.data,), (roots.scene_assets, roots.recipes, roots.annotations), roots.data)
+    carried = (roots.scene_assets, roots.recipes, roots.annotations)
+    folders = Folders(on_disk(roots.data), carried, on_disk(roots.data), reporter.line)
     made = make_executor(executor, workers, address, folders)
     with data_lock(roots.data), Interrupts() as interrupts, made as pool:
         if prepare:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from aerialdojo_gen.config.pipeline import Pipeline
 from aerialdojo_gen.errors import AerialDojoError, UsageError
-from aerialdojo_gen.pipeline.executors import Folders, make_executor
+from aerialdojo_gen.pipeline.executors import Folders, make_executor, on_disk
 from aerialdojo_gen.pipeline.interrupt import Interrupts
 from aerialdojo_gen.pipeline.progress import Reporter
 from aerialdojo_gen.validate import (
@@ -152,9 +152,9 @@ def validate(
     every = scenes_of(asked.release)
     chosen = _chosen(asked.scenes, every)
     by_scene: dict[str, tuple[list[Outcome], Tally]] = {}
-    shared = (asked.release, *([asked.meshes] if asked.meshes else []))
+    shared = on_disk(asked.release, *([asked.meshes] if asked.meshes else []))
     assets = asked.pipeline.scene_assets
-    made = make_executor(executor, workers, address, Folders(shared, (assets,) if assets else ()))
+    made = make_executor(executor, workers, address, Folders(shared, (assets,) if assets else (), (), reporter.line))
     work = [_Work(asked, scene) for scene in _large_first(asked.release, chosen)]
     with Interrupts() as interrupts, made as pool, reporter.bar("validate", len(chosen)) as bar:
         for done in pool.map(_check, work, memory_mb=MEMORY_MB):

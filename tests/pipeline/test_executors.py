@@ -22,7 +22,7 @@ RAY = pytest.param("ray", marks=pytest.mark.ray)
 def ray_pool(tmp_path_factory):
     os.environ["AERIALDOJO_TRIED"] = "forwarded"
     data = tmp_path_factory.mktemp("ray-data")
-    with make_executor("ray", 2, None, Folders((data,), (), data)) as pool:
+    with make_executor("ray", 2, None, Folders((data,), (), (data,))) as pool:
         yield pool
     del os.environ["AERIALDOJO_TRIED"]
     assert not list(data.rglob("*")), "the marker is gone with the executor"

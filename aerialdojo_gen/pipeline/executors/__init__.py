@@ -1,5 +1,5 @@
 """Where tasks are computed: in processes of this machine, or on a Ray cluster."""
 
-from aerialdojo_gen.pipeline.executors.base import EXECUTORS, Executor, Folders, Talk, make_executor
+from aerialdojo_gen.pipeline.executors.base import EXECUTORS, Executor, Folders, Talk, make_executor, on_disk
 
-__all__ = ["EXECUTORS", "Executor", "Folders", "Talk", "make_executor"]
+__all__ = ["EXECUTORS", "Executor", "Folders", "Talk", "make_executor", "on_disk"]

@@ -12,6 +12,7 @@ from typing import Any, Generic, Protocol, TypeVar
 
 from aerialdojo_gen.errors import AerialDojoError, UsageError
 from aerialdojo_gen.pipeline.executors.link import Link
+from aerialdojo_gen.store.root import DataRoot, LocalRoot
 
 EXECUTORS = ("local", "ray")
 
@@ -42,16 +43,22 @@ class Folders:
         Every machine that works has to see these under the same path: the data directory, a release.
     carried : tuple of Path
         They are small, only read, and brought to other machines: recipes, props, annotations.
-    written : Path or None
-        The one of `shared` that is held and written to.
+    written : tuple of Path
+        Those of `shared`, or in them, that are held and written to.
     say : callable
         Told in a line what a run waits for.
     """
 
     shared: tuple[Path, ...] = ()
     carried: tuple[Path, ...] = ()
-    written: Path | None = None
+    written: tuple[Path, ...] = ()
     say: Callable[[str], None] = print
+
+
+def on_disk(*places: Path | DataRoot, below: str = "") -> tuple[Path, ...]:
+    """Return those places, or what is `below` them, that are folders of a file system, not of an object store."""
+    paths = (place.path if isinstance(place, LocalRoot) else place for place in places)
+    return tuple(path / below for path in paths if isinstance(path, Path))
 
 
 @dataclass(frozen=True)
