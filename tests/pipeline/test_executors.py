@@ -175,10 +175,14 @@ def session_members(session):
     return found
 
 
-def test_what_cannot_be_is_said_in_one_line():
+def test_what_cannot_be_is_said_in_one_line(monkeypatch):
     with pytest.raises(UsageError, match="unknown executor 'slurm'; executors: local, ray"):
         make_executor("slurm")
     with pytest.raises(UsageError, match="--address is of --executor ray"):
         make_executor("local", address="127.0.0.1:6379")
+    with monkeypatch.context() as context:
+        context.setitem(sys.modules, "ray", None)
+        with pytest.raises(UsageError, match=r"--executor ray needs Ray: pip install 'aerialdojo-gen\[cluster\]'"):
+            make_executor("ray")
     with pytest.raises(UsageError, match="--address nowhere: write HOST:PORT"):
         make_executor("ray", address="nowhere")

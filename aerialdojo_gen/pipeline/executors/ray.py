@@ -82,7 +82,6 @@ class RayExecutor(Executor):
         self._lanes: list[_Lane] = []
         self._refs: dict[Any, _Lane] = {}
         self._memory_mb = 0
-        self._lanes_made = 0
         self._false_starts = 0
         self._expected: Any = None
         self._board: Any = None
@@ -113,8 +112,9 @@ class RayExecutor(Executor):
         tries: Counter[int] = Counter()
         begun_s = time.monotonic()
         while True:
-            for lane in [lane for lane in self._lanes if lane.ready]:
-                if waiting and all(lane is not other for other, _ in running.values()):
+            busy = {lane.number for lane, _ in running.values()}
+            for lane in self._lanes:
+                if lane.ready and waiting and lane.number not in busy:
                     task = waiting.take(lane.number)
                     tries[id(task)] += 1
                     running[lane.actor.do.remote(work, task, talk is not None)] = (lane, task)
@@ -255,7 +255,6 @@ class RayExecutor(Executor):
         if self._memory_mb:
             options["memory"] = int(self._memory_mb * 1e6)
         lane = _Lane(number, self._ray.remote(Worker).options(**options).remote(self._board))
-        self._lanes_made += 1
         self._lanes.append(lane)
         self._refs[lane.actor.hello.remote(self._expected)] = lane
 
