@@ -23,6 +23,9 @@ from aerialdojo_gen.pipeline.executors.link import Link, at_end
 if TYPE_CHECKING:
     from aerialdojo_gen.benchmark.runner import Evaluation
 
+# What a process takes that draws two large scenes and asks a service; a model of its own comes on top.
+MEMORY_MB = 1000
+
 
 @contextlib.contextmanager
 def worker(data: Path, evaluation: Evaluation, link: Link) -> Iterator[Worker]:
@@ -96,7 +99,7 @@ def fly_units(
     """
     left = Counter(unit.scene for unit in units)
     work = [_Work(data, evaluation, unit) for unit in units]
-    for outcome in executor.map(_fly, work, lambda one: one.scene, talk=Talk(tell, stopped)):
+    for outcome in executor.map(_fly, work, lambda one: one.scene, talk=Talk(tell, stopped), memory_mb=MEMORY_MB):
         if isinstance(outcome, AerialDojoError):
             raise outcome
         left[outcome] -= 1

@@ -95,7 +95,7 @@ STAGES: tuple[Stage, ...] = (
     ),
     Stage(
         "plan", "Plan a collision-free reference trajectory for every candidate.",
-        ("scenes", "objects", "anchors", "pairs"), ("plans",), parts=_plan_parts,
+        ("scenes", "objects", "anchors", "pairs"), ("plans",), parts=_plan_parts, memory_mb=1500,
     ),
     Stage(
         "filter", "Keep the candidates that make tasks, with a reason for every rejection.",

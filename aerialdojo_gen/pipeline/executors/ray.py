@@ -26,7 +26,7 @@ from aerialdojo_gen.pipeline.executors.base import Executor, Folders, R, T, Talk
 from aerialdojo_gen.pipeline.executors.carried import pack
 from aerialdojo_gen.pipeline.executors.local import own_cores
 from aerialdojo_gen.pipeline.executors.ray_worker import Board, Expected, Worker, listing, versions
-from aerialdojo_gen.store.staging import staged
+from aerialdojo_gen.store.staging import scratch_folder, staged
 
 # How often a task is begun before its fault is taken for its own.
 _TRIES = 4
@@ -170,7 +170,9 @@ class RayExecutor(Executor):
         ray, folders = self._ray, self._folders
         if ray.is_initialized():
             raise UsageError("this process has a Ray cluster already: call ray.shutdown() before")
-        scratch = Path(self._stack.enter_context(_scratch()))
+        # What a killed command leaves there is removed by the next one that carries an archive.
+        place = _short_folder() if self._address is None else scratch_folder()
+        scratch = self._stack.enter_context(place)
         common = {"log_to_driver": False, "logging_level": logging.CRITICAL}
         if self._address is None:
             own = {"num_cpus": self._asked or own_cores(), "include_dashboard": False, "_temp_dir": str(scratch)}
@@ -302,9 +304,9 @@ class RayExecutor(Executor):
 
 
 @contextlib.contextmanager
-def _scratch() -> Iterator[str]:
-    # Of its own, and short: Ray's sockets lie in it, and their paths have room for 107 characters.
-    folder = tempfile.mkdtemp(prefix="ad-ray-")
+def _short_folder() -> Iterator[Path]:
+    # Ray's sockets lie in it, and their paths have room for 107 characters.
+    folder = Path(tempfile.mkdtemp(prefix="ad-ray-"))
     try:
         yield folder
     finally:
