@@ -24,6 +24,7 @@ from aerialdojo_gen.store.staging import AREA
 # All of it on the loopback interface, as a cluster that a command starts for itself.
 os.environ["RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER"] = "0"
 os.environ["RAY_USAGE_STATS_ENABLED"] = "0"
+HEAD = {"num_cpus": 1, "include_dashboard": False}
 
 
 class Nodes:
@@ -32,7 +33,11 @@ class Nodes:
     def __init__(self):
         from ray.cluster_utils import Cluster
 
-        self._cluster = Cluster(initialize_head=True, head_node_args={"num_cpus": 1, "include_dashboard": False})
+        # A machine that has much else to do may not start one within Ray's half a minute, but in the next.
+        try:
+            self._cluster = Cluster(initialize_head=True, head_node_args=HEAD)
+        except Exception:
+            self._cluster = Cluster(initialize_head=True, head_node_args=HEAD)
         self.address = self._cluster.address
         self._second = self._cluster.add_node(num_cpus=1)
 
