@@ -184,5 +184,8 @@ def test_what_cannot_be_is_said_in_one_line(monkeypatch):
         context.setitem(sys.modules, "ray", None)
         with pytest.raises(UsageError, match=r"--executor ray needs Ray: pip install 'aerialdojo-gen\[cluster\]'"):
             make_executor("ray")
+    unused = "127.0.0.1:1"
+    with pytest.raises(AerialDojoError, match=rf"^no Ray cluster answers at {unused} \(.*refused\): start one"):
+        list(make_executor("ray", address=unused).map(chores.square, tasks(Path())))
     with pytest.raises(UsageError, match="--address nowhere: write HOST:PORT"):
         make_executor("ray", address="nowhere")

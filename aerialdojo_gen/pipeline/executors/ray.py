@@ -12,6 +12,7 @@ import os
 import re
 import secrets
 import shutil
+import socket
 import tempfile
 import time
 from collections import Counter
@@ -40,6 +41,7 @@ _EXTRA = "--executor ray needs Ray: pip install 'aerialdojo-gen[cluster]'"
 def _import_ray(own: bool) -> Any:
     """Import Ray, quiet; a cluster of our own listens on the loopback interface alone."""
     os.environ["RAY_USAGE_STATS_ENABLED"] = "0"
+    os.environ.setdefault("RAY_BACKEND_LOG_LEVEL", "error")
     os.environ.setdefault("RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO", "0")
     if own:
         # Ray's own switch against firewalls that ask: it takes 127.0.0.1 for the node's address.
@@ -180,6 +182,7 @@ class RayExecutor(Executor):
             python_path = os.pathsep.join(path for path in sys_path() if path)
             options = common | own | {"runtime_env": {"env_vars": {"PYTHONPATH": python_path}}}
         else:
+            _check_answers(self._address)
             archive = scratch / "carried.zip"
             pack(archive, folders.carried)
             options = common | {"address": self._address, "runtime_env": {"working_dir": str(archive)}}
@@ -301,6 +304,17 @@ class RayExecutor(Executor):
     def _hear(self, talk: Talk) -> None:
         for message in self._ray.get(self._board.take.remote(talk.stopped())):
             talk.hear(message)
+
+
+def _check_answers(address: str) -> None:
+    """Find out in five seconds what Ray needs a minute for, and then says in its own words."""
+    host, _, port = address.removeprefix("ray://").rpartition(":")
+    try:
+        socket.create_connection((host, int(port)), timeout=5.0).close()
+    except (OSError, OverflowError) as error:
+        raise AerialDojoError(
+            f"no Ray cluster answers at {address} ({first_line(error)}): start one (docs/scale.md)"
+        ) from None
 
 
 @contextlib.contextmanager
