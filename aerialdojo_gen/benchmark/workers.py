@@ -23,7 +23,7 @@ from aerialdojo_gen.pipeline.executors.link import Link, at_end
 if TYPE_CHECKING:
     from aerialdojo_gen.benchmark.runner import Evaluation
 
-# What a process takes that draws two large scenes and asks a service; a model of its own comes on top.
+# What a process is taken to need, megabytes, not measured; a model of its own comes on top.
 MEMORY_MB = 1000
 
 

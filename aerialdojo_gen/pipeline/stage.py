@@ -193,8 +193,8 @@ class Stage:
     digests : (str, str, str), optional
         A table that the stage writes and its columns with the path of a file (or folder) and the SHA-256 of it.
     memory_mb : int
-        What a process takes at its peak, megabytes, with room for larger scenes than were measured; a cluster starts no
-        more of them on a node than fit.
+        What a process takes at its peak, megabytes, with room for larger scenes than were measured; a cluster starts
+        no more of them on a node than fit.
     """
 
     name: str

@@ -36,7 +36,7 @@ from aerialdojo_gen.validate.registry import CHECKS, Outcome, run_checks
 from aerialdojo_gen.validate.report import Report
 from aerialdojo_gen.validate.rows import SceneData
 
-# What a process takes at its peak, megabytes, with room: `make dataset` was measured at half of it.
+# What a process is taken to need, megabytes; not measured.
 MEMORY_MB = 1500
 # A check looks at what those before it found fault with, so that their order is fixed here.
 _MODULES = (
