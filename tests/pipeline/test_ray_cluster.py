@@ -27,25 +27,29 @@ os.environ["RAY_USAGE_STATS_ENABLED"] = "0"
 HEAD = {"num_cpus": 1, "include_dashboard": False}
 
 
+def twice(start):
+    """A machine that has much else to do may not start a node within Ray's half a minute, but in the next."""
+    try:
+        return start()
+    except Exception:
+        return start()
+
+
 class Nodes:
     """The cluster: a head with a core, and a second node that can be lost."""
 
     def __init__(self):
         from ray.cluster_utils import Cluster
 
-        # A machine that has much else to do may not start one within Ray's half a minute, but in the next.
-        try:
-            self._cluster = Cluster(initialize_head=True, head_node_args=HEAD)
-        except Exception:
-            self._cluster = Cluster(initialize_head=True, head_node_args=HEAD)
+        self._cluster = twice(lambda: Cluster(initialize_head=True, head_node_args=HEAD))
         self.address = self._cluster.address
-        self._second = self._cluster.add_node(num_cpus=1)
+        self.add()
 
     def lose(self):
         self._cluster.remove_node(self._second, allow_graceful=False)
 
     def add(self):
-        self._second = self._cluster.add_node(num_cpus=1)
+        self._second = twice(lambda: self._cluster.add_node(num_cpus=1))
 
     def end(self):
         self._cluster.shutdown()
