@@ -19,14 +19,22 @@ class Journal:
     Parameters
     ----------
     path : Path
-        Made anew, with its folder.
+        Gone on with where it is there: a worker that was lost may have begun it. Its folder is made.
+
+    Attributes
+    ----------
+    done : frozenset of str
+        The ``task_id`` of the records that it had.
     """
 
     def __init__(self, path: Path) -> None:
         self._path = path
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
-            self._file = path.open("w", encoding="utf-8")
+            path.touch()
+            self.done = frozenset(str(record.get("task_id")) for record in read(path))
+            _cut_short_line(path)
+            self._file = path.open("a", encoding="utf-8")
         except OSError as error:
             raise disk_error(error, path) from None
 
@@ -47,6 +55,12 @@ class Journal:
     ) -> None:
         """Close the file."""
         self._file.close()
+
+
+def _cut_short_line(path: Path) -> None:
+    """Take away a last line that a kill cut short."""
+    with path.open("r+b") as file:
+        file.truncate(sum(len(line) for line in file if line.endswith(b"\n")))
 
 
 def read(path: Path) -> Iterator[dict[str, Any]]:

@@ -13,6 +13,7 @@ import time
 from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 import pyarrow as pa
@@ -30,6 +31,7 @@ from aerialdojo_gen.benchmark.worker import Finished, Unit
 from aerialdojo_gen.benchmark.workers import fly_units
 from aerialdojo_gen.common.bounded import read_json
 from aerialdojo_gen.errors import StoreError, UsageError
+from aerialdojo_gen.pipeline.executors import Folders, make_executor, on_disk
 from aerialdojo_gen.pipeline.interrupt import Interrupts
 from aerialdojo_gen.pipeline.progress import Reporter
 from aerialdojo_gen.store import shards as store
@@ -46,7 +48,9 @@ def evaluate(
     evaluation: Evaluation,
     *,
     out: Where | None = None,
-    workers: int = 1,
+    workers: int | None = 1,
+    executor: str = "local",
+    address: str | None = None,
     rerun_failed: bool = False,
     restart: bool = False,
     limits: Limits | None = None,
@@ -61,8 +65,10 @@ def evaluate(
     evaluation : Evaluation
     out : DataRoot, Path or str, optional
         Where the log goes; `data` where absent.
-    workers : int
-        Processes; with 1 everything runs in this one.
+    workers : int, optional
+        Processes; with 1 everything runs in this one, with None on all cores there are.
+    executor, address : str
+        As for `aerialdojo_gen.pipeline.executors.make_executor`.
     rerun_failed : bool
         Fly exactly those again that failed for reasons outside the agent.
     restart : bool
@@ -92,6 +98,9 @@ def evaluate(
     folder = log.below(f"runs/{check_run_name(evaluation.run)}")
     rows = select(root, evaluation.selection)
     run = _Run(root, log, folder, evaluation, rows)
+    made = make_executor(
+        executor, workers, address, Folders(on_disk(root, below="release"), (), (run.journal_folder,), reporter.line)
+    )
     with folder.lock(), Interrupts() as interrupts:
         if restart:
             run.drop()
@@ -105,9 +114,7 @@ def evaluate(
 
             def tell(finished: Finished) -> None:
                 tally.add(finished)
-                # A worker that has nothing to tell says so too, and a rate of nothing is no rate.
-                if finished.episodes:
-                    bar.advance(finished.episodes)
+                bar.advance(finished.episodes)
 
             def stopped() -> bool:
                 interrupts.check()
@@ -115,9 +122,10 @@ def evaluate(
                 return bool(tally.spent or tally.failing)
 
             try:
-                with run.kept():
-                    units = run.units(todo, workers)
-                    for scene in fly_units(root, evaluation, units, workers, tell, stopped):
+                # The processes are gone when their journals are brought in.
+                with run.kept(), made as pool:
+                    units = run.units(todo, pool.workers if todo.num_rows else 1)
+                    for scene in fly_units(root, evaluation, units, pool, tell, stopped):
                         run.bring_in(scene)
             except ServiceDown as error:
                 raise ServiceDown(f"{error} Finished episodes are kept: the same command goes on from here") from None
@@ -175,6 +183,11 @@ class _Run:
                 raise UsageError(f"there are episodes of another run {self._name!r} in {self._out}: {mend}")
         with self._folder.commit(_SETTINGS) as temporary:
             temporary.write_text(json.dumps(self._settings, indent=2, sort_keys=True) + "\n", encoding="utf-8")
+
+    @property
+    def journal_folder(self) -> Path:
+        """Where workers write what they have finished."""
+        return self._journals.folder
 
     def _begun(self) -> bool:
         return bool(episodes.run_scenes(self._out, self._name) or self._journals)

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pyarrow as pa
+import pyarrow.compute as pc
 
 from aerialdojo_gen.agents import Agent, AgentUnavailable, Usage
 from aerialdojo_gen.agents.goal import Observation
@@ -158,7 +159,8 @@ class Worker:
         if type(self._agent) is OracleAgent:
             actions = reference_actions(self._data, unit.scene, unit.rows["subset"].unique().to_pylist())
         with Journal(unit.journal) as journal:
-            for task in read_tasks(self._data, unit.rows):
+            left = unit.rows.filter(pc.invert(pc.is_in(unit.rows["task_id"], pa.array(journal.done, pa.string()))))
+            for task in read_tasks(self._data, left):
                 if stopped():
                     return
                 if isinstance(self._agent, OracleAgent):

@@ -35,6 +35,13 @@ PipelineFile = Annotated[
     Path | None, typer.Option("--pipeline", help=f"Pipeline file.  (default: pipelines/{DEFAULT_PIPELINE})")
 ]
 Workers = Annotated[int | None, typer.Option("--workers", min=1, max=1024, help="Processes.  (default: all cores)")]
+ExecutorName = Annotated[
+    str, typer.Option("--executor", metavar="local|ray", help="Processes of this machine, or of a Ray cluster.")
+]
+Address = Annotated[
+    str | None,
+    typer.Option("--address", metavar="HOST:PORT", help="Of a running Ray cluster.  (default: one on this machine)"),
+]
 Force = Annotated[bool, typer.Option("--force", help="Compute this stage's shards even where they are fresh.")]
 Replace = Annotated[
     bool, typer.Option("--replace", help="Put this release in the place of another pipeline's, which is lost.")
@@ -53,6 +60,8 @@ def run_until(
     quiet: bool = False,
     limits: Limits | None = None,
     replace: bool = False,
+    executor: str = "local",
+    address: str | None = None,
     **overrides: object,
 ) -> None:
     """Bring a stage's tables up to date, running what it needs upstream; the twin of a stage's command.
@@ -77,6 +86,8 @@ def run_until(
         How much of the stage is computed now; all of it where absent.
     replace : bool
         Whether scenes of the release that another pipeline made may be lost.
+    executor, address : str
+        As for `aerialdojo_gen.pipeline.executors.make_executor`.
     **overrides
         Values of the stage's section that replace the file's; None leaves one as it is.
 
@@ -90,7 +101,10 @@ def run_until(
 
     config, roots = open_pipeline(pipeline, data)
     config = with_overrides(config, stage, **overrides)
-    run_chosen(list(upstream(stage)), config, roots, scene, workers, [stage] if force else [], quiet, limits, replace)
+    run_chosen(
+        list(upstream(stage)), config, roots, scene, workers, [stage] if force else [], quiet, limits, replace,
+        executor, address,
+    )  # fmt: skip
 
 
 def run_chosen(
@@ -103,14 +117,16 @@ def run_chosen(
     quiet: bool,
     limits: Limits | None = None,
     replace: bool = False,
+    executor: str = "local",
+    address: str | None = None,
 ) -> None:
     """Run stages as `aerialdojo_gen.pipeline.run.run_stages` does, with progress, and say what Ctrl-C leaves."""
     from aerialdojo_gen.pipeline.progress import Reporter
 
     try:
         run_stages(
-            stages, config, roots, scene, workers=workers, force=force, reporter=Reporter(quiet=quiet), limits=limits,
-            replace=replace,
+            stages, config, roots, scene, workers=workers, executor=executor, address=address, force=force,
+            reporter=Reporter(quiet=quiet), limits=limits, replace=replace,
         )  # fmt: skip
     except KeyboardInterrupt:
         # Said here because Typer turns Ctrl-C into a silent exit.

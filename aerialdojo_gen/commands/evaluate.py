@@ -7,7 +7,17 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from aerialdojo_gen.commands.common import Data, PipelineFile, Quiet, Scene, Workers, default_workers, open_pipeline
+from aerialdojo_gen.commands.common import (
+    Address,
+    Data,
+    ExecutorName,
+    PipelineFile,
+    Quiet,
+    Scene,
+    Workers,
+    default_workers,
+    open_pipeline,
+)
 from aerialdojo_gen.errors import AerialDojoError, BeyondBounds, Malformed, UsageError
 
 if TYPE_CHECKING:
@@ -95,6 +105,8 @@ def evaluate(
         typer.Option("--failures-in-row", min=1, help="End after so many failed episodes of one kind in a row."),
     ] = 5,
     workers: Workers = None,
+    executor: ExecutorName = "local",
+    address: Address = None,
     pipeline: PipelineFile = None,
     quiet: Quiet = False,
 ) -> None:
@@ -130,7 +142,7 @@ def evaluate(
     reporter = Reporter(quiet=quiet)
     try:
         outcome = fly(
-            data, evaluation, out=out, workers=workers or default_workers(), rerun_failed=rerun_failed,
+            data, evaluation, out=out, workers=workers, executor=executor, address=address, rerun_failed=rerun_failed,
             restart=restart, limits=Limits(max_cost, max_tokens, failures_in_row), reporter=reporter,
         )  # fmt: skip
     except KeyboardInterrupt:

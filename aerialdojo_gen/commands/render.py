@@ -10,7 +10,9 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from aerialdojo_gen.commands.common import (
+    Address,
     Data,
+    ExecutorName,
     Force,
     PipelineFile,
     Quiet,
@@ -55,6 +57,7 @@ def render(
         "--verify", help="Read every recording and record again those whose content has changed.")] = False,
     estimate: Annotated[bool, typer.Option(
         "--estimate", help="Measure a few trajectories, say what all will take, and record nothing.")] = False,
+    executor: ExecutorName = "local", address: Address = None,
 ) -> None:  # fmt: skip
     """Record four RGB-D views along trajectories of the release."""
     from aerialdojo_gen.pipeline.freshness import Limits
@@ -72,7 +75,7 @@ def render(
     chosen = _scenes_of(split, scene, pipeline, data)
     run_until(
         "render", data=data, scene=chosen, pipeline=pipeline, workers=workers, force=force, quiet=quiet,
-        limits=limits, replace=replace, **overrides,
+        limits=limits, replace=replace, executor=executor, address=address, **overrides,
     )  # fmt: skip
 
 

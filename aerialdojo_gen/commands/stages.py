@@ -9,7 +9,9 @@ from typing import Annotated
 import typer
 
 from aerialdojo_gen.commands.common import (
+    Address,
     Data,
+    ExecutorName,
     Force,
     PipelineFile,
     Quiet,
@@ -31,9 +33,13 @@ _WITH_OPTIONS = ("split", "render")
 def _stage_command(name: str) -> Callable[..., None]:
     def command(
         data: Data = "data", scene: Scene = None, pipeline: PipelineFile = None,
-        workers: Workers = None, force: Force = False, quiet: Quiet = False,
+        workers: Workers = None, force: Force = False, quiet: Quiet = False, executor: ExecutorName = "local",
+        address: Address = None,
     ) -> None:  # fmt: skip
-        run_until(name, data=data, scene=scene, pipeline=pipeline, workers=workers, force=force, quiet=quiet)
+        run_until(
+            name, data=data, scene=scene, pipeline=pipeline, workers=workers, force=force, quiet=quiet,
+            executor=executor, address=address,
+        )  # fmt: skip
 
     return command
 
@@ -47,11 +53,13 @@ for _stage in STAGES:
 def split(
     data: Data = "data", scene: Scene = None, pipeline: PipelineFile = None,
     workers: Workers = None, force: Force = False, quiet: Quiet = False, replace: Replace = False,
+    executor: ExecutorName = "local", address: Address = None,
 ) -> None:  # fmt: skip
     """Write the release, with what it needs upstream."""
     run_until(
-        "split", data=data, scene=scene, pipeline=pipeline, workers=workers, force=force, quiet=quiet, replace=replace
-    )
+        "split", data=data, scene=scene, pipeline=pipeline, workers=workers, force=force, quiet=quiet,
+        replace=replace, executor=executor, address=address,
+    )  # fmt: skip
 
 
 @app.command("run")
@@ -59,6 +67,7 @@ def run(
     pipeline: Annotated[Path, typer.Argument(help="Pipeline file, e.g. pipelines/smoke.toml.")],
     data: Data = "data", scene: Scene = None,
     workers: Workers = None, force: Force = False, quiet: Quiet = False, replace: Replace = False,
+    executor: ExecutorName = "local", address: Address = None,
 ) -> None:  # fmt: skip
     """Run a pipeline's stages, from recipes and annotations to the release."""
     from aerialdojo_gen.pipeline.runner import stages_named
@@ -66,4 +75,6 @@ def run(
     config, roots = open_pipeline(pipeline, data)
     stages = stages_named(config.stages)
     forced = [stage.name for stage in stages] if force else []
-    run_chosen(stages, config, roots, scene, workers, forced, quiet, replace=replace)
+    run_chosen(
+        stages, config, roots, scene, workers, forced, quiet, replace=replace, executor=executor, address=address
+    )

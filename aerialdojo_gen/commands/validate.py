@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from aerialdojo_gen.commands.common import PipelineFile, Quiet, Scene, Workers, default_workers, home
+from aerialdojo_gen.commands.common import Address, ExecutorName, PipelineFile, Quiet, Scene, Workers, home
 
 app = typer.Typer()
 _MANY_DIGITS = 10
@@ -44,6 +44,8 @@ def validate(
     lines: Annotated[int, typer.Option("--lines", min=0, help="Faults of a check that are printed.")] = 10,
     pipeline: PipelineFile = None,
     workers: Workers = None,
+    executor: ExecutorName = "local",
+    address: Address = None,
     quiet: Quiet = False,
 ) -> None:  # fmt: skip
     """Check a release again from its Parquet files and meshes alone, and name every row at fault."""
@@ -72,7 +74,8 @@ def validate(
         pictures=None if pictures == "all" else int(pictures),
         pipeline=definitions,
     )
-    found = validation.validate(asked, workers=workers or default_workers(), reporter=Reporter(quiet=quiet))
+    reporter = Reporter(quiet=quiet)
+    found = validation.validate(asked, workers=workers, executor=executor, address=address, reporter=reporter)
     if report is not None:
         validation.write_report(found.faults, report)
     if not quiet:

@@ -13,10 +13,10 @@ from typing import Any
 from aerialdojo_gen.config.pipeline import Pipeline
 from aerialdojo_gen.config.sections import Section
 from aerialdojo_gen.errors import AerialDojoError, StoreError
-from aerialdojo_gen.pipeline.executors.local import Task
 from aerialdojo_gen.pipeline.fingerprint import scene_code, scene_fingerprint
 from aerialdojo_gen.pipeline.progress import Reporter
 from aerialdojo_gen.pipeline.stage import Job, Roots, Stage
+from aerialdojo_gen.pipeline.task import Task
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.parquet_files import read_file
 from aerialdojo_gen.store.root import DataRoot

@@ -5,7 +5,6 @@ Nothing heavy is imported before something runs: the command line imports this f
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -30,6 +29,8 @@ def run_pipeline(
     stages: Sequence[str] | None = None,
     scenes: Sequence[str] | None = None,
     workers: int | None = None,
+    executor: str = "local",
+    address: str | None = None,
     force: Iterable[str] = (),
     replace: bool = False,
     limits: Limits | None = None,
@@ -49,6 +50,10 @@ def run_pipeline(
         Names or globs; the pipeline's own where absent.
     workers : int, optional
         Processes; all cores where absent. With 1 everything runs in this one.
+    executor : str
+        ``"local"`` or ``"ray"``.
+    address : str, optional
+        ``HOST:PORT`` of a Ray cluster; one on this machine where absent.
     force : iterable of str
         Stages whose shards are computed even where they are fresh.
     replace : bool
@@ -78,8 +83,9 @@ def run_pipeline(
         needed = {stage.name for asked in stages_named(stages) for stage in upstream(asked.name)}
         chosen = stages_named([*needed])
     return run_stages(
-        chosen, config, roots, scenes, workers=workers, force=force, reporter=reporter, limits=limits, replace=replace
-    )
+        chosen, config, roots, scenes, workers=workers, executor=executor, address=address, force=force,
+        reporter=reporter, limits=limits, replace=replace,
+    )  # fmt: skip
 
 
 def home() -> Path:
@@ -135,6 +141,8 @@ def run_stages(
     scenes: Sequence[str] | None = None,
     *,
     workers: int | None = None,
+    executor: str = "local",
+    address: str | None = None,
     force: Iterable[str] = (),
     reporter: Reporter | None = None,
     limits: Limits | None = None,
@@ -166,8 +174,8 @@ def run_stages(
             _finish_release(config, roots.data, names, not scenes, reporter)
 
     return runner.run(
-        stages, names, config, roots, workers=workers or default_workers(), force=force, reporter=reporter,
-        limits=limits, prepare=prepare, finish=finish,
+        stages, names, config, roots, workers=workers, executor=executor, address=address, force=force,
+        reporter=reporter, limits=limits, prepare=prepare, finish=finish,
     )  # fmt: skip
 
 
@@ -190,4 +198,6 @@ def _finish_release(config: Pipeline, data: DataRoot, scenes: list[str], whole: 
 
 def default_workers() -> int:
     """Count the cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    from aerialdojo_gen.pipeline.executors.local import own_cores
+
+    return own_cores()

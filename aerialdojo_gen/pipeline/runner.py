@@ -17,12 +17,13 @@ from aerialdojo_gen.common.names import choose_scenes, unknown
 from aerialdojo_gen.config.pipeline import Pipeline
 from aerialdojo_gen.errors import AerialDojoError, BudgetSpent, UsageError
 from aerialdojo_gen.pipeline.code_digest import stage_code
-from aerialdojo_gen.pipeline.executors.local import Pool
+from aerialdojo_gen.pipeline.executors import Executor, Folders, make_executor, on_disk
 from aerialdojo_gen.pipeline.freshness import Limits, shards_of
 from aerialdojo_gen.pipeline.interrupt import Interrupts
 from aerialdojo_gen.pipeline.progress import Reporter
 from aerialdojo_gen.pipeline.registry import STAGES
 from aerialdojo_gen.pipeline.stage import Roots, Stage
+from aerialdojo_gen.pipeline.task import compute
 from aerialdojo_gen.store.root import Where, open_root
 
 
@@ -75,7 +76,9 @@ def run(
     pipeline: Pipeline,
     roots: Roots,
     *,
-    workers: int = 1,
+    workers: int | None = 1,
+    executor: str = "local",
+    address: str | None = None,
     force: Iterable[str] = (),
     reporter: Reporter | None = None,
     limits: Limits | None = None,
@@ -94,8 +97,10 @@ def run(
         Configuration and seed.
     roots : Roots
         The folders.
-    workers : int
-        Processes; with 1 everything runs in this one.
+    workers : int, optional
+        Processes; with 1 everything runs in this one, with None on all cores there are.
+    executor, address : str
+        As for `aerialdojo_gen.pipeline.executors.make_executor`.
     force : iterable of str
         Names of stages whose shards are computed even where they are fresh.
     reporter : Reporter, optional
@@ -124,7 +129,10 @@ def run(
     for stage in stages:
         # All of it now: who edits a file while this runs has loaded the old one, and gets all made anew next time.
         stage_code(stage.name)
-    with data_lock(roots.data), Interrupts() as interrupts, Pool(workers) as pool:
+    carried = (roots.scene_assets, roots.recipes, roots.annotations)
+    folders = Folders(on_disk(roots.data), carried, on_disk(roots.data), reporter.line)
+    made = make_executor(executor, workers, address, folders)
+    with data_lock(roots.data), Interrupts() as interrupts, made as pool:
         if prepare:
             prepare()
         for stage in stages:
@@ -148,7 +156,7 @@ def _run_stage(
     scenes: Sequence[str],
     pipeline: Pipeline,
     roots: Roots,
-    pool: Pool,
+    pool: Executor,
     force: bool,
     reporter: Reporter,
     interrupts: Interrupts,
@@ -168,7 +176,7 @@ def _run_stage(
     tasks, fresh, errors = lot.tasks, lot.fresh, lot.errors
     done = []
     with reporter.bar(stage.name, len(tasks)) as bar:
-        for outcome in pool.imap(tasks):
+        for outcome in pool.map(compute, tasks, lambda task: task.scene, memory_mb=stage.memory_mb):
             interrupts.check()
             if isinstance(outcome, BudgetSpent):
                 continue

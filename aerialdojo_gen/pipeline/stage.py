@@ -199,6 +199,9 @@ class Stage:
         fresh by one of them nothing is decided anew.
     digests : (str, str, str), optional
         A table that the stage writes and its columns with the path of a file (or folder) and the SHA-256 of it.
+    memory_mb : int
+        What a process takes at its peak, megabytes, with room for larger scenes than were measured; a cluster starts
+        no more of them on a node than fit.
     """
 
     name: str
@@ -213,3 +216,4 @@ class Stage:
     settle: Callable[[Any, Callable[[str], None]], Any] = _as_it_is
     choices: Callable[[Any], list[Any]] = _no_choice
     digests: tuple[str, str, str] | None = None
+    memory_mb: int = 1000

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from aerialdojo_gen.pipeline.stage import Job, Output, Stage
@@ -33,4 +32,5 @@ STAGE = Stage(
     writes=("plans",),
     run=run,
     parts=parts,
+    memory_mb=1500,
 )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from aerialdojo_gen.pipeline.stage import Job, Output, Stage

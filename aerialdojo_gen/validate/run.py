@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from aerialdojo_gen.common.names import choose_scenes
 from aerialdojo_gen.config.pipeline import Pipeline
 from aerialdojo_gen.errors import AerialDojoError
-from aerialdojo_gen.pipeline.executors.local import Pool
+from aerialdojo_gen.pipeline.executors import Folders, make_executor, on_disk
 from aerialdojo_gen.pipeline.interrupt import Interrupts
 from aerialdojo_gen.pipeline.progress import Reporter
 from aerialdojo_gen.release.contents import release_scenes
@@ -38,6 +38,8 @@ from aerialdojo_gen.validate.registry import CHECKS, Outcome, run_checks
 from aerialdojo_gen.validate.report import Report
 from aerialdojo_gen.validate.rows import SceneData
 
+# What a process is taken to need, megabytes; not measured.
+MEMORY_MB = 1500
 # A check looks at what those before it found fault with, so that their order is fixed here.
 _MODULES = (
     tables,
@@ -100,16 +102,34 @@ class _Work:
     def label(self) -> str:
         return f"validate {self.scene}"
 
+    def moved(self, place: Callable[[Path], Path]) -> _Work:
+        """Return the same work for a machine where the props lie elsewhere."""
+        pipeline = self.asked.pipeline
+        if pipeline.scene_assets is None:
+            return self
+        pipeline = pipeline.model_copy(update={"scene_assets": place(pipeline.scene_assets)})
+        return replace(self, asked=replace(self.asked, pipeline=pipeline))
 
-def validate(asked: Asked, *, workers: int = 1, reporter: Reporter | None = None) -> Report:
+
+def validate(
+    asked: Asked,
+    *,
+    workers: int | None = 1,
+    executor: str = "local",
+    address: str | None = None,
+    reporter: Reporter | None = None,
+) -> Report:
     """Check a release.
 
     Parameters
     ----------
     asked : Asked
         What to check.
-    workers : int
-        Processes; with 1 everything runs in this one. A process holds one scene at a time.
+    workers : int, optional
+        Processes; with 1 everything runs in this one, with None on all cores there are. A process holds one scene at
+        a time.
+    executor, address : str
+        As for `aerialdojo_gen.pipeline.executors.make_executor`.
     reporter : Reporter, optional
         Shows progress.
 
@@ -131,8 +151,12 @@ def validate(asked: Asked, *, workers: int = 1, reporter: Reporter | None = None
     every = release_scenes(release.root, release.folder)
     chosen = choose_scenes(asked.scenes, every)
     by_scene: dict[str, tuple[list[Outcome], Tally]] = {}
-    with Interrupts() as interrupts, Pool(workers) as pool, reporter.bar("validate", len(chosen)) as bar:
-        for done in pool.map(_guarded, [_Work(asked, scene) for scene in _large_first(release, chosen)]):
+    shared = on_disk(release.root, *([asked.meshes] if asked.meshes else []))
+    assets = asked.pipeline.scene_assets
+    made = make_executor(executor, workers, address, Folders(shared, (assets,) if assets else (), (), reporter.line))
+    work = [_Work(asked, scene) for scene in _large_first(release, chosen)]
+    with Interrupts() as interrupts, made as pool, reporter.bar("validate", len(chosen)) as bar:
+        for done in pool.map(_check, work, memory_mb=MEMORY_MB):
             interrupts.check()
             if isinstance(done, AerialDojoError):
                 raise done
@@ -157,11 +181,8 @@ def check_scene(asked: Asked, scene: str) -> tuple[list[Outcome], Tally]:
     return outcomes, tally
 
 
-def _guarded(work: _Work) -> tuple[list[Outcome], Tally] | AerialDojoError:
-    try:
-        return check_scene(work.asked, work.scene)
-    except AerialDojoError as error:
-        return error
+def _check(work: _Work) -> tuple[list[Outcome], Tally]:
+    return check_scene(work.asked, work.scene)
 
 
 def _large_first(release: Release, scenes: Sequence[str]) -> list[str]:

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from s3_server import CREDENTIALS, Proxy, s3_server
+from support.s3_server import CREDENTIALS, Proxy, s3_server
 
 from aerialdojo_gen.store import bucket, object_state
 from aerialdojo_gen.store.root import DataRoot, open_root

@@ -8,7 +8,7 @@ import sys
 
 import pytest
 from conftest import forget_clients
-from s3_server import Proxy
+from support.s3_server import Proxy
 from test_roots import fill, read_folder, write
 
 from aerialdojo_gen.errors import StoreError

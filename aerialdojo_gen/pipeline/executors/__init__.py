@@ -1,1 +1,5 @@
-"""Where shards are computed."""
+"""Where tasks are computed: in processes of this machine, or on a Ray cluster."""
+
+from aerialdojo_gen.pipeline.executors.base import EXECUTORS, Executor, Folders, Talk, make_executor, on_disk
+
+__all__ = ["EXECUTORS", "Executor", "Folders", "Talk", "make_executor", "on_disk"]

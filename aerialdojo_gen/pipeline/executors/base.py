@@ -1,0 +1,224 @@
+"""The executor's interface: tasks go in, results come back in the order of finishing, wherever they are computed."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Generic, Protocol, TypeVar
+
+from aerialdojo_gen.errors import AerialDojoError, UsageError
+from aerialdojo_gen.pipeline.executors.link import Link
+from aerialdojo_gen.store.root import DataRoot, LocalRoot
+
+EXECUTORS = ("local", "ray")
+
+
+class Labelled(Protocol):
+    """A task: a picklable thing with a name for messages.
+
+    Where it holds paths of folders that are carried to other machines (`Folders.carried`), it has besides a method
+    ``moved(place)`` that returns it with ``place(path)`` in their stead.
+    """
+
+    @property
+    def label(self) -> str:
+        """The task in words."""
+
+
+T = TypeVar("T", bound=Labelled)
+R = TypeVar("R")
+
+
+@dataclass(frozen=True)
+class Folders:
+    """The folders that tasks name.
+
+    Attributes
+    ----------
+    shared : tuple of Path
+        Every machine that works has to see these under the same path: the data directory, a release.
+    carried : tuple of Path
+        They are small, only read, and brought to other machines: recipes, props, annotations.
+    written : tuple of Path
+        Those of `shared`, or in them, that are held and written to.
+    say : callable
+        Told in a line what a run waits for.
+    """
+
+    shared: tuple[Path, ...] = ()
+    carried: tuple[Path, ...] = ()
+    written: tuple[Path, ...] = ()
+    say: Callable[[str], None] = print
+
+
+def on_disk(*places: Path | DataRoot, below: str = "") -> tuple[Path, ...]:
+    """Return those places, or what is `below` them, that are folders of a file system, not of an object store."""
+    paths = (place.path if isinstance(place, LocalRoot) else place for place in places)
+    return tuple(path / below for path in paths if isinstance(path, Path))
+
+
+@dataclass(frozen=True)
+class Talk:
+    """The parent's side of the links that its workers have.
+
+    Attributes
+    ----------
+    hear : callable
+        Called in this process with what a worker tells.
+    stopped : callable
+        Asked now and then in this process; once it is True workers begin nothing more. It may raise, to end all.
+    """
+
+    hear: Callable[[Any], None]
+    stopped: Callable[[], bool]
+
+
+class Executor(ABC):
+    """Does work on tasks in several processes; a context manager.
+
+    Nothing is started before the first tasks need it. The processes are kept until the block ends; where it ends by
+    an error or Ctrl-C they are ended at once (`cancel`) and are gone when the block has been left.
+    """
+
+    def __enter__(self) -> Executor:
+        """Return self."""
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """End the processes; at once where an error is under way."""
+        if kind is None:
+            self.close()
+        else:
+            self.cancel()
+
+    @property
+    @abstractmethod
+    def workers(self) -> int:
+        """Processes that work at a time, as far as that is known before."""
+
+    @abstractmethod
+    def map(
+        self,
+        work: Callable[..., R],
+        tasks: Sequence[T],
+        scene_of: Callable[[T], str] | None = None,
+        *,
+        talk: Talk | None = None,
+        memory_mb: int = 0,
+    ) -> Iterator[R | AerialDojoError]:
+        """Do work on tasks and yield what it returns, or the expected error, in the order of finishing.
+
+        Parameters
+        ----------
+        work : callable
+            A function of a module, called with a task: other processes import it.
+        tasks : sequence
+            What it is called with.
+        scene_of : callable, optional
+            A task's scene. A process stays with a scene while there is work, for it keeps what it has read and
+            built of it; tasks of no scene are done in their order.
+        talk : Talk, optional
+            Given, `work` is called with a task and a `aerialdojo_gen.pipeline.executors.link.Link`.
+        memory_mb : int
+            What a process needs, in megabytes, where that decides how many there are on a machine.
+
+        Raises
+        ------
+        AerialDojoError
+            A worker was killed, or as often as is borne.
+        Exception
+            What `work` raises beside AerialDojoError: a defect.
+        """
+
+    @abstractmethod
+    def close(self) -> None:
+        """End the processes when they have done what they are at."""
+
+    @abstractmethod
+    def cancel(self) -> None:
+        """End the processes now, and wait until they are gone."""
+
+
+def guarded(work: Callable[..., R], task: Any, link: Link | None) -> R | AerialDojoError:
+    """Do work on a task; an expected error is returned."""
+    try:
+        return work(task) if link is None else work(task, link)
+    except AerialDojoError as error:
+        return error
+
+
+def make_executor(
+    name: str, workers: int | None = None, address: str | None = None, folders: Folders | None = None
+) -> Executor:
+    """Make an executor; nothing is started yet.
+
+    Parameters
+    ----------
+    name : str
+        One of `EXECUTORS`.
+    workers : int, optional
+        Processes; where absent all cores, of this machine or of the cluster.
+    address : str, optional
+        Of a running Ray cluster, ``HOST:PORT``; one of this machine's own is started where absent.
+    folders : Folders, optional
+        What the tasks read and write.
+
+    Raises
+    ------
+    UsageError
+        There is none of that name, or it has no address.
+    AerialDojoError
+        The package that it needs is not installed.
+    """
+    if name not in EXECUTORS:
+        raise UsageError(f"unknown executor {name!r}; executors: {', '.join(EXECUTORS)}")
+    if name == "ray":
+        from aerialdojo_gen.pipeline.executors.ray import RayExecutor
+
+        return RayExecutor(workers, address, folders or Folders())
+    if address is not None:
+        raise UsageError("--address is of --executor ray: leave it out, or give both")
+    from aerialdojo_gen.pipeline.executors.local import LocalExecutor
+
+    return LocalExecutor(workers)
+
+
+class Waiting(Generic[T]):
+    """Tasks that nobody has begun, by scene; `Executor.map` of several processes takes them from here."""
+
+    def __init__(self, tasks: Sequence[T], scene_of: Callable[[T], str] | None) -> None:
+        self._scene_of = scene_of or (lambda _: "")
+        self._scenes: dict[str, deque[T]] = {}
+        for task in tasks:
+            self._scenes.setdefault(self._scene_of(task), deque()).append(task)
+        self._at: dict[int, str] = {}
+
+    def __bool__(self) -> bool:
+        return bool(self._scenes)
+
+    def take(self, lane: int) -> T:
+        """Give a process its next task: of its scene, else of one that no other works at, else of the fullest."""
+        scene = self._at.get(lane)
+        if scene not in self._scenes:
+            others = {at for other, at in self._at.items() if other != lane}
+            free = [name for name in self._scenes if name not in others]
+            scene = max(free or self._scenes, key=lambda name: len(self._scenes[name]))
+        self._at[lane] = scene
+        task = self._scenes[scene].popleft()
+        if not self._scenes[scene]:
+            del self._scenes[scene]
+        return task
+
+    def put_back(self, task: T) -> None:
+        """Take back a task whose process is gone; it is the next of its scene."""
+        self._scenes.setdefault(self._scene_of(task), deque()).appendleft(task)
+
+    def leave(self, lane: int) -> None:
+        """Forget where a process that is gone was."""
+        self._at.pop(lane, None)

@@ -1,0 +1,100 @@
+"""A shard to compute: what that takes, and how its tables are committed; executors call `compute`."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from aerialdojo_gen.common.trouble import explained
+from aerialdojo_gen.config.sections import Section
+from aerialdojo_gen.errors import AerialDojoError, BudgetSpent
+from aerialdojo_gen.pipeline.registry import BY_NAME
+from aerialdojo_gen.pipeline.stage import Job
+from aerialdojo_gen.store import shards as store
+from aerialdojo_gen.store.footers import ShardFile
+
+
+@dataclass(frozen=True)
+class Task:
+    """A shard to compute: its job, its stage's config, and the fingerprint to store with it."""
+
+    job: Job
+    config: Section
+    fingerprint: str
+
+    @property
+    def label(self) -> str:
+        """The shard in words, for messages."""
+        part = f" part {self.job.part} of {self.job.parts}" if self.job.parts > 1 else ""
+        return f"{self.job.stage} {self.job.scene}{part}"
+
+    @property
+    def scene(self) -> str:
+        """The shard's scene, which a process keeps to."""
+        return self.job.scene
+
+    def moved(self, place: Callable[[Path], Path]) -> Task:
+        """Return the same task for a machine where the folders of the sources lie elsewhere."""
+        roots = self.job.roots
+        here = replace(
+            roots,
+            scene_assets=place(roots.scene_assets),
+            recipes=place(roots.recipes),
+            annotations=place(roots.annotations),
+        )
+        return replace(self, job=replace(self.job, roots=here))
+
+
+def compute(task: Task) -> dict[str, Any]:
+    """Compute one shard and commit its tables.
+
+    Returns
+    -------
+    dict
+        The shard's summary: ``rows_in``, ``rows_out``, ``counts``.
+
+    Raises
+    ------
+    AerialDojoError
+        An expected failure.
+    RuntimeError
+        Anything else, with the shard in its message and the cause chained.
+    """
+    job = task.job
+    if job.deadline is not None and time.time() >= job.deadline:
+        raise BudgetSpent(f"the budget was spent before {task.label}")
+    stage = BY_NAME[job.stage]
+    try:
+        output = stage.run(job, task.config)
+    except AerialDojoError:
+        raise
+    except Exception as error:
+        if why := explained(error):
+            # Without the shard: it is no fault of its own, and all of them say the same.
+            raise AerialDojoError(why) from error
+        raise RuntimeError(f"{task.label} failed: {type(error).__name__}: {error}") from error
+    if set(output.tables) != set(stage.writes):
+        raise RuntimeError(f"{task.label} returned tables {sorted(output.tables)}, not {sorted(stage.writes)}")
+    summary = {"rows_in": output.rows_in, "rows_out": output.rows_out, "counts": dict(sorted(output.counts.items()))}
+    files = {name: _described(job, name) for name in sorted(job.files)}
+    for name, table in output.tables.items():
+        store.write_shard(
+            job.roots.data,
+            name,
+            job.scene,
+            job.part,
+            table,
+            fingerprint=task.fingerprint,
+            parts=job.parts,
+            summary=summary,
+            files=files,
+        )
+    return summary
+
+
+def _described(job: Job, name: str) -> ShardFile:
+    data = job.roots.data
+    return ShardFile(data.size(name), data.digest(name) if name in job.digested else "")

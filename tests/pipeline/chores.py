@@ -1,0 +1,106 @@
+"""Work for executors to do, which their processes import: small, and with every way to end."""
+
+from __future__ import annotations
+
+import os
+import signal
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+from aerialdojo_gen.errors import AssetError, StoreError
+from aerialdojo_gen.pipeline.executors.link import at_end
+
+
+@dataclass(frozen=True)
+class Chore:
+    """A task: its number, its scene, and a folder where traces are left."""
+
+    number: int
+    scene: str = ""
+    folder: Path = Path()
+    kind: str = ""
+
+    @property
+    def label(self) -> str:
+        return f"chore {self.number}"
+
+
+def square(chore):
+    return chore.number, chore.number**2
+
+
+def wait_for_the_others(chore):
+    """Number 0 ends when all others have: the order of finishing is not that of giving."""
+    done = chore.folder / str(chore.number)
+    if chore.number == 0:
+        until(lambda: len(list(chore.folder.iterdir())) >= 2)
+    done.touch()
+    return chore.number
+
+
+def where(chore):
+    # Long enough that no process does all before another one has started.
+    time.sleep(0.05)
+    return chore.scene, os.getpid(), os.environ.get("AERIALDOJO_TRIED")
+
+
+def fail(chore):
+    if chore.kind == "expected":
+        raise AssetError(f"{chore.label} has no mesh")
+    if chore.kind == "defect":
+        raise ZeroDivisionError(f"{chore.label} has a defect")
+    return chore.number
+
+
+def die_once(chore):
+    """Number 1 kills its process the first time, and every time if it is of the kind "always"."""
+    trace = chore.folder / f"died-{chore.number}"
+    if chore.number == 1 and (chore.kind == "always" or not trace.exists()):
+        trace.touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return chore.number
+
+
+def sleep(chore):
+    (chore.folder / f"{os.getpid()}").touch()
+    time.sleep(600)
+
+
+def talk(chore, link):
+    """Tell of three things, or stop before."""
+    told = 0
+    for k in range(3):
+        if link.stopped():
+            break
+        link.tell((chore.number, k))
+        told += 1
+    return told
+
+
+def go_on_until_stopped(chore, link):
+    link.tell(chore.number)
+    until(link.stopped)
+    return chore.number
+
+
+def take_turns(_chore, link):
+    return [link.turn(1000.0) for _ in range(2)]
+
+
+def keep_until_the_end(chore):
+    at_end(lambda: (chore.folder / f"closed-{os.getpid()}").touch())
+    (chore.folder / f"open-{os.getpid()}").touch()
+    return chore.number
+
+
+def refuse(chore):
+    raise StoreError(f"{chore.label} is refused")
+
+
+def until(true, seconds=60.0):
+    end = time.monotonic() + seconds
+    while not true():
+        if time.monotonic() > end:
+            raise TimeoutError("it did not come to it")
+        time.sleep(0.02)

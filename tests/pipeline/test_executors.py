@@ -1,0 +1,191 @@
+"""What every executor keeps: order of finishing, affinity, errors, kills, messages, Ctrl-C."""
+
+import itertools
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import chores
+import pytest
+from chores import Chore
+
+from aerialdojo_gen.errors import AerialDojoError, UsageError
+from aerialdojo_gen.pipeline.executors import Folders, Talk, make_executor
+
+HERE = Path(__file__).parent
+RAY = pytest.param("ray", marks=pytest.mark.ray)
+
+
+@pytest.fixture(scope="module")
+def ray_pool(tmp_path_factory):
+    os.environ["AERIALDOJO_TRIED"] = "forwarded"
+    data = tmp_path_factory.mktemp("ray-data")
+    with make_executor("ray", 2, None, Folders((data,), (), (data,))) as pool:
+        yield pool
+    del os.environ["AERIALDOJO_TRIED"]
+    assert not list(data.rglob("*")), "the marker is gone with the executor"
+
+
+@pytest.fixture(params=["local", RAY])
+def pool(request):
+    if request.param == "ray":
+        yield request.getfixturevalue("ray_pool")
+        return
+    with make_executor("local", 2) as pool:
+        yield pool
+
+
+def tasks(folder, n=6, kinds=None, scenes=None):
+    return [Chore(k, (scenes or [""])[k % len(scenes or [""])], folder, (kinds or {}).get(k, "")) for k in range(n)]
+
+
+def test_results_are_the_same_whoever_computes_them(pool, tmp_path):
+    assert pool.workers == 2
+    assert sorted(pool.map(chores.square, tasks(tmp_path))) == [(k, k * k) for k in range(6)]
+    assert list(pool.map(chores.square, [])) == []
+
+
+def test_results_come_in_the_order_of_finishing(pool, tmp_path):
+    order = list(pool.map(chores.wait_for_the_others, tasks(tmp_path, 4)))
+    assert sorted(order) == [0, 1, 2, 3]
+    assert order.index(0) >= 2
+
+
+def test_a_process_stays_with_its_scene(pool, tmp_path):
+    work = tasks(tmp_path, 12, scenes=["a", "b", "c"])
+    rows = list(pool.map(chores.where, work, lambda chore: chore.scene))
+    turns = {}
+    for scene, pid, _ in rows:
+        turns.setdefault(pid, []).append(scene)
+    assert os.getpid() not in turns
+    # A process leaves a scene only when nothing of it waits: two have at most one change more than there are scenes.
+    changes = sum(a != b for order in turns.values() for a, b in itertools.pairwise(order))
+    assert changes <= 2
+
+
+def test_expected_errors_are_results_and_defects_end_it(pool, tmp_path):
+    outcomes = list(pool.map(chores.fail, tasks(tmp_path, 4, {2: "expected"})))
+    errors = [one for one in outcomes if isinstance(one, AerialDojoError)]
+    assert [str(error) for error in errors] == ["chore 2 has no mesh"]
+    assert sorted(one for one in outcomes if not isinstance(one, AerialDojoError)) == [0, 1, 3]
+    with pytest.raises(ZeroDivisionError, match="chore 1 has a defect") as raised:
+        list(pool.map(chores.fail, tasks(tmp_path, 4, {1: "defect"})))
+    assert "chores.py" in str(raised.value.__cause__), "where it came from is said"
+
+
+def test_workers_tell_while_they_work_and_stop_when_they_are_asked(pool, tmp_path):
+    heard = []
+    assert sum(pool.map(chores.talk, tasks(tmp_path, 4), talk=Talk(heard.append, lambda: False))) == 12
+    assert sorted(heard) == [(n, k) for n in range(4) for k in range(3)]
+    heard.clear()
+    # They end by themselves once both have been heard.
+    talk = Talk(heard.append, lambda: len(heard) == 2)
+    done = list(pool.map(chores.go_on_until_stopped, tasks(tmp_path, 2), talk=talk))
+    assert sorted(done) == sorted(heard) == [0, 1]
+
+
+def test_turns_are_given_out_over_all_processes(pool, tmp_path):
+    talk = Talk(print, lambda: False)
+    waits = [wait_s for one in pool.map(chores.take_turns, tasks(tmp_path, 3), talk=talk) for wait_s in one]
+    # Six turns, a thousand seconds apart; how much of them is over when one is taken does not matter.
+    assert sorted(round(w / 1000.0) for w in waits) == [0, 1, 2, 3, 4, 5]
+
+
+def test_a_killed_worker_is_one_line(tmp_path):
+    match = r"a worker process was killed at .*chore 1.*out of memory"
+    with pytest.raises(AerialDojoError, match=match) as raised, make_executor("local", 2) as pool:
+        list(pool.map(chores.die_once, tasks(tmp_path, 4)))
+    assert "\n" not in str(raised.value)
+
+
+@pytest.mark.ray
+def test_a_task_whose_process_was_lost_is_done_again_elsewhere(ray_pool, tmp_path):
+    assert sorted(ray_pool.map(chores.die_once, tasks(tmp_path, 4))) == [0, 1, 2, 3]
+    assert (tmp_path / "died-1").exists()
+
+
+@pytest.mark.ray
+def test_a_task_that_loses_every_process_is_one_line(ray_pool, tmp_path):
+    with pytest.raises(AerialDojoError, match="chore 1: the process that worked at it was lost 4 times") as raised:
+        list(ray_pool.map(chores.die_once, tasks(tmp_path, 2, {1: "always"})))
+    assert "\n" not in str(raised.value)
+
+
+@pytest.mark.ray
+def test_variables_that_are_ours_are_forwarded(ray_pool, tmp_path):
+    assert {row[2] for row in ray_pool.map(chores.where, tasks(tmp_path, 4))} == {"forwarded"}
+
+
+def test_what_processes_keep_is_closed_at_the_end(tmp_path):
+    with make_executor("local", 2) as pool:
+        list(pool.map(chores.keep_until_the_end, tasks(tmp_path, 4)))
+    opened = {path.name.split("-")[1] for path in tmp_path.glob("open-*")}
+    assert opened == {path.name.split("-")[1] for path in tmp_path.glob("closed-*")}
+    with make_executor("local", 1) as pool:
+        list(pool.map(chores.keep_until_the_end, tasks(tmp_path, 1)))
+    assert (tmp_path / f"closed-{os.getpid()}").exists()
+
+
+@pytest.mark.parametrize("executor", ["local", RAY])
+def test_ctrl_c_ends_all_processes(executor, tmp_path):
+    program = (
+        "import sys; from pathlib import Path; import chores\n"
+        "from aerialdojo_gen.pipeline.executors import make_executor\n"
+        "from aerialdojo_gen.pipeline.interrupt import Interrupts\n"
+        "def main():\n"
+        "    work = [chores.Chore(k, '', Path(sys.argv[2])) for k in range(4)]\n"
+        "    with Interrupts() as interrupts, make_executor(sys.argv[1], 2) as pool:\n"
+        "        for _ in pool.map(chores.sleep, work):\n"
+        "            interrupts.check()\n"
+        "if __name__ == '__main__':\n"
+        "    try:\n"
+        "        main()\n"
+        "    except KeyboardInterrupt:\n"
+        "        sys.exit(130)\n"
+    )
+    script = tmp_path / "program.py"
+    script.write_text(program)
+    folder = tmp_path / "pids"
+    folder.mkdir()
+    path = os.pathsep.join([str(HERE), str(HERE.parents[1])])
+    process = subprocess.Popen(
+        [sys.executable, str(script), executor, str(folder)], stderr=subprocess.PIPE, text=True,
+        start_new_session=True, env=os.environ | {"PYTHONPATH": path},
+    )  # fmt: skip
+    chores.until(lambda: len(list(folder.iterdir())) == 2 or process.poll() is not None, 120)
+    os.killpg(process.pid, signal.SIGINT)
+    _, err = process.communicate(timeout=60)
+    assert process.returncode == 130, err
+    assert "Traceback" not in err
+    chores.until(lambda: not session_members(process.pid))
+
+
+def session_members(session):
+    """Processes of a session that are alive."""
+    found = []
+    for stat in Path("/proc").glob("[0-9]*/stat"):
+        try:
+            fields = stat.read_text().rsplit(")", 1)[1].split()
+        except OSError:
+            continue
+        if int(fields[3]) == session and fields[0] != "Z":
+            found.append(int(stat.parent.name))
+    return found
+
+
+def test_what_cannot_be_is_said_in_one_line(monkeypatch):
+    with pytest.raises(UsageError, match="unknown executor 'slurm'; executors: local, ray"):
+        make_executor("slurm")
+    with pytest.raises(UsageError, match="--address is of --executor ray"):
+        make_executor("local", address="127.0.0.1:6379")
+    with monkeypatch.context() as context:
+        context.setitem(sys.modules, "ray", None)
+        with pytest.raises(UsageError, match=r"--executor ray needs Ray: pip install 'aerialdojo-gen\[cluster\]'"):
+            make_executor("ray")
+    unused = "127.0.0.1:1"
+    with pytest.raises(AerialDojoError, match=rf"^no Ray cluster answers at {unused} \(.*refused\): start one"):
+        list(make_executor("ray", address=unused).map(chores.square, tasks(Path())))
+    with pytest.raises(UsageError, match="--address nowhere: write HOST:PORT"):
+        make_executor("ray", address="nowhere")
