@@ -142,7 +142,7 @@ class Slow(RandomAgent):
 @pytest.mark.kill
 def test_killed_again_and_again_ends_with_the_same_bytes(project, smoke, tmp_path):
     (tmp_path / "slowagent.py").write_text(SLOW)
-    env = os.environ | {"PYTHONPATH": str(tmp_path)}
+    env = os.environ | {"PYTHONPATH": f"{tmp_path}{os.pathsep}{project}"}
     out = tmp_path / "out"
     command = [
         sys.executable, "-m", "aerialdojo_gen.cli", "evaluate", "--data", str(smoke), "--out", str(out), "--run", "r",
@@ -335,10 +335,10 @@ def test_ctrl_c_keeps_what_was_finished_and_ends_the_workers(project, smoke, tmp
         sys.executable, "-m", "aerialdojo_gen.cli", "evaluate", "--data", str(smoke), "--out", str(out), "--run", "r",
         "--agent", "slowagent:Slow", "--pipeline", str(project / "pipelines" / "smoke.toml"), "--workers", "2",
     ]  # fmt: skip
+    env = os.environ | {"PYTHONPATH": f"{tmp_path}{os.pathsep}{project}"}
     process = subprocess.Popen(
-        command, cwd=tmp_path, env=os.environ | {"PYTHONPATH": str(tmp_path)}, stderr=subprocess.PIPE, text=True,
-        start_new_session=True,
-    )  # fmt: skip
+        command, cwd=tmp_path, env=env, stderr=subprocess.PIPE, text=True, start_new_session=True
+    )
     journals = out / "runs" / "r" / "journal"
     while process.poll() is None and sum(p.read_bytes().count(b"\n") for p in journals.glob("*.jsonl")) < 4:
         time.sleep(0.01)
