@@ -13,6 +13,7 @@ from aerialdojo_gen.errors import StoreError
 from aerialdojo_gen.geometry.motion import replay
 from aerialdojo_gen.pipeline.stage import Job, Roots
 from aerialdojo_gen.planning.clearance import ClearanceGrid
+from aerialdojo_gen.scenes.context import release_scenes
 from aerialdojo_gen.scenes.glb import write_glb
 from aerialdojo_gen.stages.work import pair_objects, plan
 from aerialdojo_gen.store import schemas
@@ -129,7 +130,7 @@ def test_stored_routes_run_from_the_turned_start_anchor_to_the_selected_one(data
 
 
 def test_a_shard_does_not_depend_on_what_was_planned_before(data, shards):
-    plan._planner.cache_clear()
+    release_scenes()
     again = plan.run(job(data, "plan", 1, 3), CONFIG)
     assert again.tables["plans"].equals(shards[1].tables["plans"])
 
