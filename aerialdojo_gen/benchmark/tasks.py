@@ -19,7 +19,8 @@ from aerialdojo_gen.common import rng
 from aerialdojo_gen.common.names import unknown
 from aerialdojo_gen.common.pictures import decode_rgb
 from aerialdojo_gen.errors import StoreError, UsageError
-from aerialdojo_gen.release.contents import mesh_copy, scenes_in_release
+from aerialdojo_gen.release.contents import scenes_in_release
+from aerialdojo_gen.scenes.stored import mesh_copy
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.root import DataRoot, Where, open_root
 from aerialdojo_gen.store.schemas import SETTINGS, SUBSETS, TASKS

@@ -16,9 +16,10 @@ from numpy.typing import NDArray
 from aerialdojo_gen.common.names import closest, unknown
 from aerialdojo_gen.errors import AssetError, StoreError, UsageError
 from aerialdojo_gen.planning.collision import collision_world
-from aerialdojo_gen.release.contents import mesh_copy, release_scenes
+from aerialdojo_gen.release.contents import release_scenes
 from aerialdojo_gen.scenes.context import SEVERAL, open_scene
 from aerialdojo_gen.scenes.model import Scene
+from aerialdojo_gen.scenes.stored import mesh_copy
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.root import Where, open_root
 

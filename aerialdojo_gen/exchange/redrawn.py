@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from aerialdojo_gen.common.pictures import REFERENCE_PNG, decode_rgb, encode_png
 from aerialdojo_gen.errors import AssetError, StoreError
 from aerialdojo_gen.geometry.cameras import Camera, view_pose
-from aerialdojo_gen.release.contents import mesh_copy
 from aerialdojo_gen.rendering.backend import choose_renderer, kept_renderer
 from aerialdojo_gen.scenes.context import open_scene
+from aerialdojo_gen.scenes.stored import mesh_copy
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.root import DataRoot
 

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path, PurePosixPath
+from pathlib import PurePosixPath
 
 import pyarrow as pa
 
 from aerialdojo_gen.common.names import choose_scenes
-from aerialdojo_gen.errors import AssetError, StoreError
+from aerialdojo_gen.errors import StoreError
 from aerialdojo_gen.store import schemas
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.layout import LAYOUT, is_plain, partition, shard_name
@@ -135,33 +134,6 @@ def _lack(root: DataRoot, folder: str) -> str:
         return "its folder release holds no tables" if root.exists(FOLDER) else "it has no folder release"
     tables = list(TABLES)
     return f"it has no folder release, nor {', '.join(tables[:-1])} or {tables[-1]}"
-
-
-def mesh_copy(where: Where, told: str) -> Path:
-    """Return the mesh that a row of `scenes` names, on this machine.
-
-    Raises
-    ------
-    AssetError
-        The row names one outside of the data root.
-    FileNotFoundError
-        It is not there.
-    """
-    root = open_root(where)
-    if leads_out(root, told):
-        raise AssetError(f"release/scenes: mesh_path {told!r} leads out of {root}")
-    path = root.local_copy(told)
-    if not path.is_file():
-        raise FileNotFoundError(2, os.strerror(2), str(path))
-    return path
-
-
-def leads_out(root: DataRoot, told: str) -> bool:
-    """Whether a path that a table names leads out of the data root, by dots or by a symbolic link."""
-    path = PurePosixPath(told)
-    if path.is_absolute() or ".." in path.parts:
-        return True
-    return isinstance(root, LocalRoot) and not (root.path / told).resolve().is_relative_to(root.path.resolve())
 
 
 def check_release(where: Where, scenes: list[str] | None = None) -> list[str]:

@@ -8,7 +8,26 @@ from pathlib import Path
 from aerialdojo_gen.errors import AssetError
 from aerialdojo_gen.scenes.glb import read_glb
 from aerialdojo_gen.scenes.model import Scene
-from aerialdojo_gen.store.root import DataRoot
+from aerialdojo_gen.store.root import DataRoot, Where, leads_out, open_root
+
+
+def mesh_copy(where: Where, told: str) -> Path:
+    """Return the mesh that a row of `scenes` names, on this machine.
+
+    Raises
+    ------
+    AssetError
+        The row names one outside of the data root.
+    FileNotFoundError
+        It is not there.
+    """
+    root = open_root(where)
+    if leads_out(root, told):
+        raise AssetError(f"release/scenes: mesh_path {told!r} leads out of {root}")
+    path = root.local_copy(told)
+    if not path.is_file():
+        raise FileNotFoundError(2, os.strerror(2), str(path))
+    return path
 
 
 def mesh_file(data: DataRoot, relative: str) -> Path:
@@ -17,12 +36,12 @@ def mesh_file(data: DataRoot, relative: str) -> Path:
     Raises
     ------
     AssetError
-        It is missing.
+        It is missing, or the path leads out of the data root.
     StoreError
-        The store does not answer, or the path leads out of it.
+        The store does not answer.
     """
     try:
-        return data.local_copy(relative)
+        return mesh_copy(data, relative)
     except FileNotFoundError:
         missing = f"{data.at(relative)}: cannot be read ({os.strerror(2)}); run build-scenes first"
         raise AssetError(missing) from None

@@ -13,10 +13,9 @@ from numpy.typing import NDArray
 from aerialdojo_gen.browse.lookup import FoundTask
 from aerialdojo_gen.errors import StoreError
 from aerialdojo_gen.geometry.cameras import Camera, view_pose
-from aerialdojo_gen.release.contents import leads_out
 from aerialdojo_gen.store import schemas
 from aerialdojo_gen.store import shards as store
-from aerialdojo_gen.store.root import DataRoot
+from aerialdojo_gen.store.root import DataRoot, leads_out
 
 SIZE_PX = 320
 

@@ -243,6 +243,14 @@ class LocalRoot(DataRoot):
         return self.path / inside(relative)
 
 
+def leads_out(root: DataRoot, told: str) -> bool:
+    """Whether a path that a table names leads out of the data root, by dots or by a symbolic link."""
+    path = PurePosixPath(told)
+    if path.is_absolute() or ".." in path.parts:
+        return True
+    return isinstance(root, LocalRoot) and not (root.path / told).resolve().is_relative_to(root.path.resolve())
+
+
 def inside(relative: str) -> str:
     """Return a path if it stays below the root; StoreError otherwise."""
     path = PurePosixPath(relative)

@@ -314,7 +314,7 @@ def test_the_command_in_one_line(project, smoke, tmp_path):
 
 
 def test_no_run_of_that_name(tmp_path):
-    with pytest.raises(StoreError, match=r"no run 'x' in .*there are: none"):
+    with pytest.raises(StoreError, match=r"there is no run 'x': there is none"):
         read_run(tmp_path, "x")
 
 

@@ -118,7 +118,7 @@ def test_the_floors_that_flew_the_same_tasks_are_added_and_cut_down(log: Path, r
     ]
     groups = {"open": ["alpha"], "closed": ["package:Beta"]}
     assert [run.group for run in arranged(runs, groups)] == ["open", "closed", "floors"]
-    with pytest.raises(UsageError, match="group 'open': no run 'gamma' among alpha, beta, floor"):
+    with pytest.raises(UsageError, match="group 'open': no run 'gamma': there are alpha, beta, floor"):
         arranged(runs, {"open": ["gamma"]})
 
 

@@ -357,7 +357,7 @@ def test_the_command_says_what_it_wrote_and_what_is_wrong(smoke, tmp_path):
     lost = json.loads((tmp_path / "o/export.json").read_text())["lost"]
     assert "min_clearance_m" in lost["routes"]
     for arguments, error in (
-        (["--format", "xml", "--data", str(smoke)], "no format 'xml': it is one of aerialdojo, habitat"),
+        (["--format", "xml", "--data", str(smoke)], "no format 'xml': there are aerialdojo, habitat"),
         (["--format", "habitat", "--data", str(smoke), "--scene", "Nowhere"], "Nowhere"),
         (["--format", "habitat", "--data", str(smoke), "--picture-size", "64"], "is for --format aerialdojo"),
         (["--format", "aerialdojo", "--data", str(smoke), "--picture-size", "9"], "16 to 4096 pixels, or 0"),

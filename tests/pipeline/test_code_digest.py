@@ -116,27 +116,32 @@ def test_plumbing_is_what_it_is_said_to_be():
     """Whoever lists a module here has thought about whether it decides what is written."""
     assert set(PLUMBING) == {
         f"aerialdojo_gen{name}"
-        for name in ("", ".benchmark", ".common", ".common.disk", ".common.terms", ".common.trouble",
-                     ".common.version", ".config", ".config.agreement", ".config.explain", ".config.pipeline",
-                     ".config.sections", ".errors", ".pipeline", ".pipeline.code_digest", ".pipeline.code_facts",
-                     ".pipeline.executors", ".pipeline.executors.local", ".pipeline.fingerprint",
-                     ".pipeline.freshness", ".pipeline.interrupt", ".pipeline.progress", ".pipeline.registry",
-                     ".pipeline.runner", ".pipeline.stage", ".stages", ".stages.work", ".store", ".store.atomic",
-                     ".store.files", ".store.footers", ".store.parquet_files", ".store.schemas",
-                     ".store.schemas.benchmark", ".store.schemas.columns", ".store.schemas.recordings",
-                     ".store.schemas.release", ".store.schemas.staged", ".store.shards", ".store.staging")
+        for name in ("", ".benchmark", ".common", ".common.disk", ".common.explain", ".common.names",
+                     ".common.terms", ".common.text_table", ".common.trouble", ".common.version", ".config",
+                     ".config.agreement", ".config.pipeline", ".config.sections", ".errors", ".pipeline",
+                     ".pipeline.code_digest", ".pipeline.code_facts", ".pipeline.executors",
+                     ".pipeline.executors.base", ".pipeline.executors.carried", ".pipeline.executors.link",
+                     ".pipeline.executors.local", ".pipeline.executors.ray", ".pipeline.executors.ray_worker",
+                     ".pipeline.fingerprint", ".pipeline.freshness", ".pipeline.interrupt", ".pipeline.progress",
+                     ".pipeline.registry", ".pipeline.runner", ".pipeline.stage", ".pipeline.task", ".stages",
+                     ".stages.work", ".store", ".store.atomic", ".store.bucket", ".store.cache",
+                     ".store.cloud_errors", ".store.files", ".store.footers", ".store.globbing", ".store.layout",
+                     ".store.lease", ".store.object_folders", ".store.object_root", ".store.object_state",
+                     ".store.parquet_files", ".store.root", ".store.schemas", ".store.schemas.benchmark",
+                     ".store.schemas.columns", ".store.schemas.recordings", ".store.schemas.release",
+                     ".store.schemas.staged", ".store.shards", ".store.staging")
     }  # fmt: skip
     assert {name: counted for name, counted in PLUMBING.items() if counted} == {
-        "aerialdojo_gen.store.parquet_files": ("write_clustered",),
         "aerialdojo_gen.common.terms": ("*",),
+        "aerialdojo_gen.pipeline.stage": ("Job",),
+        "aerialdojo_gen.store.layout": ("partition", "check_scene_name"),
+        "aerialdojo_gen.store.parquet_files": ("write_clustered",),
         "aerialdojo_gen.store.schemas": ("*",),
         "aerialdojo_gen.store.schemas.benchmark": ("*",),
         "aerialdojo_gen.store.schemas.columns": ("*",),
         "aerialdojo_gen.store.schemas.recordings": ("*",),
         "aerialdojo_gen.store.schemas.release": ("*",),
         "aerialdojo_gen.store.schemas.staged": ("*",),
-        "aerialdojo_gen.pipeline.stage": ("Job",),
-        "aerialdojo_gen.store.shards": ("partition", "check_scene_name"),
     }
     for name, counted in PLUMBING.items():
         known = code_digest._running().facts(name)

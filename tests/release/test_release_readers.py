@@ -136,7 +136,8 @@ def test_the_cards_head_names_every_split_and_its_files(smoke, stored):
 def test_the_card_is_the_same_whenever_it_is_written(smoke, tmp_path):
     shutil.copytree(smoke / "release", tmp_path / "release")
     before = (smoke / "release" / "README.md").read_bytes()
-    assert write_card(tmp_path).read_bytes() == before
+    write_card(tmp_path)
+    assert (tmp_path / "release" / "README.md").read_bytes() == before
     assert render_card(tmp_path).encode() == before
 
 

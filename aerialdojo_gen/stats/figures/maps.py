@@ -10,9 +10,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from aerialdojo_gen.release.contents import mesh_copy
 from aerialdojo_gen.rendering.orthographic import OrthographicPictures
 from aerialdojo_gen.scenes.glb import read_glb
+from aerialdojo_gen.scenes.stored import mesh_copy
 from aerialdojo_gen.stats.figures.style import WIDTH_IN, styled
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.root import DataRoot
