@@ -30,6 +30,7 @@ from aerialdojo_gen.scenes.ground import disc
 from aerialdojo_gen.scenes.model import Material, Scene
 from aerialdojo_gen.scenes.recipe import load_imported, load_recipe
 from aerialdojo_gen.scenes.terrain import rolling_terrain
+from aerialdojo_gen.store.root import open_root
 
 COURT = {"layout": "courtyard", "size_m": [30, 30], "ceiling_m": 12, "parameters": {"things": []}}
 POST = {"name": "post", "roles": {"body": "#808080"}, "params": {"h": 2}}
@@ -289,12 +290,12 @@ def test_a_recording_json_of_other_types_is_rendered_again(tmp_path, rows):
     (folder / "front_rgb.mp4").write_bytes(b"xxxx")
     note = folder / "recording.json"
     note.write_text(json.dumps({"fingerprint": FINGERPRINT, "recordings": [ROW]}))
-    assert finished.find(tmp_path, "media/U_A_0/n", FINGERPRINT) == [ROW]
+    assert finished.find(open_root(tmp_path), "media/U_A_0/n", FINGERPRINT) == [ROW]
     note.write_text(json.dumps({"fingerprint": FINGERPRINT, "recordings": rows}))
-    assert finished.find(tmp_path, "media/U_A_0/n", FINGERPRINT) is None
+    assert finished.find(open_root(tmp_path), "media/U_A_0/n", FINGERPRINT) is None
     for text in ("[" * 50_000, "[]", '"x"', "1" * 5000, '{"fingerprint": NaN}'):
         note.write_text(text)
-        assert finished.find(tmp_path, "media/U_A_0/n", FINGERPRINT) is None
+        assert finished.find(open_root(tmp_path), "media/U_A_0/n", FINGERPRINT) is None
 
 
 def test_a_recording_is_read_by_its_path_as_text(tmp_path):

@@ -338,7 +338,7 @@ def test_what_is_no_task_file_is_said_in_one_line(tmp_path):
         ([str(tmp_path / "none.json"), "--format", "uav-on"], "there is no file"),
         ([str(tmp_path / "empty"), "--format", "uav-on"], "is no file"),
         ([str(tmp_path / "empty"), "--format", "aerialdojo"], "has no Task.json below it"),
-        ([str(good), "--format", "habitat"], "no format 'habitat': it is one of " + ", ".join(FORMATS)),
+        ([str(good), "--format", "habitat"], "no format 'habitat': there are " + ", ".join(FORMATS)),
         (
             [str(good), "--format", "cityavos", "--frame", "ned", "--angles", "turns"],
             "angles are radians",

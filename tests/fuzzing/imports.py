@@ -14,7 +14,7 @@ from aerialdojo_gen.exchange.importing import Options, import_benchmark
 
 
 def _aerialdojo() -> list[Case]:
-    from test_import_benchmark_layout import document, put
+    from support.authors_files import document, put
 
     return [made(lambda folder, turn=turn: put(folder, *document(turn))) for turn in (15, 60)]
 

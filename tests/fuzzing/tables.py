@@ -16,6 +16,7 @@ from aerialdojo_gen.rendering.codecs import PngWriter, VideoWriter
 from aerialdojo_gen.rendering.reader import read_recording
 from aerialdojo_gen.scoring.vlm import read_order
 from aerialdojo_gen.store import shards as store
+from aerialdojo_gen.store.root import open_root
 
 
 def _answers() -> list[Case]:
@@ -87,7 +88,7 @@ def _find(folder: Path) -> None:
     from aerialdojo_gen.store.schemas import RECORDINGS
     from aerialdojo_gen.store.tables import check_table, from_rows
 
-    rows = finished.find(folder, _NAV, _FINGERPRINT)
+    rows = finished.find(open_root(folder), _NAV, _FINGERPRINT)
     if rows is not None:
         check_table(RECORDINGS, from_rows(RECORDINGS, rows))
         assert all((folder / row["path"]).resolve().is_relative_to(folder.resolve()) for row in rows)

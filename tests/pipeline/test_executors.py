@@ -7,9 +7,9 @@ import subprocess
 import sys
 from pathlib import Path
 
-import chores
 import pytest
-from chores import Chore
+from support import chores
+from support.chores import Chore
 
 from aerialdojo_gen.errors import AerialDojoError, UsageError
 from aerialdojo_gen.pipeline.executors import Folders, Talk, make_executor

@@ -9,16 +9,9 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from support.s3_server import CREDENTIALS, Proxy, s3_server
+from support.s3_server import CREDENTIALS, Proxy, forget_clients, s3_server
 
-from aerialdojo_gen.store import bucket, object_state
 from aerialdojo_gen.store.root import DataRoot, open_root
-
-
-def forget_clients() -> None:
-    """Let the next request of this process read the environment anew."""
-    bucket._made_client.cache_clear()
-    object_state._made.cache_clear()
 
 
 @pytest.fixture(scope="session")

@@ -7,8 +7,7 @@ import subprocess
 import sys
 
 import pytest
-from conftest import forget_clients
-from support.s3_server import Proxy
+from support.s3_server import Proxy, forget_clients
 from test_roots import fill, read_folder, write
 
 from aerialdojo_gen.errors import StoreError

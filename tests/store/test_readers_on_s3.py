@@ -11,7 +11,7 @@ import time
 from pathlib import Path
 
 import pytest
-from task_files import uav_on, write
+from support.task_files import uav_on, write
 
 from aerialdojo_gen import cli
 from aerialdojo_gen.agents.goal import Sensors

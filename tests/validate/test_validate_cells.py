@@ -9,7 +9,7 @@ from support.planting import check, definitions
 from aerialdojo_gen.release.contents import SHARDS
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.validate import Asked, validate
-from aerialdojo_gen.validate.parts import read_tables
+from aerialdojo_gen.validate.parts import read_tables, release_of
 
 # Every fourth pixel is looked at: a box that is off by one is within what that can tell.
 UNTOLD = {"box_u0_px", "box_v0_px", "box_u1_px", "box_v1_px"}
@@ -59,7 +59,7 @@ def test_every_cell_is_held_to_something(planted, key):
 
 
 def names(planted, key, row):
-    table = read_tables(planted.release, planted.scene)[0][store.LAYOUT[key].spec.name]
+    table = read_tables(release_of(planted.release), planted.scene)[0][store.LAYOUT[key].spec.name]
     columns = {"tasks": ("task_id",), "scenes": ("scene",)}.get(table.name)
     columns = columns or [name for name in table.spec.key if name != "scene"]
     return " ".join(f"{name}={row[name]}" for name in columns)

@@ -1,6 +1,7 @@
 """Files of a release that are missing, cut, changed or foreign; counts of the whole; the command and its reports."""
 
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -181,7 +182,8 @@ def test_splits_and_path_of_the_whole(planted, monkeypatch):
 
 def run(*args):
     command = [sys.executable, "-m", "aerialdojo_gen.cli", "validate", *map(str, args), "--pipeline", str(SMOKE)]
-    return subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
+    wide = os.environ | {"COLUMNS": "120"}
+    return subprocess.run(command, capture_output=True, text=True, timeout=300, check=False, env=wide)
 
 
 def test_the_command_passes_a_clean_release_and_says_what_it_did_not_check(planted):

@@ -8,7 +8,7 @@ from aerialdojo_gen.planning.collision import CollisionWorld
 from aerialdojo_gen.scenes.glb import read_glb
 from aerialdojo_gen.store.schemas import APPROACH, STOP, TURN_LEFT, TURN_RIGHT
 from aerialdojo_gen.validate import collisions, oracle
-from aerialdojo_gen.validate.parts import read_tables
+from aerialdojo_gen.validate.parts import read_tables, release_of
 from aerialdojo_gen.validate.registry import ALWAYS_AFTER, TABLES
 from aerialdojo_gen.validate.rows import SceneData
 from aerialdojo_gen.validate.run import SCENE_CHECKS
@@ -184,7 +184,7 @@ def test_a_start_that_is_another_anchor(planted):
 
 
 def scene_data(planted, **options):
-    tables, _ = read_tables(planted.release, planted.scene)
+    tables, _ = read_tables(release_of(planted.release), planted.scene)
     return SceneData(planted.scene, planted.release, definitions(), tables, **options)
 
 
