@@ -7,8 +7,8 @@ import subprocess
 import sys
 
 import pytest
+from support.roots import fill, read_folder, write
 from support.s3_server import Proxy, forget_clients
-from test_roots import fill, read_folder, write
 
 from aerialdojo_gen.errors import StoreError
 from aerialdojo_gen.store.bucket import Bucket
@@ -113,9 +113,11 @@ def test_who_lost_the_lock_writes_nothing_more(cloud: str):
         worker = pickle.loads(pickle.dumps(root))
         taken = b'{"token": "another", "holder": "another", "lease_s": 60}'
         bucket.put_bytes("data/.aerialdojo-lock.json", taken)
-        code = "import pickle, sys; from test_roots import write; write(pickle.load(sys.stdin.buffer), 't/a/x', b'y')"
+        code = (
+            "import pickle, sys; from support.roots import write; write(pickle.load(sys.stdin.buffer), 't/a/x', b'y')"
+        )
         done = subprocess.run([sys.executable, "-c", code], input=pickle.dumps(worker), capture_output=True,
-                              cwd=os.path.dirname(__file__), check=False)  # fmt: skip
+                              cwd=os.path.dirname(os.path.dirname(__file__)), check=False)  # fmt: skip
         assert b"this run has lost the lock of" in done.stderr
         (lease,) = root._state.leases.values()
         assert not lease._still_mine()

@@ -8,33 +8,17 @@ import pickle  # noqa: TID251 - executors send roots to other processes
 from pathlib import Path
 
 import pytest
+from support.roots import fill, read_folder, write
 
 from aerialdojo_gen.errors import StoreError, UsageError
 from aerialdojo_gen.store import schemas
 from aerialdojo_gen.store import shards as store
-from aerialdojo_gen.store.root import DataRoot, LocalRoot, open_root
+from aerialdojo_gen.store.root import LocalRoot, open_root
 from aerialdojo_gen.store.tables import from_rows
 
 SCENE = "U_Test_0"
 PAIR = {"scene": SCENE, "pair_id": "1_0__2", "start_object_id": 1, "start_anchor_id": 0, "target_object_id": 2,
         "euclidean_m": 5.0}  # fmt: skip
-
-
-def write(root: DataRoot, name: str, data: bytes) -> None:
-    with root.commit(name) as path:
-        path.write_bytes(data)
-
-
-def fill(root: DataRoot, folder: str, files: dict[str, bytes]) -> None:
-    with root.commit_folder(folder) as path:
-        for name, data in files.items():
-            (path / name).parent.mkdir(exist_ok=True)
-            (path / name).write_bytes(data)
-
-
-def read_folder(root: DataRoot, folder: str) -> dict[str, bytes]:
-    here = root.local_copy(folder)
-    return {p.relative_to(here).as_posix(): p.read_bytes() for p in here.rglob("*") if p.is_file()}
 
 
 def test_a_file_is_what_was_committed(root):
