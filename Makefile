@@ -32,6 +32,7 @@ UV := $(PIP) uv 2>/dev/null && .venv/bin/uv pip install --quiet --python .venv/b
 	  echo "error: a package could not be installed, see above. PyBullet has a wheel for Python 3.11 only and is built from" \
 	       "source on others (C++ compiler and Python headers needed): with Python 3.11, rm -rf .venv and make PYTHON=python3.11" >&2; exit 1; }
 	@echo "compiling the kernels (half a minute, once)"
+	@find aerialdojo_gen -name '*.nb[ic]' -delete  # Numba's of an earlier checkout may name modules that have moved
 	@dir=$$(mktemp -d) && trap 'rm -rf "$$dir"' EXIT && \
 	  $(RUN) plan --pipeline pipelines/smoke.toml --scene U_Courtyard_0 --data "$$dir" --workers 1 --quiet
 	@touch $@
