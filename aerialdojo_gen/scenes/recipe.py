@@ -177,5 +177,7 @@ def validated(model: type[Model], body: dict[str, Any], where: str) -> Model:
         elif first["type"] == "missing":
             message = f"key {key!r} is missing"
         else:
-            message = f"{key}: {first['msg'].removeprefix('Value error, ')}, got {brief(repr(first['input']), 60)}"
+            message = first["msg"].removeprefix("Value error, ")
+            if key:  # what a whole table lacks has none
+                message = f"{key}: {message}, got {brief(repr(first['input']), 60)}"
         raise AssetError(f"{where}: {message}") from error
