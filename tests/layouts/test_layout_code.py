@@ -49,7 +49,7 @@ def test_what_one_type_alone_uses_lies_in_its_folder_and_what_several_share_in_p
         home = chosen(recipe).modules[0].removesuffix(".layout")
         for part in fingerprint.scene_code(BUILD, roots_of(recipe), recipe.stem).parts:
             path = SOURCES.joinpath(*part.split(".")[1:]).with_suffix(".py")
-            if part.startswith("aerialdojo_gen.layouts.") and path.is_file():
+            if part.startswith("aerialdojo_gen.layouts.") and part.count(".") > 2 and path.is_file():
                 users.setdefault(part, set()).add(home)
     for module, homes in users.items():
         families = {home.rpartition(".")[0] for home in homes}
