@@ -18,7 +18,7 @@ from pathlib import Path
 
 from aerialdojo_gen.errors import ConfigError
 from aerialdojo_gen.store.atomic import disk_error
-from aerialdojo_gen.store.staging import AREA, remove, staged
+from aerialdojo_gen.store.staging import remove, staged
 
 _DEFAULT_GB = 20.0
 # Items that this process keeps from being removed: the last ones it asked for.
@@ -163,8 +163,7 @@ def _bound_bytes() -> int:
 def _size(folder: Path) -> int:
     total = 0
     for found, _, names in os.walk(folder):
-        if AREA not in found:
-            for name in names:
-                with contextlib.suppress(OSError):
-                    total += (Path(found) / name).stat().st_size
+        for name in names:
+            with contextlib.suppress(OSError):
+                total += (Path(found) / name).stat().st_size
     return total

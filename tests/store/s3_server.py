@@ -86,7 +86,8 @@ class Proxy:
         self.seen.append(line)
         how = self._rule(line)
         if how == "drop":
-            client.recv(1000)
+            if not line.startswith(("GET", "DELETE", "HEAD")):
+                client.recv(1000)
             client.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, b"\1\0\0\0\0\0\0\0")
             return False
         if b"100-continue" in head.lower():

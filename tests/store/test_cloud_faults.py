@@ -1,0 +1,183 @@
+"""Faults of a store and of the way to it: asked again where that helps, else one line; nothing half-written."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+
+import pytest
+from conftest import forget_clients
+from s3_server import Proxy
+from test_roots import fill, read_folder, write
+
+from aerialdojo_gen.errors import StoreError
+from aerialdojo_gen.store.bucket import Bucket
+from aerialdojo_gen.store.root import open_root
+
+BIG = os.urandom(20 << 20)
+
+
+@pytest.mark.parametrize("how", [500, 503, "drop", 0.5])
+def test_a_fault_that_passes_is_not_seen(cloud: str, proxy: Proxy, how: int | str | float):
+    root = open_root(cloud)
+    proxy.fail("^PUT", how)
+    write(root, "t/a/x", b"some bytes")
+    proxy.fail("^GET", how)
+    again = open_root(cloud)
+    again.refresh()
+    assert again.digest("t/a/x", anew=True) == root.digest("t/a/x")
+    assert proxy.left() == 0
+
+
+@pytest.mark.parametrize("how", [500, 503, "drop"])
+def test_a_part_of_an_upload_is_put_again(cloud: str, proxy: Proxy, how: int | str):
+    root = open_root(cloud)
+    proxy.fail("^PUT .*partNumber=2", how)
+    write(root, "t/a/x", BIG)
+    assert proxy.left() == 0
+    assert root.below("t").digest("a/x", anew=True) == root.digest("t/a/x")
+
+
+def test_a_download_that_breaks_off_goes_on(cloud: str, proxy: Proxy, tmp_path, monkeypatch):
+    write(open_root(cloud), "t/a/x", BIG)
+    monkeypatch.setenv("AERIALDOJO_CACHE", str(tmp_path / "another"))
+    forget_clients()
+    proxy.fail("^GET .*t/a/x", "cut", 2)
+    assert open_root(cloud).local_copy("t/a/x").read_bytes() == BIG
+    assert proxy.left() == 0
+
+
+def test_what_cannot_be_put_leaves_the_old_one(cloud: str, proxy: Proxy, monkeypatch):
+    monkeypatch.setenv("AWS_MAX_ATTEMPTS", "2")
+    forget_clients()
+    root = open_root(cloud)
+    write(root, "t/a/x", b"old")
+    fill(root, "media/S/n", {"a": b"old", "b": b"old"})
+    proxy.fail("^PUT .*partNumber=2", 503, 100)
+    proxy.fail("^PUT .*new-.*/b", 503, 100)
+    with pytest.raises(StoreError, match=r"s3://.*/t/a/x: the store keeps answering .*run the command again later"):
+        write(root, "t/a/x", BIG)
+    with pytest.raises(StoreError, match="nothing half-written"):
+        fill(root, "media/S/n", {"a": b"new", "b": b"new"})
+    again = open_root(cloud)
+    again.refresh()
+    assert again.local_copy("t/a/x").read_bytes() == b"old"
+    assert read_folder(again, "media/S/n") == {"a": b"old", "b": b"old"}
+    assert "".join(proxy.seen).count("DELETE") == 1, "the upload is aborted"
+
+
+KILLED = """
+import os, sys
+from aerialdojo_gen.store.root import open_root
+root = open_root(sys.argv[1])
+with root.lock():
+    print("held", flush=True)
+    with root.commit("t/a/x") as path:
+        path.write_bytes(os.urandom(20 << 20))
+"""
+
+
+def test_what_a_killed_run_left_is_removed_under_the_next_lock(cloud: str, proxy: Proxy, server: str, monkeypatch):
+    """A real SIGKILL in the middle of an upload in parts, by a run that holds the lock."""
+    monkeypatch.setenv("AERIALDOJO_LEASE_S", "2")
+    write(open_root(cloud), "t/a/x", b"old")
+    proxy.fail("^PUT .*partNumber=3", 60.0, 9)
+    run = subprocess.Popen([sys.executable, "-c", KILLED, cloud], stdout=subprocess.PIPE, text=True)
+    assert run.stdout is not None
+    assert run.stdout.readline() == "held\n"
+    with pytest.raises(StoreError, match=r"another run is writing to .* \(process \d+\) holds it until .* UTC"):
+        open_root(cloud).lock().__enter__()
+    while not any("partNumber=3" in line for line in proxy.seen):
+        assert run.poll() is None
+    run.kill()
+    run.wait()
+    monkeypatch.setenv("AWS_ENDPOINT_URL", server)
+    forget_clients()
+    bucket = Bucket(cloud.split("/")[2])
+    uploads = bucket._client.list_multipart_uploads(Bucket=bucket.name)
+    assert len(uploads.get("Uploads", [])) == 1
+    root = open_root(cloud)
+    with root.lock():
+        assert not bucket._client.list_multipart_uploads(Bucket=bucket.name).get("Uploads")
+        assert root.local_copy("t/a/x").read_bytes() == b"old"
+
+
+def test_who_lost_the_lock_writes_nothing_more(cloud: str):
+    """A holder whose lock somebody took: it stops, and so does a worker of it."""
+    import pickle  # noqa: TID251 - as executors do
+
+    root = open_root(cloud)
+    bucket = Bucket(cloud.split("/")[2])
+    with pytest.raises(StoreError, match="lost the lock"), root.lock():  # noqa: PT012 - it shows at the end too
+        write(root, "t/a/x", b"mine")
+        worker = pickle.loads(pickle.dumps(root))
+        taken = b'{"token": "another", "holder": "another", "lease_s": 60}'
+        bucket.put_bytes("data/.aerialdojo-lock.json", taken)
+        code = "import pickle, sys; from test_roots import write; write(pickle.load(sys.stdin.buffer), 't/a/x', b'y')"
+        done = subprocess.run([sys.executable, "-c", code], input=pickle.dumps(worker), capture_output=True,
+                              cwd=os.path.dirname(__file__), check=False)  # fmt: skip
+        assert b"this run has lost the lock of" in done.stderr
+        (lease,) = root._state.leases.values()
+        assert not lease._still_mine()
+        write(root, "t/a/x", b"too late")
+    assert open_root(cloud).local_copy("t/a/x").read_bytes() == b"mine"
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        ({"AWS_ACCESS_KEY_ID": "", "AWS_SECRET_ACCESS_KEY": ""}, "there are no credentials: set AWS_ACCESS_KEY_ID"),
+        ({"AWS_ENDPOINT_URL": "http://127.0.0.1:9", "AWS_MAX_ATTEMPTS": "1"}, "http://127.0.0.1:9 cannot be reached"),
+        ({"AWS_ENDPOINT_URL": "nonsense"}, "correct the AWS configuration"),
+        ({"AWS_PROFILE": "nobody"}, "there is no AWS profile"),
+        ({"AERIALDOJO_CACHE_GB": "much"}, "AERIALDOJO_CACHE_GB='much': write a number"),
+    ],
+)
+def test_what_the_environment_lacks_is_one_line(cloud: str, monkeypatch, tmp_path, change, told):
+    for name, value in change.items():
+        monkeypatch.setenv(name, value) if value else monkeypatch.delenv(name)
+    monkeypatch.setenv("HOME", str(tmp_path))
+    forget_clients()
+    with pytest.raises(Exception, match=told) as raised:
+        open_root(cloud).exists("t/a/x")
+    assert "\n" not in str(raised.value)
+    assert raised.type.__module__ == "aerialdojo_gen.errors"
+
+
+def test_a_bucket_that_is_not_there_is_named(cloud: str):
+    with pytest.raises(StoreError, match=r"s3://no-such-bucket/.*there is no bucket 'no-such-bucket' at http://127"):
+        open_root("s3://no-such-bucket/data").exists("t/a/x")
+
+
+def test_the_cache_is_bounded(cloud: str, monkeypatch, tmp_path):
+    monkeypatch.setenv("AERIALDOJO_CACHE_GB", "0.001")
+    forget_clients()
+    root = open_root(cloud)
+    for k in range(8):
+        write(root, f"t/a/{k}", os.urandom(300_000))
+    assert sum(p.stat().st_size for p in (tmp_path / "cache").rglob("*") if p.is_file()) <= 1_000_000
+    for k in range(8):
+        assert root.local_copy(f"t/a/{k}").stat().st_size == 300_000
+
+
+def test_an_upload_by_others_is_a_folder_too(cloud: str):
+    bucket = Bucket(cloud.split("/")[2])
+    for name in ("a", "b"):
+        bucket.put_bytes(f"data/media/S/n/{name}", b"1")
+    assert read_folder(open_root(cloud), "media/S/n") == {"a": b"1", "b": b"1"}
+
+
+def test_a_folder_that_is_being_written_is_not_there(cloud: str, proxy: Proxy, monkeypatch):
+    monkeypatch.setenv("AWS_MAX_ATTEMPTS", "1")
+    forget_clients()
+    root = open_root(cloud)
+    proxy.fail("^PUT .*n/b", 503, 9)
+    with pytest.raises(StoreError):
+        fill(root, "media/S/n", {"a": b"1", "b": b"1"})
+    for one in (root, open_root(cloud)):
+        one.refresh()
+        assert not one.exists("media/S/n")
+        assert not one.exists("media/S/n/a")
+    fill(root, "media/S/n", {"a": b"2"})
+    assert read_folder(root, "media/S/n") == {"a": b"2"}

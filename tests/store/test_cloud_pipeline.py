@@ -1,0 +1,50 @@
+"""The smoke pipeline on an S3 server, killed half-way: the same tables, meshes and recordings as on a local disk."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+from aerialdojo_gen.pipeline.code_digest import PLUMBING
+from aerialdojo_gen.store import shards as store
+from aerialdojo_gen.store.root import open_root
+
+
+def test_a_killed_run_goes_on_and_gives_what_a_local_one_gives(cloud: str, smoke: Path, project: Path):
+    command = [sys.executable, "-m", "aerialdojo_gen.cli", "run", "pipelines/smoke.toml", "--data", cloud]
+    environment = os.environ | {"AERIALDOJO_LEASE_S": "3"}
+    root, local = open_root(cloud), open_root(smoke)
+    killed = subprocess.Popen([*command, "--workers", "2"], cwd=project, env=environment, stderr=subprocess.DEVNULL)
+    try:
+        while not root.list("anchors", "*/*"):
+            assert killed.poll() is None, "it ended by itself"
+            root.refresh()
+            time.sleep(0.1)
+    finally:
+        killed.kill()
+        killed.wait()
+    done = subprocess.run(command, cwd=project, env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    root.refresh()
+    scenes = store.release_scenes(local)
+    assert store.release_scenes(root) == scenes
+    for table, place in store.LAYOUT.items():
+        for scene in scenes if place.command != "evaluate" else []:
+            assert store.content(root, table, scene) == store.content(local, table, scene), (table, scene)
+    for scene in scenes:
+        assert root.digest(f"meshes/{scene}.glb", anew=True) == local.digest(f"meshes/{scene}.glb")
+        for row in store.read_scene(root, "recordings", scene, ["path", "bytes", "sha256"]).to_pylist():
+            assert root.is_whole(row["path"], row["bytes"], row["sha256"], anew=True)
+    again = subprocess.run(command, cwd=project, env=environment, capture_output=True, text=True, check=False)
+    assert again.returncode == 0, again.stderr
+    assert again.stderr.count("nothing to do") == 9, again.stderr
+
+
+def test_what_carries_rows_about_makes_nothing_stale():
+    """Only what decides which bytes are written counts as a stage's code; that is no module of the data root."""
+    folder = Path(store.__file__).parent
+    plumbing = {f"aerialdojo_gen.store.{path.stem}" for path in folder.glob("*.py") if path.stem != "__init__"}
+    assert plumbing - set(PLUMBING) == {"aerialdojo_gen.store.tables"}
