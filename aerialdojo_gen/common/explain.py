@@ -50,7 +50,8 @@ def faults_of(error: ValidationError, model: type[BaseModel]) -> list[ModelFault
         path = tuple(raw["loc"])
         if not path:
             # Of the whole: what it says names its keys itself.
-            texts = str(raw["ctx"]["error"]).split("; ") if "ctx" in raw else [raw["msg"]]
+            error_of = raw.get("ctx", {}).get("error")
+            texts = [raw["msg"]] if error_of is None else str(error_of).split("; ")
             faults += [ModelFault(path, text, text) for text in texts]
             continue
         key = ".".join(map(str, path[_owner(path) :]))

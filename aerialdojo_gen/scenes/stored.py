@@ -41,7 +41,7 @@ def mesh_file(data: DataRoot, relative: str) -> Path:
         The store does not answer.
     """
     try:
-        return mesh_copy(data, relative)
+        return data.local_copy(relative)
     except FileNotFoundError:
         missing = f"{data.at(relative)}: cannot be read ({os.strerror(2)}); run build-scenes first"
         raise AssetError(missing) from None

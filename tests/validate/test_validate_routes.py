@@ -185,7 +185,7 @@ def test_a_start_that_is_another_anchor(planted):
 
 def scene_data(planted, **options):
     tables, _ = read_tables(release_of(planted.release), planted.scene)
-    return SceneData(planted.scene, planted.release, definitions(), tables, **options)
+    return SceneData(planted.scene, release_of(planted.release), definitions(), tables, **options)
 
 
 def test_replayed_actions_are_swept_for_themselves(planted, world):
