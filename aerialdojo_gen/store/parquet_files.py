@@ -46,10 +46,15 @@ def read_file(path: Path, columns: Sequence[str] | None = None, called: str = ""
     """
     wanted = None if columns is None else [*columns]
     try:
-        table = pq.read_table(path, partitioning=None, page_checksum_verification=True, columns=wanted)
-        # Names are decoded when they are asked for.
-        _ = table.schema.names
-        return table
+        # In this thread: where memory is short Arrow's pool gets no thread, and waits for one for ever. The processes
+        # beside this one read meanwhile.
+        with pq.ParquetFile(path, page_checksum_verification=True, pre_buffer=False) as file:
+            # Names are decoded when they are asked for; a column that is not there is left out unasked.
+            missing = set(wanted or ()) - set(file.schema_arrow.names)
+            if missing:
+                raise pa.ArrowInvalid(f"no column {min(missing)}")
+            table = file.read(wanted, use_threads=False)
+            return table if wanted is None else table.select(wanted)
     except _DAMAGE as error:
         raise StoreError(f"{called or path} is damaged ({first_line(error)})") from None
 

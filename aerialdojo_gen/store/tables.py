@@ -71,7 +71,7 @@ def check_table(spec: TableSpec, table: pa.Table) -> pa.Table:
         if not ordered.equals(ordered.sort_by([(k, "ascending") for k in spec.order])):
             raise StoreError(f"{spec.name}: rows are not sorted by {', '.join(spec.order)}")
         keys = table.select(list(spec.key))
-        if keys.group_by(list(spec.key)).aggregate([]).num_rows != keys.num_rows:
+        if keys.group_by(list(spec.key), use_threads=False).aggregate([]).num_rows != keys.num_rows:
             raise StoreError(f"{spec.name}: a key ({', '.join(spec.key)}) stands twice")
     return table
 

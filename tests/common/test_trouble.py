@@ -89,7 +89,7 @@ def test_file_descriptors_that_run_out_half_way_are_one_line(tmp_path):
     assert_one_line(done, 1, "too few file descriptors: ulimit -n is 64; raise it, or use fewer --workers")
 
 
-@pytest.mark.parametrize("mib", [512])
+@pytest.mark.parametrize("mib", [512, 1100])
 def test_too_little_address_space_is_said_in_one_line(smoke, tmp_path, mib):
     data = shutil.copytree(smoke, tmp_path / "data")
     shutil.rmtree(data / "plans")
