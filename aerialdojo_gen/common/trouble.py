@@ -83,6 +83,8 @@ def explained(error: BaseException) -> str | None:
         if (
             isinstance(cause, MemoryError)
             or number == errno.ENOMEM
+            # An extension that got no memory while it was imported, and forgot to say so.
+            or (isinstance(cause, SystemError) and "without setting an exception" in said and _address_space())
             or (isinstance(cause, OSError | ImportError | RuntimeError) and any(w in said for w in _NO_MEMORY))
         ):
             return f"not enough memory{_address_space()}: give it more, or use fewer --workers"
