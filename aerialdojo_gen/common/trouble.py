@@ -72,6 +72,19 @@ def check_limits(arguments: Sequence[str]) -> None:
         raise AerialDojoError(f"too few file descriptors: ulimit -n is {soft}, at least {_LEAST_FILES} are needed")
 
 
+def check_memory(needed_mb: int, what: str) -> None:
+    """Refuse work for which there is too little address space: the native libraries it uses crash or hang half-way.
+
+    Raises
+    ------
+    AerialDojoError
+        The process's limit is below what the work takes.
+    """
+    memory = resource.getrlimit(resource.RLIMIT_AS)[0]
+    if memory != resource.RLIM_INFINITY and memory < needed_mb << 20:
+        raise AerialDojoError(f"not enough memory{_address_space()}: {what} takes up to {needed_mb:,} MB")
+
+
 def explained(error: BaseException) -> str | None:
     """Return the line to print for an error that the machine's limits or its disk caused; None for any other."""
     for cause in _chain(error):

@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from aerialdojo_gen.common.names import choose_scenes, unknown
+from aerialdojo_gen.common.trouble import check_memory
 from aerialdojo_gen.config.pipeline import Pipeline
 from aerialdojo_gen.errors import AerialDojoError, BudgetSpent, UsageError
 from aerialdojo_gen.pipeline.code_digest import stage_code
@@ -172,6 +173,7 @@ def _run_stage(
         config = stage.settle(section, reporter.line)
         lot = shards_of(stage, config, scenes, pipeline, roots, force, reporter, limits)
         if lot.tasks:
+            check_memory(stage.memory_mb, stage.name)
             stage.check(roots.data, scenes, config)
     tasks, fresh, errors = lot.tasks, lot.fresh, lot.errors
     done = []
