@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import contextlib
 import json
-import shutil
 import tempfile
 from collections.abc import Iterator
 from dataclasses import replace
@@ -20,6 +19,7 @@ from aerialdojo_gen.errors import AerialDojoError
 from aerialdojo_gen.pipeline.stage import Roots
 from aerialdojo_gen.scenes.recipe import Cut, load_imported
 from aerialdojo_gen.store.atomic import atomic_file
+from aerialdojo_gen.store.staging import scratch_folder
 
 _HEAD = "\n[[imported.cuts]]\n"
 
@@ -83,19 +83,14 @@ def staged(roots: Roots, scene: str, text: str) -> Iterator[Roots]:
     StoreError
         The disk for temporary files cannot be written.
     """
-    folder = Path(tempfile.gettempdir())
-    try:
-        folder = Path(tempfile.mkdtemp(prefix=f"aerialdojo-boxes-{scene}-"))
-        (folder / f"{scene}.toml").write_text(text, encoding="utf-8")
-        (folder / f"{scene}.glb").symlink_to((roots.recipes / f"{scene}.glb").resolve())
-    except OSError as error:
-        if folder.name.startswith("aerialdojo-boxes-"):
-            shutil.rmtree(folder, ignore_errors=True)
-        raise disk_error(error, folder) from error
-    try:
+    with contextlib.ExitStack() as held:
+        try:
+            folder = held.enter_context(scratch_folder())
+            (folder / f"{scene}.toml").write_text(text, encoding="utf-8")
+            (folder / f"{scene}.glb").symlink_to((roots.recipes / f"{scene}.glb").resolve())
+        except OSError as error:
+            raise disk_error(error, Path(tempfile.gettempdir())) from error
         yield replace(roots, recipes=folder)
-    finally:
-        shutil.rmtree(folder, ignore_errors=True)
 
 
 def write(recipe: Path, text: str) -> None:

@@ -182,9 +182,9 @@ def run_stages(
 def _finish_release(config: Pipeline, data: DataRoot, scenes: list[str], whole: bool, reporter: Reporter) -> None:
     """Bring what stands beside the tables of a release up to date with them."""
     from aerialdojo_gen.release.card import write_card
+    from aerialdojo_gen.release.contents import prune_release
     from aerialdojo_gen.release.croissant import write_croissant
     from aerialdojo_gen.release.provenance import record_makers
-    from aerialdojo_gen.store.shards import prune_release
 
     if whole:
         # The whole pipeline was asked for: the release holds its scenes and no others.

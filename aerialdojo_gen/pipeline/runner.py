@@ -9,7 +9,6 @@ from __future__ import annotations
 import time
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
-from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -25,7 +24,6 @@ from aerialdojo_gen.pipeline.progress import Reporter
 from aerialdojo_gen.pipeline.registry import STAGES
 from aerialdojo_gen.pipeline.stage import Roots, Stage
 from aerialdojo_gen.pipeline.task import compute
-from aerialdojo_gen.store.root import Where, open_root
 
 
 @dataclass(frozen=True)
@@ -64,11 +62,6 @@ class StageSummary:
             f"{self.stage}: {self.rows_in:,} rows in, {self.rows_out:,} out"
             f"{f' ({counts})' if counts else ''}; {fresh}; {self.seconds:.1f} s"
         )
-
-
-def data_lock(data: Where) -> AbstractContextManager[None]:
-    """Hold a data root: `aerialdojo_gen.store.root.DataRoot.lock`."""
-    return open_root(data).lock()
 
 
 def run(
@@ -133,7 +126,7 @@ def run(
     carried = (roots.scene_assets, roots.recipes, roots.annotations)
     folders = Folders(on_disk(roots.data), carried, on_disk(roots.data), reporter.line)
     made = make_executor(executor, workers, address, folders)
-    with data_lock(roots.data), Interrupts() as interrupts, made as pool:
+    with roots.data.lock(), Interrupts() as interrupts, made as pool:
         if prepare:
             prepare()
         for stage in stages:

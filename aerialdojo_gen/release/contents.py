@@ -81,6 +81,16 @@ def scenes_there(where: Where, folder: str = FOLDER) -> list[str]:
     return sorted(set().union(*parts_there(where, folder).values()))
 
 
+def prune_release(where: Where, scenes: Sequence[str]) -> list[str]:
+    """Remove the parts of all other scenes from the release; returns the names of those removed."""
+    root = open_root(where)
+    gone = [scene for scene in scenes_there(root) if scene not in scenes]
+    for scene in gone:
+        for name in SHARDS:
+            root.delete(part_name(name, scene))
+    return gone
+
+
 def release_scenes(where: Where, folder: str = FOLDER) -> list[str]:
     """List the scenes of a release, by name; one that lacks a part is listed too.
 

@@ -86,13 +86,6 @@ def shard_folder(table: str, scene: str, run: str = "default") -> str:
     return shard_name(table, scene, run=run).rpartition("/")[0]
 
 
-def release_patterns() -> list[tuple[str, str]]:
-    """List the folders of the release's tables, and what the names of the shards in each match."""
-    templates = {place.template for place in LAYOUT.values() if place.in_release}
-    places = {t.format(partition=side, scene="*") for t in templates for side in ("id", "ood")}
-    return [(folder, name) for folder, _, name in (place.rpartition("/") for place in sorted(places))]
-
-
 def is_plain(name: str) -> bool:
     """Whether a name may be a scene's or a run's."""
     return _PLAIN.fullmatch(name) is not None

@@ -23,9 +23,7 @@ from aerialdojo_gen.store.layout import (
     Place,
     check_run_name,
     check_scene_name,
-    is_plain,
     partition,
-    release_patterns,
     shard_folder,
     shard_name,
 )
@@ -35,7 +33,7 @@ from aerialdojo_gen.store.tables import check_table, column_digests, content_dig
 
 __all__ = [
     "LAYOUT", "META", "Place", "check_run_name", "check_scene_name", "content", "count_rows", "partition",
-    "prune", "prune_release", "read_info", "read_scene", "release_scenes", "shard_folder", "shard_name",
+    "prune", "read_info", "read_scene", "shard_folder", "shard_name",
     "shard_path", "shards", "write_shard",
 ]  # fmt: skip
 
@@ -228,25 +226,3 @@ def prune(data: Where, table: str, scene: str, parts: int) -> None:
     for name in shards(root, table, scene):
         if name not in keep:
             root.delete(name)
-
-
-def release_scenes(data: Where) -> list[str]:
-    """List the scenes that any table of the release has a part of, by name.
-
-    A scene that lacks a part is listed too, so that whoever reads it is told.
-    """
-    root = open_root(data)
-    found = (name for folder, pattern in release_patterns() for name in root.list(folder, pattern))
-    names = {name.rpartition("/")[2].removeprefix("part-").removesuffix(".parquet") for name in found}
-    return sorted(name for name in names if is_plain(name))
-
-
-def prune_release(data: Where, scenes: Sequence[str]) -> list[str]:
-    """Remove the parts of all other scenes from the release; returns the names of those removed."""
-    root = open_root(data)
-    gone = [scene for scene in release_scenes(root) if scene not in scenes]
-    for scene in gone:
-        for table, place in LAYOUT.items():
-            if place.in_release:
-                root.delete(shard_name(table, scene))
-    return gone

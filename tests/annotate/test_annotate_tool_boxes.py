@@ -9,6 +9,7 @@ import shutil
 import signal
 import subprocess
 import sys
+import tempfile
 import threading
 import time
 import urllib.error
@@ -31,6 +32,9 @@ from aerialdojo_gen.layouts.build import build_scene
 from aerialdojo_gen.scenes.catalogue import load_catalogue
 from aerialdojo_gen.scenes.cuts import cut_out
 from aerialdojo_gen.scenes.recipe import Cut
+
+# Where changed recipes are laid out for a build.
+SCRATCH = Path(tempfile.gettempdir()) / f"aerialdojo-gen-{os.getuid()}"
 
 SHED = ([2.5, 2.5, 0.05], [7.5, 7.5, 4.0])
 
@@ -174,7 +178,7 @@ def test_a_box_that_cannot_be_built_leaves_the_recipe_as_it_was(terrain, project
         assert asked(url, "api/pick", top)[1]["node"] == "shed_000"
         assert asked(url, "api/boxes/shed_000", method="DELETE") == (200, {})
     assert recipe.read_bytes() == before
-    assert not list(data.glob(".boxes-*"))
+    assert not list(SCRATCH.rglob("Scan.toml"))
 
 
 def taken(path: Path):
@@ -236,4 +240,4 @@ def test_a_server_killed_while_it_builds_a_box_leaves_the_recipe_as_it_was(terra
         assert asked(url, "api/boxes", box)[1]["node"] == "shed_000"
         assert asked(url, "api/boxes/shed_000", method="DELETE") == (200, {})
     assert recipe.read_bytes() == before
-    assert not list(data.glob(".boxes-*"))
+    assert not list(SCRATCH.rglob("Scan.toml"))

@@ -17,6 +17,7 @@ from typer.testing import CliRunner
 from aerialdojo_gen.cli import app
 from aerialdojo_gen.errors import AssetError, StoreError, UsageError
 from aerialdojo_gen.exchange.exporting import export_release
+from aerialdojo_gen.release.contents import scenes_there
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.atomic import atomic_folder
 from aerialdojo_gen.store.staging import AREA
@@ -350,7 +351,7 @@ def test_the_command_says_what_it_wrote_and_what_is_wrong(smoke, tmp_path):
         app, ["export", "--format", "aerialdojo", "--data", str(smoke), "--out", str(tmp_path / "o")]
     )
     assert done.exit_code == 0
-    scenes = store.release_scenes(smoke)
+    scenes = scenes_there(smoke)
     n = sum(store.count_rows(smoke, table, scene) for table in ("routes/train", "routes/test") for scene in scenes)
     assert n > 100
     assert done.output.strip().endswith(f"2 scenes, 24 task files, {2 * n} tasks, {n} trajectories, 16 pictures")

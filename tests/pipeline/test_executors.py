@@ -160,20 +160,7 @@ def test_ctrl_c_ends_all_processes(executor, tmp_path):
     _, err = process.communicate(timeout=60)
     assert process.returncode == 130, err
     assert "Traceback" not in err
-    chores.until(lambda: not session_members(process.pid))
-
-
-def session_members(session):
-    """Processes of a session that are alive."""
-    found = []
-    for stat in Path("/proc").glob("[0-9]*/stat"):
-        try:
-            fields = stat.read_text().rsplit(")", 1)[1].split()
-        except OSError:
-            continue
-        if int(fields[3]) == session and fields[0] != "Z":
-            found.append(int(stat.parent.name))
-    return found
+    chores.until(lambda: not chores.session_members(process.pid))
 
 
 def test_what_cannot_be_is_said_in_one_line(monkeypatch):

@@ -7,11 +7,11 @@ import struct
 import subprocess
 import sys
 import time
-from pathlib import Path
 
 import pyarrow.parquet as pq
 import pytest
 import torture
+from support import chores
 
 from aerialdojo_gen.errors import AssetError
 from aerialdojo_gen.scenes.glb import read_glb
@@ -56,25 +56,12 @@ def snapshot(data):
     return {str(p.relative_to(data)): p.read_bytes() for p in files}
 
 
-def members(session):
-    """Processes of a session that are alive (not zombies)."""
-    found = []
-    for stat in Path("/proc").glob("[0-9]*/stat"):
-        try:
-            fields = stat.read_text().rsplit(")", 1)[1].split()
-        except OSError:
-            continue
-        if int(fields[3]) == session and fields[0] != "Z":
-            found.append(int(stat.parent.name))
-    return found
-
-
 def wait_until_empty(session):
     for _ in range(200):
-        if not members(session):
+        if not chores.session_members(session):
             return
         time.sleep(0.05)
-    raise AssertionError(f"processes outlived their parent: {members(session)}")
+    raise AssertionError(f"processes outlived their parent: {chores.session_members(session)}")
 
 
 def wait_for_shards(data, n, process):

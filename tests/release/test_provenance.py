@@ -13,8 +13,9 @@ import pytest
 from aerialdojo_gen.commands.common import open_pipeline, run_until
 from aerialdojo_gen.errors import StoreError, UsageError
 from aerialdojo_gen.pipeline import runner
-from aerialdojo_gen.pipeline.runner import data_lock
+from aerialdojo_gen.release.contents import scenes_there
 from aerialdojo_gen.store import shards as store
+from aerialdojo_gen.store.root import open_root
 
 A, B = "U_Courtyard_0", "U_Courtyard_1"
 
@@ -79,7 +80,7 @@ def test_another_pipeline_is_refused_at_once_and_nothing_is_lost(data, pipeline,
 
 def test_replace_puts_the_other_pipeline_s_release_in_its_place(data, pipeline):
     split(data, pipeline(), replace=True)
-    assert store.release_scenes(data) == [B]
+    assert scenes_there(data) == [B]
     (entry,) = json.loads((data / "release" / "pipeline.json").read_text())["pipelines"]
     assert (entry["name"], entry["scenes"]) == ("other", [B])
     split(data, pipeline())
@@ -109,7 +110,7 @@ def test_a_copy_with_the_same_name_and_other_settings_removes_nothing(data, pipe
     assert release(data) == before
     # Narrowed and nothing else: the release holds what the pipeline asks for, as ever.
     split(data, pipeline("smoke"))
-    assert store.release_scenes(data) == [B]
+    assert scenes_there(data) == [B]
 
 
 @pytest.mark.parametrize("record", [None, "{", '{"pipelines": [{"name": 3}]}'])
@@ -127,7 +128,7 @@ def test_a_release_that_does_not_say_is_not_thinned_out_but_made_again(data, pro
 
 def test_what_stands_beside_the_tables_is_written_while_the_data_is_held(tmp_path):
     def other():
-        with pytest.raises(StoreError, match="another run is writing"), data_lock(tmp_path / "data"):
+        with pytest.raises(StoreError, match="another run is writing"), open_root(tmp_path / "data").lock():
             pass
         asked.append(os.getpid())
 

@@ -9,6 +9,7 @@ import time
 from pathlib import Path
 
 from aerialdojo_gen.pipeline.code_digest import PLUMBING
+from aerialdojo_gen.release.contents import scenes_there
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.root import open_root
 
@@ -29,8 +30,8 @@ def test_a_killed_run_goes_on_and_gives_what_a_local_one_gives(cloud: str, smoke
     done = subprocess.run(command, cwd=project, env=environment, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     root.refresh()
-    scenes = store.release_scenes(local)
-    assert store.release_scenes(root) == scenes
+    scenes = scenes_there(local)
+    assert scenes_there(root) == scenes
     for table, place in store.LAYOUT.items():
         for scene in scenes if place.command != "evaluate" else []:
             assert store.content(root, table, scene) == store.content(local, table, scene), (table, scene)

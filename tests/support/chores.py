@@ -104,3 +104,16 @@ def until(true, seconds=60.0):
         if time.monotonic() > end:
             raise TimeoutError("it did not come to it")
         time.sleep(0.02)
+
+
+def session_members(session):
+    """Processes of a session that are alive (not zombies)."""
+    found = []
+    for stat in Path("/proc").glob("[0-9]*/stat"):
+        try:
+            fields = stat.read_text().rsplit(")", 1)[1].split()
+        except OSError:
+            continue
+        if int(fields[3]) == session and fields[0] != "Z":
+            found.append(int(stat.parent.name))
+    return found

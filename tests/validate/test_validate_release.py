@@ -16,7 +16,7 @@ from aerialdojo_gen.common.paper import PaperScene
 from aerialdojo_gen.config.pipeline import Pipeline
 from aerialdojo_gen.config.sections import SplitConfig
 from aerialdojo_gen.errors import StoreError, UsageError
-from aerialdojo_gen.release.contents import check_release
+from aerialdojo_gen.release.contents import check_release, scenes_there
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.schemas import SETTINGS
 from aerialdojo_gen.validate import Asked, counts, validate, write_report
@@ -130,7 +130,7 @@ def test_a_card_and_a_croissant_that_tell_other_numbers(planted):
 
 def test_a_lost_part_is_told_by_whoever_reads_the_release(planted):
     planted.path("release/scenes").unlink()
-    assert planted.scene in store.release_scenes(planted.data)
+    assert planted.scene in scenes_there(planted.data)
     with pytest.raises(StoreError, match="missing"):
         check_release(planted.data)
     with pytest.raises(StoreError, match=f"release/scenes of {planted.scene} is missing"):
