@@ -1,6 +1,7 @@
 """A new stage touches its module, its schema and the registry, and nothing else: CONTRIBUTING's example, run."""
 
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -16,36 +17,8 @@ PACKAGE = Path(aerialdojo_gen.__file__).parent
 CHECKOUT = next(folder for folder in Path(__file__).parents if (folder / "pyproject.toml").is_file())
 SCENE = "U_Courtyard_0"
 
-MODULE = '''"""`tally`: how many things of each category stand in a scene."""
-
-from __future__ import annotations
-
-from collections import Counter
-
-from aerialdojo_gen.pipeline.stage import Job, Output, Stage
-
-
-def run(job: Job, config: object) -> Output:
-    """Count the instances of a scene's mesh."""
-    from aerialdojo_gen.store.schemas.staged import TALLIES
-    from aerialdojo_gen.store.tables import from_rows
-
-    things = Counter(instance.category for instance in job.scene_model().instances)
-    rows = [{"scene": job.scene, "category": name, "things": n} for name, n in sorted(things.items())]
-    return Output({"tallies": from_rows(TALLIES, rows)}, rows_in=sum(things.values()), rows_out=len(rows))
-
-
-STAGE = Stage("tally", "Count a scene's things by category.", reads=("scenes",), writes=("tallies",), run=run)
-'''
-SCHEMA = """TALLIES = table(
-    "tallies", ["scene", "category"],
-    SCENE,
-    column("category", pa.string(), "category of the catalogue or of the structure"),
-    column("things", pa.int32(), "instances of it"),
-    command="tally",
-)  # fmt: skip
-
-STAGED = ("""
+# The example of CONTRIBUTING, as it stands there.
+MODULE, SCHEMA = re.findall(r"```python\n(.*?)```", (CHECKOUT / "CONTRIBUTING.md").read_text(), re.DOTALL)[:2]
 
 
 @pytest.fixture
@@ -60,7 +33,7 @@ def checkout(tmp_path):
         (tmp_path / folder).symlink_to(CHECKOUT / folder)
     package = tmp_path / "aerialdojo_gen"
     (package / "stages" / "tally.py").write_text(MODULE)
-    replaced(package / "store" / "schemas" / "staged.py", "STAGED = (", SCHEMA)
+    replaced(package / "store" / "schemas" / "staged.py", "STAGED = (", f"{SCHEMA}\n\nSTAGED = (")
     replaced(package / "store" / "schemas" / "staged.py", "VERDICTS)", "VERDICTS, TALLIES)")
     replaced(package / "pipeline" / "registry.py", "    split,\n)", "    split,\n    tally,\n)")
     replaced(package / "pipeline" / "registry.py", "    render.STAGE,\n", "    render.STAGE,\n    tally.STAGE,\n")

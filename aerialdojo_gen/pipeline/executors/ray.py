@@ -149,7 +149,7 @@ class RayExecutor(Executor):
                     yield outcome
             if not running and time.monotonic() - begun_s > _SAY_AFTER_S:
                 begun_s = float("inf")
-                self._folders.say(f"no node of the cluster has room for a process yet: {self._room()}")
+                self._folders.say(f"no process of the cluster has started yet: {self._room()}")
 
     def close(self) -> None:
         """End the actors when they have done what they are at."""
