@@ -49,7 +49,7 @@ class Parts:
         How well the parts that make its name true are seen (`aerialdojo_gen.scoring.knowing`); None where the whole
         body tells, or nothing is known of it.
     front : float or None
-        Full marks up to 35° off the object's front, little beyond 60°; None where it has none.
+        Full marks up to 25° off the object's front, little beyond 60°; None where it has none.
     """
 
     unoccluded: float

@@ -10,7 +10,7 @@ Floats = NDArray[np.float64]
 TELLS_WEIGHT, FRONT_WEIGHT = 0.35, 0.3
 # Within it an object counts as seen from its front: a step in the marks, which a little more light must not outweigh.
 FRONT_RAD = float(np.radians(60.0))
-_ANGLES_RAD, _MARKS = np.radians([0.0, 35.0, 60.0, 60.001, 120.0]), (1.0, 1.0, 0.6, 0.2, 0.0)
+_ANGLES_RAD, _MARKS = np.radians([0.0, 25.0, 60.0, 60.001, 120.0]), (1.0, 1.0, 0.5, 0.15, 0.0)
 
 
 def telling(told: Floats) -> Floats:
@@ -30,7 +30,7 @@ def telling(told: Floats) -> Floats:
 
 
 def fronting(off_front_rad: Floats | None) -> Floats | None:
-    """Mark angles off the front: full up to 35°, 0.6 at 60°, little beyond; None for an object without a front."""
+    """Mark angles off the front: full up to 25°, half at 60°, little beyond; None for an object without a front."""
     return None if off_front_rad is None else np.asarray(np.interp(off_front_rad, _ANGLES_RAD, _MARKS))
 
 

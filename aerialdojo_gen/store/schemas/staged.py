@@ -113,7 +113,7 @@ ANCHOR_COLUMNS = (
     column("part_clear", pa.float64(), "room around the body, 1 at the standoff"),
     column("part_tells", pa.float64(), "how well the parts that make the name true are seen, 0 to 1; null where the "
            "whole body does", nullable=True),
-    column("part_front", pa.float64(), "1 up to 35 degrees off the front, little beyond 60; null without a front",
+    column("part_front", pa.float64(), "1 up to 25 degrees off the front, little beyond 60; null without a front",
            nullable=True),
     column("selected", pa.bool_(), "true for one anchor an object: the goal of its tasks"),
     column("selected_by", pa.string(), "human or auto"),
