@@ -33,7 +33,7 @@ STAGE = Stage(
     reads=("scenes", "landmarks", "objects", "anchors", "viewpoints", "references", "pairs", "plans", "verdicts"),
     writes=(
         "tasks/train", "tasks/test", "routes/train", "routes/test",
-        "release/scenes", "release/landmarks", "release/objects", "release/anchors",
+        "release/scenes", "release/landmarks", "release/objects", "release/anchors", "release/viewpoints",
     ),
     run=run,
     check=check,
