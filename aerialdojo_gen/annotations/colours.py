@@ -23,8 +23,10 @@ SHADES: Mapping[str, frozenset[str]] = {
         "teal": "turquoise green blue", "turquoise": "turquoise green blue", "green": "green turquoise yellow",
         "olive": "green yellow brown", "yellow": "yellow orange beige brown", "ochre": "yellow orange brown beige",
         "amber": "yellow orange brown", "orange": "orange red yellow brown", "gold": "yellow orange brown beige",
-        "golden": "yellow orange brown beige", "bronze": "brown orange yellow green grey", "copper": "brown orange green red turquoise",
-        "brown": "brown orange beige red", "tan": "brown beige orange yellow", "beige": "beige white orange yellow brown grey",
+        "golden": "yellow orange brown beige", "bronze": "brown orange yellow green grey",
+        "copper": "brown orange green red turquoise",
+        "brown": "brown orange beige red", "tan": "brown beige orange yellow",
+        "beige": "beige white orange yellow brown grey",
         "sand": "beige yellow orange brown", "cream": "beige white yellow grey", "white": "white beige grey",
         "silver": "grey white", "grey": "grey white black", "gray": "grey white black", "black": "black grey",
     }.items()
@@ -102,7 +104,7 @@ def uncoloured(text: str, instance: Instance, materials: Mapping[str, Material])
     Returns
     -------
     list of str
-        Colours of which too little is there: under a tenth of the surface, of several or of a part under a thirtieth each.
+        Colours of which too little is there: under a tenth of the surface, of several or of a part under 3 % each.
     """
     words = colour_words(text)
     shares = colour_shares(instance, materials)

@@ -104,6 +104,8 @@ class Places:
         return test(i, value, slack)
 
     def _within(self, i: int, pattern: str, most_m: float) -> bool:
+        if most_m >= AT_M and i in self._things(pattern):
+            return True  # what makes the place is there itself
         close = set(self._geometry.around(i, most_m))
         return any(self._geometry.gap_m(i, j) <= most_m for j in sorted(self._things(pattern) & close))
 
@@ -117,13 +119,25 @@ class Places:
     def _stack(self, i: int) -> list[int]:
         """What an instance stands on, and what that stands on, and so on."""
         chain: list[int] = []
-        at: int | None = i
-        while at is not None and len(chain) < 5:
-            at = self._geometry.support(at)
-            if at is None or at in chain:
-                break
+        at = self._geometry.support(i)
+        if at is None:
+            at = self._sunk(i)
+        while at is not None and at not in chain and len(chain) < 5:
             chain.append(at)
+            at = self._geometry.support(at)
         return chain
+
+    def _sunk(self, i: int) -> int | None:
+        """What an instance stands on where its feet are not level: a slope, a rock."""
+        low = float(self._geometry.boxes[i, 0, 2])
+        found = [
+            (float(heights[heights <= low + 2.0 * _STEP_M].max()), j)
+            for x, y in self._geometry.probes(i)
+            for j, heights in self._geometry.columns(i, x, y)
+            if (heights <= low + 2.0 * _STEP_M).any()
+        ]
+        best = max(found, default=(-math.inf, -1))
+        return best[1] if best[0] >= low - 2.0 * _STEP_M else None
 
     def _on(self, i: int, pattern: str, _slack: float) -> bool:
         return bool(self._things(pattern) & set(self._stack(i)))
@@ -236,7 +250,7 @@ class Places:
         return ends[0] <= float(self._geometry.boxes[i, 0, 2]) <= ends[1]
 
     def _floor(self, i: int, value: list[Any], _slack: float) -> bool:
-        """On that floor of a thing: so many of its slabs lie above the lowest and not above the foot; it has a roof."""
+        """On that floor of a thing: so many of its slabs lie above its ground floor and not above the foot."""
         number, pattern = value
         low = float(self._geometry.boxes[i, 0, 2])
         for j in sorted(self._things(pattern) & set(self._stack(i))):

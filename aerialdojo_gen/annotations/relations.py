@@ -19,13 +19,16 @@ from aerialdojo_gen.store.schemas import DIRECTIONS
 
 Floats = NDArray[np.float64]
 
+AGAINST_M = 0.5
 BESIDE_M = 3.0
+AT_M = 5.0
 NEAR_M = 8.0
 SIDE_M = 12.0
 BETWEEN_M = 6.0
 LEVEL_M = 1.5  # less than a storey: who is a floor above is not beside
 COVER_M = 12.0
 BETWEEN_DEG = 120.0
+FRONT_DEG = 60.0
 _LARGE_M = 10.0  # above it a thing's outline is its projected mesh; below, the convex hull is as good and cheaper
 _MANY_FACES = 20_000
 _TOUCH_M = 0.35
@@ -194,6 +197,34 @@ class SceneGeometry:
     def near(self, i: int, j: int, slack: float = 1.0) -> bool:
         """`i` stands a few steps from `j`, about level with it."""
         return self.gap_m(i, j) <= NEAR_M * slack and self._level(i, j, slack)
+
+    def against(self, i: int, j: int, slack: float = 1.0) -> bool:
+        """`i` touches `j`, or nearly."""
+        return self.gap_m(i, j) <= AGAINST_M * slack and self._level(i, j, slack)
+
+    def at(self, i: int, j: int, slack: float = 1.0) -> bool:
+        """`i` belongs to where `j` stands."""
+        return self.gap_m(i, j) <= AT_M * slack and self._level(i, j, slack)
+
+    def front(self, i: int, j: int, slack: float = 1.0) -> bool:
+        """`i` stands before a front of `j`, of a thing without a front close by it."""
+        return self._before(i, j, slack, 0.0)
+
+    def behind(self, i: int, j: int, slack: float = 1.0) -> bool:
+        """`i` stands before the back of `j`, of a thing without a front close by it."""
+        return self._before(i, j, slack, math.pi)
+
+    def _before(self, i: int, j: int, slack: float, turn_rad: float) -> bool:
+        if not self.at(i, j, slack):
+            return False
+        anatomy = self.scene.instances[j].anatomy
+        fronts = anatomy.fronts_rad if anatomy is not None else ()
+        # What has two faces has no back: its two sides are as good.
+        if not fronts or (turn_rad and len(fronts) > 1):
+            return True
+        bearing = self.bearing_rad(i, j)
+        most = math.radians(FRONT_DEG) * slack
+        return bearing is not None and any(abs(wrap_angle_rad(bearing - f - turn_rad)) <= most for f in fronts)
 
     def _level(self, i: int, j: int, slack: float) -> bool:
         return self._rise_m(i, j) <= LEVEL_M * slack
