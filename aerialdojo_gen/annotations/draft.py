@@ -8,7 +8,7 @@ many of the facts about their place as it takes to tell them from their rivals. 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -98,7 +98,7 @@ def redraft_annotations(scene: Scene, catalogue: Catalogue, annotations: Annotat
             )
         category = scene[entry.node].category
         objects.append(entry.model_copy(update={"name": name, "category": category, "description": text}))
-    return annotations.model_copy(update={"objects": tuple(objects)})
+    return replace(annotations, objects=tuple(objects))
 
 
 def draft_annotations(
