@@ -182,7 +182,7 @@ def shortlisted(
     best = shortlist(score, azimuth[few], config.shortlist, apart, front[few])
     own_distance = Surface.of(world.scene.instances[found.instance]).distance_m(found.positions_m[few[best]])
     why = None
-    if len(best) and front.any() and not front[few[best[0]]]:
+    if len(best) and front[seen].any() and not front[few[best[0]]]:
         why = "better_elsewhere"
     elif len(best) and found.off_front_rad is not None and not front[few[best[0]]]:
         nearly["not_visible"] += int((found.off_front_rad <= FRONT_RAD).sum())
