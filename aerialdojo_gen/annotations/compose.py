@@ -43,6 +43,8 @@ def compose(
     (str, str)
         The description, and the template that it was made from.
     """
+    if place and needed and place.split()[0] == needed[0].split()[0] == "beside":
+        needed = [needed[0].replace("beside", "next to", 1), *needed[1:]]
     look = _least_used(words.looks, rng, used) if words.looks else ""
     template = _template(noun, look, bool(extra), rng, used)
     comma = "," if place and needed and (len(place.split()) > _LONG_PLACE or len(needed) > 1) else ""

@@ -133,7 +133,7 @@ class Teller:
         for attempt in range(_TRIES):
             place = where if attempt < _TRIES // 2 else ""
             usable = [fact for fact in facts if not self._named_in(fact, place)][attempt % 3 :]
-            talkative = bool(rng.random() < (0.4 if place else 0.8)) and attempt < _TRIES // 3
+            talkative = bool(rng.random() < (0.25 if place else 0.7)) and attempt < _TRIES // 3
             needed, extra = self._choose(i, f"It is {noun.a()} {place}.", usable, talkative)
             if not needed and not (place and attempt >= _TRIES // 3):
                 continue

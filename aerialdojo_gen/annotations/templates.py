@@ -39,7 +39,7 @@ PLAIN = (
     "It is {a}, {ing} {rel}.",
 )
 # For what is worth saying besides.
-MORE = ("It is also {rel}.", "You will see that it is {rel}, too.")
+MORE = ("It is also {rel}.",)
 RELATIONS = {
     "beside": ("beside {}", "next to {}", "right beside {}", "right next to {}"),
     "near": ("near {}", "close to {}", "not far from {}", "a few steps from {}"),
