@@ -46,8 +46,8 @@ def compose(
     if place and needed and place.split()[0] == needed[0].split()[0] == "beside":
         needed = [needed[0].replace("beside", "next to", 1), *needed[1:]]
     look = _least_used(words.looks, rng, used) if words.looks else ""
-    template = _template(noun, look, bool(extra), rng, used)
     comma = "," if place and needed and (len(place.split()) > _LONG_PLACE or len(needed) > 1) else ""
+    template = _template(noun, look, bool(comma), bool(extra), rng, used)
     rel = " ".join([*([place + comma] if place else []), *([_listed(needed)] if needed else [])])
     fields = {
         "a": noun.a(),
@@ -70,12 +70,15 @@ def _listed(texts: list[str]) -> str:
     return " and ".join([*([", ".join(texts[:-1])] if texts[1:] else []), texts[-1]])
 
 
-def _template(noun: Noun, look: str, more: bool, rng: np.random.Generator, used: dict[str, int]) -> str:
+def _template(
+    noun: Noun, look: str, parted: bool, more: bool, rng: np.random.Generator, used: dict[str, int]
+) -> str:
     pool = [
         template
         for template in (FULL if look else PLAIN)
         if not ("with {look}" in template and noun.after)
         and not ("{bare}" in template and noun.group)
+        and not (parted and "{rel} and " in template)
         and not (more and template.count(".") > 2)
     ]
     return _least_used(pool, rng, used)
