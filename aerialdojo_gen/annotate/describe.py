@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from aerialdojo_gen.annotations.ambiguity import nearest_landmark
+from aerialdojo_gen.annotations.appearance import Looks
 from aerialdojo_gen.annotations.check import check_source
 from aerialdojo_gen.annotations.format import Annotations, Object, format_annotations, parse_annotations
 from aerialdojo_gen.annotations.relations import SceneGeometry
@@ -28,10 +29,14 @@ class Describer:
         What a person says for each category.
     counts : (int, int) or None
         How many landmarks and objects there must be.
+    looks : mapping of str to tuple of Look, optional
+        What the catalogue says of how each category looks.
     """
 
-    def __init__(self, scene: Scene, names: Mapping[str, str], counts: tuple[int, int] | None) -> None:
-        self._scene, self._names, self._counts = scene, names, counts
+    def __init__(
+        self, scene: Scene, names: Mapping[str, str], counts: tuple[int, int] | None, looks: Looks | None = None
+    ) -> None:
+        self._scene, self._names, self._counts, self._looks = scene, names, counts, looks
         self._geometry = SceneGeometry(scene)  # remembers as it goes
 
     def describe(self, annotations: Annotations) -> dict[str, Any]:
@@ -46,7 +51,8 @@ class Describer:
         source = parse_annotations(format_annotations(annotations))
         faults: dict[tuple[str, int], list[dict[str, str]]] = {}
         general = []
-        for fault in check_source(source, self._scene, self._names, self._counts, self._geometry):
+        faulty = check_source(source, self._scene, self._names, self._counts, self._geometry, self._looks)
+        for fault in faulty:
             message = _MENTION.sub(lambda m: _called(annotations, m[1], int(m[2])), fault.message)
             at = _PATH.match(fault.path)
             if at is None:

@@ -53,6 +53,7 @@ class Desk:
         self._pipeline, self._roots = pipeline, roots
         catalogue = load_catalogue(roots.scene_assets)
         self._names = {category: catalogue[category].name for category in catalogue}
+        self._looks = {category: catalogue[category].looks for category in catalogue}
         self._targets = catalogue.targets
         self._counts = paper_counts().get(name) if pipeline.annotate_import.paper_counts else None
         self._lock = threading.RLock()  # the geometry remembers as it goes
@@ -63,7 +64,7 @@ class Desk:
         name, pipeline = self.storage.scene, self._pipeline
         job = Job("annotate", name, 0, 1, pipeline.seed, pipeline.embodiment, self._roots)
         scene = job.scene_model(keep=2)  # a picture of the scene before may be under way
-        payload, describer = scene_payload(scene), Describer(scene, self._names, self._counts)
+        payload, describer = scene_payload(scene), Describer(scene, self._names, self._counts, self._looks)
         rays = ray_caster(scene)
         commit()
         self.scene: Scene = scene

@@ -7,11 +7,11 @@ from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
-from aerialdojo_gen.annotations.draft import Choice, draft_annotations
-from aerialdojo_gen.annotations.format import write_annotations
+from aerialdojo_gen.annotations.draft import Choice, draft_annotations, redraft_annotations
+from aerialdojo_gen.annotations.format import parse_annotations, write_annotations
 from aerialdojo_gen.common.paper import paper_counts
 from aerialdojo_gen.config.pipeline import Pipeline
-from aerialdojo_gen.errors import UsageError
+from aerialdojo_gen.errors import AnnotationError, UsageError
 from aerialdojo_gen.layouts.build import build_scene
 from aerialdojo_gen.pipeline.stage import Job, Roots
 from aerialdojo_gen.scenes.catalogue import load_catalogue
@@ -31,6 +31,7 @@ def draft_scene(
     landmarks: tuple[str, ...] = (),
     seed: int = 0,
     force: bool = False,
+    keep_objects: bool = False,
 ) -> Path:
     """Draft a scene's annotations and write them to the folder of annotations.
 
@@ -50,6 +51,8 @@ def draft_scene(
         The same seed gives the same draft.
     force : bool
         Overwrite an existing file.
+    keep_objects : bool
+        Describe the file's own objects anew instead of choosing others; `force` is implied.
 
     Returns
     -------
@@ -64,6 +67,8 @@ def draft_scene(
         The scene has too few landmarks or too few things that can be reached, seen and told apart.
     """
     path = roots.annotations / f"{name}.json"
+    if keep_objects:
+        return _described_anew(name, path, roots, seed)
     if path.exists() and not force:
         raise UsageError(f"{path} exists: --force overwrites it")
     known = paper_counts().get(name, (n_landmarks, n_objects))
@@ -75,6 +80,18 @@ def draft_scene(
     choice = replace(choice or Choice(), eligible=reachable_nodes(scene, pipeline, roots))
     annotations = draft_annotations(scene, catalogue, wanted[0], wanted[1], seed, choice, landmarks)
     write_annotations(annotations, path)
+    return path
+
+
+def _described_anew(name: str, path: Path, roots: Roots, seed: int) -> Path:
+    if not path.exists():
+        raise UsageError(f"{path} does not exist: there are no objects to keep")
+    source = parse_annotations(path.read_text(encoding="utf-8"))
+    if source.faults:
+        raise AnnotationError(f"{path}: {source.faults[0]}")
+    catalogue = load_catalogue(roots.scene_assets)
+    scene = build_scene(roots.recipes / f"{name}.toml", catalogue)
+    write_annotations(redraft_annotations(scene, catalogue, source.annotations, seed), path)
     return path
 
 

@@ -8,6 +8,7 @@ the slack `claims.RIVAL_SLACK` on distances and angles, makes the description am
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -51,6 +52,11 @@ def nearest_landmark(centre_m: NDArray[np.float64], landmarks_m: NDArray[np.floa
     nearest = int(np.argmin(np.round(np.hypot(offset[:, 0], offset[:, 1]), 3)))
     dx, dy = float(offset[nearest, 0]), float(offset[nearest, 1])
     return None if dx == 0.0 and dy == 0.0 else Bearing(nearest, compass_direction(dx, dy))
+
+
+def first_sentence(text: str) -> str:
+    """Cut a text behind its first sentence."""
+    return re.split(r"(?<=[.!?])\s", text.strip(), maxsplit=1)[0]
 
 
 class Ambiguity:
@@ -116,8 +122,33 @@ class Ambiguity:
             j
             for j in candidates
             if self.lexicon.fits(j, own)
+            and not any(self._elsewhere(j, place, RIVAL_SLACK) for place in reading.places)
             and all(claim.holds(self.geometry, j, RIVAL_SLACK) for claim in reading.claims)
         ]
+
+    def _elsewhere(self, i: int, place: str, slack: float = 1.0) -> str:
+        """Say which condition of a place is not so of an instance; empty for what nothing is known of."""
+        places = self.lexicon.places
+        return places.fault(i, place, slack) if places is not None and place in places else ""
+
+    def twins(self, i: int, name: str, description: str) -> list[int]:
+        """Instances that the name and the first sentence of a description of `i` fit as well.
+
+        Who looks for a thing may have read no farther.
+
+        Parameters
+        ----------
+        i : int
+            Index of the instance that is described.
+        name, description : str
+            English.
+
+        Returns
+        -------
+        list of int
+            Indices; empty where the first sentence tells it from all others.
+        """
+        return self.rivals(i, f"The {name}: {first_sentence(description)}")
 
     def untruths(self, i: int, text: str) -> list[str]:
         """What a name or description says that is not so of instance `i`, in words.
@@ -128,9 +159,15 @@ class Ambiguity:
         reading: Reading = self.lexicon.read(text, i)
         instance = self.geometry.scene.instances[i]
         wrong = [f"it is called {value!r}, and the mesh is not" for value in self._wrong(i, reading.named)]
-        return wrong + [
+        wrong += [
             f"{claim.text!r} is not so of {instance.node}" for claim in reading.claims if not self._true(claim, i)
         ]
+        for place in reading.places:
+            if self.lexicon.places is not None and place not in self.lexicon.places:
+                wrong.append(f"{place!r} cannot be checked: nothing says what it claims; leave it out")
+            elif why := self._elsewhere(i, place):
+                wrong.append(f"{place!r} is not so of {instance.node}: {why}")
+        return wrong
 
     def _wrong(self, i: int, values: Sequence[str]) -> list[str]:
         return [value for value in values if self.lexicon.denied(i, value)]

@@ -8,9 +8,12 @@ from collections.abc import Iterable, Mapping, Sequence
 import numpy as np
 
 from aerialdojo_gen.annotations.ambiguity import Ambiguity, nearest_landmark
+from aerialdojo_gen.annotations.appearance import Looks, discoloured, unlike
 from aerialdojo_gen.annotations.calling import Callings
 from aerialdojo_gen.annotations.claims import Lexicon
 from aerialdojo_gen.annotations.format import Landmark, Object, Source
+from aerialdojo_gen.annotations.place_files import places_of
+from aerialdojo_gen.annotations.places import Places
 from aerialdojo_gen.annotations.positions import Fault
 from aerialdojo_gen.annotations.relations import SceneGeometry
 from aerialdojo_gen.common.names import nearest
@@ -22,6 +25,7 @@ _UNSPOKEN = re.compile(
     re.IGNORECASE,
 )
 _SENTENCES = 3
+_WORDS = 60
 
 
 def check_source(
@@ -30,6 +34,7 @@ def check_source(
     names: Mapping[str, str],
     counts: tuple[int, int] | None = None,
     geometry: SceneGeometry | None = None,
+    looks: Looks | None = None,
 ) -> list[Fault]:
     """Hold an annotation file against its scene.
 
@@ -46,6 +51,8 @@ def check_source(
         How many landmarks and objects there must be; None where any number will do.
     geometry : SceneGeometry, optional
         The scene's, where the caller has it: it remembers what it has computed.
+    looks : mapping of str to tuple of Look, optional
+        What the catalogue says of how each category looks.
 
     Returns
     -------
@@ -64,6 +71,7 @@ def check_source(
         for i, entry in source.objects.items():
             faults += _object(source, scene, names, ("objects", i), entry)
             faults += _called(source, scene, callings, ("objects", i), entry)
+            faults += _looks(source, scene, looks or {}, ("objects", i), entry)
         faults += _geometry(source, scene, names, geometry or SceneGeometry(scene))
     return sorted(dict.fromkeys(faults), key=lambda fault: fault.line)
 
@@ -131,6 +139,17 @@ def _called(
             yield source.document.fault((*path, key), message)
 
 
+def _looks(source: Source, scene: Scene, looks: Looks, path: tuple[str | int, ...], entry: Object) -> Iterable[Fault]:
+    if scene.imported or entry.node not in scene:
+        return
+    thing = scene[entry.node]
+    for message in unlike(entry.description, thing, looks, scene.materials):
+        yield source.document.fault((*path, "description"), message)
+    for key in ("name", "description"):
+        for message in discoloured(getattr(entry, key), thing, scene.materials):
+            yield source.document.fault((*path, key), message)
+
+
 def _name(source: Source, path: tuple[str | int, ...], name: str) -> Iterable[Fault]:
     if not name.strip():
         yield source.document.fault((*path, "name"), "is empty")
@@ -161,6 +180,8 @@ def _description(source: Source, path: tuple[str | int, ...], text: str) -> Iter
         yield source.document.fault(path, "must end with a full stop")
     if len(re.findall(r"[.!?](?:\s|$)", text)) > _SENTENCES:
         yield source.document.fault(path, f"has more than {_SENTENCES} sentences")
+    if len(text.split()) > _WORDS:
+        yield source.document.fault(path, f"has more than {_WORDS} words")
 
 
 def _inside(scene: Scene, point: Sequence[float] | np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> bool:
@@ -206,6 +227,12 @@ def _geometry(source: Source, scene: Scene, names: Mapping[str, str], geometry: 
                 "say how this one looks otherwise or what else stands by it"
             )
             yield source.document.fault(("objects", k, "description"), text)
+            continue
+        twins = ambiguity.twins(i, entry.name, entry.description) if entry.description.strip() else []
+        if twins:
+            others = ", ".join(scene.instances[j].node for j in twins[:3]) + ("..." if len(twins) > 3 else "")
+            text = f"its first sentence fits {others} as well: say there what tells it apart"
+            yield source.document.fault(("objects", k, "description"), text)
 
 
 def make_ambiguity(
@@ -231,5 +258,7 @@ def make_ambiguity(
         The scene's, where the caller has it.
     """
     geometry = geometry or SceneGeometry(scene)
-    lexicon = Lexicon(geometry, names, {name: geometry.index[node] for name, node in landmarks.items()})
+    bound = None if scene.imported else places_of(scene.name)
+    places = None if bound is None else Places(geometry, bound)
+    lexicon = Lexicon(geometry, names, {name: geometry.index[node] for name, node in landmarks.items()}, places)
     return Ambiguity(geometry, lexicon, [geometry.index[node] for node in order])

@@ -13,10 +13,12 @@ import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
+from aerialdojo_gen.annotations.places import Places
 from aerialdojo_gen.annotations.relations import SceneGeometry
 from aerialdojo_gen.store.schemas import DIRECTIONS
 
 RIVAL_SLACK = 1.35
+PLACE = "place"  # the attribute by which a layout says where a thing is
 
 _TOKEN = re.compile(r"[a-z0-9']+|[,.;:!?()]")
 # A corner of the compass is one word, as the tables spell it; people write it in two.
@@ -50,9 +52,13 @@ _VERBS = frozenset(
 def _relations() -> dict[str, str]:
     phrases = {
         "beside": "beside, right beside, next to, right next to, alongside, by, adjacent to, flanked by, "
-        "close beside, leaning against, at the foot of",
+        "close beside, at the foot of",
+        "against": "leaning against, right against",
         "near": "near, nearby, close to, not far from, a few steps from, a short way from, a short walk from, "
-        "surrounded by, behind, in front of, facing, around",
+        "surrounded by, facing, around",
+        "at": "at",
+        "front": "in front of, before",
+        "behind": "behind, at the back of",
         "on": "on, on top of, atop, upon, on the top of",
         "under": "under, beneath, underneath, below, sheltered by, in the shade of, under the cover of",
         "above": "above, over, high above",
@@ -79,7 +85,8 @@ class Claim:
     Attributes
     ----------
     relation : str
-        ``beside``, ``near``, ``on``, ``under``, ``above``, ``between`` or ``side:<compass direction>``.
+        ``beside``, ``against``, ``at``, ``near``, ``front``, ``behind``, ``on``, ``under``, ``above``, ``between`` or
+        ``side:<compass direction>``.
     things : tuple of frozenset of int
         For each thing named, the instances that answer to what is said of it; two for ``between``, else one.
     text : str
@@ -118,12 +125,15 @@ class Reading:
         Relations asserted of the subject.
     subjects : tuple of str
         Names of things that stand in no relation: what the text calls the subject.
+    places : tuple of str
+        Phrases of place, in lower case, bound to conditions or not.
     """
 
     values: tuple[str, ...]
     named: tuple[str, ...]
     claims: tuple[Claim, ...]
     subjects: tuple[str, ...] = ()
+    places: tuple[str, ...] = ()
 
 
 @dataclass
@@ -137,6 +147,7 @@ class _State:
     adjacent: bool = False
     claims: list[Claim] = field(default_factory=list)
     subjects: list[str] = field(default_factory=list)
+    places: list[str] = field(default_factory=list)
 
     def end_clause(self) -> None:
         # After "beside a bench with ..." values are the bench's: said of the subject they would be guesswork.
@@ -155,9 +166,18 @@ class Lexicon:
         What a person says for each category; a category that is not in it is called by its words.
     landmarks : mapping of str to int
         Name of each landmark and the index of its instance.
+    places : Places, optional
+        What the scene's phrases of place claim. Without it they are values like others: a scene of one's own.
     """
 
-    def __init__(self, geometry: SceneGeometry, names: Mapping[str, str], landmarks: Mapping[str, int]) -> None:
+    def __init__(
+        self,
+        geometry: SceneGeometry,
+        names: Mapping[str, str],
+        landmarks: Mapping[str, int],
+        places: Places | None = None,
+    ) -> None:
+        self.places = places
         instances = geometry.scene.instances
         self._attributes = [i.attributes for i in instances]
         self._categories = [i.category for i in instances]
@@ -169,14 +189,18 @@ class Lexicon:
             by_name.setdefault(names.get(instance.category, spoken(instance.category)).lower(), set()).add(i)
         things = {name: frozenset(members) for name, members in by_name.items()}
         things |= {name.lower(): frozenset([i]) for name, i in landmarks.items()}
-        values = {v for attributes in self._attributes for v in attributes.values()}
-        for attributes in self._attributes:
-            for key, value in attributes.items():
+        given = [item for attributes in self._attributes for item in attributes.items()]
+        where = {value.lower() for key, value in given if key == PLACE and places is not None}
+        values = {value for key, value in given if places is None or key != PLACE}
+        for key, value in given:
+            if value in values:
                 self._keys_of.setdefault(value.lower(), set()).add(key)
         for phrase, relation in RELATIONS.items():
             self._add(phrase, "relation", relation)
         for value in sorted(values):
             self._add(value, "value", value.lower())
+        for phrase in sorted(where | set(places.phrases() if places else ())):
+            self._add(phrase, "place", phrase)
         for name in sorted(things):
             self._things[name] = things[name]
             for form in (plural(name), name):
@@ -233,6 +257,9 @@ class Lexicon:
             if kind == "relation":
                 state.end_clause()
                 state.relation, state.words = meaning, list(words)
+            elif kind == "place":
+                state.end_clause()
+                state.places.append(meaning)
             elif kind == "value":
                 state.pending.append(meaning)
                 state.words += words
@@ -243,7 +270,9 @@ class Lexicon:
             state.adjacent = kind == "value" or (state.adjacent and tokens[at] == "and")
             at += length
         state.end_clause()
-        return Reading(tuple(state.values), tuple(state.named), tuple(state.claims), tuple(state.subjects))
+        return Reading(
+            tuple(state.values), tuple(state.named), tuple(state.claims), tuple(state.subjects), tuple(state.places)
+        )
 
     def _match(self, tokens: list[str], at: int) -> tuple[int, str, str]:
         for length in range(min(self._longest, len(tokens) - at), 0, -1):

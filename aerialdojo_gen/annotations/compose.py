@@ -2,17 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from aerialdojo_gen.annotations.phrases import Noun, Words
 from aerialdojo_gen.annotations.templates import FULL, MORE, PLAIN
 
-_MOST_IN_ONE = 2
 _LONG_PLACE = 5
 
 
 def compose(
-    words: Words, noun: Noun, place: str, facts: list[str], rng: np.random.Generator, used: dict[str, int]
+    words: Words,
+    noun: Noun,
+    place: str,
+    needed: list[str],
+    extra: list[str],
+    rng: np.random.Generator,
+    used: dict[str, int],
 ) -> tuple[str, str]:
     """Compose a description of one to three sentences.
 
@@ -21,53 +28,65 @@ def compose(
     words, noun : Words, Noun
         Of the thing described.
     place : str
-        E.g. ``"in the car park"``; may be empty.
-    facts : list of str
-        At least one, e.g. ``"beside a red mailbox"``; those beyond the second get a sentence of their own.
+        E.g. ``"in the car park"``; may be empty where there are facts.
+    needed : list of str
+        E.g. ``"beside a red mailbox"``: what tells the thing from others; all of it goes into the first sentence.
+    extra : list of str
+        What is said besides, in a sentence of its own.
     rng : numpy.random.Generator
         Chooses look, template and joints.
     used : dict of str to int
-        How often each template served already in this scene: the least used are chosen from.
+        How often each template and each look served already in this scene: the least used are chosen from.
 
     Returns
     -------
     (str, str)
         The description, and the template that it was made from.
     """
-    look = words.looks[int(rng.integers(len(words.looks)))] if words.looks else ""
-    first, rest = facts[:_MOST_IN_ONE], facts[_MOST_IN_ONE:]
-    if place and len(first) == _MOST_IN_ONE:
-        first, rest = facts[:1], facts[1:]
-    template = _template(noun, look, bool(rest), rng, used)
-    closing = any(mark in template for mark in ("{rel}.", "{rel};", "{rel}:"))
-    comma = "," if closing and len(place.split()) > _LONG_PLACE else ""
-    rel = " ".join([*([place + comma] if place else []), " and ".join(first)])
+    if place and needed and place.split()[0] == needed[0].split()[0] == "beside":
+        needed = [needed[0].replace("beside", "next to", 1), *needed[1:]]
+    look = _least_used(words.looks, rng, used) if words.looks else ""
+    comma = "," if place and needed and (len(place.split()) > _LONG_PLACE or len(needed) > 1) else ""
+    template = _template(noun, look, bool(comma), bool(extra), rng, used)
+    rel = " ".join([*([place + comma] if place else []), *([_listed(needed)] if needed else [])])
     fields = {
         "a": noun.a(),
         "bare": noun.bare,
         "the": noun.the(),
         "look": look,
         "verb": words.verb,
+        "stands": "stands" if words.verb.startswith("is ") else words.verb,
         "ing": words.participle,
         "rel": rel,
     }
     text = template.format(**fields, A=_upper(fields["a"]), Rel=_upper(rel))
-    if rest:
+    if extra:
         more = MORE[int(rng.integers(len(MORE)))]
-        text += " " + more.format(verb=words.verb, rel=" and ".join(rest))
+        text += " " + more.format(verb=words.verb, rel=_listed(extra))
     return text, template
 
 
-def _template(noun: Noun, look: str, more: bool, rng: np.random.Generator, used: dict[str, int]) -> str:
+def _listed(texts: list[str]) -> str:
+    return " and ".join([*([", ".join(texts[:-1])] if texts[1:] else []), texts[-1]])
+
+
+def _template(
+    noun: Noun, look: str, parted: bool, more: bool, rng: np.random.Generator, used: dict[str, int]
+) -> str:
     pool = [
         template
         for template in (FULL if look else PLAIN)
         if not ("with {look}" in template and noun.after)
         and not ("{bare}" in template and noun.group)
+        and not (parted and "{rel} and " in template)
         and not (more and template.count(".") > 2)
     ]
-    least = min(used.get(template, 0) for template in pool)
-    fresh = [template for template in pool if used.get(template, 0) <= least]
+    return _least_used(pool, rng, used)
+
+
+def _least_used(pool: Sequence[str], rng: np.random.Generator, used: dict[str, int]) -> str:
+    least = min(used.get(text, 0) for text in pool)
+    fresh = [text for text in pool if used.get(text, 0) <= least]
     return fresh[int(rng.integers(len(fresh)))]
 
 

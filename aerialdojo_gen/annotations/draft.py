@@ -8,30 +8,20 @@ many of the facts about their place as it takes to tell them from their rivals. 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from aerialdojo_gen.annotations.ambiguity import Ambiguity
-from aerialdojo_gen.annotations.check import make_ambiguity
-from aerialdojo_gen.annotations.claims import RIVAL_SLACK, spoken
-from aerialdojo_gen.annotations.compose import compose
-from aerialdojo_gen.annotations.facts import Fact, FactFinder
+from aerialdojo_gen.annotations.describing import NO_THING, STAGE, Teller, Vocabulary
 from aerialdojo_gen.annotations.format import Annotations, Landmark, Object
-from aerialdojo_gen.annotations.phrases import Words, noun_of, place_of, words_of
-from aerialdojo_gen.common.rng import generator, rank
+from aerialdojo_gen.common.rng import rank
 from aerialdojo_gen.errors import AnnotationError
 from aerialdojo_gen.geometry.frames import compass_direction
 from aerialdojo_gen.scenes.catalogue import Catalogue
 from aerialdojo_gen.scenes.model import Instance, Scene
 
-_STAGE = "annotate-draft"
-_MOST_FACTS = 4
-_TRIES = 12
-_WORTH_SAYING = 0.35
 _ALOFT_M = 3.0
-# What an imported mesh has and nobody looks for.
-_NO_THING = frozenset({"ground", "clutter", "slab", "terrain"})
 
 
 @dataclass(frozen=True)
@@ -64,6 +54,51 @@ class Choice:
     aloft_share: float = 0.0
     most_vegetation: int = 3
     most: int = 5
+
+
+def redraft_annotations(scene: Scene, catalogue: Catalogue, annotations: Annotations, seed: int) -> Annotations:
+    """Describe the objects of annotations anew; which they are, their ids and their names stay.
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene.
+    catalogue : Catalogue
+        Names, kinds and looks of its categories.
+    annotations : Annotations
+        Of the scene. A name that is not so of the mesh any more is replaced.
+    seed : int
+        The same seed gives the same words.
+
+    Returns
+    -------
+    Annotations
+        It passes `check.check_source` where the landmarks do.
+
+    Raises
+    ------
+    AnnotationError
+        A node is gone, or an object cannot be told from others of its kind.
+    """
+    for entry in (*annotations.landmarks, *annotations.objects):
+        if entry.node not in scene:
+            raise AnnotationError(f"{scene.name}: no node {entry.node!r} in the scene: draft the file anew")
+    vocabulary = Vocabulary(scene, catalogue)
+    teller = Teller(vocabulary, sorted(annotations.landmarks, key=lambda mark: mark.id), seed)
+    index = teller.ambiguity.geometry.index
+    objects: list[Object] = []
+    for entry in annotations.objects:
+        i = index[entry.node]
+        name = entry.name if teller.sound(i, entry.name) else vocabulary.nouns[i].short
+        text = teller.describe(i, {other.description for other in objects}, name)
+        if text is None:
+            raise AnnotationError(
+                f"{scene.name}: {entry.node} (object {entry.id}) cannot be told from others of its kind: "
+                "take another object in its place (aerialdojo-gen annotate)"
+            )
+        category = scene[entry.node].category
+        objects.append(entry.model_copy(update={"name": name, "category": category, "description": text}))
+    return replace(annotations, objects=tuple(objects))
 
 
 def draft_annotations(
@@ -110,24 +145,8 @@ def draft_annotations(
 class _Drafter:
     def __init__(self, scene: Scene, catalogue: Catalogue, seed: int, choice: Choice) -> None:
         self._scene, self._seed, self._choice = scene, seed, choice
-        self._names = {category: catalogue[category].name for category in catalogue}
-        self._kinds = {category: catalogue[category].kind for category in catalogue}
-        targets = frozenset(catalogue.targets)
-        looks = {category: tuple(look.say for look in catalogue[category].looks) for category in catalogue}
-        by_category: dict[str, Words] = {}
-        for i in scene.instances:
-            kind = self._kinds.get(i.category, "")
-            if scene.imported and i.category not in _NO_THING:
-                # A mesh of another make has categories of its own, and all of them may be asked for.
-                self._names.setdefault(i.category, spoken(i.category))
-                targets |= {i.category}
-            if i.category not in by_category:
-                name = self._names.get(i.category)
-                by_category[i.category] = words_of(
-                    i.category, name, kind, looks.get(i.category, ()), i.category in targets
-                )
-        self._words = [by_category[i.category] for i in scene.instances]
-        self._nouns = [noun_of(i, w) for i, w in zip(scene.instances, self._words, strict=True)]
+        self._vocabulary = Vocabulary(scene, catalogue)
+        self._kinds, self._nouns = self._vocabulary.kinds, self._vocabulary.nouns
 
     def landmarks(self, n: int, wanted: Sequence[str]) -> tuple[Landmark, ...]:
         """Choose landmarks: the wanted, then the tallest, then whatever is farthest from the chosen."""
@@ -160,7 +179,7 @@ class _Drafter:
 
     def _prominent(self, n: int) -> list[Instance]:
         """The n tallest things of a mesh of another make."""
-        things = [i for i in self._scene.instances if i.category not in _NO_THING]
+        things = [i for i in self._scene.instances if i.category not in NO_THING]
         return sorted(things, key=lambda i: (-float(i.bounds[1, 2]), i.node))[:n]
 
     def _sided(self, instance: Instance, name: str) -> str:
@@ -169,11 +188,9 @@ class _Drafter:
 
     def objects(self, marks: tuple[Landmark, ...], n: int) -> tuple[Object, ...]:
         """Choose and describe objects, a category at a time in turn."""
-        ambiguity = make_ambiguity(self._scene, self._names, {m.name: m.node for m in marks}, [m.node for m in marks])
-        index = ambiguity.geometry.index
-        finder = FactFinder(ambiguity, self._words, self._nouns, {index[m.node]: m.name for m in marks})
+        teller = Teller(self._vocabulary, marks, self._seed)
+        ambiguity = teller.ambiguity
         taken: dict[int, str] = {}
-        used: dict[str, int] = {}
         everywhere = self._queues(ambiguity)
         core = {c: [i for i in queue if self._in_core(i, ambiguity)] for c, queue in everywhere.items()}
         rest = {c: [i for i in queue if i not in core[c]] for c, queue in everywhere.items()}
@@ -193,7 +210,7 @@ class _Drafter:
                 # What the core has none of comes first.
                 for category, queue in sorted(queues.items(), key=lambda item: self._many(item[0], taken) > 0):
                     if len(taken) < upto and not self._full(category, taken):
-                        self._take(queue, ambiguity, finder, taken, used)
+                        self._take(queue, teller, taken)
                 if len(taken) == before:
                     break
         if len(taken) < n:
@@ -225,13 +242,11 @@ class _Drafter:
         for i, instance in enumerate(self._scene.instances):
             if self._may_be_object(i, instance, ambiguity):
                 queues.setdefault(instance.category, []).append(i)
-        return {
-            c: queues[c] for c in sorted(queues, key=lambda c: (rank(self._seed, _STAGE, self._scene.name, c), c))
-        }
+        return {c: queues[c] for c in sorted(queues, key=lambda c: (rank(self._seed, STAGE, self._scene.name, c), c))}
 
     def _may_be_object(self, i: int, instance: Instance, ambiguity: Ambiguity) -> bool:
         choice = self._choice
-        if i in ambiguity.landmarks or not self._words[i].target or ambiguity.bearing(i) is None:
+        if i in ambiguity.landmarks or not self._vocabulary.words[i].target or ambiguity.bearing(i) is None:
             return False
         middle = instance.centroid
         if not (np.all(middle >= self._scene.bounds[0]) and np.all(middle <= self._scene.bounds[1])):
@@ -251,14 +266,7 @@ class _Drafter:
         away = ambiguity.geometry.centres[i, :2] - np.asarray(centre)
         return float(np.hypot(*away)) <= self._choice.within_m
 
-    def _take(
-        self,
-        queue: list[int],
-        ambiguity: Ambiguity,
-        finder: FactFinder,
-        taken: dict[int, str],
-        used: dict[str, int],
-    ) -> None:
+    def _take(self, queue: list[int], teller: Teller, taken: dict[int, str]) -> None:
         """Move one instance from its category's queue to the objects; those that defy description are dropped."""
         instances = self._scene.instances
         while queue:
@@ -269,60 +277,14 @@ class _Drafter:
                 key=lambda i: (
                     -names.count(self._nouns[i].short),
                     round(_spread(instances[i], alike), 3),
-                    rank(self._seed, _STAGE, self._scene.name, instances[i].node),
+                    rank(self._seed, STAGE, self._scene.name, instances[i].node),
                 ),
             )
             queue.remove(best)
-            text = self._describe(best, ambiguity, finder, set(taken.values()), used)
+            text = teller.describe(best, set(taken.values())) if teller.sound(best, self._nouns[best].short) else None
             if text is not None:
                 taken[best] = text
                 return
-
-    def _describe(
-        self, i: int, ambiguity: Ambiguity, finder: FactFinder, others: set[str], used: dict[str, int]
-    ) -> str | None:
-        instance, words, noun = self._scene.instances[i], self._words[i], self._nouns[i]
-        rng = generator(self._seed, _STAGE, self._scene.name, instance.node)
-        facts = finder.facts(i, rng)
-        for attempt in range(_TRIES):
-            place = place_of(instance) if attempt < _TRIES // 2 else ""
-            usable = [fact for fact in facts if not self._named_in(fact, place)][attempt % 3 :]
-            talkative = not place or bool(rng.random() < 0.4)
-            chosen = self._choose(i, f"It is {noun.a()} {place}.", usable, ambiguity, talkative)
-            if not chosen:
-                continue
-            text, template = compose(words, noun, place, [fact.text for fact in chosen], rng, used)
-            clash = ambiguity.untruths(i, text) or ambiguity.untruths(i, noun.short)
-            if text not in others and not clash and not ambiguity.rivals(i, text):
-                used[template] = used.get(template, 0) + 1
-                return text
-        return None
-
-    def _named_in(self, fact: Fact, place: str) -> bool:
-        """Whether the place speaks of the same thing already."""
-        spoken = set(place.replace("'s", "").split())
-        return any(self._nouns[j].name.split()[-1] in spoken for j in fact.things)
-
-    def _choose(self, i: int, said: str, facts: list[Fact], ambiguity: Ambiguity, talkative: bool) -> list[Fact]:
-        """Take the most natural fact, then whatever rules out most of the rivals that are left."""
-        chosen: list[Fact] = []
-        rivals = set(ambiguity.rivals(i, said))
-        left = list(facts)
-        while left and len(chosen) < _MOST_FACTS:
-            best = left[0]
-            if chosen and rivals:
-                best = max(left, key=lambda fact: len(rivals) - len(_fitting(fact, rivals, ambiguity)))
-            elif chosen and not (talkative and len(chosen) == 1 and best.weight > _WORTH_SAYING):
-                break
-            chosen.append(best)
-            rivals = _fitting(best, rivals, ambiguity)
-            nouns = {self._nouns[j].short for j in best.things}
-            left = [f for f in left if not nouns & {self._nouns[j].short for j in f.things}]
-        return chosen
-
-
-def _fitting(fact: Fact, rivals: set[int], ambiguity: Ambiguity) -> set[int]:
-    return {j for j in rivals if all(c.holds(ambiguity.geometry, j, RIVAL_SLACK) for c in fact.claims)}
 
 
 def _spread(instance: Instance, chosen: Sequence[Instance]) -> float:

@@ -30,7 +30,7 @@ class Words:
     name : str
         What a person calls it.
     looks : tuple of str
-        Noun phrases that are true of every variant, to follow "with" or "it has".
+        Noun phrases to follow "with" or "it has".
     verb, participle : str
         ``"stands"`` and ``"standing"``, or what suits the thing better.
     group : str
@@ -85,7 +85,7 @@ def words_of(category: str, name: str | None, kind: str, looks: tuple[str, ...] 
     kind : str
         The catalogue's kind, empty for structure.
     looks : tuple of str
-        The catalogue's own looks, used where the phrases have none.
+        Those of the catalogue's phrases that are so of the instance.
     target : bool
         Whether the catalogue lets tasks ask for it.
 
@@ -98,17 +98,13 @@ def words_of(category: str, name: str | None, kind: str, looks: tuple[str, ...] 
     in_catalogue = name is not None
     return Words(
         name=name or spoken(category),
-        looks=tuple(_texts(entry.get("looks", ()))) or tuple(look.removeprefix("with ") for look in looks),
+        looks=looks,
         verb=str(entry.get("verb", verb)),
         participle=str(entry.get("participle", participle)),
         group=str(entry.get("group", "")),
         reference=bool(entry.get("reference", in_catalogue)),
         target=bool(in_catalogue and target and entry.get("target", True)),
     )
-
-
-def _texts(value: object) -> list[str]:
-    return [str(v) for v in value] if isinstance(value, (list, tuple)) else []
 
 
 @dataclass(frozen=True)

@@ -19,13 +19,16 @@ from aerialdojo_gen.store.schemas import DIRECTIONS
 
 Floats = NDArray[np.float64]
 
+AGAINST_M = 0.5
 BESIDE_M = 3.0
+AT_M = 5.0
 NEAR_M = 8.0
 SIDE_M = 12.0
 BETWEEN_M = 6.0
 LEVEL_M = 1.5  # less than a storey: who is a floor above is not beside
 COVER_M = 12.0
 BETWEEN_DEG = 120.0
+FRONT_DEG = 60.0
 _LARGE_M = 10.0  # above it a thing's outline is its projected mesh; below, the convex hull is as good and cheaper
 _MANY_FACES = 20_000
 _TOUCH_M = 0.35
@@ -49,6 +52,7 @@ class SceneGeometry:
         self._supports: dict[int, int | None] = {}
         self._corners: dict[int, tuple[Floats, Floats, Floats, Floats]] = {}
         self._covers: dict[int, frozenset[int]] = {}
+        self._level_faces: dict[int, NDArray[np.intp]] = {}
 
     @cached_property
     def _tree(self) -> shapely.STRtree:
@@ -96,8 +100,8 @@ class SceneGeometry:
         if i not in self._supports:
             low = float(self.boxes[i, 0, 2])
             best: tuple[float, int] | None = None
-            for x, y in self._probes(i):
-                for j, heights in self._columns(i, x, y):
+            for x, y in self.probes(i):
+                for j, heights in self.columns(i, x, y):
                     below = heights[heights <= low + _TOUCH_M]
                     if len(below) and below.max() >= low - _TOUCH_M and (best is None or below.max() > best[0]):
                         best = (float(below.max()), j)
@@ -110,7 +114,7 @@ class SceneGeometry:
             high = float(self.boxes[i, 1, 2])
             x, y = self.centres[i, :2]
             lowest: dict[int, float] = {}
-            for j, heights in self._columns(i, float(x), float(y)):
+            for j, heights in self.columns(i, float(x), float(y)):
                 overhead = heights[(heights >= high - 0.05) & (heights <= high + COVER_M)]
                 if len(overhead):
                     lowest[j] = float(overhead.min())
@@ -119,11 +123,12 @@ class SceneGeometry:
             self._covers[i] = frozenset(j for j, z in lowest.items() if z <= limit)
         return self._covers[i]
 
-    def _probes(self, i: int) -> list[tuple[float, float]]:
+    def probes(self, i: int) -> list[tuple[float, float]]:
+        """Places below an instance where what it stands on is looked for: its middle, and four around it."""
         (x, y), (rx, ry) = self.centres[i, :2], 0.3 * (self.boxes[i, 1, :2] - self.boxes[i, 0, :2])
         return [(x, y), (x - rx, y - ry), (x + rx, y - ry), (x - rx, y + ry), (x + rx, y + ry)]
 
-    def _columns(self, i: int, x: float, y: float) -> list[tuple[int, Floats]]:
+    def columns(self, i: int, x: float, y: float) -> list[tuple[int, Floats]]:
         """Every other instance with surfaces above or below a place, and the heights of those."""
         found = []
         for j in np.sort(self._tree.query(shapely.Point(x, y))):
@@ -133,13 +138,27 @@ class SceneGeometry:
                     found.append((int(j), heights))
         return found
 
+    def surfaces(self, j: int, x: float, y: float) -> list[tuple[str, Floats]]:
+        """Materials of an instance above or below a place, and the heights of each, metres."""
+        heights, faces = self._crossed(j, x, y)
+        if not len(heights):
+            return []
+        ends = np.cumsum([len(part.faces) for part in self.scene.instances[j].parts])
+        owners = np.searchsorted(ends, faces, side="right")
+        parts = self.scene.instances[j].parts
+        return [(parts[k].material, heights[owners == k]) for k in np.unique(owners)]
+
     def _heights(self, j: int, x: float, y: float) -> Floats:
+        return self._crossed(j, x, y)[0]
+
+    def _crossed(self, j: int, x: float, y: float) -> tuple[Floats, NDArray[np.intp]]:
+        """Heights of an instance's triangles at a place, and which of its faces they are."""
         a, b, c, det = self._triangles(j)
         u = ((b[:, 1] - c[:, 1]) * (x - c[:, 0]) + (c[:, 0] - b[:, 0]) * (y - c[:, 1])) / det
         v = ((c[:, 1] - a[:, 1]) * (x - c[:, 0]) + (a[:, 0] - c[:, 0]) * (y - c[:, 1])) / det
         inside = (u >= 0.0) & (v >= 0.0) & (u + v <= 1.0)
         z: Floats = (u * a[:, 2] + v * b[:, 2] + (1.0 - u - v) * c[:, 2])[inside]
-        return z
+        return z, self._level_faces[j][inside]
 
     def _triangles(self, j: int) -> tuple[Floats, Floats, Floats, Floats]:
         """Corners of the triangles that are not upright, and twice their signed areas from above."""
@@ -149,6 +168,7 @@ class SceneGeometry:
             det = (b[:, 1] - c[:, 1]) * (a[:, 0] - c[:, 0]) + (c[:, 0] - b[:, 0]) * (a[:, 1] - c[:, 1])
             flat = np.abs(det) > 1e-12
             self._corners[j] = a[flat], b[flat], c[flat], det[flat]
+            self._level_faces[j] = np.flatnonzero(flat)
         return self._corners[j]
 
     def bearing_rad(self, i: int, j: int) -> float | None:
@@ -177,6 +197,34 @@ class SceneGeometry:
     def near(self, i: int, j: int, slack: float = 1.0) -> bool:
         """`i` stands a few steps from `j`, about level with it."""
         return self.gap_m(i, j) <= NEAR_M * slack and self._level(i, j, slack)
+
+    def against(self, i: int, j: int, slack: float = 1.0) -> bool:
+        """`i` touches `j`, or nearly."""
+        return self.gap_m(i, j) <= AGAINST_M * slack and self._level(i, j, slack)
+
+    def at(self, i: int, j: int, slack: float = 1.0) -> bool:
+        """`i` belongs to where `j` stands."""
+        return self.gap_m(i, j) <= AT_M * slack and self._level(i, j, slack)
+
+    def front(self, i: int, j: int, slack: float = 1.0) -> bool:
+        """`i` stands before a front of `j`, of a thing without a front close by it."""
+        return self._before(i, j, slack, 0.0)
+
+    def behind(self, i: int, j: int, slack: float = 1.0) -> bool:
+        """`i` stands before the back of `j`, of a thing without a front close by it."""
+        return self._before(i, j, slack, math.pi)
+
+    def _before(self, i: int, j: int, slack: float, turn_rad: float) -> bool:
+        if not self.at(i, j, slack):
+            return False
+        anatomy = self.scene.instances[j].anatomy
+        fronts = anatomy.fronts_rad if anatomy is not None else ()
+        # What has two faces has no back: its two sides are as good.
+        if not fronts or (turn_rad and len(fronts) > 1):
+            return True
+        bearing = self.bearing_rad(i, j)
+        most = math.radians(FRONT_DEG) * slack
+        return bearing is not None and any(abs(wrap_angle_rad(bearing - f - turn_rad)) <= most for f in fronts)
 
     def _level(self, i: int, j: int, slack: float) -> bool:
         return self._rise_m(i, j) <= LEVEL_M * slack

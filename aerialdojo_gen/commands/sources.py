@@ -63,6 +63,9 @@ def annotate_draft(
     seed: Annotated[int, typer.Option(min=0, help="The same seed gives the same draft.")] = 0,
     pipeline: PipelineFile = None,
     force: Annotated[bool, typer.Option("--force", help="Overwrite an existing file.")] = False,
+    keep_objects: Annotated[
+        bool, typer.Option("--keep-objects", help="Keep the file's objects and names, describe them anew.")
+    ] = False,
 ) -> None:
     """Draft a scene's annotations, to be checked and owned as sources."""
     from aerialdojo_gen.annotate.drafting import draft_scene
@@ -76,7 +79,7 @@ def annotate_draft(
     )
     path = draft_scene(
         scene, config, roots, n_landmarks=landmarks, n_objects=objects, choice=choice,
-        landmarks=tuple(landmark or ()), seed=seed, force=force,
+        landmarks=tuple(landmark or ()), seed=seed, force=force, keep_objects=keep_objects,
     )  # fmt: skip
     print(path)
 

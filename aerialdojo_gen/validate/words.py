@@ -17,9 +17,9 @@ from pathlib import Path
 import numpy as np
 
 from aerialdojo_gen.annotations.ambiguity import Ambiguity
+from aerialdojo_gen.annotations.appearance import discoloured, unlike
 from aerialdojo_gen.annotations.check import make_ambiguity
 from aerialdojo_gen.annotations.claims import Lexicon
-from aerialdojo_gen.annotations.phrases import words_of
 from aerialdojo_gen.annotations.relations import SceneGeometry
 from aerialdojo_gen.errors import AerialDojoError
 from aerialdojo_gen.scenes.catalogue import Catalogue, load_catalogue
@@ -80,6 +80,7 @@ def object_words(data: SceneData, rows: Rows) -> Iterator[Finding]:
             text = column[row] or ""
             wrong = _misnamed(words, i, text) or next(iter(words.ambiguity.untruths(i, text)), "")
             wrong = wrong or _unborne(words, i, text) or _recoloured(instances[i], text)
+            wrong = wrong or _unlike(words, instances[i], text)
             if wrong:
                 yield Finding(row, f"{name} = {text!r}: {wrong}", f"what is so of {instances[i].node}")
                 break
@@ -95,6 +96,21 @@ def object_ambiguous(data: SceneData, rows: Rows) -> Iterator[Finding]:
         if rivals:
             others = ", ".join(instances[j].node for j in rivals[:3]) + ("..." if len(rivals) > 3 else "")
             yield Finding(row, f"{text!r}, which fits {others} as well", "words that fit one thing")
+
+
+@check("objects", needs=("landmarks", "mesh"), after=(*_FAULTS, "object_words", "object_ambiguous"))
+def object_twins(data: SceneData, rows: Rows) -> Iterator[Finding]:
+    """A name and the first sentence of its description fit nothing else of that landmark and direction."""
+    ambiguity = _words(data).ambiguity
+    index, instances = ambiguity.geometry.index, ambiguity.geometry.scene.instances
+    columns = (rows.texts(name) for name in ("mesh_node", "name", "description"))
+    for row, (node, name, text) in enumerate(zip(*columns, strict=True)):
+        twins = ambiguity.twins(index[str(node)], name or "", text or "") if node in index else []
+        if twins:
+            others = ", ".join(instances[j].node for j in twins[:3]) + ("..." if len(twins) > 3 else "")
+            yield Finding(
+                row, f"{text!r}, the first sentence of which fits {others} as well", "words that tell them apart"
+            )
 
 
 @check("objects", after=("object_words",))
@@ -202,13 +218,18 @@ def _recoloured(instance: Instance, text: str) -> str:
     return ""
 
 
+def _unlike(words: _Words, instance: Instance, text: str) -> str:
+    """Say which of the catalogue's phrases, or of its colours, a text says of a thing that is not so."""
+    materials = words.ambiguity.geometry.scene.materials
+    looks = {key: words.catalogue[key].looks for key in (instance.category,) if key in words.catalogue}
+    # What no part is known of, as in a release of an older version, cannot be asked.
+    wrong = list(unlike(text, instance, looks, materials)) if instance.anatomy is not None else []
+    return next(iter([*wrong, *discoloured(text, instance, materials)]), "")
+
+
 def _looks(words: _Words, instance: Instance) -> set[str]:
-    if instance.category not in words.catalogue:
-        looks = words_of(instance.category, None, "").looks
-    else:
-        entry = words.catalogue[instance.category]
-        looks = words_of(instance.category, entry.name, entry.kind, tuple(look.say for look in entry.looks)).looks
-    return {word for look in looks for word in _split(look)}
+    looks = words.catalogue[instance.category].looks if instance.category in words.catalogue else ()
+    return {word for look in looks for word in _split(look.say)}
 
 
 def _shades(words: _Words, instance: Instance) -> set[str]:

@@ -7,10 +7,10 @@ import re
 from pathlib import Path
 
 import pytest
-from support.annotation_scenes import box, street
+from support.annotation_scenes import PAINTS, box, street
 
 from aerialdojo_gen.annotations.check import check_source
-from aerialdojo_gen.annotations.draft import Choice, draft_annotations
+from aerialdojo_gen.annotations.draft import Choice, draft_annotations, redraft_annotations
 from aerialdojo_gen.annotations.format import format_annotations, parse_annotations
 from aerialdojo_gen.annotations.phrases import article, noun_of, words_of
 from aerialdojo_gen.common.rng import generator
@@ -39,7 +39,7 @@ def plaza(catalogue) -> Scene:
         category = categories[int(rng.integers(len(categories)))]
         spot = (-30.0 + 8.0 * (k % 8) + float(rng.uniform(0, 2)), -21.0 + 9.0 * (k // 8), 0.0)
         instances.append(catalogue.instantiate(category, f"{category}_{k:03d}", rng, spot, 15.0 * k))
-    materials = street().materials
+    materials = PAINTS | {p.material: catalogue.materials[p.material] for i in instances[1:] for p in i.parts}
     return Scene("U_Plaza_0", tuple(instances), materials, street().bounds)
 
 
@@ -124,3 +124,25 @@ def test_articles():
     assert [article(w) for w in ("unicycle", "umbrella", "oak", "SUV", "one-armed lamp", "red oak")] == [
         "a", "an", "an", "an", "a", "a",
     ]  # fmt: skip
+
+
+def test_objects_are_described_anew_and_stay_what_they_are(plaza, catalogue):
+    draft = draft_annotations(plaza, catalogue, 1, 20, seed=3)
+    # Words that are not so of the mesh any more, such as a colour, go; the choice stays.
+    first = draft.objects[0].model_copy(update={"description": "A thing that is no more.", "name": "purple kiosk"})
+    before = dataclasses.replace(draft, objects=(first, *draft.objects[1:]))
+    after = redraft_annotations(plaza, catalogue, before, seed=5)
+    assert after == redraft_annotations(plaza, catalogue, before, seed=5)
+    assert after.landmarks == draft.landmarks
+    kept = [(entry.id, entry.node, entry.category, entry.name) for entry in after.objects]
+    assert kept == [(entry.id, entry.node, entry.category, entry.name) for entry in draft.objects]
+    assert [entry.description for entry in after.objects] != [entry.description for entry in draft.objects]
+    names = {category: catalogue[category].name for category in catalogue}
+    looks = {category: catalogue[category].looks for category in catalogue}
+    text = format_annotations(after)
+    assert check_source(parse_annotations(text), plaza, names, (1, 20), looks=looks) == []
+    said = [look.say for entry in after.objects for look in looks[entry.category] if look.say in entry.description]
+    assert len(said) > 10
+    gone = dataclasses.replace(draft, objects=(first.model_copy(update={"node": "bench_999"}),))
+    with pytest.raises(AnnotationError, match="no node 'bench_999'"):
+        redraft_annotations(plaza, catalogue, gone, seed=5)

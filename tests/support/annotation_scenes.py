@@ -19,13 +19,25 @@ NAMES = {
 }
 
 
+PAINTS = {
+    name: Material(name, rgb)
+    for name, rgb in {
+        "grey": (128, 128, 128),
+        "red": (190, 40, 30),
+        "blue": (40, 80, 170),
+        "yellow": (230, 200, 40),
+        "green": (50, 130, 60),
+    }.items()
+}
+
+
 def box(
     node: str, centre: tuple[float, float, float], size: tuple[float, float, float], **attributes: str
 ) -> Instance:
     """A box on its bottom centre; the category is the node's name without its number."""
     unit = np.array([[x, y, z] for z in (0, 1) for x, y in ((-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5))])
     vertices = unit * np.array(size) + np.array(centre)
-    part = Part(vertices, CUBE_FACES, np.zeros((8, 2), dtype=np.float32), "grey")
+    part = Part(vertices, CUBE_FACES, np.zeros((8, 2), dtype=np.float32), attributes.get("colour", "grey"))
     return Instance(node, node.rsplit("_", 1)[0], attributes.get("colour", ""), attributes, (part,))
 
 
@@ -45,7 +57,7 @@ def street() -> Scene:
         box("canopy_000", (-30, 10, 3), (4, 4, 0.2)),
     )
     bounds = np.array([[-80.0, -80.0, 0.0], [80.0, 80.0, 40.0]])
-    return Scene("U_Street_0", instances, {"grey": Material("grey", (128, 128, 128))}, bounds)
+    return Scene("U_Street_0", instances, PAINTS, bounds)
 
 
 GOOD = {

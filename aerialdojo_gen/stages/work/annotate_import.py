@@ -56,7 +56,8 @@ def run(job: Job, config: AnnotateImportConfig) -> Output:
     catalogue = load_catalogue(job.roots.scene_assets)
     names = {category: catalogue[category].name for category in catalogue}
     counts = paper_counts().get(job.scene) if config.paper_counts else None
-    faults = check_source(source, scene, names, counts)
+    looks = {category: catalogue[category].looks for category in catalogue}
+    faults = check_source(source, scene, names, counts, looks=looks)
     if faults:
         raise AnnotationError(_report(path, faults))
     tables = annotation_tables(source.annotations, scene)

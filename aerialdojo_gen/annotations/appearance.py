@@ -1,0 +1,67 @@
+"""What a text says of how its thing looks, held against the mesh: the catalogue's phrases, and colours."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+
+from aerialdojo_gen.annotations.colours import uncoloured
+from aerialdojo_gen.scenes.claims import untrue
+from aerialdojo_gen.scenes.looks import Look
+from aerialdojo_gen.scenes.model import Instance, Material
+
+Looks = Mapping[str, tuple[Look, ...]]
+
+
+def unlike(text: str, instance: Instance, looks: Looks, materials: Mapping[str, Material]) -> Iterator[str]:
+    """Say which of the catalogue's phrases stand in a text and are not so of its instance.
+
+    Parameters
+    ----------
+    text : str
+        English.
+    instance : Instance
+        That the text is of.
+    looks : mapping of str to tuple of Look
+        The phrases of each category.
+    materials : mapping of str to Material
+        Of its scene.
+
+    Yields
+    ------
+    str
+        A message for each phrase, with the claim that fails.
+    """
+    said = _plain(text)
+    for look in looks.get(instance.category, ()):
+        if f" {_plain(look.say).strip()} " in said:
+            for claim in untrue(look, instance, materials)[:1]:
+                yield f"{look.say!r} is not so of {instance.node}: {claim}"
+
+
+def discoloured(text: str, instance: Instance, materials: Mapping[str, Material]) -> Iterator[str]:
+    """Say which of its colours a text says of an instance whose surface does not have it.
+
+    Parameters
+    ----------
+    text : str
+        English.
+    instance : Instance
+        That the text is of; its attribute ``colour`` is held against its materials where the text says it.
+    materials : mapping of str to Material
+        Of its scene.
+
+    Yields
+    ------
+    str
+        A message for each colour.
+    """
+    value = instance.attributes.get("colour", "")
+    if value and f" {_plain(value).strip()} " in _plain(text):
+        for word in uncoloured(value, instance, materials):
+            yield f"{word!r} is not the colour of {instance.node}: hardly any of its surface is"
+
+
+def _plain(text: str) -> str:
+    words = " ".join(re.findall(r"[^\W_]+", text.lower()))
+    return f" {words} "

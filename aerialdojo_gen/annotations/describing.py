@@ -1,0 +1,196 @@
+"""Describes things of a scene one by one, in words that are so of the mesh and of nothing else."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
+
+from aerialdojo_gen.annotations.ambiguity import Ambiguity
+from aerialdojo_gen.annotations.appearance import discoloured, unlike
+from aerialdojo_gen.annotations.calling import Callings
+from aerialdojo_gen.annotations.check import make_ambiguity
+from aerialdojo_gen.annotations.claims import RIVAL_SLACK, spoken
+from aerialdojo_gen.annotations.colours import uncoloured
+from aerialdojo_gen.annotations.compose import compose
+from aerialdojo_gen.annotations.facts import Fact, FactFinder
+from aerialdojo_gen.annotations.format import Landmark
+from aerialdojo_gen.annotations.phrases import Words, noun_of, place_of, words_of
+from aerialdojo_gen.common.rng import generator
+from aerialdojo_gen.scenes.catalogue import Catalogue
+from aerialdojo_gen.scenes.claims import true_looks
+from aerialdojo_gen.scenes.model import Instance, Scene
+
+STAGE = "annotate-draft"
+# What an imported mesh has and nobody looks for.
+NO_THING = frozenset({"ground", "clutter", "slab", "terrain"})
+_MOST_FACTS = 4
+_TRIES = 18
+_MOST_WORDS = 60
+_WORTH_SAYING = 0.35
+
+
+class Vocabulary:
+    """Words and nouns of a scene's instances.
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene.
+    catalogue : Catalogue
+        Names, kinds and looks of its categories.
+    """
+
+    def __init__(self, scene: Scene, catalogue: Catalogue) -> None:
+        self.scene = scene
+        self.names = {category: catalogue[category].name for category in catalogue}
+        self.kinds = {category: catalogue[category].kind for category in catalogue}
+        self._looks = {category: catalogue[category].looks for category in catalogue}
+        targets = frozenset(catalogue.targets)
+        by_category: dict[str, Words] = {}
+        for i in scene.instances:
+            if scene.imported and i.category not in NO_THING:
+                # A mesh of another make has categories of its own, and all of them may be asked for.
+                self.names.setdefault(i.category, spoken(i.category))
+                targets |= {i.category}
+            if i.category not in by_category:
+                name, kind = self.names.get(i.category), self.kinds.get(i.category, "")
+                by_category[i.category] = words_of(i.category, name, kind, (), i.category in targets)
+        self.words = [by_category[i.category] for i in scene.instances]
+        self.nouns = [noun_of(self._honest(i), w) for i, w in zip(scene.instances, self.words, strict=True)]
+        self.callings = Callings(self.names)
+
+    def _honest(self, instance: Instance) -> Instance:
+        """Leave out a colour that the surface does not bear out."""
+        colour = instance.attributes.get("colour", "")
+        if not colour or self.scene.imported or not uncoloured(colour, instance, self.scene.materials):
+            return instance
+        return replace(instance, attributes={k: v for k, v in instance.attributes.items() if k != "colour"})
+
+    def looks(self, instance: Instance) -> tuple[str, ...]:
+        """Phrases that are so of an instance."""
+        looks = self._looks.get(instance.category, ())
+        return tuple(look.say for look in true_looks(looks, instance, self.scene.materials))
+
+    def faults(self, instance: Instance, text: str) -> list[str]:
+        """What a text says of an instance's looks that is not so."""
+        if self.scene.imported:
+            return []
+        return [
+            *self.callings.contradictions(text, instance),
+            *unlike(text, instance, self._looks, self.scene.materials),
+            *discoloured(text, instance, self.scene.materials),
+        ]
+
+
+class Teller:
+    """Describes instances of one scene.
+
+    Parameters
+    ----------
+    vocabulary : Vocabulary
+        The scene's.
+    landmarks : sequence of Landmark
+        Its landmarks.
+    seed : int
+        The same seed gives the same words.
+    """
+
+    def __init__(self, vocabulary: Vocabulary, landmarks: Sequence[Landmark], seed: int) -> None:
+        self._vocabulary, self._scene, self._seed = vocabulary, vocabulary.scene, seed
+        named: Mapping[str, str] = {m.name: m.node for m in landmarks}
+        self.ambiguity: Ambiguity = make_ambiguity(self._scene, vocabulary.names, named, [m.node for m in landmarks])
+        index = self.ambiguity.geometry.index
+        self._finder = FactFinder(
+            self.ambiguity, vocabulary.words, vocabulary.nouns, {index[m.node]: m.name for m in landmarks}
+        )
+        self._used: dict[str, int] = {}
+
+    def sound(self, i: int, name: str) -> bool:
+        """Whether a name says nothing that is not so of instance `i`."""
+        return not self._vocabulary.faults(self._scene.instances[i], name) and not self.ambiguity.untruths(i, name)
+
+    def describe(self, i: int, others: Collection[str], name: str = "") -> str | None:
+        """Describe an instance.
+
+        Parameters
+        ----------
+        i : int
+            Its index.
+        others : collection of str
+            Descriptions that are taken.
+        name : str
+            What it is called; its noun where empty.
+
+        Returns
+        -------
+        str or None
+            One to three sentences that pass the checks of `annotate-import`; None where there are none.
+        """
+        instance, noun = self._scene.instances[i], self._vocabulary.nouns[i]
+        words = replace(self._vocabulary.words[i], looks=self._vocabulary.looks(instance))
+        rng = generator(self._seed, STAGE, self._scene.name, instance.node)
+        facts, where, name = self._finder.facts(i, rng), self._place(i), name or noun.short
+        for attempt in range(_TRIES):
+            place = where if attempt < _TRIES // 2 else ""
+            usable = [fact for fact in facts if not self._named_in(fact, place)][attempt % 3 :]
+            talkative = bool(rng.random() < (0.25 if place else 0.7)) and attempt < _TRIES // 3
+            needed, extra = self._choose(i, f"It is {noun.a()} {place}.", usable, talkative)
+            if not needed and not (place and attempt >= _TRIES // 3):
+                continue
+            plain = attempt % 6 >= 4  # a look may hold a word that reads as a claim
+            said = replace(words, looks=()) if plain else words
+            text, template = compose(
+                said, noun, place, [f.text for f in needed], [f.text for f in extra], rng, self._used
+            )
+            if text not in others and self._good(i, name, text):
+                self._used[template] = self._used.get(template, 0) + 1
+                for look in (look for look in words.looks if look in text):
+                    self._used[look] = self._used.get(look, 0) + 1
+                return text
+        return None
+
+    def _good(self, i: int, name: str, text: str) -> bool:
+        ambiguity, instance = self.ambiguity, self._scene.instances[i]
+        return (
+            len(text.split()) <= _MOST_WORDS
+            and not ambiguity.untruths(i, text)
+            and not self._vocabulary.faults(instance, text)
+            and not ambiguity.rivals(i, text)
+            and not ambiguity.twins(i, name, text)
+        )
+
+    def _place(self, i: int) -> str:
+        """Where its layout says that it is, if that can be checked and is so."""
+        place, places = place_of(self._scene.instances[i]), self.ambiguity.lexicon.places
+        if not place or places is None:
+            return place
+        bound = place.lower() in places and not places.fault(i, place.lower())
+        return place if bound else ""
+
+    def _named_in(self, fact: Fact, place: str) -> bool:
+        """Whether the place speaks of the same thing already."""
+        spoken_of = set(place.replace("'s", "").split())
+        return any(self._vocabulary.nouns[j].name.split()[-1] in spoken_of for j in fact.things)
+
+    def _choose(self, i: int, said: str, facts: list[Fact], talkative: bool) -> tuple[list[Fact], list[Fact]]:
+        """Take the most natural fact, then what rules out most of the rivals, then one more that is worth saying."""
+        needed: list[Fact] = []
+        extra: list[Fact] = []
+        rivals = set(self.ambiguity.rivals(i, said))
+        left = list(facts)
+        while left and len(needed) + len(extra) < _MOST_FACTS:
+            best = left[0]
+            if needed and rivals:
+                best = max(left, key=lambda fact: len(rivals) - len(self._fitting(fact, rivals)))
+                if len(self._fitting(best, rivals)) == len(rivals):
+                    break
+            elif needed and not (talkative and not extra and best.weight > _WORTH_SAYING):
+                break
+            (needed if not needed or rivals else extra).append(best)
+            rivals = self._fitting(best, rivals)
+            nouns = {self._vocabulary.nouns[j].short for j in best.things}
+            left = [f for f in left if not nouns & {self._vocabulary.nouns[j].short for j in f.things}]
+        return needed, extra
+
+    def _fitting(self, fact: Fact, rivals: set[int]) -> set[int]:
+        return {j for j in rivals if all(c.holds(self.ambiguity.geometry, j, RIVAL_SLACK) for c in fact.claims)}

@@ -1,0 +1,306 @@
+"""Whether a phrase of place is so of an instance: each of its conditions, computed from the mesh."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from fnmatch import fnmatchcase
+from typing import Any
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from aerialdojo_gen.annotations.place_files import SIDES, Conditions
+from aerialdojo_gen.annotations.relations import SceneGeometry
+
+TOUCHING_M, BESIDE_M, AT_M, NEAR_M = 0.3, 5.0, 8.0, 15.0
+_REACH_M: Mapping[str, float] = {"touching": TOUCHING_M, "beside": BESIDE_M, "at": AT_M, "near": NEAR_M}
+_STEP_M = 0.4
+_SLAB_SHARE = 0.06  # of the outline: a smaller level surface is a sill or a stair
+_STOREY_M = 1.6
+_GROUND = ("ground", "terrain")
+_CORNERS: Mapping[str, tuple[int, int]] = {
+    "north": (0, 1), "south": (0, -1), "east": (1, 0), "west": (-1, 0),
+    "northeast": (1, 1), "northwest": (-1, 1), "southeast": (1, -1), "southwest": (-1, -1),
+}  # fmt: skip
+
+
+class Places:
+    """The phrases of place of one scene.
+
+    Parameters
+    ----------
+    geometry : SceneGeometry
+        The scene's.
+    phrases : mapping of str to mapping
+        The conditions of each phrase (`place_files.places_of`).
+    """
+
+    def __init__(self, geometry: SceneGeometry, phrases: Mapping[str, Conditions]) -> None:
+        self._geometry = geometry
+        self._phrases = {phrase.lower(): conditions for phrase, conditions in phrases.items()}
+        self._sets: dict[str, frozenset[int]] = {}
+        self._slabs: dict[int, NDArray[np.float64]] = {}
+        self._found: dict[tuple[int, str, float], str] = {}
+
+    def __contains__(self, phrase: object) -> bool:
+        """Whether a phrase, in lower case, is bound."""
+        return phrase in self._phrases
+
+    def phrases(self) -> list[str]:
+        """List the bound phrases, in lower case."""
+        return sorted(self._phrases)
+
+    def fault(self, i: int, phrase: str, slack: float = 1.0) -> str:
+        """Say which condition of a phrase is not so of instance `i`.
+
+        Parameters
+        ----------
+        i : int
+            Index of the instance.
+        phrase : str
+            One that is bound, in lower case.
+        slack : float
+            Factor on lengths; above 1 for rivals, of which somebody might still think so.
+
+        Returns
+        -------
+        str
+            E.g. ``"near = 'coal_heap*'"``; empty where all hold.
+        """
+        key = i, phrase, slack
+        if key not in self._found:
+            conditions = self._phrases[phrase].items()
+            wrong = (f"{name} = {value!r}" for name, value in conditions if not self._holds(i, name, value, slack))
+            self._found[key] = next(wrong, "")
+        return self._found[key]
+
+    def unmatched(self) -> list[str]:
+        """List the patterns of things that match nothing of the scene."""
+        missing = []
+        for phrase, conditions in self._phrases.items():
+            for key, value in conditions.items():
+                texts = [v for v in (value if isinstance(value, list) else [value]) if isinstance(v, str)]
+                if key not in ("surface", "part", "among", "over"):
+                    missing += [f"{phrase}: {key} = {text}" for text in texts if not self._things(text)]
+        return missing
+
+    def _things(self, pattern: str) -> frozenset[int]:
+        if pattern not in self._sets:
+            instances = self._geometry.scene.instances
+            self._sets[pattern] = frozenset(
+                k for k, thing in enumerate(instances)
+                if any(fnmatchcase(thing.node, one) or thing.category == one for one in pattern.split("|"))
+            )  # fmt: skip
+        return self._sets[pattern]
+
+    def _holds(self, i: int, name: str, value: Any, slack: float) -> bool:
+        if name in _REACH_M:
+            return self._within(i, value, _REACH_M[name] * slack)
+        if name in SIDES:
+            return self._beyond(i, value, name.removesuffix("_of"))
+        test: Callable[[int, Any, float], bool] = getattr(self, f"_{name}")
+        return test(i, value, slack)
+
+    def _within(self, i: int, pattern: str, most_m: float) -> bool:
+        if most_m >= AT_M and i in self._things(pattern):
+            return True  # what makes the place is there itself
+        close = set(self._geometry.around(i, most_m))
+        return any(self._geometry.gap_m(i, j) <= most_m for j in sorted(self._things(pattern) & close))
+
+    def _beyond(self, i: int, pattern: str, direction: str) -> bool:
+        boxes = self._geometry.boxes[sorted(self._things(pattern) - {i})]
+        if len(boxes) == 0:
+            return False
+        middle = (boxes[:, 0, :2].min(axis=0) + boxes[:, 1, :2].max(axis=0)) / 2.0
+        return float((self._geometry.centres[i, :2] - middle) @ _CORNERS[direction]) > 0.0
+
+    def _stack(self, i: int) -> list[int]:
+        """What an instance stands on, and what that stands on, and so on."""
+        chain: list[int] = []
+        at = self._geometry.support(i)
+        if at is None:
+            at = self._sunk(i)
+        while at is not None and at not in chain and len(chain) < 5:
+            chain.append(at)
+            at = self._geometry.support(at)
+        return chain
+
+    def _sunk(self, i: int) -> int | None:
+        """What an instance stands on where its feet are not level: a slope, a rock."""
+        low = float(self._geometry.boxes[i, 0, 2])
+        found = [
+            (float(heights[heights <= low + 2.0 * _STEP_M].max()), j)
+            for x, y in self._geometry.probes(i)
+            for j, heights in self._geometry.columns(i, x, y)
+            if (heights <= low + 2.0 * _STEP_M).any()
+        ]
+        best = max(found, default=(-math.inf, -1))
+        return best[1] if best[0] >= low - 2.0 * _STEP_M else None
+
+    def _on(self, i: int, pattern: str, _slack: float) -> bool:
+        return bool(self._things(pattern) & set(self._stack(i)))
+
+    def _roof(self, i: int, pattern: str, slack: float) -> bool:
+        """On it, aloft, and under no part of it."""
+        mine = self._things(pattern) & set(self._stack(i))
+        return bool(mine) and not mine & self._overhead(i) and self._high(i, 1.8, slack)
+
+    def _overhead(self, i: int) -> set[int]:
+        geometry = self._geometry
+        x, y = (float(c) for c in geometry.centres[i, :2])
+        top = float(geometry.boxes[i, 1, 2]) - 0.05
+        return {j for j, heights in geometry.columns(i, x, y) if (heights >= top).any()}
+
+    def _under(self, i: int, pattern: str, _slack: float) -> bool:
+        return bool(self._things(pattern) & self._overhead(i))
+
+    def _inside(self, i: int, pattern: str, slack: float) -> bool:
+        return any(self._within_hull(i, [j]) for j in sorted(self._things(pattern) - {i}))
+
+    def _hull(self, i: int, pattern: str, slack: float) -> bool:
+        return self._within_hull(i, sorted(self._things(pattern) - {i}))
+
+    def _within_hull(self, i: int, things: list[int]) -> bool:
+        if not things:
+            return False
+        boxes = self._geometry.boxes
+        x, y, z = (float(c) for c in self._geometry.centres[i])
+        if not boxes[things, 0, 2].min() - 1.0 <= z <= boxes[things, 1, 2].max() + 2.0:
+            return False
+        low, high = boxes[things, 0, :2].min(axis=0), boxes[things, 1, :2].max(axis=0)
+        if not (low[0] <= x <= high[0] and low[1] <= y <= high[1]):
+            return False
+        hull = shapely.convex_hull(shapely.union_all([self._geometry.outline(j) for j in things]))
+        return bool(shapely.contains_xy(hull, x, y))
+
+    def _between(self, i: int, patterns: list[str], slack: float) -> bool:
+        """In the gap between one thing and another, neither of them farther than `NEAR_M`."""
+        geometry = self._geometry
+        x, y = (float(c) for c in geometry.centres[i, :2])
+        close = set(geometry.around(i, NEAR_M * slack))
+        first, second = (sorted(self._things(pattern) & close) for pattern in patterns)
+        for a in first:
+            for b in second:
+                if a == b or max(geometry.gap_m(i, a), geometry.gap_m(i, b)) > NEAR_M * slack:
+                    continue
+                hull = shapely.convex_hull(shapely.union(geometry.outline(a), geometry.outline(b)))
+                if shapely.contains_xy(shapely.buffer(hull, slack), x, y):
+                    return True
+        return False
+
+    def _over(self, i: int, pattern: str, _slack: float) -> bool:
+        """Above a thing, or above a surface of that material."""
+        geometry = self._geometry
+        low = float(geometry.boxes[i, 0, 2])
+        for j in sorted(self._things(pattern) - {i}):
+            lower = float(geometry.boxes[j, 0, 2]) < low + _STEP_M
+            if lower and shapely.intersects(geometry.outline(i), geometry.outline(j)):
+                return True
+        below = self._materials(i, self._grid(i), lambda heights: heights < low + _STEP_M)
+        return any(self._named(material, pattern) for material in below)
+
+    def _surface(self, i: int, pattern: str, slack: float) -> bool:
+        """At least half of it stands on that material, or floats in it."""
+        low, high = (float(z) for z in self._geometry.boxes[i, :, 2])
+        points = self._geometry.probes(i)
+        dry = self._materials(i, points, lambda z: (z >= low - 0.8) & (z <= low + _STEP_M))
+        wet = self._materials(i, points, lambda z: (z >= low - 0.8) & (z <= max(high, low + _STEP_M)))
+        found = [m if m and "water" not in n else n for m, n in zip(dry, wet, strict=True)]
+        good = sum(self._named(material, pattern) for material in found)
+        return good >= (1 if slack > 1.0 else (len([m for m in found if m]) + 1) // 2) and good > 0
+
+    @staticmethod
+    def _named(material: str, pattern: str) -> bool:
+        return any(fnmatchcase(material, one) for one in pattern.split("|"))
+
+    def _grid(self, i: int) -> list[tuple[float, float]]:
+        (x0, y0, _), (x1, y1, _) = self._geometry.boxes[i]
+        return [(x0 + a * (x1 - x0), y0 + b * (y1 - y0)) for a in (0.2, 0.5, 0.8) for b in (0.2, 0.5, 0.8)]
+
+    def _materials(
+        self, i: int, points: list[tuple[float, float]], fits: Callable[[NDArray[np.float64]], Any]
+    ) -> list[str]:
+        """Material of the highest fitting surface at each point; empty where there is none."""
+        found = []
+        for x, y in points:
+            best, name = -math.inf, ""
+            for j, _ in self._geometry.columns(i, x, y):
+                for material, heights in self._geometry.surfaces(j, x, y):
+                    good = heights[fits(heights)]
+                    if len(good) and float(good.max()) > best:
+                        best, name = float(good.max()), material
+            found.append(name)
+        return found
+
+    def _high(self, i: int, least_m: float, _slack: float) -> bool:
+        """So far above the ground below, if there is ground below."""
+        geometry = self._geometry
+        low = float(geometry.boxes[i, 0, 2])
+        x, y = (float(c) for c in geometry.centres[i, :2])
+        for j, heights in geometry.columns(i, x, y):
+            if geometry.scene.instances[j].category in _GROUND:
+                below = heights[heights <= low + _STEP_M]
+                if len(below) and low - float(below.max()) < least_m:
+                    return False
+        return True
+
+    def _z(self, i: int, ends: list[float], _slack: float) -> bool:
+        return ends[0] <= float(self._geometry.boxes[i, 0, 2]) <= ends[1]
+
+    def _floor(self, i: int, value: list[Any], _slack: float) -> bool:
+        """On that floor of a thing: so many of its slabs lie above its ground floor and not above the foot."""
+        number, pattern = value
+        low = float(self._geometry.boxes[i, 0, 2])
+        for j in sorted(self._things(pattern) & set(self._stack(i))):
+            slabs = self._slab_heights(j)
+            if len(slabs) and int((slabs[1:] <= low + _STEP_M).sum()) == number:
+                return True
+        # On a ground floor one may stand on the ground itself.
+        return number == 0 and self._inside(i, pattern, 1.0) and not self._high(i, 1.0, 1.0)
+
+    def _slab_heights(self, j: int) -> NDArray[np.float64]:
+        """Heights of a thing's floors, the ground floor's first, metres."""
+        if j not in self._slabs:
+            instance = self._geometry.scene.instances[j]
+            a, b, c = np.moveaxis(instance.vertices[instance.faces], 1, 0)
+            normal = np.cross(b - a, c - a)
+            area = np.linalg.norm(normal, axis=1) / 2.0
+            level = normal[:, 2] > 1.9 * area
+            z = np.round((a[:, 2] + b[:, 2] + c[:, 2])[level] / 3.0, 1)
+            least = _SLAB_SHARE * float(shapely.area(self._geometry.outline(j)))
+            ground = self._ground_under(j)
+            slabs = [ground]
+            for height in np.unique(z):
+                if float(area[level][z == height].sum()) >= least and height - slabs[-1] >= _STOREY_M:
+                    slabs.append(float(height))
+            self._slabs[j] = np.array(slabs)
+        return self._slabs[j]
+
+    def _ground_under(self, j: int) -> float:
+        """Height of the ground around a thing: of its outline's lowest corner, metres."""
+        geometry = self._geometry
+        (x0, y0, low), (x1, y1, _) = geometry.boxes[j]
+        heights = []
+        for x, y in ((x0 - 1, y0 - 1), (x1 + 1, y0 - 1), (x0 - 1, y1 + 1), (x1 + 1, y1 + 1)):
+            for k, found in geometry.columns(j, float(x), float(y)):
+                if geometry.scene.instances[k].category in _GROUND:
+                    heights.append(float(found.max()))
+        return float(np.median(heights)) if heights else float(low)
+
+    def _among(self, i: int, value: list[Any], slack: float) -> bool:
+        least, pattern, most_m = value
+        others = self._things(pattern) - {i}
+        near = (j for j in self._geometry.around(i, most_m * slack) if j in others)
+        return sum(self._geometry.gap_m(i, j) <= most_m * slack for j in near) >= least
+
+    def _part(self, i: int, part: str, slack: float) -> bool:
+        """In that part of the scene: a third of the way from its middle to the edge or farther."""
+        (x0, y0, _), (x1, y1, _) = self._geometry.scene.bounds
+        x, y = self._geometry.centres[i, :2]
+        u, v = (x - (x0 + x1) / 2) / ((x1 - x0) / 2), (y - (y0 + y1) / 2) / ((y1 - y0) / 2)
+        if part == "middle":
+            return max(abs(u), abs(v)) <= 0.34 * slack
+        dx, dy = _CORNERS[part]
+        return (dx == 0 or u * dx >= 0.2 / slack) and (dy == 0 or v * dy >= 0.2 / slack)

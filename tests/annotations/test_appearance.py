@@ -1,0 +1,135 @@
+"""What is said of looks, colours and twins is held against the mesh."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+
+import pytest
+from support.annotation_scenes import NAMES, PAINTS, box, street, street_annotations
+
+from aerialdojo_gen.annotations.appearance import unlike
+from aerialdojo_gen.annotations.check import check_source
+from aerialdojo_gen.annotations.colours import colour_shares, uncoloured
+from aerialdojo_gen.annotations.format import format_annotations, parse_annotations
+from aerialdojo_gen.annotations.relations import SceneGeometry
+from aerialdojo_gen.common.rng import generator
+from aerialdojo_gen.scenes.catalogue import load_catalogue
+from aerialdojo_gen.scenes.looks import Look
+from aerialdojo_gen.scenes.model import Material, Part, Scene
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+@pytest.fixture(scope="module")
+def catalogue():
+    return load_catalogue(ROOT / "scene_assets")
+
+
+def _faults(scene: Scene | None = None, looks=None, **texts: str) -> list[str]:
+    source = parse_annotations(format_annotations(street_annotations(**texts)))
+    return [fault.message for fault in check_source(source, scene or street(), NAMES, looks=looks)]
+
+
+def test_a_phrase_of_the_catalogue_must_be_so_of_the_instance(catalogue):
+    thing = catalogue.instantiate("traffic_light", "traffic_light_000", generator(0, "test", "looks"))
+    materials = {part.material: catalogue.materials[part.material] for part in thing.parts}
+    true = Look("Three lamps, one above the other", has=tuple(list(thing.anatomy.runs)[:1]))
+    false = Look("a tent beside it", has=("tent",))
+    looks = {"traffic_light": (true, false)}
+    assert list(unlike("It has three lamps one above the other.", thing, looks, materials)) == []
+    (message,) = unlike("A traffic light with a tent beside it.", thing, looks, materials)
+    assert message.startswith("'a tent beside it' is not so of traffic_light_000: ")
+    assert list(unlike("A traffic light with a tent beside itself.", thing, looks, materials)) == []
+
+
+def test_what_no_part_is_known_of_bears_no_phrase_out():
+    looks = {"delivery_van": (Look("sliding doors", has=("door",)),)}
+    assert any("'sliding doors' is not so of delivery_van_002" in message for message in _faults(looks=looks))
+    assert _faults() == []
+
+
+def test_colours_are_those_of_the_surface():
+    red = box("mailbox_000", (0, 0, 0), (1, 1, 1), colour="red")
+    assert colour_shares(red, PAINTS) == pytest.approx({"red": 1.0})
+    assert uncoloured("red", red, PAINTS) == []
+    assert uncoloured("dark green", red, PAINTS) == ["green"]
+    assert uncoloured("red and white", red, PAINTS) == ["white"]
+    # A twentieth of the surface is a colour of a part, and not that of the whole.
+    small = box("mailbox_000", (0, 0, 0), (0.22, 0.22, 0.22), colour="green").parts[0]
+    mixed = dataclasses.replace(red, parts=(*red.parts, small))
+    assert uncoloured("green", mixed, PAINTS) == ["green"]
+    assert uncoloured("green handle", mixed, PAINTS) == []
+
+
+def test_stripes_are_two_colours():
+    thing = box("mailbox_000", (0, 0, 0), (1, 1, 1), colour="red")
+    from numpy import uint8, zeros
+
+    tile = zeros((16, 16, 3), dtype=uint8)
+    tile[:8], tile[8:] = (200, 30, 20), (250, 250, 250)
+    awning = Material("stripes", (225, 140, 135), tile)
+    striped = dataclasses.replace(thing, parts=tuple(Part(p.vertices, p.faces, p.uv, "stripes") for p in thing.parts))
+    assert uncoloured("red and white", striped, {"stripes": awning}) == []
+    assert uncoloured("blue and white", striped, {"stripes": awning}) == ["blue"]
+
+
+def test_a_colour_that_the_surface_does_not_have_is_a_fault():
+    scene = street()
+    grey = tuple(
+        dataclasses.replace(i, parts=box("x_0", (30, 32, 0), (5, 2, 2.5)).parts)
+        if i.node == "delivery_van_002"
+        else i
+        for i in scene.instances
+    )
+    assert any(
+        "'blue' is not the colour of delivery_van_002" in message
+        for message in _faults(dataclasses.replace(scene, instances=grey))
+    )
+
+
+def test_twins_are_told_apart_in_the_first_sentence():
+    assert _faults() == []
+    late = "A red delivery van. It is parked in the yard between the bench and the street lamp."
+    assert any(
+        "its first sentence fits delivery_van_000 as well" in message for message in _faults(delivery_van_001=late)
+    )
+
+
+def test_a_description_is_short():
+    long = "The blue delivery van " + "very " * 60 + "much so."
+    assert any("has more than 60 words" in message for message in _faults(delivery_van_002=long))
+
+
+@pytest.mark.parametrize(
+    ("gap_m", "word", "so"),
+    [
+        (0.2, "leaning against", True),
+        (1.0, "leaning against", False),
+        (4.0, "at", True),
+        (6.0, "at", False),
+        (6.0, "near", True),
+    ],
+)
+def test_relations_are_read_as_strictly_as_they_are_meant(gap_m, word, so):
+    bench = box("bench_001", (-60 + 1 + gap_m + 0.5, 0, 0), (1, 1, 1), colour="green")
+    wall = box("mailbox_002", (-60, 0, 0), (2, 2, 2), colour="red")
+    geometry = SceneGeometry(dataclasses.replace(street(), instances=(*street().instances, bench, wall)))
+    from aerialdojo_gen.annotations.claims import Lexicon
+
+    lexicon = Lexicon(geometry, NAMES, {})
+    i = geometry.index["bench_001"]
+    (claim,) = lexicon.read(f"A green bench {word} the red mailbox.", i).claims
+    assert claim.holds(geometry, i) is so
+
+
+def test_in_front_and_behind_ask_for_the_front_that_a_thing_has(catalogue):
+    sign = catalogue.instantiate("stop_sign", "stop_sign_000", generator(0, "test", "front"), yaw_deg=0.0)
+    (front,) = sign.anatomy.fronts_rad
+    assert front == pytest.approx(0.0)
+    before, after = (box(f"bench_{k:03d}", (x, 0, 0), (1, 1, 1)) for k, x in enumerate((2.5, -2.5)))
+    geometry = SceneGeometry(dataclasses.replace(street(), instances=(sign, before, after)))
+    assert geometry.front(1, 0)
+    assert geometry.behind(2, 0)
+    assert not geometry.front(2, 0)
+    assert not geometry.behind(1, 0)
