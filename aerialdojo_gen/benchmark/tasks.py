@@ -27,6 +27,12 @@ from aerialdojo_gen.store.root import DataRoot, Where, open_root
 from aerialdojo_gen.store.schemas import SETTINGS, SUBSETS, TASKS
 
 MODALITIES = ("semantic", "image")
+# What an episode needs of a task: releases of other versions have these, whatever else stands in their tables.
+_COLUMNS = (
+    "task_id", "nav_id", "scene", "family", "scene_type", "partition", "subset", "setting", "modality",
+    "action_budget", "start_x_m", "start_y_m", "start_z_m", "start_yaw_rad", "target_name", "landmark", "direction",
+    "description", "reference_image_id",
+)  # fmt: skip
 _FACTS = ("nav_id", "goal_x_m", "goal_y_m", "goal_z_m", "euclidean_m", "length_m", "target_object_id")
 
 
@@ -108,7 +114,8 @@ def select(data: Where, selection: Selection) -> pa.Table:
     Returns
     -------
     pyarrow.Table
-        Rows of `tasks` with a column ``split``, sorted by scene, navigation task and modality.
+        Rows of `tasks`, the columns that an episode needs, with a column ``split``, sorted by scene, navigation task
+        and modality.
 
     Raises
     ------
@@ -124,7 +131,7 @@ def select(data: Where, selection: Selection) -> pa.Table:
             split = f"{store.partition(scene)}_{subset}"
             if split not in (selection.splits or SUBSETS):
                 continue
-            table = store.read_scene(root, f"tasks/{subset}", scene)
+            table = store.read_scene(root, f"tasks/{subset}", scene, _COLUMNS)
             for column, chosen in (("setting", selection.settings), ("modality", selection.modalities)):
                 if chosen:
                     table = table.filter(pc.is_in(table[column], pa.array(chosen, pa.string())))
