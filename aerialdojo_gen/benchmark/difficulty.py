@@ -198,8 +198,8 @@ def parting_tables(partings: Partings, kind: str, runs: Sequence[Run], profile: 
         if parting.kind == kind:
             counts = [tuple(int(mask.sum()) for mask in part.masks) for part in parting.parts]
             alike = all(len(set(count)) == 1 for count in counts)
-            told = ", ".join(f"{part.head} {n[0]:,}" for part, n in zip(parting.parts, counts, strict=True))
-            note = " ".join(filter(None, (parting.note, f"Episodes: {told}." if alike else "")))
+            told = "; ".join(f"{part.head}: {n[0]:,}" for part, n in zip(parting.parts, counts, strict=True))
+            note = " ".join(filter(None, (parting.note, f"Episodes – {told}." if alike else "")))
             pairs = [(part.head, part.masks) for part in parting.parts]
             tables.append(part_table(parting.title, runs, profile, pairs, note))
     return [table for table in tables if table is not None]

@@ -79,7 +79,7 @@ def test_every_part_is_the_one_that_a_join_finds(planted: Planted) -> None:
     one = heads["Targets that training shows"]
     seen = rows[rows.target_seen_in_train]
     assert one.rows[0][1][0] == f"{100 * seen.success.mean():.2f}"
-    assert one.notes[-1] == f"Episodes: seen in training {len(seen):,}, unseen {len(rows) - len(seen):,}."
+    assert one.notes[-1] == f"Episodes – seen in training: {len(seen):,}; unseen: {len(rows) - len(seen):,}."
     lines = list(csv.DictReader(io.StringIO(as_csv(runs, [AT_3], partings=partings))))
     blocked = rows[~rows.straight_line_free.astype(bool)]
     (row,) = [line for line in lines if (line["scope"], line["name"]) == ("straight_line_free", "blocked")]
