@@ -88,7 +88,7 @@ def reachable_nodes(scene: Scene, pipeline: Pipeline, roots: Roots) -> Callable[
     def eligible(node: str) -> bool:
         x, y, z = (float(v) for v in scene[node].centroid)
         item = {"object_id": 0, "mesh_node": node, "x_m": x, "y_m": y, "z_m": z}
-        found, _ = candidates_of(item, world, job, config)
+        found, _, _ = candidates_of(item, world, job, config)
         return found is not None and len(found.seeing(config.min_visible_fraction)) >= config.shortlist
 
     return eligible

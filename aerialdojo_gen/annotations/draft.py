@@ -113,7 +113,7 @@ class _Drafter:
         self._names = {category: catalogue[category].name for category in catalogue}
         self._kinds = {category: catalogue[category].kind for category in catalogue}
         targets = frozenset(catalogue.targets)
-        looks = {category: catalogue[category].looks for category in catalogue}
+        looks = {category: tuple(look.say for look in catalogue[category].looks) for category in catalogue}
         by_category: dict[str, Words] = {}
         for i in scene.instances:
             kind = self._kinds.get(i.category, "")

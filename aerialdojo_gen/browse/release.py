@@ -21,7 +21,7 @@ from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.root import DataRoot, open_root
 from aerialdojo_gen.store.schemas import SUBSETS
 
-TABLES = ("tasks", "routes", "objects", "landmarks", "anchors", "scenes")
+TABLES = ("tasks", "routes", "objects", "landmarks", "anchors", "viewpoints", "scenes")
 _SPLIT = ("tasks", "routes")
 # Each keeps its mesh once that is read, 10 to 100 MB.
 _MOST_SCENES = 4

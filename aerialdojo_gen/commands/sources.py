@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from aerialdojo_gen.commands.common import PipelineFile, Scene, open_pipeline
+from aerialdojo_gen.commands.common import Data, PipelineFile, Scene, open_pipeline
 
 app = typer.Typer()
 
@@ -87,8 +87,14 @@ def gallery(
     scene: Scene = None, pipeline: PipelineFile = None,
     props: Annotated[bool, typer.Option("--props/--no-props", help="The sheets of all props too.")] = True,
     small: Annotated[bool, typer.Option("--small", help="JPEGs of 1280 columns, for pages.")] = False,
+    references: Annotated[bool, typer.Option(
+        "--references", help="Instead, the objects' reference pictures with what is said of them.")] = False,
+    data: Data = "data",
 ) -> None:  # fmt: skip
     """Picture every prop and every scene as contact sheets."""
+    if references:
+        _reference_sheets(out, scene, pipeline, data, "jpg" if small else "png")
+        return
     from aerialdojo_gen.layouts.build import build_scene
     from aerialdojo_gen.pipeline import runner
     from aerialdojo_gen.rendering.gallery import props_sheet, scene_sheet, write_picture
@@ -107,3 +113,19 @@ def gallery(
         for title, names in (("props", catalogue.targets), ("landmarks", landmarks)):
             size = 120 if small else 200
             print(write_picture(props_sheet(catalogue, names, size), out, f"{title}.{suffix}"))
+
+
+def _reference_sheets(out: Path, scene: list[str] | None, pipeline: Path | None, data: str, suffix: str) -> None:
+    from aerialdojo_gen.pipeline import runner
+    from aerialdojo_gen.rendering.gallery import write_picture
+    from aerialdojo_gen.rendering.reference_sheets import reference_sheets
+    from aerialdojo_gen.store.atomic import make_folder
+    from aerialdojo_gen.store.shards import read_scene
+
+    config, roots = open_pipeline(pipeline, data)
+    make_folder(out)
+    for name in runner.chosen_scenes(config, roots, scene):
+        objects = {row["object_id"]: row for row in read_scene(roots.data, "objects", name).to_pylist()}
+        rows = [objects[row["object_id"]] | row for row in read_scene(roots.data, "references", name).to_pylist()]
+        for k, sheet in enumerate(reference_sheets(rows)):
+            print(write_picture(sheet, out, f"references-{name}-{k + 1}.{suffix}"))

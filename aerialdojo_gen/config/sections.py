@@ -85,6 +85,11 @@ class AnchorSampleConfig(Section):
         max_length=64,
         description="elevations of the candidates, seen from the centroid",
     )
+    tell_elevations_deg: tuple[float, ...] = Field(
+        (0.0, 20.0, 40.0),
+        max_length=64,
+        description="elevations of more candidates around each part that tells what the object is",
+    )
     level_heights: tuple[float, ...] = Field(
         (0.2, 0.8),
         max_length=64,
@@ -99,7 +104,12 @@ class AnchorSampleConfig(Section):
     fov_deg: float = Field(90.0, gt=0, lt=180, description="field of view of the front camera")
     min_visible_fraction: float = Field(0.3, ge=0, le=1, description="visible fraction below which nothing is seen")
     pictured: int = Field(6, ge=1, le=1000, description="candidates an object that are pictured and scored")
-    picture_px: int = Field(96, ge=16, le=1024, description="edge of those pictures")
+    picture_px: int = Field(
+        96, ge=16, le=1024, description="edge of those pictures; 320 at least for the scorers clip and vlm"
+    )
+    step_back_m: float = Field(
+        15.0, ge=0, le=1000, description="how far a reference picture may step back until its object fits"
+    )
     shortlist: int = Field(3, ge=1, le=1000, description="anchors kept an object")
     separation_deg: float = Field(45.0, gt=0, le=180, description="wanted azimuth between kept anchors")
     weights: ScorerWeights = ScorerWeights()
@@ -109,6 +119,10 @@ class AnchorSampleConfig(Section):
 
 class ReferenceImagesConfig(Section):
     """Pictures of the objects for image goals."""
+
+    step_back_m: float = Field(
+        15.0, ge=0, le=1000, description="most that is stepped back from the anchor; 0 takes the picture there"
+    )
 
     width: int = Field(320, ge=16, le=4096, description="columns, pixels")
     height: int = Field(320, ge=16, le=4096, description="rows, pixels")

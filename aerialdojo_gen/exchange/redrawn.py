@@ -22,7 +22,7 @@ _SAME_VIEW = 12.0
 
 
 class Redrawn:
-    """Draws the front view from a scene's selected anchors, at another size than the release has it.
+    """Draws a scene's reference pictures from where they were taken, at another size than the release has them.
 
     Parameters
     ----------
@@ -53,12 +53,12 @@ class Redrawn:
             ) from None
         if hashlib.sha256(mesh.read_bytes()).hexdigest() != row["mesh_sha256"]:
             raise AssetError(f"{mesh} is not the mesh that the release was made from: {keep}")
-        anchors = store.read_scene(root, "release/anchors", scene).to_pylist()
         self._scene_name = scene
-        self._anchors = {a["object_id"]: a for a in anchors if a["selected"]}
-        self._pictures = {
-            r["object_id"]: r["reference_image"] for r in store.read_scene(root, "release/objects", scene).to_pylist()
+        rows = store.read_scene(root, "release/objects", scene).to_pylist()
+        self._poses = {
+            r["object_id"]: [r[f"reference_{name}"] for name in ("x_m", "y_m", "z_m", "yaw_rad")] for r in rows
         }
+        self._pictures = {r["object_id"]: r["reference_image"] for r in rows}
         self._camera = Camera(size_px, size_px)
         self._scene = open_scene(mesh, row["mesh_sha256"]).scene
         self._renderer_name = choose_renderer("auto").name
@@ -69,7 +69,7 @@ class Redrawn:
         Parameters
         ----------
         object_id : int
-            An object with a selected anchor and a reference image.
+            An object with a reference image.
 
         Returns
         -------
@@ -81,12 +81,12 @@ class Redrawn:
         StoreError
             It is not the view that the release shows (another field of view, say).
         """
-        anchor = self._anchors[object_id]
-        pose = view_pose((anchor["x_m"], anchor["y_m"], anchor["z_m"]), anchor["yaw_rad"], "front")
+        x, y, z, yaw = self._poses[object_id]
+        pose = view_pose((x, y, z), yaw, "front")
         rgb = kept_renderer(self._scene, self._renderer_name).render(self._camera, pose).rgb
         if _difference(rgb, self._pictures[object_id]) > _SAME_VIEW:
             raise StoreError(
-                f"object {object_id} of {self._scene_name} looks otherwise in the release than from its anchor: "
+                f"object {object_id} of {self._scene_name} does not look as its picture does: "
                 "--picture-size 0 exports the release's own pictures"
             )
         return encode_png(rgb, REFERENCE_PNG)

@@ -218,7 +218,9 @@ def informativeness(
     return score
 
 
-def shortlist(score: Floats, azimuth_rad: Floats, count: int, separation_rad: float) -> NDArray[np.int64]:
+def shortlist(
+    score: Floats, azimuth_rad: Floats, count: int, separation_rad: float, wanted: NDArray[np.bool_] | None = None
+) -> NDArray[np.int64]:
     """Choose the best viewpoints that look from different sides.
 
     Greedy: the best score first; then the best among those at least the separation away in azimuth from all that are
@@ -234,6 +236,8 @@ def shortlist(score: Floats, azimuth_rad: Floats, count: int, separation_rad: fl
         How many to choose; fewer where n is smaller.
     separation_rad : float
         Wanted angle between any two.
+    wanted : (n,) bool, optional
+        One of these is chosen at least, if there is any: the best of them, in the place of the last one.
 
     Returns
     -------
@@ -252,4 +256,6 @@ def shortlist(score: Floats, azimuth_rad: Floats, count: int, separation_rad: fl
         worth[chosen] = -math.inf
         chosen.append(int(np.argmax(worth)))
         apart = np.minimum(apart, np.abs(wrap_angle_rad(azimuth_rad - azimuth_rad[chosen[-1]])))
+    if wanted is not None and wanted.any() and not wanted[chosen].any():
+        chosen[-1] = int(np.argmax(np.where(wanted, score, -math.inf)))
     return np.array(sorted(chosen, key=lambda k: (-score[k], k)), dtype=np.int64)

@@ -49,6 +49,9 @@ TABLES = {
     "objects": Table(schemas.RELEASE_OBJECTS, "One row a target object, with the picture that image goals show."),
     "landmarks": Table(schemas.LANDMARKS, "One row a landmark."),
     "anchors": Table(schemas.RELEASE_ANCHORS, "One row a viewpoint; three an object, one selected as the goal."),
+    "viewpoints": Table(
+        schemas.VIEWPOINTS, "One row a place at 1 m from an object from which it is seen: where a person would stop."
+    ),
     "scenes": Table(schemas.SCENES, "One row a scene."),
 }
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
@@ -11,13 +13,15 @@ from numpy.typing import NDArray
 
 from aerialdojo_gen.common.names import nearest
 from aerialdojo_gen.errors import AssetError, ShapeError
+from aerialdojo_gen.geometry.angles import wrap_angle_rad
+from aerialdojo_gen.scenes.anatomy import FRONTS, Anatomy, Run, moved
 from aerialdojo_gen.scenes.builders import builders
 from aerialdojo_gen.scenes.catalogue_files import TARGETS, catalogue_files
 from aerialdojo_gen.scenes.materials import MaterialLibrary, load_materials, read_toml, refuse_unknown
 from aerialdojo_gen.scenes.mesh import Mesh, areas, merge, rotation, to_part
 from aerialdojo_gen.scenes.model import Instance, Part
-from aerialdojo_gen.scenes.prop import Category, Variant, parse_category
-from aerialdojo_gen.scenes.vocabulary import MAX_TRIANGLES, part_mesh
+from aerialdojo_gen.scenes.prop import Category, Variant, parse_category, tags_of
+from aerialdojo_gen.scenes.vocabulary import MAX_TRIANGLES, copies_in, part_mesh
 
 _MATERIALS = "materials.toml"
 _CACHE_SIZE = 2000
@@ -38,7 +42,7 @@ class Catalogue:
     def __init__(self, categories: Mapping[str, Category], materials: MaterialLibrary) -> None:
         self._categories = dict(categories)
         self.materials = materials
-        self._parts: dict[tuple[object, ...], tuple[Part, ...]] = {}
+        self._parts: dict[tuple[object, ...], _Assembly] = {}
 
     def __len__(self) -> int:
         return len(self._categories)
@@ -116,7 +120,7 @@ class Catalogue:
         refuse_unknown(roles or {}, prop.roles, f"{prop.source} roles")
         words = dict(look.attributes) | dict(attributes or {})
         if prop.builder is not None:
-            parts = self._built(prop, prop.builder, sizes, surfaces, rng)
+            made = self._built(prop, prop.builder, sizes, surfaces, rng)
         else:
             signs = tuple(words.items()) if any(p["shape"] == "text" for p in prop.parts) else ()
             key = (category, look.name, tuple(sizes.items()), tuple(surfaces.items()), signs, shape_seed)
@@ -124,11 +128,17 @@ class Catalogue:
                 if len(self._parts) >= _CACHE_SIZE:
                     self._parts.clear()
                 self._parts[key] = self._assembled(prop, look, sizes, surfaces, words, shape_seed)
-            parts = self._parts[key]
-        there = placed(parts, position, yaw_deg, scale)
+            made = self._parts[key]
+        there, kept = _placed(made.parts, position, yaw_deg, scale)
         if not there:
             raise AssetError(f"{prop.source}: no triangle of variant {look.name!r} has an area")
-        return Instance(node, category, look.name, words, there)
+        anatomy = None
+        if prop.front:
+            yaw = math.radians(yaw_deg)
+            fronts = tuple(float(wrap_angle_rad(yaw + math.radians(side))) for side in FRONTS[prop.front])
+            tells = tuple(dict.fromkeys((*prop.tells, *look.tells)))
+            anatomy = Anatomy(float(wrap_angle_rad(yaw)), fronts, tells, moved(made.runs, kept))
+        return Instance(node, category, look.name, words, there, anatomy)
 
     def _draw_variant(self, prop: Category, name: str | None, rng: np.random.Generator) -> Variant:
         weights = np.array([v.weight for v in prop.variants])
@@ -156,19 +166,20 @@ class Catalogue:
         surfaces: Mapping[str, str],
         words: Mapping[str, str],
         shape_seed: int,
-    ) -> tuple[Part, ...]:
-        meshes: list[tuple[str, Mesh]] = []
+    ) -> _Assembly:
+        meshes: list[_Piece] = []
         for k, part in enumerate(prop.parts):
-            if part.get("tag") in look.without:
+            if look.without.intersection(tags_of(part)):
                 continue
             own = part
             if part["shape"] == "crown" and "seed" not in part:
                 own = {**part, "seed": shape_seed + k * _CROWN_SHAPES}
             try:
-                meshes.append((part["role"], part_mesh(own, sizes, words)))
+                body, copies = part_mesh(own, sizes, words), copies_in(own, sizes)
             except ShapeError as error:
                 raise AssetError(f"{prop.source} parts[{k}] ({part['shape']}): {error}") from error
-        total = sum(len(body.faces) for _, body in meshes)
+            meshes.append(_Piece(part["role"], body, tags_of(part), copies))
+        total = sum(len(piece.body.faces) for piece in meshes)
         if total > MAX_TRIANGLES:
             raise AssetError(f"{prop.source} has {total:,} triangles, {MAX_TRIANGLES:,} are the most")
         return self._textured(prop, meshes, surfaces)
@@ -180,38 +191,72 @@ class Catalogue:
         sizes: Mapping[str, float],
         surfaces: Mapping[str, str],
         rng: np.random.Generator,
-    ) -> tuple[Part, ...]:
+    ) -> _Assembly:
         try:
-            meshes = list(builders()[builder](rng, sizes))
+            meshes = [_Piece(role, body) for role, body in builders()[builder](rng, sizes)]
         except (ValueError, KeyError) as error:
             raise AssetError(f"{prop.source} builder {builder!r}: {error}") from error
         return self._textured(prop, meshes, surfaces)
 
-    def _textured(
-        self, prop: Category, meshes: Sequence[tuple[str, Mesh]], surfaces: Mapping[str, str]
-    ) -> tuple[Part, ...]:
-        by_material: dict[str, list[Mesh]] = {}
-        for role, body in meshes:
-            by_material.setdefault(surfaces.get(role, role), []).append(body)
-        for spec in by_material:
+    def _textured(self, prop: Category, pieces: Sequence[_Piece], surfaces: Mapping[str, str]) -> _Assembly:
+        by_material: dict[str, list[_Piece]] = {}
+        for piece in pieces:
+            by_material.setdefault(surfaces.get(piece.role, piece.role), []).append(piece)
+        runs: dict[str, list[Run]] = {}
+        parts = []
+        for k, (spec, members) in enumerate(by_material.items()):
             self.materials.check(spec, prop.source)
-        return tuple(to_part(merge(m), spec, self.materials.tile_m(spec)) for spec, m in by_material.items())
+            parts.append(to_part(merge([piece.body for piece in members]), spec, self.materials.tile_m(spec)))
+            first = 0
+            for piece in members:
+                faces = len(piece.body.faces)
+                run = Run(k, first, faces // piece.copies, piece.copies)
+                for name in dict.fromkeys((*piece.tags, piece.role)):
+                    runs.setdefault(name, []).extend([run] if faces else [])
+                first += faces
+        return _Assembly(tuple(parts), {name: tuple(members) for name, members in sorted(runs.items())})
+
+
+@dataclass(frozen=True, eq=False)
+class _Piece:
+    """A part of a prop before it has its material: so many copies of a shape."""
+
+    role: str
+    body: Mesh
+    tags: tuple[str, ...] = ()
+    copies: int = 1
+
+
+@dataclass(frozen=True, eq=False)
+class _Assembly:
+    """A prop in its own frame, and which faces are which of its parts."""
+
+    parts: tuple[Part, ...]
+    runs: Mapping[str, tuple[Run, ...]]
 
 
 def placed(
     parts: Sequence[Part], position: Sequence[float], yaw_deg: float = 0.0, scale: float = 1.0
 ) -> tuple[Part, ...]:
     """Scale, turn and move parts into the world, rounded to what float32 holds."""
+    return _placed(parts, position, yaw_deg, scale)[0]
+
+
+def _placed(
+    parts: Sequence[Part], position: Sequence[float], yaw_deg: float, scale: float
+) -> tuple[tuple[Part, ...], list[NDArray[np.bool_]]]:
+    """The placed parts, and which faces of each of the old ones are left."""
     turn = rotation(0.0, 0.0, yaw_deg).T
     offset = np.asarray(position, dtype=np.float64)
-    out = []
+    out, kept = [], []
     for p in parts:
         vertices = single(p.vertices * scale @ turn + offset)
         # Far from the origin float32 may flatten a sliver to nothing.
-        faces = p.faces[areas(vertices, p.faces) > 0.0]
-        if len(faces):
-            out.append(Part(vertices, faces, p.uv * np.float32(scale), p.material))
-    return tuple(out)
+        solid = areas(vertices, p.faces) > 0.0
+        kept.append(solid)
+        if solid.any():
+            out.append(Part(vertices, p.faces[solid], p.uv * np.float32(scale), p.material))
+    return tuple(out), kept
 
 
 def single(vertices: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -19,6 +19,11 @@ _HUES = (
     (335, "pink"),
     (361, "red"),
 )
+# Every word that a colour can have.
+COLOURS = (
+    "white", "black", "grey", "brown", "beige", "red", "orange", "yellow", "green", "turquoise", "blue", "purple",
+    "pink",
+)  # fmt: skip
 
 
 def colour_name(rgb: ArrayLike) -> str:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import operator
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -48,8 +51,9 @@ def cut_out(scene: Scene, cuts: tuple[Cut, ...]) -> Scene:
                 inside += [_some(part, boxed)] if boxed.any() else []
                 rest += [part if not boxed.any() else _some(part, ~boxed)] if not boxed.all() else []
             if rest:
-                parts = tuple(rest)
-                kept.append(Instance(instance.node, instance.category, instance.variant, instance.attributes, parts))
+                # What a cut takes faces from is no longer what its catalogue says.
+                whole = len(rest) == len(instance.parts) and all(map(operator.is_, rest, instance.parts))
+                kept.append(instance if whole else replace(instance, parts=tuple(rest), anatomy=None))
         if not inside:
             raise AssetError(f"scene {scene.name}: the box {cut.node!r} holds no triangle's middle: make it larger")
         look = {"colour": colour_name(_colour(scene, inside))}

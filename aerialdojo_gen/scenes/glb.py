@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from aerialdojo_gen.common.bounded import loads_json
 from aerialdojo_gen.common.pictures import TEXTURE_PNG, decode_rgb, encode_png
 from aerialdojo_gen.errors import AssetError
+from aerialdojo_gen.scenes.anatomy import read_anatomy
 from aerialdojo_gen.scenes.model import Instance, Material, Part, Scene
 
 _MAGIC, _JSON, _BIN = b"glTF", 0x4E4F534A, 0x004E4942
@@ -150,7 +151,12 @@ class _Writer:
             }
             indices = self._accessor(part.faces.reshape(-1).astype(_DTYPES[kind]), kind, "SCALAR", _INDEX_BUFFER)
             primitives.append({"attributes": attributes, "indices": indices, "material": materials[part.material]})
-        extras = {"category": instance.category, "variant": instance.variant, "attributes": instance.attributes}
+        extras = {
+            "category": instance.category,
+            "variant": instance.variant,
+            "attributes": instance.attributes,
+            **({} if instance.anatomy is None else {"anatomy": instance.anatomy.document()}),
+        }
         self._nodes.append({"name": instance.node, "mesh": len(self._meshes), "extras": extras})
         self._meshes.append({"primitives": primitives})
 
@@ -266,7 +272,9 @@ def _read_instance(
             raise ValueError("face beyond the vertices")
         parts.append(Part(v, faces, uv.astype(np.float32), materials[primitive["material"]]))
     extras = node["extras"]
-    return Instance(node["name"], extras["category"], extras["variant"], dict(extras["attributes"]), tuple(parts))
+    anatomy = read_anatomy(extras["anatomy"], [len(p.faces) for p in parts]) if "anatomy" in extras else None
+    words = dict(extras["attributes"])
+    return Instance(node["name"], extras["category"], extras["variant"], words, tuple(parts), anatomy)
 
 
 def _array(accessor: int, document: dict[str, Any], data: memoryview) -> NDArray[Any]:

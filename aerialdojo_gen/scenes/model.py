@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerialdojo_gen.geometry.soup import soup
+from aerialdojo_gen.scenes.anatomy import Anatomy
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,6 +75,8 @@ class Instance:
         What a description may speak of, e.g. ``{"colour": "red", "state": "open"}``.
     parts : tuple of Part
         At least one, none of them empty.
+    anatomy : Anatomy or None
+        Its fronts and named parts, where its catalogue says them.
     """
 
     node: str
@@ -81,6 +84,7 @@ class Instance:
     variant: str
     attributes: dict[str, str]
     parts: tuple[Part, ...]
+    anatomy: Anatomy | None = None
 
     @property
     def vertices(self) -> NDArray[np.float64]:
@@ -91,6 +95,19 @@ class Instance:
     def faces(self) -> NDArray[np.int32]:
         """Faces of all parts, (m, 3) int32, indices into `vertices`."""
         return self._soup[1]
+
+    def faces_of(self, name: str) -> NDArray[np.int64]:
+        """Indices into `faces` of a named part, or of several, ``"a|b"``; empty where it has none."""
+        return np.zeros(0, np.int64) if self.anatomy is None else self.anatomy.faces(name, self.face_counts)
+
+    def copies_of(self, name: str) -> list[NDArray[np.int64]]:
+        """Indices into `faces` of every copy of a named part; empty where it has none."""
+        return [] if self.anatomy is None else self.anatomy.copies(name, self.face_counts)
+
+    @property
+    def face_counts(self) -> list[int]:
+        """Number of faces of each of its parts."""
+        return [len(part.faces) for part in self.parts]
 
     @cached_property
     def _soup(self) -> tuple[NDArray[np.float64], NDArray[np.int32]]:

@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from aerialdojo_gen.common.names import nearest
 from aerialdojo_gen.errors import AssetError, ShapeError
+from aerialdojo_gen.scenes.anatomy import FRONTS
 from aerialdojo_gen.scenes.builders import builders
+from aerialdojo_gen.scenes.looks import Look, parse_looks
 from aerialdojo_gen.scenes.materials import MaterialLibrary, refuse_unknown
 from aerialdojo_gen.scenes.vocabulary import ARRAY_KEYS, PLACEMENT_KEYS, RING_KEYS, SHAPES, names_used, shape_keys
 
 KINDS = ("prop", "vegetation", "vehicle", "building", "landmark")
 Range = tuple[float, float]
-_CATEGORY_KEYS = ("name", "kind", "params", "roles", "parts", "builder", "variants", "looks")
-_VARIANT_KEYS = ("name", "attributes", "roles", "params", "without", "weight")
+_CATEGORY_KEYS = ("name", "kind", "params", "roles", "parts", "builder", "variants", "looks", "front", "tells")
+_VARIANT_KEYS = ("name", "attributes", "roles", "params", "without", "weight", "tells")
 _MIRRORS = ("x", "y", "xy")
 _MOST_PARTS = 1000
 _LARGEST = 10_000.0
@@ -32,6 +34,7 @@ class Variant:
     params: Mapping[str, Range]
     without: frozenset[str]
     weight: float
+    tells: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -46,8 +49,8 @@ class Category:
         What a person says, e.g. ``"delivery van"``.
     kind : str
         One of `KINDS`.
-    looks : tuple of str
-        Phrases that describe every variant, e.g. ``"with a sliding door"``; may be empty.
+    looks : tuple of Look
+        Phrases that may be said of it, each with what it claims; which are true is a matter of the instance.
     params : mapping of str to (low, high)
         Sizes drawn once an instance; a fixed one has low == high.
     roles : mapping of str to str
@@ -62,12 +65,17 @@ class Category:
         File and category, for messages.
     target : bool
         Whether tasks may ask for it: false of landmarks and of scenery.
+    front : str
+        The sides from which a person recognises it, a key of `aerialdojo_gen.scenes.anatomy.FRONTS`; empty where the
+        catalogue does not say.
+    tells : tuple of str
+        Parts that make its name true; empty where the whole body does.
     """
 
     category: str
     name: str
     kind: str
-    looks: tuple[str, ...]
+    looks: tuple[Look, ...]
     params: Mapping[str, Range]
     roles: Mapping[str, str]
     parts: tuple[Mapping[str, Any], ...]
@@ -75,6 +83,8 @@ class Category:
     variants: tuple[Variant, ...]
     source: str
     target: bool = True
+    front: str = ""
+    tells: tuple[str, ...] = ()
 
     def variant(self, name: str) -> Variant:
         """Look a variant up; an `AssetError` names the nearest one."""
@@ -104,9 +114,9 @@ def parse_category(path: Path, category: str, body: Any, materials: MaterialLibr
         raise AssetError(f"{where}: name is missing: what a person calls it")
     if kind not in KINDS:
         raise AssetError(f"{where}: unknown kind {kind!r}{nearest(str(kind), KINDS)} (one of {', '.join(KINDS)})")
-    looks = body.get("looks", [])
-    if not isinstance(looks, list) or not all(isinstance(x, str) for x in looks):
-        raise AssetError(f"{where}: looks must be a list of phrases")
+    front = body.get("front", "")
+    if "front" in body and front not in FRONTS:
+        raise AssetError(f"{where}: front must be one of {', '.join(FRONTS)}, got {front!r}")
     params = _params(body.get("params", {}), f"{where} params")
     roles = _roles(body.get("roles", {}), None, materials, f"{where} roles")
     builder, parts = body.get("builder"), body.get("parts", [])
@@ -120,20 +130,51 @@ def parse_category(path: Path, category: str, body: Any, materials: MaterialLibr
         _check_part(part, params, roles, materials, f"{where} parts[{k}]")
     if len(parts) > _MOST_PARTS:
         raise AssetError(f"{where}: {len(parts):,} parts, {_MOST_PARTS} are the most")
-    tags = {p["tag"] for p in parts if "tag" in p}
+    tags = {tag for p in parts for tag in tags_of(p)}
+    named = sorted({*tags, *roles, *(p["role"] for p in parts)})
+    looks = parse_looks(body.get("looks", []), named, materials.names, where)
+    tells = _tells(body.get("tells", []), named, where)
     raw = body.get("variants", [])
     if not isinstance(raw, list):
         raise AssetError(f"{where}: variants must be an array of tables, [[{category}.variants]]")
     variants: list[Variant] = []
     for k, v in enumerate(raw):
-        variants.append(_variant(v, params, roles, tags, materials, f"{where} variants[{k}]"))
+        variants.append(_variant(v, params, roles, tags, named, materials, f"{where} variants[{k}]"))
         if variants[-1].name in {x.name for x in variants[:-1]}:
             raise AssetError(f"{where} variants[{k}]: variant {variants[-1].name!r} stands twice")
     if not variants:
         variants.append(Variant("", {}, {}, {}, frozenset(), 1.0))
     return Category(
-        category, name, kind, tuple(looks), params, roles, tuple(parts), builder, tuple(variants), where, target
+        category,
+        name,
+        kind,
+        looks,
+        params,
+        roles,
+        tuple(parts),
+        builder,
+        tuple(variants),
+        where,
+        target,
+        front,
+        tells,
     )
+
+
+def tags_of(part: Mapping[str, Any]) -> tuple[str, ...]:
+    """Tags of a part: none, one, or those of a list."""
+    tag = part.get("tag", ())
+    return (tag,) if isinstance(tag, str) else tuple(tag)
+
+
+def _tells(raw: Any, named: Sequence[str], where: str) -> tuple[str, ...]:
+    if not isinstance(raw, list) or not all(isinstance(name, str) for name in raw):
+        raise AssetError(f"{where}: tells must be a list of parts, got {raw!r}")
+    for name in raw:
+        for one in name.split("|"):
+            if one not in named:
+                raise AssetError(f"{where}: tells: no part {one!r}{nearest(one, named)}: named by tag or role")
+    return tuple(raw)
 
 
 def _check_part(
@@ -158,8 +199,9 @@ def _check_part(
         raise AssetError(f"{where} ring: axis must be x, y or z")
     if part.get("mirror", "x") not in _MIRRORS:
         raise AssetError(f"{where}: mirror must be x, y or xy, got {part['mirror']!r}")
-    if not isinstance(part.get("tag", ""), str):
-        raise AssetError(f"{where}: tag must be a word, got {part['tag']!r}")
+    tags = part.get("tag", "")
+    if not isinstance(tags, str) and not (isinstance(tags, list) and all(isinstance(t, str) for t in tags)):
+        raise AssetError(f"{where}: tag must be a word or a list of words, got {tags!r}")
     role = part.get("role")
     if not isinstance(role, str):
         raise AssetError(f"{where}: role is missing: a role of the category or a material")
@@ -178,6 +220,7 @@ def _variant(
     params: Mapping[str, Range],
     roles: Mapping[str, str],
     tags: set[str],
+    named: Sequence[str],
     materials: MaterialLibrary,
     where: str,
 ) -> Variant:
@@ -200,7 +243,8 @@ def _variant(
     if not isinstance(weight, int | float) or weight <= 0:
         raise AssetError(f"{where}: weight must be a positive number, got {weight!r}")
     own_roles = _roles(body.get("roles", {}), roles, materials, f"{where} roles")
-    return Variant(body["name"], attributes, own_roles, own_params, frozenset(without), float(weight))
+    tells = _tells(body.get("tells", []), named, where)
+    return Variant(body["name"], attributes, own_roles, own_params, frozenset(without), float(weight), tells)
 
 
 def _params(body: Any, where: str) -> dict[str, Range]:

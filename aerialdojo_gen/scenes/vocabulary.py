@@ -94,6 +94,16 @@ def part_mesh(part: Mapping[str, Any], names: Mapping[str, float], words: Mappin
     return body
 
 
+def copies_in(part: Mapping[str, Any], names: Mapping[str, float]) -> int:
+    """How many copies of its shape `part_mesh` makes of a part, each of as many faces, one after the other."""
+    count = 2 ** len(part.get("mirror", ""))
+    for table, keys in (("array", ("count", "count2")), ("ring", ("count",))):
+        for key in keys:
+            if key in part.get(table, {}):
+                count *= round(_number(part[table][key], names))
+    return count
+
+
 def _arrayed(body: Mesh, array: Mapping[str, Any], names: Mapping[str, float]) -> Mesh:
     copies = [body]
     for count_key, step_key in (("count", "step"), ("count2", "step2")):

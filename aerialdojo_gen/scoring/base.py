@@ -32,6 +32,10 @@ class AnchorView:
         Of the viewpoint, seen from the object's centroid.
     clearance_m : float
         From the viewpoint to the nearest surface.
+    told : tuple of float
+        How well the picture shows each of the object's telling parts, in [0, 1]; empty where the whole body tells.
+    off_front_rad : float or None
+        Angle between where the viewpoint is and the nearest of the object's fronts; None where it has none.
     """
 
     rgb: NDArray[np.uint8]
@@ -41,6 +45,8 @@ class AnchorView:
     shown: float
     elevation_deg: float
     clearance_m: float
+    told: tuple[float, ...] = ()
+    off_front_rad: float | None = None
 
     def jpeg(self) -> bytes:
         """The picture as a JPEG file."""

@@ -9,6 +9,7 @@ import cv2
 import numpy as np
 
 from aerialdojo_gen.scoring.base import AnchorView
+from aerialdojo_gen.scoring.knowing import fronting, knowing, telling
 
 WEIGHTS = {
     "unoccluded": 0.25, "shown": 0.25, "size": 0.1, "centred": 0.1, "contrast": 0.05, "sky": 0.025, "level": 0.1,
@@ -44,6 +45,11 @@ class Parts:
         Full marks up to 15° above or below the centroid, none from 45°.
     clear : float
         Room around the body; full marks at the standoff.
+    tells : float or None
+        How well the parts that make its name true are seen (`aerialdojo_gen.scoring.knowing`); None where the whole
+        body tells, or nothing is known of it.
+    front : float or None
+        Full marks up to 25° off the object's front, little beyond 60°; None where it has none.
     """
 
     unoccluded: float
@@ -54,15 +60,19 @@ class Parts:
     sky: float
     level: float
     clear: float
+    tells: float | None = None
+    front: float | None = None
 
     @property
     def score(self) -> float:
         """The weighted mean of the terms."""
         terms = asdict(self)
-        return sum(weight * terms[name] for name, weight in WEIGHTS.items())
+        silhouette = sum(weight * terms[name] for name, weight in WEIGHTS.items())
+        known = [None if mark is None else np.array([mark]) for mark in (self.tells, self.front)]
+        return float(knowing(np.array([silhouette]), *known)[0])
 
     @property
-    def columns(self) -> dict[str, float]:
+    def columns(self) -> dict[str, float | None]:
         """The terms as columns of the table ``anchors``."""
         return {f"part_{name}": value for name, value in asdict(self).items()}
 
@@ -86,12 +96,15 @@ def judge(view: AnchorView, radius_m: float, standoff_m: float) -> Parts:
     level = 1.0 - min(max(steep, 0.0), 1.0)
     room = standoff_m - radius_m
     clear = min(max((view.clearance_m - radius_m) / room, 0.0), 1.0) if room > 0.0 else 1.0
+    tells = float(telling(np.array([view.told]))[0]) if view.told else None
+    off = fronting(None if view.off_front_rad is None else np.array([view.off_front_rad]))
+    front = None if off is None else float(off[0])
     if not view.visible.any():
-        return Parts(0.0, view.shown, 0.0, 0.0, 0.0, 0.0, level, clear)
+        return Parts(0.0, view.shown, 0.0, 0.0, 0.0, 0.0, level, clear, tells, front)
     height, width = view.visible.shape
     rows, columns = np.nonzero(view.visible)
     edge = np.sqrt((np.ptp(rows) + 1) * (np.ptp(columns) + 1) / (height * width))
-    off = np.hypot((columns.mean() + 0.5) / width * 2.0 - 1.0, (rows.mean() + 0.5) / height * 2.0 - 1.0)
+    away = np.hypot((columns.mean() + 0.5) / width * 2.0 - 1.0, (rows.mean() + 0.5) / height * 2.0 - 1.0)
     reach = 2 * max(1, round(width * _RING)) + 1
     around = cv2.dilate(view.visible.astype(np.uint8), np.ones((reach, reach), np.uint8)) > 0
     ring = around & ~view.visible
@@ -105,11 +118,13 @@ def judge(view: AnchorView, radius_m: float, standoff_m: float) -> Parts:
         unoccluded=float(view.visible.sum() / max(int(view.alone.sum()), 1)),
         shown=view.shown,
         size=min(float(edge) / _FULL_SIZE, 1.0),
-        centred=1.0 - min(float(off), 1.0),
+        centred=1.0 - min(float(away), 1.0),
         contrast=contrast,
         sky=sky,
         level=level,
         clear=clear,
+        tells=tells,
+        front=front,
     )
 
 

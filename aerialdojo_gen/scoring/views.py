@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -11,6 +14,9 @@ from aerialdojo_gen.rendering.raycast import RayRenderer, pixel_rays
 from aerialdojo_gen.scoring.base import AnchorView
 
 Floats = NDArray[np.float64]
+
+# A part that takes this share of the picture is large enough: a square of a fourteenth of its edge.
+_LARGE = 0.005
 
 
 def take_view(
@@ -24,6 +30,9 @@ def take_view(
     shown: float,
     elevation_deg: float,
     clearance_m: float,
+    told: Sequence[float] = (),
+    tells: Sequence[NDArray[np.int64]] = (),
+    off_front_rad: float | None = None,
 ) -> AnchorView:
     """Take the front view of an object from a candidate anchor.
 
@@ -42,6 +51,12 @@ def take_view(
         Counter-clockwise from +x.
     shown, elevation_deg, clearance_m : float
         See `AnchorView`.
+    told : sequence of float
+        By ray casts: how much of each telling part is seen, over what the best viewpoint sees.
+    tells : sequence of (k,) int64
+        The faces of each of those parts: indices into the object's. One that is small in the picture counts less.
+    off_front_rad : float or None
+        See `AnchorView`.
 
     Returns
     -------
@@ -57,4 +72,49 @@ def take_view(
     directions = pixel_rays(camera)[0][hidden] @ pose[:3, :3].T
     if len(hidden):
         silhouette.flat[hidden] = alone.first_hit(position_m, directions)[1] >= 0
-    return AnchorView(picture.rgb, visible, silhouette, picture.instance < 0, shown, elevation_deg, clearance_m)
+    shares = part_shares(alone, tells, camera, pose, visible)
+    marks = tuple(seen * min(1.0, math.sqrt(share / _LARGE)) for seen, share in zip(told, shares, strict=True))
+    return AnchorView(
+        picture.rgb,
+        visible,
+        silhouette,
+        picture.instance < 0,
+        shown,
+        elevation_deg,
+        clearance_m,
+        marks,
+        off_front_rad,
+    )
+
+
+def part_shares(
+    alone: TriangleRayCaster,
+    parts: Sequence[NDArray[np.int64]],
+    camera: Camera,
+    world_from_camera: Floats,
+    visible: NDArray[np.bool_],
+) -> list[float]:
+    """Share of a picture's pixels that show parts of an object.
+
+    Parameters
+    ----------
+    alone : TriangleRayCaster
+        The object by itself.
+    parts : sequence of (k,) int64
+        Faces of each part: indices into the object's.
+    camera : Camera
+    world_from_camera : (4, 4) float64
+    visible : (H, W) bool
+        Pixels that show the object.
+
+    Returns
+    -------
+    list of float
+        In [0, 1], one a part.
+    """
+    pixels = np.flatnonzero(visible)
+    if not len(parts) or not len(pixels):
+        return [0.0] * len(parts)
+    directions = pixel_rays(camera)[0][pixels] @ world_from_camera[:3, :3].T
+    face = alone.first_hit(world_from_camera[:3, 3], directions)[1]
+    return [float(np.isin(face, part).sum()) / visible.size for part in parts]

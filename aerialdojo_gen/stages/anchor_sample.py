@@ -31,7 +31,7 @@ STAGE = Stage(
     "anchor-sample",
     "Find viewpoints 1 m from each object that see it.",
     reads=("scenes", "objects", "chosen_anchors"),
-    writes=("anchors",),
+    writes=("anchors", "viewpoints"),
     run=run,
     settle=settle,
 )

@@ -30,10 +30,10 @@ def check(data: DataRoot, scenes: Sequence[str], config: SplitConfig) -> None:
 STAGE = Stage(
     "split",
     "Write the release: tasks, routes, objects, train and test.",
-    reads=("scenes", "landmarks", "objects", "anchors", "references", "pairs", "plans", "verdicts"),
+    reads=("scenes", "landmarks", "objects", "anchors", "viewpoints", "references", "pairs", "plans", "verdicts"),
     writes=(
         "tasks/train", "tasks/test", "routes/train", "routes/test",
-        "release/scenes", "release/landmarks", "release/objects", "release/anchors",
+        "release/scenes", "release/landmarks", "release/objects", "release/anchors", "release/viewpoints",
     ),
     run=run,
     check=check,

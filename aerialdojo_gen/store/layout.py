@@ -48,6 +48,7 @@ LAYOUT: dict[str, Place] = {
     "release/landmarks": Place(schemas.LANDMARKS, "release/landmarks/part-{scene}.parquet", "split"),
     "release/objects": Place(schemas.RELEASE_OBJECTS, "release/objects/part-{scene}.parquet", "split"),
     "release/anchors": Place(schemas.RELEASE_ANCHORS, "release/anchors/part-{scene}.parquet", "split"),
+    "release/viewpoints": Place(schemas.VIEWPOINTS, "release/viewpoints/part-{scene}.parquet", "split"),
     "episodes": Place(schemas.EPISODES, _RUN, "evaluate"),
     "steps": Place(schemas.STEPS, _RUN, "evaluate"),
     "timings": Place(schemas.TIMINGS, _RUN, "evaluate"),

@@ -9,6 +9,7 @@ import numpy as np
 from aerialdojo_gen.geometry.angles import wrap_angle_rad, yaw_towards
 from aerialdojo_gen.geometry.surface import Surface
 from aerialdojo_gen.scoring.geometric import WEIGHTS
+from aerialdojo_gen.scoring.knowing import FRONT_RAD, FRONT_WEIGHT, TELLS_WEIGHT
 from aerialdojo_gen.scoring.panel import SCORERS
 from aerialdojo_gen.stages.work.anchor_choice import SLACK_M
 from aerialdojo_gen.validate.links import sound
@@ -58,6 +59,11 @@ def anchor_score(data: SceneData, rows: Rows) -> Iterator[Finding]:
     asked = {name: getattr(weights, name) for name in SCORERS}
     scores = {name: rows.floats(f"score_{name}") for name in SCORERS}
     geometric = parts @ np.array([*WEIGHTS.values()])
+    known = rows.floats("part_tells", "part_front")
+    for row, k in zip(*np.nonzero((known < 0) | (known > 1)), strict=True):
+        yield Finding(int(row), f"{('part_tells', 'part_front')[k]} = {known[row, k]:.6g}", "0 to 1, or null")
+    share = np.where(np.isnan(known), 0.0, [TELLS_WEIGHT, FRONT_WEIGHT])
+    geometric = geometric * (1.0 - share.sum(axis=1)) + (share * np.nan_to_num(known)).sum(axis=1)
     by_hand = np.asarray(rows.texts("selected_by"), dtype=object) == "human"
     for row, score in enumerate(rows.floats("score")):
         own = {name: values[row] for name, values in scores.items() if np.isfinite(values[row])}
@@ -73,6 +79,41 @@ def anchor_score(data: SceneData, rows: Rows) -> Iterator[Finding]:
         # What a person placed was compared with nothing: it has the geometric score alone.
         elif min(abs(score - s) for s in (wanted, *([geometric[row]] if by_hand[row] else []))) > _SAME_SCORE:
             yield Finding(row, f"score = {score:.6g}", f"{wanted:.6g} by its parts")
+
+
+@check("anchors", needs=("objects", "mesh"), after=("unknown_object",))
+def anchor_front(data: SceneData, rows: Rows) -> Iterator[Finding]:
+    """An anchor says how far off its object's front it is; a goal more than 60 degrees off says why."""
+    scene, objects = scene_mesh(data).scene, data["objects"]
+    item = objects.find("object_id", rows.column("object_id"))
+    nodes, off = objects.texts("mesh_node"), rows.floats("off_front_rad")
+    reasons, selected = rows.texts("no_front_reason"), rows.floats("selected") == 1.0
+    places = rows.floats("x_m", "y_m", "z_m")
+    for row, k in enumerate(item.tolist()):
+        if k < 0 or nodes[k] not in scene or not np.isfinite(places[row]).all():
+            continue
+        anatomy = scene[str(nodes[k])].anatomy
+        fronts = () if anatomy is None else anatomy.fronts_rad
+        away = places[row] - scene[str(nodes[k])].centroid
+        azimuth = np.arctan2(away[1], away[0])
+        found = min((abs(float(wrap_angle_rad(azimuth - front))) for front in fronts), default=np.nan)
+        if np.isnan(found) != np.isnan(off[row]) or abs(found - off[row]) > _SAME_RAD:
+            yield Finding(row, f"off_front_rad = {off[row]:.6g}", f"{found:.6g}")
+        elif bool(reasons[row]) != bool(selected[row] and found > FRONT_RAD):
+            wanted = "a reason: it is not seen from its front" if not reasons[row] else "null"
+            yield Finding(row, f"no_front_reason = {reasons[row]!r}", wanted)
+
+
+@check("viewpoints", needs=("mesh",))
+def viewpoint_clearance(data: SceneData, rows: Rows) -> Iterator[Finding]:
+    """A body can be at a viewpoint, inside the flight volume."""
+    world, radius = scene_mesh(data).world, data.pipeline.embodiment.radius_m
+    low, high = scene_mesh(data).scene.bounds
+    for row, place in enumerate(rows.floats("x_m", "y_m", "z_m")):
+        if not (np.isfinite(place).all() and ((place >= low) & (place <= high)).all()):
+            yield Finding(row, "a place outside the flight volume", "one inside")
+        elif world.sphere_in_collision(place, radius):
+            yield Finding(row, "a place in collision", "a free one")
 
 
 @check("anchors", needs=("objects",), after=("unknown_object",))

@@ -74,6 +74,13 @@ def unknown_object(data: SceneData, rows: Rows) -> Iterator[Finding]:
         yield Finding(int(row), f"object_id = {rows.ints('object_id')[row]}", "an object of the scene")
 
 
+@check("viewpoints", needs=("objects",))
+def viewpoint_object(data: SceneData, rows: Rows) -> Iterator[Finding]:
+    """A viewpoint is one of an object that there is."""
+    for row in np.flatnonzero(data["objects"].find("object_id", rows.column("object_id")) < 0):
+        yield Finding(int(row), f"object_id = {rows.ints('object_id')[row]}", "the id of an object")
+
+
 @check("objects", needs=("anchors",))
 def selected_anchor(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """An object with anchors has exactly one that is selected."""

@@ -1,7 +1,7 @@
-"""The reference images drawn anew: each is what its object's selected anchor sees, and no other's.
+"""The reference images drawn anew: each is what is seen from where it says it was taken, and no other's.
 
 Two machines do not draw the same bytes, and two renderers less so. Pictures are therefore compared as averages of
-blocks, and not with a limit alone: a picture that is like what another anchor sees, or like its own with channels
+blocks, and not with a limit alone: a picture that is like another object's, or like its own with channels
 changed or sides turned, is told as that, however alike the two may be. Between OpenGL and TinyRenderer a picture's
 mean difference was 1.0 of 255 at most over five scenes, between two look-alike objects 4.7 at least.
 """
@@ -19,6 +19,7 @@ from aerialdojo_gen.common.pictures import decode_rgb
 from aerialdojo_gen.errors import RenderError
 from aerialdojo_gen.geometry.cameras import Camera, view_pose
 from aerialdojo_gen.rendering.backend import open_renderer
+from aerialdojo_gen.validate.images import POSE
 from aerialdojo_gen.validate.registry import Finding, UncheckedError, check
 from aerialdojo_gen.validate.rows import Rows, SceneData
 from aerialdojo_gen.validate.scene_mesh import scene_mesh
@@ -54,11 +55,11 @@ def image_format(data: SceneData, rows: Rows) -> Iterator[Finding]:
 
 
 @check(
-    "objects", needs=("anchors", "mesh"),
+    "objects", needs=("mesh",),
     after=("image_missing", "image_damaged", "image_blank", "image_format"), samples=True,
 )  # fmt: skip
 def image_redrawn(data: SceneData, rows: Rows) -> Iterator[Finding]:
-    """A picture is what is seen from its object's selected anchor, as drawn anew: no other's, no channel swapped."""
+    """A picture is what its camera sees, as drawn anew: no other's, no channel swapped."""
     skip = data.flagged("objects", ("image_missing", "image_damaged", "image_blank", "image_format"))
     asked = [row for row in data.sampled_objects.tolist() if not skip[row]]
     decoded = {row: decode_rgb(rows.column("reference_image")[row].as_py()) for row in asked}
@@ -71,7 +72,7 @@ def image_redrawn(data: SceneData, rows: Rows) -> Iterator[Finding]:
     for row in drawn:
         off = _off(own[row], anew[row])
         if explained := _other(row, own[row], off, anew, rows):
-            yield Finding(row, explained, "what its anchor sees")
+            yield Finding(row, explained, "what its camera sees")
             continue
         share = float((np.abs(own[row] - anew[row]).max(axis=2) > _BLOCK).mean())
         if off > _MEAN or share > _BLOCK_SHARE:
@@ -87,12 +88,9 @@ def image_redrawn(data: SceneData, rows: Rows) -> Iterator[Finding]:
 def _drawn(
     data: SceneData, rows: Rows, stored: dict[int, NDArray[np.uint8]]
 ) -> dict[int, NDArray[np.uint8]]:  # fmt: skip
-    """Pictures from the selected anchors of these objects, by row; without those that have none."""
-    places = data["anchors"].floats("x_m", "y_m", "z_m", "yaw_rad").reshape(-1, 4)
-    ids, config = rows.ints("object_id"), data.pipeline.reference_images
-    anchors = {row: data.selected_of_object.get(int(ids[row])) for row in stored}
-    poses = {row: places[anchor] for row, anchor in anchors.items() if anchor is not None}
-    poses = {row: pose for row, pose in poses.items() if np.isfinite(pose).all()}
+    """Pictures of these objects from where theirs were taken, by row; without those that do not say where."""
+    places, config = rows.floats(*POSE), data.pipeline.reference_images
+    poses = {row: places[row] for row in stored if np.isfinite(places[row]).all()}
     scene = scene_mesh(data).scene
     if not poses:
         return {}

@@ -11,7 +11,7 @@ import numpy as np
 from aerialdojo_gen.errors import AerialDojoError
 from aerialdojo_gen.validate.rows import Rows, SceneData
 
-TABLES = ("scenes", "landmarks", "objects", "anchors", "routes", "tasks")
+TABLES = ("scenes", "landmarks", "objects", "anchors", "viewpoints", "routes", "tasks")
 # A row without a value, or with one out of this world, is named once and not judged by what builds on it.
 ALWAYS_AFTER = ("null_value", "not_finite", "unknown_word", "wrong_part")
 
@@ -45,11 +45,12 @@ class Fault(NamedTuple):
 
 
 class Finding(NamedTuple):
-    """A row at fault, by its number: what a check yields."""
+    """A row at fault, by its number: what a check yields; a warning is no fault, and worth knowing."""
 
     row: int
     found: str
     expected: str
+    warning: bool = False
 
 
 Function = Callable[[SceneData, Rows], Iterable[Finding]]
@@ -100,6 +101,8 @@ class Outcome:
         The rows at fault.
     skipped : str
         Why nothing was judged; empty where it was.
+    warnings : list of Fault
+        Rows that are worth knowing of and at no fault.
     """
 
     check: str
@@ -107,6 +110,7 @@ class Outcome:
     rows: int = 0
     faults: list[Fault] = field(default_factory=list)
     skipped: str = ""
+    warnings: list[Fault] = field(default_factory=list)
 
 
 CHECKS: list[Check] = []
@@ -157,10 +161,11 @@ def _run(data: SceneData, one: Check, table: str) -> Outcome:
     except Exception as error:
         raise RuntimeError(f"{data.scene}: check {one.name} of {table} failed: {error}") from error
     mask = np.zeros(len(rows), dtype=np.bool_)
-    mask[[f.row for f in findings]] = True
+    mask[[f.row for f in findings if not f.warning]] = True
     data.faulty[table, one.name] = mask
-    faults = [
-        Fault(one.name, data.scene, table, rows.part(f.row), rows.key(f.row), f.found, f.expected) for f in findings
-    ]
+    told: dict[bool, list[Fault]] = {False: [], True: []}
+    for f in findings:
+        fault = Fault(one.name, data.scene, table, rows.part(f.row), rows.key(f.row), f.found, f.expected)
+        told[f.warning].append(fault)
     judged = ~left_out[data.sampled_rows(table)] if one.samples else ~left_out
-    return Outcome(one.name, table, int(judged.sum()), faults)
+    return Outcome(one.name, table, int(judged.sum()), told[False], warnings=told[True])

@@ -51,6 +51,11 @@ class Report:
         """Every row, part or table at fault."""
         return [fault for outcome in self.outcomes for fault in outcome.faults]
 
+    @property
+    def warnings(self) -> list[Fault]:
+        """Every row that is worth knowing of and at no fault."""
+        return [warning for outcome in self.outcomes for warning in outcome.warnings]
+
     def totals(self) -> list[CheckTotal]:
         """Sum up over scenes and tables, in the order of the checks."""
         totals: dict[str, CheckTotal] = {}
@@ -77,16 +82,18 @@ class Report:
         return TextTable("check", columns, rows).lines(width)
 
     def fault_lines(self, limit: int) -> list[str]:
-        """Name the first faults of every check, and how many there are."""
-        by_check: dict[str, list[Fault]] = {}
-        for fault in self.faults:
-            by_check.setdefault(fault.check, []).append(fault)
+        """Name the first warnings and faults of every check, and how many there are."""
         lines = []
-        for name, faults in by_check.items():
-            lines.append(f"{name}: {len(faults):,} at fault")
-            lines += [f"  {line(fault)}" for fault in faults[:limit]]
-            if len(faults) > limit:
-                lines.append(f"  and {len(faults) - limit:,} more (--report FILE has them all)")
+        for found, word in ((self.warnings, "to know of, no fault"), (self.faults, "at fault")):
+            by_check: dict[str, list[Fault]] = {}
+            for fault in found:
+                by_check.setdefault(fault.check, []).append(fault)
+            for name, faults in by_check.items():
+                lines.append(f"{name}: {len(faults):,} {word}")
+                lines += [f"  {line(fault)}" for fault in faults[:limit]]
+                if len(faults) > limit:
+                    more = "--report FILE has them all" if word == "at fault" else "--lines N names more"
+                    lines.append(f"  and {len(faults) - limit:,} more ({more})")
         return lines
 
     def verdict(self) -> str:
@@ -96,6 +103,7 @@ class Report:
         undone = sum(bool(total.skipped) for total in totals)
         what = f"{len(totals)} checks, {judged:,} rows judged, {n} scene{'s' if n != 1 else ''}"
         rest = f"; {undone} checks were not made everywhere" if undone else ""
+        rest += f"; {len(self.warnings):,} warnings" if self.warnings else ""
         return f"{what}: {f'{faults:,} at fault' if faults else 'no fault'}{rest}"
 
 

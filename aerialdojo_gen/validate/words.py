@@ -207,7 +207,7 @@ def _looks(words: _Words, instance: Instance) -> set[str]:
         looks = words_of(instance.category, None, "").looks
     else:
         entry = words.catalogue[instance.category]
-        looks = words_of(instance.category, entry.name, entry.kind, entry.looks).looks
+        looks = words_of(instance.category, entry.name, entry.kind, tuple(look.say for look in entry.looks)).looks
     return {word for look in looks for word in _split(look)}
 
 

@@ -114,17 +114,23 @@ masks = st.integers(0, 2**32 - 1)
 
 
 @settings(max_examples=60, deadline=None)
-@given(masks, st.floats(0, 1), st.floats(-90, 90), st.floats(0, 50))
-def test_every_term_and_the_score_lie_in_the_unit_interval(seed, shown, elevation, clearance):
+@given(
+    masks, st.floats(0, 1), st.floats(-90, 90), st.floats(0, 50), st.lists(st.floats(0, 1), max_size=3),
+    st.none() | st.floats(0, math.pi),
+)  # fmt: skip
+def test_every_term_and_the_score_lie_in_the_unit_interval(seed, shown, elevation, clearance, told, off_front):
     rng = np.random.default_rng(seed)
     alone = rng.random((24, 24)) < rng.random()
     visible = alone & (rng.random((24, 24)) < rng.random())
     rgb = rng.integers(0, 256, (24, 24, 3), np.uint8)
-    view = AnchorView(rgb, visible, alone, ~alone, shown, elevation, clearance)
+    view = AnchorView(rgb, visible, alone, ~alone, shown, elevation, clearance, tuple(told), off_front)
     parts = judge(view, RADIUS, CONFIG.standoff_m)
-    assert all(0.0 <= value <= 1.0 for value in asdict(parts).values())
+    assert (parts.tells is None) == (not told)
+    assert (parts.front is None) == (off_front is None)
+    assert all(0.0 <= value <= 1.0 for value in asdict(parts).values() if value is not None)
     assert 0.0 <= parts.score <= 1.0
-    assert parts.score == pytest.approx(sum(w * asdict(parts)[k] for k, w in WEIGHTS.items()))
+    if not told and off_front is None:
+        assert parts.score == pytest.approx(sum(w * asdict(parts)[k] for k, w in WEIGHTS.items()))
 
 
 def test_weights_of_the_terms_are_a_mean():

@@ -16,8 +16,10 @@ from aerialdojo_gen.geometry.angles import wrap_angle_rad
 from aerialdojo_gen.geometry.surface import Surface
 from aerialdojo_gen.pipeline.stage import Job
 from aerialdojo_gen.scoring.geometric import judge
+from aerialdojo_gen.scoring.knowing import FRONT_RAD
 from aerialdojo_gen.scoring.panel import SCORERS
 from aerialdojo_gen.stages.work.anchor_world import Candidates, World
+from aerialdojo_gen.stages.work.step_back import step_back_m, telling_m
 
 Floats = NDArray[np.float64]
 
@@ -97,12 +99,15 @@ def judge_anchor(
     if seen <= 0 or seen < config.min_visible_fraction:
         faults.append(f"it does not see the object: {seen:.0%} of what it faces, {config.min_visible_fraction:.0%} "
                       "is the least")  # fmt: skip
+    most = min(config.step_back_m, telling_m(looked.patches, looked.seen[0], position_m, yaw_rad, config.fov_deg))
     picture = looked.picture(0, config.picture_px, config.fov_deg)
     parts = judge(picture, radius, config.standoff_m)
     row = {
         "scene": job.scene,
         "object_id": item["object_id"],
         **looked.row(0, distance),
+        "no_front_reason": None,
+        "step_back_m": step_back_m(world, k, points, position_m, yaw_rad, config.fov_deg, most),
         # The other scorers compare candidates, and this one stands alone.
         "score": parts.score,
         **{f"score_{name}": parts.score if name == "geometric" else None for name in SCORERS},
@@ -156,9 +161,19 @@ def with_choice(
         first = judged.row
     ordered = [first, *(row for row in rows if row is not first)][: config.shortlist]
     return [
-        row | {"anchor_id": rank, "selected": rank == 0, "selected_by": "human" if rank == 0 else "auto"}
+        row
+        | {
+            "anchor_id": rank,
+            "selected": rank == 0,
+            "selected_by": "human" if rank == 0 else "auto",
+            "no_front_reason": _off_front(row) if rank == 0 else None,
+        }
         for rank, row in enumerate(ordered)
     ]
+
+
+def _off_front(row: dict[str, Any]) -> str | None:
+    return None if row["off_front_rad"] is None or row["off_front_rad"] <= FRONT_RAD else "chosen"
 
 
 def is_same(row: dict[str, Any], choice: dict[str, Any]) -> bool:

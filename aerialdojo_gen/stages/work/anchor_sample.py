@@ -15,19 +15,26 @@ from aerialdojo_gen.config.sections import AnchorSampleConfig
 from aerialdojo_gen.errors import StoreError
 from aerialdojo_gen.geometry.angles import yaw_towards
 from aerialdojo_gen.geometry.surface import Surface
+from aerialdojo_gen.geometry.telling import off_front_rad
 from aerialdojo_gen.geometry.viewpoints import around, shortlist
 from aerialdojo_gen.pipeline.stage import Job, Output
 from aerialdojo_gen.scenes.model import Instance
 from aerialdojo_gen.scoring.geometric import judge
+from aerialdojo_gen.scoring.knowing import FRONT_RAD
 from aerialdojo_gen.scoring.panel import panel
 from aerialdojo_gen.stages.work.anchor_choice import with_choice
-from aerialdojo_gen.stages.work.anchor_world import Candidates, World
-from aerialdojo_gen.store.schemas import ANCHORS
+from aerialdojo_gen.stages.work.anchor_pictures import pictured_from
+from aerialdojo_gen.stages.work.anchor_world import Candidates, World, tells_of
+from aerialdojo_gen.store.schemas import ANCHORS, VIEWPOINTS
 from aerialdojo_gen.store.tables import from_rows
 
 Floats = NDArray[np.float64]
 log = logging.getLogger(__name__)
 
+# Models that look at pictures are made for such.
+_LOOKED_AT_PX = 320
+# More parts than that get no candidates of their own.
+_MOST_TELLS = 4
 REASONS = ("no_surface", "out_of_bounds", "in_collision", "unreachable", "not_visible", "not_shortlisted")
 
 
@@ -42,7 +49,9 @@ def run(job: Job, config: AnchorSampleConfig) -> Output:
     ``not_shortlisted`` (`shortlist` others show the object better, or from a side of their own). Ray casts to points
     of its surface put the visible ones in order; the best `pictured`, from different sides, are pictured and scored
     (`aerialdojo_gen.scoring`). The best of those, again from different sides, are the object's anchors, and the best
-    of all is selected, or the one that a person chose, which then comes first.
+    of all is selected, or the one that a person chose, which then comes first. Where the catalogue says an object's
+    front and the parts that make its name true, these weigh as much as its silhouette, candidates are placed before
+    those parts as well, and one anchor at least is within 60° of a front, if any candidate there sees the object.
 
     Parameters
     ----------
@@ -54,8 +63,9 @@ def run(job: Job, config: AnchorSampleConfig) -> Output:
     Returns
     -------
     Output
-        `anchors`. Rows in are the candidates, and rows in is rows out plus the counts above; ``no_anchor`` besides
-        counts the objects that have none, each of which is named in a warning.
+        `anchors`, and `viewpoints`, all candidates that see their object. Rows in are the candidates, and rows in is
+        rows out (of `anchors`) plus the counts above; ``no_anchor`` besides counts the objects that have none, and a
+        warning names each of them.
 
     Raises
     ------
@@ -68,6 +78,7 @@ def run(job: Job, config: AnchorSampleConfig) -> Output:
     chosen = {row["object_id"]: row for row in job.read("chosen_anchors").to_pylist()}
     world = World.of(job.scene_model(), job.embodiment.radius_m, config.margin_m)
     rows: list[dict[str, Any]] = []
+    viewpoints: list[dict[str, Any]] = []
     counts: Counter[str] = Counter(dict.fromkeys(REASONS, 0))
     bare = 0
     for item in objects:
@@ -76,7 +87,13 @@ def run(job: Job, config: AnchorSampleConfig) -> Output:
                 f"{job.scene}: object {item['object_id']} ({item['name']}) has the mesh node {item['mesh_node']!r}, "
                 "which is not in the scene: run annotate-import again"
             )
-        found, rejected = anchors_of(item, world, job, config)
+        around_it, rejected, nearly = candidates_of(item, world, job, config)
+        found = shortlisted(item, around_it, nearly, world, job, config) if around_it is not None else []
+        if around_it is not None:
+            seen = around_it.seeing(config.min_visible_fraction)
+            viewpoints += around_it.viewpoints(seen, item["object_id"])
+            rejected["not_visible"] += len(around_it.positions_m) - len(seen)
+            rejected["not_shortlisted"] += len(seen) - len(found)
         if item["object_id"] in chosen:
             sampled = found
             found = with_choice(sampled, chosen[item["object_id"]], item, world, job, config)
@@ -89,7 +106,7 @@ def run(job: Job, config: AnchorSampleConfig) -> Output:
             log.warning("%s: object %d (%s) has no anchor: %s", job.scene, item["object_id"], item["name"], why)
     tally = {reason: counts[reason] for reason in REASONS}
     return Output(
-        {"anchors": from_rows(ANCHORS, rows)},
+        {"anchors": from_rows(ANCHORS, rows), "viewpoints": from_rows(VIEWPOINTS, viewpoints)},
         rows_in=len(rows) + sum(tally.values()),
         rows_out=len(rows),
         counts=tally | {"no_anchor": bare},
@@ -119,28 +136,65 @@ def anchors_of(
     rejected : Counter of str
         How many candidates failed which test; with the rows, all of them.
     """
-    found, rejected = candidates_of(item, world, job, config)
+    found, rejected, nearly = candidates_of(item, world, job, config)
     if found is None:
         return [], rejected
+    rows = shortlisted(item, found, nearly, world, job, config)
+    seen = len(found.seeing(config.min_visible_fraction))
+    rejected["not_visible"] += len(found.positions_m) - seen
+    rejected["not_shortlisted"] += seen - len(rows)
+    return rows, rejected
+
+
+def shortlisted(
+    item: dict[str, Any], found: Candidates, nearly: Counter[str], world: World, job: Job, config: AnchorSampleConfig
+) -> list[dict[str, Any]]:
+    """Picture and score the best candidates of an object, and keep the best of those.
+
+    Parameters
+    ----------
+    item, world, job, config
+        As for `anchors_of`.
+    found : Candidates
+        The object's.
+    nearly : Counter of str
+        Why places before its front are no candidates.
+
+    Returns
+    -------
+    list of dict
+        Rows of `anchors`, the best first, at most `shortlist`.
+    """
     radius = job.embodiment.radius_m
     seen = found.seeing(config.min_visible_fraction)
     away = found.positions_m - world.scene.instances[found.instance].centroid
     azimuth = np.arctan2(away[:, 1], away[:, 0])
+    front = found.before_front
     apart = math.radians(config.separation_deg)
-    few = seen[shortlist(found.rank[seen], azimuth[seen], max(config.pictured, config.shortlist), apart)]
-    pictures = [found.picture(int(i), config.picture_px, config.fov_deg) for i in few]
+    pictured = max(config.pictured, config.shortlist)
+    few = seen[shortlist(found.rank[seen], azimuth[seen], pictured, apart, front[seen])]
+    size_px = (
+        max(config.picture_px, _LOOKED_AT_PX) if config.weights.clip or config.weights.vlm else config.picture_px
+    )
+    pictures, backs = pictured_from(found, few, size_px, radius, config)
     verdicts = panel(config, radius).judge(item["name"], pictures)
     score = np.array([verdict.score for verdict in verdicts])
-    best = shortlist(score, azimuth[few], config.shortlist, apart)
-    rejected["not_visible"] += len(found.positions_m) - len(seen)
-    rejected["not_shortlisted"] += len(seen) - len(best)
+    best = shortlist(score, azimuth[few], config.shortlist, apart, front[few])
     own_distance = Surface.of(world.scene.instances[found.instance]).distance_m(found.positions_m[few[best]])
-    rows = [
+    why = None
+    if len(best) and front[seen].any() and not front[few[best[0]]]:
+        why = "better_elsewhere"
+    elif len(best) and found.off_front_rad is not None and not front[few[best[0]]]:
+        nearly["not_visible"] += int((found.off_front_rad <= FRONT_RAD).sum())
+        why = max(sorted(nearly), key=lambda reason: nearly[reason]) if nearly.total() else "no_surface"
+    return [
         {
             "scene": job.scene,
             "object_id": item["object_id"],
             "anchor_id": rank,
             **found.row(int(few[n]), float(own_distance[rank])),
+            "step_back_m": backs[n],
+            "no_front_reason": why if rank == 0 else None,
             "score": verdicts[n].score,
             **verdicts[n].parts,
             **judge(pictures[n], radius, config.standoff_m).columns,
@@ -150,12 +204,11 @@ def anchors_of(
         }
         for rank, n in enumerate(best)
     ]
-    return rows, rejected
 
 
 def candidates_of(
     item: dict[str, Any], world: World, job: Job, config: AnchorSampleConfig
-) -> tuple[Candidates | None, Counter[str]]:
+) -> tuple[Candidates | None, Counter[str], Counter[str]]:
     """Find where an object can be looked at from: everywhere around it that a drone can be.
 
     Parameters
@@ -169,19 +222,32 @@ def candidates_of(
         Viewpoints that are free and reachable, whether or not the object can be seen from them; None without any.
     rejected : Counter of str
         How many others failed which test.
+    nearly : Counter of str
+        The same of those that are before a front of the object.
     """
     k = world.index[item["mesh_node"]]
     instance: Instance = world.scene.instances[k]
     surface = Surface.of(instance)
     radius = job.embodiment.radius_m
     rejected: Counter[str] = Counter()
-
+    nearly: Counter[str] = Counter()
+    anatomy = instance.anatomy
+    fronts = anatomy.fronts_rad if anatomy is not None else ()
     places = around(
         surface, instance.bounds, config.standoff_m, config.azimuths, config.elevations_deg, config.level_heights
     )
+    triangles = instance.vertices[instance.faces]
+    for faces in tells_of(instance)[:_MOST_TELLS]:
+        box = np.stack([triangles[faces].min(axis=(0, 1)), triangles[faces].max(axis=(0, 1))])
+        places = np.concatenate(
+            [places, around(surface, box, config.standoff_m, config.azimuths, config.tell_elevations_deg, ())]
+        )
 
     def keep(places: Floats, passed: NDArray[np.bool_], reason: str) -> Floats:
         rejected[reason] += int((~passed).sum())
+        if fronts and reason != "no_surface":
+            off = off_front_rad(places[~passed], instance.centroid, fronts)
+            nearly[reason] += int((off <= FRONT_RAD).sum())
         return places[passed]
 
     places = keep(places, ~np.isnan(places[:, 0]), "no_surface")
@@ -192,7 +258,8 @@ def candidates_of(
     places = keep(places, ~touching, "in_collision")
     places = keep(places, np.array([world.free.reachable(p) for p in places], dtype=np.bool_), "unreachable")
     if not len(places):
-        return None, rejected
+        return None, rejected, nearly
     centroid = np.array([item["x_m"], item["y_m"], item["z_m"]])
     points = surface.sample(config.surface_points, generator(job.seed, "anchor-sample", job.scene, item["object_id"]))
-    return Candidates.of(world, k, points, places, yaw_towards(places, centroid), radius, config), rejected
+    found = Candidates.of(world, k, points, places, yaw_towards(places, centroid), radius, config)
+    return found, rejected, nearly

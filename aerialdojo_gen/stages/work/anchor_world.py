@@ -8,19 +8,23 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from aerialdojo_gen.common.rng import generator
 from aerialdojo_gen.config.sections import AnchorSampleConfig
 from aerialdojo_gen.geometry.cameras import Camera
 from aerialdojo_gen.geometry.rays import RayCaster, TriangleRayCaster, instance_caster
+from aerialdojo_gen.geometry.telling import Patch, off_front_rad, seen_share
 from aerialdojo_gen.geometry.viewpoints import Views, informativeness, look
 from aerialdojo_gen.planning.clearance import ClearanceGrid
 from aerialdojo_gen.planning.collision import CollisionWorld, collision_world
 from aerialdojo_gen.rendering.casters import ray_caster
 from aerialdojo_gen.rendering.raycast import ray_renderer
-from aerialdojo_gen.scenes.model import Scene
+from aerialdojo_gen.scenes.model import Instance, Scene
 from aerialdojo_gen.scoring.base import AnchorView
+from aerialdojo_gen.scoring.knowing import FRONT_RAD, fronting, knowing, telling
 from aerialdojo_gen.scoring.views import take_view
 
 Floats = NDArray[np.float64]
+_LEAST_POINTS = 32
 
 
 @dataclass(frozen=True)
@@ -76,6 +80,17 @@ class Candidates:
         Yaw; elevation seen from the object's centroid; distance to the nearest surface.
     views : Views
         What they see of the object.
+    points : (m, 3) float64
+        On the object's surface, metres, world frame.
+    patches : tuple of Patch
+        Points of each of the object's telling parts.
+    seen : (n, t) float64
+        Share that they see of each of those parts (`aerialdojo_gen.geometry.telling.seen_share`).
+    told : (n, t) float64
+        How much they see of each of the object's telling parts, over what the best of them sees; t = 0 where the
+        whole body tells what it is.
+    off_front_rad : (n,) float64 or None
+        Angle between where they are and the nearest of the object's fronts; None where it has none.
     rank : (n,) float64
         Score of the ray casts alone, which decides what is pictured at all.
     """
@@ -88,6 +103,11 @@ class Candidates:
     elevation_deg: Floats
     clearance_m: Floats
     views: Views
+    points: Floats
+    patches: tuple[Patch, ...]
+    seen: Floats
+    told: Floats
+    off_front_rad: Floats | None
     rank: Floats
 
     @classmethod
@@ -117,12 +137,42 @@ class Candidates:
         elevation = np.degrees(np.arctan2(away[:, 2], np.hypot(away[:, 0], away[:, 1])))
         clearance = np.array([world.collisions.distance_m(p) for p in positions_m])
         rank = informativeness(views, elevation, clearance, radius_m, config.standoff_m)
-        return cls(world, instance, alone, positions_m, yaw_rad, elevation, clearance, views, rank)
+        patches = patches_of(world, instance, points)
+        seen = seen_share(positions_m, yaw_rad, patches, world.rays, config.fov_deg)
+        told = seen / np.maximum(seen.max(axis=0, initial=0.0), 1e-9)
+        off_front = None
+        if thing.anatomy is not None and thing.anatomy.fronts_rad:
+            off_front = off_front_rad(positions_m, thing.centroid, thing.anatomy.fronts_rad)
+        rank = knowing(rank, telling(told) if told.shape[1] else None, fronting(off_front))
+        return cls(
+            world, instance, alone, positions_m, yaw_rad, elevation, clearance, views, points, patches, seen, told,
+            off_front, rank,
+        )  # fmt: skip
 
     def seeing(self, least: float) -> NDArray[np.int64]:
         """Numbers of the viewpoints that see at least so large a fraction of what faces them, and anything at all."""
         fraction = self.views.visible_fraction
         return np.flatnonzero((fraction > 0) & (fraction >= least))
+
+    @property
+    def before_front(self) -> NDArray[np.bool_]:
+        """Which of the viewpoints are before a front of the object, (n,) bool; none where it has no front."""
+        if self.off_front_rad is None:
+            return np.zeros(len(self.positions_m), dtype=np.bool_)
+        return np.asarray(self.off_front_rad <= FRONT_RAD)
+
+    def viewpoints(self, which: NDArray[np.int64], object_id: int) -> list[dict[str, Any]]:
+        """Rows of ``viewpoints``: where one may stop to have found the object."""
+        return [
+            {
+                "scene": self.world.scene.name,
+                "object_id": object_id,
+                "viewpoint_id": n,
+                **dict(zip(("x_m", "y_m", "z_m"), self.positions_m[k].tolist(), strict=True)),
+                "yaw_rad": float(self.yaw_rad[k]),
+            }
+            for n, k in enumerate(which)
+        ]
 
     def picture(self, k: int, size_px: int, fov_deg: float) -> AnchorView:
         """Take the front view from the k-th viewpoint."""
@@ -136,6 +186,9 @@ class Candidates:
             shown=float(self.views.shown[k]),
             elevation_deg=float(self.elevation_deg[k]),
             clearance_m=float(self.clearance_m[k]),
+            told=tuple(float(share) for share in self.told[k]),
+            tells=tells_of(self.world.scene.instances[self.instance]),
+            off_front_rad=None if self.off_front_rad is None else float(self.off_front_rad[k]),
         )
 
     def row(self, k: int, surface_distance_m: float) -> dict[str, Any]:
@@ -146,4 +199,21 @@ class Candidates:
             "clearance_m": float(self.clearance_m[k]),
             "surface_distance_m": surface_distance_m,
             "visible_fraction": float(self.views.visible_fraction[k]),
+            "off_front_rad": None if self.off_front_rad is None else float(self.off_front_rad[k]),
         }
+
+
+def tells_of(instance: Instance) -> list[NDArray[np.int64]]:
+    """The faces of each of an instance's telling parts that it has."""
+    names = () if instance.anatomy is None else instance.anatomy.tells
+    return [faces for faces in map(instance.faces_of, names) if len(faces)]
+
+
+def patches_of(world: World, instance: int, points: Floats) -> tuple[Patch, ...]:
+    """Points of each of an instance's telling parts, drawn by the number of its surface's points."""
+    thing = world.scene.instances[instance]
+    # The same points whoever asks: the draw hangs on nothing but the node.
+    rng = generator(0, "anchor-sample", world.scene.name, thing.node)
+    triangles = thing.vertices[thing.faces]
+    n = max(_LEAST_POINTS, len(points) // 4)
+    return tuple(Patch.of(triangles[faces], n, rng, world.rays, world.scene.sun) for faces in tells_of(thing))

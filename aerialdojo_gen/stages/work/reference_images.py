@@ -1,4 +1,4 @@
-"""`reference-images`: the picture of every object from its selected anchor, for image goals."""
+"""`reference-images`: the picture of every object from its selected anchor or from behind it, for image goals."""
 
 from __future__ import annotations
 
@@ -12,19 +12,28 @@ from numpy.typing import NDArray
 from aerialdojo_gen.common.pictures import REFERENCE_PNG, encode_png
 from aerialdojo_gen.config.sections import ReferenceImagesConfig
 from aerialdojo_gen.geometry.cameras import Camera, project, view_pose
-from aerialdojo_gen.geometry.rays import RayCaster
+from aerialdojo_gen.geometry.rays import RayCaster, instance_caster
 from aerialdojo_gen.pipeline.stage import Job, Output
 from aerialdojo_gen.rendering.backend import kept_renderer
 from aerialdojo_gen.rendering.casters import ray_caster
+from aerialdojo_gen.scenes.model import Instance
+from aerialdojo_gen.scoring.views import part_shares
 from aerialdojo_gen.store.schemas import REFERENCES
 from aerialdojo_gen.store.tables import from_rows
 
 _BOX = ("box_u0_px", "box_v0_px", "box_u1_px", "box_v1_px")
+_POSE = ("reference_x_m", "reference_y_m", "reference_z_m", "reference_yaw_rad")
 _IN_FRONT_M = 0.05
+# A patch of 7 x 7 pixels in a picture of 320 x 320.
+LEAST_SHARE = 0.0005
 
 
 def run(job: Job, config: ReferenceImagesConfig) -> Output:
-    """Take the front view from every object's selected anchor.
+    """Take the front view from every object's selected anchor, or from further back along its viewing axis.
+
+    How far back an object fits the picture is the anchor's to say (`step_back_m` of the table ``anchors``); the
+    configuration says how far back it may be taken. A part that tells what the object is counts as shown where it has
+    `LEAST_SHARE` of the picture's pixels.
 
     Parameters
     ----------
@@ -51,25 +60,58 @@ def run(job: Job, config: ReferenceImagesConfig) -> Output:
             "scene": job.scene,
             "object_id": item["object_id"],
             "reference_image": None,
-            **dict.fromkeys(_BOX),
-            "image_fraction": None,
+            **dict.fromkeys((*_POSE, "step_back_m", *_BOX, "image_fraction", "tells_shown", "tells_missing")),
         }
         rows.append(row)
         anchor = anchors.get(item["object_id"])
         if anchor is None:
             counts["no_anchor"] += 1
             continue
-        pose = view_pose((anchor["x_m"], anchor["y_m"], anchor["z_m"]), anchor["yaw_rad"], "front")
+        yaw, back = anchor["yaw_rad"], min(anchor["step_back_m"], config.step_back_m)
+        eye = (anchor["x_m"] - back * math.cos(yaw), anchor["y_m"] - back * math.sin(yaw), anchor["z_m"])
+        pose = view_pose(eye, yaw, "front")
+        row |= zip((*_POSE, "step_back_m"), (*eye, yaw, back), strict=True)
         row["reference_image"] = encode_png(renderer.render(camera, pose).rgb, REFERENCE_PNG)
         k = index[item["mesh_node"]]
-        mask = instance_mask(rays, k, scene.instances[k].vertices, camera, pose)
+        thing = scene.instances[k]
+        mask = instance_mask(rays, k, thing.vertices, camera, pose)
         row["image_fraction"] = float(mask.mean())
         if mask.any():
             row |= zip(_BOX, box_of(mask), strict=True)
         else:
             counts["not_in_view"] += 1
+        missing = missing_tells(thing, camera, pose, mask)
+        if thing.anatomy is not None and thing.anatomy.tells:
+            row["tells_shown"] = 1.0 - len(missing) / len(thing.anatomy.tells)
+            row["tells_missing"] = ", ".join(missing) or None
     pictures = sum(row["reference_image"] is not None for row in rows)
     return Output({"references": from_rows(REFERENCES, rows)}, len(objects), pictures, counts)
+
+
+def missing_tells(
+    instance: Instance, camera: Camera, world_from_camera: NDArray[np.float64], mask: NDArray[np.bool_]
+) -> list[str]:
+    """Which of the parts that tell what an instance is a picture does not show.
+
+    Parameters
+    ----------
+    instance : Instance
+    camera : Camera
+    world_from_camera : (4, 4) float64
+    mask : (H, W) bool
+        Pixels that show the instance.
+
+    Returns
+    -------
+    list of str
+        Names of parts with less than `LEAST_SHARE` of the picture's pixels.
+    """
+    names = () if instance.anatomy is None else instance.anatomy.tells
+    if not names:
+        return []
+    parts = [instance.faces_of(name) for name in names]
+    shares = part_shares(instance_caster(instance), parts, camera, world_from_camera, mask)
+    return [name for name, share in zip(names, shares, strict=True) if share < LEAST_SHARE]
 
 
 def instance_map(rays: RayCaster, camera: Camera, world_from_camera: NDArray[np.float64]) -> NDArray[np.int32]:

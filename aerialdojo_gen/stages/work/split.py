@@ -176,6 +176,7 @@ def run(job: Job, config: SplitConfig) -> Output:
         "release/landmarks": landmarks,
         "release/objects": pictured,
         "release/anchors": anchors.select(RELEASE_ANCHORS.schema.names),
+        "release/viewpoints": job.read("viewpoints"),
     }
     counts = {
         "train": int(np.count_nonzero(train)) * 2,

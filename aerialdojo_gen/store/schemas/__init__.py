@@ -31,6 +31,7 @@ from aerialdojo_gen.store.schemas.staged import (
     SCENES,
     STAGED,
     VERDICTS,
+    VIEWPOINTS,
 )
 
 # Tables that stages write for each other, by name.
@@ -70,6 +71,7 @@ __all__ = [
     "TURN_LEFT",
     "TURN_RIGHT",
     "VERDICTS",
+    "VIEWPOINTS",
     "VIEWS",
     "TableSpec",
 ]

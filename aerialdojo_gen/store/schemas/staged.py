@@ -30,13 +30,21 @@ OBJECT_COLUMNS = [
     column("direction", pa.string(), "compass direction from that landmark to the object, one of eight"),
 ]
 REFERENCE = [
-    column("reference_image", pa.binary(), "PNG: front view from the selected anchor", nullable=True),
+    column("reference_image", pa.binary(), "PNG: front view from the selected anchor, or from further back "
+           "along its viewing axis, where the object fits", nullable=True),
+    *[column(f"reference_{a}_m", pa.float64(), f"position of the picture's camera, {a}", "m", True) for a in "xyz"],
+    column("reference_yaw_rad", pa.float64(), "its yaw; it is level", "rad", True),
+    column("step_back_m", pa.float64(), "its distance from the anchor", "m", True),
     column("box_u0_px", pa.int32(), "object's box in the image, left column", "px", True),
     column("box_v0_px", pa.int32(), "object's box in the image, top row", "px", True),
     column("box_u1_px", pa.int32(), "object's box in the image, one past the right column", "px", True),
     column("box_v1_px", pa.int32(), "object's box in the image, one past the bottom row", "px", True),
     column("image_fraction", pa.float64(), "share of the image's pixels that show the object", nullable=True),
-]
+    column("tells_shown", pa.float64(), "of the parts that make the name true, the share that the image shows; null "
+           "where the whole body does", nullable=True),
+    column("tells_missing", pa.string(), "those that it does not show, separated by commas; null where there "
+           "are none", nullable=True),
+]  # fmt: skip
 
 SCENES = table(
     "scenes", ["scene"],
@@ -85,6 +93,11 @@ ANCHOR_COLUMNS = (
     column("clearance_m", pa.float64(), "distance to the nearest surface of the scene", "m"),
     column("surface_distance_m", pa.float64(), "distance to the object's own surface", "m"),
     column("visible_fraction", pa.float64(), "share of the object's sample points that the anchor sees"),
+    column("off_front_rad", pa.float64(), "angle in the plane to the nearest of the object's fronts, seen from its "
+           "centroid; null where it has none", "rad", True),
+    column("no_front_reason", pa.string(), "why the selected anchor is more than 60 degrees off the front: the test "
+           "that most places there failed; null where it is not", nullable=True),
+    column("step_back_m", pa.float64(), "how far back the object fits the picture, as far as the way is free", "m"),
     column("score", pa.float64(), "what the anchors are ranked by, the scorers' weighted mean, higher is better"),
     *[
         column(f"score_{name}", pa.float64(), f"the scorer {name}'s, 0 to 1; null where not asked", "", True)
@@ -98,6 +111,10 @@ ANCHOR_COLUMNS = (
     column("part_sky", pa.float64(), "share of sky in what surrounds it in the picture"),
     column("part_level", pa.float64(), "1 up to 15 degrees above or below the centroid, 0 from 45"),
     column("part_clear", pa.float64(), "room around the body, 1 at the standoff"),
+    column("part_tells", pa.float64(), "how well the parts that make the name true are seen, 0 to 1; null where the "
+           "whole body does", nullable=True),
+    column("part_front", pa.float64(), "1 up to 25 degrees off the front, little beyond 60; null without a front",
+           nullable=True),
     column("selected", pa.bool_(), "true for one anchor an object: the goal of its tasks"),
     column("selected_by", pa.string(), "human or auto"),
 )  # fmt: skip
@@ -107,6 +124,16 @@ ANCHORS = table(
     *ANCHOR_COLUMNS,
     column("thumbnail", pa.binary(), "the front view, JPEG"),
     plain=["thumbnail"],
+    command="anchor-sample",
+)  # fmt: skip
+
+VIEWPOINTS = table(
+    "viewpoints", ["scene", "object_id", "viewpoint_id"],
+    SCENE,
+    column("object_id", pa.int32(), "object that is seen"),
+    column("viewpoint_id", pa.int32(), "number among the object's"),
+    *xyz("position of the body's centre: free, reachable, at the standoff from the object, which it sees"),
+    column("yaw_rad", pa.float64(), "yaw that faces the object's centroid", "rad"),
     command="anchor-sample",
 )  # fmt: skip
 
@@ -155,4 +182,4 @@ REFERENCES = table(
 )  # fmt: skip
 
 # What lies in a folder of its own, by scene and part; a new stage's table is listed here.
-STAGED = (SCENES, LANDMARKS, OBJECTS, CHOSEN_ANCHORS, ANCHORS, REFERENCES, PAIRS, PLANS, VERDICTS)
+STAGED = (SCENES, LANDMARKS, OBJECTS, CHOSEN_ANCHORS, ANCHORS, VIEWPOINTS, REFERENCES, PAIRS, PLANS, VERDICTS)

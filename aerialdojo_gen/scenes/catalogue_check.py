@@ -1,0 +1,63 @@
+"""Whether what the catalogue says of its categories is so of what it builds."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from aerialdojo_gen.common.rng import generator
+from aerialdojo_gen.scenes.catalogue import Catalogue
+from aerialdojo_gen.scenes.claims import untrue
+
+LEAST_LOOKS = 4
+# A draft that has one phrase a variant says it of every such object.
+LEAST_TRUE = 2
+
+
+def catalogue_faults(catalogue: Catalogue, categories: Iterable[str] | None = None) -> list[str]:
+    """Build every variant of the categories that tasks ask for, and hold what is said of them against it.
+
+    Parameters
+    ----------
+    catalogue : Catalogue
+    categories : iterable of str, optional
+        Which ones; all targets by default.
+
+    Returns
+    -------
+    list of str
+        A line a fault: no front, too few phrases, a part that makes the name or an attribute true and is not there,
+        a phrase that is true of no variant, a variant of which too few are true.
+    """
+    faults = []
+    for name in catalogue.targets if categories is None else categories:
+        prop = catalogue[name]
+        if not prop.front:
+            faults.append(f"{prop.source}: front is missing")
+            continue
+        if len(prop.looks) < LEAST_LOOKS:
+            faults.append(f"{prop.source}: {len(prop.looks)} looks, {LEAST_LOOKS} are the least")
+        why: dict[str, list[str]] = {look.say: [] for look in prop.looks}
+        for variant in prop.variants:
+            thing = catalogue.instantiate(
+                name, "thing", generator(0, "check", name, variant.name), variant=variant.name
+            )
+            assert thing.anatomy is not None
+            for tell in thing.anatomy.tells:
+                if not len(thing.faces_of(tell)):
+                    faults.append(f"{prop.source} variant {variant.name!r}: tells: it has no {tell}")
+            wrong = {look.say: untrue(look, thing, catalogue.materials) for look in prop.looks}
+            true = sum(not w for w in wrong.values())
+            if true < min(LEAST_TRUE, len(prop.looks)):
+                faults.append(f"{prop.source} variant {variant.name!r}: {true} looks are true of it: {_told(wrong)}")
+            for say, claims in wrong.items():
+                why[say].append(f"{variant.name}: {', '.join(claims)}" if claims else "")
+        faults += [
+            f"{prop.source}: {say!r} is true of no variant ({'; '.join(claims)})"
+            for say, claims in why.items()
+            if all(claims)
+        ]
+    return faults
+
+
+def _told(wrong: dict[str, list[str]]) -> str:
+    return "; ".join(f"{say!r}: {', '.join(claims)}" for say, claims in wrong.items() if claims)

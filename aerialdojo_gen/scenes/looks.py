@@ -1,0 +1,226 @@
+"""What may be said of how a category looks, and what each phrase claims of the mesh."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from aerialdojo_gen.common.names import nearest
+from aerialdojo_gen.errors import AssetError
+from aerialdojo_gen.scenes.colour_names import COLOURS
+
+FORMS = ("round", "boxy", "flat", "slender", "tapering", "pointed", "sloping", "upright", "level")
+MEASURES = ("length", "width", "height")
+RELATIONS = ("above", "below", "in front of", "behind", "beside", "inside", "around")
+PLACES = ("on top", "at the bottom", "in the middle")
+_KEYS = ("say", "has", "lacks", "count", "form", "colour", "material", "size", "order")
+_TERM = r"(?:(?P<{0}p>[a-z0-9_|]+)\.)?(?P<{0}m>length|width|height)"
+_SIZE = re.compile(
+    _TERM.format("a") + r"\s*(?P<sign>[<>])\s*(?P<factor>\d+(?:\.\d+)?)?(?:\s*\*\s*)?(?:" + _TERM.format("b") + r")?"
+)
+_ORDER = re.compile(
+    r"(?P<a>[a-z0-9_|]+) (?:(?P<relation>" + "|".join(RELATIONS) + r") (?P<b>[a-z0-9_|]+)|(?P<place>"
+    + "|".join(PLACES) + r"))"
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """A measure of the body, or of a part, against a number or ``factor`` times another measure; metres.
+
+    Attributes
+    ----------
+    part : str
+        Empty for the whole body.
+    measure : str
+        One of `MEASURES`.
+    greater : bool
+        Whether it must be the greater of the two.
+    factor : float
+        The number, or what the other measure is multiplied with.
+    other : (str, str) or None
+        Part and measure that it is held against.
+    text : str
+        As it was written.
+    """
+
+    part: str
+    measure: str
+    greater: bool
+    factor: float
+    other: tuple[str, str] | None
+    text: str
+
+
+@dataclass(frozen=True)
+class Order:
+    """Where a part is: relative to another one, or in the body.
+
+    Attributes
+    ----------
+    part : str
+    relation : str
+        One of `RELATIONS`, or of `PLACES`.
+    other : str
+        The other part; empty for places.
+    text : str
+        As it was written.
+    """
+
+    part: str
+    relation: str
+    other: str
+    text: str
+
+
+@dataclass(frozen=True)
+class Look:
+    """A phrase, and what it claims.
+
+    Attributes
+    ----------
+    say : str
+        A noun phrase that follows "with" or "it has".
+    has, lacks : tuple of str
+        Parts that the body must have, or must not; ``"a|b"`` is either.
+    count : mapping of str to (least, most)
+        Copies of a part.
+    form : mapping of str to str
+        One of `FORMS`, of each copy of a part.
+    colour, material : mapping of str to tuple of str
+        Of a part: words of `aerialdojo_gen.scenes.colour_names`, and names in ``materials.toml``.
+    size : tuple of Comparison
+    order : tuple of Order
+    """
+
+    say: str
+    has: tuple[str, ...] = ()
+    lacks: tuple[str, ...] = ()
+    count: Mapping[str, tuple[int, int]] = field(default_factory=dict)
+    form: Mapping[str, str] = field(default_factory=dict)
+    colour: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    material: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    size: tuple[Comparison, ...] = ()
+    order: tuple[Order, ...] = ()
+
+    @property
+    def parts(self) -> tuple[str, ...]:
+        """All parts that it speaks of and that must be there."""
+        ordered = [name for o in self.order for name in (o.part, o.other) if name]
+        sized = [name for c in self.size for name in (c.part, c.other[0] if c.other else "") if name]
+        return tuple(
+            dict.fromkeys([*self.has, *self.count, *self.form, *self.colour, *self.material, *sized, *ordered])
+        )
+
+
+def parse_looks(raw: Any, names: Sequence[str], materials: Sequence[str], where: str) -> tuple[Look, ...]:
+    """Read a category's looks.
+
+    Parameters
+    ----------
+    raw : Any
+        As TOML gave it.
+    names : sequence of str
+        The category's parts: tags and roles.
+    materials : sequence of str
+        Names in ``materials.toml``.
+    where : str
+        For messages: file and category.
+
+    Raises
+    ------
+    AssetError
+        A phrase claims nothing, or speaks of a part, a form, a colour or a material that is not known.
+    """
+    if not isinstance(raw, list):
+        raise AssetError(f"{where}: looks must be an array of tables")
+    looks = tuple(
+        _look(entry, names, materials, f"{where} looks[{k}]")
+        for k, entry in enumerate(raw)
+        if entry.__class__ is not str
+    )
+    said = [look.say for look in looks]
+    for k, say in enumerate(said):
+        if say in said[:k]:
+            raise AssetError(f"{where} looks[{k}]: {say!r} stands twice")
+    return looks
+
+
+def _look(entry: Any, names: Sequence[str], materials: Sequence[str], where: str) -> Look:
+    if not isinstance(entry, dict) or not isinstance(entry.get("say"), str) or not entry["say"].strip():
+        raise AssetError(f"{where}: must be a table with say: the phrase, and what it claims")
+    for key in entry:
+        if key not in _KEYS:
+            raise AssetError(f"{where}: unknown key {key!r}{nearest(key, _KEYS)}")
+    if len(entry) == 1:
+        raise AssetError(f"{where}: {entry['say']!r} claims nothing that can be checked: add {', '.join(_KEYS[1:])}")
+    look = Look(
+        entry["say"].strip(),
+        has=_words(entry, "has", where),
+        lacks=_words(entry, "lacks", where),
+        count={name: _range(n, f"{where} count {name}") for name, n in _table(entry, "count", where).items()},
+        form={name: str(form) for name, form in _table(entry, "form", where).items()},
+        colour=_choices(entry, "colour", COLOURS, where),
+        material=_choices(entry, "material", materials, where),
+        size=tuple(_comparison(text, where) for text in _words(entry, "size", where)),
+        order=tuple(_order(text, where) for text in _words(entry, "order", where)),
+    )
+    for name in (*look.parts, *look.lacks):
+        for one in name.split("|"):
+            if one not in names:
+                raise AssetError(f"{where}: no part {one!r}{nearest(one, names)}: parts are named by tag or role")
+    for form in look.form.values():
+        if form not in FORMS:
+            raise AssetError(f"{where}: unknown form {form!r}{nearest(form, FORMS)} (one of {', '.join(FORMS)})")
+    return look
+
+
+def _table(entry: Mapping[str, Any], key: str, where: str) -> Mapping[str, Any]:
+    value = entry.get(key, {})
+    if not isinstance(value, dict) or (key in entry and not value):
+        raise AssetError(f"{where}: {key} must be a table of parts")
+    return value
+
+
+def _words(entry: Mapping[str, Any], key: str, where: str) -> tuple[str, ...]:
+    value = entry.get(key, [])
+    value = [value] if isinstance(value, str) else value
+    if not isinstance(value, list) or not all(isinstance(v, str) for v in value) or (key in entry and not value):
+        raise AssetError(f"{where}: {key} must be a list of words")
+    return tuple(value)
+
+
+def _choices(entry: Mapping[str, Any], key: str, known: Sequence[str], where: str) -> dict[str, tuple[str, ...]]:
+    out = {}
+    for name, value in _table(entry, key, where).items():
+        words = tuple(value.split("|")) if isinstance(value, str) else ()
+        for word in words or (str(value),):
+            if word not in known:
+                raise AssetError(f"{where} {key}: unknown {key} {word!r}{nearest(word, known)}")
+        out[name] = words
+    return out
+
+
+def _range(value: Any, where: str) -> tuple[int, int]:
+    ends = value if isinstance(value, list) else [value, value]
+    if len(ends) != 2 or not all(type(n) is int for n in ends) or not 0 < ends[0] <= ends[1]:
+        raise AssetError(f"{where}: must be a whole number or [least, most], got {value!r}")
+    return ends[0], ends[1]
+
+
+def _comparison(text: str, where: str) -> Comparison:
+    m = _SIZE.fullmatch(text.strip())
+    if m is None or (m["factor"] is None and m["bm"] is None):
+        raise AssetError(f'{where} size: {text!r} is no comparison like "height > 1.9" or "length > 3 * width"')
+    other = None if m["bm"] is None else (m["bp"] or "", m["bm"])
+    return Comparison(m["ap"] or "", m["am"], m["sign"] == ">", float(m["factor"] or 1.0), other, text)
+
+
+def _order(text: str, where: str) -> Order:
+    m = _ORDER.fullmatch(text.strip())
+    if m is None:
+        known = ", ".join([*(f'"a {r} b"' for r in RELATIONS), *(f'"a {p}"' for p in PLACES)])
+        raise AssetError(f"{where} order: {text!r} is none of {known}")
+    return Order(m["a"], m["relation"] or m["place"], m["b"] or "", text)
