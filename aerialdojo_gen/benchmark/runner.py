@@ -164,7 +164,7 @@ class _Run:
         }
         seen_from = {scene: viewpoints_content(data, scene) for scene in self._scenes}
         self.without_viewpoints = [scene for scene, found in seen_from.items() if not found]
-        content |= {f"release/viewpoints/{scene}": [found] for scene, found in seen_from.items() if found}
+        content |= {f"release/viewpoints/{scene}": found for scene, found in seen_from.items() if found}
         digest = hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
         own = {"data": digest, "code": flying_code(evaluation.agent)}
         self._settings = json.loads(json.dumps(evaluation.settings() | own))

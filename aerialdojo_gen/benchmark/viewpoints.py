@@ -29,16 +29,15 @@ from aerialdojo_gen.geometry.surface import Surface
 from aerialdojo_gen.rendering.casters import ray_caster
 from aerialdojo_gen.scenes.context import context_of
 from aerialdojo_gen.scenes.model import Scene
-from aerialdojo_gen.store.layout import check_scene_name
-from aerialdojo_gen.store.parquet_files import read_file
+from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.root import DataRoot
-from aerialdojo_gen.store.shards import read_info, read_scene
 
 Floats = NDArray[np.float64]
 
 # A target whose one sliver of 0.4 % shows is found by chance; most that can be seen is met by the first few rays.
 _POINTS = 256
 _FIRST = 16
+_TABLE = "release/viewpoints"
 _COLUMNS = ("object_id", "x_m", "y_m", "z_m")
 
 
@@ -58,18 +57,9 @@ class View:
     target_in_sight: bool
 
 
-def viewpoints_file(scene: str) -> str:
-    """Name the Parquet file of a scene's viewpoints, relative to the data root; an older release has none."""
-    return f"release/viewpoints/part-{check_scene_name(scene)}.parquet"
-
-
-def viewpoints_content(root: DataRoot, scene: str) -> str:
-    """Digest a scene's viewpoints, for what depends on them; empty where the release has none."""
-    name = viewpoints_file(scene)
-    if not root.exists(name):
-        return ""
-    info = read_info(root, name)
-    return root.digest(name) if info is None else info.content
+def viewpoints_content(root: DataRoot, scene: str) -> list[str]:
+    """Digest a scene's viewpoints, for what depends on them; empty where the release has none, as older ones."""
+    return store.content(root, _TABLE, scene) if store.shards(root, _TABLE, scene) else []
 
 
 def without_viewpoints(scenes: Sequence[str], of: int) -> str:
@@ -96,24 +86,20 @@ def viewpoints_of(root: DataRoot, scene: str) -> dict[int, Floats] | None:
     Raises
     ------
     StoreError
-        The file is damaged, or lacks a column.
+        The file is damaged.
     """
-    name = viewpoints_file(scene)
-    if not root.exists(name):
+    if not store.shards(root, _TABLE, scene):
         return None
-    try:
-        table = read_file(root.local_copy(name), _COLUMNS, root.at(name))
-    except StoreError as error:
-        raise StoreError(f"{error}: run aerialdojo-gen split --scene {scene}") from None
+    table = store.read_scene(root, _TABLE, scene, _COLUMNS)
     ids = table["object_id"].to_numpy()
-    xyz = np.column_stack([table[column].to_numpy().astype(np.float64) for column in _COLUMNS[1:]])
+    xyz = np.column_stack([table[column].to_numpy() for column in _COLUMNS[1:]])
     return {int(k): xyz[ids == k] for k in np.unique(ids)}
 
 
 @lru_cache(maxsize=64)
 def nodes_of(root: DataRoot, scene: str) -> dict[int, str]:
     """Read which node of a scene's mesh is which object: by ``object_id``."""
-    table = read_scene(root, "release/objects", scene, ("object_id", "mesh_node"))
+    table = store.read_scene(root, "release/objects", scene, ("object_id", "mesh_node"))
     return dict(zip(table["object_id"].to_pylist(), table["mesh_node"].to_pylist(), strict=True))
 
 

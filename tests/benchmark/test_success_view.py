@@ -14,7 +14,7 @@ import pandas as pd
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from support.extended import anchors_as_viewpoints, without_columns
+from support.extended import without_columns
 from support.walled import SCENE, VIEWPOINTS, walled, write_walled
 
 from aerialdojo_gen.benchmark.contents import Wanted, report_tables
@@ -144,16 +144,11 @@ def test_a_release_that_gains_viewpoints_is_other_data(tmp_path: Path) -> None:
 
 @pytest.fixture(scope="module")
 def viewed_smoke(smoke: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The smoke release with its shortlisted anchors as viewpoints, flown by three agents."""
-    data = tmp_path_factory.mktemp("viewed")
-    shutil.copytree(smoke / "release", data / "release")
-    shutil.copytree(smoke / "meshes", data / "meshes")
-    shutil.rmtree(data / "release" / "viewpoints", ignore_errors=True)
-    for path in sorted((data / "release" / "scenes").glob("part-*.parquet")):
-        anchors_as_viewpoints(data, path.stem.removeprefix("part-"))
-    for run, agent in (("oracle", "oracle"), ("random", "random"), ("constant", "constant")):
-        evaluate(data, Evaluation(run, agent, selection=Selection(modalities=("semantic",), limit=150)))
-    return data
+    """The log of three agents on the smoke release."""
+    out = tmp_path_factory.mktemp("viewed")
+    for agent in ("oracle", "random", "constant"):
+        evaluate(smoke, Evaluation(agent, agent, selection=Selection(modalities=("semantic",), limit=150)), out=out)
+    return out
 
 
 def test_relations_hold_on_real_episodes(viewed_smoke: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from pathlib import Path
 from typing import Any
 
@@ -10,29 +11,22 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from support.planting import Planted
 
-from aerialdojo_gen.store.schemas import APPROACH
+from aerialdojo_gen.store import shards as store
+from aerialdojo_gen.store.footers import decode, encode
+from aerialdojo_gen.store.schemas import APPROACH, VIEWPOINTS
 from aerialdojo_gen.store.schemas.columns import list_of
+from aerialdojo_gen.store.tables import column_digests, content_digest, from_rows
 
 KEYS = ("train", "test")
 
 
 def write_viewpoints(data: Path, scene: str, rows: list[dict[str, Any]]) -> None:
     """Write `release/viewpoints` of a scene: rows of object_id, x_m, y_m, z_m, yaw_rad."""
-    path = data / "release" / "viewpoints" / f"part-{scene}.parquet"
-    path.parent.mkdir(parents=True, exist_ok=True)
-    names = ("x_m", "y_m", "z_m", "yaw_rad")
-    columns = {
-        "scene": pa.array([scene] * len(rows), pa.string()),
-        "object_id": pa.array([row["object_id"] for row in rows], pa.int32()),
-        **{name: pa.array([row[name] for row in rows], pa.float64()) for name in names},
-    }
-    pq.write_table(pa.table(columns), path)
-
-
-def anchors_as_viewpoints(data: Path, scene: str) -> None:
-    """Take the shortlisted anchors of a release for its objects' valid viewpoints."""
-    anchors = pq.read_table(data / "release" / "anchors" / f"part-{scene}.parquet").to_pylist()
-    write_viewpoints(data, scene, anchors)
+    kept = ("object_id", "x_m", "y_m", "z_m", "yaw_rad")
+    content = [
+        {"scene": scene, "viewpoint_id": k, **{name: row[name] for name in kept}} for k, row in enumerate(rows)
+    ]
+    store.write_shard(data, "release/viewpoints", scene, 0, from_rows(VIEWPOINTS, content))
 
 
 def with_column(table: pa.Table, name: str, values: pa.Array) -> pa.Table:
@@ -79,14 +73,8 @@ def set_difficulty(planted: Planted) -> None:
 
 def without_columns(path: Path, names: tuple[str, ...]) -> None:
     """Rewrite a shard as a version wrote it that did not know some columns."""
-    import dataclasses
-
-    from aerialdojo_gen.store.footers import decode, encode
-    from aerialdojo_gen.store.shards import META
-    from aerialdojo_gen.store.tables import column_digests, content_digest
-
     table = pq.ParquetFile(path).read()
-    info = decode(table.schema.metadata[META])
+    info = decode(table.schema.metadata[store.META])
     table = table.drop_columns(list(names))
     told = dataclasses.replace(info, content=content_digest(table), columns=column_digests(table))
-    pq.write_table(table.replace_schema_metadata({META: encode(told)}), path)
+    pq.write_table(table.replace_schema_metadata({store.META: encode(told)}), path)
