@@ -220,7 +220,7 @@ def _values(run: Run, breakdown: _Breakdown, released: _Released) -> list[Any] |
             column = run.table[name].to_pylist()
         else:
             keys = zip(*(run.table[key].to_pylist() for key in ("scene", "subset", "nav_id")), strict=True)
-            column = [released.value(breakdown.table, *key, name) for key in keys]
+            column = [released.value(breakdown.table, scene, side, nav_id, name) for scene, side, nav_id in keys]
         if all(value is None for value in column):
             return None
         columns.append(column)

@@ -80,7 +80,7 @@ BOXES = [((2.6, -3.0, 0.0), (2.7, 3.0, 5.0)), ((-4.0, -4.0, 2.6), (2.6, 4.0, 2.7
 
 def meets(p: np.ndarray, q: np.ndarray, low: tuple[float, ...], high: tuple[float, ...]) -> np.ndarray:
     """Whether segments from p to every q pass through a box, by its slabs."""
-    d = np.where(q == p, 1e-12, q - p)
+    d = np.where(np.abs(q - p) < 1e-12, 1e-12, q - p)
     a, b = (np.array(low) - p) / d, (np.array(high) - p) / d
     enter, leave = np.minimum(a, b).max(axis=1), np.maximum(a, b).min(axis=1)
     return np.asarray((enter <= leave) & (leave >= 0.0) & (enter <= 1.0))
