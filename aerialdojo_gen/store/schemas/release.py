@@ -5,14 +5,17 @@ from __future__ import annotations
 import pyarrow as pa
 
 from aerialdojo_gen.store.schemas.columns import (
+    AGENT_ACTION,
     CLEARANCE,
     DETOUR,
+    DIFFICULTY,
     EUCLIDEAN,
     LISTS,
     PAIR,
     ROUTE,
     SCENE,
     SETTING,
+    START_VIEW,
     column,
     table,
     xyz,
@@ -41,6 +44,17 @@ TASKS = table(
     column("description", pa.string(), "the target's description; null for image goals", nullable=True),
     column("reference_image_id", pa.string(), "the target's picture in objects; null for semantic goals",
            nullable=True),
+    column("target_seen_in_train", pa.bool_(),
+           "whether a training task of the same partition has the same target; by the paper's split", nullable=True),
+    column("start_seen_in_train", pa.bool_(),
+           "whether a training task of the same partition starts from the same pose; by the paper's split",
+           nullable=True),
+    column("target_split", pa.string(),
+           "the split by objects: train where neither the target nor the object that the task starts from is held "
+           "out, else test", nullable=True),
+    column("target_held_out", pa.bool_(), "whether the target is one of the scene's objects that are held out",
+           nullable=True),
+    column("start_held_out", pa.bool_(), "whether the object that the task starts from is held out", nullable=True),
     clusters=["setting", "modality"],
     plain=["task_id", "nav_id"],
 )  # fmt: skip
@@ -58,10 +72,13 @@ ROUTES = table(
     column("detour_ratio", pa.float64(), DETOUR),
     ROUTE[1],
     column("min_clearance_m", pa.float64(), CLEARANCE, "m"),
+    *DIFFICULTY,
+    *START_VIEW,
     *LISTS,
+    AGENT_ACTION,
     clusters=["setting"],
-    plain=["nav_id", "euclidean_m", "length_m", "detour_ratio", "min_clearance_m",
-           *[field.name for field in LISTS]],
+    plain=["nav_id", "euclidean_m", "length_m", "detour_ratio", "min_clearance_m", "free_length_m", "plan_detour",
+           *[field.name for field in LISTS], "agent_action"],
 )  # fmt: skip
 
 REFERENCE_ID = column("reference_image_id", pa.string(), "opaque id that image tasks name")
