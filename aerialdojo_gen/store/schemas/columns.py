@@ -83,6 +83,18 @@ PAIR = [
 ]
 EUCLIDEAN = column("euclidean_m", pa.float64(), "straight distance from start to goal, d_E", "m")
 DETOUR = "length_m / euclidean_m, κ"
+# What `plan` tells of a route's difficulty, null where there is no route.
+DIFFICULTY = [
+    column("free_length_m", pa.float64(), "shortest length_m from start to goal were there no obstacles", "m", True),
+    column("plan_detour", pa.float64(), "length_m / free_length_m", nullable=True),
+    column("straight_line_free", pa.bool_(), "whether the body could fly the straight line from start to goal",
+           nullable=True),
+    column("climb_m", pa.float64(), "metres flown upwards", "m", True),
+]  # fmt: skip
+AGENT_ACTION = column(
+    "agent_action", list_of(pa.int8()), "the route as an agent can fly it: actions 0 to 15, the last is 0 (Stop)",
+    nullable=True,
+)  # fmt: skip
 CLEARANCE = "smallest distance along the route from the body's centre line to any surface, up to 5 m"
 
 

@@ -5,8 +5,10 @@ from __future__ import annotations
 import pyarrow as pa
 
 from aerialdojo_gen.store.schemas.columns import (
+    AGENT_ACTION,
     CLEARANCE,
     DETOUR,
+    DIFFICULTY,
     EUCLIDEAN,
     LISTS,
     PAIR,
@@ -123,11 +125,13 @@ PLANS = table(
     "plans", ["scene", "pair_id"],
     SCENE,
     column("pair_id", pa.string(), "candidate task"),
-    column("outcome", pa.string(), "SOLVED, START_IN_COLLISION, GOAL_IN_COLLISION, NO_PATH or BUDGET_EXHAUSTED"),
+    column("outcome", pa.string(), "what became of it: SOLVED, or why there is no route"),
     *ROUTE,
     column("expansions", pa.int64(), "nodes that the search expanded, all attempts together"),
     column("min_clearance_m", pa.float64(), CLEARANCE, "m", True),
+    *DIFFICULTY,
     *LISTS,
+    AGENT_ACTION,
     command="plan",
 )  # fmt: skip
 
