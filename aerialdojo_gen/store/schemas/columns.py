@@ -79,8 +79,8 @@ ROUTE = [
 # How much of the target the start gives away.
 START_VIEW = [
     column("target_visible_at_start", pa.float64(),
-           "of the points of the target's surface that its own body does not hide from the start, the share that lies "
-           "in one of the four views there and that nothing else hides", nullable=True),
+           "of the target's surface points that its own body does not hide from the start, the share that is in one "
+           "of the four views there and that nothing else hides", nullable=True),
     column("visible_view_at_start", pa.string(),
            "view that shows most of them: front, left, right or down; null where nothing is seen", nullable=True),
 ]  # fmt: skip
@@ -93,7 +93,7 @@ EUCLIDEAN = column("euclidean_m", pa.float64(), "straight distance from start to
 DETOUR = "length_m / euclidean_m, κ"
 # What `plan` tells of a route's difficulty, null where there is no route.
 DIFFICULTY = [
-    column("free_length_m", pa.float64(), "shortest length_m of the same start and goal without obstacles", "m", True),
+    column("free_length_m", pa.float64(), "shortest length_m from start to goal were there no obstacles", "m", True),
     column("plan_detour", pa.float64(), "length_m / free_length_m", nullable=True),
     column("straight_line_free", pa.bool_(), "whether the body could fly the straight line from start to goal",
            nullable=True),

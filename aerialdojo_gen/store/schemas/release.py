@@ -24,6 +24,21 @@ from aerialdojo_gen.store.schemas.staged import ANCHOR_COLUMNS, OBJECT_COLUMNS, 
 
 RELEASE_ANCHORS = table("anchors", ["scene", "object_id", "anchor_id"], *ANCHOR_COLUMNS)
 
+# What `tasks` says of train and test beside the subset; null in a release of an older version.
+SPLITS = [
+    column("target_seen_in_train", pa.bool_(),
+           "whether a training task of the same partition has the same target; by the paper's split", nullable=True),
+    column("start_seen_in_train", pa.bool_(),
+           "whether a training task of the same partition starts from the same pose; by the paper's split",
+           nullable=True),
+    column("target_split", pa.string(),
+           "the split by objects: train where neither the target nor the object that the task starts from is held "
+           "out, else test", nullable=True),
+    column("target_held_out", pa.bool_(), "whether the target is one of the scene's objects that are held out",
+           nullable=True),
+    column("start_held_out", pa.bool_(), "whether the object that the task starts from is held out", nullable=True),
+]  # fmt: skip
+
 TASKS = table(
     "tasks", ["scene", "nav_id", "modality"],
     column("task_id", pa.string(), "the instance: nav_id and the modality's letter"),
@@ -44,17 +59,7 @@ TASKS = table(
     column("description", pa.string(), "the target's description; null for image goals", nullable=True),
     column("reference_image_id", pa.string(), "the target's picture in objects; null for semantic goals",
            nullable=True),
-    column("target_seen_in_train", pa.bool_(),
-           "whether a training task of the same partition has the same target; by the paper's split", nullable=True),
-    column("start_seen_in_train", pa.bool_(),
-           "whether a training task of the same partition starts from the same pose; by the paper's split",
-           nullable=True),
-    column("target_split", pa.string(),
-           "the split by objects: train where neither the target nor the object that the task starts from is held "
-           "out, else test", nullable=True),
-    column("target_held_out", pa.bool_(), "whether the target is one of the scene's objects that are held out",
-           nullable=True),
-    column("start_held_out", pa.bool_(), "whether the object that the task starts from is held out", nullable=True),
+    *SPLITS,
     clusters=["setting", "modality"],
     plain=["task_id", "nav_id"],
 )  # fmt: skip
@@ -86,3 +91,7 @@ REFERENCE_ID = column("reference_image_id", pa.string(), "opaque id that image t
 RELEASE_OBJECTS = table(
     "objects", ["scene", "object_id"], *OBJECT_COLUMNS, REFERENCE_ID, *REFERENCE, plain=["reference_image"]
 )  # fmt: skip
+
+# Columns that a task is not flown by: other formats have no field for them.
+TOLD_OF_SPLITS = tuple(field.name for field in SPLITS)
+TOLD_OF_DIFFICULTY = tuple(field.name for field in (*DIFFICULTY, *START_VIEW, AGENT_ACTION))
