@@ -168,7 +168,7 @@ def scene_table(tasks: Tasks) -> Comparison:
 
 
 def seen_table(tasks: Tasks) -> Comparison:
-    """Say which test tasks of the paper's split ask for what no training task of their partition has."""
+    """Say which test tasks of the split by tasks ask for what no training task of their partition has."""
     columns = (
         Column("tasks", exact=False),
         Column("new target", exact=False), Column("target %", "%", exact=False, digits=2),
@@ -210,7 +210,7 @@ def held_out_table(tasks: Tasks) -> Comparison:
         (f"{p} {side}", figures(tasks.of((tasks.partition == p) & (tasks.target_split == side))))
         for p in ("ID", "OOD") for side in ("train", "test")
     ]  # fmt: skip
-    notes = ("target_split: a fifth of each scene's objects is held out, as targets and as starts.",)
+    notes = ("new: of an object that is held out, which no training task of this split has.",)
     return _plain("The split by objects", "target_split", columns, [*rows, ("all", figures(tasks))], notes)
 
 
