@@ -11,6 +11,7 @@ from aerialdojo_gen.scoring.geometric import WEIGHTS
 # Columns of anchors that do not matter to what reads them.
 OPINIONS = {
     "score_geometric": 0.5, "score_clip": None, "score_vlm": None, **{f"part_{name}": 0.5 for name in WEIGHTS},
+    "part_tells": None, "part_front": None, "off_front_rad": None, "no_front_reason": None, "step_back_m": 0.0,
     "thumbnail": b"",
 }  # fmt: skip
 
