@@ -70,9 +70,7 @@ def _listed(texts: list[str]) -> str:
     return " and ".join([*([", ".join(texts[:-1])] if texts[1:] else []), texts[-1]])
 
 
-def _template(
-    noun: Noun, look: str, parted: bool, more: bool, rng: np.random.Generator, used: dict[str, int]
-) -> str:
+def _template(noun: Noun, look: str, parted: bool, more: bool, rng: np.random.Generator, used: dict[str, int]) -> str:
     pool = [
         template
         for template in (FULL if look else PLAIN)
