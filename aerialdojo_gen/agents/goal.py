@@ -94,6 +94,26 @@ class Rules:
     sensors: Sensors = BLIND
 
 
+# What an agent may be told beside the paper's goal, where it is asked for.
+TELLABLE = ("heading",)
+
+
+@dataclass(frozen=True)
+class Heading:
+    """Which way the body faces at the start, as a compass would show it.
+
+    Attributes
+    ----------
+    direction : str
+        The nearest of the eight compass directions: of the same words as `Goal.direction`.
+    heading_deg : int
+        Degrees clockwise from north, 0 to 359.
+    """
+
+    direction: str
+    heading_deg: int
+
+
 @dataclass(frozen=True, eq=False)
 class Goal:
     """The object to be found, as the paper describes it to an agent.
@@ -111,6 +131,8 @@ class Goal:
     image : (H, W, 3) uint8 or None
         For image goals: the object as the drone's front camera sees it from the goal viewpoint; read-only.
     rules : Rules
+    heading : Heading or None
+        Of the start pose, where it is told (``--tell heading``); None in the paper's setting.
     """
 
     modality: str
@@ -120,6 +142,7 @@ class Goal:
     description: str | None
     image: NDArray[np.uint8] | None
     rules: Rules
+    heading: Heading | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -21,11 +21,30 @@ class OracleAgent(AgentBase):
     """Replays the reference trajectory: the upper bound, and the self-test of the data.
 
     The runner gives it the reference's actions before each episode, and gives them to no other agent.
+
+    Parameters
+    ----------
+    actions : str
+        Which list of `routes` it flies: ``action``, the Approach left out, or ``agent_action``, which has the 16
+        actions alone and ends where the target is seen.
+
+    Attributes
+    ----------
+    column : str
+        The same.
+
+    Raises
+    ------
+    ValueError
+        There is no such list.
     """
 
     sensors = BLIND
 
-    def __init__(self) -> None:
+    def __init__(self, actions: str = "action") -> None:
+        if actions not in ("action", "agent_action"):
+            raise ValueError(f"routes have the lists action and agent_action, not {actions!r}")
+        self.column = actions
         self._actions: list[int] = [STOP]
 
     def follow(self, actions: Sequence[int]) -> None:

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from aerialdojo_gen.benchmark.grid import MEASURES, Line, Measure, Table, score_table, values_of
+from aerialdojo_gen.benchmark.grid import Line, Measure, Table, score_table, values_of
 from aerialdojo_gen.benchmark.metrics import Bools
 from aerialdojo_gen.benchmark.paper_tables import in_setting
 from aerialdojo_gen.benchmark.profiles import Profile
@@ -19,12 +19,13 @@ from aerialdojo_gen.benchmark.tables import (
     line_of,
     profile_head,
     run_table,
+    shown_measures,
     stacked_table,
 )
 from aerialdojo_gen.store.schemas import FAMILIES, SETTINGS
 
 _DIFFERENCES = (Measure("SR", "sr", signed=True), Measure("OSR", "osr", signed=True))
-_SHORT = MEASURES[:3]
+_SHORT = ("sr", "sr_view", "osr", "spl")
 
 
 def by_setting(runs: Sequence[Run]) -> Iterable[tuple[str, Run]]:
@@ -50,12 +51,14 @@ def _halves(
 ) -> Table:
     """Set the episodes of one value of a column beside those of the other, and the difference of their rates."""
     lines = []
+    measures = shown_measures(runs, profile)
     for section, run in by_setting(runs):
         parts = {name: summarize(p, profile).overall for name, p in slices(run.episodes, column, names)}
-        one, other = (values_of(parts.get(name)) for name in names)
-        gap = tuple(b - a for a, b in zip(one[:2], other[:2], strict=True))
+        one, other = (values_of(parts.get(name), measures) for name in names)
+        rates = (values_of(parts.get(name), _DIFFERENCES) for name in names)
+        gap = tuple(b - a for a, b in zip(*rates, strict=True))
         lines.append(line_of(run, (*one, *other, *gap), rivals=section, section=section))
-    groups = list(zip(heads, (MEASURES, MEASURES, _DIFFERENCES), strict=True))
+    groups = list(zip(heads, (measures, measures, _DIFFERENCES), strict=True))
     return score_table(f"{title}, {profile_head(profile)}", "agent", groups, lines)
 
 
@@ -71,18 +74,20 @@ def type_table(runs: Sequence[Run], profile: Profile) -> Table:
         scores.append(found)
     order = list(FAMILIES.values())
     types = sorted(home, key=lambda t: (order.index(home[t]) if home[t] in order else len(order), t))
-    table = stacked_table(f"By scene type, {profile_head(profile)}", "scene type", runs, types, scores)
+    table = stacked_table("By scene type", "scene type", runs, profile, types, scores)
     heads = {i: home[t] for i, t in enumerate(types) if not i or home[t] != home[types[i - 1]]}
     return Table(table.title, table.stub, table.groups, table.rows, table.notes, heads, table.marks)
 
 
 def average_table(runs: Sequence[Run], profile: Profile) -> Table:
     """Set the mean of the families beside the mean of all episodes (paper, appendix C: different populations)."""
+    measures = shown_measures(runs, profile)
 
     def values(run: Run) -> Iterable[float]:
-        return values_of(summarize(run.episodes, profile).overall) + values_of(weighted_score(run.episodes, profile))
+        both = summarize(run.episodes, profile).overall, weighted_score(run.episodes, profile)
+        return (value for score in both for value in values_of(score, measures))
 
-    groups = [("mean of the families", MEASURES), ("mean of the tasks", MEASURES)]
+    groups = [("mean of the families", measures), ("mean of the tasks", measures)]
     note = "A family counts a quarter on the left, as much as it has tasks on the right: two different populations."
     return run_table(f"Two averages, {profile_head(profile)}", runs, groups, values, [note])
 
@@ -90,7 +95,7 @@ def average_table(runs: Sequence[Run], profile: Profile) -> Table:
 def part_table(
     title: str, runs: Sequence[Run], profile: Profile, parts: Sequence[tuple[str, Sequence[Bools]]], note: str = ""
 ) -> Table | None:
-    """Set parts of the episodes beside one another: SR, OSR, SPL.
+    """Set parts of the episodes beside one another: SR, SR-view, OSR, SPL.
 
     Parameters
     ----------
@@ -111,11 +116,12 @@ def part_table(
     if len(there) < 2:
         return None
     lines: list[Line] = []
+    measures = shown_measures(runs, profile, _SHORT)
     for k, run in enumerate(runs):
         values: tuple[float, ...] = ()
         for _, masks in there:
             part = run.episodes.where(masks[k])
-            values += values_of(summarize(part, profile).overall if len(part) else None, _SHORT)
+            values += values_of(summarize(part, profile).overall if len(part) else None, measures)
         lines.append(line_of(run, values))
-    groups = [(head, _SHORT) for head, _ in there]
+    groups = [(head, measures) for head, _ in there]
     return score_table(f"{title}, {profile_head(profile)}", "agent", groups, lines, [note] if note else [])

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 from aerialdojo_gen.benchmark import breakdowns, radii, tables
-from aerialdojo_gen.benchmark.difficulty import difficulty_tables
+from aerialdojo_gen.benchmark.difficulty import DIFFICULTY, SEEN, Partings, parting_tables, partings_of
 from aerialdojo_gen.benchmark.grid import Table
 from aerialdojo_gen.benchmark.paper_tables import result_tables
 from aerialdojo_gen.benchmark.profiles import Profile
@@ -44,6 +45,11 @@ class Wanted:
     intervals: bool = True
     beside: Sequence[PaperResult] = ()
 
+    @cached_property
+    def partings(self) -> Partings:
+        """What the episodes can be parted by: difficulty, and what training shows."""
+        return partings_of(self.data, self.runs)
+
 
 def _sliced(column: str) -> Callable[[Wanted], list[Table]]:
     return lambda w: [tables.slice_table(w.runs, w.profiles[0], column)]
@@ -60,7 +66,8 @@ _TABLES: dict[str, Callable[[Wanted], list[Table]]] = {
     "modality": _sliced("modality"),
     "radius": lambda w: [radii.radius_table(w.runs, w.profiles[0], w.radii_m)],
     "visits": lambda w: [radii.visit_table(w.runs, w.profiles[0])],
-    "difficulty": lambda w: difficulty_tables(w.data, w.runs, w.profiles[0]),
+    "difficulty": lambda w: parting_tables(w.partings, DIFFICULTY, w.runs, w.profiles[0]),
+    "seen": lambda w: parting_tables(w.partings, SEEN, w.runs, w.profiles[0]),
     "conduct": lambda w: [tables.conduct_table(w.runs)],
     "type": lambda w: [breakdowns.type_table(w.runs, w.profiles[0])],
     "scene": lambda w: [tables.scene_table(w.runs, w.profiles[0])],
@@ -91,6 +98,12 @@ def report_tables(wanted: Wanted, names: Sequence[str] = DEFAULT) -> list[Table]
         There is no table of that name.
     """
     return [table for made in named_tables(wanted, names).values() for table in made]
+
+
+def left_out(wanted: Wanted, names: Sequence[str] = DEFAULT) -> str:
+    """Say in one line which breakdowns of the tables asked for there are not, and why; empty where there are all."""
+    asked = "all" in names or {"difficulty", "seen"} & set(names)
+    return wanted.partings.left_out if asked else ""
 
 
 def named_tables(wanted: Wanted, names: Sequence[str]) -> dict[str, list[Table]]:

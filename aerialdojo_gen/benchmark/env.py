@@ -16,7 +16,7 @@ from aerialdojo_gen.agents.goal import N_ACTIONS, Sensors
 from aerialdojo_gen.benchmark.episode import Episode
 from aerialdojo_gen.benchmark.eyes import look, mosaic
 from aerialdojo_gen.benchmark.flight import Flight
-from aerialdojo_gen.benchmark.tasks import MODALITIES, Selection, read_tasks, reference_image, select
+from aerialdojo_gen.benchmark.tasks import MODALITIES, Selection, check_tell, read_tasks, reference_image, select
 from aerialdojo_gen.benchmark.texts import GoalText
 from aerialdojo_gen.common.names import unknown
 from aerialdojo_gen.config.agreement import SUCCESS_RADIUS_M
@@ -63,6 +63,9 @@ class AerialDojoEnv(gymnasium.Env[dict[str, Any], np.int64]):
         The body.
     renderer : str
         ``"gl"``, ``"pybullet"``, or ``"auto"`` for the fastest that works here.
+    tell : str or sequence of str
+        ``"heading"``: the goal says which way the body faces at the start, as `heading` (an index of the eight
+        directions) and `heading_deg` (clockwise from north).
     render_mode : str, optional
         ``"rgb_array"``: `render` returns the four views in one picture.
 
@@ -95,6 +98,7 @@ class AerialDojoEnv(gymnasium.Env[dict[str, Any], np.int64]):
         success_radius_m: float = SUCCESS_RADIUS_M,
         embodiment: Embodiment | None = None,
         renderer: str = "auto",
+        tell: str | Sequence[str] = (),
         render_mode: str | None = None,
     ) -> None:
         if render_mode not in (None, "rgb_array"):
@@ -102,7 +106,8 @@ class AerialDojoEnv(gymnasium.Env[dict[str, Any], np.int64]):
         self.render_mode = render_mode
         self._data = open_root(data)
         self._sensors = sensors or Sensors(tuple(views), rgb, depth, width, height)
-        self._flight = Flight(self._data, self._sensors, success_radius_m, embodiment, renderer)
+        self._tell = check_tell(_names(tell))
+        self._flight = Flight(self._data, self._sensors, success_radius_m, embodiment, renderer, self._tell)
         self._begun = False
         self._rows = select(
             self._data, Selection(_names(split), _names(setting), _names(modality), _names(scene), limit, seed)
@@ -223,6 +228,8 @@ class AerialDojoEnv(gymnasium.Env[dict[str, Any], np.int64]):
         }
         if self._image_shape is not None:
             goal["image"] = spaces.Box(0, 255, self._image_shape, np.uint8)
+        if "heading" in self._tell:
+            goal |= {"heading": spaces.Discrete(len(DIRECTIONS)), "heading_deg": spaces.Box(0, 359, (1,), np.int32)}
         s = self._sensors
         budget = int(pc.max(self._rows["action_budget"]).as_py())
         entries: dict[str, spaces.Space[Any]] = {
@@ -256,6 +263,9 @@ class AerialDojoEnv(gymnasium.Env[dict[str, Any], np.int64]):
             "direction": np.int64(DIRECTIONS.index(goal.direction)),
             "description": goal.description or "",
         }
+        if goal.heading is not None:
+            seen["heading"] = np.int64(DIRECTIONS.index(goal.heading.direction))
+            seen["heading_deg"] = np.array([goal.heading.heading_deg], np.int32)
         if self._image_shape is not None:
             seen["image"] = np.zeros(self._image_shape, np.uint8) if goal.image is None else goal.image.copy()
         return seen

@@ -135,7 +135,8 @@ def _sampled(
 ) -> tuple[float, float, float, float, int]:
     """Fly the first steps of a few tasks; tokens in and out, seconds of a request and of its pictures, how many."""
     sensors = evaluation.sensors or agent.sensors
-    flight = Flight(root, replace(sensors), embodiment=evaluation.embodiment, renderer=evaluation.renderer)
+    body, renderer, tell = evaluation.embodiment, evaluation.renderer, evaluation.tell
+    flight = Flight(root, replace(sensors), embodiment=body, renderer=renderer, tell=tell)
     # Of one scene: making another ready takes longer than all the requests.
     few = rows.filter(pc.equal(rows["scene"], rows["scene"][0].as_py())).slice(0, _TASKS)
     sums = [0.0, 0.0, 0.0, 0.0]

@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass, field
 from typing import Any
 
 from aerialdojo_gen.agents.goal import Sensors
-from aerialdojo_gen.benchmark.tasks import Selection
+from aerialdojo_gen.benchmark.tasks import Selection, check_tell
 from aerialdojo_gen.benchmark.worker import Conditions
 from aerialdojo_gen.common.secrets import Secrets
 from aerialdojo_gen.config.sections import Embodiment
@@ -40,6 +40,8 @@ class Evaluation:
         Of an agent that asks a service, all workers together.
     used : dict or None
         The options as the agent says that it uses them, for the log.
+    tell : tuple of str
+        Of `aerialdojo_gen.agents.goal.TELLABLE`: what the agent is told beside the paper's goal.
     """
 
     run: str = "default"
@@ -52,11 +54,17 @@ class Evaluation:
     conditions: Conditions = field(default_factory=Conditions)
     requests_per_minute: float | None = None
     used: Mapping[str, Any] | None = None
+    tell: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        """Refuse what nobody tells."""
+        check_tell(self.tell)
 
     def identity(self) -> dict[str, str]:
-        """Columns of `episodes` that name the run and its agent."""
+        """Columns of `episodes` that name the run, its agent, and what that is told."""
         options = json.dumps(self._logged(self.options if self.used is None else self.used), sort_keys=True)
-        return {"run_id": self.run, "agent": self.agent, "agent_options": options}
+        told = ",".join(check_tell(self.tell))
+        return {"run_id": self.run, "agent": self.agent, "agent_options": options, "told": told}
 
     def settings(self) -> dict[str, Any]:
         """What must not change within a run, as JSON without secrets; attempts, pauses and the pace may."""
@@ -66,6 +74,7 @@ class Evaluation:
             **asdict(self.selection),
             "sensors": asdict(self.sensors) if self.sensors else None,
             "renderer": self.renderer,
+            "tell": check_tell(self.tell),
             "embodiment": self.embodiment.model_dump(),
         }
 

@@ -2,14 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
+import numpy as np
+
 from aerialdojo_gen.agents.goal import Goal, Observation, Rules, Sensors
 from aerialdojo_gen.benchmark.episode import Episode
 from aerialdojo_gen.benchmark.eyes import look
 from aerialdojo_gen.benchmark.motion import FlightSpace, flight_space
-from aerialdojo_gen.benchmark.tasks import Task, goal_of, mesh_of
+from aerialdojo_gen.benchmark.tasks import Task, check_tell, goal_of, mesh_of
+from aerialdojo_gen.benchmark.viewpoints import View, nodes_of, viewed, viewpoints_of
 from aerialdojo_gen.config.agreement import SUCCESS_RADIUS_M
 from aerialdojo_gen.config.sections import Embodiment
+from aerialdojo_gen.errors import StoreError
 from aerialdojo_gen.store.root import Where, open_root
+
+_NONE = np.empty((0, 3))
 
 
 class Flight:
@@ -29,6 +37,8 @@ class Flight:
     renderer : str
         ``"gl"``, ``"pybullet"``, or ``"auto"`` for the fastest that works here; what they draw differs by a few
         grey levels.
+    tell : sequence of str
+        Of `aerialdojo_gen.agents.goal.TELLABLE`: what agents are told beside the goal.
 
     Attributes
     ----------
@@ -53,10 +63,12 @@ class Flight:
         success_radius_m: float = SUCCESS_RADIUS_M,
         embodiment: Embodiment | None = None,
         renderer: str = "auto",
+        tell: Sequence[str] = (),
     ) -> None:
         self._data = open_root(data)
         self._body = embodiment or Embodiment()
         self.renderer = renderer
+        self._tell = check_tell(tell)
         self.sensors = sensors
         self.success_radius_m = success_radius_m
 
@@ -72,10 +84,28 @@ class Flight:
         body, budget = self._body, row["action_budget"]
         rules = Rules(budget, self.success_radius_m, body.radius_m, body.wheelbase_m, self.sensors)
         self.task = task
-        self.goal = goal_of(self._data, task, rules)
+        self.goal = goal_of(self._data, task, rules, self._tell)
         self.space = flight_space(*mesh_of(self._data, row["scene"]), body.radius_m)
         self.episode = Episode(self.space, task.start, task.goal, budget)
         return self.episode
+
+    def view(self) -> View | None:
+        """Say where the body is with regard to the target; None where the release has no viewpoints.
+
+        Raises
+        ------
+        StoreError
+            Viewpoints, objects and mesh of the scene do not belong together, or a part is damaged.
+        """
+        task, scene = self.task, self.task.row["scene"]
+        viewpoints = viewpoints_of(self._data, scene)
+        if viewpoints is None:
+            return None
+        node = nodes_of(self._data, scene).get(task.target_id)
+        if node is None:
+            raise StoreError(f"object {task.target_id} of {scene} is not in {self._data}/release: run split again")
+        own = viewpoints.get(task.target_id, _NONE)
+        return viewed(self.space.scene, node, own, task.goal, self.episode.position)
 
     def observe(self) -> Observation:
         """Return what the agent has before its next action."""

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 from aerialdojo_gen.benchmark.scores import METRICS, Score
 
-HEADS = {"sr": "SR ↑", "osr": "OSR ↑", "spl": "SPL ↑", "dts_m": "DTS ↓", "cr": "CR ↓"}
+HEADS = {"sr": "SR ↑", "sr_view": "SR-view ↑", "osr": "OSR ↑", "spl": "SPL ↑", "dts_m": "DTS ↓", "cr": "CR ↓"}
 NONE = "–"
 BEST, SECOND = "best", "second"
 
@@ -114,7 +114,12 @@ class Line:
     before: tuple[str, ...] = ()
 
 
-def values_of(score: Score | None, measures: Sequence[Measure] = MEASURES) -> tuple[float, ...]:
+def measures_of(known: bool, metrics: Sequence[str] = METRICS) -> tuple[Measure, ...]:
+    """Take measures by their metrics; SR-view only where it is known of any run."""
+    return tuple(m for m in MEASURES if m.metric in metrics and (known or m.metric != "sr_view"))
+
+
+def values_of(score: Score | None, measures: Sequence[Measure]) -> tuple[float, ...]:
     """Take the measures out of a score; NaN where there is none."""
     return tuple(math.nan if score is None else float(getattr(score, m.metric)) for m in measures)
 

@@ -41,22 +41,26 @@ def bootstrap(scenes: Sequence[Floats], resamples: int = RESAMPLES, level: float
         NaN where a family has a single scene: how far scenes differ is then not known.
     """
     width = scenes[0].shape[1] if scenes else len(METRICS)
+    ends = np.full((2, width), math.nan)
     if not scenes or min(map(len, scenes)) < 2:
-        return np.full(width, math.nan), np.full(width, math.nan)
+        return ends[0], ends[1]
+    # A measure that is not known of a scene has no interval, and leaves the others theirs.
+    known = np.all([np.isfinite(part).all(axis=0) for part in scenes], axis=0)
 
     def mean_of_families(*parts: Any, axis: int) -> Any:
         return sum(np.mean(part, axis=axis) for part in parts) / len(parts)
 
     draws = rng.generator(0, "bootstrap", *(len(part) for part in scenes))
     found = stats.bootstrap(
-        tuple(scenes), mean_of_families, n_resamples=resamples, confidence_level=level, axis=0,
-        method="percentile", rng=draws,
+        tuple(part[:, known] for part in scenes), mean_of_families, n_resamples=resamples, confidence_level=level,
+        axis=0, method="percentile", rng=draws,
     ).confidence_interval  # fmt: skip
-    return np.asarray(found.low, np.float64), np.asarray(found.high, np.float64)
+    ends[:, known] = found.low, found.high
+    return ends[0], ends[1]
 
 
 def scene_scores(episodes: Episodes, profile: Profile) -> dict[str, dict[str, Floats]]:
-    """Score scenes: family, then scene, to the `METRICS` as (5,) float64."""
+    """Score scenes: family, then scene, to the `METRICS` as (6,) float64."""
     summary = summarize(episodes, profile)
     family_of = dict(zip(episodes.scene.tolist(), episodes.family.tolist(), strict=True))
     found: dict[str, dict[str, Floats]] = {family: {} for family in summary.families}
@@ -77,11 +81,11 @@ class Paired:
 
     Attributes
     ----------
-    first, second, difference : (5,) float64
-        Overall `METRICS`; fractions and metres.
-    low, high : (5,) float64
+    first, second, difference : (6,) float64
+        Overall `METRICS`; fractions and metres; NaN where a log does not say.
+    low, high : (6,) float64
         95 % interval of the difference, by scene; NaN where a family has a single scene.
-    p : (5,) float64
+    p : (6,) float64
         Two-sided: how often a difference as large arises where the two runs are exchanged scene by scene.
     tasks, scenes : int
         Flown by both.
@@ -145,6 +149,9 @@ def paired(
     p = np.ones(len(METRICS))
     if len(a) > 1:
         for k in range(len(METRICS)):
+            if not (np.isfinite(a[:, k]) & np.isfinite(b[:, k])).all():
+                p[k] = math.nan
+                continue
             p[k] = stats.permutation_test(
                 (a[:, k], b[:, k]), weighted, permutation_type="samples", vectorized=True, n_resamples=resamples,
                 rng=rng.generator(0, "permutation"),

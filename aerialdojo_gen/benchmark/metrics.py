@@ -42,6 +42,9 @@ class Episodes:
         Length of the reference route, L: the sum over its moves, which are horizontal or vertical.
     euclidean_m : (n,) float64
         Straight distance from start to goal.
+    view_distance_m : (n,) float64
+        Distance to the nearest valid viewpoint of the target at the end; inf where the target is not in sight from
+        there, NaN where the log does not say.
     """
 
     scene: Strings
@@ -61,6 +64,7 @@ class Episodes:
     path_length_m: Floats
     reference_length_m: Floats
     euclidean_m: Floats
+    view_distance_m: Floats
 
     def __len__(self) -> int:
         """Return the number of episodes."""
@@ -76,6 +80,9 @@ _KINDS: dict[str, Any] = {
     **dict.fromkeys(("stop_called", "collision"), np.bool_),
     **dict.fromkeys(("n_actions", "action_budget"), np.int64),
 }
+
+
+_DERIVED = ("view_distance_m",)
 
 
 def episodes_of(table: pa.Table) -> Episodes:
@@ -97,9 +104,11 @@ def episodes_of(table: pa.Table) -> Episodes:
     """
     columns = {}
     for field in fields(Episodes):
+        if field.name in _DERIVED:
+            continue
         kind = _KINDS.get(field.name, np.float64)
         columns[field.name] = np.asarray(table.column(field.name).to_pylist(), dtype=kind)
-    episodes = Episodes(**columns)
+    episodes = Episodes(**columns, view_distance_m=_view_distance_m(table))
     for name in columns:
         if name not in _KINDS and not (np.isfinite(columns[name]) & (columns[name] >= 0.0)).all():
             raise StoreError(f"episodes: {name} has values that are no length: run the evaluation again")
@@ -112,6 +121,19 @@ def episodes_of(table: pa.Table) -> Episodes:
     return episodes
 
 
+def _view_distance_m(table: pa.Table) -> Floats:
+    """Take `Episodes.view_distance_m` out of a table, which an older version may have written."""
+    unknown = [None] * table.num_rows
+    distance, sight = (
+        table[name].to_pylist() if name in table.column_names else unknown
+        for name in ("viewpoint_distance_m", "target_in_sight")
+    )
+    return np.array(
+        [np.nan if d is None or s is None else d if s else np.inf for d, s in zip(distance, sight, strict=True)],
+        dtype=np.float64,
+    )
+
+
 @dataclass(frozen=True)
 class Outcomes:
     """What every episode earns under a profile.
@@ -120,6 +142,9 @@ class Outcomes:
     ----------
     success, oracle_success, collision : (n,) bool
         σ; ever within the radius, whatever happens later; ended by a collision.
+    success_view : (n,) float64
+        1 for a success that is taken at any viewpoint of the target with the target in sight, else 0; NaN where the
+        log does not say, and under a rule that measures in the plane.
     spl : (n,) float64
         σ·L / max(L, ℓ), in [0, 1].
     distance_m : (n,) float64
@@ -127,6 +152,7 @@ class Outcomes:
     """
 
     success: Bools
+    success_view: Floats
     oracle_success: Bools
     spl: Floats
     distance_m: Floats
@@ -150,13 +176,22 @@ def outcomes(episodes: Episodes, profile: Profile) -> Outcomes:
     Outcomes
     """
     final, nearest = distances(episodes, profile)
-    success = may_succeed(episodes, profile) & (final <= profile.radius_m)
+    may = may_succeed(episodes, profile)
+    success = may & (final <= profile.radius_m)
     shortest = episodes.euclidean_m if profile.straight_reference else episodes.reference_length_m
     longer = np.maximum(shortest, episodes.path_length_m)
     # Nothing to fly and nothing flown is the shortest way there is.
     efficiency = np.divide(shortest, longer, out=np.ones_like(shortest), where=longer > 0.0)
     spl = np.where(success, efficiency, 0.0)
-    return Outcomes(success, nearest <= profile.radius_m, spl, final, episodes.collision)
+    view = np.where(may & (episodes.view_distance_m <= profile.radius_m), 1.0, 0.0)
+    # The log has no distance to viewpoints in the plane.
+    view[np.isnan(episodes.view_distance_m) | profile.planar] = np.nan
+    return Outcomes(success, view, nearest <= profile.radius_m, spl, final, episodes.collision)
+
+
+def knows_views(episodes: Episodes, profile: Profile) -> bool:
+    """Whether a log says of any episode if it is a success at any viewpoint, by a profile."""
+    return not profile.planar and not bool(np.isnan(episodes.view_distance_m).all())
 
 
 def distances(episodes: Episodes, profile: Profile) -> tuple[Floats, Floats]:

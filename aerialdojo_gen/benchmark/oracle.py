@@ -54,7 +54,7 @@ def shortcoming(episode: Episode, length_m: float, radius_m: float) -> str:
     episode : Episode
         Of `fly`.
     length_m : float
-        Told length of the reference, metres.
+        Told length of the reference, metres; 0 where its length does not matter.
     radius_m : float
         How near to the goal a Stop must be, metres.
 
@@ -73,5 +73,6 @@ def shortcoming(episode: Episode, length_m: float, radius_m: float) -> str:
         return f"no Stop within the budget of {spent}" if episode.termination else f"no Stop in its {spent}"
     if not episode.success(radius_m):
         return f"a Stop {episode.distance_m:.3f} m from the goal"
-    spl = length_m / max(length_m, episode.path_length_m)
+    # A length of 0 asks for none.
+    spl = length_m / max(length_m, episode.path_length_m) if length_m else 1.0
     return "" if spl >= LEAST_SPL else f"{episode.path_length_m:.3f} m flown, {length_m:.3f} m told: SPL {spl:.3f}"

@@ -13,7 +13,7 @@ from aerialdojo_gen.benchmark.metrics import outcomes
 from aerialdojo_gen.benchmark.profiles import Profile
 from aerialdojo_gen.benchmark.runs import Run
 from aerialdojo_gen.benchmark.scores import METRICS
-from aerialdojo_gen.benchmark.tables import profile_head
+from aerialdojo_gen.benchmark.tables import profile_head, shown_measures
 from aerialdojo_gen.errors import UsageError
 
 
@@ -48,7 +48,8 @@ def _same_tasks(first: Run, second: Run) -> tuple[Run, Run]:
 def _table(first: Run, second: Run, profile: Profile) -> Table:
     success = (outcomes(first.episodes, profile).success, outcomes(second.episodes, profile).success)
     result = paired(first.episodes, second.episodes, success, profile)
-    rows = [(HEADS[metric], _cells(result, k, metric)) for k, metric in enumerate(METRICS)]
+    shown = {m.metric for m in shown_measures((first, second), profile)}
+    rows = [(HEADS[m], _cells(result, k, m)) for k, m in enumerate(METRICS) if m in shown]
     notes = [
         f"{result.tasks:,} tasks of {result.scenes} scenes, flown by both. The interval draws scenes anew within "
         "their family; p is that of a permutation test which exchanges the two agents scene by scene, two-sided.",
@@ -76,4 +77,6 @@ def _cells(result: Paired, k: int, metric: str) -> tuple[str, ...]:
 
 
 def _p(p: float) -> str:
+    if math.isnan(p):
+        return NONE
     return "< 0.001" if p < 0.001 else f"{p:.3f}"

@@ -5,18 +5,18 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from aerialdojo_gen.benchmark.grid import MEASURES, Line, Measure, Table, score_table, values_of
+from aerialdojo_gen.benchmark.grid import Line, Measure, Table, score_table, values_of
 from aerialdojo_gen.benchmark.intervals import score_intervals
 from aerialdojo_gen.benchmark.profiles import Profile
 from aerialdojo_gen.benchmark.runs import Run
 from aerialdojo_gen.benchmark.scores import METRICS, summarize
-from aerialdojo_gen.benchmark.tables import NAMES, caveats, line_of, profile_head
+from aerialdojo_gen.benchmark.tables import NAMES, caveats, line_of, profile_head, shown_measures
 from aerialdojo_gen.common.paper import PaperResult
 from aerialdojo_gen.store.schemas import SETTINGS
 
 _TABLES = {"base": "the form of the paper's Table 4", "standard": "the form of the paper's Table 5"}
 # At every radius but the first, as in the paper.
-_FURTHER = MEASURES[:2]
+_FURTHER = ("sr", "sr_view", "osr")
 
 
 def result_tables(
@@ -29,7 +29,7 @@ def result_tables(
     runs : sequence of Run
         In the order and the groups of the lines.
     profiles : sequence of Profile
-        Of the first every metric is shown, of the others SR and OSR.
+        Of the first every metric is shown, of the others SR, SR-view and OSR.
     intervals : bool
         Whether the 95 % intervals stand below the scores.
     beside : sequence of PaperResult
@@ -56,7 +56,7 @@ def _result_table(
     setting: str, runs: Sequence[Run], profiles: Sequence[Profile], intervals: bool, beside: Sequence[PaperResult]
 ) -> Table:
     shown: list[tuple[Profile, tuple[Measure, ...]]] = [
-        (profile, _FURTHER if k else MEASURES) for k, profile in enumerate(profiles)
+        (profile, shown_measures(runs, profile, _FURTHER if k else METRICS)) for k, profile in enumerate(profiles)
     ]
     lines = []
     for run in runs:

@@ -14,14 +14,14 @@ import numpy as np
 from aerialdojo_gen.benchmark.figures import COLOURS, figure_of
 from aerialdojo_gen.benchmark.profiles import Profile
 from aerialdojo_gen.benchmark.runs import GROUP_OF, UPPER_BOUND, Run
-from aerialdojo_gen.benchmark.scores import METRICS, summarize
+from aerialdojo_gen.benchmark.scores import PAPER_METRICS, summarize
 from aerialdojo_gen.store.schemas import FAMILIES
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _NAMES = {"sr": "SR", "osr": "OSR", "spl": "SPL", "dts_m": "DTS", "cr": "CR"}
-_UNITS = {metric: "m" if metric == "dts_m" else "%" for metric in METRICS}
+_UNITS = {metric: "m" if metric == "dts_m" else "%" for metric in PAPER_METRICS}
 _INWARDS = ("dts_m", "cr")
 _RINGS = 4
 # An axis ends at one of these times a power of ten: all are divided into four without odd digits.
@@ -63,7 +63,7 @@ def metric_radars(runs: Sequence[Run], profile: Profile) -> Figure:
 
     def draw(figure: Figure) -> None:
         panels: Any = figure.subplots(2, 3, subplot_kw={"projection": "polar"}).ravel()
-        for m, (axes, metric) in enumerate(zip(panels, METRICS, strict=False)):
+        for m, (axes, metric) in enumerate(zip(panels, PAPER_METRICS, strict=False)):
             curves = [(k, run.label, values[n][:, m]) for n, (k, run) in enumerate(contenders(runs))]
             _chart(axes, angles, curves, [(metric, ends[m])] * len(angles), _FAMILIES)
             arrow = "↓" if metric in _INWARDS else "↑"
@@ -93,20 +93,20 @@ def family_radars(runs: Sequence[Run], profile: Profile) -> Figure:
         A family without episodes has an empty chart.
     """
     values, ends = _values(runs, profile)
-    angles = np.linspace(0.0, 2.0 * math.pi, len(METRICS), endpoint=False)
+    angles = np.linspace(0.0, 2.0 * math.pi, len(PAPER_METRICS), endpoint=False)
     tips = [
         f"{_NAMES[m]}\n{'0' if m in _INWARDS else f'{end:g}'} {_UNITS[m]}"
-        for m, end in zip(METRICS, ends, strict=True)
+        for m, end in zip(PAPER_METRICS, ends, strict=True)
     ]
     middle = ", ".join(
-        f"{_NAMES[m]} {end if m in _INWARDS else 0:g} {_UNITS[m]}" for m, end in zip(METRICS, ends, strict=True)
+        f"{_NAMES[m]} {end if m in _INWARDS else 0:g} {_UNITS[m]}" for m, end in zip(PAPER_METRICS, ends, strict=True)
     )
 
     def draw(figure: Figure) -> None:
         panels: Any = figure.subplots(2, 2, subplot_kw={"projection": "polar"}).ravel()
         for f, (axes, family) in enumerate(zip(panels, _FAMILIES, strict=True)):
             curves = [(k, run.label, values[n][f]) for n, (k, run) in enumerate(contenders(runs))]
-            _chart(axes, angles, curves, list(zip(METRICS, ends, strict=True)), tips)
+            _chart(axes, angles, curves, list(zip(PAPER_METRICS, ends, strict=True)), tips)
             axes.set_title(family, pad=36, size=10, weight="bold")
         handles, labels = panels[0].get_legend_handles_labels()
         figure.legend(
@@ -127,12 +127,12 @@ def _values(runs: Sequence[Run], profile: Profile) -> tuple[list[Any], list[floa
     for _, run in contenders(runs):
         families = summarize(run.episodes, profile).families
         rows = [
-            [math.nan if family not in families else getattr(families[family], m) for m in METRICS]
+            [math.nan if family not in families else getattr(families[family], m) for m in PAPER_METRICS]
             for family in _FAMILIES
         ]
-        found.append(np.array(rows) * [1.0 if m == "dts_m" else 100.0 for m in METRICS])
+        found.append(np.array(rows) * [1.0 if m == "dts_m" else 100.0 for m in PAPER_METRICS])
     largest = np.nanmax(np.stack(found), axis=(0, 1))
-    most = [math.inf if metric == "dts_m" else 100.0 for metric in METRICS]
+    most = [math.inf if metric == "dts_m" else 100.0 for metric in PAPER_METRICS]
     return found, [axis_end(float(value), limit) for value, limit in zip(largest, most, strict=True)]
 
 

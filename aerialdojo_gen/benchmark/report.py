@@ -21,7 +21,7 @@ from aerialdojo_gen.benchmark.paper_tables import in_setting
 from aerialdojo_gen.benchmark.radar import family_radars, metric_radars
 from aerialdojo_gen.benchmark.replay import Replay
 from aerialdojo_gen.benchmark.runs import Run
-from aerialdojo_gen.benchmark.tables import as_csv
+from aerialdojo_gen.benchmark.score_rows import as_csv, as_json
 from aerialdojo_gen.common.version import __version__
 from aerialdojo_gen.store.atomic import atomic_file
 
@@ -44,8 +44,8 @@ def write_report(out: Path, wanted: Wanted, replays: Sequence[Replay]) -> list[P
     Returns
     -------
     list of Path
-        ``report.html``, ``metrics.csv``, ``tables.md``, ``tables.tex``, and of ``families`` (a radar a metric),
-        ``radar`` (one a family) and ``radius`` a ``.png`` and a ``.svg``.
+        ``report.html``, ``metrics.csv``, ``metrics.json``, ``tables.md``, ``tables.tex``, and of ``families`` (a
+        radar a metric), ``radar`` (one a family) and ``radius`` a ``.png`` and a ``.svg``.
 
     Raises
     ------
@@ -61,9 +61,11 @@ def write_report(out: Path, wanted: Wanted, replays: Sequence[Replay]) -> list[P
         "radius": radius_curve(wanted.runs, wanted.profiles[0]),
     }
     figures = {(name, kind): encoded(f, kind) for name, f in drawn.items() for kind in ("png", "svg")}
+    scored = wanted.runs, wanted.profiles, wanted.beside, wanted.partings
     files = {
         "report.html": html(wanted, replays, {name: figures[name, "svg"] for name in drawn}, named).encode(),
-        "metrics.csv": as_csv(wanted.runs, wanted.profiles, wanted.beside).encode(),
+        "metrics.csv": as_csv(*scored).encode(),
+        "metrics.json": as_json(*scored).encode(),
         "tables.md": ("\n\n".join(map(as_markdown, tables)) + "\n").encode(),
         "tables.tex": ("\n\n".join(map(as_latex, tables)) + "\n").encode(),
         **{f"{name}.{kind}": data for (name, kind), data in figures.items()},
@@ -125,6 +127,7 @@ def html(wanted: Wanted, replays: Sequence[Replay], figures: dict[str, bytes], t
         folded=[table for name in _FOLDED for table in tables.get(name, [])],
         figures=[{"url": _svg_url(figures[name]), "caption": caption} for name, caption in captions.items()],
         replays=replays,
+        left_out=wanted.partings.left_out,
         style=style,
         script=script,
         style_hash=_hash(style),

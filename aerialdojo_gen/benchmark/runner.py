@@ -27,6 +27,7 @@ from aerialdojo_gen.benchmark.journals import Journals
 from aerialdojo_gen.benchmark.limits import Limits, Tally
 from aerialdojo_gen.benchmark.preflight import checked
 from aerialdojo_gen.benchmark.tasks import select
+from aerialdojo_gen.benchmark.viewpoints import viewpoints_content, without_viewpoints
 from aerialdojo_gen.benchmark.worker import Finished, Unit
 from aerialdojo_gen.benchmark.workers import fly_units
 from aerialdojo_gen.common.bounded import read_json
@@ -109,6 +110,8 @@ def evaluate(
         todo = run.todo(rerun_failed)
         if todo.num_rows:
             evaluation = checked(evaluation, limits, reporter)
+            if run.without_viewpoints:
+                reporter.line(without_viewpoints(run.without_viewpoints, len(rows["scene"].unique())))
         tally = Tally(limits, *run.spent())
         with reporter.bar(f"{evaluation.agent} ({evaluation.run})", todo.num_rows, "episodes") as bar:
 
@@ -159,6 +162,9 @@ class _Run:
             for scene in self._scenes
             for table in ("release/scenes", *(f"{kind}/{s}" for kind in ("tasks", "routes") for s in subsets))
         }
+        seen_from = {scene: viewpoints_content(data, scene) for scene in self._scenes}
+        self.without_viewpoints = [scene for scene, found in seen_from.items() if not found]
+        content |= {f"release/viewpoints/{scene}": found for scene, found in seen_from.items() if found}
         digest = hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
         own = {"data": digest, "code": flying_code(evaluation.agent)}
         self._settings = json.loads(json.dumps(evaluation.settings() | own))

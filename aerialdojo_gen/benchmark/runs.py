@@ -46,6 +46,8 @@ class Run:
         The root that `evaluate` wrote to, where its steps are.
     group : str
         Heading that tables set it under; empty for an agent like any other.
+    told : str
+        What the agent was told beside the goal; empty for nothing.
     """
 
     name: str
@@ -57,6 +59,7 @@ class Run:
     failed: int = 0
     log: DataRoot | None = None
     group: str = ""
+    told: str = ""
 
     def where(self, mask: Bools | NDArray[np.int64]) -> Run:
         """Return the run with the episodes that a mask selects, or with those at some indices in their order."""
@@ -100,18 +103,22 @@ def load_runs(data: Where, names: Sequence[str] = ()) -> list[Run]:
         if not table.num_rows:
             raise StoreError(f"run {name!r} has no finished episode: run aerialdojo-gen evaluate --run {name}")
     agents = [table["agent"][0].as_py() for table in tables.values()]
+    told = [table["told"][0].as_py() or "" for table in tables.values()]
+    # Who was told more is another contender.
+    called = [f"{agent} + {more}" if more else agent for agent, more in zip(agents, told, strict=True)]
     return [
         Run(
             name,
-            agent if agents.count(agent) == 1 else f"{agent} ({name})",
+            call if called.count(call) == 1 else f"{call} ({name})",
             agent,
             table["agent_options"][0].as_py(),
             table,
             episodes_of(table),
             read_run(root, name, "failures").num_rows,
             root,
+            told=more,
         )
-        for (name, table), agent in zip(tables.items(), agents, strict=True)
+        for (name, table), agent, more, call in zip(tables.items(), agents, told, called, strict=True)
     ]
 
 

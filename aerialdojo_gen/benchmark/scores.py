@@ -1,7 +1,7 @@
-"""The metrics SR, OSR, SPL, DTS and CR: outcomes averaged over scenes and families (paper, section on evaluation).
+"""The metrics SR, SR-view, OSR, SPL, DTS and CR: outcomes averaged over scenes and families.
 
-A scene has the mean of its episodes, a family that of its scenes, and the overall score is the mean of the
-families; ± is the standard deviation over scenes.
+After the paper's section on evaluation, SR-view apart. A scene has the mean of its episodes, a family that of its
+scenes, and the overall score is the mean of the families; ± is the standard deviation over scenes.
 """
 
 from __future__ import annotations
@@ -25,26 +25,37 @@ class Score:
     ----------
     episodes : int
         How many stand behind it.
-    sr, osr, spl, cr : float
-        Success rate, oracle success rate, success weighted by path length, collision rate: fractions in [0, 1].
+    sr, sr_view, osr, spl, cr : float
+        Success rate, success rate at any viewpoint with the target in sight (NaN where the log does not say), oracle
+        success rate, success weighted by path length, collision rate: fractions in [0, 1].
     dts_m : float
         Distance to the goal at the end of the episode, metres.
     """
 
     episodes: int
     sr: float
+    sr_view: float
     osr: float
     spl: float
     dts_m: float
     cr: float
 
 
-METRICS = ("sr", "osr", "spl", "dts_m", "cr")
+METRICS = ("sr", "sr_view", "osr", "spl", "dts_m", "cr")
+# The paper's own.
+PAPER_METRICS = tuple(metric for metric in METRICS if metric != "sr_view")
 
 
 def score(judged: Outcomes, mask: Bools | slice = slice(None)) -> Score:
     """Average outcomes over episodes; every value is NaN where there are none."""
-    columns = (judged.success, judged.oracle_success, judged.spl, judged.distance_m, judged.collision)
+    columns = (
+        judged.success,
+        judged.success_view,
+        judged.oracle_success,
+        judged.spl,
+        judged.distance_m,
+        judged.collision,
+    )
     chosen = [np.asarray(column[mask], dtype=np.float64) for column in columns]
     n = len(chosen[0])
     return Score(n, *(math.fsum(c) / n if n else math.nan for c in chosen))

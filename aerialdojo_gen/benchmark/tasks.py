@@ -13,12 +13,13 @@ import pyarrow as pa
 import pyarrow.compute as pc
 from numpy.typing import NDArray
 
-from aerialdojo_gen.agents.goal import Goal, Rules
+from aerialdojo_gen.agents.goal import TELLABLE, Goal, Heading, Rules
 from aerialdojo_gen.benchmark.motion import Point
 from aerialdojo_gen.common import rng
 from aerialdojo_gen.common.names import unknown
 from aerialdojo_gen.common.pictures import decode_rgb
 from aerialdojo_gen.errors import StoreError, UsageError
+from aerialdojo_gen.geometry.frames import compass_heading
 from aerialdojo_gen.release.contents import scenes_in_release
 from aerialdojo_gen.scenes.stored import mesh_copy
 from aerialdojo_gen.store import shards as store
@@ -26,7 +27,13 @@ from aerialdojo_gen.store.root import DataRoot, Where, open_root
 from aerialdojo_gen.store.schemas import SETTINGS, SUBSETS, TASKS
 
 MODALITIES = ("semantic", "image")
-_FACTS = ("nav_id", "goal_x_m", "goal_y_m", "goal_z_m", "euclidean_m", "length_m")
+# What an episode needs of a task: releases of other versions have these, whatever else stands in their tables.
+_COLUMNS = (
+    "task_id", "nav_id", "scene", "family", "scene_type", "partition", "subset", "setting", "modality",
+    "action_budget", "start_x_m", "start_y_m", "start_z_m", "start_yaw_rad", "target_name", "landmark", "direction",
+    "description", "reference_image_id",
+)  # fmt: skip
+_FACTS = ("nav_id", "goal_x_m", "goal_y_m", "goal_z_m", "euclidean_m", "length_m", "target_object_id")
 
 
 @dataclass(frozen=True)
@@ -78,12 +85,15 @@ class Task:
         Position of the goal anchor, metres, world frame.
     euclidean_m, length_m : float
         Straight distance from start to goal, and length of the reference trajectory.
+    target_id : int
+        ``object_id`` of the target.
     """
 
     row: dict[str, Any]
     goal: Point
     euclidean_m: float
     length_m: float
+    target_id: int
 
     @property
     def start(self) -> tuple[float, float, float, float]:
@@ -104,7 +114,8 @@ def select(data: Where, selection: Selection) -> pa.Table:
     Returns
     -------
     pyarrow.Table
-        Rows of `tasks` with a column ``split``, sorted by scene, navigation task and modality.
+        Rows of `tasks`, the columns that an episode needs, with a column ``split``, sorted by scene, navigation task
+        and modality.
 
     Raises
     ------
@@ -120,7 +131,7 @@ def select(data: Where, selection: Selection) -> pa.Table:
             split = f"{store.partition(scene)}_{subset}"
             if split not in (selection.splits or SUBSETS):
                 continue
-            table = store.read_scene(root, f"tasks/{subset}", scene)
+            table = store.read_scene(root, f"tasks/{subset}", scene, _COLUMNS)
             for column, chosen in (("setting", selection.settings), ("modality", selection.modalities)):
                 if chosen:
                     table = table.filter(pc.is_in(table[column], pa.array(chosen, pa.string())))
@@ -171,8 +182,8 @@ def read_tasks(data: Where, rows: pa.Table) -> list[Task]:
         fact = _facts(root, row["scene"], row["subset"]).get(row["nav_id"])
         if fact is None:
             raise StoreError(f"task {row['task_id']} has no route in {root}/release: run aerialdojo-gen split again")
-        *goal, euclidean_m, length_m = fact
-        tasks.append(Task(row, (goal[0], goal[1], goal[2]), euclidean_m, length_m))
+        *goal, euclidean_m, length_m, target_id = fact
+        tasks.append(Task(row, (goal[0], goal[1], goal[2]), euclidean_m, length_m, int(target_id)))
     return tasks
 
 
@@ -182,22 +193,52 @@ def _facts(root: DataRoot, scene: str, subset: str) -> dict[str, tuple[float, ..
     return dict(zip(columns["nav_id"], zip(*(columns[name] for name in _FACTS[1:]), strict=True), strict=True))
 
 
-def reference_actions(root: DataRoot, scene: str, subsets: Sequence[str]) -> dict[str, list[int]]:
-    """Read the reference trajectories' actions, by navigation task: for the oracle alone."""
-    return {
-        row["nav_id"]: row["action"]
-        for subset in subsets
-        for row in store.read_scene(root, f"routes/{subset}", scene, ("nav_id", "action")).to_pylist()
-    }
+def reference_actions(
+    root: DataRoot, scene: str, subsets: Sequence[str], column: str = "action"
+) -> dict[str, list[int]]:
+    """Read the reference trajectories' actions, by navigation task: for the oracle alone.
+
+    Parameters
+    ----------
+    root : DataRoot
+    scene : str
+    subsets : sequence of str
+        train, test.
+    column : str
+        Of `routes`: ``action``, or ``agent_action``, which an older release lacks.
+
+    Raises
+    ------
+    StoreError
+        The routes have no such column.
+    """
+    found: dict[str, list[int]] = {}
+    for subset in subsets:
+        routes = store.read_stored(root, f"routes/{subset}", scene, ("nav_id", column))
+        if column not in routes.column_names:
+            raise StoreError(
+                f"the routes of {scene} in {root}/release have no {column}: they were made by an older version"
+            )
+        found |= zip(routes["nav_id"].to_pylist(), (row or [] for row in routes[column].to_pylist()), strict=True)
+    return found
 
 
-def goal_of(root: DataRoot, task: Task, rules: Rules) -> Goal:
-    """Make what the agent is told of a task."""
+def check_tell(tell: Sequence[str]) -> tuple[str, ...]:
+    """Return what is to be told beside the goal, in its one order; UsageError for what nobody tells."""
+    for name in tell:
+        if name not in TELLABLE:
+            raise UsageError(unknown("nothing to tell called", name, TELLABLE))
+    return tuple(name for name in TELLABLE if name in tell)
+
+
+def goal_of(root: DataRoot, task: Task, rules: Rules, tell: Sequence[str] = ()) -> Goal:
+    """Make what the agent is told of a task; `tell` names what is told beside the goal."""
     row = task.row
     image_id = row["reference_image_id"]
     image = None if image_id is None else reference_image(root, row["scene"], image_id)
     words = (row["modality"], row["target_name"], row["landmark"], row["direction"], row["description"])
-    return Goal(*words, image, rules)
+    heading = Heading(*compass_heading(row["start_yaw_rad"])) if "heading" in tell else None
+    return Goal(*words, image, rules, heading)
 
 
 @lru_cache(maxsize=256)

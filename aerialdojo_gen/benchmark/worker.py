@@ -157,7 +157,8 @@ class Worker:
         actions: dict[str, list[int]] = {}
         # The oracle alone, by its very class: no agent of another name can ask for it.
         if type(self._agent) is OracleAgent:
-            actions = reference_actions(self._data, unit.scene, unit.rows["subset"].unique().to_pylist())
+            subsets = unit.rows["subset"].unique().to_pylist()
+            actions = reference_actions(self._data, unit.scene, subsets, self._agent.column)
         with Journal(unit.journal) as journal:
             left = unit.rows.filter(pc.invert(pc.is_in(unit.rows["task_id"], pa.array(journal.done, pa.string()))))
             for task in read_tasks(self._data, left):
@@ -257,6 +258,8 @@ class Worker:
     def _row(self, task: Task) -> dict[str, Any]:
         row, episode = task.row, self._flight.episode
         radius_m = self._flight.success_radius_m
+        view = self._flight.view()
+        near = view is not None and view.viewpoint_distance_m <= radius_m and view.target_in_sight
         told = ("task_id", "nav_id", "scene", "family", "scene_type", "partition", "subset", "split", "setting",
                 "modality", "action_budget", "start_x_m", "start_y_m", "start_z_m", "start_yaw_rad")  # fmt: skip
         return {
@@ -277,4 +280,7 @@ class Worker:
             "n_actions": episode.n_actions,
             "n_refused": episode.n_refused,
             "n_invalid": episode.n_invalid,
+            "success_view": None if view is None else episode.termination == "stop" and near,
+            "viewpoint_distance_m": None if view is None else view.viewpoint_distance_m,
+            "target_in_sight": None if view is None else view.target_in_sight,
         }

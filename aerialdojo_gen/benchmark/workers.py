@@ -43,7 +43,8 @@ def worker(data: DataRoot, evaluation: Evaluation, link: Link) -> Iterator[Worke
         agent.pace = Pace(evaluation.requests_per_minute, link).wait
     wanted: Any = getattr(agent, "sensors", None)
     sensors = evaluation.sensors or (wanted if isinstance(wanted, Sensors) else Sensors())
-    flight = Flight(data, sensors, embodiment=evaluation.embodiment, renderer=evaluation.renderer)
+    body, renderer, tell = evaluation.embodiment, evaluation.renderer, evaluation.tell
+    flight = Flight(data, sensors, embodiment=body, renderer=renderer, tell=tell)
     secrets = Secrets(evaluation.options)
     try:
         yield Worker(agent, flight, data, evaluation.identity(), evaluation.conditions, secrets)

@@ -70,6 +70,10 @@ def evaluate(
         int | None, typer.Option("--height", min=1, max=4096, help="Rows; in place of the agent's own.")
     ] = None,
     renderer: Annotated[str, typer.Option("--renderer", help="auto, gl or pybullet.")] = "auto",
+    tell: Annotated[
+        list[str] | None,
+        typer.Option("--tell", help="Tell agents more than the goal: heading, which way they face at the start."),
+    ] = None,
     out: Annotated[
         str | None,
         typer.Option("--out", metavar="DIR|URL", help="Where the log goes.  (default: the data directory)"),
@@ -133,6 +137,7 @@ def evaluate(
         renderer,
         Conditions(attempts, tolerate=tolerate),
         requests_per_minute,
+        tell=tuple(tell or ()),
     )
     if estimate:
         from aerialdojo_gen.benchmark.estimate import estimate as reckon

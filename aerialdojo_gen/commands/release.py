@@ -43,13 +43,16 @@ def stats(
         print("\n".join(pool_lines([pool_of(root, name) for name in scenes], terminal_width())))
         return
 
+    from aerialdojo_gen.release.provenance import made_of_scenes
     from aerialdojo_gen.stats.comparison import Comparison, Listing, as_csv, as_markdown
-    from aerialdojo_gen.stats.tables import benchmark_table, in_paper_order, made_of, tables
+    from aerialdojo_gen.stats.difficulty import difficulty_tables, read_tasks
+    from aerialdojo_gen.stats.tables import benchmark_table, tables
     from aerialdojo_gen.store.atomic import atomic_file
 
     names = check_release(root, scenes_in_release(root, scene) if scene else None)
-    made = in_paper_order([made_of(root, name) for name in names])
-    compared: list[Comparison | Listing] = [*tables(made), benchmark_table(made)]
+    made = made_of_scenes(root, names)
+    tasks = read_tasks(root, [m.scene for m in made])
+    compared: list[Comparison | Listing] = [*tables(made), *difficulty_tables(tasks), benchmark_table(made)]
     for path, text in ((markdown, as_markdown(compared)), (csv, as_csv(compared))):
         if path:
             with atomic_file(path.parent, path.name) as temporary:

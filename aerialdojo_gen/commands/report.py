@@ -51,7 +51,7 @@ def report(
     table: Annotated[
         list[str] | None,
         typer.Option("--table", help="Print these tables, repeatable: overall, results, partition, family, averages, "
-                                     "setting, goal, modality, radius, visits, difficulty, conduct, type, "
+                                     "setting, goal, modality, radius, visits, difficulty, seen, conduct, type, "
                                      "scene, all."),
     ] = None,
     radius: Annotated[
@@ -75,7 +75,7 @@ def report(
         bool, typer.Option("--floors/--no-floors", help="Add stop, constant, random where they flew the same tasks.")
     ] = True,
     style: Annotated[
-        Literal["terminal", "markdown", "latex", "csv"], typer.Option("--format", help="What is printed.")
+        Literal["terminal", "markdown", "latex", "csv", "json"], typer.Option("--format", help="What is printed.")
     ] = "terminal",
     by_scene: Annotated[bool, typer.Option("--by-scene", help="Print the table of scenes too.")] = False,
     out: Annotated[
@@ -84,8 +84,8 @@ def report(
     replays: Annotated[int, typer.Option("--replays", min=0, max=50, help="Tasks that report.html replays.")] = 4,
     frames: Annotated[bool, typer.Option("--frames", help="Render front pictures along the replays.")] = False,
 ) -> None:  # fmt: skip
-    """Score runs of evaluate: SR, OSR, SPL, DTS, CR as tables, figures, a page."""
-    from aerialdojo_gen.benchmark import contents, tables
+    """Score runs of evaluate: SR, SR-view, OSR, SPL, DTS, CR as tables, figures, a page."""
+    from aerialdojo_gen.benchmark import contents, score_rows
     from aerialdojo_gen.benchmark.floors import arranged, with_floors
     from aerialdojo_gen.benchmark.paired import paired_tables
     from aerialdojo_gen.benchmark.profiles import DEFAULT_PROFILES, profile_named
@@ -101,15 +101,18 @@ def report(
     wanted = contents.Wanted(
         root, loaded, rules, tuple(radius or DEFAULT_RADII_M), intervals, results() if beside else ()
     )
-    if style == "csv":
+    if style in ("csv", "json"):
         further = [at_radius(rules[0], r) for r in radius or () if r not in {rule.radius_m for rule in rules}]
-        print(tables.as_csv(loaded, [*rules, *further], wanted.beside), end="")
+        write = score_rows.as_csv if style == "csv" else score_rows.as_json
+        print(write(loaded, [*rules, *further], wanted.beside, wanted.partings), end="")
     elif paired and table is None:
         _show(paired_tables(named, rules), style)
     else:
         names = list(table or contents.DEFAULT) + (["scene"] if by_scene else [])
         chosen = contents.report_tables(wanted, names)
         _show([*chosen, *(paired_tables(named, rules) if paired else [])], style)
+        if lacking := contents.left_out(wanted, names):
+            typer.echo(lacking, err=True)
     if out is not None:
         from aerialdojo_gen.benchmark import replay
         from aerialdojo_gen.benchmark.report import write_report

@@ -19,6 +19,8 @@ SETTINGS = ("base", "standard", "long_horizon")
 SUBSETS = ("id_train", "id_test", "ood_train", "ood_test")
 DIRECTIONS = ("east", "northeast", "north", "northwest", "west", "southwest", "south", "southeast")
 VIEWS = ("front", "left", "right", "down")
+# From here on obstacles cost a route something: its `plan_detour`, length over the shortest without obstacles.
+DETOUR = 1.05
 # What ends an episode (benchmark): an agent's Stop, a collision, or the last action of the budget.
 TERMINATIONS = ("stop", "collision", "budget")
 FAMILIES = {"U": "Urban", "N": "Natural", "I": "Infrastructure", "D": "Disaster"}

@@ -139,6 +139,9 @@ class PairObjectsConfig(Section):
     min_euclidean_m: float = Field(3.0, ge=0, description="d_E at or below which no task is kept")
     max_length_m: float = Field(100.0, gt=0, le=10_000, description="L at or above which no task is kept")
     max_approach_m: float = Field(1.0, ge=0, le=100, description="longest straight Approach at the end of a route")
+    surface_points: int = Field(
+        64, ge=1, le=100_000, description="points of a target's surface that are looked for from the starts"
+    )
 
 
 class Rung(Section):
@@ -208,6 +211,12 @@ class FilterConfig(Section):
 
     min_euclidean_m: float = Field(3.0, ge=0, description="kept: d_E greater than this")
     min_detour_ratio: float = Field(1.05, ge=1, description="kept: κ at least this")
+    min_plan_detour: float = Field(
+        1.0, ge=1, le=1000, description="kept: L at least this times the shortest L without obstacles"
+    )
+    max_visible_at_start: float = Field(
+        1.0, ge=0, le=1, description="kept: at most this share of the target in view at the start"
+    )
     base: Setting = Setting(min_length_m=5, max_length_m=30, action_budget=90)
     standard: Setting = Setting(min_length_m=30, max_length_m=60, action_budget=180)
     long_horizon: Setting = Setting(min_length_m=60, max_length_m=100, action_budget=300)
@@ -230,6 +239,9 @@ class SplitConfig(Section):
 
     id_train_fraction: float = Field(0.8, ge=0, le=1, description="share of the tasks of ID scenes that train")
     ood_train_fraction: float = Field(0.2, ge=0, le=1, description="share of the tasks of OOD scenes that train")
+    held_out_fraction: float = Field(
+        0.2, ge=0, le=1, description="share of each scene's objects that the split by objects holds out"
+    )
     salt: str | None = Field(
         None, min_length=16, max_length=256,
         description="what ids of tasks and pictures are hashed with; made from the seed where absent",
@@ -239,6 +251,10 @@ class SplitConfig(Section):
         description="release the paper's numbers of tasks, of train and test, and, as near as the kept candidates "
         "allow, its metres of route",
     )
+    prefer_harder: float = Field(
+        0.0, ge=0, le=100,
+        description="how much harder candidates are preferred where paper_counts leaves a choice; 0 is not at all",
+    )  # fmt: skip
 
 
 class RenderConfig(Section):

@@ -19,7 +19,7 @@ import pyarrow as pa
 from aerialdojo_gen.exchange.frames import world_to_habitat, yaw_to_habitat_quaternion_xyzw
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.root import DataRoot
-from aerialdojo_gen.store.schemas import ACTION_NAMES, SUBSETS
+from aerialdojo_gen.store.schemas import ACTION_NAMES, SUBSETS, TOLD_OF_DIFFICULTY, TOLD_OF_SPLITS
 
 LOST: Mapping[str, Sequence[str]] = {
     "tasks": [
@@ -28,8 +28,9 @@ LOST: Mapping[str, Sequence[str]] = {
         "reference_image_id",
         "landmark",
         "direction",
+        *TOLD_OF_SPLITS,
     ],
-    "routes": ["min_clearance_m", "goal_yaw_rad"],
+    "routes": ["min_clearance_m", "goal_yaw_rad", *TOLD_OF_DIFFICULTY],
     "objects": [
         "description",
         "mesh_node",

@@ -44,6 +44,25 @@ def compass_direction(dx_m: float, dy_m: float) -> str:
     return DIRECTIONS[sector % 8]
 
 
+def compass_heading(yaw_rad: float) -> tuple[str, int]:
+    """Say a yaw as a compass shows it.
+
+    Parameters
+    ----------
+    yaw_rad : float
+        Radians, counter-clockwise from +x (east).
+
+    Returns
+    -------
+    direction : str
+        The nearest of `aerialdojo_gen.common.terms.DIRECTIONS`, of the degrees as they are said.
+    heading_deg : int
+        Clockwise from north (+y), whole degrees, 0 to 359.
+    """
+    heading = round(90.0 - math.degrees(yaw_rad)) % 360
+    return DIRECTIONS[math.floor((90.0 - heading + 22.5) / 45.0) % 8], heading
+
+
 def enu_to_ned(xyz_m: ArrayLike) -> Floats:
     """Turn world positions into NED.
 

@@ -100,10 +100,19 @@ class TriangleRayCaster:
         """
         o, p = np.broadcast_arrays(np.asarray(origins, dtype=np.float64), np.asarray(points, dtype=np.float64))
         o, p = np.atleast_2d(o), np.atleast_2d(p)
-        length = np.linalg.norm(p - o, axis=1)
+        way = p - o
+        length = np.linalg.norm(way, axis=1)
         free = np.ones(len(p), dtype=np.bool_)
-        far = length > tolerance_m
-        free[far] = self.first_hit(o[far], (p - o)[far])[0] >= length[far] - tolerance_m
+        far = np.flatnonzero(length > tolerance_m)
+        if len(far):
+            # Any hit will do, and Embree need not find the first one: twice as fast as `first_hit`.
+            hit = self._scene.run(
+                np.ascontiguousarray(o[far] - self._centre, dtype=np.float32),
+                np.ascontiguousarray(way[far] / length[far, None], dtype=np.float32),
+                dists=np.ascontiguousarray(length[far] - tolerance_m, dtype=np.float32),
+                query="OCCLUDED",
+            )
+            free[far] = np.asarray(hit) < 0
         return free
 
 

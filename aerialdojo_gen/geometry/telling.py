@@ -81,11 +81,14 @@ class Patch:
         Unit vectors; the side that they point to has no meaning.
     lit : (m, 2) bool
         Whether the sun reaches the side that the normal points to, and the other one.
+    area_m2 : float
+        Of the part's faces, each counted from one side.
     """
 
     points: Floats
     normals: Floats
     lit: NDArray[np.bool_]
+    area_m2: float
 
     @classmethod
     def of(cls, triangles: Floats, n: int, rng: np.random.Generator, scene: RayCaster, sun: ArrayLike) -> Patch:
@@ -117,7 +120,8 @@ class Patch:
         facing = normals @ towards
         start = points + normals * np.where(facing > 0.0, _OFF_SURFACE_M, -_OFF_SURFACE_M)[:, None]
         reached = np.isinf(scene.first_hit(start, np.broadcast_to(towards, start.shape))[0])
-        return cls(points, normals, np.column_stack([reached & (facing > 0.0), reached & (facing < 0.0)]))
+        lit = np.column_stack([reached & (facing > 0.0), reached & (facing < 0.0)])
+        return cls(points, normals, lit, float(area.sum()) / 2.0)
 
 
 def seen_share(

@@ -81,9 +81,11 @@ def system_prompt(goal: Goal, sight: Sight, actions: ActionSet = SIXTEEN, form: 
     str
     """
     rules = goal.rules
+    told = ", but you are told which way the drone faces at the start" if goal.heading is not None else ""
     return f"""\
 You pilot a small drone that searches for one target object in a large outdoor scene. You know the scene only from \
-the drone's cameras; there is no map, no GPS and no compass. Find the target, fly up to it, and stop in front of it.
+the drone's cameras; there is no map, no GPS and no compass{told}. Find the target, fly up to it, and stop in front \
+of it.
 
 BODY
 The drone is a quadrotor with a wheelbase of {rules.wheelbase_m:g} m. It collides with whatever comes within \
@@ -143,6 +145,11 @@ def _form(actions: ActionSet, form: str) -> str:
 def goal_text(goal: Goal) -> str:
     """Write what is to be found; for an image goal its picture follows."""
     where = f"TARGET: {goal.target_name}. It lies {goal.direction} of the landmark nearest to it: {goal.landmark}."
+    if goal.heading is not None:
+        where += (
+            f"\nAt the start the drone faces {goal.heading.direction}: a compass would show "
+            f"{goal.heading.heading_deg}° (0° is north, 90° east). Turning right adds, turning left takes away."
+        )
     if goal.image is not None:
         return f"{where}\nThis picture shows the target from the viewpoint in front of it:"
     return f"{where}\nDescription: {goal.description}"

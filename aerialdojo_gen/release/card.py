@@ -6,14 +6,18 @@ from pathlib import Path
 from typing import Any
 
 import jinja2
+import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
 from aerialdojo_gen.common.paper import inventory
+from aerialdojo_gen.common.terms import DETOUR
 from aerialdojo_gen.common.version import __version__
 from aerialdojo_gen.release.contents import TABLES, check_release, counts, meaning, sizes, unit
 from aerialdojo_gen.release.croissant import CITE_AS
-from aerialdojo_gen.stats.tables import Made, in_paper_order, made_of
+from aerialdojo_gen.release.provenance import made_of_scenes, makers
+from aerialdojo_gen.stats.difficulty import Tasks, held_out_table, read_tasks, scene_table, seen_table, setting_table
+from aerialdojo_gen.stats.tables import Made
 from aerialdojo_gen.store import schemas
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.root import DataRoot, Where, open_root
@@ -33,11 +37,10 @@ def _hf_type(field: pa.Field) -> str:
 
 def _scene_rows(root: DataRoot, made: list[Made]) -> list[dict[str, Any]]:
     rows = [store.read_scene(root, "release/scenes", m.scene).to_pylist()[0] for m in made]
-    paper = inventory()
     return [
         row
         | {"landmarks": m.landmarks, "objects": m.objects, "tasks": m.instances, "km": m.path_m / 1000}
-        | {"paper_km": paper[m.scene].path_m / 1000 if m.scene in paper else None}
+        | {"paper_km": m.paper.path_m / 1000 if m.paper else None}
         for row, m in zip(rows, made, strict=True)
     ]
 
@@ -63,6 +66,28 @@ def _example(root: DataRoot, scenes: list[str]) -> dict[str, Any] | None:
     return None
 
 
+def _of_paper(made: Made) -> bool:
+    """Whether a scene has the paper's numbers of everything."""
+    paper = made.paper
+    return paper is not None and (
+        (made.landmarks, made.objects) == (paper.landmarks, paper.objects)
+        and all(made.of(setting) == paper.tasks[setting] for setting in schemas.SETTINGS)
+    )
+
+
+def _difficulty(tasks: Tasks) -> dict[str, str]:
+    """Tables of difficulty and splits as Markdown, without their headings; none where the release does not tell."""
+    if not tasks.told or not (tasks.target_split != "").any():
+        return {}
+    tables = {
+        "setting": setting_table(tasks),
+        "scene": scene_table(tasks),
+        "seen": seen_table(tasks),
+        "held_out": held_out_table(tasks),
+    }
+    return {name: "\n".join(table.markdown()[2:]).rstrip() for name, table in tables.items()}
+
+
 def render_card(data: Where) -> str:
     """Write the card's text from what the release holds.
 
@@ -79,12 +104,14 @@ def render_card(data: Where) -> str:
     root = open_root(data)
     names = check_release(root)
     found = counts(root, names)
-    made = in_paper_order([made_of(root, name) for name in names])
+    made = made_of_scenes(root, names)
     names = [m.scene for m in made]
     objects = [store.read_scene(root, "release/objects", name, ["category"]) for name in names]
     by_setting = _by_setting(made, list(found["tasks"]))
     n_tasks = sum(found["tasks"].values())
     scenes = _scene_rows(root, made)
+    tasks, known = read_tasks(root, names), makers(root)
+    own = set(names) == set(inventory())
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("aerialdojo_gen.release"),
         undefined=jinja2.StrictUndefined,
@@ -109,7 +136,14 @@ def render_card(data: Where) -> str:
         first_split=next((split for split, n in found["tasks"].items() if n), "id_train"),
         example=_example(root, names),
         actions=schemas.ACTION_NAMES,
-        of_paper=set(names) == set(inventory()),
+        of_paper=all(map(_of_paper, made)) and own,
+        own_scenes=own,
+        made_by=sorted({maker.name for maker in known.values()} - {""}),
+        prefers_harder=any(maker.prefer_harder for maker in known.values()),
+        tables_of=_difficulty(tasks),
+        least_detour=float(np.min(tasks.plan_detour)) if len(tasks) else None,
+        most_visible=float(np.max(tasks.target_visible_at_start)) if len(tasks) else None,
+        detour=DETOUR,
         citation=CITE_AS.replace(", title", ",\n  title")
         .replace(", author", ",\n  author")
         .replace(", year", ",\n  year"),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Sequence
 
 # 48 bits: two of the paper's 102,866 tasks share an id once in 50,000 salts, and split says so.
 _DIGEST_BYTES = 6
@@ -41,6 +42,29 @@ def nav_id(scene: str, pair_id: str, key: bytes) -> str:
 def reference_id(scene: str, object_id: int, key: bytes) -> str:
     """Name an object's picture without giving the object away: ``ref_`` and 12 hexadecimal digits."""
     return "ref_" + _hex(f"{scene}/{object_id}", key, b"reference")
+
+
+def held_out(scene: str, object_ids: Sequence[int], fraction: float, key: bytes) -> set[int]:
+    """Choose the objects of a scene that the split by objects holds out.
+
+    Parameters
+    ----------
+    scene : str
+        Name of the scene.
+    object_ids : sequence of int
+        All of its objects, in any order.
+    fraction : float
+        Share of them, rounded half up to a whole number.
+    key : bytes
+        Of `key_of`.
+
+    Returns
+    -------
+    set of int
+        Those whose keyed hash comes first.
+    """
+    place = sorted(object_ids, key=lambda k: (_hex(f"{scene}/{k}", key, b"held out"), k))
+    return set(place[: int(fraction * len(place) + 0.5)])
 
 
 def _hex(text: str, key: bytes, kind: bytes) -> str:

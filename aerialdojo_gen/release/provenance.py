@@ -5,11 +5,12 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 from aerialdojo_gen.config.pipeline import Pipeline
 from aerialdojo_gen.errors import StoreError, UsageError
 from aerialdojo_gen.release.contents import scenes_there
+from aerialdojo_gen.stats.tables import Made, in_paper_order, made_of
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.root import DataRoot, Where, open_root
 
@@ -28,10 +29,16 @@ class Maker:
         The pipeline's name; empty where the release does not say.
     sha256 : str
         Of its settings, hexadecimal.
+    paper_counts : bool
+        Whether it means to release the paper's numbers; an older release does not say, and is held to them.
+    prefer_harder : float
+        How much it prefers harder candidates where the paper's numbers leave a choice.
     """
 
     name: str = ""
     sha256: str = ""
+    paper_counts: bool = field(default=True, compare=False)
+    prefer_harder: float = field(default=0.0, compare=False)
 
     def __str__(self) -> str:
         """In words, for messages."""
@@ -42,7 +49,8 @@ def maker_of(pipeline: Pipeline) -> Maker:
     """Return what a release remembers of a pipeline."""
     settings = pipeline.model_dump(mode="json", exclude=_BESIDE)
     settings["anchor_sample"].pop("clip")  # where the model's files lie
-    return Maker(pipeline.name, hashlib.sha256(json.dumps(settings, sort_keys=True).encode()).hexdigest())
+    digest = hashlib.sha256(json.dumps(settings, sort_keys=True).encode()).hexdigest()
+    return Maker(pipeline.name, digest, pipeline.split.paper_counts, pipeline.split.prefer_harder)
 
 
 def makers(data: Where) -> dict[str, Maker]:
@@ -51,12 +59,28 @@ def makers(data: Where) -> dict[str, Maker]:
     known: dict[str, Maker] = {}
     try:
         for entry in json.loads(root.local_copy(RECORD).read_text(encoding="utf-8"))["pipelines"]:
-            known |= dict.fromkeys(entry["scenes"], Maker(str(entry["name"]), str(entry["sha256"])))
+            told = (entry.get("paper_counts", True) is not False, float(entry.get("prefer_harder", 0.0)))
+            maker = Maker(str(entry["name"]), str(entry["sha256"]), *told)
+            known |= dict.fromkeys(entry["scenes"], maker)
     except FileNotFoundError:
         pass
     except (OSError, ValueError, KeyError, TypeError, RecursionError):
         known = {}  # damaged: as if nothing were known, which is the cautious side
     return {scene: known.get(scene, Maker()) for scene in scenes_there(root)}
+
+
+def made_of_scenes(data: Where, scenes: Sequence[str]) -> list[Made]:
+    """Read what a release holds of scenes, in the paper's order, beside the paper's figures where it follows them.
+
+    Raises
+    ------
+    StoreError
+        A part of a scene is missing or damaged.
+    """
+    root = open_root(data)
+    follow = {scene for scene, maker in makers(root).items() if maker.paper_counts}
+    found = (made_of(root, scene) for scene in scenes)
+    return in_paper_order([made if made.scene in follow else replace(made, paper=None) for made in found])
 
 
 def record_makers(data: Where, pipeline: Pipeline, scenes: Sequence[str]) -> None:
@@ -65,7 +89,13 @@ def record_makers(data: Where, pipeline: Pipeline, scenes: Sequence[str]) -> Non
     found = makers(root)
     found |= {scene: maker_of(pipeline) for scene in scenes if scene in found}
     entries = [
-        {"name": maker.name, "sha256": maker.sha256, "scenes": sorted(s for s in found if found[s] == maker)}
+        {
+            "name": maker.name,
+            "sha256": maker.sha256,
+            "paper_counts": maker.paper_counts,
+            "prefer_harder": maker.prefer_harder,
+            "scenes": sorted(s for s in found if found[s] == maker),
+        }
         for maker in sorted(set(found.values()) - {Maker()}, key=lambda maker: (maker.name, maker.sha256))
     ]
     with root.commit(RECORD) as path:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from aerialdojo_gen.common.paper import PaperScene
 from aerialdojo_gen.common.rng import rank
+from aerialdojo_gen.common.terms import DETOUR
 from aerialdojo_gen.store.layout import partition
 
 Floats = NDArray[np.float64]
@@ -70,6 +71,24 @@ def train_quotas(
     return {s: apportion(total, {row.scene: row.tasks[s] for row in alike})[scene] for s, total in totals.items()}
 
 
+def difficulty_steps(plan_detour: Floats, visible_at_start: Floats) -> NDArray[np.int64]:
+    """Count what makes tasks hard: a way round obstacles, and a target that the start does not see.
+
+    Parameters
+    ----------
+    plan_detour : (n,) float64
+        Length over the shortest without obstacles; NaN where it is not known.
+    visible_at_start : (n,) float64
+        Share of the target that the start sees; NaN where it is not known.
+
+    Returns
+    -------
+    (n,) int64
+        0 to 2: one for a detour of `DETOUR` or more, one for a target of which nothing is seen.
+    """
+    return (plan_detour >= DETOUR).astype(np.int64) + (visible_at_start == 0.0)
+
+
 def choose(
     lots: Sequence[str],
     settings: Sequence[str],
@@ -77,12 +96,16 @@ def choose(
     wanted: Mapping[str, int],
     path_m: float,
     seed: int,
+    steps: NDArray[np.int64] | None = None,
+    preference: float = 0.0,
 ) -> NDArray[np.bool_]:
-    """Choose so many tasks of each setting that their lengths sum to a given total.
+    """Choose so many tasks of each setting that their lengths sum to a given total, the harder ones first.
 
-    Every task draws a number from its own lot; the largest are taken, after the numbers have been tilted towards
-    short or long routes by as little as the total needs (weighted sampling without replacement with weights
-    exp(tilt · L), by Gumbel's trick). A task's chance hangs on its lot and its length alone, never on its row.
+    Every task draws a number from its own lot; the largest are taken, after `preference` has been added for each step
+    of difficulty, and after the numbers have been tilted towards short or long routes by as little as the total needs
+    (weighted sampling without replacement with weights exp(preference · steps + tilt · L), by Gumbel's trick). The
+    numbers of the settings hold whatever is preferred, and so does the total where any choice has it: the tilt knows
+    no bound. A task's chance hangs on its lot, its length and its steps alone, never on its row.
 
     Parameters
     ----------
@@ -96,6 +119,10 @@ def choose(
         Wanted sum of the lengths, metres. Where no choice reaches it, the nearest is made.
     seed : int
         Of the pipeline.
+    steps : (n,) int64, optional
+        How hard they are, as `difficulty_steps` counts; not asked for where absent.
+    preference : float
+        The odds of being chosen grow by e to this with each step.
 
     Returns
     -------
@@ -103,6 +130,8 @@ def choose(
         True for the chosen.
     """
     luck = np.array([_gumbel(seed, lot) for lot in lots])
+    if steps is not None:
+        luck = luck + preference * steps
     # Ties are broken by the lot, so that the order of rows decides nothing.
     place = np.argsort(np.argsort(np.asarray(lots)))
     groups = [(np.flatnonzero(np.asarray(settings) == s), n) for s, n in sorted(wanted.items())]

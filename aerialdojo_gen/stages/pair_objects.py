@@ -20,7 +20,7 @@ def run(job: Job, config: PairObjectsConfig) -> Output:
 STAGE = Stage(
     "pair-objects",
     "Pair start anchors with targets: the candidate tasks.",
-    reads=("objects", "anchors"),
+    reads=("scenes", "objects", "anchors"),
     writes=("pairs",),
     run=run,
 )

@@ -63,12 +63,15 @@ class Comparison:
         Heading of the rows' names.
     columns : tuple of Column
     rows : tuple of Row
+    notes : tuple of str
+        What must be known to read it.
     """
 
     title: str
     key: str
     columns: tuple[Column, ...]
     rows: tuple[Row, ...]
+    notes: tuple[str, ...] = ()
 
     @property
     def unlike(self) -> int:
@@ -128,10 +131,10 @@ class Comparison:
 
     def _verdict(self) -> list[str]:
         if not self.compared:
-            return []
+            return [*self.notes]
         if not self.unlike:
-            return [f"All {self.compared:,} counts are the paper's."]
-        return [f"{self.unlike:,} of {self.compared:,} counts are not the paper's."]
+            return [*self.notes, f"All {self.compared:,} counts are the paper's."]
+        return [*self.notes, f"{self.unlike:,} of {self.compared:,} counts are not the paper's."]
 
     def markdown(self) -> list[str]:
         """Lines of Markdown; a count that is not the paper's has the paper's in brackets."""

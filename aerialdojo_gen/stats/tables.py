@@ -92,6 +92,11 @@ def made_of(data: Where, scene: str) -> Made:
     )
 
 
+def _whole(made: Sequence[Made]) -> bool:
+    """Whether all of the paper's scenes are there, and are to be held to its figures."""
+    return {m.scene for m in made if m.paper} >= set(inventory())
+
+
 def _figures(made: Sequence[Made]) -> tuple[int | float, ...]:
     settings = [2 * sum(m.of(s) for m in made) for s in SETTINGS]
     return (
@@ -151,7 +156,7 @@ def family_table(made: Sequence[Made]) -> Comparison:
 def share_table(made: Sequence[Made]) -> Comparison:
     """Say which share of the instances has what (the paper's appendix C)."""
     total = sum(m.instances for m in made)
-    whole = {m.scene for m in made} >= set(inventory())
+    whole = _whole(made)
 
     def share(part: Iterable[int], of: int = total) -> float | None:
         return 100.0 * sum(part) / of if of else None
@@ -182,7 +187,7 @@ def mean_length_table(made: Sequence[Made]) -> Comparison:
         n = sum(m.instances for m in group) // 2
         if not n:
             continue
-        paper, whole = _paper_figures(group), {m.scene for m in made} >= set(inventory())
+        paper, whole = _paper_figures(group), _whole(made)
         theirs = 1000.0 * paper[6] / (paper[5] / 2) if whole and paper[5] and paper[6] is not None else None
         rows.append(Row(name, (sum(m.path_m for m in group) / n,), (theirs,)))
     column = Column("m", "m", exact=False, digits=2)
@@ -203,7 +208,7 @@ def benchmark_table(made: Sequence[Made]) -> Listing:
 
 def split_table(made: Sequence[Made]) -> Comparison:
     """Set the splits beside the paper's table of them, in instances; a part of the scenes has no paper's figures."""
-    whole = {m.scene for m in made} >= set(inventory())
+    whole = _whole(made)
     rows = []
     for (partition, subset), cells in splits().items():
         group = [m for m in made if store.partition(m.scene).upper() == partition]

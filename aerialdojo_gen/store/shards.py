@@ -9,7 +9,7 @@ Every function takes a data root, or a directory or URL to open as one.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -33,7 +33,7 @@ from aerialdojo_gen.store.tables import check_table, column_digests, content_dig
 
 __all__ = [
     "LAYOUT", "META", "Place", "check_run_name", "check_scene_name", "content", "count_rows", "partition",
-    "prune", "read_info", "read_scene", "shard_folder", "shard_name",
+    "prune", "read_info", "read_scene", "read_stored", "shard_folder", "shard_name",
     "shard_path", "shards", "write_shard",
 ]  # fmt: skip
 
@@ -189,7 +189,8 @@ def read_scene(
     Returns
     -------
     pyarrow.Table
-        With the table's schema, parts in their order.
+        With the table's schema, parts in their order. A column that may be null and that an older version did not
+        write is null.
 
     Raises
     ------
@@ -205,17 +206,69 @@ def read_scene(
     for name, info in zip(shards(root, table, scene, run), infos, strict=True):
         where = root.at(name)
         try:
-            shard = read_file(root.local_copy(name), columns, where)
+            if columns is None:
+                shard = read_file(root.local_copy(name), None, where)
+                stored = _stored(wanted, shard.column_names)
+            else:
+                stored = _stored(wanted, info.columns or columns)
+                shard = read_file(root.local_copy(name), stored, where)
         except FileNotFoundError:
             raise StoreError(f"{where} was removed while it was read: run the command again") from None
         except StoreError as error:
             raise StoreError(f"{error}: {mend}") from None
-        if not shard.schema.equals(wanted):
+        if not shard.schema.equals(pa.schema([wanted.field(name) for name in stored])):
             raise StoreError(f"{where} has other columns than this version's {spec.name}: {mend}")
         # The checksums of Parquet's pages do not say which column a page is of, nor what its values mean.
         if info.columns and any(info.columns.get(name) != own for name, own in column_digests(shard).items()):
             raise StoreError(f"{where} is damaged (other rows than were written): {mend}")
-        tables.append(pa.Table.from_arrays(shard.columns, schema=wanted.remove_metadata()))
+        tables.append(pa.Table.from_arrays(_with_nulls(shard, wanted), schema=wanted.remove_metadata()))
+    return pa.concat_tables(tables)
+
+
+def _stored(wanted: pa.Schema, there: Collection[str]) -> list[str]:
+    """Name the columns to be found in a shard: all but those that may be null and are not there."""
+    return [field.name for field in wanted if field.name in there or not field.nullable]
+
+
+def _with_nulls(shard: pa.Table, wanted: pa.Schema) -> list[pa.ChunkedArray | pa.Array]:
+    """Return a shard's columns in the schema's order, nulls for those that it lacks."""
+    there = set(shard.column_names)
+    return [shard[f.name] if f.name in there else pa.nulls(shard.num_rows, f.type) for f in wanted]
+
+
+def read_stored(data: Where, table: str, scene: str, columns: Sequence[str]) -> pa.Table:
+    """Read those of some columns that a scene's shards have, whatever version wrote them.
+
+    Parameters
+    ----------
+    data : DataRoot, Path or str
+        The data root.
+    table : str
+        A key of `LAYOUT`.
+    scene : str
+        Name of the scene.
+    columns : sequence of str
+        Columns of this version or of another one.
+
+    Returns
+    -------
+    pyarrow.Table
+        With fewer columns than were asked for where a shard lacks some, parts in their order.
+
+    Raises
+    ------
+    StoreError
+        A shard is missing or damaged.
+    """
+    root = open_root(data)
+    infos = _infos(root, table, scene)
+    there = [name for name in columns if all(name in info.columns for info in infos)]
+    tables = []
+    for name, info in zip(shards(root, table, scene), infos, strict=True):
+        shard = read_file(root.local_copy(name), there, root.at(name)).replace_schema_metadata(None)
+        if any(info.columns[column] != own for column, own in column_digests(shard).items()):
+            raise StoreError(f"{root.at(name)} is damaged (other rows than were written): delete it")
+        tables.append(shard)
     return pa.concat_tables(tables)
 
 

@@ -106,7 +106,8 @@ def _judged(data: SceneData, rows: Rows) -> tuple[np.ndarray, np.ndarray, Floats
     euclidean = np.where(np.abs(euclidean - paths.euclidean_m) <= _LENGTH_M, euclidean, paths.euclidean_m)
     solved = np.full(len(length), "SOLVED")
     actions = np.diff(paths.first).astype(np.int32)
-    reason, setting = judge(solved, euclidean, length, actions, data.pipeline.filter)
+    detour, visible = (rows.floats(name)[paths.rows] for name in ("plan_detour", "target_visible_at_start"))
+    reason, setting = judge(solved, euclidean, length, actions, data.pipeline.filter, detour, visible)
     return reason, setting, length, euclidean
 
 

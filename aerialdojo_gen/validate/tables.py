@@ -9,7 +9,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from aerialdojo_gen.store.layout import partition
-from aerialdojo_gen.store.schemas import DIRECTIONS, FAMILIES, SETTINGS
+from aerialdojo_gen.store.schemas import DIRECTIONS, FAMILIES, SETTINGS, VIEWS
 from aerialdojo_gen.validate.registry import Finding, check
 from aerialdojo_gen.validate.rows import Rows, SceneData
 
@@ -21,6 +21,8 @@ _WORDS = {
     "family": (*FAMILIES.values(), "Custom"),
     "partition": ("ID", "OOD"),
     "selected_by": ("human", "auto"),
+    "visible_view_at_start": VIEWS,
+    "target_split": ("train", "test"),
 }
 
 

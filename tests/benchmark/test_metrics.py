@@ -27,6 +27,7 @@ GOOD: dict[str, Any] = {
     "stop_called": True, "collision": False, "n_actions": 9, "action_budget": 90,
     "final_distance_m": 2.0, "min_distance_m": 1.5, "final_horizontal_distance_m": 1.0,
     "min_horizontal_distance_m": 0.5, "path_length_m": 12.0, "reference_length_m": 10.0, "euclidean_m": 9.0,
+    "viewpoint_distance_m": 2.0, "target_in_sight": True,
 }  # fmt: skip
 
 
@@ -74,6 +75,38 @@ def test_success_is_a_stop_within_the_radius_without_collision_within_the_budget
 )
 def test_outcomes_of_single_episodes(row: dict[str, Any], expected: tuple[bool, bool, float]) -> None:
     assert judged(**row) == expected
+
+
+@pytest.mark.parametrize(
+    ("row", "expected"),
+    [
+        ({}, 1.0),
+        # Another viewpoint of the target is near, the anchor is not: a success for who looks, and none by the paper.
+        ({"final_distance_m": 9.0}, 1.0),
+        ({"viewpoint_distance_m": 3.0}, 1.0),
+        ({"viewpoint_distance_m": 3.01}, 0.0),
+        # Near the anchor, behind a wall.
+        ({"target_in_sight": False}, 0.0),
+        ({"stop_called": False, "n_actions": 90}, 0.0),
+        ({"collision": True}, 0.0),
+        ({"n_actions": 91}, 0.0),
+        # A release without viewpoints.
+        ({"viewpoint_distance_m": None, "target_in_sight": None}, math.nan),
+    ],
+)
+def test_success_at_any_viewpoint(row: dict[str, Any], expected: float) -> None:
+    assert outcomes(log(row), AT_3).success_view[0] == pytest.approx(expected, nan_ok=True)
+    # In the plane there is no distance to viewpoints in the log.
+    assert math.isnan(outcomes(log(row), profile_named("aerialvln")).success_view[0])
+
+
+def test_a_rate_with_a_hole_in_it_is_not_known() -> None:
+    old = {"viewpoint_distance_m": None, "target_in_sight": None}
+    overall = summarize(log({}, old), AT_3).overall
+    assert math.isnan(overall.sr_view)
+    assert overall.sr == 1.0
+    without = pa.Table.from_pylist([GOOD]).drop_columns(list(old))
+    assert math.isnan(summarize(episodes_of(without), AT_3).overall.sr_view)
 
 
 def test_five_metres_are_reported_beside_three() -> None:
@@ -176,6 +209,7 @@ def rows(draw: st.DrawFn) -> dict[str, Any]:
         "min_distance_m": final * draw(st.floats(0.0, 1.0)), "final_horizontal_distance_m": flat,
         "min_horizontal_distance_m": flat * draw(st.floats(0.0, 1.0)), "path_length_m": draw(lengths),
         "reference_length_m": draw(lengths), "euclidean_m": draw(lengths),
+        "viewpoint_distance_m": final * draw(st.floats(0.0, 1.0)), "target_in_sight": draw(st.booleans()),
     }  # fmt: skip
 
 
@@ -189,6 +223,13 @@ def test_scores_are_bounded_and_ordered(drawn: list[dict[str, Any]], profile: Pr
         assert scored.dts_m >= 0.0
         if profile.fails_on_collision:
             assert scored.sr + scored.cr <= 1.0 + 1e-12
+        assert math.isnan(scored.sr_view) if profile.planar else 0.0 <= scored.sr_view <= 1.0
+    # A goal is a viewpoint of its target: who succeeds and sees it succeeds so too.
+    judged = outcomes(episodes, profile)
+    sees = np.isfinite(episodes.view_distance_m)
+    if not profile.planar:
+        assert (judged.success_view[judged.success & sees] == 1.0).all()
+        assert not judged.success_view[~sees].any()
     assert sum(s.episodes for s in summary.scenes.values()) == len(drawn) == summary.overall.episodes
 
 
@@ -216,4 +257,5 @@ def test_the_order_of_episodes_does_not_matter(drawn: list[dict[str, Any]], shuf
 
 
 def test_every_column_of_the_log_is_one_of_episodes() -> None:
-    assert {f.name for f in fields(Episodes)} == GOOD.keys()
+    derived = {"viewpoint_distance_m", "target_in_sight"}
+    assert {f.name for f in fields(Episodes)} - {"view_distance_m"} == GOOD.keys() - derived

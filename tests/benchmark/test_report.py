@@ -20,7 +20,7 @@ from support.run_logs import write_run
 from typer.testing import CliRunner
 
 from aerialdojo_gen import cli
-from aerialdojo_gen.benchmark import contents, figures, formats, radar, tables
+from aerialdojo_gen.benchmark import contents, figures, formats, radar, score_rows, tables
 from aerialdojo_gen.benchmark.grid import BEST, SECOND, Table
 from aerialdojo_gen.benchmark.profiles import PROFILES, Profile
 from aerialdojo_gen.benchmark.report import html, write_report
@@ -270,7 +270,7 @@ def test_axes_end_at_round_numbers(largest: float, end: float) -> None:
 
 
 def test_the_csv_holds_every_score_unrounded(runs: list[Run]) -> None:
-    rows = list(csv.DictReader(io.StringIO(tables.as_csv(runs, [AT_3, AT_5]))))
+    rows = list(csv.DictReader(io.StringIO(score_rows.as_csv(runs, [AT_3, AT_5]))))
     keys = ["run", "profile", "setting", "modality", "scope", "name"]
     found = {tuple(row[k] for k in keys): row for row in rows}
     assert len(found) == len(rows)

@@ -12,7 +12,7 @@ import pytest
 from scipy import stats
 from support.run_logs import episode
 
-from aerialdojo_gen.benchmark import breakdowns, contents, difficulty, intervals, paired, radii, tables
+from aerialdojo_gen.benchmark import breakdowns, contents, difficulty, intervals, paired, radii, score_rows
 from aerialdojo_gen.benchmark.floors import arranged, with_floors
 from aerialdojo_gen.benchmark.formats import as_text
 from aerialdojo_gen.benchmark.grid import BEST, SECOND, Table
@@ -24,6 +24,7 @@ from aerialdojo_gen.common.paper import results
 from aerialdojo_gen.errors import UsageError
 from aerialdojo_gen.store import schemas
 from aerialdojo_gen.store import shards as store
+from aerialdojo_gen.store.root import open_root
 from aerialdojo_gen.store.tables import from_rows
 
 AT_3, AT_5 = PROFILES["aerialdojo"], PROFILES["aerialdojo-5m"]
@@ -98,6 +99,10 @@ def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def runs(log: Path) -> list[Run]:
     return arranged(with_floors(log, load_runs(log, ["alpha", "beta"])))
+
+
+def broken_down(data: Path, runs: list[Run], kind: str) -> list[Table]:
+    return difficulty.parting_tables(difficulty.partings_of(open_root(data), runs), kind, runs, AT_3)
 
 
 def cells(table: Table, label: str) -> tuple[str, ...]:
@@ -177,7 +182,7 @@ def test_partitions_goals_averages_and_difficulty(runs: list[Run], log: Path) ->
     assert list(types.sections.values()) == ["Urban", "Natural", "Infrastructure", "Disaster"]
     assert [row[0] for _, row in types.rows] == ["12.50", "25.00", "50.00", "0.00"]
     # L / d_E is 10 / 8 in ID scenes and 10 / 9 in the others.
-    (detour,) = difficulty.difficulty_tables(log, runs, AT_3)
+    (detour,) = broken_down(log, runs, difficulty.DIFFICULTY)
     assert [head for head, _ in detour.groups] == ["1.1 to 1.25", "1.25 to 1.5"]
     assert cells(detour, "package:Alpha")[::3] == ("25.00", "18.75")
     # A log or a release that has the column has the table.
@@ -190,7 +195,7 @@ def test_partitions_goals_averages_and_difficulty(runs: list[Run], log: Path) ->
         )
         for run in load_runs(log, ["alpha", "beta"])
     ]
-    seen, _ = difficulty.difficulty_tables(log, shown, AT_3)
+    (seen,) = broken_down(log, shown, difficulty.SEEN)
     assert [head for head, _ in seen.groups] == ["seen in training", "unseen"]
     # Every second task is one with a semantic goal.
     assert cells(seen, "package:Alpha")[0] == "31.25"
@@ -267,7 +272,9 @@ def test_intervals_are_scipys_and_the_exact_ones(runs: list[Run]) -> None:
         method="percentile", n_resamples=4000, vectorized=False, rng=np.random.default_rng(5),
     ).confidence_interval  # fmt: skip
     assert (low, high) == (pytest.approx(theirs.low, abs=0.016), pytest.approx(theirs.high, abs=0.016))
-    assert found == intervals.score_intervals(runs[0].episodes, AT_3)
+    np.testing.assert_equal(found, intervals.score_intervals(runs[0].episodes, AT_3))
+    # The log does not say SR-view: that has no interval, and the others have theirs.
+    assert [math.isnan(low) for low, _ in found] == [False, True, False, False, False, False]
     # How far scenes differ is not known of a family with one of them.
     one = runs[0].episodes.where(runs[0].episodes.scene != "U_Mall_1")
     assert all(math.isnan(end) for ends in intervals.score_intervals(one, AT_3) for end in ends)
@@ -283,7 +290,7 @@ def test_tables_are_chosen_by_name(log: Path, runs: list[Run]) -> None:
 
 
 def test_the_csv_has_the_papers_rows_beside_ours(runs: list[Run]) -> None:
-    lines = tables.as_csv(runs, [AT_3, AT_5], results()).splitlines()
+    lines = score_rows.as_csv(runs, [AT_3, AT_5], results()).splitlines()
     head = lines[0].split(",")
     (row,) = [line.split(",") for line in lines if line.startswith("paper,Claude Opus 5,aerialdojo,3.0,base")]
     assert dict(zip(head, row, strict=True))["osr"] == "0.0784"

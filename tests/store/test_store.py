@@ -34,6 +34,8 @@ def plan(pair_id, n, value):
     return {
         "scene": "U_Test_0", "pair_id": pair_id, "outcome": "SOLVED" if n else "NO_PATH", "length_m": float(n),
         "n_actions": n, "expansions": 3, "min_clearance_m": 0.5 if n else None, **lists, "action": [1] * n,
+        "free_length_m": value, "plan_detour": 1.5, "straight_line_free": bool(n % 2), "climb_m": 0.0,
+        "agent_action": [1] * n if n else None,
     }  # fmt: skip
 
 

@@ -46,6 +46,7 @@ def episode(run: str, agent: str, scene: str, k: int, draws: np.random.Generator
         "n_refused": int(draws.integers(0, 3)), "n_invalid": int(draws.integers(0, 2)) if asks else 0,
         "n_requests": 40 if asks else None, "input_tokens": 52_000 if asks else None,
         "output_tokens": 1_900 if asks else None, "cost_usd": 0.21 if asks else None,
+        "success_view": None, "viewpoint_distance_m": None, "target_in_sight": None, "told": "",
     }  # fmt: skip
 
 

@@ -19,7 +19,7 @@ from aerialdojo_gen.scoring.geometric import judge
 from aerialdojo_gen.scoring.knowing import FRONT_RAD
 from aerialdojo_gen.scoring.panel import SCORERS
 from aerialdojo_gen.stages.work.anchor_world import Candidates, World
-from aerialdojo_gen.stages.work.step_back import step_back_m
+from aerialdojo_gen.stages.work.step_back import step_back_m, telling_m
 
 Floats = NDArray[np.float64]
 
@@ -99,6 +99,7 @@ def judge_anchor(
     if seen <= 0 or seen < config.min_visible_fraction:
         faults.append(f"it does not see the object: {seen:.0%} of what it faces, {config.min_visible_fraction:.0%} "
                       "is the least")  # fmt: skip
+    most = min(config.step_back_m, telling_m(looked.patches, looked.seen[0], position_m, yaw_rad, config.fov_deg))
     picture = looked.picture(0, config.picture_px, config.fov_deg)
     parts = judge(picture, radius, config.standoff_m)
     row = {
@@ -106,7 +107,7 @@ def judge_anchor(
         "object_id": item["object_id"],
         **looked.row(0, distance),
         "no_front_reason": None,
-        "step_back_m": step_back_m(world, k, points, position_m, yaw_rad, config.fov_deg, config.step_back_m),
+        "step_back_m": step_back_m(world, k, points, position_m, yaw_rad, config.fov_deg, most),
         # The other scorers compare candidates, and this one stands alone.
         "score": parts.score,
         **{f"score_{name}": parts.score if name == "geometric" else None for name in SCORERS},

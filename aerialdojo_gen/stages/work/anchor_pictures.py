@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from aerialdojo_gen.config.sections import AnchorSampleConfig
 from aerialdojo_gen.scoring.base import AnchorView
 from aerialdojo_gen.stages.work.anchor_world import Candidates
-from aerialdojo_gen.stages.work.step_back import step_back_m
+from aerialdojo_gen.stages.work.step_back import step_back_m, telling_m
 
 
 def pictured_from(
@@ -40,19 +40,17 @@ def pictured_from(
         How far back that is.
     """
     views = [found.picture(int(k), size_px, config.fov_deg) for k in which]
-    backs = [
-        step_back_m(
-            found.world, found.instance, found.points, found.positions_m[k], float(found.yaw_rad[k]), config.fov_deg,
-            config.step_back_m,
-        )
-        for k in which
-    ]  # fmt: skip
+    backs = []
+    for k in which:
+        place, yaw = found.positions_m[k], float(found.yaw_rad[k])
+        most = min(config.step_back_m, telling_m(found.patches, found.seen[k], place, yaw, config.fov_deg))
+        backs.append(step_back_m(found.world, found.instance, found.points, place, yaw, config.fov_deg, most))
     far = [n for n, back in enumerate(backs) if back > 0.0]
     if far:
-        yaw = found.yaw_rad[which[far]]
-        away = np.column_stack([np.cos(yaw), np.sin(yaw), np.zeros(len(yaw))]) * np.array(backs)[far, None]
+        yaws = found.yaw_rad[which[far]]
+        away = np.column_stack([np.cos(yaws), np.sin(yaws), np.zeros(len(yaws))]) * np.array(backs)[far, None]
         behind = Candidates.of(
-            found.world, found.instance, found.points, found.positions_m[which[far]] - away, yaw, radius_m, config
+            found.world, found.instance, found.points, found.positions_m[which[far]] - away, yaws, radius_m, config
         )
         for k, n in enumerate(far):
             back = behind.picture(k, size_px, config.fov_deg)

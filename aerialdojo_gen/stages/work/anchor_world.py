@@ -82,6 +82,10 @@ class Candidates:
         What they see of the object.
     points : (m, 3) float64
         On the object's surface, metres, world frame.
+    patches : tuple of Patch
+        Points of each of the object's telling parts.
+    seen : (n, t) float64
+        Share that they see of each of those parts (`aerialdojo_gen.geometry.telling.seen_share`).
     told : (n, t) float64
         How much they see of each of the object's telling parts, over what the best of them sees; t = 0 where the
         whole body tells what it is.
@@ -100,6 +104,8 @@ class Candidates:
     clearance_m: Floats
     views: Views
     points: Floats
+    patches: tuple[Patch, ...]
+    seen: Floats
     told: Floats
     off_front_rad: Floats | None
     rank: Floats
@@ -131,16 +137,17 @@ class Candidates:
         elevation = np.degrees(np.arctan2(away[:, 2], np.hypot(away[:, 0], away[:, 1])))
         clearance = np.array([world.collisions.distance_m(p) for p in positions_m])
         rank = informativeness(views, elevation, clearance, radius_m, config.standoff_m)
-        told, off_front = np.zeros((len(positions_m), 0)), None
-        if thing.anatomy is not None:
-            told = seen_share(positions_m, yaw_rad, patches_of(world, instance, points), world.rays, config.fov_deg)
-            told = told / np.maximum(told.max(axis=0, initial=0.0), 1e-9)
-            if thing.anatomy.fronts_rad:
-                off_front = off_front_rad(positions_m, thing.centroid, thing.anatomy.fronts_rad)
+        patches = patches_of(world, instance, points)
+        seen = seen_share(positions_m, yaw_rad, patches, world.rays, config.fov_deg)
+        told = seen / np.maximum(seen.max(axis=0, initial=0.0), 1e-9)
+        off_front = None
+        if thing.anatomy is not None and thing.anatomy.fronts_rad:
+            off_front = off_front_rad(positions_m, thing.centroid, thing.anatomy.fronts_rad)
         rank = knowing(rank, telling(told) if told.shape[1] else None, fronting(off_front))
         return cls(
-            world, instance, alone, positions_m, yaw_rad, elevation, clearance, views, points, told, off_front, rank
-        )
+            world, instance, alone, positions_m, yaw_rad, elevation, clearance, views, points, patches, seen, told,
+            off_front, rank,
+        )  # fmt: skip
 
     def seeing(self, least: float) -> NDArray[np.int64]:
         """Numbers of the viewpoints that see at least so large a fraction of what faces them, and anything at all."""
@@ -202,11 +209,11 @@ def tells_of(instance: Instance) -> list[NDArray[np.int64]]:
     return [faces for faces in map(instance.faces_of, names) if len(faces)]
 
 
-def patches_of(world: World, instance: int, points: Floats) -> list[Patch]:
+def patches_of(world: World, instance: int, points: Floats) -> tuple[Patch, ...]:
     """Points of each of an instance's telling parts, drawn by the number of its surface's points."""
     thing = world.scene.instances[instance]
     # The same points whoever asks: the draw hangs on nothing but the node.
     rng = generator(0, "anchor-sample", world.scene.name, thing.node)
     triangles = thing.vertices[thing.faces]
     n = max(_LEAST_POINTS, len(points) // 4)
-    return [Patch.of(triangles[faces], n, rng, world.rays, world.scene.sun) for faces in tells_of(thing)]
+    return tuple(Patch.of(triangles[faces], n, rng, world.rays, world.scene.sun) for faces in tells_of(thing))

@@ -12,6 +12,7 @@ from aerialdojo_gen.config.sections import FilterConfig, Setting
 from aerialdojo_gen.errors import StoreError
 from aerialdojo_gen.pipeline.stage import Job, Output
 from aerialdojo_gen.store.schemas import SETTINGS, VERDICTS
+from aerialdojo_gen.store.schemas.columns import DIFFICULTY, START_VIEW
 
 KEPT = "kept"
 
@@ -27,8 +28,10 @@ def judge(
     length_m: NDArray[np.float64],
     n_actions: NDArray[np.int32],
     config: FilterConfig,
+    plan_detour: NDArray[np.float64] | None = None,
+    visible_at_start: NDArray[np.float64] | None = None,
 ) -> tuple[NDArray[np.str_], NDArray[np.str_]]:
-    """Judge candidates by the paper's rules (section on filtering).
+    """Judge candidates by the paper's rules (section on filtering), and by two more that are off by default.
 
     Parameters
     ----------
@@ -40,12 +43,18 @@ def judge(
         Actions of the route, Stop included.
     config : FilterConfig
         Thresholds and settings.
+    plan_detour : (n,) float64, optional
+        L over the shortest L without obstacles; NaN, or none at all, where it is not known, which no
+        `min_plan_detour` above 1 lets pass.
+    visible_at_start : (n,) float64, optional
+        Share of the target that the start sees; where it is not known no `max_visible_at_start` below 1 lets it pass.
 
     Returns
     -------
     reason : (n,) str
         ``"kept"``, or the first rule that fails: the outcome in lower case (``"no_path"``), ``"too_close"``,
-        ``"too_short"``, ``"too_long"``, ``"near_straight"``, ``"over_budget"``.
+        ``"too_short"``, ``"too_long"``, ``"near_straight"``, ``"over_budget"``, ``"small_plan_detour"``,
+        ``"target_in_view"``.
     setting : (n,) str
         ``"base"``, ``"standard"``, ``"long_horizon"``, or ``""`` where the length fits none.
     """
@@ -59,12 +68,17 @@ def judge(
         over |= inside & (n_actions > rule.action_budget)
     # A product, not a ratio: it has no division by a d_E of zero.
     near_straight = length_m < config.min_detour_ratio * euclidean_m
+    none = np.full(len(outcome), np.nan)
+    small = ~((none if plan_detour is None else plan_detour) >= config.min_plan_detour)
+    in_view = ~((none if visible_at_start is None else visible_at_start) <= config.max_visible_at_start)
     rules = [
         ("too_close", euclidean_m <= config.min_euclidean_m),
         ("too_short", length_m < config.base.min_length_m),
         ("too_long", length_m >= config.long_horizon.max_length_m),
         ("near_straight", near_straight),
         ("over_budget", over),
+        ("small_plan_detour", small & (config.min_plan_detour > 1.0)),
+        ("target_in_view", in_view & (config.max_visible_at_start < 1.0)),
     ]
     reason = np.full(len(outcome), KEPT, dtype="U24")
     for word, fails in reversed(rules):
@@ -82,14 +96,19 @@ def run(job: Job, config: FilterConfig) -> Output:
         Plans and pairs are not of the same candidates.
     """
     pairs = job.read("pairs")
-    plans = job.read("plans").select(["pair_id", "outcome", "length_m", "n_actions"]).sort_by("pair_id")
+    told = [field.name for field in DIFFICULTY]
+    plans = job.read("plans").select(["pair_id", "outcome", "length_m", "n_actions", *told]).sort_by("pair_id")
     if not plans.column("pair_id").combine_chunks().equals(pairs.column("pair_id").combine_chunks()):
         raise StoreError(f"plans of {job.scene} are not those of its pairs: run aerialdojo-gen plan --force")
     outcome = np.asarray(plans.column("outcome").to_pylist(), dtype="U24")
     euclidean = pairs.column("euclidean_m").to_numpy()
     length = plans.column("length_m").to_numpy()
     n_actions = plans.column("n_actions").to_numpy()
-    reason, setting = judge(outcome, euclidean, length, n_actions, config)
+    detour, visible = (
+        table.column(name).to_numpy(zero_copy_only=False).astype(np.float64)
+        for table, name in ((plans, "plan_detour"), (pairs, "target_visible_at_start"))
+    )
+    reason, setting = judge(outcome, euclidean, length, n_actions, config, detour, visible)
     solved = outcome == "SOLVED"
     budgets = {name: rule.action_budget for name, rule in zip(SETTINGS, settings_of(config), strict=True)}
     n = len(outcome)
@@ -101,6 +120,8 @@ def run(job: Job, config: FilterConfig) -> Output:
             "length_m": pa.array(length, mask=~solved),
             "detour_ratio": pa.array(length / np.maximum(euclidean, 1e-12), mask=~solved),
             "n_actions": pa.array(n_actions, pa.int32(), mask=~solved),
+            **{name: plans.column(name) for name in told},
+            **{field.name: pairs.column(field.name) for field in START_VIEW},
             "keep": reason == KEPT,
             "reason": pa.array(reason.tolist(), pa.string()),
             "setting": pa.array([s or None for s in setting.tolist()], pa.string()),

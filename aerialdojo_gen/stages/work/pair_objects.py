@@ -9,9 +9,17 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
+from aerialdojo_gen.common.rng import generator
 from aerialdojo_gen.config.sections import PairObjectsConfig
+from aerialdojo_gen.errors import StoreError
+from aerialdojo_gen.geometry.angles import wrap_angle_rad
+from aerialdojo_gen.geometry.rays import instance_caster
+from aerialdojo_gen.geometry.start_view import seen_from
+from aerialdojo_gen.geometry.surface import Surface
 from aerialdojo_gen.pipeline.stage import Job, Output
-from aerialdojo_gen.store.schemas import PAIRS
+from aerialdojo_gen.rendering.casters import triangle_caster
+from aerialdojo_gen.scenes.model import Instance
+from aerialdojo_gen.store.schemas import PAIRS, VIEWS
 
 Floats = NDArray[np.float64]
 
@@ -19,12 +27,13 @@ Floats = NDArray[np.float64]
 def run(job: Job, config: PairObjectsConfig) -> Output:
     """Pair the shortlisted anchors of every object with the selected anchor of every other one.
 
-    Left out are only pairs that no route could make a task, whatever the scene: see `length_bound_m`.
+    Left out are only pairs that no route could make a task, whatever the scene: see `length_bound_m`. Of every other
+    one it is said how much of the target the start sees (`aerialdojo_gen.geometry.start_view.seen_from`).
 
     Parameters
     ----------
     job : Job
-        The scene; reads `anchors`.
+        The scene; reads `anchors`, `objects` and the scene's mesh.
     config : PairObjectsConfig
         The stage's section.
 
@@ -34,6 +43,11 @@ def run(job: Job, config: PairObjectsConfig) -> Output:
         `pairs`, sorted by pair_id as a string. Rows in are all ordered pairs of a start anchor and another object's
         selected anchor; counts are ``too_close`` (d_E at most `min_euclidean_m`) and ``too_far`` (no route of less
         than `max_length_m`), and rows in is rows out plus the two.
+
+    Raises
+    ------
+    StoreError
+        A target's mesh node is not in the scene: the tables do not belong together.
     """
     anchors = job.read("anchors")
     object_id = anchors["object_id"].to_numpy()
@@ -55,6 +69,8 @@ def run(job: Job, config: PairObjectsConfig) -> Output:
     ids = [f"{start}_{anchor}__{target}" for start, anchor, target in compress(starts, keep.tolist())]
     order = np.array(sorted(range(len(ids)), key=ids.__getitem__), dtype=np.int64)
     s, t = s[keep][order], t[keep][order]
+    starts_at = np.column_stack([position, wrap_angle_rad(anchors["yaw_rad"].to_numpy() + math.pi)])
+    share, view = _seen_at_start(job, config, object_id[t], starts_at[s])
     table = pa.table(
         {
             "scene": pa.array([job.scene] * len(order), pa.string()),
@@ -63,11 +79,39 @@ def run(job: Job, config: PairObjectsConfig) -> Output:
             "start_anchor_id": anchor_id[s],
             "target_object_id": object_id[t],
             "euclidean_m": euclidean[keep][order],
+            "target_visible_at_start": share,
+            "visible_view_at_start": pa.array([VIEWS[k] if k >= 0 else None for k in view.tolist()], pa.string()),
         },
         schema=PAIRS.schema,
     )
     counts = {"too_close": int(too_close.sum()), "too_far": int(too_far.sum())}
     return Output({"pairs": table}, rows_in=len(keep), rows_out=table.num_rows, counts=counts)
+
+
+def surface_points(seed: int, scene: str, object_id: int, item: Instance, n: int) -> Floats:
+    """Draw the points of an object that starts are judged by, (n, 3) float64, metres, world frame."""
+    return Surface.of(item).sample(n, generator(seed, "pair-objects", scene, object_id))
+
+
+def _seen_at_start(
+    job: Job, config: PairObjectsConfig, targets: NDArray[np.int32], starts: Floats
+) -> tuple[Floats, NDArray[np.int64]]:
+    """Shares of the targets that are seen from start poses, (n,) float64, and by which view, (n,) int64 or -1."""
+    share, view = np.zeros(len(targets)), np.full(len(targets), -1, dtype=np.int64)
+    if not len(targets):
+        return share, view
+    scene = job.scene_model()
+    caster, things = triangle_caster(scene), {item.node: item for item in scene.instances}
+    objects = job.read("objects")
+    nodes = dict(zip(objects["object_id"].to_pylist(), objects["mesh_node"].to_pylist(), strict=True))
+    for target in np.unique(targets).tolist():
+        item = things.get(nodes.get(target, ""))
+        if item is None:
+            raise StoreError(f"{job.scene}: object {target} is not in the scene's mesh: run annotate-import again")
+        rows = np.flatnonzero(targets == target)
+        points = surface_points(job.seed, job.scene, target, item, config.surface_points)
+        share[rows], view[rows] = seen_from(caster, instance_caster(item), points, starts[rows])
+    return share, view
 
 
 def length_bound_m(start: Floats, goal: Floats, max_approach_m: float) -> Floats:

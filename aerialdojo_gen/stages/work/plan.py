@@ -16,6 +16,7 @@ from aerialdojo_gen.config.sections import PlanConfig
 from aerialdojo_gen.errors import StoreError
 from aerialdojo_gen.geometry.angles import wrap_one_rad
 from aerialdojo_gen.pipeline.stage import Job, Output
+from aerialdojo_gen.planning.difficulty import Difficulty, agent_actions, difficulty_of
 from aerialdojo_gen.planning.planner import Planner, Route
 from aerialdojo_gen.scenes.context import context_of
 from aerialdojo_gen.scenes.model import Scene
@@ -55,6 +56,7 @@ def run(job: Job, config: PlanConfig) -> Output:
     pairs = pairs.filter(pc.is_in(pairs["target_object_id"], pa.array(targets, pa.int32())))
     poses, selected = _anchor_poses(job)
     planned: list[tuple[str, Route]] = []
+    planner = None
     if pairs.num_rows:
         planner = _planner(job.scene_model(), config, job.embodiment.radius_m)
         for target, candidates in _by_target(pairs):
@@ -71,7 +73,7 @@ def run(job: Job, config: PlanConfig) -> Output:
     planned.sort(key=lambda row: row[0])
     counts = Counter(route.outcome for _, route in planned)
     return Output(
-        {"plans": _table(job.scene, planned)},
+        {"plans": _table(job.scene, planned, planner)},
         rows_in=pairs.num_rows,
         rows_out=len(planned),
         counts={outcome: counts[outcome] for outcome in OUTCOMES if counts[outcome]},
@@ -106,7 +108,30 @@ def _by_target(pairs: pa.Table) -> Iterator[tuple[int, list[dict[str, Any]]]]:
     yield from sorted(groups.items())
 
 
-def _table(scene: str, planned: list[tuple[str, Route]]) -> pa.Table:
+def _told(planner: Planner | None, routes: list[Route], schema: pa.Schema) -> dict[str, pa.Array]:
+    """What the table says of the routes there are, null elsewhere: their difficulty, and an agent's actions."""
+    solved = [i for i, route in enumerate(routes) if route.outcome == "SOLVED"]
+    values: dict[str, Any] = {name: np.empty(0) for name in Difficulty._fields}
+    if planner is not None and solved:
+        c = planner.config
+        lengths = np.array([routes[i].length_m for i in solved])
+        poses = [routes[i].poses for i in solved]
+        values = difficulty_of(
+            poses, lengths, c.max_approach_m, planner.radius_m, planner.grid, planner.world
+        )._asdict()
+    place = np.full(len(routes), -1)
+    place[solved] = np.arange(len(solved))
+    rows = pa.array(place, pa.int32(), mask=place < 0)
+    told = {name: pa.array(v, schema.field(name).type).take(rows) for name, v in values.items()}
+    flown = [agent_actions(routes[i].actions) for i in solved]
+    ends = np.cumsum([0, *map(len, flown)], dtype=np.int32)
+    kind = schema.field("agent_action").type
+    flat = pa.array(np.concatenate([np.empty(0, np.int8), *flown]), kind.value_type)
+    told["agent_action"] = pa.ListArray.from_arrays(pa.array(ends), flat, type=kind).take(rows)
+    return told
+
+
+def _table(scene: str, planned: list[tuple[str, Route]], planner: Planner | None) -> pa.Table:
     """Put routes into a table; the lists go over as flat arrays, for millions of poses as objects take too long."""
     routes = [route for _, route in planned]
     ends = np.cumsum([0, *(len(r.poses) for r in routes)], dtype=np.int32)
@@ -121,6 +146,7 @@ def _table(scene: str, planned: list[tuple[str, Route]]) -> pa.Table:
         "n_actions": [r.n_actions for r in routes],
         "expansions": [r.expansions for r in routes],
         "min_clearance_m": [r.min_clearance_m for r in routes],
+        **_told(planner, routes, PLANS.schema),
     }
     arrays = []
     for field in PLANS.schema:

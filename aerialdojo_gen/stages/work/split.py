@@ -13,9 +13,10 @@ from aerialdojo_gen.common.paper import PaperScene, inventory, splits
 from aerialdojo_gen.config.sections import SplitConfig
 from aerialdojo_gen.pipeline.stage import Job, Output
 from aerialdojo_gen.release import quota
-from aerialdojo_gen.release.ids import key_of, nav_id, reference_id
+from aerialdojo_gen.release.ids import held_out, key_of, nav_id, reference_id
 from aerialdojo_gen.release.select import lot, train_counts, train_mask
 from aerialdojo_gen.store.schemas import RELEASE_ANCHORS, RELEASE_OBJECTS, ROUTES, TASKS
+from aerialdojo_gen.store.schemas.columns import DIFFICULTY, START_VIEW
 
 _LISTS = ("x_m", "y_m", "z_m", "yaw_rad", "action")
 
@@ -68,8 +69,8 @@ def routes_table(
         **{name: pairs.column(name) for name in ("start_object_id", "start_anchor_id", "target_object_id")},
         **{f"goal_{name}": goal.column(name) for name in ("x_m", "y_m", "z_m", "yaw_rad")},
         **{name: kept.column(name) for name in ("euclidean_m", "length_m", "detour_ratio", "n_actions")},
-        "min_clearance_m": plans.column("min_clearance_m"),
-        **{name: plans.column(name) for name in _LISTS},
+        **{field.name: kept.column(field.name) for field in (*DIFFICULTY, *START_VIEW)},
+        **{name: plans.column(name) for name in ("min_clearance_m", *_LISTS, "agent_action")},
     }
     routes = pa.table({name: columns[name] for name in ROUTES.schema.names}, schema=ROUTES.schema)
     routes = routes.append_column("action_budget", kept.column("action_budget"))
@@ -77,7 +78,40 @@ def routes_table(
     return routes.sort_by([(column, "ascending") for column in ROUTES.order])
 
 
-def tasks_table(routes: pa.Table, train: pa.ChunkedArray, scene: dict[str, Any], objects: pa.Table) -> pa.Table:
+def splits_of(routes: pa.Table, train: NDArray[np.bool_], out: set[int]) -> dict[str, pa.Array]:
+    """Say of routes what training has seen of their ends, and on which side of the split by objects they are.
+
+    Parameters
+    ----------
+    routes : pyarrow.Table
+        What `routes_table` returns.
+    train : (n,) bool
+        Which of them train, by the paper's split.
+    out : set of int
+        The objects that are held out.
+
+    Returns
+    -------
+    dict of str to pyarrow.Array
+        The columns of `aerialdojo_gen.store.schemas.TOLD_OF_SPLITS`, (n,) each.
+    """
+    target, start = (routes.column(f"{end}_object_id").to_numpy() for end in ("target", "start"))
+    # A scene has few anchors an object: one number is both.
+    pose = start.astype(np.int64) << 32 | routes.column("start_anchor_id").to_numpy()
+    gone = np.fromiter(out, dtype=np.int64, count=len(out))
+    target_out, start_out = np.isin(target, gone), np.isin(start, gone)
+    return {
+        "target_seen_in_train": pa.array(np.isin(target, target[train])),
+        "start_seen_in_train": pa.array(np.isin(pose, pose[train])),
+        "target_split": pa.array(np.where(target_out | start_out, "test", "train").tolist(), pa.string()),
+        "target_held_out": pa.array(target_out),
+        "start_held_out": pa.array(start_out),
+    }
+
+
+def tasks_table(
+    routes: pa.Table, train: NDArray[np.bool_], scene: dict[str, Any], objects: pa.Table, out: set[int]
+) -> pa.Table:
     """Make both instances of every navigation task: what an agent may know.
 
     Parameters
@@ -90,6 +124,8 @@ def tasks_table(routes: pa.Table, train: pa.ChunkedArray, scene: dict[str, Any],
         The scene's row of `scenes`.
     objects : pyarrow.Table
         The scene's objects, with the landmark's name as ``landmark`` and ``reference_image_id``.
+    out : set of int
+        The objects that the split by objects holds out.
 
     Returns
     -------
@@ -99,6 +135,7 @@ def tasks_table(routes: pa.Table, train: pa.ChunkedArray, scene: dict[str, Any],
     n = routes.num_rows
     target = _take(objects, "object_id", routes.column("target_object_id"))
     nulls = pa.nulls(n, pa.string())
+    told = splits_of(routes, train, out)
     instances = []
     for modality in ("image", "semantic"):
         columns: dict[str, Any] = {
@@ -106,7 +143,7 @@ def tasks_table(routes: pa.Table, train: pa.ChunkedArray, scene: dict[str, Any],
             "nav_id": routes.column("nav_id"),
             "scene": routes.column("scene"),
             **{name: _constant(scene[name], n) for name in ("family", "scene_type", "partition")},
-            "subset": pc.if_else(train, "train", "test"),
+            "subset": pc.if_else(pa.array(train), "train", "test"),
             "setting": routes.column("setting"),
             "modality": _constant(modality, n),
             "action_budget": routes.column("action_budget"),
@@ -116,12 +153,17 @@ def tasks_table(routes: pa.Table, train: pa.ChunkedArray, scene: dict[str, Any],
             "direction": target.column("direction"),
             "description": target.column("description") if modality == "semantic" else nulls,
             "reference_image_id": target.column("reference_image_id") if modality == "image" else nulls,
+            **told,
         }
         instances.append(pa.table(columns, schema=TASKS.schema))
     return pa.concat_tables(instances).sort_by([(key, "ascending") for key in TASKS.order])
 
 
-def _chosen(routes: pa.Table, paper: PaperScene, seed: int) -> NDArray[np.bool_]:
+def _chosen(routes: pa.Table, paper: PaperScene, seed: int, preference: float) -> NDArray[np.bool_]:
+    detour, visible = (
+        routes.column(name).to_numpy(zero_copy_only=False).astype(np.float64)
+        for name in ("plan_detour", "target_visible_at_start")
+    )
     return quota.choose(
         routes.column("lot").to_pylist(),
         routes.column("setting").to_pylist(),
@@ -129,6 +171,8 @@ def _chosen(routes: pa.Table, paper: PaperScene, seed: int) -> NDArray[np.bool_]
         paper.tasks,
         paper.path_m,
         seed,
+        quota.difficulty_steps(detour, visible),
+        preference,
     )
 
 
@@ -158,13 +202,14 @@ def run(job: Job, config: SplitConfig) -> Output:
     )
     paper = inventory().get(job.scene) if config.paper_counts else None
     if paper is not None:
-        routes = routes.filter(pa.array(_chosen(routes, paper, job.seed)))
+        routes = routes.filter(pa.array(_chosen(routes, paper, job.seed, config.prefer_harder)))
         trains = quota.train_quotas(job.scene, inventory(), splits())
     else:
         fraction = config.ood_train_fraction if scene["partition"] == "OOD" else config.id_train_fraction
         trains = train_counts(routes.column("setting").to_pylist(), fraction)
     train = train_mask(routes.column("lot").to_pylist(), routes.column("setting").to_pylist(), trains, job.seed)
-    tasks = tasks_table(routes, pa.chunked_array([pa.array(train)]), scene, named)
+    out = held_out(job.scene, objects.column("object_id").to_pylist(), config.held_out_fraction, key)
+    tasks = tasks_table(routes, train, scene, named, out)
     routes = routes.drop_columns(["action_budget", "lot"])
     is_train = pc.equal(tasks.column("subset"), "train")
     tables = {

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from aerialdojo_gen.geometry.telling import in_picture
+from aerialdojo_gen.geometry.telling import Patch, in_picture
 from aerialdojo_gen.stages.work.anchor_world import World
 
 Floats = NDArray[np.float64]
@@ -20,6 +21,8 @@ _CAMERA_M, _KEPT_M = 0.15, 0.3
 _STILL_SEEN = 0.8
 _TRIED = (1.0, 0.75, 0.5, 0.25)
 _WORTH_M = 0.25
+# Of the picture, what a telling part keeps if it had it: 16 x 16 pixels of 320 x 320; and what it needs to be told.
+_TOLD, _BARELY_TOLD = 0.0025, 0.0007
 
 
 def fitting_m(vertices: Floats, position_m: Floats, yaw_rad: float, fov_deg: float) -> float:
@@ -46,6 +49,37 @@ def fitting_m(vertices: Floats, position_m: Floats, yaw_rad: float, fov_deg: flo
     across = np.abs(away[:, 0] * sin - away[:, 1] * cos)
     wide = np.maximum(across, np.abs(away[:, 2])) / (_FILLED * math.tan(math.radians(fov_deg) / 2.0))
     return max(0.0, float((wide - ahead).max()))
+
+
+def telling_m(patches: Sequence[Patch], seen: Floats, position_m: Floats, yaw_rad: float, fov_deg: float) -> float:
+    """How far back a camera may go before a part that tells what the object is gets too small to be told.
+
+    Parameters
+    ----------
+    patches : sequence of Patch
+        Points of the parts.
+    seen : (len(patches),) float64
+        Share of each that is seen from the anchor.
+    position_m : (3,) float64
+        The anchor.
+    yaw_rad : float
+        Its yaw.
+    fov_deg : float
+
+    Returns
+    -------
+    float
+        Metres; infinite where none of the parts is seen from the anchor.
+    """
+    most = math.inf
+    ahead = np.array([math.cos(yaw_rad), math.sin(yaw_rad), 0.0])
+    for patch, share in zip(patches, seen.tolist(), strict=True):
+        away = max(float(((patch.points - position_m) @ ahead).mean()), 0.1)
+        taken = patch.area_m2 * share / (2.0 * away * math.tan(math.radians(fov_deg) / 2.0)) ** 2
+        if taken > 0.0:
+            floor = min(_TOLD, max(_BARELY_TOLD, taken / 2.0))
+            most = min(most, max(0.0, away * (math.sqrt(taken / floor) - 1.0)))
+    return most
 
 
 def step_back_m(

@@ -19,7 +19,14 @@ from aerialdojo_gen.common.terms import (
 from aerialdojo_gen.store.schemas.benchmark import EPISODES, FAILURES, STEPS, TIMINGS
 from aerialdojo_gen.store.schemas.columns import TableSpec
 from aerialdojo_gen.store.schemas.recordings import FRAMES, RECORDINGS
-from aerialdojo_gen.store.schemas.release import RELEASE_ANCHORS, RELEASE_OBJECTS, ROUTES, TASKS
+from aerialdojo_gen.store.schemas.release import (
+    RELEASE_ANCHORS,
+    RELEASE_OBJECTS,
+    ROUTES,
+    TASKS,
+    TOLD_OF_DIFFICULTY,
+    TOLD_OF_SPLITS,
+)
 from aerialdojo_gen.store.schemas.staged import (
     ANCHORS,
     CHOSEN_ANCHORS,
@@ -68,6 +75,8 @@ __all__ = [
     "TASKS",
     "TERMINATIONS",
     "TIMINGS",
+    "TOLD_OF_DIFFICULTY",
+    "TOLD_OF_SPLITS",
     "TURN_LEFT",
     "TURN_RIGHT",
     "VERDICTS",

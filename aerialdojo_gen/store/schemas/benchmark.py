@@ -43,6 +43,18 @@ EPISODES = table(
     column("input_tokens", pa.int64(), "tokens sent, where the service says", nullable=True),
     column("output_tokens", pa.int64(), "tokens received, where the service says", nullable=True),
     column("cost_usd", pa.float64(), "US dollars, where prices are known", nullable=True),
+    # An older version's log has none of the columns below: there they are null.
+    column("success_view", pa.bool_(),
+           "Stop within 3 m of any valid viewpoint of the target, the target in sight, without collision, within the "
+           "budget; null where the release has no viewpoints", nullable=True),
+    column("viewpoint_distance_m", pa.float64(),
+           "distance to the nearest valid viewpoint of the target where the episode ended; null without viewpoints",
+           "m", nullable=True),
+    column("target_in_sight", pa.bool_(),
+           "from where the episode ended a straight line reaches the target unobstructed; null without viewpoints",
+           nullable=True),
+    column("told", pa.string(), "what the agent was told beside the goal (heading), empty for nothing",
+           nullable=True),
 )  # fmt: skip
 
 STEPS = table(

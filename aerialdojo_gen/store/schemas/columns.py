@@ -76,6 +76,14 @@ ROUTE = [
     column("length_m", pa.float64(), "sum of the distances between consecutive positions", "m"),
     column("n_actions", pa.int32(), "number of actions, Stop included"),
 ]
+# How much of the target the start gives away.
+START_VIEW = [
+    column("target_visible_at_start", pa.float64(),
+           "of the target's surface points that its own body does not hide from the start, the share that is in one "
+           "of the four views there and that nothing else hides", nullable=True),
+    column("visible_view_at_start", pa.string(),
+           "view that shows most of them: front, left, right or down; null where nothing is seen", nullable=True),
+]  # fmt: skip
 PAIR = [
     column("start_object_id", pa.int32(), "object that the task starts from"),
     column("start_anchor_id", pa.int32(), "anchor of the start object; the start's yaw is its yaw + 180°"),
@@ -83,6 +91,18 @@ PAIR = [
 ]
 EUCLIDEAN = column("euclidean_m", pa.float64(), "straight distance from start to goal, d_E", "m")
 DETOUR = "length_m / euclidean_m, κ"
+# What `plan` tells of a route's difficulty, null where there is no route.
+DIFFICULTY = [
+    column("free_length_m", pa.float64(), "shortest length_m from start to goal were there no obstacles", "m", True),
+    column("plan_detour", pa.float64(), "length_m / free_length_m", nullable=True),
+    column("straight_line_free", pa.bool_(), "whether the body could fly the straight line from start to goal",
+           nullable=True),
+    column("climb_m", pa.float64(), "metres flown upwards", "m", True),
+]  # fmt: skip
+AGENT_ACTION = column(
+    "agent_action", list_of(pa.int8()), "the route as an agent can fly it: actions 0 to 15, the last is 0 (Stop)",
+    nullable=True,
+)  # fmt: skip
 CLEARANCE = "smallest distance along the route from the body's centre line to any surface, up to 5 m"
 
 

@@ -5,14 +5,17 @@ from __future__ import annotations
 import pyarrow as pa
 
 from aerialdojo_gen.store.schemas.columns import (
+    AGENT_ACTION,
     CLEARANCE,
     DETOUR,
+    DIFFICULTY,
     EUCLIDEAN,
     LISTS,
     PAIR,
     ROUTE,
     SCENE,
     SETTING,
+    START_VIEW,
     column,
     table,
     xyz,
@@ -20,6 +23,21 @@ from aerialdojo_gen.store.schemas.columns import (
 from aerialdojo_gen.store.schemas.staged import ANCHOR_COLUMNS, OBJECT_COLUMNS, REFERENCE
 
 RELEASE_ANCHORS = table("anchors", ["scene", "object_id", "anchor_id"], *ANCHOR_COLUMNS)
+
+# What `tasks` says of train and test beside the subset; null in a release of an older version.
+SPLITS = [
+    column("target_seen_in_train", pa.bool_(),
+           "whether a training task of the same partition has the same target; by the paper's split", nullable=True),
+    column("start_seen_in_train", pa.bool_(),
+           "whether a training task of the same partition starts from the same pose; by the paper's split",
+           nullable=True),
+    column("target_split", pa.string(),
+           "the split by objects: train where neither the target nor the object that the task starts from is held "
+           "out, else test", nullable=True),
+    column("target_held_out", pa.bool_(), "whether the target is one of the scene's objects that are held out",
+           nullable=True),
+    column("start_held_out", pa.bool_(), "whether the object that the task starts from is held out", nullable=True),
+]  # fmt: skip
 
 TASKS = table(
     "tasks", ["scene", "nav_id", "modality"],
@@ -41,6 +59,7 @@ TASKS = table(
     column("description", pa.string(), "the target's description; null for image goals", nullable=True),
     column("reference_image_id", pa.string(), "the target's picture in objects; null for semantic goals",
            nullable=True),
+    *SPLITS,
     clusters=["setting", "modality"],
     plain=["task_id", "nav_id"],
 )  # fmt: skip
@@ -58,10 +77,13 @@ ROUTES = table(
     column("detour_ratio", pa.float64(), DETOUR),
     ROUTE[1],
     column("min_clearance_m", pa.float64(), CLEARANCE, "m"),
+    *DIFFICULTY,
+    *START_VIEW,
     *LISTS,
+    AGENT_ACTION,
     clusters=["setting"],
-    plain=["nav_id", "euclidean_m", "length_m", "detour_ratio", "min_clearance_m",
-           *[field.name for field in LISTS]],
+    plain=["nav_id", "euclidean_m", "length_m", "detour_ratio", "min_clearance_m", "free_length_m", "plan_detour",
+           *[field.name for field in LISTS], "agent_action"],
 )  # fmt: skip
 
 REFERENCE_ID = column("reference_image_id", pa.string(), "opaque id that image tasks name")
@@ -69,3 +91,7 @@ REFERENCE_ID = column("reference_image_id", pa.string(), "opaque id that image t
 RELEASE_OBJECTS = table(
     "objects", ["scene", "object_id"], *OBJECT_COLUMNS, REFERENCE_ID, *REFERENCE, plain=["reference_image"]
 )  # fmt: skip
+
+# Columns that a task is not flown by: other formats have no field for them.
+TOLD_OF_SPLITS = tuple(field.name for field in SPLITS)
+TOLD_OF_DIFFICULTY = tuple(field.name for field in (*DIFFICULTY, *START_VIEW, AGENT_ACTION))

@@ -5,13 +5,16 @@ from __future__ import annotations
 import pyarrow as pa
 
 from aerialdojo_gen.store.schemas.columns import (
+    AGENT_ACTION,
     CLEARANCE,
     DETOUR,
+    DIFFICULTY,
     EUCLIDEAN,
     LISTS,
     PAIR,
     ROUTE,
     SCENE,
+    START_VIEW,
     column,
     table,
     xyz,
@@ -143,6 +146,7 @@ PAIRS = table(
     column("pair_id", pa.string(), "<start object>_<start anchor>__<target object>"),
     *PAIR,
     EUCLIDEAN,
+    *START_VIEW,
     command="pair-objects",
 )  # fmt: skip
 
@@ -150,11 +154,13 @@ PLANS = table(
     "plans", ["scene", "pair_id"],
     SCENE,
     column("pair_id", pa.string(), "candidate task"),
-    column("outcome", pa.string(), "SOLVED, START_IN_COLLISION, GOAL_IN_COLLISION, NO_PATH or BUDGET_EXHAUSTED"),
+    column("outcome", pa.string(), "what became of it: SOLVED, or why there is no route"),
     *ROUTE,
     column("expansions", pa.int64(), "nodes that the search expanded, all attempts together"),
     column("min_clearance_m", pa.float64(), CLEARANCE, "m", True),
+    *DIFFICULTY,
     *LISTS,
+    AGENT_ACTION,
     command="plan",
 )  # fmt: skip
 
@@ -166,6 +172,8 @@ VERDICTS = table(
     column("length_m", pa.float64(), "length of the planned route", "m", True),
     column("detour_ratio", pa.float64(), DETOUR, nullable=True),
     column("n_actions", pa.int32(), "number of actions, Stop included", nullable=True),
+    *DIFFICULTY,
+    *START_VIEW,
     column("keep", pa.bool_(), "whether the candidate becomes a task"),
     column("reason", pa.string(), "kept, or why not: a stable word"),
     column("setting", pa.string(), "length setting, null where the length fits none", nullable=True),

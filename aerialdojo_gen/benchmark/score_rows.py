@@ -1,0 +1,136 @@
+"""Every score as one row of a tidy table: CSV and JSON."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import math
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+from aerialdojo_gen.benchmark.difficulty import Partings
+from aerialdojo_gen.benchmark.intervals import score_intervals
+from aerialdojo_gen.benchmark.metrics import Episodes
+from aerialdojo_gen.benchmark.profiles import Profile
+from aerialdojo_gen.benchmark.runs import Run
+from aerialdojo_gen.benchmark.scores import METRICS, Score, Summary, slices, summarize, weighted_score
+from aerialdojo_gen.benchmark.tables import MODALITIES
+from aerialdojo_gen.common.paper import PaperResult
+from aerialdojo_gen.store.schemas import SETTINGS
+
+_HEAD = ("run", "agent", "profile", "radius_m", "setting", "modality", "scope", "name", "episodes")
+_ENDS = tuple(f"{metric}_{end}95" for metric in METRICS for end in ("low", "high"))
+COLUMNS = (*_HEAD, *METRICS, *(f"{metric}_sd" for metric in METRICS), *_ENDS, "told")
+_NO_PARTINGS = Partings()
+
+
+def as_csv(
+    runs: Sequence[Run],
+    profiles: Sequence[Profile],
+    beside: Sequence[PaperResult] = (),
+    partings: Partings = _NO_PARTINGS,
+) -> str:
+    """Write every score as one row of a tidy CSV: fractions and metres, unrounded; empty where there is none.
+
+    Parameters
+    ----------
+    runs, profiles
+        What is scored, and by which rules.
+    beside : sequence of PaperResult
+        Results of the paper, written as rows of the run ``paper``.
+    partings : Partings
+        Of these runs: what else than the scopes below the episodes are parted by.
+
+    Returns
+    -------
+    str
+        Scopes: ``overall`` (with ``_sd`` over scenes and 95 % intervals), ``task_weighted`` (the mean of all
+        episodes), ``family``, ``partition``, ``scene_type``, ``scene``; of all settings and modalities together
+        also the columns that episodes are parted by (``plan_detour``, ``target_seen_in_train``, …).
+    """
+    out = io.StringIO()
+    write = csv.writer(out, lineterminator="\n").writerow
+    write(COLUMNS)
+    for row in _rows(runs, profiles, beside, partings):
+        write(["" if value is None else value for value in row])
+    return out.getvalue()
+
+
+def as_json(
+    runs: Sequence[Run],
+    profiles: Sequence[Profile],
+    beside: Sequence[PaperResult] = (),
+    partings: Partings = _NO_PARTINGS,
+) -> str:
+    """Write the rows of `as_csv` as a JSON list of objects, a line each; null where there is nothing."""
+    rows = (dict(zip(COLUMNS, row, strict=True)) for row in _rows(runs, profiles, beside, partings))
+    lines = (json.dumps(row, ensure_ascii=False, allow_nan=False) for row in rows)
+    return "[\n" + ",\n".join(lines) + "\n]\n"
+
+
+def _rows(
+    runs: Sequence[Run], profiles: Sequence[Profile], beside: Sequence[PaperResult], partings: Partings
+) -> Iterator[list[Any]]:
+    for k, run in enumerate(runs):
+        parts: list[tuple[str, str, Episodes]] = [("all", "all", run.episodes)]
+        parts += [(name, "all", part) for name, part in slices(run.episodes, "setting", SETTINGS)]
+        parts += [("all", name, part) for name, part in slices(run.episodes, "modality", MODALITIES)]
+        parts += [
+            (setting, name, part)
+            for setting, whole in slices(run.episodes, "setting", SETTINGS)
+            for name, part in slices(whole, "modality", MODALITIES)
+        ]
+        for profile in profiles:
+            for setting, modality, part in parts:
+                head = [run.name, run.agent, profile.name, profile.radius_m, setting, modality]
+                scored = _scores(part, profile)
+                if setting == modality == "all":
+                    scored += _parted(run, k, profile, partings)
+                for scope, name, score, more in scored:
+                    values = [getattr(score, m) for m in METRICS] + more
+                    known = [None if math.isnan(v) else v for v in values]
+                    yield [*head, scope, name, score.episodes, *known, run.told]
+    for result in beside:
+        for profile in profiles:
+            keys = [(metric, profile.radius_m) for metric in METRICS]
+            if profile.name.startswith("aerialdojo") and any(key in result.mean for key in keys):
+                row = [kind.get(key) for kind in (result.mean, result.spread) for key in keys]
+                head = ["paper", result.model, profile.name, profile.radius_m, result.setting, "all"]
+                yield [*head, "overall", "overall", None, *row, *[None] * len(_ENDS), ""]
+
+
+_UNKNOWN = [math.nan] * (3 * len(METRICS))
+
+
+def _scores(part: Episodes, profile: Profile) -> list[tuple[str, str, Score, list[float]]]:
+    """Score a part of a log in every scope, with deviations and ends of intervals where they are known."""
+    summary: Summary = summarize(part, profile)
+    return [
+        ("overall", "overall", summary.overall, _known(part, profile, summary)),
+        ("task_weighted", "task_weighted", weighted_score(part, profile), _UNKNOWN),
+        *(("family", name, score, _UNKNOWN) for name, score in summary.families.items()),
+        *(
+            (column, name, summarize(half, profile).overall, _UNKNOWN)
+            for column in ("partition", "scene_type")
+            for name, half in slices(part, column, sorted(set(getattr(part, column).tolist())))
+        ),
+        *(("scene", name, score, _UNKNOWN) for name, score in summary.scenes.items()),
+    ]
+
+
+def _parted(run: Run, k: int, profile: Profile, partings: Partings) -> list[tuple[str, str, Score, list[float]]]:
+    """Score the parts of the k-th run's episodes."""
+    scored = []
+    for parting in partings.found:
+        for part in parting.parts:
+            episodes = run.episodes.where(part.masks[k])
+            summary = summarize(episodes, profile)
+            scored.append((parting.name, part.head, summary.overall, _known(episodes, profile, summary)))
+    return scored
+
+
+def _known(part: Episodes, profile: Profile, summary: Summary) -> list[float]:
+    """Deviations and ends of intervals of an overall score."""
+    spread = [getattr(summary.deviation, m) for m in METRICS]
+    return spread + [end for ends in score_intervals(part, profile) for end in ends]

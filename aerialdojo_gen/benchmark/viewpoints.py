@@ -1,0 +1,162 @@
+"""The valid viewpoints of targets, and whether an episode ended at one of them with the target in sight (SR-view).
+
+The paper's rule knows one viewpoint of a target, the anchor that was selected: who stops before another side of the
+same object has failed. A person would call that a success, and would not call it one where a wall or a floor stands
+between. SR-view is that rule: an explicit Stop, without collision, within the budget, at most the success radius from
+any valid viewpoint of the target, and the target in sight from the place of the Stop.
+
+In sight means that a straight line from the body's centre reaches the target: of points drawn from its surface one at
+least is met, or another place of the target on the way to it, before any other surface is. No line of sight to the
+viewpoint is asked for: what a person asks is whether the drone has found the object, and a post between two places
+from which both see it changes nothing. A goal is a viewpoint of its target in any case, so that every success by the
+paper's rule with the target in sight is one by this rule too.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aerialdojo_gen.benchmark.motion import Point
+from aerialdojo_gen.common import rng
+from aerialdojo_gen.errors import StoreError
+from aerialdojo_gen.geometry.surface import Surface
+from aerialdojo_gen.rendering.casters import ray_caster
+from aerialdojo_gen.scenes.context import context_of
+from aerialdojo_gen.scenes.model import Scene
+from aerialdojo_gen.store import shards as store
+from aerialdojo_gen.store.root import DataRoot
+
+Floats = NDArray[np.float64]
+
+# A target whose one sliver of 0.4 % shows is found by chance; most that can be seen is met by the first few rays.
+_POINTS = 256
+_FIRST = 16
+_TABLE = "release/viewpoints"
+_COLUMNS = ("object_id", "x_m", "y_m", "z_m")
+
+
+@dataclass(frozen=True)
+class View:
+    """Where a body is with regard to a target.
+
+    Attributes
+    ----------
+    viewpoint_distance_m : float
+        To the nearest valid viewpoint of the target, its goal included, metres.
+    target_in_sight : bool
+        A straight line reaches the target unobstructed.
+    """
+
+    viewpoint_distance_m: float
+    target_in_sight: bool
+
+
+def viewpoints_content(root: DataRoot, scene: str) -> list[str]:
+    """Digest a scene's viewpoints, for what depends on them; empty where the release has none, as older ones."""
+    return store.content(root, _TABLE, scene) if store.shards(root, _TABLE, scene) else []
+
+
+def without_viewpoints(scenes: Sequence[str], of: int) -> str:
+    """Say in one line which of so many scenes' episodes get no SR-view."""
+    which = "the release has" if len(scenes) == of else f"{', '.join(scenes)}: the release has"
+    return f"{which} no viewpoints/, which an older version did not write: SR-view stays empty"
+
+
+@lru_cache(maxsize=64)
+def viewpoints_of(root: DataRoot, scene: str) -> dict[int, Floats] | None:
+    """Read the valid viewpoints of a scene's objects.
+
+    Parameters
+    ----------
+    root : DataRoot
+        The data root, with a release.
+    scene : str
+
+    Returns
+    -------
+    dict of int to (n, 3) float64, or None
+        By ``object_id``, metres, world frame; None where the release has no viewpoints.
+
+    Raises
+    ------
+    StoreError
+        The file is damaged.
+    """
+    if not store.shards(root, _TABLE, scene):
+        return None
+    table = store.read_scene(root, _TABLE, scene, _COLUMNS)
+    ids = table["object_id"].to_numpy()
+    xyz = np.column_stack([table[column].to_numpy() for column in _COLUMNS[1:]])
+    return {int(k): xyz[ids == k] for k in np.unique(ids)}
+
+
+@lru_cache(maxsize=64)
+def nodes_of(root: DataRoot, scene: str) -> dict[int, str]:
+    """Read which node of a scene's mesh is which object: by ``object_id``."""
+    table = store.read_scene(root, "release/objects", scene, ("object_id", "mesh_node"))
+    return dict(zip(table["object_id"].to_pylist(), table["mesh_node"].to_pylist(), strict=True))
+
+
+def in_sight(scene: Scene, node: str, position: Point) -> bool:
+    """Tell whether a straight line from a place reaches an object, before any other surface.
+
+    Parameters
+    ----------
+    scene : Scene
+    node : str
+        The object's node name.
+    position : tuple of float
+        Metres, world frame.
+
+    Raises
+    ------
+    StoreError
+        The scene has no such node.
+    """
+    points, index = _aims(scene, node)
+    rays = ray_caster(scene)
+    return any(bool(rays.visible(position, some, index).any()) for some in (points[:_FIRST], points[_FIRST:]))
+
+
+def _aims(scene: Scene, node: str) -> tuple[Floats, int]:
+    """Draw points of an object's surface, the same in every process, in an order that goes all over it."""
+    known: dict[str, tuple[Floats, int]] = context_of(scene).part("points to see", dict)
+    if node not in known:
+        if node not in scene:
+            raise StoreError(f"{scene.name} has no node {node!r}: its mesh and the release do not belong together")
+        draws = rng.generator(0, "in-sight", node)
+        points = Surface.of(scene[node]).sample(_POINTS, draws)
+        index = next(k for k, instance in enumerate(scene.instances) if instance.node == node)
+        known[node] = (draws.permutation(points), index)
+    return known[node]
+
+
+def viewed(scene: Scene, node: str, viewpoints: Floats, goal: Point, position: Point) -> View:
+    """Say where a body is with regard to a target.
+
+    Parameters
+    ----------
+    scene : Scene
+    node : str
+        The target's node name.
+    viewpoints : (n, 3) float64
+        The target's valid viewpoints, metres, world frame; may be none.
+    goal : tuple of float
+        The goal anchor's position, which is a viewpoint in any case.
+    position : tuple of float
+        Of the body's centre.
+
+    Returns
+    -------
+    View
+    """
+    nearest = math.dist(position, goal)
+    if len(viewpoints):
+        nearest = min(nearest, float(np.linalg.norm(viewpoints - np.array(position), axis=1).min()))
+    return View(nearest, in_sight(scene, node, position))

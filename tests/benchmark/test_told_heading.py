@@ -1,0 +1,112 @@
+"""--tell heading: agents are told which way they face at the start, where it is asked for, and runs never mix."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from support.walled import write_walled
+
+from aerialdojo_gen.agents import AgentBase
+from aerialdojo_gen.agents.goal import BLIND, Goal, Heading, Observation
+from aerialdojo_gen.benchmark import AerialDojoEnv
+from aerialdojo_gen.benchmark.contents import Wanted, report_tables
+from aerialdojo_gen.benchmark.episodes import read_run
+from aerialdojo_gen.benchmark.profiles import PROFILES
+from aerialdojo_gen.benchmark.runner import Evaluation, evaluate
+from aerialdojo_gen.benchmark.runs import load_runs
+from aerialdojo_gen.benchmark.score_rows import as_csv
+from aerialdojo_gen.errors import UsageError
+from aerialdojo_gen.geometry.frames import compass_direction, compass_heading
+from aerialdojo_gen.llm.prompt import Sight, goal_text, system_prompt
+from aerialdojo_gen.store.root import open_root
+
+ME = f"{__name__}:Listener"
+
+
+class Listener(AgentBase):
+    """Keeps the goals that it is told, and stops."""
+
+    sensors = BLIND
+    heard: list[Goal] = []  # noqa: RUF012 (the runner makes the instance)
+
+    def reset(self, goal: Goal) -> None:
+        self.heard.append(goal)
+
+    def act(self, observation: Observation) -> int:
+        return 0
+
+
+@pytest.fixture(scope="module")
+def court(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_walled(tmp_path_factory.mktemp("walled"))
+
+
+@given(st.floats(-20.0, 20.0))
+def test_a_compass_shows_the_way_that_a_yaw_looks(yaw_rad: float) -> None:
+    word, degrees = compass_heading(yaw_rad)
+    assert isinstance(degrees, int)
+    assert 0 <= degrees < 360
+    # North is +y, east +x: the heading's own vector is the yaw's, to half a degree.
+    ahead = math.sin(math.radians(degrees)) * math.cos(yaw_rad) + math.cos(math.radians(degrees)) * math.sin(yaw_rad)
+    assert ahead >= math.cos(math.radians(0.5)) - 1e-9
+    assert word == compass_direction(math.sin(math.radians(degrees)), math.cos(math.radians(degrees)))
+
+
+@pytest.mark.parametrize(
+    ("yaw_deg", "told"), [(90, ("north", 0)), (0, ("east", 90)), (180, ("west", 270)), (-135, ("southwest", 225))]
+)
+def test_known_headings(yaw_deg: float, told: tuple[str, int]) -> None:
+    assert compass_heading(math.radians(yaw_deg)) == told
+
+
+def test_it_is_told_where_it_is_asked_for_and_logged(court: Path, tmp_path: Path) -> None:
+    Listener.heard.clear()
+    evaluate(court, Evaluation("plain", ME), out=tmp_path)
+    assert [goal.heading for goal in Listener.heard] == [None] * 3
+    Listener.heard.clear()
+    evaluate(court, Evaluation("told", ME, tell=("heading",)), out=tmp_path)
+    # The tasks look west.
+    assert [goal.heading for goal in Listener.heard] == [Heading("west", 270)] * 3
+    assert read_run(tmp_path, "plain")["told"].to_pylist() == [""] * 3
+    assert read_run(tmp_path, "told")["told"].to_pylist() == ["heading"] * 3
+    runs = load_runs(tmp_path, ["plain", "told"])
+    assert [run.label for run in runs] == [ME, f"{ME} + heading"]
+    (overall,) = report_tables(Wanted(open_root(court), runs, [PROFILES["aerialdojo"]]), ["overall"])
+    assert f"Told more than the goal: {ME} + heading (heading)." in overall.notes
+    told = {line.split(",")[0]: line.split(",")[-1] for line in as_csv(runs, [PROFILES["aerialdojo"]]).splitlines()}
+    assert told == {"run": "told", "plain": "", "told": "heading"}
+
+
+def test_a_run_with_it_never_mixes_with_one_without(court: Path, tmp_path: Path) -> None:
+    evaluate(court, Evaluation("r", "stop"), out=tmp_path)
+    with pytest.raises(UsageError, match=r"run 'r' was begun with tell = \[\], not \['heading'\]: give"):
+        evaluate(court, Evaluation("r", "stop", tell=("heading",)), out=tmp_path)
+    evaluate(court, Evaluation("r", "stop", tell=("heading",)), out=tmp_path, restart=True)
+    with pytest.raises(UsageError, match=r"begun with tell = \['heading'\], not \[\]"):
+        evaluate(court, Evaluation("r", "stop"), out=tmp_path)
+    with pytest.raises(UsageError, match="nothing to tell called 'headings': did you mean 'heading'"):
+        Evaluation("r", "stop", tell=("headings",))
+
+
+def test_a_language_model_reads_it_in_its_goal(court: Path, tmp_path: Path) -> None:
+    Listener.heard.clear()
+    evaluate(court, Evaluation("plain", ME), out=tmp_path)
+    evaluate(court, Evaluation("told", ME, tell=("heading",)), out=tmp_path)
+    plain, told = Listener.heard[0], Listener.heard[3]
+    assert "faces west: a compass would show 270°" in goal_text(told)
+    assert goal_text(told).endswith("Description: A crate.")
+    assert "compass" not in goal_text(plain)
+    assert "no compass. Find" in system_prompt(plain, Sight())
+    assert "no compass, but you are told which way the drone faces at the start. Find" in system_prompt(told, Sight())
+
+
+def test_the_environment_observes_it(court: Path) -> None:
+    plain, told = (AerialDojoEnv(court, views=(), tell=tell) for tell in ((), "heading"))
+    assert "heading" not in plain.reset()[0]["goal"]
+    seen = told.reset()[0]
+    assert told.observation_space.contains(seen)
+    assert (int(seen["goal"]["heading"]), seen["goal"]["heading_deg"].tolist()) == (4, [270])
