@@ -85,7 +85,7 @@ def _among(value: Any) -> bool:
 
 
 _FORMS: Mapping[str, Callable[[Any], bool]] = {
-    **dict.fromkeys(THINGS | SIDES | {"surface"}, _text),
+    **dict.fromkeys(THINGS | SIDES | {"surface", "by"}, _text),
     "floor": lambda v: isinstance(v, list) and len(v) == 2 and isinstance(v[0], int) and _text(v[1]),
     "between": lambda v: isinstance(v, list) and len(v) == 2 and all(map(_text, v)),
     "z": lambda v: isinstance(v, list) and len(v) == 2 and all(map(_number, v)) and v[0] < v[1],

@@ -11,6 +11,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
+from aerialdojo_gen.annotations.grounds import GROUND, Grounds
 from aerialdojo_gen.annotations.place_files import SIDES, Conditions
 from aerialdojo_gen.annotations.relations import SceneGeometry
 
@@ -19,7 +20,6 @@ _REACH_M: Mapping[str, float] = {"touching": TOUCHING_M, "beside": BESIDE_M, "at
 _STEP_M = 0.4
 _SLAB_SHARE = 0.06  # of the outline: a smaller level surface is a sill or a stair
 _STOREY_M = 1.6
-_GROUND = ("ground", "terrain")
 _CORNERS: Mapping[str, tuple[int, int]] = {
     "north": (0, 1), "south": (0, -1), "east": (1, 0), "west": (-1, 0),
     "northeast": (1, 1), "northwest": (-1, 1), "southeast": (1, -1), "southwest": (-1, -1),
@@ -40,6 +40,7 @@ class Places:
     def __init__(self, geometry: SceneGeometry, phrases: Mapping[str, Conditions]) -> None:
         self._geometry = geometry
         self._phrases = {phrase.lower(): conditions for phrase, conditions in phrases.items()}
+        self._grounds = Grounds(geometry)
         self._sets: dict[str, frozenset[int]] = {}
         self._slabs: dict[int, NDArray[np.float64]] = {}
         self._found: dict[tuple[int, str, float], str] = {}
@@ -82,7 +83,7 @@ class Places:
         for phrase, conditions in self._phrases.items():
             for key, value in conditions.items():
                 texts = [v for v in (value if isinstance(value, list) else [value]) if isinstance(v, str)]
-                if key not in ("surface", "part", "among", "over"):
+                if key not in ("surface", "by", "part", "among", "over"):
                     missing += [f"{phrase}: {key} = {text}" for text in texts if not self._things(text)]
         return missing
 
@@ -211,6 +212,10 @@ class Places:
         good = sum(self._named(material, pattern) for material in found)
         return good >= (1 if slack > 1.0 else (len([m for m in found if m]) + 1) // 2) and good > 0
 
+    def _by(self, i: int, pattern: str, slack: float) -> bool:
+        """Ground of that material is no farther than what one stands beside."""
+        return self._grounds.within(i, pattern, BESIDE_M * slack)
+
     @staticmethod
     def _named(material: str, pattern: str) -> bool:
         return any(fnmatchcase(material, one) for one in pattern.split("|"))
@@ -240,7 +245,7 @@ class Places:
         low = float(geometry.boxes[i, 0, 2])
         x, y = (float(c) for c in geometry.centres[i, :2])
         for j, heights in geometry.columns(i, x, y):
-            if geometry.scene.instances[j].category in _GROUND:
+            if geometry.scene.instances[j].category in GROUND:
                 below = heights[heights <= low + _STEP_M]
                 if len(below) and low - float(below.max()) < least_m:
                     return False
@@ -285,7 +290,7 @@ class Places:
         heights = []
         for x, y in ((x0 - 1, y0 - 1), (x1 + 1, y0 - 1), (x0 - 1, y1 + 1), (x1 + 1, y1 + 1)):
             for k, found in geometry.columns(j, float(x), float(y)):
-                if geometry.scene.instances[k].category in _GROUND:
+                if geometry.scene.instances[k].category in GROUND:
                     heights.append(float(found.max()))
         return float(np.median(heights)) if heights else float(low)
 
