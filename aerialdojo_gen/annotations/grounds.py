@@ -9,7 +9,7 @@ import shapely
 
 from aerialdojo_gen.annotations.relations import SceneGeometry
 
-GROUND = ("ground", "terrain")
+GROUND = ("ground", "terrain", "river")
 _RISE_M = 3.0
 
 
@@ -48,7 +48,7 @@ class Grounds:
             found = [
                 part.vertices[part.faces]
                 for thing in self._geometry.scene.instances
-                if thing.category in GROUND or thing.category == "river"
+                if thing.category in GROUND
                 for part in thing.parts
                 if any(fnmatchcase(part.material, one) for one in pattern.split("|"))
             ]

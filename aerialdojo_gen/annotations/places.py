@@ -192,14 +192,14 @@ class Places:
         return False
 
     def _over(self, i: int, pattern: str, _slack: float) -> bool:
-        """Above a thing, or above a surface of that material."""
+        """Above a thing, or above ground of that material."""
         geometry = self._geometry
         low = float(geometry.boxes[i, 0, 2])
         for j in sorted(self._things(pattern) - {i}):
             lower = float(geometry.boxes[j, 0, 2]) < low + _STEP_M
             if lower and shapely.intersects(geometry.outline(i), geometry.outline(j)):
                 return True
-        below = self._materials(i, self._grid(i), lambda heights: heights < low + _STEP_M)
+        below = self._materials(i, self._grid(i), lambda heights: heights < low + _STEP_M, ground=True)
         return any(self._named(material, pattern) for material in below)
 
     def _surface(self, i: int, pattern: str, slack: float) -> bool:
@@ -225,13 +225,19 @@ class Places:
         return [(x0 + a * (x1 - x0), y0 + b * (y1 - y0)) for a in (0.2, 0.5, 0.8) for b in (0.2, 0.5, 0.8)]
 
     def _materials(
-        self, i: int, points: list[tuple[float, float]], fits: Callable[[NDArray[np.float64]], Any]
+        self,
+        i: int,
+        points: list[tuple[float, float]],
+        fits: Callable[[NDArray[np.float64]], Any],
+        ground: bool = False,
     ) -> list[str]:
         """Material of the highest fitting surface at each point; empty where there is none."""
         found = []
         for x, y in points:
             best, name = -math.inf, ""
             for j, _ in self._geometry.columns(i, x, y):
+                if ground and self._geometry.scene.instances[j].category not in GROUND:
+                    continue
                 for material, heights in self._geometry.surfaces(j, x, y):
                     good = heights[fits(heights)]
                     if len(good) and float(good.max()) > best:
