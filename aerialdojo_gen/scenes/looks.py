@@ -136,11 +136,7 @@ def parse_looks(raw: Any, names: Sequence[str], materials: Sequence[str], where:
     """
     if not isinstance(raw, list):
         raise AssetError(f"{where}: looks must be an array of tables")
-    looks = tuple(
-        _look(entry, names, materials, f"{where} looks[{k}]")
-        for k, entry in enumerate(raw)
-        if entry.__class__ is not str
-    )
+    looks = tuple(_look(entry, names, materials, f"{where} looks[{k}]") for k, entry in enumerate(raw))
     said = [look.say for look in looks]
     for k, say in enumerate(said):
         if say in said[:k]:

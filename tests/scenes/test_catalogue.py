@@ -8,6 +8,7 @@ import pytest
 from aerialdojo_gen.common.rng import generator
 from aerialdojo_gen.errors import AssetError
 from aerialdojo_gen.scenes.catalogue import load_catalogue
+from aerialdojo_gen.scenes.catalogue_check import catalogue_faults
 
 ASSETS = Path(__file__).parents[2] / "scene_assets"
 
@@ -230,3 +231,9 @@ def test_every_shipped_surface_can_be_drawn(shipped):
         surface = shipped.materials[name]
         assert surface.texture is None or surface.texture.shape[2] == 3
         assert 0 <= min(surface.colour) <= max(surface.colour) <= 255
+
+
+def test_all_that_the_catalogue_says_of_targets_is_so_of_every_variant_it_builds():
+    catalogue = load_catalogue(ASSETS)
+    assert len(catalogue.targets) == 254
+    assert catalogue_faults(catalogue) == []
