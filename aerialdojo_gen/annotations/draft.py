@@ -80,9 +80,9 @@ def redraft_annotations(scene: Scene, catalogue: Catalogue, annotations: Annotat
     AnnotationError
         A node is gone, or an object cannot be told from others of its kind.
     """
-    for entry in (*annotations.landmarks, *annotations.objects):
-        if entry.node not in scene:
-            raise AnnotationError(f"{scene.name}: no node {entry.node!r} in the scene: draft the file anew")
+    for node in (*(m.node for m in annotations.landmarks), *(o.node for o in annotations.objects)):
+        if node not in scene:
+            raise AnnotationError(f"{scene.name}: no node {node!r} in the scene: draft the file anew")
     vocabulary = Vocabulary(scene, catalogue)
     teller = Teller(vocabulary, sorted(annotations.landmarks, key=lambda mark: mark.id), seed)
     index = teller.ambiguity.geometry.index

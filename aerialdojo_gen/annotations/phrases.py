@@ -1,4 +1,4 @@
-"""Words for drafts: noun phrases of instances, and what each category looks like (`phrases/*.toml`)."""
+"""Words for drafts: noun phrases of instances, and how each category is spoken of (`phrases/*.toml`)."""
 
 from __future__ import annotations
 

@@ -10,7 +10,7 @@ fixed by the word: who writes *beside* means at most 5 m.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -84,8 +84,8 @@ def _among(value: Any) -> bool:
     )  # fmt: skip
 
 
-_FORMS = {
-    **dict.fromkeys(THINGS | SIDES | {"surface"}, _text),
+_FORMS: Mapping[str, Callable[[Any], bool]] = {
+    **dict.fromkeys(THINGS | SIDES | {"surface", "by"}, _text),
     "floor": lambda v: isinstance(v, list) and len(v) == 2 and isinstance(v[0], int) and _text(v[1]),
     "between": lambda v: isinstance(v, list) and len(v) == 2 and all(map(_text, v)),
     "z": lambda v: isinstance(v, list) and len(v) == 2 and all(map(_number, v)) and v[0] < v[1],

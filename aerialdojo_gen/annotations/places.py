@@ -11,6 +11,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
+from aerialdojo_gen.annotations.grounds import GROUND, Grounds
 from aerialdojo_gen.annotations.place_files import SIDES, Conditions
 from aerialdojo_gen.annotations.relations import SceneGeometry
 
@@ -19,7 +20,6 @@ _REACH_M: Mapping[str, float] = {"touching": TOUCHING_M, "beside": BESIDE_M, "at
 _STEP_M = 0.4
 _SLAB_SHARE = 0.06  # of the outline: a smaller level surface is a sill or a stair
 _STOREY_M = 1.6
-_GROUND = ("ground", "terrain")
 _CORNERS: Mapping[str, tuple[int, int]] = {
     "north": (0, 1), "south": (0, -1), "east": (1, 0), "west": (-1, 0),
     "northeast": (1, 1), "northwest": (-1, 1), "southeast": (1, -1), "southwest": (-1, -1),
@@ -40,6 +40,7 @@ class Places:
     def __init__(self, geometry: SceneGeometry, phrases: Mapping[str, Conditions]) -> None:
         self._geometry = geometry
         self._phrases = {phrase.lower(): conditions for phrase, conditions in phrases.items()}
+        self._grounds = Grounds(geometry)
         self._sets: dict[str, frozenset[int]] = {}
         self._slabs: dict[int, NDArray[np.float64]] = {}
         self._found: dict[tuple[int, str, float], str] = {}
@@ -82,7 +83,7 @@ class Places:
         for phrase, conditions in self._phrases.items():
             for key, value in conditions.items():
                 texts = [v for v in (value if isinstance(value, list) else [value]) if isinstance(v, str)]
-                if key not in ("surface", "part", "among", "over"):
+                if key not in ("surface", "by", "part", "among", "over"):
                     missing += [f"{phrase}: {key} = {text}" for text in texts if not self._things(text)]
         return missing
 
@@ -191,14 +192,14 @@ class Places:
         return False
 
     def _over(self, i: int, pattern: str, _slack: float) -> bool:
-        """Above a thing, or above a surface of that material."""
+        """Above a thing, or above ground of that material."""
         geometry = self._geometry
         low = float(geometry.boxes[i, 0, 2])
         for j in sorted(self._things(pattern) - {i}):
             lower = float(geometry.boxes[j, 0, 2]) < low + _STEP_M
             if lower and shapely.intersects(geometry.outline(i), geometry.outline(j)):
                 return True
-        below = self._materials(i, self._grid(i), lambda heights: heights < low + _STEP_M)
+        below = self._materials(i, self._grid(i), lambda heights: heights < low + _STEP_M, ground=True)
         return any(self._named(material, pattern) for material in below)
 
     def _surface(self, i: int, pattern: str, slack: float) -> bool:
@@ -211,6 +212,10 @@ class Places:
         good = sum(self._named(material, pattern) for material in found)
         return good >= (1 if slack > 1.0 else (len([m for m in found if m]) + 1) // 2) and good > 0
 
+    def _by(self, i: int, pattern: str, slack: float) -> bool:
+        """Ground of that material is no farther than what one stands beside."""
+        return self._grounds.within(i, pattern, BESIDE_M * slack)
+
     @staticmethod
     def _named(material: str, pattern: str) -> bool:
         return any(fnmatchcase(material, one) for one in pattern.split("|"))
@@ -220,13 +225,19 @@ class Places:
         return [(x0 + a * (x1 - x0), y0 + b * (y1 - y0)) for a in (0.2, 0.5, 0.8) for b in (0.2, 0.5, 0.8)]
 
     def _materials(
-        self, i: int, points: list[tuple[float, float]], fits: Callable[[NDArray[np.float64]], Any]
+        self,
+        i: int,
+        points: list[tuple[float, float]],
+        fits: Callable[[NDArray[np.float64]], Any],
+        ground: bool = False,
     ) -> list[str]:
         """Material of the highest fitting surface at each point; empty where there is none."""
         found = []
         for x, y in points:
             best, name = -math.inf, ""
             for j, _ in self._geometry.columns(i, x, y):
+                if ground and self._geometry.scene.instances[j].category not in GROUND:
+                    continue
                 for material, heights in self._geometry.surfaces(j, x, y):
                     good = heights[fits(heights)]
                     if len(good) and float(good.max()) > best:
@@ -240,7 +251,7 @@ class Places:
         low = float(geometry.boxes[i, 0, 2])
         x, y = (float(c) for c in geometry.centres[i, :2])
         for j, heights in geometry.columns(i, x, y):
-            if geometry.scene.instances[j].category in _GROUND:
+            if geometry.scene.instances[j].category in GROUND:
                 below = heights[heights <= low + _STEP_M]
                 if len(below) and low - float(below.max()) < least_m:
                     return False
@@ -285,7 +296,7 @@ class Places:
         heights = []
         for x, y in ((x0 - 1, y0 - 1), (x1 + 1, y0 - 1), (x0 - 1, y1 + 1), (x1 + 1, y1 + 1)):
             for k, found in geometry.columns(j, float(x), float(y)):
-                if geometry.scene.instances[k].category in _GROUND:
+                if geometry.scene.instances[k].category in GROUND:
                     heights.append(float(found.max()))
         return float(np.median(heights)) if heights else float(low)
 

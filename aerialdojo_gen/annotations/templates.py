@@ -23,7 +23,7 @@ FULL = (
     "Search for {a} {rel}. It has {look}.",
     "{Rel} you will see {a} with {look}.",
     "{Rel} you will find {a}; it has {look}.",
-    "The {bare} {rel} is the target. It has {look}.",
+    "The target is {a} {ing} {rel}. It has {look}.",
     "Your target is {a}, {ing} {rel}. It has {look}.",
     "{A} {verb} {rel}. You will notice {look}.",
     "Go to the {bare} {rel}, the one with {look}.",

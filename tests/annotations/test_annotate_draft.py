@@ -91,7 +91,8 @@ def test_things_that_cannot_be_told_apart_are_not_drafted(catalogue):
         catalogue.instantiate("mailbox", f"mailbox_{k:03d}", rng, (30.0, 30.0 + 30.0 * k, 0.0), variant="red")
         for k in range(2)
     ]
-    scene = dataclasses.replace(street(), name="U_Twins_0", instances=(tower, *twins))
+    materials = {p.material: catalogue.materials[p.material] for i in (tower, *twins) for p in i.parts}
+    scene = dataclasses.replace(street(), name="U_Twins_0", instances=(tower, *twins), materials=materials)
     with pytest.raises(AnnotationError, match="can be chosen and told apart"):
         draft_annotations(scene, catalogue, 1, 1, 0)
 

@@ -33,7 +33,7 @@ def _house() -> tuple[Instance, ...]:
 def yard() -> Scene:
     things = (
         box("ground_000", (0, 0, -0.2), (80, 80, 0.2), colour="green"),
-        box("ground_001", (30, 0, -0.1), (16, 16, 0.1), colour="grey"),
+        box("ground_001", (30, 0, -0.1), (16, 16, 0.12), colour="grey"),
         *_house(),
         box("mailbox_000", (5.4, 0, 0), (0.6, 0.6, 1.2)),
         box("mailbox_001", (12, 0, 0), (0.6, 0.6, 1.2)),
@@ -62,6 +62,7 @@ CASES = [
     ("between house and wall", {"between": ["house", "wall_000"]}, {"mailbox_000", "mailbox_001", "sign_000"}),
     ("in the west", {"part": "west"}, {"sedan_002"}),
     ("over the asphalt", {"over": "grey"}, {"sedan_000", "sedan_001"}),
+    ("beside the asphalt", {"by": "grey", "west_of": "sedan_000"}, {"wall_000", "sign_000"}),
 ]  # fmt: skip
 
 
