@@ -9,13 +9,16 @@ from support.handmade import box, instance, scene
 from aerialdojo_gen.planning.clearance import ClearanceGrid
 from aerialdojo_gen.planning.connectivity import MOVE_LENGTHS, MOVES
 from aerialdojo_gen.planning.cost_to_go import columns_by_distance, cost_at, expand_cost, seed_goal
+from aerialdojo_gen.planning.preference import NO_PREFERENCE, narrow_cells
 
 
 def field(grid, goal, bound=200.0):
     cost = np.full(grid.moves.shape, np.inf, np.float32)
-    seeds = seed_goal(*goal, 1.0, grid.radius_m, grid.arrays, grid.moves, cost)
+    seeds = seed_goal(*goal, 0.0, 1.0, grid.radius_m, grid.arrays, grid.moves, cost, NO_PREFERENCE)
     order = columns_by_distance(math.ceil((bound + 2.0) / grid.arrays.cell))
-    visits = expand_cost(seeds, order, bound, grid.arrays.cell, grid.moves, cost)
+    visits = expand_cost(
+        seeds, order, bound, grid.arrays.cell, grid.moves, cost, narrow_cells(grid.arrays.field, NO_PREFERENCE)
+    )
     return cost, seeds, visits
 
 
@@ -34,7 +37,7 @@ def test_it_is_dijkstras_on_the_same_graph():
         columns.append(np.ravel_multi_index((i[has] + dx, j[has] + dy, k[has] + dz), shape))
         lengths.append(np.full(has.sum(), MOVE_LENGTHS[m] * grid.arrays.cell))
     again = np.full(shape, np.inf, np.float32)
-    seed_goal(*goal, 1.0, grid.radius_m, grid.arrays, grid.moves, again)
+    seed_goal(*goal, 0.0, 1.0, grid.radius_m, grid.arrays, grid.moves, again, NO_PREFERENCE)
     source = np.full(len(seeds), n)
     rows.append(source)
     columns.append(seeds)
