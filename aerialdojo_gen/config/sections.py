@@ -163,7 +163,7 @@ class PlanConfig(Section):
         1.0, gt=0, le=10, description="clearance below which a metre costs more than a metre"
     )
     clearance_weight: float = Field(
-        0.5, ge=0, le=10, description="what a metre at a surface costs beside itself, in metres; 0 for no preference"
+        0.8, ge=0, le=10, description="what a metre at a surface costs beside itself, in metres; 0 for no preference"
     )
     max_approach_angle_deg: float = Field(
         60.0, gt=0, le=180, description="largest angle between the Approach and the final heading, where avoidable"
