@@ -22,7 +22,7 @@ from aerialdojo_gen.scenes.model import Scene
 # Between cells the cost-to-go is interpolated: a little more than it is taken for what it promises.
 _INTERPOLATION = 1.005
 # Few states of the lattice lie where an Approach flies ahead: a search for the very best one would expand all others.
-_NEAR_ENOUGH_M = 0.2
+_NEAR_ENOUGH_M = 0.15
 # What the longest routes cost beside their metres for the surfaces that they come near, at a weight of 1; 99 in 100
 # cost less.
 _EXTRA_M = 3.0

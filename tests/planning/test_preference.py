@@ -80,22 +80,26 @@ def test_an_approach_flies_ahead():
 
 def test_a_goal_that_can_be_reached_from_its_front_alone_is_reached_so():
     # A niche that opens to the goal's front: from behind, from above and from the sides there is rock.
-    walls = [box((-2, -2, 0), (-0.4, 2, 5)), box((-2, 0.45, 0), (2, 2, 5)), box((-2, -2, 0), (2, -0.45, 5)),
-             box((-2, -2, 1.6), (2, 2, 5))]  # fmt: skip
+    walls = [box((-2, -3, 0), (-0.3, 3, 5)), box((-2, 0.9, 0), (2, 3, 5)), box((-2, -3, 0), (2, -0.9, 5)),
+             box((-2, -3, 2.2), (2, 3, 5))]  # fmt: skip
     world = scene(instance("rock", *walls))
     (route,) = Planner(world, PlanConfig(), RADIUS).plan_target((0.0, 0.0, 1.0, 0.0), [(7.0, 4.0, 3.0, 1.0)])
     assert route.outcome == "SOLVED"
     assert off_heading(route) > 90.0
 
 
-def test_a_wall_is_not_climbed_flush():
-    """A roof stands in the way: the climb to it keeps off the wall, though hugging it is as short."""
+def test_walls_are_not_climbed_flush():
+    """A house stands in the way: climbs to its roof keep off the wall, though hugging it is as short."""
     world = scene(instance("house", box((4, -12, 0), (10, 12, 6))), half=14.0, ceiling=12.0)
-    start, goal = (-3.0, 0.0, 2.0, 0.0), (12.0, 0.3, 3.0, 0.0)
-    (hugs,) = Planner(world, INDIFFERENT, RADIUS).plan_target(goal, [start])
-    (keeps,) = Planner(world, PlanConfig(), RADIUS).plan_target(goal, [start])
-    assert keeps.min_clearance_m >= 0.75 > hugs.min_clearance_m
-    assert keeps.length_m <= hugs.length_m + 1.5
+    starts = [(x, y, 2.0, 0.3) for x in np.linspace(-4.0, -2.0, 5) for y in (-3.0, 0.0, 3.0)]
+    goal = (12.0, 0.3, 3.0, math.pi)
+    hugs = Planner(world, INDIFFERENT, RADIUS).plan_target(goal, starts)
+    keeps = Planner(world, PlanConfig(), RADIUS).plan_target(goal, starts)
+    near, far = (np.array([r.min_clearance_m for r in routes]) for routes in (hugs, keeps))
+    assert near.min() < 0.4
+    assert far.min() > 0.6
+    assert np.median(far) > 0.8
+    assert sum(r.length_m for r in keeps) <= sum(r.length_m for r in hugs) + len(starts)
 
 
 @settings(max_examples=60, deadline=None)
@@ -107,7 +111,6 @@ def test_a_wall_is_not_climbed_flush():
 def test_near_the_ground_the_cost_of_clearance_is_the_integral(a, b, weight):
     grid = flat_ground()
     found = squeeze(*a, *b, 1.0, weight, *grid.origin, grid.cell, grid.field)
-    assert found == squeeze(*a, *b, 1.0, 1.0, *grid.origin, grid.cell, grid.field) * pytest.approx(weight)
     length = math.dist(a, b)
     assert found == pytest.approx(weight * length * (1.0 - (a[2] + b[2]) / 2), rel=1e-3, abs=1e-3)
     assert squeeze(*b, *a, 1.0, weight, *grid.origin, grid.cell, grid.field) == pytest.approx(found, rel=1e-6)
