@@ -174,7 +174,19 @@ class PlanConfig(Section):
         0.02, ge=0, le=100, description="what an action costs beside its metres: breaks ties"
     )
     sideways_actions_per_m: float = Field(
-        1.0, ge=0, le=1000, description="what a metre flown sideways counts as: the front camera should see the way"
+        0.25, ge=0, le=1000, description="what a metre flown sideways counts as: the front camera should see the way"
+    )
+    clearance_preference_m: float = Field(
+        1.0, gt=0, le=10, description="clearance below which a metre costs more than a metre"
+    )
+    clearance_weight: float = Field(
+        1.2, ge=0, le=10, description="what a metre at a surface costs beside itself, in metres; 0 for no preference"
+    )
+    max_approach_angle_deg: float = Field(
+        60.0, gt=0, le=180, description="largest angle between the Approach and the final heading, where avoidable"
+    )
+    approach_detour_m: float = Field(
+        3.0, ge=0, le=100, description="what an Approach at a larger angle costs beside its length, in metres"
     )
     clearance_cap_m: float = Field(5.0, gt=0, le=100, description="clearances are known up to this distance")
     prove_by_grid: bool = Field(True, description="leave FCL unasked about legs that the grid proves free")

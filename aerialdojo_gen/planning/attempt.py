@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from aerialdojo_gen.common.terms import APPROACH, STOP
 from aerialdojo_gen.geometry.motion import fly
 from aerialdojo_gen.planning.certify import Examination, examine
-from aerialdojo_gen.planning.cost_to_go import cost_at
+from aerialdojo_gen.planning.cost_to_go import cost_at, extra_cost
 from aerialdojo_gen.planning.grid_kernels import GridArrays
 from aerialdojo_gen.planning.hybrid_astar import FOUND, SearchArrays, SearchOptions, search
 from aerialdojo_gen.planning.refine import moves_to_actions
@@ -47,6 +47,21 @@ class Attempt(NamedTuple):
     actions: NDArray[np.int8]
     length: float
     seen: Examination
+
+
+@njit(cache=True)
+def lengths_at(
+    points: NDArray[np.float64], goal: NDArray[np.float64], grid: GridArrays, moves: NDArray[np.uint32],
+    cost: NDArray[np.float32], narrow: NDArray[np.float32],
+) -> NDArray[np.float64]:  # fmt: skip
+    """Lengths of the cheapest grid paths from points, (n, 3) float64 metres; (n,) float64 metres."""
+    values = np.empty(len(points))
+    for i in range(len(points)):
+        x, y, z = points[i, 0], points[i, 1], points[i, 2]
+        values[i] = cost_at(x, y, z, grid, cost)
+        if values[i] < np.inf:
+            values[i] -= extra_cost(x, y, z, goal, grid, moves, cost, narrow)
+    return values
 
 
 @njit(cache=True)
@@ -102,7 +117,7 @@ def attempt(
     if status != FOUND:
         unseen = Examination(np.empty((0, 3)), False, np.empty(0, np.bool_), 0.0)
         return Attempt(status, expansions, np.empty((0, 4)), np.empty(0, np.int8), 0.0, unseen)
-    flown = moves_to_actions(start, moves, goal_heading, options.sideways, options.radius, grid)
+    flown = moves_to_actions(start, moves, goal_heading, options, grid)
     poses = fly(start, flown)
     n = len(flown)
     dx, dy, dz = goal[0] - poses[n, 0], goal[1] - poses[n, 1], goal[2] - poses[n, 2]

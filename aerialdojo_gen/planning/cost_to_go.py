@@ -3,6 +3,9 @@
 The metric is the action set's: horizontal and vertical motion are separate moves, so that up to the grid's 16
 directions the cost of a free displacement is |horizontal| + |vertical| (at most 2.7 % above it).
 
+Ways near surfaces cost more than their metres (`aerialdojo_gen.planning.preference`), and so does what ends in an
+Approach that does not fly ahead.
+
 Cells are relaxed a column at a time, for a column lies together in memory and its cells are computed side by side.
 """
 
@@ -17,12 +20,17 @@ from numpy.typing import NDArray
 
 from aerialdojo_gen.planning.connectivity import MOVE_LENGTHS, MOVES, N_HALF, cell_centre
 from aerialdojo_gen.planning.grid_kernels import GridArrays, segment_free
+from aerialdojo_gen.planning.preference import NARROW_UNIT, Preference, astray, squeeze
 
 # Costs are multiples of this, so that float32 adds them without rounding and equal costs compare equal.
 _QUANTUM_M = 2.0**-12
+# So coarse are the lengths that the cells' narrowness is multiplied with, for the same reason.
+_COARSE_M = _QUANTUM_M / NARROW_UNIT
 _UP = N_HALF - 1
 _DOWN = _UP + N_HALF
 _FLAT = np.flatnonzero(MOVES[:, 2] == 0)
+# Moves along an axis, across a square and a knight's: the first of each kind, and the kind of every move.
+_, _KINDS, _KIND = np.unique(MOVE_LENGTHS, return_index=True, return_inverse=True)
 
 
 @lru_cache(maxsize=4)
@@ -53,10 +61,33 @@ def columns_by_distance(reach: int) -> NDArray[np.int32]:
 
 @njit(cache=True)
 def seed_goal(
-    gx: float, gy: float, gz: float, reach: float, radius: float,
-    grid: GridArrays, moves: NDArray[np.uint32], cost: NDArray[np.float32],
+    gx: float, gy: float, gz: float, yaw: float, reach: float, radius: float,
+    grid: GridArrays, moves: NDArray[np.uint32], cost: NDArray[np.float32], prefer: Preference,
 ) -> NDArray[np.int32]:  # fmt: skip
-    """Write the straight distance to the goal into the cells that see it within `reach`; return their numbers."""
+    """Write the cost of the straight way to the goal into the cells that see it within `reach`.
+
+    Parameters
+    ----------
+    gx, gy, gz, yaw : float
+        Goal, metres and radians.
+    reach : float
+        Longest Approach, metres.
+    radius : float
+        Radius that must stay clear, metres.
+    grid : GridArrays
+        The clearance grid.
+    moves : (nx, ny, nz) uint32
+        Its passable moves.
+    cost : (nx, ny, nz) float32
+        Filled in place, metres.
+    prefer : Preference
+        What costs beside metres.
+
+    Returns
+    -------
+    (n,) int32
+        Numbers of the cells that were written.
+    """
     nx, ny, nz = cost.shape
     found = np.empty(4096, np.int32)
     n = 0
@@ -80,6 +111,9 @@ def seed_goal(
                 x, y, z = cell_centre(i, j, k, grid)
                 d = math.sqrt((x - gx) ** 2 + (y - gy) ** 2 + (z - gz) ** 2)
                 if d <= reach and segment_free(x, y, z, gx, gy, gz, radius, grid, False):
+                    d += astray(gx - x, gy - y, yaw, d, prefer.ahead_cos, prefer.astray)
+                    d += squeeze(x, y, z, gx, gy, gz, prefer.clearance, prefer.weight,
+                                 grid.origin[0], grid.origin[1], grid.origin[2], grid.cell, grid.field)  # fmt: skip
                     cost[i, j, k] = round(d / _QUANTUM_M) * _QUANTUM_M
                     found[n] = (i * ny + j) * nz + k
                     n += 1
@@ -87,28 +121,42 @@ def seed_goal(
 
 
 @njit(cache=True, error_model="numpy")
-def _settle(column: NDArray[np.float32], moves: NDArray[np.uint32], length: np.float32) -> None:
+def _settle(
+    column: NDArray[np.float32], moves: NDArray[np.uint32], narrow: NDArray[np.float32], length: np.float32,
+    coarse: np.float32,
+) -> None:  # fmt: skip
     """Relax the vertical moves within a column, up and then down."""
     one = np.uint32(1)
     below = column[0]
     for k in range(1, column.shape[0]):
-        here, reached = column[k], below + length
+        here = column[k]
+        reached = below + (length + coarse * narrow[k - 1])
         if reached < here and (moves[k - 1] >> np.uint32(_UP)) & one:
             column[k] = here = reached
         below = here
     above = column[-1]
     for k in range(column.shape[0] - 2, -1, -1):
-        here, reached = column[k], above + length
+        here = column[k]
+        reached = above + (length + coarse * narrow[k + 1])
         if reached < here and (moves[k + 1] >> np.uint32(_DOWN)) & one:
             column[k] = here = reached
         above = here
 
 
 @njit(cache=True, error_model="numpy")
+def _leave(
+    column: NDArray[np.float32], narrow: NDArray[np.float32], length: np.float32, coarse: np.float32,
+    left: NDArray[np.float32],
+) -> None:  # fmt: skip
+    """Costs of a column's cells with those of a move that leads from them."""
+    for k in range(column.shape[0]):
+        left[k] = column[k] + (length + coarse * narrow[k])
+
+
+@njit(cache=True, error_model="numpy")
 def _push(
-    source: NDArray[np.float32], moves: NDArray[np.uint32], target: NDArray[np.float32], move: int,
-    length: np.float32, bound: np.float32,
-) -> bool:  # fmt: skip
+    source: NDArray[np.float32], moves: NDArray[np.uint32], target: NDArray[np.float32], move: int, bound: np.float32
+) -> bool:
     """Relax one move from a column to another; whether that made anything cheaper.
 
     Without a branch, so that the compiler turns the loop into vector instructions.
@@ -116,13 +164,19 @@ def _push(
     bit, never = np.uint32(1) << np.uint32(move), np.float32(np.inf)
     improved = np.uint32(0)
     for k in range(source.shape[0]):
-        reached = source[k] + length
-        reached = reached if (moves[k] & bit) != 0 else never
+        reached = source[k] if (moves[k] & bit) != 0 else never
         reached = reached if reached <= bound else never
         here = target[k]
         improved |= np.uint32(1) if reached < here else np.uint32(0)
         target[k] = reached if reached < here else here
     return improved != 0
+
+
+@njit(cache=True)
+def _move_lengths(cell: float) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Lengths of the moves, and what the narrowness of the cell that they lead from is multiplied with; metres."""
+    lengths = (np.rint(MOVE_LENGTHS * cell / _QUANTUM_M) * _QUANTUM_M).astype(np.float32)
+    return lengths, (np.rint(MOVE_LENGTHS * cell / _COARSE_M) * _COARSE_M).astype(np.float32)
 
 
 @njit(cache=True, error_model="numpy")
@@ -133,8 +187,9 @@ def expand_cost(
     cell: float,
     moves: NDArray[np.uint32],
     cost: NDArray[np.float32],
+    narrow: NDArray[np.float32],
 ) -> int:
-    """Lengths of the shortest paths over the grid's passable moves, outwards from seeded cells.
+    """Costs of the cheapest paths over the grid's passable moves, outwards from seeded cells.
 
     A label-correcting search over columns: those that may have something to pass on are visited by their distance
     from the goal, then in the opposite order, and so on until none is left. In the open one visit to a column is
@@ -155,6 +210,8 @@ def expand_cost(
         Passable moves.
     cost : (nx, ny, nz) float32
         Infinite but for the seeds; filled in place, metres.
+    narrow : (nx, ny, nz) float32
+        What a metre in the cells costs beside itself (`aerialdojo_gen.planning.preference.narrow_cells`).
 
     Returns
     -------
@@ -162,9 +219,9 @@ def expand_cost(
         Number of visits.
     """
     nx, ny, nz = cost.shape
-    lengths = (np.rint(MOVE_LENGTHS * cell / _QUANTUM_M) * _QUANTUM_M).astype(np.float32)
+    lengths, coarse = _move_lengths(cell)
     limit = np.float32(bound)
-    waiting = np.zeros((nx, ny), np.bool_)
+    waiting, departed = np.zeros((nx, ny), np.bool_), np.empty((len(_KINDS), nz), np.float32)
     left, visits = 0, 0
     middle_i, middle_j = 0, 0
     for seed in seeds:
@@ -184,14 +241,16 @@ def expand_cost(
             waiting[i, j] = False
             left -= 1
             visits += 1
-            column, passable = cost[i, j], moves[i, j]
-            _settle(column, passable, lengths[_UP])
+            column, passable, tight = cost[i, j], moves[i, j], narrow[i, j]
+            _settle(column, passable, tight, lengths[_UP], coarse[_UP])
+            for kind in range(len(_KINDS)):
+                _leave(column, tight, lengths[_KINDS[kind]], coarse[_KINDS[kind]], departed[kind])
             for m in _FLAT:
                 u, v = i + MOVES[m, 0], j + MOVES[m, 1]
                 if (
                     0 <= u < nx
                     and 0 <= v < ny
-                    and _push(column, passable, cost[u, v], m, lengths[m], limit)
+                    and _push(departed[_KIND[m]], passable, cost[u, v], m, limit)
                     and not waiting[u, v]
                 ):
                     waiting[u, v] = True
@@ -200,6 +259,66 @@ def expand_cost(
             break  # what still waits lies beyond the reach
         outwards = not outwards
     return visits
+
+
+@njit(cache=True)
+def extra_cost(
+    x: float, y: float, z: float, goal: NDArray[np.float64], grid: GridArrays, moves: NDArray[np.uint32],
+    cost: NDArray[np.float32], narrow: NDArray[np.float32],
+) -> float:  # fmt: skip
+    """How much of a point's cost-to-go is not metres: what the cheapest grid path costs beside its length.
+
+    The path is followed from the cell through which the goal is reached at least cost; sums of quanta are exact, so
+    that a cell's cost less a move's is the cost of the next cell to the bit.
+
+    Parameters
+    ----------
+    x, y, z : float
+        World frame, metres.
+    goal : (3,) float64
+        Metres.
+    grid : GridArrays
+        The clearance grid.
+    moves : (nx, ny, nz) uint32
+        Its passable moves.
+    cost, narrow : (nx, ny, nz) float32
+        What `expand_cost` filled, and was given.
+
+    Returns
+    -------
+    float
+        Metres; 0 where the goal is not reached.
+    """
+    nx, ny, nz = cost.shape
+    lengths, coarse = _move_lengths(grid.cell)
+    ci = math.floor((x - grid.origin[0]) / grid.cell - 0.5)
+    cj = math.floor((y - grid.origin[1]) / grid.cell - 0.5)
+    ck = math.floor((z - grid.origin[2]) / grid.cell - 0.5)
+    low, i, j, k = np.inf, -1, -1, -1
+    for u in range(max(0, ci), min(nx, ci + 2)):
+        for v in range(max(0, cj), min(ny, cj + 2)):
+            for w in range(max(0, ck), min(nz, ck + 2)):
+                px, py, pz = cell_centre(u, v, w, grid)
+                through = cost[u, v, w] + math.hypot(px - x, py - y) + abs(pz - z)
+                if through < low:
+                    low, i, j, k = through, u, v, w
+    if i < 0:
+        return 0.0
+    total, on = 0.0, True
+    while on:
+        on = False
+        for m in range(MOVES.shape[0]):
+            # Move m back is passable where move m is.
+            if not (moves[i, j, k] >> np.uint32(m)) & np.uint32(1):
+                continue
+            u, v, w = i + MOVES[m, 0], j + MOVES[m, 1], k + MOVES[m, 2]
+            extra = coarse[m] * narrow[u, v, w]
+            if cost[u, v, w] + (lengths[m] + extra) == cost[i, j, k]:
+                total += extra
+                i, j, k, on = u, v, w, True
+                break
+    px, py, pz = cell_centre(i, j, k, grid)
+    return total + cost[i, j, k] - math.sqrt((px - goal[0]) ** 2 + (py - goal[1]) ** 2 + (pz - goal[2]) ** 2)
 
 
 @njit(cache=True)

@@ -7,6 +7,8 @@ fewer turns. Turning adds nothing to the length, so every action carries a small
 with the turns before it, is an edge to the goal like any other.
 
 Edges are put on the open list unchecked and tested for collisions when they are taken off it, for most never are.
+What they cost beside their metres, for flying near surfaces, is found out then too: an edge that costs more goes back
+on the list, to where it belongs.
 """
 
 from __future__ import annotations
@@ -21,6 +23,7 @@ from numpy.typing import NDArray
 from aerialdojo_gen.geometry.motion import N_HEADINGS, QUARTER, TURN_RAD
 from aerialdojo_gen.planning.cost_to_go import cost_at, cost_between
 from aerialdojo_gen.planning.grid_kernels import FREE, GridArrays, segment_free, what_blocks
+from aerialdojo_gen.planning.preference import Preference, astray, squeeze
 
 # A translation is direction * 3 + step for the horizontal ones, then up 1 and 2 m, down 1 and 2 m, then the Approach.
 STEPS_M = np.array([1.0, 3.0, 5.0])
@@ -55,7 +58,9 @@ class SearchArrays(NamedTuple):
     parent : (n,) int32
         Expanded state before it, -1 for the start.
     edge_parent, edge_move, edge_next : arrays
-        Open edges, as linked lists.
+        Open edges, as linked lists; ~move for one that is known to be free.
+    edge_extra : (m,) float32
+        What such an edge costs beside its metres.
     heads : (_N_BUCKETS,) int32
         First edge of every bucket, -1 for none.
     keys : (power of two,) int64
@@ -76,6 +81,7 @@ class SearchArrays(NamedTuple):
     edge_parent: NDArray[np.int32]
     edge_move: NDArray[np.int8]
     edge_next: NDArray[np.int32]
+    edge_extra: NDArray[np.float32]
     heads: NDArray[np.int32]
     keys: NDArray[np.int64]
     stamps: NDArray[np.int32]
@@ -104,6 +110,10 @@ class SearchOptions(NamedTuple):
         Heading sectors that tell duplicates, a divisor of 24.
     sideways : float
         What a metre flown to the left or right counts as, in actions, when the found route's headings are chosen.
+    prefer : Preference
+        What costs beside metres and actions.
+    near_enough : float
+        A way to the goal is taken though another may be cheaper by this, metres.
     """
 
     radius: float
@@ -114,6 +124,8 @@ class SearchOptions(NamedTuple):
     cell: float
     sectors: int
     sideways: float
+    prefer: Preference
+    near_enough: float
 
 
 def make_search_arrays(budget: int) -> SearchArrays:
@@ -122,7 +134,7 @@ def make_search_arrays(budget: int) -> SearchArrays:
     slots = 1 << max(10, math.ceil(math.log2(4 * n)))
     return SearchArrays(
         np.empty((n, 3)), np.empty(n), np.empty(n, np.int8), np.empty(n, np.int8), np.empty(n, np.int32),
-        np.empty(edges, np.int32), np.empty(edges, np.int8), np.empty(edges, np.int32),
+        np.empty(edges, np.int32), np.empty(edges, np.int8), np.empty(edges, np.int32), np.empty(edges, np.float32),
         np.full(_N_BUCKETS, -1, np.int32), np.empty(slots, np.int64), np.zeros(slots, np.int32),
         np.zeros(1, np.int32), np.empty(_N_BLOCKERS, np.int32),
     )  # fmt: skip
@@ -238,9 +250,11 @@ def search(
         flights[m, 2], flights[m, 3] = LIFTS_M[m - N_FLAT], abs(LIFTS_M[m - N_FLAT])
     # Scalars and plain arrays: a tuple of arrays costs more to hand over than the inner loop's work.
     pose, cost, headings, moves, parents = s.pose, s.cost, s.heading, s.move, s.parent
-    edge_parent, edge_move, edge_next, heads, keys, stamps, blockers = (
-        s.edge_parent, s.edge_move, s.edge_next, s.heads, s.keys, s.stamps, s.blockers
+    edge_parent, edge_move, edge_next, edge_extra, heads, keys, stamps, blockers = (
+        s.edge_parent, s.edge_move, s.edge_next, s.edge_extra, s.heads, s.keys, s.stamps, s.blockers
     )  # fmt: skip
+    room, tightness, field = o.prefer.clearance, o.prefer.weight, grid.field
+    goal_yaw = start[3] + goal_heading * TURN_RAD
     ox, oy, oz, edge = grid.origin[0], grid.origin[1], grid.origin[2], grid.cell
     lx, ly, lz = grid.lower[0] - _ROUNDING_M, grid.lower[1] - _ROUNDING_M, grid.lower[2] - _ROUNDING_M
     hx, hy, hz = grid.upper[0] + _ROUNDING_M, grid.upper[1] + _ROUNDING_M, grid.upper[2] + _ROUNDING_M
@@ -263,6 +277,9 @@ def search(
         parent, move = edge_parent[taken], int(edge_move[taken])
         if move == _TO_GOAL:
             return FOUND, n, _moves_to(parent, parents, moves)
+        known = move < 0
+        if known:
+            move = ~move
         x, y, z, heading, g = start[0], start[1], start[2], 0, 0.0
         if parent >= 0:
             px, py, pz, heading = pose[parent, 0], pose[parent, 1], pose[parent, 2], int(headings[parent])
@@ -278,12 +295,22 @@ def search(
         slot = ~_slot(key, now, keys, stamps)
         if slot < 0:
             continue
-        if parent >= 0:
+        if known:
+            g += edge_extra[taken]
+        elif parent >= 0:
             place = _place((px + x) / 2 - ox, (py + y) / 2 - oy, (pz + z) / 2 - oz)
             found = what_blocks(px, py, pz, x, y, z, o.radius, grid, False, blockers[place])
             if found != FREE:
                 blockers[place] = found
                 continue
+            if tightness > 0.0:
+                extra = squeeze(px, py, pz, x, y, z, room, tightness, ox, oy, oz, edge, field)
+                g += extra
+                bucket = min(lowest + int(extra / _BUCKET_M), _N_BUCKETS - 1)
+                if bucket > lowest:
+                    edge_move[taken], edge_extra[taken] = ~move, extra
+                    edge_next[taken], heads[bucket] = heads[bucket], taken
+                    continue
         if n >= o.budget:
             return BUDGET, n, none
         keys[slot], stamps[slot] = key, now
@@ -292,6 +319,9 @@ def search(
         gap = math.sqrt((x - goal[0]) ** 2 + (y - goal[1]) ** 2 + (z - goal[2]) ** 2)
         if gap <= o.approach and segment_free(x, y, z, goal[0], goal[1], goal[2], o.radius, grid, False):
             f = g + gap + o.action_cost * (turns_between(heading, goal_heading) + 1) - f0
+            f += astray(goal[0] - x, goal[1] - y, goal_yaw, gap, o.prefer.ahead_cos, o.prefer.astray)
+            f += squeeze(x, y, z, goal[0], goal[1], goal[2], room, tightness, ox, oy, oz, edge, field)
+            f -= o.near_enough
             bucket = max(0, int(min(f, f_most) / _BUCKET_M))
             edge_parent[n_edges], edge_move[n_edges], edge_next[n_edges] = n, _TO_GOAL, heads[bucket]
             heads[bucket] = n_edges

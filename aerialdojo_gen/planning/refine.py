@@ -1,8 +1,9 @@
 """From translations to actions: put a found route in its best order and fly it with the fewest actions.
 
 Translations commute: flown in another order they end in the same place, after the same length. So equal directions
-are brought together, there and back cancels out, and the headings are chosen by dynamic programming: few actions, and
-few metres flown sideways, for the front camera should see where the drone is going.
+are brought together, there and back cancels out, the order is chosen that keeps away from surfaces, and the headings
+are chosen by dynamic programming: few actions, and few metres flown sideways, for the front camera should see where
+the drone is going.
 """
 
 from __future__ import annotations
@@ -16,12 +17,15 @@ from numpy.typing import NDArray
 from aerialdojo_gen.common.terms import MOVE_DOWN_1, MOVE_UP_1, TURN_LEFT, TURN_RIGHT
 from aerialdojo_gen.geometry.motion import N_HEADINGS, QUARTER, TURN_RAD
 from aerialdojo_gen.planning.grid_kernels import GridArrays, inside, segment_free
-from aerialdojo_gen.planning.hybrid_astar import LIFTS_M, N_FLAT, N_STEPS, STEPS_M, turns_between
+from aerialdojo_gen.planning.hybrid_astar import LIFTS_M, N_FLAT, N_STEPS, STEPS_M, SearchOptions, turns_between
+from aerialdojo_gen.planning.preference import Preference, squeeze
 
 # Directions of a leg beyond the horizontal ones.
 _UP, _DOWN = N_HEADINGS, N_HEADINGS + 1
 _MOVE_FORWARD_1, _MOVE_LEFT_1, _MOVE_RIGHT_1 = 1, 4, 7
 _MAX_PASSES = 50
+_ARRIVAL_M = 3
+_LEAST_ACTION_M, _WORTH_M = 1e-4, 1e-6
 
 
 @njit(cache=True, inline="always")
@@ -70,20 +74,25 @@ def _headings(
 ) -> float:  # fmt: skip
     """Choose the heading of every leg, so that turns and metres flown sideways cost least; return that cost.
 
-    A leg is flown ahead, to the left or to the right; on a tie ahead. A vertical leg keeps the heading.
+    A leg is flown ahead, to the left or to the right; on a tie ahead. A vertical leg keeps the heading. The last
+    metres may be flown sideways for nothing: what the front camera should see there is the goal.
     """
+    to_fly = 0
+    for i in range(n):
+        to_fly += metres[i]
     best = np.zeros((n + 1, 3))
     back = np.zeros((n + 1, 3), np.int64)
     at = np.zeros((n + 1, 3), np.int64)
     for i in range(1, n + 1):
         d = direction[i - 1]
+        to_fly -= metres[i - 1]
         for side in range(3):
             if d >= N_HEADINGS:
                 at[i, side], best[i, side], back[i, side] = at[i - 1, side], best[i - 1, side], side
                 continue
             offset = 0 if side == 0 else (-QUARTER if side == 1 else QUARTER)
             at[i, side] = (d + offset) % N_HEADINGS
-            own = 0.0 if side == 0 else sideways * metres[i - 1]
+            own = 0.0 if side == 0 else sideways * (metres[i - 1] - min(metres[i - 1], max(0, _ARRIVAL_M - to_fly)))
             best[i, side] = np.inf
             for before in range(3):
                 cost = best[i - 1, before] + turns_between(at[i - 1, before], at[i, side]) + own
@@ -110,6 +119,15 @@ def _effort(direction: NDArray[np.int64], metres: NDArray[np.int64], n: int, goa
     return total
 
 
+@njit(cache=True, inline="always")
+def _leg_end(x: float, y: float, z: float, yaw: float, d: int, metres: int) -> tuple[float, float, float]:
+    if d == _UP:
+        return x, y, z + metres
+    if d == _DOWN:
+        return x, y, z - metres
+    return x + math.cos(yaw + d * TURN_RAD) * metres, y + math.sin(yaw + d * TURN_RAD) * metres, z
+
+
 @njit(cache=True)
 def _legs_free(
     start: NDArray[np.float64], direction: NDArray[np.int64], metres: NDArray[np.int64], n: int,
@@ -117,15 +135,7 @@ def _legs_free(
 ) -> bool:  # fmt: skip
     x, y, z = start[0], start[1], start[2]
     for i in range(n):
-        d, length = direction[i], float(metres[i])
-        u, v, w = x, y, z
-        if d == _UP:
-            w += length
-        elif d == _DOWN:
-            w -= length
-        else:
-            u += math.cos(start[3] + d * TURN_RAD) * length
-            v += math.sin(start[3] + d * TURN_RAD) * length
+        u, v, w = _leg_end(x, y, z, start[3], direction[i], metres[i])
         if not inside(u, v, w, grid.lower, grid.upper) or not segment_free(x, y, z, u, v, w, radius, grid, False):
             return False
         x, y, z = u, v, w
@@ -133,14 +143,37 @@ def _legs_free(
 
 
 @njit(cache=True)
+def _squeezed(
+    start: NDArray[np.float64], direction: NDArray[np.int64], metres: NDArray[np.int64], n: int, most: float,
+    prefer: Preference, grid: GridArrays,
+) -> float:  # fmt: skip
+    """What legs cost beside their metres for the surfaces that they come near; beyond `most` any number above it."""
+    if prefer.weight == 0.0:
+        return 0.0
+    x, y, z, total = start[0], start[1], start[2], 0.0
+    for i in range(n):
+        u, v, w = _leg_end(x, y, z, start[3], direction[i], metres[i])
+        total += squeeze(
+            x, y, z, u, v, w, prefer.clearance, prefer.weight,
+            grid.origin[0], grid.origin[1], grid.origin[2], grid.cell, grid.field,
+        )  # fmt: skip
+        if total > most:
+            break
+        x, y, z = u, v, w
+    return total
+
+
+@njit(cache=True)
 def _reorder(
     start: NDArray[np.float64], direction: NDArray[np.int64], metres: NDArray[np.int64], n: int, goal_heading: int,
-    sideways: float, radius: float, grid: GridArrays,
+    options: SearchOptions, grid: GridArrays,
 ) -> int:  # fmt: skip
-    """Move single legs elsewhere in the sequence as long as that is free and saves length or effort, in place."""
+    """Move single legs elsewhere in the sequence as long as that is free and makes the route cheaper, in place."""
     new_direction, new_metres, chosen = np.empty_like(direction), np.empty_like(metres), np.empty_like(direction)
-    length = metres[:n].sum()
-    effort = _effort(direction, metres, n, goal_heading, sideways, chosen)
+    # Where actions cost nothing, fewer of them still decide between ways that cost the same.
+    action, prefer = max(options.action_cost, _LEAST_ACTION_M), options.prefer
+    cost = metres[:n].sum() + action * _effort(direction, metres, n, goal_heading, options.sideways, chosen)
+    cost += _squeezed(start, direction, metres, n, np.inf, prefer, grid)
     for _ in range(_MAX_PASSES):
         improved = False
         for source in range(n):
@@ -160,16 +193,20 @@ def _reorder(
                     new_direction[k], new_metres[k] = direction[source], metres[source]
                     k += 1
                 m = _merge(new_direction, new_metres, k)
-                new_length = new_metres[:m].sum()
-                if new_length > length:
+                wanted = cost - _WORTH_M
+                new_cost = float(new_metres[:m].sum())
+                if new_cost >= wanted:
                     continue
-                new_effort = _effort(new_direction, new_metres, m, goal_heading, sideways, chosen)
-                if new_length == length and new_effort >= effort:
+                new_cost += action * _effort(new_direction, new_metres, m, goal_heading, options.sideways, chosen)
+                if new_cost >= wanted:
                     continue
-                if not _legs_free(start, new_direction, new_metres, m, radius, grid):
+                new_cost += _squeezed(start, new_direction, new_metres, m, wanted - new_cost, prefer, grid)
+                if new_cost >= wanted:
+                    continue
+                if not _legs_free(start, new_direction, new_metres, m, options.radius, grid):
                     continue
                 direction[:m], metres[:m] = new_direction[:m], new_metres[:m]
-                n, length, effort = m, new_length, new_effort
+                n, cost = m, new_cost
                 improved = True
                 break
             if improved:
@@ -203,8 +240,7 @@ def moves_to_actions(
     start: NDArray[np.float64],
     moves: NDArray[np.int8],
     goal_heading: int,
-    sideways: float,
-    radius: float,
+    options: SearchOptions,
     grid: GridArrays,
 ) -> NDArray[np.int8]:
     """Turn the search's translations into actions.
@@ -217,10 +253,8 @@ def moves_to_actions(
         Translations, as `aerialdojo_gen.planning.hybrid_astar.search` returns them.
     goal_heading : int
         Heading to end with, counted from the start's yaw.
-    sideways : float
-        What a metre flown to the left or right counts as, in actions.
-    radius : float
-        Radius that must stay clear, metres.
+    options : SearchOptions
+        Of the search.
     grid : GridArrays
         The clearance grid.
 
@@ -240,9 +274,9 @@ def moves_to_actions(
             direction[i], metres[i] = (_UP if lift > 0 else _DOWN), int(abs(lift))
         total += metres[i]
     n = _merge(direction, metres, len(moves))
-    n = _reorder(start, direction, metres, n, goal_heading, sideways, radius, grid)
+    n = _reorder(start, direction, metres, n, goal_heading, options, grid)
     chosen = np.empty(n + 1, np.int64)
-    _headings(direction, metres, n, goal_heading, sideways, chosen)
+    _headings(direction, metres, n, goal_heading, options.sideways, chosen)
     actions = np.empty(total + N_HEADINGS * (n + 1), np.int8)
     k, heading = 0, 0
     for i in range(n):

@@ -19,6 +19,7 @@ from aerialdojo_gen.planning.clearance import ClearanceGrid
 from aerialdojo_gen.planning.collision import CollisionWorld
 from aerialdojo_gen.planning.cost_to_go import columns_by_distance, expand_cost, seed_goal
 from aerialdojo_gen.planning.planner import Planner
+from aerialdojo_gen.planning.preference import NO_PREFERENCE, narrow_cells
 from aerialdojo_gen.validate.registry import Finding, check
 from aerialdojo_gen.validate.rows import Floats, Rows, SceneData
 from aerialdojo_gen.validate.scene_mesh import scene_mesh
@@ -71,14 +72,15 @@ def long_way_round(data: SceneData, rows: Rows) -> Iterator[Finding]:
         cap_m=plan.clearance_cap_m,
     )  # fmt: skip
     cost = np.empty(grid.moves.shape, np.float32)
+    wide = narrow_cells(grid.arrays.field, NO_PREFERENCE)
     longest = float(paths.length_m[fit].max())
     order = columns_by_distance(math.ceil((longest + 2.0) / _CELL_M))
     places, owner = np.unique(goals[fit], axis=0, return_inverse=True)
     for g, goal in enumerate(places):
         own = fit[owner.ravel() == g]
         cost.fill(np.inf)
-        seeds = seed_goal(*goal, _CELL_M, grid.radius_m, grid.arrays, grid.moves, cost)
-        expand_cost(seeds, order, longest, grid.arrays.cell, grid.moves, cost)
+        seeds = seed_goal(*goal, 0.0, _CELL_M, grid.radius_m, grid.arrays, grid.moves, cost, NO_PREFERENCE)
+        expand_cost(seeds, order, longest, grid.arrays.cell, grid.moves, cost, wide)
         ways = np.asarray(costs_at(np.ascontiguousarray(paths.starts[own, :3]), grid.arrays, cost))
         over = paths.length_m[own] - ways
         for k in np.flatnonzero(over > np.maximum(_LONGER_M, _LONGER_SHARE * ways)):

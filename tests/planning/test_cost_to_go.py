@@ -1,29 +1,35 @@
 import math
 
 import numpy as np
+import pytest
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import dijkstra
 from support.flying import town
 from support.handmade import box, instance, scene
 
+from aerialdojo_gen.planning.attempt import lengths_at
 from aerialdojo_gen.planning.clearance import ClearanceGrid
 from aerialdojo_gen.planning.connectivity import MOVE_LENGTHS, MOVES
 from aerialdojo_gen.planning.cost_to_go import columns_by_distance, cost_at, expand_cost, seed_goal
+from aerialdojo_gen.planning.preference import NO_PREFERENCE, Preference, narrow_cells
 
 
-def field(grid, goal, bound=200.0):
+def field(grid, goal, bound=200.0, prefer=NO_PREFERENCE):
     cost = np.full(grid.moves.shape, np.inf, np.float32)
-    seeds = seed_goal(*goal, 1.0, grid.radius_m, grid.arrays, grid.moves, cost)
+    seeds = seed_goal(*goal, 0.0, 1.0, grid.radius_m, grid.arrays, grid.moves, cost, prefer)
     order = columns_by_distance(math.ceil((bound + 2.0) / grid.arrays.cell))
-    visits = expand_cost(seeds, order, bound, grid.arrays.cell, grid.moves, cost)
+    narrow = narrow_cells(grid.arrays.field, prefer)
+    visits = expand_cost(seeds, order, bound, grid.arrays.cell, grid.moves, cost, narrow)
     return cost, seeds, visits
 
 
-def test_it_is_dijkstras_on_the_same_graph():
+@pytest.mark.parametrize("prefer", [NO_PREFERENCE, Preference(1.0, 2.0, 0.5, 3.0)])
+def test_it_is_dijkstras_on_the_same_graph(prefer):
     """Visits to columns against scipy's heap over every passable move."""
     grid = ClearanceGrid.build(town(half=12.0, ceiling=8.0, n=16))
     goal = next(p for p in [(0.1, 0.2, 1.4), (4, 4, 1.4), (-7, 2, 3.4)] if grid.reachable(p))
-    cost, seeds, _ = field(grid, goal)
+    cost, seeds, _ = field(grid, goal, prefer=prefer)
+    narrow = narrow_cells(grid.arrays.field, prefer).ravel()
     shape = grid.moves.shape
     n = grid.moves.size
     i, j, k = np.indices(shape).reshape(3, -1)
@@ -32,9 +38,9 @@ def test_it_is_dijkstras_on_the_same_graph():
         has = ((grid.moves.ravel() >> np.uint32(m)) & 1).astype(bool)
         rows.append(np.flatnonzero(has))
         columns.append(np.ravel_multi_index((i[has] + dx, j[has] + dy, k[has] + dz), shape))
-        lengths.append(np.full(has.sum(), MOVE_LENGTHS[m] * grid.arrays.cell))
+        lengths.append(MOVE_LENGTHS[m] * grid.arrays.cell * (1.0 + narrow[has]))
     again = np.full(shape, np.inf, np.float32)
-    seed_goal(*goal, 1.0, grid.radius_m, grid.arrays, grid.moves, again)
+    seed_goal(*goal, 0.0, 1.0, grid.radius_m, grid.arrays, grid.moves, again, prefer)
     source = np.full(len(seeds), n)
     rows.append(source)
     columns.append(seeds)
@@ -46,8 +52,31 @@ def test_it_is_dijkstras_on_the_same_graph():
     assert (np.isfinite(expected) == np.isfinite(cost)).all()
     finite = np.isfinite(expected)
     assert finite.mean() > 0.5
-    # Move lengths are rounded to 2^-12 m, and a path has a few hundred of them.
-    assert np.abs(expected[finite] - cost[finite]).max() < 0.02
+    # Move lengths are rounded to 2^-12 m, and a path has a few hundred of them; what narrowness adds, to a hundredth.
+    assert np.abs(expected[finite] - cost[finite]).max() < (0.02 if prefer.weight == 0.0 else 0.1)
+
+
+def test_what_is_not_metres_is_told_apart():
+    """A cheapest path is no shorter than the shortest, and no dearer than the shortest is when it is paid for."""
+    grid, prefer = ClearanceGrid.build(town(half=12.0, ceiling=8.0, n=16)), Preference(1.0, 1.0, 0.5, 3.0)
+    goal = next(p for p in [(0.1, 0.2, 1.4), (4, 4, 1.4), (-7, 2, 3.4)] if grid.reachable(p))
+    plain, _, _ = field(grid, goal)
+    cost, _, _ = field(grid, goal, prefer=prefer)
+    narrow = narrow_cells(grid.arrays.field, prefer)
+    centres = np.argwhere(np.isfinite(plain))[::37]
+    points = grid.arrays.origin + (centres + 0.5) * grid.arrays.cell
+    values = lengths_at(points, np.array(goal, float), grid.arrays, grid.moves, cost, narrow)
+    shortest = np.array([cost_at(*p, grid.arrays, plain) for p in points])
+    dearest = np.array([cost_at(*p, grid.arrays, cost) for p in points])
+    assert len(points) > 200
+    assert (values >= shortest - 1e-3).all()
+    assert (values <= dearest + 1e-3).all()
+    assert (values < dearest - 0.1).mean() > 0.3
+    # No preference, nothing to tell apart.
+    zero = narrow_cells(grid.arrays.field, NO_PREFERENCE)
+    assert lengths_at(points, np.array(goal, float), grid.arrays, grid.moves, plain, zero) == pytest.approx(
+        shortest, abs=1e-3
+    )
 
 
 def test_in_the_open_it_is_the_action_metric_up_to_the_grids_directions():

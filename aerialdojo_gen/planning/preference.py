@@ -1,0 +1,150 @@
+"""What a route should rather do than not: keep its distance from surfaces, and end flying ahead.
+
+Neither is a condition. A metre flown at a clearance below the preferred one costs more than a metre, the more the
+nearer the surface is; an Approach that does not fly ahead costs some metres. The cost-to-go holds these costs too.
+L, which is stored, is of the metres alone.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+# Steps in which the cost of clearance is integrated along a way: the grid's cells are half a metre.
+_STEP_M = 0.5
+# What cells cost is counted in sixteenths, so that float32 adds it without rounding.
+NARROW_UNIT = 1.0 / 16
+_COS_ROUNDING = 1e-9
+
+
+class Preference(NamedTuple):
+    """What costs beside metres.
+
+    Attributes
+    ----------
+    clearance : float
+        Distance from surfaces from which on a way costs its metres alone, metres.
+    weight : float
+        What a metre at a surface costs beside itself, metres; in between it falls linearly. 0 for no preference.
+    ahead_cos : float
+        Cosine of the largest angle between the final heading and an Approach that flies ahead; -1 for any.
+    astray : float
+        What another Approach costs beside its length, metres.
+    """
+
+    clearance: float
+    weight: float
+    ahead_cos: float
+    astray: float
+
+
+NO_PREFERENCE = Preference(1.0, 0.0, -1.0, 0.0)
+
+
+def narrow_cells(field: NDArray[np.float32], prefer: Preference) -> NDArray[np.float32]:
+    """What a metre costs beside itself in the cells of a clearance grid.
+
+    Parameters
+    ----------
+    field : (nx, ny, nz) float32
+        Distances of the cells' centres to the nearest surface, metres.
+    prefer : Preference
+        Its clearance and weight count.
+
+    Returns
+    -------
+    (nx, ny, nz) float32
+        Metres, multiples of `NARROW_UNIT`.
+    """
+    share = np.float32(1.0) - np.clip(field, 0.0, prefer.clearance) / np.float32(prefer.clearance)
+    return np.rint(share * np.float32(prefer.weight / NARROW_UNIT)) * np.float32(NARROW_UNIT)
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def _clearance(
+    x: float, y: float, z: float, ox: float, oy: float, oz: float, cell: float, field: NDArray[np.float32]
+) -> float:  # fmt: skip
+    """Distance of a point to the nearest surface, trilinear between cells; metres."""
+    nx, ny, nz = field.shape
+    fx = min(max((x - ox) / cell - 0.5, 0.0), nx - 1.0)
+    fy = min(max((y - oy) / cell - 0.5, 0.0), ny - 1.0)
+    fz = min(max((z - oz) / cell - 0.5, 0.0), nz - 1.0)
+    i, j, k = int(fx), int(fy), int(fz)
+    fx, fy, fz = fx - i, fy - j, fz - k
+    u, v, w = min(i + 1, nx - 1), min(j + 1, ny - 1), min(k + 1, nz - 1)
+    p = (field[i, j, k] * (1 - fz) + field[i, j, w] * fz) * (1 - fy) + (
+        field[i, v, k] * (1 - fz) + field[i, v, w] * fz
+    ) * fy
+    q = (field[u, j, k] * (1 - fz) + field[u, j, w] * fz) * (1 - fy) + (
+        field[u, v, k] * (1 - fz) + field[u, v, w] * fz
+    ) * fy
+    return p * (1 - fx) + q * fx
+
+
+@njit(cache=True, error_model="numpy")
+def squeeze(
+    px: float, py: float, pz: float, qx: float, qy: float, qz: float, clearance: float, weight: float,
+    ox: float, oy: float, oz: float, cell: float, field: NDArray[np.float32],
+) -> float:  # fmt: skip
+    """What a straight way costs beside its metres for the surfaces that it comes near.
+
+    Parameters
+    ----------
+    px, py, pz, qx, qy, qz : float
+        Its ends, metres; inside the flight volume.
+    clearance, weight : float
+        Of the `Preference`.
+    ox, oy, oz, cell : float
+        Lower corner and cells of the clearance grid, metres.
+    field : (nx, ny, nz) float32
+        The clearance grid's distances.
+
+    Returns
+    -------
+    float
+        Metres.
+    """
+    dx, dy, dz = qx - px, qy - py, qz - pz
+    length = math.sqrt(dx * dx + dy * dy + dz * dz)
+    if weight == 0.0 or length == 0.0:
+        return 0.0
+    ux, uy, uz = dx / length, dy / length, dz / length
+    t, total = 0.0, 0.0
+    while t < length:
+        step = min(_STEP_M, length - t)
+        m = t + 0.5 * step
+        lack = clearance - _clearance(px + m * ux, py + m * uy, pz + m * uz, ox, oy, oz, cell, field)
+        t += step
+        if lack > 0.0:
+            total += step * lack
+        else:
+            # Distances change by a metre a metre: so far on there is room.
+            t = max(t, m - lack)
+    return weight * total / clearance
+
+
+@njit(cache=True, inline="always")
+def astray(dx: float, dy: float, yaw: float, length: float, ahead_cos: float, cost: float) -> float:
+    """What an Approach costs beside its length: nothing where it flies ahead.
+
+    Parameters
+    ----------
+    dx, dy : float
+        Its level displacement, metres.
+    yaw : float
+        Final heading, radians.
+    length : float
+        Its length, metres.
+    ahead_cos, cost : float
+        `ahead_cos` and `astray` of the `Preference`.
+
+    Returns
+    -------
+    float
+        Metres.
+    """
+    return cost if dx * math.cos(yaw) + dy * math.sin(yaw) < (ahead_cos - _COS_ROUNDING) * length else 0.0
