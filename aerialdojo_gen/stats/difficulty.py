@@ -90,8 +90,10 @@ def read_tasks(data: Where, scenes: Sequence[str]) -> Tasks:
             for name in TOLD_OF_SPLITS:
                 if name != "target_split":
                     found[name].append(_numbers(own[name]))
+    words = {name: np.array(found[name], dtype=np.str_) for name in _WORDS}
     numbers = {name: np.concatenate([np.empty(0), *parts]) for name, parts in found.items() if name not in _WORDS}
-    return Tasks(**numbers, **{name: np.array(found[name], dtype=np.str_) for name in _WORDS})
+    both: dict[str, Any] = words | numbers
+    return Tasks(**both)
 
 
 _WORDS = ("scene", "setting", "partition", "subset", "target_split")

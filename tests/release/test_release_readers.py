@@ -99,7 +99,7 @@ for block in json.loads(sys.argv[4]):
 
 def test_datasets_loads_every_config_offline_and_the_cards_examples_run(smoke, stored, tmp_path):
     blocks = re.findall(r"```python\n(.*?)```", (smoke / "release" / "README.md").read_text(), re.DOTALL)
-    assert len(blocks) == 5
+    assert len(blocks) == 6
     environment = os.environ | {
         "HF_HUB_OFFLINE": "1", "HF_DATASETS_OFFLINE": "1", "HF_HOME": str(tmp_path / "hf"),
         "HF_DATASETS_CACHE": str(tmp_path / "cache"), "HF_HUB_DISABLE_TELEMETRY": "1",

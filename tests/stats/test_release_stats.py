@@ -222,7 +222,7 @@ def test_splits_are_what_pandas_makes_of_the_tables(smoke, frame):
 def test_tables_of_difficulty_fit_a_terminal(smoke):
     tasks = read_tasks(smoke, check_release(smoke))
     many = Tasks(**{name: np.tile(values, 3) for name, values in vars(tasks).items()})
-    many.scene[:] = np.resize([*inventory()], len(many))
+    many = replace(many, scene=np.resize([*inventory()], len(many)))
     for table in difficulty_tables(many):
         assert max(map(len, table.terminal())) <= 100
         assert max(map(len, table.terminal(80))) <= 80
