@@ -98,12 +98,14 @@ def _unlike(data: SceneData, rows: Rows, name: str, wanted: Floats) -> Iterator[
 def agent_action(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """`agent_action` has the 16 actions alone, ends in Stop, and leads to within an Approach of the goal in time."""
     budgets = {s: rule.action_budget for s, rule in zip(SETTINGS, settings_of(data.pipeline.filter), strict=True)}
-    paths, actions, settings = data.paths, rows.column("agent_action"), rows.texts("setting")
+    paths, settings, known = data.paths, rows.texts("setting"), _known(rows, "agent_action")
+    lists = rows.column("agent_action")
+    ends, actions = lists.offsets.to_numpy(), lists.values.to_numpy(zero_copy_only=False)
     most_m = data.pipeline.plan.max_approach_m + _LENGTH_M
     for k, row in enumerate(paths.rows.tolist()):
-        if not actions[row].is_valid:
+        if not known[row]:
             continue
-        flown = np.asarray(actions[row].values.to_numpy(zero_copy_only=False), dtype=np.int64)
+        flown = np.nan_to_num(actions[ends[row] : ends[row + 1]], nan=-1).astype(np.int64)
         if not len(flown) or flown[-1] != STOP or (flown[:-1] <= STOP).any() or (flown >= APPROACH).any():
             yield Finding(row, f"agent_action = {flown.tolist()[-8:]}", "actions 1 to 15, and Stop (0) at the end")
             continue
@@ -148,11 +150,12 @@ def start_view(data: SceneData, rows: Rows) -> Iterator[Finding]:
         if item is None:
             continue
         points = surface_points(data.pipeline.seed, data.scene, ids[target], item, n)
-        alone = instance_caster(item)
-        for k in routes:
+        origins, aims = np.repeat(paths.starts[routes, :3], n, axis=0), np.tile(points, (len(routes), 1))
+        facing = instance_caster(item).unobstructed(origins, aims).reshape(-1, n)
+        open_air = mesh.rays.visible(origins, aims).reshape(-1, n)
+        for k, bare, clear in zip(routes, facing, open_air, strict=True):
             position, yaw = paths.starts[k, :3], float(paths.starts[k, 3])
-            bare = alone.unobstructed(position, points)
-            free = bare & mesh.rays.visible(position, points)
+            free = bare & clear
             shown = [free & _in_picture(camera, view_pose(position, yaw, view), points) for view in VIEWS]
             share = float(np.any(shown, axis=0).sum() / max(bare.sum(), 1))
             best = {

@@ -85,36 +85,6 @@ def image_box(data: SceneData, rows: Rows) -> Iterator[Finding]:
             yield Finding(row, f"image_fraction = {fraction[row]:.4g}", "more than 0, no more than the box's share")
 
 
-@check("objects", needs=("mesh",), after=("image_missing", "image_damaged", "image_box", "object_node"))
-def image_target(data: SceneData, rows: Rows) -> Iterator[Finding]:
-    """Box and share of pixels are those of the object as rays from the picture's camera find it."""
-    mesh = scene_mesh(data)
-    index = {node: k for k, node in enumerate(mesh.rays.nodes)}
-    skip = data.flagged("objects", ("image_damaged", "image_box", "object_node"))
-    nodes, boxes, fraction = rows.texts("mesh_node"), rows.floats(*_BOX).reshape(-1, 4), rows.floats("image_fraction")
-    for row, place in enumerate(rows.floats(*POSE)):
-        png = rows.column("reference_image")[row].as_py()
-        if png is None or skip[row] or not np.isfinite(place).all():
-            continue
-        picture = decode_grey(png)
-        if picture is None:
-            continue
-        camera = Camera(picture.shape[1], picture.shape[0], data.pipeline.reference_images.fov_deg)
-        pose = view_pose(place[:3], float(place[3]), "front")
-        directions = camera.rays()[::_EVERY, ::_EVERY].reshape(-1, 3) @ pose[:3, :3].T
-        seen = mesh.rays.first_hit(pose[:3, 3], directions)[1] == index[str(nodes[row])]
-        v, u = (k * _EVERY for k in np.unravel_index(np.flatnonzero(seen), picture[::_EVERY, ::_EVERY].shape))
-        u0, v0, u1, v1 = boxes[row].tolist()
-        share = float(seen.mean())
-        told = 0.0 if np.isnan(fraction[row]) else float(fraction[row])
-        # A pixel stands for the rays around it: along the object's edge that is a pixel more or less.
-        if abs(share - told) > _SHARE + _EDGE * told**0.5:
-            yield Finding(row, f"image_fraction = {told:.4f}", f"about {share:.4f}")
-        elif len(u) and not (u0 <= u.min() and v0 <= v.min() and u1 > u.max() and v1 > v.max()):
-            box = f"({u.min()}, {v.min()}) to ({u.max() + 1}, {v.max() + 1})"
-            yield Finding(row, f"box ({u0:g}, {v0:g}) to ({u1:g}, {v1:g})", f"one that holds {box}")
-
-
 @check("objects", needs=("anchors", "mesh"), after=("image_missing",))
 def image_pose(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """A picture is taken from its object's selected anchor, or from behind it with nothing between the two."""
@@ -140,6 +110,36 @@ def image_pose(data: SceneData, rows: Rows) -> Iterator[Finding]:
             yield Finding(
                 row, f"something between the anchor and the camera {backs[row]:g} m behind it", "free sight"
             )
+
+
+@check("objects", needs=("mesh",), after=("image_missing", "image_damaged", "image_box", "object_node", "image_pose"))
+def image_target(data: SceneData, rows: Rows) -> Iterator[Finding]:
+    """Box and share of pixels are those of the object as rays from the picture's camera find it."""
+    mesh = scene_mesh(data)
+    index = {node: k for k, node in enumerate(mesh.rays.nodes)}
+    skip = data.flagged("objects", ("image_damaged", "image_box", "object_node", "image_pose"))
+    nodes, boxes, fraction = rows.texts("mesh_node"), rows.floats(*_BOX).reshape(-1, 4), rows.floats("image_fraction")
+    for row, place in enumerate(rows.floats(*POSE)):
+        png = rows.column("reference_image")[row].as_py()
+        if png is None or skip[row] or not np.isfinite(place).all():
+            continue
+        picture = decode_grey(png)
+        if picture is None:
+            continue
+        camera = Camera(picture.shape[1], picture.shape[0], data.pipeline.reference_images.fov_deg)
+        pose = view_pose(place[:3], float(place[3]), "front")
+        directions = camera.rays()[::_EVERY, ::_EVERY].reshape(-1, 3) @ pose[:3, :3].T
+        seen = mesh.rays.first_hit(pose[:3, 3], directions)[1] == index[str(nodes[row])]
+        v, u = (k * _EVERY for k in np.unravel_index(np.flatnonzero(seen), picture[::_EVERY, ::_EVERY].shape))
+        u0, v0, u1, v1 = boxes[row].tolist()
+        share = float(seen.mean())
+        told = 0.0 if np.isnan(fraction[row]) else float(fraction[row])
+        # A pixel stands for the rays around it: along the object's edge that is a pixel more or less.
+        if abs(share - told) > _SHARE + _EDGE * told**0.5:
+            yield Finding(row, f"image_fraction = {told:.4f}", f"about {share:.4f}")
+        elif len(u) and not (u0 <= u.min() and v0 <= v.min() and u1 > u.max() and v1 > v.max()):
+            box = f"({u.min()}, {v.min()}) to ({u.max() + 1}, {v.max() + 1})"
+            yield Finding(row, f"box ({u0:g}, {v0:g}) to ({u1:g}, {v1:g})", f"one that holds {box}")
 
 
 @check("objects", needs=("mesh",), after=("image_missing", "image_damaged", "object_node", "image_pose"))

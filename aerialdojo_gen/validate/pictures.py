@@ -56,11 +56,11 @@ def image_format(data: SceneData, rows: Rows) -> Iterator[Finding]:
 
 @check(
     "objects", needs=("mesh",),
-    after=("image_missing", "image_damaged", "image_blank", "image_format"), samples=True,
+    after=("image_missing", "image_damaged", "image_blank", "image_format", "image_pose"), samples=True,
 )  # fmt: skip
 def image_redrawn(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """A picture is what its camera sees, as drawn anew: no other's, no channel swapped."""
-    skip = data.flagged("objects", ("image_missing", "image_damaged", "image_blank", "image_format"))
+    skip = data.flagged("objects", ("image_missing", "image_damaged", "image_blank", "image_format", "image_pose"))
     asked = [row for row in data.sampled_objects.tolist() if not skip[row]]
     decoded = {row: decode_rgb(rows.column("reference_image")[row].as_py()) for row in asked}
     stored = {row: picture for row, picture in decoded.items() if picture is not None}

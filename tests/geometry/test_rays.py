@@ -137,3 +137,16 @@ def test_standoff_is_the_first_place_from_outside_at_the_offset():
     for direction, end in zip(out, stop, strict=True):
         whole_way = np.linspace(0.0 if np.isnan(end[0]) else np.linalg.norm(end) + 1e-3, 9.0, 400)
         assert surface.distance_m(whole_way[:, None] * direction).min() > 0.5
+
+
+def test_unobstructed_says_what_the_first_hit_says():
+    """Also where the origin or the point is the wall's own, and where both are one."""
+    caster = RayCaster(YARD)._triangles
+    rng = np.random.default_rng(2)
+    origins = rng.uniform([-14, -14, 0.2], [14, 14, 9], (3000, 3))
+    points = np.vstack([rng.uniform([-14, -14, 0.2], [14, 14, 9], (1500, 3)), Surface.of(BALL).sample(1500, rng)])
+    way = points - origins
+    expected = caster.first_hit(origins, way)[0] >= np.linalg.norm(way, axis=1) - 5e-3
+    assert 0.2 < expected.mean() < 0.9
+    assert (caster.unobstructed(origins, points) == expected).mean() > 0.999
+    assert caster.unobstructed(origins[0], origins[:1]).all()

@@ -8,9 +8,11 @@ import shutil
 import subprocess
 import sys
 
+import pandas as pd
 import pytest
 
 from aerialdojo_gen.commands.common import open_pipeline, run_until
+from aerialdojo_gen.config.pipeline import load_pipeline
 from aerialdojo_gen.errors import StoreError, UsageError
 from aerialdojo_gen.pipeline import runner
 from aerialdojo_gen.release.contents import scenes_there
@@ -136,3 +138,35 @@ def test_what_stands_beside_the_tables_is_written_while_the_data_is_held(tmp_pat
     config, roots = open_pipeline(None, tmp_path / "data")
     runner.run([], [], config, roots, prepare=other, finish=other)
     assert len(asked) == 2
+
+
+def test_a_harder_release_of_the_same_candidates_costs_filter_and_split_alone(data, pipeline, project):
+    """As aerialdojo-hard.toml beside aerialdojo-200k.toml: what both need is computed once."""
+    paper, hard = (load_pipeline(project / "pipelines" / f"aerialdojo-{name}.toml") for name in ("200k", "hard"))
+    asked = hard.filter
+    assert (asked.min_plan_detour, asked.max_visible_at_start, hard.split.paper_counts) == (1.05, 0.0, False)
+    for stage in BEFORE:
+        assert hard.section(stage) == paper.section(stage)
+    assert (hard.seed, hard.embodiment, hard.split.salt) == (paper.seed, paper.embodiment, paper.split.salt)
+
+    shutil.rmtree(data / "release")
+    before = times(data / "plans") | times(data / "pairs")
+    more = "[filter]\nmin_plan_detour = 1.05\nmax_visible_at_start = 0.0\n"
+    split(data, pipeline("hard", (A, B), more))
+    assert times(data / "plans") | times(data / "pairs") == before
+    verdicts = pd.read_parquet(data / "verdicts")
+    allowed = (verdicts["plan_detour"] >= 1.05) & (verdicts["target_visible_at_start"] == 0.0)
+    assert set(verdicts["reason"]) >= {"kept", "small_plan_detour", "target_in_view"}
+    assert not verdicts["keep"][~allowed].any()
+    assert not allowed[verdicts["reason"].isin(["small_plan_detour", "target_in_view"])].any()
+    routes = pd.concat(pd.read_parquet(p) for p in (data / "release" / "routes").glob("*/*.parquet"))
+    assert len(routes) == verdicts["keep"].sum() > 0
+    (entry,) = json.loads((data / "release" / "pipeline.json").read_text())["pipelines"]
+    assert (entry["name"], entry["paper_counts"]) == ("hard", False)
+    card = (data / "release" / "README.md").read_text()
+    assert "pipeline `hard`" in card
+    assert "kept are only routes at least 5 % longer than the shortest without obstacles, and only tasks" in card
+    assert "to the paper's counts" not in card
+
+
+BEFORE = ("build-scenes", "annotate-import", "anchor-sample", "reference-images", "pair-objects", "plan")

@@ -14,8 +14,9 @@ from aerialdojo_gen.annotate.drafting import draft_scene
 from aerialdojo_gen.commands.common import open_pipeline, run_until
 from aerialdojo_gen.common.paper import inventory, splits
 from aerialdojo_gen.errors import PoolError
+from aerialdojo_gen.release.ids import held_out, key_of
 from aerialdojo_gen.release.pool import pool_lines, pool_of, require_pools
-from aerialdojo_gen.release.quota import apportion, choose, train_quotas
+from aerialdojo_gen.release.quota import apportion, choose, difficulty_steps, train_quotas
 from aerialdojo_gen.store import schemas
 from aerialdojo_gen.store import shards as store
 
@@ -87,6 +88,60 @@ def test_a_length_out_of_reach_takes_the_nearest():
     most = lengths[choose(ids, setting, lengths, wanted, 1e9, 0)].sum()
     assert least == pytest.approx(bases[:40].sum(), rel=0.02)
     assert most == pytest.approx(bases[-40:].sum(), rel=0.02)
+
+
+@settings(deadline=None, max_examples=25)
+@given(st.integers(0, 1000), st.floats(0.9, 1.1), st.sampled_from([0.5, 2.0, 5.0, 50.0]))
+def test_harder_tasks_are_preferred_and_numbers_and_metres_hold(seed, longer, preference):
+    ids, setting, lengths = pool(1500, seed)
+    rng = np.random.default_rng(seed)
+    steps = difficulty_steps(rng.choice([1.0, 1.2], 1500), rng.choice([0.0, 0.4], 1500))
+    assert set(steps.tolist()) == {0, 1, 2}
+    wanted = {"base": 150, "standard": 120, "long_horizon": 40}
+    path_m = longer * sum(n * (SETTINGS[s][0] + SETTINGS[s][1]) / 2 for s, n in wanted.items())
+    plain = choose(ids, setting, lengths, wanted, path_m, seed)
+    mask = choose(ids, setting, lengths, wanted, path_m, seed, steps, preference)
+    assert {s: sum(m and t == s for m, t in zip(mask, setting, strict=True)) for s in wanted} == wanted
+    assert lengths[mask].sum() == pytest.approx(path_m, rel=0.01)
+    assert steps[mask].sum() > steps[plain].sum()
+    # Equal steps are no preference, and the order of rows is none either.
+    assert (choose(ids, setting, lengths, wanted, path_m, seed, np.ones(1500, np.int64), preference) == plain).all()
+    order = rng.permutation(1500)
+    again = choose(
+        [ids[k] for k in order], [setting[k] for k in order], lengths[order], wanted, path_m, seed, steps[order],
+        preference,
+    )  # fmt: skip
+    assert {ids[k] for k in np.flatnonzero(mask)} == {ids[order[k]] for k in np.flatnonzero(again)}
+
+
+def test_where_all_candidates_are_wanted_nothing_is_preferred():
+    ids, setting, lengths = pool(300, 5)
+    wanted = {s: setting.count(s) for s in SETTINGS}
+    assert choose(ids, setting, lengths, wanted, 1.0, 0, np.arange(300) % 3, 50.0).all()
+
+
+def test_what_is_not_known_is_not_hard():
+    known = difficulty_steps(np.array([1.04, 1.05, np.nan, np.nan]), np.array([0.01, 0.0, 0.0, np.nan]))
+    assert known.tolist() == [0, 2, 1, 0]
+
+
+@given(st.sets(st.integers(0, 10_000), max_size=80), st.floats(0, 1), st.integers(0, 5))
+def test_held_out_objects_are_a_share_of_their_scene_by_the_salt(objects, fraction, salt):
+    key = key_of(f"salt number {salt:04}", 0)
+    out = held_out("U_Test_0", sorted(objects), fraction, key)
+    assert out <= objects
+    assert len(out) == int(fraction * len(objects) + 0.5)
+    assert held_out("U_Test_0", sorted(objects, reverse=True), fraction, key) == out
+    assert out <= held_out("U_Test_0", sorted(objects), 1.0, key) == objects
+
+
+def test_another_salt_or_scene_holds_out_other_objects():
+    sets = [
+        held_out(scene, range(200), 0.2, key_of(salt, 0))
+        for scene in ("U_A_0", "U_B_0") for salt in ("a salt of one's own", "another of one's own")
+    ]  # fmt: skip
+    assert all(len(out) == 40 for out in sets)
+    assert len({frozenset(out) for out in sets}) == 4
 
 
 def verdicts(data, scene, kept):

@@ -21,6 +21,7 @@ import pytest
 import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from support.handmade import UNSPLIT
 
 from aerialdojo_gen.errors import StoreError
 from aerialdojo_gen.release.card import render_card, write_card
@@ -148,7 +149,7 @@ def task(k, setting, modality):
         "task_id": f"U_Test_0-{k:04}-{modality[0]}", "nav_id": f"U_Test_0-{k:04}", "scene": "U_Test_0",
         "family": "Urban", "scene_type": "Test", "partition": "ID", "subset": "train", "setting": setting,
         "modality": modality, "action_budget": 90, "start_x_m": k * 0.1, "start_y_m": 2.0, "start_z_m": 1.0,
-        "start_yaw_rad": 0.5, "target_name": "van", "landmark": "tower", "direction": "north",
+        "start_yaw_rad": 0.5, "target_name": "van", "landmark": "tower", "direction": "north", **UNSPLIT,
     } | (told if modality == "semantic" else shown)  # fmt: skip
 
 

@@ -49,6 +49,39 @@ def test_rules_at_their_boundaries(case, expected):
     assert verdict(**case) == expected
 
 
+HARD = FilterConfig(min_plan_detour=1.05, max_visible_at_start=0.1)
+
+
+@pytest.mark.parametrize(
+    ("detour", "visible", "config", "expected"),
+    [
+        (1.0, 1.0, CONFIG, "kept"),
+        (np.nan, np.nan, CONFIG, "kept"),
+        (1.05, 0.1, HARD, "kept"),
+        (1.0499, 0.1, HARD, "small_plan_detour"),
+        (1.0499, 0.2, HARD, "small_plan_detour"),
+        (1.05, 0.1001, HARD, "target_in_view"),
+        (np.nan, 0.0, HARD, "small_plan_detour"),
+        (1.2, np.nan, HARD, "target_in_view"),
+        (1.0, 0.0, FilterConfig(max_visible_at_start=0.0), "kept"),
+        (1.0, 1e-9, FilterConfig(max_visible_at_start=0.0), "target_in_view"),
+        (1.06, 1.0, FilterConfig(min_plan_detour=1.06), "kept"),
+    ],
+)
+def test_rules_of_difficulty_at_their_boundaries(detour, visible, config, expected):
+    case = (np.array(["SOLVED"]), np.array([10.0]), np.array([12.0]), np.array([20], np.int32))
+    assert judge(*case, config, np.array([detour]), np.array([visible]))[0][0] == expected
+    # The paper's own rules come first.
+    near = (case[0], case[1], np.array([10.1]), case[3])
+    assert judge(*near, config, np.array([detour]), np.array([visible]))[0][0] == "near_straight"
+
+
+def test_what_nobody_told_is_not_kept_where_it_is_asked_for():
+    case = (np.array(["SOLVED"]), np.array([10.0]), np.array([12.0]), np.array([20], np.int32))
+    assert judge(*case, HARD)[0][0] == "small_plan_detour"
+    assert judge(*case, CONFIG)[0][0] == "kept"
+
+
 @given(
     st.lists(
         st.tuples(

@@ -1,14 +1,18 @@
+import hashlib
 import math
 from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from support.handmade import OPINIONS
+from support.handmade import OPINIONS, box, instance, scene
 
 from aerialdojo_gen.config.sections import Embodiment, PairObjectsConfig
+from aerialdojo_gen.errors import StoreError
 from aerialdojo_gen.pipeline.stage import Job, Roots
+from aerialdojo_gen.scenes.glb import write_glb
 from aerialdojo_gen.stages.work import pair_objects
 from aerialdojo_gen.store import schemas
 from aerialdojo_gen.store import shards as store
@@ -30,9 +34,44 @@ def anchor_rows(places, variants=3):
     ]  # fmt: skip
 
 
-def pair(data: Path, rows, config=None):
+def things(data: Path, rows, *others):
+    """A scene with a ball 3 m south of each object's first anchor, and the tables that tell of it."""
+    first = {row["object_id"]: row for row in reversed(rows)}
+    balls = {
+        k: instance(
+            f"ball_{k}",
+            trimesh.creation.icosphere(2, radius=0.4).apply_translation([row["x_m"], row["y_m"] - 3.0, row["z_m"]]),
+        )
+        for k, row in first.items()
+    }
+    world = scene(*balls.values(), *others, half=120.0)
+    mesh = data / "meshes" / f"{SCENE}.glb"
+    mesh.parent.mkdir(parents=True, exist_ok=True)
+    write_glb(world, mesh)
+    low, high = world.bounds.tolist()
+    told = {
+        "scene": SCENE, "family": "Urban", "scene_type": "Test", "partition": "ID",
+        "mesh_path": f"meshes/{SCENE}.glb", "mesh_sha256": hashlib.sha256(mesh.read_bytes()).hexdigest(),
+        "ceiling_m": high[2],
+        **{f"{e}_{a}_m": v for e, c in (("min", low), ("max", high)) for a, v in zip("xyz", c, strict=True)},
+        "n_triangles": world.n_triangles, "n_instances": len(world.instances), "n_categories": 1,
+    }  # fmt: skip
+    objects = [
+        {
+            "scene": SCENE, "object_id": k, "name": f"ball {k}", "category": "ball", "description": "A ball.",
+            "mesh_node": f"ball_{k}", "x_m": 0.0, "y_m": 0.0, "z_m": 1.0, "size_x_m": 1.0, "size_y_m": 1.0,
+            "size_z_m": 1.0, "landmark_id": 0, "direction": "east",
+        }
+        for k in balls
+    ]  # fmt: skip
+    store.write_shard(data, "scenes", SCENE, 0, from_rows(schemas.SCENES, [told]))
+    store.write_shard(data, "objects", SCENE, 0, from_rows(schemas.OBJECTS, objects))
+
+
+def pair(data: Path, rows, config=None, others=()):
     config = config or PairObjectsConfig()
     store.write_shard(data, "anchors", SCENE, 0, from_rows(schemas.ANCHORS, rows))
+    things(data, rows, *others)
     job = Job("pair-objects", SCENE, 0, 1, 0, Embodiment(), Roots(data, data, data, data))
     out = pair_objects.run(job, config)
     check_table(schemas.PAIRS, out.tables["pairs"])
@@ -81,6 +120,34 @@ def test_start_variants_limits_starts_and_not_goals(tmp_path):
 def test_a_scene_without_anchors_or_with_one_object_has_no_pairs(tmp_path):
     assert pair(tmp_path, []).rows_in == 0
     assert pair(tmp_path, anchor_rows([(0.0, 0.0, 2.0)])).rows_in == 0
+
+
+def test_the_start_looks_away_from_its_own_anchor(tmp_path):
+    """All anchors face east: starts face west, and see the ball that lies there, or below, not the one behind."""
+    places = [(0.0, 0.0, 2.0), (20.0, 0.0, 2.0), (20.0, 0.0, 12.0)]
+    rows = {r["pair_id"]: r for r in pair(tmp_path, anchor_rows(places, variants=1)).tables["pairs"].to_pylist()}
+    told = {k: (r["target_visible_at_start"], r["visible_view_at_start"]) for k, r in rows.items()}
+    assert told["1_0__0"] == (1.0, "front")
+    assert told["0_0__1"] == (0.0, None)
+    assert told["2_0__1"] == (1.0, "down")
+    assert told["1_0__2"] == (0.0, None)
+
+
+def test_what_stands_between_hides_the_target(tmp_path):
+    places, wall = [(0.0, 0.0, 2.0), (20.0, 0.0, 2.0)], instance("wall", box((9, -9, 0), (9.5, 9, 9)))
+    rows = pair(tmp_path, anchor_rows(places, variants=1), others=(wall,)).tables["pairs"].to_pylist()
+    assert [(r["target_visible_at_start"], r["visible_view_at_start"]) for r in rows] == [(0.0, None)] * 2
+
+
+def test_an_object_that_the_mesh_lacks_is_named(tmp_path):
+    rows = anchor_rows([(0.0, 0.0, 2.0), (20.0, 0.0, 2.0)])
+    pair(tmp_path, rows)
+    objects = store.read_scene(tmp_path, "objects", SCENE).to_pylist()
+    objects[1]["mesh_node"] = "gone"
+    store.write_shard(tmp_path, "objects", SCENE, 0, from_rows(schemas.OBJECTS, objects))
+    job = Job("pair-objects", SCENE, 0, 1, 0, Embodiment(), Roots(*[tmp_path] * 4))
+    with pytest.raises(StoreError, match="object 1 is not in the scene's mesh: run annotate-import again"):
+        pair_objects.run(job, PairObjectsConfig())
 
 
 moves = st.one_of(

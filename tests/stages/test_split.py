@@ -15,7 +15,7 @@ from aerialdojo_gen.config.sections import Embodiment, FilterConfig, SplitConfig
 from aerialdojo_gen.pipeline.stage import Job, Roots
 from aerialdojo_gen.release.card import write_card
 from aerialdojo_gen.release.contents import counts
-from aerialdojo_gen.release.ids import key_of, nav_id, reference_id
+from aerialdojo_gen.release.ids import held_out, key_of, nav_id, reference_id
 from aerialdojo_gen.release.select import train_counts, train_mask
 from aerialdojo_gen.stages.work import filter as filter_stage
 from aerialdojo_gen.stages.work import split
@@ -63,11 +63,14 @@ def rows_of_pairs_and_plans():
                 ids = {"start_object_id": i, "start_anchor_id": a, "target_object_id": j}
                 xyz = np.stack([p, [q[0], p[1], p[2]], q])
                 length = float(np.linalg.norm(np.diff(xyz, axis=0), axis=1).sum())
-                pair = key | ids | {"euclidean_m": float(np.linalg.norm(q - p))}
+                share = (i + j) % 3 / 4
+                seen = {"target_visible_at_start": share, "visible_view_at_start": "down" if share else None}
+                pair = key | ids | seen | {"euclidean_m": float(np.linalg.norm(q - p))}
                 plan = key | {
                     "outcome": "SOLVED", "length_m": length, "n_actions": 3, "expansions": 9, "min_clearance_m": 0.4,
                     "x_m": xyz[:, 0], "y_m": xyz[:, 1], "z_m": xyz[:, 2], "yaw_rad": [start["yaw_rad"] + math.pi] * 3,
-                    "action": [3, 16, 0],
+                    "action": [3, 16, 0], "free_length_m": length / 1.25, "plan_detour": 1.25,
+                    "straight_line_free": False, "climb_m": max(0.0, q[2] - p[2]), "agent_action": [3, 0],
                 }  # fmt: skip
                 yield pair, plan
 
@@ -150,6 +153,48 @@ def test_tasks_tell_the_start_and_nothing_of_the_goal(data):
         start = {row["start_x_m"], row["start_y_m"], row["start_z_m"]}
         numbers = {v for v in row if isinstance(v, float)}
         assert not numbers & (goal - start)
+
+
+def test_what_training_has_seen_is_told_by_the_tables_alone(data):
+    tasks, routes = load(data, "tasks").drop_duplicates("nav_id").set_index("nav_id"), load(data, "routes")
+    routes = routes.set_index("nav_id").loc[tasks.index]
+    train = tasks["subset"] == "train"
+    targets, starts = routes["target_object_id"], routes["start_object_id"] * 100 + routes["start_anchor_id"]
+    assert (tasks["target_seen_in_train"] == targets.isin(set(targets[train]))).all()
+    assert (tasks["start_seen_in_train"] == starts.isin(set(starts[train]))).all()
+    assert tasks.loc[train, ["target_seen_in_train", "start_seen_in_train"]].all(axis=None)
+
+
+def test_the_split_by_objects_keeps_both_ends_out_of_training(data):
+    tasks, routes = load(data, "tasks").drop_duplicates("nav_id").set_index("nav_id"), load(data, "routes")
+    routes = routes.set_index("nav_id").loc[tasks.index]
+    out = held_out(SCENE, range(N_OBJECTS), 0.2, key_of(None, 0))
+    assert len(out) == 1
+    for end in ("target", "start"):
+        assert (tasks[f"{end}_held_out"] == routes[f"{end}_object_id"].isin(out)).all()
+    train = tasks["target_split"] == "train"
+    assert not set(routes.loc[train, "target_object_id"]) & out
+    assert not set(routes.loc[train, "start_object_id"]) & out
+    assert (train == ~(tasks["target_held_out"] | tasks["start_held_out"])).all()
+    assert 0 < train.sum() < len(tasks)
+
+
+def test_difficulty_goes_from_plans_and_pairs_to_verdicts_and_routes(data):
+    told = ["free_length_m", "plan_detour", "straight_line_free", "climb_m"]
+    seen = ["target_visible_at_start", "visible_view_at_start"]
+    pairs, plans = (pd.read_parquet(data / name).set_index("pair_id") for name in ("pairs", "plans"))
+    verdicts = pd.read_parquet(data / "verdicts").set_index("pair_id")
+    pd.testing.assert_frame_equal(verdicts[told], plans[told].loc[verdicts.index])
+    pd.testing.assert_frame_equal(verdicts[seen], pairs[seen].loc[verdicts.index])
+    ends = ["start_object_id", "start_anchor_id", "target_object_id"]
+    for row in load(data, "routes").itertuples():
+        pair = "{}_{}__{}".format(*(getattr(row, name) for name in ends))
+        own = verdicts.loc[pair]
+        assert all(getattr(row, name) == own[name] for name in (*told, seen[0]))
+        assert [row.visible_view_at_start == "down", own["visible_view_at_start"] == "down"] == [
+            row.target_visible_at_start > 0
+        ] * 2
+        assert row.agent_action.tolist() == [3, 0]
 
 
 def test_routes_end_on_the_selected_anchor_of_the_named_target(data):

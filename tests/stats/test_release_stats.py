@@ -5,15 +5,26 @@ import io
 import subprocess
 import sys
 import xml.etree.ElementTree as ET
+from dataclasses import replace
 
 import cv2
 import numpy as np
+import pandas as pd
 import pytest
 
 from aerialdojo_gen.common.paper import inventory, splits
 from aerialdojo_gen.release.contents import check_release
 from aerialdojo_gen.release.quota import train_quotas
 from aerialdojo_gen.stats.comparison import as_csv, as_markdown
+from aerialdojo_gen.stats.difficulty import (
+    Tasks,
+    difficulty_tables,
+    held_out_table,
+    read_tasks,
+    scene_table,
+    seen_table,
+    setting_table,
+)
 from aerialdojo_gen.stats.figures import draw_figures
 from aerialdojo_gen.stats.figures.charts import composition
 from aerialdojo_gen.stats.figures.maps import _round_length
@@ -162,6 +173,69 @@ def test_scenes_that_the_paper_lacks_have_no_papers_figures(smoke):
     assert total["instances"] == sum(m.instances for m in made) > 0
 
 
+def test_a_release_of_other_numbers_is_not_held_to_the_papers(papers):
+    for table in (*tables([replace(m, paper=None) for m in papers]),):
+        assert table.compared == 0
+        assert not any("paper" in line for line in [*table.terminal(), *table.markdown()])
+
+
+@pytest.fixture(scope="module")
+def frame(smoke):
+    """Routes beside their tasks, by pandas alone."""
+    routes, tasks = (pd.concat(pd.read_parquet(p) for p in sorted((smoke / "release" / t).glob("*/*.parquet")))
+                     for t in ("routes", "tasks"))  # fmt: skip
+    return routes.merge(tasks[tasks["modality"] == "image"], on=["nav_id", "scene", "setting"])
+
+
+def test_difficulty_is_what_pandas_makes_of_the_tables(smoke, frame):
+    tasks = read_tasks(smoke, check_release(smoke))
+    by_scene = {row.name: row.ours for row in scene_table(tasks).rows}
+    for scene in (*check_release(smoke), "all"):
+        own = frame if scene == "all" else frame[frame["scene"] == scene]
+        assert by_scene[scene] == pytest.approx((
+            len(own), own["plan_detour"].median(), own["plan_detour"].quantile(0.9),
+            100 * (own["plan_detour"] < 1.05).mean(), 100 * own["straight_line_free"].mean(),
+            100 * (own["target_visible_at_start"] > 0).mean(), own["climb_m"].median(),
+        ))  # fmt: skip
+    assert by_scene["all"][0] == len(frame)
+    settings = {row.name: row.ours for row in setting_table(tasks).rows}
+    assert settings["base"][0] == (frame["setting"] == "base").sum()
+
+
+def test_splits_are_what_pandas_makes_of_the_tables(smoke, frame):
+    tasks = read_tasks(smoke, check_release(smoke))
+    test = frame[frame["subset"] == "test"]
+    new = ~test["target_seen_in_train"], ~test["start_seen_in_train"]
+    seen = {row.name: row.ours for row in seen_table(tasks).rows}["all"]
+    assert seen == pytest.approx((
+        len(test), new[0].sum(), 100 * new[0].mean(), new[1].sum(), 100 * new[1].mean(), (new[0] & new[1]).sum(),
+    ))  # fmt: skip
+    held = {row.name: row.ours for row in held_out_table(tasks).rows}
+    for partition in ("ID", "OOD"):
+        for side in ("train", "test"):
+            own = frame[(frame["partition"] == partition) & (frame["target_split"] == side)]
+            assert held[f"{partition} {side}"][0] == len(own) > 0
+            assert held[f"{partition} {side}"][4:6] == (own["target_held_out"].sum(), own["start_held_out"].sum())
+            assert side == "test" or not own["target_held_out"].any()
+
+
+def test_tables_of_difficulty_fit_a_terminal(smoke):
+    tasks = read_tasks(smoke, check_release(smoke))
+    many = Tasks(**{name: np.tile(values, 3) for name, values in vars(tasks).items()})
+    many.scene[:] = np.resize([*inventory()], len(many))
+    for table in difficulty_tables(many):
+        assert max(map(len, table.terminal())) <= 100
+        assert max(map(len, table.terminal(80))) <= 80
+    assert len(scene_table(many).terminal(80)) == 3 + 42 + 1
+
+
+def test_a_release_that_does_not_say_has_no_such_tables(smoke):
+    tasks = read_tasks(smoke, check_release(smoke))
+    assert difficulty_tables(replace(tasks, plan_detour=np.full(len(tasks), np.nan))) == []
+    unsplit = replace(tasks, target_split=np.full(len(tasks), ""))
+    assert len(difficulty_tables(unsplit)) == 2
+
+
 def stats(*arguments):
     command = [sys.executable, "-m", "aerialdojo_gen.cli", "stats", *map(str, arguments)]
     return subprocess.run(command, capture_output=True, text=True, check=False)
@@ -177,13 +251,14 @@ def drawn(smoke, tmp_path_factory):
     return out, done.stdout
 
 
-FIGURES = ("composition", "shares", "lengths", "detours", "categories", "names", "maps")
+FIGURES = ("composition", "shares", "lengths", "detours", "difficulty", "categories", "names", "maps")
 
 
 def test_the_command_writes_what_it_prints(smoke, drawn):
     out, printed = drawn
     scenes = in_paper_order([made_of(smoke, name) for name in check_release(smoke)])
-    made = [*tables(scenes), benchmark_table(scenes)]
+    told = difficulty_tables(read_tasks(smoke, [m.scene for m in scenes]))
+    made = [*tables(scenes), *told, benchmark_table(scenes)]
     assert (out / "stats.md").read_text() == as_markdown(made)
     assert (out / "stats.csv").read_text() == as_csv(made)
     assert "\n\n".join("\n".join(table.terminal(80)) for table in made) in printed

@@ -35,7 +35,8 @@ def flips(raw):
 def shard(data, n=60):
     rows = [
         {"scene": SCENE, "pair_id": f"p{k:04}", "start_object_id": k % 7, "start_anchor_id": k % 3,
-         "target_object_id": k % 5 + 7, "euclidean_m": 3.0 + k / 8}
+         "target_object_id": k % 5 + 7, "euclidean_m": 3.0 + k / 8, "target_visible_at_start": k / n,
+         "visible_view_at_start": "down" if k else None}
         for k in range(n)
     ]  # fmt: skip
     table = from_rows(schemas.PAIRS, rows)

@@ -19,7 +19,9 @@ from aerialdojo_gen.store.tables import from_rows
 
 SCENE = "U_Test_0"
 PAIR = {"scene": SCENE, "pair_id": "1_0__2", "start_object_id": 1, "start_anchor_id": 0, "target_object_id": 2,
-        "euclidean_m": 5.0}  # fmt: skip
+        "euclidean_m": 5.0, "target_visible_at_start": 0.5,
+    "visible_view_at_start": "front",
+}  # fmt: skip
 
 
 def test_a_file_is_what_was_committed(root):

@@ -25,7 +25,8 @@ finite = st.floats(-1e6, 1e6)
 def pair(i, scene="U_Test_0"):
     return {
         "scene": scene, "pair_id": f"{i}_0__{i + 1}", "start_object_id": i, "start_anchor_id": 0,
-        "target_object_id": i + 1, "euclidean_m": 4.5 + i,
+        "target_object_id": i + 1, "euclidean_m": 4.5 + i, "target_visible_at_start": i / 1000,
+        "visible_view_at_start": "left" if i else None,
     }  # fmt: skip
 
 

@@ -6,7 +6,7 @@ import hashlib
 import math
 
 import numpy as np
-from support.handmade import OPINIONS
+from support.handmade import OPINIONS, UNTOLD
 from support.rendered import courtyard
 
 from aerialdojo_gen.config.pipeline import Pipeline
@@ -41,7 +41,7 @@ def route_row(nav_id, setting, lists):
         "nav_id": nav_id, "scene": SCENE, "setting": setting, "start_object_id": 0, "start_anchor_id": 0,
         "target_object_id": 1, **dict(zip(("goal_x_m", "goal_y_m", "goal_z_m"), p[-1].tolist(), strict=True)),
         "goal_yaw_rad": 0.0, "euclidean_m": 4.0, "length_m": 5.0, "detour_ratio": 1.25, "n_actions": 6,
-        "min_clearance_m": 1.0, **lists,
+        "min_clearance_m": 1.0, **UNTOLD, **lists,
     }  # fmt: skip
 
 

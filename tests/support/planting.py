@@ -95,7 +95,9 @@ def measured(row: Row, path: np.ndarray, actions: list[int]) -> Row:
     return row | {
         **{name: path[:, k].tolist() for k, name in enumerate(LISTS[:4])},
         "action": list(actions), "n_actions": len(actions), "length_m": length, "euclidean_m": euclidean,
-        "detour_ratio": length / euclidean,
+        "detour_ratio": length / euclidean, "plan_detour": max(1.0, length / row["free_length_m"]),
+        "climb_m": float(np.maximum(np.diff(path[:, 2]), 0.0).sum()),
+        "agent_action": [action for action in actions if action != APPROACH],
     }  # fmt: skip
 
 

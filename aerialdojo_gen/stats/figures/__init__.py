@@ -1,12 +1,14 @@
-"""Figures of a release, as PNG and SVG: what it consists of, lengths, detours, categories, names, maps."""
+"""Figures of a release, as PNG and SVG: what it is made of, lengths, detours, difficulty, categories, names, maps."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
 
+from aerialdojo_gen.stats.difficulty import read_tasks
 from aerialdojo_gen.stats.figures.charts import composition, detours, lengths
 from aerialdojo_gen.stats.figures.cloud import categories, names
+from aerialdojo_gen.stats.figures.difficulty import difficulty
 from aerialdojo_gen.stats.figures.maps import maps
 from aerialdojo_gen.stats.figures.shares import shares
 from aerialdojo_gen.stats.figures.style import Routes, read_routes, save
@@ -30,7 +32,8 @@ def draw_figures(data: Where, scenes: Sequence[str], folder: Path) -> list[Path]
     Returns
     -------
     list of Path
-        ``<figure>.png`` and ``<figure>.svg``; the same release gives the same bytes.
+        ``<figure>.png`` and ``<figure>.svg``; the same release gives the same bytes. Of a release that does not say
+        how hard its tasks are there is no figure of it.
 
     Raises
     ------
@@ -39,11 +42,13 @@ def draw_figures(data: Where, scenes: Sequence[str], folder: Path) -> list[Path]
     """
     root = open_root(data)
     routes: Routes = read_routes(root, scenes)
+    tasks = read_tasks(root, scenes)
     figures = {
         "composition": composition(routes),
         "shares": shares(routes),
         "lengths": lengths(routes),
         "detours": detours(routes),
+        **({"difficulty": difficulty(tasks)} if tasks.told else {}),
         "categories": categories(root, scenes),
         "names": names(root, scenes),
         "maps": maps(root, scenes),
