@@ -188,6 +188,15 @@ def test_a_word_that_is_not_so(planted, object_id, change, old, new):
     assert check(planted) == {"object_words": objects_of(object_id)}
 
 
+def test_words_of_a_look_that_another_variant_has(planted):
+    """The catalogue's own phrase, of parts that this bin does not have."""
+    text = "A green litter bin on the lawn by the path. It has a lid held up by two short posts."
+    retell(planted, BIN, description=text)
+    assert check(planted) == {"object_words": objects_of(BIN)}
+    retell(planted, BIN, description=text.partition(". ")[0] + ".")
+    assert check(planted) == {}
+
+
 @pytest.mark.parametrize(
     "text", ["A red  delivery van.", " A red delivery van.", "A red delivery van\x00.", "A red del�very van."]
 )
