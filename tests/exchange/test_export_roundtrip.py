@@ -76,7 +76,7 @@ def test_the_report_says_what_is_lost(there_and_back):
     assert not report.unmapped
     assert not report.notes
     whole = {name for name, n in report.empty.items() if n == report.rows[name.split(".")[0]]}
-    said = {f"{table}.{c}" for table in ("routes", "objects") for c in LOST[table] if " " not in c}
+    said = {f"{table}.{c}" for table in ("tasks", "routes", "objects") for c in LOST[table] if " " not in c}
     assert whole == said
     assert report.rows["routes"] > 100
     assert report.replay() == {"routes": report.rows["routes"], "median_m": 0.0, "max_m": 0.0, "over_3_m": 0}
