@@ -174,7 +174,7 @@ class PlanConfig(Section):
         0.02, ge=0, le=100, description="what an action costs beside its metres: breaks ties"
     )
     sideways_actions_per_m: float = Field(
-        0.25, ge=0, le=1000, description="what a metre flown sideways counts as: the front camera should see the way"
+        0.5, ge=0, le=1000, description="what a metre flown sideways counts as: the front camera should see the way"
     )
     clearance_preference_m: float = Field(
         1.0, gt=0, le=10, description="clearance below which a metre costs more than a metre"

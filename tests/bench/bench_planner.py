@@ -104,7 +104,7 @@ def main() -> None:
         whole += clock() - t
         routes += found
         t = clock()
-        planner._expand(goal[:3])
+        planner._expand(goal)
         t_field.append(clock() - t)
         for start in starts:
             t = clock()
