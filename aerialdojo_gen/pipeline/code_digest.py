@@ -93,7 +93,10 @@ _WRITERS = (Edge("aerialdojo_gen.store.parquet_files", "write_clustered"), Edge(
 DYNAMIC = frozenset({"aerialdojo_gen.llm.service", "aerialdojo_gen.agents.load"})
 
 # Files that modules read, relative to the package. Those outside of it are sources of the stages.
-DATA_FILES = {"aerialdojo_gen.annotations.phrases": "annotations/phrases/*.toml"}
+DATA_FILES = {
+    "aerialdojo_gen.annotations.phrases": "annotations/phrases/*.toml",
+    "aerialdojo_gen.annotations.place_files": "annotations/places/*.toml",
+}
 
 # Where the package that is installed is not called what is imported; several may provide it.
 _DISTRIBUTIONS = {
