@@ -60,7 +60,7 @@ def free_lengths_m(starts: ArrayLike, goals: ArrayLike, max_approach_m: float) -
     def over_root(value: Floats, of: Floats) -> Floats:
         """Divide by sqrt(1 - of²); infinite from of = 1."""
         root = np.sqrt(np.maximum(1.0 - of * of, 0.0))
-        return np.divide(value, root, out=np.full_like(value, np.inf), where=root > 0.0)
+        return np.asarray(np.divide(value, root, out=np.full_like(value, np.inf), where=root > 0.0))
 
     straight, beyond = np.hypot(flat, lift), np.hypot(across, lift)
     candidates = [
@@ -71,4 +71,4 @@ def free_lengths_m(starts: ArrayLike, goals: ArrayLike, max_approach_m: float) -
         # The goal lies above or below, but for what the Approach alone flies aside.
         np.where(flat <= math.sqrt(0.5), lift + 1.0 - np.sqrt(np.maximum(1.0 - flat * flat, 0.0)), 0.0),
     ]
-    return max_approach_m * np.maximum.reduce(candidates)
+    return np.asarray(max_approach_m * np.maximum.reduce(candidates), np.float64)

@@ -61,7 +61,8 @@ def narrow_cells(field: NDArray[np.float32], prefer: Preference) -> NDArray[np.f
         Metres, multiples of `NARROW_UNIT`.
     """
     share = np.float32(1.0) - np.clip(field, 0.0, prefer.clearance) / np.float32(prefer.clearance)
-    return np.rint(share * np.float32(prefer.weight / NARROW_UNIT)) * np.float32(NARROW_UNIT)
+    units = np.rint(share * np.float32(prefer.weight / NARROW_UNIT))
+    return np.asarray(units * np.float32(NARROW_UNIT), np.float32)
 
 
 @njit(cache=True, error_model="numpy", inline="always")

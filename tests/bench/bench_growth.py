@@ -59,7 +59,7 @@ def main() -> None:
         planner, rng = planner_of(edge), np.random.default_rng(2)
         goal = np.array([edge / 2, edge / 2, 22.0, 0.0])
         starts = np.array([free_pose(planner, rng, goal, 70.0) for _ in range(40)])
-        field = seconds(lambda planner=planner, goal=goal: planner._expand(goal[:3]))
+        field = seconds(lambda planner=planner, goal=goal: planner._expand(goal))
         whole = seconds(lambda planner=planner, goal=goal, starts=starts: planner.plan_target(goal, starts))
         volume = edge**2 * 25
         print(
