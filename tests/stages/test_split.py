@@ -25,6 +25,9 @@ from aerialdojo_gen.store.tables import from_rows
 
 SCENE = "U_Test_0"
 N_OBJECTS = 6
+VIEWPOINT = {
+    "scene": SCENE, "object_id": 0, "viewpoint_id": 0, "x_m": 1.0, "y_m": 2.0, "z_m": 3.0, "yaw_rad": 0.5
+}  # fmt: skip
 
 
 def position(i):
@@ -93,12 +96,15 @@ def data(tmp_path_factory):
         {
             "scene": SCENE, "object_id": i, "reference_image": b"png",
             "box_u0_px": 1, "box_v0_px": 2, "box_u1_px": 30, "box_v1_px": 40, "image_fraction": 0.1,
+            "reference_x_m": 1.0, "reference_y_m": 2.0, "reference_z_m": 3.0, "reference_yaw_rad": 0.5,
+            "step_back_m": 0.0, "tells_shown": None, "tells_missing": None,
         }
         for i in range(N_OBJECTS)
     ]  # fmt: skip
     for table, rows in {
         "scenes": [scene], "landmarks": [landmark], "objects": list(rows_of_objects()),
-        "anchors": list(rows_of_anchors()), "references": references, "pairs": pairs, "plans": plans,
+        "anchors": list(rows_of_anchors()), "viewpoints": [VIEWPOINT], "references": references,
+        "pairs": pairs, "plans": plans,
     }.items():  # fmt: skip
         spec = store.LAYOUT[table].spec
         store.write_shard(data, table, SCENE, 0, from_rows(spec, rows))
