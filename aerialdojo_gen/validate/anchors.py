@@ -104,7 +104,43 @@ def anchor_front(data: SceneData, rows: Rows) -> Iterator[Finding]:
             yield Finding(row, f"no_front_reason = {reasons[row]!r}", wanted)
 
 
-@check("viewpoints", needs=("mesh",))
+@check("anchors", needs=("objects",), after=("unknown_object",))
+def anchor_step(data: SceneData, rows: Rows) -> Iterator[Finding]:
+    """A selected anchor steps back as far as its object's picture was taken, in centimetres."""
+    back, most = rows.floats("step_back_m"), data.pipeline.anchor_sample.step_back_m
+    item = data["objects"].find("object_id", rows.column("object_id"))
+    selected, stored = rows.floats("selected") == 1.0, data["objects"].floats("step_back_m")
+    for row, k in enumerate(item.tolist()):
+        wanted = min(back[row], data.pipeline.reference_images.step_back_m)
+        if not 0.0 <= back[row] <= most or abs(back[row] * 100.0 - round(back[row] * 100.0)) > _SAME_M:
+            yield Finding(row, f"step_back_m = {back[row]:.6g}", f"0 to {most:g}, in centimetres")
+        elif k >= 0 and selected[row] and np.isfinite(stored[k]) and abs(stored[k] - wanted) > _SAME_SCORE:
+            yield Finding(row, f"step_back_m = {back[row]:.6g}", f"{stored[k]:g}, as far as its picture was taken")
+
+
+@check("viewpoints", needs=("objects", "mesh"), after=("viewpoint_object",))
+def viewpoint_place(data: SceneData, rows: Rows) -> Iterator[Finding]:
+    """A viewpoint is at the standoff from its object's surface and faces its centre; numbers count from 0."""
+    scene, objects, wanted = scene_mesh(data).scene, data["objects"], data.pipeline.anchor_sample.standoff_m
+    item = objects.find("object_id", rows.column("object_id"))
+    place, yaw, number = rows.floats("x_m", "y_m", "z_m"), rows.floats("yaw_rad"), rows.ints("viewpoint_id")
+    centre, nodes = objects.floats("x_m", "y_m", "z_m"), objects.texts("mesh_node")
+    for k in np.unique(item[item >= 0]).tolist():
+        own = np.flatnonzero((item == k) & np.isfinite(place).all(axis=1))
+        if nodes[k] not in scene or not len(own):
+            continue
+        distance = Surface.of(scene[str(nodes[k])]).distance_m(place[own])
+        off = np.abs(wrap_angle_rad(yaw[own] - yaw_towards(place[own], centre[k])))
+        for n, row in enumerate(own.tolist()):
+            if abs(distance[n] - wanted) > _STANDOFF_M:
+                yield Finding(row, f"{distance[n]:.4f} m from the object's surface", f"{wanted:g} m")
+            elif off[n] > _SAME_RAD:
+                yield Finding(row, f"yaw_rad = {yaw[row]:.6g}", "the yaw that faces the object's centre")
+            elif number[row] != n:
+                yield Finding(row, f"viewpoint_id = {number[row]}", f"{n}")
+
+
+@check("viewpoints", needs=("mesh",), after=("viewpoint_place",))
 def viewpoint_clearance(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """A body can be at a viewpoint, inside the flight volume."""
     world, radius = scene_mesh(data).world, data.pipeline.embodiment.radius_m

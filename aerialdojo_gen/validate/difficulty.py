@@ -24,6 +24,8 @@ _THICKNESS_M = 1e-3
 # How much the 24-gon's prism sticks out of the unit sphere: an Approach of a metre saves no more than this.
 _SAVED_BY_APPROACH = math.hypot(1.0, 1.0 / math.cos(math.pi / 24)) - 1.0
 # Where something is seen its view is known; 0 with the word, and a share without, are not.
+# Of a point: a share times the number of points is whole.
+_WHOLE = 1e-6
 _UNSEEN = "nothing is seen, and no view is named"
 _OF_ROUTE = (
     "list_lengths_differ", "action_order", "n_actions", "route_length", "euclidean_distance", "replay_differs",
@@ -149,7 +151,7 @@ def start_view(data: SceneData, rows: Rows) -> Iterator[Finding]:
         item = things.get(str(nodes[target])) if target >= 0 else None
         if item is None:
             continue
-        points = surface_points(data.pipeline.seed, data.scene, ids[target], item, n)
+        points = surface_points(data.scene, ids[target], item, n)
         origins, aims = np.repeat(paths.starts[routes, :3], n, axis=0), np.tile(points, (len(routes), 1))
         facing = instance_caster(item).unobstructed(origins, aims).reshape(-1, n)
         open_air = mesh.rays.visible(origins, aims).reshape(-1, n)
@@ -162,8 +164,9 @@ def start_view(data: SceneData, rows: Rows) -> Iterator[Finding]:
                 view for view, seen in zip(VIEWS, shown, strict=True) if seen.sum() == np.sum(shown, axis=1).max()
             }
             row = int(paths.rows[k])
-            # A ray along an edge may go either way.
-            if abs(share - told[row]) > 2.5 / max(bare.sum(), 1):
+            # A ray along an edge may go either way; a share is one of so many points all the same.
+            whole, counted = max(int(bare.sum()), 1), told[row] * max(int(bare.sum()), 1)
+            if abs(share - told[row]) > 2.5 / whole or abs(counted - round(counted)) > _WHOLE:
                 yield Finding(row, f"target_visible_at_start = {told[row]:.3f}", f"{share:.3f}")
             elif (views[row] is None) != (told[row] == 0.0) or (share and told[row] and views[row] not in best):
                 wanted = " or ".join(sorted(best)) if share else _UNSEEN

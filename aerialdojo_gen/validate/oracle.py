@@ -47,7 +47,11 @@ def oracle_fails(data: SceneData, routes: Rows) -> Iterator[Finding]:
             yield Finding(row, lack, _EXPECTED)
 
 
-@check("routes", needs=("tasks", "objects", "mesh"), after=(*_ROUTE_FAULTS, "oracle_fails", "unknown_target"))
+@check(
+    "routes",
+    needs=("tasks", "objects", "mesh"),
+    after=(*_ROUTE_FAULTS, "oracle_fails", "unknown_target", "agent_action"),
+)
 def agent_action_fails(data: SceneData, routes: Rows) -> Iterator[Finding]:
     """The list agent_action is an agent's: flown it stops within 1 m of the anchor, the target in sight."""
     if "agent_action" not in routes.table.column_names:
@@ -61,6 +65,8 @@ def agent_action_fails(data: SceneData, routes: Rows) -> Iterator[Finding]:
         row = int(paths.rows[k])
         target = int(data.target_of_route[row])
         if told.task_of_route[row] < 0 or target < 0:
+            continue
+        if lists[row] is None:  # an older version wrote it
             continue
         actions = [-1 if action is None else action for action in lists[row] or []]
         wrong = [action for action in actions if not 0 <= action < APPROACH]

@@ -205,7 +205,7 @@ def test_the_sun_of_an_imported_scene_stands_above_too(tmp_path):
         ({"shape": "text", "text": "A" * 121, "height": 1}, "has 121 letters"),
         ({"shape": "text", "text": 5, "height": 1}, "text must be letters"),
         ({"shape": ["box"]}, "unknown shape"),
-        ({"shape": "box", "size": [1, 1, 1], "tag": ["x"]}, "tag must be a word"),
+        ({"shape": "box", "size": [1, 1, 1], "tag": [3]}, "tag must be a word"),
         ({"shape": "box", "size": [1e-9, 1e-9, 1e-9]}, "no triangle of variant '' has an area"),
     ],
 )  # fmt: skip

@@ -36,7 +36,7 @@ def test_every_command_says_the_same_line(command, tmp_path, capsys, monkeypatch
     assert line(command, "data", capsys, monkeypatch) == f"{where}the folder does not exist; {told}"
     (tmp_path / "data" / "meshes").mkdir(parents=True)
     lack = "it has no folder release" + (
-        ", nor tasks, routes, objects, landmarks, anchors or scenes" if command[0] == "validate" else ""
+        ", nor tasks, routes, objects, landmarks, anchors, viewpoints or scenes" if command[0] == "validate" else ""
     )
     assert line(command, "data", capsys, monkeypatch) == f"{where}{lack}; {told}"
     (tmp_path / "data" / "release" / "tasks").mkdir(parents=True)

@@ -46,7 +46,7 @@ class Planted:
         spec = store.LAYOUT[key].spec
         if sort:
             rows = sorted(
-                rows, key=lambda row: tuple(str(row[k]) if k != "object_id" else row[k] for k in spec.order)
+                rows, key=lambda row: tuple(row[k] if isinstance(row[k], int) else str(row[k]) for k in spec.order)
             )
         loose = schema or pa.schema([f.with_nullable(True) for f in spec.schema])
         table = pa.Table.from_pylist(rows, schema=loose)

@@ -12,7 +12,8 @@ from aerialdojo_gen.validate import Asked, validate
 from aerialdojo_gen.validate.parts import read_tables, release_of
 
 # Every fourth pixel is looked at: a box that is off by one is within what that can tell.
-UNTOLD = {"box_u0_px", "box_v0_px", "box_u1_px", "box_v1_px"}
+# Of the points of a target one or two may be seen or not: rays along an edge.
+UNTOLD = {"box_u0_px", "box_v0_px", "box_u1_px", "box_v1_px", "target_visible_at_start"}
 # What others say or refer to is told at them.
 TOLD_ELSEWHERE = {
     "landmark_id": "unknown_landmark", "selected": "selected_anchor", "description": "task_goal", "name": "task_goal",

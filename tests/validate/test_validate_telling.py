@@ -39,7 +39,10 @@ def change(planted, table, chosen, keys, **values):
 def test_a_picture_that_says_what_is_not_so(planted, values, found_by):
     row = first(planted, OBJECTS, lambda row: row["tells_shown"] is not None)
     keys = change(planted, OBJECTS, row, ["object_id"], **values(row))
-    assert check(planted) == {found_by: keys}
+    found = check(planted)
+    assert found.pop(found_by) == keys
+    # The anchor says how far its picture steps back, too.
+    assert set(found) <= {"anchor_step"}
 
 
 def test_a_part_that_is_shown_and_told_as_missing(planted):
@@ -86,13 +89,13 @@ def test_an_anchor_that_says_of_its_front_what_is_not_so(planted, values, found_
     assert check(planted) == {found_by: keys}
 
 
-def test_a_viewpoint_in_the_ground_or_outside(planted):
+def test_a_viewpoint_out_of_place(planted):
     row = planted.rows(VIEWPOINTS)[0]
     keys = ["object_id", "viewpoint_id"]
-    named = change(planted, VIEWPOINTS, row, keys, z_m=0.01)
-    assert check(planted) == {"viewpoint_clearance": named}
-    change(planted, VIEWPOINTS, row, keys, z_m=900.0)
-    assert check(planted) == {"viewpoint_clearance": named}
+    named = change(planted, VIEWPOINTS, row, keys, x_m=row["x_m"] + 0.05)
+    assert check(planted) == {"viewpoint_place": named}
+    change(planted, VIEWPOINTS, row, keys, x_m=row["x_m"], yaw_rad=row["yaw_rad"] + 0.05)
+    assert check(planted) == {"viewpoint_place": named}
 
 
 def test_a_viewpoint_of_no_object(planted):

@@ -88,9 +88,9 @@ def run(job: Job, config: PairObjectsConfig) -> Output:
     return Output({"pairs": table}, rows_in=len(keep), rows_out=table.num_rows, counts=counts)
 
 
-def surface_points(seed: int, scene: str, object_id: int, item: Instance, n: int) -> Floats:
+def surface_points(scene: str, object_id: int, item: Instance, n: int) -> Floats:
     """Draw the points of an object that starts are judged by, (n, 3) float64, metres, world frame."""
-    return Surface.of(item).sample(n, generator(seed, "pair-objects", scene, object_id))
+    return Surface.of(item).sample(n, generator(0, "pair-objects", scene, object_id))
 
 
 def _seen_at_start(
@@ -109,7 +109,7 @@ def _seen_at_start(
         if item is None:
             raise StoreError(f"{job.scene}: object {target} is not in the scene's mesh: run annotate-import again")
         rows = np.flatnonzero(targets == target)
-        points = surface_points(job.seed, job.scene, target, item, config.surface_points)
+        points = surface_points(job.scene, target, item, config.surface_points)
         share[rows], view[rows] = seen_from(caster, instance_caster(item), points, starts[rows])
     return share, view
 
