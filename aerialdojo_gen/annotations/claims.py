@@ -10,7 +10,7 @@ say less, so that the check of ambiguity is stricter for it, never laxer.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 
 from aerialdojo_gen.annotations.places import Places
@@ -107,8 +107,15 @@ class Claim:
         if self.relation.startswith("side:"):
             direction = self.relation.removeprefix("side:")
             return any(geometry.side(i, j, direction, slack) for j in sets[0])
-        test = getattr(geometry, self.relation)
-        return any(test(i, j, slack) for j in sets[0])
+        test = _TESTS[self.relation]
+        return any(test(geometry, i, j, slack) for j in sets[0])
+
+
+_TESTS: Mapping[str, Callable[[SceneGeometry, int, int, float], bool]] = {
+    "beside": SceneGeometry.beside, "against": SceneGeometry.against, "at": SceneGeometry.at,
+    "near": SceneGeometry.near, "front": SceneGeometry.front, "behind": SceneGeometry.behind, "on": SceneGeometry.on,
+    "under": SceneGeometry.under, "above": SceneGeometry.above,
+}  # fmt: skip
 
 
 @dataclass(frozen=True)

@@ -77,16 +77,6 @@ class Places:
             self._found[key] = next(wrong, "")
         return self._found[key]
 
-    def unmatched(self) -> list[str]:
-        """List the patterns of things that match nothing of the scene."""
-        missing = []
-        for phrase, conditions in self._phrases.items():
-            for key, value in conditions.items():
-                texts = [v for v in (value if isinstance(value, list) else [value]) if isinstance(v, str)]
-                if key not in ("surface", "by", "part", "among", "over"):
-                    missing += [f"{phrase}: {key} = {text}" for text in texts if not self._things(text)]
-        return missing
-
     def _things(self, pattern: str) -> frozenset[int]:
         if pattern not in self._sets:
             instances = self._geometry.scene.instances
@@ -101,8 +91,7 @@ class Places:
             return self._within(i, value, _REACH_M[name] * slack)
         if name in SIDES:
             return self._beyond(i, value, name.removesuffix("_of"))
-        test: Callable[[int, Any, float], bool] = getattr(self, f"_{name}")
-        return test(i, value, slack)
+        return _TESTS[name](self, i, value, slack)
 
     def _within(self, i: int, pattern: str, most_m: float) -> bool:
         if most_m >= AT_M and i in self._things(pattern):
@@ -315,3 +304,10 @@ class Places:
             return max(abs(u), abs(v)) <= 0.34 * slack
         dx, dy = _CORNERS[part]
         return (dx == 0 or u * dx >= 0.2 / slack) and (dy == 0 or v * dy >= 0.2 / slack)
+
+
+_TESTS: Mapping[str, Callable[[Places, int, Any, float], bool]] = {
+    "on": Places._on, "roof": Places._roof, "under": Places._under, "inside": Places._inside, "hull": Places._hull,
+    "between": Places._between, "over": Places._over, "surface": Places._surface, "by": Places._by,
+    "high": Places._high, "z": Places._z, "floor": Places._floor, "among": Places._among, "part": Places._part,
+}  # fmt: skip
