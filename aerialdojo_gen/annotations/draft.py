@@ -66,7 +66,7 @@ def redraft_annotations(scene: Scene, catalogue: Catalogue, annotations: Annotat
     catalogue : Catalogue
         Names, kinds and looks of its categories.
     annotations : Annotations
-        Of the scene. A name that is not so of the mesh any more is replaced.
+        Of the scene. A name that is not so of the mesh any more, or is another's of its kind, is replaced.
     seed : int
         The same seed gives the same words.
 
@@ -89,15 +89,18 @@ def redraft_annotations(scene: Scene, catalogue: Catalogue, annotations: Annotat
     objects: list[Object] = []
     for entry in annotations.objects:
         i = index[entry.node]
-        name = entry.name if teller.sound(i, entry.name) else vocabulary.nouns[i].short
+        own, kind = vocabulary.nouns[i].short, scene[entry.node].category
+        # A layout that has changed may have put the yellow one where the green one was.
+        others = {n.short for n, it in zip(vocabulary.nouns, scene.instances, strict=True) if it.category == kind}
+        sound = entry.name not in others - {own} and teller.sound(i, entry.name)
+        name = entry.name if sound else own
         text = teller.describe(i, {other.description for other in objects}, name)
         if text is None:
             raise AnnotationError(
                 f"{scene.name}: {entry.node} (object {entry.id}) cannot be told from others of its kind: "
                 "take another object in its place (aerialdojo-gen annotate)"
             )
-        category = scene[entry.node].category
-        objects.append(entry.model_copy(update={"name": name, "category": category, "description": text}))
+        objects.append(entry.model_copy(update={"name": name, "category": kind, "description": text}))
     return replace(annotations, objects=tuple(objects))
 
 

@@ -144,6 +144,12 @@ def test_objects_are_described_anew_and_stay_what_they_are(plaza, catalogue):
     assert check_source(parse_annotations(text), plaza, names, (1, 20), looks=looks) == []
     said = [look.say for entry in after.objects for look in looks[entry.category] if look.say in entry.description]
     assert len(said) > 10
+    # Names of two of a kind that have changed places come back.
+    a, b = next((x, y) for x in draft.objects for y in draft.objects if x.category == y.category and x.name != y.name)
+    swapped = {a.id: b.name, b.id: a.name}
+    mixed = [o.model_copy(update={"name": swapped.get(o.id, o.name)}) for o in draft.objects]
+    again = redraft_annotations(plaza, catalogue, dataclasses.replace(draft, objects=tuple(mixed)), seed=5)
+    assert [o.name for o in again.objects] == [o.name for o in draft.objects]
     gone = dataclasses.replace(draft, objects=(first.model_copy(update={"node": "bench_999"}),))
     with pytest.raises(AnnotationError, match="no node 'bench_999'"):
         redraft_annotations(plaza, catalogue, gone, seed=5)
