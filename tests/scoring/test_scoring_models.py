@@ -160,13 +160,19 @@ def vlm(service, **options):
     return VlmConfig(model="m", base_url=f"{service.url}/v1", retries=0, **options)
 
 
-def by_redness(body):
-    """A model that likes red: it looks at the pictures that it is sent."""
+def shown(body):
+    """The pictures that a model is sent."""
     parts = body["messages"][-1]["content"]
     pictures = []
     for url in (p["image_url"]["url"] for p in parts if p["type"] == "image_url"):
         data = np.frombuffer(base64.b64decode(url.removeprefix("data:image/jpeg;base64,")), np.uint8)
         pictures.append(cv2.imdecode(data, cv2.IMREAD_COLOR)[..., ::-1])
+    return pictures
+
+
+def by_redness(body):
+    """A model that likes red: it looks at the pictures that it is sent."""
+    pictures = shown(body)
     order = sorted(range(len(pictures)), key=lambda k: -redness(pictures[k]))
     return json.dumps({"order": [k + 1 for k in order]})
 
@@ -191,6 +197,8 @@ def test_the_models_order_selects_the_anchor(key, tmp_path):
         rows = selected(config, "red post", tmp_path)
         assert len(service.requests) == 1
     panel.cache_clear()
+    # A model is shown more than the thumbnails that geometry makes do with.
+    assert min(min(picture.shape[:2]) for picture in shown(service.requests[0]["body"])) >= 320
     assert looks_south(rows[0])
     assert [row["score_vlm"] for row in rows] == sorted((row["score_vlm"] for row in rows), reverse=True)
     assert rows[0]["score"] == 1.0
