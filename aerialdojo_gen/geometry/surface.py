@@ -133,12 +133,25 @@ class Surface:
         (n, 3) float64
             Metres, world frame.
         """
+        return self.sample_normals(n, rng)[0]
+
+    def sample_normals(self, n: int, rng: np.random.Generator) -> tuple[Floats, Floats]:
+        """Draw points as `sample` does, the same ones, with the normals of their triangles.
+
+        Returns
+        -------
+        points : (n, 3) float64
+            Metres, world frame.
+        normals : (n, 3) float64
+            Unit vectors; which side they point to is the triangle's orientation's.
+        """
         total = np.cumsum(self.areas_m2)
         place = (np.arange(n) + rng.random(n)) / n * total[-1]
         which = np.minimum(np.searchsorted(total, place, side="right"), len(total) - 1)
         r, s = np.sqrt(rng.random(n))[:, None], rng.random(n)[:, None]
         a, b, c = np.moveaxis(self._corners[which], 1, 0)
-        return np.asarray((1 - r) * a + r * (1 - s) * b + r * s * c)
+        normals = np.cross(b - a, c - a) / (2.0 * self.areas_m2[which, None])
+        return np.asarray((1 - r) * a + r * (1 - s) * b + r * s * c), np.asarray(normals)
 
     def standoff(self, aims: ArrayLike, directions: ArrayLike, offset_m: float, tolerance_m: float = 1e-4) -> Floats:
         """Come from far towards aims, and stop where the surface is as near as the offset.

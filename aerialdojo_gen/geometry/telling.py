@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from aerialdojo_gen.geometry.angles import wrap_angle_rad
 from aerialdojo_gen.geometry.rays import RayCaster
+from aerialdojo_gen.geometry.surface import Surface
 
 Floats = NDArray[np.float64]
 
@@ -91,13 +92,13 @@ class Patch:
     area_m2: float
 
     @classmethod
-    def of(cls, triangles: Floats, n: int, rng: np.random.Generator, scene: RayCaster, sun: ArrayLike) -> Patch:
+    def of(cls, surface: Surface, n: int, rng: np.random.Generator, scene: RayCaster, sun: ArrayLike) -> Patch:
         """Draw points by area.
 
         Parameters
         ----------
-        triangles : (k, 3, 3) float64
-            Metres, world frame; at least one has an area.
+        surface : Surface
+            The part's, world frame.
         n : int
             How many.
         rng : numpy.random.Generator
@@ -106,22 +107,13 @@ class Patch:
         sun : (3,) array_like
             Unit vector towards the sun.
         """
-        cross = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
-        area = np.linalg.norm(cross, axis=1)
-        solid = area > 0.0
-        triangles, cross, area = triangles[solid], cross[solid], area[solid]
-        total = np.cumsum(area) / area.sum()
-        which = np.minimum(np.searchsorted(total, (np.arange(n) + rng.random(n)) / n, side="right"), len(area) - 1)
-        u, v = np.sqrt(rng.random(n)), rng.random(n)
-        a, b, c = np.moveaxis(triangles[which], 1, 0)
-        points = a + (b - a) * (u * (1 - v))[:, None] + (c - a) * (u * v)[:, None]
-        normals = cross[which] / area[which, None]
+        points, normals = surface.sample_normals(n, rng)
         towards = np.asarray(sun, dtype=np.float64)
         facing = normals @ towards
         start = points + normals * np.where(facing > 0.0, _OFF_SURFACE_M, -_OFF_SURFACE_M)[:, None]
         reached = np.isinf(scene.first_hit(start, np.broadcast_to(towards, start.shape))[0])
         lit = np.column_stack([reached & (facing > 0.0), reached & (facing < 0.0)])
-        return cls(points, normals, lit, float(area.sum()) / 2.0)
+        return cls(points, normals, lit, float(surface.areas_m2.sum()))
 
 
 def seen_share(

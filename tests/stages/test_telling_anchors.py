@@ -11,6 +11,7 @@ from support.handmade import box, instance, scene
 from aerialdojo_gen.config.sections import AnchorSampleConfig, Embodiment, ReferenceImagesConfig
 from aerialdojo_gen.geometry.cameras import Camera, project, view_pose
 from aerialdojo_gen.geometry.rays import RayCaster
+from aerialdojo_gen.geometry.surface import Surface
 from aerialdojo_gen.geometry.telling import Patch, in_picture, off_front_rad, seen_share
 from aerialdojo_gen.pipeline.stage import Job, Roots
 from aerialdojo_gen.scenes.anatomy import Anatomy, Run
@@ -142,7 +143,7 @@ def test_what_comes_between_keeps_the_camera_near():
 def test_seen_share_counts_what_faces_the_camera_in_the_picture_and_unhidden():
     panel = instance("panel", box((-0.5, 0.0, 1.0), (0.5, 0.02, 2.0)))
     wall = instance("wall", box((-0.5, -1.0, 0.0), (0.5, -0.9, 3.0)))
-    north = panel.vertices[panel.faces][np.isclose(panel.vertices[panel.faces][..., 1], 0.02).all(axis=1)]
+    north = Surface(panel.vertices, panel.faces[np.isclose(panel.vertices[panel.faces][..., 1], 0.02).all(axis=1)])
     eyes = np.array([[0.0, 1.5, 1.5], [0.0, -2.5, 1.5], [1.4, 0.3, 1.5], [0.0, 1.5, 1.5]])
     yaws = np.array([-NORTH, NORTH, math.pi, NORTH])
     rays = RayCaster(scene(panel, wall))

@@ -87,17 +87,12 @@ def run(job: Job, config: AnchorSampleConfig) -> Output:
                 f"{job.scene}: object {item['object_id']} ({item['name']}) has the mesh node {item['mesh_node']!r}, "
                 "which is not in the scene: run annotate-import again"
             )
-        around_it, rejected, nearly = candidates_of(item, world, job, config)
-        found = shortlisted(item, around_it, nearly, world, job, config) if around_it is not None else []
-        if around_it is not None:
-            seen = around_it.seeing(config.min_visible_fraction)
-            viewpoints += around_it.viewpoints(seen, item["object_id"])
-            rejected["not_visible"] += len(around_it.positions_m) - len(seen)
-            rejected["not_shortlisted"] += len(seen) - len(found)
+        found, rejected, seen = sampled(item, world, job, config)
+        viewpoints += seen
         if item["object_id"] in chosen:
-            sampled = found
-            found = with_choice(sampled, chosen[item["object_id"]], item, world, job, config)
-            rejected["not_shortlisted"] += sum(all(row["x_m"] != f["x_m"] for f in found) for row in sampled)
+            before = found
+            found = with_choice(before, chosen[item["object_id"]], item, world, job, config)
+            rejected["not_shortlisted"] += sum(all(row["x_m"] != f["x_m"] for f in found) for row in before)
         rows += found
         counts += rejected
         if not found:
@@ -136,14 +131,34 @@ def anchors_of(
     rejected : Counter of str
         How many candidates failed which test; with the rows, all of them.
     """
+    return sampled(item, world, job, config)[:2]
+
+
+def sampled(
+    item: dict[str, Any], world: World, job: Job, config: AnchorSampleConfig
+) -> tuple[list[dict[str, Any]], Counter[str], list[dict[str, Any]]]:
+    """Find one object's anchors and viewpoints.
+
+    Parameters
+    ----------
+    item, world, job, config
+        As for `anchors_of`.
+
+    Returns
+    -------
+    rows, rejected
+        As `anchors_of` returns them.
+    viewpoints : list of dict
+        Rows of `viewpoints`: every candidate that sees the object.
+    """
     found, rejected, nearly = candidates_of(item, world, job, config)
     if found is None:
-        return [], rejected
+        return [], rejected, []
     rows = shortlisted(item, found, nearly, world, job, config)
-    seen = len(found.seeing(config.min_visible_fraction))
-    rejected["not_visible"] += len(found.positions_m) - seen
-    rejected["not_shortlisted"] += seen - len(rows)
-    return rows, rejected
+    seen = found.seeing(config.min_visible_fraction)
+    rejected["not_visible"] += len(found.positions_m) - len(seen)
+    rejected["not_shortlisted"] += len(seen) - len(rows)
+    return rows, rejected, found.viewpoints(seen, item["object_id"])
 
 
 def shortlisted(

@@ -12,6 +12,7 @@ from aerialdojo_gen.common.rng import generator
 from aerialdojo_gen.config.sections import AnchorSampleConfig
 from aerialdojo_gen.geometry.cameras import Camera
 from aerialdojo_gen.geometry.rays import RayCaster, TriangleRayCaster, instance_caster
+from aerialdojo_gen.geometry.surface import Surface
 from aerialdojo_gen.geometry.telling import Patch, off_front_rad, seen_share
 from aerialdojo_gen.geometry.viewpoints import Views, informativeness, look
 from aerialdojo_gen.planning.clearance import ClearanceGrid
@@ -214,6 +215,8 @@ def patches_of(world: World, instance: int, points: Floats) -> tuple[Patch, ...]
     thing = world.scene.instances[instance]
     # The same points whoever asks: the draw hangs on nothing but the node.
     rng = generator(0, "anchor-sample", world.scene.name, thing.node)
-    triangles = thing.vertices[thing.faces]
     n = max(_LEAST_POINTS, len(points) // 4)
-    return tuple(Patch.of(triangles[faces], n, rng, world.rays, world.scene.sun) for faces in tells_of(thing))
+    return tuple(
+        Patch.of(Surface(thing.vertices, thing.faces[faces]), n, rng, world.rays, world.scene.sun)
+        for faces in tells_of(thing)
+    )
