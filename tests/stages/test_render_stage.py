@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import io
 import math
+import shutil
 
 import cv2
 import numpy as np
@@ -22,6 +23,8 @@ from aerialdojo_gen.rendering.trajectory import by_steps, by_time
 from aerialdojo_gen.rendering.world import render_world
 from aerialdojo_gen.stages.work import reference_images
 from aerialdojo_gen.store import schemas
+from aerialdojo_gen.store import shards as store
+from aerialdojo_gen.store.tables import from_rows
 
 
 @pytest.fixture(scope="module")
@@ -162,3 +165,21 @@ def test_reference_images_show_their_objects_where_the_box_says(data):
     assert (west["reference_image"], west["image_fraction"]) == (None, None)
     assert output.counts == {"no_anchor": 1, "not_in_view": 1}
     assert io.BytesIO(red["reference_image"]).read(4) == b"\x89PNG"
+
+
+@pytest.mark.parametrize(("most_m", "back_m"), [(15.0, 2.0), (1.25, 1.25), (0.0, 0.0)])
+def test_a_picture_steps_back_as_far_as_its_anchor_and_the_pipeline_say(data, tmp_path, most_m, back_m):
+    folder = tmp_path / "data"
+    shutil.copytree(data, folder)
+    rows = [row | {"step_back_m": 2.0} for row in store.read_scene(data, "anchors", SCENE).to_pylist()]
+    store.write_shard(folder, "anchors", SCENE, 0, from_rows(schemas.ANCHORS, rows))
+    config = ReferenceImagesConfig(width=160, height=160, step_back_m=most_m)
+    (output,) = run_all(folder, config, reference_images, "reference-images")
+    red = output.tables["references"].to_pylist()[0]
+    # The anchor stands at (4, 1.5, 1.5) and looks east.
+    place = [red[f"reference_{name}"] for name in ("x_m", "y_m", "z_m", "yaw_rad")]
+    assert place == pytest.approx([4.0 - back_m, 1.5, 1.5, 0.0])
+    assert red["step_back_m"] == back_m
+    uv, _ = project(Camera(160, 160, 90.0), view_pose(place[:3], 0.0, "front"), courtyard()["red_cube"].vertices)
+    expected = [*uv.min(axis=0), *uv.max(axis=0)]
+    assert [red[f"box_{e}_px"] for e in ("u0", "v0", "u1", "v1")] == pytest.approx(expected, abs=1.01)

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from support.handmade import box, instance, scene
 
-from aerialdojo_gen.config.sections import AnchorSampleConfig, Embodiment, ReferenceImagesConfig
+from aerialdojo_gen.config.sections import AnchorSampleConfig, Embodiment
 from aerialdojo_gen.geometry.cameras import Camera, project, view_pose
 from aerialdojo_gen.geometry.rays import RayCaster
 from aerialdojo_gen.geometry.surface import Surface
@@ -163,8 +163,3 @@ def test_off_front_is_the_angle_to_the_nearest_front(azimuth, fronts):
     place = np.array([[4.0 + math.cos(azimuth), 5.0 + math.sin(azimuth), 6.3]])
     wanted = min(math.acos(max(-1.0, min(1.0, math.cos(azimuth - f)))) for f in fronts)
     assert off_front_rad(place, (4.0, 5.0, 6.0), fronts)[0] == pytest.approx(wanted, abs=1e-6)
-
-
-def test_a_picture_is_taken_from_the_anchor_where_no_step_back_is_wanted():
-    assert ReferenceImagesConfig().step_back_m == AnchorSampleConfig().step_back_m == 15.0
-    assert ReferenceImagesConfig(step_back_m=0.0).step_back_m == 0.0
