@@ -34,31 +34,34 @@ def one(d, yaw, longest=1.0):
 
 
 def brute(d, yaw, longest):
-    """The best Approach that a scan of directions and lengths finds, and a descent from there."""
-    n = 4000
+    """The best Approach that descents from many places find; the way itself and its parts are among them."""
+
+    def inside(a):
+        return a * np.minimum(1.0, longest / np.maximum(np.linalg.norm(a, axis=-1, keepdims=True), 1e-300))
+
+    def left(a):
+        return with_approach(d[None], yaw, inside(a)[None])[0]
+
+    n = 2000
     z = 1 - 2 * (np.arange(n) + 0.5) / n
     angle = np.arange(n) * math.pi * (3 - math.sqrt(5))
     unit = np.stack([np.sqrt(1 - z * z) * np.cos(angle), np.sqrt(1 - z * z) * np.sin(angle), z], axis=1)
-    tries = np.concatenate([longest * share * unit for share in (0.0, 0.25, 0.5, 0.75, 1.0)])
-    tries = np.concatenate([tries, d[None] * min(1.0, longest / max(np.linalg.norm(d), 1e-12))])
+    parts = d * [(1, 1, 1), (1, 1, 0), (0, 0, 1), (0, 0, 0)]
+    tries = inside(np.concatenate([parts, *(longest * share * unit for share in (0.25, 0.5, 0.75, 1.0))]))
     found = with_approach(np.broadcast_to(d, tries.shape), yaw, tries)
-    best = tries[found.argmin()]
-
-    def inside(a):
-        return a * min(1.0, longest / max(np.linalg.norm(a), 1e-300))
-
-    fit = minimize(
-        lambda a: with_approach(d[None], yaw, inside(a)[None])[0], best, method="Nelder-Mead",
-        options={"xatol": 1e-10, "fatol": 1e-12, "maxiter": 4000},
-    )  # fmt: skip
-    return min(float(found.min()), float(fit.fun))
+    best = tries[np.argsort(found)[:24:8]]
+    # A descent may stall at an edge: begin it again where it ended, with the steps that it takes anew.
+    options = {"xatol": 1e-10, "fatol": 1e-12, "maxiter": 2000}
+    for _ in range(3):
+        best = [minimize(left, a, method="Nelder-Mead", options=options).x for a in best]
+    return min(float(found.min()), *map(left, best))
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(d=way, yaw=yaw, longest=st.sampled_from([1.0, 0.4, 2.5]))
 def test_it_is_the_least_that_any_approach_leaves_to_fly(d, yaw, longest):
     least = brute(np.array(d), yaw, longest)
-    assert least - 1e-3 <= one(d, yaw, longest) <= least + 1e-9
+    assert least - 1e-4 <= one(d, yaw, longest) <= least + 1e-9
 
 
 @settings(max_examples=300, deadline=None)
