@@ -17,7 +17,10 @@ Floats = NDArray[np.float64]
 
 _LEAST_POINTS = 3
 _FULL_SIZE = 0.5
-_LEVEL_DEG, _STEEP_DEG = 15.0, 45.0
+# Elevations at which most things are recognised, rather from above than from below, and marks for them.
+_ELEVATIONS_DEG, _LEVEL_MARKS = (-30.0, -5.0, 20.0, 50.0), (0.0, 1.0, 1.0, 0.0)
+# What is nearer to the picture's edge than that, of half of it, is nearly cut off.
+_ROOM = 0.95
 WEIGHTS = {"visible": 0.30, "shown": 0.30, "size": 0.10, "centred": 0.10, "level": 0.10, "clear": 0.10}
 
 
@@ -89,6 +92,8 @@ class Views:
     visible_fraction : (n,) float64
         Of the sample points in the picture that the object itself does not hide (its far side, say), the share that
         nothing else hides either. 0 where fewer than three points are in the picture.
+    framed : (n,) float64
+        Share of the sample points that lie within the picture with a little room, whatever hides them.
     shown : (n,) float64
         Sample points seen, over those that at least one of the n viewpoints would see if the object stood alone: how
         much of the object one picture tells.
@@ -99,6 +104,7 @@ class Views:
     """
 
     visible_fraction: Floats
+    framed: Floats
     shown: Floats
     box_fraction: Floats
     off_centre: Floats
@@ -147,7 +153,7 @@ def look(
     with np.errstate(divide="ignore", invalid="ignore"):
         u = (ray[..., 0] * sin - ray[..., 1] * cos) / (ahead * half)
         v = -ray[..., 2] / (ahead * half)
-    framed = (ahead > 0.0) & (np.abs(u) <= 1.0) & (np.abs(v) <= 1.0)
+    framed = np.asarray((ahead > 0.0) & (np.abs(u) <= 1.0) & (np.abs(v) <= 1.0))
     who, what = np.nonzero(framed)
     facing = alone.unobstructed(positions[who], points[what])
     who, what = who[facing], what[facing]
@@ -169,6 +175,7 @@ def look(
         off[rows] = np.hypot(np.nanmean(us, axis=1), np.nanmean(vs, axis=1))
     return Views(
         visible_fraction=np.where(enough, does / np.maximum(could, 1), 0.0),
+        framed=np.asarray(((ahead > 0.0) & (np.abs(u) <= _ROOM) & (np.abs(v) <= _ROOM)).mean(axis=1)),
         shown=np.where(enough, does / max(ever, 1), 0.0),
         box_fraction=box,
         off_centre=off,
@@ -183,7 +190,7 @@ def informativeness(
     A weighted mean (`WEIGHTS`) of six terms in [0, 1]: *visible*, the visible fraction; *shown*, the share of the
     object that the picture tells, a stand-in for the correspondence of image and name; *size*, the edge of its box in
     the picture, full marks from half of the picture's edge; *centred*, how near it is to the picture's centre;
-    *level*, full marks up to 15° above or below the centroid, none from 45°; *clear*, room around the body, full
+    *level*, `level_marks`; *clear*, room around the body, full
     marks at the ample clearance.
 
     Parameters
@@ -209,13 +216,28 @@ def informativeness(
         "shown": views.shown,
         "size": np.minimum(np.sqrt(views.box_fraction) / _FULL_SIZE, 1.0),
         "centred": 1.0 - np.minimum(views.off_centre, 1.0),
-        "level": 1.0 - np.clip((np.abs(elevation_deg) - _LEVEL_DEG) / (_STEEP_DEG - _LEVEL_DEG), 0.0, 1.0),
+        "level": level_marks(elevation_deg),
         "clear": np.clip((clearance_m - radius_m) / (ample_m - radius_m), 0.0, 1.0),
     }
     score = np.zeros(len(elevation_deg))
     for name, weight in WEIGHTS.items():
         score += weight * terms[name]
     return score
+
+
+def level_marks(elevation_deg: Floats | float) -> Floats:
+    """Mark the elevation of viewpoints, seen from the centroid: full from 5° below to 20° above, 0 at -30° and 50°.
+
+    Parameters
+    ----------
+    elevation_deg : (n,) float64 or float
+
+    Returns
+    -------
+    (n,) or () float64
+        In [0, 1].
+    """
+    return np.asarray(np.interp(elevation_deg, _ELEVATIONS_DEG, _LEVEL_MARKS))
 
 
 def shortlist(

@@ -27,6 +27,7 @@ from aerialdojo_gen.scenes.model import Scene
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
+_WIDE_M = 4.0
 
 
 class RayRenderer:
@@ -38,6 +39,11 @@ class RayRenderer:
         Both sides of its triangles are seen.
     caster : TriangleRayCaster, optional
         Over the triangles of its instances in their order, where there is one already.
+
+    Attributes
+    ----------
+    wide : (instances,) bool
+        Whether an instance is more than 4 m wide both ways.
     """
 
     name = "rays"
@@ -53,6 +59,9 @@ class RayRenderer:
         self._material = np.repeat(np.array([number[part.material] for _, part in parts], np.int32), counts)
         self._corners = vertices[faces]
         self._uv = np.concatenate([part.uv for _, part in parts]).astype(np.float64)[faces]
+        # What is that wide both ways and level is ground, a road, a floor or a roof.
+        bounds = np.array([instance.bounds for instance in scene.instances]).reshape(-1, 2, 3)
+        self.wide: NDArray[np.bool_] = (bounds[:, 1, :2] - bounds[:, 0, :2]).min(axis=1) > _WIDE_M
         self._rays = caster or TriangleRayCaster(vertices, faces)
         self._light: Lighting = light_of(scene, materials)
         textures = [scene.materials[name].texture for name in materials]

@@ -36,6 +36,13 @@ class AnchorView:
         How well the picture shows each of the object's telling parts, in [0, 1]; empty where the whole body tells.
     off_front_rad : float or None
         Angle between where the viewpoint is and the nearest of the object's fronts; None where it has none.
+    framed : float
+        Share of the object's surface that lies within the picture with a little room, whatever hides it.
+    nearer : (H, W) bool or None
+        Pixels that show what stands nearer than the object: no floor or ground, which is no hindrance. None where
+        that was not looked for.
+    behind : AnchorView or None
+        From further back along the viewing axis, where the reference picture is taken; None where it is taken here.
     """
 
     rgb: NDArray[np.uint8]
@@ -47,6 +54,9 @@ class AnchorView:
     clearance_m: float
     told: tuple[float, ...] = ()
     off_front_rad: float | None = None
+    framed: float = 1.0
+    nearer: NDArray[np.bool_] | None = None
+    behind: AnchorView | None = None
 
     def jpeg(self) -> bytes:
         """The picture as a JPEG file."""

@@ -4,21 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
+from typing import Any
 
 import cv2
 import numpy as np
 
+from aerialdojo_gen.geometry.viewpoints import level_marks
 from aerialdojo_gen.scoring.base import AnchorView
-from aerialdojo_gen.scoring.knowing import fronting, knowing, telling
+from aerialdojo_gen.scoring.knowing import clarity, fronting, knowing, telling
 
 WEIGHTS = {
     "unoccluded": 0.25, "shown": 0.25, "size": 0.1, "centred": 0.1, "contrast": 0.05, "sky": 0.025, "level": 0.1,
     "clear": 0.125,
 }  # fmt: skip
+# The weighted mean is multiplied by the `clarity` (module knowing) of these, of `unoccluded` and of `level`.
+FACTORS = ("framed", "open")
 
+# Of a term of the picture, what is that of the reference picture where this is taken from further back.
+_BEHIND = 0.7
 # Full marks from half of the picture's edge on, and from this CIE76 difference on: orange on grey asphalt has 60.
 _FULL_SIZE, _FULL_CONTRAST = 0.5, 50.0
-_LEVEL_DEG, _STEEP_DEG = 15.0, 45.0
 # What surrounds the object: as far as this share of the picture's edge.
 _RING = 1 / 16
 
@@ -42,7 +47,7 @@ class Parts:
     sky : float
         Share of sky in what surrounds it: there its outline is clear.
     level : float
-        Full marks up to 15° above or below the centroid, none from 45°.
+        Full marks from 5° below the centroid to 20° above, none from 30° below and 50° above.
     clear : float
         Room around the body; full marks at the standoff.
     tells : float or None
@@ -50,6 +55,10 @@ class Parts:
         body tells, or nothing is known of it.
     front : float or None
         Full marks up to 25° off the object's front, little beyond 60°; None where it has none.
+    framed : float
+        Share of the object that lies within the picture's edges.
+    open : float
+        1 less the share that what stands nearer takes of the picture, or of the object's box in it: the larger one.
     """
 
     unoccluded: float
@@ -62,14 +71,17 @@ class Parts:
     clear: float
     tells: float | None = None
     front: float | None = None
+    framed: float = 1.0
+    open: float = 1.0
 
     @property
     def score(self) -> float:
-        """The weighted mean of the terms."""
+        """The weighted mean of the terms, times what the picture is worth for what hides or cuts off the object."""
         terms = asdict(self)
         silhouette = sum(weight * terms[name] for name, weight in WEIGHTS.items())
         known = [None if mark is None else np.array([mark]) for mark in (self.tells, self.front)]
-        return float(knowing(np.array([silhouette]), *known)[0])
+        clear = clarity(*np.array([[self.unoccluded], [self.framed], [1.0 - self.open], [self.level]]))
+        return float((knowing(np.array([silhouette]), *known) * clear)[0])
 
     @property
     def columns(self) -> dict[str, float | None]:
@@ -78,7 +90,7 @@ class Parts:
 
 
 def judge(view: AnchorView, radius_m: float, standoff_m: float) -> Parts:
-    """Take a view's terms.
+    """Take a view's terms, those of the picture rather from the picture behind it, where there is one.
 
     Parameters
     ----------
@@ -92,15 +104,25 @@ def judge(view: AnchorView, radius_m: float, standoff_m: float) -> Parts:
     -------
     Parts
     """
-    steep = (abs(view.elevation_deg) - _LEVEL_DEG) / (_STEEP_DEG - _LEVEL_DEG)
-    level = 1.0 - min(max(steep, 0.0), 1.0)
+    level = float(level_marks(view.elevation_deg))
     room = standoff_m - radius_m
     clear = min(max((view.clearance_m - radius_m) / room, 0.0), 1.0) if room > 0.0 else 1.0
     tells = float(telling(np.array([view.told]))[0]) if view.told else None
     off = fronting(None if view.off_front_rad is None else np.array([view.off_front_rad]))
-    front = None if off is None else float(off[0])
+    terms = _pictured(view)
+    if view.behind is not None:
+        behind = _pictured(view.behind)
+        terms = {name: (1.0 - _BEHIND) * term + _BEHIND * behind[name] for name, term in terms.items()}
+    return Parts(
+        shown=view.shown, level=level, clear=clear, tells=tells, front=None if off is None else float(off[0]), **terms
+    )
+
+
+def _pictured(view: AnchorView) -> dict[str, Any]:
+    """Take the terms that the picture itself decides."""
+    names = ("unoccluded", "size", "centred", "contrast", "sky", *FACTORS)
     if not view.visible.any():
-        return Parts(0.0, view.shown, 0.0, 0.0, 0.0, 0.0, level, clear, tells, front)
+        return dict.fromkeys(names, 0.0)
     height, width = view.visible.shape
     rows, columns = np.nonzero(view.visible)
     edge = np.sqrt((np.ptp(rows) + 1) * (np.ptp(columns) + 1) / (height * width))
@@ -114,18 +136,21 @@ def judge(view: AnchorView, radius_m: float, standoff_m: float) -> Parts:
         lab = cv2.cvtColor(view.rgb.astype(np.float32) / 255.0, cv2.COLOR_RGB2LAB)
         difference = np.linalg.norm(lab[view.visible].mean(axis=0) - lab[ring].mean(axis=0))
         contrast, sky = min(float(difference) / _FULL_CONTRAST, 1.0), float(view.sky[ring].mean())
-    return Parts(
-        unoccluded=float(view.visible.sum() / max(int(view.alone.sum()), 1)),
-        shown=view.shown,
-        size=min(float(edge) / _FULL_SIZE, 1.0),
-        centred=1.0 - min(float(away), 1.0),
-        contrast=contrast,
-        sky=sky,
-        level=level,
-        clear=clear,
-        tells=tells,
-        front=front,
+    foreground = 0.0
+    if view.nearer is not None:
+        rows, columns = np.nonzero(view.alone)
+        own = view.nearer[rows.min() : rows.max() + 1, columns.min() : columns.max() + 1]
+        foreground = max(float(view.nearer.mean()), float(own.mean()))
+    terms = (
+        float(view.visible.sum() / max(int(view.alone.sum()), 1)),
+        min(float(edge) / _FULL_SIZE, 1.0),
+        1.0 - min(float(away), 1.0),
+        contrast,
+        sky,
+        view.framed,
+        1.0 - foreground,
     )
+    return dict(zip(names, terms, strict=True))
 
 
 class GeometricScorer:

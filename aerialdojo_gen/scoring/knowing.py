@@ -34,6 +34,34 @@ def fronting(off_front_rad: Floats | None) -> Floats | None:
     return None if off_front_rad is None else np.asarray(np.interp(off_front_rad, _ANGLES_RAD, _MARKS))
 
 
+def clarity(unoccluded: Floats, framed: Floats, foreground: Floats, level: Floats) -> Floats:
+    """Tell what a picture of an object is worth for what hides it, cuts it off, stands nearer, or looks up or down.
+
+    Whatever else a picture shows, a person does not recognise what a rail, a post or its edge takes away, nor most
+    things from below: a factor, not a term that others outweigh.
+
+    Parameters
+    ----------
+    unoccluded, framed : (n,) float64
+        Shares of the object that nothing hides and that lie within the picture, in [0, 1].
+    foreground : (n,) float64
+        Share that what stands nearer takes of the picture or of the object's box in it, the larger one, in [0, 1].
+    level : (n,) float64
+        Marks of the elevation, in [0, 1] (`aerialdojo_gen.geometry.viewpoints.level_marks`).
+
+    Returns
+    -------
+    (n,) float64
+        In (0, 1].
+    """
+    return np.asarray(
+        np.interp(unoccluded, (0.4, 0.95), (0.4, 1.0))
+        * np.interp(framed, (0.5, 0.98), (0.6, 1.0))
+        * np.interp(foreground, (0.05, 0.5), (1.0, 0.5))
+        * np.interp(level, (0.0, 1.0), (0.7, 1.0))
+    )
+
+
 def knowing(score: Floats, tells: Floats | None, front: Floats | None) -> Floats:
     """Weigh what is known of an object with how well its silhouette shows.
 

@@ -17,6 +17,8 @@ Floats = NDArray[np.float64]
 
 # A part that takes this share of the picture is large enough: a square of a fourteenth of its edge.
 _LARGE = 0.005
+# What is nearer than the object's nearest part stands before it; a surface this level is a floor, seen from above.
+_NEARER, _FLOOR = 0.95, 0.8
 
 
 def take_view(
@@ -33,6 +35,7 @@ def take_view(
     told: Sequence[float] = (),
     tells: Sequence[NDArray[np.int64]] = (),
     off_front_rad: float | None = None,
+    framed: float = 1.0,
 ) -> AnchorView:
     """Take the front view of an object from a candidate anchor.
 
@@ -55,7 +58,7 @@ def take_view(
         By ray casts: how much of each telling part is seen, over what the best viewpoint sees.
     tells : sequence of (k,) int64
         The faces of each of those parts: indices into the object's. One that is small in the picture counts less.
-    off_front_rad : float or None
+    off_front_rad, framed
         See `AnchorView`.
 
     Returns
@@ -84,7 +87,48 @@ def take_view(
         clearance_m,
         marks,
         off_front_rad,
+        framed,
+        standing_nearer(
+            picture.depth_m, visible, (picture.instance >= 0) & renderer.wide[picture.instance], camera, pose
+        ),
     )
+
+
+def standing_nearer(
+    depth: NDArray[np.float32],
+    visible: NDArray[np.bool_],
+    wide: NDArray[np.bool_],
+    camera: Camera,
+    world_from_camera: Floats,
+) -> NDArray[np.bool_]:
+    """Tell which pixels show what stands between a camera and an object.
+
+    Parameters
+    ----------
+    depth : (H, W) float32
+        Metres along the camera's axis; infinite where there is nothing.
+    visible : (H, W) bool
+        Pixels that show the object.
+    wide : (H, W) bool
+        Pixels that show something wide enough to stand on.
+    camera : Camera
+    world_from_camera : (4, 4) float64
+
+    Returns
+    -------
+    (H, W) bool
+        Of what is nearer than the object's nearest part, all but level surfaces of what is wide.
+    """
+    if not visible.any():
+        return np.zeros_like(visible)
+    nearer = (depth < _NEARER * np.percentile(depth[visible], 2.0)) & ~visible
+    if nearer.any():
+        local = pixel_rays(camera)[0].reshape(*depth.shape, 3)
+        points = np.where(np.isfinite(depth), depth, 1e3)[..., None] * local @ world_from_camera[:3, :3].T
+        normal = np.cross(np.gradient(points, axis=0), np.gradient(points, axis=1))
+        level = np.abs(normal[..., 2]) >= _FLOOR * np.maximum(np.linalg.norm(normal, axis=-1), 1e-12)
+        nearer &= ~(level & wide)
+    return np.asarray(nearer)
 
 
 def part_shares(

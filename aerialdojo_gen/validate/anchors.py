@@ -8,8 +8,8 @@ import numpy as np
 
 from aerialdojo_gen.geometry.angles import wrap_angle_rad, yaw_towards
 from aerialdojo_gen.geometry.surface import Surface
-from aerialdojo_gen.scoring.geometric import WEIGHTS
-from aerialdojo_gen.scoring.knowing import FRONT_RAD, FRONT_WEIGHT, TELLS_WEIGHT
+from aerialdojo_gen.scoring.geometric import FACTORS, WEIGHTS
+from aerialdojo_gen.scoring.knowing import FRONT_RAD, FRONT_WEIGHT, TELLS_WEIGHT, clarity
 from aerialdojo_gen.scoring.panel import SCORERS
 from aerialdojo_gen.stages.work.anchor_choice import SLACK_M
 from aerialdojo_gen.validate.links import sound
@@ -52,18 +52,22 @@ def anchor_visibility(data: SceneData, rows: Rows) -> Iterator[Finding]:
 @check("anchors")
 def anchor_score(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """An anchor's score is what its parts make of it: each from 0 to 1, weighed as the pipeline says."""
-    parts = rows.floats(*(f"part_{name}" for name in WEIGHTS))
+    names = (*WEIGHTS, *FACTORS)
+    parts = rows.floats(*(f"part_{name}" for name in names))
     for row, k in zip(*np.nonzero(~((parts >= 0) & (parts <= 1))), strict=True):
-        yield Finding(int(row), f"part_{[*WEIGHTS][k]} = {parts[row, k]:.6g}", "0 to 1")
+        yield Finding(int(row), f"part_{names[k]} = {parts[row, k]:.6g}", "0 to 1")
     weights = data.pipeline.anchor_sample.weights
     asked = {name: getattr(weights, name) for name in SCORERS}
     scores = {name: rows.floats(f"score_{name}") for name in SCORERS}
-    geometric = parts @ np.array([*WEIGHTS.values()])
+    geometric = parts[:, : len(WEIGHTS)] @ np.array([*WEIGHTS.values()])
     known = rows.floats("part_tells", "part_front")
     for row, k in zip(*np.nonzero((known < 0) | (known > 1)), strict=True):
         yield Finding(int(row), f"{('part_tells', 'part_front')[k]} = {known[row, k]:.6g}", "0 to 1, or null")
     share = np.where(np.isnan(known), 0.0, [TELLS_WEIGHT, FRONT_WEIGHT])
     geometric = geometric * (1.0 - share.sum(axis=1)) + (share * np.nan_to_num(known)).sum(axis=1)
+    framed, unhindered = parts[:, len(WEIGHTS) :].T
+    unoccluded, level = (parts[:, names.index(name)] for name in ("unoccluded", "level"))
+    geometric = geometric * clarity(unoccluded, framed, 1.0 - unhindered, level)
     by_hand = np.asarray(rows.texts("selected_by"), dtype=object) == "human"
     for row, score in enumerate(rows.floats("score")):
         own = {name: values[row] for name, values in scores.items() if np.isfinite(values[row])}

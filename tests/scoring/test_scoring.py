@@ -1,7 +1,7 @@
 """The geometric scorer, the panel of scorers, and the pictures that they look at."""
 
 import math
-from dataclasses import asdict
+from dataclasses import asdict, replace
 
 import cv2
 import numpy as np
@@ -22,12 +22,13 @@ from aerialdojo_gen.rendering.probe import probe_scene
 from aerialdojo_gen.rendering.raycast import RayRenderer
 from aerialdojo_gen.scenes.model import Instance
 from aerialdojo_gen.scoring.base import AnchorView
-from aerialdojo_gen.scoring.geometric import WEIGHTS, judge
+from aerialdojo_gen.scoring.geometric import WEIGHTS, Parts, judge
 from aerialdojo_gen.scoring.panel import Panel, panel
 from aerialdojo_gen.stages.work.anchor_sample import anchors_of
 from aerialdojo_gen.stages.work.anchor_world import Candidates
 
 CONFIG = AnchorSampleConfig()
+BLANK = Parts(*[0.0] * len(WEIGHTS))
 RADIUS = EMBODIMENT.radius_m
 
 
@@ -69,6 +70,25 @@ def test_unoccluded_is_the_share_that_a_board_leaves():
     eye = (1.05, 0.0, 0.9)
     assert terms(yard(panel_), panel_, eye, math.pi).unoccluded == 1.0
     assert terms(yard(panel_, board), panel_, eye, math.pi).unoccluded == pytest.approx(0.5, abs=0.03)
+
+
+def test_open_is_what_stands_nearer_and_no_floor():
+    cabinet = instance("cabinet", box((-0.4, -0.4, 0.0), (0.4, 0.4, 1.8)))
+    trolley = instance("trolley", box((1.6, -1.0, 0.0), (2.4, -0.3, 0.8)))
+    eye = (3.4, 0.0, 0.9)
+    alone, beside = (terms(yard(cabinet, *more), cabinet, eye, math.pi) for more in ((), (trolley,)))
+    # The ground between is nearer as well, and hinders nobody.
+    assert alone.open == 1.0
+    assert beside.open < 0.95
+    assert beside.score < alone.score
+    assert terms(yard(cabinet, trolley), cabinet, (-3.4, 0.0, 0.9), 0.0).open == 1.0
+
+
+def test_what_the_edge_cuts_off_is_not_framed():
+    cabinet = instance("cabinet", box((-0.4, -0.4, 0.0), (0.4, 0.4, 1.8)))
+    whole, cut = all_terms(yard(cabinet), cabinet, (2.4, 0.0, 0.9, math.pi), (2.4, 0.0, 0.9, math.pi + math.pi / 4))
+    assert whole.framed == 1.0
+    assert 0.1 < cut.framed < 0.9
 
 
 def test_a_sign_is_better_from_the_front_than_from_its_edge():
@@ -129,8 +149,12 @@ def test_every_term_and_the_score_lie_in_the_unit_interval(seed, shown, elevatio
     assert (parts.front is None) == (off_front is None)
     assert all(0.0 <= value <= 1.0 for value in asdict(parts).values() if value is not None)
     assert 0.0 <= parts.score <= 1.0
+    # Whatever it shows, what hides or cuts it off, or a steep look, takes from it and adds nothing.
+    weighed = sum(w * asdict(parts)[k] for k, w in WEIGHTS.items())
     if not told and off_front is None:
-        assert parts.score == pytest.approx(sum(w * asdict(parts)[k] for k, w in WEIGHTS.items()))
+        assert parts.score <= weighed + 1e-9
+        plain = replace(parts, unoccluded=1.0, level=1.0, framed=1.0, open=1.0)
+        assert plain.score == pytest.approx(sum(w * asdict(plain)[k] for k, w in WEIGHTS.items()))
 
 
 def test_weights_of_the_terms_are_a_mean():
@@ -145,7 +169,7 @@ def test_rows_hold_the_scores_their_parts_and_a_thumbnail(tmp_path):
         assert (
             row["score"]
             == row["score_geometric"]
-            == pytest.approx(sum(weight * row[f"part_{name}"] for name, weight in WEIGHTS.items()))
+            == pytest.approx(Parts(**{name: row[f"part_{name}"] for name in asdict(BLANK)}).score)
         )
         assert row["score_clip"] is None
         assert row["score_vlm"] is None

@@ -140,6 +140,19 @@ def test_what_comes_between_keeps_the_camera_near():
     assert back < 1.2
 
 
+def test_a_post_between_is_stepped_round(tmp_path):
+    bus = instance("bus", box((-4.0, -1.2, 0.3), (4.0, 1.2, 3.2)))
+    # Before the middle of the south side stand a post and a booth: one hides, the other only takes the eye.
+    post = instance("post", box((-0.3, -4.0, 0.0), (0.3, -3.4, 4.0)))
+    booth = instance("booth", box((1.0, -4.4, 0.0), (2.0, -3.4, 2.4)))
+    wall = instance("wall", box((-20.0, 2.0, 0.0), (20.0, 2.2, 6.0)))
+    place = scene(told(bus, fronts=[-NORTH]), post, booth, wall)
+    best = anchors(place, "bus", tmp_path)[0]
+    assert best["off_front_rad"] <= FRONT_RAD
+    assert best["part_unoccluded"] > 0.9
+    assert best["part_open"] > 0.9
+
+
 def test_seen_share_counts_what_faces_the_camera_in_the_picture_and_unhidden():
     panel = instance("panel", box((-0.5, 0.0, 1.0), (0.5, 0.02, 2.0)))
     wall = instance("wall", box((-0.5, -1.0, 0.0), (0.5, -0.9, 3.0)))

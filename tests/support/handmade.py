@@ -6,12 +6,13 @@ import numpy as np
 import trimesh
 
 from aerialdojo_gen.scenes.model import Instance, Material, Part, Scene
-from aerialdojo_gen.scoring.geometric import WEIGHTS
+from aerialdojo_gen.scoring.geometric import FACTORS, WEIGHTS
 from aerialdojo_gen.store.schemas import TOLD_OF_DIFFICULTY, TOLD_OF_SPLITS
 
 # Columns of anchors that do not matter to what reads them.
 OPINIONS = {
-    "score_geometric": 0.5, "score_clip": None, "score_vlm": None, **{f"part_{name}": 0.5 for name in WEIGHTS},
+    "score_geometric": 0.5, "score_clip": None, "score_vlm": None,
+    **{f"part_{name}": 0.5 for name in (*WEIGHTS, *FACTORS)},
     "part_tells": None, "part_front": None, "off_front_rad": None, "no_front_reason": None, "step_back_m": 0.0,
     "thumbnail": b"",
 }  # fmt: skip

@@ -18,8 +18,8 @@ from aerialdojo_gen.pipeline.stage import Job
 from aerialdojo_gen.scoring.geometric import judge
 from aerialdojo_gen.scoring.knowing import FRONT_RAD
 from aerialdojo_gen.scoring.panel import SCORERS
+from aerialdojo_gen.stages.work.anchor_pictures import Looked
 from aerialdojo_gen.stages.work.anchor_world import Candidates, World
-from aerialdojo_gen.stages.work.step_back import step_back_m, telling_m
 
 Floats = NDArray[np.float64]
 
@@ -94,20 +94,20 @@ def judge_anchor(
         faults.append(f"it is too {side}: {distance:.2f} m from the object's surface, not about "
                       f"{config.standoff_m:g} m")  # fmt: skip
     points = surface.sample(config.surface_points, generator(job.seed, "anchor-sample", job.scene, item["object_id"]))
-    looked = Candidates.of(world, k, points, place, np.array([yaw_rad]), radius, config)
-    seen = float(looked.views.visible_fraction[0])
+    found = Candidates.of(world, k, points, place, np.array([yaw_rad]), radius, config)
+    seen = float(found.views.visible_fraction[0])
     if seen <= 0 or seen < config.min_visible_fraction:
         faults.append(f"it does not see the object: {seen:.0%} of what it faces, {config.min_visible_fraction:.0%} "
                       "is the least")  # fmt: skip
-    most = min(config.step_back_m, telling_m(looked.patches, looked.seen[0], position_m, yaw_rad, config.fov_deg))
-    picture = looked.picture(0, config.picture_px, config.fov_deg)
+    looked = Looked.of(found, np.zeros(1, np.int64), radius, config)
+    (picture,) = looked.pictures(np.zeros(1, np.int64), config.picture_px, config.fov_deg)
     parts = judge(picture, radius, config.standoff_m)
     row = {
         "scene": job.scene,
         "object_id": item["object_id"],
-        **looked.row(0, distance),
+        **found.row(0, distance),
         "no_front_reason": None,
-        "step_back_m": step_back_m(world, k, points, position_m, yaw_rad, config.fov_deg, most),
+        "step_back_m": float(looked.step_back_m[0]),
         # The other scorers compare candidates, and this one stands alone.
         "score": parts.score,
         **{f"score_{name}": parts.score if name == "geometric" else None for name in SCORERS},

@@ -23,7 +23,7 @@ from aerialdojo_gen.scoring.geometric import judge
 from aerialdojo_gen.scoring.knowing import FRONT_RAD
 from aerialdojo_gen.scoring.panel import panel
 from aerialdojo_gen.stages.work.anchor_choice import with_choice
-from aerialdojo_gen.stages.work.anchor_pictures import pictured_from
+from aerialdojo_gen.stages.work.anchor_pictures import Looked
 from aerialdojo_gen.stages.work.anchor_world import Candidates, World, tells_of
 from aerialdojo_gen.store.schemas import ANCHORS, VIEWPOINTS
 from aerialdojo_gen.store.tables import from_rows
@@ -33,6 +33,8 @@ log = logging.getLogger(__name__)
 
 # Models that look at pictures are made for such.
 _LOOKED_AT_PX = 320
+# So many times what is pictured is looked at by ray casts from where its reference picture would be taken.
+_LOOKED_AT = 4
 # More parts than that get no candidates of their own.
 _MOST_TELLS = 4
 REASONS = ("no_surface", "out_of_bounds", "in_collision", "unreachable", "not_visible", "not_shortlisted")
@@ -187,11 +189,16 @@ def shortlisted(
     front = found.before_front
     apart = math.radians(config.separation_deg)
     pictured = max(config.pictured, config.shortlist)
-    few = seen[shortlist(found.rank[seen], azimuth[seen], pictured, apart, front[seen])]
+    # Several a side: what stands before the object from one place does not from the next.
+    looked_at = seen[np.argsort(-found.rank[seen], kind="stable")[: _LOOKED_AT * pictured]]
+    of_sides = seen[shortlist(found.rank[seen], azimuth[seen], pictured, apart, front[seen])]
+    looked = Looked.of(found, np.union1d(looked_at, of_sides), radius, config)
+    of_looked = shortlist(looked.rank, azimuth[looked.which], pictured, apart, front[looked.which])
+    few, backs = looked.which[of_looked], looked.step_back_m[of_looked].tolist()
     size_px = (
         max(config.picture_px, _LOOKED_AT_PX) if config.weights.clip or config.weights.vlm else config.picture_px
     )
-    pictures, backs = pictured_from(found, few, size_px, radius, config)
+    pictures = looked.pictures(of_looked, size_px, config.fov_deg)
     verdicts = panel(config, radius).judge(item["name"], pictures)
     score = np.array([verdict.score for verdict in verdicts])
     best = shortlist(score, azimuth[few], config.shortlist, apart, front[few])

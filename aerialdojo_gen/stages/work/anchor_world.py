@@ -190,6 +190,7 @@ class Candidates:
             told=tuple(float(share) for share in self.told[k]),
             tells=tells_of(self.world.scene.instances[self.instance]),
             off_front_rad=None if self.off_front_rad is None else float(self.off_front_rad[k]),
+            framed=float(self.views.framed[k]),
         )
 
     def row(self, k: int, surface_distance_m: float) -> dict[str, Any]:

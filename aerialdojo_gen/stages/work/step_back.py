@@ -17,12 +17,12 @@ Floats = NDArray[np.float64]
 _FILLED = 0.94
 # The camera's own room, and what it must keep to what it backs up to.
 _CAMERA_M, _KEPT_M = 0.15, 0.3
-# Of what the anchor sees, what the picture must still see: a lamp post may come between, a wall may not.
-_STILL_SEEN = 0.8
-_TRIED = (1.0, 0.75, 0.5, 0.25)
+# What comes between counts this much against what comes into the picture: a rail hides little, and spoils it.
+_HIDDEN = 2.0
+_TRIED = (1.0, 0.85, 0.7, 0.55, 0.4, 0.25)
 _WORTH_M = 0.25
-# Of the picture, what a telling part keeps if it had it: 16 x 16 pixels of 320 x 320; and what it needs to be told.
-_TOLD, _BARELY_TOLD = 0.0025, 0.0007
+# Of the picture, what a telling part keeps if it had it: 12 x 12 pixels of 320 x 320; and what it needs to be told.
+_TOLD, _BARELY_TOLD = 0.0014, 0.0007
 
 
 def fitting_m(vertices: Floats, position_m: Floats, yaw_rad: float, fov_deg: float) -> float:
@@ -85,7 +85,7 @@ def telling_m(patches: Sequence[Patch], seen: Floats, position_m: Floats, yaw_ra
 def step_back_m(
     world: World, instance: int, points: Floats, position_m: Floats, yaw_rad: float, fov_deg: float, most_m: float
 ) -> float:
-    """How far to step back: as far as the object needs, the way is free, and the object still in sight.
+    """How far to step back: as far as the object needs and the way is free, to where most of it is in sight.
 
     Parameters
     ----------
@@ -126,7 +126,8 @@ def step_back_m(
     who, what = np.nonzero(framed)
     # What the object itself hides is hidden from every distance: its own surface counts wherever it is met.
     seen = np.bincount(who, world.rays.visible(places[who], points[what], instance), minlength=len(places))
-    for s, place, share in zip(tries[1:], places[1:], seen[1:], strict=True):
-        if share >= _STILL_SEEN * seen[0] and not world.collisions.sphere_in_collision(place, _CAMERA_M):
-            return s
-    return 0.0
+    worth = seen - _HIDDEN * (np.bincount(who, minlength=len(places)) - seen)
+    worth[1:][[world.collisions.sphere_in_collision(place, _CAMERA_M) for place in places[1:]]] = -np.inf
+    # Of equals the farthest, which leaves room around it; none where the anchor's own place is the better one.
+    best = 1 + int(worth[1:].argmax())
+    return tries[best] if worth[best] >= worth[0] else 0.0

@@ -112,12 +112,15 @@ ANCHOR_COLUMNS = (
     column("part_centred", pa.float64(), "how near the object is to the picture's centre, 0 to 1"),
     column("part_contrast", pa.float64(), "colour difference to what surrounds it in the picture, 0 to 1"),
     column("part_sky", pa.float64(), "share of sky in what surrounds it in the picture"),
-    column("part_level", pa.float64(), "1 up to 15 degrees above or below the centroid, 0 from 45"),
+    column("part_level", pa.float64(), "1 from 5 degrees below the centroid to 20 above, 0 at 30 below and 50 above"),
     column("part_clear", pa.float64(), "room around the body, 1 at the standoff"),
     column("part_tells", pa.float64(), "how well the parts that make the name true are seen, 0 to 1; null where the "
            "whole body does", nullable=True),
     column("part_front", pa.float64(), "1 up to 25 degrees off the front, little beyond 60; null without a front",
            nullable=True),
+    column("part_framed", pa.float64(), "share of the object that lies within the picture's edges"),
+    column("part_open", pa.float64(), "1 less the share that what stands nearer takes of the picture or of the "
+           "object's box in it"),
     column("selected", pa.bool_(), "true for one anchor an object: the goal of its tasks"),
     column("selected_by", pa.string(), "human or auto"),
 )  # fmt: skip
