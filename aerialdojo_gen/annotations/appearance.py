@@ -11,6 +11,10 @@ from aerialdojo_gen.scenes.looks import Look
 from aerialdojo_gen.scenes.model import Instance, Material
 
 Looks = Mapping[str, tuple[Look, ...]]
+# Attributes that name no part: a phrase that holds the colour's word speaks of that part.
+_ELSEWHERE = frozenset({"colour", "size", "material", "place"})
+_STEM = 4
+_EMPTY = frozenset({"a", "an", "the", "of", "on", "in", "its", "it", "and", "with", "without", "around", "full"})
 
 
 def unlike(text: str, instance: Instance, looks: Looks, materials: Mapping[str, Material]) -> Iterator[str]:
@@ -60,6 +64,35 @@ def discoloured(text: str, instance: Instance, materials: Mapping[str, Material]
     if value and f" {_plain(value).strip()} " in _plain(text):
         for word in uncoloured(value, instance, materials):
             yield f"{word!r} is not the colour of {instance.node}: hardly any of its surface is"
+
+
+def repeats(say: str, instance: Instance) -> bool:
+    """Whether a phrase says again what an attribute of its instance says.
+
+    Parameters
+    ----------
+    say : str
+        A phrase of the catalogue.
+    instance : Instance
+        Its name says its attributes: ``"with loose bricks on top"``.
+
+    Returns
+    -------
+    bool
+        True where all words that tell what an attribute is stand in the phrase, two at least, or others of their stems;
+        and where both say that it lacks the same.
+    """
+    said = _stems(say)
+    for key, value in instance.attributes.items():
+        telling = _stems(value)
+        lacking = value.startswith("without ") and say.startswith("no ")
+        if key not in _ELSEWHERE and len(telling) >= (1 if lacking else 2) and telling <= said:
+            return True
+    return False
+
+
+def _stems(text: str) -> set[str]:
+    return {word[:_STEM] for word in _plain(text).split() if word not in _EMPTY}
 
 
 def _plain(text: str) -> str:
