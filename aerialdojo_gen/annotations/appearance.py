@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping
 
+from aerialdojo_gen.annotations.buried import Surface
 from aerialdojo_gen.annotations.colours import uncoloured
 from aerialdojo_gen.scenes.claims import untrue
 from aerialdojo_gen.scenes.looks import Look
@@ -17,8 +18,10 @@ _STEM = 4
 _EMPTY = frozenset({"a", "an", "the", "of", "on", "in", "its", "it", "and", "with", "without", "around", "full"})
 
 
-def unlike(text: str, instance: Instance, looks: Looks, materials: Mapping[str, Material]) -> Iterator[str]:
-    """Say which of the catalogue's phrases stand in a text and are not so of its instance.
+def unlike(
+    text: str, instance: Instance, looks: Looks, materials: Mapping[str, Material], surface: Surface | None = None
+) -> Iterator[str]:
+    """Say which of the catalogue's phrases stand in a text and are not so of its instance, or not to be seen.
 
     Parameters
     ----------
@@ -30,6 +33,8 @@ def unlike(text: str, instance: Instance, looks: Looks, materials: Mapping[str, 
         The phrases of each category.
     materials : mapping of str to Material
         Of its scene.
+    surface : Surface, optional
+        Its ground and water; without it nothing is asked of what they hide.
 
     Yields
     ------
@@ -39,7 +44,10 @@ def unlike(text: str, instance: Instance, looks: Looks, materials: Mapping[str, 
     said = _plain(text)
     for look in looks.get(instance.category, ()):
         if f" {_plain(look.say).strip()} " in said:
-            for claim in untrue(look, instance, materials)[:1]:
+            wrong = untrue(look, instance, materials)[:1]
+            if not wrong and surface is not None and not surface.shows(look, instance):
+                wrong = ["that is under the ground or under water"]
+            for claim in wrong:
                 yield f"{look.say!r} is not so of {instance.node}: {claim}"
 
 

@@ -83,7 +83,7 @@ class Vocabulary:
             return []
         return [
             *self.callings.contradictions(text, instance),
-            *unlike(text, instance, self._looks, self.scene.materials),
+            *unlike(text, instance, self._looks, self.scene.materials, self._surface),
             *discoloured(text, instance, self.scene.materials),
         ]
 
