@@ -87,7 +87,7 @@ def repeats(say: str, instance: Instance) -> bool:
     Returns
     -------
     bool
-        True where all words that tell what an attribute is stand in the phrase, two at least, or others of their stems;
+        True where all telling words of an attribute, two at least, or others of their stems stand in the phrase;
         and where both say that it lacks the same.
     """
     said = _stems(say)

@@ -18,8 +18,8 @@ import numpy as np
 
 from aerialdojo_gen.annotations.ambiguity import Ambiguity
 from aerialdojo_gen.annotations.appearance import discoloured, unlike
-from aerialdojo_gen.annotations.check import make_ambiguity
 from aerialdojo_gen.annotations.buried import Surface
+from aerialdojo_gen.annotations.check import make_ambiguity
 from aerialdojo_gen.annotations.claims import Lexicon
 from aerialdojo_gen.annotations.relations import SceneGeometry
 from aerialdojo_gen.errors import AerialDojoError
