@@ -30,6 +30,7 @@ class Surface:
 
     def __init__(self, scene: Scene) -> None:
         self._scene = scene
+        self._last: tuple[Instance, NDArray[np.bool_], Floats] | None = None
 
     @cached_property
     def _triangles(self) -> tuple[shapely.STRtree, Floats]:
@@ -59,17 +60,23 @@ class Surface:
         float
             0 to 1.
         """
-        corners = instance.vertices[instance.faces[faces]]
-        a, b, c = np.moveaxis(corners, 1, 0)
-        areas = np.linalg.norm(np.cross(b - a, c - a), axis=1)
-        middles = corners.mean(axis=1)
-        tree, ground = self._triangles
-        points, over = tree.query(shapely.points(middles[:, :2]), predicate="intersects")
-        heights = _heights(ground[over], middles[points, :2])
-        below = (heights > middles[points, 2] + _TOUCH_M) & (heights < instance.bounds[1, 2])
-        under = np.zeros(len(middles), bool)
-        under[points[below]] = True
-        return float(areas[under].sum() / max(areas.sum(), 1e-12))
+        under, areas = self._under(instance)
+        return float(areas[faces][under[faces]].sum() / max(areas[faces].sum(), 1e-12))
+
+    def _under(self, instance: Instance) -> tuple[NDArray[np.bool_], Floats]:
+        """Which of all faces' middles lie under the surface, and the faces' areas."""
+        if self._last is None or self._last[0] is not instance:
+            corners = instance.vertices[instance.faces]
+            a, b, c = np.moveaxis(corners, 1, 0)
+            middles = corners.mean(axis=1)
+            tree, ground = self._triangles
+            points, over = tree.query(shapely.points(middles[:, :2]), predicate="intersects")
+            heights = _heights(ground[over], middles[points, :2])
+            below = (heights > middles[points, 2] + _TOUCH_M) & (heights < instance.bounds[1, 2])
+            under = np.zeros(len(middles), bool)
+            under[points[below]] = True
+            self._last = instance, under, np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2.0
+        return self._last[1:]
 
     def shows(self, look: Look, instance: Instance) -> bool:
         """Whether what a phrase speaks of can be seen: half of each part, and of each copy where it counts them."""
