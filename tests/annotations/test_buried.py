@@ -105,7 +105,7 @@ def test_of_every_variant_of_which_a_phrase_is_not_used_there_is_something_to_te
         (category, variant.name)
         for category in catalogue.targets
         for variant in catalogue[category].variants
-        for named in [box("thing_0000", (0, 0, 0), (1, 1, 1), **variant.attributes)]
+        for named in [dataclasses.replace(box("x_0", (0, 0, 0), (1, 1, 1)), attributes=dict(variant.attributes))]
         if any(repeats(look.say, named) for look in catalogue[category].looks)
     ]
     assert len(pairs) > 20
