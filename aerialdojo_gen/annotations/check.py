@@ -9,6 +9,7 @@ import numpy as np
 
 from aerialdojo_gen.annotations.ambiguity import Ambiguity, nearest_landmark
 from aerialdojo_gen.annotations.appearance import Looks, discoloured, unlike
+from aerialdojo_gen.annotations.buried import Surface
 from aerialdojo_gen.annotations.calling import Callings
 from aerialdojo_gen.annotations.claims import Lexicon
 from aerialdojo_gen.annotations.format import Landmark, Object, Source
@@ -67,11 +68,11 @@ def check_source(
         faults += _unique(source)
         for i, landmark in source.landmarks.items():
             faults += _landmark(source, scene, ("landmarks", i), landmark)
-        callings = Callings(names)
+        callings, surface = Callings(names), Surface(scene)
         for i, entry in source.objects.items():
             faults += _object(source, scene, names, ("objects", i), entry)
             faults += _called(source, scene, callings, ("objects", i), entry)
-            faults += _looks(source, scene, looks or {}, ("objects", i), entry)
+            faults += _looks(source, scene, looks or {}, surface, ("objects", i), entry)
         faults += _geometry(source, scene, names, geometry or SceneGeometry(scene))
     return sorted(dict.fromkeys(faults), key=lambda fault: fault.line)
 
@@ -139,11 +140,13 @@ def _called(
             yield source.document.fault((*path, key), message)
 
 
-def _looks(source: Source, scene: Scene, looks: Looks, path: tuple[str | int, ...], entry: Object) -> Iterable[Fault]:
+def _looks(
+    source: Source, scene: Scene, looks: Looks, surface: Surface, path: tuple[str | int, ...], entry: Object
+) -> Iterable[Fault]:
     if scene.imported or entry.node not in scene:
         return
     thing = scene[entry.node]
-    for message in unlike(entry.description, thing, looks, scene.materials):
+    for message in unlike(entry.description, thing, looks, scene.materials, surface):
         yield source.document.fault((*path, "description"), message)
     for key in ("name", "description"):
         for message in discoloured(getattr(entry, key), thing, scene.materials):

@@ -6,7 +6,8 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 
 from aerialdojo_gen.annotations.ambiguity import Ambiguity
-from aerialdojo_gen.annotations.appearance import discoloured, unlike
+from aerialdojo_gen.annotations.appearance import discoloured, repeats, unlike
+from aerialdojo_gen.annotations.buried import Surface
 from aerialdojo_gen.annotations.calling import Callings
 from aerialdojo_gen.annotations.check import make_ambiguity
 from aerialdojo_gen.annotations.claims import RIVAL_SLACK, spoken
@@ -17,6 +18,7 @@ from aerialdojo_gen.annotations.format import Landmark
 from aerialdojo_gen.annotations.phrases import Words, noun_of, place_of, words_of
 from aerialdojo_gen.common.rng import generator
 from aerialdojo_gen.scenes.catalogue import Catalogue
+from aerialdojo_gen.scenes.catalogue_check import LEAST_TRUE
 from aerialdojo_gen.scenes.claims import true_looks
 from aerialdojo_gen.scenes.model import Instance, Scene
 
@@ -45,6 +47,7 @@ class Vocabulary:
         self.names = {category: catalogue[category].name for category in catalogue}
         self.kinds = {category: catalogue[category].kind for category in catalogue}
         self._looks = {category: catalogue[category].looks for category in catalogue}
+        self._surface = Surface(scene)
         targets = frozenset(catalogue.targets)
         by_category: dict[str, Words] = {}
         for i in scene.instances:
@@ -67,9 +70,12 @@ class Vocabulary:
         return replace(instance, attributes={k: v for k, v in instance.attributes.items() if k != "colour"})
 
     def looks(self, instance: Instance) -> tuple[str, ...]:
-        """Phrases that are so of an instance."""
+        """Phrases that are so of an instance, can be seen, and say more than its attributes do."""
         looks = self._looks.get(instance.category, ())
-        return tuple(look.say for look in true_looks(looks, instance, self.scene.materials))
+        true = true_looks(looks, instance, self.scene.materials)
+        seen = tuple(look.say for look in true if self._surface.shows(look, instance))
+        new = tuple(say for say in seen if not repeats(say, instance))
+        return new if len(new) >= LEAST_TRUE else seen
 
     def faults(self, instance: Instance, text: str) -> list[str]:
         """What a text says of an instance's looks that is not so."""
@@ -77,7 +83,7 @@ class Vocabulary:
             return []
         return [
             *self.callings.contradictions(text, instance),
-            *unlike(text, instance, self._looks, self.scene.materials),
+            *unlike(text, instance, self._looks, self.scene.materials, self._surface),
             *discoloured(text, instance, self.scene.materials),
         ]
 

@@ -18,6 +18,7 @@ import numpy as np
 
 from aerialdojo_gen.annotations.ambiguity import Ambiguity
 from aerialdojo_gen.annotations.appearance import discoloured, unlike
+from aerialdojo_gen.annotations.buried import Surface
 from aerialdojo_gen.annotations.check import make_ambiguity
 from aerialdojo_gen.annotations.claims import Lexicon
 from aerialdojo_gen.annotations.relations import SceneGeometry
@@ -59,11 +60,14 @@ class _Words:
         What a person says for each category.
     catalogue : Catalogue
         Of the props.
+    surface : Surface
+        Ground and water, which hide what is under them.
     """
 
     ambiguity: Ambiguity
     names: dict[str, str]
     catalogue: Catalogue
+    surface: Surface
 
 
 @check("objects", needs=("landmarks", "mesh"), after=_FAULTS)
@@ -164,7 +168,7 @@ def _words(data: SceneData, landmarks: bool = True) -> _Words:
     ambiguity = make_ambiguity(scene, names, called if landmarks else {}, order, geometry)
     # A colour that nothing in the scene has is a colour all the same.
     ambiguity.lexicon.add_values("colour", _COLOURS)
-    made = data.kept[f"words {landmarks}"] = _Words(ambiguity, names, catalogue)
+    made = data.kept[f"words {landmarks}"] = _Words(ambiguity, names, catalogue, Surface(scene))
     return made
 
 
@@ -223,7 +227,7 @@ def _unlike(words: _Words, instance: Instance, text: str) -> str:
     materials = words.ambiguity.geometry.scene.materials
     looks = {key: words.catalogue[key].looks for key in (instance.category,) if key in words.catalogue}
     # What no part is known of, as in a release of an older version, cannot be asked.
-    wrong = list(unlike(text, instance, looks, materials)) if instance.anatomy is not None else []
+    wrong = list(unlike(text, instance, looks, materials, words.surface)) if instance.anatomy is not None else []
     return next(iter([*wrong, *discoloured(text, instance, materials)]), "")
 
 

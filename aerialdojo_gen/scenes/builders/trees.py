@@ -233,8 +233,9 @@ def fallen_log(rng: np.random.Generator, params: Mapping[str, float]) -> Parts:
         end = start + way
         end[2] = max(float(end[2]), -0.25)
         out.append(("bark", limb([start, end], [girth * 0.4, 0.0], 5)))
-    moss = limb((line[1:3] + vec(0.0, 0.0, girth * 0.22)), [girth * 0.78, girth * 0.72], 7)
-    out.append(("moss", moss))
+    ends = line[1] + 0.5 * (line[0] - line[1]), line[2] + 0.7 * (line[3] - line[2])
+    covered = np.array([ends[0], line[1], line[2], ends[1]]) + vec(0.0, 0.0, girth * 0.24)
+    out.append(("moss", limb(covered, np.linspace(girth * 0.8, girth * 0.66, len(covered)).tolist(), 9)))
     return out
 
 
