@@ -90,9 +90,9 @@ class Site:
         """Choose the heights (level at z = 0 by default) and what shows where nothing is painted; do it first."""
         self._terrain = flat_terrain(self.recipe.size_m) if terrain is None else terrain
         for level in self.recipe.level:
-            self._terrain = self._terrain.flattened(
-                Point(level.at).buffer(level.radius_m) if level.radius_m else Point(level.at), level.z_m, level.blend_m
-            )
+            spot = Point(level.at)
+            area = spot.buffer(level.radius_m) if level.radius_m else spot
+            self._terrain = self._terrain.flattened(area, level.z_m, level.blend_m)
         self._base = material
 
     @property

@@ -67,7 +67,7 @@ def test_a_levelled_place_is_level_and_the_ground_beyond_it_as_before():
     site = Site("N_T_0", recipe, load_catalogue(ASSETS))
     site.set_ground(own)
     turns = np.linspace(0.0, 2.0 * np.pi, 24)
-    for radius, level in ((2.0, True), (6.5, False)):
+    for radius, level in ((2.0, True), (7.5, False)):
         x, y = 5.0 + radius * np.cos(turns), -4.0 + radius * np.sin(turns)
         if level:
             assert np.ptp(own.z(x, y)) > 0.3
