@@ -209,12 +209,17 @@ class Site:
             return None
         x, y, z = at
         there = (x + move.by_m[0], y + move.by_m[1])
-        fall = self.ground_z(*there) - self.ground_z(x, y)
+        above = z - self.ground_z(x, y)
+        if above < 0.0:
+            # Let into a slope: only as deep as the new one asks for.
+            ring = [self.ground_z(there[0] + u, there[1] + v) for u, v in ((0.5, 0), (0, 0.5), (-0.5, 0), (0, -0.5))]
+            above = max(above, min((min(ring) - self.ground_z(*there)) / 2.0, 0.0))
+        base = self.ground_z(*there) + above
         self._met.add(node)
         if move.place is not None:
             options = {**options, "attributes": {**(options.get("attributes") or {}), "place": move.place}}
         return self.catalogue.instantiate(
-            category, node, self.rng_for("prop", node), (*there, z + fall + move.up_m), yaw_deg + move.turn_deg,
+            category, node, self.rng_for("prop", node), (*there, base + move.up_m), yaw_deg + move.turn_deg,
             **options,
         )  # fmt: skip
 
