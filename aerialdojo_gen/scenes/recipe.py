@@ -34,6 +34,52 @@ _Direction = Annotated[float, Field(ge=-1e6, le=1e6)]
 Sun = Annotated[tuple[_Direction, _Direction, _Direction], AfterValidator(_above)]
 
 
+class Level(BaseModel):
+    """A round place that is levelled for what stands on it.
+
+    Attributes
+    ----------
+    at : (x, y)
+        Middle, metres, world frame.
+    radius_m : float
+        Of what is level; the ground about it slopes back to its old height.
+    z_m : float or None
+        Height; the mean of the old ones by default.
+    blend_m : float
+        Width of the slope about it.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    at: tuple[Place, Place]
+    radius_m: Annotated[float, Field(ge=0, le=50)] = 0.5
+    z_m: Place | None = None
+    blend_m: Annotated[float, Field(ge=0, le=50)] = 2.0
+
+
+class Move(BaseModel):
+    """How far one node stands from where its layout puts it.
+
+    Attributes
+    ----------
+    by_m : (dx, dy)
+        World frame, metres; what stands on the ground keeps its height above it.
+    up_m : float
+        Upwards, metres.
+    turn_deg : float
+        Counter-clockwise, about its origin.
+    place : str or None
+        What descriptions say of where it is now; what the layout says by default.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    by_m: tuple[Place, Place] = (0.0, 0.0)
+    up_m: Place = 0.0
+    turn_deg: Annotated[float, Field(ge=-360, le=360)] = 0.0
+    place: Annotated[str, Field(min_length=1, max_length=_LONGEST)] | None = None
+
+
 class Recipe(BaseModel):
     """What a scene is made from.
 
@@ -57,6 +103,10 @@ class Recipe(BaseModel):
         The layout's own.
     inventory : dict of str to int
         Least number of instances of a category that the built scene must have.
+    level : tuple of Level
+        Places levelled in the layout's ground, in their order.
+    moves : dict of str to Move
+        Props that stand elsewhere than the layout puts them, by node; whatever else it places stays where it is.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -70,6 +120,8 @@ class Recipe(BaseModel):
     palette: dict[str, str] = {}
     parameters: dict[str, Any] = {}
     inventory: dict[str, Annotated[int, Field(ge=0, le=100_000)]] = {}
+    level: Annotated[tuple[Level, ...], Field(max_length=200)] = ()
+    moves: Annotated[dict[str, Move], Field(max_length=500)] = {}
 
     @property
     def sun_direction(self) -> tuple[float, float, float]:

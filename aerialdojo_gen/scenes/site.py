@@ -7,8 +7,10 @@ from typing import Any
 
 import numpy as np
 import shapely
+from shapely.geometry import Point
 from shapely.geometry.base import BaseGeometry
 
+from aerialdojo_gen.common.names import nearest
 from aerialdojo_gen.common.rng import generator
 from aerialdojo_gen.errors import AssetError
 from aerialdojo_gen.scenes.catalogue import Catalogue, placed
@@ -57,6 +59,7 @@ class Site:
         self.instances: list[Instance] = []
         self._counts: dict[str, int] = {}
         self._nodes: set[str] = set()
+        self._met: set[str] = set()
         self._footprints = Footprints()
         self._terrain = flat_terrain(recipe.size_m)
         self._base = "grass"
@@ -86,6 +89,10 @@ class Site:
     def set_ground(self, terrain: Terrain | None = None, material: str = "grass") -> None:
         """Choose the heights (level at z = 0 by default) and what shows where nothing is painted; do it first."""
         self._terrain = flat_terrain(self.recipe.size_m) if terrain is None else terrain
+        for level in self.recipe.level:
+            spot = Point(level.at)
+            area = spot.buffer(level.radius_m) if level.radius_m else spot
+            self._terrain = self._terrain.flattened(area, level.z_m, level.blend_m)
         self._base = material
 
     @property
@@ -148,7 +155,7 @@ class Site:
         Returns
         -------
         Instance
-            In world coordinates.
+            In world coordinates, where the layout puts it whether or not the recipe moves it.
         """
         name = self._claim(node or self.node(category))
         base = self.ground_z(x, y) if z is None else z
@@ -164,9 +171,10 @@ class Site:
             roles,
             attributes,
         )
-        self.instances.append(instance)
         if solid:
             self._footprints.add(footprint(instance, base), base, float(instance.bounds[1, 2]))
+        options = {"variant": variant, "scale": scale, "params": params, "roles": roles, "attributes": attributes}
+        self.instances.append(self._moved(category, name, (x, y, base), yaw_deg, options) or instance)
         return instance
 
     def try_place(self, category: str, x: float, y: float, yaw_deg: float = 0.0, **options: Any) -> Instance | None:
@@ -184,10 +192,36 @@ class Site:
             self._counts = before
             return None
         self._claim(name)
-        self.instances.append(instance)
         if options.get("solid", True):
             self._footprints.add(area, base, float(instance.bounds[1, 2]))
+        self.instances.append(self._moved(category, name, (x, y, base), yaw_deg, trial) or instance)
         return instance
+
+    def _moved(
+        self, category: str, node: str, at: tuple[float, float, float], yaw_deg: float, options: Mapping[str, Any]
+    ) -> Instance | None:
+        """Instantiate a prop where the recipe moves it to; None where it is not moved.
+
+        It keeps the ground that the layout gave it, so that all that is placed after it stays where it is.
+        """
+        move = self.recipe.moves.get(node)
+        if move is None:
+            return None
+        x, y, z = at
+        there = (x + move.by_m[0], y + move.by_m[1])
+        above = z - self.ground_z(x, y)
+        if above < 0.0:
+            # Let into a slope: only as deep as the new one asks for.
+            ring = [self.ground_z(there[0] + u, there[1] + v) for u, v in ((0.5, 0), (0, 0.5), (-0.5, 0), (0, -0.5))]
+            above = max(above, min((min(ring) - self.ground_z(*there)) / 2.0, 0.0))
+        base = self.ground_z(*there) + above
+        self._met.add(node)
+        if move.place is not None:
+            options = {**options, "attributes": {**(options.get("attributes") or {}), "place": move.place}}
+        return self.catalogue.instantiate(
+            category, node, self.rng_for("prop", node), (*there, base + move.up_m), yaw_deg + move.turn_deg,
+            **options,
+        )  # fmt: skip
 
     def add(
         self,
@@ -244,6 +278,9 @@ class Site:
 
     def scene(self) -> Scene:
         """Finish: cut the ground, check that everything has its material, and make the scene."""
+        unmet = next((node for node in self.recipe.moves if node not in self._met), None)
+        if unmet is not None:
+            raise AssetError(f"{self.name}: moves: no prop {unmet!r} is placed{nearest(unmet, self._nodes)}")
         ground = self._ground()
         instances = (ground, *self.instances)
         specs = sorted({p.material for i in instances for p in i.parts})

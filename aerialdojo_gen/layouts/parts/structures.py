@@ -34,23 +34,31 @@ def columns(points: Sequence[Point], z0: float, z1: float, radius_m: float = 0.2
 
 
 def railing(
-    path: Sequence[Point], z_m: float, *, height_m: float = 1.05, pane: str = "glass", frame: str = "iron"
+    path: Sequence[Point], z_m: float, *, height_m: float = 1.05, pane: str | None = "glass", frame: str = "iron"
 ) -> Parts:
-    """Make a glazed railing along a polyline on a floor at `z_m`: posts every 2 m, panes, and a handrail."""
+    """Make a railing along a polyline on a floor at `z_m`: posts every 2 m, a handrail, and panes.
+
+    Without a `pane` it has two slim bars below the handrail: what stands behind it is seen.
+    """
     posts, panes, rails = [], [], []
     for a, b in pairwise(path):
         length = float(np.hypot(b[0] - a[0], b[1] - a[1]))
         yaw = float(np.degrees(np.arctan2(b[1] - a[1], b[0] - a[0])))
         middle = ((a[0] + b[0]) / 2, (a[1] + b[1]) / 2)
         turn = rotation(0.0, 0.0, yaw)
-        panes.append(_posed(box(size=[length, 0.04, height_m - 0.25]), turn, (*middle, z_m + 0.12)))
+        if pane is None:
+            bars = [_posed(box(size=[length, 0.03, 0.03]), turn, (*middle, z_m + s * height_m)) for s in (0.33, 0.67)]
+            rails += bars
+        else:
+            panes.append(_posed(box(size=[length, 0.04, height_m - 0.25]), turn, (*middle, z_m + 0.12)))
         rails.append(_posed(box(size=[length + 0.08, 0.1, 0.08]), turn, (*middle, z_m + height_m)))
         count = max(round(length / 2.0), 1)
         for k in range(count + 1):
             t = k / count
             at = (a[0] + (b[0] - a[0]) * t, a[1] + (b[1] - a[1]) * t, z_m)
             posts.append(_posed(box(size=[0.08, 0.08, height_m]), turn, at))
-    return [(pane, merge(panes)), (frame, merge(posts + rails))]
+    body = (frame, merge(posts + rails))
+    return [body] if pane is None else [(pane, merge(panes)), body]
 
 
 def deck(

@@ -59,7 +59,7 @@ def balcony(site: Site, x: float, y: float, yaw_deg: float, z_m: float, *, width
     w = width_m / 2
     parts = deck(rectangle(0.0, -w, depth_m, w), 0.0, floor=floor, under=floor, thickness_m=0.18)
     path: list[Point] = [(0.05, -w + 0.05), (depth_m - 0.05, -w + 0.05), (depth_m - 0.05, w - 0.05), (0.05, w - 0.05)]
-    parts += railing(path, 0.0, pane="chain_link", frame=rail)
+    parts += railing(path, 0.0, pane=None, frame=rail)
     parts.append(("#e9e4d8", block(-0.02, -0.62, 0.06, 0.62, 0.0, 2.25)))
     parts.append(("window", block(-0.02, -0.5, 0.09, 0.5, 0.05, 2.1)))
     parts += [(rail, block(0.0, v - 0.04, depth_m * 0.7, v + 0.04, -0.42, -0.18)) for v in (-w + 0.4, w - 0.4)]

@@ -114,8 +114,12 @@ def _balconies(slab: Slab) -> Parts:
     for v, z in balcony_spots(slab):
         a, b = v - _WIDE_M / 2, v + _WIDE_M / 2
         floors.append(block(d, a, d + _DEPTH_M, b, z - 0.2, z))
-        panels.append(block(d + _DEPTH_M - 0.08, a, d + _DEPTH_M, b, z + 0.1, z + 1.0))
-        panels += [block(d, w, d + _DEPTH_M - 0.08, w + 0.06, z + 0.1, z + 1.0) for w in (a, b - 0.06)]
+        # Bars in place of parapets: what stands on a balcony is seen.
+        for low, high in ((0.0, 0.16), (0.42, 0.46), (0.69, 0.73), (0.94, 1.02)):
+            panels.append(block(d + _DEPTH_M - 0.08, a, d + _DEPTH_M, b, z + low, z + high))
+            panels += [block(d, w, d + _DEPTH_M - 0.08, w + 0.06, z + low, z + high) for w in (a, b - 0.06)]
+        corners = [block(d + _DEPTH_M - 0.08, w, d + _DEPTH_M, w + 0.08, z, z + 1.0) for w in (a, b - 0.08)]
+        panels += corners
         doors.append(block(d - 0.05, v - 1.1, d + 0.05, v + 1.1, z, z + 2.2))
     return slab.frame.parts([("concrete", merge(floors)), (slab.band, merge(panels)), ("glass", merge(doors))])
 

@@ -180,7 +180,8 @@ def _round_the_pitch(site: Site) -> None:
         y = Y0 + side * (_HALF[1] + 1.0)
         for k in range(9):
             x = -19.2 + 4.8 * k
-            if abs(x) < 4.0:
+            # The middle is open, and nothing hides the dugouts.
+            if abs(x) < (12.0 if side > 0 else 4.0):
                 continue
             colour = colours[(k + 2 * (side > 0)) % 5]
             parts.append((colour, block(x - 2.2, y - 0.06, x + 2.2, y + 0.06, 0.08, 0.95)))

@@ -1,0 +1,76 @@
+"""What a recipe may put right of a layout: levelled places and single props that stand elsewhere."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from aerialdojo_gen.errors import AssetError
+from aerialdojo_gen.layouts.build import build_scene
+from aerialdojo_gen.scenes.catalogue import load_catalogue
+from aerialdojo_gen.scenes.recipe import Recipe
+from aerialdojo_gen.scenes.site import Site
+from aerialdojo_gen.scenes.terrain import rolling_terrain
+
+ASSETS = Path(__file__).parents[2] / "scene_assets"
+YARD = ASSETS / "smoke" / "U_Courtyard_0.toml"
+
+
+def built(tmp_path, extra):
+    recipe = tmp_path / YARD.name
+    recipe.write_text(YARD.read_text() + extra)
+    return build_scene(recipe, load_catalogue(ASSETS))
+
+
+def test_a_move_moves_one_prop_and_nothing_else(tmp_path):
+    before = built(tmp_path, "")
+    node = next(i.node for i in before.instances if i.anatomy is not None)
+    after = built(tmp_path, f'\n[moves]\n{node} = {{ by_m = [0.5, -0.25], up_m = 0.5, place = "elsewhere" }}\n')
+    assert [i.node for i in after.instances] == [i.node for i in before.instances]
+    for old, new in zip(before.instances, after.instances, strict=True):
+        by = np.array([0.5, -0.25, 0.5]) if old.node == node else np.zeros(3)
+        np.testing.assert_allclose(new.vertices - old.vertices, np.broadcast_to(by, old.vertices.shape), atol=1e-4)
+        assert new.variant == old.variant
+        assert new.attributes == (old.attributes | {"place": "elsewhere"} if old.node == node else old.attributes)
+
+
+def test_a_move_of_what_is_not_placed_names_the_nearest_node(tmp_path):
+    before = built(tmp_path, "")
+    node = next(i.node for i in before.instances if i.anatomy is not None)
+    with pytest.raises(AssetError, match=f"moves: no prop '{node}0' is placed: did you mean '{node}'"):
+        built(tmp_path, f"\n[moves]\n{node}0 = {{ by_m = [1.0, 0.0] }}\n")
+
+
+def test_a_moved_prop_stays_on_the_ground():
+    site = Site(
+        "N_T_0",
+        Recipe.model_validate(
+            {"layout": "none", "size_m": (60, 60), "ceiling_m": 20, "moves": {"bench_000": {"by_m": (6.0, 3.0)}}}
+        ),
+        load_catalogue(ASSETS),
+    )
+    site.set_ground(rolling_terrain((60, 60), 1.0, 3, 4.0, 20.0))
+    layouts_own = site.place("bench", 1.0, 2.0)
+    moved = site.instances[-1]
+    fall = site.ground_z(7.0, 5.0) - site.ground_z(1.0, 2.0)
+    assert abs(fall) > 0.1
+    np.testing.assert_allclose(moved.centroid - layouts_own.centroid, (6.0, 3.0, fall), atol=1e-4)
+    # All that is placed later finds the room that the layout left it.
+    assert site.is_free(7.0, 5.0, 1.0)
+    assert not site.is_free(1.0, 2.0, 0.5)
+
+
+def test_a_levelled_place_is_level_and_the_ground_beyond_it_as_before():
+    own = rolling_terrain((60, 60), 1.0, 3, 4.0, 20.0)
+    levels = {"level": [{"at": (5.0, -4.0), "radius_m": 2.0}]}
+    recipe = Recipe.model_validate({"layout": "none", "size_m": (60, 60), "ceiling_m": 20} | levels)
+    site = Site("N_T_0", recipe, load_catalogue(ASSETS))
+    site.set_ground(own)
+    turns = np.linspace(0.0, 2.0 * np.pi, 24)
+    for radius, level in ((2.0, True), (7.5, False)):
+        x, y = 5.0 + radius * np.cos(turns), -4.0 + radius * np.sin(turns)
+        if level:
+            assert np.ptp(own.z(x, y)) > 0.3
+            assert np.ptp(site.terrain.z(x, y)) < 1e-9
+        else:
+            np.testing.assert_array_equal(site.terrain.z(x, y), own.z(x, y))
