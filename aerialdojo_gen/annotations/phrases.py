@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache
+from itertools import pairwise
 from pathlib import Path
 
 from aerialdojo_gen.annotations.claims import spoken
@@ -18,6 +19,7 @@ _AFTER_NOUN = frozenset({"down", "up", "open", "closed", "raised", "lowered", "c
 _OPENERS = frozenset({"showing", "carrying", "leaning", "facing", "selling", "holding", "wearing", "half-buried"})
 _LETTERED = frozenset({"sign", "billboard", "board", "arch", "banner"})
 _MASS = frozenset(["lichen", "moss", "snow", "ivy", "graffiti", "water", "fruit", "rust", "foliage"])
+_PREPOSITIONS = frozenset(["in", "on", "of", "around", "over", "under", "along", "at"])
 _VERBS = {"vehicle": ("is parked", "parked"), "vegetation": ("grows", "growing")}
 
 
@@ -212,8 +214,7 @@ def _noun(word: str) -> bool:
 
 
 def _plural(words: list[str]) -> bool:
-    head = words[words.index("in") - 1] if "in" in words[1:] else words[-1]
-    head = words[words.index("on") - 1] if "on" in words[1:] else head
+    head = next((before for before, word in pairwise(words) if word in _PREPOSITIONS), words[-1])
     return _noun(head) or words[0] in ("a", "an", "the", "its", "one", "two", "three", "four")
 
 

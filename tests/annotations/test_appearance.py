@@ -12,6 +12,7 @@ from aerialdojo_gen.annotations.appearance import unlike
 from aerialdojo_gen.annotations.check import check_source
 from aerialdojo_gen.annotations.colours import colour_shares, uncoloured
 from aerialdojo_gen.annotations.format import format_annotations, parse_annotations
+from aerialdojo_gen.annotations.phrases import noun_of, words_of
 from aerialdojo_gen.annotations.relations import SceneGeometry
 from aerialdojo_gen.common.rng import generator
 from aerialdojo_gen.scenes.catalogue import load_catalogue
@@ -133,3 +134,21 @@ def test_in_front_and_behind_ask_for_the_front_that_a_thing_has(catalogue):
     assert geometry.behind(2, 0)
     assert not geometry.front(2, 0)
     assert not geometry.behind(1, 0)
+
+
+@pytest.mark.parametrize(
+    ("equipment", "said"),
+    [
+        ("bands of film around it", "with bands of film around it"),
+        ("loose bricks on top", "with loose bricks on top"),
+        ("cone on top", "with a cone on top"),
+        ("blue tarpaulin over one end", "with a blue tarpaulin over one end"),
+        ("orange banner", "with an orange banner"),
+        ("a spade and a rake leaning on it", "with a spade and a rake leaning on it"),
+        ("two arms", "with two arms"),
+    ],
+)
+def test_equipment_has_the_article_that_its_head_noun_asks_for(equipment, said):
+    box_ = box("box_000", (0.0, 0.0, 0.0), (1.0, 1.0, 1.0))
+    thing = dataclasses.replace(box_, category="brick_pallet", attributes={"equipment": equipment})
+    assert said in noun_of(thing, words_of("brick_pallet", None, "object")).a()
