@@ -47,12 +47,15 @@ def stats(
     from aerialdojo_gen.stats.comparison import Comparison, Listing, as_csv, as_markdown
     from aerialdojo_gen.stats.difficulty import difficulty_tables, read_tasks
     from aerialdojo_gen.stats.tables import benchmark_table, tables
+    from aerialdojo_gen.stats.worth import worth_tables
     from aerialdojo_gen.store.atomic import atomic_file
 
     names = check_release(root, scenes_in_release(root, scene) if scene else None)
     made = made_of_scenes(root, names)
-    tasks = read_tasks(root, [m.scene for m in made])
-    compared: list[Comparison | Listing] = [*tables(made), *difficulty_tables(tasks), benchmark_table(made)]
+    names_made = [m.scene for m in made]
+    tasks = read_tasks(root, names_made)
+    compared: list[Comparison | Listing] = [*tables(made), *worth_tables(root, names_made), *difficulty_tables(tasks)]
+    compared.append(benchmark_table(made))
     for path, text in ((markdown, as_markdown(compared)), (csv, as_csv(compared))):
         if path:
             with atomic_file(path.parent, path.name) as temporary:

@@ -16,8 +16,10 @@ from aerialdojo_gen.common.version import __version__
 from aerialdojo_gen.release.contents import TABLES, check_release, counts, meaning, sizes, unit
 from aerialdojo_gen.release.croissant import CITE_AS
 from aerialdojo_gen.release.provenance import made_of_scenes, makers
+from aerialdojo_gen.stats.comparison import Comparison
 from aerialdojo_gen.stats.difficulty import Tasks, held_out_table, read_tasks, scene_table, seen_table, setting_table
 from aerialdojo_gen.stats.tables import Made
+from aerialdojo_gen.stats.worth import worth_tables
 from aerialdojo_gen.store import schemas
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.root import DataRoot, Where, open_root
@@ -85,7 +87,12 @@ def _difficulty(tasks: Tasks) -> dict[str, str]:
         "seen": seen_table(tasks),
         "held_out": held_out_table(tasks),
     }
-    return {name: "\n".join(table.markdown()[2:]).rstrip() for name, table in tables.items()}
+    return {name: _rows(table) for name, table in tables.items()}
+
+
+def _rows(table: Comparison) -> str:
+    """Give a table as Markdown without its heading."""
+    return "\n".join(table.markdown()[2:]).rstrip()
 
 
 def render_card(data: Where) -> str:
@@ -141,6 +148,7 @@ def render_card(data: Where) -> str:
         made_by=sorted({maker.name for maker in known.values()} - {""}),
         prefers_harder=any(maker.prefer_harder for maker in known.values()),
         tables_of=_difficulty(tasks),
+        worth={table.title: _rows(table) for table in worth_tables(root, names)},
         least_detour=float(np.min(tasks.plan_detour)) if len(tasks) else None,
         most_visible=float(np.max(tasks.target_visible_at_start)) if len(tasks) else None,
         detour=DETOUR,
