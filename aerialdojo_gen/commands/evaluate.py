@@ -64,7 +64,8 @@ def evaluate(
     limit: Annotated[
         int | None,
         typer.Option(
-            "--limit", min=1,
+            "--limit",
+            min=1,
             help="So many tasks in all, drawn evenly over the scenes; a semantic and an image goal are two.  "
             "(default: all)",
         ),

@@ -86,11 +86,11 @@ def report(
 ) -> None:  # fmt: skip
     """Score runs of evaluate: SR, SR-view, OSR, SPL, DTS, CR as tables, figures, a page."""
     from aerialdojo_gen.benchmark import contents, score_rows
+    from aerialdojo_gen.benchmark.episodes import runs as runs_there
     from aerialdojo_gen.benchmark.floors import arranged, with_floors
     from aerialdojo_gen.benchmark.paired import paired_tables
     from aerialdojo_gen.benchmark.profiles import DEFAULT_PROFILES, profile_named
     from aerialdojo_gen.benchmark.radii import DEFAULT_RADII_M, at_radius
-    from aerialdojo_gen.benchmark.episodes import runs as runs_there
     from aerialdojo_gen.benchmark.runs import load_runs
     from aerialdojo_gen.common.paper import results
     from aerialdojo_gen.release.contents import release_scenes

@@ -14,7 +14,7 @@ _PLAIN_EVERY_S = 10.0
 _WITHOUT_SPEED = "{l_bar}{bar}| {n_fmt}/{total_fmt} [{elapsed}{postfix}]"
 
 
-class _Tqdm(tqdm):  # type: ignore[type-arg]  # generic for type checkers alone
+class _Tqdm(tqdm):  # type: ignore[misc]  # the package has no types
     """Leaves speed and time left out until something is finished, where tqdm says ``?, ? shards/s``."""
 
     @property
