@@ -31,7 +31,7 @@ STAGE_NAMES = [stage.name for stage in STAGES]
 WRONG = {
     **{name: ["--scene", "U_Nowhere_0"] for name in STAGE_NAMES},
     "run": ["--scene", "U_Nowhere_0"],
-    "add-scene": ["--up", "sideways"],
+    "add-scene": ["--scale", "much"],
     "annotate-draft": ["--objects", "1"],
     "gallery": ["--scene", "U_Nowhere_0"],
     "annotate": ["--port", "70000"],

@@ -338,10 +338,14 @@ def test_requests_are_sent_again_as_often_as_asked(protocol: str, monkeypatch: p
 
 
 MENDS = {
-    400: "is the key in [A-Z]+_API_KEY right", 401: "is the key in [A-Z]+_API_KEY right", 402: "anything left",
-    403: "is the key in [A-Z]+_API_KEY right", 404: "is --option model=m served there", 429: "anything left",
+    400: "is the key in [A-Z]+_API_KEY right",
+    401: "is the key in [A-Z]+_API_KEY right",
+    402: "has the account anything left",
+    403: "is the key in [A-Z]+_API_KEY right",
+    404: "is --option model=m served there",
+    429: "has the account anything left",
     307: "it sends requests elsewhere",
-}  # fmt: skip
+}
 
 
 def test_the_check_does_not_wait_twice() -> None:

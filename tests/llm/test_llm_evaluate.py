@@ -115,7 +115,7 @@ def test_a_failing_service_is_logged_apart_and_its_episodes_flown_again(smoke: P
             assert given in pasted
         again = paste(pasted, tmp_path)
         assert again.returncode == 1, "none finished this time either"
-        with pytest.raises(StoreError, match="no finished episode, and 1 that failed: .* --rerun-failed"):
+        with pytest.raises(StoreError, match=r"no finished episode, and 1 that failed: .* --rerun-failed"):
             load_runs(tmp_path, ["openai"])
         assert not list((tmp_path / "episodes").rglob("*.parquet")) or read_run(tmp_path, "openai").num_rows == 0
         service.script[:] = [Say(STOP)]
