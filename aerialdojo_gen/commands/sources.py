@@ -105,11 +105,11 @@ def gallery(
     from aerialdojo_gen.store.atomic import make_folder
 
     config, roots = open_pipeline(pipeline, out)
-    names = runner.chosen_scenes(config, roots, scene)
+    scenes = runner.chosen_scenes(config, roots, scene)
     make_folder(out)  # before anything is drawn
     catalogue = load_catalogue(roots.scene_assets)
     suffix, width = ("jpg", 1280) if small else ("png", None)
-    for name in names:
+    for name in scenes:
         sheet = scene_sheet(build_scene(roots.recipes / f"{name}.toml", catalogue))
         print(write_picture(sheet, out, f"{name}.{suffix}", width))
     if props:

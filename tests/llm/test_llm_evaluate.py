@@ -111,7 +111,7 @@ def test_a_failing_service_is_logged_apart_and_its_episodes_flown_again(smoke: P
         assert last.startswith("error: 1 failed, which count as no episodes: 1 × server error (http://127.0.0.1")
         pasted = last.partition("To fly the failed again: ")[2]
         assert shlex.split(pasted)[:4] == [sys.executable, "-m", "aerialdojo_gen.cli", "evaluate"]
-        for given in (f"--data {smoke}", f"--out {tmp_path}", "--attempts 2", "--option model='\"m\"'"):
+        for given in (f"--data {smoke}", f"--out {tmp_path}", "--attempts 2", "--option 'model=\"m\"'"):
             assert given in pasted
         again = paste(pasted, tmp_path)
         assert again.returncode == 1, "none finished this time either"
