@@ -118,7 +118,7 @@ def test_what_a_comparison_lacks_is_said_under_the_table(tmp_path: Path) -> None
     assert notes[-1] == "The runs flew different tasks: their scores are no comparison of agents."
     assert not any("different" in note for note in tables.main_table(found[:1], [AT_3]).notes)
     with pytest.raises(
-        StoreError, match="run 'c' has no finished episode, and 2 that failed: .* --run c --rerun-failed"
+        StoreError, match=r"run 'c' has no finished episode, and 2 that failed: .* --run c --rerun-failed"
     ):
         load_runs(tmp_path, ["a", "c"])
 
