@@ -6,7 +6,7 @@ Nothing heavy is imported before a command runs, so that ``--help`` answers at o
 from __future__ import annotations
 
 import sys
-from typing import Any
+from typing import Annotated, Any
 
 import typer
 from typer.core import TyperGroup
@@ -47,6 +47,25 @@ app = typer.Typer(
     rich_markup_mode=None,  # half of the time that --help takes is importing what draws boxes
     context_settings={"help_option_names": ["-h", "--help"]},
 )
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        from aerialdojo_gen.common.version import __version__
+
+        print(f"aerialdojo-gen {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _program(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Say which version this is.")
+    ] = False,
+) -> None:
+    """Take what stands before a command."""
+
+
 for _group in (stages, render, sources, annotate, evaluate, release, show, validate, exchange, report):
     app.add_typer(_group.app)
 

@@ -68,7 +68,8 @@ class Asked:
             return None
         try:
             action = None if isinstance(answer, bool) else operator.index(answer)
-        except TypeError:
+        except Exception:
+            # An object of the agent's own may raise anything when it is asked for its number.
             action = None
         if action is not None and 0 <= action < N_ACTIONS:
             return action

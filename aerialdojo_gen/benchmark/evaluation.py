@@ -94,7 +94,7 @@ class Outcome:
     finished, failed : int
         In the tables now: flown, and given up because something outside failed.
     flown, actions : int
-        Episodes and actions of this call.
+        Episodes and actions of this call, failed ones too.
     cost_usd : float
         Of all calls for this run.
     tokens : int
@@ -104,7 +104,9 @@ class Outcome:
     stopped : str
         Why it ended early: too many failures in a row; empty otherwise.
     failures : tuple of str
-        What failed: how often, of which kind, and why the first did.
+        What failed, the most frequent first: how often, of which kind; of the first also the reason.
+    finished_now : int
+        Of the flown those that did not fail.
     """
 
     episodes: int
@@ -117,6 +119,12 @@ class Outcome:
     seconds: float
     stopped: str = ""
     failures: tuple[str, ...] = ()
+    finished_now: int = 0
+
+    @property
+    def fruitless(self) -> bool:
+        """Whether episodes failed and none was finished: in this call, or ever where this call flew none."""
+        return self.failed > 0 and not (self.finished_now if self.flown else self.finished)
 
     def __str__(self) -> str:
         """One line."""
@@ -129,12 +137,17 @@ class Outcome:
             f"{self.flown:,} flown now in {self.seconds:.1f} s{rate}{tokens}{cost}"
         )
 
-    @property
-    def last_line(self) -> str:
-        """What to know and do about failures; empty where there are none."""
+    def last_line(self, again: str = "--rerun-failed") -> str:
+        """Say what to know and do about failures; empty where there are none.
+
+        Parameters
+        ----------
+        again : str
+            What flies them again; it ends the line.
+        """
         if not self.failures:
             return self.stopped
         left = self.episodes - self.finished - self.failed
-        rest = f"; {left:,} not begun, which the same command goes on with" if left else ""
-        what = f"{self.failed:,} failed, which count as no episodes: {'; '.join(self.failures)}"
-        return " ".join(filter(None, (self.stopped, f"{what}. --rerun-failed flies them again{rest}")))
+        rest = f" {left:,} not begun: the same command goes on with them." if left else ""
+        what = f"{self.failed:,} failed, which count as no episodes: {', '.join(self.failures)}."
+        return " ".join(filter(None, (self.stopped, f"{what}{rest} To fly the failed again: {again}")))

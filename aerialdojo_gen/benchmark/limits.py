@@ -40,7 +40,7 @@ class Tally:
     def __init__(self, limits: Limits, cost_usd: float, tokens: int) -> None:
         self._limits = limits
         self.cost_usd, self.tokens = cost_usd, tokens
-        self.episodes = self.actions = 0
+        self.episodes = self.actions = self.finished = 0
         self.streak: tuple[Failed, ...] = ()
 
     def add(self, finished: Finished) -> None:
@@ -48,6 +48,7 @@ class Tally:
         self.cost_usd += finished.cost_usd
         self.tokens += finished.tokens
         self.episodes += finished.episodes
+        self.finished += finished.flown
         self.actions += finished.actions
         self.streak = finished.streak if finished.flown else self.streak + finished.streak
 

@@ -139,9 +139,9 @@ def evaluate(
     if tally.failing is not None:
         why = f"stopped after {limits.failures_in_row} failures in a row of one kind ({tally.failing.kind})."
     flown, seconds = tally.episodes, time.monotonic() - started
-    told = run.failures()
+    told, now = run.failures(), tally.finished
     return Outcome(
-        rows.num_rows, finished, failed, flown, tally.actions, tally.cost_usd, tally.tokens, seconds, why, told
+        rows.num_rows, finished, failed, flown, tally.actions, tally.cost_usd, tally.tokens, seconds, why, told, now
     )
 
 
@@ -243,12 +243,13 @@ class _Run:
         return len(self._ids("episodes")), len(self._ids("failures"))
 
     def failures(self) -> tuple[str, ...]:
-        """Say what failed, the most frequent kind first."""
+        """Say what failed, the most frequent kind first, with the reason of its first."""
         rows = [row for scene in self._scenes_written() for row in self._read("failures", scene, ["kind", "reason"])]
         first: dict[str, str] = {}
         for row in rows:
             first.setdefault(row["kind"], row["reason"])
-        return tuple(f"{n} × {k} ({first[k]})" for k, n in Counter(row["kind"] for row in rows).most_common())
+        counted = Counter(row["kind"] for row in rows).most_common()
+        return tuple(f"{n} × {kind}{'' if i else f' ({first[kind]})'}" for i, (kind, n) in enumerate(counted))
 
     def spent(self) -> tuple[float, int]:
         """US dollars and tokens, so far."""

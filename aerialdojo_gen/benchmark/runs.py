@@ -101,7 +101,10 @@ def load_runs(data: Where, names: Sequence[str] = ()) -> list[Run]:
         raise StoreError(f"no runs in {root}: run aerialdojo-gen evaluate")
     for name, table in tables.items():
         if not table.num_rows:
-            raise StoreError(f"run {name!r} has no finished episode: run aerialdojo-gen evaluate --run {name}")
+            failed = read_run(root, name, "failures").num_rows
+            said = f", and {failed:,} that failed: fly them again with" if failed else ": run"
+            more = " --rerun-failed" if failed else ""
+            raise StoreError(f"run {name!r} has no finished episode{said} aerialdojo-gen evaluate --run {name}{more}")
     agents = [table["agent"][0].as_py() for table in tables.values()]
     told = [table["told"][0].as_py() or "" for table in tables.values()]
     # Who was told more is another contender.

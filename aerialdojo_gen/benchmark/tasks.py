@@ -33,6 +33,7 @@ _COLUMNS = (
     "action_budget", "start_x_m", "start_y_m", "start_z_m", "start_yaw_rad", "target_name", "landmark", "direction",
     "description", "reference_image_id",
 )  # fmt: skip
+_USUAL = {"train": ("id_train", "ood_train"), "test": ("id_test", "ood_test"), "all": tuple(SUBSETS)}
 _FACTS = ("nav_id", "goal_x_m", "goal_y_m", "goal_z_m", "euclidean_m", "length_m", "target_object_id")
 
 
@@ -43,7 +44,8 @@ class Selection:
     Attributes
     ----------
     splits : tuple of str
-        Of `aerialdojo_gen.store.schemas.SUBSETS`; empty for all, as everywhere here.
+        Of `aerialdojo_gen.store.schemas.SUBSETS`; empty for all, as everywhere here. ``train`` and ``test`` stand for
+        those of both partitions, ``all`` for all, and become their names.
     settings, modalities : tuple of str
     scenes : tuple of str
         Names or globs.
@@ -61,14 +63,17 @@ class Selection:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        """Refuse what does not exist, with the nearest name."""
+        """Refuse what does not exist, with what there is; give splits their names."""
+        names = [name for split in self.splits for name in _USUAL.get(split, (split,))]
+        object.__setattr__(self, "splits", tuple(dict.fromkeys(names)))
         for what, chosen, known in (
             ("split", self.splits, SUBSETS), ("setting", self.settings, SETTINGS),
             ("modality", self.modalities, MODALITIES),
         ):  # fmt: skip
             for name in chosen:
                 if name not in known:
-                    raise UsageError(unknown(f"no {what}", name, known))
+                    also = tuple(_USUAL) if what == "split" else ()
+                    raise UsageError(unknown(f"no {what}", name, (*known, *also)))
         if self.limit is not None and self.limit < 1:
             raise UsageError(f"a limit is at least 1, not {self.limit}")
 

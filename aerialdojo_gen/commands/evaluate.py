@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from aerialdojo_gen.commands.again import again
 from aerialdojo_gen.commands.common import (
     Address,
     Data,
@@ -46,7 +47,12 @@ def evaluate(
         str | None, typer.Option("--run", help="Name of the run.  (default: the agent's or preset's)")
     ] = None,
     split: Annotated[
-        list[str] | None, typer.Option("--split", help="id_train, id_test, ood_train, ood_test; repeatable.")
+        list[str] | None,
+        typer.Option(
+            "--split",
+            help="id_train, id_test, ood_train, ood_test; train and test are both partitions'; repeatable.  "
+            "(default: all)",
+        ),
     ] = None,
     setting: Annotated[
         list[str] | None, typer.Option("--setting", help="base, standard, long_horizon; repeatable.")
@@ -57,7 +63,12 @@ def evaluate(
     scene: Scene = None,
     limit: Annotated[
         int | None,
-        typer.Option("--limit", min=1, help="So many tasks, drawn evenly over the scenes.  (default: all)"),
+        typer.Option(
+            "--limit",
+            min=1,
+            help="So many tasks in all, drawn evenly over the scenes; a semantic and an image goal are two.  "
+            "(default: all)",
+        ),
     ] = None,
     seed: Annotated[int, typer.Option("--seed", min=0, help="Of that draw.")] = 0,
     view: Annotated[
@@ -154,11 +165,12 @@ def evaluate(
         print("interrupted: finished episodes are kept, the same command goes on from here", file=sys.stderr)
         raise SystemExit(130) from None
     reporter.line(f"evaluate {evaluation.run}: {outcome}")
-    if outcome.stopped or (outcome.failed and not outcome.finished):
-        raise AerialDojoError(outcome.last_line)
-    if outcome.last_line:
+    last = outcome.last_line(again(["--rerun-failed"], without=["--restart"], data=data))
+    if outcome.stopped or outcome.fruitless:
+        raise AerialDojoError(last)
+    if last:
         # Not the reporter's: a failure is told under --quiet too.
-        print(outcome.last_line, file=sys.stderr)
+        print(last, file=sys.stderr)
 
 
 def _agent(agent: str | None, preset: str | None, options: dict[str, Any]) -> tuple[str, dict[str, Any]]:

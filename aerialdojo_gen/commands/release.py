@@ -36,7 +36,7 @@ def stats(
     if pool or not released:
         from aerialdojo_gen.release.pool import pool_lines, pool_of
 
-        if markdown or csv or figures or not (pool or root.list("verdicts")):
+        if markdown or csv or figures or not root.list("verdicts"):
             raise no_release(root)
         config, roots = open_pipeline(pipeline, data)
         scenes = runner.chosen_scenes(config, roots, scene)

@@ -86,16 +86,20 @@ def report(
 ) -> None:  # fmt: skip
     """Score runs of evaluate: SR, SR-view, OSR, SPL, DTS, CR as tables, figures, a page."""
     from aerialdojo_gen.benchmark import contents, score_rows
+    from aerialdojo_gen.benchmark.episodes import runs as runs_there
     from aerialdojo_gen.benchmark.floors import arranged, with_floors
     from aerialdojo_gen.benchmark.paired import paired_tables
     from aerialdojo_gen.benchmark.profiles import DEFAULT_PROFILES, profile_named
     from aerialdojo_gen.benchmark.radii import DEFAULT_RADII_M, at_radius
     from aerialdojo_gen.benchmark.runs import load_runs
     from aerialdojo_gen.common.paper import results
+    from aerialdojo_gen.release.contents import release_scenes
     from aerialdojo_gen.store.root import open_root
 
     rules = [profile_named(name) for name in dict.fromkeys(profile or DEFAULT_PROFILES)]
     root, written = open_root(data), open_root(log or data)
+    if log is None and not runs_there(root):
+        release_scenes(root)  # a folder without either is the wrong one
     named = load_runs(written, runs or ())
     loaded = arranged(with_floors(written, named) if floors else named, _groups(group or []))
     wanted = contents.Wanted(

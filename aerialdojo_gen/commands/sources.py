@@ -96,7 +96,7 @@ def gallery(
 ) -> None:  # fmt: skip
     """Picture every prop and every scene as contact sheets."""
     if references:
-        _reference_sheets(out, scene, pipeline, data, "jpg" if small else "png")
+        _reference_sheets(out, scene, data, "jpg" if small else "png")
         return
     from aerialdojo_gen.layouts.build import build_scene
     from aerialdojo_gen.pipeline import runner
@@ -105,10 +105,11 @@ def gallery(
     from aerialdojo_gen.store.atomic import make_folder
 
     config, roots = open_pipeline(pipeline, out)
+    scenes = runner.chosen_scenes(config, roots, scene)
     make_folder(out)  # before anything is drawn
     catalogue = load_catalogue(roots.scene_assets)
     suffix, width = ("jpg", 1280) if small else ("png", None)
-    for name in runner.chosen_scenes(config, roots, scene):
+    for name in scenes:
         sheet = scene_sheet(build_scene(roots.recipes / f"{name}.toml", catalogue))
         print(write_picture(sheet, out, f"{name}.{suffix}", width))
     if props:
@@ -118,17 +119,16 @@ def gallery(
             print(write_picture(props_sheet(catalogue, names, size), out, f"{title}.{suffix}"))
 
 
-def _reference_sheets(out: Path, scene: list[str] | None, pipeline: Path | None, data: str, suffix: str) -> None:
-    from aerialdojo_gen.pipeline import runner
+def _reference_sheets(out: Path, scene: list[str] | None, data: str, suffix: str) -> None:
+    from aerialdojo_gen.release.pictures import pictured_objects, scenes_with_pictures
     from aerialdojo_gen.rendering.gallery import write_picture
     from aerialdojo_gen.rendering.reference_sheets import reference_sheets
     from aerialdojo_gen.store.atomic import make_folder
-    from aerialdojo_gen.store.shards import read_scene
+    from aerialdojo_gen.store.root import open_root
 
-    config, roots = open_pipeline(pipeline, data)
+    root = open_root(data)
+    scenes = scenes_with_pictures(root, scene)
     make_folder(out)
-    for name in runner.chosen_scenes(config, roots, scene):
-        objects = {row["object_id"]: row for row in read_scene(roots.data, "objects", name).to_pylist()}
-        rows = [objects[row["object_id"]] | row for row in read_scene(roots.data, "references", name).to_pylist()]
-        for k, sheet in enumerate(reference_sheets(rows)):
+    for name in scenes:
+        for k, sheet in enumerate(reference_sheets(pictured_objects(root, name))):
             print(write_picture(sheet, out, f"references-{name}-{k + 1}.{suffix}"))

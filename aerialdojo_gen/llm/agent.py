@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -17,6 +18,7 @@ from aerialdojo_gen.common.secrets import Secrets
 from aerialdojo_gen.errors import AerialDojoError, UsageError
 from aerialdojo_gen.llm.answer import parse_answer
 from aerialdojo_gen.llm.images import Picture, colour_picture, depth_picture
+from aerialdojo_gen.llm.mends import refused, unanswered
 from aerialdojo_gen.llm.options import Form, Options
 from aerialdojo_gen.llm.prompt import Sight, Turn, goal_text, repair_text, step_text, system_prompt
 from aerialdojo_gen.llm.service import Connection
@@ -27,6 +29,9 @@ _KEPT_CHARACTERS = 4_000
 _MOST_TOKENS = 1 << 40
 # What a service answers that does not know structured outputs, or tool calls.
 _NOT_TAKEN = ("bad request", "not found", "malformed answer", "server error")
+# What may be over a moment later, and how long the check before a run waits for that, seconds.
+_PASSING = ("rate limit", "server error", "connection lost", "malformed answer")
+_PATIENCE_S = 10.0
 
 
 @dataclass(frozen=True)
@@ -169,13 +174,13 @@ class LanguageModelAgent(AgentBase):
         for form in forms:
             self.form = form
             try:
-                reply = self.ask(text, [Message("user", ("A grey picture:", grey))], retries=1)
+                reply = self._tried(text, [Message("user", ("A grey picture:", grey))])
             except ServiceDown as error:
                 raise ServiceDown(f"checked before the run, nothing flown: {error}") from None
             except AgentUnavailable as error:
                 if form != forms[-1] and error.kind in _NOT_TAKEN:
                     continue
-                raise AerialDojoError(f"checked before the run, nothing flown: {error}") from None
+                raise AerialDojoError(f"checked before the run, nothing flown: {unanswered(error)}") from None
             if form != forms[-1] and not self._readable(reply.text):
                 continue
             self.tells_tokens = reply.input_tokens is not None and reply.output_tokens is not None
@@ -183,6 +188,24 @@ class LanguageModelAgent(AgentBase):
             seconds = self.service.meter.longest_s
             return f"{self.service.name} answers in {seconds:.1f} s, by {form}{counted}"
         raise AssertionError("the last form either answers or raises")
+
+    def _tried(self, system: str, messages: Sequence[Message]) -> Reply:
+        """Ask once more where the service answers at all: somebody waits, and one that is not there stays so."""
+        try:
+            return self._sent(system, messages, 0)
+        except AgentUnavailable as error:
+            if error.kind not in _PASSING or (error.retry_after_s or 0.0) > _PATIENCE_S:
+                raise
+            time.sleep(1.0 if error.retry_after_s is None else error.retry_after_s)
+        return self._sent(system, messages, 0)
+
+    def _sent(self, system: str, messages: Sequence[Message], retries: int | None = None) -> Reply:
+        """Ask; what is refused for all requests ends the run."""
+        try:
+            return self.ask(system, messages, retries)
+        except UsageError as error:
+            variable = self.options.key_env or f"{self.package.upper()}_API_KEY"
+            raise refused(error, self.options.model, variable) from None
 
     def settled(self) -> dict[str, Any]:
         """Return options that `check` has settled, for the agents that fly."""
@@ -230,8 +253,8 @@ class LanguageModelAgent(AgentBase):
         ------
         InvalidAnswer
             Neither the answer nor its repair names one.
-        AgentUnavailable, ServiceDown, UsageError
-            As `ask` does.
+        AgentUnavailable, ServiceDown
+            As `ask` does; a refusal of all requests is a `ServiceDown` too.
         """
         actions = self.options.action_set
         messages = [Message("user", (*self._goal, *self._report(observation)))]
@@ -251,7 +274,7 @@ class LanguageModelAgent(AgentBase):
         return actions.ids[answer.action]
 
     def _ask(self, messages: Sequence[Message]) -> str:
-        reply = self.ask(self._system, messages)
+        reply = self._sent(self._system, messages)
         for k, count in enumerate((reply.input_tokens, reply.output_tokens)):
             so_far = self._tokens[k]
             self._tokens[k] = None if so_far is None or count is None else so_far + count

@@ -6,11 +6,23 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import TextIO
+from typing import Any, TextIO
 
 from tqdm import tqdm
 
 _PLAIN_EVERY_S = 10.0
+_WITHOUT_SPEED = "{l_bar}{bar}| {n_fmt}/{total_fmt} [{elapsed}{postfix}]"
+
+
+class _Tqdm(tqdm):  # type: ignore[misc]  # the package has no types
+    """Leaves speed and time left out until something is finished, where tqdm says ``?, ? shards/s``."""
+
+    @property
+    def format_dict(self) -> dict[str, Any]:
+        """Return what a line is made of, its format among it."""
+        known: dict[str, Any] = super().format_dict
+        begun = known["n"] > known["initial"] and known["elapsed"] > 0.0
+        return known if begun else known | {"bar_format": _WITHOUT_SPEED}
 
 
 class Bar:
@@ -21,7 +33,7 @@ class Bar:
         self._frames = 0
         self._done, self._started, self._said = 0, time.monotonic(), time.monotonic()
         self._plain = not quiet and not stream.isatty()
-        self._tqdm = tqdm(
+        self._tqdm = _Tqdm(
             total=total,
             desc=label,
             unit=f" {unit}",

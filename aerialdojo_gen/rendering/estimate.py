@@ -60,13 +60,14 @@ class Estimate:
 
     def __str__(self) -> str:
         """Three lines for people."""
+        processes = "worker" if self.workers == 1 else "workers"
         shares = f" on each of {self.machines} machines" if self.machines > 1 else ""
         return (
             f"{self.why}\n"
             f"{self.trajectories:,} trajectories, {self.poses:,} poses, {self.videos:,} videos "
             f"(measured on {self.measured} poses: {1e3 * self.cpu_s / max(self.poses, 1):.0f} ms CPU, "
             f"{self.size_bytes / max(self.poses, 1) / 1e3:.0f} kB a pose)\n"
-            f"about {_hours(self.wall_s)} with {self.workers} workers{shares} on idle cores, "
+            f"about {_hours(self.wall_s)} with {self.workers} {processes}{shares} on idle cores, "
             f"{_size(self.size_bytes)} on disk, {_size(self.memory_bytes)} of memory"
         )
 

@@ -97,6 +97,8 @@ def make_folder(folder: Path) -> None:
     """Make a folder and those above it that are missing, on the disk; StoreError where that cannot be."""
     try:
         _make_folders(folder)
+        if not folder.is_dir():
+            raise NotADirectoryError(errno.ENOTDIR, "not a folder", str(folder))
     except OSError as error:
         raise disk_error(error, folder) from error
 

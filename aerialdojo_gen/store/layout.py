@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
-from aerialdojo_gen.errors import StoreError, brief
+from aerialdojo_gen.errors import StoreError, UsageError, brief
 from aerialdojo_gen.store import schemas
 
 _PLAIN = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}")
@@ -69,9 +69,9 @@ def check_scene_name(scene: str) -> str:
 
 
 def check_run_name(run: str) -> str:
-    """Return the name if it is a plain one; it becomes part of paths, so StoreError for anything else."""
+    """Return the name if it is a plain one; it becomes part of paths, so UsageError for anything else."""
     if not _PLAIN.fullmatch(run):
-        raise StoreError(f"{brief(repr(run), 60)} is no name of a run: use letters, digits, _ and - (64 at most)")
+        raise UsageError(f"{brief(repr(run), 60)} is no name of a run: use letters, digits, _ and - (64 at most)")
     return run
 
 

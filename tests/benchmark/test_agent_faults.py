@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from aerialdojo_gen.agents import AgentBase, InvalidAnswer, load_agent
@@ -22,6 +23,16 @@ from aerialdojo_gen.errors import UsageError
 from aerialdojo_gen.scenes.context import open_contexts
 
 HERE, FILE = __name__, Path(__file__).stem
+
+
+class Unsure:
+    """A number that raises when it is asked for."""
+
+    def __index__(self) -> int:
+        raise RuntimeError("ask later")
+
+    def __repr__(self) -> str:
+        return "an unsure number"
 
 
 class Faulty(AgentBase):
@@ -48,7 +59,8 @@ class Faulty(AgentBase):
     def act(self, observation: Observation) -> Any:
         if self._mine and self._how == "act":
             raise OSError("disk\nof mine")
-        given = {"float": 2.5, "none": None, "far": 16, "true": True, "words": "MoveForward", "array": [3]}
+        given = {"float": 2.5, "none": None, "far": 16, "true": True, "words": "MoveForward", "list": [3],
+                 "array": np.array([3, 4]), "99": 99, "index": Unsure()}  # fmt: skip
         return given[self._how] if self._mine and self._how in given else 0
 
     def usage(self) -> Any:
@@ -91,7 +103,10 @@ SAID = {
     "far": r"returned 16 \(int\) from act",
     "true": r"returned True \(bool\) from act",
     "words": r"returned 'MoveForward' \(str\) from act",
-    "array": r"returned \[3\] \(list\) from act",
+    "list": r"returned \[3\] \(list\) from act",
+    "array": r"returned array\(\[3, 4\]\) \(ndarray\) from act",
+    "99": r"returned 99 \(int\) from act",
+    "index": r"returned an unsure number \(Unsure\) from act",
     "usage": r"returned 7 \(int\) from usage, where Usage or None is expected",
 }
 
@@ -113,7 +128,8 @@ def test_what_is_tolerated_is_logged(smoke: Path, tmp_path: Path) -> None:
     failures = read_run(tmp_path, "r", "failures")
     assert failures["kind"].to_pylist() == ["agent error"] * 3
     assert failures["attempts"].to_pylist() == [1] * 3, "a defect does not go away by trying again"
-    assert "'map'" in outcome.last_line
+    assert "'map'" in outcome.last_line()
+    assert not outcome.fruitless
     outcome = evaluate(smoke, job("none", 2, tolerate=True), out=tmp_path / "b")
     assert (
         read_run(tmp_path / "b", "r")["n_invalid"].to_pylist()
@@ -121,7 +137,8 @@ def test_what_is_tolerated_is_logged(smoke: Path, tmp_path: Path) -> None:
     )
     outcome = evaluate(smoke, job("act", 6, tolerate=True), out=tmp_path / "c", limits=Limits(failures_in_row=2))
     assert (outcome.finished, outcome.failed) == (0, 2)
-    assert "stopped after 2 failures in a row of one kind (agent error)" in outcome.last_line
+    assert "stopped after 2 failures in a row of one kind (agent error)" in outcome.last_line()
+    assert outcome.fruitless
 
 
 @pytest.mark.parametrize("how", ["half", "number"])

@@ -197,6 +197,19 @@ def test_a_sample_is_even_over_the_scenes_and_grows(smoke):
     assert pc.sum(pc.is_valid(some["description"])).as_py() == 0
 
 
+def test_train_and_test_are_those_of_both_partitions(smoke):
+    train = Selection(splits=("train",), modalities=("image",))
+    assert train == Selection(splits=("id_train", "ood_train"), modalities=("image",)), (
+        "one run, however it is called"
+    )
+    assert select(smoke, train) == select(smoke, Selection(splits=("ood_train", "id_train"), modalities=("image",)))
+    parts = [select(smoke, Selection(splits=(name,))).num_rows for name in ("train", "test")]
+    assert min(parts) > 0
+    assert sum(parts) == select(smoke, Selection(splits=("all",))).num_rows == select(smoke, Selection()).num_rows
+    with pytest.raises(UsageError, match="there are id_train, id_test, ood_train, ood_test, train, test, all"):
+        Selection(splits=("x",))
+
+
 def test_other_settings_do_not_mix_with_a_run(smoke, tmp_path):
     evaluate(smoke, job(limit=2), out=tmp_path)
     before = snapshot(tmp_path)
@@ -304,12 +317,12 @@ def test_the_command_in_one_line(project, smoke, tmp_path):
     assert json.loads(read_run(tmp_path, "random")["agent_options"][0].as_py()) == {"seed": 3}
     for args, said in (
         (("--agent", "oracel"), "no agent 'oracel': did you mean 'oracle'?"),
-        (("--split", "ood"), "no split 'ood'"),
+        (("--split", "valid"), "no split 'valid'"),
         (("--run", "../x"), "'../x' is no name of a run"),
         (("--option", "seed"), "--option 'seed': write key=value"),
     ):
         wrong = call(*args)
-        assert wrong.returncode in (1, 2)
+        assert wrong.returncode == 2
         assert wrong.stderr.splitlines()[-1].startswith(f"error: {said}"), wrong.stderr
 
 

@@ -117,7 +117,9 @@ def test_what_a_comparison_lacks_is_said_under_the_table(tmp_path: Path) -> None
     assert "random: 4 more episodes failed for reasons outside the agent." in notes
     assert notes[-1] == "The runs flew different tasks: their scores are no comparison of agents."
     assert not any("different" in note for note in tables.main_table(found[:1], [AT_3]).notes)
-    with pytest.raises(StoreError, match="run 'c' has no finished episode"):
+    with pytest.raises(
+        StoreError, match=r"run 'c' has no finished episode, and 2 that failed: .* --run c --rerun-failed"
+    ):
         load_runs(tmp_path, ["a", "c"])
 
 
@@ -364,7 +366,8 @@ def test_the_command_prints_what_is_asked_for(log: Path, tmp_path: Path) -> None
 
 def test_the_command_says_in_one_line_what_is_wrong(log: Path, tmp_path: Path) -> None:
     for arguments, message in (
-        (["--data", str(tmp_path)], "no runs in"),
+        (["--data", str(tmp_path)], "there is no release in"),
+        (["--data", str(tmp_path), "--log", str(tmp_path)], "no runs in"),
         (["nobody", "--data", str(log)], "no run 'nobody'"),
         (["--data", str(log), "--profile", "uav"], "no profile 'uav'"),
         (["--data", str(log), "--table", "visit"], "no table 'visit': did you mean 'visits'"),

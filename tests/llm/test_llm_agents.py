@@ -337,6 +337,29 @@ def test_requests_are_sent_again_as_often_as_asked(protocol: str, monkeypatch: p
         assert (failure.value.retry_after_s, len(service.requests)) == (3600.0, 1)
 
 
+MENDS = {
+    400: "is the key in [A-Z]+_API_KEY right",
+    401: "is the key in [A-Z]+_API_KEY right",
+    402: "has the account anything left",
+    403: "is the key in [A-Z]+_API_KEY right",
+    404: "is --option model=m served there",
+    429: "has the account anything left",
+    307: "it sends requests elsewhere",
+}
+
+
+def test_the_check_does_not_wait_twice() -> None:
+    with serving() as service:
+        service.refuses = lambda _: Hang()
+        with pytest.raises(AerialDojoError, match=r"nothing flown: .*no answer within 0.4 s: is it busy, or loading"):
+            begun("openai", service, request_retries=3, timeout_s=0.4).check()
+        assert len(service.checks) == 1
+        first = iter([Status(503, "one moment", {"retry-after": "0"})])
+        service.refuses = lambda _: next(first, None)
+        assert "answers in" in begun("anthropic", service).check()
+        assert len(service.checks) == 3, "what may pass is asked once more"
+
+
 @pytest.mark.parametrize("protocol", PROTOCOLS)
 @pytest.mark.parametrize(
     ("code", "error"),
@@ -348,9 +371,15 @@ def test_a_refusal_for_good_ends_the_run_with_one_line(protocol: str, code: int,
     location = {"location": "http://127.0.0.1:1/elsewhere"}
     with serving(Status(code, "no such thing", location, error)) as service:
         agent = begun(protocol, service, request_retries=3)
-        with pytest.raises(UsageError, match=rf"HTTP {code}: .*no such thing \(you sent .*\[key\]\)") as failure:
+        said = rf"HTTP {code}: .*no such thing \(you sent .*\[key\]\): {MENDS[code]}"
+        with pytest.raises(ServiceDown, match=said) as failure:
             agent.act(observation())
         assert len(service.requests) == 1
+        assert failure.value.exit_code == 1
+        service.refuses = lambda _: Status(code, "no such thing", location, error)
+        with pytest.raises(ServiceDown, match=rf"checked before the run, nothing flown: {service.url}.*{said}"):
+            begun(protocol, service, request_retries=3).check()
+        assert (len(service.checks), len(service.requests)) == (1, 1)
     assert KEY not in "".join(traceback.format_exception(failure.value))
 
 

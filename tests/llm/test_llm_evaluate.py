@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shlex
 import subprocess
 import sys
 import time
@@ -15,6 +16,7 @@ from support.llm_server import Act, Cut, Endless, Filtered, Hang, Raw, Say, Stat
 
 from aerialdojo_gen.benchmark.episodes import read_run
 from aerialdojo_gen.benchmark.runs import conduct, load_runs
+from aerialdojo_gen.errors import StoreError
 
 KEY = "sk-test-0b7a41dc95e84f2f8c63"
 TURN, STOP, UNREADABLE = '{"thought": "Look.", "action": "TurnLeft15"}', '{"action": "Stop"}', "I am lost."
@@ -33,6 +35,12 @@ def fly(smoke: Path, out: Path, agent: str, url: str, *more: str) -> subprocess.
     environment = {"PATH": "/usr/bin:/bin", "HOME": str(out), "OPENAI_LOG": "debug", "ANTHROPIC_LOG": "debug"}
     environment[f"{agent.upper()}_API_KEY"] = KEY
     return subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
+
+
+def paste(line: str, out: Path) -> subprocess.CompletedProcess[str]:
+    """Do as a person does with a command that a message gives."""
+    environment = {"PATH": "/usr/bin:/bin", "HOME": str(out), "OPENAI_API_KEY": KEY}
+    return subprocess.run(line, shell=True, capture_output=True, text=True, check=False, env=environment)
 
 
 def key_is_nowhere(out: Path, done: subprocess.CompletedProcess[str]) -> None:
@@ -101,10 +109,17 @@ def test_a_failing_service_is_logged_apart_and_its_episodes_flown_again(smoke: P
         assert done.returncode == 1, "none finished"
         last = done.stderr.splitlines()[-1]
         assert last.startswith("error: 1 failed, which count as no episodes: 1 × server error (http://127.0.0.1")
-        assert "--rerun-failed flies them again" in last
+        pasted = last.partition("To fly the failed again: ")[2]
+        assert shlex.split(pasted)[:4] == [sys.executable, "-m", "aerialdojo_gen.cli", "evaluate"]
+        for given in (f"--data {smoke}", f"--out {tmp_path}", "--attempts 2", "--option 'model=\"m\"'"):
+            assert given in pasted
+        again = paste(pasted, tmp_path)
+        assert again.returncode == 1, "none finished this time either"
+        with pytest.raises(StoreError, match=r"no finished episode, and 1 that failed: .* --rerun-failed"):
+            load_runs(tmp_path, ["openai"])
         assert not list((tmp_path / "episodes").rglob("*.parquet")) or read_run(tmp_path, "openai").num_rows == 0
         service.script[:] = [Say(STOP)]
-        done = fly(smoke, tmp_path, "openai", service.url, "--attempts", "2", "--limit", "1", "--rerun-failed")
+        done = paste(pasted, tmp_path)
         assert done.returncode == 0, done.stderr
     episodes = read_run(tmp_path, "openai")
     assert episodes["n_actions"].to_pylist() == [1]
@@ -116,7 +131,7 @@ def test_a_refusal_ends_the_run_with_one_line(smoke: Path, tmp_path: Path) -> No
         service.refuses = lambda _: Status(401, "wrong key")
         done = fly(smoke, tmp_path, "openai", service.url, "--quiet")
         assert (len(service.checks), len(service.requests)) == (1, 0)
-    assert done.returncode == 2
+    assert done.returncode == 1
     lines = [line for line in done.stderr.splitlines() if line.startswith("error: ")]
     assert len(lines) == 1
     assert "HTTP 401: wrong key (you sent Bearer [key])" in lines[0]
@@ -182,7 +197,8 @@ def test_whatever_a_service_does_a_run_of_thirty_ends_with_thirty_rows(smoke: Pa
         assert sum(episodes["n_invalid"].to_pylist()) == len([k for k in range(1, 30, 5) if k not in STRUCK])
         lines = done.stderr.splitlines()
         assert "12 failed, which count as no episodes: 3 × malformed answer (" in lines[-1]
-        assert "--rerun-failed flies them again" in lines[-1]
+        assert lines[-1].endswith(" --rerun-failed")
+        assert lines[-1].count("(") == 1, "one reason, the most frequent one's"
         assert "18 of 30 episodes finished, 12 failed" in lines[-2]
 
         before = len(service.requests)
@@ -205,7 +221,7 @@ def test_failures_of_one_kind_in_a_row_end_the_run(smoke: Path, tmp_path: Path) 
         # The package's own debug log stands in between.
         (line,) = [line for line in done.stderr.splitlines() if line.startswith("error: ")]
         assert line.startswith("error: stopped after 3 failures in a row of one kind (bad request).")
-        assert "17 not begun, which the same command goes on with" in line
+        assert "17 not begun: the same command goes on with them" in line
         # The service goes away in the middle: one line, and what was flown stays.
         service.script[:] = [Say(STOP)]
         more = ("--limit", "20", "--max-tokens", "2100", "--option", "request_retries=1")
@@ -218,6 +234,8 @@ def test_failures_of_one_kind_in_a_row_end_the_run(smoke: Path, tmp_path: Path) 
     last = done.stderr.splitlines()[-1]
     assert last.startswith("error: checked before the run, nothing flown: ")
     assert "refused" in last
+    assert f"{service.url}/v1: " in last
+    assert last.endswith("is the service there, and is base_url right?")
     assert "Traceback" not in done.stderr
     assert read_run(tmp_path, "openai").num_rows == 3
 

@@ -12,11 +12,17 @@ TASK = "U_Courtyard_0-0123456789ab"
 COMMANDS = {
     "stats": ["stats"],
     "stats --csv": ["stats", "--csv", "figures.csv"],
+    "stats --pool": ["stats", "--pool"],
+    "report": ["report"],
+    "report of a run": ["report", "mine", "--out", "told"],
+    "gallery --references": ["gallery", "--references", "--out", "pictured"],
+    "render --estimate": ["render", "--estimate"],
     "validate": ["validate"],
     "show": ["show", TASK],
     "view": ["view", "--scene", "U_Courtyard_0", "--no-browser"],
     "export": ["export", "--format", "habitat", "--out", "exported"],
     "evaluate": ["evaluate", "--agent", "stop"],
+    "evaluate --estimate": ["evaluate", "--agent", "openai", "--option", "model=m", "--estimate"],
 }
 
 

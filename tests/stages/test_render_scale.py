@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import os
 import re
@@ -200,7 +201,7 @@ def test_png_frames_hold_what_the_videos_do_and_instances_name_the_cubes(tmp_pat
     row = rows["nav_a", "front", "depth"]
     assert row["codec"] == "png"
     assert sorted(p.name for p in (tmp_path / row["path"]).glob("*.png")) == [f"{k:06}.png" for k in range(6)]
-    loose = read_recording(tmp_path / "media" / SCENE / "nav_a")
+    loose = read_recording(str(tmp_path / "media" / SCENE / "nav_a"))
     video = read_recording(whole / "media" / SCENE / "nav_a")
     assert len(loose) == 6
     for view in ("front", "left", "right", "down"):
@@ -229,6 +230,8 @@ def test_a_camera_s_offset_is_in_the_pictures_and_in_the_metadata(tmp_path):
 
 def test_the_estimate_is_of_the_selection_and_near_the_truth(whole):
     said = estimate(whole, [SCENE], ALL, 0, 2)
+    assert "with 2 workers on idle cores" in str(said)
+    assert "with 1 worker on idle cores" in str(dataclasses.replace(said, workers=1))
     assert (said.trajectories, said.poses, said.videos) == (22, 132, 176)
     size = sum(r["bytes"] for r in store.read_scene(whole, "recordings", SCENE).to_pylist())
     assert 0.4 * size < said.size_bytes < 2.5 * size

@@ -1,0 +1,51 @@
+"""The command as it was given, with something more, to be pasted: what a message tells to do next."""
+
+from __future__ import annotations
+
+import os
+import shlex
+import shutil
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from aerialdojo_gen.common.secrets import Secrets
+
+NAME = "aerialdojo-gen"
+
+
+def again(more: Sequence[str], *, without: Sequence[str] = (), data: str | None = None) -> str:
+    """Return this process's command with all its options, so that a shell takes it as it stands.
+
+    Parameters
+    ----------
+    more : sequence of str
+        Arguments that are added, unless they are there.
+    without : sequence of str
+        Flags that are left out.
+    data : str, optional
+        The data directory; named where it came from the environment, which another shell may lack.
+
+    Returns
+    -------
+    str
+        Quoted; secrets are ``[redacted]``.
+    """
+    kept = [argument for argument in sys.argv[1:] if argument not in without]
+    if data is not None and os.environ.get("AERIALDOJO_DATA") and not _names(kept, "--data"):
+        kept += ["--data", data]
+    kept += [argument for argument in more if argument not in kept]
+    return Secrets().text(shlex.join([*_program(), *kept]))
+
+
+def _names(arguments: Sequence[str], option: str) -> bool:
+    return any(argument == option or argument.startswith(f"{option}=") for argument in arguments)
+
+
+def _program() -> list[str]:
+    """Return how this program is called: by its name where the shell finds it by that, else as it was."""
+    called = Path(sys.argv[0])
+    if called.name != NAME:
+        return [sys.executable, "-m", "aerialdojo_gen.cli"]
+    found = shutil.which(NAME)
+    return [NAME] if found is not None and Path(found).resolve() == called.resolve() else [sys.argv[0]]
