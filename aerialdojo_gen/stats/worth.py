@@ -181,10 +181,11 @@ def goal_table(goals: Goals) -> Comparison:
     rows = [(name, figures(goals.family == name)) for name in there]
     rows.append(("all", figures(np.ones(len(goals.family), dtype=np.bool_))))
     notes = (
-        "fronts: objects with a front; front: of those, seen from within 60° of it. parts: of",
-        "the objects that parts tell, those whose reference picture shows all of these.",
-        "unhidden, framed: share of the object that nothing hides there, and that is within",
-        "the picture, mean. back: how far behind the anchor the picture is taken, median.",
+        "fronts: objects with a front; front: of those, seen from within 60° of it.",
+        "parts: of the objects that parts tell, those whose reference picture shows",
+        "all of these. unhidden, framed: share of the object that nothing hides there,",
+        "and that is within the picture, mean. back: how far behind the anchor it is",
+        "taken, median.",
     )
     none: tuple[Figure, ...] = (None,) * len(columns)
     return Comparison(
@@ -215,9 +216,9 @@ def flight_table(flights: Flights) -> Comparison:
     rows = [(_NAMES[setting], figures(flights.setting == setting)) for setting in SETTINGS]
     rows.append(("all", figures(np.ones(len(flights.setting), dtype=np.bool_))))
     notes = (
-        "clear: smallest distance to a surface on the route, median and 10th percentile.",
-        "actions: median. turns: of all actions. sideways: of the horizontal metres, but for",
-        "the last three, where the camera should see the goal.",
+        "clear: smallest distance to a surface on a route, median and 10th percentile.",
+        "actions: median. turns: of all actions. sideways: of the horizontal metres,",
+        "but for the last three, where the camera should see the goal.",
     )
     none: tuple[Figure, ...] = (None,) * len(columns)
     return Comparison(

@@ -30,6 +30,7 @@ from aerialdojo_gen.stats.figures.charts import composition
 from aerialdojo_gen.stats.figures.maps import _round_length
 from aerialdojo_gen.stats.figures.style import SETTING_COLOURS, read_routes
 from aerialdojo_gen.stats.tables import Made, benchmark_table, in_paper_order, made_of, tables
+from aerialdojo_gen.stats.worth import flight_table, goal_table, read_flights, read_goals, worth_tables
 from aerialdojo_gen.store import schemas
 
 
@@ -219,6 +220,40 @@ def test_splits_are_what_pandas_makes_of_the_tables(smoke, frame):
             assert side == "test" or not own["target_held_out"].any()
 
 
+def test_what_goals_show_is_what_pandas_makes_of_the_tables(smoke):
+    release = smoke / "release"
+    anchors, objects = (pd.concat(pd.read_parquet(p) for p in sorted((release / t).glob("*.parquet")))
+                        for t in ("anchors", "objects"))  # fmt: skip
+    goals = anchors[anchors["selected"]]
+    fronts, told = goals["off_front_rad"].dropna(), objects["tells_shown"].dropna()
+    table = goal_table(read_goals(smoke, check_release(smoke)))
+    assert table.rows[-1].ours == pytest.approx((
+        len(objects), len(fronts), 100 * (fronts <= np.radians(60.0)).mean(), 100 * (told == 1.0).mean(),
+        100 * goals["part_unoccluded"].mean(), 100 * goals["part_framed"].mean(), objects["step_back_m"].median(),
+    ))  # fmt: skip
+    assert sum(row.ours[0] for row in table.rows[:-1]) == len(objects)
+
+
+def test_how_routes_fly_is_what_a_loop_over_their_actions_makes(smoke, frame):
+    table = flight_table(read_flights(smoke, check_release(smoke)))
+    turns = ahead = sideways = 0
+    for actions in frame["action"]:
+        names = [schemas.ACTION_NAMES[a] for a in actions]
+        metres = [0 if n.startswith(("Turn", "Stop")) else 1.0 if n == "Approach" else float(n[-1]) for n in names]
+        flown = [0.0 if name == "Approach" else m for name, m in zip(names, metres, strict=True)]
+        for k, name in enumerate(names):
+            turns += name.startswith("Turn")
+            if sum(flown[k + 1 :]) >= 3.0:
+                ahead += metres[k] * name.startswith("MoveForward")
+                sideways += metres[k] * name.startswith(("MoveLeft", "MoveRight"))
+    n_actions = frame["action"].map(len)
+    assert table.rows[-1].ours == pytest.approx((
+        len(frame), frame["min_clearance_m"].median(), frame["min_clearance_m"].quantile(0.1), n_actions.median(),
+        100 * turns / n_actions.sum(), 100 * sideways / (ahead + sideways),
+    ))  # fmt: skip
+    assert max(len(line) for t in worth_tables(smoke, check_release(smoke)) for line in t.terminal(80)) <= 80
+
+
 def test_tables_of_difficulty_fit_a_terminal(smoke):
     tasks = read_tasks(smoke, check_release(smoke))
     many = Tasks(**{name: np.tile(values, 3) for name, values in vars(tasks).items()})
@@ -258,7 +293,7 @@ def test_the_command_writes_what_it_prints(smoke, drawn):
     out, printed = drawn
     scenes = in_paper_order([made_of(smoke, name) for name in check_release(smoke)])
     told = difficulty_tables(read_tasks(smoke, [m.scene for m in scenes]))
-    made = [*tables(scenes), *told, benchmark_table(scenes)]
+    made = [*tables(scenes), *worth_tables(smoke, [m.scene for m in scenes]), *told, benchmark_table(scenes)]
     assert (out / "stats.md").read_text() == as_markdown(made)
     assert (out / "stats.csv").read_text() == as_csv(made)
     assert "\n\n".join("\n".join(table.terminal(80)) for table in made) in printed
