@@ -15,6 +15,7 @@ import numpy as np
 from aerialdojo_gen.annotations.ambiguity import Ambiguity
 from aerialdojo_gen.annotations.describing import NO_THING, STAGE, Teller, Vocabulary
 from aerialdojo_gen.annotations.format import Annotations, Landmark, Object
+from aerialdojo_gen.common.advice import command
 from aerialdojo_gen.common.rng import rank
 from aerialdojo_gen.errors import AnnotationError
 from aerialdojo_gen.geometry.frames import compass_direction
@@ -98,7 +99,7 @@ def redraft_annotations(scene: Scene, catalogue: Catalogue, annotations: Annotat
         if text is None:
             raise AnnotationError(
                 f"{scene.name}: {entry.node} (object {entry.id}) cannot be told from others of its kind: "
-                "take another object in its place (aerialdojo-gen annotate)"
+                f"take another object in its place ({command('annotate', scene=scene.name)})"
             )
         objects.append(entry.model_copy(update={"name": name, "category": kind, "description": text}))
     return replace(annotations, objects=tuple(objects))

@@ -15,7 +15,7 @@ from pathlib import Path
 from aerialdojo_gen.common.names import choose_scenes, unknown
 from aerialdojo_gen.common.trouble import check_memory
 from aerialdojo_gen.config.pipeline import Pipeline
-from aerialdojo_gen.errors import AerialDojoError, BudgetSpent, UsageError
+from aerialdojo_gen.errors import AerialDojoError, AssetError, BudgetSpent, UsageError
 from aerialdojo_gen.pipeline.code_digest import stage_code
 from aerialdojo_gen.pipeline.executors import Executor, Folders, make_executor, on_disk
 from aerialdojo_gen.pipeline.freshness import Limits, shards_of
@@ -79,7 +79,7 @@ def run(
     prepare: Callable[[], None] | None = None,
     finish: Callable[[], None] | None = None,
 ) -> list[StageSummary]:
-    """Run stages in their order on scenes.
+    """Run stages in their order on scenes, each from its first stage to the last before one that it is not ready for.
 
     Parameters
     ----------
@@ -125,11 +125,13 @@ def run(
         stage_code(stage.name)
     carried = (roots.scene_assets, roots.recipes, roots.annotations)
     folders = Folders(on_disk(roots.data), carried, on_disk(roots.data), reporter.line)
+    unready(stages, scenes, roots)
     made = make_executor(executor, workers, address, folders)
     with roots.data.lock(), Interrupts() as interrupts, made as pool:
         if prepare:
             prepare()
         for stage in stages:
+            scenes = [scene for scene in scenes if not stage.wants(roots, scene)]
             # What the stage before wrote, in whatever process, is to be found.
             roots.data.refresh()
             now = limits if limits and stage is stages[-1] else Limits()
@@ -199,6 +201,35 @@ def _run_stage(
         len(done),
         time.monotonic() - started,
     )
+
+
+def unready(stages: Sequence[Stage], scenes: Sequence[str], roots: Roots) -> dict[str, str]:
+    """Find the scenes that stages leave out, as they want something of their author first.
+
+    Parameters
+    ----------
+    stages : sequence of Stage
+        What is to run.
+    scenes : sequence of str
+        Names of the scenes.
+    roots : Roots
+        The folders.
+
+    Returns
+    -------
+    dict of str to str
+        Why, by scene, in a line that names the mend.
+
+    Raises
+    ------
+    AssetError
+        None of the scenes would be left.
+    """
+    why = {scene: next(filter(None, (stage.wants(roots, scene) for stage in stages)), "") for scene in scenes}
+    left_out = {scene: line for scene, line in why.items() if line}
+    if left_out and len(left_out) == len(why):
+        raise _together([AssetError(line) for line in left_out.values()])
+    return left_out
 
 
 def _together(errors: Sequence[AerialDojoError]) -> AerialDojoError:
