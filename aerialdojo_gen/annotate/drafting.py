@@ -11,7 +11,7 @@ from functools import cache
 from pathlib import Path
 
 from aerialdojo_gen.annotations.describing import Vocabulary
-from aerialdojo_gen.annotations.draft import MOST, NO_THING_TOLD, Choice, Drafter
+from aerialdojo_gen.annotations.draft import MOST, SCENERY, Choice, Drafter
 from aerialdojo_gen.annotations.format import Annotations, parse_annotations, write_annotations
 from aerialdojo_gen.annotations.landmarks import choose_landmarks
 from aerialdojo_gen.annotations.redraft import redraft_annotations
@@ -111,7 +111,7 @@ def draft_scene(
     vocabulary = Vocabulary(scene, catalogue)
     targets = Counter(i.category for i, w in zip(scene.instances, vocabulary.words, strict=True) if w.target)
     if not targets:
-        raise _nothing(name, f"; all its {len(scene.instances):,} parts {NO_THING_TOLD}")
+        raise _nothing(name, f"; not taken: {len(scene.instances):,} {SCENERY}")
     marks = choose_landmarks(
         vocabulary, n_landmarks or (counts[0] if counts else 2 if targets.total() >= _FEW_THINGS else 1), landmarks,
         at_most=n_landmarks is None and counts is None,
@@ -153,8 +153,8 @@ def _check_enough(name: str, found: int, wanted: int, why_not: str, *, exact: bo
 
 def _nothing(name: str, why_not: str) -> AnnotationError:
     return AnnotationError(
-        f"{name}: nothing in it can be drafted as an object{why_not}. Annotate it by hand, where a box (key B) cuts a "
-        f"thing out of a surface: {command('annotate', scene=name)}"
+        f"{name}: nothing in it can be drafted as an object{why_not}. Annotate it by hand, where a box (key B) cuts "
+        f"a thing out of a surface: {command('annotate', scene=name)}"
     )
 
 
@@ -209,6 +209,6 @@ def refusals(
         if found is not None:
             rejected["not_visible"] += len(found.positions_m) - seen
         cause = max(_CAUSES, key=lambda reason: rejected[reason])
-        return f"cannot be looked at from {config.shortlist} places at {config.standoff_m:g} m ({_CAUSES[cause]})"
+        return f"without {config.shortlist} viewpoints at {config.standoff_m:g} m ({_CAUSES[cause]})"
 
     return refused

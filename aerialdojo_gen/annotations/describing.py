@@ -153,7 +153,15 @@ class Teller:
                 for look in (look for look in words.looks if look in text):
                     self._used[look] = self._used.get(look, 0) + 1
                 return text
-        return None
+        return self._bare(i, name, others) if self._scene.imported else None
+
+    def _bare(self, i: int, name: str, others: Collection[str]) -> str | None:
+        """Describe what nothing can be said of but what it is, where that tells it from all of its kind."""
+        noun, words = self._vocabulary.nouns[i], self._vocabulary.words[i]
+        alone = not any(self._scene.instances[j].category not in NO_THING for j in self._finder.near(i))
+        texts = [f"Look for {noun.a()}, {words.participle} by itself."] if alone else []
+        texts.append(f"Look for {noun.a()}.")
+        return next((text for text in texts if text not in others and self._good(i, name, text)), None)
 
     def _good(self, i: int, name: str, text: str) -> bool:
         ambiguity, instance = self.ambiguity, self._scene.instances[i]

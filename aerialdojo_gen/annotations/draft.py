@@ -24,9 +24,9 @@ from aerialdojo_gen.scenes.model import Instance, Scene
 
 _ALOFT_M = 3.0
 MOST = 5
-NO_THING_TOLD = "are ground, slabs or scraps"
-ALIKE = "cannot be told from others of their kind"
-NO_DIRECTION = "lie in no direction of a landmark, or outside the bounds"
+SCENERY = "of ground, slabs or scraps"
+_ALIKE = "without anything to tell them from others of their kind"
+_NOWHERE = "in no direction of a landmark, or outside the bounds"
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ class Choice:
     Attributes
     ----------
     refuses : callable or None
-        ``node -> str``: why it cannot be an object, e.g. as it has no anchors, to follow "17 things"; empty where it
+        ``node -> str``: why it cannot be an object, to follow "17 things", e.g. ``"without anchors"``; empty where it
         can. Asked as late as possible. None lets all in.
     centre_m : tuple of two float or None
         Middle of the core that objects are taken from; the landmarks' mean where absent.
@@ -141,7 +141,7 @@ class Drafter:
         wanted = [k for k, w in enumerate(vocabulary.words) if w.target and k not in ambiguity.landmarks]
         self.things = tuple(k for k in wanted if self._placed(k, ambiguity))
         scenery = sum(not w.target for w in vocabulary.words) if self._scene.imported else 0
-        self.refused.update({NO_DIRECTION: len(wanted) - len(self.things), NO_THING_TOLD: scenery})
+        self.refused.update({_NOWHERE: len(wanted) - len(self.things), SCENERY: scenery})
 
     def room(self) -> int:
         """How many objects there can be at the most, by the numbers of each kind, before anything is looked at."""
@@ -149,9 +149,9 @@ class Drafter:
         return sum(min(n, self._most(kind)) for kind, n in kinds.items())
 
     def why_not(self) -> str:
-        """Say what was not taken, and why: ``"; of its other parts 7 ..., 2 ..."``; empty where all were."""
+        """Say what was not taken, and why: ``"; not taken: 7 ..., 2 ..."``; empty where all were."""
         said = ", ".join(f"{n:,} {why}" for why, n in self.refused.most_common() if n)
-        return f"; of its other parts {said}" if said else ""
+        return f"; not taken: {said}" if said else ""
 
     def objects(self, n: int) -> tuple[Object, ...]:
         """Choose and describe up to `n` objects, a category at a time in turn."""
@@ -252,4 +252,4 @@ class Drafter:
         if why:
             return why, ""
         text = self._teller.describe(i, set(taken.values())) if self._teller.sound(i, self._nouns[i].short) else None
-        return (ALIKE, "") if text is None else ("", text)
+        return (_ALIKE, "") if text is None else ("", text)

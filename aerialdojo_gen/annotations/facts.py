@@ -98,6 +98,10 @@ class FactFinder:
         keyed = [(-fact.weight * float(rng.uniform(0.8, 1.25)), k, fact) for k, fact in enumerate(found)]
         return [fact for _, _, fact in sorted(keyed, key=lambda item: item[:2])]
 
+    def near(self, i: int) -> list[int]:
+        """List the instances within the reach of facts about instance `i`, by index."""
+        return self._geometry.around(i, _REACH_M)
+
     def _may_refer(self, i: int, j: int) -> bool:
         size = self._geometry.boxes[j, 1] - self._geometry.boxes[j, 0]
         return self._words[j].reference and float(size.max()) >= _SMALLEST_M and j != i

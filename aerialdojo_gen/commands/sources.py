@@ -103,7 +103,7 @@ def annotate_draft(
         centre_m=centre, within_m=within, core_share=core_share, aloft_share=aloft, most_vegetation=plants, most=most
     )
     path = draft_scene(
-        scene, config, roots, n_landmarks=landmarks, n_objects=int(objects) if (objects or "").isdigit() else objects,
+        scene, config, roots, n_landmarks=landmarks, n_objects=int(objects) if objects and objects != "auto" else objects,
         choice=choice, landmarks=tuple(landmark or ()), seed=seed, force=force, keep_objects=keep_objects,
         reporter=Reporter(quiet=quiet),
     )  # fmt: skip

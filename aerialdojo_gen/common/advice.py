@@ -96,9 +96,9 @@ def command(verb: str, *words: object, **options: object) -> str:
         ``"aerialdojo-gen annotate-draft Campus --pipeline 'my scenes/pipeline.toml'"``.
     """
     kept = given()
-    for key, value in (("pipeline", kept.pipeline), ("data", kept.data)):
-        if value and key in _TAKES.get(verb, ("pipeline", "data")):
-            options.setdefault(key, value)
+    for key, own in (("pipeline", kept.pipeline), ("data", kept.data)):
+        if own and key in _TAKES.get(verb, ("pipeline", "data")):
+            options.setdefault(key, own)
     parts = [kept.program, verb, *map(str, words)]
     for key, value in options.items():
         if value is None or value is False:
