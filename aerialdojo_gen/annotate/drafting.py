@@ -10,7 +10,7 @@ from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
-from aerialdojo_gen.annotations.describing import Vocabulary
+from aerialdojo_gen.annotations.describing import UNKNOWN, Vocabulary
 from aerialdojo_gen.annotations.draft import MOST, SCENERY, Choice, Drafter
 from aerialdojo_gen.annotations.format import Annotations, parse_annotations, write_annotations
 from aerialdojo_gen.annotations.landmarks import choose_landmarks
@@ -131,6 +131,12 @@ def draft_scene(
         objects = drafter.objects(proposed)
     _check_enough(name, len(objects), proposed, drafter.why_not(), exact=exact)
     write_annotations(Annotations(name, marks, objects), path)
+    unknown = sum(entry.category == UNKNOWN for entry in objects)
+    if unknown:
+        log.warning(
+            "%s: needs a person: nothing is known of %d of %d objects but colour and form; say what they are: %s",
+            name, unknown, len(objects), command("annotate", scene=name),
+        )  # fmt: skip
     reporter.line(f"{name}: {_many(len(marks), 'landmark')}, {_many(len(objects), 'object')}{drafter.why_not()}")
     return path
 

@@ -15,6 +15,7 @@ from aerialdojo_gen.annotations.colours import uncoloured
 from aerialdojo_gen.annotations.compose import compose
 from aerialdojo_gen.annotations.facts import Fact, FactFinder
 from aerialdojo_gen.annotations.format import Landmark
+from aerialdojo_gen.annotations.number import group_of
 from aerialdojo_gen.annotations.phrases import Words, noun_of, place_of, words_of
 from aerialdojo_gen.common.rng import generator
 from aerialdojo_gen.scenes.catalogue import Catalogue
@@ -25,6 +26,8 @@ from aerialdojo_gen.scenes.model import Instance, Scene
 STAGE = "annotate-draft"
 # What an imported mesh has and nobody looks for.
 NO_THING = frozenset({"ground", "clutter", "slab", "terrain"})
+# The category of what is imported without a name: a person has to say what it is.
+UNKNOWN = "object"
 _MOST_FACTS = 4
 _TRIES = 18
 _MOST_WORDS = 60
@@ -57,7 +60,10 @@ class Vocabulary:
                 targets |= {i.category}
             if i.category not in by_category:
                 name, kind = self.names.get(i.category), self.kinds.get(i.category, "")
-                by_category[i.category] = words_of(i.category, name, kind, (), i.category in targets)
+                words = words_of(i.category, name, kind, (), i.category in targets)
+                if scene.imported and not words.group:
+                    words = replace(words, group=group_of(words.name))
+                by_category[i.category] = words
         self.words = [by_category[i.category] for i in scene.instances]
         self.nouns = [noun_of(self._honest(i), w) for i, w in zip(scene.instances, self.words, strict=True)]
         self.callings = Callings(self.names)

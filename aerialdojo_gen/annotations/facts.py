@@ -92,6 +92,8 @@ class FactFinder:
         for a, j in enumerate(things[:6]):
             for k in things[a + 1 : 6]:
                 texts = self._thing(i, j), self._thing(i, k)
+                if self._geometry.scene.imported and 0.0 in (gaps[j], gaps[k]):
+                    continue
                 if texts[0] != texts[1] and self._geometry.between(i, j, k, _TIGHT):
                     weight = 1.2 * min(self._weight(i, j), self._weight(i, k))
                     found += self._checked(i, "between {} and {}".format(*texts), weight, (j, k))
@@ -119,7 +121,10 @@ class FactFinder:
         geometry, weight, thing = self._geometry, self._weight(i, j), self._thing(i, j)
         found: list[Fact] = []
         touching = geometry.support(i) == j or j in geometry.covers(i)
-        if geometry.support(i) == j:
+        imported = geometry.scene.imported
+        if imported and not touching and geometry.gap_m(i, j) == 0.0:
+            return []  # one goes through the other, or is a part of it: nobody says where that stands by it
+        if geometry.support(i) == j and (not imported or geometry.rests_on(i, j)):
             found += self._checked(i, self._word("on", rng).format(thing), 3.0 * weight, (j,))
         if j in geometry.covers(i):
             found += self._checked(i, self._word("under", rng).format(thing), 2.0 * weight, (j,))

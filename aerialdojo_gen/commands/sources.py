@@ -34,13 +34,25 @@ def add_scene(
     ceiling: Annotated[
         float | None, typer.Option(help="Highest z to fly at, metres.  (default: 6 m over all)")
     ] = None,
+    names: Annotated[
+        Path | None, typer.Option(help="CSV of what nodes are called: pattern,name,category,plural.")
+    ] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace a scene of this name.")] = False,
 ) -> None:
     """Make a scene of a mesh of your own."""
     from aerialdojo_gen.imports import command
 
     added = command.add_scene(
-        name, mesh, project, up=up, scale=scale, annotations=annotations, crop_m=crop, ceiling_m=ceiling, force=force
+        name,
+        mesh,
+        project,
+        up=up,
+        scale=scale,
+        annotations=annotations,
+        crop_m=crop,
+        ceiling_m=ceiling,
+        names=names,
+        force=force,
     )
     size = added.scene.bounds[1] - added.scene.bounds[0]
     print(
@@ -103,7 +115,8 @@ def annotate_draft(
         centre_m=centre, within_m=within, core_share=core_share, aloft_share=aloft, most_vegetation=plants, most=most
     )
     path = draft_scene(
-        scene, config, roots, n_landmarks=landmarks, n_objects=int(objects) if objects and objects != "auto" else objects,
+        scene, config, roots, n_landmarks=landmarks,
+        n_objects=int(objects) if objects and objects != "auto" else objects,
         choice=choice, landmarks=tuple(landmark or ()), seed=seed, force=force, keep_objects=keep_objects,
         reporter=Reporter(quiet=quiet),
     )  # fmt: skip
