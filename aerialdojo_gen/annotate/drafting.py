@@ -121,13 +121,15 @@ def draft_scene(
         choice = replace(choice, most=max(MOST, math.ceil(most / len(targets))))
     probe = Drafter(vocabulary, marks, seed, choice)
     proposed = most if exact else min(most, probe.room())
+    if not proposed:
+        raise _nothing(name, probe.why_not())
     reporter.line(
         f"{name}: {_many(len(probe.things), 'thing')} of {_many(len(targets), 'kind')} to look for; up to "
         f"{_many(proposed, 'object')} by {_many(len(marks), 'landmark')} can be drafted, if drones can look at them"
     )
     with reporter.bar("annotate-draft", len(probe.things), unit="things") as bar:
-        refuses = refusals(scene, pipeline, roots, bar.advance) if probe.things else None
-        drafter = Drafter(vocabulary, marks, seed, replace(choice, refuses=refuses))
+        looked_at = replace(choice, refuses=refusals(scene, pipeline, roots, bar.advance))
+        drafter = Drafter(vocabulary, marks, seed, looked_at)
         objects = drafter.objects(proposed)
     _check_enough(name, len(objects), proposed, drafter.why_not(), exact=exact)
     write_annotations(Annotations(name, marks, objects), path)

@@ -15,8 +15,7 @@ PROGRAM = "aerialdojo-gen"
 _TAKES: dict[str, tuple[str, ...]] = {
     "add-scene": (),
     "annotate-draft": ("pipeline",),
-    "evaluate": ("data",),
-    "run": ("data",),
+    **dict.fromkeys(("export", "import-benchmark", "report", "run", "show", "view"), ("data",)),
 }
 
 
