@@ -121,10 +121,11 @@ def draft_scene(
         choice = replace(choice, most=max(MOST, math.ceil(most / len(targets))))
     probe = Drafter(vocabulary, marks, seed, choice)
     proposed = most if exact else min(most, probe.room())
+    kinds = len({scene.instances[k].category for k in probe.things})
     if not proposed:
         raise _nothing(name, probe.why_not())
     reporter.line(
-        f"{name}: {_many(len(probe.things), 'thing')} of {_many(len(targets), 'kind')} to look for; up to "
+        f"{name}: {_many(len(probe.things), 'thing')} of {_many(kinds, 'kind')} to look for; up to "
         f"{_many(proposed, 'object')} by {_many(len(marks), 'landmark')} can be drafted, if drones can look at them"
     )
     with reporter.bar("annotate-draft", len(probe.things), unit="things") as bar:

@@ -126,7 +126,7 @@ class FactFinder:
             return []  # one goes through the other, or is a part of it: nobody says where that stands by it
         if geometry.support(i) == j and (not imported or geometry.rests_on(i, j)):
             found += self._checked(i, self._word("on", rng).format(thing), 3.0 * weight, (j,))
-        if j in geometry.covers(i):
+        if j in geometry.covers(i) and not (imported and geometry.support(j) == i):
             found += self._checked(i, self._word("under", rng).format(thing), 2.0 * weight, (j,))
         if not touching and geometry.beside(i, j, _TIGHT):
             found += self._checked(i, self._word("beside", rng).format(thing), 1.5 * weight, (j,))

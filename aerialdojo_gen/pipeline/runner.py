@@ -21,9 +21,10 @@ from aerialdojo_gen.pipeline.executors import Executor, Folders, make_executor, 
 from aerialdojo_gen.pipeline.freshness import Limits, shards_of
 from aerialdojo_gen.pipeline.interrupt import Interrupts
 from aerialdojo_gen.pipeline.progress import Reporter
-from aerialdojo_gen.pipeline.registry import STAGES
+from aerialdojo_gen.pipeline.registry import STAGES, upstream
 from aerialdojo_gen.pipeline.stage import Roots, Stage
 from aerialdojo_gen.pipeline.task import compute
+from aerialdojo_gen.store import shards as store
 
 
 @dataclass(frozen=True)
@@ -79,7 +80,7 @@ def run(
     prepare: Callable[[], None] | None = None,
     finish: Callable[[], None] | None = None,
 ) -> list[StageSummary]:
-    """Run stages in their order on scenes, each from its first stage to the last before one that it is not ready for.
+    """Run stages in their order on the scenes that are ready for them.
 
     Parameters
     ----------
@@ -125,13 +126,13 @@ def run(
         stage_code(stage.name)
     carried = (roots.scene_assets, roots.recipes, roots.annotations)
     folders = Folders(on_disk(roots.data), carried, on_disk(roots.data), reporter.line)
-    unready(stages, scenes, roots)
+    left_out = unready(stages, scenes, roots)
+    scenes = [scene for scene in scenes if scene not in left_out]
     made = make_executor(executor, workers, address, folders)
     with roots.data.lock(), Interrupts() as interrupts, made as pool:
         if prepare:
             prepare()
         for stage in stages:
-            scenes = [scene for scene in scenes if not stage.wants(roots, scene)]
             # What the stage before wrote, in whatever process, is to be found.
             roots.data.refresh()
             now = limits if limits and stage is stages[-1] else Limits()
@@ -204,7 +205,7 @@ def _run_stage(
 
 
 def unready(stages: Sequence[Stage], scenes: Sequence[str], roots: Roots) -> dict[str, str]:
-    """Find the scenes that stages leave out, as they want something of their author first.
+    """Find the scenes that stages leave out, as these or what they build on want something of its author first.
 
     Parameters
     ----------
@@ -225,7 +226,17 @@ def unready(stages: Sequence[Stage], scenes: Sequence[str], roots: Roots) -> dic
     AssetError
         None of the scenes would be left.
     """
-    why = {scene: next(filter(None, (stage.wants(roots, scene) for stage in stages)), "") for scene in scenes}
+    needed = {each.name: each for stage in stages for each in upstream(stage.name)}
+
+    def wanting(scene: str) -> str:
+        for stage in needed.values():
+            # What is not made now may have been made before.
+            there = stage not in stages and all(store.shards(roots.data, table, scene) for table in stage.writes)
+            if not there and (why := stage.wants(roots, scene)):
+                return why
+        return ""
+
+    why = {scene: wanting(scene) for scene in scenes}
     left_out = {scene: line for scene, line in why.items() if line}
     if left_out and len(left_out) == len(why):
         raise _together([AssetError(line) for line in left_out.values()])

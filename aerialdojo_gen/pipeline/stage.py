@@ -190,8 +190,8 @@ class Stage:
     sources : callable
         ``(roots, scene) -> list of Path``: files of the scene, outside the store, whose bytes the result depends on.
     wants : callable
-        ``(roots, scene) -> str``: why a scene that is not finished by its author is left out, from this stage on,
-        in a line that names the mend; empty where nothing is wanting.
+        ``(roots, scene) -> str``: why a scene that is not finished by its author is left out of this stage and
+        of those that build on it, in a line that names the mend; empty where nothing is wanting.
     imports : callable
         ``(roots, scene) -> Choice or None``: which modules the scene's work imports of a package by a name made
         at run time; the others' code makes nothing of the scene stale. None where that is not known: all count.

@@ -82,6 +82,13 @@ def test_from_a_mesh_to_tasks_by_what_the_commands_advise_past_a_scene_without_a
     assert shlex.split(advice[0]) == ["aerialdojo-gen", "annotate-draft", "Hamlet", "--pipeline", run[1]]
     by_hand = ["aerialdojo-gen", "annotate", "--scene", "Hamlet", "--pipeline", run[1], "--data", run[3]]
     assert shlex.split(advice[2]) == by_hand
+    # A pipeline whose stages begin later leaves it out as well.
+    later = (place / run[1]).with_name("later.toml")
+    later.write_text((place / run[1]).read_text().replace('"build-scenes", "annotate-import", "anchor-sample", ', ""))
+    assert "annotate-import" not in later.read_text()
+    code, _, err = said(capsys, "run", later, "--data", run[3], "--workers", "1", "--replace")
+    assert code == 0, err
+    assert err.count("left out: Hamlet") == 1
 
 
 def test_what_cannot_be_drafted_says_why_and_what_to_do(place, capsys):
@@ -163,6 +170,8 @@ def test_drafts_are_true_or_silent(place, capsys):
     assert "needs a person" in err
     for name in (mark["name"] for mark in made["landmarks"]):
         assert name not in ("truck", "grey truck", "object"), name
+    # What the crate stands on is not told as under it.
+    assert not any("crate" in entry["description"] for entry in made["objects"] if entry["category"] == "terrace")
     if "lorry_0000" in by_node:
         assert not re.search(r"\bon (top of )?the tower", by_node["lorry_0000"]["description"])
     code, _, err = said(capsys, "annotate-import", "--pipeline", draft[-1], "--data", "data", "--workers", "1")
