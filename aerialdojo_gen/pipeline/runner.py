@@ -226,15 +226,15 @@ def unready(stages: Sequence[Stage], scenes: Sequence[str], roots: Roots) -> dic
     AssetError
         None of the scenes would be left.
     """
-    needed = {each.name: each for stage in stages for each in upstream(stage.name)}
+    before = {each.name: each for stage in stages for each in upstream(stage.name)}
+    inputs = {table for stage in stages for table in stage.reads} - {t for stage in stages for t in stage.writes}
 
     def wanting(scene: str) -> str:
-        for stage in needed.values():
-            # What is not made now may have been made before.
-            there = stage not in stages and all(store.shards(roots.data, table, scene) for table in stage.writes)
-            if not there and (why := stage.wants(roots, scene)):
-                return why
-        return ""
+        why = next(filter(None, (stage.wants(roots, scene) for stage in stages)), "")
+        earlier = next(filter(None, (stage.wants(roots, scene) for stage in before.values())), "")
+        # What stages that do not run now made before, or a release brought along, is enough.
+        made = why or not earlier or all(store.shards(roots.data, table, scene) for table in inputs)
+        return why if made else earlier
 
     why = {scene: wanting(scene) for scene in scenes}
     left_out = {scene: line for scene, line in why.items() if line}
