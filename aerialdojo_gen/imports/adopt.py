@@ -271,7 +271,8 @@ def _named(bodies: Sequence[tuple[RawNode, tuple[Part, ...]]], naming: Naming) -
             continue
         called = naming.called(body.name)
         category = called.category or _category(body)
-        looks = _looks(body, tall, low) | (_form(body) if category == UNKNOWN else {}) | called.attributes
+        looks = _looks(body, tall, low)
+        looks |= (_form(body, looks) if category == UNKNOWN else {}) | called.attributes
         k = counts[category] = counts.get(category, -1) + 1
         out.append(Instance(f"{category}_{k:04d}", category, "", looks, parts))
     return out
@@ -284,20 +285,24 @@ def _category(body: RawNode) -> str:
     return "clutter" if body.name == "clutter" else "slab" if flat else UNKNOWN
 
 
-def _form(body: RawNode) -> dict[str, str]:
-    """Say the form of what has no name, where it has one that a person would name."""
+def _form(body: RawNode, looks: dict[str, str]) -> dict[str, str]:
+    """Say the form of what has no name, as nothing else tells it from others: each has one, and a size."""
     size = body.vertices.max(axis=0) - body.vertices.min(axis=0)
     outline = shapely.convex_hull(shapely.multipoints(body.vertices[:, :2]))
     if outline.area < 1e-6:
         return {}
     around = shapely.minimum_rotated_rectangle(outline)
     filled = outline.area / around.area
-    sides = sorted(math.dist(around.exterior.coords[k], around.exterior.coords[k + 1]) for k in (0, 1))
-    if sides[1] > 1.15 * sides[0]:
-        return {"shape": "flat"} if size[2] < 0.2 * sides[0] else {}
-    # A disc fills 0.785 of the square around it, an octagon 0.828.
-    shape = "round" if 0.76 < filled < 0.84 else "square" if filled > 0.95 else ""
-    return {"shape": shape} if shape else {}
+    short, long = sorted(math.dist(around.exterior.coords[k], around.exterior.coords[k + 1]) for k in (0, 1))
+    if long > 3.0 * short:
+        plan = "long"
+    elif long > 1.15 * short:
+        plan = "oblong" if filled > 0.9 else "irregular"
+    else:
+        # A disc fills 0.785 of the square around it, an octagon 0.828.
+        plan = "square" if filled > 0.95 else "round" if 0.76 < filled < 0.84 else "irregular"
+    rise = "flat " if size[2] < 0.25 * short else "upright " if size[2] > 2.0 * long else ""
+    return {"size": looks.get("size", "medium-sized"), "shape": f"{rise}{plan}"}
 
 
 def _looks(body: RawNode, tall: float, low: float) -> dict[str, str]:

@@ -14,6 +14,9 @@ from support.command_line import said
 from aerialdojo_gen.annotations.number import group_of
 from aerialdojo_gen.imports.naming import words_in
 
+# What stands there without a name: a drum and a box.
+FORMS = ("round", "square")
+
 
 def pasted(text: str, begin: str) -> list[str]:
     """The arguments of the command that a line advises."""
@@ -166,7 +169,7 @@ def test_drafts_are_true_or_silent(place, capsys):
     by_node = {entry["node"]: entry for entry in made["objects"]}
     assert {entry["category"] for entry in made["objects"]} >= {"truck", "object"}
     shapes = {entry["name"] for entry in made["objects"] if entry["category"] == "object"}
-    assert shapes <= {f"{size}{shape} grey object" for size in ("", "low ", "tall ") for shape in ("round", "square")}
+    assert shapes <= {f"{size} {form} grey object" for size in ("low", "medium-sized", "tall") for form in FORMS}
     assert "needs a person" in err
     for name in (mark["name"] for mark in made["landmarks"]):
         assert name not in ("truck", "grey truck", "object"), name
