@@ -23,7 +23,7 @@ from aerialdojo_gen.commands import (
     stages,
     validate,
 )
-from aerialdojo_gen.common import trouble
+from aerialdojo_gen.common import advice, trouble
 from aerialdojo_gen.errors import AerialDojoError
 
 
@@ -35,6 +35,11 @@ class _Commands(TyperGroup):
         rows = [(name, (self.commands[name].help or "").partition("\n\n")[0]) for name in self.list_commands(ctx)]
         with formatter.section("Commands"):
             formatter.write_dl(rows)
+
+    def invoke(self, ctx: Any) -> Any:
+        """Run the command, with nothing kept of another one."""
+        advice.begin(sys.argv[0])
+        return super().invoke(ctx)
 
 
 app = typer.Typer(

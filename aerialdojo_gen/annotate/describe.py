@@ -11,6 +11,7 @@ import numpy as np
 from aerialdojo_gen.annotations.ambiguity import nearest_landmark
 from aerialdojo_gen.annotations.appearance import Looks
 from aerialdojo_gen.annotations.check import check_source
+from aerialdojo_gen.annotations.describing import UNKNOWN
 from aerialdojo_gen.annotations.format import Annotations, Object, format_annotations, parse_annotations
 from aerialdojo_gen.annotations.relations import SceneGeometry
 from aerialdojo_gen.scenes.model import Scene
@@ -71,6 +72,7 @@ class Describer:
 
     def _object(self, annotations: Annotations, entry: Object, faults: list[dict[str, str]]) -> dict[str, Any]:
         lacks = [key for key in ("name", "category", "description") if not getattr(entry, key).strip()]
+        lacks += ["person"] if entry.category == UNKNOWN else []
         lacks += ["check"] if any(fault["field"] not in lacks for fault in faults) else []
         return {
             **entry.model_dump(),

@@ -18,6 +18,7 @@ from aerialdojo_gen.annotations.relations import SceneGeometry
 from aerialdojo_gen.store.schemas import DIRECTIONS
 
 RIVAL_SLACK = 1.35
+GROUP = "group"  # what makes one thing of a plural: no value
 PLACE = "place"  # the attribute by which a layout says where a thing is
 
 _TOKEN = re.compile(r"[a-z0-9']+|[,.;:!?()]")
@@ -198,7 +199,7 @@ class Lexicon:
         things |= {name.lower(): frozenset([i]) for name, i in landmarks.items()}
         given = [item for attributes in self._attributes for item in attributes.items()]
         where = {value.lower() for key, value in given if key == PLACE and places is not None}
-        values = {value for key, value in given if places is None or key != PLACE}
+        values = {value for key, value in given if (places is None or key != PLACE) and key != GROUP}
         for key, value in given:
             if value in values:
                 self._keys_of.setdefault(value.lower(), set()).add(key)

@@ -15,6 +15,7 @@ from aerialdojo_gen.annotations.colours import uncoloured
 from aerialdojo_gen.annotations.compose import compose
 from aerialdojo_gen.annotations.facts import Fact, FactFinder
 from aerialdojo_gen.annotations.format import Landmark
+from aerialdojo_gen.annotations.number import group_of
 from aerialdojo_gen.annotations.phrases import Words, noun_of, place_of, words_of
 from aerialdojo_gen.common.rng import generator
 from aerialdojo_gen.scenes.catalogue import Catalogue
@@ -25,6 +26,8 @@ from aerialdojo_gen.scenes.model import Instance, Scene
 STAGE = "annotate-draft"
 # What an imported mesh has and nobody looks for.
 NO_THING = frozenset({"ground", "clutter", "slab", "terrain"})
+# The category of what is imported without a name: a person has to say what it is.
+UNKNOWN = "object"
 _MOST_FACTS = 4
 _TRIES = 18
 _MOST_WORDS = 60
@@ -57,7 +60,10 @@ class Vocabulary:
                 targets |= {i.category}
             if i.category not in by_category:
                 name, kind = self.names.get(i.category), self.kinds.get(i.category, "")
-                by_category[i.category] = words_of(i.category, name, kind, (), i.category in targets)
+                words = words_of(i.category, name, kind, (), i.category in targets)
+                if scene.imported and not words.group:
+                    words = replace(words, group=group_of(words.name))
+                by_category[i.category] = words
         self.words = [by_category[i.category] for i in scene.instances]
         self.nouns = [noun_of(self._honest(i), w) for i, w in zip(scene.instances, self.words, strict=True)]
         self.callings = Callings(self.names)
@@ -153,7 +159,15 @@ class Teller:
                 for look in (look for look in words.looks if look in text):
                     self._used[look] = self._used.get(look, 0) + 1
                 return text
-        return None
+        return self._bare(i, name, others) if self._scene.imported else None
+
+    def _bare(self, i: int, name: str, others: Collection[str]) -> str | None:
+        """Describe what nothing can be said of but what it is, where that tells it from all of its kind."""
+        noun, words = self._vocabulary.nouns[i], self._vocabulary.words[i]
+        alone = not any(self._scene.instances[j].category not in NO_THING for j in self._finder.near(i))
+        texts = [f"Look for {noun.a()}, {words.participle} by itself."] if alone else []
+        texts.append(f"Look for {noun.a()}.")
+        return next((text for text in texts if text not in others and self._good(i, name, text)), None)
 
     def _good(self, i: int, name: str, text: str) -> bool:
         ambiguity, instance = self.ambiguity, self._scene.instances[i]

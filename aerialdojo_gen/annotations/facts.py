@@ -92,11 +92,17 @@ class FactFinder:
         for a, j in enumerate(things[:6]):
             for k in things[a + 1 : 6]:
                 texts = self._thing(i, j), self._thing(i, k)
+                if self._geometry.scene.imported and 0.0 in (gaps[j], gaps[k]):
+                    continue
                 if texts[0] != texts[1] and self._geometry.between(i, j, k, _TIGHT):
                     weight = 1.2 * min(self._weight(i, j), self._weight(i, k))
                     found += self._checked(i, "between {} and {}".format(*texts), weight, (j, k))
         keyed = [(-fact.weight * float(rng.uniform(0.8, 1.25)), k, fact) for k, fact in enumerate(found)]
         return [fact for _, _, fact in sorted(keyed, key=lambda item: item[:2])]
+
+    def near(self, i: int) -> list[int]:
+        """List the instances within the reach of facts about instance `i`, by index."""
+        return self._geometry.around(i, _REACH_M)
 
     def _may_refer(self, i: int, j: int) -> bool:
         size = self._geometry.boxes[j, 1] - self._geometry.boxes[j, 0]
@@ -115,9 +121,12 @@ class FactFinder:
         geometry, weight, thing = self._geometry, self._weight(i, j), self._thing(i, j)
         found: list[Fact] = []
         touching = geometry.support(i) == j or j in geometry.covers(i)
-        if geometry.support(i) == j:
+        imported = geometry.scene.imported
+        if imported and not touching and geometry.gap_m(i, j) == 0.0:
+            return []  # one goes through the other, or is a part of it: nobody says where that stands by it
+        if geometry.support(i) == j and (not imported or geometry.rests_on(i, j)):
             found += self._checked(i, self._word("on", rng).format(thing), 3.0 * weight, (j,))
-        if j in geometry.covers(i):
+        if j in geometry.covers(i) and not (imported and geometry.support(j) == i):
             found += self._checked(i, self._word("under", rng).format(thing), 2.0 * weight, (j,))
         if not touching and geometry.beside(i, j, _TIGHT):
             found += self._checked(i, self._word("beside", rng).format(thing), 1.5 * weight, (j,))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from itertools import pairwise
 from pathlib import Path
@@ -15,6 +15,8 @@ from aerialdojo_gen.scenes.model import Instance
 # Said before the noun, in the order of English: a small rotten brown wooden bench.
 _ADJECTIVES = ("size", "state", "pattern", "shape", "colour", "material")
 _PLACE = "place"
+# How an imported thing is called (see `aerialdojo_gen.imports.naming`): no adjectives.
+_NAMING = frozenset({"called", "group"})
 _AFTER_NOUN = frozenset({"down", "up", "open", "closed", "raised", "lowered", "covered", "folded", "lit", "shut"})
 _OPENERS = frozenset({"showing", "carrying", "leaning", "facing", "selling", "holding", "wearing", "half-buried"})
 _LETTERED = frozenset({"sign", "billboard", "board", "arch", "banner"})
@@ -165,12 +167,15 @@ def noun_of(instance: Instance, words: Words) -> Noun:
     Noun
         ``a red delivery van with a white stripe``.
     """
+    called, group = (instance.attributes.get(key, "") for key in ("called", "group"))
+    if called or group:
+        words = replace(words, name=called or words.name, group=group or words.group)
     before: list[str] = []
     after: list[str] = []
-    rest = [k for k in instance.attributes if k not in _ADJECTIVES and k != _PLACE]
+    rest = [k for k in instance.attributes if k not in _ADJECTIVES and k != _PLACE and k not in _NAMING]
     for key in (*_ADJECTIVES, *rest):
         value = instance.attributes.get(key)
-        others = [v for k, v in instance.attributes.items() if k != key and k != _PLACE]
+        others = [v for k, v in instance.attributes.items() if k != key and k != _PLACE and k not in _NAMING]
         if not value or value in words.name.split() or any(value in v.split() for v in others):
             continue
         said = _said(key, value)

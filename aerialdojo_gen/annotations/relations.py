@@ -32,6 +32,7 @@ FRONT_DEG = 60.0
 _LARGE_M = 10.0  # above it a thing's outline is its projected mesh; below, the convex hull is as good and cheaper
 _MANY_FACES = 20_000
 _TOUCH_M = 0.35
+_HELD = 3  # of five places below a thing
 
 
 class SceneGeometry:
@@ -107,6 +108,18 @@ class SceneGeometry:
                         best = (float(below.max()), j)
             self._supports[i] = None if best is None else best[1]
         return self._supports[i]
+
+    def rests_on(self, i: int, j: int) -> bool:
+        """Whether `j` carries `i` from below over an area, and does not rise beside it: a truck is not on a tower."""
+        low = float(self.boxes[i, 0, 2])
+        if float(self.boxes[j, 1, 2]) > low + LEVEL_M:
+            return False
+        held = 0
+        for x, y in self.probes(i):
+            own, under = self._heights(i, x, y), self._heights(j, x, y)
+            foot = float(own.min()) if len(own) else math.inf
+            held += foot <= low + _TOUCH_M and bool((np.abs(under - foot) <= _TOUCH_M).any())
+        return held >= _HELD
 
     def covers(self, i: int) -> frozenset[int]:
         """The instances that have a surface overhead, at most `COVER_M` above an instance's top."""

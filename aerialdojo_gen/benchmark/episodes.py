@@ -10,6 +10,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
+from aerialdojo_gen.common.advice import command
 from aerialdojo_gen.common.names import unknown
 from aerialdojo_gen.errors import StoreError
 from aerialdojo_gen.store import schemas
@@ -60,7 +61,7 @@ def read_run(data: Where, run: str, table: str = "episodes", columns: Sequence[s
     scenes = run_scenes(root, run)
     if not scenes:
         raise StoreError(f"{unknown(f'in {root} there is no run', run, runs(root))}; "
-                         f"aerialdojo-gen evaluate --run {run} makes it")  # fmt: skip
+                         f"{command('evaluate', run=run)} makes it")  # fmt: skip
     return pa.concat_tables([store.read_scene(root, table, scene, columns, run=run) for scene in scenes])
 
 

@@ -12,6 +12,7 @@ from aerialdojo_gen.benchmark.eyes import look
 from aerialdojo_gen.benchmark.motion import FlightSpace, flight_space
 from aerialdojo_gen.benchmark.tasks import Task, check_tell, goal_of, mesh_of
 from aerialdojo_gen.benchmark.viewpoints import View, nodes_of, viewed, viewpoints_of
+from aerialdojo_gen.common.advice import command
 from aerialdojo_gen.config.agreement import SUCCESS_RADIUS_M
 from aerialdojo_gen.config.sections import Embodiment
 from aerialdojo_gen.errors import StoreError
@@ -103,7 +104,10 @@ class Flight:
             return None
         node = nodes_of(self._data, scene).get(task.target_id)
         if node is None:
-            raise StoreError(f"object {task.target_id} of {scene} is not in {self._data}/release: run split again")
+            raise StoreError(
+                f"object {task.target_id} of {scene} is not in {self._data}/release: "
+                f"run {command('split', scene=scene)}"
+            )
         own = viewpoints.get(task.target_id, _NONE)
         return viewed(self.space.scene, node, own, task.goal, self.episode.position)
 

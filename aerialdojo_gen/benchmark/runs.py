@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from aerialdojo_gen.benchmark.episodes import has_table, read_run, runs
 from aerialdojo_gen.benchmark.metrics import Bools, Episodes, Floats, episodes_of
 from aerialdojo_gen.benchmark.swept import STEP_COLUMNS, swept_distances
+from aerialdojo_gen.common.advice import command
 from aerialdojo_gen.errors import StoreError
 from aerialdojo_gen.store.root import DataRoot, Where, open_root
 from aerialdojo_gen.store.schemas import TERMINATIONS
@@ -98,13 +99,13 @@ def load_runs(data: Where, names: Sequence[str] = ()) -> list[Run]:
     if not names:
         tables = {name: table for name, table in tables.items() if table.num_rows}
     if not tables:
-        raise StoreError(f"no runs in {root}: run aerialdojo-gen evaluate")
+        raise StoreError(f"no runs in {root}: run {command('evaluate')}")
     for name, table in tables.items():
         if not table.num_rows:
             failed = read_run(root, name, "failures").num_rows
             said = f", and {failed:,} that failed: fly them again with" if failed else ": run"
-            more = " --rerun-failed" if failed else ""
-            raise StoreError(f"run {name!r} has no finished episode{said} aerialdojo-gen evaluate --run {name}{more}")
+            again = command("evaluate", run=name, rerun_failed=bool(failed))
+            raise StoreError(f"run {name!r} has no finished episode{said} {again}")
     agents = [table["agent"][0].as_py() for table in tables.values()]
     told = [table["told"][0].as_py() or "" for table in tables.values()]
     # Who was told more is another contender.

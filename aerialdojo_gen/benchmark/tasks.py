@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from aerialdojo_gen.agents.goal import TELLABLE, Goal, Heading, Rules
 from aerialdojo_gen.benchmark.motion import Point
 from aerialdojo_gen.common import rng
+from aerialdojo_gen.common.advice import command
 from aerialdojo_gen.common.names import unknown
 from aerialdojo_gen.common.pictures import decode_rgb
 from aerialdojo_gen.errors import StoreError, UsageError
@@ -186,7 +187,9 @@ def read_tasks(data: Where, rows: pa.Table) -> list[Task]:
     for row in rows.to_pylist():
         fact = _facts(root, row["scene"], row["subset"]).get(row["nav_id"])
         if fact is None:
-            raise StoreError(f"task {row['task_id']} has no route in {root}/release: run aerialdojo-gen split again")
+            raise StoreError(
+                f"task {row['task_id']} has no route in {root}/release: run {command('split', scene=row['scene'])}"
+            )
         *goal, euclidean_m, length_m, target_id = fact
         tasks.append(Task(row, (goal[0], goal[1], goal[2]), euclidean_m, length_m, int(target_id)))
     return tasks
@@ -257,7 +260,10 @@ def reference_image(root: DataRoot, scene: str, image_id: str) -> NDArray[np.uin
     """
     picture = decode_rgb(_pictures(root, scene).get(image_id))
     if picture is None:
-        raise StoreError(f"reference image {image_id} of {scene} is not in {root}/release/objects: run split again")
+        raise StoreError(
+            f"reference image {image_id} of {scene} is not in {root}/release/objects: "
+            f"run {command('split', scene=scene)}"
+        )
     picture.setflags(write=False)
     return picture
 
@@ -284,4 +290,4 @@ def mesh_of(root: DataRoot, scene: str) -> tuple[Path, str]:
         return mesh_copy(root, row["mesh_path"]), row["mesh_sha256"]
     except FileNotFoundError:
         told = root.at(row["mesh_path"])
-        raise StoreError(f"the mesh {told} is missing: run aerialdojo-gen build-scenes --scene {scene}") from None
+        raise StoreError(f"the mesh {told} is missing: run {command('build-scenes', scene=scene)}") from None

@@ -13,6 +13,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 from numpy.typing import NDArray
 
+from aerialdojo_gen.common.advice import command
 from aerialdojo_gen.common.names import closest, unknown
 from aerialdojo_gen.errors import AssetError, StoreError, UsageError
 from aerialdojo_gen.planning.collision import collision_world
@@ -57,7 +58,9 @@ class ReleasedScene:
         """The row of `scenes`."""
         rows = self._rows("scenes")
         if len(rows) != 1:
-            raise StoreError(f"release/scenes has {len(rows)} rows of {self.name}: run aerialdojo-gen split")
+            raise StoreError(
+                f"release/scenes has {len(rows)} rows of {self.name}: run {command('split', scene=self.name)}"
+            )
         return rows[0]
 
     @cached_property
@@ -106,7 +109,7 @@ class ReleasedScene:
             path = mesh_copy(self.root, told)
         except FileNotFoundError:
             raise AssetError(
-                f"the mesh {self.root.at(told)} is missing: run aerialdojo-gen build-scenes --scene {self.name}"
+                f"the mesh {self.root.at(told)} is missing: run {command('build-scenes', scene=self.name)}"
             ) from None
         return open_scene(path, self.row["mesh_sha256"], SEVERAL).scene
 
@@ -208,6 +211,7 @@ def find_task(data: Where, task_id: str) -> FoundTask:
     instances = scene.instances(nav_id)
     if not instances:
         raise StoreError(
-            f"release/tasks has no instance of {nav_id}, which release/routes has: run aerialdojo-gen split"
+            f"release/tasks has no instance of {nav_id}, which release/routes has: "
+            f"run {command('split', scene=scene.name)}"
         )
     return FoundTask(scene, nav_id, scene.route(nav_id), instances)

@@ -7,10 +7,11 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from aerialdojo_gen.common import advice
 from aerialdojo_gen.pipeline.run import DEFAULT_PIPELINE, default_workers, home, open_pipeline, run_stages
 
 if TYPE_CHECKING:
@@ -21,10 +22,19 @@ if TYPE_CHECKING:
 
 __all__ = ["DEFAULT_PIPELINE", "default_workers", "home", "open_pipeline", "run_chosen", "run_until"]
 
+
+def kept(ctx: typer.Context, param: typer.CallbackParam, value: Any) -> Any:
+    """Keep what is written on the command line (not what the environment says) for the advice of messages."""
+    source = ctx.get_parameter_source(str(param.name))
+    if source is not None and source.name == "COMMANDLINE":
+        advice.remember(**{str(param.name): value})
+    return value
+
+
 Data = Annotated[
     str,
     typer.Option(
-        "--data", metavar="DIR|URL", envvar="AERIALDOJO_DATA",
+        "--data", metavar="DIR|URL", envvar="AERIALDOJO_DATA", callback=kept,
         help="Data directory or s3://bucket/prefix: tables, meshes, release.",
     ),
 ]  # fmt: skip
@@ -32,7 +42,11 @@ Scene = Annotated[
     list[str] | None, typer.Option("--scene", help="Scene or glob, repeatable: --scene 'U_*'.  (default: all)")
 ]
 PipelineFile = Annotated[
-    Path | None, typer.Option("--pipeline", help=f"Pipeline file.  (default: pipelines/{DEFAULT_PIPELINE})")
+    Path | None,
+    typer.Option("--pipeline", callback=kept, help=f"Pipeline file.  (default: pipelines/{DEFAULT_PIPELINE})"),
+]
+PipelineArgument = Annotated[
+    Path, typer.Argument(metavar="PIPELINE", callback=kept, help="Pipeline file, e.g. pipelines/smoke.toml.")
 ]
 Workers = Annotated[int | None, typer.Option("--workers", min=1, max=1024, help="Processes.  (default: all cores)")]
 ExecutorName = Annotated[

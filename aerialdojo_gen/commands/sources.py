@@ -7,9 +7,17 @@ from typing import Annotated
 
 import typer
 
-from aerialdojo_gen.commands.common import Data, PipelineFile, Scene, open_pipeline
+from aerialdojo_gen.commands.common import Data, PipelineFile, Quiet, Scene, open_pipeline
+from aerialdojo_gen.common import advice
 
 app = typer.Typer()
+
+
+def _number_or_auto(value: str | None) -> str | None:
+    """Take a number from 2 on, or ``auto``."""
+    if value is None or value == "auto" or (value.isascii() and value.isdigit() and 2 <= int(value[:9]) < 10**6):
+        return value
+    raise typer.BadParameter(f"{value[:40]!r} is neither auto nor a number from 2 on")
 
 
 @app.command("add-scene")
@@ -26,13 +34,25 @@ def add_scene(
     ceiling: Annotated[
         float | None, typer.Option(help="Highest z to fly at, metres.  (default: 6 m over all)")
     ] = None,
+    names: Annotated[
+        Path | None, typer.Option(help="CSV of what nodes are called: pattern,name,category,plural.")
+    ] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace a scene of this name.")] = False,
 ) -> None:
     """Make a scene of a mesh of your own."""
     from aerialdojo_gen.imports import command
 
     added = command.add_scene(
-        name, mesh, project, up=up, scale=scale, annotations=annotations, crop_m=crop, ceiling_m=ceiling, force=force
+        name,
+        mesh,
+        project,
+        up=up,
+        scale=scale,
+        annotations=annotations,
+        crop_m=crop,
+        ceiling_m=ceiling,
+        names=names,
+        force=force,
     )
     size = added.scene.bounds[1] - added.scene.bounds[0]
     print(
@@ -42,15 +62,24 @@ def add_scene(
     for line in added.repairs.lines:
         print(f"  {line}")
     if not added.annotations.exists():
-        print(f"next: aerialdojo-gen annotate-draft {name} --pipeline {added.pipeline} --landmarks 2 --objects 20")
-    print(f"then: aerialdojo-gen run {added.pipeline} --data {project / 'data'}")
+        print(f"next: {advice.command('annotate-draft', name, pipeline=added.pipeline)}")
+    print(f"then: {advice.command('run', added.pipeline, data=project / 'data')}")
 
 
 @app.command("annotate-draft")
 def annotate_draft(
     scene: Annotated[str, typer.Argument(help="Scene with a recipe, e.g. U_Mall_0.")],
-    landmarks: Annotated[int | None, typer.Option(min=1, help="How many.  (default: the paper's number)")] = None,
-    objects: Annotated[int | None, typer.Option(min=2, help="How many.  (default: the paper's number)")] = None,
+    landmarks: Annotated[
+        int | None, typer.Option(min=1, help="How many.  (default: the paper's number, else 1 or 2)")
+    ] = None,
+    objects: Annotated[
+        str | None,
+        typer.Option(
+            metavar="N|auto",
+            callback=_number_or_auto,
+            help="How many; auto takes what there is, up to 20.  (default: the paper's number, else auto)",
+        ),
+    ] = None,
     centre: Annotated[
         tuple[float, float] | None, typer.Option(help="Middle of the core, x y in metres.  (default: the landmarks')")
     ] = None,
@@ -58,7 +87,13 @@ def annotate_draft(
     core_share: Annotated[float, typer.Option(min=0, max=1, help="Share of the objects that lie in the core.")] = 1.0,
     aloft: Annotated[float, typer.Option(min=0, max=1, help="Share of the core's objects from 3 m up.")] = 0.0,
     plants: Annotated[int, typer.Option(min=0, help="Most objects of one category of vegetation.")] = 3,
-    most: Annotated[int, typer.Option(min=1, help="Most objects of any other category.")] = 5,
+    most: Annotated[
+        int | None,
+        typer.Option(
+            min=1,
+            help="Most objects of any other category.  (default: 5, more in a scene of few categories of your own)",
+        ),
+    ] = None,
     landmark: Annotated[list[str] | None, typer.Option(help="Node that is to be a landmark, repeatable.")] = None,
     seed: Annotated[int, typer.Option(min=0, help="The same seed gives the same draft.")] = 0,
     pipeline: PipelineFile = None,
@@ -66,10 +101,12 @@ def annotate_draft(
     keep_objects: Annotated[
         bool, typer.Option("--keep-objects", help="Keep the file's objects and names, describe them anew.")
     ] = False,
+    quiet: Quiet = False,
 ) -> None:
     """Draft a scene's annotations, to be checked and owned as sources."""
     from aerialdojo_gen.annotate.drafting import draft_scene
     from aerialdojo_gen.annotations.draft import Choice
+    from aerialdojo_gen.pipeline.progress import Reporter
     from aerialdojo_gen.pipeline.runner import chosen_scenes
 
     config, roots = open_pipeline(pipeline, Path("data"))
@@ -78,8 +115,10 @@ def annotate_draft(
         centre_m=centre, within_m=within, core_share=core_share, aloft_share=aloft, most_vegetation=plants, most=most
     )
     path = draft_scene(
-        scene, config, roots, n_landmarks=landmarks, n_objects=objects, choice=choice,
-        landmarks=tuple(landmark or ()), seed=seed, force=force, keep_objects=keep_objects,
+        scene, config, roots, n_landmarks=landmarks,
+        n_objects=int(objects) if objects and objects != "auto" else objects,
+        choice=choice, landmarks=tuple(landmark or ()), seed=seed, force=force, keep_objects=keep_objects,
+        reporter=Reporter(quiet=quiet),
     )  # fmt: skip
     print(path)
 

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from pathlib import Path
-from typing import Annotated
 
 import typer
 
@@ -13,6 +11,7 @@ from aerialdojo_gen.commands.common import (
     Data,
     ExecutorName,
     Force,
+    PipelineArgument,
     PipelineFile,
     Quiet,
     Replace,
@@ -64,7 +63,7 @@ def split(
 
 @app.command("run")
 def run(
-    pipeline: Annotated[Path, typer.Argument(help="Pipeline file, e.g. pipelines/smoke.toml.")],
+    pipeline: PipelineArgument,
     data: Data = "data", scene: Scene = None,
     workers: Workers = None, force: Force = False, quiet: Quiet = False, replace: Replace = False,
     executor: ExecutorName = "local", address: Address = None,

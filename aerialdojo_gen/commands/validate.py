@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from aerialdojo_gen.commands.common import Address, ExecutorName, PipelineFile, Quiet, Scene, Workers, home
+from aerialdojo_gen.commands.common import Address, ExecutorName, PipelineFile, Quiet, Scene, Workers, home, kept
 
 app = typer.Typer()
 _MANY_DIGITS = 10
@@ -21,7 +21,7 @@ def validate(
     data: Annotated[
         str,
         typer.Option(
-            "--data", metavar="DIR|URL", envvar="AERIALDOJO_DATA",
+            "--data", metavar="DIR|URL", envvar="AERIALDOJO_DATA", callback=kept,
             help="Data directory or s3://bucket/prefix, or the release itself.",
         ),
     ] = "data",

@@ -14,6 +14,7 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
+from aerialdojo_gen.common.advice import command
 from aerialdojo_gen.errors import StoreError
 from aerialdojo_gen.exchange.actions import words_of
 from aerialdojo_gen.exchange.aerialdojo_layout import (
@@ -198,7 +199,7 @@ class _Pictures:
             picture = self._objects[object_id]["reference_image"]
             if picture is None:
                 raise StoreError(f"object {object_id} of {self._scene} has no reference image: "
-                                 f"run aerialdojo-gen split --scene {self._scene}")  # fmt: skip
+                                 f"run {command('split', scene=self._scene)}")  # fmt: skip
             path.write_bytes(self._draw.picture(object_id) if self._draw else picture)
             self._first[object_id] = path
             return

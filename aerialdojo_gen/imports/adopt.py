@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+import shapely
 import trimesh
 from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from aerialdojo_gen.annotations.describing import UNKNOWN
 from aerialdojo_gen.errors import AssetError
+from aerialdojo_gen.imports.naming import Naming
 from aerialdojo_gen.imports.raw import RawNode, in_place_order, joined
 from aerialdojo_gen.scenes.catalogue import single
 from aerialdojo_gen.scenes.mesh import areas
@@ -57,6 +59,7 @@ def adopt(
     scale: float = 1.0,
     crop_m: tuple[float, float, float] | None = None,
     ceiling_m: float | None = None,
+    naming: Naming | None = None,
 ) -> tuple[Scene, Repairs]:
     """Make a scene of a foreign mesh.
 
@@ -74,6 +77,8 @@ def adopt(
         Keep what has its middle within a circle, metres, in the file's axes after `up` and `scale`.
     ceiling_m : float, optional
         Highest z that a drone may fly at; 6 m above the highest point, at least 12 m, where absent.
+    naming : Naming, optional
+        What nodes are called; the words in their names where absent.
 
     Returns
     -------
@@ -107,7 +112,7 @@ def adopt(
     shift = np.array([(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, low[2]])
     bodies = _merged_clutter([RawNode(b.name, b.vertices - shift, b.faces, b.colours) for b in bodies])
     parts: dict[str, Material] = {}
-    instances = _named([(b, _parts(b, parts, repairs)) for b in bodies])
+    instances = _named([(b, _parts(b, parts, repairs)) for b in bodies], naming or Naming())
     low, high = low - shift, high - shift
     if not instances:
         raise AssetError("no triangle is left after repair: the mesh is empty or degenerate")
@@ -255,7 +260,7 @@ def _parts(body: RawNode, materials: dict[str, Material], repairs: Repairs) -> t
     return tuple(parts)
 
 
-def _named(bodies: Sequence[tuple[RawNode, tuple[Part, ...]]]) -> list[Instance]:
+def _named(bodies: Sequence[tuple[RawNode, tuple[Part, ...]]], naming: Naming) -> list[Instance]:
     """Give every body a node name, a category from it, and what can be said of its colour, height and form."""
     counts: dict[str, int] = {}
     heights = [float(b.vertices[:, 2].max() - b.vertices[:, 2].min()) for b, parts in bodies if parts]
@@ -264,22 +269,40 @@ def _named(bodies: Sequence[tuple[RawNode, tuple[Part, ...]]]) -> list[Instance]
     for body, parts in bodies:
         if not parts:
             continue
-        category = _category(body)
+        called = naming.called(body.name)
+        category = called.category or _category(body)
+        looks = _looks(body, tall, low)
+        looks |= (_form(body, looks) if category == UNKNOWN else {}) | called.attributes
         k = counts[category] = counts.get(category, -1) + 1
-        out.append(Instance(f"{category}_{k:04d}", category, "", _looks(body, tall, low), parts))
+        out.append(Instance(f"{category}_{k:04d}", category, "", looks, parts))
     return out
 
 
 def _category(body: RawNode) -> str:
-    """Read a category from a node's name: ``"Building.012"`` and ``"building_12"`` are both a building."""
-    words = re.sub(r"([a-z])([A-Z])", r"\1 \2", body.name)
-    words = re.sub(r"[^a-z]+", "_", words.lower()).strip("_")[:40].strip("_")
-    if words and words not in ("geometry", "mesh", "object", "node", "group", "default"):
-        return words
+    """The category of a body whose name tells nothing: flat and wide is no thing to look for."""
     size = body.vertices.max(axis=0) - body.vertices.min(axis=0)
-    if size[2] < 0.05 * max(size[0], size[1]) or (size[2] < 1.0 and max(size[:2]) > 10.0):
-        return "slab"
-    return "structure" if size[2] > 3.0 else "block"
+    flat = size[2] < 0.05 * max(size[0], size[1]) or (size[2] < 1.0 and max(size[:2]) > 10.0)
+    return "clutter" if body.name == "clutter" else "slab" if flat else UNKNOWN
+
+
+def _form(body: RawNode, looks: dict[str, str]) -> dict[str, str]:
+    """Say the form of what has no name, as nothing else tells it from others: each has one, and a size."""
+    size = body.vertices.max(axis=0) - body.vertices.min(axis=0)
+    outline = shapely.convex_hull(shapely.multipoints(body.vertices[:, :2]))
+    if outline.area < 1e-6:
+        return {}
+    around = shapely.minimum_rotated_rectangle(outline)
+    filled = outline.area / around.area
+    short, long = sorted(math.dist(around.exterior.coords[k], around.exterior.coords[k + 1]) for k in (0, 1))
+    if long > 3.0 * short:
+        plan = "long"
+    elif long > 1.15 * short:
+        plan = "oblong" if filled > 0.9 else "irregular"
+    else:
+        # A disc fills 0.785 of the square around it, an octagon 0.828.
+        plan = "square" if filled > 0.95 else "round" if 0.76 < filled < 0.84 else "irregular"
+    rise = "flat " if size[2] < 0.25 * short else "upright " if size[2] > 2.0 * long else ""
+    return {"size": looks.get("size", "medium-sized"), "shape": f"{rise}{plan}"}
 
 
 def _looks(body: RawNode, tall: float, low: float) -> dict[str, str]:

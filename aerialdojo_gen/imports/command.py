@@ -11,6 +11,7 @@ from aerialdojo_gen.annotations.format import parse_annotations
 from aerialdojo_gen.errors import AnnotationError, AssetError, UsageError, brief
 from aerialdojo_gen.imports.adopt import Repairs, adopt
 from aerialdojo_gen.imports.files import read_mesh
+from aerialdojo_gen.imports.naming import read_names
 from aerialdojo_gen.pipeline.registry import STAGES
 from aerialdojo_gen.scenes.glb import write_glb
 from aerialdojo_gen.scenes.model import Scene
@@ -52,6 +53,7 @@ def add_scene(
     annotations: Path | None = None,
     crop_m: tuple[float, float, float] | None = None,
     ceiling_m: float | None = None,
+    names: Path | None = None,
     force: bool = False,
 ) -> Added:
     """Make a scene of a mesh file, in a project folder.
@@ -77,6 +79,8 @@ def add_scene(
         Keep a part, metres.
     ceiling_m : float, optional
         Highest z that a drone may fly at.
+    names : Path, optional
+        A table of what the file's nodes are called (`aerialdojo_gen.imports.naming.read_names`).
     force : bool
         Replace a scene of this name.
 
@@ -97,9 +101,12 @@ def add_scene(
     recipe = project / "scenes" / f"{name}.toml"
     if recipe.exists() and not force:
         raise UsageError(f"{recipe} exists: --force replaces the scene")
+    naming = None if names is None else read_names(names)
     text = None if annotations is None else _annotations(annotations, name)
     try:
-        scene, repairs = adopt(name, read_mesh(mesh), up=up, scale=scale, crop_m=crop_m, ceiling_m=ceiling_m)
+        scene, repairs = adopt(
+            name, read_mesh(mesh), up=up, scale=scale, crop_m=crop_m, ceiling_m=ceiling_m, naming=naming
+        )
     except AssetError as error:
         message = str(error)
         raise AssetError(message if message.startswith(str(mesh)) else f"{mesh}: {message}") from None

@@ -5,11 +5,14 @@ Nothing heavy is imported before something runs: the command line imports this f
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterable, Sequence
+from dataclasses import replace as replaced
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from aerialdojo_gen.errors import ConfigError
+from aerialdojo_gen.common import advice
+from aerialdojo_gen.errors import AssetError, ConfigError
 
 if TYPE_CHECKING:
     from aerialdojo_gen.config.pipeline import Pipeline
@@ -18,6 +21,8 @@ if TYPE_CHECKING:
     from aerialdojo_gen.pipeline.runner import StageSummary
     from aerialdojo_gen.pipeline.stage import Roots, Stage
     from aerialdojo_gen.store.root import DataRoot
+
+log = logging.getLogger(__name__)
 
 DEFAULT_PIPELINE = "aerialdojo-200k.toml"
 
@@ -82,10 +87,14 @@ def run_pipeline(
     else:
         needed = {stage.name for asked in stages_named(stages) for stage in upstream(asked.name)}
         chosen = stages_named([*needed])
-    return run_stages(
-        chosen, config, roots, scenes, workers=workers, executor=executor, address=address, force=force,
-        reporter=reporter, limits=limits, replace=replace,
-    )  # fmt: skip
+    given = advice.given()
+    given = replaced(given, pipeline=str(pipeline) if isinstance(pipeline, (str, Path)) else given.pipeline)
+    given = replaced(given, data=str(data) if isinstance(data, (str, Path)) and str(data) != "data" else given.data)
+    with advice.as_given(given):
+        return run_stages(
+            chosen, config, roots, scenes, workers=workers, executor=executor, address=address, force=force,
+            reporter=reporter, limits=limits, replace=replace,
+        )  # fmt: skip
 
 
 def home() -> Path:
@@ -150,10 +159,15 @@ def run_stages(
 ) -> list[StageSummary]:
     """Run exactly these stages over the chosen scenes; after `split`, bring card and croissant.json up to date.
 
+    A scene without annotations is left out, with a warning that names the mend; the others are finished.
+
     Parameters as for `run_pipeline`; `scenes` are names or globs, the pipeline's own where absent.
 
     Raises
     ------
+    AssetError
+        No scene has annotations, and nothing was run; or one that was asked for by its full name, or by a
+        pipeline that wants the paper's numbers, has none, and all others are finished.
     UsageError
         The release would lose scenes that another pipeline made, and `replace` is not given; nothing was run.
     """
@@ -164,6 +178,10 @@ def run_stages(
     reporter = reporter or Reporter(quiet=True)
     names = runner.chosen_scenes(config, roots, scenes)
     releases = any(stage.name == "split" for stage in stages)
+    left_out = runner.unready(stages, names, roots)
+    for line in left_out.values():
+        log.warning("left out: %s", line)
+    ready = [name for name in names if name not in left_out]
 
     def prepare() -> None:
         if releases and not replace:
@@ -171,15 +189,22 @@ def run_stages(
 
     def finish() -> None:
         if releases:
-            _finish_release(config, roots.data, names, not scenes, reporter)
+            _finish_release(config, roots.data, names, ready, not scenes, reporter)
 
-    return runner.run(
+    summaries = runner.run(
         stages, names, config, roots, workers=workers, executor=executor, address=address, force=force,
         reporter=reporter, limits=limits, prepare=prepare, finish=finish,
     )  # fmt: skip
+    exact = config.split.paper_counts or config.annotate_import.paper_counts
+    owed = [line for name, line in left_out.items() if exact or name in (scenes or config.scenes)]
+    if owed:
+        raise AssetError("\n".join([*owed, "the other scenes are finished"]))
+    return summaries
 
 
-def _finish_release(config: Pipeline, data: DataRoot, scenes: list[str], whole: bool, reporter: Reporter) -> None:
+def _finish_release(
+    config: Pipeline, data: DataRoot, scenes: list[str], released: list[str], whole: bool, reporter: Reporter
+) -> None:
     """Bring what stands beside the tables of a release up to date with them."""
     from aerialdojo_gen.release.card import write_card
     from aerialdojo_gen.release.contents import prune_release
@@ -190,7 +215,7 @@ def _finish_release(config: Pipeline, data: DataRoot, scenes: list[str], whole: 
         # The whole pipeline was asked for: the release holds its scenes and no others.
         for gone in prune_release(data, scenes):
             reporter.line(f"release: {gone} is no scene of this pipeline, removed")
-    record_makers(data, config, scenes)
+    record_makers(data, config, released)
     write_croissant(data)
     write_card(data)
     reporter.line(f"release: {data.at('release')}")

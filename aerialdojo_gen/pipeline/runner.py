@@ -15,15 +15,16 @@ from pathlib import Path
 from aerialdojo_gen.common.names import choose_scenes, unknown
 from aerialdojo_gen.common.trouble import check_memory
 from aerialdojo_gen.config.pipeline import Pipeline
-from aerialdojo_gen.errors import AerialDojoError, BudgetSpent, UsageError
+from aerialdojo_gen.errors import AerialDojoError, AssetError, BudgetSpent, UsageError
 from aerialdojo_gen.pipeline.code_digest import stage_code
 from aerialdojo_gen.pipeline.executors import Executor, Folders, make_executor, on_disk
 from aerialdojo_gen.pipeline.freshness import Limits, shards_of
 from aerialdojo_gen.pipeline.interrupt import Interrupts
 from aerialdojo_gen.pipeline.progress import Reporter
-from aerialdojo_gen.pipeline.registry import STAGES
+from aerialdojo_gen.pipeline.registry import STAGES, upstream
 from aerialdojo_gen.pipeline.stage import Roots, Stage
 from aerialdojo_gen.pipeline.task import compute
+from aerialdojo_gen.store import shards as store
 
 
 @dataclass(frozen=True)
@@ -79,7 +80,7 @@ def run(
     prepare: Callable[[], None] | None = None,
     finish: Callable[[], None] | None = None,
 ) -> list[StageSummary]:
-    """Run stages in their order on scenes.
+    """Run stages in their order on the scenes that are ready for them.
 
     Parameters
     ----------
@@ -125,6 +126,8 @@ def run(
         stage_code(stage.name)
     carried = (roots.scene_assets, roots.recipes, roots.annotations)
     folders = Folders(on_disk(roots.data), carried, on_disk(roots.data), reporter.line)
+    left_out = unready(stages, scenes, roots)
+    scenes = [scene for scene in scenes if scene not in left_out]
     made = make_executor(executor, workers, address, folders)
     with roots.data.lock(), Interrupts() as interrupts, made as pool:
         if prepare:
@@ -199,6 +202,45 @@ def _run_stage(
         len(done),
         time.monotonic() - started,
     )
+
+
+def unready(stages: Sequence[Stage], scenes: Sequence[str], roots: Roots) -> dict[str, str]:
+    """Find the scenes that stages leave out, as these or what they build on want something of its author first.
+
+    Parameters
+    ----------
+    stages : sequence of Stage
+        What is to run.
+    scenes : sequence of str
+        Names of the scenes.
+    roots : Roots
+        The folders.
+
+    Returns
+    -------
+    dict of str to str
+        Why, by scene, in a line that names the mend.
+
+    Raises
+    ------
+    AssetError
+        None of the scenes would be left.
+    """
+    before = {each.name: each for stage in stages for each in upstream(stage.name)}
+    inputs = {table for stage in stages for table in stage.reads} - {t for stage in stages for t in stage.writes}
+
+    def wanting(scene: str) -> str:
+        why = next(filter(None, (stage.wants(roots, scene) for stage in stages)), "")
+        earlier = next(filter(None, (stage.wants(roots, scene) for stage in before.values())), "")
+        # What stages that do not run now made before, or a release brought along, is enough.
+        made = why or not earlier or all(store.shards(roots.data, table, scene) for table in inputs)
+        return why if made else earlier
+
+    why = {scene: wanting(scene) for scene in scenes}
+    left_out = {scene: line for scene, line in why.items() if line}
+    if left_out and len(left_out) == len(why):
+        raise _together([AssetError(line) for line in left_out.values()])
+    return left_out
 
 
 def _together(errors: Sequence[AerialDojoError]) -> AerialDojoError:

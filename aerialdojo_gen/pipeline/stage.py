@@ -163,6 +163,10 @@ def _no_sources(_roots: Roots, _scene: str) -> list[Path]:
     return []
 
 
+def _no_want(_roots: Roots, _scene: str) -> str:
+    return ""
+
+
 def _any_module(_roots: Roots, _scene: str) -> Choice | None:
     return None
 
@@ -185,6 +189,9 @@ class Stage:
         ``(data, scene, config) -> int``: number of shards of a scene; may read upstream tables.
     sources : callable
         ``(roots, scene) -> list of Path``: files of the scene, outside the store, whose bytes the result depends on.
+    wants : callable
+        ``(roots, scene) -> str``: why a scene that is not finished by its author is left out of this stage and
+        of those that build on it, in a line that names the mend; empty where nothing is wanting.
     imports : callable
         ``(roots, scene) -> Choice or None``: which modules the scene's work imports of a package by a name made
         at run time; the others' code makes nothing of the scene stale. None where that is not known: all count.
@@ -211,6 +218,7 @@ class Stage:
     run: Callable[[Job, Any], Output]
     parts: Callable[[DataRoot, str, Any], int] = _one_part
     sources: Callable[[Roots, str], list[Path]] = _no_sources
+    wants: Callable[[Roots, str], str] = _no_want
     imports: Callable[[Roots, str], Choice | None] = _any_module
     check: Callable[[DataRoot, Sequence[str], Any], None] = _no_check
     settle: Callable[[Any, Callable[[str], None]], Any] = _as_it_is

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from aerialdojo_gen.common.advice import Given, as_given, given
 from aerialdojo_gen.common.trouble import explained
 from aerialdojo_gen.config.sections import Section
 from aerialdojo_gen.errors import AerialDojoError, BudgetSpent
@@ -19,11 +20,24 @@ from aerialdojo_gen.store.footers import ShardFile
 
 @dataclass(frozen=True)
 class Task:
-    """A shard to compute: its job, its stage's config, and the fingerprint to store with it."""
+    """A shard to compute.
+
+    Attributes
+    ----------
+    job : Job
+        What it is.
+    config : Section
+        Its stage's section.
+    fingerprint : str
+        To be stored with it.
+    given : Given
+        What the user gave, for the advice of messages in whatever process they are made.
+    """
 
     job: Job
     config: Section
     fingerprint: str
+    given: Given = field(default_factory=given, compare=False)
 
     @property
     def label(self) -> str:
@@ -68,7 +82,8 @@ def compute(task: Task) -> dict[str, Any]:
         raise BudgetSpent(f"the budget was spent before {task.label}")
     stage = BY_NAME[job.stage]
     try:
-        output = stage.run(job, task.config)
+        with as_given(task.given):
+            output = stage.run(job, task.config)
     except AerialDojoError:
         raise
     except Exception as error:

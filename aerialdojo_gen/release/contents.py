@@ -8,6 +8,7 @@ from pathlib import PurePosixPath
 
 import pyarrow as pa
 
+from aerialdojo_gen.common.advice import command
 from aerialdojo_gen.common.names import choose_scenes
 from aerialdojo_gen.errors import StoreError
 from aerialdojo_gen.store import schemas
@@ -181,7 +182,7 @@ def check_release(where: Where, scenes: list[str] | None = None) -> list[str]:
 
 
 def _faults(root: DataRoot, scene: str, present: list[str]) -> list[str]:
-    mend = f"run aerialdojo-gen split --scene {scene}"
+    mend = f"run {command('split', scene=scene)}"
     if not present:
         return [f"{scene} is not in the release in {root}: {mend}"]
     lines, prints = [], {}

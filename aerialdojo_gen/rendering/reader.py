@@ -19,6 +19,7 @@ import av
 import numpy as np
 from numpy.typing import NDArray
 
+from aerialdojo_gen.common.advice import command
 from aerialdojo_gen.common.bounded import loads_json
 from aerialdojo_gen.common.pictures import decode_as_stored
 from aerialdojo_gen.errors import Malformed, RenderError
@@ -195,7 +196,7 @@ def read_recording(folder: str | Path) -> Recording:
     folder = Path(folder)
     rgb, depth, instance = (_videos(folder, modality) for modality in ("rgb", "depth", "instance"))
     if not rgb or rgb.keys() != depth.keys() or (instance and instance.keys() != rgb.keys()):
-        raise RenderError(f"no complete recording in {folder}: run aerialdojo-gen render")
+        raise RenderError(f"no complete recording in {folder}: run {command('render')}")
     if len({len(v) for v in (*rgb.values(), *depth.values(), *instance.values())}) != 1:
         raise RenderError(f"the videos in {folder} differ in length: render them again")
     cameras = {view: _camera(video) for view, video in rgb.items()}

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from aerialdojo_gen.common.advice import command
 from aerialdojo_gen.common.bounded import loads_json
 from aerialdojo_gen.common.pictures import TEXTURE_PNG, decode_rgb, encode_png
 from aerialdojo_gen.errors import AssetError
@@ -89,12 +90,15 @@ def read_glb(path: Path, sha256: str = "") -> Scene:
         raw = path.read_bytes()
         if sha256 and hashlib.sha256(raw).hexdigest() != sha256:
             raise AssetError(
-                f"{path} is not the mesh that the tables were made from: run aerialdojo-gen split --scene {path.stem}"
+                f"{path} is not the mesh that the tables were made from: run {command('split', scene=path.stem)}"
             )
         document, data = _chunks(raw)
         extras = document["extras"]["aerialdojo"]
         if extras["version"] != _VERSION:
-            raise AssetError(f"{path}: scene format {extras['version']} is not {_VERSION}; run build-scenes again")
+            raise AssetError(
+                f"{path}: scene format {extras['version']} is not {_VERSION}; "
+                f"run {command('build-scenes', scene=path.stem)}"
+            )
         materials = [_read_material(m, document, data) for m in document["materials"]]
         names = [m.name for m in materials]
         instances = tuple(
@@ -112,9 +116,13 @@ def read_glb(path: Path, sha256: str = "") -> Scene:
         _check(scene)
         return scene
     except OSError as error:
-        raise AssetError(f"{path}: cannot be read ({error.strerror}); run build-scenes first") from error
+        raise AssetError(
+            f"{path}: cannot be read ({error.strerror}); run {command('build-scenes', scene=path.stem)}"
+        ) from error
     except (KeyError, IndexError, TypeError, AttributeError, ValueError, OverflowError, struct.error) as error:
-        raise AssetError(f"{path}: is no scene file of this program or is damaged; run build-scenes again") from error
+        raise AssetError(
+            f"{path}: is no scene file of this program or is damaged; run {command('build-scenes', scene=path.stem)}"
+        ) from error
 
 
 class _Writer:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+from aerialdojo_gen.common.advice import command
 from aerialdojo_gen.errors import AssetError
 from aerialdojo_gen.scenes.glb import read_glb
 from aerialdojo_gen.scenes.model import Scene
@@ -43,7 +44,10 @@ def mesh_file(data: DataRoot, relative: str) -> Path:
     try:
         return data.local_copy(relative)
     except FileNotFoundError:
-        missing = f"{data.at(relative)}: cannot be read ({os.strerror(2)}); run build-scenes first"
+        missing = (
+            f"{data.at(relative)}: cannot be read ({os.strerror(2)}); "
+            f"run {command('build-scenes', scene=Path(relative).stem)}"
+        )
         raise AssetError(missing) from None
 
 

@@ -11,6 +11,7 @@ import pyarrow.compute as pc
 from numpy.typing import NDArray
 
 from aerialdojo_gen.browse.lookup import FoundTask
+from aerialdojo_gen.common.advice import command
 from aerialdojo_gen.errors import StoreError
 from aerialdojo_gen.geometry.cameras import Camera, view_pose
 from aerialdojo_gen.store import schemas
@@ -116,4 +117,4 @@ def _copy(root: DataRoot, told: str) -> Path:
     try:
         return root.local_copy(told)
     except FileNotFoundError:
-        raise StoreError(f"the recording {root.at(told)} is missing: run aerialdojo-gen render") from None
+        raise StoreError(f"the recording {root.at(told)} is missing: run {command('render')}") from None

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from aerialdojo_gen.common.advice import command
 from aerialdojo_gen.errors import AssetError
 from aerialdojo_gen.pipeline.stage import Job, Output, Roots, Stage
 from aerialdojo_gen.scenes.catalogue_files import catalogue_files
@@ -22,13 +23,24 @@ def run(job: Job, config: AnnotateImportConfig) -> Output:
 
 def sources(roots: Roots, scene: str) -> list[Path]:
     """List the annotation file and the catalogue; AssetError where there is no such file."""
-    file = roots.annotations / f"{scene}.json"
-    if not file.is_file():
-        raise AssetError(
-            f"{scene} has no annotations: {file} is missing; draft them (aerialdojo-gen annotate-draft {scene}) "
-            f"or make them by hand (aerialdojo-gen annotate --scene {scene})"
-        )
-    return [file, *catalogue_files(roots.scene_assets)]
+    if missing := wants(roots, scene):
+        raise AssetError(missing)
+    return [_file(roots, scene), *catalogue_files(roots.scene_assets)]
+
+
+def wants(roots: Roots, scene: str) -> str:
+    """Say that a scene has no annotation file, and how to make one; empty where it has."""
+    file = _file(roots, scene)
+    if file.is_file():
+        return ""
+    return (
+        f"{scene} has no annotations: {file} is missing; draft them: {command('annotate-draft', scene)} "
+        f"or make them by hand: {command('annotate', scene=scene)}"
+    )
+
+
+def _file(roots: Roots, scene: str) -> Path:
+    return roots.annotations / f"{scene}.json"
 
 
 STAGE = Stage(
@@ -38,4 +50,5 @@ STAGE = Stage(
     writes=("landmarks", "objects", "chosen_anchors"),
     run=run,
     sources=sources,
+    wants=wants,
 )

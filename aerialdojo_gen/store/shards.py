@@ -16,6 +16,7 @@ from typing import Any
 
 import pyarrow as pa
 
+from aerialdojo_gen.common.advice import command
 from aerialdojo_gen.errors import StoreError, first_line
 from aerialdojo_gen.store.footers import ShardFile, ShardInfo, decode, encode
 from aerialdojo_gen.store.layout import (
@@ -162,9 +163,8 @@ def _infos(data: Where, table: str, scene: str, run: str = "default") -> list[Sh
     root = open_root(data)
     infos = [read_info(root, name) for name in shards(root, table, scene, run)]
     if not infos or infos[0] is None or len(infos) != infos[0].parts:
-        command = LAYOUT[table].command
         raise StoreError(f"{table} of {scene} is missing or incomplete in {root}: "
-                         f"run aerialdojo-gen {command} --scene {scene}")  # fmt: skip
+                         f"run {command(LAYOUT[table].command, scene=scene)}")  # fmt: skip
     return [info for info in infos if info is not None]
 
 
@@ -201,7 +201,7 @@ def read_scene(
     infos = _infos(root, table, scene, run)
     spec = LAYOUT[table].spec
     wanted = spec.schema if columns is None else pa.schema([spec.schema.field(name) for name in columns])
-    mend = f"delete it and run aerialdojo-gen {LAYOUT[table].command} --scene {scene}"
+    mend = f"delete it and run {command(LAYOUT[table].command, scene=scene)}"
     tables = []
     for name, info in zip(shards(root, table, scene, run), infos, strict=True):
         where = root.at(name)

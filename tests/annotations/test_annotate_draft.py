@@ -10,9 +10,10 @@ import pytest
 from support.annotation_scenes import PAINTS, box, street
 
 from aerialdojo_gen.annotations.check import check_source
-from aerialdojo_gen.annotations.draft import Choice, draft_annotations, redraft_annotations
+from aerialdojo_gen.annotations.draft import Choice, draft_annotations
 from aerialdojo_gen.annotations.format import format_annotations, parse_annotations
 from aerialdojo_gen.annotations.phrases import article, noun_of, words_of
+from aerialdojo_gen.annotations.redraft import redraft_annotations
 from aerialdojo_gen.common.rng import generator
 from aerialdojo_gen.errors import AnnotationError
 from aerialdojo_gen.scenes.catalogue import load_catalogue
@@ -69,7 +70,7 @@ def test_drafts_are_varied_english(plaza, catalogue):
 
 def test_choice_limits_objects(plaza, catalogue):
     allowed = {i.node for i in plaza.instances if i.category in ("bench", "sedan", "mailbox", "bicycle")}
-    choice = Choice(eligible=allowed.__contains__, centre_m=(0.0, 0.0), within_m=25.0)
+    choice = Choice(refuses=lambda node: "" if node in allowed else "not allowed", centre_m=(0.0, 0.0), within_m=25.0)
     draft = draft_annotations(plaza, catalogue, 1, 8, 0, choice)
     for entry in draft.objects:
         assert entry.node in allowed

@@ -139,7 +139,7 @@ def test_a_file_cut_anywhere_is_refused(scene, tmp_path):
     whole = path.read_bytes()
     for length in (0, 3, 11, 19, 25, 400, len(whole) // 2, len(whole) - 1):
         path.write_bytes(whole[:length])
-        with pytest.raises(AssetError, match=r"a\.glb.*run build-scenes again"):
+        with pytest.raises(AssetError, match=r"a\.glb.*run aerialdojo-gen build-scenes"):
             read_glb(path)
 
 
@@ -162,7 +162,7 @@ def test_lying_headers_are_refused(scene, tmp_path):
 
 
 def test_missing_and_foreign_files_are_refused(tmp_path):
-    with pytest.raises(AssetError, match="run build-scenes first"):
+    with pytest.raises(AssetError, match="run aerialdojo-gen build-scenes"):
         read_glb(tmp_path / "none.glb")
     trimesh.creation.box().export(tmp_path / "foreign.glb")
     with pytest.raises(AssetError, match="no scene file of this program"):

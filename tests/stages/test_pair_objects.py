@@ -146,7 +146,7 @@ def test_an_object_that_the_mesh_lacks_is_named(tmp_path):
     objects[1]["mesh_node"] = "gone"
     store.write_shard(tmp_path, "objects", SCENE, 0, from_rows(schemas.OBJECTS, objects))
     job = Job("pair-objects", SCENE, 0, 1, 0, Embodiment(), Roots(*[tmp_path] * 4))
-    with pytest.raises(StoreError, match="object 1 is not in the scene's mesh: run annotate-import again"):
+    with pytest.raises(StoreError, match="object 1 is not in the scene's mesh: run aerialdojo-gen annotate-import"):
         pair_objects.run(job, PairObjectsConfig())
 
 

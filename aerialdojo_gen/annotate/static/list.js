@@ -14,7 +14,7 @@ const FILTERS = {
   anchor: sampled,
 };
 
-const WORDS = { name: "name", category: "category", description: "description", check: "check" };
+const WORDS = { name: "name", category: "category", description: "description", check: "check", person: "a person" };
 
 export class List {
   constructor(select) {

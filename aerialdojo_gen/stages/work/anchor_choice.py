@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from aerialdojo_gen.common.advice import command
 from aerialdojo_gen.common.rng import generator
 from aerialdojo_gen.config.sections import AnchorSampleConfig
 from aerialdojo_gen.errors import AnnotationError
@@ -156,7 +157,7 @@ def with_choice(
         if judged.faults:
             raise AnnotationError(
                 f"{job.scene}: the anchor chosen for object {item['object_id']} ({item['name']}) will not do: "
-                f"{'; '.join(judged.faults)}. Choose another one: aerialdojo-gen annotate --scene {job.scene}"
+                f"{'; '.join(judged.faults)}. Choose another one: {command('annotate', scene=job.scene)}"
             )
         first = judged.row
     ordered = [first, *(row for row in rows if row is not first)][: config.shortlist]

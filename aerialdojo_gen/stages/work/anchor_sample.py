@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from aerialdojo_gen.common.advice import command
 from aerialdojo_gen.common.rng import generator
 from aerialdojo_gen.config.sections import AnchorSampleConfig
 from aerialdojo_gen.errors import StoreError
@@ -87,7 +88,7 @@ def run(job: Job, config: AnchorSampleConfig) -> Output:
         if item["mesh_node"] not in world.index:
             raise StoreError(
                 f"{job.scene}: object {item['object_id']} ({item['name']}) has the mesh node {item['mesh_node']!r}, "
-                "which is not in the scene: run annotate-import again"
+                f"which is not in the scene: run {command('annotate-import', scene=job.scene)}"
             )
         found, rejected, seen = sampled(item, world, job, config)
         viewpoints += seen

@@ -8,6 +8,7 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
+from aerialdojo_gen.common.advice import command
 from aerialdojo_gen.config.sections import FilterConfig, Setting
 from aerialdojo_gen.errors import StoreError
 from aerialdojo_gen.pipeline.stage import Job, Output
@@ -99,7 +100,9 @@ def run(job: Job, config: FilterConfig) -> Output:
     told = [field.name for field in DIFFICULTY]
     plans = job.read("plans").select(["pair_id", "outcome", "length_m", "n_actions", *told]).sort_by("pair_id")
     if not plans.column("pair_id").combine_chunks().equals(pairs.column("pair_id").combine_chunks()):
-        raise StoreError(f"plans of {job.scene} are not those of its pairs: run aerialdojo-gen plan --force")
+        raise StoreError(
+            f"plans of {job.scene} are not those of its pairs: run {command('plan', scene=job.scene, force=True)}"
+        )
     outcome = np.asarray(plans.column("outcome").to_pylist(), dtype="U24")
     euclidean = pairs.column("euclidean_m").to_numpy()
     length = plans.column("length_m").to_numpy()

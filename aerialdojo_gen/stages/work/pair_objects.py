@@ -9,6 +9,7 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
+from aerialdojo_gen.common.advice import command
 from aerialdojo_gen.common.rng import generator
 from aerialdojo_gen.config.sections import PairObjectsConfig
 from aerialdojo_gen.errors import StoreError
@@ -107,7 +108,10 @@ def _seen_at_start(
     for target in np.unique(targets).tolist():
         item = things.get(nodes.get(target, ""))
         if item is None:
-            raise StoreError(f"{job.scene}: object {target} is not in the scene's mesh: run annotate-import again")
+            raise StoreError(
+                f"{job.scene}: object {target} is not in the scene's mesh: "
+                f"run {command('annotate-import', scene=job.scene)}"
+            )
         rows = np.flatnonzero(targets == target)
         points = surface_points(job.scene, target, item, config.surface_points)
         share[rows], view[rows] = seen_from(caster, instance_caster(item), points, starts[rows])

@@ -12,6 +12,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 from numpy.typing import NDArray
 
+from aerialdojo_gen.common.advice import command
 from aerialdojo_gen.config.sections import PlanConfig
 from aerialdojo_gen.errors import StoreError
 from aerialdojo_gen.geometry.angles import wrap_one_rad
@@ -66,7 +67,7 @@ def run(job: Job, config: PlanConfig) -> Output:
             except KeyError as error:
                 raise StoreError(
                     f"{job.scene}: a candidate with target {target} needs anchor {error}, which is not in anchors: "
-                    "run pair-objects again"
+                    f"run {command('pair-objects', scene=job.scene)}"
                 ) from None
             routes = planner.plan_target(goal, starts)
             planned += [(p["pair_id"], r) for p, r in zip(candidates, routes, strict=True)]

@@ -1,0 +1,117 @@
+"""Landmarks for drafts: far apart, easy to see, and each with a name that nothing else in the scene answers to."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from aerialdojo_gen.annotations.describing import NO_THING, Vocabulary
+from aerialdojo_gen.annotations.format import Landmark
+from aerialdojo_gen.errors import AnnotationError
+from aerialdojo_gen.scenes.model import Instance
+
+# By so much the tallest must be taller than the next, and the northernmost farther north, to be called so.
+_TALLER = 1.1
+_FARTHER_M = 1.0
+_SIDES = (("northernmost", 1, 1.0), ("southernmost", 1, -1.0), ("easternmost", 0, 1.0), ("westernmost", 0, -1.0))
+
+
+def choose_landmarks(
+    vocabulary: Vocabulary, n: int, wanted: Sequence[str] = (), at_most: bool = False
+) -> tuple[Landmark, ...]:
+    """Choose landmarks: the wanted, then the tallest, then whatever is farthest from the chosen.
+
+    Parameters
+    ----------
+    vocabulary : Vocabulary
+        The scene's.
+    n : int
+        How many.
+    wanted : sequence of str
+        Nodes that are to be landmarks, first of all.
+    at_most : bool
+        Fewer will do, if there is one.
+
+    Returns
+    -------
+    tuple of Landmark
+        In the order of their choice. In an imported scene each has a name that is so of it alone.
+
+    Raises
+    ------
+    AnnotationError
+        There are too few, or a wanted one has no name of its own.
+    """
+    scene = vocabulary.scene
+    missing = [node for node in wanted if node not in scene]
+    if missing:
+        raise AnnotationError(f"{scene.name}: no node {missing[0]!r} to make a landmark of")
+    chosen = [scene[node] for node in dict.fromkeys(wanted)][:n]
+    if scene.imported:
+        names = _Names(vocabulary)
+        nameless = [i.node for i in chosen if not names.of(i)]
+        if nameless:
+            raise AnnotationError(
+                f"{scene.name}: nothing tells the landmark {nameless[0]!r} from others of its kind: take another node"
+            )
+        rest = [i for i in _prominent(vocabulary, 8 * n) if i not in chosen and names.of(i)]
+    else:
+        rest = [i for i in scene.instances if vocabulary.kinds.get(i.category) == "landmark" and i not in chosen]
+    while len(chosen) < n and rest:
+        best = max(rest, key=lambda i: (spread_m(i, chosen), float(i.bounds[1, 2])))
+        chosen.append(best)
+        rest.remove(best)
+    if len(chosen) < n and not (at_most and chosen):
+        raise AnnotationError(
+            f"{scene.name}: {n} landmark{'s are' if n > 1 else ' is'} wanted, the scene has {len(chosen)}"
+        )
+    said = [names.of(i) for i in chosen] if scene.imported else _catalogued(vocabulary, chosen)
+    if len(set(said)) < len(said):
+        raise AnnotationError(f"{scene.name}: landmarks share a name: {', '.join(sorted(said))}")
+    return tuple(Landmark(id=k, name=name, node=i.node) for k, (name, i) in enumerate(zip(said, chosen, strict=True)))
+
+
+def spread_m(instance: Instance, chosen: Sequence[Instance]) -> float:
+    """Distance in the plane to the nearest of the chosen, metres; a kilometre where there is none."""
+    gaps = [float(np.hypot(*(instance.centroid[:2] - other.centroid[:2]))) for other in chosen]
+    return min(gaps, default=1000.0)
+
+
+def _prominent(vocabulary: Vocabulary, n: int) -> list[Instance]:
+    """The n tallest things of a mesh of another make."""
+    things = [i for i in vocabulary.scene.instances if i.category not in NO_THING]
+    return sorted(things, key=lambda i: (-float(i.bounds[1, 2]), i.node))[:n]
+
+
+def _catalogued(vocabulary: Vocabulary, chosen: Sequence[Instance]) -> list[str]:
+    noun = {i.node: noun for i, noun in zip(vocabulary.scene.instances, vocabulary.nouns, strict=True)}
+    plain = [noun[i.node].name for i in chosen]
+    return [noun[i.node].short if plain.count(p) > 1 else p for i, p in zip(chosen, plain, strict=True)]
+
+
+class _Names:
+    """Names that are so of one thing of a scene alone, by what a mesh of another make tells."""
+
+    def __init__(self, vocabulary: Vocabulary) -> None:
+        self._nouns = dict(zip((i.node for i in vocabulary.scene.instances), vocabulary.nouns, strict=True))
+        self._alike: dict[str, list[Instance]] = {}
+        for instance, noun in zip(vocabulary.scene.instances, vocabulary.nouns, strict=True):
+            self._alike.setdefault(noun.name, []).append(instance)
+
+    def of(self, instance: Instance) -> str:
+        """Name a thing; empty where nothing tells it from others of its name."""
+        noun = self._nouns[instance.node]
+        others = [other for other in self._alike[noun.name] if other is not instance]
+        if not others:
+            return noun.name
+        if not any(set(noun.adjectives) <= set(self._nouns[other.node].adjectives) for other in others):
+            return noun.short
+        rises = [float(np.ptp(other.bounds[:, 2])) for other in others]
+        if float(np.ptp(instance.bounds[:, 2])) > _TALLER * max(rises):
+            return f"tallest {noun.name}"
+        for word, axis, sign in _SIDES:
+            farthest = max(sign * float(other.centroid[axis]) for other in others)
+            if sign * float(instance.centroid[axis]) > farthest + _FARTHER_M:
+                return f"{word} {noun.name}"
+        return ""

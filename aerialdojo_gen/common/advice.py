@@ -1,0 +1,114 @@
+"""Commands that messages advise, to be pasted: quoted, with the pipeline and the data directory that were given."""
+
+from __future__ import annotations
+
+import os
+import shlex
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+PROGRAM = "aerialdojo-gen"
+# Commands that do not take both --pipeline and --data.
+_TAKES: dict[str, tuple[str, ...]] = {
+    "add-scene": (),
+    "annotate-draft": ("pipeline",),
+    **dict.fromkeys(("export", "import-benchmark", "report", "run", "show", "view"), ("data",)),
+}
+
+
+@dataclass(frozen=True)
+class Given:
+    """What a user gave on the command line, or to the library, and has to give again.
+
+    Attributes
+    ----------
+    pipeline, data : str
+        As written; empty where nothing was.
+    program : str
+        What the command line is called as here.
+    """
+
+    pipeline: str = ""
+    data: str = ""
+    program: str = PROGRAM
+
+
+_NOW = [Given()]
+
+
+def given() -> Given:
+    """Return what has been given."""
+    return _NOW[0]
+
+
+def remember(*, pipeline: object = None, data: object = None) -> None:
+    """Keep what the user wrote, for the messages of this process; None leaves what is kept."""
+    new = {key: str(value) for key, value in (("pipeline", pipeline), ("data", data)) if value is not None}
+    _NOW[0] = replace(_NOW[0], **new)
+
+
+def begin(called_as: str = "") -> None:
+    """Forget what was given, at the start of a command.
+
+    Parameters
+    ----------
+    called_as : str
+        The path that the program was started by, which is what is advised where its name alone finds nothing.
+    """
+    program = _NOW[0].program
+    if Path(called_as).name == PROGRAM:
+        found = shutil.which(PROGRAM)
+        program = PROGRAM if found and Path(found).resolve() == Path(called_as).resolve() else _from_here(called_as)
+    _NOW[0] = Given(program=program)
+
+
+@contextmanager
+def as_given(what: Given) -> Iterator[None]:
+    """Give advice for what somebody else was given, for the length of the block: a worker process."""
+    before = _NOW[0]
+    _NOW[0] = what
+    try:
+        yield
+    finally:
+        _NOW[0] = before
+
+
+def command(verb: str, *words: object, **options: object) -> str:
+    """Say a command so that it can be pasted into a shell.
+
+    Parameters
+    ----------
+    verb : str
+        The command's name, e.g. ``"annotate-draft"``.
+    *words : object
+        Its arguments, and options that are not given by key.
+    **options : object
+        Its options by key, in this order: ``scene="Campus"`` is ``--scene Campus``, True a flag alone, None and False
+        nothing at all. `pipeline` and `data` are those that were given, where the command takes them.
+
+    Returns
+    -------
+    str
+        ``"aerialdojo-gen annotate-draft Campus --pipeline 'my scenes/pipeline.toml'"``.
+    """
+    kept = given()
+    for key, own in (("pipeline", kept.pipeline), ("data", kept.data)):
+        if own and key in _TAKES.get(verb, ("pipeline", "data")):
+            options.setdefault(key, own)
+    parts = [kept.program, verb, *map(str, words)]
+    for key, value in options.items():
+        if value is None or value is False:
+            continue
+        parts.append(f"--{key.replace('_', '-')}")
+        if value is not True:
+            parts.append(str(value))
+    return " ".join(shlex.quote(part) for part in parts)
+
+
+def _from_here(path: str) -> str:
+    """Write a path as one would type it in the working directory."""
+    relative = os.path.relpath(path)
+    return path if relative.startswith("..") or not Path(path).is_absolute() else relative

@@ -1,0 +1,171 @@
+"""What a foreign node's name tells: words where it holds words, nothing where it holds ids; or a user's own table."""
+
+from __future__ import annotations
+
+import csv
+import io
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fnmatch import fnmatchcase
+from pathlib import Path
+
+from aerialdojo_gen.annotations.number import group_of
+from aerialdojo_gen.errors import AssetError
+
+# Said by exporters and by people who name nothing, of whatever the thing is.
+_NOISE = frozenset({
+    "api", "asset", "body", "box", "brep", "capsule", "circle", "clone", "col", "collada", "collider", "collision",
+    "component", "cone", "copy", "cube", "curve", "cylinder", "default", "dummy", "dup", "duplicate", "elem",
+    "element", "empty", "entity", "export", "exported", "face", "faces", "fbx", "feature", "fragment", "geo",
+    "geom", "geometry", "glb", "gltf", "grid", "group", "grp", "guid", "helper", "high", "icosphere", "id",
+    "import", "imported", "instance", "item", "layer", "line", "lod", "lods", "low", "mat", "material", "max",
+    "mesh", "meshes", "model", "msh", "nan", "new", "node", "nodes", "none", "null", "nurbs", "obj", "object",
+    "objects", "osgb", "osm", "part", "parts", "piece", "placeholder", "plane", "poly", "polygon", "polysurface",
+    "prefab", "prim", "primitive", "proxy", "ref", "relation", "root", "rotation", "scan", "scene", "set", "shape",
+    "shell", "skeleton", "sketchup", "skp", "solid", "sphere", "static", "sub", "submesh", "surface", "suzanne",
+    "temp", "test", "tmp", "torus", "transform", "tri", "triangle", "ucx", "undefined", "unknown", "unnamed",
+    "untitled", "uuid", "uv", "vert", "visual", "volume", "way", "world", "xform",
+})  # fmt: skip
+# Words that might be hexadecimal digits.
+_HEX_WORDS = frozenset({"bed", "cab", "cafe", "facade", "facades", "beds", "cabs", "cafes"})
+_SHORT = frozenset({"atm", "bus", "gym", "hut", "van", "tv", "spa", "shrub", "sky", "crypt", "gypsum"})
+_MOST_WORDS = 4
+_MOST_LETTERS = 18
+_COLUMNS = ("pattern", "name", "category", "plural")
+_MOST_BYTES = 4 << 20
+
+
+@dataclass(frozen=True)
+class Called:
+    """What a thing is called.
+
+    Attributes
+    ----------
+    category : str
+        Its kind, e.g. ``"fire_engine"``; empty where nothing is known.
+    attributes : dict of str to str
+        ``called``: its name where that is not the category's words; ``group``: what makes one thing of a plural.
+    """
+
+    category: str
+    attributes: dict[str, str]
+
+
+NOTHING = Called("", {})
+
+
+@dataclass(frozen=True)
+class Naming:
+    """A user's table of node patterns.
+
+    Attributes
+    ----------
+    rows : sequence of (str, Called)
+        A glob, and what the nodes that it fits are called; the first that fits counts.
+    """
+
+    rows: Sequence[tuple[str, Called]] = ()
+
+    def called(self, node: str) -> Called:
+        """Say what a node of the file is called: by the table, else by the words in its name."""
+        for pattern, called in self.rows:
+            if fnmatchcase(node, pattern):
+                return called
+        words = words_in(node)
+        return _called(" ".join(words), "", "") if words else NOTHING
+
+
+def words_in(node: str) -> list[str]:
+    """List the words in a node's name: no numbers, ids, hexadecimal digits, or what exporters say of everything.
+
+    Parameters
+    ----------
+    node : str
+        ``"StreetLamp.012"`` or ``"City_c3e0b"``.
+
+    Returns
+    -------
+    list of str
+        In lower case: ``["street", "lamp"]``, ``["city"]``; empty where nothing of it is a word.
+    """
+    split = re.sub(r"([a-z])([A-Z])", r"\1 \2", node)
+    tokens = [token for token in re.split(r"[^A-Za-z0-9]+", split) if token]
+    words = [word for word in map(_word, tokens) if word]
+    # "building building": a mesh and its node are often called alike.
+    words = [word for k, word in enumerate(words) if word not in words[:k]]
+    return words[:_MOST_WORDS]
+
+
+def _word(token: str) -> str:
+    stem = re.fullmatch(r"([A-Za-z]{3,})\d{1,4}", token)
+    if stem and not re.fullmatch(r"[a-fA-F]+", stem.group(1)):
+        token = stem.group(1)  # House03
+    word = token.lower()
+    if not word.isalpha() or word in _NOISE or not 2 <= len(word) <= _MOST_LETTERS:
+        return ""
+    if word in _SHORT or word in _HEX_WORDS:
+        return word
+    hexadecimal = re.fullmatch(r"[a-f]+", word)
+    spoken = len(word) > 2 and re.search(r"[aeiouy]", word) and not re.search(r"[^aeiouy]{5}|([a-z])\1\1", word)
+    return word if spoken and not hexadecimal else ""
+
+
+def _called(name: str, category: str, group: str) -> Called:
+    kind = category or re.sub(r"[^a-z]+", "_", name.lower()).strip("_")[:40].strip("_")
+    attributes = {"called": name} if name and name != kind.replace("_", " ") else {}
+    return Called(kind, attributes | ({"group": group} if group else {}))
+
+
+def read_names(path: Path) -> Naming:
+    """Read a table of names: CSV with the columns ``pattern``, ``name``, ``category`` and ``plural``.
+
+    A pattern is a glob on the file's node names, case and all. ``name`` is what a person says; ``category`` its kind,
+    made of the name where empty; ``plural`` is ``yes`` where the name is of many ("leaves"), or the words that make
+    one thing of them ("a row of"), and may be left out, as may ``category``.
+
+    Raises
+    ------
+    AssetError
+        The file cannot be read, or a row of it makes no sense: which line, and why.
+    """
+    try:
+        raw = path.read_bytes()[: _MOST_BYTES + 1]
+        text = raw.decode("utf-8-sig")
+    except OSError as error:
+        raise AssetError(f"{path}: {error.strerror}") from None
+    except UnicodeDecodeError:
+        raise AssetError(f"{path}: is not UTF-8") from None
+    if len(raw) > _MOST_BYTES:
+        raise AssetError(f"{path}: larger than {_MOST_BYTES >> 20} MiB")
+    reader = csv.DictReader(io.StringIO(text), restkey="", restval="")
+    columns = tuple(reader.fieldnames or ())
+    unknown = [name for name in columns if name not in _COLUMNS]
+    if unknown or not {"pattern", "name"} <= set(columns):
+        raise AssetError(f"{path}: line 1 must name the columns pattern, name and, if wanted, category and plural")
+    rows = []
+    try:
+        for row in reader:
+            rows.append(_row(row))
+    except (csv.Error, ValueError) as error:
+        raise AssetError(f"{path}: line {reader.line_num}: {error}") from None
+    return Naming(tuple(rows))
+
+
+def _row(row: dict[str, str]) -> tuple[str, Called]:
+    if row.get(""):
+        raise ValueError("has more fields than columns")
+    pattern, name, category, plural = ((row.get(key) or "").strip() for key in _COLUMNS)
+    name, many = " ".join(name.split()), plural.lower()
+    if not pattern:
+        raise ValueError("has no pattern")
+    if not re.fullmatch(r"[^\W\d_]+(?:[ '-][^\W\d_]+)*", name) or len(name) > 60:
+        raise ValueError(f"name {name[:40]!r} is no name that a person would say: letters, spaces and hyphens")
+    if category and not re.fullmatch(r"[a-z]+(?:_[a-z]+)*", category):
+        raise ValueError(f"category {category[:40]!r} must be lower-case words joined by _")
+    if not category and not re.search(r"[A-Za-z]", name):
+        raise ValueError(f"name {name[:40]!r} makes no category: give one")
+    group = "" if many in ("", "no") else (group_of(name) or "a group of") if many == "yes" else plural
+    if group and not re.fullmatch(r"an? [a-z ]+ of", group):
+        raise ValueError(f"plural {plural[:40]!r} is neither yes nor words like 'a row of'")
+    return pattern, _called(name.lower() if name.isascii() else name, category, group)

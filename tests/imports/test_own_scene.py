@@ -1,0 +1,227 @@
+"""A scene of one's own by the commands alone: what each of them advises can be pasted and works."""
+
+from __future__ import annotations
+
+import json
+import re
+import shlex
+
+import pytest
+import trimesh
+from support import foreign
+from support.command_line import said
+
+from aerialdojo_gen.annotations.number import group_of
+from aerialdojo_gen.imports.naming import words_in
+
+# What stands there without a name: a drum and a box.
+FORMS = ("round", "square")
+
+
+def pasted(text: str, begin: str) -> list[str]:
+    """The arguments of the command that a line advises."""
+    (line,) = [line for line in text.splitlines() if begin in line]
+    program, *arguments = shlex.split(line.partition(begin)[2].strip())
+    assert program == "aerialdojo-gen"
+    return arguments
+
+
+def yard(*bodies: tuple[str, trimesh.Trimesh, tuple[float, float, float]]) -> trimesh.Scene:
+    scene = trimesh.Scene()
+    for name, body, place in bodies:
+        body.apply_translation(place)
+        scene.add_geometry(body, node_name=name)
+    return scene
+
+
+def box(*size: float) -> trimesh.Trimesh:
+    return trimesh.creation.box(size)
+
+
+@pytest.fixture
+def place(tmp_path, monkeypatch):
+    """An empty working directory whose name has to be quoted."""
+    folder = tmp_path / "my place"
+    folder.mkdir()
+    monkeypatch.chdir(folder)
+    monkeypatch.delenv("AERIALDOJO_DATA", raising=False)
+    return folder
+
+
+def added(capsys, scene: trimesh.Scene, name: str, *options: str) -> str:
+    scene.export(f"{name}.glb")
+    code, out, err = said(capsys, "add-scene", name, f"{name}.glb", "--up", "z", "--project", "our scenes", *options)
+    assert code == 0, err
+    return out
+
+
+@pytest.mark.pipeline
+def test_from_a_mesh_to_tasks_by_what_the_commands_advise_past_a_scene_without_annotations(place, capsys):
+    out = added(capsys, foreign.village(), "Village")
+    code, drafted, err = said(capsys, *pasted(out, "next: "))
+    assert code == 0, err
+    assert drafted.strip() == str(place / "our scenes/annotations/Village.json")
+    assert "up to 7 objects by 2 landmarks" in err  # eight houses and a tower
+    draft = json.loads((place / "our scenes/annotations/Village.json").read_text())
+    assert len(draft["landmarks"]) == 2
+    assert 2 <= len(draft["objects"]) <= 7
+    run = pasted(added(capsys, foreign.village(), "Hamlet"), "then: ")
+    code, _, err = said(capsys, *run, "--workers", "1", "--quiet")
+    assert code == 0, err
+    left_out = [line for line in err.splitlines() if "left out" in line]
+    assert len(left_out) == 1
+    assert left_out[0].startswith("left out: Hamlet has no annotations")
+    released = sorted(p.name for p in (place / "our scenes/data/release/tasks").rglob("*.parquet"))
+    assert released
+    assert all("Village" in name for name in released)
+    # Asked for by its full name it is owed; the one that is there is finished all the same.
+    code, _, err = said(capsys, *run, "--workers", "1", "--scene", "Hamlet", "--scene", "Village")
+    assert code == 1
+    assert "the other scenes are finished" in err
+    code, _, err = said(capsys, "plan", "--pipeline", run[1], "--data", run[3], "--scene", "Hamlet")
+    assert code == 1
+    assert "build-scenes" not in err  # nothing is begun that cannot be finished
+    advice = err.partition("draft them: ")[2].partition(" or make them by hand: ")
+    assert shlex.split(advice[0]) == ["aerialdojo-gen", "annotate-draft", "Hamlet", "--pipeline", run[1]]
+    by_hand = ["aerialdojo-gen", "annotate", "--scene", "Hamlet", "--pipeline", run[1], "--data", run[3]]
+    assert shlex.split(advice[2]) == by_hand
+    # A pipeline whose stages begin later leaves it out as well.
+    later = (place / run[1]).with_name("later.toml")
+    later.write_text((place / run[1]).read_text().replace('"build-scenes", "annotate-import", "anchor-sample", ', ""))
+    assert "annotate-import" not in later.read_text()
+    code, _, err = said(capsys, "run", later, "--data", run[3], "--workers", "1", "--replace")
+    assert code == 0, err
+    assert err.count("left out: Hamlet") == 1
+
+
+def test_what_cannot_be_drafted_says_why_and_what_to_do(place, capsys):
+    # A barn in a shed: nothing of it can be looked at. Flat things without a name that is a word are slabs.
+    bodies = yard(
+        ("Shed", box(12, 10, 9), (0, 0, 4.5)), ("Barn", box(8, 6, 5), (1, 0, 2.5)),
+        ("Mesh_012", box(40, 40, 0.1), (0, 0, 0)),
+    )  # fmt: skip
+    code, _, err = said(capsys, *pasted(added(capsys, bodies, "Inside"), "next: "))
+    assert code == 1
+    why = r"not taken: 1 of ground, slabs or scraps, 1 without 3 viewpoints at 1 m \(shut in, or below ground\)"
+    assert re.search(why, err), err
+    assert "aerialdojo-gen annotate --scene Inside --pipeline 'our scenes/pipeline.toml'" in err
+    assert not re.search(r"ask for|--objects", err)
+    assert not list((place / "our scenes/annotations").iterdir())
+
+
+def test_one_thing_beside_a_landmark_is_taken_with_a_warning(place, capsys):
+    out = added(capsys, yard(("Barn", box(8, 6, 5), (0, 0, 2.5)), ("Well", box(2, 2, 2), (15, 3, 1))), "Farm")
+    code, _, err = said(capsys, *pasted(out, "next: "))
+    assert code == 0, err
+    assert "one object makes no task" in err
+    assert "aerialdojo-gen annotate --scene Farm --pipeline 'our scenes/pipeline.toml'" in err
+    draft = json.loads((place / "our scenes/annotations/Farm.json").read_text())
+    assert {draft["landmarks"][0]["name"], draft["objects"][0]["name"].split()[-1]} == {"barn", "well"}
+
+
+def test_a_single_thing_is_no_scene_to_search(place, capsys):
+    out = added(capsys, yard(("Barn", box(8, 6, 5), (0, 0, 2.5))), "Alone")
+    code, _, err = said(capsys, *pasted(out, "next: "))
+    assert code == 1
+    print(err)
+    assert "nothing in it can be drafted" in err
+    assert "ask for" not in err
+    assert not list((place / "our scenes/annotations").iterdir())
+
+
+def test_numbers_that_cannot_be_had_are_the_most(place, capsys):
+    added(capsys, foreign.village(), "Village")
+    draft = ["annotate-draft", "Village", "--pipeline", "our scenes/pipeline.toml"]
+    code, _, err = said(capsys, *draft, "--objects", "1")
+    assert code == 2
+    assert "'1' is neither auto nor a number from 2 on" in err
+    code, _, err = said(capsys, *draft, "--objects", "30", "--landmarks", "1", "--quiet")
+    assert code == 0, err
+    assert len(json.loads((place / "our scenes/annotations/Village.json").read_text())["objects"]) >= 2
+
+
+@pytest.mark.pipeline
+def test_drafts_are_true_or_silent(place, capsys):
+    grey, bodies = (140, 140, 140, 255), []
+    for k in range(12):
+        bodies.append((f"Truck.{k:03d}", box(6, 2.5, 3), (12.0 * (k % 4), 14.0 * (k // 4), 1.5)))
+    # The foot of the tower reaches under the truck beside it; a crate stands on the terrace.
+    tower = trimesh.util.concatenate(
+        [trimesh.creation.box((4, 4, 20)), trimesh.creation.box((14, 6, 0.2)).apply_translation((5, 0, -9.9))]
+    )
+    bodies += [
+        ("Tower", tower, (-20, 0, 10)), ("Lorry", box(5, 2, 3), (-14.5, 0, 1.7)),
+        ("Terrace", box(9, 7, 2), (-20, 28, 1)), ("Crate_a3f9c", box(2, 2, 2), (-20, 28, 3)),
+        ("leaves", box(4, 4, 3), (22, -12, 1.5)), ("City_c3e0b", box(8, 6, 6), (44, -14, 3)),
+        ("Mesh_012", trimesh.creation.cylinder(1.5, 4), (0, -14, 2)), ("a3f9c", box(3, 3, 2), (10, -14, 1)),
+    ]  # fmt: skip
+    for name, body, _ in bodies:
+        body.visual.face_colors = (60, 150, 60, 255) if name == "leaves" else grey
+    out = added(capsys, yard(*bodies), "Depot")
+    draft = pasted(out, "next: ")
+    code, _, err = said(capsys, *draft)
+    assert code == 0, err
+    made = json.loads((place / "our scenes/annotations/Depot.json").read_text())
+    texts = [entry["description"] for entry in made["objects"]]
+    told = "\n".join([*texts, *(mark["name"] for mark in made["landmarks"])])
+    assert not re.search(r"\b(mesh|c3e0b|ceb|c e b|a3f9c|afc|a f c|\d+)\b", told), told
+    assert not re.search(r"\ba (low |tall |long )*(green )?leaves", told), told
+    by_node = {entry["node"]: entry for entry in made["objects"]}
+    assert {entry["category"] for entry in made["objects"]} >= {"truck", "object"}
+    shapes = {entry["name"] for entry in made["objects"] if entry["category"] == "object"}
+    assert shapes <= {f"{size} {form} grey object" for size in ("low", "medium-sized", "tall") for form in FORMS}
+    assert "needs a person" in err
+    for name in (mark["name"] for mark in made["landmarks"]):
+        assert name not in ("truck", "grey truck", "object"), name
+    # What the crate stands on is not told as under it.
+    assert not any("crate" in entry["description"] for entry in made["objects"] if entry["category"] == "terrace")
+    if "lorry_0000" in by_node:
+        assert not re.search(r"\bon (top of )?the tower", by_node["lorry_0000"]["description"])
+    code, _, err = said(capsys, "annotate-import", "--pipeline", draft[-1], "--data", "data", "--workers", "1")
+    assert code == 0, err
+
+
+def test_a_table_says_what_nodes_are_called(place, capsys):
+    rows = ["pattern,name,category,plural", "mesh_0*,garden shed,shed,", "a3f9*,hedges,,a row of", "*,thing,,"]
+    (place / "names.csv").write_text("\n".join(rows) + "\n")
+    nodes = [(f"mesh_0{k}", box(4, 3, 3), (12 * k, 0, 1.5)) for k in range(3)]
+    nodes += [("a3f9c", box(8, 1, 2), (8, 8, 1)), ("Fountain", box(3, 3, 2), (0, 12, 1))]
+    out = added(capsys, yard(*nodes), "Garden", "--names", "names.csv")
+    code, _, err = said(capsys, *pasted(out, "next: "))
+    assert code == 0, err
+    made = json.loads((place / "our scenes/annotations/Garden.json").read_text())
+    said_of = {entry["category"]: entry for entry in (*made["objects"],)}
+    names = [*(m["name"] for m in made["landmarks"]), *(entry["name"] for entry in made["objects"])]
+    assert any(name.endswith("garden shed") for name in names)
+    assert not any("fountain" in name for name in names)
+    if "hedges" in said_of:
+        assert "a row of" in said_of["hedges"]["description"].lower()
+    (place / "names.csv").write_text("pattern,name\n*,mesh_7\n")
+    code, _, err = said(
+        capsys, "add-scene", "Other", "Garden.glb", "--up", "z", "--project", "our scenes", "--names", "names.csv"
+    )
+    assert code == 1
+    assert "names.csv: line 2: name 'mesh_7' is no name that a person would say" in err
+
+
+@pytest.mark.parametrize(
+    ("node", "words"),
+    [
+        ("Building.012", "building"), ("StreetLamp_03", "street lamp"), ("Clock Tower", "clock tower"),
+        ("House03", "house"), ("City_c3e0b", "city"), ("Mesh_012", ""), ("Object.003", ""), ("a3f9c", ""),
+        ("deadbeef", ""), ("Cube.001", ""), ("geometry_0", ""), ("way/123456", ""), ("node_x2y", ""), ("grp_mdl", ""),
+        ("Cafe_LOD0", "cafe"), ("3f2504e0-4f89-11d3-9a0c-0305e82c3301", ""), ("Bus.Mesh", "bus"), ("", ""),
+        ("tree_tree_7", "tree"), ("オブジェクト", ""),
+    ],
+)  # fmt: skip
+def test_words_are_read_out_of_node_names_and_nothing_else(node, words):
+    assert " ".join(words_in(node)) == words
+
+
+@pytest.mark.parametrize(
+    ("name", "group"),
+    [("autumn leaves", "a group of"), ("bus", ""), ("glass", ""), ("grass", "a patch of"), ("trees", "a group of"),
+     ("truss", ""), ("lens", ""), ("people", "a group of"), ("tower", ""), ("rubble", "a heap of")],
+)  # fmt: skip
+def test_what_is_many_is_told_as_a_group(name, group):
+    assert group_of(name) == group
