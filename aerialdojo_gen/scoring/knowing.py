@@ -8,8 +8,6 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 TELLS_WEIGHT, FRONT_WEIGHT = 0.35, 0.3
-# Within it an object counts as seen from its front: a step in the marks, which a little more light must not outweigh.
-FRONT_RAD = float(np.radians(60.0))
 _ANGLES_RAD, _MARKS = np.radians([0.0, 25.0, 60.0, 60.001, 120.0]), (1.0, 1.0, 0.5, 0.15, 0.0)
 
 

@@ -11,7 +11,7 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from aerialdojo_gen.geometry.motion import DISPLACEMENTS, TURNS
-from aerialdojo_gen.scoring.knowing import FRONT_RAD
+from aerialdojo_gen.geometry.telling import FRONT_RAD
 from aerialdojo_gen.stats.comparison import Column, Comparison, Figure, Row
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.root import Where, open_root

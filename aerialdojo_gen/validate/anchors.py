@@ -8,8 +8,9 @@ import numpy as np
 
 from aerialdojo_gen.geometry.angles import wrap_angle_rad, yaw_towards
 from aerialdojo_gen.geometry.surface import Surface
+from aerialdojo_gen.geometry.telling import FRONT_RAD
 from aerialdojo_gen.scoring.geometric import FACTORS, WEIGHTS
-from aerialdojo_gen.scoring.knowing import FRONT_RAD, FRONT_WEIGHT, TELLS_WEIGHT, clarity
+from aerialdojo_gen.scoring.knowing import FRONT_WEIGHT, TELLS_WEIGHT, clarity
 from aerialdojo_gen.scoring.panel import SCORERS
 from aerialdojo_gen.stages.work.anchor_choice import SLACK_M
 from aerialdojo_gen.validate.links import sound

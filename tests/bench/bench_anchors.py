@@ -22,9 +22,9 @@ import numpy as np
 
 from aerialdojo_gen.common.rng import generator
 from aerialdojo_gen.config.pipeline import load_pipeline
+from aerialdojo_gen.geometry.telling import FRONT_RAD
 from aerialdojo_gen.pipeline.stage import Job, Roots
 from aerialdojo_gen.scoring.geometric import judge
-from aerialdojo_gen.scoring.knowing import FRONT_RAD
 from aerialdojo_gen.stages.work.anchor_pictures import Looked
 from aerialdojo_gen.stages.work.anchor_sample import candidates_of
 from aerialdojo_gen.stages.work.anchor_world import World

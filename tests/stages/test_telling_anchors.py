@@ -12,11 +12,10 @@ from aerialdojo_gen.config.sections import AnchorSampleConfig, Embodiment
 from aerialdojo_gen.geometry.cameras import Camera, project, view_pose
 from aerialdojo_gen.geometry.rays import RayCaster
 from aerialdojo_gen.geometry.surface import Surface
-from aerialdojo_gen.geometry.telling import Patch, in_picture, off_front_rad, seen_share
+from aerialdojo_gen.geometry.telling import FRONT_RAD, Patch, in_picture, off_front_rad, seen_share
 from aerialdojo_gen.pipeline.stage import Job, Roots
 from aerialdojo_gen.scenes.anatomy import Anatomy, Run
 from aerialdojo_gen.scenes.model import Instance
-from aerialdojo_gen.scoring.knowing import FRONT_RAD
 from aerialdojo_gen.stages.work.anchor_sample import anchors_of
 from aerialdojo_gen.stages.work.anchor_world import World
 from aerialdojo_gen.stages.work.step_back import fitting_m, step_back_m

@@ -15,9 +15,9 @@ from aerialdojo_gen.config.sections import AnchorSampleConfig
 from aerialdojo_gen.errors import AnnotationError
 from aerialdojo_gen.geometry.angles import wrap_angle_rad
 from aerialdojo_gen.geometry.surface import Surface
+from aerialdojo_gen.geometry.telling import FRONT_RAD
 from aerialdojo_gen.pipeline.stage import Job
 from aerialdojo_gen.scoring.geometric import judge
-from aerialdojo_gen.scoring.knowing import FRONT_RAD
 from aerialdojo_gen.scoring.panel import SCORERS
 from aerialdojo_gen.stages.work.anchor_pictures import Looked
 from aerialdojo_gen.stages.work.anchor_world import Candidates, World

@@ -16,12 +16,11 @@ from aerialdojo_gen.config.sections import AnchorSampleConfig
 from aerialdojo_gen.errors import StoreError
 from aerialdojo_gen.geometry.angles import yaw_towards
 from aerialdojo_gen.geometry.surface import Surface
-from aerialdojo_gen.geometry.telling import off_front_rad
+from aerialdojo_gen.geometry.telling import FRONT_RAD, off_front_rad
 from aerialdojo_gen.geometry.viewpoints import around, shortlist
 from aerialdojo_gen.pipeline.stage import Job, Output
 from aerialdojo_gen.scenes.model import Instance
 from aerialdojo_gen.scoring.geometric import judge
-from aerialdojo_gen.scoring.knowing import FRONT_RAD
 from aerialdojo_gen.scoring.panel import panel
 from aerialdojo_gen.stages.work.anchor_choice import with_choice
 from aerialdojo_gen.stages.work.anchor_pictures import Looked

@@ -13,7 +13,7 @@ from aerialdojo_gen.config.sections import AnchorSampleConfig
 from aerialdojo_gen.geometry.cameras import Camera
 from aerialdojo_gen.geometry.rays import RayCaster, TriangleRayCaster, instance_caster
 from aerialdojo_gen.geometry.surface import Surface
-from aerialdojo_gen.geometry.telling import Patch, off_front_rad, seen_share
+from aerialdojo_gen.geometry.telling import FRONT_RAD, Patch, off_front_rad, seen_share
 from aerialdojo_gen.geometry.viewpoints import Views, informativeness, look
 from aerialdojo_gen.planning.clearance import ClearanceGrid
 from aerialdojo_gen.planning.collision import CollisionWorld, collision_world
@@ -21,7 +21,7 @@ from aerialdojo_gen.rendering.casters import ray_caster
 from aerialdojo_gen.rendering.raycast import ray_renderer
 from aerialdojo_gen.scenes.model import Instance, Scene
 from aerialdojo_gen.scoring.base import AnchorView
-from aerialdojo_gen.scoring.knowing import FRONT_RAD, fronting, knowing, telling
+from aerialdojo_gen.scoring.knowing import fronting, knowing, telling
 from aerialdojo_gen.scoring.views import take_view
 
 Floats = NDArray[np.float64]
