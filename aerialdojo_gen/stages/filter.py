@@ -20,7 +20,7 @@ def run(job: Job, config: FilterConfig) -> Output:
 STAGE = Stage(
     "filter",
     "Keep the candidates that make tasks, with a reason for every rejection.",
-    reads=("pairs", "plans"),
+    reads=("scenes", "objects", "pairs", "plans"),
     writes=("verdicts",),
     run=run,
 )

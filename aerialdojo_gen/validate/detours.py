@@ -10,8 +10,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from itertools import pairwise
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from aerialdojo_gen.config.sections import Rung
 from aerialdojo_gen.planning.attempt import costs_at
@@ -19,7 +22,8 @@ from aerialdojo_gen.planning.clearance import ClearanceGrid
 from aerialdojo_gen.planning.collision import CollisionWorld
 from aerialdojo_gen.planning.cost_to_go import columns_by_distance, expand_cost, seed_goal
 from aerialdojo_gen.planning.planner import Planner
-from aerialdojo_gen.planning.preference import NO_PREFERENCE, narrow_cells
+from aerialdojo_gen.planning.preference import NO_PREFERENCE, astray, narrow_cells, squeeze
+from aerialdojo_gen.store.schemas import APPROACH
 from aerialdojo_gen.validate.registry import Finding, check
 from aerialdojo_gen.validate.rows import Floats, Rows, SceneData
 from aerialdojo_gen.validate.scene_mesh import scene_mesh
@@ -34,7 +38,8 @@ _ROOM_M = 0.05
 _CELL_M, _LONGER_M, _LONGER_SHARE = 1.0, 4.5, 0.1
 # The wide search: all but exhaustive (of the planner's own routes 4 % longer at most), a second a route.
 _WIDE = Rung(weight=0.97, budget=400_000, duplicate_cell_m=0.25)
-_SHORTER_M, _SHORTER_SHARE = 1.0, 0.06
+# Of what routes are searched for. The planner's own, where a grid or their corners cast doubt on them, go to 0.14.
+_SHORTER_M, _SHORTER_SHARE = 1.0, 0.15
 
 
 @check("routes", needs=("mesh",), after=_FITS, samples=True)
@@ -49,7 +54,7 @@ def needless_piece(data: SceneData, _rows: Rows) -> Iterator[Finding]:
             continue
         for first, last, flown, straight in _pieces(positions):
             if _straight_is_free(world, positions[first], positions[last], room):
-                if _flown_shorter(data, k, 0.0) is None:
+                if _flown_shorter(data, k) is None:
                     break
                 found = f"{flown:.2f} m from pose {first} to pose {last}"
                 yield Finding(row, found, f"{straight:.2f} m: the straight way is free")
@@ -84,16 +89,17 @@ def long_way_round(data: SceneData, rows: Rows) -> Iterator[Finding]:
         ways = np.asarray(costs_at(np.ascontiguousarray(paths.starts[own, :3]), grid.arrays, cost))
         over = paths.length_m[own] - ways
         for k in np.flatnonzero(over > np.maximum(_LONGER_M, _LONGER_SHARE * ways)):
-            shorter = _flown_shorter(data, int(own[k]), _SHORTER_SHARE)
+            shorter = _flown_shorter(data, int(own[k]))
             if shorter is not None:
                 found = f"L = {paths.length_m[own[k]]:.2f} m"
                 yield Finding(int(paths.rows[own[k]]), found, f"{shorter:.2f} m, by a wider search")
 
 
-def _flown_shorter(data: SceneData, k: int, share: float) -> float | None:
-    """Metres of a route that the wide search finds, where it is clearly shorter than path `k`; else None.
+def _flown_shorter(data: SceneData, k: int) -> float | None:
+    """Metres of a route that the wide search finds, where it is clearly better than path `k`; else None.
 
-    Clearly is by `_SHORTER_M`, and by a share of the path.
+    Clearly is by `_SHORTER_M`, and by a share, of what routes are searched for: metres, and what they cost beside for
+    surfaces that they come near and an Approach that does not fly ahead (`aerialdojo_gen.planning.preference`).
     """
     planner = data.kept.get("wide")
     if not isinstance(planner, Planner):
@@ -102,12 +108,28 @@ def _flown_shorter(data: SceneData, k: int, share: float) -> float | None:
         data.kept["wide"] = planner
     paths = data.paths
     where = paths.of(k)
-    start = [*paths.xyz[where][0], paths.yaw[where][0]]
-    goal = [*paths.xyz[where][-1], paths.yaw[where][-1]]
-    (route,) = planner.plan_target(goal, [start])
-    length = float(paths.length_m[k])
-    worse = route.outcome != "SOLVED" or length - route.length_m <= max(_SHORTER_M, share * length)
-    return None if worse else float(route.length_m)
+    poses = np.column_stack([paths.xyz[where], paths.yaw[where]])
+    (route,) = planner.plan_target(poses[-1], [poses[0]])
+    if route.outcome != "SOLVED":
+        return None
+    own, other = _cost_m(planner, poses, paths.action[where]), _cost_m(planner, route.poses, route.actions)
+    return None if own - other <= max(_SHORTER_M, _SHORTER_SHARE * own) else float(route.length_m)
+
+
+def _cost_m(planner: Planner, poses: Floats, actions: NDArray[np.integer[Any]]) -> float:
+    """What a route costs in the planner's metres: its length, and what it had rather not do."""
+    plan, grid = planner.config, planner.grid.arrays
+    total = 0.0
+    for here, there in pairwise(poses[:, :3].tolist()):
+        total += math.dist(here, there) + squeeze(
+            *here, *there, plan.clearance_preference_m, plan.clearance_weight, *grid.origin.tolist(), grid.cell,
+            grid.field,
+        )  # fmt: skip
+    if len(actions) > 1 and actions[-2] == APPROACH:
+        dx, dy, dz = (poses[-1, :3] - poses[-2, :3]).tolist()
+        ahead = math.cos(math.radians(plan.max_approach_angle_deg))
+        total += astray(dx, dy, float(poses[-1, 3]), math.hypot(dx, dy, dz), ahead, plan.approach_detour_m)
+    return total
 
 
 def _pieces(positions: Floats) -> list[tuple[int, int, float, float]]:

@@ -26,6 +26,8 @@ _SAVED_BY_APPROACH = math.hypot(1.0, 1.0 / math.cos(math.pi / 24)) - 1.0
 # Where something is seen its view is known; 0 with the word, and a share without, are not.
 # Of a point: a share times the number of points is whole.
 _WHOLE = 1e-6
+# Rays to points of the object that meet its own edges.
+_EITHER_WAY = 2
 _UNSEEN = "nothing is seen, and no view is named"
 _OF_ROUTE = (
     "list_lengths_differ", "action_order", "n_actions", "route_length", "euclidean_distance", "replay_differs",
@@ -164,9 +166,10 @@ def start_view(data: SceneData, rows: Rows) -> Iterator[Finding]:
                 view for view, seen in zip(VIEWS, shown, strict=True) if seen.sum() == np.sum(shown, axis=1).max()
             }
             row = int(paths.rows[k])
-            # A ray along an edge may go either way; a share is one of so many points all the same.
-            whole, counted = max(int(bare.sum()), 1), told[row] * max(int(bare.sum()), 1)
-            if abs(share - told[row]) > 2.5 / whole or abs(counted - round(counted)) > _WHOLE:
+            # A ray along an edge may go either way, the object's own edge too; points are whole all the same.
+            whole = max(int(bare.sum()), 1)
+            counted = told[row] * np.arange(max(whole - _EITHER_WAY, 1), whole + _EITHER_WAY + 1)
+            if abs(share - told[row]) > 2.5 / whole or np.abs(counted - np.rint(counted)).min() > _WHOLE:
                 yield Finding(row, f"target_visible_at_start = {told[row]:.3f}", f"{share:.3f}")
             elif (views[row] is None) != (told[row] == 0.0) or (share and told[row] and views[row] not in best):
                 wanted = " or ".join(sorted(best)) if share else _UNSEEN

@@ -12,8 +12,8 @@ import numpy as np
 
 from aerialdojo_gen.benchmark.motion import FlightSpace
 from aerialdojo_gen.benchmark.oracle import LEAST_SPL, Reference, fly, shortcoming
-from aerialdojo_gen.benchmark.viewpoints import in_sight
 from aerialdojo_gen.config.agreement import NEAR_GOAL_M, SUCCESS_RADIUS_M
+from aerialdojo_gen.rendering.sight import in_sight
 from aerialdojo_gen.store.schemas import APPROACH, STOP
 from aerialdojo_gen.validate.registry import ALWAYS_AFTER, Finding, UncheckedError, check
 from aerialdojo_gen.validate.rows import Ints, Mask, Rows, SceneData

@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
 
 import numpy as np
 import pyarrow as pa
+import pyarrow.compute as pc
 from numpy.typing import NDArray
 
 from aerialdojo_gen.common.advice import command
 from aerialdojo_gen.config.sections import FilterConfig, Setting
 from aerialdojo_gen.errors import StoreError
 from aerialdojo_gen.pipeline.stage import Job, Output
-from aerialdojo_gen.store.schemas import SETTINGS, VERDICTS
+from aerialdojo_gen.rendering.sight import in_sight
+from aerialdojo_gen.scenes.model import Scene
+from aerialdojo_gen.store.schemas import APPROACH, SETTINGS, VERDICTS
 from aerialdojo_gen.store.schemas.columns import DIFFICULTY, START_VIEW
 
 KEPT = "kept"
@@ -88,8 +92,50 @@ def judge(
     return reason, setting
 
 
+def sees_target(scene: Scene, nodes: Sequence[str], ends: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Tell from which places agents see the targets that they have stopped for.
+
+    Parameters
+    ----------
+    scene : Scene
+    nodes : sequence of str
+        n nodes of targets.
+    ends : (n, 3) float64
+        Where they stop, metres, world frame.
+
+    Returns
+    -------
+    (n,) bool
+        Whether a straight line reaches the target (`aerialdojo_gen.rendering.sight.in_sight`).
+    """
+    known: dict[tuple[str, bytes], bool] = {}
+    for node, end in zip(nodes, ends, strict=True):
+        if (node, end.tobytes()) not in known:
+            known[node, end.tobytes()] = in_sight(scene, node, end)
+    return np.array([known[node, end.tobytes()] for node, end in zip(nodes, ends, strict=True)], dtype=np.bool_)
+
+
+def _stops(plans: pa.Table) -> NDArray[np.float64]:
+    """Where routes end without their Approach, which agents have not, (n, 3) float64."""
+    starts = np.cumsum([0, *pc.list_value_length(plans["action"]).to_pylist()])
+    actions = pc.list_flatten(plans["action"]).to_numpy()
+    last = starts[1:] - 1
+    last -= (np.diff(starts) > 1) & (actions[np.maximum(last - 1, 0)] == APPROACH)
+    return np.column_stack([pc.list_flatten(plans[f"{axis}_m"]).to_numpy()[last] for axis in "xyz"])
+
+
+def _hidden_at_stop(job: Job, plans: pa.Table, targets: pa.Table) -> NDArray[np.bool_]:
+    """Which of some routes end, flown without their Approach, where nothing of the target is in sight."""
+    if not plans.num_rows:
+        return np.zeros(0, dtype=np.bool_)
+    objects = job.read("objects").select(["object_id", "mesh_node"])
+    index = pc.index_in(targets["target_object_id"], value_set=objects["object_id"].combine_chunks())
+    nodes = objects["mesh_node"].take(index).to_pylist()
+    return ~sees_target(job.scene_model(), nodes, _stops(plans))
+
+
 def run(job: Job, config: FilterConfig) -> Output:
-    """Judge every candidate of a scene.
+    """Judge every candidate of a scene by `judge`, and then by what its agent sees at the end (``"target_hidden"``).
 
     Raises
     ------
@@ -98,7 +144,10 @@ def run(job: Job, config: FilterConfig) -> Output:
     """
     pairs = job.read("pairs")
     told = [field.name for field in DIFFICULTY]
-    plans = job.read("plans").select(["pair_id", "outcome", "length_m", "n_actions", *told]).sort_by("pair_id")
+    flown = ["x_m", "y_m", "z_m", "action"]
+    plans = (
+        job.read("plans").select(["pair_id", "outcome", "length_m", "n_actions", *told, *flown]).sort_by("pair_id")
+    )
     if not plans.column("pair_id").combine_chunks().equals(pairs.column("pair_id").combine_chunks()):
         raise StoreError(
             f"plans of {job.scene} are not those of its pairs: run {command('plan', scene=job.scene, force=True)}"
@@ -112,6 +161,8 @@ def run(job: Job, config: FilterConfig) -> Output:
         for table, name in ((plans, "plan_detour"), (pairs, "target_visible_at_start"))
     )
     reason, setting = judge(outcome, euclidean, length, n_actions, config, detour, visible)
+    fit = np.flatnonzero(reason == KEPT)
+    reason[fit[_hidden_at_stop(job, plans.take(fit), pairs.take(fit))]] = "target_hidden"
     solved = outcome == "SOLVED"
     budgets = {name: rule.action_budget for name, rule in zip(SETTINGS, settings_of(config), strict=True)}
     n = len(outcome)
