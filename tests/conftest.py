@@ -7,11 +7,14 @@ import os
 import shutil
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import hypothesis
 import pytest
+
+from aerialdojo_gen.common import advice
 
 if TYPE_CHECKING:
     from support.planting import Planted
@@ -35,6 +38,13 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             item.add_marker(BY_FIXTURE[fixture])
         if not NOT_FAST & {mark.name for mark in item.iter_markers()}:
             item.add_marker("fast")
+
+
+@pytest.fixture(autouse=True)
+def nothing_given() -> Iterator[None]:
+    """Advice repeats what a command was given: in one process the next test was given nothing."""
+    with advice.as_given(advice.Given()):
+        yield
 
 
 @pytest.fixture(scope="session")

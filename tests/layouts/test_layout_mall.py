@@ -123,7 +123,8 @@ def test_every_look_of_every_urban_prop(theme: str, catalogue: Catalogue) -> Non
             body = catalogue.instantiate(category, "x", generator(0, "test", category), variant=variant.name)
             triangles = sum(len(p.faces) for p in body.parts)
             low, high = body.bounds
-            assert 12 <= triangles <= 1500, (category, variant.name, triangles)
+            # A stack of pallets is made of boards.
+            assert 12 <= triangles <= 3000, (category, variant.name, triangles)
             assert -0.05 <= low[2] < 0.5 or category in HUNG, (category, low)
             assert 0.4 < (high - low).max() < 25.0, (category, high - low)
 
