@@ -1,5 +1,6 @@
 """The release of a hand-made scene: counts, both instances together, and nothing about the target in `tasks`."""
 
+import hashlib
 import math
 import re
 import shutil
@@ -9,7 +10,8 @@ import pandas as pd
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from support.handmade import OPINIONS
+from support.handmade import OPINIONS, box, instance
+from support.handmade import scene as handmade_scene
 
 from aerialdojo_gen.config.sections import Embodiment, FilterConfig, SplitConfig
 from aerialdojo_gen.pipeline.stage import Job, Roots
@@ -17,6 +19,7 @@ from aerialdojo_gen.release.card import write_card
 from aerialdojo_gen.release.contents import counts
 from aerialdojo_gen.release.ids import held_out, key_of, nav_id, reference_id
 from aerialdojo_gen.release.select import train_counts, train_mask
+from aerialdojo_gen.scenes.glb import write_glb
 from aerialdojo_gen.stages.work import filter as filter_stage
 from aerialdojo_gen.stages.work import split
 from aerialdojo_gen.store import schemas
@@ -83,9 +86,14 @@ def data(tmp_path_factory):
     """A data directory with everything upstream of split, and split's own output."""
     data = tmp_path_factory.mktemp("data")
     pairs, plans = zip(*rows_of_pairs_and_plans(), strict=True)
+    things = [
+        instance(f"thing_{i:03}", box(tuple(position(i) - 0.5), tuple(position(i) + 0.5))) for i in range(N_OBJECTS)
+    ]
+    write_glb(handmade_scene(*things, half=60.0, ceiling=20.0, name=SCENE), data / "x.glb")
+    digest = hashlib.sha256((data / "x.glb").read_bytes()).hexdigest()
     scene = {
         "scene": SCENE, "family": "Urban", "scene_type": "Test", "partition": "ID", "mesh_path": "x.glb",
-        "mesh_sha256": "0", "min_x_m": 0.0, "min_y_m": 0.0, "min_z_m": 0.0, "max_x_m": 50.0, "max_y_m": 50.0,
+        "mesh_sha256": digest, "min_x_m": 0.0, "min_y_m": 0.0, "min_z_m": 0.0, "max_x_m": 50.0, "max_y_m": 50.0,
         "max_z_m": 20.0, "ceiling_m": 20.0, "n_triangles": 12, "n_instances": 7, "n_categories": 2,
     }  # fmt: skip
     landmark = {
