@@ -7,6 +7,9 @@ import io
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+from numpy.typing import NDArray
+
 from aerialdojo_gen.common import text_table
 from aerialdojo_gen.common.text_table import TextTable
 
@@ -150,6 +153,19 @@ class Comparison:
             for row in self.rows
             for column, ours, paper in zip(self.columns, row.ours, row.paper, strict=True)
         ]
+
+
+def quantile(values: NDArray[np.float64], q: float) -> Figure:
+    """Quantile of the values that are known, None without any."""
+    known = values[np.isfinite(values)]
+    return float(np.quantile(known, q)) if len(known) else None
+
+
+def own_table(title: str, key: str, columns: tuple[Column, ...], rows: list[tuple[str, tuple[Figure, ...]]],
+           notes: tuple[str, ...] = ()) -> Comparison:  # fmt: skip
+    """Make a table that the paper has nothing of."""
+    none: tuple[Figure, ...] = (None,) * len(columns)
+    return Comparison(title, key, columns, tuple(Row(name, ours, none) for name, ours in rows), notes)
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ import pyarrow.compute as pc
 from numpy.typing import NDArray
 
 from aerialdojo_gen.common.terms import DETOUR
-from aerialdojo_gen.stats.comparison import Column, Comparison, Figure, Row
+from aerialdojo_gen.stats.comparison import Column, Comparison, Figure, own_table, quantile
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.root import Where, open_root
 from aerialdojo_gen.store.schemas import SETTINGS, TOLD_OF_SPLITS
@@ -107,11 +107,6 @@ def _percent(mask: NDArray[np.bool_]) -> Figure:
     return 100.0 * float(np.mean(mask)) if len(mask) else None
 
 
-def _quantile(values: Floats, q: float) -> Figure:
-    known = values[np.isfinite(values)]
-    return float(np.quantile(known, q)) if len(known) else None
-
-
 # The last two are of the table by setting alone: scenes fit a terminal without them.
 _COLUMNS = (
     Column("tasks", exact=False),
@@ -136,29 +131,22 @@ NOTES = (
 def _figures(tasks: Tasks) -> tuple[Figure, ...]:
     return (
         len(tasks),
-        _quantile(tasks.plan_detour, 0.5),
-        _quantile(tasks.plan_detour, 0.9),
+        quantile(tasks.plan_detour, 0.5),
+        quantile(tasks.plan_detour, 0.9),
         _percent(tasks.plan_detour < DETOUR),
         _percent(tasks.straight_line_free == 1.0),
         _percent(tasks.target_visible_at_start > 0.0),
-        _quantile(tasks.climb_m, 0.5),
-        _quantile(tasks.climb_m, 0.9),
+        quantile(tasks.climb_m, 0.5),
+        quantile(tasks.climb_m, 0.9),
         _percent(tasks.target_visible_at_start >= 0.5),
     )
-
-
-def _plain(title: str, key: str, columns: tuple[Column, ...], rows: list[tuple[str, tuple[Figure, ...]]],
-           notes: tuple[str, ...] = ()) -> Comparison:  # fmt: skip
-    """Make a table that the paper has nothing of."""
-    none: tuple[Figure, ...] = (None,) * len(columns)
-    return Comparison(title, key, columns, tuple(Row(name, ours, none) for name, ours in rows), notes)
 
 
 def setting_table(tasks: Tasks) -> Comparison:
     """Say how hard tasks are by length setting."""
     rows = [(_NAMES[s], _figures(tasks.of(tasks.setting == s))) for s in SETTINGS]
     rows.append(("all", _figures(tasks)))
-    return _plain("Difficulty by length setting", "setting", _COLUMNS, rows, NOTES)
+    return own_table("Difficulty by length setting", "setting", _COLUMNS, rows, NOTES)
 
 
 def scene_table(tasks: Tasks) -> Comparison:
@@ -166,7 +154,7 @@ def scene_table(tasks: Tasks) -> Comparison:
     names = list(dict.fromkeys(tasks.scene.tolist()))
     rows = [(name, _figures(tasks.of(tasks.scene == name))[:_OF_SCENES]) for name in names]
     rows.append(("all", _figures(tasks)[:_OF_SCENES]))
-    return _plain("Difficulty by scene", "scene", _COLUMNS[:_OF_SCENES], rows)
+    return own_table("Difficulty by scene", "scene", _COLUMNS[:_OF_SCENES], rows)
 
 
 def seen_table(tasks: Tasks) -> Comparison:
@@ -192,7 +180,7 @@ def seen_table(tasks: Tasks) -> Comparison:
 
     rows = [(f"{p} test", figures(test.of(test.partition == p))) for p in ("ID", "OOD")]
     notes = ("Test tasks by the paper's split; new: no training task of the partition has it.",)
-    return _plain("What the paper's split leaves unseen", "split", columns, [*rows, ("all", figures(test))], notes)
+    return own_table("What the paper's split leaves unseen", "split", columns, [*rows, ("all", figures(test))], notes)
 
 
 def held_out_table(tasks: Tasks) -> Comparison:
@@ -213,7 +201,7 @@ def held_out_table(tasks: Tasks) -> Comparison:
         for p in ("ID", "OOD") for side in ("train", "test")
     ]  # fmt: skip
     notes = ("new: of an object that is held out, which no training task of this split has.",)
-    return _plain("The split by objects", "target_split", columns, [*rows, ("all", figures(tasks))], notes)
+    return own_table("The split by objects", "target_split", columns, [*rows, ("all", figures(tasks))], notes)
 
 
 def difficulty_tables(tasks: Tasks) -> list[Comparison]:

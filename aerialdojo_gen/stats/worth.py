@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from aerialdojo_gen.geometry.motion import DISPLACEMENTS, TURNS
 from aerialdojo_gen.geometry.telling import FRONT_RAD
-from aerialdojo_gen.stats.comparison import Column, Comparison, Figure, Row
+from aerialdojo_gen.stats.comparison import Column, Comparison, Figure, own_table, quantile
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.root import Where, open_root
 from aerialdojo_gen.store.schemas import FAMILIES, SETTINGS
@@ -152,11 +152,6 @@ def _mean(values: Floats) -> Figure:
     return 100.0 * float(known.mean()) if len(known) else None
 
 
-def _quantile(values: Floats, q: float) -> Figure:
-    known = values[np.isfinite(values)]
-    return float(np.quantile(known, q)) if len(known) else None
-
-
 def goal_table(goals: Goals) -> Comparison:
     """Say by family what goals show."""
     columns = (
@@ -174,7 +169,7 @@ def goal_table(goals: Goals) -> Comparison:
             _share(told == 1.0, np.isfinite(told)),
             _mean(goals.unoccluded[own]),
             _mean(goals.framed[own]),
-            _quantile(goals.step_back_m[own], 0.5),
+            quantile(goals.step_back_m[own], 0.5),
         )
 
     there = sorted(set(goals.family.tolist()), key=lambda name: ([*FAMILIES.values(), name].index(name), name))
@@ -187,10 +182,7 @@ def goal_table(goals: Goals) -> Comparison:
         "and that is within the picture, mean. back: how far behind the anchor it is",
         "taken, median.",
     )
-    none: tuple[Figure, ...] = (None,) * len(columns)
-    return Comparison(
-        "What goals show", "family", columns, tuple(Row(name, ours, none) for name, ours in rows), notes
-    )
+    return own_table("What goals show", "family", columns, rows, notes)
 
 
 def flight_table(flights: Flights) -> Comparison:
@@ -206,9 +198,9 @@ def flight_table(flights: Flights) -> Comparison:
         actions = int(flights.n_actions[own].sum())
         return (
             int(own.sum()),
-            _quantile(flights.min_clearance_m[own], 0.5),
-            _quantile(flights.min_clearance_m[own], 0.1),
-            _quantile(flights.n_actions[own].astype(np.float64), 0.5),
+            quantile(flights.min_clearance_m[own], 0.5),
+            quantile(flights.min_clearance_m[own], 0.1),
+            quantile(flights.n_actions[own].astype(np.float64), 0.5),
             100.0 * float(flights.n_turns[own].sum()) / actions if actions else None,
             100.0 * float(flights.sideways_m[own].sum()) / level if level else None,
         )
@@ -220,10 +212,7 @@ def flight_table(flights: Flights) -> Comparison:
         "actions: median. turns: of all actions. sideways: of the horizontal metres,",
         "but for the last three, where the camera should see the goal.",
     )
-    none: tuple[Figure, ...] = (None,) * len(columns)
-    return Comparison(
-        "How reference routes fly", "setting", columns, tuple(Row(name, ours, none) for name, ours in rows), notes
-    )
+    return own_table("How reference routes fly", "setting", columns, rows, notes)
 
 
 def worth_tables(data: Where, scenes: Sequence[str]) -> list[Comparison]:
