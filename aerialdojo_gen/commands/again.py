@@ -4,14 +4,11 @@ from __future__ import annotations
 
 import os
 import shlex
-import shutil
 import sys
 from collections.abc import Sequence
-from pathlib import Path
 
+from aerialdojo_gen.common import advice
 from aerialdojo_gen.common.secrets import Secrets
-
-NAME = "aerialdojo-gen"
 
 
 def again(more: Sequence[str], *, without: Sequence[str] = (), data: str | None = None) -> str:
@@ -35,17 +32,10 @@ def again(more: Sequence[str], *, without: Sequence[str] = (), data: str | None 
     if data is not None and os.environ.get("AERIALDOJO_DATA") and not _names(kept, "--data"):
         kept += ["--data", data]
     kept += [argument for argument in more if argument not in kept]
-    return Secrets().text(shlex.join([*_program(), *kept]))
+    called = advice.program(sys.argv[0])
+    program = [called] if called else [sys.executable, "-m", "aerialdojo_gen.cli"]
+    return Secrets().text(shlex.join([*program, *kept]))
 
 
 def _names(arguments: Sequence[str], option: str) -> bool:
     return any(argument == option or argument.startswith(f"{option}=") for argument in arguments)
-
-
-def _program() -> list[str]:
-    """Return how this program is called: by its name where the shell finds it by that, else as it was."""
-    called = Path(sys.argv[0])
-    if called.name != NAME:
-        return [sys.executable, "-m", "aerialdojo_gen.cli"]
-    found = shutil.which(NAME)
-    return [NAME] if found is not None and Path(found).resolve() == called.resolve() else [sys.argv[0]]

@@ -58,11 +58,26 @@ def begin(called_as: str = "") -> None:
     called_as : str
         The path that the program was started by, which is what is advised where its name alone finds nothing.
     """
-    program = _NOW[0].program
-    if Path(called_as).name == PROGRAM:
-        found = shutil.which(PROGRAM)
-        program = PROGRAM if found and Path(found).resolve() == Path(called_as).resolve() else _from_here(called_as)
-    _NOW[0] = Given(program=program)
+    _NOW[0] = Given(program=program(called_as) or _NOW[0].program)
+
+
+def program(called_as: str) -> str:
+    """Say how the command line is called: by its name where a shell finds it by that, else by its path.
+
+    Parameters
+    ----------
+    called_as : str
+        The path that the program was started by.
+
+    Returns
+    -------
+    str
+        Empty where that is another program.
+    """
+    if Path(called_as).name != PROGRAM:
+        return ""
+    found = shutil.which(PROGRAM)
+    return PROGRAM if found and Path(found).resolve() == Path(called_as).resolve() else _from_here(called_as)
 
 
 @contextmanager

@@ -161,8 +161,13 @@ def quantile(values: NDArray[np.float64], q: float) -> Figure:
     return float(np.quantile(known, q)) if len(known) else None
 
 
-def own_table(title: str, key: str, columns: tuple[Column, ...], rows: list[tuple[str, tuple[Figure, ...]]],
-           notes: tuple[str, ...] = ()) -> Comparison:  # fmt: skip
+def own_table(
+    title: str,
+    key: str,
+    columns: tuple[Column, ...],
+    rows: list[tuple[str, tuple[Figure, ...]]],
+    notes: tuple[str, ...] = (),
+) -> Comparison:
     """Make a table that the paper has nothing of."""
     none: tuple[Figure, ...] = (None,) * len(columns)
     return Comparison(title, key, columns, tuple(Row(name, ours, none) for name, ours in rows), notes)
