@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Annotated
 
 import typer
 
@@ -26,7 +27,7 @@ from aerialdojo_gen.pipeline.registry import BY_NAME, STAGES
 app = typer.Typer()
 
 # Stages whose command has options of its own.
-_WITH_OPTIONS = ("split", "render")
+_WITH_OPTIONS = ("plan", "split", "render")
 
 
 def _stage_command(name: str) -> Callable[..., None]:
@@ -46,6 +47,22 @@ def _stage_command(name: str) -> Callable[..., None]:
 for _stage in STAGES:
     if _stage.name not in _WITH_OPTIONS:
         app.command(_stage.name, help=_stage.help)(_stage_command(_stage.name))
+
+
+@app.command("plan", help=BY_NAME["plan"].help)
+def plan(
+    data: Data = "data", scene: Scene = None, pipeline: PipelineFile = None,
+    workers: Workers = None, force: Force = False, quiet: Quiet = False,
+    every: Annotated[
+        bool, typer.Option("--all", help="Search all candidates, also those that the release does not need.")
+    ] = False,
+    executor: ExecutorName = "local", address: Address = None,
+) -> None:  # fmt: skip
+    """Plan reference trajectories, with what they need upstream."""
+    run_until(
+        "plan", data=data, scene=scene, pipeline=pipeline, workers=workers, force=force, quiet=quiet,
+        executor=executor, address=address, search="all" if every else None,
+    )  # fmt: skip
 
 
 @app.command("split", help=BY_NAME["split"].help)

@@ -14,7 +14,9 @@ ACTION_NAMES = (
 )  # fmt: skip
 STOP, MOVE_UP_1, MOVE_DOWN_1, TURN_LEFT, TURN_RIGHT, APPROACH = 0, 10, 12, 14, 15, 16
 
-OUTCOMES = ("SOLVED", "START_IN_COLLISION", "GOAL_IN_COLLISION", "NO_PATH", "NEAR_STRAIGHT", "BUDGET_EXHAUSTED")
+OUTCOMES = (
+    "SOLVED", "START_IN_COLLISION", "GOAL_IN_COLLISION", "NO_PATH", "NEAR_STRAIGHT", "BUDGET_EXHAUSTED", "NOT_NEEDED",
+)  # fmt: skip
 SETTINGS = ("base", "standard", "long_horizon")
 SUBSETS = ("id_train", "id_test", "ood_train", "ood_test")
 DIRECTIONS = ("east", "northeast", "north", "northwest", "west", "southwest", "south", "southeast")

@@ -78,6 +78,11 @@ def disagreements(pipeline: Pipeline) -> list[str]:
             f"{kept.min_detour_ratio:g}: routes that filter would keep are never searched",
         ),
         (
+            plan.search == "all" or pipeline.split.paper_counts,
+            '[plan] search = "released" needs [split] paper_counts = true: without them all that is kept is '
+            'released; leave it out, or set search = "all"',
+        ),
+        (
             plan.max_approach_m <= pair.max_approach_m,
             f"[plan] max_approach_m = {plan.max_approach_m:g} must be at most [pair-objects] max_approach_m = "
             f"{pair.max_approach_m:g}: pairs are left out by a bound that routes could beat",

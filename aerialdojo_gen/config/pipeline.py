@@ -19,6 +19,7 @@ from aerialdojo_gen.config.sections import (
     PairObjectsConfig,
     PlanConfig,
     ReferenceImagesConfig,
+    ReleasedPlanConfig,
     RenderConfig,
     Section,
     SplitConfig,
@@ -55,9 +56,16 @@ class Pipeline(Section):
         return self
 
     def section(self, stage: str) -> Section:
-        """Return the section of a stage, by the stage's name (``"anchor-sample"``); else an empty one."""
+        """Return the section of a stage, by the stage's name (``"anchor-sample"``); else an empty one.
+
+        Where `plan` searches what is released, what decides on that is part of its section, so that its shards are
+        stale where that changes.
+        """
         section = getattr(self, stage.replace("-", "_"), Section())
         assert isinstance(section, Section)
+        if stage == "plan" and self.plan.search == "released":
+            values = self.plan.model_dump() | {"kept": self.filter, "prefer_harder": self.split.prefer_harder}
+            return ReleasedPlanConfig.model_validate(values)
         return section
 
 
@@ -108,7 +116,7 @@ def with_overrides(pipeline: Pipeline, stage: str, **values: Any) -> Pipeline:
     ConfigError
         A value is out of range, or contradicts another section's.
     """
-    section = pipeline.section(stage)
+    section = getattr(pipeline, stage.replace("-", "_"), Section())
     given = {key: value for key, value in values.items() if value is not None}
     try:
         changed = type(section).model_validate(section.model_dump() | given)

@@ -159,6 +159,14 @@ class Rung(Section):
 class PlanConfig(Section):
     """Reference trajectories."""
 
+    search: Literal["all", "released"] = Field(
+        "all",
+        description="all: every candidate; released: as many as the paper's numbers need, the first that [split] "
+        "would draw, by predicted lengths",
+    )
+    search_margin: float = Field(
+        0.25, ge=0.02, le=100, description="released: how many more are searched than are released"
+    )
     targets_per_part: int = Field(8, ge=1, le=100_000, description="targets whose plans share a shard")
     cell_m: float = Field(0.5, ge=0.05, le=10, description="edge of the cells of clearance grid and cost-to-go")
     margin_m: float = Field(0.002, ge=0, le=10, description="added to the body's radius in the search alone")
@@ -244,6 +252,13 @@ class FilterConfig(Section):
         if budgets != tuple(sorted(budgets)):
             raise ValueError(f"longer routes need more actions: action_budget falls in {budgets}")
         return self
+
+
+class ReleasedPlanConfig(PlanConfig):
+    """`plan` where it searches what is released, with what other sections say of that; no pipeline file sets it."""
+
+    kept: FilterConfig
+    prefer_harder: float
 
 
 class SplitConfig(Section):

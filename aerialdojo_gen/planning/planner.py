@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -93,7 +95,9 @@ class Planner:
             math.cos(math.radians(config.max_approach_angle_deg)), config.approach_detour_m,
         )  # fmt: skip
         self._narrow = narrow_cells(self.grid.arrays.field, self._prefer)
-        self._cost = np.empty(self.grid.moves.shape, np.float32)
+        self._cost = self._scratch = np.empty(self.grid.moves.shape, np.float32)
+        self._fields: dict[bytes, NDArray[np.float32]] = {}
+        self._keep_bytes = 0
         self._order = columns_by_distance(
             math.ceil((config.max_length_m * config.length_slack + 2 * config.max_approach_m) / config.cell_m)
         )
@@ -115,8 +119,29 @@ class Planner:
         list of Route
             One a start, in their order; none depends on the other starts.
         """
-        target = np.asarray(goal, np.float64)
-        begins = np.asarray(starts, np.float64).reshape(-1, 4)
+        target, begins = _poses(goal, starts)
+        return [
+            self._search(s, target, route.cost_to_go_m) if route.outcome == "NOT_NEEDED" else route
+            for s, route in zip(begins, self.foresee(target, begins), strict=True)
+        ]
+
+    def foresee(self, goal: ArrayLike, starts: ArrayLike) -> list[Route]:
+        """Tell what the goal's cost-to-go alone knows of the routes to it; nothing is searched.
+
+        Parameters
+        ----------
+        goal : (4,) float
+            x, y, z in metres and yaw in radians, world frame.
+        starts : (n, 4) float
+            Start poses.
+
+        Returns
+        -------
+        list of Route
+            One a start, in their order. Where a search is needed to say more its outcome is NOT_NEEDED, and
+            `cost_to_go_m` predicts the length; any other outcome is what `plan_target` returns too.
+        """
+        target, begins = _poses(goal, starts)
         if self.grid.in_collision(target[:3]):
             return [Route("START_IN_COLLISION" if self._blocked(s) else "GOAL_IN_COLLISION") for s in begins]
         blocked = [self._blocked(s) for s in begins]
@@ -131,9 +156,25 @@ class Planner:
             self._narrow,
         )
         return [
-            Route("START_IN_COLLISION") if b else self._plan(s, target, float(v))
+            Route("START_IN_COLLISION") if b else self._foreseen(s, target, float(v))
             for s, b, v in zip(begins, blocked, values, strict=True)
         ]
+
+    @contextmanager
+    def keeping_fields(self, megabytes: float) -> Iterator[None]:
+        """Keep goals' cost-to-go until the block ends, so that a goal that comes up again need not be expanded again.
+
+        Parameters
+        ----------
+        megabytes : float
+            How much may be kept; the goals after that are expanded each time.
+        """
+        self._keep_bytes = int(megabytes * 1e6)
+        try:
+            yield
+        finally:
+            self._cost, self._keep_bytes = self._scratch, 0
+            self._fields.clear()
 
     def cost_to_go(self, points: ArrayLike) -> NDArray[np.float64]:
         """Cost-to-go of points, (n, 3) float metres, to the goal that was planned for last; (n,) float64 metres."""
@@ -149,6 +190,13 @@ class Planner:
 
     def _expand(self, goal: NDArray[np.float64]) -> None:
         c, g = self.config, self.grid
+        key = goal.tobytes()
+        if key in self._fields:
+            self._cost = self._fields[key]
+            return
+        self._cost = self._scratch
+        if (len(self._fields) + 1) * self._cost.nbytes <= self._keep_bytes:
+            self._cost = self._fields[key] = np.empty_like(self._scratch)
         self._cost.fill(np.inf)
         # A route ends with a heading up to half a turn off the goal's yaw: what its Approach may do, the grid's may.
         angle = min(math.radians(c.max_approach_angle_deg) + TURN_RAD / 2, math.pi)
@@ -157,13 +205,16 @@ class Planner:
         bound = c.max_length_m * c.length_slack + _EXTRA_M * c.clearance_weight
         expand_cost(seeds, self._order, bound, g.arrays.cell, g.moves, self._cost, self._narrow)
 
-    def _plan(self, start: NDArray[np.float64], goal: NDArray[np.float64], value: float) -> Route:
-        c, g = self.config, self.grid
+    def _foreseen(self, start: NDArray[np.float64], goal: NDArray[np.float64], value: float) -> Route:
+        c = self.config
         if not value <= c.max_length_m * c.length_slack:
             return Route("NO_PATH")
         # The grid path is free of collision, so that the shortest route is no longer: a task that filter refuses.
-        if value * _INTERPOLATION < c.min_detour_ratio * math.dist(goal[:3], start[:3]):
-            return Route("NEAR_STRAIGHT", cost_to_go_m=value)
+        straight = value * _INTERPOLATION < c.min_detour_ratio * math.dist(goal[:3], start[:3])
+        return Route("NEAR_STRAIGHT" if straight else "NOT_NEEDED", cost_to_go_m=value)
+
+    def _search(self, start: NDArray[np.float64], goal: NDArray[np.float64], value: float) -> Route:
+        c, g = self.config, self.grid
         heading = nearest_heading(float(start[3]), float(goal[3]))
         expansions = 0
         for number, rung in enumerate(c.ladder, start=1):
@@ -190,6 +241,10 @@ class Planner:
                 )  # fmt: skip
         outcome = "NO_PATH" if tried.status == EXHAUSTED else "BUDGET_EXHAUSTED"
         return Route(outcome, expansions=expansions, cost_to_go_m=value, attempts=len(c.ladder))
+
+
+def _poses(goal: ArrayLike, starts: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    return np.asarray(goal, np.float64), np.asarray(starts, np.float64).reshape(-1, 4)
 
 
 def plan(

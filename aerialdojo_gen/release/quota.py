@@ -96,7 +96,7 @@ def choose(
     wanted: Mapping[str, int],
     path_m: float,
     seed: int,
-    steps: NDArray[np.int64] | None = None,
+    steps: NDArray[np.int64] | Floats | None = None,
     preference: float = 0.0,
 ) -> NDArray[np.bool_]:
     """Choose so many tasks of each setting that their lengths sum to a given total, the harder ones first.
@@ -129,35 +129,88 @@ def choose(
     (n,) bool
         True for the chosen.
     """
+    scores, place = _drawn(lots, settings, length_m, wanted, path_m, seed, steps, preference)
+    mask = np.zeros(len(lots), dtype=bool)
+    for rows, n in _groups(settings, wanted):
+        mask[_best(scores, place, rows)[:n]] = True
+    return mask
+
+
+def ranked(
+    lots: Sequence[str],
+    settings: Sequence[str],
+    length_m: Floats,
+    wanted: Mapping[str, int],
+    path_m: float,
+    seed: int,
+    steps: NDArray[np.int64] | Floats | None = None,
+    preference: float = 0.0,
+) -> dict[str, NDArray[np.int64]]:
+    """Order the tasks of each setting as `choose` takes them, from the first to the last.
+
+    Parameters
+    ----------
+    lots, settings, length_m, wanted, path_m, seed, steps, preference
+        As for `choose`; a setting may have fewer than are wanted, and steps that are foreseen need not be whole.
+
+    Returns
+    -------
+    dict of str to (m,) int64
+        By setting, the rows of its tasks; the first `wanted` of them are what `choose` chooses.
+    """
+    scores, place = _drawn(lots, settings, length_m, wanted, path_m, seed, steps, preference)
+    return {name: _best(scores, place, np.flatnonzero(np.asarray(settings) == name)) for name in sorted(wanted)}
+
+
+def _groups(settings: Sequence[str], wanted: Mapping[str, int]) -> list[tuple[NDArray[np.int64], int]]:
+    return [(np.flatnonzero(np.asarray(settings) == s), n) for s, n in sorted(wanted.items())]
+
+
+def _best(scores: Floats, place: NDArray[np.int64], rows: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Sort rows by their scores, the largest first."""
+    return rows[np.lexsort((place[rows], -scores[rows]))]
+
+
+def _drawn(
+    lots: Sequence[str],
+    settings: Sequence[str],
+    length_m: Floats,
+    wanted: Mapping[str, int],
+    path_m: float,
+    seed: int,
+    steps: NDArray[np.int64] | Floats | None,
+    preference: float,
+) -> tuple[Floats, NDArray[np.int64]]:
+    """What the tasks have drawn, tilted as the metres need it, (n,) float64; and their places among equals, (n,)."""
     luck = np.array([_gumbel(seed, lot) for lot in lots])
     if steps is not None:
         luck = luck + preference * steps
     # Ties are broken by the lot, so that the order of rows decides nothing.
     place = np.argsort(np.argsort(np.asarray(lots)))
-    groups = [(np.flatnonzero(np.asarray(settings) == s), n) for s, n in sorted(wanted.items())]
+    groups = _groups(settings, wanted)
 
-    def chosen(tilt: float) -> NDArray[np.bool_]:
-        mask = np.zeros(len(lots), dtype=bool)
-        for rows, n in groups:
-            score = luck[rows] + tilt * length_m[rows] / _SCALE_M
-            mask[rows[np.lexsort((place[rows], -score))[:n]]] = True
-        return mask
+    def tilted(tilt: float) -> Floats:
+        return np.asarray(luck + tilt * length_m / _SCALE_M)
+
+    def total(scores: Floats) -> float:
+        return float(sum(length_m[_best(scores, place, rows)[:n]].sum() for rows, n in groups))
 
     low, high = -_STEEPEST, _STEEPEST
-    best = chosen(0.0)
+    best = tilted(0.0)
+    nearest = abs(total(best) - path_m)
     for _ in range(_HALVINGS):
         middle = (low + high) / 2
-        mask = chosen(middle)
-        total = float(length_m[mask].sum())
-        if abs(total - path_m) < abs(float(length_m[best].sum()) - path_m):
-            best = mask
-        if total < path_m:
+        scores = tilted(middle)
+        reached = total(scores)
+        if abs(reached - path_m) < nearest:
+            best, nearest = scores, abs(reached - path_m)
+        if reached < path_m:
             low = middle
         else:
             high = middle
-        if abs(total - path_m) <= 1e-4 * path_m:
+        if abs(reached - path_m) <= 1e-4 * path_m:
             break
-    return best
+    return best, place
 
 
 def _gumbel(seed: int, lot: str) -> float:

@@ -19,9 +19,12 @@ def run(job: Job, config: PlanConfig) -> Output:
 
 
 def parts(data: DataRoot, scene: str, config: PlanConfig) -> int:
-    """Count the shards of a scene: `targets_per_part` targets each."""
+    """Count the shards of a scene: `targets_per_part` targets each, or one where all are chosen from together."""
+    from aerialdojo_gen.common.paper import inventory
     from aerialdojo_gen.store import shards
 
+    if config.search == "released" and scene in inventory():
+        return 1
     return -(-shards.count_rows(data, "objects", scene) // config.targets_per_part)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -13,17 +13,22 @@ import pyarrow.compute as pc
 from numpy.typing import NDArray
 
 from aerialdojo_gen.common.advice import command
-from aerialdojo_gen.config.sections import PlanConfig
+from aerialdojo_gen.common.paper import PaperScene, inventory
+from aerialdojo_gen.config.sections import PlanConfig, ReleasedPlanConfig
 from aerialdojo_gen.errors import StoreError
 from aerialdojo_gen.geometry.angles import wrap_one_rad
 from aerialdojo_gen.pipeline.stage import Job, Output
 from aerialdojo_gen.planning.difficulty import Difficulty, agent_actions, difficulty_of
+from aerialdojo_gen.planning.free_length import free_lengths_m
 from aerialdojo_gen.planning.planner import Planner, Route
 from aerialdojo_gen.scenes.context import context_of
 from aerialdojo_gen.scenes.model import Scene
+from aerialdojo_gen.stages.work.plan_order import Candidates, Draw
 from aerialdojo_gen.store.schemas import OUTCOMES, PLANS
 
 Floats = NDArray[np.float64]
+# Most that the goals' cost-to-go takes between foreseeing and searching; what does not fit is expanded once more.
+_FIELDS_MB = 500
 
 
 def targets_of_part(object_ids: list[int], part: int, config: PlanConfig) -> list[int]:
@@ -33,14 +38,14 @@ def targets_of_part(object_ids: list[int], part: int, config: PlanConfig) -> lis
 
 
 def run(job: Job, config: PlanConfig) -> Output:
-    """Plan all candidates of a slice of the scene's targets.
+    """Plan the candidates of a slice of the scene's targets; where a release is planned for, as many as it needs.
 
     Parameters
     ----------
     job : Job
         The scene and the slice; reads `objects`, `anchors`, `pairs` and the scene's mesh.
     config : PlanConfig
-        The stage's section.
+        The stage's section. With a `ReleasedPlanConfig` the slice is the whole scene.
 
     Returns
     -------
@@ -52,33 +57,71 @@ def run(job: Job, config: PlanConfig) -> Output:
     StoreError
         A pair names an anchor that does not exist: the two tables do not belong together.
     """
-    targets = targets_of_part(job.read("objects")["object_id"].to_pylist(), job.part, config)
+    paper = paper_scene(job.scene, config)
+    targets = job.read("objects")["object_id"].to_pylist()
+    if paper is None:
+        targets = targets_of_part(targets, job.part, config)
     pairs = job.read("pairs")
-    pairs = pairs.filter(pc.is_in(pairs["target_object_id"], pa.array(targets, pa.int32())))
-    poses, selected = _anchor_poses(job)
-    planned: list[tuple[str, Route]] = []
+    pairs = pairs.filter(pc.is_in(pairs["target_object_id"], pa.array(targets, pa.int32()))).sort_by("pair_id")
+    routes: list[Route] = []
     planner = None
     if pairs.num_rows:
         planner = _planner(job.scene_model(), config, job.embodiment.radius_m)
-        for target, candidates in _by_target(pairs):
-            try:
-                goal = poses[selected[target]]
-                starts = np.array([_turned(poses[p["start_object_id"], p["start_anchor_id"]]) for p in candidates])
-            except KeyError as error:
-                raise StoreError(
-                    f"{job.scene}: a candidate with target {target} needs anchor {error}, which is not in anchors: "
-                    f"run {command('pair-objects', scene=job.scene)}"
-                ) from None
-            routes = planner.plan_target(goal, starts)
-            planned += [(p["pair_id"], r) for p, r in zip(candidates, routes, strict=True)]
-    planned.sort(key=lambda row: row[0])
-    counts = Counter(route.outcome for _, route in planned)
+        goals, starts = _ends(job, pairs)
+        if paper is None or not isinstance(config, ReleasedPlanConfig):
+            routes = _by_goal(planner.plan_target, goals, starts, np.arange(pairs.num_rows))
+        else:
+            routes = _released(planner, pairs, goals, starts, paper, config, job.seed)
+    counts = Counter(route.outcome for route in routes)
     return Output(
-        {"plans": _table(job.scene, planned, planner)},
+        {"plans": _table(job.scene, pairs["pair_id"].to_pylist(), routes, planner)},
         rows_in=pairs.num_rows,
-        rows_out=len(planned),
+        rows_out=len(routes),
         counts={outcome: counts[outcome] for outcome in OUTCOMES if counts[outcome]},
     )
+
+
+def paper_scene(scene: str, config: PlanConfig) -> PaperScene | None:
+    """Return what is released of a scene, where no more than that is searched."""
+    return inventory().get(scene) if config.search == "released" else None
+
+
+def _by_goal(
+    plan: Callable[[Floats, Floats], list[Route]], goals: Floats, starts: Floats, rows: NDArray[np.int64]
+) -> list[Route]:
+    """Plan some rows of (n, 4) goals and starts, one goal after the other; in the order of `rows`."""
+    found: list[Route | None] = [None] * len(rows)
+    _, which = np.unique(goals[rows], axis=0, return_inverse=True)
+    for goal in range(which.max(initial=-1) + 1):
+        places = np.flatnonzero(which.ravel() == goal)
+        for place, route in zip(places.tolist(), plan(goals[rows[places[0]]], starts[rows[places]]), strict=True):
+            found[place] = route
+    return [route for route in found if route is not None]
+
+
+def _released(
+    planner: Planner,
+    pairs: pa.Table,
+    goals: Floats,
+    starts: Floats,
+    paper: PaperScene,
+    config: ReleasedPlanConfig,
+    seed: int,
+) -> list[Route]:
+    """Search what the release needs; the others' outcome is what the goals' cost-to-go tells, or NOT_NEEDED."""
+    with planner.keeping_fields(_FIELDS_MB):
+        routes = _by_goal(planner.foresee, goals, starts, np.arange(pairs.num_rows))
+        open_ = np.array([route.outcome == "NOT_NEEDED" for route in routes])
+        predicted = np.where(open_, [route.cost_to_go_m for route in routes], np.inf)
+        free = free_lengths_m(starts, goals[:, :3], config.max_approach_m)
+        draw = Draw(Candidates.of(pairs, free, predicted), paper, config, seed)
+        found: list[Route | None] = [None] * len(routes)
+        rows = draw.first()
+        while len(rows):
+            for row, route in zip(rows.tolist(), _by_goal(planner.plan_target, goals, starts, rows), strict=True):
+                found[row] = route
+            rows = draw.more(found)
+    return [route or foreseen for route, foreseen in zip(found, routes, strict=True)]
 
 
 def _planner(scene: Scene, config: PlanConfig, radius_m: float) -> Planner:
@@ -102,11 +145,21 @@ def _turned(anchor: Floats) -> Floats:
     return np.array([*anchor[:3], wrap_one_rad(float(anchor[3]) + math.pi)])
 
 
-def _by_target(pairs: pa.Table) -> Iterator[tuple[int, list[dict[str, Any]]]]:
-    groups: dict[int, list[dict[str, Any]]] = {}
-    for pair in pairs.sort_by("pair_id").to_pylist():
-        groups.setdefault(pair["target_object_id"], []).append(pair)
-    yield from sorted(groups.items())
+def _ends(job: Job, pairs: pa.Table) -> tuple[Floats, Floats]:
+    """Goals and start poses of the candidates, (n, 4) float64 each."""
+    poses, selected = _anchor_poses(job)
+    columns = ("target_object_id", "start_object_id", "start_anchor_id")
+    try:
+        ends = [
+            (poses[selected[target]], _turned(poses[start, anchor]))
+            for target, start, anchor in zip(*(pairs[name].to_pylist() for name in columns), strict=True)
+        ]
+    except KeyError as error:
+        raise StoreError(
+            f"{job.scene}: a candidate needs anchor {error}, which is not in anchors: "
+            f"run {command('pair-objects', scene=job.scene)}"
+        ) from None
+    return np.array([goal for goal, _ in ends]), np.array([start for _, start in ends])
 
 
 def _told(planner: Planner | None, routes: list[Route], schema: pa.Schema) -> dict[str, pa.Array]:
@@ -132,17 +185,17 @@ def _told(planner: Planner | None, routes: list[Route], schema: pa.Schema) -> di
     return told
 
 
-def _table(scene: str, planned: list[tuple[str, Route]], planner: Planner | None) -> pa.Table:
+def _table(scene: str, pair_ids: list[str], routes: list[Route], planner: Planner | None) -> pa.Table:
     """Put routes into a table; the lists go over as flat arrays, for millions of poses as objects take too long."""
-    routes = [route for _, route in planned]
     ends = np.cumsum([0, *(len(r.poses) for r in routes)], dtype=np.int32)
     poses = np.concatenate([np.empty((0, 4)), *(r.poses for r in routes)])
     actions = np.concatenate([np.empty(0, np.int8), *(r.actions for r in routes)])
     flat = {**dict(zip(("x_m", "y_m", "z_m", "yaw_rad"), poses.T, strict=True)), "action": actions}
     columns = {
-        "scene": [scene] * len(planned),
-        "pair_id": [pair_id for pair_id, _ in planned],
+        "scene": [scene] * len(routes),
+        "pair_id": pair_ids,
         "outcome": [r.outcome for r in routes],
+        "predicted_length_m": [r.cost_to_go_m if math.isfinite(r.cost_to_go_m) else None for r in routes],
         "length_m": [r.length_m for r in routes],
         "n_actions": [r.n_actions for r in routes],
         "expansions": [r.expansions for r in routes],

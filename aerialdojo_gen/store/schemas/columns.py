@@ -103,6 +103,7 @@ AGENT_ACTION = column(
     "agent_action", list_of(pa.int8()), "the route as an agent can fly it: actions 0 to 15, the last is 0 (Stop)",
     nullable=True,
 )  # fmt: skip
+PREDICTED = "length of the cheapest path over the grid, null where there is none: what the route's is predicted to be"
 CLEARANCE = "smallest distance along the route from the body's centre line to any surface, up to 5 m"
 
 
