@@ -8,7 +8,14 @@ import pytest
 from support.flying import along, distances, solid, town
 from support.handmade import OPINIONS
 
-from aerialdojo_gen.config.sections import Embodiment, PairObjectsConfig, PlanConfig
+from aerialdojo_gen.common.paper import PaperScene
+from aerialdojo_gen.config.sections import (
+    Embodiment,
+    FilterConfig,
+    PairObjectsConfig,
+    PlanConfig,
+    ReleasedPlanConfig,
+)
 from aerialdojo_gen.errors import StoreError
 from aerialdojo_gen.geometry.motion import replay
 from aerialdojo_gen.pipeline.stage import Job, Roots
@@ -150,3 +157,46 @@ def test_a_pair_without_its_anchor_is_named(data, tmp_path):
     (tmp_path / "meshes").symlink_to(data / "meshes")
     with pytest.raises(StoreError, match="pair-objects"):
         plan.run(job(tmp_path, "plan"), CONFIG)
+
+
+# What is released of the town: a fifth of its short routes, and metres that they can have.
+RELEASED = PaperScene(SCENE, 1, N_OBJECTS, 12, 3, 0, 330.0)
+
+
+@pytest.fixture
+def released(data, monkeypatch):
+    def planned(paper: PaperScene, **values) -> tuple[dict, dict]:
+        monkeypatch.setattr(plan, "inventory", lambda: {SCENE: paper})
+        config = ReleasedPlanConfig(search="released", kept=FilterConfig(), prefer_harder=5.0, **values)
+        out = plan.run(job(data, "plan"), config)
+        assert out.rows_in == out.rows_out == store.read_scene(data, "pairs", SCENE).num_rows
+        return {r["pair_id"]: r for r in check_table(schemas.PLANS, out.tables["plans"]).to_pylist()}, out.counts
+
+    return planned
+
+
+def test_as_much_is_searched_as_is_released_and_nothing_of_it_differs(data, shards, released):
+    every = {r["pair_id"]: r for out in shards for r in out.tables["plans"].to_pylist()}
+    some, counts = released(RELEASED)
+    assert counts["NOT_NEEDED"] > 10
+    assert counts["SOLVED"] >= 15
+    kept = {"base": 0, "standard": 0}
+    for key, row in some.items():
+        if row["outcome"] != "NOT_NEEDED":
+            assert row == every[key]
+            kept["base" if row["length_m"] < 30 else "standard"] += row["length_m"] >= 5
+        else:
+            assert (row["length_m"], row["x_m"]) == (0.0, [])
+            assert row["predicted_length_m"] == pytest.approx(every[key]["length_m"], rel=0.15)
+    assert kept["base"] >= 12
+    assert kept["standard"] >= 3
+    # By another number of candidates searched at first the rest are searched later: there is enough in any case.
+    again, _ = released(RELEASED, search_margin=0.02)
+    assert sum(r["outcome"] == "SOLVED" for r in again.values()) <= counts["SOLVED"]
+
+
+def test_where_more_is_released_than_there_is_all_is_searched(shards, released):
+    every = {r["pair_id"]: r for out in shards for r in out.tables["plans"].to_pylist()}
+    all_of_it, counts = released(PaperScene(SCENE, 1, N_OBJECTS, 500, 500, 9, 3e4))
+    assert "NOT_NEEDED" not in counts
+    assert all_of_it == every

@@ -73,7 +73,8 @@ def rows_of_pairs_and_plans():
                 seen = {"target_visible_at_start": share, "visible_view_at_start": "down" if share else None}
                 pair = key | ids | seen | {"euclidean_m": float(np.linalg.norm(q - p))}
                 plan = key | {
-                    "outcome": "SOLVED", "length_m": length, "n_actions": 3, "expansions": 9, "min_clearance_m": 0.4,
+                    "outcome": "SOLVED", "predicted_length_m": length,
+                    "length_m": length, "n_actions": 3, "expansions": 9, "min_clearance_m": 0.4,
                     "x_m": xyz[:, 0], "y_m": xyz[:, 1], "z_m": xyz[:, 2], "yaw_rad": [start["yaw_rad"] + math.pi] * 3,
                     "action": [3, 16, 0], "free_length_m": length / 1.25, "plan_detour": 1.25,
                     "straight_line_free": False, "climb_m": max(0.0, q[2] - p[2]), "agent_action": [3, 0],

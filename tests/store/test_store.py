@@ -33,7 +33,8 @@ def pair(i, scene="U_Test_0"):
 def plan(pair_id, n, value):
     lists = {name: [value] * n for name in ("x_m", "y_m", "z_m", "yaw_rad")}
     return {
-        "scene": "U_Test_0", "pair_id": pair_id, "outcome": "SOLVED" if n else "NO_PATH", "length_m": float(n),
+        "scene": "U_Test_0", "pair_id": pair_id, "outcome": "SOLVED" if n else "NO_PATH",
+        "predicted_length_m": None, "length_m": float(n),
         "n_actions": n, "expansions": 3, "min_clearance_m": 0.5 if n else None, **lists, "action": [1] * n,
         "free_length_m": value, "plan_detour": 1.5, "straight_line_free": bool(n % 2), "climb_m": 0.0,
         "agent_action": [1] * n if n else None,
