@@ -120,55 +120,61 @@ def seed_goal(
     return found[:n]
 
 
+# The kernels below take whole arrays, flat, and where a column begins, for a view of each column costs as much as its
+# work. These places are unsigned: what could be negative would be counted from the end, and not be vectorised.
+
+
 @njit(cache=True, error_model="numpy")
 def _settle(
-    column: NDArray[np.float32], moves: NDArray[np.uint32], narrow: NDArray[np.float32], length: np.float32,
-    coarse: np.float32,
+    cost: NDArray[np.float32], moves: NDArray[np.uint32], narrow: NDArray[np.float32], at: np.uint64, nz: np.uint64,
+    length: np.float32, coarse: np.float32,
 ) -> None:  # fmt: skip
     """Relax the vertical moves within a column, up and then down."""
     one = np.uint32(1)
-    below = column[0]
-    for k in range(1, column.shape[0]):
-        here = column[k]
-        reached = below + (length + coarse * narrow[k - 1])
-        if reached < here and (moves[k - 1] >> np.uint32(_UP)) & one:
-            column[k] = here = reached
+    below = cost[at]
+    for k in range(at + np.uint64(1), at + nz):
+        here = cost[k]
+        reached = below + (length + coarse * narrow[k - np.uint64(1)])
+        if reached < here and (moves[k - np.uint64(1)] >> np.uint32(_UP)) & one:
+            cost[k] = here = reached
         below = here
-    above = column[-1]
-    for k in range(column.shape[0] - 2, -1, -1):
-        here = column[k]
-        reached = above + (length + coarse * narrow[k + 1])
-        if reached < here and (moves[k + 1] >> np.uint32(_DOWN)) & one:
-            column[k] = here = reached
+    above = cost[at + nz - np.uint64(1)]
+    for n in range(np.uint64(1), nz):
+        k = at + nz - np.uint64(1) - n
+        here = cost[k]
+        reached = above + (length + coarse * narrow[k + np.uint64(1)])
+        if reached < here and (moves[k + np.uint64(1)] >> np.uint32(_DOWN)) & one:
+            cost[k] = here = reached
         above = here
 
 
 @njit(cache=True, error_model="numpy")
 def _leave(
-    column: NDArray[np.float32], narrow: NDArray[np.float32], length: np.float32, coarse: np.float32,
-    left: NDArray[np.float32],
+    cost: NDArray[np.float32], narrow: NDArray[np.float32], at: np.uint64, nz: np.uint64, length: np.float32,
+    coarse: np.float32, left: NDArray[np.float32], to: np.uint64,
 ) -> None:  # fmt: skip
     """Costs of a column's cells with those of a move that leads from them."""
-    for k in range(column.shape[0]):
-        left[k] = column[k] + (length + coarse * narrow[k])
+    for k in range(nz):
+        left[to + k] = cost[at + k] + (length + coarse * narrow[at + k])
 
 
 @njit(cache=True, error_model="numpy")
 def _push(
-    source: NDArray[np.float32], moves: NDArray[np.uint32], target: NDArray[np.float32], move: int, bound: np.float32
-) -> bool:
+    left: NDArray[np.float32], begin: np.uint64, moves: NDArray[np.uint32], at: np.uint64,
+    cost: NDArray[np.float32], to: np.uint64, nz: np.uint64, move: int, bound: np.float32,
+) -> bool:  # fmt: skip
     """Relax one move from a column to another; whether that made anything cheaper.
 
     Without a branch, so that the compiler turns the loop into vector instructions.
     """
     bit, never = np.uint32(1) << np.uint32(move), np.float32(np.inf)
     improved = np.uint32(0)
-    for k in range(source.shape[0]):
-        reached = source[k] if (moves[k] & bit) != 0 else never
+    for k in range(nz):
+        reached = left[begin + k] if (moves[at + k] & bit) != 0 else never
         reached = reached if reached <= bound else never
-        here = target[k]
+        here = cost[to + k]
         improved |= np.uint32(1) if reached < here else np.uint32(0)
-        target[k] = reached if reached < here else here
+        cost[to + k] = reached if reached < here else here
     return improved != 0
 
 
@@ -221,7 +227,9 @@ def expand_cost(
     nx, ny, nz = cost.shape
     lengths, coarse = _move_lengths(cell)
     limit = np.float32(bound)
-    waiting, departed = np.zeros((nx, ny), np.bool_), np.empty((len(_KINDS), nz), np.float32)
+    waiting, departed = np.zeros((nx, ny), np.bool_), np.empty(len(_KINDS) * nz, np.float32)
+    flat, passable, tight = cost.ravel(), moves.ravel(), narrow.ravel()
+    size = np.uint64(nz)
     left, visits = 0, 0
     middle_i, middle_j = 0, 0
     for seed in seeds:
@@ -241,18 +249,17 @@ def expand_cost(
             waiting[i, j] = False
             left -= 1
             visits += 1
-            column, passable, tight = cost[i, j], moves[i, j], narrow[i, j]
-            _settle(column, passable, tight, lengths[_UP], coarse[_UP])
+            at = np.uint64(i * ny + j) * size
+            _settle(flat, passable, tight, at, size, lengths[_UP], coarse[_UP])
             for kind in range(len(_KINDS)):
-                _leave(column, tight, lengths[_KINDS[kind]], coarse[_KINDS[kind]], departed[kind])
+                to = np.uint64(kind) * size
+                _leave(flat, tight, at, size, lengths[_KINDS[kind]], coarse[_KINDS[kind]], departed, to)
             for m in _FLAT:
                 u, v = i + MOVES[m, 0], j + MOVES[m, 1]
-                if (
-                    0 <= u < nx
-                    and 0 <= v < ny
-                    and _push(departed[_KIND[m]], passable, cost[u, v], m, limit)
-                    and not waiting[u, v]
-                ):
+                if not (0 <= u < nx and 0 <= v < ny):
+                    continue
+                begin, to = np.uint64(_KIND[m]) * size, np.uint64(u * ny + v) * size
+                if _push(departed, begin, passable, at, flat, to, size, m, limit) and not waiting[u, v]:
                     waiting[u, v] = True
                     left += 1
         if visits == before:
