@@ -26,7 +26,7 @@ _LONGEST_EDGE_M = 4.0
 
 @dataclass(frozen=True, eq=False)
 class _Space:
-    """What is solid in a scene, for bodies of a radius whatever margin they keep; attributes as of `ClearanceGrid`."""
+    """What is solid in a scene, for a body of a radius whatever margin it keeps; attributes as of `ClearanceGrid`."""
 
     arrays: GridArrays
     ground: Ground | None
