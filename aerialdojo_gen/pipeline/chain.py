@@ -93,8 +93,9 @@ class Chain(Waiting[Task]):
     @property
     def alone(self) -> bool:
         """Whether there is never more than one task at a time."""
-        open_now = set(self._names) - self._ended
-        return len(self) <= 1 and len(open_now) <= 1 and not any(stage.in_parts for stage in self._stages)
+        ahead = {scene: passed for scene, passed in self._passed.items() if scene not in self._ended}
+        in_parts = any(stage.in_parts for stage in self._stages[min(ahead.values(), default=0) :])
+        return len(self) <= 1 and len(ahead) <= 1 and not (ahead and in_parts)
 
     @property
     def memory_mb(self) -> int:

@@ -133,18 +133,17 @@ class Overall:
 
     def refresh(self) -> None:
         """Show how far it is now."""
-        if not self._tqdm.disable:
+        now = time.monotonic()
+        if self._plain and now - self._said >= _PLAIN_EVERY_S:
+            self._said, seen = now, self._look()
+            print(f"{100 * seen.share:.0f} %, {seen}", file=self._stream, flush=True)
+        elif not self._tqdm.disable:
             seen = self._look()
             self._tqdm.n = seen.share
             self._tqdm.set_description_str(str(seen))
 
     def advance(self, frames: int = 0) -> None:
-        """Show what has become of a shard; of several stages the frames do not count."""
-        self.refresh()
-        now = time.monotonic()
-        if self._plain and now - self._said >= _PLAIN_EVERY_S:
-            self._said, seen = now, self._look()
-            print(f"{100 * seen.share:.0f} %, {seen}", file=self._stream, flush=True)
+        """Nothing by itself: how far it is is shown when the next shard is begun."""
 
     def close(self) -> None:
         """Take it off the screen."""
