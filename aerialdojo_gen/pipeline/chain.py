@@ -121,7 +121,6 @@ class Chain(Waiting[Task]):
         """Say how far the scenes are."""
         at_work = [f"{task.scene} {task.job.stage}{_part(task)}" for task in self._at_work.values()]
         known = self._expectation
-        self._most_at_work = max(self._most_at_work, len(at_work))
         scenes = len(self._ended), len(self._names)
         return Overview(known.done_s, known.left_s, *scenes, at_work, self._most_at_work)
 
@@ -224,6 +223,7 @@ class Chain(Waiting[Task]):
     def _pop(self, scene: str) -> Task:
         task = super()._pop(scene)
         self._at_work[scene, task.job.part] = task
+        self._most_at_work = max(self._most_at_work, len(self._at_work))
         self._watch()
         return task
 
