@@ -54,13 +54,13 @@ class Shards:
         What is to be computed.
     fresh : list of dict
         The summaries of what need not be.
-    errors : list of AerialDojoError
-        Scenes whose inputs are missing or damaged.
+    errors : dict of str to AerialDojoError
+        What is missing or damaged of the inputs, by scene.
     """
 
     tasks: list[Task]
     fresh: list[dict[str, Any]]
-    errors: list[AerialDojoError]
+    errors: dict[str, AerialDojoError]
 
     @property
     def all_fresh(self) -> bool:
@@ -96,14 +96,14 @@ def shards_of(
         Shards beyond the share are left out.
     """
     pipeline = pipeline.model_copy(update={stage.name.replace("-", "_"): config})
-    found = Shards([], [], [])
+    found = Shards([], [], {})
     shard = -1
     for scene in scenes:
         try:
             fingerprint = scene_fingerprint(stage, pipeline, roots, scene)
             parts = stage.parts(roots.data, scene, config)
         except AerialDojoError as error:
-            found.errors.append(error)
+            found.errors[scene] = error
             continue
         for table in stage.writes:
             store.prune(roots.data, table, scene, parts)

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from typing import Any, TextIO
 
 from tqdm import tqdm
 
 _PLAIN_EVERY_S = 10.0
+# So many scenes are named that are under way.
+_NAMED = 3
 _WITHOUT_SPEED = "{l_bar}{bar}| {n_fmt}/{total_fmt} [{elapsed}{postfix}]"
 
 
@@ -62,9 +65,99 @@ class Bar:
                 flush=True,
             )
 
+    def refresh(self) -> None:
+        """Show what is known; of shards nothing changes but by `advance`."""
+
     def close(self) -> None:
         """Take the bar off the screen."""
         self._tqdm.close()
+
+
+@dataclass(frozen=True)
+class Overview:
+    """How far a run is.
+
+    Attributes
+    ----------
+    done_s, left_s : float
+        What was done, and what is expected to be left, seconds of one core.
+    scenes_done, scenes : int
+        Scenes that nothing is to be done of, and all.
+    at_work : list of str
+        What is under way, in words.
+    processes : int
+        How many are at work when there is enough to do.
+    """
+
+    done_s: float
+    left_s: float
+    scenes_done: int
+    scenes: int
+    at_work: list[str]
+    processes: int = 1
+
+    @property
+    def share(self) -> float:
+        """What was done of it all, from 0 to 1."""
+        return self.done_s / max(self.done_s + self.left_s, 1e-9)
+
+    def __str__(self) -> str:
+        """Scenes, time left, and what is under way."""
+        left = duration(self.left_s / max(1, min(self.processes, self.scenes - self.scenes_done)))
+        more = f" and {len(self.at_work) - _NAMED} more" if len(self.at_work) > _NAMED else ""
+        at_work = f": {', '.join(self.at_work[:_NAMED])}{more}" if self.at_work else ""
+        return f"{self.scenes_done} of {self.scenes} scenes, about {left} left{at_work}"
+
+
+class Overall:
+    """Shows how far a run through several stages is.
+
+    Parameters
+    ----------
+    look : callable
+        Tells it.
+    stream : text stream
+    quiet : bool
+        Show nothing.
+    """
+
+    def __init__(self, look: Callable[[], Overview], stream: TextIO, quiet: bool) -> None:
+        self._look, self._stream, self._said = look, stream, time.monotonic()
+        seen = look()
+        nothing = quiet or seen.scenes_done == seen.scenes
+        self._plain = not nothing and not stream.isatty()
+        self._tqdm = _Tqdm(
+            total=1.0, file=stream, leave=False, disable=nothing or self._plain, dynamic_ncols=True,
+            bar_format="{percentage:3.0f}%|{bar:12}| {desc}", mininterval=0.0,
+        )  # fmt: skip
+
+    def refresh(self) -> None:
+        """Show how far it is now."""
+        now = time.monotonic()
+        if self._plain and now - self._said >= _PLAIN_EVERY_S:
+            self._said, seen = now, self._look()
+            print(f"{100 * seen.share:.0f} %, {seen}", file=self._stream, flush=True)
+        elif not self._tqdm.disable:
+            seen = self._look()
+            self._tqdm.n = seen.share
+            self._tqdm.set_description_str(str(seen))
+
+    def advance(self, frames: int = 0) -> None:
+        """Nothing by itself: how far it is is shown when the next shard is begun."""
+
+    def close(self) -> None:
+        """Take it off the screen."""
+        self._tqdm.close()
+
+
+def duration(seconds: float) -> str:
+    """Say a time in words, e.g. "40 s", "3 min 20 s", "2 h 10 min"."""
+    whole = round(seconds)
+    if whole < 60:
+        return f"{whole} s"
+    if whole < 3600:
+        return f"{whole // 60} min {whole % 60} s"
+    return f"{whole // 3600} h {whole % 3600 // 60} min"
 
 
 class Reporter:
@@ -95,3 +188,12 @@ class Reporter:
             yield bar
         finally:
             bar.close()
+
+    @contextmanager
+    def overall(self, look: Callable[[], Overview]) -> Iterator[Overall]:
+        """Show how far a run is, as `look` tells, for the length of the block."""
+        shown = Overall(look, self._stream, self._quiet)
+        try:
+            yield shown
+        finally:
+            shown.close()

@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     from aerialdojo_gen.config.pipeline import Pipeline
     from aerialdojo_gen.pipeline.freshness import Limits
     from aerialdojo_gen.pipeline.progress import Reporter
-    from aerialdojo_gen.pipeline.runner import StageSummary
     from aerialdojo_gen.pipeline.stage import Roots, Stage
+    from aerialdojo_gen.pipeline.summary import StageSummary
     from aerialdojo_gen.store.root import DataRoot
 
 log = logging.getLogger(__name__)

@@ -1,4 +1,4 @@
-"""Run stages: find the stale shards, compute them in processes, commit each one whole.
+"""Run stages: take each scene through them in one process, as far as scenes need not wait for one another.
 
 A shard with the right fingerprint is never computed again, one with a wrong one always is; so a killed run goes on
 where it stopped, and the tables do not depend on the number of workers, their order, or the kills.
@@ -7,62 +7,24 @@ where it stopped, and the tables do not depend on the number of workers, their o
 from __future__ import annotations
 
 import time
-from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
 
 from aerialdojo_gen.common.names import choose_scenes, unknown
-from aerialdojo_gen.common.trouble import check_memory
 from aerialdojo_gen.config.pipeline import Pipeline
 from aerialdojo_gen.errors import AerialDojoError, AssetError, BudgetSpent, UsageError
+from aerialdojo_gen.pipeline.chain import Chain
 from aerialdojo_gen.pipeline.code_digest import stage_code
 from aerialdojo_gen.pipeline.executors import Executor, Folders, make_executor, on_disk
-from aerialdojo_gen.pipeline.freshness import Limits, shards_of
+from aerialdojo_gen.pipeline.expectation import Expectation
+from aerialdojo_gen.pipeline.freshness import Limits
 from aerialdojo_gen.pipeline.interrupt import Interrupts
-from aerialdojo_gen.pipeline.progress import Reporter
+from aerialdojo_gen.pipeline.progress import Reporter, duration
 from aerialdojo_gen.pipeline.registry import STAGES, upstream
 from aerialdojo_gen.pipeline.stage import Roots, Stage
-from aerialdojo_gen.pipeline.task import compute
+from aerialdojo_gen.pipeline.summary import StageSummary
+from aerialdojo_gen.pipeline.task import Computed, compute
 from aerialdojo_gen.store import shards as store
-
-
-@dataclass(frozen=True)
-class StageSummary:
-    """What a stage did.
-
-    Attributes
-    ----------
-    stage : str
-        Name of the stage.
-    rows_in, rows_out : int
-        Over all its shards, also those that were already there.
-    counts : Counter
-        Reasons and outcomes, over all its shards.
-    shards, computed : int
-        Shards in all; shards that were computed now.
-    seconds : float
-        Wall time.
-    """
-
-    stage: str
-    rows_in: int
-    rows_out: int
-    counts: Counter[str] = field(default_factory=Counter)
-    shards: int = 0
-    computed: int = 0
-    seconds: float = 0.0
-
-    def __str__(self) -> str:
-        """One line: rows in, rows out, why the others were rejected, seconds."""
-        counts = ", ".join(
-            f"{name} {n:,}" for name, n in sorted(self.counts.items(), key=lambda c: (-c[1], c[0])) if n
-        )
-        fresh = "nothing to do" if not self.computed else f"{self.computed} of {self.shards} shards computed"
-        return (
-            f"{self.stage}: {self.rows_in:,} rows in, {self.rows_out:,} out"
-            f"{f' ({counts})' if counts else ''}; {fresh}; {self.seconds:.1f} s"
-        )
 
 
 def run(
@@ -114,13 +76,14 @@ def run(
     Raises
     ------
     AerialDojoError
-        A shard failed in an expected way; the others of its stage are finished first.
+        A shard failed in an expected way: its scene stays at that stage, the others are taken on as far as no stage
+        wants all scenes.
     KeyboardInterrupt
         Workers have ended; finished shards stay.
     """
     reporter = reporter or Reporter(quiet=True)
-    forced = set(force)
-    summaries = []
+    forced, started = set(force), time.monotonic()
+    summaries: list[StageSummary] = []
     for stage in stages:
         # All of it now: who edits a file while this runs has loaded the old one, and gets all made anew next time.
         stage_code(stage.name)
@@ -132,76 +95,65 @@ def run(
     with roots.data.lock(), Interrupts() as interrupts, made as pool:
         if prepare:
             prepare()
-        for stage in stages:
-            # What the stage before wrote, in whatever process, is to be found.
+        expectation = Expectation(stages, scenes, roots)
+        for group in chained(stages, alone=limits is not None):
+            # What the stages before wrote, in whatever process, is to be found.
             roots.data.refresh()
-            now = limits if limits and stage is stages[-1] else Limits()
-            forced_now = stage.name in forced
-            summary = _run_stage(stage, scenes, pipeline, roots, pool, forced_now, reporter, interrupts, now)
+            now = limits if limits and group[-1] is stages[-1] else Limits()
+            chain = Chain(group, scenes, pipeline, roots, forced, now, reporter, expectation)
+            summaries += _go_through(chain, pool, reporter, interrupts, expectation)
             interrupts.check()
-            reporter.line(str(summary))
-            summaries.append(summary)
         if finish:
             roots.data.refresh()
             finish()
             interrupts.check()
+    if len(stages) > 1 and (computed := sum(summary.computed for summary in summaries)):
+        reporter.line(f"{computed:,} shards computed in {duration(time.monotonic() - started)}")
     return summaries
 
 
-def _run_stage(
-    stage: Stage,
-    scenes: Sequence[str],
-    pipeline: Pipeline,
-    roots: Roots,
-    pool: Executor,
-    force: bool,
-    reporter: Reporter,
-    interrupts: Interrupts,
-    limits: Limits,
-) -> StageSummary:
-    started = time.monotonic()
-    section = pipeline.section(stage.name)
-    # What takes time to decide is not decided anew as long as nothing is to be computed.
-    choices = [] if force else stage.choices(section)
-    lots = (shards_of(stage, c, scenes, pipeline, roots, force, Reporter(quiet=True), limits) for c in choices)
-    lot = next((lot for lot in lots if lot.all_fresh), None)
-    if lot is None:
-        config = stage.settle(section, reporter.line)
-        lot = shards_of(stage, config, scenes, pipeline, roots, force, reporter, limits)
-        if lot.tasks:
-            check_memory(stage.memory_mb, stage.name)
-            stage.check(roots.data, scenes, config)
-    tasks, fresh, errors = lot.tasks, lot.fresh, lot.errors
-    done = []
-    with reporter.bar(stage.name, len(tasks)) as bar:
-        for outcome in pool.map(compute, tasks, lambda task: task.scene, memory_mb=stage.memory_mb):
+def chained(stages: Sequence[Stage], *, alone: bool = False) -> list[list[Stage]]:
+    """Group stages that a scene goes through at its own pace; all scenes wait for one another before each group.
+
+    Parameters
+    ----------
+    stages : sequence of Stage
+        In pipeline order.
+    alone : bool
+        Whether the last one is a group of its own.
+    """
+    groups: list[list[Stage]] = []
+    for stage in stages:
+        if not groups or stage.waits or (alone and stage is stages[-1]):
+            groups.append([])
+        groups[-1].append(stage)
+    return groups
+
+
+def _go_through(
+    chain: Chain, pool: Executor, reporter: Reporter, interrupts: Interrupts, expectation: Expectation
+) -> list[StageSummary]:
+    """Take scenes through stages, and say what was done."""
+    summaries: list[StageSummary] = []
+
+    def say() -> None:
+        for summary in chain.summaries():
+            reporter.line(str(summary))
+            summaries.append(summary)
+
+    say()
+    with reporter.bar(chain.label, len(chain)) if chain.of_one_stage else reporter.overall(chain.look) as bar:
+        chain.watched_by(bar.refresh)
+        for outcome in pool.run(compute, chain, memory_mb=chain.memory_mb):
             interrupts.check()
-            if isinstance(outcome, BudgetSpent):
-                continue
-            if isinstance(outcome, AerialDojoError):
-                errors.append(outcome)
+            say()
+            if isinstance(outcome, Computed):
+                bar.advance(frames=outcome.summary["counts"].get("frames", 0))
+            elif not isinstance(outcome, BudgetSpent):
                 bar.advance()
-            else:
-                done.append(outcome)
-                bar.advance(frames=outcome["counts"].get("frames", 0))
-    if errors:
-        raise _together(errors)
-    counts: Counter[str] = Counter()
-    for summary in (*fresh, *done):
-        counts.update(summary["counts"])
-    every = (*fresh, *done)
-    if len(done) < len(tasks):
-        left = f"{len(tasks) - len(done):,} of {len(tasks):,} shards are left"
-        reporter.line(f"{stage.name}: the budget is spent, {left}; the same command goes on from here")
-    return StageSummary(
-        stage.name,
-        sum(s["rows_in"] for s in every),
-        sum(s["rows_out"] for s in every),
-        counts,
-        len(every),
-        len(done),
-        time.monotonic() - started,
-    )
+    if chain.errors:
+        raise _together(chain.errors)
+    return summaries
 
 
 def unready(stages: Sequence[Stage], scenes: Sequence[str], roots: Roots) -> dict[str, str]:

@@ -206,6 +206,12 @@ class Stage:
         fresh by one of them nothing is decided anew.
     digests : (str, str, str), optional
         A table that the stage writes and its columns with the path of a file (or folder) and the SHA-256 of it.
+    after_all : bool
+        Whether a scene waits here until all of them have been through the stages before. A stage with a `check` does;
+        through others a scene goes at its own pace, in one process where it can be.
+    seconds : (float, float)
+        What a scene takes, and each of its objects besides, on one ordinary core. It decides which scene is begun
+        first, and the time that is said to be left until the run itself has told better.
     memory_mb : int
         What a process takes at its peak, megabytes, with room for larger scenes than were measured; a cluster starts
         no more of them on a node than fit.
@@ -224,4 +230,16 @@ class Stage:
     settle: Callable[[Any, Callable[[str], None]], Any] = _as_it_is
     choices: Callable[[Any], list[Any]] = _no_choice
     digests: tuple[str, str, str] | None = None
+    after_all: bool = False
+    seconds: tuple[float, float] = (1.0, 0.0)
     memory_mb: int = 1000
+
+    @property
+    def in_parts(self) -> bool:
+        """Whether a scene can have several shards, which several processes may compute."""
+        return self.parts is not _one_part
+
+    @property
+    def waits(self) -> bool:
+        """Whether all scenes are to be through the stages before."""
+        return self.after_all or self.check is not _no_check

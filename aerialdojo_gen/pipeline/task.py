@@ -62,13 +62,24 @@ class Task:
         return replace(self, job=replace(self.job, roots=here))
 
 
-def compute(task: Task) -> dict[str, Any]:
-    """Compute one shard and commit its tables.
+@dataclass(frozen=True)
+class Computed:
+    """What is told of a shard that was computed.
 
-    Returns
-    -------
-    dict
-        The shard's summary: ``rows_in``, ``rows_out``, ``counts``.
+    Attributes
+    ----------
+    summary : dict
+        ``rows_in``, ``rows_out``, ``counts``, as its footer has it.
+    seconds : float
+        Wall time that it took its process.
+    """
+
+    summary: dict[str, Any]
+    seconds: float
+
+
+def compute(task: Task) -> Computed:
+    """Compute one shard and commit its tables.
 
     Raises
     ------
@@ -80,6 +91,7 @@ def compute(task: Task) -> dict[str, Any]:
     job = task.job
     if job.deadline is not None and time.time() >= job.deadline:
         raise BudgetSpent(f"the budget was spent before {task.label}")
+    started = time.monotonic()
     stage = BY_NAME[job.stage]
     try:
         with as_given(task.given):
@@ -107,7 +119,7 @@ def compute(task: Task) -> dict[str, Any]:
             summary=summary,
             files=files,
         )
-    return summary
+    return Computed(summary, time.monotonic() - started)
 
 
 def _described(job: Job, name: str) -> ShardFile:

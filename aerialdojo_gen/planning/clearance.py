@@ -7,7 +7,6 @@ would.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -23,6 +22,40 @@ from aerialdojo_gen.scenes.model import Scene
 
 # Longer triangles would have boxes full of nothing.
 _LONGEST_EDGE_M = 4.0
+
+
+@dataclass(frozen=True, eq=False)
+class _Space:
+    """What is solid in a scene, for a body of a radius whatever margin it keeps; attributes as of `ClearanceGrid`."""
+
+    arrays: GridArrays
+    ground: Ground | None
+    has_curtain: bool
+
+    @classmethod
+    def build(
+        cls, scene: Scene, cell_m: float, radius_m: float, band_m: float, cap_m: float, closed_ground: bool
+    ) -> _Space:
+        low, high = np.asarray(scene.bounds, np.float64)
+        reach = cap_m + 1.0
+        parts = [i.vertices[i.faces].reshape(-1, 9) for i in scene.instances]
+        triangles = np.concatenate(parts) if parts else np.empty((0, 9))
+        triangles = split_triangles(triangles, _LONGEST_EDGE_M, low - reach, high + reach)
+        real, real_boxes = build_bvh(triangles)
+        ground = Ground.of(scene, radius_m) if closed_ground else None
+        curtain = np.empty((0, 9)) if ground is None else ground.curtain(low, high, radius_m)
+        solid, boxes = real, real_boxes
+        if len(curtain):
+            curtain = split_triangles(curtain, _LONGEST_EDGE_M, low - reach, high + reach)
+            solid, boxes = build_bvh(np.concatenate([triangles, curtain]))
+        nx, ny, nz = (max(1, int(n)) for n in np.ceil((high - low) / cell_m - 1e-9))
+        # The bound beyond the band needs half a diagonal of a cell, however large cells are.
+        band_m = max(band_m, 0.87 * cell_m)
+        field = build_distance_field(solid, low, (nx, ny, nz), cell_m, band_m, cap_m)
+        arrays = GridArrays(
+            field, low.copy(), cell_m, solid, boxes, real, real_boxes, low + radius_m, high - radius_m
+        )
+        return cls(arrays, ground, len(curtain) > 0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,34 +123,37 @@ class ClearanceGrid:
         ClearanceGrid
             Depends on the scene and the parameters alone.
         """
-        low, high = np.asarray(scene.bounds, np.float64)
-        reach = cap_m + 1.0
-        parts = [i.vertices[i.faces].reshape(-1, 9) for i in scene.instances]
-        triangles = np.concatenate(parts) if parts else np.empty((0, 9))
-        triangles = split_triangles(triangles, _LONGEST_EDGE_M, low - reach, high + reach)
-        real, real_boxes = build_bvh(triangles)
-        ground = Ground.of(scene, radius_m) if closed_ground else None
-        curtain = np.empty((0, 9)) if ground is None else ground.curtain(low, high, radius_m)
-        solid, boxes = real, real_boxes
-        if len(curtain):
-            curtain = split_triangles(curtain, _LONGEST_EDGE_M, low - reach, high + reach)
-            solid, boxes = build_bvh(np.concatenate([triangles, curtain]))
-        nx, ny, nz = (max(1, int(n)) for n in np.ceil((high - low) / cell_m - 1e-9))
-        # The bound beyond the band needs half a diagonal of a cell, however large cells are.
-        band_m = max(band_m, 0.87 * cell_m)
-        field = build_distance_field(solid, low, (nx, ny, nz), cell_m, band_m, cap_m)
-        arrays = GridArrays(
-            field, low.copy(), cell_m, solid, boxes, real, real_boxes, low + radius_m, high - radius_m
-        )
-        moves = passable_moves(arrays, radius_m + margin_m)
-        sky = connected_with_ceiling(moves)
-        return cls(arrays, moves, sky, radius_m + margin_m, cap_m, ground, len(curtain) > 0)
+        space = _Space.build(scene, cell_m, radius_m, band_m, cap_m, closed_ground)
+        return cls._within(space, radius_m + margin_m, cap_m)
 
     @classmethod
-    def of(cls, scene: Scene, **how: Any) -> ClearanceGrid:
-        """Return the grid of a scene's context, by the parameters of `build`; one of others takes its place."""
-        key = tuple(sorted(how.items()))
-        return context_of(scene).part("clearance grid", lambda: cls.build(scene, **how), key)
+    def of(
+        cls,
+        scene: Scene,
+        cell_m: float = 0.5,
+        radius_m: float = 0.25,
+        band_m: float = 1.0,
+        cap_m: float = 5.0,
+        margin_m: float = 0.0,
+        closed_ground: bool = True,
+    ) -> ClearanceGrid:
+        """Return the grid of a scene's context, by the parameters of `build`; one of others takes its place.
+
+        What does not depend on the margin is a part of its own: who keeps another one builds no other distance field.
+        """
+        context, how = context_of(scene), (cell_m, radius_m, band_m, cap_m, closed_ground)
+
+        def make() -> ClearanceGrid:
+            space = context.part("clearance space", lambda: _Space.build(scene, *how), how)
+            return cls._within(space, radius_m + margin_m, cap_m)
+
+        return context.part("clearance grid", make, (how, margin_m))
+
+    @classmethod
+    def _within(cls, space: _Space, radius_m: float, cap_m: float) -> ClearanceGrid:
+        moves = passable_moves(space.arrays, radius_m)
+        sky = connected_with_ceiling(moves)
+        return cls(space.arrays, moves, sky, radius_m, cap_m, space.ground, space.has_curtain)
 
     def distance_m(self, p: ArrayLike) -> float:
         """Exact distance from a point to the nearest surface, up to `cap_m`; metres.

@@ -34,4 +34,5 @@ STAGE = Stage(
     writes=("anchors", "viewpoints"),
     run=run,
     settle=settle,
+    seconds=(1.0, 0.1),
 )

@@ -51,4 +51,5 @@ STAGE = Stage(
     run=run,
     sources=sources,
     wants=wants,
+    seconds=(0.5, 0.0),
 )

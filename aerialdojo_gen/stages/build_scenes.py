@@ -56,4 +56,5 @@ STAGE = Stage(
     run=run,
     sources=sources,
     imports=imports,
+    seconds=(4.0, 0.0),
 )

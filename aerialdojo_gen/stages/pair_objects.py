@@ -23,4 +23,5 @@ STAGE = Stage(
     reads=("scenes", "objects", "anchors"),
     writes=("pairs",),
     run=run,
+    seconds=(0.1, 0.005),
 )

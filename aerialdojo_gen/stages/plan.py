@@ -36,4 +36,5 @@ STAGE = Stage(
     run=run,
     parts=parts,
     memory_mb=1500,
+    seconds=(1.0, 0.4),
 )

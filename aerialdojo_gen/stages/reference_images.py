@@ -26,4 +26,5 @@ STAGE = Stage(
     run=run,
     settle=settle_renderer,
     choices=renderer_choices,
+    seconds=(1.0, 0.1),
 )

@@ -36,4 +36,6 @@ STAGE = Stage(
     settle=settle_renderer,
     choices=renderer_choices,
     digests=("recordings", "path", "sha256"),
+    seconds=(10.0, 0.0),
+    after_all=True,
 )

@@ -37,4 +37,6 @@ STAGE = Stage(
     ),
     run=run,
     check=check,
+    seconds=(0.2, 0.005),
+    after_all=True,
 )  # fmt: skip

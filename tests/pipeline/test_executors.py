@@ -66,6 +66,34 @@ def test_a_process_stays_with_its_scene(pool, tmp_path):
     assert changes <= 2
 
 
+def test_tasks_that_others_bring_stay_with_their_process(pool, tmp_path):
+    steps = chores.Steps(["a", "b"], 4, 1, tmp_path)
+    pids = {}
+    for scene, pid, _ in pool.run(chores.where, steps):
+        pids.setdefault(scene, set()).add(pid)
+    for scene in "ab":
+        assert [number for at, number in steps.order if at == scene] == [0, 1, 2, 3]
+        assert len(pids[scene]) == 1
+    assert pids["a"] != pids["b"]
+
+
+def test_a_process_helps_with_a_scene_that_is_worth_it(pool, tmp_path):
+    for alone_at, helpers in ((("a",), 1), ((), 2)):
+        steps = chores.Steps(["a"], 3, 6, tmp_path, alone_at)
+        rows = list(pool.run(chores.where, steps))
+        assert len(rows) == 18
+        assert [number for _, number in steps.order] == sorted([0, 1, 2] * 6)
+        assert len({pid for _, pid, _ in rows}) == helpers
+
+
+def test_one_process_goes_on_with_a_scene_to_its_end(tmp_path):
+    with make_executor("local", 1) as pool:
+        steps = chores.Steps(["a", "b"], 3, 2, tmp_path)
+        rows = list(pool.run(chores.where, steps))
+    assert {pid for _, pid, _ in rows} == {os.getpid()}
+    assert [scene for scene, _, _ in rows] == ["a"] * 6 + ["b"] * 6
+
+
 def test_expected_errors_are_results_and_defects_end_it(pool, tmp_path):
     outcomes = list(pool.map(chores.fail, tasks(tmp_path, 4, {2: "expected"})))
     errors = [one for one in outcomes if isinstance(one, AerialDojoError)]

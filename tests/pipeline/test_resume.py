@@ -72,8 +72,8 @@ def wait_for_shards(data, n, process):
 def test_killed_again_and_again_ends_with_the_same_bytes(project, server, smoke, tmp_path):
     data = tmp_path / "data"
     kills = 0
-    # In build-scenes, between two stages, in anchor-sample, in plan. What a kill at any one call leaves, test_atomic
-    # and the torture try.
+    # In build-scenes, and wherever the two scenes are after so many shards, each at its own stage. What a kill at any
+    # one call leaves, test_atomic and the torture try.
     for shards in (1, 6, 9, 13):
         process = start(project, data, *plan_args(data))
         wait_for_shards(data, shards, process)

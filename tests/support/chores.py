@@ -9,7 +9,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from aerialdojo_gen.errors import AssetError, StoreError
+from aerialdojo_gen.pipeline.executors.base import Waiting
 from aerialdojo_gen.pipeline.executors.link import at_end
+from aerialdojo_gen.pipeline.task import compute
 
 
 @dataclass(frozen=True)
@@ -78,6 +80,34 @@ def talk(chore, link):
     return told
 
 
+class Steps(Waiting):
+    """Scenes that take `steps` steps each, one after the other; a step's `parts` chores can be done together."""
+
+    def __init__(self, scenes, steps, parts, folder, alone_at=()):
+        super().__init__((), lambda chore: chore.scene)
+        self._steps, self._parts, self._folder, self._alone_at = steps, parts, folder, alone_at
+        self._left, self.order = dict.fromkeys(scenes, 0), []
+        for scene in scenes:
+            self._step(scene, 0)
+
+    @property
+    def alone(self):
+        return False
+
+    def finished(self, task, _outcome):
+        self.order.append((task.scene, task.number))
+        self._left[task.scene] -= 1
+        if not self._left[task.scene] and task.number + 1 < self._steps:
+            self._step(task.scene, task.number + 1)
+
+    def _step(self, scene, number):
+        self._left[scene] = self._parts
+        self._add([Chore(number, scene, self._folder)] * self._parts)
+
+    def _worth_joining(self, scene):
+        return scene not in self._alone_at
+
+
 def go_on_until_stopped(chore, link):
     link.tell(chore.number)
     until(link.stopped)
@@ -117,3 +147,12 @@ def session_members(session):
         if int(fields[3]) == session and fields[0] != "Z":
             found.append(int(stat.parent.name))
     return found
+
+
+def compute_and_sign(task):
+    """Compute a shard, and leave a note of the process that did."""
+    done = compute(task)
+    job = task.job
+    note = job.roots.data.path.with_name("notes") / f"{job.scene} {job.stage} {job.part}"
+    note.write_text(f"{os.getpid()}")
+    return done

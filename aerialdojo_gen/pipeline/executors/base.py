@@ -102,7 +102,6 @@ class Executor(ABC):
     def workers(self) -> int:
         """Processes that work at a time, as far as that is known before."""
 
-    @abstractmethod
     def map(
         self,
         work: Callable[..., R],
@@ -112,17 +111,34 @@ class Executor(ABC):
         talk: Talk | None = None,
         memory_mb: int = 0,
     ) -> Iterator[R | AerialDojoError]:
+        """Do work on tasks that are known from the start: `run` of `Waiting`.
+
+        Parameters
+        ----------
+        work : callable
+            As for `run`.
+        tasks : sequence
+            What it is called with.
+        scene_of : callable, optional
+            A task's scene. A process stays with a scene while there is work, for it keeps what it has read and
+            built of it; tasks of no scene are done in their order.
+        talk, memory_mb : Talk, int
+            As for `run`.
+        """
+        return self.run(work, Waiting(tasks, scene_of), talk=talk, memory_mb=memory_mb)
+
+    @abstractmethod
+    def run(
+        self, work: Callable[..., R], waiting: Waiting[T], *, talk: Talk | None = None, memory_mb: int = 0
+    ) -> Iterator[R | AerialDojoError]:
         """Do work on tasks and yield what it returns, or the expected error, in the order of finishing.
 
         Parameters
         ----------
         work : callable
             A function of a module, called with a task: other processes import it.
-        tasks : sequence
-            What it is called with.
-        scene_of : callable, optional
-            A task's scene. A process stays with a scene while there is work, for it keeps what it has read and
-            built of it; tasks of no scene are done in their order.
+        waiting : Waiting
+            The tasks; it is told what is finished, and may have more tasks then.
         talk : Talk, optional
             Given, `work` is called with a task and a `aerialdojo_gen.pipeline.executors.link.Link`.
         memory_mb : int
@@ -190,30 +206,52 @@ def make_executor(
 
 
 class Waiting(Generic[T]):
-    """Tasks that nobody has begun, by scene; `Executor.map` of several processes takes them from here."""
+    """Tasks that nobody has begun, by scene; `Executor.run` takes them from here."""
 
     def __init__(self, tasks: Sequence[T], scene_of: Callable[[T], str] | None) -> None:
         self._scene_of = scene_of or (lambda _: "")
         self._scenes: dict[str, deque[T]] = {}
-        for task in tasks:
-            self._scenes.setdefault(self._scene_of(task), deque()).append(task)
+        self._add(tasks)
         self._at: dict[int, str] = {}
+        self._alone = len(tasks) <= 1
 
-    def __bool__(self) -> bool:
-        return bool(self._scenes)
+    def __len__(self) -> int:
+        return sum(map(len, self._scenes.values()))
 
-    def take(self, lane: int) -> T:
+    @property
+    def alone(self) -> bool:
+        """Whether there is never more than one task at a time, so that one process is enough."""
+        return self._alone
+
+    def give(self, idle: Sequence[int]) -> Iterator[tuple[int, T]]:
+        """Give idle processes their next tasks, as far as there are: first those who stay with their scene."""
+        for lane in sorted(idle, key=lambda lane: self._at.get(lane) not in self._scenes):
+            task = self.take(lane)
+            if task is not None:
+                yield lane, task
+
+    def take(self, lane: int) -> T | None:
         """Give a process its next task: of its scene, else of one that no other works at, else of the fullest."""
         scene = self._at.get(lane)
         if scene not in self._scenes:
             others = {at for other, at in self._at.items() if other != lane}
             free = [name for name in self._scenes if name not in others]
-            scene = max(free or self._scenes, key=lambda name: len(self._scenes[name]))
+            names = free or [name for name in self._scenes if self._worth_joining(name)]
+            if not names:
+                return None
+            scene = max(names, key=self._weight)
         self._at[lane] = scene
-        task = self._scenes[scene].popleft()
-        if not self._scenes[scene]:
-            del self._scenes[scene]
-        return task
+        return self._pop(scene)
+
+    def one_by_one(self) -> Iterator[T]:
+        """Yield the tasks for one process that does all, scene after scene in their order."""
+        scene = ""
+        while self._scenes:
+            scene = scene if scene in self._scenes else next(iter(self._scenes))
+            yield self._pop(scene)
+
+    def finished(self, task: T, outcome: Any) -> None:
+        """Hear what became of a task, an error that was expected among it."""
 
     def put_back(self, task: T) -> None:
         """Take back a task whose process is gone; it is the next of its scene."""
@@ -222,3 +260,21 @@ class Waiting(Generic[T]):
     def leave(self, lane: int) -> None:
         """Forget where a process that is gone was."""
         self._at.pop(lane, None)
+
+    def _add(self, tasks: Sequence[T]) -> None:
+        for task in tasks:
+            self._scenes.setdefault(self._scene_of(task), deque()).append(task)
+
+    def _pop(self, scene: str) -> T:
+        task = self._scenes[scene].popleft()
+        if not self._scenes[scene]:
+            del self._scenes[scene]
+        return task
+
+    def _weight(self, scene: str) -> float:
+        """How much there is to do of a scene: the heaviest goes first."""
+        return len(self._scenes[scene])
+
+    def _worth_joining(self, _scene: str) -> bool:
+        """Whether a second process should work at a scene."""
+        return True

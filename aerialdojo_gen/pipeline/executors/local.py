@@ -9,7 +9,7 @@ import os
 import signal
 import sys
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from multiprocessing.util import Finalize
@@ -63,24 +63,19 @@ class LocalExecutor(Executor):
                     process.terminate()
         self.close()
 
-    def map(
-        self,
-        work: Callable[..., R],
-        tasks: Sequence[T],
-        scene_of: Callable[[T], str] | None = None,
-        *,
-        talk: Talk | None = None,
-        memory_mb: int = 0,
+    def run(
+        self, work: Callable[..., R], waiting: Waiting[T], *, talk: Talk | None = None, memory_mb: int = 0
     ) -> Iterator[R | AerialDojoError]:
         """Do work on tasks and yield what it returns, or the expected error, in the order of finishing."""
-        if self._workers <= 1 or len(tasks) <= 1:
+        if self._workers <= 1 or waiting.alone:
             here = Here(talk.hear, talk.stopped) if talk else None
-            for task in tasks:
-                yield guarded(work, task, here)
+            for task in waiting.one_by_one():
+                outcome = guarded(work, task, here)
+                waiting.finished(task, outcome)
+                yield outcome
             return
         self._start()
         self._line.clear()
-        waiting = Waiting(tasks, scene_of)
         running: dict[Future[R | AerialDojoError], tuple[int, T]] = {}
         idle = list(range(len(self._lanes)))
         try:
@@ -90,9 +85,8 @@ class LocalExecutor(Executor):
                 # starts is the parent's alone.
                 signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
                 try:
-                    while idle and waiting:
-                        lane = idle.pop(0)
-                        task = waiting.take(lane)
+                    for lane, task in waiting.give(tuple(idle)):
+                        idle.remove(lane)
                         running[self._lanes[lane].submit(_do, work, task, talk is not None)] = (lane, task)
                 finally:
                     signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
@@ -101,7 +95,9 @@ class LocalExecutor(Executor):
                     self._line.hear(talk)
                 for future in finished:
                     outcome = future.result()
-                    idle.append(running.pop(future)[0])
+                    lane, task = running.pop(future)
+                    idle.append(lane)
+                    waiting.finished(task, outcome)
                     yield outcome
                 if not running and not waiting:
                     return

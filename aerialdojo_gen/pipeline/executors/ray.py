@@ -96,30 +96,25 @@ class RayExecutor(Executor):
             return max(1, int(self._ray.cluster_resources().get("CPU", 1)))
         return self._asked
 
-    def map(
-        self,
-        work: Callable[..., R],
-        tasks: Sequence[T],
-        scene_of: Callable[[T], str] | None = None,
-        *,
-        talk: Talk | None = None,
-        memory_mb: int = 0,
+    def run(
+        self, work: Callable[..., R], waiting: Waiting[T], *, talk: Talk | None = None, memory_mb: int = 0
     ) -> Iterator[R | AerialDojoError]:
         """Do work on tasks and yield what it returns, or the expected error, in the order of finishing."""
-        if not tasks:
+        if not waiting:
             return
         self._connect()
-        self._start(memory_mb, len(tasks))
-        waiting, running = Waiting(tasks, scene_of), dict[Any, tuple[_Lane, T]]()
+        self._require(memory_mb)
+        running = dict[Any, tuple[_Lane, T]]()
         tries: Counter[int] = Counter()
         begun_s = time.monotonic()
         while True:
+            self._grow(len(running) + len(waiting))
             busy = {lane.number for lane, _ in running.values()}
-            for lane in self._lanes:
-                if lane.ready and waiting and lane.number not in busy:
-                    task = waiting.take(lane.number)
-                    tries[id(task)] += 1
-                    running[lane.actor.do.remote(work, task, talk is not None)] = (lane, task)
+            idle = {lane.number: lane for lane in self._lanes if lane.ready and lane.number not in busy}
+            for number, task in waiting.give(tuple(idle)):
+                tries[id(task)] += 1
+                lane = idle[number]
+                running[lane.actor.do.remote(work, task, talk is not None)] = (lane, task)
             if not running and not waiting:
                 return
             done, _ = self._ray.wait([*running, *self._refs], timeout=_LOOK_EVERY_S)
@@ -146,6 +141,7 @@ class RayExecutor(Executor):
                 else:
                     if talk:
                         self._hear(talk)
+                    waiting.finished(task, outcome)
                     yield outcome
             if not running and time.monotonic() - begun_s > _SAY_AFTER_S:
                 begun_s = float("inf")
@@ -233,12 +229,15 @@ class RayExecutor(Executor):
 
     # ----- its processes
 
-    def _start(self, memory_mb: int, tasks: int) -> None:
-        """Have as many actors as are needed, with as much memory."""
+    def _require(self, memory_mb: int) -> None:
+        """Have no actors with less memory than that."""
         memory_mb = self._possible(memory_mb)
         if memory_mb > self._memory_mb:
             self._end_lanes()
             self._memory_mb = memory_mb
+
+    def _grow(self, tasks: int) -> None:
+        """Have as many actors as so many tasks need."""
         while len(self._lanes) < min(self.workers, tasks):
             self._add(len(self._lanes))
 

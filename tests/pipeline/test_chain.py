@@ -1,0 +1,122 @@
+"""Scenes go through stages at their own pace, in one process each, and a failure stops its scene alone."""
+
+import json
+import shutil
+import subprocess
+import sys
+from collections import Counter
+
+import pytest
+from support import chores
+
+from aerialdojo_gen.config.pipeline import load_pipeline
+from aerialdojo_gen.pipeline.chain import Chain
+from aerialdojo_gen.pipeline.executors import make_executor
+from aerialdojo_gen.pipeline.expectation import Expectation
+from aerialdojo_gen.pipeline.freshness import Limits
+from aerialdojo_gen.pipeline.progress import Reporter
+from aerialdojo_gen.pipeline.registry import BY_NAME, STAGES
+from aerialdojo_gen.pipeline.run import open_pipeline
+from aerialdojo_gen.pipeline.runner import chained
+
+SCENES = ("U_Courtyard_0", "U_Courtyard_1")
+TABLES = {"pair-objects": "pairs", "plan": "plans", "filter": "verdicts"}
+
+
+def names(groups):
+    return [[stage.name for stage in group] for group in groups]
+
+
+def test_scenes_wait_for_one_another_before_the_release_and_before_recordings():
+    own = ["build-scenes", "annotate-import", "anchor-sample", "reference-images", "pair-objects", "plan", "filter"]
+    assert names(chained(STAGES)) == [own, ["split"], ["render"]]
+    assert names(chained(STAGES[:6])) == [own[:6]]
+    # Of the last stage alone a part may be wanted.
+    assert names(chained(STAGES[:6], alone=True)) == [own[:5], ["plan"]]
+
+
+@pytest.mark.pipeline
+def test_a_process_takes_a_scene_through_the_stages(project, smoke, tmp_path):
+    data, notes = shutil.copytree(smoke, tmp_path / "data"), tmp_path / "notes"
+    notes.mkdir()
+    for table in TABLES.values():
+        shutil.rmtree(data / table)
+    config, roots = open_pipeline(load_pipeline(project / "pipelines" / "smoke.toml"), data)
+    stages = [BY_NAME[name] for name in TABLES]
+    known = Expectation(stages, SCENES, roots)
+    expected_s = known.left_s
+    chain = Chain(stages, SCENES, config, roots, (), Limits(), Reporter(quiet=True), known)
+    with make_executor("local", 2) as pool:
+        outcomes = list(pool.run(chores.compute_and_sign, chain))
+    assert not chain.errors
+    pids = {path.name: path.read_text() for path in notes.iterdir()}
+    assert len(pids) == len(outcomes) == chain.look().scenes * 2 + len([name for name in pids if " plan " in name])
+    assert len(set(pids.values())) == 2
+    for scene in SCENES:
+        # A part of `plan` may have been done by who had nothing else to do.
+        assert pids[f"{scene} pair-objects 0"] == pids[f"{scene} plan 0"]
+    assert [(one.stage, one.shards, one.computed) for one in chain.summaries()] == [
+        (name, len([p for p in pids if f" {name} " in p]), len([p for p in pids if f" {name} " in p]))
+        for name in TABLES
+    ]
+    for table in TABLES.values():
+        for path in (smoke / table).rglob("*.parquet"):
+            assert (data / path.relative_to(smoke)).read_bytes() == path.read_bytes()
+    assert known.left_s == 0.0 < expected_s
+    assert known.done_s == pytest.approx(sum(one.seconds for one in outcomes))
+
+
+def run(project, data, pipeline, *args, verb="run"):
+    where = [str(pipeline)] if verb == "run" else ["--pipeline", str(pipeline)]
+    command = [sys.executable, "-m", "aerialdojo_gen.cli", verb, *where, "--data", str(data), "--workers", "1", *args]
+    return subprocess.run(command, cwd=project, capture_output=True, text=True, check=False)
+
+
+@pytest.mark.pipeline
+def test_a_scene_that_fails_stops_alone(project, smoke, tmp_path):
+    data = shutil.copytree(smoke, tmp_path / "data")
+    annotations = shutil.copytree(project / "annotations" / "smoke", tmp_path / "annotations")
+    broken = annotations / f"{SCENES[0]}.json"
+    document = json.loads(broken.read_text())
+    document["objects"][0]["node"] = "nothing_of_that_name"
+    broken.write_text(json.dumps(document))
+    pipeline = tmp_path / "mine.toml"
+    text = (project / "pipelines" / "smoke.toml").read_text()
+    text = text.replace('"../annotations/smoke"', f'"{annotations}"').replace('"../', f'"{project}/')
+    pipeline.write_text(text + "\n[pair-objects]\nstart_variants = 1\n")
+    before = {path: path.stat().st_mtime_ns for path in data.rglob("*.parquet")}
+    done = run(project, data, pipeline)
+    assert done.returncode == 1
+    assert done.stderr.count("error:") == 1
+    assert "nothing_of_that_name" in done.stderr
+    changed = Counter(
+        (path.relative_to(data).parts[0], path.parent.name)
+        for path in data.rglob("*.parquet")
+        if before.get(path) != path.stat().st_mtime_ns
+    )
+    # The other one is finished as far as no stage wants all scenes; the release is as it was.
+    assert set(changed) == {(table, SCENES[1]) for table in TABLES.values()}
+    assert "build-scenes: 2 rows in" in done.stderr
+    assert "plan:" not in done.stderr
+    # Mended, the first one goes on from where it stopped, and the other one has nothing to do but in `split`.
+    shutil.copyfile(project / "annotations" / "smoke" / broken.name, broken)
+    done = run(project, data, pipeline, verb="filter")
+    assert done.returncode == 0, done.stderr
+    assert "pair-objects: " in done.stderr
+    assert done.stderr.count("1 of 2 shards computed") == 2
+
+
+def test_what_is_left_follows_what_was_done(project, tmp_path):
+    _, roots = open_pipeline(load_pipeline(project / "pipelines" / "aerialdojo-200k.toml"), tmp_path)
+    stages, scenes = [BY_NAME["build-scenes"], BY_NAME["plan"]], ["U_Mall_0", "U_Park_0"]
+    known = Expectation(stages, scenes, roots)
+    # A scene with nine times as many objects takes longer, as its annotations tell before there is a table.
+    assert known.left("plan", "U_Mall_0") > 3 * known.left("plan", "U_Park_0")
+    before = known.left("plan", "U_Park_0"), known.left("build-scenes", "U_Park_0")
+    # Half of a scene took ten times what was expected: the rest and other scenes do as well, other stages less so.
+    known.took("plan", "U_Mall_0", 0.5, 5.0 * known.left("plan", "U_Mall_0"))
+    assert 5.0 < known.left("plan", "U_Park_0") / before[0] < 10.0
+    assert 1.0 < known.left("build-scenes", "U_Park_0") / before[1] < 10.0
+    known.drop("plan", "U_Park_0")
+    assert known.left("plan", "U_Park_0") == 0.0
+    assert known.left_s == pytest.approx(sum(known.left(stage.name, scene) for stage in stages for scene in scenes))
