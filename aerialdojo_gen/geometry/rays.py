@@ -62,6 +62,8 @@ class TriangleRayCaster:
             Index of the face that is hit, -1 where none is.
         """
         d = np.asarray(directions, dtype=np.float64)
+        if not len(d):
+            return np.zeros(0), np.zeros(0, np.int32)
         d = d / np.linalg.norm(d, axis=1, keepdims=True)
         o = np.broadcast_to(np.asarray(origins, dtype=np.float64), d.shape)
         hit = self._scene.run(

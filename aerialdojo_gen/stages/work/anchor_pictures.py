@@ -13,7 +13,7 @@ from aerialdojo_gen.geometry.viewpoints import level_marks
 from aerialdojo_gen.scoring.base import AnchorView
 from aerialdojo_gen.scoring.knowing import clarity
 from aerialdojo_gen.stages.work.anchor_world import Candidates
-from aerialdojo_gen.stages.work.step_back import step_back_m, telling_m
+from aerialdojo_gen.stages.work.step_back import steps_back_m, telling_m
 
 Floats = NDArray[np.float64]
 
@@ -56,16 +56,15 @@ class Looked:
             The body's.
         config : AnchorSampleConfig
         """
-        places, yaws, backs = found.positions_m[which], found.yaw_rad[which], np.zeros(len(which))
-        for n, k in enumerate(which):
-            most = min(
-                config.step_back_m, telling_m(found.patches, found.seen[k], places[n], yaws[n], config.fov_deg)
-            )
-            backs[n] = step_back_m(
-                found.world, found.instance, found.points, places[n], float(yaws[n]), config.fov_deg, most
-            )
+        places, yaws = found.positions_m[which], found.yaw_rad[which]
+        telling = [
+            telling_m(found.patches, found.seen[k], places[n], float(yaws[n]), config.fov_deg)
+            for n, k in enumerate(which)
+        ]
+        most = np.minimum(config.step_back_m, telling)
+        backs = steps_back_m(found.world, found.instance, found.points, places, yaws, config.fov_deg, most)
         away = np.column_stack([np.cos(yaws), np.sin(yaws), np.zeros(len(yaws))]) * backs[:, None]
-        behind = Candidates.of(found.world, found.instance, found.points, places - away, yaws, radius_m, config)
+        behind = found.moved(which, places - away, radius_m, config)
         views, elevation = behind.views, found.elevation_deg[which]
         clear = clarity(views.visible_fraction, views.framed, np.zeros(len(which)), level_marks(elevation))
         rank = (found.rank[which] + behind.rank) / 2.0 * clear
