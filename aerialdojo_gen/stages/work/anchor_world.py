@@ -226,6 +226,7 @@ class Candidates:
         return take_view(
             ray_renderer(self.world.scene),
             self.alone,
+            self.world.scene.instances[self.instance],
             self.instance,
             Camera(size_px, size_px, fov_deg),
             self.positions_m[k],

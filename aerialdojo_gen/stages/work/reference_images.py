@@ -11,19 +11,18 @@ from numpy.typing import NDArray
 
 from aerialdojo_gen.common.pictures import REFERENCE_PNG, encode_png
 from aerialdojo_gen.config.sections import ReferenceImagesConfig
-from aerialdojo_gen.geometry.cameras import Camera, project, view_pose
+from aerialdojo_gen.geometry.cameras import Camera, view_pose
 from aerialdojo_gen.geometry.rays import RayCaster, instance_caster
 from aerialdojo_gen.pipeline.stage import Job, Output
 from aerialdojo_gen.rendering.backend import kept_renderer
 from aerialdojo_gen.rendering.casters import ray_caster
 from aerialdojo_gen.scenes.model import Instance
-from aerialdojo_gen.scoring.views import part_shares
+from aerialdojo_gen.scoring.views import box_px, part_shares
 from aerialdojo_gen.store.schemas import REFERENCES
 from aerialdojo_gen.store.tables import from_rows
 
 _BOX = ("box_u0_px", "box_v0_px", "box_u1_px", "box_v1_px")
 _POSE = ("reference_x_m", "reference_y_m", "reference_z_m", "reference_yaw_rad")
-_IN_FRONT_M = 0.05
 # A patch of 7 x 7 pixels in a picture of 320 x 320.
 LEAST_SHARE = 0.0005
 
@@ -110,7 +109,8 @@ def missing_tells(
     if not names:
         return []
     parts = [instance.faces_of(name) for name in names]
-    shares = part_shares(instance_caster(instance), parts, camera, world_from_camera, mask)
+    alone = instance_caster(instance)
+    shares = part_shares(alone, instance, parts, camera, world_from_camera, mask, LEAST_SHARE)
     return [name for name, share in zip(names, shares, strict=True) if share < LEAST_SHARE]
 
 
@@ -152,13 +152,7 @@ def instance_mask(
     (H, W) bool
     """
     mask = np.zeros((camera.height, camera.width), dtype=np.bool_)
-    uv, depth = project(camera, world_from_camera, vertices)
-    u0, v0, u1, v1 = 0, 0, camera.width, camera.height
-    # What reaches behind the camera has no box in the picture.
-    if depth.min() > _IN_FRONT_M:
-        (low_u, low_v), (high_u, high_v) = uv.min(axis=0), uv.max(axis=0)
-        u0, v0 = max(0, math.floor(low_u) - 1), max(0, math.floor(low_v) - 1)
-        u1, v1 = min(camera.width, math.ceil(high_u) + 1), min(camera.height, math.ceil(high_v) + 1)
+    u0, v0, u1, v1 = box_px(camera, world_from_camera, vertices)
     if u0 < u1 and v0 < v1:
         mask[v0:v1, u0:u1] = _window(rays, camera, world_from_camera, u0, v0, u1, v1) == instance
     return mask
