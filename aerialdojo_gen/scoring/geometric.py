@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import cv2
 import numpy as np
@@ -24,6 +26,8 @@ FACTORS = ("framed", "open")
 _BEHIND = 0.7
 # Full marks from half of the picture's edge on, and from this CIE76 difference on: orange on grey asphalt has 60.
 _FULL_SIZE, _FULL_CONTRAST = 0.5, 50.0
+# A view is judged by the scorer, and again for what the table says of it.
+_TAKEN: WeakKeyDictionary[AnchorView, dict[str, Any]] = WeakKeyDictionary()
 # More than the sums of a score round by.
 _ROUNDING = 1e-9
 # What surrounds the object: as far as this share of the picture's edge.
@@ -153,7 +157,14 @@ def _parts(known: AnchorView | Known, terms: dict[str, Any], radius_m: float, st
 
 
 def _pictured(view: AnchorView) -> dict[str, Any]:
-    """Take the terms that the picture itself decides."""
+    """Take the terms that the picture itself decides; they are taken once a view."""
+    with contextlib.suppress(KeyError):
+        return _TAKEN[view]
+    terms = _TAKEN[view] = _terms(view)
+    return terms
+
+
+def _terms(view: AnchorView) -> dict[str, Any]:
     names = ("unoccluded", "size", "centred", "contrast", "sky", *FACTORS)
     if not view.visible.any():
         return dict.fromkeys(names, 0.0)
