@@ -167,14 +167,14 @@ class Sight:
         with np.errstate(divide="ignore", invalid="ignore"):
             u = (ray[..., 0] * sin - ray[..., 1] * cos) / (ahead * half)
             v = -ray[..., 2] / (ahead * half)
-        ahead = np.asarray(ahead > 0.0)
-        facing = ahead & (np.abs(u) <= 1.0) & (np.abs(v) <= 1.0)
+        before = np.asarray(ahead > 0.0)
+        facing = before & (np.abs(u) <= 1.0) & (np.abs(v) <= 1.0)
         who, what = np.nonzero(facing)
         facing[who, what] = alone.unobstructed(positions[who], points[what])
         who, what = np.nonzero(facing)
         seen = np.zeros_like(facing)
         seen[who, what] = scene.visible(positions[who], points[what], own_instance)
-        return cls(u, v, ahead & (np.abs(u) <= _ROOM) & (np.abs(v) <= _ROOM), facing, seen)
+        return cls(u, v, before & (np.abs(u) <= _ROOM) & (np.abs(v) <= _ROOM), facing, seen)
 
     def with_rows(self, rows: NDArray[np.int64], where: NDArray[np.int64], others: Sight) -> Sight:
         """Take some viewpoints, (k,), and put others in the place of those of them that `where` says."""
