@@ -5,12 +5,52 @@ from __future__ import annotations
 import numpy as np
 from embreex.mesh_construction import TriangleMesh
 from embreex.rtcore_scene import EmbreeScene
+from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from aerialdojo_gen.geometry.soup import Body, Things, soup
 
 Floats = NDArray[np.float64]
+Singles = NDArray[np.float32]
 Ints = NDArray[np.int32]
+
+
+@njit(cache=True)
+def _rays(origins: Floats, directions: Floats, centre: Floats) -> tuple[Floats, Singles, Singles]:
+    """Unit directions, and origins and directions as Embree wants them."""
+    n = len(directions)
+    unit, start, aim = np.empty((n, 3)), np.empty((n, 3), np.float32), np.empty((n, 3), np.float32)
+    for i in range(n):
+        x, y, z = directions[i, 0], directions[i, 1], directions[i, 2]
+        length = np.sqrt(x * x + y * y + z * z)
+        for a in range(3):
+            unit[i, a] = directions[i, a] / length
+            aim[i, a] = unit[i, a]
+            start[i, a] = origins[i, a] - centre[a]
+    return unit, start, aim
+
+
+@njit(cache=True)
+def _hits(
+    which: Ints, rough: Singles, origins: Floats, unit: Floats, corner: Floats, normal: Floats, faces: Ints
+) -> tuple[Floats, Ints]:
+    """Distances along rays from the planes of the triangles that they hit, and the faces that these are."""
+    n = len(which)
+    distance, face = np.full(n, np.inf), np.full(n, -1, np.int32)
+    for i in range(n):
+        k = which[i]
+        if k < 0:
+            continue
+        facing = height = 0.0
+        for a in range(3):
+            facing += normal[k, a] * unit[i, a]
+            height += normal[k, a] * (corner[k, a] - origins[i, a])
+        # A ray along the triangle's plane has no point on it: there Embree's own distance stands.
+        near = np.float64(rough[i])
+        exact = height / facing if facing != 0.0 else near
+        distance[i] = max(exact, 0.0) if abs(exact - near) < 1e-2 else near
+        face[i] = faces[k]
+    return distance, face
 
 
 class TriangleRayCaster:
@@ -62,25 +102,12 @@ class TriangleRayCaster:
             Index of the face that is hit, -1 where none is.
         """
         d = np.asarray(directions, dtype=np.float64)
-        d = d / np.linalg.norm(d, axis=1, keepdims=True)
+        if not len(d):
+            return np.zeros(0), np.zeros(0, np.int32)
         o = np.broadcast_to(np.asarray(origins, dtype=np.float64), d.shape)
-        hit = self._scene.run(
-            np.ascontiguousarray(o - self._centre, dtype=np.float32),
-            np.ascontiguousarray(d, dtype=np.float32),
-            output=True,
-        )
-        which = np.asarray(hit["primID"], dtype=np.int64)
-        found = which >= 0
-        k = which[found]
-        distance = np.full(len(d), np.inf)
-        rough = np.asarray(hit["tfar"], dtype=np.float64)[found]
-        facing = np.einsum("ij,ij->i", self._normal[k], d[found])
-        height = np.einsum("ij,ij->i", self._normal[k], self._corner[k] - o[found])
-        # A ray along the triangle's plane has no point on it: there Embree's own distance stands.
-        exact = np.divide(height, facing, out=rough.copy(), where=facing != 0.0)
-        distance[found] = np.where(np.abs(exact - rough) < 1e-2, np.maximum(exact, 0.0), rough)
-        face = np.full(len(d), -1, dtype=np.int32)
-        face[found] = self._face[k]
+        unit, start, aim = _rays(o, np.broadcast_to(d, d.shape), self._centre)
+        hit = self._scene.run(start, aim, output=True)
+        distance, face = _hits(hit["primID"], hit["tfar"], o, unit, self._corner, self._normal, self._face)
         return distance, face
 
     def unobstructed(self, origins: ArrayLike, points: ArrayLike, tolerance_m: float = 5e-3) -> NDArray[np.bool_]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +15,7 @@ from aerialdojo_gen.geometry.rays import RayCaster, TriangleRayCaster
 from aerialdojo_gen.geometry.surface import Surface
 
 Floats = NDArray[np.float64]
+_T = TypeVar("_T", bound=np.generic)
 
 _LEAST_POINTS = 3
 _FULL_SIZE = 0.5
@@ -110,6 +112,110 @@ class Views:
     off_centre: Floats
 
 
+@dataclass(frozen=True, eq=False)
+class Sight:
+    """Which of an object's m sample points n viewpoints see, and where in their pictures.
+
+    The camera is the front one: square picture, at the body's centre, level, looking along the yaw.
+
+    Attributes
+    ----------
+    u, v : (n, m) float64
+        Where the points are in the picture: -1 to 1 from edge to edge; meaningless behind the camera.
+    roomy : (n, m) bool
+        Points within the picture with a little room, whatever hides them.
+    facing : (n, m) bool
+        Points in the picture that the object itself does not hide.
+    seen : (n, m) bool
+        Those of them that nothing else hides either.
+    """
+
+    u: Floats
+    v: Floats
+    roomy: NDArray[np.bool_]
+    facing: NDArray[np.bool_]
+    seen: NDArray[np.bool_]
+
+    @classmethod
+    def of(
+        cls, positions: Floats, yaw_rad: Floats, points: Floats, alone: TriangleRayCaster, scene: RayCaster,
+        own_instance: int, fov_deg: float,
+    ) -> Sight:  # fmt: skip
+        """Look at an object from viewpoints, by ray casts from the body's centre to sample points.
+
+        Parameters
+        ----------
+        positions : (n, 3) float64
+            Metres, world frame.
+        yaw_rad : (n,) float64
+            Radians, counter-clockwise from +x.
+        points : (m, 3) float64
+            On the object's surface, metres, world frame.
+        alone : TriangleRayCaster
+            The object by itself.
+        scene : RayCaster
+            Everything, the object included.
+        own_instance : int
+            The object's index in the scene.
+        fov_deg : float
+            Field of view of the camera, horizontal and vertical.
+        """
+        ray = points[None] - positions[:, None]
+        cos, sin = np.cos(yaw_rad)[:, None], np.sin(yaw_rad)[:, None]
+        ahead = ray[..., 0] * cos + ray[..., 1] * sin
+        half = math.tan(math.radians(fov_deg) / 2.0)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            u = (ray[..., 0] * sin - ray[..., 1] * cos) / (ahead * half)
+            v = -ray[..., 2] / (ahead * half)
+        before = np.asarray(ahead > 0.0)
+        facing = before & (np.abs(u) <= 1.0) & (np.abs(v) <= 1.0)
+        who, what = np.nonzero(facing)
+        facing[who, what] = alone.unobstructed(positions[who], points[what])
+        who, what = np.nonzero(facing)
+        seen = np.zeros_like(facing)
+        seen[who, what] = scene.visible(positions[who], points[what], own_instance)
+        return cls(u, v, before & (np.abs(u) <= _ROOM) & (np.abs(v) <= _ROOM), facing, seen)
+
+    def with_rows(self, rows: NDArray[np.int64], where: NDArray[np.int64], others: Sight) -> Sight:
+        """Take some viewpoints, (k,), and put others in the place of those of them that `where` says."""
+
+        def mixed(mine: NDArray[_T], theirs: NDArray[_T]) -> NDArray[_T]:
+            taken = mine[rows]
+            taken[where] = theirs
+            return taken
+
+        return Sight(
+            mixed(self.u, others.u),
+            mixed(self.v, others.v),
+            mixed(self.roomy, others.roomy),
+            mixed(self.facing, others.facing),
+            mixed(self.seen, others.seen),
+        )
+
+    def views(self) -> Views:
+        """Sum up what each of the viewpoints sees, and compare them."""
+        could, does = self.facing.sum(axis=1), self.seen.sum(axis=1)
+        enough = (could >= _LEAST_POINTS) & (does > 0)
+        ever = int(self.facing.any(axis=0).sum())
+        n = len(could)
+        box, off = np.zeros(n), np.ones(n)
+        rows = np.flatnonzero(enough)
+        if len(rows):
+            seen = self.seen[rows]
+            us, vs = np.where(seen, self.u[rows], np.nan), np.where(seen, self.v[rows], np.nan)
+            wide = np.nanmax(us, axis=1) - np.nanmin(us, axis=1)
+            high = np.nanmax(vs, axis=1) - np.nanmin(vs, axis=1)
+            box[rows] = wide * high / 4.0
+            off[rows] = np.hypot(np.nanmean(us, axis=1), np.nanmean(vs, axis=1))
+        return Views(
+            visible_fraction=np.where(enough, does / np.maximum(could, 1), 0.0),
+            framed=np.asarray(self.roomy.mean(axis=1)),
+            shown=np.where(enough, does / max(ever, 1), 0.0),
+            box_fraction=box,
+            off_centre=off,
+        )
+
+
 def look(
     positions: Floats,
     yaw_rad: Floats,
@@ -119,67 +225,8 @@ def look(
     own_instance: int,
     fov_deg: float,
 ) -> Views:
-    """Look at an object from viewpoints, by ray casts from the body's centre to sample points.
-
-    The camera is the front one: square picture, at the body's centre, level, looking along the yaw.
-
-    Parameters
-    ----------
-    positions : (n, 3) float64
-        Metres, world frame.
-    yaw_rad : (n,) float64
-        Radians, counter-clockwise from +x.
-    points : (m, 3) float64
-        On the object's surface, metres, world frame.
-    alone : TriangleRayCaster
-        The object by itself.
-    scene : RayCaster
-        Everything, the object included.
-    own_instance : int
-        The object's index in the scene.
-    fov_deg : float
-        Field of view of the camera, horizontal and vertical.
-
-    Returns
-    -------
-    Views
-        One entry a viewpoint.
-    """
-    n, m = len(positions), len(points)
-    ray = points[None] - positions[:, None]
-    cos, sin = np.cos(yaw_rad)[:, None], np.sin(yaw_rad)[:, None]
-    ahead = ray[..., 0] * cos + ray[..., 1] * sin
-    half = math.tan(math.radians(fov_deg) / 2.0)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        u = (ray[..., 0] * sin - ray[..., 1] * cos) / (ahead * half)
-        v = -ray[..., 2] / (ahead * half)
-    framed = np.asarray((ahead > 0.0) & (np.abs(u) <= 1.0) & (np.abs(v) <= 1.0))
-    who, what = np.nonzero(framed)
-    facing = alone.unobstructed(positions[who], points[what])
-    who, what = who[facing], what[facing]
-    seen = np.zeros((n, m), dtype=np.bool_)
-    seen[who, what] = scene.visible(positions[who], points[what], own_instance)
-
-    could = np.bincount(who, minlength=n)
-    does = seen.sum(axis=1)
-    enough = (could >= _LEAST_POINTS) & (does > 0)
-    ever = len(np.unique(what))
-    us, vs = np.where(seen, u, np.nan), np.where(seen, v, np.nan)
-    box, off = np.zeros(n), np.ones(n)
-    rows = np.flatnonzero(enough)
-    if len(rows):
-        us, vs = us[rows], vs[rows]
-        wide = np.nanmax(us, axis=1) - np.nanmin(us, axis=1)
-        high = np.nanmax(vs, axis=1) - np.nanmin(vs, axis=1)
-        box[rows] = wide * high / 4.0
-        off[rows] = np.hypot(np.nanmean(us, axis=1), np.nanmean(vs, axis=1))
-    return Views(
-        visible_fraction=np.where(enough, does / np.maximum(could, 1), 0.0),
-        framed=np.asarray(((ahead > 0.0) & (np.abs(u) <= _ROOM) & (np.abs(v) <= _ROOM)).mean(axis=1)),
-        shown=np.where(enough, does / max(ever, 1), 0.0),
-        box_fraction=box,
-        off_centre=off,
-    )
+    """Look at an object from viewpoints: the `Views` of their `Sight`, whose parameters these are."""
+    return Sight.of(positions, yaw_rad, points, alone, scene, own_instance, fov_deg).views()
 
 
 def informativeness(

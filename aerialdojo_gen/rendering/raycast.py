@@ -86,20 +86,21 @@ class RayRenderer:
         shape = (camera.height, camera.width)
         directions = local @ world_from_camera[:3, :3].T
         distance, face = self._rays.first_hit(world_from_camera[:3, 3], directions)
-        hit = face >= 0
-        points = world_from_camera[:3, 3] + directions[hit] * (distance[hit] / length[hit])[:, None]
-        albedo = np.zeros((len(face), 3), np.uint8)
-        found = face[hit]
-        albedo[hit] = _albedo(
-            points, self._corners[found], self._uv[found], self._material[found], self._tiles, self._texels
-        )
-        # Shading divides by depth, and a camera may touch a surface.
-        depth = np.where(hit, np.maximum(distance / length, 1e-3), np.inf).astype(np.float32).reshape(shape)
-        surface = np.where(hit, self._material[face], np.int32(-1)).reshape(shape)
+        albedo, depth, surface, owner = _seen(
+            np.ascontiguousarray(world_from_camera[:3, 3]), directions, distance, length, face, self._corners,
+            self._uv, self._material, self._owner, self._tiles, self._texels,
+        )  # fmt: skip
+        depth = depth.reshape(shape)
         rgb = shade(
-            camera, world_from_camera, albedo.reshape(*shape, 3), depth, surface, self._light, self._no_shadow
+            camera,
+            world_from_camera,
+            albedo.reshape(*shape, 3),
+            depth,
+            surface.reshape(shape),
+            self._light,
+            self._no_shadow,
         )
-        return Picture(rgb, depth, np.where(hit, self._owner[face], np.int32(-1)).reshape(shape))
+        return Picture(rgb, depth, owner.reshape(shape))
 
     def close(self) -> None:
         """Do nothing: the memory is Python's own."""
@@ -122,43 +123,60 @@ def pixel_rays(camera: Camera) -> tuple[Floats, Floats]:
 
 
 @njit(cache=True, error_model="numpy")
-def _albedo(
-    points: Floats, corners: Floats, uv: Floats, material: Ints, tiles: NDArray[np.int64], texels: NDArray[np.uint8]
-) -> NDArray[np.uint8]:
-    """Colour of the nearest texel at points on triangles, (n, 3) uint8.
+def _seen(
+    eye: Floats, directions: Floats, distance: Floats, length: Floats, face: Ints, corners: Floats, uv: Floats,
+    material: Ints, owner: Ints, tiles: NDArray[np.int64], texels: NDArray[np.uint8],
+) -> tuple[NDArray[np.uint8], NDArray[np.float32], Ints, Ints]:  # fmt: skip
+    """Colour of the nearest texel where n rays hit, planar depth, material and instance.
 
     Parameters
     ----------
-    points : (n, 3) float64
-    corners : (n, 3, 3) float64
-        Of each point's triangle.
-    uv : (n, 3, 2) float64
-        At its corners, in tiles.
-    material : (n,) int32
+    eye : (3,) float64
+    directions : (n, 3) float64
+        With a planar depth of 1.
+    distance, length : (n,) float64
+        Along the rays, inf where nothing is hit; and of their directions.
+    face : (n,) int32
+        That is hit, or -1.
+    corners : (f, 3, 3) float64
+        Of all faces.
+    uv : (f, 3, 2) float64
+        At the corners, in tiles.
+    material, owner : (f,) int32
     tiles : (m, 3) int64
         A material's first texel, rows and columns.
     texels : (t, 3) uint8
     """
-    out = np.empty((len(points), 3), np.uint8)
-    for n in range(len(points)):
+    rays = len(face)
+    albedo, depth = np.zeros((rays, 3), np.uint8), np.full(rays, np.inf, np.float32)
+    surface, instance = np.full(rays, -1, np.int32), np.full(rays, -1, np.int32)
+    for n in range(rays):
+        k = face[n]
+        if k < 0:
+            continue
+        surface[n], instance[n] = material[k], owner[k]
+        along = distance[n] / length[n]
+        # Shading divides by depth, and a camera may touch a surface.
+        depth[n] = max(along, 1e-3)
         ee = ef = ff = ep = fp = 0.0
         for axis in range(3):
-            at = corners[n, 0, axis]
-            e, f, p = corners[n, 1, axis] - at, corners[n, 2, axis] - at, points[n, axis] - at
+            at = corners[k, 0, axis]
+            e, f = corners[k, 1, axis] - at, corners[k, 2, axis] - at
+            p = eye[axis] + directions[n, axis] * along - at
             ee, ef, ff, ep, fp = ee + e * e, ef + e * f, ff + f * f, ep + e * p, fp + f * p
         area = ee * ff - ef * ef
         # Where the point is between the corners; a sliver has its first corner's colour.
         s, t = 0.0, 0.0
         if area > 0.0:
             s, t = (ff * ep - ef * fp) / area, (ee * fp - ef * ep) / area
-        u = uv[n, 0, 0] + s * (uv[n, 1, 0] - uv[n, 0, 0]) + t * (uv[n, 2, 0] - uv[n, 0, 0])
-        v = uv[n, 0, 1] + s * (uv[n, 1, 1] - uv[n, 0, 1]) + t * (uv[n, 2, 1] - uv[n, 0, 1])
-        first, rows, columns = tiles[material[n], 0], tiles[material[n], 1], tiles[material[n], 2]
+        u = uv[k, 0, 0] + s * (uv[k, 1, 0] - uv[k, 0, 0]) + t * (uv[k, 2, 0] - uv[k, 0, 0])
+        v = uv[k, 0, 1] + s * (uv[k, 1, 1] - uv[k, 0, 1]) + t * (uv[k, 2, 1] - uv[k, 0, 1])
+        first, rows, columns = tiles[material[k], 0], tiles[material[k], 1], tiles[material[k], 2]
         column = min(int((u - np.floor(u)) * columns), columns - 1)
         row = min(int((1.0 - (v - np.floor(v))) * rows), rows - 1)
         texel = first + row * columns + column
-        out[n, 0], out[n, 1], out[n, 2] = texels[texel, 0], texels[texel, 1], texels[texel, 2]
-    return out
+        albedo[n, 0], albedo[n, 1], albedo[n, 2] = texels[texel, 0], texels[texel, 1], texels[texel, 2]
+    return albedo, depth, surface, instance
 
 
 def ray_renderer(scene: Scene) -> RayRenderer:

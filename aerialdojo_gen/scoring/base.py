@@ -63,6 +63,29 @@ class AnchorView:
         return encode_jpeg(self.rgb, SCORED_JPEG)
 
 
+@dataclass(frozen=True)
+class Known:
+    """What is known of a candidate anchor before it is pictured.
+
+    Attributes
+    ----------
+    shown, elevation_deg, clearance_m, off_front_rad
+        See `AnchorView`.
+    told : tuple of float
+        By ray casts: at least what the picture's would be.
+    framed, framed_behind : float
+        See `AnchorView`: from here, and from behind, None where there is no picture from there.
+    """
+
+    shown: float
+    elevation_deg: float
+    clearance_m: float
+    told: tuple[float, ...]
+    off_front_rad: float | None
+    framed: float
+    framed_behind: float | None
+
+
 class Scorer(Protocol):
     """Scores the candidates of one object against each other."""
 

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import cv2
 import numpy as np
 
 from aerialdojo_gen.geometry.viewpoints import level_marks
-from aerialdojo_gen.scoring.base import AnchorView
+from aerialdojo_gen.scoring.base import AnchorView, Known
 from aerialdojo_gen.scoring.knowing import clarity, fronting, knowing, telling
 
 WEIGHTS = {
@@ -24,6 +26,10 @@ FACTORS = ("framed", "open")
 _BEHIND = 0.7
 # Full marks from half of the picture's edge on, and from this CIE76 difference on: orange on grey asphalt has 60.
 _FULL_SIZE, _FULL_CONTRAST = 0.5, 50.0
+# A view is judged by the scorer, and again for what the table says of it.
+_TAKEN: WeakKeyDictionary[AnchorView, dict[str, Any]] = WeakKeyDictionary()
+# More than the sums of a score round by.
+_ROUNDING = 1e-9
 # What surrounds the object: as far as this share of the picture's edge.
 _RING = 1 / 16
 
@@ -104,22 +110,61 @@ def judge(view: AnchorView, radius_m: float, standoff_m: float) -> Parts:
     -------
     Parts
     """
-    level = float(level_marks(view.elevation_deg))
-    room = standoff_m - radius_m
-    clear = min(max((view.clearance_m - radius_m) / room, 0.0), 1.0) if room > 0.0 else 1.0
-    tells = float(telling(np.array([view.told]))[0]) if view.told else None
-    off = fronting(None if view.off_front_rad is None else np.array([view.off_front_rad]))
     terms = _pictured(view)
     if view.behind is not None:
         behind = _pictured(view.behind)
-        terms = {name: (1.0 - _BEHIND) * term + _BEHIND * behind[name] for name, term in terms.items()}
+        terms = {name: _mixed(term, behind[name]) for name, term in terms.items()}
+    return _parts(view, terms, radius_m, standoff_m)
+
+
+def most(known: Known, radius_m: float, standoff_m: float) -> float:
+    """Bound the score of every picture from a viewpoint from above, by what is known of the viewpoint without one.
+
+    Parameters
+    ----------
+    known : Known
+    radius_m, standoff_m : float
+        As for `judge`.
+
+    Returns
+    -------
+    float
+        No view of which this is known has a higher score by `judge`.
+    """
+    terms = dict.fromkeys(("unoccluded", "size", "centred", "contrast", "sky", "open"), 1.0)
+    framed = known.framed if known.framed_behind is None else _mixed(known.framed, known.framed_behind)
+    return _parts(known, {**terms, "framed": framed}, radius_m, standoff_m).score + _ROUNDING
+
+
+def _mixed(here: float, behind: float) -> float:
+    return (1.0 - _BEHIND) * here + _BEHIND * behind
+
+
+def _parts(known: AnchorView | Known, terms: dict[str, Any], radius_m: float, standoff_m: float) -> Parts:
+    level = float(level_marks(known.elevation_deg))
+    room = standoff_m - radius_m
+    clear = min(max((known.clearance_m - radius_m) / room, 0.0), 1.0) if room > 0.0 else 1.0
+    tells = float(telling(np.array([known.told]))[0]) if known.told else None
+    off = fronting(None if known.off_front_rad is None else np.array([known.off_front_rad]))
     return Parts(
-        shown=view.shown, level=level, clear=clear, tells=tells, front=None if off is None else float(off[0]), **terms
+        shown=known.shown,
+        level=level,
+        clear=clear,
+        tells=tells,
+        front=None if off is None else float(off[0]),
+        **terms,
     )
 
 
 def _pictured(view: AnchorView) -> dict[str, Any]:
-    """Take the terms that the picture itself decides."""
+    """Take the terms that the picture itself decides; they are taken once a view."""
+    with contextlib.suppress(KeyError):
+        return _TAKEN[view]
+    terms = _TAKEN[view] = _terms(view)
+    return terms
+
+
+def _terms(view: AnchorView) -> dict[str, Any]:
     names = ("unoccluded", "size", "centred", "contrast", "sky", *FACTORS)
     if not view.visible.any():
         return dict.fromkeys(names, 0.0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -9,13 +10,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerialdojo_gen.config.sections import AnchorSampleConfig
-from aerialdojo_gen.geometry.viewpoints import level_marks
-from aerialdojo_gen.scoring.base import AnchorView
+from aerialdojo_gen.geometry.viewpoints import level_marks, shortlist
+from aerialdojo_gen.scoring.base import AnchorView, Known
+from aerialdojo_gen.scoring.geometric import most
 from aerialdojo_gen.scoring.knowing import clarity
+from aerialdojo_gen.scoring.panel import Verdict, panel
 from aerialdojo_gen.stages.work.anchor_world import Candidates
-from aerialdojo_gen.stages.work.step_back import step_back_m, telling_m
+from aerialdojo_gen.stages.work.step_back import steps_back_m, telling_m
 
 Floats = NDArray[np.float64]
+
+# Models that look at pictures are made for such.
+_LOOKED_AT_PX = 320
 
 
 @dataclass(frozen=True)
@@ -56,16 +62,15 @@ class Looked:
             The body's.
         config : AnchorSampleConfig
         """
-        places, yaws, backs = found.positions_m[which], found.yaw_rad[which], np.zeros(len(which))
-        for n, k in enumerate(which):
-            most = min(
-                config.step_back_m, telling_m(found.patches, found.seen[k], places[n], yaws[n], config.fov_deg)
-            )
-            backs[n] = step_back_m(
-                found.world, found.instance, found.points, places[n], float(yaws[n]), config.fov_deg, most
-            )
+        places, yaws = found.positions_m[which], found.yaw_rad[which]
+        telling = [
+            telling_m(found.patches, found.seen[k], places[n], float(yaws[n]), config.fov_deg)
+            for n, k in enumerate(which)
+        ]
+        most = np.minimum(config.step_back_m, telling)
+        backs = steps_back_m(found.world, found.instance, found.points, places, yaws, config.fov_deg, most)
         away = np.column_stack([np.cos(yaws), np.sin(yaws), np.zeros(len(yaws))]) * backs[:, None]
-        behind = Candidates.of(found.world, found.instance, found.points, places - away, yaws, radius_m, config)
+        behind = found.moved(which, places - away, radius_m, config)
         views, elevation = behind.views, found.elevation_deg[which]
         clear = clarity(views.visible_fraction, views.framed, np.zeros(len(which)), level_marks(elevation))
         rank = (found.rank[which] + behind.rank) / 2.0 * clear
@@ -88,15 +93,93 @@ class Looked:
             From the candidates, with the one from behind where there is one; what is shown of the object and of its
             telling parts is the mean of both.
         """
-        views = []
-        for n in few.tolist():
-            view = self.found.picture(int(self.which[n]), size_px, fov_deg)
-            if self.step_back_m[n] > 0.0:
-                back = self.behind.picture(n, size_px, fov_deg)
-                told = _mean(view.told, back.told)
-                view = replace(view, shown=(view.shown + back.shown) / 2.0, told=told, behind=back)
-            views.append(view)
-        return views
+        return [self.picture(n, size_px, fov_deg) for n in few.tolist()]
+
+    def picture(self, n: int, size_px: int, fov_deg: float) -> AnchorView:
+        """Picture one candidate, a number among `which`; see `pictures`."""
+        view = self.found.picture(int(self.which[n]), size_px, fov_deg)
+        if self.step_back_m[n] > 0.0:
+            back = self.behind.picture(n, size_px, fov_deg)
+            told = _mean(view.told, back.told)
+            view = replace(view, shown=(view.shown + back.shown) / 2.0, told=told, behind=back)
+        return view
+
+    def most(self, n: int, radius_m: float, standoff_m: float) -> float:
+        """Bound the geometric score of a candidate, a number among `which`, from above, without a picture of it."""
+        k, found, behind = int(self.which[n]), self.found, self.behind
+        shown, told = float(found.views.shown[k]), tuple(found.told[k].tolist())
+        back = self.step_back_m[n] > 0.0
+        if back:
+            shown = (shown + float(behind.views.shown[n])) / 2.0
+            told = _mean(told, behind.told[n].tolist())
+        known = Known(
+            shown,
+            float(found.elevation_deg[k]),
+            float(found.clearance_m[k]),
+            told,
+            None if found.off_front_rad is None else float(found.off_front_rad[k]),
+            float(found.views.framed[k]),
+            float(behind.views.framed[n]) if back else None,
+        )
+        return most(known, radius_m, standoff_m)
+
+
+def best_pictured(
+    name: str,
+    looked: Looked,
+    few: NDArray[np.int64],
+    azimuth_rad: Floats,
+    front: NDArray[np.bool_],
+    radius_m: float,
+    config: AnchorSampleConfig,
+) -> tuple[NDArray[np.int64], list[tuple[AnchorView, Verdict]]]:
+    """Picture candidates, and shortlist the best of them.
+
+    Where nothing but geometry scores, a candidate is pictured only if it could still be among the best: the choice is
+    the same as of all pictures.
+
+    Parameters
+    ----------
+    name : str
+        What the object is called.
+    looked : Looked
+    few : (m,) int64
+        Numbers among ``looked.which``.
+    azimuth_rad : (m,) float64
+        Direction of each seen from the object's centroid.
+    front : (m,) bool
+        Which are before a front of the object.
+    radius_m : float
+        The body's.
+    config : AnchorSampleConfig
+
+    Returns
+    -------
+    best : (k,) int64
+        Indices into `few`, the best first, k at most `shortlist`.
+    shown : list of tuple
+        Picture and verdict of each of these.
+    """
+    scorers, apart = panel(config, radius_m), math.radians(config.separation_deg)
+    weights = config.weights
+    if weights.clip or weights.vlm:
+        views = looked.pictures(few, max(config.picture_px, _LOOKED_AT_PX), config.fov_deg)
+        found = dict(enumerate(zip(views, scorers.judge(name, views), strict=True)))
+        score = np.array([verdict.score for _, verdict in found.values()])
+    else:
+        found = {}
+        score = np.array([looked.most(n, radius_m, config.standoff_m) for n in few.tolist()])
+    while True:
+        # A choice among scores and bounds is that among scores, as soon as it falls on scores alone.
+        best = shortlist(score, azimuth_rad, config.shortlist, apart, front)
+        chosen = (*shortlist(score, azimuth_rad, config.shortlist, apart).tolist(), *best.tolist())
+        open_ones = [n for n in chosen if n not in found]
+        if not open_ones:
+            return best, [found[n] for n in best.tolist()]
+        n = open_ones[0]
+        view = looked.picture(int(few[n]), config.picture_px, config.fov_deg)
+        found[n] = view, scorers.judge(name, [view])[0]
+        score[n] = found[n][1].score
 
 
 def _mean(here: Sequence[float], there: Sequence[float]) -> tuple[float, ...]:

@@ -21,9 +21,8 @@ from aerialdojo_gen.geometry.viewpoints import around, shortlist
 from aerialdojo_gen.pipeline.stage import Job, Output
 from aerialdojo_gen.scenes.model import Instance
 from aerialdojo_gen.scoring.geometric import judge
-from aerialdojo_gen.scoring.panel import panel
 from aerialdojo_gen.stages.work.anchor_choice import with_choice
-from aerialdojo_gen.stages.work.anchor_pictures import Looked
+from aerialdojo_gen.stages.work.anchor_pictures import Looked, best_pictured
 from aerialdojo_gen.stages.work.anchor_world import Candidates, World, tells_of
 from aerialdojo_gen.store.schemas import ANCHORS, VIEWPOINTS
 from aerialdojo_gen.store.tables import from_rows
@@ -31,8 +30,6 @@ from aerialdojo_gen.store.tables import from_rows
 Floats = NDArray[np.float64]
 log = logging.getLogger(__name__)
 
-# Models that look at pictures are made for such.
-_LOOKED_AT_PX = 320
 # So many times what is pictured is looked at by ray casts from where its reference picture would be taken.
 _LOOKED_AT = 4
 # More parts than that get no candidates of their own.
@@ -195,13 +192,7 @@ def shortlisted(
     looked = Looked.of(found, np.union1d(looked_at, of_sides), radius, config)
     of_looked = shortlist(looked.rank, azimuth[looked.which], pictured, apart, front[looked.which])
     few, backs = looked.which[of_looked], looked.step_back_m[of_looked].tolist()
-    size_px = (
-        max(config.picture_px, _LOOKED_AT_PX) if config.weights.clip or config.weights.vlm else config.picture_px
-    )
-    pictures = looked.pictures(of_looked, size_px, config.fov_deg)
-    verdicts = panel(config, radius).judge(item["name"], pictures)
-    score = np.array([verdict.score for verdict in verdicts])
-    best = shortlist(score, azimuth[few], config.shortlist, apart, front[few])
+    best, shown = best_pictured(item["name"], looked, of_looked, azimuth[few], front[few], radius, config)
     own_distance = Surface.of(world.scene.instances[found.instance]).distance_m(found.positions_m[few[best]])
     why = None
     if len(best) and front[seen].any() and not front[few[best[0]]]:
@@ -217,14 +208,14 @@ def shortlisted(
             **found.row(int(few[n]), float(own_distance[rank])),
             "step_back_m": backs[n],
             "no_front_reason": why if rank == 0 else None,
-            "score": verdicts[n].score,
-            **verdicts[n].parts,
-            **judge(pictures[n], radius, config.standoff_m).columns,
-            "thumbnail": pictures[n].jpeg(),
+            "score": verdict.score,
+            **verdict.parts,
+            **judge(picture, radius, config.standoff_m).columns,
+            "thumbnail": picture.jpeg(),
             "selected": rank == 0,
             "selected_by": "auto",
         }
-        for rank, n in enumerate(best)
+        for rank, (n, (picture, verdict)) in enumerate(zip(best.tolist(), shown, strict=True))
     ]
 
 

@@ -14,7 +14,7 @@ from aerialdojo_gen.geometry.cameras import Camera
 from aerialdojo_gen.geometry.rays import RayCaster, TriangleRayCaster, instance_caster
 from aerialdojo_gen.geometry.surface import Surface
 from aerialdojo_gen.geometry.telling import FRONT_RAD, Patch, off_front_rad, seen_share
-from aerialdojo_gen.geometry.viewpoints import Views, informativeness, look
+from aerialdojo_gen.geometry.viewpoints import Sight, Views, informativeness
 from aerialdojo_gen.planning.clearance import ClearanceGrid
 from aerialdojo_gen.planning.collision import CollisionWorld, collision_world
 from aerialdojo_gen.rendering.casters import ray_caster
@@ -79,6 +79,8 @@ class Candidates:
         The body's centres, world frame.
     yaw_rad, elevation_deg, clearance_m : (n,) float64
         Yaw; elevation seen from the object's centroid; distance to the nearest surface.
+    sight : Sight
+        Which points of the object's surface they see.
     views : Views
         What they see of the object.
     points : (m, 3) float64
@@ -103,6 +105,7 @@ class Candidates:
     yaw_rad: Floats
     elevation_deg: Floats
     clearance_m: Floats
+    sight: Sight
     views: Views
     points: Floats
     patches: tuple[Patch, ...]
@@ -131,23 +134,66 @@ class Candidates:
             The body's.
         config : AnchorSampleConfig
         """
-        thing = world.scene.instances[instance]
-        alone = instance_caster(thing)
-        views = look(positions_m, yaw_rad, points, alone, world.rays, instance, config.fov_deg)
-        away = positions_m - thing.centroid
-        elevation = np.degrees(np.arctan2(away[:, 2], np.hypot(away[:, 0], away[:, 1])))
+        alone = instance_caster(world.scene.instances[instance])
+        sight = Sight.of(positions_m, yaw_rad, points, alone, world.rays, instance, config.fov_deg)
         clearance = np.array([world.collisions.distance_m(p) for p in positions_m])
-        rank = informativeness(views, elevation, clearance, radius_m, config.standoff_m)
         patches = patches_of(world, instance, points)
         seen = seen_share(positions_m, yaw_rad, patches, world.rays, config.fov_deg)
+        return cls._judged(
+            world, instance, alone, positions_m, yaw_rad, clearance, sight, points, patches, seen, radius_m, config
+        )
+
+    @classmethod
+    def _judged(
+        cls, world: World, instance: int, alone: TriangleRayCaster, positions_m: Floats, yaw_rad: Floats,
+        clearance: Floats, sight: Sight, points: Floats, patches: tuple[Patch, ...], seen: Floats, radius_m: float,
+        config: AnchorSampleConfig,
+    ) -> Candidates:  # fmt: skip
+        thing = world.scene.instances[instance]
+        views = sight.views()
+        away = positions_m - thing.centroid
+        elevation = np.degrees(np.arctan2(away[:, 2], np.hypot(away[:, 0], away[:, 1])))
+        rank = informativeness(views, elevation, clearance, radius_m, config.standoff_m)
         told = seen / np.maximum(seen.max(axis=0, initial=0.0), 1e-9)
         off_front = None
         if thing.anatomy is not None and thing.anatomy.fronts_rad:
             off_front = off_front_rad(positions_m, thing.centroid, thing.anatomy.fronts_rad)
         rank = knowing(rank, telling(told) if told.shape[1] else None, fronting(off_front))
         return cls(
-            world, instance, alone, positions_m, yaw_rad, elevation, clearance, views, points, patches, seen, told,
-            off_front, rank,
+            world, instance, alone, positions_m, yaw_rad, elevation, clearance, sight, views, points, patches, seen,
+            told, off_front, rank,
+        )  # fmt: skip
+
+    def moved(
+        self, which: NDArray[np.int64], positions_m: Floats, radius_m: float, config: AnchorSampleConfig
+    ) -> Candidates:
+        """Look from other places, facing the same way; what is known of places that are the same is not asked again.
+
+        Parameters
+        ----------
+        which : (k,) int64
+            Numbers of viewpoints.
+        positions_m : (k, 3) float64
+            Where they are moved to.
+        radius_m : float
+            The body's.
+        config : AnchorSampleConfig
+
+        Returns
+        -------
+        Candidates
+            What `of` says of those places.
+        """
+        world, yaws = self.world, self.yaw_rad[which]
+        new = np.flatnonzero((positions_m != self.positions_m[which]).any(axis=1))
+        places, turned = positions_m[new], yaws[new]
+        sight = Sight.of(places, turned, self.points, self.alone, world.rays, self.instance, config.fov_deg)
+        clearance, seen = self.clearance_m[which], self.seen[which]
+        clearance[new] = [world.collisions.distance_m(p) for p in places]
+        seen[new] = seen_share(places, turned, self.patches, world.rays, config.fov_deg)
+        return self._judged(
+            world, self.instance, self.alone, positions_m, yaws, clearance, self.sight.with_rows(which, new, sight),
+            self.points, self.patches, seen, radius_m, config,
         )  # fmt: skip
 
     def seeing(self, least: float) -> NDArray[np.int64]:
@@ -180,6 +226,7 @@ class Candidates:
         return take_view(
             ray_renderer(self.world.scene),
             self.alone,
+            self.world.scene.instances[self.instance],
             self.instance,
             Camera(size_px, size_px, fov_deg),
             self.positions_m[k],

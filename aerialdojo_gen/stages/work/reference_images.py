@@ -6,26 +6,28 @@ import math
 from functools import lru_cache
 from typing import Any
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from aerialdojo_gen.common.pictures import REFERENCE_PNG, encode_png
 from aerialdojo_gen.config.sections import ReferenceImagesConfig
-from aerialdojo_gen.geometry.cameras import Camera, project, view_pose
+from aerialdojo_gen.geometry.cameras import Camera, view_pose
 from aerialdojo_gen.geometry.rays import RayCaster, instance_caster
 from aerialdojo_gen.pipeline.stage import Job, Output
 from aerialdojo_gen.rendering.backend import kept_renderer
 from aerialdojo_gen.rendering.casters import ray_caster
 from aerialdojo_gen.scenes.model import Instance
-from aerialdojo_gen.scoring.views import part_shares
+from aerialdojo_gen.scoring.views import box_px, part_shares
 from aerialdojo_gen.store.schemas import REFERENCES
 from aerialdojo_gen.store.tables import from_rows
 
 _BOX = ("box_u0_px", "box_v0_px", "box_u1_px", "box_v1_px")
 _POSE = ("reference_x_m", "reference_y_m", "reference_z_m", "reference_yaw_rad")
-_IN_FRONT_M = 0.05
 # A patch of 7 x 7 pixels in a picture of 320 x 320.
 LEAST_SHARE = 0.0005
+# A rasteriser's edges are within a pixel of those that rays see; what it leaves out altogether is larger than that.
+_NEAR_PX, _EVERY_PX = 2, 4
 
 
 def run(job: Job, config: ReferenceImagesConfig) -> Output:
@@ -71,10 +73,11 @@ def run(job: Job, config: ReferenceImagesConfig) -> Output:
         eye = (anchor["x_m"] - back * math.cos(yaw), anchor["y_m"] - back * math.sin(yaw), anchor["z_m"])
         pose = view_pose(eye, yaw, "front")
         row |= zip((*_POSE, "step_back_m"), (*eye, yaw, back), strict=True)
-        row["reference_image"] = encode_png(renderer.render(camera, pose).rgb, REFERENCE_PNG)
+        picture = renderer.render(camera, pose, instances=renderer.name == "gl")
+        row["reference_image"] = encode_png(picture.rgb, REFERENCE_PNG)
         k = index[item["mesh_node"]]
         thing = scene.instances[k]
-        mask = instance_mask(rays, k, thing.vertices, camera, pose)
+        mask = instance_mask(rays, k, thing.vertices, camera, pose, picture.instance)
         row["image_fraction"] = float(mask.mean())
         if mask.any():
             row |= zip(_BOX, box_of(mask), strict=True)
@@ -110,7 +113,8 @@ def missing_tells(
     if not names:
         return []
     parts = [instance.faces_of(name) for name in names]
-    shares = part_shares(instance_caster(instance), parts, camera, world_from_camera, mask)
+    alone = instance_caster(instance)
+    shares = part_shares(alone, instance, parts, camera, world_from_camera, mask, LEAST_SHARE)
     return [name for name, share in zip(names, shares, strict=True) if share < LEAST_SHARE]
 
 
@@ -133,7 +137,7 @@ def instance_map(rays: RayCaster, camera: Camera, world_from_camera: NDArray[np.
 
 def instance_mask(
     rays: RayCaster, instance: int, vertices: NDArray[np.float64], camera: Camera,
-    world_from_camera: NDArray[np.float64],
+    world_from_camera: NDArray[np.float64], drawn: NDArray[np.int32] | None = None,
 ) -> NDArray[np.bool_]:  # fmt: skip
     """Which pixels show an instance: `instance_map` compared with it, looked at only where the instance can be.
 
@@ -146,21 +150,43 @@ def instance_mask(
         The instance's, metres, world frame.
     camera : Camera
     world_from_camera : (4, 4) float64
+    drawn : (H, W) int32, optional
+        What a renderer says of `instance_map`. Rays then are cast where it may be wrong: near the instance's outline,
+        at one pixel in so many elsewhere, and around each pixel where they say otherwise.
 
     Returns
     -------
     (H, W) bool
     """
     mask = np.zeros((camera.height, camera.width), dtype=np.bool_)
-    uv, depth = project(camera, world_from_camera, vertices)
-    u0, v0, u1, v1 = 0, 0, camera.width, camera.height
-    # What reaches behind the camera has no box in the picture.
-    if depth.min() > _IN_FRONT_M:
-        (low_u, low_v), (high_u, high_v) = uv.min(axis=0), uv.max(axis=0)
-        u0, v0 = max(0, math.floor(low_u) - 1), max(0, math.floor(low_v) - 1)
-        u1, v1 = min(camera.width, math.ceil(high_u) + 1), min(camera.height, math.ceil(high_v) + 1)
+    u0, v0, u1, v1 = box_px(camera, world_from_camera, vertices)
     if u0 < u1 and v0 < v1:
-        mask[v0:v1, u0:u1] = _window(rays, camera, world_from_camera, u0, v0, u1, v1) == instance
+        if drawn is None:
+            mask[v0:v1, u0:u1] = _window(rays, camera, world_from_camera, u0, v0, u1, v1) == instance
+        else:
+            directions = _local_rays(camera)[v0:v1, u0:u1] @ world_from_camera[:3, :3].T
+            mask[v0:v1, u0:u1] = _mended(rays, instance, drawn[v0:v1, u0:u1], world_from_camera[:3, 3], directions)
+    return mask
+
+
+def _mended(
+    rays: RayCaster, instance: int, drawn: NDArray[np.int32], eye: NDArray[np.float64],
+    directions: NDArray[np.float64],
+) -> NDArray[np.bool_]:  # fmt: skip
+    """Cast rays where a drawn map may be wrong about an instance, and wider where it is."""
+    mask = drawn == instance
+    shown = mask.astype(np.uint8)
+    near = np.ones((2 * _NEAR_PX + 1, 2 * _NEAR_PX + 1), np.uint8)
+    asked = cv2.dilate(shown, near) != cv2.erode(shown, near)
+    asked[::_EVERY_PX, ::_EVERY_PX] = True
+    cast = np.zeros_like(mask)
+    while asked.any():
+        cast |= asked
+        says = rays.first_hit(eye, directions[asked])[1] == instance
+        wrong = np.zeros_like(shown)
+        wrong[asked] = says != mask[asked]
+        mask[asked] = says
+        asked = (cv2.dilate(wrong, near) > 0) & ~cast
     return mask
 
 

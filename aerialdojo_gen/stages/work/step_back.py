@@ -85,6 +85,14 @@ def telling_m(patches: Sequence[Patch], seen: Floats, position_m: Floats, yaw_ra
 def step_back_m(
     world: World, instance: int, points: Floats, position_m: Floats, yaw_rad: float, fov_deg: float, most_m: float
 ) -> float:
+    """How far to step back from one anchor: `steps_back_m` of it alone."""
+    place, yaw, most = position_m[None], np.array([yaw_rad]), np.array([most_m])
+    return float(steps_back_m(world, instance, points, place, yaw, fov_deg, most)[0])
+
+
+def steps_back_m(
+    world: World, instance: int, points: Floats, positions_m: Floats, yaw_rad: Floats, fov_deg: float, most_m: Floats
+) -> Floats:
     """How far to step back: as far as the object needs and the way is free, to where most of it is in sight.
 
     Parameters
@@ -94,40 +102,55 @@ def step_back_m(
         The object's index in the scene.
     points : (m, 3) float64
         On its surface, metres, world frame.
-    position_m : (3,) float64
-        The anchor.
-    yaw_rad : float
-        Its yaw.
+    positions_m : (n, 3) float64
+        Anchors of the object.
+    yaw_rad : (n,) float64
+        Their yaws.
     fov_deg : float
-    most_m : float
-        As far as it may go.
+    most_m : (n,) float64
+        As far as it may go from each.
 
     Returns
     -------
-    float
+    (n,) float64
         Metres, in centimetres; 0 where the picture is taken from the anchor.
     """
-    wanted = min(fitting_m(world.scene.instances[instance].vertices, position_m, yaw_rad, fov_deg), most_m)
-    if wanted < _WORTH_M:
-        return 0.0
-    back = -np.array([math.cos(yaw_rad), math.sin(yaw_rad), 0.0])
-    free = float(world.rays.first_hit(position_m, back[None])[0][0]) - _KEPT_M
+    steps = np.zeros(len(positions_m))
+    vertices = world.scene.instances[instance].vertices
+    fitting = [fitting_m(vertices, p, yaw, fov_deg) for p, yaw in zip(positions_m, yaw_rad.tolist(), strict=True)]
+    wanted = np.minimum(fitting, most_m)
+    some = np.flatnonzero(wanted >= _WORTH_M)
+    if not len(some):
+        return steps
+    wanted, places, yaws = wanted[some], positions_m[some], yaw_rad[some]
+    back = -np.array([[math.cos(yaw), math.sin(yaw), 0.0] for yaw in yaws.tolist()])
+    free = world.rays.first_hit(places, back)[0] - _KEPT_M
     low, high = world.scene.bounds
-    edges = [
-        (bound - at) / b for at, b, bound in zip(position_m, back, np.where(back > 0, high, low), strict=True) if b
-    ]
-    wanted = min(wanted, free, *(edge - _CAMERA_M for edge in edges))
-    if wanted < _WORTH_M:
-        return 0.0
-    tries = [0.0, *(math.floor(100.0 * share * wanted) / 100.0 for share in _TRIED)]
-    places = np.array([position_m + s * back for s in tries])
-    yaws = np.full(len(places), yaw_rad)
-    framed = in_picture(places, yaws, points, fov_deg)
-    who, what = np.nonzero(framed)
-    # What the object itself hides is hidden from every distance: its own surface counts wherever it is met.
-    seen = np.bincount(who, world.rays.visible(places[who], points[what], instance), minlength=len(places))
-    worth = seen - _HIDDEN * (np.bincount(who, minlength=len(places)) - seen)
-    worth[1:][[world.collisions.sphere_in_collision(place, _CAMERA_M) for place in places[1:]]] = -np.inf
-    # Of equals the farthest, which leaves room around it; none where the anchor's own place is the better one.
-    best = 1 + int(worth[1:].argmax())
-    return tries[best] if worth[best] >= worth[0] else 0.0
+    with np.errstate(divide="ignore", invalid="ignore"):
+        edges = np.where(back != 0.0, (np.where(back > 0, high, low) - places) / back, np.inf)
+    wanted = np.minimum(np.minimum(wanted, free), edges.min(axis=1) - _CAMERA_M)
+    far = wanted >= _WORTH_M
+    some, wanted, places, yaws, back = some[far], wanted[far], places[far], yaws[far], back[far]
+    best, chosen = np.full(len(some), -np.inf), np.zeros(len(some))
+    # From the farthest on, so that of equals the farthest is taken, which leaves room around it; the anchor's own
+    # place is asked last, and taken only where it is the better one.
+    for share in (*_TRIED, 0.0):
+        tried = np.floor(100.0 * share * wanted) / 100.0
+        # What sees all of the points cannot be bettered, and casts no more rays.
+        left = np.flatnonzero(best < len(points))
+        if not len(left):
+            break
+        at = places[left] + tried[left, None] * back[left]
+        framed = in_picture(at, yaws[left], points, fov_deg)
+        keen = framed.sum(axis=1) > best[left]
+        if share:
+            keen[keen] = [not world.collisions.sphere_in_collision(place, _CAMERA_M) for place in at[keen]]
+        left, at, framed = left[keen], at[keen], framed[keen]
+        who, what = np.nonzero(framed)
+        # What the object itself hides is hidden from every distance: its own surface counts wherever it is met.
+        seen = np.bincount(who, world.rays.visible(at[who], points[what], instance), minlength=len(left))
+        worth = seen - _HIDDEN * (framed.sum(axis=1) - seen)
+        better = worth > best[left]
+        best[left[better]], chosen[left[better]] = worth[better], tried[left[better]]
+    steps[some] = chosen
+    return steps
