@@ -40,8 +40,8 @@ _TOML_TOKEN = re.compile(
     r"""(?P<open>["'])""",
     re.DOTALL,
 )
-# What the text of a value beyond the bounds has, nesting aside: a long integer, a large exponent, an escaped surrogate
-# or NUL. Harmless text may have it too, in a string say.
+# What the text of a value beyond the bounds has, nesting aside: a long integer, a large exponent, an escaped half
+# character or NUL. Harmless text may have it too, in a string say.
 _JSON_SUSPECT = re.compile(r"(?:^|[^.0-9])[0-9]{19}|[0-9][eE][+-]?[0-9]{3,}(?:[,\]}\s]|$)|\\u(?:0000|[dD][89a-fA-F])")
 _BUT_BRACKETS = {code: None for code in range(128) if chr(code) not in '[]{}"\\'}
 _JSON_TOKEN = re.compile(r'"(?:[^"\\]|\\.)*+"|(?P<number>[0-9]++)|(?P<mark>[\[\]{}])|(?P<open>")', re.DOTALL)

@@ -167,8 +167,8 @@ class RayCaster:
         origins, points : (n, 3) or (3,) array_like
             Metres, world frame; they broadcast against each other.
         own_instance : int or (n,) int32, optional
-            Index of the instance that the points belong to, or of each one's: where the ray meets that one first, be it nearer than the
-            point, the instance is seen along that line of sight, and the answer is True.
+            Index of the instance that the points belong to, or of each one's: where the ray meets that one first, be
+            it nearer than the point, the instance is seen along that line of sight, and the answer is True.
         tolerance_m : float
             What is hit closer to the point than this is the point's own surface.
 
