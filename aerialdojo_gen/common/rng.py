@@ -9,9 +9,11 @@ import numpy as np
 
 def _digest(seed: int, stage: str, key: tuple[object, ...]) -> bytes:
     """Hash (seed, stage, key); lengths are part of the hash, so that ("a", "bc") and ("ab", "c") differ."""
-    parts = [str(part).encode() for part in (seed, stage, *key)]
-    whole = b"".join([len(raw).to_bytes(4, "little") + raw for raw in parts])
-    return hashlib.blake2b(whole, digest_size=16).digest()
+    h = hashlib.blake2b(digest_size=16)
+    for part in (str(seed), stage, *(str(k) for k in key)):
+        raw = part.encode()
+        h.update(len(raw).to_bytes(4, "little") + raw)
+    return h.digest()
 
 
 def generator(seed: int, stage: str, *key: object) -> np.random.Generator:
