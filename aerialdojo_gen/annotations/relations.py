@@ -11,6 +11,7 @@ from functools import cached_property
 
 import numpy as np
 import shapely
+from numba import njit
 from numpy.typing import NDArray
 
 from aerialdojo_gen.geometry.angles import wrap_angle_rad
@@ -31,6 +32,9 @@ BETWEEN_DEG = 120.0
 FRONT_DEG = 60.0
 _LARGE_M = 10.0  # above it a thing's outline is its projected mesh; below, the convex hull is as good and cheaper
 _MANY_FACES = 20_000
+_GRID_M = 1e-3
+# An outline on the grid may reach so far beyond its box, and so may the other one.
+_GRID_SLACK_M = 2.0 * _GRID_M
 _TOUCH_M = 0.35
 _HELD = 3  # of five places below a thing
 
@@ -51,7 +55,7 @@ class SceneGeometry:
         self.centres: Floats = self.boxes.mean(axis=1)
         self._outlines: dict[int, shapely.Geometry] = {}
         self._supports: dict[int, int | None] = {}
-        self._corners: dict[int, tuple[Floats, Floats, Floats, Floats]] = {}
+        self._corners: dict[int, Floats] = {}
         self._covers: dict[int, frozenset[int]] = {}
         self._level_faces: dict[int, NDArray[np.intp]] = {}
 
@@ -71,10 +75,16 @@ class SceneGeometry:
                 triangles = shapely.polygons(xy[instance.faces])
                 solid = shapely.area(triangles) > 1e-6
                 hull = shapely.convex_hull(shapely.multipoints(xy))
-                outline = shapely.union_all(triangles[solid], grid_size=1e-3) if solid.any() else hull
+                outline = shapely.union_all(triangles[solid], grid_size=_GRID_M) if solid.any() else hull
             shapely.prepare(outline)
             self._outlines[i] = outline
         return self._outlines[i]
+
+    def _within(self, i: int, j: int, reach_m: float) -> bool:
+        """Whether two instances are at most so far apart: their boxes tell it of most, without an outline."""
+        (low_i, high_i), (low_j, high_j) = self.boxes[i].tolist(), self.boxes[j].tolist()
+        apart = [max(low_j[k] - high_i[k], low_i[k] - high_j[k], 0.0) for k in (0, 1)]
+        return math.hypot(*apart) <= reach_m + _GRID_SLACK_M and self.gap_m(i, j) <= reach_m
 
     def gap_m(self, i: int, j: int) -> float:
         """Distance between two instances: horizontally between outlines, vertically between height ranges."""
@@ -166,21 +176,18 @@ class SceneGeometry:
 
     def _crossed(self, j: int, x: float, y: float) -> tuple[Floats, NDArray[np.intp]]:
         """Heights of an instance's triangles at a place, and which of its faces they are."""
-        a, b, c, det = self._triangles(j)
-        u = ((b[:, 1] - c[:, 1]) * (x - c[:, 0]) + (c[:, 0] - b[:, 0]) * (y - c[:, 1])) / det
-        v = ((c[:, 1] - a[:, 1]) * (x - c[:, 0]) + (a[:, 0] - c[:, 0]) * (y - c[:, 1])) / det
-        inside = (u >= 0.0) & (v >= 0.0) & (u + v <= 1.0)
-        z: Floats = (u * a[:, 2] + v * b[:, 2] + (1.0 - u - v) * c[:, 2])[inside]
-        return z, self._level_faces[j][inside]
+        triangles = self._triangles(j)
+        z, which = _heights_at(triangles, x, y)
+        return z, self._level_faces[j][which]
 
-    def _triangles(self, j: int) -> tuple[Floats, Floats, Floats, Floats]:
-        """Corners of the triangles that are not upright, and twice their signed areas from above."""
+    def _triangles(self, j: int) -> Floats:
+        """Corners of the triangles that are not upright and twice their signed areas from above, (n, 10)."""
         if j not in self._corners:
             instance = self.scene.instances[j]
             a, b, c = np.moveaxis(instance.vertices[instance.faces], 1, 0)
             det = (b[:, 1] - c[:, 1]) * (a[:, 0] - c[:, 0]) + (c[:, 0] - b[:, 0]) * (a[:, 1] - c[:, 1])
             flat = np.abs(det) > 1e-12
-            self._corners[j] = a[flat], b[flat], c[flat], det[flat]
+            self._corners[j] = np.column_stack([a[flat], b[flat], c[flat], det[flat]])
             self._level_faces[j] = np.flatnonzero(flat)
         return self._corners[j]
 
@@ -197,8 +204,8 @@ class SceneGeometry:
     def beside(self, i: int, j: int, slack: float = 1.0) -> bool:
         """`i` stands within arm's reach of `j`, and not on, under or over it."""
         if (
-            self.gap_m(i, j) > BESIDE_M * slack
-            or not self._level(i, j, slack)
+            not self._level(i, j, slack)
+            or not self._within(i, j, BESIDE_M * slack)
             or j in self.covers(i)
             or i in self.covers(j)
         ):
@@ -209,15 +216,15 @@ class SceneGeometry:
 
     def near(self, i: int, j: int, slack: float = 1.0) -> bool:
         """`i` stands a few steps from `j`, about level with it."""
-        return self.gap_m(i, j) <= NEAR_M * slack and self._level(i, j, slack)
+        return self._level(i, j, slack) and self._within(i, j, NEAR_M * slack)
 
     def against(self, i: int, j: int, slack: float = 1.0) -> bool:
         """`i` touches `j`, or nearly."""
-        return self.gap_m(i, j) <= AGAINST_M * slack and self._level(i, j, slack)
+        return self._level(i, j, slack) and self._within(i, j, AGAINST_M * slack)
 
     def at(self, i: int, j: int, slack: float = 1.0) -> bool:
         """`i` belongs to where `j` stands."""
-        return self.gap_m(i, j) <= AT_M * slack and self._level(i, j, slack)
+        return self._level(i, j, slack) and self._within(i, j, AT_M * slack)
 
     def front(self, i: int, j: int, slack: float = 1.0) -> bool:
         """`i` stands before a front of `j`, of a thing without a front close by it."""
@@ -256,8 +263,10 @@ class SceneGeometry:
 
     def side(self, i: int, j: int, direction: str, slack: float = 1.0) -> bool:
         """`i` stands in that compass direction of `j`, not far away."""
+        if not (self._level(i, j, slack) and self._within(i, j, SIDE_M * slack)):
+            return False
         bearing = self.bearing_rad(i, j)
-        if bearing is None or self.gap_m(i, j) > SIDE_M * slack or not self._level(i, j, slack):
+        if bearing is None:
             return False
         middle = math.radians(45.0 * DIRECTIONS.index(direction))
         return abs(float(wrap_angle_rad(bearing - middle))) <= math.radians(22.5) * slack
@@ -266,9 +275,26 @@ class SceneGeometry:
         """`i` stands between `j` and `k`: both close by and on opposite sides."""
         if not (self._level(i, j, slack) and self._level(i, k, slack)):
             return False
-        if j == k or max(self.gap_m(i, j), self.gap_m(i, k)) > BETWEEN_M * slack:
+        if j == k or not all(self._within(i, other, BETWEEN_M * slack) for other in (j, k)):
             return False
         a, b = self.bearing_rad(i, j), self.bearing_rad(i, k)
         return a is not None and b is not None and bool(
             abs(float(wrap_angle_rad(a - b))) >= math.radians(BETWEEN_DEG) / slack
         )  # fmt: skip
+
+
+@njit(cache=True, error_model="numpy")
+def _heights_at(triangles: Floats, x: float, y: float) -> tuple[Floats, NDArray[np.int64]]:
+    """Heights over a place of those triangles that lie over or under it, and which of them they are."""
+    z, which = np.empty(len(triangles)), np.empty(len(triangles), dtype=np.int64)
+    n = 0
+    for k in range(len(triangles)):
+        ax, ay, az, bx, by, bz, cx, cy, cz, det = triangles[k]
+        u = ((by - cy) * (x - cx) + (cx - bx) * (y - cy)) / det
+        if not 0.0 <= u <= 1.0:
+            continue
+        v = ((cy - ay) * (x - cx) + (ax - cx) * (y - cy)) / det
+        if v >= 0.0 and u + v <= 1.0:
+            z[n], which[n] = u * az + v * bz + (1.0 - u - v) * cz, k
+            n += 1
+    return z[:n], which[:n]

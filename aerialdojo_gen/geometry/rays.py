@@ -185,7 +185,7 @@ class RayCaster:
         return distance, np.where(face >= 0, self._owner[face], np.int32(-1))
 
     def visible(
-        self, origins: ArrayLike, points: ArrayLike, own_instance: int | None = None, tolerance_m: float = 5e-3
+        self, origins: ArrayLike, points: ArrayLike, own_instance: int | Ints | None = None, tolerance_m: float = 5e-3
     ) -> NDArray[np.bool_]:
         """Whether points are seen from origins.
 
@@ -193,9 +193,9 @@ class RayCaster:
         ----------
         origins, points : (n, 3) or (3,) array_like
             Metres, world frame; they broadcast against each other.
-        own_instance : int, optional
-            Index of the instance that the points belong to: where the ray meets that one first, be it nearer than the
-            point, the instance is seen along that line of sight, and the answer is True.
+        own_instance : int or (n,) int32, optional
+            Index of the instance that the points belong to, or of each one's: where the ray meets that one first, be
+            it nearer than the point, the instance is seen along that line of sight, and the answer is True.
         tolerance_m : float
             What is hit closer to the point than this is the point's own surface.
 
@@ -211,7 +211,8 @@ class RayCaster:
         far = length > tolerance_m
         distance, instance = self.first_hit(o[far], (p - o)[far])
         reached = distance >= length[far] - tolerance_m
-        seen[far] = reached if own_instance is None else reached | (instance == own_instance)
+        own = None if own_instance is None else np.broadcast_to(own_instance, far.shape)[far]
+        seen[far] = reached if own is None else reached | (instance == own)
         return seen
 
 

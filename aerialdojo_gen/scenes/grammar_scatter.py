@@ -9,6 +9,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import shapely
+from numba import njit
+from numpy.typing import NDArray
 from shapely.geometry import LineString
 from shapely.geometry.base import BaseGeometry
 
@@ -140,6 +142,66 @@ def grid(
     return poses
 
 
+class _Taken(NamedTuple):
+    """Discs by the cells, a radius wide, that their middles lie in: `cells` has a disc of each, `after` the next."""
+
+    radius_m: float
+    corner: NDArray[np.int64]
+    cells: NDArray[np.int64]
+    discs: NDArray[np.float64]
+    after: NDArray[np.int64]
+
+    def add(self, n: int, x: float, y: float, own: float) -> None:
+        i, j = int(x // self.radius_m) - self.corner[0], int(y // self.radius_m) - self.corner[1]
+        self.discs[n] = x, y, own
+        self.after[n], self.cells[i, j] = self.cells[i, j], n
+
+
+@njit(cache=True)
+def _room(
+    x: float,
+    y: float,
+    own: float,
+    widest: float,
+    radius_m: float,
+    corner: NDArray[np.int64],
+    cells: NDArray[np.int64],
+    discs: NDArray[np.float64],
+    after: NDArray[np.int64],
+) -> bool:
+    """Whether a disc of radius `own` keeps its distance from those there are, of `widest` radius at most."""
+    reach = int(np.ceil(max(widest, own) / radius_m))
+    i, j = int(x // radius_m) - corner[0], int(y // radius_m) - corner[1]
+    for a in range(max(i - reach, 0), min(i + reach + 1, cells.shape[0])):
+        for b in range(max(j - reach, 0), min(j + reach + 1, cells.shape[1])):
+            k = cells[a, b]
+            while k >= 0:
+                u, v, apart = x - discs[k, 0], y - discs[k, 1], max(own, discs[k, 2])
+                if u * u + v * v < apart * apart:
+                    return False
+                k = after[k]
+    return True
+
+
+@njit(cache=True)
+def _next_free(
+    darts: NDArray[np.float64],
+    k: int,
+    widest: float,
+    radius_m: float,
+    corner: NDArray[np.int64],
+    cells: NDArray[np.int64],
+    discs: NDArray[np.float64],
+    after: NDArray[np.int64],
+) -> int:
+    """Index of the next dart, from `k` on, where a disc of the least radius has room; their number where none is."""
+    while k < len(darts):
+        if _room(darts[k, 0], darts[k, 1], radius_m, widest, radius_m, corner, cells, discs, after):
+            break
+        k += 1
+    return k
+
+
 def poisson_disc(
     area: BaseGeometry,
     radius_m: float,
@@ -171,35 +233,32 @@ def poisson_disc(
         return []
     shapely.prepare(area)
     x0, y0, x1, y1 = area.bounds
-    buckets: dict[tuple[int, int], list[tuple[float, float, float]]] = {}
-    widest = radius_m
     poses: list[Pose] = []
     tries = int(30 * max(area.area, 1.0) / radius_m**2)
     candidates = rng.uniform((x0, y0, 0.0), (x1, y1, 360.0), size=(min(tries, 400_000), 3))
     inside = shapely.contains_xy(area, candidates[:, 0], candidates[:, 1])
 
-    def room(x: float, y: float, own: float) -> bool:
-        i, j, reach = int(x // radius_m), int(y // radius_m), math.ceil(max(widest, own) / radius_m)
-        for a in range(i - reach, i + reach + 1):
-            for b in range(j - reach, j + reach + 1):
-                for qx, qy, qr in buckets.get((a, b), ()):
-                    if (x - qx) ** 2 + (y - qy) ** 2 < max(own, qr) ** 2:
-                        return False
-        return True
-
-    for x, y, yaw in candidates[inside].tolist():
+    darts, yaws = np.ascontiguousarray(candidates[inside, :2]), candidates[inside, 2].tolist()
+    cells = np.full((int((x1 - x0) // radius_m) + 3, int((y1 - y0) // radius_m) + 3), -1)
+    taken = _Taken(radius_m, np.array([x0 // radius_m - 1, y0 // radius_m - 1], dtype=np.int64), cells,
+                   np.empty((len(darts), 3)), np.empty(len(darts), dtype=np.int64))  # fmt: skip
+    n, widest, k = 0, radius_m, -1
+    while True:
         # Densities take longer to ask than neighbours, and no density makes a disc smaller than this.
-        if not room(x, y, radius_m):
-            continue
+        k = _next_free(darts, k + 1, widest, *taken)
+        if k == len(darts):
+            break
+        x, y = darts[k].tolist()
         share = 1.0 if density is None else float(density(x, y))
         if share <= 0.01:
             continue
         own = radius_m / math.sqrt(min(share, 1.0))
-        if own > radius_m and not room(x, y, own):
+        if own > radius_m and not _room(x, y, own, widest, *taken):
             continue
         widest = max(widest, own)
-        buckets.setdefault((int(x // radius_m), int(y // radius_m)), []).append((x, y, own))
-        poses.append(Pose(x, y, yaw))
-        if len(poses) >= limit:
+        taken.add(n, x, y, own)
+        n += 1
+        poses.append(Pose(x, y, yaws[k]))
+        if n >= limit:
             break
     return poses

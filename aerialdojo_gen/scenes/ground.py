@@ -19,7 +19,7 @@ from shapely.geometry import MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from aerialdojo_gen.scenes.mesh import Floats, Mesh, merge, mesh
-from aerialdojo_gen.scenes.shapes_extruded import triangulate
+from aerialdojo_gen.scenes.shapes_extruded import triangulate, triangulate_all
 from aerialdojo_gen.scenes.terrain import Terrain
 
 # Polygons meet on this grid (metres), so that rounding cannot open slits between them.
@@ -145,12 +145,20 @@ def _draped_mesh(layer: Surface, tiles: _Tiles) -> Mesh:
     touched = np.sort(tiles.plans.query(layer.area, predicate="intersects"))
     inside = shapely.covers(layer.area, tiles.plans.geometries[touched])
     pieces = [Mesh(corners, faces[touched[inside]])] if inside.any() else []
-    for k in touched[~inside]:
-        a, normal = corners[faces[k, 0]], tiles.normals[k]
-        for piece in polygons_of(layer.area.intersection(tiles.plans.geometries[k])):
-            flat, cut = triangulate(piece)
-            z = a[2] - ((flat - a[:2]) @ normal[:2]) / normal[2]
-            pieces.append(Mesh(np.column_stack([flat, z]), cut))
+    cut = touched[~inside]
+    parts = shapely.intersection(layer.area, tiles.plans.geometries[cut])
+    seen = [polygons_of(part) for part in parts.tolist()]
+    if any(seen):
+        flat, whose, cut_faces = triangulate_all([piece for some in seen for piece in some])
+        tile = np.repeat(cut, [len(some) for some in seen])
+        z = np.empty(len(flat))
+        # Product by product: the scenes' digests hang on how a processor rounds one of this size.
+        for k, some in zip(
+            tile.tolist(), np.split(np.arange(len(flat)), np.flatnonzero(np.diff(whose)) + 1), strict=True
+        ):
+            a, normal = corners[faces[k, 0]], tiles.normals[k]
+            z[some] = a[2] - ((flat[some] - a[:2]) @ normal[:2]) / normal[2]
+        pieces.append(Mesh(np.column_stack([flat, z]), cut_faces))
     if not pieces:
         return mesh([], [])
     whole = _compact(merge(pieces))

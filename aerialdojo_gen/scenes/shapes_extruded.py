@@ -9,6 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 import shapely
+from numpy.typing import NDArray
 from shapely.geometry import Polygon
 from shapely.geometry.polygon import orient
 
@@ -144,16 +145,42 @@ def triangulate(plan: Polygon) -> tuple[Floats, Ints]:
     faces : (m, 3) int32
         Counter-clockwise seen from +z.
     """
-    vertices = np.concatenate([np.array(r.coords)[:-1, :2] for r in (plan.exterior, *plan.interiors)])
+    vertices, _, faces = triangulate_all([plan])
+    return vertices, faces
+
+
+def triangulate_all(plans: Sequence[Polygon]) -> tuple[Floats, NDArray[np.int64], Ints]:
+    """Triangulate polygons with holes, each by itself.
+
+    Returns
+    -------
+    vertices : (n, 2) float64
+        One polygon's after the other's: exterior first, then the holes, without closing points.
+    whose : (n,) int64
+        Which polygon's they are.
+    faces : (m, 3) int32
+        In the order of the polygons, counter-clockwise seen from +z.
+    """
+    rings, owner = shapely.get_rings(np.asarray(plans, dtype=object), return_index=True)
+    points, ring = shapely.get_coordinates(rings, return_index=True)
+    first = np.flatnonzero(np.diff(ring, append=-1) == 0)
+    vertices, whose = points[first], owner[ring[first]]
     # Constrained Delaunay: plain ear clipping leaves triangles without area, and with them cracks.
-    pieces = shapely.constrained_delaunay_triangles(plan)
-    corners = shapely.get_coordinates(pieces).reshape(-1, 4, 2)[:, :3]
-    index = {xy: k for k, xy in enumerate(map(tuple, vertices.tolist()))}
-    faces = np.array([[index[x, y] for x, y in c] for c in corners.tolist()], dtype=np.int32).reshape(-1, 3)
+    pieces = shapely.constrained_delaunay_triangles(np.asarray(plans, dtype=object))
+    corners = shapely.get_coordinates(pieces).reshape(-1, 4, 2)[:, :3].reshape(-1, 2)
+    of = np.repeat(np.arange(len(plans)), 3 * shapely.get_num_geometries(pieces))
+    # A corner is the last vertex of its polygon at its place; sorted, it follows that one.
+    x, y = np.concatenate([vertices, corners]).T
+    order = np.lexsort((y, x, np.concatenate([whose, of])))
+    last = np.maximum.accumulate(np.where(order < len(vertices), np.arange(len(order)), 0))
+    index = np.empty(len(order), dtype=np.int32)
+    index[order] = order[last]
+    faces = index[len(vertices) :].reshape(-1, 3)
+    assert np.array_equal(vertices[faces].reshape(-1, 2), corners), "a triangle with a corner that is no vertex"
     a, b, c = (vertices[faces[:, k]] for k in range(3))
     turned = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0] < 0
     faces[turned] = faces[turned][:, ::-1]
-    return vertices, faces
+    return vertices, whose, faces
 
 
 def _without_straight_corners(plan: Polygon) -> Polygon:

@@ -16,8 +16,8 @@ from aerialdojo_gen.store.atomic import atomic_file
 from aerialdojo_gen.store.schemas import TableSpec
 
 _ROW_GROUP = 65536
-# For what is written without a dictionary; levels above cost five times the time for 2 % (docs/release-format.md).
-_PLAIN_LEVEL = 15
+# For what is written without a dictionary; level 15 takes three times as long for 2 % (docs/release-format.md).
+_PLAIN_LEVEL = 12
 # What reading a damaged file raises: a name may be no UTF-8, a count larger than the memory.
 _DAMAGE = (pa.ArrowException, OSError, ValueError, OverflowError, MemoryError)
 

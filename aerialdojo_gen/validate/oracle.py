@@ -13,7 +13,7 @@ import numpy as np
 from aerialdojo_gen.benchmark.motion import FlightSpace
 from aerialdojo_gen.benchmark.oracle import LEAST_SPL, Reference, fly, shortcoming
 from aerialdojo_gen.config.agreement import NEAR_GOAL_M, SUCCESS_RADIUS_M
-from aerialdojo_gen.rendering.sight import in_sight
+from aerialdojo_gen.rendering.sight import all_in_sight
 from aerialdojo_gen.store.schemas import APPROACH, STOP
 from aerialdojo_gen.validate.registry import ALWAYS_AFTER, Finding, UncheckedError, check
 from aerialdojo_gen.validate.rows import Ints, Mask, Rows, SceneData
@@ -61,6 +61,7 @@ def agent_action_fails(data: SceneData, routes: Rows) -> Iterator[Finding]:
     told, nodes = _Told(data, routes), data["objects"].texts("mesh_node")
     left_out = _left_out(data, (*_ROUTE_FAULTS, "oracle_fails", "unknown_target"))
     lists = routes.column("agent_action").to_pylist()
+    stops: list[tuple[int, str, tuple[float, float, float]]] = []
     for k in np.flatnonzero(~left_out[paths.rows]).tolist():
         row = int(paths.rows[k])
         target = int(data.target_of_route[row])
@@ -88,8 +89,11 @@ def agent_action_fails(data: SceneData, routes: Rows) -> Iterator[Finding]:
         away = math.dist(end, told.goal[row])
         if away > NEAR_GOAL_M + _REPLAY_M:
             yield Finding(row, f"a Stop {away:.3f} m from the anchor", f"{NEAR_GOAL_M:g} m at most")
-        elif (node := nodes[target]) in scene and not in_sight(scene, str(node), end):
-            yield Finding(row, "a Stop from where no straight line reaches the target", "the target in sight")
+        elif (node := nodes[target]) in scene:
+            stops.append((row, str(node), end))
+    ends = np.array([end for _, _, end in stops]).reshape(-1, 3)
+    for k in np.flatnonzero(~all_in_sight(scene, [node for _, node, _ in stops], ends)).tolist():
+        yield Finding(stops[k][0], "a Stop from where no straight line reaches the target", "the target in sight")
 
 
 class _Told:

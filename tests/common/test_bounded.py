@@ -162,3 +162,25 @@ def test_depth_is_the_same_to_all_that_measure_it(depth, tables):
             bounded.scan_json(json.dumps(value))
     else:
         bounded.scan_json(json.dumps(value))
+
+
+beyond = st.sampled_from([2**63, -(2**63) - 1, 10**30, float("inf"), "\ud800", "\0", "x\0", "\udfff"])
+odd = st.sampled_from(["[", "]", "{}", '"', '"]', "\\", "a[0]", "#9e4000", "1e999", "9" * 19, "é", 1e300, 0.1 + 0.2])
+
+
+@given(st.recursive(
+    plain | beyond | odd,
+    lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.text() | st.just("]["), inner, max_size=4),
+), st.booleans())  # fmt: skip
+def test_what_a_glance_lets_pass_is_within_the_bounds(value, ascii_only):
+    text = json.dumps(value, ensure_ascii=ascii_only).replace("Infinity", "1e999")
+    assert bounded.beyond(json.loads(text)) is None or not bounded._harmless(text)
+
+
+def test_a_glance_is_enough_for_annotations_and_deep_is_beyond_it(project):
+    texts = [path.read_text(encoding="utf-8") for path in sorted(project.glob("annotations/*.json"))]
+    assert len(texts) >= 42
+    assert all(map(bounded._harmless, texts))
+    for depth in range(MAX_DEPTH - 2, MAX_DEPTH + 3):
+        for text in ("[" * depth + "]" * depth, '{"a":' * (depth - 1) + "{}" + "}" * (depth - 1)):
+            assert depth <= MAX_DEPTH or not bounded._harmless(text)

@@ -8,8 +8,8 @@ from support.walled import SCENE, VIEWPOINTS, filled, walled, write_walled
 
 from aerialdojo_gen.config.sections import Embodiment, FilterConfig
 from aerialdojo_gen.pipeline.stage import Job, Roots
-from aerialdojo_gen.rendering.sight import in_sight
-from aerialdojo_gen.stages.work.filter import run, sees_target
+from aerialdojo_gen.rendering.sight import all_in_sight, in_sight
+from aerialdojo_gen.stages.work.filter import run
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.schemas import APPROACH, STOP
 from aerialdojo_gen.store.tables import from_rows
@@ -65,6 +65,6 @@ def test_a_stop_behind_a_wall_or_over_a_roof_makes_no_task(data):
 
 def test_what_is_seen_hangs_on_the_place_and_the_target():
     scene, ends = walled(), np.array([*ENDS.values()])
-    assert sees_target(scene, ["crate"] * 3, ends).tolist() == [True, False, False]
-    assert sees_target(scene, ["wall"] * 3, ends).tolist() == [in_sight(scene, "wall", end) for end in ends]
-    assert sees_target(scene, [], np.empty((0, 3))).tolist() == []
+    assert all_in_sight(scene, ["crate"] * 3, ends).tolist() == [True, False, False]
+    assert all_in_sight(scene, ["wall"] * 3, ends).tolist() == [in_sight(scene, "wall", end) for end in ends]
+    assert all_in_sight(scene, [], np.empty((0, 3))).tolist() == []

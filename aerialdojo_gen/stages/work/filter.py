@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
 
 import numpy as np
 import pyarrow as pa
@@ -14,8 +13,7 @@ from aerialdojo_gen.common.advice import command
 from aerialdojo_gen.config.sections import FilterConfig, Setting
 from aerialdojo_gen.errors import StoreError
 from aerialdojo_gen.pipeline.stage import Job, Output
-from aerialdojo_gen.rendering.sight import in_sight
-from aerialdojo_gen.scenes.model import Scene
+from aerialdojo_gen.rendering.sight import all_in_sight
 from aerialdojo_gen.store.schemas import APPROACH, SETTINGS, VERDICTS
 from aerialdojo_gen.store.schemas.columns import DIFFICULTY, START_VIEW
 
@@ -92,29 +90,6 @@ def judge(
     return reason, setting
 
 
-def sees_target(scene: Scene, nodes: Sequence[str], ends: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Tell from which places agents see the targets that they have stopped for.
-
-    Parameters
-    ----------
-    scene : Scene
-    nodes : sequence of str
-        n nodes of targets.
-    ends : (n, 3) float64
-        Where they stop, metres, world frame.
-
-    Returns
-    -------
-    (n,) bool
-        Whether a straight line reaches the target (`aerialdojo_gen.rendering.sight.in_sight`).
-    """
-    known: dict[tuple[str, bytes], bool] = {}
-    for node, end in zip(nodes, ends, strict=True):
-        if (node, end.tobytes()) not in known:
-            known[node, end.tobytes()] = in_sight(scene, node, end)
-    return np.array([known[node, end.tobytes()] for node, end in zip(nodes, ends, strict=True)], dtype=np.bool_)
-
-
 def _stops(plans: pa.Table) -> NDArray[np.float64]:
     """Where routes end without their Approach, which agents have not, (n, 3) float64."""
     starts = np.cumsum([0, *pc.list_value_length(plans["action"]).to_pylist()])
@@ -131,7 +106,7 @@ def _hidden_at_stop(job: Job, plans: pa.Table, targets: pa.Table) -> NDArray[np.
     objects = job.read("objects").select(["object_id", "mesh_node"])
     index = pc.index_in(targets["target_object_id"], value_set=objects["object_id"].combine_chunks())
     nodes = objects["mesh_node"].take(index).to_pylist()
-    return ~sees_target(job.scene_model(), nodes, _stops(plans))
+    return ~all_in_sight(job.scene_model(), nodes, _stops(plans))
 
 
 def run(job: Job, config: FilterConfig) -> Output:
