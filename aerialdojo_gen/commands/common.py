@@ -60,6 +60,7 @@ Force = Annotated[bool, typer.Option("--force", help="Compute this stage's shard
 Replace = Annotated[
     bool, typer.Option("--replace", help="Put this release in the place of another pipeline's, which is lost.")
 ]
+Json = Annotated[bool, typer.Option("--json", help="Print JSON: numbers unrounded, nothing cut.")]
 Quiet = Annotated[bool, typer.Option("--quiet", help="No progress and no summary.")]
 
 
