@@ -5,6 +5,8 @@ Nothing heavy is imported before a command runs, so that ``--help`` answers at o
 
 from __future__ import annotations
 
+import json
+import math
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -21,6 +23,19 @@ if TYPE_CHECKING:
     from aerialdojo_gen.store.root import Where
 
 __all__ = ["DEFAULT_PIPELINE", "default_workers", "home", "open_pipeline", "run_chosen", "run_until"]
+
+
+def print_json(value: object) -> None:
+    """Print what ``--json`` asks for: bytes left out, null where a figure is not finite."""
+    print(json.dumps(_plain(value), ensure_ascii=False, indent=1, allow_nan=False))
+
+
+def _plain(value: object) -> object:
+    if isinstance(value, dict):
+        return {str(key): _plain(inner) for key, inner in value.items() if not isinstance(inner, bytes)}
+    if isinstance(value, list | tuple):
+        return [_plain(inner) for inner in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def kept(ctx: typer.Context, param: typer.CallbackParam, value: Any) -> Any:
@@ -60,7 +75,7 @@ Force = Annotated[bool, typer.Option("--force", help="Compute this stage's shard
 Replace = Annotated[
     bool, typer.Option("--replace", help="Put this release in the place of another pipeline's, which is lost.")
 ]
-Json = Annotated[bool, typer.Option("--json", help="Print JSON: numbers unrounded, nothing cut.")]
+Json = Annotated[bool, typer.Option("--json", help="Print JSON: figures unrounded, nothing cut.")]
 Quiet = Annotated[bool, typer.Option("--quiet", help="No progress and no summary.")]
 
 

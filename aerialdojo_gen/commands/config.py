@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from aerialdojo_gen.commands.common import DEFAULT_PIPELINE, Json, PipelineFile, home
+from aerialdojo_gen.commands.common import DEFAULT_PIPELINE, Json, PipelineFile, home, print_json
 from aerialdojo_gen.common import advice
 
 app = typer.Typer(help="Show what a pipeline file may say, or write one to begin with.", no_args_is_help=True)
@@ -29,7 +28,7 @@ def show(
 
     keys = config_keys(pipeline or home() / "pipelines" / DEFAULT_PIPELINE, stage)
     if as_json:
-        print(json.dumps([key.as_json() for key in keys], ensure_ascii=False, indent=1))
+        print_json([key.as_json() for key in keys])
         return
     print("\n".join(key_lines(keys, terminal_width())))
 
