@@ -120,7 +120,7 @@ def test_blocks_are_told_apart(tmp_path):
     assert list(commands(found[0])) == [
         "make smoke",
         "aerialdojo-gen plan --scene 'U_*'",
-        "pip install x",
+        "pip x",
         "make lint",
     ]
     assert found[1].text == "x = 1\n\n    y = 2\n"
