@@ -54,16 +54,21 @@ Data = Annotated[
     ),
 ]  # fmt: skip
 Scene = Annotated[
-    list[str] | None, typer.Option("--scene", help="Scene or glob, repeatable: --scene 'U_*'.  (default: all)")
+    list[str] | None,
+    typer.Option("--scene", metavar="NAME|GLOB", help="Scene or glob, repeatable: --scene 'U_*'.  (default: all)"),
 ]
 PipelineFile = Annotated[
     Path | None,
-    typer.Option("--pipeline", callback=kept, help=f"Pipeline file.  (default: pipelines/{DEFAULT_PIPELINE})"),
+    typer.Option(
+        "--pipeline", metavar="FILE", callback=kept, help=f"Pipeline file.  (default: pipelines/{DEFAULT_PIPELINE})"
+    ),
 ]
 PipelineArgument = Annotated[
     Path, typer.Argument(metavar="PIPELINE", callback=kept, help="Pipeline file, e.g. pipelines/smoke.toml.")
 ]
-Workers = Annotated[int | None, typer.Option("--workers", min=1, max=1024, help="Processes.  (default: all cores)")]
+Workers = Annotated[
+    int | None, typer.Option("--workers", metavar="N", min=1, max=1024, help="Processes.  (default: all cores)")
+]
 ExecutorName = Annotated[
     str, typer.Option("--executor", metavar="local|ray", help="Processes of this machine, or of a Ray cluster.")
 ]

@@ -46,7 +46,7 @@ def cli_page() -> str:
             "",
             "| | what it is |",
             "|---|---|",
-            *(f"| `{_code(left)}` | {_cell(right)} |" for left, right in filter(None, said)),
+            *(f"| {_code(left)} | {_cell(right)} |" for left, right in filter(None, said)),
         ]
     return "\n".join(out) + "\n"
 
@@ -70,7 +70,11 @@ def config_page() -> str:
         "with the values of a pipeline. Paths are relative to the file. What several sections say of one thing",
         "must agree; a contradiction is an error that says which way to go.",
     ]
-    for section, keys in groupby(config_keys(), key=lambda key: key.section):
+    # A section's own keys together, then those of the tables in it.
+    order = list(dict.fromkeys(key.section for key in config_keys()))
+    for section, keys in groupby(
+        sorted(config_keys(), key=lambda key: order.index(key.section)), lambda key: key.section
+    ):
         depth = section.count(".")
         title = f"`[{section}]`" if section else "The file's own keys"
         out += ["", f"{'##' + '#' * depth} {title}", ""]
@@ -147,10 +151,12 @@ def _prose(text: str) -> str:
 
 
 def _code(text: str) -> str:
-    return _prose(text).replace("|", "\\|")
+    return f"`{_prose(text)}`"
 
 
 def _cell(text: str) -> str:
-    """Keep what Markdown would take for its own as it is said."""
-    told = _prose(text).replace("|", "\\|")
-    return told if "`" in told else re.sub(r"([*\[\]<])", r"\\\1", told)
+    """Keep what Markdown would take for its own as it is said; a code span is one already."""
+    told = _prose(text)
+    if "`" in told:
+        return told
+    return re.sub(r"([*\[\]|])", r"\\\1", told.replace("<", "&lt;"))
