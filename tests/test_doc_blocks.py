@@ -59,7 +59,7 @@ ON_SMOKE = (
     (r"\b[UNID]_[A-Z][A-Za-z]+_([01*])(?!-)", r"U_Courtyard_\1"),
     (r"\bI_Harbor_0-[0-9a-f]{12}-s\b", "TASK"),
     (r"^(add-scene .*)", r"\1 --force"),
-    (r" --data data-smoke\b", ""),
+    (r"^((?:stats|validate|show)\b.*) --data data-smoke\b", r"\1"),
     (r"--split id_train (.*--estimate)", r"--split train \1"),
     (r"\bTASK_ID\b", "TASK"),
     (r"^(render .*)--limit [03](?!.*--estimate)", r"\1--limit 1"),
@@ -75,7 +75,7 @@ def folder(smoke, tmp_path_factory):
     """A working directory as README's reader has it, the smoke data in place of the whole dataset."""
     place = tmp_path_factory.mktemp("reader")
     shutil.copytree(smoke, place / "data")
-    (place / "data-smoke").symlink_to("data")
+    shutil.copytree(smoke, place / "data-smoke")
     for name in ("pipelines", "scene_assets", "annotations", "examples"):
         (place / name).symlink_to(ROOT / name)
     village = foreign.village()
