@@ -62,6 +62,7 @@ ON_SMOKE = (
     (r"^((?:stats|validate|show)\b.*) --data data-smoke\b", r"\1"),
     (r"--split id_train (.*--estimate)", r"--split train \1"),
     (r"\bTASK_ID\b", "TASK"),
+    (r"^validate --json\b", "validate --json --no-meshes"),
     (r"^(render .*)--limit [03](?!.*--estimate)", r"\1--limit 1"),
 )  # fmt: skip
 WITH_WORKERS = ("run", "plan", "render", "evaluate", "validate", "filter", "split")
