@@ -9,7 +9,7 @@ RUN := .venv/bin/aerialdojo-gen
 RUN_FLAGS := $(if $(WORKERS),--workers $(WORKERS))
 
 .DEFAULT_GOAL := help
-.PHONY: help env dev dataset smoke evaluate test test-fast fuzz torture lint format gallery bench lock clean
+.PHONY: help env dev docs dataset smoke evaluate test test-fast fuzz torture lint format gallery bench lock clean
 
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-9s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -81,6 +81,13 @@ format: .venv/.dev  ## let ruff format the code
 
 gallery: .venv/.installed  ## picture every prop and every scene into docs/gallery/
 	@$(RUN) gallery --out docs/gallery
+
+.venv/.docs: .venv/.installed
+	@{ $(UV) -e '.[docs]' 2>/dev/null; } || $(PIP) -e '.[docs]'
+	@touch $@
+
+docs: .venv/.docs  ## build the documentation's site into build/site/; a broken link or a page left out ends it
+	@NO_MKDOCS_2_WARNING=1 .venv/bin/mkdocs build --strict --quiet
 
 bench: .venv/.dev  ## measure planner, renderer and OMPL's planners beside ours
 	@for bench in tests/bench/bench_*.py; do echo "== $$bench"; .venv/bin/python $$bench || exit 1; done

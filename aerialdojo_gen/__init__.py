@@ -15,8 +15,10 @@ from aerialdojo_gen.common.version import __version__
 if TYPE_CHECKING:
     from aerialdojo_gen.benchmark.env import make_env
     from aerialdojo_gen.browse.release import Release, open_release
+    from aerialdojo_gen.config.keys import config_keys
     from aerialdojo_gen.errors import AerialDojoError
     from aerialdojo_gen.pipeline.run import run_pipeline
+    from aerialdojo_gen.pipeline.template import init_config
     from aerialdojo_gen.planning.planner import Planner, plan
     from aerialdojo_gen.rendering.gl import GlRenderer
     from aerialdojo_gen.scenes.glb import read_glb
@@ -27,6 +29,8 @@ __all__ = [
     "Planner",
     "Release",
     "__version__",
+    "config_keys",
+    "init_config",
     "make_env",
     "open_release",
     "plan",
@@ -40,6 +44,8 @@ _HOMES = {
     "GlRenderer": "aerialdojo_gen.rendering.gl",
     "Planner": "aerialdojo_gen.planning.planner",
     "Release": "aerialdojo_gen.browse.release",
+    "config_keys": "aerialdojo_gen.config.keys",
+    "init_config": "aerialdojo_gen.pipeline.template",
     "make_env": "aerialdojo_gen.benchmark.env",
     "open_release": "aerialdojo_gen.browse.release",
     "plan": "aerialdojo_gen.planning.planner",

@@ -13,6 +13,7 @@ from typer.core import TyperGroup
 
 from aerialdojo_gen.commands import (
     annotate,
+    config,
     evaluate,
     exchange,
     release,
@@ -73,6 +74,7 @@ def _program(
 
 for _group in (stages, render, sources, annotate, evaluate, release, show, validate, exchange, report):
     app.add_typer(_group.app)
+app.add_typer(config.app, name="config")
 
 
 def main() -> None:

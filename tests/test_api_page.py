@@ -37,6 +37,7 @@ assert summary.stage == "filter" and summary.computed == 0
 assert len(recording) == recording.rgb["front"].__len__() > 1
 assert observation["rgb"]["front"].shape == (64, 64, 3)
 assert pipeline.filter.min_detour_ratio == 1.2
+assert load_pipeline("mine.toml").filter == pipeline.filter
 """
     # Worker processes are spawned from the file: its work must not begin again in them.
     body = "\n".join(found) + held

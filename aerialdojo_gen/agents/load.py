@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import importlib
 import inspect
+import os
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -31,7 +33,7 @@ def agent_class(name: str) -> Callable[..., Any]:
     Parameters
     ----------
     name : str
-        One of `BUILT_IN`, or ``package.module:Class`` for one of one's own.
+        One of `BUILT_IN`, or ``package.module:Class`` for one of one's own, installed or in the working directory.
 
     Raises
     ------
@@ -42,6 +44,8 @@ def agent_class(name: str) -> Callable[..., Any]:
     module_name, colon, class_name = where.partition(":")
     if not colon or not module_name or not class_name:
         raise UsageError(unknown("no agent", name, BUILT_IN, besides=("or package.module:Class",)))
+    if name not in BUILT_IN:
+        look_here()
     try:
         module = importlib.import_module(module_name)
     except ImportError as error:
@@ -95,6 +99,15 @@ def load_agent(name: str, **options: Any) -> Agent:
     if not isinstance(agent, Agent):
         raise UsageError(f"{name!r} is no agent: it needs reset(goal) and act(observation)")
     return agent
+
+
+def look_here() -> None:
+    """Let modules of the working directory be imported, as ``python -m`` does; a console script does not.
+
+    Last, so that a file there takes no library's place.
+    """
+    if "" not in sys.path and os.getcwd() not in sys.path:
+        sys.path.append(os.getcwd())
 
 
 def place(error: BaseException) -> str:

@@ -7,7 +7,7 @@ import importlib.util
 import json
 from pathlib import Path
 
-from aerialdojo_gen.agents.load import BUILT_IN
+from aerialdojo_gen.agents.load import BUILT_IN, look_here
 from aerialdojo_gen.pipeline.code_digest import code_of
 from aerialdojo_gen.store.files import file_digest
 
@@ -38,6 +38,7 @@ def flying_code(agent: str) -> str:
 
 
 def _file_of(module: str) -> Path | None:
+    look_here()
     try:
         spec = importlib.util.find_spec(module)
     except (ImportError, ValueError):

@@ -169,6 +169,16 @@ class FoundTask:
     route: dict[str, Any]
     instances: list[dict[str, Any]]
 
+    def as_json(self) -> dict[str, Any]:
+        """Return the rows that belong to the task: of `routes`, `tasks`, `objects`, `landmarks` and `scenes`."""
+        scene, route = self.scene, self.route
+        target = scene.object(route["target_object_id"])
+        return {
+            "nav_id": self.nav_id, "scene": scene.row, "tasks": self.instances, "route": route,
+            "target": target, "start_object": scene.object(route["start_object_id"]),
+            "landmark": scene.landmark(target["landmark_id"]),
+        }  # fmt: skip
+
 
 def find_task(data: Where, task_id: str) -> FoundTask:
     """Find a task of the release.

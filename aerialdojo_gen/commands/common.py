@@ -5,6 +5,8 @@ Nothing heavy is imported before a command runs, so that ``--help`` answers at o
 
 from __future__ import annotations
 
+import json
+import math
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -23,6 +25,19 @@ if TYPE_CHECKING:
 __all__ = ["DEFAULT_PIPELINE", "default_workers", "home", "open_pipeline", "run_chosen", "run_until"]
 
 
+def print_json(value: object) -> None:
+    """Print what ``--json`` asks for: bytes left out, null where a figure is not finite."""
+    print(json.dumps(_plain(value), ensure_ascii=False, indent=1, allow_nan=False))
+
+
+def _plain(value: object) -> object:
+    if isinstance(value, dict):
+        return {str(key): _plain(inner) for key, inner in value.items() if not isinstance(inner, bytes)}
+    if isinstance(value, list | tuple):
+        return [_plain(inner) for inner in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
 def kept(ctx: typer.Context, param: typer.CallbackParam, value: Any) -> Any:
     """Keep what is written on the command line (not what the environment says) for the advice of messages."""
     source = ctx.get_parameter_source(str(param.name))
@@ -39,16 +54,21 @@ Data = Annotated[
     ),
 ]  # fmt: skip
 Scene = Annotated[
-    list[str] | None, typer.Option("--scene", help="Scene or glob, repeatable: --scene 'U_*'.  (default: all)")
+    list[str] | None,
+    typer.Option("--scene", metavar="NAME|GLOB", help="Scene or glob, repeatable: --scene 'U_*'.  (default: all)"),
 ]
 PipelineFile = Annotated[
     Path | None,
-    typer.Option("--pipeline", callback=kept, help=f"Pipeline file.  (default: pipelines/{DEFAULT_PIPELINE})"),
+    typer.Option(
+        "--pipeline", metavar="FILE", callback=kept, help=f"Pipeline file.  (default: pipelines/{DEFAULT_PIPELINE})"
+    ),
 ]
 PipelineArgument = Annotated[
     Path, typer.Argument(metavar="PIPELINE", callback=kept, help="Pipeline file, e.g. pipelines/smoke.toml.")
 ]
-Workers = Annotated[int | None, typer.Option("--workers", min=1, max=1024, help="Processes.  (default: all cores)")]
+Workers = Annotated[
+    int | None, typer.Option("--workers", metavar="N", min=1, max=1024, help="Processes.  (default: all cores)")
+]
 ExecutorName = Annotated[
     str, typer.Option("--executor", metavar="local|ray", help="Processes of this machine, or of a Ray cluster.")
 ]
@@ -60,6 +80,7 @@ Force = Annotated[bool, typer.Option("--force", help="Compute this stage's shard
 Replace = Annotated[
     bool, typer.Option("--replace", help="Put this release in the place of another pipeline's, which is lost.")
 ]
+Json = Annotated[bool, typer.Option("--json", help="Print JSON: figures unrounded, nothing cut.")]
 Quiet = Annotated[bool, typer.Option("--quiet", help="No progress and no summary.")]
 
 

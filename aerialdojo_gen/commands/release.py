@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import sys
+from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from aerialdojo_gen.commands.common import Data, PipelineFile, Scene, open_pipeline
+from aerialdojo_gen.commands.common import Data, Json, PipelineFile, Scene, open_pipeline, print_json
 from aerialdojo_gen.common.text_table import terminal_width
 from aerialdojo_gen.errors import UsageError
 
@@ -23,6 +25,7 @@ def stats(
     figures: Annotated[
         Path | None, typer.Option("--figures", help="Draw the figures into this folder, as PNG and SVG.")
     ] = None,
+    as_json: Json = False,
 ) -> None:  # fmt: skip
     """Set the release beside the paper's tables; before there is one, what filter kept."""
     from aerialdojo_gen.pipeline import runner
@@ -40,7 +43,11 @@ def stats(
             raise no_release(root)
         config, roots = open_pipeline(pipeline, data)
         scenes = runner.chosen_scenes(config, roots, scene)
-        print("\n".join(pool_lines([pool_of(root, name) for name in scenes], terminal_width())))
+        pools = [pool_of(root, name) for name in scenes]
+        if as_json:
+            print_json([asdict(pool) for pool in pools])
+        else:
+            print("\n".join(pool_lines(pools, terminal_width())))
         return
 
     from aerialdojo_gen.release.provenance import made_of_scenes
@@ -60,10 +67,14 @@ def stats(
         if path:
             with atomic_file(path.parent, path.name) as temporary:
                 temporary.write_text(text, encoding="utf-8")
-    print("\n\n".join("\n".join(table.terminal(terminal_width())) for table in compared))
+    if as_json:
+        print_json([table.as_json() for table in compared])
+    else:
+        print("\n\n".join("\n".join(table.terminal(terminal_width())) for table in compared))
     if figures:
         from aerialdojo_gen.stats.figures import draw_figures
 
-        print()
+        told = sys.stderr if as_json else sys.stdout
+        print(file=told)
         for path in draw_figures(root, [m.scene for m in made], figures):
-            print(path)
+            print(path, file=told)

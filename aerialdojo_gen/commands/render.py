@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import time
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -14,6 +15,7 @@ from aerialdojo_gen.commands.common import (
     Data,
     ExecutorName,
     Force,
+    Json,
     PipelineFile,
     Quiet,
     Replace,
@@ -21,6 +23,7 @@ from aerialdojo_gen.commands.common import (
     Workers,
     default_workers,
     open_pipeline,
+    print_json,
     run_until,
 )
 from aerialdojo_gen.errors import UsageError
@@ -58,6 +61,7 @@ def render(
         "--verify", help="Read every recording and record again those whose content has changed.")] = False,
     estimate: Annotated[bool, typer.Option(
         "--estimate", help="Measure a few trajectories, say what all will take, and record nothing.")] = False,
+    as_json: Json = False,
     executor: ExecutorName = "local", address: Address = None,
 ) -> None:  # fmt: skip
     """Record four RGB-D views along trajectories of the release."""
@@ -71,8 +75,10 @@ def render(
         "instances": instances or None,
     }  # fmt: skip
     if estimate:
-        _estimate(data, scene, pipeline, workers, limits.share, overrides)
+        _estimate(data, scene, pipeline, workers, limits.share, overrides, as_json)
         return
+    if as_json:
+        raise UsageError("--json goes with --estimate: what was recorded stands in the tables recordings and frames")
     chosen = _scenes_of(split, scene, pipeline, data)
     run_until(
         "render", data=data, scene=chosen, pipeline=pipeline, workers=workers, force=force, quiet=quiet,
@@ -102,6 +108,7 @@ def _estimate(
     workers: int | None,
     share: tuple[int, int],
     overrides: dict[str, object],
+    as_json: bool,
 ) -> None:
     from aerialdojo_gen.config.pipeline import with_overrides
     from aerialdojo_gen.pipeline import runner
@@ -112,7 +119,11 @@ def _estimate(
     release_scenes(roots.data)
     config = with_overrides(config, "render", **overrides)
     scenes = runner.chosen_scenes(config, roots, scene)
-    print(estimate(roots.data, scenes, config.render, config.seed, workers or default_workers(), share[1]))
+    told = estimate(roots.data, scenes, config.render, config.seed, workers or default_workers(), share[1])
+    if as_json:
+        print_json(asdict(told))
+    else:
+        print(told)
 
 
 def share_of(text: str) -> tuple[int, int]:

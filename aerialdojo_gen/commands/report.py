@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal
 import typer
 from typer.core import TyperCommand
 
-from aerialdojo_gen.commands.common import Data
+from aerialdojo_gen.commands.common import Data, Json
 from aerialdojo_gen.common.text_table import terminal_width
 from aerialdojo_gen.errors import UsageError
 
@@ -77,6 +77,7 @@ def report(
     style: Annotated[
         Literal["terminal", "markdown", "latex", "csv", "json"], typer.Option("--format", help="What is printed.")
     ] = "terminal",
+    as_json: Json = False,
     by_scene: Annotated[bool, typer.Option("--by-scene", help="Print the table of scenes too.")] = False,
     out: Annotated[
         Path | None, typer.Option("--out", help="Folder for report.html, tables, figures and metrics.csv.")
@@ -96,6 +97,8 @@ def report(
     from aerialdojo_gen.release.contents import release_scenes
     from aerialdojo_gen.store.root import open_root
 
+    if as_json:
+        style = "json"
     rules = [profile_named(name) for name in dict.fromkeys(profile or DEFAULT_PROFILES)]
     root, written = open_root(data), open_root(log or data)
     if log is None and not runs_there(root):

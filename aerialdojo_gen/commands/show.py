@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from aerialdojo_gen.commands.common import Data
+from aerialdojo_gen.commands.common import Data, Json, print_json
 
 app = typer.Typer()
 
@@ -19,6 +20,7 @@ def show(
     out: Annotated[Path | None, typer.Option(help="PNG to write.  (default: TASK_ID.png)")] = None,
     html: Annotated[Path | None, typer.Option(help="Page to write, all in one file.")] = None,
     frames: Annotated[int, typer.Option(min=0, max=12, help="Front views along the way.")] = 5,
+    as_json: Json = False,
 ) -> None:
     """Picture one task: goal, route in its scene, clearance, reference image, views along the way."""
     from aerialdojo_gen.browse.lookup import find_task
@@ -27,12 +29,20 @@ def show(
     from aerialdojo_gen.show.page import write_page
     from aerialdojo_gen.show.pictured import picture_task
 
-    pictured = picture_task(find_task(data, task_id), "image" if task_id.endswith("-i") else "semantic", frames)
-    print("\n".join([pictured.title, pictured.goal, *facts(pictured.facts, terminal_width())]))
+    found = find_task(data, task_id)
+    if as_json:
+        # The rows as they stand: nothing is drawn unless a file is asked for.
+        print_json(found.as_json())
+        if out is None and html is None:
+            return
+    pictured = picture_task(found, "image" if task_id.endswith("-i") else "semantic", frames)
+    told = sys.stderr if as_json else sys.stdout
+    if not as_json:
+        print("\n".join([pictured.title, pictured.goal, *facts(pictured.facts, terminal_width())]))
     if out is not None or html is None:
-        print(write_png(pictured, out or Path(f"{task_id}.png")))
+        print(write_png(pictured, out or Path(f"{task_id}.png")), file=told)
     if html is not None:
-        print(write_page(pictured, html))
+        print(write_page(pictured, html), file=told)
 
 
 @app.command("view")

@@ -7,7 +7,18 @@ from typing import Annotated
 
 import typer
 
-from aerialdojo_gen.commands.common import Address, ExecutorName, PipelineFile, Quiet, Scene, Workers, home, kept
+from aerialdojo_gen.commands.common import (
+    Address,
+    ExecutorName,
+    Json,
+    PipelineFile,
+    Quiet,
+    Scene,
+    Workers,
+    home,
+    kept,
+    print_json,
+)
 
 app = typer.Typer()
 _MANY_DIGITS = 10
@@ -47,6 +58,7 @@ def validate(
     executor: ExecutorName = "local",
     address: Address = None,
     quiet: Quiet = False,
+    as_json: Json = False,
 ) -> None:  # fmt: skip
     """Check a release again from its Parquet files and meshes alone, and name every row at fault."""
     from aerialdojo_gen import validate as validation
@@ -78,8 +90,11 @@ def validate(
     found = validation.validate(asked, workers=workers, executor=executor, address=address, reporter=reporter)
     if report is not None:
         validation.write_report(found.faults, report)
-    if not quiet:
-        print("\n".join(found.table_lines(terminal_width())))
-    print("\n".join([*found.fault_lines(lines), found.verdict()]))
+    if as_json:
+        print_json(found.as_json())
+    else:
+        if not quiet:
+            print("\n".join(found.table_lines(terminal_width())))
+        print("\n".join([*found.fault_lines(lines), found.verdict()]))
     if found.faults:
         raise SystemExit(1)

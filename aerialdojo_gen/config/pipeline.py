@@ -30,7 +30,9 @@ from aerialdojo_gen.errors import ConfigError
 class Pipeline(Section):
     """A whole pipeline file."""
 
-    name: str = Field("default", pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*$")
+    name: str = Field(
+        "default", pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*$", description="what the release says that it was made by"
+    )
     seed: int = Field(0, ge=0, description="seed of every random draw")
     scenes: tuple[str, ...] = Field(("*",), description="names or globs of the scenes to make")
     stages: tuple[str, ...] | None = Field(None, description="stages that `run` runs; all where absent")

@@ -6,6 +6,7 @@ import csv
 import io
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -146,6 +147,17 @@ class Comparison:
         lines += ["| " + " | ".join(self._cells(row, bracket=True)) + " |" for row in self.rows]
         return [*lines, "", *self._verdict()]
 
+    def as_json(self) -> dict[str, Any]:
+        """Return title, notes, units by column, and a row's figures by column, ours and the paper's."""
+        names = [column.name for column in self.columns]
+        rows = [
+            {"name": row.name, "ours": dict(zip(names, row.ours, strict=True)), "paper": None}
+            | ({} if set(row.paper) == {None} else {"paper": dict(zip(names, row.paper, strict=True))})
+            for row in self.rows
+        ]
+        units = {column.name: column.unit for column in self.columns}
+        return {"title": self.title, "key": self.key, "units": units, "rows": rows, "notes": self._verdict()}
+
     def records(self) -> list[list[str]]:
         """One record a figure: table, row, column, unit, ours, paper; empty where there is none."""
         return [
@@ -203,6 +215,11 @@ class Listing:
         """Lines of Markdown."""
         lines = [f"### {self.title}", "", "| " + " | ".join(self.heads) + " |", "|---" * len(self.heads) + "|"]
         return [*lines, *("| " + " | ".join(row) + " |" for row in self.rows), "", *self.notes]
+
+    def as_json(self) -> dict[str, Any]:
+        """Return title, notes, and the cells of each row by their heading."""
+        rows = [dict(zip(self.heads, row, strict=True)) for row in self.rows]
+        return {"title": self.title, "key": self.heads[0], "rows": rows, "notes": [*self.notes]}
 
     def records(self) -> list[list[str]]:
         """One record a cell, as `Comparison.records` has them; all of it is the paper's but the last row."""

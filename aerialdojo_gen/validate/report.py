@@ -8,6 +8,7 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import pyarrow as pa
 
@@ -95,6 +96,24 @@ class Report:
                     more = "--report FILE has them all" if word == "at fault" else "--lines N names more"
                     lines.append(f"  and {len(faults) - limit:,} more ({more})")
         return lines
+
+    def as_json(self) -> dict[str, Any]:
+        """Return all of it as plain values: verdict, scenes, checks with their counts, every fault and warning."""
+        checks = [
+            {
+                "check": t.check,
+                "tables": [*t.tables],
+                "judged": t.judged,
+                "faults": t.faults,
+                "not_made": dict(t.skipped),
+            }
+            for t in self.totals()
+        ]
+        faults, warnings = ([one._asdict() for one in found] for found in (self.faults, self.warnings))
+        return {
+            "verdict": self.verdict(), "scenes": [*self.scenes], "checks": checks, "faults": faults,
+            "warnings": warnings,
+        }  # fmt: skip
 
     def verdict(self) -> str:
         """One line: what was checked, and whether all was well."""

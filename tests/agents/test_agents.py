@@ -1,12 +1,17 @@
 """The agents: how they are found, what they do, and the explorer's map."""
 
 import math
+import os
+import subprocess
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
 from support.flying import town
 from support.handmade import box, instance, scene
 
+import aerialdojo_gen
 from aerialdojo_gen.agents import AgentBase, load_agent
 from aerialdojo_gen.agents.depth_map import DepthMap
 from aerialdojo_gen.agents.explorer import ExplorerAgent, thumbnail
@@ -206,3 +211,23 @@ def test_the_explorer_stops_where_the_picture_fits(village):
 def test_the_explorer_says_what_it_needs():
     with pytest.raises(UsageError, match="front, left and right"):
         ExplorerAgent().reset(goal(sensors=Sensors(("front",))))
+
+
+def test_an_agent_in_the_working_directory_is_found_and_takes_no_librarys_place(tmp_path):
+    """By a console script too, whose own folder is first on the path in place of the working directory."""
+    text = "class Mine:\n    def reset(self, goal): pass\n    def act(self, observation): return 0\n"
+    for name in ("mine", "numpy"):
+        (tmp_path / f"{name}.py").write_text(text)
+    code = (
+        "from aerialdojo_gen.agents import load_agent\nfrom aerialdojo_gen.benchmark.flying_code import flying_code\n"
+        "before = flying_code('mine:Mine')\nprint(type(load_agent('mine:Mine')).__name__)\n"
+        "open('mine.py', 'a').write('x = 1')\nassert flying_code('mine:Mine') != before\n"
+        "load_agent('numpy:Mine')"
+    )
+    # -P: as a console script has it.
+    env = os.environ | {"PYTHONPATH": str(Path(aerialdojo_gen.__file__).parents[1])}
+    done = subprocess.run(
+        [sys.executable, "-P", "-c", code], cwd=tmp_path, env=env, capture_output=True, text=True, check=False
+    )
+    assert done.stdout == "Mine\n"
+    assert "module numpy has no Mine" in done.stderr

@@ -1,0 +1,49 @@
+"""``config``: what a pipeline file may say, and one to begin with."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from aerialdojo_gen.commands.common import DEFAULT_PIPELINE, Json, PipelineFile, home, print_json
+from aerialdojo_gen.common import advice
+
+app = typer.Typer(help="Show what a pipeline file may say, or write one to begin with.", no_args_is_help=True)
+
+
+@app.command("show")
+def show(
+    stage: Annotated[
+        str | None, typer.Argument(metavar="STAGE", help="Section of this stage, e.g. plan.  (default: all)")
+    ] = None,
+    pipeline: PipelineFile = None,
+    as_json: Json = False,
+) -> None:
+    """Show every key of a pipeline: value, default, unit, bounds, meaning."""
+    from aerialdojo_gen.common.text_table import terminal_width
+    from aerialdojo_gen.config.keys import config_keys
+    from aerialdojo_gen.pipeline.template import key_lines
+
+    keys = config_keys(pipeline or home() / "pipelines" / DEFAULT_PIPELINE, stage)
+    if as_json:
+        print_json([key.as_json() for key in keys])
+        return
+    print("\n".join(key_lines(keys, terminal_width())))
+
+
+@app.command("init")
+def init(
+    path: Annotated[Path, typer.Argument(metavar="NAME.toml", help="File to write.")],
+    pipeline: Annotated[
+        Path | None,
+        typer.Option("--from", metavar="PIPELINE", help="Take over this pipeline's values.  (default: the defaults)"),
+    ] = None,
+    force: Annotated[bool, typer.Option("--force", help="Overwrite an existing file.")] = False,
+) -> None:
+    """Write a commented pipeline file with every key, unit and default."""
+    from aerialdojo_gen.pipeline.template import init_config
+
+    print(init_config(path, pipeline, force=force))
+    print(f"next: {advice.command('run', path)}")

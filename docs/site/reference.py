@@ -1,0 +1,162 @@
+"""Pages of reference, written from the program itself: commands, keys of a pipeline file, tables, Python."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from itertools import groupby
+from typing import Any
+
+import pyarrow as pa
+import typer.main
+
+import aerialdojo_gen
+from aerialdojo_gen.cli import app
+from aerialdojo_gen.config.keys import Key, config_keys, plain, section_meanings
+from aerialdojo_gen.store.layout import LAYOUT
+
+
+def pages() -> dict[str, str]:
+    """Return every page as Markdown, by its path below docs/."""
+    return {
+        "reference/cli.md": cli_page(),
+        "reference/config.md": config_page(),
+        "reference/tables.md": tables_page(),
+        "reference/python.md": python_page(),
+    }
+
+
+def cli_page() -> str:
+    """Describe every command with its arguments and options."""
+    out = [
+        "# Commands",
+        "",
+        "Written from the commands themselves; `aerialdojo-gen COMMAND --help` says the same. Data go to",
+        "`--data`, else to `AERIALDOJO_DATA`, else to `data/`. Exit codes: [what a command ends",
+        "with](../errors.md).",
+    ]
+    group = typer.main.get_command(app)
+    for name, command in _commands(group, ()):
+        # What a command says of itself with --help, whatever version of Typer writes it.
+        context = command.make_context(f"aerialdojo-gen {name}", [], resilient_parsing=True)
+        said = (one.get_help_record(context) for one in command.get_params(context))
+        usage = command.get_usage(context).removeprefix("Usage: ")
+        out += ["", f"## {name}", "", _prose(command.help or ""), "", "```text", _prose(usage), "```"]
+        out += [
+            "",
+            "| | what it is |",
+            "|---|---|",
+            *(f"| {_code(left)} | {_cell(right)} |" for left, right in filter(None, said)),
+        ]
+    return "\n".join(out) + "\n"
+
+
+def _commands(group: Any, before: tuple[str, ...]) -> Iterator[tuple[str, Any]]:
+    for name, command in group.commands.items():
+        if hasattr(command, "commands"):
+            yield from _commands(command, (*before, name))
+        else:
+            yield " ".join((*before, name)), command
+
+
+def config_page() -> str:
+    """Describe every key of a pipeline file."""
+    meanings = section_meanings()
+    out = [
+        "# The pipeline file",
+        "",
+        "One TOML file, one section a stage; a key that does not exist is an error. `aerialdojo-gen config init",
+        "NAME.toml` writes a file with all of this as comments, `aerialdojo-gen config show [STAGE]` prints it",
+        "with the values of a pipeline. Paths are relative to the file. What several sections say of one thing",
+        "must agree; a contradiction is an error that says which way to go.",
+    ]
+    # A section's own keys together, then those of the tables in it.
+    order = list(dict.fromkeys(key.section for key in config_keys()))
+    for section, keys in groupby(
+        sorted(config_keys(), key=lambda key: order.index(key.section)), lambda key: key.section
+    ):
+        depth = section.count(".")
+        title = f"`[{section}]`" if section else "The file's own keys"
+        out += ["", f"{'##' + '#' * depth} {title}", ""]
+        out += [f"{meanings[section]}", ""] if section in meanings else []
+        out += ["| key | unit | default | takes | meaning |", "|---|---|---|---|---|"]
+        out += [_key(key) for key in keys]
+    return "\n".join(out) + "\n"
+
+
+def _key(key: Key) -> str:
+    takes = ", ".join(filter(None, (key.kind, key.bounds)))
+    if key.default is None:
+        default = "required" if key.required else "not set"
+    else:
+        default = "see below" if key.kind == "table" or "table" in key.kind.split() else f"`{plain(key.default)!r}`"
+    return f"| `{key.name}` | {key.unit} | {_cell(default)} | {_cell(takes)} | {_cell(key.meaning)} |"
+
+
+def tables_page() -> str:
+    """Describe every table with its columns."""
+    out = [
+        "# Tables",
+        "",
+        "Every table is a folder of Parquet files, and every column says its unit and meaning in the field's",
+        "metadata, which is where this page has them from. World: x east, y north, z up, metres; yaw in radians,",
+        "counter-clockwise from +x. [The format](../release-format.md) tells more of the release's; the others",
+        "are what stages write for each other.",
+    ]
+    for name, place in LAYOUT.items():
+        if name.endswith("/test"):
+            continue
+        spec = place.spec
+        title = name.removesuffix("/train")
+        out += [
+            "",
+            f"## {title}",
+            "",
+            f"`{place.template}`, by `{place.command}`; key: {', '.join(f'`{k}`' for k in spec.key)}.",
+            "",
+        ]
+        out += ["| column | type | unit | meaning |", "|---|---|---|---|", *map(_column, spec.schema)]
+    return "\n".join(out) + "\n"
+
+
+def _column(field: pa.Field) -> str:
+    meta = {k.decode(): v.decode() for k, v in (field.metadata or {}).items()}
+    null = ", or null" if field.nullable else ""
+    kind = f"list of {field.type.value_type}" if pa.types.is_list(field.type) else str(field.type)
+    return f"| `{field.name}` | {kind}{null} | {meta.get('unit', '')} | {_cell(meta.get('meaning', ''))} |"
+
+
+def python_page() -> str:
+    """List the public names, for mkdocstrings to fill in."""
+    out = [
+        "# Python API",
+        "",
+        "The names of `aerialdojo_gen.__all__`, and what an agent is made of. [In Python](../api.md) has",
+        "examples.",
+    ]
+    homes = {
+        **aerialdojo_gen._HOMES,
+        "Agent": "aerialdojo_gen.agents.base",
+        "AgentBase": "aerialdojo_gen.agents.base",
+    }
+    homes |= dict.fromkeys(("Goal", "Rules", "Sensors", "Observation"), "aerialdojo_gen.agents.goal")
+    homes |= {"read_recording": "aerialdojo_gen.rendering.reader", "Recording": "aerialdojo_gen.rendering.reader"}
+    for name, module in homes.items():
+        out += ["", f"## {name}", "", f"::: {module}.{name}"]
+    return "\n".join(out) + "\n"
+
+
+def _prose(text: str) -> str:
+    return " ".join(text.split())
+
+
+def _code(text: str) -> str:
+    return f"`{_prose(text)}`"
+
+
+def _cell(text: str) -> str:
+    """Keep what Markdown would take for its own as it is said; a code span is one already."""
+    told = _prose(text)
+    if "`" in told:
+        return told
+    return re.sub(r"([*\[\]|])", r"\\\1", told.replace("<", "&lt;"))

@@ -1,0 +1,260 @@
+"""Every block of code in README and docs runs on the smoke data, or a table here has the reason why not."""
+
+import dataclasses
+import io
+import json
+import os
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+import tomllib
+from contextlib import redirect_stderr, redirect_stdout
+from pathlib import Path
+
+import pytest
+import trimesh
+from support import foreign, task_files
+from support.doc_blocks import blocks, commands, is_shell
+
+from aerialdojo_gen import cli
+from aerialdojo_gen.agents.goal import N_ACTIONS, Goal, Observation, Rules
+from aerialdojo_gen.config.pipeline import Pipeline
+from aerialdojo_gen.store import shards
+from aerialdojo_gen.store.schemas import ACTION_NAMES
+
+ROOT = next(folder for folder in Path(__file__).resolve().parents if (folder / "pyproject.toml").is_file())
+PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
+
+# What cannot run on the smoke data, by what its text fits; a test named in a reason is one that runs it.
+NOT_RUN = {
+    r"make (dataset|evaluate|gallery|bench|fuzz|torture|test|test-fast|lint|lock|docs)\b.*": "takes minutes to hours",
+    r"make smoke": "is what made the data that all this runs on",
+    r"(\S*/)?pip install .*": "installs packages",
+    r"(annotate|view) .*": "serves until Ctrl-C: tests/annotate/test_annotate_tool_browser.py, "
+    "tests/view/test_view_page.py",
+    r"run my-scenes/.*": "runs in tests/imports/test_own_scene.py",
+    r"evaluate --preset .*": "asks a language model: tests/llm/test_llm_evaluate.py does, of a server of its own",
+    r"vllm .*|docker .*|helm .*|kubectl .*": "needs what is not of this project",
+    r".*(s3://|AWS_).*": "needs an object store: tests/store/test_readers_on_s3.py has one",
+    r"sudo .*|python3.11 -m venv .*|git .*|ray .*|RAY_USAGE.*|.*--executor ray.*": "makes a cluster: "
+    "tests/pipeline/test_ray_cluster.py has one",
+    r"validate DOWNLOADED .*": "runs in tests/validate/test_validate_release.py, on a release that lies elsewhere",
+    r"cp -al .*|rm -r .*|run pipelines/aerialdojo-hard.toml .*": "plans 42 scenes: "
+    "tests/stages/test_filter.py has its limits",
+    r"import-benchmark exports/.*": "runs in tests/exchange/test_export_roundtrip.py",
+}  # fmt: skip
+# Whole blocks that are a script or a file, not commands one by one.
+SCRIPTS = {
+    "#!/bin/bash": "a batch script for SLURM",
+    "FROM python": "an image for a cluster",
+    "helm repo add": "needs Kubernetes",
+}
+# What stands for what on the smoke data, in this order: its scenes, a task of its own, less to draw.
+ON_SMOKE = (
+    (r"pipelines/aerialdojo-200k\.toml", "pipelines/smoke.toml"),
+    (r"^((?:build-scenes|annotate-import|anchor-sample|reference-images|pair-objects|plan|filter|split|render|validate)"
+     r"\b(?!.*--pipeline).*)", r"\1 --pipeline pipelines/smoke.toml"),
+    (r"\b[UNID]_[A-Z][A-Za-z]+_([01*])(?!-)", r"U_Courtyard_\1"),
+    (r"\bI_Harbor_0-[0-9a-f]{12}-s\b", "TASK"),
+    (r"^(add-scene .*)", r"\1 --force"),
+    (r"^((?:stats|validate|show)\b.*) --data data-smoke\b", r"\1"),
+    (r"--split id_train (.*--estimate)", r"--split train \1"),
+    (r"\bTASK_ID\b", "TASK"),
+    (r"^validate --json\b", "validate --json --no-meshes"),
+    (r"^(render .*)--limit [03](?!.*--estimate)", r"\1--limit 1"),
+)  # fmt: skip
+WITH_WORKERS = ("run", "plan", "render", "evaluate", "validate", "filter", "split")
+PYTHON_ELSEWHERE = {"api.md": "tests/test_api_page.py", "CONTRIBUTING.md": "tests/pipeline/test_new_stage.py"}
+# What a page speaks of and does not make.
+BEFORE = {"recordings.md": "folder = next(__import__('pathlib').Path('data/media').glob('*/*'))\n"}
+
+
+@pytest.fixture(scope="module")
+def folder(smoke, tmp_path_factory):
+    """A working directory as README's reader has it, the smoke data in place of the whole dataset."""
+    place = tmp_path_factory.mktemp("reader")
+    shutil.copytree(smoke, place / "data")
+    shutil.copytree(smoke, place / "data-smoke")
+    for name in ("pipelines", "scene_assets", "annotations", "examples"):
+        (place / name).symlink_to(ROOT / name)
+    village = foreign.village()
+    village.apply_transform(trimesh.transformations.rotation_matrix(-3.141592653589793 / 2, [1, 0, 0]))
+    village.export(place / "campus.glb")
+    village.apply_scale(100.0)
+    village.export(place / "campus.obj")
+    task_files.write(place / "train.json", task_files.openfly())
+    return place
+
+
+def shell_commands():
+    """Each command once, with the first place where it stands."""
+    found = {}
+    for page in PAGES:
+        for block in blocks(page):
+            if is_shell(block) and not block.text.startswith(tuple(SCRIPTS)):
+                for command in commands(block):
+                    found.setdefault(command.removeprefix("aerialdojo-gen "), block.place)
+    return found
+
+
+def reason(command):
+    return next((why for text, why in NOT_RUN.items() if re.fullmatch(text, command)), None)
+
+
+def on_smoke(command, task_id):
+    for text, stands in ON_SMOKE:
+        command = re.sub(text, stands, command)
+    words = shlex.split(command.replace("TASK", task_id))
+    return [*words, "--workers", "1"] if words[0] in WITH_WORKERS else words
+
+
+def test_blocks_are_told_apart(tmp_path):
+    page = tmp_path / "page.md"
+    page.write_text(
+        "Text\n\n    make smoke      # a comment\n"
+        "    aerialdojo-gen plan \\\n        --scene 'U_*'\n\n    pip x && make lint\n"
+        "\n```python\nx = 1\n\n    y = 2\n```\n\n- a list\n  with a line\n\n    data/\n      release/\n"
+    )
+    found = blocks(page)
+    assert [(block.language, block.line, is_shell(block)) for block in found] == [
+        ("indented", 3, True), ("python", 10, False), ("indented", 18, False)
+    ]  # fmt: skip
+    assert list(commands(found[0])) == [
+        "make smoke",
+        "aerialdojo-gen plan --scene 'U_*'",
+        "pip x",
+        "make lint",
+    ]
+    assert found[1].text == "x = 1\n\n    y = 2\n"
+
+
+def test_no_reason_is_left_over_and_what_it_names_is_there():
+    every = shell_commands()
+    for text, why in NOT_RUN.items():
+        assert any(re.fullmatch(text, command) for command in every), f"no block has {text}: {why}"
+        for path in re.findall(r"tests/\w+/\w+\.py", why):
+            assert (ROOT / path).is_file(), path
+    scripts = [block.text for page in PAGES for block in blocks(page)]
+    for begin in SCRIPTS:
+        assert any(text.startswith(begin) for text in scripts), begin
+
+
+@pytest.fixture(scope="module")
+def ran(folder):
+    """Every command that has no reason, run once in the pages' order: where it stands, exit code, what it said."""
+    task_id = shards.read_scene(folder / "data", "tasks/test", "U_Courtyard_0")["task_id"][0].as_py()
+    results = {}
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(folder)
+        patch.delenv("AERIALDOJO_DATA", raising=False)
+        patch.setattr(sys, "path", [path for path in sys.path if path])
+        for run, agent in (("mine", "oracle"), ("theirs", "constant")):
+            arguments = ["evaluate", "--agent", agent, "--run", run, "--limit", "4", "--workers", "1"]
+            assert called(arguments)[0] == 0
+        done = {}
+        for command, place in shell_commands().items():
+            if reason(command) is None:
+                words = tuple(on_smoke(command, task_id))
+                done[words] = done.get(words) or called([*words])
+                results[command] = (place, *done[words])
+    return results
+
+
+def called(arguments):
+    """Call the command line in this process; gives the exit code and what it says to standard error."""
+    out, err = io.StringIO(), io.StringIO()
+    with pytest.MonkeyPatch.context() as patch, redirect_stdout(out), redirect_stderr(err):
+        patch.setattr(sys, "argv", ["aerialdojo-gen", *arguments])
+        try:
+            cli.main()
+        except SystemExit as ended:
+            return int(ended.code or 0), err.getvalue()
+        except Exception as error:
+            return -1, repr(error)
+    return 0, err.getvalue()
+
+
+def test_every_shell_block_runs_on_the_smoke_data(ran):
+    failed = [f"{place}: {name}: exit code {code}: {err[-300:]}" for name, (place, code, err) in ran.items() if code]
+    assert not failed, "\n".join([*failed, "make them run, or give them a line with a reason in NOT_RUN"])
+    assert len(ran) > 25
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_every_python_block_runs_on_the_smoke_data(page, folder, ran):
+    """A page's blocks one after the other, in a process of their own, on what its commands have made."""
+    found = [block.text for block in blocks(page) if block.language == "python"]
+    if page.name in PYTHON_ELSEWHERE:
+        assert found
+        assert page.name in (ROOT / PYTHON_ELSEWHERE[page.name]).read_text(encoding="utf-8")
+    elif found:
+        assert run_python(folder, BEFORE.get(page.name, "") + "\n".join(found)) is not None
+
+
+def run_python(folder, text):
+    """Run a text as a script's work, which workers that it starts do not begin again; gives what it prints."""
+    script = folder / "page.py"
+    script.write_text("if __name__ == '__main__':\n" + "".join(f"    {line}\n" for line in text.splitlines()))
+    env = os.environ | {"MPLBACKEND": "Agg"}
+    done = subprocess.run([sys.executable, script], cwd=folder, env=env, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr[-3000:]
+    return done.stdout
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_every_toml_block_is_what_a_pipeline_may_say(page):
+    for block in blocks(page):
+        if block.language == "toml":
+            Pipeline.model_validate(tomllib.loads(block.text))
+
+
+def test_the_agent_of_the_page_is_the_one_in_examples_and_has_some_forty_lines():
+    code = (ROOT / "examples/seeker.py").read_text(encoding="utf-8")
+    assert code in [block.text for block in blocks(ROOT / "docs/agent.md")]
+    assert sum(bool(line.strip()) for line in code.splitlines()) <= 40
+
+
+def test_the_table_of_actions_is_the_action_set():
+    text = (ROOT / "docs/agent.md").read_text(encoding="utf-8")
+    cells = re.findall(r"\| (\d+) \| ([A-Z]\w+)(?: (\d+)[ °m]*)?", text)
+    assert {int(k): name + size for k, name, size in cells} == dict(enumerate(ACTION_NAMES[:N_ACTIONS]))
+
+
+@pytest.mark.parametrize("told", [Goal, Rules, Observation])
+def test_the_page_names_every_field_that_an_agent_is_told(told):
+    text = (ROOT / "docs/agent.md").read_text(encoding="utf-8")
+    for one in dataclasses.fields(told):
+        assert re.search(rf"`\.?{one.name}`", text), one.name
+
+
+def test_the_notebook_runs(folder):
+    document = json.loads((ROOT / "examples/first_look.ipynb").read_text(encoding="utf-8"))
+    cells = ["".join(cell["source"]) for cell in document["cells"] if cell["cell_type"] == "code"]
+    assert len(cells) >= 6
+    assert not any(cell["outputs"] for cell in document["cells"] if cell["cell_type"] == "code")
+    # The last value of a cell is what a notebook shows.
+    run_python(folder, "\n".join([*cells, "assert rgb.shape[2] == 3 and len(recording) > 1 and info['reason']"]))
+
+
+def test_the_dataset_for_pytorch_has_every_pose_of_the_recorded_routes(folder):
+    held = """
+import sys
+sys.path.insert(0, "examples")
+from torch_dataset import Poses
+from aerialdojo_gen import open_release
+
+poses, release = Poses("data", "id_train"), open_release("data")
+assert len(poses.nav_ids) == len(set(poses.nav_ids)) > 0
+for nav_id, end in zip(poses.nav_ids, poses.ends):
+    route, last = release.task(nav_id).route, poses[end - 1]
+    assert last["action"] == 0 and [*poses.actions[nav_id]] == list(route["agent_action"])
+    assert last["text"].startswith(release.task(nav_id).instances[0]["target_name"])
+    seen = release.recording(nav_id)
+    k = len(route["agent_action"]) - 1
+    assert (last["rgb"] * 255 == seen.rgb["front"][k].transpose(2, 0, 1)).all()
+    assert last["depth_m"].shape == (1, *seen.depth_m["front"][k].shape)
+print(len(poses))
+"""
+    assert int(run_python(folder, held)) > 10
