@@ -13,8 +13,8 @@ from aerialdojo_gen.config.sections import RenderConfig
 from aerialdojo_gen.errors import UsageError
 from aerialdojo_gen.rendering.backend import choose_renderer, open_renderer
 from aerialdojo_gen.rendering.checks import Solid
-from aerialdojo_gen.rendering.codecs import SUFFIX
-from aerialdojo_gen.rendering.recording import frame_poses, record_view
+from aerialdojo_gen.rendering.placement import places
+from aerialdojo_gen.rendering.recording import frame_poses, record_views
 from aerialdojo_gen.rendering.sample import choose, tables
 from aerialdojo_gen.scenes.stored import read_scene_mesh
 from aerialdojo_gen.store import shards as store
@@ -130,7 +130,7 @@ def estimate(
     return Estimate(
         trajectories,
         poses,
-        trajectories * len(config.views) * (3 if config.instances else 2),
+        trajectories * len({place.file for place in places(config)}),
         cpu_s,
         cpu_s / workers / machines,
         poses * bytes_ / measured / machines,
@@ -173,16 +173,13 @@ def _measure(
     solid = Solid(mesh)
     short = route | {name: route[name][:_MEASURED_POSES] for name in ("x_m", "y_m", "z_m", "yaw_rad", "action")}
     poses = frame_poses(short, config)
-    size = 0
     with open_renderer(mesh, renderer_name) as renderer, scratch_folder() as folder:
         built = time.process_time() - begun
-        modalities = ("rgb", "depth", "instance") if config.instances else ("rgb", "depth")
         begun = time.process_time()
-        for view in config.views:
-            files = {m: folder / f"{view}_{m}.{SUFFIX[m]}" for m in modalities}
-            record_view(renderer, solid, view, poses, config, files)
-            size += sum(size_of(path) for path in files.values())
-        return len(poses.time_s), time.process_time() - begun, built, size
+        record_views(renderer, solid, config.views, poses, config, folder)
+        seconds = time.process_time() - begun
+        size = sum(size_of(folder / file) for file in {place.file for place in places(config)})
+        return len(poses.time_s), seconds, built, size
 
 
 def _hours(seconds: float) -> str:

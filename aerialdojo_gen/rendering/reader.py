@@ -10,6 +10,7 @@ The files are plain ones, for any other reader: `docs/recordings.md` has example
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,6 +25,7 @@ from aerialdojo_gen.common.bounded import loads_json
 from aerialdojo_gen.common.pictures import decode_as_stored
 from aerialdojo_gen.errors import Malformed, RenderError
 from aerialdojo_gen.rendering.codecs import SUFFIX, to_metres
+from aerialdojo_gen.rendering.placement import TILED
 
 
 class Video(Sequence[NDArray[Any]]):
@@ -33,6 +35,8 @@ class Video(Sequence[NDArray[Any]]):
     ----------
     path : str or Path
         What `aerialdojo_gen.rendering.codecs.VideoWriter` or `PngWriter` wrote.
+    stream : int
+        Which of the file's videos.
 
     Raises
     ------
@@ -40,26 +44,27 @@ class Video(Sequence[NDArray[Any]]):
         The file cannot be read, or is cut off: the message names it.
     """
 
-    def __init__(self, path: str | Path) -> None:
+    def __init__(self, path: str | Path, stream: int = 0) -> None:
         path = Path(path)
-        self.path = path
+        self.path, self._stream = path, stream
         self._frames: Iterator[Any] = iter(())
         self._next = -1
+        self._last: tuple[int, NDArray[Any]] | None = None
         self._files = sorted(path.glob("*.png")) if path.is_dir() else []
         if path.is_dir():
             self._open_folder()
             return
         try:
             with av.open(str(path)) as container:
-                stream = container.streams.video[0]
+                own = container.streams.video[stream]
                 # A stream of a codec that FFmpeg does not know has none, and then no format either.
-                if stream.codec_context is None or stream.format is None:
+                if own.codec_context is None or own.format is None:
                     raise RenderError(f"{path} says nothing of its pictures: render it again")
                 self.metadata = {k.lower(): v for k, v in container.metadata.items()}
-                self.fps = float(stream.average_rate or 0)
-                self.width, self.height = stream.width, stream.height
-                self._depth = stream.format.name.startswith("gray16")
-                self._pts = sorted(p.pts for p in container.demux(stream) if p.pts is not None)
+                self.fps = float(own.average_rate or 0)
+                self.width, self.height = own.width, own.height
+                self._depth = own.format.name.startswith("gray16")
+                self._pts = sorted(p.pts for p in container.demux(own) if p.pts is not None)
         except (av.FFmpegError, OSError, IndexError, UnicodeDecodeError) as error:
             raise RenderError(f"{path} is no video that can be read ({error}): render it again") from None
 
@@ -108,9 +113,15 @@ class Video(Sequence[NDArray[Any]]):
         array = frame.to_ndarray() if self._depth else frame.to_ndarray(format="rgb24")
         return np.asarray(array)
 
+    def kept(self, k: int) -> NDArray[Any]:
+        """Decode frame k, or return it where it was the last one asked for here; not to be written to."""
+        if self._last is None or self._last[0] != k:
+            self._last = (k, self[k])
+        return self._last[1]
+
     def _from(self, pts: int) -> Iterator[Any]:
         with av.open(str(self.path)) as container:
-            stream = container.streams.video[0]
+            stream = container.streams.video[self._stream]
             stream.codec_context.thread_count = 1
             container.seek(pts, stream=stream, backward=True)
             for frame in container.decode(stream):
@@ -118,21 +129,75 @@ class Video(Sequence[NDArray[Any]]):
                     yield frame
 
 
+class Tile(Video):
+    """One view of a tiled video, decoded with the others: the views of a frame are decoded once.
+
+    Parameters
+    ----------
+    whole : Video
+        The same for all views of a file.
+    camera : dict
+        What the file says of the view: ``left_px``, ``top_px``, ``width`` and ``height`` among it.
+
+    Raises
+    ------
+    RenderError
+        The view lies beyond the video's frame.
+    """
+
+    def __init__(self, whole: Video, camera: dict[str, Any]) -> None:
+        self.path, self.fps, self._pts = whole.path, whole.fps, whole._pts
+        self.metadata = {"comment": json.dumps(camera)}
+        self._whole = whole
+        box = [camera.get(name) for name in ("left_px", "top_px", "width", "height")]
+        if not all(isinstance(edge, int) and 0 <= edge < 1 << 16 for edge in box):
+            raise RenderError(f"{whole.path} does not say where its views lie: render it again")
+        self._left, self._top, self.width, self.height = (int(edge) for edge in box if edge is not None)
+        if self._left + self.width > whole.width or self._top + self.height > whole.height:
+            raise RenderError(f"{whole.path} says that a view lies beyond its frames: render it again")
+
+    @overload
+    def __getitem__(self, k: int) -> NDArray[Any]: ...
+    @overload
+    def __getitem__(self, k: slice) -> list[NDArray[Any]]: ...
+    def __getitem__(self, k: int | slice) -> NDArray[Any] | list[NDArray[Any]]:
+        """Decode frame k: (H, W, 3) uint8 of a picture, (H, W) uint16 of depth in the file's units."""
+        if isinstance(k, slice):
+            return [self[i] for i in range(*k.indices(len(self)))]
+        frame = self._whole.kept(k)
+        return frame[self._top : self._top + self.height, self._left : self._left + self.width].copy()
+
+
 class DepthVideo(Sequence[NDArray[np.float32]]):
-    """Depth in metres, over a `Video` of millimetres.
+    """Depth in metres, over a `Video` of what is stored.
 
     Attributes
     ----------
-    millimetres : Video
+    stored : Video
         The stored values, (H, W) uint16; 0 where nothing lies within range.
+    step : float
+        0 where these are millimetres, else the share by which they grow (`codecs.to_stored`).
     """
 
-    def __init__(self, video: Video) -> None:
-        self.millimetres = video
+    def __init__(self, video: Video, step: float = 0.0) -> None:
+        self.stored, self.step = video, step
+
+    @property
+    def millimetres(self) -> Video:
+        """The stored values, where they are millimetres.
+
+        Raises
+        ------
+        RenderError
+            They are not.
+        """
+        if self.step:
+            raise RenderError(f"{self.stored.path} stores no millimetres, but steps of {self.step:g} of the depth")
+        return self.stored
 
     def __len__(self) -> int:
         """Return the number of frames."""
-        return len(self.millimetres)
+        return len(self.stored)
 
     @overload
     def __getitem__(self, k: int) -> NDArray[np.float32]: ...
@@ -141,8 +206,8 @@ class DepthVideo(Sequence[NDArray[np.float32]]):
     def __getitem__(self, k: int | slice) -> NDArray[np.float32] | list[NDArray[np.float32]]:
         """Decode frame k: (H, W) float32, metres; inf where nothing lies within range."""
         if isinstance(k, slice):
-            return [to_metres(frame) for frame in self.millimetres[k]]
-        return to_metres(self.millimetres[k])
+            return [to_metres(frame, self.step) for frame in self.stored[k]]
+        return to_metres(self.stored[k], self.step)
 
 
 @dataclass(frozen=True)
@@ -194,14 +259,76 @@ def read_recording(folder: str | Path) -> Recording:
         There is no recording, a video is missing or damaged, or the videos differ in length.
     """
     folder = Path(folder)
+    if (folder / TILED).is_file():
+        return _tiled(folder / TILED)
     rgb, depth, instance = (_videos(folder, modality) for modality in ("rgb", "depth", "instance"))
     if not rgb or rgb.keys() != depth.keys() or (instance and instance.keys() != rgb.keys()):
         raise RenderError(f"no complete recording in {folder}: run {command('render')}")
     if len({len(v) for v in (*rgb.values(), *depth.values(), *instance.values())}) != 1:
         raise RenderError(f"the videos in {folder} differ in length: render them again")
     cameras = {view: _camera(video) for view, video in rgb.items()}
-    metres = {view: DepthVideo(video) for view, video in depth.items()}
+    metres = {view: DepthVideo(video, _step(_camera(video), video)) for view, video in depth.items()}
     return Recording(rgb, metres, cameras, next(iter(rgb.values())).fps, instance)
+
+
+def open_view(path: str | Path, view: str, modality: str) -> Video:
+    """Open the video of one view, whichever way its file holds it.
+
+    Parameters
+    ----------
+    path : str or Path
+        As a row of `recordings` names it.
+    view, modality : str
+        As that row has them.
+
+    Returns
+    -------
+    Video
+
+    Raises
+    ------
+    RenderError
+        The file cannot be read, or has no such view.
+    """
+    path = Path(path)
+    if path.name != TILED:
+        return Video(path)
+    found = _tiles(path)[0].get(modality, {}).get(view)
+    if found is None:
+        raise RenderError(f"{path} has no {modality} of the view {view}: render it again")
+    return found
+
+
+def _tiles(path: Path) -> tuple[dict[str, dict[str, Video]], dict[str, dict[str, Any]]]:
+    """Open the views of a tiled file, by modality and view, and return their cameras."""
+    first = Video(path)
+    said = _camera(first)
+    cameras, names = said.get("tiles"), said.get("streams")
+    if not (
+        isinstance(cameras, dict) and cameras and all(isinstance(c, dict) for c in cameras.values())
+        and isinstance(names, list) and names[:2] == ["rgb", "depth"] and names[2:] in ([], ["instance"])
+    ):  # fmt: skip
+        raise RenderError(f"{path} does not say which views it holds: render it again")
+    wholes = {name: first if k == 0 else Video(path, k) for k, name in enumerate(names)}
+    if len({len(whole) for whole in wholes.values()}) != 1:
+        raise RenderError(f"the videos in {path} differ in length: render them again")
+    tiles = {name: {view: Tile(whole, camera) for view, camera in cameras.items()} for name, whole in wholes.items()}
+    return {name: dict(views) for name, views in tiles.items()}, cameras
+
+
+def _tiled(path: Path) -> Recording:
+    videos, cameras = _tiles(path)
+    depth = {view: DepthVideo(video, _step(cameras[view], video)) for view, video in videos["depth"].items()}
+    fps = next(iter(videos["rgb"].values())).fps
+    return Recording(videos["rgb"], depth, cameras, fps, videos.get("instance", {}))
+
+
+def _step(camera: dict[str, Any], video: Video) -> float:
+    """Return the step of stored depth; recordings from before there was a choice say nothing: millimetres."""
+    step = camera.get("depth_step", 0.0)
+    if type(step) not in (int, float) or not 0.0 <= step <= 0.1:
+        raise RenderError(f"{video.path}: what it says of its camera has no depth_step from 0 to 0.1")
+    return float(step)
 
 
 def _camera(video: Video) -> dict[str, Any]:
