@@ -84,6 +84,22 @@ def test_depth_in_millimetres_is_within_half_of_one(depth):
     assert to_metres(to_stored(np.array([depth])))[0] == pytest.approx(depth, abs=5.1e-4)
 
 
+@given(st.floats(0.1, MAX_DEPTH_M), st.sampled_from([0.001, 0.005, 0.1]))
+def test_depth_in_steps_is_within_half_of_one(depth, step):
+    """Half a step, and half a millimetre, and what float32 loses."""
+    stored = to_stored(np.array([depth], dtype=np.float32), step)
+    assert stored[0] > 0
+    assert to_metres(stored, step)[0] == pytest.approx(depth, rel=0.51 * step, abs=5.1e-4)
+
+
+def test_steps_keep_nothing_within_range_and_the_order_of_depths():
+    depth = np.array([np.inf, np.nan, -1.0, 65.6, 0.1, 0.2, 1.0, 65.535])
+    stored = to_stored(depth, 0.005)
+    assert stored[:4].tolist() == [0, 0, 0, 0]
+    assert (np.diff(stored[4:].astype(int)) > 0).all()
+    assert np.isinf(to_metres(stored, 0.005)).tolist() == [True] * 4 + [False] * 4
+
+
 def test_nothing_within_range_is_zero_and_comes_back_as_infinity():
     stored = to_stored(np.array([np.inf, np.nan, -1.0, 65.5356, 65.535, 1e9]))
     assert stored.tolist() == [0, 0, 0, 0, 65535, 0]
