@@ -85,7 +85,7 @@ class GlRenderer:
         self.device = device()
         self._owned: list[Any] = []
         self._arrays: dict[tuple[str, ...], Any] = {}
-        self._targets: dict[tuple[int, int, bool, int], Any] = {}
+        self._targets: dict[tuple[int, int, bool], Any] = {}
         textured, flat, layers = chunks(scene)
         self._sets = [
             (tags, kind, self._own(self._gl.buffer(kind.vertices.tobytes())))
@@ -111,7 +111,8 @@ class GlRenderer:
         opaque = np.concatenate([layers, np.full((n, height, width, 1), 255, dtype=np.uint8)], axis=3)
         texture = self._own(self._gl.texture_array((width, height, n), 4, opaque.tobytes()))
         texture.build_mipmaps()
-        texture.filter = (self._gl.NEAREST_MIPMAP_LINEAR, self._gl.NEAREST)
+        # The nearest size alone: a texture fades into its mean before two sizes of it look different.
+        texture.filter = (self._gl.NEAREST_MIPMAP_NEAREST, self._gl.NEAREST)
         return texture
 
     def _shadow_map(self) -> Any:
@@ -160,11 +161,13 @@ class GlRenderer:
                 found = kind.seen(clips[views], eye, camera.width, camera.height)
                 for v, indices in zip(views, found, strict=True):
                     seen[v].append(indices)
-        # All are drawn before the first is read, which waits for what draws.
-        targets = [self._target(camera.width, camera.height, instances, v) for v in range(len(poses))]
-        for target, clip, pose, chosen in zip(targets, clips, poses, seen, strict=True):
+        # One target for all: what a view leaves in the processor's cache serves the next.
+        target = self._target(camera.width, camera.height, instances)
+        pictures = []
+        for clip, pose, chosen in zip(clips, poses, seen, strict=True):
             self._draw(target, camera, clip, pose, chosen, instances)
-        return [_read(target, camera, instances) for target in targets]
+            pictures.append(_read(target, camera, instances))
+        return pictures
 
     def _draw(
         self, target: Any, camera: Camera, clip: Floats, pose: Floats, seen: list[NDArray[np.uint32]], instances: bool
@@ -202,8 +205,8 @@ class GlRenderer:
             self._arrays[tags] = self._own(self._gl.vertex_array(program, content, index_buffer=indices))
         return self._arrays[tags]
 
-    def _target(self, width: int, height: int, instances: bool, view: int) -> Any:
-        key = (width, height, instances, view)
+    def _target(self, width: int, height: int, instances: bool) -> Any:
+        key = (width, height, instances)
         if key not in self._targets:
             gl, size = self._gl, (width, height)
             colours = [gl.renderbuffer(size, 4), gl.renderbuffer(size, 1, dtype="f4")]
