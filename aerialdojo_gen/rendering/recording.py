@@ -21,8 +21,8 @@ from aerialdojo_gen.rendering.checks import Solid, ViewChecks
 from aerialdojo_gen.rendering.codecs import PngWriter, VideoWriter, to_stored
 from aerialdojo_gen.rendering.picture import Picture
 from aerialdojo_gen.rendering.placement import TILED, Place, columns, modalities, places, tiled
-from aerialdojo_gen.rendering.reader import Video
 from aerialdojo_gen.rendering.trajectory import FramePoses, by_steps, by_time
+from aerialdojo_gen.rendering.video import Video
 
 Floats = NDArray[np.float64]
 
@@ -101,7 +101,11 @@ def _writers(
     comments = {view: camera_comment(camera, view, config) for view in views}
     own = [place for place in places(config) if place.view in comments]
     if config.layout == "files":
-        writers = [(place, stack.enter_context(_writer(folder, place, comments, config))) for place in own]
+        writers: list[tuple[Place, VideoWriter | PngWriter]] = []
+        for place in own:
+            writer = _writer(folder, place, comments, config)
+            stack.enter_context(writer)
+            writers.append((place, writer))
 
         def write(pictures: dict[str, Picture]) -> None:
             stored = {view: _stored(picture, config) for view, picture in pictures.items()}

@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 
 from aerialdojo_gen.errors import RenderError
 from aerialdojo_gen.rendering.codecs import MAX_DEPTH_M, VideoWriter, to_metres, to_stored
-from aerialdojo_gen.rendering.reader import Video, read_recording
+from aerialdojo_gen.rendering.reader import read_recording
+from aerialdojo_gen.rendering.video import Video
 
 N, H, W = 40, 96, 128
 
