@@ -200,7 +200,8 @@ def picture_flags(picture: Picture) -> set[str]:
         Of ``black``, ``uniform``, ``depth_invalid``, and ``camera_inside`` where the camera touches a surface.
     """
     flags = set()
-    dark, widest, nearest = _measure(picture.rgb, picture.depth_m)
+    dark, widest = _darkness(picture.rgb)
+    nearest = float(np.min(picture.depth_m))
     if dark > _BLACK_SHARE:
         flags.add("black")
     if widest <= _UNIFORM_RANGE:
@@ -213,8 +214,8 @@ def picture_flags(picture: Picture) -> set[str]:
 
 
 @njit(cache=True)
-def _measure(rgb: NDArray[np.uint8], depth_m: NDArray[np.float32]) -> tuple[float, int, float]:
-    """Share of black pixels and widest range of a colour, of every fourth pixel each way; least depth, or NaN."""
+def _darkness(rgb: NDArray[np.uint8]) -> tuple[float, int]:
+    """Share of black pixels and widest range of a colour, of every fourth pixel each way."""
     low, high = np.full(3, 255), np.zeros(3, dtype=np.int64)
     black = pixels = 0
     for row in range(0, rgb.shape[0], 4):
@@ -226,13 +227,7 @@ def _measure(rgb: NDArray[np.uint8], depth_m: NDArray[np.float32]) -> tuple[floa
                 brightest = max(brightest, value)
             black += brightest < _BLACK_LEVEL
             pixels += 1
-    nearest, numbers = np.float32(np.inf), True
-    for row in range(depth_m.shape[0]):
-        for col in range(depth_m.shape[1]):
-            value_m = depth_m[row, col]
-            numbers &= value_m == value_m
-            nearest = value_m if value_m < nearest else nearest
-    return black / pixels, int((high - low).max()), float(nearest) if numbers else np.nan
+    return black / pixels, int((high - low).max())
 
 
 def _equal(one: NDArray[Any], other: NDArray[Any]) -> bool:

@@ -44,8 +44,8 @@ def context() -> Any:
     RenderError
         moderngl or EGL is missing; the message says what to install.
     """
-    # One thread: several processes share the cores, and more threads would only wait for each other.
-    os.environ.setdefault("LP_NUM_THREADS", "1")
+    # No thread of its own: several processes share the cores, and threads would only wait for each other.
+    os.environ.setdefault("LP_NUM_THREADS", "0")
     try:
         moderngl: Any = importlib.import_module("moderngl")
 
