@@ -44,7 +44,7 @@ def render(
         "--limit", min=0, help="Trajectories of each scene and each of its three settings: 2 of 42 scenes are up to "
         "252, of four views each; 0 for all.  (default: the pipeline's)")] = None,
     profile: Annotated[str | None, typer.Option(
-        "--profile", help="full (640 px, a file a view), or training (320 px, depth to 0.25 %, one file a "
+        "--profile", help="full (640 px, a file a view), or training (320 px, depth to 0.4 %, one file a "
         "trajectory).")] = None,
     renderer: Annotated[str | None, typer.Option(
         "--renderer", help="auto (the fastest that works here), gl or pybullet.")] = None,

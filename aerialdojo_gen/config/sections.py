@@ -273,7 +273,7 @@ class SplitConfig(Section):
 PROFILES: dict[str, dict[str, object]] = {
     "full": {},
     "training": {
-        "width": 320, "height": 320, "layout": "tiled", "depth_step": 0.005, "crf": 28, "preset": "veryfast",
+        "width": 320, "height": 320, "layout": "tiled", "depth_step": 0.008, "crf": 28, "preset": "veryfast",
     },
 }  # fmt: skip
 
@@ -282,7 +282,7 @@ class RenderConfig(Section):
     """Recordings along the trajectories (paper: sensors)."""
 
     profile: Literal["full", "training"] = Field(
-        "full", description="training: 320 px, all views in one file, depth to 0.25 %; other keys override it"
+        "full", description="training: 320 px, all views in one file, depth to 0.4 %; other keys override it"
     )
     limit: int = Field(2, ge=0, description="trajectories a scene and setting; 0 for all")
     split: Literal["train", "test", "all", "id_train", "id_test", "ood_train", "ood_test"] = Field(

@@ -22,7 +22,7 @@ from aerialdojo_gen.store.files import size_of
 from aerialdojo_gen.store.root import Where, open_root
 from aerialdojo_gen.store.staging import scratch_folder
 
-_MEASURED_SCENES, _MEASURED_POSES = 3, 12
+_MEASURED_SCENES, _MEASURED_POSES = 6, 12
 
 
 @dataclass(frozen=True)
@@ -106,25 +106,30 @@ def estimate(
     choice = choose_renderer(config.renderer)
     poses = trajectories = 0
     selected: dict[str, str] = {}
+    # Scenes differ threefold: what is measured in one counts as much as the poses that it has of the selection.
+    weight: dict[str, int] = {}
     for scene in scenes:
         keys = [row for table in tables(config, scene) for row in _rows(data, table, scene, ["nav_id", "setting"])]
         mine = choose(keys, config.limit, seed)
         if mine:
             frames = _frames(data, scene, config)
             trajectories += len(mine)
-            poses += sum(frames[nav_id] for nav_id in mine)
+            weight[scene] = sum(frames[nav_id] for nav_id in mine)
+            poses += weight[scene]
             selected[scene] = min(mine, key=lambda i: rng.rank(seed, "estimate", i))
     if not selected:
         raise UsageError("there is nothing to record: no trajectory of these scenes is in the split")
     drawn = sorted(selected, key=lambda scene: rng.rank(seed, "estimate", scene))[:_MEASURED_SCENES]
-    measured = bytes_ = 0
-    seconds = opening = 0.0
+    measured = 0
+    seconds = opening = bytes_ = 0.0
+    share = {scene: weight[scene] / sum(weight[name] for name in drawn) for scene in drawn}
     for scene in drawn:
         every = (row for table in tables(config, scene) for row in _rows(data, table, scene))
         route = next(row for row in every if row["nav_id"] == selected[scene])
         n, cpu, built, size = _measure(data, scene, route, config, choice.name)
-        measured, seconds, opening, bytes_ = measured + n, seconds + cpu, opening + built, bytes_ + size
-    cpu_s = poses * seconds / measured + len(selected) * workers * opening / len(drawn)
+        measured, opening = measured + n, opening + built
+        seconds, bytes_ = seconds + share[scene] * cpu / n, bytes_ + share[scene] * size / n
+    cpu_s = poses * seconds + len(selected) * workers * opening / len(drawn)
     # Kilobytes on Linux, bytes on macOS.
     resident = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (1 if sys.platform == "darwin" else 1024)
     return Estimate(
@@ -133,7 +138,7 @@ def estimate(
         trajectories * len({place.file for place in places(config)}),
         cpu_s,
         cpu_s / workers / machines,
-        poses * bytes_ / measured / machines,
+        poses * bytes_ / machines,
         float(resident * workers),
         workers,
         machines,
