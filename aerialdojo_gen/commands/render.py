@@ -46,6 +46,9 @@ def render(
     limit: Annotated[int | None, typer.Option(
         "--limit", min=0, help="Trajectories of each scene and each of its three settings: 2 of 42 scenes are up to "
         "252, of four views each; 0 for all.  (default: the pipeline's)")] = None,
+    profile: Annotated[str | None, typer.Option(
+        "--profile", help="full (640 px, a file a view), or training (320 px, depth to 0.4 %, one file a "
+        "trajectory).")] = None,
     renderer: Annotated[str | None, typer.Option(
         "--renderer", help="auto (the fastest that works here), gl or pybullet.")] = None,
     sampling: Annotated[str | None, typer.Option(
@@ -71,8 +74,8 @@ def render(
         share_of(shard) if shard else (0, 1), time.time() + duration_s(budget) if budget else None, verify
     )
     overrides: dict[str, object] = {
-        "split": split, "limit": limit, "renderer": renderer, "sampling": sampling, "frames": frames,
-        "instances": instances or None,
+        **profile_keys(profile), "split": split, "limit": limit, "renderer": renderer, "sampling": sampling,
+        "frames": frames, "instances": instances or None,
     }  # fmt: skip
     if estimate:
         _estimate(data, scene, pipeline, workers, limits.share, overrides, as_json)
@@ -84,6 +87,17 @@ def render(
         "render", data=data, scene=chosen, pipeline=pipeline, workers=workers, force=force, quiet=quiet,
         limits=limits, replace=replace, executor=executor, address=address, **overrides,
     )  # fmt: skip
+
+
+def profile_keys(profile: str | None) -> dict[str, object]:
+    """Return what a profile sets: on the command line it goes before the pipeline's own keys."""
+    from aerialdojo_gen.config.sections import PROFILES, RenderConfig
+
+    if profile is None:
+        return {}
+    keys = {key for values in PROFILES.values() for key in values}
+    usual = {key: RenderConfig.model_fields[key].default for key in keys}
+    return usual | PROFILES.get(profile, {}) | {"profile": profile}
 
 
 def _scenes_of(split: str | None, scene: list[str] | None, pipeline: Path | None, data: Where) -> list[str] | None:

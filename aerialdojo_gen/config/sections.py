@@ -284,9 +284,21 @@ class SplitConfig(Section):
     )  # fmt: skip
 
 
+# What a profile of recordings sets where nothing else is said.
+PROFILES: dict[str, dict[str, object]] = {
+    "full": {},
+    "training": {
+        "width": 320, "height": 320, "layout": "tiled", "depth_step": 0.008, "crf": 28, "preset": "veryfast",
+    },
+}  # fmt: skip
+
+
 class RenderConfig(Section):
     """Recordings along the trajectories (paper: sensors)."""
 
+    profile: Literal["full", "training"] = Field(
+        "full", description="training: 320 px, all views in one file, depth to 0.4 %; other keys override it"
+    )
     limit: int = Field(2, ge=0, description="trajectories a scene and setting; 0 for all")
     split: Literal["train", "test", "all", "id_train", "id_test", "ood_train", "ood_test"] = Field(
         "train", description="which tasks are recorded"
@@ -310,4 +322,26 @@ class RenderConfig(Section):
     cruise_m_s: float = Field(3.0, ge=0.01, le=1000, description="speed along the path, for sampling by time")
     yaw_rate_deg_s: float = Field(90.0, ge=0.1, le=36_000, description="speed of turns, for sampling by time")
     crf: int = Field(23, ge=0, le=51, description="quality of the pictures' H.264, lower is better")
+    preset: Literal["ultrafast", "superfast", "veryfast", "faster", "fast", "medium"] = Field(
+        "ultrafast", description="x264's effort: a slower one makes smaller files"
+    )
+    depth_step: float = Field(
+        0.0, ge=0, le=0.1, description="stored depths grow by this share from 0.1 m on; 0 for whole millimetres"
+    )
+    layout: Literal["files", "tiled"] = Field(
+        "files", description="a file a view and modality, or one file a trajectory with the views side by side"
+    )
     trajectories_per_part: int = Field(8, ge=1, le=100_000, description="trajectories that share a shard")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _take_the_profile(cls, given: object) -> object:
+        if not isinstance(given, dict) or not isinstance(given.get("profile", "full"), str):
+            return given
+        return PROFILES.get(given.get("profile", "full"), {}) | given
+
+    @model_validator(mode="after")
+    def _tiles_are_video(self) -> RenderConfig:
+        if self.layout == "tiled" and self.frames == "png":
+            raise ValueError('layout = "tiled" is one video a trajectory: frames = "png" makes loose files')
+        return self

@@ -2,7 +2,7 @@
 
 Flags, in the order of `FLAGS`:
 
-- ``missing``: a file lacks frames, or does not open (found by `aerialdojo_gen.rendering.recording.record_view`)
+- ``missing``: a file lacks frames, or does not open (found by `aerialdojo_gen.rendering.recording.record_views`)
 - ``black``: nearly all of the picture is black
 - ``uniform``: one colour fills the picture
 - ``frozen``: picture and depth equal those of the frame before, though the camera has moved
@@ -14,8 +14,11 @@ Flags, in the order of `FLAGS`:
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import lru_cache
+from typing import Any
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from aerialdojo_gen.geometry.cameras import Camera
@@ -77,7 +80,8 @@ class ViewChecks:
         picture : Picture
         world_from_camera : (4, 4) float64
         """
-        self.flags |= picture_flags(picture)
+        own = picture_flags(picture)
+        self.flags |= own
         wrong, behind = self.against_rays(picture, world_from_camera)
         if wrong > _MISMATCH_SHARE:
             self.flags.add("depth_mismatch")
@@ -88,9 +92,9 @@ class ViewChecks:
             before is not None
             and self._pose is not None
             and _looks_different(self._pose, world_from_camera, picture)
-            and "uniform" not in picture_flags(picture)
-            and np.array_equal(before.rgb, picture.rgb)
-            and np.array_equal(before.depth_m, picture.depth_m)
+            and "uniform" not in own
+            and _equal(before.depth_m, picture.depth_m)
+            and _equal(before.rgb, picture.rgb)
         ):
             self.flags.add("frozen")
         self._picture, self._pose = picture, world_from_camera
@@ -115,11 +119,14 @@ class ViewChecks:
         """
         h, w = picture.depth_m.shape
         n = _SAMPLES_A_SIDE
-        rows, cols = (a.ravel() for a in np.meshgrid(_lattice(h, n), _lattice(w, n), indexing="ij"))
-        depth = picture.depth_m.astype(np.float64)
-        here = depth[rows, cols]
+        rows, cols = _samples(h, w, n)
+        depth = picture.depth_m
+        here = depth[rows, cols].astype(np.float64)
         with np.errstate(divide="ignore", invalid="ignore"):
-            inverse = [1.0 / depth[rows + r, cols + c] for r, c in ((0, 0), (-1, 0), (1, 0), (0, -1), (0, 1))]
+            inverse = [
+                1.0 / depth[rows + r, cols + c].astype(np.float64)
+                for r, c in ((0, 0), (-1, 0), (1, 0), (0, -1), (0, 1))
+            ]
             bend = np.maximum(
                 np.abs(inverse[1] + inverse[2] - 2 * inverse[0]), np.abs(inverse[3] + inverse[4] - 2 * inverse[0])
             )
@@ -193,18 +200,45 @@ def picture_flags(picture: Picture) -> set[str]:
         Of ``black``, ``uniform``, ``depth_invalid``, and ``camera_inside`` where the camera touches a surface.
     """
     flags = set()
-    coarse = picture.rgb[::4, ::4].reshape(-1, 3)
-    if (coarse.max(axis=1) < _BLACK_LEVEL).mean() > _BLACK_SHARE:
+    dark, widest = _darkness(picture.rgb)
+    nearest = float(np.min(picture.depth_m))
+    if dark > _BLACK_SHARE:
         flags.add("black")
-    if int(np.ptp(coarse, axis=0).max()) <= _UNIFORM_RANGE:
+    if widest <= _UNIFORM_RANGE:
         flags.add("uniform")
-    depth = picture.depth_m
-    nearest = float(np.min(depth))
     if np.isnan(nearest) or nearest < 0.99 * NEAR_M:
         flags.add("depth_invalid")
     elif nearest < 1.2 * NEAR_M:
         flags.add("camera_inside")
     return flags
+
+
+@njit(cache=True)
+def _darkness(rgb: NDArray[np.uint8]) -> tuple[float, int]:
+    """Share of black pixels and widest range of a colour, of every fourth pixel each way."""
+    low, high = np.full(3, 255), np.zeros(3, dtype=np.int64)
+    black = pixels = 0
+    for row in range(0, rgb.shape[0], 4):
+        for col in range(0, rgb.shape[1], 4):
+            brightest = 0
+            for c in range(3):
+                value = int(rgb[row, col, c])
+                low[c], high[c] = min(low[c], value), max(high[c], value)
+                brightest = max(brightest, value)
+            black += brightest < _BLACK_LEVEL
+            pixels += 1
+    return black / pixels, int((high - low).max())
+
+
+def _equal(one: NDArray[Any], other: NDArray[Any]) -> bool:
+    """Whether two pictures are equal: some rows first, which hardly ever are."""
+    return bool(np.array_equal(one[::32], other[::32]) and np.array_equal(one, other))
+
+
+@lru_cache
+def _samples(height: int, width: int, a_side: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    rows, cols = np.meshgrid(_lattice(height, a_side), _lattice(width, a_side), indexing="ij")
+    return rows.ravel(), cols.ravel()
 
 
 def _lattice(n: int, k: int) -> NDArray[np.int64]:

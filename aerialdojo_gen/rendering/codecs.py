@@ -1,19 +1,22 @@
 """Writers of the recordings: RGB as H.264 in MP4, depth and instance ids without loss as FFV1 in Matroska; or PNG.
 
-Depth is stored as 16-bit grey: planar depth in whole millimetres, rounded. 0 means that nothing lies within range:
-the sky, or a surface farther than 65.535 m. Instance ids are 16-bit grey too, one more than the instance's number, 0
-where nothing is seen. All writers give the same bytes for the same frames.
+Depth is stored as 16-bit grey: planar depth in whole millimetres, rounded, or in steps of a share of itself. 0 means
+that nothing lies within range: the sky, or a surface farther than 65.535 m. Instance ids are 16-bit grey too, one
+more than the instance's number, 0 where nothing is seen. All writers give the same bytes for the same frames.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from fractions import Fraction
+from functools import lru_cache
 from pathlib import Path
 from types import TracebackType
 from typing import Any
 
 import av
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from aerialdojo_gen.common.pictures import FRAME_PNG, encode_png
@@ -24,83 +27,140 @@ SUFFIX = {"rgb": "mp4", "depth": "mkv", "instance": "mkv"}
 CODEC = {"rgb": RGB_CODEC, "depth": DEPTH_CODEC, "instance": DEPTH_CODEC}
 
 # A short closed GOP without B-frames: a seek decodes 15 frames at most, and lands on the frame asked for.
-_H264 = {"preset": "veryfast", "g": "15", "bf": "0", "flags": "+bitexact+cgop"}
+_H264 = {"g": "15", "bf": "0", "flags": "+bitexact+cgop"}
 # Every frame a key frame; a checksum a slice, so that a damaged file is noticed.
 _FFV1 = {"level": "3", "slices": "4", "slicecrc": "1", "g": "1", "flags": "+bitexact"}
 
 
-def to_millimetres(depth_m: NDArray[np.floating[Any]]) -> NDArray[np.uint16]:
+def to_stored(depth_m: NDArray[np.floating[Any]], step: float = 0.0) -> NDArray[np.uint16]:
     """Depth as it is stored.
 
     Parameters
     ----------
     depth_m : float array
         Planar depth, metres; inf or NaN where nothing is hit.
+    step : float
+        0 for whole millimetres; else by what share a stored depth is more than the one before it, so that what is
+        lost is half of that share, near and far.
 
     Returns
     -------
     uint16 array
-        Millimetres, rounded; 0 where nothing lies within `MAX_DEPTH_M`.
+        Of `stored_depths_m(step)` the nearest; 0 where nothing lies within `MAX_DEPTH_M`.
     """
-    d = np.nan_to_num(np.asarray(depth_m), nan=0.0, posinf=0.0, neginf=0.0)
-    mm = np.rint(d * 1000.0)
-    return np.where((mm >= 0.0) & (mm <= 65535.0), mm, 0.0).astype(np.uint16)
+    depth = np.ascontiguousarray(depth_m)
+    out = np.empty(depth.shape, dtype=np.uint16)
+    _round(depth.reshape(-1), depth.dtype.type(1000.0), out.reshape(-1))
+    return _steps(step)[out] if step else out
 
 
-def to_metres(millimetres: NDArray[np.uint16]) -> NDArray[np.float32]:
+@njit(cache=True)
+def _round(depth_m: NDArray[Any], millimetres_a_metre: Any, out: NDArray[np.uint16]) -> None:
+    for k in range(len(depth_m)):
+        mm = np.rint(depth_m[k] * millimetres_a_metre)
+        # Not so of a NaN either.
+        out[k] = np.uint16(mm) if 0.0 <= mm <= 65535.0 else np.uint16(0)
+
+
+def to_metres(stored: NDArray[np.uint16], step: float = 0.0) -> NDArray[np.float32]:
     """Depth in metres from what is stored, float32; inf where nothing lies within range."""
-    return np.where(millimetres == 0, np.float32(np.inf), millimetres.astype(np.float32) / np.float32(1000.0))
+    if step:
+        return stored_depths_m(step)[stored]
+    return np.where(stored == 0, np.float32(np.inf), stored.astype(np.float32) / np.float32(1000.0))
+
+
+@lru_cache
+def stored_depths_m(step: float) -> NDArray[np.float32]:
+    """List what the stored values of a relative step mean: 0.1 m * (1 + step) ** (value - 1).
+
+    Parameters
+    ----------
+    step : float
+        More than 0.
+
+    Returns
+    -------
+    (65536,) float32
+        Metres; inf for 0.
+    """
+    values = np.arange(1 << 16, dtype=np.float64)
+    with np.errstate(over="ignore"):
+        metres = (0.1 * (1.0 + step) ** (values - 1.0)).astype(np.float32)
+    metres[0] = np.inf
+    return metres
+
+
+@lru_cache
+def _steps(step: float) -> NDArray[np.uint16]:
+    """List the stored values of depths in whole millimetres."""
+    metres = np.maximum(np.arange(1 << 16, dtype=np.float64) / 1000.0, 0.1)
+    values = np.rint(np.log(metres / 0.1) / np.log1p(step)).astype(np.uint16) + np.uint16(1)
+    values[0] = 0
+    return values
 
 
 class VideoWriter:
-    """Write a video frame by frame; a context manager.
+    """Write videos into one file, frame by frame; a context manager.
 
     Parameters
     ----------
     path : Path
         The file; its suffix plays no part.
-    modality : str
-        ``"rgb"`` (frames (H, W, 3) uint8, even H and W), ``"depth"`` (frames (H, W) uint16, millimetres) or
-        ``"instance"`` (frames (H, W) uint16).
+    modalities : sequence of str
+        A stream each, in this order: ``"rgb"`` (frames (H, W, 3) uint8, even H and W), ``"depth"`` or ``"instance"``
+        (frames (H, W) uint16). ``"rgb"`` alone makes an MP4, all else a Matroska file.
     width, height : int
         Pixels.
     fps : float
         Frames a second.
     crf : int
         Quality of H.264, lower is better.
+    preset : str
+        x264's, from ``"ultrafast"`` (larger files) to ``"veryslow"``.
     comment : str
         Stored in the file: what the reader must know of the camera.
     """
 
     def __init__(
-        self, path: Path, modality: str, width: int, height: int, fps: float, crf: int = 23, comment: str = ""
-    ) -> None:
-        rgb = modality == "rgb"
-        self._format = "rgb24" if rgb else "gray16le"
+        self, path: Path, modalities: Sequence[str], width: int, height: int, fps: float, crf: int = 23,
+        preset: str = "ultrafast", comment: str = "",
+    ) -> None:  # fmt: skip
         # Without bitexact the Matroska muxer writes a random id into every file, and both the library's version.
         self._container = av.open(
-            str(path), "w", format="mp4" if rgb else "matroska", options={"fflags": "+bitexact"}
+            str(path),
+            "w",
+            format="mp4" if list(modalities) == ["rgb"] else "matroska",
+            options={"fflags": "+bitexact"},
         )
         if comment:
             self._container.metadata["comment"] = comment
         rate = Fraction(fps).limit_denominator(1000)
-        options = _H264 | {"crf": str(crf)} if rgb else _FFV1
-        self._stream: Any = self._container.add_stream("libx264" if rgb else "ffv1", rate=rate, options=options)
-        self._stream.width, self._stream.height = width, height
-        self._stream.pix_fmt = "yuv420p" if rgb else "gray16le"
-        # Threads would split the rate control and with it the bytes.
-        self._stream.codec_context.thread_count = 1
+        h264 = _H264 | {"crf": str(crf), "preset": preset}
+        self._streams: dict[str, Any] = {}
+        for modality in modalities:
+            rgb = modality == "rgb"
+            stream: Any = self._container.add_stream(
+                "libx264" if rgb else "ffv1", rate=rate, options=h264 if rgb else _FFV1
+            )
+            stream.width, stream.height = width, height
+            stream.pix_fmt = "yuv420p" if rgb else "gray16le"
+            # Threads would split the rate control and with it the bytes.
+            stream.codec_context.thread_count = 1
+            self._streams[modality] = stream
 
-    def write(self, frame: NDArray[np.uint8] | NDArray[np.uint16]) -> None:
-        """Append a frame."""
-        picture = av.VideoFrame.from_ndarray(np.ascontiguousarray(frame), format=self._format)
-        for packet in self._stream.encode(picture):
-            self._container.mux(packet)
+    def write(self, frames: Mapping[str, NDArray[np.uint8] | NDArray[np.uint16]]) -> None:
+        """Append a frame to every stream, by modality."""
+        for modality, stream in self._streams.items():
+            kind = "rgb24" if modality == "rgb" else "gray16le"
+            picture = av.VideoFrame.from_ndarray(np.ascontiguousarray(frames[modality]), format=kind)
+            for packet in stream.encode(picture):
+                self._container.mux(packet)
 
     def close(self) -> None:
         """Write what is left and close the file."""
-        for packet in self._stream.encode():
-            self._container.mux(packet)
+        for stream in self._streams.values():
+            for packet in stream.encode():
+                self._container.mux(packet)
         self._container.close()
 
     def __enter__(self) -> VideoWriter:
@@ -124,18 +184,20 @@ class PngWriter:
     ----------
     folder : Path
         Made here; it must not exist.
+    modality : str
+        ``"rgb"``, ``"depth"`` or ``"instance"``.
     comment : str
         Stored beside the frames, in ``camera.json``.
     """
 
-    def __init__(self, folder: Path, comment: str = "") -> None:
-        self._folder, self._n = folder, 0
+    def __init__(self, folder: Path, modality: str, comment: str = "") -> None:
+        self._folder, self._modality, self._n = folder, modality, 0
         folder.mkdir()
         (folder / "camera.json").write_text(comment or "{}", encoding="utf-8")
 
-    def write(self, frame: NDArray[np.uint8] | NDArray[np.uint16]) -> None:
-        """Append a frame: (H, W, 3) uint8 RGB, or (H, W) uint16."""
-        (self._folder / f"{self._n:06}.png").write_bytes(encode_png(frame, FRAME_PNG))
+    def write(self, frames: Mapping[str, NDArray[np.uint8] | NDArray[np.uint16]]) -> None:
+        """Append the modality's frame: (H, W, 3) uint8 RGB, or (H, W) uint16."""
+        (self._folder / f"{self._n:06}.png").write_bytes(encode_png(frames[self._modality], FRAME_PNG))
         self._n += 1
 
     def __enter__(self) -> PngWriter:

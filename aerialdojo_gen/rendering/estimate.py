@@ -13,8 +13,8 @@ from aerialdojo_gen.config.sections import RenderConfig
 from aerialdojo_gen.errors import UsageError
 from aerialdojo_gen.rendering.backend import choose_renderer, open_renderer
 from aerialdojo_gen.rendering.checks import Solid
-from aerialdojo_gen.rendering.codecs import SUFFIX
-from aerialdojo_gen.rendering.recording import frame_poses, record_view
+from aerialdojo_gen.rendering.placement import places
+from aerialdojo_gen.rendering.recording import frame_poses, record_views
 from aerialdojo_gen.rendering.sample import choose, tables
 from aerialdojo_gen.scenes.stored import read_scene_mesh
 from aerialdojo_gen.store import shards as store
@@ -22,7 +22,7 @@ from aerialdojo_gen.store.files import size_of
 from aerialdojo_gen.store.root import Where, open_root
 from aerialdojo_gen.store.staging import scratch_folder
 
-_MEASURED_SCENES, _MEASURED_POSES = 3, 12
+_MEASURED_SCENES, _MEASURED_POSES = 6, 12
 
 
 @dataclass(frozen=True)
@@ -106,34 +106,39 @@ def estimate(
     choice = choose_renderer(config.renderer)
     poses = trajectories = 0
     selected: dict[str, str] = {}
+    # Scenes differ threefold: what is measured in one counts as much as the poses that it has of the selection.
+    weight: dict[str, int] = {}
     for scene in scenes:
         keys = [row for table in tables(config, scene) for row in _rows(data, table, scene, ["nav_id", "setting"])]
         mine = choose(keys, config.limit, seed)
         if mine:
             frames = _frames(data, scene, config)
             trajectories += len(mine)
-            poses += sum(frames[nav_id] for nav_id in mine)
+            weight[scene] = sum(frames[nav_id] for nav_id in mine)
+            poses += weight[scene]
             selected[scene] = min(mine, key=lambda i: rng.rank(seed, "estimate", i))
     if not selected:
         raise UsageError("there is nothing to record: no trajectory of these scenes is in the split")
     drawn = sorted(selected, key=lambda scene: rng.rank(seed, "estimate", scene))[:_MEASURED_SCENES]
-    measured = bytes_ = 0
-    seconds = opening = 0.0
+    measured = 0
+    seconds = opening = bytes_ = 0.0
+    share = {scene: weight[scene] / sum(weight[name] for name in drawn) for scene in drawn}
     for scene in drawn:
         every = (row for table in tables(config, scene) for row in _rows(data, table, scene))
         route = next(row for row in every if row["nav_id"] == selected[scene])
         n, cpu, built, size = _measure(data, scene, route, config, choice.name)
-        measured, seconds, opening, bytes_ = measured + n, seconds + cpu, opening + built, bytes_ + size
-    cpu_s = poses * seconds / measured + len(selected) * workers * opening / len(drawn)
+        measured, opening = measured + n, opening + built
+        seconds, bytes_ = seconds + share[scene] * cpu / n, bytes_ + share[scene] * size / n
+    cpu_s = poses * seconds + len(selected) * workers * opening / len(drawn)
     # Kilobytes on Linux, bytes on macOS.
     resident = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (1 if sys.platform == "darwin" else 1024)
     return Estimate(
         trajectories,
         poses,
-        trajectories * len(config.views) * (3 if config.instances else 2),
+        trajectories * len({place.file for place in places(config)}),
         cpu_s,
         cpu_s / workers / machines,
-        poses * bytes_ / measured / machines,
+        poses * bytes_ / machines,
         float(resident * workers),
         workers,
         machines,
@@ -173,16 +178,13 @@ def _measure(
     solid = Solid(mesh)
     short = route | {name: route[name][:_MEASURED_POSES] for name in ("x_m", "y_m", "z_m", "yaw_rad", "action")}
     poses = frame_poses(short, config)
-    size = 0
     with open_renderer(mesh, renderer_name) as renderer, scratch_folder() as folder:
         built = time.process_time() - begun
-        modalities = ("rgb", "depth", "instance") if config.instances else ("rgb", "depth")
         begun = time.process_time()
-        for view in config.views:
-            files = {m: folder / f"{view}_{m}.{SUFFIX[m]}" for m in modalities}
-            record_view(renderer, solid, view, poses, config, files)
-            size += sum(size_of(path) for path in files.values())
-        return len(poses.time_s), time.process_time() - begun, built, size
+        record_views(renderer, solid, config.views, poses, config, folder)
+        seconds = time.process_time() - begun
+        size = sum(size_of(folder / file) for file in {place.file for place in places(config)})
+        return len(poses.time_s), seconds, built, size
 
 
 def _hours(seconds: float) -> str:

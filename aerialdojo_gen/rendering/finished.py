@@ -76,8 +76,8 @@ def find(data: DataRoot, folder: str, fingerprint: str, *, verify: bool = False)
     rows = note.get("recordings")
     if not isinstance(rows, list) or not _are_recordings(rows, folder):
         return None
-    whole = all(data.is_whole(row["path"], row["bytes"], row["sha256"] if verify else "", anew=True) for row in rows)
-    return rows if whole else None
+    files = {(row["path"], row["bytes"], row["sha256"] if verify else "") for row in rows}
+    return rows if all(data.is_whole(*file, anew=True) for file in files) else None
 
 
 def _are_recordings(rows: list[Any], folder: str) -> bool:

@@ -7,24 +7,21 @@ pixel's centre, the nearest first, so that what stands behind is rejected by its
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from aerialdojo_gen.geometry.morton import morton_codes
+from aerialdojo_gen.rendering.gl_culling import chunks_in_view, triangles_in_view
 from aerialdojo_gen.scenes.model import Scene
 
 Floats = NDArray[np.float64]
 
 CHUNK_TRIANGLES = 96
 _LARGEST_TEXTURE = 512
-# Corners nearer than this are not projected; and how far OpenGL may round a corner, pixels.
 _MORTON_BITS = 16
-_NEAR_W, _ROUNDING_PX = 0.05, 0.02
 
 # Three vertices a triangle, none shared: normal, colour and instance are those of the face.
 VERTEX = np.dtype(
@@ -54,6 +51,8 @@ class Chunks:
         A chunk's box, metres, world frame.
     planes : (n, 4) float64
         A triangle faces the eye where ``normal . eye + d`` is positive.
+    corners : (n, 9) float32
+        The positions of `vertices`, by themselves: whoever chooses triangles reads nothing else.
     """
 
     vertices: NDArray[np.void]
@@ -61,82 +60,30 @@ class Chunks:
     low: Floats
     high: Floats
     planes: Floats
+    corners: NDArray[np.float32]
 
-    def seen(self, clip_from_world: Floats, eye: Floats, width: int, height: int) -> NDArray[np.uint32]:
-        """Choose what a view draws.
+    def seen(self, clips: Floats, eye: Floats, width: int, height: int) -> list[NDArray[np.uint32]]:
+        """Choose what the views of one eye draw.
 
         Parameters
         ----------
-        clip_from_world : (4, 4) float64
-            OpenGL's matrix of the camera, row-major.
+        clips : (v, 4, 4) float64
+            OpenGL's matrices of the cameras, row-major.
         eye : (3,) float64
-            The camera's centre.
+            The cameras' common centre.
         width, height : int
             Pixels.
 
         Returns
         -------
-        (3 k,) uint32
-            Indices into `vertices`, chunk by chunk, the nearest first.
+        list of (3 k,) uint32
+            A view's indices into `vertices`, chunk by chunk, the nearest first.
         """
-        x, y, z, w = clip_from_world
-        inside = np.ones(len(self.low), dtype=np.bool_)
-        # A point is in view where -w <= x, y <= w and z >= -w in clip coordinates.
-        for side in (w + x, w - x, w + y, w - y, w + z):
-            # The box's corner farthest along the side's normal is the one that would be inside.
-            inside &= np.where(side[:3] > 0.0, self.high, self.low) @ side[:3] + side[3] > 0.0
-        found = np.flatnonzero(inside)
-        away = np.maximum(self.low[found] - eye, 0.0) + np.maximum(eye - self.high[found], 0.0)
-        nearest = found[np.argsort(np.einsum("ij,ij->i", away, away), kind="stable")]
-        return _seen(
-            nearest, self.starts, self.planes, self.vertices["position"], clip_from_world, eye, width, height
+        order, sees = chunks_in_view(self.low, self.high, eye, clips)
+        indices, count = triangles_in_view(
+            order, sees, self.starts, self.planes, self.corners, clips, eye, width, height
         )
-
-
-@njit(cache=True)
-def _seen(
-    order: NDArray[np.int64],
-    starts: NDArray[np.int64],
-    planes: Floats,
-    position: NDArray[np.float32],
-    clip: Floats,
-    eye: Floats,
-    width: int,
-    height: int,
-) -> NDArray[np.uint32]:
-    most = 0
-    for chunk in order:
-        most += starts[chunk + 1] - starts[chunk]
-    out = np.empty(3 * most, dtype=np.uint32)
-    n = 0
-    for chunk in order:
-        for t in range(starts[chunk], starts[chunk + 1]):
-            if planes[t, 0] * eye[0] + planes[t, 1] * eye[1] + planes[t, 2] * eye[2] + planes[t, 3] <= 0.0:
-                continue
-            u0, u1, v0, v1 = np.inf, -np.inf, np.inf, -np.inf
-            behind = 0
-            for k in range(3 * t, 3 * t + 3):
-                x, y, z = position[k, 0], position[k, 1], position[k, 2]
-                w = clip[3, 0] * x + clip[3, 1] * y + clip[3, 2] * z + clip[3, 3]
-                if w < _NEAR_W:
-                    behind += 1
-                    continue
-                u = (clip[0, 0] * x + clip[0, 1] * y + clip[0, 2] * z + clip[0, 3]) / w
-                v = (clip[1, 0] * x + clip[1, 1] * y + clip[1, 2] * z + clip[1, 3]) / w
-                u0, u1, v0, v1 = min(u0, u), max(u1, u), min(v0, v), max(v1, v)
-            if behind == 3:
-                continue
-            if behind == 0:
-                # To pixels, centres at whole numbers; OpenGL rounds corners to 1/256 pixel.
-                left = max(math.ceil((u0 + 1.0) * 0.5 * width - 0.5 - _ROUNDING_PX), 0)
-                right = min(math.floor((u1 + 1.0) * 0.5 * width - 0.5 + _ROUNDING_PX), width - 1)
-                top = max(math.ceil((v0 + 1.0) * 0.5 * height - 0.5 - _ROUNDING_PX), 0)
-                bottom = min(math.floor((v1 + 1.0) * 0.5 * height - 0.5 + _ROUNDING_PX), height - 1)
-                if left > right or top > bottom:
-                    continue
-            out[n], out[n + 1], out[n + 2] = 3 * t, 3 * t + 1, 3 * t + 2
-            n += 3
-    return out[:n]
+        return [row[:n] for row, n in zip(indices, count, strict=True)]
 
 
 def chunks(scene: Scene) -> tuple[Chunks, Chunks, NDArray[np.uint8] | None]:
@@ -182,7 +129,9 @@ def _cut(parts: list[NDArray[np.void]]) -> Chunks:
     triangles = np.concatenate([*parts, np.zeros((0, 3), dtype=VERTEX)])
     if not len(triangles):
         none = np.zeros((0, 3))
-        return Chunks(triangles.ravel(), np.zeros(1, dtype=np.int64), none, none, np.zeros((0, 4)))
+        return Chunks(
+            triangles.ravel(), np.zeros(1, dtype=np.int64), none, none, np.zeros((0, 4)), _positions(triangles)
+        )
     corners = triangles["position"].astype(np.float64)
     low, high = corners.min(axis=1), corners.max(axis=1)
     extent = (high - low).max(axis=1)
@@ -199,7 +148,12 @@ def _cut(parts: list[NDArray[np.void]]) -> Chunks:
         np.minimum.reduceat(low[order], starts),
         np.maximum.reduceat(high[order], starts),
         np.column_stack([normal, offset]),
+        _positions(triangles),
     )
+
+
+def _positions(triangles: NDArray[np.void]) -> NDArray[np.float32]:
+    return np.ascontiguousarray(triangles["position"].reshape(-1, 9), dtype=np.float32)
 
 
 def _layers(scene: Scene, names: list[str]) -> NDArray[np.uint8] | None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from aerialdojo_gen.rendering import shading
 
-_HEAD = "#version 330 core\n"
+_HEAD = "#version 400 core\n"
 
 _VERTEX = (
     _HEAD
@@ -56,7 +56,7 @@ void main() {
 _FRAGMENT = (
     _HEAD
     + """
-uniform sampler2DShadow shadow;
+uniform sampler2D shadow;
 uniform vec3 horizon;
 uniform float focal_px;
 #ifdef TEXTURED
@@ -84,7 +84,12 @@ void main() {
     float keep = clamp((FADE - texels) / (FADE - 1.0), 0.0, 1.0);
     base = mix(base, texture(textures, vec3(v_uv, v_texture.x)).rgb * 255.0, keep);
 #endif
-    float lit = v_light.y * textureProj(shadow, v_sun);
+    // The mean of four comparisons, weighted as a linear filter would.
+    vec3 at = v_sun.xyz / v_sun.w;
+    vec4 lit_by = step(vec4(at.z), textureGather(shadow, at.xy));
+    vec2 share = fract(at.xy * vec2(textureSize(shadow, 0)) - 0.5);
+    vec2 column = mix(lit_by.wx, lit_by.zy, share.x);
+    float lit = v_light.y * mix(column.x, column.y, share.y);
     float haze = 1.0 - exp(range_m * (-1.0 / HAZE_RANGE));
     vec3 value = mix(base * (v_light.x + lit), horizon, haze * haze);
     out_colour = vec4(value / 255.0, 1.0);

@@ -10,129 +10,52 @@ The files are plain ones, for any other reader: `docs/recordings.md` has example
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, overload
 
-import av
 import numpy as np
 from numpy.typing import NDArray
 
 from aerialdojo_gen.common.advice import command
 from aerialdojo_gen.common.bounded import loads_json
-from aerialdojo_gen.common.pictures import decode_as_stored
 from aerialdojo_gen.errors import Malformed, RenderError
 from aerialdojo_gen.rendering.codecs import SUFFIX, to_metres
-
-
-class Video(Sequence[NDArray[Any]]):
-    """The frames of a video file, or of a folder of PNG files; decoded when asked for, in any order.
-
-    Parameters
-    ----------
-    path : str or Path
-        What `aerialdojo_gen.rendering.codecs.VideoWriter` or `PngWriter` wrote.
-
-    Raises
-    ------
-    RenderError
-        The file cannot be read, or is cut off: the message names it.
-    """
-
-    def __init__(self, path: str | Path) -> None:
-        path = Path(path)
-        self.path = path
-        self._frames: Iterator[Any] = iter(())
-        self._next = -1
-        self._files = sorted(path.glob("*.png")) if path.is_dir() else []
-        if path.is_dir():
-            self._open_folder()
-            return
-        try:
-            with av.open(str(path)) as container:
-                stream = container.streams.video[0]
-                # A stream of a codec that FFmpeg does not know has none, and then no format either.
-                if stream.codec_context is None or stream.format is None:
-                    raise RenderError(f"{path} says nothing of its pictures: render it again")
-                self.metadata = {k.lower(): v for k, v in container.metadata.items()}
-                self.fps = float(stream.average_rate or 0)
-                self.width, self.height = stream.width, stream.height
-                self._depth = stream.format.name.startswith("gray16")
-                self._pts = sorted(p.pts for p in container.demux(stream) if p.pts is not None)
-        except (av.FFmpegError, OSError, IndexError, UnicodeDecodeError) as error:
-            raise RenderError(f"{path} is no video that can be read ({error}): render it again") from None
-
-    def _open_folder(self) -> None:
-        """Take what a video's header says from a folder: `fps` is not known there."""
-        camera = self.path / "camera.json"
-        if not self._files or not camera.is_file():
-            raise RenderError(f"{self.path} holds no frames: render it again")
-        # What is not UTF-8 is no JSON either, and `read_recording` says so.
-        self.metadata = {"comment": camera.read_text(encoding="utf-8", errors="surrogateescape")}
-        self.fps = 0.0
-        self._pts = list(range(len(self._files)))
-        self.height, self.width = self._png(0).shape[:2]
-
-    def _png(self, k: int) -> NDArray[Any]:
-        image = decode_as_stored(self._files[k].read_bytes())
-        if image is None:
-            raise RenderError(f"{self._files[k]} is no picture that can be read: render it again")
-        return image
-
-    def __len__(self) -> int:
-        """Return the number of frames."""
-        return len(self._pts)
-
-    @overload
-    def __getitem__(self, k: int) -> NDArray[Any]: ...
-    @overload
-    def __getitem__(self, k: slice) -> list[NDArray[Any]]: ...
-    def __getitem__(self, k: int | slice) -> NDArray[Any] | list[NDArray[Any]]:
-        """Decode frame k: (H, W, 3) uint8 of a picture, (H, W) uint16 millimetres of depth."""
-        if isinstance(k, slice):
-            return [self[i] for i in range(*k.indices(len(self)))]
-        if not -len(self) <= k < len(self):
-            raise IndexError(f"{self.path.name} has {len(self)} frames, not {k}")
-        k %= len(self)
-        if self._files:
-            return self._png(k)
-        if k != self._next:
-            self._frames = self._from(self._pts[k])
-        try:
-            frame = next(self._frames)
-        except (StopIteration, av.FFmpegError) as error:
-            self._next = -1
-            raise RenderError(f"{self.path}: frame {k} does not decode ({error}): render it again") from None
-        self._next = k + 1
-        array = frame.to_ndarray() if self._depth else frame.to_ndarray(format="rgb24")
-        return np.asarray(array)
-
-    def _from(self, pts: int) -> Iterator[Any]:
-        with av.open(str(self.path)) as container:
-            stream = container.streams.video[0]
-            stream.codec_context.thread_count = 1
-            container.seek(pts, stream=stream, backward=True)
-            for frame in container.decode(stream):
-                if frame.pts is not None and frame.pts >= pts:
-                    yield frame
+from aerialdojo_gen.rendering.placement import TILED
+from aerialdojo_gen.rendering.video import Tile, Video
 
 
 class DepthVideo(Sequence[NDArray[np.float32]]):
-    """Depth in metres, over a `Video` of millimetres.
+    """Depth in metres, over a `Video` of what is stored.
 
     Attributes
     ----------
-    millimetres : Video
+    stored : Video
         The stored values, (H, W) uint16; 0 where nothing lies within range.
+    step : float
+        0 where these are millimetres, else the share by which they grow (`codecs.to_stored`).
     """
 
-    def __init__(self, video: Video) -> None:
-        self.millimetres = video
+    def __init__(self, video: Video, step: float = 0.0) -> None:
+        self.stored, self.step = video, step
+
+    @property
+    def millimetres(self) -> Video:
+        """The stored values, where they are millimetres.
+
+        Raises
+        ------
+        RenderError
+            They are not.
+        """
+        if self.step:
+            raise RenderError(f"{self.stored.path} stores no millimetres, but steps of {self.step:g} of the depth")
+        return self.stored
 
     def __len__(self) -> int:
         """Return the number of frames."""
-        return len(self.millimetres)
+        return len(self.stored)
 
     @overload
     def __getitem__(self, k: int) -> NDArray[np.float32]: ...
@@ -141,8 +64,8 @@ class DepthVideo(Sequence[NDArray[np.float32]]):
     def __getitem__(self, k: int | slice) -> NDArray[np.float32] | list[NDArray[np.float32]]:
         """Decode frame k: (H, W) float32, metres; inf where nothing lies within range."""
         if isinstance(k, slice):
-            return [to_metres(frame) for frame in self.millimetres[k]]
-        return to_metres(self.millimetres[k])
+            return [to_metres(frame, self.step) for frame in self.stored[k]]
+        return to_metres(self.stored[k], self.step)
 
 
 @dataclass(frozen=True)
@@ -194,14 +117,76 @@ def read_recording(folder: str | Path) -> Recording:
         There is no recording, a video is missing or damaged, or the videos differ in length.
     """
     folder = Path(folder)
+    if (folder / TILED).is_file():
+        return _tiled(folder / TILED)
     rgb, depth, instance = (_videos(folder, modality) for modality in ("rgb", "depth", "instance"))
     if not rgb or rgb.keys() != depth.keys() or (instance and instance.keys() != rgb.keys()):
         raise RenderError(f"no complete recording in {folder}: run {command('render')}")
     if len({len(v) for v in (*rgb.values(), *depth.values(), *instance.values())}) != 1:
         raise RenderError(f"the videos in {folder} differ in length: render them again")
     cameras = {view: _camera(video) for view, video in rgb.items()}
-    metres = {view: DepthVideo(video) for view, video in depth.items()}
+    metres = {view: DepthVideo(video, _step(_camera(video), video)) for view, video in depth.items()}
     return Recording(rgb, metres, cameras, next(iter(rgb.values())).fps, instance)
+
+
+def open_view(path: str | Path, view: str, modality: str) -> Video:
+    """Open the video of one view, whichever way its file holds it.
+
+    Parameters
+    ----------
+    path : str or Path
+        As a row of `recordings` names it.
+    view, modality : str
+        As that row has them.
+
+    Returns
+    -------
+    Video
+
+    Raises
+    ------
+    RenderError
+        The file cannot be read, or has no such view.
+    """
+    path = Path(path)
+    if path.name != TILED:
+        return Video(path)
+    found = _tiles(path)[0].get(modality, {}).get(view)
+    if found is None:
+        raise RenderError(f"{path} has no {modality} of the view {view}: render it again")
+    return found
+
+
+def _tiles(path: Path) -> tuple[dict[str, dict[str, Video]], dict[str, dict[str, Any]]]:
+    """Open the views of a tiled file, by modality and view, and return their cameras."""
+    first = Video(path)
+    said = _camera(first)
+    cameras, names = said.get("tiles"), said.get("streams")
+    if not (
+        isinstance(cameras, dict) and cameras and all(isinstance(c, dict) for c in cameras.values())
+        and isinstance(names, list) and names[:2] == ["rgb", "depth"] and names[2:] in ([], ["instance"])
+    ):  # fmt: skip
+        raise RenderError(f"{path} does not say which views it holds: render it again")
+    wholes = {name: first if k == 0 else Video(path, k) for k, name in enumerate(names)}
+    if len({len(whole) for whole in wholes.values()}) != 1:
+        raise RenderError(f"the videos in {path} differ in length: render them again")
+    tiles = {name: {view: Tile(whole, camera) for view, camera in cameras.items()} for name, whole in wholes.items()}
+    return {name: dict(views) for name, views in tiles.items()}, cameras
+
+
+def _tiled(path: Path) -> Recording:
+    videos, cameras = _tiles(path)
+    depth = {view: DepthVideo(video, _step(cameras[view], video)) for view, video in videos["depth"].items()}
+    fps = next(iter(videos["rgb"].values())).fps
+    return Recording(videos["rgb"], depth, cameras, fps, videos.get("instance", {}))
+
+
+def _step(camera: dict[str, Any], video: Video) -> float:
+    """Return the step of stored depth; recordings from before there was a choice say nothing: millimetres."""
+    step = camera.get("depth_step", 0.0)
+    if type(step) not in (int, float) or not 0.0 <= step <= 0.1:
+        raise RenderError(f"{video.path}: what it says of its camera has no depth_step from 0 to 0.1")
+    return float(step)
 
 
 def _camera(video: Video) -> dict[str, Any]:

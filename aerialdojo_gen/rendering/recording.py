@@ -1,9 +1,11 @@
-"""Record one view of one trajectory: render, encode, check."""
+"""Record one trajectory: render its views, check them, and encode them while the next ones are drawn."""
 
 from __future__ import annotations
 
 import json
 import math
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
@@ -16,9 +18,11 @@ from aerialdojo_gen.errors import RenderError
 from aerialdojo_gen.geometry.cameras import Camera, view_pose
 from aerialdojo_gen.rendering.backend import Renderer
 from aerialdojo_gen.rendering.checks import Solid, ViewChecks
-from aerialdojo_gen.rendering.codecs import PngWriter, VideoWriter, to_millimetres
-from aerialdojo_gen.rendering.reader import Video
+from aerialdojo_gen.rendering.codecs import PngWriter, VideoWriter, to_stored
+from aerialdojo_gen.rendering.picture import Picture
+from aerialdojo_gen.rendering.placement import TILED, Place, columns, modalities, places, tiled
 from aerialdojo_gen.rendering.trajectory import FramePoses, by_steps, by_time
+from aerialdojo_gen.rendering.video import Video
 
 Floats = NDArray[np.float64]
 
@@ -44,59 +48,110 @@ def frame_poses(route: dict[str, Any], config: RenderConfig) -> FramePoses:
     )  # fmt: skip
 
 
-def record_view(
-    renderer: Renderer, solid: Solid, view: str, poses: FramePoses, config: RenderConfig, files: dict[str, Path]
-) -> set[str]:
-    """Render and encode one view; frames are never held together in memory.
+def record_views(
+    renderer: Renderer, solid: Solid, views: Sequence[str], poses: FramePoses, config: RenderConfig, folder: Path
+) -> dict[str, set[str]]:
+    """Render and encode views of a trajectory; two poses' frames at most are held together in memory.
 
     Parameters
     ----------
     renderer : Renderer
     solid : Solid
         The same scene.
-    view : str
-        One of `aerialdojo_gen.store.schemas.VIEWS`.
+    views : sequence of str
+        Of `aerialdojo_gen.store.schemas.VIEWS`; all of the configuration's where its layout is tiled.
     poses : FramePoses
     config : RenderConfig
-    files : dict of str to Path
-        What to write, by modality: ``rgb``, ``depth``, and ``instance`` where it is wanted. A file each, or with
-        ``frames = "png"`` a folder.
+    folder : Path
+        Where the files of `aerialdojo_gen.rendering.placement.places` are written.
 
     Returns
     -------
-    set of str
-        Quality flags (`aerialdojo_gen.rendering.checks.FLAGS`).
+    dict of str to set of str
+        Quality flags (`aerialdojo_gen.rendering.checks.FLAGS`) by view.
     """
     camera = Camera(config.width, config.height, config.fov_deg)
-    comment = camera_comment(camera, view, config)
-    checks = ViewChecks(camera, solid)
+    checks = {view: ViewChecks(camera, solid) for view in views}
     with ExitStack() as stack:
-        writers: dict[str, VideoWriter | PngWriter] = {}
-        for modality, path in files.items():
-            writers[modality] = _writer(path, modality, config, comment)
-            stack.enter_context(writers[modality])
+        write = _writers(stack, folder, views, camera, config)
+        # One thread: the frames of a video come in their order.
+        encoder = stack.enter_context(ThreadPoolExecutor(1))
+        pending: Future[None] | None = None
         for position, yaw in zip(poses.position, poses.yaw_rad, strict=True):
-            pose = camera_pose(position, float(yaw), view, config)
-            picture = renderer.render(camera, pose, "instance" in writers)
-            checks.add(picture, pose)
-            writers["rgb"].write(picture.rgb)
-            writers["depth"].write(to_millimetres(picture.depth_m))
-            if picture.instance is not None and "instance" in writers:
-                writers["instance"].write((picture.instance + 1).astype(np.uint16))
-    if not all(_complete(path, len(poses.time_s)) for path in files.values()):
-        checks.flags.add("missing")
-    return checks.flags
+            at = [camera_pose(position, float(yaw), view, config) for view in views]
+            pictures = renderer.render_views(camera, at, config.instances)
+            if pending is not None:
+                pending.result()
+            pending = encoder.submit(write, dict(zip(views, pictures, strict=True)))
+            for view, picture, pose in zip(views, pictures, at, strict=True):
+                checks[view].add(picture, pose)
+        if pending is not None:
+            pending.result()
+    flags = {view: check.flags for view, check in checks.items()}
+    for place in places(config):
+        if place.view in flags and not _complete(folder / place.file, place.stream, len(poses.time_s)):
+            flags[place.view].add("missing")
+    return flags
 
 
-def _writer(path: Path, modality: str, config: RenderConfig, comment: str) -> VideoWriter | PngWriter:
+def _writers(
+    stack: ExitStack, folder: Path, views: Sequence[str], camera: Camera, config: RenderConfig
+) -> Callable[[dict[str, Picture]], None]:
+    """Open what is written; returns what encodes the pictures of a pose, by view."""
+    comments = {view: camera_comment(camera, view, config) for view in views}
+    own = [place for place in places(config) if place.view in comments]
+    if config.layout == "files":
+        writers: list[tuple[Place, VideoWriter | PngWriter]] = []
+        for place in own:
+            writer = _writer(folder, place, comments, config)
+            stack.enter_context(writer)
+            writers.append((place, writer))
+
+        def write(pictures: dict[str, Picture]) -> None:
+            stored = {view: _stored(picture, config) for view, picture in pictures.items()}
+            for place, writer in writers:
+                writer.write(stored[place.view])
+
+        return write
+    height = config.height * -(-len(config.views) // columns(config))
+    one = stack.enter_context(
+        VideoWriter(
+            folder / TILED, modalities(config), config.width * columns(config), height, config.fps, config.crf,
+            config.preset, tiles_comment(own, comments),
+        )
+    )  # fmt: skip
+
+    def write_tiles(pictures: dict[str, Picture]) -> None:
+        stored = {view: _stored(picture, config) for view, picture in pictures.items()}
+        one.write(
+            {m: tiled({view: frames[m] for view, frames in stored.items()}, config) for m in modalities(config)}
+        )
+
+    return write_tiles
+
+
+def _writer(folder: Path, place: Place, comments: dict[str, str], config: RenderConfig) -> VideoWriter | PngWriter:
+    path, comment = folder / place.file, comments[place.view]
     if config.frames == "png":
-        return PngWriter(path, comment)
-    return VideoWriter(path, modality, config.width, config.height, config.fps, config.crf, comment)
+        return PngWriter(path, place.modality, comment)
+    return VideoWriter(
+        path, [place.modality], config.width, config.height, config.fps, config.crf, config.preset, comment
+    )
 
 
-def _complete(path: Path, n_frames: int) -> bool:
+def _stored(picture: Picture, config: RenderConfig) -> dict[str, NDArray[np.uint8] | NDArray[np.uint16]]:
+    frames: dict[str, NDArray[np.uint8] | NDArray[np.uint16]] = {
+        "rgb": picture.rgb,
+        "depth": to_stored(picture.depth_m, config.depth_step),
+    }
+    if picture.instance is not None:
+        frames["instance"] = (picture.instance + 1).astype(np.uint16)
+    return frames
+
+
+def _complete(path: Path, stream: int, n_frames: int) -> bool:
     try:
-        return len(Video(path)) == n_frames
+        return len(Video(path, stream)) == n_frames
     except RenderError:
         return False
 
@@ -126,15 +181,33 @@ def camera_pose(position: ArrayLike, yaw_rad: float, view: str, config: RenderCo
 
 def camera_comment(camera: Camera, view: str, config: RenderConfig) -> str:
     """Describe a camera in the words that a recording's files carry: JSON."""
+    factor = 1.0 + config.depth_step
+    depth = f"metres = 0.1 * {factor!r} ** (value - 1)" if config.depth_step else "millimetres"
     return json.dumps(
         {
             "view": view,
+            "width": camera.width,
+            "height": camera.height,
             "K": camera.matrix.round(9).tolist(),
             "body_from_camera": camera_pose((0.0, 0.0, 0.0), 0.0, view, config).tolist(),
             "fov_deg": camera.fov_deg,
             "pixel_centre": "centre of the top-left pixel is (0.5, 0.5)",
             "axes": "camera x right, y down, z forward; body x forward, y left, z up",
-            "depth": "planar, millimetres; 0 = nothing within 65.535 m",
+            "depth": f"planar, {depth}; 0 = nothing within 65.535 m",
+            "depth_step": config.depth_step,
             "instance": "number of the node in the scene's mesh, plus 1; 0 = nothing",
+        }
+    )
+
+
+def tiles_comment(own: Sequence[Place], comments: dict[str, str]) -> str:
+    """Describe the views of a tiled file: JSON, with every view's camera and place, and what the streams are."""
+    return json.dumps(
+        {
+            "tiles": {
+                place.view: {"left_px": place.left_px, "top_px": place.top_px, **json.loads(comments[place.view])}
+                for place in own
+            },
+            "streams": list(dict.fromkeys(place.modality for place in own)),
         }
     )

@@ -95,7 +95,7 @@ def _recorded(task: FoundTask, steps: list[int]) -> list[NDArray[np.uint8]] | No
     path = next((row["path"] for row in rows if (row["view"], row["modality"]) == ("front", "rgb")), None)
     if path is None:
         return None
-    from aerialdojo_gen.rendering.reader import Video
+    from aerialdojo_gen.rendering.reader import open_view
 
     frames = store.read_scene(root, "frames", scene, ["nav_id", "frame", "step"])
     frames = frames.filter(pc.equal(frames["nav_id"], task.nav_id))
@@ -104,7 +104,7 @@ def _recorded(task: FoundTask, steps: list[int]) -> list[NDArray[np.uint8]] | No
         first[step] = min(frame, first.get(step, frame))
     if any(step not in first for step in steps):
         return None
-    video = Video(_copy(root, path))
+    video = open_view(_copy(root, path), "front", "rgb")
     return [
         np.asarray(cv2.resize(video[first[step]], (SIZE_PX, SIZE_PX), interpolation=cv2.INTER_AREA), dtype=np.uint8)
         for step in steps

@@ -24,7 +24,7 @@ from aerialdojo_gen.geometry.rays import RayCaster
 from aerialdojo_gen.layouts.build import build_scene
 from aerialdojo_gen.rendering.backend import choose_renderer, open_renderer
 from aerialdojo_gen.rendering.checks import Solid
-from aerialdojo_gen.rendering.recording import frame_poses, record_view
+from aerialdojo_gen.rendering.recording import frame_poses, record_views
 from aerialdojo_gen.scenes.catalogue import load_catalogue
 from aerialdojo_gen.scenes.model import Scene
 from aerialdojo_gen.store.schemas import VIEWS
@@ -57,9 +57,7 @@ def record(scene: Scene, name: str, n: int) -> tuple[float, float]:
     with open_renderer(scene, name) as renderer, tempfile.TemporaryDirectory() as folder:
         renderer.render(CAMERA, view_pose(poses.position[0], 0.0, "front"))
         begun = time.process_time()
-        for view in VIEWS:
-            files = {"rgb": Path(folder) / f"{view}.mp4", "depth": Path(folder) / f"{view}.mkv"}
-            record_view(renderer, solid, view, poses, config, files)
+        record_views(renderer, solid, VIEWS, poses, config, Path(folder))
         seconds = (time.process_time() - begun) / n
         return seconds, sum(p.stat().st_size for p in Path(folder).iterdir()) / n / 1e3
 

@@ -301,8 +301,8 @@ def test_a_recording_json_of_other_types_is_rendered_again(tmp_path, rows):
 def test_a_recording_is_read_by_its_path_as_text(tmp_path):
     for modality in ("rgb", "depth"):
         shape = (16, 16, 3) if modality == "rgb" else (16, 16)
-        with PngWriter(tmp_path / f"front_{modality}", comment='{"fov_deg": 90.0}') as writer:
-            writer.write(np.full(shape, 7, np.uint8 if modality == "rgb" else np.uint16))
+        with PngWriter(tmp_path / f"front_{modality}", modality, comment='{"fov_deg": 90.0}') as writer:
+            writer.write({modality: np.full(shape, 7, np.uint8 if modality == "rgb" else np.uint16)})
     for path in (tmp_path, str(tmp_path)):
         recording = read_recording(path)
         assert recording.cameras == {"front": {"fov_deg": 90.0}}

@@ -102,15 +102,17 @@ def _recordings() -> list[Case]:
 
     def videos(folder: Path) -> None:
         for modality, suffix in (("rgb", "mp4"), ("depth", "mkv")):
-            with VideoWriter(folder / f"front_{modality}.{suffix}", modality, 16, 16, 15.0, comment=camera) as writer:
+            with VideoWriter(
+                folder / f"front_{modality}.{suffix}", [modality], 16, 16, 15.0, comment=camera
+            ) as writer:
                 for k in range(3):
-                    writer.write(colour + k if modality == "rgb" else colour[..., 0].astype(np.uint16) + k)
+                    writer.write({"rgb": colour + k, "depth": colour[..., 0].astype(np.uint16) + k})
 
     def pictures(folder: Path) -> None:
         for modality in ("rgb", "depth"):
-            with PngWriter(folder / f"front_{modality}", comment=camera) as writer:
+            with PngWriter(folder / f"front_{modality}", modality, comment=camera) as writer:
                 for k in range(2):
-                    writer.write(colour + k if modality == "rgb" else colour[..., 0].astype(np.uint16) + k)
+                    writer.write({"rgb": colour + k, "depth": colour[..., 0].astype(np.uint16) + k})
 
     return [made(videos), made(pictures)]
 

@@ -9,8 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from aerialdojo_gen.errors import RenderError
-from aerialdojo_gen.rendering.codecs import MAX_DEPTH_M, VideoWriter, to_metres, to_millimetres
-from aerialdojo_gen.rendering.reader import Video, read_recording
+from aerialdojo_gen.rendering.codecs import MAX_DEPTH_M, VideoWriter, to_metres, to_stored
+from aerialdojo_gen.rendering.reader import read_recording
+from aerialdojo_gen.rendering.video import Video
 
 N, H, W = 40, 96, 128
 
@@ -29,9 +30,9 @@ def rgb_frames() -> list[np.ndarray]:
 
 
 def write(path, modality, frames, **options):
-    with VideoWriter(path, modality, W, H, 15.0, **options) as writer:
+    with VideoWriter(path, [modality], W, H, 15.0, **options) as writer:
         for frame in frames:
-            writer.write(frame)
+            writer.write({modality: frame})
     return path
 
 
@@ -81,11 +82,27 @@ def test_opencv_reads_depth_with_conversion_off(tmp_path):
 
 @given(st.floats(0.001, MAX_DEPTH_M))
 def test_depth_in_millimetres_is_within_half_of_one(depth):
-    assert to_metres(to_millimetres(np.array([depth])))[0] == pytest.approx(depth, abs=5.1e-4)
+    assert to_metres(to_stored(np.array([depth])))[0] == pytest.approx(depth, abs=5.1e-4)
+
+
+@given(st.floats(0.1, MAX_DEPTH_M), st.sampled_from([0.001, 0.005, 0.1]))
+def test_depth_in_steps_is_within_half_of_one(depth, step):
+    """Half a step, and half a millimetre, and what float32 loses."""
+    stored = to_stored(np.array([depth], dtype=np.float32), step)
+    assert stored[0] > 0
+    assert to_metres(stored, step)[0] == pytest.approx(depth, rel=0.51 * step, abs=5.1e-4)
+
+
+def test_steps_keep_nothing_within_range_and_the_order_of_depths():
+    depth = np.array([np.inf, np.nan, -1.0, 65.6, 0.1, 0.2, 1.0, 65.535])
+    stored = to_stored(depth, 0.005)
+    assert stored[:4].tolist() == [0, 0, 0, 0]
+    assert (np.diff(stored[4:].astype(int)) > 0).all()
+    assert np.isinf(to_metres(stored, 0.005)).tolist() == [True] * 4 + [False] * 4
 
 
 def test_nothing_within_range_is_zero_and_comes_back_as_infinity():
-    stored = to_millimetres(np.array([np.inf, np.nan, -1.0, 65.5356, 65.535, 1e9]))
+    stored = to_stored(np.array([np.inf, np.nan, -1.0, 65.5356, 65.535, 1e9]))
     assert stored.tolist() == [0, 0, 0, 0, 65535, 0]
     assert np.isinf(to_metres(stored)).tolist() == [True, True, True, True, False, True]
 

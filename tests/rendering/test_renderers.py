@@ -167,6 +167,18 @@ def test_a_renderer_made_anew_draws_the_same_bytes(scene, opened, name):
 
 
 @every_renderer
+def test_views_drawn_together_are_what_each_is_by_itself(opened, name):
+    """Four views of one eye, and a fifth of another."""
+    poses = [*(view_pose((1, 1, 3), 2.0, view) for view in VIEWS), view_pose((-1, 2, 2.5), 0.3, "front")]
+    together = opened(name).render_views(CAMERA, poses, instances=True)
+    assert len(together) == len(poses)
+    for picture, pose in zip(together, poses, strict=True):
+        alone = opened(name).render(CAMERA, pose, instances=True)
+        for array in ("rgb", "depth_m", "instance"):
+            assert np.array_equal(getattr(picture, array), getattr(alone, array))
+
+
+@every_renderer
 def test_a_picture_s_arrays_are_its_own(opened, name):
     pose = view_pose((1, 1, 3), 2.0, "front")
     first = opened(name).render(CAMERA, pose)

@@ -153,14 +153,14 @@ def test_a_damaged_recording_is_made_again(tmp_path, fault):
 def test_a_flagged_view_is_rendered_once_again_and_a_fault_that_passes_leaves_no_flag(tmp_path, monkeypatch):
     write_inputs(tmp_path)
     calls = []
-    view = recording.record_view
+    record = recording.record_views
 
-    def faulty(renderer, solid, name, poses, config, files):
-        flags = view(renderer, solid, name, poses, config, files)
-        calls.append(name)
-        return flags | {"frozen"} if calls.count(name) <= faults else flags
+    def faulty(renderer, solid, views, poses, config, folder):
+        flags = record(renderer, solid, views, poses, config, folder)
+        calls.extend(views)
+        return {view: own | {"frozen"} if calls.count(view) <= faults else own for view, own in flags.items()}
 
-    monkeypatch.setattr(render, "record_view", faulty)
+    monkeypatch.setattr(render, "record_views", faulty)
     monkeypatch.setattr(render, "choose", lambda *_: ["nav_a"])
     only = CONFIG.model_copy(update={"views": ("front",)})
     for times, expected in ((1, 0), (10**6, 1)):
@@ -178,10 +178,10 @@ def test_a_video_that_lacks_a_frame_is_flagged_missing(tmp_path, monkeypatch):
     write = recording.VideoWriter.write
     n = []
 
-    def forgetful(self, frame):
+    def forgetful(self, frames):
         n.append(0)
         if len(n) % 5:
-            write(self, frame)
+            write(self, frames)
 
     monkeypatch.setattr(recording.VideoWriter, "write", forgetful)
     monkeypatch.setattr(render, "choose", lambda *_: ["nav_a"])

@@ -14,8 +14,9 @@ from aerialdojo_gen.pipeline.stage import Job, Output
 from aerialdojo_gen.rendering import finished
 from aerialdojo_gen.rendering.backend import kept_renderer
 from aerialdojo_gen.rendering.checks import CONCERNS, FLAGS, kept_solid
-from aerialdojo_gen.rendering.codecs import CODEC, SUFFIX
-from aerialdojo_gen.rendering.recording import frame_poses, record_view
+from aerialdojo_gen.rendering.codecs import CODEC
+from aerialdojo_gen.rendering.placement import places
+from aerialdojo_gen.rendering.recording import frame_poses, record_views
 from aerialdojo_gen.rendering.sample import choose, tables
 from aerialdojo_gen.rendering.trajectory import FramePoses
 from aerialdojo_gen.scenes.model import Scene
@@ -32,7 +33,7 @@ def run(job: Job, config: RenderConfig) -> Output:
     Parameters
     ----------
     job : Job
-        Reads ``routes/train`` or ``routes/test``; writes ``media/<scene>/<nav_id>/<view>_<modality>``. A trajectory
+        Reads ``routes/train`` or ``routes/test``; writes into ``media/<scene>/<nav_id>``. A trajectory
         that lies there finished is not recorded again.
     config : RenderConfig
 
@@ -60,7 +61,7 @@ def run(job: Job, config: RenderConfig) -> Output:
             if job.deadline is not None and time.time() >= job.deadline:
                 raise BudgetSpent(f"the budget was spent in {job.scene}")
             rows = _Trajectory(job.scene_model(), nav_id, poses, config).record(job.roots.data, folder, fingerprint)
-        job.files.extend([f"{folder}/{finished.NOTE}", *(row["path"] for row in rows)])
+        job.files.extend([f"{folder}/{finished.NOTE}", *dict.fromkeys(row["path"] for row in rows)])
         recordings += rows
         frames += _frame_rows(job.scene, nav_id, poses)
     counts = Counter(flag for row in recordings for flag in row["flags"])
@@ -82,46 +83,57 @@ class _Trajectory:
     def record(self, data: DataRoot, folder: str, fingerprint: str) -> list[dict[str, Any]]:
         """Record all views into a folder that appears when it is whole; returns the rows of `recordings`."""
         with data.commit_folder(folder) as here:
-            rows = [row for view in self.config.views for row in self._view(view, here, folder)]
+            rows = self._rows(here, folder, self._views(here))
             finished.note(here, fingerprint, rows)
         return rows
 
-    def _view(self, view: str, here: Path, folder: str) -> list[dict[str, Any]]:
+    def _views(self, here: Path) -> dict[str, set[str]]:
+        """Record the views into a folder; returns their quality flags."""
         config = self.config
         renderer, solid = kept_renderer(self.scene, config.renderer), kept_solid(self.scene)
-        modalities = ("rgb", "depth", "instance") if config.instances else ("rgb", "depth")
-        png = config.frames == "png"
-        names = {m: f"{view}_{m}" if png else f"{view}_{m}.{SUFFIX[m]}" for m in modalities}
-        files = {m: here / name for m, name in names.items()}
-        flags = record_view(renderer, solid, view, self.poses, config, files)
-        if flags:
-            # A renderer that has gone wrong may be right when it is built anew; what stays is the view's own fault.
-            for file in files.values():
-                remove(file)
-            renderer = kept_renderer(self.scene, config.renderer, anew=True)
-            flags = record_view(renderer, solid, view, self.poses, config, files)
+        flags = record_views(renderer, solid, config.views, self.poses, config, here)
+        wrong = [view for view in config.views if flags[view]]
+        if not wrong:
+            return flags
+        # A renderer that has gone wrong may be right when it is built anew; what stays is the view's own fault.
+        if config.layout == "tiled":
+            wrong = list(config.views)
+        for file in {place.file for place in places(config) if place.view in wrong}:
+            remove(here / file)
+        renderer = kept_renderer(self.scene, config.renderer, anew=True)
+        return flags | record_views(renderer, solid, wrong, self.poses, config, here)
+
+    def _rows(self, here: Path, folder: str, flags: dict[str, set[str]]) -> list[dict[str, Any]]:
+        config = self.config
+        renderer = kept_renderer(self.scene, config.renderer)
+        own = places(config)
+        facts = {file: (size_of(here / file), sha256_of(here / file)) for file in {place.file for place in own}}
         return [
             {
                 "scene": self.scene.name,
                 "nav_id": self.nav_id,
-                "view": view,
-                "modality": m,
-                "path": f"{folder}/{names[m]}",
+                "view": place.view,
+                "modality": place.modality,
+                "path": f"{folder}/{place.file}",
+                "stream": place.stream,
+                "left_px": place.left_px,
+                "top_px": place.top_px,
                 "sampling": config.sampling,
                 "n_frames": len(self.poses.time_s),
                 "fps": config.fps,
                 "width": config.width,
                 "height": config.height,
                 "fov_deg": config.fov_deg,
-                "codec": "png" if png else CODEC[m],
+                "depth_step": config.depth_step if place.modality == "depth" else None,
+                "codec": "png" if config.frames == "png" else CODEC[place.modality],
                 "renderer": renderer.name,
                 "device": renderer.device,
-                "bytes": size_of(file),
-                "sha256": sha256_of(file),
-                "ok": not flags & CONCERNS[m],
-                "flags": [flag for flag in FLAGS if flag in flags & CONCERNS[m]],
+                "bytes": facts[place.file][0],
+                "sha256": facts[place.file][1],
+                "ok": not flags[place.view] & CONCERNS[place.modality],
+                "flags": [flag for flag in FLAGS if flag in flags[place.view] & CONCERNS[place.modality]],
             }
-            for m, file in files.items()
+            for place in own
         ]
 
 

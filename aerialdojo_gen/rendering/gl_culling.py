@@ -1,0 +1,148 @@
+"""Which triangles the views of one place draw: those that face the eye, lie in the picture and hold a pixel's centre.
+
+The views of a pose share their eye, and with it the order of the chunks, the side that a triangle shows, and the
+triangles that are loaded at all: what is found out once serves all four.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+# Corners nearer than this are not projected; and how far OpenGL may round a corner, pixels.
+_NEAR_W, _ROUNDING_PX = 0.05, 0.02
+
+
+def chunks_in_view(
+    low: Floats, high: Floats, eye: Floats, clips: Floats
+) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+    """Choose the chunks whose boxes one view at least may see.
+
+    Parameters
+    ----------
+    low, high : (k, 3) float64
+        The chunks' boxes, metres, world frame.
+    eye : (3,) float64
+    clips : (v, 4, 4) float64
+        OpenGL's matrices of the views, row-major.
+
+    Returns
+    -------
+    order : (m,) int64
+        Indices, the nearest first.
+    sees : (m, v) bool
+        Which views may see each of them.
+    """
+    sees = _boxes_in_view(low, high, clips)
+    found = np.flatnonzero(sees.any(axis=1))
+    away = np.maximum(low[found] - eye, 0.0) + np.maximum(eye - high[found], 0.0)
+    order = found[np.argsort(np.einsum("ij,ij->i", away, away), kind="stable")]
+    return order, sees[order]
+
+
+@njit(cache=True)
+def _boxes_in_view(low: Floats, high: Floats, clips: Floats) -> NDArray[np.bool_]:
+    out = np.ones((len(low), len(clips)), dtype=np.bool_)
+    for v in range(len(clips)):
+        w = clips[v, 3]
+        # A point is in view where -w <= x, y <= w and z >= -w in clip coordinates.
+        for row, sign in ((0, 1.0), (0, -1.0), (1, 1.0), (1, -1.0), (2, 1.0)):
+            a, b, c, d = w + sign * clips[v, row]
+            for k in range(len(low)):
+                # The box's corner farthest along the side's normal is the one that would be inside.
+                reach = a * (high[k, 0] if a > 0.0 else low[k, 0]) + b * (high[k, 1] if b > 0.0 else low[k, 1])
+                out[k, v] &= reach + c * (high[k, 2] if c > 0.0 else low[k, 2]) + d > 0.0
+    return out
+
+
+@njit(cache=True, fastmath={"contract", "arcp", "nsz"})
+def triangles_in_view(
+    order: NDArray[np.int64],
+    sees: NDArray[np.bool_],
+    starts: NDArray[np.int64],
+    planes: Floats,
+    corners: NDArray[np.float32],
+    clips: Floats,
+    eye: Floats,
+    width: int,
+    height: int,
+) -> tuple[NDArray[np.uint32], NDArray[np.int64]]:
+    """Choose the triangles of every view.
+
+    Parameters
+    ----------
+    order, sees
+        Of `chunks_in_view`.
+    starts : (k + 1,) int64
+        First triangle of every chunk.
+    planes : (n, 4) float64
+        A triangle faces the eye where ``normal . eye + d`` is positive.
+    corners : (n, 9) float32
+        Metres, world frame.
+    clips : (v, 4, 4) float64
+    eye : (3,) float64
+        The views' common one.
+    width, height : int
+        Pixels.
+
+    Returns
+    -------
+    indices : (v, 3 most) uint32
+        Three vertices a triangle, in the order of the chunks.
+    count : (v,) int64
+        How many of a view's indices count.
+    """
+    views = len(clips)
+    most = 0
+    for chunk in order:
+        most += starts[chunk + 1] - starts[chunk]
+    out = np.empty((views, 3 * most), dtype=np.uint32)
+    count = np.zeros(views, dtype=np.int64)
+    half_w, half_h = 0.5 * width, 0.5 * height
+    for c in range(len(order)):
+        for t in range(starts[order[c]], starts[order[c] + 1]):
+            if planes[t, 0] * eye[0] + planes[t, 1] * eye[1] + planes[t, 2] * eye[2] + planes[t, 3] <= 0.0:
+                continue
+            ax, ay, az = corners[t, 0] - eye[0], corners[t, 1] - eye[1], corners[t, 2] - eye[2]
+            bx, by, bz = corners[t, 3] - eye[0], corners[t, 4] - eye[1], corners[t, 5] - eye[2]
+            cx, cy, cz = corners[t, 6] - eye[0], corners[t, 7] - eye[1], corners[t, 8] - eye[2]
+            for v in range(views):
+                if not sees[c, v]:
+                    continue
+                # Seen from the eye, x, y and w have no constant part.
+                m0, m1, m2 = clips[v, 3, 0], clips[v, 3, 1], clips[v, 3, 2]
+                aw, bw, cw = m0 * ax + m1 * ay + m2 * az, m0 * bx + m1 * by + m2 * bz, m0 * cx + m1 * cy + m2 * cz
+                if aw < _NEAR_W and bw < _NEAR_W and cw < _NEAR_W:
+                    continue
+                m0, m1, m2 = clips[v, 0, 0], clips[v, 0, 1], clips[v, 0, 2]
+                au, bu, cu = m0 * ax + m1 * ay + m2 * az, m0 * bx + m1 * by + m2 * bz, m0 * cx + m1 * cy + m2 * cz
+                if (au > aw and bu > bw and cu > cw) or (au < -aw and bu < -bw and cu < -cw):
+                    continue
+                m0, m1, m2 = clips[v, 1, 0], clips[v, 1, 1], clips[v, 1, 2]
+                av, bv, cv = m0 * ax + m1 * ay + m2 * az, m0 * bx + m1 * by + m2 * bz, m0 * cx + m1 * cy + m2 * cz
+                if (av > aw and bv > bw and cv > cw) or (av < -aw and bv < -bw and cv < -cw):
+                    continue
+                if aw >= _NEAR_W and bw >= _NEAR_W and cw >= _NEAR_W:
+                    aw, bw, cw = 1.0 / aw, 1.0 / bw, 1.0 / cw
+                    if _between_centres(au * aw, bu * bw, cu * cw, half_w):
+                        continue
+                    if _between_centres(av * aw, bv * bw, cv * cw, half_h):
+                        continue
+                n = count[v]
+                out[v, n], out[v, n + 1], out[v, n + 2] = 3 * t, 3 * t + 1, 3 * t + 2
+                count[v] = n + 3
+    return out, count
+
+
+@njit(cache=True, inline="always")
+def _between_centres(a: float, b: float, c: float, half: float) -> bool:
+    """Whether three places across the picture, from -1 to 1, have no pixel's centre between them."""
+    # To pixels, centres at whole numbers; OpenGL rounds corners to 1/256 pixel.
+    first = (min(a, b, c) + 1.0) * half - 0.5 - _ROUNDING_PX
+    last = (max(a, b, c) + 1.0) * half - 0.5 + _ROUNDING_PX
+    return math.ceil(first) > math.floor(last)

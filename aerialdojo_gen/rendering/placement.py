@@ -1,0 +1,102 @@
+"""Which files a recording has, and where in them a view's pictures lie: a file each, or all tiled in one."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aerialdojo_gen.config.sections import RenderConfig
+from aerialdojo_gen.rendering.codecs import SUFFIX
+
+# The one file of a tiled recording.
+TILED = "views.mkv"
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where the pictures of one view and modality lie.
+
+    Attributes
+    ----------
+    view, modality : str
+    file : str
+        Name of the file, or of a folder of PNG files.
+    stream : int
+        Which of the file's videos.
+    left_px, top_px : int
+        The picture's top-left pixel in the video's frame.
+    """
+
+    view: str
+    modality: str
+    file: str
+    stream: int = 0
+    left_px: int = 0
+    top_px: int = 0
+
+
+def modalities(config: RenderConfig) -> tuple[str, ...]:
+    """Return what is recorded of every view: pictures, depth, and instance ids where they are asked for."""
+    return ("rgb", "depth", "instance") if config.instances else ("rgb", "depth")
+
+
+def places(config: RenderConfig) -> list[Place]:
+    """List what a recording consists of, view by view.
+
+    Parameters
+    ----------
+    config : RenderConfig
+
+    Returns
+    -------
+    list of Place
+        In the order of the views, and of `modalities`.
+    """
+    return [
+        _place(config, k, view, n, modality)
+        for k, view in enumerate(config.views)
+        for n, modality in enumerate(modalities(config))
+    ]
+
+
+def _place(config: RenderConfig, k: int, view: str, stream: int, modality: str) -> Place:
+    if config.layout == "tiled":
+        row, column = divmod(k, columns(config))
+        return Place(view, modality, TILED, stream, column * config.width, row * config.height)
+    name = f"{view}_{modality}"
+    return Place(view, modality, name if config.frames == "png" else f"{name}.{SUFFIX[modality]}")
+
+
+def columns(config: RenderConfig) -> int:
+    """Count the tiles side by side: two of four views."""
+    return math.ceil(math.sqrt(len(config.views)))
+
+
+def tiled(pictures: Mapping[str, NDArray[Any]], config: RenderConfig) -> NDArray[Any]:
+    """Lay the views' pictures side by side.
+
+    Parameters
+    ----------
+    pictures : mapping of str to (H, W, ...) array
+        By view; all of the configuration's.
+    config : RenderConfig
+
+    Returns
+    -------
+    array
+        Of `columns` tiles a row; zeros where there is no view.
+    """
+    across = columns(config)
+    down = -(-len(config.views) // across)
+    first = pictures[config.views[0]]
+    out = np.zeros((down * config.height, across * config.width, *first.shape[2:]), dtype=first.dtype)
+    for k, view in enumerate(config.views):
+        row, column = divmod(k, across)
+        top, left = row * config.height, column * config.width
+        out[top : top + config.height, left : left + config.width] = pictures[view]
+    return out
