@@ -173,7 +173,7 @@ def _push(
 
 
 @njit(cache=True)
-def _move_lengths(cell: float) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+def move_lengths(cell: float) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Lengths of the moves, and what the narrowness of the cell that they lead from is multiplied with; metres."""
     lengths = (np.rint(MOVE_LENGTHS * cell / _QUANTUM_M) * _QUANTUM_M).astype(np.float32)
     return lengths, (np.rint(MOVE_LENGTHS * cell / _COARSE_M) * _COARSE_M).astype(np.float32)
@@ -219,7 +219,7 @@ def expand_cost(
         Number of visits.
     """
     nx, ny, nz = cost.shape
-    lengths, coarse = _move_lengths(cell)
+    lengths, coarse = move_lengths(cell)
     limit = np.float32(bound)
     waiting, departed = np.zeros((nx, ny), np.bool_), np.empty((len(_KINDS), nz), np.float32)
     left, visits = 0, 0
@@ -290,7 +290,7 @@ def extra_cost(
         Metres; 0 where the goal is not reached.
     """
     nx, ny, nz = cost.shape
-    lengths, coarse = _move_lengths(grid.cell)
+    lengths, coarse = move_lengths(grid.cell)
     ci = math.floor((x - grid.origin[0]) / grid.cell - 0.5)
     cj = math.floor((y - grid.origin[1]) / grid.cell - 0.5)
     ck = math.floor((z - grid.origin[2]) / grid.cell - 0.5)
