@@ -58,7 +58,9 @@ def grid_metric(dx: float, dy: float, dz: float) -> float:
     """Length of a displacement in the grid's 16 directions and the vertical; in the displacement's unit."""
     a, b = abs(dx), abs(dy)
     high, low = max(a, b), min(a, b)
-    flat = high - 2.0 * low + _SQRT5 * low if 2.0 * low <= high else _SQRT5 * (high - low) + _SQRT2 * (2.0 * low - high)
+    flat = (
+        high - 2.0 * low + _SQRT5 * low if 2.0 * low <= high else _SQRT5 * (high - low) + _SQRT2 * (2.0 * low - high)
+    )
     return flat + abs(dz)
 
 
@@ -101,7 +103,11 @@ def short_path_cost(
     lengths, coarse = move_lengths(edge)
     n_moves = MOVES.shape[0]
     steps = MOVES[:, 0] * (ny * nz) + MOVES[:, 1] * nz + MOVES[:, 2]
-    fx, fy, fz = (x - grid.origin[0]) / edge - 0.5, (y - grid.origin[1]) / edge - 0.5, (z - grid.origin[2]) / edge - 0.5
+    fx, fy, fz = (
+        (x - grid.origin[0]) / edge - 0.5,
+        (y - grid.origin[1]) / edge - 0.5,
+        (z - grid.origin[2]) / edge - 0.5,
+    )
     # The cells that the start's cost-to-go is interpolated between, as in `cost_between`.
     i0 = max(0, min(int(max(fx, 0.0)), nx - 2))
     j0 = max(0, min(int(max(fy, 0.0)), ny - 2))

@@ -126,16 +126,17 @@ class Planner:
         target, begins = _poses(goal, starts)
         return [
             self._search(s, target, route.cost_to_go_m, self._cost, self.config.ladder)
-            if route.outcome == "NOT_NEEDED" else route
+            if route.outcome == "NOT_NEEDED"
+            else route
             for s, route in zip(begins, self.foresee(target, begins), strict=True)
         ]
 
     def plan_one(self, goal: ArrayLike, start: ArrayLike) -> Route:
         """Plan from one start to a goal: the route of `plan_target`, sooner where the goal has no other starts.
 
-        The goal's cost-to-go is found where the search looks at it (`aerialdojo_gen.planning.query_field`). Where that
-        is not enough to be sure of the same route, `plan_target` is asked. What `cost_to_go` knows does not change
-        where it was not.
+        The goal's cost-to-go is found where the search looks at it alone (`aerialdojo_gen.planning.query_field`).
+        Where that is not enough to be sure of the same route, `plan_target` is asked. `cost_to_go` still tells that
+        of the goal that `plan_target` or `foresee` was asked for last.
 
         Parameters
         ----------

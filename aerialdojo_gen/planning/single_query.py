@@ -93,8 +93,8 @@ class NearField:
         cost.reshape(-1)[seeds] = seeded
         sure = max(weight * path + _SURPLUS_M, least)
         written = expand_query(
-            seeds, start[:3], goal[:3], approach, sure + reach_margin(cells.cell, weight), weight, bound, cells, moves,
-            self.narrow, self._arrays,
+            seeds, start[:3], goal[:3], approach, sure + reach_margin(cells.cell, weight), weight, bound, cells,
+            moves, self.narrow, self._arrays,
         )  # fmt: skip
         try:
             yield Found(cost, False, sure)
