@@ -135,8 +135,7 @@ class Planner:
         """Plan from one start to a goal: the route of `plan_target`, sooner where the goal has no other starts.
 
         The goal's cost-to-go is found where the search looks at it alone (`aerialdojo_gen.planning.query_field`).
-        Where that is not enough to be sure of the same route, `plan_target` is asked. `cost_to_go` still tells that
-        of the goal that `plan_target` or `foresee` was asked for last.
+        Where that is not enough to be sure of the same route, `plan_target` is asked.
 
         Parameters
         ----------
@@ -226,7 +225,10 @@ class Planner:
             self._fields.clear()
 
     def cost_to_go(self, points: ArrayLike) -> NDArray[np.float64]:
-        """Cost-to-go of points, (n, 3) float metres, to the goal that was planned for last; (n,) float64 metres."""
+        """Cost-to-go of points, (n, 3) float metres; (n,) float64 metres.
+
+        It is that of the goal which `plan_target` or `foresee` was asked for last.
+        """
         p = np.ascontiguousarray(np.asarray(points, np.float64).reshape(-1, 3))
         return np.asarray(costs_at(p, self.grid.arrays, self._cost))
 
