@@ -86,7 +86,9 @@ class NearField:
         cost, cells, moves = self._arrays.cost, self.grid.arrays, self.grid.moves
         seeds = seed(goal, cost)
         seeded = cost.ravel()[seeds]
-        path = short_path_cost(seeds, *start[:3], bound, cells, moves, self.narrow, cost, self._path)
+        # The start is not dearer than the bound as soon as one of the cells is not that it lies between.
+        farthest = bound + reach_margin(cells.cell, 1.0)
+        path = short_path_cost(seeds, *start[:3], farthest, cells, moves, self.narrow, cost, self._path)
         if path == GAVE_UP or not math.isfinite(path):
             yield Found(None, path != GAVE_UP, 0.0)
             return
