@@ -12,8 +12,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from aerialdojo_gen.planning.column_kernels import move_lengths
 from aerialdojo_gen.planning.connectivity import MOVES
-from aerialdojo_gen.planning.cost_to_go import move_lengths
 from aerialdojo_gen.planning.grid_kernels import GridArrays
 
 # A little above 1: of the many ways of equal cost one is followed to its end.

@@ -19,14 +19,11 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from aerialdojo_gen.planning.connectivity import MOVE_LENGTHS, MOVES, N_HALF
-from aerialdojo_gen.planning.cost_to_go import move_lengths
+from aerialdojo_gen.planning.column_kernels import FLAT, KIND_OF, KINDS, UP, leave, move_lengths, push, settle
+from aerialdojo_gen.planning.connectivity import MOVE_LENGTHS, MOVES
 from aerialdojo_gen.planning.grid_kernels import GridArrays
 from aerialdojo_gen.planning.grid_path import grid_metric
 
-_UP = N_HALF - 1
-_FLAT = np.flatnonzero(MOVES[:, 2] == 0)
-_, _KINDS, _KIND = np.unique(MOVE_LENGTHS, return_index=True, return_inverse=True)
 # Columns wait in bins half a cell wide for their turn; the longest move is not quite five bins long.
 _BINS = 8
 _DELAY = (2.0 * MOVE_LENGTHS).astype(np.int64)
@@ -106,58 +103,6 @@ def _span(
 
 
 @njit(cache=True, error_model="numpy")
-def _settle(
-    costs: NDArray[np.float32], moves: NDArray[np.uint32], narrow: NDArray[np.float32], first: int, last: int,
-    length: np.float32, coarse: np.float32,
-) -> None:  # fmt: skip
-    """Relax the vertical moves between the cells from `first` to before `last`, up and then down."""
-    one = np.uint32(1)
-    below = costs[first]
-    for k in range(first + 1, last):
-        here = costs[k]
-        reached = below + (length + coarse * narrow[k - 1])
-        if reached < here and (moves[k - 1] >> np.uint32(_UP)) & one:
-            costs[k] = here = reached
-        below = here
-    above = costs[last - 1]
-    for k in range(last - 2, first - 1, -1):
-        here = costs[k]
-        reached = above + (length + coarse * narrow[k + 1])
-        if reached < here and (moves[k + 1] >> np.uint32(_UP + N_HALF)) & one:
-            costs[k] = here = reached
-        above = here
-
-
-@njit(cache=True, error_model="numpy")
-def _leave(
-    costs: NDArray[np.float32], narrow: NDArray[np.float32], first: int, n: int, length: np.float32,
-    coarse: np.float32, left: NDArray[np.float32], at: int,
-) -> None:  # fmt: skip
-    """Costs of n cells with those of a move that leads from them, into `left` from `at` on."""
-    # Unsigned, for else every index is asked whether it is negative, and the loop becomes no vector instructions.
-    a, b = np.uint64(first), np.uint64(at)
-    for k in range(np.uint64(n)):
-        left[b + k] = costs[a + k] + (length + coarse * narrow[a + k])
-
-
-@njit(cache=True, error_model="numpy")
-def _push(
-    left: NDArray[np.float32], at: int, moves: NDArray[np.uint32], source: int, costs: NDArray[np.float32],
-    target: int, n: int, move: int, bound: np.float32,
-) -> bool:  # fmt: skip
-    """Relax one move from n cells of a column to those of another; whether that made anything cheaper."""
-    bit, never, improved = np.uint32(1) << np.uint32(move), np.float32(np.inf), np.uint32(0)
-    a, b, c = np.uint64(at), np.uint64(source), np.uint64(target)
-    for k in range(np.uint64(n)):
-        reached = left[a + k] if (moves[b + k] & bit) != 0 else never
-        reached = reached if reached <= bound else never
-        here = costs[c + k]
-        improved |= np.uint32(1) if reached < here else np.uint32(0)
-        costs[c + k] = reached if reached < here else here
-    return improved != 0
-
-
-@njit(cache=True, error_model="numpy")
 def expand_query(
     seeds: NDArray[np.int32], start: NDArray[np.float64], goal: NDArray[np.float64], approach: float, reach: float,
     weight: float, bound: float, grid: GridArrays, moves: NDArray[np.uint32], narrow: NDArray[np.float32],
@@ -200,7 +145,7 @@ def expand_query(
         arrays.first, arrays.last, arrays.limit, arrays.waiting, arrays.next, arrays.columns
     )  # fmt: skip
     lengths, coarse = move_lengths(grid.cell)
-    departed = np.empty(len(_KINDS) * nz, np.float32)
+    departed = np.empty(len(KINDS) * nz, np.float32)
     bins = np.full(_BINS, -1, np.int32)
     n, left, now = 0, 0, 0
     for seed in seeds:
@@ -222,11 +167,11 @@ def expand_query(
         i, j = c // ny, c % ny
         waiting[i, j] = False
         k0, k1, base = first[i, j], last[i, j], c * nz
-        _settle(costs, flat_moves, flat_narrow, base + k0, base + k1, lengths[_UP], coarse[_UP])
-        for kind in range(len(_KINDS)):
-            m = _KINDS[kind]
-            _leave(costs, flat_narrow, base + k0, k1 - k0, lengths[m], coarse[m], departed, kind * nz + k0)
-        for m in _FLAT:
+        settle(costs, flat_moves, flat_narrow, base + k0, base + k1, lengths[UP], coarse[UP])
+        for kind in range(len(KINDS)):
+            m = KINDS[kind]
+            leave(costs, flat_narrow, base + k0, k1 - k0, lengths[m], coarse[m], departed, kind * nz + k0)
+        for m in FLAT:
             u, v = i + MOVES[m, 0], j + MOVES[m, 1]
             if not (0 <= u < nx and 0 <= v < ny) or last[u, v] < 0:
                 continue
@@ -238,8 +183,8 @@ def expand_query(
             b0, b1 = max(k0, first[u, v]), min(k1, last[u, v])
             if (
                 b0 < b1
-                and _push(
-                    departed, _KIND[m] * nz + b0, flat_moves, base + b0, costs, d * nz + b0, b1 - b0, m, limit[u, v]
+                and push(
+                    departed, KIND_OF[m] * nz + b0, flat_moves, base + b0, costs, d * nz + b0, b1 - b0, m, limit[u, v]
                 )
                 and not waiting[u, v]
             ):
