@@ -16,7 +16,7 @@ from aerialdojo_gen.planning.query_field import clear_query, expand_query, make_
 
 # What a search takes off its list is seldom dearer than the known grid path and the weight make by more than this:
 # for actions, and for what the lattice cannot fly as the grid can.
-_SURPLUS_M = 1.0
+_SURPLUS_M = 1.1
 
 
 class Found(NamedTuple):
