@@ -18,19 +18,20 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from aerialdojo_gen.planning.connectivity import MOVE_LENGTHS, MOVES, N_HALF, cell_centre
+from aerialdojo_gen.planning.column_kernels import (
+    FLAT,
+    KIND_OF,
+    KINDS,
+    QUANTUM_M,
+    UP,
+    leave,
+    move_lengths,
+    push,
+    settle,
+)
+from aerialdojo_gen.planning.connectivity import MOVES, cell_centre
 from aerialdojo_gen.planning.grid_kernels import GridArrays, segment_free
-from aerialdojo_gen.planning.preference import NARROW_UNIT, Preference, astray, squeeze
-
-# Costs are multiples of this, so that float32 adds them without rounding and equal costs compare equal.
-_QUANTUM_M = 2.0**-12
-# So coarse are the lengths that the cells' narrowness is multiplied with, for the same reason.
-_COARSE_M = _QUANTUM_M / NARROW_UNIT
-_UP = N_HALF - 1
-_DOWN = _UP + N_HALF
-_FLAT = np.flatnonzero(MOVES[:, 2] == 0)
-# Moves along an axis, across a square and a knight's: the first of each kind, and the kind of every move.
-_, _KINDS, _KIND = np.unique(MOVE_LENGTHS, return_index=True, return_inverse=True)
+from aerialdojo_gen.planning.preference import Preference, astray, squeeze
 
 
 @lru_cache(maxsize=4)
@@ -114,75 +115,10 @@ def seed_goal(
                     d += astray(gx - x, gy - y, yaw, d, prefer.ahead_cos, prefer.astray)
                     d += squeeze(x, y, z, gx, gy, gz, prefer.clearance, prefer.weight,
                                  grid.origin[0], grid.origin[1], grid.origin[2], grid.cell, grid.field)  # fmt: skip
-                    cost[i, j, k] = round(d / _QUANTUM_M) * _QUANTUM_M
+                    cost[i, j, k] = round(d / QUANTUM_M) * QUANTUM_M
                     found[n] = (i * ny + j) * nz + k
                     n += 1
     return found[:n]
-
-
-# The kernels below take whole arrays, flat, and where a column begins, for a view of each column costs as much as its
-# work. These places are unsigned: what could be negative would be counted from the end, and not be vectorised.
-
-
-@njit(cache=True, error_model="numpy")
-def _settle(
-    cost: NDArray[np.float32], moves: NDArray[np.uint32], narrow: NDArray[np.float32], at: np.uint64, nz: np.uint64,
-    length: np.float32, coarse: np.float32,
-) -> None:  # fmt: skip
-    """Relax the vertical moves within a column, up and then down."""
-    one = np.uint32(1)
-    below = cost[at]
-    for k in range(at + np.uint64(1), at + nz):
-        here = cost[k]
-        reached = below + (length + coarse * narrow[k - np.uint64(1)])
-        if reached < here and (moves[k - np.uint64(1)] >> np.uint32(_UP)) & one:
-            cost[k] = here = reached
-        below = here
-    above = cost[at + nz - np.uint64(1)]
-    for n in range(np.uint64(1), nz):
-        k = at + nz - np.uint64(1) - n
-        here = cost[k]
-        reached = above + (length + coarse * narrow[k + np.uint64(1)])
-        if reached < here and (moves[k + np.uint64(1)] >> np.uint32(_DOWN)) & one:
-            cost[k] = here = reached
-        above = here
-
-
-@njit(cache=True, error_model="numpy")
-def _leave(
-    cost: NDArray[np.float32], narrow: NDArray[np.float32], at: np.uint64, nz: np.uint64, length: np.float32,
-    coarse: np.float32, left: NDArray[np.float32], to: np.uint64,
-) -> None:  # fmt: skip
-    """Costs of a column's cells with those of a move that leads from them."""
-    for k in range(nz):
-        left[to + k] = cost[at + k] + (length + coarse * narrow[at + k])
-
-
-@njit(cache=True, error_model="numpy")
-def _push(
-    left: NDArray[np.float32], begin: np.uint64, moves: NDArray[np.uint32], at: np.uint64,
-    cost: NDArray[np.float32], to: np.uint64, nz: np.uint64, move: int, bound: np.float32,
-) -> bool:  # fmt: skip
-    """Relax one move from a column to another; whether that made anything cheaper.
-
-    Without a branch, so that the compiler turns the loop into vector instructions.
-    """
-    bit, never = np.uint32(1) << np.uint32(move), np.float32(np.inf)
-    improved = np.uint32(0)
-    for k in range(nz):
-        reached = left[begin + k] if (moves[at + k] & bit) != 0 else never
-        reached = reached if reached <= bound else never
-        here = cost[to + k]
-        improved |= np.uint32(1) if reached < here else np.uint32(0)
-        cost[to + k] = reached if reached < here else here
-    return improved != 0
-
-
-@njit(cache=True)
-def _move_lengths(cell: float) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Lengths of the moves, and what the narrowness of the cell that they lead from is multiplied with; metres."""
-    lengths = (np.rint(MOVE_LENGTHS * cell / _QUANTUM_M) * _QUANTUM_M).astype(np.float32)
-    return lengths, (np.rint(MOVE_LENGTHS * cell / _COARSE_M) * _COARSE_M).astype(np.float32)
 
 
 @njit(cache=True, error_model="numpy")
@@ -225,11 +161,10 @@ def expand_cost(
         Number of visits.
     """
     nx, ny, nz = cost.shape
-    lengths, coarse = _move_lengths(cell)
+    lengths, coarse = move_lengths(cell)
     limit = np.float32(bound)
-    waiting, departed = np.zeros((nx, ny), np.bool_), np.empty(len(_KINDS) * nz, np.float32)
-    flat, passable, tight = cost.ravel(), moves.ravel(), narrow.ravel()
-    size = np.uint64(nz)
+    waiting, departed = np.zeros((nx, ny), np.bool_), np.empty(len(KINDS) * nz, np.float32)
+    costs, passable, tight = cost.reshape(-1), moves.reshape(-1), narrow.reshape(-1)
     left, visits = 0, 0
     middle_i, middle_j = 0, 0
     for seed in seeds:
@@ -249,17 +184,19 @@ def expand_cost(
             waiting[i, j] = False
             left -= 1
             visits += 1
-            at = np.uint64(i * ny + j) * size
-            _settle(flat, passable, tight, at, size, lengths[_UP], coarse[_UP])
-            for kind in range(len(_KINDS)):
-                to = np.uint64(kind) * size
-                _leave(flat, tight, at, size, lengths[_KINDS[kind]], coarse[_KINDS[kind]], departed, to)
-            for m in _FLAT:
+            base = (i * ny + j) * nz
+            settle(costs, passable, tight, base, base + nz, lengths[UP], coarse[UP])
+            for kind in range(len(KINDS)):
+                k = KINDS[kind]
+                leave(costs, tight, base, nz, lengths[k], coarse[k], departed, kind * nz)
+            for m in FLAT:
                 u, v = i + MOVES[m, 0], j + MOVES[m, 1]
-                if not (0 <= u < nx and 0 <= v < ny):
-                    continue
-                begin, to = np.uint64(_KIND[m]) * size, np.uint64(u * ny + v) * size
-                if _push(departed, begin, passable, at, flat, to, size, m, limit) and not waiting[u, v]:
+                if (
+                    0 <= u < nx
+                    and 0 <= v < ny
+                    and push(departed, KIND_OF[m] * nz, passable, base, costs, (u * ny + v) * nz, nz, m, limit)
+                    and not waiting[u, v]
+                ):
                     waiting[u, v] = True
                     left += 1
         if visits == before:
@@ -297,7 +234,7 @@ def extra_cost(
         Metres; 0 where the goal is not reached.
     """
     nx, ny, nz = cost.shape
-    lengths, coarse = _move_lengths(grid.cell)
+    lengths, coarse = move_lengths(grid.cell)
     ci = math.floor((x - grid.origin[0]) / grid.cell - 0.5)
     cj = math.floor((y - grid.origin[1]) / grid.cell - 0.5)
     ck = math.floor((z - grid.origin[2]) / grid.cell - 0.5)

@@ -69,6 +69,8 @@ class SearchArrays(NamedTuple):
         Search that wrote a slot of the table.
     clock : (1,) int32
         Number of the search.
+    highest : (1,) float64
+        Most that an edge could cost, its cost-to-go included, that the last search took off the list; metres.
     blockers : (_N_BLOCKERS,) int32
         Triangle that blocked an edge last, by where the edge's middle is; -1 for none.
     """
@@ -86,6 +88,7 @@ class SearchArrays(NamedTuple):
     keys: NDArray[np.int64]
     stamps: NDArray[np.int32]
     clock: NDArray[np.int32]
+    highest: NDArray[np.float64]
     blockers: NDArray[np.int32]
 
 
@@ -136,7 +139,7 @@ def make_search_arrays(budget: int) -> SearchArrays:
         np.empty((n, 3)), np.empty(n), np.empty(n, np.int8), np.empty(n, np.int8), np.empty(n, np.int32),
         np.empty(edges, np.int32), np.empty(edges, np.int8), np.empty(edges, np.int32), np.empty(edges, np.float32),
         np.full(_N_BUCKETS, -1, np.int32), np.empty(slots, np.int64), np.zeros(slots, np.int32),
-        np.zeros(1, np.int32), np.empty(_N_BLOCKERS, np.int32),
+        np.zeros(1, np.int32), np.zeros(1), np.empty(_N_BLOCKERS, np.int32),
     )  # fmt: skip
 
 
@@ -265,13 +268,16 @@ def search(
     f_most = (_N_BUCKETS - 1) * _BUCKET_M
     # The start is an edge from nowhere.
     edge_parent[0], edge_move[0], edge_next[0], heads[0] = -1, 0, -1, 0
-    n, n_edges, lowest = 0, 1, 0
+    n, n_edges, lowest, highest = 0, 1, 0, -1
     none = np.empty(0, np.int8)
     while True:
         while lowest < _N_BUCKETS and heads[lowest] < 0:
             lowest += 1
         if lowest == _N_BUCKETS:
             return EXHAUSTED, n, none
+        if lowest > highest:
+            highest = lowest
+            s.highest[0] = f0 + (lowest + 1) * _BUCKET_M
         taken = heads[lowest]
         heads[lowest] = edge_next[taken]
         parent, move = edge_parent[taken], int(edge_move[taken])

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from aerialdojo_gen.config.sections import PlanConfig
+from aerialdojo_gen.config.sections import PlanConfig, Rung
 from aerialdojo_gen.geometry.motion import TURN_RAD, nearest_heading
 from aerialdojo_gen.planning.attempt import attempt, costs_at, lengths_at
 from aerialdojo_gen.planning.certify import conclude
@@ -19,12 +19,15 @@ from aerialdojo_gen.planning.collision import collision_world
 from aerialdojo_gen.planning.cost_to_go import columns_by_distance, expand_cost, seed_goal
 from aerialdojo_gen.planning.hybrid_astar import EXHAUSTED, FOUND, SearchArrays, SearchOptions, make_search_arrays
 from aerialdojo_gen.planning.preference import Preference, narrow_cells
+from aerialdojo_gen.planning.single_query import NearField
 from aerialdojo_gen.scenes.model import Scene
 
 # Between cells the cost-to-go is interpolated: a little more than it is taken for what it promises.
 _INTERPOLATION = 1.005
 # Few states of the lattice lie where an Approach flies ahead: a search for the very best one would expand all others.
 _NEAR_ENOUGH_M = 0.15
+# How often the cost-to-go of a single query is found farther away before that of the whole scene is.
+_TRIES = 3
 # What the longest routes cost beside their metres for the surfaces that they come near, at a weight of 1; 99 in 100
 # cost less.
 _EXTRA_M = 3.0
@@ -103,6 +106,7 @@ class Planner:
         )
         self._memory: dict[int, SearchArrays] = {}
         self._known: dict[bytes, bool] = {}
+        self._near: NearField | None = None
 
     def plan_target(self, goal: ArrayLike, starts: ArrayLike) -> list[Route]:
         """Plan from every start to one goal.
@@ -121,9 +125,53 @@ class Planner:
         """
         target, begins = _poses(goal, starts)
         return [
-            self._search(s, target, route.cost_to_go_m) if route.outcome == "NOT_NEEDED" else route
+            self._search(s, target, route.cost_to_go_m, self._cost, self.config.ladder)
+            if route.outcome == "NOT_NEEDED"
+            else route
             for s, route in zip(begins, self.foresee(target, begins), strict=True)
         ]
+
+    def plan_one(self, goal: ArrayLike, start: ArrayLike) -> Route:
+        """Plan from one start to a goal: the route of `plan_target`, sooner where the goal has no other starts.
+
+        The goal's cost-to-go is found where the search looks at it alone (`aerialdojo_gen.planning.query_field`).
+        Where that is not enough to be sure of the same route, `plan_target` is asked.
+
+        Parameters
+        ----------
+        goal, start : (4,) float
+            x, y, z in metres and yaw in radians, world frame.
+
+        Returns
+        -------
+        Route
+            As `plan_target` returns it.
+        """
+        target, (begin,) = _poses(goal, start)
+        weight = self.config.ladder[0].weight
+        if weight < 1.0 or self.grid.in_collision(target[:3]) or self._blocked(begin):
+            return self.plan_target(target, begin)[0]
+        if self._near is None:
+            self._near = NearField(self.grid, self._narrow)
+        c, least = self.config, 0.0
+        for _ in range(_TRIES):
+            with self._near.between(
+                target, begin, weight, self._seed, c.max_approach_m, self._bound_m, least
+            ) as found:
+                if found.cost is None:
+                    return Route("NO_PATH") if found.none else self.plan_target(target, begin)[0]
+                cells, moves = self.grid.arrays, self.grid.moves
+                length = lengths_at(begin[None, :3], target[:3], cells, moves, found.cost, self._narrow)
+                route = self._foreseen(begin, target, float(length[0]))
+                if route.outcome != "NOT_NEEDED":
+                    return route
+                route = self._search(begin, target, route.cost_to_go_m, found.cost, c.ladder[:1])
+            least = float(self._memory[c.ladder[0].budget].highest[0])
+            if route.outcome != "SOLVED":
+                break
+            if least <= found.sure_m:
+                return route
+        return self.plan_target(target, begin)[0]
 
     def foresee(self, goal: ArrayLike, starts: ArrayLike) -> list[Route]:
         """Tell what the goal's cost-to-go alone knows of the routes to it; nothing is searched.
@@ -177,7 +225,10 @@ class Planner:
             self._fields.clear()
 
     def cost_to_go(self, points: ArrayLike) -> NDArray[np.float64]:
-        """Cost-to-go of points, (n, 3) float metres, to the goal that was planned for last; (n,) float64 metres."""
+        """Cost-to-go of points, (n, 3) float metres; (n,) float64 metres.
+
+        It is that of the goal which `plan_target` or `foresee` was asked for last.
+        """
         p = np.ascontiguousarray(np.asarray(points, np.float64).reshape(-1, 3))
         return np.asarray(costs_at(p, self.grid.arrays, self._cost))
 
@@ -189,7 +240,6 @@ class Planner:
         return self._known[key]
 
     def _expand(self, goal: NDArray[np.float64]) -> None:
-        c, g = self.config, self.grid
         key = goal.tobytes()
         if key in self._fields:
             self._cost = self._fields[key]
@@ -198,12 +248,22 @@ class Planner:
         if (len(self._fields) + 1) * self._cost.nbytes <= self._keep_bytes:
             self._cost = self._fields[key] = np.empty_like(self._scratch)
         self._cost.fill(np.inf)
+        expand_cost(
+            self._seed(goal, self._cost), self._order, self._bound_m, self.grid.arrays.cell, self.grid.moves,
+            self._cost, self._narrow,
+        )  # fmt: skip
+
+    @property
+    def _bound_m(self) -> float:
+        c = self.config
+        return c.max_length_m * c.length_slack + _EXTRA_M * c.clearance_weight
+
+    def _seed(self, goal: NDArray[np.float64], cost: NDArray[np.float32]) -> NDArray[np.int32]:
+        c, g = self.config, self.grid
         # A route ends with a heading up to half a turn off the goal's yaw: what its Approach may do, the grid's may.
         angle = min(math.radians(c.max_approach_angle_deg) + TURN_RAD / 2, math.pi)
         prefer = self._prefer._replace(ahead_cos=math.cos(angle))
-        seeds = seed_goal(*goal, c.max_approach_m, g.radius_m, g.arrays, g.moves, self._cost, prefer)
-        bound = c.max_length_m * c.length_slack + _EXTRA_M * c.clearance_weight
-        expand_cost(seeds, self._order, bound, g.arrays.cell, g.moves, self._cost, self._narrow)
+        return np.asarray(seed_goal(*goal, c.max_approach_m, g.radius_m, g.arrays, g.moves, cost, prefer))
 
     def _foreseen(self, start: NDArray[np.float64], goal: NDArray[np.float64], value: float) -> Route:
         c = self.config
@@ -213,11 +273,14 @@ class Planner:
         straight = value * _INTERPOLATION < c.min_detour_ratio * math.dist(goal[:3], start[:3])
         return Route("NEAR_STRAIGHT" if straight else "NOT_NEEDED", cost_to_go_m=value)
 
-    def _search(self, start: NDArray[np.float64], goal: NDArray[np.float64], value: float) -> Route:
+    def _search(
+        self, start: NDArray[np.float64], goal: NDArray[np.float64], value: float, cost: NDArray[np.float32],
+        ladder: tuple[Rung, ...],
+    ) -> Route:  # fmt: skip
         c, g = self.config, self.grid
         heading = nearest_heading(float(start[3]), float(goal[3]))
         expansions = 0
-        for number, rung in enumerate(c.ladder, start=1):
+        for number, rung in enumerate(ladder, start=1):
             memory = self._memory.get(rung.budget)
             if memory is None:
                 memory = self._memory[rung.budget] = make_search_arrays(rung.budget)
@@ -226,7 +289,7 @@ class Planner:
                 rung.duplicate_cell_m, rung.heading_sectors, c.sideways_actions_per_m, self._prefer,
                 _NEAR_ENOUGH_M,
             )  # fmt: skip
-            tried = attempt(start, goal[:3], heading, self._cost, g.arrays, memory, options, self.radius_m, g.cap_m)
+            tried = attempt(start, goal[:3], heading, cost, g.arrays, memory, options, self.radius_m, g.cap_m)
             expansions += tried.expansions
             if tried.status != FOUND:
                 continue
@@ -240,7 +303,7 @@ class Planner:
                     value, number,
                 )  # fmt: skip
         outcome = "NO_PATH" if tried.status == EXHAUSTED else "BUDGET_EXHAUSTED"
-        return Route(outcome, expansions=expansions, cost_to_go_m=value, attempts=len(c.ladder))
+        return Route(outcome, expansions=expansions, cost_to_go_m=value, attempts=len(ladder))
 
 
 def _poses(goal: ArrayLike, starts: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -268,5 +331,4 @@ def plan(
     Route
         Its outcome says whether there is one; no route is an outcome, not an error.
     """
-    (route,) = Planner(scene, config, radius_m).plan_target(goal, np.asarray(start, dtype=float)[None])
-    return route
+    return Planner(scene, config, radius_m).plan_one(goal, start)

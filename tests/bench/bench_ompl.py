@@ -1,14 +1,21 @@
 """The planner beside OMPL's, in one run: the same FCL world, the same pairs, one core.
 
-    python tests/bench/bench_ompl.py [--targets 2] [--starts 170] [--some 40] [--slow 12] [--seconds 3] [--data data]
+    python tests/bench/bench_ompl.py [--targets 2] [--starts 170] [--singles 40] [--some 40] [--slow 8] [--seconds 3]
 
 The worlds are a made-up one of boxes and trees with random pairs, and scenes of the dataset with their own
-candidates (these need the tables up to `pairs`). (a) is this planner, its cost-to-go and certificates included; what
-it does not solve there has no path within `max_length_m`. (b) is RRTConnect with path simplification, twice: with
-FCL's swept capsule for every motion, which is our certificate's own check, and with OMPL's own motion check, a ball
-asked for every 0.1 m. (c) is RRT* with a time limit, swept. OMPL plans positions only, in a space whose distance is
-the action metric (horizontal plus vertical), so that lengths compare; our routes are bound to the action set and to
-headings besides. (BIT* cannot sample such a space; RRT* can.) Times of (a) and (b) are CPU seconds of this process.
+candidates (`--data data`; these need the tables up to `pairs`). Two regimes: single queries, with one start a goal,
+where every query pays for its own goal; and as many starts a goal as the dataset has, which share what is known of
+it. Times are CPU seconds of this process over the candidates searched, for every planner: those that are near
+straight count for none. What is made once a scene has a line of its own: the FCL world, which all planners ask, and
+the clearance grid, which ours has besides.
+
+(a) is this planner, its cost-to-go and certificates included; what it does not solve has no path within
+`max_length_m`. For single queries it is `Planner.plan_one`, and below it `plan_target`, which finds the whole
+cost-to-go. (b) is RRTConnect with path simplification, twice: with FCL's swept capsule for every motion, which is our
+certificate's own check, and with OMPL's own motion check, a ball asked for every 0.1 m. (c) is RRT* with a time
+limit, swept, and its time is the wall's. OMPL plans positions only, in a space whose distance is the action metric
+(horizontal plus vertical), so that lengths compare; our routes are bound to the action set and to headings besides.
+(BIT* cannot sample such a space; RRT* can.)
 """
 
 from __future__ import annotations
@@ -16,6 +23,7 @@ from __future__ import annotations
 import argparse
 import sys
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -23,12 +31,15 @@ import numpy as np
 from ompl import base, geometric, util
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
-from bench_planner import RADIUS, SIZE, free_pose, world
+from bench_planner import RADIUS, free_pose, world
 
 from aerialdojo_gen.config.pipeline import load_pipeline
 from aerialdojo_gen.config.sections import PlanConfig
 from aerialdojo_gen.pipeline.stage import Job, Roots
-from aerialdojo_gen.planning.planner import Planner
+from aerialdojo_gen.planning.clearance import ClearanceGrid
+from aerialdojo_gen.planning.collision import CollisionWorld
+from aerialdojo_gen.planning.planner import Planner, Route
+from aerialdojo_gen.scenes.model import Scene
 from aerialdojo_gen.stages.work import plan
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -38,36 +49,41 @@ SAMPLED_M = 0.1
 
 @dataclass
 class Case:
-    """A planner, the corners of where it may fly, and starts by goal."""
+    """A scene, its planner, starts by goal, and pairs of goals of their own."""
 
     name: str
+    scene: Scene
     planner: Planner
-    low: np.ndarray
-    high: np.ndarray
-    starts: list[tuple[np.ndarray, np.ndarray]]
+    groups: list[tuple[np.ndarray, np.ndarray]]
+    singles: list[tuple[np.ndarray, np.ndarray]]
 
 
-def made_up(targets: int, starts: int) -> Case:
-    planner, rng, groups = Planner(world(), PlanConfig(), RADIUS), np.random.default_rng(1), []
-    for _ in range(targets):
+def made_up(targets: int, starts: int, singles: int) -> Case:
+    scene, rng = world(), np.random.default_rng(1)
+    planner, groups = Planner(scene, PlanConfig(), RADIUS), []
+    for k in range(targets + singles):
         goal = free_pose(planner, rng)
         # Not farther than a released task reaches.
-        groups.append((goal, np.array([free_pose(planner, rng, goal, 70.0) for _ in range(starts)])))
-    return Case("made up", planner, np.zeros(3), np.array(SIZE), groups)
+        some = range(starts if k < targets else 1)
+        groups.append((goal, np.array([free_pose(planner, rng, goal, 70.0) for _ in some])))
+    alone = [(goal, start) for goal, (start,) in groups[targets:]]
+    return Case("made up", scene, planner, groups[:targets], alone)
 
 
-def of_dataset(scene_name: str, data: Path, targets: int, starts: int) -> Case:
+def of_dataset(scene_name: str, data: Path, targets: int, starts: int, singles: int) -> Case:
     pipeline = load_pipeline(ROOT / "pipelines/aerialdojo-200k.toml")
     job = Job("plan", scene_name, 0, 1, pipeline.seed, pipeline.embodiment, Roots(data, data, data, data))
-    scene = job.scene_model()
-    poses, selected = plan._anchor_poses(job)
-    by_target = list(plan._by_target(job.read("pairs")))
-    groups = []
-    for target, pairs in by_target[:: max(1, len(by_target) // targets)][:targets]:
-        every = np.array([plan._turned(poses[p["start_object_id"], p["start_anchor_id"]]) for p in pairs])
-        groups.append((poses[selected[target]], every[:: max(1, len(every) // starts)][:starts]))
-    low, high = np.asarray(scene.bounds)
-    return Case(scene_name, Planner(scene, pipeline.plan, RADIUS), low, high, groups)
+    scene, pairs = job.scene_model(), job.read("pairs").sort_by("pair_id")
+    goals, begins = plan._ends(job, pairs)
+    which, rng = pairs["target_object_id"].to_numpy(), np.random.default_rng(1)
+    every, groups, alone = np.unique(which), [], []
+    for target in every[:: max(1, len(every) // targets)][:targets]:
+        rows = np.flatnonzero(which == target)
+        groups.append((goals[rows[0]], begins[rows[:: max(1, len(rows) // starts)][:starts]]))
+    for target in rng.permutation(every)[:singles]:
+        row = rng.choice(np.flatnonzero(which == target))
+        alone.append((goals[row], begins[row]))
+    return Case(scene_name, scene, Planner(scene, pipeline.plan, RADIUS), groups, alone)
 
 
 class Swept(base.MotionValidator):
@@ -86,12 +102,13 @@ def position(state) -> tuple[float, float, float]:
 
 
 def setup(case: Case, swept: bool) -> geometric.SimpleSetup:
+    low, high = np.asarray(case.scene.bounds)
     flat, upright = base.RealVectorStateSpace(2), base.RealVectorStateSpace(1)
     for space, axes in ((flat, (0, 1)), (upright, (2,))):
         bounds = base.RealVectorBounds(len(axes))
         for k, axis in enumerate(axes):
-            bounds.setLow(k, case.low[axis] + RADIUS)
-            bounds.setHigh(k, case.high[axis] - RADIUS)
+            bounds.setLow(k, low[axis] + RADIUS)
+            bounds.setHigh(k, high[axis] - RADIUS)
         space.setBounds(bounds)
     space = base.CompoundStateSpace()
     space.addSubspace(flat, 1.0)
@@ -129,57 +146,102 @@ def solve(case: Case, make, start, goal, seconds: float, simplify: bool, swept: 
     return float(np.hypot(steps[:, 0], steps[:, 1]).sum() + np.abs(steps[:, 2]).sum())
 
 
-def line(name: str, seconds_each: float, lengths: np.ndarray, ours: np.ndarray, ours_each: float) -> None:
+def line(name: str, each_s: float, lengths: np.ndarray, ours: np.ndarray, ours_each_s: float) -> None:
     both = np.isfinite(lengths) & np.isfinite(ours)
     ratio = (ours[both] / lengths[both]).mean()
     print(
-        f"  {name:<34}{1 / seconds_each:>13.1f}{np.isfinite(lengths).mean():>9.1%}{ratio:>12.3f}"
-        f"{seconds_each / ours_each:>13.1f}"
+        f"  {name:<44}{1 / each_s:>10.1f}{1e3 * each_s:>9.1f}{np.isfinite(lengths).mean():>9.1%}{ratio:>12.3f}"
+        f"{each_s / ours_each_s:>9.1f}"
+    )
+
+
+def head(regime: str) -> None:
+    print(regime)
+    print(f"  {'':<44}{'searched/s':>10}{'ms each':>9}{'solved':>9}{'our L / its':>12}{'x ours':>9}")
+
+
+def lengths_of(routes: list[Route]) -> np.ndarray:
+    return np.array([route.length_m if route.outcome == "SOLVED" else np.inf for route in routes])
+
+
+def timed(call: Callable[[], list[Route]]) -> tuple[float, list[Route]]:
+    t = time.process_time()
+    routes = call()
+    return time.process_time() - t, routes
+
+
+def others(
+    case: Case, pairs: list[tuple[np.ndarray, np.ndarray]], ours: np.ndarray, each_s: float, some: int
+) -> None:
+    """RRTConnect for some of the searched pairs, (goal, start), against our lengths and time."""
+    few = np.linspace(0, len(pairs) - 1, min(some, len(pairs))).astype(int)
+    for name, swept in (("swept", True), (f"a ball every {SAMPLED_M:g} m", False)):
+        t = time.process_time()
+        found = np.array([solve(case, geometric.RRTConnect, *pairs[k][::-1], 3.0, True, swept) for k in few])
+        line(f"(b) RRTConnect, {name}", (time.process_time() - t) / len(few), found, ours[few], each_s)
+
+
+def scene_line(case: Case) -> None:
+    config, shape = case.planner.config, " x ".join(map(str, case.planner.grid.moves.shape))
+    how = {"cell_m": config.cell_m, "radius_m": RADIUS, "margin_m": config.margin_m, "cap_m": config.clearance_cap_m}
+    t = time.process_time()
+    CollisionWorld(case.scene)
+    t_world, t = time.process_time() - t, time.process_time()
+    ClearanceGrid.build(case.scene, **how)
+    t_grid = time.process_time() - t
+    print(f"{case.name}: {case.scene.n_triangles} triangles")
+    print(
+        f"once a scene: FCL world {t_world:.2f} s, for all; clearance grid {t_grid:.2f} s, for ours ({shape} cells)"
     )
 
 
 def compare(case: Case, some: int, slow: int, seconds: float) -> None:
-    for goal, starts in case.starts:
-        case.planner.plan_target(goal, starts[:1])
-    pairs, ours = [], []
-    t = time.process_time()
-    for goal, starts in case.starts:
-        for start, route in zip(starts, case.planner.plan_target(goal, starts), strict=True):
-            # What is not searched because it is near straight says nothing of paths.
-            searched = route.outcome != "NEAR_STRAIGHT"
-            pairs.append((start, goal, searched))
-            ours.append(route.length_m if route.outcome == "SOLVED" else np.inf)
-    each = (time.process_time() - t) / len(pairs)
-    a, asked = np.array(ours), np.flatnonzero([searched for *_, searched in pairs])
-    print(f"{case.name}: {len(case.starts)} targets, {len(pairs)} candidates, {len(asked)} of them searched")
-    print(f"  {'':<34}{'candidates/s':>13}{'solved':>9}{'our L / its':>12}{'time / ours':>13}")
-    line("(a) aerialdojo-gen", each, a[asked], a[asked], each)
-    for name, swept in (("swept", True), (f"a ball every {SAMPLED_M:g} m", False)):
-        few = asked[np.linspace(0, len(asked) - 1, min(some, len(asked))).astype(int)]
-        t = time.process_time()
-        b = np.array([solve(case, geometric.RRTConnect, *pairs[k][:2], 3.0, True, swept) for k in few])
-        line(f"(b) RRTConnect, {name}", (time.process_time() - t) / len(few), b, a[few], each)
-    few = asked[np.linspace(0, len(asked) - 1, min(slow, len(asked))).astype(int)]
+    planner = case.planner
+    scene_line(case)
+    goal, start = case.singles[0]
+    for _ in range(2):  # kernels compiled, memory there
+        planner.plan_one(goal, start)
+        planner.plan_target(goal, start)
+
+    # What is not searched because it is near straight says nothing of paths.
+    pairs = [p for p in case.singles if planner.plan_one(*p).outcome != "NEAR_STRAIGHT"]
+    t_one, routes = timed(lambda: [planner.plan_one(goal, start) for goal, start in pairs])
+    t_whole, again = timed(lambda: [planner.plan_target(goal, start)[0] for goal, start in pairs])
+    lengths, each_s = lengths_of(routes), t_one / len(pairs)
+    head(f"single queries, one start a goal: {len(pairs)} searched")
+    line("(a) aerialdojo-gen, plan_one", each_s, lengths, lengths, each_s)
+    line("(a) aerialdojo-gen, the whole cost-to-go", t_whole / len(pairs), lengths_of(again), lengths, each_s)
+    others(case, pairs, lengths, each_s, some)
+
+    t_all, routes = timed(lambda: [r for group in case.groups for r in planner.plan_target(*group)])
+    ends = [(goal, start) for goal, starts in case.groups for start in starts]
+    asked = [k for k, route in enumerate(routes) if route.outcome != "NEAR_STRAIGHT"]
+    pairs, lengths, each_s = [ends[k] for k in asked], lengths_of(routes)[asked], t_all / len(asked)
+    head(f"many starts a goal: {len(case.groups)} goals, {len(ends)} candidates, {len(asked)} searched")
+    line("(a) aerialdojo-gen", each_s, lengths, lengths, each_s)
+    others(case, pairs, lengths, each_s, some)
+    few = np.linspace(0, len(pairs) - 1, min(slow, len(pairs))).astype(int)
     t = time.monotonic()
-    c = np.array([solve(case, geometric.RRTstar, *pairs[k][:2], seconds, False) for k in few])
-    line(f"(c) RRT*, {seconds:g} s", (time.monotonic() - t) / len(few), c, a[few], each)
+    found = np.array([solve(case, geometric.RRTstar, *pairs[k][::-1], seconds, False) for k in few])
+    line(f"(c) RRT*, {seconds:g} s", (time.monotonic() - t) / len(few), found, lengths[few], each_s)
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--targets", type=int, default=2)
     parser.add_argument("--starts", type=int, default=170, help="starts a target; the dataset has 174")
-    parser.add_argument("--some", type=int, default=40, help="pairs that each (b) gets")
+    parser.add_argument("--singles", type=int, default=40, help="goals with a single start")
+    parser.add_argument("--some", type=int, default=40, help="pairs that each (b) gets in a regime")
     parser.add_argument("--slow", type=int, default=8, help="pairs that (c) gets")
     parser.add_argument("--seconds", type=float, default=3.0, help="time limit of (c), wall time")
     parser.add_argument("--data", type=Path, default=Path("data"))
     options = parser.parse_args()
     util.setLogLevel(util.LOG_ERROR)
     util.RNG.setSeed(1)
-    compare(made_up(options.targets, options.starts), options.some, options.slow, options.seconds)
+    compare(made_up(options.targets, options.starts, options.singles), options.some, options.slow, options.seconds)
     for name in SCENES:
         if (options.data / "pairs" / name).is_dir():
-            case = of_dataset(name, options.data, options.targets, options.starts)
+            case = of_dataset(name, options.data, options.targets, options.starts, options.singles)
             compare(case, options.some, options.slow, options.seconds)
         else:
             print(f"{name}: {options.data} has no pairs of it")

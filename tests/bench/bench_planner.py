@@ -106,10 +106,11 @@ def main() -> None:
         t = clock()
         planner._expand(goal)
         t_field.append(clock() - t)
-        for start in starts:
-            t = clock()
-            planner._plan(start, goal, float(planner.cost_to_go(start[:3])[0]))
-            plans.append(clock() - t)
+        for start, route in zip(starts, found, strict=True):
+            if route.outcome == "SOLVED":
+                t = clock()
+                planner._search(start, goal, route.cost_to_go_m, planner._cost, planner.config.ladder)
+                plans.append(clock() - t)
         for r in found:
             if r.outcome == "SOLVED":
                 t = clock()
@@ -121,7 +122,7 @@ def main() -> None:
                 if b.outcome == "SOLVED":
                     ratios.append(found[i].length_m / b.length_m)
     solved = [r for r in routes if r.outcome == "SOLVED"]
-    ms = 1e3 * np.array([p for p, r in zip(plans, routes, strict=True) if r.outcome == "SOLVED"])
+    ms = 1e3 * np.array(plans)
     over = np.array([r.length_m / r.cost_to_go_m for r in solved])
     took, legs, asked = np.array(certificates).T
     expansions = [r.expansions for r in solved]

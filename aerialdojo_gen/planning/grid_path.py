@@ -1,0 +1,165 @@
+"""A short grid path between a goal and one start, by weighted A*: how long the shortest may be at most.
+
+It looks at few cells where the way is plain, so that a single query knows how far its cost-to-go has to reach.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from aerialdojo_gen.planning.column_kernels import move_lengths
+from aerialdojo_gen.planning.connectivity import MOVES
+from aerialdojo_gen.planning.grid_kernels import GridArrays
+
+# A little above 1: of the many ways of equal cost one is followed to its end.
+_WEIGHT = 1.05
+_N_BUCKETS = 4096
+_N_ENTRIES = 1 << 20
+_SQRT2, _SQRT5 = math.sqrt(2.0), math.sqrt(5.0)
+
+GAVE_UP = -1.0
+
+
+class PathArrays(NamedTuple):
+    """Memory of a search for a grid path; pages never written cost nothing.
+
+    Attributes
+    ----------
+    heads : (_N_BUCKETS,) int32
+        First open entry of every bucket, -1 for none.
+    cell, cost, next : (n,) arrays
+        Open entries as linked lists: flat number of a cell, its cost in metres when it was entered, the next entry.
+    touched : (n,) int32
+        Cells whose cost was written.
+    """
+
+    heads: NDArray[np.int32]
+    cell: NDArray[np.int32]
+    cost: NDArray[np.float32]
+    next: NDArray[np.int32]
+    touched: NDArray[np.int32]
+
+
+def make_path_arrays() -> PathArrays:
+    """Reserve memory for searches of one grid."""
+    return PathArrays(
+        np.full(_N_BUCKETS, -1, np.int32), np.empty(_N_ENTRIES, np.int32), np.empty(_N_ENTRIES, np.float32),
+        np.empty(_N_ENTRIES, np.int32), np.empty(_N_ENTRIES, np.int32),
+    )  # fmt: skip
+
+
+@njit(cache=True, inline="always")
+def grid_metric(dx: float, dy: float, dz: float) -> float:
+    """Length of a displacement in the grid's 16 directions and the vertical; in the displacement's unit."""
+    a, b = abs(dx), abs(dy)
+    high, low = max(a, b), min(a, b)
+    flat = (
+        high - 2.0 * low + _SQRT5 * low if 2.0 * low <= high else _SQRT5 * (high - low) + _SQRT2 * (2.0 * low - high)
+    )
+    return flat + abs(dz)
+
+
+@njit(cache=True, error_model="numpy")
+def short_path_cost(
+    seeds: NDArray[np.int32], x: float, y: float, z: float, bound: float, grid: GridArrays, moves: NDArray[np.uint32],
+    narrow: NDArray[np.float32], costs: NDArray[np.float32], arrays: PathArrays,
+) -> float:  # fmt: skip
+    """Cost of a short grid path from a start to the goal, in the costs of `expand_cost`.
+
+    Parameters
+    ----------
+    seeds : (n,) int32
+        Flat numbers of the cells whose `costs` are set.
+    x, y, z : float
+        The start, metres.
+    bound : float
+        Dearer paths are not looked for, metres.
+    grid : GridArrays
+        The clearance grid.
+    moves : (nx, ny, nz) uint32
+        Its passable moves.
+    narrow : (nx, ny, nz) float32
+        What a metre in the cells costs beside itself.
+    costs : (nx, ny, nz) float32
+        Infinite but for the seeds, and so again in the end.
+    arrays : PathArrays
+        Memory.
+
+    Returns
+    -------
+    float
+        Metres, at most `_WEIGHT` times the least; infinite where none is within the bound, GAVE_UP where there was
+        too much to look at.
+    """
+    nx, ny, nz = costs.shape
+    flat, flat_moves, flat_narrow = costs.reshape(-1), moves.reshape(-1), narrow.reshape(-1)
+    heads, cells, entered, nexts, touched = arrays.heads, arrays.cell, arrays.cost, arrays.next, arrays.touched
+    edge = grid.cell
+    lengths, coarse = move_lengths(edge)
+    n_moves = MOVES.shape[0]
+    steps = MOVES[:, 0] * (ny * nz) + MOVES[:, 1] * nz + MOVES[:, 2]
+    fx, fy, fz = (
+        (x - grid.origin[0]) / edge - 0.5,
+        (y - grid.origin[1]) / edge - 0.5,
+        (z - grid.origin[2]) / edge - 0.5,
+    )
+    # The cells that the start's cost-to-go is interpolated between, as in `cost_between`.
+    i0 = max(0, min(int(max(fx, 0.0)), nx - 2))
+    j0 = max(0, min(int(max(fy, 0.0)), ny - 2))
+    k0 = max(0, min(int(max(fz, 0.0)), nz - 2))
+    width = _WEIGHT * bound / (_N_BUCKETS - 2)
+    n, n_touched, lowest, found = 0, 0, _N_BUCKETS, np.inf
+    for seed in seeds:
+        h = edge * grid_metric(seed // (ny * nz) - fx, seed // nz % ny - fy, seed % nz - fz)
+        touched[n_touched] = seed
+        n_touched += 1
+        if flat[seed] + h <= bound:
+            bucket = int((flat[seed] + _WEIGHT * h) / width)
+            cells[n], entered[n], nexts[n], heads[bucket] = seed, flat[seed], heads[bucket], n
+            lowest = min(lowest, bucket)
+            n += 1
+    while True:
+        while lowest < _N_BUCKETS and heads[lowest] < 0:
+            lowest += 1
+        if lowest == _N_BUCKETS:
+            break
+        entry = heads[lowest]
+        heads[lowest] = nexts[entry]
+        c, g = cells[entry], entered[entry]
+        if g > flat[c]:
+            continue
+        i, j, k = c // (ny * nz), c // nz % ny, c % nz
+        if 0 <= i - i0 <= 1 and 0 <= j - j0 <= 1 and 0 <= k - k0 <= 1:
+            found = g + edge * (math.sqrt((i - fx) ** 2 + (j - fy) ** 2) + abs(k - fz))
+            break
+        if n + n_moves > cells.shape[0] or n_touched + n_moves > touched.shape[0]:
+            found = GAVE_UP
+            break
+        bits, tight = flat_moves[c], flat_narrow[c]
+        for m in range(n_moves):
+            if not (bits >> np.uint32(m)) & np.uint32(1):
+                continue
+            d = c + steps[m]
+            reached = g + (lengths[m] + coarse[m] * tight)
+            if reached >= flat[d]:
+                continue
+            h = edge * grid_metric(i + MOVES[m, 0] - fx, j + MOVES[m, 1] - fy, k + MOVES[m, 2] - fz)
+            if reached + h > bound:
+                continue
+            if flat[d] == np.inf:
+                touched[n_touched] = d
+                n_touched += 1
+            flat[d] = reached
+            bucket = int((reached + _WEIGHT * h) / width)
+            cells[n], entered[n], nexts[n], heads[bucket] = d, reached, heads[bucket], n
+            lowest = min(lowest, bucket)
+            n += 1
+    heads[:] = -1
+    for t in range(n_touched):
+        flat[touched[t]] = np.inf
+    return found

@@ -1,0 +1,175 @@
+"""Single queries: the routes of the whole cost-to-go, found by a part of it."""
+
+import math
+from functools import lru_cache
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from support.flying import town
+from support.handmade import box, instance, scene
+
+from aerialdojo_gen.config.sections import PlanConfig, Rung
+from aerialdojo_gen.planning.clearance import ClearanceGrid
+from aerialdojo_gen.planning.cost_to_go import columns_by_distance, cost_at, expand_cost, seed_goal
+from aerialdojo_gen.planning.grid_path import make_path_arrays, short_path_cost
+from aerialdojo_gen.planning.planner import Planner, plan
+from aerialdojo_gen.planning.preference import Preference, narrow_cells
+from aerialdojo_gen.planning.query_field import clear_query, expand_query, make_query_arrays
+
+RADIUS = 0.25
+PREFER = Preference(1.0, 1.2, 0.4, 3.0)
+
+
+class Alone(Planner):
+    """A planner that does not expand the whole cost-to-go."""
+
+    def plan_target(self, goal, starts):
+        raise AssertionError("the whole cost-to-go is asked for")
+
+
+def same(one, other):
+    assert one.outcome == other.outcome
+    assert one.poses.tobytes() == other.poses.tobytes()
+    assert one.actions.tobytes() == other.actions.tobytes()
+    told = ("length_m", "expansions", "min_clearance_m", "cost_to_go_m", "attempts")
+    assert [getattr(one, name) for name in told] == [getattr(other, name) for name in told]
+
+
+def poses(planner, rng, n):
+    low, high = planner.grid.arrays.lower, planner.grid.arrays.upper
+    found = []
+    while len(found) < n:
+        p = rng.uniform(low, high)
+        if planner.grid.distance_m(p) > 0.3 and planner.grid.reachable(p):
+            found.append(np.array([*p, rng.uniform(-math.pi, math.pi)]))
+    return found
+
+
+def test_in_the_town_the_routes_are_those_of_the_whole_cost_to_go():
+    whole, alone = Planner(town(), PlanConfig(), RADIUS), Alone(town(), PlanConfig(), RADIUS)
+    rng = np.random.default_rng(4)
+    for goal in poses(whole, rng, 3):
+        starts = poses(whole, rng, 20)
+        routes = whole.plan_target(goal, starts)
+        assert [r.outcome for r in routes] == ["SOLVED"] * 20
+        for start, route in zip(starts, routes, strict=True):
+            same(alone.plan_one(goal, start), route)
+
+
+@st.composite
+def worlds(draw):
+    """A low or a high hall, less than a cell's block of vector lanes or some of them, with blocks and walls in it."""
+    half, ceiling = draw(st.sampled_from([4.3, 9.0])), draw(st.sampled_from([1.7, 4.1, 9.0]))
+    blocks = []
+    for n in range(draw(st.integers(0, 7))):
+        x, y = (draw(st.floats(-half, half)) for _ in range(2))
+        w, d, h = (draw(st.floats(0.1, most)) for most in (half, half, ceiling))
+        z = draw(st.sampled_from([0.0, 0.0, ceiling - h]))
+        blocks.append(instance(f"block_{n}", box((x - w / 2, y - d / 2, z - 0.1), (x + w / 2, y + d / 2, z + h))))
+    return scene(*blocks, half=half, ceiling=ceiling)
+
+
+CONFIGS = [
+    PlanConfig(),
+    PlanConfig(clearance_weight=0.0, max_approach_angle_deg=180.0),
+    PlanConfig(max_length_m=9.0, min_detour_ratio=1.05),
+    PlanConfig(cell_m=0.8, ladder=(Rung(weight=1.4, budget=2_000),)),
+]
+
+
+@given(worlds(), st.sampled_from(CONFIGS), st.integers(0, 2**32 - 1))
+@settings(max_examples=40, deadline=None)
+def test_in_any_world_what_becomes_of_a_query_is_the_same(world, config, seed):
+    planner, rng = Planner(world, config, RADIUS), np.random.default_rng(seed)
+    low, high = planner.grid.arrays.lower, planner.grid.arrays.upper
+    # Anywhere: in solids and in sealed rooms too.
+    ends = [np.array([*rng.uniform(low, high), rng.uniform(-math.pi, math.pi)]) for _ in range(6)]
+    for goal, start in zip(ends[:3], ends[3:], strict=True):
+        one = planner.plan_one(goal, start)
+        (target,) = planner.plan_target(goal, [start])
+        same(one, target)
+        # And again, for the memory of a query has to be clean after it.
+        same(planner.plan_one(goal, start), target)
+
+
+@lru_cache(maxsize=1)
+def ground():
+    grid = ClearanceGrid.build(town())
+    goal = np.array([0.1, 0.2, 1.4]) if grid.reachable((0.1, 0.2, 1.4)) else np.array([4.0, 4.0, 1.4])
+    assert grid.reachable(goal)
+    narrow = narrow_cells(grid.arrays.field, PREFER)
+    whole = np.full(grid.moves.shape, np.inf, np.float32)
+    seeds = seed_goal(*goal, 0.0, 1.0, grid.radius_m, grid.arrays, grid.moves, whole, PREFER)
+    seeded = whole.ravel()[seeds]
+    expand_cost(seeds, columns_by_distance(400), 100.0, grid.arrays.cell, grid.moves, whole, narrow)
+    return grid, goal, narrow, whole, seeds, seeded
+
+
+@pytest.mark.parametrize(("weight", "beyond"), [(1.0, 0.0), (1.05, 1.0), (1.05, 4.0), (1.6, 6.0)])
+def test_within_reach_costs_are_those_of_the_whole_field_to_the_bit(weight, beyond):
+    grid, goal, narrow, whole, seeds, seeded = ground()
+    arrays = make_query_arrays(grid.moves.shape)
+    centres = [grid.arrays.origin[a] + (np.arange(n) + 0.5) * grid.arrays.cell for a, n in enumerate(whole.shape)]
+    x, y, z = np.meshgrid(*centres, indexing="ij")
+    for start in ((14.0, -11.0, 2.0), (-13.2, 9.1, 6.5), (-4.0, -15.0, 0.9)):
+        reach = weight * cost_at(*start, grid.arrays, whole) + beyond
+        away = np.hypot(x - start[0], y - start[1]) + abs(z - start[2])
+        within = away + weight * whole.astype(float) <= reach - 1e-6
+        for _ in range(2):
+            arrays.cost.reshape(-1)[seeds] = seeded
+            n = expand_query(
+                seeds, np.array(start), goal, 1.0, reach, weight, 100.0, grid.arrays, grid.moves, narrow, arrays
+            )
+            assert within.sum() > 100
+            assert (arrays.cost[within] == whole[within]).all()
+            # Nothing is cheaper than it is, and most of the field is left alone.
+            assert (arrays.cost >= whole).all()
+            assert np.isfinite(arrays.cost).mean() < 0.7 * np.isfinite(whole).mean()
+            clear_query(n, seeds, arrays)
+            assert np.isinf(arrays.cost).all()
+            assert not arrays.last.any()
+            assert not arrays.waiting.any()
+
+
+def test_a_short_grid_path_is_little_longer_than_the_shortest():
+    grid, _, narrow, whole, seeds, seeded = ground()
+    cost, arrays = np.full(whole.shape, np.inf, np.float32), make_path_arrays()
+    rng, ratios = np.random.default_rng(1), []
+    while len(ratios) < 60:
+        p = rng.uniform([-17, -17, 0.5], [17, 17, 11])
+        if not grid.reachable(p):
+            continue
+        cost.reshape(-1)[seeds] = seeded
+        found = short_path_cost(seeds, *p, 100.0, grid.arrays, grid.moves, narrow, cost, arrays)
+        assert np.isinf(cost).all()
+        assert (arrays.heads == -1).all()
+        ratios.append(found / cost_at(*p, grid.arrays, whole))
+        cost.reshape(-1)[seeds] = seeded
+        assert short_path_cost(seeds, *p, found / 1.2, grid.arrays, grid.moves, narrow, cost, arrays) == np.inf
+    # Between cells the cost-to-go is interpolated, the path's is of one of them.
+    assert min(ratios) > 0.97
+    assert max(ratios) < 1.1
+    assert np.median(ratios) < 1.02
+
+
+def test_a_search_that_looks_farther_than_the_path_tells_finds_the_same():
+    """Where actions cost half a metre, edges are taken that are much dearer than the grid's path."""
+    config = PlanConfig(action_cost_m=0.5)
+    whole, alone = Planner(town(), config, RADIUS), Alone(town(), config, RADIUS)
+    rng = np.random.default_rng(9)
+    goal, *starts = poses(whole, rng, 9)
+    for start, route in zip(starts, whole.plan_target(goal, starts), strict=True):
+        assert route.outcome == "SOLVED"
+        same(alone.plan_one(goal, start), route)
+
+
+def test_planning_one_trajectory_is_a_single_query():
+    ends = (-16.0, -16.0, 1.0, 0.0), (16.0, 16.0, 1.0, 0.0)
+    (route,) = Planner(town(), PlanConfig(), RADIUS).plan_target(ends[1], [ends[0]])
+    assert route.outcome == "SOLVED"
+    same(plan(town(), *ends), route)
+    exhaustive = PlanConfig(ladder=(Rung(weight=0.97, budget=50_000),))
+    (route,) = Planner(town(), exhaustive, RADIUS).plan_target(ends[1], [ends[0]])
+    same(plan(town(), *ends, config=exhaustive), route)
