@@ -11,7 +11,7 @@ from aerialdojo_gen.agents.goal import Sensors
 from aerialdojo_gen.benchmark.motion import Point
 from aerialdojo_gen.errors import RenderError
 from aerialdojo_gen.geometry.cameras import view_pose
-from aerialdojo_gen.rendering.backend import Renderer, kept_renderer
+from aerialdojo_gen.rendering.backend import Renderer, choose_renderer, kept_renderer
 from aerialdojo_gen.scenes.model import Scene
 
 Pictures = dict[str, NDArray[np.uint8]]
@@ -22,7 +22,8 @@ Depths = dict[str, NDArray[np.float32]]
 _drawn_by_gl: list[int] = []
 
 
-def _renderer(scene: Scene, name: str) -> Renderer:
+def drawing(scene: Scene, name: str) -> Renderer:
+    """Return what draws a scene in this process; RenderError in a fork of one that has drawn."""
     if _drawn_by_gl and os.getpid() not in _drawn_by_gl:
         raise RenderError(
             "this process was forked from one that has drawn by OpenGL: start it by spawn "
@@ -32,6 +33,22 @@ def _renderer(scene: Scene, name: str) -> Renderer:
     if renderer.name == "gl":
         _drawn_by_gl[:] = [os.getpid()]
     return renderer
+
+
+def renderer_name(name: str) -> str:
+    """Return the name of what draws in this process; ``"auto"`` is the fastest that works here."""
+    if name != "auto":
+        return name
+    chosen = choose_renderer().name
+    # To choose it a scene was drawn.
+    if not _drawn_by_gl:
+        _drawn_by_gl[:] = [os.getpid()]
+    return chosen
+
+
+def has_drawn() -> bool:
+    """Whether this process has drawn by OpenGL, so that a fork of it could not."""
+    return bool(_drawn_by_gl)
 
 
 def look(
@@ -60,7 +77,7 @@ def look(
     depth_m: Depths = {}
     if sensors.blind:
         return rgb, depth_m
-    takes = _renderer(scene, renderer)
+    takes = drawing(scene, renderer)
     for view in sensors.views:
         picture = takes.render(sensors.camera, view_pose(position, yaw_rad, view))
         if sensors.rgb:
