@@ -4,26 +4,26 @@ from __future__ import annotations
 
 import math
 from collections import OrderedDict
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from aerialdojo_gen.agents.goal import N_ACTIONS
-from aerialdojo_gen.benchmark.motion import FlightSpace
-from aerialdojo_gen.config.sections import PlanConfig
+from aerialdojo_gen.benchmark.motion import FlightSpace, flight_space
 from aerialdojo_gen.geometry.motion import replay
 from aerialdojo_gen.planning.attempt import costs_at
-from aerialdojo_gen.planning.clearance import ClearanceGrid
 from aerialdojo_gen.planning.cost_to_go import columns_by_distance, expand_cost, seed_goal
 from aerialdojo_gen.planning.preference import NO_PREFERENCE
 from aerialdojo_gen.scenes.context import context_of
-from aerialdojo_gen.scenes.model import Scene
 from aerialdojo_gen.store.schemas import STOP
 
 Floats = NDArray[np.float64]
 
 # Ways longer than this are not found, metres: the longest tasks have routes of 100 m, and who strays flies farther.
 _FARTHEST_M = 200.0
+# How far from the goal a way over the grid may end: what a reference's Approach flies at most, metres.
+_REACH_M = 1.0
 # Fields that a scene keeps, some ten megabytes each.
 _KEPT = 8
 
@@ -33,21 +33,14 @@ class Geodesic:
 
     Parameters
     ----------
-    scene : Scene
-        World coordinates, metres.
-    radius_m : float
-        The body's radius.
+    space : FlightSpace
+        The scene and its grid: ways lead where the environment lets the body fly.
     """
 
-    def __init__(self, scene: Scene, radius_m: float = 0.25) -> None:
-        plan = PlanConfig()
-        self._reach_m = plan.max_approach_m
-        self._space = FlightSpace(scene, radius_m)
-        self._grid = ClearanceGrid.build(
-            scene, cell_m=plan.cell_m, radius_m=radius_m, margin_m=plan.margin_m, cap_m=plan.clearance_cap_m
-        )
+    def __init__(self, space: FlightSpace) -> None:
+        self._space, self._grid = space, space.grid
         self._plain = np.zeros(self._grid.moves.shape, np.float32)
-        self._order = columns_by_distance(math.ceil((_FARTHEST_M + 2 * self._reach_m) / plan.cell_m))
+        self._order = columns_by_distance(math.ceil((_FARTHEST_M + 2 * _REACH_M) / self._grid.arrays.cell))
         self._fields: OrderedDict[tuple[float, ...], NDArray[np.float32]] = OrderedDict()
 
     def distances_m(self, goal: ArrayLike, points: ArrayLike) -> Floats:
@@ -108,7 +101,7 @@ class Geodesic:
             return self._fields[key]
         grid = self._grid
         cost = np.full(grid.moves.shape, np.inf, np.float32)
-        seeds = seed_goal(*goal, 0.0, self._reach_m, grid.radius_m, grid.arrays, grid.moves, cost, NO_PREFERENCE)
+        seeds = seed_goal(*goal, 0.0, _REACH_M, grid.radius_m, grid.arrays, grid.moves, cost, NO_PREFERENCE)
         expand_cost(seeds, self._order, _FARTHEST_M, grid.arrays.cell, grid.moves, cost, self._plain)
         while len(self._fields) >= _KEPT:
             self._fields.popitem(last=False)
@@ -116,6 +109,7 @@ class Geodesic:
         return cost
 
 
-def geodesic(scene: Scene, radius_m: float = 0.25) -> Geodesic:
-    """Return the scene's distances: a part of its context."""
-    return context_of(scene).part("geodesic", lambda: Geodesic(scene, radius_m), radius_m)
+def geodesic(mesh: Path, sha256: str, radius_m: float = 0.25) -> Geodesic:
+    """Return a scene's distances, a part of its context; parameters as for `flight_space`."""
+    space = flight_space(mesh, sha256, radius_m)
+    return context_of(space.scene).part("geodesic", lambda: Geodesic(space), radius_m)

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import importlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from aerialdojo_gen.benchmark.eyes import has_drawn
 from aerialdojo_gen.errors import AerialDojoError, StoreError, UsageError, first_line
+from aerialdojo_gen.learning.order import Order
 from aerialdojo_gen.learning.trajectories import Trajectories
 
 _MEND = "install the extra: pip install 'aerialdojo-gen[train]'"
@@ -74,7 +75,13 @@ class Loader:
         self._workers, self._tensors, self._context = workers, tensors, context
         self._torch = torch_package() if workers or tensors else None
         data.order(batch_size, seed=seed, **how)  # refuses what makes no sense
+        self._sampler = _Sampler()
+        self._loading: Any = None
         self.epoch = self.batches_done = 0
+
+    def close(self) -> None:
+        """End the workers; the next iteration starts new ones."""
+        self._loading = None
 
     def __len__(self) -> int:
         """Return the number of batches of a whole epoch."""
@@ -125,27 +132,47 @@ class Loader:
             raise StoreError(f"a loader has no batch {batch} of epoch {epoch}")
         self.epoch, self.batches_done = epoch, batch
 
-    def _from_workers(self, order: Any) -> Iterator[dict[str, Any]]:
+    def _from_workers(self, order: Order) -> Iterator[dict[str, Any]]:
         assert self._torch is not None
-        loading = self._torch.utils.data.DataLoader(
-            _Batches(self._data),
-            sampler=order,
-            batch_size=None,
-            num_workers=self._workers,
-            multiprocessing_context=self._context or ("spawn" if has_drawn() else "fork"),
-            worker_init_fn=_one_thread,
-        )
+        self._sampler.order = order
+        if self._loading is None:
+            # Kept over the epochs: what a worker has opened stays open.
+            self._loading = self._torch.utils.data.DataLoader(
+                _Batches(self._data),
+                sampler=self._sampler,
+                batch_size=None,
+                num_workers=self._workers,
+                multiprocessing_context=self._context or ("spawn" if has_drawn() else "fork"),
+                worker_init_fn=_one_thread,
+                persistent_workers=True,
+            )
         try:
-            for batch in loading:
+            for batch in self._loading:
                 yield batch if self._tensors else _as_arrays(batch)
         except RuntimeError as error:
             # torch has no class for it; what a worker raises itself comes as its own class.
             if "DataLoader worker" not in str(error):
                 raise
+            self._loading = None
             raise WorkerDied(
                 f"a worker of the loader died ({first_line(error)}): fewer workers or smaller batches take less "
                 "memory; load_state_dict goes on at the batch"
             ) from None
+
+
+class _Sampler:
+    """The order of the epoch under way: a DataLoader keeps its sampler."""
+
+    def __init__(self) -> None:
+        self.order: Sequence[list[int]] | Order = ()
+
+    def __len__(self) -> int:
+        """Return the number of batches that are left."""
+        return len(self.order)
+
+    def __iter__(self) -> Iterator[list[int]]:
+        """Yield their samples."""
+        return iter(self.order)
 
 
 class _Batches:

@@ -23,7 +23,6 @@ from aerialdojo_gen.learning.index import Index, read_index
 from aerialdojo_gen.learning.order import Order
 from aerialdojo_gen.learning.pictures import Drawn, Frames, Recorded, Source
 from aerialdojo_gen.learning.words import PADDING, Vocabulary, goal_text
-from aerialdojo_gen.scenes.context import SEVERAL, open_scene
 from aerialdojo_gen.store.cache import cache_folder
 from aerialdojo_gen.store.root import Where, open_root
 from aerialdojo_gen.store.schemas import VIEWS
@@ -283,8 +282,7 @@ class Trajectories:
     def _known(
         self, out: dict[str, Any], i: int, here: NDArray[np.bool_], k: int, poses: NDArray[np.float64]
     ) -> None:  # fmt: skip
-        scene = open_scene(*mesh_of(self._root, self.index.scenes[self.index.scene[k]]), SEVERAL).scene
-        ways, goal = geodesic(scene), self.index.goal[k]
+        ways, goal = geodesic(*mesh_of(self._root, self.index.scenes[self.index.scene[k]])), self.index.goal[k]
         if "goal_distance_m" in self.privileged:
             out["goal_distance_m"][i, here] = ways.distances_m(goal, poses[:, :3])
         if "actions" in self.privileged:
