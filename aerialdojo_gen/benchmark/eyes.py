@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from aerialdojo_gen.agents.goal import Sensors
 from aerialdojo_gen.benchmark.motion import Point
 from aerialdojo_gen.errors import RenderError
-from aerialdojo_gen.geometry.cameras import view_pose
 from aerialdojo_gen.rendering.backend import Renderer, choose_renderer, kept_renderer
+from aerialdojo_gen.rendering.bodies import draw_bodies
 from aerialdojo_gen.scenes.model import Scene
 
 Pictures = dict[str, NDArray[np.uint8]]
@@ -77,14 +77,14 @@ def look(
     depth_m: Depths = {}
     if sensors.blind:
         return rgb, depth_m
-    takes = drawing(scene, renderer)
-    for view in sensors.views:
-        picture = takes.render(sensors.camera, view_pose(position, yaw_rad, view))
+    pose = np.array([[*position, yaw_rad]])
+    pictures, depths = draw_bodies(drawing(scene, renderer), sensors.camera, pose, sensors.views)
+    for v, view in enumerate(sensors.views):
         if sensors.rgb:
-            rgb[view] = picture.rgb
+            rgb[view] = pictures[0, v]
         if sensors.depth:
-            within = picture.depth_m <= np.float32(sensors.max_depth_m)
-            depth_m[view] = np.where(within, picture.depth_m, np.float32(0.0))
+            within = depths[0, v] <= np.float32(sensors.max_depth_m)
+            depth_m[view] = np.where(within, depths[0, v], np.float32(0.0))
     return rgb, depth_m
 
 

@@ -201,7 +201,7 @@ def pictures_folder(store: Store, sensors: Sensors) -> Path:
     """
     s = sensors
     facts = {
-        "code": [code_of(f"aerialdojo_gen.rendering.{module}").digest for module in ("bodies", "gl", "world", "reader")],
+        "code": [code_of(f"aerialdojo_gen.rendering.{name}").digest for name in ("bodies", "gl", "world", "reader")],
         "source": store.source,
         "renderer": renderer_name(store.renderer), "views": s.views, "rgb": s.rgb, "depth": s.depth,
         "width": s.width, "height": s.height, "fov_deg": s.fov_deg, "max_depth_m": s.max_depth_m,

@@ -1,4 +1,4 @@
-"""How far it is to a goal on ways that the body can fly: what reward shaping and teachers need, and no agent may know."""
+"""How far it is to a goal on ways that the body can fly: for rewards and teachers; no agent may know it."""
 
 from __future__ import annotations
 
@@ -82,7 +82,9 @@ class Geodesic:
             a turn and Stop cost what the pose itself does.
         """
         p = np.asarray(poses, np.float64).reshape(-1, 4)
-        ends = np.array([[replay(pose, [a])[-1, :3] for a in range(N_ACTIONS)] for pose in p]).reshape(-1, N_ACTIONS, 3)
+        ends = np.array([[replay(pose, [a])[-1, :3] for a in range(N_ACTIONS)] for pose in p]).reshape(
+            -1, N_ACTIONS, 3
+        )
         collides, refused = np.zeros((2, len(p), N_ACTIONS), np.bool_)
         for k, pose in enumerate(p[:, :3].tolist()):
             here = (pose[0], pose[1], pose[2])

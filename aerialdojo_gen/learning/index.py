@@ -1,4 +1,4 @@
-"""Which trajectories are learned from: the release's tables as few flat arrays, a hundred thousand routes in a few MB."""
+"""Which trajectories are learned from: the release's tables as few flat arrays, some MB for all routes."""
 
 from __future__ import annotations
 

@@ -159,7 +159,9 @@ def recorded_frames(root: DataRoot, scene: str, sensors: Sensors) -> dict[str, i
         return {}
     columns = ("nav_id", "view", "modality", "sampling", "n_frames", "width", "height", "fov_deg", "ok")
     rows = store.read_stored(root, "recordings", scene, columns).to_pylist()
-    wanted = {(view, kind) for view in sensors.views for kind, on in (("rgb", sensors.rgb), ("depth", sensors.depth)) if on}
+    wanted = {
+        (view, kind) for view in sensors.views for kind, on in (("rgb", sensors.rgb), ("depth", sensors.depth)) if on
+    }
     seen: dict[str, set[tuple[str, str]]] = {}
     frames: dict[str, int] = {}
     for row in rows:
@@ -176,7 +178,9 @@ def _recording(root: DataRoot, folder: str) -> Recording:
     try:
         recording = read_recording(root.local_copy(folder))
     except FileNotFoundError:
-        raise StoreError(f"{root.at(folder)} is missing, though recordings name it: run {command('render')}") from None
+        raise StoreError(
+            f"{root.at(folder)} is missing, though recordings name it: run {command('render')}"
+        ) from None
     for view, camera in recording.cameras.items():
         offset = np.array(camera.get("body_from_camera", np.eye(4)), np.float64)[:3, 3]
         if offset.any():

@@ -39,12 +39,12 @@ class Trajectories:
 
     A sample ends at one step of a trajectory and looks back over `past` steps; T = past + 1. All arrays lead with T:
 
-    - ``rgb`` (T, views, H, W, 3) uint8, ``depth_m`` (T, views, H, W) float32, metres, 0 where nothing is in range
+    - ``rgb`` (T, views, H, W, 3) uint8; ``depth_m`` (T, views, H, W) float32, metres, 0 where nothing is in range
     - ``action`` (T,) int64: what the reference does there, 0 to 15; ``previous_action``: 16 at the first step
     - ``remaining_actions`` (T,) int32; ``odometry`` (T, 4) float32: x forward, y left, z up in metres and yaw in
       radians, from the start pose and in its frame, which an agent can reckon from its actions
     - ``mask`` (T,) bool: False before the trajectory's first step, where everything else is 0
-    - ``text``, ``tokens`` (length,) int64 or ``image`` (h, w, 3) uint8, as `goal` says; ``has_image`` bool beside that
+    - ``text``, ``tokens`` (length,) int64 or ``image`` (h, w, 3) uint8, as `goal` says; ``has_image`` bool beside
     - ``nav_id`` and ``step`` (int64), which the sample ends at
     - of `privileged`, which no agent may know: ``pose`` (T, 4) float64; ``goal_distance_m`` (T,) float32, the length
       of the shortest way that can be flown; by ``"actions"`` ``action_collides``, ``action_refused`` (T, 16) bool and
@@ -136,13 +136,18 @@ class Trajectories:
         max_depth_m: float = 65.535,
     ) -> None:
         self._root = open_root(release)
-        self.goal, self.privileged = _chosen("goal", goal, GOALS), _chosen("privileged column", privileged, PRIVILEGED)
+        self.goal, self.privileged = (
+            _chosen("goal", goal, GOALS),
+            _chosen("privileged column", privileged, PRIVILEGED),
+        )
         if source not in SOURCES:
             raise UsageError(unknown("no source", source, SOURCES))
         if (past is not None and past < 0) or stride < 1 or cache_gb < 0:
             raise UsageError("past and cache_gb are at least 0, stride at least 1")
         width, height = (size, size) if isinstance(size, int) else size
-        self.sensors = Sensors(_chosen("view", views, VIEWS, keep=True), rgb, depth, width, height, max_depth_m=max_depth_m)
+        self.sensors = Sensors(
+            _chosen("view", views, VIEWS, keep=True), rgb, depth, width, height, max_depth_m=max_depth_m
+        )
         # One modality alone where it is the only one asked for: both instances have the same trajectory.
         modalities = ("image",) if self.goal == ("image",) else ()
         chosen = Selection(_names(split), _names(setting), modalities, _names(scene), None, seed)
@@ -293,7 +298,9 @@ class Trajectories:
         if self._source is None:
             return Frames(None, None)
         # Windows overlap: what two samples of a batch share is drawn once, a scene after the other.
-        keys, back = np.unique(np.stack([self.index.scene[trajectories], trajectories, steps]), axis=1, return_inverse=True)
+        keys, back = np.unique(
+            np.stack([self.index.scene[trajectories], trajectories, steps]), axis=1, return_inverse=True
+        )
         parts = [
             self._source.frames(*keys[1:, keys[0] == scene].astype(np.int64)) for scene in np.unique(keys[0])
         ]  # fmt: skip
@@ -369,7 +376,9 @@ def collate(samples: Sequence[dict[str, Any]]) -> dict[str, Any]:
         elif name in _WHOLE:
             out[name] = np.stack(values)
         else:
-            out[name] = np.stack([np.concatenate([np.zeros((window - len(v), *v.shape[1:]), v.dtype), v]) for v in values])
+            out[name] = np.stack(
+                [np.concatenate([np.zeros((window - len(v), *v.shape[1:]), v.dtype), v]) for v in values]
+            )
     return out
 
 

@@ -75,7 +75,12 @@ class GlBodies:
         self._cullings = [BodyCulling(kind) for _, kind, _ in renderer._sets]
 
     def draw(
-        self, camera: Camera, poses: Floats, views: Sequence[str], rgb: NDArray[np.uint8], depth_m: NDArray[np.float32]
+        self,
+        camera: Camera,
+        poses: Floats,
+        views: Sequence[str],
+        rgb: NDArray[np.uint8],
+        depth_m: NDArray[np.float32],
     ) -> None:
         """Fill ``rgb`` (n, views, H, W, 3) and ``depth_m`` (n, views, H, W); see `draw_bodies`."""
         from aerialdojo_gen.rendering.gl import clip_from_world

@@ -1,8 +1,8 @@
-"""What all cameras of a body draw, chosen in one pass: they share their centre, so that a triangle's side is asked once.
+"""What all cameras of a body draw, chosen in one pass: they share their centre.
 
 OpenGL in software takes a microsecond for a triangle, however few pixels of it are seen, and a small picture has few
-pixels. So the nearest triangles are drawn here too, their depth alone, and what lies behind it everywhere is left out,
-whole chunks first. OpenGL draws the rest and decides: what is left out could not have been seen, by margins that
+pixels. So triangles are drawn here too, the nearest first and their depth alone, and what lies behind it everywhere
+is left out, whole chunks at once. OpenGL draws the rest and decides: what is left out could not have been seen, by margins that
 exceed what OpenGL rounds.
 """
 
@@ -67,7 +67,9 @@ class BodyCulling:
         order = order[np.argsort(_away(order, eye, c.low, c.high), kind="stable")]
         if len(self._out) < len(clips):
             self._out = np.empty((len(clips), len(c.vertices)), np.uint32)
-        counts = _triangles_seen(order, inside, c.starts, c.planes, self._corners, clips, eye, c.low, c.high, nearness, self._out)
+        counts = _triangles_seen(
+            order, inside, c.starts, c.planes, self._corners, clips, eye, c.low, c.high, nearness, self._out
+        )
         return [self._out[v, :n] for v, n in enumerate(counts.tolist())]
 
 
@@ -230,7 +232,14 @@ def _covers(
                 here = most if flat else min(max(n, least), most)
                 if here + slack >= nearness[y, x]:
                     visible = True
-                    if e0 > s0 and e1 > s1 and e2 > s2 and not flat and most <= _NEAREST and here - slack > nearness[y, x]:
+                    if (
+                        e0 > s0
+                        and e1 > s1
+                        and e2 > s2
+                        and not flat
+                        and most <= _NEAREST
+                        and here - slack > nearness[y, x]
+                    ):
                         nearness[y, x] = here - slack
             e0 -= b0
             e1 -= b1

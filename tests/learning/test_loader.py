@@ -4,6 +4,7 @@ import os
 import signal
 import subprocess
 import sys
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -46,7 +47,7 @@ def test_epochs_and_seeds_differ_and_repeat():
     orders = {(s, e): list(Order(scene, first, 16, seed=s, epoch=e)) for s in (0, 1) for e in (0, 1)}
     assert len({str(o) for o in orders.values()}) == 4
     assert orders[1, 0] == list(Order(scene, first, 16, seed=1, epoch=0))
-    assert list(Order(scene, first, 100, shuffle=False))[0] == list(range(100))
+    assert next(iter(Order(scene, first, 100, shuffle=False))) == list(range(100))
 
 
 def test_a_worker_has_one_scene_open_as_long_as_a_block():
@@ -56,7 +57,7 @@ def test_a_worker_has_one_scene_open_as_long_as_a_block():
     for worker in (0, 1):
         own = [scene[np.searchsorted(first, np.array(b), side="right") - 1] for b in batches[worker::2]]
         changes = sum(int((np.diff(b) != 0).sum()) for b in own)
-        switches = sum(a[-1] != b[0] for a, b in zip(own, own[1:], strict=False))
+        switches = sum(a[-1] != b[0] for a, b in pairwise(own))
         assert changes + switches <= len(batches) * 32 / 500 + 20
 
 
@@ -106,7 +107,9 @@ def test_a_loader_goes_on_within_an_epoch(data):
 def test_a_state_of_another_loader_is_refused(smoke, data):
     state = Loader(data, 16).state_dict()
     other = Trajectories(smoke, split="all", size=32, limit=10)
-    with pytest.raises(StoreError, match=rf"its fingerprint is {data.fingerprint}, and here it is {other.fingerprint}"):
+    with pytest.raises(
+        StoreError, match=rf"its fingerprint is {data.fingerprint}, and here it is {other.fingerprint}"
+    ):
         Loader(other, 16).load_state_dict(state)
     with pytest.raises(StoreError, match="its batch_size is 16, and here it is 8"):
         Loader(data, 8).load_state_dict(state)
@@ -159,11 +162,12 @@ def test_workers_give_what_this_process_gives(data, context):
     alone = list(Loader(data, 16, seed=3))
     if context == "fork":
         # This process has drawn: only one that has not can be forked.
-        code = (
-            "import sys; from test_loader import forked; forked(sys.argv[1])"
-        )
+        code = "import sys; from test_loader import forked; forked(sys.argv[1])"
         done = subprocess.run(
-            [sys.executable, "-c", code, str(data._root)], cwd=os.path.dirname(__file__), capture_output=True, text=True
+            [sys.executable, "-c", code, str(data._root)],
+            cwd=os.path.dirname(__file__),
+            capture_output=True,
+            text=True,
         )
         assert done.returncode == 0, done.stderr
         return

@@ -178,7 +178,10 @@ def test_goals_as_text_tokens_and_pictures(smoke):
     sample = data[11]
     found = release.task(sample["nav_id"])
     words = found.instances[0]
-    assert sample["text"] == f"{words['target_name']}, {words['direction']} of {words['landmark']}. {words['description']}"
+    assert (
+        sample["text"]
+        == f"{words['target_name']}, {words['direction']} of {words['landmark']}. {words['description']}"
+    )
     assert (sample["image"] == release.picture(sample["nav_id"])).all()
     assert sample["has_image"]
     back = [data.vocabulary.words[n - 2] for n in sample["tokens"] if n]
