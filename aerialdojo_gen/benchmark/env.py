@@ -8,6 +8,7 @@ from typing import Any
 
 import gymnasium
 import numpy as np
+import pyarrow as pa
 import pyarrow.compute as pc
 from gymnasium import spaces
 from numpy.typing import NDArray
@@ -16,13 +17,21 @@ from aerialdojo_gen.agents.goal import N_ACTIONS, Sensors
 from aerialdojo_gen.benchmark.episode import Episode
 from aerialdojo_gen.benchmark.eyes import look, mosaic
 from aerialdojo_gen.benchmark.flight import Flight
-from aerialdojo_gen.benchmark.tasks import MODALITIES, Selection, check_tell, read_tasks, reference_image, select
+from aerialdojo_gen.benchmark.tasks import (
+    MODALITIES,
+    Selection,
+    Task,
+    check_tell,
+    read_tasks,
+    reference_image,
+    select,
+)
 from aerialdojo_gen.benchmark.texts import GoalText
 from aerialdojo_gen.common.names import unknown
 from aerialdojo_gen.config.agreement import SUCCESS_RADIUS_M
 from aerialdojo_gen.config.sections import Embodiment
 from aerialdojo_gen.errors import UsageError
-from aerialdojo_gen.store.root import Where, open_root
+from aerialdojo_gen.store.root import DataRoot, Where, open_root
 from aerialdojo_gen.store.schemas import DIRECTIONS, VIEWS
 
 _TEXT = ("target_name", "landmark", "description")
@@ -118,6 +127,26 @@ class AerialDojoEnv(gymnasium.Env[dict[str, Any], np.int64]):
         self.observation_space: spaces.Dict = self._observations()
 
     @property
+    def data(self) -> DataRoot:
+        """The data root."""
+        return self._data
+
+    @property
+    def scenes(self) -> list[str]:
+        """Names of the scenes that have tasks to draw, sorted."""
+        return sorted(pc.unique(self._rows["scene"]).to_pylist())
+
+    def task_ids(self, scenes: Sequence[str]) -> list[str]:
+        """Ids of the tasks to draw from that are in some scenes, sorted."""
+        own = self._rows.filter(pc.is_in(self._rows["scene"], pa.array(list(scenes), pa.string())))
+        return sorted(own["task_id"].to_pylist())
+
+    def told(self) -> list[tuple[str, str, str, str | None]]:
+        """Goals in words, of all tasks to draw from: target, landmark, direction, description or None."""
+        words = self._rows.group_by([*_TEXT[:2], "direction", _TEXT[2]]).aggregate([]).to_pylist()
+        return [(w["target_name"], w["landmark"], w["direction"], w["description"]) for w in words]
+
+    @property
     def n_tasks(self) -> int:
         """Number of tasks that episodes are drawn from."""
         return int(self._rows.num_rows)
@@ -208,6 +237,18 @@ class AerialDojoEnv(gymnasium.Env[dict[str, Any], np.int64]):
         if not self._begun:
             raise RuntimeError("no episode is under way: call reset first")
         return self._flight.episode
+
+    @property
+    def task(self) -> Task:
+        """The task under way with its goal: the evaluator's, not for agents; RuntimeError where none was begun."""
+        if not self._begun:
+            raise RuntimeError("no episode is under way: call reset first")
+        return self._flight.task
+
+    @property
+    def radius_m(self) -> float:
+        """Radius of the body's collision sphere, metres."""
+        return self._flight.space.radius_m
 
     def _find(self, task_id: str) -> int:
         if self._index is None:

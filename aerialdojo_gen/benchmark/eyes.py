@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from aerialdojo_gen.agents.goal import Sensors
 from aerialdojo_gen.benchmark.motion import Point
 from aerialdojo_gen.errors import RenderError
-from aerialdojo_gen.geometry.cameras import view_pose
-from aerialdojo_gen.rendering.backend import Renderer, kept_renderer
+from aerialdojo_gen.rendering.backend import Renderer, choose_renderer, kept_renderer
+from aerialdojo_gen.rendering.bodies import draw_bodies
 from aerialdojo_gen.scenes.model import Scene
 
 Pictures = dict[str, NDArray[np.uint8]]
@@ -22,7 +22,8 @@ Depths = dict[str, NDArray[np.float32]]
 _drawn_by_gl: list[int] = []
 
 
-def _renderer(scene: Scene, name: str) -> Renderer:
+def drawing(scene: Scene, name: str) -> Renderer:
+    """Return what draws a scene in this process; RenderError in a fork of one that has drawn."""
     if _drawn_by_gl and os.getpid() not in _drawn_by_gl:
         raise RenderError(
             "this process was forked from one that has drawn by OpenGL: start it by spawn "
@@ -32,6 +33,22 @@ def _renderer(scene: Scene, name: str) -> Renderer:
     if renderer.name == "gl":
         _drawn_by_gl[:] = [os.getpid()]
     return renderer
+
+
+def renderer_name(name: str) -> str:
+    """Return the name of what draws in this process; ``"auto"`` is the fastest that works here."""
+    if name != "auto":
+        return name
+    chosen = choose_renderer().name
+    # To choose it a scene was drawn.
+    if not _drawn_by_gl:
+        _drawn_by_gl[:] = [os.getpid()]
+    return chosen
+
+
+def has_drawn() -> bool:
+    """Whether this process has drawn by OpenGL, so that a fork of it could not."""
+    return bool(_drawn_by_gl)
 
 
 def look(
@@ -60,14 +77,14 @@ def look(
     depth_m: Depths = {}
     if sensors.blind:
         return rgb, depth_m
-    takes = _renderer(scene, renderer)
-    for view in sensors.views:
-        picture = takes.render(sensors.camera, view_pose(position, yaw_rad, view))
+    pose = np.array([[*position, yaw_rad]])
+    pictures, depths = draw_bodies(drawing(scene, renderer), sensors.camera, pose, sensors.views)
+    for v, view in enumerate(sensors.views):
         if sensors.rgb:
-            rgb[view] = picture.rgb
+            rgb[view] = pictures[0, v]
         if sensors.depth:
-            within = picture.depth_m <= np.float32(sensors.max_depth_m)
-            depth_m[view] = np.where(within, picture.depth_m, np.float32(0.0))
+            within = depths[0, v] <= np.float32(sensors.max_depth_m)
+            depth_m[view] = np.where(within, depths[0, v], np.float32(0.0))
     return rgb, depth_m
 
 

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from aerialdojo_gen.errors import RenderError
 from aerialdojo_gen.geometry.cameras import Camera
 from aerialdojo_gen.rendering import gl_shaders as glsl
+from aerialdojo_gen.rendering.bodies import GlBodies
 from aerialdojo_gen.rendering.gl_geometry import VERTEX, chunks
 from aerialdojo_gen.rendering.lighting import light_of, sun_view
 from aerialdojo_gen.rendering.picture import FAR_M, NEAR_M, Picture
@@ -85,7 +86,8 @@ class GlRenderer:
         self.device = device()
         self._owned: list[Any] = []
         self._arrays: dict[tuple[str, ...], Any] = {}
-        self._targets: dict[tuple[int, int, bool], Any] = {}
+        self._targets: dict[tuple[int, int, bool, int], Any] = {}
+        self._bodies: GlBodies | None = None
         textured, flat, layers = chunks(scene)
         self._sets = [
             (tags, kind, self._own(self._gl.buffer(kind.vertices.tobytes())))
@@ -162,34 +164,67 @@ class GlRenderer:
                 for v, indices in zip(views, found, strict=True):
                     seen[v].append(indices)
         # One target for all: what a view leaves in the processor's cache serves the next.
-        target = self._target(camera.width, camera.height, instances)
-        pictures = []
-        for clip, pose, chosen in zip(clips, poses, seen, strict=True):
-            self._draw(target, camera, clip, pose, chosen, instances)
-            pictures.append(_read(target, camera, instances))
-        return pictures
+        return [
+            _read(self.draw_seen(camera, pose, clip, chosen, instances), camera, instances)
+            for clip, pose, chosen in zip(clips, poses, seen, strict=True)
+        ]
 
-    def _draw(
-        self, target: Any, camera: Camera, clip: Floats, pose: Floats, seen: list[NDArray[np.uint32]], instances: bool
-    ) -> None:
+    def bodies(self) -> GlBodies:
+        """Return what draws many small pictures in a row with this renderer."""
+        if self._bodies is None:
+            self._bodies = GlBodies(self)
+        return self._bodies
+
+    def draw_seen(
+        self,
+        camera: Camera,
+        world_from_camera: Floats,
+        clip: Floats,
+        seen: Sequence[NDArray[np.uint32]],
+        instances: bool = False,
+        slot: int = 0,
+    ) -> Any:
+        """Draw triangles that were chosen, and the sky behind them.
+
+        Parameters
+        ----------
+        camera : Camera
+        world_from_camera : (4, 4) float64
+        clip : (4, 4) float64
+            Of `clip_from_world`.
+        seen : sequence of (3 k,) uint32
+            Indices into the vertices of each kind of surface.
+        instances : bool
+            Whether the picture has an instance id map.
+        slot : int
+            Which of several targets of this size: what is drawn in another stays.
+
+        Returns
+        -------
+        moderngl.Framebuffer
+            The target; who reads it waits until it is drawn.
+        """
+        target = self._target(camera.width, camera.height, instances, slot)
+        eye = world_from_camera[:3, 3]
         self._begin(target)
         if self._textures is not None:
             self._textures.use(0)
         self._shadow.use(1)
         tags = ("INSTANCES",) if instances else ()
-        for (own_tags, _, buffer), indices in zip(self._sets, seen, strict=True):
-            if not len(indices):
+        for (own_tags, _, buffer), chosen in zip(self._sets, seen, strict=True):
+            if not len(chosen):
                 continue
             array = self._array((*own_tags, *tags), buffer)
-            _set(array.program, clip_from_world=_columns(clip), eye=pose[:3, 3], focal_px=camera.focal_px)
+            _set(array.program, clip_from_world=_columns(clip), eye=eye, focal_px=camera.focal_px)
             self._indices.orphan()
-            self._indices.write(indices)
-            array.render(vertices=len(indices))
+            self._indices.write(chosen)
+            array.render(vertices=len(chosen))
         self._gl.disable(self._gl.CULL_FACE)
         sky = self._array(("SKY", *tags), None)
         reach = np.array([camera.width, camera.height]) / 2.0 / camera.focal_px
-        _set(sky.program, world_from_camera=_columns(pose[:3, :3]), reach=reach)
+        _set(sky.program, world_from_camera=_columns(world_from_camera[:3, :3]), reach=reach)
         sky.render(vertices=3)
+        return target
 
     def _array(self, tags: tuple[str, ...], buffer: Any) -> Any:
         """Return the vertex array of a program and its buffer, made when it is first needed."""
@@ -205,8 +240,8 @@ class GlRenderer:
             self._arrays[tags] = self._own(self._gl.vertex_array(program, content, index_buffer=indices))
         return self._arrays[tags]
 
-    def _target(self, width: int, height: int, instances: bool) -> Any:
-        key = (width, height, instances)
+    def _target(self, width: int, height: int, instances: bool, slot: int) -> Any:
+        key = (width, height, instances, slot)
         if key not in self._targets:
             gl, size = self._gl, (width, height)
             colours = [gl.renderbuffer(size, 4), gl.renderbuffer(size, 1, dtype="f4")]
@@ -222,7 +257,7 @@ class GlRenderer:
         """Free the renderer's memory; a second call does nothing."""
         while self._owned:
             self._owned.pop().release()
-        self._arrays, self._targets = {}, {}
+        self._arrays, self._targets, self._bodies = {}, {}, None
 
     def __enter__(self) -> GlRenderer:
         """Return itself."""

@@ -1,0 +1,117 @@
+"""How far it is to a goal on ways that the body can fly: for rewards and teachers; no agent may know it."""
+
+from __future__ import annotations
+
+import math
+from collections import OrderedDict
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from aerialdojo_gen.agents.goal import N_ACTIONS
+from aerialdojo_gen.benchmark.motion import FlightSpace, flight_space
+from aerialdojo_gen.geometry.motion import replay
+from aerialdojo_gen.planning.attempt import costs_at
+from aerialdojo_gen.planning.cost_to_go import columns_by_distance, expand_cost, seed_goal
+from aerialdojo_gen.planning.preference import NO_PREFERENCE
+from aerialdojo_gen.scenes.context import context_of
+from aerialdojo_gen.store.schemas import STOP
+
+Floats = NDArray[np.float64]
+
+# Ways longer than this are not found, metres: the longest tasks have routes of 100 m, and who strays flies farther.
+_FARTHEST_M = 200.0
+# How far from the goal a way over the grid may end: what a reference's Approach flies at most, metres.
+_REACH_M = 1.0
+# Fields that a scene keeps, some ten megabytes each.
+_KEPT = 8
+
+
+class Geodesic:
+    """Lengths of shortest ways to the goals of a scene.
+
+    Parameters
+    ----------
+    space : FlightSpace
+        The scene and its grid: ways lead where the environment lets the body fly.
+    """
+
+    def __init__(self, space: FlightSpace) -> None:
+        self._space, self._grid = space, space.grid
+        self._plain = np.zeros(self._grid.moves.shape, np.float32)
+        self._order = columns_by_distance(math.ceil((_FARTHEST_M + 2 * _REACH_M) / self._grid.arrays.cell))
+        self._fields: OrderedDict[tuple[float, ...], NDArray[np.float32]] = OrderedDict()
+
+    def distances_m(self, goal: ArrayLike, points: ArrayLike) -> Floats:
+        """Lengths of the shortest ways from points to a goal, in the planner's metric.
+
+        Parameters
+        ----------
+        goal : (3,) float
+            Metres, world frame.
+        points : (n, 3) float
+            Metres, world frame.
+
+        Returns
+        -------
+        (n,) float64
+            Metres, horizontal and vertical ones added as actions fly them; at least the straight distance, infinite
+            where no way of up to 200 m leads. Ways run over a grid of half a metre: to within a percent or so.
+        """
+        g, p = np.asarray(goal, np.float64), np.asarray(points, np.float64).reshape(-1, 3)
+        found = np.asarray(costs_at(np.ascontiguousarray(p), self._grid.arrays, self._field(g)))
+        return np.maximum(found, np.linalg.norm(p - g, axis=1))
+
+    def actions(self, goal: ArrayLike, poses: ArrayLike) -> tuple[NDArray[np.bool_], NDArray[np.bool_], Floats]:
+        """What each of the 16 actions would do at some poses.
+
+        Parameters
+        ----------
+        goal : (3,) float
+            Metres, world frame.
+        poses : (n, 4) float
+            x, y, z in metres and yaw in radians, world frame; free of collision.
+
+        Returns
+        -------
+        collides, refused : (n, 16) bool
+            The action touches a surface; it would leave the flight volume, and moves nothing.
+        cost_to_go_m : (n, 16) float64
+            Shortest way from where the action leads; infinite where it collides. A refused one leads nowhere else;
+            a turn and Stop cost what the pose itself does.
+        """
+        p = np.asarray(poses, np.float64).reshape(-1, 4)
+        ends = np.array([[replay(pose, [a])[-1, :3] for a in range(N_ACTIONS)] for pose in p]).reshape(
+            -1, N_ACTIONS, 3
+        )
+        collides, refused = np.zeros((2, len(p), N_ACTIONS), np.bool_)
+        for k, pose in enumerate(p[:, :3].tolist()):
+            here = (pose[0], pose[1], pose[2])
+            for a in range(N_ACTIONS):
+                x, y, z = ends[k, a].tolist()
+                if a != STOP and (x, y, z) != here:
+                    _, collides[k, a], refused[k, a] = self._space.fly(here, (x, y, z))
+            ends[k, refused[k]] = p[k, :3]
+        cost = self.distances_m(goal, ends.reshape(-1, 3)).reshape(-1, N_ACTIONS)
+        return collides, refused, np.where(collides, np.inf, cost)
+
+    def _field(self, goal: Floats) -> NDArray[np.float32]:
+        key = tuple(goal.tolist())
+        if key in self._fields:
+            self._fields.move_to_end(key)
+            return self._fields[key]
+        grid = self._grid
+        cost = np.full(grid.moves.shape, np.inf, np.float32)
+        seeds = seed_goal(*goal, 0.0, _REACH_M, grid.radius_m, grid.arrays, grid.moves, cost, NO_PREFERENCE)
+        expand_cost(seeds, self._order, _FARTHEST_M, grid.arrays.cell, grid.moves, cost, self._plain)
+        while len(self._fields) >= _KEPT:
+            self._fields.popitem(last=False)
+        self._fields[key] = cost
+        return cost
+
+
+def geodesic(mesh: Path, sha256: str, radius_m: float = 0.25) -> Geodesic:
+    """Return a scene's distances, a part of its context; parameters as for `flight_space`."""
+    space = flight_space(mesh, sha256, radius_m)
+    return context_of(space.scene).part("geodesic", lambda: Geodesic(space), radius_m)

@@ -1,0 +1,223 @@
+"""Which trajectories are learned from: the release's tables as few flat arrays, some MB for all routes."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
+from numpy.typing import NDArray
+
+from aerialdojo_gen.benchmark.tasks import Selection, select
+from aerialdojo_gen.common.advice import command
+from aerialdojo_gen.common.names import unknown
+from aerialdojo_gen.errors import StoreError, UsageError
+from aerialdojo_gen.geometry.motion import replay
+from aerialdojo_gen.store import shards as store
+from aerialdojo_gen.store.root import DataRoot
+from aerialdojo_gen.store.schemas import APPROACH, STOP
+
+_SIDES = ("train", "test")
+_GOAL = ("goal_x_m", "goal_y_m", "goal_z_m")
+_START = ("start_x_m", "start_y_m", "start_z_m", "start_yaw_rad")
+_TOLD = ("target_name", "landmark", "direction")
+
+
+@dataclass(frozen=True, eq=False)
+class Index:
+    """The trajectories of a selection, sorted by scene and navigation task.
+
+    Attributes
+    ----------
+    scenes : tuple of str
+        Their scenes, sorted.
+    scene : (n,) int32
+        Of every trajectory, an index of `scenes`.
+    nav_id : list of str
+    actions : (m,) int8
+        Of all trajectories one after the other: 0 to 15, the last of each a Stop.
+    first : (n + 1,) int64
+        Where each trajectory's begin.
+    start : (n, 4) float64
+        Start poses: x, y, z in metres and yaw in radians, world frame.
+    goal : (n, 3) float64
+        Goal anchors, metres, world frame.
+    budget : (n,) int32
+        Most actions, Stop included.
+    told : dict of str to list
+        ``target_name``, ``landmark``, ``direction``, ``description`` (None without a semantic instance) and
+        ``reference_image_id`` (None without an image instance).
+    """
+
+    scenes: tuple[str, ...]
+    scene: NDArray[np.int32]
+    nav_id: list[str]
+    actions: NDArray[np.int8]
+    first: NDArray[np.int64]
+    start: NDArray[np.float64]
+    goal: NDArray[np.float64]
+    budget: NDArray[np.int32]
+    told: dict[str, list[str | None]]
+
+    def __len__(self) -> int:
+        """Return the number of trajectories."""
+        return len(self.nav_id)
+
+    @property
+    def steps(self) -> NDArray[np.int64]:
+        """Actions of every trajectory, Stop included, (n,) int64."""
+        return np.diff(self.first)
+
+    def actions_of(self, k: int) -> NDArray[np.int8]:
+        """Actions of trajectory k, Stop included."""
+        return self.actions[self.first[k] : self.first[k + 1]]
+
+    def poses_of(self, k: int) -> NDArray[np.float64]:
+        """Poses before every action of trajectory k, (steps, 4) float64, as the environment flies them."""
+        return replay(self.start[k], self.actions_of(k)[:-1])
+
+    @cached_property
+    def digest(self) -> str:
+        """SHA-256, hexadecimal, of all that a sample's labels come from."""
+        found = hashlib.sha256("\n".join(self.nav_id).encode())
+        for array in (self.actions, self.first, self.start, self.goal, self.budget):
+            found.update(np.ascontiguousarray(array).tobytes())
+        for name, texts in sorted(self.told.items()):
+            found.update(f"{name}\0{texts}".encode())
+        return found.hexdigest()
+
+    def take(self, rows: NDArray[np.int64]) -> Index:
+        """Keep some trajectories, in their order."""
+        pieces = [self.actions_of(int(k)) for k in rows]
+        names = sorted({self.scenes[self.scene[k]] for k in rows})
+        place = {name: i for i, name in enumerate(names)}
+        return Index(
+            tuple(names),
+            np.array([place[self.scenes[self.scene[k]]] for k in rows], np.int32),
+            [self.nav_id[k] for k in rows],
+            np.concatenate([*pieces, np.empty(0, np.int8)]),
+            np.concatenate([[0], np.cumsum([len(p) for p in pieces], dtype=np.int64)]).astype(np.int64),
+            self.start[rows], self.goal[rows], self.budget[rows],
+            {name: [texts[k] for k in rows] for name, texts in self.told.items()},
+        )  # fmt: skip
+
+
+def read_index(root: DataRoot, selection: Selection, target_split: str | None = None) -> Index:
+    """Read the trajectories of a selection.
+
+    Parameters
+    ----------
+    root : DataRoot
+        With a release.
+    selection : Selection
+        Of tasks; the two instances of a navigation task are one trajectory, and a limit counts trajectories.
+    target_split : str, optional
+        ``train`` or ``test`` of the split by objects.
+
+    Returns
+    -------
+    Index
+
+    Raises
+    ------
+    UsageError
+        No task fits, or the release has no split by objects.
+    StoreError
+        There is no release, a part of it is damaged, or tasks and routes do not belong together.
+    """
+    if target_split is not None and target_split not in _SIDES:
+        raise UsageError(unknown("no side of the split by objects", target_split, _SIDES))
+    chosen = select(root, selection)
+    parts = []
+    for scene in sorted(pc.unique(chosen["scene"]).to_pylist()):
+        here = chosen.filter(pc.equal(chosen["scene"], scene))
+        parts.append(_scene(root, scene, here, target_split))
+    found = _joined([part for part in parts if len(part)])
+    if not len(found):
+        raise UsageError(f"no task of the selection has the target split {target_split!r}")
+    return found
+
+
+def _scene(root: DataRoot, scene: str, rows: pa.Table, target_split: str | None) -> Index:
+    wanted: dict[str, dict[str, object]] = {}
+    allowed = None if target_split is None else _of_target_split(root, scene, target_split)
+    for row in rows.to_pylist():
+        if allowed is not None and row["nav_id"] not in allowed:
+            continue
+        known = wanted.setdefault(row["nav_id"], row)
+        for name in ("description", "reference_image_id"):
+            known[name] = known[name] or row[name]
+    routes: dict[str, tuple[NDArray[np.int8], list[float]]] = {}
+    for side in sorted({str(row["subset"]) for row in wanted.values()}):
+        routes |= _routes(root, scene, side, wanted)
+    ids = sorted(wanted)
+    for nav_id in ids:
+        if nav_id not in routes:
+            raise StoreError(f"task {nav_id} has no route in {root}/release: run {command('split', scene=scene)}")
+    pieces = [routes[nav_id][0] for nav_id in ids]
+    return Index(
+        (scene,),
+        np.zeros(len(ids), np.int32),
+        ids,
+        np.concatenate([*pieces, np.empty(0, np.int8)]),
+        np.concatenate([[0], np.cumsum([len(p) for p in pieces])]).astype(np.int64),
+        np.array([[wanted[i][c] for c in _START] for i in ids], np.float64).reshape(-1, 4),
+        np.array([routes[i][1] for i in ids], np.float64).reshape(-1, 3),
+        np.array([wanted[i]["action_budget"] for i in ids], np.int32),
+        {name: [wanted[i][name] for i in ids] for name in (*_TOLD, "description", "reference_image_id")},  # type: ignore[misc]
+    )
+
+
+def _routes(
+    root: DataRoot, scene: str, side: str, wanted: dict[str, dict[str, object]]
+) -> dict[str, tuple[NDArray[np.int8], list[float]]]:
+    columns = ("nav_id", "action", "agent_action", *_GOAL)
+    table = store.read_stored(root, f"routes/{side}", scene, columns)
+    table = table.filter(pc.is_in(table["nav_id"], pa.array(list(wanted), pa.string())))
+    own = table["agent_action"].to_pylist() if "agent_action" in table.column_names else [None] * table.num_rows
+    found = {}
+    for k, nav_id in enumerate(table["nav_id"].to_pylist()):
+        # A release of an older version has the reference's actions alone: an agent has no Approach.
+        row = own[k] if own[k] is not None else [a for a in table["action"][k].as_py() if a != APPROACH]
+        actions = np.array(row, np.int8)
+        if not len(actions) or actions[-1] != STOP or (actions[:-1] == STOP).any() or actions.max() >= APPROACH:
+            raise StoreError(
+                f"the actions of route {nav_id} do not end in their one Stop: run {command('validate', scene=scene)}"
+            )
+        found[nav_id] = (actions, [table[name][k].as_py() for name in _GOAL])
+    return found
+
+
+def _of_target_split(root: DataRoot, scene: str, side: str) -> set[str]:
+    found: set[str] = set()
+    for subset in _SIDES:
+        table = store.read_stored(root, f"tasks/{subset}", scene, ("nav_id", "target_split"))
+        if "target_split" not in table.column_names or table["target_split"].null_count:
+            raise UsageError(
+                f"the release in {root} has no split by objects for {scene}: it was made by an older version"
+            )
+        found |= set(table.filter(pc.equal(table["target_split"], side))["nav_id"].to_pylist())
+    return found
+
+
+def _joined(parts: Sequence[Index]) -> Index:
+    if not parts:
+        nothing = np.empty(0, np.int32)
+        return Index((), nothing, [], np.empty(0, np.int8), np.zeros(1, np.int64), np.empty((0, 4)), np.empty((0, 3)),
+                     nothing, {})  # fmt: skip
+    shifts = np.cumsum([0, *(len(p.actions) for p in parts)])
+    return Index(
+        tuple(p.scenes[0] for p in parts),
+        np.concatenate([np.full(len(p), i, np.int32) for i, p in enumerate(parts)]),
+        [nav_id for p in parts for nav_id in p.nav_id],
+        np.concatenate([p.actions for p in parts]),
+        np.concatenate([[0], *(p.first[1:] + s for p, s in zip(parts, shifts, strict=False))]).astype(np.int64),
+        np.concatenate([p.start for p in parts]),
+        np.concatenate([p.goal for p in parts]),
+        np.concatenate([p.budget for p in parts]),
+        {name: [t for p in parts for t in p.told[name]] for name in parts[0].told},
+    )

@@ -1,0 +1,214 @@
+"""Batches for training: in order, from worker processes where wanted, and resumable within an epoch."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from aerialdojo_gen.benchmark.eyes import has_drawn
+from aerialdojo_gen.errors import AerialDojoError, StoreError, UsageError, first_line
+from aerialdojo_gen.learning.order import Order
+from aerialdojo_gen.learning.trajectories import Trajectories
+
+_MEND = "install the extra: pip install 'aerialdojo-gen[train]'"
+_STATE = {"seed", "epoch", "batch", "batch_size", "fingerprint"}
+
+
+class WorkerDied(AerialDojoError):  # noqa: N818 - it says what happened
+    """A worker process of a loader ended before its batches were drawn: killed, or out of memory."""
+
+
+class Loader:
+    """The batches of a data set, epoch after epoch; an iteration is what is left of the epoch.
+
+    What comes depends on the data set, `seed`, the epoch and the batch alone: not on the number of workers, and not
+    on what was iterated before. `state_dict` says where it is, and `load_state_dict` goes on there.
+
+    Parameters
+    ----------
+    data : Trajectories
+    batch_size : int
+    workers : int
+        Processes that draw; 0 draws in this one, without torch.
+    seed : int
+        Of the order.
+    tensors : bool
+        Whether arrays come as torch tensors.
+    context : str, optional
+        How workers start: ``"fork"`` or ``"spawn"``. Where absent it is fork, but spawn where this process has
+        drawn by OpenGL, whose forks could not.
+    **how
+        ``block``, ``streams``, ``shuffle``, ``drop_last`` of `aerialdojo_gen.learning.order.Order`.
+
+    Attributes
+    ----------
+    epoch : int
+        The one under way.
+    batches_done : int
+        Of it; batches that were handed out, not those that workers have ready.
+
+    Raises
+    ------
+    UsageError
+        A value makes no sense, or there is no torch for what needs it.
+    """
+
+    def __init__(
+        self,
+        data: Trajectories,
+        batch_size: int = 32,
+        *,
+        workers: int = 0,
+        seed: int = 0,
+        tensors: bool = False,
+        context: str | None = None,
+        **how: Any,
+    ) -> None:
+        if workers < 0:
+            raise UsageError(f"there are 0 or more workers, not {workers}")
+        if context not in (None, "fork", "spawn", "forkserver"):
+            raise UsageError(f"workers start by fork, spawn or forkserver, not by {context!r}")
+        self._data, self._batch_size, self._seed, self._how = data, batch_size, seed, how
+        self._workers, self._tensors, self._context = workers, tensors, context
+        self._torch = torch_package() if workers or tensors else None
+        data.order(batch_size, seed=seed, **how)  # refuses what makes no sense
+        self._sampler = _Sampler()
+        self._loading: Any = None
+        self.epoch = self.batches_done = 0
+
+    def close(self) -> None:
+        """End the workers; the next iteration starts new ones."""
+        self._loading = None
+
+    def __len__(self) -> int:
+        """Return the number of batches of a whole epoch."""
+        return len(self._data.order(self._batch_size, **self._how))
+
+    def __iter__(self) -> Iterator[dict[str, Any]]:
+        """Yield what is left of the epoch; the next iteration is the next epoch.
+
+        Raises
+        ------
+        WorkerDied
+            A worker was killed.
+        """
+        order = self._data.order(
+            self._batch_size, seed=self._seed, epoch=self.epoch, start=self.batches_done, **self._how
+        )
+        batches = self._from_workers(order) if self._workers else (self._data.batch(n) for n in order)
+        for batch in batches:
+            self.batches_done += 1
+            yield as_tensors(batch) if self._tensors and not self._workers else batch
+        self.epoch, self.batches_done = self.epoch + 1, 0
+
+    def state_dict(self) -> dict[str, Any]:
+        """Return where the loader is: JSON, for a checkpoint."""
+        return {
+            "seed": self._seed, "epoch": self.epoch, "batch": self.batches_done, "batch_size": self._batch_size,
+            "fingerprint": self._data.fingerprint,
+        }  # fmt: skip
+
+    def load_state_dict(self, state: Mapping[str, Any]) -> None:
+        """Go on where a state was taken.
+
+        Raises
+        ------
+        StoreError
+            The state is of another data set, seed or size of batches.
+        """
+        own = self.state_dict()
+        if set(state) != _STATE:
+            raise StoreError(f"a loader's state has {', '.join(sorted(_STATE))}, not {', '.join(sorted(state))}")
+        for name in ("fingerprint", "seed", "batch_size"):
+            if state[name] != own[name]:
+                raise StoreError(
+                    f"the state is of another loader: its {name} is {state[name]}, and here it is {own[name]}"
+                )
+        epoch, batch = state["epoch"], state["batch"]
+        if not (isinstance(epoch, int) and isinstance(batch, int) and epoch >= 0 and 0 <= batch <= len(self)):
+            raise StoreError(f"a loader has no batch {batch} of epoch {epoch}")
+        self.epoch, self.batches_done = epoch, batch
+
+    def _from_workers(self, order: Order) -> Iterator[dict[str, Any]]:
+        assert self._torch is not None
+        self._sampler.order = order
+        if self._loading is None:
+            # Kept over the epochs: what a worker has opened stays open.
+            self._loading = self._torch.utils.data.DataLoader(
+                _Batches(self._data),
+                sampler=self._sampler,
+                batch_size=None,
+                num_workers=self._workers,
+                multiprocessing_context=self._context or ("spawn" if has_drawn() else "fork"),
+                worker_init_fn=_one_thread,
+                persistent_workers=True,
+            )
+        try:
+            for batch in self._loading:
+                yield batch if self._tensors else _as_arrays(batch)
+        except RuntimeError as error:
+            # torch has no class for it; what a worker raises itself comes as its own class.
+            if "DataLoader worker" not in str(error):
+                raise
+            self._loading = None
+            raise WorkerDied(
+                f"a worker of the loader died ({first_line(error)}): fewer workers or smaller batches take less "
+                "memory; load_state_dict goes on at the batch"
+            ) from None
+
+
+class _Sampler:
+    """The order of the epoch under way: a DataLoader keeps its sampler."""
+
+    def __init__(self) -> None:
+        self.order: Sequence[list[int]] | Order = ()
+
+    def __len__(self) -> int:
+        """Return the number of batches that are left."""
+        return len(self.order)
+
+    def __iter__(self) -> Iterator[list[int]]:
+        """Yield their samples."""
+        return iter(self.order)
+
+
+class _Batches:
+    """A data set whose items are batches, by the list of their samples."""
+
+    def __init__(self, data: Trajectories) -> None:
+        self._data = data
+
+    def __getitem__(self, numbers: list[int]) -> dict[str, Any]:
+        """Draw a batch."""
+        return as_tensors(self._data.batch(numbers))
+
+
+def torch_package() -> Any:
+    """Import torch; UsageError naming the extra where it is not installed."""
+    try:
+        importlib.import_module("torch.utils.data")
+        return importlib.import_module("torch")
+    except ImportError:
+        raise UsageError(f"worker processes and tensors need PyTorch: {_MEND}") from None
+
+
+def as_tensors(batch: Mapping[str, Any]) -> dict[str, Any]:
+    """Make tensors of a batch's arrays, without copying them; texts stay as they are."""
+    torch = torch_package()
+    return {
+        name: torch.from_numpy(np.ascontiguousarray(value)) if isinstance(value, np.ndarray) else value
+        for name, value in batch.items()
+    }
+
+
+def _as_arrays(batch: Mapping[str, Any]) -> dict[str, Any]:
+    return {name: value.numpy() if hasattr(value, "numpy") else value for name, value in batch.items()}
+
+
+def _one_thread(worker: int) -> None:
+    """Leave the cores to the other workers."""
+    del worker
+    torch_package().set_num_threads(1)

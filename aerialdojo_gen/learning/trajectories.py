@@ -1,0 +1,421 @@
+"""A release as a data set: reference trajectories with what the body sees, what it was told, and what it did."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aerialdojo_gen.agents.goal import N_ACTIONS, Sensors
+from aerialdojo_gen.benchmark.tasks import Selection, mesh_of, reference_image
+from aerialdojo_gen.common import rng
+from aerialdojo_gen.common.names import unknown
+from aerialdojo_gen.errors import UsageError
+from aerialdojo_gen.geometry.angles import wrap_angle_rad
+from aerialdojo_gen.learning.cached import Cached, Store
+from aerialdojo_gen.learning.geodesic import geodesic
+from aerialdojo_gen.learning.index import Index, read_index
+from aerialdojo_gen.learning.order import Order
+from aerialdojo_gen.learning.pictures import Drawn, Frames, Recorded, Source
+from aerialdojo_gen.learning.words import PADDING, Vocabulary, goal_text
+from aerialdojo_gen.store.cache import cache_folder
+from aerialdojo_gen.store.root import Where, open_root
+from aerialdojo_gen.store.schemas import VIEWS
+
+GOALS = ("text", "tokens", "image")
+SOURCES = ("render", "recordings", "auto")
+PRIVILEGED = ("pose", "goal_distance_m", "actions")
+# In the place of the action before the first one.
+NO_ACTION = N_ACTIONS
+
+
+class Trajectories:
+    """Reference trajectories as samples: a map-style data set for ``torch.utils.data.DataLoader``, or without torch.
+
+    A sample ends at one step of a trajectory and looks back over `past` steps; T = past + 1. All arrays lead with T:
+
+    - ``rgb`` (T, views, H, W, 3) uint8; ``depth_m`` (T, views, H, W) float32, metres, 0 where nothing is in range
+    - ``action`` (T,) int64: what the reference does there, 0 to 15; ``previous_action``: 16 at the first step
+    - ``remaining_actions`` (T,) int32; ``odometry`` (T, 4) float32: x forward, y left, z up in metres and yaw in
+      radians, from the start pose and in its frame, which an agent can reckon from its actions
+    - ``mask`` (T,) bool: False before the trajectory's first step, where everything else is 0
+    - ``text``, ``tokens`` (length,) int64 or ``image`` (h, w, 3) uint8, as `goal` says; ``has_image`` bool beside
+    - ``nav_id`` and ``step`` (int64), which the sample ends at
+    - of `privileged`, which no agent may know: ``pose`` (T, 4) float64; ``goal_distance_m`` (T,) float32, the length
+      of the shortest way that can be flown; by ``"actions"`` ``action_collides``, ``action_refused`` (T, 16) bool and
+      ``action_cost_to_go_m`` (T, 16) float32, infinite where the action collides
+
+    Samples come by number (``data[3]``), many at a time (``data.batch([3, 4, 5])``, drawn together), or in order of
+    number (``for sample in data``); `order` has the shuffled batches of an epoch.
+
+    Parameters
+    ----------
+    release : str, Path or DataRoot
+        The data directory, in which ``release/`` lies, and beside it ``meshes/`` and ``media/``.
+    split, setting, scene : str or sequence of str
+        Which tasks; all settings and scenes where absent. Scenes may be globs.
+    target_split : str, optional
+        ``"train"`` or ``"test"`` of the split by objects, where the release has it.
+    limit : int, optional
+        Draw so many trajectories by `seed`, spread over the scenes.
+    views : str or sequence of str
+        Of front, left, right, down.
+    size : int or (int, int)
+        Pixels: edge, or width and height.
+    rgb, depth : bool
+        Which pictures; without both nothing is drawn.
+    goal : str or sequence of str
+        Of ``"text"``, ``"tokens"``, ``"image"``.
+    past : int or None
+        Steps before the last one of a sample; None for whole trajectories, each a sample with a T of its own.
+    stride : int
+        Every so many steps a sample ends, counted back from the Stop: with ``past = stride - 1`` a step is in one
+        sample.
+    privileged : str or sequence of str
+        Of ``"pose"``, ``"goal_distance_m"``, ``"actions"``.
+    source : str
+        ``"render"`` draws pictures from the meshes; ``"recordings"`` takes the trajectories that have a recording,
+        and reads that; ``"auto"`` reads where there is one and draws else. Recorded pictures are lossy and made
+        smaller: they do not equal drawn ones.
+    cache_gb : float
+        Keep pictures in so many gigabytes of the disk; 0 keeps none.
+    cache_dir : str or Path, optional
+        Where; ``learning/`` in ``$AERIALDOJO_CACHE`` where absent.
+    vocabulary : Vocabulary, optional
+        Of the tokens; the words of this selection where absent. Give a test set that of its training set.
+    renderer : str
+        ``"gl"``, ``"pybullet"`` or ``"auto"``.
+    max_depth_m : float
+        Range of the depth camera.
+
+    Attributes
+    ----------
+    index : Index
+        The trajectories.
+    sensors : Sensors
+    vocabulary : Vocabulary
+    fingerprint : str
+        SHA-256 of what samples are made from: the trajectories and the parameters that shape a sample.
+
+    Raises
+    ------
+    UsageError
+        No task fits, or a value makes no sense.
+    StoreError
+        There is no release, or a scene's mesh is missing.
+    """
+
+    def __init__(
+        self,
+        release: Where,
+        split: str | Sequence[str] = "id_train",
+        *,
+        setting: str | Sequence[str] = (),
+        scene: str | Sequence[str] = (),
+        target_split: str | None = None,
+        limit: int | None = None,
+        seed: int = 0,
+        views: str | Sequence[str] = ("front",),
+        size: int | tuple[int, int] = 128,
+        rgb: bool = True,
+        depth: bool = True,
+        goal: str | Sequence[str] = "text",
+        past: int | None = 0,
+        stride: int = 1,
+        privileged: str | Sequence[str] = (),
+        source: str = "render",
+        cache_gb: float = 0.0,
+        cache_dir: str | Path | None = None,
+        vocabulary: Vocabulary | None = None,
+        renderer: str = "auto",
+        max_depth_m: float = 65.535,
+    ) -> None:
+        self._root = open_root(release)
+        self.goal, self.privileged = (
+            _chosen("goal", goal, GOALS),
+            _chosen("privileged column", privileged, PRIVILEGED),
+        )
+        if source not in SOURCES:
+            raise UsageError(unknown("no source", source, SOURCES))
+        if (past is not None and past < 0) or stride < 1 or cache_gb < 0:
+            raise UsageError("past and cache_gb are at least 0, stride at least 1")
+        width, height = (size, size) if isinstance(size, int) else size
+        self.sensors = Sensors(
+            _chosen("view", views, VIEWS, keep=True), rgb, depth, width, height, max_depth_m=max_depth_m
+        )
+        # One modality alone where it is the only one asked for: both instances have the same trajectory.
+        modalities = ("image",) if self.goal == ("image",) else ()
+        chosen = Selection(_names(split), _names(setting), modalities, _names(scene), None, seed)
+        index = read_index(self._root, chosen, target_split)
+        if limit is not None:
+            index = index.take(drawn_evenly(index, limit, seed))
+        # A scene without a mesh is named before the first epoch, not within it.
+        meshes = {name: mesh_of(self._root, name)[1] for name in index.scenes} if not self.sensors.blind else {}
+        self._source = None if self.sensors.blind else Drawn(self._root, index, self.sensors, renderer)
+        if source != "render" and not self.sensors.blind:
+            index = self._with_recordings(index, source, renderer)
+        self.index, self.past, self.stride = index, past, stride
+        ends = np.ones(len(index), np.int64) if past is None else (index.steps - 1) // stride + 1
+        self._first = np.concatenate([[0], np.cumsum(ends)])
+        self._texts = [goal_text(*said) for said in zip(  # type: ignore[arg-type]
+            *(index.told[name] for name in ("target_name", "landmark", "direction", "description")), strict=True
+        )]  # fmt: skip
+        self.vocabulary = vocabulary or Vocabulary.of(self._texts)
+        self._image_shape: tuple[int, ...] | None = None
+        self.fingerprint = self._fingerprint()
+        if cache_gb and not self.sensors.blind:
+            base = Path(cache_dir) if cache_dir is not None else cache_folder() / "learning"
+            assert self._source is not None
+            self._source = Cached(
+                self._source, index, self.sensors, Store(base, int(cache_gb * 1e9), source, renderer), meshes
+            )
+
+    def __len__(self) -> int:
+        """Return the number of samples."""
+        return int(self._first[-1])
+
+    def __getitem__(self, number: int) -> dict[str, Any]:
+        """Return one sample."""
+        return self.__getitems__([number])[0]
+
+    def __getitems__(self, numbers: Sequence[int]) -> list[dict[str, Any]]:
+        """Return samples, drawn together; ``torch.utils.data.DataLoader`` asks for a batch by this."""
+        batch = self.batch(numbers)
+        return [_unbatched(batch, k, self.past is None) for k in range(len(numbers))]
+
+    def __iter__(self) -> Iterator[dict[str, Any]]:
+        """Yield all samples in the order of their numbers."""
+        for begin in range(0, len(self), 32):
+            yield from self.__getitems__(range(begin, min(begin + 32, len(self))))
+
+    def order(self, batch_size: int, *, seed: int = 0, epoch: int = 0, start: int = 0, **how: Any) -> Order:
+        """Return the batches of an epoch, as lists of numbers: a ``batch_sampler``.
+
+        Parameters
+        ----------
+        batch_size : int
+        seed, epoch : int
+        start : int
+            The batch to begin with.
+        **how
+            ``block``, ``streams``, ``shuffle`` and ``drop_last`` of `aerialdojo_gen.learning.order.Order`.
+        """
+        return Order(self.index.scene, self._first, batch_size, seed=seed, epoch=epoch, start=start, **how)
+
+    def place(self, number: int) -> tuple[int, int]:
+        """Return a sample's trajectory, a row of `index`, and the step that it ends at."""
+        if not -len(self) <= number < len(self):
+            raise IndexError(f"there are {len(self):,} samples: {number} is none of them")
+        number %= len(self)
+        k = int(np.searchsorted(self._first, number, side="right")) - 1
+        last = int(self.index.steps[k]) - 1
+        return k, last - self.stride * int(self._first[k + 1] - 1 - number)
+
+    def batch(self, numbers: Sequence[int]) -> dict[str, Any]:
+        """Return samples as one: arrays lead with the sample and T, texts are lists.
+
+        Samples of different T (whole trajectories) are padded at their front to the longest, with ``mask`` False.
+        """
+        places = [self.place(int(number)) for number in numbers]
+        window = max((end + 1 for _, end in places), default=1) if self.past is None else self.past + 1
+        rows = np.array([k for k, _ in places], np.int64)
+        ends = np.array([end for _, end in places], np.int64)
+        steps = ends[:, None] + np.arange(1 - window, 1)
+        mask = steps >= 0
+        out: dict[str, Any] = {"mask": mask, "step": ends, "nav_id": [self.index.nav_id[k] for k, _ in places]}
+        out |= self._told(rows)
+        out |= self._labels(rows, steps, mask)
+        frames = self._frames(np.broadcast_to(rows[:, None], steps.shape)[mask], steps[mask])
+        for name, seen in (("rgb", frames.rgb), ("depth_m", frames.depth_m)):
+            if seen is not None:
+                out[name] = seen.reshape(*mask.shape, *seen.shape[1:]) if mask.all() else _scattered(seen, mask)
+        return out
+
+    def _told(self, rows: NDArray[np.int64]) -> dict[str, Any]:
+        out: dict[str, Any] = {}
+        if "text" in self.goal:
+            out["text"] = [self._texts[k] for k in rows]
+        if "tokens" in self.goal:
+            found = [self.vocabulary.encode(self._texts[k]) for k in rows]
+            out["tokens"] = np.stack(found) if found else np.full((0, self.vocabulary.length), PADDING, np.int64)
+        if "image" in self.goal:
+            pictures = [self._image(int(k)) for k in rows]
+            shape = next((p.shape for p in pictures if p is not None), self._image_shape or (0, 0, 3))
+            self._image_shape = shape
+            out["image"] = np.stack([np.zeros(shape, np.uint8) if p is None else p for p in pictures])
+            out["has_image"] = np.array([p is not None for p in pictures])
+        return out
+
+    def _image(self, k: int) -> NDArray[np.uint8] | None:
+        named = self.index.told["reference_image_id"][k]
+        return None if named is None else reference_image(self._root, self.index.scenes[self.index.scene[k]], named)
+
+    def _labels(self, rows: NDArray[np.int64], steps: NDArray[np.int64], mask: NDArray[np.bool_]) -> dict[str, Any]:
+        index = self.index
+        n, window = steps.shape
+        out: dict[str, Any] = {
+            "action": np.zeros((n, window), np.int64),
+            "previous_action": np.zeros((n, window), np.int64),
+            "remaining_actions": np.zeros((n, window), np.int32),
+            "odometry": np.zeros((n, window, 4), np.float32),
+        }
+        if "pose" in self.privileged:
+            out["pose"] = np.zeros((n, window, 4))
+        if "goal_distance_m" in self.privileged:
+            out["goal_distance_m"] = np.zeros((n, window), np.float32)
+        if "actions" in self.privileged:
+            out["action_collides"], out["action_refused"] = np.zeros((2, n, window, N_ACTIONS), np.bool_)
+            out["action_cost_to_go_m"] = np.zeros((n, window, N_ACTIONS), np.float32)
+        for i, k in enumerate(rows.tolist()):
+            here, at = mask[i], steps[i, mask[i]]
+            actions, poses = index.actions_of(k), index.poses_of(k)
+            out["action"][i, here] = actions[at]
+            out["previous_action"][i, here] = np.concatenate([[NO_ACTION], actions[:-1]])[at]
+            out["remaining_actions"][i, here] = index.budget[k] - at
+            out["odometry"][i, here] = _odometry(poses)[at]
+            if "pose" in self.privileged:
+                out["pose"][i, here] = poses[at]
+            if self.privileged and self.privileged != ("pose",):
+                self._known(out, i, here, k, poses[at])
+        return out
+
+    def _known(
+        self, out: dict[str, Any], i: int, here: NDArray[np.bool_], k: int, poses: NDArray[np.float64]
+    ) -> None:  # fmt: skip
+        ways, goal = geodesic(*mesh_of(self._root, self.index.scenes[self.index.scene[k]])), self.index.goal[k]
+        if "goal_distance_m" in self.privileged:
+            out["goal_distance_m"][i, here] = ways.distances_m(goal, poses[:, :3])
+        if "actions" in self.privileged:
+            out["action_collides"][i, here], out["action_refused"][i, here], cost = ways.actions(goal, poses)
+            out["action_cost_to_go_m"][i, here] = cost
+
+    def _frames(self, trajectories: NDArray[np.int64], steps: NDArray[np.int64]) -> Frames:
+        if self._source is None:
+            return Frames(None, None)
+        # Windows overlap: what two samples of a batch share is drawn once, a scene after the other.
+        keys, back = np.unique(
+            np.stack([self.index.scene[trajectories], trajectories, steps]), axis=1, return_inverse=True
+        )
+        parts = [
+            self._source.frames(*keys[1:, keys[0] == scene].astype(np.int64)) for scene in np.unique(keys[0])
+        ]  # fmt: skip
+        joined = parts[0] if len(parts) == 1 else Frames(
+            np.concatenate([p.rgb for p in parts]) if self.sensors.rgb else None,  # type: ignore[misc]
+            np.concatenate([p.depth_m for p in parts]) if self.sensors.depth else None,  # type: ignore[misc]
+        )  # fmt: skip
+        return joined.take(np.asarray(back, np.int64).ravel())
+
+    def _with_recordings(self, index: Index, source: str, renderer: str) -> Index:
+        drawn: Source = Drawn(self._root, index, self.sensors, renderer)
+        recorded = Recorded(self._root, index, self.sensors, drawn)
+        if source == "recordings":
+            has = np.flatnonzero([recorded.has(k) for k in range(len(index))])
+            if not len(has):
+                raise UsageError(
+                    f"none of the {len(index):,} trajectories has a recording of the views asked for: run "
+                    "aerialdojo-gen render, or choose source='render'"
+                )
+            index = index.take(has)
+            drawn = Drawn(self._root, index, self.sensors, renderer)
+            recorded = Recorded(self._root, index, self.sensors, drawn)
+        self._source = recorded
+        return index
+
+    def _fingerprint(self) -> str:
+        s = self.sensors
+        facts = {
+            "trajectories": self.index.digest, "past": self.past, "stride": self.stride, "goal": self.goal,
+            "privileged": self.privileged, "words": self.vocabulary.words, "length": self.vocabulary.length,
+            "sensors": [s.views, s.rgb, s.depth, s.width, s.height, s.fov_deg, s.max_depth_m],
+        }  # fmt: skip
+        return hashlib.sha256(json.dumps(facts, sort_keys=True).encode()).hexdigest()
+
+
+def drawn_evenly(index: Index, limit: int, seed: int) -> NDArray[np.int64]:
+    """Draw trajectories, spread over the scenes as evenly as they go; a larger limit only adds to them.
+
+    Returns
+    -------
+    (at most limit,) int64
+        Rows of the index, ascending.
+    """
+    if limit < 1:
+        raise UsageError(f"a limit is at least 1, not {limit}")
+    lots: list[tuple[int, int, int]] = []
+    for number, scene in enumerate(index.scenes):
+        own = np.flatnonzero(index.scene == number).tolist()
+        ranked = sorted((rng.rank(seed, "learning", index.nav_id[k]), k) for k in own)[:limit]
+        lots += [(turn, rng.rank(seed, "learning", scene), k) for turn, (_, k) in enumerate(ranked)]
+    return np.array(sorted(k for _, _, k in sorted(lots)[:limit]), np.int64)
+
+
+def collate(samples: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    """Join samples to a batch, as `Trajectories.batch` gives it: a ``collate_fn`` that needs no torch.
+
+    Parameters
+    ----------
+    samples : sequence of dict
+        Of one data set; of different T they are padded at their front.
+
+    Returns
+    -------
+    dict
+        Arrays that lead with the sample, and lists of texts.
+    """
+    window = max(len(sample["mask"]) for sample in samples)
+    out: dict[str, Any] = {}
+    for name, first in samples[0].items():
+        values = [sample[name] for sample in samples]
+        if isinstance(first, str):
+            out[name] = values
+        elif name in _WHOLE:
+            out[name] = np.stack(values)
+        else:
+            out[name] = np.stack(
+                [np.concatenate([np.zeros((window - len(v), *v.shape[1:]), v.dtype), v]) for v in values]
+            )
+    return out
+
+
+# What a sample has once, and not for every step.
+_WHOLE = ("step", "tokens", "image", "has_image")
+
+
+def _unbatched(batch: dict[str, Any], k: int, whole: bool) -> dict[str, Any]:
+    """Return one of a batch's samples; a whole trajectory without what it was padded with."""
+    begin = int(batch["mask"][k].argmax()) if whole else 0
+    return {
+        name: value[k] if isinstance(value, list) or name in _WHOLE else value[k, begin:]
+        for name, value in batch.items()
+    }
+
+
+def _odometry(poses: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Poses in the frame of the first: x ahead, y left, z up in metres, and yaw in radians."""
+    c, s = np.cos(poses[0, 3]), np.sin(poses[0, 3])
+    away = poses[:, :3] - poses[0, :3]
+    turned = wrap_angle_rad(poses[:, 3] - poses[0, 3])
+    return np.column_stack([away[:, 0] * c + away[:, 1] * s, away[:, 1] * c - away[:, 0] * s, away[:, 2], turned])
+
+
+def _scattered(seen: NDArray[Any], mask: NDArray[np.bool_]) -> NDArray[Any]:
+    out = np.zeros((*mask.shape, *seen.shape[1:]), seen.dtype)
+    out[mask] = seen
+    return out
+
+
+def _names(given: str | Sequence[str]) -> tuple[str, ...]:
+    return (given,) if isinstance(given, str) else tuple(given)
+
+
+def _chosen(what: str, given: str | Sequence[str], known: Sequence[str], keep: bool = False) -> tuple[str, ...]:
+    names = _names(given)
+    for name in names:
+        if name not in known:
+            raise UsageError(unknown(f"no {what}", name, known))
+    return names if keep else tuple(name for name in known if name in names)

@@ -1,0 +1,114 @@
+"""What the cameras of many bodies see: small pictures of one scene, drawn in a row.
+
+A small picture's time goes to finding out what to draw, to the triangles that are drawn and to waiting for the
+picture, not to its pixels. So the views of a body are culled together, and a picture is read back when others have
+been drawn since.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Sequence
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from aerialdojo_gen.geometry.cameras import Camera, view_pose
+from aerialdojo_gen.rendering.backend import Renderer
+from aerialdojo_gen.rendering.gl_cull import BodyCulling
+from aerialdojo_gen.rendering.picture import FAR_M, NEAR_M
+
+Floats = NDArray[np.float64]
+
+# Pictures that are drawn before the first of them is read.
+_AHEAD = 4
+
+
+def draw_bodies(
+    renderer: Renderer, camera: Camera, poses: Floats, views: Sequence[str]
+) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
+    """Take the pictures of all views at some poses.
+
+    Parameters
+    ----------
+    renderer : Renderer
+    camera : Camera
+        Of every view.
+    poses : (n, 4) float64
+        x, y, z in metres and yaw in radians, world frame, of the body's centre.
+    views : sequence of str
+        Of `aerialdojo_gen.store.schemas.VIEWS`.
+
+    Returns
+    -------
+    rgb : (n, views, H, W, 3) uint8
+        sRGB; what `Renderer.render` gives for each alone, to the bit.
+    depth_m : (n, views, H, W) float32
+        Planar depth, metres; inf where nothing is hit.
+    """
+    shape = (len(poses), len(views), camera.height, camera.width)
+    rgb, depth_m = np.empty((*shape, 3), np.uint8), np.empty(shape, np.float32)
+    many = getattr(renderer, "bodies", None)
+    if many is not None:
+        many().draw(camera, poses, views, rgb, depth_m)
+        return rgb, depth_m
+    for k, pose in enumerate(poses):
+        for v, view in enumerate(views):
+            picture = renderer.render(camera, view_pose(pose[:3], float(pose[3]), view))
+            rgb[k, v], depth_m[k, v] = picture.rgb, picture.depth_m
+    return rgb, depth_m
+
+
+class GlBodies:
+    """Draws bodies' views with a `GlRenderer`.
+
+    Parameters
+    ----------
+    renderer : GlRenderer
+        Its buffers, programs and targets are used, and stay its own.
+    """
+
+    def __init__(self, renderer: Any) -> None:
+        self._renderer = renderer
+        self._cullings = [BodyCulling(kind) for _, kind, _ in renderer._sets]
+
+    def draw(
+        self,
+        camera: Camera,
+        poses: Floats,
+        views: Sequence[str],
+        rgb: NDArray[np.uint8],
+        depth_m: NDArray[np.float32],
+    ) -> None:
+        """Fill ``rgb`` (n, views, H, W, 3) and ``depth_m`` (n, views, H, W); see `draw_bodies`."""
+        from aerialdojo_gen.rendering.gl import clip_from_world
+
+        waiting: deque[tuple[Any, int, int]] = deque()
+        rgba = np.empty((camera.height, camera.width, 4), np.uint8)
+        turn = 0
+        for k, pose in enumerate(poses):
+            world = [view_pose(pose[:3], float(pose[3]), view) for view in views]
+            clips = np.stack([clip_from_world(camera, matrix, NEAR_M, FAR_M) for matrix in world])
+            eye = np.ascontiguousarray(pose[:3])
+            nearness = np.zeros((len(views), camera.height, camera.width), np.float32)
+            seen = [culling.seen(clips, eye, camera.width, camera.height, nearness) for culling in self._cullings]
+            for v, matrix in enumerate(world):
+                target = self._renderer.draw_seen(
+                    camera, matrix, clips[v], [of_kind[v] for of_kind in seen], slot=turn % (_AHEAD + 1)
+                )
+                turn += 1
+                waiting.append((target, k, v))
+                if len(waiting) > _AHEAD:
+                    _fetch(*waiting.popleft(), rgba, rgb, depth_m)
+        while waiting:
+            _fetch(*waiting.popleft(), rgba, rgb, depth_m)
+
+
+def _fetch(
+    target: Any, k: int, v: int, rgba: NDArray[np.uint8], rgb: NDArray[np.uint8], depth_m: NDArray[np.float32]
+) -> None:
+    target.read_into(rgba, components=4)
+    target.read_into(depth_m[k, v], components=1, attachment=1, dtype="f4")
+    cv2.cvtColor(rgba, cv2.COLOR_RGBA2RGB, dst=rgb[k, v])

@@ -1,0 +1,311 @@
+"""The data set: its pictures are the renderer's, its labels fly to the goal, its windows are the trajectory's."""
+
+import json
+import shutil
+
+import numpy as np
+import pytest
+
+from aerialdojo_gen import GlRenderer, open_release
+from aerialdojo_gen.agents.goal import N_ACTIONS
+from aerialdojo_gen.benchmark.env import AerialDojoEnv
+from aerialdojo_gen.benchmark.episode import Episode
+from aerialdojo_gen.benchmark.motion import flight_space
+from aerialdojo_gen.benchmark.tasks import mesh_of
+from aerialdojo_gen.errors import StoreError, UsageError
+from aerialdojo_gen.geometry.cameras import Camera, view_pose
+from aerialdojo_gen.learning import Trajectories, Vocabulary, collate
+from aerialdojo_gen.learning.cached import Cached
+from aerialdojo_gen.learning.trajectories import NO_ACTION
+from aerialdojo_gen.store.root import open_root
+
+VIEWS = ("front", "down", "left")
+
+
+@pytest.fixture(scope="module")
+def seen(smoke):
+    return Trajectories(smoke, split="all", views=VIEWS, size=(40, 24), limit=6, privileged="pose")
+
+
+@pytest.fixture(scope="module")
+def blind(smoke):
+    return Trajectories(smoke, split="all", views=(), privileged=("pose", "goal_distance_m", "actions"))
+
+
+def test_pictures_are_those_of_the_renderer_at_the_same_pose_and_size(smoke, seen):
+    release = open_release(smoke)
+    numbers = range(0, len(seen), 7)
+    batch = seen.batch(numbers)
+    for scene in seen.index.scenes:
+        own = [k for k, nav_id in enumerate(batch["nav_id"]) if nav_id.startswith(scene)]
+        assert own, "both scenes are drawn from"
+        with GlRenderer(release.mesh(scene)) as renderer:
+            for k in own:
+                pose = batch["pose"][k, 0]
+                for v, view in enumerate(VIEWS):
+                    picture = renderer.render(Camera(40, 24, 90.0), view_pose(pose[:3], pose[3], view))
+                    assert (batch["rgb"][k, 0, v] == picture.rgb).all()
+                    depth = np.where(picture.depth_m <= np.float32(65.535), picture.depth_m, 0)
+                    assert (batch["depth_m"][k, 0, v] == depth).all()
+    assert batch["rgb"].std() > 10
+
+
+def test_what_is_learned_from_is_what_the_environment_shows(smoke, seen):
+    k = 2
+    task = f"{seen.index.nav_id[k]}-s"
+    env = AerialDojoEnv(smoke, views=VIEWS, width=40, height=24)
+    observation, _ = env.reset(options={"task_id": task})
+    for number in range(*seen._first[k : k + 2]):
+        sample = seen[number]
+        assert sample["remaining_actions"] == observation["remaining_actions"]
+        for v, view in enumerate(VIEWS):
+            assert np.abs(sample["rgb"][0, v].astype(int) - observation["rgb"][view]).max() <= 1
+            assert np.median(np.abs(sample["depth_m"][0, v] - observation["depth_m"][view])) < 1e-5
+        observation, reward, terminated, _, _ = env.step(sample["action"][0])
+    assert (reward, terminated) == (1.0, True), "the labels fly to the goal"
+
+
+def test_labels_fly_every_trajectory_to_its_goal(smoke, blind):
+    index, root = blind.index, open_root(smoke)
+    assert len(index) > 200
+    assert len(blind) == len(index.actions)
+    for k in range(0, len(index), 12):
+        batch = blind.batch(range(blind._first[k], blind._first[k + 1]))
+        space = flight_space(*mesh_of(root, index.scenes[index.scene[k]]), 0.25)
+        episode = Episode(space, tuple(index.start[k]), tuple(index.goal[k]), int(index.budget[k]))
+        for i, action in enumerate(batch["action"][:, 0]):
+            assert (batch["action_collides"][i, 0, action], batch["action_refused"][i, 0, action]) == (False, False)
+            assert batch["pose"][i, 0] == pytest.approx((*episode.position, episode.yaw_rad), abs=1e-9)
+            assert batch["remaining_actions"][i, 0] == episode.remaining_actions
+            straight = np.linalg.norm(index.goal[k] - episode.position)
+            assert straight - 1e-4 <= batch["goal_distance_m"][i, 0] <= 3 * straight + 40
+            episode.step(int(action))
+        assert episode.success(3.0)
+
+
+def test_privileged_columns_are_what_the_environment_does(smoke, blind):
+    root = open_root(smoke)
+    draw = np.random.default_rng(0)
+    touched = 0
+    for number in draw.choice(len(blind), 60, replace=False):
+        sample = blind[int(number)]
+        k, _ = blind.place(int(number))
+        space = flight_space(*mesh_of(root, blind.index.scenes[blind.index.scene[k]]), 0.25)
+        for action in range(N_ACTIONS):
+            episode = Episode(space, tuple(sample["pose"][0]), tuple(blind.index.goal[k]), 5)
+            episode.step(action)
+            collision = episode.termination == "collision"
+            touched += collision
+            assert sample["action_collides"][0, action] == collision
+            assert sample["action_refused"][0, action] == episode.refused
+            cost = sample["action_cost_to_go_m"][0, action]
+            assert np.isinf(cost) if collision else cost >= episode.distance_m - 1e-3
+    assert touched > 20
+
+
+def test_the_cheapest_action_leads_towards_the_goal(blind):
+    """Along a reference the distance left falls by about what is flown."""
+    for k in range(0, len(blind.index), 40):
+        left = blind.batch(range(blind._first[k], blind._first[k + 1]))["goal_distance_m"][:, 0]
+        assert left[-1] <= 3.0
+        assert (np.diff(left) <= 5.3).all()
+        assert left[0] > left[-1]
+
+
+def test_windows_look_back_and_hold_nothing_before_the_start(smoke, seen):
+    past = Trajectories(smoke, split="all", views=VIEWS, size=(40, 24), limit=6, privileged="pose", past=3)
+    assert len(past) == len(seen)
+    k = 4
+    for step in range(6):
+        number = int(seen._first[k]) + step
+        window = past[number]
+        assert window["mask"].tolist() == [step - 3 + i >= 0 for i in range(4)]
+        for i in range(4):
+            if not window["mask"][i]:
+                assert not window["rgb"][i].any()
+                assert not window["depth_m"][i].any()
+                continue
+            alone = seen[number - 3 + i]
+            for name in ("rgb", "depth_m", "action", "previous_action", "remaining_actions", "odometry", "pose"):
+                assert (window[name][i] == alone[name][0]).all(), name
+        first = int(window["mask"].argmax())
+        assert (window["previous_action"][first] == NO_ACTION) == (step <= 3)
+
+
+def test_a_stride_shares_every_step_out_once(smoke):
+    tiled = Trajectories(smoke, split="all", views=(), past=7, stride=8, privileged="pose")
+    steps = {}
+    for number in range(len(tiled)):
+        k, end = tiled.place(number)
+        window = tiled[number]
+        seen = [s for s, on in zip(range(end - 7, end + 1), window["mask"], strict=True) if on]
+        steps.setdefault(k, []).extend(seen)
+    assert all(sorted(found) == list(range(tiled.index.steps[k])) for k, found in steps.items())
+    assert len(steps) == len(tiled.index)
+
+
+def test_whole_trajectories_are_padded_at_their_front(smoke):
+    whole = Trajectories(smoke, split="all", views=("front",), size=16, past=None, limit=5)
+    assert len(whole) == len(whole.index) == 5
+    lengths = whole.index.steps.tolist()
+    assert len(set(lengths)) > 1
+    samples = [whole[k] for k in range(5)]
+    assert [len(s["action"]) for s in samples] == lengths
+    for batch in (collate(samples), whole.batch(range(5))):
+        assert batch["rgb"].shape == (5, max(lengths), 1, 16, 16, 3)
+        assert batch["mask"].sum(axis=1).tolist() == lengths
+        assert batch["mask"][:, -1].all()
+        for k, sample in enumerate(samples):
+            assert (batch["action"][k, -lengths[k] :] == sample["action"]).all()
+            assert (batch["rgb"][k, -lengths[k] :] == sample["rgb"]).all()
+            assert not batch["rgb"][k, : -lengths[k]].any()
+
+
+def test_odometry_is_reckoned_from_actions_alone(blind):
+    from aerialdojo_gen.geometry.motion import replay
+
+    for number in range(0, len(blind), 97):
+        k, end = blind.place(number)
+        reckoned = replay([0.0, 0.0, 0.0, 0.0], blind.index.actions_of(k)[:end])[-1]
+        told = blind[number]["odometry"][0]
+        assert told[:3] == pytest.approx(reckoned[:3], abs=1e-4)
+        assert np.cos(told[3] - reckoned[3]) == pytest.approx(1.0, abs=1e-6)
+
+
+def test_goals_as_text_tokens_and_pictures(smoke):
+    data = Trajectories(smoke, split="all", views=(), goal=("image", "text", "tokens"))
+    release = open_release(smoke)
+    sample = data[11]
+    found = release.task(sample["nav_id"])
+    words = found.instances[0]
+    assert (
+        sample["text"]
+        == f"{words['target_name']}, {words['direction']} of {words['landmark']}. {words['description']}"
+    )
+    assert (sample["image"] == release.picture(sample["nav_id"])).all()
+    assert sample["has_image"]
+    back = [data.vocabulary.words[n - 2] for n in sample["tokens"] if n]
+    assert " ".join(back).startswith(words["target_name"].lower().split()[0])
+    few = Vocabulary.of(data._texts[:1], length=5)
+    other = Trajectories(smoke, split="all", views=(), goal="tokens", vocabulary=few)
+    tokens = other.batch(range(0, len(other), 50))["tokens"]
+    assert tokens.shape[1:] == (5,)
+    assert (tokens == 1).any(), "words that are not known"
+    assert other.fingerprint != data.fingerprint
+
+
+def test_the_cache_gives_what_was_drawn_and_survives_damage(smoke, seen, tmp_path):
+    kept = Trajectories(
+        smoke, split="all", views=VIEWS, size=(40, 24), limit=6, privileged="pose", cache_gb=1, cache_dir=tmp_path
+    )
+    assert kept.fingerprint == seen.fingerprint
+    numbers = list(range(0, len(seen), 5))
+    plain, first = seen.batch(numbers), kept.batch(numbers)
+    files = sorted(tmp_path.glob("*/*/*.pix"))
+    assert len(files) == 6
+    written = [path.stat().st_mtime_ns for path in files]
+    again = kept.batch(numbers)
+    assert [path.stat().st_mtime_ns for path in files] == written, "read, not drawn"
+    files[0].write_bytes(files[0].read_bytes()[:-7])
+    files[1].write_bytes(files[1].read_bytes()[:400])
+    broken = bytearray(files[2].read_bytes())
+    broken[-30] ^= 1
+    files[2].write_bytes(bytes(broken))
+    mended = kept.batch(range(len(kept)))
+    assert kept.batch(numbers)["rgb"].tobytes() == plain["rgb"].tobytes()
+    for name in ("rgb", "depth_m"):
+        for batch in (first, again):
+            assert (batch[name] == plain[name]).all()
+        assert (mended[name][numbers] == plain[name]).all()
+
+
+def test_the_cache_stays_within_its_bound(smoke, seen, tmp_path):
+    size = 130_000
+    kept = Trajectories(
+        smoke, split="all", views=VIEWS, size=(40, 24), limit=6, cache_gb=size / 1e9, cache_dir=tmp_path
+    )
+    assert isinstance(kept._source, Cached)
+    for _ in range(2):
+        assert (kept.batch(range(len(kept)))["rgb"] == seen.batch(range(len(seen)))["rgb"]).all()
+    files = list(tmp_path.glob("*/*/*.pix"))
+    assert 0 < len(files) < 6
+    assert sum(path.stat().st_size for path in files) <= size
+
+
+def test_recordings_are_read_where_they_are(smoke):
+    options = {"split": "all", "views": VIEWS, "size": 160, "privileged": "pose"}
+    read = Trajectories(smoke, source="recordings", **options)
+    assert sorted(read.index.nav_id) == open_release(smoke).recorded()
+    drawn = Trajectories(smoke, **options)
+    place = {nav_id: k for k, nav_id in enumerate(drawn.index.nav_id)}
+    numbers = list(range(0, len(read), 9))
+    same = [int(drawn._first[place[read.index.nav_id[k]]]) + step for k, step in map(read.place, numbers)]
+    a, b = read.batch(numbers), drawn.batch(same)
+    assert (a["pose"] == b["pose"]).all()
+    assert np.abs(a["rgb"].astype(int) - b["rgb"]).mean() < 6, "lossy, and made smaller"
+    close = np.abs(a["depth_m"] - b["depth_m"]) < 0.02 * b["depth_m"] + 0.02
+    assert close.mean() > 0.9
+    both = Trajectories(smoke, source="auto", **options)
+    assert len(both) == len(drawn)
+    mixed = both.batch([*same[:2], 0, 1])
+    assert (mixed["rgb"][:2] == a["rgb"][:2]).all()
+    other = [k for k in (0, 1) if drawn.index.nav_id[drawn.place(k)[0]] not in read.index.nav_id]
+    assert all((mixed["rgb"][2 + k] == drawn[k]["rgb"]).all() for k in other)
+
+
+def test_without_recordings_it_says_what_makes_them(planted):
+    with pytest.raises(UsageError, match="aerialdojo-gen render"):
+        Trajectories(planted.data, split="all", source="recordings")
+
+
+def test_a_release_without_meshes_is_named(planted):
+    shutil.rmtree(planted.data / "meshes")
+    with pytest.raises(StoreError, match=r"the mesh .*U_Courtyard_0.*is missing: run aerialdojo-gen build-scenes"):
+        Trajectories(planted.data, split="all")
+    assert len(Trajectories(planted.data, split="all", views=())) > 0, "who sees nothing needs none"
+
+
+def test_the_split_by_objects_is_kept_to(smoke):
+    sides = {side: Trajectories(smoke, split="all", views=(), target_split=side) for side in ("train", "test")}
+    tasks = open_release(smoke).tasks().to_pandas().drop_duplicates("nav_id").set_index("nav_id")["target_split"]
+    for side, data in sides.items():
+        assert set(tasks[data.index.nav_id]) == {side}
+    assert sum(len(d.index) for d in sides.values()) == len(tasks)
+
+
+def test_a_limit_spreads_over_scenes_and_only_adds(smoke):
+    few = Trajectories(smoke, split="all", views=(), limit=4).index
+    more = Trajectories(smoke, split="all", views=(), limit=7).index
+    assert set(few.nav_id) < set(more.nav_id)
+    assert np.bincount(few.scene).tolist() == [2, 2]
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"views": ("front", "up")}, "no view 'up'"),
+        ({"goal": "txt"}, "did you mean 'text'"),
+        ({"privileged": "posse"}, "did you mean 'pose'"),
+        ({"split": "id_trian"}, "did you mean 'id_train'"),
+        ({"scene": "U_Nowhere"}, "no scene 'U_Nowhere'"),
+        ({"source": "disk"}, "no source 'disk'"),
+        ({"size": 0}, "no camera has 0"),
+        ({"past": -1}, "at least 0"),
+        ({"limit": 0}, "a limit is at least 1"),
+    ],
+)
+def test_what_makes_no_sense_is_named(smoke, options, message):
+    with pytest.raises(UsageError, match=message):
+        Trajectories(smoke, **{"split": "all", **options})
+
+
+def test_a_number_beyond_the_samples_is_an_index_error(blind):
+    with pytest.raises(IndexError, match="samples"):
+        blind[len(blind)]
+    assert blind[-1]["nav_id"] == blind.index.nav_id[-1]
+
+
+def test_the_fingerprint_is_json_and_tells_selections_apart(smoke):
+    one = Trajectories(smoke, split="id_train", views=())
+    assert json.loads(json.dumps(one.fingerprint)) == Trajectories(smoke, split="id_train", views=()).fingerprint
+    assert one.fingerprint != Trajectories(smoke, split="id_test", views=()).fingerprint

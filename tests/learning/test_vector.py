@@ -1,0 +1,140 @@
+"""Vector environments, rewards for progress, and the checkers of Gymnasium and Stable-Baselines3."""
+
+import warnings
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+
+from aerialdojo_gen import make_env, open_release
+from aerialdojo_gen.errors import UsageError
+from aerialdojo_gen.learning.vector import OwnScenes, ProgressReward, make_vec
+
+
+class Blindfold(gymnasium.ObservationWrapper):
+    """What goes through: a wrapper of a user's, which can be sent to another process."""
+
+    def __init__(self, env):
+        super().__init__(env)
+        self.observation_space = gymnasium.spaces.Dict({"step": env.observation_space["step"]})
+
+    def observation(self, observation):
+        return {"step": observation["step"]}
+
+
+def scene_of(task_id):
+    return task_id.rsplit("-", 2)[0]
+
+
+def references(smoke, n):
+    return open_release(smoke).routes(scene="U_Courtyard_0").slice(0, n).to_pylist()
+
+
+def test_progress_adds_up_to_the_distance_flown_nearer(smoke):
+    env = ProgressReward(make_env(smoke, views=()), scale=0.5, action_cost=0.25)
+    for row in references(smoke, 5):
+        _, info = env.reset(options={"task_id": f"{row['nav_id']}-s"})
+        start, total = info["goal_distance_m"], 0.0
+        assert row["euclidean_m"] - 1e-6 <= start <= row["length_m"] * 1.02 + 0.5
+        for action in row["agent_action"]:
+            _, reward, terminated, _, info = env.step(action)
+            total += reward
+        assert terminated
+        assert info["goal_distance_m"] <= 3.0
+        expected = 1.0 + 0.5 * (start - info["goal_distance_m"]) - 0.25 * len(row["agent_action"])
+        assert total == pytest.approx(expected, abs=1e-6)
+
+
+def test_turning_on_the_spot_gains_nothing_and_a_detour_gains_nothing_in_the_end(smoke):
+    env = ProgressReward(make_env(smoke, views=()))
+    row = references(smoke, 1)[0]
+    env.reset(options={"task_id": f"{row['nav_id']}-s"})
+    assert [env.step(14)[1], env.step(15)[1]] == [0.0, 0.0]
+    there, back = env.step(10)[1], env.step(12)[1]
+    assert there + back == pytest.approx(0.0, abs=1e-9)
+
+
+def test_a_collision_costs(smoke):
+    env = ProgressReward(make_env(smoke, views=(), scene="U_Courtyard_0"), scale=0.0, collision_cost=2.0)
+    for seed in range(20):
+        env.reset(seed=seed)
+        ended = False
+        while not ended:
+            _, reward, terminated, truncated, info = env.step(3)
+            ended = terminated or truncated
+        if info["reason"] == "collision":
+            assert reward == -2.0
+            return
+    pytest.fail("nothing was ever hit")
+
+
+def test_gymnasiums_checker_finds_nothing_in_the_wrappers(smoke):
+    env = ProgressReward(OwnScenes(make_env(smoke, views=("front",), width=16, height=16), ["U_Courtyard_0"]))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        warnings.filterwarnings("ignore", message=".*not.*unwrapped|.*spec.*|.*render_modes.*|.*is different from.*")
+        check_env(env, skip_render_check=True)
+
+
+def test_stable_baselines_checker_takes_what_it_can_take(smoke):
+    """It takes no dicts within dicts and no texts: pictures and numbers, which is what its policies read."""
+    checker = pytest.importorskip(
+        "stable_baselines3.common.env_checker", reason="stable-baselines3 is not installed: tried where it is"
+    )
+    from aerialdojo_gen.learning.vector import Flattened
+
+    env = Flattened(ProgressReward(make_env(smoke, views=("front", "down"), width=48, height=48)))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        # Depth is metres, and goes to a network as numbers.
+        warnings.filterwarnings("ignore", message="It seems that your observation depth_m is an image")
+        checker.check_env(env, skip_render_check=True)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("mode", ["sync", "async"])
+def test_environments_share_the_scenes_out(smoke, mode):
+    alone = OwnScenes(make_env(smoke, views=("front",), width=24, height=16), ["U_Courtyard_0"])
+    scenes = make_env(smoke, views=()).scenes
+    envs = make_vec(smoke, 2, vectorization_mode=mode, views=("front",), width=24, height=16, progress={"scale": 1.0})
+    try:
+        first, info = envs.reset(seed=[5, 6])
+        assert first["rgb"]["front"].shape == (2, 16, 24, 3)
+        mine = scenes.index("U_Courtyard_0")
+        expected, _ = alone.reset(seed=5 + mine)
+        assert (first["rgb"]["front"][mine] == expected["rgb"]["front"]).all()
+        assert first["goal"]["target_name"][mine] == expected["goal"]["target_name"]
+        assert (info["goal_distance_m"] > 3.0).all()
+        _, rewards, terminated, truncated, info = envs.step(np.array([14, 14]))
+        assert rewards.tolist() == [0.0, 0.0]
+        assert not terminated.any()
+        assert not truncated.any()
+    finally:
+        envs.close()
+
+
+def test_more_environments_than_scenes_and_ones_own_wrappers(smoke):
+    envs = make_vec(smoke, 5, vectorization_mode="sync", views=(), wrappers=[Blindfold])
+    observation, _ = envs.reset(seed=0)
+    assert set(observation) == {"step"}
+    assert {scene_of(env.unwrapped.task.row["task_id"]) for env in envs.envs} == set(make_env(smoke, views=()).scenes)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"num_envs": 0}, "at least 1 environment"),
+        ({"vectorization_mode": "threads"}, "no vectorization mode 'threads'"),
+        ({"split": "ood_tset"}, "did you mean 'ood_test'"),
+        ({"progress": {"discount": 2.0}, "vectorization_mode": "sync", "views": ()}, "a discount is from 0 to 1"),
+    ],
+)
+def test_what_makes_no_sense_is_named(smoke, options, message):
+    with pytest.raises(UsageError, match=message):
+        make_vec(smoke, **options)
+
+
+def test_scenes_without_tasks_are_named(smoke):
+    with pytest.raises(UsageError, match="no task of the selection is in U_Mall_0"):
+        OwnScenes(make_env(smoke, views=()), ["U_Mall_0"])
