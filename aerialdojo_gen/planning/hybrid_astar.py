@@ -38,6 +38,8 @@ _TO_GOAL, _DIRECT = N_TRANSLATIONS, N_TRANSLATIONS + 1
 _DIRECT_SHARE = 0.03
 # The direct way is tried from states that are nearer by this than those before.
 _PROGRESS_M = 0.5
+# A step that leads away from where the search goes, by so much: longer ones that way are thought of when it is taken.
+_LONGER, _SPREAD_M = 100, 0.3
 
 FOUND, EXHAUSTED, BUDGET = 0, 1, 2
 
@@ -323,7 +325,7 @@ def search(
             lowest += 1
         if lowest == _N_BUCKETS:
             return EXHAUSTED, n, none
-        taken = heads[lowest]
+        taken, level = heads[lowest], lowest
         heads[lowest] = edge_next[taken]
         parent, move = edge_parent[taken], int(edge_move[taken])
         if move == _TO_GOAL:
@@ -335,6 +337,22 @@ def search(
         known = move < 0
         if known:
             move = ~move
+        if move >= _LONGER:
+            move = (move - _LONGER) * N_STEPS
+            px, py, pz = pose[parent, 0], pose[parent, 1], pose[parent, 2]
+            turns = _N_TURNS[_around(move // N_STEPS - int(headings[parent]))]
+            for m in range(move + 1, move + N_STEPS):
+                u, v = px + flights[m, 0], py + flights[m, 1]
+                if not (lx <= u <= hx and ly <= v <= hy):
+                    break
+                h = cost_between(u, v, pz, ox, oy, oz, edge, cost_to_go)
+                f = cost[parent] + flights[m, 3] + o.action_cost * (turns + 1) + o.weight * h - f0
+                if f < f_most:
+                    bucket = max(0, int(f / _BUCKET_M))
+                    edge_parent[n_edges], edge_move[n_edges], edge_next[n_edges] = parent, m, heads[bucket]
+                    heads[bucket] = n_edges
+                    n_edges += 1
+                    lowest = min(lowest, bucket)
         x, y, z, heading, g = start[0], start[1], start[2], 0, 0.0
         if parent >= 0:
             px, py, pz, heading = pose[parent, 0], pose[parent, 1], pose[parent, 2], int(headings[parent])
@@ -361,8 +379,8 @@ def search(
             if tightness > 0.0:
                 extra = squeeze(px, py, pz, x, y, z, room, tightness, ox, oy, oz, edge, field)
                 g += extra
-                bucket = min(lowest + int(extra / _BUCKET_M), _N_BUCKETS - 1)
-                if bucket > lowest:
+                bucket = min(level + int(extra / _BUCKET_M), _N_BUCKETS - 1)
+                if bucket > level:
                     edge_move[taken], edge_extra[taken] = ~move, extra
                     edge_next[taken], heads[bucket] = heads[bucket], taken
                     continue
@@ -377,11 +395,12 @@ def search(
             f += astray(goal[0] - x, goal[1] - y, goal_yaw, gap, o.prefer.ahead_cos, o.prefer.astray)
             f += squeeze(x, y, z, goal[0], goal[1], goal[2], room, tightness, ox, oy, oz, edge, field)
             f -= o.near_enough
-            bucket = max(0, int(min(f, f_most) / _BUCKET_M))
-            edge_parent[n_edges], edge_move[n_edges], edge_next[n_edges] = n, _TO_GOAL, heads[bucket]
-            heads[bucket] = n_edges
-            n_edges += 1
-            lowest = min(lowest, bucket)
+            if f < f_most:
+                f_most, bucket = f, max(0, int(f / _BUCKET_M))
+                edge_parent[n_edges], edge_move[n_edges], edge_next[n_edges] = n, _TO_GOAL, heads[bucket]
+                heads[bucket] = n_edges
+                n_edges += 1
+                lowest = min(lowest, bucket)
         h = cost_between(x, y, z, ox, oy, oz, edge, cost_to_go)
         direct = np.inf
         if h < nearest - _PROGRESS_M:
@@ -391,18 +410,38 @@ def search(
             )  # fmt: skip
         if direct < np.inf:
             f = g + direct * (1.0 + _DIRECT_SHARE) + o.action_cost * _actions_of(heading, goal_heading, legs, metres)
-            bucket = max(0, int(min(f - f0 - o.near_enough, f_most) / _BUCKET_M))
-            edge_parent[n_edges], edge_move[n_edges], edge_next[n_edges] = n, _DIRECT, heads[bucket]
-            heads[bucket] = n_edges
-            n_edges += 1
-            lowest = min(lowest, bucket)
-        for m in range(N_TRANSLATIONS):
-            u, v, w = x + flights[m, 0], y + flights[m, 1], z + flights[m, 2]
-            if not (lx <= u <= hx and ly <= v <= hy and lz <= w <= hz):
+            f -= f0 + o.near_enough
+            if f < f_most:
+                f_most, bucket = f, max(0, int(f / _BUCKET_M))
+                edge_parent[n_edges], edge_move[n_edges], edge_next[n_edges] = n, _DIRECT, heads[bucket]
+                heads[bucket] = n_edges
+                n_edges += 1
+                lowest = min(lowest, bucket)
+        f_near = g + o.weight * h - f0 + _SPREAD_M
+        for m in range(0, N_FLAT, N_STEPS):
+            turns = _N_TURNS[_around(m // N_STEPS - heading)]
+            for step in range(N_STEPS):
+                u, v = x + flights[m + step, 0], y + flights[m + step, 1]
+                if not (lx <= u <= hx and ly <= v <= hy):
+                    break
+                h = cost_between(u, v, z, ox, oy, oz, edge, cost_to_go)
+                f = g + flights[m + step, 3] + o.action_cost * (turns + 1) + o.weight * h - f0
+                later = step == 0 and f > f_near
+                if f < f_most:
+                    bucket = max(0, int(f / _BUCKET_M))
+                    edge_parent[n_edges], edge_next[n_edges] = n, heads[bucket]
+                    edge_move[n_edges] = _LONGER + m // N_STEPS if later else m + step
+                    heads[bucket] = n_edges
+                    n_edges += 1
+                    lowest = min(lowest, bucket)
+                if later:
+                    break
+        for m in range(N_FLAT, N_TRANSLATIONS):
+            w = z + flights[m, 2]
+            if not lz <= w <= hz:
                 continue
-            turns = _N_TURNS[_around(m // N_STEPS - heading)] if m < N_FLAT else 0
-            h = cost_between(u, v, w, ox, oy, oz, edge, cost_to_go)
-            f = g + flights[m, 3] + o.action_cost * (turns + 1) + o.weight * h - f0
+            h = cost_between(x, y, w, ox, oy, oz, edge, cost_to_go)
+            f = g + flights[m, 3] + o.action_cost + o.weight * h - f0
             if not f < f_most:
                 continue
             bucket = max(0, int(f / _BUCKET_M))
