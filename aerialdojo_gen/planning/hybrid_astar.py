@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from aerialdojo_gen.geometry.motion import N_HEADINGS, QUARTER, TURN_RAD
 from aerialdojo_gen.planning.cost_to_go import cost_at, cost_between
+from aerialdojo_gen.planning.direct import UP, direct_legs
 from aerialdojo_gen.planning.grid_kernels import FREE, GridArrays, segment_free, what_blocks
 from aerialdojo_gen.planning.preference import Preference, astray, squeeze
 
@@ -31,7 +32,14 @@ N_STEPS = 3
 N_FLAT = N_HEADINGS * N_STEPS
 LIFTS_M = np.array([1.0, 2.0, -1.0, -2.0])
 N_TRANSLATIONS = N_FLAT + 4
-_TO_GOAL = N_TRANSLATIONS
+# Ways to the goal: the Approach alone, and the direct way.
+_TO_GOAL, _DIRECT = N_TRANSLATIONS, N_TRANSLATIONS + 1
+# What a direct way must be cheaper by than what the search may still find, in shares of its cost.
+_DIRECT_SHARE = 0.03
+# The direct way is tried from states that are nearer by this than those before.
+_PROGRESS_M = 0.5
+# A step that leads away from where the search goes, by so much: longer ones that way are thought of when it is taken.
+_LONGER, _SPREAD_M = 100, 0.3
 
 FOUND, EXHAUSTED, BUDGET = 0, 1, 2
 
@@ -133,7 +141,7 @@ class SearchOptions(NamedTuple):
 
 def make_search_arrays(budget: int) -> SearchArrays:
     """Reserve memory for searches of up to `budget` expansions; pages never written cost nothing."""
-    n, edges = budget + 2, (budget + 2) * (N_TRANSLATIONS + 1)
+    n, edges = budget + 2, (budget + 2) * (N_TRANSLATIONS + 2)
     slots = 1 << max(10, math.ceil(math.log2(4 * n)))
     return SearchArrays(
         np.empty((n, 3)), np.empty(n), np.empty(n, np.int8), np.empty(n, np.int8), np.empty(n, np.int32),
@@ -207,6 +215,49 @@ def _moves_to(node: int, parents: NDArray[np.int32], moves: NDArray[np.int8]) ->
     return found
 
 
+@njit(cache=True)
+def _with_legs(
+    moves: NDArray[np.int8], directions: NDArray[np.int64], metres: NDArray[np.int64]
+) -> NDArray[np.int8]:  # fmt: skip
+    """Append the fewest translations that fly some legs."""
+    found = np.empty(len(moves) + metres.sum(), np.int8)
+    n = len(moves)
+    found[:n] = moves
+    for i in range(len(metres)):
+        left = metres[i]
+        vertical = directions[i] >= N_HEADINGS
+        while left > 0:
+            if vertical:
+                step = 1 if left >= 2 else 0
+                found[n] = N_FLAT + step + (0 if directions[i] == UP else 2)
+                left -= step + 1
+            else:
+                step = 2 if left >= 5 else (1 if left >= 3 else 0)
+                found[n] = directions[i] * N_STEPS + step
+                left -= 2 * step + 1
+            n += 1
+    return found[:n].copy()
+
+
+@njit(cache=True, error_model="numpy")
+def _actions_of(
+    heading: int, goal_heading: int, directions: NDArray[np.int64], metres: NDArray[np.int64]
+) -> int:  # fmt: skip
+    """Actions that some legs, the turns before, between and after them and an Approach take."""
+    count = 1
+    for i in range(len(metres)):
+        if metres[i] == 0:
+            continue
+        if directions[i] >= N_HEADINGS:
+            count += (metres[i] + 1) // 2
+            continue
+        rest = metres[i] % 5
+        count += metres[i] // 5 + rest // 3 + rest % 3
+        relative = _around(directions[i] - heading)
+        count, heading = count + _N_TURNS[relative], _around(heading + _TURN_BY[relative] - N_HEADINGS)
+    return count + turns_between(heading, goal_heading)
+
+
 @njit(cache=True, error_model="numpy")
 def search(
     start: NDArray[np.float64],
@@ -269,6 +320,8 @@ def search(
     # The start is an edge from nowhere.
     edge_parent[0], edge_move[0], edge_next[0], heads[0] = -1, 0, -1, 0
     n, n_edges, lowest, highest = 0, 1, 0, -1
+    nearest = np.inf
+    legs, metres = np.zeros(3, np.int64), np.zeros(3, np.int64)
     none = np.empty(0, np.int8)
     while True:
         while lowest < _N_BUCKETS and heads[lowest] < 0:
@@ -278,14 +331,34 @@ def search(
         if lowest > highest:
             highest = lowest
             s.highest[0] = f0 + (lowest + 1) * _BUCKET_M
-        taken = heads[lowest]
+        taken, level = heads[lowest], lowest
         heads[lowest] = edge_next[taken]
         parent, move = edge_parent[taken], int(edge_move[taken])
         if move == _TO_GOAL:
             return FOUND, n, _moves_to(parent, parents, moves)
+        if move == _DIRECT:
+            x, y, z = pose[parent, 0], pose[parent, 1], pose[parent, 2]
+            direct_legs(x, y, z, start[3], goal, goal_yaw, 0.0, o.radius, o.approach, o.prefer, grid, legs, metres)
+            return FOUND, n, _with_legs(_moves_to(parent, parents, moves), legs, metres)
         known = move < 0
         if known:
             move = ~move
+        if move >= _LONGER:
+            move = (move - _LONGER) * N_STEPS
+            px, py, pz = pose[parent, 0], pose[parent, 1], pose[parent, 2]
+            turns = _N_TURNS[_around(move // N_STEPS - int(headings[parent]))]
+            for m in range(move + 1, move + N_STEPS):
+                u, v = px + flights[m, 0], py + flights[m, 1]
+                if not (lx <= u <= hx and ly <= v <= hy):
+                    break
+                h = cost_between(u, v, pz, ox, oy, oz, edge, cost_to_go)
+                f = cost[parent] + flights[m, 3] + o.action_cost * (turns + 1) + o.weight * h - f0
+                if f < f_most:
+                    bucket = max(0, int(f / _BUCKET_M))
+                    edge_parent[n_edges], edge_move[n_edges], edge_next[n_edges] = parent, m, heads[bucket]
+                    heads[bucket] = n_edges
+                    n_edges += 1
+                    lowest = min(lowest, bucket)
         x, y, z, heading, g = start[0], start[1], start[2], 0, 0.0
         if parent >= 0:
             px, py, pz, heading = pose[parent, 0], pose[parent, 1], pose[parent, 2], int(headings[parent])
@@ -312,8 +385,8 @@ def search(
             if tightness > 0.0:
                 extra = squeeze(px, py, pz, x, y, z, room, tightness, ox, oy, oz, edge, field)
                 g += extra
-                bucket = min(lowest + int(extra / _BUCKET_M), _N_BUCKETS - 1)
-                if bucket > lowest:
+                bucket = min(level + int(extra / _BUCKET_M), _N_BUCKETS - 1)
+                if bucket > level:
                     edge_move[taken], edge_extra[taken] = ~move, extra
                     edge_next[taken], heads[bucket] = heads[bucket], taken
                     continue
@@ -328,18 +401,53 @@ def search(
             f += astray(goal[0] - x, goal[1] - y, goal_yaw, gap, o.prefer.ahead_cos, o.prefer.astray)
             f += squeeze(x, y, z, goal[0], goal[1], goal[2], room, tightness, ox, oy, oz, edge, field)
             f -= o.near_enough
-            bucket = max(0, int(min(f, f_most) / _BUCKET_M))
-            edge_parent[n_edges], edge_move[n_edges], edge_next[n_edges] = n, _TO_GOAL, heads[bucket]
-            heads[bucket] = n_edges
-            n_edges += 1
-            lowest = min(lowest, bucket)
-        for m in range(N_TRANSLATIONS):
-            u, v, w = x + flights[m, 0], y + flights[m, 1], z + flights[m, 2]
-            if not (lx <= u <= hx and ly <= v <= hy and lz <= w <= hz):
+            if f < f_most:
+                f_most, bucket = f, max(0, int(f / _BUCKET_M))
+                edge_parent[n_edges], edge_move[n_edges], edge_next[n_edges] = n, _TO_GOAL, heads[bucket]
+                heads[bucket] = n_edges
+                n_edges += 1
+                lowest = min(lowest, bucket)
+        h = cost_between(x, y, z, ox, oy, oz, edge, cost_to_go)
+        direct = np.inf
+        if h < nearest - _PROGRESS_M:
+            nearest = h
+            direct = direct_legs(
+                x, y, z, start[3], goal, goal_yaw, h, o.radius, o.approach, o.prefer, grid, legs, metres
+            )  # fmt: skip
+        if direct < np.inf:
+            f = g + direct * (1.0 + _DIRECT_SHARE) + o.action_cost * _actions_of(heading, goal_heading, legs, metres)
+            f -= f0 + o.near_enough
+            if f < f_most:
+                f_most, bucket = f, max(0, int(f / _BUCKET_M))
+                edge_parent[n_edges], edge_move[n_edges], edge_next[n_edges] = n, _DIRECT, heads[bucket]
+                heads[bucket] = n_edges
+                n_edges += 1
+                lowest = min(lowest, bucket)
+        f_near = g + o.weight * h - f0 + _SPREAD_M
+        for m in range(0, N_FLAT, N_STEPS):
+            turns = _N_TURNS[_around(m // N_STEPS - heading)]
+            for step in range(N_STEPS):
+                u, v = x + flights[m + step, 0], y + flights[m + step, 1]
+                if not (lx <= u <= hx and ly <= v <= hy):
+                    break
+                h = cost_between(u, v, z, ox, oy, oz, edge, cost_to_go)
+                f = g + flights[m + step, 3] + o.action_cost * (turns + 1) + o.weight * h - f0
+                later = step == 0 and f > f_near
+                if f < f_most:
+                    bucket = max(0, int(f / _BUCKET_M))
+                    edge_parent[n_edges], edge_next[n_edges] = n, heads[bucket]
+                    edge_move[n_edges] = _LONGER + m // N_STEPS if later else m + step
+                    heads[bucket] = n_edges
+                    n_edges += 1
+                    lowest = min(lowest, bucket)
+                if later:
+                    break
+        for m in range(N_FLAT, N_TRANSLATIONS):
+            w = z + flights[m, 2]
+            if not lz <= w <= hz:
                 continue
-            turns = _N_TURNS[_around(m // N_STEPS - heading)] if m < N_FLAT else 0
-            h = cost_between(u, v, w, ox, oy, oz, edge, cost_to_go)
-            f = g + flights[m, 3] + o.action_cost * (turns + 1) + o.weight * h - f0
+            h = cost_between(x, y, w, ox, oy, oz, edge, cost_to_go)
+            f = g + flights[m, 3] + o.action_cost + o.weight * h - f0
             if not f < f_most:
                 continue
             bucket = max(0, int(f / _BUCKET_M))

@@ -70,7 +70,7 @@ def _fewest_moves(direction: int, metres: int) -> int:
 @njit(cache=True)
 def _headings(
     direction: NDArray[np.int64], metres: NDArray[np.int64], n: int, goal_heading: int, sideways: float,
-    chosen: NDArray[np.int64],
+    chosen: NDArray[np.int64], best: NDArray[np.float64], back: NDArray[np.int64], at: NDArray[np.int64],
 ) -> float:  # fmt: skip
     """Choose the heading of every leg, so that turns and metres flown sideways cost least; return that cost.
 
@@ -80,9 +80,7 @@ def _headings(
     to_fly = 0
     for i in range(n):
         to_fly += metres[i]
-    best = np.zeros((n + 1, 3))
-    back = np.zeros((n + 1, 3), np.int64)
-    at = np.zeros((n + 1, 3), np.int64)
+    best[0], at[0] = 0.0, 0
     for i in range(1, n + 1):
         d = direction[i - 1]
         to_fly -= metres[i - 1]
@@ -109,16 +107,6 @@ def _headings(
     return total
 
 
-@njit(cache=True)
-def _effort(direction: NDArray[np.int64], metres: NDArray[np.int64], n: int, goal_heading: int, sideways: float,
-            chosen: NDArray[np.int64]) -> float:  # fmt: skip
-    """Actions, and what metres flown sideways count as."""
-    total = _headings(direction, metres, n, goal_heading, sideways, chosen)
-    for i in range(n):
-        total += _fewest_moves(direction[i], metres[i])
-    return total
-
-
 @njit(cache=True, inline="always")
 def _leg_end(x: float, y: float, z: float, yaw: float, d: int, metres: int) -> tuple[float, float, float]:
     if d == _UP:
@@ -128,39 +116,51 @@ def _leg_end(x: float, y: float, z: float, yaw: float, d: int, metres: int) -> t
     return x + math.cos(yaw + d * TURN_RAD) * metres, y + math.sin(yaw + d * TURN_RAD) * metres, z
 
 
-@njit(cache=True)
-def _legs_free(
-    start: NDArray[np.float64], direction: NDArray[np.int64], metres: NDArray[np.int64], n: int,
-    radius: float, grid: GridArrays,
-) -> bool:  # fmt: skip
-    x, y, z = start[0], start[1], start[2]
-    for i in range(n):
-        u, v, w = _leg_end(x, y, z, start[3], direction[i], metres[i])
-        if not inside(u, v, w, grid.lower, grid.upper) or not segment_free(x, y, z, u, v, w, radius, grid, False):
-            return False
-        x, y, z = u, v, w
-    return True
-
-
-@njit(cache=True)
-def _squeezed(
-    start: NDArray[np.float64], direction: NDArray[np.int64], metres: NDArray[np.int64], n: int, most: float,
-    prefer: Preference, grid: GridArrays,
+@njit(cache=True, inline="always")
+def _leg_squeezed(
+    x: float, y: float, z: float, u: float, v: float, w: float, prefer: Preference, grid: GridArrays
 ) -> float:  # fmt: skip
-    """What legs cost beside their metres for the surfaces that they come near; beyond `most` any number above it."""
-    if prefer.weight == 0.0:
-        return 0.0
-    x, y, z, total = start[0], start[1], start[2], 0.0
+    """What a leg costs beside its metres for the surfaces that it comes near."""
+    return squeeze(
+        x, y, z, u, v, w, prefer.clearance, prefer.weight,
+        grid.origin[0], grid.origin[1], grid.origin[2], grid.cell, grid.field,
+    )  # fmt: skip
+
+
+@njit(cache=True)
+def _fly_legs(
+    start: NDArray[np.float64], direction: NDArray[np.int64], metres: NDArray[np.int64], n: int,
+    prefer: Preference, grid: GridArrays, points: NDArray[np.float64], before: NDArray[np.float64],
+) -> None:  # fmt: skip
+    """Where every leg begins, and what those before it cost for the surfaces that they come near."""
+    x, y, z = start[0], start[1], start[2]
+    points[0, 0], points[0, 1], points[0, 2], before[0] = x, y, z, 0.0
     for i in range(n):
         u, v, w = _leg_end(x, y, z, start[3], direction[i], metres[i])
-        total += squeeze(
-            x, y, z, u, v, w, prefer.clearance, prefer.weight,
-            grid.origin[0], grid.origin[1], grid.origin[2], grid.cell, grid.field,
-        )  # fmt: skip
-        if total > most:
-            break
+        before[i + 1] = before[i] + _leg_squeezed(x, y, z, u, v, w, prefer, grid)
         x, y, z = u, v, w
-    return total
+        points[i + 1, 0], points[i + 1, 1], points[i + 1, 2] = x, y, z
+
+
+@njit(cache=True)
+def _moved(
+    direction: NDArray[np.int64], metres: NDArray[np.int64], n: int, source: int, target: int,
+    new_direction: NDArray[np.int64], new_metres: NDArray[np.int64],
+) -> int:  # fmt: skip
+    """Write legs of which one stands elsewhere, joined where they may be; return how many they are."""
+    k = 0
+    for i in range(n):
+        if i == source:
+            continue
+        if k == target:
+            new_direction[k], new_metres[k] = direction[source], metres[source]
+            k += 1
+        new_direction[k], new_metres[k] = direction[i], metres[i]
+        k += 1
+    if k == target:
+        new_direction[k], new_metres[k] = direction[source], metres[source]
+        k += 1
+    return _merge(new_direction, new_metres, k)
 
 
 @njit(cache=True)
@@ -168,45 +168,71 @@ def _reorder(
     start: NDArray[np.float64], direction: NDArray[np.int64], metres: NDArray[np.int64], n: int, goal_heading: int,
     options: SearchOptions, grid: GridArrays,
 ) -> int:  # fmt: skip
-    """Move single legs elsewhere in the sequence as long as that is free and makes the route cheaper, in place."""
+    """Move single legs elsewhere in the sequence as long as that is free and makes the route cheaper, in place.
+
+    Legs before and after those that change place stay where they are: what is known of them holds.
+    """
+    size = len(direction)
     new_direction, new_metres, chosen = np.empty_like(direction), np.empty_like(metres), np.empty_like(direction)
+    best, back, at = np.empty((size + 1, 3)), np.empty((size + 1, 3), np.int64), np.empty((size + 1, 3), np.int64)
+    points, before = np.empty((size + 1, 3)), np.empty(size + 1)
     # Where actions cost nothing, fewer of them still decide between ways that cost the same.
     action, prefer = max(options.action_cost, _LEAST_ACTION_M), options.prefer
-    cost = metres[:n].sum() + action * _effort(direction, metres, n, goal_heading, options.sideways, chosen)
-    cost += _squeezed(start, direction, metres, n, np.inf, prefer, grid)
+    _fly_legs(start, direction, metres, n, prefer, grid, points, before)
+    cost = before[n]
+    for i in range(n):
+        cost += metres[i] + action * _fewest_moves(direction[i], metres[i])
+    cost += action * _headings(direction, metres, n, goal_heading, options.sideways, chosen, best, back, at)
     for _ in range(_MAX_PASSES):
         improved = False
         for source in range(n):
             for target in range(n):
-                if target == source:
+                # A leg and its neighbour change places once.
+                if target == source or target == source - 1:
                     continue
-                k = 0
-                for i in range(n):
-                    if i == source:
-                        continue
-                    if k == target:
-                        new_direction[k], new_metres[k] = direction[source], metres[source]
-                        k += 1
-                    new_direction[k], new_metres[k] = direction[i], metres[i]
-                    k += 1
-                if k == target:
-                    new_direction[k], new_metres[k] = direction[source], metres[source]
-                    k += 1
-                m = _merge(new_direction, new_metres, k)
+                m = _moved(direction, metres, n, source, target, new_direction, new_metres)
+                lead, tail = 0, 0
+                while lead < min(n, m) and (
+                    new_direction[lead] == direction[lead] and new_metres[lead] == metres[lead]
+                ):
+                    lead += 1
+                while tail < min(n, m) - lead and (
+                    new_direction[m - 1 - tail] == direction[n - 1 - tail]
+                    and new_metres[m - 1 - tail] == metres[n - 1 - tail]
+                ):
+                    tail += 1
                 wanted = cost - _WORTH_M
-                new_cost = float(new_metres[:m].sum())
+                new_cost = before[lead] + before[n] - before[n - tail]
+                for i in range(m):
+                    new_cost += new_metres[i] + action * _fewest_moves(new_direction[i], new_metres[i])
                 if new_cost >= wanted:
                     continue
-                new_cost += action * _effort(new_direction, new_metres, m, goal_heading, options.sideways, chosen)
+                new_cost += action * _headings(
+                    new_direction, new_metres, m, goal_heading, options.sideways, chosen, best, back, at
+                )
+                x, y, z = points[lead, 0], points[lead, 1], points[lead, 2]
+                for i in range(lead, m - tail):
+                    if new_cost >= wanted:
+                        break
+                    u, v, w = _leg_end(x, y, z, start[3], new_direction[i], new_metres[i])
+                    new_cost += _leg_squeezed(x, y, z, u, v, w, prefer, grid)
+                    x, y, z = u, v, w
                 if new_cost >= wanted:
                     continue
-                new_cost += _squeezed(start, new_direction, new_metres, m, wanted - new_cost, prefer, grid)
-                if new_cost >= wanted:
-                    continue
-                if not _legs_free(start, new_direction, new_metres, m, options.radius, grid):
+                x, y, z, free = points[lead, 0], points[lead, 1], points[lead, 2], True
+                for i in range(lead, m - tail):
+                    u, v, w = _leg_end(x, y, z, start[3], new_direction[i], new_metres[i])
+                    if not inside(u, v, w, grid.lower, grid.upper) or not segment_free(
+                        x, y, z, u, v, w, options.radius, grid, False
+                    ):
+                        free = False
+                        break
+                    x, y, z = u, v, w
+                if not free:
                     continue
                 direction[:m], metres[:m] = new_direction[:m], new_metres[:m]
                 n, cost = m, new_cost
+                _fly_legs(start, direction, metres, n, prefer, grid, points, before)
                 improved = True
                 break
             if improved:
@@ -275,8 +301,9 @@ def moves_to_actions(
         total += metres[i]
     n = _merge(direction, metres, len(moves))
     n = _reorder(start, direction, metres, n, goal_heading, options, grid)
-    chosen = np.empty(n + 1, np.int64)
-    _headings(direction, metres, n, goal_heading, options.sideways, chosen)
+    chosen, best = np.empty(n + 1, np.int64), np.empty((n + 1, 3))
+    back, at = np.empty((n + 1, 3), np.int64), np.empty((n + 1, 3), np.int64)
+    _headings(direction, metres, n, goal_heading, options.sideways, chosen, best, back, at)
     actions = np.empty(total + N_HEADINGS * (n + 1), np.int8)
     k, heading = 0, 0
     for i in range(n):

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from aerialdojo_gen.geometry.cameras import Camera, view_pose
 from aerialdojo_gen.rendering.backend import Renderer
-from aerialdojo_gen.rendering.gl_cull import BodyCulling
+from aerialdojo_gen.rendering.gl_occlusion import BodyCulling
 from aerialdojo_gen.rendering.picture import FAR_M, NEAR_M
 
 Floats = NDArray[np.float64]

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 # Corners nearer than this are not projected; and how far OpenGL may round a corner, pixels.
-_NEAR_W, _ROUNDING_PX = 0.05, 0.02
+NEAR_W, ROUNDING_PX = 0.05, 0.02
 
 
 def chunks_in_view(
@@ -117,7 +117,7 @@ def triangles_in_view(
                 # Seen from the eye, x, y and w have no constant part.
                 m0, m1, m2 = clips[v, 3, 0], clips[v, 3, 1], clips[v, 3, 2]
                 aw, bw, cw = m0 * ax + m1 * ay + m2 * az, m0 * bx + m1 * by + m2 * bz, m0 * cx + m1 * cy + m2 * cz
-                if aw < _NEAR_W and bw < _NEAR_W and cw < _NEAR_W:
+                if aw < NEAR_W and bw < NEAR_W and cw < NEAR_W:
                     continue
                 m0, m1, m2 = clips[v, 0, 0], clips[v, 0, 1], clips[v, 0, 2]
                 au, bu, cu = m0 * ax + m1 * ay + m2 * az, m0 * bx + m1 * by + m2 * bz, m0 * cx + m1 * cy + m2 * cz
@@ -127,7 +127,7 @@ def triangles_in_view(
                 av, bv, cv = m0 * ax + m1 * ay + m2 * az, m0 * bx + m1 * by + m2 * bz, m0 * cx + m1 * cy + m2 * cz
                 if (av > aw and bv > bw and cv > cw) or (av < -aw and bv < -bw and cv < -cw):
                     continue
-                if aw >= _NEAR_W and bw >= _NEAR_W and cw >= _NEAR_W:
+                if aw >= NEAR_W and bw >= NEAR_W and cw >= NEAR_W:
                     aw, bw, cw = 1.0 / aw, 1.0 / bw, 1.0 / cw
                     if _between_centres(au * aw, bu * bw, cu * cw, half_w):
                         continue
@@ -143,6 +143,6 @@ def triangles_in_view(
 def _between_centres(a: float, b: float, c: float, half: float) -> bool:
     """Whether three places across the picture, from -1 to 1, have no pixel's centre between them."""
     # To pixels, centres at whole numbers; OpenGL rounds corners to 1/256 pixel.
-    first = (min(a, b, c) + 1.0) * half - 0.5 - _ROUNDING_PX
-    last = (max(a, b, c) + 1.0) * half - 0.5 + _ROUNDING_PX
+    first = (min(a, b, c) + 1.0) * half - 0.5 - ROUNDING_PX
+    last = (max(a, b, c) + 1.0) * half - 0.5 + ROUNDING_PX
     return math.ceil(first) > math.floor(last)

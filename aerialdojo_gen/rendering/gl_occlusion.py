@@ -14,7 +14,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from aerialdojo_gen.rendering.gl_geometry import _NEAR_W, _ROUNDING_PX, Chunks
+from aerialdojo_gen.rendering.gl_culling import NEAR_W, ROUNDING_PX, chunks_in_view
+from aerialdojo_gen.rendering.gl_geometry import Chunks
 from aerialdojo_gen.rendering.picture import NEAR_M
 
 Floats = NDArray[np.float64]
@@ -37,8 +38,6 @@ class BodyCulling:
 
     def __init__(self, chunks: Chunks) -> None:
         self._chunks = chunks
-        # Without the other fields of a vertex, three to a cache line.
-        self._corners = np.ascontiguousarray(chunks.vertices["position"].reshape(-1, 9))
         self._out = np.empty((0, 0), np.uint32)
 
     def seen(
@@ -63,65 +62,18 @@ class BodyCulling:
             By view, indices into the chunks' vertices, chunk by chunk, the nearest first; valid until the next call.
         """
         c = self._chunks
-        order, inside = _chunks_seen(clips, c.low, c.high)
-        order = order[np.argsort(_away(order, eye, c.low, c.high), kind="stable")]
+        order, sees = chunks_in_view(c.low, c.high, eye, clips)
         if len(self._out) < len(clips):
             self._out = np.empty((len(clips), len(c.vertices)), np.uint32)
         counts = _triangles_seen(
-            order, inside, c.starts, c.planes, self._corners, clips, eye, c.low, c.high, nearness, self._out
+            order, sees, c.starts, c.planes, c.corners, clips, eye, c.low, c.high, nearness, self._out
         )
         return [self._out[v, :n] for v, n in enumerate(counts.tolist())]
 
 
-@njit(cache=True)
-def _chunks_seen(clips: Floats, low: Floats, high: Floats) -> tuple[NDArray[np.int64], NDArray[np.uint8]]:
-    """Number the chunks whose box some view may see, and tell by bits which."""
-    n, views = len(low), len(clips)
-    sides = np.empty((views, 5, 4))
-    for v in range(views):
-        # A point is in view where -w <= x, y <= w and z >= -w in clip coordinates.
-        for i in range(4):
-            x, y, z, w = clips[v, 0, i], clips[v, 1, i], clips[v, 2, i], clips[v, 3, i]
-            sides[v, 0, i], sides[v, 1, i], sides[v, 2, i], sides[v, 3, i] = w + x, w - x, w + y, w - y
-            sides[v, 4, i] = w + z
-    found, masks, m = np.empty(n, np.int64), np.zeros(n, np.uint8), 0
-    for k in range(n):
-        mask = 0
-        for v in range(views):
-            inside = True
-            for s in range(5):
-                # The box's corner farthest along the side's normal is the one that would be inside.
-                reach = sides[v, s, 3]
-                for i in range(3):
-                    a = sides[v, s, i]
-                    reach += a * (high[k, i] if a > 0.0 else low[k, i])
-                if reach <= 0.0:
-                    inside = False
-                    break
-            if inside:
-                mask |= 1 << v
-        masks[k] = mask
-        if mask:
-            found[m] = k
-            m += 1
-    return found[:m], masks
-
-
-@njit(cache=True)
-def _away(order: NDArray[np.int64], eye: Floats, low: Floats, high: Floats) -> Floats:
-    out = np.empty(len(order))
-    for n in range(len(order)):
-        k, total = order[n], 0.0
-        for i in range(3):
-            d = max(low[k, i] - eye[i], 0.0) + max(eye[i] - high[k, i], 0.0)
-            total += d * d
-        out[n] = total
-    return out
-
-
 @njit(cache=True, error_model="numpy")
 def _triangles_seen(
-    order: NDArray[np.int64], masks: NDArray[np.uint8], starts: NDArray[np.int64], planes: Floats,
+    order: NDArray[np.int64], sees: NDArray[np.bool_], starts: NDArray[np.int64], planes: Floats,
     corners: NDArray[np.float32], clips: Floats, eye: Floats, low: Floats, high: Floats,
     nearness: NDArray[np.float32], out: NDArray[np.uint32],
 ) -> NDArray[np.int64]:  # fmt: skip
@@ -129,10 +81,10 @@ def _triangles_seen(
     counts = np.zeros(views, np.int64)
     ex, ey, ez = eye[0], eye[1], eye[2]
     half_w, half_h = 0.5 * width, 0.5 * height
-    for chunk in order:
-        mask = 0
+    for n in range(len(order)):
+        chunk, mask = order[n], 0
         for v in range(views):
-            if (masks[chunk] >> v) & 1 and not _hidden(low[chunk], high[chunk], clips[v], nearness[v]):
+            if sees[n, v] and not _hidden(low[chunk], high[chunk], clips[v], nearness[v]):
                 mask |= 1 << v
         if not mask:
             continue
@@ -149,26 +101,26 @@ def _triangles_seen(
                 w0 = m[3, 0] * ax + m[3, 1] * ay + m[3, 2] * az + m[3, 3]
                 w1 = m[3, 0] * bx + m[3, 1] * by + m[3, 2] * bz + m[3, 3]
                 w2 = m[3, 0] * cx + m[3, 1] * cy + m[3, 2] * cz + m[3, 3]
-                if w0 >= _NEAR_W and w1 >= _NEAR_W and w2 >= _NEAR_W:
+                if w0 >= NEAR_W and w1 >= NEAR_W and w2 >= NEAR_W:
                     # To pixels, centres at whole numbers.
                     w0, w1, w2 = 1.0 / w0, 1.0 / w1, 1.0 / w2
                     u0 = ((m[0, 0] * ax + m[0, 1] * ay + m[0, 2] * az + m[0, 3]) * w0 + 1.0) * half_w - 0.5
                     u1 = ((m[0, 0] * bx + m[0, 1] * by + m[0, 2] * bz + m[0, 3]) * w1 + 1.0) * half_w - 0.5
                     u2 = ((m[0, 0] * cx + m[0, 1] * cy + m[0, 2] * cz + m[0, 3]) * w2 + 1.0) * half_w - 0.5
-                    left = max(math.ceil(min(u0, min(u1, u2)) - _ROUNDING_PX), 0)
-                    right = min(math.floor(max(u0, max(u1, u2)) + _ROUNDING_PX), width - 1)
+                    left = max(math.ceil(min(u0, min(u1, u2)) - ROUNDING_PX), 0)
+                    right = min(math.floor(max(u0, max(u1, u2)) + ROUNDING_PX), width - 1)
                     if left > right:
                         continue
                     v0 = ((m[1, 0] * ax + m[1, 1] * ay + m[1, 2] * az + m[1, 3]) * w0 + 1.0) * half_h - 0.5
                     v1 = ((m[1, 0] * bx + m[1, 1] * by + m[1, 2] * bz + m[1, 3]) * w1 + 1.0) * half_h - 0.5
                     v2 = ((m[1, 0] * cx + m[1, 1] * cy + m[1, 2] * cz + m[1, 3]) * w2 + 1.0) * half_h - 0.5
-                    top = max(math.ceil(min(v0, min(v1, v2)) - _ROUNDING_PX), 0)
-                    bottom = min(math.floor(max(v0, max(v1, v2)) + _ROUNDING_PX), height - 1)
+                    top = max(math.ceil(min(v0, min(v1, v2)) - ROUNDING_PX), 0)
+                    bottom = min(math.floor(max(v0, max(v1, v2)) + ROUNDING_PX), height - 1)
                     if top > bottom:
                         continue
                     if not _covers(u0, v0, w0, u1, v1, w1, u2, v2, w2, left, right, top, bottom, nearness[v]):
                         continue
-                elif w0 < _NEAR_W and w1 < _NEAR_W and w2 < _NEAR_W:
+                elif w0 < NEAR_W and w1 < NEAR_W and w2 < NEAR_W:
                     continue
                 n = counts[v]
                 out[v, n], out[v, n + 1], out[v, n + 2] = 3 * t, 3 * t + 1, 3 * t + 2
@@ -186,13 +138,13 @@ def _hidden(low: Floats, high: Floats, m: Floats, nearness: NDArray[np.float32])
         y = high[1] if corner & 2 else low[1]
         z = high[2] if corner & 4 else low[2]
         w = m[3, 0] * x + m[3, 1] * y + m[3, 2] * z + m[3, 3]
-        if w < _NEAR_W:
+        if w < NEAR_W:
             return False
         u = ((m[0, 0] * x + m[0, 1] * y + m[0, 2] * z + m[0, 3]) / w + 1.0) * 0.5 * width - 0.5
         v = ((m[1, 0] * x + m[1, 1] * y + m[1, 2] * z + m[1, 3]) / w + 1.0) * 0.5 * height - 0.5
         u0, u1, v0, v1, nearest = min(u0, u), max(u1, u), min(v0, v), max(v1, v), min(nearest, w)
-    left, right = max(math.ceil(u0 - _ROUNDING_PX), 0), min(math.floor(u1 + _ROUNDING_PX), width - 1)
-    top, bottom = max(math.ceil(v0 - _ROUNDING_PX), 0), min(math.floor(v1 + _ROUNDING_PX), height - 1)
+    left, right = max(math.ceil(u0 - ROUNDING_PX), 0), min(math.floor(u1 + ROUNDING_PX), width - 1)
+    top, bottom = max(math.ceil(v0 - ROUNDING_PX), 0), min(math.floor(v1 + ROUNDING_PX), height - 1)
     limit = np.float32(1.0 / nearest + _NEARER)
     for y in range(top, bottom + 1):
         for x in range(left, right + 1):
