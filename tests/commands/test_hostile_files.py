@@ -266,6 +266,7 @@ def test_annotations_with_half_characters_are_refused_by_the_server_and_never_sh
 FINGERPRINT = "f" * 64
 ROW = {
     "scene": "U_A_0", "nav_id": "n", "view": "front", "modality": "rgb", "path": "media/U_A_0/n/front_rgb.mp4",
+    "stream": 0, "left_px": 0, "top_px": 0, "depth_step": None,
     "sampling": "steps", "n_frames": 1, "fps": 15.0, "width": 16, "height": 16, "fov_deg": 90.0, "codec": "h264",
     "renderer": "gl", "device": "x", "bytes": 4, "sha256": "0" * 64, "ok": True, "flags": [],
 }  # fmt: skip
