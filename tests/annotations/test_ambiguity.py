@@ -136,3 +136,29 @@ def test_the_first_of_equally_near_landmarks_is_taken():
     assert bearing.landmark == 0
     assert nearest_landmark(np.array([1.0, 1.0]), np.array([[1.0, 1.0]])) is None
     assert nearest_landmark(np.array([1.0, 1.0]), np.zeros((0, 2))) is None
+
+
+def test_boxes_reject_no_pair_that_outlines_would_not():
+    geometry = SceneGeometry(street())
+    some = range(len(geometry.boxes))
+    reaches = (0.5, 3.0, 8.0, 20.0)
+    found = [(geometry._within(i, j, r), geometry.gap_m(i, j) <= r) for i in some for j in some for r in reaches]
+    assert all(told == true for told, true in found)
+    assert {told for told, _ in found} == {True, False}
+
+
+def test_heights_over_a_place_are_those_of_the_triangles_there():
+    geometry = SceneGeometry(street())
+    for i, (x, y, _) in enumerate(geometry.centres.tolist()):
+        for j, instance in enumerate(geometry.scene.instances):
+            a, b, c = np.moveaxis(instance.vertices[instance.faces], 1, 0)
+            upright = np.abs(np.cross(b - a, c - a)[:, 2]) <= 1e-12
+            basis = np.stack([b - a, c - a], axis=2)[~upright]
+            u, v = np.linalg.solve(basis[:, :2], (np.array([x, y]) - a[~upright, :2])[:, :, None])[:, :, 0].T
+            inside = (u >= 1e-9) & (v >= 1e-9) & (u + v <= 1 - 1e-9)
+            edge = (u >= -1e-9) & (v >= -1e-9) & (u + v <= 1 + 1e-9)
+            z = a[~upright, 2] + u * basis[:, 2, 0] + v * basis[:, 2, 1]
+            heights = np.sort(geometry._heights(j, x, y))
+            assert inside.sum() <= len(heights) <= edge.sum(), (i, j)
+            assert np.isin(heights.round(6), z[edge].round(6)).all()
+            assert np.isin(z[inside].round(6), heights.round(6)).all()

@@ -1,6 +1,7 @@
 """From recipe to scene file: ground, footprints, errors, and the same bytes in every process."""
 
 import hashlib
+import math
 import os
 import subprocess
 import sys
@@ -25,6 +26,7 @@ from aerialdojo_gen.scenes.grammar_scatter import along, grid, poisson_disc, smo
 from aerialdojo_gen.scenes.grammar_streets import crossing, parking_row, streets
 from aerialdojo_gen.scenes.ground import Surface, disc, ground_meshes, rectangle, ribbon
 from aerialdojo_gen.scenes.recipe import Recipe
+from aerialdojo_gen.scenes.shapes_extruded import triangulate, triangulate_all
 from aerialdojo_gen.scenes.site import Site
 from aerialdojo_gen.scenes.terrain import flat_terrain, mound, rolling_terrain
 from aerialdojo_gen.stages.work import build_scenes
@@ -335,6 +337,37 @@ def test_poisson_discs_keep_their_distance_and_fill_the_area(seed, radius):
     assert gaps.min() >= radius
     # Thrown until nearly full: a maximal set covers the area by discs of its radius.
     assert len(points) * radius**2 > 0.5 * area.area
+
+
+@given(st.integers(0, 2**32 - 1), st.floats(0.3, 2.0), st.integers(1, 200))
+@settings(max_examples=25, deadline=None)
+def test_poisson_discs_of_a_density_are_those_of_the_rule_taken_dart_by_dart(seed, radius, limit):
+    area, density = disc(3.0, -40.0, 6.0), lambda x, y: abs(math.sin(x)) * abs(math.cos(y))
+    rng, taken, wanted = np.random.default_rng(seed), [], []
+    x0, y0, x1, y1 = area.bounds
+    for x, y, yaw in rng.uniform((x0, y0, 0.0), (x1, y1, 360.0), size=(int(30 * area.area / radius**2), 3)).tolist():
+        share = density(x, y)
+        if shapely.contains_xy(area, x, y) and share > 0.01 and len(wanted) < limit:
+            own = radius / math.sqrt(share)
+            if all((x - u) ** 2 + (y - v) ** 2 >= max(own, other) ** 2 for u, v, other in taken):
+                taken.append((x, y, own))
+                wanted.append((x, y, yaw))
+    assert [tuple(pose) for pose in poisson_disc(area, radius, np.random.default_rng(seed), density, limit)] == wanted
+
+
+@given(st.lists(st.tuples(st.integers(-8, 8), st.integers(-8, 8), st.integers(3, 9)), min_size=1, max_size=6))
+def test_polygons_triangulated_together_are_those_triangulated_alone(discs):
+    holed = [disc(x, y, 5.0, n).difference(disc(x + 0.5, y, 2.0, n)) for x, y, n in discs]
+    vertices, whose, faces = triangulate_all(holed)
+    alone = [triangulate(plan) for plan in holed]
+    assert np.array_equal(vertices, np.concatenate([v for v, _ in alone]))
+    assert np.array_equal(whose, np.repeat(np.arange(len(holed)), [len(v) for v, _ in alone]))
+    first = np.cumsum([0, *(len(v) for v, _ in alone[:-1])])
+    assert np.array_equal(faces, np.concatenate([f + k for (_, f), k in zip(alone, first, strict=True)]))
+    a, b, c = (vertices[faces[:, k]] for k in range(3))
+    doubled = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
+    assert (doubled > 0).all()
+    assert np.isclose(doubled.sum() / 2, sum(plan.area for plan in holed))
 
 
 def test_poses_along_a_path_reach_both_ends_and_face_along_it():
