@@ -2,8 +2,8 @@
 
 OpenGL in software takes a microsecond for a triangle, however few pixels of it are seen, and a small picture has few
 pixels. So triangles are drawn here too, the nearest first and their depth alone, and what lies behind it everywhere
-is left out, whole chunks at once. OpenGL draws the rest and decides: what is left out could not have been seen, by margins that
-exceed what OpenGL rounds.
+is left out, whole chunks at once. OpenGL draws the rest and decides: what is left out could not have been seen, by
+margins that exceed what OpenGL rounds.
 """
 
 from __future__ import annotations
