@@ -8,27 +8,10 @@
 NumPy is enough; worker processes and tensors need PyTorch, the extra ``train``.
 """
 
-from __future__ import annotations
+from aerialdojo_gen.learning.batches import collate
+from aerialdojo_gen.learning.loader import Loader
+from aerialdojo_gen.learning.trajectories import Trajectories
+from aerialdojo_gen.learning.vector import Flattened, OwnScenes, ProgressReward, make_vec
+from aerialdojo_gen.learning.words import Vocabulary
 
-import importlib
-from typing import TYPE_CHECKING, Any
-
-if TYPE_CHECKING:
-    from aerialdojo_gen.learning.loader import Loader
-    from aerialdojo_gen.learning.trajectories import Trajectories, collate
-    from aerialdojo_gen.learning.words import Vocabulary
-
-__all__ = ["Loader", "Trajectories", "Vocabulary", "collate"]
-
-_HOMES = {
-    "Loader": "aerialdojo_gen.learning.loader",
-    "Trajectories": "aerialdojo_gen.learning.trajectories",
-    "Vocabulary": "aerialdojo_gen.learning.words",
-    "collate": "aerialdojo_gen.learning.trajectories",
-}
-
-
-def __getattr__(name: str) -> Any:
-    if name not in _HOMES:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(importlib.import_module(_HOMES[name]), name)
+__all__ = ["Flattened", "Loader", "OwnScenes", "ProgressReward", "Trajectories", "Vocabulary", "collate", "make_vec"]

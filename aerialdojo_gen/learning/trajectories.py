@@ -11,15 +11,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from aerialdojo_gen.agents.goal import N_ACTIONS, Sensors
+from aerialdojo_gen.agents.goal import Sensors
 from aerialdojo_gen.benchmark.tasks import Selection, mesh_of, reference_image
 from aerialdojo_gen.common import rng
 from aerialdojo_gen.common.names import unknown
 from aerialdojo_gen.errors import UsageError
-from aerialdojo_gen.geometry.angles import wrap_angle_rad
+from aerialdojo_gen.learning.batches import scattered, unbatched
 from aerialdojo_gen.learning.cached import Cached, Store
-from aerialdojo_gen.learning.geodesic import geodesic
 from aerialdojo_gen.learning.index import Index, read_index
+from aerialdojo_gen.learning.labels import PRIVILEGED, Labels
 from aerialdojo_gen.learning.order import Order
 from aerialdojo_gen.learning.pictures import Drawn, Frames, Recorded, Source
 from aerialdojo_gen.learning.words import PADDING, Vocabulary, goal_text
@@ -29,9 +29,6 @@ from aerialdojo_gen.store.schemas import VIEWS
 
 GOALS = ("text", "tokens", "image")
 SOURCES = ("render", "recordings", "auto")
-PRIVILEGED = ("pose", "goal_distance_m", "actions")
-# In the place of the action before the first one.
-NO_ACTION = N_ACTIONS
 
 
 class Trajectories:
@@ -156,13 +153,16 @@ class Trajectories:
             index = index.take(drawn_evenly(index, limit, seed))
         # A scene without a mesh is named before the first epoch, not within it.
         meshes = {name: mesh_of(self._root, name)[1] for name in index.scenes} if not self.sensors.blind else {}
-        self._source = None if self.sensors.blind else Drawn(self._root, index, self.sensors, renderer)
+        self._source: Source | None = None
+        if not self.sensors.blind:
+            self._source = Drawn(self._root, index, self.sensors, renderer)
         if source != "render" and not self.sensors.blind:
             index = self._with_recordings(index, source, renderer)
         self.index, self.past, self.stride = index, past, stride
+        self._labels = Labels(self._root, index, self.privileged)
         ends = np.ones(len(index), np.int64) if past is None else (index.steps - 1) // stride + 1
         self._first = np.concatenate([[0], np.cumsum(ends)])
-        self._texts = [goal_text(*said) for said in zip(  # type: ignore[arg-type]
+        self._texts = [goal_text(*said) for said in zip(
             *(index.told[name] for name in ("target_name", "landmark", "direction", "description")), strict=True
         )]  # fmt: skip
         self.vocabulary = vocabulary or Vocabulary.of(self._texts)
@@ -186,7 +186,7 @@ class Trajectories:
     def __getitems__(self, numbers: Sequence[int]) -> list[dict[str, Any]]:
         """Return samples, drawn together; ``torch.utils.data.DataLoader`` asks for a batch by this."""
         batch = self.batch(numbers)
-        return [_unbatched(batch, k, self.past is None) for k in range(len(numbers))]
+        return [unbatched(batch, k, self.past is None) for k in range(len(numbers))]
 
     def __iter__(self) -> Iterator[dict[str, Any]]:
         """Yield all samples in the order of their numbers."""
@@ -229,11 +229,11 @@ class Trajectories:
         mask = steps >= 0
         out: dict[str, Any] = {"mask": mask, "step": ends, "nav_id": [self.index.nav_id[k] for k, _ in places]}
         out |= self._told(rows)
-        out |= self._labels(rows, steps, mask)
+        out |= self._labels.of(rows, steps, mask)
         frames = self._frames(np.broadcast_to(rows[:, None], steps.shape)[mask], steps[mask])
         for name, seen in (("rgb", frames.rgb), ("depth_m", frames.depth_m)):
             if seen is not None:
-                out[name] = seen.reshape(*mask.shape, *seen.shape[1:]) if mask.all() else _scattered(seen, mask)
+                out[name] = seen.reshape(*mask.shape, *seen.shape[1:]) if mask.all() else scattered(seen, mask)
         return out
 
     def _told(self, rows: NDArray[np.int64]) -> dict[str, Any]:
@@ -255,45 +255,6 @@ class Trajectories:
         named = self.index.told["reference_image_id"][k]
         return None if named is None else reference_image(self._root, self.index.scenes[self.index.scene[k]], named)
 
-    def _labels(self, rows: NDArray[np.int64], steps: NDArray[np.int64], mask: NDArray[np.bool_]) -> dict[str, Any]:
-        index = self.index
-        n, window = steps.shape
-        out: dict[str, Any] = {
-            "action": np.zeros((n, window), np.int64),
-            "previous_action": np.zeros((n, window), np.int64),
-            "remaining_actions": np.zeros((n, window), np.int32),
-            "odometry": np.zeros((n, window, 4), np.float32),
-        }
-        if "pose" in self.privileged:
-            out["pose"] = np.zeros((n, window, 4))
-        if "goal_distance_m" in self.privileged:
-            out["goal_distance_m"] = np.zeros((n, window), np.float32)
-        if "actions" in self.privileged:
-            out["action_collides"], out["action_refused"] = np.zeros((2, n, window, N_ACTIONS), np.bool_)
-            out["action_cost_to_go_m"] = np.zeros((n, window, N_ACTIONS), np.float32)
-        for i, k in enumerate(rows.tolist()):
-            here, at = mask[i], steps[i, mask[i]]
-            actions, poses = index.actions_of(k), index.poses_of(k)
-            out["action"][i, here] = actions[at]
-            out["previous_action"][i, here] = np.concatenate([[NO_ACTION], actions[:-1]])[at]
-            out["remaining_actions"][i, here] = index.budget[k] - at
-            out["odometry"][i, here] = _odometry(poses)[at]
-            if "pose" in self.privileged:
-                out["pose"][i, here] = poses[at]
-            if self.privileged and self.privileged != ("pose",):
-                self._known(out, i, here, k, poses[at])
-        return out
-
-    def _known(
-        self, out: dict[str, Any], i: int, here: NDArray[np.bool_], k: int, poses: NDArray[np.float64]
-    ) -> None:  # fmt: skip
-        ways, goal = geodesic(*mesh_of(self._root, self.index.scenes[self.index.scene[k]])), self.index.goal[k]
-        if "goal_distance_m" in self.privileged:
-            out["goal_distance_m"][i, here] = ways.distances_m(goal, poses[:, :3])
-        if "actions" in self.privileged:
-            out["action_collides"][i, here], out["action_refused"][i, here], cost = ways.actions(goal, poses)
-            out["action_cost_to_go_m"][i, here] = cost
-
     def _frames(self, trajectories: NDArray[np.int64], steps: NDArray[np.int64]) -> Frames:
         if self._source is None:
             return Frames(None, None)
@@ -305,8 +266,8 @@ class Trajectories:
             self._source.frames(*keys[1:, keys[0] == scene].astype(np.int64)) for scene in np.unique(keys[0])
         ]  # fmt: skip
         joined = parts[0] if len(parts) == 1 else Frames(
-            np.concatenate([p.rgb for p in parts]) if self.sensors.rgb else None,  # type: ignore[misc]
-            np.concatenate([p.depth_m for p in parts]) if self.sensors.depth else None,  # type: ignore[misc]
+            np.concatenate([p.rgb for p in parts]) if self.sensors.rgb else None,
+            np.concatenate([p.depth_m for p in parts]) if self.sensors.depth else None,
         )  # fmt: skip
         return joined.take(np.asarray(back, np.int64).ravel())
 
@@ -352,61 +313,6 @@ def drawn_evenly(index: Index, limit: int, seed: int) -> NDArray[np.int64]:
         ranked = sorted((rng.rank(seed, "learning", index.nav_id[k]), k) for k in own)[:limit]
         lots += [(turn, rng.rank(seed, "learning", scene), k) for turn, (_, k) in enumerate(ranked)]
     return np.array(sorted(k for _, _, k in sorted(lots)[:limit]), np.int64)
-
-
-def collate(samples: Sequence[dict[str, Any]]) -> dict[str, Any]:
-    """Join samples to a batch, as `Trajectories.batch` gives it: a ``collate_fn`` that needs no torch.
-
-    Parameters
-    ----------
-    samples : sequence of dict
-        Of one data set; of different T they are padded at their front.
-
-    Returns
-    -------
-    dict
-        Arrays that lead with the sample, and lists of texts.
-    """
-    window = max(len(sample["mask"]) for sample in samples)
-    out: dict[str, Any] = {}
-    for name, first in samples[0].items():
-        values = [sample[name] for sample in samples]
-        if isinstance(first, str):
-            out[name] = values
-        elif name in _WHOLE:
-            out[name] = np.stack(values)
-        else:
-            out[name] = np.stack(
-                [np.concatenate([np.zeros((window - len(v), *v.shape[1:]), v.dtype), v]) for v in values]
-            )
-    return out
-
-
-# What a sample has once, and not for every step.
-_WHOLE = ("step", "tokens", "image", "has_image")
-
-
-def _unbatched(batch: dict[str, Any], k: int, whole: bool) -> dict[str, Any]:
-    """Return one of a batch's samples; a whole trajectory without what it was padded with."""
-    begin = int(batch["mask"][k].argmax()) if whole else 0
-    return {
-        name: value[k] if isinstance(value, list) or name in _WHOLE else value[k, begin:]
-        for name, value in batch.items()
-    }
-
-
-def _odometry(poses: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Poses in the frame of the first: x ahead, y left, z up in metres, and yaw in radians."""
-    c, s = np.cos(poses[0, 3]), np.sin(poses[0, 3])
-    away = poses[:, :3] - poses[0, :3]
-    turned = wrap_angle_rad(poses[:, 3] - poses[0, 3])
-    return np.column_stack([away[:, 0] * c + away[:, 1] * s, away[:, 1] * c - away[:, 0] * s, away[:, 2], turned])
-
-
-def _scattered(seen: NDArray[Any], mask: NDArray[np.bool_]) -> NDArray[Any]:
-    out = np.zeros((*mask.shape, *seen.shape[1:]), seen.dtype)
-    out[mask] = seen
-    return out
 
 
 def _names(given: str | Sequence[str]) -> tuple[str, ...]:

@@ -16,7 +16,7 @@ from aerialdojo_gen.errors import StoreError, UsageError
 from aerialdojo_gen.geometry.cameras import Camera, view_pose
 from aerialdojo_gen.learning import Trajectories, Vocabulary, collate
 from aerialdojo_gen.learning.cached import Cached
-from aerialdojo_gen.learning.trajectories import NO_ACTION
+from aerialdojo_gen.learning.labels import NO_ACTION
 from aerialdojo_gen.store.root import open_root
 
 VIEWS = ("front", "down", "left")

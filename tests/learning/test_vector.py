@@ -88,7 +88,7 @@ def test_stable_baselines_checker_takes_what_it_can_take(smoke):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         # Depth is metres, and goes to a network as numbers.
-        warnings.filterwarnings("ignore", message="It seems that your observation depth_m is an image")
+        warnings.filterwarnings("ignore", message="It seems that your observation( space)? depth_m is an image")
         checker.check_env(env, skip_render_check=True)
 
 

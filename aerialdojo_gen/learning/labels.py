@@ -1,0 +1,98 @@
+"""What a sample's steps are labelled with, and what only teachers and rewards may know."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aerialdojo_gen.agents.goal import N_ACTIONS
+from aerialdojo_gen.benchmark.tasks import mesh_of
+from aerialdojo_gen.geometry.angles import wrap_angle_rad
+from aerialdojo_gen.learning.geodesic import geodesic
+from aerialdojo_gen.learning.index import Index
+from aerialdojo_gen.store.root import DataRoot
+
+PRIVILEGED = ("pose", "goal_distance_m", "actions")
+# In the place of the action before the first one.
+NO_ACTION = N_ACTIONS
+
+
+class Labels:
+    """Labels of a selection's trajectories.
+
+    Parameters
+    ----------
+    root : DataRoot
+        With the meshes, for what is privileged.
+    index : Index
+    privileged : tuple of str
+        Of `PRIVILEGED`.
+    """
+
+    def __init__(self, root: DataRoot, index: Index, privileged: tuple[str, ...]) -> None:
+        self._root, self.index, self.privileged = root, index, privileged
+
+    def of(self, rows: NDArray[np.int64], steps: NDArray[np.int64], mask: NDArray[np.bool_]) -> dict[str, Any]:
+        """Label windows of steps.
+
+        Parameters
+        ----------
+        rows : (n,) int64
+            Trajectories.
+        steps : (n, T) int64
+            Steps of each.
+        mask : (n, T) bool
+            Which of them there are; where not, labels are 0.
+
+        Returns
+        -------
+        dict of str to (n, T, ...) array
+            See `aerialdojo_gen.learning.trajectories.Trajectories`.
+        """
+        index = self.index
+        n, window = steps.shape
+        out: dict[str, Any] = {
+            "action": np.zeros((n, window), np.int64),
+            "previous_action": np.zeros((n, window), np.int64),
+            "remaining_actions": np.zeros((n, window), np.int32),
+            "odometry": np.zeros((n, window, 4), np.float32),
+        }
+        if "pose" in self.privileged:
+            out["pose"] = np.zeros((n, window, 4))
+        if "goal_distance_m" in self.privileged:
+            out["goal_distance_m"] = np.zeros((n, window), np.float32)
+        if "actions" in self.privileged:
+            out["action_collides"], out["action_refused"] = np.zeros((2, n, window, N_ACTIONS), np.bool_)
+            out["action_cost_to_go_m"] = np.zeros((n, window, N_ACTIONS), np.float32)
+        for i, k in enumerate(rows.tolist()):
+            here, at = mask[i], steps[i, mask[i]]
+            actions, poses = index.actions_of(k), index.poses_of(k)
+            out["action"][i, here] = actions[at]
+            out["previous_action"][i, here] = np.concatenate([[NO_ACTION], actions[:-1]])[at]
+            out["remaining_actions"][i, here] = index.budget[k] - at
+            out["odometry"][i, here] = _odometry(poses)[at]
+            if "pose" in self.privileged:
+                out["pose"][i, here] = poses[at]
+            if self.privileged and self.privileged != ("pose",):
+                self._known(out, i, here, k, poses[at])
+        return out
+
+    def _known(
+        self, out: dict[str, Any], i: int, here: NDArray[np.bool_], k: int, poses: NDArray[np.float64]
+    ) -> None:  # fmt: skip
+        ways, goal = geodesic(*mesh_of(self._root, self.index.scenes[self.index.scene[k]])), self.index.goal[k]
+        if "goal_distance_m" in self.privileged:
+            out["goal_distance_m"][i, here] = ways.distances_m(goal, poses[:, :3])
+        if "actions" in self.privileged:
+            out["action_collides"][i, here], out["action_refused"][i, here], cost = ways.actions(goal, poses)
+            out["action_cost_to_go_m"][i, here] = cost
+
+
+def _odometry(poses: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Poses in the frame of the first: x ahead, y left, z up in metres, and yaw in radians."""
+    c, s = np.cos(poses[0, 3]), np.sin(poses[0, 3])
+    away = poses[:, :3] - poses[0, :3]
+    turned = wrap_angle_rad(poses[:, 3] - poses[0, 3])
+    return np.column_stack([away[:, 0] * c + away[:, 1] * s, away[:, 1] * c - away[:, 0] * s, away[:, 2], turned])

@@ -1,0 +1,103 @@
+"""How many samples a second a core the loader gives, where the time goes, and the environment beside it.
+
+    python tests/bench/bench_loader.py data U_Mall_0 N_Forest_0
+
+CPU time of this process, the best of three: one core, and other processes on the machine count less.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable
+from tempfile import TemporaryDirectory
+
+import numpy as np
+
+from aerialdojo_gen import make_env
+from aerialdojo_gen.benchmark.eyes import drawing
+from aerialdojo_gen.benchmark.tasks import mesh_of
+from aerialdojo_gen.geometry.cameras import Camera, view_pose
+from aerialdojo_gen.learning import Trajectories
+from aerialdojo_gen.rendering.gl import clip_from_world
+from aerialdojo_gen.rendering.picture import FAR_M, NEAR_M
+from aerialdojo_gen.scenes.context import SEVERAL, open_scene
+from aerialdojo_gen.store.root import open_root
+from aerialdojo_gen.store.schemas import VIEWS
+
+SAMPLES = 48
+
+
+def best_ms(work: Callable[[], object], times: int = 3) -> float:
+    """CPU milliseconds of the best of some runs."""
+    found = []
+    for _ in range(times):
+        begun = time.process_time()
+        work()
+        found.append(time.process_time() - begun)
+    return 1e3 * min(found)
+
+
+def scene_rows(data: str, scene: str) -> None:
+    root = open_root(data)
+    context = open_scene(*mesh_of(root, scene), SEVERAL)
+    renderer = drawing(context.scene, "gl")
+    print(f"\n{scene}, CPU ms a sample")
+    print(
+        f"{'px':>4} {'views':>5} {'one by one':>10} {'loader':>7} {'culling':>8} {'cached':>7} {'samples/s/core':>14}"
+    )
+    for size in (64, 128, 224):
+        for views in (VIEWS[:1], VIEWS):
+            options = {"split": "all", "scene": scene, "limit": 8, "views": views, "size": size, "renderer": "gl"}
+            loaded = Trajectories(data, **options)
+            numbers = np.random.default_rng(0).choice(len(loaded), SAMPLES, replace=False).tolist()
+            poses = [loaded.index.poses_of(k)[step] for k, step in map(loaded.place, numbers)]
+            camera = Camera(size, size, 90.0)
+
+            def alone(poses=poses, views=views, camera=camera):
+                for pose in poses:
+                    for view in views:
+                        renderer.render(camera, view_pose(pose[:3], pose[3], view))
+
+            def cull(poses=poses, views=views, camera=camera, size=size):
+                for pose in poses:
+                    clips = [clip_from_world(camera, view_pose(pose[:3], pose[3], v), NEAR_M, FAR_M) for v in views]
+                    nearness = np.zeros((len(views), size, size), np.float32)
+                    for culling in renderer.bodies()._cullings:
+                        culling.seen(np.stack(clips), pose[:3].copy(), size, size, nearness)
+
+            def load(loaded=loaded, numbers=numbers):
+                loaded.batch(numbers)
+
+            alone(), cull(), load()
+            with TemporaryDirectory() as folder:
+                kept = Trajectories(data, **options, cache_gb=4, cache_dir=folder)
+                kept.batch(numbers)
+                cached = best_ms(lambda kept=kept, numbers=numbers: kept.batch(numbers)) / SAMPLES
+            one, loader, culling = (best_ms(work) / SAMPLES for work in (alone, load, cull))
+            print(
+                f"{size:>4} {len(views):>5} {one:>10.2f} {loader:>7.2f} {culling:>8.2f} {cached:>7.2f} "
+                f"{1e3 / loader:>14.0f}",
+                flush=True,
+            )
+
+
+def environment(data: str, scene: str) -> None:
+    for views in (VIEWS[:1], VIEWS):
+        env = make_env(data, scene=scene, views=views, width=128, height=128, renderer="gl")
+        env.reset(seed=0)
+
+        def fly(env=env):
+            for _ in range(60):
+                ended = env.step(14)[2:4]
+                if any(ended):
+                    env.reset()
+
+        fly()
+        print(f"environment, {scene}, 128 px, {len(views)} views: {60e3 / best_ms(fly):.0f} steps/s/core", flush=True)
+
+
+if __name__ == "__main__":
+    for name in sys.argv[2:]:
+        environment(sys.argv[1], name)
+        scene_rows(sys.argv[1], name)
