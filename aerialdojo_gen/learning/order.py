@@ -59,7 +59,7 @@ class Order:
             if value < 1:
                 raise UsageError(f"{what} is at least 1, not {value}")
         self._scene, self._first = scene, first
-        self._batch_size, self._drop_last = batch_size, drop_last
+        self._batch_size = batch_size
         self._seed, self._epoch, self._block, self._streams = seed, epoch, block, streams
         self._shuffle = shuffle
         n = int(first[-1])

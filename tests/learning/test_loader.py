@@ -18,6 +18,20 @@ from aerialdojo_gen.learning.order import Order
 WITHOUT = "PyTorch is not installed: it is the extra 'train'"
 
 
+# In a process of its own: two forks, then none, and the same batches.
+FORKED = """
+import sys
+from aerialdojo_gen.learning import Loader, Trajectories
+data = Trajectories(sys.argv[1], split="all", size=24, views=("front", "down"), limit=10, past=1)
+loader = Loader(data, 16, seed=3, workers=2, context="fork")
+drawn = list(loader)
+loader.close()
+plain = list(Loader(data, 16, seed=3))
+assert len(drawn) == len(plain) > 3
+assert all((a[name] == b[name]).all() for a, b in zip(drawn, plain) for name in ("rgb", "depth_m", "action"))
+"""
+
+
 @st.composite
 def worlds(draw):
     scene = np.sort(draw(st.lists(st.integers(0, 3), min_size=1, max_size=40)))
@@ -162,9 +176,8 @@ def test_workers_give_what_this_process_gives(data, context):
     alone = list(Loader(data, 16, seed=3))
     if context == "fork":
         # This process has drawn: only one that has not can be forked.
-        code = "import sys; from test_loader import forked; forked(sys.argv[1])"
         done = subprocess.run(
-            [sys.executable, "-c", code, str(data._root)],
+            [sys.executable, "-c", FORKED, str(data._root)],
             cwd=os.path.dirname(__file__),
             capture_output=True,
             text=True,
@@ -178,15 +191,6 @@ def test_workers_give_what_this_process_gives(data, context):
             assert isinstance(a["rgb"], torch.Tensor)
             assert alike(a, b)
     loader.close()
-
-
-def forked(smoke):
-    """In a process of its own: two forks, then none, and the same batches."""
-    data = Trajectories(smoke, split="all", size=24, views=("front", "down"), limit=10, past=1)
-    loader = Loader(data, 16, seed=3, workers=2, context="fork")
-    drawn = list(loader)
-    loader.close()
-    assert all(alike(a, b) for a, b in zip(drawn, Loader(data, 16, seed=3), strict=True))
 
 
 @pytest.mark.slow
