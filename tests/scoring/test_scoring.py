@@ -187,7 +187,8 @@ def test_only_the_best_few_are_pictured(tmp_path, monkeypatch):
     monkeypatch.setattr(Candidates, "picture", lambda self, k, *a: taken.append(k) or picture(self, k, *a))
     config = AnchorSampleConfig(pictured=5)
     rows, rejected = anchors_of(item_of(POST, "post"), world_of(yard(POST)), job_in(tmp_path), config)
-    assert len(taken) == len(set(taken)) == 5
+    # Fewer where no other can be chosen any more.
+    assert 1 <= len(taken) == len(set(taken)) <= 5
     assert rejected["not_shortlisted"] > 20
     assert len(rows) == 3
 
