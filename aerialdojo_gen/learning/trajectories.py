@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from aerialdojo_gen.agents.goal import Sensors
 from aerialdojo_gen.benchmark.tasks import Selection, mesh_of, reference_image
 from aerialdojo_gen.common import rng
+from aerialdojo_gen.common.advice import command
 from aerialdojo_gen.common.names import unknown
 from aerialdojo_gen.errors import UsageError
 from aerialdojo_gen.learning.batches import scattered, unbatched
@@ -279,7 +280,7 @@ class Trajectories:
             if not len(has):
                 raise UsageError(
                     f"none of the {len(index):,} trajectories has a recording of the views asked for: run "
-                    "aerialdojo-gen render, or choose source='render'"
+                    f"{command('render')}, or choose source='render'"
                 )
             index = index.take(has)
             drawn = Drawn(self._root, index, self.sensors, renderer)

@@ -11,8 +11,8 @@ from aerialdojo_gen.geometry.cameras import Camera, project, view_pose
 from aerialdojo_gen.geometry.motion import DISPLACEMENTS, replay
 from aerialdojo_gen.geometry.rays import instance_caster
 from aerialdojo_gen.release.ids import held_out, key_of, nav_id
-from aerialdojo_gen.stages.work.filter import settings_of
 from aerialdojo_gen.stages.work.pair_objects import surface_points
+from aerialdojo_gen.stages.work.rules import settings_of
 from aerialdojo_gen.store.schemas import APPROACH, SETTINGS, STOP, TOLD_OF_DIFFICULTY, TOLD_OF_SPLITS, VIEWS
 from aerialdojo_gen.validate.registry import Finding, UncheckedError, check
 from aerialdojo_gen.validate.rows import Floats, Mask, Rows, SceneData

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from aerialdojo_gen.stages.work.filter import KEPT, judge
+from aerialdojo_gen.stages.work.rules import KEPT, judge
 from aerialdojo_gen.store.schemas import APPROACH, STOP
 from aerialdojo_gen.validate.registry import Finding, UncheckedError, check
 from aerialdojo_gen.validate.rows import Floats, Rows, SceneData, list_lengths

@@ -10,7 +10,7 @@ import numpy as np
 import pyarrow as pa
 
 from aerialdojo_gen.geometry.frames import compass_direction
-from aerialdojo_gen.stages.work.filter import settings_of
+from aerialdojo_gen.stages.work.rules import settings_of
 from aerialdojo_gen.store.schemas import SETTINGS, TOLD_OF_SPLITS
 from aerialdojo_gen.validate.registry import ALWAYS_AFTER, Finding, UncheckedError, check
 from aerialdojo_gen.validate.rows import Ints, Mask, Rows, SceneData, pose_text, unequal

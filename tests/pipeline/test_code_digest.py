@@ -22,7 +22,7 @@ USED = {
     "build-scenes": ("layouts/urban/courtyard/layout.py", None),
     "annotate-import": ("annotations/relations.py", None),
     "anchor-sample": ("geometry/viewpoints.py", None),
-    "reference-images": ("rendering/gl_shaders.py", "#version 330 core"),
+    "reference-images": ("rendering/gl_shaders.py", "#version 400 core"),
     "pair-objects": ("store/tables.py", '"ascending"'),
     "plan": ("geometry/motion.py", None),
     "filter": ("common/terms.py", '"long_horizon"'),
@@ -119,11 +119,12 @@ def test_plumbing_is_what_it_is_said_to_be():
         for name in ("", ".benchmark", ".common", ".common.disk", ".common.explain", ".common.names",
                      ".common.terms", ".common.text_table", ".common.trouble", ".common.version", ".config",
                      ".config.agreement", ".config.pipeline", ".config.sections", ".errors", ".pipeline",
-                     ".pipeline.code_digest", ".pipeline.code_facts", ".pipeline.executors",
+                     ".pipeline.chain", ".pipeline.code_digest", ".pipeline.code_facts", ".pipeline.executors",
                      ".pipeline.executors.base", ".pipeline.executors.carried", ".pipeline.executors.link",
                      ".pipeline.executors.local", ".pipeline.executors.ray", ".pipeline.executors.ray_worker",
-                     ".pipeline.fingerprint", ".pipeline.freshness", ".pipeline.interrupt", ".pipeline.progress",
-                     ".pipeline.registry", ".pipeline.runner", ".pipeline.stage", ".pipeline.task", ".stages",
+                     ".pipeline.expectation", ".pipeline.fingerprint", ".pipeline.freshness", ".pipeline.interrupt",
+                     ".pipeline.progress", ".pipeline.registry", ".pipeline.runner", ".pipeline.stage",
+                     ".pipeline.summary", ".pipeline.task", ".stages",
                      ".stages.work", ".store", ".store.atomic", ".store.bucket", ".store.cache",
                      ".store.cloud_errors", ".store.files", ".store.footers", ".store.globbing", ".store.layout",
                      ".store.lease", ".store.object_folders", ".store.object_root", ".store.object_state",
@@ -184,6 +185,7 @@ def test_what_is_imported_by_a_name_made_at_run_time_counts():
 def test_figures_of_the_paper_count_where_they_are_read():
     assert [name for name in NAMES if "aerialdojo_gen.common.paper" in stage_code(name).parts] == [
         "annotate-import",
+        "plan",
         "split",
     ]
 

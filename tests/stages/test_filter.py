@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from aerialdojo_gen.config.sections import FilterConfig
-from aerialdojo_gen.stages.work.filter import judge
+from aerialdojo_gen.stages.work.rules import judge
 
 CONFIG = FilterConfig()
 

@@ -9,8 +9,8 @@ from aerialdojo_gen.common.paper import PaperScene
 from aerialdojo_gen.config.sections import FilterConfig, ReleasedPlanConfig
 from aerialdojo_gen.planning.planner import Route
 from aerialdojo_gen.release.quota import choose, difficulty_steps
-from aerialdojo_gen.stages.work.filter import judge
 from aerialdojo_gen.stages.work.plan_order import Candidates, Draw
+from aerialdojo_gen.stages.work.rules import judge
 
 PREFERENCE = 5.0
 

@@ -10,84 +10,13 @@ import pyarrow.compute as pc
 from numpy.typing import NDArray
 
 from aerialdojo_gen.common.advice import command
-from aerialdojo_gen.config.sections import FilterConfig, Setting
+from aerialdojo_gen.config.sections import FilterConfig
 from aerialdojo_gen.errors import StoreError
 from aerialdojo_gen.pipeline.stage import Job, Output
 from aerialdojo_gen.rendering.sight import all_in_sight
+from aerialdojo_gen.stages.work.rules import KEPT, judge, settings_of
 from aerialdojo_gen.store.schemas import APPROACH, SETTINGS, VERDICTS
 from aerialdojo_gen.store.schemas.columns import DIFFICULTY, START_VIEW
-
-KEPT = "kept"
-
-
-def settings_of(config: FilterConfig) -> tuple[Setting, Setting, Setting]:
-    """Return the length settings in the order of `aerialdojo_gen.store.schemas.SETTINGS`."""
-    return config.base, config.standard, config.long_horizon
-
-
-def judge(
-    outcome: NDArray[np.str_],
-    euclidean_m: NDArray[np.float64],
-    length_m: NDArray[np.float64],
-    n_actions: NDArray[np.int32],
-    config: FilterConfig,
-    plan_detour: NDArray[np.float64] | None = None,
-    visible_at_start: NDArray[np.float64] | None = None,
-) -> tuple[NDArray[np.str_], NDArray[np.str_]]:
-    """Judge candidates by the paper's rules (section on filtering), and by two more that are off by default.
-
-    Parameters
-    ----------
-    outcome : (n,) str
-        One of `aerialdojo_gen.store.schemas.OUTCOMES`.
-    euclidean_m, length_m : (n,) float64
-        d_E and L, metres; the length of an unsolved plan does not matter.
-    n_actions : (n,) int32
-        Actions of the route, Stop included.
-    config : FilterConfig
-        Thresholds and settings.
-    plan_detour : (n,) float64, optional
-        L over the shortest L without obstacles; NaN, or none at all, where it is not known, which no
-        `min_plan_detour` above 1 lets pass.
-    visible_at_start : (n,) float64, optional
-        Share of the target that the start sees; where it is not known no `max_visible_at_start` below 1 lets it pass.
-
-    Returns
-    -------
-    reason : (n,) str
-        ``"kept"``, or the first rule that fails: the outcome in lower case (``"no_path"``), ``"too_close"``,
-        ``"too_short"``, ``"too_long"``, ``"near_straight"``, ``"over_budget"``, ``"small_plan_detour"``,
-        ``"target_in_view"``.
-    setting : (n,) str
-        ``"base"``, ``"standard"``, ``"long_horizon"``, or ``""`` where the length fits none.
-    """
-    solved = outcome == "SOLVED"
-    # Fixed widths: numpy would cut a longer word to the width of the first ones.
-    setting = np.full(len(outcome), "", dtype="U24")
-    over = np.zeros(len(outcome), dtype=bool)
-    for name, rule in zip(SETTINGS, settings_of(config), strict=True):
-        inside = solved & (length_m >= rule.min_length_m) & (length_m < rule.max_length_m)
-        setting[inside] = name
-        over |= inside & (n_actions > rule.action_budget)
-    # A product, not a ratio: it has no division by a d_E of zero.
-    near_straight = length_m < config.min_detour_ratio * euclidean_m
-    none = np.full(len(outcome), np.nan)
-    small = ~((none if plan_detour is None else plan_detour) >= config.min_plan_detour)
-    in_view = ~((none if visible_at_start is None else visible_at_start) <= config.max_visible_at_start)
-    rules = [
-        ("too_close", euclidean_m <= config.min_euclidean_m),
-        ("too_short", length_m < config.base.min_length_m),
-        ("too_long", length_m >= config.long_horizon.max_length_m),
-        ("near_straight", near_straight),
-        ("over_budget", over),
-        ("small_plan_detour", small & (config.min_plan_detour > 1.0)),
-        ("target_in_view", in_view & (config.max_visible_at_start < 1.0)),
-    ]
-    reason = np.full(len(outcome), KEPT, dtype="U24")
-    for word, fails in reversed(rules):
-        reason[fails] = word
-    reason[~solved] = np.char.lower(outcome[~solved])
-    return reason, setting
 
 
 def _stops(plans: pa.Table) -> NDArray[np.float64]:

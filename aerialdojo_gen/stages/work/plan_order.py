@@ -22,7 +22,7 @@ from aerialdojo_gen.config.sections import ReleasedPlanConfig
 from aerialdojo_gen.planning.planner import Route
 from aerialdojo_gen.release.quota import choose, difficulty_steps, ranked
 from aerialdojo_gen.release.select import lot
-from aerialdojo_gen.stages.work.filter import KEPT, judge
+from aerialdojo_gen.stages.work.rules import KEPT, judge
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
