@@ -64,6 +64,8 @@ ON_SMOKE = (
     (r"--split id_train (.*--estimate)", r"--split train \1"),
     (r"\bTASK_ID\b", "TASK"),
     (r"^validate --json\b", "validate --json --no-meshes"),
+    # Recorded for training they would take the place of those that the page's blocks read.
+    (r"^(render .*--profile training)", r"\1 --estimate"),
     (r"^(render .*)--limit [03](?!.*--estimate)", r"\1--limit 1"),
 )  # fmt: skip
 WITH_WORKERS = ("run", "plan", "render", "evaluate", "validate", "filter", "split")
