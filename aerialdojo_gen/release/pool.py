@@ -23,8 +23,9 @@ class Pool:
     ----------
     scene : str
         Name.
-    candidates, searched : int
-        Candidates that were judged, and those of them whose routes `plan` needed.
+    candidates, judged : int
+        All candidates, and those of them that `plan` did not leave out as not needed: searched, or known without a
+        search to be no task.
     kept : dict of str to int
         Kept candidates by setting.
     paper : PaperScene or None
@@ -35,7 +36,7 @@ class Pool:
 
     scene: str
     candidates: int
-    searched: int
+    judged: int
     kept: dict[str, int]
     paper: PaperScene | None
     path_m: tuple[float, float] | None
@@ -73,8 +74,8 @@ def pool_of(root: Where, scene: str) -> Pool:
         least = sum(float(lengths[s][:n].sum()) for s, n in paper.tasks.items())
         most = sum(float(lengths[s][len(lengths[s]) - n :].sum()) for s, n in paper.tasks.items())
         path = least, most
-    searched = sum(reason != "not_needed" for reason in verdicts["reason"].to_pylist())
-    return Pool(scene, verdicts.num_rows, searched, {s: len(v) for s, v in lengths.items()}, paper, path)
+    judged = sum(reason != "not_needed" for reason in verdicts["reason"].to_pylist())
+    return Pool(scene, verdicts.num_rows, judged, {s: len(v) for s, v in lengths.items()}, paper, path)
 
 
 def require_pools(root: Where, scenes: Sequence[str]) -> None:
@@ -98,10 +99,10 @@ def require_pools(root: Where, scenes: Sequence[str]) -> None:
 
 def pool_lines(pools: Sequence[Pool], width: int | None = None) -> list[str]:
     """Set pools as a table for the terminal: kept / wanted, and kilometres that a choice can reach."""
-    heads = ["candidates", "searched", *(s.replace("_horizon", "") for s in SETTINGS), "km reachable/paper"]
+    heads = ["candidates", "judged", *(s.replace("_horizon", "") for s in SETTINGS), "km reachable/paper"]
     rows = []
     for pool in pools:
-        cells = [f"{pool.candidates}", f"{pool.searched}"]
+        cells = [f"{pool.candidates}", f"{pool.judged}"]
         for s in SETTINGS:
             wanted = f"/{pool.paper.tasks[s]}" if pool.paper else ""
             cells.append(f"{pool.kept[s]}{wanted}{'!' if s in pool.short else ' '}")
