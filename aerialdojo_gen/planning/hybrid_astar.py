@@ -47,7 +47,7 @@ _BETTER_M = 0.1
 # It is tried from states that are nearer than all before, and from one in so many others.
 _TRIED = 4
 # What it costs for the surfaces that it comes near counts so many times: the search may yet find more room.
-_CARE = 2.0
+_CARE = 3.0
 # A step that leads away from where the search goes, by so much: longer ones that way are thought of when it is taken.
 _LONGER, _SPREAD_M = 100, 0.3
 
