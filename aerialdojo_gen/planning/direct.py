@@ -13,23 +13,88 @@ from numba import njit
 from numpy.typing import NDArray
 
 from aerialdojo_gen.geometry.motion import N_HEADINGS, TURN_RAD
-from aerialdojo_gen.planning.grid_kernels import GridArrays, inside, segment_free
+from aerialdojo_gen.planning.grid_kernels import GridArrays, bound_at, inside, segment_free
 from aerialdojo_gen.planning.preference import Preference, astray, squeeze
+from aerialdojo_gen.planning.translations import DOWN, UP
 
 # Orders of the three legs: along the nearer direction clockwise, counter-clockwise, vertical.
 _ORDERS = np.array([(2, 0, 1), (0, 1, 2), (2, 1, 0), (1, 0, 2), (0, 2, 1), (1, 2, 0)], np.int64)
-UP, DOWN = N_HEADINGS, N_HEADINGS + 1
 # A cost-to-go above this many times the direct way's length, and so many metres more, says that something is there.
 _DETOUR, _DETOUR_M = 1.03, 1.0
+# No lattice way is longer than this many times the level distance, nor shorter by more than an Approach spares.
+_LONGEST, _SPARED = 1.01, 0.45
 _SPLITS = 4
+_COS, _SIN = math.cos(TURN_RAD), math.sin(TURN_RAD)
+
+
+@njit(cache=True, error_model="numpy")
+def _proven(
+    px: float, py: float, pz: float, qx: float, qy: float, qz: float, radius: float,
+    ox: float, oy: float, oz: float, cell: float, field: NDArray[np.float32],
+) -> bool:  # fmt: skip
+    """Whether the grid proves a segment free; for inner loops, and not as good at it as `segment_free`."""
+    dx, dy, dz = qx - px, qy - py, qz - pz
+    length = math.sqrt(dx * dx + dy * dy + dz * dz)
+    if length == 0.0:
+        return True
+    ux, uy, uz, t = dx / length, dy / length, dz / length, 0.0
+    while t < length:
+        slack = bound_at(px + t * ux, py + t * uy, pz + t * uz, ox, oy, oz, cell, field) - radius
+        if slack <= 0.1 * cell:
+            half = 0.5 * min(cell, length - t)
+            m = t + half
+            if bound_at(px + m * ux, py + m * uy, pz + m * uz, ox, oy, oz, cell, field) - radius <= half:
+                return False
+            slack = 2.0 * half
+        t += slack
+    return True
+
+
+@njit(cache=True, error_model="numpy")
+def _some_order_proven(
+    x: float, y: float, z: float, ax: float, ay: float, bx: float, by: float, lift: float, radius: float,
+    grid: GridArrays,
+) -> bool:  # fmt: skip
+    """Whether the grid proves three legs free in some order, given as two level displacements and a lift.
+
+    The ways are edges of a box, and every edge belongs to two of them or is looked at once.
+    """
+    ox, oy, oz, cell, field = grid.origin[0], grid.origin[1], grid.origin[2], grid.cell, grid.field
+    reached = 1
+    for corner in range(7):
+        if not (reached >> corner) & 1:
+            continue
+        px, py, pz = x, y, z
+        if corner & 1:
+            px, py = px + ax, py + ay
+        if corner & 2:
+            px, py = px + bx, py + by
+        if corner & 4:
+            pz += lift
+        for leg in range(3):
+            beyond = corner | (1 << leg)
+            if beyond == corner or (reached >> beyond) & 1:
+                continue
+            qx, qy, qz = px, py, pz
+            if leg == 0:
+                qx, qy = px + ax, py + ay
+            elif leg == 1:
+                qx, qy = px + bx, py + by
+            else:
+                qz = pz + lift
+            if _proven(px, py, pz, qx, qy, qz, radius, ox, oy, oz, cell, field):
+                reached |= 1 << beyond
+                if beyond == 7:
+                    return True
+    return False
 
 
 @njit(cache=True, error_model="numpy")
 def direct_legs(
     x: float, y: float, z: float, start_yaw: float, goal: NDArray[np.float64], goal_yaw: float, h: float,
-    radius: float, approach: float, prefer: Preference, grid: GridArrays,
+    most: float, radius: float, approach: float, prefer: Preference, grid: GridArrays,
     directions: NDArray[np.int64], metres: NDArray[np.int64],
-) -> float:  # fmt: skip
+) -> tuple[float, float]:  # fmt: skip
     """Find the direct way from a state to the goal.
 
     Parameters
@@ -44,6 +109,8 @@ def direct_legs(
         Final heading, radians.
     h : float
         Cost-to-go of the state, metres: where it tells of a detour, nothing is tried.
+    most : float
+        Ways that cost more need not be found, metres.
     radius : float
         Radius that must stay clear, metres.
     approach : float
@@ -58,22 +125,24 @@ def direct_legs(
 
     Returns
     -------
-    float
-        Metres and what costs beside them, but for actions; infinite where the grid does not prove a way free.
+    length : float
+        Metres, and what an Approach that does not fly ahead costs; infinite where the grid does not prove a way free.
+    extra : float
+        What the way costs beside its metres for the surfaces that it comes near.
     """
     dx, dy, dz = goal[0] - x, goal[1] - y, goal[2] - z
     flat = math.sqrt(dx * dx + dy * dy)
-    if h > _DETOUR * (1.01 * flat + abs(dz)) + _DETOUR_M:
-        return np.inf
+    if h > _DETOUR * (_LONGEST * flat + abs(dz)) + _DETOUR_M or flat + abs(dz) - _SPARED * approach > most:
+        return np.inf, 0.0
     turn = math.atan2(dy, dx) - start_yaw
     a = math.floor(turn / TURN_RAD)
-    beyond = turn - a * TURN_RAD
-    along_a = flat * math.sin(TURN_RAD - beyond) / math.sin(TURN_RAD)
-    along_b = flat * math.sin(beyond) / math.sin(TURN_RAD)
-    if h > _DETOUR * (along_a + along_b + abs(dz)) + _DETOUR_M:
-        return np.inf
     ax, ay = math.cos(start_yaw + a * TURN_RAD), math.sin(start_yaw + a * TURN_RAD)
-    bx, by = math.cos(start_yaw + (a + 1) * TURN_RAD), math.sin(start_yaw + (a + 1) * TURN_RAD)
+    bx, by = ax * _COS - ay * _SIN, ay * _COS + ax * _SIN
+    along_a, along_b = (dx * by - dy * bx) / _SIN, (ax * dy - ay * dx) / _SIN
+    if not _some_order_proven(
+        x, y, z, along_a * ax, along_a * ay, along_b * bx, along_b * by, dz, radius, grid
+    ):  # fmt: skip
+        return np.inf, 0.0
     sign = 1.0 if dz >= 0.0 else -1.0
     cos_yaw, sin_yaw = math.cos(goal_yaw), math.sin(goal_yaw)
     best, na, nb, nz = np.inf, 0, 0, 0
@@ -96,16 +165,16 @@ def direct_legs(
                 if cost < best:
                     best, na, nb, nz = cost, p, total - p, q
     if best == np.inf:
-        return np.inf
+        return np.inf, 0.0
     ux, uy, uz = x + na * ax + nb * bx, y + na * ay + nb * by, z + sign * nz
     if not inside(ux, uy, uz, grid.lower, grid.upper) or not segment_free(
         ux, uy, uz, goal[0], goal[1], goal[2], radius, grid, False
     ):
-        return np.inf
+        return np.inf, 0.0
     gx, gy, gz, cell = grid.origin[0], grid.origin[1], grid.origin[2], grid.cell
     length = na + nb + nz + math.sqrt((goal[0] - ux) ** 2 + (goal[1] - uy) ** 2 + (goal[2] - uz) ** 2)
     length += astray(goal[0] - ux, goal[1] - uy, goal_yaw, length - na - nb - nz, prefer.ahead_cos, prefer.astray)
-    length += squeeze(
+    last = squeeze(
         ux, uy, uz, goal[0], goal[1], goal[2], prefer.clearance, prefer.weight, gx, gy, gz, cell, grid.field
     )  # fmt: skip
     least_extra, order = np.inf, 0
@@ -137,8 +206,10 @@ def direct_legs(
             least_extra, order = extra, o
             if extra == 0.0:
                 break
+    if least_extra == np.inf:
+        return np.inf, 0.0
     for i in range(3):
         leg = _ORDERS[order, i]
         directions[i] = (UP if sign > 0 else DOWN) if leg == 2 else (a + leg) % N_HEADINGS
         metres[i] = nz if leg == 2 else (nb if leg == 1 else na)
-    return length + least_extra
+    return length, last + least_extra

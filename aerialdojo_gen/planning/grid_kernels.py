@@ -58,13 +58,14 @@ def inside(x: float, y: float, z: float, lower: NDArray[np.float64], upper: NDAr
 @njit(cache=True, inline="always")
 def point_bound(x: float, y: float, z: float, grid: GridArrays) -> float:
     """Lower bound of the distance from a point to the nearest surface, metres; may be negative."""
-    return _bound_at(x, y, z, grid.origin[0], grid.origin[1], grid.origin[2], grid.cell, grid.field)
+    return bound_at(x, y, z, grid.origin[0], grid.origin[1], grid.origin[2], grid.cell, grid.field)
 
 
 @njit(cache=True, error_model="numpy")
-def _bound_at(
+def bound_at(
     x: float, y: float, z: float, ox: float, oy: float, oz: float, cell: float, field: NDArray[np.float32]
 ) -> float:  # fmt: skip
+    """`point_bound` for inner loops, where a tuple of arrays costs more to hand over than the work itself."""
     i = min(max(int((x - ox) / cell), 0), field.shape[0] - 1)
     j = min(max(int((y - oy) / cell), 0), field.shape[1] - 1)
     k = min(max(int((z - oz) / cell), 0), field.shape[2] - 1)
@@ -106,19 +107,19 @@ def what_blocks(
     dx, dy, dz = qx - px, qy - py, qz - pz
     length = math.sqrt(dx * dx + dy * dy + dz * dz)
     if length == 0.0:
-        if _bound_at(px, py, pz, ox, oy, oz, cell, field) > radius:
+        if bound_at(px, py, pz, ox, oy, oz, cell, field) > radius:
             return FREE
         return UNKNOWN if prove_only else segment_blocker(px, py, pz, qx, qy, qz, radius, grid.tri, grid.boxes)
     ux, uy, uz = dx / length, dy / length, dz / length
     t, doubt = 0.0, -1.0  # where the stretch begins that the grid cannot decide, if there is one
     while t < length:
-        slack = _bound_at(px + t * ux, py + t * uy, pz + t * uz, ox, oy, oz, cell, field) - radius
+        slack = bound_at(px + t * ux, py + t * uy, pz + t * uz, ox, oy, oz, cell, field) - radius
         if slack > 0.1 * cell:
             reached = t + slack
         else:
             reached = min(t + cell, length)
             m = 0.5 * (t + reached)
-            if _bound_at(px + m * ux, py + m * uy, pz + m * uz, ox, oy, oz, cell, field) - radius <= 0.5 * (
+            if bound_at(px + m * ux, py + m * uy, pz + m * uz, ox, oy, oz, cell, field) - radius <= 0.5 * (
                 reached - t
             ):
                 if prove_only:

@@ -4,7 +4,8 @@ A state is (x, y, z, heading): positions are continuous, headings 15° apart fro
 states of one cell and heading sector. An edge is a translation together with the turns that it needs: to fly in any
 of the 24 directions the body turns until that direction lies ahead, to its left or to its right, whichever takes
 fewer turns. Turning adds nothing to the length, so every action carries a small cost that breaks ties. The Approach,
-with the turns before it, is an edge to the goal like any other.
+with the turns before it, is an edge to the goal like any other, and so is the direct way
+(`aerialdojo_gen.planning.direct`), which ends most searches long before they would have walked there.
 
 Edges are put on the open list unchecked and tested for collisions when they are taken off it, for most never are.
 What they cost beside their metres, for flying near surfaces, is found out then too: an edge that costs more goes back
@@ -20,24 +21,33 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from aerialdojo_gen.geometry.motion import N_HEADINGS, QUARTER, TURN_RAD
+from aerialdojo_gen.geometry.motion import N_HEADINGS, TURN_RAD
 from aerialdojo_gen.planning.cost_to_go import cost_at, cost_between
-from aerialdojo_gen.planning.direct import UP, direct_legs
+from aerialdojo_gen.planning.direct import direct_legs
 from aerialdojo_gen.planning.grid_kernels import FREE, GridArrays, segment_free, what_blocks
 from aerialdojo_gen.planning.preference import Preference, astray, squeeze
+from aerialdojo_gen.planning.translations import (
+    LIFTS_M,
+    N_FLAT,
+    N_STEPS,
+    N_TRANSLATIONS,
+    N_TURNS,
+    STEPS_M,
+    TURN_BY,
+    actions_of,
+    around,
+    turns_between,
+    with_legs,
+)
 
-# A translation is direction * 3 + step for the horizontal ones, then up 1 and 2 m, down 1 and 2 m, then the Approach.
-STEPS_M = np.array([1.0, 3.0, 5.0])
-N_STEPS = 3
-N_FLAT = N_HEADINGS * N_STEPS
-LIFTS_M = np.array([1.0, 2.0, -1.0, -2.0])
-N_TRANSLATIONS = N_FLAT + 4
 # Ways to the goal: the Approach alone, and the direct way.
 _TO_GOAL, _DIRECT = N_TRANSLATIONS, N_TRANSLATIONS + 1
-# What a direct way must be cheaper by than what the search may still find, in shares of its cost.
-_DIRECT_SHARE = 0.03
-# The direct way is tried from states that are nearer by this than those before.
-_PROGRESS_M = 0.5
+# Once one is known, others are looked for where they may be cheaper by this.
+_BETTER_M = 0.1
+# It is tried from states that are nearer than all before, and from one in so many others.
+_TRIED = 4
+# What it costs for the surfaces that it comes near counts so many times: the search may yet find more room.
+_CARE = 3.0
 # A step that leads away from where the search goes, by so much: longer ones that way are thought of when it is taken.
 _LONGER, _SPREAD_M = 100, 0.3
 
@@ -66,7 +76,8 @@ class SearchArrays(NamedTuple):
     parent : (n,) int32
         Expanded state before it, -1 for the start.
     edge_parent, edge_move, edge_next : arrays
-        Open edges, as linked lists; ~move for one that is known to be free.
+        Open edges, as linked lists; ~move for one that is known to be free, `_LONGER` and a direction for a step
+        of the shortest length that longer ones are left out for.
     edge_extra : (m,) float32
         What such an edge costs beside its metres.
     heads : (_N_BUCKETS,) int32
@@ -151,30 +162,6 @@ def make_search_arrays(budget: int) -> SearchArrays:
     )  # fmt: skip
 
 
-@njit(cache=True, inline="always")
-def turns_between(a: int, b: int) -> int:
-    """Fewest turns from heading a to heading b."""
-    d = (b - a) % N_HEADINGS
-    return min(d, N_HEADINGS - d)
-
-
-def _ways_to_fly() -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """For every direction relative to the heading, the turns to the best heading to fly there from, and how many.
-
-    The body flies ahead, to its left or to its right; ahead wins ties.
-    """
-    by, count = np.zeros(N_HEADINGS, np.int64), np.zeros(N_HEADINGS, np.int64)
-    for direction in range(N_HEADINGS):
-        options = [direction, (direction - QUARTER) % N_HEADINGS, (direction + QUARTER) % N_HEADINGS]
-        turns = [min(d, N_HEADINGS - d) for d in options]
-        best = int(np.argmin(turns))
-        by[direction], count[direction] = options[best], turns[best]
-    return by, count
-
-
-_TURN_BY, _N_TURNS = _ways_to_fly()
-
-
 @njit(cache=True)
 def _slot(key: int, now: int, keys: NDArray[np.int64], stamps: NDArray[np.int32]) -> int:
     """Where in the table of closed states a key stands, as it is written, or ~slot of where it would."""
@@ -194,12 +181,6 @@ def _place(x: float, y: float, z: float) -> int:
     return (int(x) * 73 + int(y) * 7919 + int(z) * 104729) & (_N_BLOCKERS - 1)
 
 
-@njit(cache=True, inline="always")
-def _around(heading: int) -> int:
-    """Bring a number from -24 to 23 into 0 to 23; a division would take longer than what it is for."""
-    return heading + N_HEADINGS if heading < 0 else heading
-
-
 @njit(cache=True)
 def _moves_to(node: int, parents: NDArray[np.int32], moves: NDArray[np.int8]) -> NDArray[np.int8]:
     """Translations from the start to an expanded state."""
@@ -213,49 +194,6 @@ def _moves_to(node: int, parents: NDArray[np.int32], moves: NDArray[np.int8]) ->
         found[count] = moves[node]
         node = parents[node]
     return found
-
-
-@njit(cache=True)
-def _with_legs(
-    moves: NDArray[np.int8], directions: NDArray[np.int64], metres: NDArray[np.int64]
-) -> NDArray[np.int8]:  # fmt: skip
-    """Append the fewest translations that fly some legs."""
-    found = np.empty(len(moves) + metres.sum(), np.int8)
-    n = len(moves)
-    found[:n] = moves
-    for i in range(len(metres)):
-        left = metres[i]
-        vertical = directions[i] >= N_HEADINGS
-        while left > 0:
-            if vertical:
-                step = 1 if left >= 2 else 0
-                found[n] = N_FLAT + step + (0 if directions[i] == UP else 2)
-                left -= step + 1
-            else:
-                step = 2 if left >= 5 else (1 if left >= 3 else 0)
-                found[n] = directions[i] * N_STEPS + step
-                left -= 2 * step + 1
-            n += 1
-    return found[:n].copy()
-
-
-@njit(cache=True, error_model="numpy")
-def _actions_of(
-    heading: int, goal_heading: int, directions: NDArray[np.int64], metres: NDArray[np.int64]
-) -> int:  # fmt: skip
-    """Actions that some legs, the turns before, between and after them and an Approach take."""
-    count = 1
-    for i in range(len(metres)):
-        if metres[i] == 0:
-            continue
-        if directions[i] >= N_HEADINGS:
-            count += (metres[i] + 1) // 2
-            continue
-        rest = metres[i] % 5
-        count += metres[i] // 5 + rest // 3 + rest % 3
-        relative = _around(directions[i] - heading)
-        count, heading = count + _N_TURNS[relative], _around(heading + _TURN_BY[relative] - N_HEADINGS)
-    return count + turns_between(heading, goal_heading)
 
 
 @njit(cache=True, error_model="numpy")
@@ -338,15 +276,17 @@ def search(
             return FOUND, n, _moves_to(parent, parents, moves)
         if move == _DIRECT:
             x, y, z = pose[parent, 0], pose[parent, 1], pose[parent, 2]
-            direct_legs(x, y, z, start[3], goal, goal_yaw, 0.0, o.radius, o.approach, o.prefer, grid, legs, metres)
-            return FOUND, n, _with_legs(_moves_to(parent, parents, moves), legs, metres)
+            direct_legs(
+                x, y, z, start[3], goal, goal_yaw, 0.0, np.inf, o.radius, o.approach, o.prefer, grid, legs, metres
+            )  # fmt: skip
+            return FOUND, n, with_legs(_moves_to(parent, parents, moves), legs, metres)
         known = move < 0
         if known:
             move = ~move
         if move >= _LONGER:
             move = (move - _LONGER) * N_STEPS
             px, py, pz = pose[parent, 0], pose[parent, 1], pose[parent, 2]
-            turns = _N_TURNS[_around(move // N_STEPS - int(headings[parent]))]
+            turns = N_TURNS[around(move // N_STEPS - int(headings[parent]))]
             for m in range(move + 1, move + N_STEPS):
                 u, v = px + flights[m, 0], py + flights[m, 1]
                 if not (lx <= u <= hx and ly <= v <= hy):
@@ -364,8 +304,8 @@ def search(
             px, py, pz, heading = pose[parent, 0], pose[parent, 1], pose[parent, 2], int(headings[parent])
             x, y, z, turns = px + flights[move, 0], py + flights[move, 1], pz + flights[move, 2], 0
             if move < N_FLAT:
-                relative = _around(move // N_STEPS - heading)
-                turns, heading = _N_TURNS[relative], _around(heading + _TURN_BY[relative] - N_HEADINGS)
+                relative = around(move // N_STEPS - heading)
+                turns, heading = N_TURNS[relative], around(heading + TURN_BY[relative] - N_HEADINGS)
             g = cost[parent] + flights[move, 3] + o.action_cost * (turns + 1)
         key = int((x - lx) / o.cell + 1.0)
         key = (key << 20) | int((y - ly) / o.cell + 1.0)
@@ -408,15 +348,16 @@ def search(
                 n_edges += 1
                 lowest = min(lowest, bucket)
         h = cost_between(x, y, z, ox, oy, oz, edge, cost_to_go)
-        direct = np.inf
-        if h < nearest - _PROGRESS_M:
-            nearest = h
-            direct = direct_legs(
-                x, y, z, start[3], goal, goal_yaw, h, o.radius, o.approach, o.prefer, grid, legs, metres
+        direct, extra = np.inf, 0.0
+        most = f_most + f0 + o.near_enough - g - _BETTER_M
+        if h <= most and (h < nearest or n % _TRIED == 0):
+            direct, extra = direct_legs(
+                x, y, z, start[3], goal, goal_yaw, h, most, o.radius, o.approach, o.prefer, grid, legs, metres
             )  # fmt: skip
+        nearest = min(nearest, h)
         if direct < np.inf:
-            f = g + direct * (1.0 + _DIRECT_SHARE) + o.action_cost * _actions_of(heading, goal_heading, legs, metres)
-            f -= f0 + o.near_enough
+            f = g + direct + _CARE * extra - f0 - o.near_enough
+            f += o.action_cost * actions_of(heading, goal_heading, legs, metres)
             if f < f_most:
                 f_most, bucket = f, max(0, int(f / _BUCKET_M))
                 edge_parent[n_edges], edge_move[n_edges], edge_next[n_edges] = n, _DIRECT, heads[bucket]
@@ -425,7 +366,7 @@ def search(
                 lowest = min(lowest, bucket)
         f_near = g + o.weight * h - f0 + _SPREAD_M
         for m in range(0, N_FLAT, N_STEPS):
-            turns = _N_TURNS[_around(m // N_STEPS - heading)]
+            turns = N_TURNS[around(m // N_STEPS - heading)]
             for step in range(N_STEPS):
                 u, v = x + flights[m + step, 0], y + flights[m + step, 1]
                 if not (lx <= u <= hx and ly <= v <= hy):

@@ -17,11 +17,10 @@ from numpy.typing import NDArray
 from aerialdojo_gen.common.terms import MOVE_DOWN_1, MOVE_UP_1, TURN_LEFT, TURN_RIGHT
 from aerialdojo_gen.geometry.motion import N_HEADINGS, QUARTER, TURN_RAD
 from aerialdojo_gen.planning.grid_kernels import GridArrays, inside, segment_free
-from aerialdojo_gen.planning.hybrid_astar import LIFTS_M, N_FLAT, N_STEPS, STEPS_M, SearchOptions, turns_between
+from aerialdojo_gen.planning.hybrid_astar import SearchOptions
 from aerialdojo_gen.planning.preference import Preference, squeeze
+from aerialdojo_gen.planning.translations import DOWN, LIFTS_M, N_FLAT, N_STEPS, STEPS_M, UP, turns_between
 
-# Directions of a leg beyond the horizontal ones.
-_UP, _DOWN = N_HEADINGS, N_HEADINGS + 1
 _MOVE_FORWARD_1, _MOVE_LEFT_1, _MOVE_RIGHT_1 = 1, 4, 7
 _MAX_PASSES = 50
 _ARRIVAL_M = 3
@@ -109,9 +108,9 @@ def _headings(
 
 @njit(cache=True, inline="always")
 def _leg_end(x: float, y: float, z: float, yaw: float, d: int, metres: int) -> tuple[float, float, float]:
-    if d == _UP:
+    if d == UP:
         return x, y, z + metres
-    if d == _DOWN:
+    if d == DOWN:
         return x, y, z - metres
     return x + math.cos(yaw + d * TURN_RAD) * metres, y + math.sin(yaw + d * TURN_RAD) * metres, z
 
@@ -297,7 +296,7 @@ def moves_to_actions(
             direction[i], metres[i] = move // N_STEPS, int(STEPS_M[move % N_STEPS])
         else:
             lift = LIFTS_M[move - N_FLAT]
-            direction[i], metres[i] = (_UP if lift > 0 else _DOWN), int(abs(lift))
+            direction[i], metres[i] = (UP if lift > 0 else DOWN), int(abs(lift))
         total += metres[i]
     n = _merge(direction, metres, len(moves))
     n = _reorder(start, direction, metres, n, goal_heading, options, grid)
@@ -310,9 +309,9 @@ def moves_to_actions(
         k = _turn(actions, k, heading, chosen[i])
         heading = chosen[i]
         d = direction[i]
-        if d == _UP:
+        if d == UP:
             k = _write(actions, k, MOVE_UP_1, (1, 2), metres[i])
-        elif d == _DOWN:
+        elif d == DOWN:
             k = _write(actions, k, MOVE_DOWN_1, (1, 2), metres[i])
         else:
             side = (d - heading) % N_HEADINGS

@@ -1,0 +1,95 @@
+"""Translations, which a search's edges are: 24 directions times three lengths, and up and down.
+
+To fly in a direction the body turns until that direction lies ahead, to its left or to its right, whichever takes
+fewer turns.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from aerialdojo_gen.geometry.motion import N_HEADINGS, QUARTER
+
+# A translation is direction * 3 + step for the horizontal ones, then up 1 and 2 m, down 1 and 2 m.
+STEPS_M = np.array([1.0, 3.0, 5.0])
+N_STEPS = 3
+N_FLAT = N_HEADINGS * N_STEPS
+LIFTS_M = np.array([1.0, 2.0, -1.0, -2.0])
+N_TRANSLATIONS = N_FLAT + 4
+# Directions of a leg beyond the horizontal ones.
+UP, DOWN = N_HEADINGS, N_HEADINGS + 1
+
+
+@njit(cache=True, inline="always")
+def turns_between(a: int, b: int) -> int:
+    """Fewest turns from heading a to heading b."""
+    d = (b - a) % N_HEADINGS
+    return min(d, N_HEADINGS - d)
+
+
+@njit(cache=True, inline="always")
+def around(heading: int) -> int:
+    """Bring a number from -24 to 23 into 0 to 23; a division would take longer than what it is for."""
+    return heading + N_HEADINGS if heading < 0 else heading
+
+
+def _ways_to_fly() -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """For every direction relative to the heading, the turns to the best heading to fly there from, and how many.
+
+    The body flies ahead, to its left or to its right; ahead wins ties.
+    """
+    by, count = np.zeros(N_HEADINGS, np.int64), np.zeros(N_HEADINGS, np.int64)
+    for direction in range(N_HEADINGS):
+        options = [direction, (direction - QUARTER) % N_HEADINGS, (direction + QUARTER) % N_HEADINGS]
+        turns = [min(d, N_HEADINGS - d) for d in options]
+        best = int(np.argmin(turns))
+        by[direction], count[direction] = options[best], turns[best]
+    return by, count
+
+
+TURN_BY, N_TURNS = _ways_to_fly()
+
+
+@njit(cache=True)
+def with_legs(
+    moves: NDArray[np.int8], directions: NDArray[np.int64], metres: NDArray[np.int64]
+) -> NDArray[np.int8]:  # fmt: skip
+    """Append the fewest translations that fly some legs."""
+    found = np.empty(len(moves) + metres.sum(), np.int8)
+    n = len(moves)
+    found[:n] = moves
+    for i in range(len(metres)):
+        left = metres[i]
+        vertical = directions[i] >= N_HEADINGS
+        while left > 0:
+            if vertical:
+                step = 1 if left >= 2 else 0
+                found[n] = N_FLAT + step + (0 if directions[i] == UP else 2)
+                left -= step + 1
+            else:
+                step = 2 if left >= 5 else (1 if left >= 3 else 0)
+                found[n] = directions[i] * N_STEPS + step
+                left -= 2 * step + 1
+            n += 1
+    return found[:n].copy()
+
+
+@njit(cache=True, error_model="numpy")
+def actions_of(
+    heading: int, goal_heading: int, directions: NDArray[np.int64], metres: NDArray[np.int64]
+) -> int:  # fmt: skip
+    """Actions that some legs, the turns before, between and after them and an Approach take."""
+    count = 1
+    for i in range(len(metres)):
+        if metres[i] == 0:
+            continue
+        if directions[i] >= N_HEADINGS:
+            count += (metres[i] + 1) // 2
+            continue
+        rest = metres[i] % 5
+        count += metres[i] // 5 + rest // 3 + rest % 3
+        relative = around(directions[i] - heading)
+        count, heading = count + N_TURNS[relative], around(heading + TURN_BY[relative] - N_HEADINGS)
+    return count + turns_between(heading, goal_heading)
