@@ -47,6 +47,18 @@ def nothing_given() -> Iterator[None]:
         yield
 
 
+@pytest.fixture(scope="session", autouse=True)
+def own_cache(shared: Path) -> Iterator[None]:
+    """What the tests' commands keep in the user's cache goes with the tests."""
+    before = os.environ.get("AERIALDOJO_CACHE")
+    os.environ["AERIALDOJO_CACHE"] = str(shared / "cache")
+    yield
+    if before is None:
+        del os.environ["AERIALDOJO_CACHE"]
+    else:
+        os.environ["AERIALDOJO_CACHE"] = before
+
+
 @pytest.fixture(scope="session")
 def project() -> Path:
     """The checkout's folder."""

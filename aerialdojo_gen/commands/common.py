@@ -27,7 +27,12 @@ __all__ = ["DEFAULT_PIPELINE", "default_workers", "home", "open_pipeline", "run_
 
 def print_json(value: object) -> None:
     """Print what ``--json`` asks for: bytes left out, null where a figure is not finite."""
-    print(json.dumps(_plain(value), ensure_ascii=False, indent=1, allow_nan=False))
+    print(json_text(value))
+
+
+def json_text(value: object) -> str:
+    """Give what `print_json` prints."""
+    return json.dumps(_plain(value), ensure_ascii=False, indent=1, allow_nan=False)
 
 
 def _plain(value: object) -> object:

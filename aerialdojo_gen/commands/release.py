@@ -5,13 +5,17 @@ from __future__ import annotations
 import sys
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from aerialdojo_gen.commands.common import Data, Json, PipelineFile, Scene, open_pipeline, print_json
+from aerialdojo_gen.commands.common import Data, Json, PipelineFile, Scene, json_text, open_pipeline, print_json
 from aerialdojo_gen.common.text_table import terminal_width
 from aerialdojo_gen.errors import UsageError
+
+if TYPE_CHECKING:
+    from aerialdojo_gen.stats.comparison import Comparison, Listing
+    from aerialdojo_gen.store.root import DataRoot
 
 app = typer.Typer()
 
@@ -28,8 +32,9 @@ def stats(
     as_json: Json = False,
 ) -> None:  # fmt: skip
     """Set the release beside the paper's tables; before there is one, what filter kept."""
-    from aerialdojo_gen.pipeline import runner
-    from aerialdojo_gen.release.contents import check_release, no_release, scenes_in_release, scenes_there
+    from aerialdojo_gen.release.contents import files_there, no_release, scenes_in_release, scenes_there
+    from aerialdojo_gen.release.provenance import RECORD
+    from aerialdojo_gen.store.remembered import key_of, remembered
     from aerialdojo_gen.store.root import open_root
 
     root = open_root(data)
@@ -37,6 +42,7 @@ def stats(
     if pool and (markdown or csv or figures):
         raise UsageError("--pool is printed only: leave --markdown, --csv and --figures out")
     if pool or not released:
+        from aerialdojo_gen.pipeline import runner
         from aerialdojo_gen.release.pool import pool_lines, pool_of
 
         if markdown or csv or figures or not root.list("verdicts"):
@@ -50,31 +56,46 @@ def stats(
             print("\n".join(pool_lines(pools, terminal_width())))
         return
 
-    from aerialdojo_gen.release.provenance import made_of_scenes
-    from aerialdojo_gen.stats.comparison import Comparison, Listing, as_csv, as_markdown
-    from aerialdojo_gen.stats.difficulty import difficulty_tables, read_tasks
-    from aerialdojo_gen.stats.tables import benchmark_table, tables
-    from aerialdojo_gen.stats.worth import worth_tables
-    from aerialdojo_gen.store.atomic import atomic_file
+    names = scenes_in_release(root, scene) if scene else None
+    width = terminal_width()
 
-    names = check_release(root, scenes_in_release(root, scene) if scene else None)
-    made = made_of_scenes(root, names)
-    names_made = [m.scene for m in made]
-    tasks = read_tasks(root, names_made)
-    compared: list[Comparison | Listing] = [*tables(made), *worth_tables(root, names_made), *difficulty_tables(tasks)]
-    compared.append(benchmark_table(made))
-    for path, text in ((markdown, as_markdown(compared)), (csv, as_csv(compared))):
-        if path:
-            with atomic_file(path.parent, path.name) as temporary:
-                temporary.write_text(text, encoding="utf-8")
-    if as_json:
-        print_json([table.as_json() for table in compared])
-    else:
-        print("\n\n".join("\n".join(table.terminal(terminal_width())) for table in compared))
+    def show() -> str:
+        compared = _compared(root, names)
+        if as_json:
+            return json_text([table.as_json() for table in compared])
+        return "\n\n".join("\n".join(table.terminal(width)) for table in compared)
+
+    # The same release gives the same tables, and make dataset prints them each time.
+    print(remembered(key_of(root, [*files_there(root), RECORD], "stats", names, as_json or width), show))
+    if markdown or csv:
+        from aerialdojo_gen.stats.comparison import as_csv, as_markdown
+        from aerialdojo_gen.store.atomic import atomic_file
+
+        compared = _compared(root, names)
+        for path, text in ((markdown, as_markdown(compared)), (csv, as_csv(compared))):
+            if path:
+                with atomic_file(path.parent, path.name) as temporary:
+                    temporary.write_text(text, encoding="utf-8")
     if figures:
+        from aerialdojo_gen.release.provenance import made_of_scenes
         from aerialdojo_gen.stats.figures import draw_figures
 
         told = sys.stderr if as_json else sys.stdout
         print(file=told)
-        for path in draw_figures(root, [m.scene for m in made], figures):
+        for path in draw_figures(root, [m.scene for m in made_of_scenes(root, names or released)], figures):
             print(path, file=told)
+
+
+def _compared(root: DataRoot, scenes: list[str] | None) -> list[Comparison | Listing]:
+    """Read a release, or some scenes of it, and set it beside the paper."""
+    from aerialdojo_gen.release.contents import check_release
+    from aerialdojo_gen.release.provenance import made_of_scenes
+    from aerialdojo_gen.stats.difficulty import difficulty_tables, read_tasks
+    from aerialdojo_gen.stats.tables import benchmark_table, tables
+    from aerialdojo_gen.stats.worth import worth_tables
+
+    made = made_of_scenes(root, check_release(root, scenes))
+    names = [m.scene for m in made]
+    return [
+        *tables(made), *worth_tables(root, names), *difficulty_tables(read_tasks(root, names)), benchmark_table(made)
+    ]  # fmt: skip

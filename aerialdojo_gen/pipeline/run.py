@@ -206,18 +206,26 @@ def _finish_release(
     config: Pipeline, data: DataRoot, scenes: list[str], released: list[str], whole: bool, reporter: Reporter
 ) -> None:
     """Bring what stands beside the tables of a release up to date with them."""
-    from aerialdojo_gen.release.card import write_card
-    from aerialdojo_gen.release.contents import prune_release
-    from aerialdojo_gen.release.croissant import write_croissant
-    from aerialdojo_gen.release.provenance import record_makers
+    from aerialdojo_gen.release.contents import CARD, CROISSANT, files_there, prune_release
+    from aerialdojo_gen.release.provenance import RECORD, record_makers
+    from aerialdojo_gen.store.remembered import keep, key_of, known
 
     if whole:
         # The whole pipeline was asked for: the release holds its scenes and no others.
         for gone in prune_release(data, scenes):
             reporter.line(f"release: {gone} is no scene of this pipeline, removed")
     record_makers(data, config, released)
-    write_croissant(data)
-    write_card(data)
+
+    def as_it_is() -> str:
+        return key_of(data, [*files_there(data), RECORD, CARD, CROISSANT], "documents")
+
+    if not known(as_it_is()):
+        from aerialdojo_gen.release.card import write_card
+        from aerialdojo_gen.release.croissant import write_croissant
+
+        write_croissant(data)
+        write_card(data)
+        keep(as_it_is())
     reporter.line(f"release: {data.at('release')}")
 
 

@@ -18,6 +18,7 @@ from aerialdojo_gen.planning.clearance import ClearanceGrid
 from aerialdojo_gen.planning.collision import collision_world
 from aerialdojo_gen.planning.cost_to_go import columns_by_distance, expand_cost, seed_goal
 from aerialdojo_gen.planning.hybrid_astar import EXHAUSTED, FOUND, SearchArrays, SearchOptions, make_search_arrays
+from aerialdojo_gen.planning.kept_fields import KeptFields
 from aerialdojo_gen.planning.preference import Preference, narrow_cells
 from aerialdojo_gen.planning.single_query import NearField
 from aerialdojo_gen.scenes.model import Scene
@@ -99,8 +100,7 @@ class Planner:
         )  # fmt: skip
         self._narrow = narrow_cells(self.grid.arrays.field, self._prefer)
         self._cost = self._scratch = np.empty(self.grid.moves.shape, np.float32)
-        self._fields: dict[bytes, NDArray[np.float32]] = {}
-        self._keep_bytes = 0
+        self._fields = KeptFields(0, 0)
         self._order = columns_by_distance(
             math.ceil((config.max_length_m * config.length_slack + 2 * config.max_approach_m) / config.cell_m)
         )
@@ -209,20 +209,19 @@ class Planner:
         ]
 
     @contextmanager
-    def keeping_fields(self, megabytes: float) -> Iterator[None]:
+    def keeping_fields(self, plain_mb: float, packed_mb: float) -> Iterator[None]:
         """Keep goals' cost-to-go until the block ends, so that a goal that comes up again need not be expanded again.
 
         Parameters
         ----------
-        megabytes : float
-            How much may be kept; the goals after that are expanded each time.
+        plain_mb, packed_mb : float
+            How many megabytes are kept as they are, and how many compressed; goals after that are expanded each time.
         """
-        self._keep_bytes = int(megabytes * 1e6)
+        self._fields = KeptFields(plain_mb, packed_mb)
         try:
             yield
         finally:
-            self._cost, self._keep_bytes = self._scratch, 0
-            self._fields.clear()
+            self._cost, self._fields = self._scratch, KeptFields(0, 0)
 
     def cost_to_go(self, points: ArrayLike) -> NDArray[np.float64]:
         """Cost-to-go of points, (n, 3) float metres; (n,) float64 metres.
@@ -240,18 +239,17 @@ class Planner:
         return self._known[key]
 
     def _expand(self, goal: NDArray[np.float64]) -> None:
-        key = goal.tobytes()
-        if key in self._fields:
-            self._cost = self._fields[key]
+        kept = self._fields.find(goal.tobytes(), self._scratch)
+        if kept is not None:
+            self._cost = kept
             return
         self._cost = self._scratch
-        if (len(self._fields) + 1) * self._cost.nbytes <= self._keep_bytes:
-            self._cost = self._fields[key] = np.empty_like(self._scratch)
         self._cost.fill(np.inf)
         expand_cost(
             self._seed(goal, self._cost), self._order, self._bound_m, self.grid.arrays.cell, self.grid.moves,
             self._cost, self._narrow,
         )  # fmt: skip
+        self._fields.keep(goal.tobytes(), self._cost)
 
     @property
     def _bound_m(self) -> float:

@@ -13,7 +13,7 @@ import pyarrow.compute as pc
 from aerialdojo_gen.common.paper import inventory
 from aerialdojo_gen.common.terms import DETOUR
 from aerialdojo_gen.common.version import __version__
-from aerialdojo_gen.release.contents import TABLES, check_release, counts, meaning, sizes, unit
+from aerialdojo_gen.release.contents import CARD, TABLES, check_release, counts, meaning, sizes, unit
 from aerialdojo_gen.release.croissant import CITE_AS
 from aerialdojo_gen.release.provenance import made_of_scenes, makers
 from aerialdojo_gen.stats.comparison import Comparison
@@ -177,6 +177,6 @@ def write_card(data: Where) -> Path:
     """
     root = open_root(data)
     text = render_card(root)
-    with root.commit("release/README.md") as path:
+    with root.commit(CARD) as path:
         path.write_text(text, encoding="utf-8")
-    return root.local_copy("release/README.md")
+    return root.local_copy(CARD)

@@ -59,6 +59,8 @@ TABLES = {
 # Keys of `LAYOUT` that make up a scene's part of the release.
 SHARDS = tuple(name for name, place in LAYOUT.items() if place.in_release)
 FOLDER = "release"
+CARD = f"{FOLDER}/README.md"
+CROISSANT = f"{FOLDER}/croissant.json"
 
 
 def part_name(name: str, scene: str, folder: str = FOLDER) -> str:
@@ -75,6 +77,11 @@ def parts_there(where: Where, folder: str = FOLDER) -> dict[str, list[str]]:
         stems = (PurePosixPath(path).stem for at in folders for path in root.list(at, "part-*.parquet"))
         found[name] = sorted(filter(is_plain, (stem.removeprefix("part-") for stem in stems)))
     return found
+
+
+def files_there(where: Where) -> list[str]:
+    """List what `TABLES` of a release are made of: names of files, relative to the data root."""
+    return [part_name(name, scene) for name, scenes in parts_there(where).items() for scene in scenes]
 
 
 def scenes_there(where: Where, folder: str = FOLDER) -> list[str]:

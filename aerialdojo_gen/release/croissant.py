@@ -9,7 +9,7 @@ from typing import Any
 import pyarrow as pa
 
 from aerialdojo_gen.common.version import __version__
-from aerialdojo_gen.release.contents import TABLES, Table, check_release, counts, meaning, unit
+from aerialdojo_gen.release.contents import CROISSANT, TABLES, Table, check_release, counts, meaning, unit
 from aerialdojo_gen.store.root import Where, open_root
 
 # Of this version's output. Not the day of the run: the same sources give the same bytes on any day.
@@ -162,6 +162,6 @@ def write_croissant(data: Where) -> Path:
     """
     root = open_root(data)
     found = counts(root, check_release(root))
-    with root.commit("release/croissant.json") as path:
+    with root.commit(CROISSANT) as path:
         path.write_text(json.dumps(croissant(found), indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
-    return root.local_copy("release/croissant.json")
+    return root.local_copy(CROISSANT)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import json
 from collections.abc import Sequence
@@ -84,7 +85,7 @@ def made_of_scenes(data: Where, scenes: Sequence[str]) -> list[Made]:
 
 
 def record_makers(data: Where, pipeline: Pipeline, scenes: Sequence[str]) -> None:
-    """Write down that a pipeline made these scenes of the release."""
+    """Write down that a pipeline made these scenes of the release; what says so already stays as it is."""
     root = open_root(data)
     found = makers(root)
     found |= {scene: maker_of(pipeline) for scene in scenes if scene in found}
@@ -98,8 +99,12 @@ def record_makers(data: Where, pipeline: Pipeline, scenes: Sequence[str]) -> Non
         }
         for maker in sorted(set(found.values()) - {Maker()}, key=lambda maker: (maker.name, maker.sha256))
     ]
+    text = json.dumps({"pipelines": entries}, indent=1) + "\n"
+    with contextlib.suppress(OSError, UnicodeDecodeError):
+        if root.local_copy(RECORD).read_text(encoding="utf-8") == text:
+            return
     with root.commit(RECORD) as path:
-        path.write_text(json.dumps({"pipelines": entries}, indent=1) + "\n", encoding="utf-8")
+        path.write_text(text, encoding="utf-8")
 
 
 def check_replaced(data: Where, pipeline: Pipeline, scenes: Sequence[str], *, whole: bool) -> None:

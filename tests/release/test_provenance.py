@@ -89,6 +89,18 @@ def test_replace_puts_the_other_pipeline_s_release_in_its_place(data, pipeline):
     assert f"| `{A}` |" not in (data / "release" / "README.md").read_text()
 
 
+def test_what_describes_a_release_is_written_again_only_where_something_is_another(data, project):
+    documents = [data / "release" / name for name in ("README.md", "croissant.json", "pipeline.json")]
+    split(data, project / "pipelines" / "smoke.toml")
+    before = [(path.stat().st_ino, path.read_bytes()) for path in documents]
+    split(data, project / "pipelines" / "smoke.toml")
+    assert [(path.stat().st_ino, path.read_bytes()) for path in documents] == before
+    for path, change in zip(documents, (b"edited", None, b"{}"), strict=True):
+        path.write_bytes(change) if change else path.unlink()
+        split(data, project / "pipelines" / "smoke.toml")
+        assert [path.read_bytes() for path in documents] == [text for _, text in before], path.name
+
+
 def test_the_same_pipeline_on_some_scenes_keeps_the_others(data, project):
     before = release(data)
     shutil.rmtree(data / "release" / "tasks" / "id_train")

@@ -27,8 +27,9 @@ from aerialdojo_gen.stages.work.plan_order import Candidates, Draw
 from aerialdojo_gen.store.schemas import OUTCOMES, PLANS
 
 Floats = NDArray[np.float64]
-# Most that the goals' cost-to-go takes between foreseeing and searching; what does not fit is expanded once more.
-_FIELDS_MB = 500
+# Most that the goals' cost-to-go takes between foreseeing and searching, as it is and compressed to a tenth; what
+# does not fit is expanded once more.
+_FIELDS_MB = 300.0, 250.0
 
 
 def targets_of_part(object_ids: list[int], part: int, config: PlanConfig) -> list[int]:
@@ -109,7 +110,7 @@ def _released(
     seed: int,
 ) -> list[Route]:
     """Search what the release needs; the others' outcome is what the goals' cost-to-go tells, or NOT_NEEDED."""
-    with planner.keeping_fields(_FIELDS_MB):
+    with planner.keeping_fields(*_FIELDS_MB):
         routes = _by_goal(planner.foresee, goals, starts, np.arange(pairs.num_rows))
         open_ = np.array([route.outcome == "NOT_NEEDED" for route in routes])
         predicted = np.where(open_, [route.cost_to_go_m for route in routes], np.inf)

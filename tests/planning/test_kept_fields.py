@@ -1,0 +1,67 @@
+"""What is kept of a goal's cost-to-go is the same to the bit, within the room that there is."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as arrays
+from support.flying import town
+
+from aerialdojo_gen.config.sections import PlanConfig
+from aerialdojo_gen.planning.column_kernels import QUANTUM_M
+from aerialdojo_gen.planning.kept_fields import KeptFields
+from aerialdojo_gen.planning.planner import Planner
+
+FIELDS = arrays.arrays(
+    np.float32,
+    arrays.array_shapes(min_dims=3, max_dims=3, max_side=6),
+    elements=st.one_of(st.just(np.inf), st.integers(0, 2**24 - 1).map(lambda n: n * QUANTUM_M)),
+)
+
+
+@given(FIELDS, st.booleans())
+def test_a_field_comes_back_bit_for_bit(field, plain):
+    kept = KeptFields(1.0 if plain else 0.0, 1.0)
+    scratch = field.copy()
+    kept.keep(b"goal", scratch)
+    scratch.fill(3.0)
+    found = kept.find(b"goal", scratch)
+    assert found.dtype == np.float32
+    assert np.array_equal(found.view(np.int32), field.view(np.int32))
+    assert (found is scratch) is not plain
+    assert kept.find(b"another", scratch) is None
+
+
+def test_no_more_is_kept_than_there_is_room_for():
+    rough = np.random.default_rng(1).integers(0, 2**24, (100, 100, 6)).astype(np.float32) * np.float32(QUANTUM_M)
+    kept = KeptFields(0.5, 0.3)  # two as they are, one compressed
+    for k in range(5):
+        kept.keep(bytes([k]), rough)
+    there = [kept.find(bytes([k]), np.empty_like(rough)) is not None for k in range(5)]
+    assert there == [True, True, True, False, False]
+
+
+@pytest.fixture(scope="module")
+def planner():
+    return Planner(town(), PlanConfig(), 0.25)
+
+
+@pytest.mark.parametrize("room", [(0.0, 0.0), (0.0, 50.0), (1000.0, 0.0)])
+def test_routes_are_the_same_however_fields_are_kept(planner, room):
+    low, high = planner.grid.arrays.lower, planner.grid.arrays.upper
+    rng = np.random.default_rng(5)
+    points = rng.uniform([*low, -3.0], [*high, 3.0], (200, 4))
+    free = [p for p in points if planner.grid.distance_m(p[:3]) > 0.3 and planner.grid.reachable(p[:3])]
+    goals, starts = free[:3], np.array(free[3:15])
+    expected = [planner.plan_target(goal, starts) for goal in goals]
+    with planner.keeping_fields(*room):
+        foreseen = [planner.foresee(goal, starts) for goal in goals]
+        routes = [planner.plan_target(goal, starts) for goal in goals]
+    assert sum(route.outcome == "SOLVED" for route in expected[0]) > 6
+    for before, after, told in zip(expected, routes, foreseen, strict=True):
+        for a, b, c in zip(before, after, told, strict=True):
+            assert (a.outcome, a.length_m, a.expansions) == (b.outcome, b.length_m, b.expansions)
+            assert a.poses.tobytes() == b.poses.tobytes()
+            assert c.outcome in ("NOT_NEEDED", a.outcome)

@@ -1,0 +1,82 @@
+"""What is kept of files is what they say: never of files that have changed, never in the way where it cannot be."""
+
+from __future__ import annotations
+
+import os
+import shutil
+
+import pytest
+
+from aerialdojo_gen.cli import app
+from aerialdojo_gen.errors import StoreError
+from aerialdojo_gen.store.remembered import keep, key_of, known, remembered
+from aerialdojo_gen.store.root import open_root
+
+
+@pytest.fixture(autouse=True)
+def cache(tmp_path, monkeypatch):
+    monkeypatch.setenv("AERIALDOJO_CACHE", str(tmp_path / "cache"))
+    return tmp_path / "cache"
+
+
+@pytest.fixture
+def root(tmp_path):
+    folder = tmp_path / "data"
+    folder.mkdir()
+    (folder / "a").write_text("a")
+    (folder / "b").write_text("b")
+    return open_root(folder)
+
+
+def test_a_key_is_of_the_files_and_of_what_is_asked(root, tmp_path):
+    key = key_of(root, ["a", "b"], "stats", 80)
+    assert key == key_of(root, ["b", "a"], "stats", 80)
+    others = {key_of(root, ["a"], "stats", 80), key_of(root, ["a", "b"], "stats", 79), key_of(root, ["a", "b", "c"])}
+    os.utime(tmp_path / "data" / "a", ns=(1, 1))
+    others.add(key_of(root, ["a", "b"], "stats", 80))
+    (tmp_path / "data" / "b").unlink()
+    others.add(key_of(root, ["a", "b"], "stats", 80))
+    assert len(others) == 5
+    assert key not in others
+
+
+def test_a_text_is_made_once(root):
+    asked = []
+    key = key_of(root, ["a"])
+    texts = [remembered(key, lambda: asked.append(1) or "ärial") for _ in range(3)]
+    assert texts == ["ärial"] * 3
+    assert len(asked) == 1
+    assert known(key)
+    assert not known(key_of(root, ["b"]))
+
+
+def test_where_nothing_can_be_kept_it_is_made_each_time(root, cache):
+    cache.write_text("a file where the folder should be")
+    assert [remembered(key_of(root, ["a"]), lambda: "text") for _ in range(2)] == ["text"] * 2
+    keep(key_of(root, ["a"]))
+    assert not known(key_of(root, ["a"]))
+
+
+def test_stats_of_a_changed_release_are_its_own(smoke, tmp_path, capsys):
+    data = tmp_path / "copy"
+    shutil.copytree(smoke / "release", data / "release")
+    texts = []
+    for _ in range(2):
+        app(["stats", "--data", str(data)], standalone_mode=False)
+        texts.append(capsys.readouterr().out)
+    assert texts[0] == texts[1]
+    assert "U_Courtyard_0" in texts[0]
+    for path in data.rglob("part-U_Courtyard_0.parquet"):
+        path.unlink()
+    app(["stats", "--data", str(data)], standalone_mode=False)
+    assert "U_Courtyard_0" not in capsys.readouterr().out
+
+
+def test_a_truncated_part_is_told_of_though_its_tables_were_kept(smoke, tmp_path):
+    data = tmp_path / "copy"
+    shutil.copytree(smoke / "release", data / "release")
+    app(["stats", "--data", str(data)], standalone_mode=False)
+    part = next(data.rglob("routes/**/part-U_Courtyard_0.parquet"))
+    part.write_bytes(part.read_bytes()[:-20])
+    with pytest.raises(StoreError, match=part.name):
+        app(["stats", "--data", str(data)], standalone_mode=False)
