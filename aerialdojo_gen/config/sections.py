@@ -201,8 +201,8 @@ class PlanConfig(Section):
     ladder: tuple[Rung, ...] = Field(
         (
             Rung(weight=1.05, budget=20_000),
-            Rung(weight=1.15, budget=40_000, duplicate_cell_m=0.25, heading_sectors=4, extra_radius_m=0.02),
-            Rung(weight=1.15, budget=40_000, duplicate_cell_m=0.25, heading_sectors=4),
+            Rung(weight=1.15, budget=8_000, duplicate_cell_m=0.25, heading_sectors=4, extra_radius_m=0.02),
+            Rung(weight=1.15, budget=25_000, duplicate_cell_m=0.25, heading_sectors=4),
         ),
         min_length=1,
         max_length=16,

@@ -8,6 +8,7 @@ forward slashes. Libraries that want a file of this machine (PyArrow, OpenCV, FF
 from __future__ import annotations
 
 import fcntl
+import fnmatch
 import os
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
@@ -189,6 +190,14 @@ class LocalRoot(DataRoot):
 
     def list(self, folder: str, pattern: str = "*") -> list[str]:
         """Paths of what in a folder matches a glob."""
+        if "/" not in pattern and "**" not in pattern:
+            # A run asks some thousand times what shards a scene has: pathlib takes five times as long.
+            prefix = "" if (place := PurePosixPath(folder).as_posix()) == "." else f"{place}/"
+            try:
+                names = os.listdir(self._at(folder))
+            except (FileNotFoundError, NotADirectoryError, PermissionError):
+                return []
+            return sorted(prefix + name for name in fnmatch.filter(names, pattern))
         return sorted(path.relative_to(self.path).as_posix() for path in self._at(folder).glob(pattern))
 
     def commit(self, relative: str) -> AbstractContextManager[Path]:
@@ -253,8 +262,7 @@ def leads_out(root: DataRoot, told: str) -> bool:
 
 def inside(relative: str) -> str:
     """Return a path if it stays below the root; StoreError otherwise."""
-    path = PurePosixPath(relative)
-    if path.is_absolute() or ".." in path.parts:
+    if relative.startswith("/") or ".." in relative.split("/"):
         raise StoreError(f"{relative!r} leads out of the data directory")
     return relative
 
