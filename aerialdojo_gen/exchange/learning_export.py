@@ -230,7 +230,9 @@ def estimate_for_learning(
 def _writer(format_name: str, wanted: Wanted) -> ModuleType:
     s = wanted.sensors
     if format_name == "lerobot" and (s.width % 2 or s.height % 2):
-        raise UsageError(f"a video has an even number of columns and rows, not {s.width} x {s.height}: choose another --size")
+        raise UsageError(
+            f"a video has an even number of columns and rows, not {s.width} x {s.height}: choose another --size"
+        )
     if format_name == "lerobot" and wanted.jpeg_quality:
         raise UsageError("--jpeg-quality is for --format webdataset: LeRobot's pictures are videos")
     return WRITERS[format_name]
@@ -299,5 +301,3 @@ def _marker(
         "actions": {str(k): name for k, name in enumerate(ACTION_NAMES[:16])},
         "lost": {table: list(columns) for table, columns in writer.LOST.items()},
     }
-
-

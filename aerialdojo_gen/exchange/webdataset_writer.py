@@ -51,7 +51,9 @@ def write_part(root: DataRoot, part: Part, wanted: Wanted, folder: Path) -> None
                         if frames.rgb is not None:
                             _add(tar, f"{key}.{view}.{_kind(wanted)}", _picture(frames.rgb[i, v], wanted))
                     if frames.depth_m is not None:
-                        stored = {view: to_stored(frames.depth_m[i, v]) for v, view in enumerate(wanted.sensors.views)}
+                        stored = {
+                            view: to_stored(frames.depth_m[i, v]) for v, view in enumerate(wanted.sensors.views)
+                        }
                         _add(tar, f"{key}.depth.npz", _arrays(stored))
                     if goal is not None:
                         _add(tar, f"{key}.goal.{_kind(wanted)}", goal)
