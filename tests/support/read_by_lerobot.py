@@ -47,7 +47,10 @@ def main(folder: str, out: str) -> None:
     window = LeRobotDataset("local/aerialdojo", root=folder, delta_timestamps=back, **options)
     at = meta.episodes[0]["dataset_to_index"] - 1
     arrays["window"] = [window[at][camera].numpy()]
-    arrays["window_action"], arrays["window_pad"] = [window[at]["action"].numpy()], [window[at]["action_is_pad"].numpy()]
+    arrays["window_action"], arrays["window_pad"] = (
+        [window[at]["action"].numpy()],
+        [window[at]["action_is_pad"].numpy()],
+    )
     batch = next(iter(torch.utils.data.DataLoader(data, batch_size=5)))
     told["batch"] = {name: list(value.shape) for name, value in batch.items() if hasattr(value, "shape")}
     one = LeRobotDataset("local/aerialdojo", root=folder, episodes=[meta.total_episodes - 1], **options)
