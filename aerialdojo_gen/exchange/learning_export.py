@@ -230,9 +230,7 @@ def estimate_for_learning(
 def _writer(format_name: str, wanted: Wanted) -> ModuleType:
     s = wanted.sensors
     if format_name == "lerobot" and (s.width % 2 or s.height % 2):
-        raise UsageError(
-            f"a video has an even number of columns and rows, not {s.width} x {s.height}: choose another --size"
-        )
+        raise UsageError(f"a video has even --width and --height, not {s.width} x {s.height}")
     if format_name == "lerobot" and wanted.jpeg_quality:
         raise UsageError("--jpeg-quality is for --format webdataset: LeRobot's pictures are videos")
     return WRITERS[format_name]

@@ -194,6 +194,22 @@ def test_goals_as_text_tokens_and_pictures(smoke):
     assert other.fingerprint != data.fingerprint
 
 
+def test_a_batch_without_a_goal_picture_is_the_same_whenever_it_comes(planted):
+    """Where there is none it is black, and as large as the others', whatever was seen before."""
+    rows = planted.rows("tasks/train")
+    lacking = min(row["nav_id"] for row in rows)
+    planted.write("tasks/train", [r for r in rows if (r["nav_id"], r["modality"]) != (lacking, "image")])
+    options = {"scene": planted.scene, "split": "train", "views": (), "goal": ("text", "image")}
+    fresh, used = Trajectories(planted.data, **options), Trajectories(planted.data, **options)
+    assert fresh.index.nav_id[0] == lacking
+    other = used.batch([len(used) - 1])
+    assert other["has_image"].tolist() == [True]
+    for batch in (fresh.batch([0, 1]), used.batch([0, 1])):
+        assert batch["image"].shape == (2, *other["image"].shape[1:])
+        assert not batch["has_image"].any()
+        assert not batch["image"].any()
+
+
 def test_the_cache_gives_what_was_drawn_and_survives_damage(smoke, seen, tmp_path):
     kept = Trajectories(
         smoke, split="all", views=VIEWS, size=(40, 24), limit=6, privileged="pose", cache_gb=1, cache_dir=tmp_path

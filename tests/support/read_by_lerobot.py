@@ -36,7 +36,7 @@ def main(folder: str, out: str) -> None:
         "lengths": [int(n) for n in meta.episodes["length"]], "nav_id": list(meta.episodes["nav_id"]),
         "stats": {key: {name: np.asarray(v).tolist() for name, v in of.items()} for key, of in meta.stats.items()},
     }  # fmt: skip
-    for k in range(len(data)):
+    for k in range(0, len(data), 4):
         item = data[k]
         told["tasks"].append(item.pop("task"))
         for name, value in item.items():
