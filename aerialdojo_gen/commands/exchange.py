@@ -37,7 +37,8 @@ def export(
     setting: Annotated[list[str] | None, typer.Option(
         "--setting", help="base, standard, long_horizon; repeatable.")] = None,
     limit: Annotated[int | None, typer.Option(
-        "--limit", min=0, help="Trajectories of each scene and each of its three settings; 0 for all.  (default: 0)")] = None,
+        "--limit", min=0, help="Trajectories of each scene and each of its three settings.  (default: 0, all)"
+    )] = None,
     seed: Annotated[int | None, typer.Option(
         "--seed", min=0, help="Of that draw.  (default: 0)")] = None,
     view: Annotated[list[str] | None, typer.Option(

@@ -78,8 +78,8 @@ def scene_rows(data: str, scene: str) -> None:
             one, loader, culling = (best_ms(work) / SAMPLES for work in (alone, load, cull))
             triangles, pixels = drawing_ms(renderer, camera, poses, views)
             print(
-                f"{size:>4} {len(views):>5} {one:>10.2f} {loader:>7.2f} {culling:>8.2f} {triangles:>9.2f} {pixels:>7.2f} "
-                f"{cached:>7.2f} {1e3 / loader:>14.0f}",
+                f"{size:>4} {len(views):>5} {one:>10.2f} {loader:>7.2f} {culling:>8.2f} {triangles:>9.2f} "
+                f"{pixels:>7.2f} {cached:>7.2f} {1e3 / loader:>14.0f}",
                 flush=True,
             )
 
