@@ -14,14 +14,16 @@ from numpy.typing import NDArray
 
 # Frames are read in any order: every second one is a key frame, as in LeRobot's own videos.
 KEY_EVERY = 2
-CRF = 20
+QP = 20
 DEPTH_CODES = 4096
 # Metres, of LeRobot's logarithmic steps: code 0 is 0 m, which is "nothing within range" here.
 DEPTH_MIN_M, DEPTH_SHIFT_M = 0.0, 3.5
 
 _OPTIONS = {
+    # A constant quantiser, and nothing that is decided by floating-point numbers: their sums depend on the processor.
     "rgb": ("libx264", "yuv420p", {
-        "g": str(KEY_EVERY), "bf": "0", "crf": str(CRF), "preset": "veryfast", "flags": "+bitexact+cgop",
+        "g": str(KEY_EVERY), "bf": "0", "qp": str(QP), "preset": "veryfast", "flags": "+bitexact+cgop",
+        "x264-params": "aq-mode=0:mbtree=0:weightp=0:rc-lookahead=0:scenecut=0:cpu-independent=1",
     }),
     # One thread and no pool: the bytes must not depend on the machine's cores.
     "depth": ("libx265", "gray12le", {

@@ -8,7 +8,7 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from aerialdojo_gen.exchange.clips import CRF, DEPTH_MIN_M, DEPTH_SHIFT_M, KEY_EVERY
+from aerialdojo_gen.exchange.clips import DEPTH_MIN_M, DEPTH_SHIFT_M, KEY_EVERY
 from aerialdojo_gen.exchange.samples import Wanted
 from aerialdojo_gen.geometry.motion import DISPLACEMENTS, TURN_RAD
 from aerialdojo_gen.store.schemas import STOP, TURN_LEFT, TURN_RIGHT
@@ -114,7 +114,5 @@ def _video(wanted: Wanted, kind: str) -> dict[str, Any]:
             "video.use_log": True,
             "depth_unit": "m",
         }
-    else:
-        told["video.crf"] = CRF
     shape = [s.height, s.width, 1 if depth else 3]
     return {"dtype": "video", "shape": shape, "names": ["height", "width", "channels"], "info": told}
