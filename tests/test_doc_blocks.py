@@ -197,8 +197,9 @@ def test_every_python_block_runs_on_the_smoke_data(page, folder, ran):
 
 
 def lacks_an_extra(text):
-    """Whether a block imports what only the extra `train` brings, and it is not installed."""
-    return "from torch" in text and importlib.util.find_spec("torch") is None
+    """Whether a block imports what no environment has to have, and it is not installed."""
+    named = {"from torch": "torch", "from lerobot": "lerobot", "import webdataset": "webdataset"}
+    return any(said in text and importlib.util.find_spec(name) is None for said, name in named.items())
 
 
 def run_python(folder, text):

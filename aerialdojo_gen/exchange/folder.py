@@ -44,6 +44,21 @@ def whole_folder(target: Path, marker: str, *, force: bool) -> Iterator[Path]:
     StoreError
         The disk is full or read-only.
     """
+    check_target(target, marker, force=force)
+    with atomic_folder(target.absolute()) as temporary:
+        yield temporary
+
+
+def check_target(target: Path, marker: str, *, force: bool) -> None:
+    """Refuse a folder that `whole_folder` could not fill, before work that takes long.
+
+    Raises
+    ------
+    UsageError
+        The folder is not empty, or holds what is not ours to replace.
+    StoreError
+        It cannot be read.
+    """
     target = target.absolute()
     # Before anything is decided: it may bring back what a kill between two renames took away.
     sweep(target.parent)
@@ -56,8 +71,6 @@ def whole_folder(target: Path, marker: str, *, force: bool) -> Iterator[Path]:
         raise UsageError(f"{target} is there already and holds no {marker}: name another folder")
     if taken and not force:
         raise UsageError(f"{target} is there already: --force replaces it")
-    with atomic_folder(target) as temporary:
-        yield temporary
 
 
 @contextlib.contextmanager

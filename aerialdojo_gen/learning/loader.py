@@ -14,7 +14,7 @@ from aerialdojo_gen.learning.order import Order
 from aerialdojo_gen.learning.trajectories import Trajectories
 
 _MEND = "install the extra: pip install 'aerialdojo-gen[train]'"
-_STATE = {"seed", "epoch", "batch", "batch_size", "fingerprint"}
+_STATE = {"seed", "epoch", "batch", "batch_size", "order", "fingerprint"}
 
 
 class WorkerDied(AerialDojoError):  # noqa: N818 - it says what happened
@@ -74,7 +74,8 @@ class Loader:
         self._data, self._batch_size, self._seed, self._how = data, batch_size, seed, how
         self._workers, self._tensors, self._context = workers, tensors, context
         self._torch = torch_package() if workers or tensors else None
-        data.order(batch_size, seed=seed, **how)  # refuses what makes no sense
+        # Refuses what makes no sense.
+        self._order = data.order(batch_size, seed=seed, **how).how
         self._sampler = _Sampler()
         self._loading: Any = None
         self.epoch = self.batches_done = 0
@@ -108,7 +109,7 @@ class Loader:
         """Return where the loader is: JSON, for a checkpoint."""
         return {
             "seed": self._seed, "epoch": self.epoch, "batch": self.batches_done, "batch_size": self._batch_size,
-            "fingerprint": self._data.fingerprint,
+            "order": dict(self._order), "fingerprint": self._data.fingerprint,
         }  # fmt: skip
 
     def load_state_dict(self, state: Mapping[str, Any]) -> None:
@@ -117,12 +118,12 @@ class Loader:
         Raises
         ------
         StoreError
-            The state is of another data set, seed or size of batches.
+            The state is of another data set, seed, size of batches or order.
         """
         own = self.state_dict()
         if set(state) != _STATE:
             raise StoreError(f"a loader's state has {', '.join(sorted(_STATE))}, not {', '.join(sorted(state))}")
-        for name in ("fingerprint", "seed", "batch_size"):
+        for name in ("fingerprint", "seed", "batch_size", "order"):
             if state[name] != own[name]:
                 raise StoreError(
                     f"the state is of another loader: its {name} is {state[name]}, and here it is {own[name]}"

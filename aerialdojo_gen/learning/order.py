@@ -39,6 +39,11 @@ class Order:
         False for the order of the numbers.
     drop_last : bool
         Leave out a last batch that is not full.
+
+    Attributes
+    ----------
+    how : dict
+        ``block``, ``streams``, ``shuffle`` and ``drop_last``: with another one, batches are others.
     """
 
     def __init__(
@@ -58,6 +63,7 @@ class Order:
         for what, value in (("batch_size", batch_size), ("block", block), ("streams", streams)):
             if value < 1:
                 raise UsageError(f"{what} is at least 1, not {value}")
+        self.how = {"block": block, "streams": streams, "shuffle": shuffle, "drop_last": drop_last}
         self._scene, self._first = scene, first
         self._batch_size = batch_size
         self._seed, self._epoch, self._block, self._streams = seed, epoch, block, streams

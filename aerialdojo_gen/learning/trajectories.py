@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Iterator, Sequence
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -167,7 +168,6 @@ class Trajectories:
             *(index.told[name] for name in ("target_name", "landmark", "direction", "description")), strict=True
         )]  # fmt: skip
         self.vocabulary = vocabulary or Vocabulary.of(self._texts)
-        self._image_shape: tuple[int, ...] | None = None
         self.fingerprint = self._fingerprint()
         if cache_gb and not self.sensors.blind:
             base = Path(cache_dir) if cache_dir is not None else cache_folder() / "learning"
@@ -246,11 +246,17 @@ class Trajectories:
             out["tokens"] = np.stack(found) if found else np.full((0, self.vocabulary.length), PADDING, np.int64)
         if "image" in self.goal:
             pictures = [self._image(int(k)) for k in rows]
-            shape = next((p.shape for p in pictures if p is not None), self._image_shape or (0, 0, 3))
-            self._image_shape = shape
-            out["image"] = np.stack([np.zeros(shape, np.uint8) if p is None else p for p in pictures])
+            empty = np.zeros(self._image_shape, np.uint8)
+            out["image"] = np.stack([empty if p is None else p for p in pictures])
             out["has_image"] = np.array([p is not None for p in pictures])
         return out
+
+    @cached_property
+    def _image_shape(self) -> tuple[int, ...]:
+        # Of the selection, not of what was seen before: a batch without a picture is the same whenever it comes.
+        first = next((k for k, named in enumerate(self.index.told["reference_image_id"]) if named), None)
+        picture = None if first is None else self._image(first)
+        return (0, 0, 3) if picture is None else picture.shape
 
     def _image(self, k: int) -> NDArray[np.uint8] | None:
         named = self.index.told["reference_image_id"][k]

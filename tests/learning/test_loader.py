@@ -127,6 +127,8 @@ def test_a_state_of_another_loader_is_refused(smoke, data):
         Loader(other, 16).load_state_dict(state)
     with pytest.raises(StoreError, match="its batch_size is 16, and here it is 8"):
         Loader(data, 8).load_state_dict(state)
+    with pytest.raises(StoreError, match=r"its order is .*'block': 2048.*, and here it is .*'block': 64"):
+        Loader(data, 16, block=64).load_state_dict(state)
     with pytest.raises(StoreError, match="no batch 9999"):
         Loader(data, 16).load_state_dict(state | {"batch": 9999})
     with pytest.raises(StoreError, match="a loader's state has"):

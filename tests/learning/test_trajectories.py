@@ -4,6 +4,8 @@ import json
 import shutil
 
 import numpy as np
+import pyarrow.compute as pc
+import pyarrow.parquet as pq
 import pytest
 
 from aerialdojo_gen import GlRenderer, open_release
@@ -192,6 +194,23 @@ def test_goals_as_text_tokens_and_pictures(smoke):
     assert tokens.shape[1:] == (5,)
     assert (tokens == 1).any(), "words that are not known"
     assert other.fingerprint != data.fingerprint
+
+
+def test_a_batch_without_a_goal_picture_is_the_same_whenever_it_comes(planted):
+    """Where there is none it is black, and as large as the others', whatever was seen before."""
+    table = pq.read_table(planted.path("tasks/train"), partitioning=None)
+    lacking = min(table["nav_id"].to_pylist())
+    is_lacking = pc.and_(pc.equal(table["nav_id"], lacking), pc.equal(table["modality"], "image"))
+    planted.write_table("tasks/train", table.filter(pc.invert(is_lacking)))
+    options = {"scene": planted.scene, "split": "train", "views": (), "goal": ("text", "image")}
+    fresh, used = Trajectories(planted.data, **options), Trajectories(planted.data, **options)
+    assert fresh.index.nav_id[0] == lacking
+    other = used.batch([len(used) - 1])
+    assert other["has_image"].tolist() == [True]
+    for batch in (fresh.batch([0, 0]), used.batch([0, 0])):
+        assert batch["image"].shape == (2, *other["image"].shape[1:])
+        assert not batch["has_image"][0]
+        assert not batch["image"][0].any()
 
 
 def test_the_cache_gives_what_was_drawn_and_survives_damage(smoke, seen, tmp_path):

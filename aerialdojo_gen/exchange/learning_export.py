@@ -1,0 +1,301 @@
+"""The release as a data set for training in others' formats: LeRobotDataset v3, WebDataset."""
+
+from __future__ import annotations
+
+import dataclasses
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from aerialdojo_gen.agents.goal import Sensors
+from aerialdojo_gen.benchmark.eyes import renderer_name
+from aerialdojo_gen.benchmark.tasks import mesh_of
+from aerialdojo_gen.common import rng
+from aerialdojo_gen.common.version import __version__
+from aerialdojo_gen.errors import AerialDojoError, UsageError
+from aerialdojo_gen.exchange import lerobot_writer, webdataset_writer
+from aerialdojo_gen.exchange.folder import check_target, whole_folder, write_json
+from aerialdojo_gen.exchange.parts import Unfinished, whole_part
+from aerialdojo_gen.exchange.samples import Part, Wanted, named_splits, planned
+from aerialdojo_gen.pipeline.code_digest import code_of
+from aerialdojo_gen.pipeline.executors import make_executor
+from aerialdojo_gen.pipeline.progress import Reporter, duration
+from aerialdojo_gen.store import shards as store
+from aerialdojo_gen.store.files import size_of
+from aerialdojo_gen.store.root import DataRoot, Where, open_root
+from aerialdojo_gen.store.staging import scratch_folder
+
+MARKER = "export.json"
+WRITERS: dict[str, ModuleType] = {"lerobot": lerobot_writer, "webdataset": webdataset_writer}
+FRAME = "of the body at the start: x ahead, y left, z up, metres; yaw in radians, counter-clockwise"
+_MEASURED_PARTS, _MEASURED_STEPS = 6, 24
+
+
+@dataclass(frozen=True)
+class Made:
+    """What an export consists of.
+
+    Attributes
+    ----------
+    counts : dict of str to int
+        What there is of everything, by its name.
+    parts, parts_kept : int
+        How many parts it was made of, and how many of them an earlier run had finished.
+    """
+
+    counts: dict[str, int]
+    parts: int
+    parts_kept: int
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """What an export will take.
+
+    Attributes
+    ----------
+    trajectories, frames, parts : int
+        Of the selection; a frame is a step, seen in every view.
+    cpu_s, wall_s : float
+        Seconds of one core, and on `workers` idle ones.
+    size_bytes : float
+        Of the whole export.
+    workers : int
+    measured : int
+        Frames that were drawn and encoded to find out.
+    """
+
+    trajectories: int
+    frames: int
+    parts: int
+    cpu_s: float
+    wall_s: float
+    size_bytes: float
+    workers: int
+    measured: int
+
+    def __str__(self) -> str:
+        """Two lines for people."""
+        size = f"{self.size_bytes / 1e9:.1f} GB" if self.size_bytes >= 1e9 else f"{self.size_bytes / 1e6:.0f} MB"
+        processes = "worker" if self.workers == 1 else "workers"
+        each = 1e3 * self.cpu_s / self.frames
+        return (
+            f"{self.trajectories:,} trajectories, {self.frames:,} frames (measured on {self.measured}: {each:.1f} ms "
+            f"CPU, {self.size_bytes / self.frames / 1e3:.1f} kB a frame)\n"
+            f"about {duration(self.wall_s)} with {self.workers} {processes} on idle cores, {size} on disk"
+        )
+
+
+def wanted_from(
+    *,
+    split: Sequence[str] = (),
+    setting: Sequence[str] = (),
+    scene: Sequence[str] = (),
+    limit: int = 0,
+    seed: int = 0,
+    views: Sequence[str] = ("front",),
+    size: int | tuple[int, int] = 128,
+    rgb: bool = True,
+    depth: bool = True,
+    goal: Sequence[str] = ("text",),
+    source: str = "render",
+    renderer: str = "auto",
+    jpeg_quality: int = 0,
+) -> Wanted:
+    """Say what is to be exported; parameters as for `aerialdojo_gen.learning.Trajectories` and `Wanted`.
+
+    Raises
+    ------
+    UsageError
+        A value makes no sense.
+    """
+    if limit < 0:
+        raise UsageError(f"a limit is 0, for all, or more, not {limit}")
+    width, height = (size, size) if isinstance(size, int) else size
+    sensors = Sensors(tuple(views), rgb, depth, width, height)
+    name = "" if source == "recordings" else renderer_name(renderer)
+    return Wanted(
+        named_splits(split), tuple(setting), tuple(scene), limit, seed, sensors, tuple(goal), source, name,
+        jpeg_quality,
+    )  # fmt: skip
+
+
+def export_for_learning(
+    format_name: str,
+    data: Where,
+    out: Path,
+    wanted: Wanted,
+    *,
+    force: bool = False,
+    workers: int | None = None,
+    reporter: Reporter | None = None,
+) -> Made:
+    """Write trajectories with what the body sees on them, as a data set for training.
+
+    Parameters
+    ----------
+    format_name : str
+        A key of `WRITERS`.
+    data : DataRoot, Path or str
+        The data root: release and meshes, or recordings.
+    out : Path
+        Folder to be made; it appears when it is whole. Until then finished parts lie beside it in
+        ``.NAME.unfinished``, and the same call goes on with them; a call that asks for something else begins anew.
+    wanted : Wanted
+        Made by `wanted_from`.
+    force : bool
+        Replace an earlier export there.
+    workers : int, optional
+        Processes; all cores where absent.
+    reporter : Reporter, optional
+        Where progress is shown.
+
+    Returns
+    -------
+    Made
+
+    Raises
+    ------
+    UsageError
+        The folder is not empty, nothing is selected, or the format cannot hold what is asked for.
+    StoreError
+        The release or a mesh is missing or damaged, or the disk is full.
+    AerialDojoError
+        A worker was killed.
+    """
+    writer = _writer(format_name, wanted)
+    told = reporter or Reporter(quiet=True)
+    check_target(out, MARKER, force=force)
+    root = open_root(data)
+    parts = planned(root, wanted, writer.frames_a_part(wanted))
+    unfinished = Unfinished(out, _request(format_name, root, wanted, parts))
+    with unfinished.held():
+        left = [part for part in parts if not unfinished.has(part.number)]
+        if unfinished.resumed:
+            told.line(f"going on: {len(parts) - len(left)} of {len(parts)} parts are finished")
+        jobs = [_Job(format_name, root.url, wanted, part, unfinished.folder) for part in left]
+        with told.bar("export", len(jobs), "parts") as bar, make_executor("local", workers) as pool:
+            for outcome in pool.map(_write, jobs, lambda job: job.part.scene):
+                if isinstance(outcome, AerialDojoError):
+                    raise outcome
+                bar.advance(frames=outcome)
+        with whole_folder(out, MARKER, force=force) as folder:
+            made = [unfinished.part(part.number) for part in parts]
+            counts = {"scenes": len({part.scene for part in parts})} | writer.finish(parts, wanted, made, folder)
+            write_json(folder / MARKER, _marker(format_name, wanted, parts, counts, writer))
+        unfinished.remove()
+    return Made(counts, len(parts), len(parts) - len(left))
+
+
+def estimate_for_learning(
+    format_name: str, data: Where, wanted: Wanted, workers: int | None = None
+) -> Estimate:  # fmt: skip
+    """Measure a few trajectories and say what all of them will take; nothing is written.
+
+    Raises
+    ------
+    UsageError, StoreError
+        As `export_for_learning`.
+    """
+    writer = _writer(format_name, wanted)
+    root = open_root(data)
+    parts = planned(root, wanted, writer.frames_a_part(wanted))
+    drawn = sorted(parts, key=lambda part: rng.rank(wanted.seed, "estimate", part.scene))[:_MEASURED_PARTS]
+    measured = size = 0
+    seconds = opening = 0.0
+    for part in drawn:
+        # The first picture of a scene opens it.
+        seconds_of = {}
+        for what, sample in (("open", part.cut(1, 1)), ("all", part.cut(2, _MEASURED_STEPS))):
+            with scratch_folder() as folder:
+                begun = time.process_time()
+                writer.write_part(root, sample, wanted, folder)
+                seconds_of[what] = time.process_time() - begun
+                written = sum(size_of(path) for path in folder.iterdir())
+        opening += seconds_of["open"]
+        seconds, measured, size = seconds + seconds_of["all"], measured + sample.frames, size + written
+    frames = sum(part.frames for part in parts)
+    count = workers or make_executor("local").workers
+    scenes = len({part.scene for part in parts})
+    cpu_s = frames * seconds / measured + scenes * opening / len(drawn)
+    return Estimate(
+        sum(len(part.index) for part in parts), frames, len(parts), cpu_s, cpu_s / min(count, len(parts)),
+        frames * size / measured, count, measured,
+    )  # fmt: skip
+
+
+def _writer(format_name: str, wanted: Wanted) -> ModuleType:
+    s = wanted.sensors
+    if format_name == "lerobot" and (s.width % 2 or s.height % 2):
+        raise UsageError(f"a video has even --width and --height, not {s.width} x {s.height}")
+    if format_name == "lerobot" and wanted.jpeg_quality:
+        raise UsageError("--jpeg-quality is for --format webdataset: LeRobot's pictures are videos")
+    return WRITERS[format_name]
+
+
+@dataclass(frozen=True, eq=False)
+class _Job:
+    """A part to be written, wherever."""
+
+    format_name: str
+    data: str
+    wanted: Wanted
+    part: Part
+    unfinished: Path
+
+    @property
+    def label(self) -> str:
+        return f"part {self.part.number} of {self.part.scene}"
+
+
+def _write(job: _Job) -> int:
+    with whole_part(job.unfinished, job.part.number) as folder:
+        WRITERS[job.format_name].write_part(open_root(job.data), job.part, job.wanted, folder)
+    return job.part.frames
+
+
+def _request(format_name: str, root: DataRoot, wanted: Wanted, parts: list[Part]) -> dict[str, Any]:
+    """Collect what decides every byte: parts of another request are not gone on with."""
+    scenes = sorted({part.scene for part in parts})
+    read = wanted.source != "render"
+    return {
+        "format": format_name,
+        "version": __version__,
+        "code": code_of(f"aerialdojo_gen.exchange.{format_name}_writer").digest,
+        "wanted": _plain(dataclasses.asdict(wanted)),
+        "trajectories": [part.index.digest for part in parts],
+        "meshes": {} if wanted.source == "recordings" else {name: mesh_of(root, name)[1] for name in scenes},
+        "recordings": {name: _recordings(root, name) for name in scenes} if read else {},
+    }
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _plain(inner) for key, inner in value.items()}
+    return [_plain(inner) for inner in value] if isinstance(value, list | tuple) else value
+
+
+def _recordings(root: DataRoot, scene: str) -> list[str]:
+    if not root.list("recordings", f"{scene}/*.parquet"):
+        return []
+    return sorted(store.read_stored(root, "recordings", scene, ("sha256",))["sha256"].to_pylist())
+
+
+def _marker(
+    format_name: str, wanted: Wanted, parts: list[Part], counts: dict[str, int], writer: ModuleType
+) -> dict[str, Any]:  # fmt: skip
+    from aerialdojo_gen.store.schemas import ACTION_NAMES
+
+    return {
+        "format": format_name,
+        "written_by": f"aerialdojo-gen {__version__}",
+        "frame": FRAME,
+        "scenes": sorted({part.scene for part in parts}),
+        "counts": counts,
+        "wanted": _plain(dataclasses.asdict(wanted)),
+        "actions": {str(k): name for k, name in enumerate(ACTION_NAMES[:16])},
+        "lost": {table: list(columns) for table, columns in writer.LOST.items()},
+    }

@@ -1,0 +1,118 @@
+"""The features of an export as LeRobotDataset v3, as ``meta/info.json`` declares them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+from numpy.typing import NDArray
+
+from aerialdojo_gen.exchange.clips import DEPTH_MIN_M, DEPTH_SHIFT_M, KEY_EVERY
+from aerialdojo_gen.exchange.samples import Wanted
+from aerialdojo_gen.geometry.motion import DISPLACEMENTS, TURN_RAD
+from aerialdojo_gen.store.schemas import STOP, TURN_LEFT, TURN_RIGHT
+
+# Steps have no duration: a frame a step, at the rate of the recordings.
+FPS = 15
+VERSION = "v3.0"
+FILES_A_CHUNK = 1000
+DATA_PATH = "data/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet"
+VIDEO_PATH = "videos/{video_key}/chunk-{chunk_index:03d}/file-{file_index:03d}.mp4"
+EPISODES_PATH = "meta/episodes/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet"
+GOAL = "observation.images.goal"
+STATE = ("x_ahead_m", "y_left_m", "z_up_m", "yaw_rad", "remaining_actions")
+ACTION = ("forward_m", "left_m", "up_m", "turn_rad", "stop")
+
+
+def _of_actions() -> NDArray[np.float32]:
+    table = np.zeros((TURN_RIGHT + 1, len(ACTION)), np.float32)
+    table[:, :3] = DISPLACEMENTS[: TURN_RIGHT + 1]
+    table[TURN_LEFT, 3], table[TURN_RIGHT, 3] = TURN_RAD, -TURN_RAD
+    table[STOP, 4] = 1.0
+    return table
+
+
+# What each of the 16 actions does in the body's frame, (16, 5) float32: see `ACTION`.
+OF_ACTION = _of_actions()
+
+
+def view_key(view: str) -> str:
+    """Name the feature of a view's pictures."""
+    return f"observation.images.{view}"
+
+
+def depth_key(view: str) -> str:
+    """Name the feature of a view's depth."""
+    return f"observation.depth.{view}"
+
+
+def video_kinds(wanted: Wanted) -> dict[str, str]:
+    """Return the features that are videos, and of which kind each is: ``rgb`` or ``depth``."""
+    s = wanted.sensors
+    pictures = {view_key(view): "rgb" for view in s.views} if s.rgb else {}
+    depths = {depth_key(view): "depth" for view in s.views} if s.depth else {}
+    return pictures | ({GOAL: "rgb"} if "image" in wanted.goal else {}) | depths
+
+
+def features(wanted: Wanted) -> dict[str, dict[str, Any]]:
+    """Return the features of frames: their types, shapes, names, and how videos are to be read."""
+    numbers = {
+        "observation.state": _feature("float32", len(STATE), list(STATE)),
+        "action": _feature("float32", len(ACTION), list(ACTION)),
+        "discrete_action": _feature("int64", 1, None),
+        "next.done": _feature("bool", 1, None),
+        "timestamp": _feature("float32", 1, None),
+        **{name: _feature("int64", 1, None) for name in ("frame_index", "episode_index", "index", "task_index")},
+    }
+    return {**{key: _video(wanted, kind) for key, kind in video_kinds(wanted).items()}, **numbers}
+
+
+def frame_schema() -> pa.Schema:
+    """Return the columns of ``data/``: all features that are no videos."""
+
+    def numbers(n: int) -> pa.DataType:
+        return pa.list_(pa.float32(), n)
+
+    return pa.schema(
+        [
+            ("observation.state", numbers(len(STATE))),
+            ("action", numbers(len(ACTION))),
+            ("discrete_action", pa.int64()),
+            ("next.done", pa.bool_()),
+            ("timestamp", pa.float32()),
+            *((name, pa.int64()) for name in ("frame_index", "episode_index", "index", "task_index")),
+        ]
+    )
+
+
+def _feature(dtype: str, n: int, names: list[str] | None) -> dict[str, Any]:
+    return {"dtype": dtype, "shape": [n], "names": names}
+
+
+def _video(wanted: Wanted, kind: str) -> dict[str, Any]:
+    s = wanted.sensors
+    depth = kind == "depth"
+    told: dict[str, Any] = {
+        "video.height": s.height,
+        "video.width": s.width,
+        "video.codec": "hevc" if depth else "h264",
+        "video.pix_fmt": "gray12le" if depth else "yuv420p",
+        "video.fps": FPS,
+        "video.channels": 1 if depth else 3,
+        "video.g": KEY_EVERY,
+        # The first is LeRobot's name of today, the second that of 0.4 and 0.5.
+        "is_depth_map": depth,
+        "video.is_depth_map": depth,
+        "has_audio": False,
+    }
+    if depth:
+        told |= {
+            "video.depth_min": DEPTH_MIN_M,
+            "video.depth_max": s.max_depth_m,
+            "video.shift": DEPTH_SHIFT_M,
+            "video.use_log": True,
+            "depth_unit": "m",
+        }
+    shape = [s.height, s.width, 1 if depth else 3]
+    return {"dtype": "video", "shape": shape, "names": ["height", "width", "channels"], "info": told}

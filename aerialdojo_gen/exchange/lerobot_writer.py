@@ -1,0 +1,251 @@
+"""LeRobotDataset v3, written: a Parquet file and a video a camera for every part, then what describes them all."""
+
+from __future__ import annotations
+
+import json
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pyarrow as pa
+from numpy.typing import NDArray
+
+from aerialdojo_gen.exchange import moments
+from aerialdojo_gen.exchange.clips import DEPTH_CODES, Clip, depth_codes, depths_of_codes_m
+from aerialdojo_gen.exchange.folder import write_json
+from aerialdojo_gen.exchange.lerobot_features import (
+    DATA_PATH,
+    EPISODES_PATH,
+    FILES_A_CHUNK,
+    FPS,
+    GOAL,
+    OF_ACTION,
+    VERSION,
+    VIDEO_PATH,
+    depth_key,
+    features,
+    frame_schema,
+    video_kinds,
+    view_key,
+)
+from aerialdojo_gen.exchange.parts import place
+from aerialdojo_gen.exchange.samples import Eyes, Part, Wanted
+from aerialdojo_gen.learning.labels import Labels
+from aerialdojo_gen.store.parquet_files import read_file, write_file
+from aerialdojo_gen.store.root import DataRoot
+
+# Steps of a part: a video of so many is some MB to 200 MB large, as LeRobot's own are.
+FRAMES_A_PART = 2048
+_FACTS = "part.json"
+
+Counts = dict[str, NDArray[np.int64]]
+
+
+def frames_a_part(wanted: Wanted) -> int:
+    """Return how many steps a part has at least, unless its scene has fewer."""
+    del wanted
+    return FRAMES_A_PART
+
+
+def write_part(root: DataRoot, part: Part, wanted: Wanted, folder: Path) -> None:
+    """Write the files of a part: its data, its videos, and ``part.json`` with what is counted of them."""
+    labels = Labels(root, part.index, ())
+    columns: dict[str, list[NDArray[Any]]] = {name: [] for name in frame_schema().names}
+    episodes: list[dict[str, moments.Stats]] = []
+    sums: Counts = {}
+    with ExitStack() as stack:
+        clips = {
+            key: stack.enter_context(
+                Clip(folder / f"{key}.mp4", kind, wanted.sensors.width, wanted.sensors.height, FPS)
+            )
+            for key, kind in video_kinds(wanted).items()
+        }
+        eyes = Eyes(root, part, wanted)
+        for k in range(len(part.index)):
+            own = _columns(labels, part, k)
+            counts = _seen(eyes, k, wanted, clips, part)
+            stats = {name: moments.of_rows(values) for name, values in own.items()}
+            stats |= {key: _described(key, found, wanted, len(own["index"])) for key, found in counts.items()}
+            episodes.append(stats)
+            for name, values in own.items():
+                columns[name].append(values)
+            for key, found in counts.items():
+                sums[key] = sums[key] + found if key in sums else found
+    arrays = [
+        _column(field.type, np.concatenate(columns[field.name])) for field in frame_schema()
+    ]  # fmt: skip
+    write_file(folder / "data.parquet", pa.table(arrays, schema=frame_schema()))
+    facts = {"stats": episodes, "counts": {key: found.tolist() for key, found in sums.items()}}
+    (folder / _FACTS).write_text(json.dumps(facts), encoding="utf-8")
+
+
+def _column(kind: pa.DataType, values: NDArray[Any]) -> pa.Array:
+    if not pa.types.is_fixed_size_list(kind):
+        return pa.array(values, kind)
+    return pa.FixedSizeListArray.from_arrays(pa.array(values.ravel(), kind.value_type), type=kind)
+
+
+def _columns(labels: Labels, part: Part, k: int) -> dict[str, NDArray[Any]]:
+    n = int(part.index.steps[k])
+    steps = np.arange(n)
+    found = labels.of(np.array([k]), steps[None], np.ones((1, n), np.bool_))
+    actions = found["action"][0]
+    state = np.column_stack([found["odometry"][0], found["remaining_actions"][0]]).astype(np.float32)
+    return {
+        "observation.state": state,
+        "action": OF_ACTION[actions],
+        "discrete_action": actions,
+        "next.done": steps == n - 1,
+        "timestamp": (steps / FPS).astype(np.float32),
+        "frame_index": steps,
+        "episode_index": np.full(n, part.first_episode + k),
+        "index": part.first_frame + int(part.index.first[k]) + steps,
+        "task_index": np.full(n, part.tasks[k]),
+    }
+
+
+def _seen(eyes: Eyes, k: int, wanted: Wanted, clips: dict[str, Clip], part: Part) -> Counts:
+    """Write what a trajectory sees into the videos, and count its values."""
+    s = wanted.sensors
+    counts: Counts = {}
+    for _, frames in eyes.frames(k):
+        for v, view in enumerate(s.views):
+            if frames.rgb is not None:
+                _add(counts, view_key(view), _rgb_counts(frames.rgb[:, v]))
+                for picture in frames.rgb[:, v]:
+                    clips[view_key(view)].write(picture)
+            if frames.depth_m is not None:
+                codes = depth_codes(frames.depth_m[:, v], s.max_depth_m)
+                _add(counts, depth_key(view), _counted(codes, DEPTH_CODES)[None])
+                for code in codes:
+                    clips[depth_key(view)].write(code)
+    if GOAL in clips:
+        picture = eyes.goal(k)
+        n = int(part.index.steps[k])
+        _add(counts, GOAL, _rgb_counts(picture[None]) * n)
+        for _ in range(n):
+            clips[GOAL].write(picture)
+    return counts
+
+
+def _add(counts: Counts, key: str, found: NDArray[np.int64]) -> None:
+    counts[key] = counts[key] + found if key in counts else found
+
+
+def _rgb_counts(pictures: NDArray[np.uint8]) -> NDArray[np.int64]:
+    return np.stack([_counted(np.ascontiguousarray(pictures[..., c]), 256) for c in range(3)])
+
+
+def _counted(values: NDArray[Any], n: int) -> NDArray[np.int64]:
+    # Counts are 32-bit floats here, exact for as few pixels as are held at a time.
+    found = cv2.calcHist([values.reshape(-1, values.shape[-1])], [0], None, [n], [0, n])
+    return found.ravel().astype(np.int64)
+
+
+def _described(key: str, counts: NDArray[np.int64], wanted: Wanted, frames: int) -> moments.Stats:
+    if video_kinds(wanted)[key] == "depth":
+        return moments.of_counts(counts, depths_of_codes_m(wanted.sensors.max_depth_m), frames)
+    return moments.of_counts(counts, np.arange(256) / 255.0, frames)
+
+
+def finish(parts: list[Part], wanted: Wanted, made: list[Path], folder: Path) -> dict[str, int]:
+    """Put the files of all parts in their places, and write ``meta/``.
+
+    Parameters
+    ----------
+    parts : list of Part
+    wanted : Wanted
+    made : list of Path
+        What `write_part` has filled, a folder a part.
+    folder : Path
+        Where the dataset is to be.
+
+    Returns
+    -------
+    dict of str to int
+        How many episodes, frames, tasks and files there are.
+    """
+    keys = list(video_kinds(wanted))
+    tables: list[pa.Table] = []
+    sums: Counts = {}
+    for part, source in zip(parts, made, strict=True):
+        at = {"chunk_index": part.number // FILES_A_CHUNK, "file_index": part.number % FILES_A_CHUNK}
+        place(source / "data.parquet", folder / DATA_PATH.format(**at))
+        for key in keys:
+            place(source / f"{key}.mp4", folder / VIDEO_PATH.format(video_key=key, **at))
+        facts = json.loads((source / _FACTS).read_text(encoding="utf-8"))
+        path = folder / EPISODES_PATH.format(**at)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        write_file(path, _episodes(part, facts["stats"], keys, at))
+        for key, found in facts["counts"].items():
+            _add(sums, key, np.array(found, np.int64))
+        tables.append(read_file(source / "data.parquet"))
+    frames = sum(part.frames for part in parts)
+    episodes = sum(len(part.index) for part in parts)
+    texts = dict(sorted({int(n): t for part in parts for n, t in zip(part.tasks, part.texts, strict=True)}.items()))
+    write_file(folder / "meta" / "tasks.parquet", _tasks(list(texts.values())))
+    every = pa.concat_tables(tables)
+    stats = {name: moments.of_rows(_values(every[name])) for name in frame_schema().names}
+    stats |= {key: _described(key, found, wanted, frames) for key, found in sums.items()}
+    write_json(folder / "meta" / "stats.json", stats)
+    info = {
+        "codebase_version": VERSION, "robot_type": "aerialdojo", "total_episodes": episodes, "total_frames": frames,
+        "total_tasks": len(texts), "chunks_size": FILES_A_CHUNK, "data_files_size_in_mb": 100,
+        "video_files_size_in_mb": 200, "fps": FPS, "splits": {"train": f"0:{episodes}"}, "data_path": DATA_PATH,
+        "video_path": VIDEO_PATH, "features": features(wanted),
+    }  # fmt: skip
+    write_json(folder / "meta" / "info.json", info)
+    return {"episodes": episodes, "frames": frames, "tasks": len(texts), "videos": len(parts) * len(keys)}
+
+
+def _values(column: pa.ChunkedArray) -> NDArray[Any]:
+    joined = column.combine_chunks()
+    if pa.types.is_fixed_size_list(joined.type):
+        return np.asarray(joined.flatten()).reshape(-1, joined.type.list_size)
+    return np.asarray(joined)
+
+
+def _episodes(part: Part, stats: list[dict[str, moments.Stats]], keys: list[str], at: dict[str, int]) -> pa.Table:
+    index, n = part.index, len(part.index)
+    begin, end = index.first[:-1], index.first[1:]
+    columns: dict[str, Any] = {
+        "episode_index": part.first_episode + np.arange(n),
+        "tasks": pa.array([[text] for text in part.texts], pa.list_(pa.string())),
+        "length": index.steps,
+        "dataset_from_index": part.first_frame + begin,
+        "dataset_to_index": part.first_frame + end,
+    }
+    for prefix in ("data", "meta/episodes", *(f"videos/{key}" for key in keys)):
+        columns |= {f"{prefix}/{name}": np.full(n, value) for name, value in at.items()}
+    for key in keys:
+        columns[f"videos/{key}/from_timestamp"] = begin / FPS
+        columns[f"videos/{key}/to_timestamp"] = end / FPS
+    columns |= {"nav_id": index.nav_id, "scene": [part.scene] * n, "split": part.splits, "setting": part.settings}
+    columns |= {
+        name: pa.array(index.told[name], pa.string())
+        for name in ("target_name", "landmark", "direction", "reference_image_id")
+    }
+    for key in stats[0]:
+        for name in stats[0][key]:
+            columns[f"stats/{key}/{name}"] = [found[key][name] for found in stats]
+    return pa.table(columns)
+
+
+def _tasks(texts: list[str]) -> pa.Table:
+    """Return the table of tasks, whose text pandas takes for the index, as LeRobot looks them up."""
+    numbers = {"name": "task_index", "field_name": "task_index", "pandas_type": "int64", "numpy_type": "int64"}
+    words = {"name": "task", "field_name": "task", "pandas_type": "unicode", "numpy_type": "object"}
+    told = {
+        "index_columns": ["task"], "column_indexes": [], "pandas_version": "2.2.0",
+        "columns": [{**column, "metadata": None} for column in (numbers, words)],
+        "creator": {"library": "pyarrow", "version": pa.__version__},
+    }  # fmt: skip
+    table = pa.table({"task_index": pa.array(range(len(texts)), pa.int64()), "task": pa.array(texts, pa.string())})
+    return table.replace_schema_metadata({"pandas": json.dumps(told)})
+
+
+LOST = {
+    "routes": ("goal_x_m", "goal_y_m", "goal_z_m", "goal_yaw_rad", "the world's frame of all poses"),
+}

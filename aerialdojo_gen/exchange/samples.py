@@ -1,0 +1,267 @@
+"""Trajectories with pictures, as the exports for learning write them: which, in what parts, and what a part shows."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from aerialdojo_gen.agents.goal import Sensors
+from aerialdojo_gen.benchmark.tasks import Selection, mesh_of, reference_image, select
+from aerialdojo_gen.common.advice import command
+from aerialdojo_gen.common.names import unknown
+from aerialdojo_gen.errors import UsageError
+from aerialdojo_gen.learning.index import Index, read_index
+from aerialdojo_gen.learning.pictures import Drawn, Frames, Recorded, Source
+from aerialdojo_gen.learning.trajectories import SOURCES
+from aerialdojo_gen.learning.words import goal_text
+from aerialdojo_gen.rendering.sample import choose
+from aerialdojo_gen.store.root import DataRoot
+
+GOALS = ("text", "image")
+# What a task says in words where its goal is a picture alone: the description would tell what the picture shows.
+IMAGE_TASK = "Fly to the object that the goal picture shows."
+# Pixels of all views that are held at a time.
+_PIXELS = 1 << 22
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What is exported.
+
+    Attributes
+    ----------
+    splits, settings, scenes : tuple of str
+        As in `aerialdojo_gen.benchmark.tasks.Selection`.
+    limit : int
+        Trajectories of each scene and each setting, drawn as `render` draws them; 0 for all.
+    seed : int
+        Of that draw.
+    sensors : Sensors
+        Views, size, and whether there is depth.
+    goal : tuple of str
+        Of `GOALS`.
+    source : str
+        As for `aerialdojo_gen.learning.trajectories.Trajectories`.
+    renderer : str
+        Name of what draws; not ``"auto"``, which may be another one in another process.
+    jpeg_quality : int
+        Of the pictures in shards, 1 to 100; 0 for PNG.
+    """
+
+    splits: tuple[str, ...]
+    settings: tuple[str, ...]
+    scenes: tuple[str, ...]
+    limit: int
+    seed: int
+    sensors: Sensors
+    goal: tuple[str, ...]
+    source: str
+    renderer: str
+    jpeg_quality: int = 0
+
+    def __post_init__(self) -> None:
+        """Refuse what there is not."""
+        for name in self.goal:
+            if name not in GOALS:
+                raise UsageError(unknown("no goal", name, GOALS))
+        if self.source not in SOURCES:
+            raise UsageError(unknown("no source", self.source, SOURCES))
+        if not self.goal:
+            raise UsageError(f"a goal is told by {' or '.join(GOALS)}: name one")
+        if not self.sensors.views or not (self.sensors.rgb or self.sensors.depth):
+            raise UsageError("nothing is seen without a view: name one of front, left, right, down")
+        if not 0 <= self.jpeg_quality <= 100:
+            raise UsageError(f"a JPEG's quality is from 1 to 100, or 0 for PNG, not {self.jpeg_quality}")
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """Trajectories of one scene that are written together.
+
+    Attributes
+    ----------
+    number : int
+        From 0; files are called by it.
+    index : Index
+        Its trajectories, of one scene.
+    settings, splits : list of str
+        Of every trajectory.
+    tasks : (n,) int64
+        Number of every trajectory's text.
+    texts : list of str
+        What tells its goal in words.
+    first_episode, first_frame : int
+        How many trajectories and steps all parts before it have.
+    """
+
+    number: int
+    index: Index
+    settings: list[str]
+    splits: list[str]
+    tasks: NDArray[np.int64]
+    texts: list[str]
+    first_episode: int
+    first_frame: int
+
+    @property
+    def scene(self) -> str:
+        """Name of its scene."""
+        return self.index.scenes[0]
+
+    @property
+    def frames(self) -> int:
+        """How many steps it has, each seen in every view."""
+        return int(self.index.first[-1])
+
+    def cut(self, trajectories: int, steps: int) -> Part:
+        """Keep the first trajectories, and of each the first steps: a sample to measure."""
+        index = self.index.take(np.arange(min(trajectories, len(self.index))))
+        short = [index.actions_of(k)[:steps] for k in range(len(index))]
+        first = np.concatenate([[0], np.cumsum([len(actions) for actions in short])]).astype(np.int64)
+        small = Index(
+            index.scenes, index.scene, index.nav_id, np.concatenate(short), first, index.start, index.goal,
+            index.budget, index.told,
+        )  # fmt: skip
+        n = len(small)
+        return Part(0, small, self.settings[:n], self.splits[:n], self.tasks[:n], self.texts[:n], 0, 0)
+
+
+def planned(root: DataRoot, wanted: Wanted, frames_a_part: int) -> list[Part]:
+    """Choose the trajectories, and cut them into parts.
+
+    Parameters
+    ----------
+    root : DataRoot
+        With a release.
+    wanted : Wanted
+    frames_a_part : int
+        A part ends with the trajectory that brings it to so many steps, or with its scene.
+
+    Returns
+    -------
+    list of Part
+        In the order of scenes and of navigation tasks.
+
+    Raises
+    ------
+    UsageError
+        No task fits, or none of them has a recording where recordings alone are asked for.
+    StoreError
+        There is no release, it is damaged, or a scene's mesh is missing.
+    """
+    modalities = ("image",) if wanted.goal == ("image",) else ()
+    selection = Selection(wanted.splits, wanted.settings, modalities, wanted.scenes)
+    index = read_index(root, selection)
+    facts = select(root, selection).select(["nav_id", "scene", "setting", "partition", "subset"]).to_pylist()
+    known = {row["nav_id"]: row for row in facts}
+    chosen = index.take(_chosen(index, known, wanted))
+    if wanted.source != "recordings":
+        for scene in chosen.scenes:
+            mesh_of(root, scene)  # a scene without a mesh is named before the first picture
+    else:
+        chosen = _recorded(root, chosen, wanted)
+    texts = [IMAGE_TASK if modalities else goal_text(*said) for said in zip(
+        *(chosen.told[name] for name in ("target_name", "landmark", "direction", "description")), strict=True
+    )]  # fmt: skip
+    number = {text: k for k, text in enumerate(dict.fromkeys(texts))}
+    parts: list[Part] = []
+    for rows in _cuts(chosen, frames_a_part):
+        own = [known[chosen.nav_id[k]] for k in rows]
+        parts.append(
+            Part(
+                len(parts),
+                chosen.take(rows),
+                [row["setting"] for row in own],
+                [f"{row['partition'].lower()}_{row['subset']}" for row in own],
+                np.array([number[texts[k]] for k in rows], np.int64),
+                [texts[k] for k in rows],
+                int(rows[0]),
+                int(chosen.first[rows[0]]),
+            )
+        )
+    return parts
+
+
+def _chosen(index: Index, known: dict[str, dict[str, str]], wanted: Wanted) -> NDArray[np.int64]:
+    if not wanted.limit:
+        return np.arange(len(index))
+    by_scene: dict[str, list[dict[str, str]]] = {}
+    for nav_id in index.nav_id:
+        by_scene.setdefault(known[nav_id]["scene"], []).append(known[nav_id])
+    taken = {nav_id for rows in by_scene.values() for nav_id in choose(rows, wanted.limit, wanted.seed)}
+    return np.flatnonzero([nav_id in taken for nav_id in index.nav_id])
+
+
+def _recorded(root: DataRoot, index: Index, wanted: Wanted) -> Index:
+    recorded = Recorded(root, index, wanted.sensors, Drawn(root, index, wanted.sensors, wanted.renderer))
+    has = np.flatnonzero([recorded.has(k) for k in range(len(index))])
+    if not len(has):
+        raise UsageError(
+            f"none of the {len(index):,} trajectories has a recording of the views asked for: run "
+            f"{command('render')}, or choose --source render"
+        )
+    return index.take(has)
+
+
+def _cuts(index: Index, frames_a_part: int) -> Iterator[NDArray[np.int64]]:
+    begun: list[int] = []
+    frames = 0
+    for k in range(len(index)):
+        if begun and (frames >= frames_a_part or index.scene[k] != index.scene[begun[0]]):
+            yield np.array(begun, np.int64)
+            begun, frames = [], 0
+        begun.append(k)
+        frames += int(index.steps[k])
+    if begun:
+        yield np.array(begun, np.int64)
+
+
+class Eyes:
+    """What the trajectories of a part see, and what their goals look like.
+
+    Parameters
+    ----------
+    root : DataRoot
+        With meshes, and recordings where they are read.
+    part : Part
+    wanted : Wanted
+    """
+
+    def __init__(self, root: DataRoot, part: Part, wanted: Wanted) -> None:
+        self._root, self._part, self._sensors = root, part, wanted.sensors
+        drawn: Source = Drawn(root, part.index, wanted.sensors, wanted.renderer)
+        self._source: Source = (
+            drawn if wanted.source == "render" else Recorded(root, part.index, wanted.sensors, drawn)
+        )
+
+    def frames(self, k: int) -> Iterator[tuple[int, Frames]]:
+        """Yield the pictures of trajectory k, some steps at a time, with the first of these steps."""
+        s = self._sensors
+        n = int(self._part.index.steps[k])
+        size = max(1, _PIXELS // (len(s.views) * s.height * s.width))
+        for begin in range(0, n, size):
+            steps = np.arange(begin, min(begin + size, n))
+            yield begin, self._source.frames(np.full(len(steps), k), steps)
+
+    def goal(self, k: int) -> NDArray[np.uint8]:
+        """Return the goal's picture of trajectory k: (H, W, 3) uint8, as wide and high as the views'.
+
+        A trajectory without an image instance has a black one.
+        """
+        s = self._sensors
+        named = self._part.index.told["reference_image_id"][k]
+        if named is None:
+            return np.zeros((s.height, s.width, 3), np.uint8)
+        picture = reference_image(self._root, self._part.scene, named)
+        shrinks = picture.shape[0] >= s.height and picture.shape[1] >= s.width
+        how = cv2.INTER_AREA if shrinks else cv2.INTER_LINEAR
+        return np.asarray(cv2.resize(picture, (s.width, s.height), interpolation=how), np.uint8)
+
+
+def named_splits(given: Sequence[str]) -> tuple[str, ...]:
+    """Return the names of splits, ``train``, ``test`` and ``all`` written out; UsageError for others."""
+    return Selection(tuple(given)).splits

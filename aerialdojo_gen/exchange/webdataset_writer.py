@@ -1,0 +1,135 @@
+"""WebDataset shards, written: a tar file a part, and in it pictures and JSON of every step."""
+
+from __future__ import annotations
+
+import io
+import json
+import tarfile
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from aerialdojo_gen.common.pictures import FRAME_PNG, encode_png
+from aerialdojo_gen.errors import RenderError
+from aerialdojo_gen.exchange.folder import write_json
+from aerialdojo_gen.exchange.parts import place
+from aerialdojo_gen.exchange.samples import Eyes, Part, Wanted
+from aerialdojo_gen.learning.labels import Labels
+from aerialdojo_gen.rendering.codecs import to_stored
+from aerialdojo_gen.store.root import DataRoot
+
+SHARD = "shard-{:06d}.tar"
+# Pixels of a shard, some hundred megabytes; and steps at most.
+_PIXELS, _STEPS = 1 << 27, 4096
+_FILE = "shard.tar"
+
+
+def frames_a_part(wanted: Wanted) -> int:
+    """Return how many steps a shard has at least, unless its scene has fewer."""
+    s = wanted.sensors
+    return min(_STEPS, max(64, _PIXELS // (len(s.views) * s.width * s.height)))
+
+
+def write_part(root: DataRoot, part: Part, wanted: Wanted, folder: Path) -> None:
+    """Write the shard of a part."""
+    labels, eyes = Labels(root, part.index, ()), Eyes(root, part, wanted)
+    # The oldest form of the three has neither times of a finer kind nor names of users: the same bytes everywhere.
+    with tarfile.open(folder / _FILE, "w", format=tarfile.USTAR_FORMAT) as tar:
+        for k in range(len(part.index)):
+            told = _told(labels, part, k, wanted)
+            goal = _picture(eyes.goal(k), wanted) if "image" in wanted.goal else None
+            for begin, frames in eyes.frames(k):
+                seen = frames.rgb if frames.rgb is not None else frames.depth_m
+                assert seen is not None
+                for i in range(len(seen)):
+                    step = told[begin + i]
+                    key = f"{step['nav_id']}-{step['step']:04d}"
+                    for v, view in enumerate(wanted.sensors.views):
+                        if frames.rgb is not None:
+                            _add(tar, f"{key}.{view}.{_kind(wanted)}", _picture(frames.rgb[i, v], wanted))
+                    if frames.depth_m is not None:
+                        stored = {
+                            view: to_stored(frames.depth_m[i, v]) for v, view in enumerate(wanted.sensors.views)
+                        }
+                        _add(tar, f"{key}.depth.npz", _arrays(stored))
+                    if goal is not None:
+                        _add(tar, f"{key}.goal.{_kind(wanted)}", goal)
+                    _add(tar, f"{key}.json", json.dumps(step, ensure_ascii=False).encode())
+
+
+def _told(labels: Labels, part: Part, k: int, wanted: Wanted) -> list[dict[str, Any]]:
+    """Return the JSON of every step of a trajectory."""
+    index = part.index
+    n = int(index.steps[k])
+    found = labels.of(np.array([k]), np.arange(n)[None], np.ones((1, n), np.bool_))
+    whole: dict[str, Any] = {
+        "nav_id": index.nav_id[k],
+        "scene": part.scene,
+        "split": part.splits[k],
+        "setting": part.settings[k],
+        "n_steps": n,
+        "task": part.texts[k],
+    }
+    if "text" in wanted.goal:
+        whole |= {name: index.told[name][k] for name in ("target_name", "landmark", "direction", "description")}
+    if "image" in wanted.goal:
+        whole["reference_image_id"] = index.told["reference_image_id"][k]
+    return [
+        {
+            **whole,
+            "step": step,
+            "action": int(found["action"][0, step]),
+            "previous_action": int(found["previous_action"][0, step]),
+            "remaining_actions": int(found["remaining_actions"][0, step]),
+            "odometry": [float(value) for value in found["odometry"][0, step]],
+        }
+        for step in range(n)
+    ]
+
+
+def _kind(wanted: Wanted) -> str:
+    return "jpg" if wanted.jpeg_quality else "png"
+
+
+def _picture(rgb: NDArray[np.uint8], wanted: Wanted) -> bytes:
+    if not wanted.jpeg_quality:
+        return encode_png(rgb, FRAME_PNG)
+    done, data = cv2.imencode(".jpg", rgb[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, wanted.jpeg_quality])
+    if not done:
+        raise RenderError(f"OpenCV could not compress a picture of {rgb.shape[1]} x {rgb.shape[0]} pixels")
+    return bytes(data)
+
+
+def _arrays(arrays: dict[str, NDArray[np.uint16]]) -> bytes:
+    file = io.BytesIO()
+    np.savez_compressed(file, **arrays)  # type: ignore[arg-type]
+    return file.getvalue()
+
+
+def _add(tar: tarfile.TarFile, name: str, content: bytes) -> None:
+    member = tarfile.TarInfo(name)
+    member.size, member.mode = len(content), 0o644
+    tar.addfile(member, io.BytesIO(content))
+
+
+def finish(parts: list[Part], wanted: Wanted, made: list[Path], folder: Path) -> dict[str, int]:
+    """Put the shards in their places, and list them; see `aerialdojo_gen.exchange.lerobot_writer.finish`."""
+    del wanted
+    shards = []
+    for part, source in zip(parts, made, strict=True):
+        name = SHARD.format(part.number)
+        place(source / _FILE, folder / name)
+        shards.append({"url": name, "nsamples": part.frames, "filesize": (source / _FILE).stat().st_size})
+    # The list that WebDataset's own reader of indexed shards takes.
+    write_json(folder / "index.json", {"__kind__": "wids-shard-index-v1", "wids_version": 1, "shardlist": shards})
+    return {
+        "trajectories": sum(len(part.index) for part in parts),
+        "samples": sum(part.frames for part in parts),
+        "shards": len(parts),
+    }
+
+
+LOST = {"routes": ("goal_x_m", "goal_y_m", "goal_z_m", "goal_yaw_rad", "the world's frame of all poses")}

@@ -1,0 +1,328 @@
+"""The exports for training, read back by LeRobot's and WebDataset's readers: the loader's pictures and labels."""
+
+import hashlib
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+
+import cv2
+import numpy as np
+import pytest
+from support import lerobot_reader
+from typer.testing import CliRunner
+
+from aerialdojo_gen.cli import app
+from aerialdojo_gen.errors import StoreError, UsageError
+from aerialdojo_gen.exchange.learning_export import export_for_learning, wanted_from
+from aerialdojo_gen.exchange.parts import Unfinished
+from aerialdojo_gen.geometry.motion import replay
+from aerialdojo_gen.learning import Trajectories
+from aerialdojo_gen.rendering.codecs import to_stored
+
+VIEWS = ("front", "down")
+OPTIONS = {"split": ("all",), "limit": 1, "views": VIEWS, "size": (48, 32), "goal": ("text", "image")}
+# A Python that has LeRobot, which wants other versions of many packages than this project's environment has.
+LEROBOT = os.environ.get("LEROBOT_PYTHON", "")
+
+
+@pytest.fixture(scope="module")
+def made(smoke, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("exports")
+    wanted = wanted_from(**OPTIONS)
+    counts = {
+        form: export_for_learning(form, smoke, folder / form, wanted, workers=1) for form in ("lerobot", "webdataset")
+    }
+    return folder, counts
+
+
+@pytest.fixture(scope="module")
+def lerobot(made):
+    return lerobot_reader.load(made[0] / "lerobot")
+
+
+@pytest.fixture(scope="module")
+def seen(smoke, lerobot):
+    """The same trajectories by the loader."""
+    whole = Trajectories(smoke, split="all", views=VIEWS, size=(48, 32), past=None, goal=("text", "image"))
+    number = {nav_id: k for k, nav_id in enumerate(whole.index.nav_id)}
+    return [whole[number[nav_id]] for nav_id in lerobot.episodes["nav_id"]]
+
+
+def files(folder):
+    return {
+        str(p.relative_to(folder)): hashlib.sha256(p.read_bytes()).hexdigest()
+        for p in folder.rglob("*")
+        if p.is_file()
+    }
+
+
+def test_lerobot_has_the_loaders_labels(lerobot, seen):
+    assert len(seen) == len(lerobot.episodes) > 3
+    assert set(lerobot.episodes["setting"]) >= {"base", "standard"}
+    for episode, sample in enumerate(seen):
+        own = lerobot.frames[lerobot.frames["episode_index"] == episode]
+        assert own["discrete_action"].to_list() == sample["action"].tolist()
+        state = np.stack(own["observation.state"].to_list())
+        assert (state[:, :4] == sample["odometry"]).all()
+        assert (state[:, 4] == sample["remaining_actions"]).all()
+        assert own["next.done"].to_list() == [False] * (len(own) - 1) + [True]
+        (task,) = lerobot.episodes.loc[episode, "tasks"]
+        assert task == sample["text"]
+
+
+def test_lerobots_continuous_actions_fly_what_the_discrete_ones_do(lerobot):
+    actions, discrete = lerobot.columns("action"), lerobot.columns("discrete_action")
+    assert lerobot.info["features"]["action"]["names"] == ["forward_m", "left_m", "up_m", "turn_rad", "stop"]
+    for action in np.unique(discrete):
+        (motion,) = np.unique(actions[discrete == action], axis=0)
+        assert motion[4] == (action == 0)
+        flown = replay((0.0, 0.0, 0.0, 0.0), np.array([action], np.int8))[-1]
+        assert motion[:4] == pytest.approx(flown, abs=1e-6)
+    assert len(np.unique(actions, axis=0)) == len(np.unique(discrete))
+
+
+def test_lerobots_videos_are_the_loaders_pictures(lerobot, seen):
+    for episode, sample in enumerate(seen):
+        for v, view in enumerate(VIEWS):
+            pictures = lerobot.video(f"observation.images.{view}", episode)
+            away = np.abs(pictures.astype(int) - sample["rgb"][:, v])
+            assert away.mean() < 6, "H.264 and halved colours of pictures of 48 pixels"
+            depth = lerobot.video(f"observation.depth.{view}", episode)
+            error = np.abs(depth - sample["depth_m"][:, v])
+            assert (error <= 0.0004 * (sample["depth_m"][:, v] + 3.5) + 1e-4).all()
+            assert ((depth == 0) == (sample["depth_m"][:, v] == 0)).all()
+        goal = lerobot.video("observation.images.goal", episode)
+        expected = cv2.resize(np.asarray(sample["image"]), (48, 32), interpolation=cv2.INTER_AREA)
+        assert np.abs(goal.astype(int) - expected).mean() < 10
+
+
+def test_lerobots_statistics_are_those_of_the_pictures_and_columns(lerobot, seen):
+    for v, view in enumerate(VIEWS):
+        pixels = np.concatenate([s["rgb"][:, v].reshape(-1, 3) for s in seen]) / 255.0
+        stats = lerobot.stats[f"observation.images.{view}"]
+        for name, expected in (
+            ("min", pixels.min(0)), ("max", pixels.max(0)), ("mean", pixels.mean(0)), ("std", pixels.std(0)),
+            ("q50", np.quantile(pixels, 0.5, axis=0, method="inverted_cdf")),
+            ("q99", np.quantile(pixels, 0.99, axis=0, method="inverted_cdf")),
+        ):  # fmt: skip
+            assert stats[name].ravel() == pytest.approx(expected, abs=1e-9), name
+        depth = np.concatenate([s["depth_m"][:, v].ravel() for s in seen])
+        found = lerobot.stats[f"observation.depth.{view}"]
+        assert found["mean"].item() == pytest.approx(depth.mean(), abs=0.01)
+        assert found["std"].item() == pytest.approx(depth.std(), abs=0.01)
+    for name in ("observation.state", "action", "discrete_action"):
+        values = lerobot.columns(name).reshape(len(lerobot.frames), -1)
+        assert lerobot.stats[name]["mean"] == pytest.approx(values.mean(0, dtype=np.float64))
+        assert lerobot.stats[name]["std"] == pytest.approx(values.std(0, dtype=np.float64))
+        assert lerobot.stats[name]["max"] == pytest.approx(values.max(0))
+    row = lerobot.episodes.loc[1]
+    own = seen[1]["rgb"][:, 0].reshape(-1, 3) / 255.0
+    told = np.array([[[float(x) for x in b] for b in a] for a in row["stats/observation.images.front/mean"]])
+    assert told.shape == (3, 1, 1)
+    assert told.ravel() == pytest.approx(own.mean(0))
+
+
+@pytest.mark.slow
+def test_lerobots_own_class_reads_it(made, lerobot, project, tmp_path):
+    if not LEROBOT:
+        pytest.skip("LEROBOT_PYTHON names no Python with LeRobot: a strict reader of the format has read the export")
+    out = tmp_path / "read.npz"
+    script = project / "tests" / "support" / "read_by_lerobot.py"
+    environment = {**os.environ, "HF_HOME": str(tmp_path / "hf"), "PYTHONPATH": ""}
+    done = subprocess.run(
+        [LEROBOT, str(script), str(made[0] / "lerobot"), str(out)], capture_output=True, text=True, env=environment
+    )
+    assert done.returncode == 0, done.stderr[-3000:]
+    read = np.load(out)
+    told = json.loads(str(read["told"]))
+    assert (told["frames"], told["episodes"], told["fps"]) == (len(lerobot.frames), len(lerobot.episodes), 15)
+    assert told["nav_id"] == lerobot.episodes["nav_id"].to_list()
+    assert set(told["cameras"]) == {name for name, f in lerobot.info["features"].items() if f["dtype"] == "video"}
+    at = read["index"]
+    assert len(at) > 20
+    assert told["tasks"] == [lerobot.tasks[k] for k in lerobot.frames["task_index"].iloc[at]]
+    for name in ("observation.state", "action", "discrete_action", "next.done", "index"):
+        assert (read[name] == lerobot.columns(name)[at]).all()
+    for view in VIEWS:
+        ours = np.concatenate([lerobot.video(f"observation.images.{view}", e) for e in lerobot.episodes.index])
+        theirs = np.moveaxis(read[f"observation.images.{view}"], 1, -1) * 255
+        assert np.abs(theirs - ours[at]).max() <= 3, "two versions of FFmpeg turn colours back alike"
+        if told["depth"]:
+            depth = np.concatenate([lerobot.video(f"observation.depth.{view}", e) for e in lerobot.episodes.index])
+            assert np.abs(read[f"observation.depth.{view}"][:, 0] - depth[at]).max() < 1e-3
+    last = int(lerobot.episodes.loc[0, "length"]) - 1
+    assert (read["window_action"][0, 0] == lerobot.columns("action")[last]).all()
+    assert read["window_pad"][0].tolist() == [False, True]
+    assert told["last_alone"] == lerobot.episodes["length"].iloc[-1]
+    assert told["batch"]["observation.images.front"] == [5, 3, 32, 48]
+    for key in ("observation.state", "observation.images.front"):
+        assert np.array(told["stats"][key]["mean"]).ravel() == pytest.approx(lerobot.stats[key]["mean"].ravel())
+
+
+def test_webdataset_reads_the_shards_back(made, seen, lerobot):
+    webdataset = pytest.importorskip("webdataset", reason="webdataset is not installed: it is of the extra 'dev'")
+    folder = made[0] / "webdataset"
+    shards = sorted(str(path) for path in folder.glob("shard-*.tar"))
+    index = json.loads((folder / "index.json").read_text())
+    assert [str(folder / shard["url"]) for shard in index["shardlist"]] == shards
+    assert all((folder / s["url"]).stat().st_size == s["filesize"] for s in index["shardlist"])
+    samples = list(webdataset.WebDataset(shards, shardshuffle=False, empty_check=False).decode("rgb8"))
+    assert len(samples) == sum(s["nsamples"] for s in index["shardlist"]) == len(lerobot.frames)
+    at = 0
+    for trajectory in seen:
+        for step in range(len(trajectory["mask"])):
+            sample, told = samples[at], samples[at]["json"]
+            at += 1
+            assert sample["__key__"].endswith(f"{told['nav_id']}-{step:04d}")
+            assert (told["nav_id"], told["step"], told["task"]) == (trajectory["nav_id"], step, trajectory["text"])
+            for name in ("action", "previous_action", "remaining_actions"):
+                assert told[name] == trajectory[name][step]
+            assert told["odometry"] == pytest.approx(trajectory["odometry"][step], abs=1e-7)
+            for v, view in enumerate(VIEWS):
+                assert (sample[f"{view}.png"] == trajectory["rgb"][step, v]).all(), "PNG loses nothing"
+                assert (sample["depth.npz"][view] == to_stored(trajectory["depth_m"][step, v])).all()
+            assert sample["goal.png"].shape == (32, 48, 3)
+    assert at == len(samples)
+
+
+@pytest.mark.parametrize("form", ["lerobot", "webdataset"])
+def test_the_same_bytes_by_any_number_of_workers(form, made, smoke, tmp_path, monkeypatch):
+    # Several parts a scene, so that there is something to share out.
+    from aerialdojo_gen.exchange import lerobot_writer, webdataset_writer
+
+    again = export_for_learning(form, smoke, tmp_path / "again", wanted_from(**OPTIONS), workers=2)
+    assert again == made[1][form]
+    assert files(tmp_path / "again") == files(made[0] / form)
+    assert not list(tmp_path.glob(".*")), "nothing unfinished is left"
+    for writer in (lerobot_writer, webdataset_writer):
+        monkeypatch.setattr(writer, "frames_a_part", lambda wanted: 20)
+    cut = export_for_learning(form, smoke, tmp_path / "cut", wanted_from(**OPTIONS), workers=1)
+    assert cut.parts > again.parts
+    if form == "lerobot":
+        one, many = lerobot_reader.load(made[0] / form), lerobot_reader.load(tmp_path / "cut")
+        assert many.frames.equals(one.frames)
+        for key, of in one.stats.items():
+            for name, value in of.items():
+                assert many.stats[key][name] == pytest.approx(value, abs=1e-9)
+        last = len(one.episodes) - 1
+        key = "observation.depth.down"
+        assert (many.video(key, last) == one.video(key, last)).all()
+
+
+@pytest.mark.kill
+def test_what_is_killed_goes_on_with_finished_parts(made, smoke, tmp_path):
+    out = tmp_path / "export"
+    # The process ends itself when its second part has been half written, as a power failure would.
+    script = f"""
+import os, pathlib, signal, sys
+from aerialdojo_gen.exchange import webdataset_writer
+from aerialdojo_gen.exchange.learning_export import export_for_learning, wanted_from
+whole, done = webdataset_writer.write_part, []
+def write(root, part, wanted, folder):
+    whole(root, part, wanted, folder)
+    done.append(part)
+    if len(done) == 2:
+        os.kill(os.getpid(), signal.SIGKILL)
+webdataset_writer.write_part = write
+export_for_learning("webdataset", sys.argv[1], pathlib.Path(sys.argv[2]), wanted_from(**{OPTIONS!r}), workers=1)
+"""
+    done = subprocess.run([sys.executable, "-c", script, str(smoke), str(out)], capture_output=True, text=True)
+    assert done.returncode == -signal.SIGKILL, done.stderr
+    assert not out.exists(), "nothing stands under the name before it is whole"
+    (unfinished,) = tmp_path.glob(".*.unfinished")
+    assert [path.name for path in (unfinished / "parts").iterdir()] == ["000000"]
+    first = (unfinished / "parts" / "000000" / "shard.tar").stat().st_ino
+    resumed = export_for_learning("webdataset", smoke, out, wanted_from(**OPTIONS), workers=1)
+    assert (resumed.parts_kept, resumed.parts) == (1, 2)
+    assert (out / "shard-000000.tar").stat().st_ino == first, "it is the file of the killed run"
+    assert files(out) == files(made[0] / "webdataset")
+    assert not unfinished.exists()
+
+
+def test_parts_of_another_request_are_not_gone_on_with(smoke, tmp_path):
+    def parts(request):
+        unfinished = Unfinished(tmp_path / "export", request)
+        with unfinished.held():
+            before = sorted(path.name for path in (unfinished.folder / "parts").iterdir())
+            unfinished.part(0).mkdir(exist_ok=True)
+            with pytest.raises(UsageError, match="another process is making this export"), unfinished.held():
+                pass
+        return before
+
+    assert parts({"size": 1}) == []
+    assert parts({"size": 1}) == ["000000"]
+    assert parts({"size": 2}) == []
+
+
+def test_recordings_are_read_where_there_are_some(smoke, tmp_path):
+    """What is not recorded is left out by recordings, and drawn by auto."""
+    wanted = wanted_from(split=("all",), source="recordings", size=64, depth=False)
+    made = export_for_learning("webdataset", smoke, tmp_path / "recorded", wanted, workers=1)
+    assert 0 < made.counts["trajectories"] < 10
+
+
+def call(*arguments):
+    return CliRunner().invoke(app, ["export", *map(str, arguments)])
+
+
+def test_an_estimate_writes_nothing_and_counts_what_the_export_has(made, smoke, tmp_path):
+    arguments = ["--format", "lerobot", "--data", smoke, "--out", tmp_path / "x", "--limit", 1, "--estimate"]
+    done = call(*arguments, "--json")
+    assert done.exit_code == 0, done.output
+    told = json.loads(done.stdout)
+    assert told["frames"] == made[1]["lerobot"].counts["frames"]
+    assert told["trajectories"] == made[1]["lerobot"].counts["episodes"]
+    assert told["cpu_s"] > 0
+    assert told["size_bytes"] > 0
+    assert not list(tmp_path.iterdir())
+    assert "trajectories" in call(*arguments).stdout
+
+
+def test_the_command_says_what_it_made_and_does_not_replace_it_unasked(smoke, tmp_path):
+    arguments = ["--format", "webdataset", "--data", smoke, "--out", tmp_path / "x", "--limit", 1, "--width", 16,
+                 "--no-depth", "--jpeg-quality", 80, "--workers", 1]  # fmt: skip
+    done = call(*arguments, "--json")
+    assert done.exit_code == 0, done.output
+    assert json.loads(done.stdout)["counts"]["shards"] == 2
+    before = files(tmp_path / "x")
+    again = call(*arguments)
+    assert again.exit_code == 2 or again.exit_code == 1
+    assert "--force replaces it" in str(again.exception or again.output)
+    assert call(*arguments, "--force", "--quiet").stdout == ""
+    assert files(tmp_path / "x") == before
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (("--format", "lerobot", "--width", 31), "even --width and --height, not 31 x 31"),
+        (("--format", "lerobot", "--jpeg-quality", 80), "--jpeg-quality is for --format webdataset"),
+        (("--format", "lerobot", "--picture-size", 64), "--picture-size is for --format aerialdojo"),
+        (("--format", "habitat", "--limit", 3), "--limit is for --format lerobot and webdataset, not for habitat"),
+        (("--format", "habitat", "--split", "train", "--view", "down"), "--split, --view are for"),
+        (("--format", "lerobots"), "did you mean 'lerobot'"),
+        (("--format", "webdataset", "--goal", "txt"), "did you mean 'text'"),
+        (("--format", "webdataset", "--view", "up"), "no view 'up'"),
+        (("--format", "webdataset", "--split", "id_trian"), "did you mean 'id_train'"),
+        (("--format", "webdataset", "--source", "disk"), "no source 'disk'"),
+        (("--format", "webdataset", "--scene", "U_Nowhere_0"), "no scene 'U_Nowhere_0'"),
+    ],
+)
+def test_what_makes_no_sense_is_one_line(smoke, tmp_path, options, message):
+    done = call(*options, "--data", smoke, "--out", tmp_path / "x")
+    assert done.exit_code != 0
+    assert message in str(done.exception)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_release_without_meshes_and_one_without_recordings_are_named(planted, tmp_path):
+    with pytest.raises(UsageError, match=r"has a recording of the views asked for: run .*render.*--source render"):
+        export_for_learning("lerobot", planted.data, tmp_path / "x", wanted_from(source="recordings"))
+    shutil.rmtree(planted.data / "meshes")
+    with pytest.raises(StoreError, match=r"the mesh .* is missing: run aerialdojo-gen build-scenes"):
+        export_for_learning("lerobot", planted.data, tmp_path / "x", wanted_from())
+    assert not list(tmp_path.glob("x*"))
+    assert not list(tmp_path.glob(".x*"))
