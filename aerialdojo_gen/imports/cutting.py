@@ -105,8 +105,14 @@ def cut(vertices: Floats, faces: Ints, region: Region) -> Pieces:
     corners = vertices[faces]
     body, closed = bodies_of(faces, len(vertices))
     pieces = Pieces(corners, np.arange(len(faces)), np.broadcast_to(np.eye(3), (len(faces), 3, 3)))
-    reach = corners[:, :, :2]
-    touched = (reach.min(axis=1) <= region.high).all(axis=1) & (reach.max(axis=1) >= region.low).all(axis=1)
+    # A closed body must come to the planes whole, for what each of them cuts away tells where it is to be closed.
+    low, high = np.full((len(closed), 2), np.inf), np.full((len(closed), 2), -np.inf)
+    np.minimum.at(low, body, corners[:, :, :2].min(axis=1))
+    np.maximum.at(high, body, corners[:, :, :2].max(axis=1))
+    own = closed[body][:, None]
+    low = np.where(own, low[body], corners[:, :, :2].min(axis=1))
+    high = np.where(own, high[body], corners[:, :, :2].max(axis=1))
+    touched = (low <= region.high).all(axis=1) & (high >= region.low).all(axis=1)
     pieces = _some(pieces, touched)
     for normal, offset in region.planes:
         pieces = _halved(pieces, body, closed, normal, offset)
@@ -141,18 +147,16 @@ def _halved(pieces: Pieces, body: Ints, closed: NDArray[np.bool_], normal: Float
     at = np.arange(len(rows))[:, None]
     split = _some(pieces, rows)
     c, w, d = split.corners[at, turn], split.weights[at, turn], away[rows][at, turn]
-    share = d[:, :1] / (d[:, :1] - d[:, 1:])
-    # From the inner corner outwards, so that both triangles of an edge are cut at the same place to the bit.
     k = len(one)
-    at_border = np.empty((len(rows), 2, 3))
-    weights = np.empty((len(rows), 2, 3))
+    at_border, weights = np.empty((len(rows), 2, 3)), np.empty((len(rows), 2, 3))
     for j in (0, 1):
-        t = share[:k, j, None]
-        at_border[:k, j] = c[:k, j + 1] + (1 - t) * (c[:k, 0] - c[:k, j + 1])
-        weights[:k, j] = w[:k, j + 1] + (1 - t) * (w[:k, 0] - w[:k, j + 1])
-        t = share[k:, j, None]
-        at_border[k:, j] = c[k:, 0] + t * (c[k:, j + 1] - c[k:, 0])
-        weights[k:, j] = w[k:, 0] + t * (w[k:, j + 1] - w[k:, 0])
+        # From the inner corner outwards, so that both triangles of an edge are cut at the same place to the bit.
+        ends = np.concatenate([np.full(k, j + 1), np.zeros(len(two), np.int64)])
+        beyond = np.concatenate([np.zeros(k, np.int64), np.full(len(two), j + 1)])
+        i = np.arange(len(rows))
+        share = (d[i, ends] / (d[i, ends] - d[i, beyond]))[:, None]
+        at_border[:, j] = c[i, ends] + share * (c[i, beyond] - c[i, ends])
+        weights[:, j] = w[i, ends] + share * (w[i, beyond] - w[i, ends])
     source = split.source
     quads = [
         Pieces(np.stack([at_border[:k, 0], c[:k, 1], c[:k, 2]], 1), source[:k],
