@@ -225,13 +225,37 @@ def _filled(lines: NDArray[np.object_]) -> NDArray[np.object_]:
 
 
 def bodies_of(faces: Ints, n: int) -> tuple[Ints, NDArray[np.bool_]]:
-    """Number of the connected body of every face, and which bodies are closed: each edge there twice."""
-    graph = coo_array((np.ones(2 * len(faces), np.int8), (np.repeat(faces[:, 0], 2), faces[:, 1:].reshape(-1))),
-                      shape=(n, n))  # fmt: skip
-    _, label = connected_components(graph, directed=False)
-    body = label[faces[:, 0]].astype(np.int64)
-    edges = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
-    _, same, count = np.unique(edges[:, 0] * n + edges[:, 1], return_inverse=True, return_counts=True)
-    closed = np.ones(int(label.max(initial=-1)) + 1, dtype=np.bool_)
-    closed[np.tile(body, 3)[count[same.reshape(-1)] != 2]] = False
-    return body, closed
+    """Find the connected bodies of faces.
+
+    Parameters
+    ----------
+    faces : (m, 3) int64
+        Indices of vertices, equal places one vertex.
+    n : int
+        Number of vertices.
+
+    Returns
+    -------
+    body : (m,) int64
+        Number of each face's body, from 0. Bodies hang together by edges; where four faces and more meet in one,
+        closed bodies touch (a house on a plate), and do not hang together by it.
+    closed : (k,) bool
+        Which bodies have each edge twice, triangles that are there from both sides counted once.
+    """
+    if not len(faces):
+        return np.zeros(0, np.int64), np.zeros(0, np.bool_)
+    own, same = np.unique(np.sort(faces, axis=1), axis=0, return_inverse=True)
+    m = len(own)
+    edges = np.concatenate([own[:, [0, 1]], own[:, [1, 2]], own[:, [0, 2]]])
+    key = edges[:, 0] * n + edges[:, 1]
+    order = np.argsort(key, kind="stable")
+    owner, key = (np.tile(np.arange(m), 3))[order], key[order]
+    first = np.flatnonzero(np.diff(key, prepend=-1))
+    count = np.diff(first, append=len(key))
+    next_of = np.flatnonzero(np.repeat((count == 2) | (count == 3), count)[1:] & (key[1:] == key[:-1]))
+    graph = coo_array((np.ones(len(next_of), np.int8), (owner[next_of], owner[next_of + 1])), shape=(m, m))
+    k, label = connected_components(graph, directed=False)
+    pairs, times = np.unique(np.column_stack([label[owner], key]), axis=0, return_counts=True)
+    closed = np.ones(k, dtype=np.bool_)
+    closed[pairs[times != 2, 0]] = False
+    return label[same.reshape(-1)].astype(np.int64), closed

@@ -82,6 +82,19 @@ def guess(nodes: Sequence[RawNode]) -> Guess:
     return Guess(up, sure, scale, unit)
 
 
+def _guess_within_domes(nodes: Sequence[RawNode], naming: Naming | None) -> Guess:
+    """Guess by what stands within sky domes, whose form tells neither axis nor scale of the place."""
+    found = guess(nodes)
+    for up in (found.up, "z" if found.up == "y" else "y"):
+        place = Place.of(nodes, up, 1.0, naming)
+        if place.domes:
+            # Back into the file's axes.
+            v = [b.vertices for b in place.bodies]
+            own = [x if up == "z" else np.column_stack([x[:, 0], x[:, 2], -x[:, 1]]) for x in v]
+            return guess([b.placed(x) for b, x in zip(place.bodies, own, strict=True)])
+    return found
+
+
 def contents(
     nodes: Sequence[RawNode],
     *,
@@ -111,7 +124,7 @@ def contents(
     AssetError
         There is nothing in it.
     """
-    found = guess(nodes)
+    found = _guess_within_domes(nodes, naming)
     taken_up, taken_scale = up or found.up, scale or found.scale
     place = Place.of(nodes, taken_up, taken_scale, naming)
     naming = naming or Naming()
@@ -139,13 +152,13 @@ def contents(
     rows = []
     for body, label, closed in largest[:_SHOWN]:
         called = naming.called(body.name).category.replace("_", " ")
-        ranges = [
-            f"{a:.1f} to {b:.1f}" for a, b in zip(body.vertices.min(axis=0), body.vertices.max(axis=0), strict=True)
-        ]
+        west, east = body.vertices.min(axis=0) + 0.0, body.vertices.max(axis=0) + 0.0  # no minus before a zero
+        ranges = [f"{a:.1f} to {b:.1f}" for a, b in zip(west, east, strict=True)]
         cells = [called[:20] or "-", f"{len(body.faces):,}", f"{int(label.max()) + 1:,}", f"{closed.mean():.0%}"]
         rows.append((body.name[:24] or "-", [*cells, *ranges]))
     heads = [Column("called", words=True), *map(Column, ("triangles", "pieces", "closed", "x, m", "y, m", "z, m"))]
     lines += ["", *TextTable("node", heads, rows).lines(width)]
-    if len(largest) > _SHOWN:
-        lines.append(f"and {len(largest) - _SHOWN:,} smaller nodes")
+    rest = len(largest) - _SHOWN
+    if rest > 0:
+        lines.append(f"and {rest:,} smaller node{'s' if rest > 1 else ''}")
     return lines
