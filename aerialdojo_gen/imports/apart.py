@@ -26,7 +26,7 @@ _CELL_M = 1.0
 _MOST_CELLS = 4_000_000
 # Openings by windows of these many cells take away what is narrower: Zhang et al. 2003, progressive.
 _WINDOWS = (3, 5, 9, 17, 33, 65)
-_SLOPE, _STEP_M, _HIGHEST_STEP_M = 0.35, 0.4, 3.0
+_SLOPE, _STEP_M, _HIGHEST_STEP_M, _HOUSE_M = 0.35, 0.4, 3.0, 35.0
 _ABOVE_M = 0.4
 # What stands out of the ground is a thing if it is so high, covers so much, and has walls.
 _THING_M, _THING_M2, _WALLS, _STEEP = 1.2, 2.0, 0.2, 0.6
@@ -198,7 +198,9 @@ def _floor(body: RawNode) -> tuple[Floats, Plan]:
         if window > min(plan.shape):
             break
         opened = scipy.ndimage.grey_opening(surface, size=(window, window), mode="nearest")
-        step_m = min(_STEP_M + _SLOPE * (window - before) * step, _HIGHEST_STEP_M)
+        step_m = _STEP_M + _SLOPE * (window - before) * step
+        # A house of a storey is no hill; what is wider than a house may be one.
+        step_m = min(step_m, _HIGHEST_STEP_M) if window * step < _HOUSE_M else step_m
         surface = np.where(surface - opened > step_m, opened, surface)
         before = window
     return surface, plan
