@@ -27,13 +27,18 @@ _STEP_M = 0.5
 _MOST_NODES = 1_000_000
 
 
-@check("anchors", needs=("mesh",))
+# What is in a wall, or below ground, is told as that.
+@check("anchors", needs=("mesh",), after=("anchor_surface", "anchor_clearance", "anchor_below_ground"))
 def anchor_shut_in(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """From an anchor there is a free way to the open sky."""
     yield from _shut_in(data, rows.floats("x_m", "y_m", "z_m"))
 
 
-@check("routes", needs=("mesh",), after=("list_lengths_differ", "out_of_bounds"))
+@check(
+    "routes",
+    needs=("mesh",),
+    after=("list_lengths_differ", "out_of_bounds", "start_anchor", "route_collision", "route_below_ground"),
+)
 def route_shut_in(data: SceneData, _rows: Rows) -> Iterator[Finding]:
     """From a route's start, and so from all of it, there is a free way to the open sky."""
     paths = data.paths
@@ -56,7 +61,7 @@ def _have_a_way(data: SceneData, places: Floats) -> Mask:
     if not free.all() and len(data.paths.rows):
         free[~free] = _by_routes(data, rays, places[~free])
     if not free.all():
-        free[~free] = _over_lattice(rays, scene_mesh(data).scene.bounds, places[~free])
+        free[~free] = over_lattice(rays, scene_mesh(data).scene.bounds, places[~free])
     return free
 
 
@@ -92,8 +97,22 @@ def _by_routes(data: SceneData, rays: RayCaster, places: Floats) -> Mask:
     return found
 
 
-def _over_lattice(rays: RayCaster, bounds: Floats, places: Floats) -> Mask:
-    """Whether places see a lattice point that hangs together, by points that see each other, with one in the open."""
+def over_lattice(rays: RayCaster, bounds: Floats, places: Floats) -> Mask:
+    """Whether places see a lattice point that hangs together, by points that see each other, with one in the open.
+
+    Parameters
+    ----------
+    rays : RayCaster
+        Of the scene.
+    bounds : (2, 3) float64
+        The flight volume, metres.
+    places : (n, 3) float64
+        Metres.
+
+    Returns
+    -------
+    (n,) bool
+    """
     size = bounds[1] - bounds[0]
     step = max(_STEP_M, float(np.prod(size) / _MOST_NODES) ** (1 / 3))
     shape = np.maximum(1, (size / step).astype(np.int64))
