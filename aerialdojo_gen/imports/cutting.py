@@ -112,7 +112,7 @@ def cut(vertices: Floats, faces: Ints, region: Region) -> Pieces:
     own = closed[body][:, None]
     low = np.where(own, low[body], corners[:, :, :2].min(axis=1))
     high = np.where(own, high[body], corners[:, :, :2].max(axis=1))
-    touched = (low <= region.high).all(axis=1) & (high >= region.low).all(axis=1)
+    touched = np.asarray((low <= region.high).all(axis=1) & (high >= region.low).all(axis=1))
     pieces = _some(pieces, touched)
     for normal, offset in region.planes:
         pieces = _halved(pieces, body, closed, normal, offset)

@@ -62,8 +62,8 @@ def read_mesh(path: Path, max_memory_bytes: int = MAX_MEMORY_BYTES) -> list[RawN
         raise AssetError(f"{path}: {error.strerror}") from None
     if size > MAX_FILE_BYTES:
         raise AssetError(f"{path}: {size >> 20} MiB, the most is {MAX_FILE_BYTES >> 20}: simplify or split the mesh")
-    if said := _unlike(path):
-        raise AssetError(f"{path}: {said}")
+    if unlike := _unlike(path):
+        raise AssetError(f"{path}: {unlike}")
     with scratch_folder() as folder:
         out = folder / "nodes.npz"
         # Not multiprocessing, which would run a caller's unguarded script a second time.

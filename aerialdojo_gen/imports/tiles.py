@@ -82,7 +82,7 @@ def tiles_of(
         for column in range(columns):
             corner = low[:2] + edge_m * np.array([column, row])
             region = Region.box(*corner, *(corner + edge_m))
-            near = (boxes[:, 0] < region.high).all(axis=1) & (boxes[:, 1] > region.low).all(axis=1)
+            near = np.asarray((boxes[:, 0] < region.high).all(axis=1) & (boxes[:, 1] > region.low).all(axis=1))
             part = Place([b for b, n in zip(place.bodies, near, strict=True) if n], place.domes, place.repairs)
             if not near.any() or not _holds_something(part, region, edge_m):
                 continue

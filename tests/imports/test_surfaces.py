@@ -59,7 +59,9 @@ def test_a_dome_is_drawn_and_never_in_the_way(kind, name, tmp_path):
     ]
     assert [i.surface for i in again.instances] == [i.surface for i in scene.instances]
     assert ClearanceGrid.build(again).reachable([0.0, 8.0, 3.0])
-    assert CollisionWorld(again).distance_m([0.0, 8.0, 3.0]) == CollisionWorld(plain_scene).distance_m([0.0, 8.0, 3.0])
+    assert CollisionWorld(again).distance_m([0.0, 8.0, 3.0]) == CollisionWorld(plain_scene).distance_m(
+        [0.0, 8.0, 3.0]
+    )
 
 
 def test_what_encloses_and_is_no_sky_stays():
