@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import scipy.ndimage
@@ -97,11 +97,15 @@ def taken_apart(bodies: Sequence[RawNode]) -> tuple[list[RawNode], Apart]:
             out.append(body)
             continue
         told.soups.append(body.name if len(bodies) > 1 else "")
+        if len(bodies) == 1 and len(pieces) > 1:
+            # What a file calls all that it holds is no name of a thing in it.
+            pieces = [replace(piece, name="") for piece in pieces]
         told.pieces += len(pieces)
         grounds, things = [], []
         for piece in pieces:
             if _bears(piece, low, high):
                 ground, grown = _ground_and_things(piece)
+                grown = [replace(thing, name="") for thing in grown]
                 told.grown += len(grown)
                 grounds += [ground] if len(ground.faces) else []
                 things += grown

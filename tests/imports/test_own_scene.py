@@ -191,12 +191,11 @@ def test_drafts_are_true_or_silent(place, capsys):
 
 def test_what_cannot_be_told_apart_says_with_what_it_is_confused(project):
     crates = [(f"Crate.{k}", box(2, 2, 2), (60.0 + 2.4 * (k % 3), 2.4 * (k // 3), 1.0)) for k in range(9)]
-    scene = yard(("Tower", box(5, 5, 20), (0, 0, 10)), *crates)
-    nodes = [
-        RawNode(name, np.asarray(body.vertices), np.asarray(body.faces, np.int64), plain(len(body.faces)))
-        for name, body in scene.geometry.items()
-    ]
-    adopted, _ = adopt("Stack", [node.placed(node.vertices) for node in nodes])
+    nodes = []
+    for name, body, place in (("Tower", box(5, 5, 20), (0, 0, 10)), *crates):
+        faces = np.asarray(body.faces, np.int64)
+        nodes.append(RawNode(name, np.asarray(body.vertices) + place, faces, plain(len(faces))))
+    adopted, _ = adopt("Stack", nodes)
     vocabulary = Vocabulary(dataclasses.replace(adopted, imported=True), load_catalogue(project / "scene_assets"))
     drafter = Drafter(vocabulary, choose_landmarks(vocabulary, 1), 0, Choice(most=30))
     made = drafter.objects(9)
