@@ -36,6 +36,8 @@ NOT_RUN = {
     r"(annotate|view) .*": "serves until Ctrl-C: tests/annotate/test_annotate_tool_browser.py, "
     "tests/view/test_view_page.py",
     r"run my-scenes/.*": "runs in tests/imports/test_own_scene.py",
+    r"add-scene \S+ (odm_|city\.).*": "reads a scan, a city: tests/imports/test_cuts.py and "
+    "tests/imports/test_surfaces.py make some",
     r"evaluate --preset .*": "asks a language model: tests/llm/test_llm_evaluate.py does, of a server of its own",
     r"vllm .*|docker .*|helm .*|kubectl .*": "needs what is not of this project",
     r".*(s3://|AWS_).*": "needs an object store: tests/store/test_readers_on_s3.py has one",

@@ -25,6 +25,7 @@ from aerialdojo_gen.scenes.model import Instance, Scene
 _ALOFT_M = 3.0
 MOST = 5
 SCENERY = "of ground, slabs or scraps"
+_SHOWN = 3
 _ALIKE = "without anything to tell them from others of their kind"
 _NOWHERE = "in no direction of a landmark, or outside the bounds"
 
@@ -129,6 +130,8 @@ class Drafter:
         Indices of what may become an object before anything is looked at closely: what is no landmark and no ground.
     refused : Counter of str
         How many of those were looked at and not taken, by why.
+    confused : list of (str, sequence of str)
+        Nodes of what could not be told apart, and the nodes that what can be said of them fits as well.
     """
 
     def __init__(self, vocabulary: Vocabulary, marks: tuple[Landmark, ...], seed: int, choice: Choice) -> None:
@@ -136,6 +139,7 @@ class Drafter:
         self._kinds, self._nouns = vocabulary.kinds, vocabulary.nouns
         self.marks = marks
         self.refused: Counter[str] = Counter()
+        self.confused: list[tuple[str, Sequence[str]]] = []
         self._teller = Teller(vocabulary, marks, seed)
         ambiguity = self._teller.ambiguity
         wanted = [k for k, w in enumerate(vocabulary.words) if w.target and k not in ambiguity.landmarks]
@@ -150,8 +154,19 @@ class Drafter:
 
     def why_not(self) -> str:
         """Say what was not taken, and why: ``"; not taken: 7 ..., 2 ..."``; empty where all were."""
-        said = ", ".join(f"{n:,} {why}" for why, n in self.refused.most_common() if n)
+        said = ", ".join(f"{n:,} {why}{self._with(why)}" for why, n in self.refused.most_common() if n)
         return f"; not taken: {said}" if said else ""
+
+    def _with(self, why: str) -> str:
+        """Say with what the first of what could not be told apart were confused."""
+        if why != _ALIKE:
+            return ""
+        pairs = [(node, others) for node, others in self.confused if others][:_SHOWN]
+        said = "; ".join(
+            f"{node} with {others[0]}{f' and {len(others) - 1:,} more' if len(others) > 1 else ''}"
+            for node, others in pairs
+        )
+        return f" ({said})" if said else ""
 
     def objects(self, n: int) -> tuple[Object, ...]:
         """Choose and describe up to `n` objects, a category at a time in turn."""
@@ -252,4 +267,9 @@ class Drafter:
         if why:
             return why, ""
         text = self._teller.describe(i, set(taken.values())) if self._teller.sound(i, self._nouns[i].short) else None
-        return (_ALIKE, "") if text is None else ("", text)
+        if text is not None:
+            return "", text
+        noun = self._nouns[i]
+        rivals = self._teller.ambiguity.rivals(i, f"Look for {noun.a()}.")
+        self.confused.append((instance.node, [self._scene.instances[j].node for j in rivals]))
+        return _ALIKE, ""

@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from aerialdojo_gen.commands.common import Data, PipelineFile, Quiet, Scene, open_pipeline
 from aerialdojo_gen.common import advice
+from aerialdojo_gen.common.text_table import terminal_width
+from aerialdojo_gen.errors import UsageError
+
+if TYPE_CHECKING:
+    from aerialdojo_gen.imports.command import Added
 
 app = typer.Typer()
 
@@ -24,12 +29,20 @@ def _number_or_auto(value: str | None) -> str | None:
 def add_scene(
     name: Annotated[str, typer.Argument(help="Name of the scene; the suffix _1 makes it out-of-distribution.")],
     mesh: Annotated[Path, typer.Argument(help="GLB, OBJ, STL, PLY or 3DS file.")],
-    up: Annotated[str, typer.Option(help="The mesh's axis that points up: z or y.")],
-    scale: Annotated[float, typer.Option(help="Metres a unit of the mesh: 0.01 for centimetres.")] = 1.0,
+    up: Annotated[str | None, typer.Option(help="The mesh's axis that points up: z or y.")] = None,
+    scale: Annotated[
+        float | None, typer.Option(help="Metres a unit of the mesh: 0.01 for centimetres.  (default: 1)")
+    ] = None,
     annotations: Annotated[Path | None, typer.Option(help="Annotation file to go with it.")] = None,
     project: Annotated[Path, typer.Option(help="Folder for your scenes and their pipeline.")] = Path("my-scenes"),
     crop: Annotated[
         tuple[float, float, float] | None, typer.Option(help="Keep a circle: x y radius, metres.")
+    ] = None,
+    box: Annotated[
+        tuple[float, float, float, float] | None, typer.Option(help="Keep a rectangle: x0 y0 x1 y1, metres.")
+    ] = None,
+    tiles: Annotated[
+        float | None, typer.Option(help="Make a scene of every square of this edge, metres, in one frame.")
     ] = None,
     ceiling: Annotated[
         float | None, typer.Option(help="Highest z to fly at, metres.  (default: 6 m over all)")
@@ -38,32 +51,43 @@ def add_scene(
         Path | None, typer.Option(help="CSV of what nodes are called: pattern,name,category,plural.")
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace a scene of this name.")] = False,
+    show: Annotated[
+        bool, typer.Option("--list", help="Say what the file holds, and guess its axis and scale; write nothing.")
+    ] = False,
 ) -> None:
     """Make a scene of a mesh of your own."""
     from aerialdojo_gen.imports import command
 
-    added = command.add_scene(
-        name,
-        mesh,
-        project,
-        up=up,
-        scale=scale,
-        annotations=annotations,
-        crop_m=crop,
-        ceiling_m=ceiling,
-        names=names,
-        force=force,
-    )
-    size = added.scene.bounds[1] - added.scene.bounds[0]
+    if show:
+        print("\n".join(command.list_mesh(mesh, up=up, scale=scale, names=names, width=terminal_width())))
+        return
+    if up is None:
+        raise UsageError(f"--up is missing: z or y; {advice.command('add-scene', name, mesh, '--list')} guesses it")
+    if tiles is not None and annotations is not None:
+        raise UsageError("--annotations are of one scene, --tiles make several: leave one of them out")
+    cut: dict[str, Any] = {"crop_m": crop, "box_m": box, "ceiling_m": ceiling, "names": names, "force": force}
+    scale = 1.0 if scale is None else scale
+    if tiles is not None:
+        made = command.add_tiles(name, mesh, project, tiles, up=up, scale=scale, watch=_told, **cut)
+        print(f"{len(made):,} scenes in one frame")
+    else:
+        made = [command.add_scene(name, mesh, project, up=up, scale=scale, annotations=annotations, **cut)]
+        _told(made[0])
+    first = next((added for added in made if not added.annotations.exists()), None)
+    if first is not None:
+        print(f"next: {advice.command('annotate-draft', first.scene.name, pipeline=first.pipeline)}")
+    print(f"then: {advice.command('run', made[0].pipeline, data=project / 'data')}")
+
+
+def _told(added: Added) -> None:
+    scene = added.scene
+    size = scene.bounds[1] - scene.bounds[0]
     print(
-        f"{name}: {len(added.scene.instances):,} instances, {added.scene.n_triangles:,} triangles, "
-        f"{size[0]:.0f} x {size[1]:.0f} m, ceiling {added.scene.ceiling_m:.0f} m"
+        f"{scene.name}: {len(scene.instances):,} instances, {scene.n_triangles:,} triangles, "
+        f"{size[0]:.0f} x {size[1]:.0f} m, ceiling {scene.ceiling_m:.0f} m"
     )
     for line in added.repairs.lines:
         print(f"  {line}")
-    if not added.annotations.exists():
-        print(f"next: {advice.command('annotate-draft', name, pipeline=added.pipeline)}")
-    print(f"then: {advice.command('run', added.pipeline, data=project / 'data')}")
 
 
 @app.command("annotate-draft")

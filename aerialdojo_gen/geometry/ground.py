@@ -53,11 +53,14 @@ class Ground:
         Edges that one triangle alone has: their two ends, and that triangle's third corner.
     bare : (k, 2) float64
         Where in the plan of the flight volume nothing of the scene lies, nor half a metre north and east, metres.
+    nodes : frozenset of str
+        The things that triangles of it belong to.
     """
 
     triangles: Floats
     rim: Floats
     bare: Floats
+    nodes: frozenset[str] = frozenset()
 
     @classmethod
     def of(cls, scene: Things, radius_m: float | None = None) -> Ground | None:
@@ -86,6 +89,9 @@ class Ground:
         inside = [i for i in scene.instances if _reaches(i.bounds, low, high)]
         if not inside:
             return None
+        told = any(i.surface for i in inside)
+        if told and not any(i.surface == "ground" for i in inside):
+            return None
         own = [i.vertices[i.faces] for i in inside]
         lowest = lowest_of(np.concatenate(own).reshape(-1, 9), plan)
         empty = np.isnan(lowest)
@@ -93,17 +99,26 @@ class Ground:
         bare = plan.places(empty[:-1, :-1] & empty[1:, :-1] & empty[:-1, 1:] & empty[1:, 1:])
         if radius_m is not None and not _within(bare, low, high, radius_m):
             return None
-        large = [k for k, i in enumerate(inside) if np.prod(np.ptp(i.bounds[:, :2], axis=0)) >= _LEAST_AREA_M2]
+        large = [
+            k
+            for k, i in enumerate(inside)
+            if np.prod(np.ptp(i.bounds[:, :2], axis=0)) >= _LEAST_AREA_M2 and i.surface in ("", "ground")
+        ]
         if not large:
             return None
-        faces, corners = _welded(np.concatenate([own[k] for k in large]))
+        faces, corners, rows = _welded(np.concatenate([own[k] for k in large]))
+        owner = np.repeat(large, [len(own[k]) for k in large])[rows]
         body = _bodies(faces, len(corners))
         order = np.argsort(body, kind="stable")
-        faces, body = faces[order], body[order]
+        faces, body, owner = faces[order], body[order], owner[order]
         triangles = corners[faces].reshape(-1, 9)
         n = int(body[-1]) + 1 if len(body) else 0
         covered, single, bottom = shares_of(triangles, body, n, lowest, plan)
         up, area = _areas(triangles)
+        if told:
+            known = _has_rim(faces, body, n)[body]
+            names = frozenset(inside[k].node for k in np.unique(owner[known]))
+            return cls(triangles[known], _rim(faces[known], corners), bare, names) if known.any() else None
         level = np.bincount(body, up, n) >= _LEVEL * np.bincount(body, area, n)
         all_columns = int(np.isfinite(lowest).sum())
         is_ground = (
@@ -117,7 +132,8 @@ class Ground:
         sheet = triangles[chosen]
         if not len(sheet) or np.isfinite(lowest_of(sheet, plan)).sum() < _COVER * all_columns:
             return None
-        return cls(sheet, _rim(faces[chosen], corners), bare)
+        names = frozenset(inside[k].node for k in np.unique(owner[chosen]))
+        return cls(sheet, _rim(faces[chosen], corners), bare, names)
 
     @cached_property
     def _columns(self) -> ColumnIndex:
@@ -200,17 +216,18 @@ def _reaches(bounds: Floats, low: Floats, high: Floats) -> bool:
     )
 
 
-def _welded(triangles: Floats) -> tuple[Ints, Floats]:
-    """Give triangles (n, 3, 3) common corners: faces (m, 3) without doubles and slivers, and corners (k, 3)."""
+def _welded(triangles: Floats) -> tuple[Ints, Floats, Ints]:
+    """Give triangles (n, 3, 3) common corners: faces (m, 3), no doubles or slivers, corners (k, 3), rows (m,)."""
     points = triangles.reshape(-1, 3)
     cells = np.round((points - points.min(axis=0)) / _WELD_M).astype(np.int64)
     same = _numbered(*cells.T)
     _, first = np.unique(same, return_index=True)
     faces = same.reshape(-1, 3)
-    faces = faces[(faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])]
+    rows = np.flatnonzero((faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0]))
     # An open surface of an import is there twice, once from each side.
-    _, once = np.unique(_numbered(*np.sort(faces, axis=1).T), return_index=True)
-    return faces[np.sort(once)], points[first]
+    _, once = np.unique(_numbered(*np.sort(faces[rows], axis=1).T), return_index=True)
+    rows = rows[np.sort(once)]
+    return faces[rows], points[first], rows
 
 
 def _numbered(*columns: Ints) -> Ints:

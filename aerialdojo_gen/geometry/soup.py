@@ -32,6 +32,10 @@ class Thing(Body, Protocol):
     def bounds(self) -> NDArray[np.float64]:
         """Axis-aligned box, (2, 3) float64, metres, world frame: lower corner, upper corner."""
 
+    @property
+    def surface(self) -> str:
+        """What its surface is known to be, ``"ground"`` for one; empty where that is not known."""
+
 
 class Things(Protocol):
     """Things and the volume that a drone may fly in among them, as `aerialdojo_gen.scenes.model.Scene` is."""

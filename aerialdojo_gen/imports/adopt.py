@@ -4,19 +4,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import shapely
 import trimesh
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from aerialdojo_gen.annotations.describing import UNKNOWN
 from aerialdojo_gen.errors import AssetError
+from aerialdojo_gen.imports.apart import taken_apart
+from aerialdojo_gen.imports.cutting import Region, bodies_of
 from aerialdojo_gen.imports.naming import Naming
-from aerialdojo_gen.imports.raw import RawNode, in_place_order, joined
+from aerialdojo_gen.imports.raw import RawNode, cut_to, in_place_order, joined
+from aerialdojo_gen.imports.surfaces import SKY, decided, domes_of, told
 from aerialdojo_gen.scenes.catalogue import single
 from aerialdojo_gen.scenes.mesh import areas
 from aerialdojo_gen.scenes.model import Instance, Material, Part, Scene
@@ -32,7 +33,6 @@ _HEADROOM_M = 6.0
 _LOWEST_CEILING_M = 12.0
 _GROUND_COVER = 0.97
 _CLUTTER_M = 0.5
-_REACH_M = 0.3
 _MOST_INSTANCES = 3000
 _LEAST_AREA_M2 = 1e-9
 _WELD_M = 1e-4
@@ -41,14 +41,89 @@ _GROUND = (122, 132, 108)
 
 @dataclass
 class Repairs:
-    """What was found wrong and how it was mended, for the user to read."""
+    """What was found and how it was mended, for the user to read.
+
+    Attributes
+    ----------
+    lines : list of str
+    origin_m : (x, y, z)
+        Where the scene's origin lies in the file's axes, after `up` and `scale`, metres.
+    """
 
     lines: list[str] = field(default_factory=list)
+    origin_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     def add(self, n: int, text: str) -> None:
         """Note a repair of n things, if there were any."""
         if n:
             self.lines.append(f"{n:,} {text}")
+
+
+@dataclass(frozen=True, eq=False)
+class Place:
+    """A foreign mesh in metres, z up, mended, before any of it is cut away.
+
+    Attributes
+    ----------
+    bodies, domes : list of RawNode
+        What stands there, and the skies around it; in the order of their places.
+    repairs : Repairs
+        What was mended.
+    """
+
+    bodies: list[RawNode]
+    domes: list[RawNode]
+    repairs: Repairs
+
+    @classmethod
+    def of(cls, nodes: Sequence[RawNode], up: str, scale: float, naming: Naming | None = None) -> Place:
+        """Turn, scale and mend the nodes of a file; errors as of `adopt`."""
+        if up not in ("y", "z"):
+            raise AssetError(f"--up {up!r}: a mesh's up axis is y or z")
+        if not (math.isfinite(scale) and scale > 0):
+            raise AssetError(f"--scale {scale}: must be a number above 0")
+        repairs = Repairs()
+        bodies = [b for node in nodes for b in [_sound(_turned(node, up, scale), repairs)] if len(b.faces)]
+        if not bodies:
+            raise AssetError("no triangle is left after repair: the mesh is empty or degenerate")
+        # Lines of repairs, too, must not depend on the order in which a reader gives the nodes.
+        repairs.lines.sort()
+        bodies = in_place_order(bodies)
+        called = [naming.told(b.name).category if naming else "" for b in bodies]
+        domes = domes_of(bodies, called)
+        rest = [b for k, b in enumerate(bodies) if k not in domes]
+        return cls(rest, [bodies[k] for k in domes], repairs)
+
+    @property
+    def low(self) -> Floats:
+        """Lower corner of what stands there, (3,) float64, metres."""
+        return _bounds(self.bodies)[0]
+
+    @property
+    def high(self) -> Floats:
+        """Upper corner, (3,) float64, metres."""
+        return _bounds(self.bodies)[1]
+
+    def within(self, region: Region) -> Place:
+        """Cut away what lies outside a region; AssetError where nothing is left, with what lies where."""
+        cut = [_sound(cut_to(b, region), Repairs()) for b in self.bodies]
+        kept = [b for b in cut if len(b.faces)]
+        if not kept:
+            raise AssetError(f"{region.said}: nothing of the mesh lies there: {lies(self.bodies)}")
+        return Place(kept, self.domes, self.repairs)
+
+
+def lies(bodies: Sequence[RawNode]) -> str:
+    """Say the ranges of x and y of bodies, and about where most of their triangles lie."""
+    low, high = _bounds(bodies)
+    middles = np.concatenate([b.vertices[b.faces].mean(axis=1)[:, :2] for b in bodies])
+    cell = max(float((high - low)[:2].max()) / 10, 1e-9)
+    places, n = np.unique(np.floor((middles - low[:2]) / cell).astype(np.int64), axis=0, return_counts=True)
+    x, y = low[:2] + (places[np.argmax(n)] + 0.5) * cell
+    return (
+        f"x is {low[0]:.7g} to {high[0]:.7g}, y {low[1]:.7g} to {high[1]:.7g} m, and most triangles "
+        f"({int(n.max()):,} of {len(middles):,}) lie about x {x:.0f}, y {y:.0f}"
+    )
 
 
 def adopt(
@@ -58,6 +133,7 @@ def adopt(
     up: str = "z",
     scale: float = 1.0,
     crop_m: tuple[float, float, float] | None = None,
+    box_m: tuple[float, float, float, float] | None = None,
     ceiling_m: float | None = None,
     naming: Naming | None = None,
 ) -> tuple[Scene, Repairs]:
@@ -74,17 +150,21 @@ def adopt(
     scale : float
         Metres a unit of the file: 0.01 for centimetres.
     crop_m : (x, y, radius), optional
-        Keep what has its middle within a circle, metres, in the file's axes after `up` and `scale`.
+        Keep what lies within a circle, metres, in the file's axes after `up` and `scale`. Triangles are cut at its
+        border, and closed bodies closed there again.
+    box_m : (x0, y0, x1, y1), optional
+        The same, of a rectangle.
     ceiling_m : float, optional
-        Highest z that a drone may fly at; 6 m above the highest point, at least 12 m, where absent.
+        Highest z that a drone may fly at; 6 m above the highest point, at least 12 m above the lowest, where absent.
     naming : Naming, optional
         What nodes are called; the words in their names where absent.
 
     Returns
     -------
     Scene
-        Its origin is the middle of the mesh at the ground. Nodes of the file are its instances; a file without them
-        is taken apart into connected components. Surfaces that are not closed are there from both sides.
+        Its origin is the middle of the mesh at the ground. Nodes of the file are its instances; soups are taken apart
+        (`aerialdojo_gen.imports.apart`). Surfaces that are not closed are there from both sides; which of them are
+        the ground is decided (`aerialdojo_gen.imports.surfaces`), and sky domes are its backdrop.
     Repairs
         What had to be mended.
 
@@ -93,57 +173,126 @@ def adopt(
     AssetError
         Nothing is left to build from, or the extent cannot be metres.
     """
-    if up not in ("y", "z"):
-        raise AssetError(f"--up {up!r}: a mesh's up axis is y or z")
-    if not (math.isfinite(scale) and scale > 0):
-        raise AssetError(f"--scale {scale}: must be a number above 0")
-    repairs = Repairs()
-    bodies = [b for node in nodes for b in [_sound(_turned(node, up, scale), repairs)] if len(b.faces)]
-    if not bodies:
-        raise AssetError("no triangle is left after repair: the mesh is empty or degenerate")
-    bodies = in_place_order(_instances(bodies))
+    place = Place.of(nodes, up, scale, naming)
+    return settled(name, place, region_of(crop_m, box_m), ceiling_m=ceiling_m, naming=naming)
+
+
+def region_of(
+    crop_m: tuple[float, float, float] | None, box_m: tuple[float, float, float, float] | None
+) -> Region | None:
+    """Return the part that is kept; AssetError for two of them, or one without an area."""
+    if crop_m is not None and box_m is not None:
+        raise AssetError("--crop and --box both say what to keep: give one of them")
+    numbers = crop_m or box_m or ()
+    if not all(math.isfinite(v) and abs(v) < 1e7 for v in numbers):
+        raise AssetError("--crop and --box take numbers of metres")
     if crop_m is not None:
-        x, y, radius = crop_m
-        bodies = [b for b in bodies if math.hypot(*(_middle(b)[:2] - (x, y))) <= radius]
-        if not bodies:
-            raise AssetError(f"--crop {x:g} {y:g} {radius:g}: nothing of the mesh lies there")
-    low, high = _bounds(bodies)
-    _check_extent(high - low)
-    shift = np.array([(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, low[2]])
-    bodies = _merged_clutter([RawNode(b.name, b.vertices - shift, b.faces, b.colours) for b in bodies])
+        if crop_m[2] <= 0:
+            raise AssetError(f"--crop {crop_m[0]:g} {crop_m[1]:g} {crop_m[2]:g}: the radius must be above 0")
+        return Region.circle(*crop_m)
+    if box_m is not None:
+        if box_m[0] == box_m[2] or box_m[1] == box_m[3]:
+            raise AssetError("--box X0 Y0 X1 Y1: the two corners must differ in x and in y")
+        return Region.box(*box_m)
+    return None
+
+
+def settled(
+    name: str,
+    place: Place,
+    region: Region | None = None,
+    *,
+    ceiling_m: float | None = None,
+    naming: Naming | None = None,
+    origin_m: Floats | None = None,
+) -> tuple[Scene, Repairs]:
+    """Make a scene of a place, or of a part of one.
+
+    Parameters
+    ----------
+    name : str
+        Name of the scene.
+    place : Place
+    region : Region, optional
+        The part to keep; the scene ends there for drones too.
+    ceiling_m, naming
+        As of `adopt`.
+    origin_m : (3,) float64, optional
+        Where in the place the scene's origin lies, metres; the middle of what is kept, at its lowest, where absent.
+
+    Returns
+    -------
+    Scene, Repairs
+        As of `adopt`.
+
+    Raises
+    ------
+    AssetError
+        As of `adopt`.
+    """
+    repairs = Repairs(list(place.repairs.lines))
+    part = place if region is None else place.within(region)
+    bodies = part.bodies
+    low, high = part.low, part.high
+    _check_extent(high - low, bodies)
+    bodies, apart = taken_apart(bodies)
+    repairs.lines += apart.lines()
+    shift = np.array([(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, low[2]]) if origin_m is None else origin_m
+    repairs.origin_m = (float(shift[0]), float(shift[1]), float(shift[2]))
+    bodies = _merged_clutter(_moved(in_place_order(bodies), -shift))
     parts: dict[str, Material] = {}
-    instances = _named([(b, _parts(b, parts, repairs)) for b in bodies], naming or Naming())
-    low, high = low - shift, high - shift
+    dressed = [(b, made) for b in bodies for made in [_parts(b, parts, repairs)] if made]
+    instances = _named(dressed, naming or Naming())
     if not instances:
         raise AssetError("no triangle is left after repair: the mesh is empty or degenerate")
+    instances = [
+        replace(instance, surface="solid" if bodies_of(body.faces, len(body.vertices))[1].all() else "sheet")
+        for instance, (body, _) in zip(instances, dressed, strict=True)
+    ]
+    called = {instance.node: body.name for instance, (body, _) in zip(instances, dressed, strict=True)}
+    backdrop = tuple(
+        Instance(f"{SKY}_{k:04d}", SKY, "", {}, _parts(dome, parts, Repairs()), surface="dome")
+        for k, dome in enumerate(_moved(part.domes, -shift))
+    )
+    low, high = low - shift, high - shift
     cover = _ground_cover(instances, low, high)
     if cover < _GROUND_COVER:
         instances.insert(0, _ground_plane(low, high, parts))
         repairs.lines.append(f"level ground laid under it (the mesh covers {cover:.0%} of its extent)")
-    top = max(float(high[2]) + _HEADROOM_M, _LOWEST_CEILING_M) if ceiling_m is None else ceiling_m
+    top = max(float(high[2]) + _HEADROOM_M, float(low[2]) + _LOWEST_CEILING_M) if ceiling_m is None else ceiling_m
     bounds = np.array(
-        [[low[0] - _MARGIN_M, low[1] - _MARGIN_M, 0.0], [high[0] + _MARGIN_M, high[1] + _MARGIN_M, top]]
+        [[low[0] - _MARGIN_M, low[1] - _MARGIN_M, low[2]], [high[0] + _MARGIN_M, high[1] + _MARGIN_M, top]]
     )
-    return Scene(name, tuple(instances), parts, bounds), repairs
+    if region is not None:
+        # What is cut open at the border is shut by the end of the flight volume.
+        bounds[0, :2] = np.maximum(bounds[0, :2], region.low - shift[:2])
+        bounds[1, :2] = np.minimum(bounds[1, :2], region.high - shift[:2])
+    scene = decided(Scene(name, tuple(instances), parts, bounds, imported=True, backdrop=backdrop), called)
+    repairs.lines += told(scene)
+    return replace(scene, imported=False), repairs
+
+
+def _moved(bodies: Sequence[RawNode], by_m: Floats) -> list[RawNode]:
+    return [b.placed(b.vertices + by_m) for b in bodies]
 
 
 def _turned(node: RawNode, up: str, scale: float) -> RawNode:
     v = node.vertices * scale
     if up == "y":
         v = np.column_stack([v[:, 0], -v[:, 2], v[:, 1]])
-    return RawNode(node.name, v, node.faces, node.colours)
+    return node.placed(v)
 
 
 def _sound(node: RawNode, repairs: Repairs) -> RawNode:
     """Drop faces that are no triangles of finite size; weld vertices, so that neighbours are known."""
-    faces, colours = node.faces, node.colours
+    faces = node.faces
     inside = ((faces >= 0) & (faces < len(node.vertices))).all(axis=1)
     finite = np.asarray(np.isfinite(node.vertices).all(axis=1) & (np.abs(node.vertices) < 1e7).all(axis=1))
     ok = np.array(inside)
     ok[inside] = finite[faces[inside]].all(axis=1)
     repairs.add(int((~ok).sum()), f"triangles of {node.name or 'the mesh'} with no place (NaN, infinite) dropped")
-    faces, colours = faces[ok], colours[ok]
-    used, faces = np.unique(faces, return_inverse=True)
+    node = node.some(ok)
+    used, faces = np.unique(node.faces, return_inverse=True)
     vertices = node.vertices[used]
     if len(vertices):
         _, first, same = np.unique(np.round(vertices / _WELD_M), axis=0, return_index=True, return_inverse=True)
@@ -151,54 +300,11 @@ def _sound(node: RawNode, repairs: Repairs) -> RawNode:
     faces = faces.reshape(-1, 3).astype(np.int64)
     solid = _areas(vertices, faces) > _LEAST_AREA_M2 if len(faces) else np.zeros(0, dtype=bool)
     repairs.add(int((~solid).sum()), f"triangles of {node.name or 'the mesh'} without area dropped")
-    return RawNode(node.name, vertices, faces[solid], colours[solid])
+    return node.placed(vertices, faces).some(solid)
 
 
 def _areas(vertices: Floats, faces: NDArray[np.int64]) -> Floats:
     return areas(vertices, faces.astype(np.int32))
-
-
-def _instances(bodies: list[RawNode]) -> list[RawNode]:
-    """The file's nodes; where it has one alone, its connected components."""
-    if len(bodies) > 1:
-        return bodies
-    body = bodies[0]
-    f, n = body.faces, len(body.vertices)
-    edges = coo_array((np.ones(2 * len(f)), (np.repeat(f[:, 0], 2), f[:, 1:].reshape(-1))), shape=(n, n))
-    _, labels = connected_components(edges, directed=False)
-    of_face = labels[f[:, 0]]
-    order = np.argsort(of_face, kind="stable")
-    starts = np.flatnonzero(np.diff(of_face[order], prepend=-1))
-    pieces = []
-    for rows in np.split(order, starts[1:]):
-        rows = np.sort(rows)
-        used, faces = np.unique(f[rows], return_inverse=True)
-        pieces.append(RawNode("", body.vertices[used], faces.reshape(-1, 3), body.colours[rows]))
-    return _gathered(pieces)
-
-
-def _gathered(pieces: list[RawNode]) -> list[RawNode]:
-    """Give what lies within the box of something larger to the smallest such thing: a roof has its tiles."""
-    low = np.array([p.vertices.min(axis=0) for p in pieces])
-    high = np.array([p.vertices.max(axis=0) for p in pieces])
-    size = np.linalg.norm(high - low, axis=1)
-    order = np.argsort(size, kind="stable")
-    owner = np.arange(len(pieces))
-    for rank, k in enumerate(order):
-        larger = order[rank + 1 :]
-        around = (low[larger] <= low[k] + _REACH_M).all(axis=1) & (high[larger] >= high[k] - _REACH_M).all(axis=1)
-        if around.any() and size[larger[np.argmax(around)]] > 1.5 * size[k]:
-            owner[k] = larger[np.argmax(around)]
-    for k in order[::-1]:
-        owner[k] = owner[owner[k]]
-    groups: dict[int, list[RawNode]] = {}
-    for k, piece in enumerate(pieces):
-        groups.setdefault(int(owner[k]), []).append(piece)
-    return [joined("", members) for _, members in sorted(groups.items())]
-
-
-def _middle(body: RawNode) -> Floats:
-    return np.asarray((body.vertices.min(axis=0) + body.vertices.max(axis=0)) / 2)
 
 
 def _bounds(bodies: Sequence[RawNode]) -> tuple[Floats, Floats]:
@@ -207,12 +313,13 @@ def _bounds(bodies: Sequence[RawNode]) -> tuple[Floats, Floats]:
     return low, high
 
 
-def _check_extent(size: Floats) -> None:
+def _check_extent(size: Floats, bodies: Sequence[RawNode]) -> None:
     wide = float(max(size[0], size[1]))
     text = f"the mesh is {size[0]:,.4g} by {size[1]:,.4g} by {size[2]:,.4g} m"
     if wide > LARGEST_M or math.prod(2 * (s + 2 * _MARGIN_M) for s in size) > _MOST_CELLS:
         raise AssetError(
-            f"{text}, too large to plan in: --scale 0.01 if it is in centimetres, --crop X Y RADIUS for a part"
+            f"{text}, too large to plan in: --scale 0.01 if it is in centimetres, --crop X Y RADIUS or "
+            f"--box X0 Y0 X1 Y1 for a part, --tiles 200 for all of it in parts; {lies(bodies)}"
         )
     if wide < SMALLEST_M:
         larger = 10 ** math.ceil(math.log10(SMALLEST_M / max(wide, 1e-9)))
@@ -338,6 +445,8 @@ def _ground_plane(low: Floats, high: Floats, materials: dict[str, Material]) -> 
     spec = "#{:02x}{:02x}{:02x}".format(*_GROUND)
     materials.setdefault(spec, Material(spec, _GROUND))
     # Just under the lowest point, where a floor of the mesh may lie.
-    vertices = single(np.array([[x0, y0, -0.02], [x1, y0, -0.02], [x1, y1, -0.02], [x0, y1, -0.02]]))
+    z = low[2] - 0.02
+    vertices = single(np.array([[x0, y0, z], [x1, y0, z], [x1, y1, z], [x0, y1, z]]))
     faces = np.array([[0, 1, 2], [0, 2, 3]], dtype=np.int32)
-    return Instance("ground", "ground", "", {}, (Part(vertices, faces, np.zeros((4, 2), dtype=np.float32), spec),))
+    part = Part(vertices, faces, np.zeros((4, 2), dtype=np.float32), spec)
+    return Instance("ground", "ground", "", {}, (part,), surface="sheet")

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
 from aerialdojo_gen.annotations.format import parse_annotations
 from aerialdojo_gen.errors import AnnotationError, AssetError, UsageError, brief
-from aerialdojo_gen.imports.adopt import Repairs, adopt
+from aerialdojo_gen.imports.adopt import Place, Repairs, adopt, region_of
 from aerialdojo_gen.imports.files import read_mesh
+from aerialdojo_gen.imports.listing import contents
 from aerialdojo_gen.imports.naming import read_names
+from aerialdojo_gen.imports.tiles import tile_name, tiles_of
 from aerialdojo_gen.pipeline.registry import STAGES
 from aerialdojo_gen.scenes.glb import write_glb
 from aerialdojo_gen.scenes.model import Scene
@@ -52,6 +56,7 @@ def add_scene(
     scale: float = 1.0,
     annotations: Path | None = None,
     crop_m: tuple[float, float, float] | None = None,
+    box_m: tuple[float, float, float, float] | None = None,
     ceiling_m: float | None = None,
     names: Path | None = None,
     force: bool = False,
@@ -76,7 +81,9 @@ def add_scene(
     annotations : Path, optional
         An annotation file to go with it.
     crop_m : (x, y, radius), optional
-        Keep a part, metres.
+        Keep a circle, metres, in the file's axes.
+    box_m : (x0, y0, x1, y1), optional
+        Keep a rectangle.
     ceiling_m : float, optional
         Highest z that a drone may fly at.
     names : Path, optional
@@ -97,25 +104,119 @@ def add_scene(
     AnnotationError
         The annotation file is of another scene or malformed.
     """
-    check_scene_name(name)
-    recipe = project / "scenes" / f"{name}.toml"
-    if recipe.exists() and not force:
-        raise UsageError(f"{recipe} exists: --force replaces the scene")
+    _check_free([name], project, force)
     naming = None if names is None else read_names(names)
     text = None if annotations is None else _annotations(annotations, name)
-    try:
+    with _naming_the_file(mesh):
+        region_of(crop_m, box_m)
         scene, repairs = adopt(
-            name, read_mesh(mesh), up=up, scale=scale, crop_m=crop_m, ceiling_m=ceiling_m, naming=naming
+            name, read_mesh(mesh), up=up, scale=scale, crop_m=crop_m, box_m=box_m, ceiling_m=ceiling_m, naming=naming
         )
+    kept = {"crop_m": crop_m, "box_m": box_m}
+    return _put(scene, repairs, project, _recipe(_digested(mesh), scene, repairs, up, scale, kept), text)
+
+
+def add_tiles(
+    name: str,
+    mesh: Path,
+    project: Path,
+    edge_m: float,
+    *,
+    up: str,
+    scale: float = 1.0,
+    crop_m: tuple[float, float, float] | None = None,
+    box_m: tuple[float, float, float, float] | None = None,
+    ceiling_m: float | None = None,
+    names: Path | None = None,
+    force: bool = False,
+    watch: Callable[[Added], None] = lambda added: None,
+) -> list[Added]:
+    """Make scenes of a large mesh, a square each, in one frame: their coordinates lie side by side.
+
+    Parameters
+    ----------
+    name : str
+        Of the whole; each scene's has its column from the west and its row from the south, ``"City-x0y2"``.
+    mesh, project, up, scale, crop_m, box_m, ceiling_m, names, force
+        As of `add_scene`; what is kept by `crop_m` or `box_m` is cut into squares.
+    edge_m : float
+        Edge of a square, metres.
+    watch : callable
+        Called with each scene once it is written.
+
+    Returns
+    -------
+    list of Added
+        West to east, south to north; squares that hold next to nothing are left out.
+
+    Raises
+    ------
+    UsageError, AssetError
+        As of `add_scene`; one of the scenes exists already: nothing is written then.
+    """
+    check_scene_name(tile_name(name, 99, 99))
+    naming = None if names is None else read_names(names)
+    with _naming_the_file(mesh):
+        region = region_of(crop_m, box_m)
+        place = Place.of(read_mesh(mesh), up, scale, naming)
+        if region is not None:
+            place = place.within(region)
+        # Every tile is made before one is written, so that what cannot be made leaves nothing behind.
+        tiles = list(tiles_of(name, place, edge_m, ceiling_m=ceiling_m, naming=naming))
+        if not tiles:
+            raise AssetError(f"--tiles {edge_m:g}: no tile of the mesh holds more than scraps")
+    _check_free([tile.name for tile in tiles], project, force)
+    digested, out = _digested(mesh), []
+    for tile in tiles:
+        (x0, y0), (x1, y1) = tile.region.low.tolist(), tile.region.high.tolist()
+        kept = {"crop_m": crop_m, "box_m": (x0, y0, x1, y1)}
+        recipe = _recipe(digested, tile.scene, tile.repairs, up, scale, kept)
+        out.append(_put(tile.scene, tile.repairs, project, recipe, None))
+        watch(out[-1])
+    return out
+
+
+def list_mesh(
+    mesh: Path,
+    *,
+    up: str | None = None,
+    scale: float | None = None,
+    names: Path | None = None,
+    width: int | None = None,
+) -> list[str]:
+    """Say what a mesh file holds, in lines for a terminal (`aerialdojo_gen.imports.listing.contents`)."""
+    naming = None if names is None else read_names(names)
+    with _naming_the_file(mesh):
+        return [f"{mesh.name}:", *contents(read_mesh(mesh), up=up, scale=scale, naming=naming, width=width)]
+
+
+def _check_free(names: Sequence[str], project: Path, force: bool) -> None:
+    for name in names:
+        check_scene_name(name)
+        recipe = project / "scenes" / f"{name}.toml"
+        if recipe.exists() and not force:
+            raise UsageError(f"{recipe} exists: --force replaces the scene")
+
+
+@contextmanager
+def _naming_the_file(mesh: Path) -> Iterator[None]:
+    """Put the file before what is wrong with it."""
+    try:
+        yield
     except AssetError as error:
         message = str(error)
         raise AssetError(message if message.startswith(str(mesh)) else f"{mesh}: {message}") from None
+
+
+def _put(scene: Scene, repairs: Repairs, project: Path, recipe: str, text: str | None) -> Added:
+    """Write a scene into a project, its recipe after its mesh, so that what is killed half-way is no scene."""
+    name = scene.name
     for folder in ("scenes", "annotations"):
         make_folder(project / folder)
     with atomic_file(project, f"scenes/{name}.glb") as path:
         write_glb(scene, path)
     with atomic_file(project, f"scenes/{name}.toml") as path:
-        path.write_text(_recipe(mesh, scene, up, scale, crop_m), encoding="utf-8")
+        path.write_text(recipe, encoding="utf-8")
     if text is not None:
         with atomic_file(project, f"annotations/{name}.json") as path:
             path.write_text(text, encoding="utf-8")
@@ -139,15 +240,27 @@ def _annotations(path: Path, name: str) -> str:
     return text
 
 
-def _recipe(mesh: Path, scene: Scene, up: str, scale: float, crop_m: tuple[float, float, float] | None) -> str:
+def _digested(mesh: Path) -> tuple[str, str]:
+    return mesh.name, hashlib.sha256(mesh.read_bytes()).hexdigest()
+
+
+def _recipe(
+    source: tuple[str, str],
+    scene: Scene,
+    repairs: Repairs,
+    up: str,
+    scale: float,
+    kept: Mapping[str, tuple[float, ...] | None],
+) -> str:
     lines = [
         "# Made by add-scene; the mesh lies beside this file, repaired, in metres.",
         "[imported]",
-        f"source = {json.dumps(mesh.name)}",
-        f'source_sha256 = "{hashlib.sha256(mesh.read_bytes()).hexdigest()}"',
+        f"source = {json.dumps(source[0])}",
+        f'source_sha256 = "{source[1]}"',
         f'up = "{up}"',
         f"scale = {scale}",
-        *([f"crop_m = {list(crop_m)}"] if crop_m else []),
+        *(f"{key} = {list(part)}" for key, part in kept.items() if part),
+        f"origin_m = {list(repairs.origin_m)}",
         f"ceiling_m = {scene.ceiling_m}",
         'sky = "#{:02x}{:02x}{:02x}"'.format(*scene.sky),
         f"sun = {list(scene.sun)}",

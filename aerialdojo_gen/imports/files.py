@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from aerialdojo_gen.common.bounded import loads_json
 from aerialdojo_gen.errors import AssetError
 from aerialdojo_gen.imports.raw import RawNode, joined, plain
+from aerialdojo_gen.imports.sniffing import mismatch
 from aerialdojo_gen.store.staging import scratch_folder
 
 SUFFIXES = (".glb", ".obj", ".stl", ".ply", ".3ds")
@@ -61,6 +62,8 @@ def read_mesh(path: Path, max_memory_bytes: int = MAX_MEMORY_BYTES) -> list[RawN
         raise AssetError(f"{path}: {error.strerror}") from None
     if size > MAX_FILE_BYTES:
         raise AssetError(f"{path}: {size >> 20} MiB, the most is {MAX_FILE_BYTES >> 20}: simplify or split the mesh")
+    if unlike := _unlike(path):
+        raise AssetError(f"{path}: {unlike}")
     with scratch_folder() as folder:
         out = folder / "nodes.npz"
         # Not multiprocessing, which would run a caller's unguarded script a second time.
@@ -73,6 +76,13 @@ def read_mesh(path: Path, max_memory_bytes: int = MAX_MEMORY_BYTES) -> list[RawN
             said = ended.stdout.strip().splitlines()
             raise AssetError(f"{path}: {said[-1] if said else 'its reader crashed: damaged, or too large'}")
         return unpacked(out)
+
+
+def _unlike(path: Path) -> str:
+    try:
+        return mismatch(path, SUFFIXES)
+    except OSError as error:
+        return str(error.strerror)
 
 
 def read_into(path: Path, out: Path) -> str:

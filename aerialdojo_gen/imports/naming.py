@@ -69,11 +69,13 @@ class Naming:
 
     def called(self, node: str) -> Called:
         """Say what a node of the file is called: by the table, else by the words in its name."""
-        for pattern, called in self.rows:
-            if fnmatchcase(node, pattern):
-                return called
+        told = self.told(node)
         words = words_in(node)
-        return _called(" ".join(words), "", "") if words else NOTHING
+        return told if told is not NOTHING else _called(" ".join(words), "", "") if words else NOTHING
+
+    def told(self, node: str) -> Called:
+        """Say what the table calls a node; `NOTHING` where it says nothing of it."""
+        return next((called for pattern, called in self.rows if fnmatchcase(node, pattern)), NOTHING)
 
 
 def words_in(node: str) -> list[str]:

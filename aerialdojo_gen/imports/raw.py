@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerialdojo_gen.geometry.soup import soup
+from aerialdojo_gen.imports.cutting import Region, cut
 
 GREY = (168, 164, 156)
 
@@ -34,6 +35,28 @@ class RawNode:
     vertices: NDArray[np.float64]
     faces: NDArray[np.int64]
     colours: NDArray[np.uint8]
+
+    def some(self, rows: NDArray[np.bool_] | NDArray[np.int64]) -> RawNode:
+        """Return the node with some of its faces alone, in the order given; vertices stay as they are."""
+        return RawNode(self.name, self.vertices, self.faces[rows], self.colours[rows])
+
+    def placed(self, vertices: NDArray[np.float64], faces: NDArray[np.int64] | None = None) -> RawNode:
+        """Return the node with other vertices, and where given with other indices into them, face by face."""
+        return RawNode(self.name, vertices, self.faces if faces is None else faces, self.colours)
+
+
+def some_of(body: RawNode, rows: NDArray[np.int64] | NDArray[np.bool_]) -> RawNode:
+    """Make a node of some faces of another, with the vertices that they need."""
+    used, faces = np.unique(body.faces[rows], return_inverse=True)
+    return body.some(rows).placed(body.vertices[used], faces.reshape(-1, 3))
+
+
+def cut_to(body: RawNode, region: Region) -> RawNode:
+    """Make a node of what of another lies within a region of the plan; without faces where nothing does."""
+    pieces = cut(body.vertices, body.faces, region)
+    n = len(pieces.source)
+    # What faces have comes from their source; what corners have is mixed by `pieces.weights`.
+    return body.some(pieces.source).placed(pieces.corners.reshape(-1, 3), np.arange(3 * n).reshape(n, 3))
 
 
 def plain(n: int) -> NDArray[np.uint8]:

@@ -44,11 +44,13 @@ def cut_out(scene: Scene, cuts: tuple[Cut, ...]) -> Scene:
             )
         kept: list[Instance] = []
         inside: list[Part] = []
+        surfaces: set[str] = set()
         for instance in instances:
             rest = []
             for part in instance.parts:
                 boxed = _in_box(part, cut)
                 inside += [_some(part, boxed)] if boxed.any() else []
+                surfaces |= {instance.surface} if boxed.any() else set()
                 rest += [part if not boxed.any() else _some(part, ~boxed)] if not boxed.all() else []
             if rest:
                 # What a cut takes faces from is no longer what its catalogue says.
@@ -57,10 +59,10 @@ def cut_out(scene: Scene, cuts: tuple[Cut, ...]) -> Scene:
         if not inside:
             raise AssetError(f"scene {scene.name}: the box {cut.node!r} holds no triangle's middle: make it larger")
         look = {"colour": colour_name(_colour(scene, inside))}
-        instances = [*kept, Instance(cut.node, cut.category, "", look, tuple(inside))]
-    return Scene(
-        scene.name, tuple(instances), scene.materials, scene.bounds, scene.sky, scene.sun, imported=scene.imported
-    )
+        # What was the ground, and all that stood on it in one piece, is nothing to fly below either.
+        surface = "ground" if "ground" in surfaces else "sheet" if surfaces - {""} else ""
+        instances = [*kept, Instance(cut.node, cut.category, "", look, tuple(inside), surface=surface)]
+    return replace(scene, instances=tuple(instances))
 
 
 def _in_box(part: Part, cut: Cut) -> NDArray[np.bool_]:

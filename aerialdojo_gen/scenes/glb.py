@@ -21,7 +21,7 @@ from aerialdojo_gen.common.bounded import loads_json
 from aerialdojo_gen.common.pictures import TEXTURE_PNG, decode_rgb, encode_png
 from aerialdojo_gen.errors import AssetError
 from aerialdojo_gen.scenes.anatomy import read_anatomy
-from aerialdojo_gen.scenes.model import Instance, Material, Part, Scene
+from aerialdojo_gen.scenes.model import SURFACES, Instance, Material, Part, Scene
 
 _MAGIC, _JSON, _BIN = b"glTF", 0x4E4F534A, 0x004E4942
 _FLOAT, _UINT16, _UINT32 = 5126, 5123, 5125
@@ -45,11 +45,12 @@ def write_glb(scene: Scene, path: Path) -> None:
         Written in place; callers that need atomicity write to a temporary name and rename.
     """
     writer = _Writer()
-    names = sorted({p.material for i in scene.instances for p in i.parts})
+    shown = (*scene.instances, *scene.backdrop)
+    names = sorted({p.material for i in shown for p in i.parts})
     for name in names:
         writer.material(scene.materials[name])
     index = {name: k for k, name in enumerate(names)}
-    for instance in scene.instances:
+    for instance in shown:
         writer.instance(instance, index)
     document = writer.document(scene)
     head = json.dumps(document, separators=(",", ":"), ensure_ascii=False, allow_nan=False).encode()
@@ -106,12 +107,13 @@ def read_glb(path: Path, sha256: str = "") -> Scene:
         )
         scene = Scene(
             name=extras["name"],
-            instances=instances,
+            instances=tuple(i for i in instances if i.surface != "dome"),
             materials={m.name: m for m in materials},
             bounds=np.array(extras["bounds_m"], dtype=np.float64),
             sky=tuple(extras["sky"]),
             sun=tuple(extras["sun"]),
             imported=bool(extras.get("imported", False)),
+            backdrop=tuple(i for i in instances if i.surface == "dome"),
         )
         _check(scene)
         return scene
@@ -163,6 +165,7 @@ class _Writer:
             "category": instance.category,
             "variant": instance.variant,
             "attributes": instance.attributes,
+            **({"surface": instance.surface} if instance.surface else {}),
             **({} if instance.anatomy is None else {"anatomy": instance.anatomy.document()}),
         }
         self._nodes.append({"name": instance.node, "mesh": len(self._meshes), "extras": extras})
@@ -233,8 +236,11 @@ def _check(scene: Scene) -> None:
     """Raise ValueError for values that no scene has: what reads as JSON may still say anything."""
     if not scene.instances:
         raise ValueError("a scene shows at least one instance")
-    texts = [scene.name, *(t for i in scene.instances for t in (i.node, i.category, i.variant))]
-    words = [w for i in scene.instances for pair in i.attributes.items() for w in pair]
+    shown = (*scene.instances, *scene.backdrop)
+    if not all(i.surface in ("", *SURFACES) for i in shown):
+        raise ValueError("a surface of no kind")
+    texts = [scene.name, *(t for i in shown for t in (i.node, i.category, i.variant))]
+    words = [w for i in shown for pair in i.attributes.items() for w in pair]
     if not all(isinstance(text, str) for text in (*texts, *words, *scene.materials)):
         raise ValueError("a name is no text")
     for colour in (scene.sky, *(m.colour for m in scene.materials.values())):
@@ -243,12 +249,10 @@ def _check(scene: Scene) -> None:
     numbers = [*scene.sun, *(m.tile_m for m in scene.materials.values())]
     if len(scene.sun) != 3 or not all(isinstance(n, int | float) and abs(n) < 1e9 for n in numbers):
         raise ValueError("sun or tiles are no numbers")
-    arrays = [scene.bounds, *(a for i in scene.instances for p in i.parts for a in (p.vertices, p.uv))]
+    arrays = [scene.bounds, *(a for i in shown for p in i.parts for a in (p.vertices, p.uv))]
     if scene.bounds.shape != (2, 3) or not all(np.isfinite(a).all() for a in arrays):
         raise ValueError("a coordinate is no finite number")
-    if not all(
-        i.parts and all(len(p.faces) and len(p.uv) == len(p.vertices) for p in i.parts) for i in scene.instances
-    ):
+    if not all(i.parts and all(len(p.faces) and len(p.uv) == len(p.vertices) for p in i.parts) for i in shown):
         raise ValueError("a node has no triangle")
 
 
@@ -282,7 +286,9 @@ def _read_instance(
     extras = node["extras"]
     anatomy = read_anatomy(extras["anatomy"], [len(p.faces) for p in parts]) if "anatomy" in extras else None
     words = dict(extras["attributes"])
-    return Instance(node["name"], extras["category"], extras["variant"], words, tuple(parts), anatomy)
+    return Instance(
+        node["name"], extras["category"], extras["variant"], words, tuple(parts), anatomy, extras.get("surface", "")
+    )
 
 
 def _array(accessor: int, document: dict[str, Any], data: memoryview) -> NDArray[Any]:

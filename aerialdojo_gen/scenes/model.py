@@ -14,6 +14,9 @@ from numpy.typing import NDArray
 from aerialdojo_gen.geometry.soup import soup
 from aerialdojo_gen.scenes.anatomy import Anatomy
 
+# Closed; open and there from both sides; open and the ground, which nobody flies below; behind everything.
+SURFACES = ("solid", "sheet", "ground", "dome")
+
 
 @dataclass(frozen=True, eq=False)
 class Material:
@@ -77,6 +80,8 @@ class Instance:
         At least one, none of them empty.
     anatomy : Anatomy or None
         Its fronts and named parts, where its catalogue says them.
+    surface : str
+        What its surface is, one of `SURFACES`, where ``add-scene`` has decided it; empty where form alone tells.
     """
 
     node: str
@@ -85,6 +90,7 @@ class Instance:
     attributes: dict[str, str]
     parts: tuple[Part, ...]
     anatomy: Anatomy | None = None
+    surface: str = ""
 
     @property
     def vertices(self) -> NDArray[np.float64]:
@@ -145,6 +151,8 @@ class Scene:
         Unit vector from the scene towards the sun, world frame.
     imported : bool
         Whether it comes from a mesh of another make, whose categories are its own.
+    backdrop : tuple of Instance
+        Sky domes and the like: drawn behind everything, and nowhere else there, neither for rays nor for collision.
     """
 
     name: str
@@ -154,14 +162,17 @@ class Scene:
     sky: tuple[int, int, int] = (150, 190, 230)
     sun: tuple[float, float, float] = (0.45, -0.35, 0.82)
     imported: bool = False
+    backdrop: tuple[Instance, ...] = ()
     _by_node: dict[str, Instance] = field(default_factory=dict, init=False, repr=False)
 
     def __post_init__(self) -> None:
         """Index the instances and refuse a node name that stands twice."""
-        for instance in self.instances:
+        for instance in (*self.instances, *self.backdrop):
             if instance.node in self._by_node:
                 raise ValueError(f"scene {self.name}: node {instance.node!r} stands twice")
             self._by_node[instance.node] = instance
+        for instance in self.backdrop:
+            del self._by_node[instance.node]
 
     @property
     def ceiling_m(self) -> float:

@@ -21,6 +21,8 @@ Positive = Annotated[float, Field(gt=0, le=1e6)]
 Extent = Annotated[float, Field(ge=2, le=1000)]
 Height = Annotated[float, Field(gt=0, le=1000)]
 Place = Annotated[float, Field(ge=-1e5, le=1e5)]
+# Of a foreign file: maps count metres from the equator.
+Mapped = Annotated[float, Field(ge=-1e7, le=1e7)]
 Colour = Annotated[str, Field(pattern=r"^#[0-9a-fA-F]{6}$")]
 
 
@@ -161,7 +163,11 @@ class Imported(BaseModel):
     scale : float
         Metres a unit of the file.
     crop_m : (x, y, radius) or None
-        The part that was kept, metres.
+        The circle that was kept, metres, in the file's axes.
+    box_m : (x0, y0, x1, y1) or None
+        The rectangle that was kept.
+    origin_m : (x, y, z) or None
+        Where the scene's origin lies in the file's axes, after `up` and `scale`, metres; equal in tiles of a place.
     ceiling_m : float
         Highest z that a drone may fly at, metres.
     sky : str
@@ -178,7 +184,9 @@ class Imported(BaseModel):
     source_sha256: str
     up: Literal["y", "z"]
     scale: Positive
-    crop_m: tuple[Place, Place, Positive] | None = None
+    crop_m: tuple[Mapped, Mapped, Positive] | None = None
+    box_m: tuple[Mapped, Mapped, Mapped, Mapped] | None = None
+    origin_m: tuple[Mapped, Mapped, Mapped] | None = None
     ceiling_m: Positive
     sky: Colour = "#96bee6"
     sun: Sun = (0.45, -0.35, 0.82)

@@ -67,7 +67,8 @@ def mesh_moved(data: SceneData, _rows: Rows) -> Iterator[Finding]:
         yield Finding(
             0, f"node {name}{others} moved by {_told(world)}", "z up turned into y up, and no other transform"
         )
-    wanted = Counter(instance.node for instance in scene_mesh(data).scene.instances)
+    scene = scene_mesh(data).scene
+    wanted = Counter(instance.node for instance in (*scene.instances, *scene.backdrop))
     if shown != wanted:
         odd = sorted(((shown - wanted) + (wanted - shown)).elements())
         yield Finding(0, f"{len(odd):,} nodes that a viewer shows otherwise, {odd[0]} first", "each node once")

@@ -3,7 +3,8 @@
 A surface without an underside stops no body that comes round its rim, so that a way below terrain touches nothing.
 What the generator keeps from there by its clearance grid is looked at here by rays alone: a place is below ground
 where one straight up meets ground and one straight down meets none. What is ground is found anew as well, by trimesh
-and Embree, a little more strictly than the generator does: what is doubtful is no fault.
+and Embree, a little more strictly than the generator does: what is doubtful is no fault. What the scene's file calls
+ground is ground whatever its form.
 """
 
 from __future__ import annotations
@@ -124,6 +125,7 @@ def open_ground(scene: Scene) -> TriangleRayCaster | None:
     upwards, downwards = np.repeat(_UP, len(plan), axis=0), np.repeat(_DOWN, len(plan), axis=0)
     up, owner = RayCaster(Scene(scene.name, standing, {}, scene.bounds)).first_hit(under, upwards)
     met = np.isfinite(up)
+    stored: list[trimesh.Trimesh] = []
     sheets, covered = [], np.zeros(len(plan), dtype=np.bool_)
     for k in np.flatnonzero(np.bincount(owner[met], minlength=len(standing)) >= _LEAST_PROBES):
         for body in _open_bodies(standing[k]):
@@ -142,12 +144,14 @@ def open_ground(scene: Scene) -> TriangleRayCaster | None:
             level = np.abs(normal[:, 2]).sum() >= _LEVEL * np.linalg.norm(normal, axis=1).sum()
             one_layer = (thickness[own] <= _THIN_M).mean() >= _ONE_LAYER
             undermost = (bottom[own] <= up[near][own] + _THIN_M).mean() >= _UNDERMOST
-            if one_layer and undermost and (level or own.sum() >= _COVER * met.sum()):
+            if standing[k].surface == "ground":
+                stored.append(body)
+            elif one_layer and undermost and (level or own.sum() >= _COVER * met.sum()):
                 sheets.append(body)
                 covered[near[own]] = True
-    if not sheets or covered.sum() < _COVER * met.sum():
-        return None
-    return TriangleRayCaster(*soup(sheets))
+    if covered.sum() < _COVER * met.sum():
+        sheets = []
+    return TriangleRayCaster(*soup([*stored, *sheets])) if stored or sheets else None
 
 
 def _open_bodies(instance: Instance) -> list[trimesh.Trimesh]:

@@ -2,17 +2,25 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import re
 import shlex
 
+import numpy as np
 import pytest
 import trimesh
 from support import foreign
 from support.command_line import said
 
+from aerialdojo_gen.annotations.describing import Vocabulary
+from aerialdojo_gen.annotations.draft import Choice, Drafter
+from aerialdojo_gen.annotations.landmarks import choose_landmarks
 from aerialdojo_gen.annotations.number import group_of
+from aerialdojo_gen.imports.adopt import adopt
 from aerialdojo_gen.imports.naming import words_in
+from aerialdojo_gen.imports.raw import RawNode, plain
+from aerialdojo_gen.scenes.catalogue import load_catalogue
 
 # What stands there without a name: a drum and a box.
 FORMS = ("round", "square")
@@ -179,6 +187,24 @@ def test_drafts_are_true_or_silent(place, capsys):
         assert not re.search(r"\bon (top of )?the tower", by_node["lorry_0000"]["description"])
     code, _, err = said(capsys, "annotate-import", "--pipeline", draft[-1], "--data", "data", "--workers", "1")
     assert code == 0, err
+
+
+def test_what_cannot_be_told_apart_says_with_what_it_is_confused(project):
+    crates = [(f"Crate.{k}", box(2, 2, 2), (60.0 + 2.4 * (k % 3), 2.4 * (k // 3), 1.0)) for k in range(9)]
+    nodes = []
+    for name, body, place in (("Tower", box(5, 5, 20), (0, 0, 10)), *crates):
+        faces = np.asarray(body.faces, np.int64)
+        nodes.append(RawNode(name, np.asarray(body.vertices) + place, faces, plain(len(faces))))
+    adopted, _ = adopt("Stack", nodes)
+    vocabulary = Vocabulary(dataclasses.replace(adopted, imported=True), load_catalogue(project / "scene_assets"))
+    drafter = Drafter(vocabulary, choose_landmarks(vocabulary, 1), 0, Choice(most=30))
+    made = drafter.objects(9)
+    assert len(made) < 9
+    assert len(drafter.confused) == drafter.refused["without anything to tell them from others of their kind"] > 0
+    for node, others in drafter.confused:
+        assert node not in others
+        assert set(others) <= {f"crate_{k:04d}" for k in range(9)}
+    assert re.search(r"of their kind \(crate_\d{4} with crate_\d{4}( and \d more)?; ", drafter.why_not())
 
 
 def test_a_table_says_what_nodes_are_called(place, capsys):

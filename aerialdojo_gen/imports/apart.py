@@ -1,0 +1,279 @@
+"""Take a soup of triangles apart into things: by what touches, by material, and by what stands on the ground."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import scipy.ndimage
+from numpy.typing import NDArray
+
+from aerialdojo_gen.geometry.columns import Plan, lowest_of
+from aerialdojo_gen.imports.cutting import bodies_of
+from aerialdojo_gen.imports.raw import RawNode, joined, some_of
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+_REACH_M = 0.3
+# A node as wide as this along both axes, in many pieces, is a soup of things; a thing as wide may be several.
+_WIDE_M, _SPREAD_M = 60.0, 100.0
+_MOST_OF = 0.6
+# A body as wide as this share of all that there is, and open, is what the rest stands on.
+_GROUND_SHARE = 0.25
+_CELL_M = 1.0
+_MOST_CELLS = 4_000_000
+# Openings by windows of these many cells take away what is narrower: Zhang et al. 2003, progressive.
+_WINDOWS = (3, 5, 9, 17, 33, 65)
+_SLOPE, _STEP_M, _HIGHEST_STEP_M, _HOUSE_M = 0.35, 0.4, 3.0, 35.0
+_ABOVE_M = 0.4
+# What stands out of the ground is a thing if it is so high, covers so much, and has walls.
+_THING_M, _THING_M2, _WALLS, _STEEP = 1.2, 2.0, 0.2, 0.6
+_MAP_M = 0.5
+_MOST_MAPPED = 20_000
+
+
+@dataclass
+class Apart:
+    """How often what was taken apart.
+
+    Attributes
+    ----------
+    pieces, things : int
+        Connected pieces that soups fell into; what they were gathered to.
+    materials : int
+        Pieces of one material that wide connected bodies fell into.
+    grown : int
+        Things that were one surface with the ground.
+    """
+
+    pieces: int = 0
+    things: int = 0
+    materials: int = 0
+    grown: int = 0
+    soups: list[str] = field(default_factory=list)
+
+    def lines(self) -> list[str]:
+        """Say it, a line each."""
+        if not self.soups:
+            return []
+        of = "the only node" if self.soups == [""] else f"{len(self.soups):,} node{'s' * (len(self.soups) > 1)}"
+        out = [
+            f"taken apart: {of}, in {self.pieces:,} connected pieces, into {self.things:,} by what belongs together"
+        ]
+        if self.materials:
+            out.append(f"{self.materials:,} pieces are of wide bodies, taken apart by material")
+        if self.grown:
+            out.append(f"{self.grown:,} things were one surface with the ground, and stand by themselves now")
+        return out
+
+
+def taken_apart(bodies: Sequence[RawNode]) -> tuple[list[RawNode], Apart]:
+    """Take soups apart; nodes that are things of their own stay whole.
+
+    Parameters
+    ----------
+    bodies : sequence of RawNode
+        z up, metres, equal places one vertex.
+
+    Returns
+    -------
+    bodies : list of RawNode
+        A file's only node, and a node of several pieces that spreads over 100 m along both axes, fall into connected
+        pieces. Bodies wider than 60 m that are no ground fall into pieces of one colour. What stands out of an open
+        surface that the rest stands on (a photogrammetric model is one surface) is cut from it. Last, a piece goes
+        to the smallest thing, not the ground, whose box and plan hold it: a roof has its tiles.
+    Apart
+        How often that was done.
+    """
+    told = Apart()
+    low = np.min([b.vertices.min(axis=0) for b in bodies], axis=0)
+    high = np.max([b.vertices.max(axis=0) for b in bodies], axis=0)
+    out: list[RawNode] = []
+    for body in bodies:
+        pieces = _connected(body)
+        if len(bodies) > 1 and not _is_soup(body, pieces):
+            out.append(body)
+            continue
+        told.soups.append(body.name if len(bodies) > 1 else "")
+        if len(bodies) == 1 and len(pieces) > 1:
+            # What a file calls all that it holds is no name of a thing in it.
+            pieces = [replace(piece, name="") for piece in pieces]
+        told.pieces += len(pieces)
+        grounds, things = [], []
+        for piece in pieces:
+            if _bears(piece, low, high):
+                ground, grown = _ground_and_things(piece)
+                grown = [replace(thing, name="") for thing in grown]
+                told.grown += len(grown)
+                grounds += [ground] if len(ground.faces) else []
+                things += grown
+            elif (np.ptp(piece.vertices[:, :2], axis=0) > _WIDE_M).any() and len(
+                np.unique(piece.colours, axis=0)
+            ) > 1:
+                parts = _by_colour(piece)
+                told.materials += len(parts)
+                things += parts
+            else:
+                things.append(piece)
+        gathered = _gathered(things)
+        told.things += len(grounds) + len(gathered)
+        out += [*grounds, *gathered]
+    return out, told
+
+
+def _connected(body: RawNode) -> list[RawNode]:
+    label, _ = bodies_of(body.faces, len(body.vertices))
+    return _split(body, label)
+
+
+def _split(body: RawNode, label: Ints) -> list[RawNode]:
+    """Faces of equal labels as bodies, in the order of their first faces."""
+    order = np.argsort(label, kind="stable")
+    cuts = np.flatnonzero(np.diff(label[order])) + 1
+    groups = sorted((np.sort(rows) for rows in np.split(order, cuts) if len(rows)), key=lambda rows: int(rows[0]))
+    return [some_of(body, rows) for rows in groups]
+
+
+def _is_soup(body: RawNode, pieces: Sequence[RawNode]) -> bool:
+    size = np.ptp(body.vertices[:, :2], axis=0)
+    if len(pieces) < 2 or (size < _SPREAD_M).any():
+        return False
+    return all((np.ptp(p.vertices[:, :2], axis=0) < _MOST_OF * size).all() for p in pieces)
+
+
+def _by_colour(body: RawNode) -> list[RawNode]:
+    _, shade = np.unique(body.colours // 16, axis=0, return_inverse=True)
+    out = []
+    for k in np.unique(shade):
+        out += _connected(some_of(body, np.flatnonzero(shade.reshape(-1) == k)))
+    return out
+
+
+def _bears(body: RawNode, low: Floats, high: Floats) -> bool:
+    """Whether a body is wide enough, and open, to be what others stand on."""
+    size = np.ptp(body.vertices[:, :2], axis=0)
+    if (size < _GROUND_SHARE * (high - low)[:2]).any() or (size < 10.0).any():
+        return False
+    _, closed = bodies_of(body.faces, len(body.vertices))
+    normal = np.cross(
+        body.vertices[body.faces[:, 1]] - body.vertices[body.faces[:, 0]],
+        body.vertices[body.faces[:, 2]] - body.vertices[body.faces[:, 0]],
+    )
+    level = np.abs(normal[:, 2]).sum() >= 0.3 * np.linalg.norm(normal, axis=1).sum()
+    return bool(not closed.all() and level)
+
+
+def _ground_and_things(body: RawNode) -> tuple[RawNode, list[RawNode]]:
+    """Cut what stands out of a surface from it: the ground below it has a hole there."""
+    floor, plan = _floor(body)
+    middle = body.vertices[body.faces].mean(axis=1)
+    cell = np.clip(((middle[:, :2] - plan.low) / plan.step_m).astype(np.int64), 0, np.array(plan.shape) - 1)
+    raised = middle[:, 2] - floor[cell[:, 0], cell[:, 1]] > _ABOVE_M
+    if not raised.any():
+        return body, []
+    label, _ = bodies_of(body.faces[raised], len(body.vertices))
+    rows = np.flatnonzero(raised)
+    things = []
+    for k in range(int(label.max()) + 1):
+        own = rows[label == k]
+        if len(own) and _is_thing(body, own):
+            things.append(own)
+    taken = np.zeros(len(body.faces), dtype=np.bool_)
+    for own in things:
+        taken[own] = True
+    return some_of(body, np.flatnonzero(~taken)), [some_of(body, own) for own in things]
+
+
+def _floor(body: RawNode) -> tuple[Floats, Plan]:
+    """Height of the bare ground over a lattice: openings take away what is narrow and high."""
+    low, high = body.vertices[:, :2].min(axis=0), body.vertices[:, :2].max(axis=0)
+    step = max(_CELL_M, float(np.sqrt(np.prod(high - low) / _MOST_CELLS)))
+    plan = Plan.over(low, high, step)
+    surface = lowest_of(body.vertices[body.faces].reshape(-1, 9), plan)
+    empty = np.isnan(surface)
+    if empty.all():
+        return np.full(plan.shape, float(body.vertices[:, 2].min())), plan
+    nearest = scipy.ndimage.distance_transform_edt(empty, return_distances=False, return_indices=True)
+    surface = surface[tuple(nearest)]
+    before = 1
+    for window in _WINDOWS:
+        if window > min(plan.shape):
+            break
+        opened = scipy.ndimage.grey_opening(surface, size=(window, window), mode="nearest")
+        step_m = _STEP_M + _SLOPE * (window - before) * step
+        # A house of a storey is no hill; what is wider than a house may be one.
+        step_m = min(step_m, _HIGHEST_STEP_M) if window * step < _HOUSE_M else step_m
+        surface = np.where(surface - opened > step_m, opened, surface)
+        before = window
+    return surface, plan
+
+
+def _is_thing(body: RawNode, rows: Ints) -> bool:
+    corners = body.vertices[body.faces[rows]]
+    size = np.ptp(corners.reshape(-1, 3), axis=0)
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    area = np.linalg.norm(normal, axis=1)
+    steep = area[np.abs(normal[:, 2]) < _STEEP * area].sum() / max(float(area.sum()), 1e-12)
+    return bool(
+        size[2] >= _THING_M
+        and np.abs(normal[:, 2]).sum() / 2 >= _THING_M2
+        and steep >= _WALLS
+        and (size[:2] <= _WIDE_M).all()
+    )
+
+
+def _gathered(pieces: Sequence[RawNode]) -> list[RawNode]:
+    """Give what lies within the box of something larger, and over or at it, to the smallest such thing."""
+    if not pieces:
+        return []
+    low = np.array([p.vertices.min(axis=0) for p in pieces])
+    high = np.array([p.vertices.max(axis=0) for p in pieces])
+    size = np.linalg.norm(high - low, axis=1)
+    order = np.argsort(size, kind="stable")
+    owner = np.arange(len(pieces))
+    maps: dict[int, frozenset[tuple[int, int]] | None] = {}
+    for rank, k in enumerate(order):
+        larger = order[rank + 1 :]
+        around = (low[larger] <= low[k] + _REACH_M).all(axis=1) & (high[larger] >= high[k] - _REACH_M).all(axis=1)
+        around &= size[larger] > 1.5 * size[k]
+        for j in larger[around]:
+            if _holds(pieces, int(j), int(k), maps):
+                owner[k] = j
+                break
+    for k in order[::-1]:
+        owner[k] = owner[owner[k]]
+    groups: dict[int, list[RawNode]] = {}
+    for k, piece in enumerate(pieces):
+        groups.setdefault(int(owner[k]), []).append(piece)
+    return [joined(pieces[k].name, members) for k, members in sorted(groups.items())]
+
+
+def _holds(
+    pieces: Sequence[RawNode], larger: int, smaller: int, maps: dict[int, frozenset[tuple[int, int]] | None]
+) -> bool:
+    """Whether half of a piece's plan lies over another's, or beside it: a fence does not hold the house within."""
+    own, other = (_cells(pieces[k], k, maps) for k in (smaller, larger))
+    if own is None or other is None:
+        return True
+    return 2 * len(own & other) >= len(own)
+
+
+def _cells(
+    body: RawNode, k: int, maps: dict[int, frozenset[tuple[int, int]] | None]
+) -> frozenset[tuple[int, int]] | None:
+    """Squares of the plan that a body's triangles lie over, and those around; None for one of too many."""
+    if k not in maps:
+        corners = body.vertices[body.faces][:, :, :2]
+        first = np.floor((corners.min(axis=1) - _REACH_M) / _MAP_M).astype(np.int64)
+        last = np.floor((corners.max(axis=1) + _REACH_M) / _MAP_M).astype(np.int64)
+        spans = np.unique(np.column_stack([first, last]), axis=0)
+        n = ((spans[:, 2] - spans[:, 0] + 1) * (spans[:, 3] - spans[:, 1] + 1)).sum()
+        cells: frozenset[tuple[int, int]] | None = None
+        if n <= _MOST_MAPPED:
+            cells = frozenset(
+                (i, j) for x0, y0, x1, y1 in spans.tolist() for i in range(x0, x1 + 1) for j in range(y0, y1 + 1)
+            )
+        maps[k] = cells
+    return maps[k]

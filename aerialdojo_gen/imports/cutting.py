@@ -1,0 +1,261 @@
+"""Cut triangles along upright planes: a part of a large place, closed where closed bodies are cut open."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+_SIDES = 64
+_GRID_M = 1e-6
+
+
+@dataclass(frozen=True)
+class Region:
+    """A convex part of the plan, with what a user calls it.
+
+    Attributes
+    ----------
+    corners : tuple of (x, y)
+        Metres, counter-clockwise.
+    said : str
+        ``"--crop 10 20 100"``.
+    """
+
+    corners: tuple[tuple[float, float], ...]
+    said: str
+
+    @classmethod
+    def circle(cls, x: float, y: float, radius: float) -> Region:
+        """Make a polygon of 64 sides that lies within a circle and touches it at its corners; metres."""
+        angles = [2 * math.pi * k / _SIDES for k in range(_SIDES)]
+        corners = tuple((x + radius * math.cos(a), y + radius * math.sin(a)) for a in angles)
+        return cls(corners, f"--crop {x:g} {y:g} {radius:g}")
+
+    @classmethod
+    def box(cls, x0: float, y0: float, x1: float, y1: float) -> Region:
+        """Make a rectangle of two opposite corners, metres."""
+        (x0, x1), (y0, y1) = sorted((x0, x1)), sorted((y0, y1))
+        return cls(((x0, y0), (x1, y0), (x1, y1), (x0, y1)), f"--box {x0:g} {y0:g} {x1:g} {y1:g}")
+
+    @property
+    def low(self) -> Floats:
+        """Lower corner of the rectangle around it, (2,) float64."""
+        return np.min(self.corners, axis=0)
+
+    @property
+    def high(self) -> Floats:
+        """Upper corner of the rectangle around it, (2,) float64."""
+        return np.max(self.corners, axis=0)
+
+    @property
+    def planes(self) -> list[tuple[Floats, float]]:
+        """Sides as (outward normal, offset): a point p lies within where normal · p <= offset for all of them."""
+        out = []
+        for (x0, y0), (x1, y1) in zip(self.corners, (*self.corners[1:], self.corners[0]), strict=True):
+            normal = np.array([y1 - y0, x0 - x1]) / math.hypot(x1 - x0, y1 - y0)
+            out.append((normal, float(normal @ (x0, y0))))
+        return out
+
+
+@dataclass(frozen=True, eq=False)
+class Pieces:
+    """What is left of triangles.
+
+    Attributes
+    ----------
+    corners : (k, 3, 3) float64
+        Metres.
+    source : (k,) int64
+        The triangle that each was; for one that closes a cut, a triangle of the cut's rim.
+    weights : (k, 3, 3) float64
+        What each corner is made of: shares of the source's three corners, for whatever is interpolated.
+    """
+
+    corners: Floats
+    source: Ints
+    weights: Floats
+
+
+def cut(vertices: Floats, faces: Ints, region: Region) -> Pieces:
+    """Keep what of triangles lies within a region; those that cross its border are cut there.
+
+    Parameters
+    ----------
+    vertices : (n, 3) float64
+        Metres, equal places one vertex.
+    faces : (m, 3) int64
+    region : Region
+
+    Returns
+    -------
+    Pieces
+        In the order of the faces that they were; connected bodies that were closed are closed again by level pieces
+        of the border, behind them.
+    """
+    corners = vertices[faces]
+    body, closed = bodies_of(faces, len(vertices))
+    pieces = Pieces(corners, np.arange(len(faces)), np.broadcast_to(np.eye(3), (len(faces), 3, 3)))
+    # A closed body must come to the planes whole, for what each of them cuts away tells where it is to be closed.
+    low, high = np.full((len(closed), 2), np.inf), np.full((len(closed), 2), -np.inf)
+    np.minimum.at(low, body, corners[:, :, :2].min(axis=1))
+    np.maximum.at(high, body, corners[:, :, :2].max(axis=1))
+    own = closed[body][:, None]
+    low = np.where(own, low[body], corners[:, :, :2].min(axis=1))
+    high = np.where(own, high[body], corners[:, :, :2].max(axis=1))
+    touched = np.asarray((low <= region.high).all(axis=1) & (high >= region.low).all(axis=1))
+    pieces = _some(pieces, touched)
+    for normal, offset in region.planes:
+        pieces = _halved(pieces, body, closed, normal, offset)
+    return pieces
+
+
+def _some(pieces: Pieces, rows: NDArray[np.bool_] | Ints) -> Pieces:
+    return Pieces(pieces.corners[rows], pieces.source[rows], pieces.weights[rows])
+
+
+def _joined(parts: Sequence[Pieces]) -> Pieces:
+    return Pieces(
+        np.concatenate([p.corners for p in parts]), np.concatenate([p.source for p in parts]),
+        np.concatenate([p.weights for p in parts]),
+    )  # fmt: skip
+
+
+def _halved(pieces: Pieces, body: Ints, closed: NDArray[np.bool_], normal: Floats, offset: float) -> Pieces:
+    """Keep what lies on the inner side of an upright plane, and close what was closed."""
+    away = pieces.corners[:, :, :2] @ normal - offset
+    # What lies in the plane is within, so that every surface is cut alike however often its corners meet it.
+    outside = away > 0.0
+    n = outside.sum(axis=1)
+    inner = n == 0
+    if inner.all():
+        return pieces
+    keep, one, two = _some(pieces, inner), np.flatnonzero(n == 1), np.flatnonzero(n == 2)
+    # The odd corner first, so that the two cases are cut alike.
+    first = np.concatenate([np.argmax(outside[one], axis=1), np.argmin(outside[two], axis=1)])
+    rows = np.concatenate([one, two])
+    turn = (first[:, None] + np.arange(3)) % 3
+    at = np.arange(len(rows))[:, None]
+    split = _some(pieces, rows)
+    c, w, d = split.corners[at, turn], split.weights[at, turn], away[rows][at, turn]
+    k = len(one)
+    at_border, weights = np.empty((len(rows), 2, 3)), np.empty((len(rows), 2, 3))
+    for j in (0, 1):
+        # From the inner corner outwards, so that both triangles of an edge are cut at the same place to the bit.
+        ends = np.concatenate([np.full(k, j + 1), np.zeros(len(two), np.int64)])
+        beyond = np.concatenate([np.zeros(k, np.int64), np.full(len(two), j + 1)])
+        i = np.arange(len(rows))
+        share = (d[i, ends] / (d[i, ends] - d[i, beyond]))[:, None]
+        at_border[:, j] = c[i, ends] + share * (c[i, beyond] - c[i, ends])
+        weights[:, j] = w[i, ends] + share * (w[i, beyond] - w[i, ends])
+    source = split.source
+    quads = [
+        Pieces(np.stack([at_border[:k, 0], c[:k, 1], c[:k, 2]], 1), source[:k],
+               np.stack([weights[:k, 0], w[:k, 1], w[:k, 2]], 1)),
+        Pieces(np.stack([at_border[:k, 0], c[:k, 2], at_border[:k, 1]], 1), source[:k],
+               np.stack([weights[:k, 0], w[:k, 2], weights[:k, 1]], 1)),
+        Pieces(np.stack([c[k:, 0], at_border[k:, 0], at_border[k:, 1]], 1), source[k:],
+               np.stack([w[k:, 0], weights[k:, 0], weights[k:, 1]], 1)),
+    ]  # fmt: skip
+    kept = _joined([keep, *quads])
+    kept = _some(kept, np.argsort(kept.source, kind="stable"))
+    return _joined([kept, *_lids(at_border, source, body, closed, normal, offset)])
+
+
+def _lids(
+    segments: Floats, source: Ints, body: Ints, closed: NDArray[np.bool_], normal: Floats, offset: float
+) -> list[Pieces]:
+    """Triangles in a plane that close the closed bodies whose rims there are `segments`, (n, 2, 3)."""
+    out = []
+    along = np.array([-normal[1], normal[0]])
+    origin = normal * offset
+    whole = np.flatnonzero(closed[body[source]])
+    for k in np.unique(body[source[whole]]):
+        rows = whole[body[source[whole]] == k]
+        flat = np.stack([(segments[rows][:, :, :2] - origin) @ along, segments[rows][:, :, 2]], axis=-1)
+        grid = np.round(flat / _GRID_M)
+        lines = shapely.linestrings(grid * _GRID_M)
+        lines = lines[shapely.length(lines) > 0]
+        if not len(lines):
+            continue
+        triangles = shapely.get_parts(shapely.constrained_delaunay_triangles(_filled(lines)))
+        if not len(triangles):
+            continue
+        uz = shapely.get_coordinates(triangles).reshape(-1, 4, 2)[:, :3]
+        a, b, c = uz[:, 0], uz[:, 1], uz[:, 2]
+        turned = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0]) < 0
+        uz[turned] = uz[turned][:, ::-1]
+        corners = np.empty((len(uz), 3, 3))
+        corners[:, :, :2] = origin + uz[:, :, :1] * along
+        corners[:, :, 2] = uz[:, :, 1]
+        # The very places of the rim, so that nothing gapes.
+        ends = dict(zip(map(tuple, grid.reshape(-1, 2).tolist()), segments[rows].reshape(-1, 3), strict=True))
+        wanted = np.round(uz / _GRID_M).reshape(-1, 2).tolist()
+        corners = np.array(
+            [ends.get((u, z), at) for (u, z), at in zip(wanted, corners.reshape(-1, 3), strict=True)]
+        ).reshape(-1, 3, 3)
+        one = np.zeros((len(uz), 3, 3))
+        one[:, :, 0] = 1.0
+        out.append(Pieces(corners, np.full(len(uz), source[rows].min()), one))
+    return out
+
+
+def _filled(lines: NDArray[np.object_]) -> NDArray[np.object_]:
+    """Polygons within closed outlines, holes left out: what a line to the far side crosses an odd number of times."""
+    faces = shapely.get_parts(shapely.polygonize([shapely.union_all(lines)]))
+    inner = shapely.get_coordinates(shapely.point_on_surface(faces))
+    ends = shapely.get_coordinates(lines).reshape(-1, 2, 2)
+    a, b = ends[:, 0], ends[:, 1]
+    odd = np.zeros(len(faces), dtype=np.bool_)
+    for k, (u, z) in enumerate(inner):
+        spans = (a[:, 1] > z) != (b[:, 1] > z)
+        rise = b[spans, 1] - a[spans, 1]
+        at = a[spans, 0] + (z - a[spans, 1]) / rise * (b[spans, 0] - a[spans, 0])
+        odd[k] = int((at > u).sum()) % 2 == 1
+    return np.asarray(faces[odd])
+
+
+def bodies_of(faces: Ints, n: int) -> tuple[Ints, NDArray[np.bool_]]:
+    """Find the connected bodies of faces.
+
+    Parameters
+    ----------
+    faces : (m, 3) int64
+        Indices of vertices, equal places one vertex.
+    n : int
+        Number of vertices.
+
+    Returns
+    -------
+    body : (m,) int64
+        Number of each face's body, from 0. Bodies hang together by edges; where four faces and more meet in one,
+        closed bodies touch (a house on a plate), and do not hang together by it.
+    closed : (k,) bool
+        Which bodies have each edge twice, triangles that are there from both sides counted once.
+    """
+    if not len(faces):
+        return np.zeros(0, np.int64), np.zeros(0, np.bool_)
+    own, same = np.unique(np.sort(faces, axis=1), axis=0, return_inverse=True)
+    m = len(own)
+    edges = np.concatenate([own[:, [0, 1]], own[:, [1, 2]], own[:, [0, 2]]])
+    key = edges[:, 0] * n + edges[:, 1]
+    order = np.argsort(key, kind="stable")
+    owner, key = (np.tile(np.arange(m), 3))[order], key[order]
+    first = np.flatnonzero(np.diff(key, prepend=-1))
+    count = np.diff(first, append=len(key))
+    next_of = np.flatnonzero(np.repeat((count == 2) | (count == 3), count)[1:] & (key[1:] == key[:-1]))
+    graph = coo_array((np.ones(len(next_of), np.int8), (owner[next_of], owner[next_of + 1])), shape=(m, m))
+    k, label = connected_components(graph, directed=False)
+    pairs, times = np.unique(np.column_stack([label[owner], key]), axis=0, return_counts=True)
+    closed = np.ones(k, dtype=np.bool_)
+    closed[pairs[times != 2, 0]] = False
+    return label[same.reshape(-1)].astype(np.int64), closed

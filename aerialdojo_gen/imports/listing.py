@@ -1,0 +1,164 @@
+"""What a mesh file holds, told before anything is made of it: bodies, ranges, guesses of axis and scale."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aerialdojo_gen.common.text_table import Column, TextTable
+from aerialdojo_gen.imports.adopt import LARGEST_M, Place, lies
+from aerialdojo_gen.imports.cutting import bodies_of
+from aerialdojo_gen.imports.naming import Naming
+from aerialdojo_gen.imports.raw import RawNode
+from aerialdojo_gen.scenes.mesh import areas
+
+Floats = NDArray[np.float64]
+
+# Metres of a unit that programs export in, and what they are called.
+_UNITS = ((1.0, "metres"), (0.01, "centimetres"), (0.001, "millimetres"), (0.3048, "feet"), (0.0254, "inches"))
+# A place that is flown in is so wide, and so high.
+_WIDE_M, _HIGH_M = (15.0, 5000.0), (1.5, 400.0)
+_USUAL_WIDE_M = 250.0
+_SURE = 1.3
+_FLAT = 0.95
+_SHOWN = 12
+
+
+@dataclass(frozen=True)
+class Guess:
+    """What a file's form suggests.
+
+    Attributes
+    ----------
+    up : {"z", "y"}
+        The axis along which more of the surface is level.
+    up_sure : bool
+        Whether it is so by much.
+    scale : float
+        Metres a unit.
+    unit : str
+        ``"metres"``.
+    """
+
+    up: str
+    up_sure: bool
+    scale: float
+    unit: str
+
+
+def guess(nodes: Sequence[RawNode]) -> Guess:
+    """Guess the axis that points up, and the unit, of what a file holds."""
+    level = np.zeros(3)
+    low, high = np.full(3, np.inf), np.full(3, -np.inf)
+    for node in nodes:
+        corners = node.vertices[node.faces]
+        corners = corners[np.isfinite(corners).all(axis=(1, 2))]
+        if not len(corners):
+            continue
+        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        area = np.linalg.norm(normal, axis=1)
+        for k in range(3):
+            # A sheet of hills is level in parts alone: the area in plan counts.
+            steep = np.abs(normal[:, k]) < 0.3 * area
+            level[k] += np.abs(normal[~steep, k]).sum()
+        low, high = np.minimum(low, corners.min(axis=(0, 1))), np.maximum(high, corners.max(axis=(0, 1)))
+    size = np.where(np.isfinite(high - low), high - low, 0.0)
+    # Places are wider than high: the shorter of the two axes is the likelier one.
+    weight = [level[k] / max(float(size[k]), 1e-9) ** 0.5 for k in (1, 2)]
+    up = "y" if weight[0] > weight[1] else "z"
+    sure = max(weight) >= _SURE * min(weight)
+    tall = float(size[1] if up == "y" else size[2])
+    wide = float(max(size[0], size[2] if up == "y" else size[1]))
+
+    def odd(scale: float) -> tuple[bool, float]:
+        fits = _WIDE_M[0] <= wide * scale <= _WIDE_M[1] and _HIGH_M[0] <= tall * scale <= _HIGH_M[1]
+        return not fits, abs(np.log(max(wide * scale, 1e-9) / _USUAL_WIDE_M))
+
+    # Metres, unless the place would be none.
+    scale, unit = _UNITS[0] if not odd(1.0)[0] else min(_UNITS, key=lambda pair: odd(pair[0]))
+    return Guess(up, sure, scale, unit)
+
+
+def _guess_within_domes(nodes: Sequence[RawNode], naming: Naming | None) -> Guess:
+    """Guess by what stands within sky domes, whose form tells neither axis nor scale of the place."""
+    found = guess(nodes)
+    for up in (found.up, "z" if found.up == "y" else "y"):
+        place = Place.of(nodes, up, 1.0, naming)
+        if place.domes:
+            # Back into the file's axes.
+            v = [b.vertices for b in place.bodies]
+            own = [x if up == "z" else np.column_stack([x[:, 0], x[:, 2], -x[:, 1]]) for x in v]
+            return guess([b.placed(x) for b, x in zip(place.bodies, own, strict=True)])
+    return found
+
+
+def contents(
+    nodes: Sequence[RawNode],
+    *,
+    up: str | None = None,
+    scale: float | None = None,
+    naming: Naming | None = None,
+    width: int | None = None,
+) -> list[str]:
+    """Say what a file holds, in lines for a terminal.
+
+    Parameters
+    ----------
+    nodes : sequence of RawNode
+        As read.
+    up, scale, naming
+        As of `adopt`; guessed, or by the names themselves, where absent.
+    width : int, optional
+        Columns of the terminal, for the table of the largest nodes.
+
+    Returns
+    -------
+    list of str
+        Ranges of x, y and z after `up` and `scale`, which are those of ``--crop``, ``--box`` and ``--tiles``.
+
+    Raises
+    ------
+    AssetError
+        There is nothing in it.
+    """
+    found = _guess_within_domes(nodes, naming)
+    taken_up, taken_scale = up or found.up, scale or found.scale
+    place = Place.of(nodes, taken_up, taken_scale, naming)
+    naming = naming or Naming()
+    triangles = sum(len(b.faces) for b in (*place.bodies, *place.domes))
+    bodies = [(b, *bodies_of(b.faces, len(b.vertices))) for b in place.bodies]
+    pieces = sum(int(label.max()) + 1 for _, label, _ in bodies)
+    colours = len(np.unique(np.concatenate([b.colours for b in place.bodies]) // 16, axis=0))
+    low, high = place.low, place.high
+    sure = "" if found.up_sure else ", not by much: look at it in a viewer"
+    lines = [
+        f"{len(nodes):,} nodes with {triangles:,} triangles in {pieces:,} connected pieces, {colours:,} shades",
+        f"up: {taken_up} {'as given' if up else f'by its form{sure}'} (--up {found.up} is the guess)",
+        f"scale: {taken_scale:g} {'as given' if scale else f'if its unit is {found.unit}'}: "
+        f"{high[0] - low[0]:,.4g} by {high[1] - low[1]:,.4g} m, {high[2] - low[2]:,.4g} m high",
+        f"there: {lies(place.bodies)}",
+        f"heights: z is {low[2]:.7g} to {high[2]:.7g} m",
+    ]
+    if max(high - low) > LARGEST_M:
+        lines.append(
+            f"wider than {LARGEST_M:g} m: --tiles 200 makes scenes of its parts, --crop or --box one of a part"
+        )
+    lines += [f"dome: {d.name or 'a node without a name'}, {len(d.faces):,} triangles" for d in place.domes]
+    lines += [f"note: {line}" for line in place.repairs.lines]
+    largest = sorted(bodies, key=lambda row: -float(areas(row[0].vertices, row[0].faces.astype(np.int32)).sum()))
+    rows = []
+    for body, label, closed in largest[:_SHOWN]:
+        called = naming.called(body.name).category.replace("_", " ")
+        west, east = body.vertices.min(axis=0) + 0.0, body.vertices.max(axis=0) + 0.0  # no minus before a zero
+        ranges = [f"{a:.1f} to {b:.1f}" for a, b in zip(west, east, strict=True)]
+        cells = [called[:20] or "-", f"{len(body.faces):,}", f"{int(label.max()) + 1:,}", f"{closed.mean():.0%}"]
+        rows.append((body.name[:24] or "-", [*cells, *ranges]))
+    heads = [Column("called", words=True), *map(Column, ("triangles", "pieces", "closed", "x, m", "y, m", "z, m"))]
+    lines += ["", *TextTable("node", heads, rows).lines(width)]
+    rest = len(largest) - _SHOWN
+    if rest > 0:
+        lines.append(f"and {rest:,} smaller node{'s' if rest > 1 else ''}")
+    return lines

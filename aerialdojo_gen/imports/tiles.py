@@ -1,0 +1,109 @@
+"""A large place as a set of scenes in one frame."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aerialdojo_gen.errors import AssetError
+from aerialdojo_gen.imports.adopt import LARGEST_M, SMALLEST_M, Place, Repairs, settled
+from aerialdojo_gen.imports.cutting import Region
+from aerialdojo_gen.imports.naming import Naming
+from aerialdojo_gen.scenes.model import Scene
+
+Floats = NDArray[np.float64]
+
+_MOST_TILES = 400
+# A tile with less at the place's edge than this share of its plan is none.
+_LEAST_SHARE = 0.02
+
+
+@dataclass(frozen=True, eq=False)
+class Tile:
+    """A part of a place as a scene.
+
+    Attributes
+    ----------
+    name : str
+        Of its scene: that of the place with its column from the west and row from the south, ``"City-x0y2"``.
+    region : Region
+        The square, in the file's axes, metres.
+    scene : Scene
+        In the frame that all tiles share: their scenes' coordinates lie side by side.
+    repairs : Repairs
+        What was mended; its `origin_m` is the same for all tiles.
+    """
+
+    name: str
+    region: Region
+    scene: Scene
+    repairs: Repairs
+
+
+def tiles_of(
+    name: str, place: Place, edge_m: float, *, ceiling_m: float | None = None, naming: Naming | None = None
+) -> Iterator[Tile]:
+    """Cut a place into squares, west to east and south to north, and make a scene of each that holds something.
+
+    Parameters
+    ----------
+    name : str
+        Of the place; a suffix ``_0`` or ``_1`` stays at the end of every tile's name, as it says its partition.
+    place : Place
+    edge_m : float
+        Edge of a square, metres.
+    ceiling_m, naming
+        As of `adopt`; where absent each tile's ceiling is 6 m over its own highest point.
+
+    Yields
+    ------
+    Tile
+
+    Raises
+    ------
+    AssetError
+        The edge is too small or too large, or there are too many squares.
+    """
+    if not (math.isfinite(edge_m) and SMALLEST_M <= edge_m <= LARGEST_M):
+        raise AssetError(f"--tiles {edge_m:g}: the edge of a tile is {SMALLEST_M:g} to {LARGEST_M:g} m")
+    low, high = place.low, place.high
+    columns, rows = (max(1, math.ceil(v / edge_m - 1e-9)) for v in (high - low)[:2])
+    if columns * rows > _MOST_TILES:
+        raise AssetError(
+            f"--tiles {edge_m:g}: {columns * rows:,} tiles, {_MOST_TILES} are the most: make them larger"
+        )
+    origin = np.array([*(low[:2] + high[:2]) / 2, low[2]])
+    boxes = np.array([[b.vertices[:, :2].min(axis=0), b.vertices[:, :2].max(axis=0)] for b in place.bodies])
+    for row in range(rows):
+        for column in range(columns):
+            corner = low[:2] + edge_m * np.array([column, row])
+            region = Region.box(*corner, *(corner + edge_m))
+            near = np.asarray((boxes[:, 0] < region.high).all(axis=1) & (boxes[:, 1] > region.low).all(axis=1))
+            part = Place([b for b, n in zip(place.bodies, near, strict=True) if n], place.domes, place.repairs)
+            if not near.any() or not _holds_something(part, region, edge_m):
+                continue
+            tile = tile_name(name, column, row)
+            scene, repairs = settled(tile, part, region, ceiling_m=ceiling_m, naming=naming, origin_m=origin)
+            yield Tile(tile, region, scene, repairs)
+
+
+def tile_name(name: str, column: int, row: int) -> str:
+    """Name a tile; the suffix that says a partition stays last."""
+    for suffix in ("_0", "_1"):
+        if name.endswith(suffix):
+            return f"{name[: -len(suffix)]}-x{column}y{row}{suffix}"
+    return f"{name}-x{column}y{row}"
+
+
+def _holds_something(place: Place, region: Region, edge_m: float) -> bool:
+    """Whether what lies in a square is wide enough to fly in, and more than a scrap of it."""
+    try:
+        part = place.within(region)
+    except AssetError:
+        return False
+    size = (part.high - part.low)[:2]
+    return bool(size.max() >= SMALLEST_M and np.prod(size) >= _LEAST_SHARE * edge_m**2)

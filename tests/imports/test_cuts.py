@@ -1,0 +1,200 @@
+"""Parts of large meshes: triangles are cut at the border, closed bodies closed again, tiles lie side by side."""
+
+import json
+import re
+
+import numpy as np
+import pytest
+import trimesh
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from support.command_line import said
+from support.hills import hills, standing, write_hills
+
+from aerialdojo_gen.errors import AssetError, UsageError
+from aerialdojo_gen.imports.adopt import Place, adopt
+from aerialdojo_gen.imports.command import add_scene, add_tiles
+from aerialdojo_gen.imports.cutting import Region, cut
+from aerialdojo_gen.imports.listing import guess
+from aerialdojo_gen.imports.raw import RawNode, plain
+from aerialdojo_gen.scenes.glb import read_glb
+from aerialdojo_gen.scenes.recipe import load_imported
+
+
+def raw(mesh: trimesh.Trimesh, name: str = "", up: str = "z") -> RawNode:
+    v = np.asarray(mesh.vertices)
+    v = np.column_stack([v[:, 0], v[:, 2], -v[:, 1]]) if up == "y" else v
+    return RawNode(name, v, np.asarray(mesh.faces, dtype=np.int64), plain(len(mesh.faces)))
+
+
+def city(seed: int = 0, streets: int = 6, up: str = "z") -> list[RawNode]:
+    """One soup of houses on a plate, as a city of a single object is."""
+    rng = np.random.default_rng(seed)
+    bodies = [trimesh.creation.box(bounds=[[-5, -5, -1], [30 * streets + 5, 30 * streets + 5, 0]])]
+    for i in range(streets):
+        for j in range(streets):
+            size = rng.uniform([8, 8, 5], [18, 18, 25])
+            at = np.array([30 * i + 15, 30 * j + 15])
+            bodies.append(trimesh.creation.box(bounds=[[*(at - size[:2] / 2), 0], [*(at + size[:2] / 2), size[2]]]))
+    return [raw(trimesh.util.concatenate(bodies), up=up)]
+
+
+def outside(region: Region, xy: np.ndarray) -> float:
+    return max(float((xy @ normal - offset).max()) for normal, offset in region.planes)
+
+
+def volume_within(region: Region, mesh: trimesh.Trimesh) -> float:
+    for normal, offset in region.planes:
+        mesh = trimesh.intersections.slice_mesh_plane(
+            mesh, -np.array([*normal, 0.0]), np.array([*(normal * offset), 0.0]), cap=True
+        )
+    return float(mesh.volume)
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.integers(0, 10**6), st.booleans())
+def test_what_is_kept_lies_within_and_closed_bodies_stay_closed(seed, round_):
+    rng = np.random.default_rng(seed)
+    body = trimesh.creation.torus(8, 3, 12, 8) if seed % 2 else trimesh.creation.box((14, 9, 6))
+    body.apply_transform(trimesh.transformations.random_rotation_matrix(rng.random(3)))
+    at = rng.uniform(-6, 6, 2)
+    region = Region.circle(*at, rng.uniform(3, 9)) if round_ else Region.box(*at, *(at + rng.uniform(2, 12, 2)))
+    pieces = cut(np.asarray(body.vertices), np.asarray(body.faces, np.int64), region)
+    if not len(pieces.source):
+        return
+    assert outside(region, pieces.corners[:, :, :2].reshape(-1, 2)) < 1e-9
+    # Corners are what their weights make of the triangle that they were cut from, but for those that close a cut.
+    mixed = np.einsum("kij,kjd->kid", pieces.weights, body.vertices[body.faces[pieces.source]])
+    own = ~(pieces.weights[:, :, 0] == 1.0).all(axis=1)
+    np.testing.assert_allclose(mixed[own], pieces.corners[own], atol=1e-9)
+    made = trimesh.Trimesh(pieces.corners.reshape(-1, 3), np.arange(3 * len(pieces.source)).reshape(-1, 3))
+    made.merge_vertices(digits_vertex=6)
+    made.update_faces(made.nondegenerate_faces(height=0))
+    edges, count = np.unique(np.sort(made.edges, axis=1), axis=0, return_counts=True)
+    gaping = np.linalg.norm(made.vertices[edges[count % 2 == 1, 0]] - made.vertices[edges[count % 2 == 1, 1]], axis=1)
+    assert gaping.sum() < 1e-3
+    if not round_:
+        assert made.volume == pytest.approx(volume_within(region, body), abs=1e-3)
+
+
+def test_a_crop_cuts_triangles_of_one_large_object_and_closes_its_houses():
+    nodes = city()
+    for options, region in (
+        ({"crop_m": (70.0, 80.0, 40.0)}, Region.circle(70, 80, 40)),
+        ({"box_m": (110.0, 131.5, 60.0, 44.0)}, Region.box(60, 44, 110, 131.5)),
+    ):
+        scene, repairs = adopt("City", nodes, **options)
+        origin = np.array(repairs.origin_m)
+        for thing in scene.instances:
+            if thing.category != "ground":
+                assert outside(region, thing.vertices[:, :2] + origin[:2]) < 1e-4
+                assert thing.surface == "solid"
+                assert trimesh.Trimesh(thing.vertices, thing.faces).is_watertight
+        # The plate, and more than a handful of houses: nothing is kept or dropped by the middle of a whole body.
+        assert len(scene.instances) > 5
+        assert (scene.bounds[0, :2] + origin[:2] >= region.low - 1e-9).all()
+        assert (scene.bounds[1, :2] + origin[:2] <= region.high + 1e-9).all()
+
+
+def test_a_part_without_anything_says_what_lies_where():
+    nodes = city()
+    with pytest.raises(
+        AssetError, match=r"--crop 900 900 5: nothing of the mesh lies there: x is -5 to 185, y -5 to"
+    ):
+        adopt("City", nodes, crop_m=(900.0, 900.0, 5.0))
+    with pytest.raises(
+        AssetError, match=r"too large to plan in.*--box X0 Y0 X1 Y1.*--tiles 200.*x is -250 to 9250, y"
+    ):
+        adopt("City", nodes, scale=50.0)
+    for wrong in ({"crop_m": (0.0, 0.0, -5.0)}, {"box_m": (0.0, 0.0, 0.0, 9.0)}, {"crop_m": (0.0, float("nan"), 5.0)},
+                  {"crop_m": (0.0, 0.0, 9.0), "box_m": (0.0, 0.0, 9.0, 9.0)}):  # fmt: skip
+        with pytest.raises(AssetError, match=r"--crop|--box"):
+            adopt("City", nodes, **wrong)
+
+
+def test_tiles_lie_side_by_side_in_one_frame(tmp_path):
+    mesh = write_hills(hills(3, cells=30), [], tmp_path / "hills.glb")
+    made = add_tiles("Valley_1", mesh, tmp_path / "mine", 25.0, up="z")
+    names = [added.scene.name for added in made]
+    assert names == [f"Valley-x{x}y{y}_1" for y in range(3) for x in range(3)]
+    corners = {}
+    for added in made:
+        scene = read_glb(tmp_path / "mine/scenes" / f"{added.scene.name}.glb")
+        recipe = load_imported(tmp_path / "mine/scenes" / f"{added.scene.name}.toml")
+        assert recipe.origin_m == made[0].repairs.origin_m
+        x0, y0, x1, y1 = np.array(recipe.box_m) - np.tile(np.array(recipe.origin_m)[:2], 2)
+        sheet = next(i for i in scene.instances if i.category == "terrain")
+        assert sheet.surface == "ground"
+        v = sheet.vertices
+        assert (v[:, :2] >= [x0 - 1e-4, y0 - 1e-4]).all()
+        assert (v[:, :2] <= [x1 + 1e-4, y1 + 1e-4]).all()
+        for axis, at in ((0, x1), (0, x0), (1, y1), (1, y0)):
+            corners.setdefault((axis, round(at, 3)), []).append(v[np.abs(v[:, axis] - at) < 1e-4])
+    # What two tiles have at their common border are the same places, heights too.
+    shared = [(1 - axis, both) for (axis, at), both in corners.items() if len(both) == 6]
+    assert len(shared) == 4
+    for along, places in shared:
+        for part in places:
+            middles = [abs(p[:, along].mean() - part[:, along].mean()) for p in places]
+            (other,) = (p for p, m in zip(places, middles, strict=True) if p is not part and m < 1.0)
+            order = np.argsort(other[:, along])
+            heights = np.interp(part[:, along], other[order, along], other[order, 2])
+            np.testing.assert_allclose(part[:, 2], heights, atol=1e-3)
+    with pytest.raises(UsageError, match="--force"):
+        add_tiles("Valley_1", mesh, tmp_path / "mine", 25.0, up="z")
+    with pytest.raises(AssetError, match=r"--tiles 1: the edge"):
+        add_tiles("Other", mesh, tmp_path / "mine", 1.0, up="z")
+    assert not list((tmp_path / "mine/scenes").glob("Other*"))
+
+
+@pytest.mark.parametrize(
+    ("up", "scale", "unit"), [("z", 1.0, "metres"), ("y", 100.0, "centimetres"), ("y", 1000.0, "millimetres")]
+)
+def test_axis_and_unit_are_guessed_by_form(up, scale, unit):
+    (node,) = city(up=up)
+    found = guess([node.placed(node.vertices * scale)])
+    assert (found.up, found.unit) == (up, unit)
+    assert found.up_sure
+
+
+def test_a_list_says_what_a_file_holds_and_writes_nothing(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    field = hills(2, cells=40)
+    scene = trimesh.Scene()
+    scene.add_geometry(field.mesh(), node_name="Terrain")
+    for k, box in enumerate(standing(field, 5, 2)):
+        scene.add_geometry(box, node_name=f"Hut.{k:03d}")
+    dome = trimesh.creation.icosphere(3, 500.0)
+    dome.invert()
+    scene.add_geometry(dome, node_name="SkyDome")
+    scene.export("place.glb")
+    before = sorted(p.name for p in tmp_path.rglob("*"))
+    code, out, err = said(capsys, "add-scene", "Place", "place.glb", "--list")
+    assert code == 0, err
+    assert "7 nodes" in out
+    assert "x is 0 to 80, y 0 to 80 m" in out
+    assert re.search(r"up: z .*--up z is the guess", out)
+    assert "scale: 1 if its unit is metres: 80 by 80 m" in out
+    assert "dome: SkyDome, 1,280 triangles" in out
+    assert re.search(r"^Terrain +terrain +3,200 +1 +0% +0\.0 to 80\.0 +0\.0 to 80\.0", out, re.MULTILINE)
+    assert max(map(len, out.splitlines())) <= 120
+    assert sorted(p.name for p in tmp_path.rglob("*")) == before
+    code, _, err = said(capsys, "add-scene", "Place", "place.glb")
+    assert code == 2
+    assert re.search(r"--up is missing: z or y; .*add-scene Place place.glb --list guesses it", err)
+    assert sorted(p.name for p in tmp_path.rglob("*")) == before
+
+
+def test_a_part_of_a_place_far_from_its_origin_is_one_recipe_like_others(tmp_path):
+    # Metres of a map: millions.
+    nodes = city(streets=4)
+    mesh = trimesh.Trimesh(nodes[0].vertices + np.array([4.1e5, 6.6e6, 12.0]), nodes[0].faces, process=False)
+    mesh.export(tmp_path / "city.ply", vertex_normal=False)
+    place = Place.of([nodes[0].placed(np.asarray(mesh.vertices))], "z", 1.0)
+    assert place.low == pytest.approx([4.1e5 - 5, 6.6e6 - 5, 11.0])
+    added = add_scene("Far", tmp_path / "city.ply", tmp_path / "mine", up="z", crop_m=(410060.0, 6600060.0, 40.0))
+    recipe = load_imported(tmp_path / "mine/scenes/Far.toml")
+    assert recipe.origin_m == added.repairs.origin_m
+    assert recipe.origin_m[1] == pytest.approx(6600060.0, abs=1.0)
+    assert np.abs(added.scene.bounds[:, :2]).max() <= 41
+    assert json.dumps(recipe.crop_m) == "[410060.0, 6600060.0, 40.0]"

@@ -1,0 +1,255 @@
+"""What is solid, ground or sky is decided at the import, stored with the scene, and soups are taken apart."""
+
+import struct
+import zipfile
+
+import numpy as np
+import pytest
+import trimesh
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from support import foreign
+from support.command_line import said
+from support.hills import hills, standing, write_hills
+
+from aerialdojo_gen.errors import AssetError
+from aerialdojo_gen.geometry.ground import Ground
+from aerialdojo_gen.imports.adopt import adopt
+from aerialdojo_gen.imports.apart import taken_apart
+from aerialdojo_gen.imports.command import add_scene
+from aerialdojo_gen.imports.files import read_mesh
+from aerialdojo_gen.imports.naming import Called, Naming
+from aerialdojo_gen.imports.raw import RawNode, plain
+from aerialdojo_gen.planning.clearance import ClearanceGrid
+from aerialdojo_gen.planning.collision import CollisionWorld
+from aerialdojo_gen.scenes.glb import read_glb, write_glb
+
+
+def raw(mesh: trimesh.Trimesh, name: str = "", colour: tuple[int, int, int] | None = None) -> RawNode:
+    colours = plain(len(mesh.faces)) if colour is None else np.tile(np.array(colour, np.uint8), (len(mesh.faces), 1))
+    return RawNode(name, np.asarray(mesh.vertices), np.asarray(mesh.faces, dtype=np.int64), colours)
+
+
+def dome(kind: str, radius: float = 300.0) -> trimesh.Trimesh:
+    body = trimesh.creation.box((2 * radius,) * 3) if kind == "box" else trimesh.creation.icosphere(3, radius)
+    return body.slice_plane([0, 0, -1e-3], [0, 0, 1]) if kind == "half" else body
+
+
+def yard() -> list[RawNode]:
+    rng = np.random.default_rng(3)
+    boxes = [trimesh.creation.box((4, 3, 5)).apply_translation([9 * k, 5 * rng.random(), 2.5]) for k in range(5)]
+    return [raw(b, f"Shed.{k:03d}") for k, b in enumerate(boxes)]
+
+
+@pytest.mark.parametrize("kind", ["ball", "half", "box"])
+@pytest.mark.parametrize("name", ["SkyDome", "Sphere.001", ""])
+def test_a_dome_is_drawn_and_never_in_the_way(kind, name, tmp_path):
+    scene, repairs = adopt("Yard", [*yard(), raw(dome(kind), name)])
+    assert [b.surface for b in scene.backdrop] == ["dome"]
+    assert "sky_0000" not in scene
+    assert any("sky_0000: drawn as the sky" in line for line in repairs.lines)
+    plain_scene, _ = adopt("Yard", yard())
+    # All else is as if it were not there: extent, ceiling, what may be hit.
+    np.testing.assert_array_equal(scene.bounds, plain_scene.bounds)
+    assert [i.node for i in scene.instances] == [i.node for i in plain_scene.instances]
+    write_glb(scene, tmp_path / "yard.glb")
+    again = read_glb(tmp_path / "yard.glb")
+    assert [(b.node, b.surface, len(b.faces)) for b in again.backdrop] == [
+        (b.node, b.surface, len(b.faces)) for b in scene.backdrop
+    ]
+    assert [i.surface for i in again.instances] == [i.surface for i in scene.instances]
+    assert ClearanceGrid.build(again).reachable([0.0, 8.0, 3.0])
+    assert CollisionWorld(again).distance_m([0.0, 8.0, 3.0]) == CollisionWorld(plain_scene).distance_m(
+        [0.0, 8.0, 3.0]
+    )
+
+
+def test_what_encloses_and_is_no_sky_stays():
+    hall = trimesh.creation.box((70, 40, 18)).apply_translation([18, 0, 9])
+    greenhouse = trimesh.creation.icosphere(3, 60.0).slice_plane([0, 0, -1e-3], [0, 0, 1])
+    for body, name in ((hall, "Hall"), (hall, ""), (greenhouse, "Greenhouse")):
+        scene, _ = adopt("Yard", [*yard(), raw(body, name)])
+        assert not scene.backdrop
+    # A table has the last word, either way.
+    sky, shed = (Naming((("X*", Called(category, {})),)) for category in ("sky", "greenhouse"))
+    assert adopt("Yard", [*yard(), raw(greenhouse, "X1")], naming=sky)[0].backdrop
+    assert not adopt("Yard", [*yard(), raw(greenhouse, "X1")], naming=shed)[0].backdrop
+
+
+@settings(max_examples=8, deadline=None)
+@given(st.integers(0, 10**6), st.floats(2.0, 16.0), st.booleans())
+def test_the_ground_that_is_stored_is_the_ground_by_form(seed, relief_m, turned):
+    field = hills(seed, cells=14, relief_m=relief_m)
+    nodes = [raw(field.mesh(turned), "Mesh.007"), *(raw(b) for b in standing(field, 3, seed))]
+    scene, repairs = adopt("Hills", nodes)
+    assert sorted(i.surface for i in scene.instances) == ["ground", "solid", "solid", "solid"]
+    assert any(line.startswith("nobody flies below the open ground") for line in repairs.lines)
+    ground = Ground.of(scene)
+    assert ground is not None
+    p = np.random.default_rng(seed).uniform(scene.bounds[0], scene.bounds[1], (400, 3))
+    shift = np.array(repairs.origin_m)
+    z = field.z((p + shift)[:, :2])
+    clear = np.isnan(z) | (np.abs((p + shift)[:, 2] - z) > 1e-3)
+    with np.errstate(invalid="ignore"):
+        expected = (p + shift)[:, 2] < z
+    assert (ground.below(p) == expected)[clear].all()
+
+
+def test_terrain_by_name_is_ground_where_its_form_leaves_it_open():
+    # A patch of relief in the corner of a wide paved yard that lies lower.
+    field = hills(5, cells=16, relief_m=5.0)
+    patch = field.mesh().apply_translation([0, 0, 2.0])
+    yard_ = trimesh.creation.box(bounds=[[-60, -60, -0.5], [60, 60, 0]])
+    scene, _ = adopt("Patch", [raw(patch, "Terrain"), raw(yard_, "Yard")])
+    assert {i.category: i.surface for i in scene.instances} == {"terrain": "ground", "yard": "solid"}
+    nameless, _ = adopt("Patch", [raw(patch, "Awning"), raw(yard_, "Yard")])
+    assert {i.category: i.surface for i in nameless.instances} == {"awning": "sheet", "yard": "solid"}
+
+
+def scan(seed: int) -> tuple[RawNode, list[np.ndarray]]:
+    """One surface, as photogrammetry makes it: hills, out of which houses rise without a seam."""
+    rng = np.random.default_rng(seed)
+    x, y = np.meshgrid(np.arange(0, 81.0), np.arange(0, 81.0))
+    ground = 3 * np.sin(x / 17 + seed) + 2 * np.cos(y / 13)
+    z, places = ground.copy(), []
+    for i in range(3):
+        for j in range(3):
+            x0, y0 = 8 + 24 * i + rng.integers(0, 4), 8 + 24 * j + rng.integers(0, 4)
+            at = np.s_[y0 : y0 + 9, x0 : x0 + 7]
+            z[at] = ground[at].max() + rng.uniform(4, 9)
+            places.append(np.array([x0 + 3, y0 + 4]))
+    n = 81
+    a = (np.arange(n - 1)[:, None] * n + np.arange(n - 1)).reshape(-1)
+    faces = np.concatenate([np.column_stack([a, a + 1, a + n + 1]), np.column_stack([a, a + n + 1, a + n])])
+    vertices = np.column_stack([x.ravel(), y.ravel(), z.ravel()])
+    return RawNode("", vertices, faces, plain(len(faces))), places
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_what_stands_out_of_one_surface_becomes_things(seed):
+    node, places = scan(seed)
+    bodies, told = taken_apart([node])
+    assert told.grown == len(places)
+    assert len(bodies) == 1 + len(places)
+    assert sum(len(b.faces) for b in bodies) == len(node.faces)
+    middles = [(b.vertices.min(axis=0) + b.vertices.max(axis=0))[:2] / 2 for b in bodies[1:]]
+    for place in places:
+        assert min(np.abs(m - place).max() for m in middles) < 2.0
+    scene, repairs = adopt("Scan", [node])
+    assert any(line.startswith("9 things were one surface with the ground") for line in repairs.lines)
+    # What was one surface with the ground has nothing below it either, and nobody flies into a house from below.
+    ground, origin = Ground.of(scene), np.array(repairs.origin_m)
+    assert ground is not None
+    for x, y in places:
+        assert ground.below([[x - origin[0], y - origin[1], 2.0 - origin[2] - 3.0]]).all()
+
+
+def test_bare_hills_are_not_taken_apart():
+    field = hills(7, cells=30, relief_m=14.0)
+    bodies, told = taken_apart([raw(field.mesh())])
+    assert (len(bodies), told.grown) == (1, 0)
+
+
+def test_a_fence_does_not_swallow_what_it_stands_around_and_a_house_has_its_chimney():
+    fence = trimesh.util.concatenate(
+        [trimesh.creation.box(bounds=b) for b in (
+            [[0, 0, 0], [40, 0.4, 9]], [[0, 39.6, 0], [40, 40, 9]], [[0, 0.3, 0], [0.4, 39.7, 9]],
+            [[39.6, 0.3, 0], [40, 39.7, 9]])]
+    )  # fmt: skip
+    ring = trimesh.creation.annulus(18, 20, 9).apply_translation([20, 20, 4.5])
+    house = trimesh.creation.box(bounds=[[15, 15, 0], [25, 24, 6]])
+    roof = trimesh.creation.box(bounds=[[16, 16, 6], [20, 20, 8.9]])
+    tower = trimesh.creation.box(bounds=[[60, 10, 0], [66, 16, 20]])
+    hatch = trimesh.creation.box(bounds=[[62, 12, 20], [63, 13, 20.2]])
+    soup = trimesh.util.concatenate([ring, house, roof, tower, hatch])
+    bodies, told = taken_apart([raw(soup)])
+    assert told.pieces == 5
+    sizes = sorted(len(b.faces) for b in bodies)
+    assert sizes == sorted([len(ring.faces), 12, 12, 24])
+    assert len(taken_apart([raw(fence, "Fence"), raw(house, "House")])[0]) == 2
+
+
+def test_wide_bodies_of_several_colours_fall_apart_by_material():
+    rows = [trimesh.creation.box(bounds=[[10 * k, 0, 0], [10 * k + 10, 9, 8 + k % 3]]) for k in range(8)]
+    terrace = trimesh.util.concatenate(rows)
+    terrace.merge_vertices()
+    colours = np.repeat(np.array([[200, 40, 40], [40, 90, 200]] * 4, np.uint8), 12, axis=0)
+    node = RawNode("", np.asarray(terrace.vertices), np.asarray(terrace.faces, np.int64), colours)
+    bodies, _ = taken_apart([node])
+    assert 8 <= len(bodies) <= 16
+
+
+@settings(max_examples=6, deadline=None)
+@given(st.randoms(use_true_random=False))
+def test_nodes_in_any_order_make_the_same_bytes(tmp_path_factory, random):
+    folder = tmp_path_factory.mktemp("order")
+    field = hills(4, cells=12)
+    nodes = [raw(field.mesh(), "Terrain"), *(raw(b, f"Hut.{k}") for k, b in enumerate(standing(field, 4, 4)))]
+    nodes += [raw(trimesh.creation.icosphere(2, 200.0), "Sky"), *[raw(trimesh.creation.box((3, 3, 3)), "Twin")] * 2]
+    nodes += [RawNode("Hut.9", np.full((3, 3), np.nan), np.array([[0, 1, 2]]), plain(1))]
+    made = []
+    for order in (list(range(len(nodes))), random.sample(range(len(nodes)), len(nodes))):
+        scene, repairs = adopt("Hills", [nodes[k] for k in order], crop_m=(12.0, 12.0, 10.0))
+        write_glb(scene, folder / "x.glb")
+        made.append(((folder / "x.glb").read_bytes(), repairs))
+    assert made[0] == made[1]
+
+
+def locked_zip(path) -> None:
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("m.obj", "v 0 0 0\n")
+    data = bytearray(path.read_bytes())
+    struct.pack_into("<H", data, 6, 1)
+    path.write_bytes(data)
+
+
+BAD = [
+    ("a.glb", b"", r"is empty \(0 bytes\)"),
+    ("a.obj", b"\0" * 5000, "begins with zeros alone"),
+    ("a.glb", b"\x1f\x8b\x08" + b"x" * 40, "compressed by gzip: unpack it first"),
+    ("a.obj", b"PK\x03\x04\x14\0\0\0" + b"x" * 40, "is a ZIP archive: unpack it"),
+    ("a.obj", None, "is an encrypted ZIP archive: unpack it with its password"),
+    ("a.ply", b"glTF\x02\0\0\0" + b"x" * 40, r"is a GLB file by its content: rename it to a\.glb"),
+    ("a.glb", b"ply\nformat ascii 1.0\nend_header\n", r"is a PLY file by its content: rename it to a\.ply"),
+    ("a.glb", b"<!DOCTYPE html><html>sign in</html>", "is a web page"),
+    ("a.glb", b"version https://git-lfs.github.com/spec/v1\noid sha256:00\n", "Git LFS pointer.*git lfs pull"),
+    ("a.stl", b"BLENDER-v300" + b"\0" * 40, "is a Blender file: export it as GLB"),
+    ("a.ply", b"ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nend_header\n0\n", "points and no faces"),
+    ("a.glb", foreign.glb(b'{"asset":{"version":"2.0"},"extensionsRequired":["KHR_draco_mesh_compression"]}'),
+     r"is compressed \(KHR_draco_mesh_compression\): export it without compression"),
+    ("a.obj", b"v nan nan nan\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "empty or degenerate|no triangle"),
+    ("a.dwg", b"AC1032", "meshes are read from"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("name", "content", "message"), BAD)
+def test_bad_files_are_one_line_with_the_mend_and_leave_nothing(tmp_path, capsys, name, content, message):
+    path = tmp_path / name
+    if content is None:
+        locked_zip(path)
+    else:
+        path.write_bytes(content)
+    with pytest.raises(AssetError, match=message) as error:
+        add_scene("Odd", path, tmp_path / "mine", up="z")
+    assert str(error.value).startswith(str(path))
+    assert "\n" not in str(error.value)
+    assert sorted(p.name for p in tmp_path.iterdir()) == [name]
+    code, _, err = said(capsys, "add-scene", "Odd", path, "--list")
+    assert code == 1
+    assert err.count("\n") == 1
+
+
+def test_a_file_of_ten_gigabytes_is_not_opened(tmp_path):
+    path = tmp_path / "huge.obj"
+    with path.open("wb") as file:
+        file.truncate(10 << 30)
+    with pytest.raises(AssetError, match=r"huge\.obj: 10240 MiB, the most is 1024: simplify or split the mesh"):
+        read_mesh(path)
+
+
+def test_a_cut_glb_is_named(tmp_path):
+    whole = write_hills(hills(1, cells=10), [], tmp_path / "hills.glb").read_bytes()
+    for end in (10, 30, len(whole) // 2, len(whole) - 40):
+        (tmp_path / "cut.glb").write_bytes(whole[:end])
+        with pytest.raises(AssetError, match=r"cut\.glb: "):
+            read_mesh(tmp_path / "cut.glb")
