@@ -48,7 +48,6 @@ app = typer.Typer(
     name="aerialdojo-gen",
     help="Generate aerial object-goal-search datasets: scenes, tasks, certified routes, RGB-D recordings.",
     no_args_is_help=True,
-    add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,  # half of the time that --help takes is importing what draws boxes
     context_settings={"help_option_names": ["-h", "--help"]},

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from aerialdojo_gen.commands.common import Data, Scene
+from aerialdojo_gen.commands.common import Data, Scene, Scenes, together
 
 app = typer.Typer()
 
@@ -15,6 +15,7 @@ app = typer.Typer()
 @app.command("export")
 def export(
     form: Annotated[str, typer.Option("--format", help="aerialdojo or habitat.")],
+    scenes: Scenes = None,
     data: Data = "data",
     out: Annotated[Path | None, typer.Option("--out", help="Folder to make.  (default: DATA/exports/FORMAT)")] = None,
     scene: Scene = None,
@@ -35,7 +36,7 @@ def export(
     if out is None and not isinstance(root, LocalRoot):
         raise UsageError("an export is a folder of this machine: name it with --out")
     target = out or Path(root.at(f"exports/{form}"))
-    counts = export_release(form, root, target, scene, force=force, picture_px=picture_size)
+    counts = export_release(form, root, target, together(scenes, scene), force=force, picture_px=picture_size)
     print(f"{target}: " + ", ".join(f"{n:,} {name}" for name, n in counts.items()))
 
 
