@@ -16,6 +16,7 @@ from aerialdojo_gen.commands import (
     config,
     evaluate,
     exchange,
+    hub,
     release,
     render,
     report,
@@ -71,7 +72,7 @@ def _program(
     """Take what stands before a command."""
 
 
-for _group in (stages, render, sources, annotate, evaluate, release, show, validate, exchange, report):
+for _group in (stages, render, sources, annotate, evaluate, release, show, validate, exchange, hub, report):
     app.add_typer(_group.app)
 app.add_typer(config.app, name="config")
 
