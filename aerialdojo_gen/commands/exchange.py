@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from aerialdojo_gen.commands.common import Data, Scene, Scenes, together
+from aerialdojo_gen.commands.common import Data, Quiet, Scene, Scenes, together
 
 app = typer.Typer()
 
@@ -26,17 +26,25 @@ def export(
             help="Pixels of aerialdojo's pictures, drawn from the meshes; 0: the release's own.  (default: 640)"
         ),
     ] = None,
+    shards: Annotated[
+        bool, typer.Option("--shards", help="One tar a scene in place of aerialdojo's file a trajectory.")
+    ] = False,
+    quiet: Quiet = False,
 ) -> None:
     """Write the release in the layout of AerialDojo's authors, or as Habitat's ObjectNav-v1."""
     from aerialdojo_gen.errors import UsageError
     from aerialdojo_gen.exchange.exporting import export_release
+    from aerialdojo_gen.pipeline.progress import Reporter
     from aerialdojo_gen.store.root import LocalRoot, open_root
 
     root = open_root(data)
     if out is None and not isinstance(root, LocalRoot):
         raise UsageError("an export is a folder of this machine: name it with --out")
     target = out or Path(root.at(f"exports/{form}"))
-    counts = export_release(form, root, target, together(scenes, scene), force=force, picture_px=picture_size)
+    counts = export_release(
+        form, root, target, together(scenes, scene), force=force, picture_px=picture_size, shards=shards,
+        reporter=Reporter(quiet=quiet),
+    )  # fmt: skip
     print(f"{target}: " + ", ".join(f"{n:,} {name}" for name, n in counts.items()))
 
 

@@ -85,28 +85,39 @@ class Hub:
         from huggingface_hub import errors
 
         # The library's own client: its name is another one in other versions.
-        client_error: type[Exception] = errors.HfHubHTTPError.__bases__[0]
-        who = f"{TOKEN} may not see it" if self.token else f"it is private, and {TOKEN} is not set"
+        known = (errors.HfHubHTTPError.__bases__[0], ConnectionError, TimeoutError)
         try:
             yield
-        except errors.RevisionNotFoundError:
-            raise UsageError(f"{self.repo} at {self.endpoint} has no such revision") from None
-        except errors.HfHubHTTPError as error:
-            status = error.response.status_code if error.response is not None else 0
-            # Without an account the server says of what is private, and of what is not there, 401.
-            if status == 404 or (status == 401 and isinstance(error, errors.RepositoryNotFoundError)):
-                raise UsageError(f"there is no data set {self.repo} at {self.endpoint}, or {who}") from None
-            if status == 401:
-                raise AerialDojoError(f"{self.endpoint} does not know the token in {TOKEN}: make another") from None
-            if status == 403:
-                raise AerialDojoError(
-                    f"the token in {TOKEN} may not {doing} {self.repo}: it needs that right at {self.endpoint}"
-                ) from None
-            raise AerialDojoError(f"{self.endpoint} answers {status}: {self._line(error)}; try again later") from None
-        except (client_error, ConnectionError, TimeoutError) as error:
-            raise AerialDojoError(
+        except Exception as error:
+            # What goes wrong in one of its threads comes as a RuntimeError that was caused by it.
+            cause: BaseException | None = error
+            while cause is not None and not isinstance(cause, known):
+                cause = cause.__cause__
+            if cause is None or isinstance(error, AerialDojoError):
+                raise
+            raise self._told(cause, doing) from None
+
+    def _told(self, error: BaseException, doing: str) -> AerialDojoError:
+        from huggingface_hub import errors
+
+        who = f"{TOKEN} may not see it" if self.token else f"it is private, and {TOKEN} is not set"
+        if isinstance(error, errors.RevisionNotFoundError):
+            return UsageError(f"{self.repo} at {self.endpoint} has no such revision")
+        if not isinstance(error, errors.HfHubHTTPError):
+            return AerialDojoError(
                 f"cannot reach {self.endpoint} ({self._line(error)}): the same command goes on when there is a way"
-            ) from None
+            )
+        status = error.response.status_code if error.response is not None else 0
+        # Without an account the server says of what is private, and of what is not there, 401.
+        if status == 404 or (status == 401 and isinstance(error, errors.RepositoryNotFoundError)):
+            return UsageError(f"there is no data set {self.repo} at {self.endpoint}, or {who}")
+        if status == 401:
+            return AerialDojoError(f"{self.endpoint} does not know the token in {TOKEN}: make another")
+        if status == 403:
+            return AerialDojoError(
+                f"{self.endpoint} refuses to {doing} {self.repo} ({self._line(error)}): {TOKEN} needs that right"
+            )
+        return AerialDojoError(f"{self.endpoint} answers {status}: {self._line(error)}; try again later")
 
     def _line(self, error: BaseException) -> str:
         said = getattr(error, "server_message", None)
