@@ -43,7 +43,12 @@ class Size:
 
     def __str__(self) -> str:
         """In words."""
-        return f"{self.files:,} files, about {self.bytes / 1e6:,.0f} MB"
+        megabytes = self.bytes / 1e6
+        return (
+            f"{self.files:,} files, about {megabytes:,.0f} MB"
+            if megabytes >= 10
+            else (f"{self.files:,} files, about {megabytes:.1f} MB")
+        )
 
 
 def size_of(format_name: str, data: DataRoot, scenes: Sequence[str], picture_px: int) -> Size:

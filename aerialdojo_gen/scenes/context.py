@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import threading
 from collections import OrderedDict
-from collections.abc import Callable, Hashable, Iterable
+from collections.abc import Callable, Hashable
 from pathlib import Path
 from typing import Any, TypeVar
 from weakref import WeakKeyDictionary
@@ -198,6 +198,7 @@ def _oldest_beyond(number: int) -> list[SceneContext]:
     return [_contexts.popitem(last=False)[1] for _ in range(len(_contexts) - number)]
 
 
-def _release(contexts: Iterable[SceneContext]) -> None:
-    for context in contexts:
-        context.release()
+def _release(contexts: list[SceneContext]) -> None:
+    """Let go of them one by one, so that none of them is left when the next scene is read."""
+    while contexts:
+        contexts.pop(0).release()
