@@ -41,6 +41,7 @@ NOT_RUN = {
     r".*(s3://|AWS_).*": "needs an object store: tests/store/test_readers_on_s3.py has one",
     r"sudo .*|python3.11 -m venv .*|git .*|ray .*|RAY_USAGE.*|.*--executor ray.*": "makes a cluster: "
     "tests/pipeline/test_ray_cluster.py has one",
+    r"export HF_TOKEN.*|push-to-hub .*|pull .*|validate --data pulled .*": "asks a hub: tests/exchange/test_hub.py has one",
     r"validate DOWNLOADED .*": "runs in tests/validate/test_validate_release.py, on a release that lies elsewhere",
     r"cp -al .*|rm -r .*|run pipelines/aerialdojo-hard.toml .*": "plans 42 scenes: "
     "tests/stages/test_filter.py has its limits",
