@@ -67,6 +67,15 @@ def test_every_pipeline_that_is_shipped_goes_by_its_name(unpacked, project):
     assert done.stdout.split() == names
 
 
+def test_where_no_release_is_the_wheel_advises_what_it_has(unpacked, tmp_path):
+    done = subprocess.run(
+        [sys.executable, "-m", "aerialdojo_gen.cli", "stats", "--data", str(tmp_path / "none")],
+        cwd=tmp_path, env=os.environ | {"PYTHONPATH": str(unpacked)}, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 1
+    assert done.stderr.endswith("or make one with aerialdojo-gen run aerialdojo-200k\n")
+
+
 @pytest.mark.parametrize(
     ("version", "there", "not_there"), [("3.11", "pybullet", "moderngl"), ("3.12", "moderngl", "pybullet"),
                                         ("3.13", "moderngl", "pybullet")]
