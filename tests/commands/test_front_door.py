@@ -11,7 +11,7 @@ import typer.main
 from aerialdojo_gen import cli
 from aerialdojo_gen.commands.picking import given_scene, pick_scene
 from aerialdojo_gen.errors import UsageError
-from aerialdojo_gen.pipeline.registry import STAGES
+from aerialdojo_gen.pipeline.registry import STAGES, upstream
 from aerialdojo_gen.pipeline.run import home
 from aerialdojo_gen.store import shards
 
@@ -123,9 +123,11 @@ def test_a_run_with_nothing_to_do_says_so_in_a_line(smoke, call, monkeypatch, pr
     assert code == 0
     lines = said.splitlines()
     assert [line.partition(":")[0] for line in lines] == ["filter", "nothing to do"]
-    assert lines[1].startswith(f"nothing to do: all {STAGE_NAMES.index('filter') + 1} stages are up to date")
+    n = len(upstream("filter"))
+    assert n > 4
+    assert lines[1].startswith(f"nothing to do: all {n} stages are up to date")
     _, _, said = call(*asked, "--verbose")
-    assert said.count("; nothing to do; ") == STAGE_NAMES.index("filter") + 1
+    assert said.count("; nothing to do; ") == n
     assert call(*asked, "-q") == (0, "", "")
 
 
