@@ -269,7 +269,7 @@ class AerialDojoEnv(gymnasium.Env[dict[str, Any], np.int64]):
         """Refuse: see `__deepcopy__`."""
         raise TypeError(_NO_COPY)
 
-    def __deepcopy__(self, memo: dict[int, Any]) -> AerialDojoEnv:
+    def __deepcopy__(self, _memo: dict[int, Any]) -> AerialDojoEnv:
         """Refuse: a copy would share what draws, and what holds the scene, with this one."""
         raise TypeError(_NO_COPY)
 

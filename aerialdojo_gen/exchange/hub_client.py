@@ -60,7 +60,7 @@ class Hub:
             )
         try:
             import huggingface_hub
-            from huggingface_hub.utils import disable_progress_bars
+            from huggingface_hub.utils import disable_progress_bars  # type: ignore[attr-defined]
         except ImportError:
             raise AerialDojoError(f"{verb} lacks the package huggingface_hub: {_MEND}") from None
         disable_progress_bars()

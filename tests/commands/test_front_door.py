@@ -123,7 +123,7 @@ def test_a_run_with_nothing_to_do_says_so_in_a_line(smoke, call, monkeypatch, pr
     assert code == 0
     lines = said.splitlines()
     assert [line.partition(":")[0] for line in lines] == ["filter", "nothing to do"]
-    n = len(upstream("filter"))
+    n = len(list(upstream("filter")))
     assert n > 4
     assert lines[1].startswith(f"nothing to do: all {n} stages are up to date")
     _, _, said = call(*asked, "--verbose")
