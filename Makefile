@@ -24,13 +24,12 @@ UV := $(PIP) uv 2>/dev/null && .venv/bin/uv pip install --quiet --python .venv/b
 
 .venv/.installed: pyproject.toml constraints.txt
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { \
-	  echo "error: $(PYTHON) is older than Python 3.11: install Python 3.11, or make PYTHON=/path/to/python3.11" >&2; exit 1; }
+	  echo "error: $(PYTHON) is older than Python 3.11: install 3.11, 3.12 or 3.13, or make PYTHON=/path/to/python3" >&2; exit 1; }
 	@test -x .venv/bin/python || $(PYTHON) -m venv .venv
 	@echo "installing the packages of constraints.txt into .venv/ (seconds by uv, minutes by pip)"
 	@{ $(UV) -e '.[gl,web]' 2>/dev/null; } || $(PIP) -e '.[gl,web]' || { \
-	  $(PYTHON) -c 'import sys; sys.exit(sys.version_info[:2] == (3, 11))' && echo "error: a package could not be installed, see above" >&2 || \
-	  echo "error: a package could not be installed, see above. PyBullet has a wheel for Python 3.11 only and is built from" \
-	       "source on others (C++ compiler and Python headers needed): with Python 3.11, rm -rf .venv and make PYTHON=python3.11" >&2; exit 1; }
+	  echo "error: a package could not be installed, see above. For every one there are wheels for Python 3.11, 3.12 and 3.13:" \
+	       "with one of them, rm -rf .venv and make PYTHON=/path/to/python3" >&2; exit 1; }
 	@echo "compiling the kernels (half a minute, once)"
 	@find aerialdojo_gen -name '*.nb[ic]' -delete  # Numba's of an earlier checkout may name modules that have moved
 	@dir=$$(mktemp -d) && trap 'rm -rf "$$dir"' EXIT && \

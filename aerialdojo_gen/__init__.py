@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from aerialdojo_gen.browse.release import Release, open_release
     from aerialdojo_gen.config.keys import config_keys
     from aerialdojo_gen.errors import AerialDojoError
+    from aerialdojo_gen.exchange.hub import pull_release, push_to_hub
     from aerialdojo_gen.pipeline.run import run_pipeline
     from aerialdojo_gen.pipeline.template import init_config
     from aerialdojo_gen.planning.planner import Planner, plan
@@ -34,6 +35,8 @@ __all__ = [
     "make_env",
     "open_release",
     "plan",
+    "pull_release",
+    "push_to_hub",
     "read_glb",
     "run_pipeline",
 ]
@@ -49,6 +52,8 @@ _HOMES = {
     "make_env": "aerialdojo_gen.benchmark.env",
     "open_release": "aerialdojo_gen.browse.release",
     "plan": "aerialdojo_gen.planning.planner",
+    "pull_release": "aerialdojo_gen.exchange.hub",
+    "push_to_hub": "aerialdojo_gen.exchange.hub",
     "read_glb": "aerialdojo_gen.scenes.glb",
     "run_pipeline": "aerialdojo_gen.pipeline.run",
 }

@@ -16,6 +16,7 @@ from aerialdojo_gen.commands import (
     config,
     evaluate,
     exchange,
+    hub,
     release,
     render,
     report,
@@ -48,7 +49,6 @@ app = typer.Typer(
     name="aerialdojo-gen",
     help="Generate aerial object-goal-search datasets: scenes, tasks, certified routes, RGB-D recordings.",
     no_args_is_help=True,
-    add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,  # half of the time that --help takes is importing what draws boxes
     context_settings={"help_option_names": ["-h", "--help"]},
@@ -72,7 +72,7 @@ def _program(
     """Take what stands before a command."""
 
 
-for _group in (stages, render, sources, annotate, evaluate, release, show, validate, exchange, report):
+for _group in (stages, render, sources, annotate, evaluate, release, show, validate, exchange, hub, report):
     app.add_typer(_group.app)
 app.add_typer(config.app, name="config")
 

@@ -43,6 +43,8 @@ NOT_RUN = {
     r".*(s3://|AWS_).*": "needs an object store: tests/store/test_readers_on_s3.py has one",
     r"sudo .*|python3.11 -m venv .*|git .*|ray .*|RAY_USAGE.*|.*--executor ray.*": "makes a cluster: "
     "tests/pipeline/test_ray_cluster.py has one",
+    r"export HF_TOKEN.*|push-to-hub .*|pull .*|validate --data pulled .*": "asks a hub: "
+    "tests/exchange/test_hub.py has one",
     r"validate DOWNLOADED .*": "runs in tests/validate/test_validate_release.py, on a release that lies elsewhere",
     r"cp -al .*|rm -r .*|run pipelines/aerialdojo-hard.toml .*": "plans 42 scenes: "
     "tests/stages/test_filter.py has its limits",
@@ -212,6 +214,24 @@ def run_python(folder, text):
     done = subprocess.run([sys.executable, script], cwd=folder, env=env, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr[-3000:]
     return done.stdout
+
+
+def test_git_ignores_what_readme_and_docs_suggest_to_write(tmp_path):
+    """Where they are called, in the checkout: nothing of it is to be committed by mistake."""
+    options = re.compile(r"--(?:out|html|markdown|csv|figures|report|data|log)[ =](\S+)")
+    suggested = set()
+    for command in shell_commands():
+        suggested |= {path for path in options.findall(command) if "://" not in path and not path.startswith("/")}
+        suggested |= set(re.findall(r"^config init (\S+)", command))
+    suggested -= {"DIR", "docs/gallery"}
+    assert {"exports/aerialdojo", "stats.md", "figures/", "task.png", "mine.toml", "data-smoke"} <= suggested
+    shutil.copy(ROOT / ".gitignore", tmp_path)
+    subprocess.run(["git", "init", "-q"], cwd=tmp_path, check=True)
+    # A folder is known by its slash, for there is none.
+    folders = {name if Path(name).suffix else f"{name.rstrip('/')}/" for name in suggested}
+    names = sorted({*folders, "my-scenes/pipeline.toml", "U_Mall_0-6c9aa88ae4fc-s.png"})
+    done = subprocess.run(["git", "check-ignore", "--", *names], cwd=tmp_path, capture_output=True, text=True)
+    assert set(names) - set(done.stdout.splitlines()) == set()
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)

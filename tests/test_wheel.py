@@ -4,9 +4,11 @@ import os
 import shutil
 import subprocess
 import sys
+import tomllib
 import zipfile
 
 import pytest
+from packaging.requirements import Requirement
 
 
 @pytest.fixture(scope="module")
@@ -39,9 +41,9 @@ def test_a_wheel_finds_nothing_to_do_after_a_checkout_and_makes_the_same_bytes(u
     found = subprocess.run([sys.executable, "-c", where], cwd=unpacked, env=env, capture_output=True, text=True)
     assert found.stdout.strip() == str(package / "__init__.py")
 
-    # What the checkout wrote is the wheel's own.
+    # What the checkout wrote is the wheel's own, and a pipeline's name is as good as its path.
     pipeline = package / "_shipped" / "pipelines" / "smoke.toml"
-    said = run(unpacked, "run", pipeline, "--data", data).splitlines()
+    said = run(unpacked, "run", "smoke", "--data", data, "--verbose").splitlines()
     stages = [line for line in said if " rows in, " in line]
     assert len(stages) == 9
     assert all("; nothing to do; " in line for line in stages), said
@@ -51,3 +53,60 @@ def test_a_wheel_finds_nothing_to_do_after_a_checkout_and_makes_the_same_bytes(u
         assert "2 of 2 shards computed" in run(unpacked, stage, "--pipeline", pipeline, "--data", data, "--force")
     shards = sorted(path.relative_to(smoke) for path in smoke.rglob("*") if path.is_file())
     assert [path for path in shards if (data / path).read_bytes() != (smoke / path).read_bytes()] == []
+
+
+def test_every_pipeline_that_is_shipped_goes_by_its_name(unpacked, project):
+    env = os.environ | {"PYTHONPATH": str(unpacked)}
+    names = sorted(path.stem for path in (project / "pipelines").glob("*.toml"))
+    assert {"smoke", "aerialdojo-200k"} <= set(names)
+    text = "import sys; from aerialdojo_gen.pipeline.run import open_pipeline as o; "
+    text += "print(*[o(name, 'd')[0].name for name in sys.argv[1:]])"
+    done = subprocess.run(
+        [sys.executable, "-c", text, *names], cwd=unpacked, env=env, capture_output=True, text=True, check=True
+    )
+    assert done.stdout.split() == names
+
+
+def test_where_no_release_is_the_wheel_advises_what_it_has(unpacked, tmp_path):
+    done = subprocess.run(
+        [sys.executable, "-m", "aerialdojo_gen.cli", "stats", "--data", str(tmp_path / "none")],
+        cwd=tmp_path, env=os.environ | {"PYTHONPATH": str(unpacked)}, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 1
+    assert done.stderr.endswith("or make one with aerialdojo-gen run aerialdojo-200k\n")
+
+
+@pytest.mark.parametrize(
+    ("version", "there", "not_there"), [("3.11", "pybullet", "moderngl"), ("3.12", "moderngl", "pybullet"),
+                                        ("3.13", "moderngl", "pybullet")]
+)  # fmt: skip
+def test_there_is_a_renderer_for_every_python(project, version, there, not_there):
+    """PyBullet has wheels up to 3.11: later it is an extra, and OpenGL comes in its place."""
+    known = tomllib.loads((project / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    found = {one.name for one in map(Requirement, known["dependencies"])
+             if one.marker is None or one.marker.evaluate({"python_version": version})}  # fmt: skip
+    assert there in found
+    assert not_there not in found
+    assert Requirement(*known["optional-dependencies"]["pybullet"]).name == "pybullet"
+    assert f"Programming Language :: Python :: {version}" in known["classifiers"]
+
+
+def test_without_pybullet_opengl_draws_and_who_asks_for_pybullet_gets_a_line(project):
+    text = """
+import sys
+sys.modules["pybullet"] = None  # as where it is not installed
+from aerialdojo_gen.rendering.backend import choose_renderer
+assert choose_renderer("auto").name == "gl"
+from aerialdojo_gen.rendering.preview import look_at
+from aerialdojo_gen.rendering.probe import probe_scene
+assert look_at(probe_scene(), (-6, -6, 6), (0, 0, 1), 32, 24).std() > 5
+from aerialdojo_gen.errors import RenderError
+try:
+    choose_renderer("pybullet")
+except RenderError as error:
+    print(error)
+"""
+    done = subprocess.run([sys.executable, "-c", text], cwd=project, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.count("\n") == 1
+    assert "pip install 'aerialdojo-gen[pybullet]'" in done.stdout

@@ -24,7 +24,8 @@ class Sensors:
     Attributes
     ----------
     views : tuple of str
-        Of `aerialdojo_gen.store.schemas.VIEWS`; empty for an agent that flies blind, and then nothing is rendered.
+        Of `aerialdojo_gen.store.schemas.VIEWS` (a name alone does for one); empty for an agent that flies blind,
+        and then nothing is rendered.
     rgb, depth : bool
         Whether pictures, and whether depth, are handed out.
     width, height : int
@@ -44,7 +45,8 @@ class Sensors:
     max_depth_m: float = 65.535
 
     def __post_init__(self) -> None:
-        """Refuse what no body carries."""
+        """Refuse what no body carries; give views their one form."""
+        object.__setattr__(self, "views", (self.views,) if isinstance(self.views, str) else tuple(self.views))
         for view in self.views:
             if view not in VIEWS:
                 raise UsageError(unknown("no view", view, VIEWS))

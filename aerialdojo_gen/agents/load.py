@@ -39,6 +39,8 @@ def agent_class(name: str) -> Callable[..., Any]:
     ------
     UsageError
         There is no such agent, or its module raises.
+    AerialDojoError
+        One of `BUILT_IN` lacks a package.
     """
     where = BUILT_IN.get(name, name)
     module_name, colon, class_name = where.partition(":")
@@ -49,6 +51,10 @@ def agent_class(name: str) -> Callable[..., Any]:
     try:
         module = importlib.import_module(module_name)
     except ImportError as error:
+        if name in BUILT_IN:
+            raise AerialDojoError(
+                f"agent {name!r} lacks the package {error.name}: pip install 'aerialdojo-gen[llm]'"
+            ) from None
         raise UsageError(f"cannot load agent {name!r}: {first_line(error)}") from None
     except AerialDojoError:
         raise

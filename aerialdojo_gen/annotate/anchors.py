@@ -192,13 +192,13 @@ class AnchorDesk:
         return view
 
     def _look(self, position_m: Floats, yaw_rad: float) -> View:
+        from aerialdojo_gen.rendering.backend import kept_renderer
         from aerialdojo_gen.rendering.casters import ray_caster
-        from aerialdojo_gen.rendering.world import render_world
         from aerialdojo_gen.stages.work.reference_images import box_of, instance_map
 
         camera = Camera(self._pictures.width, self._pictures.height, self._pictures.fov_deg)
         pose = view_pose(position_m, yaw_rad, "front")
-        picture = render_world(self.scene).render(camera, pose)
+        picture = kept_renderer(self.scene, self._pictures.renderer).render(camera, pose)
         rays = ray_caster(self.scene)
         shown = instance_map(rays, camera, pose)
         found, counts = np.unique(shown[shown >= 0], return_counts=True)

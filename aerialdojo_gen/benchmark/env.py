@@ -8,12 +8,12 @@ from typing import Any
 
 import gymnasium
 import numpy as np
-import pyarrow as pa
 import pyarrow.compute as pc
 from gymnasium import spaces
 from numpy.typing import NDArray
 
 from aerialdojo_gen.agents.goal import N_ACTIONS, Sensors
+from aerialdojo_gen.benchmark.draw import TaskDraw
 from aerialdojo_gen.benchmark.episode import Episode
 from aerialdojo_gen.benchmark.eyes import look, mosaic
 from aerialdojo_gen.benchmark.flight import Flight
@@ -31,10 +31,15 @@ from aerialdojo_gen.common.names import unknown
 from aerialdojo_gen.config.agreement import SUCCESS_RADIUS_M
 from aerialdojo_gen.config.sections import Embodiment
 from aerialdojo_gen.errors import UsageError
+from aerialdojo_gen.scenes.context import SEVERAL
 from aerialdojo_gen.store.root import DataRoot, Where, open_root
 from aerialdojo_gen.store.schemas import DIRECTIONS, VIEWS
 
 _TEXT = ("target_name", "landmark", "description")
+_NO_COPY = (
+    "an environment cannot be copied: it holds an OpenGL context and a collision world; make another one with the "
+    "same arguments (make_env, make_vec); reset(options={'task_id': …}) and the same actions lead to the same state"
+)
 _RENDERED = Sensors(depth=False, width=320, height=320)
 
 
@@ -77,6 +82,14 @@ class AerialDojoEnv(gymnasium.Env[dict[str, Any], np.int64]):
         directions) and `heading_deg` (clockwise from north).
     render_mode : str, optional
         ``"rgb_array"``: `render` returns the four views in one picture.
+    scenes_in_memory : int
+        How many scenes stay open in this process, some 100 to 200 MB each: going back to one of them costs nothing,
+        another one seconds.
+    episodes_per_scene : int
+        So many episodes in a row are drawn in one scene. Over many episodes tasks are drawn as often as with 1.
+    prefetch : bool
+        Read the scene that comes next in a thread, while this one is flown in; it comes beside `scenes_in_memory`.
+        Tasks are the same ones with it and without.
 
     Raises
     ------
@@ -99,7 +112,7 @@ class AerialDojoEnv(gymnasium.Env[dict[str, Any], np.int64]):
         limit: int | None = None,
         seed: int = 0,
         sensors: Sensors | None = None,
-        views: Sequence[str] = VIEWS,
+        views: str | Sequence[str] = VIEWS,
         rgb: bool = True,
         depth: bool = True,
         width: int = 640,
@@ -109,18 +122,28 @@ class AerialDojoEnv(gymnasium.Env[dict[str, Any], np.int64]):
         renderer: str = "auto",
         tell: str | Sequence[str] = (),
         render_mode: str | None = None,
+        scenes_in_memory: int = SEVERAL,
+        episodes_per_scene: int = 1,
+        prefetch: bool = False,
     ) -> None:
         if render_mode not in (None, "rgb_array"):
             raise UsageError(f"no render mode {render_mode!r}: there is 'rgb_array'")
+        for name, number in (("scenes_in_memory", scenes_in_memory), ("episodes_per_scene", episodes_per_scene)):
+            if number < 1:
+                raise UsageError(f"{name} is at least 1, not {number}")
         self.render_mode = render_mode
         self._data = open_root(data)
-        self._sensors = sensors or Sensors(tuple(views), rgb, depth, width, height)
+        self._sensors = sensors or Sensors(_names(views), rgb, depth, width, height)
         self._tell = check_tell(_names(tell))
-        self._flight = Flight(self._data, self._sensors, success_radius_m, embodiment, renderer, self._tell)
-        self._begun = False
+        self._flight = Flight(
+            self._data, self._sensors, success_radius_m, embodiment, renderer, self._tell, scenes_in_memory
+        )
+        self._begun = self._closed = False
         self._rows = select(
             self._data, Selection(_names(split), _names(setting), _names(modality), _names(scene), limit, seed)
         )
+        self._draw = TaskDraw(self._rows["scene"].to_pylist(), episodes_per_scene)
+        self._prefetch = prefetch
         self._index: dict[str, int] | None = None
         self._image_shape = self._find_image_shape()
         self.action_space = spaces.Discrete(N_ACTIONS)
@@ -136,10 +159,15 @@ class AerialDojoEnv(gymnasium.Env[dict[str, Any], np.int64]):
         """Names of the scenes that have tasks to draw, sorted."""
         return sorted(pc.unique(self._rows["scene"]).to_pylist())
 
-    def task_ids(self, scenes: Sequence[str]) -> list[str]:
-        """Ids of the tasks to draw from that are in some scenes, sorted."""
-        own = self._rows.filter(pc.is_in(self._rows["scene"], pa.array(list(scenes), pa.string())))
-        return sorted(own["task_id"].to_pylist())
+    def draw_from(self, scenes: Sequence[str]) -> None:
+        """Draw episodes from some scenes alone; the spaces stay those of all tasks.
+
+        Raises
+        ------
+        UsageError
+            No task of the selection is in them.
+        """
+        self._draw.restrict(scenes)
 
     def told(self) -> list[tuple[str, str, str, str | None]]:
         """Goals in words, of all tasks to draw from: target, landmark, direction, description or None."""
@@ -172,13 +200,19 @@ class AerialDojoEnv(gymnasium.Env[dict[str, Any], np.int64]):
         UsageError
             There is no such task among those chosen, or no such option.
         """
+        if self._closed:
+            raise RuntimeError("the environment is closed: make another one")
         super().reset(seed=seed)
+        if seed is not None:
+            self._draw.begin_anew()
         unknown = set(options or {}) - {"task_id"}
         if unknown:
             raise UsageError(f"reset has no option {sorted(unknown)[0]!r}: there is 'task_id'")
-        at = int(self.np_random.integers(self.n_tasks)) if not options else self._find(options["task_id"])
+        at = self._find(options["task_id"]) if options else self._draw.next(self.np_random)
         self._flight.begin(read_tasks(self._data, self._rows.slice(at, 1))[0])
         self._begun = True
+        if self._prefetch and not options and (coming := self._draw.coming) is not None:
+            self._flight.look_ahead(coming)
         return self._observe(), {"reason": ""}
 
     def step(self, action: Any) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
@@ -224,6 +258,20 @@ class AerialDojoEnv(gymnasium.Env[dict[str, Any], np.int64]):
         episode = self.episode
         flight = self._flight
         return mosaic(look(flight.space.scene, _RENDERED, episode.position, episode.yaw_rad, flight.renderer)[0])
+
+    def close(self) -> None:
+        """Let go of the scenes, their pictures and what reads ahead; a second call does nothing."""
+        if not self._closed:
+            self._closed, self._begun = True, False
+            self._flight.close()
+
+    def __copy__(self) -> AerialDojoEnv:
+        """Refuse: see `__deepcopy__`."""
+        raise TypeError(_NO_COPY)
+
+    def __deepcopy__(self, _memo: dict[int, Any]) -> AerialDojoEnv:
+        """Refuse: a copy would share what draws, and what holds the scene, with this one."""
+        raise TypeError(_NO_COPY)
 
     @property
     def episode(self) -> Episode:

@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Sequence
+from threading import Thread
 
 import numpy as np
 
 from aerialdojo_gen.agents.goal import Goal, Observation, Rules, Sensors
 from aerialdojo_gen.benchmark.episode import Episode
 from aerialdojo_gen.benchmark.eyes import look
-from aerialdojo_gen.benchmark.motion import FlightSpace, flight_space
+from aerialdojo_gen.benchmark.motion import FlightSpace, build_ahead, flight_space
 from aerialdojo_gen.benchmark.tasks import Task, check_tell, goal_of, mesh_of
 from aerialdojo_gen.benchmark.viewpoints import View, nodes_of, viewed, viewpoints_of
 from aerialdojo_gen.common.advice import command
 from aerialdojo_gen.config.agreement import SUCCESS_RADIUS_M
 from aerialdojo_gen.config.sections import Embodiment
 from aerialdojo_gen.errors import StoreError
+from aerialdojo_gen.scenes.context import SEVERAL, forget_scene, hold_scenes
 from aerialdojo_gen.store.root import Where, open_root
 
 _NONE = np.empty((0, 3))
@@ -40,6 +43,8 @@ class Flight:
         grey levels.
     tell : sequence of str
         Of `aerialdojo_gen.agents.goal.TELLABLE`: what agents are told beside the goal.
+    scenes_in_memory : int
+        How many scenes stay open in this process.
 
     Attributes
     ----------
@@ -65,7 +70,13 @@ class Flight:
         embodiment: Embodiment | None = None,
         renderer: str = "auto",
         tell: Sequence[str] = (),
+        scenes_in_memory: int = SEVERAL,
     ) -> None:
+        self._keep = scenes_in_memory
+        self._opened: set[str] = set()
+        self._reader: Thread | None = None
+        if scenes_in_memory > SEVERAL:
+            hold_scenes(self, scenes_in_memory)
         self._data = open_root(data)
         self._body = embodiment or Embodiment()
         self.renderer = renderer
@@ -86,9 +97,38 @@ class Flight:
         rules = Rules(budget, self.success_radius_m, body.radius_m, body.wheelbase_m, self.sensors)
         self.task = task
         self.goal = goal_of(self._data, task, rules, self._tell)
-        self.space = flight_space(*mesh_of(self._data, row["scene"]), body.radius_m)
+        mesh, sha256 = mesh_of(self._data, row["scene"])
+        if self._reader is not None and self._reader.name == sha256:
+            self._reader.join()
+        self.space = flight_space(mesh, sha256, body.radius_m, self._keep)
+        self._opened.add(sha256)
         self.episode = Episode(self.space, task.start, task.goal, budget)
         return self.episode
+
+    def look_ahead(self, scene: str) -> None:
+        """Read a scene in a thread, while another one is flown in; nothing happens where one is being read."""
+        mesh, sha256 = mesh_of(self._data, scene)
+        if self._reader is not None and self._reader.is_alive():
+            return
+
+        def read() -> None:
+            # What is wrong with it is told when it is opened.
+            with contextlib.suppress(Exception):
+                build_ahead(mesh, sha256, self._body.radius_m)
+
+        self._opened.add(sha256)
+        self._reader = Thread(target=read, name=sha256, daemon=True)
+        self._reader.start()
+
+    def close(self) -> None:
+        """Let go of the scenes that were opened; a second call does nothing."""
+        if self._reader is not None:
+            self._reader.join()
+            self._reader = None
+        hold_scenes(self, 0)
+        while self._opened:
+            forget_scene(self._opened.pop())
+        self.__dict__.pop("space", None)
 
     def view(self) -> View | None:
         """Say where the body is with regard to the target; None where the release has no viewpoints.

@@ -16,7 +16,7 @@ from numba import njit
 from aerialdojo_gen.planning.clearance import ClearanceGrid
 from aerialdojo_gen.planning.collision import CollisionWorld, collision_world
 from aerialdojo_gen.planning.grid_kernels import GridArrays, inside, segment_free
-from aerialdojo_gen.scenes.context import SEVERAL, open_scene
+from aerialdojo_gen.scenes.context import SEVERAL, SceneContext, open_scene, read_ahead
 from aerialdojo_gen.scenes.model import Scene
 
 Point = tuple[float, float, float]
@@ -117,7 +117,7 @@ def _between(p: Point, q: Point, share: float) -> Point:
     return (p[0] + share * (q[0] - p[0]), p[1] + share * (q[1] - p[1]), p[2] + share * (q[2] - p[2]))
 
 
-def flight_space(mesh: Path, sha256: str, radius_m: float) -> FlightSpace:
+def flight_space(mesh: Path, sha256: str, radius_m: float, keep: int = SEVERAL) -> FlightSpace:
     """Return a scene to fly in, a part of the scene's context: for all environments of a process.
 
     Parameters
@@ -128,6 +128,16 @@ def flight_space(mesh: Path, sha256: str, radius_m: float) -> FlightSpace:
         Of the file, as `scenes` has it.
     radius_m : float
         Radius of the body.
+    keep : int
+        As for `aerialdojo_gen.scenes.context.open_scene`.
     """
-    context = open_scene(mesh, sha256, SEVERAL)
+    return _space_of(open_scene(mesh, sha256, keep), radius_m)
+
+
+def build_ahead(mesh: Path, sha256: str, radius_m: float) -> None:
+    """Read a scene and build all that flying wants but what draws, for `flight_space` to find: in another thread."""
+    read_ahead(mesh, sha256, lambda context: _space_of(context, radius_m).world)
+
+
+def _space_of(context: SceneContext, radius_m: float) -> FlightSpace:
     return context.part("flight space", lambda: FlightSpace(context.scene, radius_m), radius_m)

@@ -7,15 +7,16 @@ from typing import Annotated
 
 import typer
 
-from aerialdojo_gen.commands.common import Data, PipelineFile, open_pipeline
+from aerialdojo_gen.commands.common import Data, OneScene, PipelineFile, SceneOption, open_pipeline
 
 app = typer.Typer()
 
 
 @app.command("annotate")
 def annotate(
-    scene: Annotated[str, typer.Option("--scene", help="Scene to annotate, e.g. U_Mall_0.")],
+    name: OneScene = None,
     data: Data = "data",
+    scene: SceneOption = None,
     pipeline: PipelineFile = None,
     port: Annotated[int, typer.Option(min=0, max=65535, help="Port to listen on.  (default: a free one)")] = 0,
     host: Annotated[
@@ -26,14 +27,18 @@ def annotate(
         Path | None, typer.Option("--coco", help="Write boxes and pictures as a COCO archive (ZIP) and end.")
     ] = None,
 ) -> None:
-    """Annotate a scene in the browser: landmarks, objects, their anchors."""
+    """Annotate a scene in the browser: landmarks, objects, their anchors; of several that fit one is picked."""
     from aerialdojo_gen.annotate.desk import open_desk
     from aerialdojo_gen.annotate.serve import serve_desk, write_coco
+    from aerialdojo_gen.commands.picking import given_scene, pick_scene
+    from aerialdojo_gen.pipeline.runner import chosen_scenes, known_scenes
     from aerialdojo_gen.web.serving import require_web
 
     if coco is None:
         require_web()
     config, roots = open_pipeline(pipeline, data)
+    given = given_scene(name, scene)
+    scene = pick_scene(given, known_scenes(roots.recipes) if given else chosen_scenes(config, roots))
     desk = open_desk(scene, config, roots)
     if coco is not None:
         print(write_coco(desk, coco))

@@ -13,8 +13,16 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from aerialdojo_gen.commands import completion
 from aerialdojo_gen.common import advice
-from aerialdojo_gen.pipeline.run import DEFAULT_PIPELINE, default_workers, home, open_pipeline, run_stages
+from aerialdojo_gen.pipeline.run import (
+    DEFAULT_PIPELINE,
+    default_workers,
+    home,
+    open_pipeline,
+    pipeline_file,
+    run_stages,
+)
 
 if TYPE_CHECKING:
     from aerialdojo_gen.config.pipeline import Pipeline
@@ -22,7 +30,7 @@ if TYPE_CHECKING:
     from aerialdojo_gen.pipeline.stage import Roots, Stage
     from aerialdojo_gen.store.root import Where
 
-__all__ = ["DEFAULT_PIPELINE", "default_workers", "home", "open_pipeline", "run_chosen", "run_until"]
+__all__ = ["default_workers", "home", "open_pipeline", "pipeline_file", "run_chosen", "run_until"]
 
 
 def print_json(value: object) -> None:
@@ -60,16 +68,35 @@ Data = Annotated[
 ]  # fmt: skip
 Scene = Annotated[
     list[str] | None,
-    typer.Option("--scene", metavar="NAME|GLOB", help="Scene or glob, repeatable: --scene 'U_*'.  (default: all)"),
+    typer.Option(
+        "--scene",
+        metavar="NAME|GLOB",
+        autocompletion=completion.scenes,
+        help="Scene or glob, repeatable: --scene 'U_*'.  (default: all)",
+    ),
+]
+Scenes = Annotated[
+    list[str] | None,
+    typer.Argument(metavar="SCENE", autocompletion=completion.scenes, help="Scenes or globs, as by --scene."),
 ]
 PipelineFile = Annotated[
     Path | None,
     typer.Option(
-        "--pipeline", metavar="FILE", callback=kept, help=f"Pipeline file.  (default: pipelines/{DEFAULT_PIPELINE})"
+        "--pipeline",
+        metavar="FILE|NAME",
+        callback=kept,
+        autocompletion=completion.pipelines,
+        help=f"Pipeline file, or the name of one that comes with this.  (default: {Path(DEFAULT_PIPELINE).stem})",
     ),
 ]
 PipelineArgument = Annotated[
-    Path, typer.Argument(metavar="PIPELINE", callback=kept, help="Pipeline file, e.g. pipelines/smoke.toml.")
+    Path,
+    typer.Argument(
+        metavar="PIPELINE",
+        callback=kept,
+        autocompletion=completion.pipelines,
+        help="Pipeline file, or the name of one that comes with this: smoke, aerialdojo-200k.",
+    ),
 ]
 Workers = Annotated[
     int | None, typer.Option("--workers", metavar="N", min=1, max=1024, help="Processes.  (default: all cores)")
@@ -86,7 +113,21 @@ Replace = Annotated[
     bool, typer.Option("--replace", help="Put this release in the place of another pipeline's, which is lost.")
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON: figures unrounded, nothing cut.")]
-Quiet = Annotated[bool, typer.Option("--quiet", help="No progress and no summary.")]
+OneScene = Annotated[
+    str | None,
+    typer.Argument(metavar="SCENE", autocompletion=completion.scenes, help="Scene, or a glob that fits one."),
+]
+SceneOption = Annotated[
+    str | None,
+    typer.Option("--scene", metavar="NAME|GLOB", autocompletion=completion.scenes, help="The same as an option."),
+]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress and no summary.")]
+Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="A line also for a stage with nothing to do.")]
+
+
+def together(scenes: list[str] | None, scene: list[str] | None) -> list[str] | None:
+    """Join scenes that are given by position with those of ``--scene``; None where there is neither."""
+    return [*(scenes or ()), *(scene or ())] or None
 
 
 def run_until(
@@ -98,6 +139,7 @@ def run_until(
     workers: int | None = None,
     force: bool = False,
     quiet: bool = False,
+    verbose: bool = False,
     limits: Limits | None = None,
     replace: bool = False,
     executor: str = "local",
@@ -122,6 +164,8 @@ def run_until(
         Compute this stage's shards even where they are fresh (not those of the stages upstream).
     quiet : bool
         No progress and no summary.
+    verbose : bool
+        A line also for a stage with nothing to do.
     limits : Limits, optional
         How much of the stage is computed now; all of it where absent.
     replace : bool
@@ -143,7 +187,7 @@ def run_until(
     config = with_overrides(config, stage, **overrides)
     run_chosen(
         list(upstream(stage)), config, roots, scene, workers, [stage] if force else [], quiet, limits, replace,
-        executor, address,
+        executor, address, verbose,
     )  # fmt: skip
 
 
@@ -159,6 +203,7 @@ def run_chosen(
     replace: bool = False,
     executor: str = "local",
     address: str | None = None,
+    verbose: bool = False,
 ) -> None:
     """Run stages as `aerialdojo_gen.pipeline.run.run_stages` does, with progress, and say what Ctrl-C leaves."""
     from aerialdojo_gen.pipeline.progress import Reporter
@@ -166,7 +211,7 @@ def run_chosen(
     try:
         run_stages(
             stages, config, roots, scene, workers=workers, executor=executor, address=address, force=force,
-            reporter=Reporter(quiet=quiet), limits=limits, replace=replace,
+            reporter=Reporter(quiet=quiet, verbose=verbose), limits=limits, replace=replace,
         )  # fmt: skip
     except KeyboardInterrupt:
         # Said here because Typer turns Ctrl-C into a silent exit.

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from aerialdojo_gen.commands.common import DEFAULT_PIPELINE, Json, PipelineFile, home, print_json
+from aerialdojo_gen.commands.common import Json, PipelineFile, pipeline_file, print_json
 from aerialdojo_gen.common import advice
 
 app = typer.Typer(help="Show what a pipeline file may say, or write one to begin with.", no_args_is_help=True)
@@ -26,7 +26,7 @@ def show(
     from aerialdojo_gen.config.keys import config_keys
     from aerialdojo_gen.pipeline.template import key_lines
 
-    keys = config_keys(pipeline or home() / "pipelines" / DEFAULT_PIPELINE, stage)
+    keys = config_keys(pipeline_file(pipeline), stage)
     if as_json:
         print_json([key.as_json() for key in keys])
         return
@@ -45,5 +45,5 @@ def init(
     """Write a commented pipeline file with every key, unit and default."""
     from aerialdojo_gen.pipeline.template import init_config
 
-    print(init_config(path, pipeline, force=force))
+    print(init_config(path, pipeline and pipeline_file(pipeline), force=force))
     print(f"next: {advice.command('run', path)}")

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from aerialdojo_gen.commands import completion
 from aerialdojo_gen.commands.again import again
 from aerialdojo_gen.commands.common import (
     Address,
@@ -15,9 +16,11 @@ from aerialdojo_gen.commands.common import (
     PipelineFile,
     Quiet,
     Scene,
+    Scenes,
     Workers,
     default_workers,
     open_pipeline,
+    together,
 )
 from aerialdojo_gen.errors import AerialDojoError, BeyondBounds, Malformed, UsageError
 
@@ -29,11 +32,14 @@ app = typer.Typer()
 
 @app.command("evaluate")
 def evaluate(
+    scenes: Scenes = None,
     data: Data = "data",
     agent: Annotated[
         str | None,
         typer.Option(
-            "--agent", help="oracle, random, stop, explorer, …, or package.module:Class.  (default: random)"
+            "--agent",
+            autocompletion=completion.agents,
+            help="oracle, random, stop, explorer, …, or package.module:Class.  (default: random)",
         ),
     ] = None,
     preset: Annotated[
@@ -134,7 +140,8 @@ def evaluate(
     from aerialdojo_gen.pipeline.progress import Reporter
 
     config, _ = open_pipeline(pipeline, data)
-    splits, settings, modalities, scenes = (tuple(names or ()) for names in (split, setting, modality, scene))
+    splits, settings, modalities = (tuple(names or ()) for names in (split, setting, modality))
+    chosen = tuple(together(scenes, scene) or ())
     options = _options(option or [])
     name = preset or agent or "random"
     agent, options = _agent(agent, preset, options)
@@ -142,7 +149,7 @@ def evaluate(
         run or name.replace(".", "-").replace(":", "-"),
         agent,
         options,
-        Selection(splits, settings, modalities, scenes, limit, seed),
+        Selection(splits, settings, modalities, chosen, limit, seed),
         _sensors(agent, options, view, width, height),
         config.embodiment,
         renderer,

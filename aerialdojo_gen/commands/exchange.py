@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from aerialdojo_gen.commands.common import Data, Json, Quiet, Scene, Workers
+from aerialdojo_gen.commands.common import Data, Json, Quiet, Scene, Scenes, Workers, together
 
 if TYPE_CHECKING:
     from aerialdojo_gen.store.root import DataRoot
@@ -22,6 +22,7 @@ FOR_TRAINING = ("lerobot", "webdataset")
 @app.command("export")
 def export(
     form: Annotated[str, typer.Option("--format", help="aerialdojo, habitat, lerobot or webdataset.")],
+    scenes: Scenes = None,
     data: Data = "data",
     out: Annotated[Path | None, typer.Option("--out", help="Folder to make.  (default: DATA/exports/FORMAT)")] = None,
     scene: Scene = None,
@@ -32,6 +33,9 @@ def export(
             help="Pixels of aerialdojo's pictures, drawn from the meshes; 0: the release's own.  (default: 640)"
         ),
     ] = None,
+    shards: Annotated[
+        bool, typer.Option("--shards", help="One tar a scene in place of aerialdojo's file a trajectory.")
+    ] = False,
     split: Annotated[list[str] | None, typer.Option(
         "--split", help="id_train, id_test, ood_train, ood_test, train, test; repeatable.  (default: all)")] = None,
     setting: Annotated[list[str] | None, typer.Option(
@@ -73,6 +77,7 @@ def export(
     from aerialdojo_gen.common.names import unknown
     from aerialdojo_gen.errors import UsageError
     from aerialdojo_gen.exchange.exporting import FORMATS, export_release
+    from aerialdojo_gen.pipeline.progress import Reporter
     from aerialdojo_gen.store.root import LocalRoot, open_root
 
     training = {
@@ -91,13 +96,28 @@ def export(
     if form in FOR_TRAINING:
         if picture_size is not None:
             raise UsageError("--picture-size is for --format aerialdojo: choose --width and --height here")
-        _for_training(form, root, target, {**given, "scene": scene or ()}, force, workers, estimate, as_json, quiet)
+        if shards:
+            raise UsageError("--shards is for --format aerialdojo")
+        _for_training(
+            form,
+            root,
+            target,
+            {**given, "scene": together(scenes, scene) or ()},
+            force,
+            workers,
+            estimate,
+            as_json,
+            quiet,
+        )
         return
     if given or estimate or workers is not None:
         names = _options(given, estimate, workers)
         verb = "is" if len(names) == 1 else "are"
         raise UsageError(f"{', '.join(names)} {verb} for --format {' and '.join(FOR_TRAINING)}, not for {form}")
-    counts = export_release(form, root, target, scene, force=force, picture_px=picture_size)
+    counts = export_release(
+        form, root, target, together(scenes, scene), force=force, picture_px=picture_size, shards=shards,
+        reporter=Reporter(quiet=quiet or as_json),
+    )  # fmt: skip
     if as_json:
         print_json({"path": str(target), **counts})
     elif not quiet:

@@ -9,7 +9,17 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from aerialdojo_gen.commands.common import Data, Json, PipelineFile, Scene, json_text, open_pipeline, print_json
+from aerialdojo_gen.commands.common import (
+    Data,
+    Json,
+    PipelineFile,
+    Scene,
+    Scenes,
+    json_text,
+    open_pipeline,
+    print_json,
+    together,
+)
 from aerialdojo_gen.common.text_table import terminal_width
 from aerialdojo_gen.errors import UsageError
 
@@ -22,7 +32,7 @@ app = typer.Typer()
 
 @app.command("stats")
 def stats(
-    data: Data = "data", scene: Scene = None, pipeline: PipelineFile = None,
+    scenes: Scenes = None, data: Data = "data", scene: Scene = None, pipeline: PipelineFile = None,
     pool: Annotated[bool, typer.Option("--pool", help="What filter kept, not the release.")] = False,
     markdown: Annotated[Path | None, typer.Option("--markdown", help="Write the tables as Markdown.")] = None,
     csv: Annotated[Path | None, typer.Option("--csv", help="Write the tables as CSV, a line a figure.")] = None,
@@ -37,7 +47,7 @@ def stats(
     from aerialdojo_gen.store.remembered import key_of, remembered
     from aerialdojo_gen.store.root import open_root
 
-    root = open_root(data)
+    root, scene = open_root(data), together(scenes, scene)
     released = scenes_there(root)
     if pool and (markdown or csv or figures):
         raise UsageError("--pool is printed only: leave --markdown, --csv and --figures out")
@@ -48,8 +58,7 @@ def stats(
         if markdown or csv or figures or not root.list("verdicts"):
             raise no_release(root)
         config, roots = open_pipeline(pipeline, data)
-        scenes = runner.chosen_scenes(config, roots, scene)
-        pools = [pool_of(root, name) for name in scenes]
+        pools = [pool_of(root, name) for name in runner.chosen_scenes(config, roots, scene)]
         if as_json:
             print_json([asdict(pool) for pool in pools])
         else:

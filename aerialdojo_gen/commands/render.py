@@ -20,11 +20,14 @@ from aerialdojo_gen.commands.common import (
     Quiet,
     Replace,
     Scene,
+    Scenes,
+    Verbose,
     Workers,
     default_workers,
     open_pipeline,
     print_json,
     run_until,
+    together,
 )
 from aerialdojo_gen.errors import UsageError
 from aerialdojo_gen.pipeline.registry import BY_NAME
@@ -39,8 +42,9 @@ _SECONDS = {"s": 1.0, "m": 60.0, "h": 3600.0, "d": 86400.0}
 
 @app.command("render", help=BY_NAME["render"].help)
 def render(
-    data: Data = "data", scene: Scene = None, pipeline: PipelineFile = None,
-    workers: Workers = None, force: Force = False, quiet: Quiet = False, replace: Replace = False,
+    scenes: Scenes = None, data: Data = "data", scene: Scene = None, pipeline: PipelineFile = None,
+    workers: Workers = None, force: Force = False, quiet: Quiet = False, verbose: Verbose = False,
+    replace: Replace = False,
     split: Annotated[str | None, typer.Option(
         "--split", help="train, test, all, id_train, id_test, ood_train or ood_test.")] = None,
     limit: Annotated[int | None, typer.Option(
@@ -70,6 +74,7 @@ def render(
     """Record four RGB-D views along trajectories of the release."""
     from aerialdojo_gen.pipeline.freshness import Limits
 
+    scene = together(scenes, scene)
     limits = Limits(
         share_of(shard) if shard else (0, 1), time.time() + duration_s(budget) if budget else None, verify
     )
@@ -85,7 +90,7 @@ def render(
     chosen = _scenes_of(split, scene, pipeline, data)
     run_until(
         "render", data=data, scene=chosen, pipeline=pipeline, workers=workers, force=force, quiet=quiet,
-        limits=limits, replace=replace, executor=executor, address=address, **overrides,
+        verbose=verbose, limits=limits, replace=replace, executor=executor, address=address, **overrides,
     )  # fmt: skip
 
 

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from aerialdojo_gen.commands.common import Data, Json, print_json
+from aerialdojo_gen.commands.common import Data, Json, OneScene, SceneOption, print_json
 
 app = typer.Typer()
 
@@ -38,7 +38,7 @@ def show(
     pictured = picture_task(found, "image" if task_id.endswith("-i") else "semantic", frames)
     told = sys.stderr if as_json else sys.stdout
     if not as_json:
-        print("\n".join([pictured.title, pictured.goal, *facts(pictured.facts, terminal_width())]))
+        print("\n".join([pictured.title, pictured.told, *facts(pictured.facts, terminal_width())]))
     if out is not None or html is None:
         print(write_png(pictured, out or Path(f"{task_id}.png")), file=told)
     if html is not None:
@@ -47,16 +47,21 @@ def show(
 
 @app.command("view")
 def view(
-    scene: Annotated[str, typer.Option("--scene", help="Scene of the release, e.g. U_Mall_0.")],
+    name: OneScene = None,
     data: Data = "data",
+    scene: SceneOption = None,
     port: Annotated[int, typer.Option(min=0, max=65535, help="Port on 127.0.0.1; 0 takes a free one.")] = 0,
     browser: Annotated[bool, typer.Option("--browser/--no-browser", help="Open the page.")] = True,
 ) -> None:
-    """Show a scene in the browser: landmarks, objects, anchors, routes."""
+    """Show a scene in the browser: landmarks, objects, anchors, routes; of several that fit one is picked."""
+    from aerialdojo_gen.commands.picking import given_scene, pick_scene
+    from aerialdojo_gen.release.contents import release_scenes
+    from aerialdojo_gen.store.root import open_root
     from aerialdojo_gen.view.server import view_app
     from aerialdojo_gen.web.serving import open_socket, require_web, serve, url_of
 
     require_web()
+    scene = pick_scene(given_scene(name, scene), release_scenes(open_root(data)))
     page = view_app(data, scene)
     listener = open_socket(port)
     print(f"{scene}: {url_of(listener)}  (Ctrl-C ends it)", flush=True)

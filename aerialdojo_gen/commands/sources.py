@@ -7,7 +7,17 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from aerialdojo_gen.commands.common import Data, PipelineFile, Quiet, Scene, open_pipeline
+from aerialdojo_gen.commands.common import (
+    Data,
+    OneScene,
+    PipelineFile,
+    Quiet,
+    Scene,
+    SceneOption,
+    Scenes,
+    open_pipeline,
+    together,
+)
 from aerialdojo_gen.common import advice
 from aerialdojo_gen.common.text_table import terminal_width
 from aerialdojo_gen.errors import UsageError
@@ -92,7 +102,8 @@ def _told(added: Added) -> None:
 
 @app.command("annotate-draft")
 def annotate_draft(
-    scene: Annotated[str, typer.Argument(help="Scene with a recipe, e.g. U_Mall_0.")],
+    name: OneScene = None,
+    scene: SceneOption = None,
     landmarks: Annotated[
         int | None, typer.Option(min=1, help="How many.  (default: the paper's number, else 1 or 2)")
     ] = None,
@@ -130,11 +141,13 @@ def annotate_draft(
     """Draft a scene's annotations, to be checked and owned as sources."""
     from aerialdojo_gen.annotate.drafting import draft_scene
     from aerialdojo_gen.annotations.draft import Choice
+    from aerialdojo_gen.commands.picking import given_scene, pick_scene
     from aerialdojo_gen.pipeline.progress import Reporter
-    from aerialdojo_gen.pipeline.runner import chosen_scenes
+    from aerialdojo_gen.pipeline.runner import chosen_scenes, known_scenes
 
     config, roots = open_pipeline(pipeline, Path("data"))
-    chosen_scenes(config, roots, [scene])
+    given = given_scene(name, scene)
+    scene = pick_scene(given, known_scenes(roots.recipes) if given else chosen_scenes(config, roots))
     choice = Choice(
         centre_m=centre, within_m=within, core_share=core_share, aloft_share=aloft, most_vegetation=plants, most=most
     )
@@ -149,6 +162,7 @@ def annotate_draft(
 
 @app.command("gallery")
 def gallery(
+    scenes: Scenes = None,
     out: Annotated[Path, typer.Option("--out", help="Folder for the pictures.")] = Path("docs/gallery"),
     scene: Scene = None, pipeline: PipelineFile = None,
     props: Annotated[bool, typer.Option("--props/--no-props", help="The sheets of all props too.")] = True,
@@ -158,6 +172,7 @@ def gallery(
     data: Data = "data",
 ) -> None:  # fmt: skip
     """Picture every prop and every scene as contact sheets."""
+    scene = together(scenes, scene)
     if references:
         _reference_sheets(out, scene, data, "jpg" if small else "png")
         return
@@ -168,11 +183,11 @@ def gallery(
     from aerialdojo_gen.store.atomic import make_folder
 
     config, roots = open_pipeline(pipeline, out)
-    scenes = runner.chosen_scenes(config, roots, scene)
+    chosen = runner.chosen_scenes(config, roots, scene)
     make_folder(out)  # before anything is drawn
     catalogue = load_catalogue(roots.scene_assets)
     suffix, width = ("jpg", 1280) if small else ("png", None)
-    for name in scenes:
+    for name in chosen:
         sheet = scene_sheet(build_scene(roots.recipes / f"{name}.toml", catalogue))
         print(write_picture(sheet, out, f"{name}.{suffix}", width))
     if props:

@@ -17,10 +17,13 @@ from aerialdojo_gen.commands.common import (
     Quiet,
     Replace,
     Scene,
+    Scenes,
+    Verbose,
     Workers,
     open_pipeline,
     run_chosen,
     run_until,
+    together,
 )
 from aerialdojo_gen.pipeline.registry import BY_NAME, STAGES
 
@@ -32,13 +35,13 @@ _WITH_OPTIONS = ("plan", "split", "render")
 
 def _stage_command(name: str) -> Callable[..., None]:
     def command(
-        data: Data = "data", scene: Scene = None, pipeline: PipelineFile = None,
-        workers: Workers = None, force: Force = False, quiet: Quiet = False, executor: ExecutorName = "local",
-        address: Address = None,
+        scenes: Scenes = None, data: Data = "data", scene: Scene = None, pipeline: PipelineFile = None,
+        workers: Workers = None, force: Force = False, quiet: Quiet = False, verbose: Verbose = False,
+        executor: ExecutorName = "local", address: Address = None,
     ) -> None:  # fmt: skip
         run_until(
-            name, data=data, scene=scene, pipeline=pipeline, workers=workers, force=force, quiet=quiet,
-            executor=executor, address=address,
+            name, data=data, scene=together(scenes, scene), pipeline=pipeline, workers=workers, force=force,
+            quiet=quiet, verbose=verbose, executor=executor, address=address,
         )  # fmt: skip
 
     return command
@@ -51,8 +54,8 @@ for _stage in STAGES:
 
 @app.command("plan", help=BY_NAME["plan"].help)
 def plan(
-    data: Data = "data", scene: Scene = None, pipeline: PipelineFile = None,
-    workers: Workers = None, force: Force = False, quiet: Quiet = False,
+    scenes: Scenes = None, data: Data = "data", scene: Scene = None, pipeline: PipelineFile = None,
+    workers: Workers = None, force: Force = False, quiet: Quiet = False, verbose: Verbose = False,
     every: Annotated[
         bool, typer.Option("--all", help="Search all candidates, also those that the release does not need.")
     ] = False,
@@ -60,29 +63,31 @@ def plan(
 ) -> None:  # fmt: skip
     """Plan reference trajectories, with what they need upstream."""
     run_until(
-        "plan", data=data, scene=scene, pipeline=pipeline, workers=workers, force=force, quiet=quiet,
-        executor=executor, address=address, search="all" if every else None,
+        "plan", data=data, scene=together(scenes, scene), pipeline=pipeline, workers=workers, force=force,
+        quiet=quiet, verbose=verbose, executor=executor, address=address, search="all" if every else None,
     )  # fmt: skip
 
 
 @app.command("split", help=BY_NAME["split"].help)
 def split(
-    data: Data = "data", scene: Scene = None, pipeline: PipelineFile = None,
-    workers: Workers = None, force: Force = False, quiet: Quiet = False, replace: Replace = False,
+    scenes: Scenes = None, data: Data = "data", scene: Scene = None, pipeline: PipelineFile = None,
+    workers: Workers = None, force: Force = False, quiet: Quiet = False, verbose: Verbose = False,
+    replace: Replace = False,
     executor: ExecutorName = "local", address: Address = None,
 ) -> None:  # fmt: skip
     """Write the release, with what it needs upstream."""
     run_until(
-        "split", data=data, scene=scene, pipeline=pipeline, workers=workers, force=force, quiet=quiet,
-        replace=replace, executor=executor, address=address,
+        "split", data=data, scene=together(scenes, scene), pipeline=pipeline, workers=workers, force=force,
+        quiet=quiet, verbose=verbose, replace=replace, executor=executor, address=address,
     )  # fmt: skip
 
 
 @app.command("run")
 def run(
-    pipeline: PipelineArgument,
+    pipeline: PipelineArgument, scenes: Scenes = None,
     data: Data = "data", scene: Scene = None,
-    workers: Workers = None, force: Force = False, quiet: Quiet = False, replace: Replace = False,
+    workers: Workers = None, force: Force = False, quiet: Quiet = False, verbose: Verbose = False,
+    replace: Replace = False,
     executor: ExecutorName = "local", address: Address = None,
 ) -> None:  # fmt: skip
     """Run a pipeline's stages, from recipes and annotations to the release."""
@@ -92,5 +97,15 @@ def run(
     stages = stages_named(config.stages)
     forced = [stage.name for stage in stages] if force else []
     run_chosen(
-        stages, config, roots, scene, workers, forced, quiet, replace=replace, executor=executor, address=address
+        stages,
+        config,
+        roots,
+        together(scenes, scene),
+        workers,
+        forced,
+        quiet,
+        replace=replace,
+        executor=executor,
+        address=address,
+        verbose=verbose,
     )

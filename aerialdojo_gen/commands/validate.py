@@ -14,10 +14,13 @@ from aerialdojo_gen.commands.common import (
     PipelineFile,
     Quiet,
     Scene,
+    Scenes,
     Workers,
     home,
     kept,
+    pipeline_file,
     print_json,
+    together,
 )
 
 app = typer.Typer()
@@ -29,6 +32,7 @@ def validate(
     folder: Annotated[
         str | None, typer.Argument(metavar="RELEASE", help="A release, or a folder or URL with one; as --data.")
     ] = None,
+    scenes: Scenes = None,
     data: Annotated[
         str,
         typer.Option(
@@ -62,7 +66,6 @@ def validate(
 ) -> None:  # fmt: skip
     """Check a release again from its Parquet files and meshes alone, and name every row at fault."""
     from aerialdojo_gen import validate as validation
-    from aerialdojo_gen.commands.common import DEFAULT_PIPELINE
     from aerialdojo_gen.common.text_table import terminal_width
     from aerialdojo_gen.config.pipeline import load_pipeline
     from aerialdojo_gen.errors import UsageError
@@ -74,12 +77,12 @@ def validate(
         check_format(report)
     if pictures != "all" and not (pictures.isascii() and pictures.isdigit() and len(pictures) < _MANY_DIGITS):
         raise UsageError(f"--pictures {pictures}: a number, or all")
-    definitions = load_pipeline(pipeline or home() / "pipelines" / DEFAULT_PIPELINE)
+    definitions = load_pipeline(pipeline_file(pipeline))
     if definitions.scene_assets is None:
         definitions = definitions.model_copy(update={"scene_assets": home() / "scene_assets"})
     asked = validation.Asked(
         release=release_of(folder or data),
-        scenes=tuple(scene or ()),
+        scenes=tuple(together(scenes, scene) or ()),
         meshes=meshes.absolute() if meshes else None,
         use_meshes=not no_meshes,
         sample=sample,

@@ -15,7 +15,9 @@ PROGRAM = "aerialdojo-gen"
 _TAKES: dict[str, tuple[str, ...]] = {
     **dict.fromkeys(("add-scene", "config"), ()),
     "annotate-draft": ("pipeline",),
-    **dict.fromkeys(("export", "import-benchmark", "report", "run", "show", "view"), ("data",)),
+    **dict.fromkeys(
+        ("export", "import-benchmark", "pull", "push-to-hub", "report", "run", "show", "view"), ("data",)
+    ),
 }
 
 

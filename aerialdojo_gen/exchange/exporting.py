@@ -11,11 +11,16 @@ from aerialdojo_gen.common.version import __version__
 from aerialdojo_gen.errors import UsageError
 from aerialdojo_gen.exchange import aerialdojo_writer, habitat_writer
 from aerialdojo_gen.exchange.folder import whole_folder, write_json
+from aerialdojo_gen.exchange.size import check_room, size_of
+from aerialdojo_gen.exchange.tars import pack
+from aerialdojo_gen.pipeline.progress import Reporter
 from aerialdojo_gen.release.contents import scenes_in_release
 from aerialdojo_gen.store.root import Where, open_root
 
 MARKER = "export.json"
 PICTURE_PX = 640
+# So many that file systems, copies and hubs become slow.
+_MANY_FILES = 10_000
 FORMATS = {
     "aerialdojo": ("north, east, down, metres; quaternions xyzw; forward +x", aerialdojo_writer.LOST),
     "habitat": ("east, up, south, metres; quaternions xyzw; forward -z", habitat_writer.LOST),
@@ -30,6 +35,8 @@ def export_release(
     *,
     force: bool = False,
     picture_px: int | None = None,
+    shards: bool = False,
+    reporter: Reporter | None = None,
 ) -> dict[str, int]:
     """Write the release in a format of others.
 
@@ -48,6 +55,11 @@ def export_release(
     picture_px : int, optional
         Columns and rows of the pictures of ``aerialdojo``, drawn anew from the meshes: 640 as the authors' where
         absent; 0 for the release's own.
+    shards : bool
+        One tar archive a scene, ``SCENE.tar``, in place of a file a trajectory: unpacked in one folder they are what
+        is written without.
+    reporter : Reporter, optional
+        Is told how much it will be, before anything is written, and which scenes are done.
 
     Returns
     -------
@@ -59,7 +71,7 @@ def export_release(
     UsageError
         The format or a scene does not exist, or the folder is not empty.
     StoreError
-        The release is missing or damaged, or the disk is full.
+        The release is missing or damaged, or the disk has no room for it.
     AssetError
         Pictures are to be drawn, and a mesh is missing or another one.
     """
@@ -71,16 +83,32 @@ def export_release(
     chosen = scenes_in_release(root, scenes)
     frame, lost = FORMATS[format_name]
     size_px = PICTURE_PX if picture_px is None else picture_px
+    if shards and format_name != "aerialdojo":
+        raise UsageError(f"--shards is for --format aerialdojo: {format_name} has a file a scene as it is")
     counts: Counter[str] = Counter(scenes=len(chosen))
+    reporter = reporter or Reporter(quiet=True)
     with whole_folder(out, MARKER, force=force) as folder:
-        if format_name == "aerialdojo":
-            for scene in chosen:
-                counts.update(aerialdojo_writer.write_scene(root, scene, folder, size_px))
-        else:
-            categories = habitat_writer.categories_of(root, chosen)
+        size = size_of(format_name, root, chosen, size_px)
+        instead = ""
+        if shards:
+            instead = f", as {len(chosen)} archives"
+        elif size.files > _MANY_FILES:
+            instead = f"; --shards writes {len(chosen) + 1} files in their place"
+        reporter.line(f"export: {size}{instead}, into {out}")
+        check_room(out, size.bytes if shards else size.on_disk)
+        categories = {} if format_name == "aerialdojo" else habitat_writer.categories_of(root, chosen)
+        if format_name == "habitat":
             habitat_writer.write_index(folder, categories)
+        with reporter.bar("export", len(chosen), "scenes") as bar:
             for scene in chosen:
-                counts.update(habitat_writer.write_scene(root, scene, folder, categories))
+                if format_name == "habitat":
+                    counts.update(habitat_writer.write_scene(root, scene, folder, categories))
+                elif shards:
+                    counts.update(aerialdojo_writer.write_scene(root, scene, folder / scene, size_px))
+                    pack(folder / scene, folder / f"{scene}.tar")
+                else:
+                    counts.update(aerialdojo_writer.write_scene(root, scene, folder, size_px))
+                bar.advance()
         write_json(
             folder / MARKER,
             {

@@ -105,19 +105,7 @@ class OwnScenes(gymnasium.Wrapper[dict[str, Any], np.int64, dict[str, Any], np.i
         own = env.unwrapped
         if not isinstance(own, AerialDojoEnv):
             raise UsageError(f"scenes are of AerialDojo-v0's tasks, not of {own}")
-        self._ids = own.task_ids(scenes)
-        if not self._ids:
-            raise UsageError(f"no task of the selection is in {', '.join(scenes)}")
-        self._draw = np.random.default_rng()
-
-    def reset(
-        self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[dict[str, Any], dict[str, Any]]:
-        """Begin an episode in one of the scenes; see `AerialDojoEnv.reset`."""
-        if seed is not None:
-            self._draw = np.random.default_rng(seed)
-        chosen = options or {"task_id": self._ids[int(self._draw.integers(len(self._ids)))]}
-        return self.env.reset(seed=seed, options=chosen)
+        own.draw_from(scenes)
 
 
 def make_vec(

@@ -169,10 +169,17 @@ class Reporter:
         Say nothing.
     stream : text stream, optional
         Where to write.
+    verbose : bool
+        Say more: a line also for a stage with nothing to do.
+
+    Attributes
+    ----------
+    verbose : bool
     """
 
-    def __init__(self, quiet: bool = False, stream: TextIO | None = None) -> None:
+    def __init__(self, quiet: bool = False, stream: TextIO | None = None, *, verbose: bool = False) -> None:
         self._quiet, self._stream = quiet, stream or sys.stderr
+        self.verbose = verbose
 
     def line(self, text: str) -> None:
         """Write one line, above a bar if there is one."""

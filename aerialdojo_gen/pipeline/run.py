@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from aerialdojo_gen.common import advice
+from aerialdojo_gen.common.advice import PROGRAM
 from aerialdojo_gen.errors import AssetError, ConfigError
 
 if TYPE_CHECKING:
@@ -46,7 +47,8 @@ def run_pipeline(
     Parameters
     ----------
     pipeline : str, Path or Pipeline, optional
-        A TOML file, or what `aerialdojo_gen.config.pipeline.load_pipeline` read of one; the paper's where absent.
+        A TOML file, the name of one that comes with the program (``"smoke"``), or what
+        `aerialdojo_gen.config.pipeline.load_pipeline` read of one; the paper's where absent.
     data : str, Path or DataRoot
         The data directory.
     stages : sequence of str, optional
@@ -106,13 +108,43 @@ def home() -> Path:
     return package.parent if (package.parent / "scene_assets").is_dir() else package / "_shipped"
 
 
+def pipeline_file(given: str | Path | None = None) -> Path:
+    """Find a pipeline's file: as a path, else by its name among those that come with the program.
+
+    Parameters
+    ----------
+    given : str or Path, optional
+        A path, or a name such as ``smoke`` or ``smoke.toml``; the paper's pipeline where absent.
+
+    Returns
+    -------
+    Path
+        What is at that path goes before what has that name.
+
+    Raises
+    ------
+    ConfigError
+        There is neither; the message lists the names.
+    """
+    shipped = home() / "pipelines"
+    path = Path(given) if given else shipped / DEFAULT_PIPELINE
+    if path.is_file():
+        return path
+    if path.parent == Path() and (named := shipped / f"{path.name.removesuffix('.toml')}.toml").is_file():
+        return named
+    known = sorted(file.stem for file in shipped.glob("*.toml"))
+    beside = sorted(file.name for file in path.parent.glob("*.toml")) if path.parent.is_dir() else []
+    there = f"; there are {', '.join(beside)} in {path.parent}" if beside and path.parent != Path() else ""
+    raise ConfigError(f"no pipeline file {path}{there}; by name, as in {PROGRAM} run smoke: {', '.join(known)}")
+
+
 def open_pipeline(pipeline: str | Path | Pipeline | None, data: str | Path | DataRoot) -> tuple[Pipeline, Roots]:
     """Read the pipeline file and find the folders.
 
     Parameters
     ----------
     pipeline : str, Path, Pipeline or None
-        The pipeline file, or what was read of one; None for the default one.
+        The pipeline file as for `pipeline_file`, or what was read of one; None for the default one.
     data : str, Path or DataRoot
         The data directory.
 
@@ -130,7 +162,7 @@ def open_pipeline(pipeline: str | Path | Pipeline | None, data: str | Path | Dat
     from aerialdojo_gen.store.root import open_root
 
     if not isinstance(pipeline, Pipeline):
-        pipeline = load_pipeline(Path(pipeline) if pipeline else home() / "pipelines" / DEFAULT_PIPELINE)
+        pipeline = load_pipeline(pipeline_file(pipeline))
     roots = Roots(
         data=open_root(data),
         scene_assets=(assets := pipeline.scene_assets or home() / "scene_assets"),

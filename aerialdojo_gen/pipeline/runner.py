@@ -101,15 +101,24 @@ def run(
             roots.data.refresh()
             now = limits if limits and group[-1] is stages[-1] else Limits()
             chain = Chain(group, scenes, pipeline, roots, forced, now, reporter, expectation)
-            summaries += _go_through(chain, pool, reporter, interrupts, expectation)
+            summaries += _go_through(chain, pool, reporter, interrupts, stages[-1].name)
             interrupts.check()
         if finish:
             roots.data.refresh()
             finish()
             interrupts.check()
-    if len(stages) > 1 and (computed := sum(summary.computed for summary in summaries)):
-        reporter.line(f"{computed:,} shards computed in {duration(time.monotonic() - started)}")
+    if len(stages) > 1:
+        reporter.line(_altogether(summaries, time.monotonic() - started))
     return summaries
+
+
+def _altogether(summaries: Sequence[StageSummary], seconds: float) -> str:
+    """Say what stages did together, those that had nothing to do among them."""
+    idle = sum(not summary.computed for summary in summaries)
+    if idle == len(summaries):
+        return f"nothing to do: all {idle} stages are up to date ({duration(seconds)})"
+    besides = f"; {idle} of {len(summaries)} stages had nothing to do" if idle else ""
+    return f"{sum(s.computed for s in summaries):,} shards computed in {duration(seconds)}{besides}"
 
 
 def chained(stages: Sequence[Stage], *, alone: bool = False) -> list[list[Stage]]:
@@ -131,14 +140,16 @@ def chained(stages: Sequence[Stage], *, alone: bool = False) -> list[list[Stage]
 
 
 def _go_through(
-    chain: Chain, pool: Executor, reporter: Reporter, interrupts: Interrupts, expectation: Expectation
+    chain: Chain, pool: Executor, reporter: Reporter, interrupts: Interrupts, asked: str
 ) -> list[StageSummary]:
     """Take scenes through stages, and say what was done."""
     summaries: list[StageSummary] = []
 
     def say() -> None:
         for summary in chain.summaries():
-            reporter.line(str(summary))
+            # What was asked for has its line in any case, what it builds on where there was something to do.
+            if summary.computed or reporter.verbose or summary.stage == asked:
+                reporter.line(str(summary))
             summaries.append(summary)
 
     say()

@@ -63,7 +63,7 @@ def _passable(
     return segment_free(x, y, z, u, v, w, radius, grid, False)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def passable_moves(grid: GridArrays, radius: float) -> NDArray[np.uint32]:
     """Find the moves that the body can make from every cell.
 
@@ -118,7 +118,7 @@ def passable_moves(grid: GridArrays, radius: float) -> NDArray[np.uint32]:
     return moves
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def connected_with_ceiling(moves: NDArray[np.uint32]) -> NDArray[np.bool_]:
     """Mark the cells that `passable_moves` connects with the highest layer that has any.
 

@@ -22,7 +22,7 @@ def _edge_d2(wx: float, wy: float, wz: float, ux: float, uy: float, uz: float, i
     return ex * ex + ey * ey + ez * ez
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", nogil=True)
 def _splat(
     tri: NDArray[np.float64], origin: NDArray[np.float64], cell: float, band: float, field: NDArray[np.float32]
 ) -> None:
@@ -77,7 +77,7 @@ def _splat(
                         field[i, j, l] = d2
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _seed_around(
     tri: NDArray[np.float64],
     origin: NDArray[np.float64],
@@ -119,7 +119,7 @@ def _seed_around(
                     seeds[i, j, k] = point_triangle_d2(x, y, z, tri, t) <= half2 * (1.0 + 1e-6)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _beyond(
     field: NDArray[np.float32],
     cell: float,

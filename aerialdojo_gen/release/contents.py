@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import PurePosixPath
+from pathlib import Path, PurePosixPath
 
 import pyarrow as pa
 
-from aerialdojo_gen.common.advice import command
+from aerialdojo_gen.common.advice import command, given
 from aerialdojo_gen.common.names import choose_scenes
 from aerialdojo_gen.errors import StoreError
 from aerialdojo_gen.store import schemas
@@ -136,8 +136,14 @@ def no_release(where: Where, folder: str = FOLDER) -> StoreError:
     place = root.url if folder in ("", FOLDER) else root.at(folder)
     return StoreError(
         f"there is no release in {place}: {_lack(root, folder)}; "
-        "name its folder with --data, or make one with make dataset"
+        f"name its folder with --data, or make one with {_making()}"
     )
+
+
+def _making() -> str:
+    """Say what makes the dataset here: a wheel brings no Makefile."""
+    here = (Path(__file__).resolve().parents[2] / "Makefile").is_file()
+    return "make dataset" if here else f"{given().program} run aerialdojo-200k"
 
 
 def _lack(root: DataRoot, folder: str) -> str:

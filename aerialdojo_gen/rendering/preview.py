@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from aerialdojo_gen.geometry.cameras import Camera, look_at_pose
-from aerialdojo_gen.rendering.world import render_world
+from aerialdojo_gen.rendering.backend import kept_renderer
 from aerialdojo_gen.scenes.model import Scene
 
 
@@ -34,7 +34,8 @@ def look_at(
     (height, width, 3) uint8
         sRGB.
     """
-    return render_world(scene).render(Camera(width, height, fov_deg), look_at_pose(eye, target)).rgb
+    camera = Camera(width, height, fov_deg)
+    return kept_renderer(scene, "auto").render(camera, look_at_pose(eye, target)).rgb
 
 
 def contact_sheet(

@@ -3,7 +3,7 @@
 A ray caster, a collision world, a clearance grid or a renderer takes tens of megabytes and seconds to build. Each is
 a part of the scene's context: made when it is first asked for, and gone when the context is. Contexts are found by
 the mesh's digest, few are kept, and the oldest goes before the next scene is read, so that memory stays that of so
-many scenes however many are worked on.
+many scenes however many are worked on. One more is read ahead where somebody asks for that.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from collections import OrderedDict
 from collections.abc import Callable, Hashable
 from pathlib import Path
 from typing import Any, TypeVar
+from weakref import WeakKeyDictionary
 
 from aerialdojo_gen.scenes.glb import read_glb
 from aerialdojo_gen.scenes.model import Scene
@@ -24,9 +25,12 @@ SEVERAL = 3
 # A scene that was made in memory comes beside the one that is worked on.
 _BESIDE = 2
 
-# One lock for all: making a part may ask for another, of this scene or (a renderer's check) of another one.
+# Of which contexts there are. Each has a lock of its own for its parts: what is made of a scene that is read ahead
+# keeps nobody from the scene that is worked on. Nobody asks for a context's lock who holds this one.
 _lock = threading.RLock()
 _contexts: OrderedDict[Hashable, SceneContext] = OrderedDict()
+_ahead: dict[str, SceneContext] = {}
+_holders: WeakKeyDictionary[object, int] = WeakKeyDictionary()
 
 
 class SceneContext:
@@ -43,6 +47,8 @@ class SceneContext:
 
     def __init__(self, scene: Scene) -> None:
         self.scene = scene
+        # Making a part may ask for another one.
+        self._lock = threading.RLock()
         self._parts: dict[str, tuple[tuple[Hashable, ...], Any]] = {}
 
     def part(self, kind: str, make: Callable[[], _T], *given: Hashable) -> _T:
@@ -58,7 +64,7 @@ class SceneContext:
         *given : hashable
             What else than the scene it is made from. Another part of its kind goes first.
         """
-        with _lock:
+        with self._lock:
             known = self._parts.get(kind)
             if known is None or known[0] != given:
                 self.drop(kind)
@@ -68,14 +74,14 @@ class SceneContext:
 
     def drop(self, kind: str) -> None:
         """Let go of a part, where there is one."""
-        with _lock:
+        with self._lock:
             _, part = self._parts.pop(kind, ((), None))
             if hasattr(part, "close"):
                 part.close()
 
     def release(self) -> None:
         """Let go of all parts; who asks again gets new ones."""
-        with _lock:
+        with self._lock:
             while self._parts:
                 self.drop(next(reversed(self._parts)))
 
@@ -90,8 +96,8 @@ def open_scene(mesh: Path, sha256: str, keep: int = 1) -> SceneContext:
     sha256 : str
         Of its bytes, as `scenes` has it: the same content has the same context, wherever it lies.
     keep : int
-        How many contexts there are at most, with this one; those that were not asked for longest go, and before the
-        mesh is read.
+        How many contexts there are at most, with this one, unless `hold_scenes` asks for more; those that were not
+        asked for longest go, and before the mesh is read.
 
     Raises
     ------
@@ -99,13 +105,61 @@ def open_scene(mesh: Path, sha256: str, keep: int = 1) -> SceneContext:
         The mesh is missing, damaged, or another one.
     """
     with _lock:
-        context = _contexts.pop(sha256, None)
-        _release_down_to(keep - 1)
-        if context is None:
-            context = SceneContext(read_glb(mesh, sha256))
+        context = _contexts.pop(sha256, None) or _ahead.pop(sha256, None)
+        gone = _oldest_beyond(max(keep, *_holders.values(), 1) - 1)
+        if context is not None:
+            _contexts[sha256] = context
+    _release(gone)
+    if context is not None:
+        return context
+    with _lock:
+        # Somebody else may have read it meanwhile.
+        context = _contexts.get(sha256) or SceneContext(read_glb(mesh, sha256))
         # Of a file without a digest nothing tells whether it is the same the next time.
         _contexts[sha256 or id(context.scene)] = context
         return context
+
+
+def read_ahead(mesh: Path, sha256: str, make: Callable[[SceneContext], object]) -> None:
+    """Read a scene and build on it, in a thread beside the work on another one; `open_scene` takes it from there.
+
+    No other scene goes for it: only who works on a scene lets go of what draws it, in the thread that drew.
+
+    Parameters
+    ----------
+    mesh, sha256
+        As for `open_scene`.
+    make : callable
+        Makes parts of its context; none that draws.
+
+    Raises
+    ------
+    AssetError
+        The mesh is missing, damaged, or another one.
+    """
+    with _lock:
+        if sha256 in _contexts or sha256 in _ahead:
+            return
+    context = SceneContext(read_glb(mesh, sha256))
+    with _lock:
+        _ahead[sha256] = context
+    make(context)
+
+
+def hold_scenes(owner: object, number: int) -> None:
+    """Keep so many scenes at least as long as the owner lives, whoever opens another one; 0 for no such wish."""
+    with _lock:
+        if number:
+            _holders[owner] = number
+        else:
+            _holders.pop(owner, None)
+
+
+def forget_scene(sha256: str) -> None:
+    """Let go of a scene, where it is kept or was read ahead."""
+    with _lock:
+        gone = [context for kept in (_contexts, _ahead) if (context := kept.pop(sha256, None))]
+    _release(gone)
 
 
 def context_of(scene: Scene) -> SceneContext:
@@ -115,10 +169,14 @@ def context_of(scene: Scene) -> SceneContext:
             if context.scene is scene:
                 _contexts.move_to_end(key)
                 return context
-        _release_down_to(_BESIDE - 1)
+        for context in _ahead.values():
+            if context.scene is scene:
+                return context
+        gone = _oldest_beyond(max(_BESIDE, *_holders.values(), 1) - 1)
         # The context holds the scene, so that nothing else gets its id as long as this stands.
         context = _contexts[id(scene)] = SceneContext(scene)
-        return context
+    _release(gone)
+    return context
 
 
 def open_contexts() -> tuple[SceneContext, ...]:
@@ -130,9 +188,17 @@ def open_contexts() -> tuple[SceneContext, ...]:
 def release_scenes() -> None:
     """Let go of all scenes."""
     with _lock:
-        _release_down_to(0)
+        gone = [*_oldest_beyond(0), *_ahead.values()]
+        _ahead.clear()
+    _release(gone)
 
 
-def _release_down_to(number: int) -> None:
-    while len(_contexts) > number:
-        _contexts.popitem(last=False)[1].release()
+def _oldest_beyond(number: int) -> list[SceneContext]:
+    """Take out those that are more than so many; to be released when the lock is let go."""
+    return [_contexts.popitem(last=False)[1] for _ in range(len(_contexts) - number)]
+
+
+def _release(contexts: list[SceneContext]) -> None:
+    """Let go of them one by one, so that none of them is left when the next scene is read."""
+    while contexts:
+        contexts.pop(0).release()

@@ -91,6 +91,21 @@ class PicturedTask:
         )
 
     @property
+    def told(self) -> str:
+        """The goal for a terminal, which shows no picture: which one it is, and what the twin in words says."""
+        row = self.instance
+        if row["modality"] != "image" or self.reference is None:
+            return self.goal
+        height, width = self.reference.shape[:2]
+        lines = [
+            f"{self.goal.removesuffix(':')}: reference image {row['reference_image_id']}, {width} x {height} pixels"
+        ]
+        twin = next((other for other in self.task.instances if other["modality"] == "semantic"), None)
+        if twin is not None:
+            lines.append(f"In words, which {twin['task_id']} gives in its place: {twin['description']}")
+        return "\n".join(lines)
+
+    @property
     def facts(self) -> list[tuple[str, str]]:
         """Figures of the route, name and value."""
         route = self.task.route

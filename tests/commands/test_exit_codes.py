@@ -28,6 +28,8 @@ NEEDED = {
     "show": [TASK],
     "view": ["--scene", SCENE, "--no-browser"],
     "export": ["--format", "habitat"],
+    "push-to-hub": ["me/data"],
+    "pull": ["me/data"],
     "config init": ["{file}"],
     "import-benchmark": ["tasks.json", "--format", "openfly", "--frame", "enu"],
 }
@@ -50,6 +52,8 @@ WRONG = {
     "export": ["--picture-size", "many"],
     "import-benchmark": ["--format", "nothing"],
     "report": ["--profile", "nothing"],
+    "push-to-hub": ["--revision", "a..b"],
+    "pull": ["--revision", "a..b"],
 }
 # What was asked for makes sense, and cannot be done: a file stands where a folder is wanted, or there is no data.
 IMPOSSIBLE = {
@@ -59,6 +63,7 @@ IMPOSSIBLE = {
     "gallery": ["--out", "file"],
     "annotate": ["--data", "file"],
     "import-benchmark": ["--data", "file"],
+    "pull": ["--data", "file"],
     "config init": ["--force"],
 }  # fmt: skip
 

@@ -112,8 +112,7 @@ def test_a_driver_that_is_killed_and_started_again_goes_on_to_the_same_bytes(pro
     before = {p: p.stat().st_mtime_ns for p in data.glob("anchors/*/*.parquet")}
     assert before
     err = finish(start(project, nodes, data))
-    assert "build-scenes" in err
-    assert "nothing to do" in err
+    assert "stages had nothing to do" in err
     assert {p: p.stat().st_mtime_ns for p in data.glob("anchors/*/*.parquet")} == before
     assert snapshot(data) == snapshot(smoke)
     until(lambda: not workers_alive())

@@ -131,7 +131,7 @@ def test_nothing_changed_nothing_is_written(server, copy):
     code, err = run(server, copy, *plan_args(copy))
     assert code == 0
     assert mtimes(copy) == before
-    assert err.count("nothing to do") == 5
+    assert err.count("; nothing to do; ") == 1, "what was asked for, not what it builds on"
 
 
 def shard(data, table, number):

@@ -1,0 +1,295 @@
+"""A release to and from the Hugging Face Hub: its own files alone, each held against its digest."""
+
+from __future__ import annotations
+
+import hashlib
+import shutil
+from collections.abc import Collection, Sequence
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from dataclasses import dataclass
+from pathlib import Path, PurePosixPath
+from typing import Any
+
+from aerialdojo_gen.errors import StoreError, UsageError
+from aerialdojo_gen.exchange.hub_client import Hub, check_revision
+from aerialdojo_gen.pipeline.progress import Reporter
+from aerialdojo_gen.release.contents import FOLDER, SHARDS, check_release, part_name, scenes_there
+from aerialdojo_gen.store import shards as store
+from aerialdojo_gen.store.atomic import atomic_folder, make_folder
+from aerialdojo_gen.store.layout import is_plain
+from aerialdojo_gen.store.root import DataRoot, LocalRoot, Where, open_root
+
+# What stands beside the tables; the dataset card is what the Hub shows of a data set.
+_BESIDE = ("README.md", "croissant.json", "pipeline.json")
+_AT_ONCE = 8
+_CHUNK = 1 << 20
+
+
+@dataclass(frozen=True)
+class Moved:
+    """What was sent or fetched.
+
+    Attributes
+    ----------
+    where : str
+        The data set's address, or the folder.
+    commit : str
+        The revision, hexadecimal.
+    scenes, files, bytes : int
+    meshes : int
+        How many of the files are meshes.
+    left : tuple of str
+        What the data set holds beside a release, and was left there.
+    """
+
+    where: str
+    commit: str
+    scenes: int
+    files: int
+    bytes: int
+    meshes: int = 0
+    left: tuple[str, ...] = ()
+
+    def __str__(self) -> str:
+        """Where, and how much."""
+        return (
+            f"{self.where}: {self.scenes:,} scenes, {self.files:,} files, {self.bytes / 1e6:,.1f} MB, "
+            f"revision {self.commit[:12]}"
+        )
+
+
+def push_to_hub(
+    repo: str,
+    data: Where = "data",
+    *,
+    private: bool = False,
+    revision: str | None = None,
+    meshes: bool = False,
+    reporter: Reporter | None = None,
+) -> Moved:
+    """Send a release to the Hub as a data set; the twin of ``aerialdojo-gen push-to-hub``.
+
+    One commit holds it all. Files that the server has are not sent again, so that the same call goes on after a
+    failure; parts of scenes that the release does not have (any more) are removed there.
+
+    Parameters
+    ----------
+    repo : str
+        ``USER/NAME``; made where there is none.
+    data : str, Path or DataRoot
+        The data directory, on this machine.
+    private : bool
+        Whether a data set that is made now is private.
+    revision : str, optional
+        Branch to write to; the main one where absent.
+    meshes : bool
+        Send the scenes' meshes too: `evaluate`, `view` and the whole of `validate` want them.
+    reporter : Reporter, optional
+        Is told what is done.
+
+    Raises
+    ------
+    UsageError
+        The name is none, or the data directory is no folder of this machine.
+    StoreError
+        There is no release, or a part of it is missing or damaged.
+    AerialDojoError
+        There is no token in ``HF_TOKEN``, it may not write, or the server does not answer.
+    """
+    root = open_root(data)
+    if not isinstance(root, LocalRoot):
+        raise UsageError("push-to-hub sends a folder of this machine: copy the release here and name it with --data")
+    check_revision(revision)
+    scenes = check_release(root)
+    reporter = reporter or Reporter(quiet=True)
+    hub = Hub(repo, "push-to-hub", writes=True)
+    from huggingface_hub import CommitOperationAdd, CommitOperationDelete
+
+    own = [*_BESIDE, *(part_name(key, scene, "") for key in SHARDS for scene in scenes)]
+    files = {name: root.path / FOLDER / name for name in own if (root.path / FOLDER / name).is_file()}
+    if meshes:
+        files |= {f"meshes/{scene}.glb": _mesh(root, scene) for scene in scenes}
+    size = sum(path.stat().st_size for path in files.values())
+    reporter.line(f"push-to-hub: {len(files):,} files, {size / 1e6:,.1f} MB to {hub.endpoint}/datasets/{repo}")
+    with hub.told("make or write to"):
+        if not hub.api.repo_exists(repo, repo_type="dataset"):
+            hub.api.create_repo(repo, repo_type="dataset", private=private)
+        if revision:
+            hub.api.create_branch(repo, branch=revision, repo_type="dataset", exist_ok=True)
+        there = hub.api.list_repo_files(repo, repo_type="dataset", revision=revision)
+        gone = [name for name in there if scene_of(name) and name not in files and (meshes or not _is_mesh(name))]
+        operations: list[Any] = [CommitOperationAdd(name, str(path)) for name, path in sorted(files.items())]
+        operations += [CommitOperationDelete(name) for name in sorted(gone)]
+        made = hub.api.create_commit(
+            repo, operations, commit_message=f"Release of {len(scenes)} scenes", repo_type="dataset",
+            revision=revision, num_threads=_AT_ONCE,
+        )  # fmt: skip
+    return Moved(
+        f"{hub.endpoint}/datasets/{repo}", str(made.oid), len(scenes), len(files), size, sum(map(_is_mesh, files))
+    )
+
+
+def pull_release(
+    repo: str,
+    data: Where = "data",
+    *,
+    revision: str | None = None,
+    meshes: bool = True,
+    replace: bool = False,
+    reporter: Reporter | None = None,
+) -> Moved:
+    """Fetch a release from the Hub; the twin of ``aerialdojo-gen pull``.
+
+    Only files that a release has are fetched, by the names that they have here. What was fetched stays after a
+    failure, and the same call goes on from there. Each file is held against the digest that the server has of it, and
+    all parts against their own; then the release appears whole.
+
+    Parameters
+    ----------
+    repo : str
+        ``USER/NAME``.
+    data : str, Path or DataRoot
+        Data directory to be made, or one without a release, on this machine.
+    revision : str, optional
+        Branch, tag or commit; the main branch where absent.
+    meshes : bool
+        Fetch the meshes too, where the data set has them.
+    replace : bool
+        Whether a release that is there may be lost.
+    reporter : Reporter, optional
+        Shows progress.
+
+    Raises
+    ------
+    UsageError
+        There is no such data set or revision, it holds no release, or the data directory has another one.
+    StoreError
+        What came is damaged, or the disk is full.
+    AerialDojoError
+        The server does not answer.
+    """
+    root = open_root(data)
+    if not isinstance(root, LocalRoot):
+        raise UsageError("pull writes a folder of this machine: name one with --data")
+    check_revision(revision)
+    if root.path.exists() and not root.path.is_dir():
+        raise StoreError(f"{root.path} is no folder: name another with --data")
+    if scenes_there(root) and not replace:
+        raise UsageError(f"there is a release in {root.url}: name another folder with --data, or add --replace")
+    reporter = reporter or Reporter(quiet=True)
+    hub = Hub(repo, "pull")
+    with hub.told("read"):
+        info = hub.api.repo_info(repo, repo_type="dataset", revision=revision, files_metadata=True)
+    commit = str(info.sha)
+    wanted = {
+        s.rfilename: s for s in info.siblings if _is_ours(s.rfilename) and (meshes or not _is_mesh(s.rfilename))
+    }
+    left = tuple(s.rfilename for s in info.siblings if not _is_ours(s.rfilename) and s.rfilename != ".gitattributes")
+    scenes = {scene for name in wanted if (scene := scene_of(name)) and not _is_mesh(name)}
+    if not scenes:
+        raise UsageError(f"the data set {repo} at {hub.endpoint} holds no release of aerialdojo-gen")
+    # Laid out as a data directory, so that what is asked of one can be asked of it.
+    partial = root.path / f".pull-{repo.replace('/', '--')}"
+    make_folder(partial / FOLDER)
+    _fetch(hub, commit, list(wanted.values()), partial, reporter)
+    size = sum(_place(partial, name).stat().st_size for name in wanted)
+    _check(open_root(partial), {name for name in wanted if _is_mesh(name)})
+    _settle(root, partial, sorted(wanted))
+    return Moved(str(root.path / FOLDER), commit, len(scenes), len(wanted), size, sum(map(_is_mesh, wanted)), left)
+
+
+def scene_of(name: str) -> str:
+    """Return the scene that a file of a data set is a part or the mesh of; empty where it is neither.
+
+    Parameters
+    ----------
+    name : str
+        Path in the data set, as anybody may have written it.
+    """
+    stem = PurePosixPath(name).name.partition(".")[0].removeprefix("part-")
+    if not is_plain(stem):
+        return ""
+    own = {f"meshes/{stem}.glb", *(part_name(key, stem, "") for key in SHARDS)}
+    return stem if name in own else ""
+
+
+def _is_ours(name: str) -> bool:
+    return name in _BESIDE or bool(scene_of(name))
+
+
+def _is_mesh(name: str) -> bool:
+    return name.startswith("meshes/")
+
+
+def _mesh(root: LocalRoot, scene: str) -> Path:
+    path = root.path / "meshes" / f"{scene}.glb"
+    if not path.is_file():
+        raise StoreError(f"the mesh {path} is missing: leave --meshes out, or make it by build-scenes")
+    return path
+
+
+def _fetch(hub: Hub, commit: str, files: Sequence[Any], folder: Path, reporter: Reporter) -> None:
+    """Fetch what is not there yet, and hold each file against what the server says of it."""
+
+    def one(sibling: Any) -> None:
+        path = _place(folder, sibling.rfilename)
+        if path.is_file() and _is_as_told(path, sibling):
+            return
+        below = path.parents[len(PurePosixPath(sibling.rfilename).parts) - 1]
+        hub.api.hf_hub_download(hub.repo, sibling.rfilename, repo_type="dataset", revision=commit, local_dir=below)
+        if not _is_as_told(path, sibling):
+            path.unlink(missing_ok=True)
+            raise StoreError(f"{sibling.rfilename} of {hub.repo} came damaged: the same command fetches it again")
+
+    with reporter.bar("pull", len(files), "files") as bar, hub.told("read"):
+        pool = ThreadPoolExecutor(_AT_ONCE)
+        try:
+            for done in as_completed([pool.submit(one, sibling) for sibling in files]):
+                done.result()
+                bar.advance()
+        finally:
+            pool.shutdown(cancel_futures=True)
+
+
+def _is_as_told(path: Path, sibling: Any) -> bool:
+    """Whether a file has the size and the digest that the server has: SHA-256 of a large one, else git's own."""
+    size = path.stat().st_size
+    if sibling.size is not None and size != sibling.size:
+        return False
+    if sibling.lfs is not None:
+        told, digest = sibling.lfs.sha256, hashlib.sha256()
+    else:
+        told, digest = sibling.blob_id, hashlib.sha1(b"blob %d\0" % size, usedforsecurity=False)
+    with path.open("rb") as file:
+        while chunk := file.read(_CHUNK):
+            digest.update(chunk)
+    return told is not None and digest.hexdigest() == told
+
+
+def _place(folder: Path, name: str) -> Path:
+    """Return where a file of a data set lies in a data directory: meshes beside the release."""
+    return folder / name if _is_mesh(name) else folder / FOLDER / name
+
+
+def _check(root: DataRoot, meshes: Collection[str]) -> None:
+    """Read every part, which verifies its columns, and hold meshes against what the release says of them."""
+    for scene in check_release(root):
+        for key in SHARDS:
+            store.read_scene(root, key, scene)
+        row = store.read_scene(root, "release/scenes", scene, ("mesh_path", "mesh_sha256")).to_pylist()[0]
+        name = row["mesh_path"]
+        if name in meshes and root.digest(name) != row["mesh_sha256"]:
+            raise StoreError(f"{root.at(name)} is not the mesh that the release was made from: pull --no-meshes")
+
+
+def _settle(root: LocalRoot, partial: Path, names: Sequence[str]) -> None:
+    """Give the fetched files their places: the release in one step, the meshes before it."""
+    for name in filter(_is_mesh, names):
+        make_folder(root.path / "meshes")
+        _place(partial, name).replace(root.path / name)
+    with root.lock(), atomic_folder(root.path / FOLDER) as folder:
+        for name in names:
+            if not _is_mesh(name):
+                make_folder((folder / name).parent)
+                _place(partial, name).replace(folder / name)
+    shutil.rmtree(partial, ignore_errors=True)

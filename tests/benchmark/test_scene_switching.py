@@ -1,0 +1,198 @@
+"""Going from scene to scene: which stay open, what is read ahead, and that neither changes an episode."""
+
+import copy
+import threading
+from collections import Counter
+
+import numpy as np
+import pytest
+
+from aerialdojo_gen import make_env
+from aerialdojo_gen.benchmark.draw import TaskDraw
+from aerialdojo_gen.benchmark.tasks import mesh_of
+from aerialdojo_gen.errors import UsageError
+from aerialdojo_gen.learning.vector import OwnScenes
+from aerialdojo_gen.scenes.context import context_of, forget_scene, open_contexts, open_scene, read_ahead
+from aerialdojo_gen.scenes.context import release_scenes as let_go
+from aerialdojo_gen.store.root import open_root
+
+YARDS = ("U_Courtyard_0", "U_Courtyard_1")
+BLIND = {"views": (), "rgb": False, "depth": False}
+
+
+@pytest.fixture(autouse=True)
+def nothing_open():
+    let_go()
+    yield
+    let_go()
+
+
+def flown(env, episodes, seed=3):
+    """The tasks that are drawn, and what is seen after a step of each."""
+    ids, seen = [], []
+    for k in range(episodes):
+        env.reset(seed=seed if k == 0 else None)
+        ids.append(env.task.row["task_id"])
+        seen.append((env.task.row["scene"], env.step(14)[0]))
+    return ids, seen
+
+
+def test_reading_ahead_changes_no_task_and_no_picture(smoke):
+    options = {"views": "front", "width": 48, "height": 48, "episodes_per_scene": 2}
+    plain = make_env(smoke, scenes_in_memory=1, **options)
+    ids, seen = flown(plain, 12)
+    plain.close()
+    ahead = make_env(smoke, scenes_in_memory=1, prefetch=True, **options)
+    again, there = flown(ahead, 12)
+    ahead.close()
+    assert ids == again
+    assert {scene for scene, _ in seen} == set(YARDS), "the draw goes from one to the other"
+    for (_, one), (_, other) in zip(seen, there, strict=True):
+        assert (one["rgb"]["front"] == other["rgb"]["front"]).all()
+        assert (one["depth_m"]["front"] == other["depth_m"]["front"]).all()
+
+
+def test_one_episode_a_scene_is_the_draw_of_old(smoke):
+    env = make_env(smoke, **BLIND)
+    ids, _ = flown(env, 8)
+    draw = np.random.Generator(np.random.PCG64(np.random.SeedSequence(3)))
+    rows = env._rows["task_id"].to_pylist()
+    assert ids == [rows[int(draw.integers(len(rows)))] for _ in range(8)]
+
+
+@pytest.mark.parametrize("in_a_row", [1, 2, 5])
+def test_episodes_come_in_blocks_of_a_scene_and_all_tasks_as_often(in_a_row):
+    scenes = ["a"] * 6 + ["b"] * 3 + ["c"]
+    tasks, draw = TaskDraw(scenes, in_a_row), np.random.default_rng(0)
+    drawn = [tasks.next(draw) for _ in range(20_000)]
+    for k in range(0, len(drawn), in_a_row):
+        assert len({scenes[at] for at in drawn[k : k + in_a_row]}) == 1
+    counts = Counter(drawn)
+    # Blocks of five make a fifth as many independent draws of a scene: four standard deviations of that.
+    off = 4.0 * np.sqrt(len(drawn) * in_a_row / len(scenes))
+    assert all(abs(counts[at] - len(drawn) / len(scenes)) < off for at in range(len(scenes)))
+
+
+def test_what_comes_is_known_and_a_seed_begins_anew():
+    tasks = TaskDraw(["a", "b", "c", "d"] * 5, 3)
+    assert tasks.coming is None
+    first = np.random.default_rng(1)
+    for _ in range(30):
+        tasks.next(first)
+        coming = tasks.coming
+        for _ in range(2):
+            tasks.next(first)
+        assert tasks._scenes[tasks.next(first)] == coming
+        for _ in range(2):
+            tasks.next(first)
+    tasks.begin_anew()
+    once = [tasks.next(draw) for draw in [np.random.default_rng(7)] for _ in range(9)]
+    tasks.begin_anew()
+    assert once == [tasks.next(draw) for draw in [np.random.default_rng(7)] for _ in range(9)]
+    tasks.restrict(["b"])
+    draw = np.random.default_rng(0)
+    assert {tasks._scenes[tasks.next(draw)] for _ in range(20)} == {"b"}
+    with pytest.raises(UsageError, match="in e"):
+        tasks.restrict(["e"])
+
+
+def test_scenes_stay_open_as_many_as_were_asked_for(smoke):
+    root = open_root(smoke)
+    digests = {mesh_of(root, scene)[1]: scene for scene in YARDS}
+
+    def kept():
+        from aerialdojo_gen.scenes import context
+
+        return [digests[key] for key in context._contexts if key in digests]
+
+    ids = make_env(smoke, **BLIND)._rows.select(["task_id", "scene"]).to_pylist()
+    one, other = (next(row["task_id"] for row in ids if row["scene"] == scene) for scene in YARDS)
+    few = make_env(smoke, scenes_in_memory=1, **BLIND)
+    for task in (one, other, one):
+        few.reset(options={"task_id": task})
+        assert kept() == [few.task.row["scene"]]
+    few.close()
+    assert kept() == []
+    many = make_env(smoke, scenes_in_memory=5, **BLIND)
+    many.reset(options={"task_id": one})
+    space = many._flight.space
+    many.reset(options={"task_id": other})
+    # Somebody who keeps a single scene does not take away what this one holds.
+    open_scene(*mesh_of(root, YARDS[1]), 1)
+    assert set(kept()) == set(YARDS)
+    many.reset(options={"task_id": one})
+    assert many._flight.space is space, "nothing was read or built again"
+    many.close()
+    assert kept() == []
+
+
+def test_what_is_read_ahead_is_taken_up_and_keeps_nobody_waiting(smoke):
+    root = open_root(smoke)
+    here, there = (mesh_of(root, scene) for scene in YARDS)
+    begun, go_on, made = threading.Event(), threading.Event(), []
+
+    def make(context):
+        context.part("slow", lambda: (begun.set(), go_on.wait(60), made.append(context)))
+
+    ahead = threading.Thread(target=read_ahead, args=(*there, make), daemon=True)
+    ahead.start()
+    assert begun.wait(60)
+    worked = threading.Event()
+
+    def work():
+        context = open_scene(*here, 1)
+        context.part("quick", lambda: 1)
+        assert context_of(context.scene) is context
+        open_scene(*here, 1)
+        worked.set()
+
+    # What waits for the other thread here would wait for ever.
+    threading.Thread(target=work, daemon=True).start()
+    assert worked.wait(60)
+    assert not made
+    go_on.set()
+    ahead.join(60)
+    assert len(open_contexts()) == 1
+    taken = open_scene(*there, 1)
+    assert taken is made[0]
+    assert taken.part("slow", lambda: "anew") != "anew"
+    assert open_contexts() == (taken,)
+    forget_scene(there[1])
+    assert not open_contexts()
+
+
+def test_a_closed_environment_says_so_and_leaves_no_thread(smoke):
+    before = threading.active_count()
+    env = make_env(smoke, prefetch=True, **BLIND)
+    env.reset(seed=0)
+    env.close()
+    env.close()
+    assert threading.active_count() == before
+    assert not open_contexts()
+    with pytest.raises(RuntimeError, match="closed: make another"):
+        env.reset()
+    with pytest.raises(RuntimeError, match="call reset first"):
+        env.step(0)
+
+
+@pytest.mark.parametrize("how", [copy.copy, copy.deepcopy])
+def test_a_copy_is_refused_with_what_to_do(smoke, how):
+    env = make_env(smoke, **BLIND)
+    for one in (env, OwnScenes(env, YARDS[:1])):
+        if how is copy.deepcopy or one is env:
+            with pytest.raises(TypeError, match="make_env, make_vec"):
+                how(one)
+
+
+def test_one_view_may_be_a_word(smoke):
+    env = make_env(smoke, views="down", width=32, height=24)
+    assert list(env.reset(seed=0)[0]["rgb"]) == ["down"]
+    env.close()
+    with pytest.raises(UsageError, match="no view 'fron': did you mean 'front'"):
+        make_env(smoke, views="fron")
+
+
+@pytest.mark.parametrize("wrong", [{"scenes_in_memory": 0}, {"episodes_per_scene": 0}])
+def test_there_is_at_least_one(smoke, wrong):
+    with pytest.raises(UsageError, match="at least 1, not 0"):
+        make_env(smoke, **wrong)

@@ -1,0 +1,199 @@
+"""push-to-hub and pull, against a server at 127.0.0.1 that answers what huggingface_hub asks of the Hub."""
+
+import shutil
+import sys
+
+import pytest
+from huggingface_hub import constants
+from support.hub_server import READER, TOKEN, Repo, hub_server, is_large
+
+from aerialdojo_gen import cli
+from aerialdojo_gen.exchange.hub import scene_of
+from aerialdojo_gen.store import shards
+
+NAME = "me/yards"
+
+
+@pytest.fixture
+def hub(monkeypatch):
+    """The server, which the commands are told of by the environment."""
+    # Its own storage protocol is another service's; the server here takes files by git-lfs, as older ones do.
+    monkeypatch.setattr(constants, "HF_HUB_DISABLE_XET", True)
+    with hub_server() as server:
+        monkeypatch.setenv("HF_ENDPOINT", server.url)
+        monkeypatch.setenv("HF_TOKEN", TOKEN)
+        yield server
+
+
+@pytest.fixture
+def call(monkeypatch, capsys):
+    """Call a command; returns the exit code, standard output and standard error."""
+
+    def called(*arguments):
+        monkeypatch.setattr(sys, "argv", ["aerialdojo-gen", *map(str, arguments)])
+        code = 0
+        try:
+            cli.main()
+        except SystemExit as end:
+            code = end.code or 0
+        return code, *capsys.readouterr()
+
+    return called
+
+
+def files_of(folder):
+    return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+def has_failed(answer, code, *words):
+    got, _, said = answer
+    last = said.splitlines()[-1]
+    return (got == code and last.startswith("error: ") and all(word in last for word in words)) or answer
+
+
+def test_what_was_sent_comes_back_to_the_byte_and_nothing_else_does(smoke, hub, call, tmp_path):
+    code, said, _ = call("push-to-hub", NAME, "--data", smoke, "--quiet")
+    assert code == 0
+    assert f"{hub.url}/datasets/{NAME}: 2 scenes" in said
+    released = files_of(smoke / "release")
+    assert hub.repos[NAME].files == released, "the card is README.md, at the top"
+
+    strangers = ("notes.txt", "tasks/../../evil.parquet", "run.py", "/etc/x", "../../meshes/U_Courtyard_0.glb")
+    hub.repos[NAME].files |= dict.fromkeys((*strangers, "tasks/id_train/part-..parquet"), b"x")
+    code, said, _ = call("pull", NAME, "--data", tmp_path / "mine")
+    assert code == 0
+    assert "left there: " in said
+    assert "notes.txt" in said
+    assert f"next: aerialdojo-gen validate --no-meshes --data {tmp_path / 'mine'}" in said
+    assert files_of(tmp_path / "mine" / "release") == released
+    assert {path.name for path in (tmp_path / "mine").iterdir()} == {"release", ".lock"}
+    assert {path.name for path in tmp_path.iterdir()} == {"mine"}
+    code, said, _ = call(
+        "validate", "--data", tmp_path / "mine", "--no-meshes", "--pipeline", "smoke", "--workers", 1
+    )
+    assert code == 0, said
+
+
+def test_meshes_travel_where_they_are_asked_for(smoke, hub, call, tmp_path):
+    assert call("push-to-hub", NAME, "--data", smoke, "--meshes", "--private")[0] == 0
+    assert hub.repos[NAME].private
+    assert call("pull", NAME, "--data", tmp_path / "all")[0] == 0
+    assert files_of(tmp_path / "all" / "meshes") == files_of(smoke / "meshes")
+    assert call("pull", NAME, "--data", tmp_path / "few", "--no-meshes")[0] == 0
+    assert not (tmp_path / "few" / "meshes").exists()
+    # A mesh of another making has a digest of its own, which the release knows nothing of.
+    hub.repos[NAME].files["meshes/U_Courtyard_1.glb"] = hub.repos[NAME].files["meshes/U_Courtyard_0.glb"]
+    assert (
+        has_failed(call("pull", NAME, "--data", tmp_path / "other"), 1, "U_Courtyard_1.glb is not the mesh") is True
+    )
+    assert not (tmp_path / "other" / "release").exists()
+
+
+def test_both_go_on_where_they_were_cut_off(smoke, hub, call, tmp_path):
+    large = {path: content for path, content in files_of(smoke / "release").items() if is_large(path)}
+    hub.gives_up_after = 5
+    assert call("push-to-hub", NAME, "--data", smoke)[0] == 1
+    assert not hub.repos[NAME].files, "one commit, whole or not at all"
+    there, hub.gives_up_after = len(hub.objects), None
+    assert 0 < there < len(large)
+    hub.calls.clear()
+    assert call("push-to-hub", NAME, "--data", smoke)[0] == 0
+    assert hub.calls["sent"] == len(set(large.values())) - there
+
+    hub.calls.clear()
+    hub.gives_up_after = 5
+    assert call("pull", NAME, "--data", tmp_path)[0] == 1
+    assert not (tmp_path / "release").exists()
+    hub.gives_up_after = None
+    there = sum(1 for path in tmp_path.rglob("part-*.parquet"))
+    assert there > 0
+    hub.calls.clear()
+    assert call("pull", NAME, "--data", tmp_path)[0] == 0
+    assert hub.calls["fetched"] <= len(files_of(smoke / "release")) - there
+    assert files_of(tmp_path / "release") == files_of(smoke / "release")
+
+
+def test_scenes_that_the_release_has_no_more_are_taken_away_and_strangers_files_stay(smoke, hub, call, tmp_path):
+    hub.repos[NAME] = Repo(files={"tasks/id_train/part-U_Gone_0.parquet": b"x", "notes.txt": b"mine"})
+    assert call("push-to-hub", NAME, "--data", smoke)[0] == 0
+    assert hub.repos[NAME].files == files_of(smoke / "release") | {"notes.txt": b"mine"}
+
+
+def test_what_comes_damaged_is_told_and_not_kept(smoke, hub, call, tmp_path):
+    assert call("push-to-hub", NAME, "--data", smoke)[0] == 0
+    part = "objects/part-U_Courtyard_0.parquet"
+    whole = hub.repos[NAME].files[part]
+    hub.spoilt[part] = whole[:100] + bytes([whole[100] ^ 1]) + whole[101:]
+    assert has_failed(call("pull", NAME, "--data", tmp_path), 1, part, "came damaged") is True
+    assert not (tmp_path / "release").exists()
+    hub.spoilt.clear()
+    assert call("pull", NAME, "--data", tmp_path)[0] == 0
+    assert shards.read_scene(tmp_path, "release/objects", "U_Courtyard_0").num_rows > 0
+
+
+def test_a_data_set_whose_parts_are_wrong_makes_no_release(smoke, hub, call, tmp_path):
+    assert call("push-to-hub", NAME, "--data", smoke)[0] == 0
+    files = hub.repos[NAME].files
+    part = "landmarks/part-U_Courtyard_0.parquet"
+    whole = files.pop(part)
+    assert has_failed(call("pull", NAME, "--data", tmp_path), 1, part, "is missing") is True
+    files[part] = whole[: len(whole) // 2]
+    assert has_failed(call("pull", NAME, "--data", tmp_path), 1, part) is True
+    assert not (tmp_path / "release").exists()
+
+
+def test_a_release_that_is_there_stays_unless_it_is_to_be_replaced(smoke, hub, call, tmp_path):
+    assert call("push-to-hub", NAME, "--data", smoke)[0] == 0
+    shutil.copytree(smoke / "release", tmp_path / "release")
+    (tmp_path / "release" / "README.md").write_text("mine")
+    assert has_failed(call("pull", NAME, "--data", tmp_path), 2, "--replace") is True
+    assert (tmp_path / "release" / "README.md").read_text() == "mine"
+    assert call("pull", NAME, "--data", tmp_path, "--replace")[0] == 0
+    assert files_of(tmp_path / "release") == files_of(smoke / "release")
+
+
+def test_what_goes_wrong_is_a_line_that_names_the_mend(smoke, hub, call, tmp_path, monkeypatch):
+    push = ("push-to-hub", NAME, "--data", smoke)
+    pull = ("pull", NAME, "--data", tmp_path / "new")
+    assert has_failed(call(*pull), 2, f"there is no data set {NAME} at {hub.url}") is True
+    hub.repos[NAME] = Repo(files={"README.md": b"a model", "data.csv": b"1"})
+    assert has_failed(call(*pull), 2, "holds no release") is True
+    assert has_failed(call(*pull, "--revision", "v9"), 2, "no such revision") is True
+    monkeypatch.setenv("HF_TOKEN", READER)
+    assert has_failed(call(*push), 1, "refuses to make or write to", "HF_TOKEN") is True
+    monkeypatch.setenv("HF_TOKEN", "hf_aWrongTokenOfNoAccount12345678")
+    for command in (push, pull):
+        answer = call(*command)
+        assert has_failed(answer, 1, "does not know the token in HF_TOKEN") is True
+        assert "hf_aWrong" not in answer[2]
+    monkeypatch.delenv("HF_TOKEN")
+    hub.repos[NAME].private = True
+    assert has_failed(call(*pull), 2, "HF_TOKEN is not set") is True
+    assert has_failed(call(*push), 1, "export HF_TOKEN=", "/settings/tokens") is True
+    assert has_failed(call("pull", "yards", "--data", tmp_path), 2, "write USER/NAME") is True
+    assert has_failed(call("push-to-hub", NAME, "--data", tmp_path / "none"), 1, "there is no release in") is True
+    monkeypatch.setenv("HF_ENDPOINT", "http://127.0.0.1:9")
+    assert has_failed(call(*pull), 1, "cannot reach http://127.0.0.1:9") is True
+    monkeypatch.setenv("HF_ENDPOINT", "nowhere")
+    assert has_failed(call(*pull), 2, "HF_ENDPOINT") is True
+    assert not (tmp_path / "new").exists()
+
+
+@pytest.mark.parametrize(
+    ("name", "scene"),
+    [
+        ("tasks/id_train/part-U_Mall_0.parquet", "U_Mall_0"),
+        ("routes/ood_test/part-U_Mall_1.parquet", "U_Mall_1"),
+        ("meshes/U_Mall_0.glb", "U_Mall_0"),
+        ("tasks/ood_train/part-U_Mall_0.parquet", ""),
+        ("tasks/part-U_Mall_0.parquet", ""),
+        ("meshes/../U_Mall_0.glb", ""),
+        ("/objects/part-U_Mall_0.parquet", ""),
+        ("objects/part-U_Mall_0.parquet.py", ""),
+        ("objects\\part-U_Mall_0.parquet", ""),
+        ("objects/part-.parquet", ""),
+        ("objects/part-a/b.parquet", ""),
+    ],
+)
+def test_only_names_of_a_release_are_taken(name, scene):
+    assert scene_of(name) == scene
