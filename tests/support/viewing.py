@@ -15,12 +15,12 @@ YARD = "U_Courtyard_0"
 
 @contextmanager
 def served(data: Path, scene: str, *, silent: bool = True) -> Iterator[str]:
-    """Run ``aerialdojo-gen view``; gives its address, and checks at last that Ctrl-C is a plain end."""
+    """Run ``aerialdojo-gen view``; gives the address of the scene's page; Ctrl-C has to be a plain end."""
     command = [sys.executable, "-m", "aerialdojo_gen.cli", "view", "--data", str(data), "--scene", scene]
     command.append("--no-browser")
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     line = process.stdout.readline()
-    url = re.fullmatch(rf"{scene}: (http://127\.0\.0\.1:\d+/)  \(Ctrl-C ends it\)\n", line)
+    url = re.fullmatch(rf"{scene}: (http://127\.0\.0\.1:\d+/scenes/{scene}/)  \(Ctrl-C ends it\)\n", line)
     assert url, line + process.communicate()[1]
     try:
         yield url[1]
