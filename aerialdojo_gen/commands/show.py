@@ -53,10 +53,11 @@ def view(
     browser: Annotated[bool, typer.Option("--browser/--no-browser", help="Open the page.")] = True,
 ) -> None:
     """Show the release in the browser: scenes and tasks to choose from, a scene with its objects and routes."""
-    from aerialdojo_gen.view.server import chosen_scenes, view_app
     from aerialdojo_gen.web.serving import open_socket, require_web, serve, url_of
 
     require_web()
+    from aerialdojo_gen.view.server import chosen_scenes, view_app
+
     names = chosen_scenes(data, scene)
     page = view_app(data, names)
     listener = open_socket(port)

@@ -81,6 +81,7 @@ class ShownScenes:
         # A renderer belongs to the thread that has made it, FCL's manager is no thing for two, and scenes that are
         # let go of close both: all that touches a mesh is done by one thread.
         self._worker = ThreadPoolExecutor(1, "scenes")
+        self._drawing = threading.Lock()
 
     def require(self, name: str) -> None:
         """UsageError where there is no scene of the name."""
@@ -113,9 +114,11 @@ class ShownScenes:
 
     def picture(self, name: str) -> bytes:
         """Return a picture of a scene from its south-west, JPEG, as the page of the scene begins."""
-        if name not in self._pictures:
-            self._pictures[name] = self.do(name, lambda shown: _picture(shown.released.model))
-        return self._pictures[name]
+        # One at a time: the start page asks for many, and who opens a scene is not to wait for them all.
+        with self._drawing:
+            if name not in self._pictures:
+                self._pictures[name] = self.do(name, lambda shown: _picture(shown.released.model))
+            return self._pictures[name]
 
 
 def _picture(scene: Scene) -> bytes:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
+
+from fastapi import FastAPI, Query, Response
 
 from aerialdojo_gen.browse.release import open_release
 from aerialdojo_gen.release.contents import scenes_in_release
@@ -13,9 +15,6 @@ from aerialdojo_gen.store.root import Where, open_root
 from aerialdojo_gen.view.scenes import ShownScenes
 from aerialdojo_gen.view.tasks import TaskList
 from aerialdojo_gen.web.serving import STATIC, local_app
-
-if TYPE_CHECKING:
-    from fastapi import FastAPI
 
 _MOST_TASKS = 200
 
@@ -42,8 +41,6 @@ def view_app(data: Where, scenes: str | Sequence[str] | None = None) -> FastAPI:
     root = open_root(data)
     names = chosen_scenes(root, scenes)
     app = local_app("start.html", f"aerialdojo-gen view {root}", also=("view.html",))
-    from fastapi import Query, Response
-
     shown, release = ShownScenes(root, names), open_release(root)
     tasks = TaskList(release, names)
     if len(names) == 1:

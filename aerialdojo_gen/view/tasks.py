@@ -17,6 +17,7 @@ from aerialdojo_gen.errors import UsageError
 _ROUTES = ["nav_id", "scene", "setting", "target_object_id", "length_m", "detour_ratio", "min_clearance_m",
            "n_actions", "split"]  # fmt: skip
 _OBJECTS = ["scene", "object_id", "name", "category", "description", "direction", "landmark_id"]
+_BEGINS = r"(?:^|[^\pL\pN])"
 ORDERS = ("nav_id", "length_m", "detour_ratio", "min_clearance_m", "n_actions")
 
 
@@ -64,7 +65,7 @@ class TaskList:
         setting, split : str
             Of these alone; any where empty.
         words : str
-            All of which the target's name, category, description, landmark or the id must hold.
+            Each has to begin one of the target's name, category, description or landmark, or to be part of the id.
         order : str
             One of `ORDERS`; the ids, which are digests, give a fair mixture.
         descending : bool
@@ -102,15 +103,14 @@ def _fitting(table: pa.Table, setting: str, split: str, words: Sequence[str]) ->
         if wanted:
             keep &= pc.equal(table[column], wanted).to_numpy(zero_copy_only=False)
     for word in words:
-        holds = np.zeros(table.num_rows, dtype=np.bool_)
-        for column in ("nav_id", "name", "category", "description", "landmark"):
-            text = table[column].cast(pa.string()) if column != "category" else pc.replace_substring(
-                table[column].cast(pa.string()), "_", " "
-            )  # fmt: skip
-            # A task's id is its route's and a letter more.
-            sought = re.sub("-[si]$", "", word) if column == "nav_id" else word
-            holds |= pc.match_substring(text, sought, ignore_case=True).to_numpy(zero_copy_only=False)
-        keep &= holds
+        # A task's id is its route's and a letter more.
+        holds = pc.match_substring(table["nav_id"], re.sub("-[si]$", "", word), ignore_case=True)
+        for column in ("name", "category", "description", "landmark"):
+            begins = pc.match_substring_regex(
+                table[column].cast(pa.string()), _BEGINS + re.escape(word), ignore_case=True
+            )
+            holds = pc.or_(holds, begins)
+        keep &= holds.to_numpy(zero_copy_only=False)
     return table.filter(pa.array(keep))
 
 

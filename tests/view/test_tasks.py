@@ -57,7 +57,12 @@ def test_tasks_are_found_by_filters(client, release):
         }
         assert (task["scene"], task["setting"], task["split"]) == (route["scene"], route["setting"], route["split"])
         assert task["length_m"] == pytest.approx(route["length_m"], abs=1e-3)
-    for choice in ({"split": "id_test"}, {"setting": "standard"}, {"scene": YARD}, {"scene": YARD, "setting": "base"}):
+    for choice in (
+        {"split": "id_test"},
+        {"setting": "standard"},
+        {"scene": YARD},
+        {"scene": YARD, "setting": "base"},
+    ):
         wanted = [r for r in routes if all(r[key] == value for key, value in choice.items())]
         assert 0 < len(wanted) <= len(routes)
         assert asked(client, **choice)["total"] == len(wanted), choice
@@ -92,7 +97,9 @@ def test_pictures_are_those_of_the_release(client, release):
     wanted = cv2.resize(whole, small.shape[1::-1], interpolation=cv2.INTER_AREA).astype(float)
     assert np.abs(small - wanted).mean() < 6
     pictures = [client.get(f"/scenes/{name}/picture").content for name in release.scenes[:2]]
-    assert all(len(np.unique(cv2.imdecode(np.frombuffer(p, np.uint8), 1).reshape(-1, 3), axis=0)) > 500 for p in pictures)
+    assert all(
+        len(np.unique(cv2.imdecode(np.frombuffer(p, np.uint8), 1).reshape(-1, 3), axis=0)) > 500 for p in pictures
+    )
     assert pictures[0] != pictures[1]
 
 

@@ -10,7 +10,9 @@ export const LEVELS = [
 /** Where a browser without a GPU begins. */
 export const SOFTWARE_LEVEL = 3;
 // A frame that takes longer is followed by one of which less is drawn; some that take less, by one of more.
-const SLOW_MS = 85, VERY_SLOW_MS = 220, QUICK_MS = 30, QUICK_FRAMES = 8, POLL_MS = 4;
+const SLOW_MS = 85, VERY_SLOW_MS = 220, QUICK_MS = 50, QUICK_FRAMES = 6, POLL_MS = 4;
+// What was too slow is not tried again so soon: the picture would flicker between two sharpnesses.
+const WARY_MS = 10000;
 const SOFTWARE = /swiftshader|llvmpipe|softpipe|software|basic render/i;
 
 /** Whether the browser draws without a GPU: what a context says of itself. */
@@ -27,6 +29,7 @@ export class Pace {
     this.gl = gl;
     this.level = level;
     this.quick = 0;
+    this.slow = { level: -1, until: 0 };
     this.fence = null;
   }
 
@@ -53,8 +56,13 @@ export class Pace {
   /** Draw less, or more, after a frame of a motion that took so long. */
   learn(milliseconds) {
     this.quick = milliseconds < QUICK_MS ? this.quick + 1 : 0;
-    const step = milliseconds > VERY_SLOW_MS ? 2 : milliseconds > SLOW_MS ? 1 : this.quick >= QUICK_FRAMES ? -1 : 0;
-    if (step) this.quick = 0;
-    this.level = Math.min(LEVELS.length - 1, Math.max(0, this.level + step));
+    const now = performance.now();
+    if (milliseconds > SLOW_MS) {
+      this.slow = { level: this.level, until: now + WARY_MS };
+      this.level = Math.min(LEVELS.length - 1, this.level + (milliseconds > VERY_SLOW_MS ? 2 : 1));
+    } else if (this.quick >= QUICK_FRAMES && this.level > 0 && (this.level - 1 > this.slow.level || now > this.slow.until)) {
+      this.level -= 1;
+      this.quick = 0;
+    }
   }
 }

@@ -1,6 +1,6 @@
 // The routes of the page: which of them the filters leave, how they are drawn, what the colours say.
 import { clearanceColour, clearanceStops, SETTING } from "./colours.js";
-import { make, words } from "./dom.js";
+import { hasWords, make, words } from "./dom.js";
 
 const FILTERS = ["setting", "split", "modality", "target", "colour", "most"];
 // So many are drawn as broad lines, more as thin ones, that cost a tenth.
@@ -43,8 +43,8 @@ export class Routes {
 
   says(k, wish = this.words) {
     if (!wish.length) return true;
-    const text = `${this.start[k]} → ${this.target[k]} ${this.index.routes.nav_id[k]}`.toLowerCase();
-    return wish.every((word) => text.includes(word));
+    const nav = this.index.routes.nav_id[k].toLowerCase();
+    return hasWords(`${this.start[k]} ${this.target[k]}`, wish) || wish.every((word) => nav.includes(word.replace(/-[si]$/, "")));
   }
 
   /** How many routes have these words. */

@@ -45,6 +45,7 @@ export class SceneView {
     this.index = new Map(payload.nodes.map((entry, k) => [entry.node, k]));
     this.layers = new Map();
     this.level = -1;
+    this.resting = 0;
     this.frameListeners = [];
     this.pickListeners = [];
     this.hoverListeners = [];
@@ -87,13 +88,15 @@ export class SceneView {
         this.invalidate();
         return;
       }
+      // The first frame of a motion may wait behind the last one at rest.
+      const first = this.resting === 0;
       clearTimeout(this.resting);
       this.controls.update(this.last ? (now - this.last) / 1000 : 1 / 60);
       this.last = this.controls.moving ? now : 0;
       this.draw(this.pace.level);
       this.pace.watch((took) => {
-        this.pace.learn(took);
-        if (this.level && !this.pending) this.resting = setTimeout(() => this.draw(), SETTLE_MS);
+        if (!first) this.pace.learn(took);
+        this.resting = setTimeout(() => { if (this.level) this.draw(); this.resting = 0; }, SETTLE_MS);
       });
       if (this.controls.moving) this.invalidate();
     });
@@ -101,7 +104,6 @@ export class SceneView {
 
   /** Draw everything, or what a level of LEVELS leaves of it. */
   draw(level = 0) {
-    clearTimeout(this.resting);
     this.camera.updateMatrixWorld();
     this.matrix = new THREE.Matrix4().multiplyMatrices(this.camera.projectionMatrix, this.camera.matrixWorldInverse);
     this.measure(level);

@@ -1,5 +1,5 @@
 // The search box: landmarks and objects by words, routes by their id; the arrows lead into what is found.
-import { make, words } from "./dom.js";
+import { hasWords, make, words } from "./dom.js";
 
 const MOST = 12, LETTERS_OF_AN_ID = 4;
 
@@ -41,14 +41,12 @@ export function addSearch(page, input, list) {
   });
 }
 
-/** Things that have every word somewhere, those of whose name it is the beginning of a word first. */
+/** Things of which every word begins one, those of whose name it does first. */
 function found(page, wish) {
   const { landmarks, objects, routes } = page.index, hits = [];
   const add = (name, rest, note, act) => {
-    const text = `${name} ${rest}`.toLowerCase();
-    if (!wish.every((word) => text.includes(word))) return;
-    const begins = (word) => ` ${name.toLowerCase()}`.includes(` ${word}`);
-    hits.push({ name, note, act, rank: wish.filter((word) => !begins(word)).length });
+    if (!hasWords(`${name} ${rest}`, wish)) return;
+    hits.push({ name, note, act, rank: wish.filter((word) => !hasWords(name, [word])).length });
   };
   for (const mark of landmarks) add(mark.name, mark.node, "landmark", () => page.pickLandmark(mark, true));
   for (const object of objects) {

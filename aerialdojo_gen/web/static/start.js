@@ -27,7 +27,7 @@ function sceneCard(scene) {
       make("div", { class: "text" }, make("strong", {}, scene.scene),
         make("small", {}, `${scene.family} · ${scene.scene_type} · ${scene.partition}`),
         make("small", {}, `${scene.n_objects} objects · ${count(scene.n_routes)} routes`))),
-    make("button", { onclick: () => choose(scene.scene), "aria-label": `Tasks in ${scene.scene}` }, "Tasks here"));
+    make("button", { onclick: () => choose(scene.scene), "aria-label": `Tasks here: ${scene.scene}` }, "Tasks here"));
 }
 
 function taskCard(task) {
@@ -66,11 +66,12 @@ async function tasks(offset = 0) {
     const { total, tasks: found } = await json(`/api/tasks?${query}`);
     if (mine !== asked) return;
     if (!offset) $("tasks").replaceChildren();
+    $("wrong").textContent = "";
     $("tasks").append(...found.map(taskCard));
     $("n-tasks").textContent = count(total);
     $("more").hidden = offset + found.length >= total;
   } catch (error) {
-    if (mine === asked) $("tasks").replaceChildren(make("li", { class: "error", role: "alert" }, String(error.message)));
+    if (mine === asked) $("wrong").textContent = String(error.message);
   } finally {
     if (mine === asked) busy.hide();
   }

@@ -120,6 +120,7 @@ class Page {
   async pickRoute(nav, focus = false) {
     const k = this.routes.row.get(nav), route = this.routes.at(k);
     this.clear(this.objects.get(route.target_object_id)?.mesh_node, nav);
+    this.tabs.show("panel");
     const mine = this.selection, detail = await json(`api/routes/${nav}`);
     if (mine !== this.selection) return;
     this.picture = { route, detail };
