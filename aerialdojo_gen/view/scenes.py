@@ -6,7 +6,7 @@ import threading
 from collections import OrderedDict
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any, TypeVar
 
 import cv2
@@ -18,6 +18,7 @@ from aerialdojo_gen.common.pictures import GALLERY_JPEG, decode_rgb, encode_jpeg
 from aerialdojo_gen.errors import UsageError
 from aerialdojo_gen.geometry.cameras import Camera, look_at_pose
 from aerialdojo_gen.scenes.model import Scene
+from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.root import DataRoot
 from aerialdojo_gen.view.contents import route_detail, route_points, scene_index
 from aerialdojo_gen.web.payload import scene_payload
@@ -81,7 +82,8 @@ class ShownScenes:
         # A renderer belongs to the thread that has made it, FCL's manager is no thing for two, and scenes that are
         # let go of close both: all that touches a mesh is done by one thread.
         self._worker = ThreadPoolExecutor(1, "scenes")
-        self._drawing = threading.Lock()
+        self._drawing, self._reading = threading.Lock(), threading.Lock()
+        self._images = lru_cache(maxsize=_MOST_OPEN)(self._read_images)
 
     def require(self, name: str) -> None:
         """UsageError where there is no scene of the name."""
@@ -103,14 +105,21 @@ class ShownScenes:
 
     def thumb(self, name: str, object_id: int) -> bytes:
         """Return an object's reference image made small, JPEG; UsageError where it has none."""
-        key = (name, object_id)
-        if key not in self._small:
-            image = decode_rgb(self.do(name, lambda shown: shown.image(object_id)))
-            assert image is not None
-            scale = THUMB_PX / max(image.shape[:2])
-            small = cv2.resize(image, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
-            self._small[key] = encode_jpeg(np.asarray(small, dtype=np.uint8), GALLERY_JPEG)
-        return self._small[key]
+        self.require(name)
+        with self._reading:
+            key = (name, object_id)
+            if key not in self._small:
+                image = decode_rgb(self._images(name).get(object_id))
+                if image is None:
+                    raise UsageError(f"object {object_id} of {name} has no reference image")
+                scale = THUMB_PX / max(image.shape[:2])
+                small = cv2.resize(image, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
+                self._small[key] = encode_jpeg(np.asarray(small, dtype=np.uint8), GALLERY_JPEG)
+            return self._small[key]
+
+    def _read_images(self, name: str) -> dict[int, bytes | None]:
+        table = store.read_scene(self.root, "release/objects", name, ["object_id", "reference_image"])
+        return dict(zip(table["object_id"].to_pylist(), table["reference_image"].to_pylist(), strict=True))
 
     def picture(self, name: str) -> bytes:
         """Return a picture of a scene from its south-west, JPEG, as the page of the scene begins."""

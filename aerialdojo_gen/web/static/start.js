@@ -1,6 +1,7 @@
 // The start page of `aerialdojo-gen view`: scenes with their pictures, tasks with their goals.
 import { Busy } from "./busy.js";
 import { make, number, words } from "./dom.js";
+import { LazyPictures } from "./lazy.js";
 
 const PAGE = 48, TYPING_MS = 250;
 const $ = (id) => document.getElementById(id);
@@ -14,16 +15,24 @@ async function json(url) {
   return body;
 }
 
+const rendered = new LazyPictures();
+
 /** A picture, or in words that there is none. */
-function picture(src, alt) {
-  const image = make("img", { class: "picture", src, alt, loading: "lazy" });
+function picture(attributes) {
+  const image = make("img", { class: "picture", ...attributes });
   image.addEventListener("error", () => image.replaceWith(make("div", { class: "picture none" }, "no picture")));
+  return image;
+}
+
+function scenePicture(scene) {
+  const image = picture({ "data-src": `/scenes/${scene}/picture`, alt: "", width: 480, height: 300 });
+  rendered.add(image);
   return image;
 }
 
 function sceneCard(scene) {
   return make("li", { "data-scene": scene.scene },
-    make("a", { href: `/scenes/${scene.scene}/` }, picture(`/scenes/${scene.scene}/picture`, ""),
+    make("a", { href: `/scenes/${scene.scene}/` }, scenePicture(scene.scene),
       make("div", { class: "text" }, make("strong", {}, scene.scene),
         make("small", {}, `${scene.family} · ${scene.scene_type} · ${scene.partition}`),
         make("small", {}, `${scene.n_objects} objects · ${count(scene.n_routes)} routes`))),
@@ -33,10 +42,10 @@ function sceneCard(scene) {
 function taskCard(task) {
   return make("li", { "data-nav": task.nav_id },
     make("a", { href: `/scenes/${task.scene}/#route=${task.nav_id}`, title: task.description },
-      picture(`/scenes/${task.scene}/api/objects/${task.object_id}/thumb`, `Goal: ${task.name}`),
+      picture({ src: `/scenes/${task.scene}/api/objects/${task.object_id}/thumb`, alt: `Goal: ${task.name}`, loading: "lazy" }),
       make("div", { class: "text" }, make("strong", {}, task.name),
         make("small", {}, `${task.direction} of the ${task.landmark}`),
-        make("small", {}, make("span", { class: `chip ${task.setting}` }), `${words(task.setting)} · ${number(task.length_m)} m · ${task.n_actions} actions`),
+        make("small", {}, make("span", { class: `chip ${task.setting}` }), `${words(task.setting)} · ${number(task.length_m)} m`),
         make("small", {}, `${task.scene} · ${task.split}`))));
 }
 
