@@ -330,6 +330,25 @@ def test_what_is_drawn_in_motion_stays_near_what_is_drawn_at_rest(yard):
         assert np.abs(shot - shots[0]).mean() < most, level
 
 
+def test_what_is_picked_is_what_the_camera_sees_now(yard):
+    """A frame may be drawn later: a click means the place where the camera is by then."""
+    picked = yard.execute_script(
+        """const { view, index } = page, seen = [];
+        view.pending = 1;  // no frame from now on
+        for (const { mesh_node: node } of index.objects.slice(0, 4)) {
+          view.focusOn(node);
+          const [x, y] = [view.width / 2, view.height / 2];
+          const before = view.pickNode(x, y)?.node;
+          view.draw();
+          seen.push([before, view.pickNode(x, y)?.node]);
+        }
+        view.pending = 0;
+        return seen;"""
+    )
+    assert all(before == after for before, after in picked)
+    assert len({after for _, after in picked}) > 1
+
+
 def test_the_pace_draws_less_of_slow_frames_and_more_of_quick_ones(yard):
     levels, most = yard.execute_async_script(
         """const done = arguments[0], real = performance.now;

@@ -55,8 +55,11 @@ export class CrowdLayer {
     const whole = this.segments <= most;
     let every = 1;
     if (!whole) {
-      this.kept ??= this.bends();
-      every = Math.ceil((this.kept.reduce((sum, keep) => sum + keep, 0) - this.routes.length) / most);
+      if (!this.kept) {
+        this.kept = this.bends();
+        this.bent = this.kept.reduce((sum, keep) => sum + keep, 0) - this.routes.length;
+      }
+      every = Math.ceil(this.bent / most);
     }
     const key = whole ? 0 : every;
     if (!this.indices.has(key)) this.indices.set(key, new THREE.BufferAttribute(this.joined(whole, every), 1));

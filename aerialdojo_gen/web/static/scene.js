@@ -104,12 +104,17 @@ export class SceneView {
 
   /** Draw everything, or what a level of LEVELS leaves of it. */
   draw(level = 0) {
-    this.camera.updateMatrixWorld();
-    this.matrix = new THREE.Matrix4().multiplyMatrices(this.camera.projectionMatrix, this.camera.matrixWorldInverse);
+    this.aim();
     this.measure(level);
     this.renderer.render(this.three, this.camera);
     this.placeLabels();
     for (const listener of this.frameListeners) listener(this);
+  }
+
+  /** Where the camera is now, whether or not that is drawn yet. */
+  aim() {
+    this.camera.updateMatrixWorld();
+    this.matrix = new THREE.Matrix4().multiplyMatrices(this.camera.projectionMatrix, this.camera.matrixWorldInverse);
   }
 
   measure(level) {
@@ -205,6 +210,7 @@ export class SceneView {
 
   /** Ray through a pixel: [origin, unit direction], arrays of 3. */
   ray(x, y) {
+    this.aim();
     const o = this.camera.position;
     const d = new THREE.Vector3(2 * x / this.width - 1, 1 - 2 * y / this.height, 0.5).unproject(this.camera)
       .sub(o).normalize();
@@ -223,6 +229,7 @@ export class SceneView {
 
   /** What lies under a pixel: markers before routes before nodes; a route behind a surface is not picked. */
   pick(x, y) {
+    this.aim();
     const node = this.pickNode(x, y);
     for (const kind of ["marker", "route"]) {
       let best = null;
