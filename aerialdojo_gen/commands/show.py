@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from aerialdojo_gen.commands.common import Data, Json, OneScene, SceneOption, print_json
+from aerialdojo_gen.commands.common import Data, Json, Scene, Scenes, print_json, together
 
 app = typer.Typer()
 
@@ -47,22 +47,23 @@ def show(
 
 @app.command("view")
 def view(
-    name: OneScene = None,
+    scenes: Scenes = None,
     data: Data = "data",
-    scene: SceneOption = None,
+    scene: Scene = None,
     port: Annotated[int, typer.Option(min=0, max=65535, help="Port on 127.0.0.1; 0 takes a free one.")] = 0,
     browser: Annotated[bool, typer.Option("--browser/--no-browser", help="Open the page.")] = True,
 ) -> None:
-    """Show a scene in the browser: landmarks, objects, anchors, routes; of several that fit one is picked."""
-    from aerialdojo_gen.commands.picking import given_scene, pick_scene
-    from aerialdojo_gen.release.contents import release_scenes
-    from aerialdojo_gen.store.root import open_root
-    from aerialdojo_gen.view.server import view_app
+    """Show the release in the browser: scenes and tasks to choose from, a scene with its objects and routes."""
     from aerialdojo_gen.web.serving import open_socket, require_web, serve, url_of
 
     require_web()
-    scene = pick_scene(given_scene(name, scene), release_scenes(open_root(data)))
-    page = view_app(data, scene)
+    from aerialdojo_gen.view.server import chosen_scenes, view_app
+
+    names = chosen_scenes(data, together(scenes, scene))
+    page = view_app(data, names)
     listener = open_socket(port)
-    print(f"{scene}: {url_of(listener)}  (Ctrl-C ends it)", flush=True)
-    serve(page, listener, browser)
+    # One scene is shown at once; of several the start page lets one choose.
+    path = f"scenes/{names[0]}/" if len(names) == 1 else ""
+    called = names[0] if path else f"{len(names)} scenes"
+    print(f"{called}: {url_of(listener)}{path}  (Ctrl-C ends it)", flush=True)
+    serve(page, listener, browser, path)

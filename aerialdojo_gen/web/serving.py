@@ -12,7 +12,7 @@ import re
 import socket
 import threading
 import webbrowser
-from collections.abc import Awaitable, Callable, MutableMapping
+from collections.abc import Awaitable, Callable, MutableMapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -113,7 +113,9 @@ def one_line(text: str, most: int = 500) -> str:
     return shown if len(shown) <= most else f"{shown[: most - 4]} ..."
 
 
-def local_app(page: str, title: str, max_body_bytes: int = 1 << 20, *, any_host: bool = False) -> FastAPI:
+def local_app(
+    page: str, title: str, max_body_bytes: int = 1 << 20, *, any_host: bool = False, also: Sequence[str] = ()
+) -> FastAPI:
     """Make an app that serves a page of ``static/`` at ``/``, the rest of that folder under ``/static/``.
 
     Parameters
@@ -126,6 +128,8 @@ def local_app(page: str, title: str, max_body_bytes: int = 1 << 20, *, any_host:
         Largest request body that is taken.
     any_host : bool
         Answer to any ``Host``, and to ``Origin`` of that host: for a page that asks for a token besides.
+    also : sequence of str
+        Other pages of ``static/`` that the caller serves: their import maps are allowed too.
 
     Returns
     -------
@@ -146,7 +150,8 @@ def local_app(page: str, title: str, max_body_bytes: int = 1 << 20, *, any_host:
     from starlette.exceptions import HTTPException
 
     html = (STATIC / page).read_bytes()
-    maps = [base64.b64encode(hashlib.sha256(text).digest()).decode() for text in _IMPORT_MAP.findall(html)]
+    texts = b"".join([html, *((STATIC / name).read_bytes() for name in also)])
+    maps = [base64.b64encode(hashlib.sha256(text).digest()).decode() for text in _IMPORT_MAP.findall(texts)]
     scripts = " ".join(["'self'", *(f"'sha256-{digest}'" for digest in maps)])
     policy = (
         f"default-src 'none'; script-src {scripts}; style-src 'self'; img-src 'self' data: blob:; "
@@ -207,7 +212,7 @@ def open_socket(port: int, host: str = "127.0.0.1") -> socket.socket:
     return listener
 
 
-def serve(app: FastAPI, listener: socket.socket, browser: bool = False) -> None:
+def serve(app: FastAPI, listener: socket.socket, browser: bool = False, path: str = "") -> None:
     """Serve until Ctrl-C, which is a plain end.
 
     Parameters
@@ -218,12 +223,14 @@ def serve(app: FastAPI, listener: socket.socket, browser: bool = False) -> None:
         From `open_socket`; closed at the end.
     browser : bool
         Whether to open the page in the user's browser.
+    path : str
+        Of the page that is opened, without a slash before it.
     """
     import uvicorn
 
     from aerialdojo_gen.web.limits import bound_log, limits
 
-    url = url_of(listener)
+    url = url_of(listener) + path
     config = uvicorn.Config(app, log_level="warning", access_log=False, lifespan="off", timeout_graceful_shutdown=1,
                             proxy_headers=False, server_header=False, **limits())  # fmt: skip
     server = uvicorn.Server(config)

@@ -14,13 +14,14 @@ YARD = "U_Courtyard_0"
 
 
 @contextmanager
-def served(data: Path, scene: str, *, silent: bool = True) -> Iterator[str]:
-    """Run ``aerialdojo-gen view``; gives its address, and checks at last that Ctrl-C is a plain end."""
-    command = [sys.executable, "-m", "aerialdojo_gen.cli", "view", "--data", str(data), "--scene", scene]
-    command.append("--no-browser")
+def served(data: Path, scene: str | None = None, *, silent: bool = True) -> Iterator[str]:
+    """Run ``aerialdojo-gen view``; gives the address of the page that it opens; Ctrl-C has to be a plain end."""
+    command = [sys.executable, "-m", "aerialdojo_gen.cli", "view", "--data", str(data), "--no-browser"]
+    command += ["--scene", scene] if scene else []
+    called, path = (scene, f"scenes/{scene}/") if scene else (r"\d+ scenes", "")
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     line = process.stdout.readline()
-    url = re.fullmatch(rf"{scene}: (http://127\.0\.0\.1:\d+/)  \(Ctrl-C ends it\)\n", line)
+    url = re.fullmatch(rf"{called}: (http://127\.0\.0\.1:\d+/{path})  \(Ctrl-C ends it\)\n", line)
     assert url, line + process.communicate()[1]
     try:
         yield url[1]

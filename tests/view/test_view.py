@@ -7,6 +7,7 @@ import socket
 import struct
 from collections import Counter
 from pathlib import Path
+from urllib.parse import urlsplit
 
 import cv2
 import numpy as np
@@ -21,9 +22,12 @@ from support.viewing import YARD, served
 from aerialdojo_gen.browse.lookup import ReleasedScene
 from aerialdojo_gen.errors import StoreError, UsageError
 from aerialdojo_gen.scenes.model import Scene
-from aerialdojo_gen.view.server import route_detail, route_points, scene_index, view_app
+from aerialdojo_gen.view.contents import route_detail, route_points, scene_index
+from aerialdojo_gen.view.server import view_app
 from aerialdojo_gen.web import serving
 from aerialdojo_gen.web.payload import scene_payload
+
+SCENE = f"/scenes/{YARD}/"
 
 
 def unpacked(payload):
@@ -108,7 +112,7 @@ def client(smoke):
     "host", ["evil.example", "127.0.0.1.evil.example", "127.0.0.1:81", "localhost:1", "", "[::1]"]
 )
 def test_foreign_hosts_are_refused(client, host):
-    answer = client.get("/api/index", headers={"host": host})
+    answer = client.get(f"{SCENE}api/index", headers={"host": host})
     assert answer.status_code == 403
     assert YARD not in answer.text
 
@@ -125,12 +129,12 @@ def test_foreign_hosts_are_refused(client, host):
     ],
 )
 def test_foreign_origins_are_refused(client, headers):
-    assert client.get("/api/index", headers=headers).status_code == 403
+    assert client.get(f"{SCENE}api/index", headers=headers).status_code == 403
 
 
 def test_ones_own_origin_is_not_refused(client):
     for headers in ({}, {"origin": "http://127.0.0.1"}, {"host": "localhost", "origin": "http://localhost"}):
-        assert client.get("/api/index", headers=headers).status_code == 200
+        assert client.get(f"{SCENE}api/index", headers=headers).status_code == 200
 
 
 def test_a_link_out_of_the_folder_is_not_followed(tmp_path, monkeypatch):
@@ -146,7 +150,7 @@ def test_a_link_out_of_the_folder_is_not_followed(tmp_path, monkeypatch):
 
 
 def test_every_answer_has_the_security_headers(client):
-    for path in ("/", "/static/view.js", "/api/index", "/nothing"):
+    for path in ("/", "/static/view.js", f"{SCENE}api/index", "/nothing"):
         headers = client.get(path).headers
         policy = dict(rule.split(" ", 1) for rule in headers["content-security-policy"].split("; "))
         assert policy["default-src"] == policy["frame-ancestors"] == policy["base-uri"] == "'none'"
@@ -171,16 +175,16 @@ def test_large_bodies_are_refused_before_they_are_read():
 
 
 def test_what_does_not_exist_is_named(client):
-    answer = client.get("/api/routes/U_Courtyard_0-000000000000")
+    answer = client.get(f"{SCENE}api/routes/U_Courtyard_0-000000000000")
     assert answer.status_code == 404
     assert answer.json()["error"].startswith("no navigation task 'U_Courtyard_0-000000000000': did you mean 'U_Court")
-    assert client.get("/api/objects/9999/image").status_code == 404
-    assert client.get("/api/objects/x/image").status_code == 422
+    assert client.get(f"{SCENE}api/objects/9999/image").status_code == 404
+    assert client.get(f"{SCENE}api/objects/x/image").status_code == 422
 
 
 def test_the_index_and_the_ways_are_the_release(smoke, client):
     scene = ReleasedScene(smoke, YARD)
-    index = client.get("/api/index").json()
+    index = client.get(f"{SCENE}api/index").json()
     assert index == json.loads(json.dumps(scene_index(scene)))
     routes = scene.routes.to_pylist()
     assert index["routes"]["nav_id"] == [row["nav_id"] for row in routes]
@@ -188,7 +192,7 @@ def test_the_index_and_the_ways_are_the_release(smoke, client):
     assert all(sorted(kinds) == ["image", "semantic"] for kinds in index["routes"]["modality"])
     assert len(index["objects"]) == len(scene.objects)
     assert len(index["anchors"]) == len(scene.anchors)
-    raw = client.get("/api/routes/points").content
+    raw = client.get(f"{SCENE}api/routes/points").content
     assert raw == route_points(scene)
     (n,) = struct.unpack_from("<I", raw)
     offsets = np.frombuffer(raw, "<u4", n + 1, 4)
@@ -202,13 +206,13 @@ def test_the_index_and_the_ways_are_the_release(smoke, client):
         assert (length > 0).all()
         assert length.sum() == pytest.approx(row["length_m"], abs=1e-3)
     for row in scene.objects:
-        assert client.get(f"/api/objects/{row['object_id']}/image").content == row["reference_image"]
+        assert client.get(f"{SCENE}api/objects/{row['object_id']}/image").content == row["reference_image"]
 
 
 def test_a_routes_clearance_is_its_certificates(smoke, client):
     scene = ReleasedScene(smoke, YARD)
     for row in scene.routes.slice(0, 12).to_pylist():
-        detail = client.get(f"/api/routes/{row['nav_id']}").json()
+        detail = client.get(f"{SCENE}api/routes/{row['nav_id']}").json()
         assert detail == json.loads(json.dumps(route_detail(scene, row["nav_id"])))
         least = min(detail["clearance_m"])
         # The certificate is the least over the whole way; samples every half metre miss at most a quarter of one.
@@ -243,7 +247,7 @@ def server(smoke):
 
 
 def test_the_server_listens_on_the_loopback_alone(server):
-    port = int(server.rstrip("/").rpartition(":")[2])
+    port = urlsplit(server).port
     listening = [row.split() for row in Path("/proc/net/tcp").read_text().splitlines()[1:]]
     here = [row[1] for row in listening if row[3] == "0A" and int(row[1].partition(":")[2], 16) == port]
     assert here == [f"0100007F:{port:04X}"]
@@ -264,12 +268,13 @@ def test_the_server_listens_on_the_loopback_alone(server):
         "/../serving.py",
         "/static/",
         "/static/three",
-        "/api/routes/..%2f..%2fscene",
+        "/scenes/..%2f..%2fserving.py",
+        f"/scenes/{YARD}/api/routes/..%2f..%2fscene",
     ],
 )
 def test_paths_do_not_escape(server, path):
     # Not httpx or a browser: they tidy the path up before they send it.
-    connection = http.client.HTTPConnection("127.0.0.1", int(server.rstrip("/").rpartition(":")[2]))
+    connection = http.client.HTTPConnection("127.0.0.1", urlsplit(server).port)
     connection.request("GET", path)
     answer = connection.getresponse()
     text = answer.read().decode()

@@ -10,6 +10,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from urllib.parse import urlsplit
 
 import pytest
 from support import annotating
@@ -22,7 +23,7 @@ pytestmark = pytest.mark.slow
 
 
 def port_of(url):
-    return int(url.rstrip("/").rpartition(":")[2])
+    return urlsplit(url).port
 
 
 def ask(port, method, path, body=None, headers=None, host="127.0.0.1"):
@@ -174,7 +175,11 @@ ADDRESSES = [
     "/api/objects/%s/anchors", "/api/nodes/%s", "/api/document?client=%s", "/api/picture?x=%s&y=0&z=5&yaw_deg=0",
     "/api/picture?x=0&y=0&z=5&yaw_deg=%s", "/annotate/%s", "/static/%s", "/%s",
 ]  # fmt: skip
-VIEWED = ["/api/routes/%s", "/api/objects/%s/image", "/static/%s", "/%s?x=%s"]
+VIEWED = [
+    f"/scenes/{YARD}/api/routes/%s", f"/scenes/{YARD}/api/objects/%s/image", f"/scenes/{YARD}/api/objects/%s/thumb",
+    "/scenes/%s/", "/scenes/%s/picture", "/scenes/%s/api/index", "/api/tasks?offset=%s",
+    "/api/tasks?words=%s&scene=%s", "/api/tasks?order=%s", "/static/%s", "/%s?x=%s",
+]  # fmt: skip
 PARTS = [
     "9" * 5000, "-1", "1e999", "nan", "%ED%A0%80", "%00", "%0a%0d", "..%2f..%2fetc", "%ff%fe", "x" * 9000, "1%27--",
     "%F0%9F%9A%81",

@@ -17,3 +17,9 @@ export const facts = (pairs) =>
 export const number = (value, digits = 1) => value.toFixed(digits);
 
 export const words = (text) => text.replaceAll("_", " ");
+
+/** Whether each of some words, in small letters, begins a word of a text. */
+export function hasWords(text, wish) {
+  const spaced = ` ${text.toLowerCase().replace(/[^\p{L}\p{N}]+/gu, " ")}`;
+  return wish.every((word) => spaced.includes(` ${word}`));
+}

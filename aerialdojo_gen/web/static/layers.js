@@ -2,7 +2,7 @@
 import * as THREE from "three";
 import { segmentDistance } from "./picking.js";
 
-const bytes = (colour) => {
+export const bytes = (colour) => {
   const value = parseInt(colour.slice(1), 16);
   return [(value >> 16) & 255, (value >> 8) & 255, value & 255];
 };
@@ -38,6 +38,26 @@ const LINE_FRAGMENT = /* glsl */ `
   out vec4 pixel;
   void main() { pixel = vec4(vColour * (1.0 - 0.35 * across * across), opacity); }`;
 
+/** Four corners a segment. Not instanced: without a GPU an instance costs as much as a draw call. */
+function quads(ends, colours, n) {
+  const corners = new Float32Array(12 * n), both = new Float32Array(24 * n), tint = new Uint8Array(16 * n), index = new Uint32Array(6 * n);
+  for (let k = 0; k < n; k++) {
+    corners.set([0, -1, 0, 1, -1, 0, 1, 1, 0, 0, 1, 0], 12 * k);
+    for (let c = 0; c < 4; c++) {
+      both.set(ends.subarray(6 * k, 6 * k + 6), 6 * (4 * k + c));
+      tint.set(colours.subarray(4 * k, 4 * k + 4), 4 * (4 * k + c));
+    }
+    index.set([4 * k, 4 * k + 1, 4 * k + 2, 4 * k, 4 * k + 2, 4 * k + 3], 6 * k);
+  }
+  const geometry = new THREE.BufferGeometry(), segments = new THREE.InterleavedBuffer(both, 6);
+  geometry.setAttribute("position", new THREE.BufferAttribute(corners, 3));
+  geometry.setAttribute("a", new THREE.InterleavedBufferAttribute(segments, 3, 0));
+  geometry.setAttribute("b", new THREE.InterleavedBufferAttribute(segments, 3, 3));
+  geometry.setAttribute("colour", new THREE.BufferAttribute(tint, 4, true));
+  geometry.setIndex(new THREE.BufferAttribute(index, 1));
+  return geometry;
+}
+
 /** Polylines of constant width on the screen: [{id, points: flat xyz, colour: "#rrggbb" or one a segment}]. */
 export class RouteLayer {
   constructor(routes, { width = 2.5, opacity = 0.9, onTop = false, pickable = true } = {}) {
@@ -56,15 +76,7 @@ export class RouteLayer {
         this.owner[k] = r;
       }
     });
-    const geometry = new THREE.InstancedBufferGeometry();
-    geometry.setAttribute("position", new THREE.BufferAttribute(
-      new Float32Array([0, -1, 0, 1, -1, 0, 1, 1, 0, 0, 1, 0]), 3));
-    geometry.setIndex([0, 1, 2, 0, 2, 3]);
-    const ends = new THREE.InstancedInterleavedBuffer(this.ends, 6);
-    geometry.setAttribute("a", new THREE.InterleavedBufferAttribute(ends, 3, 0));
-    geometry.setAttribute("b", new THREE.InterleavedBufferAttribute(ends, 3, 3));
-    geometry.setAttribute("colour", new THREE.InstancedBufferAttribute(colours, 4, true));
-    geometry.instanceCount = n;
+    const geometry = quads(this.ends, colours, n);
     this.object = new THREE.Mesh(geometry, new THREE.ShaderMaterial({
       glslVersion: THREE.GLSL3, vertexShader: LINE_VERTEX, fragmentShader: LINE_FRAGMENT, side: THREE.DoubleSide,
       transparent: true, depthWrite: false, depthTest: !onTop,

@@ -1,22 +1,29 @@
 // The side panel: what was picked, told in words and figures.
 import { clearanceColour } from "./colours.js";
 import { facts, make, number, words } from "./dom.js";
+import { SPEEDS } from "./flight.js";
 
 const MOST_LISTED = 12;
 
+/** Put something else into the panel, which begins at its top. */
+function put(panel, ...children) {
+  panel.replaceChildren(...children);
+  panel.scrollTop = 0;
+}
+
 export function welcome(panel) {
-  panel.replaceChildren(make("h2", {}, "Click something"),
+  put(panel, make("h2", {}, "Click something"),
     make("p", {}, "An object tells its name, description, reference image and the tasks that look for it. A route tells its length, "
       + "clearance and actions. Anything else tells its node in the mesh."));
 }
 
 export function failure(panel, error) {
-  panel.replaceChildren(make("p", { class: "error", role: "alert" }, String(error.message ?? error)));
+  put(panel, make("p", { class: "error", role: "alert" }, String(error.message ?? error)));
 }
 
 export function showNode(panel, hit) {
   const { category, variant, attributes } = hit.instance;
-  panel.replaceChildren(make("h2", {}, hit.node), facts([
+  put(panel, make("h2", {}, hit.node), facts([
     ["category", words(category)], ...(variant ? [["variant", words(variant)]] : []),
     ...Object.entries(attributes).map(([key, value]) => [words(key), value]),
     ["point", hit.point.map((v) => number(v, 2)).join(", ") + " m"],
@@ -24,7 +31,7 @@ export function showNode(panel, hit) {
 }
 
 export function showLandmark(panel, landmark, objects, actions) {
-  panel.replaceChildren(make("h2", {}, landmark.name), make("p", { class: "soft" }, "landmark"),
+  put(panel, make("h2", {}, landmark.name), make("p", { class: "soft" }, "landmark"),
     facts([["node", landmark.node], ["centre", landmark.position.map((v) => number(v, 2)).join(", ") + " m"],
       ["nearest for", `${objects.length} objects`]]),
     make("ul", { class: "list" }, ...objects.map((object) => make("li", {}, make("button",
@@ -32,10 +39,10 @@ export function showLandmark(panel, landmark, objects, actions) {
 }
 
 export function showObject(panel, object, routes, actions) {
-  panel.replaceChildren(...[
+  put(panel, ...[
     make("h2", {}, object.name),
     make("p", { class: "soft" }, `${words(object.category)} · ${object.direction} of the ${object.landmark}`),
-    object.image && make("img", { src: `/api/objects/${object.object_id}/image`, alt: `Reference image: ${object.name}`,
+    object.image && make("img", { src: `api/objects/${object.object_id}/image`, alt: `Reference image: ${object.name}`,
       width: 300, height: 300 }),
     make("blockquote", {}, object.description),
     facts([["object", object.object_id], ["node", object.mesh_node],
@@ -43,7 +50,8 @@ export function showObject(panel, object, routes, actions) {
       ["size", object.size.map((v) => number(v, 2)).join(" × ") + " m"]]),
     make("h3", {}, `${routes.length.toLocaleString("en")} routes lead to it`),
     routes.length > 0 && make("div", { class: "buttons" },
-      make("button", { id: "only-these", onclick: () => actions.only(object.object_id) }, "Show only these")),
+      make("button", { id: "only-these", onclick: () => actions.only(object.object_id) }, "Show only these"),
+      make("button", { id: "list-these", onclick: () => actions.list(object.object_id) }, "List them all")),
     make("ul", { class: "list" }, ...routes.slice(0, MOST_LISTED).map((route) => routeItem(route, actions))),
     routes.length > MOST_LISTED && make("p", { class: "soft" }, `and ${routes.length - MOST_LISTED} more`),
   ].filter(Boolean));
@@ -55,7 +63,7 @@ const routeItem = (route, actions) => make("li", {}, make("button", { onclick: (
 export function showRoute(panel, route, detail, actions) {
   const semantic = detail.tasks.find((task) => task.modality === "semantic");
   const task = semantic ?? detail.tasks[0];
-  panel.replaceChildren(...[
+  put(panel, ...[
     make("h2", { id: "picked-route" }, route.nav_id),
     make("p", { class: "soft" }, `${words(route.setting)} · ${route.split}`),
     make("p", {}, "From ", link(route.start, () => actions.object(route.start_object_id)), " to ",
@@ -71,6 +79,11 @@ export function showRoute(panel, route, detail, actions) {
     make("h3", {}, "Height, clearance as colour"), profile(detail),
     make("h3", {}, "Fly along"),
     make("div", { class: "buttons" },
+      make("button", { id: "play", title: "Space", onclick: () => actions.play() }, "Play"),
+      make("label", { for: "speed", class: "soft" }, "Speed"),
+      make("select", { id: "speed", onchange: (event) => actions.speed(Number(event.target.value)) },
+        ...SPEEDS.map((speed) => make("option", { value: speed, selected: speed === 1 }, `${speed} ×`)))),
+    make("div", { class: "buttons more" },
       make("button", { id: "ride", "aria-pressed": "false", onclick: () => actions.ride() }, "From on board"),
       make("button", { onclick: () => actions.whole() }, "Whole route")),
     make("label", { for: "step", class: "soft" }, "Pose ", make("output", { id: "pose" }, "0"), ` of ${detail.poses.length - 1}`),
@@ -100,7 +113,7 @@ function profile({ way, clearance_m: clearance }) {
   const pieces = way.slice(1).map((p, k) => make("line", { x1: x(along[k]), y1: y(way[k][2]), x2: x(along[k + 1]), y2: y(p[2]),
     stroke: clearanceColour(Math.min(clearance[k], clearance[k + 1])), "stroke-width": 4, "stroke-linecap": "round" }));
   const text = (at, up, content, anchor = "end") =>
-    make("text", { x: at, y: up, "font-size": 10.5, "text-anchor": anchor, fill: "#475569" }, content);
+    make("text", { x: at, y: up, "font-size": 10.5, "text-anchor": anchor }, content);
   return make("svg", { viewBox: "0 0 300 96", class: "chart", role: "img" },
     make("title", {}, `Height from ${number(low)} to ${number(high)} m over ${number(along.at(-1))} m of route`),
     text(26, y(low) + 4, number(low)), ...(high - low > 0.5 ? [text(26, y(high) + 4, number(high))] : []), ...pieces,

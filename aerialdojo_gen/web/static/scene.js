@@ -7,7 +7,10 @@
 //   view.focusOn("delivery_van_003"); view.setVisible("objects", false);
 import * as THREE from "three";
 import { CameraControls } from "./controls.js";
+import { CrowdLayer } from "./crowd.js";
+import { NodeCuller } from "./culling.js";
 import { MarkerLayer, RouteLayer } from "./layers.js";
+import { drawnBySoftware, LEVELS, Pace, SOFTWARE_LEVEL } from "./pace.js";
 import { loadPayload } from "./payload.js";
 import { NodePicker } from "./picking.js";
 import { boxOf, eyeFor, homeEye, topEye } from "./viewpoints.js";
@@ -17,9 +20,13 @@ const FIELD_OF_VIEW_DEG = 60;
 // A pick that takes longer than this waits until the cursor rests.
 const SLOW_MS = 12, REST_MS = 120;
 
-function makeRenderer() {
+// What has stood still for so long is drawn whole.
+const SETTLE_MS = 180;
+
+function makeRenderer(software) {
   try {
-    return new THREE.WebGLRenderer({ antialias: true, powerPreference: "high-performance" });
+    // Four samples a pixel cost half of the time where no GPU takes them.
+    return new THREE.WebGLRenderer({ antialias: !software, powerPreference: "high-performance" });
   } catch (error) {
     throw new Error("this browser shows no WebGL 2: switch hardware acceleration on, or try another browser", { cause: error });
   }
@@ -37,12 +44,14 @@ export class SceneView {
     this.nodes = payload.nodes;
     this.index = new Map(payload.nodes.map((entry, k) => [entry.node, k]));
     this.layers = new Map();
+    this.level = -1;
+    this.resting = 0;
     this.frameListeners = [];
     this.pickListeners = [];
     this.hoverListeners = [];
-    this.renderer = makeRenderer();
+    const software = drawnBySoftware();
+    this.renderer = makeRenderer(software);
     this.renderer.outputColorSpace = THREE.LinearSRGBColorSpace;
-    this.renderer.setPixelRatio(Math.min(window.devicePixelRatio, 2));
     this.canvas = this.renderer.domElement;
     this.canvas.setAttribute("aria-label", `3D view of ${payload.name}`);
     this.canvas.setAttribute("role", "application");
@@ -59,6 +68,8 @@ export class SceneView {
     const extent = boxOf(payload, payload.nodes.map((_, k) => k));
     castShadow(this.renderer, this.meshes, uniforms, extent.min, extent.max);
     this.picker = new NodePicker(payload);
+    this.culler = new NodeCuller(payload, this.meshes);
+    this.pace = new Pace(this.renderer.getContext(), software ? SOFTWARE_LEVEL : 0);
     this.controls = new CameraControls(this.camera, this.canvas);
     this.controls.addEventListener("change", () => this.invalidate());
     this.listen();
@@ -73,19 +84,49 @@ export class SceneView {
     if (this.pending) return;
     this.pending = requestAnimationFrame((now) => {
       this.pending = 0;
+      if (this.pace.busy) {
+        this.invalidate();
+        return;
+      }
+      // The first frame of a motion may wait behind the last one at rest.
+      const first = this.resting === 0;
+      clearTimeout(this.resting);
       this.controls.update(this.last ? (now - this.last) / 1000 : 1 / 60);
       this.last = this.controls.moving ? now : 0;
-      this.draw();
+      this.draw(this.pace.level);
+      this.pace.watch((took) => {
+        if (!first) this.pace.learn(took);
+        this.resting = setTimeout(() => { if (this.level) this.draw(); this.resting = 0; }, SETTLE_MS);
+      });
       if (this.controls.moving) this.invalidate();
     });
   }
 
-  draw() {
-    this.camera.updateMatrixWorld();
-    this.matrix = new THREE.Matrix4().multiplyMatrices(this.camera.projectionMatrix, this.camera.matrixWorldInverse);
+  /** Draw everything, or what a level of LEVELS leaves of it. */
+  draw(level = 0) {
+    this.aim();
+    this.measure(level);
     this.renderer.render(this.three, this.camera);
     this.placeLabels();
     for (const listener of this.frameListeners) listener(this);
+  }
+
+  /** Where the camera is now, whether or not that is drawn yet. */
+  aim() {
+    this.camera.updateMatrixWorld();
+    this.matrix = new THREE.Matrix4().multiplyMatrices(this.camera.projectionMatrix, this.camera.matrixWorldInverse);
+  }
+
+  measure(level) {
+    const { ratio, leastPixels, mostSegments } = LEVELS[level];
+    if (level !== this.level) {
+      this.level = level;
+      this.renderer.setPixelRatio(ratio * Math.min(window.devicePixelRatio, 2));
+      for (const layer of this.layers.values()) this.fit(layer);
+    }
+    if (level) this.culler.cull(this.camera, this.height, leastPixels);
+    else this.culler.release();
+    for (const layer of this.layers.values()) layer.thin?.(mostSegments);
   }
 
   resize() {
@@ -105,6 +146,8 @@ export class SceneView {
   addMarkers(name, markers, options) { this.replace(name, new MarkerLayer(markers, options)); }
 
   addRoutes(name, routes, options) { this.replace(name, new RouteLayer(routes, options)); }
+
+  addCrowd(name, routes, options) { this.replace(name, new CrowdLayer(routes, options)); }
 
   replace(name, layer) {
     const visible = this.layers.get(name)?.object.visible ?? true;
@@ -167,6 +210,7 @@ export class SceneView {
 
   /** Ray through a pixel: [origin, unit direction], arrays of 3. */
   ray(x, y) {
+    this.aim();
     const o = this.camera.position;
     const d = new THREE.Vector3(2 * x / this.width - 1, 1 - 2 * y / this.height, 0.5).unproject(this.camera)
       .sub(o).normalize();
@@ -185,6 +229,7 @@ export class SceneView {
 
   /** What lies under a pixel: markers before routes before nodes; a route behind a surface is not picked. */
   pick(x, y) {
+    this.aim();
     const node = this.pickNode(x, y);
     for (const kind of ["marker", "route"]) {
       let best = null;

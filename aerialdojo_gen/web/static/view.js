@@ -1,11 +1,16 @@
-// The page of `aerialdojo-gen view`: a scene with its landmarks, objects, anchors and routes.
+// The page of a scene of `aerialdojo-gen view`: its landmarks, objects, anchors and routes.
+import { Busy } from "./busy.js";
+import { ANCHOR, clearanceColour, GOAL, LANDMARK, OBJECT, START } from "./colours.js";
 import { addCompass } from "./compass.js";
-import { ANCHOR, clearanceColour, clearanceStops, GOAL, LANDMARK, OBJECT, SETTING, START } from "./colours.js";
 import { make, number, words } from "./dom.js";
+import { Flight } from "./flight.js";
 import { frameNode } from "./frame.js";
 import { failure, showLandmark, showNode, showObject, showRoute, welcome } from "./panel.js";
+import { RouteList } from "./routelist.js";
+import { Routes } from "./routes.js";
 import { SceneView } from "./scene.js";
 import { addSearch } from "./search.js";
+import { Tabs } from "./tabs.js";
 
 const $ = (id) => document.getElementById(id);
 const panel = $("panel");
@@ -18,24 +23,23 @@ async function json(url) {
 }
 
 class Page {
-  constructor(view, index) {
+  constructor(view, index, busy) {
     this.view = view;
     this.index = index;
     this.objects = new Map(index.objects.map((object) => [object.object_id, object]));
     this.byNode = new Map(index.objects.map((object) => [object.mesh_node, object]));
     this.landmarkByNode = new Map(index.landmarks.map((landmark) => [landmark.node, landmark]));
-    const { routes } = index;
-    this.rows = new Map(routes.nav_id.map((nav, k) => [nav, k]));
-    this.byTarget = new Map(index.objects.map((object) => [object.object_id, []]));
-    routes.target_object_id.forEach((target, k) => this.byTarget.get(target)?.push(k));
+    this.routes = new Routes(view, index, busy, (rows) => this.list.show(rows));
+    this.list = new RouteList(this.routes, $("list"), {
+      pick: (nav) => this.settle(this.pickRoute(nav, true)),
+      filter: (wish) => { this.routes.words = wish; this.settle(this.routes.draw()); },
+    });
+    this.tabs = new Tabs(["panel", "list"], () => this.list.render());
     this.selection = 0;
   }
 
-  /** One route of the index as a row. */
-  route(k) {
-    const row = Object.fromEntries(Object.entries(this.index.routes).map(([key, column]) => [key, column[k]]));
-    return { ...row, start: this.objects.get(row.start_object_id)?.name ?? "?", target: this.objects.get(row.target_object_id)?.name ?? "?" };
-  }
+  /** What goes wrong in the background is told in the panel. */
+  settle(promise) { return Promise.resolve(promise).catch((error) => { this.tabs.show("panel"); failure(panel, error); }); }
 
   // ---- layers ----
 
@@ -57,65 +61,14 @@ class Page {
   setLayer(name, on) {
     this.view.setVisible(name, on);
     if (name === "anchors") this.view.setVisible("looks", on);
-    if (name === "routes") this.drawRoutes();
-  }
-
-  wanted() {
-    const { routes } = this.index, rows = [];
-    const setting = $("setting").value, split = $("split").value, modality = $("modality").value, target = $("target").value;
-    for (const k of target === "" ? routes.nav_id.keys() : this.byTarget.get(Number(target))) {
-      if ((!setting || routes.setting[k] === setting) && (!split || routes.split[k] === split)
-        && (!modality || routes.modality[k].includes(modality))) rows.push(k);
-    }
-    return rows;
-  }
-
-  /** Draw what the filters leave; the ways are fetched when they are first needed. */
-  async drawRoutes() {
-    const rows = this.wanted(), most = Number($("most").value) || Infinity;
-    // Ids are digests: every n-th of them is a fair sample, and the same one each time.
-    const stride = Math.max(1, rows.length / most);
-    const shown = rows.length > most ? Array.from({ length: most }, (_, k) => rows[Math.floor(k * stride)]) : rows;
-    $("n-routes").textContent = rows.length > shown.length
-      ? `${shown.length.toLocaleString("en")} of ${rows.length.toLocaleString("en")}` : rows.length.toLocaleString("en");
-    this.shownRoutes = shown.length;
-    const on = document.querySelector("[data-layer=routes]").checked;
-    if (!on) return;
-    this.ways ??= this.fetchWays();
-    const ways = await this.ways, { routes } = this.index, byClearance = $("colour").value === "clearance";
-    this.view.addRoutes("routes", shown.map((k) => ({
-      id: routes.nav_id[k], points: ways(k),
-      colour: byClearance ? clearanceColour(routes.min_clearance_m[k]) : SETTING[routes.setting[k]],
-    })), { width: shown.length > 1500 ? 1.2 : 2.2 });
-    this.fade();
-    this.legend(byClearance);
-  }
-
-  async fetchWays() {
-    const buffer = await (await fetch("/api/routes/points")).arrayBuffer();
-    const n = new DataView(buffer).getUint32(0, true);
-    const offsets = new Uint32Array(buffer, 4, n + 1), points = new Float32Array(buffer, 8 + 4 * n);
-    return (k) => points.subarray(3 * offsets[k], 3 * offsets[k + 1]);
-  }
-
-  /** The crowd steps back: all the more where one route is picked. */
-  fade() {
-    this.view.setOpacity("routes", this.picture ? 0.2 : this.shownRoutes > 1500 ? 0.5 : 0.85);
-  }
-
-  legend(byClearance) {
-    const swatch = (colour, text) => make("span", {}, make("svg", { width: 18, height: 8 },
-      make("rect", { width: 18, height: 8, rx: 2, fill: colour })), text);
-    $("legend").replaceChildren(...(byClearance
-      ? [make("span", { class: "ramp" }, "Least clearance along the route"),
-        ...clearanceStops.map(([metres, colour]) => swatch(colour, `${metres} m`))]
-      : this.index.settings.map((setting) => swatch(SETTING[setting], words(setting)))));
+    if (name === "routes") this.settle(this.routes.draw());
   }
 
   // ---- picking ----
 
   picked(hit) {
     if (!hit) return this.letGo();
+    this.tabs.show("panel");
     if (hit.kind === "route" && hit.layer === "routes") return this.pickRoute(hit.id);
     if (hit.kind === "marker" && hit.layer === "objects") return this.pickObject(hit.id);
     if (hit.kind === "marker" && hit.layer === "anchors") return this.pickObject(hit.item.anchor.object_id);
@@ -130,13 +83,15 @@ class Page {
     showNode(panel, node);
   }
 
-  clear(node) {
+  clear(node, nav = null) {
     this.selection++;
+    this.flight?.pause();
     for (const layer of ["selected", "ends", "drone"]) this.view.remove(layer);
-    frameNode(this.view, node);
     if (this.riding) this.ride(false);
-    this.picture = null;
-    this.fade();
+    this.picture = this.flight = null;
+    frameNode(this.view, node);
+    this.routes.fade(false);
+    this.list.mark(nav);
   }
 
   letGo() {
@@ -149,25 +104,29 @@ class Page {
     const object = this.objects.get(id);
     if (!object) return;
     this.clear(object.mesh_node);
+    this.tabs.show("panel");
     if (focus) this.view.focusOn(object.mesh_node);
-    showObject(panel, object, this.byTarget.get(id).map((k) => this.route(k)), this.actions);
+    showObject(panel, object, this.routes.byTarget.get(id).map((k) => this.routes.at(k)), this.actions);
     history.replaceState(null, "", `#object=${id}`);
   }
 
   pickLandmark(landmark, focus = false) {
     this.clear(landmark.node);
+    this.tabs.show("panel");
     if (focus) this.view.focusOn(landmark.node);
     showLandmark(panel, landmark, this.index.objects.filter((object) => object.landmark_id === landmark.id), this.actions);
   }
 
   async pickRoute(nav, focus = false) {
-    this.clear(this.objects.get(this.index.routes.target_object_id[this.rows.get(nav)])?.mesh_node);
-    const mine = this.selection, route = this.route(this.rows.get(nav));
-    const detail = await json(`/api/routes/${nav}`);
+    const k = this.routes.row.get(nav), route = this.routes.at(k);
+    this.clear(this.objects.get(route.target_object_id)?.mesh_node, nav);
+    this.tabs.show("panel");
+    const mine = this.selection, detail = await json(`api/routes/${nav}`);
     if (mine !== this.selection) return;
     this.picture = { route, detail };
-    this.fade();
-    const colours = detail.way.slice(1).map((_, k) => clearanceColour(Math.min(detail.clearance_m[k], detail.clearance_m[k + 1])));
+    this.flight = new Flight(detail.poses, { show: (pose, at) => this.flown(pose, at), state: (playing) => this.playing(playing) });
+    this.routes.fade(true);
+    const colours = detail.way.slice(1).map((_, i) => clearanceColour(Math.min(detail.clearance_m[i], detail.clearance_m[i + 1])));
     this.view.addRoutes("selected", [{ id: nav, points: detail.way.flat(), colour: colours }],
       { width: 6, opacity: 1, onTop: true, pickable: false });
     const ends = { start: detail.poses[0], goal: detail.poses.at(-1) };
@@ -175,34 +134,55 @@ class Page {
       { id: label, position: ends[label].slice(0, 3), colour, label })), { size: 15, pickable: false });
     showRoute(panel, route, detail, this.actions);
     if (focus) this.view.focusOn(detail.way);
-    this.step(0);
+    this.flight.now();
     history.replaceState(null, "", `#route=${nav}`);
   }
 
   get actions() {
     return {
       object: (id) => this.pickObject(id, true),
-      route: (nav) => this.pickRoute(nav, true),
-      only: (id) => { $("target").value = String(id); this.showRoutes(); },
+      route: (nav) => this.settle(this.pickRoute(nav, true)),
+      only: (id) => this.showRoutes(id),
+      list: (id) => { this.showRoutes(id); this.tabs.show("list"); },
       ride: () => this.ride(!this.riding),
       whole: () => { this.ride(false); this.view.focusOn(this.picture.detail.way); },
-      step: (k) => this.step(k),
+      step: (k) => { this.flight.pause(); this.flight.seek(k); },
+      play: () => this.flight.toggle(),
+      speed: (speed) => { this.flight.speed = speed; },
     };
   }
 
-  showRoutes() {
+  showRoutes(target) {
+    $("target").value = String(target);
     document.querySelector("[data-layer=routes]").checked = true;
     this.setLayer("routes", true);
   }
 
-  step(k) {
-    const [x, y, z, yaw] = this.picture.detail.poses[k];
+  /** All routes with these words, as a list. */
+  listRoutes(wish) {
+    $("target").value = "";
+    this.list.find.value = wish.join(" ");
+    this.routes.words = wish;
+    this.tabs.show("list");
+    this.settle(this.routes.draw());
+  }
+
+  // ---- flying along ----
+
+  flown([x, y, z, yaw], k) {
     $("pose").textContent = k;
+    $("step").value = k;
     $("doing").textContent = `${this.picture.detail.actions[k]} at ${number(x, 2)}, ${number(y, 2)}, ${number(z, 2)} m`;
     const ahead = [x + 1.5 * Math.cos(yaw), y + 1.5 * Math.sin(yaw), z];
     this.view.addRoutes("drone", [{ points: [x, y, z, ...ahead], colour: "#ffffff" }], { width: 4, onTop: true, pickable: false });
     this.view.setVisible("drone", !this.riding);
     if (this.riding) this.view.controls.lookFrom([x, y, z], ahead);
+  }
+
+  playing(on) {
+    $("play").textContent = on ? "Pause" : "Play";
+    // What changes several times a second is not to be read out.
+    panel.setAttribute("aria-live", on ? "off" : "polite");
   }
 
   ride(on) {
@@ -213,8 +193,9 @@ class Page {
     for (const layer of ["selected", "ends", "frame"]) this.view.setVisible(layer, !on);
     for (const box of document.querySelectorAll("[data-layer]")) {
       if (box.checked) this.view.setVisible(box.dataset.layer, !on);
+      if (box.checked && box.dataset.layer === "anchors") this.view.setVisible("looks", !on);
     }
-    this.step(Number($("step").value));
+    this.flight.now();
   }
 
   // ---- the cursor ----
@@ -224,19 +205,13 @@ class Page {
     element.hidden = !hit;
     if (!hit) return;
     const node = hit.kind === "node" ? hit.node : null;
-    const text = hit.kind === "route" ? this.routeLine(hit.id)
+    element.textContent = hit.kind === "route" ? this.routes.line(this.routes.row.get(hit.id))
       : hit.layer === "objects" ? this.objects.get(hit.id).name
         : hit.layer === "landmarks" ? hit.item.label
           : hit.layer === "anchors" ? `anchor ${hit.item.anchor.anchor_id} of ${this.objects.get(hit.item.anchor.object_id)?.name ?? "?"}`
             : this.byNode.get(node)?.name ?? this.landmarkByNode.get(node)?.name ?? node;
-    element.textContent = text;
     element.style.left = `${Math.min(event.clientX + 14, innerWidth - 310)}px`;
     element.style.top = `${event.clientY + 14}px`;
-  }
-
-  routeLine(nav) {
-    const route = this.route(this.rows.get(nav));
-    return `${words(route.setting)}, ${number(route.length_m)} m: ${route.start} → ${route.target}`;
   }
 
   // ---- the page's controls ----
@@ -251,18 +226,17 @@ class Page {
     for (const box of document.querySelectorAll("[data-layer]")) {
       box.addEventListener("change", () => this.setLayer(box.dataset.layer, box.checked));
     }
-    for (const id of ["setting", "split", "modality", "target", "colour", "most"]) {
-      $(id).addEventListener("change", () => this.drawRoutes());
-    }
     const act = { orbit: () => this.mode("orbit"), fly: () => this.mode("fly"), home: () => view.home(), top: () => view.top() };
     for (const [id, press] of Object.entries(act)) $(id).addEventListener("click", press);
     const keys = { o: act.orbit, f: act.fly, h: act.home, t: act.top, Escape: () => this.letGo() };
     document.addEventListener("keydown", (event) => {
       if (event.target.matches("input, select, textarea") || event.ctrlKey || event.metaKey || event.altKey) return;
-      if (event.key === "/") { event.preventDefault(); $("search").focus(); } else keys[event.key]?.();
+      if (event.key === "/") { event.preventDefault(); $("search").focus(); }
+      else if (event.key === " " && this.flight && !event.target.matches("button")) { event.preventDefault(); this.flight.toggle(); }
+      else keys[event.key]?.();
     });
     addSearch(this, $("search"), $("results"));
-    view.onPick((hit) => Promise.resolve(this.picked(hit)).catch((error) => failure(panel, error)));
+    view.onPick((hit) => this.settle(this.picked(hit)));
     view.onHover((hit, event) => this.tooltip(hit, event));
   }
 
@@ -283,20 +257,21 @@ class Page {
 
   fromAddress() {
     const [, what, id] = location.hash.match(/^#(route|object)=(.+)$/) ?? [];
-    if (what === "route" && this.rows.has(id)) return this.pickRoute(id, true);
+    if (what === "route" && this.routes.row.has(id)) return this.pickRoute(id, true);
     if (what === "object" && this.objects.has(Number(id))) return this.pickObject(Number(id), true);
     return welcome(panel);
   }
 }
 
+const busy = new Busy($("busy"));
 try {
-  const [view, index] = await Promise.all([SceneView.load($("scene"), "/api/scene"), json("/api/index")]);
-  const page = new Page(view, index);
+  const [view, index] = await Promise.all([SceneView.load($("scene"), "api/scene"), json("api/index")]);
+  const page = new Page(view, index, busy);
   addCompass(view, view.overlay);
   page.fillIn();
   page.addPlaces();
   page.listen();
-  await page.drawRoutes();
+  await page.routes.draw();
   await page.fromAddress();
   window.page = page;
   document.body.dataset.ready = "yes";
@@ -304,4 +279,6 @@ try {
   failure(panel, error);
   document.body.dataset.ready = "failed";
   throw error;
+} finally {
+  busy.hide();
 }
