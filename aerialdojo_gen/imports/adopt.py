@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import shapely
@@ -17,9 +17,11 @@ from aerialdojo_gen.annotations.describing import UNKNOWN
 from aerialdojo_gen.errors import AssetError
 from aerialdojo_gen.imports.naming import Naming
 from aerialdojo_gen.imports.raw import RawNode, in_place_order, joined
+from aerialdojo_gen.imports.skinning import Light, Skinner, photographed
 from aerialdojo_gen.scenes.catalogue import single
 from aerialdojo_gen.scenes.mesh import areas
 from aerialdojo_gen.scenes.model import Instance, Material, Part, Scene
+from aerialdojo_gen.scenes.sampling import colour_words, shown_colours
 
 Floats = NDArray[np.float64]
 
@@ -37,6 +39,7 @@ _MOST_INSTANCES = 3000
 _LEAST_AREA_M2 = 1e-9
 _WELD_M = 1e-4
 _GROUND = (122, 132, 108)
+_MOST_NOTES = 8
 
 
 @dataclass
@@ -60,6 +63,7 @@ def adopt(
     crop_m: tuple[float, float, float] | None = None,
     ceiling_m: float | None = None,
     naming: Naming | None = None,
+    light: Light = "auto",
 ) -> tuple[Scene, Repairs]:
     """Make a scene of a foreign mesh.
 
@@ -79,6 +83,9 @@ def adopt(
         Highest z that a drone may fly at; 6 m above the highest point, at least 12 m, where absent.
     naming : Naming, optional
         What nodes are called; the words in their names where absent.
+    light : {"auto", "sun", "baked"}
+        Whether textures are lit by the scene's sun, or drawn as they are, as photographs, whose light is in them;
+        by what they look like where ``"auto"`` (`aerialdojo_gen.imports.skinning.photographed`).
 
     Returns
     -------
@@ -110,9 +117,12 @@ def adopt(
     low, high = _bounds(bodies)
     _check_extent(high - low)
     shift = np.array([(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, low[2]])
-    bodies = _merged_clutter([RawNode(b.name, b.vertices - shift, b.faces, b.colours) for b in bodies])
-    parts: dict[str, Material] = {}
-    instances = _named([(b, _parts(b, parts, repairs)) for b in bodies], naming or Naming())
+    bodies = _merged_clutter([b.placed(b.vertices - shift) for b in bodies])
+    skinner = Skinner(light == "baked" or (light == "auto" and photographed(bodies)))
+    skinner.scale(bodies)
+    parts = skinner.materials
+    instances = _named([(b, _parts(b, skinner, repairs)) for b in bodies], naming or Naming(), parts)
+    _tell_textures(bodies, skinner, light, repairs)
     low, high = low - shift, high - shift
     if not instances:
         raise AssetError("no triangle is left after repair: the mesh is empty or degenerate")
@@ -131,19 +141,19 @@ def _turned(node: RawNode, up: str, scale: float) -> RawNode:
     v = node.vertices * scale
     if up == "y":
         v = np.column_stack([v[:, 0], -v[:, 2], v[:, 1]])
-    return RawNode(node.name, v, node.faces, node.colours)
+    return node.placed(v)
 
 
 def _sound(node: RawNode, repairs: Repairs) -> RawNode:
     """Drop faces that are no triangles of finite size; weld vertices, so that neighbours are known."""
-    faces, colours = node.faces, node.colours
+    faces = node.faces
     inside = ((faces >= 0) & (faces < len(node.vertices))).all(axis=1)
     finite = np.asarray(np.isfinite(node.vertices).all(axis=1) & (np.abs(node.vertices) < 1e7).all(axis=1))
     ok = np.array(inside)
     ok[inside] = finite[faces[inside]].all(axis=1)
     repairs.add(int((~ok).sum()), f"triangles of {node.name or 'the mesh'} with no place (NaN, infinite) dropped")
-    faces, colours = faces[ok], colours[ok]
-    used, faces = np.unique(faces, return_inverse=True)
+    node = node.some(ok)
+    used, faces = np.unique(node.faces, return_inverse=True)
     vertices = node.vertices[used]
     if len(vertices):
         _, first, same = np.unique(np.round(vertices / _WELD_M), axis=0, return_index=True, return_inverse=True)
@@ -151,7 +161,7 @@ def _sound(node: RawNode, repairs: Repairs) -> RawNode:
     faces = faces.reshape(-1, 3).astype(np.int64)
     solid = _areas(vertices, faces) > _LEAST_AREA_M2 if len(faces) else np.zeros(0, dtype=bool)
     repairs.add(int((~solid).sum()), f"triangles of {node.name or 'the mesh'} without area dropped")
-    return RawNode(node.name, vertices, faces[solid], colours[solid])
+    return node.placed(vertices, faces).some(solid)
 
 
 def _areas(vertices: Floats, faces: NDArray[np.int64]) -> Floats:
@@ -173,7 +183,8 @@ def _instances(bodies: list[RawNode]) -> list[RawNode]:
     for rows in np.split(order, starts[1:]):
         rows = np.sort(rows)
         used, faces = np.unique(f[rows], return_inverse=True)
-        pieces.append(RawNode("", body.vertices[used], faces.reshape(-1, 3), body.colours[rows]))
+        piece = body.some(rows).placed(body.vertices[used], faces.reshape(-1, 3))
+        pieces.append(replace(piece, name=""))
     return _gathered(pieces)
 
 
@@ -233,34 +244,35 @@ def _merged_clutter(bodies: list[RawNode]) -> list[RawNode]:
     return [*(b for b, s in zip(bodies, small, strict=True) if not s), joined("clutter", scraps)]
 
 
-def _parts(body: RawNode, materials: dict[str, Material], repairs: Repairs) -> tuple[Part, ...]:
-    """Make parts by colour; a closed body faces outwards, an open one is there from both sides."""
+def _parts(body: RawNode, skinner: Skinner, repairs: Repairs) -> tuple[Part, ...]:
+    """Make parts by material; a closed body faces outwards, an open one is there from both sides."""
     mesh = trimesh.Trimesh(body.vertices, body.faces, process=False)
-    faces, colours = body.faces, body.colours
-    if mesh.is_watertight and mesh.is_winding_consistent:
-        if mesh.volume < 0:
-            faces = faces[:, ::-1]
-            repairs.lines.append(f"{body.name or 'a component'} was inside out")
-    else:
-        faces, colours = np.concatenate([faces, faces[:, ::-1]]), np.concatenate([colours, colours])
-    # Photographs bring thousands of shades: sixteen levels a channel are materials enough.
-    shades = (colours // 16) * 16 + 8
-    parts = []
-    for shade in np.unique(shades, axis=0):
-        rows = (shades == shade).all(axis=1)
-        red, green, blue = (int(c) for c in shade)
-        spec = f"#{red:02x}{green:02x}{blue:02x}"
-        materials.setdefault(spec, Material(spec, (red, green, blue)))
-        used, own = np.unique(faces[rows], return_inverse=True)
-        vertices = single(body.vertices[used])
-        triangles = np.asarray(own.reshape(-1, 3), dtype=np.int32)
-        triangles = triangles[areas(vertices, triangles) > 0.0]
-        if len(triangles):
-            parts.append(Part(vertices, triangles, np.zeros((len(vertices), 2), dtype=np.float32), spec))
-    return tuple(parts)
+    closed = mesh.is_watertight and mesh.is_winding_consistent
+    if closed and mesh.volume < 0:
+        corners = None if body.corners is None else body.corners[:, ::-1]
+        body = replace(body, faces=body.faces[:, ::-1], corners=corners)
+        repairs.lines.append(f"{body.name or 'a component'} was inside out")
+    return skinner.parts(body, double_sided=not closed)
 
 
-def _named(bodies: Sequence[tuple[RawNode, tuple[Part, ...]]], naming: Naming) -> list[Instance]:
+def _tell_textures(bodies: Sequence[RawNode], skinner: Skinner, light: Light, repairs: Repairs) -> None:
+    """Say what became of the textures."""
+    shown = [m for m in skinner.materials.values() if m.texture is not None]
+    if shown:
+        sizes = {m.name.split(",")[0]: m.texture.shape[:2] for m in shown if m.texture is not None}
+        most = max(sizes.values(), key=lambda size: size[0] * size[1])
+        unlit = sum(m.unlit for m in shown)
+        how = "drawn as they are, with the light that is in them" if unlit else "lit by the scene's sun"
+        other = "" if light != "auto" else f" (--light {'sun' if unlit else 'baked'} for the other)"
+        repairs.add(len(sizes), f"textures, the largest {most[1]} x {most[0]} pixels, {how}{other}")
+    notes = {note: None for b in bodies for s in b.surfaces for note in s.notes}
+    repairs.lines += [*notes][:_MOST_NOTES]
+    repairs.add(max(len(notes) - _MOST_NOTES, 0), "more textures like that")
+
+
+def _named(
+    bodies: Sequence[tuple[RawNode, tuple[Part, ...]]], naming: Naming, materials: dict[str, Material]
+) -> list[Instance]:
     """Give every body a node name, a category from it, and what can be said of its colour, height and form."""
     counts: dict[str, int] = {}
     heights = [float(b.vertices[:, 2].max() - b.vertices[:, 2].min()) for b, parts in bodies if parts]
@@ -271,7 +283,7 @@ def _named(bodies: Sequence[tuple[RawNode, tuple[Part, ...]]], naming: Naming) -
             continue
         called = naming.called(body.name)
         category = called.category or _category(body)
-        looks = _looks(body, tall, low)
+        looks = _looks(body, parts, materials, tall, low)
         looks |= (_form(body, looks) if category == UNKNOWN else {}) | called.attributes
         k = counts[category] = counts.get(category, -1) + 1
         out.append(Instance(f"{category}_{k:04d}", category, "", looks, parts))
@@ -305,11 +317,11 @@ def _form(body: RawNode, looks: dict[str, str]) -> dict[str, str]:
     return {"size": looks.get("size", "medium-sized"), "shape": f"{rise}{plan}"}
 
 
-def _looks(body: RawNode, tall: float, low: float) -> dict[str, str]:
-    from aerialdojo_gen.scenes.colour_names import colour_name
-
+def _looks(
+    body: RawNode, parts: Sequence[Part], materials: dict[str, Material], tall: float, low: float
+) -> dict[str, str]:
     size = body.vertices.max(axis=0) - body.vertices.min(axis=0)
-    looks = {"colour": colour_name(np.median(body.colours, axis=0))}
+    looks = {"colour": colour_words(*shown_colours(parts, materials))}
     if tall > 1.2 * low:
         looks |= {"size": "tall"} if size[2] >= tall else {"size": "low"} if size[2] <= low else {}
     flat = body.vertices[:, :2] - body.vertices[:, :2].mean(axis=0)

@@ -76,7 +76,7 @@ def _imported(recipe_path: Path, imported: Imported) -> Scene:
     red, green, blue = (int(imported.sky[k : k + 2], 16) for k in (1, 3, 5))
     whole = Scene(
         recipe_path.stem, scene.instances, scene.materials, bounds, (red, green, blue),
-        (float(sun[0]), float(sun[1]), float(sun[2])), imported=True,
+        (float(sun[0]), float(sun[1]), float(sun[2])), imported=True, backdrop=scene.backdrop,
     )  # fmt: skip
     return cut_out(whole, imported.cuts) if imported.cuts else whole
 

@@ -14,10 +14,13 @@ from numpy.typing import NDArray
 from aerialdojo_gen.geometry.soup import soup
 from aerialdojo_gen.scenes.anatomy import Anatomy
 
+# Closed; open and there from both sides; open and the ground, which nobody flies below; behind everything.
+SURFACES = ("solid", "sheet", "ground", "dome")
+
 
 @dataclass(frozen=True, eq=False)
 class Material:
-    """A surface: a colour, or a small tileable texture.
+    """A surface: a colour, a small tileable texture, or a picture that came with a foreign mesh.
 
     Attributes
     ----------
@@ -29,12 +32,33 @@ class Material:
         sRGB tile, repeated over the surface; row 0 is the top (v = 1).
     tile_m : float
         Edge of one texture tile in metres; UVs are metres divided by it.
+    mask : (H, W) bool or None
+        Where the texture is there, of its size; None where it is everywhere.
+    atlas : bool
+        Whether the texture is a foreign mesh's own, in which a place stands for a place of the surface: it is drawn
+        at every distance, where a tileable one fades into its mean. `tile_m` is then its width at its mean scale.
+    double_sided : bool
+        Whether its triangles are there from both sides; else from the front alone.
+    unlit : bool
+        Whether its colours have their light in them, as those of a photograph have, and are drawn as they are.
+    jpeg : bytes
+        The texture's file, where that is a JPEG: it is stored as it is. Empty where the texture is stored as PNG.
     """
 
     name: str
     colour: tuple[int, int, int]
     texture: NDArray[np.uint8] | None = None
     tile_m: float = 1.0
+    mask: NDArray[np.bool_] | None = None
+    atlas: bool = False
+    double_sided: bool = False
+    unlit: bool = False
+    jpeg: bytes = b""
+
+    @property
+    def foreign(self) -> bool:
+        """Whether it is drawn as only a foreign mesh's materials are."""
+        return self.atlas or self.double_sided or self.unlit or self.mask is not None
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,12 +75,15 @@ class Part:
         Texture coordinates in tiles (metres / `Material.tile_m`).
     material : str
         Name of a `Material` of the scene.
+    colours : (n, 3) uint8 or None
+        sRGB of the vertices, in place of the material's colour; None where that counts.
     """
 
     vertices: NDArray[np.float64]
     faces: NDArray[np.int32]
     uv: NDArray[np.float32]
     material: str
+    colours: NDArray[np.uint8] | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,6 +104,8 @@ class Instance:
         At least one, none of them empty.
     anatomy : Anatomy or None
         Its fronts and named parts, where its catalogue says them.
+    surface : str
+        What its surface is, one of `SURFACES`, where ``add-scene`` has decided it; empty where form alone tells.
     """
 
     node: str
@@ -85,6 +114,7 @@ class Instance:
     attributes: dict[str, str]
     parts: tuple[Part, ...]
     anatomy: Anatomy | None = None
+    surface: str = ""
 
     @property
     def vertices(self) -> NDArray[np.float64]:
@@ -145,6 +175,9 @@ class Scene:
         Unit vector from the scene towards the sun, world frame.
     imported : bool
         Whether it comes from a mesh of another make, whose categories are its own.
+    backdrop : tuple of Instance
+        What is seen behind everything and never touched: the sky domes of an imported mesh. They are drawn, and are
+        no part of what is looked for, flown around, or told.
     """
 
     name: str
@@ -154,14 +187,17 @@ class Scene:
     sky: tuple[int, int, int] = (150, 190, 230)
     sun: tuple[float, float, float] = (0.45, -0.35, 0.82)
     imported: bool = False
+    backdrop: tuple[Instance, ...] = ()
     _by_node: dict[str, Instance] = field(default_factory=dict, init=False, repr=False)
 
     def __post_init__(self) -> None:
         """Index the instances and refuse a node name that stands twice."""
-        for instance in self.instances:
+        for instance in (*self.instances, *self.backdrop):
             if instance.node in self._by_node:
                 raise ValueError(f"scene {self.name}: node {instance.node!r} stands twice")
             self._by_node[instance.node] = instance
+        for instance in self.backdrop:
+            del self._by_node[instance.node]
 
     @property
     def ceiling_m(self) -> float:
