@@ -23,7 +23,7 @@ def _number_or_auto(value: str | None) -> str | None:
 @app.command("add-scene")
 def add_scene(
     name: Annotated[str, typer.Argument(help="Name of the scene; the suffix _1 makes it out-of-distribution.")],
-    mesh: Annotated[Path, typer.Argument(help="GLB, OBJ, STL, PLY or 3DS file.")],
+    mesh: Annotated[Path, typer.Argument(help="GLB, glTF, OBJ, STL, PLY, 3DS, DAE or FBX file.")],
     up: Annotated[str, typer.Option(help="The mesh's axis that points up: z or y.")],
     scale: Annotated[float, typer.Option(help="Metres a unit of the mesh: 0.01 for centimetres.")] = 1.0,
     annotations: Annotated[Path | None, typer.Option(help="Annotation file to go with it.")] = None,
@@ -37,6 +37,12 @@ def add_scene(
     names: Annotated[
         Path | None, typer.Option(help="CSV of what nodes are called: pattern,name,category,plural.")
     ] = None,
+    light: Annotated[
+        str, typer.Option(help="Textures are lit by the sun, or have their light in them: auto, sun or baked.")
+    ] = "auto",
+    texture_px: Annotated[
+        int, typer.Option("--texture-px", min=16, max=8192, help="Longest side of a texture that is kept, pixels.")
+    ] = 8192,
     force: Annotated[bool, typer.Option("--force", help="Replace a scene of this name.")] = False,
 ) -> None:
     """Make a scene of a mesh of your own."""
@@ -52,6 +58,8 @@ def add_scene(
         crop_m=crop,
         ceiling_m=ceiling,
         names=names,
+        light=light,
+        texture_px=texture_px,
         force=force,
     )
     size = added.scene.bounds[1] - added.scene.bounds[0]

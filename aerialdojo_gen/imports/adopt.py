@@ -17,7 +17,7 @@ from aerialdojo_gen.annotations.describing import UNKNOWN
 from aerialdojo_gen.errors import AssetError
 from aerialdojo_gen.imports.naming import Naming
 from aerialdojo_gen.imports.raw import RawNode, in_place_order, joined
-from aerialdojo_gen.imports.skinning import Light, Skinner, photographed
+from aerialdojo_gen.imports.skinning import LIGHTS, Skinner, photographed
 from aerialdojo_gen.scenes.catalogue import single
 from aerialdojo_gen.scenes.mesh import areas
 from aerialdojo_gen.scenes.model import Instance, Material, Part, Scene
@@ -63,7 +63,7 @@ def adopt(
     crop_m: tuple[float, float, float] | None = None,
     ceiling_m: float | None = None,
     naming: Naming | None = None,
-    light: Light = "auto",
+    light: str = "auto",
 ) -> tuple[Scene, Repairs]:
     """Make a scene of a foreign mesh.
 
@@ -104,6 +104,8 @@ def adopt(
         raise AssetError(f"--up {up!r}: a mesh's up axis is y or z")
     if not (math.isfinite(scale) and scale > 0):
         raise AssetError(f"--scale {scale}: must be a number above 0")
+    if light not in LIGHTS:
+        raise AssetError(f"--light {light!r}: must be {', '.join(LIGHTS[:-1])} or {LIGHTS[-1]}")
     repairs = Repairs()
     bodies = [b for node in nodes for b in [_sound(_turned(node, up, scale), repairs)] if len(b.faces)]
     if not bodies:
@@ -255,7 +257,7 @@ def _parts(body: RawNode, skinner: Skinner, repairs: Repairs) -> tuple[Part, ...
     return skinner.parts(body, double_sided=not closed)
 
 
-def _tell_textures(bodies: Sequence[RawNode], skinner: Skinner, light: Light, repairs: Repairs) -> None:
+def _tell_textures(bodies: Sequence[RawNode], skinner: Skinner, light: str, repairs: Repairs) -> None:
     """Say what became of the textures."""
     shown = [m for m in skinner.materials.values() if m.texture is not None]
     if shown:

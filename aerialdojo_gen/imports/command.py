@@ -12,6 +12,7 @@ from aerialdojo_gen.errors import AnnotationError, AssetError, UsageError, brief
 from aerialdojo_gen.imports.adopt import Repairs, adopt
 from aerialdojo_gen.imports.files import read_mesh
 from aerialdojo_gen.imports.naming import read_names
+from aerialdojo_gen.imports.pictures import TEXTURE_PX
 from aerialdojo_gen.pipeline.registry import STAGES
 from aerialdojo_gen.scenes.glb import write_glb
 from aerialdojo_gen.scenes.model import Scene
@@ -54,6 +55,8 @@ def add_scene(
     crop_m: tuple[float, float, float] | None = None,
     ceiling_m: float | None = None,
     names: Path | None = None,
+    light: str = "auto",
+    texture_px: int = TEXTURE_PX,
     force: bool = False,
 ) -> Added:
     """Make a scene of a mesh file, in a project folder.
@@ -66,7 +69,7 @@ def add_scene(
     name : str
         Letters, digits, ``_`` and ``-``; the suffix ``_1`` puts the scene in the OOD partition.
     mesh : Path
-        GLB, OBJ, STL, PLY or 3DS.
+        GLB, glTF, OBJ, STL, PLY, 3DS, Collada or FBX.
     project : Path
         The folder; made where it is missing.
     up : {"z", "y"}
@@ -81,6 +84,10 @@ def add_scene(
         Highest z that a drone may fly at.
     names : Path, optional
         A table of what the file's nodes are called (`aerialdojo_gen.imports.naming.read_names`).
+    light : {"auto", "sun", "baked"}
+        Whether textures are lit by the scene's sun, or drawn as they are (`aerialdojo_gen.imports.adopt.adopt`).
+    texture_px : int
+        Longest side of a texture, pixels; larger ones are made smaller.
     force : bool
         Replace a scene of this name.
 
@@ -105,8 +112,9 @@ def add_scene(
     text = None if annotations is None else _annotations(annotations, name)
     try:
         scene, repairs = adopt(
-            name, read_mesh(mesh), up=up, scale=scale, crop_m=crop_m, ceiling_m=ceiling_m, naming=naming
-        )
+            name, read_mesh(mesh, texture_px=texture_px), up=up, scale=scale, crop_m=crop_m, ceiling_m=ceiling_m,
+            naming=naming, light=light,
+        )  # fmt: skip
     except AssetError as error:
         message = str(error)
         raise AssetError(message if message.startswith(str(mesh)) else f"{mesh}: {message}") from None

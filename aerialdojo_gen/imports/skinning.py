@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,8 +13,8 @@ from aerialdojo_gen.scenes.catalogue import single
 from aerialdojo_gen.scenes.mesh import areas
 from aerialdojo_gen.scenes.model import Material, Part
 
-Light = Literal["auto", "sun", "baked"]
-LIGHTS: tuple[Light, ...] = ("auto", "sun", "baked")
+# What lights textures: what suits them, the scene's sun, or nothing, as their light is in them.
+LIGHTS = ("auto", "sun", "baked")
 
 # A thing with more plain colours than this is painted vertex by vertex, and no longer part by part.
 _MOST_PLAIN = 64
@@ -68,7 +67,7 @@ class Skinner:
         painted = kind == _PAINTED
         if painted.any():
             # White: vertex colours take its place, and where a program multiplies by both they stay what they are.
-            paint = Material(_MIXED, (255, 255, 255), double_sided=double_sided, unlit=self.baked)
+            paint = Material(_MIXED, (255, 255, 255), atlas=True, double_sided=double_sided, unlit=self.baked)
             found += self._made(body, painted, paint)
         for k in np.unique(kind[kind >= 0]):
             found += self._made(body, kind == k, self._textured(body.surfaces[k], double_sided))
@@ -99,9 +98,9 @@ class Skinner:
         material = replace(material, name=_name(material))
         material = self.materials.get(material.name, material)
         corners = None
-        if material.atlas and body.corners is not None:
+        if material.texture is not None and body.corners is not None:
             corners = body.corners[rows][..., :2]
-        elif material.name.startswith(_MIXED):
+        elif material.atlas:
             corners = _painted(body, rows)
         vertices, faces, carried = _split(single(body.vertices), body.faces[rows], corners)
         solid = areas(vertices, faces) > 0.0
@@ -110,7 +109,7 @@ class Skinner:
         used, faces = np.unique(faces[solid], return_inverse=True)
         uv = np.zeros((len(used), 2), dtype=np.float32)
         colours = None
-        if carried is not None and material.atlas:
+        if carried is not None and material.texture is not None:
             uv = carried[used].astype(np.float32)
         elif carried is not None:
             colours = carried[used].astype(np.uint8)

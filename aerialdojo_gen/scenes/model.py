@@ -37,6 +37,7 @@ class Material:
     atlas : bool
         Whether the texture is a foreign mesh's own, in which a place stands for a place of the surface: it is drawn
         at every distance, where a tileable one fades into its mean. `tile_m` is then its width at its mean scale.
+        So is one without a texture, whose parts have vertex colours.
     double_sided : bool
         Whether its triangles are there from both sides; else from the front alone.
     unlit : bool

@@ -14,6 +14,7 @@ from aerialdojo_gen.scenes.model import Material, Part
 _SAMPLES = 4096
 # A second colour is told where it has so much of the surface, and so much of what the first has.
 _SECOND, _OF_FIRST = 0.2, 0.35
+_NEUTRAL, _AS_MUCH = ("white", "grey", "black"), 1.5
 
 
 def shown_colours(
@@ -102,7 +103,12 @@ def colour_words(colours: NDArray[np.uint8], weights: NDArray[np.float64]) -> st
     if not ranked:
         return ""
     first, second = ranked[0], ranked[1] if len(ranked) > 1 else ""
-    both = second and shares[second] >= max(_SECOND, _OF_FIRST * shares[first])
+    # People say blue and white, and not white and blue, where there is as much of both.
+    if first in _NEUTRAL and second not in _NEUTRAL and second and shares[first] < _AS_MUCH * shares[second]:
+        first, second = second, first
+    both = second and min(shares[first], shares[second]) >= max(
+        _SECOND, _OF_FIRST * max(shares[first], shares[second])
+    )
     return f"{first} and {second}" if both else first
 
 
