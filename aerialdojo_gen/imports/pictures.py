@@ -137,7 +137,7 @@ def _decoded(file: bytes) -> tuple[NDArray[Any] | None, str]:
     if file[:12] == b"\xabKTX 20\xbb\r\n\x1a\n":
         return None, "is in KTX2, which is not read (export it as PNG or JPEG)"
     if size is None:
-        return None, "is no PNG or JPEG that can be read"
+        return None, "is no PNG, JPEG, BMP or WebP"
     if max(size) > _LARGEST_PX or size[0] * size[1] > _MOST_DECODED:
         return None, f"has {size[0]} x {size[1]} pixels, {_LARGEST_PX} a side are the most"
     image = cv2.imdecode(np.frombuffer(file, dtype=np.uint8), cv2.IMREAD_UNCHANGED)
@@ -160,21 +160,20 @@ def image_size(file: bytes) -> tuple[int, int] | None:
     if file[:2] == b"BM" and len(file) >= 26:
         width, height = struct.unpack("<ii", file[18:26])
         return abs(width), abs(height)
-    if file[:4] in (b"II*\0", b"MM\0*") or (file[:4] == b"RIFF" and file[8:12] == b"WEBP"):
-        return _told_size(file)
+    if file[:4] == b"RIFF" and file[8:12] == b"WEBP" and len(file) >= 30:
+        return _webp_size(file)
     return None
 
 
-def _told_size(file: bytes) -> tuple[int, int] | None:
-    import io
-
-    from PIL import Image
-
-    try:
-        with Image.open(io.BytesIO(file)) as image:
-            return int(image.width), int(image.height)
-    except (OSError, ValueError, Image.DecompressionBombError):
-        return None
+def _webp_size(file: bytes) -> tuple[int, int] | None:
+    kind = file[12:16]
+    if kind == b"VP8X":
+        return 1 + int.from_bytes(file[24:27], "little"), 1 + int.from_bytes(file[27:30], "little")
+    if kind == b"VP8L":
+        bits = int.from_bytes(file[21:25], "little")
+        return 1 + (bits & 0x3FFF), 1 + (bits >> 14 & 0x3FFF)
+    width, height = struct.unpack("<HH", file[26:30])
+    return width & 0x3FFF, height & 0x3FFF
 
 
 def _jpeg_size(file: bytes) -> tuple[int, int] | None:

@@ -142,3 +142,32 @@ def yard(path: Path) -> Path:
     ground = np.array([[-15.0, -15, 0], [15, -15, 0], [15, 15, 0], [-15, 15, 0]])
     out.node("Ground", ground, WALL_FACES, out.material(factor=[0.2, 0.25, 0.15, 1]))
     return out.write(path)
+
+
+def scan(path: Path, cells: int = 40, texture_px: int = 512, jpeg: bool = True) -> Path:
+    """Write what a photogrammetry program writes: one open surface of 2 cells² triangles in one atlas, an OBJ.
+
+    Ground of 60 x 60 m with houses pulled out of it; the atlas is a photograph from above.
+    """
+    step = 60.0 / cells
+    k = np.arange(cells + 1)
+    x, y = np.meshgrid(-30 + step * k, -30 + step * k)
+    z = 0.4 * np.sin(x / 7) * np.cos(y / 9)
+    for cx, cy, high in ((-15, -12, 6), (10, 8, 9), (14, -14, 5), (-12, 14, 7)):
+        z = np.where((abs(x - cx) < 5) & (abs(y - cy) < 4), high, z)
+    photo = photograph(texture_px, seed=5)
+    picture = path.with_suffix(".jpg" if jpeg else ".png")
+    picture.write_bytes(picture_file(photo, picture.suffix))
+    path.with_suffix(".mtl").write_text(f"newmtl atlas\nKd 0.2 0.2 0.2\nmap_Kd {picture.name}\n")
+    v = np.column_stack([x.ravel(), y.ravel(), z.ravel()])
+    vt = np.column_stack([(x.ravel() + 30) / 60, (y.ravel() + 30) / 60])
+    a = (np.arange(cells)[:, None] * (cells + 1) + np.arange(cells)[None]).ravel() + 1
+    b, c, d = a + 1, a + cells + 2, a + cells + 1
+    faces = np.concatenate([np.column_stack([a, b, c]), np.column_stack([a, c, d])])
+    with path.open("w") as file:
+        file.write(f"mtllib {path.with_suffix('.mtl').name}\n")
+        file.write(("v %.4f %.4f %.4f\n" * len(v)) % tuple(v.ravel().tolist()))
+        file.write(("vt %.6f %.6f\n" * len(vt)) % tuple(vt.ravel().tolist()))
+        file.write("usemtl atlas\n")
+        file.write(("f %d/%d %d/%d %d/%d\n" * len(faces)) % tuple(np.repeat(faces.ravel(), 2).tolist()))
+    return path
