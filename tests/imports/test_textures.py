@@ -107,7 +107,7 @@ def test_a_lit_wall_is_its_texture_times_the_light(yard, renderer):
 def test_holes_are_looked_through_and_leaves_are_seen(yard):
     # A quarter of the hedge's 4 x 4 m has leaves: its middle.
     hedge = thing(yard, "hedge")
-    pose = look_at_pose(hedge.centroid + (0, 6, 0), hedge.centroid)
+    pose = look_at_pose(hedge.centroid + np.array([0, 6, 0]), hedge.centroid)
     for renderer in RENDERERS:
         with renderer(yard) as camera:
             depth = camera.render(CAMERA, pose).depth_m
