@@ -55,7 +55,11 @@ def choose_landmarks(
             raise AnnotationError(
                 f"{scene.name}: nothing tells the landmark {nameless[0]!r} from others of its kind: take another node"
             )
-        rest = [i for i in _prominent(vocabulary, 8 * n) if i not in chosen and names.of(i)]
+        prominent = [i for i in _prominent(vocabulary) if i not in chosen]
+        rest = [i for i in prominent[: 8 * n] if names.of(i)]
+        if len(chosen) + len(rest) < n:
+            # Where little is known by name, what is farthest to a side has one, however low it is.
+            rest = [i for i in prominent if names.of(i)][:n]
     else:
         rest = [i for i in scene.instances if vocabulary.kinds.get(i.category) == "landmark" and i not in chosen]
     while len(chosen) < n and rest:
@@ -78,10 +82,10 @@ def spread_m(instance: Instance, chosen: Sequence[Instance]) -> float:
     return min(gaps, default=1000.0)
 
 
-def _prominent(vocabulary: Vocabulary, n: int) -> list[Instance]:
-    """The n tallest things of a mesh of another make."""
+def _prominent(vocabulary: Vocabulary) -> list[Instance]:
+    """The things of a mesh of another make, the highest first."""
     things = [i for i in vocabulary.scene.instances if i.category not in NO_THING]
-    return sorted(things, key=lambda i: (-float(i.bounds[1, 2]), i.node))[:n]
+    return sorted(things, key=lambda i: (-float(i.bounds[1, 2]), i.node))
 
 
 def _catalogued(vocabulary: Vocabulary, chosen: Sequence[Instance]) -> list[str]:
