@@ -8,6 +8,7 @@ to is read from beside it or not at all.
 from __future__ import annotations
 
 import json
+import re
 import resource
 import struct
 import subprocess
@@ -23,7 +24,7 @@ from aerialdojo_gen.errors import AssetError
 from aerialdojo_gen.imports.beside import Beside
 from aerialdojo_gen.imports.gltf import read_gltf
 from aerialdojo_gen.imports.pictures import TEXTURE_PX
-from aerialdojo_gen.imports.raw import RawNode, RawSurface
+from aerialdojo_gen.imports.raw import RawNode, RawSurface, joined
 from aerialdojo_gen.imports.skins import skins_of
 from aerialdojo_gen.imports.sniffing import mismatch
 from aerialdojo_gen.store.staging import scratch_folder
@@ -146,7 +147,7 @@ def _read(path: Path, texture_px: int) -> list[RawNode]:
     # What the file refers to comes through a resolver that stays in its folder.
     beside = _beside(path)
     scene = trimesh.load_scene(
-        path, file_type=suffix[1:], resolver=beside, process=False, split_objects=True, group_material=False,
+        path, file_type=suffix[1:], resolver=beside, process=False, split_objects=True, group_material=True,
         maintain_order=True,
     )  # fmt: skip
     shown = []
@@ -157,13 +158,26 @@ def _read(path: Path, texture_px: int) -> list[RawNode]:
             vertices = trimesh.transform_points(np.asarray(body.vertices, dtype=np.float64), transform)
             shown.append((str(name), body, vertices))
     skins = skins_of([body for _, body, _ in shown], beside, texture_px)
-    return [
-        RawNode(
-            "" if suffix in (".stl", ".ply") else name, vertices, np.asarray(body.faces, dtype=np.int64),
-            skin.colours, skin.surface, skin.corners, skin.surfaces,
-        )
-        for (name, body, vertices), skin in zip(shown, skins, strict=True)
-    ]  # fmt: skip
+    named = _objects_of(path) if suffix == ".obj" else {}
+    nodes: dict[str, list[RawNode]] = {}
+    for (name, body, vertices), skin in zip(shown, skins, strict=True):
+        label = "" if suffix in (".stl", ".ply") else named.get(name, name)
+        faces = np.asarray(body.faces, dtype=np.int64)
+        made = RawNode(label, vertices, faces, skin.colours, skin.surface, skin.corners, skin.surfaces)
+        nodes.setdefault(label, []).append(made)
+    return [bodies[0] if len(bodies) == 1 else joined(bodies[0].name, bodies) for bodies in nodes.values()]
+
+
+def _objects_of(path: Path) -> dict[str, str]:
+    """Read the objects of an OBJ file: by the names that trimesh gives to what of one is of one material."""
+    named, thing, material = {}, "", ""
+    for key, told in re.findall(rb"^(o|usemtl)[ \t]+(.*?)[ \t\r]*$", path.read_bytes(), re.MULTILINE):
+        if key == b"o":
+            thing = told.decode("utf-8", "replace")
+        else:
+            material = told.decode("utf-8", "replace")
+        named["_".join(word for word in (thing, material) if word)] = thing
+    return named
 
 
 def _beside(path: Path) -> Any:

@@ -220,6 +220,31 @@ def test_a_missing_texture_is_told(tmp_path):
     assert any("scan.mtl" in line for line in repairs.lines)
 
 
+def test_an_object_of_several_materials_has_all_of_them(tmp_path):
+    lines = [
+        "mtllib m.mtl",
+        "o Wall",
+        "v -4 0 0",
+        "v 4 0 0",
+        "v 4 0 8",
+        "v -4 0 8",
+        "vt 0 0",
+        "vt 1 0",
+        "vt 1 1",
+        "vt 0 1",
+    ]
+    lines += ["usemtl one", "f 1/1 2/2 3/3", "usemtl two", "f 1/1 3/3 4/4"]
+    (tmp_path / "wall.obj").write_text("\n".join(lines))
+    (tmp_path / "m.mtl").write_text("newmtl one\nmap_Kd a.png\nnewmtl two\nKd 0 1 0\n")
+    (tmp_path / "a.png").write_bytes(textured.picture_file(textured.checkerboard()))
+    (node,) = nodes_of(tmp_path / "wall.obj", tmp_path / "nodes.npz")
+    assert node.name == "Wall"
+    assert node.surface is not None
+    shown = [node.surfaces[k] for k in node.surface]
+    assert sorted((s.texture is not None, s.colour) for s in shown)[0] == (False, (0, 255, 0))
+    assert [s.texture is not None for s in shown].count(True) == 1
+
+
 def test_files_elsewhere_are_not_read(tmp_path):
     (tmp_path / "in").mkdir()
     path = textured.scan(tmp_path / "in" / "scan.obj")
@@ -263,8 +288,8 @@ def test_gltf_says_more_than_plain_triangles(tmp_path):
     assert (normal[:, 1] < 0).all()
     texture = node.surfaces[0].texture
     assert texture is not None
-    # Half the light of 235 is 173, of 20 it is 12 (IEC 61966-2-1); what is not red stays.
-    np.testing.assert_allclose(np.unique(texture[..., 0]), [12, 173], atol=1)
+    # Half the light of 235 is 173, of 190 139 and of 20 12 (IEC 61966-2-1); what is not red stays.
+    np.testing.assert_allclose(np.unique(texture[..., 0]), [12, 139, 173], atol=1)
     assert set(np.unique(texture[..., 1])) == {40, 235}
 
 
