@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from aerialdojo_gen.scenes.colour_names import colour_name
 from aerialdojo_gen.scenes.mesh import areas
 from aerialdojo_gen.scenes.model import Instance, Material
+from aerialdojo_gen.scenes.sampling import shown_colours
 
 # What people call a colour, and what `colour_name` may call it: one word is a shade of several.
 SHADES: Mapping[str, frozenset[str]] = {
@@ -53,12 +54,24 @@ def colour_shares(instance: Instance, materials: Mapping[str, Material]) -> dict
     """
     shares: dict[str, float] = {}
     whole = 0.0
+    if any(materials[part.material].atlas for part in instance.parts):
+        # A foreign texture's place counts, and not the whole of it, which may be a city's.
+        return _counted(*shown_colours(instance.parts, materials))
     for part in instance.parts:
         area = float(areas(part.vertices, part.faces).sum())
         whole += area
         for name, share in _called(materials[part.material]).items():
             shares[name] = shares.get(name, 0.0) + area * share
     return {name: area / whole for name, area in shares.items()} if whole > 0.0 else {}
+
+
+def _counted(colours: NDArray[np.uint8], weights: NDArray[np.float64]) -> dict[str, float]:
+    found, index = np.unique(colours // 8 * 8 + 4, axis=0, return_inverse=True)
+    shares: dict[str, float] = {}
+    for rgb, weight in zip(found, np.bincount(index.reshape(-1), weights=weights, minlength=len(found)), strict=True):
+        for name in _names(rgb):
+            shares[name] = shares.get(name, 0.0) + float(weight)
+    return shares
 
 
 def _called(material: Material) -> dict[str, float]:

@@ -38,7 +38,7 @@ def _number_or_auto(value: str | None) -> str | None:
 @app.command("add-scene")
 def add_scene(
     name: Annotated[str, typer.Argument(help="Name of the scene; the suffix _1 makes it out-of-distribution.")],
-    mesh: Annotated[Path, typer.Argument(help="GLB, OBJ, STL, PLY or 3DS file.")],
+    mesh: Annotated[Path, typer.Argument(help="GLB, glTF, OBJ, STL, PLY, 3DS, DAE or FBX file.")],
     up: Annotated[str | None, typer.Option(help="The mesh's axis that points up: z or y.")] = None,
     scale: Annotated[
         float | None, typer.Option(help="Metres a unit of the mesh: 0.01 for centimetres.  (default: 1)")
@@ -60,6 +60,12 @@ def add_scene(
     names: Annotated[
         Path | None, typer.Option(help="CSV of what nodes are called: pattern,name,category,plural.")
     ] = None,
+    light: Annotated[
+        str, typer.Option(help="Textures are lit by the sun, or have their light in them: auto, sun or baked.")
+    ] = "auto",
+    texture_px: Annotated[
+        int, typer.Option("--texture-px", min=16, max=8192, help="Longest side of a texture that is kept, pixels.")
+    ] = 8192,
     force: Annotated[bool, typer.Option("--force", help="Replace a scene of this name.")] = False,
     show: Annotated[
         bool, typer.Option("--list", help="Say what the file holds, and guess its axis and scale; write nothing.")
@@ -76,6 +82,7 @@ def add_scene(
     if tiles is not None and annotations is not None:
         raise UsageError("--annotations are of one scene, --tiles make several: leave one of them out")
     cut: dict[str, Any] = {"crop_m": crop, "box_m": box, "ceiling_m": ceiling, "names": names, "force": force}
+    cut |= {"light": light, "texture_px": texture_px}
     scale = 1.0 if scale is None else scale
     if tiles is not None:
         made = command.add_tiles(name, mesh, project, tiles, up=up, scale=scale, watch=_told, **cut)

@@ -90,6 +90,20 @@ def _decoded(file: bytes | memoryview | None, flags: int) -> NDArray[Any] | None
     return None if image is None else np.ascontiguousarray(image)
 
 
+def encode_masked(image: NDArray[np.uint8], mask: NDArray[np.bool_], setting: tuple[int, ...] = PLAIN_PNG) -> bytes:
+    """Encode a picture (H, W, 3) that is there only where a mask (H, W) is, as PNG with alpha; see `encode_png`."""
+    # OpenCV's order is blue, green, red, alpha.
+    return _encoded(np.dstack([np.where(mask, 255, 0).astype(np.uint8), image]), ".png", setting)
+
+
+def decode_masked(file: bytes | memoryview | None) -> tuple[NDArray[np.uint8] | None, NDArray[np.bool_] | None]:
+    """Decode what `encode_masked` made: the picture (H, W, 3) and its mask (H, W); None for both where it is none."""
+    image = _decoded(file, cv2.IMREAD_UNCHANGED)
+    if image is None or image.ndim != 3 or image.shape[2] != 4 or image.dtype != np.uint8:
+        return None, None
+    return np.ascontiguousarray(image[..., 2::-1]), np.asarray(image[..., 3] >= 128)
+
+
 def data_url(file: bytes) -> str:
     """Write a PNG or JPEG as a data URL, for pages that are one file."""
     return f"data:{media_type(file)};base64,{base64.b64encode(file).decode('ascii')}"

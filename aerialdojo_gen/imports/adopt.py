@@ -17,10 +17,12 @@ from aerialdojo_gen.imports.apart import taken_apart
 from aerialdojo_gen.imports.cutting import Region, bodies_of
 from aerialdojo_gen.imports.naming import Naming
 from aerialdojo_gen.imports.raw import RawNode, cut_to, in_place_order, joined
+from aerialdojo_gen.imports.skinning import LIGHTS, Skinner, photographed
 from aerialdojo_gen.imports.surfaces import SKY, decided, domes_of, told
 from aerialdojo_gen.scenes.catalogue import single
 from aerialdojo_gen.scenes.mesh import areas
 from aerialdojo_gen.scenes.model import Instance, Material, Part, Scene
+from aerialdojo_gen.scenes.sampling import colour_words, shown_colours
 
 Floats = NDArray[np.float64]
 
@@ -37,6 +39,7 @@ _MOST_INSTANCES = 3000
 _LEAST_AREA_M2 = 1e-9
 _WELD_M = 1e-4
 _GROUND = (122, 132, 108)
+_MOST_NOTES = 8
 
 
 @dataclass
@@ -136,6 +139,7 @@ def adopt(
     box_m: tuple[float, float, float, float] | None = None,
     ceiling_m: float | None = None,
     naming: Naming | None = None,
+    light: str = "auto",
 ) -> tuple[Scene, Repairs]:
     """Make a scene of a foreign mesh.
 
@@ -158,6 +162,9 @@ def adopt(
         Highest z that a drone may fly at; 6 m above the highest point, at least 12 m above the lowest, where absent.
     naming : Naming, optional
         What nodes are called; the words in their names where absent.
+    light : {"auto", "sun", "baked"}
+        Whether textures are lit by the scene's sun, or drawn as they are, as photographs, whose light is in them;
+        by what they look like where ``"auto"`` (`aerialdojo_gen.imports.skinning.photographed`).
 
     Returns
     -------
@@ -174,7 +181,7 @@ def adopt(
         Nothing is left to build from, or the extent cannot be metres.
     """
     place = Place.of(nodes, up, scale, naming)
-    return settled(name, place, region_of(crop_m, box_m), ceiling_m=ceiling_m, naming=naming)
+    return settled(name, place, region_of(crop_m, box_m), ceiling_m=ceiling_m, naming=naming, light=light)
 
 
 def region_of(
@@ -205,6 +212,7 @@ def settled(
     ceiling_m: float | None = None,
     naming: Naming | None = None,
     origin_m: Floats | None = None,
+    light: str = "auto",
 ) -> tuple[Scene, Repairs]:
     """Make a scene of a place, or of a part of one.
 
@@ -215,7 +223,7 @@ def settled(
     place : Place
     region : Region, optional
         The part to keep; the scene ends there for drones too.
-    ceiling_m, naming
+    ceiling_m, naming, light
         As of `adopt`.
     origin_m : (3,) float64, optional
         Where in the place the scene's origin lies, metres; the middle of what is kept, at its lowest, where absent.
@@ -230,6 +238,8 @@ def settled(
     AssetError
         As of `adopt`.
     """
+    if light not in LIGHTS:
+        raise AssetError(f"--light {light!r}: must be {', '.join(LIGHTS[:-1])} or {LIGHTS[-1]}")
     repairs = Repairs(list(place.repairs.lines))
     part = place if region is None else place.within(region)
     bodies = part.bodies
@@ -240,9 +250,12 @@ def settled(
     shift = np.array([(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, low[2]]) if origin_m is None else origin_m
     repairs.origin_m = (float(shift[0]), float(shift[1]), float(shift[2]))
     bodies = _merged_clutter(_moved(in_place_order(bodies), -shift))
-    parts: dict[str, Material] = {}
-    dressed = [(b, made) for b in bodies for made in [_parts(b, parts, repairs)] if made]
-    instances = _named(dressed, naming or Naming())
+    domes = _moved(part.domes, -shift)
+    skinner = Skinner(light == "baked" or (light == "auto" and photographed(bodies)))
+    skinner.scale([*bodies, *domes])
+    parts = skinner.materials
+    dressed = [(b, made) for b in bodies for made in [_parts(b, skinner, repairs)] if made]
+    instances = _named(dressed, naming or Naming(), parts)
     if not instances:
         raise AssetError("no triangle is left after repair: the mesh is empty or degenerate")
     instances = [
@@ -251,9 +264,10 @@ def settled(
     ]
     called = {instance.node: body.name for instance, (body, _) in zip(instances, dressed, strict=True)}
     backdrop = tuple(
-        Instance(f"{SKY}_{k:04d}", SKY, "", {}, _parts(dome, parts, Repairs()), surface="dome")
-        for k, dome in enumerate(_moved(part.domes, -shift))
+        Instance(f"{SKY}_{k:04d}", SKY, "", {}, _parts(dome, skinner, Repairs()), surface="dome")
+        for k, dome in enumerate(domes)
     )
+    _tell_textures([*bodies, *domes], skinner, light, repairs)
     low, high = low - shift, high - shift
     cover = _ground_cover(instances, low, high)
     if cover < _GROUND_COVER:
@@ -340,34 +354,35 @@ def _merged_clutter(bodies: list[RawNode]) -> list[RawNode]:
     return [*(b for b, s in zip(bodies, small, strict=True) if not s), joined("clutter", scraps)]
 
 
-def _parts(body: RawNode, materials: dict[str, Material], repairs: Repairs) -> tuple[Part, ...]:
-    """Make parts by colour; a closed body faces outwards, an open one is there from both sides."""
+def _parts(body: RawNode, skinner: Skinner, repairs: Repairs) -> tuple[Part, ...]:
+    """Make parts by material; a closed body faces outwards, an open one is there from both sides."""
     mesh = trimesh.Trimesh(body.vertices, body.faces, process=False)
-    faces, colours = body.faces, body.colours
-    if mesh.is_watertight and mesh.is_winding_consistent:
-        if mesh.volume < 0:
-            faces = faces[:, ::-1]
-            repairs.lines.append(f"{body.name or 'a component'} was inside out")
-    else:
-        faces, colours = np.concatenate([faces, faces[:, ::-1]]), np.concatenate([colours, colours])
-    # Photographs bring thousands of shades: sixteen levels a channel are materials enough.
-    shades = (colours // 16) * 16 + 8
-    parts = []
-    for shade in np.unique(shades, axis=0):
-        rows = (shades == shade).all(axis=1)
-        red, green, blue = (int(c) for c in shade)
-        spec = f"#{red:02x}{green:02x}{blue:02x}"
-        materials.setdefault(spec, Material(spec, (red, green, blue)))
-        used, own = np.unique(faces[rows], return_inverse=True)
-        vertices = single(body.vertices[used])
-        triangles = np.asarray(own.reshape(-1, 3), dtype=np.int32)
-        triangles = triangles[areas(vertices, triangles) > 0.0]
-        if len(triangles):
-            parts.append(Part(vertices, triangles, np.zeros((len(vertices), 2), dtype=np.float32), spec))
-    return tuple(parts)
+    closed = mesh.is_watertight and mesh.is_winding_consistent
+    if closed and mesh.volume < 0:
+        corners = None if body.corners is None else body.corners[:, ::-1]
+        body = replace(body, faces=body.faces[:, ::-1], corners=corners)
+        repairs.lines.append(f"{body.name or 'a component'} was inside out")
+    return skinner.parts(body, double_sided=not closed)
 
 
-def _named(bodies: Sequence[tuple[RawNode, tuple[Part, ...]]], naming: Naming) -> list[Instance]:
+def _tell_textures(bodies: Sequence[RawNode], skinner: Skinner, light: str, repairs: Repairs) -> None:
+    """Say what became of the textures."""
+    shown = [m for m in skinner.materials.values() if m.texture is not None]
+    if shown:
+        sizes = {m.name.split(",")[0]: m.texture.shape[:2] for m in shown if m.texture is not None}
+        most = max(sizes.values(), key=lambda size: size[0] * size[1])
+        unlit = sum(m.unlit for m in shown)
+        how = "drawn as they are, with the light that is in them" if unlit else "lit by the scene's sun"
+        other = "" if light != "auto" else f" (--light {'sun' if unlit else 'baked'} for the other)"
+        repairs.add(len(sizes), f"textures, the largest {most[1]} x {most[0]} pixels, {how}{other}")
+    notes = {note: None for b in bodies for s in b.surfaces for note in s.notes}
+    repairs.lines += [*notes][:_MOST_NOTES]
+    repairs.add(max(len(notes) - _MOST_NOTES, 0), "more textures like that")
+
+
+def _named(
+    bodies: Sequence[tuple[RawNode, tuple[Part, ...]]], naming: Naming, materials: dict[str, Material]
+) -> list[Instance]:
     """Give every body a node name, a category from it, and what can be said of its colour, height and form."""
     counts: dict[str, int] = {}
     heights = [float(b.vertices[:, 2].max() - b.vertices[:, 2].min()) for b, parts in bodies if parts]
@@ -378,7 +393,7 @@ def _named(bodies: Sequence[tuple[RawNode, tuple[Part, ...]]], naming: Naming) -
             continue
         called = naming.called(body.name)
         category = called.category or _category(body)
-        looks = _looks(body, tall, low)
+        looks = _looks(body, parts, materials, tall, low)
         looks |= (_form(body, looks) if category == UNKNOWN else {}) | called.attributes
         k = counts[category] = counts.get(category, -1) + 1
         out.append(Instance(f"{category}_{k:04d}", category, "", looks, parts))
@@ -412,11 +427,11 @@ def _form(body: RawNode, looks: dict[str, str]) -> dict[str, str]:
     return {"size": looks.get("size", "medium-sized"), "shape": f"{rise}{plan}"}
 
 
-def _looks(body: RawNode, tall: float, low: float) -> dict[str, str]:
-    from aerialdojo_gen.scenes.colour_names import colour_name
-
+def _looks(
+    body: RawNode, parts: Sequence[Part], materials: dict[str, Material], tall: float, low: float
+) -> dict[str, str]:
     size = body.vertices.max(axis=0) - body.vertices.min(axis=0)
-    looks = {"colour": colour_name(np.median(body.colours, axis=0))}
+    looks = {"colour": colour_words(*shown_colours(parts, materials))}
     if tall > 1.2 * low:
         looks |= {"size": "tall"} if size[2] >= tall else {"size": "low"} if size[2] <= low else {}
     flat = body.vertices[:, :2] - body.vertices[:, :2].mean(axis=0)

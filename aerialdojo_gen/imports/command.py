@@ -15,6 +15,7 @@ from aerialdojo_gen.imports.adopt import Place, Repairs, adopt, region_of
 from aerialdojo_gen.imports.files import read_mesh
 from aerialdojo_gen.imports.listing import contents
 from aerialdojo_gen.imports.naming import read_names
+from aerialdojo_gen.imports.pictures import TEXTURE_PX
 from aerialdojo_gen.imports.tiles import tile_name, tiles_of
 from aerialdojo_gen.pipeline.registry import STAGES
 from aerialdojo_gen.scenes.glb import write_glb
@@ -59,6 +60,8 @@ def add_scene(
     box_m: tuple[float, float, float, float] | None = None,
     ceiling_m: float | None = None,
     names: Path | None = None,
+    light: str = "auto",
+    texture_px: int = TEXTURE_PX,
     force: bool = False,
 ) -> Added:
     """Make a scene of a mesh file, in a project folder.
@@ -71,7 +74,7 @@ def add_scene(
     name : str
         Letters, digits, ``_`` and ``-``; the suffix ``_1`` puts the scene in the OOD partition.
     mesh : Path
-        GLB, OBJ, STL, PLY or 3DS.
+        GLB, glTF, OBJ, STL, PLY, 3DS, Collada or FBX.
     project : Path
         The folder; made where it is missing.
     up : {"z", "y"}
@@ -88,6 +91,10 @@ def add_scene(
         Highest z that a drone may fly at.
     names : Path, optional
         A table of what the file's nodes are called (`aerialdojo_gen.imports.naming.read_names`).
+    light : {"auto", "sun", "baked"}
+        Whether textures are lit by the scene's sun, or drawn as they are (`aerialdojo_gen.imports.adopt.adopt`).
+    texture_px : int
+        Longest side of a texture, pixels; larger ones are made smaller.
     force : bool
         Replace a scene of this name.
 
@@ -110,8 +117,9 @@ def add_scene(
     with _naming_the_file(mesh):
         region_of(crop_m, box_m)
         scene, repairs = adopt(
-            name, read_mesh(mesh), up=up, scale=scale, crop_m=crop_m, box_m=box_m, ceiling_m=ceiling_m, naming=naming
-        )
+            name, read_mesh(mesh, texture_px=texture_px), up=up, scale=scale, crop_m=crop_m, box_m=box_m,
+            ceiling_m=ceiling_m, naming=naming, light=light,
+        )  # fmt: skip
     kept = {"crop_m": crop_m, "box_m": box_m}
     return _put(scene, repairs, project, _recipe(_digested(mesh), scene, repairs, up, scale, kept), text)
 
@@ -128,6 +136,8 @@ def add_tiles(
     box_m: tuple[float, float, float, float] | None = None,
     ceiling_m: float | None = None,
     names: Path | None = None,
+    light: str = "auto",
+    texture_px: int = TEXTURE_PX,
     force: bool = False,
     watch: Callable[[Added], None] = lambda added: None,
 ) -> list[Added]:
@@ -137,7 +147,7 @@ def add_tiles(
     ----------
     name : str
         Of the whole; each scene's has its column from the west and its row from the south, ``"City-x0y2"``.
-    mesh, project, up, scale, crop_m, box_m, ceiling_m, names, force
+    mesh, project, up, scale, crop_m, box_m, ceiling_m, names, light, texture_px, force
         As of `add_scene`; what is kept by `crop_m` or `box_m` is cut into squares.
     edge_m : float
         Edge of a square, metres.
@@ -158,11 +168,11 @@ def add_tiles(
     naming = None if names is None else read_names(names)
     with _naming_the_file(mesh):
         region = region_of(crop_m, box_m)
-        place = Place.of(read_mesh(mesh), up, scale, naming)
+        place = Place.of(read_mesh(mesh, texture_px=texture_px), up, scale, naming)
         if region is not None:
             place = place.within(region)
         # Every tile is made before one is written, so that what cannot be made leaves nothing behind.
-        tiles = list(tiles_of(name, place, edge_m, ceiling_m=ceiling_m, naming=naming))
+        tiles = list(tiles_of(name, place, edge_m, ceiling_m=ceiling_m, naming=naming, light=light))
         if not tiles:
             raise AssetError(f"--tiles {edge_m:g}: no tile of the mesh holds more than scraps")
     _check_free([tile.name for tile in tiles], project, force)

@@ -1,4 +1,4 @@
-"""Read a mesh file of a foreign make: GLB, OBJ, STL, PLY (by trimesh) or 3DS.
+"""Read a mesh file of a foreign make: glTF, OBJ, STL, PLY (by trimesh), 3DS, or Collada and FBX (by assimp).
 
 Files are hostile until shown otherwise: they are read in a process of their own that may take neither more memory
 nor more time than it is given, GLB files are looked over before an array of theirs is made, and what a file refers
@@ -7,6 +7,7 @@ to is read from beside it or not at all.
 
 from __future__ import annotations
 
+import json
 import re
 import resource
 import struct
@@ -14,26 +15,28 @@ import subprocess
 import sys
 import warnings
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
-from numpy.typing import NDArray
 
 from aerialdojo_gen.common.bounded import loads_json
 from aerialdojo_gen.errors import AssetError
-from aerialdojo_gen.imports.raw import RawNode, joined, plain
+from aerialdojo_gen.imports.beside import Beside
+from aerialdojo_gen.imports.gltf import read_gltf
+from aerialdojo_gen.imports.pictures import TEXTURE_PX
+from aerialdojo_gen.imports.raw import RawNode, RawSurface, joined
+from aerialdojo_gen.imports.skins import skins_of
 from aerialdojo_gen.imports.sniffing import mismatch
 from aerialdojo_gen.store.staging import scratch_folder
 
-SUFFIXES = (".glb", ".obj", ".stl", ".ply", ".3ds")
+SUFFIXES = (".glb", ".gltf", ".obj", ".stl", ".ply", ".3ds", ".dae", ".fbx")
 MAX_FILE_BYTES = 1 << 30
 MAX_TRIANGLES = 4_000_000
 MAX_MEMORY_BYTES = 6 << 30
 MAX_SECONDS = 300
-_MAX_SIDE_FILE = 64 << 20
 
 
-def read_mesh(path: Path, max_memory_bytes: int = MAX_MEMORY_BYTES) -> list[RawNode]:
+def read_mesh(path: Path, max_memory_bytes: int = MAX_MEMORY_BYTES, texture_px: int = TEXTURE_PX) -> list[RawNode]:
     """Read a mesh file's nodes, in bounded memory and time.
 
     Parameters
@@ -42,6 +45,8 @@ def read_mesh(path: Path, max_memory_bytes: int = MAX_MEMORY_BYTES) -> list[RawN
         A file with one of `SUFFIXES`.
     max_memory_bytes : int
         Most address space of the reading process.
+    texture_px : int
+        Longest side of a texture, pixels; larger ones are made smaller (`aerialdojo_gen.imports.pictures`).
 
     Returns
     -------
@@ -67,7 +72,8 @@ def read_mesh(path: Path, max_memory_bytes: int = MAX_MEMORY_BYTES) -> list[RawN
     with scratch_folder() as folder:
         out = folder / "nodes.npz"
         # Not multiprocessing, which would run a caller's unguarded script a second time.
-        command = [sys.executable, "-m", __name__, str(path.resolve()), str(out), str(max_memory_bytes)]
+        command = [sys.executable, "-m", __name__, str(path.resolve()), str(out)]
+        command += [str(max_memory_bytes), str(texture_px)]
         try:
             ended = subprocess.run(command, capture_output=True, text=True, timeout=MAX_SECONDS, check=False)
         except subprocess.TimeoutExpired:
@@ -85,7 +91,7 @@ def _unlike(path: Path) -> str:
         return str(error.strerror)
 
 
-def read_into(path: Path, out: Path) -> str:
+def read_into(path: Path, out: Path, texture_px: int = TEXTURE_PX) -> str:
     """Read a mesh file without bounds on memory and time: for a process of its own that has them.
 
     Parameters
@@ -94,6 +100,8 @@ def read_into(path: Path, out: Path) -> str:
         The mesh file.
     out : Path
         Where the nodes go; `read_mesh` reads them from there.
+    texture_px : int
+        Longest side of a texture, pixels.
 
     Returns
     -------
@@ -103,7 +111,7 @@ def read_into(path: Path, out: Path) -> str:
     # What readers grumble about is repaired and reported later.
     warnings.simplefilter("ignore")
     try:
-        nodes = [n for n in _read(path) if len(n.faces)]
+        nodes = [n for n in _read(path, texture_px) if len(n.faces)]
         total = sum(len(n.faces) for n in nodes)
         if not nodes:
             return "holds no triangles"
@@ -121,97 +129,68 @@ def read_into(path: Path, out: Path) -> str:
     return ""
 
 
-def _read(path: Path) -> list[RawNode]:
+def _read(path: Path, texture_px: int) -> list[RawNode]:
     suffix = path.suffix.lower()
     if suffix == ".3ds":
         from aerialdojo_gen.imports.three_ds import read_3ds
 
         return read_3ds(path.read_bytes())
-    if suffix == ".glb":
+    if suffix in (".glb", ".gltf"):
         look_over_glb(path)
+        return read_gltf(path.read_bytes(), Beside(path).get, texture_px)
+    if suffix in (".dae", ".fbx"):
+        from aerialdojo_gen.imports.assimp import read_by_assimp
+
+        return read_by_assimp(path, Beside(path).get, texture_px)
     import trimesh
 
     # What the file refers to comes through a resolver that stays in its folder.
+    beside = _beside(path)
     scene = trimesh.load_scene(
-        path, file_type=suffix[1:], resolver=_beside(path), process=False, split_objects=True, group_material=False,
+        path, file_type=suffix[1:], resolver=beside, process=False, split_objects=True, group_material=True,
         maintain_order=True,
     )  # fmt: skip
-    nodes: dict[str, list[RawNode]] = {}
+    shown = []
     for name in scene.graph.nodes_geometry:
         transform, geometry = scene.graph[name]
         body = scene.geometry[geometry]
-        if not isinstance(body, trimesh.Trimesh):
-            continue
-        vertices = trimesh.transform_points(np.asarray(body.vertices, dtype=np.float64), transform)
+        if isinstance(body, trimesh.Trimesh):
+            vertices = trimesh.transform_points(np.asarray(body.vertices, dtype=np.float64), transform)
+            shown.append((str(name), body, vertices))
+    skins = skins_of([body for _, body, _ in shown], beside, texture_px)
+    named = _objects_of(path) if suffix == ".obj" else {}
+    nodes: dict[str, list[RawNode]] = {}
+    for (name, body, vertices), skin in zip(shown, skins, strict=True):
+        label = "" if suffix in (".stl", ".ply") else named.get(name, name)
         faces = np.asarray(body.faces, dtype=np.int64)
-        owner = _owner(scene, str(name)) if suffix == ".glb" else str(name)
-        label = "" if suffix in (".stl", ".ply") else owner
-        nodes.setdefault(owner, []).append(RawNode(label, vertices, faces, _colours(body)))
+        made = RawNode(label, vertices, faces, skin.colours, skin.surface, skin.corners, skin.surfaces)
+        nodes.setdefault(label, []).append(made)
     return [bodies[0] if len(bodies) == 1 else joined(bodies[0].name, bodies) for bodies in nodes.values()]
 
 
-def _owner(scene: Any, name: str) -> str:
-    """Name the file's node that a node of trimesh's belongs to.
-
-    Where a node has several primitives (materials), trimesh makes a node of each and names it by the file's node and
-    six random hexadecimal digits: another name in every run.
-    """
-    parent = scene.graph.transforms.parents.get(name)
-    if parent is not None and re.fullmatch(rf"{re.escape(str(parent))}_[0-9a-f]{{6}}", name):
-        return str(parent)
-    return name
+def _objects_of(path: Path) -> dict[str, str]:
+    """Read the objects of an OBJ file: by the names that trimesh gives to what of one is of one material."""
+    named, thing, material = {}, "", ""
+    for key, told in re.findall(rb"^(o|usemtl)[ \t]+(.*?)[ \t\r]*$", path.read_bytes(), re.MULTILINE):
+        if key == b"o":
+            thing = told.decode("utf-8", "replace")
+        else:
+            material = told.decode("utf-8", "replace")
+        named["_".join(word for word in (thing, material) if word)] = thing
+    return named
 
 
 def _beside(path: Path) -> Any:
     import trimesh
 
-    folder = path.resolve().parent
+    class Resolver(Beside, trimesh.resolvers.Resolver):
+        """What trimesh asks for files."""
 
-    class Beside(trimesh.resolvers.Resolver):
-        """Gives files of the mesh's own folder and below, and no other."""
-
-        def __init__(self) -> None:
-            pass
-
-        def get(self, name: str) -> bytes:
-            wanted = (folder / name.strip()).resolve()
-            if not wanted.is_relative_to(folder) or not wanted.is_file():
-                raise FileNotFoundError(name)
-            if wanted.stat().st_size > _MAX_SIDE_FILE:
-                raise FileNotFoundError(name)
-            return wanted.read_bytes()
-
-        def keys(self) -> list[str]:
-            return []
-
-        def namespaced(self, namespace: str) -> Any:
-            return self
-
-        def write(self, name: str, data: bytes) -> None:
-            raise PermissionError(name)
-
-    return Beside()
-
-
-def _colours(body: Any) -> NDArray[np.uint8]:
-    """Colour a mesh's faces: by face or vertex colours, else by its material's colour or its texture's mean."""
-    n = len(body.faces)
-    visual = body.visual
-    if visual.kind in ("face", "vertex"):
-        return np.asarray(visual.face_colors[:, :3], dtype=np.uint8)
-    material = getattr(visual, "material", None)
-    if material is None:
-        return plain(n)
-    image = getattr(material, "baseColorTexture", None) or getattr(material, "image", None)
-    if image is not None and image.width * image.height <= 16 << 20:
-        mean = np.asarray(image.convert("RGB").resize((1, 1), 4), dtype=np.uint8).reshape(3)
-        return np.tile(mean, (n, 1))
-    colour = np.asarray(material.main_color, dtype=np.uint8)[:3]
-    return np.tile(colour, (n, 1))
+    return Resolver(path)
 
 
 def look_over_glb(path: Path) -> None:
-    """Refuse a GLB whose arrays would be far larger than the file, before any of them is made.
+    """Refuse a GLB or glTF file whose arrays would be far larger than the file, before any of them is made.
 
     An accessor without a buffer view is all zeros and costs the file nothing, and several nodes may show one mesh: a
     few hundred bytes can ask for terabytes.
@@ -219,17 +198,12 @@ def look_over_glb(path: Path) -> None:
     Raises
     ------
     AssetError
-        It is no GLB 2 file, or it asks for more triangles or numbers than `MAX_TRIANGLES` allows.
+        It is no glTF 2.0 file, or it asks for more triangles or numbers than `MAX_TRIANGLES` allows.
     """
     with path.open("rb") as file:
-        head = file.read(20)
-        if len(head) < 20 or head[:4] != b"glTF":
-            raise AssetError("is no GLB file")
-        version, _, length, kind = struct.unpack("<IIII", head[4:])
-        if version != 2 or kind != 0x4E4F534A or length > MAX_FILE_BYTES // 4:
-            raise AssetError("is no GLB 2 file")
+        text = file.read(MAX_FILE_BYTES // 4) if path.suffix.lower() == ".gltf" else _glb_json(file)
         try:
-            document = loads_json(file.read(length), finite=False)
+            document = loads_json(text, finite=False)
             accessors = document.get("accessors", [])
             counts = [int(a["count"]) for a in accessors]
             shown = sum(
@@ -239,7 +213,7 @@ def look_over_glb(path: Path) -> None:
                 for p in document["meshes"][node["mesh"]]["primitives"]
             )
         except (ValueError, KeyError, IndexError, TypeError, AttributeError) as error:
-            raise AssetError("is a damaged GLB file") from error
+            raise AssetError(f"is a damaged {path.suffix[1:].upper()} file") from error
     if min(counts, default=0) < 0 or sum(counts) > 6 * MAX_TRIANGLES or shown > MAX_TRIANGLES:
         raise AssetError(
             f"asks for {max(shown, sum(counts) // 3):,} triangles, the most is {MAX_TRIANGLES:,}: "
@@ -251,25 +225,69 @@ def look_over_glb(path: Path) -> None:
         raise AssetError(f"is compressed ({', '.join(sorted(packed))}): export it without compression")
 
 
+def _glb_json(file: BinaryIO) -> bytes:
+    head = file.read(20)
+    if len(head) < 20 or head[:4] != b"glTF":
+        raise AssetError("is no GLB file")
+    version, _, length, kind = struct.unpack("<IIII", head[4:])
+    if version != 2 or kind != 0x4E4F534A or length > MAX_FILE_BYTES // 4:
+        raise AssetError("is no GLB 2 file")
+    return file.read(length)
+
+
 def _pack(nodes: list[RawNode], out: Path) -> None:
     arrays: dict[str, Any] = {"names": np.array([n.name for n in nodes], dtype=np.str_)}
+    shelves = {n.surfaces: None for n in nodes}
+    place = {shelf: k for k, shelf in enumerate(shelves)}
+    arrays["shelves"] = np.array([place[n.surfaces] for n in nodes])
+    said = []
+    for shelf in shelves:
+        said.append([{"name": s.name, "colour": s.colour, "double_sided": s.double_sided, "unlit": s.unlit,
+                      "notes": s.notes} for s in shelf])  # fmt: skip
+        for k, s in enumerate(shelf):
+            key = f"{place[shelf]}-{k}"
+            arrays |= {f"t{key}": s.texture} if s.texture is not None else {}
+            arrays |= {f"m{key}": s.mask} if s.mask is not None else {}
+            arrays |= {f"j{key}": np.frombuffer(s.jpeg, dtype=np.uint8)} if s.jpeg else {}
+    arrays["said"] = np.frombuffer(json.dumps(said).encode(), dtype=np.uint8)
     for k, node in enumerate(nodes):
         arrays |= {f"v{k}": node.vertices, f"f{k}": node.faces, f"c{k}": node.colours}
+        arrays |= {f"s{k}": node.surface} if node.surface is not None else {}
+        arrays |= {f"u{k}": node.corners} if node.corners is not None else {}
     np.savez(out, **arrays)
 
 
 def unpacked(path: Path) -> list[RawNode]:
     """Return the nodes that `read_into` wrote."""
     with np.load(path, allow_pickle=False) as file:
+
+        def got(key: str) -> Any:
+            return file[key] if key in file.files else None
+
+        shelves = []
+        for n, shelf in enumerate(json.loads(file["said"].tobytes())):
+            surfaces = []
+            for k, said in enumerate(shelf):
+                red, green, blue = said["colour"]
+                jpeg = got(f"j{n}-{k}")
+                surfaces.append(RawSurface(
+                    said["name"], (red, green, blue), got(f"t{n}-{k}"), got(f"m{n}-{k}"), said["double_sided"],
+                    said["unlit"], b"" if jpeg is None else jpeg.tobytes(), tuple(said["notes"]),
+                ))  # fmt: skip
+            shelves.append(tuple(surfaces))
         return [
-            RawNode(str(name), file[f"v{k}"], file[f"f{k}"], file[f"c{k}"]) for k, name in enumerate(file["names"])
-        ]
+            RawNode(
+                str(name), file[f"v{k}"], file[f"f{k}"], file[f"c{k}"], got(f"s{k}"), got(f"u{k}"),
+                shelves[int(file["shelves"][k])],
+            )
+            for k, name in enumerate(file["names"])
+        ]  # fmt: skip
 
 
 if __name__ == "__main__":
     memory = int(sys.argv[3])
     resource.setrlimit(resource.RLIMIT_AS, (memory, memory))
     resource.setrlimit(resource.RLIMIT_CPU, (MAX_SECONDS, MAX_SECONDS))
-    fault = read_into(Path(sys.argv[1]), Path(sys.argv[2]))
+    fault = read_into(Path(sys.argv[1]), Path(sys.argv[2]), int(sys.argv[4]))
     print(fault)
     raise SystemExit(1 if fault else 0)

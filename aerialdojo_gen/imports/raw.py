@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +14,53 @@ from aerialdojo_gen.geometry.soup import soup
 from aerialdojo_gen.imports.cutting import Region, cut
 
 GREY = (168, 164, 156)
+
+
+# Columns of `RawNode.corners`: texture coordinates, v up, and sRGB, 0-255, NaN where a corner has no colour.
+CORNER = ("u", "v", "red", "green", "blue")
+
+
+@dataclass(frozen=True, eq=False)
+class RawSurface:
+    """A material of a file.
+
+    Attributes
+    ----------
+    name : str
+        As in the file.
+    colour : tuple of int
+        sRGB, 0-255; a texture's mean where it has one.
+    texture : (H, W, 3) uint8 or None
+        sRGB; row 0 is the top (v = 1).
+    mask : (H, W) bool or None
+        Where the texture is there; None where it is everywhere.
+    double_sided : bool
+        Whether it is there from both sides.
+    unlit : bool
+        Whether it is to be drawn without light.
+    jpeg : bytes
+        The texture's file, where that is a JPEG and the texture is just what it decodes to.
+    notes : tuple of str
+        What was lost or changed of it, for the user to read.
+    """
+
+    name: str = ""
+    colour: tuple[int, int, int] = GREY
+    texture: NDArray[np.uint8] | None = None
+    mask: NDArray[np.bool_] | None = None
+    double_sided: bool = False
+    unlit: bool = False
+    jpeg: bytes = b""
+    notes: tuple[str, ...] = ()
+
+    @cached_property
+    def digest(self) -> str:
+        """Of all that is drawn of it, hexadecimal: the same whatever it is called and wherever it stands."""
+        said = hashlib.sha256(repr((self.colour, self.double_sided, self.unlit)).encode())
+        for array in (self.texture, self.mask):
+            if array is not None:
+                said.update(repr(array.shape).encode() + np.ascontiguousarray(array).tobytes())
+        return said.hexdigest()
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,20 +77,34 @@ class RawNode:
         Indices into `vertices`.
     colours : (m, 3) uint8
         sRGB of each face.
+    surface : (m,) int32 or None
+        Index into `surfaces` of each face's material, -1 where it has none but its colour; None where none has one.
+    corners : (m, 3, 5) float32 or None
+        What the corners of each face carry, see `CORNER`: whoever cuts a face finds it at the cut by weighting.
+    surfaces : tuple of RawSurface
+        The file's materials, in the order of their digests; nodes of a file share them.
     """
 
     name: str
     vertices: NDArray[np.float64]
     faces: NDArray[np.int64]
     colours: NDArray[np.uint8]
+    surface: NDArray[np.int32] | None = None
+    corners: NDArray[np.float32] | None = None
+    surfaces: tuple[RawSurface, ...] = ()
 
     def some(self, rows: NDArray[np.bool_] | NDArray[np.int64]) -> RawNode:
         """Return the node with some of its faces alone, in the order given; vertices stay as they are."""
-        return RawNode(self.name, self.vertices, self.faces[rows], self.colours[rows])
+        return RawNode(
+            self.name, self.vertices, self.faces[rows], self.colours[rows],
+            None if self.surface is None else self.surface[rows],
+            None if self.corners is None else self.corners[rows], self.surfaces,
+        )  # fmt: skip
 
     def placed(self, vertices: NDArray[np.float64], faces: NDArray[np.int64] | None = None) -> RawNode:
         """Return the node with other vertices, and where given with other indices into them, face by face."""
-        return RawNode(self.name, vertices, self.faces if faces is None else faces, self.colours)
+        faces = self.faces if faces is None else faces
+        return RawNode(self.name, vertices, faces, self.colours, self.surface, self.corners, self.surfaces)
 
 
 def some_of(body: RawNode, rows: NDArray[np.int64] | NDArray[np.bool_]) -> RawNode:
@@ -55,8 +117,11 @@ def cut_to(body: RawNode, region: Region) -> RawNode:
     """Make a node of what of another lies within a region of the plan; without faces where nothing does."""
     pieces = cut(body.vertices, body.faces, region)
     n = len(pieces.source)
-    # What faces have comes from their source; what corners have is mixed by `pieces.weights`.
-    return body.some(pieces.source).placed(pieces.corners.reshape(-1, 3), np.arange(3 * n).reshape(n, 3))
+    # What faces have comes from their source; what corners have is mixed by their weights.
+    kept = body.some(pieces.source)
+    if kept.corners is not None:
+        kept = replace(kept, corners=np.einsum("kij,kjc->kic", pieces.weights, kept.corners).astype(np.float32))
+    return kept.placed(pieces.corners.reshape(-1, 3), np.arange(3 * n).reshape(n, 3))
 
 
 def plain(n: int) -> NDArray[np.uint8]:
@@ -65,10 +130,31 @@ def plain(n: int) -> NDArray[np.uint8]:
 
 
 def joined(name: str, bodies: Sequence[RawNode]) -> RawNode:
-    """Make one node of several; the same one whatever their order."""
+    """Make one node of several of a file; the same one whatever their order."""
     bodies = sorted(bodies, key=_digest)
     vertices, faces = soup(bodies)
-    return RawNode(name, vertices, faces.astype(np.int64), np.concatenate([b.colours for b in bodies]))
+    colours = np.concatenate([b.colours for b in bodies])
+    whole = RawNode(name, vertices, faces.astype(np.int64), colours)
+    if all(b.surface is None and b.corners is None for b in bodies):
+        return whole
+    first: dict[tuple[RawSurface, ...], int] = {}
+    for b in bodies:
+        first.setdefault(b.surfaces, sum(map(len, first)))
+    surface, corners = [], []
+    for b in bodies:
+        m = len(b.faces)
+        own = np.full(m, -1, np.int32) if b.surface is None else b.surface
+        surface.append(np.where(own < 0, own, own + first[b.surfaces]).astype(np.int32))
+        corners.append(no_corners(m) if b.corners is None else b.corners)
+    surfaces = tuple(s for several in first for s in several)
+    return RawNode(name, vertices, whole.faces, colours, np.concatenate(surface), np.concatenate(corners), surfaces)
+
+
+def no_corners(n: int) -> NDArray[np.float32]:
+    """Return what the corners of n faces carry that have neither texture coordinates nor colours, (n, 3, 5)."""
+    out = np.full((n, 3, len(CORNER)), np.nan, dtype=np.float32)
+    out[..., :2] = 0.0
+    return out
 
 
 def in_place_order(bodies: Sequence[RawNode]) -> list[RawNode]:
@@ -82,6 +168,7 @@ def in_place_order(bodies: Sequence[RawNode]) -> list[RawNode]:
 
 def _digest(body: RawNode) -> bytes:
     digest = hashlib.sha256()
-    for array in (body.vertices, body.faces, body.colours):
-        digest.update(np.ascontiguousarray(array).tobytes())
+    for array in (body.vertices, body.faces, body.colours, body.surface, body.corners):
+        if array is not None:
+            digest.update(np.ascontiguousarray(array).tobytes())
     return digest.digest()

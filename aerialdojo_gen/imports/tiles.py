@@ -45,7 +45,13 @@ class Tile:
 
 
 def tiles_of(
-    name: str, place: Place, edge_m: float, *, ceiling_m: float | None = None, naming: Naming | None = None
+    name: str,
+    place: Place,
+    edge_m: float,
+    *,
+    ceiling_m: float | None = None,
+    naming: Naming | None = None,
+    light: str = "auto",
 ) -> Iterator[Tile]:
     """Cut a place into squares, west to east and south to north, and make a scene of each that holds something.
 
@@ -56,7 +62,7 @@ def tiles_of(
     place : Place
     edge_m : float
         Edge of a square, metres.
-    ceiling_m, naming
+    ceiling_m, naming, light
         As of `adopt`; where absent each tile's ceiling is 6 m over its own highest point.
 
     Yields
@@ -87,7 +93,9 @@ def tiles_of(
             if not near.any() or not _holds_something(part, region, edge_m):
                 continue
             tile = tile_name(name, column, row)
-            scene, repairs = settled(tile, part, region, ceiling_m=ceiling_m, naming=naming, origin_m=origin)
+            scene, repairs = settled(
+                tile, part, region, ceiling_m=ceiling_m, naming=naming, origin_m=origin, light=light
+            )
             yield Tile(tile, region, scene, repairs)
 
 

@@ -72,7 +72,7 @@ class GlBodies:
 
     def __init__(self, renderer: Any) -> None:
         self._renderer = renderer
-        self._cullings = [BodyCulling(kind) for _, kind, _ in renderer._sets]
+        self._cullings = [BodyCulling(d.kind.chunks, d.kind.hides) for d in renderer._sets]
 
     def draw(
         self,

@@ -27,6 +27,7 @@ from aerialdojo_gen.geometry.soup import soup
 from aerialdojo_gen.rendering.casters import triangle_caster
 from aerialdojo_gen.rendering.codecs import MAX_DEPTH_M
 from aerialdojo_gen.rendering.picture import NEAR_M, Picture
+from aerialdojo_gen.rendering.texels import seen_caster
 from aerialdojo_gen.scenes.context import context_of
 from aerialdojo_gen.scenes.model import Scene
 
@@ -158,7 +159,10 @@ class Solid:
         vertices, faces = soup(scene.instances)
         corners = vertices[faces]
         self._normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        self._caster = caster or TriangleRayCaster(vertices, faces)
+        # What is there from both sides has no inside.
+        both = [scene.materials[p.material].double_sided for i in scene.instances for p in i.parts]
+        self._normal[np.repeat(both, [len(p.faces) for i in scene.instances for p in i.parts])] = 0.0
+        self._caster = seen_caster(scene, caster or TriangleRayCaster(vertices, faces))
 
     def first_hit(self, origin: Floats, directions: Floats) -> tuple[Floats, float]:
         """Find what rays hit first.

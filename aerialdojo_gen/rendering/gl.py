@@ -6,6 +6,7 @@ import ctypes.util
 import importlib
 import os
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import lru_cache
 from types import TracebackType
 from typing import Any
@@ -18,7 +19,8 @@ from aerialdojo_gen.errors import RenderError
 from aerialdojo_gen.geometry.cameras import Camera
 from aerialdojo_gen.rendering import gl_shaders as glsl
 from aerialdojo_gen.rendering.bodies import GlBodies
-from aerialdojo_gen.rendering.gl_geometry import VERTEX, chunks
+from aerialdojo_gen.rendering.gl_foreign import backdrop_kinds, foreign_kinds
+from aerialdojo_gen.rendering.gl_geometry import VERTEX, Kind, chunks
 from aerialdojo_gen.rendering.lighting import light_of, sun_view
 from aerialdojo_gen.rendering.picture import FAR_M, NEAR_M, Picture
 from aerialdojo_gen.scenes.model import Scene
@@ -71,7 +73,8 @@ class GlRenderer:
     Parameters
     ----------
     scene : Scene
-        Copied into buffers. Front faces alone are drawn (those wound counter-clockwise as the camera sees them).
+        Copied into buffers. Front faces are drawn (those wound counter-clockwise as the camera sees them), and both
+        sides of double-sided materials.
 
     Raises
     ------
@@ -85,18 +88,15 @@ class GlRenderer:
         self._gl = context()
         self.device = device()
         self._owned: list[Any] = []
-        self._arrays: dict[tuple[str, ...], Any] = {}
+        self._arrays: dict[tuple[Any, ...], Any] = {}
         self._targets: dict[tuple[int, int, bool, int], Any] = {}
         self._bodies: GlBodies | None = None
         textured, flat, layers = chunks(scene)
-        self._sets = [
-            (tags, kind, self._own(self._gl.buffer(kind.vertices.tobytes())))
-            for tags, kind in ((("TEXTURED",), textured), ((), flat))
-            if len(kind.low)
-        ]
-        most = max(len(kind.vertices) for _, kind, _ in self._sets)
+        kinds = [Kind(textured, ("TEXTURED",), layers), Kind(flat, (), None), *foreign_kinds(scene)]
+        self._sets = [_Drawn(kind, self) for kind in kinds if len(kind.chunks.low)]
+        self._behind = [_Drawn(kind, self) for kind in backdrop_kinds(scene)]
+        most = max(len(drawn.kind.chunks.vertices) for drawn in (*self._sets, *self._behind))
         self._indices = self._own(self._gl.buffer(reserve=4 * most, dynamic=True))
-        self._textures = None if layers is None else self._texture_array(layers)
         self._light = light_of(scene)
         camera, pose, near_m, far_m = sun_view(scene, _SHADOW_PX)
         self._sun_from_world = clip_from_world(camera, pose, near_m, far_m)
@@ -107,14 +107,24 @@ class GlRenderer:
         self._owned.append(thing)
         return thing
 
-    def _texture_array(self, layers: NDArray[np.uint8]) -> Any:
-        n, height, width, _ = layers.shape
-        # Four bytes a texel: llvmpipe takes a tenth of a picture's time longer to pick three.
-        opaque = np.concatenate([layers, np.full((n, height, width, 1), 255, dtype=np.uint8)], axis=3)
-        texture = self._own(self._gl.texture_array((width, height, n), 4, opaque.tobytes()))
+    def texture_array(self, kind: Kind) -> Any:
+        """Load a kind's textures; None where it has none."""
+        if kind.layers is None:
+            return None
+        layers = kind.layers
+        n, height, width, channels = layers.shape
+        if channels == 3:
+            # Four bytes a texel: llvmpipe takes a tenth of a picture's time longer to pick three.
+            whole = np.full((n, height, width, 4), 255, dtype=np.uint8)
+            whole[..., :3] = layers
+            layers = whole
+        texture = self._own(self._gl.texture_array((width, height, n), 4, layers))
         texture.build_mipmaps()
-        # The nearest size alone: a texture fades into its mean before two sizes of it look different.
-        texture.filter = (self._gl.NEAREST_MIPMAP_NEAREST, self._gl.NEAREST)
+        if kind.smooth:
+            texture.filter = (self._gl.LINEAR_MIPMAP_LINEAR, self._gl.LINEAR)
+        else:
+            # The nearest size alone: a texture fades into its mean before two sizes of it look different.
+            texture.filter = (self._gl.NEAREST_MIPMAP_NEAREST, self._gl.NEAREST)
         return texture
 
     def _shadow_map(self) -> Any:
@@ -122,14 +132,15 @@ class GlRenderer:
         gl = self._gl
         depth = gl.depth_texture((_SHADOW_PX, _SHADOW_PX))
         target = gl.framebuffer(depth_attachment=depth)
-        program = gl.program(*glsl.SUN)
-        program["clip_from_world"].write(_columns(self._sun_from_world))
         self._begin(target)
-        for _, _, buffer in self._sets:
-            array = gl.vertex_array(program, [_content(program, buffer)])
+        for drawn in self._sets:
+            program = gl.program(*(glsl.specialise(source, *drawn.kind.tags) for source in glsl.SUN))
+            _set(program, clip_from_world=_columns(self._sun_from_world), textures=0)
+            array = gl.vertex_array(program, [_content(program, drawn.buffer)])
+            drawn.begin(gl)
             array.render()
             array.release()
-        program.release()
+            program.release()
         target.release()
         # As numbers, and not as the depth texture that they are: llvmpipe compares that at twice the price.
         shadow = self._own(gl.texture((_SHADOW_PX, _SHADOW_PX), 1, depth.read(), dtype="f4"))
@@ -159,8 +170,8 @@ class GlRenderer:
         seen: list[list[NDArray[np.uint32]]] = [[] for _ in poses]
         for views in eyes.values():
             eye = np.ascontiguousarray(poses[views[0]][:3, 3])
-            for _, kind, _ in self._sets:
-                found = kind.seen(clips[views], eye, camera.width, camera.height)
+            for drawn in self._sets:
+                found = drawn.kind.chunks.seen(clips[views], eye, camera.width, camera.height)
                 for v, indices in zip(views, found, strict=True):
                     seen[v].append(indices)
         # One target for all: what a view leaves in the processor's cache serves the next.
@@ -207,14 +218,14 @@ class GlRenderer:
         target = self._target(camera.width, camera.height, instances, slot)
         eye = world_from_camera[:3, 3]
         self._begin(target)
-        if self._textures is not None:
-            self._textures.use(0)
         self._shadow.use(1)
         tags = ("INSTANCES",) if instances else ()
-        for (own_tags, _, buffer), chosen in zip(self._sets, seen, strict=True):
+        everything = [np.arange(len(drawn.kind.chunks.vertices), dtype=np.uint32) for drawn in self._behind]
+        for drawn, chosen in zip((*self._sets, *self._behind), (*seen, *everything), strict=True):
             if not len(chosen):
                 continue
-            array = self._array((*own_tags, *tags), buffer)
+            drawn.begin(self._gl)
+            array = self._array((*drawn.kind.tags, *tags), drawn.buffer)
             _set(array.program, clip_from_world=_columns(clip), eye=eye, focal_px=camera.focal_px)
             self._indices.orphan()
             self._indices.write(chosen)
@@ -228,7 +239,9 @@ class GlRenderer:
 
     def _array(self, tags: tuple[str, ...], buffer: Any) -> Any:
         """Return the vertex array of a program and its buffer, made when it is first needed."""
-        if tags not in self._arrays:
+        # Two kinds may have one program, and never one buffer.
+        key = (*tags, id(buffer))
+        if key not in self._arrays:
             sky = "SKY" in tags
             sources = glsl.SKY if sky else glsl.SURFACES
             program = self._own(self._gl.program(*(glsl.specialise(source, *tags) for source in sources)))
@@ -237,8 +250,8 @@ class GlRenderer:
                 horizon=self._light.horizon, zenith=self._light.zenith, textures=0, shadow=1,
             )  # fmt: skip
             content, indices = ([], None) if sky else ([_content(program, buffer)], self._indices)
-            self._arrays[tags] = self._own(self._gl.vertex_array(program, content, index_buffer=indices))
-        return self._arrays[tags]
+            self._arrays[key] = self._own(self._gl.vertex_array(program, content, index_buffer=indices))
+        return self._arrays[key]
 
     def _target(self, width: int, height: int, instances: bool, slot: int) -> Any:
         key = (width, height, instances, slot)
@@ -268,6 +281,24 @@ class GlRenderer:
     ) -> None:
         """Free the renderer's memory."""
         self.close()
+
+
+class _Drawn:
+    """A kind of surface in the renderer's memory."""
+
+    def __init__(self, kind: Kind, renderer: GlRenderer) -> None:
+        self.kind = replace(kind, layers=None)
+        self.buffer = renderer._own(renderer._gl.buffer(kind.chunks.vertices.tobytes()))
+        self.textures = renderer.texture_array(kind)
+
+    def begin(self, gl: Any) -> None:
+        """Set what holds for this kind, and not for others."""
+        if self.textures is not None:
+            self.textures.use(0)
+        if self.kind.double_sided:
+            gl.disable(gl.CULL_FACE)
+        else:
+            gl.enable(gl.CULL_FACE)
 
 
 def clip_from_world(camera: Camera, world_from_camera: Floats, near_m: float, far_m: float) -> Floats:

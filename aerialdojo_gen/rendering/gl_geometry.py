@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from aerialdojo_gen.geometry.morton import morton_codes
 from aerialdojo_gen.rendering.gl_culling import chunks_in_view, triangles_in_view
-from aerialdojo_gen.scenes.model import Scene
+from aerialdojo_gen.scenes.model import Material, Part, Scene
 
 Floats = NDArray[np.float64]
 
@@ -86,8 +86,37 @@ class Chunks:
         return [row[:n] for row, n in zip(indices, count, strict=True)]
 
 
+@dataclass(frozen=True, eq=False)
+class Kind:
+    """Surfaces that one program draws, from one texture array.
+
+    Attributes
+    ----------
+    chunks : Chunks
+    tags : tuple of str
+        What the program is made for (`aerialdojo_gen.rendering.gl_shaders.specialise`).
+    layers : (n, h, w, 3 or 4) uint8 or None
+        The layers of its texture array, first row at v = 0; None where it has none.
+    smooth : bool
+        Whether textures are drawn between their texels and their sizes, as those of foreign meshes are.
+    double_sided : bool
+        Whether both sides are drawn.
+    """
+
+    chunks: Chunks
+    tags: tuple[str, ...]
+    layers: NDArray[np.uint8] | None
+    smooth: bool = False
+    double_sided: bool = False
+
+    @property
+    def hides(self) -> bool:
+        """Whether what lies behind a triangle of it is not seen."""
+        return "MASK" not in self.tags
+
+
 def chunks(scene: Scene) -> tuple[Chunks, Chunks, NDArray[np.uint8] | None]:
-    """Pack a scene for OpenGL.
+    """Pack what of a scene has a material of the catalogue's making for OpenGL.
 
     Parameters
     ----------
@@ -100,32 +129,46 @@ def chunks(scene: Scene) -> tuple[Chunks, Chunks, NDArray[np.uint8] | None]:
     textures : (n, e, e, 3) uint8 or None
         The layers of the texture array, first row at v = 0; None where no material has a texture.
     """
-    names = [name for name in sorted(scene.materials) if scene.materials[name].texture is not None]
+    names = [name for name, m in sorted(scene.materials.items()) if m.texture is not None and not m.atlas]
     layer = {name: float(k) for k, name in enumerate(names)}
     textured, flat = [], []
     for k, instance in enumerate(scene.instances):
         for part in instance.parts:
             material = scene.materials[part.material]
-            corners = part.vertices[part.faces]
-            normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-            length = np.linalg.norm(normal, axis=1)
-            solid = length > 0.0
-            rows = np.zeros((int(solid.sum()), 3), dtype=VERTEX)
-            rows["position"] = corners[solid]
-            rows["uv"] = part.uv[part.faces[solid]]
-            rows["normal"] = (normal[solid] / length[solid, None])[:, None]
-            rows["colour"][..., :3] = material.colour
-            rows["instance"] = k
+            if is_foreign(part, material):
+                continue
+            rows = packed(part, material, k)
             if material.texture is None:
                 flat.append(rows)
             else:
                 rows["texel_m"] = material.tile_m / material.texture.shape[1]
                 rows["layer"] = layer[part.material]
                 textured.append(rows)
-    return _cut(textured), _cut(flat), _layers(scene, names)
+    return cut(textured), cut(flat), _layers(scene, names)
 
 
-def _cut(parts: list[NDArray[np.void]]) -> Chunks:
+def is_foreign(part: Part, material: Material) -> bool:
+    """Whether a part is drawn as only foreign meshes are: by `aerialdojo_gen.rendering.gl_foreign`."""
+    return material.foreign or part.colours is not None
+
+
+def packed(part: Part, material: Material, instance: int) -> NDArray[np.void]:
+    """Pack the triangles of a part that have an area, (n, 3) of `VERTEX`; texel and layer are left at 0."""
+    corners = part.vertices[part.faces]
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    length = np.linalg.norm(normal, axis=1)
+    solid = length > 0.0
+    rows = np.zeros((int(solid.sum()), 3), dtype=VERTEX)
+    rows["position"] = corners[solid]
+    rows["uv"] = part.uv[part.faces[solid]]
+    rows["normal"] = (normal[solid] / length[solid, None])[:, None]
+    rows["colour"][..., :3] = material.colour if part.colours is None else part.colours[part.faces[solid]]
+    rows["instance"] = instance
+    return rows
+
+
+def cut(parts: list[NDArray[np.void]], double_sided: bool = False) -> Chunks:
+    """Cut packed triangles into chunks; of what is double-sided every triangle faces every eye."""
     triangles = np.concatenate([*parts, np.zeros((0, 3), dtype=VERTEX)])
     if not len(triangles):
         none = np.zeros((0, 3))
@@ -147,7 +190,7 @@ def _cut(parts: list[NDArray[np.void]]) -> Chunks:
         np.append(starts, len(triangles)),
         np.minimum.reduceat(low[order], starts),
         np.maximum.reduceat(high[order], starts),
-        np.column_stack([normal, offset]),
+        np.tile([0.0, 0.0, 0.0, 1.0], (len(normal), 1)) if double_sided else np.column_stack([normal, offset]),
         _positions(triangles),
     )
 

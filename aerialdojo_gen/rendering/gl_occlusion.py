@@ -34,10 +34,13 @@ class BodyCulling:
     Parameters
     ----------
     chunks : Chunks
+    hides : bool
+        Whether what lies behind its triangles is not seen: not so where their texture has holes.
     """
 
-    def __init__(self, chunks: Chunks) -> None:
+    def __init__(self, chunks: Chunks, hides: bool = True) -> None:
         self._chunks = chunks
+        self._hides = hides
         self._out = np.empty((0, 0), np.uint32)
 
     def seen(
@@ -62,6 +65,8 @@ class BodyCulling:
             By view, indices into the chunks' vertices, chunk by chunk, the nearest first; valid until the next call.
         """
         c = self._chunks
+        if not self._hides:
+            return c.seen(clips, eye, width, height)
         order, sees = chunks_in_view(c.low, c.high, eye, clips)
         if len(self._out) < len(clips):
             self._out = np.empty((len(clips), len(c.vertices)), np.uint32)

@@ -29,13 +29,33 @@ flat out vec3 v_normal;
 in float instance;
 flat out float v_instance;
 #endif
+#ifdef ATLAS
+in vec2 uv;
+in float layer;
+out vec2 v_uv;
+flat out float v_layer;
+#endif
 out vec3 v_ray;
 out vec4 v_sun;
+#ifdef FOREIGN
+out vec3 v_colour;
+flat out float v_lit;
+#else
 flat out vec3 v_colour;
+#endif
 flat out vec2 v_light;
 void main() {
     gl_Position = clip_from_world * vec4(position, 1.0);
     vec3 n = normal;
+#ifdef FOREIGN
+    // The side that is seen is the one that is lit; which it is, is the same at all corners.
+    n *= dot(normal, eye - position) < 0.0 ? -1.0 : 1.0;
+    v_lit = 1.0 - colour.a;
+#endif
+#ifdef BACKDROP
+    // Behind everything, and before the sky.
+    gl_Position.z = gl_Position.w * 0.9999999;
+#endif
     v_ray = position - eye;
     vec4 s = sun_from_world * vec4(position + n * bias_m, 1.0);
     v_sun = vec4((s.xyz + s.w) * 0.5, s.w);
@@ -45,6 +65,10 @@ void main() {
     v_uv = uv;
     v_texture = vec2(layer, texel_m);
     v_normal = n;
+#endif
+#ifdef ATLAS
+    v_uv = uv;
+    v_layer = layer;
 #endif
 #ifdef INSTANCES
     v_instance = instance + 1.0;
@@ -65,9 +89,19 @@ in vec2 v_uv;
 flat in vec2 v_texture;
 flat in vec3 v_normal;
 #endif
+#ifdef ATLAS
+uniform sampler2DArray textures;
+in vec2 v_uv;
+flat in float v_layer;
+#endif
 in vec3 v_ray;
 in vec4 v_sun;
+#ifdef FOREIGN
+in vec3 v_colour;
+flat in float v_lit;
+#else
 flat in vec3 v_colour;
+#endif
 flat in vec2 v_light;
 layout(location = 0) out vec4 out_colour;
 layout(location = 1) out float out_depth;
@@ -84,6 +118,22 @@ void main() {
     float keep = clamp((FADE - texels) / (FADE - 1.0), 0.0, 1.0);
     base = mix(base, texture(textures, vec3(v_uv, v_texture.x)).rgb * 255.0, keep);
 #endif
+#ifdef ATLAS
+    vec4 texel = texture(textures, vec3(v_uv, v_layer));
+    base = texel.rgb * 255.0;
+#endif
+#ifdef MASK
+    // At a distance the smaller sizes' alpha is a mean: less is asked for there, or trees lose their leaves.
+    if (texel.a < 0.5 - 0.2 * clamp(textureQueryLod(textures, v_uv).y / 4.0, 0.0, 1.0)) discard;
+#endif
+#ifdef BACKDROP
+    out_colour = vec4(base / 255.0, 1.0);
+    out_depth = uintBitsToFloat(0x7f800000u);
+#ifdef INSTANCES
+    out_instance = 0.0;
+#endif
+    return;
+#endif
     // The mean of four comparisons, weighted as a linear filter would.
     vec3 at = v_sun.xyz / v_sun.w;
     vec4 lit_by = step(vec4(at.z), textureGather(shadow, at.xy));
@@ -91,7 +141,12 @@ void main() {
     vec2 column = mix(lit_by.wx, lit_by.zy, share.x);
     float lit = v_light.y * mix(column.x, column.y, share.y);
     float haze = 1.0 - exp(range_m * (-1.0 / HAZE_RANGE));
+#ifdef FOREIGN
+    base *= mix(1.0, v_light.x + lit, v_lit);
+    vec3 value = mix(base, horizon, haze * haze);
+#else
     vec3 value = mix(base * (v_light.x + lit), horizon, haze * haze);
+#endif
     out_colour = vec4(value / 255.0, 1.0);
     out_depth = 1.0 / gl_FragCoord.w;
 #ifdef INSTANCES
@@ -106,11 +161,37 @@ _SUN_VERTEX = (
     + """
 uniform mat4 clip_from_world;
 in vec3 position;
-void main() { gl_Position = clip_from_world * vec4(position, 1.0); }
+#ifdef MASK
+in vec2 uv;
+in float layer;
+out vec2 v_uv;
+flat out float v_layer;
+#endif
+void main() {
+    gl_Position = clip_from_world * vec4(position, 1.0);
+#ifdef MASK
+    v_uv = uv;
+    v_layer = layer;
+#endif
+}
 """
 )
 
-_SUN_FRAGMENT = _HEAD + "void main() {}\n"
+_SUN_FRAGMENT = (
+    _HEAD
+    + """
+#ifdef MASK
+uniform sampler2DArray textures;
+in vec2 v_uv;
+flat in float v_layer;
+#endif
+void main() {
+#ifdef MASK
+    if (texture(textures, vec3(v_uv, v_layer)).a < 0.5) discard;
+#endif
+}
+"""
+)
 
 _SKY_VERTEX = (
     _HEAD
@@ -163,7 +244,9 @@ def specialise(source: str, *defined: str) -> str:
     source : str
         One of this module's programs.
     *defined : str
-        Of ``TEXTURED`` (samples the texture array) and ``INSTANCES`` (writes the instance id map).
+        Of ``TEXTURED`` (samples the texture array, and fades it into its mean), ``INSTANCES`` (writes the instance id
+        map); and of a foreign mesh ``FOREIGN`` (vertex colours, both sides, light of its own), ``ATLAS`` (samples the
+        texture array at every distance), ``MASK`` (leaves its holes out) and ``BACKDROP`` (behind everything).
 
     Returns
     -------

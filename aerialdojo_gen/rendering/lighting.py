@@ -11,12 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerialdojo_gen.geometry.cameras import Camera, look_at_pose
-from aerialdojo_gen.scenes.model import Scene
+from aerialdojo_gen.scenes.model import Material, Scene
 
 Floats = NDArray[np.float64]
 
 # How far the sun of the shadow map stands, in radii of the scene: its rays are then within 5° of parallel.
 _SUN_RADII = 12.0
+_ENDLESS_M = 1e9
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,7 +29,9 @@ class Lighting:
     colour : (n, 3) float64
         The material's mean colour, 0-255.
     texel_m : (n,) float64
-        Edge of a texel, metres; 0 for a flat material.
+        Edge of a texel, metres; 0 for a flat material, endless for one that is never to fade into its mean.
+    unlit : (n,) bool
+        Whether the material has its light in its colours.
     sun : (3,) float64
         Unit vector towards the sun.
     zenith, horizon : (3,) float64
@@ -37,6 +40,7 @@ class Lighting:
 
     colour: Floats
     texel_m: Floats
+    unlit: NDArray[np.bool_]
     sun: Floats
     zenith: Floats
     horizon: Floats
@@ -60,11 +64,18 @@ def light_of(scene: Scene, materials: Sequence[str] = ()) -> Lighting:
     sun = np.array(scene.sun, dtype=np.float64)
     return Lighting(
         colour=np.array([m.colour for m in found], dtype=np.float64).reshape(-1, 3),
-        texel_m=np.array([0.0 if m.texture is None else m.tile_m / m.texture.shape[1] for m in found]),
+        texel_m=np.array([_texel_m(m) for m in found]),
+        unlit=np.array([m.unlit for m in found], dtype=bool),
         sun=sun / np.linalg.norm(sun),
         zenith=sky * np.array([0.72, 0.84, 0.97]),
         horizon=sky + (np.array([236.0, 238.0, 240.0]) - sky) * 0.6,
     )
+
+
+def _texel_m(material: Material) -> float:
+    if material.atlas:
+        return _ENDLESS_M
+    return 0.0 if material.texture is None else material.tile_m / material.texture.shape[1]
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from aerialdojo_gen.geometry.rays import TriangleRayCaster
 from aerialdojo_gen.geometry.soup import soup
 from aerialdojo_gen.rendering.casters import triangle_caster
+from aerialdojo_gen.rendering.texels import SurfaceTexels, seen_caster
 from aerialdojo_gen.scenes.context import context_of
 from aerialdojo_gen.scenes.model import Material, Scene
 
@@ -73,10 +74,12 @@ class OrthographicPictures:
         names = sorted({part.material for part in parts})
         index = {name: k for k, name in enumerate(names)}
         self._vertices, self._faces = soup(parts)
-        self._uv = np.concatenate([part.uv for part in parts]).astype(np.float64)
         self._material = np.repeat([index[part.material] for part in parts], [len(part.faces) for part in parts])
         self._materials = [scene.materials[name] for name in names]
-        self._rays = caster or TriangleRayCaster(self._vertices, self._faces)
+        self._rays = seen_caster(scene, caster or TriangleRayCaster(self._vertices, self._faces))
+        self._texels = SurfaceTexels(parts, scene.materials)
+        self._double_sided = np.array([m.double_sided for m in self._materials])[self._material]
+        self._unlit = np.array([m.unlit for m in self._materials])[self._material]
         self._sun = np.array(scene.sun, dtype=np.float64) / np.linalg.norm(scene.sun)
         sky = np.array(scene.sky, dtype=np.float64)
         ground = [instance for instance in scene.instances if instance.category == "ground"]
@@ -115,10 +118,14 @@ class OrthographicPictures:
         hit = np.flatnonzero(face >= 0)
         face, points = face[hit], origins[hit] + distance[hit, None] * forward
         normal = self._normals(face)
-        cut = normal @ forward > 0.0
+        away = normal @ forward > 0.0
+        both = self._double_sided[face]
+        normal[away & both] *= -1.0
+        cut = away & ~both
         colour = self._colours(face, points, pixel_m)
         level = _AMBIENT + normal @ np.array([_FROM_EAST, _FROM_NORTH, _FROM_ABOVE])
         level += _SUN * self._sunlit(points, normal)
+        level[self._unlit[face]] = 1.0
         out[hit] = colour * np.where(cut, _CUT_LEVEL, level)[:, None]
         if abs(forward[2]) < 1e-9:
             # Ground is a sheet without thickness: what the plane cuts of it is filled in.
@@ -161,22 +168,11 @@ class OrthographicPictures:
         for first, rows in zip(starts, np.split(order, starts[1:]), strict=True):
             tile = _reduced(self._materials[material[order[first]]], pixel_m)
             if tile is not None:
-                uv = self._uv_at(face[rows], points[rows])
+                uv = self._texels.uv_at(face[rows], points[rows])
                 column = np.floor(uv[:, 0] % 1.0 * tile.shape[1]).astype(np.int64) % tile.shape[1]
                 row = np.floor(-uv[:, 1] % 1.0 * tile.shape[0]).astype(np.int64) % tile.shape[0]
                 colour[rows] = tile[row, column]
-        return colour
-
-    def _uv_at(self, face: NDArray[np.int32], points: Floats) -> Floats:
-        index = self._faces[face]
-        a, b, c = (self._vertices[index[:, k]] for k in range(3))
-        ab, ac, ap = b - a, c - a, points - a
-        d00, d01, d11 = (np.einsum("ij,ij->i", x, y) for x, y in ((ab, ab), (ab, ac), (ac, ac)))
-        d20, d21 = np.einsum("ij,ij->i", ap, ab), np.einsum("ij,ij->i", ap, ac)
-        area = np.maximum(d00 * d11 - d01 * d01, 1e-30)
-        v, w = (d11 * d20 - d01 * d21) / area, (d00 * d21 - d01 * d20) / area
-        uv = self._uv[index]
-        return np.asarray((1.0 - v - w)[:, None] * uv[:, 0] + v[:, None] * uv[:, 1] + w[:, None] * uv[:, 2])
+        return self._texels.painted(face, points, colour)
 
 
 def _reduced(material: Material, pixel_m: float) -> NDArray[np.uint8] | None:

@@ -22,6 +22,7 @@ from aerialdojo_gen.rendering.casters import triangle_caster
 from aerialdojo_gen.rendering.lighting import Lighting, ShadowMap, light_of
 from aerialdojo_gen.rendering.picture import Picture
 from aerialdojo_gen.rendering.shading import shade
+from aerialdojo_gen.rendering.texels import Backdrop, scene_texels, seen_caster
 from aerialdojo_gen.scenes.context import context_of
 from aerialdojo_gen.scenes.model import Scene
 
@@ -62,7 +63,10 @@ class RayRenderer:
         # What is that wide both ways and level is ground, a road, a floor or a roof.
         bounds = np.array([instance.bounds for instance in scene.instances]).reshape(-1, 2, 3)
         self.wide: NDArray[np.bool_] = (bounds[:, 1, :2] - bounds[:, 0, :2]).min(axis=1) > _WIDE_M
-        self._rays = caster or TriangleRayCaster(vertices, faces)
+        self._rays = seen_caster(scene, caster or TriangleRayCaster(vertices, faces))
+        painted = any(part.colours is not None for _, part in parts)
+        self._painted = scene_texels(scene) if painted else None
+        self._backdrop = Backdrop(scene)
         self._light: Lighting = light_of(scene, materials)
         textures = [scene.materials[name].texture for name in materials]
         flat = [np.array([[scene.materials[name].colour]], np.uint8) for name in materials]
@@ -90,6 +94,11 @@ class RayRenderer:
             np.ascontiguousarray(world_from_camera[:3, 3]), directions, distance, length, face, self._corners,
             self._uv, self._material, self._owner, self._tiles, self._texels,
         )  # fmt: skip
+        if self._painted is not None:
+            hit = np.flatnonzero(face >= 0)
+            along = distance[hit] / length[hit]
+            points = world_from_camera[:3, 3] + along[:, None] * directions[hit]
+            albedo[hit] = self._painted.painted(face[hit], points, albedo[hit])
         depth = depth.reshape(shape)
         rgb = shade(
             camera,
@@ -100,6 +109,7 @@ class RayRenderer:
             self._light,
             self._no_shadow,
         )
+        self._backdrop.paint(rgb, surface.reshape(shape) < 0, camera, world_from_camera)
         return Picture(rgb, depth, owner.reshape(shape))
 
     def close(self) -> None:

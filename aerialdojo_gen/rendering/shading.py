@@ -65,6 +65,7 @@ def shade(
         np.ascontiguousarray(world_from_camera),
         light.colour,
         light.texel_m,
+        light.unlit,
         np.stack([light.sun, light.zenith, light.horizon]),
         shadow.depth_m,
         np.ascontiguousarray(shadow.world_from_camera),
@@ -120,6 +121,7 @@ def _shade(
     pose: Floats,
     colour: Floats,
     texel: Floats,
+    unlit: NDArray[np.bool_],
     sky: Floats,
     shadow: NDArray[np.float32],
     sun_pose: Floats,
@@ -178,6 +180,8 @@ def _shade(
                 pz = pose[2, 3] + dz * z + nz * bias_m
                 lit *= _sunlit(px, py, pz, shadow, sun_pose, sun_focal)
             level = _AMBIENT + _FROM_ABOVE * nz + _FROM_EAST * nx + _FROM_NORTH * ny + _SUN * lit
+            if unlit[k]:
+                level = 1.0
             range_m = z * stretch / _HAZE_RANGE_M
             haze = 1.0 - math.exp(-range_m)
             haze *= haze

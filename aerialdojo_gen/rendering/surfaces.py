@@ -8,18 +8,21 @@ can see from the front are left out, and long ones are cut up: a ground of slive
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from aerialdojo_gen.geometry.soup import soup
-from aerialdojo_gen.scenes.model import Part, Scene
+from aerialdojo_gen.scenes.model import Material, Part, Scene
+from aerialdojo_gen.scenes.sampling import texel
 
 # Edges longer than this are halved, metres.
 _LONGEST_EDGE_M = 10.0
 # Cameras stand within so much of the flight volume at its sides and above it, and so much over its floor, metres.
 _AROUND_M, _FLOOR_M = 300.0, 0.1
+# How often triangles with holes are cut into four, and how many that may make.
+_HALVINGS, _MOST_HOLED = 4, 200_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,12 +39,15 @@ class Surface:
         Texture coordinates in tiles.
     faces : (m, 3) int64
         Indices into `vertices`.
+    palette : (h, w, 3) uint8 or None
+        The texture that `uv` is of, where faces have colours of their own: one texel each.
     """
 
     material: str
     vertices: NDArray[np.float64]
     uv: NDArray[np.float64]
     faces: NDArray[np.int64]
+    palette: NDArray[np.uint8] | None = None
 
 
 def surfaces(scene: Scene) -> list[Surface]:
@@ -62,15 +68,56 @@ def surfaces(scene: Scene) -> list[Surface]:
             by_material.setdefault(part.material, []).append(part)
     low, high = scene.bounds[0], scene.bounds[1]
     room = np.stack([low + np.array([-_AROUND_M, -_AROUND_M, _FLOOR_M]), high + _AROUND_M])
-    merged = (_merge(material, by_material[material]) for material in sorted(by_material))
+    merged = (_foreign(_merge(name, by_material[name]), scene.materials[name]) for name in sorted(by_material))
     cut = (_cut(_visible(surface, room)) for surface in merged)
     return [surface for surface in cut if len(surface.faces)]
 
 
 def _merge(material: str, parts: list[Part]) -> Surface:
+    if any(p.colours is not None for p in parts):
+        return _painted(material, parts)
     vertices, faces = soup(parts)
     uv = np.concatenate([p.uv for p in parts]).astype(np.float64)
     return Surface(material, vertices, uv, faces.astype(np.int64))
+
+
+def _painted(material: str, parts: list[Part]) -> Surface:
+    """Merge parts with vertex colours: TinyRenderer mixes none, so that each face has the mean of its own."""
+    vertices, faces = soup(parts)
+    own = np.concatenate([np.zeros((0, 3, 3)), *(p.colours[p.faces] for p in parts if p.colours is not None)])
+    side = max(1, int(np.ceil(np.sqrt(len(own)))))
+    palette = np.zeros((side * side, 3), dtype=np.uint8)
+    palette[: len(own)] = np.rint(own.mean(axis=1))
+    k = np.arange(len(own))
+    uv = np.stack([(k % side + 0.5) / side, 1.0 - (k // side + 0.5) / side], axis=1)
+    corners = vertices[faces].reshape(-1, 3)
+    index = np.arange(len(corners)).reshape(-1, 3)
+    return Surface(material, corners, np.repeat(uv, 3, axis=0), index, palette.reshape(side, side, 3))
+
+
+def _foreign(surface: Surface, material: Material) -> Surface:
+    """Give a surface its holes and its back: TinyRenderer knows neither."""
+    if material.mask is not None:
+        surface = _holed(surface, material.mask)
+    if material.double_sided:
+        surface = replace(surface, faces=np.concatenate([surface.faces, surface.faces[:, ::-1]]))
+    return surface
+
+
+def _holed(surface: Surface, mask: NDArray[np.bool_]) -> Surface:
+    """Leave out what of a surface is a hole, in pieces of its triangles."""
+    vertices, uv, faces = surface.vertices, surface.uv, surface.faces
+    for _ in range(_HALVINGS):
+        if 4 * len(faces) > _MOST_HOLED:
+            break
+        n, middles = len(vertices), [(faces[:, k], faces[:, (k + 1) % 3]) for k in range(3)]
+        vertices = np.concatenate([vertices, *((vertices[a] + vertices[b]) / 2.0 for a, b in middles)])
+        uv = np.concatenate([uv, *((uv[a] + uv[b]) / 2.0 for a, b in middles)])
+        ab, bc, ca = (n + k * len(faces) + np.arange(len(faces)) for k in range(3))
+        a, b, c = faces.T
+        faces = np.concatenate([np.stack(f, axis=1) for f in ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))])
+    there = mask[texel(uv[faces].mean(axis=1), mask.shape[0], mask.shape[1])]
+    return Surface(surface.material, vertices, uv, faces[there])
 
 
 def _visible(surface: Surface, room: NDArray[np.float64]) -> Surface:
@@ -80,7 +127,7 @@ def _visible(surface: Surface, room: NDArray[np.float64]) -> Surface:
     # The box's corner farthest along the normal is the one that would see the front.
     farthest = np.where(normal > 0.0, room[1], room[0])
     front = np.einsum("ij,ij->i", normal, farthest - corners[:, 0]) > 0.0
-    return Surface(surface.material, surface.vertices, surface.uv, surface.faces[front])
+    return replace(surface, faces=surface.faces[front])
 
 
 def _cut(surface: Surface) -> Surface:
@@ -104,4 +151,4 @@ def _cut(surface: Surface) -> Surface:
         vertices = np.concatenate([vertices, (vertices[first] + vertices[second]) / 2.0])
         uv = np.concatenate([uv, (uv[first] + uv[second]) / 2.0])
         faces = np.concatenate([np.stack([a, middle, c], axis=1), np.stack([middle, b, c], axis=1)])
-    return Surface(surface.material, vertices, uv, np.concatenate([*done, faces]))
+    return replace(surface, vertices=vertices, uv=uv, faces=np.concatenate([*done, faces]))

@@ -17,6 +17,7 @@ from aerialdojo_gen.rendering.lighting import Lighting, ShadowMap, light_of, sun
 from aerialdojo_gen.rendering.picture import FAR_M, NEAR_M, Picture
 from aerialdojo_gen.rendering.shading import shade
 from aerialdojo_gen.rendering.surfaces import Surface, surfaces
+from aerialdojo_gen.rendering.texels import Backdrop, reduced
 from aerialdojo_gen.scenes.context import context_of
 from aerialdojo_gen.scenes.model import Material, Scene
 from aerialdojo_gen.store.staging import scratch_folder
@@ -25,6 +26,7 @@ Floats = NDArray[np.float64]
 
 # Steps by which a camera gives way to a vertex in its own plane, and the gap that float32 needs, metres.
 _NUDGE_M, _GAP_M = 1.3e-4, 3e-5
+_LARGEST_ATLAS_PX = 2048
 
 
 class RenderWorld:
@@ -35,7 +37,7 @@ class RenderWorld:
     scene : Scene
         Copied into the renderer: one body a material (see `aerialdojo_gen.rendering.surfaces`). Only front faces are
         drawn (those wound counter-clockwise as the camera sees them): TinyRenderer's double-sided flag does nothing,
-        and drawing every face twice doubles the time.
+        and drawing every face twice doubles the time. What is there from both sides is loaded twice.
 
     Raises
     ------
@@ -47,6 +49,7 @@ class RenderWorld:
         found = surfaces(scene)
         self._vertices = np.concatenate([s.vertices for s in found])
         self._light: Lighting = light_of(scene, [s.material for s in found])
+        self._backdrop = Backdrop(scene)
         self._client = pybullet.connect(pybullet.DIRECT)
         if self._client < 0:
             raise RenderError("PyBullet's DIRECT client did not start: too many renderers are open in this process")
@@ -64,7 +67,8 @@ class RenderWorld:
         client = self._client
         path = folder / f"{k}.obj"
         write_obj(path, surface)
-        rgba = (1.0, 1.0, 1.0, 1.0) if material.texture is not None else (*(c / 255 for c in material.colour), 1.0)
+        texture = material.texture if surface.palette is None else surface.palette
+        rgba = (1.0, 1.0, 1.0, 1.0) if texture is not None else (*(c / 255 for c in material.colour), 1.0)
         shape = pybullet.createVisualShape(
             pybullet.GEOM_MESH, fileName=str(path), rgbaColor=rgba, specularColor=(0, 0, 0),
             physicsClientId=client,
@@ -74,10 +78,12 @@ class RenderWorld:
         # Bodies are numbered in order, and the segmentation mask is read as the surface's number.
         if body != k:
             raise RenderError(f"PyBullet did not load the surface of material {material.name!r}")
-        if material.texture is not None:
+        if texture is not None:
             if material.name not in textures:
                 picture = folder / f"texture{len(textures)}.png"
-                picture.write_bytes(encode_png(material.texture))
+                # It samples the nearest texel at any distance: what is finer than a pixel would only flicker.
+                shown = reduced(texture, _LARGEST_ATLAS_PX) if material.atlas and surface.palette is None else texture
+                picture.write_bytes(encode_png(shown))
                 textures[material.name] = pybullet.loadTexture(str(picture), physicsClientId=client)
             pybullet.changeVisualShape(body, -1, textureUniqueId=textures[material.name], physicsClientId=client)
 
@@ -96,6 +102,7 @@ class RenderWorld:
         """
         albedo, depth, surface = self.rasterise(camera, world_from_camera)
         rgb = shade(camera, world_from_camera, albedo, depth, surface, self._light, self._shadow)
+        self._backdrop.paint(rgb, surface < 0, camera, world_from_camera)
         return Picture(rgb, depth)
 
     def rasterise(

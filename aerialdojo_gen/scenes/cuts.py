@@ -9,10 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerialdojo_gen.errors import AssetError
-from aerialdojo_gen.scenes.colour_names import colour_name
-from aerialdojo_gen.scenes.mesh import areas
 from aerialdojo_gen.scenes.model import Instance, Part, Scene
 from aerialdojo_gen.scenes.recipe import Cut
+from aerialdojo_gen.scenes.sampling import colour_words, shown_colours
 
 
 def cut_out(scene: Scene, cuts: tuple[Cut, ...]) -> Scene:
@@ -58,7 +57,7 @@ def cut_out(scene: Scene, cuts: tuple[Cut, ...]) -> Scene:
                 kept.append(instance if whole else replace(instance, parts=tuple(rest), anatomy=None))
         if not inside:
             raise AssetError(f"scene {scene.name}: the box {cut.node!r} holds no triangle's middle: make it larger")
-        look = {"colour": colour_name(_colour(scene, inside))}
+        look = {"colour": colour_words(*shown_colours(inside, scene.materials))}
         # What was the ground, and all that stood on it in one piece, is nothing to fly below either.
         surface = "ground" if "ground" in surfaces else "sheet" if surfaces - {""} else ""
         instances = [*kept, Instance(cut.node, cut.category, "", look, tuple(inside), surface=surface)]
@@ -72,12 +71,5 @@ def _in_box(part: Part, cut: Cut) -> NDArray[np.bool_]:
 
 def _some(part: Part, faces: NDArray[np.bool_]) -> Part:
     used, index = np.unique(part.faces[faces], return_inverse=True)
-    return Part(part.vertices[used], index.reshape(-1, 3).astype(np.int32), part.uv[used], part.material)
-
-
-def _colour(scene: Scene, parts: list[Part]) -> tuple[int, int, int]:
-    """Colour of the material that shows most."""
-    shown: dict[str, float] = {}
-    for part in parts:
-        shown[part.material] = shown.get(part.material, 0.0) + float(areas(part.vertices, part.faces).sum())
-    return scene.materials[max(shown, key=lambda name: shown[name])].colour
+    colours = None if part.colours is None else part.colours[used]
+    return Part(part.vertices[used], index.reshape(-1, 3).astype(np.int32), part.uv[used], part.material, colours)

@@ -9,7 +9,6 @@ from __future__ import annotations
 import hashlib
 import json
 import struct
-from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -18,20 +17,19 @@ from numpy.typing import NDArray
 
 from aerialdojo_gen.common.advice import command
 from aerialdojo_gen.common.bounded import loads_json
-from aerialdojo_gen.common.pictures import TEXTURE_PNG, decode_rgb, encode_png
 from aerialdojo_gen.errors import AssetError
 from aerialdojo_gen.scenes.anatomy import read_anatomy
+from aerialdojo_gen.scenes.glb_materials import linear_colours, material_entry, read_material, srgb_colours
 from aerialdojo_gen.scenes.model import SURFACES, Instance, Material, Part, Scene
 
 _MAGIC, _JSON, _BIN = b"glTF", 0x4E4F534A, 0x004E4942
 _FLOAT, _UINT16, _UINT32 = 5126, 5123, 5125
 _ARRAY_BUFFER, _INDEX_BUFFER = 34962, 34963
 _DTYPES: dict[int, np.dtype[Any]] = {_FLOAT: np.dtype("<f4"), _UINT16: np.dtype("<u2"), _UINT32: np.dtype("<u4")}
-_WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3}
+_WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
 # Quaternion (x, y, z, w) of a quarter turn about x: z up becomes y up.
 _Z_UP_TO_Y_UP = [-0.7071067811865476, 0.0, 0.0, 0.7071067811865476]
 _VERSION = 1
-_LARGEST_TEXTURE_PX = 4096
 
 
 def write_glb(scene: Scene, path: Path) -> None:
@@ -64,13 +62,6 @@ def write_glb(scene: Scene, path: Path) -> None:
         file.write(body)
 
 
-# Scenes of one catalogue share their materials.
-@lru_cache(maxsize=512)
-def _png(material: Material) -> bytes:
-    assert material.texture is not None
-    return encode_png(material.texture, TEXTURE_PNG)
-
-
 def read_glb(path: Path, sha256: str = "") -> Scene:
     """Read a scene that `write_glb` wrote; it equals the written one to the last bit.
 
@@ -100,7 +91,9 @@ def read_glb(path: Path, sha256: str = "") -> Scene:
                 f"{path}: scene format {extras['version']} is not {_VERSION}; "
                 f"run {command('build-scenes', scene=path.stem)}"
             )
-        materials = [_read_material(m, document, data) for m in document["materials"]]
+        materials = [
+            read_material(m, lambda texture: _image_file(texture, document, data)) for m in document["materials"]
+        ]
         names = [m.name for m in materials]
         instances = tuple(
             _read_instance(document["nodes"][k], document, data, names) for k in document["nodes"][0]["children"]
@@ -140,14 +133,11 @@ class _Writer:
         self._nodes: list[dict[str, Any]] = []
 
     def material(self, material: Material) -> None:
-        surface: dict[str, Any] = {"metallicFactor": 0.0, "roughnessFactor": 0.9}
-        extras: dict[str, Any] = {"colour": list(material.colour), "tile_m": material.tile_m}
-        if material.texture is None:
-            surface["baseColorFactor"] = [*(_linear(c) for c in material.colour), 1.0]
-        else:
-            surface["baseColorTexture"] = {"index": len(self._images)}
-            self._images.append({"mimeType": "image/png", "bufferView": self._view(_png(material), None)})
-        self._materials.append({"name": material.name, "pbrMetallicRoughness": surface, "extras": extras})
+        self._materials.append(material_entry(material, self._image))
+
+    def _image(self, file: bytes, media_type: str) -> int:
+        self._images.append({"mimeType": media_type, "bufferView": self._view(file, None)})
+        return len(self._images) - 1
 
     def instance(self, instance: Instance, materials: dict[str, int]) -> None:
         primitives = []
@@ -159,6 +149,10 @@ class _Writer:
                 "POSITION": self._accessor(v, _FLOAT, "VEC3", _ARRAY_BUFFER, bounds=True),
                 "TEXCOORD_0": self._accessor(uv, _FLOAT, "VEC2", _ARRAY_BUFFER),
             }
+            if part.colours is not None:
+                stored = self._accessor(linear_colours(part.colours), _UINT16, "VEC4", _ARRAY_BUFFER)
+                self._accessors[stored]["normalized"] = True
+                attributes["COLOR_0"] = stored
             indices = self._accessor(part.faces.reshape(-1).astype(_DTYPES[kind]), kind, "SCALAR", _INDEX_BUFFER)
             primitives.append({"attributes": attributes, "indices": indices, "material": materials[part.material]})
         extras = {
@@ -194,6 +188,9 @@ class _Writer:
             "bufferViews": self._views,
             "buffers": [{"byteLength": len(self.data)}],
         }
+        used = sorted({name for entry in self._materials for name in entry.get("extensions", {})})
+        if used:
+            document["extensionsUsed"] = used
         if self._images:
             document["images"] = self._images
             document["samplers"] = [{"wrapS": 10497, "wrapT": 10497, "magFilter": 9729, "minFilter": 9987}]
@@ -256,20 +253,9 @@ def _check(scene: Scene) -> None:
         raise ValueError("a node has no triangle")
 
 
-def _read_material(entry: dict[str, Any], document: dict[str, Any], data: memoryview) -> Material:
-    texture = None
-    source = entry["pbrMetallicRoughness"].get("baseColorTexture")
-    if source is not None:
-        image = document["images"][document["textures"][source["index"]]["source"]]
-        png = _view_bytes(image["bufferView"], document, data)
-        # A kilobyte of PNG can ask for a gigabyte of pixels.
-        if max(struct.unpack_from(">II", png, 16)) > _LARGEST_TEXTURE_PX:
-            raise ValueError("texture is too large")
-        texture = decode_rgb(png)
-        if texture is None:
-            raise ValueError("texture cannot be decoded")
-    red, green, blue = entry["extras"]["colour"]
-    return Material(entry["name"], (red, green, blue), texture, float(entry["extras"]["tile_m"]))
+def _image_file(texture: int, document: dict[str, Any], data: memoryview) -> memoryview:
+    image = document["images"][document["textures"][texture]["source"]]
+    return _view_bytes(image["bufferView"], document, data)
 
 
 def _read_instance(
@@ -282,7 +268,12 @@ def _read_instance(
         faces = _array(primitive["indices"], document, data).astype(np.int32).reshape(-1, 3)
         if len(faces) and int(faces.max()) >= len(v):
             raise ValueError("face beyond the vertices")
-        parts.append(Part(v, faces, uv.astype(np.float32), materials[primitive["material"]]))
+        colours = None
+        if "COLOR_0" in primitive["attributes"]:
+            colours = srgb_colours(_array(primitive["attributes"]["COLOR_0"], document, data))
+            if len(colours) != len(v):
+                raise ValueError("as many colours as vertices")
+        parts.append(Part(v, faces, uv.astype(np.float32), materials[primitive["material"]], colours))
     extras = node["extras"]
     anatomy = read_anatomy(extras["anatomy"], [len(p.faces) for p in parts]) if "anatomy" in extras else None
     words = dict(extras["attributes"])
@@ -305,9 +296,3 @@ def _view_bytes(view: int, document: dict[str, Any], data: memoryview) -> memory
     if start + size > len(data):
         raise ValueError("buffer view beyond the data")
     return data[start : start + size]
-
-
-def _linear(channel: int) -> float:
-    """Turn an sRGB channel, 0-255, into the linear factor that glTF wants, 0-1."""
-    c = channel / 255.0
-    return round(c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4, 6)

@@ -20,7 +20,7 @@ SURFACES = ("solid", "sheet", "ground", "dome")
 
 @dataclass(frozen=True, eq=False)
 class Material:
-    """A surface: a colour, or a small tileable texture.
+    """A surface: a colour, a small tileable texture, or a picture that came with a foreign mesh.
 
     Attributes
     ----------
@@ -32,12 +32,34 @@ class Material:
         sRGB tile, repeated over the surface; row 0 is the top (v = 1).
     tile_m : float
         Edge of one texture tile in metres; UVs are metres divided by it.
+    mask : (H, W) bool or None
+        Where the texture is there, of its size; None where it is everywhere.
+    atlas : bool
+        Whether the texture is a foreign mesh's own, in which a place stands for a place of the surface: it is drawn
+        at every distance, where a tileable one fades into its mean. `tile_m` is then its width at its mean scale.
+        So is one without a texture, whose parts have vertex colours.
+    double_sided : bool
+        Whether its triangles are there from both sides; else from the front alone.
+    unlit : bool
+        Whether its colours have their light in them, as those of a photograph have, and are drawn as they are.
+    jpeg : bytes
+        The texture's file, where that is a JPEG: it is stored as it is. Empty where the texture is stored as PNG.
     """
 
     name: str
     colour: tuple[int, int, int]
     texture: NDArray[np.uint8] | None = None
     tile_m: float = 1.0
+    mask: NDArray[np.bool_] | None = None
+    atlas: bool = False
+    double_sided: bool = False
+    unlit: bool = False
+    jpeg: bytes = b""
+
+    @property
+    def foreign(self) -> bool:
+        """Whether it is drawn as only a foreign mesh's materials are."""
+        return self.atlas or self.double_sided or self.unlit or self.mask is not None
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,12 +76,15 @@ class Part:
         Texture coordinates in tiles (metres / `Material.tile_m`).
     material : str
         Name of a `Material` of the scene.
+    colours : (n, 3) uint8 or None
+        sRGB of the vertices, in place of the material's colour; None where that counts.
     """
 
     vertices: NDArray[np.float64]
     faces: NDArray[np.int32]
     uv: NDArray[np.float32]
     material: str
+    colours: NDArray[np.uint8] | None = None
 
 
 @dataclass(frozen=True, eq=False)

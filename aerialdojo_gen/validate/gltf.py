@@ -83,7 +83,8 @@ def mesh_colours(data: SceneData, _rows: Rows) -> Iterator[Finding]:
         material, surface = by_name[entry["name"]], entry["pbrMetallicRoughness"]
         factor = np.array(surface.get("baseColorFactor", (1, 1, 1, 1)), dtype=np.float64)
         if material.texture is not None:
-            mean = material.texture.reshape(-1, 3).mean(axis=0)
+            seen = slice(None) if material.mask is None or not material.mask.any() else material.mask.ravel()
+            mean = material.texture.reshape(-1, 3)[seen].mean(axis=0)
             same = np.abs(mean - material.colour).max() <= _MEAN and np.abs(factor - 1).max() <= _FACTOR
             wanted = f"its texture's mean, {_rgb(mean)}, and no factor"
         else:

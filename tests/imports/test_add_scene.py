@@ -80,7 +80,7 @@ def test_axes_and_units():
         adopt("Box", [raw(box)], scale=float("nan"))
 
 
-def test_what_is_inside_out_is_turned_and_what_is_open_is_doubled():
+def test_what_is_inside_out_is_turned_and_what_is_open_is_there_from_both_sides():
     closed = trimesh.creation.box((10, 10, 4))
     closed.invert()
     scene, repairs = adopt("Box", [raw(closed)])
@@ -89,7 +89,8 @@ def test_what_is_inside_out_is_turned_and_what_is_open_is_doubled():
     assert any("inside out" in line for line in repairs.lines)
     open_box = trimesh.Trimesh(closed.vertices, closed.faces[2:], process=False)
     scene, _ = adopt("Box", [raw(open_box)])
-    assert sum(len(i.faces) for i in things(scene)) == 2 * len(open_box.faces)
+    assert sum(len(i.faces) for i in things(scene)) == len(open_box.faces)
+    assert all(scene.materials[p.material].double_sided for i in things(scene) for p in i.parts)
 
 
 def test_what_has_no_place_is_dropped_and_said():

@@ -16,6 +16,7 @@ export async function readPayload(buffer) {
   const base = 4 + length;
   const groups = await Promise.all(header.groups.map(async (group) => ({
     size: group.size,
+    holes: group.holes, bothSides: group.both_sides, unlit: group.unlit, behind: group.behind,
     position: at(buffer, base, group.position, Float32Array),
     index: at(buffer, base, group.index, Uint32Array),
     ranges: at(buffer, base, group.ranges, Uint32Array),
@@ -26,18 +27,38 @@ export async function readPayload(buffer) {
   return { ...header, boxes: at(buffer, base, header.boxes, Float32Array), groups };
 }
 
-/** Decode PNG layers of one size into the bytes of a texture array, RGBA. */
+const typeOf = (buffer, start) => (new Uint8Array(buffer, start, 1)[0] === 0xff ? "image/jpeg" : "image/png");
+
+/** Decode PNG or JPEG layers of one size into the bytes of a texture array, RGBA. */
 async function decode(buffer, base, [height, width], layers) {
   const texels = new Uint8Array(layers.length * width * height * 4);
   const canvas = new OffscreenCanvas(width, height);
   const context = canvas.getContext("2d", { willReadFrequently: true });
   const images = await Promise.all(layers.map((view) => createImageBitmap(
-    new Blob([new Uint8Array(buffer, base + view.offset, view.bytes)], { type: "image/png" }),
+    new Blob([new Uint8Array(buffer, base + view.offset, view.bytes)], { type: typeOf(buffer, base + view.offset) }),
     { colorSpaceConversion: "none", premultiplyAlpha: "none" })));
   images.forEach((image, k) => {
+    context.clearRect(0, 0, width, height);
     context.drawImage(image, 0, 0);
-    texels.set(context.getImageData(0, 0, width, height).data, k * width * height * 4);
+    const own = context.getImageData(0, 0, width, height).data;
+    fillHoles(own);
+    texels.set(own, k * width * height * 4);
     image.close();
   });
   return texels;
+}
+
+/** Give holes the mean colour of what is there: smaller sizes of a texture mix both. */
+function fillHoles(rgba) {
+  const sum = [0, 0, 0];
+  let solid = 0;
+  for (let i = 0; i < rgba.length; i += 4) {
+    if (rgba[i + 3] < 128) continue;
+    for (let c = 0; c < 3; c++) sum[c] += rgba[i + c];
+    solid++;
+  }
+  if (!solid || 4 * solid === rgba.length) return;
+  for (let i = 0; i < rgba.length; i += 4) {
+    if (rgba[i + 3] < 128) for (let c = 0; c < 3; c++) rgba[i + c] = sum[c] / solid;
+  }
 }

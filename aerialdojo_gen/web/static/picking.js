@@ -47,8 +47,8 @@ function boxEntry(boxes, at, origin, direction) {
   return near <= far ? near : null;
 }
 
-/** Möller–Trumbore, front faces only: those that are drawn. */
-function firstTriangle({ position: p, index }, first, count, o, d, limit) {
+/** Möller–Trumbore, the faces that are drawn: front faces, and both sides of what has both. */
+function firstTriangle({ position: p, index, bothSides }, first, count, o, d, limit) {
   let best = limit;
   for (let f = 3 * first; f < 3 * (first + count); f += 3) {
     const a = 3 * index[f], b = 3 * index[f + 1], c = 3 * index[f + 2];
@@ -56,7 +56,7 @@ function firstTriangle({ position: p, index }, first, count, o, d, limit) {
     const e2x = p[c] - p[a], e2y = p[c + 1] - p[a + 1], e2z = p[c + 2] - p[a + 2];
     const hx = d[1] * e2z - d[2] * e2y, hy = d[2] * e2x - d[0] * e2z, hz = d[0] * e2y - d[1] * e2x;
     const det = e1x * hx + e1y * hy + e1z * hz;
-    if (det <= 1e-12) continue;
+    if (bothSides ? Math.abs(det) <= 1e-12 : det <= 1e-12) continue;
     const sx = o[0] - p[a], sy = o[1] - p[a + 1], sz = o[2] - p[a + 2];
     const u = (sx * hx + sy * hy + sz * hz) / det;
     if (u < 0 || u > 1) continue;

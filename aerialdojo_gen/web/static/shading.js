@@ -21,6 +21,9 @@ const LIGHT = /* glsl */ `
     float lit = max(0.0, dot(n, sun));
     if (lit > 0.0) lit *= sunlit(cameraPosition + rel + n * shadowBias);
     float level = 0.55 + 0.11 * n.z + 0.05 * n.x + 0.03 * n.y + 0.47 * lit;
+    #ifdef UNLIT
+      level = 1.0;
+    #endif
     float haze = 1.0 - exp(-length(rel) / 420.0);
     return mix(base * level, horizon, haze * haze);
   }`;
@@ -42,6 +45,9 @@ const VERTEX = /* glsl */ `
       vColour = colour.rgb;
     #endif
     gl_Position = projectionMatrix * viewMatrix * vec4(position, 1.0);
+    #ifdef BEHIND
+      gl_Position.z = gl_Position.w * 0.999999;
+    #endif
   }`;
 
 const FRAGMENT = /* glsl */ `
@@ -57,11 +63,19 @@ const FRAGMENT = /* glsl */ `
   ${LIGHT}
   void main() {
     #ifdef TEXTURED
-      vec3 base = texture(layers, vec3(vUvl.xy, floor(vUvl.z + 0.5))).rgb;
+      vec4 texel = texture(layers, vec3(vUvl.xy, floor(vUvl.z + 0.5)));
+      vec3 base = texel.rgb;
+      #ifdef HOLES
+        if (texel.a < 0.4) discard;
+      #endif
     #else
       vec3 base = vColour;
     #endif
-    pixel = vec4(min(shade(base, rel), vec3(1.0)), 1.0);
+    #ifdef BEHIND
+      pixel = vec4(base, 1.0);
+    #else
+      pixel = vec4(min(shade(base, rel), vec3(1.0)), 1.0);
+    #endif
   }`;
 
 /** What all materials of a scene share; the shadow map is filled in by castShadow. */
@@ -99,9 +113,15 @@ export function groupMesh(group, uniforms, anisotropy) {
   }
   const material = new THREE.ShaderMaterial({
     glslVersion: THREE.GLSL3, vertexShader: VERTEX, fragmentShader: FRAGMENT, uniforms: own,
-    defines: group.uv ? { TEXTURED: 1 } : {},
+    defines: {
+      ...(group.uv && { TEXTURED: 1 }), ...(group.holes && { HOLES: 1 }), ...(group.unlit && { UNLIT: 1 }),
+      ...(group.behind && { BEHIND: 1 }),
+    },
+    side: group.bothSides || group.behind ? THREE.DoubleSide : THREE.FrontSide,
   });
   const mesh = new THREE.Mesh(geometry, material);
+  if (group.behind) mesh.frustumCulled = false;
+  mesh.userData.shades = !group.behind;
   mesh.matrixAutoUpdate = false;
   return mesh;
 }
@@ -137,8 +157,11 @@ export function castShadow(renderer, meshes, uniforms, low, high, size = 4096) {
     depthTexture: new THREE.DepthTexture(size, size, THREE.FloatType),
   });
   const scene = new THREE.Scene();
-  const black = new THREE.MeshBasicMaterial({ color: 0 });
-  for (const mesh of meshes) scene.add(new THREE.Mesh(mesh.geometry, black));
+  const black = new Map([THREE.FrontSide, THREE.DoubleSide].map((side) => [
+    side, new THREE.MeshBasicMaterial({ color: 0, side })]));
+  for (const mesh of meshes) {
+    if (mesh.userData.shades) scene.add(new THREE.Mesh(mesh.geometry, black.get(mesh.material.side)));
+  }
   renderer.setRenderTarget(target);
   renderer.clear();
   renderer.render(scene, camera);

@@ -1,0 +1,110 @@
+"""Collada and FBX, by Assimp (the extra ``formats``)."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aerialdojo_gen.errors import AssetError
+from aerialdojo_gen.imports.pictures import TEXTURE_PX, Paint, surfaces_of
+from aerialdojo_gen.imports.raw import RawNode, joined, no_corners
+
+_MEND = "install it with pip install 'aerialdojo-gen[formats]', or export the mesh as GLB"
+
+
+def read_by_assimp(path: Path, resolve: Callable[[str], bytes], texture_px: int = TEXTURE_PX) -> list[RawNode]:
+    """Read a Collada or FBX file.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    resolve : callable
+        Gives the bytes of a file that it refers to; FileNotFoundError where there is none.
+    texture_px : int
+        Longest side of a texture, pixels.
+
+    Returns
+    -------
+    list of RawNode
+        One a node of the file that shows a mesh, in the order of the file's tree; transformations are applied.
+
+    Raises
+    ------
+    AssetError
+        Assimp is not installed, or cannot read the file.
+    """
+    try:
+        assimp: Any = importlib.import_module("assimp_py")
+    except ImportError:
+        raise AssetError(f"{path.suffix[1:].upper()} is read by assimp-py: {_MEND}") from None
+    try:
+        scene = assimp.import_file(str(path), assimp.Process_Triangulate | assimp.Process_SortByPType)
+    except (RuntimeError, ValueError, OSError) as error:
+        raise AssetError(
+            f"Assimp cannot read it ({str(error).splitlines()[0][:120] if str(error) else 'no reason'})"
+        ) from None
+    diffuse = int(assimp.TextureType_DIFFUSE)
+    surfaces, index = surfaces_of([_paint(m, diffuse, resolve) for m in scene.materials], texture_px)
+    meshes = [_mesh(mesh) for mesh in scene.meshes]
+    out: list[RawNode] = []
+    waiting = [(scene.root_node, np.eye(4))]
+    while waiting:
+        node, parent = waiting.pop()
+        world = parent @ np.array(node.transformation, dtype=np.float64).reshape(4, 4)
+        bodies = []
+        for k in node.mesh_indices:
+            vertices, faces, corners = meshes[k]
+            if not len(faces):
+                continue
+            surface = index[scene.meshes[k].material_index] if index else -1
+            colour = surfaces[surface].colour if index else (168, 164, 156)
+            turned = faces[:, ::-1] if np.linalg.det(world[:3, :3]) < 0 else faces
+            bodies.append(RawNode(
+                node.name, vertices @ world[:3, :3].T + world[:3, 3], turned,
+                np.tile(np.array(colour, dtype=np.uint8), (len(faces), 1)),
+                np.full(len(faces), surface, dtype=np.int32), corners[turned], surfaces,
+            ))  # fmt: skip
+        if bodies:
+            out.append(bodies[0] if len(bodies) == 1 else joined(node.name, bodies))
+        waiting += [(child, world) for child in reversed(node.children)]
+    return out
+
+
+def _mesh(mesh: Any) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.float32]]:
+    """Vertices (n, 3), faces (m, 3), and what a corner at each vertex carries, (n, 5)."""
+    vertices = np.asarray(mesh.vertices, dtype=np.float64).reshape(-1, 3)
+    flat = np.asarray(mesh.indices, dtype=np.int64).ravel()
+    # Lines and points are meshes of their own, and no triangles.
+    faces = flat.reshape(-1, 3) if len(flat) == 3 * mesh.num_faces else np.zeros((0, 3), dtype=np.int64)
+    corners = no_corners(len(vertices))[:, 0]
+    if mesh.texcoords:
+        uv = np.asarray(mesh.texcoords[0], dtype=np.float32).reshape(len(vertices), -1)[:, :2]
+        corners[:, :2] = np.nan_to_num(uv)
+    if mesh.colors:
+        rgb = np.asarray(mesh.colors[0], dtype=np.float32).reshape(len(vertices), -1)[:, :3]
+        if (rgb < 0.998).any():
+            corners[:, 2:] = np.rint(255.0 * np.clip(np.nan_to_num(rgb), 0.0, 1.0))
+    return vertices, faces, corners
+
+
+def _paint(material: dict[str, Any], diffuse: int, resolve: Callable[[str], bytes]) -> Paint:
+    name = str(material.get("NAME", ""))
+    told = material.get("COLOR_DIFFUSE") or material.get("BASE_COLOR") or (0.66, 0.64, 0.61)
+    red, green, blue = (float(c) for c in list(told)[:3])
+    files = (material.get("TEXTURES") or {}).get(diffuse) or []
+    image, missing = None, ""
+    if files:
+        try:
+            image = resolve(str(files[0]))
+        except FileNotFoundError:
+            missing = str(files[0])[-80:]
+    return Paint(
+        name, (1.0, 1.0, 1.0) if image is not None else (red, green, blue), image, missing, alpha="blend",
+        double_sided=bool(material.get("TWOSIDED", 0)),
+    )  # fmt: skip

@@ -1,0 +1,298 @@
+"""glTF 2.0: nodes, triangles and materials, from a .glb or from a .gltf and what lies beside it.
+
+By code of our own, as general readers leave out what decides the picture: normalised integers, second texture
+coordinates, texture transforms, unlit materials; and they name nodes anew in every run.
+"""
+
+from __future__ import annotations
+
+import base64
+import struct
+from collections.abc import Callable, Iterator
+from typing import Any
+from urllib.parse import unquote
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aerialdojo_gen.common.bounded import loads_json
+from aerialdojo_gen.errors import AssetError
+from aerialdojo_gen.imports.pictures import CUTOFF, TEXTURE_PX, Paint, srgb_of, surfaces_of
+from aerialdojo_gen.imports.raw import RawNode, joined, no_corners, plain
+
+Floats = NDArray[np.float64]
+Resolve = Callable[[str], bytes]
+
+_DTYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
+_WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
+_TRIANGLES, _STRIP, _FAN = 4, 5, 6
+# Writers that put sRGB into vertex colours, which the format means to be linear.
+_CARELESS = ("trimesh", "meshlab", "open3d")
+
+
+def read_gltf(raw: bytes, resolve: Resolve, texture_px: int = TEXTURE_PX) -> list[RawNode]:
+    """Read a glTF file.
+
+    Parameters
+    ----------
+    raw : bytes
+        The whole .glb or .gltf.
+    resolve : callable
+        Gives the bytes of a file that it refers to; FileNotFoundError where there is none.
+    texture_px : int
+        Longest side of a texture, pixels.
+
+    Returns
+    -------
+    list of RawNode
+        One a node of the file's scene that shows a mesh; transformations are applied.
+
+    Raises
+    ------
+    AssetError, ValueError, KeyError, IndexError, TypeError, struct.error
+        It is damaged.
+    """
+    return _File(raw, resolve, texture_px).nodes()
+
+
+class _File:
+    def __init__(self, raw: bytes, resolve: Resolve, texture_px: int) -> None:
+        self._resolve = resolve
+        self._document, self._own = _opened(raw)
+        self._buffers: dict[int, memoryview] = {}
+        writer = str(self._document.get("asset", {}).get("generator", "")).lower()
+        self._srgb_colours = any(word in writer for word in _CARELESS)
+        materials = self._document.get("materials", [])
+        surfaces, index = surfaces_of([self._paint(m, k) for k, m in enumerate(materials)], texture_px)
+        self._surfaces, self._index = surfaces, index
+
+    def nodes(self) -> list[RawNode]:
+        """Return the nodes that show a mesh, in the order of the file's tree."""
+        document, out = self._document, []
+        for k, world in self._placed():
+            node = document["nodes"][k]
+            if "mesh" not in node:
+                continue
+            mesh = document["meshes"][node["mesh"]]
+            name = str(node.get("name") or mesh.get("name") or "")
+            bodies = [b for p in mesh["primitives"] for b in [self._primitive(p, name, world)] if len(b.faces)]
+            if bodies:
+                out.append(bodies[0] if len(bodies) == 1 else joined(name, bodies))
+        return out
+
+    def _placed(self) -> Iterator[tuple[int, Floats]]:
+        nodes = self._document.get("nodes", [])
+        scenes = self._document.get("scenes", [])
+        if scenes:
+            roots = scenes[self._document.get("scene", 0)].get("nodes", [])
+        else:
+            children = {c for n in nodes for c in n.get("children", ())}
+            roots = [k for k in range(len(nodes)) if k not in children]
+        waiting, seen = [(int(k), np.eye(4)) for k in reversed(roots)], set()
+        while waiting:
+            k, parent = waiting.pop()
+            if k in seen or not 0 <= k < len(nodes):
+                continue
+            seen.add(k)
+            world = parent @ _local(nodes[k])
+            yield k, world
+            waiting += [(int(child), world) for child in reversed(nodes[k].get("children", ()))]
+
+    def _primitive(self, primitive: dict[str, Any], name: str, world: Floats) -> RawNode:
+        attributes = primitive["attributes"]
+        local = self._array(attributes["POSITION"]).astype(np.float64)
+        with np.errstate(invalid="ignore", over="ignore"):
+            vertices = local[:, :3] @ world[:3, :3].T + world[:3, 3]
+        faces = self._faces(primitive, len(vertices))
+        if np.linalg.det(world[:3, :3]) < 0:
+            faces = faces[:, ::-1]
+        m = len(faces)
+        if m and (int(faces.max()) >= len(vertices) or int(faces.min()) < 0):
+            raise AssetError("is a damaged glTF file: a triangle beyond its vertices")
+        material = primitive.get("material")
+        surface = np.full(m, -1 if material is None else self._index[material], dtype=np.int32)
+        colours, corners = plain(m), no_corners(m)
+        if material is not None:
+            shown = self._surfaces[self._index[material]]
+            colours = np.tile(np.array(shown.colour, dtype=np.uint8), (m, 1))
+            uv = self._texture_coordinates(self._document["materials"][material], attributes)
+            if shown.texture is not None and uv is not None:
+                corners[..., :2] = uv[faces]
+        if "COLOR_0" in attributes:
+            light = self._array(attributes["COLOR_0"])[:, :3].astype(np.float64)
+            factor = self._factor(material)
+            if factor is not None:
+                light = light * factor
+            own = 255.0 * (np.clip(light, 0.0, 1.0) if self._srgb_colours else srgb_of(light))
+            if (own < 254.5).any():
+                corners[..., 2:] = np.rint(own[faces])
+                colours = np.rint(own[faces].mean(axis=1)).astype(np.uint8)
+        return RawNode(name, vertices, faces, colours, surface, corners, self._surfaces)
+
+    def _factor(self, material: int | None) -> Floats | None:
+        """Return what vertex colours are multiplied by, linear; None for white."""
+        if material is None:
+            return None
+        factor = np.array(_base(self._document["materials"][material])[0][:3], dtype=np.float64)
+        if (factor == 1.0).all():
+            return None
+        return srgb_of(factor) if self._srgb_colours else factor
+
+    def _faces(self, primitive: dict[str, Any], n: int) -> NDArray[np.int64]:
+        mode = primitive.get("mode", _TRIANGLES)
+        if mode not in (_TRIANGLES, _STRIP, _FAN):
+            return np.zeros((0, 3), dtype=np.int64)
+        flat = self._array(primitive["indices"]).ravel() if "indices" in primitive else np.arange(n)
+        flat = flat.astype(np.int64)
+        if mode == _TRIANGLES:
+            return flat[: len(flat) // 3 * 3].reshape(-1, 3)
+        if len(flat) < 3:
+            return np.zeros((0, 3), dtype=np.int64)
+        if mode == _FAN:
+            return np.column_stack([np.full(len(flat) - 2, flat[0]), flat[1:-1], flat[2:]])
+        out = np.column_stack([flat[:-2], flat[1:-1], flat[2:]])
+        out[1::2] = out[1::2, ::-1]
+        return out
+
+    def _texture_coordinates(
+        self, material: dict[str, Any], attributes: dict[str, int]
+    ) -> NDArray[np.float32] | None:
+        source = _base(material)[1]
+        if source is None:
+            return None
+        moved = source.get("extensions", {}).get("KHR_texture_transform", {})
+        which = f"TEXCOORD_{moved.get('texCoord', source.get('texCoord', 0))}"
+        if which not in attributes:
+            return None
+        uv = self._array(attributes[which])[:, :2].astype(np.float64)
+        if moved:
+            angle = float(moved.get("rotation", 0.0))
+            c, s = np.cos(angle), np.sin(angle)
+            uv = uv * np.array(moved.get("scale", (1.0, 1.0)), dtype=np.float64)
+            uv = uv @ np.array([[c, s], [-s, c]]).T + np.array(moved.get("offset", (0.0, 0.0)), dtype=np.float64)
+        uv[~np.isfinite(uv)] = 0.0
+        # The format's v points down.
+        return np.column_stack([uv[:, 0], 1.0 - uv[:, 1]]).astype(np.float32)
+
+    def _paint(self, material: dict[str, Any], k: int) -> Paint:
+        factor, source = _base(material)
+        extensions = material.get("extensions", {})
+        image, missing = (None, "") if source is None else self._image(source["index"])
+        red, green, blue = srgb_of(np.array(factor[:3], dtype=np.float64)).tolist()
+        return Paint(
+            str(material.get("name") or f"material {k}"), (red, green, blue), image, missing,
+            alpha=str(material.get("alphaMode", "OPAQUE")).lower(),
+            cutoff=float(material.get("alphaCutoff", CUTOFF)) if material.get("alphaMode") == "MASK" else CUTOFF,
+            double_sided=bool(material.get("doubleSided", False)), unlit="KHR_materials_unlit" in extensions,
+        )  # fmt: skip
+
+    def _image(self, texture: int) -> tuple[bytes | None, str]:
+        entry = self._document["textures"][texture]
+        source = entry.get("source")
+        if source is None:
+            found = [e["source"] for e in entry.get("extensions", {}).values() if "source" in e]
+            if not found:
+                return None, "without an image"
+            source = found[0]
+        image = self._document["images"][source]
+        if "bufferView" in image:
+            return bytes(self._view(image["bufferView"])), ""
+        uri = str(image["uri"])
+        try:
+            return self._fetched(uri), ""
+        except FileNotFoundError:
+            return None, unquote(uri)[:80]
+
+    def _fetched(self, uri: str) -> bytes:
+        if uri.startswith("data:"):
+            return base64.b64decode(uri.split(",", 1)[1])
+        return self._resolve(unquote(uri))
+
+    def _array(self, accessor: int) -> NDArray[Any]:
+        """Return an accessor's values, (n, width); normalised integers as they are meant, 0-1."""
+        entry = self._document["accessors"][accessor]
+        count, width = int(entry["count"]), _WIDTHS[entry["type"]]
+        dtype = np.dtype(_DTYPES[entry["componentType"]])
+        if "bufferView" in entry:
+            values = self._strided(entry["bufferView"], int(entry.get("byteOffset", 0)), dtype, count, width)
+        else:
+            values = np.zeros((count, width), dtype=dtype)
+        if "sparse" in entry:
+            sparse, n = entry["sparse"], int(entry["sparse"]["count"])
+            told = sparse["indices"]
+            kind = np.dtype(_DTYPES[told["componentType"]])
+            rows = self._strided(told["bufferView"], int(told.get("byteOffset", 0)), kind, n, 1).ravel()
+            told = sparse["values"]
+            values = values.copy()
+            values[rows] = self._strided(told["bufferView"], int(told.get("byteOffset", 0)), dtype, n, width)
+        if entry.get("normalized") and dtype.kind in "iu":
+            return np.maximum(values.astype(np.float64) / np.iinfo(dtype).max, -1.0)
+        return values
+
+    def _strided(self, view: int, offset: int, dtype: np.dtype[Any], count: int, width: int) -> NDArray[Any]:
+        data = self._view(view)
+        stride = int(self._document["bufferViews"][view].get("byteStride", 0)) or width * dtype.itemsize
+        last = offset + (count - 1) * stride + width * dtype.itemsize
+        if count < 0 or offset < 0 or (count and last > len(data)):
+            raise AssetError("is a damaged glTF file: an array beyond its data")
+        if not count:
+            return np.zeros((0, width), dtype=dtype)
+        return np.ndarray((count, width), dtype, data, offset, (stride, dtype.itemsize))
+
+    def _view(self, view: int) -> memoryview:
+        entry = self._document["bufferViews"][view]
+        data = self._buffer(int(entry["buffer"]))
+        start, size = int(entry.get("byteOffset", 0)), int(entry["byteLength"])
+        if start < 0 or size < 0 or start + size > len(data):
+            raise AssetError("is a damaged glTF file: cut short")
+        return data[start : start + size]
+
+    def _buffer(self, k: int) -> memoryview:
+        if k not in self._buffers:
+            entry = self._document["buffers"][k]
+            if "uri" in entry:
+                try:
+                    self._buffers[k] = memoryview(self._fetched(str(entry["uri"])))
+                except FileNotFoundError:
+                    raise AssetError(f"refers to {str(entry['uri'])[:80]}, which is not beside it") from None
+            else:
+                self._buffers[k] = self._own
+        return self._buffers[k]
+
+
+def _opened(raw: bytes) -> tuple[dict[str, Any], memoryview]:
+    if raw[:4] != b"glTF":
+        document = loads_json(raw, finite=False)
+        if not isinstance(document, dict):
+            raise AssetError("is no glTF file")
+        return document, memoryview(b"")
+    (length,) = struct.unpack_from("<I", raw, 12)
+    document = loads_json(raw[20 : 20 + length], finite=False)
+    rest = memoryview(raw)[20 + length :]
+    if len(rest) < 8:
+        return document, memoryview(b"")
+    (size,) = struct.unpack_from("<I", rest, 0)
+    return document, rest[8 : 8 + size]
+
+
+def _base(material: dict[str, Any]) -> tuple[list[float], dict[str, Any] | None]:
+    """Return a material's colour, linear, and its texture."""
+    old = material.get("extensions", {}).get("KHR_materials_pbrSpecularGlossiness")
+    if old is not None:
+        return list(old.get("diffuseFactor", (1.0, 1.0, 1.0, 1.0))), old.get("diffuseTexture")
+    surface = material.get("pbrMetallicRoughness", {})
+    return list(surface.get("baseColorFactor", (1.0, 1.0, 1.0, 1.0))), surface.get("baseColorTexture")
+
+
+def _local(node: dict[str, Any]) -> Floats:
+    if "matrix" in node:
+        return np.array(node["matrix"], dtype=np.float64).reshape(4, 4).T
+    x, y, z, w = (float(c) for c in node.get("rotation", (0, 0, 0, 1)))
+    out = np.eye(4)
+    out[:3, :3] = np.array([
+        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+    ]) * np.array(node.get("scale", (1, 1, 1)), dtype=np.float64)  # fmt: skip
+    out[:3, 3] = node.get("translation", (0, 0, 0))
+    return out

@@ -1,0 +1,246 @@
+"""Textures of foreign meshes: decoded, held to a budget, and made materials that are told by what they show."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from aerialdojo_gen.imports.raw import GREY, RawSurface
+
+# Of one texture, pixels a side; of all textures of a file together, pixels.
+TEXTURE_PX = 8192
+TEXELS = 8192 * 8192
+# What a file may ask to be decoded at all, pixels a side and in all.
+_LARGEST_PX, _MOST_DECODED = 16384, 20000 * 10000
+# Alpha below this is a hole, where the file says nothing else.
+CUTOFF = 0.5
+# A texture that is blended is cut where at least so much of it is all but gone; else it is glass, and drawn whole.
+_HOLES, _GONE = 0.05, 0.1
+
+
+@dataclass(frozen=True)
+class Paint:
+    """What a file's material says, before its texture is decoded.
+
+    Attributes
+    ----------
+    name : str
+        Its name, for messages.
+    factor : (r, g, b) of float
+        sRGB, 0-1: the colour, or what a texture is multiplied by, linearly.
+    image : bytes or None
+        The texture's file.
+    missing : str
+        Name of a texture that the file asks for and that is not there; empty where none is.
+    alpha : {"opaque", "mask", "blend"}
+        What the texture's alpha means.
+    cutoff : float
+        Of ``"mask"``.
+    mask : bytes or None
+        A file whose brightness is the texture's alpha.
+    double_sided, unlit : bool
+    """
+
+    name: str
+    factor: tuple[float, float, float] = (GREY[0] / 255, GREY[1] / 255, GREY[2] / 255)
+    image: bytes | None = None
+    missing: str = ""
+    alpha: str = "opaque"
+    cutoff: float = CUTOFF
+    mask: bytes | None = None
+    double_sided: bool = False
+    unlit: bool = False
+
+
+def surfaces_of(paints: Sequence[Paint], texture_px: int = TEXTURE_PX) -> tuple[tuple[RawSurface, ...], list[int]]:
+    """Decode what materials show.
+
+    Parameters
+    ----------
+    paints : sequence of Paint
+        The file's materials.
+    texture_px : int
+        Longest side of a texture; larger ones are made smaller, and all of them where together they are more than
+        `TEXELS`.
+
+    Returns
+    -------
+    surfaces : tuple of RawSurface
+        In the order of their digests, each once.
+    index : list of int
+        Where each of the paints is among them.
+    """
+    decoded: dict[bytes, tuple[NDArray[Any] | None, str]] = {}
+    made = [_surface(paint, decoded) for paint in paints]
+    made = _held(made, texture_px)
+    surfaces = {s.digest: s for s in reversed(made)}
+    order = sorted(surfaces)
+    return tuple(surfaces[d] for d in order), [order.index(s.digest) for s in made]
+
+
+def _surface(paint: Paint, decoded: dict[bytes, tuple[NDArray[Any] | None, str]]) -> RawSurface:
+    red, green, blue = (round(255 * min(max(c, 0.0), 1.0)) for c in paint.factor)
+    name = paint.name or "a material"
+    plain = RawSurface(
+        paint.name, (red, green, blue), double_sided=paint.double_sided, unlit=paint.unlit,
+        notes=(f"{name}: its texture {paint.missing} is not there: drawn in its colour",) if paint.missing else (),
+    )  # fmt: skip
+    if paint.image is None:
+        return plain
+    if paint.image not in decoded:
+        decoded[paint.image] = _decoded(paint.image)
+    image, fault = decoded[paint.image]
+    if image is None:
+        return replace(plain, notes=(f"{name}: its texture {fault}: drawn in its colour",))
+    rgb, alpha = _channels(image)
+    white = min(red, green, blue) == 255
+    if not white:
+        # What modellers mean is a product of light; a texture's numbers are not.
+        scale = _linear(np.array([red, green, blue]) / 255.0)
+        table = np.rint(255 * _srgb(_linear(np.arange(256) / 255.0)[:, None] * scale)).astype(np.uint8)
+        rgb = np.stack([table[:, k][rgb[..., k]] for k in range(3)], axis=2)
+    if paint.mask is not None:
+        other, _ = _decoded(paint.mask)
+        if other is not None:
+            grey = _channels(other)[0].max(axis=2)
+            alpha = cv2.resize(grey, (rgb.shape[1], rgb.shape[0]), interpolation=cv2.INTER_AREA).astype(np.uint8)
+    mask = _mask(alpha, paint)
+    mean = _mean(rgb, mask)
+    jpeg = paint.image if white and mask is None and paint.image[:3] == b"\xff\xd8\xff" and image.ndim == 3 else b""
+    return replace(plain, colour=mean, texture=rgb, mask=mask, jpeg=jpeg)
+
+
+def _mask(alpha: NDArray[np.uint8] | None, paint: Paint) -> NDArray[np.bool_] | None:
+    if alpha is None or paint.alpha == "opaque":
+        return None
+    if paint.alpha == "blend" and float((alpha < 255 * _GONE).mean()) < _HOLES:
+        return None
+    mask = np.asarray(alpha >= 255 * paint.cutoff)
+    return None if mask.all() else mask
+
+
+def _mean(rgb: NDArray[np.uint8], mask: NDArray[np.bool_] | None) -> tuple[int, int, int]:
+    seen = rgb.reshape(-1, 3) if mask is None or not mask.any() else rgb[mask]
+    red, green, blue = (int(c) for c in seen.mean(axis=0, dtype=np.float64).round())
+    return red, green, blue
+
+
+def _decoded(file: bytes) -> tuple[NDArray[Any] | None, str]:
+    """Decode an image file, with the channels that it has, RGB(A); or say what is wrong with it."""
+    size = image_size(file)
+    if file[:12] == b"\xabKTX 20\xbb\r\n\x1a\n":
+        return None, "is in KTX2, which is not read (export it as PNG or JPEG)"
+    if size is None:
+        return None, "is no PNG, JPEG, BMP or WebP"
+    if max(size) > _LARGEST_PX or size[0] * size[1] > _MOST_DECODED:
+        return None, f"has {size[0]} x {size[1]} pixels, {_LARGEST_PX} a side are the most"
+    image = cv2.imdecode(np.frombuffer(file, dtype=np.uint8), cv2.IMREAD_UNCHANGED)
+    if image is None or image.dtype not in (np.uint8, np.uint16):
+        return None, "cannot be decoded"
+    if image.dtype == np.uint16:
+        image = (image >> 8).astype(np.uint8)
+    if image.ndim == 3:
+        image = cv2.cvtColor(image, cv2.COLOR_BGRA2RGBA if image.shape[2] == 4 else cv2.COLOR_BGR2RGB)
+    return np.ascontiguousarray(image), ""
+
+
+def image_size(file: bytes) -> tuple[int, int] | None:
+    """Read an image's width and height, pixels, without decoding it; None where it is of no kind that is read."""
+    if file[:8] == b"\x89PNG\r\n\x1a\n" and len(file) >= 24:
+        width, height = struct.unpack(">II", file[16:24])
+        return int(width), int(height)
+    if file[:3] == b"\xff\xd8\xff":
+        return _jpeg_size(file)
+    if file[:2] == b"BM" and len(file) >= 26:
+        width, height = struct.unpack("<ii", file[18:26])
+        return abs(width), abs(height)
+    if file[:4] == b"RIFF" and file[8:12] == b"WEBP" and len(file) >= 30:
+        return _webp_size(file)
+    return None
+
+
+def _webp_size(file: bytes) -> tuple[int, int] | None:
+    kind = file[12:16]
+    if kind == b"VP8X":
+        return 1 + int.from_bytes(file[24:27], "little"), 1 + int.from_bytes(file[27:30], "little")
+    if kind == b"VP8L":
+        bits = int.from_bytes(file[21:25], "little")
+        return 1 + (bits & 0x3FFF), 1 + (bits >> 14 & 0x3FFF)
+    width, height = struct.unpack("<HH", file[26:30])
+    return width & 0x3FFF, height & 0x3FFF
+
+
+def _jpeg_size(file: bytes) -> tuple[int, int] | None:
+    at = 2
+    while at + 9 < len(file) and file[at] == 0xFF:
+        kind = file[at + 1]
+        if kind == 0xFF:
+            at += 1
+            continue
+        if 0xC0 <= kind <= 0xCF and kind not in (0xC4, 0xC8, 0xCC):
+            height, width = struct.unpack(">HH", file[at + 5 : at + 9])
+            return int(width), int(height)
+        at += 2 if 0xD0 <= kind <= 0xD9 else 2 + struct.unpack(">H", file[at + 2 : at + 4])[0]
+    return None
+
+
+def _channels(image: NDArray[np.uint8]) -> tuple[NDArray[np.uint8], NDArray[np.uint8] | None]:
+    if image.ndim == 2:
+        return np.repeat(image[..., None], 3, axis=2), None
+    if image.shape[2] == 4:
+        return np.ascontiguousarray(image[..., :3]), np.ascontiguousarray(image[..., 3])
+    return image, None
+
+
+def _held(made: list[RawSurface], texture_px: int) -> list[RawSurface]:
+    """Make textures smaller until each, and all together, keep to what they are given."""
+    different = {s.digest: s for s in made if s.texture is not None}
+    sides = {d: s.texture.shape[:2] for d, s in different.items() if s.texture is not None}
+    size = {d: _fitted(shape, texture_px) for d, shape in sides.items()}
+    while sum(h * w for h, w in size.values()) > TEXELS:
+        largest = max(max(shape) for shape in size.values())
+        size = {d: _fitted(shape, max(1, largest // 2)) for d, shape in size.items()}
+    resized = {d: _resized(s, size[d]) for d, s in different.items() if size[d] != sides[d]}
+    return [resized.get(s.digest, s) for s in made]
+
+
+def _fitted(shape: tuple[int, ...], most: int) -> tuple[int, int]:
+    height, width = shape[0], shape[1]
+    longest = max(height, width)
+    if longest <= most:
+        return height, width
+    return max(1, round(height * most / longest)), max(1, round(width * most / longest))
+
+
+def _resized(surface: RawSurface, size: tuple[int, int]) -> RawSurface:
+    assert surface.texture is not None
+    height, width = surface.texture.shape[:2]
+    smaller = cv2.resize(surface.texture, size[::-1], interpolation=cv2.INTER_AREA)
+    mask = surface.mask
+    if mask is not None:
+        mask = cv2.resize(mask.astype(np.float32), size[::-1], interpolation=cv2.INTER_AREA) >= CUTOFF
+    note = (
+        f"{surface.name or 'a material'}: its texture of {width} x {height} pixels is kept at {size[1]} x {size[0]}"
+    )
+    return replace(
+        surface, texture=np.asarray(smaller, dtype=np.uint8), mask=mask, jpeg=b"", notes=(*surface.notes, note)
+    )
+
+
+def _linear(srgb: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
+
+
+def _srgb(linear: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.where(linear <= 0.0031308, linear * 12.92, 1.055 * np.maximum(linear, 0.0) ** (1 / 2.4) - 0.055)
+
+
+def srgb_of(linear: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Turn linear light, 0-1, into sRGB, 0-1."""
+    return _srgb(np.clip(linear, 0.0, 1.0))

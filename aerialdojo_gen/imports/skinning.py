@@ -1,0 +1,213 @@
+"""From the look of a foreign mesh's faces to parts and materials of a scene."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aerialdojo_gen.imports.raw import RawNode, RawSurface
+from aerialdojo_gen.scenes.catalogue import single
+from aerialdojo_gen.scenes.mesh import areas
+from aerialdojo_gen.scenes.model import Material, Part
+
+# What lights textures: what suits them, the scene's sun, or nothing, as their light is in them.
+LIGHTS = ("auto", "sun", "baked")
+
+# A thing with more plain colours than this is painted vertex by vertex, and no longer part by part.
+_MOST_PLAIN = 64
+# More colours than this are those of a photograph.
+_MOST_PAINTED = 256
+# A texture that covers itself more often than this is a pattern, and no picture of a place (a box has six sides).
+_REPEATED = 8.0
+_MIXED = "vertex colours"
+
+
+@dataclass
+class Skinner:
+    """Makes parts, and the materials that they are of.
+
+    Attributes
+    ----------
+    baked : bool
+        Whether textures and vertex colours have their light in them.
+    materials : dict of str to Material
+        What has been used, by name.
+    """
+
+    baked: bool = False
+    materials: dict[str, Material] = field(default_factory=dict)
+    _scales: dict[str, float] = field(default_factory=dict)
+
+    def parts(self, body: RawNode, double_sided: bool) -> tuple[Part, ...]:
+        """Make a body's parts, one a material.
+
+        Parameters
+        ----------
+        body : RawNode
+            Sound: every vertex finite, every index inside.
+        double_sided : bool
+            Whether its faces are there from both sides.
+
+        Returns
+        -------
+        tuple of Part
+            In the order of their materials' names; what has no area in float32 is left out.
+        """
+        found: list[tuple[Material, Part]] = []
+        kind = _kinds(body)
+        plain = kind == _PLAIN
+        for rgb in np.unique(body.colours[plain], axis=0):
+            rows = plain & (body.colours == rgb).all(axis=1)
+            red, green, blue = (int(c) for c in rgb)
+            name = f"#{red:02x}{green:02x}{blue:02x}"
+            found += self._made(body, rows, Material(name, (red, green, blue), double_sided=double_sided))
+        painted = kind == _PAINTED
+        if painted.any():
+            # White: vertex colours take its place, and where a program multiplies by both they stay what they are.
+            paint = Material(_MIXED, (255, 255, 255), atlas=True, double_sided=double_sided, unlit=self.baked)
+            found += self._made(body, painted, paint)
+        for k in np.unique(kind[kind >= 0]):
+            found += self._made(body, kind == k, self._textured(body.surfaces[k], double_sided))
+        return tuple(part for _, part in sorted(found, key=lambda pair: pair[0].name))
+
+    def scale(self, nodes: Sequence[RawNode]) -> None:
+        """Find how many metres a texture's width stands for, over all that shows it; vertices are in metres."""
+        world: dict[str, float] = {}
+        flat: dict[str, float] = {}
+        for node in nodes:
+            kind = _kinds(node)
+            for k in np.unique(kind[kind >= 0]):
+                rows, key = kind == k, node.surfaces[k].digest
+                own = areas(node.vertices, node.faces[rows].astype(np.int32))
+                world[key] = world.get(key, 0.0) + float(own.sum())
+                flat[key] = flat.get(key, 0.0) + float(_uv_areas(node, rows).sum())
+        self._scales = {key: float(np.sqrt(world[key] / flat[key])) if flat[key] > 0 else 1.0 for key in world}
+
+    def _textured(self, surface: RawSurface, double_sided: bool) -> Material:
+        both = double_sided or (surface.mask is not None and surface.double_sided)
+        return Material(
+            f"texture {surface.digest[:12]}", surface.colour, surface.texture,
+            min(max(self._scales.get(surface.digest, 1.0), 1e-3), 1e6), surface.mask, atlas=True, double_sided=both,
+            unlit=self.baked or surface.unlit, jpeg=surface.jpeg,
+        )  # fmt: skip
+
+    def _made(self, body: RawNode, rows: NDArray[np.bool_], material: Material) -> list[tuple[Material, Part]]:
+        material = replace(material, name=_name(material))
+        material = self.materials.get(material.name, material)
+        corners = None
+        if material.texture is not None and body.corners is not None:
+            corners = body.corners[rows][..., :2]
+        elif material.atlas:
+            corners = _painted(body, rows)
+        vertices, faces, carried = _split(single(body.vertices), body.faces[rows], corners)
+        solid = areas(vertices, faces) > 0.0
+        if not solid.any():
+            return []
+        used, faces = np.unique(faces[solid], return_inverse=True)
+        uv = np.zeros((len(used), 2), dtype=np.float32)
+        colours = None
+        if carried is not None and material.texture is not None:
+            uv = carried[used].astype(np.float32)
+        elif carried is not None:
+            colours = carried[used].astype(np.uint8)
+        self.materials.setdefault(material.name, material)
+        part = Part(vertices[used], faces.reshape(-1, 3).astype(np.int32), uv, material.name, colours)
+        return [(material, part)]
+
+
+_PLAIN, _PAINTED = -1, -2
+
+
+def _kinds(body: RawNode) -> NDArray[np.int32]:
+    """Tell how each face is drawn: the index of its texture, or one of `_PLAIN` and `_PAINTED`."""
+    n = len(body.faces)
+    kind = np.full(n, _PLAIN, dtype=np.int32)
+    if body.corners is not None:
+        own = np.isfinite(body.corners[..., 2:]).all(axis=(1, 2))
+        # A face of one colour is no more than that colour, however its file tells it.
+        even = own & (np.ptp(np.nan_to_num(body.corners[..., 2:]), axis=1) < 1.0).all(axis=1)
+        kind[own & ~even] = _PAINTED
+        if (kind == _PAINTED).any():
+            kind[even] = _PAINTED
+        if body.surface is not None:
+            shows = np.array([s.texture is not None for s in body.surfaces] + [False])
+            shown = shows[body.surface]
+            kind[shown] = body.surface[shown]
+    plain = kind == _PLAIN
+    if plain.any() and len(np.unique(body.colours[plain], axis=0)) > _MOST_PLAIN:
+        kind[plain] = _PAINTED
+    return kind
+
+
+def _painted(body: RawNode, rows: NDArray[np.bool_]) -> NDArray[np.float32]:
+    """Colours of faces' corners, (m, 3, 3), where they have none that of the face."""
+    face = np.repeat(body.colours[rows][:, None, :].astype(np.float32), 3, axis=1)
+    if body.corners is None:
+        return face
+    own = body.corners[rows][..., 2:]
+    return np.where(np.isfinite(own), np.clip(own, 0.0, 255.0), face)
+
+
+def _uv_areas(node: RawNode, rows: NDArray[np.bool_]) -> NDArray[np.float64]:
+    assert node.corners is not None
+    uv = node.corners[rows][..., :2].astype(np.float64)
+    a, b = uv[:, 1] - uv[:, 0], uv[:, 2] - uv[:, 0]
+    return np.asarray(np.abs(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]) / 2.0)
+
+
+def _split(
+    vertices: NDArray[np.float64], faces: NDArray[np.int64], corners: NDArray[np.float32] | None
+) -> tuple[NDArray[np.float64], NDArray[np.int32], NDArray[np.float32] | None]:
+    """Split vertices where what their corners carry jumps."""
+    used, flat = np.unique(faces, return_inverse=True)
+    flat = flat.reshape(-1)
+    if corners is None:
+        return vertices[used], flat.reshape(-1, 3).astype(np.int32), None
+    carried = corners.reshape(len(flat), -1) + np.float32(0.0)  # no negative zero
+    order = np.lexsort((*carried.T[::-1], flat))
+    new = np.ones(len(order), dtype=bool)
+    new[1:] = (flat[order[1:]] != flat[order[:-1]]) | (carried[order[1:]] != carried[order[:-1]]).any(axis=1)
+    index = np.empty(len(order), dtype=np.int32)
+    index[order] = np.cumsum(new) - 1
+    first = order[new]
+    return vertices[used[flat[first]]], index.reshape(-1, 3), carried[first]
+
+
+def _name(material: Material) -> str:
+    base = material.name.split(",")[0]
+    return base + (", both sides" if material.double_sided else "") + (", unlit" if material.unlit else "")
+
+
+def photographed(nodes: Sequence[RawNode]) -> bool:
+    """Guess whether most of a mesh shows photographs of the place, with their light in them, and no patterns.
+
+    Parameters
+    ----------
+    nodes : sequence of RawNode
+        Sound ones.
+
+    Returns
+    -------
+    bool
+        Whether more than half of the area has a texture that hardly covers itself, or vertex colours of which there
+        are more than a few hundred.
+    """
+    whole = painted = 0.0
+    shown: dict[str, float] = {}
+    flat: dict[str, float] = {}
+    colours: list[NDArray[np.uint8]] = []
+    for node in nodes:
+        area, kind = areas(node.vertices, node.faces.astype(np.int32)), _kinds(node)
+        whole += float(area.sum())
+        painted += float(area[kind == _PAINTED].sum())
+        colours.append(np.unique(node.colours[kind == _PAINTED], axis=0))
+        for k in np.unique(kind[kind >= 0]):
+            key, rows = node.surfaces[k].digest, kind == k
+            shown[key] = shown.get(key, 0.0) + float(area[rows].sum())
+            flat[key] = flat.get(key, 0.0) + float(_uv_areas(node, rows).sum())
+    many = len(np.unique(np.concatenate([*colours, np.zeros((0, 3), np.uint8)]), axis=0)) > _MOST_PAINTED
+    once = sum(area for key, area in shown.items() if flat[key] <= _REPEATED)
+    return once + (painted if many else 0.0) > 0.5 * whole

@@ -1,0 +1,206 @@
+"""What a place of a scene's surface shows: its texture coordinates, its colour, and whether it is a hole.
+
+For what casts rays. OpenGL finds it out by itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from aerialdojo_gen.geometry.cameras import Camera
+from aerialdojo_gen.geometry.rays import TriangleRayCaster
+from aerialdojo_gen.geometry.soup import soup
+from aerialdojo_gen.rendering.casters import triangle_caster
+from aerialdojo_gen.scenes.context import context_of
+from aerialdojo_gen.scenes.model import Material, Part, Scene
+from aerialdojo_gen.scenes.sampling import texel
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int32]
+
+# How often a ray goes on through a hole, and how far behind it it begins anew, metres.
+_MOST_HOLES, _ON_M = 12, 1e-3
+
+
+class SurfaceTexels:
+    """Looks up places on the triangles of parts.
+
+    Parameters
+    ----------
+    parts : sequence of Part
+        Their triangles are numbered in this order.
+    materials : mapping of str to Material
+        That they are of.
+    """
+
+    def __init__(self, parts: Sequence[Part], materials: Mapping[str, Material]) -> None:
+        names = sorted({part.material for part in parts})
+        counts = [len(part.faces) for part in parts]
+        self.materials = [materials[name] for name in names]
+        self.material = np.repeat(np.array([names.index(p.material) for p in parts], dtype=np.int64), counts)
+        self.vertices, self.faces = soup(parts)
+        self.uv = np.concatenate([part.uv for part in parts]).astype(np.float64)
+        self._painted = any(part.colours is not None for part in parts)
+        if self._painted:
+            self._colours = np.concatenate([_vertex_colours(p, materials[p.material]) for p in parts])
+            self._own = np.repeat([part.colours is not None for part in parts], counts)
+
+    def shares(self, face: Ints, points: Floats) -> Floats:
+        """Weights (n, 3) of a face's corners at points (n, 3) on it."""
+        index = self.faces[face]
+        a, b, c = (self.vertices[index[:, k]] for k in range(3))
+        ab, ac, ap = b - a, c - a, points - a
+        d00, d01, d11 = (np.einsum("ij,ij->i", x, y) for x, y in ((ab, ab), (ab, ac), (ac, ac)))
+        d20, d21 = np.einsum("ij,ij->i", ap, ab), np.einsum("ij,ij->i", ap, ac)
+        area = np.maximum(d00 * d11 - d01 * d01, 1e-30)
+        v, w = (d11 * d20 - d01 * d21) / area, (d00 * d21 - d01 * d20) / area
+        return np.stack([1.0 - v - w, v, w], axis=1)
+
+    def holes(self, face: Ints, points: Floats) -> NDArray[np.bool_]:
+        """Whether places (n, 3) on faces (n,) are holes."""
+        out = np.zeros(len(face), dtype=bool)
+        for k in np.unique(self.material[face]):
+            mask = self.materials[k].mask
+            if mask is not None:
+                rows = np.flatnonzero(self.material[face] == k)
+                uv = self.uv_at(face[rows], points[rows])
+                out[rows] = ~mask[texel(uv, mask.shape[0], mask.shape[1])]
+        return out
+
+    def colours(self, face: Ints, points: Floats) -> NDArray[np.uint8]:
+        """Colours (n, 3) of places (n, 3) on faces (n,): of the nearest texel."""
+        out = np.array([m.colour for m in self.materials], dtype=np.uint8)[self.material[face]]
+        for k in np.unique(self.material[face]):
+            texture = self.materials[k].texture
+            if texture is not None:
+                rows = np.flatnonzero(self.material[face] == k)
+                uv = self.uv_at(face[rows], points[rows])
+                out[rows] = texture[texel(uv, texture.shape[0], texture.shape[1])]
+        return self.painted(face, points, out)
+
+    def painted(self, face: Ints, points: Floats, colours: NDArray[Any]) -> NDArray[Any]:
+        """Put vertex colours in the place of colours (n, 3) where there are some."""
+        if not self._painted:
+            return colours
+        rows = np.flatnonzero(self._own[face])
+        mixed = np.einsum(
+            "nk,nkc->nc", self.shares(face[rows], points[rows]), self._colours[self.faces[face[rows]]].astype(float)
+        )
+        out = colours.copy()
+        out[rows] = np.clip(np.rint(mixed), 0, 255)
+        return out
+
+    def uv_at(self, face: Ints, points: Floats) -> Floats:
+        """Texture coordinates (n, 2) of places (n, 3) on faces (n,)."""
+        share, uv = self.shares(face, points), self.uv[self.faces[face]]
+        return np.asarray(share[:, :1] * uv[:, 0] + share[:, 1:2] * uv[:, 1] + share[:, 2:] * uv[:, 2])
+
+
+def _vertex_colours(part: Part, material: Material) -> NDArray[np.uint8]:
+    if part.colours is not None:
+        return part.colours
+    return np.tile(np.array(material.colour, dtype=np.uint8), (len(part.vertices), 1))
+
+
+class SeenRayCaster:
+    """Casts rays at what is to be seen of a scene: through the holes in its textures.
+
+    Parameters
+    ----------
+    caster : TriangleRayCaster
+        Over the triangles of `texels`, in their order.
+    texels : SurfaceTexels
+    """
+
+    def __init__(self, caster: TriangleRayCaster, texels: SurfaceTexels) -> None:
+        self._caster = caster
+        self._texels = texels
+        holed = np.array([m.mask is not None for m in texels.materials])
+        self._holed = holed[texels.material]
+
+    def first_hit(self, origins: Floats, directions: Floats) -> tuple[Floats, Ints]:
+        """Find what rays hit first; see `aerialdojo_gen.geometry.rays.TriangleRayCaster.first_hit`."""
+        distance, face = self._caster.first_hit(origins, directions)
+        length = np.linalg.norm(directions, axis=1)
+        origins = np.broadcast_to(origins, directions.shape)
+        rows = np.flatnonzero(face >= 0)
+        for _ in range(_MOST_HOLES):
+            rows = rows[self._holed[face[rows]]]
+            points = origins[rows] + (distance[rows] / length[rows])[:, None] * directions[rows]
+            through = self._texels.holes(face[rows], points)
+            rows, points = rows[through], points[through]
+            if not len(rows):
+                break
+            on = points + _ON_M * directions[rows] / length[rows, None]
+            further, face[rows] = self._caster.first_hit(on, directions[rows])
+            distance[rows] += further + _ON_M
+            rows = rows[face[rows] >= 0]
+        return distance, face
+
+
+def scene_texels(scene: Scene) -> SurfaceTexels:
+    """Return what looks up places on a scene's instances, in their order."""
+    parts = [part for instance in scene.instances for part in instance.parts]
+    return context_of(scene).part("texels", lambda: SurfaceTexels(parts, scene.materials))
+
+
+def seen_caster(scene: Scene, caster: TriangleRayCaster | None = None) -> TriangleRayCaster | SeenRayCaster:
+    """Return what casts rays at what is to be seen of a scene: its one Embree scene, but through holes."""
+    whole = caster or triangle_caster(scene)
+    if all(material.mask is None for material in scene.materials.values()):
+        return whole
+    return SeenRayCaster(whole, scene_texels(scene))
+
+
+class Backdrop:
+    """Paints what a scene has behind everything.
+
+    Parameters
+    ----------
+    scene : Scene
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        parts = [part for instance in scene.backdrop for part in instance.parts]
+        self._texels = SurfaceTexels(parts, scene.materials) if parts else None
+        self._caster = TriangleRayCaster(*soup(parts)) if parts else None
+
+    def paint(
+        self, rgb: NDArray[np.uint8], missing: NDArray[np.bool_], camera: Camera, world_from_camera: Floats
+    ) -> None:
+        """Paint the backdrop into a picture.
+
+        Parameters
+        ----------
+        rgb : (H, W, 3) uint8
+            Changed in place.
+        missing : (H, W) bool
+            Pixels that show nothing else.
+        camera : Camera
+        world_from_camera : (4, 4) float64
+        """
+        if self._caster is None or self._texels is None or not missing.any():
+            return
+        rows, columns = np.nonzero(missing)
+        directions = camera.rays().reshape(camera.height, camera.width, 3)[rows, columns]
+        directions = directions @ world_from_camera[:3, :3].T
+        eye = world_from_camera[:3, 3]
+        distance, face = self._caster.first_hit(eye, directions)
+        hit = np.flatnonzero(face >= 0)
+        along = distance[hit] / np.linalg.norm(directions[hit], axis=1)
+        rgb[rows[hit], columns[hit]] = self._texels.colours(face[hit], eye + along[:, None] * directions[hit])
+
+
+def reduced(texture: NDArray[np.uint8], longest: int) -> NDArray[np.uint8]:
+    """Make a texture smaller where its longer side has more pixels than `longest`."""
+    height, width = texture.shape[:2]
+    if max(height, width) <= longest:
+        return texture
+    scale = longest / max(height, width)
+    size = (max(1, round(width * scale)), max(1, round(height * scale)))
+    return np.asarray(cv2.resize(texture, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)

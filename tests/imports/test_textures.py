@@ -1,0 +1,372 @@
+"""Textures, vertex colours, holes and both sides of foreign meshes: from the file to pictures and words."""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+from support import textured
+
+from aerialdojo_gen.annotations.colours import colour_shares, uncoloured
+from aerialdojo_gen.errors import AssetError
+from aerialdojo_gen.geometry.cameras import Camera, look_at_pose
+from aerialdojo_gen.imports.adopt import adopt
+from aerialdojo_gen.imports.files import read_into, read_mesh, unpacked
+from aerialdojo_gen.imports.pictures import Paint, image_size, surfaces_of
+from aerialdojo_gen.imports.raw import RawNode
+from aerialdojo_gen.rendering.checks import Solid
+from aerialdojo_gen.rendering.gl import GlRenderer
+from aerialdojo_gen.rendering.orthographic import OrthographicPictures
+from aerialdojo_gen.rendering.raycast import RayRenderer
+from aerialdojo_gen.rendering.world import RenderWorld
+from aerialdojo_gen.scenes.glb import read_glb, write_glb
+from aerialdojo_gen.scenes.model import Scene
+from aerialdojo_gen.web.payload import scene_payload
+
+RENDERERS = (GlRenderer, RenderWorld, RayRenderer)
+CAMERA = Camera(256, 256, 90.0)
+
+
+def nodes_of(path: Path, out: Path, texture_px: int = 8192) -> list[RawNode]:
+    assert read_into(path, out, texture_px) == ""
+    return unpacked(out)
+
+
+def stored(scene: Scene, path: Path) -> Scene:
+    write_glb(scene, path)
+    return read_glb(path)
+
+
+def thing(scene: Scene, category: str):
+    (found,) = [i for i in scene.instances if i.category == category]
+    return found
+
+
+@pytest.fixture(scope="module")
+def yard(tmp_path_factory) -> Scene:
+    folder = tmp_path_factory.mktemp("yard")
+    nodes = nodes_of(textured.yard(folder / "yard.glb"), folder / "nodes.npz")
+    return stored(adopt("Yard", nodes, light="sun")[0], folder / "scene.glb")
+
+
+@pytest.fixture(scope="module")
+def board(tmp_path_factory) -> Scene:
+    """A checkerboard on a wall that faces south, whose colours are drawn as they are."""
+    folder = tmp_path_factory.mktemp("board")
+    out = textured.Gltf()
+    paint = out.material(textured.picture_file(textured.checkerboard()))
+    out.node("Wall", textured.WALL, textured.WALL_FACES, paint, textured.WALL_UV)
+    ground = np.array([[-30.0, -30, 0], [30, -30, 0], [30, 30, 0], [-30, 30, 0]])
+    out.node("Ground", ground, textured.WALL_FACES, out.material(factor=[0.2, 0.25, 0.15, 1]))
+    nodes = nodes_of(out.write(folder / "board.glb"), folder / "nodes.npz")
+    return stored(adopt("Board", nodes, light="baked")[0], folder / "scene.glb")
+
+
+@pytest.mark.parametrize("renderer", RENDERERS)
+def test_a_checkerboard_is_photographed_straight_on(board, renderer):
+    # From 4 m a picture of 90 degrees shows 8 m of the wall: its texture, pixel for pixel.
+    with renderer(board) as camera:
+        picture = camera.render(CAMERA, look_at_pose(np.array([0.0, -4, 4]), np.array([0.0, 0, 4])))
+    wanted = textured.checkerboard()
+    wrong = np.abs(picture.rgb.astype(int) - wanted).max(axis=2) > 4
+    # Between two squares a pixel may be of both.
+    assert wrong.mean() < 0.06
+    assert np.abs(picture.rgb[:20, :20].astype(int) - (20, 40, 200)).max() <= 4
+    np.testing.assert_allclose(picture.depth_m[40:200, 40:200], 4.0, atol=1e-3)
+
+
+@pytest.mark.parametrize("renderer", RENDERERS)
+def test_a_wall_has_its_textures_mean_colour_from_both_sides_near_and_far(board, renderer):
+    wall = textured.checkerboard().reshape(-1, 3).mean(axis=0)
+    with renderer(board) as camera:
+        for side in (-1, 1):
+            for away in (4.0, 23.0):
+                pose = look_at_pose(np.array([0.0, side * away, 4]), np.array([0.0, 0, 4]))
+                picture = camera.render(CAMERA, pose)
+                shown = picture.rgb[np.abs(picture.depth_m - away) < 0.02]
+                assert len(shown) > 1000
+                # Haze is all that is added.
+                np.testing.assert_allclose(shown.mean(axis=0), wall, atol=5.0)
+
+
+@pytest.mark.parametrize("renderer", RENDERERS)
+def test_a_lit_wall_is_its_texture_times_the_light(yard, renderer):
+    with renderer(yard) as camera:
+        pose = look_at_pose(np.array([0.0, -6, 4]), np.array([0.0, 0, 4]))
+        rgb = camera.render(CAMERA, pose).rgb[64:192, 64:192].reshape(-1, 3).mean(axis=0)
+    sun = np.array(yard.sun) / np.linalg.norm(yard.sun)
+    light = 0.55 - 0.03 - 0.47 * sun[1]
+    # From 6 m the middle half of the picture shows 6 of the wall's 8 m.
+    wanted = textured.photograph()[32:224, 32:224].reshape(-1, 3).mean(axis=0)
+    np.testing.assert_allclose(rgb / light, wanted, atol=5.0)
+
+
+def test_holes_are_looked_through_and_leaves_are_seen(yard):
+    # A quarter of the hedge's 4 x 4 m has leaves: its middle.
+    hedge = thing(yard, "hedge")
+    pose = look_at_pose(hedge.centroid + np.array([0, 6, 0]), hedge.centroid)
+    for renderer in RENDERERS:
+        with renderer(yard) as camera:
+            depth = camera.render(CAMERA, pose).depth_m
+        seen = np.abs(depth - 6.0) < 0.02
+        rows, columns = np.nonzero(seen)
+        assert seen[128, 128]
+        edge = 2.0 / 6.0 * 128
+        assert seen.sum() == pytest.approx(edge**2, rel=0.15)
+        assert rows.max() - rows.min() == pytest.approx(edge, abs=4)
+        assert columns.max() - columns.min() == pytest.approx(edge, abs=4)
+
+
+def test_vertex_colours_run_over_a_face(yard):
+    stone = thing(yard, "stone")
+    assert stone.attributes["colour"] in ("purple and yellow", "yellow and purple", "pink and yellow")
+    pose = look_at_pose(stone.centroid - (0, 4, 0), stone.centroid)
+    with GlRenderer(yard) as camera:
+        rgb = camera.render(CAMERA, pose).rgb
+    column = rgb[100:157, 128].astype(int)
+    # From yellow at the top to purple at the bottom, a little at a time.
+    assert (np.diff(column[:, 1]) <= 0).all()
+    assert column[0, 1] - column[-1, 1] > 60
+
+
+def test_words_for_colours_are_what_textures_show(yard):
+    truck = thing(yard, "truck")
+    assert truck.attributes["colour"] == "blue and white"
+    shares = colour_shares(truck, yard.materials)
+    assert shares["blue"] == pytest.approx(0.5, abs=0.05)
+    assert shares["white"] == pytest.approx(0.5, abs=0.05)
+    assert uncoloured("blue and white", truck, yard.materials) == []
+    assert uncoloured("red", truck, yard.materials) == ["red"]
+    assert thing(yard, "hedge").attributes["colour"] == "green"
+
+
+def test_from_neither_side_of_a_wall_is_a_camera_inside_and_in_a_house_it_is(yard):
+    solid = Solid(yard)
+    directions = CAMERA.rays().reshape(-1, 3)[::97]
+    for y in (-3.0, 3.0):
+        pose = look_at_pose(np.array([0.0, y, 4]), np.array([0.0, 0, 4]))
+        _, behind = solid.first_hit(pose[:3, 3], directions @ pose[:3, :3].T)
+        assert behind == 0.0
+    inside = look_at_pose(thing(yard, "truck").centroid, np.array([0.0, 0, 1.5]))
+    # A ray along an edge may slip through between two sides.
+    assert solid.first_hit(inside[:3, 3], directions @ inside[:3, :3].T)[1] > 0.95
+
+
+def test_a_map_shows_both_sides_alike_and_no_stipples(yard):
+    ground = thing(yard, "ground")
+    (x0, y0, _), (x1, y1, _) = ground.bounds
+    picture = OrthographicPictures(yard).from_above((x0, x1, y0, y1), 0.25)
+    free = picture[2:20, 2:118]  # the north, where nothing stands
+    assert np.ptp(free.reshape(-1, 3), axis=0).max() == 0
+
+
+def test_a_scene_comes_back_from_its_file_to_the_bit_and_twice_the_same(tmp_path):
+    digests = set()
+    for k in range(2):
+        path = textured.yard(tmp_path / f"{k}.glb")
+        scene, _ = adopt("Yard", nodes_of(path, tmp_path / f"{k}.npz"), light="auto")
+        back = stored(scene, tmp_path / f"scene{k}.glb")
+        digests.add(hashlib.sha256((tmp_path / f"scene{k}.glb").read_bytes()).hexdigest())
+        write_glb(back, tmp_path / "again.glb")
+        assert (tmp_path / "again.glb").read_bytes() == (tmp_path / f"scene{k}.glb").read_bytes()
+        for one, other in zip(scene.instances, back.instances, strict=True):
+            for a, b in zip(one.parts, other.parts, strict=True):
+                np.testing.assert_array_equal(a.uv, b.uv)
+                assert (a.colours is None) == (b.colours is None)
+                if a.colours is not None and b.colours is not None:
+                    np.testing.assert_array_equal(a.colours, b.colours)
+        for name, material in scene.materials.items():
+            if material.texture is not None:
+                mine, theirs = material.texture, back.materials[name].texture
+                if material.mask is not None:
+                    np.testing.assert_array_equal(material.mask, back.materials[name].mask)
+                np.testing.assert_array_equal(mine, theirs)
+    assert len(digests) == 1
+    assert scene_payload(back) == scene_payload(back)
+
+
+def test_a_scan_keeps_its_jpeg_and_is_drawn_as_it_is(tmp_path):
+    path = textured.scan(tmp_path / "scan.obj")
+    scene, repairs = adopt("Scan", nodes_of(path, tmp_path / "nodes.npz"))
+    (material,) = [m for m in scene.materials.values() if m.texture is not None]
+    assert material.jpeg == (tmp_path / "scan.jpg").read_bytes()
+    assert material.unlit
+    assert any("drawn as they are" in line for line in repairs.lines)
+    assert sum(len(p.faces) for i in scene.instances for p in i.parts if p.material == material.name) == 2 * 40**2
+    assert (tmp_path / "scan.jpg").read_bytes() in (stored(scene, tmp_path / "s.glb") and
+                                                     (tmp_path / "s.glb").read_bytes())  # fmt: skip
+
+
+def test_textures_keep_to_their_budget_and_it_is_told(tmp_path):
+    path = textured.scan(tmp_path / "scan.obj", texture_px=512)
+    scene, repairs = adopt("Scan", nodes_of(path, tmp_path / "nodes.npz", texture_px=128))
+    (material,) = [m for m in scene.materials.values() if m.texture is not None]
+    assert material.texture is not None
+    assert material.texture.shape == (128, 128, 3)
+    assert any("512 x 512 pixels is kept at 128 x 128" in line for line in repairs.lines)
+
+
+def test_a_missing_texture_is_told(tmp_path):
+    path = textured.scan(tmp_path / "scan.obj")
+    (tmp_path / "scan.jpg").unlink()
+    scene, repairs = adopt("Scan", nodes_of(path, tmp_path / "nodes.npz"))
+    assert all(m.texture is None for m in scene.materials.values())
+    assert any("scan.jpg" in line for line in repairs.lines)
+    path.with_suffix(".mtl").unlink()
+    _, repairs = adopt("Scan", nodes_of(path, tmp_path / "nodes.npz"))
+    assert any("scan.mtl" in line for line in repairs.lines)
+
+
+def test_an_object_of_several_materials_has_all_of_them(tmp_path):
+    lines = [
+        "mtllib m.mtl",
+        "o Wall",
+        "v -4 0 0",
+        "v 4 0 0",
+        "v 4 0 8",
+        "v -4 0 8",
+        "vt 0 0",
+        "vt 1 0",
+        "vt 1 1",
+        "vt 0 1",
+    ]
+    lines += ["usemtl one", "f 1/1 2/2 3/3", "usemtl two", "f 1/1 3/3 4/4"]
+    (tmp_path / "wall.obj").write_text("\n".join(lines))
+    (tmp_path / "m.mtl").write_text("newmtl one\nmap_Kd a.png\nnewmtl two\nKd 0 1 0\n")
+    (tmp_path / "a.png").write_bytes(textured.picture_file(textured.checkerboard()))
+    (node,) = nodes_of(tmp_path / "wall.obj", tmp_path / "nodes.npz")
+    assert node.name == "Wall"
+    assert node.surface is not None
+    shown = [node.surfaces[k] for k in node.surface]
+    assert sorted((s.texture is not None, s.colour) for s in shown)[0] == (False, (0, 255, 0))
+    assert [s.texture is not None for s in shown].count(True) == 1
+
+
+def test_files_elsewhere_are_not_read(tmp_path):
+    (tmp_path / "in").mkdir()
+    path = textured.scan(tmp_path / "in" / "scan.obj")
+    (tmp_path / "in" / "scan.jpg").rename(tmp_path / "scan.jpg")
+    path.with_suffix(".mtl").write_text("newmtl atlas\nmap_Kd ../scan.jpg\n")
+    _, repairs = adopt("Scan", nodes_of(path, tmp_path / "nodes.npz"))
+    assert any("../scan.jpg is not there" in line for line in repairs.lines)
+
+
+def test_ply_keeps_the_colours_of_its_vertices(tmp_path):
+    body = trimesh.creation.icosphere(3, 8.0)
+    height = (body.vertices[:, 2] + 8.0) / 16.0
+    paint = np.column_stack([255 * height, 80 * np.ones_like(height), 255 * (1 - height)])
+    body.visual.vertex_colors = np.rint(paint).astype(np.uint8)
+    body.export(tmp_path / "ball.ply")
+    scene, _ = adopt("Ball", nodes_of(tmp_path / "ball.ply", tmp_path / "nodes.npz"))
+    (part,) = next(i for i in scene.instances if i.category != "ground").parts
+    assert part.colours is not None
+    high = part.vertices[:, 2] / np.ptp(part.vertices[:, 2])
+    np.testing.assert_allclose(part.colours[:, 0], 255 * high, atol=2.0)
+
+
+def test_gltf_says_more_than_plain_triangles(tmp_path):
+    """Normalised integers, a second set of coordinates, a moved texture, a strip, a factor, a mirrored node."""
+    out = textured.Gltf()
+    paint = out.material(textured.picture_file(textured.checkerboard(2)), factor=[0.5, 1, 1, 1])
+    texture = out.document["materials"][paint]["pbrMetallicRoughness"]["baseColorTexture"]
+    texture |= {"texCoord": 1, "extensions": {"KHR_texture_transform": {"scale": [2, 2], "offset": [0.5, 0]}}}
+    out.node("Wall", textured.WALL[[0, 1, 3, 2]], [0, 1, 2, 3], paint)
+    primitive = out.document["meshes"][0]["primitives"][0]
+    uv = (textured.WALL_UV[[0, 1, 3, 2]] * 65535).astype(np.uint16)
+    primitive["attributes"]["TEXCOORD_1"] = out.accessor(uv, normalized=True)
+    primitive["mode"] = 5
+    out.document["nodes"][0] |= {"scale": [-1, 1, 1]}
+    (node,) = nodes_of(out.write(tmp_path / "wall.glb"), tmp_path / "nodes.npz")
+    assert len(node.faces) == 2
+    assert node.corners is not None
+    np.testing.assert_allclose(np.unique(node.corners[..., 0]), [0.5, 2.5], atol=1e-4)
+    normal = np.cross(*(node.vertices[node.faces[:, k]] - node.vertices[node.faces[:, 0]] for k in (1, 2)))
+    # Turned by the mirror, and turned back.
+    assert (normal[:, 1] < 0).all()
+    texture = node.surfaces[0].texture
+    assert texture is not None
+    # Half the light of 235 is 173, of 190 139 and of 20 12 (IEC 61966-2-1); what is not red stays.
+    np.testing.assert_allclose(np.unique(texture[..., 0]), [12, 139, 173], atol=1)
+    assert set(np.unique(texture[..., 1])) == {40, 235}
+
+
+@pytest.mark.parametrize(
+    ("file", "said"),
+    [
+        (b"\xabKTX 20\xbb\r\n\x1a\n" + bytes(40), "KTX2"),
+        (b"no picture at all", "no PNG, JPEG"),
+        (b"\x89PNG\r\n\x1a\n" + bytes(8) + (60000).to_bytes(4, "big") * 2, "60000 x 60000"),
+    ],
+)
+def test_bad_textures_are_told_and_the_mesh_stays(file, said):
+    (surface,), _ = surfaces_of([Paint("wall", (1.0, 0.0, 0.0), file)])
+    assert surface.texture is None
+    assert surface.colour == (255, 0, 0)
+    assert said in surface.notes[0]
+
+
+def test_sizes_of_pictures_are_told_without_decoding():
+    picture = np.zeros((20, 30, 3), dtype=np.uint8)
+    for suffix in (".png", ".jpg", ".bmp", ".webp"):
+        assert image_size(textured.picture_file(picture, suffix)) == (30, 20)
+
+
+def test_only_known_lights_are_taken(tmp_path):
+    nodes = read_mesh(textured.scan(tmp_path / "scan.obj", cells=8))
+    with pytest.raises(AssetError, match="--light 'moon'"):
+        adopt("Scan", nodes, light="moon")
+
+
+_DAE = """<?xml version="1.0"?>
+<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">
+<asset><unit name="meter" meter="1"/><up_axis>Z_UP</up_axis></asset>
+<library_images><image id="i"><init_from>board.png</init_from></image></library_images>
+<library_effects><effect id="e"><profile_COMMON>
+<newparam sid="s"><surface type="2D"><init_from>i</init_from></surface></newparam>
+<newparam sid="t"><sampler2D><source>s</source></sampler2D></newparam>
+<technique sid="c"><lambert><diffuse><texture texture="t" texcoord="UV"/></diffuse></lambert></technique>
+</profile_COMMON></effect></library_effects>
+<library_materials><material id="m"><instance_effect url="#e"/></material></library_materials>
+<library_geometries><geometry id="g"><mesh>
+<source id="p"><float_array id="pa" count="12">-4 0 0 4 0 0 4 0 8 -4 0 8</float_array><technique_common>
+<accessor source="#pa" count="4" stride="3"><param name="X" type="float"/><param name="Y" type="float"/>
+<param name="Z" type="float"/></accessor></technique_common></source>
+<source id="u"><float_array id="ua" count="8">0 0 1 0 1 1 0 1</float_array><technique_common>
+<accessor source="#ua" count="4" stride="2"><param name="S" type="float"/><param name="T" type="float"/></accessor>
+</technique_common></source>
+<vertices id="v"><input semantic="POSITION" source="#p"/></vertices>
+<triangles count="2" material="m"><input semantic="VERTEX" source="#v" offset="0"/>
+<input semantic="TEXCOORD" source="#u" offset="1" set="0"/><p>0 0 1 1 2 2 0 0 2 2 3 3</p></triangles>
+</mesh></geometry></library_geometries>
+<library_visual_scenes><visual_scene id="w"><node id="Wall" name="Wall"><translate>0 5 0</translate>
+<instance_geometry url="#g"><bind_material><technique_common><instance_material symbol="m" target="#m">
+<bind_vertex_input semantic="UV" input_semantic="TEXCOORD" input_set="0"/></instance_material></technique_common>
+</bind_material></instance_geometry></node></visual_scene></library_visual_scenes>
+<scene><instance_visual_scene url="#w"/></scene></COLLADA>
+"""
+
+
+def test_collada_brings_its_textures_and_places(tmp_path):
+    (tmp_path / "board.png").write_bytes(textured.picture_file(textured.checkerboard()))
+    (tmp_path / "wall.dae").write_text(_DAE)
+    (node,) = nodes_of(tmp_path / "wall.dae", tmp_path / "nodes.npz")
+    assert node.name == "Wall"
+    # Whatever the file's axis, Assimp turns Collada y up.
+    np.testing.assert_allclose(node.vertices[:, 2], -5.0)
+    assert node.surface is not None
+    assert node.corners is not None
+    np.testing.assert_array_equal(node.surfaces[node.surface[0]].texture, textured.checkerboard())
+    at = node.vertices[node.faces]
+    np.testing.assert_allclose(node.corners[..., 0], (at[..., 0] + 4) / 8, atol=1e-6)
+    np.testing.assert_allclose(node.corners[..., 1], at[..., 1] / 8, atol=1e-6)
+
+
+@pytest.mark.parametrize("suffix", [".dae", ".fbx"])
+def test_damaged_interchange_files_are_one_line(tmp_path, suffix):
+    (tmp_path / f"bad{suffix}").write_bytes(b"no mesh " * 20)
+    fault = read_into(tmp_path / f"bad{suffix}", tmp_path / "nodes.npz")
+    assert "Assimp cannot read it" in fault
+    assert "\n" not in fault
