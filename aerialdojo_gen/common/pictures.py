@@ -90,9 +90,7 @@ def _decoded(file: bytes | memoryview | None, flags: int) -> NDArray[Any] | None
     return None if image is None else np.ascontiguousarray(image)
 
 
-def encode_masked(
-    image: NDArray[np.uint8], mask: NDArray[np.bool_], setting: tuple[int, ...] = PLAIN_PNG
-) -> bytes:
+def encode_masked(image: NDArray[np.uint8], mask: NDArray[np.bool_], setting: tuple[int, ...] = PLAIN_PNG) -> bytes:
     """Encode a picture (H, W, 3) that is there only where a mask (H, W) is, as PNG with alpha; see `encode_png`."""
     # OpenCV's order is blue, green, red, alpha.
     return _encoded(np.dstack([np.where(mask, 255, 0).astype(np.uint8), image]), ".png", setting)

@@ -102,9 +102,7 @@ def _texture(material: Material) -> NDArray[np.uint8] | None:
     return reduced(material.texture, _LARGEST_PX)
 
 
-def _group(
-    body: _Body, look: _Look, parts: list[tuple[int, Part]], materials: dict[str, Material]
-) -> dict[str, Any]:
+def _group(body: _Body, look: _Look, parts: list[tuple[int, Part]], materials: dict[str, Material]) -> dict[str, Any]:
     """Merge parts that draw together; within the group they stay in the order of the scene's instances."""
     vertices, index = soup([p for _, p in parts])
     counts = [len(p.vertices) for _, p in parts]
