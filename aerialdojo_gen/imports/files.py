@@ -148,7 +148,7 @@ def _read(path: Path, texture_px: int) -> list[RawNode]:
     beside = _beside(path)
     scene = trimesh.load_scene(
         path, file_type=suffix[1:], resolver=beside, process=False, split_objects=True, group_material=True,
-        maintain_order=True,
+        maintain_order=False,
     )  # fmt: skip
     shown = []
     for name in scene.graph.nodes_geometry:

@@ -106,7 +106,7 @@ class Skinner:
         solid = areas(vertices, faces) > 0.0
         if not solid.any():
             return []
-        used, faces = np.unique(faces[solid], return_inverse=True)
+        used, index = np.unique(faces[solid], return_inverse=True)
         uv = np.zeros((len(used), 2), dtype=np.float32)
         colours = None
         if carried is not None and material.texture is not None:
@@ -114,7 +114,7 @@ class Skinner:
         elif carried is not None:
             colours = carried[used].astype(np.uint8)
         self.materials.setdefault(material.name, material)
-        part = Part(vertices[used], faces.reshape(-1, 3).astype(np.int32), uv, material.name, colours)
+        part = Part(vertices[used], index.reshape(-1, 3).astype(np.int32), uv, material.name, colours)
         return [(material, part)]
 
 
@@ -135,7 +135,7 @@ def _kinds(body: RawNode) -> NDArray[np.int32]:
         if body.surface is not None:
             shows = np.array([s.texture is not None for s in body.surfaces] + [False])
             shown = shows[body.surface]
-            kind[shown] = body.surface[shown]
+            kind[shown] = body.surface[shown].astype(np.int32)
     plain = kind == _PLAIN
     if plain.any() and len(np.unique(body.colours[plain], axis=0)) > _MOST_PLAIN:
         kind[plain] = _PAINTED

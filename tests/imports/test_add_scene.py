@@ -178,7 +178,7 @@ def test_a_reader_that_wants_too_much_is_ended(village):
         ("a.3ds", b"hello, this is text", "3DS"),
         ("a.obj", b"# nothing\n", "a.obj"),
         ("a.ply", b"ply\nformat ascii 1.0\nelement vertex 99999999999\nend_header\n", "a.ply"),
-        ("a.fbx", b"x", "read from GLB"),
+        ("a.step", b"x", "read from GLB"),
     ],
 )
 def test_no_mesh_at_all(tmp_path, name, content, message):
