@@ -103,6 +103,8 @@ class Recipe(BaseModel):
         The layout's own.
     inventory : dict of str to int
         Least number of instances of a category that the built scene must have.
+    attribution : str
+        Whose data the scene is made of, and under which licence, where it is of a real place.
     level : tuple of Level
         Places levelled in the layout's ground, in their order.
     moves : dict of str to Move
@@ -120,6 +122,7 @@ class Recipe(BaseModel):
     palette: dict[str, str] = {}
     parameters: dict[str, Any] = {}
     inventory: dict[str, Annotated[int, Field(ge=0, le=100_000)]] = {}
+    attribution: Annotated[str, Field(max_length=500)] = ""
     level: Annotated[tuple[Level, ...], Field(max_length=200)] = ()
     moves: Annotated[dict[str, Move], Field(max_length=500)] = {}
 
