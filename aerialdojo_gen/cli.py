@@ -16,6 +16,7 @@ from aerialdojo_gen.commands import (
     config,
     evaluate,
     exchange,
+    places,
     release,
     render,
     report,
@@ -72,7 +73,7 @@ def _program(
     """Take what stands before a command."""
 
 
-for _group in (stages, render, sources, annotate, evaluate, release, show, validate, exchange, report):
+for _group in (stages, render, sources, places, annotate, evaluate, release, show, validate, exchange, report):
     app.add_typer(_group.app)
 app.add_typer(config.app, name="config")
 

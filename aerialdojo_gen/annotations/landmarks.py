@@ -58,6 +58,10 @@ def choose_landmarks(
         rest = [i for i in _prominent(vocabulary, 8 * n) if i not in chosen and names.of(i)]
     else:
         rest = [i for i in scene.instances if vocabulary.kinds.get(i.category) == "landmark" and i not in chosen]
+        if len(chosen) + len(rest) < n and at_most:
+            # A town of a map has no landmark of the catalogue as often as not: its tallest buildings will do.
+            named = _Names(vocabulary)
+            rest += [i for i in _prominent(vocabulary, 8 * n) if i not in (*chosen, *rest) and named.of(i)]
     while len(chosen) < n and rest:
         best = max(rest, key=lambda i: (spread_m(i, chosen), float(i.bounds[1, 2])))
         chosen.append(best)

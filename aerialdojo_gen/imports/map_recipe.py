@@ -80,7 +80,6 @@ def town_recipe(
         "rails": map_ground.rails(lines, window),
         "crossings": map_things.crossings(points, site),
         "signals": map_things.signals(points, site),
-        "origin": {"lon_deg": round(frame.lon_deg, 7), "lat_deg": round(frame.lat_deg, 7)},
         "areas": map_ground.areas(areas, lines, window),
         "roads": map_ground.streets(lines, window, told),
         "buildings": buildings,
@@ -96,17 +95,17 @@ def town_recipe(
         raise UsageError(
             f"--bbox {in_words(bbox)} has nothing of the map in it: {source} reaches over {in_words(found.extent)}"
         )
-    rise = 0.0
+    rise, origin = 0.0, {"lon_deg": round(frame.lon_deg, 7), "lat_deg": round(frame.lat_deg, 7)}
     if heights is not None:
         table = heights(frame, (width, depth))
-        parameters["origin"]["z_m"] = table.pop("z_m")
+        origin["z_m"] = table.pop("z_m")
         parameters["heights"] = table
         rise = max(max(row) for row in table["rows_m"])
     top = max((b["top_m"] for one in buildings for b in one["bodies"]), default=0.0) + rise
     ceiling = max(math.ceil(top + _HEADROOM_M), _LOWEST_CEILING_M) if ceiling_m is None else ceiling_m
     head = {
         "layout": "town", "seed": seed, "size_m": [width, depth], "ceiling_m": float(ceiling),
-        "attribution": "; ".join(filter(None, (ATTRIBUTION, extra_attribution))),
+        "attribution": "; ".join(filter(None, (ATTRIBUTION, extra_attribution))), "origin": origin,
     }  # fmt: skip
     comments = (
         f"Made by add-map of {source}, --bbox {' '.join(f'{v:.7g}' for v in bbox)}.",

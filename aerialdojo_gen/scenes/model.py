@@ -145,6 +145,8 @@ class Scene:
         Unit vector from the scene towards the sun, world frame.
     imported : bool
         Whether it comes from a mesh of another make, whose categories are its own.
+    attribution : str
+        Whose data it is made of, and under which licence; empty for what is this program's own.
     """
 
     name: str
@@ -154,6 +156,7 @@ class Scene:
     sky: tuple[int, int, int] = (150, 190, 230)
     sun: tuple[float, float, float] = (0.45, -0.35, 0.82)
     imported: bool = False
+    attribution: str = ""
     _by_node: dict[str, Instance] = field(default_factory=dict, init=False, repr=False)
 
     def __post_init__(self) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from shapely.geometry import Polygon
 
 from aerialdojo_gen.layouts.places.town.model import Body, Building
-from aerialdojo_gen.layouts.places.town.roofs import Parts, roof
+from aerialdojo_gen.layouts.places.town.roofs import PARAPET_M, Parts, roof
 from aerialdojo_gen.scenes.grammar_buildings import facade
 from aerialdojo_gen.scenes.grammar_frames import block
 from aerialdojo_gen.scenes.grammar_scatter import slab
@@ -24,17 +24,23 @@ def put_up(site: Site, building: Building) -> None:
 
     Its floor is the lowest ground about it, as OpenStreetMap counts heights, and its walls reach a little below.
     """
-    plans = [body.plan for body in building.bodies]
-    base = min(site.ground_z(x, y) for plan in plans for x, y in plan.exterior.coords)
+    plans, base = [body.plan for body in building.bodies], building_base(site, building)
     parts: Parts = []
     for body, plan in zip(building.bodies, plans, strict=True):
         parts += _canopy(body, plan, base, building) if building.canopy else _body(site, body, plan, base, building)
     attributes = {"colour": building.colour} if building.colour else {}
     attributes |= {"place": f"on {building.street}"} if building.street else {}
     instance = site.add(None, building.category, parts, attributes)
-    low, high = (float(z) for z in instance.bounds[:, 2])
+    low = float(instance.bounds[0, 2])
     for plan, body in zip(plans, building.bodies, strict=True):
-        site.occupy(plan.buffer(0.15), low if body.base_m < 3.0 else base + body.base_m, high)
+        # What stands on a flat roof stands within its parapet.
+        top = base + body.top_m - (PARAPET_M if body.roof == "flat" else 0.0)
+        site.occupy(plan.buffer(0.15), low if body.base_m < 3.0 else base + body.base_m, top - 0.01)
+
+
+def building_base(site: Site, building: Building) -> float:
+    """Height of a building's ground floor: the lowest ground about it, metres."""
+    return min(site.ground_z(x, y) for body in building.bodies for x, y in body.plan.exterior.coords)
 
 
 def _body(site: Site, body: Body, plan: Polygon, base: float, building: Building) -> Parts:

@@ -194,14 +194,6 @@ class Rule(_Table):
     lamps: bool = True
 
 
-class Origin(_Table):
-    """Where the scene's origin lies, WGS 84, degrees; `z_m` is the height that is z = 0, metres."""
-
-    lon_deg: Annotated[float, Field(ge=-180, le=180)]
-    lat_deg: Annotated[float, Field(ge=-90, le=90)]
-    z_m: Annotated[float, Field(ge=-2000, le=2000)] = 0.0
-
-
 _MOST = 1000
 
 
@@ -210,8 +202,6 @@ class Parameters(_Table):
 
     Attributes
     ----------
-    origin : Origin, optional
-        Where on the earth it is.
     ground : str
         Material of what nothing is said of.
     heights : Heights, optional
@@ -228,7 +218,6 @@ class Parameters(_Table):
         The side of the street that is driven on.
     """
 
-    origin: Origin | None = None
     ground: str = "paving:#9a978f"
     heights: Heights | None = None
     buildings: Annotated[tuple[Building, ...], Field(max_length=_MOST)] = ()
@@ -243,4 +232,4 @@ class Parameters(_Table):
     drive_on: Literal["right", "left"] = "right"
 
 
-__all__ = ["Area", "Barrier", "Body", "Building", "Origin", "Parameters", "Road", "Rule", "Thing"]
+__all__ = ["Area", "Barrier", "Body", "Building", "Parameters", "Road", "Rule", "Thing"]

@@ -22,7 +22,7 @@ _RECTANGLE = 0.93
 _GABLE_THICK_M = 0.18
 _STEPS = 8
 _ON_M = 1e-6
-_PARAPET_M, _PARAPET_THICK_M = 0.45, 0.3
+PARAPET_M, _PARAPET_THICK_M = 0.45, 0.3
 
 
 def roof(plan: Polygon, top_m: float, rise_m: float, form: str, wall: str, roofing: str) -> Parts:
@@ -53,7 +53,7 @@ def roof(plan: Polygon, top_m: float, rise_m: float, form: str, wall: str, roofi
 def _flat(plan: Polygon, top_m: float, roofing: str) -> Parts:
     # The lid's sides must not lie in the walls' plane, where both would flicker.
     lid = plan.buffer(-0.02, join_style="mitre")
-    level = top_m - _PARAPET_M
+    level = top_m - PARAPET_M
     rim = plan.difference(plan.buffer(-_PARAPET_THICK_M, join_style="mitre")).buffer(-0.004, join_style="mitre")
     parts = [(roofing, slab(p, level - 0.25, level)) for p in polygons_of(lid)]
     return parts + [("concrete", slab(p, level - 0.05, top_m)) for p in polygons_of(rim)]

@@ -22,7 +22,7 @@ from aerialdojo_gen.scenes.site import Site
 
 _DASH_M, _GAP_M = 2.0, 4.0
 _ZEBRA_M, _STRIPE_M = 3.0, 0.5
-_RAIL_M, _GAUGE_M = 0.09, 1.5
+_RAIL_M, _GAUGE_M = 0.05, 1.5
 _AT_CROSSING_M = 5.0
 _NEAR_M = 1.5
 
@@ -160,13 +160,14 @@ def _paint_rails(site: Site, rails: Sequence[Sequence[tuple[float, float]]], car
     bed = shapely.union_all([line.buffer(_GAUGE_M / 2 + 0.6, cap_style="flat") for line in lines])
     site.paint(bed, site.material("track", "cobbles:#7d7a75"))
     sides = [line.offset_curve(d) for line in lines for d in (-_GAUGE_M / 2, _GAUGE_M / 2)]
-    site.paint(shapely.union_all([s.buffer(_RAIL_M, cap_style="flat") for s in sides]), "steel")
+    site.paint(shapely.union_all([s.buffer(_RAIL_M, cap_style="flat") for s in sides]), "iron")
 
 
 def kerbside(road: Road, line: LineString, spacing_m: float, offset_m: float) -> list[Pose]:
     """List poses on both sides of a street, `offset_m` beyond its kerbs, that face it."""
     out = []
-    count = int(line.length // spacing_m)
+    # Maps cut streets at every corner: rounding down would leave the short stretches bare.
+    count = round(line.length / spacing_m)
     for k in range(count):
         s = (k + 0.5) * line.length / count
         a, b = line.interpolate(max(s - 0.3, 0.0)), line.interpolate(min(s + 0.3, line.length))

@@ -9,7 +9,9 @@ import shapely
 from shapely.geometry import Point, Polygon
 from shapely.geometry.base import BaseGeometry
 
+from aerialdojo_gen.layouts.places.town.buildings import building_base
 from aerialdojo_gen.layouts.places.town.model import Area, Barrier, Building, Parameters, Road, Thing
+from aerialdojo_gen.layouts.places.town.roofs import PARAPET_M
 from aerialdojo_gen.layouts.places.town.streets import Streets, kerbside
 from aerialdojo_gen.scenes.grammar_buildings import oriented_rectangle
 from aerialdojo_gen.scenes.grammar_frames import Frame
@@ -33,6 +35,8 @@ _FURNITURE = (
     "recycling_bin", "bicycle", "advertising_column", "fire_hydrant",
 )  # fmt: skip
 _SHOPS = ("a_board", "cafe_table", "planter", "clothes_rack", "menu_board", "bicycle")
+_ON_ROOFS = ("air_conditioner", "vent_stack", "satellite_dish", "skylight", "solar_panels")
+_FROM_EDGE_M, _LEAST_ROOF_M2 = 1.8, 40.0
 _LAMPS_M, _FURNITURE_M, _BAY_M, _TRAFFIC_M = 26.0, 9.0, 6.2, 34.0
 _LEAST_LAMPS = 4
 _LEAST_TREES = 3
@@ -66,6 +70,8 @@ def by_rule(site: Site, p: Parameters, streets: Streets) -> None:
                 for pose in kerbside(road, line, _LAMPS_M, 0.5)[:: 2 if road.width_m < 8 else 1]:
                     _on_street(site, streets, "street_lamp", pose)
     _furnish(site, streets, rule.furniture)
+    for k, building in enumerate(p.buildings):
+        _on_roofs(site, building, rule.furniture, k)
     for building in p.buildings:
         if building.shops:
             _shop_things(site, streets, building, rule.furniture)
@@ -96,6 +102,8 @@ def _put(site: Site, streets: Streets, thing: Thing) -> Instance | None:
 
 _AROUND = tuple(math.radians(45.0 * k) for k in range(8))
 _ROOTED = frozenset({"urban_tree", "oak_tree", "spruce_tree", "pine_tree", "birch_tree"})
+# One street has one kind of them.
+_ALIKE = frozenset({"bollard", "street_lamp", "traffic_light"})
 _IN_STREETS = frozenset({"bollard", "traffic_cone"})
 
 
@@ -103,7 +111,11 @@ def _try(site: Site, streets: Streets, category: str, pose: Pose, place: str = "
     street = "" if place else streets.street(pose.x, pose.y)
     words = {"place": place or f"on {street}"} if place or street else None
     # Plants come as often as their weights say: nobody plants every fifth tree pink.
-    variant = None if site.catalogue[category].kind == "vegetation" else next_variant(site, category)
+    kind = site.catalogue[category].kind
+    if category in _ALIKE:
+        variant = next(iter(v.name for v in site.catalogue[category].variants), None)
+    else:
+        variant = None if kind == "vegetation" else next_variant(site, category)
     return site.try_place(category, *pose, variant=variant, attributes=words, **options)
 
 
@@ -150,11 +162,12 @@ def _traffic(site: Site, streets: Streets, road: Road, line: shapely.LineString,
         middle = way * lane + lane / 2 - road.width_m / 2
         # Positive offsets lie to the left of the line.
         back = not road.oneway and (middle > 0.0) == (drive_on == "right")
-        for n in range(int(line.length // _TRAFFIC_M)):
+        count = math.ceil(line.length / _TRAFFIC_M)
+        for n in range(count):
             rng = site.rng_for("driving", k, way, n)
-            if rng.random() >= share:
+            if rng.random() >= share * line.length / (count * _TRAFFIC_M):
                 continue
-            s = (n + rng.uniform(0.2, 0.8)) * _TRAFFIC_M
+            s = (n + rng.uniform(0.2, 0.8)) * line.length / count
             a, b = line.interpolate(max(s - 0.5, 0.0)), line.interpolate(min(s + 0.5, line.length))
             yaw = math.atan2(b.y - a.y, b.x - a.x)
             x, y = (a.x + b.x) / 2 - middle * math.sin(yaw), (a.y + b.y) / 2 + middle * math.cos(yaw)
@@ -205,6 +218,24 @@ def _furnish(site: Site, streets: Streets, share: float) -> None:
             if rng.random() >= share * 0.5 or shapely.contains_xy(streets.busy, pose.x, pose.y):
                 continue
             if _on_street(site, streets, _FURNITURE[turn % len(_FURNITURE)], pose) is not None:
+                turn += 1
+
+
+def _on_roofs(site: Site, building: Building, share: float, k: int) -> None:
+    """Set out what stands on flat roofs, away from their edges."""
+    base = building_base(site, building)
+    turn = k
+    for body in building.bodies:
+        room = body.plan.buffer(-_FROM_EDGE_M)
+        if building.canopy or body.roof != "flat" or room.area < _LEAST_ROOF_M2:
+            continue
+        rng = site.rng_for("roof", k, round(room.area))
+        for pose in poisson_disc(room, 7.0, rng, limit=4):
+            if rng.random() < share:
+                category, z = _ON_ROOFS[turn % len(_ON_ROOFS)], base + body.top_m - PARAPET_M
+                yaw = 90.0 * round(pose.yaw_deg / 90.0)
+                words = {"place": "on the roof"}
+                site.try_place(category, pose.x, pose.y, yaw, z=z, variant=next_variant(site, category), attributes=words)
                 turn += 1
 
 
