@@ -100,7 +100,7 @@ def visible_surfaces(extent: Polygon, base: str, surfaces: Sequence[Surface]) ->
     for layer in reversed(groups):
         seen = _areal(_snapped(layer.area).intersection(_snapped(extent)))
         seen = shapely.difference(seen, covered, grid_size=_GRID_M)
-        covered = shapely.union(covered, _areal(seen), grid_size=_GRID_M)
+        covered = _areal(shapely.union(covered, _areal(seen), grid_size=_GRID_M))
         if seen.area > _MIN_AREA_M2:
             layers.append(Surface(seen, layer.material, layer.rise_m, layer.edge))
     return layers[::-1]

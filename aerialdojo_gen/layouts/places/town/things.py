@@ -5,10 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+import numpy as np
 import shapely
 from shapely.geometry import Point, Polygon
 from shapely.geometry.base import BaseGeometry
 
+from aerialdojo_gen.layouts.parts.natural_ground import settled_z
 from aerialdojo_gen.layouts.places.town.buildings import building_base
 from aerialdojo_gen.layouts.places.town.model import Area, Barrier, Building, Parameters, Road, Thing
 from aerialdojo_gen.layouts.places.town.roofs import PARAPET_M
@@ -116,6 +118,8 @@ def _try(site: Site, streets: Streets, category: str, pose: Pose, place: str = "
         variant = next(iter(v.name for v in site.catalogue[category].variants), None)
     else:
         variant = None if kind == "vegetation" else next_variant(site, category)
+    if np.ptp(site.terrain.heights_m) > 0.0:
+        options = {"z": settled_z(site, pose.x, pose.y), **options}
     return site.try_place(category, *pose, variant=variant, attributes=words, **options)
 
 
