@@ -15,7 +15,9 @@ if TYPE_CHECKING:
 app = typer.Typer()
 
 Project = Annotated[Path, typer.Option(help="Folder for your scenes and their pipeline.")]
-Cell = Annotated[float | None, typer.Option(help="Distance of the ground's heights, metres.  (default: the model's own)")]
+Cell = Annotated[
+    float | None, typer.Option(help="Distance of the ground's heights, metres.  (default: the model's own)")
+]
 Ceiling = Annotated[float | None, typer.Option(help="Highest z to fly at, metres.  (default: a little over all)")]
 Seed = Annotated[int, typer.Option(min=0, help="Of what is added by rule.")]
 Attribution = Annotated[str, typer.Option(help="Whose heights they are, for the card.")]
@@ -26,9 +28,7 @@ Force = Annotated[bool, typer.Option("--force", help="Replace a scene of this na
 def add_map(
     name: Annotated[str, typer.Argument(help="Name of the scene; of several, what their names begin with.")],
     extract: Annotated[Path, typer.Argument(help="Extract of OpenStreetMap: .osm.pbf or .osm.")],
-    bbox: Annotated[
-        list[str], typer.Option(help="WEST,SOUTH,EAST,NORTH in degrees; repeatable, a scene each.")
-    ],
+    bbox: Annotated[list[str], typer.Option(help="WEST,SOUTH,EAST,NORTH in degrees; repeatable, a scene each.")],
     tiles: Annotated[float | None, typer.Option(help="Cut every box into squares of so many metres.")] = None,
     dem: Annotated[Path | None, typer.Option(help="Height model that the ground is of: .tif, .asc or .npz.")] = None,
     cell: Cell = None,
@@ -56,7 +56,9 @@ def add_terrain(
     bbox: Annotated[str | None, typer.Option(help="Part of it: WEST,SOUTH,EAST,NORTH in degrees.")] = None,
     size: Annotated[tuple[float, float] | None, typer.Option(help="Extent about the middle: x y, metres.")] = None,
     cell: Cell = None,
-    water: Annotated[float | None, typer.Option(help="There is water up to this height, metres as in the model.")] = None,
+    water: Annotated[
+        float | None, typer.Option(help="There is water up to this height, metres as in the model.")
+    ] = None,
     sand: Annotated[float | None, typer.Option(help="There is sand up to this height.")] = None,
     snow: Annotated[float | None, typer.Option(help="There is snow from this height on.")] = None,
     bare: Annotated[bool, typer.Option("--bare", help="Nothing grows or lies about.")] = False,
@@ -80,7 +82,9 @@ def _box(text: str) -> tuple[float, float, float, float]:
     try:
         west, south, east, north = (float(part) for part in text.replace(",", " ").split())
     except ValueError:
-        raise typer.BadParameter(f"--bbox {text[:60]!r}: must be WEST,SOUTH,EAST,NORTH, four numbers in degrees") from None
+        raise typer.BadParameter(
+            f"--bbox {text[:60]!r}: must be WEST,SOUTH,EAST,NORTH, four numbers in degrees"
+        ) from None
     return west, south, east, north
 
 

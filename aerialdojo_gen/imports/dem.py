@@ -78,9 +78,7 @@ class Dem:
     def at_degrees(self, lon: Floats, lat: Floats) -> Floats:
         """Heights at points on earth; a `UsageError` where the file does not say where it is."""
         if self.to_grid is None:
-            raise UsageError(
-                f"{self.path} does not say where on earth it is: give a GeoTIFF, or a grid in degrees of longitude and latitude"
-            )
+            raise UsageError(f"{self.path} does not say where on earth it is: give a GeoTIFF, or a grid in degrees")
         return self.at(*self.to_grid(lon, lat))
 
 
@@ -125,24 +123,30 @@ def _geotiff(path: Path) -> Dem:
         rasterio = importlib.import_module("rasterio")
         warp = importlib.import_module("rasterio.warp")
     except ImportError:
-        raise UsageError("GeoTIFFs are read by rasterio, which is not installed: pip install 'aerialdojo-gen[maps]'") from None
+        raise UsageError(
+            "GeoTIFFs are read by rasterio, which is not installed: pip install 'aerialdojo-gen[maps]'"
+        ) from None
     try:
         with rasterio.open(path) as file:
             if file.width * file.height > _MOST_CELLS:
                 raise AssetError(
-                    f"{path} has {file.width:,} x {file.height:,} heights, {_MOST_CELLS:,} are the most: cut a part out of it first"
+                    f"{path} has {file.width:,} x {file.height:,} heights, {_MOST_CELLS:,} are the most: "
+                    "cut a part out of it first"
                 )
             z = file.read(1, masked=True).astype(np.float64).filled(np.nan)
             crs, t = file.crs, file.transform
     except rasterio.errors.RasterioError as error:
-        raise AssetError(f"{path} cannot be read as a GeoTIFF, or is cut short: {_line(error)}; get it again") from None
+        raise AssetError(
+            f"{path} cannot be read as a GeoTIFF, or is cut short: {_line(error)}; get it again"
+        ) from None
     if crs is None:
         raise AssetError(f"{path} has no coordinate system: set one, e.g. gdal_edit.py -a_srs EPSG:4326 {path.name}")
     if abs(t.b) > 1e-12 or abs(t.d) > 1e-12 or t.a <= 0 or t.e >= 0:
         raise AssetError(f"{path} is turned or mirrored: north must be up (gdalwarp -t_srs EPSG:4326 makes it so)")
     if not crs.is_geographic and not math.isclose(crs.linear_units_factor[1], 1.0, rel_tol=1e-9):
         raise AssetError(
-            f"{path} is in {crs.linear_units_factor[0]}, not in metres or degrees: gdalwarp -t_srs EPSG:4326 makes it so"
+            f"{path} is in {crs.linear_units_factor[0]}, not in metres or degrees: "
+            "gdalwarp -t_srs EPSG:4326 makes it so"
         )
 
     def to_grid(lon: Floats, lat: Floats) -> tuple[Floats, Floats]:
@@ -171,7 +175,9 @@ def _ascii(path: Path) -> Dem:
             columns, rows, cell = int(head["ncols"]), int(head["nrows"]), head["cellsize"]
             numbers = np.fromstring(file.read(), dtype=np.float64, sep=" ") if columns * rows <= _MOST_CELLS else None
     except (KeyError, ValueError, UnicodeDecodeError) as error:
-        raise AssetError(f"{path} is no ESRI ASCII grid (ncols, nrows, xllcorner, yllcorner, cellsize): {_line(error)}") from None
+        raise AssetError(
+            f"{path} is no ESRI ASCII grid (ncols, nrows, xllcorner, yllcorner, cellsize): {_line(error)}"
+        ) from None
     if numbers is None or numbers.size != columns * rows or not (cell > 0 and math.isfinite(cell)):
         found = "too many" if numbers is None else f"{numbers.size:,}"
         raise AssetError(f"{path} says {columns:,} by {rows:,} heights and has {found}: is it cut short?")
@@ -192,9 +198,13 @@ def _npz(path: Path) -> Dem:
             cell = float(file["cell_m"]) if "cell_m" in file else None
             bbox = [float(v) for v in file["bbox_deg"]] if "bbox_deg" in file else None
     except (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile) as error:
-        raise AssetError(f"{path} cannot be read: {_line(error)}; it must hold heights_m with cell_m or bbox_deg") from None
+        raise AssetError(
+            f"{path} cannot be read: {_line(error)}; it must hold heights_m with cell_m or bbox_deg"
+        ) from None
     if z.ndim != 2 or z.size > _MOST_CELLS or (cell is None) == (bbox is None) or min(z.shape) < 2:
-        raise AssetError(f"{path} must hold heights_m, 2 by 2 or more, with cell_m (metres) or bbox_deg (west, south, east, north)")
+        raise AssetError(
+            f"{path} must hold heights_m, 2 by 2 or more, with cell_m (metres) or bbox_deg (west, south, east, north)"
+        )
     z[~(np.abs(z) < 1e5)] = np.nan
     rows, columns = z.shape
     if bbox is not None:

@@ -48,7 +48,7 @@ class LocalFrame:
         return math.radians(east), math.radians(north)
 
     def metres(self, lon: ArrayLike, lat: ArrayLike) -> tuple[Floats, Floats]:
-        """x and y of points, metres."""
+        """X and y of points, metres."""
         east, north = self.metres_a_degree
         x = (np.asarray(lon, dtype=np.float64) - self.lon_deg) * east
         return x, (np.asarray(lat, dtype=np.float64) - self.lat_deg) * north
@@ -65,8 +65,10 @@ def checked_bbox(bbox: Bbox) -> Bbox:
     west, south, east, north = bbox
     said = " ".join(f"{v:g}" for v in bbox)
     if not all(math.isfinite(v) for v in bbox) or not (west < east and south < north):
-        raise UsageError(f"--bbox {said}: must be WEST SOUTH EAST NORTH, degrees, west below east and south below north")
-    if not (-180 <= west and east <= 180 and -_POLE_DEG <= south and north <= _POLE_DEG):
+        raise UsageError(
+            f"--bbox {said}: must be WEST SOUTH EAST NORTH, degrees, west below east and south below north"
+        )
+    if not (west >= -180 and east <= 180 and south >= -_POLE_DEG and north <= _POLE_DEG):
         raise UsageError(
             f"--bbox {said}: degrees of longitude reach from -180 to 180, of latitude here from -{_POLE_DEG:g} to "
             f"{_POLE_DEG:g}; WEST SOUTH EAST NORTH is the order"
@@ -82,7 +84,7 @@ def size_m(bbox: Bbox) -> tuple[float, float]:
 
 
 def tiles(bbox: Bbox, tile_m: float) -> list[Bbox]:
-    """Cut a bounding box into squares, from its south-west corner by rows running north; what is left over is not used."""
+    """Cut a bounding box into squares, from its south-west corner by rows running north; the rest is not used."""
     wide, deep = size_m(bbox)
     east, north = LocalFrame.about(bbox).metres_a_degree
     nx, ny = (int(s / tile_m + 1e-3) for s in (wide, deep))
@@ -90,7 +92,11 @@ def tiles(bbox: Bbox, tile_m: float) -> list[Bbox]:
         raise UsageError(f"--tiles {tile_m:g}: the bounding box is {wide:,.0f} by {deep:,.0f} m, smaller than a tile")
     dx, dy = tile_m / east, tile_m / north
     west, south = bbox[:2]
-    return [(west + i * dx, south + j * dy, west + (i + 1) * dx, south + (j + 1) * dy) for j in range(ny) for i in range(nx)]
+    return [
+        (west + i * dx, south + j * dy, west + (i + 1) * dx, south + (j + 1) * dy)
+        for j in range(ny)
+        for i in range(nx)
+    ]
 
 
 def in_words(bbox: Bbox) -> str:

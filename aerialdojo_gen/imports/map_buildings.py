@@ -48,7 +48,18 @@ _LEVELS = {
     "school": 3, "public_building": 4, "garage_building": 1, "outbuilding": 1, "hotel": 6, "hospital": 5,
     "station_building": 3, "canopy": 1,
 }  # fmt: skip
-_PLASTER = ("#d9bd74", "#e3d6b0", "#c98f6a", "#d8c7b4", "#b9c2b0", "#cfa79c", "#c4b49a", "#e6e0d2", "#b08a6a", "#a9b4bb")
+_PLASTER = (
+    "#d9bd74",
+    "#e3d6b0",
+    "#c98f6a",
+    "#d8c7b4",
+    "#b9c2b0",
+    "#cfa79c",
+    "#c4b49a",
+    "#e6e0d2",
+    "#b08a6a",
+    "#a9b4bb",
+)
 _BRICK = ("#8f4a3c", "#a4614a", "#7d5546")
 _OFFICE = ("facade_office:#b8b4ac", "facade_office:#97a1a8", "facade_office:#c9bfae", "curtain_wall:#6f95ad",
            "curtain_wall:#7f958c", "facade_office:#a08c78")  # fmt: skip
@@ -73,7 +84,9 @@ class Told:
         self.counts[what] += n
 
 
-def buildings(areas: Sequence[Feature], shops: Sequence[BaseGeometry], site: Polygon, told: Told) -> list[dict[str, Any]]:
+def buildings(
+    areas: Sequence[Feature], shops: Sequence[BaseGeometry], site: Polygon, told: Told
+) -> list[dict[str, Any]]:
     """Make the recipe's buildings.
 
     Parameters
@@ -100,7 +113,11 @@ def buildings(areas: Sequence[Feature], shops: Sequence[BaseGeometry], site: Pol
         own = [parts[k] for k in sorted(tree.query(area.shape, predicate="contains"))]
         plan = area.shape.difference(shapely.union_all(taken)) if taken else area.shape
         taken = [*taken, area.shape]
-        bodies = [b for part in own for b in _bodies(part.shape.intersection(plan), _inherited(area, part), usual, site, None)]
+        bodies = [
+            b
+            for part in own
+            for b in _bodies(part.shape.intersection(plan), _inherited(area, part), usual, site, None)
+        ]
         rest = plan.difference(shapely.union_all([p.shape for p in own])) if own else plan
         if not own or rest.area > (1.0 - _PARTED) * area.shape.area:
             bodies += _bodies(rest, area, usual, site, told)
@@ -187,7 +204,11 @@ def _heights(area: Feature, plan: Polygon, usual: int, told: Told | None) -> tup
     rise = metres(tags, "roof:height")
     if rise is None:
         roof_levels = count(tags, "roof:levels")
-        rise = roof_levels * _ROOF_LEVEL_M if roof_levels else min(half * (1.0 if form == "dome" else _PITCH), _MOST_RISE_M)
+        rise = (
+            roof_levels * _ROOF_LEVEL_M
+            if roof_levels
+            else min(half * (1.0 if form == "dome" else _PITCH), _MOST_RISE_M)
+        )
     rise = 0.0 if form == "flat" else rise
     base = metres(tags, "min_height", "building:min_height") or STOREY_M * (count(tags, "building:min_level") or 0)
     if height is None:
@@ -212,7 +233,9 @@ def _wall(area: Feature, kind: str, top_m: float) -> tuple[str, str]:
     given, material = colour(tags, "building:colour", "building:color"), tags.get("building:material", "")
     paint = given or _PLASTER[_pick(area, "plaster", len(_PLASTER))]
     brick = given or _BRICK[_pick(area, "brick", len(_BRICK))]
-    if material == "glass" or (kind == "office_building" and not given and material in ("", "glass", "steel", "metal")):
+    if material == "glass" or (
+        kind == "office_building" and not given and material in ("", "glass", "steel", "metal")
+    ):
         spec = "curtain_wall" if material == "glass" else _OFFICE[_pick(area, "office", len(_OFFICE))]
     elif material == "wood":
         spec = f"planks:{given or '#b59468'}"
@@ -225,7 +248,9 @@ def _wall(area: Feature, kind: str, top_m: float) -> tuple[str, str]:
     else:
         spec = f"facade_flats:{paint}"
     shade = spec.partition(":")[2]
-    word = colour_name(parse_colour(shade)) if shade and not spec.startswith(("curtain_wall", "facade_office")) else ""
+    word = (
+        colour_name(parse_colour(shade)) if shade and not spec.startswith(("curtain_wall", "facade_office")) else ""
+    )
     return spec, word
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-import shapely
 from shapely.geometry import LineString, Point, Polygon
 from shapely.geometry.base import BaseGeometry
 from shapely.ops import polygonize, unary_union
@@ -16,6 +15,7 @@ from aerialdojo_gen.imports.osm import Feature
 from aerialdojo_gen.scenes.ground import polygons_of
 
 _SPACING_M = 0.06
+_PARKED = ("parallel", "lane", "diagonal", "perpendicular", "street_side", "on_kerb", "half_on_kerb", "yes")
 _LANE_M, _PARKED_M = 3.2, 2.2
 _LEAST_AREA_M2 = 2.0
 # Kind, width without lanes, lanes, pavement: what a street of this class has if its tags do not say.
@@ -28,16 +28,17 @@ _CLASSES: dict[str, tuple[str, float, int, float]] = {
     "cycleway": ("path", 2.4, 1, 0.0), "steps": ("path", 2.4, 1, 0.0), "bridleway": ("path", 2.0, 1, 0.0),
 }  # fmt: skip
 _PATH_SURFACE = {
-    "cycleway": "asphalt:#7d5a50", "footway": "paving:#b1aaa0", "pedestrian": "paving:#b5aca0", "path": "gravel:#b0a38a",
-    "steps": "concrete:#9b9890", "bridleway": "dirt",
+    "cycleway": "asphalt:#7d5a50", "footway": "paving:#b1aaa0", "pedestrian": "paving:#b5aca0",
+    "path": "gravel:#b0a38a", "steps": "concrete:#9b9890", "bridleway": "dirt",
 }  # fmt: skip
 # Material, what grows, by key and value.
 _AREAS: dict[str, dict[str, tuple[str, str]]] = {
     "landuse": {
         "grass": ("grass", ""), "village_green": ("grass", "park"), "recreation_ground": ("grass", "park"),
         "meadow": ("meadow", ""), "forest": ("leaf_litter:#6b6a40", "wood"), "cemetery": ("grass:#5b7d45", "park"),
-        "flowerbed": ("soil", "scrub"), "farmland": ("dirt", ""), "orchard": ("grass", "park"), "basin": ("water", ""),
-        "reservoir": ("water", ""), "railway": ("gravel:#7f7b75", ""), "construction": ("dirt", ""),
+        "flowerbed": ("soil", "scrub"), "farmland": ("dirt", ""), "orchard": ("grass", "park"),
+        "basin": ("water", ""), "reservoir": ("water", ""), "railway": ("gravel:#7f7b75", ""),
+        "construction": ("dirt", ""),
         "brownfield": ("gravel", ""), "allotments": ("meadow", ""),
     },
     "leisure": {
@@ -46,9 +47,10 @@ _AREAS: dict[str, dict[str, tuple[str, str]]] = {
         "golf_course": ("grass:#6fa04a", "park"), "common": ("grass", "park"), "track": ("asphalt:#a2563f", ""),
     },
     "natural": {
-        "wood": ("leaf_litter:#6b6a40", "wood"), "water": ("water", ""), "scrub": ("meadow", "scrub"), "sand": ("sand", ""),
-        "beach": ("sand", ""), "grassland": ("meadow", ""), "heath": ("meadow:#95924f", "scrub"), "bare_rock": ("rock", ""),
-        "shingle": ("gravel", ""), "wetland": ("mud", "scrub"),
+        "wood": ("leaf_litter:#6b6a40", "wood"), "water": ("water", ""), "scrub": ("meadow", "scrub"),
+        "sand": ("sand", ""), "beach": ("sand", ""), "grassland": ("meadow", ""),
+        "heath": ("meadow:#95924f", "scrub"),
+        "bare_rock": ("rock", ""),         "shingle": ("gravel", ""), "wetland": ("mud", "scrub"),
     },
     "amenity": {"parking": ("asphalt", ""), "school": ("asphalt:#6b6c6e", ""), "kindergarten": ("sand", "")},
     "place": {"square": ("paving:#b5aca0", "")},
@@ -133,10 +135,13 @@ def _wide(width: float) -> float:
 
 
 def _parks(tags: Tags, *, by_rule: bool) -> bool:
-    said = [v for k, v in tags.items() if k.startswith("parking:") and k.count(":") <= 2 and not k.endswith(("fee", "conditional"))]
+    said = [
+        v
+        for k, v in tags.items()
+        if k.startswith("parking:") and k.count(":") <= 2 and not k.endswith(("fee", "conditional"))
+    ]
     if said:
-        return any(v in ("parallel", "lane", "diagonal", "perpendicular", "street_side", "on_kerb", "half_on_kerb", "yes")
-                   for v in said)  # fmt: skip
+        return any(v in _PARKED for v in said)
     return by_rule
 
 

@@ -30,7 +30,8 @@ Heights = dict[str, Any]
 
 
 def town_recipe(
-    found: Map, bbox: Bbox, source: str, *, heights: Callable[[LocalFrame, tuple[float, float]], Heights] | None = None,
+    found: Map, bbox: Bbox, source: str, *,
+    heights: Callable[[LocalFrame, tuple[float, float]], Heights] | None = None,
     extra_attribution: str = "", seed: int = 0, ceiling_m: float | None = None, drive_on: str = "right",
 ) -> tuple[str, Told]:  # fmt: skip
     """Write the recipe of a town.
@@ -60,10 +61,10 @@ def town_recipe(
         The box is no size that a drone flies in, or nothing of the map is in it.
     """
     width, depth = (float(math.floor(s * 100 + 0.5) / 100) for s in size_m(bbox))
-    if not (SMALLEST_M <= min(width, depth) and max(width, depth) <= LARGEST_M):
+    if not (min(width, depth) >= SMALLEST_M and max(width, depth) <= LARGEST_M):
         raise UsageError(
-            f"--bbox {in_words(bbox)} is {width:,.0f} by {depth:,.0f} m, a scene {SMALLEST_M:g} to {LARGEST_M:,.0f} m: "
-            "--tiles 200 cuts a large one into several"
+            f"--bbox {in_words(bbox)} is {width:,.0f} by {depth:,.0f} m, a scene "
+            f"{SMALLEST_M:g} to {LARGEST_M:,.0f} m: --tiles 200 cuts a large one into several"
         )
     frame, site = LocalFrame.about(bbox), rectangle(-width / 2, -depth / 2, width / 2, depth / 2)
     window = site.buffer(_BEYOND_M, join_style="mitre")

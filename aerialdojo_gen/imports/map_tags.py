@@ -52,7 +52,8 @@ def below_ground(tags: Tags) -> bool:
 SURFACES = {
     "asphalt": "asphalt", "paved": "asphalt", "concrete": "concrete:#8f8d88", "concrete:plates": "concrete:#8f8d88",
     "sett": "cobbles:#77746f", "cobblestone": "cobbles:#77746f", "unhewn_cobblestone": "cobbles:#77746f",
-    "paving_stones": "paving:#aaa59c", "gravel": "gravel", "fine_gravel": "gravel:#b0a38a", "compacted": "gravel:#a89c88",
-    "unpaved": "gravel:#a89c88", "pebblestone": "gravel", "dirt": "dirt", "ground": "dirt", "earth": "dirt",
+    "paving_stones": "paving:#aaa59c", "gravel": "gravel", "fine_gravel": "gravel:#b0a38a",
+    "compacted": "gravel:#a89c88", "unpaved": "gravel:#a89c88", "pebblestone": "gravel", "dirt": "dirt",
+    "ground": "dirt", "earth": "dirt",
     "grass": "grass", "sand": "sand", "wood": "planks", "mud": "mud",
 }  # fmt: skip

@@ -64,7 +64,9 @@ def things(points: Sequence[Feature], lines: Sequence[Feature], areas: Sequence[
             continue
         out.append(_thing(category, at, feature.tags))
     for feature in lines:
-        spacing = _SPACING_M.get("tree_row" if feature.tags.get("natural") == "tree_row" else feature.tags.get("barrier", ""))
+        spacing = _SPACING_M.get(
+            "tree_row" if feature.tags.get("natural") == "tree_row" else feature.tags.get("barrier", "")
+        )
         if spacing and not below_ground(feature.tags):
             category = "urban_tree" if "natural" in feature.tags else "bollard"
             out += [_thing(category, p, feature.tags) for p in _along(feature.shape, spacing)
@@ -86,15 +88,20 @@ def shop_points(points: Sequence[Feature], areas: Sequence[Feature]) -> list[Bas
 
 def crossings(points: Sequence[Feature], site: Polygon) -> list[list[float]]:
     """Where streets are crossed on stripes."""
-    kinds = ("zebra", "marked", "uncontrolled", "traffic_signals")
-    return [_at(f.shape) for f in points if f.tags.get("highway") == "crossing" and site.contains(f.shape)
-            and f.tags.get("crossing", "marked") in kinds and f.tags.get("crossing:markings", "yes") != "no"]  # fmt: skip
+    return [_at(f.shape) for f in points if site.contains(f.shape) and _striped(f.tags)]
 
 
 def signals(points: Sequence[Feature], site: Polygon) -> list[list[float]]:
     """Where traffic lights are."""
+    kinds = ("highway", "crossing")
     return [_at(f.shape) for f in points if site.contains(f.shape)
-            and (f.tags.get("highway") == "traffic_signals" or f.tags.get("crossing") == "traffic_signals")]  # fmt: skip
+            and any(f.tags.get(key) == "traffic_signals" for key in kinds)]  # fmt: skip
+
+
+def _striped(tags: Tags) -> bool:
+    kinds = ("zebra", "marked", "uncontrolled", "traffic_signals")
+    marked = tags.get("crossing", "marked") in kinds and tags.get("crossing:markings", "yes") != "no"
+    return tags.get("highway") == "crossing" and marked
 
 
 def _category(tags: Tags) -> str | None:

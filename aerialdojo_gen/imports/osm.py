@@ -20,8 +20,8 @@ SUFFIXES = (".pbf", ".osm", ".osm.bz2", ".osm.gz")
 _LARGEST_BYTES = 1 << 30
 _MOST_POINTS = 5_000
 # Ways of these are outlines of areas where they are closed; others stay lines.
-_AREA_KEYS = ("building", "building:part", "landuse", "leisure", "natural", "amenity", "area", "area:highway", "tourism",
-              "place", "water", "man_made", "public_transport", "railway")  # fmt: skip
+_AREA_KEYS = ("building", "building:part", "landuse", "leisure", "natural", "amenity", "area", "area:highway",
+              "tourism", "place", "water", "man_made", "public_transport", "railway")  # fmt: skip
 _LINES = {"natural": ("tree_row", "cliff", "coastline"), "man_made": ("embankment", "pipeline", "beam", "wire"),
           "railway": ("rail", "tram", "subway", "light_rail")}  # fmt: skip
 
@@ -77,7 +77,9 @@ def read_map(path: Path, bbox: Bbox) -> Map:
     try:
         osmium = importlib.import_module("osmium")
     except ImportError:
-        raise UsageError("maps are read by osmium, which is not installed: pip install 'aerialdojo-gen[maps]'") from None
+        raise UsageError(
+            "maps are read by osmium, which is not installed: pip install 'aerialdojo-gen[maps]'"
+        ) from None
     if not path.name.endswith(SUFFIXES):
         raise AssetError(f"{path}: a map is a file {', '.join(SUFFIXES)}")
     try:

@@ -50,7 +50,8 @@ class Place:
 
 
 def add_map(
-    name: str, extract: Path, project: Path, *, bbox: Sequence[Bbox], tile_m: float | None = None, dem: Path | None = None,
+    name: str, extract: Path, project: Path, *, bbox: Sequence[Bbox], tile_m: float | None = None,
+    dem: Path | None = None,
     cell_m: float | None = None, attribution: str = "", seed: int = 0, ceiling_m: float | None = None,
     drive_on: str = "right", force: bool = False,
 ) -> list[Place]:  # fmt: skip
@@ -107,7 +108,9 @@ def add_map(
             raise UsageError(f"--tiles {tile_m:g}: a scene is 20 to 1,000 m wide")
         boxes = [tile for box in boxes for tile in tiles(box, tile_m)]
     if len(boxes) > _MOST_SCENES:
-        raise UsageError(f"{len(boxes):,} scenes are asked for, {_MOST_SCENES} at a time are the most: take larger tiles")
+        raise UsageError(
+            f"{len(boxes):,} scenes are asked for, {_MOST_SCENES} at a time are the most: take larger tiles"
+        )
     names = [name] if len(boxes) == 1 else [f"{name}-{k}" for k in range(1, len(boxes) + 1)]
     _check_free(names, project, force)
     model = None if dem is None else read_dem(dem)
@@ -126,8 +129,9 @@ def add_map(
 
 def add_terrain(
     name: str, dem: Path, project: Path, *, bbox: Bbox | None = None, size_m: tuple[float, float] | None = None,
-    cell_m: float | None = None, water_m: float | None = None, snow_m: float | None = None, sand_m: float | None = None,
-    bare: bool = False, attribution: str = "", seed: int = 0, ceiling_m: float | None = None, force: bool = False,
+    cell_m: float | None = None, water_m: float | None = None, snow_m: float | None = None,
+    sand_m: float | None = None, bare: bool = False, attribution: str = "", seed: int = 0, ceiling_m: float | None = None,
+    force: bool = False,
 ) -> Place:  # fmt: skip
     """Make open country of a height model, in a project folder.
 
@@ -193,7 +197,9 @@ def _added(name: str, text: str, project: Path, said: tuple[str, ...]) -> Place:
 
 def _counted(counts: dict[str, int]) -> list[str]:
     """Say what of the map is there, how high buildings are known to be, and what was left out."""
-    what = [f"{n:,} {key}" for key in ("buildings", "streets", "paths", "things of the map") if (n := counts.pop(key, 0))]
+    what = [
+        f"{n:,} {key}" for key in ("buildings", "streets", "paths", "things of the map") if (n := counts.pop(key, 0))
+    ]
     by = {"height": "by their height", "levels": "by their levels", "rule": "by rule, without either"}
     known = [f"{n:,} {word}" for key, word in by.items() if (n := counts.pop(key, 0))]
     lines = [", ".join(what) or "nothing that stands"]

@@ -24,7 +24,9 @@ _LEAST_SHARE = 0.5
 _HEADROOM_M = 25.0
 
 
-def grid(dem: Dem, size: tuple[float, float], cell_m: float, frame: LocalFrame | None, middle: tuple[float, float]) -> Floats:
+def grid(
+    dem: Dem, size: tuple[float, float], cell_m: float, frame: LocalFrame | None, middle: tuple[float, float]
+) -> Floats:
     """Sample a height model on a square grid about a point.
 
     Parameters
@@ -54,7 +56,12 @@ def grid(dem: Dem, size: tuple[float, float], cell_m: float, frame: LocalFrame |
     x, y = np.meshgrid(*((np.arange(n + 1) - n / 2) * cell_m for n in (columns, rows)))
     if frame is not None:
         z = dem.at_degrees(*frame.degrees(x, y))
-        where = in_words((*(float(v) for v in frame.degrees(x[0, 0], y[0, 0])), *(float(v) for v in frame.degrees(x[-1, -1], y[-1, -1]))))  # type: ignore[arg-type]
+        where = in_words(
+            (
+                *(float(v) for v in frame.degrees(x[0, 0], y[0, 0])),
+                *(float(v) for v in frame.degrees(x[-1, -1], y[-1, -1])),
+            )
+        )  # type: ignore[arg-type]
     else:
         z = dem.at(x + middle[0], y + middle[1])
         where = f"{size[0]:,.0f} by {size[1]:,.0f} m about ({middle[0]:,.0f}, {middle[1]:,.0f})"
@@ -71,10 +78,15 @@ def cell_for(size: tuple[float, float], wanted_m: float | None, own_m: float) ->
     """Choose the distance of heights: no finer than the model's own, and no more than `MOST_CELLS` of them."""
     least = math.sqrt(size[0] * size[1] / MOST_CELLS)
     if wanted_m is not None:
-        if not (math.isfinite(wanted_m) and wanted_m >= _FINEST_M) or wanted_m < least * 0.999 or wanted_m > min(size) / 2:
+        if (
+            not (math.isfinite(wanted_m) and wanted_m >= _FINEST_M)
+            or wanted_m < least * 0.999
+            or wanted_m > min(size) / 2
+        ):
             raise UsageError(
-                f"--cell {wanted_m:g}: {size[0]:,.0f} by {size[1]:,.0f} m take cells of {max(least, _FINEST_M):.2f} m or more "
-                f"({MOST_CELLS:,} of them at most) and of {min(size) / 2:g} m or less"
+                f"--cell {wanted_m:g}: {size[0]:,.0f} by {size[1]:,.0f} m take cells of "
+                f"{max(least, _FINEST_M):.2f} m or more ({MOST_CELLS:,} of them at most), "
+                f"and of {min(size) / 2:g} m or less"
             )
         return wanted_m
     return max(own_m, least, _FINEST_M * 2)
@@ -135,7 +147,7 @@ def relief_recipe(
         What was done, for the user to read.
     """
     frame, middle, size = _place(dem, bbox, size)
-    if not (SMALLEST_M <= min(size) and max(size) <= LARGEST_M):
+    if not (min(size) >= SMALLEST_M and max(size) <= LARGEST_M):
         raise UsageError(
             f"{dem.path.name}: {size[0]:,.0f} by {size[1]:,.0f} m, a scene has {SMALLEST_M:g} to {LARGEST_M:,.0f} m: "
             f"--size 400 400 takes the middle of it, --bbox a part; {outside(dem)}"
@@ -157,19 +169,27 @@ def relief_recipe(
         **({"attribution": attribution} if attribution else {}), "origin": _origin(frame, middle, datum),
     }  # fmt: skip
     said = [
-        f"heights every {cell:g} m ({2 * round(size[0] / cell) * round(size[1] / cell):,} triangles), z = 0 is {datum:g} m, "
-        f"the highest point {top:.1f} m over it",
+        f"heights every {cell:g} m ({2 * round(size[0] / cell) * round(size[1] / cell):,} triangles), "
+        f"z = 0 is {datum:g} m, the highest point {top:.1f} m over it",
         "x east, y north, metres about "
-        + (f"{frame.lat_deg:.6f} N, {frame.lon_deg:.6f} E" if frame else f"({middle[0]:,.2f}, {middle[1]:,.2f}) of the model"),
+        + (
+            f"{frame.lat_deg:.6f} N, {frame.lon_deg:.6f} E"
+            if frame
+            else f"({middle[0]:,.2f}, {middle[1]:,.2f}) of the model"
+        ),
     ]
     missing = int(np.isnan(dem.heights_m).sum())
     if missing:
-        said.append(f"{missing:,} of {dem.heights_m.size:,} heights of the file are nodata: the nearest stands for them")
+        said.append(
+            f"{missing:,} of {dem.heights_m.size:,} heights of the file are nodata: the nearest stands for them"
+        )
     comments = (f"Made by add-terrain of {dem.path.name}: {said[0]}.", said[1] + ".")
     return recipe_text(head, parameters, comments), said
 
 
-def _place(dem: Dem, bbox: Bbox | None, size: tuple[float, float] | None) -> tuple[LocalFrame | None, tuple[float, float], tuple[float, float]]:
+def _place(
+    dem: Dem, bbox: Bbox | None, size: tuple[float, float] | None
+) -> tuple[LocalFrame | None, tuple[float, float], tuple[float, float]]:
     """Where on earth, or in the model's metres, the scene's middle is, and its extent."""
     west, south, east, north = dem.extent
     middle = (west + east) / 2, (south + north) / 2
@@ -187,7 +207,7 @@ def _origin(frame: LocalFrame | None, middle: tuple[float, float], datum: float)
 
 
 def ground_of(dem: Dem, cell_m: float | None = None) -> Any:
-    """Make what gives a town its ground: ``(frame, size_m) -> table`` of `heights` with the height of z = 0 in `z_m`."""
+    """Make what gives a town its ground: ``(frame, size_m) -> table``, the height of z = 0 in `z_m`."""
 
     def heights(frame: LocalFrame, size: tuple[float, float]) -> dict[str, Any]:
         cell = round(cell_for(size, cell_m, own_cell_m(dem, frame)), 4)

@@ -5,6 +5,7 @@ import sys
 import numpy as np
 import pytest
 from scipy.interpolate import RegularGridInterpolator
+from support import maps
 
 from aerialdojo_gen.errors import AssetError, UsageError
 from aerialdojo_gen.geometry.rays import RayCaster
@@ -14,7 +15,6 @@ from aerialdojo_gen.imports.places import add_terrain
 from aerialdojo_gen.layouts.build import build_scene
 from aerialdojo_gen.pipeline.run import home
 from aerialdojo_gen.scenes.catalogue import load_catalogue
-from support import maps
 
 UTM = "EPSG:32635"
 
@@ -108,7 +108,9 @@ def test_a_geotiff_in_degrees_and_one_in_metres_are_the_same_relief(tmp_path):
     difference = np.abs(a.at_degrees(lon, lat) - b.at_degrees(lon, lat))
     # The zone's scale is 0.9996: two centimetres over 50 m, on a slope of less than 1.
     assert difference.max() < 0.03
-    one = add_terrain("Degrees", degrees, tmp_path / "mine", size_m=(80.0, 80.0), cell_m=4.0, bare=True, attribution="A survey")
+    one = add_terrain(
+        "Degrees", degrees, tmp_path / "mine", size_m=(80.0, 80.0), cell_m=4.0, bare=True, attribution="A survey"
+    )
     two = add_terrain("Metres", metres, tmp_path / "mine", size_m=(80.0, 80.0), cell_m=4.0, bare=True)
     places = np.random.default_rng(2).uniform(-39, 39, size=(100, 2))
     za = ground_heights(one.scene, places) + read_dem_origin(one)
@@ -131,15 +133,25 @@ def test_missing_heights_are_the_nearest_ones(tmp_path):
 
 
 def tif(folder, z=None, crs="EPSG:4326", dx=1e-5, nodata=None):
-    return maps.write_geotiff(folder / "x.tif", maps.heights(2.0, 60.0) if z is None else z, crs, 24.9, 60.2, dx, dx, nodata)
+    return maps.write_geotiff(
+        folder / "x.tif", maps.heights(2.0, 60.0) if z is None else z, crs, 24.9, 60.2, dx, dx, nodata
+    )
 
 
 FAULTS = {
-    "nothing but nodata": (lambda d: tif(d, np.full((9, 9), -5.0), nodata=-5.0), {}, "holds no height, every cell is nodata"),
+    "nothing but nodata": (
+        lambda d: tif(d, np.full((9, 9), -5.0), nodata=-5.0),
+        {},
+        "holds no height, every cell is nodata",
+    ),
     "no coordinate system": (lambda d: tif(d, crs=""), {}, "has no coordinate system"),
     "feet": (lambda d: tif(d, crs="EPSG:2263", dx=2.0), {}, "not in metres or degrees"),
     "too large": (lambda d: tif(d, dx=1e-3), {}, "--size 400 400 takes the middle"),
-    "elsewhere": (lambda d: tif(d), {"bbox": (10.0, 50.0, 10.001, 50.001)}, "has no height: x.tif reaches over 24.9000"),
+    "elsewhere": (
+        lambda d: tif(d),
+        {"bbox": (10.0, 50.0, 10.001, 50.001)},
+        "has no height: x.tif reaches over 24.9000",
+    ),
     "too fine": (lambda d: tif(d, dx=5e-5), {"cell_m": 0.3}, "take cells of"),
     "no such file": (lambda d: d / "none.tif", {}, "no such file"),
     "no height model": (lambda d: d / "x.png", {}, "a height model is a file .tif"),
@@ -149,7 +161,7 @@ FAULTS = {
 @pytest.mark.parametrize("fault", FAULTS)
 def test_a_fault_is_one_line(fault, tmp_path):
     make, options, said = FAULTS[fault]
-    with pytest.raises((AssetError, UsageError), match=".+") as found:
+    with pytest.raises((AssetError, UsageError)) as found:
         add_terrain("X", make(tmp_path), tmp_path / "mine", **options)
     assert said in str(found.value)
     assert "\n" not in str(found.value)

@@ -12,8 +12,10 @@ FRAME = LocalFrame(24.9, 60.2)
 HALF_M = 60.0
 BUILDINGS = {
     # Name: outline, tags.
-    "tall": ([(-50, 12), (-20, 12), (-20, 30), (-50, 30)], {"building": "apartments", "height": "21.5", "roof:shape": "flat"}),
-    "levels": ([(10, 14), (40, 14), (40, 32), (10, 32)], {"building": "office", "building:levels": "4", "roof:shape": "flat"}),
+    "tall": ([(-50, 12), (-20, 12), (-20, 30), (-50, 30)],
+             {"building": "apartments", "height": "21.5", "roof:shape": "flat"}),
+    "levels": ([(10, 14), (40, 14), (40, 32), (10, 32)],
+               {"building": "office", "building:levels": "4", "roof:shape": "flat"}),
     "house": ([(-45, -40), (-33, -40), (-33, -30), (-45, -30)],
               {"building": "house", "height": "8", "roof:shape": "gabled", "building:colour": "red"}),
     "hall": ([(-16, 40), (4, 40), (4, 56), (-6, 56), (-6, 50), (-16, 50)],
@@ -22,11 +24,15 @@ BUILDINGS = {
 POINTS = [
     ((-40, 7.6), {"amenity": "bench"}), ((-5, 7.8), {"highway": "bus_stop"}), ((20, -8), {"amenity": "post_box"}),
     ((30, -7.8), {"amenity": "waste_basket"}), ((0, 0), {"highway": "crossing", "crossing": "zebra"}),
-    ((20, -30), {"natural": "tree", "height": "9"}), ((30, -36), {"natural": "tree"}), ((36, -28), {"natural": "tree"}),
+    ((20, -30), {"natural": "tree", "height": "9"}), ((30, -36), {"natural": "tree"}),
+    ((36, -28), {"natural": "tree"}),
     ((-35, 20), {"amenity": "bench"}), ((26, -44), {"tourism": "artwork", "name": "Ode"}),
 ]  # fmt: skip
 LINES = [
-    ([(-80, 0), (0, 0), (80, 0)], {"highway": "secondary", "name": "Long Street", "lanes": "2", "surface": "asphalt"}),
+    (
+        [(-80, 0), (0, 0), (80, 0)],
+        {"highway": "secondary", "name": "Long Street", "lanes": "2", "surface": "asphalt"},
+    ),
     ([(0, 0), (0, -80)], {"highway": "residential", "name": "Short Street"}),
     ([(10, -22), (50, -50)], {"highway": "footway"}),
     ([(-80, -70), (80, -70)], {"highway": "primary", "tunnel": "yes", "layer": "-1"}),
@@ -82,7 +88,9 @@ def heights(cell_m: float, half_m: float) -> np.ndarray:
     return hill(x, y)
 
 
-def write_geotiff(path: Path, z: np.ndarray, crs: str, west: float, north: float, dx: float, dy: float, nodata: float | None = None) -> Path:
+def write_geotiff(
+    path: Path, z: np.ndarray, crs: str, west: float, north: float, dx: float, dy: float, nodata: float | None = None
+) -> Path:
     """Write heights whose north-western cell has its corner at (west, north)."""
     import rasterio
     from rasterio.transform import from_origin

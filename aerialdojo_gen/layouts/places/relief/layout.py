@@ -1,7 +1,8 @@
-"""Open country from a height model: grass, rock where it is steep, snow where it is high, sand and water where it is low."""
+"""Open country from a height model: grass, rock where it is steep, snow high up, sand and water where it is low."""
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Annotated
 
 import contourpy
@@ -35,8 +36,9 @@ _LANDMARKS = ("summit_cross", "fire_tower", "radio_mast")
 # Category, least distance, most of them, on which ground.
 _GROWTH = (
     ("spruce_tree", 7.0, 70, "grass"), ("oak_tree", 12.0, 18, "grass"), ("birch_tree", 9.0, 24, "grass"),
-    ("bush", 6.0, 40, "grass"), ("boulder", 9.0, 36, "rock"), ("boulder", 16.0, 16, "grass"), ("dead_tree", 26.0, 8, "rock"),
-    ("tree_stump", 20.0, 10, "grass"), ("fallen_log", 22.0, 8, "grass"), ("driftwood", 18.0, 8, "sand"),
+    ("bush", 6.0, 40, "grass"), ("boulder", 9.0, 36, "rock"), ("boulder", 16.0, 16, "grass"),
+    ("dead_tree", 26.0, 8, "rock"), ("tree_stump", 20.0, 10, "grass"), ("fallen_log", 22.0, 8, "grass"),
+    ("driftwood", 18.0, 8, "sand"),
     ("reed_clump", 6.0, 20, "sand"),
 )  # fmt: skip
 _CAMP = ("picnic_set", "log_bench", "backpack", "direction_sign", "cooler_box", "camp_chair")
@@ -125,7 +127,7 @@ def _where(value: Floats, ground: Terrain) -> BaseGeometry:
     lines = contourpy.contour_generator(x, y, value, fill_type="OuterOffset").filled(0.0, np.inf)
     plans = []
     for points, offsets in zip(*lines, strict=True):
-        rings = [points[a:b] for a, b in zip(offsets[:-1], offsets[1:], strict=True)]
+        rings = [points[a:b] for a, b in pairwise(offsets)]
         if len(rings[0]) > 3:
             plans.append(Polygon(rings[0], [r for r in rings[1:] if len(r) > 3]))
     area = shapely.union_all([shapely.make_valid(plan) for plan in plans])

@@ -70,7 +70,7 @@ def _inset(plan: Polygon, eaves_m: float, rise_m: float, *, round_: bool) -> Mes
         inner = plan.buffer(-high, join_style="mitre", mitre_limit=3.0) if math.isfinite(high) else Polygon()
         for ring in polygons_of(outer.difference(inner)):
             flat, faces = triangulate(ring)
-            # By the ring that a corner is of: at a corner that points inwards it lies farther from the walls than its ring.
+            # By the ring that a corner is of: where it points inwards it lies farther from the walls.
             on_outer = shapely.distance(outer.boundary, shapely.points(flat)) < _ON_M
             share = np.where(on_outer, low, min(high, reach)) / reach
             up = np.sqrt(np.maximum(1.0 - (1.0 - share) ** 2, 0.0)) if round_ else share

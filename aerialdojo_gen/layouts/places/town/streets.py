@@ -137,7 +137,9 @@ def _lane_marks(road: Road, line: LineString) -> list[BaseGeometry]:
 
 def _zebra(x: float, y: float, roads: Sequence[Road], lines: Sequence[LineString]) -> list[Polygon] | None:
     """Stripes of a crossing, along the street that it crosses; None where there is none."""
-    away = [line.distance(Point(x, y)) if r.kind != "service" else math.inf for r, line in zip(roads, lines, strict=True)]
+    away = [
+        line.distance(Point(x, y)) if r.kind != "service" else math.inf for r, line in zip(roads, lines, strict=True)
+    ]
     if not away or min(away) > _NEAR_M:
         return None
     k = int(np.argmin(away))

@@ -29,7 +29,8 @@ _PARKED = {
     "sedan": 0.33, "hatchback": 0.31, "suv": 0.2, "delivery_van": 0.07, "motorcycle": 0.05, "pickup_truck": 0.04,
 }  # fmt: skip
 _DRIVEN = {
-    "sedan": 0.34, "hatchback": 0.24, "suv": 0.14, "delivery_van": 0.1, "city_bus": 0.08, "box_truck": 0.05, "motorcycle": 0.05,
+    "sedan": 0.34, "hatchback": 0.24, "suv": 0.14, "delivery_van": 0.1, "city_bus": 0.08, "box_truck": 0.05,
+    "motorcycle": 0.05,
 }  # fmt: skip
 # Along pavements, in turn.
 _FURNITURE = (
@@ -109,7 +110,9 @@ _ALIKE = frozenset({"bollard", "street_lamp", "traffic_light"})
 _IN_STREETS = frozenset({"bollard", "traffic_cone"})
 
 
-def _try(site: Site, streets: Streets, category: str, pose: Pose, place: str = "", **options: object) -> Instance | None:
+def _try(
+    site: Site, streets: Streets, category: str, pose: Pose, place: str = "", **options: object
+) -> Instance | None:
     street = "" if place else streets.street(pose.x, pose.y)
     words = {"place": place or f"on {street}"} if place or street else None
     # Plants come as often as their weights say: nobody plants every fifth tree pink.
@@ -207,9 +210,7 @@ def _car_park(site: Site, area: Area, share: float, k: int) -> None:
                 back = 180.0 if rng.random() < 0.25 else 0.0
                 pose = Pose(bay.x, bay.y, bay.yaw_deg + back + rng.uniform(-2.0, 2.0))
                 category = _drawn(_PARKED, rng.random())
-                site.try_place(
-                    category, *pose, variant=next_variant(site, category), attributes={"place": place}
-                )
+                site.try_place(category, *pose, variant=next_variant(site, category), attributes={"place": place})
 
 
 def _furnish(site: Site, streets: Streets, share: float) -> None:
@@ -239,7 +240,9 @@ def _on_roofs(site: Site, building: Building, share: float, k: int) -> None:
                 category, z = _ON_ROOFS[turn % len(_ON_ROOFS)], base + body.top_m - PARAPET_M
                 yaw = 90.0 * round(pose.yaw_deg / 90.0)
                 words = {"place": "on the roof"}
-                site.try_place(category, pose.x, pose.y, yaw, z=z, variant=next_variant(site, category), attributes=words)
+                site.try_place(
+                    category, pose.x, pose.y, yaw, z=z, variant=next_variant(site, category), attributes=words
+                )
                 turn += 1
 
 
@@ -291,7 +294,9 @@ def _barrier(site: Site, barrier: Barrier) -> None:
         if barrier.kind == "hedge":
             place_along(site, "hedge_block", path, _HEDGE_M, turn_deg=90.0)
         elif barrier.kind == "wall":
-            site.add(None, "garden_wall", [("stone", wall(site, path, barrier.height_m, 0.3))], footprint=leg.buffer(0.2))
+            site.add(
+                None, "garden_wall", [("stone", wall(site, path, barrier.height_m, 0.3))], footprint=leg.buffer(0.2)
+            )
         else:
             _fence(site, path, barrier.height_m, leg)
 
