@@ -130,8 +130,8 @@ def add_map(
 def add_terrain(
     name: str, dem: Path, project: Path, *, bbox: Bbox | None = None, size_m: tuple[float, float] | None = None,
     cell_m: float | None = None, water_m: float | None = None, snow_m: float | None = None,
-    sand_m: float | None = None, bare: bool = False, attribution: str = "", seed: int = 0, ceiling_m: float | None = None,
-    force: bool = False,
+    sand_m: float | None = None, bare: bool = False, attribution: str = "", seed: int = 0,
+    ceiling_m: float | None = None, force: bool = False,
 ) -> Place:  # fmt: skip
     """Make open country of a height model, in a project folder.
 
