@@ -103,7 +103,8 @@ def read_map(path: Path, bbox: Bbox) -> Map:
         apart = west > extent[2] or east < extent[0] or south > extent[3] or north < extent[1]
         why = "lies outside the extract" if apart else "has nothing of the map in it"
         raise UsageError(f"--bbox {in_words(bbox)} {why}: {path.name} reaches over {in_words(extent)}")
-    return Map(*(tuple(sorted(found[k], key=_order)) for k in ("points", "lines", "areas")), extent)
+    points, lines, areas = (tuple(sorted(found[k], key=_order)) for k in ("points", "lines", "areas"))
+    return Map(points, lines, areas, extent)
 
 
 def _order(feature: Feature) -> tuple[str, int, float, float]:
