@@ -35,7 +35,7 @@ def colour(tags: Tags, *keys: str) -> str:
     """Read a colour as ``"#rrggbb"``; empty where there is none."""
     for key in keys:
         text = tags.get(key, "").strip().lower().replace(" ", "").replace("_", "")
-        text = CSS4_COLORS.get(text, text).lower()
+        text = str(CSS4_COLORS.get(text, text)).lower()
         if _COLOUR.fullmatch(text):
             return text if len(text) == 7 else "#" + "".join(2 * c for c in text[1:])
     return ""

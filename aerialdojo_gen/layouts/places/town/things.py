@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import shapely
@@ -110,9 +111,7 @@ _ALIKE = frozenset({"bollard", "street_lamp", "traffic_light"})
 _IN_STREETS = frozenset({"bollard", "traffic_cone"})
 
 
-def _try(
-    site: Site, streets: Streets, category: str, pose: Pose, place: str = "", **options: object
-) -> Instance | None:
+def _try(site: Site, streets: Streets, category: str, pose: Pose, place: str = "", **options: Any) -> Instance | None:
     street = "" if place else streets.street(pose.x, pose.y)
     words = {"place": place or f"on {street}"} if place or street else None
     # Plants come as often as their weights say: nobody plants every fifth tree pink.
