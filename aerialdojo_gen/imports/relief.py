@@ -56,12 +56,8 @@ def grid(
     x, y = np.meshgrid(*((np.arange(n + 1) - n / 2) * cell_m for n in (columns, rows)))
     if frame is not None:
         z = dem.at_degrees(*frame.degrees(x, y))
-        where = in_words(
-            (
-                *(float(v) for v in frame.degrees(x[0, 0], y[0, 0])),
-                *(float(v) for v in frame.degrees(x[-1, -1], y[-1, -1])),
-            )
-        )  # type: ignore[arg-type]
+        (west, east), (south, north) = frame.degrees((x[0, 0], x[-1, -1]), (y[0, 0], y[-1, -1]))
+        where = in_words((float(west), float(south), float(east), float(north)))
     else:
         z = dem.at(x + middle[0], y + middle[1])
         where = f"{size[0]:,.0f} by {size[1]:,.0f} m about ({middle[0]:,.0f}, {middle[1]:,.0f})"
