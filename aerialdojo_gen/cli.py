@@ -17,6 +17,7 @@ from aerialdojo_gen.commands import (
     evaluate,
     exchange,
     hub,
+    places,
     release,
     render,
     report,
@@ -72,7 +73,9 @@ def _program(
     """Take what stands before a command."""
 
 
-for _group in (stages, render, sources, annotate, evaluate, release, show, validate, exchange, hub, report):
+for _group in (
+    stages, render, sources, places, annotate, evaluate, release, show, validate, exchange, hub, report
+):  # fmt: skip
     app.add_typer(_group.app)
 app.add_typer(config.app, name="config")
 

@@ -48,6 +48,7 @@ def choose_landmarks(
     if missing:
         raise AnnotationError(f"{scene.name}: no node {missing[0]!r} to make a landmark of")
     chosen = [scene[node] for node in dict.fromkeys(wanted)][:n]
+    nouns = {i.node: noun for i, noun in zip(scene.instances, vocabulary.nouns, strict=True)}
     if scene.imported:
         names = _Names(vocabulary)
         nameless = [i.node for i in chosen if not names.of(i)]
@@ -62,10 +63,17 @@ def choose_landmarks(
             rest = [i for i in prominent if names.of(i)][:n]
     else:
         rest = [i for i in scene.instances if vocabulary.kinds.get(i.category) == "landmark" and i not in chosen]
+        if len(chosen) + len(rest) < n and at_most:
+            # A town of a map has no landmark of the catalogue as often as not: its tallest buildings will do.
+            named = _Names(vocabulary)
+            rest += [i for i in _prominent(vocabulary, 8 * n) if i not in (*chosen, *rest) and named.of(i)]
     while len(chosen) < n and rest:
         best = max(rest, key=lambda i: (spread_m(i, chosen), float(i.bounds[1, 2])))
         chosen.append(best)
         rest.remove(best)
+        if at_most and not scene.imported:
+            # Of statues that look alike one will do: a landmark has its name to itself.
+            rest = [i for i in rest if nouns[i.node].short != nouns[best.node].short]
     if len(chosen) < n and not (at_most and chosen):
         raise AnnotationError(
             f"{scene.name}: {n} landmark{'s are' if n > 1 else ' is'} wanted, the scene has {len(chosen)}"

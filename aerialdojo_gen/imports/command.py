@@ -232,7 +232,7 @@ def _put(scene: Scene, repairs: Repairs, project: Path, recipe: str, text: str |
             path.write_text(text, encoding="utf-8")
     if not (project / PIPELINE).exists():
         with atomic_file(project, PIPELINE) as path:
-            path.write_text(_pipeline(project), encoding="utf-8")
+            path.write_text(pipeline_text(project), encoding="utf-8")
     return Added(scene, repairs, project / PIPELINE, project / "annotations" / f"{name}.json")
 
 
@@ -278,7 +278,8 @@ def _recipe(
     return "\n".join(lines) + "\n"
 
 
-def _pipeline(project: Path) -> str:
+def pipeline_text(project: Path) -> str:
+    """Write the pipeline file of a project of one's own scenes."""
     name = "".join(c if c.isalnum() or c in "._-" else "-" for c in project.resolve().name).strip("._-") or "scenes"
     stages = [stage.name for stage in STAGES if stage.name != "render"]
     lines = [

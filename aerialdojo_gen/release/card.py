@@ -47,6 +47,15 @@ def _scene_rows(root: DataRoot, made: list[Made]) -> list[dict[str, Any]]:
     ]
 
 
+def _attributions(scenes: list[dict[str, Any]]) -> dict[str, list[str]]:
+    """Scenes by whose data they are made of; those of this program's own are left out."""
+    found: dict[str, list[str]] = {}
+    for row in scenes:
+        if row["attribution"]:
+            found.setdefault(row["attribution"], []).append(row["scene"])
+    return found
+
+
 def _by_setting(made: list[Made], splits: list[str]) -> dict[str, dict[str, int]]:
     total = {split: dict.fromkeys(schemas.SETTINGS, 0) for split in splits}
     for m in made:
@@ -145,6 +154,7 @@ def render_card(data: Where) -> str:
         actions=schemas.ACTION_NAMES,
         of_paper=all(map(_of_paper, made)) and own,
         own_scenes=own,
+        attributions=_attributions(scenes),
         made_by=sorted({maker.name for maker in known.values()} - {""}),
         prefers_harder=any(maker.prefer_harder for maker in known.values()),
         tables_of=_difficulty(tasks),

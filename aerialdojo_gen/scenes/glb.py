@@ -107,6 +107,7 @@ def read_glb(path: Path, sha256: str = "") -> Scene:
             sun=tuple(extras["sun"]),
             imported=bool(extras.get("imported", False)),
             backdrop=tuple(i for i in instances if i.surface == "dome"),
+            attribution=str(document["asset"].get("copyright", "")),
         )
         _check(scene)
         return scene
@@ -177,7 +178,8 @@ class _Writer:
         children = list(range(1, len(self._nodes) + 1))
         root = {"name": scene.name, "rotation": _Z_UP_TO_Y_UP, "children": children}
         document: dict[str, Any] = {
-            "asset": {"version": "2.0", "generator": "aerialdojo-gen"},
+            "asset": {"version": "2.0", "generator": "aerialdojo-gen"}
+            | ({"copyright": scene.attribution} if scene.attribution else {}),
             "extras": {"aerialdojo": own},
             "scene": 0,
             "scenes": [{"name": scene.name, "nodes": [0]}],

@@ -98,9 +98,9 @@ def visible_surfaces(extent: Polygon, base: str, surfaces: Sequence[Surface]) ->
     covered: BaseGeometry = Polygon()
     layers = []
     for layer in reversed(groups):
-        seen = _snapped(layer.area).intersection(_snapped(extent))
+        seen = _areal(_snapped(layer.area).intersection(_snapped(extent)))
         seen = shapely.difference(seen, covered, grid_size=_GRID_M)
-        covered = shapely.union(covered, seen, grid_size=_GRID_M)
+        covered = _areal(shapely.union(covered, _areal(seen), grid_size=_GRID_M))
         if seen.area > _MIN_AREA_M2:
             layers.append(Surface(seen, layer.material, layer.rise_m, layer.edge))
     return layers[::-1]
@@ -111,6 +111,11 @@ def polygons_of(area: BaseGeometry) -> list[Polygon]:
     if isinstance(area, Polygon):
         return [area] if area.area > _MIN_AREA_M2 else []
     return [p for g in getattr(area, "geoms", ()) for p in polygons_of(g)]
+
+
+def _areal(area: BaseGeometry) -> BaseGeometry:
+    """Drop the lines and points where areas touch and do not overlap: overlays refuse what is mixed."""
+    return MultiPolygon(polygons_of(area)) if area.geom_type == "GeometryCollection" else area
 
 
 def _snapped(area: BaseGeometry) -> BaseGeometry:

@@ -178,6 +178,8 @@ class Scene:
         Whether it comes from a mesh of another make, whose categories are its own.
     backdrop : tuple of Instance
         Sky domes and the like: drawn behind everything, and nowhere else there, neither for rays nor for collision.
+    attribution : str
+        Whose data it is made of, and under which licence; empty for what is this program's own.
     """
 
     name: str
@@ -188,6 +190,7 @@ class Scene:
     sun: tuple[float, float, float] = (0.45, -0.35, 0.82)
     imported: bool = False
     backdrop: tuple[Instance, ...] = ()
+    attribution: str = ""
     _by_node: dict[str, Instance] = field(default_factory=dict, init=False, repr=False)
 
     def __post_init__(self) -> None:

@@ -82,6 +82,28 @@ class Move(BaseModel):
     place: Annotated[str, Field(min_length=1, max_length=_LONGEST)] | None = None
 
 
+class Origin(BaseModel):
+    """Where the origin of a real place's scene lies.
+
+    Attributes
+    ----------
+    lon_deg, lat_deg : float or None
+        Longitude and latitude, WGS 84.
+    x_m, y_m : float or None
+        In the metres of the model that its heights are from, where that does not say where on earth they are.
+    z_m : float
+        The height that is z = 0, metres.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    lon_deg: Annotated[float, Field(ge=-180, le=180)] | None = None
+    lat_deg: Annotated[float, Field(ge=-90, le=90)] | None = None
+    x_m: Annotated[float, Field(ge=-1e9, le=1e9)] | None = None
+    y_m: Annotated[float, Field(ge=-1e9, le=1e9)] | None = None
+    z_m: Annotated[float, Field(ge=-1e5, le=1e5)] = 0.0
+
+
 class Recipe(BaseModel):
     """What a scene is made from.
 
@@ -105,6 +127,10 @@ class Recipe(BaseModel):
         The layout's own.
     inventory : dict of str to int
         Least number of instances of a category that the built scene must have.
+    attribution : str
+        Whose data the scene is made of, and under which licence, where it is of a real place.
+    origin : Origin or None
+        Where on earth that is.
     level : tuple of Level
         Places levelled in the layout's ground, in their order.
     moves : dict of str to Move
@@ -122,6 +148,8 @@ class Recipe(BaseModel):
     palette: dict[str, str] = {}
     parameters: dict[str, Any] = {}
     inventory: dict[str, Annotated[int, Field(ge=0, le=100_000)]] = {}
+    attribution: Annotated[str, Field(max_length=500)] = ""
+    origin: Origin | None = None
     level: Annotated[tuple[Level, ...], Field(max_length=200)] = ()
     moves: Annotated[dict[str, Move], Field(max_length=500)] = {}
 

@@ -289,7 +289,7 @@ class Site:
         floor = float(ground.bounds[0, 2])
         bounds = np.array([[-x / 2, -y / 2, floor], [x / 2, y / 2, self.recipe.ceiling_m]])
         sky, sun = parse_colour(self.recipe.sky), self.recipe.sun_direction
-        return Scene(self.name, instances, materials, bounds, sky, sun)
+        return Scene(self.name, instances, materials, bounds, sky, sun, attribution=self.recipe.attribution)
 
     def _ground(self) -> Instance:
         meshes = ground_meshes(self._terrain, self.extent, self._base, self._surfaces)

@@ -20,7 +20,9 @@ from aerialdojo_gen.scenes.recipe import load_recipe
 SOURCES = Path(aerialdojo_gen.__file__).parent
 PROJECT = SOURCES.parent
 ASSETS = PROJECT / "scene_assets"
-RECIPES = sorted([*ASSETS.glob("scenes/*.toml"), *ASSETS.glob("smoke/*.toml")])
+# Layouts of real places have no scene among the 42.
+PLACES = PROJECT / "tests" / "layouts" / "places"
+RECIPES = sorted([*ASSETS.glob("scenes/*.toml"), *ASSETS.glob("smoke/*.toml"), *PLACES.glob("*.toml")])
 BUILD = BY_NAME["build-scenes"]
 # It calls the layouts, and belongs to none.
 ENGINE = "aerialdojo_gen.layouts.build"

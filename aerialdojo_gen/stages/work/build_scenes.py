@@ -69,6 +69,7 @@ def scene_row(scene: Scene, mesh_path: str, mesh_sha256: str) -> dict[str, objec
         "n_triangles": scene.n_triangles,
         "n_instances": len(scene.instances),
         "n_categories": len({i.category for i in scene.instances}),
+        "attribution": scene.attribution or None,
     }
 
 

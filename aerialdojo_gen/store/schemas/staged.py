@@ -64,6 +64,8 @@ SCENES = table(
     column("n_triangles", pa.int64(), "triangles of all instances"),
     column("n_instances", pa.int32(), "named nodes"),
     column("n_categories", pa.int32(), "distinct categories among the nodes"),
+    column("attribution", pa.string(), "whose data a real place is made of, and their licence; null for other scenes",
+           nullable=True),
     command="build-scenes",
 )  # fmt: skip
 

@@ -1,0 +1,233 @@
+"""Height models: GeoTIFF (by rasterio), ESRI ASCII grids and NPZ, sampled in metres."""
+
+from __future__ import annotations
+
+import importlib
+import math
+import zipfile
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aerialdojo_gen.errors import AssetError, UsageError
+from aerialdojo_gen.imports.earth import Bbox, LocalFrame, in_words
+
+Floats = NDArray[np.float64]
+# What a survey flies over has far fewer; a continent's model is cut first.
+_MOST_CELLS = 100_000_000
+_MOST_TEXT_BYTES = 512 << 20
+_BEYOND = 1e-6
+_DEGREES = 1.0
+_ASC_KEYS = ("ncols", "nrows", "xllcorner", "yllcorner", "xllcenter", "yllcenter", "cellsize", "nodata_value")
+_SUFFIXES = (".tif", ".tiff", ".asc", ".npz")
+
+
+@dataclass(frozen=True, eq=False)
+class Dem:
+    """Heights on a grid.
+
+    Attributes
+    ----------
+    path : Path
+        The file.
+    heights_m : (rows, columns) float64
+        Metres; rows run south from the northernmost, NaN where there is none.
+    x0, y0 : float
+        Of the north-western height, in the grid's own coordinates.
+    dx, dy : float
+        From one to the next, eastwards and southwards; both above 0.
+    geographic : bool or None
+        Whether its coordinates are degrees of longitude and latitude; None where they are metres from anywhere.
+    to_grid : callable or None
+        ``(lon, lat) -> (x, y)``; None where the grid is nowhere on earth.
+    """
+
+    path: Path
+    heights_m: Floats
+    x0: float
+    y0: float
+    dx: float
+    dy: float
+    geographic: bool | None
+    to_grid: Callable[[Floats, Floats], tuple[Floats, Floats]] | None
+
+    @property
+    def extent(self) -> Bbox:
+        """Least x and y, greatest x and y of its heights, own coordinates."""
+        rows, columns = self.heights_m.shape
+        return self.x0, self.y0 - (rows - 1) * self.dy, self.x0 + (columns - 1) * self.dx, self.y0
+
+    def at(self, x: Floats, y: Floats) -> Floats:
+        """Heights by bilinear interpolation at points of its own coordinates; NaN beyond it and next to no height."""
+        rows, columns = self.heights_m.shape
+        u, v = (x - self.x0) / self.dx, (self.y0 - y) / self.dy
+        near = (u > -_BEYOND) & (v > -_BEYOND) & (u < columns - 1 + _BEYOND) & (v < rows - 1 + _BEYOND)
+        u, v = np.clip(u, 0, columns - 1), np.clip(v, 0, rows - 1)
+        j, i = np.minimum(u.astype(int), columns - 2), np.minimum(v.astype(int), rows - 2)
+        u, v = u - j, v - i
+        h = self.heights_m
+        total = np.zeros(np.shape(x))
+        for a, b, weight in ((0, 0, (1 - u) * (1 - v)), (0, 1, u * (1 - v)), (1, 0, (1 - u) * v), (1, 1, u * v)):
+            # A height that is not there matters only where it has a say.
+            total += np.where(weight > 1e-9, weight * h[i + a, j + b], 0.0)
+        return np.where(near, total, np.nan)
+
+    def at_degrees(self, lon: Floats, lat: Floats) -> Floats:
+        """Heights at points on earth; a `UsageError` where the file does not say where it is."""
+        if self.to_grid is None:
+            raise UsageError(f"{self.path} does not say where on earth it is: give a GeoTIFF, or a grid in degrees")
+        return self.at(*self.to_grid(lon, lat))
+
+
+def read_dem(path: Path) -> Dem:
+    """Read a height model.
+
+    Parameters
+    ----------
+    path : Path
+        ``.tif``: the first band, in metres, of any coordinate system that is projected in metres or geographic.
+        ``.asc``: an ESRI ASCII grid. ``.npz``: `heights_m` (rows from north to south) with `cell_m`, or with
+        `bbox_deg` (west, south, east, north of the outermost heights).
+
+    Raises
+    ------
+    UsageError
+        A GeoTIFF, and rasterio is not installed.
+    AssetError
+        The file is missing, damaged, without a coordinate system or any height, or its system is in other units.
+    """
+    suffix = path.suffix.lower()
+    if suffix not in _SUFFIXES:
+        raise AssetError(f"{path}: a height model is a file {', '.join(_SUFFIXES)}")
+    if not path.is_file():
+        raise AssetError(f"{path}: cannot be read (no such file)")
+    dem = _geotiff(path) if suffix in (".tif", ".tiff") else _ascii(path) if suffix == ".asc" else _npz(path)
+    if min(dem.heights_m.shape) < 2:
+        raise AssetError(f"{path}: has {' by '.join(map(str, dem.heights_m.shape))} heights, a relief needs 2 by 2")
+    if not np.isfinite(dem.heights_m).any():
+        raise AssetError(f"{path}: holds no height, every cell is nodata")
+    return dem
+
+
+def frame_of(dem: Dem) -> LocalFrame | None:
+    """Where the middle of a geographic grid is; None for any other."""
+    west, south, east, north = dem.extent
+    return LocalFrame((west + east) / 2, (south + north) / 2) if dem.geographic else None
+
+
+def _geotiff(path: Path) -> Dem:
+    try:
+        rasterio = importlib.import_module("rasterio")
+        warp = importlib.import_module("rasterio.warp")
+    except ImportError:
+        raise UsageError(
+            "GeoTIFFs are read by rasterio, which is not installed: pip install 'aerialdojo-gen[maps]'"
+        ) from None
+    try:
+        with rasterio.open(path) as file:
+            if file.width * file.height > _MOST_CELLS:
+                raise AssetError(
+                    f"{path} has {file.width:,} x {file.height:,} heights, {_MOST_CELLS:,} are the most: "
+                    "cut a part out of it first"
+                )
+            z = file.read(1, masked=True).astype(np.float64).filled(np.nan)
+            crs, t = file.crs, file.transform
+    except rasterio.errors.RasterioError as error:
+        raise AssetError(
+            f"{path} cannot be read as a GeoTIFF, or is cut short: {_line(error)}; get it again"
+        ) from None
+    if crs is None:
+        raise AssetError(f"{path} has no coordinate system: set one, e.g. gdal_edit.py -a_srs EPSG:4326 {path.name}")
+    if abs(t.b) > 1e-12 or abs(t.d) > 1e-12 or t.a <= 0 or t.e >= 0:
+        raise AssetError(f"{path} is turned or mirrored: north must be up (gdalwarp -t_srs EPSG:4326 makes it so)")
+    if not crs.is_geographic and not math.isclose(crs.linear_units_factor[1], 1.0, rel_tol=1e-9):
+        raise AssetError(
+            f"{path} is in {crs.linear_units_factor[0]}, not in metres or degrees: "
+            "gdalwarp -t_srs EPSG:4326 makes it so"
+        )
+
+    def to_grid(lon: Floats, lat: Floats) -> tuple[Floats, Floats]:
+        shape = np.shape(lon)
+        x, y = warp.transform("EPSG:4326", crs, np.ravel(lon).tolist(), np.ravel(lat).tolist())
+        return np.reshape(x, shape), np.reshape(y, shape)
+
+    z[~(np.abs(z) < 1e5)] = np.nan
+    # A GeoTIFF's heights are those of the middles of its cells.
+    return Dem(path, z, t.c + t.a / 2, t.f + t.e / 2, t.a, -t.e, bool(crs.is_geographic), to_grid)
+
+
+def _ascii(path: Path) -> Dem:
+    if path.stat().st_size > _MOST_TEXT_BYTES:
+        raise AssetError(f"{path} has more than {_MOST_TEXT_BYTES >> 20} MiB: cut a part out of it first")
+    head: dict[str, float] = {}
+    try:
+        with path.open(encoding="ascii") as file:
+            while True:
+                start = file.tell()
+                words = file.readline(200).split()
+                if len(words) != 2 or words[0].lower() not in _ASC_KEYS:
+                    file.seek(start)
+                    break
+                head[words[0].lower()] = float(words[1])
+            columns, rows, cell = int(head["ncols"]), int(head["nrows"]), head["cellsize"]
+            numbers = np.fromstring(file.read(), dtype=np.float64, sep=" ") if columns * rows <= _MOST_CELLS else None
+    except (KeyError, ValueError, UnicodeDecodeError) as error:
+        raise AssetError(
+            f"{path} is no ESRI ASCII grid (ncols, nrows, xllcorner, yllcorner, cellsize): {_line(error)}"
+        ) from None
+    if numbers is None or numbers.size != columns * rows or not (cell > 0 and math.isfinite(cell)):
+        found = "too many" if numbers is None else f"{numbers.size:,}"
+        raise AssetError(f"{path} says {columns:,} by {rows:,} heights and has {found}: is it cut short?")
+    z = numbers.reshape(rows, columns)
+    z[z == head.get("nodata_value", -9999.0)] = np.nan
+    half = 0.0 if "xllcenter" in head else cell / 2
+    west = head.get("xllcenter", head.get("xllcorner", 0.0)) + half
+    south = head.get("yllcenter", head.get("yllcorner", 0.0)) + half
+    north = south + (rows - 1) * cell
+    geographic = cell * max(rows, columns) < 5 and abs(west) <= 180 and abs(north) <= 90 and cell < _DEGREES / 10
+    return Dem(path, z, west, north, cell, cell, geographic or None, _same if geographic else None)
+
+
+def _npz(path: Path) -> Dem:
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            z = np.array(file["heights_m"], dtype=np.float64)
+            cell = float(file["cell_m"]) if "cell_m" in file else None
+            bbox = [float(v) for v in file["bbox_deg"]] if "bbox_deg" in file else None
+    except (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile) as error:
+        raise AssetError(
+            f"{path} cannot be read: {_line(error)}; it must hold heights_m with cell_m or bbox_deg"
+        ) from None
+    if z.ndim != 2 or z.size > _MOST_CELLS or (cell is None) == (bbox is None) or min(z.shape) < 2:
+        raise AssetError(
+            f"{path} must hold heights_m, 2 by 2 or more, with cell_m (metres) or bbox_deg (west, south, east, north)"
+        )
+    z[~(np.abs(z) < 1e5)] = np.nan
+    rows, columns = z.shape
+    if bbox is not None:
+        if len(bbox) != 4 or not (bbox[0] < bbox[2] and bbox[1] < bbox[3]):
+            raise AssetError(f"{path}: bbox_deg must be west, south, east, north")
+        west, south, east, north = bbox
+        return Dem(path, z, west, north, (east - west) / (columns - 1), (north - south) / (rows - 1), True, _same)
+    if cell is None or not (math.isfinite(cell) and cell > 0):
+        raise AssetError(f"{path}: cell_m must be a number above 0")
+    return Dem(path, z, 0.0, (rows - 1) * cell, cell, cell, None, None)
+
+
+def _same(lon: Floats, lat: Floats) -> tuple[Floats, Floats]:
+    return lon, lat
+
+
+def _line(error: BaseException) -> str:
+    return " ".join(str(error).split())[:160] or type(error).__name__
+
+
+def outside(dem: Dem) -> str:
+    """Say over what a height model reaches, for a message."""
+    west, south, east, north = dem.extent
+    if dem.geographic:
+        return f"{dem.path.name} reaches over {in_words(dem.extent)}"
+    return f"{dem.path.name} reaches over x {west:,.0f} to {east:,.0f}, y {south:,.0f} to {north:,.0f} m"

@@ -1,0 +1,272 @@
+"""Buildings of a map: what they are, how high, under which roof, behind which façade."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from statistics import median_low
+from typing import Any
+
+import shapely
+from shapely import STRtree
+from shapely.geometry import Polygon
+from shapely.geometry.base import BaseGeometry
+
+from aerialdojo_gen.common.rng import rank
+from aerialdojo_gen.imports.map_tags import Tags, below_ground, colour, count, metres
+from aerialdojo_gen.imports.osm import Feature
+from aerialdojo_gen.scenes.colour_names import colour_name
+from aerialdojo_gen.scenes.ground import polygons_of
+from aerialdojo_gen.scenes.materials import parse_colour
+
+STOREY_M = 3.2
+_ROOF_LEVEL_M = 2.4
+_LEAST_M2, _LEAST_WIDTH_M = 6.0, 1.2
+_PITCH = 0.62
+_MOST_RISE_M = 5.0
+# Of a building's ground: where its parts take more, its outline has nothing to add.
+_PARTED = 0.85
+_SHOP_NEAR_M = 2.5
+
+_CATEGORY = {
+    **dict.fromkeys(("apartments", "residential", "dormitory", "terrace"), "apartment_building"),
+    **dict.fromkeys(("house", "detached", "semidetached_house", "bungalow", "villa", "cabin", "farm"), "house"),
+    **dict.fromkeys(("office", "commercial", "bank"), "office_building"),
+    **dict.fromkeys(("retail", "supermarket", "shop", "mall", "kiosk"), "shop_building"),
+    **dict.fromkeys(("industrial", "warehouse", "factory", "hangar"), "factory_building"),
+    **dict.fromkeys(("church", "cathedral", "chapel"), "church"),
+    **dict.fromkeys(("school", "university", "college", "kindergarten"), "school"),
+    **dict.fromkeys(("public", "civic", "government", "townhall", "courthouse", "library"), "public_building"),
+    **dict.fromkeys(("garage", "garages", "carport"), "garage_building"),
+    **dict.fromkeys(("shed", "hut", "greenhouse", "service", "toilets", "transformer_tower"), "outbuilding"),
+    "hotel": "hotel", "hospital": "hospital", "train_station": "station_building", "museum": "museum",
+    "theatre": "theatre", "mosque": "mosque", "synagogue": "synagogue", "temple": "temple", "roof": "canopy",
+}  # fmt: skip
+_LEVELS = {
+    "apartment_building": 5, "house": 2, "office_building": 5, "shop_building": 2, "factory_building": 2, "church": 4,
+    "school": 3, "public_building": 4, "garage_building": 1, "outbuilding": 1, "hotel": 6, "hospital": 5,
+    "station_building": 3, "canopy": 1,
+}  # fmt: skip
+_PLASTER = (
+    "#d9bd74",
+    "#e3d6b0",
+    "#c98f6a",
+    "#d8c7b4",
+    "#b9c2b0",
+    "#cfa79c",
+    "#c4b49a",
+    "#e6e0d2",
+    "#b08a6a",
+    "#a9b4bb",
+)
+_BRICK = ("#8f4a3c", "#a4614a", "#7d5546")
+_OFFICE = ("facade_office:#b8b4ac", "facade_office:#97a1a8", "facade_office:#c9bfae", "curtain_wall:#6f95ad",
+           "curtain_wall:#7f958c", "facade_office:#a08c78")  # fmt: skip
+_METAL = ("sheet_metal:#4f5a55", "sheet_metal:#5f4a44", "sheet_metal:#464b50", "sheet_metal:#6f7d74")
+_TILES = ("roof_tiles:#8a4a38", "roof_tiles:#a05a40", "shingles:#55504c")
+_FLAT = ("concrete:#77787a", "gravel:#8b877f", "concrete:#63656a")
+_ROOFS = {
+    **dict.fromkeys(("gabled", "gambrel", "saltbox", "half-hipped"), "gabled"),
+    **dict.fromkeys(("hipped", "pyramidal", "mansard", "cone", "side_hipped"), "hipped"),
+    **dict.fromkeys(("dome", "onion", "round"), "dome"), "flat": "flat", "skillion": "flat",
+}  # fmt: skip
+
+
+@dataclass
+class Told:
+    """What was made of the map, for the user to read: how often, by what."""
+
+    counts: Counter[str] = field(default_factory=Counter)
+
+    def add(self, what: str, n: int = 1) -> None:
+        """Count a thing."""
+        self.counts[what] += n
+
+
+def buildings(
+    areas: Sequence[Feature], shops: Sequence[BaseGeometry], site: Polygon, told: Told
+) -> list[dict[str, Any]]:
+    """Make the recipe's buildings.
+
+    Parameters
+    ----------
+    areas : sequence of Feature
+        In metres.
+    shops : sequence of points
+        Where shops, cafés and the like are.
+    site : Polygon
+        What is cut off at the scene's border is left out.
+    told : Told
+        Gets how their heights were found.
+    """
+    outlines = [a for a in areas if a.tags.get("building", "no") != "no" and not below_ground(a.tags)]
+    parts = [a for a in areas if a.tags.get("building:part", "no") != "no" and not below_ground(a.tags)]
+    levels = [n for a in outlines if (n := count(a.tags, "building:levels")) and n > 1]
+    usual = median_low(levels) if len(levels) >= 3 else 3
+    tree = STRtree([p.shape.representative_point() for p in parts])
+    taken: list[BaseGeometry] = []
+    shop_points = shapely.union_all(list(shops)) if shops else None
+    out = []
+    # A passage or a wing that was drawn over its house is cut out of the larger one.
+    for area in sorted(outlines, key=lambda a: (a.shape.area, a.key)):
+        own = [parts[k] for k in sorted(tree.query(area.shape, predicate="contains"))]
+        plan = area.shape.difference(shapely.union_all(taken)) if taken else area.shape
+        taken = [*taken, area.shape]
+        bodies = [
+            b
+            for part in own
+            for b in _bodies(part.shape.intersection(plan), _inherited(area, part), usual, site, None)
+        ]
+        rest = plan.difference(shapely.union_all([p.shape for p in own])) if own else plan
+        if not own or rest.area > (1.0 - _PARTED) * area.shape.area:
+            bodies += _bodies(rest, area, usual, site, told)
+        if not bodies:
+            continue
+        out.append((area.key, _building(area, bodies, shop_points)))
+    told.add("buildings", len(out))
+    return [made for _, made in sorted(out, key=lambda item: (item[0][0], int(item[0][1:])))]
+
+
+def _inherited(whole: Feature, part: Feature) -> Feature:
+    """A part is of its building's material, kind and colour unless it says otherwise; heights are its own."""
+    own = ("height", "building:levels", "roof:", "min_height", "building:min_level")
+    given = {k: v for k, v in whole.tags.items() if not k.startswith(own)}
+    return Feature(part.key, part.shape, given | dict(part.tags))
+
+
+def category(tags: Tags) -> str:
+    """What a building is, by its own kind or by what is in it."""
+    for key in ("building", "amenity", "tourism", "shop", "office", "building:use"):
+        value = tags.get(key, "")
+        if value in _CATEGORY:
+            return _CATEGORY[value]
+    if tags.get("amenity") == "place_of_worship":
+        return "church"
+    return "shop_building" if "shop" in tags else "office_building" if "office" in tags else "building"
+
+
+def _building(area: Feature, bodies: list[dict[str, Any]], shops: BaseGeometry | None) -> dict[str, Any]:
+    kind = category(area.tags)
+    wall, word = _wall(area, kind, max(b["top_m"] for b in bodies))
+    lets = kind in ("shop_building", "hotel") or (
+        kind in ("building", "apartment_building", "office_building", "public_building")
+        and shops is not None and shapely.distance(shops, area.shape) < _SHOP_NEAR_M
+    )  # fmt: skip
+    pitched = any(b["roof"] != "flat" for b in bodies)
+    named = {"name": area.tags.get("name", "")[:80], "street": area.tags.get("addr:street", "")[:80]}
+    return {
+        "category": kind,
+        **{k: v for k, v in named.items() if v},
+        "wall": wall,
+        "roofing": _roofing(area, pitched, kind),
+        **({"colour": word} if word else {}),
+        **({"shops": True} if lets else {}),
+        **({"canopy": True} if kind == "canopy" else {}),
+        "bodies": bodies,
+    }
+
+
+def _bodies(shape: BaseGeometry, area: Feature, usual: int, site: Polygon, told: Told | None) -> list[dict[str, Any]]:
+    out = []
+    for piece in polygons_of(shape.intersection(site)):
+        plan = piece.simplify(0.12)
+        if plan.area < _LEAST_M2 or plan.buffer(-_LEAST_WIDTH_M / 2).is_empty or not isinstance(plan, Polygon):
+            continue
+        base, top, roof, rise = _heights(area, plan, usual, told)
+        out.append({
+            "outline": _ring(plan.exterior), **({"holes": [_ring(r) for r in plan.interiors if Polygon(r).area > 1.0]}
+                                                if plan.interiors else {}),
+            **({"base_m": round(base, 2)} if base else {}), "top_m": round(top, 2), "roof": roof,
+            **({"roof_m": round(rise, 2)} if rise else {}),
+        })  # fmt: skip
+    return out
+
+
+def _ring(ring: Any) -> list[list[float]]:
+    return [[round(float(x), 2), round(float(y), 2)] for x, y in list(ring.coords)[:-1]]
+
+
+def _heights(area: Feature, plan: Polygon, usual: int, told: Told | None) -> tuple[float, float, str, float]:
+    """Base, top, roof's form and rise, metres over the ground."""
+    tags, kind = area.tags, category(area.tags)
+    height, levels = metres(tags, "height", "building:height"), count(tags, "building:levels")
+    if levels is None:
+        small = 1 if plan.area < 60.0 else 2 if plan.area < 160.0 else usual
+        levels_used = _LEVELS.get(kind, small)
+    else:
+        levels_used = levels
+    if told is not None:
+        told.add("height" if height else "levels" if levels else "rule")
+    form = _ROOFS.get(tags.get("roof:shape", ""), "") or _usual_roof(area, kind, levels_used)
+    # A roof's slope is as long as half its narrower side.
+    half = float(shapely.maximum_inscribed_circle(plan, tolerance=0.1).length)
+    rise = metres(tags, "roof:height")
+    if rise is None:
+        roof_levels = count(tags, "roof:levels")
+        rise = (
+            roof_levels * _ROOF_LEVEL_M
+            if roof_levels
+            else min(half * (1.0 if form == "dome" else _PITCH), _MOST_RISE_M)
+        )
+    rise = 0.0 if form == "flat" else rise
+    base = metres(tags, "min_height", "building:min_height") or STOREY_M * (count(tags, "building:min_level") or 0)
+    if height is None:
+        height = (3.0 if kind == "canopy" else max(levels_used * STOREY_M, 2.6)) + rise
+    height = min(max(height, 2.2), 400.0)
+    base = min(base, height - 1.0)
+    if rise > 0.8 * (height - base):
+        rise = 0.5 * (height - base)
+    return base, height, form if rise >= 0.3 else "flat", rise if rise >= 0.3 else 0.0
+
+
+def _usual_roof(area: Feature, kind: str, levels: int) -> str:
+    if kind in ("house", "church"):
+        return "gabled"
+    old = kind in ("apartment_building", "building", "public_building", "school", "hotel") and 2 <= levels <= 8
+    return "hipped" if old and _pick(area, "roof", 10) < 6 else "flat"
+
+
+def _wall(area: Feature, kind: str, top_m: float) -> tuple[str, str]:
+    """Material of the walls, and their colour in a word, empty where glass is most of it."""
+    tags = area.tags
+    given, material = colour(tags, "building:colour", "building:color"), tags.get("building:material", "")
+    paint = given or _PLASTER[_pick(area, "plaster", len(_PLASTER))]
+    brick = given or _BRICK[_pick(area, "brick", len(_BRICK))]
+    if material == "glass" or (
+        kind == "office_building" and not given and material in ("", "glass", "steel", "metal")
+    ):
+        spec = "curtain_wall" if material == "glass" else _OFFICE[_pick(area, "office", len(_OFFICE))]
+    elif material == "wood":
+        spec = f"planks:{given or '#b59468'}"
+    elif kind in ("church", "outbuilding", "garage_building", "canopy") or top_m < 2.8:
+        spec = f"brick:{brick}" if material == "brick" else f"plaster:{paint}"
+    elif kind == "factory_building":
+        spec = f"facade_industrial:{given}" if given else "facade_industrial"
+    elif material == "brick" or (not material and not given and _pick(area, "wall", 10) < 2):
+        spec = f"facade_brick:{brick}"
+    else:
+        spec = f"facade_flats:{paint}"
+    shade = spec.partition(":")[2]
+    word = (
+        colour_name(parse_colour(shade)) if shade and not spec.startswith(("curtain_wall", "facade_office")) else ""
+    )
+    return spec, word
+
+
+def _roofing(area: Feature, pitched: bool, kind: str) -> str:
+    given, material = colour(area.tags, "roof:colour", "roof:color"), area.tags.get("roof:material", "")
+    if not pitched:
+        return f"concrete:{given}" if given else _FLAT[_pick(area, "flat", len(_FLAT))]
+    tiled = material in ("roof_tiles", "tile", "tiles") or (not material and kind == "house")
+    if given:
+        return f"{'roof_tiles' if tiled else 'sheet_metal'}:{given}"
+    if material == "copper":
+        return "sheet_metal:#6fa08c"
+    choice = _TILES if tiled else _METAL
+    return choice[_pick(area, "roofing", len(choice))]
+
+
+def _pick(area: Feature, what: str, n: int) -> int:
+    """Draw by the building's own id: neither another building nor the bounding box changes it."""
+    return rank(0, "add-map", area.key, what) % n

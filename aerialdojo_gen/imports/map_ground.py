@@ -1,0 +1,238 @@
+"""Streets, paths, rails, areas and barriers of a map."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+from shapely.geometry import LineString, Point, Polygon
+from shapely.geometry.base import BaseGeometry
+from shapely.ops import polygonize, unary_union
+
+from aerialdojo_gen.imports.map_buildings import Told
+from aerialdojo_gen.imports.map_tags import SURFACES, Tags, below_ground, count, metres
+from aerialdojo_gen.imports.osm import Feature
+from aerialdojo_gen.scenes.ground import polygons_of
+
+_SPACING_M = 0.06
+_PARKED = ("parallel", "lane", "diagonal", "perpendicular", "street_side", "on_kerb", "half_on_kerb", "yes")
+_LANE_M, _PARKED_M = 3.2, 2.2
+_LEAST_AREA_M2 = 2.0
+# Kind, width without lanes, lanes, pavement: what a street of this class has if its tags do not say.
+_CLASSES: dict[str, tuple[str, float, int, float]] = {
+    "motorway": ("main", 12.0, 3, 0.0), "trunk": ("main", 10.0, 3, 2.0), "primary": ("main", 10.0, 3, 3.0),
+    "secondary": ("main", 8.0, 2, 2.8), "tertiary": ("main", 7.5, 2, 2.5), "unclassified": ("side", 6.5, 2, 2.2),
+    "residential": ("side", 6.0, 2, 2.2), "living_street": ("side", 5.5, 2, 1.5), "busway": ("side", 6.5, 2, 2.0),
+    "road": ("side", 6.0, 2, 1.5), "service": ("service", 3.6, 1, 0.0), "track": ("service", 3.0, 1, 0.0),
+    "pedestrian": ("path", 5.0, 1, 0.0), "footway": ("path", 2.2, 1, 0.0), "path": ("path", 1.6, 1, 0.0),
+    "cycleway": ("path", 2.4, 1, 0.0), "steps": ("path", 2.4, 1, 0.0), "bridleway": ("path", 2.0, 1, 0.0),
+}  # fmt: skip
+_PATH_SURFACE = {
+    "cycleway": "asphalt:#7d5a50", "footway": "paving:#b1aaa0", "pedestrian": "paving:#b5aca0",
+    "path": "gravel:#b0a38a", "steps": "concrete:#9b9890", "bridleway": "dirt",
+}  # fmt: skip
+# Material, what grows, by key and value.
+_AREAS: dict[str, dict[str, tuple[str, str]]] = {
+    "landuse": {
+        "grass": ("grass", ""), "village_green": ("grass", "park"), "recreation_ground": ("grass", "park"),
+        "meadow": ("meadow", ""), "forest": ("leaf_litter:#6b6a40", "wood"), "cemetery": ("grass:#5b7d45", "park"),
+        "flowerbed": ("soil", "scrub"), "farmland": ("dirt", ""), "orchard": ("grass", "park"),
+        "basin": ("water", ""), "reservoir": ("water", ""), "railway": ("gravel:#7f7b75", ""),
+        "construction": ("dirt", ""),
+        "brownfield": ("gravel", ""), "allotments": ("meadow", ""),
+    },
+    "leisure": {
+        "park": ("grass", "park"), "garden": ("grass:#648f3e", "park"), "playground": ("sand", ""),
+        "pitch": ("asphalt:#8a5a4a", ""), "dog_park": ("grass", ""), "swimming_pool": ("water:#5fb3cc", ""),
+        "golf_course": ("grass:#6fa04a", "park"), "common": ("grass", "park"), "track": ("asphalt:#a2563f", ""),
+    },
+    "natural": {
+        "wood": ("leaf_litter:#6b6a40", "wood"), "water": ("water", ""), "scrub": ("meadow", "scrub"),
+        "sand": ("sand", ""), "beach": ("sand", ""), "grassland": ("meadow", ""),
+        "heath": ("meadow:#95924f", "scrub"),
+        "bare_rock": ("rock", ""),         "shingle": ("gravel", ""), "wetland": ("mud", "scrub"),
+    },
+    "amenity": {"parking": ("asphalt", ""), "school": ("asphalt:#6b6c6e", ""), "kindergarten": ("sand", "")},
+    "place": {"square": ("paving:#b5aca0", "")},
+    "highway": {"pedestrian": ("paving:#b5aca0", ""), "footway": ("paving:#b1aaa0", ""), "service": ("asphalt", ""),
+                "platform": ("paving:#a5a199", "")},
+    "railway": {"platform": ("paving:#a5a199", "")},
+    "public_transport": {"platform": ("paving:#a5a199", "")},
+    "man_made": {"pier": ("planks", ""), "bridge": ("concrete:#8f8d88", "")},
+    "waterway": {"riverbank": ("water", ""), "dock": ("water", "")},
+}  # fmt: skip
+_WATERWAYS = {"river": 8.0, "canal": 8.0, "stream": 1.6, "ditch": 1.0}
+
+
+def streets(lines: Sequence[Feature], window: Polygon, told: Told) -> list[dict[str, Any]]:
+    """Make the recipe's streets and paths, clipped to a window somewhat larger than the site."""
+    out = []
+    for feature in lines:
+        made = _street(feature.tags)
+        if made is None:
+            continue
+        if below_ground(feature.tags):
+            told.add("ways in tunnels or below ground left out")
+            continue
+        if feature.tags.get("bridge", "no") != "no":
+            told.add("bridges laid on the ground")
+        for line in clipped(feature.shape, window):
+            out.append({**made, "line": line})
+            told.add("streets" if made["kind"] != "path" else "paths")
+    return out
+
+
+def clipped(shape: BaseGeometry, window: Polygon) -> list[list[list[float]]]:
+    """Clip a line, and round it to centimetres without points that fall together."""
+    inner = shape.intersection(window)
+    out = []
+    for part in getattr(inner, "geoms", [inner]):
+        if not isinstance(part, LineString) or part.is_empty:
+            continue
+        line: list[list[float]] = []
+        for x, y in part.coords:
+            p = [round(float(x), 2), round(float(y), 2)]
+            if not line or (p[0] - line[-1][0]) ** 2 + (p[1] - line[-1][1]) ** 2 > _SPACING_M**2:
+                line.append(p)
+        if len(line) > 1 and LineString(line).length > 0.5:
+            out.append(line)
+    return out
+
+
+def _street(tags: Tags) -> dict[str, Any] | None:
+    kind_of = tags.get("highway", "").removesuffix("_link")
+    if kind_of not in _CLASSES or tags.get("footway") == "crossing" or tags.get("area") == "yes":
+        return None
+    kind, width, lanes, pavement = _CLASSES[kind_of]
+    surface = SURFACES.get(tags.get("surface", ""), "")
+    name = {"name": tags["name"][:80]} if tags.get("name") else {}
+    if kind == "path":
+        paved = surface or _PATH_SURFACE[kind_of]
+        raised = tags.get("footway") == "sidewalk"
+        own = metres(tags, "width", "est_width") or width
+        return {"kind": kind, **name, "width_m": _wide(own), "surface": paved, **({"raised": True} if raised else {})}
+    oneway = tags.get("oneway") in ("yes", "1", "true", "-1") or tags.get("junction") == "roundabout"
+    tagged = count(tags, "lanes")
+    lanes = min(tagged or (max(lanes - 1, 1) if oneway else lanes), 8)
+    parking = kind == "side" and _parks(tags, by_rule=kind_of in ("residential", "unclassified", "living_street"))
+    width = metres(tags, "width", "est_width") or (
+        (lanes * _LANE_M if tagged or oneway else width) + (2 * _PARKED_M if parking else 0.0)
+    )
+    sidewalk = tags.get("sidewalk", tags.get("sidewalk:both", ""))
+    pavement = 0.0 if sidewalk in ("no", "none") else min(pavement, 1.2) if sidewalk == "separate" else pavement
+    surface = surface or ("dirt" if kind_of == "track" else "asphalt")
+    smooth = surface.startswith(("asphalt", "concrete"))
+    return {
+        "kind": kind, **name, "width_m": _wide(width), "lanes": lanes,
+        **({"pavement_m": pavement} if pavement else {}), **({"oneway": True} if oneway else {}),
+        **({"marks": True} if smooth and lanes > 1 and kind == "main" else {}),
+        **({"parking": True} if parking and width >= 5.0 else {}), "surface": surface,
+    }  # fmt: skip
+
+
+def _wide(width: float) -> float:
+    return round(min(max(width, 0.6), 40.0), 2)
+
+
+def _parks(tags: Tags, *, by_rule: bool) -> bool:
+    said = [
+        v
+        for k, v in tags.items()
+        if k.startswith("parking:") and k.count(":") <= 2 and not k.endswith(("fee", "conditional"))
+    ]
+    if said:
+        return any(v in _PARKED for v in said)
+    return by_rule
+
+
+def rails(lines: Sequence[Feature], window: Polygon) -> list[list[list[float]]]:
+    """Make the tracks that lie in the open."""
+    kinds = ("tram", "rail", "light_rail", "narrow_gauge")
+    open_ = (f for f in lines if f.tags.get("railway") in kinds and not below_ground(f.tags))
+    return [line for f in open_ for line in clipped(f.shape, window)]
+
+
+def areas(found: Iterable[Feature], lines: Sequence[Feature], window: Polygon) -> list[dict[str, Any]]:
+    """Make the recipe's areas: the larger before the smaller, water over land."""
+    out: list[tuple[bool, float, str, dict[str, Any]]] = []
+    for feature in found:
+        said = _ground(feature.tags)
+        if said is None or below_ground(feature.tags) or "building" in feature.tags:
+            continue
+        material, grows = said
+        parking = feature.tags.get("amenity") == "parking"
+        name = feature.tags.get("name", "")[:80] if grows == "park" or parking else ""
+        for piece in polygons_of(feature.shape.intersection(window)):
+            made = _area(piece, material, grows=grows, parking=parking, name=name)
+            if made:
+                out.append((material.startswith("water"), -feature.shape.area, feature.key, made))
+    for feature in lines:
+        wide = _WATERWAYS.get(feature.tags.get("waterway", ""))
+        if wide and not below_ground(feature.tags):
+            wide = metres(feature.tags, "width") or wide
+            for piece in polygons_of(feature.shape.buffer(wide / 2).intersection(window)):
+                made = _area(piece, "water")
+                if made:
+                    out.append((True, -piece.area, feature.key, made))
+    for piece in _sea(lines, window):
+        made = _area(piece, "water:#46788c")
+        if made:
+            out.append((True, -piece.area, "sea", made))
+    return [made for *_, made in sorted(out, key=lambda row: row[:3])]
+
+
+def _ground(tags: Tags) -> tuple[str, str] | None:
+    if tags.get("parking") in ("underground", "multi-storey", "rooftop") or tags.get("amenity") == "parking_space":
+        return None
+    for key, values in _AREAS.items():
+        if tags.get(key) in values:
+            material, grows = values[tags[key]]
+            surface = SURFACES.get(tags.get("surface", ""), "")
+            return (surface or material) if not material.startswith("water") else material, grows
+    return None
+
+
+def _area(piece: Polygon, material: str, **said: Any) -> dict[str, Any] | None:
+    plan = piece.simplify(0.1)
+    if not isinstance(plan, Polygon) or plan.area < _LEAST_AREA_M2 or len(plan.exterior.coords) > 900:
+        return None
+
+    def ring(r: Any) -> list[list[float]]:
+        return [[round(float(x), 2), round(float(y), 2)] for x, y in list(r.coords)[:-1]]
+
+    holes = [ring(r) for r in plan.interiors if Polygon(r).area > 1.0]
+    made = {"material": material, **{k: v for k, v in said.items() if v}, "outline": ring(plan.exterior)}
+    return made | ({"holes": holes} if holes else {})
+
+
+def _sea(lines: Sequence[Feature], window: Polygon) -> list[Polygon]:
+    """What lies to the right of coastlines: so OpenStreetMap tells the sea."""
+    coasts = [f.shape for f in lines if f.tags.get("natural") == "coastline" and f.shape.intersects(window)]
+    if not coasts:
+        return []
+    out = []
+    for face in polygonize(unary_union([*coasts, window.exterior])):
+        spot: Point = face.representative_point()
+        if not window.contains(spot):
+            continue
+        coast = min(coasts, key=lambda line: line.distance(spot))
+        s = coast.project(spot)
+        a, b = coast.interpolate(max(s - 0.5, 0.0)), coast.interpolate(min(s + 0.5, coast.length))
+        if (b.x - a.x) * (spot.y - a.y) - (b.y - a.y) * (spot.x - a.x) < 0.0:
+            out.append(face)
+    return out
+
+
+def barriers(lines: Sequence[Feature], window: Polygon) -> list[dict[str, Any]]:
+    """Make walls, fences and hedges."""
+    kinds = {"wall": "wall", "city_wall": "wall", "retaining_wall": "wall", "fence": "fence", "guard_rail": "fence",
+             "handrail": "fence", "hedge": "hedge"}  # fmt: skip
+    usual = {"wall": 1.4, "fence": 1.1, "hedge": 1.1}
+    out = []
+    for feature in lines:
+        kind = kinds.get(feature.tags.get("barrier", ""))
+        if kind is None or below_ground(feature.tags):
+            continue
+        height = min(max(metres(feature.tags, "height") or usual[kind], 0.4), 8.0)
+        out += [{"kind": kind, "height_m": round(height, 2), "line": line} for line in clipped(feature.shape, window)]
+    return out

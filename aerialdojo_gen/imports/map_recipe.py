@@ -1,0 +1,130 @@
+"""From a map to a town's recipe."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import shapely
+from numpy.typing import NDArray
+from shapely.geometry import Polygon
+
+from aerialdojo_gen.errors import UsageError
+from aerialdojo_gen.imports import map_buildings, map_ground, map_things
+from aerialdojo_gen.imports.earth import Bbox, LocalFrame, in_words, size_m
+from aerialdojo_gen.imports.map_buildings import Told
+from aerialdojo_gen.imports.osm import ATTRIBUTION, Feature, Map
+from aerialdojo_gen.imports.toml_text import recipe_text
+from aerialdojo_gen.scenes.ground import rectangle
+
+SMALLEST_M, LARGEST_M = 20.0, 1000.0
+# Streets run on a little beyond the border, so that their ends are not seen.
+_BEYOND_M = 15.0
+_HEADROOM_M, _LOWEST_CEILING_M = 6.0, 15.0
+# Where so much of the ground is built on it is paved between.
+_PAVED = 0.12
+_MOST = 1000
+
+Heights = dict[str, Any]
+
+
+def town_recipe(
+    found: Map, bbox: Bbox, source: str, *,
+    heights: Callable[[LocalFrame, tuple[float, float]], Heights] | None = None,
+    extra_attribution: str = "", seed: int = 0, ceiling_m: float | None = None, drive_on: str = "right",
+) -> tuple[str, Told]:  # fmt: skip
+    """Write the recipe of a town.
+
+    Parameters
+    ----------
+    found : Map
+        What the extract has in the bounding box and a little about it.
+    bbox : (west, south, east, north)
+        Degrees; its middle is the origin.
+    source : str
+        Name of the extract.
+    heights : callable, optional
+        ``(frame, size_m) -> table``: the ground's heights; level where absent.
+    extra_attribution : str
+        Of the heights.
+    seed : int
+        Of what is added by rule.
+    ceiling_m : float, optional
+        Highest z that a drone may fly at; 6 m over the highest roof where absent.
+    drive_on : {"right", "left"}
+        Side of the street that is driven on.
+
+    Raises
+    ------
+    UsageError
+        The box is no size that a drone flies in, or nothing of the map is in it.
+    """
+    width, depth = (float(math.floor(s * 100 + 0.5) / 100) for s in size_m(bbox))
+    if not (min(width, depth) >= SMALLEST_M and max(width, depth) <= LARGEST_M):
+        raise UsageError(
+            f"--bbox {in_words(bbox)} is {width:,.0f} by {depth:,.0f} m, a scene "
+            f"{SMALLEST_M:g} to {LARGEST_M:,.0f} m: --tiles 200 cuts a large one into several"
+        )
+    frame, site = LocalFrame.about(bbox), rectangle(-width / 2, -depth / 2, width / 2, depth / 2)
+    window = site.buffer(_BEYOND_M, join_style="mitre")
+    points, lines, areas = (_in_metres(frame, features) for features in (found.points, found.lines, found.areas))
+    told = Told()
+    inner = site.buffer(-0.3, join_style="mitre")
+    shops = map_things.shop_points(points, areas)
+    buildings = map_buildings.buildings([a for a in areas if a.shape.intersects(site)], shops, inner, told)
+    built = shapely.union_all([Polygon(b["outline"], b.get("holes", ())) for one in buildings for b in one["bodies"]])
+    share = built.area / site.area
+    parameters: dict[str, Any] = {
+        "ground": "paving:#98958d" if share > _PAVED else "grass",
+        "drive_on": drive_on,
+        "rails": map_ground.rails(lines, window),
+        "crossings": map_things.crossings(points, site),
+        "signals": map_things.signals(points, site),
+        "areas": map_ground.areas(areas, lines, window),
+        "roads": map_ground.streets(lines, window, told),
+        "buildings": buildings,
+        "barriers": map_ground.barriers(lines, inner),
+        "things": map_things.things(points, lines, areas, inner, built, told),
+    }
+    for key, value in parameters.items():
+        if isinstance(value, list) and len(value) > _MOST:
+            told.add(f"{key} beyond the first {_MOST:,} left out", len(value) - _MOST)
+            parameters[key] = value[:_MOST]
+    parameters = {k: v for k, v in parameters.items() if v != []}
+    if not ({"buildings", "roads", "areas", "things"} & parameters.keys()):
+        raise UsageError(
+            f"--bbox {in_words(bbox)} has nothing of the map in it: {source} reaches over {in_words(found.extent)}"
+        )
+    rise, origin = 0.0, {"lon_deg": round(frame.lon_deg, 7), "lat_deg": round(frame.lat_deg, 7)}
+    if heights is not None:
+        table = heights(frame, (width, depth))
+        origin["z_m"] = table.pop("z_m")
+        parameters["heights"] = table
+        rise = max(max(row) for row in table["rows_m"])
+    top = max((b["top_m"] for one in buildings for b in one["bodies"]), default=0.0) + rise
+    ceiling = max(math.ceil(top + _HEADROOM_M), _LOWEST_CEILING_M) if ceiling_m is None else ceiling_m
+    head = {
+        "layout": "town", "seed": seed, "size_m": [width, depth], "ceiling_m": float(ceiling),
+        "attribution": "; ".join(filter(None, (ATTRIBUTION, extra_attribution))), "origin": origin,
+    }  # fmt: skip
+    comments = (
+        f"Made by add-map of {source}, --bbox {' '.join(f'{v:.7g}' for v in bbox)}.",
+        "Metres about the middle of the box, x east, y north. Change what is not so, and run again.",
+    )
+    return recipe_text(head, parameters, comments), told
+
+
+def _in_metres(frame: LocalFrame, features: Sequence[Feature]) -> list[Feature]:
+    def moved(at: NDArray[Any]) -> NDArray[Any]:
+        x, y = frame.metres(at[:, 0], at[:, 1])
+        return shapely.get_coordinates(shapely.points(x, y))
+
+    return [Feature(f.key, _valid(shapely.transform(f.shape, moved)), f.tags) for f in features]
+
+
+def _valid(shape: Any) -> Any:
+    return shape if shape.is_valid else shapely.make_valid(shape)
+
+
+__all__ = ["Heights", "town_recipe"]

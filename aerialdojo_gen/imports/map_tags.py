@@ -1,0 +1,59 @@
+"""What OpenStreetMap's tags say in numbers and colours: heights, levels, widths, materials."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+
+from matplotlib.colors import CSS4_COLORS
+
+Tags = Mapping[str, str]
+
+_NUMBER = re.compile(r"\s*(\d{1,5}(?:\.\d{1,6})?)\s*(m|metres|meters|ft|feet|')?\s*")
+_COLOUR = re.compile(r"#(?:[0-9a-fA-F]{3}){1,2}")
+_FOOT_M = 0.3048
+
+
+def metres(tags: Tags, *keys: str) -> float | None:
+    """Read a length, metres or feet, by the first key that holds one; None where none does."""
+    for key in keys:
+        match = _NUMBER.fullmatch(tags.get(key, "").replace(",", "."))
+        if match:
+            value = float(match[1]) * (_FOOT_M if match[2] in ("ft", "feet", "'") else 1.0)
+            if value > 0.0:
+                return value
+    return None
+
+
+def count(tags: Tags, *keys: str) -> int | None:
+    """Read a whole number above 0, rounded; None where none of the keys holds one."""
+    found = metres(tags, *keys)
+    return None if found is None else max(round(found), 1)
+
+
+def colour(tags: Tags, *keys: str) -> str:
+    """Read a colour as ``"#rrggbb"``; empty where there is none."""
+    for key in keys:
+        text = tags.get(key, "").strip().lower().replace(" ", "").replace("_", "")
+        text = str(CSS4_COLORS.get(text, text)).lower()
+        if _COLOUR.fullmatch(text):
+            return text if len(text) == 7 else "#" + "".join(2 * c for c in text[1:])
+    return ""
+
+
+def below_ground(tags: Tags) -> bool:
+    """Whether a thing lies in a tunnel, under the ground or indoors."""
+    tunnel = tags.get("tunnel", "no") not in ("no", "building_passage", "avalanche_protector")
+    layer = tags.get("layer", "0")
+    under = layer.startswith("-") or tags.get("location") in ("underground", "indoor")
+    return tunnel or under or tags.get("indoor", "no") != "no" or tags.get("level", "0").startswith("-")
+
+
+SURFACES = {
+    "asphalt": "asphalt", "paved": "asphalt", "concrete": "concrete:#8f8d88", "concrete:plates": "concrete:#8f8d88",
+    "sett": "cobbles:#77746f", "cobblestone": "cobbles:#77746f", "unhewn_cobblestone": "cobbles:#77746f",
+    "paving_stones": "paving:#aaa59c", "gravel": "gravel", "fine_gravel": "gravel:#b0a38a",
+    "compacted": "gravel:#a89c88", "unpaved": "gravel:#a89c88", "pebblestone": "gravel", "dirt": "dirt",
+    "ground": "dirt", "earth": "dirt",
+    "grass": "grass", "sand": "sand", "wood": "planks", "mud": "mud",
+}  # fmt: skip

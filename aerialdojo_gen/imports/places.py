@@ -1,0 +1,208 @@
+"""The twins of ``add-map`` and ``add-terrain``: real places as recipes in a folder of one's own scenes."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from aerialdojo_gen.errors import AssetError, UsageError
+from aerialdojo_gen.imports.command import PIPELINE, pipeline_text
+from aerialdojo_gen.imports.dem import Dem, read_dem
+from aerialdojo_gen.imports.earth import Bbox, checked_bbox, tiles
+from aerialdojo_gen.imports.map_recipe import town_recipe
+from aerialdojo_gen.imports.osm import read_map
+from aerialdojo_gen.imports.relief import ground_of, relief_recipe
+from aerialdojo_gen.layouts.build import build_scene
+from aerialdojo_gen.pipeline.run import home
+from aerialdojo_gen.scenes.catalogue import load_catalogue
+from aerialdojo_gen.scenes.model import Scene
+from aerialdojo_gen.store.atomic import atomic_file, make_folder
+from aerialdojo_gen.store.layout import check_scene_name
+
+# A map's ways and areas are read a little beyond the box: streets run on, and parts belong to buildings.
+_BEYOND_DEG = 0.0006
+_MOST_SCENES = 100
+
+
+@dataclass(frozen=True)
+class Place:
+    """A scene that was made of a real place.
+
+    Attributes
+    ----------
+    name : str
+        Of the scene.
+    scene : Scene
+        As its recipe is built.
+    recipe, pipeline : Path
+        Files of the project.
+    said : tuple of str
+        What was done, for people.
+    """
+
+    name: str
+    scene: Scene
+    recipe: Path
+    pipeline: Path
+    said: tuple[str, ...]
+
+
+def add_map(
+    name: str, extract: Path, project: Path, *, bbox: Sequence[Bbox], tile_m: float | None = None,
+    dem: Path | None = None,
+    cell_m: float | None = None, attribution: str = "", seed: int = 0, ceiling_m: float | None = None,
+    drive_on: str = "right", force: bool = False,
+) -> list[Place]:  # fmt: skip
+    """Make towns of an extract of OpenStreetMap, in a project folder.
+
+    Each becomes a recipe, ``scenes/<name>.toml``: buildings, streets, areas and things in metres, to be read and
+    changed. It is built once before it is kept.
+
+    Parameters
+    ----------
+    name : str
+        Of the scene; of several, what their names begin with (``-1``, ``-2``, … follow).
+    extract : Path
+        ``.osm.pbf`` or another file of OpenStreetMap.
+    project : Path
+        The folder; made where it is missing.
+    bbox : sequence of (west, south, east, north)
+        Degrees, WGS 84; a scene each.
+    tile_m : float, optional
+        Cut every box into squares of this size.
+    dem : Path, optional
+        Height model that the ground is of.
+    cell_m : float, optional
+        Distance of the ground's heights.
+    attribution : str
+        Whose heights they are.
+    seed : int
+        Of what is added by rule.
+    ceiling_m : float, optional
+        Highest z to fly at.
+    drive_on : {"right", "left"}
+        Side of the street that is driven on.
+    force : bool
+        Replace scenes of these names.
+
+    Returns
+    -------
+    list of Place
+
+    Raises
+    ------
+    UsageError
+        A box is none, too large, or outside the extract; a scene exists; osmium or rasterio is not installed.
+    AssetError
+        A file cannot be read, or a recipe cannot be built.
+    """
+    if drive_on not in ("right", "left"):
+        raise UsageError(f"--drive-on {drive_on[:20]!r}: right or left")
+    boxes = [checked_bbox(box) for box in bbox]
+    if not boxes:
+        raise UsageError("--bbox WEST SOUTH EAST NORTH is needed: which part of the map, degrees")
+    if tile_m is not None:
+        if not 20.0 <= tile_m <= 1000.0:
+            raise UsageError(f"--tiles {tile_m:g}: a scene is 20 to 1,000 m wide")
+        boxes = [tile for box in boxes for tile in tiles(box, tile_m)]
+    if len(boxes) > _MOST_SCENES:
+        raise UsageError(
+            f"{len(boxes):,} scenes are asked for, {_MOST_SCENES} at a time are the most: take larger tiles"
+        )
+    names = [name] if len(boxes) == 1 else [f"{name}-{k}" for k in range(1, len(boxes) + 1)]
+    _check_free(names, project, force)
+    model = None if dem is None else read_dem(dem)
+    heights = None if model is None else ground_of(model, cell_m)
+    texts = []
+    for one, box in zip(names, boxes, strict=True):
+        w, s, e, n = box
+        found = read_map(extract, (w - _BEYOND_DEG, s - _BEYOND_DEG / 2, e + _BEYOND_DEG, n + _BEYOND_DEG / 2))
+        text, told = town_recipe(
+            found, box, extract.name, heights=heights, extra_attribution=attribution, seed=seed, ceiling_m=ceiling_m,
+            drive_on=drive_on,
+        )  # fmt: skip
+        texts.append((one, text, tuple(_counted(dict(told.counts)))))
+    return [_added(one, text, project, said) for one, text, said in texts]
+
+
+def add_terrain(
+    name: str, dem: Path, project: Path, *, bbox: Bbox | None = None, size_m: tuple[float, float] | None = None,
+    cell_m: float | None = None, water_m: float | None = None, snow_m: float | None = None,
+    sand_m: float | None = None, bare: bool = False, attribution: str = "", seed: int = 0,
+    ceiling_m: float | None = None, force: bool = False,
+) -> Place:  # fmt: skip
+    """Make open country of a height model, in a project folder.
+
+    Parameters
+    ----------
+    name : str
+        Of the scene.
+    dem : Path
+        GeoTIFF, ESRI ASCII grid or NPZ (`aerialdojo_gen.imports.dem.read_dem`).
+    project : Path
+        The folder; made where it is missing.
+    bbox, size_m, cell_m, water_m, snow_m, sand_m, bare, attribution, seed, ceiling_m
+        As `aerialdojo_gen.imports.relief.relief_recipe` takes them.
+    force : bool
+        Replace a scene of this name.
+
+    Returns
+    -------
+    Place
+
+    Raises
+    ------
+    UsageError
+        The part that is asked for has no heights or no size to fly in; the scene exists; rasterio is not installed.
+    AssetError
+        The file cannot be read.
+    """
+    _check_free([name], project, force)
+    model: Dem = read_dem(dem)
+    text, said = relief_recipe(
+        model, bbox=None if bbox is None else checked_bbox(bbox), size=size_m, cell_m=cell_m, water_m=water_m,
+        snow_m=snow_m, sand_m=sand_m, bare=bare, seed=seed, ceiling_m=ceiling_m, attribution=attribution,
+    )  # fmt: skip
+    return _added(name, text, project, tuple(said))
+
+
+def _check_free(names: Sequence[str], project: Path, force: bool) -> None:
+    for name in names:
+        recipe = project / "scenes" / f"{check_scene_name(name)}.toml"
+        if recipe.exists() and not force:
+            raise UsageError(f"{recipe} exists: --force replaces the scene")
+
+
+def _added(name: str, text: str, project: Path, said: tuple[str, ...]) -> Place:
+    """Build a recipe, and keep it if that went well."""
+    with tempfile.TemporaryDirectory() as folder:
+        trial = Path(folder) / f"{name}.toml"
+        trial.write_text(text, encoding="utf-8")
+        try:
+            scene = build_scene(trial, load_catalogue(home() / "scene_assets"))
+        except AssetError as error:
+            raise AssetError(str(error).replace(f"{trial}", f"{name}.toml")) from None
+    for inner in ("scenes", "annotations"):
+        make_folder(project / inner)
+    with atomic_file(project, f"scenes/{name}.toml") as path:
+        path.write_text(text, encoding="utf-8")
+    (project / "scenes" / f"{name}.glb").unlink(missing_ok=True)
+    if not (project / PIPELINE).exists():
+        with atomic_file(project, PIPELINE) as path:
+            path.write_text(pipeline_text(project), encoding="utf-8")
+    return Place(name, scene, project / "scenes" / f"{name}.toml", project / PIPELINE, said)
+
+
+def _counted(counts: dict[str, int]) -> list[str]:
+    """Say what of the map is there, how high buildings are known to be, and what was left out."""
+    what = [
+        f"{n:,} {key}" for key in ("buildings", "streets", "paths", "things of the map") if (n := counts.pop(key, 0))
+    ]
+    by = {"height": "by their height", "levels": "by their levels", "rule": "by rule, without either"}
+    known = [f"{n:,} {word}" for key, word in by.items() if (n := counts.pop(key, 0))]
+    lines = [", ".join(what) or "nothing that stands"]
+    if known:
+        lines.append(f"heights of buildings: {', '.join(known)}")
+    return lines + [f"{n:,} {key}" for key, n in sorted(counts.items())]

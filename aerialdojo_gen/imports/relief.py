@@ -1,0 +1,216 @@
+"""From a height model to the heights and the recipe of a scene."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import distance_transform_edt
+
+from aerialdojo_gen.errors import UsageError
+from aerialdojo_gen.imports.dem import Dem, outside
+from aerialdojo_gen.imports.earth import Bbox, LocalFrame, in_words, size_m
+from aerialdojo_gen.imports.toml_text import recipe_text
+
+Floats = NDArray[np.float64]
+
+SMALLEST_M, LARGEST_M = 20.0, 1000.0
+# So many cells are two triangles each: as much as a scene of the dataset has all in all.
+MOST_CELLS = 40_000
+_FINEST_M = 0.25
+_LEAST_SHARE = 0.5
+_HEADROOM_M = 25.0
+
+
+def grid(
+    dem: Dem, size: tuple[float, float], cell_m: float, frame: LocalFrame | None, middle: tuple[float, float]
+) -> Floats:
+    """Sample a height model on a square grid about a point.
+
+    Parameters
+    ----------
+    dem : Dem
+        Heights.
+    size : (float, float)
+        Extent along x and y, metres; whole cells.
+    cell_m : float
+        Distance of neighbouring points, metres.
+    frame : LocalFrame or None
+        Where on earth the grid's middle is; None where the grid has the model's own metres.
+    middle : (x, y)
+        The grid's middle in the model's own metres, without a frame.
+
+    Returns
+    -------
+    (rows, columns) float64
+        Metres, rows running north; what is missing is that of the nearest height there is.
+
+    Raises
+    ------
+    UsageError
+        Less than half of the grid has heights.
+    """
+    columns, rows = (round(s / cell_m) for s in size)
+    x, y = np.meshgrid(*((np.arange(n + 1) - n / 2) * cell_m for n in (columns, rows)))
+    if frame is not None:
+        z = dem.at_degrees(*frame.degrees(x, y))
+        (west, east), (south, north) = frame.degrees((x[0, 0], x[-1, -1]), (y[0, 0], y[-1, -1]))
+        where = in_words((float(west), float(south), float(east), float(north)))
+    else:
+        z = dem.at(x + middle[0], y + middle[1])
+        where = f"{size[0]:,.0f} by {size[1]:,.0f} m about ({middle[0]:,.0f}, {middle[1]:,.0f})"
+    missing = np.isnan(z)
+    if missing.mean() > 1.0 - _LEAST_SHARE:
+        raise UsageError(f"{missing.mean():.0%} of {where} has no height: {outside(dem)}")
+    if missing.any():
+        nearest = distance_transform_edt(missing, return_distances=False, return_indices=True)
+        z = z[tuple(nearest)]
+    return z
+
+
+def cell_for(size: tuple[float, float], wanted_m: float | None, own_m: float) -> float:
+    """Choose the distance of heights: no finer than the model's own, and no more than `MOST_CELLS` of them."""
+    least = math.sqrt(size[0] * size[1] / MOST_CELLS)
+    if wanted_m is not None:
+        if (
+            not (math.isfinite(wanted_m) and wanted_m >= _FINEST_M)
+            or wanted_m < least * 0.999
+            or wanted_m > min(size) / 2
+        ):
+            raise UsageError(
+                f"--cell {wanted_m:g}: {size[0]:,.0f} by {size[1]:,.0f} m take cells of "
+                f"{max(least, _FINEST_M):.2f} m or more ({MOST_CELLS:,} of them at most), "
+                f"and of {min(size) / 2:g} m or less"
+            )
+        return wanted_m
+    return max(own_m, least, _FINEST_M * 2)
+
+
+def whole_cells(size: tuple[float, float], cell_m: float) -> tuple[float, float]:
+    """Shorten an extent to whole cells, metres."""
+    x, y = (max(int(s / cell_m + 1e-6), 1) * cell_m for s in size)
+    return round(x, 6), round(y, 6)
+
+
+def rounded(z: Floats) -> list[list[float]]:
+    """Heights as a recipe states them, to the centimetre."""
+    return [[round(float(v), 2) for v in row] for row in z]
+
+
+def own_cell_m(dem: Dem, frame: LocalFrame | None) -> float:
+    """Distance of a model's own heights, metres, the larger of both ways."""
+    if not dem.geographic:
+        return max(dem.dx, dem.dy)
+    east, north = (frame or LocalFrame(*dem.extent[:2])).metres_a_degree
+    return max(dem.dx * east, dem.dy * north)
+
+
+def relief_recipe(
+    dem: Dem, *, bbox: Bbox | None = None, size: tuple[float, float] | None = None, cell_m: float | None = None,
+    water_m: float | None = None, snow_m: float | None = None, sand_m: float | None = None, bare: bool = False,
+    seed: int = 0, ceiling_m: float | None = None, attribution: str = "",
+) -> tuple[str, list[str]]:  # fmt: skip
+    """Write the recipe of a relief.
+
+    Parameters
+    ----------
+    dem : Dem
+        Heights.
+    bbox : (west, south, east, north), optional
+        Part of it, degrees; the whole, or `size` about its middle, where absent.
+    size : (float, float), optional
+        Extent along x and y about the middle, metres.
+    cell_m : float, optional
+        Distance of heights in the scene, metres.
+    water_m, snow_m, sand_m : float, optional
+        There is water up to, snow from, and sand up to this height, metres as in the model.
+    bare : bool
+        Nothing grows or lies about.
+    seed : int
+        Of what does.
+    ceiling_m : float, optional
+        Highest z that a drone may fly at; 25 m over the highest point where absent.
+    attribution : str
+        Whose heights they are.
+
+    Returns
+    -------
+    str
+        The recipe.
+    list of str
+        What was done, for the user to read.
+    """
+    frame, middle, size = _place(dem, bbox, size)
+    if not (min(size) >= SMALLEST_M and max(size) <= LARGEST_M):
+        raise UsageError(
+            f"{dem.path.name}: {size[0]:,.0f} by {size[1]:,.0f} m, a scene has {SMALLEST_M:g} to {LARGEST_M:,.0f} m: "
+            f"--size 400 400 takes the middle of it, --bbox a part; {outside(dem)}"
+        )
+    cell = round(cell_for(size, cell_m, own_cell_m(dem, frame)), 4)
+    size = whole_cells(size, cell)
+    z = grid(dem, size, cell, frame, middle)
+    datum = round(float(z.min()), 2)
+    top = float(z.max()) - datum
+    marks = {"water_z_m": water_m, "snow_z_m": snow_m, "sand_z_m": sand_m}
+    parameters: dict[str, Any] = {
+        **{key: round(value - datum, 2) for key, value in marks.items() if value is not None},
+        **({"bare": True} if bare else {}),
+        "heights": {"cell_m": cell, "rows_m": rounded(z - datum)},
+    }
+    head = {
+        "layout": "relief", "seed": seed, "size_m": list(size),
+        "ceiling_m": float(math.ceil(top + _HEADROOM_M)) if ceiling_m is None else ceiling_m,
+        **({"attribution": attribution} if attribution else {}), "origin": _origin(frame, middle, datum),
+    }  # fmt: skip
+    said = [
+        f"heights every {cell:g} m ({2 * round(size[0] / cell) * round(size[1] / cell):,} triangles), "
+        f"z = 0 is {datum:g} m, the highest point {top:.1f} m over it",
+        "x east, y north, metres about "
+        + (
+            f"{frame.lat_deg:.6f} N, {frame.lon_deg:.6f} E"
+            if frame
+            else f"({middle[0]:,.2f}, {middle[1]:,.2f}) of the model"
+        ),
+    ]
+    missing = int(np.isnan(dem.heights_m).sum())
+    if missing:
+        said.append(
+            f"{missing:,} of {dem.heights_m.size:,} heights of the file are nodata: the nearest stands for them"
+        )
+    comments = (f"Made by add-terrain of {dem.path.name}: {said[0]}.", said[1] + ".")
+    return recipe_text(head, parameters, comments), said
+
+
+def _place(
+    dem: Dem, bbox: Bbox | None, size: tuple[float, float] | None
+) -> tuple[LocalFrame | None, tuple[float, float], tuple[float, float]]:
+    """Where on earth, or in the model's metres, the scene's middle is, and its extent."""
+    west, south, east, north = dem.extent
+    middle = (west + east) / 2, (south + north) / 2
+    if bbox is not None:
+        return LocalFrame.about(bbox), (0.0, 0.0), size or size_m(bbox)
+    if dem.geographic:
+        return LocalFrame(*middle), (0.0, 0.0), size or size_m(dem.extent)
+    return None, middle, size or (east - west, north - south)
+
+
+def _origin(frame: LocalFrame | None, middle: tuple[float, float], datum: float) -> dict[str, float]:
+    if frame is None:
+        return {"x_m": round(middle[0], 3), "y_m": round(middle[1], 3), "z_m": datum}
+    return {"lon_deg": round(frame.lon_deg, 7), "lat_deg": round(frame.lat_deg, 7), "z_m": datum}
+
+
+def ground_of(dem: Dem, cell_m: float | None = None) -> Any:
+    """Make what gives a town its ground: ``(frame, size_m) -> table``, the height of z = 0 in `z_m`."""
+
+    def heights(frame: LocalFrame, size: tuple[float, float]) -> dict[str, Any]:
+        cell = round(cell_for(size, cell_m, own_cell_m(dem, frame)), 4)
+        # Whole cells that cover the site: a town keeps the size of its bounding box.
+        around = tuple(math.ceil(s / cell / 2 - 1e-9) * 2 * cell for s in size)
+        z = grid(dem, (around[0], around[1]), cell, frame, (0.0, 0.0))
+        datum = round(float(z.min()), 2)
+        return {"cell_m": cell, "rows_m": rounded(z - datum), "z_m": datum}
+
+    return heights

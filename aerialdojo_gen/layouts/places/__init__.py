@@ -1,0 +1,1 @@
+"""Real places: towns from a map and reliefs from a height model."""

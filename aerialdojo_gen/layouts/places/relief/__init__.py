@@ -1,0 +1,1 @@
+"""Open country from a height model."""

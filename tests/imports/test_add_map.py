@@ -1,0 +1,227 @@
+"""add-map: a town's buildings, streets and things are the map's, and stand on the ground that is given."""
+
+import sys
+
+import numpy as np
+import pytest
+import shapely
+from shapely.geometry import Point, Polygon
+from support import maps
+
+from aerialdojo_gen.errors import AssetError, UsageError
+from aerialdojo_gen.imports.earth import in_words, size_m, tiles
+from aerialdojo_gen.imports.places import add_map
+from aerialdojo_gen.layouts.build import build_scene
+from aerialdojo_gen.pipeline.run import home
+from aerialdojo_gen.scenes.catalogue import load_catalogue
+from aerialdojo_gen.scenes.recipe import load_recipe
+
+
+@pytest.fixture(scope="module")
+def extract(tmp_path_factory):
+    return maps.write_town(tmp_path_factory.mktemp("map") / "town.osm.pbf")
+
+
+@pytest.fixture(scope="module")
+def town(extract, tmp_path_factory):
+    return add_map("Town", extract, tmp_path_factory.mktemp("mine"), bbox=[maps.box()])[0]
+
+
+def built(place):
+    """Buildings as the map has them: name, the instance that stands there."""
+    kinds = {"tall": "apartment_building", "levels": "office_building", "house": "house", "hall": "building"}
+    return {
+        name: next(i for i in place.scene.instances if i.category == kind and near(i, maps.BUILDINGS[name][0]))
+        for name, kind in kinds.items()
+    }
+
+
+def near(instance, outline):
+    low, high = instance.bounds[:, :2]
+    x0, y0, x1, y1 = Polygon(outline).bounds
+    return np.abs(np.array([*low, *high]) - (x0, y0, x1, y1)).max() < 1.0
+
+
+def ground_of(scene, places):
+    from aerialdojo_gen.geometry.rays import RayCaster
+    from aerialdojo_gen.scenes.model import Scene
+
+    ground = Scene("ground", (scene["ground"],), scene.materials, scene.bounds)
+    origins = np.column_stack([places, np.full(len(places), 500.0)])
+    hit, _ = RayCaster(ground).first_hit(origins, np.tile([0.0, 0.0, -1.0], (len(origins), 1)))
+    return 500.0 - hit
+
+
+def test_buildings_are_as_high_and_as_wide_as_their_tags_say(town):
+    found = built(town)
+    tops = {name: float(i.bounds[1, 2]) for name, i in found.items()}
+    assert tops["tall"] == pytest.approx(21.5, abs=0.01)
+    assert tops["levels"] == pytest.approx(4 * 3.2, abs=0.01)
+    assert tops["house"] == pytest.approx(8.0, abs=0.01)
+    assert tops["hall"] == pytest.approx(30 * 0.3048, abs=0.01)
+    for name in ("tall", "levels"):
+        low, high = found[name].bounds[:, :2]
+        x0, y0, x1, y1 = Polygon(maps.BUILDINGS[name][0]).bounds
+        assert np.abs(np.array([*low, *high]) - (x0, y0, x1, y1)).max() < 0.02
+    # A hip's ridge is the highest line of it, and its eaves are 3 m below.
+    hall = found["hall"]
+    z = hall.vertices[:, 2]
+    assert np.any(np.abs(z - (tops["hall"] - 3.0)) < 0.01)
+    assert found["house"].attributes["colour"] == "red"
+    assert any("3 by their height, 1 by their levels" in line for line in town.said)
+
+
+def test_streets_lie_on_the_ground_with_marks_and_a_crossing(town):
+    ground = town.scene["ground"]
+    by_material = {}
+    for part in ground.parts:
+        by_material.setdefault(part.material.split(":")[0], []).append(part)
+    asphalt = shapely.union_all(
+        [Polygon(part.vertices[face][:, :2]) for part in by_material["asphalt"] for face in part.faces]
+    )
+    # The secondary street's two lanes of 3.2 m, from border to border.
+    assert asphalt.buffer(0.02).contains(
+        shapely.box(-59, -3.1, 59, 3.1)
+        .difference(Point(0, 0).buffer(8))
+        .difference(
+            shapely.union_all(
+                [Polygon(p.vertices[f][:, :2]) for p in by_material["marking"] for f in p.faces]
+            ).buffer(0.02)
+        )
+    )
+    marks = np.concatenate([part.vertices for part in by_material["marking"]])
+    assert np.abs(marks[:, 2]).max() < 1e-6
+    stripes = marks[(np.abs(marks[:, 0]) < 2) & (np.abs(marks[:, 1]) < 3.3)]
+    assert len(np.unique(np.round(stripes[:, 1], 1))) >= 6  # both edges of three stripes or more
+    # The tunnel is not there.
+    recipe = load_recipe(town.recipe)
+    assert all(abs(y + 70) > 1 for road in recipe.parameters["roads"] for _, y in road["line"])
+    assert any("1 ways in tunnels" in line for line in town.said)
+
+
+def test_things_of_the_map_are_the_catalogues_and_what_is_in_a_building_is_not(town):
+    scene = town.scene
+    categories = [i.category for i in scene.instances]
+    assert {"bus_shelter", "mailbox", "litter_bin", "statue"} <= set(categories)
+    bench = [i for i in scene.instances if i.category == "bench" and np.hypot(*(i.centroid[:2] - (-40, 7.6))) < 2.5]
+    assert len(bench) == 1
+    assert bench[0].attributes["place"] == "on Long Street"
+    assert any("1 things inside buildings left out" in line for line in town.said)
+    plans = shapely.union_all([Polygon(o) for o, _ in maps.BUILDINGS.values()]).buffer(-0.2)
+    feet = [i for i in scene.instances if i.bounds[0, 2] < 3.0 and i.category not in
+            ("ground", "apartment_building", "office_building", "house", "building")]  # fmt: skip
+    assert len(feet) > 20
+    assert not [i.node for i in feet if plans.contains(Point(i.centroid[:2]))]
+    # Cars stand along the side street and drive on the right of the main one.
+    cars = [i for i in scene.instances if i.category in ("sedan", "hatchback", "suv", "delivery_van", "motorcycle")]
+    assert cars
+    road = shapely.union_all([shapely.box(-60, -3.3, 60, 3.3), shapely.box(-6, -60, 6, 4)])
+    assert all(road.contains(Point(c.centroid[:2])) for c in cars)
+
+
+def test_the_same_map_makes_the_same_bytes_whatever_the_order_of_its_things(town, extract, tmp_path):
+    again = add_map("Town", extract, tmp_path / "a", bbox=[maps.box()])[0]
+    assert again.recipe.read_bytes() == town.recipe.read_bytes()
+    rebuilt = build_scene(again.recipe, load_catalogue(home() / "scene_assets"))
+    assert [i.node for i in rebuilt.instances] == [i.node for i in town.scene.instances]
+    assert all(np.array_equal(a.vertices, b.vertices)
+               for a, b in zip(rebuilt.instances, town.scene.instances, strict=True))  # fmt: skip
+
+
+def test_on_a_height_model_everything_stands_on_the_ground(extract, tmp_path):
+    west, south, east, north = maps.box(90.0)
+    dem = tmp_path / "hill.npz"
+    np.savez(dem, heights_m=maps.heights(2.0, 90.0), bbox_deg=[west, south, east, north])
+    place = add_map("Town", extract, tmp_path / "mine", bbox=[maps.box()], dem=dem, attribution="A survey")[0]
+    datum = load_recipe(place.recipe).origin.z_m
+    places = np.random.default_rng(5).uniform(-55, 55, size=(300, 2))
+    z = ground_of(place.scene, places) + datum
+    # Between points of 2 m the hill bends by less than 3 cm; pavements rise by 12.
+    off = z - maps.hill(places[:, 0], places[:, 1])
+    assert off.min() > -0.05
+    assert off.max() < 0.18
+    for name, top in (("tall", 21.5), ("levels", 12.8)):
+        outline = np.array(maps.BUILDINGS[name][0], dtype=float)
+        lowest = (maps.hill(outline[:, 0], outline[:, 1]) - datum).min()
+        assert float(built(place)[name].bounds[1, 2]) == pytest.approx(lowest + top, abs=0.05)
+    things = [i for i in place.scene.instances if i.category in ("bench", "mailbox", "litter_bin")]
+    under = ground_of(place.scene, np.array([i.centroid[:2] for i in things]))
+    assert things
+    assert np.abs(np.array([i.bounds[0, 2] for i in things]) - under).max() < 0.35
+    assert "A survey" in place.scene.attribution
+
+
+def test_whose_data_it_is_stands_in_the_mesh_and_in_the_table(town, tmp_path):
+    from aerialdojo_gen.scenes.glb import read_glb, write_glb
+    from aerialdojo_gen.stages.work.build_scenes import scene_row
+
+    assert town.scene.attribution.startswith("© OpenStreetMap contributors, Open Database License")
+    write_glb(town.scene, tmp_path / "town.glb")
+    assert b'"copyright":"\xc2\xa9 OpenStreetMap contributors' in (tmp_path / "town.glb").read_bytes()
+    assert read_glb(tmp_path / "town.glb").attribution == town.scene.attribution
+    assert scene_row(town.scene, "x", "y")["attribution"] == town.scene.attribution
+
+
+def test_a_box_is_cut_into_tiles_with_a_shared_frame(extract, tmp_path):
+    west, south, east, north = box = maps.box()
+    cut = tiles(box, 60.0)
+    assert len(cut) == 4
+    assert all(size_m(one) == pytest.approx((60.0, 60.0), abs=0.001) for one in cut)
+    assert cut[0][:2] == (west, south)
+    assert cut[3][2:] == pytest.approx((east, north), abs=1e-8)
+    places = add_map("Tiles", extract, tmp_path / "mine", bbox=[box], tile_m=60.0)
+    assert [p.name for p in places] == ["Tiles-1", "Tiles-2", "Tiles-3", "Tiles-4"]
+    origins = [load_recipe(p.recipe).origin for p in places]
+    x, y = maps.FRAME.metres([o.lon_deg for o in origins], [o.lat_deg for o in origins])
+    assert np.round(np.column_stack([x, y])).tolist() == [[-30, -30], [30, -30], [-30, 30], [30, 30]]
+    # The street runs on from one to the next.
+    for place, side in ((places[0], 30.0), (places[2], -30.0)):
+        assert (
+            shapely.union_all(
+                [shapely.LineString(road["line"]) for road in load_recipe(place.recipe).parameters["roads"]]
+            ).distance(Point(-10, side))
+            < 0.1
+        )
+
+
+@pytest.mark.parametrize(
+    ("box", "said"),
+    [
+        ((10.0, 50.0, 10.002, 50.001), "lies outside the extract: town.osm.pbf reaches over 24.89"),
+        ((24.9, 60.3, 24.8, 60.2), "must be WEST SOUTH EAST NORTH"),
+        ((60.19, 24.89, 60.2, 124.9), "degrees of longitude"),
+        ((24.0, 60.0, 25.0, 61.0), "--tiles 200 cuts a large one"),
+        ((24.9, 60.2, 24.9, 60.2), "must be WEST SOUTH EAST NORTH"),
+    ],
+)
+def test_a_box_that_cannot_be_is_one_line(extract, tmp_path, box, said):
+    with pytest.raises(UsageError) as found:
+        add_map("X", extract, tmp_path / "mine", bbox=[box])
+    assert said in str(found.value)
+    assert "\n" not in str(found.value)
+    assert not (tmp_path / "mine").exists()
+
+
+def test_a_file_that_cannot_be_read_is_one_line(extract, tmp_path):
+    whole = extract.read_bytes()
+    for part in (0, 10, len(whole) // 2, len(whole) - 7):
+        (tmp_path / "cut.osm.pbf").write_bytes(whole[:part])
+        with pytest.raises((AssetError, UsageError)) as found:
+            add_map("X", tmp_path / "cut.osm.pbf", tmp_path / "mine", bbox=[maps.box()])
+        assert "cut.osm.pbf" in str(found.value)
+        assert "\n" not in str(found.value)
+    with pytest.raises(AssetError, match=r"a map is a file \.pbf"):
+        add_map("X", tmp_path / "town.shp", tmp_path / "mine", bbox=[maps.box()])
+    with pytest.raises(AssetError, match="No such file"):
+        add_map("X", tmp_path / "none.osm.pbf", tmp_path / "mine", bbox=[maps.box()])
+    nowhere = tmp_path / "grid.npz"
+    np.savez(nowhere, heights_m=maps.heights(2.0, 60.0), cell_m=2.0)
+    with pytest.raises(UsageError, match="does not say where on earth it is"):
+        add_map("X", extract, tmp_path / "mine", bbox=[maps.box()], dem=nowhere)
+    assert in_words(maps.box())
+
+
+def test_without_osmium_it_says_what_to_install(extract, tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "osmium", None)
+    with pytest.raises(UsageError, match=r"osmium, which is not installed: pip install 'aerialdojo-gen\[maps\]'"):
+        add_map("X", extract, tmp_path / "mine", bbox=[maps.box()])

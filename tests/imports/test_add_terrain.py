@@ -1,0 +1,190 @@
+"""add-terrain: heights as the model has them, by another interpolation, and one line for each fault of a file."""
+
+import sys
+
+import numpy as np
+import pytest
+from scipy.interpolate import RegularGridInterpolator
+from support import maps
+
+from aerialdojo_gen.errors import AssetError, UsageError
+from aerialdojo_gen.geometry.rays import RayCaster
+from aerialdojo_gen.imports.dem import read_dem
+from aerialdojo_gen.imports.earth import LocalFrame
+from aerialdojo_gen.imports.places import add_terrain
+from aerialdojo_gen.layouts.build import build_scene
+from aerialdojo_gen.pipeline.run import home
+from aerialdojo_gen.scenes.catalogue import load_catalogue
+
+UTM = "EPSG:32635"
+
+
+@pytest.fixture(scope="module")
+def hill(tmp_path_factory):
+    """The hill as a grid in metres, 2 m apart, 120 m wide."""
+    path = tmp_path_factory.mktemp("dem") / "hill.npz"
+    np.savez(path, heights_m=maps.heights(2.0, 60.0), cell_m=2.0)
+    return path
+
+
+@pytest.fixture(scope="module")
+def added(hill, tmp_path_factory):
+    return add_terrain("Hill", hill, tmp_path_factory.mktemp("mine"), water_m=98.5, snow_m=113.0)
+
+
+def ground_heights(scene, places):
+    """What a plumb line meets of the ground, metres."""
+    from aerialdojo_gen.scenes.model import Scene
+
+    ground = Scene("ground", (scene["ground"],), scene.materials, scene.bounds)
+    origins = np.column_stack([places, np.full(len(places), 500.0)])
+    hit, _ = RayCaster(ground).first_hit(origins, np.tile([0.0, 0.0, -1.0], (len(places), 1)))
+    return 500.0 - hit
+
+
+def test_the_ground_is_the_models_by_interpolation(added):
+    at = np.arange(-60.0, 60.1, 2.0)
+    reference = RegularGridInterpolator((at, at), maps.heights(2.0, 60.0)[::-1])
+    rng = np.random.default_rng(3)
+    places = rng.uniform(-59.5, 59.5, size=(600, 2))
+    z = ground_heights(added.scene, places)
+    origin = read_dem_origin(added)
+    # A cell is two flat triangles here and a bent sheet there: they part by a quarter of its bend at the most.
+    assert np.abs(z + origin - reference(places[:, ::-1])).max() < 0.06
+    # On the model's own points there is nothing between them but the rounding to a centimetre.
+    corners = np.array([(x, y) for x in at[5:-5:7] for y in at[5:-5:7]])
+    assert np.abs(ground_heights(added.scene, corners) + origin - reference(corners[:, ::-1])).max() < 0.006
+
+
+def read_dem_origin(place):
+    from aerialdojo_gen.scenes.recipe import load_recipe
+
+    return load_recipe(place.recipe).origin.z_m
+
+
+def test_it_is_painted_by_slope_and_height_and_grows_what_such_ground_has(added):
+    scene = added.scene
+    materials = {part.material.split(":")[0] for part in scene["ground"].parts}
+    assert {"meadow", "rock", "snow"} & materials >= {"meadow", "snow"}
+    snow = [part for part in scene["ground"].parts if part.material == "snow"]
+    lowest = min(float(part.vertices[:, 2].min()) for part in snow) + read_dem_origin(added)
+    assert lowest > 113.0 - 3.0
+    water = [i for i in scene.instances if i.category == "water_surface"]
+    assert len(water) == 1
+    assert water[0].bounds[1, 2] + read_dem_origin(added) == pytest.approx(98.5, abs=0.011)
+    # Trees and stones stand on the ground, none in the water.
+    things = [i for i in scene.instances if i.category not in ("ground", "water_surface")]
+    assert len(things) > 15
+    feet = np.array([i.centroid[:2] for i in things])
+    z = ground_heights(scene, feet)
+    assert all(i.bounds[0, 2] <= h + 1.0 and i.bounds[1, 2] > h for i, h in zip(things, z, strict=True))
+    assert (z + read_dem_origin(added) > 98.0).all()
+
+
+def test_the_same_file_makes_the_same_bytes(hill, added, tmp_path):
+    again = add_terrain("Hill", hill, tmp_path / "other", water_m=98.5, snow_m=113.0)
+    assert again.recipe.read_bytes() == added.recipe.read_bytes()
+    rebuilt = build_scene(again.recipe, load_catalogue(home() / "scene_assets"))
+    for a, b in zip(rebuilt.instances, added.scene.instances, strict=True):
+        assert a.node == b.node
+        assert np.array_equal(a.vertices, b.vertices)
+
+
+def test_a_geotiff_in_degrees_and_one_in_metres_are_the_same_relief(tmp_path):
+    """One hill in two coordinate systems: the heights above a place on earth are the same."""
+    from rasterio import warp
+
+    frame = LocalFrame(27.0, 60.2)  # on the middle meridian of zone 35, where its north is north
+    east, north = frame.metres_a_degree
+    z = maps.heights(2.0, 60.0)
+    n = len(z)
+    degrees = maps.write_geotiff(
+        tmp_path / "degrees.tif", z, "EPSG:4326", 27.0 - 61.0 / east, 60.2 + 61.0 / north, 2.0 / east, 2.0 / north
+    )
+    (x0,), (y0,) = warp.transform("EPSG:4326", UTM, [27.0], [60.2])
+    metres = maps.write_geotiff(tmp_path / "metres.tif", z, UTM, x0 - n, y0 + n, 2.0, 2.0)
+    a, b = read_dem(degrees), read_dem(metres)
+    lon, lat = frame.degrees(*np.random.default_rng(1).uniform(-50, 50, size=(2, 200)))
+    difference = np.abs(a.at_degrees(lon, lat) - b.at_degrees(lon, lat))
+    # The zone's scale is 0.9996: two centimetres over 50 m, on a slope of less than 1.
+    assert difference.max() < 0.03
+    one = add_terrain(
+        "Degrees", degrees, tmp_path / "mine", size_m=(80.0, 80.0), cell_m=4.0, bare=True, attribution="A survey"
+    )
+    two = add_terrain("Metres", metres, tmp_path / "mine", size_m=(80.0, 80.0), cell_m=4.0, bare=True)
+    places = np.random.default_rng(2).uniform(-39, 39, size=(100, 2))
+    za = ground_heights(one.scene, places) + read_dem_origin(one)
+    zb = ground_heights(two.scene, places) + read_dem_origin(two)
+    assert np.abs(za - zb).max() < 0.03
+    assert one.scene.attribution == "A survey"
+
+
+def test_missing_heights_are_the_nearest_ones(tmp_path):
+    z = maps.heights(2.0, 60.0)
+    z[10:14, 20:24] = -9999.0
+    rows = "\n".join(" ".join(f"{v:.3f}" for v in row) for row in z)
+    path = tmp_path / "hole.asc"
+    path.write_text(f"ncols 61\nnrows 61\nxllcenter -60\nyllcenter -60\ncellsize 2\nNODATA_value -9999\n{rows}\n")
+    place = add_terrain("Hole", path, tmp_path / "mine", bare=True)
+    assert any("16 of 3,721 heights" in line for line in place.said)
+    known = maps.heights(2.0, 60.0)
+    found = ground_heights(place.scene, np.array([[2 * 21 - 60.0, 60.0 - 2 * 11]]))[0] + read_dem_origin(place)
+    assert known[9:15, 19:25].min() - 0.02 <= found <= known[9:15, 19:25].max() + 0.02
+
+
+def tif(folder, z=None, crs="EPSG:4326", dx=1e-5, nodata=None):
+    return maps.write_geotiff(
+        folder / "x.tif", maps.heights(2.0, 60.0) if z is None else z, crs, 24.9, 60.2, dx, dx, nodata
+    )
+
+
+FAULTS = {
+    "nothing but nodata": (
+        lambda d: tif(d, np.full((9, 9), -5.0), nodata=-5.0),
+        {},
+        "holds no height, every cell is nodata",
+    ),
+    "no coordinate system": (lambda d: tif(d, crs=""), {}, "has no coordinate system"),
+    "feet": (lambda d: tif(d, crs="EPSG:2263", dx=2.0), {}, "not in metres or degrees"),
+    "too large": (lambda d: tif(d, dx=1e-3), {}, "--size 400 400 takes the middle"),
+    "elsewhere": (
+        lambda d: tif(d),
+        {"bbox": (10.0, 50.0, 10.001, 50.001)},
+        "has no height: x.tif reaches over 24.9000",
+    ),
+    "too fine": (lambda d: tif(d, dx=5e-5), {"cell_m": 0.3}, "take cells of"),
+    "no such file": (lambda d: d / "none.tif", {}, "no such file"),
+    "no height model": (lambda d: d / "x.png", {}, "a height model is a file .tif"),
+}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_a_fault_is_one_line(fault, tmp_path):
+    make, options, said = FAULTS[fault]
+    with pytest.raises((AssetError, UsageError)) as found:
+        add_terrain("X", make(tmp_path), tmp_path / "mine", **options)
+    assert said in str(found.value)
+    assert "\n" not in str(found.value)
+    assert not (tmp_path / "mine" / "scenes").exists()
+
+
+def test_a_file_cut_short_is_one_line(tmp_path):
+    whole = tif(tmp_path).read_bytes()
+    for part in (0, 60, len(whole) // 2):
+        (tmp_path / "cut.tif").write_bytes(whole[:part])
+        with pytest.raises(AssetError, match=r"cut\.tif cannot be read as a GeoTIFF, or is cut short"):
+            read_dem(tmp_path / "cut.tif")
+    (tmp_path / "cut.asc").write_text("ncols 4\nnrows 4\nxllcorner 0\nyllcorner 0\ncellsize 1\n1 2 3\n")
+    with pytest.raises(AssetError, match="says 4 by 4 heights and has 3: is it cut short"):
+        read_dem(tmp_path / "cut.asc")
+    np.savez(tmp_path / "cut.npz", heights_m=np.zeros((4, 4)), cell_m=1.0)
+    (tmp_path / "cut.npz").write_bytes((tmp_path / "cut.npz").read_bytes()[:80])
+    with pytest.raises(AssetError, match=r"cut\.npz cannot be read"):
+        read_dem(tmp_path / "cut.npz")
+
+
+def test_without_rasterio_it_says_what_to_install(tmp_path, monkeypatch):
+    path = tif(tmp_path)
+    monkeypatch.setitem(sys.modules, "rasterio", None)
+    with pytest.raises(UsageError, match=r"rasterio, which is not installed: pip install 'aerialdojo-gen\[maps\]'"):
+        read_dem(path)

@@ -1,0 +1,103 @@
+"""A small town as a map, and small height models, for the tests of real places."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from aerialdojo_gen.imports.earth import LocalFrame
+
+FRAME = LocalFrame(24.9, 60.2)
+HALF_M = 60.0
+BUILDINGS = {
+    # Name: outline, tags.
+    "tall": ([(-50, 12), (-20, 12), (-20, 30), (-50, 30)],
+             {"building": "apartments", "height": "21.5", "roof:shape": "flat"}),
+    "levels": ([(10, 14), (40, 14), (40, 32), (10, 32)],
+               {"building": "office", "building:levels": "4", "roof:shape": "flat"}),
+    "house": ([(-45, -40), (-33, -40), (-33, -30), (-45, -30)],
+              {"building": "house", "height": "8", "roof:shape": "gabled", "building:colour": "red"}),
+    "hall": ([(-16, 40), (4, 40), (4, 56), (-6, 56), (-6, 50), (-16, 50)],
+             {"building": "yes", "height": "30 ft", "roof:shape": "hipped", "roof:height": "3"}),
+}  # fmt: skip
+POINTS = [
+    ((-40, 7.6), {"amenity": "bench"}), ((-5, 7.8), {"highway": "bus_stop"}), ((20, -8), {"amenity": "post_box"}),
+    ((30, -7.8), {"amenity": "waste_basket"}), ((0, 0), {"highway": "crossing", "crossing": "zebra"}),
+    ((20, -30), {"natural": "tree", "height": "9"}), ((30, -36), {"natural": "tree"}),
+    ((36, -28), {"natural": "tree"}),
+    ((-35, 20), {"amenity": "bench"}), ((26, -44), {"tourism": "artwork", "name": "Ode"}),
+]  # fmt: skip
+LINES = [
+    (
+        [(-80, 0), (0, 0), (80, 0)],
+        {"highway": "secondary", "name": "Long Street", "lanes": "2", "surface": "asphalt"},
+    ),
+    ([(0, 0), (0, -80)], {"highway": "residential", "name": "Short Street"}),
+    ([(10, -22), (50, -50)], {"highway": "footway"}),
+    ([(-80, -70), (80, -70)], {"highway": "primary", "tunnel": "yes", "layer": "-1"}),
+]
+AREAS = [([(8, -18), (55, -18), (55, -55), (8, -55)], {"leisure": "park", "name": "Old Park"})]
+
+
+def box(half_m: float = HALF_M) -> tuple[float, float, float, float]:
+    """Bounding box of the town, degrees."""
+    (west, east), (south, north) = FRAME.degrees([-half_m, half_m], [-half_m, half_m])
+    return float(west), float(south), float(east), float(north)
+
+
+def write_town(path: Path, *, order: int = 1) -> Path:
+    """Write the town as `.osm.pbf`; `order` -1 gives its things other ids, in the other order."""
+    import osmium
+
+    ids = iter(range(1, 10_000))
+    nodes, ways = [], []
+
+    def node(x: float, y: float, tags: dict[str, str] | None = None) -> int:
+        lon, lat = FRAME.degrees(x, y)
+        number = next(ids)
+        nodes.append(osmium.osm.mutable.Node(id=number, location=(float(lon), float(lat)), tags=tags or {}))
+        return number
+
+    shared: dict[tuple[float, float], int] = {}
+    for line, tags in [*LINES, *(([*o, o[0]], t) for o, t in [*BUILDINGS.values(), *AREAS])][::order]:
+        for at in line:
+            if at not in shared:
+                shared[at] = node(*at)
+        ways.append(osmium.osm.mutable.Way(id=len(ways) + 1, nodes=[shared[at] for at in line], tags=tags))
+    for at, tags in POINTS[::order]:
+        node(*at, tags)
+    writer = osmium.SimpleWriter(str(path), overwrite=True)
+    for one in nodes:
+        writer.add_node(one)
+    for one in ways:
+        writer.add_way(one)
+    writer.close()
+    return path
+
+
+def hill(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Heights of a slope with a hill, metres, at places in metres about the middle."""
+    return 100.0 + 0.05 * x + 18.0 * np.exp(-((x - 20.0) ** 2 + (y + 10.0) ** 2) / 900.0)
+
+
+def heights(cell_m: float, half_m: float) -> np.ndarray:
+    """The hill's heights on a grid, rows from north to south."""
+    at = np.arange(-half_m, half_m + 1e-9, cell_m)
+    x, y = np.meshgrid(at, at[::-1])
+    return hill(x, y)
+
+
+def write_geotiff(
+    path: Path, z: np.ndarray, crs: str, west: float, north: float, dx: float, dy: float, nodata: float | None = None
+) -> Path:
+    """Write heights whose north-western cell has its corner at (west, north)."""
+    import rasterio
+    from rasterio.transform import from_origin
+
+    with rasterio.open(
+        path, "w", driver="GTiff", height=z.shape[0], width=z.shape[1], count=1, dtype="float32", crs=crs or None,
+        transform=from_origin(west, north, dx, dy), nodata=nodata,
+    ) as file:  # fmt: skip
+        file.write(z.astype(np.float32), 1)
+    return path
