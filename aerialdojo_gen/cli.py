@@ -22,6 +22,7 @@ from aerialdojo_gen.commands import (
     show,
     sources,
     stages,
+    train,
     validate,
 )
 from aerialdojo_gen.common import advice, trouble
@@ -72,7 +73,7 @@ def _program(
     """Take what stands before a command."""
 
 
-for _group in (stages, render, sources, annotate, evaluate, release, show, validate, exchange, report):
+for _group in (stages, render, sources, annotate, evaluate, release, show, validate, exchange, report, train):
     app.add_typer(_group.app)
 app.add_typer(config.app, name="config")
 
