@@ -1,4 +1,4 @@
-"""Weights and checkpoints: safetensors files, written whole or not at all; nothing in them is run when they are read."""
+"""Weights and checkpoints: safetensors files, written whole or not at all; reading them runs nothing."""
 
 from __future__ import annotations
 
