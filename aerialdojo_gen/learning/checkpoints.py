@@ -68,7 +68,7 @@ def write(path: Path, tensors: Mapping[str, Any], about: About, state: Mapping[s
     named = {name: tensor.detach().cpu().contiguous() for name, tensor in tensors.items()}
     text = {"format": _FORMAT, "about": about.as_text(), "state": json.dumps(dict(state or {}))}
     with atomic_file(path.parent, path.name) as temporary:
-        _safetensors("torch").save_file(named, str(temporary), metadata=text)
+        _safetensors()[1].save_file(named, str(temporary), metadata=text)
 
 
 def read(path: str | Path) -> tuple[dict[str, Any], About, dict[str, Any]]:
@@ -91,7 +91,7 @@ def read(path: str | Path) -> tuple[dict[str, Any], About, dict[str, Any]]:
     if not Path(path).is_file():
         raise UsageError(f"there are no weights {path}: aerialdojo-gen train writes them")
     try:
-        with _safetensors("").safe_open(str(path), framework="pt") as file:
+        with _safetensors()[0].safe_open(str(path), framework="pt") as file:
             told = file.metadata() or {}
             tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118 - it is no mapping
         if told.get("format") != _FORMAT:
@@ -113,8 +113,10 @@ def read(path: str | Path) -> tuple[dict[str, Any], About, dict[str, Any]]:
     return tensors, about, state
 
 
-def _safetensors(module: str) -> Any:
+def _safetensors() -> tuple[Any, Any]:
     try:
-        return importlib.import_module(f"safetensors.{module}" if module else "safetensors")
+        return importlib.import_module("safetensors"), importlib.import_module("safetensors.torch")
     except ImportError:
-        raise UsageError("weights need safetensors: install the extra: pip install 'aerialdojo-gen[train]'") from None
+        raise UsageError(
+            "weights need safetensors: install the extra: pip install 'aerialdojo-gen[train]'"
+        ) from None
