@@ -15,7 +15,7 @@ PROGRAM = "aerialdojo-gen"
 _TAKES: dict[str, tuple[str, ...]] = {
     **dict.fromkeys(("add-scene", "config"), ()),
     "annotate-draft": ("pipeline",),
-    **dict.fromkeys(("export", "import-benchmark", "report", "run", "show", "view"), ("data",)),
+    **dict.fromkeys(("export", "import-benchmark", "report", "run", "show", "train", "view"), ("data",)),
 }
 
 

@@ -117,6 +117,4 @@ def _safetensors() -> tuple[Any, Any]:
     try:
         return importlib.import_module("safetensors"), importlib.import_module("safetensors.torch")
     except ImportError:
-        raise UsageError(
-            "weights need safetensors: install the extra: pip install 'aerialdojo-gen[train]'"
-        ) from None
+        raise UsageError("weights need safetensors: install the extra: pip install 'aerialdojo-gen[train]'") from None

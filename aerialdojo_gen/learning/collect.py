@@ -31,8 +31,8 @@ from aerialdojo_gen.scenes.context import SEVERAL, open_scene
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.root import DataRoot
 
-# Trajectories of a part: a few seconds to a minute of work.
-_PART = 256
+# Trajectories of a part: seconds of work, so that no process is left with a long one while the others wait.
+_PART = 64
 _MEMORY_MB = 1500
 
 

@@ -18,6 +18,7 @@ from aerialdojo_gen.agents.goal import Sensors
 from aerialdojo_gen.benchmark.tasks import Selection
 from aerialdojo_gen.common import rng
 from aerialdojo_gen.common.bounded import read_json
+from aerialdojo_gen.common.names import unknown
 from aerialdojo_gen.errors import UsageError
 from aerialdojo_gen.learning import checkpoints
 from aerialdojo_gen.learning.collect import Flying, collect, parts_of
@@ -95,12 +96,16 @@ def train(
     StoreError
         There is no release, or a scene's mesh is missing.
     """
+    if device not in ("auto", "cpu", "cuda"):
+        raise UsageError(unknown("no device", device, ("auto", "cpu", "cuda")))
+    root = open_root(data)
+    # What is missing there is said before what is missing here.
+    release_fingerprint(root)
     torch = torch_package()
     if device == "auto":
         device = "cuda" if torch.cuda.is_available() else "cpu"
-    if device not in ("cpu", "cuda") or (device == "cuda" and not torch.cuda.is_available()):
-        raise UsageError(f"there is no device {device!r} here: choose cpu, or cuda where there is such a GPU")
-    root = open_root(data)
+    if device == "cuda" and not torch.cuda.is_available():
+        raise UsageError("PyTorch finds no GPU here: --device cpu, or install its CUDA wheel")
     if not isinstance(root, LocalRoot) and (out is None or cache is None):
         raise UsageError("a training writes to a disk: give --out and --cache beside a release in an object store")
     base = root.path if isinstance(root, LocalRoot) else Path()
