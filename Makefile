@@ -9,7 +9,7 @@ RUN := .venv/bin/aerialdojo-gen
 RUN_FLAGS := $(if $(WORKERS),--workers $(WORKERS))
 
 .DEFAULT_GOAL := help
-.PHONY: help env dev docs dataset smoke evaluate test test-fast fuzz torture lint format gallery bench lock clean
+.PHONY: help env dev torch docs dataset smoke evaluate test test-fast fuzz torture lint format gallery bench lock clean
 
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-9s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -38,6 +38,18 @@ UV := $(PIP) uv 2>/dev/null && .venv/bin/uv pip install --quiet --python .venv/b
 
 .venv/.dev: .venv/.installed
 	@{ $(UV) -e '.[dev]' 2>/dev/null; } || $(PIP) -e '.[dev]'
+	@touch $@
+
+torch: .venv/.train  ## the same with what policies are trained with: PyTorch for the CPU
+
+# A CPU wheel of a folder that pip or uv is told of; else of PyTorch's own index; PyPI's brings several GB of CUDA.
+TORCH_WHEEL = $(lastword $(sort $(wildcard $(addsuffix /torch-*cpu*-cp311-*.whl,$(UV_FIND_LINKS) $(PIP_FIND_LINKS)))))
+TRAIN := safetensors tensorboard
+.venv/.train: .venv/.dev
+	@echo "installing PyTorch for the CPU into .venv/"
+	@$(PIP) $(TRAIN)
+	@{ test -n "$(TORCH_WHEEL)" && $(PIP) "$(TORCH_WHEEL)"; } \
+	  || $(PIP) --index-url https://download.pytorch.org/whl/cpu torch 2>/dev/null || $(PIP) torch
 	@touch $@
 
 dataset: .venv/.installed  ## generate the dataset: scene_assets/ and annotations/ to $(DATA)/release/

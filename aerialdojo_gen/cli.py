@@ -24,6 +24,7 @@ from aerialdojo_gen.commands import (
     show,
     sources,
     stages,
+    train,
     validate,
 )
 from aerialdojo_gen.common import advice, trouble
@@ -74,7 +75,7 @@ def _program(
 
 
 for _group in (
-    stages, render, sources, places, annotate, evaluate, release, show, validate, exchange, hub, report
+    stages, render, sources, places, annotate, evaluate, release, show, validate, exchange, hub, report, train
 ):  # fmt: skip
     app.add_typer(_group.app)
 app.add_typer(config.app, name="config")

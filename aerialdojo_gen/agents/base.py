@@ -83,6 +83,8 @@ class Agent(Protocol):
       the agent cannot work (nobody listens, a wrong key), else returns what is worth telling.
     - ``settled() -> dict``: options that ``check`` has settled, given to the instances that fly.
     - ``used_options() -> dict``: its options with their defaults, JSON and no secrets, for the log.
+    - ``suits(release: str)``: called once before it flies, with the fingerprint of the release's scenes; raises an
+      `AerialDojoError` if the agent was made for others.
     - ``pace``: a callable that the runner sets under ``--requests-per-minute``, to be called before each request.
 
     A run has one instance a worker. Episodes come in any order, so that what an agent does must depend on nothing but

@@ -18,6 +18,7 @@ from aerialdojo_gen.common.secrets import Secrets
 from aerialdojo_gen.errors import AerialDojoError, UsageError
 from aerialdojo_gen.pipeline.executors import Executor, Talk
 from aerialdojo_gen.pipeline.executors.link import Link, at_end
+from aerialdojo_gen.release.fingerprint import release_fingerprint
 from aerialdojo_gen.store.root import DataRoot
 
 if TYPE_CHECKING:
@@ -34,13 +35,16 @@ def worker(data: DataRoot, evaluation: Evaluation, link: Link) -> Iterator[Worke
     Raises
     ------
     UsageError
-        There is no such agent, or its requests are to be paced and it does not let them.
+        There is no such agent, its requests are to be paced and it does not let them, or it is of another release.
     """
     agent: Any = load_agent(evaluation.agent, **evaluation.options)
     if evaluation.requests_per_minute is not None:
         if not hasattr(agent, "pace"):
             raise UsageError(f"agent {evaluation.agent!r} has no pace to be set: leave --requests-per-minute out")
         agent.pace = Pace(evaluation.requests_per_minute, link).wait
+    suits: Any = getattr(agent, "suits", None)
+    if suits is not None:
+        suits(release_fingerprint(data))
     wanted: Any = getattr(agent, "sensors", None)
     sensors = evaluation.sensors or (wanted if isinstance(wanted, Sensors) else Sensors())
     body, renderer, tell = evaluation.embodiment, evaluation.renderer, evaluation.tell

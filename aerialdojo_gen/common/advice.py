@@ -16,7 +16,7 @@ _TAKES: dict[str, tuple[str, ...]] = {
     **dict.fromkeys(("add-map", "add-scene", "add-terrain", "config"), ()),
     "annotate-draft": ("pipeline",),
     **dict.fromkeys(
-        ("export", "import-benchmark", "pull", "push-to-hub", "report", "run", "show", "view"), ("data",)
+        ("export", "import-benchmark", "pull", "push-to-hub", "report", "run", "show", "train", "view"), ("data",)
     ),
 }
 

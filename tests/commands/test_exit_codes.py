@@ -28,6 +28,7 @@ NEEDED = {
     "annotate": ["--scene", SCENE, "--pipeline", "{pipeline}", "--no-browser"],
     "evaluate": ["--agent", "stop"],
     "show": [TASK],
+    "train": ["{project}/pipelines/baselines/imitation.toml"],
     "view": ["--scene", SCENE, "--no-browser"],
     "export": ["--format", "habitat"],
     "push-to-hub": ["me/data"],
@@ -47,6 +48,7 @@ WRONG = {
     "gallery": ["--scene", "U_Nowhere_0"],
     "annotate": ["--port", "70000"],
     "evaluate": ["--split", "nowhere"],
+    "train": ["--device", "abacus"],
     "config init": ["--from", "nowhere.toml"],
     "config show": ["nowhere"],
     "stats": ["--pool", "--csv", "figures.csv"],
@@ -86,7 +88,7 @@ def ended(tmp_path, monkeypatch, capsys, project):
     def call(*arguments):
         # A command of a group is two words; a file cannot be made below a file.
         arguments = (*arguments[0].split(), *arguments[1:])
-        known = {"pipeline": project / "pipelines/smoke.toml", "file": "file/mine.toml"}
+        known = {"pipeline": project / "pipelines/smoke.toml", "project": project, "file": "file/mine.toml"}
         given = [argument.format(**known) for argument in arguments]
         monkeypatch.setattr(sys, "argv", ["aerialdojo-gen", *given])
         with pytest.raises(SystemExit) as end:

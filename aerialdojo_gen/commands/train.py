@@ -1,0 +1,52 @@
+"""Train a policy on a release."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from aerialdojo_gen.commands.common import Data, Quiet, Workers
+
+app = typer.Typer()
+
+
+@app.command("train")
+def train(
+    recipe: Annotated[
+        Path, typer.Argument(metavar="RECIPE", help="Recipe, e.g. pipelines/baselines/imitation.toml.")
+    ],
+    data: Data = "data",
+    small: Annotated[
+        bool, typer.Option("--small", help="A few scenes and epochs, by the recipe's [small]: a first try.")
+    ] = False,
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", metavar="DIR", help="Weights and checkpoints.  (default: policies/NAME in --data)"),
+    ] = None,
+    cache: Annotated[
+        Path | None,
+        typer.Option("--cache", metavar="DIR", help="What was drawn.  (default: policies/cache in --data)"),
+    ] = None,
+    device: Annotated[str, typer.Option("--device", help="auto, cpu or cuda.")] = "auto",
+    renderer: Annotated[str, typer.Option("--renderer", help="auto, gl or pybullet.")] = "auto",
+    restart: Annotated[bool, typer.Option("--restart", help="Forget an earlier training of this name.")] = False,
+    workers: Workers = None,
+    quiet: Quiet = False,
+) -> None:
+    """Train a policy by imitation and DAgger; what was killed goes on where it was."""
+    from aerialdojo_gen.learning.recipe import load_recipe
+    from aerialdojo_gen.learning.training import train as learn
+    from aerialdojo_gen.pipeline.progress import Reporter
+
+    chosen = load_recipe(recipe)
+    try:
+        learn(
+            data, chosen.made_small() if small else chosen, out=out, cache=cache, device=device, workers=workers,
+            renderer=renderer, restart=restart, reporter=Reporter(quiet=quiet),
+        )  # fmt: skip
+    except KeyboardInterrupt:
+        print("interrupted: the same command goes on from the last checkpoint", file=sys.stderr)
+        raise SystemExit(130) from None

@@ -1,0 +1,120 @@
+"""Weights and checkpoints: safetensors files, written whole or not at all; reading them runs nothing."""
+
+from __future__ import annotations
+
+import importlib
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from aerialdojo_gen.agents.goal import Sensors
+from aerialdojo_gen.common.bounded import loads_json
+from aerialdojo_gen.errors import AerialDojoError, StoreError, UsageError, first_line
+from aerialdojo_gen.learning.loader import torch_package
+from aerialdojo_gen.learning.seen import actions_fingerprint
+from aerialdojo_gen.learning.words import Vocabulary
+from aerialdojo_gen.store.atomic import atomic_file, make_folder
+
+_FORMAT = "aerialdojo-gen policy 1"
+
+
+@dataclass(frozen=True)
+class About:
+    """What a policy is made for: it stands in the file beside the weights.
+
+    Attributes
+    ----------
+    shape : dict
+        `aerialdojo_gen.learning.network.Shape`.
+    vocabulary : Vocabulary
+    sensors : Sensors
+    release : str
+        Fingerprint of the release that it learned from.
+    actions : str
+        Fingerprint of the action set.
+    """
+
+    shape: dict[str, Any]
+    vocabulary: Vocabulary
+    sensors: Sensors
+    release: str
+    actions: str
+
+    def as_text(self) -> str:
+        """Return it as JSON."""
+        s, v = self.sensors, self.vocabulary
+        return json.dumps({
+            "shape": self.shape, "words": v.words, "length": v.length, "release": self.release,
+            "actions": self.actions,
+            "sensors": [s.views, s.width, s.height, s.fov_deg, s.max_depth_m],
+        })  # fmt: skip
+
+
+def write(path: Path, tensors: Mapping[str, Any], about: About, state: Mapping[str, Any] | None = None) -> None:
+    """Write tensors with what they belong to.
+
+    Parameters
+    ----------
+    path : Path
+        ``.safetensors``; replaced where it is there.
+    tensors : mapping of str to torch.Tensor
+    about : About
+    state : mapping, optional
+        JSON: where a training is.
+    """
+    make_folder(path.parent)
+    named = {name: tensor.detach().cpu().contiguous() for name, tensor in tensors.items()}
+    text = {"format": _FORMAT, "about": about.as_text(), "state": json.dumps(dict(state or {}))}
+    with atomic_file(path.parent, path.name) as temporary:
+        _safetensors()[1].save_file(named, str(temporary), metadata=text)
+
+
+def read(path: str | Path) -> tuple[dict[str, Any], About, dict[str, Any]]:
+    """Read what `write` wrote.
+
+    Returns
+    -------
+    tensors : dict of str to torch.Tensor
+    about : About
+    state : dict
+
+    Raises
+    ------
+    UsageError
+        There is no such file, or it is of another action set.
+    StoreError
+        It is damaged, or no policy.
+    """
+    torch_package()
+    if not Path(path).is_file():
+        raise UsageError(f"there are no weights {path}: aerialdojo-gen train writes them")
+    try:
+        with _safetensors()[0].safe_open(str(path), framework="pt") as file:
+            told = file.metadata() or {}
+            tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118 - it is no mapping
+        if told.get("format") != _FORMAT:
+            raise ValueError(f"its format is {told.get('format')!r}, not {_FORMAT!r}")
+        given, state = loads_json(told["about"]), loads_json(told["state"])
+        views, width, height, fov_deg, max_depth_m = given["sensors"]
+        sensors = Sensors(tuple(views), bool(views), bool(views), width, height, fov_deg, max_depth_m)
+        words = Vocabulary(given["words"], given["length"])
+        about = About(given["shape"], words, sensors, given["release"], given["actions"])
+    except AerialDojoError as error:
+        raise StoreError(f"{path} holds no policy: {first_line(error)}") from None
+    except Exception as error:  # safetensors has an error of its own, and a header may say anything
+        raise StoreError(f"{path} holds no policy: {first_line(error)}") from None
+    if about.actions != actions_fingerprint():
+        raise UsageError(
+            f"{path} is of another action set: its fingerprint is {about.actions[:16]}, and that of this version is "
+            f"{actions_fingerprint()[:16]}"
+        )
+    return tensors, about, state
+
+
+def _safetensors() -> tuple[Any, Any]:
+    try:
+        return importlib.import_module("safetensors"), importlib.import_module("safetensors.torch")
+    except ImportError:
+        raise UsageError("weights need safetensors: install the extra: pip install 'aerialdojo-gen[train]'") from None

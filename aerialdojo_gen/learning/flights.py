@@ -1,0 +1,168 @@
+"""A policy flies training tasks while the teacher looks on: what DAgger learns from (Ross, Gordon, Bagnell 2011)."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aerialdojo_gen.agents.goal import N_ACTIONS
+from aerialdojo_gen.benchmark.episode import Episode
+from aerialdojo_gen.benchmark.motion import FlightSpace, flight_space
+from aerialdojo_gen.benchmark.tasks import mesh_of
+from aerialdojo_gen.common import rng
+from aerialdojo_gen.config.sections import Embodiment, PlanConfig
+from aerialdojo_gen.geometry.motion import replay
+from aerialdojo_gen.learning import checkpoints
+from aerialdojo_gen.learning.collect import Flying, Part, goal_poses, goals_of, offsets, pictures
+from aerialdojo_gen.learning.loader import torch_package
+from aerialdojo_gen.learning.policy import network_of
+from aerialdojo_gen.learning.seen import Reckoning
+from aerialdojo_gen.learning.steps import Steps
+from aerialdojo_gen.learning.teacher import NO_LABEL, Teacher, teacher_of
+from aerialdojo_gen.scenes.context import SEVERAL, open_scene
+from aerialdojo_gen.store.schemas import STOP
+
+# Episodes that are flown side by side.
+_TOGETHER = 32
+# An episode is over after so many times the reference's actions, and some more: who is lost learns little more.
+_TIMES, _MORE = 1.5, 12
+
+
+class Flown:
+    """One episode under way, and what was written down of it."""
+
+    def __init__(
+        self, space: FlightSpace, start: NDArray[np.float64], goal: NDArray[np.float64], budget: int
+    ) -> None:
+        x, y, z, yaw = start.tolist()
+        self.space, self.goal = space, goal
+        self.episode = Episode(space, (x, y, z, yaw), (goal[0], goal[1], goal[2]), budget)
+        self.reckoning, self.previous = Reckoning(), N_ACTIONS
+        self.rows: list[tuple[int, int, float]] = []
+        self.odometry: list[NDArray[np.float32]] = []
+        self.poses: list[NDArray[np.float64]] = []
+        self.frames: list[NDArray[np.uint8]] = []
+
+    @property
+    def pose(self) -> NDArray[np.float64]:
+        """x, y, z in metres and yaw in radians, world frame."""
+        return np.array([*self.episode.position, self.episode.yaw_rad])
+
+    def note(self, label: int, frame: NDArray[np.uint8], pose: NDArray[np.float64]) -> None:
+        """Write down a step before it is flown."""
+        self.rows.append((label, self.previous, float(self.episode.remaining_actions)))
+        self.odometry.append(self.reckoning.odometry)
+        self.poses.append(pose)
+        self.frames.append(frame)
+
+    def fly(self, chosen: int, label: int) -> bool:
+        """Fly the policy's action, or the teacher's where that would end the episode; False when it is over."""
+        if chosen == STOP or self._collides(chosen):
+            if label == STOP:
+                return False
+            chosen = label
+        self.episode.step(chosen)
+        self.previous = chosen
+        if not self.episode.refused:
+            self.reckoning.add(chosen)
+        return self.episode.termination is None
+
+    def _collides(self, action: int) -> bool:
+        x, y, z = replay(self.pose, [action])[-1, :3].tolist()
+        here = self.episode.position
+        return (x, y, z) != here and self.space.fly(here, (x, y, z))[1]
+
+
+def flights(part: Part, flying: Flying) -> Steps:
+    """Fly a part's tasks.
+
+    The policy's actions are flown, now and then the teacher's; where the policy would stop too early or collide the
+    teacher's are, so that an episode goes on. Every step is labelled with what the teacher does there.
+    """
+    torch = torch_package()
+    torch.set_num_threads(1)
+    index = part.index()
+    body = Embodiment()
+    mesh = mesh_of(part.data, part.scene)
+    space = flight_space(*mesh, body.radius_m)
+    teacher = teacher_of(open_scene(*mesh, SEVERAL), PlanConfig(), body.radius_m)
+    tensors, about, _ = checkpoints.read(flying.weights)
+    network = network_of(about, tensors, str(flying.weights)).eval()
+    goals, told = goal_poses(part, index), goals_of(part, index)
+    order = np.lexsort((np.arange(len(index)), *index.goal.T))
+    flown: dict[int, Flown] = {}
+    with torch.inference_mode(), teacher.keeping():
+        for k in range(0, len(order), _TOGETHER):
+            rows = order[k : k + _TOGETHER]
+            own = [Flown(space, index.start[r], goals[r], int(index.budget[r])) for r in rows]
+            most = [int(_TIMES * index.steps[r]) + _MORE for r in rows]
+            draws = [rng.generator(flying.seed, "dagger", flying.round, index.nav_id[r]) for r in rows]
+            shown = np.array([bool(d.random() < 0.5) for d in draws]) & (told["image"][rows] >= 0)
+            goal = _understood(torch, network, told, rows, shown)
+            _fly(torch, network, part, teacher, own, most, draws, flying.teacher_share, goal)
+            flown |= dict(zip(rows.tolist(), own, strict=True))
+    return _steps([flown[r] for r in range(len(index))], told, part)
+
+
+def _understood(
+    torch: Any, network: Any, told: dict[str, Any], rows: NDArray[np.int64], shown: NDArray[np.bool_]
+) -> Any:
+    shown = shown | ~told["semantic"][rows]
+    images = np.zeros((len(rows), *told["images"].shape[1:]), np.uint8)
+    images[shown] = told["images"][told["image"][rows[shown]]]
+    tokens = told["tokens"][rows, 1 - shown.astype(np.int64)]
+    return network.understand(torch.from_numpy(tokens), torch.from_numpy(images), torch.from_numpy(shown))
+
+
+def _fly(
+    torch: Any, network: Any, part: Part, teacher: Teacher, flown: list[Flown], most: list[int],
+    draws: list[np.random.Generator], teacher_share: float, goal: Any,
+) -> None:  # fmt: skip
+    going = list(range(len(flown)))
+    memory = torch.zeros(1, len(flown), network.shape.hidden)
+    while going:
+        poses = [flown[k].pose for k in going]
+        labels = teacher.labels([flown[k].goal for k in going], poses)
+        keep = [i for i in range(len(going)) if labels[i] != NO_LABEL]
+        going, poses, labels = [going[i] for i in keep], [poses[i] for i in keep], labels[keep]
+        if not going:
+            return
+        frames = pictures(part, np.array(poses))
+        for i, k in enumerate(going):
+            flown[k].note(int(labels[i]), frames[i], poses[i])
+        last = [flown[k] for k in going]
+        logits, _, memory[:, going] = network(
+            torch.from_numpy(frames) if part.sensors.views else None,
+            goal[going],
+            torch.tensor([[f.rows[-1][1]] for f in last]),
+            torch.from_numpy(np.stack([f.odometry[-1] for f in last])[:, None]),
+            torch.tensor([[f.rows[-1][2]] for f in last]),
+            torch.ones((len(going), 1), dtype=torch.bool),
+            memory[:, going].contiguous(),
+        )
+        chosen = logits[:, 0].argmax(dim=1).tolist()
+        left = []
+        for i, k in enumerate(going):
+            label = int(labels[i])
+            action = label if draws[k].random() < teacher_share else chosen[i]
+            if flown[k].fly(action, label) and len(flown[k].rows) < most[k]:
+                left.append(k)
+        going = left
+
+
+def _steps(flown: list[Flown], told: dict[str, Any], part: Part) -> Steps:
+    rows = np.array([row for f in flown for row in f.rows], np.float64).reshape(-1, 3)
+    counts = [len(f.rows) for f in flown]
+    poses = np.array([pose for f in flown for pose in f.poses]).reshape(-1, 4)
+    goals = np.repeat(np.array([f.goal[:3] for f in flown]).reshape(-1, 3), counts, axis=0)
+    shape = (len(part.sensors.views), part.size_px, part.size_px, 4)
+    return Steps(
+        frames=np.array([frame for f in flown for frame in f.frames], np.uint8).reshape(-1, *shape),
+        first=np.concatenate([[0], np.cumsum(counts)]).astype(np.int64),
+        label=rows[:, 0].astype(np.int64), previous=rows[:, 1].astype(np.int64),
+        remaining=rows[:, 2].astype(np.float32),
+        odometry=np.array([o for f in flown for o in f.odometry], np.float32).reshape(-1, 4),
+        offset=offsets(poses, goals), **told,
+    )  # fmt: skip

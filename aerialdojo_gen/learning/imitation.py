@@ -1,0 +1,266 @@
+"""Behaviour cloning: a network learns to do at each step of an episode what the teacher does there."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aerialdojo_gen.common import rng
+from aerialdojo_gen.learning.loader import torch_package
+from aerialdojo_gen.learning.network import Network
+from aerialdojo_gen.learning.recipe import Recipe
+from aerialdojo_gen.learning.steps import Pool
+
+# Batches of like lengths are put together from so many: padding costs time.
+_CHUNK = 24
+# Pictures are kept on the accelerator where they take at most this share of what is free there.
+_RESIDENT = 0.7
+_GOAL_UNIT_M = 10.0
+
+
+@dataclass
+class Progress:
+    """Where a training is: JSON, for a checkpoint.
+
+    Attributes
+    ----------
+    phase : int
+        0 for the references, then the round of DAgger.
+    epoch, batch : int
+        Of the phase; batches that are done.
+    sums : list of float
+        Of the epoch so far: loss, right actions, steps.
+    """
+
+    phase: int = 0
+    epoch: int = 0
+    batch: int = 0
+    sums: list[float] = field(default_factory=lambda: [0.0, 0.0, 0.0])
+
+    def as_json(self) -> dict[str, Any]:
+        """Return it as plain values."""
+        return {"phase": self.phase, "epoch": self.epoch, "batch": self.batch, "sums": self.sums}
+
+
+@dataclass(frozen=True)
+class Epoch:
+    """What came of an epoch: mean loss and accuracy of the steps it was trained on, accuracy on those kept back."""
+
+    phase: int
+    number: int
+    loss: float
+    accuracy: float
+    kept_back: float | None
+    left_s: float
+
+
+def epoch_batches(
+    lengths: NDArray[np.int64], most_steps: int, seed: int, phase: int, epoch: int
+) -> list[NDArray[np.int64]]:
+    """Put episodes into batches of like lengths, shuffled; the same for one seed, phase and epoch.
+
+    Parameters
+    ----------
+    lengths : (n,) int64
+        Steps of the episodes.
+    most_steps : int
+        Of a batch, padding among them; a longer episode is a batch of its own.
+    seed, phase, epoch : int
+
+    Returns
+    -------
+    list of (k,) int64
+        Episodes.
+    """
+    draw = rng.generator(seed, "learning batches", phase, epoch)
+    order = draw.permutation(np.flatnonzero(lengths > 0))
+    size = max(1, int(_CHUNK * most_steps / max(float(lengths.mean()), 1.0)))
+    batches: list[NDArray[np.int64]] = []
+    for begin in range(0, len(order), size):
+        chunk = order[begin : begin + size]
+        chunk = chunk[np.argsort(-lengths[chunk], kind="stable")]
+        while len(chunk):
+            n = max(1, most_steps // int(lengths[chunk[0]]))
+            batches.append(chunk[:n])
+            chunk = chunk[n:]
+    return [batches[k] for k in draw.permutation(len(batches))]
+
+
+class Learner:
+    """A network, its optimiser, and what it learns by.
+
+    Parameters
+    ----------
+    network : Network
+    recipe : Recipe
+    device : str
+        ``cpu`` or ``cuda``.
+    """
+
+    def __init__(self, network: Network, recipe: Recipe, device: str) -> None:
+        self.torch = torch_package()
+        self.network = network.to(device)
+        self.recipe, self.device = recipe, device
+        self.progress = Progress()
+        self.optimiser = self._optimiser()
+
+    def state(self) -> dict[str, Any]:
+        """Return all tensors that a training goes on from: weights, and the optimiser's moments."""
+        named = {f"network.{name}": t for name, t in self.network.state_dict().items()}
+        for number, moments in self.optimiser.state_dict()["state"].items():
+            named |= {f"optimiser.{number}.{name}": t for name, t in moments.items()}
+        return named
+
+    def restore(self, tensors: Mapping[str, Any], progress: Mapping[str, Any]) -> None:
+        """Go on from a checkpoint."""
+        weights = {n.removeprefix("network."): t for n, t in tensors.items() if n.startswith("network.")}
+        self.network.load_state_dict(weights)
+        moments: dict[int, dict[str, Any]] = {}
+        for name, tensor in tensors.items():
+            if name.startswith("optimiser."):
+                _, number, what = name.split(".", 2)
+                moments.setdefault(int(number), {})[what] = tensor
+        given = self.optimiser.state_dict()
+        self.optimiser.load_state_dict({"state": moments, "param_groups": given["param_groups"]})
+        self.progress = Progress(**progress)
+
+    def begin(self, phase: int) -> None:
+        """Begin a phase, with a new optimiser."""
+        self.progress = Progress(phase)
+        self.optimiser = self._optimiser()
+
+    def learn(
+        self,
+        pool: Pool,
+        kept_back: NDArray[np.bool_],
+        epochs: int,
+        learning_rate: float,
+        *,
+        after: Callable[[Epoch], None],
+        tick: Callable[[int, int, float, float], None],
+    ) -> None:
+        """Go through a phase's epochs, from where the progress is.
+
+        Parameters
+        ----------
+        pool : Pool
+        kept_back : (n,) bool
+            Episodes that are not learned from.
+        epochs : int
+        learning_rate : float
+            The highest.
+        after : callable
+            Called after each epoch.
+        tick : callable
+            Called after each batch with its number of all, how many there are, its loss and its accuracy.
+        """
+        p, seed, most = self.progress, self.recipe.seed, self.recipe.train.batch_steps
+        lengths = np.where(kept_back, 0, pool.lengths)
+        counts = [len(epoch_batches(lengths, most, seed, p.phase, e)) for e in range(epochs)]
+        total, done = sum(counts), sum(counts[: p.epoch]) + p.batch
+        frames = self._frames(pool)
+        started, first = time.monotonic(), done
+        while p.epoch < epochs:
+            self.network.train()
+            batches = epoch_batches(lengths, most, seed, p.phase, p.epoch)
+            for episodes in batches[p.batch :]:
+                rate = self._rate(done, total, learning_rate)
+                loss, right, n = self._step(pool, frames, episodes, rate, (p.phase, p.epoch, p.batch))
+                p.batch, done = p.batch + 1, done + 1
+                p.sums = [a + b for a, b in zip(p.sums, (loss * n, right, n), strict=True)]
+                tick(done, total, loss, right / n)
+            spent = time.monotonic() - started
+            left_s = spent / max(done - first, 1) * (total - done)
+            sums, number = p.sums, p.epoch
+            p.epoch, p.batch, p.sums = p.epoch + 1, 0, [0.0, 0.0, 0.0]
+            n = max(sums[2], 1.0)
+            after(Epoch(p.phase, number, sums[0] / n, sums[1] / n, self.accuracy(pool, frames, kept_back), left_s))
+
+    def accuracy(self, pool: Pool, frames: Any, chosen: NDArray[np.bool_]) -> float | None:
+        """Share of steps at which the network does what the teacher does; None without any."""
+        lengths = np.where(chosen, pool.lengths, 0)
+        if not lengths.any():
+            return None
+        self.network.eval()
+        right = n = 0.0
+        with self.torch.no_grad():
+            for episodes in epoch_batches(lengths, self.recipe.train.batch_steps, 0, 0, 0):
+                batch = self._batch(pool, frames, episodes, rng.generator(0, "kept back"))
+                logits, _ = self._forward(batch)
+                hit = (logits.argmax(-1) == batch["label"])[batch["mask"]]
+                right, n = right + float(hit.sum()), n + hit.numel()
+        return right / n
+
+    def _optimiser(self) -> Any:
+        train = self.recipe.train
+        return self.torch.optim.AdamW(
+            self.network.parameters(), lr=train.learning_rate, weight_decay=train.weight_decay
+        )
+
+    def _rate(self, done: int, total: int, highest: float) -> float:
+        warm = min(1.0, (done + 1) / (self.recipe.train.warmup_batches + 1))
+        return highest * warm * (0.1 + 0.9 * 0.5 * (1.0 + math.cos(math.pi * done / max(total, 1))))
+
+    def _frames(self, pool: Pool) -> Any:
+        """All pictures on the accelerator where there is room; else None, and batches read their own."""
+        if self.device == "cpu" or not self.recipe.data.views:
+            return None
+        size = sum(part.frames.nbytes for part in pool.parts)
+        free, _ = self.torch.cuda.mem_get_info()
+        if size > _RESIDENT * free:
+            return None
+        shape = (pool.n_steps, *pool.parts[0].frames.shape[1:])
+        out = self.torch.empty(shape, dtype=self.torch.uint8, device=self.device)
+        at = 0
+        for part in pool.parts:
+            n = len(part.frames)
+            out[at : at + n] = self.torch.from_numpy(np.array(part.frames)).to(self.device)
+            at += n
+        return out
+
+    def _batch(
+        self, pool: Pool, frames: Any, episodes: NDArray[np.int64], draw: np.random.Generator
+    ) -> dict[str, Any]:
+        by_image = draw.random(len(episodes)) < self.recipe.train.image_share
+        arrays = pool.batch(episodes, by_image)
+        rows = arrays.pop("rows")
+        out = {name: self.torch.from_numpy(value).to(self.device) for name, value in arrays.items()}
+        if self.recipe.data.views:
+            if frames is None:
+                out["pictures"] = self.torch.from_numpy(pool.frames(rows)).to(self.device)
+            else:
+                out["pictures"] = frames[self.torch.from_numpy(rows).to(self.device)]
+        return out
+
+    def _forward(self, batch: dict[str, Any]) -> tuple[Any, Any]:
+        with self.torch.autocast(self.device, self.torch.bfloat16, enabled=self.device != "cpu"):
+            goal = self.network.understand(batch["tokens"], batch["images"], batch["told_by_image"])
+            logits, offset, _ = self.network(
+                batch.get("pictures"), goal, batch["previous"], batch["odometry"], batch["remaining"], batch["mask"]
+            )
+        return logits.float(), offset.float()
+
+    def _step(
+        self, pool: Pool, frames: Any, episodes: NDArray[np.int64], rate: float, place: tuple[int, int, int]
+    ) -> tuple[float, float, int]:
+        functional = self.torch.nn.functional
+        batch = self._batch(pool, frames, episodes, rng.generator(self.recipe.seed, "learning goals", *place))
+        logits, offset = self._forward(batch)
+        mask = batch["mask"]
+        label = batch["label"][mask]
+        loss = functional.cross_entropy(logits[mask], label)
+        where = functional.smooth_l1_loss(offset[mask], batch["offset"][mask] / _GOAL_UNIT_M)
+        for group in self.optimiser.param_groups:
+            group["lr"] = rate
+        self.optimiser.zero_grad(set_to_none=True)
+        (loss + self.recipe.train.goal_weight * where).backward()
+        self.torch.nn.utils.clip_grad_norm_(self.network.parameters(), self.recipe.train.gradient_norm)
+        self.optimiser.step()
+        right = (logits[mask].argmax(-1) == label).sum()
+        return float(loss.detach()), float(right), int(mask.sum())

@@ -1,0 +1,125 @@
+"""A trained policy as an agent: ``evaluate --agent aerialdojo_gen.learning.policy:Policy --option weights=FILE``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from aerialdojo_gen.agents.base import AgentBase
+from aerialdojo_gen.agents.goal import N_ACTIONS, Goal, Observation
+from aerialdojo_gen.errors import StoreError, UsageError, first_line
+from aerialdojo_gen.learning import checkpoints
+from aerialdojo_gen.learning.loader import torch_package
+from aerialdojo_gen.learning.seen import Reckoning, goal_picture, packed
+from aerialdojo_gen.learning.words import goal_text
+from aerialdojo_gen.store.files import file_digest
+
+
+class Policy(AgentBase):
+    """Flies what a network says, the most likely action at each step.
+
+    Parameters
+    ----------
+    weights : str
+        A file that `aerialdojo-gen train` wrote.
+    any_release : bool
+        Fly in a release of other scenes than the one that it learned from.
+    device : str
+        ``cpu``, or ``cuda``.
+    sha256 : str, optional
+        Of the file, which the run then has in its log; other weights are refused.
+
+    Raises
+    ------
+    UsageError
+        There is no PyTorch, no such file, or it is of another action set.
+    StoreError
+        The file is damaged.
+    """
+
+    def __init__(
+        self, weights: str = "", any_release: bool = False, device: str = "cpu", sha256: str | None = None
+    ) -> None:
+        torch = self._torch = torch_package()
+        if not weights:
+            raise UsageError("a policy needs weights: --option weights=data/policies/imitation/policy.safetensors")
+        # An observation is too little work to be shared, and the cores have a worker each.
+        torch.set_num_threads(1)
+        tensors, self._about, _ = checkpoints.read(weights)
+        self._sha256, self._weights = file_digest(Path(weights)), weights
+        if sha256 is not None and sha256 != self._sha256:
+            raise UsageError(f"{weights} has changed since the run began: give another --run")
+        self._any_release, self._device = any_release, device
+        self.network = network_of(self._about, tensors, weights).to(device).eval()
+        self.sensors = self._about.sensors
+
+    def check(self) -> str:
+        """Nothing is asked for that could fail: the weights were read."""
+        return ""
+
+    def settled(self) -> dict[str, Any]:
+        """Return the weights' digest, for the instances that fly and for the log."""
+        return {"sha256": self._sha256}
+
+    def suits(self, release: str) -> None:
+        """Refuse a release of other scenes.
+
+        Raises
+        ------
+        UsageError
+            It is another one, and `any_release` is not set.
+        """
+        if release != self._about.release and not self._any_release:
+            raise UsageError(
+                f"{self._weights} learned from another release: its fingerprint is {self._about.release[:16]}, and "
+                f"that of this one is {release[:16]}; to fly here all the same: --option any_release=true"
+            )
+
+    def reset(self, goal: Goal) -> None:
+        """Begin an episode: read the goal once."""
+        torch, about = self._torch, self._about
+        text = goal_text(goal.target_name, goal.landmark, goal.direction, goal.description)
+        tokens = torch.from_numpy(about.vocabulary.encode(text)[None]).to(self._device)
+        image = torch.from_numpy(goal_picture(goal.image, about.shape["size_px"])[None]).to(self._device)
+        shown = torch.tensor([goal.image is not None], device=self._device)
+        with torch.inference_mode():
+            self._goal = self.network.understand(tokens, image, shown)
+        self._reckoning, self._previous, self._memory = Reckoning(), N_ACTIONS, None
+
+    def act(self, observation: Observation) -> int:
+        """Look, remember, choose."""
+        torch, device, sensors = self._torch, self._device, self.sensors
+        if self._previous != N_ACTIONS and not observation.refused:
+            self._reckoning.add(self._previous)
+        pictures = None
+        if sensors.views:
+            rgb = np.stack([observation.rgb[view] for view in sensors.views])
+            depth_m = np.stack([observation.depth_m[view] for view in sensors.views])
+            pictures = torch.from_numpy(packed(rgb, depth_m, sensors)[None]).to(device)
+        with torch.inference_mode():
+            logits, _, self._memory = self.network(
+                pictures,
+                self._goal,
+                torch.tensor([[self._previous]], device=device),
+                torch.from_numpy(self._reckoning.odometry[None, None]).to(device),
+                torch.tensor([[float(observation.remaining_actions)]], device=device),
+                torch.ones((1, 1), dtype=torch.bool, device=device),
+                self._memory,
+            )
+        self._previous = int(logits[0, 0].argmax())
+        return self._previous
+
+
+def network_of(about: checkpoints.About, tensors: dict[str, Any], where: str) -> Any:
+    """Make the network that weights are of; StoreError where they do not fit it."""
+    from aerialdojo_gen.learning.network import Network, Shape
+
+    try:
+        shape = Shape(**{**about.shape, "channels": tuple(about.shape["channels"])})
+        network = Network(shape)
+        network.load_state_dict({name.removeprefix("network."): t for name, t in tensors.items()})
+    except (RuntimeError, TypeError, ValueError, KeyError) as error:
+        raise StoreError(f"{where} holds no policy of this version: {first_line(error)}") from None
+    return network

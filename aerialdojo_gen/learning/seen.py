@@ -1,0 +1,70 @@
+"""What a policy sees and is told, as arrays: the same in training and in flight."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from aerialdojo_gen.agents.goal import N_ACTIONS, Sensors
+from aerialdojo_gen.geometry.motion import DISPLACEMENTS, TURN_RAD, TURNS
+from aerialdojo_gen.store.schemas import ACTION_NAMES
+
+
+def packed(rgb: NDArray[np.uint8], depth_m: NDArray[np.float32], sensors: Sensors) -> NDArray[np.uint8]:
+    """Join colours and depth to four bytes a pixel.
+
+    Parameters
+    ----------
+    rgb : (..., H, W, 3) uint8
+    depth_m : (..., H, W) float32
+        Metres, 0 where there is nothing within range.
+    sensors : Sensors
+        For the range.
+
+    Returns
+    -------
+    (..., H, W, 4) uint8
+        The last is 255 times the root of depth over range: a near surface is told to some centimetres.
+    """
+    near = np.sqrt(np.clip(depth_m / np.float32(sensors.max_depth_m), 0.0, 1.0), dtype=np.float32)
+    return np.concatenate([rgb, np.rint(near * 255.0).astype(np.uint8)[..., None]], axis=-1)
+
+
+def goal_picture(image: NDArray[np.uint8] | None, size_px: int) -> NDArray[np.uint8]:
+    """Make a goal's picture as small as a view, without depth: (size, size, 4) uint8; black where there is none."""
+    out = np.zeros((size_px, size_px, 4), np.uint8)
+    if image is not None:
+        fits = image.shape[:2] == (size_px, size_px)
+        out[..., :3] = image if fits else cv2.resize(image, (size_px, size_px), interpolation=cv2.INTER_AREA)
+    return out
+
+
+class Reckoning:
+    """Where a body is that adds up its own actions, in the frame of its start."""
+
+    def __init__(self) -> None:
+        self._place = np.zeros(3)
+        self._headings = 0
+
+    def add(self, action: int) -> None:
+        """Add an action that was carried out."""
+        angle = self._headings * TURN_RAD
+        c, s = np.cos(angle), np.sin(angle)
+        ahead, left, up = DISPLACEMENTS[action]
+        self._place += (c * ahead - s * left, s * ahead + c * left, up)
+        self._headings += int(TURNS[action])
+
+    @property
+    def odometry(self) -> NDArray[np.float32]:
+        """X ahead, y left, z up in metres and yaw in radians: (4,) float32."""
+        return np.array([*self._place, self._headings * TURN_RAD], np.float32)
+
+
+def actions_fingerprint() -> str:
+    """SHA-256 of the action set: names, magnitudes and turns."""
+    facts = [ACTION_NAMES[:N_ACTIONS], DISPLACEMENTS[:N_ACTIONS].tolist(), TURNS[:N_ACTIONS].tolist(), TURN_RAD]
+    return hashlib.sha256(json.dumps(facts).encode()).hexdigest()

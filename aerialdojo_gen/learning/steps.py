@@ -1,0 +1,174 @@
+"""Flown episodes as arrays on the disk: what the body saw at each step, what it did, and what it should have done."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aerialdojo_gen.errors import StoreError
+from aerialdojo_gen.store.atomic import atomic_folder, make_folder
+
+_FRAMES, _STEPS = "frames.npy", "steps.npz"
+
+
+@dataclass(frozen=True, eq=False)
+class Steps:
+    """Episodes one after the other; arrays of steps have m rows, those of episodes n.
+
+    Attributes
+    ----------
+    frames : (m, views, H, W, 4) uint8
+        See `aerialdojo_gen.learning.seen.packed`; of a blind policy there are no views.
+    first : (n + 1,) int64
+        Where each episode's steps begin.
+    label : (m,) int64
+        What the teacher does there, 0 to 15.
+    previous : (m,) int64
+        What was done before, 16 at the start.
+    remaining : (m,) float32
+        Actions left.
+    odometry : (m, 4) float32
+        Own motion from the start and in its frame: metres and radians.
+    offset : (m, 3) float32
+        The goal ahead, left and up of the body, metres: privileged, a side task.
+    tokens : (n, 2, length) int64
+        The goal's words without and with its description.
+    image : (n,) int64
+        Row of `images`, -1 without one.
+    semantic : (n,) bool
+        Whether there is a semantic instance.
+    images : (k, H, W, 4) uint8
+        The goals' pictures.
+    nav_id : (n,) str
+    """
+
+    frames: NDArray[np.uint8]
+    first: NDArray[np.int64]
+    label: NDArray[np.int64]
+    previous: NDArray[np.int64]
+    remaining: NDArray[np.float32]
+    odometry: NDArray[np.float32]
+    offset: NDArray[np.float32]
+    tokens: NDArray[np.int64]
+    image: NDArray[np.int64]
+    semantic: NDArray[np.bool_]
+    images: NDArray[np.uint8]
+    nav_id: NDArray[np.str_]
+
+    def __len__(self) -> int:
+        """Return the number of episodes."""
+        return len(self.first) - 1
+
+    def write(self, folder: Path) -> None:
+        """Write to a folder that is there whole or not at all."""
+        make_folder(folder.parent)
+        with atomic_folder(folder) as temporary:
+            np.save(temporary / _FRAMES, self.frames, allow_pickle=False)
+            named = {field.name: getattr(self, field.name) for field in fields(self) if field.name != "frames"}
+            np.savez(temporary / _STEPS, allow_pickle=False, **named)
+
+
+def is_written(folder: Path) -> bool:
+    """Whether a folder holds episodes."""
+    return (folder / _STEPS).is_file()
+
+
+def read_steps(folder: Path) -> Steps:
+    """Read episodes; pictures stay on the disk until they are asked for.
+
+    Raises
+    ------
+    StoreError
+        They are damaged.
+    """
+    try:
+        with np.load(folder / _STEPS, allow_pickle=False) as file:
+            rest = {name: file[name] for name in file.files}
+        with (folder / _FRAMES).open("rb") as file:
+            np.lib.format.read_magic(file)
+            shape, _, _ = np.lib.format.read_array_header_1_0(file)
+        # What is empty cannot be mapped.
+        frames = np.load(folder / _FRAMES, mmap_mode="r" if np.prod(shape) else None, allow_pickle=False)
+        return Steps(frames=frames, **rest)
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise StoreError(f"{folder} is damaged: remove it, the same command makes it again ({error})") from None
+
+
+class Pool:
+    """All episodes that are learned from.
+
+    Parameters
+    ----------
+    parts : sequence of Steps
+    """
+
+    def __init__(self, parts: Sequence[Steps]) -> None:
+        self.parts = list(parts)
+        self._steps = np.cumsum([0, *(len(p.label) for p in parts)])
+        joined: dict[str, NDArray[Any]] = {}
+        for name in ("label", "previous", "remaining", "odometry", "offset", "tokens", "semantic", "nav_id"):
+            joined[name] = np.concatenate([getattr(p, name) for p in parts])
+        shifts = np.cumsum([0, *(len(p.images) for p in parts)])
+        joined["image"] = np.concatenate(
+            [np.where(p.image >= 0, p.image + s, -1) for p, s in zip(parts, shifts, strict=False)]
+        )
+        joined["images"] = np.concatenate([p.images for p in parts])
+        self._joined = joined
+        self.first = np.concatenate([[0], *(p.first[1:] + s for p, s in zip(parts, self._steps, strict=False))])
+        self.lengths = np.diff(self.first)
+        self.nav_id = joined["nav_id"]
+
+    def __len__(self) -> int:
+        """Return the number of episodes."""
+        return len(self.lengths)
+
+    @property
+    def n_steps(self) -> int:
+        """Steps of all of them."""
+        return int(self._steps[-1])
+
+    def frames(self, rows: NDArray[np.int64]) -> NDArray[np.uint8]:
+        """Read pictures of steps, in their order."""
+        first = self.parts[0].frames
+        out = np.empty((len(rows), *first.shape[1:]), np.uint8)
+        part = np.searchsorted(self._steps, rows, side="right") - 1
+        for p in np.unique(part):
+            at = np.flatnonzero(part == p)
+            out[at] = self.parts[p].frames[rows[at] - self._steps[p]]
+        return out
+
+    def batch(self, episodes: NDArray[np.int64], by_image: NDArray[np.bool_]) -> dict[str, NDArray[Any]]:
+        """Put episodes side by side.
+
+        Parameters
+        ----------
+        episodes : (n,) int64
+        by_image : (n,) bool
+            Whose goal is to be told by its picture, where it has one.
+
+        Returns
+        -------
+        dict
+            ``rows`` (m,), and by name (n, T, …) arrays and (n, …) of the goals.
+        """
+        j, lengths = self._joined, self.lengths[episodes]
+        window = int(lengths.max())
+        mask = np.arange(window)[None] < lengths[:, None]
+        rows = (self.first[episodes][:, None] + np.arange(window)[None])[mask]
+        out: dict[str, NDArray[Any]] = {"rows": rows, "mask": mask}
+        for name in ("label", "previous", "remaining", "odometry", "offset"):
+            values = j[name]
+            out[name] = np.zeros((*mask.shape, *values.shape[1:]), values.dtype)
+            out[name][mask] = values[rows]
+        image = j["image"][episodes]
+        shown = (by_image | ~j["semantic"][episodes]) & (image >= 0)
+        out["told_by_image"] = shown
+        out["tokens"] = j["tokens"][episodes, 1 - shown.astype(np.int64)]
+        out["images"] = np.zeros((len(episodes), *j["images"].shape[1:]), np.uint8)
+        out["images"][shown] = j["images"][image[shown]]
+        return out

@@ -1,0 +1,297 @@
+"""A whole training: references drawn once, behaviour cloning, rounds of DAgger; resumable."""
+
+from __future__ import annotations
+
+import hashlib
+import importlib
+import json
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aerialdojo_gen.agents.goal import Sensors
+from aerialdojo_gen.benchmark.tasks import Selection
+from aerialdojo_gen.common import rng
+from aerialdojo_gen.common.bounded import read_json
+from aerialdojo_gen.common.names import unknown
+from aerialdojo_gen.errors import UsageError
+from aerialdojo_gen.learning import checkpoints
+from aerialdojo_gen.learning.collect import Flying, collect, parts_of
+from aerialdojo_gen.learning.index import Index, read_index
+from aerialdojo_gen.learning.loader import torch_package
+from aerialdojo_gen.learning.recipe import Recipe
+from aerialdojo_gen.learning.seen import actions_fingerprint
+from aerialdojo_gen.learning.steps import Pool, Steps
+from aerialdojo_gen.learning.trajectories import drawn_evenly
+from aerialdojo_gen.learning.words import Vocabulary, goal_text
+from aerialdojo_gen.pipeline.executors import make_executor
+from aerialdojo_gen.pipeline.progress import Reporter, duration
+from aerialdojo_gen.release.fingerprint import release_fingerprint
+from aerialdojo_gen.store.atomic import atomic_file, make_folder
+from aerialdojo_gen.store.files import file_digest
+from aerialdojo_gen.store.root import DataRoot, LocalRoot, Where, open_root
+
+_SETTINGS, _CHECKPOINT, _HISTORY = "training.json", "checkpoint.safetensors", "history.jsonl"
+# Seconds between lines about what is under way.
+_SAY_EVERY_S = 15.0
+
+
+@dataclass(frozen=True)
+class Trained:
+    """What a training left: the weights after the references alone, and the last ones."""
+
+    imitation: Path
+    policy: Path
+
+
+def train(
+    data: Where,
+    recipe: Recipe,
+    *,
+    out: str | Path | None = None,
+    cache: str | Path | None = None,
+    device: str = "auto",
+    workers: int | None = None,
+    renderer: str = "auto",
+    restart: bool = False,
+    reporter: Reporter | None = None,
+) -> Trained:
+    """Train a policy; `aerialdojo-gen train` in the library.
+
+    On a CPU the weights depend on the release, the recipe, the renderer and the version of PyTorch alone: also where
+    it was killed and went on.
+
+    Parameters
+    ----------
+    data : DataRoot, Path or str
+        The data directory, with a release and its meshes.
+    recipe : Recipe
+    out : str or Path, optional
+        Folder of the weights and checkpoints; ``policies/NAME`` in the data directory where absent.
+    cache : str or Path, optional
+        Folder of what was drawn; ``policies/cache`` in the data directory where absent. Other recipes use it too.
+    device : str
+        ``cpu``, ``cuda``, or ``auto`` for a GPU where there is one.
+    workers : int, optional
+        Processes that draw and fly; all cores where absent.
+    renderer : str
+        ``gl``, ``pybullet`` or ``auto``.
+    restart : bool
+        Forget an earlier training of this name.
+    reporter : Reporter, optional
+
+    Returns
+    -------
+    Trained
+
+    Raises
+    ------
+    UsageError
+        There is no PyTorch, no task fits, or the folder has another training's checkpoint.
+    StoreError
+        There is no release, or a scene's mesh is missing.
+    """
+    if device not in ("auto", "cpu", "cuda"):
+        raise UsageError(unknown("no device", device, ("auto", "cpu", "cuda")))
+    root = open_root(data)
+    # What is missing there is said before what is missing here.
+    release_fingerprint(root)
+    torch = torch_package()
+    if device == "auto":
+        device = "cuda" if torch.cuda.is_available() else "cpu"
+    if device == "cuda" and not torch.cuda.is_available():
+        raise UsageError("PyTorch finds no GPU here: --device cpu, or install its CUDA wheel")
+    if not isinstance(root, LocalRoot) and (out is None or cache is None):
+        raise UsageError("a training writes to a disk: give --out and --cache beside a release in an object store")
+    base = root.path if isinstance(root, LocalRoot) else Path()
+    folder = Path(out) if out is not None else base / "policies" / recipe.name
+    drawn = Path(cache) if cache is not None else base / "policies" / "cache"
+    make_folder(folder)
+    with open_root(folder).lock():
+        return _Training(root, recipe, folder, drawn, device, workers, renderer, reporter or Reporter(True)).run(
+            restart
+        )
+
+
+class _Training:
+    def __init__(
+        self, root: DataRoot, recipe: Recipe, folder: Path, cache: Path, device: str, workers: int | None,
+        renderer: str, reporter: Reporter,
+    ) -> None:  # fmt: skip
+        from aerialdojo_gen.learning.imitation import Learner
+        from aerialdojo_gen.learning.network import Network, Shape
+
+        torch = torch_package()
+        self._root, self._recipe, self._folder, self._cache = root, recipe, folder, cache
+        self._workers, self._renderer, self._reporter = workers, renderer, reporter
+        d, m = recipe.data, recipe.model
+        self._sensors = Sensors(d.views, bool(d.views), bool(d.views), d.size_px, d.size_px)
+        self._selection = (Selection((d.split,)).splits, d.settings)
+        self._index = self._read_index()
+        told = (self._index.told[name] for name in ("target_name", "landmark", "direction", "description"))
+        self._vocabulary = Vocabulary.of(goal_text(*said) for said in zip(*told, strict=True))  # type: ignore[arg-type]
+        shape = Shape(
+            len(self._vocabulary), len(d.views), d.size_px, m.channels, m.features, m.word_features, m.hidden
+        )
+        self._about = checkpoints.About(
+            shape.as_json(), self._vocabulary, self._sensors, release_fingerprint(root), actions_fingerprint()
+        )
+        torch.manual_seed(recipe.seed)
+        if device == "cpu":
+            torch.use_deterministic_algorithms(True)
+        self._learner = Learner(Network(shape), recipe, device)
+        self._said = self._kept = time.monotonic()
+        self._board: Any = None
+
+    def run(self, restart: bool) -> Trained:
+        recipe, learner, report = self._recipe, self._learner, self._reporter
+        if restart:
+            for name in (_SETTINGS, _CHECKPOINT, _HISTORY):
+                (self._folder / name).unlink(missing_ok=True)
+        self._claim()
+        self._resume()
+        index = self._index
+        report.line(
+            f"train {recipe.name}: {len(index):,} trajectories of {len(index.scenes)} scenes, "
+            f"{int(index.steps.sum()):,} steps; {self._about.shape['words']:,} words; "
+            f"{sum(p.numel() for p in learner.network.parameters()):,} weights on {learner.device}"
+        )
+        self._board = _board(self._folder / "tensorboard")
+        parts = self._collect(index, None, "drawing references")
+        for phase in range(recipe.dagger.rounds + 1):
+            if phase:
+                parts += self._collect(self._drawn(phase), self._flying(phase), f"round {phase}: flying")
+            if phase < learner.progress.phase or self._weights(phase).is_file():
+                continue
+            if phase > learner.progress.phase:
+                learner.begin(phase)
+            self._learn(parts, phase)
+            weights = {n: t for n, t in learner.state().items() if n.startswith("network.")}
+            checkpoints.write(self._weights(phase), weights, self._about, learner.progress.as_json())
+            self._keep()
+        last = self._folder / "policy.safetensors"
+        tensors, about, state = checkpoints.read(self._weights(recipe.dagger.rounds))
+        checkpoints.write(last, tensors, about, state)
+        report.line(f"train {recipe.name}: weights in {last}")
+        return Trained(self._weights(0), last)
+
+    def _read_index(self) -> Index:
+        d = self._recipe.data
+        index = read_index(self._root, Selection((d.split,), d.settings, (), d.scenes), d.target_split)
+        return index if d.limit is None else index.take(drawn_evenly(index, d.limit, self._recipe.seed))
+
+    def _weights(self, phase: int) -> Path:
+        return self._folder / ("imitation.safetensors" if not phase else f"dagger-{phase}.safetensors")
+
+    def _drawn(self, phase: int) -> Index:
+        """Draw a round's tasks: as many as fit, none of those kept back, others than the round before's first."""
+        index, want = self._index, self._recipe.dagger.episodes
+        rank = [rng.rank(self._recipe.seed, "dagger tasks", phase, nav_id) for nav_id in index.nav_id]
+        free = np.flatnonzero(~self._kept_back(np.array(index.nav_id)))
+        return index.take(np.sort(free[np.argsort(np.array(rank, np.uint64)[free], kind="stable")[:want]]))
+
+    def _flying(self, phase: int) -> Flying:
+        weights = self._weights(phase - 1)
+        return Flying(weights, file_digest(weights), self._recipe.seed, phase, self._recipe.dagger.teacher_share)
+
+    def _collect(self, index: Index, flying: Flying | None, what: str) -> list[Steps]:
+        parts = parts_of(
+            self._root, index, self._cache, self._selection, self._sensors, self._recipe.data.size_px,
+            self._vocabulary, self._renderer, flying,
+        )  # fmt: skip
+        with make_executor("local", self._workers) as executor:
+            return collect(parts, executor, self._reporter, what)
+
+    def _kept_back(self, nav_ids: NDArray[np.str_]) -> NDArray[np.bool_]:
+        share = self._recipe.data.validation_share * 2.0**64
+        return np.array([rng.rank(self._recipe.seed, "kept back", n) < share for n in nav_ids.tolist()], np.bool_)
+
+    def _learn(self, parts: list[Steps], phase: int) -> None:
+        train, dagger = self._recipe.train, self._recipe.dagger
+        epochs, rate = (dagger.epochs, dagger.learning_rate) if phase else (train.epochs, train.learning_rate)
+        pool = Pool(parts)
+        what = f"round {phase}" if phase else "imitation"
+        after = self._after(what, epochs)
+        self._learner.learn(
+            pool, self._kept_back(pool.nav_id), epochs, rate, after=after, tick=self._tick(what, time.monotonic())
+        )
+
+    def _tick(self, what: str, started: float) -> Callable[[int, int, float, float], None]:
+        first: list[int] = []
+
+        def tick(done: int, total: int, loss: float, accuracy: float) -> None:
+            first[:] = first or [done - 1]
+            now = time.monotonic()
+            if self._board is not None:
+                self._board.add_scalar(f"{what}/loss", loss, done)
+                self._board.add_scalar(f"{what}/accuracy", accuracy, done)
+            if now - self._said >= _SAY_EVERY_S:
+                self._said = now
+                left = (now - started) / (done - first[0]) * (total - done)
+                self._reporter.line(
+                    f"{what}: batch {done:,} of {total:,}, loss {loss:.3f}, accuracy {accuracy:.1%}, "
+                    f"{duration(left)} left"
+                )
+            if now - self._kept >= self._recipe.train.checkpoint_s:
+                self._keep()
+
+        return tick
+
+    def _after(self, what: str, epochs: int) -> Callable[[Any], None]:
+        def after(epoch: Any) -> None:
+            kept = "" if epoch.kept_back is None else f" ({epoch.kept_back:.1%} on those kept back)"
+            self._reporter.line(
+                f"{what}: epoch {epoch.number + 1} of {epochs}, loss {epoch.loss:.3f}, accuracy "
+                f"{epoch.accuracy:.1%}{kept}, {duration(epoch.left_s)} left"
+            )
+            row = {"phase": epoch.phase, "epoch": epoch.number, "loss": epoch.loss, "accuracy": epoch.accuracy,
+                   "kept_back": epoch.kept_back}  # fmt: skip
+            with (self._folder / _HISTORY).open("a", encoding="utf-8") as file:
+                file.write(json.dumps(row) + "\n")
+            self._keep()
+
+        return after
+
+    def _keep(self) -> None:
+        progress = self._learner.progress.as_json()
+        checkpoints.write(self._folder / _CHECKPOINT, self._learner.state(), self._about, progress)
+        self._kept = time.monotonic()
+
+    def _resume(self) -> None:
+        path = self._folder / _CHECKPOINT
+        if path.is_file():
+            tensors, _, state = checkpoints.read(path)
+            self._learner.restore(tensors, state)
+
+    def _claim(self) -> None:
+        """Take the folder for this training; UsageError where it was begun with another."""
+        recipe = self._recipe.model_dump(mode="json", exclude={"small", "name"})
+        recipe["train"].pop("checkpoint_s")
+        own = {"recipe": hashlib.sha256(json.dumps(recipe, sort_keys=True).encode()).hexdigest(),
+               "release": self._about.release, "trajectories": self._index.digest,
+               "action set": self._about.actions}  # fmt: skip
+        path = self._folder / _SETTINGS
+        if path.is_file():
+            before = read_json(path, UsageError)
+            for name, value in own.items():
+                known = str(before.get(name)) if isinstance(before, dict) else "none"
+                if known != value:
+                    raise UsageError(
+                        f"{self._folder} was begun with another {name}: its fingerprint is {known[:16]}, and that of "
+                        f"this one is {value[:16]}; give --restart, or another --out"
+                    )
+        with atomic_file(self._folder, _SETTINGS) as temporary:
+            temporary.write_text(json.dumps(own, indent=2) + "\n", encoding="utf-8")
+
+
+def _board(folder: Path) -> Any:
+    """TensorBoard's writer, where it is installed."""
+    try:
+        return importlib.import_module("torch.utils.tensorboard").SummaryWriter(str(folder))
+    except ImportError:
+        return None

@@ -1,0 +1,232 @@
+"""Policies: trained, resumed to the bit, flown by the evaluator, and refused where they do not fit."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+from support.flying import town
+
+from aerialdojo_gen.benchmark.episode import Episode
+from aerialdojo_gen.benchmark.episodes import run_scenes
+from aerialdojo_gen.benchmark.motion import FlightSpace
+from aerialdojo_gen.benchmark.runner import Evaluation, evaluate
+from aerialdojo_gen.benchmark.tasks import Selection
+from aerialdojo_gen.errors import ConfigError, StoreError, UsageError
+from aerialdojo_gen.learning.index import read_index
+from aerialdojo_gen.learning.recipe import Recipe, load_recipe
+from aerialdojo_gen.learning.steps import read_steps
+from aerialdojo_gen.learning.teacher import NO_LABEL, Teacher
+from aerialdojo_gen.learning.trajectories import drawn_evenly
+from aerialdojo_gen.planning.difficulty import agent_actions
+from aerialdojo_gen.planning.planner import Planner
+from aerialdojo_gen.store import shards as store
+from aerialdojo_gen.store.root import open_root
+from aerialdojo_gen.store.schemas import STOP
+
+torch = pytest.importorskip("torch", reason="PyTorch is not installed: it is the extra 'train'")
+
+from aerialdojo_gen.learning import checkpoints  # noqa: E402 - it needs torch
+from aerialdojo_gen.learning.training import train  # noqa: E402
+
+POLICY = "aerialdojo_gen.learning.policy:Policy"
+SMALL = {
+    "name": "small",
+    "data": {"split": "id_train", "limit": 8, "size_px": 32, "validation_share": 0.0, "settings": []},
+    "model": {"channels": [8, 16, 16, 32], "features": 64, "word_features": 32, "hidden": 128},
+    "train": {"epochs": 80, "batch_steps": 64, "learning_rate": 4e-3, "warmup_batches": 5, "checkpoint_s": 1e-3},
+    "dagger": {"rounds": 0},
+}
+
+
+def recipe(**changed):
+    given = {key: dict(value) if isinstance(value, dict) else value for key, value in SMALL.items()}
+    for key, value in changed.items():
+        given[key] = {**given[key], **value} if isinstance(value, dict) else value
+    return Recipe.model_validate(given)
+
+
+@pytest.fixture(scope="module")
+def cache(tmp_path_factory):
+    return tmp_path_factory.mktemp("drawn")
+
+
+@pytest.fixture(scope="module")
+def learned(smoke, cache, tmp_path_factory):
+    """A policy that has learned eight trajectories by heart."""
+    out = tmp_path_factory.mktemp("policy")
+    return train(smoke, recipe(), out=out, cache=cache, device="cpu", workers=1)
+
+
+def history(folder):
+    return [json.loads(line) for line in (folder / "history.jsonl").read_text().splitlines()]
+
+
+def the_eight(smoke):
+    """The navigation tasks that were learned from."""
+    index = read_index(open_root(smoke), Selection(("id_train",)))
+    return set(index.take(drawn_evenly(index, 8, 0)).nav_id)
+
+
+def test_eight_trajectories_are_learned_by_heart_and_flown(smoke, learned, tmp_path):
+    assert history(learned.policy.parent)[-1]["accuracy"] > 0.95
+    options = {"weights": str(learned.policy)}
+    evaluate(smoke, Evaluation("learned", POLICY, options, Selection(("id_train",))), out=tmp_path, workers=1)
+    rows = []
+    for scene in run_scenes(open_root(tmp_path), "learned"):
+        columns = ["nav_id", "success", "agent_options"]
+        rows += store.read_scene(tmp_path, "episodes", scene, columns, "learned").to_pylist()
+    own = [row for row in rows if row["nav_id"] in the_eight(smoke)]
+    assert len(own) == 16, "both goals of each"
+    assert sum(row["success"] for row in own) >= 14
+    assert json.loads(own[0]["agent_options"])["weights"] == str(learned.policy)
+
+
+def test_killed_and_gone_on_with_it_ends_with_the_same_weights(smoke, cache, learned, tmp_path):
+    """A kill between two batches, at a checkpoint of every batch: what is left is learned, and nothing twice."""
+    whole = tmp_path / "whole"
+    short = recipe(train={"epochs": 6})
+    train(smoke, short, out=whole, cache=cache, device="cpu", workers=1)
+    file = tmp_path / "short.toml"
+    file.write_text(
+        'name = "small"\n[data]\nlimit = 8\nsize_px = 32\nvalidation_share = 0.0\nsettings = []\n'
+        "[model]\nchannels = [8, 16, 16, 32]\nfeatures = 64\nword_features = 32\nhidden = 128\n"
+        "[train]\nepochs = 6\nbatch_steps = 64\nlearning_rate = 4e-3\nwarmup_batches = 5\ncheckpoint_s = 1e-3\n"
+        "[dagger]\nrounds = 0\n"
+    )
+    assert load_recipe(file) == short
+    broken = tmp_path / "broken"
+    command = [
+        sys.executable, "-m", "aerialdojo_gen.cli", "train", str(file), "--data", str(smoke), "--out", str(broken),
+        "--cache", str(cache), "--device", "cpu", "--workers", "1",
+    ]  # fmt: skip
+    with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE) as process:
+        until = time.monotonic() + 300
+        while not (broken / "checkpoint.safetensors").is_file() and process.poll() is None:
+            assert time.monotonic() < until
+            time.sleep(0.02)
+        process.send_signal(signal.SIGKILL)
+        process.communicate()
+    assert process.returncode == -signal.SIGKILL
+    assert not (broken / "policy.safetensors").exists()
+    train(smoke, short, out=broken, cache=cache, device="cpu", workers=1)
+    one, two = (checkpoints.read(folder / "policy.safetensors")[0] for folder in (whole, broken))
+    assert one.keys() == two.keys()
+    assert all(torch.equal(one[name], two[name]) for name in one)
+    rows = [[row["loss"] for row in history(folder)] for folder in (whole, broken)]
+    assert rows[0] == rows[1]
+
+
+def test_another_training_does_not_take_the_folder(smoke, cache, learned, tmp_path):
+    other = recipe(train={"epochs": 3})
+    with pytest.raises(UsageError, match=r"another recipe: its fingerprint is [0-9a-f]{16}, and that of this one is"):
+        train(smoke, other, out=learned.policy.parent, cache=cache, device="cpu", workers=1)
+
+
+@pytest.fixture
+def changed(learned, tmp_path):
+    """The learned weights, with something else said of them."""
+
+    def make(**said):
+        tensors, about, state = checkpoints.read(learned.policy)
+        path = tmp_path / "changed.safetensors"
+        checkpoints.write(path, tensors, type(about)(**{**vars(about), **said}), state)
+        return path
+
+    return make
+
+
+def test_weights_of_another_action_set_or_release_are_refused_with_both_fingerprints(smoke, changed, tmp_path):
+    def fly(path, **options):
+        chosen = Selection(("id_train",), limit=1)
+        evaluation = Evaluation("refused", POLICY, {"weights": str(path), **options}, chosen)
+        return evaluate(smoke, evaluation, out=tmp_path / "log", workers=1)
+
+    with pytest.raises(UsageError, match=r"another action set: its fingerprint is f{16}, and .* [0-9a-f]{16}"):
+        fly(changed(actions="f" * 64))
+    with pytest.raises(UsageError, match=r"another release: its fingerprint is e{16}, and .* [0-9a-f]{16};"):
+        fly(changed(release="e" * 64))
+    assert fly(changed(release="e" * 64), any_release=True).finished == 1
+
+
+def test_what_is_no_policy_is_said_in_a_line(tmp_path, learned):
+    with pytest.raises(UsageError, match="there are no weights"):
+        checkpoints.read(tmp_path / "none.safetensors")
+    cut = tmp_path / "cut.safetensors"
+    cut.write_bytes(learned.policy.read_bytes()[:-1000])
+    with pytest.raises(StoreError, match="holds no policy"):
+        checkpoints.read(cut)
+    cut.write_text("{}")
+    with pytest.raises(StoreError, match="holds no policy"):
+        checkpoints.read(cut)
+    file = tmp_path / "wrong.toml"
+    file.write_text("[train]\nepoch = 3\n")
+    with pytest.raises(ConfigError, match="did you mean 'epochs'"):
+        load_recipe(file)
+
+
+def test_the_teachers_labels_are_the_planners_own_plan():
+    """From wherever the body is: the label is the plan's first action, and to follow labels is to arrive."""
+    world = town()
+    planner, teacher = Planner(world), Teacher(world)
+    draw = np.random.default_rng(1)
+    low, high = planner.grid.arrays.lower, planner.grid.arrays.upper
+    free = []
+    while len(free) < 9:
+        p = draw.uniform(low, high)
+        if planner.grid.distance_m(p) > 0.4 and planner.grid.reachable(p):
+            free.append(np.array([*p, draw.uniform(-np.pi, np.pi)]))
+    goal, starts = free[0], free[1:]
+    with teacher.keeping():
+        labels = teacher.labels([goal] * len(starts), starts)
+        for start, label in zip(starts, labels, strict=True):
+            route = planner.plan_one(goal, start)
+            assert route.outcome == "SOLVED"
+            assert label == agent_actions(route.actions)[0]
+            episode = Episode(FlightSpace(world, 0.25), tuple(start), tuple(goal[:3]), 300)
+            while episode.termination is None:
+                pose = np.array([*episode.position, episode.yaw_rad])
+                (action,) = teacher.labels([goal], [pose])
+                assert action != NO_LABEL
+                episode.step(int(action))
+            assert episode.termination == "stop"
+            assert episode.distance_m <= 1.0 + 1e-6
+            assert episode.path_length_m <= route.length_m * 1.02 + 0.1
+
+
+def test_rounds_of_dagger_add_flights_whose_labels_are_the_teachers(smoke, cache, learned, tmp_path):
+    own = tmp_path / "drawn"
+    again = recipe(train={"epochs": 1}, dagger={"rounds": 1, "episodes": 4, "epochs": 1, "teacher_share": 0.0})
+    done = train(smoke, again, out=tmp_path / "out", cache=own, device="cpu", workers=1)
+    assert (done.policy.parent / "dagger-1.safetensors").is_file()
+    assert [row["phase"] for row in history(done.policy.parent)] == [0, 1]
+    parts = [read_steps(path) for path in sorted(own.iterdir()) if path.is_dir()]
+    # The references are eight, the flights four.
+    flown = sorted(parts, key=len)[: len(parts) // 2]
+    assert 0 < sum(len(part) for part in flown) <= 4
+    for part in flown:
+        assert (part.label < 16).all()
+        assert part.frames.shape[1:] == (1, 32, 32, 4)
+        # What was flown is what was noted as flown before the next step.
+        for k in range(len(part)):
+            steps = slice(part.first[k], part.first[k + 1])
+            assert part.previous[steps][0] == 16
+            assert not part.odometry[steps][0].any()
+            assert (part.previous[steps][1:] != STOP).all()
+
+
+def test_without_torch_there_is_one_line(smoke, tmp_path):
+    """In a process that cannot import it."""
+    (tmp_path / "torch.py").write_text("raise ImportError('no torch here')\n")
+    env = os.environ | {"PYTHONPATH": os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")])}
+    file = tmp_path / "recipe.toml"
+    file.write_text('name = "small"\n')
+    command = [sys.executable, "-m", "aerialdojo_gen.cli", "train", str(file), "--data", str(smoke)]
+    done = subprocess.run(command, capture_output=True, text=True, env=env, check=False)
+    assert done.returncode == UsageError.exit_code
+    assert done.stderr.count("\n") == 1
+    assert "aerialdojo-gen[train]" in done.stderr
