@@ -66,7 +66,7 @@ def choose_landmarks(
         if len(chosen) + len(rest) < n and at_most:
             # A town of a map has no landmark of the catalogue as often as not: its tallest buildings will do.
             named = _Names(vocabulary)
-            rest += [i for i in _prominent(vocabulary, 8 * n) if i not in (*chosen, *rest) and named.of(i)]
+            rest += [i for i in _prominent(vocabulary)[: 8 * n] if i not in (*chosen, *rest) and named.of(i)]
     while len(chosen) < n and rest:
         best = max(rest, key=lambda i: (spread_m(i, chosen), float(i.bounds[1, 2])))
         chosen.append(best)

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerialdojo_gen.errors import AssetError, UsageError
-from aerialdojo_gen.imports.earth import Bbox, LocalFrame, in_words
+from aerialdojo_gen.imports.earth import Bbox, in_words
 
 Floats = NDArray[np.float64]
 # What a survey flies over has far fewer; a continent's model is cut first.
@@ -110,12 +110,6 @@ def read_dem(path: Path) -> Dem:
     if not np.isfinite(dem.heights_m).any():
         raise AssetError(f"{path}: holds no height, every cell is nodata")
     return dem
-
-
-def frame_of(dem: Dem) -> LocalFrame | None:
-    """Where the middle of a geographic grid is; None for any other."""
-    west, south, east, north = dem.extent
-    return LocalFrame((west + east) / 2, (south + north) / 2) if dem.geographic else None
 
 
 def _geotiff(path: Path) -> Dem:

@@ -179,8 +179,8 @@ class Learner:
             left_s = spent / max(done - first, 1) * (total - done)
             sums, number = p.sums, p.epoch
             p.epoch, p.batch, p.sums = p.epoch + 1, 0, [0.0, 0.0, 0.0]
-            n = max(sums[2], 1.0)
-            after(Epoch(p.phase, number, sums[0] / n, sums[1] / n, self.accuracy(pool, frames, kept_back), left_s))
+            seen, held = max(sums[2], 1.0), self.accuracy(pool, frames, kept_back)
+            after(Epoch(p.phase, number, sums[0] / seen, sums[1] / seen, held, left_s))
 
     def accuracy(self, pool: Pool, frames: Any, chosen: NDArray[np.bool_]) -> float | None:
         """Share of steps at which the network does what the teacher does; None without any."""

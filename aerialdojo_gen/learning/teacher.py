@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import AbstractContextManager
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,7 +18,7 @@ from aerialdojo_gen.scenes.model import Scene
 # In the place of an action where the planner finds no way.
 NO_LABEL = N_ACTIONS
 # Goals' cost-to-go that are kept: those of the episodes that are flown side by side.
-_FIELDS_MB = 400.0
+_FIELDS_MB = 400.0, 0.0
 
 
 class Teacher:
@@ -65,9 +66,9 @@ class Teacher:
                     out[k] = agent_actions(route.actions)[0]
         return out
 
-    def keeping(self) -> object:
+    def keeping(self) -> AbstractContextManager[None]:
         """Keep goals' cost-to-go until the block ends."""
-        return self._planner.keeping_fields(_FIELDS_MB)
+        return self._planner.keeping_fields(*_FIELDS_MB)
 
 
 def teacher_of(context: SceneContext, config: PlanConfig, radius_m: float) -> Teacher:

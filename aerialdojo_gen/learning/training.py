@@ -134,7 +134,7 @@ class _Training:
         self._selection = (Selection((d.split,)).splits, d.settings)
         self._index = self._read_index()
         told = (self._index.told[name] for name in ("target_name", "landmark", "direction", "description"))
-        self._vocabulary = Vocabulary.of(goal_text(*said) for said in zip(*told, strict=True))  # type: ignore[arg-type]
+        self._vocabulary = Vocabulary.of(goal_text(*said) for said in zip(*told, strict=True))
         shape = Shape(
             len(self._vocabulary), len(d.views), d.size_px, m.channels, m.features, m.word_features, m.hidden
         )
