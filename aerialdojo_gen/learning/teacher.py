@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import AbstractContextManager
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -65,9 +66,10 @@ class Teacher:
                     out[k] = agent_actions(route.actions)[0]
         return out
 
-    def keeping(self) -> object:
+    def keeping(self) -> AbstractContextManager[None]:
         """Keep goals' cost-to-go until the block ends."""
-        return self._planner.keeping_fields(_FIELDS_MB)
+        fields: AbstractContextManager[None] = self._planner.keeping_fields(_FIELDS_MB)
+        return fields
 
 
 def teacher_of(context: SceneContext, config: PlanConfig, radius_m: float) -> Teacher:
