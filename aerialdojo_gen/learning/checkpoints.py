@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from aerialdojo_gen.agents.goal import Sensors
+from aerialdojo_gen.common.advice import command
 from aerialdojo_gen.common.bounded import loads_json
 from aerialdojo_gen.errors import AerialDojoError, StoreError, UsageError, first_line
 from aerialdojo_gen.learning.loader import torch_package
@@ -89,7 +90,7 @@ def read(path: str | Path) -> tuple[dict[str, Any], About, dict[str, Any]]:
     """
     torch_package()
     if not Path(path).is_file():
-        raise UsageError(f"there are no weights {path}: aerialdojo-gen train writes them")
+        raise UsageError(f"there are no weights {path}: run {command('train', 'pipelines/baselines/imitation.toml')}")
     try:
         with _safetensors()[0].safe_open(str(path), framework="pt") as file:
             told = file.metadata() or {}

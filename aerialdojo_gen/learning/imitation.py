@@ -16,6 +16,7 @@ from aerialdojo_gen.learning.loader import torch_package
 from aerialdojo_gen.learning.network import Network
 from aerialdojo_gen.learning.recipe import Recipe
 from aerialdojo_gen.learning.steps import Pool
+from aerialdojo_gen.pipeline.executors.local import own_cores
 
 # Batches of like lengths are put together from so many: padding costs time.
 _CHUNK = 24
@@ -160,6 +161,8 @@ class Learner:
         tick : callable
             Called after each batch with its number of all, how many there are, its loss and its accuracy.
         """
+        # Sums depend on how many threads share them, and who flew in this process before left it one.
+        self.torch.set_num_threads(own_cores())
         p, seed, most = self.progress, self.recipe.seed, self.recipe.train.batch_steps
         lengths = np.where(kept_back, 0, pool.lengths)
         counts = [len(epoch_batches(lengths, most, seed, p.phase, e)) for e in range(epochs)]
@@ -179,8 +182,9 @@ class Learner:
             left_s = spent / max(done - first, 1) * (total - done)
             sums, number = p.sums, p.epoch
             p.epoch, p.batch, p.sums = p.epoch + 1, 0, [0.0, 0.0, 0.0]
-            seen, held = max(sums[2], 1.0), self.accuracy(pool, frames, kept_back)
-            after(Epoch(p.phase, number, sums[0] / seen, sums[1] / seen, held, left_s))
+            steps = max(sums[2], 1.0)
+            kept = self.accuracy(pool, frames, kept_back)
+            after(Epoch(p.phase, number, sums[0] / steps, sums[1] / steps, kept, left_s))
 
     def accuracy(self, pool: Pool, frames: Any, chosen: NDArray[np.bool_]) -> float | None:
         """Share of steps at which the network does what the teacher does; None without any."""

@@ -63,8 +63,8 @@ def train(
 ) -> Trained:
     """Train a policy; `aerialdojo-gen train` in the library.
 
-    On a CPU the weights depend on the release, the recipe, the renderer and the version of PyTorch alone: also where
-    it was killed and went on.
+    On a CPU the weights depend on the release, the recipe, the renderer, the version of PyTorch and the number of
+    cores alone: also where it was killed and went on.
 
     Parameters
     ----------
@@ -267,6 +267,13 @@ class _Training:
         if path.is_file():
             tensors, _, state = checkpoints.read(path)
             self._learner.restore(tensors, state)
+        # An epoch that was written down and not yet kept is gone through again.
+        p, file = self._learner.progress, self._folder / _HISTORY
+        if file.is_file():
+            rows = [json.loads(line) for line in file.read_text(encoding="utf-8").splitlines()]
+            known = [row for row in rows if (row["phase"], row["epoch"]) < (p.phase, p.epoch)]
+            with atomic_file(self._folder, _HISTORY) as temporary:
+                temporary.write_text("".join(json.dumps(row) + "\n" for row in known), encoding="utf-8")
 
     def _claim(self) -> None:
         """Take the folder for this training; UsageError where it was begun with another."""
