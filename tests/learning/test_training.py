@@ -74,6 +74,7 @@ def the_eight(smoke):
 
 def test_eight_trajectories_are_learned_by_heart_and_flown(smoke, learned, tmp_path):
     assert history(learned.policy.parent)[-1]["accuracy"] > 0.95
+    assert learned.imitation.is_file()
     options = {"weights": str(learned.policy)}
     evaluate(smoke, Evaluation("learned", POLICY, options, Selection(("id_train",))), out=tmp_path, workers=1)
     rows = []
