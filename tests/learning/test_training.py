@@ -38,7 +38,7 @@ SMALL = {
     "name": "small",
     "data": {"split": "id_train", "limit": 8, "size_px": 32, "validation_share": 0.0, "settings": []},
     "model": {"channels": [8, 16, 16, 32], "features": 64, "word_features": 32, "hidden": 128},
-    "train": {"epochs": 60, "batch_steps": 64, "learning_rate": 4e-3, "warmup_batches": 5, "checkpoint_s": 1e-3},
+    "train": {"epochs": 80, "batch_steps": 64, "learning_rate": 4e-3, "warmup_batches": 5, "checkpoint_s": 1e-3},
     "dagger": {"rounds": 0},
 }
 
