@@ -38,7 +38,7 @@ SMALL = {
     "name": "small",
     "data": {"split": "id_train", "limit": 8, "size_px": 32, "validation_share": 0.0, "settings": []},
     "model": {"channels": [8, 16, 16, 32], "features": 64, "word_features": 32, "hidden": 128},
-    "train": {"epochs": 60, "batch_steps": 64, "learning_rate": 4e-3, "warmup_batches": 5, "checkpoint_s": 1e-3},
+    "train": {"epochs": 80, "batch_steps": 64, "learning_rate": 4e-3, "warmup_batches": 5, "checkpoint_s": 1e-3},
     "dagger": {"rounds": 0},
 }
 
@@ -74,6 +74,7 @@ def the_eight(smoke):
 
 def test_eight_trajectories_are_learned_by_heart_and_flown(smoke, learned, tmp_path):
     assert history(learned.policy.parent)[-1]["accuracy"] > 0.95
+    assert learned.imitation.is_file()
     options = {"weights": str(learned.policy)}
     evaluate(smoke, Evaluation("learned", POLICY, options, Selection(("id_train",))), out=tmp_path, workers=1)
     rows = []
