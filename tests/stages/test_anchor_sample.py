@@ -236,6 +236,7 @@ def whole_run(place, objects, data, seed=0, chosen=()):
               for a, v in zip("xyz", row, strict=True)}  # fmt: skip
     place_row = bounds | {
         "scene": name, "family": "Urban", "scene_type": "Test", "partition": "ID", "mesh_path": "scene.glb",
+        "attribution": None,
         "mesh_sha256": hashlib.sha256((data / "scene.glb").read_bytes()).hexdigest(), "ceiling_m": place.ceiling_m,
         "n_triangles": place.n_triangles, "n_instances": len(place.instances), "n_categories": 2,
     }  # fmt: skip

@@ -51,7 +51,8 @@ def things(data: Path, rows, *others):
     low, high = world.bounds.tolist()
     told = {
         "scene": SCENE, "family": "Urban", "scene_type": "Test", "partition": "ID",
-        "mesh_path": f"meshes/{SCENE}.glb", "mesh_sha256": hashlib.sha256(mesh.read_bytes()).hexdigest(),
+        "mesh_path": f"meshes/{SCENE}.glb",
+        "attribution": None, "mesh_sha256": hashlib.sha256(mesh.read_bytes()).hexdigest(),
         "ceiling_m": high[2],
         **{f"{e}_{a}_m": v for e, c in (("min", low), ("max", high)) for a, v in zip("xyz", c, strict=True)},
         "n_triangles": world.n_triangles, "n_instances": len(world.instances), "n_categories": 1,

@@ -51,7 +51,7 @@ def data(tmp_path_factory) -> Path:
     low, high = world.bounds.tolist()
     write(root, "scenes", schemas.SCENES, [
         {"scene": SCENE, "family": "Urban", "scene_type": "Test", "partition": "ID",
-         "mesh_path": f"meshes/{SCENE}.glb", "mesh_sha256": digest, "ceiling_m": high[2],
+         "mesh_path": f"meshes/{SCENE}.glb", "attribution": None, "mesh_sha256": digest, "ceiling_m": high[2],
          **{f"{e}_{a}_m": v for e, c in (("min", low), ("max", high)) for a, v in zip("xyz", c, strict=True)},
          "n_triangles": world.n_triangles, "n_instances": len(world.instances), "n_categories": 2}])  # fmt: skip
     write(root, "objects", schemas.OBJECTS, [

@@ -94,6 +94,7 @@ def data(tmp_path_factory):
     digest = hashlib.sha256((data / "x.glb").read_bytes()).hexdigest()
     scene = {
         "scene": SCENE, "family": "Urban", "scene_type": "Test", "partition": "ID", "mesh_path": "x.glb",
+        "attribution": None,
         "mesh_sha256": digest, "min_x_m": 0.0, "min_y_m": 0.0, "min_z_m": 0.0, "max_x_m": 50.0, "max_y_m": 50.0,
         "max_z_m": 20.0, "ceiling_m": 20.0, "n_triangles": 12, "n_instances": 7, "n_categories": 2,
     }  # fmt: skip

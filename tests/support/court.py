@@ -56,7 +56,8 @@ def write_inputs(data, bad=BAD):
         "scenes": [
             {
                 "scene": SCENE, "family": "Urban", "scene_type": "Court", "partition": "ID",
-                "mesh_path": f"meshes/{SCENE}.glb", "mesh_sha256": hashlib.sha256(mesh.read_bytes()).hexdigest(),
+                "mesh_path": f"meshes/{SCENE}.glb",
+                "attribution": None, "mesh_sha256": hashlib.sha256(mesh.read_bytes()).hexdigest(),
                 **{f"{e}_{a}_m": v for e, p in (("min", low), ("max", high)) for a, v in zip("xyz", p, strict=True)},
                 "ceiling_m": high[2], "n_triangles": scene.n_triangles, "n_instances": len(scene.instances),
                 "n_categories": 1,
