@@ -10,6 +10,7 @@ PyBullet's own EGL plugin is not among them: its 16-bit depth buffer does not pa
 from __future__ import annotations
 
 import contextlib
+import threading
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -33,6 +34,7 @@ from aerialdojo_gen.scenes.model import Scene
 Floats = NDArray[np.float64]
 
 _TOLERANCE_M, _SHARE, _EDGE_SHARE = 0.01, 0.999, 0.1
+_here = threading.local()
 
 
 class Renderer(Protocol):
@@ -212,7 +214,10 @@ def kept_renderer(scene: Scene, name: str, anew: bool = False) -> Renderer:
     context = context_of(scene)
     if anew:
         context.drop("renderer")
-    return context.part("renderer", lambda: open_renderer(scene, name), name)
+    # What draws by OpenGL draws in the thread that made it alone.
+    if not hasattr(_here, "thread"):
+        _here.thread = object()
+    return context.part("renderer", lambda: open_renderer(scene, name), name, _here.thread)
 
 
 def forget_renderers() -> None:

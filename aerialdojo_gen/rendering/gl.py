@@ -5,9 +5,9 @@ from __future__ import annotations
 import ctypes.util
 import importlib
 import os
+import threading
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import lru_cache
 from types import TracebackType
 from typing import Any
 
@@ -34,9 +34,12 @@ _FORMATS = {
 }  # fmt: skip
 
 
-@lru_cache(maxsize=1)
+# A context belongs to the thread that made it: in another one its calls do nothing, or reach that one's objects.
+_here = threading.local()
+
+
 def context() -> Any:
-    """Return this process's OpenGL context.
+    """Return this thread's OpenGL context.
 
     Returns
     -------
@@ -47,6 +50,8 @@ def context() -> Any:
     RenderError
         moderngl or EGL is missing; the message says what to install.
     """
+    if (known := getattr(_here, "context", None)) is not None:
+        return known
     # No thread of its own: several processes share the cores, and threads would only wait for each other.
     os.environ.setdefault("LP_NUM_THREADS", "0")
     try:
@@ -55,11 +60,12 @@ def context() -> Any:
         # The libraries' development packages, which have the names without a version, need not be there.
         found = {"libegl": ctypes.util.find_library("EGL"), "libgl": ctypes.util.find_library("GL")}
         named = {option: library for option, library in found.items() if library}
-        return moderngl.create_standalone_context(backend="egl", require=430, **named)
+        _here.context = moderngl.create_standalone_context(backend="egl", require=430, **named)
     except ImportError:
         raise RenderError(f"the renderer gl lacks the package moderngl: {_MEND}") from None
     except Exception as error:  # glcontext raises plain Exceptions
         raise RenderError(f"the renderer gl does not start ({error}): {_MEND}") from None
+    return _here.context
 
 
 def device() -> str:
@@ -267,9 +273,11 @@ class GlRenderer:
         return self._targets[key]
 
     def close(self) -> None:
-        """Free the renderer's memory; a second call does nothing."""
+        """Free the renderer's memory; a second call does nothing, nor does one in another thread than made it."""
         while self._owned:
-            self._owned.pop().release()
+            thing = self._owned.pop()
+            if getattr(_here, "context", None) is self._gl:
+                thing.release()
         self._arrays, self._targets, self._bodies = {}, {}, None
 
     def __enter__(self) -> GlRenderer:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import cv2
@@ -16,7 +17,7 @@ from aerialdojo_gen.errors import RenderError
 from aerialdojo_gen.geometry.cameras import Camera, look_at_pose, view_pose
 from aerialdojo_gen.geometry.rays import RayCaster
 from aerialdojo_gen.rendering import backend
-from aerialdojo_gen.rendering.backend import check, choose_renderer, open_renderer
+from aerialdojo_gen.rendering.backend import check, choose_renderer, kept_renderer, open_renderer
 from aerialdojo_gen.rendering.probe import probe_scene
 from aerialdojo_gen.scenes.model import Scene
 from aerialdojo_gen.store.schemas import VIEWS
@@ -249,3 +250,28 @@ def test_auto_takes_the_fast_one():
 def test_an_unknown_renderer_is_named():
     with pytest.raises(RenderError, match="no renderer 'blender': it is one of gl, pybullet, or auto"):
         open_renderer(probe_scene(), "blender")
+
+
+@needs_gl
+def test_every_thread_draws_by_itself(scene, opened):
+    """A thread that is gone, one beside it, and the closing of what another one made harm nobody's pictures."""
+    pose = view_pose((1, 1, 3), 2.0, "front")
+    expected = opened("gl").render(CAMERA, pose).rgb
+
+    def drawn():
+        return kept_renderer(scene, "gl").render(CAMERA, pose).rgb, kept_renderer(scene, "gl")
+
+    pictures, kept = [], []
+    for _ in range(2):
+        with ThreadPoolExecutor(1) as one:
+            rgb, renderer = one.submit(drawn).result()
+            pictures.append(rgb)
+            kept.append(renderer)
+    with ThreadPoolExecutor(2) as both:
+        pictures += [rgb for rgb, _ in both.map(lambda _: drawn(), range(4))]
+    for renderer in kept:
+        renderer.close()
+    pictures.append(drawn()[0])
+    pictures.append(opened("gl").render(CAMERA, pose).rgb)
+    assert kept[0] is not kept[1]
+    assert all(np.array_equal(rgb, expected) for rgb in pictures)
