@@ -30,11 +30,12 @@ PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").g
 
 # What cannot run on the smoke data, by what its text fits; a test named in a reason is one that runs it.
 NOT_RUN = {
-    r"make (dataset|evaluate|gallery|bench|fuzz|torture|test|test-fast|lint|lock|docs|torch)\b.*": "takes minutes to hours",
+    r"make (dataset|evaluate|gallery|bench|fuzz|torture|test|test-fast|lint|lock|docs|torch)\b.*": "takes minutes "
+    "to hours",
     r"make smoke": "is what made the data that all this runs on",
     r"(\S*/)?pip install .*": "installs packages",
-    r"train .*|evaluate --agent aerialdojo_gen.learning.policy:Policy .*|report small .*|tensorboard .*": "needs the extra train: "
-    "tests/learning/test_training.py does",
+    r"train .*|evaluate --agent aerialdojo_gen.learning.policy:Policy .*|report small .*|tensorboard .*": "needs the "
+    "extra train: tests/learning/test_training.py does",
     r"(annotate|view) .*": "serves until Ctrl-C: tests/annotate/test_annotate_tool_browser.py, "
     "tests/view/test_view_page.py",
     r"run my-scenes/.*": "runs in tests/imports/test_own_scene.py",
