@@ -151,7 +151,7 @@ class _Training:
     def run(self, restart: bool) -> Trained:
         recipe, learner, report = self._recipe, self._learner, self._reporter
         if restart:
-            # The weights too: a phase that has some counts as done. The settings last: what is killed here is not begun.
+            # The weights too: a phase that has some counts as done. The settings last, in case of a kill between.
             weights = [self._folder / f"{name}.safetensors" for name in ("imitation", "policy")]
             for path in (*weights, *self._folder.glob("dagger-*.safetensors")):
                 path.unlink(missing_ok=True)
