@@ -8,6 +8,7 @@ import typer
 
 from aerialdojo_gen.commands.common import Data, Quiet
 from aerialdojo_gen.common import advice
+from aerialdojo_gen.errors import brief
 
 app = typer.Typer()
 
@@ -60,5 +61,7 @@ def pull(
     )
     print(moved)
     if moved.left:
-        print(f"left there: {', '.join(moved.left[:5])}{' …' if len(moved.left) > 5 else ''}")
+        # Anybody may have chosen these names: none of them is to talk to the terminal.
+        names = ["".join(c if c.isprintable() else "?" for c in brief(name, 100)) for name in moved.left[:5]]
+        print(f"left there: {', '.join(names)}{' …' if len(moved.left) > 5 else ''}")
     print(f"next: {advice.command('validate', no_meshes=not moved.meshes)}")

@@ -110,7 +110,7 @@ def push_to_hub(
     if meshes:
         files |= {f"meshes/{scene}.glb": _mesh(root, scene) for scene in scenes}
     size = sum(path.stat().st_size for path in files.values())
-    reporter.line(f"push-to-hub: {len(files):,} files, {size / 1e6:,.1f} MB to {hub.endpoint}/datasets/{repo}")
+    reporter.line(f"push-to-hub: {len(files):,} files, {size / 1e6:,.1f} MB to {hub.address}/datasets/{repo}")
     with hub.told("make or write to"):
         if not hub.api.repo_exists(repo, repo_type="dataset"):
             hub.api.create_repo(repo, repo_type="dataset", private=private)
@@ -125,7 +125,7 @@ def push_to_hub(
             revision=revision, num_threads=_AT_ONCE,
         )  # fmt: skip
     return Moved(
-        f"{hub.endpoint}/datasets/{repo}", str(made.oid), len(scenes), len(files), size, sum(map(_is_mesh, files))
+        f"{hub.address}/datasets/{repo}", str(made.oid), len(scenes), len(files), size, sum(map(_is_mesh, files))
     )
 
 
@@ -187,10 +187,15 @@ def pull_release(
     left = tuple(s.rfilename for s in info.siblings if not _is_ours(s.rfilename) and s.rfilename != ".gitattributes")
     scenes = {scene for name in wanted if (scene := scene_of(name)) and not _is_mesh(name)}
     if not scenes:
-        raise UsageError(f"the data set {repo} at {hub.endpoint} holds no release of aerialdojo-gen")
+        raise UsageError(f"the data set {repo} at {hub.address} holds no release of aerialdojo-gen")
     # Laid out as a data directory, so that what is asked of one can be asked of it.
     partial = root.path / f".pull-{repo.replace('/', '--')}"
     make_folder(partial / FOLDER)
+    places = {_place(partial, name) for name in wanted}
+    # What a call for another revision has left is no part of this one.
+    for path in partial.rglob("part-*.parquet"):
+        if path not in places:
+            path.unlink()
     _fetch(hub, commit, list(wanted.values()), partial, reporter)
     size = sum(_place(partial, name).stat().st_size for name in wanted)
     _check(open_root(partial), {name for name in wanted if _is_mesh(name)})

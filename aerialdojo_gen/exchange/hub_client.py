@@ -34,6 +34,8 @@ class Hub:
     repo : str
     endpoint : str
         Address of the server: that of ``HF_ENDPOINT``, else the Hub's own.
+    address : str
+        The same for messages, without what is secret in it.
     token : str or False
         That of ``HF_TOKEN``; one that another program has stored is not looked for.
     api : huggingface_hub.HfApi
@@ -52,11 +54,15 @@ class Hub:
         self.repo = repo
         self.endpoint = os.environ.get(ENDPOINT, "").strip().rstrip("/") or USUAL
         if not re.match(r"https?://[^\s/]", self.endpoint):
-            raise UsageError(f"{ENDPOINT}={brief(self.endpoint, 100)!r} is no address: write https://…")
+            raise UsageError(
+                f"{ENDPOINT}={brief(Secrets().text(self.endpoint), 100)!r} is no address: write https://…"
+            )
+        # As messages say it: an address may have a password in it.
+        self.address = Secrets().text(self.endpoint)
         self.token: str | bool = os.environ.get(TOKEN, "").strip() or False
         if writes and not self.token:
             raise AerialDojoError(
-                f"{verb} needs a token that may write: export {TOKEN}=hf_…, made at {self.endpoint}/settings/tokens"
+                f"{verb} needs a token that may write: export {TOKEN}=hf_…, made at {self.address}/settings/tokens"
             )
         try:
             import huggingface_hub
@@ -102,22 +108,22 @@ class Hub:
 
         who = f"{TOKEN} may not see it" if self.token else f"it is private, and {TOKEN} is not set"
         if isinstance(error, errors.RevisionNotFoundError):
-            return UsageError(f"{self.repo} at {self.endpoint} has no such revision")
+            return UsageError(f"{self.repo} at {self.address} has no such revision")
         if not isinstance(error, errors.HfHubHTTPError):
             return AerialDojoError(
-                f"cannot reach {self.endpoint} ({self._line(error)}): the same command goes on when there is a way"
+                f"cannot reach {self.address} ({self._line(error)}): the same command goes on when there is a way"
             )
         status = error.response.status_code if error.response is not None else 0
         # Without an account the server says of what is private, and of what is not there, 401.
         if status == 404 or (status == 401 and isinstance(error, errors.RepositoryNotFoundError)):
-            return UsageError(f"there is no data set {self.repo} at {self.endpoint}, or {who}")
+            return UsageError(f"there is no data set {self.repo} at {self.address}, or {who}")
         if status == 401:
-            return AerialDojoError(f"{self.endpoint} does not know the token in {TOKEN}: make another")
+            return AerialDojoError(f"{self.address} does not know the token in {TOKEN}: make another")
         if status == 403:
             return AerialDojoError(
-                f"{self.endpoint} refuses to {doing} {self.repo} ({self._line(error)}): {TOKEN} needs that right"
+                f"{self.address} refuses to {doing} {self.repo} ({self._line(error)}): {TOKEN} needs that right"
             )
-        return AerialDojoError(f"{self.endpoint} answers {status}: {self._line(error)}; try again later")
+        return AerialDojoError(f"{self.address} answers {status}: {self._line(error)}; try again later")
 
     def _line(self, error: BaseException) -> str:
         said = getattr(error, "server_message", None)

@@ -23,6 +23,7 @@ from aerialdojo_gen.exchange.samples import Part, Wanted, named_splits, planned
 from aerialdojo_gen.pipeline.code_digest import code_of
 from aerialdojo_gen.pipeline.executors import make_executor
 from aerialdojo_gen.pipeline.progress import Reporter, duration
+from aerialdojo_gen.release.contents import part_name
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.files import size_of
 from aerialdojo_gen.store.root import DataRoot, Where, open_root
@@ -260,7 +261,7 @@ def _write(job: _Job) -> int:
 def _request(format_name: str, root: DataRoot, wanted: Wanted, parts: list[Part]) -> dict[str, Any]:
     """Collect what decides every byte: parts of another request are not gone on with."""
     scenes = sorted({part.scene for part in parts})
-    read = wanted.source != "render"
+    read, shown = wanted.source != "render", "image" in wanted.goal
     return {
         "format": format_name,
         "version": __version__,
@@ -268,6 +269,7 @@ def _request(format_name: str, root: DataRoot, wanted: Wanted, parts: list[Part]
         "wanted": _plain(dataclasses.asdict(wanted)),
         "trajectories": [part.index.digest for part in parts],
         "meshes": {} if wanted.source == "recordings" else {name: mesh_of(root, name)[1] for name in scenes},
+        "goals": {name: root.digest(part_name("release/objects", name)) for name in scenes} if shown else {},
         "recordings": {name: _recordings(root, name) for name in scenes} if read else {},
     }
 

@@ -17,6 +17,7 @@ from aerialdojo_gen.imports.listing import contents
 from aerialdojo_gen.imports.naming import read_names
 from aerialdojo_gen.imports.pictures import TEXTURE_PX
 from aerialdojo_gen.imports.tiles import tile_name, tiles_of
+from aerialdojo_gen.imports.toml_text import toml_value
 from aerialdojo_gen.pipeline.registry import STAGES
 from aerialdojo_gen.scenes.glb import write_glb
 from aerialdojo_gen.scenes.model import Scene
@@ -265,7 +266,7 @@ def _recipe(
     lines = [
         "# Made by add-scene; the mesh lies beside this file, repaired, in metres.",
         "[imported]",
-        f"source = {json.dumps(source[0])}",
+        f"source = {toml_value(source[0])}",
         f'source_sha256 = "{source[1]}"',
         f'up = "{up}"',
         f"scale = {scale}",

@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import math
 import zipfile
+import zlib
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,6 +20,7 @@ Floats = NDArray[np.float64]
 # What a survey flies over has far fewer; a continent's model is cut first.
 _MOST_CELLS = 100_000_000
 _MOST_TEXT_BYTES = 512 << 20
+_HIGHEST_M = 1e5
 _BEYOND = 1e-6
 _DEGREES = 1.0
 _ASC_KEYS = ("ncols", "nrows", "xllcorner", "yllcorner", "xllcenter", "yllcenter", "cellsize", "nodata_value")
@@ -121,7 +123,8 @@ def _geotiff(path: Path) -> Dem:
             "GeoTIFFs are read by rasterio, which is not installed: pip install 'aerialdojo-gen[maps]'"
         ) from None
     try:
-        with rasterio.open(path) as file:
+        # By its own driver alone: others follow what a file says to other files, and to the net.
+        with rasterio.open(path, driver="GTiff") as file:
             if file.width * file.height > _MOST_CELLS:
                 raise AssetError(
                     f"{path} has {file.width:,} x {file.height:,} heights, {_MOST_CELLS:,} are the most: "
@@ -148,7 +151,7 @@ def _geotiff(path: Path) -> Dem:
         x, y = warp.transform("EPSG:4326", crs, np.ravel(lon).tolist(), np.ravel(lat).tolist())
         return np.reshape(x, shape), np.reshape(y, shape)
 
-    z[~(np.abs(z) < 1e5)] = np.nan
+    z[~(np.abs(z) < _HIGHEST_M)] = np.nan
     # A GeoTIFF's heights are those of the middles of its cells.
     return Dem(path, z, t.c + t.a / 2, t.f + t.e / 2, t.a, -t.e, bool(crs.is_geographic), to_grid)
 
@@ -167,8 +170,11 @@ def _ascii(path: Path) -> Dem:
                     break
                 head[words[0].lower()] = float(words[1])
             columns, rows, cell = int(head["ncols"]), int(head["nrows"]), head["cellsize"]
-            numbers = np.fromstring(file.read(), dtype=np.float64, sep=" ") if columns * rows <= _MOST_CELLS else None
-    except (KeyError, ValueError, UnicodeDecodeError) as error:
+            if min(columns, rows) < 1:
+                raise ValueError(f"{columns} columns, {rows} rows")
+            fits = columns * rows <= _MOST_CELLS
+            numbers = np.fromstring(file.read(), dtype=np.float64, sep=" ") if fits else None
+    except (KeyError, ValueError, OverflowError, UnicodeDecodeError) as error:
         raise AssetError(
             f"{path} is no ESRI ASCII grid (ncols, nrows, xllcorner, yllcorner, cellsize): {_line(error)}"
         ) from None
@@ -176,7 +182,7 @@ def _ascii(path: Path) -> Dem:
         found = "too many" if numbers is None else f"{numbers.size:,}"
         raise AssetError(f"{path} says {columns:,} by {rows:,} heights and has {found}: is it cut short?")
     z = numbers.reshape(rows, columns)
-    z[z == head.get("nodata_value", -9999.0)] = np.nan
+    z[(z == head.get("nodata_value", -9999.0)) | ~(np.abs(z) < _HIGHEST_M)] = np.nan
     half = 0.0 if "xllcenter" in head else cell / 2
     west = head.get("xllcenter", head.get("xllcorner", 0.0)) + half
     south = head.get("yllcenter", head.get("yllcorner", 0.0)) + half
@@ -187,11 +193,14 @@ def _ascii(path: Path) -> Dem:
 
 def _npz(path: Path) -> Dem:
     try:
+        _look_over_npz(path)
         with np.load(path, allow_pickle=False) as file:
             z = np.array(file["heights_m"], dtype=np.float64)
             cell = float(file["cell_m"]) if "cell_m" in file else None
             bbox = [float(v) for v in file["bbox_deg"]] if "bbox_deg" in file else None
-    except (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile) as error:
+    except (
+        OSError, ValueError, KeyError, TypeError, EOFError, RuntimeError, zlib.error, zipfile.BadZipFile,
+    ) as error:  # fmt: skip
         raise AssetError(
             f"{path} cannot be read: {_line(error)}; it must hold heights_m with cell_m or bbox_deg"
         ) from None
@@ -199,7 +208,7 @@ def _npz(path: Path) -> Dem:
         raise AssetError(
             f"{path} must hold heights_m, 2 by 2 or more, with cell_m (metres) or bbox_deg (west, south, east, north)"
         )
-    z[~(np.abs(z) < 1e5)] = np.nan
+    z[~(np.abs(z) < _HIGHEST_M)] = np.nan
     rows, columns = z.shape
     if bbox is not None:
         if len(bbox) != 4 or not (bbox[0] < bbox[2] and bbox[1] < bbox[3]):
@@ -209,6 +218,22 @@ def _npz(path: Path) -> Dem:
     if cell is None or not (math.isfinite(cell) and cell > 0):
         raise AssetError(f"{path}: cell_m must be a number above 0")
     return Dem(path, z, 0.0, (rows - 1) * cell, cell, cell, None, None)
+
+
+def _look_over_npz(path: Path) -> None:
+    """Refuse an NPZ whose arrays are larger than any height model: some kilobytes may ask for terabytes."""
+    with zipfile.ZipFile(path) as archive:
+        for name in ("heights_m.npy", "cell_m.npy", "bbox_deg.npy"):
+            if name not in archive.namelist():
+                continue
+            with archive.open(name) as file:
+                version = np.lib.format.read_magic(file)
+                read = (
+                    np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
+                )
+                shape, _, dtype = read(file)
+            if math.prod(shape) * dtype.itemsize > 8 * _MOST_CELLS:
+                raise ValueError(f"{name} has {math.prod(shape):,} numbers, {_MOST_CELLS:,} are the most")
 
 
 def _same(lon: Floats, lat: Floats) -> tuple[Floats, Floats]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import struct
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -11,6 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from aerialdojo_gen.common.image_size import image_size
 from aerialdojo_gen.imports.raw import GREY, RawSurface
 
 # Of one texture, pixels a side; of all textures of a file together, pixels.
@@ -148,46 +148,6 @@ def _decoded(file: bytes) -> tuple[NDArray[Any] | None, str]:
     if image.ndim == 3:
         image = cv2.cvtColor(image, cv2.COLOR_BGRA2RGBA if image.shape[2] == 4 else cv2.COLOR_BGR2RGB)
     return np.ascontiguousarray(image), ""
-
-
-def image_size(file: bytes) -> tuple[int, int] | None:
-    """Read an image's width and height, pixels, without decoding it; None where it is of no kind that is read."""
-    if file[:8] == b"\x89PNG\r\n\x1a\n" and len(file) >= 24:
-        width, height = struct.unpack(">II", file[16:24])
-        return int(width), int(height)
-    if file[:3] == b"\xff\xd8\xff":
-        return _jpeg_size(file)
-    if file[:2] == b"BM" and len(file) >= 26:
-        width, height = struct.unpack("<ii", file[18:26])
-        return abs(width), abs(height)
-    if file[:4] == b"RIFF" and file[8:12] == b"WEBP" and len(file) >= 30:
-        return _webp_size(file)
-    return None
-
-
-def _webp_size(file: bytes) -> tuple[int, int] | None:
-    kind = file[12:16]
-    if kind == b"VP8X":
-        return 1 + int.from_bytes(file[24:27], "little"), 1 + int.from_bytes(file[27:30], "little")
-    if kind == b"VP8L":
-        bits = int.from_bytes(file[21:25], "little")
-        return 1 + (bits & 0x3FFF), 1 + (bits >> 14 & 0x3FFF)
-    width, height = struct.unpack("<HH", file[26:30])
-    return width & 0x3FFF, height & 0x3FFF
-
-
-def _jpeg_size(file: bytes) -> tuple[int, int] | None:
-    at = 2
-    while at + 9 < len(file) and file[at] == 0xFF:
-        kind = file[at + 1]
-        if kind == 0xFF:
-            at += 1
-            continue
-        if 0xC0 <= kind <= 0xCF and kind not in (0xC4, 0xC8, 0xCC):
-            height, width = struct.unpack(">HH", file[at + 5 : at + 9])
-            return int(width), int(height)
-        at += 2 if 0xD0 <= kind <= 0xD9 else 2 + struct.unpack(">H", file[at + 2 : at + 4])[0]
-    return None
 
 
 def _channels(image: NDArray[np.uint8]) -> tuple[NDArray[np.uint8], NDArray[np.uint8] | None]:

@@ -19,16 +19,17 @@ def recipe_text(head: Mapping[str, Any], parameters: Mapping[str, Any], comments
     comments : tuple of str
         Lines to begin with.
     """
-    lines = [f"# {line}" for line in comments]
-    lines += [f"{key} = {_value(value)}" for key, value in head.items()]
+    # A file's name may have any character in it, a new line too.
+    lines = ["# " + "".join(c if c.isprintable() else "?" for c in line) for line in comments]
+    lines += [f"{key} = {toml_value(value)}" for key, value in head.items()]
     plain = {k: v for k, v in parameters.items() if not _tables(v) and not isinstance(v, Mapping)}
-    lines += ["", "[parameters]", *(f"{key} = {_value(value)}" for key, value in plain.items())]
+    lines += ["", "[parameters]", *(f"{key} = {toml_value(value)}" for key, value in plain.items())]
     for key, value in parameters.items():
         if isinstance(value, Mapping):
-            lines += ["", f"[parameters.{key}]", *(f"{k} = {_value(v)}" for k, v in value.items())]
+            lines += ["", f"[parameters.{key}]", *(f"{k} = {toml_value(v)}" for k, v in value.items())]
         elif _tables(value):
             for table in value:
-                lines += ["", f"[[parameters.{key}]]", *(f"{k} = {_value(v)}" for k, v in table.items())]
+                lines += ["", f"[[parameters.{key}]]", *(f"{k} = {toml_value(v)}" for k, v in table.items())]
     return "\n".join(lines) + "\n"
 
 
@@ -36,17 +37,18 @@ def _tables(value: Any) -> bool:
     return isinstance(value, list) and bool(value) and isinstance(value[0], Mapping)
 
 
-def _value(value: Any) -> str:
+def toml_value(value: Any) -> str:
+    """Write a value: a number, a text, a truth value, a list or an inline table."""
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, Mapping):
-        return "{ " + ", ".join(f"{k} = {_value(v)}" for k, v in value.items()) + " }"
+        return "{ " + ", ".join(f"{k} = {toml_value(v)}" for k, v in value.items()) + " }"
     if isinstance(value, list | tuple):
         if value and isinstance(value[0], list | tuple) and len(value[0]) > 8:
-            return "[\n" + ",\n".join("  " + _value(row) for row in value) + ",\n]"
+            return "[\n" + ",\n".join("  " + toml_value(row) for row in value) + ",\n]"
         if value and isinstance(value[0], Mapping):
-            return "[\n" + ",\n".join("  " + _value(row) for row in value) + ",\n]"
-        return "[" + ", ".join(_value(v) for v in value) + "]"
+            return "[\n" + ",\n".join("  " + toml_value(row) for row in value) + ",\n]"
+        return "[" + ", ".join(toml_value(v) for v in value) + "]"
     if isinstance(value, float):
         return f"{value:.10g}" if value % 1 else f"{value:.1f}"
     if isinstance(value, str):

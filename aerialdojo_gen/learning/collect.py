@@ -26,6 +26,7 @@ from aerialdojo_gen.pipeline.code_digest import code_of
 from aerialdojo_gen.pipeline.executors import Executor
 from aerialdojo_gen.pipeline.executors.link import Link
 from aerialdojo_gen.pipeline.progress import Reporter
+from aerialdojo_gen.release.contents import part_name
 from aerialdojo_gen.rendering.bodies import draw_bodies
 from aerialdojo_gen.scenes.context import SEVERAL, open_scene
 from aerialdojo_gen.store import shards as store
@@ -128,17 +129,19 @@ def parts_of(
     code = [
         code_of(f"aerialdojo_gen.{name}").digest for name in ("rendering.gl", "learning.collect", "learning.flights")
     ]
-    facts = [sensors.views, sensors.width, sensors.height, sensors.max_depth_m, size_px, vocabulary.words,
-             vocabulary.length, renderer, code, None if flying is None else
+    facts = [sensors.views, sensors.width, sensors.height, sensors.fov_deg, sensors.max_depth_m, size_px,
+             vocabulary.words, vocabulary.length, renderer, code, None if flying is None else
              [flying.sha256, flying.seed, flying.round, flying.teacher_share]]  # fmt: skip
     parts = []
     for number, scene in enumerate(index.scenes):
         rows = np.flatnonzero(index.scene == number)
+        # The goals' pictures are drawn by a stage of their own: the same trajectories may have others.
+        shown = data.digest(part_name("release/objects", scene))
         # Those to one goal together: its cost-to-go is made once.
         rows = rows[np.lexsort((rows, *index.goal[rows].T))]
         for own in np.array_split(rows, -(-len(rows) // _PART)):
             piece = index.take(own)
-            text = json.dumps([facts, piece.digest, mesh_of(data, scene)[1]], sort_keys=True)
+            text = json.dumps([facts, piece.digest, mesh_of(data, scene)[1], shown], sort_keys=True)
             name = f"{scene}-{hashlib.sha256(text.encode()).hexdigest()[:16]}"
             parts.append(Part(
                 data, *selection, scene, tuple(piece.nav_id), sensors, size_px, vocabulary.words, vocabulary.length,

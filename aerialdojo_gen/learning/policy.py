@@ -118,8 +118,11 @@ def network_of(about: checkpoints.About, tensors: dict[str, Any], where: str) ->
 
     try:
         shape = Shape(**{**about.shape, "channels": tuple(about.shape["channels"])})
-        network = Network(shape)
-        network.load_state_dict({name.removeprefix("network."): t for name, t in tensors.items()})
+        # Of no memory until the file's own tensors are in it: a shape may say anything.
+        with torch_package().device("meta"):
+            network = Network(shape)
+        network.load_state_dict({name.removeprefix("network."): t for name, t in tensors.items()}, assign=True)
+        network.float()
     except (RuntimeError, TypeError, ValueError, KeyError) as error:
         raise StoreError(f"{where} holds no policy of this version: {first_line(error)}") from None
     return network

@@ -88,7 +88,7 @@ def read_steps(folder: Path) -> Steps:
     """
     try:
         with np.load(folder / _STEPS, allow_pickle=False) as file:
-            rest = {name: file[name] for name in file.files}
+            rest = {field.name: file[field.name] for field in fields(Steps) if field.name != "frames"}
         with (folder / _FRAMES).open("rb") as file:
             np.lib.format.read_magic(file)
             shape, _, _ = np.lib.format.read_array_header_1_0(file)

@@ -6,7 +6,7 @@ import hashlib
 import importlib
 import json
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 from aerialdojo_gen.agents.goal import Sensors
 from aerialdojo_gen.benchmark.tasks import Selection
 from aerialdojo_gen.common import rng
-from aerialdojo_gen.common.bounded import read_json
+from aerialdojo_gen.common.bounded import loads_json, read_json
 from aerialdojo_gen.common.names import unknown
-from aerialdojo_gen.errors import UsageError
+from aerialdojo_gen.errors import Malformed, UsageError
 from aerialdojo_gen.learning import checkpoints
 from aerialdojo_gen.learning.collect import Flying, collect, parts_of
 from aerialdojo_gen.learning.index import Index, read_index
@@ -151,7 +151,11 @@ class _Training:
     def run(self, restart: bool) -> Trained:
         recipe, learner, report = self._recipe, self._learner, self._reporter
         if restart:
-            for name in (_SETTINGS, _CHECKPOINT, _HISTORY):
+            # The weights too: a phase that has some counts as done. The settings last, in case of a kill between.
+            weights = [self._folder / f"{name}.safetensors" for name in ("imitation", "policy")]
+            for path in (*weights, *self._folder.glob("dagger-*.safetensors")):
+                path.unlink(missing_ok=True)
+            for name in (_CHECKPOINT, _HISTORY, _SETTINGS):
                 (self._folder / name).unlink(missing_ok=True)
         self._claim()
         self._resume()
@@ -270,8 +274,7 @@ class _Training:
         # An epoch that was written down and not yet kept is gone through again.
         p, file = self._learner.progress, self._folder / _HISTORY
         if file.is_file():
-            rows = [json.loads(line) for line in file.read_text(encoding="utf-8").splitlines()]
-            known = [row for row in rows if (row["phase"], row["epoch"]) < (p.phase, p.epoch)]
+            known = [row for row in _rows(file) if (row["phase"], row["epoch"]) < (p.phase, p.epoch)]
             with atomic_file(self._folder, _HISTORY) as temporary:
                 temporary.write_text("".join(json.dumps(row) + "\n" for row in known), encoding="utf-8")
 
@@ -294,6 +297,15 @@ class _Training:
                     )
         with atomic_file(self._folder, _SETTINGS) as temporary:
             temporary.write_text(json.dumps(own, indent=2) + "\n", encoding="utf-8")
+
+
+def _rows(file: Path) -> Iterator[dict[str, Any]]:
+    """Read a history as far as it was written: the last line may be cut short."""
+    for line in file.read_text(encoding="utf-8", errors="replace").splitlines():
+        try:
+            yield loads_json(line)
+        except Malformed:
+            return
 
 
 def _board(folder: Path) -> Any:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import struct
 from collections.abc import Callable
 from functools import lru_cache
 from typing import Any
@@ -10,7 +9,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from aerialdojo_gen.common.pictures import TEXTURE_PNG, decode_masked, decode_rgb, encode_masked, encode_png
+from aerialdojo_gen.common.image_size import image_size
+from aerialdojo_gen.common.pictures import (
+    TEXTURE_PNG,
+    decode_as_stored,
+    decode_masked,
+    decode_rgb,
+    encode_masked,
+    encode_png,
+)
 from aerialdojo_gen.scenes.model import Material
 
 UNLIT = "KHR_materials_unlit"
@@ -64,7 +71,7 @@ def read_material(entry: dict[str, Any], image: Callable[[int], memoryview]) -> 
 
     Raises
     ------
-    ValueError, KeyError, TypeError, struct.error
+    ValueError, KeyError, TypeError
         It is damaged, or its texture is too large.
     """
     texture, mask, jpeg = None, None, b""
@@ -73,16 +80,19 @@ def read_material(entry: dict[str, Any], image: Callable[[int], memoryview]) -> 
     source = entry["pbrMetallicRoughness"].get("baseColorTexture")
     if source is not None:
         file = image(source["index"])
-        if atlas and bytes(file[:2]) == b"\xff\xd8":
-            jpeg = bytes(file)
-        elif max(struct.unpack_from(">II", file, 16)) > (_LARGEST_TEXTURE_PX if atlas else 4096):
-            # A kilobyte of PNG can ask for a gigabyte of pixels.
+        # A kilobyte can ask for a gigabyte of pixels, and whatever is a picture would be decoded.
+        stored_as_jpeg, size = file[:3] == b"\xff\xd8\xff", image_size(file)
+        if not (stored_as_jpeg or file[:8] == b"\x89PNG\r\n\x1a\n") or size is None:
+            raise ValueError("texture is neither PNG nor JPEG")
+        if max(size) > (_LARGEST_TEXTURE_PX if atlas else 4096):
             raise ValueError("texture is too large")
         if entry.get("alphaMode") == "MASK":
             texture, mask = decode_masked(file)
         else:
-            texture = decode_rgb(file)
-        if texture is None or max(texture.shape[:2]) > _LARGEST_TEXTURE_PX:
+            # As it is stored: cameras write how they were held, which is no matter of texture coordinates.
+            texture = decode_as_stored(file) if stored_as_jpeg else decode_rgb(file)
+        jpeg = bytes(file) if atlas and stored_as_jpeg else b""
+        if texture is None or texture.ndim != 3 or max(texture.shape[:2]) > _LARGEST_TEXTURE_PX:
             raise ValueError("texture cannot be decoded")
     red, green, blue = extras["colour"]
     return Material(

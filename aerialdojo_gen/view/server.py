@@ -62,6 +62,8 @@ def view_app(data: Where, scenes: str | Sequence[str] | None = None) -> FastAPI:
         order: str = "nav_id", descending: bool = False, offset: Annotated[int, Query(ge=0, le=10**7)] = 0,
         most: Annotated[int, Query(ge=0, le=_MOST_TASKS)] = 48,
     ) -> dict[str, Any]:  # fmt: skip
+        for name in scene or ():
+            shown.require(name)
         wanted = [name for name in names if not scene or name in scene]
         return tasks.find(wanted, setting=setting, split=split, words=words[:200], order=order, descending=descending,
                           offset=offset, most=most)  # fmt: skip

@@ -113,6 +113,27 @@ def test_both_go_on_where_they_were_cut_off(smoke, hub, call, tmp_path):
     assert files_of(tmp_path / "release") == files_of(smoke / "release")
 
 
+def test_what_another_revision_left_half_fetched_is_no_part_of_this_one(smoke, hub, call, tmp_path):
+    assert call("push-to-hub", NAME, "--data", smoke)[0] == 0
+    left = tmp_path / f".pull-{NAME.replace('/', '--')}" / "release" / "objects" / "part-U_Gone_0.parquet"
+    left.parent.mkdir(parents=True)
+    left.write_bytes(b"of a scene that this revision does not have")
+    assert call("pull", NAME, "--data", tmp_path)[0] == 0
+    assert files_of(tmp_path / "release") == files_of(smoke / "release")
+
+
+def test_neither_a_strangers_names_nor_a_password_reach_the_terminal(smoke, hub, call, tmp_path, monkeypatch):
+    assert call("push-to-hub", NAME, "--data", smoke)[0] == 0
+    hub.repos[NAME].files["\x1b]0;owned\x07\nnext: rm -rf"] = b"x"
+    code, said, _ = call("pull", NAME, "--data", tmp_path)
+    assert code == 0
+    assert "left there: ?]0;owned??next: rm -rf\n" in said
+    monkeypatch.setenv("HF_ENDPOINT", hub.url.replace("://", "://me:hunter2@") + "9")
+    answer = call("pull", NAME, "--data", tmp_path / "new")
+    assert has_failed(answer, 1, "cannot reach") is True
+    assert "hunter2" not in "".join(answer[1:])
+
+
 def test_scenes_that_the_release_has_no_more_are_taken_away_and_strangers_files_stay(smoke, hub, call, tmp_path):
     hub.repos[NAME] = Repo(files={"tasks/id_train/part-U_Gone_0.parquet": b"x", "notes.txt": b"mine"})
     assert call("push-to-hub", NAME, "--data", smoke)[0] == 0

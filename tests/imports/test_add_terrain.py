@@ -1,6 +1,8 @@
 """add-terrain: heights as the model has them, by another interpolation, and one line for each fault of a file."""
 
+import shutil
 import sys
+import zipfile
 
 import numpy as np
 import pytest
@@ -181,6 +183,59 @@ def test_a_file_cut_short_is_one_line(tmp_path):
     (tmp_path / "cut.npz").write_bytes((tmp_path / "cut.npz").read_bytes()[:80])
     with pytest.raises(AssetError, match=r"cut\.npz cannot be read"):
         read_dem(tmp_path / "cut.npz")
+
+
+def test_a_geotiff_is_no_way_to_other_files(tmp_path):
+    """GDAL reads by content: a text of the name of a GeoTIFF may name any file of the machine, or an address."""
+    whole = tif(tmp_path)
+    (tmp_path / "in").mkdir()
+    (tmp_path / "in" / "vrt.tif").write_text(
+        '<VRTDataset rasterXSize="61" rasterYSize="61"><SRS>EPSG:4326</SRS>'
+        "<GeoTransform>24.9, 1e-5, 0, 60.2, 0, -1e-5</GeoTransform>"
+        '<VRTRasterBand dataType="Float64" band="1"><SimpleSource>'
+        f"<SourceFilename>{whole}</SourceFilename><SourceBand>1</SourceBand>"
+        "</SimpleSource></VRTRasterBand></VRTDataset>"
+    )
+    with pytest.raises(AssetError, match="cannot be read as a GeoTIFF"):
+        read_dem(tmp_path / "in" / "vrt.tif")
+
+
+def test_arrays_far_larger_than_their_file_are_refused_before_they_are_made(tmp_path):
+    path = tmp_path / "bomb.npz"
+    for name in ("heights_m.npy", "bbox_deg.npy"):
+        with zipfile.ZipFile(path, "w") as archive:
+            for key, shape in (("heights_m.npy", (4, 4)), ("cell_m.npy", ()), ("bbox_deg.npy", (4,))):
+                with archive.open(key, "w") as file:
+                    told = {"descr": "<f8", "fortran_order": False, "shape": (1 << 22,) * 2 if key == name else shape}
+                    np.lib.format.write_array_header_1_0(file, told)
+                    file.write(bytes(8 * max(1, int(np.prod(shape)))))
+        with pytest.raises(AssetError, match=rf"{name} has 17,592,186,044,416 numbers"):
+            read_dem(path)
+
+
+@pytest.mark.parametrize(
+    ("head", "numbers"),
+    [
+        ("ncols inf\nnrows 4\n", "1 2 3 4"),
+        ("ncols -2\nnrows -2\n", "1 2 3 4"),
+        ("ncols 2\nnrows 2\n", "1 inf 1e300 nan"),
+    ],
+)
+def test_numbers_that_are_none_are_one_line_or_no_height(head, numbers, tmp_path):
+    path = tmp_path / "x.asc"
+    path.write_text(f"{head}xllcorner 0\nyllcorner 0\ncellsize 1\n{numbers}\n")
+    if numbers.endswith("nan"):
+        assert np.nanmax(read_dem(path).heights_m) == 1.0
+        return
+    with pytest.raises(AssetError, match="is no ESRI ASCII grid"):
+        read_dem(path)
+
+
+def test_a_files_name_cannot_write_into_the_recipe(hill, tmp_path):
+    odd = tmp_path / "hill\nlayout = 'yard'\n.npz"
+    shutil.copy(hill, odd)
+    place = add_terrain("Odd", odd, tmp_path / "mine", bare=True)
+    assert place.recipe.read_text().startswith("# Made by add-terrain of hill?layout = 'yard'?.npz: ")
 
 
 def test_without_rasterio_it_says_what_to_install(tmp_path, monkeypatch):

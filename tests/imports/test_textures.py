@@ -5,17 +5,19 @@ from __future__ import annotations
 import hashlib
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 import trimesh
 from support import textured
 
 from aerialdojo_gen.annotations.colours import colour_shares, uncoloured
+from aerialdojo_gen.common.image_size import image_size
 from aerialdojo_gen.errors import AssetError
 from aerialdojo_gen.geometry.cameras import Camera, look_at_pose
 from aerialdojo_gen.imports.adopt import adopt
 from aerialdojo_gen.imports.files import read_into, read_mesh, unpacked
-from aerialdojo_gen.imports.pictures import Paint, image_size, surfaces_of
+from aerialdojo_gen.imports.pictures import Paint, surfaces_of
 from aerialdojo_gen.imports.raw import RawNode
 from aerialdojo_gen.rendering.checks import Solid
 from aerialdojo_gen.rendering.gl import GlRenderer
@@ -198,6 +200,46 @@ def test_a_scan_keeps_its_jpeg_and_is_drawn_as_it_is(tmp_path):
     assert sum(len(p.faces) for i in scene.instances for p in i.parts if p.material == material.name) == 2 * 40**2
     assert (tmp_path / "scan.jpg").read_bytes() in (stored(scene, tmp_path / "s.glb") and
                                                      (tmp_path / "s.glb").read_bytes())  # fmt: skip
+
+
+def test_a_scans_jpeg_is_taken_as_it_is_stored_however_the_camera_was_held(tmp_path):
+    path = textured.scan(tmp_path / "scan.obj", cells=8, texture_px=128)
+    picture = cv2.imread(str(tmp_path / "scan.jpg"))[:64]
+    turned = cv2.imencode(".jpg", picture)[1].tobytes()
+    # Orientation 6, a quarter turn, as cameras write it.
+    tiff = b"MM\0*\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0\x06\0\0\0\0\0\0"
+    exif = b"Exif\0\0" + tiff
+    turned = turned[:2] + b"\xff\xe1" + (2 + len(exif)).to_bytes(2, "big") + exif + turned[2:]
+    (tmp_path / "scan.jpg").write_bytes(turned)
+    scene, _ = adopt("Scan", nodes_of(path, tmp_path / "nodes.npz"))
+    (mine,) = [m.texture for m in scene.materials.values() if m.texture is not None]
+    (theirs,) = [m.texture for m in stored(scene, tmp_path / "s.glb").materials.values() if m.texture is not None]
+    assert mine.shape == (64, 128, 3)
+    np.testing.assert_array_equal(mine, theirs)
+
+
+@pytest.mark.parametrize("kind", ["jpeg", "bmp"])
+def test_a_scene_that_asks_for_gigabytes_of_pixels_is_refused(kind, tmp_path, monkeypatch):
+    """Scenes come from the Hub too: neither may a file of another kind pass for a small PNG."""
+    path = textured.scan(tmp_path / "scan.obj", cells=8, texture_px=64)
+    scene, _ = adopt("Scan", nodes_of(path, tmp_path / "nodes.npz"))
+    write_glb(scene, tmp_path / "s.glb")
+    whole, jpeg = (tmp_path / "s.glb").read_bytes(), (tmp_path / "scan.jpg").read_bytes()
+    if kind == "jpeg":
+        at = jpeg.index(b"\xff\xc0") + 5
+        bad = jpeg[:at] + (60000).to_bytes(2, "big") * 2 + jpeg[at + 4 :]
+    else:
+        head = b"BM" + bytes(8) + (54).to_bytes(4, "little") + (40).to_bytes(4, "little")
+        bad = head + (16384).to_bytes(4, "little") * 2 + b"\1\0\x18\0"
+        bad += bytes(len(jpeg) - len(bad))
+    assert whole.count(jpeg) == 1
+    (tmp_path / "s.glb").write_bytes(whole.replace(jpeg, bad))
+    decoded: list[int] = []
+    decode = cv2.imdecode
+    monkeypatch.setattr(cv2, "imdecode", lambda *given: decoded.append(1) or decode(*given))
+    with pytest.raises(AssetError, match="damaged"):
+        read_glb(tmp_path / "s.glb")
+    assert not decoded
 
 
 def test_textures_keep_to_their_budget_and_it_is_told(tmp_path):

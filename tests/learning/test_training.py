@@ -2,28 +2,35 @@
 
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
 import time
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 from support.flying import town
 
+from aerialdojo_gen.agents.goal import Sensors
 from aerialdojo_gen.benchmark.episode import Episode
 from aerialdojo_gen.benchmark.episodes import run_scenes
 from aerialdojo_gen.benchmark.motion import FlightSpace
 from aerialdojo_gen.benchmark.runner import Evaluation, evaluate
 from aerialdojo_gen.benchmark.tasks import Selection
 from aerialdojo_gen.errors import ConfigError, StoreError, UsageError
+from aerialdojo_gen.learning.collect import parts_of
 from aerialdojo_gen.learning.index import read_index
 from aerialdojo_gen.learning.recipe import Recipe, load_recipe
 from aerialdojo_gen.learning.steps import read_steps
 from aerialdojo_gen.learning.teacher import NO_LABEL, Teacher
 from aerialdojo_gen.learning.trajectories import drawn_evenly
+from aerialdojo_gen.learning.words import Vocabulary
 from aerialdojo_gen.planning.difficulty import agent_actions
 from aerialdojo_gen.planning.planner import Planner
+from aerialdojo_gen.release.contents import part_name
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.root import open_root
 from aerialdojo_gen.store.schemas import STOP
@@ -31,6 +38,7 @@ from aerialdojo_gen.store.schemas import STOP
 torch = pytest.importorskip("torch", reason="PyTorch is not installed: it is the extra 'train'")
 
 from aerialdojo_gen.learning import checkpoints  # noqa: E402 - it needs torch
+from aerialdojo_gen.learning.policy import Policy  # noqa: E402
 from aerialdojo_gen.learning.training import train  # noqa: E402
 
 POLICY = "aerialdojo_gen.learning.policy:Policy"
@@ -126,6 +134,48 @@ def test_another_training_does_not_take_the_folder(smoke, cache, learned, tmp_pa
     other = recipe(train={"epochs": 3})
     with pytest.raises(UsageError, match=r"another recipe: its fingerprint is [0-9a-f]{16}, and that of this one is"):
         train(smoke, other, out=learned.policy.parent, cache=cache, device="cpu", workers=1)
+
+
+def test_to_restart_is_to_learn_anew(smoke, cache, learned, tmp_path):
+    out = tmp_path / "again"
+    options = {"out": out, "cache": cache, "device": "cpu", "workers": 1}
+    for epochs in (1, 2):
+        done = train(smoke, recipe(train={"epochs": epochs}), restart=True, **options)
+        assert [row["epoch"] for row in history(out)] == list(range(epochs))
+        assert checkpoints.read(done.policy)[2]["epoch"] == epochs
+    # A line that was cut short is no line.
+    (out / "history.jsonl").write_text((out / "history.jsonl").read_text() + '{"phase": 0, "ep')
+    train(smoke, recipe(train={"epochs": 2}), **options)
+    assert len(history(out)) == 2
+
+
+def test_a_shape_beyond_its_weights_is_refused_before_it_takes_memory(learned, changed):
+    _, about, _ = checkpoints.read(learned.policy)
+    path = changed(shape={**about.shape, "hidden": 10**7})
+    with pytest.raises(StoreError, match="holds no policy of this version"):
+        Policy(str(path))
+
+
+def test_other_pictures_of_the_goals_are_drawn_from_anew(smoke, tmp_path):
+    data = tmp_path / "data"
+    shutil.copytree(smoke / "release", data / "release")
+    (data / "meshes").symlink_to(smoke / "meshes")
+    root = open_root(data)
+    index = read_index(root, Selection(("id_train",)))
+
+    def names():
+        words = Vocabulary(("a",), 4)
+        parts = parts_of(open_root(data), index, tmp_path, (("id_train",), ()), Sensors(), 32, words, "gl")
+        return {part.scene: part.folder.name for part in parts}
+
+    before = names()
+    part = data / part_name("release/objects", index.scenes[0])
+    table = pq.read_table(part)
+    shown = [None if png is None else png + b"x" for png in table["reference_image"].to_pylist()]
+    at = table.column_names.index("reference_image")
+    pq.write_table(table.set_column(at, table.schema.field(at), pa.array(shown, table.schema.field(at).type)), part)
+    after = names()
+    assert {scene for scene in before if before[scene] != after[scene]} == {index.scenes[0]}
 
 
 @pytest.fixture

@@ -113,6 +113,7 @@ def test_what_is_not_there_is_refused(client, smoke):
         assert answer.status_code == 404
         assert "U_Nowhere_0" in answer.json()["error"] or "9999" in answer.json()["error"]
     assert client.get("/api/tasks", params={"order": "x"}).status_code == 404
+    assert client.get("/api/tasks", params={"scene": "U_Nowhere_0"}).status_code == 404
     assert client.get("/api/tasks", params={"offset": -1}).status_code == 422
     # Of several scenes those alone that are shown.
     one = TestClient(view_app(smoke, YARD), base_url="http://127.0.0.1")
