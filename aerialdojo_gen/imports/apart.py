@@ -81,9 +81,9 @@ def taken_apart(bodies: Sequence[RawNode]) -> tuple[list[RawNode], Apart]:
     -------
     bodies : list of RawNode
         A file's only node, and a node of several pieces that spreads over 100 m along both axes, fall into connected
-        pieces. Bodies wider than 60 m that are no ground fall into pieces of one colour. What stands out of an open
-        surface that the rest stands on (a photogrammetric model is one surface) is cut from it. Last, a piece goes
-        to the smallest thing, not the ground, whose box and plan hold it: a roof has its tiles.
+        pieces. Bodies wider than 60 m that are no ground fall into pieces of one colour and material. What stands
+        out of an open surface that the rest stands on (a photogrammetric model is one surface) is cut from it. Last,
+        a piece goes to the smallest thing, not the ground, whose box and plan hold it: a roof has its tiles.
     Apart
         How often that was done.
     """
@@ -109,10 +109,8 @@ def taken_apart(bodies: Sequence[RawNode]) -> tuple[list[RawNode], Apart]:
                 told.grown += len(grown)
                 grounds += [ground] if len(ground.faces) else []
                 things += grown
-            elif (np.ptp(piece.vertices[:, :2], axis=0) > _WIDE_M).any() and len(
-                np.unique(piece.colours, axis=0)
-            ) > 1:
-                parts = _by_colour(piece)
+            elif (np.ptp(piece.vertices[:, :2], axis=0) > _WIDE_M).any() and (_materials(piece) > 0).any():
+                parts = _by_material(piece)
                 told.materials += len(parts)
                 things += parts
             else:
@@ -143,12 +141,16 @@ def _is_soup(body: RawNode, pieces: Sequence[RawNode]) -> bool:
     return all((np.ptp(p.vertices[:, :2], axis=0) < _MOST_OF * size).all() for p in pieces)
 
 
-def _by_colour(body: RawNode) -> list[RawNode]:
-    _, shade = np.unique(body.colours // 16, axis=0, return_inverse=True)
-    out = []
-    for k in np.unique(shade):
-        out += _connected(some_of(body, np.flatnonzero(shade.reshape(-1) == k)))
-    return out
+def _materials(body: RawNode) -> Ints:
+    """Number the faces by colour and by the file's material, from 0; (m,) int64."""
+    surface = np.full(len(body.faces), -1) if body.surface is None else body.surface
+    _, kind = np.unique(np.column_stack([body.colours // 16, surface]), axis=0, return_inverse=True)
+    return np.asarray(kind.reshape(-1), dtype=np.int64)
+
+
+def _by_material(body: RawNode) -> list[RawNode]:
+    kind = _materials(body)
+    return [piece for k in np.unique(kind) for piece in _connected(some_of(body, np.flatnonzero(kind == k)))]
 
 
 def _bears(body: RawNode, low: Floats, high: Floats) -> bool:

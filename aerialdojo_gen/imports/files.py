@@ -14,6 +14,7 @@ import struct
 import subprocess
 import sys
 import warnings
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -161,7 +162,7 @@ def _read(path: Path, texture_px: int) -> list[RawNode]:
     named = _objects_of(path) if suffix == ".obj" else {}
     nodes: dict[str, list[RawNode]] = {}
     for (name, body, vertices), skin in zip(shown, skins, strict=True):
-        label = "" if suffix in (".stl", ".ply") else named.get(name, name)
+        label = "" if suffix in (".stl", ".ply") else _object_of(name, named)
         faces = np.asarray(body.faces, dtype=np.int64)
         made = RawNode(label, vertices, faces, skin.colours, skin.surface, skin.corners, skin.surfaces)
         nodes.setdefault(label, []).append(made)
@@ -178,6 +179,14 @@ def _objects_of(path: Path) -> dict[str, str]:
             material = told.decode("utf-8", "replace")
         named["_".join(word for word in (thing, material) if word)] = thing
     return named
+
+
+def _object_of(name: str, named: Mapping[str, str]) -> str:
+    """Say of which object a mesh of trimesh's is, where its name holds a number in place of a material, too."""
+    stem = re.sub(r"_\d+$", "", name)
+    objects = set(named.values())
+    # Without materials, or with one alone, trimesh counts the pieces of an object.
+    return named.get(name, stem if name not in objects and stem in objects else name)
 
 
 def _beside(path: Path) -> Any:

@@ -125,7 +125,7 @@ def buildings(
             continue
         out.append((area.key, _building(area, bodies, shop_points)))
     told.add("buildings", len(out))
-    return [made for _, made in sorted(out, key=lambda item: (item[0][0], int(item[0][1:])))]
+    return [made for _, made in sorted(out, key=lambda item: item[0])]
 
 
 def _inherited(whole: Feature, part: Feature) -> Feature:
@@ -268,5 +268,5 @@ def _roofing(area: Feature, pitched: bool, kind: str) -> str:
 
 
 def _pick(area: Feature, what: str, n: int) -> int:
-    """Draw by the building's own id: neither another building nor the bounding box changes it."""
+    """Draw by the place of the building: no other building, no id and no bounding box changes it."""
     return rank(0, "add-map", area.key, what) % n

@@ -35,7 +35,7 @@ class Feature:
     Attributes
     ----------
     key : str
-        ``"n1"``, ``"w1"``, ``"r1"``: what it is and its id.
+        Where it is: the bounding box of all of it in degrees. Ids depend on who wrote the extract, this does not.
     shape : shapely geometry
         Point, LineString or Polygon, degrees; a multipolygon's parts are features of the same key.
     tags : mapping
@@ -49,7 +49,7 @@ class Feature:
 
 @dataclass(frozen=True)
 class Map:
-    """What an extract has in a bounding box, each in the order of its ids."""
+    """What an extract has in a bounding box, each in the order of its places, whatever the order in the file."""
 
     points: tuple[Feature, ...]
     lines: tuple[Feature, ...]
@@ -107,9 +107,13 @@ def read_map(path: Path, bbox: Bbox) -> Map:
     return Map(points, lines, areas, extent)
 
 
-def _order(feature: Feature) -> tuple[str, int, float, float]:
-    x, y = shapely.get_coordinates(feature.shape)[0]
-    return feature.key[0], int(feature.key[1:]), float(x), float(y)
+def _order(feature: Feature) -> tuple[str, list[tuple[str, str]], bytes]:
+    return feature.key, sorted(feature.tags.items()), shapely.to_wkb(feature.shape)
+
+
+def _key(shape: Any) -> str:
+    # OpenStreetMap's coordinates have seven digits.
+    return " ".join(f"{degrees:.7f}" for degrees in shape.bounds)
 
 
 def _read(osmium: Any, path: Path, bbox: Bbox) -> tuple[dict[str, list[Feature]], Bbox | None]:
@@ -124,14 +128,15 @@ def _read(osmium: Any, path: Path, bbox: Bbox) -> tuple[dict[str, list[Feature]]
             lon, lat = thing.location.lon, thing.location.lat
             low, high = [min(low[0], lon), min(low[1], lat)], [max(high[0], lon), max(high[1], lat)]
             if thing.tags and bbox[0] <= lon <= bbox[2] and bbox[1] <= lat <= bbox[3]:
-                found["points"].append(Feature(f"n{thing.id}", shapely.Point(lon, lat), dict(thing.tags)))
+                point = shapely.Point(lon, lat)
+                found["points"].append(Feature(_key(point), point, dict(thing.tags)))
         elif thing.is_way():
             tags = dict(thing.tags)
             if not tags or (thing.is_closed() and _is_area(tags)) or len(thing.nodes) > _MOST_POINTS:
                 continue
             line = _line(thing.nodes)
             if line is not None and window.intersects(line):
-                found["lines"].append(Feature(f"w{thing.id}", line, tags))
+                found["lines"].append(Feature(_key(line), line, tags))
         elif thing.is_area():
             tags = dict(thing.tags)
             if not _is_area(tags):
@@ -142,10 +147,9 @@ def _read(osmium: Any, path: Path, bbox: Bbox) -> tuple[dict[str, list[Feature]]
                 continue  # an outline that the extract has cut
             if not window.intersects(whole):
                 continue
-            key = ("w" if thing.from_way() else "r") + str(thing.orig_id())
             for part in shapely.get_parts(whole):
                 if isinstance(part, Polygon) and window.intersects(part):
-                    found["areas"].append(Feature(key, part, tags))
+                    found["areas"].append(Feature(_key(whole), part, tags))
     extent = None if low[0] > high[0] else (low[0], low[1], high[0], high[1])
     return found, extent
 

@@ -226,21 +226,26 @@ class GlRenderer:
         self._begin(target)
         self._shadow.use(1)
         tags = ("INSTANCES",) if instances else ()
-        everything = [np.arange(len(drawn.kind.chunks.vertices), dtype=np.uint32) for drawn in self._behind]
-        for drawn, chosen in zip((*self._sets, *self._behind), (*seen, *everything), strict=True):
-            if not len(chosen):
-                continue
+
+        def draw(drawn: _Drawn, chosen: NDArray[np.uint32]) -> None:
             drawn.begin(self._gl)
             array = self._array((*drawn.kind.tags, *tags), drawn.buffer)
             _set(array.program, clip_from_world=_columns(clip), eye=eye, focal_px=camera.focal_px)
             self._indices.orphan()
             self._indices.write(chosen)
             array.render(vertices=len(chosen))
+
+        for drawn, chosen in zip(self._sets, seen, strict=True):
+            if len(chosen):
+                draw(drawn, chosen)
         self._gl.disable(self._gl.CULL_FACE)
         sky = self._array(("SKY", *tags), None)
         reach = np.array([camera.width, camera.height]) / 2.0 / camera.focal_px
         _set(sky.program, world_from_camera=_columns(world_from_camera[:3, :3]), reach=reach)
         sky.render(vertices=3)
+        # After the sky: depths so near to the far end are rounded to it, and the one that is drawn last is seen.
+        for drawn in self._behind:
+            draw(drawn, np.arange(len(drawn.kind.chunks.vertices), dtype=np.uint32))
         return target
 
     def _array(self, tags: tuple[str, ...], buffer: Any) -> Any:

@@ -53,7 +53,7 @@ void main() {
     v_lit = 1.0 - colour.a;
 #endif
 #ifdef BACKDROP
-    // Behind everything, and before the sky.
+    // Behind everything but the sky.
     gl_Position.z = gl_Position.w * 0.9999999;
 #endif
     v_ray = position - eye;

@@ -13,6 +13,7 @@ from aerialdojo_gen.imports.earth import in_words, size_m, tiles
 from aerialdojo_gen.imports.places import add_map
 from aerialdojo_gen.layouts.build import build_scene
 from aerialdojo_gen.pipeline.run import home
+from aerialdojo_gen.planning.clearance import ClearanceGrid
 from aerialdojo_gen.scenes.catalogue import load_catalogue
 from aerialdojo_gen.scenes.recipe import load_recipe
 
@@ -119,8 +120,22 @@ def test_things_of_the_map_are_the_catalogues_and_what_is_in_a_building_is_not(t
     assert all(road.contains(Point(c.centroid[:2])) for c in cars)
 
 
+def test_nobody_is_in_a_building_and_everybody_may_be_in_the_street(town):
+    # Anchors, goals and starts are what the grid can reach.
+    grid = ClearanceGrid.build(town.scene)
+    rng = np.random.default_rng(6)
+    for outline, top in ((maps.BUILDINGS["tall"][0], 21.0), (maps.BUILDINGS["levels"][0], 12.3)):
+        x0, y0, x1, y1 = Polygon(outline).bounds
+        inside = rng.uniform([x0 + 0.3, y0 + 0.3, 0.3], [x1 - 0.3, y1 - 0.3, top], size=(400, 3))
+        assert not any(grid.reachable(p) for p in inside)
+    street = rng.uniform([-55, -3, 6.0], [55, 3, 9.0], size=(200, 3))
+    assert np.mean([grid.reachable(p) for p in street]) > 0.9
+
+
 def test_the_same_map_makes_the_same_bytes_whatever_the_order_of_its_things(town, extract, tmp_path):
-    again = add_map("Town", extract, tmp_path / "a", bbox=[maps.box()])[0]
+    other = maps.write_town(tmp_path / extract.name, order=-1)
+    assert other.read_bytes() != extract.read_bytes()
+    again = add_map("Town", other, tmp_path / "a", bbox=[maps.box()])[0]
     assert again.recipe.read_bytes() == town.recipe.read_bytes()
     rebuilt = build_scene(again.recipe, load_catalogue(home() / "scene_assets"))
     assert [i.node for i in rebuilt.instances] == [i.node for i in town.scene.instances]

@@ -16,6 +16,7 @@ from aerialdojo_gen.imports.earth import LocalFrame
 from aerialdojo_gen.imports.places import add_terrain
 from aerialdojo_gen.layouts.build import build_scene
 from aerialdojo_gen.pipeline.run import home
+from aerialdojo_gen.planning.clearance import ClearanceGrid
 from aerialdojo_gen.scenes.catalogue import load_catalogue
 
 UTM = "EPSG:32635"
@@ -62,6 +63,19 @@ def read_dem_origin(place):
     from aerialdojo_gen.scenes.recipe import load_recipe
 
     return load_recipe(place.recipe).origin.z_m
+
+
+def test_nobody_flies_below_the_relief(added):
+    grid = ClearanceGrid.build(added.scene)
+    rng = np.random.default_rng(8)
+    low, high = added.scene.bounds
+    p = rng.uniform([*low[:2] + 1, low[2]], [*high[:2] - 1, high[2]], size=(4000, 3))
+    over = p[:, 2] + read_dem_origin(added) - maps.hill(p[:, 0], p[:, 1])
+    reached = np.array([grid.reachable(x) for x in p])
+    assert (over < -0.3).sum() > 300
+    assert not reached[over < -0.1].any()
+    # Over it there is little but trees and stones.
+    assert reached[over > 1.0].mean() > 0.8
 
 
 def test_it_is_painted_by_slope_and_height_and_grows_what_such_ground_has(added):

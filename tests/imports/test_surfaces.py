@@ -2,6 +2,7 @@
 
 import struct
 import zipfile
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -19,7 +20,7 @@ from aerialdojo_gen.imports.apart import taken_apart
 from aerialdojo_gen.imports.command import add_scene
 from aerialdojo_gen.imports.files import read_mesh
 from aerialdojo_gen.imports.naming import Called, Naming
-from aerialdojo_gen.imports.raw import RawNode, plain
+from aerialdojo_gen.imports.raw import RawNode, RawSurface, no_corners, plain
 from aerialdojo_gen.planning.clearance import ClearanceGrid
 from aerialdojo_gen.planning.collision import CollisionWorld
 from aerialdojo_gen.scenes.glb import read_glb, write_glb
@@ -169,14 +170,29 @@ def test_a_fence_does_not_swallow_what_it_stands_around_and_a_house_has_its_chim
     assert len(taken_apart([raw(fence, "Fence"), raw(house, "House")])[0]) == 2
 
 
-def test_wide_bodies_of_several_colours_fall_apart_by_material():
+def terrace() -> tuple[np.ndarray, np.ndarray]:
+    """Eight houses in a row without a seam, 80 m long, every one with faces of its own."""
     rows = [trimesh.creation.box(bounds=[[10 * k, 0, 0], [10 * k + 10, 9, 8 + k % 3]]) for k in range(8)]
-    terrace = trimesh.util.concatenate(rows)
-    terrace.merge_vertices()
-    colours = np.repeat(np.array([[200, 40, 40], [40, 90, 200]] * 4, np.uint8), 12, axis=0)
-    node = RawNode("", np.asarray(terrace.vertices), np.asarray(terrace.faces, np.int64), colours)
+    whole = trimesh.util.concatenate(rows)
+    whole.merge_vertices()
+    return np.asarray(whole.vertices), np.asarray(whole.faces, np.int64)
+
+
+@pytest.mark.parametrize("by", ["colour", "texture"])
+def test_wide_bodies_of_several_colours_or_textures_fall_apart_by_material(by):
+    turns = np.repeat([0, 1] * 4, 12)
+    colours = np.array([[200, 40, 40], [40, 90, 200] if by == "colour" else [200, 40, 40]], np.uint8)[turns]
+    node = RawNode("", *terrace(), colours)
+    if by == "texture":
+        # Two pictures of one mean colour.
+        paint = [np.full((8, 8, 3), (200, 40, 40), np.uint8) for _ in range(2)]
+        paint[1][::2], paint[1][1::2] = (220, 60, 60), (180, 20, 20)
+        surfaces = tuple(RawSurface(f"m{k}", (200, 40, 40), picture) for k, picture in enumerate(paint))
+        node = replace(node, surface=turns.astype(np.int32), corners=no_corners(len(turns)), surfaces=surfaces)
     bodies, _ = taken_apart([node])
     assert 8 <= len(bodies) <= 16
+    assert sum(len(b.faces) for b in bodies) == 96
+    assert by == "colour" or all(len(np.unique(b.surface)) == 1 for b in bodies)
 
 
 @settings(max_examples=6, deadline=None)

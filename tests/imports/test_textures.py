@@ -284,6 +284,14 @@ def test_an_object_of_several_materials_has_all_of_them(tmp_path):
     assert node.surface is not None
     shown = [node.surfaces[k] for k in node.surface]
     assert sorted((s.texture is not None, s.colour) for s in shown)[0] == (False, (0, 255, 0))
+    # An object stays one where its materials are not there, or are not told apart.
+    for told in ("newmtl one\nKd 0 1 0\n", ""):
+        (tmp_path / "m.mtl").write_text(told)
+        (node,) = nodes_of(tmp_path / "wall.obj", tmp_path / "nodes.npz")
+        assert (node.name, len(node.faces)) == ("Wall", 2)
+    (tmp_path / "m.mtl").unlink()
+    (node,) = nodes_of(tmp_path / "wall.obj", tmp_path / "nodes.npz")
+    assert (node.name, len(node.faces)) == ("Wall", 2)
     assert [s.texture is not None for s in shown].count(True) == 1
 
 
