@@ -29,6 +29,10 @@ class ConfigError(UsageError):
     """A pipeline file or one of its values is wrong."""
 
 
+class MissingPackage(AerialDojoError):  # noqa: N818 - it says what is missing
+    """A package of an extra is not installed; `lacks` words the message."""
+
+
 class AssetError(AerialDojoError):
     """A recipe, a prop or a mesh is missing or wrong."""
 
@@ -67,6 +71,21 @@ class Malformed(AerialDojoError, ValueError):  # noqa: N818 - it says what the t
 
 class BeyondBounds(Malformed):
     """A text is TOML or JSON, but larger, deeper or with other numbers or characters than anything here can use."""
+
+
+def lacks(who: str, package: str | None, extra: str) -> str:
+    """Word that a package is not installed, with the command that installs the extra that has it.
+
+    Parameters
+    ----------
+    who : str
+        What wants the package, as the user calls it: an option, a command, a kind of file.
+    package : str or None
+        The package, as it is imported; None as ImportError may have it.
+    extra : str
+        The extra of this distribution that brings it.
+    """
+    return f"{who} lacks the package {package or extra}: pip install 'aerialdojo-gen[{extra}]'"
 
 
 def first_line(error: BaseException) -> str:

@@ -67,6 +67,24 @@ def test_every_pipeline_that_is_shipped_goes_by_its_name(unpacked, project):
     assert done.stdout.split() == names
 
 
+def test_a_recipe_that_is_shipped_goes_by_its_name_anywhere(unpacked, project, tmp_path):
+    text = "import sys; from aerialdojo_gen.learning.recipe import load_recipe as o\n"
+    text += "for name in sys.argv[1:]: print(o(name).model_dump_json())"
+    env = os.environ | {"PYTHONPATH": str(unpacked)}
+
+    def read(*given):
+        return subprocess.run(
+            [sys.executable, "-c", text, *given], cwd=tmp_path, env=env, capture_output=True, text=True, check=False
+        )
+
+    done = read("imitation", "imitation.toml", str(project / "pipelines" / "baselines" / "imitation.toml"))
+    assert len(done.stdout.splitlines()) == 3, done.stderr
+    assert len(set(done.stdout.splitlines())) == 1
+    (tmp_path / "imitation").write_text('name = "mine"\n')  # a file goes before a name
+    assert '"name":"mine"' in read("imitation").stdout
+    assert "no recipe imitatoin; by name, as in aerialdojo-gen train imitation: imitation" in read("imitatoin").stderr
+
+
 def test_where_no_release_is_the_wheel_advises_what_it_has(unpacked, tmp_path):
     done = subprocess.run(
         [sys.executable, "-m", "aerialdojo_gen.cli", "stats", "--data", str(tmp_path / "none")],

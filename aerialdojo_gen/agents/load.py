@@ -12,7 +12,7 @@ from typing import Any
 
 from aerialdojo_gen.agents.base import Agent
 from aerialdojo_gen.common.names import unknown
-from aerialdojo_gen.errors import AerialDojoError, UsageError, first_line
+from aerialdojo_gen.errors import AerialDojoError, MissingPackage, UsageError, first_line, lacks
 
 _HERE = "aerialdojo_gen.agents"
 # Where the agents of this project are; nothing is imported before one is asked for.
@@ -39,7 +39,7 @@ def agent_class(name: str) -> Callable[..., Any]:
     ------
     UsageError
         There is no such agent, or its module raises.
-    AerialDojoError
+    MissingPackage
         One of `BUILT_IN` lacks a package.
     """
     where = BUILT_IN.get(name, name)
@@ -52,9 +52,7 @@ def agent_class(name: str) -> Callable[..., Any]:
         module = importlib.import_module(module_name)
     except ImportError as error:
         if name in BUILT_IN:
-            raise AerialDojoError(
-                f"agent {name!r} lacks the package {error.name}: pip install 'aerialdojo-gen[llm]'"
-            ) from None
+            raise MissingPackage(lacks(f"agent {name!r}", error.name, "llm")) from None
         raise UsageError(f"cannot load agent {name!r}: {first_line(error)}") from None
     except AerialDojoError:
         raise

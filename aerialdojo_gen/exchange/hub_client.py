@@ -9,12 +9,11 @@ from contextlib import contextmanager
 from typing import Any
 
 from aerialdojo_gen.common.secrets import Secrets
-from aerialdojo_gen.errors import AerialDojoError, UsageError, brief, first_line
+from aerialdojo_gen.errors import AerialDojoError, MissingPackage, UsageError, brief, first_line, lacks
 
 TOKEN, ENDPOINT, USUAL = "HF_TOKEN", "HF_ENDPOINT", "https://huggingface.co"
 _REPO = re.compile(r"[A-Za-z0-9][\w.-]{0,95}/[A-Za-z0-9][\w.-]{0,95}")
 _REVISION = re.compile(r"[\w.][\w./-]{0,199}")
-_MEND = "pip install 'aerialdojo-gen[hub]'"
 
 
 class Hub:
@@ -68,7 +67,7 @@ class Hub:
             import huggingface_hub
             from huggingface_hub.utils import disable_progress_bars  # type: ignore[attr-defined]
         except ImportError:
-            raise AerialDojoError(f"{verb} lacks the package huggingface_hub: {_MEND}") from None
+            raise MissingPackage(lacks(verb, "huggingface_hub", "hub")) from None
         disable_progress_bars()
         self.api: Any = huggingface_hub.HfApi(endpoint=self.endpoint, token=self.token, library_name="aerialdojo-gen")
 

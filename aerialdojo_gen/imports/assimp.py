@@ -10,11 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from aerialdojo_gen.errors import AssetError
+from aerialdojo_gen.errors import AssetError, lacks
 from aerialdojo_gen.imports.pictures import TEXTURE_PX, Paint, surfaces_of
 from aerialdojo_gen.imports.raw import RawNode, joined, no_corners
-
-_MEND = "install it with pip install 'aerialdojo-gen[formats]', or export the mesh as GLB"
 
 
 def read_by_assimp(path: Path, resolve: Callable[[str], bytes], texture_px: int = TEXTURE_PX) -> list[RawNode]:
@@ -42,7 +40,8 @@ def read_by_assimp(path: Path, resolve: Callable[[str], bytes], texture_px: int 
     try:
         assimp: Any = importlib.import_module("assimp_py")
     except ImportError:
-        raise AssetError(f"{path.suffix[1:].upper()} is read by assimp-py: {_MEND}") from None
+        who = path.suffix[1:].upper()
+        raise AssetError(f"{lacks(who, 'assimp_py', 'formats')}, or export the mesh as GLB") from None
     try:
         scene = assimp.import_file(str(path), assimp.Process_Triangulate | assimp.Process_SortByPType)
     except (RuntimeError, ValueError, OSError) as error:

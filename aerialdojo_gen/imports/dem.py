@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from aerialdojo_gen.errors import AssetError, UsageError
+from aerialdojo_gen.errors import AssetError, MissingPackage, UsageError, lacks
 from aerialdojo_gen.imports.earth import Bbox, in_words
 
 Floats = NDArray[np.float64]
@@ -96,7 +96,7 @@ def read_dem(path: Path) -> Dem:
 
     Raises
     ------
-    UsageError
+    MissingPackage
         A GeoTIFF, and rasterio is not installed.
     AssetError
         The file is missing, damaged, without a coordinate system or any height, or its system is in other units.
@@ -119,9 +119,7 @@ def _geotiff(path: Path) -> Dem:
         rasterio = importlib.import_module("rasterio")
         warp = importlib.import_module("rasterio.warp")
     except ImportError:
-        raise UsageError(
-            "GeoTIFFs are read by rasterio, which is not installed: pip install 'aerialdojo-gen[maps]'"
-        ) from None
+        raise MissingPackage(lacks(f"{path}, a GeoTIFF,", "rasterio", "maps")) from None
     try:
         # By its own driver alone: others follow what a file says to other files, and to the net.
         with rasterio.open(path, driver="GTiff") as file:

@@ -11,7 +11,7 @@ from typing import Any
 import shapely
 from shapely.geometry import LineString, Polygon
 
-from aerialdojo_gen.errors import AssetError, UsageError
+from aerialdojo_gen.errors import AssetError, MissingPackage, UsageError, lacks
 from aerialdojo_gen.imports.earth import Bbox, in_words
 
 ATTRIBUTION = "© OpenStreetMap contributors, Open Database License (ODbL) 1.0, openstreetmap.org/copyright"
@@ -69,17 +69,17 @@ def read_map(path: Path, bbox: Bbox) -> Map:
 
     Raises
     ------
+    MissingPackage
+        osmium is not installed.
     UsageError
-        osmium is not installed, or the box lies outside the extract: the message has the extract's.
+        The box lies outside the extract: the message has the extract's.
     AssetError
         The file is missing, too large, cut short, or no such file.
     """
     try:
         osmium = importlib.import_module("osmium")
     except ImportError:
-        raise UsageError(
-            "maps are read by osmium, which is not installed: pip install 'aerialdojo-gen[maps]'"
-        ) from None
+        raise MissingPackage(lacks("add-map", "osmium", "maps")) from None
     if not path.name.endswith(SUFFIXES):
         raise AssetError(f"{path}: a map is a file {', '.join(SUFFIXES)}")
     try:

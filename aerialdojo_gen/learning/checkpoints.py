@@ -12,7 +12,7 @@ from typing import Any
 from aerialdojo_gen.agents.goal import Sensors
 from aerialdojo_gen.common.advice import command
 from aerialdojo_gen.common.bounded import loads_json
-from aerialdojo_gen.errors import AerialDojoError, StoreError, UsageError, first_line
+from aerialdojo_gen.errors import AerialDojoError, MissingPackage, StoreError, UsageError, first_line, lacks
 from aerialdojo_gen.learning.loader import torch_package
 from aerialdojo_gen.learning.seen import actions_fingerprint
 from aerialdojo_gen.learning.words import Vocabulary
@@ -90,7 +90,7 @@ def read(path: str | Path) -> tuple[dict[str, Any], About, dict[str, Any]]:
     """
     torch_package()
     if not Path(path).is_file():
-        raise UsageError(f"there are no weights {path}: run {command('train', 'pipelines/baselines/imitation.toml')}")
+        raise UsageError(f"there are no weights {path}: run {command('train', 'imitation')}")
     try:
         with _safetensors()[0].safe_open(str(path), framework="pt") as file:
             told = file.metadata() or {}
@@ -118,4 +118,4 @@ def _safetensors() -> tuple[Any, Any]:
     try:
         return importlib.import_module("safetensors"), importlib.import_module("safetensors.torch")
     except ImportError:
-        raise UsageError("weights need safetensors: install the extra: pip install 'aerialdojo-gen[train]'") from None
+        raise MissingPackage(lacks("a policy", "safetensors", "train")) from None

@@ -9,11 +9,10 @@ from typing import Any
 import numpy as np
 
 from aerialdojo_gen.benchmark.eyes import has_drawn
-from aerialdojo_gen.errors import AerialDojoError, StoreError, UsageError, first_line
+from aerialdojo_gen.errors import AerialDojoError, MissingPackage, StoreError, UsageError, first_line, lacks
 from aerialdojo_gen.learning.order import Order
 from aerialdojo_gen.learning.trajectories import Trajectories
 
-_MEND = "install the extra: pip install 'aerialdojo-gen[train]'"
 _STATE = {"seed", "epoch", "batch", "batch_size", "order", "fingerprint"}
 
 
@@ -53,7 +52,9 @@ class Loader:
     Raises
     ------
     UsageError
-        A value makes no sense, or there is no torch for what needs it.
+        A value makes no sense.
+    MissingPackage
+        There is no torch for what needs it.
     """
 
     def __init__(
@@ -73,7 +74,7 @@ class Loader:
             raise UsageError(f"workers start by fork, spawn or forkserver, not by {context!r}")
         self._data, self._batch_size, self._seed, self._how = data, batch_size, seed, how
         self._workers, self._tensors, self._context = workers, tensors, context
-        self._torch = torch_package() if workers or tensors else None
+        self._torch = torch_package("a loader with workers or tensors") if workers or tensors else None
         # Refuses what makes no sense.
         self._order = data.order(batch_size, seed=seed, **how).how
         self._sampler = _Sampler()
@@ -187,13 +188,13 @@ class _Batches:
         return as_tensors(self._data.batch(numbers))
 
 
-def torch_package() -> Any:
-    """Import torch; UsageError naming the extra where it is not installed."""
+def torch_package(who: str = "a policy") -> Any:
+    """Import torch for who wants it; MissingPackage naming the extra where it is not installed."""
     try:
         importlib.import_module("torch.utils.data")
         return importlib.import_module("torch")
     except ImportError:
-        raise UsageError(f"worker processes and tensors need PyTorch: {_MEND}") from None
+        raise MissingPackage(lacks(who, "torch", "train")) from None
 
 
 def as_tensors(batch: Mapping[str, Any]) -> dict[str, Any]:

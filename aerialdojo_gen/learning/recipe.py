@@ -7,10 +7,12 @@ from typing import Any, Literal
 
 from pydantic import Field, ValidationError, model_validator
 
+from aerialdojo_gen.common.advice import PROGRAM
 from aerialdojo_gen.common.bounded import read_toml
 from aerialdojo_gen.common.explain import explain
 from aerialdojo_gen.config.sections import Section
 from aerialdojo_gen.errors import ConfigError
+from aerialdojo_gen.pipeline.run import home
 
 View = Literal["front", "left", "right", "down"]
 SettingName = Literal["base", "standard", "long_horizon"]
@@ -113,24 +115,43 @@ class Recipe(Section):
         )
 
 
+def recipe_file(given: str | Path) -> Path:
+    """Find a recipe: as a path, else by its name among those that come with the program.
+
+    Parameters
+    ----------
+    given : str or Path
+        A path, or a name such as ``imitation``; what is at that path goes before what has that name.
+
+    Raises
+    ------
+    ConfigError
+        There is neither; the message lists the names.
+    """
+    path, shipped = Path(given), home() / "pipelines" / "baselines"
+    if path.is_file():
+        return path
+    if path.parent == Path() and (named := shipped / f"{path.name.removesuffix('.toml')}.toml").is_file():
+        return named
+    known = ", ".join(sorted(file.stem for file in shipped.glob("*.toml")))
+    raise ConfigError(f"no recipe {path}; by name, as in {PROGRAM} train imitation: {known}")
+
+
 def load_recipe(file: str | Path) -> Recipe:
     """Read and validate a recipe.
 
     Parameters
     ----------
     file : str or Path
-        A TOML file.
+        A TOML file, or the name of one that comes with the program.
 
     Raises
     ------
     ConfigError
         It does not exist, is no TOML, or has a key or value that there is not; every fault is named.
     """
-    path = Path(file)
-    try:
-        raw: dict[str, Any] = read_toml(path, ConfigError, finite=False)
-    except FileNotFoundError:
-        raise ConfigError(f"no recipe {path}: there is pipelines/baselines/imitation.toml") from None
+    path = recipe_file(file)
+    raw: dict[str, Any] = read_toml(path, ConfigError, finite=False)
     try:
         return Recipe.model_validate(raw)
     except ValidationError as error:

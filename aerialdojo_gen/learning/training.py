@@ -91,8 +91,10 @@ def train(
 
     Raises
     ------
+    MissingPackage
+        There is no PyTorch.
     UsageError
-        There is no PyTorch, no task fits, or the folder has another training's checkpoint.
+        No task fits, or the folder has another training's checkpoint.
     StoreError
         There is no release, or a scene's mesh is missing.
     """
@@ -101,7 +103,7 @@ def train(
     root = open_root(data)
     # What is missing there is said before what is missing here.
     release_fingerprint(root)
-    torch = torch_package()
+    torch = torch_package("train")
     if device == "auto":
         device = "cuda" if torch.cuda.is_available() else "cpu"
     if device == "cuda" and not torch.cuda.is_available():
@@ -126,7 +128,7 @@ class _Training:
         from aerialdojo_gen.learning.imitation import Learner
         from aerialdojo_gen.learning.network import Network, Shape
 
-        torch = torch_package()
+        torch = torch_package("train")
         self._root, self._recipe, self._folder, self._cache = root, recipe, folder, cache
         self._workers, self._renderer, self._reporter = workers, renderer, reporter
         d, m = recipe.data, recipe.model

@@ -13,7 +13,7 @@ from tenacity import RetryCallState, Retrying, retry_if_exception, stop_after_at
 
 from aerialdojo_gen.agents.base import AgentUnavailable, ServiceDown
 from aerialdojo_gen.common.secrets import Secrets
-from aerialdojo_gen.errors import AerialDojoError, UsageError
+from aerialdojo_gen.errors import AerialDojoError, MissingPackage, UsageError, lacks
 from aerialdojo_gen.llm.faults import refusal
 from aerialdojo_gen.llm.http import CONNECT_S, BodyBoundError, Meter, bounded_client, retry_after_s
 
@@ -98,8 +98,10 @@ class Connection:
 
     Raises
     ------
+    MissingPackage
+        The package is not installed.
     UsageError
-        The package is not installed, there is no key, or the address holds one.
+        There is no key, or the address holds one.
     """
 
     def __init__(
@@ -116,8 +118,7 @@ class Connection:
         try:
             self._package = importlib.import_module(package)
         except ImportError:
-            extra = "pip install 'aerialdojo-gen[llm]'"
-            raise UsageError(f"the {package} agent needs the package {package}: {extra}") from None
+            raise MissingPackage(lacks(f"agent {package!r}", package, "llm")) from None
         variable = f"{package.upper()}_BASE_URL"
         self.base_url = base_url or os.environ.get(variable) or None
         if self.base_url:

@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from aerialdojo_gen.errors import AssetError, UsageError
+from aerialdojo_gen.errors import AssetError, MissingPackage, lacks
 from aerialdojo_gen.scoring.base import AnchorView
 
 if TYPE_CHECKING:
@@ -40,7 +40,7 @@ class ClipScorer:
 
     Raises
     ------
-    UsageError
+    MissingPackage
         The packages are not installed.
     AssetError
         A file is missing or is not what it should be.
@@ -53,9 +53,7 @@ class ClipScorer:
             import onnxruntime
             import tokenizers
         except ImportError as error:
-            raise UsageError(
-                f"the clip scorer needs the package {error.name}: pip install 'aerialdojo-gen[clip]'"
-            ) from None
+            raise MissingPackage(lacks("the scorer clip", error.name, "clip")) from None
         self._vision = _session(onnxruntime, config.vision)
         self._text = _session(onnxruntime, config.text)
         pictures = [i for i in self._vision.get_inputs() if len(i.shape) == 4]

@@ -19,7 +19,7 @@ from io import BytesIO
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from aerialdojo_gen.errors import StoreError
+from aerialdojo_gen.errors import MissingPackage, StoreError, lacks
 from aerialdojo_gen.store.cloud_errors import Changed, cloud_error, code_of, is_transient
 
 # A file of more bytes goes up in parts, several at a time; S3 takes 10,000 of them at most.
@@ -55,8 +55,10 @@ class Bucket:
 
     Raises
     ------
+    MissingPackage
+        The extra ``cloud`` is not installed.
     StoreError
-        The extra ``cloud`` is not installed, or the AWS configuration is wrong. All methods raise it where the store
+        The AWS configuration is wrong. All methods raise it where the store
         refuses or does not answer, FileNotFoundError where there is no object of that key, and `Changed` where a
         condition does not hold.
     """
@@ -252,9 +254,7 @@ def _made_client(_process: int) -> Any:
         import botocore.session
         from botocore.config import Config
     except ImportError:
-        raise StoreError(
-            "s3:// needs the extra cloud, which is not installed: pip install 'aerialdojo-gen[cloud]'"
-        ) from None
+        raise MissingPackage(lacks("s3://", "botocore", "cloud")) from None
     retries: dict[str, Any] = {} if "AWS_RETRY_MODE" in os.environ else {"mode": "standard"}
     if "AWS_MAX_ATTEMPTS" not in os.environ:
         retries["total_max_attempts"] = _TRIES

@@ -16,7 +16,7 @@ from collections.abc import Awaitable, Callable, MutableMapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from aerialdojo_gen.errors import AerialDojoError, UsageError
+from aerialdojo_gen.errors import AerialDojoError, MissingPackage, UsageError, lacks
 
 if TYPE_CHECKING:
     from fastapi import FastAPI
@@ -97,14 +97,14 @@ def require_web() -> None:
 
     Raises
     ------
-    UsageError
+    MissingPackage
         FastAPI or uvicorn is not installed.
     """
     try:
         import fastapi  # noqa: F401
         import uvicorn  # noqa: F401
     except ImportError as error:
-        raise UsageError(f"web pages need {error.name}: pip install 'aerialdojo-gen[web]'") from None
+        raise MissingPackage(lacks("the page", error.name, "web")) from None
 
 
 def one_line(text: str, most: int = 500) -> str:

@@ -8,7 +8,7 @@ import shapely
 from shapely.geometry import Point, Polygon
 from support import maps
 
-from aerialdojo_gen.errors import AssetError, UsageError
+from aerialdojo_gen.errors import AssetError, MissingPackage, UsageError
 from aerialdojo_gen.imports.earth import in_words, size_m, tiles
 from aerialdojo_gen.imports.places import add_map
 from aerialdojo_gen.layouts.build import build_scene
@@ -238,5 +238,5 @@ def test_a_file_that_cannot_be_read_is_one_line(extract, tmp_path):
 
 def test_without_osmium_it_says_what_to_install(extract, tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "osmium", None)
-    with pytest.raises(UsageError, match=r"osmium, which is not installed: pip install 'aerialdojo-gen\[maps\]'"):
+    with pytest.raises(MissingPackage, match=r"lacks the package osmium: pip install 'aerialdojo-gen\[maps\]'"):
         add_map("X", extract, tmp_path / "mine", bbox=[maps.box()])

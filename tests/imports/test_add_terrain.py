@@ -9,7 +9,7 @@ import pytest
 from scipy.interpolate import RegularGridInterpolator
 from support import maps
 
-from aerialdojo_gen.errors import AssetError, UsageError
+from aerialdojo_gen.errors import AssetError, MissingPackage, UsageError
 from aerialdojo_gen.geometry.rays import RayCaster
 from aerialdojo_gen.imports.dem import read_dem
 from aerialdojo_gen.imports.earth import LocalFrame
@@ -255,5 +255,5 @@ def test_a_files_name_cannot_write_into_the_recipe(hill, tmp_path):
 def test_without_rasterio_it_says_what_to_install(tmp_path, monkeypatch):
     path = tif(tmp_path)
     monkeypatch.setitem(sys.modules, "rasterio", None)
-    with pytest.raises(UsageError, match=r"rasterio, which is not installed: pip install 'aerialdojo-gen\[maps\]'"):
+    with pytest.raises(MissingPackage, match=r"lacks the package rasterio: pip install 'aerialdojo-gen\[maps\]'"):
         read_dem(path)

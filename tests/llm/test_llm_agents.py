@@ -18,7 +18,7 @@ from support.llm_server import MOVE, Call, Cut, Drip, Endless, Filtered, Hang, R
 
 from aerialdojo_gen.agents import AgentUnavailable, InvalidAnswer, ServiceDown, load_agent
 from aerialdojo_gen.agents.goal import Goal, Observation, Rules
-from aerialdojo_gen.errors import AerialDojoError, UsageError
+from aerialdojo_gen.errors import AerialDojoError, MissingPackage, UsageError
 from aerialdojo_gen.llm import service as services
 from aerialdojo_gen.llm.agent import LanguageModelAgent
 from aerialdojo_gen.llm.answer import parse_answer
@@ -457,7 +457,7 @@ def _without_packages(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.usefixtures("_without_packages")
 @pytest.mark.parametrize("protocol", PROTOCOLS)
 def test_a_missing_package_is_named_with_the_extra_that_has_it(protocol: str) -> None:
-    with pytest.raises(UsageError, match=rf"needs the package {protocol}: pip install 'aerialdojo-gen\[llm\]'"):
+    with pytest.raises(MissingPackage, match=rf"lacks the package {protocol}: pip install 'aerialdojo-gen\[llm\]'"):
         load_agent(protocol, model="m")
 
 

@@ -22,7 +22,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-from aerialdojo_gen.errors import AerialDojoError, UsageError, first_line
+from aerialdojo_gen.errors import AerialDojoError, MissingPackage, UsageError, first_line, lacks
 from aerialdojo_gen.pipeline.executors.base import Executor, Folders, R, T, Talk, Waiting
 from aerialdojo_gen.pipeline.executors.carried import pack
 from aerialdojo_gen.pipeline.executors.local import own_cores
@@ -35,7 +35,6 @@ _TRIES = 4
 _FALSE_STARTS = 6
 _LOOK_EVERY_S, _SAY_AFTER_S, _END_WITHIN_S = 0.3, 30.0, 20.0
 _FORWARDED = re.compile(r"(AWS|AERIALDOJO)_\w+|\w+_API_KEY|(OPENAI|ANTHROPIC)_BASE_URL|HF_TOKEN")
-_EXTRA = "--executor ray needs Ray: pip install 'aerialdojo-gen[cluster]'"
 
 
 def _import_ray(own: bool) -> Any:
@@ -49,7 +48,7 @@ def _import_ray(own: bool) -> Any:
     try:
         import ray
     except ImportError:
-        raise UsageError(_EXTRA) from None
+        raise MissingPackage(lacks("--executor ray", "ray", "cluster")) from None
     return ray
 
 
