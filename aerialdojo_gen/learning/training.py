@@ -154,8 +154,8 @@ class _Training:
         recipe, learner, report = self._recipe, self._learner, self._reporter
         if restart:
             # The weights too: a phase that has some counts as done. The settings last, in case of a kill between.
-            weights = [self._folder / f"{name}.safetensors" for name in ("imitation", "policy")]
-            for path in (*weights, *self._folder.glob("dagger-*.safetensors")):
+            ended = [self._folder / f"{name}.safetensors" for name in ("imitation", "policy")]
+            for path in (*ended, *self._folder.glob("dagger-*.safetensors")):
                 path.unlink(missing_ok=True)
             for name in (_CHECKPOINT, _HISTORY, _SETTINGS):
                 (self._folder / name).unlink(missing_ok=True)

@@ -81,8 +81,9 @@ def read_material(entry: dict[str, Any], image: Callable[[int], memoryview]) -> 
     if source is not None:
         file = image(source["index"])
         # A kilobyte can ask for a gigabyte of pixels, and whatever is a picture would be decoded.
-        stored_as_jpeg, size = file[:3] == b"\xff\xd8\xff", image_size(file)
-        if not (stored_as_jpeg or file[:8] == b"\x89PNG\r\n\x1a\n") or size is None:
+        head, size = bytes(file[:8]), image_size(file)
+        stored_as_jpeg = head.startswith(b"\xff\xd8\xff")
+        if not (stored_as_jpeg or head == b"\x89PNG\r\n\x1a\n") or size is None:
             raise ValueError("texture is neither PNG nor JPEG")
         if max(size) > (_LARGEST_TEXTURE_PX if atlas else 4096):
             raise ValueError("texture is too large")
