@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from aerialdojo_gen.errors import StoreError, UsageError
+from aerialdojo_gen.errors import MissingPackage, StoreError, UsageError
 from aerialdojo_gen.learning import Loader, Trajectories
 from aerialdojo_gen.learning.order import Order
 
@@ -138,9 +138,9 @@ def test_a_state_of_another_loader_is_refused(smoke, data):
 def test_without_torch_workers_name_the_extra(data, monkeypatch):
     monkeypatch.setitem(sys.modules, "torch", None)
     monkeypatch.setitem(sys.modules, "torch.utils.data", None)
-    with pytest.raises(UsageError, match=r"aerialdojo-gen\[train\]"):
+    with pytest.raises(MissingPackage, match=r"aerialdojo-gen\[train\]"):
         Loader(data, 16, workers=2)
-    with pytest.raises(UsageError, match=r"aerialdojo-gen\[train\]"):
+    with pytest.raises(MissingPackage, match=r"aerialdojo-gen\[train\]"):
         Loader(data, 16, tensors=True)
     assert next(iter(Loader(data, 4)))["rgb"].shape == (4, 2, 2, 24, 24, 3)
 

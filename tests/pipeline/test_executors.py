@@ -12,7 +12,7 @@ import pytest
 from support import chores
 from support.chores import Chore
 
-from aerialdojo_gen.errors import AerialDojoError, UsageError
+from aerialdojo_gen.errors import AerialDojoError, MissingPackage, UsageError
 from aerialdojo_gen.pipeline.executors import Folders, Talk, make_executor
 
 TESTS = Path(__file__).resolve().parents[1]
@@ -198,7 +198,7 @@ def test_what_cannot_be_is_said_in_one_line(monkeypatch):
         make_executor("local", address="127.0.0.1:6379")
     with monkeypatch.context() as context:
         context.setitem(sys.modules, "ray", None)
-        with pytest.raises(UsageError, match=r"--executor ray needs Ray: pip install 'aerialdojo-gen\[cluster\]'"):
+        with pytest.raises(MissingPackage, match=r"--executor ray lacks the package ray: pip install 'aerialdojo-gen\[cluster\]'"):
             make_executor("ray")
     # In a process of its own: this one may have a cluster.
     program = (

@@ -13,7 +13,7 @@ from support.llm_server import Say, Status, serving
 from support.two_coloured import POST, item_of, job_in, plain_view, redness, world_of, yard
 
 from aerialdojo_gen.config.sections import AnchorSampleConfig, ClipConfig, ScorerWeights, VlmConfig
-from aerialdojo_gen.errors import AssetError, UsageError
+from aerialdojo_gen.errors import AssetError, MissingPackage, UsageError
 from aerialdojo_gen.pipeline.registry import BY_NAME
 from aerialdojo_gen.scoring.clip import ClipScorer, digest
 from aerialdojo_gen.scoring.panel import panel
@@ -146,7 +146,7 @@ def test_encoders_in_each_others_place_are_noticed(clip):
 
 def test_clip_without_its_package_says_what_to_install(clip, monkeypatch):
     monkeypatch.setitem(sys.modules, "onnxruntime", None)
-    with pytest.raises(UsageError, match=r"pip install 'aerialdojo-gen\[clip\]'"):
+    with pytest.raises(MissingPackage, match=r"pip install 'aerialdojo-gen\[clip\]'"):
         ClipScorer(clip)
 
 
