@@ -198,7 +198,9 @@ def test_what_cannot_be_is_said_in_one_line(monkeypatch):
         make_executor("local", address="127.0.0.1:6379")
     with monkeypatch.context() as context:
         context.setitem(sys.modules, "ray", None)
-        with pytest.raises(MissingPackage, match=r"--executor ray lacks the package ray: pip install 'aerialdojo-gen\[cluster\]'"):
+        with pytest.raises(
+            MissingPackage, match=r"--executor ray lacks the package ray: pip install 'aerialdojo-gen\[cluster\]'"
+        ):
             make_executor("ray")
     # In a process of its own: this one may have a cluster.
     program = (
