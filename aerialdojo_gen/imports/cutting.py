@@ -11,6 +11,7 @@ import shapely
 from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -182,7 +183,9 @@ def _lids(
     for k in np.unique(body[source[whole]]):
         rows = whole[body[source[whole]] == k]
         flat = np.stack([(segments[rows][:, :, :2] - origin) @ along, segments[rows][:, :, 2]], axis=-1)
-        grid = np.round(flat / _GRID_M)
+        spot = _spots(flat.reshape(-1, 2))
+        _, first = np.unique(spot, return_index=True)
+        grid = np.round(flat.reshape(-1, 2)[first] / _GRID_M)[spot].reshape(-1, 2, 2)
         lines = shapely.linestrings(grid * _GRID_M)
         lines = lines[shapely.length(lines) > 0]
         if not len(lines):
@@ -207,6 +210,13 @@ def _lids(
         one[:, :, 0] = 1.0
         out.append(Pieces(corners, np.full(len(uz), source[rows].min()), one))
     return out
+
+
+def _spots(ends: Floats) -> Ints:
+    """Number the places of points, (n, 2): those no farther apart than the grid are one, which rounding may part."""
+    pairs = cKDTree(ends).query_pairs(_GRID_M, output_type="ndarray")
+    near = coo_array((np.ones(len(pairs), np.int8), pairs.T), shape=(len(ends), len(ends)))
+    return connected_components(near, directed=False)[1].astype(np.int64)
 
 
 def _filled(lines: NDArray[np.object_]) -> NDArray[np.object_]:
