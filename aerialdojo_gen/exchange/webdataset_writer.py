@@ -13,12 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerialdojo_gen.common.pictures import FRAME_PNG, encode_png
-from aerialdojo_gen.errors import RenderError
+from aerialdojo_gen.errors import RenderError, StoreError, brief
 from aerialdojo_gen.exchange.folder import write_json
 from aerialdojo_gen.exchange.parts import place
 from aerialdojo_gen.exchange.samples import Eyes, Part, Wanted
 from aerialdojo_gen.learning.labels import Labels
 from aerialdojo_gen.rendering.codecs import to_stored
+from aerialdojo_gen.store.layout import is_plain
 from aerialdojo_gen.store.root import DataRoot
 
 SHARD = "shard-{:06d}.tar"
@@ -39,6 +40,11 @@ def write_part(root: DataRoot, part: Part, wanted: Wanted, folder: Path) -> None
     # The oldest form of the three has neither times of a finer kind nor names of users: the same bytes everywhere.
     with tarfile.open(folder / _FILE, "w", format=tarfile.USTAR_FORMAT) as tar:
         for k in range(len(part.index)):
+            # A release of somebody else's may call a route what leads out of the folder that a tar is unpacked in.
+            if not is_plain(name := str(part.index.nav_id[k])):
+                raise StoreError(
+                    f"routes of {part.scene} in {root}: nav_id {brief(repr(name), 60)} cannot name a file"
+                )
             told = _told(labels, part, k, wanted)
             goal = _picture(eyes.goal(k), wanted) if "image" in wanted.goal else None
             for begin, frames in eyes.frames(k):

@@ -21,6 +21,7 @@ from aerialdojo_gen.exchange.parts import Unfinished
 from aerialdojo_gen.geometry.motion import replay
 from aerialdojo_gen.learning import Trajectories
 from aerialdojo_gen.rendering.codecs import to_stored
+from aerialdojo_gen.store import shards as store
 
 VIEWS = ("front", "down")
 OPTIONS = {"split": ("all",), "limit": 1, "views": VIEWS, "size": (48, 32), "goal": ("text", "image")}
@@ -326,3 +327,13 @@ def test_a_release_without_meshes_and_one_without_recordings_are_named(planted, 
         export_for_learning("lerobot", planted.data, tmp_path / "x", wanted_from())
     assert not list(tmp_path.glob("x*"))
     assert not list(tmp_path.glob(".x*"))
+
+
+def test_a_name_that_leads_out_of_the_folder_comes_into_no_tar(planted, tmp_path):
+    old = planted.rows("routes/train")[0]["nav_id"]
+    for table in ("routes/train", "tasks/train"):
+        rows = [row | {"nav_id": "../../outside"} if row["nav_id"] == old else row for row in planted.rows(table)]
+        planted.write(table, rows, schema=store.LAYOUT[table].spec.schema)
+    with pytest.raises(StoreError, match=r"nav_id '../../outside' cannot name a file"):
+        export_for_learning("webdataset", planted.data, tmp_path / "x", wanted_from(split=("train",), size=(32, 32)))
+    assert not (tmp_path / "x").exists()
