@@ -4,9 +4,11 @@ import io
 import os
 import subprocess
 import sys
+from functools import partial
 
 import pytest
 import typer.main
+from support.command_line import said
 
 from aerialdojo_gen import cli
 from aerialdojo_gen.commands.picking import given_scene, pick_scene
@@ -21,17 +23,9 @@ OF_A_RELEASE = ["evaluate", "export", "stats", "view", "validate"]
 
 
 @pytest.fixture
-def call(monkeypatch, capsys):
-    def called(*arguments):
-        monkeypatch.setattr(sys, "argv", ["aerialdojo-gen", *map(str, arguments)])
-        code = 0
-        try:
-            cli.main()
-        except SystemExit as end:
-            code = end.code or 0
-        return code, *capsys.readouterr()
-
-    return called
+def call(capsys):
+    """Call a command; returns the exit code, standard output and standard error."""
+    return partial(said, capsys)
 
 
 @pytest.mark.parametrize("name", [*STAGE_NAMES, "run", "gallery", "annotate", "annotate-draft", *OF_A_RELEASE])

@@ -1,13 +1,13 @@
 """push-to-hub and pull, against a server at 127.0.0.1 that answers what huggingface_hub asks of the Hub."""
 
 import shutil
-import sys
+from functools import partial
 
 import pytest
 from huggingface_hub import constants
+from support.command_line import said
 from support.hub_server import READER, TOKEN, Repo, hub_server, is_large
 
-from aerialdojo_gen import cli
 from aerialdojo_gen.exchange.hub import scene_of
 from aerialdojo_gen.store import shards
 
@@ -26,19 +26,9 @@ def hub(monkeypatch):
 
 
 @pytest.fixture
-def call(monkeypatch, capsys):
+def call(capsys):
     """Call a command; returns the exit code, standard output and standard error."""
-
-    def called(*arguments):
-        monkeypatch.setattr(sys, "argv", ["aerialdojo-gen", *map(str, arguments)])
-        code = 0
-        try:
-            cli.main()
-        except SystemExit as end:
-            code = end.code or 0
-        return code, *capsys.readouterr()
-
-    return called
+    return partial(said, capsys)
 
 
 def files_of(folder):
