@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterable
 from functools import cache
 from pathlib import Path
 
+from aerialdojo_gen.common.paper import files
 from aerialdojo_gen.errors import AerialDojoError
 from aerialdojo_gen.store.cache import Cache
 from aerialdojo_gen.store.root import DataRoot
@@ -74,10 +75,11 @@ def keep(key: str, text: str = "") -> None:
 
 @cache
 def _sources() -> str:
-    """Return what tells the package's sources from others: other code may say other things of the same files."""
+    """Return what tells the package's sources, and the paper's figures, from others, which may say other things."""
     package = Path(__file__).resolve().parents[1]
     digest = hashlib.sha256()
-    for path in sorted([*package.rglob("*.py"), *package.rglob("*.j2"), *package.rglob("*.toml")]):
+    kinds = ("*.py", "*.j2", "*.toml", "*.csv")
+    for path in sorted([*(path for kind in kinds for path in package.rglob(kind)), *files()]):
         stat = path.stat()
         digest.update(f"{path}\0{stat.st_size}\0{stat.st_mtime_ns}\n".encode())
     return digest.hexdigest()
