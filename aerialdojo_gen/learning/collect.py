@@ -194,7 +194,7 @@ def references(part: Part) -> Steps:
     return Steps(
         frames=pictures(part, poses), first=index.first, label=joined["action"], previous=joined["previous_action"],
         remaining=joined["remaining_actions"].astype(np.float32), odometry=joined["odometry"],
-        offset=offsets(poses, goals), **goals_of(part, index),
+        offset=offsets(poses, goals), pose=poses.astype(np.float32), **goals_of(part, index),
     )  # fmt: skip
 
 

@@ -121,7 +121,7 @@ def _fly(
     draws: list[np.random.Generator], teacher_share: float, goal: Any,
 ) -> None:  # fmt: skip
     going = list(range(len(flown)))
-    memory = torch.zeros(1, len(flown), network.shape.hidden)
+    memory = network.blank(len(flown))
     while going:
         poses = [flown[k].pose for k in going]
         labels = teacher.labels([flown[k].goal for k in going], poses)
@@ -164,5 +164,5 @@ def _steps(flown: list[Flown], told: dict[str, Any], part: Part) -> Steps:
         label=rows[:, 0].astype(np.int64), previous=rows[:, 1].astype(np.int64),
         remaining=rows[:, 2].astype(np.float32),
         odometry=np.array([o for f in flown for o in f.odometry], np.float32).reshape(-1, 4),
-        offset=offsets(poses, goals), **told,
+        offset=offsets(poses, goals), pose=poses.astype(np.float32), **told,
     )  # fmt: skip

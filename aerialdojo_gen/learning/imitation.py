@@ -16,13 +16,13 @@ from aerialdojo_gen.learning.loader import torch_package
 from aerialdojo_gen.learning.network import Network
 from aerialdojo_gen.learning.recipe import Recipe
 from aerialdojo_gen.learning.steps import Pool
+from aerialdojo_gen.learning.whereabouts import missed
 from aerialdojo_gen.pipeline.executors.local import own_cores
 
 # Batches of like lengths are put together from so many: padding costs time.
 _CHUNK = 24
 # Pictures are kept on the accelerator where they take at most this share of what is free there.
 _RESIDENT = 0.7
-_GOAL_UNIT_M = 10.0
 
 
 @dataclass
@@ -245,21 +245,21 @@ class Learner:
     def _forward(self, batch: dict[str, Any]) -> tuple[Any, Any]:
         with self.torch.autocast(self.device, self.torch.bfloat16, enabled=self.device != "cpu"):
             goal = self.network.understand(batch["tokens"], batch["images"], batch["told_by_image"])
-            logits, offset, _ = self.network(
+            logits, guess, _ = self.network(
                 batch.get("pictures"), goal, batch["previous"], batch["odometry"], batch["remaining"], batch["mask"]
             )
-        return logits.float(), offset.float()
+        return logits.float(), guess
 
     def _step(
         self, pool: Pool, frames: Any, episodes: NDArray[np.int64], rate: float, place: tuple[int, int, int]
     ) -> tuple[float, float, int]:
         functional = self.torch.nn.functional
         batch = self._batch(pool, frames, episodes, rng.generator(self.recipe.seed, "learning goals", *place))
-        logits, offset = self._forward(batch)
+        logits, guess = self._forward(batch)
         mask = batch["mask"]
         label = batch["label"][mask]
         loss = functional.cross_entropy(logits[mask], label)
-        where = functional.smooth_l1_loss(offset[mask], batch["offset"][mask] / _GOAL_UNIT_M)
+        where = missed(guess, batch)
         for group in self.optimiser.param_groups:
             group["lr"] = rate
         self.optimiser.zero_grad(set_to_none=True)

@@ -11,11 +11,13 @@ from torch import nn
 from torch.nn import functional
 
 from aerialdojo_gen.agents.goal import N_ACTIONS
+from aerialdojo_gen.learning.whereabouts import SUMS, UNIT_M, Guess, Whereabouts
 
 # Wave lengths of the sines that tell places apart, metres; beside them the place itself.
 _WAVES_M = (4.0, 12.0, 36.0, 108.0)
 _FAR_M = 30.0
 _ODOMETRY = 3 * (2 * len(_WAVES_M) + 1) + 2
+_BEARING = 3 * (2 * len(_WAVES_M) + 1) + 3 + 1
 # The action before, none among them, becomes so many numbers.
 _ACTION_FEATURES = 32
 _BUDGET = 300.0
@@ -69,22 +71,25 @@ class Network(nn.Module):  # type: ignore[misc]  # torch is looked at by no type
         edge = shape.size_px // 16
         self.eye = nn.Sequential(
             *layers, nn.Flatten(), nn.Linear(before * edge * edge, shape.features), nn.LayerNorm(shape.features)
-        )
+        ).to(memory_format=torch.channels_last)
         self.words = nn.Embedding(shape.words, shape.word_features, padding_idx=0)
         self.phrase = nn.Conv1d(shape.word_features, shape.features, 3, padding=1)
         # Whether the goal is a picture stands beside what it shows.
         self.goal = nn.Sequential(nn.Linear(2 * shape.features + 1, shape.features), nn.ReLU(inplace=True))
         self.action = nn.Embedding(N_ACTIONS + 1, _ACTION_FEATURES)
-        seen = shape.views * shape.features + shape.features + _ACTION_FEATURES + _ODOMETRY + 2
+        # Who sees nothing guesses by what is said alone.
+        pictured = max(shape.views, 1) * shape.features
+        self.whereabouts = Whereabouts(pictured, shape.features, shape.features)
+        seen = pictured + shape.features + _ACTION_FEATURES + _ODOMETRY + _BEARING + 2
         self.joined = nn.Sequential(nn.Linear(seen, shape.hidden), nn.ReLU(inplace=True))
         self.memory = nn.GRU(shape.hidden, shape.hidden, batch_first=True)
         self.thought = nn.Sequential(nn.Linear(2 * shape.hidden, shape.hidden), nn.ReLU(inplace=True))
         self.choice = nn.Linear(shape.hidden, N_ACTIONS)
-        self.whereabouts = nn.Linear(shape.hidden, 3)
 
     def look(self, pictures: Any) -> Any:
         """Encode pictures: (n, H, W, 4) uint8 to (n, features)."""
-        return self.eye(pictures.permute(0, 3, 1, 2).float().div(127.5).sub(1.0).contiguous())
+        # As they lie in memory, colours last: on a CPU convolutions take half the time so.
+        return self.eye(pictures.permute(0, 3, 1, 2).float().div(127.5).sub(1.0))
 
     def understand(self, tokens: Any, images: Any, told_by_image: Any) -> Any:
         """Encode goals.
@@ -124,35 +129,53 @@ class Network(nn.Module):  # type: ignore[misc]  # torch is looked at by no type
             Actions left.
         mask : (n, T) bool
             Which steps there are: those of an episode come first.
-        memory : (1, n, hidden), optional
-            Of the steps before.
+        memory : (1, n, hidden + 13), optional
+            Of the steps before; `blank` where absent.
 
         Returns
         -------
         logits : (n, T, 16)
-        offset : (n, T, 3)
-            Where the goal is thought to be: ahead, left, up of the body, in 10 m.
-        memory : (1, n, hidden)
+        guess : Guess
+            Where the goal is thought to be.
+        memory : (1, n, hidden + 13)
         """
         n, steps = mask.shape
+        memory = self.blank(n).to(odometry.device) if memory is None else memory
+        seen = goal[:, None].expand(n, steps, -1)
+        if pictures is not None:
+            looked = self.look(pictures.flatten(0, 1)).reshape(len(pictures), -1)
+            flat = torch.zeros(n * steps, looked.shape[1], dtype=looked.dtype, device=looked.device)
+            rows = mask.flatten().nonzero()[:, 0]
+            seen = flat.index_copy(0, rows, looked).reshape(n, steps, -1)
+        guess, sums = self.whereabouts(seen, goal, odometry, memory[0, :, -SUMS:])
         parts = [
-            goal[:, None].expand(n, steps, -1), self.action(previous), reckoned(odometry),
+            seen, goal[:, None].expand(n, steps, -1), self.action(previous), reckoned(odometry), bearing(guess),
             remaining[..., None] / 30.0, (remaining / _BUDGET).sqrt()[..., None],
         ]  # fmt: skip
-        if pictures is not None:
-            seen = self.look(pictures.flatten(0, 1)).reshape(len(pictures), -1)
-            flat = torch.zeros(n * steps, seen.shape[1], dtype=seen.dtype, device=seen.device)
-            rows = mask.flatten().nonzero()[:, 0]
-            parts.append(flat.index_copy(0, rows, seen).reshape(n, steps, -1))
         joined = self.joined(torch.cat([part.to(goal.dtype) for part in parts], dim=2))
-        kept, memory = self.memory(joined, memory)
+        kept, last = self.memory(joined, memory[..., :-SUMS].to(joined.dtype).contiguous())
         thought = self.thought(torch.cat([joined, kept], dim=2))
-        return self.choice(thought), self.whereabouts(thought), memory
+        return self.choice(thought), guess, torch.cat([last.float(), sums[None]], dim=2)
+
+    def blank(self, n: int) -> Any:
+        """Return the memory of n episodes that begin: (1, n, hidden + 13)."""
+        return torch.zeros(1, n, self.shape.hidden + SUMS)
 
 
 def reckoned(odometry: Any) -> Any:
     """Places and headings as numbers that tell them apart: (..., 4) to (..., 29)."""
-    place = odometry[..., :3]
-    waves = [f(place * (2.0 * np.pi / length)) for length in _WAVES_M for f in (torch.sin, torch.cos)]
     yaw = odometry[..., 3:]
-    return torch.cat([place / _FAR_M, *waves, torch.sin(yaw), torch.cos(yaw)], dim=-1)
+    return torch.cat([_waves(odometry[..., :3]), torch.sin(yaw), torch.cos(yaw)], dim=-1)
+
+
+def bearing(guess: Guess) -> Any:
+    """Where the goal is thought to be, as numbers: (n, T, 31); choices teach it nothing."""
+    away_m = guess.offset.detach() * UNIT_M
+    flat = torch.linalg.vector_norm(away_m[..., :2], dim=-1, keepdim=True)
+    towards = away_m[..., :2] / (flat + 0.5)
+    return torch.cat([_waves(away_m), towards, torch.log1p(flat), guess.sure.detach().log()], dim=-1)
+
+
+def _waves(place_m: Any) -> Any:
+    waves = [f(place_m * (2.0 * np.pi / length)) for length in _WAVES_M for f in (torch.sin, torch.cos)]
+    return torch.cat([place_m / _FAR_M, *waves], dim=-1)

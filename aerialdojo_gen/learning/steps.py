@@ -35,7 +35,9 @@ class Steps:
     odometry : (m, 4) float32
         Own motion from the start and in its frame: metres and radians.
     offset : (m, 3) float32
-        The goal ahead, left and up of the body, metres: privileged, a side task.
+        The goal ahead, left and up of the body, metres: privileged, as is `pose`; for side tasks.
+    pose : (m, 4) float32
+        x, y, z in metres and yaw in radians, world frame.
     tokens : (n, 2, length) int64
         The goal's words without and with its description.
     image : (n,) int64
@@ -54,6 +56,7 @@ class Steps:
     remaining: NDArray[np.float32]
     odometry: NDArray[np.float32]
     offset: NDArray[np.float32]
+    pose: NDArray[np.float32]
     tokens: NDArray[np.int64]
     image: NDArray[np.int64]
     semantic: NDArray[np.bool_]
@@ -111,7 +114,7 @@ class Pool:
         self.parts = list(parts)
         self._steps = np.cumsum([0, *(len(p.label) for p in parts)])
         joined: dict[str, NDArray[Any]] = {}
-        for name in ("label", "previous", "remaining", "odometry", "offset", "tokens", "semantic", "nav_id"):
+        for name in ("label", "previous", "remaining", "odometry", "offset", "pose", "tokens", "semantic", "nav_id"):
             joined[name] = np.concatenate([getattr(p, name) for p in parts])
         shifts = np.cumsum([0, *(len(p.images) for p in parts)])
         joined["image"] = np.concatenate(
@@ -161,7 +164,7 @@ class Pool:
         mask = np.arange(window)[None] < lengths[:, None]
         rows = (self.first[episodes][:, None] + np.arange(window)[None])[mask]
         out: dict[str, NDArray[Any]] = {"rows": rows, "mask": mask}
-        for name in ("label", "previous", "remaining", "odometry", "offset"):
+        for name in ("label", "previous", "remaining", "odometry", "offset", "pose"):
             values = j[name]
             out[name] = np.zeros((*mask.shape, *values.shape[1:]), values.dtype)
             out[name][mask] = values[rows]

@@ -1,0 +1,179 @@
+"""Where a policy thinks its goal to be: carried over by its own motion, and by nothing else of its own."""
+
+import numpy as np
+import pytest
+
+from aerialdojo_gen.geometry.motion import replay
+from aerialdojo_gen.learning.seen import Reckoning
+
+torch = pytest.importorskip("torch", reason="PyTorch is not installed: it is the extra 'train'")
+
+from aerialdojo_gen.learning.network import Network, Shape  # noqa: E402 - it needs torch
+from aerialdojo_gen.learning.whereabouts import SUMS, UNIT_M, Guess, Whereabouts, directions, missed, places  # noqa: E402
+
+T = 9
+START, GOAL = np.array([31.0, -12.0, 6.0, 2.3]), np.array([-8.0, 20.0, 9.0])
+
+
+@pytest.fixture(scope="module")
+def flight():
+    """Poses of an episode, its own motion, and where the goal is seen from each."""
+    actions = np.random.default_rng(3).integers(1, 16, T - 1)
+    poses = replay(START, actions.tolist())
+    reckoning, moved = Reckoning(), []
+    for action in [*actions, 0]:
+        moved.append(reckoning.odometry)
+        reckoning.add(int(action))
+    away, yaw = GOAL - poses[:, :3], poses[:, 3]
+    offset = np.column_stack([
+        away[:, 0] * np.cos(yaw) + away[:, 1] * np.sin(yaw), away[:, 1] * np.cos(yaw) - away[:, 0] * np.sin(yaw),
+        away[:, 2],
+    ])  # fmt: skip
+    return {
+        name: torch.from_numpy(np.asarray(value, np.float32)[None])
+        for name, value in {"pose": poses, "odometry": moved, "offset": offset}.items()
+    } | {"mask": torch.ones((1, T), dtype=torch.bool)}
+
+
+class Known(torch.nn.Module):
+    """In the place of a layer: what it would say."""
+
+    def __init__(self, said):
+        super().__init__()
+        self.said = said
+
+    def forward(self, _):
+        return self.said
+
+
+def told(value, centres, width):
+    """Logits of intervals that have this mean: of the two whose middles it lies between."""
+    near = (1.0 - (value[..., None] - centres).abs() / width).clamp(min=0.0)
+    return near.log().clamp(min=-80.0)
+
+
+def place_logits(place):
+    x, y, z = place.unbind(-1)
+    plane, level = torch.arange(64) * 4.0 - 126.0, torch.arange(36) * 2.0 - 23.0
+    return torch.cat([told(x, plane, 4.0), told(y, plane, 4.0), told(z, level, 2.0)], dim=-1)
+
+
+def heading_logits(yaw):
+    """So steep that the mean of the two sectors about it is the yaw, to a hundredth of a degree."""
+    sectors = torch.deg2rad(torch.arange(24) * 15.0 - 172.5)
+    apart = torch.rad2deg(torch.remainder(yaw[..., None] - sectors + np.pi, 2 * np.pi) - np.pi).abs() / 15.0
+    return (1.0 - apart).clamp(min=0.0).log().clamp(min=-80.0)
+
+
+def guessing(place, yaw, goal, sure):
+    """Make whereabouts that guess this at every step."""
+    made = Whereabouts(4, 4, 4)
+    made.body = Known(torch.cat([place_logits(place), heading_logits(yaw), sure], dim=-1))
+    made.target = Known(torch.cat([place_logits(goal), torch.zeros(1, T, 1)], dim=-1))
+    return made
+
+
+def asked(whereabouts, flight):
+    return whereabouts(torch.zeros(1, T, 4), torch.zeros(1, 4), flight["odometry"], torch.zeros(1, SUMS))[0]
+
+
+def truth(flight):
+    goal = torch.from_numpy(GOAL.astype(np.float32)).expand(1, T, 3)
+    return flight["pose"][..., :3].clone(), flight["pose"][..., 3].clone(), goal
+
+
+def error_m(guess, flight):
+    return torch.linalg.vector_norm(guess.offset * UNIT_M - flight["offset"], dim=-1)
+
+
+def test_what_intervals_tell_is_a_place_and_a_direction():
+    draw = torch.Generator().manual_seed(2)
+    wide = torch.tensor([120.0, 120.0, 20.0])
+    place = (torch.rand(200, 3, generator=draw) * 2.0 - 1.0) * wide
+    assert torch.allclose(places(place_logits(place)), place, atol=1e-3)
+    yaw = (torch.rand(200, generator=draw) * 2.0 - 1.0) * np.pi
+    found = directions(heading_logits(yaw))
+    turned = torch.atan2(found[:, 1], found[:, 0]) - yaw
+    assert float((torch.remainder(turned + np.pi, 2 * np.pi) - np.pi).abs().max()) < np.deg2rad(0.1)
+
+
+def test_right_guesses_say_where_the_goal_is_seen_from_the_body(flight):
+    sure = torch.randn(1, T, 1, generator=torch.Generator().manual_seed(1))
+    guess = asked(guessing(*truth(flight), sure), flight)
+    assert float(error_m(guess, flight).max()) < 0.1
+
+
+def test_one_sure_look_is_remembered_through_steps_that_know_nothing(flight):
+    """What is wildly wrong and unsure afterwards does not matter: own motion carries the one good look on."""
+    place, yaw, goal = truth(flight)
+    place[:, 1:] += 40.0
+    yaw[:, 1:] = 1.0
+    sure = torch.full((1, T, 1), -20.0)
+    sure[:, 0] = 50.0
+    assert float(error_m(asked(guessing(place, yaw, goal, sure), flight), flight).max()) < 0.2
+    # The same looks, all trusted alike, are far off.
+    assert float(error_m(asked(guessing(place, yaw, goal, torch.zeros(1, T, 1)), flight), flight)[0, -1]) > 10.0
+
+
+def test_the_loss_falls_only_where_each_guess_is_right(flight):
+    """No logits have a smaller loss than those of the truth: each guess moved off it costs more."""
+    place, yaw, goal = truth(flight)
+    right = Guess(
+        flight["offset"] / UNIT_M, place_logits(place), heading_logits(yaw), place_logits(goal), torch.ones(1, T, 1)
+    )
+    least = float(missed(right, flight))
+    assert float(missed(right._replace(offset=right.offset + 0.5), flight)) == pytest.approx(least + 0.125)
+    wrong = {
+        "place": place_logits(place + 3.0), "goal": place_logits(goal - 3.0), "heading": heading_logits(yaw + 0.5)
+    }  # fmt: skip
+    for name, logits in wrong.items():
+        assert float(missed(right._replace(**{name: logits}), flight)) > least + 1.0, name
+
+
+@pytest.fixture(scope="module")
+def episode():
+    torch.manual_seed(0)
+    network = Network(Shape(50, 1, 32, (8, 8, 8, 8), 16, 8, 24)).eval()
+    draw = torch.Generator().manual_seed(5)
+    given = {
+        "pictures": torch.randint(0, 256, (2 * T, 1, 32, 32, 4), dtype=torch.uint8, generator=draw),
+        "previous": torch.randint(0, 17, (2, T), generator=draw),
+        "odometry": torch.randn(2, T, 4, generator=draw),
+        "remaining": torch.rand(2, T, generator=draw) * 90.0,
+        "mask": torch.ones((2, T), dtype=torch.bool),
+    }
+    images = torch.randint(0, 256, (2, 32, 32, 4), dtype=torch.uint8, generator=draw)
+    with torch.no_grad():
+        goal = network.understand(torch.randint(1, 50, (2, 64), generator=draw), images, torch.tensor([True, False]))
+    return network, goal, given
+
+
+def test_flown_step_by_step_it_chooses_as_it_learned(episode):
+    network, goal, given = episode
+    with torch.no_grad():
+        logits, guess, end = network(given["pictures"], goal, *[given[n] for n in list(given)[1:]])
+        memory, pictures = None, given["pictures"].reshape(2, T, 1, 32, 32, 4)
+        for k in range(T):
+            at = [given[name][:, k : k + 1] for name in ("previous", "odometry", "remaining", "mask")]
+            own, thought, memory = network(pictures[:, k], goal, *at, memory)
+            assert torch.allclose(own[:, 0], logits[:, k], atol=1e-5)
+            assert torch.allclose(thought.offset[:, 0], guess.offset[:, k], atol=1e-5)
+    assert torch.allclose(memory, end, atol=1e-5)
+
+
+def test_the_goals_place_is_not_read_off_the_actions_before(episode):
+    """The action before and the actions left tell a choice, never the guess that it stands on."""
+    network, goal, given = episode
+    other = given | {"previous": (given["previous"] + 5) % 17, "remaining": given["remaining"] + 7.0}
+    with torch.no_grad():
+        (one, guess, _), (two, same, _) = (network(g["pictures"], goal, *[g[n] for n in list(g)[1:]]) for g in (given, other))
+    assert all(torch.equal(a, b) for a, b in zip(guess, same, strict=True))
+    assert not torch.allclose(one, two)
+
+
+def test_choices_teach_the_guess_nothing(episode):
+    network, goal, given = episode
+    logits, _, _ = network(given["pictures"], goal.detach(), *[given[n] for n in list(given)[1:]])
+    logits.sum().backward()
+    assert all(p.grad is None or not p.grad.any() for p in network.whereabouts.parameters())
+    assert network.choice.weight.grad.any()
