@@ -16,7 +16,7 @@ from aerialdojo_gen.learning.loader import torch_package
 from aerialdojo_gen.learning.network import Network
 from aerialdojo_gen.learning.recipe import Recipe
 from aerialdojo_gen.learning.steps import Pool
-from aerialdojo_gen.learning.whereabouts import missed
+from aerialdojo_gen.learning.whereabouts import astray, missed
 from aerialdojo_gen.pipeline.executors.local import own_cores
 
 # Batches of like lengths are put together from so many: padding costs time.
@@ -110,6 +110,8 @@ class Learner:
         self.recipe, self.device = recipe, device
         self.progress = Progress()
         self.optimiser = self._optimiser()
+        # Steps of the pool that are not kept back.
+        self._anywhere = np.empty(0, np.int64)
 
     def state(self) -> dict[str, Any]:
         """Return all tensors that a training goes on from: weights, and the optimiser's moments."""
@@ -163,6 +165,7 @@ class Learner:
         """
         # Sums depend on how many threads share them, and who flew in this process before left it one.
         self.torch.set_num_threads(own_cores())
+        self._anywhere = np.flatnonzero(np.repeat(~kept_back, pool.lengths))
         p, seed, most = self.progress, self.recipe.seed, self.recipe.train.batch_steps
         lengths = np.where(kept_back, 0, pool.lengths)
         counts = [len(epoch_batches(lengths, most, seed, p.phase, e)) for e in range(epochs)]
@@ -236,10 +239,7 @@ class Learner:
         rows = arrays.pop("rows")
         out = {name: self.torch.from_numpy(value).to(self.device) for name, value in arrays.items()}
         if self.recipe.data.views:
-            if frames is None:
-                out["pictures"] = self.torch.from_numpy(pool.frames(rows)).to(self.device)
-            else:
-                out["pictures"] = frames[self.torch.from_numpy(rows).to(self.device)]
+            out["pictures"] = self._pictures(pool, frames, rows)
         return out
 
     def _forward(self, batch: dict[str, Any]) -> tuple[Any, Any]:
@@ -250,16 +250,34 @@ class Learner:
             )
         return logits.float(), guess
 
+    def _looked_about(self, pool: Pool, frames: Any, draw: np.random.Generator) -> Any:
+        """Loss of places told by pictures from anywhere: those of an episode are too much alike to learn a scene by."""
+        n = self.recipe.train.looks
+        if not (n and self.recipe.data.views and len(self._anywhere)):
+            return 0.0
+        rows = np.sort(draw.choice(self._anywhere, n))
+        pictures, poses = self._pictures(pool, frames, rows), self.torch.from_numpy(pool.poses(rows)).to(self.device)
+        with self.torch.autocast(self.device, self.torch.bfloat16, enabled=self.device != "cpu"):
+            seen = self.network.look(pictures.flatten(0, 1)).reshape(n, -1)
+            place, heading, _ = self.network.whereabouts.found(seen)
+        return astray(place, heading, poses)
+
+    def _pictures(self, pool: Pool, frames: Any, rows: NDArray[np.int64]) -> Any:
+        if frames is None:
+            return self.torch.from_numpy(pool.frames(rows)).to(self.device)
+        return frames[self.torch.from_numpy(rows).to(self.device)]
+
     def _step(
         self, pool: Pool, frames: Any, episodes: NDArray[np.int64], rate: float, place: tuple[int, int, int]
     ) -> tuple[float, float, int]:
         functional = self.torch.nn.functional
-        batch = self._batch(pool, frames, episodes, rng.generator(self.recipe.seed, "learning goals", *place))
+        draw = rng.generator(self.recipe.seed, "learning goals", *place)
+        batch = self._batch(pool, frames, episodes, draw)
         logits, guess = self._forward(batch)
         mask = batch["mask"]
         label = batch["label"][mask]
         loss = functional.cross_entropy(logits[mask], label)
-        where = missed(guess, batch)
+        where = missed(guess, batch) + self._looked_about(pool, frames, draw)
         for group in self.optimiser.param_groups:
             group["lr"] = rate
         self.optimiser.zero_grad(set_to_none=True)

@@ -59,11 +59,14 @@ class TrainingConfig(Section):
     batch_steps: int = Field(2048, ge=1, le=1_000_000, description="steps of trajectories a batch has, at most")
     learning_rate: float = Field(1e-3, gt=0, le=1, description="of AdamW at most; it falls to a tenth by a cosine")
     weight_decay: float = Field(0.01, ge=0, le=1, description="of AdamW")
-    warmup_batches: int = Field(100, ge=0, description="batches in which the learning rate rises to its highest")
+    warmup_batches: int = Field(50, ge=0, description="batches in which the learning rate rises to its highest")
     gradient_norm: float = Field(1.0, gt=0, description="gradients are scaled down to this norm")
     image_share: float = Field(0.5, ge=0, le=1, description="goals told by picture, of those that have both")
     goal_weight: float = Field(
-        0.5, ge=0, description="of the side task beside the actions: where the goal is, seen from the body"
+        1.0, ge=0, description="of the side task beside the actions: where the goal is, seen from the body"
+    )
+    looks: int = Field(
+        256, ge=0, description="pictures from anywhere beside a batch, from which it learns where the body is"
     )
     checkpoint_s: float = Field(60.0, gt=0, description="seconds between checkpoints")
 
@@ -83,10 +86,12 @@ class SmallConfig(Section):
 
     scenes: tuple[str, ...] = Field(("U_Mall_0", "N_Forest_0", "I_Harbor_0"), min_length=1, description="of the data")
     limit: int | None = Field(1500, ge=1, description="most trajectories")
-    epochs: int = Field(8, ge=1, description="of [train]")
-    rounds: int = Field(1, ge=0, description="of [dagger]")
-    dagger_episodes: int = Field(600, ge=1, description="of [dagger], a round")
-    dagger_epochs: int = Field(4, ge=1, description="of [dagger], a round")
+    size_px: int = Field(32, ge=32, le=256, multiple_of=16, description="edge of the pictures, of [data]")
+    epochs: int = Field(4, ge=1, description="of [train]")
+    batch_steps: int = Field(256, ge=1, le=1_000_000, description="of [train]: few steps are to be many batches")
+    rounds: int = Field(2, ge=0, le=100, description="of [dagger]")
+    dagger_episodes: int = Field(300, ge=1, description="of [dagger], a round")
+    dagger_epochs: int = Field(2, ge=1, description="of [dagger], a round")
 
 
 class Recipe(Section):
@@ -106,8 +111,8 @@ class Recipe(Section):
         return self.model_copy(
             update={
                 "name": f"{self.name}-small",
-                "data": self.data.model_copy(update={"scenes": s.scenes, "limit": s.limit}),
-                "train": self.train.model_copy(update={"epochs": s.epochs}),
+                "data": self.data.model_copy(update={"scenes": s.scenes, "limit": s.limit, "size_px": s.size_px}),
+                "train": self.train.model_copy(update={"epochs": s.epochs, "batch_steps": s.batch_steps}),
                 "dagger": self.dagger.model_copy(
                     update={"rounds": s.rounds, "episodes": s.dagger_episodes, "epochs": s.dagger_epochs}
                 ),

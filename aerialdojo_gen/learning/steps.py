@@ -145,6 +145,10 @@ class Pool:
             out[at] = self.parts[p].frames[rows[at] - self._steps[p]]
         return out
 
+    def poses(self, rows: NDArray[np.int64]) -> NDArray[np.float32]:
+        """Read poses of steps: (n, 4)."""
+        return np.asarray(self._joined["pose"][rows], np.float32)
+
     def batch(self, episodes: NDArray[np.int64], by_image: NDArray[np.bool_]) -> dict[str, NDArray[Any]]:
         """Put episodes side by side.
 

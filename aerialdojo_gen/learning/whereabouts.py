@@ -72,6 +72,11 @@ class Whereabouts(nn.Module):  # type: ignore[misc]  # torch is looked at by no 
             nn.Linear(seen + goal, hidden), nn.ReLU(inplace=True), nn.Linear(hidden, _PLACES + 1)
         )
 
+    def found(self, seen: Any) -> tuple[Any, Any, Any]:
+        """Guess where bodies are by pictures alone: logits of places and headings, and how far to trust them."""
+        body = self.body(seen).float()
+        return body[..., :_PLACES], body[..., _PLACES:-1], functional.softplus(body[..., -1:]) + _LEAST
+
     def forward(self, seen: Any, goal: Any, odometry: Any, sums: Any) -> tuple[Guess, Any]:
         """Guess at every step of episodes.
 
@@ -91,17 +96,16 @@ class Whereabouts(nn.Module):  # type: ignore[misc]  # torch is looked at by no 
             Sums with these steps.
         """
         steps = seen.shape[1]
-        body = self.body(seen).float()
+        seen_at, facing, sure = self.found(seen)
         target = self.target(torch.cat([seen, goal[:, None].expand(-1, steps, -1)], dim=2)).float()
-        seen_at, facing = body[..., :_PLACES], body[..., _PLACES:-1]
-        sure, weight = functional.softplus(body[..., -1:]) + _LEAST, functional.softplus(target[..., -1:]) + _LEAST
-        place, goal_place = places(seen_at) / UNIT_M, places(target[..., :_PLACES]) / UNIT_M
+        weight = functional.softplus(target[..., -1:]) + _LEAST
+        # The offset's loss teaches which steps to trust; intervals learn by their own, which is steadier.
+        place = places(seen_at.detach()) / UNIT_M
+        goal_place = places(target[..., :_PLACES].detach()) / UNIT_M
         moved, yaw = odometry[..., :3] / UNIT_M, odometry[..., 3]
         turn = torch.stack([yaw.cos(), yaw.sin()], dim=-1)
-        begun = _seen_from(directions(facing), turn)
-        added = torch.cat(
-            [sure, sure * begun, sure * place, sure * moved, weight, weight * goal_place], dim=2
-        )
+        begun = _seen_from(directions(facing.detach()), turn)
+        added = torch.cat([sure, sure * begun, sure * place, sure * moved, weight, weight * goal_place], dim=2)
         total = sums[:, None].float() + added.cumsum(dim=1)
         all_sure, start, been, moves, all_weight, goals = total.split([1, 2, 3, 3, 1, 3], dim=2)
         start = functional.normalize(start, dim=-1, eps=1e-4)
@@ -156,13 +160,19 @@ def missed(guess: Guess, batch: Mapping[str, Any]) -> Any:
     # Turned by the yaw: seen from a heading of as much to the other side.
     back = torch.stack([pose[:, 3].cos(), -pose[:, 3].sin()], dim=-1)
     away_m = torch.cat([_seen_from(offset[:, :2], back), offset[:, 2:]], dim=-1) * UNIT_M
+    own = astray(guess.place[mask], guess.heading[mask], pose)
+    return (
+        functional.smooth_l1_loss(guess.offset[mask], offset) + own + _unlike(guess.goal[mask], pose[:, :3] + away_m)
+    )
+
+
+def astray(place: Any, heading: Any, pose: Any) -> Any:
+    """Return the loss of guesses of where bodies are: logits (m, 164) and (m, 24) of poses (m, 4)."""
     sector = (torch.remainder(pose[:, 3] + math.pi, 2.0 * math.pi) / _SECTOR_RAD - 0.5)[:, None]
-    apart = torch.remainder(
-        torch.arange(_HEADINGS, device=sector.device) - sector + _HEADINGS / 2, _HEADINGS
-    ) - _HEADINGS / 2
-    turned = functional.cross_entropy(guess.heading[mask], (1.0 - apart.abs()).clamp(min=0.0))
-    where = _unlike(guess.place[mask], pose[:, :3]) + _unlike(guess.goal[mask], pose[:, :3] + away_m)
-    return functional.smooth_l1_loss(guess.offset[mask], offset) + turned + where
+    number = torch.arange(_HEADINGS, device=pose.device)
+    apart = torch.remainder(number - sector + _HEADINGS / 2, _HEADINGS) - _HEADINGS / 2
+    turned = functional.cross_entropy(heading, (1.0 - apart.abs()).clamp(min=0.0))
+    return turned + _unlike(place, pose[:, :3])
 
 
 def _unlike(logits: Any, place_m: Any) -> Any:

@@ -166,7 +166,9 @@ def test_the_goals_place_is_not_read_off_the_actions_before(episode):
     network, goal, given = episode
     other = given | {"previous": (given["previous"] + 5) % 17, "remaining": given["remaining"] + 7.0}
     with torch.no_grad():
-        (one, guess, _), (two, same, _) = (network(g["pictures"], goal, *[g[n] for n in list(g)[1:]]) for g in (given, other))
+        (one, guess, _), (two, same, _) = (
+            network(g["pictures"], goal, *[g[n] for n in list(g)[1:]]) for g in (given, other)
+        )
     assert all(torch.equal(a, b) for a, b in zip(guess, same, strict=True))
     assert not torch.allclose(one, two)
 
