@@ -251,7 +251,7 @@ class Learner:
         return logits.float(), guess
 
     def _looked_about(self, pool: Pool, frames: Any, draw: np.random.Generator) -> Any:
-        """Loss of places told by pictures from anywhere: those of an episode are too much alike to learn a scene by."""
+        """Loss of places told by pictures from anywhere: an episode's are too much alike to learn a scene by."""
         n = self.recipe.train.looks
         if not (n and self.recipe.data.views and len(self._anywhere)):
             return 0.0

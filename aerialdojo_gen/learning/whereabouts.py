@@ -12,8 +12,8 @@ from torch.nn import functional
 
 # Networks reckon places in units of this many metres.
 UNIT_M = 10.0
-# Places are told as chances of intervals of each axis, headings as those of sectors: that is learned in a tenth of the
-# epochs that numbers of metres take. Intervals reach beyond every scene.
+# Places are told as chances of intervals of each axis, headings as those of sectors: numbers of metres are learned too
+# slowly. Intervals reach beyond every scene.
 _CELL_M, _STOREY_M, _SECTOR_RAD = 4.0, 2.0, math.radians(15.0)
 _AXES = (_CELL_M, 64, -128.0), (_CELL_M, 64, -128.0), (_STOREY_M, 36, -24.0)
 _PLACES, _HEADINGS = sum(n for _, n, _ in _AXES), round(2.0 * math.pi / _SECTOR_RAD)
@@ -109,7 +109,7 @@ class Whereabouts(nn.Module):  # type: ignore[misc]  # torch is looked at by no 
         total = sums[:, None].float() + added.cumsum(dim=1)
         all_sure, start, been, moves, all_weight, goals = total.split([1, 2, 3, 3, 1, 3], dim=2)
         start = functional.normalize(start, dim=-1, eps=1e-4)
-        # The goal less the mean place is as far as the goal, from the mean of the moves: seen from the start's heading.
+        # From the mean place to the goal, in the start's frame: the mean of the moves leads to that place.
         away = goals / all_weight - been / all_sure
         ahead = torch.cat([_seen_from(away[..., :2], start), away[..., 2:]], dim=-1) + moves / all_sure - moved
         offset = torch.cat([_seen_from(ahead[..., :2], turn), ahead[..., 2:]], dim=-1)
@@ -124,7 +124,7 @@ def _seen_from(vector: Any, by: Any) -> Any:
 
 
 def places(logits: Any) -> Any:
-    """Return places that logits tell: (..., 164) to (..., 3), metres: of each axis the mean about its likeliest interval."""
+    """Return places that logits tell, metres, (..., 164) to (..., 3): the mean about each axis' likeliest part."""
     out = []
     for one, (width, n, low) in zip(logits.split([n for _, n, _ in _AXES], dim=-1), _AXES, strict=True):
         number = torch.arange(n, device=logits.device)
