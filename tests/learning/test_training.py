@@ -46,7 +46,14 @@ SMALL = {
     "name": "small",
     "data": {"split": "id_train", "limit": 8, "size_px": 32, "validation_share": 0.0, "settings": []},
     "model": {"channels": [8, 16, 16, 32], "features": 64, "word_features": 32, "hidden": 128},
-    "train": {"epochs": 80, "batch_steps": 64, "learning_rate": 4e-3, "warmup_batches": 5, "checkpoint_s": 1e-3},
+    "train": {
+        "epochs": 80,
+        "batch_steps": 64,
+        "learning_rate": 4e-3,
+        "warmup_batches": 5,
+        "checkpoint_s": 1e-3,
+        "looks": 16,
+    },
     "dagger": {"rounds": 0},
 }
 
@@ -105,7 +112,7 @@ def test_killed_and_gone_on_with_it_ends_with_the_same_weights(smoke, cache, lea
         'name = "small"\n[data]\nlimit = 8\nsize_px = 32\nvalidation_share = 0.0\nsettings = []\n'
         "[model]\nchannels = [8, 16, 16, 32]\nfeatures = 64\nword_features = 32\nhidden = 128\n"
         "[train]\nepochs = 6\nbatch_steps = 64\nlearning_rate = 4e-3\nwarmup_batches = 5\ncheckpoint_s = 1e-3\n"
-        "[dagger]\nrounds = 0\n"
+        "looks = 16\n[dagger]\nrounds = 0\n"
     )
     assert load_recipe(file) == short
     broken = tmp_path / "broken"
