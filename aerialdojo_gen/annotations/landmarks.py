@@ -14,6 +14,7 @@ from aerialdojo_gen.scenes.model import Instance
 # By so much the tallest must be taller than the next, and the northernmost farther north, to be called so.
 _TALLER = 1.1
 _FARTHER_M = 1.0
+_LARGE_M = 3.0
 _SIDES = (("northernmost", 1, 1.0), ("southernmost", 1, -1.0), ("easternmost", 0, 1.0), ("westernmost", 0, -1.0))
 
 
@@ -66,7 +67,8 @@ def choose_landmarks(
         if len(chosen) + len(rest) < n and at_most:
             # A town of a map has no landmark of the catalogue as often as not: its tallest buildings will do.
             named = _Names(vocabulary)
-            rest += [i for i in _prominent(vocabulary)[: 8 * n] if i not in (*chosen, *rest) and named.of(i)]
+            large = [i for i in _prominent(vocabulary) if _seen_from_afar(i)]
+            rest += [i for i in large[: 8 * n] if i not in (*chosen, *rest) and named.of(i)]
     while len(chosen) < n and rest:
         best = max(rest, key=lambda i: (spread_m(i, chosen), float(i.bounds[1, 2])))
         chosen.append(best)
@@ -96,6 +98,11 @@ def _prominent(vocabulary: Vocabulary) -> list[Instance]:
     return sorted(things, key=lambda i: (-float(i.bounds[1, 2]), i.node))
 
 
+def _seen_from_afar(instance: Instance) -> bool:
+    """Whether a thing is large: what stands on a tall roof is high, and no landmark."""
+    return float(np.ptp(instance.bounds, axis=0).min()) >= _LARGE_M
+
+
 def _catalogued(vocabulary: Vocabulary, chosen: Sequence[Instance]) -> list[str]:
     noun = {i.node: noun for i, noun in zip(vocabulary.scene.instances, vocabulary.nouns, strict=True)}
     plain = [noun[i.node].name for i in chosen]
@@ -115,6 +122,9 @@ class _Names:
         """Name a thing; empty where nothing tells it from others of its name."""
         noun = self._nouns[instance.node]
         others = [other for other in self._alike[noun.name] if other is not instance]
+        # An office building is a building, too.
+        kinds = (name for name in self._alike if name.endswith(f" {noun.name}"))
+        others += [other for name in kinds for other in self._alike[name]]
         if not others:
             return noun.name
         if not any(set(noun.adjectives) <= set(self._nouns[other.node].adjectives) for other in others):
