@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -49,6 +49,7 @@ def choose_landmarks(
     if missing:
         raise AnnotationError(f"{scene.name}: no node {missing[0]!r} to make a landmark of")
     chosen = [scene[node] for node in dict.fromkeys(wanted)][:n]
+    own: dict[str, str] = {}
     nouns = {i.node: noun for i, noun in zip(scene.instances, vocabulary.nouns, strict=True)}
     if scene.imported:
         names = _Names(vocabulary)
@@ -67,8 +68,9 @@ def choose_landmarks(
         if len(chosen) + len(rest) < n and at_most:
             # A town of a map has no landmark of the catalogue as often as not: its tallest buildings will do.
             named = _Names(vocabulary)
-            large = [i for i in _prominent(vocabulary) if _seen_from_afar(i)]
-            rest += [i for i in large[: 8 * n] if i not in (*chosen, *rest) and named.of(i)]
+            large = [i for i in _prominent(vocabulary) if _seen_from_afar(i)][: 8 * n]
+            own = {i.node: named.of(i) for i in large if i not in (*chosen, *rest) and named.of(i)}
+            rest += [i for i in large if i.node in own]
     while len(chosen) < n and rest:
         best = max(rest, key=lambda i: (spread_m(i, chosen), float(i.bounds[1, 2])))
         chosen.append(best)
@@ -80,7 +82,7 @@ def choose_landmarks(
         raise AnnotationError(
             f"{scene.name}: {n} landmark{'s are' if n > 1 else ' is'} wanted, the scene has {len(chosen)}"
         )
-    said = [names.of(i) for i in chosen] if scene.imported else _catalogued(vocabulary, chosen)
+    said = [names.of(i) for i in chosen] if scene.imported else _catalogued(vocabulary, chosen, own)
     if len(set(said)) < len(said):
         raise AnnotationError(f"{scene.name}: landmarks share a name: {', '.join(sorted(said))}")
     return tuple(Landmark(id=k, name=name, node=i.node) for k, (name, i) in enumerate(zip(said, chosen, strict=True)))
@@ -103,10 +105,12 @@ def _seen_from_afar(instance: Instance) -> bool:
     return float(np.ptp(instance.bounds, axis=0).min()) >= _LARGE_M
 
 
-def _catalogued(vocabulary: Vocabulary, chosen: Sequence[Instance]) -> list[str]:
+def _catalogued(vocabulary: Vocabulary, chosen: Sequence[Instance], own: Mapping[str, str]) -> list[str]:
+    """Name landmarks as the catalogue does; what it has no landmark's name for, by what it has of its own."""
     noun = {i.node: noun for i, noun in zip(vocabulary.scene.instances, vocabulary.nouns, strict=True)}
     plain = [noun[i.node].name for i in chosen]
-    return [noun[i.node].short if plain.count(p) > 1 else p for i, p in zip(chosen, plain, strict=True)]
+    return [own.get(i.node) or (noun[i.node].short if plain.count(p) > 1 else p)
+            for i, p in zip(chosen, plain, strict=True)]  # fmt: skip
 
 
 class _Names:

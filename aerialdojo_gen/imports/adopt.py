@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from aerialdojo_gen.annotations.describing import UNKNOWN
 from aerialdojo_gen.errors import AssetError
 from aerialdojo_gen.imports.apart import taken_apart
-from aerialdojo_gen.imports.cutting import Region, bodies_of
+from aerialdojo_gen.imports.cutting import Region, bodies_of, unique_rows
 from aerialdojo_gen.imports.naming import Naming
 from aerialdojo_gen.imports.raw import RawNode, cut_to, in_place_order, joined
 from aerialdojo_gen.imports.skinning import LIGHTS, Skinner, photographed
@@ -309,8 +309,8 @@ def _sound(node: RawNode, repairs: Repairs) -> RawNode:
     used, faces = np.unique(node.faces, return_inverse=True)
     vertices = node.vertices[used]
     if len(vertices):
-        _, first, same = np.unique(np.round(vertices / _WELD_M), axis=0, return_index=True, return_inverse=True)
-        vertices, faces = vertices[first], same.reshape(-1)[faces.reshape(-1)]
+        first, same, _ = unique_rows(*np.round(vertices / _WELD_M).T)
+        vertices, faces = vertices[first], same[faces.reshape(-1)]
     faces = faces.reshape(-1, 3).astype(np.int64)
     solid = _areas(vertices, faces) > _LEAST_AREA_M2 if len(faces) else np.zeros(0, dtype=bool)
     repairs.add(int((~solid).sum()), f"triangles of {node.name or 'the mesh'} without area dropped")
