@@ -128,10 +128,11 @@ def draft_scene(
         f"{name}: {_many(len(probe.things), 'thing')} of {_many(kinds, 'kind')} to look for; up to "
         f"{_many(proposed, 'object')} by {_many(len(marks), 'landmark')} can be drafted, if drones can look at them"
     )
-    with reporter.bar("annotate-draft", len(probe.things), unit="things") as bar:
-        looked_at = replace(choice, refuses=refusals(scene, pipeline, roots, bar.advance))
+    # Counted is what ends the search: most things are never looked at, and the world is made before the first.
+    looked_at = replace(choice, refuses=refusals(scene, pipeline, roots))
+    with reporter.bar("annotate-draft", proposed, unit="objects") as bar:
         drafter = Drafter(vocabulary, marks, seed, looked_at)
-        objects = drafter.objects(proposed)
+        objects = drafter.objects(proposed, bar.advance)
     _check_enough(name, len(objects), proposed, drafter.why_not(), exact=exact)
     write_annotations(Annotations(name, marks, objects), path)
     unknown = sum(entry.category == UNKNOWN for entry in objects)
@@ -183,9 +184,7 @@ def _described_anew(name: str, path: Path, roots: Roots, seed: int) -> Path:
     return path
 
 
-def refusals(
-    scene: Scene, pipeline: Pipeline, roots: Roots, watch: Callable[[], None] = lambda: None
-) -> Callable[[str], str]:
+def refusals(scene: Scene, pipeline: Pipeline, roots: Roots) -> Callable[[str], str]:
     """Make the test why a node cannot be an object: it must have a full shortlist of anchors.
 
     Parameters
@@ -194,8 +193,6 @@ def refusals(
         The scene.
     pipeline, roots
         Configuration and folders.
-    watch : callable
-        Called once a node, when it has been looked at.
 
     Returns
     -------
@@ -212,7 +209,6 @@ def refusals(
         item = {"object_id": 0, "mesh_node": node, "x_m": x, "y_m": y, "z_m": z}
         found, rejected, _ = candidates_of(item, world, job, config)
         seen = 0 if found is None else len(found.seeing(config.min_visible_fraction))
-        watch()
         if seen >= config.shortlist:
             return ""
         if found is not None:

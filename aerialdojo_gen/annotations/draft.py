@@ -168,8 +168,8 @@ class Drafter:
         )
         return f" ({said})" if said else ""
 
-    def objects(self, n: int) -> tuple[Object, ...]:
-        """Choose and describe up to `n` objects, a category at a time in turn."""
+    def objects(self, n: int, chosen: Callable[[], object] = lambda: None) -> tuple[Object, ...]:
+        """Choose and describe up to `n` objects, a category at a time in turn; `chosen` is called once each."""
         ambiguity = self._teller.ambiguity
         taken: dict[int, str] = {}
         everywhere = self._queues()
@@ -190,8 +190,9 @@ class Drafter:
                 before = len(taken)
                 # What the core has none of comes first.
                 for category, queue in sorted(queues.items(), key=lambda item: self._many(item[0], taken) > 0):
-                    if len(taken) < upto and not self._full(category, taken):
-                        self._take(queue, taken)
+                    wanted = len(taken) < upto and not self._full(category, taken)
+                    if wanted and self._take(queue, taken):
+                        chosen()
                 if len(taken) == before:
                     break
         return tuple(
@@ -240,8 +241,11 @@ class Drafter:
         away = ambiguity.geometry.centres[i, :2] - np.asarray(centre)
         return float(np.hypot(*away)) <= self._choice.within_m
 
-    def _take(self, queue: list[int], taken: dict[int, str]) -> None:
-        """Move one instance from its category's queue to the objects; those that will not do are dropped."""
+    def _take(self, queue: list[int], taken: dict[int, str]) -> bool:
+        """Move one instance from its category's queue to the objects; those that will not do are dropped.
+
+        Tells whether there was one.
+        """
         instances = self._scene.instances
         while queue:
             alike = [instances[j] for j in taken if instances[j].category == instances[queue[0]].category]
@@ -260,7 +264,8 @@ class Drafter:
                 self.refused[why] += 1
             else:
                 taken[best] = text
-                return
+                return True
+        return False
 
     def _described(self, i: int, instance: Instance, taken: dict[int, str]) -> tuple[str, str]:
         why = self._choice.refuses(instance.node) if self._choice.refuses else ""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from aerialdojo_gen.scenes.model import Instance
 # By so much the tallest must be taller than the next, and the northernmost farther north, to be called so.
 _TALLER = 1.1
 _FARTHER_M = 1.0
+_LARGE_M = 3.0
 _SIDES = (("northernmost", 1, 1.0), ("southernmost", 1, -1.0), ("easternmost", 0, 1.0), ("westernmost", 0, -1.0))
 
 
@@ -48,6 +49,7 @@ def choose_landmarks(
     if missing:
         raise AnnotationError(f"{scene.name}: no node {missing[0]!r} to make a landmark of")
     chosen = [scene[node] for node in dict.fromkeys(wanted)][:n]
+    own: dict[str, str] = {}
     nouns = {i.node: noun for i, noun in zip(scene.instances, vocabulary.nouns, strict=True)}
     if scene.imported:
         names = _Names(vocabulary)
@@ -66,7 +68,9 @@ def choose_landmarks(
         if len(chosen) + len(rest) < n and at_most:
             # A town of a map has no landmark of the catalogue as often as not: its tallest buildings will do.
             named = _Names(vocabulary)
-            rest += [i for i in _prominent(vocabulary)[: 8 * n] if i not in (*chosen, *rest) and named.of(i)]
+            large = [i for i in _prominent(vocabulary) if _seen_from_afar(i)][: 8 * n]
+            own = {i.node: named.of(i) for i in large if i not in (*chosen, *rest) and named.of(i)}
+            rest += [i for i in large if i.node in own]
     while len(chosen) < n and rest:
         best = max(rest, key=lambda i: (spread_m(i, chosen), float(i.bounds[1, 2])))
         chosen.append(best)
@@ -78,7 +82,7 @@ def choose_landmarks(
         raise AnnotationError(
             f"{scene.name}: {n} landmark{'s are' if n > 1 else ' is'} wanted, the scene has {len(chosen)}"
         )
-    said = [names.of(i) for i in chosen] if scene.imported else _catalogued(vocabulary, chosen)
+    said = [names.of(i) for i in chosen] if scene.imported else _catalogued(vocabulary, chosen, own)
     if len(set(said)) < len(said):
         raise AnnotationError(f"{scene.name}: landmarks share a name: {', '.join(sorted(said))}")
     return tuple(Landmark(id=k, name=name, node=i.node) for k, (name, i) in enumerate(zip(said, chosen, strict=True)))
@@ -96,10 +100,17 @@ def _prominent(vocabulary: Vocabulary) -> list[Instance]:
     return sorted(things, key=lambda i: (-float(i.bounds[1, 2]), i.node))
 
 
-def _catalogued(vocabulary: Vocabulary, chosen: Sequence[Instance]) -> list[str]:
+def _seen_from_afar(instance: Instance) -> bool:
+    """Whether a thing is large: what stands on a tall roof is high, and no landmark."""
+    return float(np.ptp(instance.bounds, axis=0).min()) >= _LARGE_M
+
+
+def _catalogued(vocabulary: Vocabulary, chosen: Sequence[Instance], own: Mapping[str, str]) -> list[str]:
+    """Name landmarks as the catalogue does; what it has no landmark's name for, by what it has of its own."""
     noun = {i.node: noun for i, noun in zip(vocabulary.scene.instances, vocabulary.nouns, strict=True)}
     plain = [noun[i.node].name for i in chosen]
-    return [noun[i.node].short if plain.count(p) > 1 else p for i, p in zip(chosen, plain, strict=True)]
+    return [own.get(i.node) or (noun[i.node].short if plain.count(p) > 1 else p)
+            for i, p in zip(chosen, plain, strict=True)]  # fmt: skip
 
 
 class _Names:
@@ -115,6 +126,9 @@ class _Names:
         """Name a thing; empty where nothing tells it from others of its name."""
         noun = self._nouns[instance.node]
         others = [other for other in self._alike[noun.name] if other is not instance]
+        # An office building is a building, too.
+        kinds = (name for name in self._alike if name.endswith(f" {noun.name}"))
+        others += [other for name in kinds for other in self._alike[name]]
         if not others:
             return noun.name
         if not any(set(noun.adjectives) <= set(self._nouns[other.node].adjectives) for other in others):

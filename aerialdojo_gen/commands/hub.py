@@ -48,7 +48,7 @@ def pull(
         bool, typer.Option("--meshes/--no-meshes", help="Fetch the meshes too, where the data set has them.")
     ] = True,
     replace: Annotated[
-        bool, typer.Option("--replace", help="Put it in the place of a release that is lost.")
+        bool, typer.Option("--replace", help="Put it in the place of a release and of meshes, which are lost.")
     ] = False,
     quiet: Quiet = False,
 ) -> None:

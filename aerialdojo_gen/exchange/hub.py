@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import shutil
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
@@ -155,14 +155,15 @@ def pull_release(
     meshes : bool
         Fetch the meshes too, where the data set has them.
     replace : bool
-        Whether a release that is there may be lost.
+        Whether a release, and meshes, that are there may be lost.
     reporter : Reporter, optional
         Shows progress.
 
     Raises
     ------
     UsageError
-        There is no such data set or revision, it holds no release, or the data directory has another one.
+        There is no such data set or revision, it holds no release, or the data directory has another one, or other
+        meshes of its scenes.
     StoreError
         What came is damaged, or the disk is full.
     AerialDojoError
@@ -188,6 +189,8 @@ def pull_release(
     scenes = {scene for name in wanted if (scene := scene_of(name)) and not _is_mesh(name)}
     if not scenes:
         raise UsageError(f"the data set {repo} at {hub.address} holds no release of aerialdojo-gen")
+    if not replace:
+        _keep_meshes(root, {name: sibling for name, sibling in wanted.items() if _is_mesh(name)}, repo)
     # Laid out as a data directory, so that what is asked of one can be asked of it.
     partial = root.path / f".pull-{repo.replace('/', '--')}"
     make_folder(partial / FOLDER)
@@ -231,6 +234,18 @@ def _mesh(root: LocalRoot, scene: str) -> Path:
     if not path.is_file():
         raise StoreError(f"the mesh {path} is missing: leave --meshes out, or make it by build-scenes")
     return path
+
+
+def _keep_meshes(root: LocalRoot, wanted: Mapping[str, Any], repo: str) -> None:
+    """Refuse to take the place of meshes that are others: without a release they may be all that somebody has."""
+    others = [name for name in sorted(wanted) if (root.path / name).is_file()]
+    others = [name for name in others if not _is_as_told(root.path / name, wanted[name])]
+    if others:
+        more = f" and {len(others) - 1} more" if others[1:] else ""
+        raise UsageError(
+            f"{root.at(others[0])}{more} would be replaced by {repo}'s: name another folder with --data, or add "
+            "--no-meshes or --replace"
+        )
 
 
 def _fetch(hub: Hub, commit: str, files: Sequence[Any], folder: Path, reporter: Reporter) -> None:

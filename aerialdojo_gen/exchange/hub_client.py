@@ -7,6 +7,7 @@ import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
+from urllib.parse import urlsplit
 
 from aerialdojo_gen.common.secrets import Secrets
 from aerialdojo_gen.errors import AerialDojoError, MissingPackage, UsageError, brief, first_line, lacks
@@ -42,7 +43,7 @@ class Hub:
     Raises
     ------
     UsageError
-        That is no name of a data set.
+        That is no name of a data set, or the token would go to another machine unencrypted.
     AerialDojoError
         There is no token to write with, or the package is missing.
     """
@@ -59,6 +60,11 @@ class Hub:
         # As messages say it: an address may have a password in it.
         self.address = Secrets().text(self.endpoint)
         self.token: str | bool = os.environ.get(TOKEN, "").strip() or False
+        if self.token and _is_open(self.endpoint):
+            raise UsageError(
+                f"{TOKEN} would go to {self.address} unencrypted: write {ENDPOINT}=https://…, or unset {TOKEN} "
+                "to read what is public"
+            )
         if writes and not self.token:
             raise AerialDojoError(
                 f"{verb} needs a token that may write: export {TOKEN}=hf_…, made at {self.address}/settings/tokens"
@@ -127,6 +133,12 @@ class Hub:
     def _line(self, error: BaseException) -> str:
         said = getattr(error, "server_message", None)
         return Secrets().text(brief(str(said), 160) if said else first_line(error))
+
+
+def _is_open(address: str) -> bool:
+    """Whether what is sent there can be read on the way: not by HTTPS, and to another machine."""
+    parts = urlsplit(address)
+    return parts.scheme != "https" and parts.hostname not in ("127.0.0.1", "::1", "localhost")
 
 
 def check_revision(revision: str | None) -> str | None:

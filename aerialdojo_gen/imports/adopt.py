@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from aerialdojo_gen.annotations.describing import UNKNOWN
 from aerialdojo_gen.errors import AssetError
 from aerialdojo_gen.imports.apart import taken_apart
-from aerialdojo_gen.imports.cutting import Region, bodies_of
+from aerialdojo_gen.imports.cutting import Region, bodies_of, unique_rows
 from aerialdojo_gen.imports.naming import Naming
 from aerialdojo_gen.imports.raw import RawNode, cut_to, in_place_order, joined
 from aerialdojo_gen.imports.skinning import LIGHTS, Skinner, photographed
@@ -37,6 +37,7 @@ _GROUND_COVER = 0.97
 _CLUTTER_M = 0.5
 _MOST_INSTANCES = 3000
 _LEAST_AREA_M2 = 1e-9
+_LEVEL_SHARE = 0.7
 _WELD_M = 1e-4
 _GROUND = (122, 132, 108)
 _MOST_NOTES = 8
@@ -309,8 +310,8 @@ def _sound(node: RawNode, repairs: Repairs) -> RawNode:
     used, faces = np.unique(node.faces, return_inverse=True)
     vertices = node.vertices[used]
     if len(vertices):
-        _, first, same = np.unique(np.round(vertices / _WELD_M), axis=0, return_index=True, return_inverse=True)
-        vertices, faces = vertices[first], same.reshape(-1)[faces.reshape(-1)]
+        first, same, _ = unique_rows(*np.round(vertices / _WELD_M).T)
+        vertices, faces = vertices[first], same[faces.reshape(-1)]
     faces = faces.reshape(-1, 3).astype(np.int64)
     solid = _areas(vertices, faces) > _LEAST_AREA_M2 if len(faces) else np.zeros(0, dtype=bool)
     repairs.add(int((~solid).sum()), f"triangles of {node.name or 'the mesh'} without area dropped")
@@ -387,17 +388,30 @@ def _named(
     counts: dict[str, int] = {}
     heights = [float(b.vertices[:, 2].max() - b.vertices[:, 2].min()) for b, parts in bodies if parts]
     tall, low = (float(np.quantile(heights, q)) for q in (0.8, 0.2)) if heights else (0.0, 0.0)
+    least, most = _bounds([body for body, _ in bodies]) if bodies else (np.zeros(3), np.zeros(3))
     out = []
     for body, parts in bodies:
         if not parts:
             continue
         called = naming.called(body.name)
-        category = called.category or _category(body)
+        ground = len(bodies) > 1 and _is_terrain(body, most - least)
+        category = called.category or ("terrain" if ground and body.name != "clutter" else _category(body))
         looks = _looks(body, parts, materials, tall, low)
         looks |= (_form(body, looks) if category == UNKNOWN else {}) | called.attributes
         k = counts[category] = counts.get(category, -1) + 1
         out.append(Instance(f"{category}_{k:04d}", category, "", looks, parts))
     return out
+
+
+def _is_terrain(body: RawNode, extent: Floats) -> bool:
+    """Whether a body is what the others stand on: as wide as half the place, uneven, and level rather than steep."""
+    size = np.ptp(body.vertices, axis=0)
+    if (size[:2] < 0.5 * extent[:2]).any() or not 0.05 * size[:2].max() <= size[2] < 0.25 * size[:2].min():
+        return False
+    a, b, c = (body.vertices[body.faces[:, k]] for k in range(3))
+    normal = np.cross(b - a, c - a)
+    level = np.abs(normal[:, 2]).sum() >= _LEVEL_SHARE * np.linalg.norm(normal, axis=1).sum()
+    return bool(level) and not bodies_of(body.faces, len(body.vertices))[1].all()
 
 
 def _category(body: RawNode) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import shapely
@@ -254,7 +255,9 @@ def bodies_of(faces: Ints, n: int) -> tuple[Ints, NDArray[np.bool_]]:
     """
     if not len(faces):
         return np.zeros(0, np.int64), np.zeros(0, np.bool_)
-    own, same = np.unique(np.sort(faces, axis=1), axis=0, return_inverse=True)
+    own = np.sort(faces, axis=1)
+    first, same, _ = unique_rows(*own.T)
+    own = own[first]
     m = len(own)
     edges = np.concatenate([own[:, [0, 1]], own[:, [1, 2]], own[:, [0, 2]]])
     key = edges[:, 0] * n + edges[:, 1]
@@ -265,7 +268,37 @@ def bodies_of(faces: Ints, n: int) -> tuple[Ints, NDArray[np.bool_]]:
     next_of = np.flatnonzero(np.repeat((count == 2) | (count == 3), count)[1:] & (key[1:] == key[:-1]))
     graph = coo_array((np.ones(len(next_of), np.int8), (owner[next_of], owner[next_of + 1])), shape=(m, m))
     k, label = connected_components(graph, directed=False)
-    pairs, times = np.unique(np.column_stack([label[owner], key]), axis=0, return_counts=True)
+    of = label[owner]
+    pair, _, times = unique_rows(of, key)
     closed = np.ones(k, dtype=np.bool_)
-    closed[pairs[times != 2, 0]] = False
-    return label[same.reshape(-1)].astype(np.int64), closed
+    closed[of[pair[times != 2]]] = False
+    return label[same].astype(np.int64), closed
+
+
+def unique_rows(*columns: NDArray[Any]) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+    """Find the different rows of columns of numbers, as `numpy.unique` by its axis 0 does, several times as fast.
+
+    Parameters
+    ----------
+    *columns : (n,) array
+        The first counts most.
+
+    Returns
+    -------
+    first : (k,) int64
+        Index of the first of each row, in the order of the rows' values.
+    same : (n,) int64
+        Which of them each row is.
+    times : (k,) int64
+        How often each is there.
+    """
+    order = np.lexsort(columns[::-1])
+    new = np.zeros(len(order), dtype=np.bool_)
+    new[:1] = True
+    for column in columns:
+        ordered = column[order]
+        new[1:] |= ordered[1:] != ordered[:-1]
+    same = np.empty(len(order), dtype=np.int64)
+    same[order] = np.cumsum(new) - 1
+    begins = np.flatnonzero(new)
+    return order[begins], same, np.diff(begins, append=len(order))

@@ -11,8 +11,6 @@ import json
 import re
 import resource
 import struct
-import subprocess
-import sys
 import warnings
 from collections.abc import Mapping
 from pathlib import Path
@@ -23,6 +21,7 @@ import numpy as np
 from aerialdojo_gen.common.bounded import loads_json
 from aerialdojo_gen.errors import AssetError
 from aerialdojo_gen.imports.beside import Beside
+from aerialdojo_gen.imports.child import MAX_MEMORY_BYTES, bounded, read_in_child
 from aerialdojo_gen.imports.gltf import read_gltf
 from aerialdojo_gen.imports.pictures import TEXTURE_PX
 from aerialdojo_gen.imports.raw import RawNode, RawSurface, joined
@@ -33,8 +32,6 @@ from aerialdojo_gen.store.staging import scratch_folder
 SUFFIXES = (".glb", ".gltf", ".obj", ".stl", ".ply", ".3ds", ".dae", ".fbx")
 MAX_FILE_BYTES = 1 << 30
 MAX_TRIANGLES = 4_000_000
-MAX_MEMORY_BYTES = 6 << 30
-MAX_SECONDS = 300
 
 
 def read_mesh(path: Path, max_memory_bytes: int = MAX_MEMORY_BYTES, texture_px: int = TEXTURE_PX) -> list[RawNode]:
@@ -72,16 +69,8 @@ def read_mesh(path: Path, max_memory_bytes: int = MAX_MEMORY_BYTES, texture_px: 
         raise AssetError(f"{path}: {unlike}")
     with scratch_folder() as folder:
         out = folder / "nodes.npz"
-        # Not multiprocessing, which would run a caller's unguarded script a second time.
-        command = [sys.executable, "-m", __name__, str(path.resolve()), str(out)]
-        command += [str(max_memory_bytes), str(texture_px)]
-        try:
-            ended = subprocess.run(command, capture_output=True, text=True, timeout=MAX_SECONDS, check=False)
-        except subprocess.TimeoutExpired:
-            raise AssetError(f"{path}: reading takes more than {MAX_SECONDS} s: simplify or split the mesh") from None
-        if ended.returncode:
-            said = ended.stdout.strip().splitlines()
-            raise AssetError(f"{path}: {said[-1] if said else 'its reader crashed: damaged, or too large'}")
+        arguments = [str(out), str(texture_px)]
+        read_in_child(__name__, path, arguments, max_memory_bytes, "simplify or split the mesh")
         return unpacked(out)
 
 
@@ -294,9 +283,4 @@ def unpacked(path: Path) -> list[RawNode]:
 
 
 if __name__ == "__main__":
-    memory = int(sys.argv[3])
-    resource.setrlimit(resource.RLIMIT_AS, (memory, memory))
-    resource.setrlimit(resource.RLIMIT_CPU, (MAX_SECONDS, MAX_SECONDS))
-    fault = read_into(Path(sys.argv[1]), Path(sys.argv[2]), int(sys.argv[4]))
-    print(fault)
-    raise SystemExit(1 if fault else 0)
+    raise SystemExit(bounded(lambda given: read_into(Path(given[0]), Path(given[1]), int(given[2]))))

@@ -9,6 +9,7 @@ from shapely.geometry import LineString, Point, Polygon
 from shapely.geometry.base import BaseGeometry
 from shapely.ops import polygonize, unary_union
 
+from aerialdojo_gen.imports.map_bridges import BRIDGE
 from aerialdojo_gen.imports.map_buildings import Told
 from aerialdojo_gen.imports.map_tags import SURFACES, Tags, below_ground, count, metres
 from aerialdojo_gen.imports.osm import Feature
@@ -58,7 +59,7 @@ _AREAS: dict[str, dict[str, tuple[str, str]]] = {
                 "platform": ("paving:#a5a199", "")},
     "railway": {"platform": ("paving:#a5a199", "")},
     "public_transport": {"platform": ("paving:#a5a199", "")},
-    "man_made": {"pier": ("planks", ""), "bridge": ("concrete:#8f8d88", "")},
+    "man_made": {"pier": ("planks", "")},
     "waterway": {"riverbank": ("water", ""), "dock": ("water", "")},
 }  # fmt: skip
 _WATERWAYS = {"river": 8.0, "canal": 8.0, "stream": 1.6, "ditch": 1.0}
@@ -74,8 +75,9 @@ def streets(lines: Sequence[Feature], window: Polygon, told: Told) -> list[dict[
         if below_ground(feature.tags):
             told.add("ways in tunnels or below ground left out")
             continue
-        if feature.tags.get("bridge", "no") != "no":
-            told.add("bridges laid on the ground")
+        if BRIDGE in feature.tags:
+            # Nobody parks on a bridge.
+            made = {k: v for k, v in made.items() if k != "parking"} | {"bridge": int(feature.tags[BRIDGE])}
         for line in clipped(feature.shape, window):
             out.append({**made, "line": line})
             told.add("streets" if made["kind"] != "path" else "paths")
@@ -145,11 +147,11 @@ def _parks(tags: Tags, *, by_rule: bool) -> bool:
     return by_rule
 
 
-def rails(lines: Sequence[Feature], window: Polygon) -> list[list[list[float]]]:
-    """Make the tracks that lie in the open."""
+def rails(lines: Sequence[Feature], window: Polygon, on: str = "") -> list[list[list[float]]]:
+    """Make the tracks that lie in the open, on the ground or on the bridge of a number."""
     kinds = ("tram", "rail", "light_rail", "narrow_gauge")
     open_ = (f for f in lines if f.tags.get("railway") in kinds and not below_ground(f.tags))
-    return [line for f in open_ for line in clipped(f.shape, window)]
+    return [line for f in open_ if f.tags.get(BRIDGE, "") == on for line in clipped(f.shape, window)]
 
 
 def areas(found: Iterable[Feature], lines: Sequence[Feature], window: Polygon) -> list[dict[str, Any]]:

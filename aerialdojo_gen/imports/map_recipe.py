@@ -11,11 +11,12 @@ from numpy.typing import NDArray
 from shapely.geometry import Polygon
 
 from aerialdojo_gen.errors import UsageError
-from aerialdojo_gen.imports import map_buildings, map_ground, map_things
+from aerialdojo_gen.imports import map_bridges, map_buildings, map_ground, map_things
 from aerialdojo_gen.imports.earth import Bbox, LocalFrame, in_words, size_m
 from aerialdojo_gen.imports.map_buildings import Told
 from aerialdojo_gen.imports.osm import ATTRIBUTION, Feature, Map
 from aerialdojo_gen.imports.toml_text import recipe_text
+from aerialdojo_gen.layouts.places.parts.heights import Heights as HeightTable
 from aerialdojo_gen.scenes.ground import rectangle
 
 SMALLEST_M, LARGEST_M = 20.0, 1000.0
@@ -75,6 +76,12 @@ def town_recipe(
     buildings = map_buildings.buildings([a for a in areas if a.shape.intersects(site)], shops, inner, told)
     built = shapely.union_all([Polygon(b["outline"], b.get("holes", ())) for one in buildings for b in one["bodies"]])
     share = built.area / site.area
+    origin = {"lon_deg": round(frame.lon_deg, 7), "lat_deg": round(frame.lat_deg, 7)}
+    table = None if heights is None else heights(frame, (width, depth))
+    if table is not None:
+        origin["z_m"] = table.pop("z_m")
+    ground = _level if table is None else _terrain(table, (width, depth))
+    raised, lines = map_bridges.bridges(lines, areas, site, ground, told)
     parameters: dict[str, Any] = {
         "ground": "paving:#98958d" if share > _PAVED else "grass",
         "drive_on": drive_on,
@@ -83,6 +90,7 @@ def town_recipe(
         "signals": map_things.signals(points, site),
         "areas": map_ground.areas(areas, lines, window),
         "roads": map_ground.streets(lines, window, told),
+        "bridges": [b.table() | _on(map_ground.rails(lines, window, str(k))) for k, b in enumerate(raised)],
         "buildings": buildings,
         "barriers": map_ground.barriers(lines, inner),
         "things": map_things.things(points, lines, areas, inner, built, told),
@@ -96,13 +104,12 @@ def town_recipe(
         raise UsageError(
             f"--bbox {in_words(bbox)} has nothing of the map in it: {source} reaches over {in_words(found.extent)}"
         )
-    rise, origin = 0.0, {"lon_deg": round(frame.lon_deg, 7), "lat_deg": round(frame.lat_deg, 7)}
-    if heights is not None:
-        table = heights(frame, (width, depth))
-        origin["z_m"] = table.pop("z_m")
+    rise = 0.0
+    if table is not None:
         parameters["heights"] = table
         rise = max(max(row) for row in table["rows_m"])
-    top = max((b["top_m"] for one in buildings for b in one["bodies"]), default=0.0) + rise
+    tops = [b["top_m"] for one in buildings for b in one["bodies"]]
+    top = max([*tops, *(max(b.heights_m) for b in raised)], default=0.0) + rise
     ceiling = max(math.ceil(top + _HEADROOM_M), _LOWEST_CEILING_M) if ceiling_m is None else ceiling_m
     head = {
         "layout": "town", "seed": seed, "size_m": [width, depth], "ceiling_m": float(ceiling),
@@ -113,6 +120,19 @@ def town_recipe(
         "Metres about the middle of the box, x east, y north. Change what is not so, and run again.",
     )
     return recipe_text(head, parameters, comments), told
+
+
+def _on(rails: list[Any]) -> dict[str, Any]:
+    return {"rails": rails} if rails else {}
+
+
+def _level(x: float, y: float) -> float:
+    return 0.0
+
+
+def _terrain(table: Heights, size: tuple[float, float]) -> Callable[[float, float], float]:
+    terrain = HeightTable.model_validate(table).terrain(size)
+    return lambda x, y: float(terrain.z(x, y))
 
 
 def _in_metres(frame: LocalFrame, features: Sequence[Feature]) -> list[Feature]:

@@ -11,6 +11,8 @@ Tags = Mapping[str, str]
 
 _NUMBER = re.compile(r"\s*(\d{1,5}(?:\.\d{1,6})?)\s*(m|metres|meters|ft|feet|')?\s*")
 _COLOUR = re.compile(r"#(?:[0-9a-fA-F]{3}){1,2}")
+_BEARING = re.compile(r"\d{1,3}(?:\.\d{1,6})?")
+_POINTS = ("N", "NNE", "NE", "ENE", "E", "ESE", "SE", "SSE", "S", "SSW", "SW", "WSW", "W", "WNW", "NW", "NNW")
 _FOOT_M = 0.3048
 
 
@@ -22,6 +24,17 @@ def metres(tags: Tags, *keys: str) -> float | None:
             value = float(match[1]) * (_FOOT_M if match[2] in ("ft", "feet", "'") else 1.0)
             if value > 0.0:
                 return value
+    return None
+
+
+def bearing_deg(tags: Tags, *keys: str) -> float | None:
+    """Read a compass bearing, degrees from north or one of 16 points; None where none of the keys holds one."""
+    for key in keys:
+        text = tags.get(key, "").strip().upper().removesuffix("°")
+        if text in _POINTS:
+            return 22.5 * _POINTS.index(text)
+        if _BEARING.fullmatch(text) and float(text) <= 360.0:
+            return float(text)
     return None
 
 

@@ -11,7 +11,7 @@ from shapely.geometry import LineString, Point, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from aerialdojo_gen.imports.map_buildings import Told
-from aerialdojo_gen.imports.map_tags import Tags, below_ground, metres
+from aerialdojo_gen.imports.map_tags import Tags, bearing_deg, below_ground, metres
 from aerialdojo_gen.imports.osm import Feature
 
 # By key and value. What is listed first counts.
@@ -126,8 +126,8 @@ def _thing(category: str, at: Point, tags: Tags) -> dict[str, Any]:
     height = metres(tags, "height")
     if height and category in _MAPPED_TREE_M:
         made["scale"] = round(min(max(height / _MAPPED_TREE_M[category], 0.5), 2.5), 2)
-    bearing = metres(tags, "direction")
-    if bearing is not None and bearing <= 360.0:
+    bearing = bearing_deg(tags, "direction")
+    if bearing is not None:
         made["yaw"] = round(90.0 - bearing, 1)
     return made
 

@@ -1,18 +1,25 @@
-"""Extracts of OpenStreetMap, read by osmium: what lies in a bounding box, by tags."""
+"""Extracts of OpenStreetMap, read by osmium: what lies in bounding boxes, by tags.
+
+Files are hostile until shown otherwise: they are read in a process of their own, in bounded memory and time.
+"""
 
 from __future__ import annotations
 
 import importlib
-from collections.abc import Mapping
+import json
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import shapely
 from shapely.geometry import LineString, Polygon
 
 from aerialdojo_gen.errors import AssetError, MissingPackage, UsageError, lacks
+from aerialdojo_gen.imports.child import MAX_MEMORY_BYTES, bounded, read_in_child
 from aerialdojo_gen.imports.earth import Bbox, in_words
+from aerialdojo_gen.store.staging import scratch_folder
 
 ATTRIBUTION = "© OpenStreetMap contributors, Open Database License (ODbL) 1.0, openstreetmap.org/copyright"
 SUFFIXES = (".pbf", ".osm", ".osm.bz2", ".osm.gz")
@@ -25,7 +32,11 @@ _AREA_KEYS = ("building", "building:part", "landuse", "leisure", "natural", "ame
 _LINES = {"natural": ("tree_row", "cliff", "coastline"), "man_made": ("embankment", "pipeline", "beam", "wire"),
           "railway": ("rail", "tram", "subway", "light_rail")}  # fmt: skip
 
+_KINDS = ("points", "lines", "areas")
+
 Tags = Mapping[str, str]
+_Said = tuple[str, str, Tags]
+"""Key, shape as hexadecimal WKB, tags."""
 
 
 @dataclass(frozen=True)
@@ -57,27 +68,34 @@ class Map:
     extent: Bbox
 
 
-def read_map(path: Path, bbox: Bbox) -> Map:
-    """Read what of an extract touches a bounding box; ways and areas whole.
+def read_maps(path: Path, boxes: Sequence[Bbox], max_memory_bytes: int = MAX_MEMORY_BYTES) -> list[Map]:
+    """Read what of an extract touches bounding boxes, in one pass; ways and areas whole.
 
     Parameters
     ----------
     path : Path
         ``.osm.pbf``, or ``.osm`` with or without ``.gz`` or ``.bz2``.
-    bbox : (west, south, east, north)
+    boxes : sequence of (west, south, east, north)
         Degrees.
+    max_memory_bytes : int
+        Most address space of the reading process.
+
+    Returns
+    -------
+    list of Map
+        One a box.
 
     Raises
     ------
     MissingPackage
         osmium is not installed.
     UsageError
-        The box lies outside the extract: the message has the extract's.
+        A box lies outside the extract: the message has the extract's.
     AssetError
-        The file is missing, too large, cut short, or no such file.
+        The file is missing, too large, cut short, or no such file, or it needs too much memory or time.
     """
     try:
-        osmium = importlib.import_module("osmium")
+        importlib.import_module("osmium")
     except ImportError:
         raise MissingPackage(lacks("add-map", "osmium", "maps")) from None
     if not path.name.endswith(SUFFIXES):
@@ -87,24 +105,63 @@ def read_map(path: Path, bbox: Bbox) -> Map:
     except OSError as error:
         raise AssetError(f"{path}: cannot be read ({error.strerror})") from None
     if size > _LARGEST_BYTES:
-        raise AssetError(
-            f"{path} has {size / 2**30:.1f} GiB, 1 GiB is the most: cut a part out of it first, e.g. osmium extract "
-            f"--bbox {','.join(f'{v:g}' for v in bbox)} {path.name} -o part.osm.pbf"
+        raise AssetError(f"{path} has {size / 2**30:.1f} GiB, 1 GiB is the most: {_part(path, boxes)}")
+    with scratch_folder() as folder:
+        out = folder / "found.json"
+        given = [str(out), json.dumps(boxes)]
+        read_in_child(__name__, path, given, max_memory_bytes, _part(path, boxes))
+        found = json.loads(out.read_text(encoding="utf-8"))
+    west, south, east, north = found["extent"]
+    extent = (west, south, east, north)
+    maps = []
+    for box, own in zip(boxes, found["boxes"], strict=True):
+        if not any(own.values()):
+            apart = box[0] > east or box[2] < west or box[1] > north or box[3] < south
+            why = "lies outside the extract" if apart else "has nothing of the map in it"
+            raise UsageError(f"--bbox {in_words(box)} {why}: {path.name} reaches over {in_words(extent)}")
+        points, lines, areas = (
+            tuple(sorted((Feature(k, shapely.from_wkb(shape), t) for k, shape, t in own[kind]), key=_order))
+            for kind in _KINDS
         )
+        maps.append(Map(points, lines, areas, extent))
+    return maps
+
+
+def _part(path: Path, boxes: Sequence[Bbox]) -> str:
+    west, south = (min(box[k] for box in boxes) for k in (0, 1))
+    east, north = (max(box[k] for box in boxes) for k in (2, 3))
+    where = f"{west:g},{south:g},{east:g},{north:g}"
+    return f"cut a part out of it first, e.g. osmium extract --bbox {where} {path.name} -o part.osm.pbf"
+
+
+def read_into(path: Path, out: Path, boxes: Sequence[Bbox]) -> str:
+    """Read an extract without bounds on memory and time: for a process of its own that has them.
+
+    Parameters
+    ----------
+    path, out : Path
+        The extract, and where what is found goes, as JSON.
+    boxes : sequence of (west, south, east, north)
+        Degrees.
+
+    Returns
+    -------
+    str
+        What is wrong with the file; empty where nothing is.
+    """
     try:
-        found, extent = _read(osmium, path, bbox)
-    except (RuntimeError, ValueError, UnicodeError) as error:
-        why = " ".join(str(error).split()) or "it is damaged"
-        raise AssetError(f"{path} cannot be read as a map, or is cut short: {why}; download it again") from None
-    if extent is None:
-        raise AssetError(f"{path} holds no points")
-    if not any(found.values()):
-        west, south, east, north = bbox
-        apart = west > extent[2] or east < extent[0] or south > extent[3] or north < extent[1]
-        why = "lies outside the extract" if apart else "has nothing of the map in it"
-        raise UsageError(f"--bbox {in_words(bbox)} {why}: {path.name} reaches over {in_words(extent)}")
-    points, lines, areas = (tuple(sorted(found[k], key=_order)) for k in ("points", "lines", "areas"))
-    return Map(points, lines, areas, extent)
+        found, extent = _read(importlib.import_module("osmium"), path, boxes)
+        if extent is None:
+            return "holds no points"
+        out.write_text(json.dumps({"extent": extent, "boxes": found}), encoding="utf-8")
+    except (MemoryError, ImportError):
+        return f"needs too much memory to read: {_part(path, boxes)}"
+    except Exception as error:  # a foreign file may make a reader fail in any way: it is named, never let through
+        if "bad_alloc" in str(error):
+            return f"needs too much memory to read: {_part(path, boxes)}"
+        why = " ".join(str(error).split())[:200] or "it is damaged"
+        return f"cannot be read as a map, or is cut short: {why}; download it again"
+    return ""
 
 
 def _order(feature: Feature) -> tuple[str, list[tuple[str, str]], bytes]:
@@ -116,27 +173,36 @@ def _key(shape: Any) -> str:
     return " ".join(f"{degrees:.7f}" for degrees in shape.bounds)
 
 
-def _read(osmium: Any, path: Path, bbox: Bbox) -> tuple[dict[str, list[Feature]], Bbox | None]:
+def _read(osmium: Any, path: Path, boxes: Sequence[Bbox]) -> tuple[list[dict[str, list[_Said]]], Bbox | None]:
     """Go through a file once; the extent is that of its points, which a header need not state."""
-    window = shapely.box(*bbox)
-    shapely.prepare(window)
-    found: dict[str, list[Feature]] = {"points": [], "lines": [], "areas": []}
+    windows = shapely.box(*np.asarray(boxes, dtype=np.float64).T)
+    around = shapely.box(*shapely.total_bounds(windows))
+    for shape in (windows, around):
+        shapely.prepare(shape)
+    found: list[dict[str, list[_Said]]] = [{kind: [] for kind in _KINDS} for _ in boxes]
     low, high = [1e9, 1e9], [-1e9, -1e9]
     factory = osmium.geom.WKBFactory()
+
+    def keep(kind: str, shape: Any, part: Any, tags: Tags) -> None:
+        if not around.intersects(part):
+            return
+        for k in np.flatnonzero(shapely.intersects(windows, part)):
+            found[k][kind].append((_key(shape), str(shapely.to_wkb(part, hex=True)), tags))
+
     for thing in osmium.FileProcessor(str(path)).with_locations().with_areas():
         if thing.is_node():
             lon, lat = thing.location.lon, thing.location.lat
             low, high = [min(low[0], lon), min(low[1], lat)], [max(high[0], lon), max(high[1], lat)]
-            if thing.tags and bbox[0] <= lon <= bbox[2] and bbox[1] <= lat <= bbox[3]:
+            if thing.tags:
                 point = shapely.Point(lon, lat)
-                found["points"].append(Feature(_key(point), point, dict(thing.tags)))
+                keep("points", point, point, dict(thing.tags))
         elif thing.is_way():
             tags = dict(thing.tags)
             if not tags or (thing.is_closed() and _is_area(tags)) or len(thing.nodes) > _MOST_POINTS:
                 continue
             line = _line(thing.nodes)
-            if line is not None and window.intersects(line):
-                found["lines"].append(Feature(_key(line), line, tags))
+            if line is not None:
+                keep("lines", line, line, tags)
         elif thing.is_area():
             tags = dict(thing.tags)
             if not _is_area(tags):
@@ -145,11 +211,9 @@ def _read(osmium: Any, path: Path, bbox: Bbox) -> tuple[dict[str, list[Feature]]
                 whole = shapely.from_wkb(bytes.fromhex(factory.create_multipolygon(thing)))
             except RuntimeError:
                 continue  # an outline that the extract has cut
-            if not window.intersects(whole):
-                continue
             for part in shapely.get_parts(whole):
-                if isinstance(part, Polygon) and window.intersects(part):
-                    found["areas"].append(Feature(_key(whole), part, tags))
+                if isinstance(part, Polygon):
+                    keep("areas", whole, part, tags)
     extent = None if low[0] > high[0] else (low[0], low[1], high[0], high[1])
     return found, extent
 
@@ -167,3 +231,7 @@ def _line(nodes: Any) -> LineString | None:
     at = [(n.lon, n.lat) for n in nodes if n.location.valid()]
     at = [p for k, p in enumerate(at) if k == 0 or p != at[k - 1]]
     return LineString(at) if len(at) > 1 else None
+
+
+if __name__ == "__main__":
+    raise SystemExit(bounded(lambda given: read_into(Path(given[0]), Path(given[1]), json.loads(given[2]))))

@@ -12,7 +12,7 @@ from aerialdojo_gen.imports.command import PIPELINE, pipeline_text
 from aerialdojo_gen.imports.dem import Dem, read_dem
 from aerialdojo_gen.imports.earth import Bbox, checked_bbox, tiles
 from aerialdojo_gen.imports.map_recipe import town_recipe
-from aerialdojo_gen.imports.osm import read_map
+from aerialdojo_gen.imports.osm import read_maps
 from aerialdojo_gen.imports.relief import ground_of, relief_recipe
 from aerialdojo_gen.layouts.build import build_scene
 from aerialdojo_gen.pipeline.run import home
@@ -116,9 +116,9 @@ def add_map(
     model = None if dem is None else read_dem(dem)
     heights = None if model is None else ground_of(model, cell_m)
     texts = []
-    for one, box in zip(names, boxes, strict=True):
-        w, s, e, n = box
-        found = read_map(extract, (w - _BEYOND_DEG, s - _BEYOND_DEG / 2, e + _BEYOND_DEG, n + _BEYOND_DEG / 2))
+    wide, high = _BEYOND_DEG, _BEYOND_DEG / 2
+    maps = read_maps(extract, [(w - wide, s - high, e + wide, n + high) for w, s, e, n in boxes])
+    for one, box, found in zip(names, boxes, maps, strict=True):
         text, told = town_recipe(
             found, box, extract.name, heights=heights, extra_attribution=attribution, seed=seed, ceiling_m=ceiling_m,
             drive_on=drive_on,

@@ -16,6 +16,9 @@ from aerialdojo_gen.learning.seen import Reckoning, goal_picture, packed
 from aerialdojo_gen.learning.words import goal_text
 from aerialdojo_gen.store.files import file_digest
 
+# Tokens of a text: what is longer is no description.
+_LONGEST = 1024
+
 
 class Policy(AgentBase):
     """Flies what a network says, the most likely action at each step.
@@ -112,6 +115,21 @@ class Policy(AgentBase):
         return self._previous
 
 
+def _agree(about: checkpoints.About, shape: Any) -> None:
+    """Refuse what the weights cannot take; that shape holds for them has been seen. ValueError says what."""
+    sensors, vocabulary = about.sensors, about.vocabulary
+    if len(sensors.views) != shape.views or len(vocabulary) != shape.words:
+        raise ValueError(
+            f"{len(sensors.views)} views and {len(vocabulary)} words, for weights of {shape.views} and {shape.words}"
+        )
+    if sensors.views and (sensors.width, sensors.height) != (shape.size_px, shape.size_px):
+        raise ValueError(
+            f"pictures of {sensors.width} x {sensors.height}, for weights of {shape.size_px} x {shape.size_px}"
+        )
+    if vocabulary.length > _LONGEST:
+        raise ValueError(f"texts of {vocabulary.length} tokens, {_LONGEST} at most")
+
+
 def network_of(about: checkpoints.About, tensors: dict[str, Any], where: str) -> Any:
     """Make the network that weights are of; StoreError where they do not fit it."""
     from aerialdojo_gen.learning.network import Network, Shape
@@ -123,6 +141,7 @@ def network_of(about: checkpoints.About, tensors: dict[str, Any], where: str) ->
             network = Network(shape)
         network.load_state_dict({name.removeprefix("network."): t for name, t in tensors.items()}, assign=True)
         network.float()
+        _agree(about, shape)
     except (RuntimeError, TypeError, ValueError, KeyError) as error:
         raise StoreError(f"{where} holds no policy of this version: {first_line(error)}") from None
     return network

@@ -27,10 +27,12 @@ PLUMBING: dict[str, tuple[str, ...]] = {
     "aerialdojo_gen": (),
     "aerialdojo_gen.benchmark": (),
     "aerialdojo_gen.common": (),
+    "aerialdojo_gen.common.advice": (),
     "aerialdojo_gen.common.disk": (),
     "aerialdojo_gen.common.terms": ("*",),
     "aerialdojo_gen.common.explain": (),
     "aerialdojo_gen.common.names": (),
+    "aerialdojo_gen.common.secrets": (),
     "aerialdojo_gen.common.text_table": (),
     "aerialdojo_gen.common.trouble": (),
     "aerialdojo_gen.common.version": (),
@@ -150,9 +152,9 @@ class Code:
 
 
 @cache
-def code_of(module: str, chosen: Choice | None = None) -> Code:
+def code_of(module: str, chosen: Choice | None = None, idle: tuple[str, ...] = ()) -> Code:
     """Return the code that a module of the running package consists of, as it is when first asked in this process."""
-    return _running().of(module, chosen)
+    return _running().of(module, chosen, idle)
 
 
 @cache
@@ -160,9 +162,9 @@ def _running() -> Package:
     return Package(Path(__file__).parents[1])
 
 
-def stage_code(stage: str, chosen: Choice | None = None) -> Code:
+def stage_code(stage: str, chosen: Choice | None = None, idle: tuple[str, ...] = ()) -> Code:
     """Return the code of a stage, by the stage's name."""
-    return code_of(stage_module(stage), chosen)
+    return code_of(stage_module(stage), chosen, idle)
 
 
 def stage_module(stage: str) -> str:
@@ -192,7 +194,7 @@ class Package:
         self._facts: dict[str, Facts] = {}
         self._paths = {_module_name(path.relative_to(folder.parent)): path for path in sorted(folder.rglob("*.py"))}
 
-    def of(self, module: str, chosen: Choice | None = None) -> Code:
+    def of(self, module: str, chosen: Choice | None = None, idle: tuple[str, ...] = ()) -> Code:
         """Return the code that a module consists of.
 
         Parameters
@@ -201,6 +203,8 @@ class Package:
             Its absolute name.
         chosen : Choice, optional
             What is known of a package whose modules it imports by a name made at run time.
+        idle : tuple of str, optional
+            Absolute names of modules and of libraries that are not used, although there are imports of them.
 
         Raises
         ------
@@ -209,7 +213,7 @@ class Package:
         RuntimeError
             A module imports what cannot be told from its source.
         """
-        search = _Search(self, chosen)
+        search = _Search(self, chosen, frozenset(idle))
         for edge in (Edge(module), *_WRITERS):
             search.follow(edge)
         self._cache.save()
@@ -250,8 +254,8 @@ def _module_name(path: Path) -> str:
 class _Search:
     """Follows imports from where it is put."""
 
-    def __init__(self, package: Package, chosen: Choice | None) -> None:
-        self._package, self._chosen = package, chosen
+    def __init__(self, package: Package, chosen: Choice | None, idle: frozenset[str]) -> None:
+        self._package, self._chosen, self._idle = package, chosen, idle
         self.parts: dict[str, str] = {}
         self.libraries: set[str] = set()
         self._seen: set[Edge] = set()
@@ -264,6 +268,8 @@ class _Search:
             if edge in self._seen:
                 continue
             self._seen.add(edge)
+            if edge.module in self._idle or f"{edge.module}.{edge.name}" in self._idle:
+                continue
             if not self._package.belongs(edge.module):
                 if edge.module not in sys.stdlib_module_names and edge.module not in _SHAPELESS:
                     self.libraries.add(edge.module)

@@ -46,7 +46,7 @@ def scene_fingerprint(stage: Stage, pipeline: Pipeline, roots: Roots, scene: str
     StoreError, AssetError
         An input or an asset is missing or damaged.
     """
-    code = scene_code(stage, roots, scene)
+    code = scene_code(stage, roots, scene, pipeline.section(stage.name))
     # The paper's figures lie beside the package in a checkout, inside it in a wheel.
     carried = paper.files() if "aerialdojo_gen.common.paper" in code.parts else []
     sources = [*stage.sources(roots, scene), *carried]
@@ -64,9 +64,9 @@ def scene_fingerprint(stage: Stage, pipeline: Pipeline, roots: Roots, scene: str
     return hashlib.sha256(json.dumps(facts, sort_keys=True).encode()).hexdigest()
 
 
-def scene_code(stage: Stage, roots: Roots, scene: str) -> Code:
-    """Return the code that a stage runs for a scene."""
-    return stage_code(stage.name, stage.imports(roots, scene))
+def scene_code(stage: Stage, roots: Roots, scene: str, config: Section | None = None) -> Code:
+    """Return the code that a stage runs for a scene; without a configuration, all that any would run."""
+    return stage_code(stage.name, stage.imports(roots, scene), () if config is None else stage.idle(config))
 
 
 @lru_cache(maxsize=4096)

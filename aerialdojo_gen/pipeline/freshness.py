@@ -119,7 +119,7 @@ def shards_of(
                 found.fresh.append(summary)
             else:
                 whole = Job(stage.name, scene, part, parts, pipeline.seed, pipeline.embodiment, roots)
-                code = scene_code(stage, roots, scene).digest
+                code = scene_code(stage, roots, scene, config).digest
                 job = replace(whole, deadline=limits.deadline, force=force, verify=limits.verify, code=code)
                 found.tasks.append(Task(job, config, fingerprint))
     return found

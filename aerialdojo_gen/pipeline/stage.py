@@ -171,6 +171,10 @@ def _any_module(_roots: Roots, _scene: str) -> Choice | None:
     return None
 
 
+def _nothing_idle(_config: Any) -> tuple[str, ...]:
+    return ()
+
+
 @dataclass(frozen=True)
 class Stage:
     """A stage of the pipeline.
@@ -195,6 +199,9 @@ class Stage:
     imports : callable
         ``(roots, scene) -> Choice or None``: which modules the scene's work imports of a package by a name made
         at run time; the others' code makes nothing of the scene stale. None where that is not known: all count.
+    idle : callable
+        ``(config) -> tuple of str``: modules and libraries that the work does not use with such a configuration,
+        although it has imports of them. They do not count: whoever installs an extra has nothing made again.
     check : callable
         ``(data, scenes, config)``: raises an `AerialDojoError` where the inputs of all scenes together will not do,
         before anything is written.
@@ -226,6 +233,7 @@ class Stage:
     sources: Callable[[Roots, str], list[Path]] = _no_sources
     wants: Callable[[Roots, str], str] = _no_want
     imports: Callable[[Roots, str], Choice | None] = _any_module
+    idle: Callable[[Any], tuple[str, ...]] = _nothing_idle
     check: Callable[[DataRoot, Sequence[str], Any], None] = _no_check
     settle: Callable[[Any, Callable[[str], None]], Any] = _as_it_is
     choices: Callable[[Any], list[Any]] = _no_choice

@@ -49,9 +49,12 @@ _MISMATCH_SHARE = 0.03
 
 
 def _looks_different(before: Floats, now: Floats, picture: Picture) -> bool:
-    """Whether a picture must differ from the one before: the camera has moved, and not only under the same sky."""
-    part = slice(0, 4) if np.isfinite(picture.depth_m).any() else slice(0, 3)
-    return not np.allclose(before[:3, part], now[:3, part], rtol=0.0, atol=1e-4)
+    """Whether a picture must differ from the one before: the camera has moved, and not only under the same sky.
+
+    The sky is the same from everywhere and to every side: of it alone a camera sees something else only if it tilts.
+    """
+    rows, columns = (slice(0, 3), slice(0, 4)) if np.isfinite(picture.depth_m).any() else (slice(2, 3), slice(0, 3))
+    return not np.allclose(before[rows, columns], now[rows, columns], rtol=0.0, atol=1e-4)
 
 
 @dataclass

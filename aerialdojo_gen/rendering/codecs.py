@@ -15,6 +15,7 @@ from types import TracebackType
 from typing import Any
 
 import av
+import cv2
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
@@ -30,6 +31,9 @@ CODEC = {"rgb": RGB_CODEC, "depth": DEPTH_CODEC, "instance": DEPTH_CODEC}
 _H264 = {"g": "15", "bf": "0", "flags": "+bitexact+cgop"}
 # Every frame a key frame; a checksum a slice, so that a damaged file is noticed.
 _FFV1 = {"level": "3", "slices": "4", "slicecrc": "1", "g": "1", "flags": "+bitexact"}
+
+# 16 and 128, and half of what the shift cuts off.
+_Y_OFFSET, _UV_OFFSET = (16 << 16) + (1 << 15), (128 << 18) + (1 << 17)
 
 
 def to_stored(depth_m: NDArray[np.floating[Any]], step: float = 0.0) -> NDArray[np.uint16]:
@@ -151,9 +155,7 @@ class VideoWriter:
     def write(self, frames: Mapping[str, NDArray[np.uint8] | NDArray[np.uint16]]) -> None:
         """Append a frame to every stream, by modality."""
         for modality, stream in self._streams.items():
-            kind = "rgb24" if modality == "rgb" else "gray16le"
-            picture = av.VideoFrame.from_ndarray(np.ascontiguousarray(frames[modality]), format=kind)
-            for packet in stream.encode(picture):
+            for packet in stream.encode(_frame(modality, frames[modality])):
                 self._container.mux(packet)
 
     def close(self) -> None:
@@ -175,6 +177,58 @@ class VideoWriter:
             self.close()
         else:
             self._container.close()
+
+
+def _frame(modality: str, picture: NDArray[np.uint8] | NDArray[np.uint16]) -> Any:
+    """Copy a picture into a frame of its codec's format; ValueError where it does not fit one."""
+    height, width = picture.shape[:2]
+    if modality == "rgb":
+        if picture.dtype != np.uint8 or picture.shape[2:] != (3,) or height % 2 or width % 2:
+            raise ValueError(f"a picture is (H, W, 3) uint8, H and W even, not {picture.shape} {picture.dtype}")
+        frame = av.VideoFrame(width, height, "yuv420p")
+        # A pixel in one load each: that, and no table, is what lets the compiler take several at a time.
+        rgba = cv2.cvtColor(picture, cv2.COLOR_RGB2RGBA).view(np.int32)[..., 0]
+        _to_yuv(rgba, *(_plane(frame, k, np.uint8) for k in range(3)))
+        return frame
+    if picture.dtype != np.uint16 or picture.ndim != 2:
+        raise ValueError(f"depth and instance ids are (H, W) uint16, not {picture.shape} {picture.dtype}")
+    frame = av.VideoFrame(width, height, "gray16le")
+    _plane(frame, 0, np.uint16)[:] = picture
+    return frame
+
+
+def _plane(frame: Any, k: int, dtype: type[np.uint8] | type[np.uint16]) -> NDArray[Any]:
+    """Return a frame's own memory of one plane, without what its lines are filled up with."""
+    plane = frame.planes[k]
+    return np.frombuffer(plane, dtype).reshape(plane.height, -1)[:, : plane.width]
+
+
+@njit(cache=True, error_model="numpy")
+def _to_yuv(
+    rgba: NDArray[np.int32], y: NDArray[np.uint8], u: NDArray[np.uint8], v: NDArray[np.uint8]
+) -> None:  # fmt: skip
+    """Convert by BT.601, limited range, chroma the mean of four pixels: whole numbers, the same on every machine."""
+    for r in range(rgba.shape[0]):
+        for c in range(rgba.shape[1]):
+            p = np.int32(rgba[r, c])
+            red, green, blue = p & 255, (p >> 8) & 255, (p >> 16) & 255
+            y[r, c] = np.uint8(
+                (np.int32(16829) * red + np.int32(33039) * green + np.int32(6416) * blue + np.int32(_Y_OFFSET)) >> 16
+            )
+    for r in range(rgba.shape[0] // 2):
+        for c in range(rgba.shape[1] // 2):
+            a, b = np.int32(rgba[2 * r, 2 * c]), np.int32(rgba[2 * r, 2 * c + 1])
+            d, e = np.int32(rgba[2 * r + 1, 2 * c]), np.int32(rgba[2 * r + 1, 2 * c + 1])
+            red = (a & 255) + (b & 255) + (d & 255) + (e & 255)
+            green = ((a >> 8) & 255) + ((b >> 8) & 255) + ((d >> 8) & 255) + ((e >> 8) & 255)
+            blue = ((a >> 16) & 255) + ((b >> 16) & 255) + ((d >> 16) & 255) + ((e >> 16) & 255)
+            # Four pixels' sum, so two bits more.
+            u[r, c] = np.uint8(
+                (np.int32(28784) * blue - np.int32(9714) * red - np.int32(19070) * green + np.int32(_UV_OFFSET)) >> 18
+            )
+            v[r, c] = np.uint8(
+                (np.int32(28784) * red - np.int32(24103) * green - np.int32(4681) * blue + np.int32(_UV_OFFSET)) >> 18
+            )
 
 
 class PngWriter:

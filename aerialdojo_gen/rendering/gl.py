@@ -21,6 +21,7 @@ from aerialdojo_gen.rendering import gl_shaders as glsl
 from aerialdojo_gen.rendering.bodies import GlBodies
 from aerialdojo_gen.rendering.gl_foreign import backdrop_kinds, foreign_kinds
 from aerialdojo_gen.rendering.gl_geometry import VERTEX, Kind, chunks
+from aerialdojo_gen.rendering.gl_tiles import Tiles
 from aerialdojo_gen.rendering.lighting import light_of, sun_view
 from aerialdojo_gen.rendering.picture import FAR_M, NEAR_M, Picture
 from aerialdojo_gen.scenes.model import Scene
@@ -176,8 +177,9 @@ class GlRenderer:
         seen: list[list[NDArray[np.uint32]]] = [[] for _ in poses]
         for views in eyes.values():
             eye = np.ascontiguousarray(poses[views[0]][:3, 3])
+            tiles = Tiles.empty(len(views), camera.width, camera.height)
             for drawn in self._sets:
-                found = drawn.kind.chunks.seen(clips[views], eye, camera.width, camera.height)
+                found = drawn.kind.chunks.seen(clips[views], eye, tiles, drawn.kind.hides)
                 for v, indices in zip(views, found, strict=True):
                     seen[v].append(indices)
         # One target for all: what a view leaves in the processor's cache serves the next.

@@ -12,6 +12,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from aerialdojo_gen.rendering.gl_tiles import cover, hidden
+
 Floats = NDArray[np.float64]
 
 # Corners nearer than this are not projected; and how far OpenGL may round a corner, pixels.
@@ -69,8 +71,14 @@ def triangles_in_view(
     corners: NDArray[np.float32],
     clips: Floats,
     eye: Floats,
+    low: Floats,
+    high: Floats,
+    hides: bool,
     width: int,
     height: int,
+    whole: NDArray[np.float32],
+    part: NDArray[np.float32],
+    covered: NDArray[np.uint64],
 ) -> tuple[NDArray[np.uint32], NDArray[np.int64]]:
     """Choose the triangles of every view.
 
@@ -87,8 +95,14 @@ def triangles_in_view(
     clips : (v, 4, 4) float64
     eye : (3,) float64
         The views' common one.
+    low, high : (k, 3) float64
+        The chunks' boxes.
+    hides : bool
+        Whether what lies behind these triangles is not seen.
     width, height : int
         Pixels.
+    whole, part, covered
+        Of `aerialdojo_gen.rendering.gl_tiles.Tiles`: what is drawn already; what hides is added.
 
     Returns
     -------
@@ -104,15 +118,22 @@ def triangles_in_view(
     out = np.empty((views, 3 * most), dtype=np.uint32)
     count = np.zeros(views, dtype=np.int64)
     half_w, half_h = 0.5 * width, 0.5 * height
+    here = np.empty(views, dtype=np.bool_)
     for c in range(len(order)):
-        for t in range(starts[order[c]], starts[order[c] + 1]):
+        chunk, views_left = order[c], False
+        for v in range(views):
+            here[v] = sees[c, v] and not _box_hidden(low[chunk], high[chunk], clips[v], width, height, whole[v])
+            views_left |= here[v]
+        if not views_left:
+            continue
+        for t in range(starts[chunk], starts[chunk + 1]):
             if planes[t, 0] * eye[0] + planes[t, 1] * eye[1] + planes[t, 2] * eye[2] + planes[t, 3] <= 0.0:
                 continue
             ax, ay, az = corners[t, 0] - eye[0], corners[t, 1] - eye[1], corners[t, 2] - eye[2]
             bx, by, bz = corners[t, 3] - eye[0], corners[t, 4] - eye[1], corners[t, 5] - eye[2]
             cx, cy, cz = corners[t, 6] - eye[0], corners[t, 7] - eye[1], corners[t, 8] - eye[2]
             for v in range(views):
-                if not sees[c, v]:
+                if not here[v]:
                     continue
                 # Seen from the eye, x, y and w have no constant part.
                 m0, m1, m2 = clips[v, 3, 0], clips[v, 3, 1], clips[v, 3, 2]
@@ -129,10 +150,19 @@ def triangles_in_view(
                     continue
                 if aw >= NEAR_W and bw >= NEAR_W and cw >= NEAR_W:
                     aw, bw, cw = 1.0 / aw, 1.0 / bw, 1.0 / cw
-                    if _between_centres(au * aw, bu * bw, cu * cw, half_w):
+                    au, bu, cu = _pixel(au * aw, half_w), _pixel(bu * bw, half_w), _pixel(cu * cw, half_w)
+                    left, right = _centres(au, bu, cu, width)
+                    if left > right:
                         continue
-                    if _between_centres(av * aw, bv * bw, cv * cw, half_h):
+                    av, bv, cv = _pixel(av * aw, half_h), _pixel(bv * bw, half_h), _pixel(cv * cw, half_h)
+                    top, bottom = _centres(av, bv, cv, height)
+                    if top > bottom or hidden(left, right, top, bottom, max(aw, bw, cw), whole[v]):
                         continue
+                    if hides:
+                        cover(
+                            au, av, aw, bu, bv, bw, cu, cv, cw, left, right, top, bottom, width, height,
+                            whole[v], part[v], covered[v],
+                        )  # fmt: skip
                 n = count[v]
                 out[v, n], out[v, n + 1], out[v, n + 2] = 3 * t, 3 * t + 1, 3 * t + 2
                 count[v] = n + 3
@@ -140,9 +170,34 @@ def triangles_in_view(
 
 
 @njit(cache=True, inline="always")
-def _between_centres(a: float, b: float, c: float, half: float) -> bool:
-    """Whether three places across the picture, from -1 to 1, have no pixel's centre between them."""
-    # To pixels, centres at whole numbers; OpenGL rounds corners to 1/256 pixel.
-    first = (min(a, b, c) + 1.0) * half - 0.5 - ROUNDING_PX
-    last = (max(a, b, c) + 1.0) * half - 0.5 + ROUNDING_PX
-    return math.ceil(first) > math.floor(last)
+def _pixel(place: float, half: float) -> float:
+    """From -1 to 1 across the picture, to pixels, centres at whole numbers."""
+    return (place + 1.0) * half - 0.5
+
+
+@njit(cache=True, inline="always")
+def _centres(a: float, b: float, c: float, size: int) -> tuple[int, int]:
+    """First and last pixel whose centre may lie between three places; the first is the larger where none does."""
+    return (
+        max(math.ceil(min(a, b, c) - ROUNDING_PX), 0),
+        min(math.floor(max(a, b, c) + ROUNDING_PX), size - 1),
+    )
+
+
+@njit(cache=True, error_model="numpy")
+def _box_hidden(low: Floats, high: Floats, m: Floats, width: int, height: int, whole: NDArray[np.float32]) -> bool:
+    """Whether a box lies behind what is drawn at every pixel whose centre it could hold."""
+    u0, u1, v0, v1, nearest = np.inf, -np.inf, np.inf, -np.inf, np.inf
+    for corner in range(8):
+        x = high[0] if corner & 1 else low[0]
+        y = high[1] if corner & 2 else low[1]
+        z = high[2] if corner & 4 else low[2]
+        w = m[3, 0] * x + m[3, 1] * y + m[3, 2] * z + m[3, 3]
+        if w < NEAR_W:
+            return False
+        u = _pixel((m[0, 0] * x + m[0, 1] * y + m[0, 2] * z + m[0, 3]) / w, 0.5 * width)
+        v = _pixel((m[1, 0] * x + m[1, 1] * y + m[1, 2] * z + m[1, 3]) / w, 0.5 * height)
+        u0, u1, v0, v1, nearest = min(u0, u), max(u1, u), min(v0, v), max(v1, v), min(nearest, w)
+    left, right = max(math.ceil(u0 - ROUNDING_PX), 0), min(math.floor(u1 + ROUNDING_PX), width - 1)
+    top, bottom = max(math.ceil(v0 - ROUNDING_PX), 0), min(math.floor(v1 + ROUNDING_PX), height - 1)
+    return left > right or top > bottom or hidden(left, right, top, bottom, 1.0 / nearest, whole)

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from aerialdojo_gen.geometry.morton import morton_codes
 from aerialdojo_gen.rendering.gl_culling import chunks_in_view, triangles_in_view
+from aerialdojo_gen.rendering.gl_tiles import Tiles
 from aerialdojo_gen.scenes.model import Material, Part, Scene
 
 Floats = NDArray[np.float64]
@@ -62,7 +63,7 @@ class Chunks:
     planes: Floats
     corners: NDArray[np.float32]
 
-    def seen(self, clips: Floats, eye: Floats, width: int, height: int) -> list[NDArray[np.uint32]]:
+    def seen(self, clips: Floats, eye: Floats, tiles: Tiles, hides: bool = True) -> list[NDArray[np.uint32]]:
         """Choose what the views of one eye draw.
 
         Parameters
@@ -71,8 +72,10 @@ class Chunks:
             OpenGL's matrices of the cameras, row-major.
         eye : (3,) float64
             The cameras' common centre.
-        width, height : int
-            Pixels.
+        tiles : Tiles
+            What is drawn already; what is chosen here and hides is added.
+        hides : bool
+            Whether what lies behind a triangle is not seen: not so where its texture has holes.
 
         Returns
         -------
@@ -81,8 +84,9 @@ class Chunks:
         """
         order, sees = chunks_in_view(self.low, self.high, eye, clips)
         indices, count = triangles_in_view(
-            order, sees, self.starts, self.planes, self.corners, clips, eye, width, height
-        )
+            order, sees, self.starts, self.planes, self.corners, clips, eye, self.low, self.high, hides,
+            tiles.width, tiles.height, tiles.whole, tiles.part, tiles.covered,
+        )  # fmt: skip
         return [row[:n] for row, n in zip(indices, count, strict=True)]
 
 

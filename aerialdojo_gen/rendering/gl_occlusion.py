@@ -16,16 +16,9 @@ from numpy.typing import NDArray
 
 from aerialdojo_gen.rendering.gl_culling import NEAR_W, ROUNDING_PX, chunks_in_view
 from aerialdojo_gen.rendering.gl_geometry import Chunks
-from aerialdojo_gen.rendering.picture import NEAR_M
+from aerialdojo_gen.rendering.gl_tiles import MOVED_PX, NEARER, NEAREST, Tiles
 
 Floats = NDArray[np.float64]
-
-# How far OpenGL moves a corner at most, pixels: it counts them in 256ths.
-_MOVED_PX = 0.004
-# What is nearer than OpenGL's near plane hides nothing.
-_NEAREST = 1.0 / NEAR_M
-# How much nearer something must be to hide another, in inverse metres: several steps of the depth buffer.
-_NEARER = 1e-5
 
 
 class BodyCulling:
@@ -66,7 +59,7 @@ class BodyCulling:
         """
         c = self._chunks
         if not self._hides:
-            return c.seen(clips, eye, width, height)
+            return c.seen(clips, eye, Tiles.empty(len(clips), width, height), hides=False)
         order, sees = chunks_in_view(c.low, c.high, eye, clips)
         if len(self._out) < len(clips):
             self._out = np.empty((len(clips), len(c.vertices)), np.uint32)
@@ -150,7 +143,7 @@ def _hidden(low: Floats, high: Floats, m: Floats, nearness: NDArray[np.float32])
         u0, u1, v0, v1, nearest = min(u0, u), max(u1, u), min(v0, v), max(v1, v), min(nearest, w)
     left, right = max(math.ceil(u0 - ROUNDING_PX), 0), min(math.floor(u1 + ROUNDING_PX), width - 1)
     top, bottom = max(math.ceil(v0 - ROUNDING_PX), 0), min(math.floor(v1 + ROUNDING_PX), height - 1)
-    limit = np.float32(1.0 / nearest + _NEARER)
+    limit = np.float32(1.0 / nearest + NEARER)
     for y in range(top, bottom + 1):
         for x in range(left, right + 1):
             if nearness[y, x] <= limit:
@@ -172,12 +165,12 @@ def _covers(
     if area < 0.0:
         a0, b0, a1, b1, a2, b2 = -a0, -b0, -a1, -b1, -a2, -b2
     # Where a corner is moved, an edge's function changes by at most so much.
-    s0, s1, s2 = _MOVED_PX * (abs(a0) + abs(b0)), _MOVED_PX * (abs(a1) + abs(b1)), _MOVED_PX * (abs(a2) + abs(b2))
+    s0, s1, s2 = MOVED_PX * (abs(a0) + abs(b0)), MOVED_PX * (abs(a1) + abs(b1)), MOVED_PX * (abs(a2) + abs(b2))
     flat = abs(area) < 1e-9
     dx = 0.0 if flat else ((n1 - n0) * (v2 - v0) - (n2 - n0) * (v1 - v0)) / area
     dy = 0.0 if flat else ((n2 - n0) * (u1 - u0) - (n1 - n0) * (u2 - u0)) / area
     least, most = min(n0, min(n1, n2)), max(n0, max(n1, n2))
-    slack = _NEARER + _MOVED_PX * (abs(dx) + abs(dy))
+    slack = NEARER + MOVED_PX * (abs(dx) + abs(dy))
     visible = False
     for y in range(top, bottom + 1):
         e0 = a0 * (y - v0) - b0 * (left - u0)
@@ -194,7 +187,7 @@ def _covers(
                         and e1 > s1
                         and e2 > s2
                         and not flat
-                        and most <= _NEAREST
+                        and most <= NEAREST
                         and here - slack > nearness[y, x]
                     ):
                         nearness[y, x] = here - slack

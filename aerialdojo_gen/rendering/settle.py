@@ -39,3 +39,12 @@ def renderer_choices(config: Any) -> list[Any]:
 
     names = RENDERERS if config.renderer == "auto" else (config.renderer,)
     return [config.model_copy(update={"renderer": name}) for name in names]
+
+
+def idle_renderers(config: Any) -> tuple[str, ...]:
+    """Name what the other renderer draws with; nothing before a section has settled for one."""
+    drawers = {
+        "gl": ("aerialdojo_gen.rendering.gl", "moderngl"),
+        "pybullet": ("aerialdojo_gen.rendering.world", "pybullet"),
+    }
+    return () if config.renderer == "auto" else sum((v for k, v in drawers.items() if k != config.renderer), ())

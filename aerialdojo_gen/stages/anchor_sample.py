@@ -27,6 +27,11 @@ def settle(config: AnchorSampleConfig, _say: Callable[[str], None]) -> AnchorSam
     return config.model_copy(update={"clip": config.clip.model_copy(update={"sha256": digest(config.clip)})})
 
 
+def idle(config: AnchorSampleConfig) -> tuple[str, ...]:
+    """Name the scorers that are not asked."""
+    return tuple(f"aerialdojo_gen.scoring.{name}" for name in ("clip", "vlm") if not getattr(config.weights, name))
+
+
 STAGE = Stage(
     "anchor-sample",
     "Find viewpoints 1 m from each object that see it.",
@@ -34,5 +39,6 @@ STAGE = Stage(
     writes=("anchors", "viewpoints"),
     run=run,
     settle=settle,
+    idle=idle,
     seconds=(1.0, 0.1),
 )

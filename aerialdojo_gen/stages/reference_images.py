@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from aerialdojo_gen.pipeline.stage import Job, Output, Stage
-from aerialdojo_gen.rendering.settle import renderer_choices, settle_renderer
+from aerialdojo_gen.rendering.settle import idle_renderers, renderer_choices, settle_renderer
 
 if TYPE_CHECKING:
     from aerialdojo_gen.config.sections import ReferenceImagesConfig
@@ -26,5 +26,6 @@ STAGE = Stage(
     run=run,
     settle=settle_renderer,
     choices=renderer_choices,
+    idle=idle_renderers,
     seconds=(1.0, 0.1),
 )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from aerialdojo_gen.pipeline.stage import Job, Output, Stage
-from aerialdojo_gen.rendering.settle import renderer_choices, settle_renderer
+from aerialdojo_gen.rendering.settle import idle_renderers, renderer_choices, settle_renderer
 
 if TYPE_CHECKING:
     from aerialdojo_gen.config.sections import RenderConfig
@@ -35,6 +35,7 @@ STAGE = Stage(
     parts=parts,
     settle=settle_renderer,
     choices=renderer_choices,
+    idle=idle_renderers,
     digests=("recordings", "path", "sha256"),
     seconds=(10.0, 0.0),
     after_all=True,

@@ -79,6 +79,28 @@ def test_meshes_travel_where_they_are_asked_for(smoke, hub, call, tmp_path):
     assert not (tmp_path / "other" / "release").exists()
 
 
+def test_a_mesh_of_ones_own_is_not_lost(smoke, hub, call, tmp_path):
+    assert call("push-to-hub", NAME, "--data", smoke, "--meshes")[0] == 0
+    own = tmp_path / "meshes" / "U_Courtyard_1.glb"
+    own.parent.mkdir()
+    own.write_bytes(b"drawn by hand")
+    shutil.copyfile(smoke / "meshes" / "U_Courtyard_0.glb", own.with_name("U_Courtyard_0.glb"))
+    refused = has_failed(call("pull", NAME, "--data", tmp_path), 2, str(own), "--no-meshes", "--replace")
+    assert refused is True
+    assert files_of(tmp_path).keys() == {"meshes/U_Courtyard_0.glb", "meshes/U_Courtyard_1.glb"}
+    assert own.read_bytes() == b"drawn by hand"
+    assert call("pull", NAME, "--data", tmp_path, "--replace")[0] == 0
+    assert files_of(tmp_path / "meshes") == files_of(smoke / "meshes")
+
+
+@pytest.mark.parametrize("address", ["http://hub.example", "http://10.0.0.7:8080/hf", "http://127.0.0.1.example"])
+def test_a_token_goes_to_no_other_machine_unencrypted(hub, call, tmp_path, monkeypatch, address):
+    monkeypatch.setenv("HF_ENDPOINT", address)
+    answer = call("pull", NAME, "--data", tmp_path)
+    assert has_failed(answer, 2, f"HF_TOKEN would go to {address} unencrypted", "https://") is True
+    assert TOKEN not in "".join(answer[1:])
+
+
 def test_both_go_on_where_they_were_cut_off(smoke, hub, call, tmp_path):
     large = {path: content for path, content in files_of(smoke / "release").items() if is_large(path)}
     hub.gives_up_after = 5

@@ -10,6 +10,7 @@ from support import maps
 
 from aerialdojo_gen.errors import AssetError, MissingPackage, UsageError
 from aerialdojo_gen.imports.earth import in_words, size_m, tiles
+from aerialdojo_gen.imports.osm import read_maps
 from aerialdojo_gen.imports.places import add_map
 from aerialdojo_gen.layouts.build import build_scene
 from aerialdojo_gen.pipeline.run import home
@@ -197,6 +198,27 @@ def test_a_box_is_cut_into_tiles_with_a_shared_frame(extract, tmp_path):
             ).distance(Point(-10, side))
             < 0.1
         )
+
+
+def test_several_boxes_are_read_at_once_as_each_by_itself(extract):
+    west, south, east, north = maps.box()
+    middle = (west + east) / 2
+    boxes = [(west, south, middle, north), (middle, south, east, north), (west, south, east, (south + north) / 2)]
+    together = read_maps(extract, boxes)
+    for box, found in zip(boxes, together, strict=True):
+        (alone,) = read_maps(extract, [box])
+        assert alone == found
+        window = shapely.box(*box)
+        assert all(window.intersects(f.shape) for f in (*found.points, *found.lines, *found.areas))
+    assert {len(found.points) for found in together} != {len(maps.POINTS)}
+
+
+def test_a_map_is_read_in_bounded_memory(extract, tmp_path):
+    with pytest.raises(AssetError) as found:
+        read_maps(extract, [maps.box()], max_memory_bytes=96 << 20)
+    assert str(found.value).startswith(f"{extract}: ")
+    assert "\n" not in str(found.value)
+    assert read_maps(extract, [maps.box()])[0].lines
 
 
 @pytest.mark.parametrize(

@@ -198,8 +198,9 @@ def test_what_cannot_be_told_apart_says_with_what_it_is_confused(project):
     adopted, _ = adopt("Stack", nodes)
     vocabulary = Vocabulary(dataclasses.replace(adopted, imported=True), load_catalogue(project / "scene_assets"))
     drafter = Drafter(vocabulary, choose_landmarks(vocabulary, 1), 0, Choice(most=30))
-    made = drafter.objects(9)
-    assert len(made) < 9
+    chosen = []
+    made = drafter.objects(9, lambda: chosen.append(1))
+    assert len(chosen) == len(made) < 9
     assert len(drafter.confused) == drafter.refused["without anything to tell them from others of their kind"] > 0
     for node, others in drafter.confused:
         assert node not in others

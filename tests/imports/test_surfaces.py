@@ -13,6 +13,7 @@ from support import foreign
 from support.command_line import said
 from support.hills import hills, standing, write_hills
 
+from aerialdojo_gen.annotations.describing import Vocabulary
 from aerialdojo_gen.errors import AssetError
 from aerialdojo_gen.geometry.ground import Ground
 from aerialdojo_gen.imports.adopt import adopt
@@ -21,8 +22,10 @@ from aerialdojo_gen.imports.command import add_scene
 from aerialdojo_gen.imports.files import read_mesh
 from aerialdojo_gen.imports.naming import Called, Naming
 from aerialdojo_gen.imports.raw import RawNode, RawSurface, no_corners, plain
+from aerialdojo_gen.pipeline.run import home
 from aerialdojo_gen.planning.clearance import ClearanceGrid
 from aerialdojo_gen.planning.collision import CollisionWorld
+from aerialdojo_gen.scenes.catalogue import load_catalogue
 from aerialdojo_gen.scenes.glb import read_glb, write_glb
 
 
@@ -269,3 +272,25 @@ def test_a_cut_glb_is_named(tmp_path):
         (tmp_path / "cut.glb").write_bytes(whole[:end])
         with pytest.raises(AssetError, match=r"cut\.glb: "):
             read_mesh(tmp_path / "cut.glb")
+
+
+def test_the_ground_of_a_scan_without_a_name_is_nothing_to_look_for():
+    at = np.linspace(-60.0, 60.0, 121)
+    x, y = np.meshgrid(at, at)
+    z = 4.0 * np.sin(x / 25.0) + 3.0 * np.cos(y / 20.0)
+    for u, v in ((-30.0, -20.0), (10.0, 25.0), (35.0, -35.0)):
+        z[(np.abs(x - u) < 6.0) & (np.abs(y - v) < 5.0)] += 6.0
+    cell = np.arange(120 * 121).reshape(120, 121)[:, :-1].ravel()
+    faces = np.concatenate(
+        [np.column_stack([cell, cell + 1, cell + 122]), np.column_stack([cell, cell + 122, cell + 121])]
+    )
+    scan = RawNode("Mesh_0", np.column_stack([x.ravel(), y.ravel(), z.ravel()]), faces, plain(len(faces)))
+    scene, _ = adopt("Scan", [scan])
+    wide = [i for i in scene.instances if np.ptp(i.bounds, axis=0)[:2].min() > 100.0]
+    assert [(i.category, i.surface) for i in wide] == [("terrain", "ground")]
+    # What stands on it stays: three blocks, each to be found.
+    things = [i for i in scene.instances if i.category == "object"]
+    assert len(things) == 3
+    vocabulary = Vocabulary(replace(scene, imported=True), load_catalogue(home() / "scene_assets"))
+    targets = {i.node for i, w in zip(scene.instances, vocabulary.words, strict=True) if w.target}
+    assert targets == {i.node for i in things}

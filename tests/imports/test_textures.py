@@ -399,10 +399,85 @@ _DAE = """<?xml version="1.0"?>
 """
 
 
-def test_collada_brings_its_textures_and_places(tmp_path):
+_FBX = """; FBX 7.4.0 project file
+FBXHeaderExtension:  {
+	FBXHeaderVersion: 1003
+	FBXVersion: 7400
+}
+Objects:  {
+	Geometry: 1, "Geometry::", "Mesh" {
+		Vertices: *12 {
+			a: -4,0,0,4,0,0,4,8,0,-4,8,0
+		}
+		PolygonVertexIndex: *4 {
+			a: 0,1,2,-4
+		}
+		GeometryVersion: 124
+		LayerElementUV: 0 {
+			Version: 101
+			Name: "UVMap"
+			MappingInformationType: "ByPolygonVertex"
+			ReferenceInformationType: "Direct"
+			UV: *8 {
+				a: 0,0,1,0,1,1,0,1
+			}
+		}
+		LayerElementMaterial: 0 {
+			Version: 101
+			Name: ""
+			MappingInformationType: "AllSame"
+			ReferenceInformationType: "IndexToDirect"
+			Materials: *1 {
+				a: 0
+			}
+		}
+		Layer: 0 {
+			Version: 100
+			LayerElement:  {
+				Type: "LayerElementUV"
+				TypedIndex: 0
+			}
+			LayerElement:  {
+				Type: "LayerElementMaterial"
+				TypedIndex: 0
+			}
+		}
+	}
+	Model: 2, "Model::Wall", "Mesh" {
+		Version: 232
+		Properties70:  {
+			P: "Lcl Translation", "Lcl Translation", "", "A",0,0,-5
+		}
+	}
+	Material: 3, "Material::Brick", "" {
+		Version: 102
+		ShadingModel: "phong"
+		Properties70:  {
+			P: "DiffuseColor", "Color", "", "A",1,1,1
+		}
+	}
+	Texture: 4, "Texture::Board", "" {
+		Type: "TextureVideoClip"
+		Version: 202
+		TextureName: "Texture::Board"
+		FileName: "C:\\scans\\board.png"
+		RelativeFilename: "board.png"
+	}
+}
+Connections:  {
+	C: "OO",2,0
+	C: "OO",1,2
+	C: "OO",3,2
+	C: "OP",4,3, "DiffuseColor"
+}
+"""
+
+
+@pytest.mark.parametrize(("suffix", "text"), [(".dae", _DAE), (".fbx", _FBX)])
+def test_interchange_files_bring_their_textures_and_places(tmp_path, suffix, text):
     (tmp_path / "board.png").write_bytes(textured.picture_file(textured.checkerboard()))
-    (tmp_path / "wall.dae").write_text(_DAE)
-    (node,) = nodes_of(tmp_path / "wall.dae", tmp_path / "nodes.npz")
+    (tmp_path / f"wall{suffix}").write_text(text)
+    (node,) = nodes_of(tmp_path / f"wall{suffix}", tmp_path / "nodes.npz")
     assert node.name == "Wall"
     # Whatever the file's axis, Assimp turns Collada y up.
     np.testing.assert_allclose(node.vertices[:, 2], -5.0)

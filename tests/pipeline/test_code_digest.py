@@ -1,19 +1,22 @@
 """Fingerprints follow the code: what it does changes them, what is said about it does not."""
 
+import os
 import re
 import shutil
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 
 import aerialdojo_gen
 from aerialdojo_gen.benchmark.flying_code import flying_code
-from aerialdojo_gen.config.sections import AnchorSampleConfig, ClipConfig
+from aerialdojo_gen.config.sections import AnchorSampleConfig, ClipConfig, ReferenceImagesConfig, RenderConfig
 from aerialdojo_gen.pipeline import code_digest
 from aerialdojo_gen.pipeline.code_digest import PLUMBING, Package, code_of, stage_code, stage_module
 from aerialdojo_gen.pipeline.code_facts import module_facts
 from aerialdojo_gen.pipeline.fingerprint import _values
-from aerialdojo_gen.pipeline.registry import STAGES
+from aerialdojo_gen.pipeline.registry import BY_NAME, STAGES
 
 NAMES = [stage.name for stage in STAGES]
 SOURCES = Path(aerialdojo_gen.__file__).parent
@@ -106,6 +109,7 @@ def test_a_constant_of_a_module_that_it_uses_makes_it_stale(copied, name):
         "pipeline/runner.py",
         "benchmark/report.py",
         "release/card.py",
+        "common/advice.py",
     ],
 )
 def test_messages_and_plumbing_make_nothing_stale(copied, relative):
@@ -116,7 +120,8 @@ def test_plumbing_is_what_it_is_said_to_be():
     """Whoever lists a module here has thought about whether it decides what is written."""
     assert set(PLUMBING) == {
         f"aerialdojo_gen{name}"
-        for name in ("", ".benchmark", ".common", ".common.disk", ".common.explain", ".common.names",
+        for name in ("", ".benchmark", ".common", ".common.advice", ".common.disk", ".common.explain",
+                     ".common.names", ".common.secrets",
                      ".common.terms", ".common.text_table", ".common.trouble", ".common.version", ".config",
                      ".config.agreement", ".config.pipeline", ".config.sections", ".errors", ".pipeline",
                      ".pipeline.chain", ".pipeline.code_digest", ".pipeline.code_facts", ".pipeline.executors",
@@ -207,6 +212,50 @@ def test_libraries_that_shape_the_bytes_count():
     for name in NAMES:
         assert all(re.search(r" \d+(\.\d+)+", version) for version in stage_code(name).libraries.values()), name
     assert "llvmlite" in stage_code("plan").libraries["numba"]
+
+
+def of_section(stage, **section):
+    """The code that a stage runs with a configuration, once that is settled."""
+    config = SECTIONS[stage](**section)
+    return stage_code(stage, None, BY_NAME[stage].idle(config))
+
+
+SECTIONS = {"anchor-sample": AnchorSampleConfig, "reference-images": ReferenceImagesConfig, "render": RenderConfig}
+EXTRAS = {"av", "moderngl", "onnxruntime", "pybullet", "tenacity", "tokenizers"}
+
+
+@pytest.mark.parametrize(
+    ("stage", "section", "extras"),
+    [
+        ("anchor-sample", {}, set()),
+        ("anchor-sample", {"weights": {"clip": 1}}, {"onnxruntime", "tokenizers"}),
+        ("anchor-sample", {"weights": {"vlm": 1}}, {"tenacity"}),
+        ("reference-images", {"renderer": "gl"}, {"moderngl"}),
+        ("reference-images", {"renderer": "pybullet"}, {"pybullet"}),
+        ("reference-images", {"renderer": "auto"}, {"moderngl", "pybullet"}),
+        ("render", {"renderer": "gl"}, {"av", "moderngl"}),
+        ("render", {"renderer": "pybullet"}, {"av", "pybullet"}),
+    ],
+)
+def test_an_extra_that_the_configuration_does_not_use_makes_nothing_stale(stage, section, extras):
+    assert set(of_section(stage, **section).libraries) & EXTRAS == extras
+
+
+def test_what_is_idle_is_not_imported(project, smoke, tmp_path):
+    """By Python's own list of imports, of the command and its workers."""
+    data = shutil.copytree(smoke, tmp_path / "data")
+    python = {**os.environ, "PYTHONPROFILEIMPORTTIME": "1"}
+    for stage in ("anchor-sample", "reference-images"):
+        idle = BY_NAME[stage].idle(SECTIONS[stage](**({"renderer": "gl"} if stage == "reference-images" else {})))
+        told = subprocess.run(
+            [sys.executable, "-m", "aerialdojo_gen.cli", stage, "U_Courtyard_0", "--pipeline", "pipelines/smoke.toml",
+             "--data", str(data), "--force", "--workers", "1"],
+            cwd=project, env=python, capture_output=True, text=True, check=True,
+        )  # fmt: skip
+        imported = {line.rpartition("|")[2].strip() for line in told.stderr.splitlines() if "|" in line}
+        assert f"aerialdojo_gen.stages.work.{stage.replace('-', '_')}" in imported
+        assert len(idle) == 2
+        assert not imported & set(idle)
 
 
 def test_imports_are_followed_however_they_are_written():

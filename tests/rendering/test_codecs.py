@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import json
 
+import av
 import cv2
 import numpy as np
 import pytest
@@ -9,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from aerialdojo_gen.errors import RenderError
-from aerialdojo_gen.rendering.codecs import MAX_DEPTH_M, VideoWriter, to_metres, to_stored
+from aerialdojo_gen.rendering.codecs import MAX_DEPTH_M, VideoWriter, _frame, to_metres, to_stored
 from aerialdojo_gen.rendering.reader import read_recording
 from aerialdojo_gen.rendering.video import Video
 
@@ -50,6 +51,51 @@ def test_rgb_comes_back_close(tmp_path):
     for a, b in zip(video, frames, strict=True):
         error = np.mean((a.astype(float) - b.astype(float)) ** 2)
         assert 10 * np.log10(255**2 / error) > 30
+
+
+def test_colours_are_converted_as_the_field_does():
+    """BT.601 in limited range: brightness as FFmpeg has it, to its rounding, chroma to half a level."""
+    draw = np.random.default_rng(0)
+    colours = np.vstack(
+        [
+            draw.integers(0, 256, (H * W // 16 - 8, 3)),
+            [[a, b, c] for a in (0, 255) for b in (0, 255) for c in (0, 255)],
+        ]
+    )
+    blocks = colours.astype(np.uint8).reshape(H // 4, W // 4, 3)
+    picture = np.repeat(np.repeat(blocks, 4, axis=0), 4, axis=1)
+    mine = _frame("rgb", picture).to_ndarray().astype(int)
+    theirs = av.VideoFrame.from_ndarray(picture, format="rgb24").reformat(format="yuv420p").to_ndarray().astype(int)
+    assert np.abs(mine[:H] - theirs[:H]).max() <= 1
+    red, green, blue = (blocks[..., k].astype(float) for k in range(3))
+    u = 128 + (-37.797 * red - 74.203 * green + 112.0 * blue) / 255
+    v = 128 + (112.0 * red - 93.786 * green - 18.214 * blue) / 255
+    chroma = mine[H:].reshape(2, H // 2, W // 2)
+    assert np.abs(chroma[0] - np.repeat(np.repeat(u, 2, axis=0), 2, axis=1)).max() < 0.6
+    assert np.abs(chroma[1] - np.repeat(np.repeat(v, 2, axis=0), 2, axis=1)).max() < 0.6
+
+
+def test_chroma_is_the_mean_of_four_pixels():
+    picture = np.zeros((2, 4, 3), np.uint8)
+    picture[0, 0] = picture[1, 1] = (255, 0, 0)
+    whole = np.full((2, 4, 3), 0, np.uint8)
+    whole[:, :2] = (128, 0, 0)
+    halves, mean = (_frame("rgb", p).to_ndarray().astype(int)[2:] for p in (picture, whole))
+    assert np.abs(halves - mean).max() <= 1
+    assert halves.max() > 140
+
+
+@pytest.mark.parametrize(
+    ("modality", "picture"),
+    [
+        ("rgb", np.zeros((8, 8), np.uint8)), ("rgb", np.zeros((8, 7, 3), np.uint8)),
+        ("rgb", np.zeros((8, 8, 3), np.uint16)), ("depth", np.zeros((8, 8), np.float32)),
+        ("depth", np.zeros((8, 8, 1), np.uint16)),
+    ],
+)  # fmt: skip
+def test_what_is_no_frame_is_refused(modality, picture):
+    with pytest.raises(ValueError, match=r"are|is"):
+        _frame(modality, picture)
 
 
 @pytest.mark.parametrize(("modality", "frames"), [("rgb", rgb_frames()), ("depth", depth_frames())])

@@ -65,15 +65,23 @@ def test_frozen_only_where_the_camera_moved(sound, solid):
     assert flags_of(solid, (sound, HERE), (sound, HERE)) == set()
 
 
-def test_the_sky_stands_still_until_the_camera_turns(world, solid):
-    # High above everything, looking level: nothing but sky, from wherever it is seen.
-    low, high, turned = (
-        view_pose((0.0, 0.0, z), yaw, "front") for z, yaw in ((400.0, 0.2), (401.0, 0.2), (400.0, 1.2))
+def test_the_sky_stands_still_until_the_camera_tilts(world, solid):
+    # High above everything, looking level: nothing but sky, the same from wherever it is seen and to all sides.
+    low, high, turned, tilted = (
+        view_pose((0.0, 0.0, z), yaw, view)
+        for z, yaw, view in (
+            (400.0, 0.2, "front"),
+            (401.0, 0.2, "front"),
+            (400.0, 1.2, "front"),
+            (400.0, 0.2, "down"),
+        )
     )
-    sky = world.render(CAMERA, low)
-    sky = replace(sky, depth_m=np.full_like(sky.depth_m, np.inf))
-    assert "frozen" not in flags_of(solid, (sky, low), (sky, high))
-    assert "frozen" in flags_of(solid, (sky, low), (sky, turned))
+    far = Camera(CAMERA.width, CAMERA.height, 20.0)
+    sky = world.render(far, low)
+    assert not np.isfinite(sky.depth_m).any()
+    assert np.array_equal(sky.rgb, world.render(far, turned).rgb)
+    assert "frozen" not in flags_of(solid, (sky, low), (sky, high), (sky, turned))
+    assert "frozen" in flags_of(solid, (sky, low), (sky, tilted))
 
 
 @pytest.mark.parametrize("value", [np.nan, -0.5, 0.0])

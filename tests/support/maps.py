@@ -37,6 +37,25 @@ LINES = [
     ([(10, -22), (50, -50)], {"highway": "footway"}),
     ([(-80, -70), (80, -70)], {"highway": "primary", "tunnel": "yes", "layer": "-1"}),
 ]
+# A street over another one, with room for its ramps; a hump without room, side by side with a path, over a stream; a
+# footbridge over a railway that the map's border cuts.
+BRIDGES = [
+    ([(-80, -20), (80, -20)], {"highway": "secondary", "lanes": "2", "name": "Low Street"}),
+    ([(20, -80), (20, -60)], {"highway": "tertiary", "name": "High Street"}),
+    ([(20, -60), (20, -45)], {"highway": "tertiary", "name": "High Street"}),
+    ([(20, -45), (20, 0), (20, 5)],
+     {"highway": "tertiary", "name": "High Street", "bridge": "yes", "layer": "1", "parking:both": "lane"}),
+    ([(20, 5), (20, 80)], {"highway": "tertiary", "name": "High Street"}),
+    ([(-80, 20), (-20, 20)], {"waterway": "stream", "width": "4"}),
+    ([(-30, 0), (-30, 40)], {"highway": "residential", "bridge": "yes", "name": "Hump"}),
+    ([(-25, 0), (-25, 40)], {"highway": "cycleway", "bridge": "yes"}),
+    ([(-30, 40), (-30, 50), (-10, 50)], {"highway": "residential"}),
+    ([(-25, 40), (-30, 40)], {"highway": "cycleway"}),
+    ([(-30, 0), (-25, 0), (0, 0)], {"highway": "residential"}),
+    ([(-52, -80), (-52, -30)], {"railway": "rail"}),
+    ([(-90, -50), (-40, -50)], {"highway": "footway", "bridge": "yes", "layer": "1"}),
+    ([(-40, -50), (-8, -50)], {"highway": "footway"}),
+]  # fmt: skip
 AREAS = [([(8, -18), (55, -18), (55, -55), (8, -55)], {"leisure": "park", "name": "Old Park"})]
 
 
@@ -48,6 +67,13 @@ def box(half_m: float = HALF_M) -> tuple[float, float, float, float]:
 
 def write_town(path: Path, *, order: int = 1) -> Path:
     """Write the town as `.osm.pbf`; `order` -1 gives its things other ids, in the other order."""
+    return write_map(
+        path, [*LINES, *(([*o, o[0]], t) for o, t in [*BUILDINGS.values(), *AREAS])], POINTS, order=order
+    )
+
+
+def write_map(path: Path, lines: list, points: list = (), *, order: int = 1) -> Path:
+    """Write ways (points in metres, tags) and points of a map; ways share the points that lie in one place."""
     import osmium
 
     ids = iter(range(1, 10_000))
@@ -60,12 +86,12 @@ def write_town(path: Path, *, order: int = 1) -> Path:
         return number
 
     shared: dict[tuple[float, float], int] = {}
-    for line, tags in [*LINES, *(([*o, o[0]], t) for o, t in [*BUILDINGS.values(), *AREAS])][::order]:
+    for line, tags in lines[::order]:
         for at in line:
             if at not in shared:
                 shared[at] = node(*at)
         ways.append(osmium.osm.mutable.Way(id=len(ways) + 1, nodes=[shared[at] for at in line], tags=tags))
-    for at, tags in POINTS[::order]:
+    for at, tags in points[::order]:
         node(*at, tags)
     writer = osmium.SimpleWriter(str(path), overwrite=True)
     for one in nodes:

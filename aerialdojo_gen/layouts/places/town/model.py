@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 from shapely.geometry import Polygon
 
 from aerialdojo_gen.layouts.places.parts.heights import Heights
@@ -21,6 +21,12 @@ def _ring(points: tuple[tuple[float, float], ...]) -> tuple[tuple[float, float],
     if not plan.is_valid or plan.area < 0.5:
         raise ValueError("an outline is a simple polygon of half a square metre or more")
     return points
+
+
+def _rising(span: tuple[float, float]) -> tuple[float, float]:
+    if not span[0] < span[1]:
+        raise ValueError("a span runs from a place to one farther along")
+    return span
 
 
 Ring = Annotated[tuple[At, ...], Field(min_length=3, max_length=1000), AfterValidator(_ring)]
@@ -109,6 +115,8 @@ class Road(_Table):
         Material.
     raised : bool
         Of paths: as high as pavements.
+    bridge : int or None
+        Which of the bridges, counted from 0, it lies on or climbs to.
     name : str
         As on the map.
     """
@@ -123,7 +131,41 @@ class Road(_Table):
     parking: bool = False
     surface: str = "asphalt"
     raised: bool = False
+    bridge: Annotated[int, Field(ge=0)] | None = None
     name: Name = ""
+
+
+class Bridge(_Table):
+    """A deck that streets, paths or rails lie on, with its ramps.
+
+    Attributes
+    ----------
+    line : points
+        Middle line from the foot of one ramp to that of the other, points at equal distances, metres.
+    heights_m : tuple of float
+        Height of the road at those points over the straight line between the ground at both ends.
+    span_m : (from, to)
+        What of the line is bridge; before and behind it are ramps, metres along it.
+    depth_m : float
+        Thickness of the deck.
+    rails : tuple of points
+        Middle lines of tracks on it.
+    name : str
+        As on the map.
+    """
+
+    line: Line
+    heights_m: Annotated[tuple[Annotated[float, Field(ge=0, le=60)], ...], Field(min_length=2, max_length=3000)]
+    span_m: Annotated[tuple[Annotated[float, Field(ge=0)], Annotated[float, Field(ge=0)]], AfterValidator(_rising)]
+    depth_m: Annotated[float, Field(ge=0.1, le=5)] = 0.8
+    rails: Annotated[tuple[Line, ...], Field(max_length=100)] = ()
+    name: Name = ""
+
+    @model_validator(mode="after")
+    def _paired(self) -> Bridge:
+        if len(self.line) != len(self.heights_m):
+            raise ValueError("line and heights_m of a bridge must have as many points")
+        return self
 
 
 class Area(_Table):
@@ -206,7 +248,7 @@ class Parameters(_Table):
         Material of what nothing is said of.
     heights : Heights, optional
         The ground's; level where absent.
-    buildings, roads, areas, things, barriers
+    buildings, roads, bridges, areas, things, barriers
         What there is.
     rails : tuple of points
         Middle lines of tracks let into the street.
@@ -222,6 +264,7 @@ class Parameters(_Table):
     heights: Heights | None = None
     buildings: Annotated[tuple[Building, ...], Field(max_length=_MOST)] = ()
     roads: Annotated[tuple[Road, ...], Field(max_length=_MOST)] = ()
+    bridges: Annotated[tuple[Bridge, ...], Field(max_length=_MOST)] = ()
     areas: Annotated[tuple[Area, ...], Field(max_length=_MOST)] = ()
     things: Annotated[tuple[Thing, ...], Field(max_length=_MOST)] = ()
     barriers: Annotated[tuple[Barrier, ...], Field(max_length=_MOST)] = ()
@@ -231,5 +274,12 @@ class Parameters(_Table):
     rule: Rule = Rule()
     drive_on: Literal["right", "left"] = "right"
 
+    @model_validator(mode="after")
+    def _there(self) -> Parameters:
+        for k, road in enumerate(self.roads):
+            if road.bridge is not None and road.bridge >= len(self.bridges):
+                raise ValueError(f"roads.{k}: bridge {road.bridge} is none of {len(self.bridges)}, counted from 0")
+        return self
 
-__all__ = ["Area", "Barrier", "Body", "Building", "Parameters", "Road", "Rule", "Thing"]
+
+__all__ = ["Area", "Barrier", "Body", "Bridge", "Building", "Parameters", "Road", "Rule", "Thing"]

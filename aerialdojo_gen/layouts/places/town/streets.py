@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,10 +14,11 @@ from shapely.geometry import LineString, Point, Polygon
 from shapely.geometry.base import BaseGeometry
 from shapely.ops import substring
 
+from aerialdojo_gen.layouts.places.town.bridges import Deck, deck, put_up_bridge
 from aerialdojo_gen.layouts.places.town.model import Parameters, Road
 from aerialdojo_gen.scenes.grammar_scatter import Pose
 from aerialdojo_gen.scenes.grammar_streets import KERB_M, MARK_M
-from aerialdojo_gen.scenes.ground import rectangle, ribbon
+from aerialdojo_gen.scenes.ground import Surface, rectangle, ribbon
 from aerialdojo_gen.scenes.site import Site
 
 _DASH_M, _GAP_M = 2.0, 4.0
@@ -34,7 +35,7 @@ class Streets:
     Attributes
     ----------
     roads : tuple of Road
-        Those that are driven on.
+        Those on the ground that are driven on.
     lines : tuple of LineString
         Their middle lines, metres.
     carriageways, pavements : shapely geometry
@@ -69,33 +70,98 @@ class Streets:
 
 
 def lay(site: Site, p: Parameters) -> Streets:
-    """Paint all streets, and what is marked on them."""
-    driven = tuple(road for road in p.roads if road.kind != "path")
-    paths = [road for road in p.roads if road.kind == "path"]
-    lines = tuple(LineString(road.line) for road in driven)
-    ribbons = [ribbon(r.line, r.width_m, round_ends=True) for r in driven]
-    carriageways = shapely.union_all(ribbons)
-    kerbed = [ribbon(r.line, r.width_m + 2 * r.pavement_m, round_ends=True) for r in driven if r.pavement_m > 0.0]
-    raised = [ribbon(r.line, r.width_m, round_ends=True) for r in paths if r.raised]
-    pavements = shapely.union_all([*kerbed, *raised])
-    for surface, members in _by_surface(r for r in paths if not r.raised):
-        site.paint(shapely.union_all([ribbon(r.line, r.width_m, round_ends=True) for r in members]), surface)
-    if not pavements.is_empty:
-        site.paint(pavements, site.material("pavement", "paving:#aaa59c"), KERB_M, site.material("kerb", "#8d8a84"))
-    for surface, _ in _by_surface(driven):
-        own = [area for r, area in zip(driven, ribbons, strict=True) if r.surface == surface]
-        site.paint(shapely.union_all(own), surface)
-    junctions = _junctions(driven)
+    """Paint all streets and what is marked on them; put up their bridges."""
+    decks = [_deck(site, p, k) for k in range(len(p.bridges))]
+    driven = [road for road in p.roads if road.kind != "path"]
+    lines = [LineString(road.line) for road in driven]
     zebras = [z for z in (_zebra(x, y, driven, lines) for x, y in p.crossings) if z is not None]
     discs = [Point(x, y).buffer(_AT_CROSSING_M) for x, y in p.crossings]
-    busy = shapely.union_all([*junctions, *discs])
-    _paint_rails(site, p.rails, carriageways)
-    marks = [m for r, line in zip(driven, lines, strict=True) if r.marks for m in _lane_marks(r, line)]
-    marks = [shapely.difference(m, busy) for m in marks]
-    whole = shapely.intersection(shapely.union_all([*marks, *(s for z in zebras for s in z)]), carriageways)
-    if not whole.is_empty:
-        site.paint(whole, "marking")
-    return Streets(driven, lines, carriageways, shapely.difference(pavements, carriageways), busy)
+    busy = shapely.union_all([*_junctions(driven), *discs])
+
+    def on_ground(road: Road, width_m: float) -> BaseGeometry:
+        own = None if road.bridge is None else decks[road.bridge]
+        area = ribbon(road.line, width_m, round_ends=True)
+        return area if own is None else area.difference(own.plan)
+
+    stripes = [stripe for zebra in zebras for stripe in zebra]
+    surfaces, carriageways, pavements = _painted(site, p.roads, on_ground, stripes, busy)
+    tracks = [LineString(line) for line in p.rails]
+    for surface in surfaces:
+        site.paint(surface.area, surface.material, surface.rise_m, surface.edge)
+    for bridge, one in zip(p.bridges, decks, strict=True):
+        off = shapely.Polygon() if one is None else one.plan
+        for surface in _rails(site, [LineString(line) for line in bridge.rails]):
+            site.paint(surface.area.difference(off), surface.material)
+    for surface in _rails(site, tracks):
+        site.paint(surface.area, surface.material)
+    marks = _marks(site, p.roads, carriageways, stripes, busy, [None if d is None else d.plan for d in decks])
+    if not marks.is_empty:
+        site.paint(marks, "marking")
+    paths = [on_ground(road, road.width_m) for road in p.roads if road.kind == "path"]
+    beds = [line.buffer(_GAUGE_M, cap_style="flat") for line in tracks]
+    below = shapely.union_all([carriageways, pavements, *paths, *beds])
+    for k, one in enumerate(decks):
+        if one is not None:
+            put_up_bridge(site, one, _on_deck(site, p, k, busy), below)
+    level = [k for k, road in enumerate(driven) if road.bridge is None or decks[road.bridge] is None]
+    return Streets(
+        tuple(driven[k] for k in level), tuple(lines[k] for k in level), carriageways,
+        shapely.difference(pavements, carriageways), busy,
+    )  # fmt: skip
+
+
+def _deck(site: Site, p: Parameters, k: int) -> Deck | None:
+    """Find where a bridge stands, by what it bears."""
+    roads = [ribbon(r.line, r.width_m + 2 * r.pavement_m, round_ends=True) for r in p.roads if r.bridge == k]
+    rails = [LineString(line).buffer(_GAUGE_M / 2 + 1.0) for line in p.bridges[k].rails]
+    return deck(site, p.bridges[k], [*roads, *rails]) if roads or rails else None
+
+
+def _painted(
+    site: Site, roads: Sequence[Road], area_of: Callable[[Road, float], BaseGeometry],
+    stripes: Sequence[BaseGeometry], busy: BaseGeometry,
+) -> tuple[list[Surface], BaseGeometry, BaseGeometry]:  # fmt: skip
+    """Lay out streets: what is painted, in order, but rails and marks; all carriageways; all pavements."""
+    driven = [road for road in roads if road.kind != "path"]
+    paths = [road for road in roads if road.kind == "path"]
+    ribbons = [area_of(r, r.width_m) for r in driven]
+    carriageways = shapely.union_all(ribbons)
+    kerbed = [area_of(r, r.width_m + 2 * r.pavement_m) for r in driven if r.pavement_m > 0.0]
+    raised = [area_of(r, r.width_m) for r in paths if r.raised]
+    pavements = shapely.union_all([*kerbed, *raised])
+    out = []
+    for surface, members in _by_surface(r for r in paths if not r.raised):
+        out.append(Surface(shapely.union_all([area_of(r, r.width_m) for r in members]), surface))
+    if not pavements.is_empty:
+        kerb = site.material("kerb", "#8d8a84")
+        out.append(Surface(pavements, site.material("pavement", "paving:#aaa59c"), KERB_M, kerb))
+    for surface, _ in _by_surface(driven):
+        own = [area for r, area in zip(driven, ribbons, strict=True) if r.surface == surface]
+        out.append(Surface(shapely.union_all(own), surface))
+    return out, carriageways, pavements
+
+
+def _marks(
+    site: Site, roads: Sequence[Road], carriageways: BaseGeometry, stripes: Sequence[BaseGeometry],
+    busy: BaseGeometry, decks: Sequence[BaseGeometry | None],
+) -> BaseGeometry:  # fmt: skip
+    """Lay out lane marks and zebra stripes, within carriageways and off other streets' decks."""
+    out = list(stripes)
+    for road in roads:
+        if road.kind != "path" and road.marks:
+            whole = shapely.union_all(_lane_marks(road, LineString(road.line)))
+            own = None if road.bridge is None or not decks else decks[road.bridge]
+            out.append(shapely.difference(whole, busy if own is None else busy.union(own)))
+    return shapely.intersection(shapely.union_all(out), carriageways)
+
+
+def _on_deck(site: Site, p: Parameters, k: int, busy: BaseGeometry) -> list[Surface]:
+    """Lay out what is painted on a bridge."""
+    roads = [road for road in p.roads if road.bridge == k]
+    surfaces, carriageways, _ = _painted(site, roads, lambda r, w: ribbon(r.line, w, round_ends=True), (), busy)
+    surfaces += _rails(site, [LineString(line) for line in p.bridges[k].rails])
+    marks = _marks(site, roads, carriageways, (), busy, ())
+    return surfaces if marks.is_empty else [*surfaces, Surface(marks, "marking")]
 
 
 def _by_surface(roads: Iterable[Road]) -> list[tuple[str, list[Road]]]:
@@ -155,14 +221,14 @@ def _zebra(x: float, y: float, roads: Sequence[Road], lines: Sequence[LineString
     return out
 
 
-def _paint_rails(site: Site, rails: Sequence[Sequence[tuple[float, float]]], carriageways: BaseGeometry) -> None:
-    if not rails:
-        return
-    lines = [LineString(line) for line in rails]
+def _rails(site: Site, lines: Sequence[LineString]) -> list[Surface]:
+    """Lay out tracks: their beds, then their rails."""
+    if not lines:
+        return []
     bed = shapely.union_all([line.buffer(_GAUGE_M / 2 + 0.6, cap_style="flat") for line in lines])
-    site.paint(bed, site.material("track", "cobbles:#7d7a75"))
     sides = [line.offset_curve(d) for line in lines for d in (-_GAUGE_M / 2, _GAUGE_M / 2)]
-    site.paint(shapely.union_all([s.buffer(_RAIL_M, cap_style="flat") for s in sides]), "iron")
+    iron = shapely.union_all([s.buffer(_RAIL_M, cap_style="flat") for s in sides])
+    return [Surface(bed, site.material("track", "cobbles:#7d7a75")), Surface(iron, "iron")]
 
 
 def kerbside(road: Road, line: LineString, spacing_m: float, offset_m: float) -> list[Pose]:
