@@ -12,7 +12,7 @@ from torch.nn import functional
 
 # Networks reckon places in units of this many metres.
 UNIT_M = 10.0
-# Places are told as chances of intervals of each axis, headings as those of sectors: metres are learned too slowly.
+# Places are told as chances of intervals of each axis, headings as those of sectors.
 # Intervals reach beyond every scene.
 _CELL_M, _STOREY_M, _SECTOR_RAD = 4.0, 2.0, math.radians(15.0)
 _AXES = (_CELL_M, 64, -128.0), (_CELL_M, 64, -128.0), (_STOREY_M, 36, -24.0)
