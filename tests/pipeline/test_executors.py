@@ -69,7 +69,7 @@ def test_a_process_stays_with_its_scene(pool, tmp_path):
 def test_tasks_that_others_bring_stay_with_their_process(pool, tmp_path):
     steps = chores.Steps(["a", "b"], 4, 1, tmp_path)
     pids = {}
-    for scene, pid, _ in pool.run(chores.where, steps):
+    for scene, pid, _ in pool.run(chores.meet, steps):
         pids.setdefault(scene, set()).add(pid)
     for scene in "ab":
         assert [number for at, number in steps.order if at == scene] == [0, 1, 2, 3]

@@ -48,6 +48,13 @@ def where(chore):
     return chore.scene, os.getpid(), os.environ.get("AERIALDOJO_TRIED")
 
 
+def meet(chore):
+    """Wait until another scene has begun: no process does all while another one starts."""
+    (chore.folder / chore.scene).touch()
+    until(lambda: len(list(chore.folder.iterdir())) >= 2)
+    return where(chore)
+
+
 def fail(chore):
     if chore.kind == "expected":
         raise AssetError(f"{chore.label} has no mesh")
