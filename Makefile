@@ -53,8 +53,7 @@ TRAIN := safetensors tensorboard
 	@touch $@
 
 dataset: .venv/.installed  ## generate the dataset: scene_assets/ and annotations/ to $(DATA)/release/
-	@$(RUN) run pipelines/aerialdojo-200k.toml --data $(DATA) $(RUN_FLAGS)
-	@$(RUN) stats --data $(DATA)
+	@$(RUN) run pipelines/aerialdojo-200k.toml --stats --data $(DATA) $(RUN_FLAGS)
 
 smoke: .venv/.installed  ## two small scenes through all stages, a rendered video included (DATA=data-smoke)
 	@$(RUN) run pipelines/smoke.toml --data $(SMOKE_DATA) $(RUN_FLAGS)

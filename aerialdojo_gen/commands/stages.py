@@ -88,6 +88,7 @@ def run(
     data: Data = "data", scene: Scene = None,
     workers: Workers = None, force: Force = False, quiet: Quiet = False, verbose: Verbose = False,
     replace: Replace = False,
+    stats: Annotated[bool, typer.Option("--stats", help="Print at the end what stats prints.")] = False,
     executor: ExecutorName = "local", address: Address = None,
 ) -> None:  # fmt: skip
     """Run a pipeline's stages, from recipes and annotations to the release."""
@@ -109,3 +110,8 @@ def run(
         address=address,
         verbose=verbose,
     )
+    if stats:
+        from aerialdojo_gen.commands import release
+
+        # In this process: a second one would take a second to begin.
+        release.stats(data=data, pipeline=pipeline)
