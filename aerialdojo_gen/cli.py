@@ -46,15 +46,19 @@ class _Commands(TyperGroup):
         return super().invoke(ctx)
 
 
-app = typer.Typer(
-    cls=_Commands,
-    name="aerialdojo-gen",
-    help="Generate aerial object-goal-search datasets: scenes, tasks, certified routes, RGB-D recordings.",
-    no_args_is_help=True,
-    pretty_exceptions_enable=False,
-    rich_markup_mode=None,  # half of the time that --help takes is importing what draws boxes
-    context_settings={"help_option_names": ["-h", "--help"]},
-)
+def _new() -> typer.Typer:
+    return typer.Typer(
+        cls=_Commands,
+        name="aerialdojo-gen",
+        help="Generate aerial object-goal-search datasets: scenes, tasks, certified routes, RGB-D recordings.",
+        no_args_is_help=True,
+        pretty_exceptions_enable=False,
+        rich_markup_mode=None,  # half of the time that --help takes is importing what draws boxes
+        context_settings={"help_option_names": ["-h", "--help"]},
+    )
+
+
+app = _new()
 
 
 def _version(wanted: bool) -> None:
@@ -74,11 +78,23 @@ def _program(
     """Take what stands before a command."""
 
 
-for _group in (
+_GROUPS = (
     stages, render, sources, places, annotate, evaluate, release, show, validate, exchange, hub, report, train
-):  # fmt: skip
+)  # fmt: skip
+for _group in _GROUPS:
     app.add_typer(_group.app)
 app.add_typer(config.app, name="config")
+
+
+def _for(named: list[str]) -> typer.Typer:
+    """Return a command line of one command where that is named, else of all: of each one Typer makes parameters."""
+    for info in [info for group in _GROUPS for info in group.app.registered_commands]:
+        if [info.name] == named:
+            alone = _new()
+            alone.registered_callback = app.registered_callback
+            alone.registered_commands = [info]
+            return alone
+    return app
 
 
 def main() -> None:
@@ -86,7 +102,7 @@ def main() -> None:
     try:
         trouble.check_arguments(sys.argv[1:])
         trouble.check_limits(sys.argv[1:])
-        app(standalone_mode=True)
+        _for(sys.argv[1:2])(standalone_mode=True)
     except AerialDojoError as error:
         print(f"error: {error}", file=sys.stderr)
         raise SystemExit(error.exit_code) from None

@@ -57,11 +57,14 @@ def scene_fingerprint(stage: Stage, pipeline: Pipeline, roots: Roots, scene: str
         "seed": pipeline.seed,
         "embodiment": pipeline.embodiment.model_dump(mode="json"),
         "config": _values(pipeline.section(stage.name)),
-        "schemas": {name: _described(name) for name in (*stage.writes, *stage.reads)},
         "inputs": {table: store.content(roots.data, table, scene) for table in stage.reads},
         "assets": [[_short(path, roots), _digest(path)] for path in sources],
     }
-    return hashlib.sha256(json.dumps(facts, sort_keys=True).encode()).hexdigest()
+    texts = {name: json.dumps(value, sort_keys=True) for name, value in facts.items()}
+    texts["schemas"] = _schemas((*stage.writes, *stage.reads))
+    # What json.dumps makes of them all; the schemas' part is long, and the same for all scenes.
+    whole = ", ".join(f'"{name}": {texts[name]}' for name in sorted(texts))
+    return hashlib.sha256(f"{{{whole}}}".encode()).hexdigest()
 
 
 def scene_code(stage: Stage, roots: Roots, scene: str, config: Section | None = None) -> Code:
@@ -99,6 +102,10 @@ def _values(section: Section) -> dict[str, Any]:
 
 
 @cache
+def _schemas(tables: tuple[str, ...]) -> str:
+    return json.dumps({name: _described(name) for name in tables}, sort_keys=True)
+
+
 def _described(table: str) -> list[Any]:
     spec = store.LAYOUT[table].spec
     fields = [

@@ -6,6 +6,7 @@ configuration: its fingerprint tells.
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -123,6 +124,17 @@ def shards_of(
                 job = replace(whole, deadline=limits.deadline, force=force, verify=limits.verify, code=code)
                 found.tasks.append(Task(job, config, fingerprint))
     return found
+
+
+def look_ahead(stage: Stage, scenes: Sequence[str], roots: Roots) -> None:
+    """Begin to read the files whose digests tell whether a stage's shards are whole."""
+    names = []
+    for scene in scenes:
+        for table in stage.writes:
+            with contextlib.suppress(AerialDojoError):
+                infos = [store.read_info(roots.data, name) for name in store.shards(roots.data, table, scene)]
+                names += [name for info in infos if info for name, file in info.files.items() if file.sha256]
+    roots.data.digest_ahead(names)
 
 
 def _fresh(

@@ -17,7 +17,7 @@ from aerialdojo_gen.pipeline.chain import Chain
 from aerialdojo_gen.pipeline.code_digest import stage_code
 from aerialdojo_gen.pipeline.executors import Executor, Folders, make_executor, on_disk
 from aerialdojo_gen.pipeline.expectation import Expectation
-from aerialdojo_gen.pipeline.freshness import Limits
+from aerialdojo_gen.pipeline.freshness import Limits, look_ahead
 from aerialdojo_gen.pipeline.interrupt import Interrupts
 from aerialdojo_gen.pipeline.progress import Reporter, duration
 from aerialdojo_gen.pipeline.registry import STAGES, upstream
@@ -25,6 +25,7 @@ from aerialdojo_gen.pipeline.stage import Roots, Stage
 from aerialdojo_gen.pipeline.summary import StageSummary
 from aerialdojo_gen.pipeline.task import Computed, compute
 from aerialdojo_gen.store import shards as store
+from aerialdojo_gen.store.known_footers import footers_known
 
 
 def run(
@@ -92,7 +93,9 @@ def run(
     left_out = unready(stages, scenes, roots)
     scenes = [scene for scene in scenes if scene not in left_out]
     made = make_executor(executor, workers, address, folders)
-    with roots.data.lock(), Interrupts() as interrupts, made as pool:
+    with roots.data.lock(), footers_known(roots.data), Interrupts() as interrupts, made as pool:
+        if stages[0].name not in forced:
+            look_ahead(stages[0], scenes, roots)
         if prepare:
             prepare()
         expectation = Expectation(stages, scenes, roots)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from aerialdojo_gen import layouts
-from aerialdojo_gen.common.bounded import read_toml
-from aerialdojo_gen.errors import AssetError
+from aerialdojo_gen.common.bounded import loads_toml, read_toml
+from aerialdojo_gen.errors import AssetError, Malformed
 from aerialdojo_gen.pipeline.stage import Job, Output, Roots, Stage
 from aerialdojo_gen.scenes.catalogue_files import catalogue_files
 
@@ -39,13 +40,23 @@ def imports(roots: Roots, scene: str) -> Choice | None:
     from aerialdojo_gen.pipeline.code_digest import Choice
 
     try:
-        recipe = read_toml(roots.recipes / f"{scene}.toml", AssetError)
-    except (AssetError, OSError):
+        recipe = _top(roots.recipes / f"{scene}.toml")
+    except (AssetError, OSError, UnicodeDecodeError):
         return None
     if "imported" in recipe:
         return Choice(layouts.__name__, ())
     module = layouts.layout_modules().get(str(recipe.get("layout")))
     return Choice(layouts.__name__, (f"{layouts.__name__}.{module}",)) if module else None
+
+
+def _top(path: Path) -> dict[str, Any]:
+    """Read of a recipe what stands before its first table, where that tells all: its lists of things take long."""
+    text = path.read_text(encoding="utf-8")
+    if "imported" not in text:
+        # Inside of a string or a list no table begins: what is before it is no TOML then.
+        with contextlib.suppress(Malformed):
+            return loads_toml(text.partition("\n[")[0])
+    return read_toml(path, AssetError)
 
 
 STAGE = Stage(
