@@ -12,7 +12,7 @@ import hashlib
 import json
 import os
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from functools import cache, cached_property
 from importlib import metadata
@@ -193,6 +193,7 @@ class Package:
         self._folder, self._name = folder, folder.name
         self._cache = _Cache(folder / "__pycache__" / "code-facts.json")
         self._facts: dict[str, Facts] = {}
+        self._searches: dict[tuple[str, str, frozenset[str]], _Search] = {}
         self._paths = {_module_name(path.relative_to(folder.parent)): path for path in sorted(folder.rglob("*.py"))}
 
     def of(self, module: str, chosen: Choice | None = None, idle: tuple[str, ...] = ()) -> Code:
@@ -214,11 +215,23 @@ class Package:
         RuntimeError
             A module imports what cannot be told from its source.
         """
-        search = _Search(self, chosen, frozenset(idle))
-        for edge in (Edge(module), *_WRITERS):
-            search.follow(edge)
+        search = self._followed(module, chosen.package if chosen else "", frozenset(idle))
+        if chosen and chosen.package in search.asked:
+            # What is reached does not depend on the order: the way to the package is the same for all its modules.
+            search = search.copy()
+            for name in chosen.modules:
+                search.follow(Edge(name))
         self._cache.save()
         return Code(dict(sorted(search.parts.items())), {name: _version(name) for name in sorted(search.libraries)})
+
+    def _followed(self, module: str, left_out: str, idle: frozenset[str]) -> _Search:
+        """Follow a module's imports, those of any module of one package left out."""
+        key = module, left_out, idle
+        if key not in self._searches:
+            search = self._searches[key] = _Search(self, left_out, idle)
+            for edge in (Edge(module), *_WRITERS):
+                search.follow(edge)
+        return self._searches[key]
 
     def contains(self, module: str) -> bool:
         """Whether a module is one of the package's, by its absolute name."""
@@ -255,11 +268,20 @@ def _module_name(path: Path) -> str:
 class _Search:
     """Follows imports from where it is put."""
 
-    def __init__(self, package: Package, chosen: Choice | None, idle: frozenset[str]) -> None:
-        self._package, self._chosen, self._idle = package, chosen, idle
+    def __init__(self, package: Package, left_out: str, idle: frozenset[str]) -> None:
+        self._package, self._left_out, self._idle = package, left_out, idle
         self.parts: dict[str, str] = {}
         self.libraries: set[str] = set()
+        # Packages of which any module is imported, by a name that is made at run time.
+        self.asked: set[str] = set()
         self._seen: set[Edge] = set()
+
+    def copy(self) -> _Search:
+        """Return another that goes on from here."""
+        other = _Search(self._package, self._left_out, self._idle)
+        other.parts, other.libraries = dict(self.parts), set(self.libraries)
+        other.asked, other._seen = set(self.asked), set(self._seen)
+        return other
 
     def follow(self, first: Edge) -> None:
         """Count what is imported, and what that imports."""
@@ -275,17 +297,14 @@ class _Search:
                 if edge.module not in sys.stdlib_module_names and edge.module not in _SHAPELESS:
                     self.libraries.add(edge.module)
             elif edge.name == "**":
-                waiting += [Edge(module) for module in self._any_of(edge.module)]
+                self.asked.add(edge.module)
+                if edge.module != self._left_out:
+                    waiting += [Edge(module) for module in self._package.modules_in(edge.module)]
             elif edge.name and self._package.contains(f"{edge.module}.{edge.name}"):
                 waiting += [Edge(edge.module, "", ()), Edge(f"{edge.module}.{edge.name}", "", edge.uses)]
             else:
                 names = (edge.name,) if edge.name else edge.uses
                 waiting += self._enter(edge.module, names)
-
-    def _any_of(self, package: str) -> Sequence[str]:
-        if self._chosen is not None and self._chosen.package == package:
-            return self._chosen.modules
-        return self._package.modules_in(package)
 
     def _enter(self, module: str, names: tuple[str, ...]) -> Iterator[Edge]:
         above = module.rpartition(".")[0]

@@ -19,7 +19,6 @@ from aerialdojo_gen.pipeline.progress import Reporter
 from aerialdojo_gen.pipeline.stage import Job, Roots, Stage
 from aerialdojo_gen.pipeline.task import Task
 from aerialdojo_gen.store import shards as store
-from aerialdojo_gen.store.parquet_files import read_file
 from aerialdojo_gen.store.root import DataRoot
 
 
@@ -165,6 +164,8 @@ def _verified(stage: Stage, data: DataRoot, scene: str, part: int, reporter: Rep
     """Whether the files that a fresh shard names have the digests that it says."""
     if stage.digests is None:
         return True
+    from aerialdojo_gen.store.parquet_files import read_file
+
     table, *columns = stage.digests
     try:
         name = store.shard_name(table, scene, part)

@@ -206,6 +206,7 @@ def run_stages(
     from aerialdojo_gen.pipeline import runner
     from aerialdojo_gen.pipeline.progress import Reporter
     from aerialdojo_gen.release.provenance import check_replaced
+    from aerialdojo_gen.store.known_footers import footers_known
 
     reporter = reporter or Reporter(quiet=True)
     names = runner.chosen_scenes(config, roots, scenes)
@@ -223,10 +224,11 @@ def run_stages(
         if releases:
             _finish_release(config, roots.data, names, ready, not scenes, reporter)
 
-    summaries = runner.run(
-        stages, names, config, roots, workers=workers, executor=executor, address=address, force=force,
-        reporter=reporter, limits=limits, prepare=prepare, finish=finish,
-    )  # fmt: skip
+    with footers_known(roots.data):
+        summaries = runner.run(
+            stages, names, config, roots, workers=workers, executor=executor, address=address, force=force,
+            reporter=reporter, limits=limits, prepare=prepare, finish=finish,
+        )  # fmt: skip
     exact = config.split.paper_counts or config.annotate_import.paper_counts
     owed = [line for name, line in left_out.items() if exact or name in (scenes or config.scenes)]
     if owed:

@@ -25,7 +25,6 @@ from aerialdojo_gen.pipeline.stage import Roots, Stage
 from aerialdojo_gen.pipeline.summary import StageSummary
 from aerialdojo_gen.pipeline.task import Computed, compute
 from aerialdojo_gen.store import shards as store
-from aerialdojo_gen.store.known_footers import footers_known
 
 
 def run(
@@ -85,6 +84,9 @@ def run(
     reporter = reporter or Reporter(quiet=True)
     forced, started = set(force), time.monotonic()
     summaries: list[StageSummary] = []
+    for first in stages[:1]:
+        if first.name not in forced:
+            look_ahead(first, scenes, roots)
     for stage in stages:
         # All of it now: who edits a file while this runs has loaded the old one, and gets all made anew next time.
         stage_code(stage.name)
@@ -93,9 +95,7 @@ def run(
     left_out = unready(stages, scenes, roots)
     scenes = [scene for scene in scenes if scene not in left_out]
     made = make_executor(executor, workers, address, folders)
-    with roots.data.lock(), footers_known(roots.data), Interrupts() as interrupts, made as pool:
-        if stages[0].name not in forced:
-            look_ahead(stages[0], scenes, roots)
+    with roots.data.lock(), Interrupts() as interrupts, made as pool:
         if prepare:
             prepare()
         expectation = Expectation(stages, scenes, roots)

@@ -30,9 +30,7 @@ from aerialdojo_gen.store.layout import (
     shard_folder,
     shard_name,
 )
-from aerialdojo_gen.store.parquet_files import read_file, read_footer, write_clustered
 from aerialdojo_gen.store.root import DataRoot, LocalRoot, Where, open_root
-from aerialdojo_gen.store.tables import check_table, column_digests, content_digest
 
 __all__ = [
     "LAYOUT", "META", "Place", "check_run_name", "check_scene_name", "content", "count_rows", "partition",
@@ -81,6 +79,10 @@ def write_shard(
     StoreError
         The table does not fit its schema, or the disk is full or read-only; nothing is left behind.
     """
+    # Here alone, as in the other functions: half of what importing Arrow takes is what works on rows.
+    from aerialdojo_gen.store.parquet_files import write_clustered
+    from aerialdojo_gen.store.tables import check_table, column_digests, content_digest
+
     spec = LAYOUT[table_name].spec
     table = check_table(spec, table)
     info = ShardInfo(
@@ -134,6 +136,8 @@ def _read_info(root: DataRoot, name: str, version: str) -> ShardInfo | None:
     known, begun_ns = known_footers(), time.time_ns()
     if known is not None and (said := known.find(root, name, version)) is not None:
         return said
+    from aerialdojo_gen.store.parquet_files import read_footer
+
     where, mend = root.at(name), "delete it and run the command again"
     try:
         with root.open(name) as file:
@@ -204,6 +208,9 @@ def read_scene(
     StoreError
         A shard is missing, damaged or of another schema; the message names it and what to run.
     """
+    from aerialdojo_gen.store.parquet_files import read_file
+    from aerialdojo_gen.store.tables import column_digests
+
     root = open_root(data)
     infos = _infos(root, table, scene, run)
     spec = LAYOUT[table].spec
@@ -267,6 +274,9 @@ def read_stored(data: Where, table: str, scene: str, columns: Sequence[str]) -> 
     StoreError
         A shard is missing or damaged.
     """
+    from aerialdojo_gen.store.parquet_files import read_file
+    from aerialdojo_gen.store.tables import column_digests
+
     root = open_root(data)
     infos = _infos(root, table, scene)
     there = [name for name in columns if all(name in info.columns for info in infos)]
