@@ -136,6 +136,14 @@ def look_ahead(stage: Stage, scenes: Sequence[str], roots: Roots) -> None:
     roots.data.digest_ahead(names)
 
 
+def keep_footers(stages: Sequence[Stage], scenes: Sequence[str], roots: Roots) -> None:
+    """Let the next run know what the footers of stages' shards say, those that this one has written among them."""
+    for stage in stages:
+        for scene in scenes:
+            for table in stage.writes:
+                store.keep_infos(roots.data, store.shards(roots.data, table, scene))
+
+
 def _fresh(
     stage: Stage, data: DataRoot, scene: str, part: int, parts: int, fingerprint: str, reporter: Reporter
 ) -> dict[str, Any] | None:

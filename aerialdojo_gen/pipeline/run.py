@@ -204,6 +204,7 @@ def run_stages(
         The release would lose scenes that another pipeline made, and `replace` is not given; nothing was run.
     """
     from aerialdojo_gen.pipeline import runner
+    from aerialdojo_gen.pipeline.freshness import keep_footers
     from aerialdojo_gen.pipeline.progress import Reporter
     from aerialdojo_gen.release.provenance import check_replaced
     from aerialdojo_gen.store.known_footers import footers_known
@@ -229,6 +230,8 @@ def run_stages(
             stages, names, config, roots, workers=workers, executor=executor, address=address, force=force,
             reporter=reporter, limits=limits, prepare=prepare, finish=finish,
         )  # fmt: skip
+        if any(summary.computed for summary in summaries):
+            keep_footers(stages, ready, roots)
     exact = config.split.paper_counts or config.annotate_import.paper_counts
     owed = [line for name, line in left_out.items() if exact or name in (scenes or config.scenes)]
     if owed:

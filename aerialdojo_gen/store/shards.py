@@ -9,6 +9,7 @@ Every function takes a data root, or a directory or URL to open as one.
 
 from __future__ import annotations
 
+import contextlib
 import time
 from collections.abc import Collection, Mapping, Sequence
 from functools import lru_cache
@@ -33,7 +34,7 @@ from aerialdojo_gen.store.layout import (
 from aerialdojo_gen.store.root import DataRoot, LocalRoot, Where, open_root
 
 __all__ = [
-    "LAYOUT", "META", "Place", "check_run_name", "check_scene_name", "content", "count_rows", "partition",
+    "LAYOUT", "META", "Place", "check_run_name", "check_scene_name", "content", "count_rows", "keep_infos", "partition",
     "prune", "read_info", "read_scene", "read_stored", "shard_folder", "shard_name",
     "shard_path", "shards", "write_shard",
 ]  # fmt: skip
@@ -158,6 +159,16 @@ def _read_info(root: DataRoot, name: str, version: str) -> ShardInfo | None:
     if known is not None:
         known.note(root, name, version, begun_ns, info)
     return info
+
+
+def keep_infos(root: DataRoot, names: Sequence[str]) -> None:
+    """Let `aerialdojo_gen.store.known_footers` keep what shards' footers say; those that are damaged are left out."""
+    if known_footers() is None:
+        return
+    for name in names:
+        with contextlib.suppress(StoreError, OSError):
+            # Read once more what was read as soon as it was written: a change right after that could hide.
+            _read_info.__wrapped__(root, name, root.version(name))
 
 
 def count_rows(data: Where, table: str, scene: str) -> int:

@@ -279,3 +279,14 @@ def test_render_command_keeps_to_the_pipelines_scenes(smoke, project):
     trained = tasks[tasks["subset"] == "train"].groupby(["scene", "setting"]).ngroups
     assert f"render: {trained} rows in, {8 * trained} out" in done.stderr
     assert {p: p.stat().st_mtime_ns for p in smoke.rglob("*.parquet")} == before
+
+
+def test_a_run_prints_what_stats_prints(smoke, project):
+    def said(*args):
+        command = [sys.executable, "-m", "aerialdojo_gen.cli", *args, "--data", str(smoke)]
+        done = subprocess.run(command, cwd=project, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stderr
+        return done.stdout
+
+    assert said("run", "pipelines/smoke.toml", "--stats") == said("stats")
+    assert said("run", "pipelines/smoke.toml") == ""

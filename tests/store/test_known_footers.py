@@ -1,0 +1,135 @@
+"""What is kept of footers is what they say: never of shards that have changed, never in the way."""
+
+import os
+import shutil
+
+import pytest
+
+from aerialdojo_gen.errors import StoreError
+from aerialdojo_gen.store import known_footers, schemas
+from aerialdojo_gen.store import shards as store
+from aerialdojo_gen.store.known_footers import footers_known
+from aerialdojo_gen.store.root import LocalRoot
+from aerialdojo_gen.store.tables import from_rows
+
+SCENE = "U_Test_0"
+
+
+class Counted(LocalRoot):
+    """Says which of its files were opened."""
+
+    opened: list[str] = []  # noqa: RUF012
+
+    def open(self, relative):
+        self.opened.append(relative)
+        return super().open(relative)
+
+
+@pytest.fixture(autouse=True)
+def cache(tmp_path, monkeypatch):
+    monkeypatch.setenv("AERIALDOJO_CACHE", str(tmp_path / "cache"))
+    return tmp_path / "cache"
+
+
+@pytest.fixture
+def at_once(monkeypatch):
+    """What has just been written is kept too, so that no test waits for it to come of age."""
+    monkeypatch.setattr(known_footers, "_TOLD_APART_NS", -1)
+
+
+def shard(folder, fingerprint="f" * 64, rows=3):
+    table = from_rows(
+        schemas.LANDMARKS,
+        [{n: {"scene": SCENE, "landmark_id": k}.get(n, _value(schemas.LANDMARKS.schema.field(n), k))
+          for n in schemas.LANDMARKS.schema.names} for k in range(rows)],
+    )  # fmt: skip
+    files = {"meshes/a.glb": store.ShardFile(7, "a" * 64)}
+    summary = {"rows_in": rows, "rows_out": rows, "counts": {"kept": rows}}
+    store.write_shard(folder, "landmarks", SCENE, 0, table, fingerprint=fingerprint, summary=summary, files=files)
+    return folder / store.shard_name("landmarks", SCENE)
+
+
+def _value(field, k):
+    return str(k) if str(field.type) == "string" else [] if str(field.type).startswith("list") else k
+
+
+def asked(folder):
+    """What a process that begins now reads of the shard, and whether it had to open it."""
+    store._read_info.cache_clear()
+    Counted.opened.clear()
+    root = Counted(folder)
+    with footers_known(root):
+        info = store.read_info(root, store.shard_name("landmarks", SCENE))
+    return info, bool(Counted.opened)
+
+
+def test_a_footer_is_read_once(tmp_path, at_once):
+    shard(tmp_path / "data")
+    first, again, third = (asked(tmp_path / "data") for _ in range(3))
+    assert first == (again[0], True)
+    assert again == third == (first[0], False)
+    assert first[0].files["meshes/a.glb"] == store.ShardFile(7, "a" * 64)
+    assert first[0].summary["counts"] == {"kept": 3}
+
+
+def test_a_shard_that_was_replaced_is_read_again(tmp_path, at_once):
+    shard(tmp_path / "data")
+    asked(tmp_path / "data")
+    shard(tmp_path / "data", "e" * 64)
+    assert asked(tmp_path / "data")[0].fingerprint == "e" * 64
+
+
+def test_damage_that_keeps_size_and_time_is_found(tmp_path, at_once):
+    path = shard(tmp_path / "data")
+    asked(tmp_path / "data")
+    before, raw = path.stat(), path.read_bytes()
+    with path.open("r+b") as file:
+        file.seek(raw.index(b'{"checksum"') + 20)
+        file.write(b"?")
+    os.utime(path, ns=(before.st_atime_ns, before.st_mtime_ns))
+    after = path.stat()
+    assert (after.st_size, after.st_mtime_ns, after.st_ino) == (before.st_size, before.st_mtime_ns, before.st_ino)
+    with pytest.raises(StoreError, match="is damaged"):
+        asked(tmp_path / "data")
+
+
+def test_what_was_written_just_now_is_not_kept_yet(tmp_path):
+    shard(tmp_path / "data")
+    assert [asked(tmp_path / "data")[1] for _ in range(2)] == [True, True]
+
+
+def test_a_copy_elsewhere_knows_nothing_of_it(tmp_path, at_once):
+    shard(tmp_path / "data")
+    asked(tmp_path / "data")
+    shutil.copytree(tmp_path / "data", tmp_path / "copy")
+    assert asked(tmp_path / "copy")[1]
+
+
+@pytest.mark.parametrize("text", [b"", b"x\n{}", b"null", b"\xff\n\xff"])
+def test_a_damaged_memory_is_none(tmp_path, cache, at_once, text):
+    shard(tmp_path / "data")
+    first = asked(tmp_path / "data")
+    (memory,) = (cache / "footers").iterdir()
+    memory.write_bytes(text)
+    assert asked(tmp_path / "data") == first
+    assert asked(tmp_path / "data") == (first[0], False)
+
+
+def test_where_nothing_can_be_kept_footers_are_read(tmp_path, cache, at_once):
+    shard(tmp_path / "data")
+    cache.write_text("a file where the folder should be")
+    assert [asked(tmp_path / "data")[1] for _ in range(2)] == [True, True]
+
+
+def test_shards_that_are_gone_are_forgotten(tmp_path, cache, at_once):
+    path = shard(tmp_path / "data")
+    asked(tmp_path / "data")
+    (memory,) = (cache / "footers").iterdir()
+    assert SCENE.encode() in memory.read_bytes()
+    path.rename(path.with_name("part-00001.parquet"))
+    root = Counted(tmp_path / "data")
+    with footers_known(root):
+        store.keep_infos(root, store.shards(root, "landmarks", SCENE))
+    said = memory.read_bytes()
+    assert b"part-00001.parquet" in said
+    assert b"part-00000.parquet" not in said
