@@ -1,4 +1,4 @@
-"""Which layout a recipe names is found without reading its lists of things, and as reading all of it would find it."""
+"""Which layout a recipe names is found without reading its lists of things, as reading all of it would."""
 
 import pytest
 
