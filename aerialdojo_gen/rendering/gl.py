@@ -8,6 +8,7 @@ import os
 import threading
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import lru_cache
 from types import TracebackType
 from typing import Any
 
@@ -34,6 +35,9 @@ _FORMATS = {
     "position": "3f", "uv": "2f", "normal": "3f", "colour": "4f1", "texel_m": "1f", "layer": "1f", "instance": "1f",
 }  # fmt: skip
 
+
+# What programs are told for every picture.
+_CHANGING = ("clip_from_world", "eye", "focal_px", "world_from_camera", "reach")
 
 # A context belongs to the thread that made it: in another one its calls do nothing, or reach that one's objects.
 _here = threading.local()
@@ -66,6 +70,9 @@ def context() -> Any:
         raise RenderError(f"the renderer gl lacks the package moderngl: {_MEND}") from None
     except Exception as error:  # glcontext raises plain Exceptions
         raise RenderError(f"the renderer gl does not start ({error}): {_MEND}") from None
+    # Pictures are drawn upside down, so that their first row comes first in memory: that turns the winding.
+    _here.context.front_face = "cw"
+    _here.context.depth_func = "<="
     return _here.context
 
 
@@ -95,7 +102,7 @@ class GlRenderer:
         self._gl = context()
         self.device = device()
         self._owned: list[Any] = []
-        self._arrays: dict[tuple[Any, ...], Any] = {}
+        self._arrays: dict[tuple[Any, ...], tuple[Any, dict[str, Any]]] = {}
         self._targets: dict[tuple[int, int, bool, int], Any] = {}
         self._bodies: GlBodies | None = None
         textured, flat, layers = chunks(scene)
@@ -159,9 +166,6 @@ class GlRenderer:
         gl = self._gl
         target.use()
         gl.enable_only(gl.DEPTH_TEST | gl.CULL_FACE)
-        # Pictures are drawn upside down, so that their first row comes first in memory: that turns the winding.
-        gl.front_face = "cw"
-        gl.depth_func = "<="
         target.clear(depth=1.0)
 
     def render(self, camera: Camera, world_from_camera: Floats, instances: bool = False) -> Picture:
@@ -224,16 +228,19 @@ class GlRenderer:
             The target; who reads it waits until it is drawn.
         """
         target = self._target(camera.width, camera.height, instances, slot)
-        eye = world_from_camera[:3, 3]
+        eye = world_from_camera[:3, 3].astype(np.float32).tobytes()
         self._begin(target)
         self._shadow.use(1)
         tags = ("INSTANCES",) if instances else ()
 
+        place = {"clip_from_world": _columns(clip), "eye": eye, "focal_px": np.float32(camera.focal_px).tobytes()}
+
         def draw(drawn: _Drawn, chosen: NDArray[np.uint32]) -> None:
             drawn.begin(self._gl)
-            array = self._array((*drawn.kind.tags, *tags), drawn.buffer)
-            _set(array.program, clip_from_world=_columns(clip), eye=eye, focal_px=camera.focal_px)
-            self._indices.orphan()
+            array, uniforms = self._array((*drawn.kind.tags, *tags), drawn.buffer)
+            _write(uniforms, place)
+            # No larger than it must be: Mesa clears all of it.
+            self._indices.orphan(chosen.nbytes)
             self._indices.write(chosen)
             array.render(vertices=len(chosen))
 
@@ -241,17 +248,16 @@ class GlRenderer:
             if len(chosen):
                 draw(drawn, chosen)
         self._gl.disable(self._gl.CULL_FACE)
-        sky = self._array(("SKY", *tags), None)
-        reach = np.array([camera.width, camera.height]) / 2.0 / camera.focal_px
-        _set(sky.program, world_from_camera=_columns(world_from_camera[:3, :3]), reach=reach)
+        sky, uniforms = self._array(("SKY", *tags), None)
+        _write(uniforms, {"world_from_camera": _columns(world_from_camera[:3, :3]), "reach": _reach(camera)})
         sky.render(vertices=3)
         # After the sky: depths so near to the far end are rounded to it, and the one that is drawn last is seen.
         for drawn in self._behind:
             draw(drawn, np.arange(len(drawn.kind.chunks.vertices), dtype=np.uint32))
         return target
 
-    def _array(self, tags: tuple[str, ...], buffer: Any) -> Any:
-        """Return the vertex array of a program and its buffer, made when it is first needed."""
+    def _array(self, tags: tuple[str, ...], buffer: Any) -> tuple[Any, dict[str, Any]]:
+        """Return the vertex array of a program and its buffer, made when it is first needed, and what it can be told."""
         # Two kinds may have one program, and never one buffer.
         key = (*tags, id(buffer))
         if key not in self._arrays:
@@ -263,7 +269,8 @@ class GlRenderer:
                 horizon=self._light.horizon, zenith=self._light.zenith, textures=0, shadow=1,
             )  # fmt: skip
             content, indices = ([], None) if sky else ([_content(program, buffer)], self._indices)
-            self._arrays[key] = self._own(self._gl.vertex_array(program, content, index_buffer=indices))
+            uniforms = {name: program[name] for name in _CHANGING if name in program}
+            self._arrays[key] = self._own(self._gl.vertex_array(program, content, index_buffer=indices)), uniforms
         return self._arrays[key]
 
     def _target(self, width: int, height: int, instances: bool, slot: int) -> Any:
@@ -321,15 +328,31 @@ def clip_from_world(camera: Camera, world_from_camera: Floats, near_m: float, fa
 
     Pixel centres are where OpenGL samples: nothing is to be shifted.
     """
+    return np.asarray(_projection(camera, near_m, far_m) @ np.linalg.inv(world_from_camera))
+
+
+@lru_cache(maxsize=64)
+def _projection(camera: Camera, near_m: float, far_m: float) -> Floats:
     x, y = 2.0 * camera.focal_px / camera.width, 2.0 * camera.focal_px / camera.height
     span = far_m - near_m
     projection = np.diag([x, y, (far_m + near_m) / span, 0.0])
     projection[2, 3], projection[3, 2] = -2.0 * far_m * near_m / span, 1.0
-    return np.asarray(projection @ np.linalg.inv(world_from_camera))
+    return projection
+
+
+@lru_cache(maxsize=64)
+def _reach(camera: Camera) -> bytes:
+    """Half the picture's width and height at a depth of 1, as the sky's program wants it."""
+    return (np.array([camera.width, camera.height]) / 2.0 / camera.focal_px).astype(np.float32).tobytes()
 
 
 def _columns(matrix: Floats) -> bytes:
     return np.ascontiguousarray(matrix.T, dtype=np.float32).tobytes()
+
+
+def _write(uniforms: dict[str, Any], values: dict[str, bytes]) -> None:
+    for name, uniform in uniforms.items():
+        uniform.write(values[name])
 
 
 def _set(program: Any, **values: Any) -> None:

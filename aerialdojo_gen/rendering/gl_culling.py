@@ -20,6 +20,7 @@ Floats = NDArray[np.float64]
 NEAR_W, ROUNDING_PX = 0.05, 0.02
 
 
+@njit(cache=True)
 def chunks_in_view(
     low: Floats, high: Floats, eye: Floats, clips: Floats
 ) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
@@ -41,9 +42,20 @@ def chunks_in_view(
         Which views may see each of them.
     """
     sees = _boxes_in_view(low, high, clips)
-    found = np.flatnonzero(sees.any(axis=1))
-    away = np.maximum(low[found] - eye, 0.0) + np.maximum(eye - high[found], 0.0)
-    order = found[np.argsort(np.einsum("ij,ij->i", away, away), kind="stable")]
+    found, away = np.empty(len(low), np.int64), np.empty(len(low), np.float64)
+    n = 0
+    for k in range(len(low)):
+        any_sees = False
+        for v in range(len(clips)):
+            any_sees |= sees[k, v]
+        if any_sees:
+            x = max(low[k, 0] - eye[0], 0.0) + max(eye[0] - high[k, 0], 0.0)
+            y = max(low[k, 1] - eye[1], 0.0) + max(eye[1] - high[k, 1], 0.0)
+            z = max(low[k, 2] - eye[2], 0.0) + max(eye[2] - high[k, 2], 0.0)
+            found[n], away[n] = k, x * x + y * y + z * z
+            n += 1
+    # A stable sort: of boxes that are equally near the first one stays before.
+    order = found[:n][np.argsort(away[:n], kind="mergesort")]
     return order, sees[order]
 
 
@@ -187,6 +199,22 @@ def _centres(a: float, b: float, c: float, size: int) -> tuple[int, int]:
 @njit(cache=True, error_model="numpy")
 def _box_hidden(low: Floats, high: Floats, m: Floats, width: int, height: int, whole: NDArray[np.float32]) -> bool:
     """Whether a box lies behind what is drawn at every pixel whose centre it could hold."""
+    left, right, top, bottom, nearest = box_pixels(low, high, m, width, height)
+    return left > right or top > bottom or hidden(left, right, top, bottom, nearest, whole)
+
+
+@njit(cache=True, error_model="numpy")
+def box_pixels(low: Floats, high: Floats, m: Floats, width: int, height: int) -> tuple[int, int, int, int, float]:
+    """Project a box.
+
+    Returns
+    -------
+    left, right, top, bottom : int
+        First and last columns and rows of pixels whose centres it could hold; the first is the larger where there
+        are none.
+    nearest : float
+        Inverse depth of its nearest corner; inf, and all pixels, where one is too near to be projected.
+    """
     u0, u1, v0, v1, nearest = np.inf, -np.inf, np.inf, -np.inf, np.inf
     for corner in range(8):
         x = high[0] if corner & 1 else low[0]
@@ -194,10 +222,10 @@ def _box_hidden(low: Floats, high: Floats, m: Floats, width: int, height: int, w
         z = high[2] if corner & 4 else low[2]
         w = m[3, 0] * x + m[3, 1] * y + m[3, 2] * z + m[3, 3]
         if w < NEAR_W:
-            return False
+            return 0, width - 1, 0, height - 1, np.inf
         u = _pixel((m[0, 0] * x + m[0, 1] * y + m[0, 2] * z + m[0, 3]) / w, 0.5 * width)
         v = _pixel((m[1, 0] * x + m[1, 1] * y + m[1, 2] * z + m[1, 3]) / w, 0.5 * height)
         u0, u1, v0, v1, nearest = min(u0, u), max(u1, u), min(v0, v), max(v1, v), min(nearest, w)
     left, right = max(math.ceil(u0 - ROUNDING_PX), 0), min(math.floor(u1 + ROUNDING_PX), width - 1)
     top, bottom = max(math.ceil(v0 - ROUNDING_PX), 0), min(math.floor(v1 + ROUNDING_PX), height - 1)
-    return left > right or top > bottom or hidden(left, right, top, bottom, 1.0 / nearest, whole)
+    return left, right, top, bottom, 1.0 / nearest

@@ -9,16 +9,20 @@ margins that exceed what OpenGL rounds.
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from aerialdojo_gen.rendering.gl_culling import NEAR_W, ROUNDING_PX, chunks_in_view
-from aerialdojo_gen.rendering.gl_geometry import Chunks
+from aerialdojo_gen.rendering.gl_culling import NEAR_W, ROUNDING_PX, box_pixels, chunks_in_view
+from aerialdojo_gen.rendering.gl_geometry import CHUNK_TRIANGLES, Chunks
 from aerialdojo_gen.rendering.gl_tiles import MOVED_PX, NEARER, NEAREST, Tiles
 
 Floats = NDArray[np.float64]
+
+# Triangles that are computed with together, whether all of them are there or not: loops of a known length.
+_SIZE = CHUNK_TRIANGLES
 
 
 class BodyCulling:
@@ -35,6 +39,7 @@ class BodyCulling:
         self._chunks = chunks
         self._hides = hides
         self._out = np.empty((0, 0), np.uint32)
+        self._planes, self._corners = _blocks(chunks.planes, chunks.starts), _blocks(chunks.corners, chunks.starts)
 
     def seen(
         self, clips: Floats, eye: Floats, width: int, height: int, nearness: NDArray[np.float32]
@@ -64,9 +69,17 @@ class BodyCulling:
         if len(self._out) < len(clips):
             self._out = np.empty((len(clips), len(c.vertices)), np.uint32)
         counts = _triangles_seen(
-            order, sees, c.starts, c.planes, c.corners, clips, eye, c.low, c.high, nearness, self._out
+            order, sees, c.starts, self._planes, self._corners, clips, eye, c.low, c.high, nearness, self._out
         )
         return [self._out[v, :n] for v, n in enumerate(counts.tolist())]
+
+
+def _blocks(rows: NDArray[Any], starts: NDArray[np.int64]) -> NDArray[Any]:
+    """Lay triangles' rows out by chunk, field and triangle: so that several are computed with in one step."""
+    out = np.zeros((len(starts) - 1, rows.shape[1], CHUNK_TRIANGLES), rows.dtype)
+    chunk = np.repeat(np.arange(len(starts) - 1), np.diff(starts))
+    out[chunk, :, np.arange(len(rows)) - starts[chunk]] = rows
+    return out.reshape(len(out), -1)
 
 
 @njit(cache=True, error_model="numpy")
@@ -77,73 +90,78 @@ def _triangles_seen(
 ) -> NDArray[np.int64]:  # fmt: skip
     views, height, width = nearness.shape
     counts = np.zeros(views, np.int64)
-    ex, ey, ez = eye[0], eye[1], eye[2]
-    half_w, half_h = 0.5 * width, 0.5 * height
+    facing, places = np.empty(_SIZE), np.empty(12 * _SIZE)
     for n in range(len(order)):
-        chunk, mask = order[n], 0
+        chunk, known = order[n], False
+        first = starts[chunk]
         for v in range(views):
-            if sees[n, v] and not _hidden(low[chunk], high[chunk], clips[v], nearness[v]):
-                mask |= 1 << v
-        if not mask:
-            continue
-        for t in range(starts[chunk], starts[chunk + 1]):
-            if planes[t, 0] * ex + planes[t, 1] * ey + planes[t, 2] * ez + planes[t, 3] <= 0.0:
+            if not sees[n, v] or _hidden(low[chunk], high[chunk], clips[v], nearness[v]):
                 continue
-            ax, ay, az = corners[t, 0], corners[t, 1], corners[t, 2]
-            bx, by, bz = corners[t, 3], corners[t, 4], corners[t, 5]
-            cx, cy, cz = corners[t, 6], corners[t, 7], corners[t, 8]
-            for v in range(views):
-                if not (mask >> v) & 1:
+            if not known:
+                _face(planes[chunk], eye[0], eye[1], eye[2], facing)
+                known = True
+            for corner in range(3):
+                _project(corners[chunk, 3 * corner * _SIZE :], clips[v], width, height, places[4 * corner * _SIZE :])
+            at = counts[v]
+            for i in range(starts[chunk + 1] - first):
+                if facing[i] <= 0.0:
                     continue
-                m = clips[v]
-                w0 = m[3, 0] * ax + m[3, 1] * ay + m[3, 2] * az + m[3, 3]
-                w1 = m[3, 0] * bx + m[3, 1] * by + m[3, 2] * bz + m[3, 3]
-                w2 = m[3, 0] * cx + m[3, 1] * cy + m[3, 2] * cz + m[3, 3]
-                if w0 >= NEAR_W and w1 >= NEAR_W and w2 >= NEAR_W:
-                    # To pixels, centres at whole numbers.
-                    w0, w1, w2 = 1.0 / w0, 1.0 / w1, 1.0 / w2
-                    u0 = ((m[0, 0] * ax + m[0, 1] * ay + m[0, 2] * az + m[0, 3]) * w0 + 1.0) * half_w - 0.5
-                    u1 = ((m[0, 0] * bx + m[0, 1] * by + m[0, 2] * bz + m[0, 3]) * w1 + 1.0) * half_w - 0.5
-                    u2 = ((m[0, 0] * cx + m[0, 1] * cy + m[0, 2] * cz + m[0, 3]) * w2 + 1.0) * half_w - 0.5
+                near = 0
+                for corner in range(3):
+                    near += places[4 * corner * _SIZE + i] < NEAR_W
+                if near == 3:
+                    continue
+                if near == 0:
+                    u0, v0, w0 = places[_SIZE + i], places[2 * _SIZE + i], places[3 * _SIZE + i]
+                    u1, v1, w1 = places[5 * _SIZE + i], places[6 * _SIZE + i], places[7 * _SIZE + i]
+                    u2, v2, w2 = places[9 * _SIZE + i], places[10 * _SIZE + i], places[11 * _SIZE + i]
                     left = max(math.ceil(min(u0, min(u1, u2)) - ROUNDING_PX), 0)
                     right = min(math.floor(max(u0, max(u1, u2)) + ROUNDING_PX), width - 1)
                     if left > right:
                         continue
-                    v0 = ((m[1, 0] * ax + m[1, 1] * ay + m[1, 2] * az + m[1, 3]) * w0 + 1.0) * half_h - 0.5
-                    v1 = ((m[1, 0] * bx + m[1, 1] * by + m[1, 2] * bz + m[1, 3]) * w1 + 1.0) * half_h - 0.5
-                    v2 = ((m[1, 0] * cx + m[1, 1] * cy + m[1, 2] * cz + m[1, 3]) * w2 + 1.0) * half_h - 0.5
                     top = max(math.ceil(min(v0, min(v1, v2)) - ROUNDING_PX), 0)
                     bottom = min(math.floor(max(v0, max(v1, v2)) + ROUNDING_PX), height - 1)
                     if top > bottom:
                         continue
                     if not _covers(u0, v0, w0, u1, v1, w1, u2, v2, w2, left, right, top, bottom, nearness[v]):
                         continue
-                elif w0 < NEAR_W and w1 < NEAR_W and w2 < NEAR_W:
-                    continue
-                n = counts[v]
-                out[v, n], out[v, n + 1], out[v, n + 2] = 3 * t, 3 * t + 1, 3 * t + 2
-                counts[v] = n + 3
+                t = 3 * (first + i)
+                out[v, at], out[v, at + 1], out[v, at + 2] = t, t + 1, t + 2
+                at += 3
+            counts[v] = at
     return counts
+
+
+@njit(cache=True)
+def _face(planes: Floats, x: float, y: float, z: float, facing: Floats) -> None:
+    """Tell which triangles of a chunk face a point: where it is above their planes."""
+    for i in range(_SIZE):
+        facing[i] = planes[i] * x + planes[i + _SIZE] * y + planes[i + 2 * _SIZE] * z + planes[i + 3 * _SIZE]
+
+
+@njit(cache=True, error_model="numpy")
+def _project(corners: NDArray[np.float32], m: Floats, width: int, height: int, places: Floats) -> None:
+    """Project a corner of all triangles of a chunk: w, then the pixel, its centre at whole numbers, and 1 / w."""
+    half_w, half_h = 0.5 * width, 0.5 * height
+    a0, a1, a2, a3 = m[0, 0], m[0, 1], m[0, 2], m[0, 3]
+    b0, b1, b2, b3 = m[1, 0], m[1, 1], m[1, 2], m[1, 3]
+    d0, d1, d2, d3 = m[3, 0], m[3, 1], m[3, 2], m[3, 3]
+    for i in range(_SIZE):
+        x, y, z = corners[i], corners[i + _SIZE], corners[i + 2 * _SIZE]
+        w = d0 * x + d1 * y + d2 * z + d3
+        inverse = 1.0 / w
+        places[i] = w
+        places[i + _SIZE] = ((a0 * x + a1 * y + a2 * z + a3) * inverse + 1.0) * half_w - 0.5
+        places[i + 2 * _SIZE] = ((b0 * x + b1 * y + b2 * z + b3) * inverse + 1.0) * half_h - 0.5
+        places[i + 3 * _SIZE] = inverse
 
 
 @njit(cache=True, error_model="numpy")
 def _hidden(low: Floats, high: Floats, m: Floats, nearness: NDArray[np.float32]) -> bool:
     """Whether a box lies behind what is drawn at every pixel whose centre it could hold."""
     height, width = nearness.shape
-    u0, u1, v0, v1, nearest = np.inf, -np.inf, np.inf, -np.inf, np.inf
-    for corner in range(8):
-        x = high[0] if corner & 1 else low[0]
-        y = high[1] if corner & 2 else low[1]
-        z = high[2] if corner & 4 else low[2]
-        w = m[3, 0] * x + m[3, 1] * y + m[3, 2] * z + m[3, 3]
-        if w < NEAR_W:
-            return False
-        u = ((m[0, 0] * x + m[0, 1] * y + m[0, 2] * z + m[0, 3]) / w + 1.0) * 0.5 * width - 0.5
-        v = ((m[1, 0] * x + m[1, 1] * y + m[1, 2] * z + m[1, 3]) / w + 1.0) * 0.5 * height - 0.5
-        u0, u1, v0, v1, nearest = min(u0, u), max(u1, u), min(v0, v), max(v1, v), min(nearest, w)
-    left, right = max(math.ceil(u0 - ROUNDING_PX), 0), min(math.floor(u1 + ROUNDING_PX), width - 1)
-    top, bottom = max(math.ceil(v0 - ROUNDING_PX), 0), min(math.floor(v1 + ROUNDING_PX), height - 1)
-    limit = np.float32(1.0 / nearest + NEARER)
+    left, right, top, bottom, nearest = box_pixels(low, high, m, width, height)
+    limit = np.float32(nearest + NEARER)
     for y in range(top, bottom + 1):
         for x in range(left, right + 1):
             if nearness[y, x] <= limit:
@@ -170,29 +188,52 @@ def _covers(
     dx = 0.0 if flat else ((n1 - n0) * (v2 - v0) - (n2 - n0) * (v1 - v0)) / area
     dy = 0.0 if flat else ((n2 - n0) * (u1 - u0) - (n1 - n0) * (u2 - u0)) / area
     least, most = min(n0, min(n1, n2)), max(n0, max(n1, n2))
+    if flat:
+        least = most
     slack = NEARER + MOVED_PX * (abs(dx) + abs(dy))
-    visible = False
+    hides, visible = not flat and most <= NEAREST, False
+    i0, i1, i2 = 1.0 / b0, 1.0 / b1, 1.0 / b2
     for y in range(top, bottom + 1):
-        e0 = a0 * (y - v0) - b0 * (left - u0)
-        e1 = a1 * (y - v1) - b1 * (left - u1)
-        e2 = a2 * (y - v2) - b2 * (left - u2)
-        n = n0 + dx * (left - u0) + dy * (y - v0)
-        for x in range(left, right + 1):
-            if e0 >= -s0 and e1 >= -s1 and e2 >= -s2:
-                here = most if flat else min(max(n, least), most)
-                if here + slack >= nearness[y, x]:
+        span = float(left), float(right), left - 0.5, right + 0.5
+        span = _within(a0 * (y - v0) + b0 * u0, b0, i0, s0, span)
+        span = _within(a1 * (y - v1) + b1 * u1, b1, i1, s1, span)
+        span = _within(a2 * (y - v2) + b2 * u2, b2, i2, s2, span)
+        first, last = math.ceil(span[0] - 1e-6), math.floor(span[1] + 1e-6)
+        row = n0 - dx * u0 + dy * (y - v0)
+        if not visible:
+            for x in range(first, last + 1):
+                if min(max(row + dx * x, least), most) + slack >= nearness[y, x]:
                     visible = True
-                    if (
-                        e0 > s0
-                        and e1 > s1
-                        and e2 > s2
-                        and not flat
-                        and most <= NEAREST
-                        and here - slack > nearness[y, x]
-                    ):
-                        nearness[y, x] = here - slack
-            e0 -= b0
-            e1 -= b1
-            e2 -= b2
-            n += dx
+                    break
+        if not visible:
+            # Nothing of this row is nearer than what is there.
+            continue
+        if not hides:
+            return True
+        for x in range(math.ceil(span[2] + 1e-6), math.floor(span[3] - 1e-6) + 1):
+            here = min(max(row + dx * x, least), most) - slack
+            if here > nearness[y, x]:
+                nearness[y, x] = here
     return visible
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def _within(
+    r: float, b: float, inverse: float, s: float, span: tuple[float, float, float, float]
+) -> tuple[float, float, float, float]:
+    """Narrow a row of pixels to the inner side of an edge, where r - b x is positive.
+
+    The first two bounds are those of what may lie there, the others of what surely does; s is what moved corners
+    change. A difference of a millionth of a pixel is within s.
+    """
+    first, last, sure_first, sure_last = span
+    if b > 0.0:
+        last, sure_last = min(last, (r + s) * inverse), min(sure_last, (r - s) * inverse)
+    elif b < 0.0:
+        first, sure_first = max(first, (r + s) * inverse), max(sure_first, (r - s) * inverse)
+    else:
+        if r + s < 0.0:
+            last = -1.0
+        if r - s <= 0.0:
+            sure_last = -1.0
+    return first, last, sure_first, sure_last
