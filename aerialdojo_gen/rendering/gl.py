@@ -257,7 +257,7 @@ class GlRenderer:
         return target
 
     def _array(self, tags: tuple[str, ...], buffer: Any) -> tuple[Any, dict[str, Any]]:
-        """Return the vertex array of a program and its buffer, made when it is first needed, and what it can be told."""
+        """Return the vertex array of a program and its buffer, made when it is first needed, and what it is told."""
         # Two kinds may have one program, and never one buffer.
         key = (*tags, id(buffer))
         if key not in self._arrays:
