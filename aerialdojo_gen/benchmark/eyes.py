@@ -83,8 +83,8 @@ def look(
         if sensors.rgb:
             rgb[view] = pictures[0, v]
         if sensors.depth:
-            within = depths[0, v] <= np.float32(sensors.max_depth_m)
-            depth_m[view] = np.where(within, depths[0, v], np.float32(0.0))
+            depth_m[view] = depths[0, v]
+            np.putmask(depth_m[view], ~(depth_m[view] <= np.float32(sensors.max_depth_m)), np.float32(0.0))
     return rgb, depth_m
 
 
