@@ -306,6 +306,8 @@ class Learner:
         functional = self.torch.nn.functional
         draw = rng.generator(self.recipe.seed, "learning goals", *place)
         batch = self._batch(pool, frames, episodes, draw)
+        # What is dropped out is drawn anew at every batch, so that a resumed training draws the same.
+        self.torch.manual_seed(int(draw.integers(2**31)))
         thought, mask = self._forward(batch), batch["mask"]
         logits, label = thought.logits[mask].float(), batch["label"][mask]
         loss = functional.cross_entropy(logits, label)
