@@ -1,11 +1,11 @@
-"""Makes what is learned from, a scene's episodes at a time in processes: references, or what a policy flew."""
+"""Makes what is learned from, in processes: references, flights of a policy, looks about in a scene."""
 
 from __future__ import annotations
 
 import hashlib
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +27,7 @@ from aerialdojo_gen.pipeline.executors import Executor
 from aerialdojo_gen.pipeline.executors.link import Link
 from aerialdojo_gen.pipeline.progress import Reporter
 from aerialdojo_gen.release.contents import part_name
+from aerialdojo_gen.release.fingerprint import release_fingerprint
 from aerialdojo_gen.rendering.bodies import draw_bodies
 from aerialdojo_gen.scenes.context import SEVERAL, open_scene
 from aerialdojo_gen.store import shards as store
@@ -34,6 +35,7 @@ from aerialdojo_gen.store.root import DataRoot
 
 # Trajectories of a part: seconds of work, so that no process is left with a long one while the others wait.
 _PART = 64
+_LOOKS = 2000
 _MEMORY_MB = 1500
 
 
@@ -61,6 +63,26 @@ class Flying:
 
 
 @dataclass(frozen=True)
+class Survey:
+    """Looks about in a scene.
+
+    Attributes
+    ----------
+    looks : int
+        How many.
+    seed, number : int
+        Of the draws; of this part among those of its scene.
+    target_split : str or None
+        Side of the split by objects whose references are followed.
+    """
+
+    looks: int
+    seed: int
+    number: int
+    target_split: str | None
+
+
+@dataclass(frozen=True)
 class Part:
     """Trajectories of one scene.
 
@@ -82,6 +104,8 @@ class Part:
         Where to; named by what is in it.
     flying : Flying, optional
         None for the references.
+    survey : Survey, optional
+        Looks about instead of trajectories.
     """
 
     data: DataRoot
@@ -96,11 +120,17 @@ class Part:
     renderer: str
     folder: Path
     flying: Flying | None = None
+    survey: Survey | None = None
 
     @property
     def label(self) -> str:
         """In words."""
-        return f"{'references' if self.flying is None else 'flights'} of {self.scene}"
+        what = "looks" if self.survey is not None else "references" if self.flying is None else "flights"
+        return f"{what} of {self.scene}"
+
+    def __len__(self) -> int:
+        """Return the number of trajectories, or of looks."""
+        return len(self.nav_ids) if self.survey is None else self.survey.looks
 
     def index(self) -> Index:
         """Read the trajectories."""
@@ -126,9 +156,9 @@ def parts_of(
     sensors, size_px, vocabulary, renderer, flying
         As for `Part`.
     """
-    code = [
-        code_of(f"aerialdojo_gen.{name}").digest for name in ("rendering.gl", "learning.collect", "learning.flights")
-    ]
+    # References are what they are whatever network flies later.
+    modules = ["rendering.gl", "learning.collect", *(["learning.flights"] if flying is not None else [])]
+    code = [code_of(f"aerialdojo_gen.{name}").digest for name in modules]
     facts = [sensors.views, sensors.width, sensors.height, sensors.fov_deg, sensors.max_depth_m, size_px,
              vocabulary.words, vocabulary.length, renderer, code, None if flying is None else
              [flying.sha256, flying.seed, flying.round, flying.teacher_share]]  # fmt: skip
@@ -150,6 +180,26 @@ def parts_of(
     return parts
 
 
+def survey_parts(
+    data: DataRoot, scenes: Sequence[str], folder: Path, split: str, target_split: str | None, looks: int, seed: int,
+    like: Part,
+) -> list[Part]:  # fmt: skip
+    """Share looks about out; cameras, vocabulary and renderer are those of another part."""
+    code = [code_of(f"aerialdojo_gen.{name}").digest for name in ("rendering.gl", "learning.survey")]
+    s, parts, release = like.sensors, [], release_fingerprint(data)
+    for scene in scenes:
+        for number, begin in enumerate(range(0, looks, _LOOKS)):
+            own = Survey(min(_LOOKS, looks - begin), seed, number, target_split)
+            facts = [s.views, s.width, s.height, s.fov_deg, s.max_depth_m, like.renderer, code, release, split,
+                     mesh_of(data, scene)[1], asdict(own), like.length]  # fmt: skip
+            name = f"{scene}-{hashlib.sha256(json.dumps(facts, sort_keys=True).encode()).hexdigest()[:16]}"
+            parts.append(replace(
+                like, splits=(split,), settings=(), scene=scene, nav_ids=(), folder=folder / name, flying=None,
+                survey=own,
+            ))  # fmt: skip
+    return parts
+
+
 def collect(parts: Sequence[Part], executor: Executor, reporter: Reporter, what: str) -> list[Steps]:
     """Make the parts that are not there, and read them all.
 
@@ -160,7 +210,8 @@ def collect(parts: Sequence[Part], executor: Executor, reporter: Reporter, what:
     """
     todo = [part for part in parts if not is_written(part.folder)]
     if todo:
-        with reporter.bar(what, sum(len(part.nav_ids) for part in todo), "trajectories") as bar:
+        unit = "trajectories" if todo[0].survey is None else "looks"
+        with reporter.bar(what, sum(map(len, todo)), unit) as bar:
             for done in executor.map(make_part, todo, lambda part: part.scene, memory_mb=_MEMORY_MB):
                 if isinstance(done, AerialDojoError):
                     raise done
@@ -171,14 +222,18 @@ def collect(parts: Sequence[Part], executor: Executor, reporter: Reporter, what:
 def make_part(part: Part, link: Link | None = None) -> int:
     """Make one part and write it; return how many trajectories it has."""
     del link
-    if part.flying is None:
+    if part.survey is not None:
+        from aerialdojo_gen.learning.survey import surveyed
+
+        steps = surveyed(part, part.survey)
+    elif part.flying is None:
         steps = references(part)
     else:
         from aerialdojo_gen.learning.flights import flights
 
         steps = flights(part, part.flying)
     steps.write(part.folder)
-    return len(part.nav_ids)
+    return len(part)
 
 
 def references(part: Part) -> Steps:
@@ -239,6 +294,7 @@ def goals_of(part: Part, index: Index) -> dict[str, Any]:
         "semantic": np.array([said is not None for said in names[3]], np.bool_),
         "images": np.array(shown, np.uint8).reshape(-1, part.size_px, part.size_px, 4),
         "nav_id": np.array(index.nav_id, np.str_),
+        "scene": np.full(len(index), part.scene),
     }
 
 

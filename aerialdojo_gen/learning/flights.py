@@ -12,6 +12,7 @@ from aerialdojo_gen.benchmark.episode import Episode
 from aerialdojo_gen.benchmark.motion import FlightSpace, flight_space
 from aerialdojo_gen.benchmark.tasks import mesh_of
 from aerialdojo_gen.common import rng
+from aerialdojo_gen.config.agreement import SUCCESS_RADIUS_M
 from aerialdojo_gen.config.sections import Embodiment, PlanConfig
 from aerialdojo_gen.geometry.motion import replay
 from aerialdojo_gen.learning import checkpoints
@@ -59,6 +60,8 @@ class Flown:
 
     def fly(self, chosen: int, label: int) -> bool:
         """Fly the policy's action, or the teacher's where that would end the episode; False when it is over."""
+        if chosen == STOP and self.arrived:
+            return False
         if chosen == STOP or self._collides(chosen):
             if label == STOP:
                 return False
@@ -68,6 +71,11 @@ class Flown:
         if not self.episode.refused:
             self.reckoning.add(chosen)
         return self.episode.termination is None
+
+    @property
+    def arrived(self) -> bool:
+        """Whether a Stop here is a success."""
+        return self.episode.distance_m <= SUCCESS_RADIUS_M
 
     def _collides(self, action: int) -> bool:
         x, y, z = replay(self.pose, [action])[-1, :3].tolist()
@@ -133,16 +141,15 @@ def _fly(
         for i, k in enumerate(going):
             flown[k].note(int(labels[i]), frames[i], poses[i])
         last = [flown[k] for k in going]
-        logits, _, memory[:, going] = network(
+        thought, memory[going] = network(
             torch.from_numpy(frames) if part.sensors.views else None,
             goal[going],
             torch.tensor([[f.rows[-1][1]] for f in last]),
             torch.from_numpy(np.stack([f.odometry[-1] for f in last])[:, None]),
-            torch.tensor([[f.rows[-1][2]] for f in last]),
             torch.ones((len(going), 1), dtype=torch.bool),
-            memory[:, going].contiguous(),
+            memory[going],
         )
-        chosen = logits[:, 0].argmax(dim=1).tolist()
+        chosen = thought.actions[:, 0].tolist()
         left = []
         for i, k in enumerate(going):
             label = int(labels[i])

@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 
 from aerialdojo_gen.common import rng
 from aerialdojo_gen.learning.loader import torch_package
-from aerialdojo_gen.learning.network import Network
+from aerialdojo_gen.learning.network import Network, Thought
 from aerialdojo_gen.learning.recipe import Recipe
 from aerialdojo_gen.learning.steps import Pool
-from aerialdojo_gen.learning.whereabouts import astray, missed
+from aerialdojo_gen.learning.whereabouts import UNIT_M, astray, missed
 from aerialdojo_gen.pipeline.executors.local import own_cores
 
 # Batches of like lengths are put together from so many: padding costs time.
@@ -51,14 +51,33 @@ class Progress:
 
 @dataclass(frozen=True)
 class Epoch:
-    """What came of an epoch: mean loss and accuracy of the steps it was trained on, accuracy on those kept back."""
+    """What came of an epoch: mean loss and accuracy of the steps trained on, and what `Learner.assess` finds."""
 
     phase: int
     number: int
     loss: float
     accuracy: float
-    kept_back: float | None
+    kept_back: Assessed | None
     left_s: float
+
+
+@dataclass(frozen=True)
+class Assessed:
+    """How well a network does on steps that it was not trained on.
+
+    Attributes
+    ----------
+    accuracy : float
+        Share of steps at which its likeliest action is the teacher's.
+    goal_off_m : float
+        Median distance between where the goal is and where it is thought to be, metres.
+    goal_off_at_start_m : float
+        That at the first steps of episodes.
+    """
+
+    accuracy: float
+    goal_off_m: float
+    goal_off_at_start_m: float
 
 
 def epoch_batches(
@@ -141,6 +160,7 @@ class Learner:
     def learn(
         self,
         pool: Pool,
+        survey: Pool | None,
         kept_back: NDArray[np.bool_],
         epochs: int,
         learning_rate: float,
@@ -153,6 +173,8 @@ class Learner:
         Parameters
         ----------
         pool : Pool
+        survey : Pool, optional
+            Looks about, for the map beside the episodes' own pictures.
         kept_back : (n,) bool
             Episodes that are not learned from.
         epochs : int
@@ -165,12 +187,15 @@ class Learner:
         """
         # Sums depend on how many threads share them, and who flew in this process before left it one.
         self.torch.set_num_threads(own_cores())
-        self._anywhere = np.flatnonzero(np.repeat(~kept_back, pool.lengths))
+        anywhere = np.flatnonzero(np.repeat(~kept_back, pool.lengths))
         p, seed, most = self.progress, self.recipe.seed, self.recipe.train.batch_steps
         lengths = np.where(kept_back, 0, pool.lengths)
         counts = [len(epoch_batches(lengths, most, seed, p.phase, e)) for e in range(epochs)]
         total, done = sum(counts), sum(counts[: p.epoch]) + p.batch
         frames = self._frames(pool)
+        self._about = [(pool, frames, anywhere)]
+        if survey is not None:
+            self._about.append((survey, self._frames(survey), np.arange(survey.n_steps)))
         started, first = time.monotonic(), done
         while p.epoch < epochs:
             self.network.train()
@@ -186,23 +211,26 @@ class Learner:
             sums, number = p.sums, p.epoch
             p.epoch, p.batch, p.sums = p.epoch + 1, 0, [0.0, 0.0, 0.0]
             steps = max(sums[2], 1.0)
-            kept = self.accuracy(pool, frames, kept_back)
+            kept = self.assess(pool, frames, kept_back)
             after(Epoch(p.phase, number, sums[0] / steps, sums[1] / steps, kept, left_s))
 
-    def accuracy(self, pool: Pool, frames: Any, chosen: NDArray[np.bool_]) -> float | None:
-        """Share of steps at which the network does what the teacher does; None without any."""
+    def assess(self, pool: Pool, frames: Any, chosen: NDArray[np.bool_]) -> Assessed | None:
+        """See how well the network does on some episodes; None without any."""
         lengths = np.where(chosen, pool.lengths, 0)
         if not lengths.any():
             return None
         self.network.eval()
-        right = n = 0.0
+        right, off, first = [], [], []
         with self.torch.no_grad():
             for episodes in epoch_batches(lengths, self.recipe.train.batch_steps, 0, 0, 0):
                 batch = self._batch(pool, frames, episodes, rng.generator(0, "kept back"))
-                logits, _ = self._forward(batch)
-                hit = (logits.argmax(-1) == batch["label"])[batch["mask"]]
-                right, n = right + float(hit.sum()), n + hit.numel()
-        return right / n
+                thought, mask = self._forward(batch), batch["mask"]
+                right.append((thought.logits.argmax(-1) == batch["label"])[mask])
+                away = self.torch.linalg.vector_norm(thought.guess.offset * UNIT_M - batch["offset"], dim=-1)
+                off.append(away[mask])
+                first.append(away[:, 0])
+        median = [float(self.torch.cat(one).median()) for one in (off, first)]
+        return Assessed(float(self.torch.cat(right).float().mean()), *median)
 
     def _optimiser(self) -> Any:
         train = self.recipe.train
@@ -242,25 +270,30 @@ class Learner:
             out["pictures"] = self._pictures(pool, frames, rows)
         return out
 
-    def _forward(self, batch: dict[str, Any]) -> tuple[Any, Any]:
+    def _forward(self, batch: dict[str, Any]) -> Thought:
         with self.torch.autocast(self.device, self.torch.bfloat16, enabled=self.device != "cpu"):
             goal = self.network.understand(batch["tokens"], batch["images"], batch["told_by_image"])
-            logits, guess, _ = self.network(
-                batch.get("pictures"), goal, batch["previous"], batch["odometry"], batch["remaining"], batch["mask"]
+            thought, _ = self.network(
+                batch.get("pictures"), goal, batch["previous"], batch["odometry"], batch["mask"]
             )
-        return logits.float(), guess
+        return thought
 
-    def _looked_about(self, pool: Pool, frames: Any, draw: np.random.Generator) -> Any:
+    def _looked_about(self, draw: np.random.Generator) -> Any:
         """Loss of places told by pictures from anywhere: an episode's are too much alike to learn a scene by."""
         n = self.recipe.train.looks
-        if not (n and self.recipe.data.views and len(self._anywhere)):
+        about = [(pool, frames, rows) for pool, frames, rows in self._about if len(rows)]
+        if not (n and self.recipe.data.views and about):
             return 0.0
-        rows = np.sort(draw.choice(self._anywhere, n))
-        pictures, poses = self._pictures(pool, frames, rows), self.torch.from_numpy(pool.poses(rows)).to(self.device)
+        looks = []
+        for k, (pool, frames, rows) in enumerate(about):
+            chosen = np.sort(draw.choice(rows, (n + k) // len(about)))
+            at = (self.torch.from_numpy(one).to(self.device) for one in pool.places(chosen))
+            looks.append((self._pictures(pool, frames, chosen), *at))
+        pictures, pose, number = (self.torch.cat(same) for same in zip(*looks, strict=True))
         with self.torch.autocast(self.device, self.torch.bfloat16, enabled=self.device != "cpu"):
             seen = self.network.look(pictures.flatten(0, 1)).reshape(n, -1)
-            place, heading, _ = self.network.whereabouts.found(seen)
-        return astray(place, heading, poses)
+            place, heading, scene, _ = self.network.whereabouts.found(seen)
+        return astray(place, heading, scene, pose, number)
 
     def _pictures(self, pool: Pool, frames: Any, rows: NDArray[np.int64]) -> Any:
         if frames is None:
@@ -273,16 +306,17 @@ class Learner:
         functional = self.torch.nn.functional
         draw = rng.generator(self.recipe.seed, "learning goals", *place)
         batch = self._batch(pool, frames, episodes, draw)
-        logits, guess = self._forward(batch)
-        mask = batch["mask"]
-        label = batch["label"][mask]
-        loss = functional.cross_entropy(logits[mask], label)
-        where = missed(guess, batch) + self._looked_about(pool, frames, draw)
+        # What is dropped out is drawn anew at every batch, so that a resumed training draws the same.
+        self.torch.manual_seed(int(draw.integers(2**31)))
+        thought, mask = self._forward(batch), batch["mask"]
+        logits, label = thought.logits[mask].float(), batch["label"][mask]
+        loss = functional.cross_entropy(logits, label)
+        where = missed(thought.guess, batch) + self._looked_about(draw)
         for group in self.optimiser.param_groups:
             group["lr"] = rate
         self.optimiser.zero_grad(set_to_none=True)
         (loss + self.recipe.train.goal_weight * where).backward()
         self.torch.nn.utils.clip_grad_norm_(self.network.parameters(), self.recipe.train.gradient_norm)
         self.optimiser.step()
-        right = (logits[mask].argmax(-1) == label).sum()
+        right = (logits.argmax(-1) == label).sum()
         return float(loss.detach()), float(right), int(mask.sum())

@@ -1,9 +1,9 @@
-"""The policy's network: a small CNN for all views and the goal's picture, an embedding of words, a GRU."""
+"""The policy's network: a small CNN for all views and the goal's picture, an embedding of words, a map, a choice."""
 
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import torch
@@ -11,16 +11,19 @@ from torch import nn
 from torch.nn import functional
 
 from aerialdojo_gen.agents.goal import N_ACTIONS
-from aerialdojo_gen.learning.whereabouts import SUMS, UNIT_M, Guess, Whereabouts
+from aerialdojo_gen.learning.whereabouts import UNIT_M, Guess, Whereabouts
+from aerialdojo_gen.store.schemas import STOP
 
 # Wave lengths of the sines that tell places apart, metres; beside them the place itself.
 _WAVES_M = (4.0, 12.0, 36.0, 108.0)
 _FAR_M = 30.0
-_ODOMETRY = 3 * (2 * len(_WAVES_M) + 1) + 2
-_BEARING = 3 * (2 * len(_WAVES_M) + 1) + 3 + 1
+_BEARING = 3 * (2 * len(_WAVES_M) + 1) + 3 + 8
 # The action before, none among them, becomes so many numbers.
 _ACTION_FEATURES = 32
-_BUDGET = 300.0
+_PATCH_PX = 4
+_DROPOUT = 0.1
+# Where a policy stops, metres: within the 3 m of success by what it may be mistaken.
+ARRIVED_M = 2.0
 
 
 @dataclass(frozen=True)
@@ -33,8 +36,10 @@ class Shape:
         Numbers of the vocabulary, padding and the unknown word among them.
     views, size_px : int
         Pictures of a step, and their edge.
+    scenes : int
+        That are learned.
     channels : tuple of int
-        Of the CNN's four layers.
+        Of the CNN's three layers: of patches of 4 x 4 pixels, then of two convolutions that halve.
     features, word_features, hidden : int
         See `aerialdojo_gen.learning.recipe.ModelConfig`.
     """
@@ -42,7 +47,8 @@ class Shape:
     words: int
     views: int
     size_px: int
-    channels: tuple[int, int, int, int]
+    scenes: int
+    channels: tuple[int, int, int]
     features: int
     word_features: int
     hidden: int
@@ -52,8 +58,39 @@ class Shape:
         return asdict(self)
 
 
+class Thought(NamedTuple):
+    """What comes out.
+
+    Attributes
+    ----------
+    logits : (n, T, 16)
+        Of the actions.
+    guess : Guess
+        Where the goal is thought to be.
+    """
+
+    logits: Any
+    guess: Guess
+
+    @property
+    def actions(self) -> Any:
+        """The likeliest action, (n, T) int64: Stop where the goal is thought to be within 2 m, and nowhere else.
+
+        A reference stops at one of many steps, and where a body has strayed the planner hardly ever says so: by the
+        actions' chances alone a policy learns to fly on for ever.
+        """
+        moving = self.logits.float().clone()
+        moving[..., STOP] = -torch.inf
+        near = torch.linalg.vector_norm(self.guess.offset, dim=-1) * UNIT_M <= ARRIVED_M
+        return moving.argmax(dim=-1).masked_fill(near, STOP)
+
+
 class Network(nn.Module):  # type: ignore[misc]  # torch is looked at by no type checker here
     """Actions from pictures, goal and own motion.
+
+    What it remembers is its map: where pictures of earlier steps put the body. A memory of its own, a GRU beside the
+    map, went on turning once it had begun to turn, for that is what references do (the copycat problem of imitation
+    learning: Wen et al. 2020).
 
     Parameters
     ----------
@@ -63,9 +100,12 @@ class Network(nn.Module):  # type: ignore[misc]  # torch is looked at by no type
     def __init__(self, shape: Shape) -> None:
         super().__init__()
         self.shape = shape
-        layers: list[Any] = []
-        before = 4
-        for n in shape.channels:
+        patches, *channels = shape.channels
+        # Patches of 4 x 4 pixels first, as one product of matrices: layers of few channels are what takes a CPU long.
+        self.patches = nn.Linear(4 * _PATCH_PX**2, patches)
+        layers: list[Any] = [nn.ReLU(inplace=True)]
+        before = patches
+        for n in channels:
             layers += [nn.Conv2d(before, n, 3, stride=2, padding=1), nn.ReLU(inplace=True)]
             before = n
         edge = shape.size_px // 16
@@ -79,17 +119,21 @@ class Network(nn.Module):  # type: ignore[misc]  # torch is looked at by no type
         self.action = nn.Embedding(N_ACTIONS + 1, _ACTION_FEATURES)
         # Who sees nothing guesses by what is said alone.
         pictured = max(shape.views, 1) * shape.features
-        self.whereabouts = Whereabouts(pictured, shape.features, shape.features)
-        seen = pictured + shape.features + _ACTION_FEATURES + _ODOMETRY + _BEARING + 2
-        self.joined = nn.Sequential(nn.Linear(seen, shape.hidden), nn.ReLU(inplace=True))
-        self.memory = nn.GRU(shape.hidden, shape.hidden, batch_first=True)
-        self.thought = nn.Sequential(nn.Linear(2 * shape.hidden, shape.hidden), nn.ReLU(inplace=True))
-        self.choice = nn.Linear(shape.hidden, N_ACTIONS)
+        self.whereabouts = Whereabouts(pictured, shape.features, shape.features, shape.scenes)
+        known = pictured + shape.features + _BEARING + _ACTION_FEATURES
+        self.choice = nn.Sequential(
+            nn.Linear(known, shape.hidden), nn.ReLU(inplace=True), nn.Dropout(_DROPOUT),
+            nn.Linear(shape.hidden, shape.hidden), nn.ReLU(inplace=True), nn.Linear(shape.hidden, N_ACTIONS),
+        )  # fmt: skip
 
     def look(self, pictures: Any) -> Any:
         """Encode pictures: (n, H, W, 4) uint8 to (n, features)."""
-        # As they lie in memory, colours last: on a CPU convolutions take half the time so.
-        return self.eye(pictures.permute(0, 3, 1, 2).float().div(127.5).sub(1.0))
+        n, height, width, bytes_a_pixel = pictures.shape
+        rows, columns = height // _PATCH_PX, width // _PATCH_PX
+        cut = pictures.view(n, rows, _PATCH_PX, columns, _PATCH_PX, bytes_a_pixel).transpose(2, 3)
+        patches = self.patches(cut.reshape(n, rows, columns, -1).float().div(127.5).sub(1.0))
+        # As they lie in memory, channels last: on a CPU convolutions take half the time so.
+        return self.eye(patches.permute(0, 3, 1, 2))
 
     def understand(self, tokens: Any, images: Any, told_by_image: Any) -> Any:
         """Encode goals.
@@ -111,8 +155,8 @@ class Network(nn.Module):  # type: ignore[misc]  # torch is looked at by no type
         return self.goal(torch.cat([said, shown, told_by_image[:, None].float()], dim=1))
 
     def forward(
-        self, pictures: Any, goal: Any, previous: Any, odometry: Any, remaining: Any, mask: Any, memory: Any = None
-    ) -> tuple[Any, Any, Any]:
+        self, pictures: Any, goal: Any, previous: Any, odometry: Any, mask: Any, memory: Any = None
+    ) -> tuple[Thought, Any]:
         """Choose actions for steps of episodes.
 
         Parameters
@@ -125,19 +169,15 @@ class Network(nn.Module):  # type: ignore[misc]  # torch is looked at by no type
             The action before each.
         odometry : (n, T, 4) float32
             x ahead, y left, z up in metres and yaw in radians, in the frame of the start.
-        remaining : (n, T) float32
-            Actions left.
         mask : (n, T) bool
             Which steps there are: those of an episode come first.
-        memory : (1, n, hidden + 13), optional
+        memory : (n, sums), optional
             Of the steps before; `blank` where absent.
 
         Returns
         -------
-        logits : (n, T, 16)
-        guess : Guess
-            Where the goal is thought to be.
-        memory : (1, n, hidden + 13)
+        Thought
+        memory : (n, sums)
         """
         n, steps = mask.shape
         memory = self.blank(n).to(odometry.device) if memory is None else memory
@@ -147,25 +187,13 @@ class Network(nn.Module):  # type: ignore[misc]  # torch is looked at by no type
             flat = torch.zeros(n * steps, looked.shape[1], dtype=looked.dtype, device=looked.device)
             rows = mask.flatten().nonzero()[:, 0]
             seen = flat.index_copy(0, rows, looked).reshape(n, steps, -1)
-        guess, sums = self.whereabouts(seen, goal, odometry, memory[0, :, -SUMS:])
-        parts = [
-            seen, goal[:, None].expand(n, steps, -1), self.action(previous), reckoned(odometry), bearing(guess),
-            remaining[..., None] / 30.0, (remaining / _BUDGET).sqrt()[..., None],
-        ]  # fmt: skip
-        joined = self.joined(torch.cat([part.to(goal.dtype) for part in parts], dim=2))
-        kept, last = self.memory(joined, memory[..., :-SUMS].to(joined.dtype).contiguous())
-        thought = self.thought(torch.cat([joined, kept], dim=2))
-        return self.choice(thought), guess, torch.cat([last.float(), sums[None]], dim=2)
+        guess, memory = self.whereabouts(seen, goal, odometry, memory)
+        parts = [seen, goal[:, None].expand(n, steps, -1), bearing(guess), self.action(previous)]
+        return Thought(self.choice(torch.cat([part.to(goal.dtype) for part in parts], dim=2)), guess), memory
 
     def blank(self, n: int) -> Any:
-        """Return the memory of n episodes that begin: (1, n, hidden + 13)."""
-        return torch.zeros(1, n, self.shape.hidden + SUMS)
-
-
-def reckoned(odometry: Any) -> Any:
-    """Places and headings as numbers that tell them apart: (..., 4) to (..., 29)."""
-    yaw = odometry[..., 3:]
-    return torch.cat([_waves(odometry[..., :3]), torch.sin(yaw), torch.cos(yaw)], dim=-1)
+        """Return the memory of n episodes that begin: (n, sums)."""
+        return torch.zeros(n, self.whereabouts.sums)
 
 
 def bearing(guess: Guess) -> Any:

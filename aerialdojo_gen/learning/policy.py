@@ -102,16 +102,15 @@ class Policy(AgentBase):
             depth_m = np.stack([observation.depth_m[view] for view in sensors.views])
             pictures = torch.from_numpy(packed(rgb, depth_m, sensors)[None]).to(device)
         with torch.inference_mode():
-            logits, _, self._memory = self.network(
+            thought, self._memory = self.network(
                 pictures,
                 self._goal,
                 torch.tensor([[self._previous]], device=device),
                 torch.from_numpy(self._reckoning.odometry[None, None]).to(device),
-                torch.tensor([[float(observation.remaining_actions)]], device=device),
                 torch.ones((1, 1), dtype=torch.bool, device=device),
                 self._memory,
             )
-        self._previous = int(logits[0, 0].argmax())
+        self._previous = int(thought.actions[0, 0])
         return self._previous
 
 

@@ -30,6 +30,9 @@ class DataConfig(Section):
     limit: int | None = Field(None, ge=1, description="most trajectories, drawn evenly over the scenes")
     views: tuple[View, ...] = Field(("front",), description="cameras; none for a blind policy")
     size_px: int = Field(64, ge=32, le=256, description="edge of the pictures; a multiple of 16")
+    looks: int = Field(
+        0, ge=0, description="pictures a scene from anywhere that its references lead, turned at random, for the map"
+    )
     validation_share: float = Field(
         0.02, ge=0, lt=0.5, description="trajectories that are kept for the accuracy on what was not trained on"
     )
@@ -46,7 +49,7 @@ class DataConfig(Section):
 class ModelConfig(Section):
     """The policy's sizes."""
 
-    channels: tuple[int, int, int, int] = Field((32, 64, 96, 128), description="of the four layers of the CNN")
+    channels: tuple[int, int, int] = Field((64, 96, 128), description="of the three layers of the CNN")
     features: int = Field(256, ge=8, le=4096, description="numbers that a view, or the goal's picture, becomes")
     word_features: int = Field(96, ge=4, le=2048, description="numbers that a word of the goal becomes")
     hidden: int = Field(384, ge=8, le=4096, description="memory of the recurrent layer")
@@ -87,7 +90,7 @@ class SmallConfig(Section):
     scenes: tuple[str, ...] = Field(("U_Mall_0", "N_Forest_0", "I_Harbor_0"), min_length=1, description="of the data")
     limit: int | None = Field(1500, ge=1, description="most trajectories")
     size_px: int = Field(32, ge=32, le=256, multiple_of=16, description="edge of the pictures, of [data]")
-    epochs: int = Field(4, ge=1, description="of [train]")
+    epochs: int = Field(6, ge=1, description="of [train]")
     batch_steps: int = Field(256, ge=1, le=1_000_000, description="of [train]: few steps are to be many batches")
     rounds: int = Field(2, ge=0, le=100, description="of [dagger]")
     dagger_episodes: int = Field(300, ge=1, description="of [dagger], a round")

@@ -46,7 +46,7 @@ class Steps:
         Whether there is a semantic instance.
     images : (k, H, W, 4) uint8
         The goals' pictures.
-    nav_id : (n,) str
+    nav_id, scene : (n,) str
     """
 
     frames: NDArray[np.uint8]
@@ -62,6 +62,7 @@ class Steps:
     semantic: NDArray[np.bool_]
     images: NDArray[np.uint8]
     nav_id: NDArray[np.str_]
+    scene: NDArray[np.str_]
 
     def __len__(self) -> int:
         """Return the number of episodes."""
@@ -108,9 +109,11 @@ class Pool:
     Parameters
     ----------
     parts : sequence of Steps
+    scenes : sequence of str
+        By whose order scenes are numbered.
     """
 
-    def __init__(self, parts: Sequence[Steps]) -> None:
+    def __init__(self, parts: Sequence[Steps], scenes: Sequence[str]) -> None:
         self.parts = list(parts)
         self._steps = np.cumsum([0, *(len(p.label) for p in parts)])
         joined: dict[str, NDArray[Any]] = {}
@@ -125,6 +128,9 @@ class Pool:
         self.first = np.concatenate([[0], *(p.first[1:] + s for p, s in zip(parts, self._steps, strict=False))])
         self.lengths = np.diff(self.first)
         self.nav_id = joined["nav_id"]
+        number = {name: k for k, name in enumerate(scenes)}
+        self._scene = np.array([number[name] for p in parts for name in p.scene.tolist()], np.int64)
+        self._scene_of_step = np.repeat(self._scene, self.lengths)
 
     def __len__(self) -> int:
         """Return the number of episodes."""
@@ -145,9 +151,9 @@ class Pool:
             out[at] = self.parts[p].frames[rows[at] - self._steps[p]]
         return out
 
-    def poses(self, rows: NDArray[np.int64]) -> NDArray[np.float32]:
-        """Read poses of steps: (n, 4)."""
-        return np.asarray(self._joined["pose"][rows], np.float32)
+    def places(self, rows: NDArray[np.int64]) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
+        """Read poses of steps, (n, 4), and numbers of their scenes, (n,)."""
+        return np.asarray(self._joined["pose"][rows], np.float32), self._scene_of_step[rows]
 
     def batch(self, episodes: NDArray[np.int64], by_image: NDArray[np.bool_]) -> dict[str, NDArray[Any]]:
         """Put episodes side by side.
@@ -175,6 +181,7 @@ class Pool:
         image = j["image"][episodes]
         shown = (by_image | ~j["semantic"][episodes]) & (image >= 0)
         out["told_by_image"] = shown
+        out["scene"] = self._scene[episodes]
         out["tokens"] = j["tokens"][episodes, 1 - shown.astype(np.int64)]
         out["images"] = np.zeros((len(episodes), *j["images"].shape[1:]), np.uint8)
         out["images"][shown] = j["images"][image[shown]]

@@ -7,7 +7,7 @@ import importlib
 import json
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +21,7 @@ from aerialdojo_gen.common.bounded import loads_json, read_json
 from aerialdojo_gen.common.names import unknown
 from aerialdojo_gen.errors import Malformed, UsageError
 from aerialdojo_gen.learning import checkpoints
-from aerialdojo_gen.learning.collect import Flying, collect, parts_of
+from aerialdojo_gen.learning.collect import Flying, Part, collect, parts_of, survey_parts
 from aerialdojo_gen.learning.index import Index, read_index
 from aerialdojo_gen.learning.loader import torch_package
 from aerialdojo_gen.learning.recipe import Recipe
@@ -138,7 +138,14 @@ class _Training:
         told = (self._index.told[name] for name in ("target_name", "landmark", "direction", "description"))
         self._vocabulary = Vocabulary.of(goal_text(*said) for said in zip(*told, strict=True))
         shape = Shape(
-            len(self._vocabulary), len(d.views), d.size_px, m.channels, m.features, m.word_features, m.hidden
+            len(self._vocabulary),
+            len(d.views),
+            d.size_px,
+            len(self._index.scenes),
+            m.channels,
+            m.features,
+            m.word_features,
+            m.hidden,
         )
         self._about = checkpoints.About(
             shape.as_json(), self._vocabulary, self._sensors, release_fingerprint(root), actions_fingerprint()
@@ -146,9 +153,12 @@ class _Training:
         torch.manual_seed(recipe.seed)
         if device == "cpu":
             torch.use_deterministic_algorithms(True)
+            # Every tensor filled before it is written: a tenth of the time, and none is read before.
+            torch.utils.deterministic.fill_uninitialized_memory = False
         self._learner = Learner(Network(shape), recipe, device)
         self._said = self._kept = time.monotonic()
         self._board: Any = None
+        self._survey: Pool | None = None
 
     def run(self, restart: bool) -> Trained:
         recipe, learner, report = self._recipe, self._learner, self._reporter
@@ -169,6 +179,7 @@ class _Training:
         )
         self._board = _board(self._folder / "tensorboard")
         parts = self._collect(index, None, "drawing references")
+        self._survey = self._look_about()
         for phase in range(recipe.dagger.rounds + 1):
             if phase:
                 parts += self._collect(self._drawn(phase), self._flying(phase), f"round {phase}: flying")
@@ -205,13 +216,27 @@ class _Training:
         weights = self._weights(phase - 1)
         return Flying(weights, file_digest(weights), self._recipe.seed, phase, self._recipe.dagger.teacher_share)
 
-    def _collect(self, index: Index, flying: Flying | None, what: str) -> list[Steps]:
-        parts = parts_of(
+    def _parts(self, index: Index, flying: Flying | None) -> list[Part]:
+        return parts_of(
             self._root, index, self._cache, self._selection, self._sensors, self._recipe.data.size_px,
             self._vocabulary, self._renderer, flying,
         )  # fmt: skip
+
+    def _collect(self, index: Index, flying: Flying | None, what: str) -> list[Steps]:
+        parts = self._parts(index, flying)
         with make_executor("local", self._workers) as executor:
             return collect(parts, executor, self._reporter, what)
+
+    def _look_about(self) -> Pool | None:
+        d, scenes = self._recipe.data, self._index.scenes
+        if not (d.looks and d.views):
+            return None
+        like = self._parts(self._index, None)[0]
+        parts = survey_parts(
+            self._root, scenes, self._cache, d.split, d.target_split, d.looks, self._recipe.seed, like
+        )
+        with make_executor("local", self._workers) as executor:
+            return Pool(collect(parts, executor, self._reporter, "looking about"), scenes)
 
     def _kept_back(self, nav_ids: NDArray[np.str_]) -> NDArray[np.bool_]:
         share = self._recipe.data.validation_share * 2.0**64
@@ -220,12 +245,13 @@ class _Training:
     def _learn(self, parts: list[Steps], phase: int) -> None:
         train, dagger = self._recipe.train, self._recipe.dagger
         epochs, rate = (dagger.epochs, dagger.learning_rate) if phase else (train.epochs, train.learning_rate)
-        pool = Pool(parts)
+        pool = Pool(parts, self._index.scenes)
         what = f"round {phase}" if phase else "imitation"
         after = self._after(what, epochs)
         self._learner.learn(
-            pool, self._kept_back(pool.nav_id), epochs, rate, after=after, tick=self._tick(what, time.monotonic())
-        )
+            pool, self._survey, self._kept_back(pool.nav_id), epochs, rate, after=after,
+            tick=self._tick(what, time.monotonic()),
+        )  # fmt: skip
 
     def _tick(self, what: str, started: float) -> Callable[[int, int, float, float], None]:
         first: list[int] = []
@@ -250,13 +276,21 @@ class _Training:
 
     def _after(self, what: str, epochs: int) -> Callable[[Any], None]:
         def after(epoch: Any) -> None:
-            kept = "" if epoch.kept_back is None else f" ({epoch.kept_back:.1%} on those kept back)"
+            k = epoch.kept_back
+            kept = (
+                ""
+                if k is None
+                else (
+                    f" (kept back: {k.accuracy:.1%}; goal off by {k.goal_off_at_start_m:.1f} m at the start, "
+                    f"{k.goal_off_m:.1f} m in all)"
+                )
+            )
             self._reporter.line(
                 f"{what}: epoch {epoch.number + 1} of {epochs}, loss {epoch.loss:.3f}, accuracy "
                 f"{epoch.accuracy:.1%}{kept}, {duration(epoch.left_s)} left"
             )
             row = {"phase": epoch.phase, "epoch": epoch.number, "loss": epoch.loss, "accuracy": epoch.accuracy,
-                   "kept_back": epoch.kept_back}  # fmt: skip
+                   "kept_back": None if k is None else asdict(k)}  # fmt: skip
             with (self._folder / _HISTORY).open("a", encoding="utf-8") as file:
                 file.write(json.dumps(row) + "\n")
             self._keep()

@@ -19,10 +19,12 @@ _AXES = (_CELL_M, 64, -128.0), (_CELL_M, 64, -128.0), (_STOREY_M, 36, -24.0)
 _PLACES, _HEADINGS = sum(n for _, n, _ in _AXES), round(2.0 * math.pi / _SECTOR_RAD)
 # Intervals to either side of the likeliest one whose mean is a place.
 _BESIDE = 2
-# Sums over the steps so far: of weights, of the start's heading, of places, of own motion; of the goal's weights and
-# places.
-SUMS = 1 + 2 + 3 + 3 + 1 + 3
+# Sums over the steps so far: of each axis' weights, of weighted places, of own motion weighted as each axis is (ahead
+# and left for x and for y, up for z), of the start's heading; beside them those of the scenes' logits.
+_SUMS = 3 + 3 + 5 + 2
 _LEAST = 1e-3
+# A place is never told better than so, in units: what nearby steps have in common cannot be averaged away.
+_FLOOR = 0.05
 
 
 class Guess(NamedTuple):
@@ -37,15 +39,19 @@ class Guess(NamedTuple):
         of z.
     heading : (n, T, 24)
         Logits of sectors of the body's yaw, by the step's pictures alone.
+    scene : (n, T, scenes)
+        Logits of the scenes that were learned, by the step's pictures alone.
     goal : (n, T, 164)
-        Logits of where the goal is in the scene's frame, by what is said of it and the step's pictures.
-    sure : (n, T, 1)
-        Weights of the body's places so far, together.
+        Logits of where the goal is in the scene's frame, by what is said of it and by the scene.
+    sure : (n, T, 8)
+        How well it is known, all above 0: precisions of the body's axes and of its heading by all steps so far, those
+        of the goal's axes, and the chance of the likeliest scene.
     """
 
     offset: Any
     place: Any
     heading: Any
+    scene: Any
     goal: Any
     sure: Any
 
@@ -53,29 +59,38 @@ class Guess(NamedTuple):
 class Whereabouts(nn.Module):  # type: ignore[misc]  # torch is looked at by no type checker here
     """Guess where the goal is.
 
-    Own motion is used for one thing alone: to carry guesses of earlier steps over to the present one. So the goal's
-    place cannot be read off the actions that a reference takes towards it, which tell it in training and never in
-    flight (causal confusion in imitation learning: de Haan, Jayaraman and Levine 2019).
+    Own motion is used for one thing alone: to carry guesses of earlier steps over to the present one. Of the pictures
+    the goal's guess knows no more than which scene they show. So the goal's place cannot be read off the actions that
+    a reference takes towards it, nor off what is seen where they lead, which tell it in training and never in flight
+    (causal confusion in imitation learning: de Haan, Jayaraman and Levine 2019).
 
     Parameters
     ----------
     seen, goal, hidden : int
         Numbers of a step's pictures, of a goal, and of the layers between.
+    scenes : int
+        That are learned.
     """
 
-    def __init__(self, seen: int, goal: int, hidden: int) -> None:
+    def __init__(self, seen: int, goal: int, hidden: int, scenes: int) -> None:
         super().__init__()
+        self.scenes = scenes
         self.body = nn.Sequential(
-            nn.Linear(seen, hidden), nn.ReLU(inplace=True), nn.Linear(hidden, _PLACES + _HEADINGS + 1)
+            nn.Linear(seen, hidden), nn.ReLU(inplace=True), nn.Linear(hidden, _PLACES + _HEADINGS + scenes + 1)
         )
         self.target = nn.Sequential(
-            nn.Linear(seen + goal, hidden), nn.ReLU(inplace=True), nn.Linear(hidden, _PLACES + 1)
+            nn.Linear(goal + scenes, hidden), nn.ReLU(inplace=True), nn.Linear(hidden, _PLACES)
         )
 
-    def found(self, seen: Any) -> tuple[Any, Any, Any]:
-        """Guess where bodies are by pictures alone: logits of places and headings, and how far to trust them."""
-        body = self.body(seen).float()
-        return body[..., :_PLACES], body[..., _PLACES:-1], functional.softplus(body[..., -1:]) + _LEAST
+    @property
+    def sums(self) -> int:
+        """Numbers that are carried from step to step."""
+        return _SUMS + self.scenes
+
+    def found(self, seen: Any) -> tuple[Any, Any, Any, Any]:
+        """Guess by pictures alone where bodies are: logits of places, headings, scenes, and how far to trust them."""
+        place, heading, scene, trust = self.body(seen).float().split([_PLACES, _HEADINGS, self.scenes, 1], dim=-1)
+        return place, heading, scene, functional.softplus(trust) + _LEAST
 
     def forward(self, seen: Any, goal: Any, odometry: Any, sums: Any) -> tuple[Guess, Any]:
         """Guess at every step of episodes.
@@ -86,34 +101,48 @@ class Whereabouts(nn.Module):  # type: ignore[misc]  # torch is looked at by no 
         goal : (n, goal)
         odometry : (n, T, 4)
             x ahead, y left, z up in metres and yaw in radians, in the frame of the start.
-        sums : (n, 13)
+        sums : (n, sums)
             Of the steps before.
 
         Returns
         -------
         Guess
-        (n, 13)
+        (n, sums)
             Sums with these steps.
         """
         steps = seen.shape[1]
-        seen_at, facing, sure = self.found(seen)
-        target = self.target(torch.cat([seen, goal[:, None].expand(-1, steps, -1)], dim=2)).float()
-        weight = functional.softplus(target[..., -1:]) + _LEAST
+        seen_at, facing, scene, trust = self.found(seen)
         # The offset's loss teaches which steps to trust; intervals learn by their own, which is steadier.
-        place = places(seen_at.detach()) / UNIT_M
-        goal_place = places(target[..., :_PLACES].detach()) / UNIT_M
+        place, spread = places(seen_at.detach())
+        place, weight = place / UNIT_M, trust / ((spread / UNIT_M).square() + _FLOOR**2)
         moved, yaw = odometry[..., :3] / UNIT_M, odometry[..., 3]
         turn = torch.stack([yaw.cos(), yaw.sin()], dim=-1)
-        begun = _seen_from(directions(facing.detach()), turn)
-        added = torch.cat([sure, sure * begun, sure * place, sure * moved, weight, weight * goal_place], dim=2)
+        begun = _seen_from(directions(facing.detach()), turn) * trust
+        moves = torch.cat(
+            [weight[..., :1] * moved[..., :2], weight[..., 1:2] * moved[..., :2], weight[..., 2:] * moved[..., 2:]],
+            dim=-1,
+        )
+        added = torch.cat([weight, weight * place, moves, begun, scene.detach()], dim=2)
         total = sums[:, None].float() + added.cumsum(dim=1)
-        all_sure, start, been, moves, all_weight, goals = total.split([1, 2, 3, 3, 1, 3], dim=2)
-        start = functional.normalize(start, dim=-1, eps=1e-4)
-        # From the mean place to the goal, in the start's frame: the mean of the moves leads to that place.
-        away = goals / all_weight - been / all_sure
-        ahead = torch.cat([_seen_from(away[..., :2], start), away[..., 2:]], dim=-1) + moves / all_sure - moved
+        weights, been, moves, start, known = total.split([3, 3, 5, 2, self.scenes], dim=2)
+        turned = torch.linalg.vector_norm(start, dim=-1, keepdim=True)
+        start = start / turned.clamp(min=1e-4)
+        where = known.softmax(dim=-1)
+        target = self.target(torch.cat([goal[:, None].expand(-1, steps, -1), where.to(goal.dtype)], dim=2)).float()
+        goal_at, goal_spread = places(target.detach())
+        # The mean place minus where own motion leads from the start, turned as the start faced, is the start.
+        c, s = start.unbind(-1)
+        led = torch.stack(
+            [c * moves[..., 0] - s * moves[..., 1], s * moves[..., 2] + c * moves[..., 3], moves[..., 4]], dim=-1
+        )
+        away = goal_at / UNIT_M - (been - led) / weights
+        ahead = torch.cat([_seen_from(away[..., :2], start), away[..., 2:]], dim=-1) - moved
         offset = torch.cat([_seen_from(ahead[..., :2], turn), ahead[..., 2:]], dim=-1)
-        return Guess(offset, seen_at, facing, target[..., :_PLACES], all_sure), total[:, -1]
+        sure = torch.cat(
+            [weights, turned + _LEAST, 1.0 / ((goal_spread / UNIT_M).square() + _FLOOR**2),
+             where.amax(dim=-1, keepdim=True)], dim=2,
+        )  # fmt: skip
+        return Guess(offset, seen_at, facing, scene, target, sure), total[:, -1]
 
 
 def _seen_from(vector: Any, by: Any) -> Any:
@@ -123,22 +152,33 @@ def _seen_from(vector: Any, by: Any) -> Any:
     return torch.stack([c * x + s * y, c * y - s * x], dim=-1)
 
 
-def places(logits: Any) -> Any:
-    """Return places that logits tell, metres, (..., 164) to (..., 3): the mean about each axis' likeliest part."""
-    out = []
+def places(logits: Any) -> tuple[Any, Any]:
+    """Return places that logits tell, and how far they spread: metres, (..., 164) to twice (..., 3).
+
+    A place is the mean about each axis' likeliest part, the spread the root of the mean square distance from it of
+    all chances.
+    """
+    out, spread = [], []
     for one, (width, n, low) in zip(logits.split([n for _, n, _ in _AXES], dim=-1), _AXES, strict=True):
         number = torch.arange(n, device=logits.device)
+        middle = low + (number + 0.5) * width
         near = (number - one.argmax(dim=-1, keepdim=True)).abs() <= _BESIDE
-        chance = one.masked_fill(~near, -torch.inf).softmax(dim=-1)
-        out.append((chance * (low + (number + 0.5) * width)).sum(dim=-1))
-    return torch.stack(out, dim=-1)
+        place = (one.masked_fill(~near, -torch.inf).softmax(dim=-1) * middle).sum(dim=-1, keepdim=True)
+        out.append(place)
+        spread.append((one.softmax(dim=-1) * (middle - place).square()).sum(dim=-1, keepdim=True).sqrt())
+    return torch.cat(out, dim=-1), torch.cat(spread, dim=-1)
 
 
 def directions(logits: Any) -> Any:
-    """Return the mean directions of sectors: (..., 24) to (..., 2), cosine and sine of the yaw."""
+    """Return the mean directions of sectors: (..., 24) to (..., 2), the shorter the less is known.
+
+    Cosine and sine of the yaw, times the concentration of a von Mises distribution with that mean, at most some 20.
+    """
     yaw = (torch.arange(_HEADINGS, device=logits.device) + 0.5) * _SECTOR_RAD - math.pi
     mean = logits.softmax(dim=-1) @ torch.stack([yaw.cos(), yaw.sin()], dim=-1)
-    return functional.normalize(mean, dim=-1, eps=1e-4)
+    length = torch.linalg.vector_norm(mean, dim=-1, keepdim=True)
+    # Mardia and Jupp 2000, as Banerjee et al. 2005 simplify it for two dimensions.
+    return mean * (2.0 - length.square()) / (1.05 - length.square())
 
 
 def missed(guess: Guess, batch: Mapping[str, Any]) -> Any:
@@ -148,7 +188,7 @@ def missed(guess: Guess, batch: Mapping[str, Any]) -> Any:
     ----------
     guess : Guess
     batch : mapping of str to Tensor
-        ``mask``, ``offset`` and ``pose`` as `aerialdojo_gen.learning.steps.Pool.batch` gives them.
+        ``mask``, ``offset``, ``pose`` and ``scene`` as `aerialdojo_gen.learning.steps.Pool.batch` gives them.
 
     Returns
     -------
@@ -160,19 +200,29 @@ def missed(guess: Guess, batch: Mapping[str, Any]) -> Any:
     # Turned by the yaw: seen from a heading of as much to the other side.
     back = torch.stack([pose[:, 3].cos(), -pose[:, 3].sin()], dim=-1)
     away_m = torch.cat([_seen_from(offset[:, :2], back), offset[:, 2:]], dim=-1) * UNIT_M
-    own = astray(guess.place[mask], guess.heading[mask], pose)
+    scene = batch["scene"][:, None].expand(mask.shape)[mask]
+    own = astray(guess.place[mask], guess.heading[mask], guess.scene[mask], pose, scene)
     return (
         functional.smooth_l1_loss(guess.offset[mask], offset) + own + _unlike(guess.goal[mask], pose[:, :3] + away_m)
     )
 
 
-def astray(place: Any, heading: Any, pose: Any) -> Any:
-    """Return the loss of guesses of where bodies are: logits (m, 164) and (m, 24) of poses (m, 4)."""
+def astray(place: Any, heading: Any, scene: Any, pose: Any, number: Any) -> Any:
+    """Return the loss of guesses of where bodies are.
+
+    Parameters
+    ----------
+    place, heading, scene : (m, 164), (m, 24) and (m, scenes)
+        Logits.
+    pose : (m, 4)
+    number : (m,)
+        Of the scenes.
+    """
     sector = (torch.remainder(pose[:, 3] + math.pi, 2.0 * math.pi) / _SECTOR_RAD - 0.5)[:, None]
-    number = torch.arange(_HEADINGS, device=pose.device)
-    apart = torch.remainder(number - sector + _HEADINGS / 2, _HEADINGS) - _HEADINGS / 2
+    sectors = torch.arange(_HEADINGS, device=pose.device)
+    apart = torch.remainder(sectors - sector + _HEADINGS / 2, _HEADINGS) - _HEADINGS / 2
     turned = functional.cross_entropy(heading, (1.0 - apart.abs()).clamp(min=0.0))
-    return turned + _unlike(place, pose[:, :3])
+    return turned + _unlike(place, pose[:, :3]) + functional.cross_entropy(scene, number)
 
 
 def _unlike(logits: Any, place_m: Any) -> Any:

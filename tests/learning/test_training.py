@@ -21,13 +21,15 @@ from aerialdojo_gen.benchmark.motion import FlightSpace
 from aerialdojo_gen.benchmark.runner import Evaluation, evaluate
 from aerialdojo_gen.benchmark.tasks import Selection
 from aerialdojo_gen.errors import ConfigError, StoreError, UsageError
-from aerialdojo_gen.learning.collect import parts_of
+from aerialdojo_gen.learning.collect import collect, parts_of, pictures, survey_parts
 from aerialdojo_gen.learning.index import read_index
 from aerialdojo_gen.learning.recipe import Recipe, load_recipe
 from aerialdojo_gen.learning.steps import read_steps
 from aerialdojo_gen.learning.teacher import NO_LABEL, Teacher
 from aerialdojo_gen.learning.trajectories import drawn_evenly
 from aerialdojo_gen.learning.words import Vocabulary
+from aerialdojo_gen.pipeline.executors import make_executor
+from aerialdojo_gen.pipeline.progress import Reporter
 from aerialdojo_gen.planning.difficulty import agent_actions
 from aerialdojo_gen.planning.planner import Planner
 from aerialdojo_gen.release.contents import part_name
@@ -45,7 +47,7 @@ POLICY = "aerialdojo_gen.learning.policy:Policy"
 SMALL = {
     "name": "small",
     "data": {"split": "id_train", "limit": 8, "size_px": 32, "validation_share": 0.0, "settings": []},
-    "model": {"channels": [8, 16, 16, 32], "features": 64, "word_features": 32, "hidden": 128},
+    "model": {"channels": [16, 16, 32], "features": 64, "word_features": 32, "hidden": 128},
     "train": {
         "epochs": 80,
         "batch_steps": 64,
@@ -110,7 +112,7 @@ def test_killed_and_gone_on_with_it_ends_with_the_same_weights(smoke, cache, lea
     file = tmp_path / "short.toml"
     file.write_text(
         'name = "small"\n[data]\nlimit = 8\nsize_px = 32\nvalidation_share = 0.0\nsettings = []\n'
-        "[model]\nchannels = [8, 16, 16, 32]\nfeatures = 64\nword_features = 32\nhidden = 128\n"
+        "[model]\nchannels = [16, 16, 32]\nfeatures = 64\nword_features = 32\nhidden = 128\n"
         "[train]\nepochs = 6\nbatch_steps = 64\nlearning_rate = 4e-3\nwarmup_batches = 5\ncheckpoint_s = 1e-3\n"
         "looks = 16\n[dagger]\nrounds = 0\n"
     )
@@ -183,6 +185,46 @@ def test_other_pictures_of_the_goals_are_drawn_from_anew(smoke, tmp_path):
     pq.write_table(table.set_column(at, table.schema.field(at), pa.array(shown, table.schema.field(at).type)), part)
     after = names()
     assert {scene for scene in before if before[scene] != after[scene]} == {index.scenes[0]}
+
+
+def test_looks_about_are_taken_where_references_lead_and_turned_at_random(smoke, tmp_path):
+    root = open_root(smoke)
+    index = read_index(root, Selection(("id_train",)))
+    sensors = Sensors(("front", "down"), width=32, height=32)
+    (like, *_) = parts_of(root, index, tmp_path, (("id_train",), ()), sensors, 32, Vocabulary(("a",), 4), "gl")
+    parts = survey_parts(root, index.scenes, tmp_path, "id_train", "train", 40, 7, like)
+    assert [part.scene for part in parts] == list(index.scenes)
+    with make_executor("local", 1) as executor:
+        surveys = collect(parts, executor, Reporter(False), "looking")
+    followed = read_index(root, Selection(("id_train",)), "train")
+    for part, looks in zip(parts, surveys, strict=True):
+        own = [k for k in range(len(followed)) if followed.scenes[followed.scene[k]] == part.scene]
+        places = np.concatenate([followed.poses_of(k) for k in own])[:, :3]
+        apart = np.linalg.norm(looks.pose[:, None, :3] - places[None], axis=2).min(axis=1)
+        assert apart.max() < 1e-4
+        assert set(looks.scene) == {part.scene}
+        assert (looks.first == np.arange(41)).all()
+        # All four quarters, each by more than a tenth.
+        assert np.bincount(((looks.pose[:, 3] + np.pi) // (np.pi / 2)).astype(int), minlength=4).min() > 4
+        again = pictures(part, looks.pose[:5].astype(np.float64))
+        assert again.shape == (5, 2, 32, 32, 4)
+        # Poses are kept in single precision: an edge may fall on the other side of a pixel's middle.
+        assert (again == looks.frames[:5]).mean() > 0.99
+        assert len(np.unique(looks.frames.reshape(40, -1), axis=0)) > 30
+
+
+def test_a_map_is_learned_from_looks_about_too(smoke, cache, tmp_path):
+    """With them the place of a body is known better, at references that were kept back."""
+    off = {}
+    for looks in (0, 300):
+        out = tmp_path / str(looks)
+        own = recipe(
+            data={"looks": looks, "limit": None, "validation_share": 0.2},
+            train={"epochs": 6, "looks": 64, "batch_steps": 256},
+        )
+        train(smoke, own, out=out, cache=cache, device="cpu", workers=1)
+        off[looks] = history(out)[-1]["kept_back"]["goal_off_m"]
+    assert off[300] < off[0]
 
 
 @pytest.fixture

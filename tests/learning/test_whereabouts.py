@@ -9,9 +9,9 @@ from aerialdojo_gen.learning.seen import Reckoning
 torch = pytest.importorskip("torch", reason="PyTorch is not installed: it is the extra 'train'")
 
 from aerialdojo_gen.learning.network import Network, Shape  # noqa: E402 - it needs torch
-from aerialdojo_gen.learning.whereabouts import SUMS, UNIT_M, Guess, Whereabouts, directions, missed, places  # noqa: E402
+from aerialdojo_gen.learning.whereabouts import UNIT_M, Guess, Whereabouts, directions, missed, places  # noqa: E402
 
-T = 9
+T, SCENES = 9, 3
 START, GOAL = np.array([31.0, -12.0, 6.0, 2.3]), np.array([-8.0, 20.0, 9.0])
 
 
@@ -32,7 +32,7 @@ def flight():
     return {
         name: torch.from_numpy(np.asarray(value, np.float32)[None])
         for name, value in {"pose": poses, "odometry": moved, "offset": offset}.items()
-    } | {"mask": torch.ones((1, T), dtype=torch.bool)}
+    } | {"mask": torch.ones((1, T), dtype=torch.bool), "scene": torch.tensor([1])}
 
 
 class Known(torch.nn.Module):
@@ -65,16 +65,21 @@ def heading_logits(yaw):
     return (1.0 - apart).clamp(min=0.0).log().clamp(min=-80.0)
 
 
-def guessing(place, yaw, goal, sure):
+def scene_logits(number=1):
+    return torch.nn.functional.one_hot(torch.full((1, T), number), SCENES) * 20.0
+
+
+def guessing(place, yaw, goal, trust):
     """Make whereabouts that guess this at every step."""
-    made = Whereabouts(4, 4, 4)
-    made.body = Known(torch.cat([place_logits(place), heading_logits(yaw), sure], dim=-1))
-    made.target = Known(torch.cat([place_logits(goal), torch.zeros(1, T, 1)], dim=-1))
+    made = Whereabouts(4, 4, 4, SCENES)
+    made.body = Known(torch.cat([place_logits(place), heading_logits(yaw), scene_logits(), trust], dim=-1))
+    made.target = Known(place_logits(goal))
     return made
 
 
 def asked(whereabouts, flight):
-    return whereabouts(torch.zeros(1, T, 4), torch.zeros(1, 4), flight["odometry"], torch.zeros(1, SUMS))[0]
+    blank = torch.zeros(1, whereabouts.sums)
+    return whereabouts(torch.zeros(1, T, 4), torch.zeros(1, 4), flight["odometry"], blank)[0]
 
 
 def truth(flight):
@@ -90,16 +95,23 @@ def test_what_intervals_tell_is_a_place_and_a_direction():
     draw = torch.Generator().manual_seed(2)
     wide = torch.tensor([120.0, 120.0, 20.0])
     place = (torch.rand(200, 3, generator=draw) * 2.0 - 1.0) * wide
-    assert torch.allclose(places(place_logits(place)), place, atol=1e-3)
+    found, spread = places(place_logits(place))
+    assert torch.allclose(found, place, atol=1e-3)
+    # Of two intervals at most half of one; who has no idea is a quarter of all intervals off, and more.
+    assert float((spread / torch.tensor([4.0, 4.0, 2.0])).max()) <= 0.5 + 1e-3
+    assert bool((places(torch.zeros(5, 164))[1] > torch.tensor([70.0, 70.0, 20.0])).all())
     yaw = (torch.rand(200, generator=draw) * 2.0 - 1.0) * np.pi
     found = directions(heading_logits(yaw))
+    length = torch.linalg.vector_norm(found, dim=-1)
+    assert float(length.min()) > 10.0
+    assert float(directions(torch.zeros(1, 24)).abs().max()) < 1e-5
     turned = torch.atan2(found[:, 1], found[:, 0]) - yaw
     assert float((torch.remainder(turned + np.pi, 2 * np.pi) - np.pi).abs().max()) < np.deg2rad(0.1)
 
 
 def test_right_guesses_say_where_the_goal_is_seen_from_the_body(flight):
-    sure = torch.randn(1, T, 1, generator=torch.Generator().manual_seed(1))
-    guess = asked(guessing(*truth(flight), sure), flight)
+    trust = torch.randn(1, T, 1, generator=torch.Generator().manual_seed(1))
+    guess = asked(guessing(*truth(flight), trust), flight)
     assert float(error_m(guess, flight).max()) < 0.1
 
 
@@ -108,9 +120,9 @@ def test_one_sure_look_is_remembered_through_steps_that_know_nothing(flight):
     place, yaw, goal = truth(flight)
     place[:, 1:] += 40.0
     yaw[:, 1:] = 1.0
-    sure = torch.full((1, T, 1), -20.0)
-    sure[:, 0] = 50.0
-    assert float(error_m(asked(guessing(place, yaw, goal, sure), flight), flight).max()) < 0.2
+    trust = torch.full((1, T, 1), -20.0)
+    trust[:, 0] = 50.0
+    assert float(error_m(asked(guessing(place, yaw, goal, trust), flight), flight).max()) < 0.2
     # The same looks, all trusted alike, are far off.
     assert float(error_m(asked(guessing(place, yaw, goal, torch.zeros(1, T, 1)), flight), flight)[0, -1]) > 10.0
 
@@ -119,12 +131,14 @@ def test_the_loss_falls_only_where_each_guess_is_right(flight):
     """No logits have a smaller loss than those of the truth: each guess moved off it costs more."""
     place, yaw, goal = truth(flight)
     right = Guess(
-        flight["offset"] / UNIT_M, place_logits(place), heading_logits(yaw), place_logits(goal), torch.ones(1, T, 1)
-    )
+        flight["offset"] / UNIT_M, place_logits(place), heading_logits(yaw), scene_logits(), place_logits(goal),
+        torch.ones(1, T, 8),
+    )  # fmt: skip
     least = float(missed(right, flight))
     assert float(missed(right._replace(offset=right.offset + 0.5), flight)) == pytest.approx(least + 0.125)
     wrong = {
-        "place": place_logits(place + 3.0), "goal": place_logits(goal - 3.0), "heading": heading_logits(yaw + 0.5)
+        "place": place_logits(place + 3.0), "goal": place_logits(goal - 3.0), "heading": heading_logits(yaw + 0.5),
+        "scene": scene_logits(2),
     }  # fmt: skip
     for name, logits in wrong.items():
         assert float(missed(right._replace(**{name: logits}), flight)) > least + 1.0, name
@@ -133,13 +147,12 @@ def test_the_loss_falls_only_where_each_guess_is_right(flight):
 @pytest.fixture(scope="module")
 def episode():
     torch.manual_seed(0)
-    network = Network(Shape(50, 1, 32, (8, 8, 8, 8), 16, 8, 24)).eval()
+    network = Network(Shape(50, 1, 32, 2, (8, 8, 8), 16, 8, 24)).eval()
     draw = torch.Generator().manual_seed(5)
     given = {
         "pictures": torch.randint(0, 256, (2 * T, 1, 32, 32, 4), dtype=torch.uint8, generator=draw),
         "previous": torch.randint(0, 17, (2, T), generator=draw),
         "odometry": torch.randn(2, T, 4, generator=draw),
-        "remaining": torch.rand(2, T, generator=draw) * 90.0,
         "mask": torch.ones((2, T), dtype=torch.bool),
     }
     images = torch.randint(0, 256, (2, 32, 32, 4), dtype=torch.uint8, generator=draw)
@@ -151,31 +164,56 @@ def episode():
 def test_flown_step_by_step_it_chooses_as_it_learned(episode):
     network, goal, given = episode
     with torch.no_grad():
-        logits, guess, end = network(given["pictures"], goal, *[given[n] for n in list(given)[1:]])
+        all_at_once, end = network(given["pictures"], goal, *[given[n] for n in list(given)[1:]])
         memory, pictures = None, given["pictures"].reshape(2, T, 1, 32, 32, 4)
         for k in range(T):
-            at = [given[name][:, k : k + 1] for name in ("previous", "odometry", "remaining", "mask")]
-            own, thought, memory = network(pictures[:, k], goal, *at, memory)
-            assert torch.allclose(own[:, 0], logits[:, k], atol=1e-5)
-            assert torch.allclose(thought.offset[:, 0], guess.offset[:, k], atol=1e-5)
+            at = [given[name][:, k : k + 1] for name in ("previous", "odometry", "mask")]
+            thought, memory = network(pictures[:, k], goal, *at, memory)
+            assert torch.allclose(thought.logits[:, 0], all_at_once.logits[:, k], atol=1e-5)
+            assert torch.allclose(thought.guess.offset[:, 0], all_at_once.guess.offset[:, k], atol=1e-4)
     assert torch.allclose(memory, end, atol=1e-5)
 
 
 def test_the_goals_place_is_not_read_off_the_actions_before(episode):
-    """The action before and the actions left tell a choice, never the guess that it stands on."""
+    """The action before tells a choice, never the guess that it stands on."""
     network, goal, given = episode
-    other = given | {"previous": (given["previous"] + 5) % 17, "remaining": given["remaining"] + 7.0}
+    other = given | {"previous": (given["previous"] + 5) % 17}
     with torch.no_grad():
-        (one, guess, _), (two, same, _) = (
-            network(g["pictures"], goal, *[g[n] for n in list(g)[1:]]) for g in (given, other)
-        )
-    assert all(torch.equal(a, b) for a, b in zip(guess, same, strict=True))
-    assert not torch.allclose(one, two)
+        one, two = (network(g["pictures"], goal, *[g[n] for n in list(g)[1:]])[0] for g in (given, other))
+    assert all(torch.equal(a, b) for a, b in zip(one.guess, two.guess, strict=True))
+    assert not torch.allclose(one.logits, two.logits)
 
 
 def test_choices_teach_the_guess_nothing(episode):
     network, goal, given = episode
-    logits, _, _ = network(given["pictures"], goal.detach(), *[given[n] for n in list(given)[1:]])
-    logits.sum().backward()
+    thought, _ = network(given["pictures"], goal.detach(), *[given[n] for n in list(given)[1:]])
+    thought.logits.sum().backward()
     assert all(p.grad is None or not p.grad.any() for p in network.whereabouts.parameters())
-    assert network.choice.weight.grad.any()
+    assert network.choice[0].weight.grad.any()
+
+
+def test_it_stops_where_it_thinks_to_have_arrived_and_nowhere_else(episode):
+    network, goal, given = episode
+    thought, _ = network(given["pictures"], goal, *[given[n] for n in list(given)[1:]])
+    logits = thought.logits.detach().clone()
+    logits[..., 0] = 50.0
+    away_m = torch.tensor([1.9, 2.1, 30.0]).repeat(T // 3).expand(2, T)
+    offset = torch.nn.functional.normalize(thought.guess.offset.detach(), dim=-1) * away_m[..., None] / UNIT_M
+    actions = thought._replace(logits=logits, guess=thought.guess._replace(offset=offset)).actions
+    assert torch.equal(actions == 0, away_m < 2.0), "though Stop is the likeliest of the actions everywhere"
+    assert torch.equal(actions[away_m > 2.0], logits[..., 1:].argmax(dim=-1)[away_m > 2.0] + 1)
+
+
+def test_the_goal_knows_no_more_of_the_pictures_than_the_scene(flight):
+    """Other pictures, taken for the same scene, put the goal at the same place."""
+    torch.manual_seed(4)
+    made = Whereabouts(6, 5, 16, SCENES).eval()
+    seen, goal = torch.randn(2, T, 6), torch.randn(1, 5).expand(2, 5)
+    with torch.no_grad():
+        made.body[2].bias[164 + 24 + 1] += 60.0
+        guess, _ = made(seen, goal, flight["odometry"].expand(2, T, 4), torch.zeros(2, made.sums))
+        made.body[2].bias[164 + 24 + 1] -= 120.0
+        other, _ = made(seen, goal, flight["odometry"].expand(2, T, 4), torch.zeros(2, made.sums))
+    assert not torch.allclose(guess.place[0], guess.place[1])
+    assert torch.allclose(guess.goal[0], guess.goal[1], atol=1e-5)
+    assert not torch.allclose(guess.goal, other.goal, atol=1e-3)
