@@ -181,7 +181,7 @@ def segment_triangle_d2(
 
 def split_triangles(
     triangles: NDArray[np.float64], max_edge_m: float, lower: NDArray[np.float64], upper: NDArray[np.float64]
-) -> NDArray[np.float64]:
+) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """Halve long triangles until none is longer than asked, and leave out what lies outside a box.
 
     Parameters
@@ -195,22 +195,28 @@ def split_triangles(
 
     Returns
     -------
-    (m, 9) float64
+    pieces : (m, 9) float64
         Covering the same surface inside the box, in an order that depends on the input alone.
+    rows : (m,) int64
+        Which triangle each is a piece of.
     """
     done: list[NDArray[np.float64]] = []
-    todo = triangles.reshape(-1, 3, 3)
+    whose: list[NDArray[np.int64]] = []
+    todo, rows = triangles.reshape(-1, 3, 3), np.arange(len(triangles))
     while len(todo):
         inside = ((todo.min(axis=1) <= upper) & (todo.max(axis=1) >= lower)).all(axis=1)
-        todo = todo[inside]
+        todo, rows = todo[inside], rows[inside]
         edges = np.linalg.norm(todo - np.roll(todo, -1, axis=1), axis=2)
         short = edges.max(axis=1, initial=0.0) <= max_edge_m
         done.append(todo[short])
-        todo, edges = todo[~short], edges[~short]
-        rows = np.arange(len(todo))
+        whose.append(rows[short])
+        todo, edges, rows = todo[~short], edges[~short], rows[~short]
+        every = np.arange(len(todo))
         i = edges.argmax(axis=1)
         j, k = (i + 1) % 3, (i + 2) % 3
-        a, b, c = todo[rows, i], todo[rows, j], todo[rows, k]
+        a, b, c = todo[every, i], todo[every, j], todo[every, k]
         middle = (a + b) / 2
         todo = np.concatenate([np.stack([a, middle, c], axis=1), np.stack([middle, b, c], axis=1)])
-    return np.concatenate(done or [np.empty((0, 3, 3))]).reshape(-1, 9)
+        rows = np.concatenate([rows, rows])
+    pieces = np.concatenate(done or [np.empty((0, 3, 3))]).reshape(-1, 9)
+    return pieces, np.concatenate(whose or [np.empty(0, np.int64)])
