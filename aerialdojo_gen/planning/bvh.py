@@ -46,19 +46,25 @@ def build_bvh(
     leaves = 1
     while leaves * LEAF < n:
         leaves *= 2
-    corners = triangles.reshape(-1, 3, 3)
+    return triangles, _boxed(triangles, leaves), order
+
+
+@njit(cache=True)
+def _boxed(triangles: NDArray[np.float64], leaves: int) -> NDArray[np.float64]:
+    """Boxes of the tree's nodes, leaves last."""
     boxes = np.empty((2 * leaves, 6))
     boxes[:, :3], boxes[:, 3:] = np.inf, -np.inf
-    low, high = np.full((leaves * LEAF, 3), np.inf), np.full((leaves * LEAF, 3), -np.inf)
-    low[:n], high[:n] = corners.min(axis=1), corners.max(axis=1)
-    boxes[leaves:, :3] = low.reshape(leaves, LEAF, 3).min(axis=1)
-    boxes[leaves:, 3:] = high.reshape(leaves, LEAF, 3).max(axis=1)
-    while leaves > 1:
-        below = boxes[leaves : 2 * leaves].reshape(-1, 2, 6)
-        leaves //= 2
-        boxes[leaves : 2 * leaves, :3] = below[:, :, :3].min(axis=1)
-        boxes[leaves : 2 * leaves, 3:] = below[:, :, 3:].max(axis=1)
-    return triangles, boxes, order
+    for k in range(len(triangles)):
+        box = boxes[leaves + k // LEAF]
+        for c in range(9):
+            axis = c % 3
+            box[axis] = min(box[axis], triangles[k, c])
+            box[axis + 3] = max(box[axis + 3], triangles[k, c])
+    for node in range(leaves - 1, 0, -1):
+        for axis in range(3):
+            boxes[node, axis] = min(boxes[2 * node, axis], boxes[2 * node + 1, axis])
+            boxes[node, axis + 3] = max(boxes[2 * node, axis + 3], boxes[2 * node + 1, axis + 3])
+    return boxes
 
 
 @njit(cache=True, inline="always")
