@@ -8,7 +8,9 @@ from numpy.typing import NDArray
 
 
 @njit(cache=True)
-def _interleaved(points: NDArray[np.float64], low: NDArray[np.float64], extent: float, most: int) -> NDArray[np.uint64]:
+def _interleaved(
+    points: NDArray[np.float64], low: NDArray[np.float64], extent: float, most: int
+) -> NDArray[np.uint64]:
     out = np.empty(len(points), np.uint64)
     for n in range(len(points)):
         code = np.uint64(0)

@@ -57,7 +57,7 @@ def _hits(
 def _towards(
     origins: Floats, points: Floats, centre: Floats, least_m: float
 ) -> tuple[NDArray[np.int64], Floats, Floats, Singles, Singles]:
-    """Rays from origins to points further away than `least_m`: which, distances, directions, and what Embree wants."""
+    """Rays to points further away than `least_m`: which, distances, directions, and what Embree wants."""
     n, k = len(points), 0
     which, length = np.empty(n, np.int64), np.empty(n)
     unit, start, aim = np.empty((n, 3)), np.empty((n, 3), np.float32), np.empty((n, 3), np.float32)

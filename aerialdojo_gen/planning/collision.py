@@ -171,12 +171,10 @@ class CollisionWorld:
         if not self._instances:
             return float("inf")
         sphere = self._sphere(p, _POINT_RADIUS_M)
-        found = {float(fcl.distance(self._object(k), sphere, self._distances)) for k in nearest}
-        if found:
-            least = min(found)
-            # Of surfaces that coincide the manager decides by its tree whose last bits count.
-            if all(other == least or other > least + _SAME_M for other in found):
-                return max(least, 0.0) + _POINT_RADIUS_M
+        found = sorted(float(fcl.distance(self._object(k), sphere, self._distances)) for k in nearest)
+        # Where surfaces of two coincide, the last bits hang on which of them the tree comes to first.
+        if found and (len(found) == 1 or found[1] > found[0] + _SAME_M):
+            return max(found[0], 0.0) + _POINT_RADIUS_M
         data = fcl.DistanceData()
         self._manager.distance(sphere, data, fcl.defaultDistanceCallback)
         return max(float(data.result.min_distance), 0.0) + _POINT_RADIUS_M

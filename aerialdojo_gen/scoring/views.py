@@ -184,7 +184,7 @@ def box_px(camera: Camera, world_from_camera: Floats, vertices: Floats) -> tuple
 
 @njit(cache=True, error_model="numpy")
 def _extent(points: Floats, pose: Floats, focal_px: float) -> tuple[float, float, float, float, float]:
-    """Least depth of points, and the box of their projections about the picture's middle: left, top, right, bottom."""
+    """Least depth of points, and where they are about the picture's middle: left, top, right, bottom."""
     nearest, low_u, low_v, high_u, high_v = np.inf, np.inf, np.inf, -np.inf, -np.inf
     for n in range(len(points)):
         x, y, z = points[n, 0] - pose[0, 3], points[n, 1] - pose[1, 3], points[n, 2] - pose[2, 3]

@@ -142,7 +142,7 @@ def best_pictured(
     """Picture candidates, and shortlist the best of them.
 
     Where nothing but geometry scores, a candidate is pictured only if it could still be among the best: the choice is
-    the same as of all pictures. What is seen from behind it counts for more, and is pictured first: mostly that will do.
+    the same as of all pictures. What is seen from behind it counts for more, and is pictured first.
 
     Parameters
     ----------
