@@ -172,7 +172,7 @@ class CollisionWorld:
             return float("inf")
         sphere = self._sphere(p, _POINT_RADIUS_M)
         found = sorted(float(fcl.distance(self._object(k), sphere, self._distances)) for k in nearest)
-        # Where surfaces of two coincide, the last bits hang on which of them the tree comes to first.
+        # Where surfaces of two coincide, the last bits hang on which of them is come to first: the tree's to say.
         if found and (len(found) == 1 or found[1] > found[0] + _SAME_M):
             return max(found[0], 0.0) + _POINT_RADIUS_M
         data = fcl.DistanceData()

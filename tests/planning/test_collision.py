@@ -90,7 +90,9 @@ def test_who_is_known_to_be_nearest_is_asked_alone_and_says_the_same():
 def test_surfaces_that_coincide_are_left_to_the_tree():
     left, right = instance("left", box((-2, 0, 0), (0, 0.3, 3))), instance("right", box((-1, 0, 0), (2, 0.3, 3)))
     both, p = CollisionWorld(scene(left, right)), (-0.5, 1.1, 1.3)
-    assert both.distance_m(p, (0, 1)) == both.distance_m(p) == pytest.approx(0.8, abs=1e-5)
+    # The tree itself does not say the same twice there, to the last bit.
+    assert both.distance_m(p, (0, 1)) == pytest.approx(both.distance_m(p), abs=1e-12)
+    assert both.distance_m(p, (0, 1)) == pytest.approx(0.8, abs=1e-5)
 
 
 @settings(max_examples=100, deadline=None)
