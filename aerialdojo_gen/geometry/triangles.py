@@ -181,7 +181,7 @@ def segment_triangle_d2(
 
 def split_triangles(
     triangles: NDArray[np.float64], max_edge_m: float, lower: NDArray[np.float64], upper: NDArray[np.float64]
-) -> NDArray[np.float64]:
+) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """Halve long triangles until none is longer than asked, and leave out what lies outside a box.
 
     Parameters
@@ -195,22 +195,57 @@ def split_triangles(
 
     Returns
     -------
-    (m, 9) float64
+    pieces : (m, 9) float64
         Covering the same surface inside the box, in an order that depends on the input alone.
+    rows : (m,) int64
+        Which triangle each is a piece of.
     """
-    done: list[NDArray[np.float64]] = []
     todo = triangles.reshape(-1, 3, 3)
+    near, small = _within(triangles, lower, upper, max_edge_m)
+    rows = np.flatnonzero(near & ~small)
+    # What is small needs no lengths of edges; it stays among the others that need no cut, in their order.
+    lengths = _edges(todo[rows]).max(axis=1, initial=0.0)
+    small[rows[lengths <= max_edge_m]] = True
+    whose = [np.flatnonzero(near & small)]
+    done = [todo[whose[0]]]
+    rows = rows[lengths > max_edge_m]
+    todo = todo[rows]
+    edges = _edges(todo)
     while len(todo):
-        inside = ((todo.min(axis=1) <= upper) & (todo.max(axis=1) >= lower)).all(axis=1)
-        todo = todo[inside]
-        edges = np.linalg.norm(todo - np.roll(todo, -1, axis=1), axis=2)
-        short = edges.max(axis=1, initial=0.0) <= max_edge_m
-        done.append(todo[short])
-        todo, edges = todo[~short], edges[~short]
-        rows = np.arange(len(todo))
+        every = np.arange(len(todo))
         i = edges.argmax(axis=1)
         j, k = (i + 1) % 3, (i + 2) % 3
-        a, b, c = todo[rows, i], todo[rows, j], todo[rows, k]
+        a, b, c = todo[every, i], todo[every, j], todo[every, k]
         middle = (a + b) / 2
         todo = np.concatenate([np.stack([a, middle, c], axis=1), np.stack([middle, b, c], axis=1)])
-    return np.concatenate(done or [np.empty((0, 3, 3))]).reshape(-1, 9)
+        rows = np.concatenate([rows, rows])
+        inside = ((todo.min(axis=1) <= upper) & (todo.max(axis=1) >= lower)).all(axis=1)
+        todo, rows = todo[inside], rows[inside]
+        edges = _edges(todo)
+        short = edges.max(axis=1, initial=0.0) <= max_edge_m
+        done.append(todo[short])
+        whose.append(rows[short])
+        todo, edges, rows = todo[~short], edges[~short], rows[~short]
+    return np.concatenate(done).reshape(-1, 9), np.concatenate(whose)
+
+
+def _edges(triangles: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Lengths of the edges of triangles (n, 3, 3), each from its own corner: (n, 3)."""
+    return np.asarray(np.linalg.norm(triangles - np.roll(triangles, -1, axis=1), axis=2))
+
+
+@njit(cache=True)
+def _within(
+    triangles: NDArray[np.float64], lower: NDArray[np.float64], upper: NDArray[np.float64], longest: float
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Which triangles have a box that touches a box, and which a box so small that no edge of theirs is longer."""
+    near, small = np.ones(len(triangles), np.bool_), np.empty(len(triangles), np.bool_)
+    for n in range(len(triangles)):
+        t = triangles[n]
+        across2 = 0.0
+        for a in range(3):
+            low, high = min(t[a], t[a + 3], t[a + 6]), max(t[a], t[a + 3], t[a + 6])
+            near[n] &= low <= upper[a] and high >= lower[a]
+            across2 += (high - low) * (high - low)
+        small[n] = across2 < longest * longest * 0.999
+    return near, small

@@ -17,7 +17,9 @@ LEAF = 4
 _STACK = 64
 
 
-def build_bvh(triangles: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def build_bvh(
+    triangles: NDArray[np.float64],
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
     """Sort triangles and box them.
 
     Parameters
@@ -32,27 +34,37 @@ def build_bvh(triangles: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDAr
     boxes : (2 m, 6) float64
         Lower and upper corner of every node's box, m leaves (a power of two); row 0 is unused, an empty node's box
         is inverted.
+    order : (n,) int64
+        Which of the given triangles each is.
     """
     n = len(triangles)
+    order = np.arange(n)
     if n:
         centres = triangles.reshape(-1, 3, 3).mean(axis=1)
-        triangles = np.ascontiguousarray(triangles[np.argsort(morton_codes(centres), kind="stable")])
+        order = np.argsort(morton_codes(centres), kind="stable")
+        triangles = np.ascontiguousarray(triangles[order])
     leaves = 1
     while leaves * LEAF < n:
         leaves *= 2
-    corners = triangles.reshape(-1, 3, 3)
+    return triangles, _boxed(triangles, leaves), order
+
+
+@njit(cache=True)
+def _boxed(triangles: NDArray[np.float64], leaves: int) -> NDArray[np.float64]:
+    """Boxes of the tree's nodes, leaves last."""
     boxes = np.empty((2 * leaves, 6))
     boxes[:, :3], boxes[:, 3:] = np.inf, -np.inf
-    low, high = np.full((leaves * LEAF, 3), np.inf), np.full((leaves * LEAF, 3), -np.inf)
-    low[:n], high[:n] = corners.min(axis=1), corners.max(axis=1)
-    boxes[leaves:, :3] = low.reshape(leaves, LEAF, 3).min(axis=1)
-    boxes[leaves:, 3:] = high.reshape(leaves, LEAF, 3).max(axis=1)
-    while leaves > 1:
-        below = boxes[leaves : 2 * leaves].reshape(-1, 2, 6)
-        leaves //= 2
-        boxes[leaves : 2 * leaves, :3] = below[:, :, :3].min(axis=1)
-        boxes[leaves : 2 * leaves, 3:] = below[:, :, 3:].max(axis=1)
-    return triangles, boxes
+    for k in range(len(triangles)):
+        box = boxes[leaves + k // LEAF]
+        for c in range(9):
+            axis = c % 3
+            box[axis] = min(box[axis], triangles[k, c])
+            box[axis + 3] = max(box[axis + 3], triangles[k, c])
+    for node in range(leaves - 1, 0, -1):
+        for axis in range(3):
+            boxes[node, axis] = min(boxes[2 * node, axis], boxes[2 * node + 1, axis])
+            boxes[node, axis + 3] = max(boxes[2 * node, axis + 3], boxes[2 * node + 1, axis + 3])
+    return boxes
 
 
 @njit(cache=True, inline="always")
@@ -237,3 +249,51 @@ def point_distance(
         for k in range(first, min(first + LEAF, tri.shape[0])):
             best2 = min(best2, point_triangle_d2(px, py, pz, tri, k))
     return np.sqrt(best2)
+
+
+@njit(cache=True)
+def nearest_owners(
+    px: float, py: float, pz: float, bound: float, slack: float, tri: NDArray[np.float64],
+    boxes: NDArray[np.float64], owner: NDArray[np.int32],
+) -> NDArray[np.int32]:  # fmt: skip
+    """Whose the triangles are that are as near to p as any, give or take `slack`; none where all are beyond `bound`.
+
+    Parameters
+    ----------
+    px, py, pz : float
+        World frame, metres.
+    bound, slack : float
+        Metres.
+    tri, boxes : arrays
+        As `build_bvh` returns them.
+    owner : (n,) int32
+        Whose each triangle is.
+
+    Returns
+    -------
+    (k,) int32
+        Each owner once.
+    """
+    found = np.empty(8, np.int32)
+    n = 0
+    near = point_distance(px, py, pz, bound, tri, boxes)
+    if near >= bound:
+        return found[:0]
+    reach2 = (near + slack) * (near + slack)
+    leaves = boxes.shape[0] // 2
+    node = 1
+    while node > 0:
+        if _box_gap2(px, py, pz, px, py, pz, boxes, node) > reach2:
+            node = _after(node)
+        elif node < leaves:
+            node *= 2
+        else:
+            first = (node - leaves) * LEAF
+            for k in range(first, min(first + LEAF, tri.shape[0])):
+                if point_triangle_d2(px, py, pz, tri, k) <= reach2 and not (found[:n] == owner[k]).any():
+                    if n == len(found):
+                        found = np.concatenate((found, np.empty(n, np.int32)))
+                    found[n] = owner[k]
+                    n += 1
+            node = _after(node)
+    return found[:n]

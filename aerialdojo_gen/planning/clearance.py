@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from aerialdojo_gen.geometry.ground import Ground
 from aerialdojo_gen.geometry.triangles import split_triangles
-from aerialdojo_gen.planning.bvh import build_bvh, crossings_above, point_distance
+from aerialdojo_gen.planning.bvh import build_bvh, crossings_above, nearest_owners, point_distance
 from aerialdojo_gen.planning.connectivity import connected_with_ceiling, linked_cell, passable_moves
 from aerialdojo_gen.planning.distance_field import build_distance_field
 from aerialdojo_gen.planning.grid_kernels import GridArrays, inside, segment_free
@@ -22,6 +22,8 @@ from aerialdojo_gen.scenes.model import Scene
 
 # Longer triangles would have boxes full of nothing.
 _LONGEST_EDGE_M = 4.0
+# More than distances to pieces of a triangle and to the whole of it differ by.
+_SAME_M = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,6 +33,7 @@ class _Space:
     arrays: GridArrays
     ground: Ground | None
     has_curtain: bool
+    owner: NDArray[np.int32]
 
     @classmethod
     def build(
@@ -40,14 +43,15 @@ class _Space:
         reach = cap_m + 1.0
         parts = [i.vertices[i.faces].reshape(-1, 9) for i in scene.instances]
         triangles = np.concatenate(parts) if parts else np.empty((0, 9))
-        triangles = split_triangles(triangles, _LONGEST_EDGE_M, low - reach, high + reach)
-        real, real_boxes = build_bvh(triangles)
+        owner = np.repeat(np.arange(len(parts), dtype=np.int32), [len(part) for part in parts])
+        triangles, rows = split_triangles(triangles, _LONGEST_EDGE_M, low - reach, high + reach)
+        real, real_boxes, order = build_bvh(triangles)
         ground = Ground.of(scene, radius_m) if closed_ground else None
         curtain = np.empty((0, 9)) if ground is None else ground.curtain(low, high, radius_m)
         solid, boxes = real, real_boxes
         if len(curtain):
-            curtain = split_triangles(curtain, _LONGEST_EDGE_M, low - reach, high + reach)
-            solid, boxes = build_bvh(np.concatenate([triangles, curtain]))
+            curtain, _ = split_triangles(curtain, _LONGEST_EDGE_M, low - reach, high + reach)
+            solid, boxes, _ = build_bvh(np.concatenate([triangles, curtain]))
         nx, ny, nz = (max(1, int(n)) for n in np.ceil((high - low) / cell_m - 1e-9))
         # The bound beyond the band needs half a diagonal of a cell, however large cells are.
         band_m = max(band_m, 0.87 * cell_m)
@@ -55,7 +59,7 @@ class _Space:
         arrays = GridArrays(
             field, low.copy(), cell_m, solid, boxes, real, real_boxes, low + radius_m, high - radius_m
         )
-        return cls(arrays, ground, len(curtain) > 0)
+        return cls(arrays, ground, len(curtain) > 0, owner[rows[order]])
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,6 +82,8 @@ class ClearanceGrid:
         The scene's ground where that is an open sheet that the body could get past.
     has_curtain : bool
         Whether the body could get below it but for the curtain.
+    owner : (n,) int32
+        Index of the instance that each of ``arrays.real_tri`` is of.
     """
 
     arrays: GridArrays
@@ -85,6 +91,7 @@ class ClearanceGrid:
     sky: NDArray[np.bool_]
     radius_m: float
     cap_m: float
+    owner: NDArray[np.int32]
     ground: Ground | None = None
     has_curtain: bool = False
 
@@ -153,7 +160,7 @@ class ClearanceGrid:
     def _within(cls, space: _Space, radius_m: float, cap_m: float) -> ClearanceGrid:
         moves = passable_moves(space.arrays, radius_m)
         sky = connected_with_ceiling(moves)
-        return cls(space.arrays, moves, sky, radius_m, cap_m, space.ground, space.has_curtain)
+        return cls(space.arrays, moves, sky, radius_m, cap_m, space.owner, space.ground, space.has_curtain)
 
     def distance_m(self, p: ArrayLike) -> float:
         """Exact distance from a point to the nearest surface, up to `cap_m`; metres.
@@ -165,6 +172,34 @@ class ClearanceGrid:
         """
         x, y, z = np.asarray(p, np.float64)
         return float(point_distance(x, y, z, self.cap_m, self.arrays.real_tri, self.arrays.real_boxes))
+
+    def nearest(self, p: ArrayLike) -> NDArray[np.int32]:
+        """Instances whose surface is as near to a point as any: mostly one; none where all are beyond `cap_m`.
+
+        Parameters
+        ----------
+        p : (3,) float
+            World frame, metres, inside the flight volume.
+
+        Returns
+        -------
+        (k,) int32
+            Their indices.
+        """
+        x, y, z = np.asarray(p, np.float64)
+        a = self.arrays
+        return np.asarray(nearest_owners(x, y, z, self.cap_m, _SAME_M, a.real_tri, a.real_boxes, self.owner))
+
+    def ball_proven_free(self, p: ArrayLike, radius_m: float) -> bool:
+        """Whether the grid alone proves that a ball touches nothing; False is undecided.
+
+        Parameters
+        ----------
+        p : (3,) float
+            Its centre, world frame, metres, inside the flight volume.
+        radius_m : float
+        """
+        return self.segment_proven_free(p, p, radius_m)
 
     def in_collision(self, p: ArrayLike) -> bool:
         """Whether the body cannot be at a point: it would touch a surface, leave the bounds, or sit in a solid.

@@ -1,4 +1,4 @@
-"""The collision world: FCL, one bounding-volume hierarchy an instance under a dynamic AABB tree.
+"""The collision world: FCL, one bounding-volume hierarchy an instance, made when something first comes near it.
 
 FCL is asked for what must be right beyond doubt: the certificate of every route, and the distance to a surface.
 Surfaces are what it knows: a point deep inside a closed solid is far from every surface and not in collision here
@@ -10,10 +10,12 @@ from __future__ import annotations
 import itertools
 import math
 import threading
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from functools import cached_property
 
 import fcl
 import numpy as np
+from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from aerialdojo_gen.scenes.context import context_of
@@ -21,6 +23,8 @@ from aerialdojo_gen.scenes.model import Instance, Scene
 
 # A ball of no size: FCL measures distances between shapes, and has no point.
 _POINT_RADIUS_M = 1e-6
+# Two distances are to surfaces that coincide, and more than FCL rounds a box by.
+_SAME_M, _BESIDE_M = 1e-9, 1e-6
 
 
 def _bvh(instance: Instance) -> fcl.BVHModel:
@@ -49,6 +53,21 @@ class _Shapes(threading.local):
         self.capsules: dict[tuple[float, float], fcl.CollisionObject] = {}
 
 
+@njit(cache=True)
+def _touched(
+    boxes: NDArray[np.float64], lx: float, ly: float, lz: float, hx: float, hy: float, hz: float
+) -> NDArray[np.int64]:
+    """Rows of boxes (n, 6) that the box (l, h) touches."""
+    found = np.empty(len(boxes), np.int64)
+    n = 0
+    for k in range(len(boxes)):
+        b = boxes[k]
+        if b[0] <= hx and b[3] >= lx and b[1] <= hy and b[4] >= ly and b[2] <= hz and b[5] >= lz:
+            found[n] = k
+            n += 1
+    return found[:n]
+
+
 class CollisionWorld:
     """Collision and distance queries against all instances of a scene.
 
@@ -59,12 +78,32 @@ class CollisionWorld:
     """
 
     def __init__(self, scene: Scene) -> None:
-        self._objects = {i.node: fcl.CollisionObject(_bvh(i), fcl.Transform()) for i in scene.instances}
-        self._manager = fcl.DynamicAABBTreeCollisionManager()
-        self._manager.registerObjects(list(self._objects.values()))
-        self._manager.setup()
+        self._instances = scene.instances
+        self._index = {instance.node: k for k, instance in enumerate(scene.instances)}
+        self._boxes = np.array([i.bounds for i in scene.instances], np.float64).reshape(-1, 6)
+        # A hierarchy takes milliseconds to build, and most things stand where nobody flies.
+        self._objects: dict[int, fcl.CollisionObject] = {}
+        self._lock = threading.RLock()
         self._request = fcl.CollisionRequest(num_max_contacts=1, enable_contact=False)
+        self._distances = fcl.DistanceRequest()
         self._shapes = _Shapes()
+
+    def _object(self, k: int) -> fcl.CollisionObject:
+        made = self._objects.get(k)
+        if made is None:
+            with self._lock:
+                made = self._objects.get(k)
+                if made is None:
+                    made = self._objects[k] = fcl.CollisionObject(_bvh(self._instances[k]), fcl.Transform())
+        return made
+
+    @cached_property
+    def _manager(self) -> fcl.DynamicAABBTreeCollisionManager:
+        with self._lock:
+            manager = fcl.DynamicAABBTreeCollisionManager()
+            manager.registerObjects([self._object(k) for k in range(len(self._instances))])
+            manager.setup()
+            return manager
 
     def sphere_in_collision(self, p: ArrayLike, radius_m: float) -> bool:
         """Whether a ball touches a surface.
@@ -81,7 +120,8 @@ class CollisionWorld:
         bool
             True for a collision.
         """
-        return self._collides(self._sphere(p, radius_m))
+        x, y, z = np.asarray(p, np.float64).tolist()
+        return self._collides(self._sphere(p, radius_m), x, y, z, x, y, z, radius_m)
 
     def segment_in_collision(self, p: ArrayLike, q: ArrayLike, radius_m: float) -> bool:
         """Whether a ball that moves straight from `p` to `q` touches a surface anywhere on its way.
@@ -115,20 +155,28 @@ class CollisionWorld:
             capsule = capsules[key] = fcl.CollisionObject(fcl.Capsule(radius_m, key[1]))
         capsule.setRotation(_along_z(dx / length, dy / length, dz / length))
         capsule.setTranslation(np.array([(ax + bx) / 2, (ay + by) / 2, (az + bz) / 2]))
-        return self._collides(capsule)
+        return self._collides(capsule, ax, ay, az, bx, by, bz, radius_m)
 
-    def distance_m(self, p: ArrayLike) -> float:
+    def distance_m(self, p: ArrayLike, nearest: Iterable[int] = ()) -> float:
         """Distance from a point to the nearest surface of the scene, metres; infinite in an empty scene.
 
         Parameters
         ----------
         p : (3,) float
             World frame, metres.
+        nearest : iterable of int
+            Indices of instances, where it is known that no others are nearer than the nearest of these: the others
+            are not asked.
         """
-        if not self._objects:
+        if not self._instances:
             return float("inf")
+        sphere = self._sphere(p, _POINT_RADIUS_M)
+        found = sorted(float(fcl.distance(self._object(k), sphere, self._distances)) for k in nearest)
+        # Where surfaces of two coincide, the last bits hang on which of them is come to first: the tree's to say.
+        if found and (len(found) == 1 or found[1] > found[0] + _SAME_M):
+            return max(found[0], 0.0) + _POINT_RADIUS_M
         data = fcl.DistanceData()
-        self._manager.distance(self._sphere(p, _POINT_RADIUS_M), data, fcl.defaultDistanceCallback)
+        self._manager.distance(sphere, data, fcl.defaultDistanceCallback)
         return max(float(data.result.min_distance), 0.0) + _POINT_RADIUS_M
 
     def instance_distance_m(self, node: str, p: ArrayLike) -> float:
@@ -146,8 +194,8 @@ class CollisionWorld:
         KeyError
             There is no such node.
         """
-        request, result = fcl.DistanceRequest(), fcl.DistanceResult()
-        distance = fcl.distance(self._sphere(p, _POINT_RADIUS_M), self._objects[node], request, result)
+        sphere = self._sphere(p, _POINT_RADIUS_M)
+        distance = fcl.distance(sphere, self._object(self._index[node]), self._distances)
         return max(float(distance), 0.0) + _POINT_RADIUS_M
 
     def route_in_collision(self, points: Sequence[ArrayLike] | NDArray[np.float64], radius_m: float) -> bool:
@@ -178,10 +226,17 @@ class CollisionWorld:
         sphere.setTranslation(np.asarray(p, np.float64))
         return sphere
 
-    def _collides(self, shape: fcl.CollisionObject) -> bool:
-        data = fcl.CollisionData(self._request, fcl.CollisionResult())
-        self._manager.collide(shape, data, fcl.defaultCollisionCallback)
-        return bool(data.result.is_collision)
+    def _collides(
+        self, shape: fcl.CollisionObject, ax: float, ay: float, az: float, bx: float, by: float, bz: float,
+        radius_m: float,
+    ) -> bool:  # fmt: skip
+        """Whether a shape, all of it within a radius of the segment ab, touches a surface."""
+        r = radius_m + _BESIDE_M
+        touched = _touched(
+            self._boxes, min(ax, bx) - r, min(ay, by) - r, min(az, bz) - r, max(ax, bx) + r, max(ay, by) + r,
+            max(az, bz) + r,
+        )  # fmt: skip
+        return any(fcl.collide(self._object(k), shape, self._request) for k in touched.tolist())
 
 
 def collision_world(scene: Scene) -> CollisionWorld:

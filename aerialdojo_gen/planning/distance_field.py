@@ -12,6 +12,11 @@ from aerialdojo_gen.geometry.triangles import point_triangle_d2
 
 # float32 rounds either way: take off more than it can add, so that a bound stays a bound.
 _ROUNDING_M = 1e-5
+# A box or a plane that is farther than a known distance by more than this cannot hold a nearer point, however the
+# last bits fall: a factor on squares, and something added to them.
+_SURE, _SURE_M = 1.0 + 1e-6, 1e-9
+# Of the square of the area that its edges span: what has less is a sliver.
+_SLIVER = 1e-6
 
 
 @njit(cache=True, inline="always")
@@ -26,14 +31,18 @@ def _edge_d2(wx: float, wy: float, wz: float, ux: float, uy: float, uz: float, i
 def _splat(
     tri: NDArray[np.float64], origin: NDArray[np.float64], cell: float, band: float, field: NDArray[np.float32]
 ) -> None:
-    """Lower `field` (squared distances) to every triangle's, in the triangle's box grown by `band`.
+    """Lower `field` (squared distances) to every triangle's, as far as `band` from the triangle's box.
 
-    The distance is that of `aerialdojo_gen.geometry.triangles.point_triangle_d2`, with what depends on the triangle
+    Where the box or the plane of a triangle is farther than what is known already, the triangle is not asked. The
+    distance is that of `aerialdojo_gen.geometry.triangles.point_triangle_d2`, with what depends on the triangle
     alone taken out of the loop over cells.
     """
     nx, ny, nz = field.shape
     ox, oy, oz = origin[0], origin[1], origin[2]
     band2 = band * band
+    # In float32 the band's edge may seem a little further out.
+    edge2 = band2 * _SURE + _SURE_M
+    above2 = np.empty(nz)
     for k in range(tri.shape[0]):
         ax, ay, az = tri[k, 0], tri[k, 1], tri[k, 2]
         ux, uy, uz = tri[k, 3] - ax, tri[k, 4] - ay, tri[k, 5] - az
@@ -45,20 +54,36 @@ def _splat(
         iu, iv, ie = 1.0 / uu if uu > 0.0 else 0.0, 1.0 / vv if vv > 0.0 else 0.0, 1.0 / ee if ee > 0.0 else 0.0
         im = 1.0 / mm if mm > 0.0 else 0.0
         plane2 = band2 * mm
-        x0 = max(0, math.ceil((ax + min(0.0, ux, vx) - band - ox) / cell - 0.5))
-        x1 = min(nx - 1, math.floor((ax + max(0.0, ux, vx) + band - ox) / cell - 0.5))
-        y0 = max(0, math.ceil((ay + min(0.0, uy, vy) - band - oy) / cell - 0.5))
-        y1 = min(ny - 1, math.floor((ay + max(0.0, uy, vy) + band - oy) / cell - 0.5))
-        z0 = max(0, math.ceil((az + min(0.0, uz, vz) - band - oz) / cell - 0.5))
-        z1 = min(nz - 1, math.floor((az + max(0.0, uz, vz) + band - oz) / cell - 0.5))
+        # A sliver's normal is noise: how far its plane is says nothing.
+        i_plane = im if mm > _SLIVER * uu * vv else 0.0
+        lx, ly, lz = min(0.0, ux, vx), min(0.0, uy, vy), min(0.0, uz, vz)
+        hx, hy, hz = max(0.0, ux, vx), max(0.0, uy, vy), max(0.0, uz, vz)
+        x0 = max(0, math.ceil((ax + lx - band - ox) / cell - 0.5))
+        x1 = min(nx - 1, math.floor((ax + hx + band - ox) / cell - 0.5))
+        y0 = max(0, math.ceil((ay + ly - band - oy) / cell - 0.5))
+        y1 = min(ny - 1, math.floor((ay + hy + band - oy) / cell - 0.5))
+        z0 = max(0, math.ceil((az + lz - band - oz) / cell - 0.5))
+        z1 = min(nz - 1, math.floor((az + hz + band - oz) / cell - 0.5))
+        for l in range(z0, z1 + 1):  # noqa: E741
+            wz = oz + (l + 0.5) * cell - az
+            gz = max(0.0, max(lz - wz, wz - hz))
+            above2[l] = gz * gz
         for i in range(x0, x1 + 1):
             wx = ox + (i + 0.5) * cell - ax
+            gx = max(0.0, max(lx - wx, wx - hx))
             for j in range(y0, y1 + 1):
                 wy = oy + (j + 0.5) * cell - ay
+                gy = max(0.0, max(ly - wy, wy - hy))
+                beside2 = gx * gx + gy * gy
+                if beside2 > edge2:
+                    continue
                 for l in range(z0, z1 + 1):  # noqa: E741
+                    known2 = min(np.float64(field[i, j, l]) * _SURE + _SURE_M, edge2)
+                    if beside2 + above2[l] > known2:
+                        continue
                     wz = oz + (l + 0.5) * cell - az
                     h = wx * mx + wy * my + wz * mz
-                    if h * h > plane2:
+                    if h * h > plane2 or h * h * i_plane > known2:
                         continue
                     wu, wv = wx * ux + wy * uy + wz * uz, wx * vx + wy * vy + wz * vz
                     # Barycentric coordinates of the foot on the plane, times mm: inside, the plane decides.
@@ -120,6 +145,14 @@ def _seed_around(
 
 
 @njit(cache=True, nogil=True)
+def _lower(row: NDArray[np.float32], other: NDArray[np.float32], add: np.float32) -> None:
+    """Lower a row to another one plus a number; by itself, so that it becomes vector instructions."""
+    for k in range(len(row)):
+        value = other[k] + add
+        row[k] = value if value < row[k] else row[k]
+
+
+@njit(cache=True, nogil=True)
 def _beyond(
     field: NDArray[np.float32],
     cell: float,
@@ -159,19 +192,16 @@ def _beyond(
     along_y = np.empty((mx, ny, nz), np.float32)
     for i in range(mx):
         for j in range(ny):
-            along_y[i, j] = along_z[i, j + by]
+            row = along_y[i, j]
+            row[:] = along_z[i, j + by]
             for m in range(max(0, j + by - reach), min(my, j + by + reach + 1)):
-                add = np.float32((m - j - by) * (m - j - by))
-                for k in range(nz):
-                    along_y[i, j, k] = min(along_y[i, j, k], along_z[i, m, k] + add)
+                _lower(row, along_z[i, m], np.float32((m - j - by) * (m - j - by)))
     row = np.empty(nz, np.float32)
     for i in range(nx):
         for j in range(ny):
             row[:] = far
             for m in range(max(0, i + bx - reach), min(mx, i + bx + reach + 1)):
-                add = np.float32((m - i - bx) * (m - i - bx))
-                for k in range(nz):
-                    row[k] = min(row[k], along_y[m, j, k] + add)
+                _lower(row, along_y[m, j], np.float32((m - i - bx) * (m - i - bx)))
             for k in range(nz):
                 if field[i, j, k] <= band * band:
                     field[i, j, k] = max(0.0, math.sqrt(field[i, j, k]) - _ROUNDING_M)

@@ -120,6 +120,24 @@ def open_scene(mesh: Path, sha256: str, keep: int = 1) -> SceneContext:
         return context
 
 
+def keep_scene(scene: Scene, sha256: str) -> None:
+    """Keep a scene that was just written to a mesh, in the place of others: `open_scene` need not read it.
+
+    Parameters
+    ----------
+    scene : Scene
+        Equal to what `read_glb` makes of the mesh, as built scenes are.
+    sha256 : str
+        Of the mesh's bytes.
+    """
+    with _lock:
+        if sha256 in _contexts:
+            return
+        gone = _oldest_beyond(max((*_holders.values(), 1)) - 1)
+        _contexts[sha256] = SceneContext(scene)
+    _release(gone)
+
+
 def read_ahead(mesh: Path, sha256: str, make: Callable[[SceneContext], object]) -> None:
     """Read a scene and build on it, in a thread beside the work on another one; `open_scene` takes it from there.
 

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from aerialdojo_gen.scenes.model import Part
@@ -150,9 +151,20 @@ def _uv_or_nan(m: Mesh) -> Floats:
 
 def areas(v: Floats, f: Ints) -> Floats:
     """Areas of faces (m, 3) over vertices (n, 3): (m,) float64, square metres."""
-    a = v[f[:, 0]]
-    u, w = v[f[:, 1]] - a, v[f[:, 2]] - a
-    return np.asarray(np.sqrt((_cross(u, w) ** 2).sum(axis=1)) / 2.0)
+    return np.asarray(_areas(np.ascontiguousarray(v, np.float64), np.ascontiguousarray(f, np.int32)))
+
+
+@njit(cache=True)
+def _areas(v: Floats, f: Ints) -> Floats:
+    # By numpy's order of additions, in one call: meshes are many and small.
+    out = np.empty(len(f))
+    for n in range(len(f)):
+        a, b, c = f[n, 0], f[n, 1], f[n, 2]
+        ux, uy, uz = v[b, 0] - v[a, 0], v[b, 1] - v[a, 1], v[b, 2] - v[a, 2]
+        wx, wy, wz = v[c, 0] - v[a, 0], v[c, 1] - v[a, 1], v[c, 2] - v[a, 2]
+        x, y, z = uy * wz - uz * wy, uz * wx - ux * wz, ux * wy - uy * wx
+        out[n] = np.sqrt(x * x + y * y + z * z) / 2.0
+    return out
 
 
 def _cross(u: Floats, w: Floats) -> Floats:

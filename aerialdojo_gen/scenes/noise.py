@@ -21,9 +21,9 @@ def value_noise(size: int, cells: int, rng: np.random.Generator, cells_y: int | 
     y = np.arange(size) * rows / size
     i, j = np.floor(y).astype(int), np.floor(x).astype(int)
     ty, tx = _smooth(y - i)[:, None], _smooth(x - j)[None, :]
-    a, b = lattice[np.ix_(i, j)], lattice[np.ix_(i, (j + 1) % cells)]
-    c, d = lattice[np.ix_((i + 1) % rows, j)], lattice[np.ix_((i + 1) % rows, (j + 1) % cells)]
-    return np.asarray((a * (1 - tx) + b * tx) * (1 - ty) + (c * (1 - tx) + d * tx) * ty)
+    # Along x once a row of the lattice, not once a row of the picture.
+    rungs = lattice[:, j] * (1 - tx) + lattice[:, (j + 1) % cells] * tx
+    return np.asarray(rungs[i] * (1 - ty) + rungs[(i + 1) % rows] * ty)
 
 
 def fractal(size: int, cells: int, octaves: int, rng: np.random.Generator, gain: float = 0.5) -> Floats:
@@ -41,11 +41,20 @@ def cells(size: int, count: int, rng: np.random.Generator) -> tuple[Floats, Floa
     Distances are in tiles, (size, size) float64.
     """
     points = rng.uniform(0.0, 1.0, size=(count, 2))
+    return _cells(size, points.tobytes())
+
+
+# A pattern is the same in all colours of its texture.
+@lru_cache(maxsize=16)
+def _cells(size: int, points: bytes) -> tuple[Floats, Floats, NDArray[np.int64]]:
     axis = (np.arange(size) + 0.5) / size
     x, y = np.meshgrid(axis, axis)
-    distance, owner = _nearest_two(points, np.column_stack([x.ravel(), y.ravel()]))
+    distance, owner = _nearest_two(np.frombuffer(points).reshape(-1, 2), np.column_stack([x.ravel(), y.ravel()]))
     first, second = distance.T.reshape(2, size, size)
-    return first, second, owner[:, 0].reshape(size, size)
+    found = first, second, owner[:, 0].reshape(size, size)
+    for array in found:
+        array.flags.writeable = False
+    return found
 
 
 @lru_cache(maxsize=8)

@@ -107,7 +107,7 @@ class Site:
 
     def ground_z(self, x: float, y: float) -> float:
         """Height of the painted ground at a point, metres."""
-        z = float(self._terrain.z(x, y))
+        z = self._terrain.at(x, y)
         for surface in reversed(self._surfaces):
             # Hundreds of lane marks are painted: their boxes are cheaper to ask than their areas.
             x0, y0, x1, y1 = surface.bounds

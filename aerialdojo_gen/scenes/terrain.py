@@ -48,6 +48,21 @@ class Terrain:
         above = sw + v * (nw - sw) + u * (ne - nw)
         return np.where(u >= v, below, above)
 
+    def at(self, x: float, y: float) -> float:
+        """Height at one point: what `z` says of it, without arrays."""
+        rows, columns = (n - 1 for n in self.heights_m.shape)
+        u = min(max((float(x) - self.x0_m) / self.cell_m, 0.0), float(columns))
+        v = min(max((float(y) - self.y0_m) / self.cell_m, 0.0), float(rows))
+        j, i = min(int(u), columns - 1), min(int(v), rows - 1)
+        u, v = u - j, v - i
+        h = self.heights_m.item
+        sw, ne = h(i, j), h(i + 1, j + 1)
+        if u >= v:
+            se = h(i, j + 1)
+            return sw + u * (se - sw) + v * (ne - se)
+        nw = h(i + 1, j)
+        return sw + v * (nw - sw) + u * (ne - nw)
+
     def corners(self) -> Floats:
         """Grid corners as (n, 3) float64 in rows running north, metres."""
         rows, columns = self.heights_m.shape

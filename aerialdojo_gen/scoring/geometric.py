@@ -117,7 +117,7 @@ def judge(view: AnchorView, radius_m: float, standoff_m: float) -> Parts:
     return _parts(view, terms, radius_m, standoff_m)
 
 
-def most(known: Known, radius_m: float, standoff_m: float) -> float:
+def most(known: Known, radius_m: float, standoff_m: float, behind: AnchorView | None = None) -> float:
     """Bound the score of every picture from a viewpoint from above, by what is known of the viewpoint without one.
 
     Parameters
@@ -125,6 +125,8 @@ def most(known: Known, radius_m: float, standoff_m: float) -> float:
     known : Known
     radius_m, standoff_m : float
         As for `judge`.
+    behind : AnchorView, optional
+        The picture from behind the viewpoint, where it is there already.
 
     Returns
     -------
@@ -132,8 +134,13 @@ def most(known: Known, radius_m: float, standoff_m: float) -> float:
         No view of which this is known has a higher score by `judge`.
     """
     terms = dict.fromkeys(("unoccluded", "size", "centred", "contrast", "sky", "open"), 1.0)
-    framed = known.framed if known.framed_behind is None else _mixed(known.framed, known.framed_behind)
-    return _parts(known, {**terms, "framed": framed}, radius_m, standoff_m).score + _ROUNDING
+    terms["framed"] = known.framed
+    if behind is not None:
+        seen = _pictured(behind)
+        terms = {name: _mixed(term, seen[name]) for name, term in terms.items()}
+    elif known.framed_behind is not None:
+        terms["framed"] = _mixed(known.framed, known.framed_behind)
+    return _parts(known, terms, radius_m, standoff_m).score + _ROUNDING
 
 
 def _mixed(here: float, behind: float) -> float:

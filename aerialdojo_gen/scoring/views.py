@@ -9,7 +9,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from aerialdojo_gen.geometry.cameras import Camera, project, view_pose
+from aerialdojo_gen.geometry.cameras import Camera, view_pose
 from aerialdojo_gen.geometry.rays import TriangleRayCaster
 from aerialdojo_gen.geometry.soup import Body
 from aerialdojo_gen.rendering.raycast import RayRenderer, pixel_rays
@@ -172,13 +172,30 @@ def box_px(camera: Camera, world_from_camera: Floats, vertices: Floats) -> tuple
     A pixel of room around them; the whole picture where one of them reaches behind the camera, which has no place
     in it.
     """
-    uv, depth = project(camera, world_from_camera, vertices)
-    if depth.min() <= _IN_FRONT_M:
+    pose = np.ascontiguousarray(world_from_camera)
+    nearest, low_u, low_v, high_u, high_v = _extent(np.ascontiguousarray(vertices), pose, camera.focal_px)
+    if nearest <= _IN_FRONT_M:
         return 0, 0, camera.width, camera.height
-    (low_u, low_v), (high_u, high_v) = uv.min(axis=0), uv.max(axis=0)
-    u0, v0 = max(0, math.floor(low_u) - 1), max(0, math.floor(low_v) - 1)
-    u1, v1 = min(camera.width, math.ceil(high_u) + 1), min(camera.height, math.ceil(high_v) + 1)
+    u, v = camera.width / 2.0, camera.height / 2.0
+    u0, v0 = max(0, math.floor(low_u + u) - 1), max(0, math.floor(low_v + v) - 1)
+    u1, v1 = min(camera.width, math.ceil(high_u + u) + 1), min(camera.height, math.ceil(high_v + v) + 1)
     return u0, v0, max(u1, u0), max(v1, v0)
+
+
+@njit(cache=True, error_model="numpy")
+def _extent(points: Floats, pose: Floats, focal_px: float) -> tuple[float, float, float, float, float]:
+    """Least depth of points, and where they are about the picture's middle: left, top, right, bottom."""
+    nearest, low_u, low_v, high_u, high_v = np.inf, np.inf, np.inf, -np.inf, -np.inf
+    for n in range(len(points)):
+        x, y, z = points[n, 0] - pose[0, 3], points[n, 1] - pose[1, 3], points[n, 2] - pose[2, 3]
+        depth = x * pose[0, 2] + y * pose[1, 2] + z * pose[2, 2]
+        nearest = min(nearest, depth)
+        if nearest <= _IN_FRONT_M:
+            break
+        u = focal_px * (x * pose[0, 0] + y * pose[1, 0] + z * pose[2, 0]) / depth
+        v = focal_px * (x * pose[0, 1] + y * pose[1, 1] + z * pose[2, 1]) / depth
+        low_u, high_u, low_v, high_v = min(low_u, u), max(high_u, u), min(low_v, v), max(high_v, v)
+    return nearest, low_u, low_v, high_u, high_v
 
 
 def boxed(camera: Camera, world_from_camera: Floats, vertices: Floats) -> NDArray[np.bool_]:

@@ -137,21 +137,28 @@ def test_split_triangles_cover_the_same_surface():
     rng = np.random.default_rng(6)
     tri = rng.uniform(-20, 20, (12, 9))
     low, high = np.full(3, -50.0), np.full(3, 50.0)
-    pieces = split_triangles(tri, 4.0, low, high).reshape(-1, 3, 3)
+    pieces, rows = split_triangles(tri, 4.0, low, high)
+    pieces = pieces.reshape(-1, 3, 3)
 
     def area(t):
         return np.linalg.norm(np.cross(t[:, 1] - t[:, 0], t[:, 2] - t[:, 0]), axis=1).sum() / 2
 
     assert area(pieces) == pytest.approx(area(tri.reshape(-1, 3, 3)), rel=1e-9)
     assert np.linalg.norm(pieces - np.roll(pieces, -1, axis=1), axis=2).max() <= 4.0 + 1e-9
-    ordered, boxes = build_bvh(pieces.reshape(-1, 9))
+    whole = tri.reshape(-1, 3, 3)[rows]
+    normal = np.cross(whole[:, 1] - whole[:, 0], whole[:, 2] - whole[:, 0])
+    assert np.abs(((pieces - whole[:, :1]) * normal[:, None]).sum(axis=2)).max() < 1e-9 * np.abs(normal).max()
+    for k in range(len(tri)):
+        assert area(pieces[rows == k]) == pytest.approx(area(tri[k].reshape(1, 3, 3)), rel=1e-9)
+    ordered, boxes, order = build_bvh(pieces.reshape(-1, 9))
+    assert np.array_equal(ordered, pieces.reshape(-1, 9)[order])
     assert sorted(map(tuple, ordered.round(9))) == sorted(map(tuple, pieces.reshape(-1, 9).round(9)))
     assert np.allclose(boxes[1], np.concatenate([pieces.min(axis=(0, 1)), pieces.max(axis=(0, 1))]))
 
 
 def test_a_plane_of_forty_kilometres_is_cut_to_the_scene():
     huge = np.array([[-2e4, -2e4, 0, 2e4, -2e4, 0, 0, 2e4, 0]])
-    assert len(split_triangles(huge, 4.0, np.full(3, -20.0), np.full(3, 20.0))) < 3000
+    assert len(split_triangles(huge, 4.0, np.full(3, -20.0), np.full(3, 20.0))[0]) < 3000
 
 
 def test_too_narrow_a_band_is_refused():

@@ -47,30 +47,26 @@ def limb(points: ArrayLike, radii: Sequence[float], sides: int = 6) -> Mesh:
         vertices.append(p + r * (np.cos(angles)[:, None] * side + np.sin(angles)[:, None] * other))
     along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
     width = 2 * np.pi * max(radii) / sides
-    faces: list[tuple[int, int, int]] = []
-    uv: list[Sequence[tuple[float, float]]] = []
-    for i in range(rings - 1):
-        for k in range(sides):
-            a, b = i * sides + k, i * sides + (k + 1) % sides
-            u0, u1, v0, v1 = k * width, (k + 1) * width, float(along[i]), float(along[i + 1])
-            faces += [(a, b, b + sides), (a, b + sides, a + sides)]
-            uv += [((u0, v0), (u1, v0), (u1, v1)), ((u0, v0), (u1, v1), (u0, v1))]
-    last = (rings - 1) * sides
-    flat = [(np.nan, np.nan)] * 3
-    for k in range(1, sides - 1):
-        faces.append((0, k + 1, k))
-        uv.append(flat)
-        if not tip:
-            faces.append((last, last + k, last + k + 1))
-            uv.append(flat)
+    # Two triangles a side of every stretch, ends of caps and tip after them.
+    k = np.arange(sides)
+    a = np.arange(rings - 1)[:, None] * sides + k
+    b = np.arange(rings - 1)[:, None] * sides + (k + 1) % sides
+    corners = [np.stack([a, b, b + sides, a, b + sides, a + sides], axis=2).reshape(-1, 3)]
+    u0, u1 = (np.broadcast_to(u * width, a.shape) for u in (k, k + 1))
+    v0, v1 = (np.broadcast_to(v[:, None], a.shape) for v in (along[: rings - 1], along[1:rings]))
+    places = [np.stack([u0, v0, u1, v0, u1, v1, u0, v0, u1, v1, u0, v1], axis=2).reshape(-1, 3, 2)]
+    last, c = (rings - 1) * sides, np.arange(1, sides - 1)
+    foot, top = (np.zeros_like(c), c + 1, c), (np.full_like(c, last), last + c, last + c + 1)
+    caps = np.stack(foot if tip else (*foot, *top), axis=1).reshape(-1, 3)
+    corners.append(caps)
+    places.append(np.full((len(caps), 3, 2), np.nan))
     if tip:
         vertices.append(line[-1:])
-        for k in range(sides):
-            a, b = last + k, last + (k + 1) % sides
-            faces.append((a, b, rings * sides))
-            v0, v1 = float(along[-2]), float(along[-1])
-            uv.append(((k * width, v0), ((k + 1) * width, v0), ((k + 0.5) * width, v1)))
-    return outward(mesh(np.concatenate(vertices), faces, np.array(uv)))
+        corners.append(np.column_stack([last + k, last + (k + 1) % sides, np.full(sides, rings * sides)]))
+        low, high = np.full(sides, along[-2]), np.full(sides, along[-1])
+        ends = (k * width, low, (k + 1) * width, low, (k + 0.5) * width, high)
+        places.append(np.stack(ends, axis=1).reshape(-1, 3, 2))
+    return outward(mesh(np.concatenate(vertices), np.concatenate(corners), np.concatenate(places)))
 
 
 def clump(

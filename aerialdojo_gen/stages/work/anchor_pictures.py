@@ -95,23 +95,29 @@ class Looked:
         """
         return [self.picture(n, size_px, fov_deg) for n in few.tolist()]
 
-    def picture(self, n: int, size_px: int, fov_deg: float) -> AnchorView:
-        """Picture one candidate, a number among `which`; see `pictures`."""
+    def picture(self, n: int, size_px: int, fov_deg: float, back: AnchorView | None = None) -> AnchorView:
+        """Picture one candidate, a number among `which`; see `pictures`. The one from behind may be there already."""
         view = self.found.picture(int(self.which[n]), size_px, fov_deg)
-        if self.step_back_m[n] > 0.0:
-            back = self.behind.picture(n, size_px, fov_deg)
+        if self.has_back(n):
+            back = back or self.behind.picture(n, size_px, fov_deg)
             told = _mean(view.told, back.told)
             view = replace(view, shown=(view.shown + back.shown) / 2.0, told=told, behind=back)
         return view
 
-    def most(self, n: int, radius_m: float, standoff_m: float) -> float:
-        """Bound the geometric score of a candidate, a number among `which`, from above, without a picture of it."""
+    def has_back(self, n: int) -> bool:
+        """Whether the reference picture of a candidate, a number among `which`, is taken from behind it."""
+        return bool(self.step_back_m[n] > 0.0)
+
+    def most(self, n: int, radius_m: float, standoff_m: float, back: AnchorView | None = None) -> float:
+        """Bound the geometric score of a candidate, a number among `which`, from above, without a picture from it.
+
+        Where there is one from behind it already, the bound is that much tighter.
+        """
         k, found, behind = int(self.which[n]), self.found, self.behind
         shown, told = float(found.views.shown[k]), tuple(found.told[k].tolist())
-        back = self.step_back_m[n] > 0.0
-        if back:
+        if self.has_back(n):
             shown = (shown + float(behind.views.shown[n])) / 2.0
-            told = _mean(told, behind.told[n].tolist())
+            told = _mean(told, behind.told[n].tolist() if back is None else back.told)
         known = Known(
             shown,
             float(found.elevation_deg[k]),
@@ -119,9 +125,9 @@ class Looked:
             told,
             None if found.off_front_rad is None else float(found.off_front_rad[k]),
             float(found.views.framed[k]),
-            float(behind.views.framed[n]) if back else None,
+            float(behind.views.framed[n]) if self.has_back(n) else None,
         )
-        return most(known, radius_m, standoff_m)
+        return most(known, radius_m, standoff_m, back)
 
 
 def best_pictured(
@@ -136,7 +142,7 @@ def best_pictured(
     """Picture candidates, and shortlist the best of them.
 
     Where nothing but geometry scores, a candidate is pictured only if it could still be among the best: the choice is
-    the same as of all pictures.
+    the same as of all pictures. What is seen from behind it counts for more, and is pictured first.
 
     Parameters
     ----------
@@ -169,6 +175,7 @@ def best_pictured(
     else:
         found = {}
         score = np.array([looked.most(n, radius_m, config.standoff_m) for n in few.tolist()])
+    backs: dict[int, AnchorView] = {}
     while True:
         # A choice among scores and bounds is that among scores, as soon as it falls on scores alone.
         best = shortlist(score, azimuth_rad, config.shortlist, apart, front)
@@ -177,7 +184,12 @@ def best_pictured(
         if not open_ones:
             return best, [found[n] for n in best.tolist()]
         n = open_ones[0]
-        view = looked.picture(int(few[n]), config.picture_px, config.fov_deg)
+        which = int(few[n])
+        if looked.has_back(which) and n not in backs:
+            backs[n] = looked.behind.picture(which, config.picture_px, config.fov_deg)
+            score[n] = looked.most(which, radius_m, config.standoff_m, backs[n])
+            continue
+        view = looked.picture(which, config.picture_px, config.fov_deg, backs.get(n))
         found[n] = view, scorers.judge(name, [view])[0]
         score[n] = found[n][1].score
 

@@ -63,6 +63,15 @@ class World:
             {i.node: k for k, i in enumerate(scene.instances)},
         )
 
+    def clearance_m(self, position_m: Floats) -> float:
+        """Distance from a place in the flight volume, (3,) float64, to the nearest surface, metres, by FCL."""
+        return self.collisions.distance_m(position_m, self.free.nearest(position_m).tolist())
+
+    def ball_collides(self, position_m: Floats, radius_m: float) -> bool:
+        """Whether a ball in the flight volume touches a surface: FCL is asked where the grid cannot tell."""
+        proven = self.free.ball_proven_free(position_m, radius_m)
+        return not proven and self.collisions.sphere_in_collision(position_m, radius_m)
+
 
 @dataclass(frozen=True, eq=False)
 class Candidates:
@@ -136,7 +145,7 @@ class Candidates:
         """
         alone = instance_caster(world.scene.instances[instance])
         sight = Sight.of(positions_m, yaw_rad, points, alone, world.rays, instance, config.fov_deg)
-        clearance = np.array([world.collisions.distance_m(p) for p in positions_m])
+        clearance = np.array([world.clearance_m(p) for p in positions_m])
         patches = patches_of(world, instance, points)
         seen = seen_share(positions_m, yaw_rad, patches, world.rays, config.fov_deg)
         return cls._judged(
@@ -189,7 +198,7 @@ class Candidates:
         places, turned = positions_m[new], yaws[new]
         sight = Sight.of(places, turned, self.points, self.alone, world.rays, self.instance, config.fov_deg)
         clearance, seen = self.clearance_m[which], self.seen[which]
-        clearance[new] = [world.collisions.distance_m(p) for p in places]
+        clearance[new] = [world.clearance_m(p) for p in places]
         seen[new] = seen_share(places, turned, self.patches, world.rays, config.fov_deg)
         return self._judged(
             world, self.instance, self.alone, positions_m, yaws, clearance, self.sight.with_rows(which, new, sight),

@@ -11,6 +11,7 @@ from aerialdojo_gen.config.sections import BuildScenesConfig
 from aerialdojo_gen.layouts.build import build_scene
 from aerialdojo_gen.pipeline.stage import Job, Output
 from aerialdojo_gen.scenes.catalogue import load_catalogue
+from aerialdojo_gen.scenes.context import keep_scene
 from aerialdojo_gen.scenes.glb import write_glb
 from aerialdojo_gen.scenes.model import Scene
 from aerialdojo_gen.store.layout import check_scene_name
@@ -47,6 +48,9 @@ def run(job: Job, config: BuildScenesConfig) -> Output:
     with job.output_file(relative) as path:
         write_glb(scene, path)
         digest = hashlib.sha256(path.read_bytes()).hexdigest()
+    if not scene.imported:
+        # The next stage mostly follows in this process.
+        keep_scene(scene, digest)
     table = pa.Table.from_pylist([scene_row(scene, relative, digest)], schema=SCENES.schema)
     return Output(tables={"scenes": table}, rows_in=1, rows_out=1, counts={"triangles": scene.n_triangles})
 

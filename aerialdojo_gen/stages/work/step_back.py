@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from aerialdojo_gen.geometry.telling import Patch, in_picture
@@ -43,12 +44,18 @@ def fitting_m(vertices: Floats, position_m: Floats, yaw_rad: float, fov_deg: flo
     float
         Metres; 0 where it fits already.
     """
-    away = vertices - position_m
-    cos, sin = math.cos(yaw_rad), math.sin(yaw_rad)
-    ahead = away[:, 0] * cos + away[:, 1] * sin
-    across = np.abs(away[:, 0] * sin - away[:, 1] * cos)
-    wide = np.maximum(across, np.abs(away[:, 2])) / (_FILLED * math.tan(math.radians(fov_deg) / 2.0))
-    return max(0.0, float((wide - ahead).max()))
+    half = _FILLED * math.tan(math.radians(fov_deg) / 2.0)
+    x, y, z = (float(c) for c in position_m)
+    return max(0.0, float(_fitting(vertices, x, y, z, math.cos(yaw_rad), math.sin(yaw_rad), half)))
+
+
+@njit(cache=True)
+def _fitting(vertices: Floats, x: float, y: float, z: float, cos: float, sin: float, half: float) -> float:
+    most = -np.inf
+    for n in range(len(vertices)):
+        u, v, w = vertices[n, 0] - x, vertices[n, 1] - y, vertices[n, 2] - z
+        most = max(most, max(abs(u * sin - v * cos), abs(w)) / half - (u * cos + v * sin))
+    return most
 
 
 def telling_m(patches: Sequence[Patch], seen: Floats, position_m: Floats, yaw_rad: float, fov_deg: float) -> float:
@@ -144,7 +151,7 @@ def steps_back_m(
         framed = in_picture(at, yaws[left], points, fov_deg)
         keen = framed.sum(axis=1) > best[left]
         if share:
-            keen[keen] = [not world.collisions.sphere_in_collision(place, _CAMERA_M) for place in at[keen]]
+            keen[keen] = [not world.ball_collides(place, _CAMERA_M) for place in at[keen]]
         left, at, framed = left[keen], at[keen], framed[keen]
         who, what = np.nonzero(framed)
         # What the object itself hides is hidden from every distance: its own surface counts wherever it is met.

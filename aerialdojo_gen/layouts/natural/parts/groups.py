@@ -26,7 +26,7 @@ from aerialdojo_gen.scenes.site import Site
 from aerialdojo_gen.scenes.terrain import Terrain
 from aerialdojo_gen.scenes.values import At, Degrees, Length
 
-_TRIES = 500
+_TRIES, _AT_ONCE = 500, 20
 _ATTEMPTS = 6
 _NUMBER = r"-?\d{1,4}(?:\.\d{0,6})?"
 _THING = re.compile(
@@ -248,19 +248,35 @@ def _found(
     tree = shapely.STRtree(blocked)
     wanted = 1 if group.where == "any" else 12
     found: list[tuple[float, float, float]] = []
-    for k in range(_TRIES):
-        # A crowded place spreads a little.
-        reach = group.radius_m * (1.0 + max(k / _TRIES - 0.5, 0.0))
-        r, angle = reach * float(np.sqrt(rng.random())), float(rng.uniform(0, 2 * np.pi))
-        x, y = group.at[0] + r * float(np.cos(angle)), group.at[1] + r * float(np.sin(angle))
-        outward = float(np.degrees(angle)) + float(rng.uniform(-25, 25))
-        # On roofs things are set square.
-        free = group.yaw_deg + 90.0 * float(rng.integers(4)) if group.on else float(rng.uniform(0, 360))
-        yaw = {"out": outward, "middle": outward + 180.0, "any": free}[group.facing]
-        outline = translate(rotate(shape, yaw, origin=(0, 0)), x, y)
-        if room.contains(outline) and not len(tree.query(outline.buffer(group.gap_m), predicate="intersects")):
-            found.append((x, y, yaw))
-            if len(found) >= wanted:
-                break
+    shapely.prepare(room)
+    for first in range(0, _TRIES, _AT_ONCE):
+        tries = [_drawn(group, rng, k) for k in range(first, min(first + _AT_ONCE, _TRIES))]
+        # The middle of an outline is well inside of it: where that is not free, the outline is not.
+        turns = np.radians([yaw for _, _, yaw in tries])
+        middle = shape.centroid
+        xs = np.array([x for x, _, _ in tries]) + np.cos(turns) * middle.x - np.sin(turns) * middle.y
+        ys = np.array([y for _, y, _ in tries]) + np.sin(turns) * middle.x + np.cos(turns) * middle.y
+        free = shapely.contains_xy(room, xs, ys)
+        free[tree.query(shapely.points(xs, ys), predicate="intersects")[0]] = False
+        for x, y, yaw in (tries[k] for k in np.flatnonzero(free)):
+            outline = translate(rotate(shape, yaw, origin=(0, 0)), x, y)
+            if room.contains(outline) and not len(tree.query(outline.buffer(group.gap_m), predicate="intersects")):
+                found.append((x, y, yaw))
+                if len(found) >= wanted:
+                    break
+        if len(found) >= wanted:
+            break
     sign = -1.0 if group.where == "low" else 1.0
     return max(found, key=lambda p: sign * height(p[0], p[1])) if found else None
+
+
+def _drawn(group: Group, rng: np.random.Generator, k: int) -> tuple[float, float, float]:
+    """Draw the k-th place that is tried for a thing of a group, and its yaw."""
+    # A crowded place spreads a little.
+    reach = group.radius_m * (1.0 + max(k / _TRIES - 0.5, 0.0))
+    r, angle = reach * float(np.sqrt(rng.random())), float(rng.uniform(0, 2 * np.pi))
+    x, y = group.at[0] + r * float(np.cos(angle)), group.at[1] + r * float(np.sin(angle))
+    outward = float(np.degrees(angle)) + float(rng.uniform(-25, 25))
+    # On roofs things are set square.
+    free = group.yaw_deg + 90.0 * float(rng.integers(4)) if group.on else float(rng.uniform(0, 360))
+    return x, y, {"out": outward, "middle": outward + 180.0, "any": free}[group.facing]
