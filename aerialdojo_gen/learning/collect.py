@@ -248,7 +248,7 @@ def references(part: Part) -> Steps:
     goals = np.repeat(index.goal, index.steps, axis=0)
     return Steps(
         frames=pictures(part, poses), first=index.first, label=joined["action"], previous=joined["previous_action"],
-        remaining=joined["remaining_actions"].astype(np.float32), odometry=joined["odometry"],
+        odometry=joined["odometry"],
         offset=offsets(poses, goals), pose=poses.astype(np.float32), **goals_of(part, index),
     )  # fmt: skip
 

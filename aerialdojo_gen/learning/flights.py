@@ -41,7 +41,7 @@ class Flown:
         self.space, self.goal = space, goal
         self.episode = Episode(space, (x, y, z, yaw), (goal[0], goal[1], goal[2]), budget)
         self.reckoning, self.previous = Reckoning(), N_ACTIONS
-        self.rows: list[tuple[int, int, float]] = []
+        self.rows: list[tuple[int, int]] = []
         self.odometry: list[NDArray[np.float32]] = []
         self.poses: list[NDArray[np.float64]] = []
         self.frames: list[NDArray[np.uint8]] = []
@@ -53,7 +53,7 @@ class Flown:
 
     def note(self, label: int, frame: NDArray[np.uint8], pose: NDArray[np.float64]) -> None:
         """Write down a step before it is flown."""
-        self.rows.append((label, self.previous, float(self.episode.remaining_actions)))
+        self.rows.append((label, self.previous))
         self.odometry.append(self.reckoning.odometry)
         self.poses.append(pose)
         self.frames.append(frame)
@@ -160,7 +160,7 @@ def _fly(
 
 
 def _steps(flown: list[Flown], told: dict[str, Any], part: Part) -> Steps:
-    rows = np.array([row for f in flown for row in f.rows], np.float64).reshape(-1, 3)
+    rows = np.array([row for f in flown for row in f.rows], np.int64).reshape(-1, 2)
     counts = [len(f.rows) for f in flown]
     poses = np.array([pose for f in flown for pose in f.poses]).reshape(-1, 4)
     goals = np.repeat(np.array([f.goal[:3] for f in flown]).reshape(-1, 3), counts, axis=0)
@@ -168,8 +168,7 @@ def _steps(flown: list[Flown], told: dict[str, Any], part: Part) -> Steps:
     return Steps(
         frames=np.array([frame for f in flown for frame in f.frames], np.uint8).reshape(-1, *shape),
         first=np.concatenate([[0], np.cumsum(counts)]).astype(np.int64),
-        label=rows[:, 0].astype(np.int64), previous=rows[:, 1].astype(np.int64),
-        remaining=rows[:, 2].astype(np.float32),
+        label=rows[:, 0], previous=rows[:, 1],
         odometry=np.array([o for f in flown for o in f.odometry], np.float32).reshape(-1, 4),
         offset=offsets(poses, goals), pose=poses.astype(np.float32), **told,
     )  # fmt: skip

@@ -130,7 +130,7 @@ class Learner:
         self.progress = Progress()
         self.optimiser = self._optimiser()
         # Steps of the pool that are not kept back.
-        self._anywhere = np.empty(0, np.int64)
+        self._about: list[tuple[Pool, Any, NDArray[np.int64]]] = []
 
     def state(self) -> dict[str, Any]:
         """Return all tensors that a training goes on from: weights, and the optimiser's moments."""

@@ -30,8 +30,6 @@ class Steps:
         What the teacher does there, 0 to 15.
     previous : (m,) int64
         What was done before, 16 at the start.
-    remaining : (m,) float32
-        Actions left.
     odometry : (m, 4) float32
         Own motion from the start and in its frame: metres and radians.
     offset : (m, 3) float32
@@ -53,7 +51,6 @@ class Steps:
     first: NDArray[np.int64]
     label: NDArray[np.int64]
     previous: NDArray[np.int64]
-    remaining: NDArray[np.float32]
     odometry: NDArray[np.float32]
     offset: NDArray[np.float32]
     pose: NDArray[np.float32]
@@ -117,7 +114,7 @@ class Pool:
         self.parts = list(parts)
         self._steps = np.cumsum([0, *(len(p.label) for p in parts)])
         joined: dict[str, NDArray[Any]] = {}
-        for name in ("label", "previous", "remaining", "odometry", "offset", "pose", "tokens", "semantic", "nav_id"):
+        for name in ("label", "previous", "odometry", "offset", "pose", "tokens", "semantic", "nav_id"):
             joined[name] = np.concatenate([getattr(p, name) for p in parts])
         shifts = np.cumsum([0, *(len(p.images) for p in parts)])
         joined["image"] = np.concatenate(
@@ -174,7 +171,7 @@ class Pool:
         mask = np.arange(window)[None] < lengths[:, None]
         rows = (self.first[episodes][:, None] + np.arange(window)[None])[mask]
         out: dict[str, NDArray[Any]] = {"rows": rows, "mask": mask}
-        for name in ("label", "previous", "remaining", "odometry", "offset", "pose"):
+        for name in ("label", "previous", "odometry", "offset", "pose"):
             values = j[name]
             out[name] = np.zeros((*mask.shape, *values.shape[1:]), values.dtype)
             out[name][mask] = values[rows]
