@@ -149,7 +149,8 @@ def _fly(
             torch.ones((len(going), 1), dtype=torch.bool),
             memory[going],
         )
-        chosen = thought.actions[:, 0].tolist()
+        turned = torch.tensor([[f.reckoning.turned] for f in last])
+        chosen = thought.actions(turned)[:, 0].tolist()
         left = []
         for i, k in enumerate(going):
             label = int(labels[i])

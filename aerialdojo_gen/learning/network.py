@@ -11,6 +11,7 @@ from torch import nn
 from torch.nn import functional
 
 from aerialdojo_gen.agents.goal import N_ACTIONS
+from aerialdojo_gen.geometry.motion import TURNS
 from aerialdojo_gen.learning.whereabouts import UNIT_M, Guess, Whereabouts
 from aerialdojo_gen.store.schemas import STOP
 
@@ -72,15 +73,25 @@ class Thought(NamedTuple):
     logits: Any
     guess: Guess
 
-    @property
-    def actions(self) -> Any:
-        """The likeliest action, (n, T) int64: Stop where the goal is thought to be within 2 m, and nowhere else.
+    def actions(self, turned: Any) -> Any:
+        """Choose the likeliest action: Stop where the goal is thought to be within 2 m, and nowhere else.
 
         A reference stops at one of many steps, and where a body has strayed the planner hardly ever says so: by the
-        actions' chances alone a policy learns to fly on for ever.
+        actions' chances alone a policy learns to fly on for ever; and to turn for ever, for turns follow turns.
+
+        Parameters
+        ----------
+        turned : (n, T) bool
+            Who has turned in place by half a circle, and is to go somewhere: `Reckoning.turned`.
+
+        Returns
+        -------
+        (n, T) int64
         """
         moving = self.logits.float().clone()
         moving[..., STOP] = -torch.inf
+        turns = torch.from_numpy(TURNS[:N_ACTIONS] != 0).to(moving.device)
+        moving = moving.masked_fill(turned[..., None] & turns, -torch.inf)
         near = torch.linalg.vector_norm(self.guess.offset, dim=-1) * UNIT_M <= ARRIVED_M
         return moving.argmax(dim=-1).masked_fill(near, STOP)
 

@@ -110,7 +110,8 @@ class Policy(AgentBase):
                 torch.ones((1, 1), dtype=torch.bool, device=device),
                 self._memory,
             )
-        self._previous = int(thought.actions[0, 0])
+        turned = torch.tensor([[self._reckoning.turned]], device=device)
+        self._previous = int(thought.actions(turned)[0, 0])
         return self._previous
 
 

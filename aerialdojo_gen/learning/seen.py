@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerialdojo_gen.agents.goal import N_ACTIONS, Sensors
-from aerialdojo_gen.geometry.motion import DISPLACEMENTS, TURN_RAD, TURNS
+from aerialdojo_gen.geometry.motion import DISPLACEMENTS, N_HEADINGS, TURN_RAD, TURNS
 from aerialdojo_gen.store.schemas import ACTION_NAMES
 
 
@@ -49,6 +49,7 @@ class Reckoning:
     def __init__(self) -> None:
         self._place = np.zeros(3)
         self._headings = 0
+        self._turns = 0
 
     def add(self, action: int) -> None:
         """Add an action that was carried out."""
@@ -57,6 +58,12 @@ class Reckoning:
         ahead, left, up = DISPLACEMENTS[action]
         self._place += (c * ahead - s * left, s * ahead + c * left, up)
         self._headings += int(TURNS[action])
+        self._turns = self._turns + 1 if TURNS[action] else 0
+
+    @property
+    def turned(self) -> bool:
+        """Whether the body has made turns of half a circle in a row, in place: no reference makes more."""
+        return self._turns >= N_HEADINGS // 2
 
     @property
     def odometry(self) -> NDArray[np.float32]:

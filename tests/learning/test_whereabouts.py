@@ -199,9 +199,31 @@ def test_it_stops_where_it_thinks_to_have_arrived_and_nowhere_else(episode):
     logits[..., 0] = 50.0
     away_m = torch.tensor([1.9, 2.1, 30.0]).repeat(T // 3).expand(2, T)
     offset = torch.nn.functional.normalize(thought.guess.offset.detach(), dim=-1) * away_m[..., None] / UNIT_M
-    actions = thought._replace(logits=logits, guess=thought.guess._replace(offset=offset)).actions
+    actions = thought._replace(logits=logits, guess=thought.guess._replace(offset=offset)).actions(
+        torch.zeros(2, T, dtype=torch.bool)
+    )
     assert torch.equal(actions == 0, away_m < 2.0), "though Stop is the likeliest of the actions everywhere"
     assert torch.equal(actions[away_m > 2.0], logits[..., 1:].argmax(dim=-1)[away_m > 2.0] + 1)
+
+
+def test_who_has_turned_by_half_a_circle_in_place_goes_somewhere(episode):
+    network, goal, given = episode
+    thought, _ = network(given["pictures"], goal, *[given[n] for n in list(given)[1:]])
+    logits = thought.logits.detach().clone()
+    logits[..., 14:] = 50.0
+    far = thought.guess._replace(offset=torch.ones(2, T, 3))
+    turned = torch.arange(T).expand(2, T) % 2 == 0
+    actions = thought._replace(logits=logits, guess=far).actions(turned)
+    assert torch.equal(actions >= 14, ~turned)
+    assert torch.equal(actions[turned], logits[turned][:, 1:14].argmax(dim=-1) + 1)
+    reckoning = Reckoning()
+    for _ in range(11):
+        reckoning.add(14)
+        assert not reckoning.turned
+    reckoning.add(14)
+    assert reckoning.turned, "24 headings are a circle"
+    reckoning.add(10)
+    assert not reckoning.turned
 
 
 def test_the_goal_knows_no_more_of_the_pictures_than_the_scene(flight):
