@@ -92,14 +92,22 @@ class FlightSpace:
             `q` is outside the flight volume: nothing moved. A geofence holds the drone, for the volume's bounds are
             no surface that a camera could see.
         """
-        verdict = _judge(*p, *q, self.radius_m, self._arrays)
-        if verdict == _FREE:
-            return q, False, False
-        if verdict == _OUTSIDE:
+        collision, refused = self.hindered(p, q)
+        if refused:
             return p, False, True
-        if not self.world.segment_in_collision(p, q, self.radius_m):
-            return q, False, False
-        return self._contact(p, q), True, False
+        return (self._contact(p, q) if collision else q), collision, False
+
+    def hindered(self, p: Point, q: Point) -> tuple[bool, bool]:
+        """Say what keeps a body from flying from `p` to `q`: `fly` without where it then is.
+
+        Returns
+        -------
+        collision, refused : bool
+        """
+        verdict = _judge(*p, *q, self.radius_m, self._arrays)
+        if verdict in (_FREE, _OUTSIDE):
+            return False, verdict == _OUTSIDE
+        return self.world.segment_in_collision(p, q, self.radius_m), False
 
     def _contact(self, p: Point, q: Point) -> Point:
         length = sum((b - a) ** 2 for a, b in zip(p, q, strict=True)) ** 0.5

@@ -14,8 +14,11 @@ from numpy.typing import NDArray
 
 from aerialdojo_gen.agents.goal import Sensors
 from aerialdojo_gen.benchmark.eyes import drawing
+from aerialdojo_gen.benchmark.motion import flight_space
 from aerialdojo_gen.benchmark.tasks import Selection, mesh_of, reference_image
+from aerialdojo_gen.config.sections import Embodiment
 from aerialdojo_gen.errors import AerialDojoError
+from aerialdojo_gen.learning.blocked import blocked
 from aerialdojo_gen.learning.index import Index, read_index
 from aerialdojo_gen.learning.labels import Labels
 from aerialdojo_gen.learning.pictures import within
@@ -249,7 +252,8 @@ def references(part: Part) -> Steps:
     return Steps(
         frames=pictures(part, poses), first=index.first, label=joined["action"], previous=joined["previous_action"],
         odometry=joined["odometry"],
-        offset=offsets(poses, goals), pose=poses.astype(np.float32), **goals_of(part, index),
+        offset=offsets(poses, goals), pose=poses.astype(np.float32), blocked=hindered(part, poses),
+        **goals_of(part, index),
     )  # fmt: skip
 
 
@@ -266,6 +270,12 @@ def pictures(part: Part, poses: NDArray[np.float64]) -> NDArray[np.uint8]:
         rgb, depth_m = draw_bodies(renderer, s.camera, poses[k : k + 512], s.views)
         out[k : k + 512] = packed(rgb, within(depth_m, s), s)
     return out
+
+
+def hindered(part: Part, poses: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Say which actions lead nowhere at poses (n, 4): (n, 16) bool."""
+    collides, refused, _ = blocked(flight_space(*mesh_of(part.data, part.scene), Embodiment().radius_m), poses)
+    return collides | refused
 
 
 def offsets(poses: NDArray[np.float64], goals: NDArray[np.float64]) -> NDArray[np.float32]:

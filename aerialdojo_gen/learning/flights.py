@@ -14,14 +14,14 @@ from aerialdojo_gen.benchmark.tasks import mesh_of
 from aerialdojo_gen.common import rng
 from aerialdojo_gen.config.agreement import SUCCESS_RADIUS_M
 from aerialdojo_gen.config.sections import Embodiment, PlanConfig
-from aerialdojo_gen.geometry.motion import replay
 from aerialdojo_gen.learning import checkpoints
+from aerialdojo_gen.learning.blocked import blocked
 from aerialdojo_gen.learning.collect import Flying, Part, goal_poses, goals_of, offsets, pictures
 from aerialdojo_gen.learning.loader import torch_package
 from aerialdojo_gen.learning.policy import network_of
 from aerialdojo_gen.learning.seen import Reckoning
 from aerialdojo_gen.learning.steps import Steps
-from aerialdojo_gen.learning.teacher import NO_LABEL, Teacher, teacher_of
+from aerialdojo_gen.learning.teacher import Teacher, teacher_of
 from aerialdojo_gen.scenes.context import SEVERAL, open_scene
 from aerialdojo_gen.store.schemas import STOP
 
@@ -41,9 +41,12 @@ class Flown:
         self.space, self.goal = space, goal
         self.episode = Episode(space, (x, y, z, yaw), (goal[0], goal[1], goal[2]), budget)
         self.reckoning, self.previous = Reckoning(), N_ACTIONS
+        # What the teacher would do from here on; empty where that is not known.
+        self.way = np.zeros(0, np.int8)
         self.rows: list[tuple[int, int]] = []
         self.odometry: list[NDArray[np.float32]] = []
         self.poses: list[NDArray[np.float64]] = []
+        self.blocked: list[NDArray[np.bool_]] = []
         self.frames: list[NDArray[np.uint8]] = []
 
     @property
@@ -56,18 +59,22 @@ class Flown:
         self.rows.append((label, self.previous))
         self.odometry.append(self.reckoning.odometry)
         self.poses.append(pose)
+        collides, refused, _ = blocked(self.space, pose)
+        self.blocked.append((collides | refused)[0])
         self.frames.append(frame)
 
     def fly(self, chosen: int, label: int) -> bool:
-        """Fly the policy's action, or the teacher's where that would end the episode; False when it is over."""
+        """Fly the policy's action, or the teacher's where that ends it or moves nothing; False when it is over."""
         if chosen == STOP and self.arrived:
             return False
-        if chosen == STOP or self._collides(chosen):
+        if chosen == STOP or self.blocked[-1][chosen]:
             if label == STOP:
                 return False
             chosen = label
         self.episode.step(chosen)
         self.previous = chosen
+        # Who does what a route says is still on it; a new search from there would find its rest, or one as good.
+        self.way = self.way[1:] if chosen == self.way[0] and not self.episode.refused else self.way[:0]
         if not self.episode.refused:
             self.reckoning.add(chosen)
         return self.episode.termination is None
@@ -77,17 +84,13 @@ class Flown:
         """Whether a Stop here is a success."""
         return self.episode.distance_m <= SUCCESS_RADIUS_M
 
-    def _collides(self, action: int) -> bool:
-        x, y, z = replay(self.pose, [action])[-1, :3].tolist()
-        here = self.episode.position
-        return (x, y, z) != here and self.space.fly(here, (x, y, z))[1]
-
 
 def flights(part: Part, flying: Flying) -> Steps:
     """Fly a part's tasks.
 
-    The policy's actions are flown, now and then the teacher's; where the policy would stop too early or collide the
-    teacher's are, so that an episode goes on. Every step is labelled with what the teacher does there.
+    The policy's actions are flown, now and then the teacher's; where the policy would stop too early, collide or
+    leave the flight volume the teacher's are, so that an episode goes on. Every step is labelled with what the
+    teacher does there: a route's first action, the next where that was done.
     """
     torch = torch_package()
     torch.set_num_threads(1)
@@ -131,15 +134,16 @@ def _fly(
     going = list(range(len(flown)))
     memory = network.blank(len(flown))
     while going:
-        poses = [flown[k].pose for k in going]
-        labels = teacher.labels([flown[k].goal for k in going], poses)
-        keep = [i for i in range(len(going)) if labels[i] != NO_LABEL]
-        going, poses, labels = [going[i] for i in keep], [poses[i] for i in keep], labels[keep]
+        lost = [flown[k] for k in going if not len(flown[k].way)]
+        for one, way in zip(lost, teacher.ways([f.goal for f in lost], [f.pose for f in lost]), strict=True):
+            one.way = way
+        going = [k for k in going if len(flown[k].way)]
         if not going:
             return
+        poses, labels = [flown[k].pose for k in going], [int(flown[k].way[0]) for k in going]
         frames = pictures(part, np.array(poses))
         for i, k in enumerate(going):
-            flown[k].note(int(labels[i]), frames[i], poses[i])
+            flown[k].note(labels[i], frames[i], poses[i])
         last = [flown[k] for k in going]
         thought, memory[going] = network(
             torch.from_numpy(frames) if part.sensors.views else None,
@@ -153,9 +157,8 @@ def _fly(
         chosen = thought.actions(turned)[:, 0].tolist()
         left = []
         for i, k in enumerate(going):
-            label = int(labels[i])
-            action = label if draws[k].random() < teacher_share else chosen[i]
-            if flown[k].fly(action, label) and len(flown[k].rows) < most[k]:
+            action = labels[i] if draws[k].random() < teacher_share else chosen[i]
+            if flown[k].fly(action, labels[i]) and len(flown[k].rows) < most[k]:
                 left.append(k)
         going = left
 
@@ -171,5 +174,6 @@ def _steps(flown: list[Flown], told: dict[str, Any], part: Part) -> Steps:
         first=np.concatenate([[0], np.cumsum(counts)]).astype(np.int64),
         label=rows[:, 0], previous=rows[:, 1],
         odometry=np.array([o for f in flown for o in f.odometry], np.float32).reshape(-1, 4),
-        offset=offsets(poses, goals), pose=poses.astype(np.float32), **told,
+        offset=offsets(poses, goals), pose=poses.astype(np.float32),
+        blocked=np.array([one for f in flown for one in f.blocked], np.bool_).reshape(-1, N_ACTIONS), **told,
     )  # fmt: skip

@@ -11,12 +11,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from aerialdojo_gen.agents.goal import N_ACTIONS
 from aerialdojo_gen.benchmark.motion import FlightSpace, flight_space
-from aerialdojo_gen.geometry.motion import replay
+from aerialdojo_gen.learning.blocked import blocked
 from aerialdojo_gen.planning.attempt import costs_at
 from aerialdojo_gen.planning.cost_to_go import columns_by_distance, expand_cost, seed_goal
 from aerialdojo_gen.planning.preference import NO_PREFERENCE
 from aerialdojo_gen.scenes.context import context_of
-from aerialdojo_gen.store.schemas import STOP
 
 Floats = NDArray[np.float64]
 
@@ -81,18 +80,7 @@ class Geodesic:
             Shortest way from where the action leads; infinite where it collides. A refused one leads nowhere else;
             a turn and Stop cost what the pose itself does.
         """
-        p = np.asarray(poses, np.float64).reshape(-1, 4)
-        ends = np.array([[replay(pose, [a])[-1, :3] for a in range(N_ACTIONS)] for pose in p]).reshape(
-            -1, N_ACTIONS, 3
-        )
-        collides, refused = np.zeros((2, len(p), N_ACTIONS), np.bool_)
-        for k, pose in enumerate(p[:, :3].tolist()):
-            here = (pose[0], pose[1], pose[2])
-            for a in range(N_ACTIONS):
-                x, y, z = ends[k, a].tolist()
-                if a != STOP and (x, y, z) != here:
-                    _, collides[k, a], refused[k, a] = self._space.fly(here, (x, y, z))
-            ends[k, refused[k]] = p[k, :3]
+        collides, refused, ends = blocked(self._space, poses)
         cost = self.distances_m(goal, ends.reshape(-1, 3)).reshape(-1, N_ACTIONS)
         return collides, refused, np.where(collides, np.inf, cost)
 

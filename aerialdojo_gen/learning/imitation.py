@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from aerialdojo_gen.agents.goal import N_ACTIONS
 from aerialdojo_gen.common import rng
 from aerialdojo_gen.learning.loader import torch_package
 from aerialdojo_gen.learning.network import Network, Thought
@@ -73,11 +74,15 @@ class Assessed:
         Median distance between where the goal is and where it is thought to be, metres.
     goal_off_at_start_m : float
         That at the first steps of episodes.
+    blocked_told, free_told : float
+        Share of blocked actions, and of free ones, that it takes for such; not a number without any.
     """
 
     accuracy: float
     goal_off_m: float
     goal_off_at_start_m: float
+    blocked_told: float
+    free_told: float
 
 
 def epoch_batches(
@@ -110,6 +115,12 @@ def epoch_batches(
             batches.append(chunk[:n])
             chunk = chunk[n:]
     return [batches[k] for k in draw.permutation(len(batches))]
+
+
+def touched(logits: Any, blocked: Any) -> Any:
+    """Return the loss of chances that actions are blocked: logits (m, 16) and bool (m, 16) to (); of all actions."""
+    functional = torch_package().nn.functional
+    return N_ACTIONS * functional.binary_cross_entropy_with_logits(logits.float(), blocked.float())
 
 
 class Learner:
@@ -220,17 +231,21 @@ class Learner:
         if not lengths.any():
             return None
         self.network.eval()
-        right, off, first = [], [], []
+        right, off, first, hindered, free = [], [], [], [], []
         with self.torch.no_grad():
             for episodes in epoch_batches(lengths, self.recipe.train.batch_steps, 0, 0, 0):
                 batch = self._batch(pool, frames, episodes, rng.generator(0, "kept back"))
                 thought, mask = self._forward(batch), batch["mask"]
                 right.append((thought.logits.argmax(-1) == batch["label"])[mask])
+                said, is_so = thought.blocked[mask] > 0.0, batch["blocked"][mask]
+                hindered.append(said[is_so])
+                free.append(~said[~is_so])
                 away = self.torch.linalg.vector_norm(thought.guess.offset * UNIT_M - batch["offset"], dim=-1)
                 off.append(away[mask])
                 first.append(away[:, 0])
         median = [float(self.torch.cat(one).median()) for one in (off, first)]
-        return Assessed(float(self.torch.cat(right).float().mean()), *median)
+        shares = [float(self.torch.cat(one).float().mean()) for one in (right, hindered, free)]
+        return Assessed(shares[0], *median, *shares[1:])
 
     def _optimiser(self) -> Any:
         train = self.recipe.train
@@ -289,11 +304,12 @@ class Learner:
             chosen = np.sort(draw.choice(rows, (n + k) // len(about)))
             at = (self.torch.from_numpy(one).to(self.device) for one in pool.places(chosen))
             looks.append((self._pictures(pool, frames, chosen), *at))
-        pictures, pose, number = (self.torch.cat(same) for same in zip(*looks, strict=True))
+        pictures, pose, number, blocked = (self.torch.cat(same) for same in zip(*looks, strict=True))
         with self.torch.autocast(self.device, self.torch.bfloat16, enabled=self.device != "cpu"):
             seen = self.network.look(pictures.flatten(0, 1)).reshape(n, -1)
             place, heading, scene, _ = self.network.whereabouts.found(seen)
-        return astray(place, heading, scene, pose, number)
+            hindered = self.network.blocked(seen)
+        return astray(place, heading, scene, pose, number) + touched(hindered, blocked)
 
     def _pictures(self, pool: Pool, frames: Any, rows: NDArray[np.int64]) -> Any:
         if frames is None:
@@ -311,7 +327,8 @@ class Learner:
         thought, mask = self._forward(batch), batch["mask"]
         logits, label = thought.logits[mask].float(), batch["label"][mask]
         loss = functional.cross_entropy(logits, label)
-        where = missed(thought.guess, batch) + self._looked_about(draw)
+        touches = touched(thought.blocked[mask], batch["blocked"][mask])
+        where = missed(thought.guess, batch) + touches + self._looked_about(draw)
         for group in self.optimiser.param_groups:
             group["lr"] = rate
         self.optimiser.zero_grad(set_to_none=True)

@@ -25,6 +25,8 @@ _PATCH_PX = 4
 _DROPOUT = 0.1
 # Where a policy stops, metres: within the 3 m of success by what it may be mistaken.
 ARRIVED_M = 2.0
+# Chances of actions are multiplied by this power of the chance that they are free.
+CAUTION = 3.0
 
 
 @dataclass(frozen=True)
@@ -66,18 +68,23 @@ class Thought(NamedTuple):
     ----------
     logits : (n, T, 16)
         Of the actions.
+    blocked : (n, T, 16)
+        Logits of each action's touching a surface or leaving the flight volume.
     guess : Guess
         Where the goal is thought to be.
     """
 
     logits: Any
+    blocked: Any
     guess: Guess
 
     def actions(self, turned: Any) -> Any:
-        """Choose the likeliest action: Stop where the goal is thought to be within 2 m, and nowhere else.
+        """Choose the likeliest action that leads somewhere; Stop where the goal is thought to be within 2 m.
 
-        A reference stops at one of many steps, and where a body has strayed the planner hardly ever says so: by the
-        actions' chances alone a policy learns to fly on for ever; and to turn for ever, for turns follow turns.
+        An action's chance counts with that of its being free: one collision ends an episode, and who imitates is
+        never told so. A reference stops at one of many steps, and where a body has strayed the planner hardly ever
+        says so: by the actions' chances alone a policy learns to fly on for ever; and to turn for ever, for turns
+        follow turns.
 
         Parameters
         ----------
@@ -88,7 +95,8 @@ class Thought(NamedTuple):
         -------
         (n, T) int64
         """
-        moving = self.logits.float().clone()
+        free = functional.logsigmoid(-self.blocked.float())
+        moving = self.logits.float() + CAUTION * free
         moving[..., STOP] = -torch.inf
         turns = torch.from_numpy(TURNS[:N_ACTIONS] != 0).to(moving.device)
         moving = moving.masked_fill(turned[..., None] & turns, -torch.inf)
@@ -136,6 +144,10 @@ class Network(nn.Module):  # type: ignore[misc]  # torch is looked at by no type
             nn.Linear(known, shape.hidden), nn.ReLU(inplace=True), nn.Dropout(_DROPOUT),
             nn.Linear(shape.hidden, shape.hidden), nn.ReLU(inplace=True), nn.Linear(shape.hidden, N_ACTIONS),
         )  # fmt: skip
+
+        self.blocked = nn.Sequential(
+            nn.Linear(pictured, shape.features), nn.ReLU(inplace=True), nn.Linear(shape.features, N_ACTIONS)
+        )
 
     def look(self, pictures: Any) -> Any:
         """Encode pictures: (n, H, W, 4) uint8 to (n, features)."""
@@ -200,7 +212,8 @@ class Network(nn.Module):  # type: ignore[misc]  # torch is looked at by no type
             seen = flat.index_copy(0, rows, looked).reshape(n, steps, -1)
         guess, memory = self.whereabouts(seen, goal, odometry, memory)
         parts = [seen, goal[:, None].expand(n, steps, -1), bearing(guess), self.action(previous)]
-        return Thought(self.choice(torch.cat([part.to(goal.dtype) for part in parts], dim=2)), guess), memory
+        logits = self.choice(torch.cat([part.to(goal.dtype) for part in parts], dim=2))
+        return Thought(logits, self.blocked(seen), guess), memory
 
     def blank(self, n: int) -> Any:
         """Return the memory of n episodes that begin: (n, sums)."""

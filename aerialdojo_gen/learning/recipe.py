@@ -30,9 +30,7 @@ class DataConfig(Section):
     limit: int | None = Field(None, ge=1, description="most trajectories, drawn evenly over the scenes")
     views: tuple[View, ...] = Field(("front",), description="cameras; none for a blind policy")
     size_px: int = Field(64, ge=32, le=256, description="edge of the pictures; a multiple of 16")
-    looks: int = Field(
-        0, ge=0, description="pictures a scene from anywhere that its references lead, turned at random, for the map"
-    )
+    looks: int = Field(0, ge=0, description="pictures a scene from within 3 m of its references, turned at random")
     validation_share: float = Field(
         0.02, ge=0, lt=0.5, description="trajectories that are kept for the accuracy on what was not trained on"
     )
@@ -66,10 +64,12 @@ class TrainingConfig(Section):
     gradient_norm: float = Field(1.0, gt=0, description="gradients are scaled down to this norm")
     image_share: float = Field(0.5, ge=0, le=1, description="goals told by picture, of those that have both")
     goal_weight: float = Field(
-        1.0, ge=0, description="of the side task beside the actions: where the goal is, seen from the body"
+        1.0, ge=0, description="of the tasks beside the choice: where body and goal are, which actions are blocked"
     )
     looks: int = Field(
-        256, ge=0, description="pictures from anywhere beside a batch, from which it learns where the body is"
+        256,
+        ge=0,
+        description="pictures from anywhere beside a batch: where they are, and what is in the way",
     )
     checkpoint_s: float = Field(60.0, gt=0, description="seconds between checkpoints")
 

@@ -36,6 +36,8 @@ class Steps:
         The goal ahead, left and up of the body, metres: privileged, as is `pose`; for side tasks.
     pose : (m, 4) float32
         x, y, z in metres and yaw in radians, world frame.
+    blocked : (m, 16) bool
+        Actions that would touch a surface or leave the flight volume: privileged, for a side task.
     tokens : (n, 2, length) int64
         The goal's words without and with its description.
     image : (n,) int64
@@ -54,6 +56,7 @@ class Steps:
     odometry: NDArray[np.float32]
     offset: NDArray[np.float32]
     pose: NDArray[np.float32]
+    blocked: NDArray[np.bool_]
     tokens: NDArray[np.int64]
     image: NDArray[np.int64]
     semantic: NDArray[np.bool_]
@@ -114,7 +117,7 @@ class Pool:
         self.parts = list(parts)
         self._steps = np.cumsum([0, *(len(p.label) for p in parts)])
         joined: dict[str, NDArray[Any]] = {}
-        for name in ("label", "previous", "odometry", "offset", "pose", "tokens", "semantic", "nav_id"):
+        for name in ("label", "previous", "odometry", "offset", "pose", "blocked", "tokens", "semantic", "nav_id"):
             joined[name] = np.concatenate([getattr(p, name) for p in parts])
         shifts = np.cumsum([0, *(len(p.images) for p in parts)])
         joined["image"] = np.concatenate(
@@ -148,9 +151,13 @@ class Pool:
             out[at] = self.parts[p].frames[rows[at] - self._steps[p]]
         return out
 
-    def places(self, rows: NDArray[np.int64]) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
-        """Read poses of steps, (n, 4), and numbers of their scenes, (n,)."""
-        return np.asarray(self._joined["pose"][rows], np.float32), self._scene_of_step[rows]
+    def places(self, rows: NDArray[np.int64]) -> tuple[NDArray[np.float32], NDArray[np.int64], NDArray[np.bool_]]:
+        """Read poses of steps, (n, 4), numbers of their scenes, (n,), and which actions are blocked, (n, 16)."""
+        return (
+            np.asarray(self._joined["pose"][rows], np.float32),
+            self._scene_of_step[rows],
+            np.asarray(self._joined["blocked"][rows], np.bool_),
+        )
 
     def batch(self, episodes: NDArray[np.int64], by_image: NDArray[np.bool_]) -> dict[str, NDArray[Any]]:
         """Put episodes side by side.
@@ -171,7 +178,7 @@ class Pool:
         mask = np.arange(window)[None] < lengths[:, None]
         rows = (self.first[episodes][:, None] + np.arange(window)[None])[mask]
         out: dict[str, NDArray[Any]] = {"rows": rows, "mask": mask}
-        for name in ("label", "previous", "odometry", "offset", "pose"):
+        for name in ("label", "previous", "odometry", "offset", "pose", "blocked"):
             values = j[name]
             out[name] = np.zeros((*mask.shape, *values.shape[1:]), values.dtype)
             out[name][mask] = values[rows]

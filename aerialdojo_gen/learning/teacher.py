@@ -56,14 +56,19 @@ class Teacher:
         (n,) int64
             Actions, 0 to 15; `NO_LABEL` where no way is found.
         """
-        out = np.full(len(poses), NO_LABEL, np.int64)
+        ways = self.ways(goals, poses)
+        return np.array([way[0] if len(way) else NO_LABEL for way in ways], np.int64)
+
+    def ways(self, goals: Sequence[ArrayLike], poses: Sequence[ArrayLike]) -> list[NDArray[np.int8]]:
+        """Plan from poses: the actions of each route, Stop at its end; none where no way is found."""
+        out = [np.zeros(0, np.int8)] * len(poses)
         keys = [np.asarray(goal, np.float64).tobytes() for goal in goals]
         for key in dict.fromkeys(keys):
             rows = [k for k, own in enumerate(keys) if own == key]
             starts = np.array([np.asarray(poses[k], np.float64) for k in rows])
             for k, route in zip(rows, self._planner.plan_target(goals[rows[0]], starts), strict=True):
                 if route.outcome == "SOLVED":
-                    out[k] = agent_actions(route.actions)[0]
+                    out[k] = agent_actions(route.actions)
         return out
 
     def keeping(self) -> AbstractContextManager[None]:

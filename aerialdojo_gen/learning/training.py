@@ -282,7 +282,7 @@ class _Training:
                 if k is None
                 else (
                     f" (kept back: {k.accuracy:.1%}; goal off by {k.goal_off_at_start_m:.1f} m at the start, "
-                    f"{k.goal_off_m:.1f} m in all)"
+                    f"{k.goal_off_m:.1f} m in all; {k.blocked_told:.0%} of blocked actions told)"
                 )
             )
             self._reporter.line(

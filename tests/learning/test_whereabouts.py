@@ -199,7 +199,8 @@ def test_it_stops_where_it_thinks_to_have_arrived_and_nowhere_else(episode):
     logits[..., 0] = 50.0
     away_m = torch.tensor([1.9, 2.1, 30.0]).repeat(T // 3).expand(2, T)
     offset = torch.nn.functional.normalize(thought.guess.offset.detach(), dim=-1) * away_m[..., None] / UNIT_M
-    actions = thought._replace(logits=logits, guess=thought.guess._replace(offset=offset)).actions(
+    clear = torch.full_like(logits, -50.0)
+    actions = thought._replace(logits=logits, blocked=clear, guess=thought.guess._replace(offset=offset)).actions(
         torch.zeros(2, T, dtype=torch.bool)
     )
     assert torch.equal(actions == 0, away_m < 2.0), "though Stop is the likeliest of the actions everywhere"
@@ -213,7 +214,8 @@ def test_who_has_turned_by_half_a_circle_in_place_goes_somewhere(episode):
     logits[..., 14:] = 50.0
     far = thought.guess._replace(offset=torch.ones(2, T, 3))
     turned = torch.arange(T).expand(2, T) % 2 == 0
-    actions = thought._replace(logits=logits, guess=far).actions(turned)
+    clear = torch.full_like(logits, -50.0)
+    actions = thought._replace(logits=logits, blocked=clear, guess=far).actions(turned)
     assert torch.equal(actions >= 14, ~turned)
     assert torch.equal(actions[turned], logits[turned][:, 1:14].argmax(dim=-1) + 1)
     reckoning = Reckoning()
@@ -224,6 +226,19 @@ def test_who_has_turned_by_half_a_circle_in_place_goes_somewhere(episode):
     assert reckoning.turned, "24 headings are a circle"
     reckoning.add(10)
     assert not reckoning.turned
+
+
+def test_of_likely_actions_it_takes_one_that_is_free(episode):
+    network, goal, given = episode
+    thought, _ = network(given["pictures"], goal, *[given[n] for n in list(given)[1:]])
+    logits, blocked = torch.zeros(2, T, 16), torch.full((2, T, 16), -20.0)
+    logits[..., 3], logits[..., 2], logits[..., 1] = 9.0, 8.0, 4.0
+    # The likeliest is surely blocked, the next one perhaps: 1 in 100, then 9 in 10.
+    blocked[..., 3], blocked[:, 0, 2], blocked[:, 1:, 2] = 20.0, -4.6, 2.2
+    far = thought.guess._replace(offset=torch.ones(2, T, 3))
+    actions = thought._replace(logits=logits, blocked=blocked, guess=far).actions(torch.zeros(2, T, dtype=torch.bool))
+    assert (actions[:, 0] == 2).all()
+    assert (actions[:, 1:] == 1).all()
 
 
 def test_the_goal_knows_no_more_of_the_pictures_than_the_scene(flight):
