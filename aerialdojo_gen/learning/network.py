@@ -138,7 +138,7 @@ class Network(nn.Module):  # type: ignore[misc]  # torch is looked at by no type
         self.action = nn.Embedding(N_ACTIONS + 1, _ACTION_FEATURES)
         # Who sees nothing guesses by what is said alone.
         pictured = max(shape.views, 1) * shape.features
-        self.whereabouts = Whereabouts(pictured, shape.features, shape.features, shape.scenes)
+        self.whereabouts = Whereabouts(pictured, shape.features, shape.hidden, shape.scenes)
         known = pictured + shape.features + _BEARING + _ACTION_FEATURES
         self.choice = nn.Sequential(
             nn.Linear(known, shape.hidden), nn.ReLU(inplace=True), nn.Dropout(_DROPOUT),
@@ -146,7 +146,7 @@ class Network(nn.Module):  # type: ignore[misc]  # torch is looked at by no type
         )  # fmt: skip
 
         self.blocked = nn.Sequential(
-            nn.Linear(pictured, shape.features), nn.ReLU(inplace=True), nn.Linear(shape.features, N_ACTIONS)
+            nn.Linear(pictured, shape.hidden), nn.ReLU(inplace=True), nn.Linear(shape.hidden, N_ACTIONS)
         )
 
     def look(self, pictures: Any) -> Any:

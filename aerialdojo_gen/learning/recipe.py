@@ -50,7 +50,7 @@ class ModelConfig(Section):
     channels: tuple[int, int, int] = Field((64, 96, 128), description="of the three layers of the CNN")
     features: int = Field(256, ge=8, le=4096, description="numbers that a view, or the goal's picture, becomes")
     word_features: int = Field(96, ge=4, le=2048, description="numbers that a word of the goal becomes")
-    hidden: int = Field(384, ge=8, le=4096, description="memory of the recurrent layer")
+    hidden: int = Field(384, ge=8, le=4096, description="width of the layers that choose, place and warn")
 
 
 class TrainingConfig(Section):
