@@ -74,15 +74,15 @@ class Assessed:
         Median distance between where the goal is and where it is thought to be, metres.
     goal_off_at_start_m : float
         That at the first steps of episodes.
-    blocked_told, free_told : float
-        Share of blocked actions, and of free ones, that it takes for such; not a number without any.
+    blocked_told, free_told : float or None
+        Share of blocked actions, and of free ones, that it takes for such; None where there are none.
     """
 
     accuracy: float
     goal_off_m: float
     goal_off_at_start_m: float
-    blocked_told: float
-    free_told: float
+    blocked_told: float | None
+    free_told: float | None
 
 
 def epoch_batches(
@@ -244,8 +244,9 @@ class Learner:
                 off.append(away[mask])
                 first.append(away[:, 0])
         median = [float(self.torch.cat(one).median()) for one in (off, first)]
-        shares = [float(self.torch.cat(one).float().mean()) for one in (right, hindered, free)]
-        return Assessed(shares[0], *median, *shares[1:])
+        told = [self.torch.cat(one).float() for one in (hindered, free)]
+        shares = [float(one.mean()) if len(one) else None for one in told]
+        return Assessed(float(self.torch.cat(right).float().mean()), *median, *shares)
 
     def _optimiser(self) -> Any:
         train = self.recipe.train

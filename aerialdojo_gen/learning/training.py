@@ -282,7 +282,7 @@ class _Training:
                 if k is None
                 else (
                     f" (kept back: {k.accuracy:.1%}; goal off by {k.goal_off_at_start_m:.1f} m at the start, "
-                    f"{k.goal_off_m:.1f} m in all; {k.blocked_told:.0%} of blocked actions told)"
+                    f"{k.goal_off_m:.1f} m in all{_told(k)})"
                 )
             )
             self._reporter.line(
@@ -342,6 +342,13 @@ def _rows(file: Path) -> Iterator[dict[str, Any]]:
             yield loads_json(line)
         except Malformed:
             return
+
+
+def _told(kept: Any) -> str:
+    """What is known of blocked and free actions, in words; `Assessed` to a clause."""
+    shares = [(kept.blocked_told, "blocked"), (kept.free_told, "free")]
+    known = [f"{share:.1%} of {what}" for share, what in shares if share is not None]
+    return f"; {' and '.join(known)} actions told" if known else ""
 
 
 def _board(folder: Path) -> Any:
