@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from aerialdojo_gen.agents.goal import N_ACTIONS
 from aerialdojo_gen.common import rng
 from aerialdojo_gen.learning.loader import torch_package
 from aerialdojo_gen.learning.network import Network, Thought
@@ -22,6 +21,8 @@ from aerialdojo_gen.pipeline.executors.local import own_cores
 
 # Batches of like lengths are put together from so many: padding costs time.
 _CHUNK = 24
+# Weight of the warning's mean loss: what is in the way is soon seen, and places are to be learned by the same pictures.
+_WARNING = 4.0
 # Pictures are kept on the accelerator where they take at most this share of what is free there.
 _RESIDENT = 0.7
 
@@ -118,9 +119,9 @@ def epoch_batches(
 
 
 def touched(logits: Any, blocked: Any) -> Any:
-    """Return the loss of chances that actions are blocked: logits (m, 16) and bool (m, 16) to (); of all actions."""
+    """Return the loss of chances that actions are blocked: logits (m, 16) and bool (m, 16) to ()."""
     functional = torch_package().nn.functional
-    return N_ACTIONS * functional.binary_cross_entropy_with_logits(logits.float(), blocked.float())
+    return _WARNING * functional.binary_cross_entropy_with_logits(logits.float(), blocked.float())
 
 
 class Learner:
