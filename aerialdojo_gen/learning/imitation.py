@@ -21,7 +21,7 @@ from aerialdojo_gen.pipeline.executors.local import own_cores
 
 # Batches of like lengths are put together from so many: padding costs time.
 _CHUNK = 24
-# Weight of the warning's mean loss: what is in the way is soon seen, and places are to be learned by the same pictures.
+# Weight of the mean loss of the warning: what is in the way is soon seen, and places are learned by the same pictures.
 _WARNING = 4.0
 # Pictures are kept on the accelerator where they take at most this share of what is free there.
 _RESIDENT = 0.7
