@@ -148,7 +148,6 @@ def _fly(
         thought, memory[going] = network(
             torch.from_numpy(frames) if part.sensors.views else None,
             goal[going],
-            torch.tensor([[f.rows[-1][1]] for f in last]),
             torch.from_numpy(np.stack([f.odometry[-1] for f in last])[:, None]),
             torch.ones((len(going), 1), dtype=torch.bool),
             memory[going],

@@ -21,7 +21,7 @@ from aerialdojo_gen.pipeline.executors.local import own_cores
 
 # Batches of like lengths are put together from so many: padding costs time.
 _CHUNK = 24
-# Weight of the mean loss of the warning: what is in the way is soon seen, and places are learned by the same pictures.
+# Weight of the warning's mean loss: what is in the way is soon seen, and the same pictures are to tell places.
 _WARNING = 4.0
 # Pictures are kept on the accelerator where they take at most this share of what is free there.
 _RESIDENT = 0.7
@@ -290,9 +290,7 @@ class Learner:
     def _forward(self, batch: dict[str, Any]) -> Thought:
         with self.torch.autocast(self.device, self.torch.bfloat16, enabled=self.device != "cpu"):
             goal = self.network.understand(batch["tokens"], batch["images"], batch["told_by_image"])
-            thought, _ = self.network(
-                batch.get("pictures"), goal, batch["previous"], batch["odometry"], batch["mask"]
-            )
+            thought, _ = self.network(batch.get("pictures"), goal, batch["odometry"], batch["mask"])
         return thought
 
     def _looked_about(self, draw: np.random.Generator) -> Any:

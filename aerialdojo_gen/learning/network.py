@@ -19,8 +19,6 @@ from aerialdojo_gen.store.schemas import STOP
 _WAVES_M = (4.0, 12.0, 36.0, 108.0)
 _FAR_M = 30.0
 _BEARING = 3 * (2 * len(_WAVES_M) + 1) + 3 + 8
-# The action before, none among them, becomes so many numbers.
-_ACTION_FEATURES = 32
 _PATCH_PX = 4
 _DROPOUT = 0.1
 # Where a policy stops, metres: within the 3 m of success by what it may be mistaken.
@@ -108,8 +106,9 @@ class Network(nn.Module):  # type: ignore[misc]  # torch is looked at by no type
     """Actions from pictures, goal and own motion.
 
     What it remembers is its map: where pictures of earlier steps put the body. A memory of its own, a GRU beside the
-    map, went on turning once it had begun to turn, for that is what references do (the copycat problem of imitation
-    learning: Wen et al. 2020).
+    map or no more than the action before, went on turning once it had begun to turn, for that is what references do
+    (the copycat problem of imitation learning: Wen et al. 2020). The planner needs none: its route from a pose depends
+    on nothing before.
 
     Parameters
     ----------
@@ -135,11 +134,10 @@ class Network(nn.Module):  # type: ignore[misc]  # torch is looked at by no type
         self.phrase = nn.Conv1d(shape.word_features, shape.features, 3, padding=1)
         # Whether the goal is a picture stands beside what it shows.
         self.goal = nn.Sequential(nn.Linear(2 * shape.features + 1, shape.features), nn.ReLU(inplace=True))
-        self.action = nn.Embedding(N_ACTIONS + 1, _ACTION_FEATURES)
         # Who sees nothing guesses by what is said alone.
         pictured = max(shape.views, 1) * shape.features
         self.whereabouts = Whereabouts(pictured, shape.features, shape.hidden, shape.scenes)
-        known = pictured + shape.features + _BEARING + _ACTION_FEATURES
+        known = pictured + shape.features + _BEARING
         self.choice = nn.Sequential(
             nn.Linear(known, shape.hidden), nn.ReLU(inplace=True), nn.Dropout(_DROPOUT),
             nn.Linear(shape.hidden, shape.hidden), nn.ReLU(inplace=True), nn.Linear(shape.hidden, N_ACTIONS),
@@ -177,9 +175,7 @@ class Network(nn.Module):  # type: ignore[misc]  # torch is looked at by no type
         shown = self.look(images) * told_by_image[:, None]
         return self.goal(torch.cat([said, shown, told_by_image[:, None].float()], dim=1))
 
-    def forward(
-        self, pictures: Any, goal: Any, previous: Any, odometry: Any, mask: Any, memory: Any = None
-    ) -> tuple[Thought, Any]:
+    def forward(self, pictures: Any, goal: Any, odometry: Any, mask: Any, memory: Any = None) -> tuple[Thought, Any]:
         """Choose actions for steps of episodes.
 
         Parameters
@@ -188,8 +184,6 @@ class Network(nn.Module):  # type: ignore[misc]  # torch is looked at by no type
             Of the steps that the mask has, row after row.
         goal : (n, features)
             Of the episodes.
-        previous : (n, T) int64
-            The action before each.
         odometry : (n, T, 4) float32
             x ahead, y left, z up in metres and yaw in radians, in the frame of the start.
         mask : (n, T) bool
@@ -211,7 +205,7 @@ class Network(nn.Module):  # type: ignore[misc]  # torch is looked at by no type
             rows = mask.flatten().nonzero()[:, 0]
             seen = flat.index_copy(0, rows, looked).reshape(n, steps, -1)
         guess, memory = self.whereabouts(seen, goal, odometry, memory)
-        parts = [seen, goal[:, None].expand(n, steps, -1), bearing(guess), self.action(previous)]
+        parts = [seen, goal[:, None].expand(n, steps, -1), bearing(guess)]
         logits = self.choice(torch.cat([part.to(goal.dtype) for part in parts], dim=2))
         return Thought(logits, self.blocked(seen), guess), memory
 

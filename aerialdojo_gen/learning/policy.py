@@ -105,7 +105,6 @@ class Policy(AgentBase):
             thought, self._memory = self.network(
                 pictures,
                 self._goal,
-                torch.tensor([[self._previous]], device=device),
                 torch.from_numpy(self._reckoning.odometry[None, None]).to(device),
                 torch.ones((1, 1), dtype=torch.bool, device=device),
                 self._memory,

@@ -151,7 +151,6 @@ def episode():
     draw = torch.Generator().manual_seed(5)
     given = {
         "pictures": torch.randint(0, 256, (2 * T, 1, 32, 32, 4), dtype=torch.uint8, generator=draw),
-        "previous": torch.randint(0, 17, (2, T), generator=draw),
         "odometry": torch.randn(2, T, 4, generator=draw),
         "mask": torch.ones((2, T), dtype=torch.bool),
     }
@@ -167,21 +166,11 @@ def test_flown_step_by_step_it_chooses_as_it_learned(episode):
         all_at_once, end = network(given["pictures"], goal, *[given[n] for n in list(given)[1:]])
         memory, pictures = None, given["pictures"].reshape(2, T, 1, 32, 32, 4)
         for k in range(T):
-            at = [given[name][:, k : k + 1] for name in ("previous", "odometry", "mask")]
+            at = [given[name][:, k : k + 1] for name in ("odometry", "mask")]
             thought, memory = network(pictures[:, k], goal, *at, memory)
             assert torch.allclose(thought.logits[:, 0], all_at_once.logits[:, k], atol=1e-5)
             assert torch.allclose(thought.guess.offset[:, 0], all_at_once.guess.offset[:, k], atol=1e-4)
     assert torch.allclose(memory, end, atol=1e-5)
-
-
-def test_the_goals_place_is_not_read_off_the_actions_before(episode):
-    """The action before tells a choice, never the guess that it stands on."""
-    network, goal, given = episode
-    other = given | {"previous": (given["previous"] + 5) % 17}
-    with torch.no_grad():
-        one, two = (network(g["pictures"], goal, *[g[n] for n in list(g)[1:]])[0] for g in (given, other))
-    assert all(torch.equal(a, b) for a, b in zip(one.guess, two.guess, strict=True))
-    assert not torch.allclose(one.logits, two.logits)
 
 
 def test_choices_teach_the_guess_nothing(episode):
