@@ -107,8 +107,8 @@ class Network(nn.Module):  # type: ignore[misc]  # torch is looked at by no type
 
     What it remembers is its map: where pictures of earlier steps put the body. A memory of its own, a GRU beside the
     map or no more than the action before, went on turning once it had begun to turn, for that is what references do
-    (the copycat problem of imitation learning: Wen et al. 2020). The planner needs none: its route from a pose depends
-    on nothing before.
+    (the copycat problem of imitation learning: Wen et al. 2020). The planner needs none: its route from a pose
+    depends on nothing before.
 
     Parameters
     ----------
