@@ -16,8 +16,8 @@ from aerialdojo_gen.config.agreement import SUCCESS_RADIUS_M
 from aerialdojo_gen.config.sections import Embodiment, PlanConfig
 from aerialdojo_gen.learning import checkpoints
 from aerialdojo_gen.learning.blocked import blocked
-from aerialdojo_gen.learning.collect import Flying, Part, goal_poses, goals_of, offsets, pictures
 from aerialdojo_gen.learning.loader import torch_package
+from aerialdojo_gen.learning.parts import Flying, Part, goal_poses, goals_of, offsets, pictures
 from aerialdojo_gen.learning.policy import network_of
 from aerialdojo_gen.learning.seen import Reckoning
 from aerialdojo_gen.learning.steps import Steps

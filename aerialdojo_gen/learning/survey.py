@@ -9,8 +9,8 @@ from aerialdojo_gen.benchmark.motion import FlightSpace, flight_space
 from aerialdojo_gen.benchmark.tasks import Selection, mesh_of
 from aerialdojo_gen.common import rng
 from aerialdojo_gen.config.sections import Embodiment
-from aerialdojo_gen.learning.collect import Part, Survey, hindered, pictures
 from aerialdojo_gen.learning.index import read_index
+from aerialdojo_gen.learning.parts import Part, Survey, hindered, pictures
 from aerialdojo_gen.learning.steps import Steps
 
 # Farthest that a look is from where a reference leads, metres.

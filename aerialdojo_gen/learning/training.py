@@ -21,9 +21,10 @@ from aerialdojo_gen.common.bounded import loads_json, read_json
 from aerialdojo_gen.common.names import unknown
 from aerialdojo_gen.errors import Malformed, UsageError
 from aerialdojo_gen.learning import checkpoints
-from aerialdojo_gen.learning.collect import Flying, Part, collect, parts_of, survey_parts
+from aerialdojo_gen.learning.collect import collect, parts_of, survey_parts
 from aerialdojo_gen.learning.index import Index, read_index
 from aerialdojo_gen.learning.loader import torch_package
+from aerialdojo_gen.learning.parts import Flying, Part
 from aerialdojo_gen.learning.recipe import Recipe
 from aerialdojo_gen.learning.seen import actions_fingerprint
 from aerialdojo_gen.learning.steps import Pool, Steps

@@ -41,6 +41,7 @@ PLUMBING: dict[str, tuple[str, ...]] = {
     "aerialdojo_gen.config.pipeline": (),
     "aerialdojo_gen.config.sections": (),
     "aerialdojo_gen.errors": (),
+    "aerialdojo_gen.learning": (),
     "aerialdojo_gen.pipeline": (),
     "aerialdojo_gen.pipeline.chain": (),
     "aerialdojo_gen.pipeline.code_digest": (),

@@ -21,13 +21,15 @@ from aerialdojo_gen.benchmark.motion import FlightSpace, flight_space
 from aerialdojo_gen.benchmark.runner import Evaluation, evaluate
 from aerialdojo_gen.benchmark.tasks import Selection, mesh_of
 from aerialdojo_gen.errors import ConfigError, StoreError, UsageError
-from aerialdojo_gen.learning.collect import collect, parts_of, pictures, survey_parts
+from aerialdojo_gen.learning.collect import collect, parts_of, survey_parts
 from aerialdojo_gen.learning.index import read_index
+from aerialdojo_gen.learning.parts import pictures
 from aerialdojo_gen.learning.recipe import Recipe, load_recipe
 from aerialdojo_gen.learning.steps import read_steps
 from aerialdojo_gen.learning.teacher import NO_LABEL, Teacher
 from aerialdojo_gen.learning.trajectories import drawn_evenly
 from aerialdojo_gen.learning.words import Vocabulary
+from aerialdojo_gen.pipeline.code_digest import code_of
 from aerialdojo_gen.pipeline.executors import make_executor
 from aerialdojo_gen.pipeline.progress import Reporter
 from aerialdojo_gen.planning.difficulty import agent_actions
@@ -185,6 +187,15 @@ def test_other_pictures_of_the_goals_are_drawn_from_anew(smoke, tmp_path):
     pq.write_table(table.set_column(at, table.schema.field(at), pa.array(shown, table.schema.field(at).type)), part)
     after = names()
     assert {scene for scene in before if before[scene] != after[scene]} == {index.scenes[0]}
+
+
+def test_references_and_looks_are_not_drawn_again_where_only_the_network_is_another():
+    for name in ("parts", "survey"):
+        counted = set(code_of(f"aerialdojo_gen.learning.{name}").parts)
+        assert f"aerialdojo_gen.learning.{name}" in counted
+        learned = {"network", "policy", "flights", "imitation", "training"}
+        assert not {f"aerialdojo_gen.learning.{module}" for module in learned} & counted
+    assert "aerialdojo_gen.learning.network" in code_of("aerialdojo_gen.learning.flights").parts
 
 
 def test_looks_about_are_taken_near_where_references_lead_and_turned_at_random(smoke, tmp_path):

@@ -1,0 +1,205 @@
+"""A part of what is learned from: trajectories of one scene, or looks about in it, and how they are drawn."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aerialdojo_gen.agents.goal import Sensors
+from aerialdojo_gen.benchmark.eyes import drawing
+from aerialdojo_gen.benchmark.motion import flight_space
+from aerialdojo_gen.benchmark.tasks import Selection, mesh_of, reference_image
+from aerialdojo_gen.config.sections import Embodiment
+from aerialdojo_gen.learning.blocked import blocked
+from aerialdojo_gen.learning.index import Index, read_index
+from aerialdojo_gen.learning.labels import Labels
+from aerialdojo_gen.learning.pictures import within
+from aerialdojo_gen.learning.seen import goal_picture, packed
+from aerialdojo_gen.learning.steps import Steps
+from aerialdojo_gen.learning.words import Vocabulary, goal_text
+from aerialdojo_gen.rendering.bodies import draw_bodies
+from aerialdojo_gen.scenes.context import SEVERAL, open_scene
+from aerialdojo_gen.store import shards as store
+from aerialdojo_gen.store.root import DataRoot
+
+
+@dataclass(frozen=True)
+class Flying:
+    """A round of DAgger.
+
+    Attributes
+    ----------
+    weights : Path
+        Of the policy that flies.
+    sha256 : str
+        Of that file.
+    seed, round : int
+        Of the draws.
+    teacher_share : float
+        Steps at which the teacher's action is flown.
+    """
+
+    weights: Path
+    sha256: str
+    seed: int
+    round: int
+    teacher_share: float
+
+
+@dataclass(frozen=True)
+class Survey:
+    """Looks about in a scene.
+
+    Attributes
+    ----------
+    looks : int
+        How many.
+    seed, number : int
+        Of the draws; of this part among those of its scene.
+    target_split : str or None
+        Side of the split by objects whose references are followed.
+    """
+
+    looks: int
+    seed: int
+    number: int
+    target_split: str | None
+
+
+@dataclass(frozen=True)
+class Part:
+    """Trajectories of one scene.
+
+    Attributes
+    ----------
+    data : DataRoot
+    splits, settings : tuple of str
+        Where they are found.
+    scene : str
+    nav_ids : tuple of str
+    sensors : Sensors
+    size_px : int
+        Edge of the goals' pictures.
+    words : tuple of str
+    length : int
+        Of the vocabulary.
+    renderer : str
+    folder : Path
+        Where to; named by what is in it.
+    flying : Flying, optional
+        None for the references.
+    survey : Survey, optional
+        Looks about instead of trajectories.
+    """
+
+    data: DataRoot
+    splits: tuple[str, ...]
+    settings: tuple[str, ...]
+    scene: str
+    nav_ids: tuple[str, ...]
+    sensors: Sensors
+    size_px: int
+    words: tuple[str, ...]
+    length: int
+    renderer: str
+    folder: Path
+    flying: Flying | None = None
+    survey: Survey | None = None
+
+    @property
+    def label(self) -> str:
+        """In words."""
+        what = "looks" if self.survey is not None else "references" if self.flying is None else "flights"
+        return f"{what} of {self.scene}"
+
+    def __len__(self) -> int:
+        """Return the number of trajectories, or of looks."""
+        return len(self.nav_ids) if self.survey is None else self.survey.looks
+
+    def index(self) -> Index:
+        """Read the trajectories."""
+        found = read_index(self.data, Selection(self.splits, self.settings, (), (self.scene,)))
+        wanted = set(self.nav_ids)
+        return found.take(np.array([k for k, nav_id in enumerate(found.nav_id) if nav_id in wanted], np.int64))
+
+
+def references(part: Part) -> Steps:
+    """Fly the references, and look at every step."""
+    index = part.index()
+    labels = Labels(part.data, index, ())
+    poses = np.concatenate([index.poses_of(k) for k in range(len(index))])
+    told = [
+        labels.of(np.array([k]), np.arange(n)[None], np.ones((1, n), np.bool_)) for k, n in enumerate(index.steps)
+    ]
+    joined = {name: np.concatenate([one[name][0] for one in told]) for name in told[0]}
+    goals = np.repeat(index.goal, index.steps, axis=0)
+    return Steps(
+        frames=pictures(part, poses), first=index.first, label=joined["action"], previous=joined["previous_action"],
+        odometry=joined["odometry"],
+        offset=offsets(poses, goals), pose=poses.astype(np.float32), blocked=hindered(part, poses),
+        **goals_of(part, index),
+    )  # fmt: skip
+
+
+def pictures(part: Part, poses: NDArray[np.float64]) -> NDArray[np.uint8]:
+    """Draw what is seen at poses: (n, views, H, W, 4) uint8."""
+    s = part.sensors
+    out = np.empty((len(poses), len(s.views), part.size_px, part.size_px, 4), np.uint8)
+    if s.blind:
+        return out
+    context = open_scene(*mesh_of(part.data, part.scene), SEVERAL)
+    renderer = drawing(context.scene, part.renderer)
+    # In pieces: floats take as much again.
+    for k in range(0, len(poses), 512):
+        rgb, depth_m = draw_bodies(renderer, s.camera, poses[k : k + 512], s.views)
+        out[k : k + 512] = packed(rgb, within(depth_m, s), s)
+    return out
+
+
+def hindered(part: Part, poses: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Say which actions lead nowhere at poses (n, 4): (n, 16) bool."""
+    collides, refused, _ = blocked(flight_space(*mesh_of(part.data, part.scene), Embodiment().radius_m), poses)
+    return collides | refused
+
+
+def offsets(poses: NDArray[np.float64], goals: NDArray[np.float64]) -> NDArray[np.float32]:
+    """Where goals (n, 3) are, seen from bodies (n, 4): ahead, left, up, metres."""
+    away = goals - poses[:, :3]
+    c, s = np.cos(poses[:, 3]), np.sin(poses[:, 3])
+    found = np.column_stack([away[:, 0] * c + away[:, 1] * s, away[:, 1] * c - away[:, 0] * s, away[:, 2]])
+    return found.astype(np.float32)
+
+
+def goals_of(part: Part, index: Index) -> dict[str, Any]:
+    """Read what each trajectory's goal is told by: fields of `Steps`."""
+    vocabulary = Vocabulary(part.words, part.length)
+    names = [index.told[name] for name in ("target_name", "landmark", "direction", "description")]
+    tokens = [
+        [vocabulary.encode(goal_text(str(n), str(m), str(d), text)) for text in (None, said)]
+        for n, m, d, said in zip(*names, strict=True)
+    ]
+    ids = index.told["reference_image_id"]
+    known = sorted({one for one in ids if one is not None})
+    place = {one: k for k, one in enumerate(known)}
+    shown = [goal_picture(reference_image(part.data, part.scene, one), part.size_px) for one in known]
+    return {
+        "tokens": np.array(tokens, np.int64).reshape(len(index), 2, part.length),
+        "image": np.array([-1 if one is None else place[one] for one in ids], np.int64),
+        "semantic": np.array([said is not None for said in names[3]], np.bool_),
+        "images": np.array(shown, np.uint8).reshape(-1, part.size_px, part.size_px, 4),
+        "nav_id": np.array(index.nav_id, np.str_),
+        "scene": np.full(len(index), part.scene),
+    }
+
+
+def goal_poses(part: Part, index: Index) -> NDArray[np.float64]:
+    """Read goals with the yaw that the references end with: (n, 4) float64, the planner's."""
+    yaw: dict[str, float] = {}
+    for side in ("train", "test"):
+        rows = store.read_stored(part.data, f"routes/{side}", part.scene, ("nav_id", "goal_yaw_rad"))
+        yaw |= dict(zip(rows["nav_id"].to_pylist(), rows["goal_yaw_rad"].to_pylist(), strict=True))
+    return np.column_stack([index.goal, [yaw[nav_id] for nav_id in index.nav_id]])
