@@ -123,7 +123,7 @@ def test_plumbing_is_what_it_is_said_to_be():
         for name in ("", ".benchmark", ".common", ".common.advice", ".common.disk", ".common.explain",
                      ".common.names", ".common.secrets",
                      ".common.terms", ".common.text_table", ".common.trouble", ".common.version", ".config",
-                     ".config.agreement", ".config.pipeline", ".config.sections", ".errors", ".pipeline",
+                     ".config.agreement", ".config.pipeline", ".config.sections", ".errors", ".learning", ".pipeline",
                      ".pipeline.chain", ".pipeline.code_digest", ".pipeline.code_facts", ".pipeline.executors",
                      ".pipeline.executors.base", ".pipeline.executors.carried", ".pipeline.executors.link",
                      ".pipeline.executors.local", ".pipeline.executors.ray", ".pipeline.executors.ray_worker",
