@@ -152,8 +152,8 @@ def _fly(
             torch.ones((len(going), 1), dtype=torch.bool),
             memory[going],
         )
-        turned = torch.tensor([[f.reckoning.turned] for f in last])
-        chosen = thought.actions(turned)[:, 0].tolist()
+        back = torch.from_numpy(np.stack([f.reckoning.back for f in last])[:, None])
+        chosen = thought.actions(back)[:, 0].tolist()
         left = []
         for i, k in enumerate(going):
             action = labels[i] if draws[k].random() < teacher_share else chosen[i]

@@ -25,6 +25,7 @@ _DROPOUT = 0.1
 ARRIVED_M = 2.0
 # Chances of actions are multiplied by this power of the chance that they are free.
 CAUTION = 3.0
+_NEVER = 1e6
 
 
 @dataclass(frozen=True)
@@ -76,18 +77,19 @@ class Thought(NamedTuple):
     blocked: Any
     guess: Guess
 
-    def actions(self, turned: Any) -> Any:
+    def actions(self, back: Any) -> Any:
         """Choose the likeliest action that leads somewhere; Stop where the goal is thought to be within 2 m.
 
         An action's chance counts with that of its being free: one collision ends an episode, and who imitates is
         never told so. A reference stops at one of many steps, and where a body has strayed the planner hardly ever
-        says so: by the actions' chances alone a policy learns to fly on for ever; and to turn for ever, for turns
-        follow turns.
+        says so: by the actions' chances alone a policy learns to fly on for ever. And who is torn between two turns
+        makes them in turn for ever: where the likeliest action leads back, the likeliest translation that does not is
+        taken.
 
         Parameters
         ----------
-        turned : (n, T) bool
-            Who has turned in place by half a circle, and is to go somewhere: `Reckoning.turned`.
+        back : (n, T, 16) bool
+            Which actions lead back: `aerialdojo_gen.learning.seen.Reckoning.back`.
 
         Returns
         -------
@@ -96,10 +98,13 @@ class Thought(NamedTuple):
         free = functional.logsigmoid(-self.blocked.float())
         moving = self.logits.float() + CAUTION * free
         moving[..., STOP] = -torch.inf
+        likeliest = moving.argmax(dim=-1, keepdim=True)
         turns = torch.from_numpy(TURNS[:N_ACTIONS] != 0).to(moving.device)
-        moving = moving.masked_fill(turned[..., None] & turns, -torch.inf)
+        # Where all of them lead back, any but Stop.
+        onward = (moving - _NEVER * (turns | back)).argmax(dim=-1)
+        chosen = torch.where(back.gather(-1, likeliest)[..., 0], onward, likeliest[..., 0])
         near = torch.linalg.vector_norm(self.guess.offset, dim=-1) * UNIT_M <= ARRIVED_M
-        return moving.argmax(dim=-1).masked_fill(near, STOP)
+        return chosen.masked_fill(near, STOP)
 
 
 class Network(nn.Module):  # type: ignore[misc]  # torch is looked at by no type checker here

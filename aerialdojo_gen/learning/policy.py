@@ -109,8 +109,8 @@ class Policy(AgentBase):
                 torch.ones((1, 1), dtype=torch.bool, device=device),
                 self._memory,
             )
-        turned = torch.tensor([[self._reckoning.turned]], device=device)
-        self._previous = int(thought.actions(turned)[0, 0])
+        back = torch.from_numpy(self._reckoning.back[None, None]).to(device)
+        self._previous = int(thought.actions(back)[0, 0])
         return self._previous
 
 

@@ -11,7 +11,10 @@ from numpy.typing import NDArray
 
 from aerialdojo_gen.agents.goal import N_ACTIONS, Sensors
 from aerialdojo_gen.geometry.motion import DISPLACEMENTS, N_HEADINGS, TURN_RAD, TURNS
-from aerialdojo_gen.store.schemas import ACTION_NAMES
+from aerialdojo_gen.store.schemas import ACTION_NAMES, STOP
+
+# Places within so much are one, metres.
+_SAME_M = 0.25
 
 
 def packed(rgb: NDArray[np.uint8], depth_m: NDArray[np.float32], sensors: Sensors) -> NDArray[np.uint8]:
@@ -50,25 +53,42 @@ class Reckoning:
         self._place = np.zeros(3)
         self._headings = 0
         self._turns = 0
+        self._been = {_pose(self._place, 0)}
 
     def add(self, action: int) -> None:
         """Add an action that was carried out."""
+        self._place, self._headings = self._after(action)
+        self._turns = self._turns + 1 if TURNS[action] else 0
+        self._been.add(_pose(self._place, self._headings))
+
+    @property
+    def back(self) -> NDArray[np.bool_]:
+        """Actions that no route has here: to a pose where the body has been, and turns beyond half a circle in place.
+
+        (16,) bool; Stop is none of them.
+        """
+        turned = self._turns >= N_HEADINGS // 2
+        found = [(turned and bool(TURNS[a])) or _pose(*self._after(a)) in self._been for a in range(N_ACTIONS)]
+        found[STOP] = False
+        return np.array(found)
+
+    def _after(self, action: int) -> tuple[NDArray[np.float64], int]:
         angle = self._headings * TURN_RAD
         c, s = np.cos(angle), np.sin(angle)
         ahead, left, up = DISPLACEMENTS[action]
-        self._place += (c * ahead - s * left, s * ahead + c * left, up)
-        self._headings += int(TURNS[action])
-        self._turns = self._turns + 1 if TURNS[action] else 0
-
-    @property
-    def turned(self) -> bool:
-        """Whether the body has made turns of half a circle in a row, in place: no reference makes more."""
-        return self._turns >= N_HEADINGS // 2
+        place = self._place + np.array([c * ahead - s * left, s * ahead + c * left, up])
+        return place, self._headings + int(TURNS[action])
 
     @property
     def odometry(self) -> NDArray[np.float32]:
         """X ahead, y left, z up in metres and yaw in radians: (4,) float32."""
         return np.array([*self._place, self._headings * TURN_RAD], np.float32)
+
+
+def _pose(place: NDArray[np.float64], headings: int) -> tuple[int, int, int, int]:
+    """Tell poses apart: actions lead to others by half a metre or more, sums of them differ by rounding."""
+    x, y, z = np.rint(place / _SAME_M).astype(int).tolist()
+    return x, y, z, headings % N_HEADINGS
 
 
 def actions_fingerprint() -> str:

@@ -2,6 +2,8 @@
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from aerialdojo_gen.geometry.motion import replay
 from aerialdojo_gen.learning.seen import Reckoning
@@ -190,31 +192,69 @@ def test_it_stops_where_it_thinks_to_have_arrived_and_nowhere_else(episode):
     offset = torch.nn.functional.normalize(thought.guess.offset.detach(), dim=-1) * away_m[..., None] / UNIT_M
     clear = torch.full_like(logits, -50.0)
     actions = thought._replace(logits=logits, blocked=clear, guess=thought.guess._replace(offset=offset)).actions(
-        torch.zeros(2, T, dtype=torch.bool)
+        torch.zeros(2, T, 16, dtype=torch.bool)
     )
     assert torch.equal(actions == 0, away_m < 2.0), "though Stop is the likeliest of the actions everywhere"
     assert torch.equal(actions[away_m > 2.0], logits[..., 1:].argmax(dim=-1)[away_m > 2.0] + 1)
 
 
-def test_who_has_turned_by_half_a_circle_in_place_goes_somewhere(episode):
+def test_who_would_come_back_goes_on(episode):
+    """The likeliest translation in the place of a turn that leads back; what does not lead back is left."""
     network, goal, given = episode
     thought, _ = network(given["pictures"], goal, *[given[n] for n in list(given)[1:]])
     logits = thought.logits.detach().clone()
     logits[..., 14:] = 50.0
-    far = thought.guess._replace(offset=torch.ones(2, T, 3))
-    turned = torch.arange(T).expand(2, T) % 2 == 0
-    clear = torch.full_like(logits, -50.0)
-    actions = thought._replace(logits=logits, blocked=clear, guess=far).actions(turned)
-    assert torch.equal(actions >= 14, ~turned)
-    assert torch.equal(actions[turned], logits[turned][:, 1:14].argmax(dim=-1) + 1)
+    logits[..., 14] = 51.0
+    clear, far = torch.full_like(logits, -50.0), thought.guess._replace(offset=torch.ones(2, T, 3))
+    back = torch.zeros(2, T, 16, dtype=torch.bool)
+    back[:, ::2, 14], back[:, ::2, 3] = True, True
+    actions = thought._replace(logits=logits, blocked=clear, guess=far).actions(back)
+    assert (actions[:, 1::2] == 14).all()
+    logits[..., 3] = -50.0
+    assert torch.equal(actions[:, ::2], logits[:, ::2, 1:14].argmax(dim=-1) + 1)
+    everywhere = torch.ones_like(back)
+    assert (thought._replace(logits=logits, blocked=clear, guess=far).actions(everywhere) != 0).all()
+
+
+def test_what_leads_back_is_told_by_own_motion_alone():
     reckoning = Reckoning()
-    for _ in range(11):
-        reckoning.add(14)
-        assert not reckoning.turned
+    assert not reckoning.back.any()
     reckoning.add(14)
-    assert reckoning.turned, "24 headings are a circle"
+    assert reckoning.back.nonzero()[0].tolist() == [15], "the turn undone"
+    for _ in range(10):
+        reckoning.add(14)
+        assert not reckoning.back[14]
+    reckoning.add(14)
+    assert reckoning.back.nonzero()[0].tolist() == [14, 15], "half a circle, of 24 headings"
     reckoning.add(10)
-    assert not reckoning.turned
+    assert reckoning.back.nonzero()[0].tolist() == [12], "down again"
+    # Once about a square, each corner turned in the other direction: the last side leads to where it began.
+    square = Reckoning()
+    for _ in range(4):
+        assert not square.back[2]
+        square.add(2)
+        for _ in range(6):
+            square.add(15)
+    assert square.back.nonzero()[0].tolist() == [2, 14]
+
+
+@given(st.lists(st.integers(1, 15), max_size=40), st.integers(1, 15))
+def test_only_what_leads_back_is_said_to(actions, last):
+    """By poses that are replayed: the same place and heading as before, or turns beyond half a circle."""
+    reckoning = Reckoning()
+    for action in actions:
+        reckoning.add(action)
+    poses = replay(np.zeros(4), [*actions, last])
+    there, been = poses[-1], poses[:-1]
+    turned = np.abs(np.angle(np.exp(1j * (been[:, 3] - there[3])))) < 1e-6
+    near = np.linalg.norm(been[:, :3] - there[:3], axis=1)
+    # Rounded to a grid, so that places half a step apart are one or two.
+    same, apart = bool((turned & (near < 1e-6)).any()), not (turned & (near < 0.5)).any()
+    in_a_row = next((k for k, a in enumerate(reversed(actions)) if a < 14), len(actions))
+    if last >= 14 and in_a_row >= 12:
+        assert reckoning.back[last]
+    elif same or apart:
+        assert reckoning.back[last] == same
 
 
 def test_of_likely_actions_it_takes_one_that_is_free(episode):
@@ -225,7 +265,9 @@ def test_of_likely_actions_it_takes_one_that_is_free(episode):
     # The likeliest is surely blocked, the next one perhaps: 1 in 100, then 9 in 10.
     blocked[..., 3], blocked[:, 0, 2], blocked[:, 1:, 2] = 20.0, -4.6, 2.2
     far = thought.guess._replace(offset=torch.ones(2, T, 3))
-    actions = thought._replace(logits=logits, blocked=blocked, guess=far).actions(torch.zeros(2, T, dtype=torch.bool))
+    actions = thought._replace(logits=logits, blocked=blocked, guess=far).actions(
+        torch.zeros(2, T, 16, dtype=torch.bool)
+    )
     assert (actions[:, 0] == 2).all()
     assert (actions[:, 1:] == 1).all()
 
