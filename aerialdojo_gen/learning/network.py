@@ -135,7 +135,12 @@ class Network(nn.Module):  # type: ignore[misc]  # torch is looked at by no type
         self.eye = nn.Sequential(
             *layers, nn.Flatten(), nn.Linear(before * edge * edge, shape.features), nn.LayerNorm(shape.features)
         ).to(memory_format=torch.channels_last)
-        self.words = nn.Embedding(shape.words, shape.word_features, padding_idx=0)
+        # By hand, as `nn.Embedding` does: where a tensor has no memory its `normal_` imports a compiler, for seconds.
+        table = torch.empty(shape.words, shape.word_features)
+        if not table.is_meta:
+            nn.init.normal_(table)
+            table[0] = 0.0
+        self.words = nn.Embedding.from_pretrained(table, freeze=False, padding_idx=0)
         self.phrase = nn.Conv1d(shape.word_features, shape.features, 3, padding=1)
         # Whether the goal is a picture stands beside what it shows.
         self.goal = nn.Sequential(nn.Linear(2 * shape.features + 1, shape.features), nn.ReLU(inplace=True))

@@ -340,6 +340,16 @@ def test_rounds_of_dagger_add_flights_whose_labels_are_the_teachers(smoke, cache
             assert (part.previous[steps][1:] != STOP).all()
 
 
+def test_weights_are_read_without_torchs_compiler(learned):
+    """Whose import takes some seconds, in every process that flies."""
+    said = (
+        "import sys; from aerialdojo_gen.learning.policy import Policy; "
+        f"Policy({str(learned.policy)!r}); print('torch._dynamo' in sys.modules)"
+    )
+    done = subprocess.run([sys.executable, "-c", said], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "False"
+
+
 def test_without_torch_there_is_one_line(smoke, tmp_path):
     """In a process that cannot import it."""
     (tmp_path / "torch.py").write_text("raise ImportError('no torch here')\n")
