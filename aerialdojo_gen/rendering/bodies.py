@@ -11,13 +11,13 @@ from collections import deque
 from collections.abc import Sequence
 from typing import Any
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from aerialdojo_gen.geometry.cameras import Camera, view_pose
 from aerialdojo_gen.rendering.backend import Renderer
 from aerialdojo_gen.rendering.gl_occlusion import BodyCulling
+from aerialdojo_gen.rendering.gl_target import read_pixels
 from aerialdojo_gen.rendering.picture import FAR_M, NEAR_M
 
 Floats = NDArray[np.float64]
@@ -86,7 +86,7 @@ class GlBodies:
         from aerialdojo_gen.rendering.gl import clip_from_world
 
         waiting: deque[tuple[Any, int, int]] = deque()
-        rgba = np.empty((camera.height, camera.width, 4), np.uint8)
+        pixels = np.empty((camera.height, camera.width, 2), np.float32)
         turn = 0
         for k, pose in enumerate(poses):
             world = [view_pose(pose[:3], float(pose[3]), view) for view in views]
@@ -101,14 +101,7 @@ class GlBodies:
                 turn += 1
                 waiting.append((target, k, v))
                 if len(waiting) > _AHEAD:
-                    _fetch(*waiting.popleft(), rgba, rgb, depth_m)
-        while waiting:
-            _fetch(*waiting.popleft(), rgba, rgb, depth_m)
-
-
-def _fetch(
-    target: Any, k: int, v: int, rgba: NDArray[np.uint8], rgb: NDArray[np.uint8], depth_m: NDArray[np.float32]
-) -> None:
-    target.read_into(rgba, components=4)
-    target.read_into(depth_m[k, v], components=1, attachment=1, dtype="f4")
-    cv2.cvtColor(rgba, cv2.COLOR_RGBA2RGB, dst=rgb[k, v])
+                    ready, i, j = waiting.popleft()
+                    read_pixels(ready, pixels, rgb[i, j], depth_m[i, j])
+        for ready, i, j in waiting:
+            read_pixels(ready, pixels, rgb[i, j], depth_m[i, j])

@@ -12,7 +12,6 @@ from functools import lru_cache
 from types import TracebackType
 from typing import Any
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -22,6 +21,7 @@ from aerialdojo_gen.rendering import gl_shaders as glsl
 from aerialdojo_gen.rendering.bodies import GlBodies
 from aerialdojo_gen.rendering.gl_foreign import backdrop_kinds, foreign_kinds
 from aerialdojo_gen.rendering.gl_geometry import VERTEX, Kind, chunks
+from aerialdojo_gen.rendering.gl_target import clear_depth, read_picture
 from aerialdojo_gen.rendering.gl_tiles import Tiles
 from aerialdojo_gen.rendering.lighting import light_of, sun_view
 from aerialdojo_gen.rendering.picture import FAR_M, NEAR_M, Picture
@@ -162,11 +162,12 @@ class GlRenderer:
         shadow.filter = (gl.NEAREST, gl.NEAREST)
         return shadow
 
-    def _begin(self, target: Any) -> None:
+    def _begin(self, target: Any, colours: int = 0) -> None:
+        """Start to draw into a target with some colours, which stay what they are: the sky covers them all."""
         gl = self._gl
-        target.use()
         gl.enable_only(gl.DEPTH_TEST | gl.CULL_FACE)
-        target.clear(depth=1.0)
+        clear_depth(target, colours)
+        target.use()
 
     def render(self, camera: Camera, world_from_camera: Floats, instances: bool = False) -> Picture:
         """Take a picture; see `aerialdojo_gen.rendering.backend.Renderer`."""
@@ -188,7 +189,7 @@ class GlRenderer:
                     seen[v].append(indices)
         # One target for all: what a view leaves in the processor's cache serves the next.
         return [
-            _read(self.draw_seen(camera, pose, clip, chosen, instances), camera, instances)
+            read_picture(self.draw_seen(camera, pose, clip, chosen, instances), camera, instances)
             for clip, pose, chosen in zip(clips, poses, seen, strict=True)
         ]
 
@@ -229,7 +230,7 @@ class GlRenderer:
         """
         target = self._target(camera.width, camera.height, instances, slot)
         eye = world_from_camera[:3, 3].astype(np.float32).tobytes()
-        self._begin(target)
+        self._begin(target, 1 + instances)
         self._shadow.use(1)
         tags = ("INSTANCES",) if instances else ()
 
@@ -277,7 +278,7 @@ class GlRenderer:
         key = (width, height, instances, slot)
         if key not in self._targets:
             gl, size = self._gl, (width, height)
-            colours = [gl.renderbuffer(size, 4), gl.renderbuffer(size, 1, dtype="f4")]
+            colours = [gl.renderbuffer(size, 2, dtype="u4")]
             if instances:
                 # As floats, exact to 16 million: not every driver clears an attachment of integers.
                 colours.append(gl.renderbuffer(size, 1, dtype="f4"))
@@ -371,17 +372,3 @@ def _content(program: Any, buffer: Any) -> tuple[Any, ...]:
     sizes = {name: VERTEX.fields[name][0].itemsize for name in _FORMATS} if VERTEX.fields else {}
     layout = " ".join(_FORMATS[name] if used else f"{sizes[name]}x" for name, used in fields)
     return (buffer, layout, *(name for name, used in fields if used))
-
-
-def _read(target: Any, camera: Camera, instances: bool) -> Picture:
-    shape = (camera.height, camera.width)
-    rgba = np.empty((*shape, 4), dtype=np.uint8)
-    depth = np.empty(shape, dtype=np.float32)
-    target.read_into(rgba, components=4)
-    target.read_into(depth, components=1, attachment=1, dtype="f4")
-    found = None
-    if instances:
-        numbers = np.empty(shape, dtype=np.float32)
-        target.read_into(numbers, components=1, attachment=2, dtype="f4")
-        found = numbers.astype(np.int32) - 1
-    return Picture(np.asarray(cv2.cvtColor(rgba, cv2.COLOR_RGBA2RGB), dtype=np.uint8), depth, found)

@@ -1,4 +1,8 @@
-"""The GLSL programs of the OpenGL renderer: the formulas of `aerialdojo_gen.rendering.shading`, a pixel at a time."""
+"""The GLSL programs of the OpenGL renderer: the formulas of `aerialdojo_gen.rendering.shading`, a pixel at a time.
+
+A pixel is two whole numbers: the four bytes of its colour, and the bits of its depth. llvmpipe writes one such target
+in less time than a target of colours and one of depths, and it is read back in one piece.
+"""
 
 from __future__ import annotations
 
@@ -103,11 +107,10 @@ flat in float v_lit;
 flat in vec3 v_colour;
 #endif
 flat in vec2 v_light;
-layout(location = 0) out vec4 out_colour;
-layout(location = 1) out float out_depth;
+layout(location = 0) out uvec2 out_pixel;
 #ifdef INSTANCES
 flat in float v_instance;
-layout(location = 2) out float out_instance;
+layout(location = 1) out float out_instance;
 #endif
 void main() {
     float range_m = length(v_ray);
@@ -127,8 +130,7 @@ void main() {
     if (texel.a < 0.5 - 0.2 * clamp(textureQueryLod(textures, v_uv).y / 4.0, 0.0, 1.0)) discard;
 #endif
 #ifdef BACKDROP
-    out_colour = vec4(base / 255.0, 1.0);
-    out_depth = uintBitsToFloat(0x7f800000u);
+    out_pixel = uvec2(packUnorm4x8(vec4(base / 255.0, 1.0)), ENDLESS);
 #ifdef INSTANCES
     out_instance = 0.0;
 #endif
@@ -147,8 +149,7 @@ void main() {
 #else
     vec3 value = mix(base * (v_light.x + lit), horizon, haze * haze);
 #endif
-    out_colour = vec4(value / 255.0, 1.0);
-    out_depth = 1.0 / gl_FragCoord.w;
+    out_pixel = uvec2(packUnorm4x8(vec4(value / 255.0, 1.0)), floatBitsToUint(1.0 / gl_FragCoord.w));
 #ifdef INSTANCES
     out_instance = v_instance;
 #endif
@@ -214,15 +215,13 @@ _SKY_FRAGMENT = (
 uniform vec3 horizon;
 uniform vec3 zenith;
 in vec3 v_ray;
-layout(location = 0) out vec4 out_colour;
-layout(location = 1) out float out_depth;
+layout(location = 0) out uvec2 out_pixel;
 #ifdef INSTANCES
-layout(location = 2) out float out_instance;
+layout(location = 1) out float out_instance;
 #endif
 void main() {
     float up = pow(max(v_ray.z, 0.0) / length(v_ray), 0.55);
-    out_colour = vec4(mix(horizon, zenith, up) / 255.0, 1.0);
-    out_depth = uintBitsToFloat(0x7f800000u);
+    out_pixel = uvec2(packUnorm4x8(vec4(mix(horizon, zenith, up) / 255.0, 1.0)), ENDLESS);
 #ifdef INSTANCES
     out_instance = 0.0;
 #endif
@@ -263,5 +262,7 @@ def specialise(source: str, *defined: str) -> str:
         "FADE": shading._FADE_TEXELS,
     }
     lines = [f"#define {name} {value:.6f}" for name, value in constants.items()]
+    # The bits of an endless depth.
+    lines.append("#define ENDLESS 0x7f800000u")
     lines += [f"#define {name}" for name in defined]
     return source.replace(_HEAD, _HEAD + "\n".join(lines) + "\n", 1)

@@ -8,7 +8,8 @@ from support.rendered import courtyard
 
 from aerialdojo_gen import GlRenderer
 from aerialdojo_gen.geometry.cameras import Camera, view_pose
-from aerialdojo_gen.rendering.gl import _read, clip_from_world
+from aerialdojo_gen.rendering.gl import clip_from_world
+from aerialdojo_gen.rendering.gl_target import read_picture
 from aerialdojo_gen.rendering.gl_tiles import Tiles
 from aerialdojo_gen.rendering.picture import FAR_M, NEAR_M
 from aerialdojo_gen.store.schemas import VIEWS
@@ -47,7 +48,7 @@ def test_pictures_are_those_of_all_triangles(make, width, height, fov):
             _, seen = chosen(renderer, camera, poses, Tiles.empty(4, width, height))
             less, more = less + count(seen), more + count(every)
             for v, picture in enumerate(renderer.render_views(camera, poses)):
-                full = _read(renderer.draw_seen(camera, poses[v], clips[v], every[v]), camera, False)
+                full = read_picture(renderer.draw_seen(camera, poses[v], clips[v], every[v]), camera, False)
                 assert np.array_equal(picture.depth_m, full.depth_m)
                 assert np.array_equal(picture.rgb, full.rgb)
     assert less <= more

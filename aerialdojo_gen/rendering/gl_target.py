@@ -1,0 +1,67 @@
+"""What OpenGL draws into, and how it is read: two numbers a pixel, its colour's four bytes and its depth's bits."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from aerialdojo_gen.geometry.cameras import Camera
+from aerialdojo_gen.rendering.picture import Picture
+
+
+def clear_depth(target: Any, colours: int) -> None:
+    """Clear a target's depth, and none of its colours: what is drawn last covers them all.
+
+    Parameters
+    ----------
+    target : moderngl.Framebuffer
+        To be put to use after this and not before: that is what lets its colours be drawn again.
+    colours : int
+        How many it has.
+    """
+    # One attachment has its mask alone, several have a tuple of them.
+    none, every = (False,) * 4, (True,) * 4
+    if colours:
+        target.color_mask = none if colours == 1 else (none,) * colours
+    target.clear(depth=1.0)
+    if colours:
+        target.color_mask = every if colours == 1 else (every,) * colours
+
+
+def read_picture(target: Any, camera: Camera, instances: bool) -> Picture:
+    """Read a picture of a camera, with its instance id map where it has one."""
+    shape = (camera.height, camera.width)
+    pixels = np.empty((*shape, 2), dtype=np.float32)
+    rgb, depth = np.empty((*shape, 3), dtype=np.uint8), np.empty(shape, dtype=np.float32)
+    read_pixels(target, pixels, rgb, depth)
+    found = None
+    if instances:
+        numbers = np.empty(shape, dtype=np.float32)
+        target.read_into(numbers, components=1, attachment=1, dtype="f4")
+        found = numbers.astype(np.int32) - 1
+    return Picture(rgb, depth, found)
+
+
+def read_pixels(
+    target: Any, pixels: NDArray[np.float32], rgb: NDArray[np.uint8], depth_m: NDArray[np.float32]
+) -> None:
+    """Read what was drawn.
+
+    Parameters
+    ----------
+    target : moderngl.Framebuffer
+        Of `aerialdojo_gen.rendering.gl.GlRenderer.draw_seen`.
+    pixels : (H, W, 2) float32
+        What to read it into first: the bytes of colours, which are no numbers, and depths.
+    rgb : (H, W, 3) uint8
+        sRGB.
+    depth_m : (H, W) float32
+        Planar depth; inf where nothing is hit.
+    """
+    target.read_into(pixels, components=2, dtype="u4")
+    rgba = np.empty(depth_m.shape, np.float32)
+    cv2.split(pixels, [rgba, depth_m])
+    cv2.cvtColor(rgba.view(np.uint8).reshape(*depth_m.shape, 4), cv2.COLOR_RGBA2RGB, dst=rgb)
