@@ -86,7 +86,6 @@ class GlBodies:
         from aerialdojo_gen.rendering.gl import clip_from_world
 
         waiting: deque[tuple[Any, int, int]] = deque()
-        pixels = np.empty((camera.height, camera.width, 2), np.float32)
         turn = 0
         for k, pose in enumerate(poses):
             world = [view_pose(pose[:3], float(pose[3]), view) for view in views]
@@ -102,6 +101,6 @@ class GlBodies:
                 waiting.append((target, k, v))
                 if len(waiting) > _AHEAD:
                     ready, i, j = waiting.popleft()
-                    read_pixels(ready, pixels, rgb[i, j], depth_m[i, j])
+                    read_pixels(ready, rgb[i, j], depth_m[i, j])
         for ready, i, j in waiting:
-            read_pixels(ready, pixels, rgb[i, j], depth_m[i, j])
+            read_pixels(ready, rgb[i, j], depth_m[i, j])

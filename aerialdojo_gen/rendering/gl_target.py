@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from typing import Any
 
 import cv2
@@ -10,6 +11,9 @@ from numpy.typing import NDArray
 
 from aerialdojo_gen.geometry.cameras import Camera
 from aerialdojo_gen.rendering.picture import Picture
+
+# A thread's memory for reading: to ask for it anew costs more than to read.
+_here = threading.local()
 
 
 def clear_depth(target: Any, colours: int) -> None:
@@ -34,9 +38,8 @@ def clear_depth(target: Any, colours: int) -> None:
 def read_picture(target: Any, camera: Camera, instances: bool) -> Picture:
     """Read a picture of a camera, with its instance id map where it has one."""
     shape = (camera.height, camera.width)
-    pixels = np.empty((*shape, 2), dtype=np.float32)
     rgb, depth = np.empty((*shape, 3), dtype=np.uint8), np.empty(shape, dtype=np.float32)
-    read_pixels(target, pixels, rgb, depth)
+    read_pixels(target, rgb, depth)
     found = None
     if instances:
         numbers = np.empty(shape, dtype=np.float32)
@@ -45,23 +48,22 @@ def read_picture(target: Any, camera: Camera, instances: bool) -> Picture:
     return Picture(rgb, depth, found)
 
 
-def read_pixels(
-    target: Any, pixels: NDArray[np.float32], rgb: NDArray[np.uint8], depth_m: NDArray[np.float32]
-) -> None:
+def read_pixels(target: Any, rgb: NDArray[np.uint8], depth_m: NDArray[np.float32]) -> None:
     """Read what was drawn.
 
     Parameters
     ----------
     target : moderngl.Framebuffer
         Of `aerialdojo_gen.rendering.gl.GlRenderer.draw_seen`.
-    pixels : (H, W, 2) float32
-        What to read it into first: the bytes of colours, which are no numbers, and depths.
     rgb : (H, W, 3) uint8
         sRGB.
     depth_m : (H, W) float32
         Planar depth; inf where nothing is hit.
     """
-    target.read_into(pixels, components=2, dtype="u4")
-    rgba = np.empty(depth_m.shape, np.float32)
-    cv2.split(pixels, [rgba, depth_m])
-    cv2.cvtColor(rgba.view(np.uint8).reshape(*depth_m.shape, 4), cv2.COLOR_RGBA2RGB, dst=rgb)
+    shape = depth_m.shape
+    if getattr(_here, "shape", None) != shape:
+        # The bytes of colours, which are no numbers, and depths.
+        _here.shape, _here.pixels, _here.rgba = shape, np.empty((*shape, 2), np.float32), np.empty(shape, np.float32)
+    target.read_into(_here.pixels, components=2, dtype="u4")
+    cv2.split(_here.pixels, [_here.rgba, depth_m])
+    cv2.cvtColor(_here.rgba.view(np.uint8).reshape(*shape, 4), cv2.COLOR_RGBA2RGB, dst=rgb)

@@ -90,8 +90,7 @@ def drawing_ms(
 ) -> tuple[float, float]:
     """CPU milliseconds a sample of OpenGL: until triangles are handed over, and until pixels are read."""
     size = camera.width
-    pixels, depth = np.empty((size, size, 2), np.float32), np.empty((size, size), np.float32)
-    rgb = np.empty((size, size, 3), np.uint8)
+    rgb, depth = np.empty((size, size, 3), np.uint8), np.empty((size, size), np.float32)
     best = (np.inf, np.inf)
     for _ in range(3):
         handed = read = 0.0
@@ -104,7 +103,7 @@ def drawing_ms(
                 begun = time.process_time()
                 target = renderer.draw_seen(camera, matrix, clips[v], [of_kind[v] for of_kind in seen])
                 between = time.process_time()
-                read_pixels(target, pixels, rgb, depth)
+                read_pixels(target, rgb, depth)
                 handed, read = handed + between - begun, read + time.process_time() - between
         best = min(best[0], handed), min(best[1], read)
     return 1e3 * best[0] / len(poses), 1e3 * best[1] / len(poses)
