@@ -95,10 +95,11 @@ class ViewChecks:
         if (
             before is not None
             and self._pose is not None
-            and _looks_different(self._pose, world_from_camera, picture)
             and "uniform" not in own
+            # What hardly ever holds first: the rest looks at all of a picture.
             and _equal(before.depth_m, picture.depth_m)
             and _equal(before.rgb, picture.rgb)
+            and _looks_different(self._pose, world_from_camera, picture)
         ):
             self.flags.add("frozen")
         self._picture, self._pose = picture, world_from_camera
@@ -223,18 +224,19 @@ def picture_flags(picture: Picture) -> set[str]:
 @njit(cache=True)
 def _darkness(rgb: NDArray[np.uint8]) -> tuple[float, int]:
     """Share of black pixels and widest range of a colour, of every fourth pixel each way."""
-    low, high = np.full(3, 255), np.zeros(3, dtype=np.int64)
+    least_red = least_green = least_blue = np.uint8(255)
+    most_red = most_green = most_blue = np.uint8(0)
     black = pixels = 0
     for row in range(0, rgb.shape[0], 4):
         for col in range(0, rgb.shape[1], 4):
-            brightest = 0
-            for c in range(3):
-                value = int(rgb[row, col, c])
-                low[c], high[c] = min(low[c], value), max(high[c], value)
-                brightest = max(brightest, value)
-            black += brightest < _BLACK_LEVEL
+            red, green, blue = rgb[row, col, 0], rgb[row, col, 1], rgb[row, col, 2]
+            least_red, most_red = min(least_red, red), max(most_red, red)
+            least_green, most_green = min(least_green, green), max(most_green, green)
+            least_blue, most_blue = min(least_blue, blue), max(most_blue, blue)
+            black += max(red, green, blue) < _BLACK_LEVEL
             pixels += 1
-    return black / pixels, int((high - low).max())
+    widest = max(most_red - least_red, most_green - least_green, most_blue - least_blue)
+    return black / pixels, int(widest)
 
 
 def _equal(one: NDArray[Any], other: NDArray[Any]) -> bool:
