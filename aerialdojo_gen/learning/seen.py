@@ -13,7 +13,7 @@ from aerialdojo_gen.agents.goal import N_ACTIONS, Sensors
 from aerialdojo_gen.geometry.motion import DISPLACEMENTS, N_HEADINGS, TURN_RAD, TURNS
 from aerialdojo_gen.store.schemas import ACTION_NAMES, STOP
 
-# Places within so much are one, metres.
+# Edge of the cells whose places are one, metres.
 _SAME_M = 0.25
 
 
@@ -86,7 +86,7 @@ class Reckoning:
 
 
 def _pose(place: NDArray[np.float64], headings: int) -> tuple[int, int, int, int]:
-    """Tell poses apart: actions lead to others by half a metre or more, sums of them differ by rounding."""
+    """Tell poses apart by heading and by cells of 0.25 m: who comes so near has been there."""
     x, y, z = np.rint(place / _SAME_M).astype(int).tolist()
     return x, y, z, headings % N_HEADINGS
 

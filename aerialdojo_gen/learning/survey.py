@@ -1,4 +1,4 @@
-"""Looks about in a scene: pictures from where its references lead, turned at random. A map is learned from them."""
+"""Looks about in a scene: pictures near where its references lead, turned at random. A map is learned from them."""
 
 from __future__ import annotations
 
