@@ -40,10 +40,10 @@ class Flown:
         x, y, z, yaw = start.tolist()
         self.space, self.goal = space, goal
         self.episode = Episode(space, (x, y, z, yaw), (goal[0], goal[1], goal[2]), budget)
-        self.reckoning, self.previous = Reckoning(), N_ACTIONS
+        self.reckoning = Reckoning()
         # What the teacher would do from here on; empty where that is not known.
         self.way = np.zeros(0, np.int8)
-        self.rows: list[tuple[int, int]] = []
+        self.labels: list[int] = []
         self.odometry: list[NDArray[np.float32]] = []
         self.poses: list[NDArray[np.float64]] = []
         self.blocked: list[NDArray[np.bool_]] = []
@@ -56,7 +56,7 @@ class Flown:
 
     def note(self, label: int, frame: NDArray[np.uint8], pose: NDArray[np.float64]) -> None:
         """Write down a step before it is flown."""
-        self.rows.append((label, self.previous))
+        self.labels.append(label)
         self.odometry.append(self.reckoning.odometry)
         self.poses.append(pose)
         collides, refused, _ = blocked(self.space, pose)
@@ -72,11 +72,9 @@ class Flown:
                 return False
             chosen = label
         self.episode.step(chosen)
-        self.previous = chosen
         # Who does what a route says is still on it; a new search from there would find its rest, or one as good.
         self.way = self.way[1:] if chosen == self.way[0] and not self.episode.refused else self.way[:0]
-        if not self.episode.refused:
-            self.reckoning.add(chosen)
+        self.reckoning.add(chosen, self.episode.refused)
         return self.episode.termination is None
 
     @property
@@ -157,21 +155,20 @@ def _fly(
         left = []
         for i, k in enumerate(going):
             action = labels[i] if draws[k].random() < teacher_share else chosen[i]
-            if flown[k].fly(action, labels[i]) and len(flown[k].rows) < most[k]:
+            if flown[k].fly(action, labels[i]) and len(flown[k].labels) < most[k]:
                 left.append(k)
         going = left
 
 
 def _steps(flown: list[Flown], told: dict[str, Any], part: Part) -> Steps:
-    rows = np.array([row for f in flown for row in f.rows], np.int64).reshape(-1, 2)
-    counts = [len(f.rows) for f in flown]
+    counts = [len(f.labels) for f in flown]
     poses = np.array([pose for f in flown for pose in f.poses]).reshape(-1, 4)
     goals = np.repeat(np.array([f.goal[:3] for f in flown]).reshape(-1, 3), counts, axis=0)
     shape = (len(part.sensors.views), part.size_px, part.size_px, 4)
     return Steps(
         frames=np.array([frame for f in flown for frame in f.frames], np.uint8).reshape(-1, *shape),
         first=np.concatenate([[0], np.cumsum(counts)]).astype(np.int64),
-        label=rows[:, 0], previous=rows[:, 1],
+        label=np.array([label for f in flown for label in f.labels], np.int64),
         odometry=np.array([o for f in flown for o in f.odometry], np.float32).reshape(-1, 4),
         offset=offsets(poses, goals), pose=poses.astype(np.float32),
         blocked=np.array([one for f in flown for one in f.blocked], np.bool_).reshape(-1, N_ACTIONS), **told,

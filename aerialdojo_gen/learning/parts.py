@@ -138,7 +138,7 @@ def references(part: Part) -> Steps:
     joined = {name: np.concatenate([one[name][0] for one in told]) for name in told[0]}
     goals = np.repeat(index.goal, index.steps, axis=0)
     return Steps(
-        frames=pictures(part, poses), first=index.first, label=joined["action"], previous=joined["previous_action"],
+        frames=pictures(part, poses), first=index.first, label=joined["action"],
         odometry=joined["odometry"],
         offset=offsets(poses, goals), pose=poses.astype(np.float32), blocked=hindered(part, poses),
         **goals_of(part, index),

@@ -94,8 +94,8 @@ class Policy(AgentBase):
     def act(self, observation: Observation) -> int:
         """Look, remember, choose."""
         torch, device, sensors = self._torch, self._device, self.sensors
-        if self._previous != N_ACTIONS and not observation.refused:
-            self._reckoning.add(self._previous)
+        if self._previous != N_ACTIONS:
+            self._reckoning.add(self._previous, bool(observation.refused))
         pictures = None
         if sensors.views:
             rgb = np.stack([observation.rgb[view] for view in sensors.views])

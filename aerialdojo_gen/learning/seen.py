@@ -55,11 +55,13 @@ class Reckoning:
         self._turns = 0
         self._been = {_pose(self._place, 0)}
 
-    def add(self, action: int) -> None:
-        """Add an action that was carried out."""
-        self._place, self._headings = self._after(action)
-        self._turns = self._turns + 1 if TURNS[action] else 0
-        self._been.add(_pose(self._place, self._headings))
+    def add(self, action: int, refused: bool = False) -> None:
+        """Add an action; one that was refused moved nothing, and its end counts as a pose where the body has been."""
+        place, headings = self._after(action)
+        self._been.add(_pose(place, headings))
+        if not refused:
+            self._place, self._headings = place, headings
+            self._turns = self._turns + 1 if TURNS[action] else 0
 
     @property
     def back(self) -> NDArray[np.bool_]:

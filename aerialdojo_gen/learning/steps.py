@@ -28,8 +28,6 @@ class Steps:
         Where each episode's steps begin.
     label : (m,) int64
         What the teacher does there, 0 to 15.
-    previous : (m,) int64
-        What was done before, 16 at the start.
     odometry : (m, 4) float32
         Own motion from the start and in its frame: metres and radians.
     offset : (m, 3) float32
@@ -52,7 +50,6 @@ class Steps:
     frames: NDArray[np.uint8]
     first: NDArray[np.int64]
     label: NDArray[np.int64]
-    previous: NDArray[np.int64]
     odometry: NDArray[np.float32]
     offset: NDArray[np.float32]
     pose: NDArray[np.float32]
@@ -117,7 +114,7 @@ class Pool:
         self.parts = list(parts)
         self._steps = np.cumsum([0, *(len(p.label) for p in parts)])
         joined: dict[str, NDArray[Any]] = {}
-        for name in ("label", "previous", "odometry", "offset", "pose", "blocked", "tokens", "semantic", "nav_id"):
+        for name in ("label", "odometry", "offset", "pose", "blocked", "tokens", "semantic", "nav_id"):
             joined[name] = np.concatenate([getattr(p, name) for p in parts])
         shifts = np.cumsum([0, *(len(p.images) for p in parts)])
         joined["image"] = np.concatenate(
@@ -178,7 +175,7 @@ class Pool:
         mask = np.arange(window)[None] < lengths[:, None]
         rows = (self.first[episodes][:, None] + np.arange(window)[None])[mask]
         out: dict[str, NDArray[Any]] = {"rows": rows, "mask": mask}
-        for name in ("label", "previous", "odometry", "offset", "pose", "blocked"):
+        for name in ("label", "odometry", "offset", "pose", "blocked"):
             values = j[name]
             out[name] = np.zeros((*mask.shape, *values.shape[1:]), values.dtype)
             out[name][mask] = values[rows]

@@ -35,7 +35,7 @@ def surveyed(part: Part, survey: Survey) -> Steps:
     poses[:, :3] = _strayed(flight_space(*mesh_of(part.data, part.scene), Embodiment().radius_m), poses[:, :3], draw)
     n, none = survey.looks, np.zeros(survey.looks, np.int64)
     return Steps(
-        frames=pictures(part, poses), first=np.arange(n + 1), label=none, previous=none,
+        frames=pictures(part, poses), first=np.arange(n + 1), label=none,
         odometry=np.zeros((n, 4), np.float32), offset=np.zeros((n, 3), np.float32),
         pose=poses.astype(np.float32), blocked=hindered(part, poses),
         tokens=np.zeros((n, 2, part.length), np.int64), image=none - 1,

@@ -238,6 +238,16 @@ def test_what_leads_back_is_told_by_own_motion_alone():
     assert square.back.nonzero()[0].tolist() == [2, 14]
 
 
+def test_what_was_refused_is_not_tried_again_from_there():
+    reckoning = Reckoning()
+    reckoning.add(2, refused=True)
+    assert not reckoning.odometry.any()
+    assert reckoning.back.nonzero()[0].tolist() == [2]
+    # A turn aside it is another action.
+    reckoning.add(14)
+    assert reckoning.back.nonzero()[0].tolist() == [15]
+
+
 @given(st.lists(st.integers(1, 15), max_size=40), st.integers(1, 15))
 def test_only_what_leads_back_is_said_to(actions, last):
     """By poses that are replayed: the same place and heading as before, or turns beyond half a circle."""
