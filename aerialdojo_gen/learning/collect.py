@@ -16,7 +16,7 @@ from aerialdojo_gen.errors import AerialDojoError
 from aerialdojo_gen.learning.index import Index
 from aerialdojo_gen.learning.parts import Flying, Part, Survey, references
 from aerialdojo_gen.learning.steps import Steps, is_written, read_steps
-from aerialdojo_gen.learning.words import Vocabulary
+from aerialdojo_gen.learning.trajectories import draw_rank
 from aerialdojo_gen.pipeline.code_digest import code_of
 from aerialdojo_gen.pipeline.executors import Executor
 from aerialdojo_gen.pipeline.executors.link import Link
@@ -33,7 +33,7 @@ _MEMORY_MB = 1500
 
 def parts_of(
     data: DataRoot, index: Index, folder: Path, selection: tuple[tuple[str, ...], tuple[str, ...]], sensors: Sensors,
-    size_px: int, vocabulary: Vocabulary, renderer: str, flying: Flying | None = None,
+    size_px: int, seed: int, renderer: str, flying: Flying | None = None,
 ) -> list[Part]:  # fmt: skip
     """Share trajectories out; a part's folder is named by all that shapes what will be in it.
 
@@ -45,29 +45,36 @@ def parts_of(
         Parts are folders in it.
     selection : tuple
         Splits and settings that the index was read by.
-    sensors, size_px, vocabulary, renderer, flying
+    sensors, size_px, renderer, flying
         As for `Part`.
+    seed : int
+        Of the draw of trajectories.
     """
     # References are what they are whatever network flies later.
     modules = ["rendering.gl", "learning.parts", *(["learning.flights"] if flying is not None else [])]
     code = [code_of(f"aerialdojo_gen.{name}").digest for name in modules]
     facts = [sensors.views, sensors.width, sensors.height, sensors.fov_deg, sensors.max_depth_m, size_px,
-             vocabulary.words, vocabulary.length, renderer, code, None if flying is None else
+             renderer, code, None if flying is None else
              [flying.sha256, flying.seed, flying.round, flying.teacher_share]]  # fmt: skip
     parts = []
     for number, scene in enumerate(index.scenes):
         rows = np.flatnonzero(index.scene == number)
         # The goals' pictures are drawn by a stage of their own: the same trajectories may have others.
         shown = data.digest(part_name("release/objects", scene))
-        # Those to one goal together: its cost-to-go is made once.
-        rows = rows[np.lexsort((rows, *index.goal[rows].T))]
-        for own in np.array_split(rows, -(-len(rows) // _PART)):
+        if flying is None:
+            # As they were drawn: of more trajectories, or of fewer, all parts but the last are the same.
+            rows = rows[np.argsort([draw_rank(seed, index.nav_id[k]) for k in rows], kind="stable")]
+            shares = [rows[k : k + _PART] for k in range(0, len(rows), _PART)]
+        else:
+            # Those to one goal together: its cost-to-go is made once.
+            rows = rows[np.lexsort((rows, *index.goal[rows].T))]
+            shares = np.array_split(rows, -(-len(rows) // _PART))
+        for own in shares:
             piece = index.take(own)
             text = json.dumps([facts, piece.digest, mesh_of(data, scene)[1], shown], sort_keys=True)
             name = f"{scene}-{hashlib.sha256(text.encode()).hexdigest()[:16]}"
             parts.append(Part(
-                data, *selection, scene, tuple(piece.nav_id), sensors, size_px, vocabulary.words, vocabulary.length,
-                renderer, folder / name, flying,
+                data, *selection, scene, tuple(piece.nav_id), sensors, size_px, renderer, folder / name, flying,
             ))  # fmt: skip
     return parts
 
@@ -76,14 +83,14 @@ def survey_parts(
     data: DataRoot, scenes: Sequence[str], folder: Path, split: str, target_split: str | None, looks: int, seed: int,
     like: Part,
 ) -> list[Part]:  # fmt: skip
-    """Share looks about out; cameras, vocabulary and renderer are those of another part."""
+    """Share looks about out; cameras and renderer are those of another part."""
     code = [code_of(f"aerialdojo_gen.{name}").digest for name in ("rendering.gl", "learning.survey")]
     s, parts, release = like.sensors, [], release_fingerprint(data)
     for scene in scenes:
         for number, begin in enumerate(range(0, looks, _LOOKS)):
             own = Survey(min(_LOOKS, looks - begin), seed, number, target_split)
             facts = [s.views, s.width, s.height, s.fov_deg, s.max_depth_m, like.renderer, code, release, split,
-                     mesh_of(data, scene)[1], asdict(own), like.length]  # fmt: skip
+                     mesh_of(data, scene)[1], asdict(own)]  # fmt: skip
             name = f"{scene}-{hashlib.sha256(json.dumps(facts, sort_keys=True).encode()).hexdigest()[:16]}"
             parts.append(replace(
                 like, splits=(split,), settings=(), scene=scene, nav_ids=(), folder=folder / name, flying=None,

@@ -22,6 +22,7 @@ from aerialdojo_gen.learning.policy import network_of
 from aerialdojo_gen.learning.seen import Reckoning
 from aerialdojo_gen.learning.steps import Steps
 from aerialdojo_gen.learning.teacher import Teacher, teacher_of
+from aerialdojo_gen.learning.words import Vocabulary
 from aerialdojo_gen.scenes.context import SEVERAL, open_scene
 from aerialdojo_gen.store.schemas import STOP
 
@@ -109,19 +110,20 @@ def flights(part: Part, flying: Flying) -> Steps:
             most = [int(_TIMES * index.steps[r]) + _MORE for r in rows]
             draws = [rng.generator(flying.seed, "dagger", flying.round, index.nav_id[r]) for r in rows]
             shown = np.array([bool(d.random() < 0.5) for d in draws]) & (told["image"][rows] >= 0)
-            goal = _understood(torch, network, told, rows, shown)
+            goal = _understood(torch, network, about.vocabulary, told, rows, shown)
             _fly(torch, network, part, teacher, own, most, draws, flying.teacher_share, goal)
             flown |= dict(zip(rows.tolist(), own, strict=True))
     return _steps([flown[r] for r in range(len(index))], told, part)
 
 
 def _understood(
-    torch: Any, network: Any, told: dict[str, Any], rows: NDArray[np.int64], shown: NDArray[np.bool_]
-) -> Any:
+    torch: Any, network: Any, vocabulary: Vocabulary, told: dict[str, Any], rows: NDArray[np.int64],
+    shown: NDArray[np.bool_],
+) -> Any:  # fmt: skip
     shown = shown | ~told["semantic"][rows]
     images = np.zeros((len(rows), *told["images"].shape[1:]), np.uint8)
     images[shown] = told["images"][told["image"][rows[shown]]]
-    tokens = told["tokens"][rows, 1 - shown.astype(np.int64)]
+    tokens = np.array([vocabulary.encode(text) for text in told["text"][rows, 1 - shown.astype(np.int64)].tolist()])
     return network.understand(torch.from_numpy(tokens), torch.from_numpy(images), torch.from_numpy(shown))
 
 

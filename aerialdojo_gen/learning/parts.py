@@ -20,7 +20,7 @@ from aerialdojo_gen.learning.labels import Labels
 from aerialdojo_gen.learning.pictures import within
 from aerialdojo_gen.learning.seen import goal_picture, packed
 from aerialdojo_gen.learning.steps import Steps
-from aerialdojo_gen.learning.words import Vocabulary, goal_text
+from aerialdojo_gen.learning.words import goal_text
 from aerialdojo_gen.rendering.bodies import draw_bodies
 from aerialdojo_gen.scenes.context import SEVERAL, open_scene
 from aerialdojo_gen.store import shards as store
@@ -84,9 +84,6 @@ class Part:
     sensors : Sensors
     size_px : int
         Edge of the goals' pictures.
-    words : tuple of str
-    length : int
-        Of the vocabulary.
     renderer : str
     folder : Path
         Where to; named by what is in it.
@@ -103,8 +100,6 @@ class Part:
     nav_ids: tuple[str, ...]
     sensors: Sensors
     size_px: int
-    words: tuple[str, ...]
-    length: int
     renderer: str
     folder: Path
     flying: Flying | None = None
@@ -176,10 +171,9 @@ def offsets(poses: NDArray[np.float64], goals: NDArray[np.float64]) -> NDArray[n
 
 def goals_of(part: Part, index: Index) -> dict[str, Any]:
     """Read what each trajectory's goal is told by: fields of `Steps`."""
-    vocabulary = Vocabulary(part.words, part.length)
     names = [index.told[name] for name in ("target_name", "landmark", "direction", "description")]
-    tokens = [
-        [vocabulary.encode(goal_text(str(n), str(m), str(d), text)) for text in (None, said)]
+    text = [
+        [goal_text(str(n), str(m), str(d), more) for more in (None, said)]
         for n, m, d, said in zip(*names, strict=True)
     ]
     ids = index.told["reference_image_id"]
@@ -187,7 +181,7 @@ def goals_of(part: Part, index: Index) -> dict[str, Any]:
     place = {one: k for k, one in enumerate(known)}
     shown = [goal_picture(reference_image(part.data, part.scene, one), part.size_px) for one in known]
     return {
-        "tokens": np.array(tokens, np.int64).reshape(len(index), 2, part.length),
+        "text": np.array(text, np.str_).reshape(len(index), 2),
         "image": np.array([-1 if one is None else place[one] for one in ids], np.int64),
         "semantic": np.array([said is not None for said in names[3]], np.bool_),
         "images": np.array(shown, np.uint8).reshape(-1, part.size_px, part.size_px, 4),

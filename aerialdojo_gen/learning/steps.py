@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerialdojo_gen.errors import StoreError
+from aerialdojo_gen.learning.words import Vocabulary
 from aerialdojo_gen.store.atomic import atomic_folder, make_folder
 
 _FRAMES, _STEPS = "frames.npy", "steps.npz"
@@ -36,8 +37,8 @@ class Steps:
         x, y, z in metres and yaw in radians, world frame.
     blocked : (m, 16) bool
         Actions that would touch a surface or leave the flight volume: privileged, for a side task.
-    tokens : (n, 2, length) int64
-        The goal's words without and with its description.
+    text : (n, 2) str
+        The goal in words, without and with its description.
     image : (n,) int64
         Row of `images`, -1 without one.
     semantic : (n,) bool
@@ -54,7 +55,7 @@ class Steps:
     offset: NDArray[np.float32]
     pose: NDArray[np.float32]
     blocked: NDArray[np.bool_]
-    tokens: NDArray[np.int64]
+    text: NDArray[np.str_]
     image: NDArray[np.int64]
     semantic: NDArray[np.bool_]
     images: NDArray[np.uint8]
@@ -108,19 +109,24 @@ class Pool:
     parts : sequence of Steps
     scenes : sequence of str
         By whose order scenes are numbered.
+    vocabulary : Vocabulary
+        By which words are.
     """
 
-    def __init__(self, parts: Sequence[Steps], scenes: Sequence[str]) -> None:
+    def __init__(self, parts: Sequence[Steps], scenes: Sequence[str], vocabulary: Vocabulary) -> None:
         self.parts = list(parts)
         self._steps = np.cumsum([0, *(len(p.label) for p in parts)])
         joined: dict[str, NDArray[Any]] = {}
-        for name in ("label", "odometry", "offset", "pose", "blocked", "tokens", "semantic", "nav_id"):
+        for name in ("label", "odometry", "offset", "pose", "blocked", "semantic", "nav_id"):
             joined[name] = np.concatenate([getattr(p, name) for p in parts])
         shifts = np.cumsum([0, *(len(p.images) for p in parts)])
         joined["image"] = np.concatenate(
             [np.where(p.image >= 0, p.image + s, -1) for p, s in zip(parts, shifts, strict=False)]
         )
         joined["images"] = np.concatenate([p.images for p in parts])
+        # The cache has words, not their numbers: another vocabulary asks for no other pictures.
+        tokens = [vocabulary.encode(text) for part in parts for text in part.text.ravel().tolist()]
+        joined["tokens"] = np.array(tokens, np.int64).reshape(-1, 2, vocabulary.length)
         self._joined = joined
         self.first = np.concatenate([[0], *(p.first[1:] + s for p, s in zip(parts, self._steps, strict=False))])
         self.lengths = np.diff(self.first)

@@ -38,7 +38,7 @@ def surveyed(part: Part, survey: Survey) -> Steps:
         frames=pictures(part, poses), first=np.arange(n + 1), label=none,
         odometry=np.zeros((n, 4), np.float32), offset=np.zeros((n, 3), np.float32),
         pose=poses.astype(np.float32), blocked=hindered(part, poses),
-        tokens=np.zeros((n, 2, part.length), np.int64), image=none - 1,
+        text=np.full((n, 2), ""), image=none - 1,
         semantic=np.zeros(n, np.bool_), images=np.zeros((0, part.size_px, part.size_px, 4), np.uint8),
         nav_id=np.full(n, ""), scene=np.full(n, part.scene),
     )  # fmt: skip

@@ -220,7 +220,7 @@ class _Training:
     def _parts(self, index: Index, flying: Flying | None) -> list[Part]:
         return parts_of(
             self._root, index, self._cache, self._selection, self._sensors, self._recipe.data.size_px,
-            self._vocabulary, self._renderer, flying,
+            self._recipe.seed, self._renderer, flying,
         )  # fmt: skip
 
     def _collect(self, index: Index, flying: Flying | None, what: str) -> list[Steps]:
@@ -237,7 +237,7 @@ class _Training:
             self._root, scenes, self._cache, d.split, d.target_split, d.looks, self._recipe.seed, like
         )
         with make_executor("local", self._workers) as executor:
-            return Pool(collect(parts, executor, self._reporter, "looking about"), scenes)
+            return Pool(collect(parts, executor, self._reporter, "looking about"), scenes, self._vocabulary)
 
     def _kept_back(self, nav_ids: NDArray[np.str_]) -> NDArray[np.bool_]:
         share = self._recipe.data.validation_share * 2.0**64
@@ -246,7 +246,7 @@ class _Training:
     def _learn(self, parts: list[Steps], phase: int) -> None:
         train, dagger = self._recipe.train, self._recipe.dagger
         epochs, rate = (dagger.epochs, dagger.learning_rate) if phase else (train.epochs, train.learning_rate)
-        pool = Pool(parts, self._index.scenes)
+        pool = Pool(parts, self._index.scenes, self._vocabulary)
         what = f"round {phase}" if phase else "imitation"
         after = self._after(what, epochs)
         self._learner.learn(

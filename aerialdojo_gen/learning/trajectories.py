@@ -317,9 +317,14 @@ def drawn_evenly(index: Index, limit: int, seed: int) -> NDArray[np.int64]:
     lots: list[tuple[int, int, int]] = []
     for number, scene in enumerate(index.scenes):
         own = np.flatnonzero(index.scene == number).tolist()
-        ranked = sorted((rng.rank(seed, "learning", index.nav_id[k]), k) for k in own)[:limit]
+        ranked = sorted((draw_rank(seed, index.nav_id[k]), k) for k in own)[:limit]
         lots += [(turn, rng.rank(seed, "learning", scene), k) for turn, (_, k) in enumerate(ranked)]
     return np.array(sorted(k for _, _, k in sorted(lots)[:limit]), np.int64)
+
+
+def draw_rank(seed: int, nav_id: str) -> int:
+    """Return by what `drawn_evenly` orders the trajectories of a scene."""
+    return rng.rank(seed, "learning", nav_id)
 
 
 def _names(given: str | Sequence[str]) -> tuple[str, ...]:

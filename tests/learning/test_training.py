@@ -28,7 +28,6 @@ from aerialdojo_gen.learning.recipe import Recipe, load_recipe
 from aerialdojo_gen.learning.steps import read_steps
 from aerialdojo_gen.learning.teacher import NO_LABEL, Teacher
 from aerialdojo_gen.learning.trajectories import drawn_evenly
-from aerialdojo_gen.learning.words import Vocabulary
 from aerialdojo_gen.pipeline.code_digest import code_of
 from aerialdojo_gen.pipeline.executors import make_executor
 from aerialdojo_gen.pipeline.progress import Reporter
@@ -175,8 +174,7 @@ def test_other_pictures_of_the_goals_are_drawn_from_anew(smoke, tmp_path):
     index = read_index(root, Selection(("id_train",)))
 
     def names():
-        words = Vocabulary(("a",), 4)
-        parts = parts_of(open_root(data), index, tmp_path, (("id_train",), ()), Sensors(), 32, words, "gl")
+        parts = parts_of(open_root(data), index, tmp_path, (("id_train",), ()), Sensors(), 32, 0, "gl")
         return {part.scene: part.folder.name for part in parts}
 
     before = names()
@@ -198,11 +196,31 @@ def test_references_and_looks_are_not_drawn_again_where_only_the_network_is_anot
     assert "aerialdojo_gen.learning.network" in code_of("aerialdojo_gen.learning.flights").parts
 
 
+def test_of_more_trajectories_or_other_scenes_what_was_drawn_stays_drawn(smoke, tmp_path, monkeypatch):
+    monkeypatch.setattr("aerialdojo_gen.learning.collect._PART", 5)
+    root = open_root(smoke)
+    index = read_index(root, Selection(("id_train", "ood_train")))
+    assert len(index.scenes) > 1
+
+    def names(chosen):
+        parts = parts_of(root, chosen, tmp_path, (("id_train",), ()), Sensors(), 32, 3, "gl")
+        assert sorted(nav_id for part in parts for nav_id in part.nav_ids) == sorted(chosen.nav_id)
+        return {part.folder.name for part in parts if len(part) == 5}
+
+    all_of_them = names(index)
+    fewer = names(index.take(drawn_evenly(index, 10 * len(index.scenes), 3)))
+    assert len(fewer) == 2 * len(index.scenes)
+    assert fewer < all_of_them
+    last = names(index.take(np.flatnonzero(index.scene == len(index.scenes) - 1)))
+    assert last
+    assert last < all_of_them
+
+
 def test_looks_about_are_taken_near_where_references_lead_and_turned_at_random(smoke, tmp_path):
     root = open_root(smoke)
     index = read_index(root, Selection(("id_train",)))
     sensors = Sensors(("front", "down"), width=32, height=32)
-    (like, *_) = parts_of(root, index, tmp_path, (("id_train",), ()), sensors, 32, Vocabulary(("a",), 4), "gl")
+    (like, *_) = parts_of(root, index, tmp_path, (("id_train",), ()), sensors, 32, 0, "gl")
     parts = survey_parts(root, index.scenes, tmp_path, "id_train", "train", 40, 7, like)
     assert [part.scene for part in parts] == list(index.scenes)
     with make_executor("local", 1) as executor:
