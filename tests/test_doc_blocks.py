@@ -34,7 +34,7 @@ NOT_RUN = {
     "to hours",
     r"make smoke": "is what made the data that all this runs on",
     r"(\S*/)?pip install .*": "installs packages",
-    r"train .*|evaluate --agent aerialdojo_gen.learning.policy:Policy .*|report small .*|tensorboard .*": "needs the "
+    r"train .*|evaluate --agent policy .*|report small .*|tensorboard .*": "needs the "
     "extra train: tests/learning/test_training.py does",
     r"(annotate|view) .*": "serves until Ctrl-C: tests/annotate/test_annotate_tool_browser.py, "
     "tests/view/test_view_page.py",

@@ -24,7 +24,10 @@ BUILT_IN = {
     "explorer": f"{_HERE}.explorer:ExplorerAgent",
     "openai": "aerialdojo_gen.llm.openai_agent:OpenAIAgent",
     "anthropic": "aerialdojo_gen.llm.anthropic_agent:AnthropicAgent",
+    "policy": "aerialdojo_gen.learning.policy:Policy",
 }
+# The extra whose packages an agent imports.
+_EXTRAS = {"openai": "llm", "anthropic": "llm", "policy": "train"}
 
 
 def agent_class(name: str) -> Callable[..., Any]:
@@ -51,8 +54,8 @@ def agent_class(name: str) -> Callable[..., Any]:
     try:
         module = importlib.import_module(module_name)
     except ImportError as error:
-        if name in BUILT_IN:
-            raise MissingPackage(lacks(f"agent {name!r}", error.name, "llm")) from None
+        if name in _EXTRAS:
+            raise MissingPackage(lacks(f"agent {name!r}", error.name, _EXTRAS[name])) from None
         raise UsageError(f"cannot load agent {name!r}: {first_line(error)}") from None
     except AerialDojoError:
         raise

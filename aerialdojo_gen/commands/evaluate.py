@@ -39,7 +39,7 @@ def evaluate(
         typer.Option(
             "--agent",
             autocompletion=completion.agents,
-            help="oracle, random, stop, explorer, …, or package.module:Class.  (default: random)",
+            help="oracle, random, stop, explorer, policy, …, or package.module:Class.  (default: random)",
         ),
     ] = None,
     preset: Annotated[

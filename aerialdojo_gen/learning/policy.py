@@ -1,4 +1,4 @@
-"""A trained policy as an agent: ``evaluate --agent aerialdojo_gen.learning.policy:Policy --option weights=FILE``."""
+"""A trained policy as an agent: ``evaluate --agent policy --option weights=FILE``."""
 
 from __future__ import annotations
 

@@ -44,7 +44,7 @@ from aerialdojo_gen.learning import checkpoints  # noqa: E402 - it needs torch
 from aerialdojo_gen.learning.policy import Policy  # noqa: E402
 from aerialdojo_gen.learning.training import train  # noqa: E402
 
-POLICY = "aerialdojo_gen.learning.policy:Policy"
+POLICY = "policy"
 SMALL = {
     "name": "small",
     "data": {"split": "id_train", "limit": 8, "size_px": 32, "validation_share": 0.0, "settings": []},
