@@ -35,6 +35,8 @@ class About:
         Fingerprint of the release that it learned from.
     actions : str
         Fingerprint of the action set.
+    named : tuple of str
+        Words that pictures are searched for.
     """
 
     shape: dict[str, Any]
@@ -42,13 +44,14 @@ class About:
     sensors: Sensors
     release: str
     actions: str
+    named: tuple[str, ...] = ()
 
     def as_text(self) -> str:
         """Return it as JSON."""
         s, v = self.sensors, self.vocabulary
         return json.dumps({
             "shape": self.shape, "words": v.words, "length": v.length, "release": self.release,
-            "actions": self.actions,
+            "actions": self.actions, "named": self.named,
             "sensors": [s.views, s.width, s.height, s.fov_deg, s.max_depth_m],
         })  # fmt: skip
 
@@ -101,7 +104,9 @@ def read(path: str | Path) -> tuple[dict[str, Any], About, dict[str, Any]]:
         views, width, height, fov_deg, max_depth_m = given["sensors"]
         sensors = Sensors(tuple(views), bool(views), bool(views), width, height, fov_deg, max_depth_m)
         words = Vocabulary(given["words"], given["length"])
-        about = About(given["shape"], words, sensors, given["release"], given["actions"])
+        # Weights of an earlier version search for nothing.
+        named = tuple(map(str, given.get("named", ())))
+        about = About(given["shape"], words, sensors, given["release"], given["actions"], named)
     except AerialDojoError as error:
         raise StoreError(f"{path} holds no policy: {first_line(error)}") from None
     except Exception as error:  # safetensors has an error of its own, and a header may say anything

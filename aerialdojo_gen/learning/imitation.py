@@ -34,7 +34,7 @@ class Progress:
     Attributes
     ----------
     phase : int
-        0 for the references, then the round of DAgger.
+        -1 for what objects look like, 0 for the references, then the round of DAgger.
     epoch, batch : int
         Of the phase; batches that are done.
     sums : list of float
@@ -169,6 +169,23 @@ class Learner:
         self.progress = Progress(phase)
         self.optimiser = self._optimiser()
 
+    def share_cores(self) -> None:
+        """Use the cores that are ours: sums depend on how many, and who flew in this process before left it one."""
+        self.torch.set_num_threads(own_cores())
+
+    def autocast(self) -> Any:
+        """Return what a network is to run in: half as many bits on an accelerator."""
+        return self.torch.autocast(self.device, self.torch.bfloat16, enabled=self.device != "cpu")
+
+    def update(self, loss: Any, rate: float) -> None:
+        """Descend a loss, (), by one step of the optimiser."""
+        for group in self.optimiser.param_groups:
+            group["lr"] = rate
+        self.optimiser.zero_grad(set_to_none=True)
+        loss.backward()
+        self.torch.nn.utils.clip_grad_norm_(self.network.parameters(), self.recipe.train.gradient_norm)
+        self.optimiser.step()
+
     def learn(
         self,
         pool: Pool,
@@ -197,8 +214,7 @@ class Learner:
         tick : callable
             Called after each batch with its number of all, how many there are, its loss and its accuracy.
         """
-        # Sums depend on how many threads share them, and who flew in this process before left it one.
-        self.torch.set_num_threads(own_cores())
+        self.share_cores()
         anywhere = np.flatnonzero(np.repeat(~kept_back, pool.lengths))
         p, seed, most = self.progress, self.recipe.seed, self.recipe.train.batch_steps
         lengths = np.where(kept_back, 0, pool.lengths)
@@ -213,7 +229,7 @@ class Learner:
             self.network.train()
             batches = epoch_batches(lengths, most, seed, p.phase, p.epoch)
             for episodes in batches[p.batch :]:
-                rate = self._rate(done, total, learning_rate)
+                rate = self.rate(done, total, learning_rate)
                 loss, right, n = self._step(pool, frames, episodes, rate, (p.phase, p.epoch, p.batch))
                 p.batch, done = p.batch + 1, done + 1
                 p.sums = [a + b for a, b in zip(p.sums, (loss * n, right, n), strict=True)]
@@ -255,7 +271,8 @@ class Learner:
             self.network.parameters(), lr=train.learning_rate, weight_decay=train.weight_decay
         )
 
-    def _rate(self, done: int, total: int, highest: float) -> float:
+    def rate(self, done: int, total: int, highest: float) -> float:
+        """Learning rate after so many of all batches of a phase."""
         warm = min(1.0, (done + 1) / (self.recipe.train.warmup_batches + 1))
         return highest * warm * (0.1 + 0.9 * 0.5 * (1.0 + math.cos(math.pi * done / max(total, 1))))
 
@@ -288,7 +305,7 @@ class Learner:
         return out
 
     def _forward(self, batch: dict[str, Any]) -> Thought:
-        with self.torch.autocast(self.device, self.torch.bfloat16, enabled=self.device != "cpu"):
+        with self.autocast():
             goal = self.network.understand(batch["tokens"], batch["images"], batch["told_by_image"])
             thought, _ = self.network(batch.get("pictures"), goal, batch["odometry"], batch["mask"])
         return thought
@@ -305,7 +322,7 @@ class Learner:
             at = (self.torch.from_numpy(one).to(self.device) for one in pool.places(chosen))
             looks.append((self._pictures(pool, frames, chosen), *at))
         pictures, pose, number, blocked = (self.torch.cat(same) for same in zip(*looks, strict=True))
-        with self.torch.autocast(self.device, self.torch.bfloat16, enabled=self.device != "cpu"):
+        with self.autocast():
             seen = self.network.look(pictures.flatten(0, 1)).reshape(n, -1)
             place, heading, scene, _ = self.network.whereabouts.found(seen)
             hindered = self.network.blocked(seen)
@@ -329,11 +346,6 @@ class Learner:
         loss = functional.cross_entropy(logits, label)
         touches = touched(thought.blocked[mask], batch["blocked"][mask])
         where = missed(thought.guess, batch) + touches + self._looked_about(draw)
-        for group in self.optimiser.param_groups:
-            group["lr"] = rate
-        self.optimiser.zero_grad(set_to_none=True)
-        (loss + self.recipe.train.goal_weight * where).backward()
-        self.torch.nn.utils.clip_grad_norm_(self.network.parameters(), self.recipe.train.gradient_norm)
-        self.optimiser.step()
+        self.update(loss + self.recipe.train.goal_weight * where, rate)
         right = (logits.argmax(-1) == label).sum()
         return float(loss.detach()), float(right), int(mask.sum())

@@ -12,6 +12,8 @@ from torch.nn import functional
 
 from aerialdojo_gen.agents.goal import N_ACTIONS
 from aerialdojo_gen.geometry.motion import TURNS
+from aerialdojo_gen.learning.seen import PATCH_PX
+from aerialdojo_gen.learning.sight import Sight
 from aerialdojo_gen.learning.whereabouts import UNIT_M, Guess, Whereabouts
 from aerialdojo_gen.store.schemas import STOP
 
@@ -19,7 +21,6 @@ from aerialdojo_gen.store.schemas import STOP
 _WAVES_M = (4.0, 12.0, 36.0, 108.0)
 _FAR_M = 30.0
 _BEARING = 3 * (2 * len(_WAVES_M) + 1) + 3 + 8
-_PATCH_PX = 4
 _DROPOUT = 0.1
 # Where a policy stops, metres: within the 3 m of success by what it may be mistaken.
 ARRIVED_M = 2.0
@@ -44,6 +45,8 @@ class Shape:
         Of the CNN's three layers: of patches of 4 x 4 pixels, then of two convolutions that halve.
     features, word_features, hidden : int
         See `aerialdojo_gen.learning.recipe.ModelConfig`.
+    named : int
+        Words that pictures are searched for; without any there is nothing that searches.
     """
 
     words: int
@@ -54,6 +57,7 @@ class Shape:
     features: int
     word_features: int
     hidden: int
+    named: int = 0
 
     def as_json(self) -> dict[str, Any]:
         """Return it as plain values."""
@@ -125,7 +129,7 @@ class Network(nn.Module):  # type: ignore[misc]  # torch is looked at by no type
         self.shape = shape
         patches, *channels = shape.channels
         # Patches of 4 x 4 pixels first, as one product of matrices: layers of few channels are what takes a CPU long.
-        self.patches = nn.Linear(4 * _PATCH_PX**2, patches)
+        self.patches = nn.Linear(4 * PATCH_PX**2, patches)
         layers: list[Any] = [nn.ReLU(inplace=True)]
         before = patches
         for n in channels:
@@ -156,12 +160,14 @@ class Network(nn.Module):  # type: ignore[misc]  # torch is looked at by no type
         self.blocked = nn.Sequential(
             nn.Linear(pictured, shape.hidden), nn.ReLU(inplace=True), nn.Linear(shape.hidden, N_ACTIONS)
         )
+        # The last, so that the others begin as they do without it.
+        self.sight = Sight(shape.named, shape.channels) if shape.named else None
 
     def look(self, pictures: Any) -> Any:
         """Encode pictures: (n, H, W, 4) uint8 to (n, features)."""
         n, height, width, bytes_a_pixel = pictures.shape
-        rows, columns = height // _PATCH_PX, width // _PATCH_PX
-        cut = pictures.view(n, rows, _PATCH_PX, columns, _PATCH_PX, bytes_a_pixel).transpose(2, 3)
+        rows, columns = height // PATCH_PX, width // PATCH_PX
+        cut = pictures.view(n, rows, PATCH_PX, columns, PATCH_PX, bytes_a_pixel).transpose(2, 3)
         patches = self.patches(cut.reshape(n, rows, columns, -1).float().div(127.5).sub(1.0))
         # As they lie in memory, channels last: on a CPU convolutions take half the time so.
         return self.eye(patches.permute(0, 3, 1, 2))
@@ -206,18 +212,27 @@ class Network(nn.Module):  # type: ignore[misc]  # torch is looked at by no type
         Thought
         memory : (n, sums)
         """
-        n, steps = mask.shape
-        memory = self.blank(n).to(odometry.device) if memory is None else memory
-        seen = goal[:, None].expand(n, steps, -1)
-        if pictures is not None:
-            looked = self.look(pictures.flatten(0, 1)).reshape(len(pictures), -1)
-            flat = torch.zeros(n * steps, looked.shape[1], dtype=looked.dtype, device=looked.device)
-            rows = mask.flatten().nonzero()[:, 0]
-            seen = flat.index_copy(0, rows, looked).reshape(n, steps, -1)
+        memory = self.blank(len(mask)).to(odometry.device) if memory is None else memory
+        seen = self.features(pictures, goal, mask)
         guess, memory = self.whereabouts(seen, goal, odometry, memory)
+        return self.choose(seen, goal, guess), memory
+
+    def features(self, pictures: Any, goal: Any, mask: Any) -> Any:
+        """Encode what is seen at steps, (n, T, ...); of who sees nothing, the goal. Parameters are `forward`'s."""
+        n, steps = mask.shape
+        if pictures is None:
+            return goal[:, None].expand(n, steps, -1)
+        looked = self.look(pictures.flatten(0, 1)).reshape(len(pictures), -1)
+        flat = torch.zeros(n * steps, looked.shape[1], dtype=looked.dtype, device=looked.device)
+        rows = mask.flatten().nonzero()[:, 0]
+        return flat.index_copy(0, rows, looked).reshape(n, steps, -1)
+
+    def choose(self, seen: Any, goal: Any, guess: Guess) -> Thought:
+        """Choose actions by what is seen, (n, T, ...), the goal, (n, features), and where it is thought to be."""
+        n, steps = seen.shape[:2]
         parts = [seen, goal[:, None].expand(n, steps, -1), bearing(guess)]
         logits = self.choice(torch.cat([part.to(goal.dtype) for part in parts], dim=2))
-        return Thought(logits, self.blocked(seen), guess), memory
+        return Thought(logits, self.blocked(seen), guess)
 
     def blank(self, n: int) -> Any:
         """Return the memory of n episodes that begin: (n, sums)."""

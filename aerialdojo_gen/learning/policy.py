@@ -12,6 +12,8 @@ from aerialdojo_gen.agents.goal import N_ACTIONS, Goal, Observation
 from aerialdojo_gen.errors import StoreError, UsageError, first_line
 from aerialdojo_gen.learning import checkpoints
 from aerialdojo_gen.learning.loader import torch_package
+from aerialdojo_gen.learning.naming import named_by
+from aerialdojo_gen.learning.search import LOST_NATS, Search
 from aerialdojo_gen.learning.seen import Reckoning, goal_picture, packed
 from aerialdojo_gen.learning.words import goal_text
 from aerialdojo_gen.store.files import file_digest
@@ -90,6 +92,9 @@ class Policy(AgentBase):
         with torch.inference_mode():
             self._goal = self.network.understand(tokens, image, shown)
         self._reckoning, self._previous, self._memory = Reckoning(), N_ACTIONS, None
+        self._doubt: list[float] = []
+        wanted = named_by([goal.target_name], about.named)[0] if about.named else None
+        self._search = None if wanted is None else Search(wanted, self.sensors)
 
     def act(self, observation: Observation) -> int:
         """Look, remember, choose."""
@@ -101,17 +106,27 @@ class Policy(AgentBase):
             rgb = np.stack([observation.rgb[view] for view in sensors.views])
             depth_m = np.stack([observation.depth_m[view] for view in sensors.views])
             pictures = torch.from_numpy(packed(rgb, depth_m, sensors)[None]).to(device)
+        odometry = torch.from_numpy(self._reckoning.odometry[None, None]).to(device)
         with torch.inference_mode():
-            thought, self._memory = self.network(
-                pictures,
-                self._goal,
-                torch.from_numpy(self._reckoning.odometry[None, None]).to(device),
-                torch.ones((1, 1), dtype=torch.bool, device=device),
-                self._memory,
-            )
+            step = torch.ones((1, 1), dtype=torch.bool, device=device)
+            seen = self.network.features(pictures, self._goal, step)
+            memory = self.network.blank(1).to(device) if self._memory is None else self._memory
+            guess, self._memory = self.network.whereabouts(seen, self._goal, odometry, memory)
+            if self._search is not None and pictures is not None:
+                self._doubt.append(float(guess.scene_nats[0, 0]))
+                self._notice(self._search, pictures)
+                if np.mean(self._doubt) > LOST_NATS:
+                    away = self._search.towards(self._reckoning.odometry, observation.remaining_actions)
+                    guess = guess.led(torch.from_numpy(away[None, None]).to(device))
+            thought = self.network.choose(seen, self._goal, guess)
         back = torch.from_numpy(self._reckoning.back[None, None]).to(device)
         self._previous = int(thought.actions(back)[0, 0])
         return self._previous
+
+    def _notice(self, search: Search, pictures: Any) -> None:
+        """Remember what is seen: a map that was trusted may turn out to be of somewhere else."""
+        chances = self.network.sight(pictures[0]).log_softmax(dim=-1).flatten(0, 1)
+        search.look(chances.cpu().numpy(), pictures[0].cpu().numpy(), self._reckoning.odometry)
 
 
 def _agree(about: checkpoints.About, shape: Any) -> None:
@@ -125,6 +140,8 @@ def _agree(about: checkpoints.About, shape: Any) -> None:
         raise ValueError(
             f"pictures of {sensors.width} x {sensors.height}, for weights of {shape.size_px} x {shape.size_px}"
         )
+    if len(about.named) != shape.named:
+        raise ValueError(f"{len(about.named)} words to search for, for weights of {shape.named}")
     if vocabulary.length > _LONGEST:
         raise ValueError(f"texts of {vocabulary.length} tokens, {_LONGEST} at most")
 

@@ -74,6 +74,14 @@ class TrainingConfig(Section):
     checkpoint_s: float = Field(60.0, gt=0, description="seconds between checkpoints")
 
 
+class SightConfig(Section):
+    """What objects look like: learned from the looks about, for scenes that there is no map of."""
+
+    epochs: int = Field(4, ge=0, le=10_000, description="times that every look is gone through; 0 for no sight")
+    batch_looks: int = Field(128, ge=1, le=100_000, description="looks a batch has")
+    learning_rate: float = Field(2e-3, gt=0, le=1, description="as in [train]")
+
+
 class DaggerConfig(Section):
     """DAgger: the policy flies, the planner says what it should have done, and it learns from both (Ross 2011)."""
 
@@ -105,6 +113,7 @@ class Recipe(Section):
     data: DataConfig = Field(default_factory=DataConfig)
     model: ModelConfig = Field(default_factory=ModelConfig)
     train: TrainingConfig = Field(default_factory=TrainingConfig)
+    sight: SightConfig = Field(default_factory=SightConfig)
     dagger: DaggerConfig = Field(default_factory=DaggerConfig)
     small: SmallConfig = Field(default_factory=SmallConfig)
 

@@ -13,6 +13,8 @@ from aerialdojo_gen.agents.goal import N_ACTIONS, Sensors
 from aerialdojo_gen.geometry.motion import DISPLACEMENTS, N_HEADINGS, TURN_RAD, TURNS
 from aerialdojo_gen.store.schemas import ACTION_NAMES, STOP
 
+# Edge of the patches of pixels that networks begin with.
+PATCH_PX = 4
 # Edge of the cells whose places are one, metres.
 _SAME_M = 0.25
 

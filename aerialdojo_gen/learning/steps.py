@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
@@ -46,6 +46,11 @@ class Steps:
     images : (k, H, W, 4) uint8
         The goals' pictures.
     nav_id, scene : (n,) str
+    shown : (m, patches) int16
+        Of looks about: which object a patch shows, a number of `names`; -1 for none, -2 where that is not told.
+        Patches of all views, row after row.
+    names : (k,) str
+        Of those objects.
     """
 
     frames: NDArray[np.uint8]
@@ -61,6 +66,8 @@ class Steps:
     images: NDArray[np.uint8]
     nav_id: NDArray[np.str_]
     scene: NDArray[np.str_]
+    shown: NDArray[np.int16] = field(default_factory=lambda: np.zeros((0, 0), np.int16))
+    names: NDArray[np.str_] = field(default_factory=lambda: np.zeros(0, "U1"))
 
     def __len__(self) -> int:
         """Return the number of episodes."""
@@ -71,7 +78,7 @@ class Steps:
         make_folder(folder.parent)
         with atomic_folder(folder) as temporary:
             np.save(temporary / _FRAMES, self.frames, allow_pickle=False)
-            named = {field.name: getattr(self, field.name) for field in fields(self) if field.name != "frames"}
+            named = {one.name: getattr(self, one.name) for one in fields(self) if one.name != "frames"}
             np.savez(temporary / _STEPS, allow_pickle=False, **named)
 
 
@@ -90,7 +97,7 @@ def read_steps(folder: Path) -> Steps:
     """
     try:
         with np.load(folder / _STEPS, allow_pickle=False) as file:
-            rest = {field.name: file[field.name] for field in fields(Steps) if field.name != "frames"}
+            rest = {one.name: file[one.name] for one in fields(Steps) if one.name != "frames"}
         with (folder / _FRAMES).open("rb") as file:
             np.lib.format.read_magic(file)
             shape, _, _ = np.lib.format.read_array_header_1_0(file)
@@ -161,6 +168,22 @@ class Pool:
             self._scene_of_step[rows],
             np.asarray(self._joined["blocked"][rows], np.bool_),
         )
+
+    @property
+    def names(self) -> list[str]:
+        """Of all objects that looks about show."""
+        return [name for part in self.parts for name in part.names.tolist()]
+
+    def shown(self, rows: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Read which objects the patches of looks show: (n, patches), numbers of `names`; see `Steps`."""
+        part = np.searchsorted(self._steps, rows, side="right") - 1
+        shifts = np.cumsum([0, *(len(p.names) for p in self.parts)])
+        found = [
+            np.where(one >= 0, one + shifts[p], one)
+            for p, row in zip(part.tolist(), rows.tolist(), strict=True)
+            for one in [self.parts[p].shown[row - self._steps[p]].astype(np.int64)]
+        ]
+        return np.array(found, np.int64)
 
     def batch(self, episodes: NDArray[np.int64], by_image: NDArray[np.bool_]) -> dict[str, NDArray[Any]]:
         """Put episodes side by side.

@@ -24,6 +24,7 @@ from aerialdojo_gen.learning import checkpoints
 from aerialdojo_gen.learning.collect import collect, parts_of, survey_parts
 from aerialdojo_gen.learning.index import Index, read_index
 from aerialdojo_gen.learning.loader import torch_package
+from aerialdojo_gen.learning.naming import naming_words
 from aerialdojo_gen.learning.parts import Flying, Part
 from aerialdojo_gen.learning.recipe import Recipe
 from aerialdojo_gen.learning.seen import actions_fingerprint
@@ -135,7 +136,7 @@ class _Training:
         d, m = recipe.data, recipe.model
         self._sensors = Sensors(d.views, bool(d.views), bool(d.views), d.size_px, d.size_px)
         self._selection = (Selection((d.split,)).splits, d.settings)
-        self._index = self._read_index()
+        self._index, named = self._read_index()
         told = (self._index.told[name] for name in ("target_name", "landmark", "direction", "description"))
         self._vocabulary = Vocabulary.of(goal_text(*said) for said in zip(*told, strict=True))
         shape = Shape(
@@ -147,16 +148,21 @@ class _Training:
             m.features,
             m.word_features,
             m.hidden,
+            len(named),
         )
         self._about = checkpoints.About(
-            shape.as_json(), self._vocabulary, self._sensors, release_fingerprint(root), actions_fingerprint()
-        )
+            shape.as_json(), self._vocabulary, self._sensors, release_fingerprint(root), actions_fingerprint(),
+            named,
+        )  # fmt: skip
         torch.manual_seed(recipe.seed)
         if device == "cpu":
             torch.use_deterministic_algorithms(True)
             # Every tensor filled before it is written: a tenth of the time, and none is read before.
             torch.utils.deterministic.fill_uninitialized_memory = False
         self._learner = Learner(Network(shape), recipe, device)
+        # What objects look like comes before the references, where it is learned.
+        self._first = -1 if named else 0
+        self._learner.begin(self._first)
         self._said = self._kept = time.monotonic()
         self._board: Any = None
         self._survey: Pool | None = None
@@ -165,7 +171,7 @@ class _Training:
         recipe, learner, report = self._recipe, self._learner, self._reporter
         if restart:
             # The weights too: a phase that has some counts as done. The settings last, in case of a kill between.
-            ended = [self._folder / f"{name}.safetensors" for name in ("imitation", "policy")]
+            ended = [self._folder / f"{name}.safetensors" for name in ("sight", "imitation", "policy")]
             for path in (*ended, *self._folder.glob("dagger-*.safetensors")):
                 path.unlink(missing_ok=True)
             for name in (_CHECKPOINT, _HISTORY, _SETTINGS):
@@ -181,8 +187,8 @@ class _Training:
         self._board = _board(self._folder / "tensorboard")
         parts = self._collect(index, None, "drawing references")
         self._survey = self._look_about()
-        for phase in range(recipe.dagger.rounds + 1):
-            if phase:
+        for phase in range(self._first, recipe.dagger.rounds + 1):
+            if phase > 0:
                 parts += self._collect(self._drawn(phase), self._flying(phase), f"round {phase}: flying")
             if phase < learner.progress.phase or self._weights(phase).is_file():
                 continue
@@ -198,13 +204,20 @@ class _Training:
         report.line(f"train {recipe.name}: weights in {last}")
         return Trained(self._weights(0), last)
 
-    def _read_index(self) -> Index:
+    def _read_index(self) -> tuple[Index, tuple[str, ...]]:
+        """Read the trajectories that are learned from, and the words that pictures will be searched for."""
         d = self._recipe.data
         index = read_index(self._root, Selection((d.split,), d.settings, (), d.scenes), d.target_split)
-        return index if d.limit is None else index.take(drawn_evenly(index, d.limit, self._recipe.seed))
+        named: tuple[str, ...] = ()
+        if d.looks and d.views and self._recipe.sight.epochs:
+            # Of all targets, however few of the trajectories to them are learned from.
+            targets = set(zip(index.scene.tolist(), index.told["target_name"], strict=True))
+            named = naming_words(str(name) for _, name in sorted(targets, key=str))
+        return (index if d.limit is None else index.take(drawn_evenly(index, d.limit, self._recipe.seed))), named
 
     def _weights(self, phase: int) -> Path:
-        return self._folder / ("imitation.safetensors" if not phase else f"dagger-{phase}.safetensors")
+        names = {-1: "sight", 0: "imitation"}
+        return self._folder / f"{names.get(phase, f'dagger-{phase}')}.safetensors"
 
     def _drawn(self, phase: int) -> Index:
         """Draw a round's tasks: as many as fit, none of those kept back, others than the round before's first."""
@@ -245,6 +258,14 @@ class _Training:
 
     def _learn(self, parts: list[Steps], phase: int) -> None:
         train, dagger = self._recipe.train, self._recipe.dagger
+        if phase < 0 and self._survey is not None:
+            from aerialdojo_gen.learning.recognition import recognise
+
+            recognise(
+                self._learner, self._survey, self._about.named, after=self._after("sight", self._recipe.sight.epochs),
+                tick=self._tick("sight", time.monotonic()),
+            )  # fmt: skip
+            return
         epochs, rate = (dagger.epochs, dagger.learning_rate) if phase else (train.epochs, train.learning_rate)
         pool = Pool(parts, self._index.scenes, self._vocabulary)
         what = f"round {phase}" if phase else "imitation"

@@ -25,6 +25,8 @@ _SUMS = 3 + 3 + 5 + 2
 _LEAST = 1e-3
 # A place is never told better than so, in units: what nearby steps have in common cannot be averaged away.
 _FLOOR = 0.05
+# Precisions of what is known from elsewhere: those of a map after a few steps.
+_LED, _LED_YAW = 1.0 / _FLOOR**2, 20.0
 
 
 class Guess(NamedTuple):
@@ -54,6 +56,23 @@ class Guess(NamedTuple):
     scene: Any
     goal: Any
     sure: Any
+
+    @property
+    def scene_nats(self) -> Any:
+        """How unsure each step's pictures are of which scene they show: (n, T), nats, 0 where there is no doubt."""
+        told = self.scene.log_softmax(dim=-1)
+        return -(told.exp() * told).sum(dim=-1)
+
+    def led(self, offset_m: Any) -> Guess:
+        """Put the goal where something else says that it is, and be sure of it.
+
+        Parameters
+        ----------
+        offset_m : (n, T, 3)
+            Ahead, left and up of the body, metres.
+        """
+        sure = torch.tensor([_LED] * 3 + [_LED_YAW] + [_LED] * 3 + [1.0], device=offset_m.device)
+        return self._replace(offset=offset_m / UNIT_M, sure=sure.expand(*offset_m.shape[:2], -1))
 
 
 class Whereabouts(nn.Module):  # type: ignore[misc]  # torch is looked at by no type checker here

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from aerialdojo_gen.geometry.cameras import Camera, view_pose
 from aerialdojo_gen.rendering.backend import Renderer
 from aerialdojo_gen.rendering.gl_occlusion import BodyCulling
-from aerialdojo_gen.rendering.gl_target import read_pixels
+from aerialdojo_gen.rendering.gl_target import read_instances, read_pixels
 from aerialdojo_gen.rendering.picture import FAR_M, NEAR_M
 
 Floats = NDArray[np.float64]
@@ -27,7 +27,7 @@ _AHEAD = 4
 
 
 def draw_bodies(
-    renderer: Renderer, camera: Camera, poses: Floats, views: Sequence[str]
+    renderer: Renderer, camera: Camera, poses: Floats, views: Sequence[str], instance: NDArray[np.int32] | None = None
 ) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
     """Take the pictures of all views at some poses.
 
@@ -40,6 +40,8 @@ def draw_bodies(
         x, y, z in metres and yaw in radians, world frame, of the body's centre.
     views : sequence of str
         Of `aerialdojo_gen.store.schemas.VIEWS`.
+    instance : (n, views, H, W) int32, optional
+        Filled with the pictures' instance id maps: numbers in the scene's order, -1 where nothing is hit.
 
     Returns
     -------
@@ -52,12 +54,14 @@ def draw_bodies(
     rgb, depth_m = np.empty((*shape, 3), np.uint8), np.empty(shape, np.float32)
     many = getattr(renderer, "bodies", None)
     if many is not None:
-        many().draw(camera, poses, views, rgb, depth_m)
+        many().draw(camera, poses, views, rgb, depth_m, instance)
         return rgb, depth_m
     for k, pose in enumerate(poses):
         for v, view in enumerate(views):
-            picture = renderer.render(camera, view_pose(pose[:3], float(pose[3]), view))
+            picture = renderer.render(camera, view_pose(pose[:3], float(pose[3]), view), instance is not None)
             rgb[k, v], depth_m[k, v] = picture.rgb, picture.depth_m
+            if instance is not None:
+                instance[k, v] = np.asarray(picture.instance)
     return rgb, depth_m
 
 
@@ -81,8 +85,9 @@ class GlBodies:
         views: Sequence[str],
         rgb: NDArray[np.uint8],
         depth_m: NDArray[np.float32],
+        instance: NDArray[np.int32] | None = None,
     ) -> None:
-        """Fill ``rgb`` (n, views, H, W, 3) and ``depth_m`` (n, views, H, W); see `draw_bodies`."""
+        """Fill ``rgb`` (n, views, H, W, 3), ``depth_m`` and ``instance`` (n, views, H, W); see `draw_bodies`."""
         from aerialdojo_gen.rendering.gl import clip_from_world
 
         waiting: deque[tuple[Any, int, int]] = deque()
@@ -95,12 +100,21 @@ class GlBodies:
             seen = [culling.seen(clips, eye, camera.width, camera.height, nearness) for culling in self._cullings]
             for v, matrix in enumerate(world):
                 target = self._renderer.draw_seen(
-                    camera, matrix, clips[v], [of_kind[v] for of_kind in seen], slot=turn % (_AHEAD + 1)
-                )
+                    camera, matrix, clips[v], [of_kind[v] for of_kind in seen], instance is not None,
+                    slot=turn % (_AHEAD + 1),
+                )  # fmt: skip
                 turn += 1
                 waiting.append((target, k, v))
                 if len(waiting) > _AHEAD:
-                    ready, i, j = waiting.popleft()
-                    read_pixels(ready, rgb[i, j], depth_m[i, j])
-        for ready, i, j in waiting:
-            read_pixels(ready, rgb[i, j], depth_m[i, j])
+                    _read(*waiting.popleft(), rgb, depth_m, instance)
+        for one in waiting:
+            _read(*one, rgb, depth_m, instance)
+
+
+def _read(
+    target: Any, k: int, v: int, rgb: NDArray[np.uint8], depth_m: NDArray[np.float32],
+    instance: NDArray[np.int32] | None,
+) -> None:  # fmt: skip
+    read_pixels(target, rgb[k, v], depth_m[k, v])
+    if instance is not None:
+        instance[k, v] = read_instances(target, depth_m[k, v].shape)

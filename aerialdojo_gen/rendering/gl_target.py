@@ -40,12 +40,14 @@ def read_picture(target: Any, camera: Camera, instances: bool) -> Picture:
     shape = (camera.height, camera.width)
     rgb, depth = np.empty((*shape, 3), dtype=np.uint8), np.empty(shape, dtype=np.float32)
     read_pixels(target, rgb, depth)
-    found = None
-    if instances:
-        numbers = np.empty(shape, dtype=np.float32)
-        target.read_into(numbers, components=1, attachment=1, dtype="f4")
-        found = numbers.astype(np.int32) - 1
-    return Picture(rgb, depth, found)
+    return Picture(rgb, depth, read_instances(target, shape) if instances else None)
+
+
+def read_instances(target: Any, shape: tuple[int, int]) -> NDArray[np.int32]:
+    """Read the instance id map, (H, W) int32, of a target that was drawn with one; -1 where nothing is hit."""
+    numbers = np.empty(shape, dtype=np.float32)
+    target.read_into(numbers, components=1, attachment=1, dtype="f4")
+    return numbers.astype(np.int32) - 1
 
 
 def read_pixels(target: Any, rgb: NDArray[np.uint8], depth_m: NDArray[np.float32]) -> None:
