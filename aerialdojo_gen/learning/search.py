@@ -136,10 +136,9 @@ class Search:
         away_m = float(np.linalg.norm(place))
         if remaining <= _LAST_WAY + _A_METRE * away_m:
             return place
-        if best.looked_at or away_m <= _REACHED_M:
-            return self._onward(odometry)
-        best.tried += 1
-        return place
+        # Who stands before it and has not seen it from nearby sees something else there.
+        best.tried = _PATIENCE if away_m <= _REACHED_M else best.tried + 1
+        return self._onward(odometry) if best.looked_at else place
 
     def _onward(self, odometry: NDArray[np.float32]) -> NDArray[np.float32]:
         self._since += 1
