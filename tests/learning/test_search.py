@@ -1,0 +1,187 @@
+"""Where to look for a goal that no map tells: names of what is seen, sightings joined over steps, and where to fly."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from aerialdojo_gen.agents.goal import Sensors
+from aerialdojo_gen.benchmark.eyes import drawing
+from aerialdojo_gen.benchmark.tasks import Selection, mesh_of
+from aerialdojo_gen.benchmark.viewpoints import nodes_of
+from aerialdojo_gen.geometry.cameras import view_pose
+from aerialdojo_gen.learning.index import read_index
+from aerialdojo_gen.learning.naming import named_by, naming_words
+from aerialdojo_gen.learning.parts import Part, Survey
+from aerialdojo_gen.learning.search import Search, patch_depths_m, patch_rays
+from aerialdojo_gen.learning.survey import NOTHING, UNTOLD, patches_of, surveyed
+from aerialdojo_gen.scenes.context import SEVERAL, open_scene
+from aerialdojo_gen.store import shards as store
+from aerialdojo_gen.store.root import open_root
+
+SENSORS = Sensors(("front", "left", "right", "down"), width=32, height=32)
+WORDS = ("blue", "red", "van")
+coordinates = st.floats(-60.0, 60.0)
+poses = st.tuples(coordinates, coordinates, st.floats(-8.0, 8.0), st.floats(-3.2, 3.2)).map(
+    lambda p: np.array(p, np.float32)
+)
+
+
+@pytest.fixture(scope="module")
+def looks(smoke, tmp_path_factory):
+    """Looks about in the smoke run's scene, with what they show."""
+    root = open_root(smoke)
+    (scene, *_) = read_index(root, Selection(("id_train",))).scenes
+    part = Part(root, ("id_train",), (), scene, (), SENSORS, 32, "gl", tmp_path_factory.mktemp("looks"))
+    return root, scene, surveyed(part, Survey(60, 3, 0, "train"))
+
+
+def seeing(shown, number):
+    """Log chances of a sight that is right: the words of `WORDS` for patches that show an object, else nothing."""
+    chances = np.full((len(shown), len(WORDS) + 1), 1e-3, np.float32)
+    chances[shown == number, 1:3] = 0.49
+    chances[shown != number, -1] = 0.99
+    return np.log(chances)
+
+
+def test_words_that_name_several_objects_are_searched_for():
+    words = naming_words(["the red van", "a red car, with a roof", "van of the baker", "roof"])
+    assert words == ("red", "roof", "van")
+    wanted = named_by(["red van in red", "blue bus"], words)
+    assert np.allclose(wanted, [[0.5, 0.0, 0.5], [0.0, 0.0, 0.0]])
+
+
+@given(st.integers(0, 2**32 - 1), st.sampled_from([2, 5, 12]))
+def test_a_patch_shows_what_most_of_its_pixels_do(seed, blocky):
+    rng = np.random.default_rng(seed)
+    # Blocks of any size: patches of one object, of several, and of few pixels of one.
+    small = rng.integers(-2, 4, (2, 16 // blocky + 1, 16 // blocky + 1)).astype(np.int16)
+    number = small.repeat(blocky, axis=1).repeat(blocky, axis=2)[:, :16, :16]
+    for k, found in enumerate(patches_of(number).tolist()):
+        view, row, column = np.unravel_index(k, (2, 4, 4))
+        own = number[view, 4 * row : 4 * row + 4, 4 * column : 4 * column + 4].ravel().tolist()
+        count = {one: own.count(one) for one in set(own) - {NOTHING}}
+        if not count:
+            assert found == NOTHING
+        elif max(count.values()) < 4:
+            assert found == UNTOLD
+        else:
+            assert count[found] == max(count.values())
+
+
+def test_looks_about_tell_targets_of_their_side_and_no_others(looks):
+    root, name, found = looks
+    scene = open_scene(*mesh_of(root, name), SEVERAL).scene
+    rows = store.read_scene(root, "release/objects", name, ("object_id", "name")).to_pylist()
+    called = {nodes_of(root, name)[row["object_id"]]: row["name"] for row in rows}
+    targets = {"train": set(), "test": set()}
+    for side in ("train", "test"):
+        told = {row["nav_id"]: row["target_split"] for row in store.read_scene(
+            root, f"tasks/{side}", name, ("nav_id", "target_split")).to_pylist()}  # fmt: skip
+        for row in store.read_scene(root, f"routes/{side}", name, ("nav_id", "target_object_id")).to_pylist():
+            targets[told[row["nav_id"]]].add(nodes_of(root, name)[row["target_object_id"]])
+    assert targets["test"]
+    assert sorted(found.names) == sorted(called[node] for node in targets["train"])
+    renderer, seen = drawing(scene, "gl"), 0
+    for pose, shown in zip(found.pose[:20].astype(np.float64), found.shown, strict=False):
+        matrices = [view_pose(pose[:3], float(pose[3]), view) for view in SENSORS.views]
+        instance = np.stack([p.instance for p in renderer.render_views(SENSORS.camera, matrices, True)])
+        cut = instance.reshape(4, 8, 4, 8, 4).transpose(0, 1, 3, 2, 4).reshape(-1, 16)
+        for own, said in zip(cut, shown.tolist(), strict=True):
+            nodes = [scene.instances[k].node for k in own[own >= 0]]
+            if said >= 0:
+                # Poses are kept in single precision: a pixel at an edge may be another's.
+                assert sum(called.get(n) == found.names[said] and n in targets["train"] for n in nodes) >= 3
+                seen += 1
+            elif said == NOTHING:
+                assert sum(node in called for node in nodes) <= 1
+    assert seen > 20
+
+
+def test_who_sees_the_goal_is_led_to_it(looks):
+    root, name, found = looks
+    rows = store.read_scene(
+        root, "release/objects", name, ("name", "x_m", "y_m", "z_m", "size_x_m", "size_y_m", "size_z_m")
+    ).to_pylist()
+    known = {row["name"]: row for row in rows if [r["name"] for r in rows].count(row["name"]) == 1}
+    off = []
+    wanted = named_by(["red van"], WORDS)[0]
+    for k, pose in enumerate(found.pose):
+        distance_m = np.linalg.norm(
+            patch_rays(SENSORS) * patch_depths_m(found.frames[k], SENSORS.max_depth_m)[:, None], axis=1
+        )
+        near = np.where((distance_m > 0.0) & (distance_m < 12.0), found.shown[k], NOTHING)
+        for number in np.unique(near[near >= 0]).tolist():
+            row = known.get(str(found.names[number]))
+            if row is None or (near == number).sum() < 3:
+                continue
+            search = Search(wanted, SENSORS)
+            # From another pose the same sighting leads to the same place.
+            for begun in ((0.0, 0.0, 0.0, 0.0), (4.0, -2.0, 1.0, 1.2)):
+                odometry = np.array(begun, np.float32)
+                search = Search(wanted, SENSORS)
+                search.look(seeing(found.shown[k], number), found.frames[k], odometry)
+                ahead, left, up = search.towards(odometry, 1).astype(float)
+                c, s = np.cos(pose[3]), np.sin(pose[3])
+                place = pose[:3] + np.array([c * ahead - s * left, s * ahead + c * left, up])
+                outside = np.abs(place - [row["x_m"], row["y_m"], row["z_m"]])
+                size = np.array([row["size_x_m"], row["size_y_m"], row["size_z_m"]])
+                off.append(np.linalg.norm(np.maximum(outside - size / 2.0, 0.0)))
+    assert len(off) > 20
+    # It stands 1.5 m before the object; a patch's depth may be that of what is behind the object or in front of it.
+    assert np.median(off) < 2.0
+    assert np.quantile(off, 0.85) < 3.0
+
+
+def test_it_goes_to_what_looks_most_like_the_goal_until_it_was_seen_from_nearby():
+    wanted = named_by(["red van"], WORDS)[0]
+    search, start = Search(wanted, SENSORS), np.zeros(4, np.float32)
+    rays = patch_rays(SENSORS)
+    # One patch ahead and one to the left, 9 m away; what is ahead is red, what is to the left is a red van.
+    ahead = int(np.linalg.norm(rays - [1.0, 0.0, 0.0], axis=1).argmin())
+    left = int(np.linalg.norm(rays - [0.0, 1.0, 0.0], axis=1).argmin())
+    chances = np.full((256, 4), 1e-3)
+    chances[:, -1] = 0.997
+    chances[ahead] = [0.01, 0.9, 0.04, 0.05]
+    chances[left] = [0.01, 0.45, 0.45, 0.09]
+    pictures = np.zeros((4, 32, 32, 4), np.uint8)
+    pictures[..., 3] = round(255 * np.sqrt(9.0 / SENSORS.max_depth_m))
+    search.look(np.log(chances).astype(np.float32), pictures, start)
+    first = search.towards(start, 60)
+    assert first[1] > 5.0 > abs(first[0])
+    # From nearby it is no van: what is ahead is more like one now.
+    there = np.array([0.0, 6.0, 0.0, np.pi / 2], np.float32)
+    pictures[..., 3] = round(255 * np.sqrt(3.0 / SENSORS.max_depth_m))
+    chances[left] = chances[0]
+    chances[ahead] = [0.9, 0.01, 0.001, 0.089]
+    for _ in range(3):
+        search.look(np.log(chances).astype(np.float32), pictures, there)
+    second = search.towards(start, 60)
+    assert second[0] > 5.0 > abs(second[1])
+
+
+@given(st.lists(poses, min_size=1, max_size=40), st.integers(20, 90))
+def test_who_has_seen_nothing_flies_round_and_stops_nowhere(places, remaining):
+    search = Search(named_by(["red van"], WORDS)[0], SENSORS)
+    for odometry in places:
+        search.look(np.log(np.full((256, 4), [1e-3, 1e-3, 1e-3, 0.997])), np.zeros((4, 32, 32, 4), np.uint8), odometry)
+        away = search.towards(odometry, remaining)
+        assert np.linalg.norm(away) > 2.0
+        c, s = np.cos(odometry[3]), np.sin(odometry[3])
+        place = odometry[:3] + [c * away[0] - s * away[1], s * away[0] + c * away[1], away[2]]
+        assert np.hypot(place[0], place[1]) == pytest.approx(12.0, abs=1e-3)
+        assert place[2] == pytest.approx(0.0, abs=1e-4)
+
+
+def test_the_ring_is_flown_round_once_in_its_order():
+    search = Search(named_by(["red van"], WORDS)[0], SENSORS)
+    odometry, bearings = np.zeros(4, np.float32), []
+    for _ in range(60):
+        away = search.towards(odometry, 90)
+        # As a body does that flies 3 m at a time, and turns nowhere.
+        odometry[:3] += away * min(1.0, 3.0 / np.linalg.norm(away))
+        corner = odometry[:3] + away
+        bearings.append(np.arctan2(odometry[1], odometry[0]))
+        assert np.isfinite(corner).all()
+    turned = np.unwrap(bearings)
+    assert turned[-1] - turned[3] > 2.0 * np.pi
