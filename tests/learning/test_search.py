@@ -1,4 +1,4 @@
-"""Where to look for a goal that no map tells: names of what is seen, sightings joined over steps, and where to fly."""
+"""Where to look for a goal that no map tells: names of what is seen, sightings over steps, and where to fly."""
 
 import numpy as np
 import pytest
@@ -163,12 +163,14 @@ def test_it_goes_to_what_looks_most_like_the_goal_until_it_was_seen_from_nearby(
 @given(st.lists(poses, min_size=1, max_size=40), st.integers(20, 90))
 def test_who_has_seen_nothing_flies_round_and_stops_nowhere(places, remaining):
     search = Search(named_by(["red van"], WORDS)[0], SENSORS)
+    nothing = np.log(np.full((256, 4), [1e-3, 1e-3, 1e-3, 0.997]))
     for odometry in places:
-        search.look(np.log(np.full((256, 4), [1e-3, 1e-3, 1e-3, 0.997])), np.zeros((4, 32, 32, 4), np.uint8), odometry)
+        search.look(nothing, np.zeros((4, 32, 32, 4), np.uint8), odometry)
         away = search.towards(odometry, remaining)
         assert np.linalg.norm(away) > 2.0
         c, s = np.cos(odometry[3]), np.sin(odometry[3])
-        place = odometry[:3] + [c * away[0] - s * away[1], s * away[0] + c * away[1], away[2]]
+        moved = np.array([c * away[0] - s * away[1], s * away[0] + c * away[1], away[2]])
+        place = odometry[:3] + moved
         assert np.hypot(place[0], place[1]) == pytest.approx(12.0, abs=1e-3)
         assert place[2] == pytest.approx(0.0, abs=1e-4)
 
