@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from aerialdojo_gen.agents.base import AgentBase
 from aerialdojo_gen.agents.goal import N_ACTIONS, Goal, Observation
@@ -93,6 +94,8 @@ class Policy(AgentBase):
             self._goal = self.network.understand(tokens, image, shown)
         self._reckoning, self._previous, self._memory = Reckoning(), N_ACTIONS, None
         self._doubt: list[float] = []
+        # Looks that nothing was searched in: what is known needs no search, and it takes half as long as all else.
+        self._unsearched: list[tuple[Any, NDArray[np.float32]]] = []
         wanted = named_by([goal.target_name], about.named)[0] if about.named else None
         self._search = None if wanted is None else Search(wanted, self.sensors)
 
@@ -114,8 +117,9 @@ class Policy(AgentBase):
             guess, self._memory = self.network.whereabouts(seen, self._goal, odometry, memory)
             if self._search is not None and pictures is not None:
                 self._doubt.append(float(guess.scene_nats[0, 0]))
-                self._notice(self._search, pictures)
+                self._unsearched.append((pictures[0], self._reckoning.odometry))
                 if np.mean(self._doubt) > LOST_NATS:
+                    self._notice(self._search)
                     away = self._search.towards(self._reckoning.odometry, observation.remaining_actions)
                     guess = guess.led(torch.from_numpy(away[None, None]).to(device))
             thought = self.network.choose(seen, self._goal, guess)
@@ -123,10 +127,12 @@ class Policy(AgentBase):
         self._previous = int(thought.actions(back)[0, 0])
         return self._previous
 
-    def _notice(self, search: Search, pictures: Any) -> None:
-        """Remember what is seen: a map that was trusted may turn out to be of somewhere else."""
-        chances = self.network.sight(pictures[0]).log_softmax(dim=-1).flatten(0, 1)
-        search.look(chances.cpu().numpy(), pictures[0].cpu().numpy(), self._reckoning.odometry)
+    def _notice(self, search: Search) -> None:
+        """Search what was seen so far: a map that was trusted may turn out to be of somewhere else."""
+        for pictures, odometry in self._unsearched:
+            chances = self.network.sight(pictures).log_softmax(dim=-1).flatten(0, 1)
+            search.look(chances.cpu().numpy(), pictures.cpu().numpy(), odometry)
+        self._unsearched.clear()
 
 
 def _agree(about: checkpoints.About, shape: Any) -> None:

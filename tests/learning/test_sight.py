@@ -9,6 +9,7 @@ import time
 import numpy as np
 import pytest
 
+from aerialdojo_gen.agents.goal import Goal, Observation, Rules
 from aerialdojo_gen.benchmark.runner import Evaluation, evaluate
 from aerialdojo_gen.benchmark.tasks import Selection
 from aerialdojo_gen.errors import StoreError
@@ -20,7 +21,7 @@ from aerialdojo_gen.store.root import open_root
 torch = pytest.importorskip("torch", reason="PyTorch is not installed: it is the extra 'train'")
 
 from aerialdojo_gen.learning import checkpoints  # noqa: E402 - it needs torch
-from aerialdojo_gen.learning.policy import network_of  # noqa: E402
+from aerialdojo_gen.learning.policy import Policy, network_of  # noqa: E402
 from aerialdojo_gen.learning.training import train  # noqa: E402
 from aerialdojo_gen.learning.whereabouts import UNIT_M  # noqa: E402
 
@@ -158,11 +159,30 @@ def test_the_search_leads_where_the_place_is_not_known_and_nowhere_else(smoke, t
     assert rows
     if lost:
         assert all(row["n_actions"] == 1 and row["termination"] == "stop" for row in rows)
-        assert Beacon.led == len(rows)
+        assert Beacon.led == Beacon.looked == len(rows)
     else:
         assert Beacon.led == 0
+        assert Beacon.looked == 0
         assert any(row["n_actions"] > 1 for row in rows)
-    assert Beacon.looked == sum(row["n_actions"] for row in rows)
+
+
+def test_who_finds_out_late_that_it_is_lost_searches_what_it_saw_before(trained, monkeypatch):
+    monkeypatch.setattr("aerialdojo_gen.learning.policy.Search", Beacon)
+    monkeypatch.setattr("aerialdojo_gen.learning.policy.LOST_NATS", np.inf)
+    monkeypatch.setattr(Beacon, "looked", 0)
+    policy = Policy(str(trained(12)))
+    goal = Goal("semantic", "red van", "clock tower", "north", "A red van.", None, Rules(90, sensors=policy.sensors))
+    policy.reset(goal)
+    draw = np.random.default_rng(0)
+    for step in range(7):
+        if step == 5:
+            assert Beacon.looked == 0
+            monkeypatch.setattr("aerialdojo_gen.learning.policy.LOST_NATS", -1.0)
+        rgb = {view: draw.integers(0, 256, (32, 32, 3), np.uint8) for view in policy.sensors.views}
+        depth_m = {view: draw.uniform(1.0, 20.0, (32, 32)).astype(np.float32) for view in policy.sensors.views}
+        assert 0 <= policy.act(Observation(step, 90 - step, rgb=rgb, depth_m=depth_m)) < 16
+    # The five of before, and one at each step since.
+    assert Beacon.looked == 7
 
 
 def test_a_guess_that_is_led_is_where_it_was_led_to(trained):
