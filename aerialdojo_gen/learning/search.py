@@ -35,7 +35,7 @@ _LOOKED_AT_M = 4.5
 # Patches that are surely no object.
 _NOTHING = math.log(0.5)
 # Actions that are kept for the way to the best of what was seen: some, and so many a metre. References take 1.4.
-_LAST_WAY, _A_METRE = 10, 1.5
+_LAST_WAY, _A_METRE = 12, 2.0
 
 
 @dataclass
@@ -78,6 +78,7 @@ class Search:
         angles = [(k + 0.5) * turn for k in range(_CORNERS)]
         self._ring = [np.array([_RING_M * math.cos(a), _RING_M * math.sin(a), 0.0]) for a in angles]
         self._corner = self._since = 0
+        self._last: _Thing | None = None
 
     def look(
         self, log_chances: NDArray[np.float32], pictures: NDArray[np.uint8], odometry: NDArray[np.float32]
@@ -129,12 +130,14 @@ class Search:
         (3,) float32
             Ahead, left and up of the body, metres; a corner of the ring is never within the 2 m of a Stop.
         """
-        best = max(self._things.values(), key=lambda thing: thing.likeness, default=None)
+        best = self._last or max(self._things.values(), key=lambda thing: thing.likeness, default=None)
         if best is None:
             return self._onward(odometry)
         place = _seen_from(best.place / best.weight, odometry)
         away_m = float(np.linalg.norm(place))
-        if remaining <= _LAST_WAY + _A_METRE * away_m:
+        if self._last or remaining <= _LAST_WAY + _A_METRE * away_m:
+            # For good: who changes his mind on the way arrives nowhere.
+            self._last = best
             return place
         # Who stands before it and has not seen it from nearby sees something else there.
         best.tried = _PATIENCE if away_m <= _REACHED_M else best.tried + 1

@@ -187,3 +187,31 @@ def test_the_ring_is_flown_round_once_in_its_order():
         assert np.isfinite(corner).all()
     turned = np.unwrap(bearings)
     assert turned[-1] - turned[3] > 2.0 * np.pi
+
+
+def test_the_last_way_leads_to_one_thing_and_is_begun_in_time():
+    """Whatever is seen on it: who changes his mind arrives nowhere."""
+    search, odometry = Search(named_by(["red van"], WORDS)[0], SENSORS), np.zeros(4, np.float32)
+    left = int(np.linalg.norm(patch_rays(SENSORS) - [0.0, 1.0, 0.0], axis=1).argmin())
+    ahead = int(np.linalg.norm(patch_rays(SENSORS) - [1.0, 0.0, 0.0], axis=1).argmin())
+    pictures = np.zeros((4, 32, 32, 4), np.uint8)
+    pictures[..., 3] = round(255 * np.sqrt(9.0 / SENSORS.max_depth_m))
+
+    def see(patch):
+        chances = np.full((256, 4), 1e-3)
+        chances[:, -1] = 0.997
+        chances[patch] = [0.01, 0.45, 0.45, 0.09]
+        search.look(np.log(chances).astype(np.float32), pictures, odometry)
+
+    see(left)
+    # It has looked at it, in vain, and is as far from it as it was: round the start, until the way there is due.
+    first = search.towards(odometry, 90)
+    for _ in range(13):
+        search.towards(odometry, 90)
+    due = [r for r in range(60, 10, -1) if np.allclose(search.towards(odometry, r), first)]
+    assert due
+    assert due == list(range(due[0], 10, -1)), "for good"
+    assert 20 <= due[0] <= 40
+    for _ in range(8):
+        see(ahead)
+    assert np.allclose(search.towards(odometry, 9), first)
