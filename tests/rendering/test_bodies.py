@@ -80,3 +80,21 @@ def test_nothing_to_draw_is_no_error():
         rgb, depth_m = draw_bodies(renderer, Camera(8, 8, 90.0), np.empty((0, 4)), ["front"])
     assert rgb.shape == (0, 1, 8, 8, 3)
     assert depth_m.shape == (0, 1, 8, 8)
+
+
+@pytest.mark.parametrize("kind", [GlRenderer, PyBulletRenderer])
+def test_who_asks_for_them_has_instance_ids_too(kind):
+    """Those of each picture alone; and colours and depths are what they are without."""
+    world, camera = courtyard(), Camera(24, 16, 90.0)
+    poses, views = poses_in(world, 6, 5), ["front", "down", "left"]
+    instance_ids = np.full((6, 3, 16, 24), -9, np.int32)
+    with kind(world) as renderer:
+        rgb, depth_m = draw_bodies(renderer, camera, poses, views, instance_ids)
+        without = draw_bodies(renderer, camera, poses, views)
+        for k, pose in enumerate(poses):
+            for v, view in enumerate(views):
+                picture = renderer.render(camera, view_pose(pose[:3], pose[3], view), instances=True)
+                assert (instance_ids[k, v] == picture.instance).all(), (k, view)
+    assert (rgb == without[0]).all()
+    assert (depth_m == without[1]).all()
+    assert len(np.unique(instance_ids)) > 3
