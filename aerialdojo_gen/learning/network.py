@@ -13,7 +13,7 @@ from torch.nn import functional
 from aerialdojo_gen.agents.goal import N_ACTIONS
 from aerialdojo_gen.geometry.motion import TURNS
 from aerialdojo_gen.learning.seen import PATCH_PX
-from aerialdojo_gen.learning.sight import Sight
+from aerialdojo_gen.learning.sight import Sight, as_patches
 from aerialdojo_gen.learning.whereabouts import UNIT_M, Guess, Whereabouts
 from aerialdojo_gen.store.schemas import STOP
 
@@ -165,10 +165,7 @@ class Network(nn.Module):  # type: ignore[misc]  # torch is looked at by no type
 
     def look(self, pictures: Any) -> Any:
         """Encode pictures: (n, H, W, 4) uint8 to (n, features)."""
-        n, height, width, bytes_a_pixel = pictures.shape
-        rows, columns = height // PATCH_PX, width // PATCH_PX
-        cut = pictures.view(n, rows, PATCH_PX, columns, PATCH_PX, bytes_a_pixel).transpose(2, 3)
-        patches = self.patches(cut.reshape(n, rows, columns, -1).float().div(127.5).sub(1.0))
+        patches = self.patches(as_patches(pictures))
         # As they lie in memory, channels last: on a CPU convolutions take half the time so.
         return self.eye(patches.permute(0, 3, 1, 2))
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from aerialdojo_gen.agents.goal import Sensors
 from aerialdojo_gen.geometry.cameras import view_pose
-from aerialdojo_gen.learning.seen import PATCH_PX
+from aerialdojo_gen.learning.seen import PATCH_PX, in_patches
 
 Floats = NDArray[np.float64]
 
@@ -165,9 +165,7 @@ def patch_rays(sensors: Sensors) -> Floats:
 
 def patch_depths_m(pictures: NDArray[np.uint8], range_m: float) -> Floats:
     """Median depths of patches, metres, 0 where most of a patch has none: (views, H, W, 4) to (patches,)."""
-    views, height, width, _ = pictures.shape
-    cut = pictures[..., 3].reshape(views, height // PATCH_PX, PATCH_PX, width // PATCH_PX, PATCH_PX)
-    near = np.median(cut.transpose(0, 1, 3, 2, 4).reshape(-1, PATCH_PX**2), axis=1)
+    near = np.median(in_patches(pictures[..., 3]), axis=1)
     return np.square(near / 255.0) * range_m
 
 

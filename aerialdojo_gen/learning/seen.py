@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+from typing import Any
 
 import cv2
 import numpy as np
@@ -37,6 +38,13 @@ def packed(rgb: NDArray[np.uint8], depth_m: NDArray[np.float32], sensors: Sensor
     """
     near = np.sqrt(np.clip(depth_m / np.float32(sensors.max_depth_m), 0.0, 1.0), dtype=np.float32)
     return np.concatenate([rgb, np.rint(near * 255.0).astype(np.uint8)[..., None]], axis=-1)
+
+
+def in_patches(values: NDArray[Any]) -> NDArray[Any]:
+    """Cut pictures into patches, view after view and row after row: (views, H, W) to (patches, pixels of a patch)."""
+    views, height, width = values.shape
+    cut = values.reshape(views, height // PATCH_PX, PATCH_PX, width // PATCH_PX, PATCH_PX)
+    return cut.transpose(0, 1, 3, 2, 4).reshape(-1, PATCH_PX**2)
 
 
 def goal_picture(image: NDArray[np.uint8] | None, size_px: int) -> NDArray[np.uint8]:

@@ -13,6 +13,14 @@ from aerialdojo_gen.learning.seen import PATCH_PX
 _WIDTH = 128
 
 
+def as_patches(pictures: Any) -> Any:
+    """Cut pictures into patches, -1 to 1: (n, H, W, 4) uint8 to (n, H / 4, W / 4, 64)."""
+    n, height, width, bytes_a_pixel = pictures.shape
+    rows, columns = height // PATCH_PX, width // PATCH_PX
+    cut = pictures.view(n, rows, PATCH_PX, columns, PATCH_PX, bytes_a_pixel).transpose(2, 3)
+    return cut.reshape(n, rows, columns, -1).float().div(127.5).sub(1.0)
+
+
 class Sight(nn.Module):  # type: ignore[misc]  # torch is looked at by no type checker here
     """Chances that the words of objects' names name what a patch of a picture shows.
 
@@ -53,10 +61,9 @@ class Sight(nn.Module):  # type: ignore[misc]  # torch is looked at by no type c
         (n, H / 4 * W / 4, words + 1), or (k, words + 1)
             Logits; the last is of no object.
         """
-        n, height, width, size = pictures.shape
-        rows, columns = height // PATCH_PX, width // PATCH_PX
-        cut = pictures.view(n, rows, PATCH_PX, columns, PATCH_PX, size).transpose(2, 3)
-        fine = functional.relu(self.patches(cut.reshape(n, rows, columns, -1).float().div(127.5).sub(1.0)))
+        cut = as_patches(pictures)
+        n, rows, columns, _ = cut.shape
+        fine = functional.relu(self.patches(cut))
         fine = fine.permute(0, 3, 1, 2)
         middle = functional.relu(self.halved(fine))
         coarse = functional.relu(self.quartered(middle))

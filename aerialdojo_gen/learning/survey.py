@@ -17,7 +17,7 @@ from aerialdojo_gen.config.sections import Embodiment
 from aerialdojo_gen.learning.index import Index, read_index
 from aerialdojo_gen.learning.parts import Part, Survey, hindered
 from aerialdojo_gen.learning.pictures import within
-from aerialdojo_gen.learning.seen import PATCH_PX, packed
+from aerialdojo_gen.learning.seen import PATCH_PX, in_patches, packed
 from aerialdojo_gen.learning.steps import Steps
 from aerialdojo_gen.rendering.bodies import draw_bodies
 from aerialdojo_gen.scenes.context import SEVERAL, open_scene
@@ -111,9 +111,7 @@ def patches_of(number: NDArray[np.int16]) -> NDArray[np.int16]:
 
     At least a quarter of them; where fewer do, or where it is one that may not be named, that is not told.
     """
-    views, height, width = number.shape
-    cut = number.reshape(views, height // PATCH_PX, PATCH_PX, width // PATCH_PX, PATCH_PX)
-    pixels = cut.transpose(0, 1, 3, 2, 4).reshape(-1, PATCH_PX**2)
+    pixels = in_patches(number)
     out = np.full(len(pixels), NOTHING, np.int16)
     some = np.flatnonzero((pixels != NOTHING).any(axis=1))
     own = pixels[some]
