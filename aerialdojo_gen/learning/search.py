@@ -64,18 +64,15 @@ class Search:
         Words of the goal's name: a row of `aerialdojo_gen.learning.naming.named_by`.
     sensors : Sensors
         Of the pictures.
-    clockwise : bool
-        To which side the ring is flown.
     """
 
-    def __init__(self, wanted: NDArray[np.float32], sensors: Sensors, clockwise: bool = False) -> None:
+    def __init__(self, wanted: NDArray[np.float32], sensors: Sensors) -> None:
         self._wanted = wanted.astype(np.float64)
         self._rays = patch_rays(sensors)
         self._range_m = sensors.max_depth_m
         self._things: dict[tuple[int, int, int], _Thing] = {}
         # The first corner is ahead to one side, the last to the other.
-        turn = (-1.0 if clockwise else 1.0) * 2.0 * math.pi / _CORNERS
-        angles = [(k + 0.5) * turn for k in range(_CORNERS)]
+        angles = [(k + 0.5) * 2.0 * math.pi / _CORNERS for k in range(_CORNERS)]
         self._ring = [np.array([_RING_M * math.cos(a), _RING_M * math.sin(a), 0.0]) for a in angles]
         self._corner = self._since = 0
         self._last: _Thing | None = None
