@@ -16,7 +16,7 @@ from aerialdojo_gen.learning.loader import torch_package
 from aerialdojo_gen.learning.network import Network, Thought
 from aerialdojo_gen.learning.recipe import Recipe
 from aerialdojo_gen.learning.steps import Pool
-from aerialdojo_gen.learning.whereabouts import UNIT_M, astray, missed
+from aerialdojo_gen.learning.whereabouts import UNIT_M, Guess, astray, missed
 from aerialdojo_gen.pipeline.executors.local import own_cores
 
 # Batches of like lengths are put together from so many: padding costs time.
@@ -53,7 +53,10 @@ class Progress:
 
 @dataclass(frozen=True)
 class Epoch:
-    """What came of an epoch: mean loss and accuracy of the steps trained on, and what `Learner.assess` finds."""
+    """What came of an epoch: mean loss and accuracy of the steps trained on, and what `Learner.assess` finds.
+
+    The loss and this accuracy are those of choices that are told where the goal is.
+    """
 
     phase: int
     number: int
@@ -70,7 +73,7 @@ class Assessed:
     Attributes
     ----------
     accuracy : float
-        Share of steps at which its likeliest action is the teacher's.
+        Share of steps at which its likeliest action, by where it thinks the goal to be, is the teacher's.
     goal_off_m : float
         Median distance between where the goal is and where it is thought to be, metres.
     goal_off_at_start_m : float
@@ -252,12 +255,12 @@ class Learner:
         with self.torch.no_grad():
             for episodes in epoch_batches(lengths, self.recipe.train.batch_steps, 0, 0, 0):
                 batch = self._batch(pool, frames, episodes, rng.generator(0, "kept back"))
-                thought, mask = self._forward(batch), batch["mask"]
+                (thought, guess), mask = self._forward(batch, told=False), batch["mask"]
                 right.append((thought.logits.argmax(-1) == batch["label"])[mask])
                 said, is_so = thought.blocked[mask] > 0.0, batch["blocked"][mask]
                 hindered.append(said[is_so])
                 free.append(~said[~is_so])
-                away = self.torch.linalg.vector_norm(thought.guess.offset * UNIT_M - batch["offset"], dim=-1)
+                away = self.torch.linalg.vector_norm(guess.offset * UNIT_M - batch["offset"], dim=-1)
                 off.append(away[mask])
                 first.append(away[:, 0])
         median = [float(self.torch.cat(one).median()) for one in (off, first)]
@@ -304,11 +307,19 @@ class Learner:
             out["pictures"] = self._pictures(pool, frames, rows)
         return out
 
-    def _forward(self, batch: dict[str, Any]) -> Thought:
+    def _forward(self, batch: dict[str, Any], *, told: bool) -> tuple[Thought, Guess]:
+        """Guess where goals are, and choose by that guess, or by where they are where the choice is told.
+
+        A choice is learned beside the true offset: beside guesses that are still wrong it learns not to go by them,
+        and who searches, or has a better map later, has a choice that does not follow.
+        """
+        network = self.network
         with self.autocast():
-            goal = self.network.understand(batch["tokens"], batch["images"], batch["told_by_image"])
-            thought, _ = self.network(batch.get("pictures"), goal, batch["odometry"], batch["mask"])
-        return thought
+            goal = network.understand(batch["tokens"], batch["images"], batch["told_by_image"])
+            seen = network.features(batch.get("pictures"), goal, batch["mask"])
+            blank = network.blank(len(seen)).to(self.device)
+            guess, _ = network.whereabouts(seen, goal, batch["odometry"], blank)
+            return network.choose(seen, guess.led(batch["offset"]) if told else guess), guess
 
     def _looked_about(self, draw: np.random.Generator) -> Any:
         """Loss of places told by pictures from anywhere: an episode's are too much alike to learn a scene by."""
@@ -341,11 +352,11 @@ class Learner:
         batch = self._batch(pool, frames, episodes, draw)
         # What is dropped out is drawn anew at every batch, so that a resumed training draws the same.
         self.torch.manual_seed(int(draw.integers(2**31)))
-        thought, mask = self._forward(batch), batch["mask"]
+        (thought, guess), mask = self._forward(batch, told=True), batch["mask"]
         logits, label = thought.logits[mask].float(), batch["label"][mask]
         loss = functional.cross_entropy(logits, label)
         touches = touched(thought.blocked[mask], batch["blocked"][mask])
-        where = missed(thought.guess, batch) + touches + self._looked_about(draw)
+        where = missed(guess, batch) + touches + self._looked_about(draw)
         self.update(loss + self.recipe.train.goal_weight * where, rate)
         right = (logits.argmax(-1) == label).sum()
         return float(loss.detach()), float(right), int(mask.sum())

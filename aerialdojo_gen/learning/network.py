@@ -20,7 +20,7 @@ from aerialdojo_gen.store.schemas import STOP
 # Wave lengths of the sines that tell places apart, metres; beside them the place itself.
 _WAVES_M = (4.0, 12.0, 36.0, 108.0)
 _FAR_M = 30.0
-_BEARING = 3 * (2 * len(_WAVES_M) + 1) + 3 + 8
+_BEARING = 3 * (2 * len(_WAVES_M) + 1) + 3
 _DROPOUT = 0.1
 # Where a policy stops, metres: within the 3 m of success by what it may be mistaken.
 ARRIVED_M = 2.0
@@ -74,7 +74,7 @@ class Thought(NamedTuple):
     blocked : (n, T, 16)
         Logits of each action's touching a surface or leaving the flight volume.
     guess : Guess
-        Where the goal is thought to be.
+        Where the goal is thought to be, or was said to be.
     """
 
     logits: Any
@@ -130,7 +130,8 @@ class Network(nn.Module):  # type: ignore[misc]  # torch is looked at by no type
         patches, *channels = shape.channels
         # Patches of 4 x 4 pixels first, as one product of matrices: layers of few channels are what takes a CPU long.
         self.patches = nn.Linear(4 * PATCH_PX**2, patches)
-        layers: list[Any] = [nn.ReLU(inplace=True)]
+        # The first not in place: what it is given is a view, whose gradient would be copied, a fifth of the time.
+        layers: list[Any] = [nn.ReLU()]
         before = patches
         for n in channels:
             layers += [nn.Conv2d(before, n, 3, stride=2, padding=1), nn.ReLU(inplace=True)]
@@ -151,9 +152,8 @@ class Network(nn.Module):  # type: ignore[misc]  # torch is looked at by no type
         # Who sees nothing guesses by what is said alone.
         pictured = max(shape.views, 1) * shape.features
         self.whereabouts = Whereabouts(pictured, shape.features, shape.hidden, shape.scenes)
-        known = pictured + shape.features + _BEARING
         self.choice = nn.Sequential(
-            nn.Linear(known, shape.hidden), nn.ReLU(inplace=True), nn.Dropout(_DROPOUT),
+            nn.Linear(pictured + _BEARING, shape.hidden), nn.ReLU(inplace=True), nn.Dropout(_DROPOUT),
             nn.Linear(shape.hidden, shape.hidden), nn.ReLU(inplace=True), nn.Linear(shape.hidden, N_ACTIONS),
         )  # fmt: skip
 
@@ -212,7 +212,7 @@ class Network(nn.Module):  # type: ignore[misc]  # torch is looked at by no type
         memory = self.blank(len(mask)).to(odometry.device) if memory is None else memory
         seen = self.features(pictures, goal, mask)
         guess, memory = self.whereabouts(seen, goal, odometry, memory)
-        return self.choose(seen, goal, guess), memory
+        return self.choose(seen, guess), memory
 
     def features(self, pictures: Any, goal: Any, mask: Any) -> Any:
         """Encode what is seen at steps, (n, T, ...); of who sees nothing, the goal. Parameters are `forward`'s."""
@@ -224,11 +224,13 @@ class Network(nn.Module):  # type: ignore[misc]  # torch is looked at by no type
         rows = mask.flatten().nonzero()[:, 0]
         return flat.index_copy(0, rows, looked).reshape(n, steps, -1)
 
-    def choose(self, seen: Any, goal: Any, guess: Guess) -> Thought:
-        """Choose actions by what is seen, (n, T, ...), the goal, (n, features), and where it is thought to be."""
-        n, steps = seen.shape[:2]
-        parts = [seen, goal[:, None].expand(n, steps, -1), bearing(guess)]
-        logits = self.choice(torch.cat([part.to(goal.dtype) for part in parts], dim=2))
+    def choose(self, seen: Any, guess: Guess) -> Thought:
+        """Choose actions by what is seen, (n, T, ...), and where the goal is thought to be, and by nothing else.
+
+        What the goal is has done its part by then. With its words a choice learns routes of the training's scenes by
+        heart, and beside a map that is still poor it learns not to go by the map.
+        """
+        logits = self.choice(torch.cat([seen, bearing(guess).to(seen.dtype)], dim=2))
         return Thought(logits, self.blocked(seen), guess)
 
     def blank(self, n: int) -> Any:
@@ -237,11 +239,11 @@ class Network(nn.Module):  # type: ignore[misc]  # torch is looked at by no type
 
 
 def bearing(guess: Guess) -> Any:
-    """Where the goal is thought to be, as numbers: (n, T, 31); choices teach it nothing."""
+    """Where the goal is thought to be, as numbers: (n, T, 30); choices teach it nothing."""
     away_m = guess.offset.detach() * UNIT_M
     flat = torch.linalg.vector_norm(away_m[..., :2], dim=-1, keepdim=True)
     towards = away_m[..., :2] / (flat + 0.5)
-    return torch.cat([_waves(away_m), towards, torch.log1p(flat), guess.sure.detach().log()], dim=-1)
+    return torch.cat([_waves(away_m), towards, torch.log1p(flat)], dim=-1)
 
 
 def _waves(place_m: Any) -> Any:

@@ -122,7 +122,7 @@ class Policy(AgentBase):
                     self._notice(self._search)
                     away = self._search.towards(self._reckoning.odometry, observation.remaining_actions)
                     guess = guess.led(torch.from_numpy(away[None, None]).to(device))
-            thought = self.network.choose(seen, self._goal, guess)
+            thought = self.network.choose(seen, guess)
         back = torch.from_numpy(self._reckoning.back[None, None]).to(device)
         self._previous = int(thought.actions(back)[0, 0])
         return self._previous

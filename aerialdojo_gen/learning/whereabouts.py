@@ -25,8 +25,6 @@ _SUMS = 3 + 3 + 5 + 2
 _LEAST = 1e-3
 # A place is never told better than so, in units: what nearby steps have in common cannot be averaged away.
 _FLOOR = 0.05
-# Precisions of what is known from elsewhere: those of a map after a few steps.
-_LED, _LED_YAW = 1.0 / _FLOOR**2, 20.0
 
 
 class Guess(NamedTuple):
@@ -45,9 +43,6 @@ class Guess(NamedTuple):
         Logits of the scenes that were learned, by the step's pictures alone.
     goal : (n, T, 164)
         Logits of where the goal is in the scene's frame, by what is said of it and by the scene.
-    sure : (n, T, 8)
-        How well it is known, all above 0: precisions of the body's axes and of its heading by all steps so far, those
-        of the goal's axes, and the chance of the likeliest scene.
     """
 
     offset: Any
@@ -55,7 +50,6 @@ class Guess(NamedTuple):
     heading: Any
     scene: Any
     goal: Any
-    sure: Any
 
     @property
     def scene_nats(self) -> Any:
@@ -64,15 +58,14 @@ class Guess(NamedTuple):
         return -(told.exp() * told).sum(dim=-1)
 
     def led(self, offset_m: Any) -> Guess:
-        """Put the goal where something else says that it is, and be sure of it.
+        """Put the goal where something else says that it is.
 
         Parameters
         ----------
         offset_m : (n, T, 3)
             Ahead, left and up of the body, metres.
         """
-        sure = torch.tensor([_LED] * 3 + [_LED_YAW] + [_LED] * 3 + [1.0], device=offset_m.device)
-        return self._replace(offset=offset_m / UNIT_M, sure=sure.expand(*offset_m.shape[:2], -1))
+        return self._replace(offset=offset_m / UNIT_M)
 
 
 class Whereabouts(nn.Module):  # type: ignore[misc]  # torch is looked at by no type checker here
@@ -148,7 +141,7 @@ class Whereabouts(nn.Module):  # type: ignore[misc]  # torch is looked at by no 
         start = start / turned.clamp(min=1e-4)
         where = known.softmax(dim=-1)
         target = self.target(torch.cat([goal[:, None].expand(-1, steps, -1), where.to(goal.dtype)], dim=2)).float()
-        goal_at, goal_spread = places(target.detach())
+        goal_at, _ = places(target.detach())
         # The mean place minus where own motion leads from the start, turned as the start faced, is the start.
         c, s = start.unbind(-1)
         led = torch.stack(
@@ -157,11 +150,7 @@ class Whereabouts(nn.Module):  # type: ignore[misc]  # torch is looked at by no 
         away = goal_at / UNIT_M - (been - led) / weights
         ahead = torch.cat([_seen_from(away[..., :2], start), away[..., 2:]], dim=-1) - moved
         offset = torch.cat([_seen_from(ahead[..., :2], turn), ahead[..., 2:]], dim=-1)
-        sure = torch.cat(
-            [weights, turned + _LEAST, 1.0 / ((goal_spread / UNIT_M).square() + _FLOOR**2),
-             where.amax(dim=-1, keepdim=True)], dim=2,
-        )  # fmt: skip
-        return Guess(offset, seen_at, facing, scene, target, sure), total[:, -1]
+        return Guess(offset, seen_at, facing, scene, target), total[:, -1]
 
 
 def _seen_from(vector: Any, by: Any) -> Any:

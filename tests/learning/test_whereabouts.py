@@ -134,7 +134,6 @@ def test_the_loss_falls_only_where_each_guess_is_right(flight):
     place, yaw, goal = truth(flight)
     right = Guess(
         flight["offset"] / UNIT_M, place_logits(place), heading_logits(yaw), scene_logits(), place_logits(goal),
-        torch.ones(1, T, 8),
     )  # fmt: skip
     least = float(missed(right, flight))
     assert float(missed(right._replace(offset=right.offset + 0.5), flight)) == pytest.approx(least + 0.125)
