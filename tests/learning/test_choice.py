@@ -61,6 +61,6 @@ def test_told_where_goals_are_it_flies_there_though_its_map_knows_nothing(smoke,
     rows = np.linspace(0, len(index) - 1, min(len(index), 40)).astype(int)
     with torch.inference_mode():
         told, untold = ([flown(root, network, about.sensors, index, k, led) for k in rows] for led in (True, False))
-    # 18 and 0 of 39 as measured.
+    # 18 and 0 of 39 as measured; a choice that learned beside its own guess ended none when told.
     assert np.mean(told) > 0.25
     assert np.mean(untold) < 0.1
