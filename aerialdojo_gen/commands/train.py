@@ -16,7 +16,7 @@ app = typer.Typer()
 @app.command("train")
 def train(
     recipe: Annotated[
-        Path, typer.Argument(metavar="RECIPE", help="Recipe: a file, or a name of those shipped: imitation.")
+        Path, typer.Argument(metavar="RECIPE", help="Recipe: a file, or the name of a shipped one: imitation, blind, …")
     ],
     data: Data = "data",
     small: Annotated[

@@ -319,6 +319,15 @@ def test_what_is_no_policy_is_said_in_a_line(tmp_path, learned):
         load_recipe(file)
 
 
+def test_shipped_recipes_are_named_after_their_files_and_small_ones_have_no_more_rounds(project):
+    files = sorted((project / "pipelines" / "baselines").glob("*.toml"))
+    assert {"imitation", "blind"} <= {file.stem for file in files}
+    for file in files:
+        shipped = load_recipe(file)
+        assert shipped.name == file.stem  # else two of them would train into one folder
+        assert shipped.made_small().dagger.rounds <= shipped.dagger.rounds, f"{file} --small is another method"
+
+
 def test_the_teachers_labels_are_the_planners_own_plan():
     """From wherever the body is: the label is the plan's first action, and to follow labels is to arrive."""
     world = town()
