@@ -82,7 +82,8 @@ def test_a_recipe_that_is_shipped_goes_by_its_name_anywhere(unpacked, project, t
     assert len(set(done.stdout.splitlines())) == 1
     (tmp_path / "imitation").write_text('name = "mine"\n')  # a file goes before a name
     assert '"name":"mine"' in read("imitation").stdout
-    assert "no recipe imitatoin; by name, as in aerialdojo-gen train imitation: blind, imitation" in read("imitatoin").stderr
+    told = read("imitatoin").stderr
+    assert "no recipe imitatoin; by name, as in aerialdojo-gen train imitation: blind, imitation" in told
 
 
 def test_where_no_release_is_the_wheel_advises_what_it_has(unpacked, tmp_path):

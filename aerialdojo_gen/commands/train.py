@@ -16,7 +16,7 @@ app = typer.Typer()
 @app.command("train")
 def train(
     recipe: Annotated[
-        Path, typer.Argument(metavar="RECIPE", help="Recipe: a file, or the name of a shipped one: imitation, blind, …")
+        Path, typer.Argument(metavar="RECIPE", help="A file, or the name of a shipped recipe: imitation, blind, …")
     ],
     data: Data = "data",
     small: Annotated[
