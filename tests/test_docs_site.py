@@ -1,11 +1,15 @@
-"""The site's pages of reference say all that the program has, and the site has every page of docs/."""
+"""The site's reference covers the whole program, the site has every page of docs/, and it works without a network."""
 
+import os
 import re
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 import typer.main
 import yaml
+from support.browser import chromium, errors, until
 
 from aerialdojo_gen.cli import app
 from aerialdojo_gen.config.keys import config_keys
@@ -66,3 +70,37 @@ def test_every_page_stands_in_the_navigation_and_what_stands_there_exists(pages)
     own = {str(page.relative_to(ROOT / "docs")) for page in (ROOT / "docs").rglob("*.md")}
     assert set(listed) == own | set(pages) | {page for page, _ in brought}
     assert all((ROOT / source).is_file() for _, source in brought)
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory):
+    """The site as `make docs` builds it, in a folder of its own."""
+    folder = tmp_path_factory.mktemp("site")
+    command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--quiet", "--site-dir", folder]
+    env = os.environ | {"NO_MKDOCS_2_WARNING": "1"}
+    done = subprocess.run(command, cwd=ROOT, env=env, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return folder
+
+
+@pytest.mark.slow
+def test_no_page_or_style_of_the_site_loads_anything_from_elsewhere(site):
+    loads = re.compile(
+        r"""<(?!a\s)[^>]*\s(?:src|srcset|data|poster|href)=["']?((?:https?:)?//[^"'\s>]*)|"""
+        r"""(?:url\(|@import\s)\s*["']?((?:https?:)?//[^"')\s]*)"""
+    )
+    pages = [*site.rglob("*.html"), *site.rglob("*.css")]
+    assert len(pages) > 30
+    assert {found for page in pages for found in loads.findall(page.read_text(encoding="utf-8"))} == set()
+
+
+@pytest.mark.browser
+def test_search_works_where_the_site_is_opened_from_a_folder(site):
+    with chromium("the site's search") as driver:
+        for page in ("faq.html", "reference/cli.html"):
+            driver.get((site / page).as_uri())
+            driver.find_element("css selector", "input[name=query]").click()
+            driver.find_element("css selector", "input[name=query]").send_keys("object store")
+            found = until("results", lambda: driver.find_elements("css selector", ".md-search-result__item a"))
+            assert found[0].get_attribute("href") == (site / "object-store.html").as_uri()
+            assert errors(driver) == []
