@@ -104,13 +104,13 @@ def main() -> None:
         trouble.check_limits(sys.argv[1:])
         _for(sys.argv[1:2])(standalone_mode=True)
     except AerialDojoError as error:
-        print(f"error: {error}", file=sys.stderr)
+        print("\n".join([f"error: {error}", *getattr(error, "__notes__", ())]), file=sys.stderr)
         raise SystemExit(error.exit_code) from None
     except Exception as error:
         line = trouble.explained(error)
         if line is None:
             raise
-        print(f"error: {line}", file=sys.stderr)
+        print("\n".join([f"error: {line}", *getattr(error, "__notes__", ())]), file=sys.stderr)
         raise SystemExit(1) from None
 
 

@@ -205,9 +205,13 @@ def run_chosen(
     address: str | None = None,
     verbose: bool = False,
 ) -> None:
-    """Run stages as `aerialdojo_gen.pipeline.run.run_stages` does, with progress, and say what Ctrl-C leaves."""
+    """Run stages as `aerialdojo_gen.pipeline.run.run_stages` does, with progress; an error or Ctrl-C says what is kept."""
+    from aerialdojo_gen.errors import UsageError
     from aerialdojo_gen.pipeline.progress import Reporter
 
+    kept = "finished shards are kept, " + (
+        "and --force computes them again" if force else "the same command continues from where it stopped"
+    )
     try:
         run_stages(
             stages, config, roots, scene, workers=workers, executor=executor, address=address, force=force,
@@ -215,5 +219,10 @@ def run_chosen(
         )  # fmt: skip
     except KeyboardInterrupt:
         # Said here because Typer turns Ctrl-C into a silent exit.
-        print("interrupted: finished shards are kept, the same command goes on from here", file=sys.stderr)
+        print(f"interrupted: {kept}", file=sys.stderr)
         raise SystemExit(130) from None
+    except Exception as error:
+        # A wrong option or pipeline file ended it before anything was computed.
+        if not isinstance(error, UsageError):
+            error.add_note(kept)
+        raise

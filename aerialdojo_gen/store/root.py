@@ -12,7 +12,7 @@ import fnmatch
 import os
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Iterator
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import AbstractContextManager, ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import BinaryIO, TextIO, TypeAlias
@@ -21,7 +21,7 @@ from aerialdojo_gen.common.disk import disk_error
 from aerialdojo_gen.errors import StoreError, UsageError
 from aerialdojo_gen.store import files
 from aerialdojo_gen.store.atomic import atomic_file, atomic_folder
-from aerialdojo_gen.store.staging import remove, sweep, sweep_unstaged
+from aerialdojo_gen.store.staging import remove, staged, sweep, sweep_unstaged
 
 
 class DataRoot(ABC):
@@ -232,7 +232,7 @@ class LocalRoot(DataRoot):
             file = path.open("a+")
         except OSError as error:
             raise disk_error(error, path) from None
-        with file:
+        with file, ExitStack() as stack:
             try:
                 fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except BlockingIOError:
@@ -243,6 +243,10 @@ class LocalRoot(DataRoot):
                 raise disk_error(error, path) from None
             self._sweep_once(file)
             sweep(self.path)
+            # An item of this run keeps the staging folder there until its end: workers need not make it anew for each
+            # file. On a full disk a run that has nothing to write goes on without.
+            with suppress(OSError):
+                stack.enter_context(staged(self.path, path))
             try:
                 yield
             finally:

@@ -72,7 +72,8 @@ def _claim(area: Path) -> tuple[Path, TextIO]:
             area.mkdir(parents=True, exist_ok=True)
             item.mkdir()
             lease = (item / _LEASE).open("x+", encoding="utf-8", errors="surrogateescape")
-        except FileNotFoundError:
+        except (FileNotFoundError, FileExistsError):
+            # Another process removed the area: pathlib reports the second where that came while it made it.
             if not left:
                 raise
             continue

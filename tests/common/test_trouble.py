@@ -11,6 +11,8 @@ import sys
 import pytest
 from support.preload import library, unshared
 
+KEPT = "finished shards are kept, the same command continues from where it stopped"
+
 
 def call(*args, cwd=None, limits=(), **env):
     def set_limits():
@@ -25,9 +27,11 @@ def call(*args, cwd=None, limits=(), **env):
     return done
 
 
-def assert_one_line(done, code, *words):
+def assert_one_line(done, code, *words, run=False):
+    """`run`: the line of a run that had begun, and below it what the same command does."""
     assert done.returncode == code, done.stderr
-    assert done.stderr.count("\n") == 1, done.stderr
+    line, kept = done.stderr.split("\n", 1)
+    assert kept == (f"{KEPT}\n" if run else ""), done.stderr
     assert done.stderr.startswith("error: ")
     for word in words:
         assert word in done.stderr, done.stderr
@@ -39,7 +43,9 @@ def test_a_file_system_without_locks(smoke, tmp_path, verb, number):
     options = {"split": ["--pipeline", "pipelines/smoke.toml"], "evaluate": ["--agent", "stop", "--limit", "1"]}[verb]
     env = {"LD_PRELOAD": str(library()), "PRELOAD_FLOCK_ERRNO": str(number)}
     done = call(verb, *options, "--data", str(data), "--quiet", **env)
-    assert_one_line(done, 1, "cannot write", ".lock: the file system", "no locks", "a local disk")
+    assert_one_line(
+        done, 1, "cannot write", ".lock: the file system", "no locks", "a local disk", run=verb != "evaluate"
+    )
 
 
 @pytest.mark.parametrize(
@@ -86,7 +92,8 @@ def test_file_descriptors_that_run_out_half_way_are_one_line(tmp_path):
     # Every worker takes some: forty of them do not fit into 64.
     limits = [(resource.RLIMIT_NOFILE, 64)]
     done = call("build-scenes", "--data", str(tmp_path / "d"), "--workers", "40", "--quiet", limits=limits)
-    assert_one_line(done, 1, "too few file descriptors: ulimit -n is 64; raise it, or use fewer --workers")
+    assert_one_line(done, 1, "too few file descriptors: ulimit -n is 64; raise it, or use fewer --workers",
+                    run=True)  # fmt: skip
 
 
 @pytest.mark.parametrize("mib", [512, 1100])
@@ -96,9 +103,20 @@ def test_too_little_address_space_is_said_in_one_line(smoke, tmp_path, mib):
     limits = [(resource.RLIMIT_AS, mib << 20)]
     args = ["plan", "--pipeline", "pipelines/smoke.toml", "--data", str(data), "--workers", "1", "--quiet"]
     done = call(*args, limits=limits)
-    assert_one_line(done, 1, "not enough memory", f"(ulimit -v is {mib << 10} kB, {mib} MB)")
+    assert_one_line(done, 1, "not enough memory", f"(ulimit -v is {mib << 10} kB, {mib} MB)", run=mib > 1024)
     assert not list(data.rglob(".aerialdojo-staging"))
     assert call("--help", limits=limits).returncode == 0
+
+
+def test_a_run_that_ends_in_an_error_says_that_the_same_command_continues(tmp_path):
+    data = tmp_path / "data"
+    data.mkdir()
+    (data / "scenes").write_text("in the way")
+    command = ["build-scenes", "U_Courtyard_0", "--pipeline", "smoke", "--data", str(data), "--workers", "1", "--quiet"]
+    assert_one_line(call(*command), 1, str(data / "scenes"), "not a folder", run=True)
+    assert "--force computes them again" in call(*command, "--force").stderr.splitlines()[-1]
+    (data / "scenes").unlink()
+    assert call(*command).returncode == 0
 
 
 def test_targets_that_cannot_be_written(smoke, tmp_path):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import signal
 import subprocess
@@ -15,6 +16,7 @@ from support.preload import killing_environment, unshared
 from aerialdojo_gen.errors import StoreError
 from aerialdojo_gen.store import staging
 from aerialdojo_gen.store.atomic import atomic_file, atomic_folder
+from aerialdojo_gen.store.root import LocalRoot
 from aerialdojo_gen.store.staging import AREA, scratch_folder, sweep
 
 HOLDING = """
@@ -25,6 +27,15 @@ HOLDING = """
         path.write_text("x")
         print(path, flush=True)
         time.sleep(300)
+"""
+STAGING = """
+    import sys
+    from pathlib import Path
+    from aerialdojo_gen.store.staging import staged
+    root = Path(sys.argv[1])
+    for _ in range(int(sys.argv[2])):
+        with staged(root, root / "f"):
+            pass
 """
 REPLACING = """
     import sys
@@ -182,6 +193,45 @@ def test_two_writers_of_one_folder_do_not_mix(tmp_path):
     found = names(tmp_path)
     assert found.keys() == {"f/a", "f/b"}
     assert len(set(found.values())) == 1
+
+
+def stagers(root, items, count=2):
+    """Start processes that stage so many items each."""
+    command = [sys.executable, "-c", textwrap.dedent(STAGING), str(root), str(items)]
+    return [subprocess.Popen(command) for _ in range(count)]
+
+
+def test_the_staging_folder_can_go_while_another_process_makes_it(tmp_path):
+    area = tmp_path / AREA
+    processes = stagers(tmp_path, 500)
+    while any(process.poll() is None for process in processes):
+        for change in (os.mkdir, os.rmdir):
+            with contextlib.suppress(OSError):
+                change(area)
+    assert [process.returncode for process in processes] == [0, 0]
+
+
+def test_the_staging_folder_stays_as_long_as_a_run(tmp_path):
+    with LocalRoot(tmp_path).lock():
+        before = (tmp_path / AREA).stat()
+        assert [process.wait() for process in stagers(tmp_path, 3)] == [0, 0]
+        assert os.path.samestat(before, (tmp_path / AREA).stat())
+    assert [path.name for path in tmp_path.iterdir()] == [".lock"]
+
+
+@pytest.mark.kill
+def test_a_killed_run_s_staging_folder_is_gone_after_the_next(tmp_path):
+    code = """
+        import os, signal, sys
+        from aerialdojo_gen.store.root import open_root
+        with open_root(sys.argv[1]).lock():
+            os.kill(os.getpid(), signal.SIGKILL)
+    """
+    subprocess.run([sys.executable, "-c", textwrap.dedent(code), str(tmp_path)], check=False)
+    assert len(list((tmp_path / AREA).iterdir())) == 1
+    with LocalRoot(tmp_path).lock():
+        assert len(list((tmp_path / AREA).iterdir())) == 1
+    assert [path.name for path in tmp_path.iterdir()] == [".lock"]
 
 
 def test_another_disk_below_the_root_gets_what_it_is_to_have(tmp_path):
