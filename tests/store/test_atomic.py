@@ -203,7 +203,7 @@ def stagers(root, items, count=2):
 
 def test_the_staging_folder_can_go_while_another_process_makes_it(tmp_path):
     area = tmp_path / AREA
-    processes = stagers(tmp_path, 500)
+    processes = stagers(tmp_path, 300)
     while any(process.poll() is None for process in processes):
         for change in (os.mkdir, os.rmdir):
             with contextlib.suppress(OSError):
