@@ -205,7 +205,7 @@ def run_chosen(
     address: str | None = None,
     verbose: bool = False,
 ) -> None:
-    """Run stages as `aerialdojo_gen.pipeline.run.run_stages` does, with progress; an error or Ctrl-C says what is kept."""
+    """Run stages with progress (`aerialdojo_gen.pipeline.run.run_stages`), and say what an error or Ctrl-C leaves."""
     from aerialdojo_gen.errors import UsageError
     from aerialdojo_gen.pipeline.progress import Reporter
 
