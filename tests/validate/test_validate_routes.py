@@ -125,6 +125,41 @@ def test_a_way_through_a_wall_and_back(planted, world):
     assert found in ({"oracle_fails": key(old)}, {"oracle_fails": key(old), "long_way_round": key(old)})
 
 
+def test_a_wall_across_any_one_leg_of_any_route_is_found(planted, world):
+    """Two free routes joined through a wall: the joint is the first, a middle, the last or the only leg that hits."""
+    ends = {"first": (-1, 0), "middle": (0, 0), "last": (0, -1), "only": (-1, -1)}
+
+    def joined(place, row):
+        """The row's route and another's, joined as `place` says, where only the joint meets a surface."""
+        own = poses(row)
+        own = own[ends[place][0] :] if ends[place][0] else own
+        for other in others:
+            theirs = poses(other) if ends[place][1] == 0 else poses(other)[:1]
+            if world.segment_in_collision(own[-1, :3], theirs[0, :3], RADIUS):
+                return np.concatenate([own, theirs]), own[-1, :3], theirs[0, :3]
+        raise AssertionError("no route of the scene ends behind a wall")
+
+    others = planted.rows(KEY)
+    joints = {}
+    # The first and a middle route of the first part, and the first and the last of the second.
+    chosen = {
+        "routes/train": [("last", 0), ("middle", len(others) // 2)],
+        "routes/test": [("first", 0), ("only", -1)],
+    }
+    for part, places in chosen.items():
+        rows = planted.rows(part)
+        for place, k in places:
+            path, *joint = joined(place, rows[k])
+            rows[k] |= {name: path[:, i].tolist() for i, name in enumerate(("x_m", "y_m", "z_m", "yaw_rad"))}
+            rows[k]["action"] = [STOP] * len(path)
+            joints[key(rows[k])[0]] = joint
+        planted.write(part, rows)
+    data = scene_data(planted)
+    found = {data["routes"].key(f.row): f.found for f in collisions.route_collision(data, data["routes"])}
+    told = {name: [", ".join(f"{v:.2f}" for v in end) for end in joint] for name, joint in joints.items()}
+    assert found == {name: f"the body touches a surface between ({p}) and ({q}) m" for name, (p, q) in told.items()}
+
+
 def test_an_action_that_leads_elsewhere(planted):
     def wanted(row):
         return TURN_LEFT in row["action"]
