@@ -27,7 +27,7 @@ from aerialdojo_gen.commands import (
     train,
     validate,
 )
-from aerialdojo_gen.common import advice, trouble
+from aerialdojo_gen.common import advice, terminal, trouble
 from aerialdojo_gen.errors import AerialDojoError
 
 
@@ -40,6 +40,10 @@ class _Commands(TyperGroup):
         with formatter.section("Commands"):
             formatter.write_dl(rows)
 
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Give help where nothing is asked for."""
+        return super().parse_args(ctx, args or ["--help"])
+
     def invoke(self, ctx: Any) -> Any:
         """Run the command, with nothing kept of another one."""
         advice.begin(sys.argv[0])
@@ -51,7 +55,6 @@ def _new() -> typer.Typer:
         cls=_Commands,
         name="aerialdojo-gen",
         help="Generate aerial object-goal-search datasets: scenes, tasks, certified routes, RGB-D recordings.",
-        no_args_is_help=True,
         pretty_exceptions_enable=False,
         rich_markup_mode=None,  # half of the time that --help takes is importing what draws boxes
         context_settings={"help_option_names": ["-h", "--help"]},
@@ -83,7 +86,7 @@ _GROUPS = (
 )  # fmt: skip
 for _group in _GROUPS:
     app.add_typer(_group.app)
-app.add_typer(config.app, name="config")
+app.add_typer(config.app, name="config", cls=_Commands)
 
 
 def _for(named: list[str]) -> typer.Typer:
@@ -97,21 +100,44 @@ def _for(named: list[str]) -> typer.Typer:
     return app
 
 
+# Its base is the class of all that is wrong with options; Typer has Click's, or its own, by its version.
+_BadOption: Any = typer.BadParameter.__bases__[0]
+
+
 def main() -> None:
     """Run the command line; an expected error becomes one line and an exit code."""
+    trouble.use_utf8()
+    with terminal.standard_streams():
+        code, line = _ended()
+        if line:
+            print(f"error: {line}", file=sys.stderr)
+    raise SystemExit(code)
+
+
+def _ended() -> tuple[int, str]:
+    """Run the command; return its exit code, and its error in one line where it is an expected one."""
     try:
         trouble.check_arguments(sys.argv[1:])
         trouble.check_limits(sys.argv[1:])
-        _for(sys.argv[1:2])(standalone_mode=True)
+        try:
+            called = advice.program(sys.argv[0]) or advice.PROGRAM
+            return _for(sys.argv[1:2])(prog_name=called, standalone_mode=False) or 0, ""
+        finally:
+            sys.stdout.flush()
+    except _BadOption as error:
+        where = f"; see {error.ctx.command_path} --help" if error.ctx else ""
+        return error.exit_code, f"{error.format_message().rstrip('.')}{where}"
     except AerialDojoError as error:
-        print("\n".join([f"error: {error}", *getattr(error, "__notes__", ())]), file=sys.stderr)
-        raise SystemExit(error.exit_code) from None
+        return error.exit_code, _with_notes(str(error), error)
     except Exception as error:
         line = trouble.explained(error)
         if line is None:
             raise
-        print("\n".join([f"error: {line}", *getattr(error, "__notes__", ())]), file=sys.stderr)
-        raise SystemExit(1) from None
+        return 1, _with_notes(line, error)
+
+
+def _with_notes(line: str, error: Exception) -> str:
+    return "\n".join([line, *getattr(error, "__notes__", ())])
 
 
 if __name__ == "__main__":

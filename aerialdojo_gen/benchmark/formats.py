@@ -9,19 +9,16 @@ from aerialdojo_gen.benchmark.grid import BEST, SECOND, Table
 from aerialdojo_gen.common.text_table import Column, TextTable
 
 _SIGNS = {BEST: "¹", SECOND: "²"}
-_ANSI = {BEST: "\x1b[1m", SECOND: "\x1b[4m"}
 
 
-def as_text(table: Table, width: int | None = None, ansi: bool = False) -> str:
-    """Write a table for a terminal.
+def as_text(table: Table, width: int | None = None) -> str:
+    """Write a table for a terminal; the best has ¹, the second ².
 
     Parameters
     ----------
     table : Table
     width : int, optional
         Columns of the terminal: what does not fit goes below, under the same first column.
-    ansi : bool
-        Whether the best is bold and the second underlined, as terminals do it; else they have ¹ and ².
 
     Returns
     -------
@@ -31,13 +28,12 @@ def as_text(table: Table, width: int | None = None, ansi: bool = False) -> str:
     columns = [Column(name, group) for group, names in table.groups for name in names]
     heads = [column.head for column in columns]
     cells = [list(row) for _, row in table.rows]
-    if not ansi:
-        bare = {k for i, k in table.marks if " ± " not in cells[i][k]}
-        for i, line in enumerate([heads, *cells]):
-            for k in range(len(heads)):
-                sign = _SIGNS.get(table.marks.get((i - 1, k), ""), " ")
-                # The mean is what is marked: the sign takes the place of the blank behind it.
-                line[k] = line[k].replace(" ± ", f"{sign}± ") if " ± " in line[k] else line[k] + sign * (k in bare)
+    bare = {k for i, k in table.marks if " ± " not in cells[i][k]}
+    for i, line in enumerate([heads, *cells]):
+        for k in range(len(heads)):
+            sign = _SIGNS.get(table.marks.get((i - 1, k), ""), " ")
+            # The mean is what is marked: the sign takes the place of the blank behind it.
+            line[k] = line[k].replace(" ± ", f"{sign}± ") if " ± " in line[k] else line[k] + sign * (k in bare)
     return "\n".join(
         TextTable(
             table.stub,
@@ -46,17 +42,15 @@ def as_text(table: Table, width: int | None = None, ansi: bool = False) -> str:
             table.title,
             table.notes,
             table.sections,
-            {at: _ANSI[mark] for at, mark in table.marks.items()} if ansi else {},
         ).lines(width)
     )
 
 
-def legend(tables: Sequence[Table], ansi: bool = False) -> str:
+def legend(tables: Sequence[Table]) -> str:
     """Say what the marks in tables for a terminal mean; empty where there are none."""
     if not any(table.marks for table in tables):
         return ""
-    what = "Bold: best; underlined: second" if ansi else "¹ best, ² second"
-    return f"{what} of those compared; the oracle, which is given the way, is not."
+    return "¹ best, ² second of those compared; the oracle, which is given the route, is not."
 
 
 def as_markdown(table: Table) -> str:

@@ -10,7 +10,7 @@ import typer
 from aerialdojo_gen.commands.common import Json, PipelineFile, pipeline_file, print_json
 from aerialdojo_gen.common import advice
 
-app = typer.Typer(help="Show what a pipeline file may say, or write one to begin with.", no_args_is_help=True)
+app = typer.Typer(help="Show what a pipeline file may say, or write one to begin with.")
 
 
 @app.command("show")

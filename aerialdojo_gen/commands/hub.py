@@ -61,7 +61,6 @@ def pull(
     )
     print(moved)
     if moved.left:
-        # Anybody may have chosen these names: none of them is to talk to the terminal.
-        names = ["".join(c if c.isprintable() else "?" for c in brief(name, 100)) for name in moved.left[:5]]
+        names = [brief(name, 100) for name in moved.left[:5]]
         print(f"left there: {', '.join(names)}{' …' if len(moved.left) > 5 else ''}")
     print(f"next: {advice.command('validate', no_meshes=not moved.meshes)}")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import sys
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -133,9 +132,8 @@ def _show(tables: Any, style: str) -> None:
     from aerialdojo_gen.benchmark import formats
 
     if style == "terminal":
-        ansi = sys.stdout.isatty()
         width = terminal_width()
-        parts = [*(formats.as_text(table, width, ansi) for table in tables), formats.legend(tables, ansi)]
+        parts = [*(formats.as_text(table, width) for table in tables), formats.legend(tables)]
         print("\n\n".join(filter(None, parts)))
     else:
         print("\n\n".join(formats.FORMATS[style](table) for table in tables))

@@ -17,7 +17,6 @@ _WIDTH = 80
 _NARROWEST = 40
 # A column of words is not made narrower than this, if it is that wide at all.
 _LEAST_WORDS = 24
-_OFF = "\x1b[0m"
 
 
 @dataclass(frozen=True)
@@ -59,8 +58,6 @@ class TextTable:
         What must be known to read it.
     sections : mapping of int to str
         Headings within the table, by the row that they stand above.
-    styles : mapping of (int, int) to str
-        Escape sequences that a terminal shows a cell with, by row and column.
     """
 
     stub: str
@@ -69,7 +66,6 @@ class TextTable:
     title: str = ""
     notes: Sequence[str] = ()
     sections: Mapping[int, str] = field(default_factory=dict)
-    styles: Mapping[tuple[int, int], str] = field(default_factory=dict)
 
     def lines(self, width: int | None = None) -> list[str]:
         """Write the table.
@@ -182,7 +178,7 @@ class _Body:
             widths[span[-1]] += max(0, len(group) - inner)
             top += "   " + group.center(max(inner, len(group)))
 
-        def written(label: str, cells: Sequence[str], row: int | None) -> list[str]:
+        def written(label: str, cells: Sequence[str]) -> list[str]:
             parts = {k: wrapped(cells[k], widths[k]) if columns[k].words else [cells[k]] for k in block}
             made = []
             for n in range(max(map(len, parts.values()), default=1)):
@@ -190,9 +186,7 @@ class _Body:
                 for k in block:
                     part = parts[k][n] if n < len(parts[k]) else ""
                     blank = " " * (widths[k] - len(part))
-                    style = None if row is None else table.styles.get((row, k))
-                    shown = f"{style}{part}{_OFF}" if style else part
-                    text += ("   " if k in firsts else "  ") + (shown + blank if columns[k].words else blank + shown)
+                    text += ("   " if k in firsts else "  ") + (part + blank if columns[k].words else blank + part)
                 made.append(text.rstrip())
             return made
 
@@ -202,7 +196,8 @@ class _Body:
             rows += [table.sections[i]] if i in table.sections else []
             # A row whose cells all went to another block says nothing here.
             if label.strip() or any(cells[k].strip() for k in block):
-                rows += written(self.indent + label, cells, i)
-                breadth = max(breadth, *map(len, written(self.indent + label, cells, None)))
-        heads = [*([top.rstrip()] if top.strip() else []), *written(table.stub, [c.head for c in columns], None)]
+                lines = written(self.indent + label, cells)
+                rows += lines
+                breadth = max(breadth, *map(len, lines))
+        heads = [*([top.rstrip()] if top.strip() else []), *written(table.stub, [c.head for c in columns])]
         return [*heads, "-" * max(breadth, *map(len, heads)), *rows]

@@ -8,6 +8,7 @@ from __future__ import annotations
 import errno
 import os
 import resource
+import sys
 from collections.abc import Iterator, Sequence
 
 from aerialdojo_gen.common.disk import DISK_ERRORS
@@ -21,6 +22,12 @@ _NO_MEMORY = (
     "out of memory", "unable to allocate",
 )  # fmt: skip
 _NO_FILES = ("too many open files",)
+
+
+def use_utf8() -> None:
+    """Start Python again in its UTF-8 mode where the locale has another encoding: paths and files are UTF-8 here."""
+    if sys.getfilesystemencoding() != "utf-8" and os.environ.get("PYTHONUTF8") != "1":
+        os.execve(sys.executable, [sys.executable, *sys.orig_argv[1:]], os.environ | {"PYTHONUTF8": "1"})  # noqa: S606
 
 
 def check_arguments(arguments: Sequence[str]) -> None:

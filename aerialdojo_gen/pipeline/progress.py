@@ -11,6 +11,8 @@ from typing import Any, TextIO
 
 from tqdm import tqdm
 
+from aerialdojo_gen.common.terminal import raw, shown
+
 _PLAIN_EVERY_S = 10.0
 # So many scenes are named that are under way.
 _NAMED = 3
@@ -32,6 +34,7 @@ class Bar:
     """Counts finished shards (or what `unit` says); `advance` counts them."""
 
     def __init__(self, label: str, total: int, stream: TextIO, quiet: bool, unit: str = "shards") -> None:
+        label = shown(label)
         self._label, self._total, self._stream, self._unit = label, total, stream, unit
         self._frames = 0
         self._done, self._started, self._said = 0, time.monotonic(), time.monotonic()
@@ -106,7 +109,7 @@ class Overview:
         left = duration(self.left_s / max(1, min(self.processes, self.scenes - self.scenes_done)))
         more = f" and {len(self.at_work) - _NAMED} more" if len(self.at_work) > _NAMED else ""
         at_work = f": {', '.join(self.at_work[:_NAMED])}{more}" if self.at_work else ""
-        return f"{self.scenes_done} of {self.scenes} scenes, about {left} left{at_work}"
+        return shown(f"{self.scenes_done} of {self.scenes} scenes, about {left} left{at_work}")
 
 
 class Overall:
@@ -178,13 +181,13 @@ class Reporter:
     """
 
     def __init__(self, quiet: bool = False, stream: TextIO | None = None, *, verbose: bool = False) -> None:
-        self._quiet, self._stream = quiet, stream or sys.stderr
+        self._quiet, self._stream = quiet, raw(stream or sys.stderr)
         self.verbose = verbose
 
     def line(self, text: str) -> None:
         """Write one line, above a bar if there is one."""
         if not self._quiet:
-            tqdm.write(text, file=self._stream)
+            tqdm.write(shown(text), file=self._stream)
             self._stream.flush()
 
     @contextmanager

@@ -232,7 +232,7 @@ def serve(app: FastAPI, listener: socket.socket, browser: bool = False, path: st
 
     url = url_of(listener) + path
     config = uvicorn.Config(app, log_level="warning", access_log=False, lifespan="off", timeout_graceful_shutdown=1,
-                            proxy_headers=False, server_header=False, **limits())  # fmt: skip
+                            proxy_headers=False, server_header=False, use_colors=False, **limits())  # fmt: skip
     server = uvicorn.Server(config)
     bound_log()
     if browser:

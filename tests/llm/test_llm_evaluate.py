@@ -96,7 +96,7 @@ def test_an_evaluation_logs_what_was_said_and_what_it_cost(smoke: Path, tmp_path
 
 
 def test_a_failing_service_is_logged_apart_and_its_episodes_flown_again(smoke: Path, tmp_path: Path) -> None:
-    broken: list[Act] = [Status(503, "overloaded", {"retry-after": "0"})]
+    broken: list[Act] = [Status(503, "overloaded\x1b[2J", {"retry-after": "0"})]
     with serving(*broken) as service:
         done = fly(smoke, tmp_path, "openai", service.url, "--attempts", "2", "--limit", "1")
         assert len(service.requests) == 2
@@ -107,6 +107,7 @@ def test_a_failing_service_is_logged_apart_and_its_episodes_flown_again(smoke: P
         assert "HTTP 503: overloaded" in failures["reason"][0].as_py()
         assert (failures["kind"].to_pylist(), failures["n_requests"].to_pylist()) == (["server error"], [2])
         assert done.returncode == 1, "none finished"
+        assert all(line.isprintable() for line in done.stderr.splitlines())
         last = done.stderr.splitlines()[-1]
         assert last.startswith("error: 1 failed, which count as no episodes: 1 × server error (http://127.0.0.1")
         pasted = last.partition("To fly the failed again: ")[2]
@@ -128,13 +129,14 @@ def test_a_failing_service_is_logged_apart_and_its_episodes_flown_again(smoke: P
 
 def test_a_refusal_ends_the_run_with_one_line(smoke: Path, tmp_path: Path) -> None:
     with serving() as service:
-        service.refuses = lambda _: Status(401, "wrong key")
+        service.refuses = lambda _: Status(401, "wrong key\x1b]0;owned\x07\x1b[2J\x9b\u202e")
         done = fly(smoke, tmp_path, "openai", service.url, "--quiet")
         assert (len(service.checks), len(service.requests)) == (1, 0)
     assert done.returncode == 1
     lines = [line for line in done.stderr.splitlines() if line.startswith("error: ")]
     assert len(lines) == 1
-    assert "HTTP 401: wrong key (you sent Bearer [key])" in lines[0]
+    assert "HTTP 401: wrong key\\u001b]0;owned\\u0007\\u001b[2J\\u009b\\u202e (you sent Bearer [key])" in lines[0]
+    assert all(line.isprintable() for line in done.stderr.splitlines())
     assert "Traceback" not in done.stderr
     key_is_nowhere(tmp_path, done)
 
