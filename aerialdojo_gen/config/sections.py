@@ -70,7 +70,7 @@ class VlmConfig(Section):
     temperature: float | None = Field(0.0, ge=0, le=2, description="of its answers")
     picture_px: int = Field(336, ge=32, le=2048, description="longest side of a picture that it is shown")
     max_tokens: int = Field(1000, ge=16, le=1_000_000, description="longest answer")
-    timeout_s: float = Field(60.0, gt=0, le=86_400, description="longest wait for an answer")
+    timeout_s: float = Field(60.0, gt=0, le=86_400, description="longest wait for a whole answer")
     retries: int = Field(4, ge=0, le=20, description="how often a failed request is sent again")
 
 

@@ -1,4 +1,4 @@
-"""An HTTP client for the client packages: bounded in size and time, paced, and timed."""
+"""An HTTP client for the client packages, bounded in size; and a count of requests and their times."""
 
 from __future__ import annotations
 
@@ -10,12 +10,10 @@ from dataclasses import dataclass
 from typing import Any
 
 MAX_BODY_BYTES = 4 << 20
-# Longest wait for a connection: whoever listens accepts one long before it has an answer.
-CONNECT_S = 10.0
 
 
 class BodyBoundError(Exception):
-    """A service sent more, or took longer, than it may, or something that is no JSON."""
+    """A service sent more than it may, or something that is no JSON."""
 
 
 @dataclass
@@ -48,22 +46,18 @@ class Meter:
         self.longest_s = max(self.longest_s, seconds)
 
 
-def bounded_client(base: Any, timeout: Any, whole_s: float, meter: Meter) -> Any:
-    """Make an HTTP client whose responses are bounded.
+def bounded_client(base: Any, timeout: Any) -> Any:
+    """Make an asynchronous HTTP client whose responses are bounded in size.
 
-    The client packages read a body whole, an error's too, however long it is; and their time-out is one a read, which
-    a server that drips never exceeds. Redirects are not followed: they would carry the key elsewhere.
+    The client packages read a body whole, an error's too, however long it is. Redirects are not followed: they would
+    carry the key elsewhere.
 
     Parameters
     ----------
     base : type
-        The package's own ``DefaultHttpxClient``.
+        The package's own ``DefaultAsyncHttpxClient``.
     timeout : object
-        The package's own ``Timeout``, for connecting and for a read.
-    whole_s : float
-        For a whole response, seconds.
-    meter : Meter
-        Counts the requests, and paces them.
+        The package's own ``Timeout``.
 
     Returns
     -------
@@ -72,15 +66,9 @@ def bounded_client(base: Any, timeout: Any, whole_s: float, meter: Meter) -> Any
     """
 
     class BoundedClient(base):  # type: ignore[misc]  # a class that is known at run time alone
-        def send(self, request: Any, *, stream: bool = False, **options: Any) -> Any:
-            if meter.pace is not None:
-                meter.pace()
-            began = time.monotonic()
-            try:
-                response = super().send(request, stream=True, **options)
-                body = _whole(response, began + whole_s, whole_s)
-            finally:
-                meter.add(time.monotonic() - began)
+        async def send(self, request: Any, *, stream: bool = False, **options: Any) -> Any:
+            response = await super().send(request, stream=True, **options)
+            body = await _whole(response)
             if response.status_code == 200:
                 _check_json(body)
             framing = ("content-encoding", "content-length", "transfer-encoding")
@@ -90,17 +78,15 @@ def bounded_client(base: Any, timeout: Any, whole_s: float, meter: Meter) -> Any
     return BoundedClient(timeout=timeout, follow_redirects=False)
 
 
-def _whole(response: Any, deadline: float, whole_s: float) -> bytes:
+async def _whole(response: Any) -> bytes:
     body = bytearray()
     try:
-        for chunk in response.iter_bytes():
+        async for chunk in response.aiter_bytes():
             body += chunk
             if len(body) > MAX_BODY_BYTES:
                 raise BodyBoundError(f"its answer is larger than {MAX_BODY_BYTES >> 20} MiB")
-            if time.monotonic() > deadline:
-                raise BodyBoundError(f"its answer is not complete after {whole_s:g} s")
     finally:
-        response.close()
+        await response.aclose()
     return bytes(body)
 
 

@@ -29,7 +29,7 @@ class Options(BaseModel):
     max_tokens : int
         Most tokens of an answer.
     timeout_s : float
-        Longest wait for an answer.
+        Longest wait for a whole answer, from the request to its last byte.
     request_retries : int
         How often a request that failed for the service's sake is sent again before the episode is given up. A
         repeated request changes nothing for the agent; an episode begun again costs all of its requests anew.

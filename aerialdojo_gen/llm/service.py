@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import asyncio
 import importlib
 import os
+import threading
 import time
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 from typing import Any, TypeVar
 from urllib.parse import urlsplit
 
@@ -15,10 +17,12 @@ from aerialdojo_gen.agents.base import AgentUnavailable, ServiceDown
 from aerialdojo_gen.common.secrets import Secrets
 from aerialdojo_gen.errors import AerialDojoError, MissingPackage, UsageError, lacks
 from aerialdojo_gen.llm.faults import refusal
-from aerialdojo_gen.llm.http import CONNECT_S, BodyBoundError, Meter, bounded_client, retry_after_s
+from aerialdojo_gen.llm.http import BodyBoundError, Meter, bounded_client, retry_after_s
 
 # A service may say when to come back; beyond this the runner's own schedule is the better one.
 MAX_WAIT_S = 60.0
+# Longest wait for a connection: a service that listens accepts one long before it has an answer.
+_CONNECT_S = 10.0
 
 _CLIENTS = {"openai": "OpenAI", "anthropic": "Anthropic"}
 # By name, for the packages bring one of two generations of httpx with them.
@@ -75,7 +79,8 @@ class Connection:
     base_url : str or None
         Where the service is; ``OPENAI_BASE_URL`` or ``ANTHROPIC_BASE_URL`` where absent, else the provider's own.
     timeout_s : float
-        Longest wait for an answer.
+        Longest wait for a whole answer, from looking up the address to the last byte. One deadline holds for all of
+        it: a time-out for each read never ends a server that sends a few bytes at a time.
     retries : int
         How often a failed request is sent again before the episode is given up.
     secrets : Secrets, optional
@@ -88,7 +93,7 @@ class Connection:
     Attributes
     ----------
     client : object
-        The package's client; its own retries are off, so that there is one place that tries again.
+        The package's asynchronous client, used in a thread that runs its event loop; its own retries are off, so that there is one place that tries again.
     base_url : str or None
         As found.
     name : str
@@ -131,29 +136,32 @@ class Connection:
         self._timeout_s, self._retries, self._model = timeout_s, retries, model
         self.name = self.base_url or _CLIENTS[package]
         self.meter = Meter()
-        timeout = self._package.Timeout(timeout_s, connect=min(timeout_s, CONNECT_S))
-        self.client = getattr(self._package, _CLIENTS[package])(
+        # Less than the deadline, so that an address where nobody listens is not taken for a slow answer.
+        timeout = self._package.Timeout(None, connect=min(timeout_s / 2, _CONNECT_S))
+        self.client = getattr(self._package, f"Async{_CLIENTS[package]}")(
             api_key=self._key,
             base_url=self.base_url,
             max_retries=0,
             timeout=timeout,
-            http_client=bounded_client(self._package.DefaultHttpxClient, timeout, timeout_s, self.meter),
+            http_client=bounded_client(self._package.DefaultAsyncHttpxClient, timeout),
         )
+        self._loop = asyncio.new_event_loop()
+        threading.Thread(target=_run, args=(self._loop,), name=f"requests to {package}", daemon=True).start()
 
-    def call(self, ask: Callable[[Any], Result], retries: int | None = None) -> Result:
+    def call(self, ask: Callable[[Any], Awaitable[Result]], retries: int | None = None) -> Result:
         """Send a request; send it again where that may help.
 
         Parameters
         ----------
         ask : callable
-            Takes the client, returns what the package makes of the answer.
+            Takes the client, returns an awaitable of what the package makes of the answer.
         retries : int, optional
             In place of the connection's own.
 
         Returns
         -------
         object
-            What `ask` returns.
+            The result of `ask`.
 
         Raises
         ------
@@ -174,15 +182,30 @@ class Connection:
         )
         return again(self._once, ask)
 
-    def _once(self, ask: Callable[[Any], Result]) -> Result:
+    def _once(self, ask: Callable[[Any], Awaitable[Result]]) -> Result:
+        if self.meter.pace is not None:
+            self.meter.pace()
+        began = time.monotonic()
+        future = asyncio.run_coroutine_threadsafe(self._within_deadline(ask), self._loop)
         try:
-            return ask(self.client)
+            return future.result()
         except self._package.APIError as error:
             failure = self._failure(error)
+        except TimeoutError:
+            said = f"{self.name}: no complete answer within {self._timeout_s:g} s"
+            failure = AgentUnavailable(said, kind="time-out")
         except BodyBoundError as error:
             # One of the packages wraps what its client raises, the other lets it through.
             failure = self._bound(error)
+        finally:
+            # Ctrl-C leaves the request unfinished.
+            future.cancel()
+            self.meter.add(time.monotonic() - began)
         raise failure from None
+
+    async def _within_deadline(self, ask: Callable[[Any], Awaitable[Result]]) -> Result:
+        async with asyncio.timeout(self._timeout_s):
+            return await ask(self.client)
 
     def not_understood(self, what: str) -> AgentUnavailable:
         """Make the error for an answer that is not what the protocol says."""
@@ -205,12 +228,12 @@ class Connection:
 
     def close(self) -> None:
         """Close the connections."""
-        self.client.close()
+        if self._loop.is_running():
+            closing = asyncio.run_coroutine_threadsafe(self.client.close(), self._loop)
+            closing.add_done_callback(lambda _: self._loop.stop())
 
     def _bound(self, error: BodyBoundError) -> AgentUnavailable:
-        late = "complete" in str(error)
-        kind = "time-out" if late else "malformed answer"
-        return AgentUnavailable(f"{self.name}: {self.clean(str(error))}", kind=kind, again=late)
+        return AgentUnavailable(f"{self.name}: {self.clean(str(error))}", kind="malformed answer", again=False)
 
     def _failure(self, error: Any) -> AerialDojoError:
         if isinstance(error, self._package.APIStatusError):
@@ -223,9 +246,8 @@ class Connection:
             return self._bound(cause)
         said = self._line(str(cause) or type(cause).__name__)
         if type(cause).__name__ in _NO_ROUTE:
+            said = _system_error(cause) or said
             return ServiceDown(f"{self.name}: {said}: is the service there, and is base_url right?")
-        if isinstance(error, self._package.APITimeoutError):
-            return AgentUnavailable(f"{self.name}: no answer within {self._timeout_s:g} s", kind="time-out")
         return AgentUnavailable(f"{self.name}: {said}", kind="connection lost")
 
     def _line(self, value: Any) -> str:
@@ -235,6 +257,21 @@ class Connection:
         # The key goes before the text is cut: half a key is too much as well.
         lines = self.clean(str(value)).strip().splitlines()
         return " ".join((lines[0] if lines else "").split())[:300]
+
+
+def _system_error(error: BaseException | None) -> str | None:
+    """Find the system's error under the HTTP client's, which says "All connection attempts failed" alone."""
+    while error is not None:
+        if isinstance(error, OSError) and error.errno and error.errno > 0:
+            return f"[Errno {error.errno}] {os.strerror(error.errno)}"
+        several = error.exceptions if isinstance(error, BaseExceptionGroup) else (None,)
+        error = several[0] or error.__cause__ or error.__context__
+    return None
+
+
+def _run(loop: asyncio.AbstractEventLoop) -> None:
+    loop.run_forever()
+    loop.close()
 
 
 def _worth_another_try(error: BaseException) -> bool:

@@ -6,15 +6,17 @@ import base64
 import email.utils
 import json
 import logging
+import socket
 import subprocess
 import sys
+import threading
 import traceback
 from typing import Any
 
 import cv2
 import numpy as np
 import pytest
-from support.llm_server import MOVE, Call, Cut, Drip, Endless, Filtered, Hang, Raw, Say, Service, Status, serving
+from support.llm_server import MOVE, Call, Cut, Drip, Endless, Filtered, Hang, Raw, Say, Service, Status, Trickle, serving
 
 from aerialdojo_gen.agents import AgentUnavailable, InvalidAnswer, ServiceDown, load_agent
 from aerialdojo_gen.agents.goal import Goal, Observation, Rules
@@ -196,8 +198,9 @@ FAILURES = {
     "503": (Status(503, "later", {"retry-after": "0.5"}), r"HTTP 503: later", "server error", 0.5),
     "529": (Status(529, "overloaded"), r"HTTP 529: overloaded", "server error", None),
     "cut": (Cut(), r"http://127\.0\.0\.1:\d+.*: \w+", "connection lost", None),
-    "hang": (Hang(), r"no answer within 0\.4 s", "time-out", None),
-    "drip": (Drip(), r"not complete after 0\.4 s", "time-out", None),
+    "hang": (Hang(), r"no complete answer within 0\.4 s", "time-out", None),
+    "body trickles": (Drip(), r"no complete answer within 0\.4 s", "time-out", None),
+    "headers trickle": (Trickle(), r"no complete answer within 0\.4 s", "time-out", None),
     "huge": (Endless(), r"larger than 4 MiB", "malformed answer", None),
     "huge error": (Endless(500), r"larger than 4 MiB", "malformed answer", None),
     "no json": (Raw(b"<html>hello</html>", "text/html"), r"base_url right.*hello", "malformed answer", None),
@@ -222,7 +225,7 @@ WITHOUT_AGAIN = ("malformed answer", "bad request", "content filter", "context t
 def test_a_failure_of_the_service_is_no_failure_of_the_agent(protocol: str, name: str) -> None:
     act, message, kind, asked_s = FAILURES[name]
     with serving(act) as service:
-        slow = {"timeout_s": 0.4} if name in ("hang", "drip") else {}
+        slow = {"timeout_s": 0.4} if kind == "time-out" else {}
         agent = begun(protocol, service, **slow)
         with pytest.raises(AgentUnavailable, match=message) as failure:
             agent.act(observation())
@@ -232,6 +235,16 @@ def test_a_failure_of_the_service_is_no_failure_of_the_agent(protocol: str, name
         said = "".join(traceback.format_exception(failure.value)) + repr(failure.value)
         assert KEY not in said
         assert "\n" not in str(failure.value)
+
+
+@pytest.mark.parametrize("protocol", PROTOCOLS)
+def test_a_server_that_accepts_and_is_silent_is_given_up(protocol: str) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as listening:
+        url = f"http://127.0.0.1:{listening.getsockname()[1]}"
+        agent = begun(protocol, Service(url, [], [], threading.Event()), timeout_s=0.4)
+        with pytest.raises(AgentUnavailable, match=r"no complete answer within 0\.4 s"):
+            agent.act(observation())
+        agent.close()
 
 
 @pytest.mark.parametrize("protocol", PROTOCOLS)
@@ -351,7 +364,7 @@ MENDS = {
 def test_the_check_does_not_wait_twice() -> None:
     with serving() as service:
         service.refuses = lambda _: Hang()
-        with pytest.raises(AerialDojoError, match=r"nothing flown: .*no answer within 0.4 s: is it busy, or loading"):
+        with pytest.raises(AerialDojoError, match=r"nothing flown: .*no complete answer within 0.4 s: is it busy, or loading"):
             begun("openai", service, request_retries=3, timeout_s=0.4).check()
         assert len(service.checks) == 1
         first = iter([Status(503, "one moment", {"retry-after": "0"})])

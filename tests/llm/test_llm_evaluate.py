@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from support.llm_server import Act, Cut, Endless, Filtered, Hang, Raw, Say, Status, serving
+from support.llm_server import Act, Cut, Endless, Filtered, Hang, Raw, Say, Status, Trickle, serving
 
 from aerialdojo_gen.benchmark.episodes import read_run
 from aerialdojo_gen.benchmark.runs import conduct, load_runs
@@ -156,6 +156,7 @@ STRUCK: dict[int, tuple[Act, str]] = {
     20: (Hang(), "time-out"),
     22: (Filtered(), "content filter"),
     24: (Endless(), "malformed answer"),
+    26: (Trickle(), "time-out"),
 }
 NO_ACTION = [
     '{"thought": ' + "9" * 5_000 + ', "action": "Stop"}', '{"thought": "\\ud800", "action": "Stop"}', "\ud800",
@@ -198,10 +199,10 @@ def test_whatever_a_service_does_a_run_of_thirty_ends_with_thirty_rows(smoke: Pa
         assert any(reason.endswith("HTTP 500: broken") for reason in failures["reason"].to_pylist())
         assert sum(episodes["n_invalid"].to_pylist()) == len([k for k in range(1, 30, 5) if k not in STRUCK])
         lines = done.stderr.splitlines()
-        assert "12 failed, which count as no episodes: 3 × malformed answer (" in lines[-1]
+        assert f"{len(STRUCK)} failed, which count as no episodes: 3 × malformed answer (" in lines[-1]
         assert lines[-1].endswith(" --rerun-failed")
         assert lines[-1].count("(") == 1, "one reason, the most frequent one's"
-        assert "18 of 30 episodes finished, 12 failed" in lines[-2]
+        assert f"{30 - len(STRUCK)} of 30 episodes finished, {len(STRUCK)} failed" in lines[-2]
 
         before = len(service.requests)
         again = fly(smoke, tmp_path, "openai", service.url, *more)
@@ -210,7 +211,7 @@ def test_whatever_a_service_does_a_run_of_thirty_ends_with_thirty_rows(smoke: Pa
         service.policy = striking(set())
         again = fly(smoke, tmp_path, "openai", service.url, *more, "--rerun-failed")
         assert again.returncode == 0, again.stderr
-        assert "12 flown now" in again.stderr.splitlines()[-1], "exactly those that failed"
+        assert f"{len(STRUCK)} flown now" in again.stderr.splitlines()[-1], "exactly those that failed"
     assert (read_run(tmp_path, "openai").num_rows, read_run(tmp_path, "openai", "failures").num_rows) == (30, 0)
 
 

@@ -9,9 +9,10 @@ import sys
 import cv2
 import numpy as np
 import pytest
-from support.llm_server import Say, Status, serving
+from support.llm_server import Drip, Hang, Say, Status, Trickle, serving
 from support.two_coloured import POST, item_of, job_in, plain_view, redness, world_of, yard
 
+from aerialdojo_gen.agents.base import AgentUnavailable
 from aerialdojo_gen.config.sections import AnchorSampleConfig, ClipConfig, ScorerWeights, VlmConfig
 from aerialdojo_gen.errors import AssetError, MissingPackage, UsageError
 from aerialdojo_gen.pipeline.registry import BY_NAME
@@ -231,6 +232,12 @@ def test_a_service_that_refuses_ends_it_in_one_line_without_the_key(key):
         VlmScorer(vlm(service)).score("post", [RED, BLUE])
     assert KEY not in str(said.value)
     assert "\n" not in str(said.value)
+
+
+@pytest.mark.parametrize("act", [Hang(), Trickle(), Drip()])
+def test_a_service_that_takes_too_long_is_given_up(key, act):
+    with serving(act) as service, pytest.raises(AgentUnavailable, match=r"no complete answer within 0\.3 s"):
+        VlmScorer(vlm(service, timeout_s=0.3)).score("post", [RED, BLUE])
 
 
 def test_a_busy_service_is_asked_again(key):

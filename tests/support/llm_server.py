@@ -65,6 +65,11 @@ class Drip:
 
 
 @dataclass(frozen=True)
+class Trickle:
+    """Headers of 8 bytes every 20 ms: no single read takes long."""
+
+
+@dataclass(frozen=True)
 class Hang:
     """No answer at all."""
 
@@ -74,7 +79,7 @@ class Cut:
     """The connection is cut in the middle of an answer."""
 
 
-Act = Say | Call | Filtered | Status | Raw | Endless | Drip | Hang | Cut
+Act = Say | Call | Filtered | Status | Raw | Endless | Drip | Trickle | Hang | Cut
 
 
 @dataclass
@@ -145,6 +150,14 @@ class _Handler(BaseHTTPRequestHandler):
             self.send_header("content-length", "1000")
             self.end_headers()
             self.wfile.write(b'{"id": "x", ')
+            self.close_connection = True
+        elif isinstance(act, Trickle):
+            self.wfile.write(b"HTTP/1.1 200 OK\r\n")
+            # It ends, so that a client without a deadline fails instead of hanging.
+            for k in range(500):
+                self.wfile.write(b"X-%03d:\r\n" % k)
+                if self.service.stop.wait(0.02):
+                    break
             self.close_connection = True
         elif isinstance(act, Hang):
             self.service.stop.wait(30)
