@@ -32,7 +32,7 @@ from aerialdojo_gen.learning.steps import Pool, Steps
 from aerialdojo_gen.learning.trajectories import drawn_evenly
 from aerialdojo_gen.learning.words import Vocabulary, goal_text
 from aerialdojo_gen.pipeline.executors import make_executor
-from aerialdojo_gen.pipeline.progress import Reporter, duration
+from aerialdojo_gen.pipeline.progress import Rate, Reporter, duration
 from aerialdojo_gen.release.fingerprint import release_fingerprint
 from aerialdojo_gen.store.atomic import atomic_file, make_folder
 from aerialdojo_gen.store.files import file_digest
@@ -263,7 +263,7 @@ class _Training:
 
             recognise(
                 self._learner, self._survey, self._about.named, after=self._after("sight", self._recipe.sight.epochs),
-                tick=self._tick("sight", time.monotonic()),
+                tick=self._tick("sight"),
             )  # fmt: skip
             return
         epochs, rate = (dagger.epochs, dagger.learning_rate) if phase else (train.epochs, train.learning_rate)
@@ -272,24 +272,23 @@ class _Training:
         after = self._after(what, epochs)
         self._learner.learn(
             pool, self._survey, self._kept_back(pool.nav_id), epochs, rate, after=after,
-            tick=self._tick(what, time.monotonic()),
+            tick=self._tick(what),
         )  # fmt: skip
 
-    def _tick(self, what: str, started: float) -> Callable[[int, int, float, float], None]:
-        first: list[int] = []
+    def _tick(self, what: str) -> Callable[[int, int, float, float], None]:
+        rate = Rate()
 
         def tick(done: int, total: int, loss: float, accuracy: float) -> None:
-            first[:] = first or [done - 1]
+            per_s = rate.per_s(done)
             now = time.monotonic()
             if self._board is not None:
                 self._board.add_scalar(f"{what}/loss", loss, done)
                 self._board.add_scalar(f"{what}/accuracy", accuracy, done)
             if now - self._said >= _SAY_EVERY_S:
                 self._said = now
-                left = (now - started) / (done - first[0]) * (total - done)
+                left = f", {duration((total - done) / per_s)} left" if per_s else ""
                 self._reporter.line(
-                    f"{what}: batch {done:,} of {total:,}, loss {loss:.3f}, accuracy {accuracy:.1%}, "
-                    f"{duration(left)} left"
+                    f"{what}: batch {done:,} of {total:,}, loss {loss:.3f}, accuracy {accuracy:.1%}{left}"
                 )
             if now - self._kept >= self._recipe.train.checkpoint_s:
                 self._keep()

@@ -93,7 +93,8 @@ class Connection:
     Attributes
     ----------
     client : object
-        The package's asynchronous client, used in a thread that runs its event loop; its own retries are off, so that there is one place that tries again.
+        The package's asynchronous client, used in a thread that runs its event loop; its own retries are off, so
+        that there is one place that tries again.
     base_url : str or None
         As found.
     name : str

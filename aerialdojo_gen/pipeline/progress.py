@@ -20,14 +20,35 @@ _WITHOUT_SPEED = "{l_bar}{bar}| {n_fmt}/{total_fmt} [{elapsed}{postfix}]"
 
 
 class _Tqdm(tqdm):  # type: ignore[misc]  # the package has no types
-    """Leaves speed and time left out until something is finished, where tqdm says ``?, ? shards/s``."""
+    """Leaves speed and time left out until they are known, and shows those of a `Rate`."""
+
+    per_s: float | None = None
 
     @property
     def format_dict(self) -> dict[str, Any]:
         """Return what a line is made of, its format among it."""
         known: dict[str, Any] = super().format_dict
-        begun = known["n"] > known["initial"] and known["elapsed"] > 0.0
-        return known if begun else known | {"bar_format": _WITHOUT_SPEED}
+        return known | ({"rate": self.per_s} if self.per_s else {"bar_format": _WITHOUT_SPEED})
+
+
+class Rate:
+    """Measures how many things are finished a second, from the first one on: starting up is no part of it."""
+
+    def __init__(self) -> None:
+        self._began = time.monotonic()
+        self._first: tuple[int, float] | None = None
+
+    def per_s(self, done: int) -> float | None:
+        """Return things a second now that `done` are finished; None before it is known.
+
+        Several processes finish their first things almost together. So it is not known before as much time has passed
+        since the first thing as before it.
+        """
+        now = time.monotonic()
+        if self._first is None:
+            self._first = done, now
+        before, at = self._first
+        return (done - before) / (now - at) if done > before and now - at >= at - self._began else None
 
 
 class Bar:
@@ -37,7 +58,7 @@ class Bar:
         label = shown(label)
         self._label, self._total, self._stream, self._unit = label, total, stream, unit
         self._frames = 0
-        self._done, self._started, self._said = 0, time.monotonic(), time.monotonic()
+        self._done, self._rate, self._frame_rate, self._said = 0, Rate(), Rate(), time.monotonic()
         self._plain = not quiet and not stream.isatty()
         self._tqdm = _Tqdm(
             total=total,
@@ -52,21 +73,20 @@ class Bar:
         """Count `n` more, with as many frames of video."""
         self._done += n
         self._frames += frames
-        speed = self._frames / max(time.monotonic() - self._started, 1e-9)
-        if self._frames:
-            self._tqdm.set_postfix_str(f"{speed:.1f} frames/s", refresh=False)
+        per_s = self._tqdm.per_s = self._rate.per_s(self._done)
+        frames_per_s = self._frame_rate.per_s(self._frames) if self._frames else None
+        if frames_per_s:
+            self._tqdm.set_postfix_str(f"{frames_per_s:.1f} frames/s", refresh=False)
         self._tqdm.update(n)
         now = time.monotonic()
         if self._plain and now - self._said >= _PLAIN_EVERY_S:
             self._said = now
-            rate = self._done / (now - self._started)
-            left = (self._total - self._done) / rate
-            pictures = f", {self._frames:,} frames, {speed:.1f} frames/s" if self._frames else ""
-            print(
-                f"{self._label}: {self._done}/{self._total} {self._unit}, {rate:.2f}/s{pictures}, ETA {left:.0f} s",
-                file=self._stream,
-                flush=True,
-            )
+            said = [f"{self._label}: {self._done}/{self._total} {self._unit}"]
+            said += [f"{per_s:.2f}/s"] if per_s else []
+            said += [f"{self._frames:,} frames"] if self._frames else []
+            said += [f"{frames_per_s:.1f} frames/s"] if frames_per_s else []
+            said += [f"ETA {(self._total - self._done) / per_s:.0f} s"] if per_s else []
+            print(", ".join(said), file=self._stream, flush=True)
 
     def refresh(self) -> None:
         """Show what is known; of shards nothing changes but by `advance`."""
@@ -129,7 +149,7 @@ class Overall:
         seen = look()
         nothing = quiet or seen.scenes_done == seen.scenes
         self._plain = not nothing and not stream.isatty()
-        self._tqdm = _Tqdm(
+        self._tqdm = tqdm(
             total=1.0, file=stream, leave=False, disable=nothing or self._plain, dynamic_ncols=True,
             bar_format="{percentage:3.0f}%|{bar:12}| {desc}", mininterval=0.0,
         )  # fmt: skip

@@ -16,7 +16,21 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
-from support.llm_server import MOVE, Call, Cut, Drip, Endless, Filtered, Hang, Raw, Say, Service, Status, Trickle, serving
+from support.llm_server import (
+    MOVE,
+    Call,
+    Cut,
+    Drip,
+    Endless,
+    Filtered,
+    Hang,
+    Raw,
+    Say,
+    Service,
+    Status,
+    Trickle,
+    serving,
+)
 
 from aerialdojo_gen.agents import AgentUnavailable, InvalidAnswer, ServiceDown, load_agent
 from aerialdojo_gen.agents.goal import Goal, Observation, Rules
@@ -364,7 +378,9 @@ MENDS = {
 def test_the_check_does_not_wait_twice() -> None:
     with serving() as service:
         service.refuses = lambda _: Hang()
-        with pytest.raises(AerialDojoError, match=r"nothing flown: .*no complete answer within 0.4 s: is it busy, or loading"):
+        with pytest.raises(
+            AerialDojoError, match=r"nothing flown: .*no complete answer within 0.4 s: is it busy, or"
+        ):
             begun("openai", service, request_retries=3, timeout_s=0.4).check()
         assert len(service.checks) == 1
         first = iter([Status(503, "one moment", {"retry-after": "0"})])

@@ -1,26 +1,100 @@
 """Progress on a terminal, and where there is none."""
 
+import contextlib
 import fcntl
 import io
 import os
+import re
 import struct
 import termios
+import time
 
-from aerialdojo_gen.pipeline.progress import Overview, Reporter, duration
+import pytest
+
+from aerialdojo_gen.pipeline import progress
+from aerialdojo_gen.pipeline.progress import Overview, Rate, Reporter, duration
+
+
+def on_a_terminal(show, columns=None):
+    """Return what `show` writes to a terminal, which is given a stream."""
+    ours, terminal = os.openpty()
+    if columns is not None:
+        fcntl.ioctl(terminal, termios.TIOCSWINSZ, struct.pack("HHHH", 24, columns, 0, 0))
+    with open(terminal, "w", encoding="utf-8") as stream:
+        show(stream)
+    said = b""
+    # A pseudo-terminal hands over what was written in pieces; its end is an error.
+    with contextlib.suppress(OSError):
+        while piece := os.read(ours, 1 << 16):
+            said += piece
+    os.close(ours)
+    return said.decode()
 
 
 def test_a_bar_has_no_speed_before_there_is_one():
-    ours, terminal = os.openpty()
-    with open(terminal, "w", encoding="utf-8") as stream:
+    def show(stream):
         with Reporter(stream=stream).bar("plan", 3) as bar:
             bar.advance()
             bar.advance(2)
-        stream.flush()
-        said = os.read(ours, 1 << 16).decode()
-    os.close(ours)
+
+    said = on_a_terminal(show)
     assert "plan:   0%" in said
     assert "? shards/s" not in said
     assert "0/3 [00:00]" in said
+
+
+def paced(bar, starting_s, n, each_s, **more):
+    """Do n things of each_s, after starting up."""
+    time.sleep(starting_s)
+    for _ in range(n):
+        bar.advance(**more)
+        time.sleep(each_s)
+
+
+def test_a_rate_does_not_count_starting_up():
+    rate = Rate()
+    time.sleep(0.2)
+    assert rate.per_s(1) is None, "one thing has no rate"
+    assert rate.per_s(4) is None, "several processes finish their first things together"
+    time.sleep(0.4)
+    known = rate.per_s(5)
+    assert known is not None
+    # 4 in 0.4 s, or in as long as a busy machine sleeps; with the start 0.6 s.
+    assert known <= 4 / 0.4
+
+
+def test_a_time_left_is_said_when_it_is_known_and_does_not_count_starting_up(monkeypatch):
+    monkeypatch.setattr(progress, "_PLAIN_EVERY_S", 0.0)
+    stream, n = io.StringIO(), 200
+    with Reporter(stream=stream).bar("evaluate", n, "episodes") as bar:
+        began = time.monotonic()
+        paced(bar, 0.3, 1, 0.0)
+        first = time.monotonic() - began
+        paced(bar, 0.0, 60, 0.01)
+    lines = stream.getvalue().splitlines()
+    assert lines[0] == f"evaluate: 1/{n} episodes"
+    told = [match for line in lines if (match := re.search(r"(\d+)/200 .* ETA (\d+) s", line))]
+    assert told, lines
+    assert "ETA" not in lines[1]
+    # By the first thing alone it would be 200 times the start.
+    assert all(int(match[2]) < 0.5 * (n - int(match[1])) * first for match in told), lines
+
+
+@pytest.mark.parametrize("frames", [0, 5])
+def test_a_terminal_shows_no_time_left_before_it_is_known(frames):
+    def show(stream):
+        with Reporter(stream=stream).bar("plan", 300) as bar:
+            paced(bar, 0.3, 1, 0.11, frames=frames)
+            paced(bar, 0.0, 12, 0.11, frames=frames)
+
+    shown = [part for part in on_a_terminal(show).split("\r") if re.search(r" [1-9]\d*/300", part)]
+    assert "shards/s" not in shown[0], shown
+    left = re.findall(r"<(\d+):(\d+), +([\d.]+) shards/s", shown[-1])
+    assert left, shown
+    minutes, seconds, speed = left[0]
+    n = int(re.search(r" (\d+)/300", shown[-1])[1])
+    assert abs(60 * int(minutes) + int(seconds) - (300 - n) / float(speed)) < 2.0
+    assert ("frames/s" in shown[-1]) == bool(frames)
 
 
 def test_elsewhere_there_is_no_bar():
@@ -45,17 +119,15 @@ def overviews():
 
 
 def test_how_far_a_run_is_fits_a_terminal():
-    ours, terminal = os.openpty()
-    fcntl.ioctl(terminal, termios.TIOCSWINSZ, struct.pack("HHHH", 24, 80, 0, 0))
     seen = list(overviews())
-    with open(terminal, "w", encoding="utf-8") as stream:
+
+    def show(stream):
         with Reporter(stream=stream).overall(lambda: seen[0]) as bar:
             for _ in range(2):
                 seen.pop(0)
                 bar.refresh()
-        stream.flush()
-        said = os.read(ours, 1 << 16).decode()
-    os.close(ours)
+
+    said = on_a_terminal(show, columns=80)
     lines = [line.strip("\n\x1b[A") for line in said.split("\r") if line.strip()]
     assert max(map(len, lines)) <= 80, lines
     assert " 25%|" in said
