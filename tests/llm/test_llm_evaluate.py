@@ -29,9 +29,10 @@ def fly(smoke: Path, out: Path, agent: str, url: str, *more: str) -> subprocess.
     }  # fmt: skip
     command = [sys.executable, "-m", "aerialdojo_gen.cli", "evaluate", "--agent", agent, "--data", str(smoke)]
     command += ["--out", str(out), "--limit", "2", "--workers", "1", "--modality", "semantic"]
-    command += ["--option", "answer=text", *more]
+    command += ["--option", "answer=text"]
     for name, value in options.items():
         command += ["--option", f"{name}={json.dumps(value)}"]
+    command += more
     environment = {"PATH": "/usr/bin:/bin", "HOME": str(out), "OPENAI_LOG": "debug", "ANTHROPIC_LOG": "debug"}
     environment[f"{agent.upper()}_API_KEY"] = KEY
     return subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
