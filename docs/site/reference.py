@@ -32,8 +32,8 @@ def cli_page() -> str:
         "# Commands",
         "",
         "Written from the commands themselves; `aerialdojo-gen COMMAND --help` says the same. Data go to",
-        "`--data`, else to `AERIALDOJO_DATA`, else to `data/`. Exit codes: [what a command ends",
-        "with](../errors.md).",
+        "`--data`, else to `AERIALDOJO_DATA`, else to `data/`. [Exit",
+        "codes](../errors.md).",
     ]
     group = typer.main.get_command(app)
     for name, command in _commands(group, ()):
