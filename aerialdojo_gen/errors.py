@@ -49,6 +49,10 @@ class StoreError(AerialDojoError):
     """A table is missing, damaged, or does not fit its schema."""
 
 
+class DamagedFile(StoreError):  # noqa: N818 - it says what the file is
+    """A table's file can be read, and its bytes are not those that were written: to delete it is the mend."""
+
+
 class PoolError(AerialDojoError):
     """Scenes have fewer kept candidates than are to be released."""
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import fcntl
 import os
 import shutil
+import signal
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -24,6 +25,10 @@ NOT_FAST = frozenset({"pipeline", "browser", "kill", "scenes", "ray", "s3", "slo
 # Marks that go with a fixture.
 BY_FIXTURE = {"smoke": "pipeline", "browser": "browser", "mesh_of": "scenes"}
 
+
+# Where it is ignored, as in a script's background job, the processes of the tests would ignore Ctrl-C too.
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 # How long an example takes is the machine's affair: no test fails for that.
 hypothesis.settings.register_profile("untimed", deadline=None)

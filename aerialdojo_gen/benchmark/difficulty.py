@@ -15,7 +15,6 @@ from aerialdojo_gen.benchmark.grid import Table
 from aerialdojo_gen.benchmark.metrics import Bools
 from aerialdojo_gen.benchmark.profiles import Profile
 from aerialdojo_gen.benchmark.runs import Run
-from aerialdojo_gen.errors import StoreError
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.root import DataRoot
 
@@ -254,11 +253,10 @@ class _Released:
         return found
 
     def _stored(self, table: str, scene: str, subset: str, names: Sequence[str]) -> dict[str, dict[str, Any]]:
-        try:
-            read = store.read_stored(self._root, f"{table}/{subset}", scene, ["nav_id", *names])
-        except StoreError:
+        if not store.shards(self._root, f"{table}/{subset}", scene):
             # No release, or not this scene: the log speaks for itself.
             return {}
+        read = store.read_stored(self._root, f"{table}/{subset}", scene, ["nav_id", *names])
         ids = read["nav_id"].to_pylist()
         return {
             name: dict(zip(ids, read[name].to_pylist(), strict=True))

@@ -73,8 +73,7 @@ def has_table(data: Where, run: str, table: str) -> bool:
 def fingerprint_of(data: Where, run: str, scene: str) -> str | None:
     """Return the fingerprint that a scene's episodes were written with; None where there are none."""
     paths = store.shards(data, "episodes", scene, run)
-    info = store.read_info(data, paths[0]) if paths else None
-    return info.fingerprint if info else None
+    return store.read_info(data, paths[0]).fingerprint if paths else None
 
 
 def add_records(data: Where, run: str, scene: str, records: Sequence[dict[str, Any]], fingerprint: str) -> None:

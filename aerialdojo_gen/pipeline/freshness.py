@@ -13,7 +13,7 @@ from typing import Any
 
 from aerialdojo_gen.config.pipeline import Pipeline
 from aerialdojo_gen.config.sections import Section
-from aerialdojo_gen.errors import AerialDojoError, StoreError
+from aerialdojo_gen.errors import AerialDojoError, DamagedFile
 from aerialdojo_gen.pipeline.fingerprint import scene_code, scene_fingerprint
 from aerialdojo_gen.pipeline.progress import Reporter
 from aerialdojo_gen.pipeline.stage import Job, Roots, Stage
@@ -132,7 +132,7 @@ def look_ahead(stage: Stage, scenes: Sequence[str], roots: Roots) -> None:
         for table in stage.writes:
             with contextlib.suppress(AerialDojoError):
                 infos = [store.read_info(roots.data, name) for name in store.shards(roots.data, table, scene)]
-                names += [name for info in infos if info for name, file in info.files.items() if file.sha256]
+                names += [name for info in infos for name, file in info.files.items() if file.sha256]
     roots.data.digest_ahead(names)
 
 
@@ -155,10 +155,10 @@ def _fresh(
             return None
         try:
             info = store.read_info(data, name)
-        except StoreError as error:
-            reporter.line(f"{str(error).split(':', 1)[0]}: computed again")
+        except DamagedFile as error:
+            reporter.line(f"{str(error).split(': delete')[0]}: computed again")
             return None
-        if info is None or info.fingerprint != fingerprint or info.parts != parts:
+        if info.fingerprint != fingerprint or info.parts != parts:
             return None
         for relative, written in info.files.items():
             if not data.is_whole(relative, written.size, written.sha256):
@@ -178,7 +178,7 @@ def _verified(stage: Stage, data: DataRoot, scene: str, part: int, reporter: Rep
     try:
         name = store.shard_name(table, scene, part)
         rows = read_file(data.local_copy(name), columns, data.at(name))
-    except StoreError as error:
+    except DamagedFile as error:
         reporter.line(f"{error}: computed again")
         return False
     for relative, digest in zip(*(rows.column(name).to_pylist() for name in columns), strict=True):

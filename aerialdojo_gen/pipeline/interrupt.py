@@ -21,7 +21,9 @@ class Interrupts:
 
     def __enter__(self) -> Interrupts:
         """Listen; only the main thread can, another one leaves things as they are."""
-        if threading.current_thread() is threading.main_thread():
+        # A script's background jobs have it ignored: a Ctrl-C is not meant for them.
+        ignored = signal.getsignal(signal.SIGINT) is signal.SIG_IGN
+        if threading.current_thread() is threading.main_thread() and not ignored:
             self._before = signal.signal(signal.SIGINT, self._on_signal)
         return self
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -12,6 +13,9 @@ from typing import Any, TextIO
 from tqdm import tqdm
 
 from aerialdojo_gen.common.terminal import raw, shown
+
+# Its own lock is a semaphore, which needs a /dev/shm that can be written and outlives a process that is killed.
+tqdm.set_lock(threading.RLock())
 
 _PLAIN_EVERY_S = 10.0
 # So many scenes are named that are under way.

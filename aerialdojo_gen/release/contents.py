@@ -205,14 +205,9 @@ def _faults(root: DataRoot, scene: str, present: list[str]) -> list[str]:
             lines.append(f"{root.at(part)} is missing: {mend}")
             continue
         try:
-            info = store.read_info(root, part)
+            prints[name] = store.read_info(root, part).fingerprint
         except StoreError as error:
             lines.append(str(error))
-            continue
-        if info is None:
-            lines.append(f"{root.at(part)} was not written by aerialdojo-gen: delete it and {mend}")
-            continue
-        prints[name] = info.fingerprint
     if len(set(prints.values())) > 1:
         lines.append(f"the release's parts of {scene} in {root} are of different runs: {mend} --force")
     return lines

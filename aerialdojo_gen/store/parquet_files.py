@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import errno
 import itertools
+import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import BinaryIO
@@ -11,7 +13,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
-from aerialdojo_gen.errors import StoreError, first_line
+from aerialdojo_gen.errors import DamagedFile, StoreError, first_line
 from aerialdojo_gen.store.atomic import atomic_file
 from aerialdojo_gen.store.schemas import TableSpec
 
@@ -41,8 +43,10 @@ def read_file(path: Path, columns: Sequence[str] | None = None, called: str = ""
 
     Raises
     ------
+    DamagedFile
+        It is no Parquet file, or its checksums are wrong.
     StoreError
-        The file is damaged.
+        It cannot be read (permission denied, say).
     """
     wanted = None if columns is None else [*columns]
     try:
@@ -56,7 +60,7 @@ def read_file(path: Path, columns: Sequence[str] | None = None, called: str = ""
             table = file.read(wanted, use_threads=False)
             return table if wanted is None else table.select(wanted)
     except _DAMAGE as error:
-        raise StoreError(f"{called or path} is damaged ({first_line(error)})") from None
+        raise _unreadable(error, called or path) from None
 
 
 def read_footer(file: Path | BinaryIO, called: str = "") -> tuple[int, dict[bytes, bytes]]:
@@ -71,14 +75,25 @@ def read_footer(file: Path | BinaryIO, called: str = "") -> tuple[int, dict[byte
 
     Raises
     ------
+    DamagedFile
+        It is no Parquet file (truncated, say).
     StoreError
-        The file is damaged (truncated, say).
+        It cannot be read (permission denied, say).
     """
     try:
         footer = pq.read_metadata(file)
     except _DAMAGE as error:
-        raise StoreError(f"{called or file} is damaged ({first_line(error)})") from None
+        raise _unreadable(error, called or file) from None
     return footer.num_rows, dict(footer.metadata or {})
+
+
+def _unreadable(error: BaseException, where: object) -> StoreError:
+    """Tell a file that the system does not let us read from one that is damaged, which messages advise to delete."""
+    number = error.errno if isinstance(error, OSError) else None
+    # Places that a damaged footer names may lie before the file's beginning: EINVAL.
+    if number and number != errno.EINVAL:
+        return StoreError(f"cannot read {where}: {os.strerror(number)}")
+    return DamagedFile(f"{where} is damaged ({first_line(error)})")
 
 
 def write_file(path: Path, table: pa.Table) -> None:

@@ -19,7 +19,7 @@ from typing import Any
 import pyarrow as pa
 
 from aerialdojo_gen.common.advice import command
-from aerialdojo_gen.errors import StoreError, first_line
+from aerialdojo_gen.errors import DamagedFile, StoreError, first_line
 from aerialdojo_gen.store.footers import ShardFile, ShardInfo, decode, encode
 from aerialdojo_gen.store.known_footers import known_footers
 from aerialdojo_gen.store.layout import (
@@ -103,8 +103,8 @@ def write_shard(
     return root.local_copy(name)
 
 
-def read_info(data: Where, name: str = "") -> ShardInfo | None:
-    """Read a shard's footer; None where it is not a shard of ours (no metadata).
+def read_info(data: Where, name: str = "") -> ShardInfo:
+    """Read a shard's footer.
 
     Parameters
     ----------
@@ -115,8 +115,10 @@ def read_info(data: Where, name: str = "") -> ShardInfo | None:
 
     Raises
     ------
+    DamagedFile
+        The shard is damaged (truncated, say, or something else wrote it), or has other rows than were written.
     StoreError
-        The shard is missing or damaged (truncated, say), or has other rows than were written.
+        It is missing or cannot be read.
     """
     if not name:
         path = Path(str(data))
@@ -132,7 +134,7 @@ def read_info(data: Where, name: str = "") -> ShardInfo | None:
 
 
 @lru_cache(maxsize=8192)
-def _read_info(root: DataRoot, name: str, version: str) -> ShardInfo | None:
+def _read_info(root: DataRoot, name: str, version: str) -> ShardInfo:
     # A shard is never written to, only replaced; a run asks for the same footer half a dozen times.
     known, begun_ns = known_footers(), time.time_ns()
     if known is not None and (said := known.find(root, name, version)) is not None:
@@ -145,17 +147,16 @@ def _read_info(root: DataRoot, name: str, version: str) -> ShardInfo | None:
             rows, metadata = read_footer(file, where)
     except FileNotFoundError:
         raise StoreError(f"cannot read {where}: No such file or directory") from None
-    except StoreError as error:
-        raise StoreError(f"{error}: {mend}") from None
-    raw = metadata.get(META)
-    if raw is None:
-        return None
+    except DamagedFile as error:
+        raise DamagedFile(f"{error}: {mend}") from None
+    if META not in metadata:
+        raise DamagedFile(f"{where} is damaged (not written by aerialdojo-gen): {mend}")
     try:
-        info = decode(raw)
+        info = decode(metadata[META])
     except ValueError as error:
-        raise StoreError(f"{where} is damaged ({error}): {mend}") from None
+        raise DamagedFile(f"{where} is damaged ({error}): {mend}") from None
     if info.rows != rows:
-        raise StoreError(f"{where} has {rows:,} rows where {info.rows:,} were written: {mend}")
+        raise DamagedFile(f"{where} has {rows:,} rows where {info.rows:,} were written: {mend}")
     if known is not None:
         known.note(root, name, version, begun_ns, info)
     return info
@@ -173,21 +174,23 @@ def keep_infos(root: DataRoot, names: Sequence[str]) -> None:
 
 def count_rows(data: Where, table: str, scene: str) -> int:
     """Count a scene's rows from the footers of its shards."""
-    return sum(info.rows for info in _infos(data, table, scene))
+    return sum(info.rows for info in _parts(data, table, scene).values())
 
 
 def content(data: Where, table: str, scene: str) -> list[str]:
     """Return the content digests of a scene's shards, by part."""
-    return [info.content for info in _infos(data, table, scene)]
+    return [info.content for info in _parts(data, table, scene).values()]
 
 
-def _infos(data: Where, table: str, scene: str, run: str = "default") -> list[ShardInfo]:
+def _parts(data: Where, table: str, scene: str, run: str = "default") -> dict[str, ShardInfo]:
+    """Read the footers of all of a scene's shards, by name; StoreError where one is missing, or is one too many."""
     root = open_root(data)
-    infos = [read_info(root, name) for name in shards(root, table, scene, run)]
-    if not infos or infos[0] is None or len(infos) != infos[0].parts:
+    infos = {name: read_info(root, name) for name in shards(root, table, scene, run)}
+    whole = [shard_name(table, scene, part, run) for part in range(len(infos))]
+    if not infos or [*infos] != whole or any(info.parts != len(infos) for info in infos.values()):
         raise StoreError(f"{table} of {scene} is missing or incomplete in {root}: "
                          f"run {command(LAYOUT[table].command, scene=scene)}")  # fmt: skip
-    return [info for info in infos if info is not None]
+    return infos
 
 
 def read_scene(
@@ -223,12 +226,11 @@ def read_scene(
     from aerialdojo_gen.store.tables import column_digests
 
     root = open_root(data)
-    infos = _infos(root, table, scene, run)
     spec = LAYOUT[table].spec
     wanted = spec.schema if columns is None else pa.schema([spec.schema.field(name) for name in columns])
     mend = f"delete it and run {command(LAYOUT[table].command, scene=scene)}"
     tables = []
-    for name, info in zip(shards(root, table, scene, run), infos, strict=True):
+    for name, info in _parts(root, table, scene, run).items():
         where = root.at(name)
         try:
             if columns is None:
@@ -239,13 +241,13 @@ def read_scene(
                 shard = read_file(root.local_copy(name), stored, where)
         except FileNotFoundError:
             raise StoreError(f"{where} was removed while it was read: run the command again") from None
-        except StoreError as error:
-            raise StoreError(f"{error}: {mend}") from None
+        except DamagedFile as error:
+            raise DamagedFile(f"{error}: {mend}") from None
         if not shard.schema.equals(pa.schema([wanted.field(name) for name in stored])):
             raise StoreError(f"{where} has other columns than this version's {spec.name}: {mend}")
         # The checksums of Parquet's pages do not say which column a page is of, nor what its values mean.
         if info.columns and any(info.columns.get(name) != own for name, own in column_digests(shard).items()):
-            raise StoreError(f"{where} is damaged (other rows than were written): {mend}")
+            raise DamagedFile(f"{where} is damaged (other rows than were written): {mend}")
         tables.append(pa.Table.from_arrays(_with_nulls(shard, wanted), schema=wanted.remove_metadata()))
     return pa.concat_tables(tables)
 
@@ -289,13 +291,13 @@ def read_stored(data: Where, table: str, scene: str, columns: Sequence[str]) -> 
     from aerialdojo_gen.store.tables import column_digests
 
     root = open_root(data)
-    infos = _infos(root, table, scene)
-    there = [name for name in columns if all(name in info.columns for info in infos)]
+    parts = _parts(root, table, scene)
+    there = [name for name in columns if all(name in info.columns for info in parts.values())]
     tables = []
-    for name, info in zip(shards(root, table, scene), infos, strict=True):
+    for name, info in parts.items():
         shard = read_file(root.local_copy(name), there, root.at(name)).replace_schema_metadata(None)
         if any(info.columns[column] != own for column, own in column_digests(shard).items()):
-            raise StoreError(f"{root.at(name)} is damaged (other rows than were written): delete it")
+            raise DamagedFile(f"{root.at(name)} is damaged (other rows than were written): delete it")
         tables.append(shard)
     return pa.concat_tables(tables)
 

@@ -9,7 +9,7 @@ from pathlib import PurePosixPath
 
 import pyarrow as pa
 
-from aerialdojo_gen.errors import StoreError
+from aerialdojo_gen.errors import DamagedFile
 from aerialdojo_gen.release.contents import FOLDER, SHARDS, part_name
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.parquet_files import read_file
@@ -168,15 +168,14 @@ def _read(release: Release, key: str, scene: str, found: dict[str, Outcome], run
     found["part_damaged"].rows += 1
     try:
         table, info = read_file(path, None, where), store.read_info(release.root, name)
-    except StoreError as error:
+    except DamagedFile as error:
         fault("part_damaged", str(error).removeprefix(f"{where} ").split(": delete")[0], "a whole Parquet file")
         return None
     found["part_schema"].rows += 1
-    if info is not None:
-        runs[relative] = info.fingerprint
-        found["part_content"].rows += 1
-        if content_digest(table) != info.content:
-            fault("part_content", "other rows than its footer tells of", f"rows of SHA-256 {info.content[:12]}…")
+    runs[relative] = info.fingerprint
+    found["part_content"].rows += 1
+    if content_digest(table) != info.content:
+        fault("part_content", "other rows than its footer tells of", f"rows of SHA-256 {info.content[:12]}…")
     extra = [name for name in table.column_names if name not in spec.schema.names]
     if spec.name == "tasks":
         found["leaking_column"].rows += 1

@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from support import chores
+from support import chores, preload
 from support.chores import Chore
 
 from aerialdojo_gen.errors import AerialDojoError, MissingPackage, UsageError
@@ -157,38 +157,99 @@ def test_what_processes_keep_is_closed_at_the_end(tmp_path):
     assert (tmp_path / f"closed-{os.getpid()}").exists()
 
 
-@pytest.mark.parametrize("executor", ["local", RAY])
-def test_ctrl_c_ends_all_processes(executor, tmp_path):
-    program = (
-        "import sys; from pathlib import Path; from support import chores\n"
-        "from aerialdojo_gen.pipeline.executors import make_executor\n"
-        "from aerialdojo_gen.pipeline.interrupt import Interrupts\n"
-        "def main():\n"
-        "    work = [chores.Chore(k, '', Path(sys.argv[2])) for k in range(4)]\n"
-        "    with Interrupts() as interrupts, make_executor(sys.argv[1], 2) as pool:\n"
-        "        for _ in pool.map(chores.sleep, work):\n"
-        "            interrupts.check()\n"
-        "if __name__ == '__main__':\n"
-        "    try:\n"
-        "        main()\n"
-        "    except KeyboardInterrupt:\n"
-        "        sys.exit(130)\n"
-    )
-    script = tmp_path / "program.py"
-    script.write_text(program)
-    folder = tmp_path / "pids"
+PROGRAM = """
+import sys
+from pathlib import Path
+from support import chores, preload
+from aerialdojo_gen.pipeline.executors import Talk, make_executor
+from aerialdojo_gen.pipeline.interrupt import Interrupts
+from aerialdojo_gen.pipeline.progress import Reporter
+
+def main(executor, work, folder):
+    reporter = Reporter()
+    tasks = [chores.Chore(k, "", Path(folder)) for k in range(4)]
+    talk = Talk(lambda _: None, lambda: False) if work == "talk" else None
+    with Interrupts() as interrupts, make_executor(executor, 2) as pool, reporter.bar("chores", len(tasks)) as bar:
+        for _ in pool.map(getattr(chores, work), tasks, talk=talk):
+            interrupts.check()
+            bar.advance()
+    reporter.line("all done")
+
+if __name__ == "__main__":
+    try:
+        main(*sys.argv[1:])
+    except KeyboardInterrupt:
+        sys.exit(130)
+"""
+
+
+def start(tmp_path, executor, work, **popen):
+    """Start a program whose processes do chores, in a session of its own; gives the folder of their traces too."""
+    script, folder = tmp_path / "program.py", tmp_path / "pids"
+    script.write_text(PROGRAM)
     folder.mkdir()
     path = os.pathsep.join([str(TESTS), str(TESTS.parent)])
+    environment = os.environ | {"PYTHONPATH": path} | popen.pop("env", {})
+    command = [sys.executable, str(script), executor, work, str(folder)]
     process = subprocess.Popen(
-        [sys.executable, str(script), executor, str(folder)], stderr=subprocess.PIPE, text=True,
-        start_new_session=True, env=os.environ | {"PYTHONPATH": path},
-    )  # fmt: skip
+        command, stderr=subprocess.PIPE, text=True, start_new_session=True, env=environment, **popen
+    )
+    return process, folder
+
+
+def wait_for_both(process, folder):
     chores.until(lambda: len(list(folder.iterdir())) == 2 or process.poll() is not None, 120)
+
+
+@pytest.mark.parametrize(
+    ("executor", "stopped"), [("local", False), ("local", True), pytest.param("ray", False, marks=pytest.mark.ray)]
+)
+def test_ctrl_c_ends_all_processes(executor, stopped, tmp_path):
+    process, folder = start(tmp_path, executor, "sleep")
+    wait_for_both(process, folder)
+    if stopped:
+        os.kill(int(next(folder.iterdir()).name), signal.SIGSTOP)
     os.killpg(process.pid, signal.SIGINT)
     _, err = process.communicate(timeout=60)
     assert process.returncode == 130, err
     assert "Traceback" not in err
     chores.until(lambda: not chores.session_members(process.pid))
+
+
+@pytest.mark.kill
+def test_an_ignored_ctrl_c_stays_ignored(tmp_path):
+    # As a shell starts the background jobs of a script.
+    process, folder = start(
+        tmp_path, "local", "wait_for_go", preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_IGN)
+    )
+    wait_for_both(process, folder)
+    os.killpg(process.pid, signal.SIGINT)
+    (folder / "go").touch()
+    _, err = process.communicate(timeout=60)
+    assert (process.returncode, err) == (0, "all done\n")
+
+
+@pytest.mark.kill
+def test_a_termination_leaves_no_processes_and_no_semaphores(tmp_path):
+    process, folder = start(tmp_path, "local", "sleep")
+    wait_for_both(process, folder)
+    process.terminate()
+    # What outlives the process, as Python's tracker of semaphores does, has the same standard error.
+    _, err = process.communicate(timeout=60)
+    assert (process.returncode, err) == (-signal.SIGTERM, "")
+    chores.until(lambda: not chores.session_members(process.pid))
+
+
+@pytest.mark.kill
+def test_processes_work_where_no_semaphore_can_be_made(tmp_path):
+    """As where ``/dev/shm`` is full or read-only."""
+    without = {"LD_PRELOAD": str(preload.library()), "PRELOAD_NO_SEMAPHORES": "1"}
+    lock = [sys.executable, "-c", "import multiprocessing; multiprocessing.Lock()"]
+    failed = subprocess.run(lock, env=os.environ | without, capture_output=True, text=True, check=False)
+    assert "OSError: [Errno 30] Read-only file system" in failed.stderr
+    process, _ = start(tmp_path, "local", "talk", env=without)
+    _, err = process.communicate(timeout=60)
+    assert (process.returncode, err) == (0, "all done\n")
 
 
 def test_what_cannot_be_is_said_in_one_line(monkeypatch):

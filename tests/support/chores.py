@@ -77,6 +77,12 @@ def sleep(chore):
     time.sleep(600)
 
 
+def wait_for_go(chore):
+    (chore.folder / f"{os.getpid()}").touch()
+    until(lambda: (chore.folder / "go").exists())
+    return chore.number
+
+
 def talk(chore, link):
     """Tell of three things, or stop before."""
     told = 0

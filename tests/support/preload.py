@@ -1,4 +1,4 @@
-"""A library that kills a program at its n-th call of a kind, or makes locks fail: compiled from C, preloaded.
+"""A library that kills a program at its n-th call of a kind, or makes locks and semaphores fail: from C, preloaded.
 
 The shipped code has no hook for it: what is counted are the calls of the C library by which files take their names,
 reach the disk and go.
@@ -20,7 +20,9 @@ SOURCE = r"""
 #include <dlfcn.h>
 #include <errno.h>
 #include <fcntl.h>
+#include <semaphore.h>
 #include <signal.h>
+#include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -103,6 +105,17 @@ int flock(int fd, int how) {
     if (error) { errno = atoi(error); return -1; }
     count("flock", NULL);
     return real(fd, how);
+}
+/* As where /dev/shm is full or read-only. */
+sem_t *sem_open(const char *name, int flags, ...) {
+    REAL(sem_open);
+    if (getenv("PRELOAD_NO_SEMAPHORES")) { errno = EROFS; return SEM_FAILED; }
+    va_list more;
+    va_start(more, flags);
+    mode_t mode = va_arg(more, mode_t);
+    unsigned value = va_arg(more, unsigned);
+    va_end(more);
+    return real(name, flags, mode, value);
 }
 """
 

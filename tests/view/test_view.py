@@ -3,8 +3,12 @@
 import http.client
 import json
 import re
+import signal
 import socket
 import struct
+import subprocess
+import sys
+import urllib.request
 from collections import Counter
 from pathlib import Path
 from urllib.parse import urlsplit
@@ -282,3 +286,27 @@ def test_paths_do_not_escape(server, path):
     assert answer.status == 404, text
     assert "import" not in text
     assert "root:" not in text
+
+
+@pytest.mark.kill
+def test_an_ignored_ctrl_c_stays_ignored_and_a_termination_is_a_plain_end():
+    program = (
+        "from aerialdojo_gen.web.serving import local_app, open_socket, serve\n"
+        "listener = open_socket(0)\n"
+        "print(listener.getsockname()[1], flush=True)\n"
+        "serve(local_app('view.html', 'view'), listener)\n"
+    )
+    process = subprocess.Popen(
+        [sys.executable, "-c", program], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_IGN),
+    )  # fmt: skip
+    port = int(process.stdout.readline())
+
+    with urllib.request.urlopen(f"http://127.0.0.1:{port}/", timeout=60) as answer:
+        assert answer.status == 200
+    # Its handlers are there once it answers.
+    ignored = re.search(r"SigIgn:\s*([0-9a-f]+)", Path(f"/proc/{process.pid}/status").read_text())[1]
+    assert int(ignored, 16) >> (signal.SIGINT - 1) & 1
+    process.send_signal(signal.SIGTERM)
+    _, err = process.communicate(timeout=60)
+    assert (process.returncode, err) == (-signal.SIGTERM, "")

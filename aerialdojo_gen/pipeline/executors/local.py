@@ -1,4 +1,8 @@
-"""Tasks in processes of this machine, or in this one."""
+"""Tasks in processes of this machine, or in this one.
+
+A worker process and its parent talk by a pipe alone. Semaphores would need a ``/dev/shm`` that can be written, and a
+parent that was killed would leave them behind.
+"""
 
 from __future__ import annotations
 
@@ -9,18 +13,22 @@ import os
 import signal
 import sys
 import time
+import traceback
 from collections.abc import Callable, Iterator
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
-from concurrent.futures.process import BrokenProcessPool
-from multiprocessing.util import Finalize
+from multiprocessing.connection import Connection, wait
+from multiprocessing.reduction import ForkingPickler
 from typing import Any
 
 from aerialdojo_gen.errors import AerialDojoError
 from aerialdojo_gen.pipeline.executors.base import Executor, R, T, Talk, Waiting, guarded
 from aerialdojo_gen.pipeline.executors.link import Here, Turns, end
 
-# How often the parent looks at what its workers tell, seconds.
-_HEAR_EVERY_S = 0.2
+# How often the parent looks whether workers are to stop, seconds.
+_LOOK_EVERY_S = 0.2
+# How long a worker that was terminated may take to end before it is killed, seconds.
+_END_WITHIN_S = 5.0
+# spawn: FCL, PyBullet and numba hold state that does not survive a fork.
+_CONTEXT = multiprocessing.get_context("spawn")
 
 
 def own_cores() -> int:
@@ -39,9 +47,7 @@ class LocalExecutor(Executor):
 
     def __init__(self, workers: int | None = None) -> None:
         self._workers = workers or own_cores()
-        # A pool of one process each, so that this side chooses who does what.
-        self._lanes: list[ProcessPoolExecutor] = []
-        self._line = _Line()
+        self._lanes: dict[int, _Lane] = {}
 
     @property
     def workers(self) -> int:
@@ -50,18 +56,34 @@ class LocalExecutor(Executor):
 
     def close(self) -> None:
         """End the processes when they have done what they are at."""
-        for lane in self._lanes:
-            lane.shutdown(wait=True, cancel_futures=True)
+        for lane in self._lanes.values():
+            lane.pipe.close()
+        try:
+            for lane in self._lanes.values():
+                lane.process.join()
+        except KeyboardInterrupt:
+            self.cancel()
+            raise
         self._lanes.clear()
         end()
 
     def cancel(self) -> None:
-        """End the processes now, and wait until they are gone."""
-        for lane in self._lanes:
-            for process in list((lane._processes or {}).values()):
-                with contextlib.suppress(OSError):
-                    process.terminate()
-        self.close()
+        """End the processes now; one that does not end by itself (stopped, or waiting for a disk) is killed."""
+        lanes = [*self._lanes.values()]
+        self._lanes.clear()
+        for lane in lanes:
+            lane.process.terminate()
+            lane.pipe.close()
+        try:
+            until = time.monotonic() + _END_WITHIN_S
+            for lane in lanes:
+                lane.process.join(max(0.0, until - time.monotonic()))
+        finally:
+            for lane in lanes:
+                lane.process.kill()
+            for lane in lanes:
+                lane.process.join(_END_WITHIN_S)
+        end()
 
     def run(
         self, work: Callable[..., R], waiting: Waiting[T], *, talk: Talk | None = None, memory_mb: int = 0
@@ -74,96 +96,113 @@ class LocalExecutor(Executor):
                 waiting.finished(task, outcome)
                 yield outcome
             return
-        self._start()
-        self._line.clear()
-        running: dict[Future[R | AerialDojoError], tuple[int, T]] = {}
-        idle = list(range(len(self._lanes)))
+        turns, running, stopping = Turns(), dict[int, T](), set[int]()
         try:
             while True:
                 # One task a process keeps a Ctrl-C from waiting for what has not begun.
-                # The first submit starts the process; it inherits a blocked SIGINT, so that a Ctrl-C while it
-                # starts is the parent's alone.
-                signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-                try:
-                    for lane, task in waiting.give(tuple(idle)):
-                        idle.remove(lane)
-                        running[self._lanes[lane].submit(_do, work, task, talk is not None)] = (lane, task)
-                finally:
-                    signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
-                finished, _ = wait(running, _HEAR_EVERY_S if talk else None, FIRST_COMPLETED)
-                if talk:
-                    self._line.hear(talk)
-                for future in finished:
-                    outcome = future.result()
-                    lane, task = running.pop(future)
-                    idle.append(lane)
-                    waiting.finished(task, outcome)
-                    yield outcome
+                for number, task in waiting.give([n for n in range(self._workers) if n not in running]):
+                    running[number] = task
+                    stopping.discard(number)
+                    self._lane(number).send((work, task, talk is not None))
+                pipes = {self._lanes[number].pipe: number for number in running}
+                ready = wait([*pipes], _LOOK_EVERY_S if talk else None)
+                if talk and talk.stopped():
+                    for number in running.keys() - stopping:
+                        stopping.add(number)
+                        self._lanes[number].send(_STOP)
+                for number in (pipes[pipe] for pipe in ready if isinstance(pipe, Connection)):
+                    match self._lanes[number].receive():
+                        case "told", message:
+                            if talk:
+                                talk.hear(message)
+                        case "turn", interval_s:
+                            self._lanes[number].send(turns.take(interval_s, time.monotonic()))
+                        case "raised", error, origin:
+                            raise error from RuntimeError(f"in a worker process\n{origin}")
+                        case "done", outcome:
+                            waiting.finished(running.pop(number), outcome)
+                            yield outcome
                 if not running and not waiting:
                     return
-        except BrokenProcessPool:
-            labels = "; ".join(task.label for _, task in running.values())
+        except _LostError:
+            labels = "; ".join(task.label for task in running.values())
             raise AerialDojoError(
                 f"a worker process was killed at {labels} (out of memory?): "
                 "run again, what was finished is kept; use fewer --workers if memory ran out"
             ) from None
+        finally:
+            if running:
+                # What they still send is of no run that follows.
+                self.cancel()
 
-    def _start(self) -> None:
-        if self._lanes:
-            return
-        self._line.open()
-        self._lanes = [
-            ProcessPoolExecutor(1, mp_context=_CONTEXT, initializer=_begin, initargs=(os.getpid(), self._line))
-            for _ in range(self._workers)
-        ]
-
-
-# spawn: FCL, PyBullet and numba hold state that does not survive a fork.
-_CONTEXT = multiprocessing.get_context("spawn")
+    def _lane(self, number: int) -> _Lane:
+        """Return a worker process, started by its first task."""
+        if number not in self._lanes:
+            self._lanes[number] = _Lane()
+        return self._lanes[number]
 
 
-class _Line:
-    """The links of all workers of a pool; it is inherited, not sent."""
+class _LostError(Exception):
+    """A worker process is gone."""
 
-    _told: Any
-    _stop: Any
-    _next: Any
+
+class _Lane:
+    """A worker process that does one task at a time, and this end of its pipe."""
+
+    def __init__(self) -> None:
+        self.pipe, theirs = _CONTEXT.Pipe()
+        self.process = _CONTEXT.Process(target=_serve, args=(os.getpid(), theirs))
+        # It inherits a blocked SIGINT, so that a Ctrl-C while it starts is the parent's alone.
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+        try:
+            self.process.start()
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        theirs.close()
+
+    def send(self, message: object) -> None:
+        try:
+            self.pipe.send(message)
+        except ConnectionError:
+            raise _LostError from None
+
+    def receive(self) -> Any:
+        try:
+            return self.pipe.recv()
+        except (EOFError, ConnectionError):
+            raise _LostError from None
+
+
+# Sent to a worker that is to begin nothing more.
+_STOP = "stop"
+
+
+class _PipeLink:
+    """The link of a worker process."""
+
     every_s = 0.1
 
-    def open(self) -> None:
-        self._told, self._stop = _CONTEXT.SimpleQueue(), _CONTEXT.Event()
-        # Of the monotonic clock, which all processes of a machine share.
-        self._next = _CONTEXT.Value("d", 0.0)
-
-    def clear(self) -> None:
-        self._stop.clear()
-
-    def hear(self, talk: Talk) -> None:
-        """Pass on what was told, and what the parent wants."""
-        while not self._told.empty():
-            talk.hear(self._told.get())
-        if talk.stopped():
-            self._stop.set()
+    def __init__(self, pipe: Connection[Any, Any]) -> None:
+        self._pipe, self._stopped = pipe, False
 
     def tell(self, message: object) -> None:
-        self._told.put(message)
+        self._pipe.send(("told", message))
 
     def stopped(self) -> bool:
-        return bool(self._stop.is_set())
+        # The parent sends nothing else while nobody waits for a turn.
+        if not self._stopped and self._pipe.poll():
+            self._stopped = self._pipe.recv() == _STOP
+        return self._stopped
 
     def turn(self, interval_s: float) -> float:
-        with self._next.get_lock():
-            turns, now = Turns(self._next.value), time.monotonic()
-            wait_s = turns.take(interval_s, now)
-            self._next.value = turns.next
-        return wait_s
+        self._pipe.send(("turn", interval_s))
+        while (answer := self._pipe.recv()) == _STOP:
+            self._stopped = True
+        return float(answer)
 
 
-# A worker process's link, from its start on.
-_own: list[_Line] = []
-
-
-def _begin(parent: int, line: _Line) -> None:
+def _serve(parent: int, pipe: Connection[Any, Any]) -> None:
+    """Do tasks until the parent closes the pipe or is gone."""
     # Ctrl-C goes to the whole process group: the parent alone answers it, and ends the workers itself.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     # A worker must not outlive a parent that was killed with SIGKILL.
@@ -172,9 +211,25 @@ def _begin(parent: int, line: _Line) -> None:
         # It may have been killed before the line above, while this process was starting.
         if os.getppid() != parent:
             os._exit(1)
-    _own.append(line)
-    Finalize(None, end, exitpriority=1)
+    try:
+        with contextlib.suppress(EOFError, ConnectionError):
+            while True:
+                message = pipe.recv()
+                if message != _STOP:
+                    pipe.send_bytes(_answer(pipe, *message))
+    finally:
+        end()
 
 
-def _do(work: Callable[..., R], task: Any, linked: bool) -> R | AerialDojoError:
-    return guarded(work, task, _own[0] if linked else None)
+def _answer(pipe: Connection[Any, Any], work: Callable[..., Any], task: Any, linked: bool) -> memoryview:
+    """Do work on a task; gives the message that tells how it ended."""
+    try:
+        return ForkingPickler.dumps(("done", guarded(work, task, _PipeLink(pipe) if linked else None)))
+    except BaseException as error:
+        text = traceback.format_exc()
+        try:
+            message = ForkingPickler.dumps(("raised", error, text))
+            ForkingPickler.loads(message)
+        except Exception:
+            return ForkingPickler.dumps(("raised", RuntimeError(f"{type(error).__name__}: {error}"), text))
+        return message
