@@ -19,7 +19,7 @@ _LEAST_FILES = 64
 _LEAST_MEMORY = 1 << 30
 _NO_MEMORY = (
     "cannot allocate memory", "failed to map segment", "bad_alloc", "can't start new thread", "insufficient memory",
-    "out of memory", "unable to allocate",
+    "out of memory", "unable to allocate", "memory allocation still failed",
 )  # fmt: skip
 _NO_FILES = ("too many open files",)
 
@@ -92,6 +92,11 @@ def check_memory(needed_mb: int, what: str) -> None:
         raise AerialDojoError(f"not enough memory{_address_space()}: {what} takes up to {needed_mb:,} MB")
 
 
+def is_out_of_memory(text: str) -> bool:
+    """Whether a library's message says that there is too little memory."""
+    return any(words in text.lower() for words in _NO_MEMORY)
+
+
 def explained(error: BaseException) -> str | None:
     """Return the line to print for an error that the machine's limits or its disk caused; None for any other."""
     for cause in _chain(error):
@@ -105,7 +110,7 @@ def explained(error: BaseException) -> str | None:
             or number == errno.ENOMEM
             # An extension that got no memory while it was imported, and forgot to say so.
             or (isinstance(cause, SystemError) and "without setting an exception" in said and _address_space())
-            or (isinstance(cause, OSError | ImportError | RuntimeError) and any(w in said for w in _NO_MEMORY))
+            or (isinstance(cause, OSError | ImportError | RuntimeError) and is_out_of_memory(said))
         ):
             return f"not enough memory{_address_space()}: give it more, or use fewer --workers"
         if number in DISK_ERRORS and isinstance(cause, OSError) and cause.filename is not None:

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import json
 import re
-import resource
 import struct
 import warnings
 from collections.abc import Mapping
@@ -19,6 +18,7 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from aerialdojo_gen.common.bounded import loads_json
+from aerialdojo_gen.common.trouble import is_out_of_memory
 from aerialdojo_gen.errors import AssetError
 from aerialdojo_gen.imports.beside import Beside
 from aerialdojo_gen.imports.child import MAX_MEMORY_BYTES, bounded, read_in_child
@@ -110,10 +110,9 @@ def read_into(path: Path, out: Path, texture_px: int = TEXTURE_PX) -> str:
         _pack(nodes, out)
     except AssetError as error:
         return str(error)
-    except (MemoryError, ImportError):
-        most = resource.getrlimit(resource.RLIMIT_AS)[0] >> 20
-        return f"needs more than {most} MiB to read: simplify or split the mesh"
     except Exception as error:  # a foreign file may make a reader fail in any way: it is named, never let through
+        if isinstance(error, MemoryError) or is_out_of_memory(str(error)):
+            raise MemoryError from None
         first = (str(error).splitlines() or [""])[0]
         return f"cannot be read ({type(error).__name__}{': ' + first[:120] if first else ''})"
     return ""

@@ -23,6 +23,10 @@ from aerialdojo_gen.scenes.materials import parse_colour
 STOREY_M = 3.2
 _ROOF_LEVEL_M = 2.4
 _LEAST_M2, _LEAST_WIDTH_M = 6.0, 1.2
+_LEAST_HOLE_M2 = 1.0
+# A recipe takes rings of 1,000.
+_MOST_POINTS = 900
+_LEFT_OUT = "outlines that cross themselves, or have too many corners, left out"
 _PITCH = 0.62
 _MOST_RISE_M = 5.0
 # Of a building's ground: where its parts take more, its outline has nothing to add.
@@ -84,6 +88,35 @@ class Told:
         self.counts[what] += n
 
 
+def plans_of(shape: BaseGeometry, tolerance_m: float, told: Told) -> list[Polygon]:
+    """Simplify an area, and round it to centimetres; count what is left out as it crosses itself then."""
+    out = []
+    for piece in polygons_of(shape):
+        plan = piece.simplify(tolerance_m)
+        rounded = [_to_centimetres(plan)]
+        if not rounded[0].is_valid:
+            # By GEOS's noding, which gives whole centimetres: rounding its result again changes nothing.
+            rounded = [_to_centimetres(p) for p in polygons_of(shapely.set_precision(plan, 0.01))]
+        valid = [p for p in rounded if p.is_valid and len(p.exterior.coords) <= _MOST_POINTS]
+        if len(valid) < len(rounded):
+            told.add(_LEFT_OUT, len(rounded) - len(valid))
+        out += valid
+    return out
+
+
+def rings_of(plan: Polygon) -> dict[str, Any]:
+    """Return the keys of a recipe that have an area: `outline`, and `holes` where there are any."""
+    outline, *holes = ([list(at) for at in ring.coords[:-1]] for ring in (plan.exterior, *plan.interiors))
+    return {"outline": outline, **({"holes": holes} if holes else {})}
+
+
+def _to_centimetres(plan: Polygon) -> Polygon:
+    def ring(r: Any) -> list[tuple[float, float]]:
+        return [(round(float(x), 2), round(float(y), 2)) for x, y in r.coords]
+
+    return Polygon(ring(plan.exterior), [ring(r) for r in plan.interiors if Polygon(r).area > _LEAST_HOLE_M2])
+
+
 def buildings(
     areas: Sequence[Feature], shops: Sequence[BaseGeometry], site: Polygon, told: Told
 ) -> list[dict[str, Any]]:
@@ -116,7 +149,7 @@ def buildings(
         bodies = [
             b
             for part in own
-            for b in _bodies(part.shape.intersection(plan), _inherited(area, part), usual, site, None)
+            for b in _bodies(part.shape.intersection(plan), _inherited(area, part), usual, site, told, part=True)
         ]
         rest = plan.difference(shapely.union_all([p.shape for p in own])) if own else plan
         if not own or rest.area > (1.0 - _PARTED) * area.shape.area:
@@ -167,24 +200,19 @@ def _building(area: Feature, bodies: list[dict[str, Any]], shops: BaseGeometry |
     }
 
 
-def _bodies(shape: BaseGeometry, area: Feature, usual: int, site: Polygon, told: Told | None) -> list[dict[str, Any]]:
+def _bodies(
+    shape: BaseGeometry, area: Feature, usual: int, site: Polygon, told: Told, *, part: bool = False
+) -> list[dict[str, Any]]:
     out = []
-    for piece in polygons_of(shape.intersection(site)):
-        plan = piece.simplify(0.12)
-        if plan.area < _LEAST_M2 or plan.buffer(-_LEAST_WIDTH_M / 2).is_empty or not isinstance(plan, Polygon):
+    for plan in plans_of(shape.intersection(site), 0.12, told):
+        if plan.area < _LEAST_M2 or plan.buffer(-_LEAST_WIDTH_M / 2).is_empty:
             continue
-        base, top, roof, rise = _heights(area, plan, usual, told)
+        base, top, roof, rise = _heights(area, plan, usual, None if part else told)
         out.append({
-            "outline": _ring(plan.exterior), **({"holes": [_ring(r) for r in plan.interiors if Polygon(r).area > 1.0]}
-                                                if plan.interiors else {}),
-            **({"base_m": round(base, 2)} if base else {}), "top_m": round(top, 2), "roof": roof,
+            **rings_of(plan), **({"base_m": round(base, 2)} if base else {}), "top_m": round(top, 2), "roof": roof,
             **({"roof_m": round(rise, 2)} if rise else {}),
         })  # fmt: skip
     return out
-
-
-def _ring(ring: Any) -> list[list[float]]:
-    return [[round(float(x), 2), round(float(y), 2)] for x, y in list(ring.coords)[:-1]]
 
 
 def _heights(area: Feature, plan: Polygon, usual: int, told: Told | None) -> tuple[float, float, str, float]:

@@ -10,10 +10,9 @@ from shapely.geometry.base import BaseGeometry
 from shapely.ops import polygonize, unary_union
 
 from aerialdojo_gen.imports.map_bridges import BRIDGE
-from aerialdojo_gen.imports.map_buildings import Told
+from aerialdojo_gen.imports.map_buildings import Told, plans_of, rings_of
 from aerialdojo_gen.imports.map_tags import SURFACES, Tags, below_ground, count, metres
 from aerialdojo_gen.imports.osm import Feature
-from aerialdojo_gen.scenes.ground import polygons_of
 
 _SPACING_M = 0.06
 _PARKED = ("parallel", "lane", "diagonal", "perpendicular", "street_side", "on_kerb", "half_on_kerb", "yes")
@@ -154,7 +153,7 @@ def rails(lines: Sequence[Feature], window: Polygon, on: str = "") -> list[list[
     return [line for f in open_ if f.tags.get(BRIDGE, "") == on for line in clipped(f.shape, window)]
 
 
-def areas(found: Iterable[Feature], lines: Sequence[Feature], window: Polygon) -> list[dict[str, Any]]:
+def areas(found: Iterable[Feature], lines: Sequence[Feature], window: Polygon, told: Told) -> list[dict[str, Any]]:
     """Make the recipe's areas: the larger before the smaller, water over land."""
     out: list[tuple[bool, float, str, dict[str, Any]]] = []
     for feature in found:
@@ -164,22 +163,16 @@ def areas(found: Iterable[Feature], lines: Sequence[Feature], window: Polygon) -
         material, grows = said
         parking = feature.tags.get("amenity") == "parking"
         name = feature.tags.get("name", "")[:80] if grows == "park" or parking else ""
-        for piece in polygons_of(feature.shape.intersection(window)):
-            made = _area(piece, material, grows=grows, parking=parking, name=name)
-            if made:
-                out.append((material.startswith("water"), -feature.shape.area, feature.key, made))
+        for made in _areas(feature.shape.intersection(window), told, material, grows, parking, name):
+            out.append((material.startswith("water"), -feature.shape.area, feature.key, made))
     for feature in lines:
         wide = _WATERWAYS.get(feature.tags.get("waterway", ""))
         if wide and not below_ground(feature.tags):
             wide = metres(feature.tags, "width") or wide
-            for piece in polygons_of(feature.shape.buffer(wide / 2).intersection(window)):
-                made = _area(piece, "water")
-                if made:
-                    out.append((True, -piece.area, feature.key, made))
+            wet = feature.shape.buffer(wide / 2).intersection(window)
+            out += [(True, -wet.area, feature.key, made) for made in _areas(wet, told, "water")]
     for piece in _sea(lines, window):
-        made = _area(piece, "water:#46788c")
-        if made:
-            out.append((True, -piece.area, "sea", made))
+        out += [(True, -piece.area, "sea", made) for made in _areas(piece, told, "water:#46788c")]
     return [made for *_, made in sorted(out, key=lambda row: row[:3])]
 
 
@@ -194,17 +187,12 @@ def _ground(tags: Tags) -> tuple[str, str] | None:
     return None
 
 
-def _area(piece: Polygon, material: str, **said: Any) -> dict[str, Any] | None:
-    plan = piece.simplify(0.1)
-    if not isinstance(plan, Polygon) or plan.area < _LEAST_AREA_M2 or len(plan.exterior.coords) > 900:
-        return None
-
-    def ring(r: Any) -> list[list[float]]:
-        return [[round(float(x), 2), round(float(y), 2)] for x, y in list(r.coords)[:-1]]
-
-    holes = [ring(r) for r in plan.interiors if Polygon(r).area > 1.0]
-    made = {"material": material, **{k: v for k, v in said.items() if v}, "outline": ring(plan.exterior)}
-    return made | ({"holes": holes} if holes else {})
+def _areas(
+    shape: BaseGeometry, told: Told, material: str, grows: str = "", parking: bool = False, name: str = ""
+) -> list[dict[str, Any]]:
+    said = {k: v for k, v in {"grows": grows, "parking": parking, "name": name}.items() if v}
+    plans = (plan for plan in plans_of(shape, 0.1, told) if plan.area >= _LEAST_AREA_M2)
+    return [{"material": material, **said, **rings_of(plan)} for plan in plans]
 
 
 def _sea(lines: Sequence[Feature], window: Polygon) -> list[Polygon]:

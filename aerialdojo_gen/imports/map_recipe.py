@@ -17,7 +17,7 @@ from aerialdojo_gen.imports.map_buildings import Told
 from aerialdojo_gen.imports.osm import ATTRIBUTION, Feature, Map
 from aerialdojo_gen.imports.toml_text import recipe_text
 from aerialdojo_gen.layouts.places.parts.heights import Heights as HeightTable
-from aerialdojo_gen.scenes.ground import rectangle
+from aerialdojo_gen.scenes.ground import polygons_of, rectangle
 
 SMALLEST_M, LARGEST_M = 20.0, 1000.0
 # Streets run on a little beyond the border, so that their ends are not seen.
@@ -88,7 +88,7 @@ def town_recipe(
         "rails": map_ground.rails(lines, window),
         "crossings": map_things.crossings(points, site),
         "signals": map_things.signals(points, site),
-        "areas": map_ground.areas(areas, lines, window),
+        "areas": map_ground.areas(areas, lines, window, told),
         "roads": map_ground.streets(lines, window, told),
         "bridges": [b.table() | _on(map_ground.rails(lines, window, str(k))) for k, b in enumerate(raised)],
         "buildings": buildings,
@@ -144,7 +144,11 @@ def _in_metres(frame: LocalFrame, features: Sequence[Feature]) -> list[Feature]:
 
 
 def _valid(shape: Any) -> Any:
-    return shape if shape.is_valid else shapely.make_valid(shape)
+    if shape.is_valid:
+        return shape
+    made = shapely.make_valid(shape)
+    # Of an area, the lines that are left of what crosses itself are no part: overlays refuse what is mixed.
+    return shapely.MultiPolygon(polygons_of(made)) if shape.geom_type.endswith("Polygon") else made
 
 
 __all__ = ["Heights", "town_recipe"]

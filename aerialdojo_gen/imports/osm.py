@@ -16,6 +16,7 @@ import numpy as np
 import shapely
 from shapely.geometry import LineString, Polygon
 
+from aerialdojo_gen.common.trouble import is_out_of_memory
 from aerialdojo_gen.errors import AssetError, MissingPackage, UsageError, lacks
 from aerialdojo_gen.imports.child import MAX_MEMORY_BYTES, bounded, read_in_child
 from aerialdojo_gen.imports.earth import Bbox, in_words
@@ -154,11 +155,9 @@ def read_into(path: Path, out: Path, boxes: Sequence[Bbox]) -> str:
         if extent is None:
             return "holds no points"
         out.write_text(json.dumps({"extent": extent, "boxes": found}), encoding="utf-8")
-    except (MemoryError, ImportError):
-        return f"needs too much memory to read: {_part(path, boxes)}"
     except Exception as error:  # a foreign file may make a reader fail in any way: it is named, never let through
-        if "bad_alloc" in str(error):
-            return f"needs too much memory to read: {_part(path, boxes)}"
+        if isinstance(error, MemoryError) or is_out_of_memory(str(error)):
+            raise MemoryError from None
         why = " ".join(str(error).split())[:200] or "it is damaged"
         return f"cannot be read as a map, or is cut short: {why}; download it again"
     return ""

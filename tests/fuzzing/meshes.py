@@ -55,7 +55,10 @@ def _village(suffix: str) -> Callable[[], list[Case]]:
 def _read_mesh(folder: Path) -> None:
     path = next(p for p in folder.iterdir() if p.stem == "m" and p.suffix != ".mtl")
     out = folder / "nodes.npz"
-    fault = read_into(path, out)
+    try:
+        fault = read_into(path, out)
+    except MemoryError:
+        fault = "needs too much memory"
     if fault:
         raise AerialDojoError(fault)
     scene, repairs = adopt("U_Mine_0", unpacked(out))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import shapely
 
 from aerialdojo_gen.imports.earth import LocalFrame
 
@@ -127,3 +128,16 @@ def write_geotiff(
     ) as file:  # fmt: skip
         file.write(z.astype(np.float32), 1)
     return path
+
+
+def crowded(seed: int, n: int = 40) -> list[tuple[list[tuple[float, float]], dict[str, str]]]:
+    """Make up buildings, rings in metres with tags: stars of up to 60 corners that overlap and leave the town."""
+    rng = np.random.default_rng(seed)
+    out = []
+    while len(out) < n:
+        (x, y), k = rng.uniform(-HALF_M - 2, HALF_M + 2, 2), int(rng.integers(3, 60))
+        angle, radius = np.sort(rng.uniform(0, 2 * np.pi, k)), rng.uniform(0.3, 16, k)
+        ring = np.column_stack([x + radius * np.cos(angle), y + radius * np.sin(angle)])
+        if shapely.Polygon(ring).is_valid:
+            out.append((list(map(tuple, ring.tolist())), {"building": "yes", "height": "9"}))
+    return out
