@@ -16,6 +16,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from aerialdojo_gen.common.disk import check_regular
 from aerialdojo_gen.errors import AerialDojoError, BeyondBounds, Malformed, StoreError
 
 JsonPath = tuple[str | int, ...]
@@ -273,6 +274,7 @@ def too_deep(value: Any) -> bool:
 
 def _text(path: Path, limit: int, error: type[AerialDojoError]) -> str:
     try:
+        check_regular(path)
         with path.open("rb") as file:
             raw = file.read(limit + 1)
     except FileNotFoundError:

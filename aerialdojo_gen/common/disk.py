@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import stat
 from pathlib import Path
 
 from aerialdojo_gen.errors import StoreError, first_line
@@ -23,6 +24,17 @@ DISK_ERRORS = {
     errno.ENOLCK: "the file system gives no locks (ENOLCK): use a folder on a local disk",
     errno.EOPNOTSUPP: "the file system knows no locks: use a folder on a local disk",
 }
+_KINDS = {
+    stat.S_IFDIR: "is a folder", stat.S_IFIFO: "is a FIFO", stat.S_IFSOCK: "is a socket", stat.S_IFCHR: "is a device",
+    stat.S_IFBLK: "is a device",
+}  # fmt: skip
+
+
+def check_regular(path: Path) -> None:
+    """Raise OSError for what is no regular file: a FIFO does not answer, a device does not end."""
+    kind = stat.S_IFMT(path.stat().st_mode)
+    if kind != stat.S_IFREG:
+        raise OSError(errno.EINVAL, f"{_KINDS.get(kind, 'is no file')}, a file is needed", str(path))
 
 
 def disk_error(error: OSError, path: Path) -> StoreError:

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from aerialdojo_gen.common.bounded import MAX_DEPTH, loads_json, too_deep
+from aerialdojo_gen.common.disk import check_regular
 from aerialdojo_gen.errors import ImportRefused, brief
 from aerialdojo_gen.exchange.fields import shown
 
@@ -177,6 +178,7 @@ def small_document(path: Path, *, limit: int = RECORD_LIMIT) -> Any:
     OSError
         It cannot be read.
     """
+    check_regular(path)
     with path.open("rb") as file:
         raw = file.read(limit + 1)
     if len(raw) > limit:

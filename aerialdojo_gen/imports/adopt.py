@@ -12,7 +12,7 @@ import trimesh
 from numpy.typing import NDArray
 
 from aerialdojo_gen.annotations.describing import UNKNOWN
-from aerialdojo_gen.errors import AssetError
+from aerialdojo_gen.errors import AssetError, UsageError
 from aerialdojo_gen.imports.apart import taken_apart
 from aerialdojo_gen.imports.cutting import Region, bodies_of, unique_rows
 from aerialdojo_gen.imports.naming import Naming
@@ -82,10 +82,7 @@ class Place:
     @classmethod
     def of(cls, nodes: Sequence[RawNode], up: str, scale: float, naming: Naming | None = None) -> Place:
         """Turn, scale and mend the nodes of a file; errors as of `adopt`."""
-        if up not in ("y", "z"):
-            raise AssetError(f"--up {up!r}: a mesh's up axis is y or z")
-        if not (math.isfinite(scale) and scale > 0):
-            raise AssetError(f"--scale {scale}: must be a number above 0")
+        check_options(up, scale)
         repairs = Repairs()
         bodies = [b for node in nodes for b in [_sound(_turned(node, up, scale), repairs)] if len(b.faces)]
         if not bodies:
@@ -125,9 +122,24 @@ def lies(bodies: Sequence[RawNode]) -> str:
     places, n = np.unique(np.floor((middles - low[:2]) / cell).astype(np.int64), axis=0, return_counts=True)
     x, y = low[:2] + (places[np.argmax(n)] + 0.5) * cell
     return (
-        f"x is {low[0]:.7g} to {high[0]:.7g}, y {low[1]:.7g} to {high[1]:.7g} m, and most triangles "
-        f"({int(n.max()):,} of {len(middles):,}) lie about x {x:.0f}, y {y:.0f}"
+        f"x is {low[0]:.7g} to {high[0]:.7g}, y {low[1]:.7g} to {high[1]:.7g} m, densest about x {x:.0f}, y {y:.0f} "
+        f"({int(n.max()):,} of {len(middles):,} triangles)"
     )
+
+
+def size_text(size: Floats) -> str:
+    """Write lengths in metres, three digits of small ones: ``"1,250 by 84.5 by 12 m"``."""
+    return f"{' by '.join(f'{s:,.0f}' if s >= 99.95 else f'{s:.3g}' for s in size.tolist())} m"
+
+
+def check_options(up: str | None, scale: float | None, light: str = "auto") -> None:
+    """Refuse what says of no mesh how it lies: a `UsageError`, before any mesh is read."""
+    if up not in (None, "y", "z"):
+        raise UsageError(f"--up {up[:20]!r}: must be z or y, the mesh's axis that points up")
+    if scale is not None and not (math.isfinite(scale) and scale > 0):
+        raise UsageError(f"--scale {scale}: must be a number above 0")
+    if light not in LIGHTS:
+        raise UsageError(f"--light {light[:20]!r}: must be {', '.join(LIGHTS[:-1])} or {LIGHTS[-1]}")
 
 
 def adopt(
@@ -188,19 +200,19 @@ def adopt(
 def region_of(
     crop_m: tuple[float, float, float] | None, box_m: tuple[float, float, float, float] | None
 ) -> Region | None:
-    """Return the part that is kept; AssetError for two of them, or one without an area."""
+    """Return the part that is kept; UsageError for two of them, or one without an area."""
     if crop_m is not None and box_m is not None:
-        raise AssetError("--crop and --box both say what to keep: give one of them")
+        raise UsageError("--crop and --box both say what to keep: give one of them")
     numbers = crop_m or box_m or ()
     if not all(math.isfinite(v) and abs(v) < 1e7 for v in numbers):
-        raise AssetError("--crop and --box take numbers of metres")
+        raise UsageError("--crop and --box take numbers of metres")
     if crop_m is not None:
         if crop_m[2] <= 0:
-            raise AssetError(f"--crop {crop_m[0]:g} {crop_m[1]:g} {crop_m[2]:g}: the radius must be above 0")
+            raise UsageError(f"--crop {crop_m[0]:g} {crop_m[1]:g} {crop_m[2]:g}: the radius must be above 0")
         return Region.circle(*crop_m)
     if box_m is not None:
         if box_m[0] == box_m[2] or box_m[1] == box_m[3]:
-            raise AssetError("--box X0 Y0 X1 Y1: the two corners must differ in x and in y")
+            raise UsageError("--box X0 Y0 X1 Y1: the two corners must differ in x and in y")
         return Region.box(*box_m)
     return None
 
@@ -239,8 +251,7 @@ def settled(
     AssetError
         As of `adopt`.
     """
-    if light not in LIGHTS:
-        raise AssetError(f"--light {light!r}: must be {', '.join(LIGHTS[:-1])} or {LIGHTS[-1]}")
+    check_options(None, None, light)
     repairs = Repairs(list(place.repairs.lines))
     part = place if region is None else place.within(region)
     bodies = part.bodies
@@ -330,7 +341,7 @@ def _bounds(bodies: Sequence[RawNode]) -> tuple[Floats, Floats]:
 
 def _check_extent(size: Floats, bodies: Sequence[RawNode]) -> None:
     wide = float(max(size[0], size[1]))
-    text = f"the mesh is {size[0]:,.4g} by {size[1]:,.4g} by {size[2]:,.4g} m"
+    text = f"the mesh is {size_text(size)}"
     if wide > LARGEST_M or math.prod(2 * (s + 2 * _MARGIN_M) for s in size) > _MOST_CELLS:
         raise AssetError(
             f"{text}, too large to plan in: --scale 0.01 if it is in centimetres, --crop X Y RADIUS or "

@@ -57,7 +57,7 @@ def _cause(ended: subprocess.CompletedProcess[str], max_memory_bytes: int, mend:
     if number == signal.SIGXCPU:
         return f"reading takes more than {MAX_SECONDS} s: {mend}"
     if number == signal.SIGKILL:
-        return f"its reader was killed (signal 9), by the system if the machine is out of memory: try again, or {mend}"
+        return f"its reader was killed (signal 9), by the system if memory ran out: try again, or {mend}"
     if number > 0:
         return f"its reader crashed (signal {number}, {signal.strsignal(number)}): the file may be damaged"
     return said[-1] if said else f"its reader failed ({failed[-1][:160] if failed else 'without a reason'})"

@@ -10,8 +10,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from aerialdojo_gen.annotations.format import parse_annotations
+from aerialdojo_gen.common.disk import check_regular
 from aerialdojo_gen.errors import AnnotationError, AssetError, UsageError, brief
-from aerialdojo_gen.imports.adopt import Place, Repairs, adopt, region_of
+from aerialdojo_gen.imports.adopt import Place, Repairs, adopt, check_options, region_of
 from aerialdojo_gen.imports.files import read_mesh
 from aerialdojo_gen.imports.listing import contents
 from aerialdojo_gen.imports.naming import read_names
@@ -113,10 +114,11 @@ def add_scene(
         The annotation file is of another scene or malformed.
     """
     _check_free([name], project, force)
+    check_options(up, scale, light)
+    region_of(crop_m, box_m)
     naming = None if names is None else read_names(names)
     text = None if annotations is None else _annotations(annotations, name)
     with _naming_the_file(mesh):
-        region_of(crop_m, box_m)
         scene, repairs = adopt(
             name, read_mesh(mesh, texture_px=texture_px), up=up, scale=scale, crop_m=crop_m, box_m=box_m,
             ceiling_m=ceiling_m, naming=naming, light=light,
@@ -166,9 +168,10 @@ def add_tiles(
         As of `add_scene`; one of the scenes exists already: nothing is written then.
     """
     check_scene_name(tile_name(name, 99, 99))
+    check_options(up, scale, light)
+    region = region_of(crop_m, box_m)
     naming = None if names is None else read_names(names)
     with _naming_the_file(mesh):
-        region = region_of(crop_m, box_m)
         place = Place.of(read_mesh(mesh, texture_px=texture_px), up, scale, naming)
         if region is not None:
             place = place.within(region)
@@ -196,6 +199,7 @@ def list_mesh(
     width: int | None = None,
 ) -> list[str]:
     """Say what a mesh file holds, in lines for a terminal (`aerialdojo_gen.imports.listing.contents`)."""
+    check_options(up, scale)
     naming = None if names is None else read_names(names)
     with _naming_the_file(mesh):
         return [f"{mesh.name}:", *contents(read_mesh(mesh), up=up, scale=scale, naming=naming, width=width)]
@@ -239,9 +243,12 @@ def _put(scene: Scene, repairs: Repairs, project: Path, recipe: str, text: str |
 
 def _annotations(path: Path, name: str) -> str:
     try:
+        check_regular(path)
         text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise AnnotationError(f"{path} cannot be read: {error}") from None
+    except OSError as error:
+        raise AnnotationError(f"{path} cannot be read: {error.strerror}") from None
+    except UnicodeDecodeError as error:
+        raise AnnotationError(f"{path} is not UTF-8: {error}") from None
     source = parse_annotations(text)
     if source.scene and source.scene != name:
         found = brief(repr(source.scene), 60)

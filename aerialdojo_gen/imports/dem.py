@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from aerialdojo_gen.common.disk import check_regular
 from aerialdojo_gen.errors import AssetError, MissingPackage, UsageError, lacks
 from aerialdojo_gen.imports.earth import Bbox, in_words
 
@@ -104,8 +105,10 @@ def read_dem(path: Path) -> Dem:
     suffix = path.suffix.lower()
     if suffix not in _SUFFIXES:
         raise AssetError(f"{path}: a height model is a file {', '.join(_SUFFIXES)}")
-    if not path.is_file():
-        raise AssetError(f"{path}: cannot be read (no such file)")
+    try:
+        check_regular(path)
+    except OSError as error:
+        raise AssetError(f"{path}: cannot be read ({error.strerror})") from None
     dem = _geotiff(path) if suffix in (".tif", ".tiff") else _ascii(path) if suffix == ".asc" else _npz(path)
     if min(dem.heights_m.shape) < 2:
         raise AssetError(f"{path}: has {' by '.join(map(str, dem.heights_m.shape))} heights, a relief needs 2 by 2")

@@ -18,6 +18,7 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from aerialdojo_gen.common.bounded import loads_json
+from aerialdojo_gen.common.disk import check_regular
 from aerialdojo_gen.common.trouble import is_out_of_memory
 from aerialdojo_gen.errors import AssetError
 from aerialdojo_gen.imports.beside import Beside
@@ -60,6 +61,7 @@ def read_mesh(path: Path, max_memory_bytes: int = MAX_MEMORY_BYTES, texture_px: 
     if suffix not in SUFFIXES:
         raise AssetError(f"{path}: meshes are read from {', '.join(s[1:].upper() for s in SUFFIXES)} files")
     try:
+        check_regular(path)
         size = path.stat().st_size
     except OSError as error:
         raise AssetError(f"{path}: {error.strerror}") from None
@@ -150,7 +152,7 @@ def _read(path: Path, texture_px: int) -> list[RawNode]:
     named = _objects_of(path) if suffix == ".obj" else {}
     nodes: dict[str, list[RawNode]] = {}
     for (name, body, vertices), skin in zip(shown, skins, strict=True):
-        label = "" if suffix in (".stl", ".ply") else _object_of(name, named)
+        label = "" if suffix in (".stl", ".ply") else _object_of(name, named, path)
         faces = np.asarray(body.faces, dtype=np.int64)
         made = RawNode(label, vertices, faces, skin.colours, skin.surface, skin.corners, skin.surfaces)
         nodes.setdefault(label, []).append(made)
@@ -169,12 +171,14 @@ def _objects_of(path: Path) -> dict[str, str]:
     return named
 
 
-def _object_of(name: str, named: Mapping[str, str]) -> str:
+def _object_of(name: str, named: Mapping[str, str], path: Path) -> str:
     """Say of which object a mesh of trimesh's is, where its name holds a number in place of a material, too."""
     stem = re.sub(r"_\d+$", "", name)
     objects = set(named.values())
-    # Without materials, or with one alone, trimesh counts the pieces of an object.
-    return named.get(name, stem if name not in objects and stem in objects else name)
+    # Without materials, or with one alone, trimesh counts the pieces of an object. What has no name it calls by the
+    # path of the file.
+    other = stem if name not in objects and stem in objects else "" if path.name in name else name
+    return named.get(name, other)
 
 
 def _beside(path: Path) -> Any:
@@ -211,7 +215,9 @@ def look_over_glb(path: Path) -> None:
             )
         except (ValueError, KeyError, IndexError, TypeError, AttributeError) as error:
             raise AssetError(f"is a damaged {path.suffix[1:].upper()} file") from error
-    if min(counts, default=0) < 0 or sum(counts) > 6 * MAX_TRIANGLES or shown > MAX_TRIANGLES:
+    if min(counts, default=0) < 0:
+        raise AssetError(f"is a damaged {path.suffix[1:].upper()} file: an array of {min(counts):,} numbers")
+    if sum(counts) > 6 * MAX_TRIANGLES or shown > MAX_TRIANGLES:
         raise AssetError(
             f"asks for {max(shown, sum(counts) // 3):,} triangles, the most is {MAX_TRIANGLES:,}: "
             "simplify or split the mesh"

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerialdojo_gen.common.text_table import Column, TextTable
-from aerialdojo_gen.imports.adopt import LARGEST_M, Place, lies
+from aerialdojo_gen.imports.adopt import LARGEST_M, Place, lies, size_text
 from aerialdojo_gen.imports.cutting import bodies_of
 from aerialdojo_gen.imports.naming import Naming
 from aerialdojo_gen.imports.raw import RawNode
@@ -17,11 +17,10 @@ from aerialdojo_gen.scenes.mesh import areas
 
 Floats = NDArray[np.float64]
 
-# Metres of a unit that programs export in, and what they are called.
+# Metres of a unit that programs export in, and what they are called, the likelier before the rarer.
 _UNITS = ((1.0, "metres"), (0.01, "centimetres"), (0.001, "millimetres"), (0.3048, "feet"), (0.0254, "inches"))
 # A place that is flown in is so wide, and so high.
 _WIDE_M, _HIGH_M = (15.0, 5000.0), (1.5, 400.0)
-_USUAL_WIDE_M = 250.0
 _SURE = 1.3
 _FLAT = 0.95
 _SHOWN = 12
@@ -37,16 +36,14 @@ class Guess:
         The axis along which more of the surface is level.
     up_sure : bool
         Whether it is so by much.
-    scale : float
-        Metres a unit.
-    unit : str
-        ``"metres"``.
+    units : tuple of (float, str)
+        Metres a unit and its name, ``(1.0, "metres")``, of the units by which the file has the size of a place to fly
+        in, the likeliest first; metres alone where there is none.
     """
 
     up: str
     up_sure: bool
-    scale: float
-    unit: str
+    units: tuple[tuple[float, str], ...]
 
 
 def guess(nodes: Sequence[RawNode]) -> Guess:
@@ -72,14 +69,12 @@ def guess(nodes: Sequence[RawNode]) -> Guess:
     sure = max(weight) >= _SURE * min(weight)
     tall = float(size[1] if up == "y" else size[2])
     wide = float(max(size[0], size[2] if up == "y" else size[1]))
-
-    def odd(scale: float) -> tuple[bool, float]:
-        fits = _WIDE_M[0] <= wide * scale <= _WIDE_M[1] and _HIGH_M[0] <= tall * scale <= _HIGH_M[1]
-        return not fits, abs(np.log(max(wide * scale, 1e-9) / _USUAL_WIDE_M))
-
-    # Metres, unless the place would be none.
-    scale, unit = _UNITS[0] if not odd(1.0)[0] else min(_UNITS, key=lambda pair: odd(pair[0]))
-    return Guess(up, sure, scale, unit)
+    fit = tuple(
+        (scale, unit)
+        for scale, unit in _UNITS
+        if _WIDE_M[0] <= wide * scale <= _WIDE_M[1] and _HIGH_M[0] <= tall * scale <= _HIGH_M[1]
+    )
+    return Guess(up, sure, fit or _UNITS[:1])
 
 
 def _guess_within_domes(nodes: Sequence[RawNode], naming: Naming | None) -> Guess:
@@ -125,7 +120,7 @@ def contents(
         There is nothing in it.
     """
     found = _guess_within_domes(nodes, naming)
-    taken_up, taken_scale = up or found.up, scale or found.scale
+    taken_up, taken_scale = up or found.up, scale or found.units[0][0]
     place = Place.of(nodes, taken_up, taken_scale, naming)
     naming = naming or Naming()
     triangles = sum(len(b.faces) for b in (*place.bodies, *place.domes))
@@ -137,8 +132,13 @@ def contents(
     lines = [
         f"{len(nodes):,} nodes with {triangles:,} triangles in {pieces:,} connected pieces, {colours:,} shades",
         f"up: {taken_up} {'as given' if up else f'by its form{sure}'} (--up {found.up} is the guess)",
-        f"scale: {taken_scale:g} {'as given' if scale else f'if its unit is {found.unit}'}: "
-        f"{high[0] - low[0]:,.4g} by {high[1] - low[1]:,.4g} m, {high[2] - low[2]:,.4g} m high",
+        f"scale: {taken_scale:g} {'as given' if scale else f'if its unit is {found.units[0][1]}'}: "
+        f"{size_text(high - low)} (x, y, z)",
+        *(
+            f"   or: {other:g} if its unit is {unit}: {size_text((high - low) * other / taken_scale)}"
+            for other, unit in found.units
+            if other != taken_scale
+        ),
         f"there: {lies(place.bodies)}",
         f"heights: z is {low[2]:.7g} to {high[2]:.7g} m",
     ]

@@ -11,6 +11,7 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 
 from aerialdojo_gen.annotations.number import group_of
+from aerialdojo_gen.common.disk import check_regular
 from aerialdojo_gen.errors import AssetError
 
 # Said by exporters and by people who name nothing, of whatever the thing is.
@@ -132,6 +133,7 @@ def read_names(path: Path) -> Naming:
         The file cannot be read, or a row of it makes no sense: which line, and why.
     """
     try:
+        check_regular(path)
         raw = path.read_bytes()[: _MOST_BYTES + 1]
         text = raw.decode("utf-8-sig")
     except OSError as error:

@@ -16,6 +16,7 @@ import numpy as np
 import shapely
 from shapely.geometry import LineString, Polygon
 
+from aerialdojo_gen.common.disk import check_regular
 from aerialdojo_gen.common.trouble import is_out_of_memory
 from aerialdojo_gen.errors import AssetError, MissingPackage, UsageError, lacks
 from aerialdojo_gen.imports.child import MAX_MEMORY_BYTES, bounded, read_in_child
@@ -102,6 +103,7 @@ def read_maps(path: Path, boxes: Sequence[Bbox], max_memory_bytes: int = MAX_MEM
     if not path.name.endswith(SUFFIXES):
         raise AssetError(f"{path}: a map is a file {', '.join(SUFFIXES)}")
     try:
+        check_regular(path)
         size = path.stat().st_size
     except OSError as error:
         raise AssetError(f"{path}: cannot be read ({error.strerror})") from None

@@ -74,9 +74,9 @@ def test_axes_and_units():
     scene, _ = adopt("Box", [raw(box)], up="y", scale=0.01)
     (body,) = things(scene)
     np.testing.assert_allclose(body.bounds[1] - body.bounds[0], [20, 10, 3], atol=1e-4)
-    with pytest.raises(AssetError, match=r"--up 'x'"):
+    with pytest.raises(UsageError, match=r"--up 'x'"):
         adopt("Box", [raw(box)], up="x")
-    with pytest.raises(AssetError, match="--scale"):
+    with pytest.raises(UsageError, match="--scale"):
         adopt("Box", [raw(box)], scale=float("nan"))
 
 

@@ -1,4 +1,4 @@
-"""add-map on maps whose buildings and areas overlap, so that outlines cross themselves once they are cut and rounded."""
+"""add-map on maps whose buildings and areas overlap, so that cut and rounded outlines cross themselves."""
 
 import re
 

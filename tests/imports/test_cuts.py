@@ -122,7 +122,7 @@ def test_a_part_without_anything_says_what_lies_where():
         adopt("City", nodes, scale=50.0)
     for wrong in ({"crop_m": (0.0, 0.0, -5.0)}, {"box_m": (0.0, 0.0, 0.0, 9.0)}, {"crop_m": (0.0, float("nan"), 5.0)},
                   {"crop_m": (0.0, 0.0, 9.0), "box_m": (0.0, 0.0, 9.0, 9.0)}):  # fmt: skip
-        with pytest.raises(AssetError, match=r"--crop|--box"):
+        with pytest.raises(UsageError, match=r"--crop|--box"):
             adopt("City", nodes, **wrong)
 
 
@@ -162,13 +162,55 @@ def test_tiles_lie_side_by_side_in_one_frame(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("up", "scale", "unit"), [("z", 1.0, "metres"), ("y", 100.0, "centimetres"), ("y", 1000.0, "millimetres")]
+    ("up", "scale", "unit"),
+    [("z", 1.0, "metres"), ("y", 100.0, "centimetres"), ("y", 1000.0, "millimetres"), ("z", 1 / 0.3048, "metres")],
 )
 def test_axis_and_unit_are_guessed_by_form(up, scale, unit):
     (node,) = city(up=up)
     found = guess([node.placed(node.vertices * scale)])
-    assert (found.up, found.unit) == (up, unit)
+    assert (found.up, found.units[0][1]) == (up, unit)
     assert found.up_sure
+
+
+@pytest.mark.parametrize("wide_m", [51.0, 90.0, 150.0, 250.0, 900.0])
+def test_a_file_in_centimetres_is_not_taken_for_one_in_inches(tmp_path, capsys, wide_m):
+    """Between 50 and 157 m wide it was, as 250 m are the usual width."""
+    box = trimesh.creation.box((100 * wide_m, 60 * wide_m, 1500.0))
+    box.export(tmp_path / "hall.stl")
+    code, out, err = said(capsys, "add-scene", "Hall", tmp_path / "hall.stl", "--list")
+    assert code == 0, err
+    size = f"{wide_m:.3g} by {0.6 * wide_m:.3g} by 15 m (x, y, z)"
+    assert f"scale: 0.01 if its unit is centimetres: {size}\n" in out
+    inches = re.search(r"^ +or: 0\.0254 if its unit is inches: ([0-9,]+) by", out, re.MULTILINE)
+    assert float(inches[1].replace(",", "")) == pytest.approx(254 * wide_m / 100, abs=0.5)
+
+
+def test_what_is_in_no_unit_has_its_size_in_plain_digits(tmp_path, capsys):
+    text = "\n".join(f"v {x} {y} {z}" for x, y, z in [(0, 0, 0), (12e6, 0, 0), (12e6, 12e6, 0), (9, 9, 2.84e6)])
+    (tmp_path / "no names.obj").write_text(f"{text}\nf 1 2 3\nf 1 2 4\nf 2 3 4\n")
+    code, out, err = said(capsys, "add-scene", "A", tmp_path / "no names.obj", "--list", "--scale", "0.001")
+    assert code == 0, err
+    assert "scale: 0.001 as given: 12,000 by 12,000 by 2,840 m (x, y, z)\n" in out
+    assert re.search(r"densest about x -?\d+, y -?\d+ \(\d of 3 triangles\)", out)
+    assert re.search(r"^- +- +3 ", out, re.MULTILINE)  # the only node, without a name
+    assert str(tmp_path) not in out
+    assert "e+" not in out
+
+
+@pytest.mark.parametrize(
+    ("word", "options"),
+    [
+        ("--up", ["--up", "Y"]), ("--up", ["--up", "w"]), ("--scale", ["--up", "z", "--scale", "-1"]),
+        ("--light", ["--up", "z", "--light", "moon"]), ("--crop", ["--up", "z", "--crop", "0", "0", "0"]),
+        ("--box", ["--up", "z", "--box", "1", "0", "1", "9"]),
+    ],
+)  # fmt: skip
+def test_wrong_options_are_refused_before_the_mesh_is_read(tmp_path, capsys, word, options):
+    for how in ([], ["--tiles", "100"], *([["--list"]] if word in ("--up", "--scale") else [])):
+        code, _, err = said(capsys, "add-scene", "A", tmp_path / "missing.glb", *options, *how, "--project", tmp_path)
+        assert code == 2
+        assert re.fullmatch(rf"error: {word} [^\n]*\n", err)
+        assert "missing.glb" not in err
 
 
 def test_a_list_says_what_a_file_holds_and_writes_nothing(tmp_path, capsys, monkeypatch):
@@ -188,7 +230,7 @@ def test_a_list_says_what_a_file_holds_and_writes_nothing(tmp_path, capsys, monk
     assert "7 nodes" in out
     assert "x is 0 to 80, y 0 to 80 m" in out
     assert re.search(r"up: z .*--up z is the guess", out)
-    assert "scale: 1 if its unit is metres: 80 by 80 m" in out
+    assert "scale: 1 if its unit is metres: 80 by 80 by " in out
     assert "dome: SkyDome, 1,280 triangles" in out
     assert re.search(r"^Terrain +terrain +3,200 +1 +0% +0\.0 to 80\.0 +0\.0 to 80\.0", out, re.MULTILINE)
     assert max(map(len, out.splitlines())) <= 120

@@ -13,7 +13,7 @@ from support import textured
 
 from aerialdojo_gen.annotations.colours import colour_shares, uncoloured
 from aerialdojo_gen.common.image_size import image_size
-from aerialdojo_gen.errors import AssetError
+from aerialdojo_gen.errors import AssetError, UsageError
 from aerialdojo_gen.geometry.cameras import Camera, look_at_pose
 from aerialdojo_gen.imports.adopt import adopt
 from aerialdojo_gen.imports.files import read_into, read_mesh, unpacked
@@ -368,7 +368,7 @@ def test_sizes_of_pictures_are_told_without_decoding():
 
 def test_only_known_lights_are_taken(tmp_path):
     nodes = read_mesh(textured.scan(tmp_path / "scan.obj", cells=8))
-    with pytest.raises(AssetError, match="--light 'moon'"):
+    with pytest.raises(UsageError, match="--light 'moon'"):
         adopt("Scan", nodes, light="moon")
 
 

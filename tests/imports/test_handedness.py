@@ -1,0 +1,148 @@
+"""No import is a mirror image: corners of an asymmetric body lie where the file's axes say, in every format."""
+
+import numpy as np
+import pytest
+import trimesh
+from PIL import Image
+from support import foreign, maps
+
+from aerialdojo_gen.imports.adopt import adopt
+from aerialdojo_gen.imports.dem import read_dem
+from aerialdojo_gen.imports.earth import LocalFrame
+from aerialdojo_gen.imports.files import read_into, unpacked
+
+# A tetrahedron, x east, y north, z up: four edges of different lengths meet in a corner, so that no mirror image and
+# no other turn of it has its corners in these places.
+CORNERS = np.array([[0.0, 0, 0], [30, 0, 0], [0, 20, 0], [0, 0, 10]])
+FACES = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
+# In a file whose y points up, x points east and so z south: right-handed as all of these formats are.
+IN_FILE = {"z": CORNERS, "y": np.column_stack([CORNERS[:, 0], CORNERS[:, 2], -CORNERS[:, 1]])}
+_COLLADA = """<?xml version="1.0"?>
+<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">
+<asset><unit name="meter" meter="1"/><up_axis>{up}_UP</up_axis></asset>
+<library_geometries><geometry id="g"><mesh>
+<source id="p"><float_array id="pa" count="12">{vertices}</float_array><technique_common>
+<accessor source="#pa" count="4" stride="3"><param name="X" type="float"/><param name="Y" type="float"/>
+<param name="Z" type="float"/></accessor></technique_common></source>
+<vertices id="v"><input semantic="POSITION" source="#p"/></vertices>
+<triangles count="4"><input semantic="VERTEX" source="#v" offset="0"/><p>{faces}</p></triangles>
+</mesh></geometry></library_geometries>
+<library_visual_scenes><visual_scene id="w"><node id="Body" name="Body"><instance_geometry url="#g"/></node>
+</visual_scene></library_visual_scenes><scene><instance_visual_scene url="#w"/></scene></COLLADA>
+"""
+_FBX = """; FBX 7.4.0 project file
+FBXHeaderExtension:  {{
+	FBXHeaderVersion: 1003
+	FBXVersion: 7400
+}}
+Objects:  {{
+	Geometry: 1, "Geometry::", "Mesh" {{
+		Vertices: *12 {{
+			a: {vertices}
+		}}
+		PolygonVertexIndex: *12 {{
+			a: {faces}
+		}}
+		GeometryVersion: 124
+	}}
+	Model: 2, "Model::Body", "Mesh" {{
+		Version: 232
+	}}
+}}
+Connections:  {{
+	C: "OO",2,0
+	C: "OO",1,2
+}}
+"""
+
+
+def write(path, vertices, up):
+    numbers = vertices.ravel().tolist()
+    if path.suffix == ".dae":
+        flat = " ".join(map(str, FACES.ravel()))
+        path.write_text(_COLLADA.format(up=up.upper(), vertices=" ".join(map(str, numbers)), faces=flat))
+    elif path.suffix == ".fbx":
+        flat = ",".join(f"{a},{b},{-c - 1}" for a, b, c in FACES)
+        path.write_text(_FBX.format(vertices=",".join(map(str, numbers)), faces=flat))
+    elif path.suffix == ".3ds":
+        path.write_bytes(foreign.three_ds([("body", trimesh.Trimesh(vertices, FACES, process=False))], (9, 9, 9)))
+    else:
+        trimesh.Scene(trimesh.Trimesh(vertices, FACES, process=False)).export(path)
+
+
+def read(path):
+    out = path.with_name("nodes.npz")
+    assert read_into(path, out) == ""
+    return unpacked(out)
+
+
+def corners_of(scene):
+    """Corners of all but the ground, from the corner of the right angles, in the order of their distances."""
+    (body,) = [i for i in scene.instances if i.category != "ground"]
+    own = np.unique(np.round(body.vertices, 3), axis=0)
+    # As in CORNERS: it has the least x, the least y and the least z.
+    own = own - own.min(axis=0)
+    return own[np.argsort(np.linalg.norm(own, axis=1))], trimesh.Trimesh(body.vertices, body.faces)
+
+
+@pytest.mark.parametrize(
+    ("suffix", "up"),
+    # Assimp turns Collada y up, whatever its own axis.
+    [(f".{s}", up) for s in ("glb", "gltf", "obj", "stl", "ply", "3ds", "fbx", "dae") for up in "zy"],
+)
+def test_an_import_is_turned_and_never_mirrored(tmp_path, suffix, up):
+    write(tmp_path / f"body{suffix}", IN_FILE[up], up)
+    scene, _ = adopt("Body", read(tmp_path / f"body{suffix}"), up="y" if suffix == ".dae" else up)
+    corners, mesh = corners_of(scene)
+    np.testing.assert_allclose(corners, CORNERS[[0, 3, 2, 1]], atol=2e-3)
+    assert mesh.volume == pytest.approx(30 * 20 * 10 / 6, rel=1e-3)
+
+
+@pytest.mark.parametrize("up", ["z", "y"])
+@pytest.mark.parametrize("suffix", [".glb", ".obj"])
+def test_a_picture_on_a_wall_is_read_from_left_to_right(tmp_path, suffix, up):
+    """Seen from the south: red at the upper left, green at the upper right, blue at the lower left."""
+    letter = np.zeros((8, 8, 3), dtype=np.uint8)
+    letter[:4, :4, 0] = letter[:4, 4:, 1] = letter[4:, :4, 2] = 255
+    wall = np.array([[0.0, 0, 0], [30, 0, 0], [30, 0, 10], [0, 0, 10]])
+    wall = wall if up == "z" else np.column_stack([wall[:, 0], wall[:, 2], -wall[:, 1]])
+    uv = np.array([[0.0, 0], [1, 0], [1, 1], [0, 1]])
+    visual = trimesh.visual.TextureVisuals(uv=uv, image=Image.fromarray(letter))
+    mesh = trimesh.Trimesh(wall, [[0, 1, 2], [0, 2, 3]], visual=visual, process=False)
+    trimesh.Scene(mesh).export(tmp_path / f"wall{suffix}")
+    scene, _ = adopt("Wall", read(tmp_path / f"wall{suffix}"), up=up)
+    (body,) = [i for i in scene.instances if i.category != "ground"]
+    seen = {}
+    for part in body.parts:
+        texture = scene.materials[part.material].texture
+        low, size = body.vertices.min(axis=0), np.ptp(body.vertices, axis=0)
+        for (x, _, z), (u, v) in zip(part.vertices, part.uv, strict=True):
+            inset = 0.5 + 0.9 * (np.array([u % 1.0001, v % 1.0001]) - 0.5)
+            column, row = int(inset[0] * texture.shape[1]), int((1 - inset[1]) * texture.shape[0])
+            seen["right" if x > low[0] + size[0] / 2 else "left", "up" if z > low[2] + size[2] / 2 else "down"] = (
+                texture[row, column] > 128
+            ).tolist()
+    assert seen == {
+        ("left", "up"): [True, False, False], ("right", "up"): [False, True, False],
+        ("left", "down"): [False, False, True], ("right", "down"): [False, False, False],
+    }  # fmt: skip
+
+
+def test_every_height_model_has_north_up_and_east_on_the_right(tmp_path):
+    """The hill is higher in the east and in the south: a mirror image differs by metres."""
+    x, y = np.array([20.0, -20, 20, -20]), np.array([-10.0, -10, 10, 10])
+    z, wanted = maps.heights(2.0, 60.0), maps.hill(x, y)
+    assert np.ptp(wanted) > 5.0
+    frame = LocalFrame(24.9, 60.2)
+    np.savez(tmp_path / "cell.npz", heights_m=z, cell_m=2.0)
+    np.savez(tmp_path / "bbox.npz", heights_m=z, bbox_deg=maps.box(60.0))
+    head = f"ncols {z.shape[1]}\nnrows {z.shape[0]}\nxllcenter -60\nyllcenter -60\ncellsize 2\n"
+    (tmp_path / "grid.asc").write_text(head + "\n".join(" ".join(map(str, row)) for row in z))
+    (west, east), (south, north) = frame.degrees([-61.0, 61.0], [-61.0, 61.0])
+    dx, dy = (east - west) / len(z), (north - south) / len(z)
+    maps.write_geotiff(tmp_path / "grid.tif", z, "EPSG:4326", float(west), float(north), float(dx), float(dy))
+    lon, lat = frame.degrees(x, y)
+    np.testing.assert_allclose(read_dem(tmp_path / "cell.npz").at(x + 60, y + 60), wanted, atol=0.01)
+    np.testing.assert_allclose(read_dem(tmp_path / "grid.asc").at(x, y), wanted, atol=0.01)
+    for name in ("bbox.npz", "grid.tif"):
+        np.testing.assert_allclose(read_dem(tmp_path / name).at_degrees(lon, lat), wanted, atol=0.02)
