@@ -261,6 +261,42 @@ def test_what_lies_beyond_the_longest_length_is_no_path():
     assert outcomes == ["SOLVED", "NO_PATH"]
 
 
+def test_a_rung_that_fails_counts_too_and_the_next_one_is_tried():
+    start, goal = (-16.0, -16.0, 1.0, 0.0), (16.0, 16.0, 1.0, 0.0)
+    wide = Rung(weight=1.05, budget=20_000)
+    alone = plan_one(town(), start, goal, PlanConfig(ladder=(wide,)))
+    second = plan_one(town(), start, goal, PlanConfig(ladder=(Rung(weight=1.05, budget=3), wide)))
+    assert (alone.attempts, second.attempts) == (1, 2)
+    assert second.expansions == alone.expansions + 3
+    assert second.poses.tobytes() == alone.poses.tobytes()
+
+
+def test_a_rung_with_a_larger_radius_keeps_more_room():
+    goal, starts = (16.0, 16.0, 6.0, 0.0), [(-16.0, y, 6.0, 0.0) for y in (-16.0, -8.0, 0.0, 8.0)]
+    least = []
+    for extra in (0.0, 0.2):
+        config = METRES.model_copy(update={"ladder": (Rung(weight=1.05, budget=20_000, extra_radius_m=extra),)})
+        routes = Planner(town(), config, RADIUS).plan_target(goal, starts)
+        assert {r.outcome for r in routes} == {"SOLVED"}
+        least.append(min(r.min_clearance_m for r in routes))
+    assert RADIUS <= least[0] < RADIUS + 0.2 <= least[1]
+
+
+def test_the_longest_length_is_of_the_route_and_not_of_the_grid():
+    """The grid overestimates ways between two of its 16 directions, and narrow places cost more than metres."""
+    angle = math.radians(13.0)
+    half_way = 18 * np.array([math.cos(angle), math.sin(angle)])
+    start, goal = (*-half_way, 3, angle), (*half_way, 3, 0)
+    route = plan_one(scene(half=20.0), start, goal, METRES.model_copy(update={"max_length_m": 36.2}))
+    assert route.outcome == "SOLVED"
+    assert route.cost_to_go_m > 36.2 > route.length_m == pytest.approx(36.0)
+    slot = [box((-2, -16, 0), (2, -0.6, 16)), box((-2, 0.6, 0), (2, 16, 16))]
+    world = scene(instance("slot", *slot), half=6.0, ceiling=6.0)
+    route = plan_one(world, (-4.5, 0, 3, 0), (4.5, 0, 3, 0), PlanConfig(max_length_m=9.2))
+    assert route.outcome == "SOLVED"
+    assert route.length_m == pytest.approx(9.0, abs=0.2)
+
+
 def test_a_goal_on_the_lattice_needs_no_approach():
     route = plan_one(scene(), (0.0, 0.0, 3.0, 0.0), (5.0, 0.0, 3.0, 0.0))
     assert route.length_m == pytest.approx(5.0)

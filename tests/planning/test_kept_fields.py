@@ -55,6 +55,9 @@ def test_routes_are_the_same_however_fields_are_kept(planner, room):
     points = rng.uniform([*low, -3.0], [*high, 3.0], (200, 4))
     free = [p for p in points if planner.grid.distance_m(p[:3]) > 0.3 and planner.grid.reachable(p[:3])]
     goals, starts = free[:3], np.array(free[3:15])
+    # A goal of the same place that faces elsewhere is another goal, and so is one above it.
+    goals += [goals[0] + [0, 0, 0, 3.0], goals[0] + [0, 0, 0.5, 0]]
+    assert not planner.grid.in_collision(goals[-1][:3])
     expected = [planner.plan_target(goal, starts) for goal in goals]
     with planner.keeping_fields(*room):
         foreseen = [planner.foresee(goal, starts) for goal in goals]

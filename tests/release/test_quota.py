@@ -14,7 +14,7 @@ from aerialdojo_gen.annotate.drafting import draft_scene
 from aerialdojo_gen.commands.common import open_pipeline, run_until
 from aerialdojo_gen.common.paper import inventory, splits
 from aerialdojo_gen.errors import PoolError
-from aerialdojo_gen.release.ids import held_out, key_of
+from aerialdojo_gen.release.ids import held_out, key_of, reference_id
 from aerialdojo_gen.release.pool import pool_lines, pool_of, require_pools
 from aerialdojo_gen.release.quota import apportion, choose, difficulty_steps, train_quotas
 from aerialdojo_gen.store import schemas
@@ -78,6 +78,7 @@ def test_a_choice_has_the_numbers_and_the_metres(seed, longer):
     order = np.random.default_rng(seed).permutation(len(ids))
     again = choose([ids[k] for k in order], [setting[k] for k in order], lengths[order], wanted, longer * plain, seed)
     assert {ids[k] for k in np.flatnonzero(mask)} == {ids[order[k]] for k in np.flatnonzero(again)}
+    assert (choose(ids, setting, lengths, wanted, longer * plain, seed + 1) != mask).any()
 
 
 def test_a_length_out_of_reach_takes_the_nearest():
@@ -142,6 +143,13 @@ def test_another_salt_or_scene_holds_out_other_objects():
     ]  # fmt: skip
     assert all(len(out) == 40 for out in sets)
     assert len({frozenset(out) for out in sets}) == 4
+
+
+def test_the_ids_of_pictures_do_not_tell_which_objects_are_held_out():
+    key = key_of("a salt of one's own", 0)
+    by_id = sorted(range(200), key=lambda k: reference_id("U_A_0", k, key))
+    # By chance a fifth of the 40 that come first.
+    assert len(held_out("U_A_0", range(200), 0.2, key) & set(by_id[:40])) < 20
 
 
 def verdicts(data, scene, kept):

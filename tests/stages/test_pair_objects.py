@@ -111,6 +111,21 @@ def test_close_and_far_pairs_are_counted(tmp_path):
     assert out.tables["pairs"]["pair_id"].to_pylist() == ["1_0__2", "2_0__1"]
 
 
+def test_a_pair_whose_shortest_route_is_as_long_as_the_limit_is_too_far(tmp_path):
+    """As `filter` has it: L is less than 100 m."""
+    config = PairObjectsConfig(max_approach_m=0.0)
+    for metres, counts in ((100.0, {"too_close": 0, "too_far": 2}), (99.999, {"too_close": 0, "too_far": 0})):
+        rows = anchor_rows([(-50.0, 0.0, 2.0), (metres - 50.0, 0.0, 2.0)], variants=1)
+        assert pair(tmp_path, rows, config).counts == counts
+
+
+def test_points_of_two_objects_are_drawn_apart():
+    balls = [instance(f"ball_{k}", trimesh.creation.icosphere(2, radius=0.4)) for k in range(2)]
+    first, second = (pair_objects.surface_points(SCENE, k, ball, 16) for k, ball in enumerate(balls))
+    assert not (first == second).any()
+    assert (pair_objects.surface_points(SCENE, 0, balls[0], 16) == first).all()
+
+
 def test_start_variants_limits_starts_and_not_goals(tmp_path):
     rows = anchor_rows([(0.0, 0.0, 2.0), (20.0, 0.0, 2.0)])
     out = pair(tmp_path, rows, PairObjectsConfig(start_variants=1))

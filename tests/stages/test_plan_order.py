@@ -103,3 +103,20 @@ def test_rows_in_another_order_are_searched_all_the_same():
         c.predicted_m[order],
     )  # fmt: skip
     assert searched(Draw(mixed, paper, config, 200), outcome[order], length[order]).tolist() == which[order].tolist()
+
+
+def test_a_few_more_are_kept_than_are_released():
+    """`filter` may still refuse some: two more a setting, or one in fifty."""
+    n = 200
+    lots = [f"U_Test_0-{k:012x}" for k in range(n)]
+    length = np.full(n, 20.0)
+    c = Candidates("U_Test_0", lots, length / 1.2, length / 1.1, np.zeros(n), length)
+    for wanted, spare in ((40, 2), (150, 3)):
+        paper = PaperScene("U_Test_0", 1, 20, wanted, 0, 0, wanted * 20.0)
+        config = ReleasedPlanConfig(
+            search="released", search_margin=0.02, kept=FilterConfig(), prefer_harder=PREFERENCE
+        )
+        # One in a hundred has no route.
+        outcome = np.where(np.arange(n) % 100 == 0, "NO_PATH", "SOLVED")
+        which = searched(Draw(c, paper, config, 200), outcome, length)
+        assert np.count_nonzero(which & (outcome == "SOLVED")) >= wanted + spare

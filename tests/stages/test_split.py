@@ -157,6 +157,19 @@ def test_train_share_and_both_instances_on_one_side(data):
         assert (train["setting"] == setting).sum() // 2 == int(0.8 * total + 0.5)
 
 
+def test_of_a_scene_that_is_out_of_distribution_a_fifth_trains(data, tmp_path):
+    shutil.copytree(data, tmp_path / "data", ignore=shutil.ignore_patterns("release"))
+    scene = store.read_scene(data, "scenes", SCENE).to_pylist()[0] | {"partition": "OOD"}
+    store.write_shard(tmp_path / "data", "scenes", SCENE, 0, from_rows(schemas.SCENES, [scene]))
+    job = Job("split", SCENE, 0, 1, 0, Embodiment(), Roots(*[tmp_path / "data"] * 4))
+    tables = {name: table.to_pandas() for name, table in split.run(job, SplitConfig()).tables.items()}
+    n = load(data, "routes").groupby("setting").size()
+    for table, instances in (("tasks", 2), ("routes", 1)):
+        trains = tables[f"{table}/train"].groupby("setting").size() // instances
+        assert trains.to_dict() == {setting: int(0.2 * total + 0.5) for setting, total in n.items()}
+        assert len(tables[f"{table}/train"]) + len(tables[f"{table}/test"]) == instances * n.sum()
+
+
 def test_tasks_tell_the_start_and_nothing_of_the_goal(data):
     tasks, routes = load(data, "tasks").set_index("nav_id"), load(data, "routes").set_index("nav_id")
     telling = ("goal", "target_o", "start_o", "start_a", "len", "euc", "x_", "y_")
@@ -211,6 +224,22 @@ def test_difficulty_goes_from_plans_and_pairs_to_verdicts_and_routes(data):
             row.target_visible_at_start > 0
         ] * 2
         assert row.agent_action.tolist() == [3, 0]
+
+
+def test_verdicts_are_judged_by_each_candidates_own_figures(data):
+    verdicts = pd.read_parquet(data / "verdicts").set_index("pair_id")
+    assert np.allclose(verdicts["detour_ratio"], verdicts["length_m"] / verdicts["euclidean_m"], atol=1e-12)
+    paper, roots = verdicts[verdicts["keep"]], Roots(data, data, data, data)
+    assert paper["detour_ratio"].min() >= 1.05
+    job = Job("filter", SCENE, 0, 1, 0, Embodiment(), roots)
+    for rule, kept in (
+        ({"max_visible_at_start": 0.25}, paper["target_visible_at_start"] <= 0.25),
+        ({"min_plan_detour": 1.25}, paper["plan_detour"] >= 1.25),
+        ({"min_plan_detour": 1.26}, paper["plan_detour"] >= 1.26),
+    ):
+        rows = filter_stage.run(job, FilterConfig(**rule)).tables["verdicts"].to_pandas().set_index("pair_id")
+        assert set(rows.index[rows["keep"]]) == set(paper.index[kept])
+    assert 0 < (paper["target_visible_at_start"] <= 0.25).sum() < len(paper)
 
 
 def test_routes_end_on_the_selected_anchor_of_the_named_target(data):
@@ -289,3 +318,9 @@ def test_training_tasks_are_chosen_by_key_not_by_row(n, fraction, seed, order):
     order.shuffle(shuffled)
     again = train_mask([ids[i] for i in shuffled], [settings[i] for i in shuffled], trains, seed)
     assert [mask[i] for i in shuffled] == list(again)
+
+
+def test_another_seed_trains_on_other_tasks():
+    ids = [f"t{i}" for i in range(60)]
+    masks = {tuple(train_mask(ids, ["base"] * 60, {"base": 48}, seed)) for seed in range(5)}
+    assert len(masks) == 5
