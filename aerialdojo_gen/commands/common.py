@@ -86,7 +86,8 @@ PipelineFile = Annotated[
         metavar="FILE|NAME",
         callback=kept,
         autocompletion=completion.pipelines,
-        help=f"Pipeline file, or the name of one that comes with this.  (default: {Path(DEFAULT_PIPELINE).stem})",
+        help=f"Pipeline file, or the name of one that comes with this.  (default: that of the "
+        f"release in --data, else {Path(DEFAULT_PIPELINE).stem})",
     ),
 ]
 PipelineArgument = Annotated[
@@ -157,7 +158,7 @@ def run_until(
     scene : list of str, optional
         Names or globs; the pipeline's scenes where absent.
     pipeline : Path, optional
-        A pipeline file; the default one where absent.
+        A pipeline file; where absent that of the release in the data directory, else the default one.
     workers : int, optional
         Processes; all cores where absent.
     force : bool

@@ -139,7 +139,7 @@ def evaluate(
     from aerialdojo_gen.benchmark.worker import Conditions
     from aerialdojo_gen.pipeline.progress import Reporter
 
-    config, _ = open_pipeline(pipeline, data)
+    config, _ = open_pipeline(pipeline, data, reads=True)
     splits, settings, modalities = (tuple(names or ()) for names in (split, setting, modality))
     chosen = tuple(together(scenes, scene) or ())
     options = _options(option or [])

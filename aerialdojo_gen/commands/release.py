@@ -57,7 +57,7 @@ def stats(
 
         if markdown or csv or figures or not root.list("verdicts"):
             raise no_release(root)
-        config, roots = open_pipeline(pipeline, data)
+        config, roots = open_pipeline(pipeline, data, reads=True)
         pools = [pool_of(root, name) for name in runner.chosen_scenes(config, roots, scene)]
         if as_json:
             print_json([asdict(pool) for pool in pools])

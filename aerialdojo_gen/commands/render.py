@@ -134,7 +134,7 @@ def _estimate(
     from aerialdojo_gen.release.contents import release_scenes
     from aerialdojo_gen.rendering.estimate import estimate
 
-    config, roots = open_pipeline(pipeline, data)
+    config, roots = open_pipeline(pipeline, data, reads=True)
     release_scenes(roots.data)
     config = with_overrides(config, "render", **overrides)
     scenes = runner.chosen_scenes(config, roots, scene)

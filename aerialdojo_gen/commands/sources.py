@@ -16,6 +16,7 @@ from aerialdojo_gen.commands.common import (
     SceneOption,
     Scenes,
     open_pipeline,
+    pipeline_file,
     together,
 )
 from aerialdojo_gen.common import advice
@@ -152,7 +153,7 @@ def annotate_draft(
     from aerialdojo_gen.pipeline.progress import Reporter
     from aerialdojo_gen.pipeline.runner import chosen_scenes, known_scenes
 
-    config, roots = open_pipeline(pipeline, Path("data"))
+    config, roots = open_pipeline(pipeline_file(pipeline), Path("data"))
     given = given_scene(name, scene)
     scene = pick_scene(given, known_scenes(roots.recipes) if given else chosen_scenes(config, roots))
     choice = Choice(

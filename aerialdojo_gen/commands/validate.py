@@ -70,6 +70,8 @@ def validate(
     from aerialdojo_gen.config.pipeline import load_pipeline
     from aerialdojo_gen.errors import UsageError
     from aerialdojo_gen.pipeline.progress import Reporter
+    from aerialdojo_gen.pipeline.run import release_pipeline
+    from aerialdojo_gen.release.provenance import pipeline_names
     from aerialdojo_gen.validate.parts import release_of
     from aerialdojo_gen.validate.report import check_format
 
@@ -77,11 +79,13 @@ def validate(
         check_format(report)
     if pictures != "all" and not (pictures.isascii() and pictures.isdigit() and len(pictures) < _MANY_DIGITS):
         raise UsageError(f"--pictures {pictures}: a number, or all")
-    definitions = load_pipeline(pipeline_file(pipeline))
+    release = release_of(folder or data)
+    file = pipeline or release_pipeline(release.root, release.folder, reads=True)
+    definitions = load_pipeline(pipeline_file(file))
     if definitions.scene_assets is None:
         definitions = definitions.model_copy(update={"scene_assets": home() / "scene_assets"})
     asked = validation.Asked(
-        release=release_of(folder or data),
+        release=release,
         scenes=tuple(together(scenes, scene) or ()),
         meshes=meshes.absolute() if meshes else None,
         use_meshes=not no_meshes,
@@ -90,6 +94,11 @@ def validate(
         pipeline=definitions,
     )
     reporter = Reporter(quiet=quiet)
+    names = pipeline_names(release.root, release.folder)
+    if names and definitions.name not in names:
+        reporter.line(
+            f"not the pipeline of the release, which is --pipeline {' or '.join(names)}: {definitions.name}"
+        )
     found = validation.validate(asked, workers=workers, executor=executor, address=address, reporter=reporter)
     if report is not None:
         validation.write_report(found.faults, report)

@@ -5,6 +5,7 @@ Nothing heavy is imported before something runs: the command line imports this f
 
 from __future__ import annotations
 
+import contextlib
 import logging
 from collections.abc import Iterable, Sequence
 from dataclasses import replace as replaced
@@ -13,7 +14,7 @@ from typing import TYPE_CHECKING
 
 from aerialdojo_gen.common import advice
 from aerialdojo_gen.common.advice import PROGRAM
-from aerialdojo_gen.errors import AssetError, ConfigError
+from aerialdojo_gen.errors import AssetError, ConfigError, UsageError
 
 if TYPE_CHECKING:
     from aerialdojo_gen.config.pipeline import Pipeline
@@ -48,7 +49,8 @@ def run_pipeline(
     ----------
     pipeline : str, Path or Pipeline, optional
         A TOML file, the name of one that comes with the program (``"smoke"``), or what
-        `aerialdojo_gen.config.pipeline.load_pipeline` read of one; the paper's where absent.
+        `aerialdojo_gen.config.pipeline.load_pipeline` read of one; where absent that of the release in the data
+        directory, else the paper's.
     data : str, Path or DataRoot
         The data directory.
     stages : sequence of str, optional
@@ -138,15 +140,50 @@ def pipeline_file(given: str | Path | None = None) -> Path:
     raise ConfigError(f"no pipeline file {path}{there}; by name, as in {PROGRAM} run smoke: {', '.join(known)}")
 
 
-def open_pipeline(pipeline: str | Path | Pipeline | None, data: str | Path | DataRoot) -> tuple[Pipeline, Roots]:
+def release_pipeline(data: DataRoot, folder: str = "release", *, reads: bool = False) -> Path | None:
+    """Find the file of a release's pipeline, shipped or beside the data directory; None where there is no release.
+
+    Raises
+    ------
+    UsageError
+        Several pipelines made the release; or its pipeline's file is not found, and the caller does not only read.
+    """
+    from aerialdojo_gen.common.bounded import read_toml
+    from aerialdojo_gen.release.provenance import pipeline_names
+    from aerialdojo_gen.store.root import LocalRoot
+
+    names = pipeline_names(data, folder)
+    if len(names) > 1:
+        raise UsageError(
+            f"the release in {data} was made by pipelines {' and '.join(names)}: choose by --pipeline NAME"
+        )
+    for name in names:
+        shipped = home() / "pipelines" / f"{name}.toml"
+        if shipped.is_file():
+            return shipped
+        for file in sorted(data.path.parent.glob("*.toml")) if isinstance(data, LocalRoot) else ():
+            with contextlib.suppress(ConfigError, OSError):
+                if read_toml(file, ConfigError, finite=False).get("name") == name:
+                    return file
+        if not reads:
+            raise UsageError(f"the release in {data} was made by pipeline {name!r}: give its file, --pipeline FILE")
+    return None
+
+
+def open_pipeline(
+    pipeline: str | Path | Pipeline | None, data: str | Path | DataRoot, *, reads: bool = False
+) -> tuple[Pipeline, Roots]:
     """Read the pipeline file and find the folders.
 
     Parameters
     ----------
     pipeline : str, Path, Pipeline or None
-        The pipeline file as for `pipeline_file`, or what was read of one; None for the default one.
+        The pipeline file as for `pipeline_file`, or what was read of one; None for that of the release in the data
+        directory, else the paper's.
     data : str, Path or DataRoot
         The data directory.
+    reads : bool
+        Nothing is written: where the file of the release's pipeline is not found, the paper's will do.
 
     Returns
     -------
@@ -156,15 +193,20 @@ def open_pipeline(pipeline: str | Path | Pipeline | None, data: str | Path | Dat
     ------
     ConfigError
         The file is missing or wrong.
+    UsageError
+        As for `release_pipeline`.
     """
     from aerialdojo_gen.config.pipeline import Pipeline, load_pipeline
     from aerialdojo_gen.pipeline.stage import Roots
     from aerialdojo_gen.store.root import open_root
 
+    data = open_root(data)
+    if pipeline is None:
+        pipeline = release_pipeline(data, reads=reads)
     if not isinstance(pipeline, Pipeline):
         pipeline = load_pipeline(pipeline_file(pipeline))
     roots = Roots(
-        data=open_root(data),
+        data=data,
         scene_assets=(assets := pipeline.scene_assets or home() / "scene_assets"),
         recipes=pipeline.recipes or assets / "scenes",
         annotations=pipeline.annotations or home() / "annotations",

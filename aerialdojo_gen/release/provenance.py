@@ -5,17 +5,21 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import json
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 from aerialdojo_gen.config.pipeline import Pipeline
 from aerialdojo_gen.errors import StoreError, UsageError
-from aerialdojo_gen.release.contents import scenes_there
+from aerialdojo_gen.release.contents import FOLDER, scenes_there
 from aerialdojo_gen.stats.tables import Made, in_paper_order, made_of
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.root import DataRoot, Where, open_root
 
-RECORD = "release/pipeline.json"
+_RECORD = "pipeline.json"
+RECORD = f"{FOLDER}/{_RECORD}"
+_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*")
 # What does not change the release: folders of this machine, which scenes and stages are asked for, recordings.
 _BESIDE = {"name", "scenes", "stages", "render", "scene_assets", "recipes", "annotations"}
 
@@ -54,18 +58,32 @@ def maker_of(pipeline: Pipeline) -> Maker:
     return Maker(pipeline.name, digest, pipeline.split.paper_counts, pipeline.split.prefer_harder)
 
 
+def pipeline_names(data: Where, folder: str = FOLDER) -> list[str]:
+    """Return the names of the pipelines that made a release; none where it does not say."""
+    names = {str(entry.get("name", "")) for entry in _recorded(open_root(data), f"{folder}/{_RECORD}".lstrip("/"))}
+    # It may come from elsewhere, and is looked for as a file.
+    return sorted(name for name in names if _NAME.fullmatch(name))
+
+
+def _recorded(root: DataRoot, path: str = RECORD) -> list[dict[str, Any]]:
+    """Read what a release says of its pipelines; nothing where the record is missing or damaged."""
+    try:
+        entries = json.loads(root.local_copy(path).read_text(encoding="utf-8"))["pipelines"]
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
+        return []
+    return [entry for entry in entries if isinstance(entry, dict)] if isinstance(entries, list) else []
+
+
 def makers(data: Where) -> dict[str, Maker]:
     """Return the makers of a release's scenes, by scene; one that the release does not know is `Maker()`."""
     root = open_root(data)
     known: dict[str, Maker] = {}
     try:
-        for entry in json.loads(root.local_copy(RECORD).read_text(encoding="utf-8"))["pipelines"]:
+        for entry in _recorded(root):
             told = (entry.get("paper_counts", True) is not False, float(entry.get("prefer_harder", 0.0)))
             maker = Maker(str(entry["name"]), str(entry["sha256"]), *told)
             known |= dict.fromkeys(entry["scenes"], maker)
-    except FileNotFoundError:
-        pass
-    except (OSError, ValueError, KeyError, TypeError, RecursionError):
+    except (ValueError, KeyError, TypeError):
         known = {}  # damaged: as if nothing were known, which is the cautious side
     return {scene: known.get(scene, Maker()) for scene in scenes_there(root)}
 
@@ -141,8 +159,10 @@ def check_replaced(data: Where, pipeline: Pipeline, scenes: Sequence[str], *, wh
     what = " and ".join(
         f"{verb} {_listed(root, part)}" for verb, part in (("remove", removed), ("replace", replaced)) if part
     )
+    names = {maker.name for maker in others} - {"", mine.name}
+    own = f"give --pipeline {names.pop()}, " if len(names) == 1 else ""
     raise UsageError(
-        f"the release in {root} was made by {named}: {mine} would {what}; use another --data, "
+        f"the release in {root} was made by {named}: {mine} would {what}; {own}use another --data, "
         "or lose them with --replace"
     )
 

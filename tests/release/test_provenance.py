@@ -10,6 +10,7 @@ import sys
 
 import pandas as pd
 import pytest
+from support.command_line import said
 
 from aerialdojo_gen.commands.common import open_pipeline, run_until
 from aerialdojo_gen.config.pipeline import load_pipeline
@@ -74,10 +75,44 @@ def test_another_pipeline_is_refused_at_once_and_nothing_is_lost(data, pipeline,
     tasks = {s: sum(store.count_rows(data, f"tasks/{k}", s) for k in ("train", "test")) for s in (A, B)}
     for words in (
         f"error: the release in {data} was made by pipeline 'smoke': pipeline 'other' would ",
-        f"remove 1 scene with {tasks[A]} tasks ({A})", f"replace 1 scene with {tasks[B]} tasks ({B})", "--replace",
+        f"remove 1 scene with {tasks[A]} tasks ({A})", f"replace 1 scene with {tasks[B]} tasks ({B})",
+        "; give --pipeline smoke, use another --data, or lose them with --replace",
     ):  # fmt: skip
         assert words in done.stderr
     assert times(data) == before
+
+
+def test_commands_take_the_pipeline_of_the_release(data, capsys):
+    before = times(data)
+    code, _, err = said(capsys, "render", "--data", data, "--limit", "1", "--workers", "1")
+    assert (code, "render: 4 rows in" in err) == (0, True), err
+    assert times(data) == before
+    for place in (data, data / "release"):
+        code, out, err = said(capsys, "validate", place, "--no-meshes", "--pictures", "0", "--workers", "1")
+        assert code == 0
+        assert "another salt" not in out + err
+    code, out, err = said(capsys, "validate", data, "--no-meshes", "--workers", "1", "--pipeline", "aerialdojo-200k")
+    assert err.startswith("not the pipeline of the release, which is --pipeline smoke")
+
+
+def test_a_pipeline_of_ones_own_is_found_beside_the_data_or_asked_for(data, pipeline, capsys):
+    file = pipeline()
+    split(data, file, replace=True)
+    before = times(data)
+    code, _, err = said(capsys, "split", "--data", data, "--workers", "1")
+    assert (code, times(data)) == (0, before), err
+    file.unlink()
+    code, _, err = said(capsys, "split", "--data", data, "--workers", "1")
+    assert code == 2
+    assert err == f"error: the release in {data} was made by pipeline 'other': give its file, --pipeline FILE\n"
+    assert times(data) == before
+    # What only reads goes on: whoever downloads a release does not have its pipeline.
+    assert open_pipeline(None, data, reads=True)[0].name == "aerialdojo-200k"
+    (data / "release" / "pipeline.json").write_text(
+        '{"pipelines": [{"name": "../other"}, {"name": "a"}, {"name": "b"}]}'
+    )
+    with pytest.raises(UsageError, match="made by pipelines a and b: choose by --pipeline NAME"):
+        open_pipeline(None, data)
 
 
 def test_replace_puts_the_other_pipeline_s_release_in_its_place(data, pipeline):
