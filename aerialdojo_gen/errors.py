@@ -14,9 +14,12 @@ class AerialDojoError(Exception):
     ----------
     exit_code : int
         What the command line exits with: 2 for something wrong in what was asked, 1 otherwise.
+    traceback : str
+        Of an agent of the user's that raised; empty otherwise.
     """
 
     exit_code = 1
+    traceback = ""
 
 
 class UsageError(AerialDojoError):

@@ -73,13 +73,13 @@ class Usage:
 class Agent(Protocol):
     """What chooses actions.
 
-    Besides, an agent may have (and `AgentBase` gives):
+    Besides, an agent may have (``close``, ``usage`` and ``answer`` are in `AgentBase`, and do nothing there):
 
     - ``sensors``, a `aerialdojo_gen.agents.goal.Sensors`: what it wants to see; all four views where absent.
     - ``close()``: called once, at the end of the run.
     - ``usage() -> Usage or None``: what it has used since `reset`.
     - ``answer() -> str or None``: the words behind the last action, kept in `steps`.
-    - ``check() -> str``: called once before a run, in a process of its own instance: raises an `AerialDojoError` if
+    - ``check() -> str``: called once before a run, on an instance made for it: raises an `AerialDojoError` if
       the agent cannot work (nobody listens, a wrong key), else returns what is worth telling.
     - ``settled() -> dict``: options that ``check`` has settled, given to the instances that fly.
     - ``used_options() -> dict``: its options with their defaults, JSON and no secrets, for the log.

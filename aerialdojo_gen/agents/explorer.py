@@ -1,4 +1,4 @@
-"""An explorer that learns nothing: it avoids walls by depth, visits frontiers, and stops where the picture fits."""
+"""An explorer that learns nothing: it avoids walls by depth, visits frontiers, and stops where an image goal fits."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ class ExplorerAgent(AgentBase):
     """Frontier exploration in the plane, by depth alone (Yamauchi 1997), in a frame reckoned from its own actions.
 
     It keeps the height it starts at, and climbs a metre where there is nowhere left to go. With an image goal it
-    stops where the front view correlates with the picture; with a semantic goal it understands nothing, and its last
-    action is a Stop wherever it is then.
+    stops where the front view correlates with the picture; the words of a goal it ignores. Its last action is a Stop,
+    wherever it is then.
 
     Parameters
     ----------

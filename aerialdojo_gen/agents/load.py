@@ -6,13 +6,25 @@ import importlib
 import inspect
 import os
 import sys
-from collections.abc import Callable
+import sysconfig
+import traceback
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
 from aerialdojo_gen.agents.base import Agent
+from aerialdojo_gen.common.bounded import loads_json
 from aerialdojo_gen.common.names import unknown
-from aerialdojo_gen.errors import AerialDojoError, MissingPackage, UsageError, first_line, lacks
+from aerialdojo_gen.common.secrets import Secrets
+from aerialdojo_gen.errors import (
+    AerialDojoError,
+    BeyondBounds,
+    Malformed,
+    MissingPackage,
+    UsageError,
+    first_line,
+    lacks,
+)
 
 _HERE = "aerialdojo_gen.agents"
 # Where the agents of this project are; nothing is imported before one is asked for.
@@ -26,6 +38,12 @@ BUILT_IN = {
     "anthropic": "aerialdojo_gen.llm.anthropic_agent:AnthropicAgent",
     "policy": "aerialdojo_gen.learning.policy:Policy",
 }
+_BOOLEANS = {"true": True, "yes": True, "on": True, "1": True, "false": False, "no": False, "off": False, "0": False}
+# Where code is that is no agent of a user's.
+_LIBRARIES = (
+    "<frozen", os.path.join(Path(__file__).parent.parent, ""),
+    *(os.path.join(sysconfig.get_path(kind), "") for kind in ("stdlib", "platstdlib", "purelib", "platlib")),
+)  # fmt: skip
 # The extra whose packages an agent imports.
 _EXTRAS = {"openai": "llm", "anthropic": "llm", "policy": "train"}
 
@@ -60,7 +78,7 @@ def agent_class(name: str) -> Callable[..., Any]:
     except AerialDojoError:
         raise
     except Exception as error:
-        raise UsageError(f"cannot load agent {name!r}: {place(error)}") from error
+        raise keep_traceback(UsageError(f"cannot load agent {name!r}: {place(error)}"), error) from error
     cls = getattr(module, class_name, None)
     if cls is None:
         raise UsageError(f"cannot load agent {name!r}: module {module_name} has no {class_name}")
@@ -100,12 +118,47 @@ def load_agent(name: str, **options: Any) -> Agent:
     except AerialDojoError:
         raise
     except (TypeError, ValueError) as error:
-        raise UsageError(f"agent {name!r}: {first_line(error)}") from error
+        raise keep_traceback(UsageError(f"agent {name!r}: {first_line(error)}"), error) from error
     except Exception as error:
-        raise UsageError(f"agent {name!r} cannot be made: {place(error)}") from error
+        raise keep_traceback(UsageError(f"agent {name!r} cannot be made: {place(error)}"), error) from error
     if not isinstance(agent, Agent):
         raise UsageError(f"{name!r} is no agent: it needs reset(goal) and act(observation)")
     return agent
+
+
+def read_options(name: str, given: Mapping[str, str]) -> dict[str, Any]:
+    """Convert an agent's options from text to the types of their defaults.
+
+    Raises
+    ------
+    UsageError
+        There is no such agent, or a text cannot be converted.
+    """
+    parameters = inspect.signature(agent_class(name)).parameters
+    defaults = {key: parameters[key].default for key in given if key in parameters}
+    return {key: _converted(name, key, text, defaults.get(key)) for key, text in given.items()}
+
+
+def _converted(name: str, option: str, text: str, default: Any) -> Any:
+    kinds = ((bool, "true or false"), (int, "a whole number"), (float, "a number"))
+    for kind, what in kinds:
+        if isinstance(default, kind):
+            try:
+                return _BOOLEANS[text.strip().lower()] if kind is bool else kind(text)
+            except (KeyError, ValueError):
+                shown = Secrets().text(text)[:60]
+                raise UsageError(
+                    f"--option {option}={shown}: agent {name!r} takes {what} here, its default is {default!r}"
+                ) from None
+    try:
+        value: Any = None if text.strip() == "None" else loads_json(text)
+    except BeyondBounds as error:
+        raise UsageError(f"--option {option}: {error}") from None
+    except Malformed:
+        return text
+    # A name like 007 stays one; a list may be written as JSON, or as the agent reads it.
+    fits = str if isinstance(default, str) else str | list if isinstance(default, tuple | list) else object
+    return value if isinstance(value, fits) else text
 
 
 def look_here() -> None:
@@ -118,9 +171,21 @@ def look_here() -> None:
 
 
 def place(error: BaseException) -> str:
-    """Say what was raised and where, in one line: ``KeyError at mine.py:12: 'map'``."""
-    at = error.__traceback__
-    while at is not None and at.tb_next is not None:
-        at = at.tb_next
-    where = f" at {Path(at.tb_frame.f_code.co_filename).name}:{at.tb_lineno}" if at is not None else ""
+    """Say what was raised and where, in one line: ``KeyError at mine.py:12: 'map'``.
+
+    The place is the last one outside of libraries and of this package, so that it is in the agent's own code.
+    """
+    frames = traceback.extract_tb(error.__traceback__)
+    own = [frame for frame in frames if not frame.filename.startswith(_LIBRARIES)] or frames
+    where = f" at {Path(own[-1].filename).name}:{own[-1].lineno}" if own else ""
     return f"{type(error).__name__}{where}: {first_line(error)}"
+
+
+def keep_traceback(error: AerialDojoError, cause: BaseException) -> AerialDojoError:
+    """Set an agent's own traceback on the error that is made of it: unlike a cause, it is pickled with it."""
+    at = cause.__traceback__
+    while at is not None and at.tb_frame.f_code.co_filename.startswith(_LIBRARIES):
+        at = at.tb_next
+    lines = traceback.format_exception(type(cause), cause, at or cause.__traceback__)
+    error.traceback = Secrets().text("".join(lines).rstrip())
+    return error

@@ -8,11 +8,11 @@ from typing import Any
 
 from aerialdojo_gen.agents import Agent, InvalidAnswer, Usage
 from aerialdojo_gen.agents.goal import N_ACTIONS, Goal, Observation
-from aerialdojo_gen.agents.load import place
+from aerialdojo_gen.agents.load import keep_traceback, place
 from aerialdojo_gen.common.secrets import Secrets
 from aerialdojo_gen.errors import AerialDojoError
 
-_TOLERATED = "--tolerate logs such episodes as failures and goes on"
+_TOLERATED = "--tolerate logs such episodes as failures and goes on, --traceback shows the agent's traceback"
 
 
 class AgentError(AerialDojoError):
@@ -102,7 +102,7 @@ class Asked:
             raise
         except (Exception, SystemExit) as error:
             # SystemExit too: an agent that gives up ends its episode, not the run without a word.
-            raise self._wrong(f"{place(error)} (in {what}); {_TOLERATED}") from error
+            raise keep_traceback(self._wrong(f"{place(error)} (in {what}); {_TOLERATED}"), error) from error
 
     def _wrong(self, what: str) -> AgentError:
         line = " ".join(f"agent {self._name} failed at task {self.task}: {what}".split())

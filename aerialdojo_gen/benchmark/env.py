@@ -49,13 +49,14 @@ class AerialDojoEnv(gymnasium.Env[dict[str, Any], np.int64]):
     Actions are `Discrete(16)`: Stop, moves and turns of `aerialdojo_gen.store.schemas.ACTION_NAMES`, carried out by
     their exact magnitudes. An episode is `terminated` by Stop or by a collision, and `truncated` where the last
     action of the budget is neither; ``info["reason"]`` is then ``"stop"``, ``"collision"`` or ``"budget"``, ``""``
-    before. A move that would leave the flight volume is refused: it is spent, and nothing moves. The reward is 1 for
-    a Stop within the success radius, and 0 otherwise.
+    before. At the end, and not before, the info has also the ``task_id``, whether the episode was a ``success``, and
+    the distance to the goal, ``distance_m``. A move that would leave the flight volume is refused: it is spent, and
+    nothing moves. The reward is 1 for a Stop within the success radius, and 0 otherwise.
 
     An observation is a dict: ``step`` and ``remaining_actions`` ((1,) int32), ``refused`` (0 or 1), ``goal``
     (modality, target_name, landmark, direction, and description or image), and, where asked for, ``rgb`` and
-    ``depth_m`` by view. Neither it nor the info holds a pose, a distance, a route or an id (paper: what an agent may
-    know).
+    ``depth_m`` by view. While an episode goes on, neither it nor the info holds a pose, a distance, a route or an id
+    (paper: what an agent may know).
 
     Parameters
     ----------
@@ -231,7 +232,7 @@ class AerialDojoEnv(gymnasium.Env[dict[str, Any], np.int64]):
         terminated, truncated : bool
             Ended by Stop or collision; ended by the budget.
         info : dict
-            ``reason``.
+            ``reason``; at the end also ``task_id``, ``success`` and ``distance_m``.
 
         Raises
         ------
@@ -243,13 +244,11 @@ class AerialDojoEnv(gymnasium.Env[dict[str, Any], np.int64]):
         episode = self.episode
         episode.step(int(action))
         reason = episode.termination or ""
-        return (
-            self._observe(),
-            float(episode.success(self._flight.success_radius_m)),
-            reason in ("stop", "collision"),
-            reason == "budget",
-            {"reason": reason},
-        )
+        success = episode.success(self._flight.success_radius_m)
+        info: dict[str, Any] = {"reason": reason}
+        if reason:
+            info |= {"task_id": self.task.row["task_id"], "success": success, "distance_m": episode.distance_m}
+        return self._observe(), float(success), reason in ("stop", "collision"), reason == "budget", info
 
     def render(self) -> NDArray[np.uint8] | None:
         """Return the four views in one picture, (2 · H, 2 · W, 3) uint8, where the render mode is ``"rgb_array"``."""

@@ -107,6 +107,8 @@ class Outcome:
         What failed, the most frequent first: how often, of which kind; of the first also the reason.
     finished_now : int
         Of the flown those that did not fail.
+    successes : int
+        Of the finished.
     """
 
     episodes: int
@@ -120,6 +122,7 @@ class Outcome:
     stopped: str = ""
     failures: tuple[str, ...] = ()
     finished_now: int = 0
+    successes: int = 0
 
     @property
     def fruitless(self) -> bool:
@@ -132,8 +135,9 @@ class Outcome:
         cost = f"; {self.cost_usd:.2f} USD" if self.cost_usd else ""
         tokens = f"; {self.tokens:,} tokens" if self.tokens else ""
         failed = f", {self.failed:,} failed" if self.failed else ""
+        success = f", success rate {self.successes / self.finished:.1%}" if self.finished else ""
         return (
-            f"{self.finished:,} of {self.episodes:,} episodes finished{failed}; "
+            f"{self.finished:,} of {self.episodes:,} episodes finished{failed}{success}; "
             f"{self.flown:,} flown now in {self.seconds:.1f} s{rate}{tokens}{cost}"
         )
 

@@ -134,15 +134,16 @@ def evaluate(
                 raise ServiceDown(f"{error} Finished episodes are kept: the same command goes on from here") from None
         if tally.spent and len(run.todo(False)):
             reporter.line(f"stopped at {tally.spent}: a higher one goes on from here")
-        finished, failed = run.counts()
+        finished, failed, successes = run.counts()
     why = ""
     if tally.failing is not None:
         why = f"stopped after {limits.failures_in_row} failures in a row of one kind ({tally.failing.kind})."
     flown, seconds = tally.episodes, time.monotonic() - started
     told, now = run.failures(), tally.finished
     return Outcome(
-        rows.num_rows, finished, failed, flown, tally.actions, tally.cost_usd, tally.tokens, seconds, why, told, now
-    )
+        rows.num_rows, finished, failed, flown, tally.actions, tally.cost_usd, tally.tokens, seconds, why, told, now,
+        successes,
+    )  # fmt: skip
 
 
 class _Run:
@@ -238,9 +239,10 @@ class _Run:
         done = self._ids("episodes") + self._ids("failures")
         return self._rows.filter(pc.invert(pc.is_in(ids, pa.array(done, pa.string()))))
 
-    def counts(self) -> tuple[int, int]:
-        """Episodes in the tables: finished, failed."""
-        return len(self._ids("episodes")), len(self._ids("failures"))
+    def counts(self) -> tuple[int, int, int]:
+        """Episodes in the tables: finished, failed, successful."""
+        flown = [row["success"] for s in self._scenes_written() for row in self._read("episodes", s, ["success"])]
+        return len(flown), len(self._ids("failures")), sum(flown)
 
     def failures(self) -> tuple[str, ...]:
         """Say what failed, the most frequent kind first, with the reason of its first."""

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -22,7 +24,8 @@ from aerialdojo_gen.commands.common import (
     open_pipeline,
     together,
 )
-from aerialdojo_gen.errors import AerialDojoError, BeyondBounds, Malformed, UsageError
+from aerialdojo_gen.common.advice import command
+from aerialdojo_gen.errors import AerialDojoError, UsageError
 
 if TYPE_CHECKING:
     from aerialdojo_gen.agents.goal import Sensors
@@ -47,7 +50,10 @@ def evaluate(
         typer.Option("--preset", help="A language model by name, in place of --agent: qwen3-vl-4b, …"),
     ] = None,
     option: Annotated[
-        list[str] | None, typer.Option("--option", help="An option of the agent, repeatable: --option seed=1.")
+        list[str] | None,
+        typer.Option(
+            "--option", help="An option of the agent, repeatable: --option seed=1, of the type of its default."
+        ),
     ] = None,
     run: Annotated[
         str | None, typer.Option("--run", help="Name of the run.  (default: the agent's or preset's)")
@@ -106,6 +112,9 @@ def evaluate(
         bool,
         typer.Option("--tolerate", help="Log episodes in which the agent raises as failed; count no-actions; go on."),
     ] = False,
+    traceback: Annotated[
+        bool, typer.Option("--traceback", help="Print the traceback of an agent that raises, not its place alone.")
+    ] = False,
     restart: Annotated[bool, typer.Option("--restart", help="Drop what the run has written before.")] = False,
     estimate: Annotated[
         bool,
@@ -142,21 +151,21 @@ def evaluate(
     config, _ = open_pipeline(pipeline, data, reads=True)
     splits, settings, modalities = (tuple(names or ()) for names in (split, setting, modality))
     chosen = tuple(together(scenes, scene) or ())
-    options = _options(option or [])
     name = preset or agent or "random"
-    agent, options = _agent(agent, preset, options)
-    evaluation = Evaluation(
-        run or name.replace(".", "-").replace(":", "-"),
-        agent,
-        options,
-        Selection(splits, settings, modalities, chosen, limit, seed),
-        _sensors(agent, options, view, width, height),
-        config.embodiment,
-        renderer,
-        Conditions(attempts, tolerate=tolerate),
-        requests_per_minute,
-        tell=tuple(tell or ()),
-    )
+    with _tracebacks(traceback):
+        agent, options = _agent(agent, preset, _options(option or []))
+        evaluation = Evaluation(
+            run or name.replace(".", "-").replace(":", "-"),
+            agent,
+            options,
+            Selection(splits, settings, modalities, chosen, limit, seed),
+            _sensors(agent, options, view, width, height),
+            config.embodiment,
+            renderer,
+            Conditions(attempts, tolerate=tolerate),
+            requests_per_minute,
+            tell=tuple(tell or ()),
+        )
     if estimate:
         from aerialdojo_gen.benchmark.estimate import estimate as reckon
 
@@ -164,14 +173,17 @@ def evaluate(
         return
     reporter = Reporter(quiet=quiet)
     try:
-        outcome = fly(
-            data, evaluation, out=out, workers=workers, executor=executor, address=address, rerun_failed=rerun_failed,
-            restart=restart, limits=Limits(max_cost, max_tokens, failures_in_row), reporter=reporter,
-        )  # fmt: skip
+        with _tracebacks(traceback):
+            outcome = fly(
+                data, evaluation, out=out, workers=workers, executor=executor, address=address,
+                rerun_failed=rerun_failed, restart=restart,
+                limits=Limits(max_cost, max_tokens, failures_in_row), reporter=reporter,
+            )  # fmt: skip
     except KeyboardInterrupt:
         print("interrupted: finished episodes are kept, the same command goes on from here", file=sys.stderr)
         raise SystemExit(130) from None
-    reporter.line(f"evaluate {evaluation.run}: {outcome}")
+    scores = f"; for all scores: {command('report', evaluation.run, log=out)}" if outcome.finished else ""
+    reporter.line(f"evaluate {evaluation.run}: {outcome}{scores}")
     last = outcome.last_line(again(["--rerun-failed"], without=["--restart"], data=data))
     if outcome.stopped or outcome.fruitless:
         raise AerialDojoError(last)
@@ -180,33 +192,39 @@ def evaluate(
         print(last, file=sys.stderr)
 
 
-def _agent(agent: str | None, preset: str | None, options: dict[str, Any]) -> tuple[str, dict[str, Any]]:
+@contextmanager
+def _tracebacks(wanted: bool) -> Iterator[None]:
+    """Print an agent's traceback, if it raises in the block."""
+    try:
+        yield
+    except AerialDojoError as error:
+        if wanted and error.traceback:
+            print(error.traceback, file=sys.stderr)
+        raise
+
+
+def _agent(agent: str | None, preset: str | None, given: dict[str, str]) -> tuple[str, dict[str, Any]]:
     """Take the agent, or a preset's with its options under those that are given."""
+    from aerialdojo_gen.agents.load import read_options
+
     if preset is None:
-        return agent or "random", options
+        return agent or "random", read_options(agent or "random", given)
     from aerialdojo_gen.llm.presets import preset as find
 
     found = find(preset)
     if agent is not None and agent != found.agent:
         raise UsageError(f"preset {preset!r} is of the agent {found.agent!r}: leave --agent {agent} out")
-    return found.agent, found.options | options
+    return found.agent, found.options | read_options(found.agent, given)
 
 
-def _options(given: list[str]) -> dict[str, Any]:
-    from aerialdojo_gen.common.bounded import loads_json
+def _options(given: list[str]) -> dict[str, str]:
     from aerialdojo_gen.common.secrets import Secrets
 
-    options: dict[str, Any] = {}
+    options = {}
     for item in given:
-        key, equals, value = item.partition("=")
+        key, equals, options[key] = item.partition("=")
         if not equals or not key.isidentifier():
             raise UsageError(f"--option {Secrets().text(item)[:60]!r}: write key=value")
-        try:
-            options[key] = loads_json(value)
-        except BeyondBounds as error:
-            raise UsageError(f"--option {key}: {error}") from None
-        except Malformed:
-            options[key] = value
     return options
 
 

@@ -13,6 +13,8 @@ _SECRET_WORDS = frozenset((
     "apikey", "auth", "authorization", "bearer", "cookie", "credential", "credentials", "key", "passphrase", "passwd",
     "password", "pwd", "secret", "secrets", "sig", "signature", "token",
 ))  # fmt: skip
+# Shells keep the working directory in these, in spite of their names.
+_FOLDERS = ("PWD", "OLDPWD")
 _WORD = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+")
 # Shorter values of environment variables are words like "true", which stand anywhere.
 _LEAST_CHARACTERS = 8
@@ -45,7 +47,7 @@ class Secrets:
     """
 
     def __init__(self, options: Mapping[str, Any] | None = None, values: Iterable[str] = ()) -> None:
-        found = {value for name, value in os.environ.items() if is_secret_name(name)}
+        found = {value for name, value in os.environ.items() if is_secret_name(name) and name not in _FOLDERS}
         found |= set(_under_secret_names(options or {})) | set(values)
         # The longest first: one may be the beginning of another.
         known = sorted({v for v in found if len(v.strip()) >= _LEAST_CHARACTERS}, key=len, reverse=True)

@@ -16,6 +16,7 @@ from aerialdojo_gen.agents import AgentBase, load_agent
 from aerialdojo_gen.agents.depth_map import DepthMap
 from aerialdojo_gen.agents.explorer import ExplorerAgent, thumbnail
 from aerialdojo_gen.agents.goal import BLIND, Goal, Observation, Rules, Sensors
+from aerialdojo_gen.agents.load import read_options
 from aerialdojo_gen.agents.simple import BEST_CONSTANT, ConstantAgent, OracleAgent, RandomAgent, StopAgent
 from aerialdojo_gen.benchmark.episode import Episode
 from aerialdojo_gen.benchmark.motion import FlightSpace
@@ -82,6 +83,47 @@ def test_what_cannot_be_made_is_said_in_one_line(name, options, message):
     with pytest.raises(UsageError, match=message) as error:
         load_agent(name, **options)
     assert "\n" not in str(error.value)
+
+
+class Typed(AgentBase):
+    """Has a default of every type."""
+
+    def __init__(self, needed, n=3, share=0.5, flag=False, name="", seed=None, names=("a",)):
+        self.given = needed, n, share, flag, name, seed, names
+
+    def reset(self, goal): ...
+
+    def act(self, observation): ...
+
+
+@pytest.mark.parametrize(
+    ("option", "text", "value"),
+    [
+        ("n", "12", 12), ("n", "-1", -1), ("share", "2", 2.0), ("share", "1e-3", 1e-3),
+        ("flag", "true", True), ("flag", "False", False), ("flag", "1", True), ("flag", "no", False),
+        ("name", "12", "12"), ("name", "None", "None"), ("name", "true", "true"), ("name", "[1]", "[1]"),
+        ("name", '"quoted"', "quoted"), ("name", "", ""),
+        ("seed", "None", None), ("seed", "null", None), ("seed", "7", 7), ("seed", "words", "words"),
+        ("names", '["b", "c"]', ["b", "c"]), ("names", "b,c", "b,c"), ("names", "7", "7"),
+        ("needed", "7", 7), ("needed", "words", "words"), ("other", "true", True),
+    ],
+)  # fmt: skip
+def test_options_take_the_types_of_their_defaults(option, text, value):
+    read = read_options(f"{__name__}:Typed", {option: text})
+    assert read == {option: value}
+    assert type(read[option]) is type(value)
+
+
+@pytest.mark.parametrize(
+    ("option", "text", "what"),
+    [("n", "1.5", "a whole number"), ("n", "true", "a whole number"), ("n", "None", "a whole number"),
+     ("share", "much", "a number"), ("flag", "maybe", "true or false"), ("flag", "2", "true or false")],
+)  # fmt: skip
+def test_an_option_that_cannot_be_converted_is_named(option, text, what):
+    default = {"n": 3, "share": 0.5, "flag": False}[option]
+    message = rf"^--option {option}={text}: agent '\S+:Typed' takes {what} here, its default is {default}$"
+    with pytest.raises(UsageError, match=message):
+        read_options(f"{__name__}:Typed", {option: text})
 
 
 def test_the_constant_agent_does_the_same_whatever_it_is_told_and_then_stops():

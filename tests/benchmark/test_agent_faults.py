@@ -191,3 +191,52 @@ def test_the_command_tells_a_faulty_agent_in_one_line(smoke: Path, tmp_path: Pat
     assert last.startswith(f"error: agent {HERE}:Faulty failed at task U_")
     assert "(in reset); --tolerate logs such episodes as failures and goes on" in last
     assert not runs(tmp_path)
+
+
+OWN_CODE = """
+import json
+
+class Agent:
+    def __init__(self, how="act"):
+        self.how = how
+        if how == "init":
+            json.loads("broken in init")
+
+    def reset(self, goal):
+        pass
+
+    def act(self, observation):
+        return self.think()
+
+    def think(self):
+        return json.loads("broken in act")
+"""
+
+
+@pytest.mark.parametrize(("how", "line", "workers"), [("act", 17, 1), ("act", 17, 2), ("init", 8, 2)])
+def test_an_agents_own_file_is_named_and_its_traceback_shown_on_demand(
+    smoke: Path, tmp_path: Path, how: str, line: int, workers: int
+) -> None:
+    (tmp_path / "own_agent.py").write_text(OWN_CODE)
+    command = [sys.executable, "-m", "aerialdojo_gen.cli", "evaluate", "--data", str(smoke), "--out", str(tmp_path)]
+    command += ["--agent", "own_agent:Agent", "--option", f"how={how}", "--limit", "2", "--workers", str(workers)]
+    env = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+    brief, full = (
+        subprocess.run([*command, *more], capture_output=True, text=True, check=False, env=env, cwd=tmp_path)
+        for more in ([], ["--traceback"])
+    )
+    assert (brief.returncode, full.returncode) == ((1, 1) if how == "act" else (2, 2))
+    for done in (brief, full):
+        last = done.stderr.splitlines()[-1]
+        # The library's line helps nobody: the place is in the agent's file.
+        if how == "act":
+            assert f"JSONDecodeError at own_agent.py:{line}: Expecting value" in last
+        else:
+            assert "Expecting value" in last
+    assert "Traceback" not in brief.stderr
+    trace = full.stderr[full.stderr.index("Traceback") :].splitlines()[:-1]
+    files = [one.split('"')[1] for one in trace if one.startswith("  File ")]
+    assert files[0].endswith("own_agent.py"), "it begins with the agent"
+    assert f'own_agent.py", line {line}, in ' in full.stderr
+    assert trace[-1].startswith("json.decoder.JSONDecodeError: ")
+    assert len(full.stderr.split("Traceback")) == 2

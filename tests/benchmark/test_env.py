@@ -202,9 +202,11 @@ def test_a_chosen_task_and_what_ends_it(smoke):
         observation, _, terminated, truncated, info = env.step(schemas.TURN_LEFT)
         assert truncated == (k == row["action_budget"] - 1)
         assert not terminated
-    assert info == {"reason": "budget"}
+    told = {"task_id": row["task_id"], "success": False, "distance_m": math.dist(env.episode.position, env.task.goal)}
+    assert info == {"reason": "budget"} | told
     env.reset(options={"task_id": row["task_id"]})
-    assert env.step(0)[1:] == (0.0, True, False, {"reason": "stop"}), "the start is never within 3 m of the goal"
+    ended = (0.0, True, False, {"reason": "stop"} | told)
+    assert env.step(0)[1:] == ended, "the start is never within 3 m of the goal"
     with pytest.raises(RuntimeError, match="stop"):
         env.step(0)
 
@@ -222,7 +224,8 @@ def test_the_same_seed_draws_the_same_tasks(smoke):
 def test_reward_is_one_for_success(smoke):
     env = AerialDojoEnv(smoke, views=(), success_radius_m=1000.0)
     env.reset(seed=0)
-    assert env.step(0)[1:] == (1.0, True, False, {"reason": "stop"})
+    *ended, info = env.step(0)[1:]
+    assert (ended, info["reason"], info["success"]) == ([1.0, True, False], "stop", True)
 
 
 @pytest.mark.parametrize("mode", ["sync", "async"])
@@ -239,6 +242,10 @@ def test_vectorised(smoke, mode):
         assert terminated.tolist() == [True, False]
         assert truncated.tolist() == [False, False]
         assert info["reason"].tolist() == ["stop", ""]
+        ended = alone[0].step(0)[-1]
+        for name in ("task_id", "success", "distance_m"):
+            assert info[name][0] == ended[name]
+            assert info[f"_{name}"].tolist() == [True, False], "nothing of an episode that goes on"
         assert observation["step"].tolist() == [[1], [1]]
         assert list(first["goal"]["target_name"]) == names, "an observation that was kept stays what it was"
     finally:

@@ -19,7 +19,7 @@ from aerialdojo_gen.agents.goal import BLIND
 from aerialdojo_gen.benchmark import journal
 from aerialdojo_gen.benchmark.episodes import TABLES, read_run, runs
 from aerialdojo_gen.benchmark.limits import Limits
-from aerialdojo_gen.benchmark.runner import Evaluation, evaluate
+from aerialdojo_gen.benchmark.runner import Evaluation, Outcome, evaluate
 from aerialdojo_gen.benchmark.tasks import Selection, select
 from aerialdojo_gen.benchmark.worker import Conditions
 from aerialdojo_gen.errors import AerialDojoError, StoreError, UsageError
@@ -313,7 +313,7 @@ def test_the_command_in_one_line(project, smoke, tmp_path):
 
     done = call("--agent", "random", "--option", "seed=3", "--limit", "4", "--setting", "base", "--workers", "1")
     assert done.returncode == 0, done.stderr
-    assert "evaluate random: 4 of 4 episodes finished" in done.stderr
+    assert "evaluate random: 4 of 4 episodes finished, success rate 0.0%; 4 flown now" in done.stderr
     assert json.loads(read_run(tmp_path, "random")["agent_options"][0].as_py()) == {"seed": 3}
     for args, said in (
         (("--agent", "oracel"), "no agent 'oracel': did you mean 'oracle'?"),
@@ -324,6 +324,24 @@ def test_the_command_in_one_line(project, smoke, tmp_path):
         wrong = call(*args)
         assert wrong.returncode == 2
         assert wrong.stderr.splitlines()[-1].startswith(f"error: {said}"), wrong.stderr
+
+
+def test_the_last_line_has_the_success_rate_and_the_command_for_the_scores(smoke, tmp_path):
+    command = [sys.executable, "-m", "aerialdojo_gen.cli", "evaluate", "--data", smoke, "--out", tmp_path, "--agent"]
+    command += ["oracle", "--limit", "5", "--workers", "1"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    last = done.stderr.splitlines()[-1]
+    assert "evaluate oracle: 5 of 5 episodes finished, success rate 100.0%; 5 flown now" in last
+    advised = last.partition("; for all scores: aerialdojo-gen ")[2]
+    assert advised == f"report oracle --log {tmp_path} --data {smoke}"
+    shown = [sys.executable, "-m", "aerialdojo_gen.cli", *advised.split(), "--json"]
+    told = subprocess.run(shown, capture_output=True, text=True, check=False)
+    assert told.returncode == 0, told.stderr
+    assert '"oracle"' in told.stdout
+    some = Outcome(10, 8, 1, 9, 90, 0.0, 0, 1.0, successes=3)
+    assert str(some).startswith("8 of 10 episodes finished, 1 failed, success rate 37.5%; 9 flown now")
+    assert "rate" not in str(Outcome(10, 0, 0, 0, 0, 0.0, 0, 1.0)), "no episode, no rate"
 
 
 def test_no_run_of_that_name(tmp_path):

@@ -162,5 +162,9 @@ def test_observations_and_infos_of_the_environment_hold_nothing_either(smoke, mo
             handed += [*env.step(action)]
             if handed[-1]["reason"]:
                 break
+        last, infos = handed.pop(), [info for info in handed if isinstance(info, dict) and "reason" in info]
+        assert last["reason"], "the episode is over"
+        assert len(infos) >= 2
         assert secrets.found(handed, env.action_space) == []
-        assert {key for info in handed if isinstance(info, dict) and "reason" in info for key in info} == {"reason"}
+        assert all(info == {"reason": ""} for info in infos)
+        assert set(last) == {"reason", "task_id", "success", "distance_m"}
