@@ -2,8 +2,8 @@
 
     python examples/torch_dataset.py data
 
-It needs recordings (`aerialdojo-gen render`), pandas, and `pip install torch --index-url
-https://download.pytorch.org/whl/cpu` for batches; without torch the samples are there all the same, as NumPy arrays.
+It needs recordings (`aerialdojo-gen render`), and for batches `pip install torch --index-url
+https://download.pytorch.org/whl/cpu`. Without torch, samples are NumPy arrays.
 """
 
 import bisect

@@ -6,6 +6,7 @@ import subprocess
 import sys
 
 import pytest
+from support.plain_install import as_script, plain_site, run_plain
 
 import aerialdojo_gen
 
@@ -39,12 +40,9 @@ assert observation["rgb"]["front"].shape == (64, 64, 3)
 assert pipeline.filter.min_detour_ratio == 1.2
 assert load_pipeline("mine.toml").filter == pipeline.filter
 """
-    # Worker processes are spawned from the file: its work must not begin again in them.
-    body = "\n".join(found) + held
-    script.write_text("if __name__ == '__main__':\n" + "".join(f"    {line}\n" for line in body.splitlines()))
-    done = subprocess.run([sys.executable, script], cwd=tmp_path, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr[-3000:]
-    assert "did you mean" in done.stdout or "the nearest is" in done.stdout
+    script.write_text(as_script("\n".join(found) + held))
+    said = run_plain(plain_site(tmp_path / "packages"), script, tmp_path)
+    assert "did you mean" in said or "the nearest is" in said
 
 
 def test_the_page_names_all_that_is_public(project):

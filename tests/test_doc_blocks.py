@@ -1,25 +1,24 @@
-"""Every block of code in README and docs runs on the smoke data, or a table here has the reason why not."""
+"""Every block of code in README, docs and the notebook runs on the smoke data with what `make env` installs.
+
+What does not has its reason in a table here; what needs more packages stands below the command that installs them.
+"""
 
 import dataclasses
 import importlib.util
-import io
 import json
-import os
 import re
 import shlex
 import shutil
 import subprocess
-import sys
 import tomllib
-from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 
 import pytest
 import trimesh
 from support import foreign, task_files
 from support.doc_blocks import blocks, commands, is_shell
+from support.plain_install import as_script, plain_site, run_plain
 
-from aerialdojo_gen import cli
 from aerialdojo_gen.agents.goal import N_ACTIONS, Goal, Observation, Rules
 from aerialdojo_gen.config.pipeline import Pipeline
 from aerialdojo_gen.store import shards
@@ -153,32 +152,15 @@ def test_no_reason_is_left_over_and_what_it_names_is_there():
         assert any(text.startswith(begin) for text in scripts), begin
 
 
-@pytest.fixture(scope="module")
-def ran(folder):
-    """Every command that has no reason, run once in the pages' order: where it stands, exit code, what it said."""
-    task_id = shards.read_scene(folder / "data", "tasks/test", "U_Courtyard_0")["task_id"][0].as_py()
-    results = {}
-    with pytest.MonkeyPatch.context() as patch:
-        patch.chdir(folder)
-        patch.delenv("AERIALDOJO_DATA", raising=False)
-        patch.setattr(sys, "path", [path for path in sys.path if path])
-        for run, agent in (("mine", "oracle"), ("theirs", "constant")):
-            arguments = ["evaluate", "--agent", agent, "--run", run, "--limit", "4", "--workers", "1"]
-            assert called(arguments)[0] == 0
-        done = {}
-        for command, place in shell_commands().items():
-            if reason(command) is None:
-                words = tuple(on_smoke(command, task_id))
-                done[words] = done.get(words) or called([*words])
-                results[command] = (place, *done[words])
-    return results
+# One process calls all commands: a process each would cost a second. What they end with and say is a line of JSON.
+CALLS = """
+import io, json, sys
+from contextlib import redirect_stderr, redirect_stdout
+from aerialdojo_gen import cli
 
-
-def called(arguments):
-    """Call the command line in this process; gives the exit code and what it says to standard error."""
-    out, err = io.StringIO(), io.StringIO()
-    with pytest.MonkeyPatch.context() as patch, redirect_stdout(out), redirect_stderr(err):
-        patch.setattr(sys, "argv", ["aerialdojo-gen", *arguments])
+def called(words):
+    sys.argv, err = ["aerialdojo-gen", *words], io.StringIO()
+    with redirect_stdout(io.StringIO()), redirect_stderr(err):
         try:
             cli.main()
         except SystemExit as ended:
@@ -186,6 +168,49 @@ def called(arguments):
         except Exception as error:
             return -1, repr(error)
     return 0, err.getvalue()
+
+print(json.dumps([called(words) for words in json.load(open("calls.json"))]))
+"""
+
+
+@pytest.fixture(scope="module")
+def site_of(tmp_path_factory):
+    """Gives the folder of packages that a reader has who has typed the installations of a text."""
+    made = {}
+
+    def site(text=""):
+        commands = re.findall(r"pip install ([^`\n]*)", text)
+        extras = {
+            one for command in commands for some in re.findall(r"\[([\w,]+)\]", command) for one in some.split(",")
+        }
+        packages = {one for command in commands for one in command.split() if re.fullmatch(r"[a-z][\w-]+", one)}
+        key = (frozenset(extras), frozenset(packages))
+        return made.get(key) or made.setdefault(key, plain_site(tmp_path_factory.mktemp("packages") / "site", *key))
+
+    return site
+
+
+@pytest.fixture(scope="module")
+def ran(folder, site_of):
+    """Every command that has no reason, run once in the pages' order: where it stands, exit code, what it said."""
+    task_id = shards.read_scene(folder / "data", "tasks/test", "U_Courtyard_0")["task_id"][0].as_py()
+    calls = {
+        ("evaluate", "--agent", agent, "--run", run, "--limit", "4", "--workers", "1"): None
+        for run, agent in (("mine", "oracle"), ("theirs", "constant"))
+    }
+    asked = {
+        command: (place, tuple(on_smoke(command, task_id)))
+        for command, place in shell_commands().items()
+        if reason(command) is None
+    }
+    calls |= dict.fromkeys(words for _, words in asked.values())
+    (folder / "calls.json").write_text(json.dumps([*calls]))
+    (folder / "calls.py").write_text(as_script(CALLS))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.delenv("AERIALDOJO_DATA", raising=False)
+        ended = json.loads(run_plain(site_of(), folder / "calls.py", folder))
+    results = dict(zip(calls, ended, strict=True))
+    return {command: (place, *results[words]) for command, (place, words) in asked.items()}
 
 
 def test_every_shell_block_runs_on_the_smoke_data(ran):
@@ -195,14 +220,16 @@ def test_every_shell_block_runs_on_the_smoke_data(ran):
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
-def test_every_python_block_runs_on_the_smoke_data(page, folder, ran):
+def test_every_python_block_runs_on_the_smoke_data(page, folder, site_of, ran):
     """A page's blocks one after the other, in a process of their own, on what its commands have made."""
-    found = [block.text for block in blocks(page) if block.language == "python" and not lacks_an_extra(block.text)]
+    found = [block for block in blocks(page) if block.language == "python" and not lacks_an_extra(block.text)]
     if page.name in PYTHON_ELSEWHERE:
         assert found
         assert page.name in (ROOT / PYTHON_ELSEWHERE[page.name]).read_text(encoding="utf-8")
     elif found:
-        assert run_python(folder, BEFORE.get(page.name, "") + "\n".join(found)) is not None
+        above = "".join(page.read_text(encoding="utf-8").splitlines(keepends=True)[: found[-1].line])
+        text = BEFORE.get(page.name, "") + "\n".join(block.text for block in found)
+        run_python(folder, text, site_of(above))
 
 
 def lacks_an_extra(text):
@@ -211,14 +238,9 @@ def lacks_an_extra(text):
     return any(said in text and importlib.util.find_spec(name) is None for said, name in named.items())
 
 
-def run_python(folder, text):
-    """Run a text as a script's work, which workers that it starts do not begin again; gives what it prints."""
-    script = folder / "page.py"
-    script.write_text("if __name__ == '__main__':\n" + "".join(f"    {line}\n" for line in text.splitlines()))
-    env = os.environ | {"MPLBACKEND": "Agg"}
-    done = subprocess.run([sys.executable, script], cwd=folder, env=env, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr[-3000:]
-    return done.stdout
+def run_python(folder, text, site):
+    (folder / "page.py").write_text(as_script(text))
+    return run_plain(site, folder / "page.py", folder)
 
 
 def test_git_ignores_what_readme_and_docs_suggest_to_write(tmp_path):
@@ -234,7 +256,7 @@ def test_git_ignores_what_readme_and_docs_suggest_to_write(tmp_path):
     subprocess.run(["git", "init", "-q"], cwd=tmp_path, check=True)
     # A folder is known by its slash, for there is none.
     folders = {name if Path(name).suffix else f"{name.rstrip('/')}/" for name in suggested}
-    names = sorted({*folders, "my-scenes/pipeline.toml", "U_Mall_0-6c9aa88ae4fc-s.png"})
+    names = sorted({*folders, "my-scenes/pipeline.toml", "pictures/x.jpg", "U_Mall_0-6c9aa88ae4fc-s.png"})
     done = subprocess.run(["git", "check-ignore", "--", *names], cwd=tmp_path, capture_output=True, text=True)
     assert set(names) - set(done.stdout.splitlines()) == set()
 
@@ -265,16 +287,17 @@ def test_the_page_names_every_field_that_an_agent_is_told(told):
         assert re.search(rf"`\.?{one.name}`", text), one.name
 
 
-def test_the_notebook_runs(folder):
+def test_the_notebook_runs(folder, site_of):
     document = json.loads((ROOT / "examples/first_look.ipynb").read_text(encoding="utf-8"))
     cells = ["".join(cell["source"]) for cell in document["cells"] if cell["cell_type"] == "code"]
     assert len(cells) >= 6
     assert not any(cell["outputs"] for cell in document["cells"] if cell["cell_type"] == "code")
     # The last value of a cell is what a notebook shows.
-    run_python(folder, "\n".join([*cells, "assert rgb.shape[2] == 3 and len(recording) > 1 and info['reason']"]))
+    text = "\n".join([*cells, "assert rgb.shape[2] == 3 and len(recording) > 1 and info['reason']"])
+    run_python(folder, text, site_of())
 
 
-def test_the_dataset_for_pytorch_has_every_pose_of_the_recorded_routes(folder):
+def test_the_dataset_for_pytorch_has_every_pose_of_the_recorded_routes(folder, site_of):
     held = """
 import sys
 sys.path.insert(0, "examples")
@@ -293,4 +316,4 @@ for nav_id, end in zip(poses.nav_ids, poses.ends):
     assert last["depth_m"].shape == (1, *seen.depth_m["front"][k].shape)
 print(len(poses))
 """
-    assert int(run_python(folder, held)) > 10
+    assert int(run_python(folder, held, site_of())) > 10
