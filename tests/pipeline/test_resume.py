@@ -157,6 +157,7 @@ def test_a_shard_that_something_else_rewrote_is_made_again(server, smoke, copy):
     pq.write_table(table.slice(0, 3).replace_schema_metadata(None), path)
     code, err = run(server, copy, *plan_args(copy))
     assert code == 0, err
+    assert f"{path} is damaged (not written by aerialdojo-gen): computed again" in err
     assert snapshot(copy) == snapshot(smoke)
 
 

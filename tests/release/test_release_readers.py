@@ -241,7 +241,7 @@ def mix_runs(data):
             r"tasks/id_train/part-{}.parquet has \d+ rows where \d+ were written: delete it and run .* again$",
         ),
         (lose_scene_row, r"release/scenes/part-{}.parquet is missing: run aerialdojo-gen split --scene {}$"),
-        (replace_by_foreign, r"anchors/part-{}.parquet was not written by aerialdojo-gen: delete it and run .*{}$"),
+        (replace_by_foreign, r"anchors/part-{}.parquet is damaged \(not written by aerialdojo-gen\): delete it and "),
         (mix_runs, r"the release's parts of {} in .* are of different runs: run .* split --scene {} --force$"),
     ],
     ids=lambda case: getattr(case, "__name__", ""),

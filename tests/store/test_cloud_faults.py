@@ -11,8 +11,11 @@ from support.roots import fill, read_folder, write
 from support.s3_server import Proxy, forget_clients
 
 from aerialdojo_gen.errors import StoreError
+from aerialdojo_gen.store import schemas
+from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.bucket import Bucket
 from aerialdojo_gen.store.root import open_root
+from aerialdojo_gen.store.tables import from_rows
 
 BIG = os.urandom(20 << 20)
 
@@ -64,6 +67,30 @@ def test_what_cannot_be_put_leaves_the_old_one(cloud: str, proxy: Proxy, monkeyp
     assert again.local_copy("t/a/x").read_bytes() == b"old"
     assert read_folder(again, "media/S/n") == {"a": b"old", "b": b"old"}
     assert "".join(proxy.seen).count("DELETE") == 1, "the upload is aborted"
+
+
+@pytest.mark.parametrize("read", [store.count_rows, store.read_scene])
+def test_a_shard_that_cannot_be_fetched_is_not_called_damaged(cloud: str, proxy: Proxy, monkeypatch, tmp_path, read):
+    monkeypatch.setenv("AWS_MAX_ATTEMPTS", "1")
+    row = {
+        "scene": "U_Test_0",
+        "landmark_id": 0,
+        "name": "tower",
+        "mesh_node": "n",
+        "x_m": 1.0,
+        "y_m": 2.0,
+        "z_m": 3.0,
+    }
+    store.write_shard(cloud, "landmarks", "U_Test_0", 0, from_rows(schemas.LANDMARKS, [row]))
+    monkeypatch.setenv("AERIALDOJO_CACHE", str(tmp_path / "another"))
+    forget_clients()
+    store._read_info.cache_clear()
+    if read == store.read_scene:
+        store.count_rows(cloud, "landmarks", "U_Test_0")
+    proxy.fail("^GET .*landmarks.*parquet", "drop", 100)
+    with pytest.raises(StoreError, match="cannot be reached or drops the connection") as raised:
+        read(cloud, "landmarks", "U_Test_0")
+    assert "delete" not in str(raised.value)
 
 
 KILLED = """

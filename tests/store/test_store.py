@@ -13,7 +13,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from aerialdojo_gen.errors import StoreError
+from aerialdojo_gen.errors import DamagedFile, StoreError
 from aerialdojo_gen.store import schemas
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.atomic import atomic_file, atomic_folder
@@ -137,6 +137,60 @@ def test_a_missing_part_says_what_to_run(tmp_path):
     write(tmp_path, [pair(0)], parts=2)
     with pytest.raises(StoreError, match=r"missing or incomplete.*run aerialdojo-gen pair-objects --scene U_Test_0"):
         store.read_scene(tmp_path, "pairs", "U_Test_0")
+
+
+def by_pandas(path):
+    pd.read_parquet(path).to_parquet(path)
+
+
+def zeros_in_the_footer(path):
+    path.write_bytes(path.read_bytes().replace(store.META, bytes(len(store.META))))
+
+
+READERS = {
+    "count_rows": store.count_rows, "content": store.content, "read_scene": store.read_scene,
+    "read_stored": lambda *where: store.read_stored(*where, ["pair_id"]),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("damage", [by_pandas, zeros_in_the_footer])
+@pytest.mark.parametrize("read", READERS.values(), ids=READERS)
+def test_a_part_without_our_footer_is_named(tmp_path, read, damage):
+    where = tmp_path, "pairs", "U_Test_0"
+    for part in range(3):
+        store.write_shard(*where, part, from_rows(schemas.PAIRS, [pair(10 * part + i) for i in range(4)]), parts=3)
+    assert store.count_rows(*where) == 12
+    path = store.shard_path(*where, 1)
+    damage(path)
+    with pytest.raises(DamagedFile, match=rf"{path} is damaged \(.*\): delete it and run"):
+        read(*where)
+
+
+@pytest.mark.parametrize("read", READERS.values(), ids=READERS)
+def test_a_part_of_another_division_does_not_stand_for_one_that_is_missing(tmp_path, read):
+    where = tmp_path, "pairs", "U_Test_0"
+    for part, parts in ((0, 2), (2, 3)):
+        store.write_shard(*where, part, from_rows(schemas.PAIRS, [pair(part)]), parts=parts)
+    with pytest.raises(StoreError, match="pairs of U_Test_0 is missing or incomplete"):
+        read(*where)
+
+
+def test_a_file_that_the_system_does_not_open_is_not_called_damaged(tmp_path):
+    path = write(tmp_path, [pair(0)])
+    code = f"""
+        import resource
+        from pathlib import Path
+        from aerialdojo_gen.errors import StoreError
+        from aerialdojo_gen.store.parquet_files import read_file, read_footer
+        resource.setrlimit(resource.RLIMIT_NOFILE, (3, 3))
+        for read in read_file, read_footer:
+            try:
+                read(Path({str(path)!r}))
+            except StoreError as error:
+                print(error)
+    """
+    out = subprocess.run([sys.executable, "-c", textwrap.dedent(code)], capture_output=True, text=True, check=True)
+    assert out.stdout == f"cannot read {path}: Too many open files\n" * 2
 
 
 @pytest.mark.parametrize("scene", ["../outside", "/etc", "a/b", "", ".hidden", "x" * 65, "a\n"])

@@ -50,10 +50,16 @@ def test_a_flipped_bit_within_a_part(planted):
     assert check(planted) == {"part_damaged": [relative(planted, "routes/train")]}
 
 
+@pytest.mark.parametrize("key", ["tasks/train", "release/anchors"])
+def test_a_part_that_something_else_wrote(planted, key):
+    path = planted.path(key)
+    pq.write_table(pq.read_table(path, partitioning=None).replace_schema_metadata(None), path)
+    assert check(planted) == {"part_damaged": [relative(planted, key)]}
+
+
 def test_a_column_that_is_missing_or_in_another_unit(planted):
-    path = planted.path("release/landmarks")
-    table = pq.read_table(path, partitioning=None)
-    pq.write_table(table.drop_columns(["mesh_node"]).replace_schema_metadata(None), path)
+    table = pq.read_table(planted.path("release/landmarks"), partitioning=None)
+    planted.write_table("release/landmarks", table.drop_columns(["mesh_node"]))
     field = pq.read_schema(planted.path("release/anchors")).field("x_m").with_metadata({"unit": "cm"})
     anchors = pq.read_table(planted.path("release/anchors"), partitioning=None)
     at = anchors.schema.get_field_index("x_m")
@@ -64,10 +70,8 @@ def test_a_column_that_is_missing_or_in_another_unit(planted):
 
 
 def test_a_column_that_tells_the_goal(planted):
-    path = planted.path("tasks/train")
-    table = pq.read_table(path, partitioning=None)
-    told = table.append_column("goal_x_m", pa.array([1.5] * table.num_rows)).replace_schema_metadata(None)
-    pq.write_table(told, path)
+    table = pq.read_table(planted.path("tasks/train"), partitioning=None)
+    planted.write_table("tasks/train", table.append_column("goal_x_m", pa.array([1.5] * table.num_rows)))
     assert check(planted) == {"leaking_column": [relative(planted, "tasks/train")]}
 
 
