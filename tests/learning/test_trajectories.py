@@ -79,6 +79,8 @@ def test_labels_fly_every_trajectory_to_its_goal(smoke, blind):
             assert (batch["action_collides"][i, 0, action], batch["action_refused"][i, 0, action]) == (False, False)
             assert batch["pose"][i, 0] == pytest.approx((*episode.position, episode.yaw_rad), abs=1e-9)
             assert batch["remaining_actions"][i, 0] == episode.remaining_actions
+            # What was done last, not what is to be done now: that is the label.
+            assert batch["previous_action"][i, 0] == (batch["action"][i - 1, 0] if i else NO_ACTION)
             straight = np.linalg.norm(index.goal[k] - episode.position)
             assert straight - 1e-4 <= batch["goal_distance_m"][i, 0] <= 3 * straight + 40
             episode.step(int(action))
