@@ -1,0 +1,140 @@
+"""Every key of a pipeline file, changed in the file, changes the fingerprints of the stages that read it."""
+
+import json
+import typing
+from pathlib import Path
+
+import pytest
+from pydantic import BaseModel
+
+from aerialdojo_gen.commands.common import open_pipeline
+from aerialdojo_gen.config.pipeline import Pipeline, load_pipeline
+from aerialdojo_gen.config.sections import PROFILES, ClipConfig, VlmConfig
+from aerialdojo_gen.errors import ConfigError
+from aerialdojo_gen.pipeline.fingerprint import scene_fingerprint
+from aerialdojo_gen.pipeline.registry import BY_NAME
+from aerialdojo_gen.store import shards as store
+from aerialdojo_gen.store.tables import from_rows
+
+SCENE = "U_Courtyard_0"
+ALL = set(BY_NAME)
+# Keys that say what is run, or where files are: the files count by their bytes.
+UNCOUNTED = {"name", "scenes", "stages", "scene_assets", "recipes", "annotations"}
+# Keys that must keep the same value.
+CAMERA = [("anchor-sample", "fov_deg"), ("reference-images", "fov_deg"), ("render", "fov_deg")]
+BOUNDS = [
+    [("filter", "base", "max_length_m"), ("filter", "standard", "min_length_m")],
+    [("filter", "standard", "max_length_m"), ("filter", "long_horizon", "min_length_m")],
+]
+JOINED = {key: keys for keys in (CAMERA, *BOUNDS) for key in keys}
+# `plan` searches what is released, and then depends on what decides on that.
+RELEASED = {("plan", "search"): "released", ("split", "paper_counts"): True}
+
+
+def values_of(model, path=()):
+    """Each key's path, value and the words that it may have, of a model and the models in it."""
+    for name, field in type(model).model_fields.items():
+        value, key = getattr(model, name), (*path, field.alias or name)
+        if isinstance(value, BaseModel):
+            yield from values_of(value, key)
+        elif isinstance(value, tuple) and value and isinstance(value[0], BaseModel):
+            for k, inner in enumerate(value):
+                yield from values_of(inner, (*key, k))
+        else:
+            literal = typing.get_origin(field.annotation) is typing.Literal
+            yield key, value, typing.get_args(field.annotation) if literal else ()
+
+
+def others(value, words):
+    """Values of the same kind, some of which the key's bounds let through."""
+    if words:
+        return [word for word in words if word != value]
+    if isinstance(value, bool):
+        return [not value]
+    if isinstance(value, int):
+        return [value + 1, value - 1, value + 2]
+    if isinstance(value, float):
+        return [value * 1.01 + 0.001, value * 0.99 - 0.001]
+    if isinstance(value, tuple):
+        return [value[:-1], (*value, "U_*")]
+    if isinstance(value, dict):
+        return [{**value, "down": [0.0, 0.0, -0.1]}]
+    return ["another-text-of-some-length", ["plan"]]
+
+
+def toml(value):
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{json.dumps(k)} = {toml(v)}" for k, v in value.items() if v is not None) + "}"
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(map(toml, value)) + "]"
+    return json.dumps(str(value) if isinstance(value, Path) else value)
+
+
+def put(raw, key, value):
+    *folders, last = key
+    for folder in folders:
+        raw = raw[folder]
+    raw[last] = value
+
+
+def written(folder, changes):
+    """The pipeline of a file with every key in it, some of them changed."""
+    whole = Pipeline()
+    scorers = {
+        "clip": ClipConfig(vision="v.onnx", text="t.onnx", tokenizer="t.json", sha256="0" * 64),
+        "vlm": VlmConfig(model="m", base_url="http://127.0.0.1:9/v1"),
+    }
+    whole = whole.model_copy(update={"anchor_sample": whole.anchor_sample.model_copy(update=scorers)})
+    raw = whole.model_dump(by_alias=True)
+    raw["plan"]["ladder"] = list(raw["plan"]["ladder"])
+    for key, value in changes.items():
+        put(raw, key, value)
+    if ("render", "profile") in changes:
+        raw["render"] = {k: v for k, v in raw["render"].items() if k not in PROFILES["training"]}
+    file = folder / "pipeline.toml"
+    file.write_text("".join(f"{json.dumps(k)} = {toml(v)}\n" for k, v in raw.items() if v is not None))
+    return load_pipeline(file)
+
+
+def changed_by(folder, base, key, value, words):
+    """The pipeline with another value of a key, and of those that must go with it; None where none is allowed."""
+    for other in others(value, words):
+        try:
+            pipeline = written(folder, base | dict.fromkeys(JOINED.get(key, [key]), other))
+        except ConfigError:
+            continue
+        return pipeline
+    return None
+
+
+@pytest.mark.parametrize("base", [{}, RELEASED], ids=["all", "released"])
+def test_a_key_counts_for_the_stages_that_read_it(project, tmp_path, base):
+    _, roots = open_pipeline(project / "pipelines" / "smoke.toml", tmp_path / "data")
+
+    for table in {table for stage in BY_NAME.values() for table in stage.reads}:
+        store.write_shard(roots.data, table, SCENE, 0, from_rows(store.LAYOUT[table].spec, []))
+
+    def prints(pipeline):
+        return {name: scene_fingerprint(stage, pipeline, roots, SCENE) for name, stage in BY_NAME.items()}
+
+    pipeline = written(tmp_path, base)
+    before, judged, fixed = prints(pipeline), set(), set()
+    assert prints(written(tmp_path, base)) == before
+    for key, value, words in values_of(pipeline):
+        other = changed_by(tmp_path, base, key, value, words)
+        if other is None:
+            fixed.add(key)
+            continue
+        sections = {name for name, *_ in JOINED.get(key, [key])}
+        expected = ALL if sections & {"seed", "embodiment"} else sections - UNCOUNTED
+        if isinstance(value, Path):
+            expected = set()
+        if base and (sections == {"filter"} or key == ("split", "prefer_harder")):
+            expected = expected | {"plan"}
+        after = prints(other)
+        assert {name for name in ALL if before[name] != after[name]} == expected, key
+        judged.add(key)
+    # What contradicts another section whatever it says is changed with the other base.
+    assert fixed == ({("split", "paper_counts")} if base else {("plan", "search")})
+    assert len(judged) > 100
+    assert {key[0] for key in judged} >= ALL - {"build-scenes"} | {"seed", "embodiment"}
