@@ -18,37 +18,45 @@ help:  ## list the targets
 env: .venv/.installed  ## make the environment in .venv/
 dev: .venv/.dev  ## the same with what tests and linters need
 
-# uv installs in seconds what takes pip two minutes. Where it cannot (a mirror that only pip is told of), pip does.
-PIP := .venv/bin/python -m pip install --quiet --disable-pip-version-check -c constraints.txt
-UV := $(PIP) uv 2>/dev/null && .venv/bin/uv pip install --quiet --python .venv/bin/python -c constraints.txt
+# uv installs in seconds what takes pip minutes; both refuse a file whose hash is not in constraints.txt. Where uv cannot
+# (a mirror that only pip is told of), pip installs all of constraints.txt: it takes hashes for no less.
+PIP := .venv/bin/python -m pip install --disable-pip-version-check
+# $(call install,EXTRA,EXTRA)
+install = { $(PIP) --quiet --require-hashes -r <(sed -n '/^uv==/,/[^\\]$$/p' constraints.txt) \
+    && .venv/bin/uv pip install --python .venv/bin/python -c constraints.txt -b constraints.txt -e '.[$(1),$(2)]'; } \
+  || { echo "uv could not install them: trying pip" >&2; $(PIP) --require-hashes -r constraints.txt \
+    && $(PIP) --no-deps --no-build-isolation -e .; }
 
+# .venv.unfinished lies there until the first installation is through: what was killed before is made anew.
 .venv/.installed: pyproject.toml constraints.txt
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { \
 	  echo "error: $(PYTHON) is older than Python 3.11: install 3.11, 3.12 or 3.13, or make PYTHON=/path/to/python3" >&2; exit 1; }
-	@test -x .venv/bin/python || $(PYTHON) -m venv .venv
-	@echo "installing the packages of constraints.txt into .venv/ (seconds by uv, minutes by pip)"
-	@{ $(UV) -e '.[gl,web]' 2>/dev/null; } || $(PIP) -e '.[gl,web]' || { \
+	@if [ ! -x .venv/bin/python ] || [ -e .venv.unfinished ]; then \
+	  echo "making the environment .venv/ with $(PYTHON)"; touch .venv.unfinished && $(PYTHON) -m venv --clear .venv; fi
+	@echo "installing the packages of constraints.txt into .venv/"
+	@$(call install,gl,web) || { \
 	  echo "error: a package could not be installed, see above. For every one there are wheels for Python 3.11, 3.12 and 3.13:" \
-	       "with one of them, rm -rf .venv and make PYTHON=/path/to/python3" >&2; exit 1; }
-	@echo "compiling the kernels (half a minute, once)"
-	@find aerialdojo_gen -name '*.nb[ic]' -delete  # Numba's of an earlier checkout may name modules that have moved
+	       "with one of them, make PYTHON=/path/to/python3" >&2; exit 1; }
+	@rm -f .venv.unfinished
+	@echo "compiling the kernels, once (half a minute; two on a busy machine)"
 	@dir=$$(mktemp -d) && trap 'rm -rf "$$dir"' EXIT && \
-	  $(RUN) plan --pipeline pipelines/smoke.toml --scene U_Courtyard_0 --data "$$dir" --workers 1 --quiet
+	  $(RUN) plan --pipeline pipelines/smoke.toml --scene U_Courtyard_0 --data "$$dir" --workers 1
 	@touch $@
 
 .venv/.dev: .venv/.installed
-	@{ $(UV) -e '.[dev]' 2>/dev/null; } || $(PIP) -e '.[dev]'
+	@echo "installing what tests, linters and the documentation need into .venv/"
+	@$(call install,dev,docs)
 	@touch $@
 
 torch: .venv/.train  ## the same with what policies are trained with: PyTorch for the CPU
 
-# A CPU wheel of a folder that pip or uv is told of; else of PyTorch's own index; PyPI's brings several GB of CUDA.
-TORCH_WHEEL = $(lastword $(sort $(wildcard $(addsuffix /torch-*cpu*-cp311-*.whl,$(UV_FIND_LINKS) $(PIP_FIND_LINKS)))))
-TRAIN := safetensors tensorboard
+# A CPU wheel of a folder that pip or uv is told of; else of PyTorch's own index, whose wheels constraints.txt does not
+# name; PyPI's brings several GB of CUDA.
+TORCH_TAG = $(shell .venv/bin/python -c 'import sys; print("cp%d%d" % sys.version_info[:2])')
+TORCH_WHEEL = $(lastword $(sort $(wildcard $(addsuffix /torch-*cpu*-$(TORCH_TAG)-*.whl,$(UV_FIND_LINKS) $(PIP_FIND_LINKS)))))
 .venv/.train: .venv/.dev
 	@echo "installing PyTorch for the CPU into .venv/"
-	@$(PIP) $(TRAIN)
-	@{ test -n "$(TORCH_WHEEL)" && $(PIP) "$(TORCH_WHEEL)"; } \
+	@{ test -n "$(TORCH_WHEEL)" && $(PIP) --no-deps "$(TORCH_WHEEL)"; } \
 	  || $(PIP) --index-url https://download.pytorch.org/whl/cpu torch 2>/dev/null || $(PIP) torch
 	@touch $@
 
@@ -92,19 +100,15 @@ format: .venv/.dev  ## let ruff format the code
 gallery: .venv/.installed  ## picture every prop and every scene into docs/gallery/
 	@$(RUN) gallery --out docs/gallery
 
-.venv/.docs: .venv/.installed
-	@{ $(UV) -e '.[docs]' 2>/dev/null; } || $(PIP) -e '.[docs]'
-	@touch $@
-
-docs: .venv/.docs  ## build the documentation's site into build/site/; a broken link or a page left out ends it
+docs: .venv/.dev  ## build the documentation's site into build/site/; a broken link or a page left out ends it
 	@NO_MKDOCS_2_WARNING=1 .venv/bin/mkdocs build --strict --quiet
 
 bench: .venv/.dev  ## measure planner, renderer and OMPL's planners beside ours
 	@for bench in tests/bench/bench_*.py; do echo "== $$bench"; .venv/bin/python $$bench || exit 1; done
 
-lock: .venv/.dev  ## write constraints.txt anew from the ranges in pyproject.toml
-	@.venv/bin/uv pip compile pyproject.toml --all-extras --python-version 3.11 --upgrade --no-header \
-	  --no-annotate --no-emit-index-url --no-emit-find-links --quiet -o constraints.txt
+lock: .venv/.dev  ## write constraints.txt anew from the ranges in pyproject.toml, with the hashes of all wheels
+	@.venv/bin/uv pip compile pyproject.toml --extra dev --extra docs --universal --python-version 3.11 --generate-hashes \
+	  --upgrade --no-header --no-annotate --no-emit-index-url --no-emit-find-links --quiet -o constraints.txt
 
 clean:  ## remove caches (not data, not .venv)
 	@rm -rf .mypy_cache .ruff_cache .pytest_cache .hypothesis
