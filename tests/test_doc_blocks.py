@@ -32,7 +32,7 @@ NOT_RUN = {
     r"make (dataset|evaluate|gallery|bench|fuzz|torture|test|test-fast|lint|lock|docs|torch)\b.*": "takes minutes "
     "to hours",
     r"make smoke": "is what made the data that all this runs on",
-    r"(\S*/)?pip install .*": "installs packages",
+    r"(\S*/)?(uv )?pip install .*": "installs packages",
     r"train .*|evaluate --agent policy .*|report small .*|tensorboard .*": "needs the "
     "extra train: tests/learning/test_training.py does",
     r"(annotate|view) .*": "serves until Ctrl-C: tests/annotate/test_annotate_tool_browser.py, "
