@@ -6,6 +6,7 @@ Nothing heavy is imported before a command runs, so that ``--help`` answers at o
 from __future__ import annotations
 
 import sys
+import traceback
 from typing import Annotated, Any
 
 import typer
@@ -108,7 +109,11 @@ def main() -> None:
     """Run the command line; an expected error becomes one line and an exit code."""
     trouble.use_utf8()
     with terminal.standard_streams():
-        code, line = _ended()
+        try:
+            code, line = _ended()
+        except Exception:  # a defect: what its traceback quotes is cleaned too
+            traceback.print_exc()
+            code, line = 1, ""
         if line:
             print(f"error: {line}", file=sys.stderr)
     raise SystemExit(code)

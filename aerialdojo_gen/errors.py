@@ -56,6 +56,10 @@ class DamagedFile(StoreError):  # noqa: N818 - it says what the file is
     """A table's file can be read, and its bytes are not those that were written: to delete it is the mend."""
 
 
+class SceneNameError(UsageError, StoreError):
+    """A scene's name is not a plain one."""
+
+
 class PoolError(AerialDojoError):
     """Scenes have fewer kept candidates than are to be released."""
 

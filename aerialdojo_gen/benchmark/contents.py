@@ -106,10 +106,16 @@ def left_out(wanted: Wanted, names: Sequence[str] = DEFAULT) -> str:
     return wanted.partings.left_out if asked else ""
 
 
-def named_tables(wanted: Wanted, names: Sequence[str]) -> dict[str, list[Table]]:
-    """Make tables as `report_tables` does, by the names that they go by."""
+def check_names(names: Sequence[str]) -> Sequence[str]:
+    """Return names of tables; UsageError where there is no such table."""
     for name in names:
         if name not in (*NAMES, "all"):
             raise UsageError(unknown("no table", name, NAMES, besides=("all",)))
+    return names
+
+
+def named_tables(wanted: Wanted, names: Sequence[str]) -> dict[str, list[Table]]:
+    """Make tables as `report_tables` does, by the names that they go by."""
+    check_names(names)
     chosen = NAMES if "all" in names else [name for name in NAMES if name in names]
     return {name: _TABLES[name](wanted) for name in chosen}

@@ -9,7 +9,7 @@ import json
 import math
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
@@ -18,7 +18,6 @@ from aerialdojo_gen.common import advice
 from aerialdojo_gen.pipeline.run import (
     DEFAULT_PIPELINE,
     default_workers,
-    home,
     open_pipeline,
     pipeline_file,
     run_stages,
@@ -30,7 +29,7 @@ if TYPE_CHECKING:
     from aerialdojo_gen.pipeline.stage import Roots, Stage
     from aerialdojo_gen.store.root import Where
 
-__all__ = ["default_workers", "home", "open_pipeline", "pipeline_file", "run_chosen", "run_until"]
+__all__ = ["default_workers", "open_pipeline", "pipeline_file", "run_chosen", "run_until"]
 
 
 def print_json(value: object) -> None:
@@ -121,6 +120,10 @@ OneScene = Annotated[
 SceneOption = Annotated[
     str | None,
     typer.Option("--scene", metavar="NAME|GLOB", autocompletion=completion.scenes, help="The same as an option."),
+]
+RendererName = Annotated[
+    Literal["auto", "gl", "pybullet"],
+    typer.Option("--renderer", help="Renderer; auto takes the fastest that works on this machine."),
 ]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress and no summary.")]
 Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="A line also for a stage with nothing to do.")]

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from aerialdojo_gen.pipeline.run import home
+from aerialdojo_gen.common.shipped import home
 
 if TYPE_CHECKING:
     from aerialdojo_gen.store.root import DataRoot

@@ -46,4 +46,4 @@ def init(
     from aerialdojo_gen.pipeline.template import init_config
 
     print(init_config(path, pipeline and pipeline_file(pipeline), force=force))
-    print(f"next: {advice.command('run', path)}")
+    print(f"next: {advice.command('run', path, data=f'data-{path.stem}')}")

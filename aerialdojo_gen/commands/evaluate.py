@@ -17,6 +17,7 @@ from aerialdojo_gen.commands.common import (
     ExecutorName,
     PipelineFile,
     Quiet,
+    RendererName,
     Scene,
     Scenes,
     Workers,
@@ -92,7 +93,7 @@ def evaluate(
     height: Annotated[
         int | None, typer.Option("--height", min=1, max=4096, help="Rows; in place of the agent's own.")
     ] = None,
-    renderer: Annotated[str, typer.Option("--renderer", help="auto, gl or pybullet.")] = "auto",
+    renderer: RendererName = "auto",
     tell: Annotated[
         list[str] | None,
         typer.Option("--tell", help="Tell agents more than the goal: heading, which way they face at the start."),

@@ -98,12 +98,14 @@ def report(
 
     if as_json:
         style = "json"
+    groups = _groups(group or [])
+    names = contents.check_names(list(table or contents.DEFAULT) + (["scene"] if by_scene else []))
     rules = [profile_named(name) for name in dict.fromkeys(profile or DEFAULT_PROFILES)]
     root, written = open_root(data), open_root(log or data)
     if log is None and not runs_there(root):
         release_scenes(root)  # a folder without either is the wrong one
     named = load_runs(written, runs or ())
-    loaded = arranged(with_floors(written, named) if floors else named, _groups(group or []))
+    loaded = arranged(with_floors(written, named) if floors else named, groups)
     wanted = contents.Wanted(
         root, loaded, rules, tuple(radius or DEFAULT_RADII_M), intervals, results() if beside else ()
     )
@@ -114,7 +116,6 @@ def report(
     elif paired and table is None:
         _show(paired_tables(named, rules), style)
     else:
-        names = list(table or contents.DEFAULT) + (["scene"] if by_scene else [])
         chosen = contents.report_tables(wanted, names)
         _show([*chosen, *(paired_tables(named, rules) if paired else [])], style)
         if lacking := contents.left_out(wanted, names):

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from aerialdojo_gen.commands.common import Data, Quiet, Workers
+from aerialdojo_gen.commands.common import Data, Quiet, RendererName, Workers
 
 app = typer.Typer()
 
@@ -31,7 +31,7 @@ def train(
         typer.Option("--cache", metavar="DIR", help="What was drawn.  (default: policies/cache in --data)"),
     ] = None,
     device: Annotated[str, typer.Option("--device", help="auto, cpu or cuda.")] = "auto",
-    renderer: Annotated[str, typer.Option("--renderer", help="auto, gl or pybullet.")] = "auto",
+    renderer: RendererName = "auto",
     restart: Annotated[bool, typer.Option("--restart", help="Forget an earlier training of this name.")] = False,
     workers: Workers = None,
     quiet: Quiet = False,

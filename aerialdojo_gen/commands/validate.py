@@ -16,12 +16,12 @@ from aerialdojo_gen.commands.common import (
     Scene,
     Scenes,
     Workers,
-    home,
     kept,
     pipeline_file,
     print_json,
     together,
 )
+from aerialdojo_gen.common.shipped import home
 
 app = typer.Typer()
 _MANY_DIGITS = 10

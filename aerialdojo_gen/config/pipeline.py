@@ -9,6 +9,7 @@ from pydantic import Field, ValidationError, model_validator
 
 from aerialdojo_gen.common.bounded import read_toml
 from aerialdojo_gen.common.explain import explain
+from aerialdojo_gen.common.shipped import read_path
 from aerialdojo_gen.config.agreement import disagreements
 from aerialdojo_gen.config.sections import (
     AnchorSampleConfig,
@@ -77,7 +78,8 @@ def load_pipeline(file: str | Path) -> Pipeline:
     Parameters
     ----------
     file : str or Path
-        A TOML file; relative folders in it are relative to its own folder.
+        A TOML file; relative folders in it are relative to its own folder, those after
+        ``shipped:`` to what comes with the program.
 
     Returns
     -------
@@ -99,11 +101,11 @@ def load_pipeline(file: str | Path) -> Pipeline:
         raise ConfigError(f"no pipeline file {path}{hint}") from None
     for key in ("scene_assets", "recipes", "annotations"):
         if isinstance(raw.get(key), str):
-            raw[key] = (path.parent / raw[key]).resolve()
+            raw[key] = read_path(raw[key], path.parent)
     clip = raw.get("anchor-sample", {}).get("clip", {}) if isinstance(raw.get("anchor-sample"), dict) else {}
     for key, value in clip.items() if isinstance(clip, dict) else ():
         if key != "sha256" and isinstance(value, str):
-            clip[key] = (path.parent / value).resolve()
+            clip[key] = read_path(value, path.parent)
     try:
         return Pipeline.model_validate(raw)
     except ValidationError as error:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from aerialdojo_gen.errors import AssetError
+from aerialdojo_gen.errors import AssetError, UsageError
 from aerialdojo_gen.imports.adopt import LARGEST_M, SMALLEST_M, Place, Repairs, settled
 from aerialdojo_gen.imports.cutting import Region
 from aerialdojo_gen.imports.naming import Naming
@@ -75,7 +75,7 @@ def tiles_of(
         The edge is too small or too large, or there are too many squares.
     """
     if not (math.isfinite(edge_m) and SMALLEST_M <= edge_m <= LARGEST_M):
-        raise AssetError(f"--tiles {edge_m:g}: the edge of a tile is {SMALLEST_M:g} to {LARGEST_M:g} m")
+        raise UsageError(f"--tiles {edge_m:g}: the edge of a tile is {SMALLEST_M:g} to {LARGEST_M:g} m")
     low, high = place.low, place.high
     columns, rows = (max(1, math.ceil(v / edge_m - 1e-9)) for v in (high - low)[:2])
     if columns * rows > _MOST_TILES:

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 from aerialdojo_gen.common import advice
 from aerialdojo_gen.common.advice import PROGRAM
+from aerialdojo_gen.common.shipped import home
 from aerialdojo_gen.errors import AssetError, ConfigError, UsageError
 
 if TYPE_CHECKING:
@@ -99,15 +100,6 @@ def run_pipeline(
             chosen, config, roots, scenes, workers=workers, executor=executor, address=address, force=force,
             reporter=reporter, limits=limits, replace=replace,
         )  # fmt: skip
-
-
-def home() -> Path:
-    """Return the folder that holds scene_assets/, annotations/ and pipelines/.
-
-    A checkout's own folder where the package lies in one, else what the wheel carries.
-    """
-    package = Path(__file__).resolve().parents[1]
-    return package.parent if (package.parent / "scene_assets").is_dir() else package / "_shipped"
 
 
 def pipeline_file(given: str | Path | None = None) -> Path:

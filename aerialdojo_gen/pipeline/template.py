@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import re
 import textwrap
 from itertools import groupby
@@ -13,6 +12,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from aerialdojo_gen.common.explain import explain
+from aerialdojo_gen.common.shipped import written_path
 from aerialdojo_gen.common.text_table import wrapped
 from aerialdojo_gen.config.keys import Key, config_keys, plain, section_meanings
 from aerialdojo_gen.config.pipeline import Pipeline, load_pipeline
@@ -119,7 +119,7 @@ def _written(key: Key, folder: Path | None) -> list[str]:
         return [f"#{key.name} ="]
     value = plain(key.value)
     if folder is not None and key.kind == "path":
-        value = Path(os.path.relpath(value, folder)).as_posix()
+        value = written_path(value, folder)
     lines = f"{key.name} = {_toml(value)}".split("\n")
     return lines if key.changed or key.name == "name" else [f"#{line}" for line in lines]
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
-from aerialdojo_gen.errors import StoreError, UsageError, brief
+from aerialdojo_gen.errors import SceneNameError, UsageError, brief
 from aerialdojo_gen.store import schemas
 
 _PLAIN = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}")
@@ -62,9 +62,10 @@ def partition(scene: str) -> str:
 
 
 def check_scene_name(scene: str) -> str:
-    """Return the name if it is a plain one; it becomes part of paths, so StoreError for anything else."""
+    """Return the name if it is a plain one; it becomes part of paths, so SceneNameError for anything else."""
     if not _PLAIN.fullmatch(scene):
-        raise StoreError(f"{brief(repr(scene), 60)} is not a scene name: use letters, digits, _ and - (64 at most)")
+        shown = brief(repr(scene), 60)
+        raise SceneNameError(f"{shown} is not a scene name: use letters, digits, _ and - (64 at most)")
     return scene
 
 

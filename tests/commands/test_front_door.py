@@ -12,9 +12,9 @@ from support.command_line import said
 
 from aerialdojo_gen import cli
 from aerialdojo_gen.commands.picking import given_scene, pick_scene
+from aerialdojo_gen.common.shipped import home
 from aerialdojo_gen.errors import UsageError
 from aerialdojo_gen.pipeline.registry import STAGES, upstream
-from aerialdojo_gen.pipeline.run import home
 from aerialdojo_gen.store import shards
 
 STAGE_NAMES = [stage.name for stage in STAGES]

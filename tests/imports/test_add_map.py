@@ -8,12 +8,12 @@ import shapely
 from shapely.geometry import Point, Polygon
 from support import maps
 
+from aerialdojo_gen.common.shipped import home
 from aerialdojo_gen.errors import AssetError, MissingPackage, UsageError
 from aerialdojo_gen.imports.earth import in_words, size_m, tiles
 from aerialdojo_gen.imports.osm import read_maps
 from aerialdojo_gen.imports.places import add_map
 from aerialdojo_gen.layouts.build import build_scene
-from aerialdojo_gen.pipeline.run import home
 from aerialdojo_gen.planning.clearance import ClearanceGrid
 from aerialdojo_gen.scenes.catalogue import load_catalogue
 from aerialdojo_gen.scenes.recipe import load_recipe

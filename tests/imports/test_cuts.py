@@ -156,7 +156,7 @@ def test_tiles_lie_side_by_side_in_one_frame(tmp_path):
             np.testing.assert_allclose(part[:, 2], heights, atol=1e-3)
     with pytest.raises(UsageError, match="--force"):
         add_tiles("Valley_1", mesh, tmp_path / "mine", 25.0, up="z")
-    with pytest.raises(AssetError, match=r"--tiles 1: the edge"):
+    with pytest.raises(UsageError, match=r"--tiles 1: the edge"):
         add_tiles("Other", mesh, tmp_path / "mine", 1.0, up="z")
     assert not list((tmp_path / "mine/scenes").glob("Other*"))
 

@@ -69,6 +69,10 @@ def test_what_is_written_is_read_as_it_was(name, project, tmp_path):
     path = init_config(tmp_path / "mine.toml", shipped)
     before = Pipeline() if shipped is None else load_pipeline(shipped)
     assert load_pipeline(path) == before.model_copy(update={"name": "mine"})
+    text = path.read_text(encoding="utf-8")
+    assert str(project) not in text
+    assert ".." not in text, "the folder that the program is installed in, which an upgrade may move"
+    assert ('recipes = "shipped:scene_assets/smoke"' in text) == (name == "smoke")
 
 
 def test_every_commented_key_shows_its_default(tmp_path):
@@ -130,7 +134,7 @@ def test_the_command_shows_what_the_function_lists(project, tmp_path, monkeypatc
     wrong = runner.invoke(app, ["config", "show", "plann"])
     assert str(wrong.exception) == "no section 'plann': did you mean 'plan'?"
     made = runner.invoke(app, ["config", "init", str(tmp_path / "mine.toml")])
-    assert made.stdout.splitlines()[1] == f"next: aerialdojo-gen run {tmp_path / 'mine.toml'}"
+    assert made.stdout.splitlines()[1] == f"next: aerialdojo-gen run {tmp_path / 'mine.toml'} --data data-mine"
     assert load_pipeline(tmp_path / "mine.toml") == Pipeline(name="mine")
 
 
