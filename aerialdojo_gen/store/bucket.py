@@ -19,13 +19,15 @@ from io import BytesIO
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from aerialdojo_gen.errors import MissingPackage, StoreError, lacks
+from aerialdojo_gen.errors import ConfigError, MissingPackage, StoreError, lacks
 from aerialdojo_gen.store.cloud_errors import Changed, cloud_error, code_of, is_transient
 
 # A file of more bytes goes up in parts, several at a time; S3 takes 10,000 of them at most.
 _SINGLE, _PART, _MOST_PARTS, _AT_ONCE = 16 << 20, 8 << 20, 9_000, 4
 _BLOCK = 1 << 20
 _TRIES = 6
+# A connection that is silent for so long is given up and made anew: well below the time that a lock holds.
+_SILENT_S = 15.0
 
 
 @dataclass(frozen=True)
@@ -91,8 +93,9 @@ class Bucket:
             # Of a whole object the client compares the checksum that the store has of it.
             part = {} if whole and at == 0 else {"Range": f"bytes={at}-{end - 1}"}
             with self._told(key):
+                # The client itself tries again until an answer begins; what breaks off later is tried again here.
+                answer = self._client.get_object(Bucket=self.name, Key=key, IfMatch=etag, **part)
                 try:
-                    answer = self._client.get_object(Bucket=self.name, Key=key, IfMatch=etag, **part)
                     for block in answer["Body"].iter_chunks(_BLOCK):
                         sink.write(block)
                         at += len(block)
@@ -239,6 +242,18 @@ def _age_s(answer: Mapping[str, Any]) -> float:
     return now - float(answer["LastModified"].timestamp())
 
 
+def timeout_s() -> float:
+    """Seconds without a byte after which a request is tried again: ``$AERIALDOJO_TIMEOUT_S``, or 15."""
+    value = os.environ.get("AERIALDOJO_TIMEOUT_S", str(_SILENT_S))
+    try:
+        seconds = float(value)
+    except ValueError:
+        seconds = 0.0
+    if not 0.1 <= seconds <= 3600.0:
+        raise ConfigError(f"AERIALDOJO_TIMEOUT_S={value!r}: write a number of seconds from 0.1 to 3600")
+    return seconds
+
+
 _making = threading.Lock()
 
 
@@ -260,8 +275,9 @@ def _made_client(_process: int) -> Any:
         retries["total_max_attempts"] = _TRIES
     # Stores other than AWS's have one host name for all buckets.
     own = any(os.environ.get(name) for name in ("AWS_ENDPOINT_URL", "AWS_ENDPOINT_URL_S3"))
+    silent_s = timeout_s()
     config = Config(
-        retries=retries or None, connect_timeout=10, read_timeout=60, max_pool_connections=2 * _AT_ONCE,
+        retries=retries or None, connect_timeout=silent_s, read_timeout=silent_s, max_pool_connections=2 * _AT_ONCE,
         s3={"addressing_style": "path"} if own else None,
     )  # fmt: skip
     try:

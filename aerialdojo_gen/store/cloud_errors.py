@@ -103,7 +103,7 @@ def _explained(code: str, names: set[str], bucket: str, endpoint: str | None) ->
         return f"the store keeps answering {code}: run the command again later; {_KEPT}"
     if names & _UNREACHABLE:
         return (
-            f"{endpoint} cannot be reached or drops the connection: check the network and AWS_ENDPOINT_URL, and run "
-            f"the command again; {_KEPT}"
+            f"{endpoint} cannot be reached, does not answer or drops the connection: check the network and "
+            f"AWS_ENDPOINT_URL, and run the command again; {_KEPT}"
         )
     return ""

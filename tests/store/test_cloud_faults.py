@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import socket
 import subprocess
 import sys
 
@@ -50,6 +51,47 @@ def test_a_download_that_breaks_off_goes_on(cloud: str, proxy: Proxy, tmp_path, 
     assert proxy.left() == 0
 
 
+def test_a_connection_that_falls_silent_is_made_anew(cloud: str, proxy: Proxy, tmp_path, monkeypatch):
+    monkeypatch.setenv("AERIALDOJO_TIMEOUT_S", "0.5")
+    forget_clients()
+    root = open_root(cloud)
+    proxy.fail("^PUT", 30.0)
+    write(root, "t/a/x", BIG[: 1 << 20])
+    assert sum(line.startswith("PUT") for line in proxy.seen) == 2
+    monkeypatch.setenv("AERIALDOJO_CACHE", str(tmp_path / "another"))
+    forget_clients()
+    proxy.fail("^GET .*t/a/x", 30.0)
+    proxy.fail("^GET .*t/a/x", "stall", 2)
+    assert open_root(cloud).local_copy("t/a/x").read_bytes() == BIG[: 1 << 20]
+    assert sum(line.startswith("GET") and "t/a/x" in line for line in proxy.seen) == 4
+
+
+def test_a_store_that_takes_connections_and_never_answers_ends_a_command(cloud: str):
+    """The time limit of `run` guards against a hang; how long the command takes is not looked at."""
+    with socket.create_server(("127.0.0.1", 0)) as silent:
+        url = f"http://127.0.0.1:{silent.getsockname()[1]}"
+        limits = {"AERIALDOJO_TIMEOUT_S": "0.5", "AWS_MAX_ATTEMPTS": "2", "AWS_ENDPOINT_URL": url}
+        command = [sys.executable, "-m", "aerialdojo_gen.cli", "stats", "--data", cloud]
+        done = subprocess.run(
+            command, env=os.environ | limits, capture_output=True, text=True, timeout=100, check=False
+        )
+    assert done.returncode == 1
+    assert done.stderr.startswith("error: s3://")
+    assert f"{url} cannot be reached, does not answer" in done.stderr
+
+
+def test_a_download_is_tried_as_often_as_the_client_tries(cloud: str, proxy: Proxy, tmp_path, monkeypatch):
+    write(open_root(cloud), "t/a/x", b"some bytes")
+    monkeypatch.setenv("AERIALDOJO_TIMEOUT_S", "0.3")
+    monkeypatch.setenv("AWS_MAX_ATTEMPTS", "2")
+    monkeypatch.setenv("AERIALDOJO_CACHE", str(tmp_path / "another"))
+    forget_clients()
+    proxy.fail("^GET .*t/a/x", 30.0, 100)
+    with pytest.raises(StoreError, match="does not answer"):
+        open_root(cloud).local_copy("t/a/x")
+    assert proxy.left() == 98
+
+
 def test_what_cannot_be_put_leaves_the_old_one(cloud: str, proxy: Proxy, monkeypatch):
     monkeypatch.setenv("AWS_MAX_ATTEMPTS", "2")
     forget_clients()
@@ -88,7 +130,7 @@ def test_a_shard_that_cannot_be_fetched_is_not_called_damaged(cloud: str, proxy:
     if read == store.read_scene:
         store.count_rows(cloud, "landmarks", "U_Test_0")
     proxy.fail("^GET .*landmarks.*parquet", "drop", 100)
-    with pytest.raises(StoreError, match="cannot be reached or drops the connection") as raised:
+    with pytest.raises(StoreError, match="cannot be reached, does not answer or drops the connection") as raised:
         read(cloud, "landmarks", "U_Test_0")
     assert "delete" not in str(raised.value)
 
@@ -159,6 +201,7 @@ def test_who_lost_the_lock_writes_nothing_more(cloud: str):
         ({"AWS_ENDPOINT_URL": "http://127.0.0.1:9", "AWS_MAX_ATTEMPTS": "1"}, "http://127.0.0.1:9 cannot be reached"),
         ({"AWS_ENDPOINT_URL": "nonsense"}, "correct the AWS configuration"),
         ({"AWS_PROFILE": "nobody"}, "there is no AWS profile"),
+        ({"AERIALDOJO_TIMEOUT_S": "soon"}, "AERIALDOJO_TIMEOUT_S='soon': write a number of seconds"),
         ({"AERIALDOJO_CACHE_GB": "much"}, "AERIALDOJO_CACHE_GB='much': write a number"),
     ],
 )

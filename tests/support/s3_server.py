@@ -49,7 +49,8 @@ class Proxy:
     """Hands requests on to a server, but for those that match a rule: each rule is used up by its number of times.
 
     Rules are added by `fail`: a number is answered as an HTTP error, ``"drop"`` closes the connection after part of
-    the request was taken, ``"cut"`` closes it in the middle of the answer, a float waits for so many seconds.
+    the request was taken, ``"cut"`` closes it in the middle of the answer, ``"stall"`` sends nothing more from there
+    on, a float waits for so many seconds.
     """
 
     def __init__(self, server: str) -> None:
@@ -117,7 +118,11 @@ class Proxy:
             answer = b""
             while block := server.recv(1 << 16):
                 answer += block
-        client.sendall(answer if how != "cut" else answer[: answer.index(b"\r\n\r\n") + 4 + len(answer) // 3])
+        if how in ("cut", "stall"):
+            answer = answer[: answer.index(b"\r\n\r\n") + 4 + len(answer) // 3]
+        client.sendall(answer)
+        if how == "stall":
+            client.recv(1)  # until the other side gives up
         return False
 
     def _rule(self, line: str) -> int | str | float | None:
