@@ -92,6 +92,26 @@ def test_look_at_sees_its_target_in_the_middle_upright(eye, target):
     assert -pose[2, 1] > -1e-9
 
 
+@pytest.mark.parametrize("away", [0.0, 1e-9, -1e-9])
+@pytest.mark.parametrize(("below", "right"), [(-10.0, (1, 0, 0)), (10.0, (-1, 0, 0))])
+def test_looking_straight_down_or_up_north_is_at_the_top(below, right, away):
+    pose = look_at_pose((3.0, 4.0, 5.0), (3.0 + away, 4.0 - away, 5.0 + below))
+    axes = np.array([right, (0, -1, 0), (0, 0, math.copysign(1, below))]).T
+    assert pose[:3, :3] == pytest.approx(axes, abs=1e-9)
+    assert pose[:3, 3] == pytest.approx((3, 4, 5))
+
+
+@given(st.floats(-math.pi, math.pi), st.sampled_from([-1.0, 1.0]), st.floats(1e-3, 1.0))
+def test_nearly_straight_what_is_ahead_is_at_the_top_of_a_look_down_and_at_the_bottom_of_a_look_up(yaw, up, tilt):
+    c, s = math.cos(yaw), math.sin(yaw)
+    pose = look_at_pose((0.0, 0.0, 0.0), (tilt * c, tilt * s, up))
+    assert pose[:3, 0] == pytest.approx((s, -c, 0.0), abs=1e-9)
+    (_, middle), (_, ahead) = project(
+        Camera(), pose, [(tilt * c, tilt * s, up), (1.5 * tilt * c, 1.5 * tilt * s, up)]
+    )[0]
+    assert (ahead < middle) == (up < 0)
+
+
 def test_a_camera_without_pixels_is_refused():
     with pytest.raises(ValueError, match="no camera"):
         Camera(0, 10)

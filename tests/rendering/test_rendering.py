@@ -4,13 +4,15 @@ import math
 
 import numpy as np
 import pytest
+from support.handmade import box, instance
 from support.rendered import MATERIALS, block, courtyard
 
-from aerialdojo_gen.geometry.cameras import Camera, project, view_pose
+from aerialdojo_gen.geometry.cameras import Camera, look_at_pose, project, view_pose
 from aerialdojo_gen.geometry.rays import RayCaster
 from aerialdojo_gen.rendering.preview import contact_sheet, look_at
+from aerialdojo_gen.rendering.raycast import RayRenderer
 from aerialdojo_gen.rendering.world import RenderWorld, render_world
-from aerialdojo_gen.scenes.model import Scene
+from aerialdojo_gen.scenes.model import Material, Scene
 from aerialdojo_gen.store.schemas import VIEWS
 
 CAMERA = Camera(320, 320, 90.0)
@@ -163,3 +165,17 @@ def test_vertices_in_the_camera_s_own_plane_do_no_harm(scene, view):
             depth = world.render(CAMERA, view_pose(position, 0.0, view)).depth_m
             assert not np.isnan(depth).any()
             assert depth.min() > 0.1
+
+
+@pytest.mark.parametrize(("below", "east_is_right"), [(-6.0, True), (6.0, False)])
+def test_a_look_straight_down_or_up_shows_north_at_the_top(below, east_is_right):
+    north = instance("north", box((-0.5, 2.0, 5.0), (0.5, 3.0, 6.0)))
+    east = instance("east", box((2.0, -0.5, 5.0), (3.0, 0.5, 6.0)))
+    place = Scene("U_Test_0", (north, east), {"grey": Material("grey", (128, 128, 128))}, np.zeros((2, 3)))
+    with RayRenderer(place) as renderer:
+        picture = renderer.render(CAMERA, look_at_pose((0.0, 0.0, 5.5 - below), (0.0, 0.0, 5.5)))
+    (rows, columns), (rows_east, columns_east) = (np.nonzero(picture.instance == k) for k in (0, 1))
+    assert rows.max() < 160
+    assert abs(columns.mean() - 159.5) < 1.0
+    assert columns_east.min() > 160 if east_is_right else columns_east.max() < 160
+    assert abs(rows_east.mean() - 159.5) < 1.0

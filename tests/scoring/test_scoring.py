@@ -72,6 +72,39 @@ def test_unoccluded_is_the_share_that_a_board_leaves():
     assert terms(yard(panel_, board), panel_, eye, math.pi).unoccluded == pytest.approx(0.5, abs=0.03)
 
 
+def test_a_wall_before_an_object_costs_the_anchors_behind_it(tmp_path):
+    config = AnchorSampleConfig(azimuths=8, pictured=1000, shortlist=1000, separation_deg=1.0)
+    wall = instance("wall", box((-3.0, 0.85, 0.0), (3.0, 0.9, 1.2)))
+    open_, walled = ({}, {})
+    for found, more in ((open_, ()), (walled, (wall,))):
+        rows, _ = anchors_of(item_of(POST, "post"), world_of(yard(POST, *more)), job_in(tmp_path), config)
+        for row, azimuth in zip(rows, directions(rows, POST), strict=True):
+            found[round(math.degrees(azimuth)), round(row["z_m"], 2)] = row
+    behind = [key for key in open_.keys() & walled.keys() if walled[key]["part_unoccluded"] < 0.9]
+    south = [key for key in open_.keys() & walled.keys() if key[0] < -10]
+    assert len(behind) >= 4
+    assert len(south) >= 8
+    for key in behind:
+        assert key[0] > 10, "the wall stands in the north"
+        assert walled[key]["score"] < 0.75 * open_[key]["score"]
+        assert walled[key]["part_open"] < 0.9
+    for key in south:
+        assert walled[key]["score"] == pytest.approx(open_[key]["score"], abs=0.01)
+    assert max(walled[key]["score"] for key in behind) < min(walled[key]["score"] for key in south)
+
+
+@pytest.mark.parametrize(
+    ("term", "steps"), [("unoccluded", (0.9, 0.7, 0.5)), ("open", (0.9, 0.7, 0.5)), ("framed", (0.9, 0.7, 0.5))]
+)
+def test_what_hides_an_object_costs_more_than_its_weight(term, steps):
+    parts = Parts(**dict.fromkeys(WEIGHTS, 1.0))
+    assert parts.score == pytest.approx(1.0)
+    scores = [1.0, *(replace(parts, **{term: value}).score for value in steps)]
+    for value, score in zip(steps, scores[1:], strict=True):
+        assert score < 1.0 - WEIGHTS.get(term, 0.0) * (1.0 - value) - 0.02
+    assert scores == sorted(scores, reverse=True)
+
+
 def test_open_is_what_stands_nearer_and_no_floor():
     cabinet = instance("cabinet", box((-0.4, -0.4, 0.0), (0.4, 0.4, 1.8)))
     trolley = instance("trolley", box((1.6, -1.0, 0.0), (2.4, -0.3, 0.8)))
