@@ -14,6 +14,7 @@ from aerialdojo_gen.geometry.viewpoints import shortlist
 from aerialdojo_gen.pipeline.stage import Job, Roots
 from aerialdojo_gen.scenes.glb import write_glb
 from aerialdojo_gen.stages.work import anchor_sample
+from aerialdojo_gen.stages.work.anchor_choice import is_same
 from aerialdojo_gen.stages.work.anchor_sample import World, anchors_of
 from aerialdojo_gen.store import schemas
 from aerialdojo_gen.store import shards as store
@@ -310,6 +311,19 @@ def test_the_anchor_that_a_person_chose_comes_first_and_is_selected(tmp_path):
     again = whole_run(place, [BALL, BUS], tmp_path)
     assert out.counts["not_shortlisted"] == again.counts["not_shortlisted"] + 1
     assert out.rows_in == again.rows_in + 1
+
+
+@pytest.mark.parametrize(
+    ("moved_m", "turned_deg", "same"),
+    [(0.0, 0.0, True), (0.0019, 0.0, True), (0.0021, 0.0, False), (0.0, 0.019, True), (0.0, -0.021, False)],
+)
+@pytest.mark.parametrize("yaw_deg", [0.0, 180.0, -179.995])
+def test_a_choice_is_a_sampled_anchor_up_to_the_digits_of_its_file(yaw_deg, moved_m, turned_deg, same):
+    """Also where the yaw is due west, which files write as 180° or as -180°."""
+    row = choice(np.array([1.0, 2.0, 3.0]), math.radians(yaw_deg))
+    for turns in (-1, 0, 1):
+        chosen = choice(np.array([1.0, 2.0, 3.0 - moved_m]), math.radians(yaw_deg + turned_deg + 360.0 * turns))
+        assert is_same(row, chosen) is same
 
 
 @pytest.mark.parametrize(
