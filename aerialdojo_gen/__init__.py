@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from aerialdojo_gen.errors import AerialDojoError
     from aerialdojo_gen.exchange.hub import pull_release, push_to_hub
     from aerialdojo_gen.pipeline.run import run_pipeline
+    from aerialdojo_gen.pipeline.status import pipeline_status
     from aerialdojo_gen.pipeline.template import init_config
     from aerialdojo_gen.planning.planner import Planner, plan
     from aerialdojo_gen.rendering.gl import GlRenderer
@@ -34,6 +35,7 @@ __all__ = [
     "init_config",
     "make_env",
     "open_release",
+    "pipeline_status",
     "plan",
     "pull_release",
     "push_to_hub",
@@ -51,6 +53,7 @@ _HOMES = {
     "init_config": "aerialdojo_gen.pipeline.template",
     "make_env": "aerialdojo_gen.benchmark.env",
     "open_release": "aerialdojo_gen.browse.release",
+    "pipeline_status": "aerialdojo_gen.pipeline.status",
     "plan": "aerialdojo_gen.planning.planner",
     "pull_release": "aerialdojo_gen.exchange.hub",
     "push_to_hub": "aerialdojo_gen.exchange.hub",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import asdict
 from typing import Annotated
 
 import typer
@@ -12,6 +13,7 @@ from aerialdojo_gen.commands.common import (
     Data,
     ExecutorName,
     Force,
+    Json,
     PipelineArgument,
     PipelineFile,
     Quiet,
@@ -21,10 +23,12 @@ from aerialdojo_gen.commands.common import (
     Verbose,
     Workers,
     open_pipeline,
+    print_json,
     run_chosen,
     run_until,
     together,
 )
+from aerialdojo_gen.common.text_table import terminal_width
 from aerialdojo_gen.pipeline.registry import BY_NAME, STAGES
 
 app = typer.Typer()
@@ -80,6 +84,21 @@ def split(
         "split", data=data, scene=together(scenes, scene), pipeline=pipeline, workers=workers, force=force,
         quiet=quiet, verbose=verbose, replace=replace, executor=executor, address=address,
     )  # fmt: skip
+
+
+@app.command("status")
+def status(
+    scenes: Scenes = None, data: Data = "data", scene: Scene = None, pipeline: PipelineFile = None,
+    as_json: Json = False,
+) -> None:  # fmt: skip
+    """Say which scenes of each stage are fresh, stale or missing; run and write nothing."""
+    from aerialdojo_gen.pipeline.status import pipeline_status, status_table
+
+    found = pipeline_status(pipeline, data, scenes=together(scenes, scene))
+    if as_json:
+        print_json([asdict(one) for one in found])
+    else:
+        print("\n".join(status_table(found).lines(terminal_width())))
 
 
 @app.command("run")

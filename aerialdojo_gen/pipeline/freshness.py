@@ -125,6 +125,18 @@ def shards_of(
     return found
 
 
+def is_fresh(stage: Stage, config: Section, scene: str, pipeline: Pipeline, roots: Roots) -> bool:
+    """Whether all shards of a scene are fresh under a stage's section; nothing is written."""
+    pipeline = pipeline.model_copy(update={stage.name.replace("-", "_"): config})
+    try:
+        fingerprint = scene_fingerprint(stage, pipeline, roots, scene)
+        parts = stage.parts(roots.data, scene, config)
+    except AerialDojoError:
+        return False
+    quiet = Reporter(quiet=True)
+    return all(_fresh(stage, roots.data, scene, k, parts, fingerprint, quiet) is not None for k in range(parts))
+
+
 def look_ahead(stage: Stage, scenes: Sequence[str], roots: Roots) -> None:
     """Begin to read the files whose digests tell whether a stage's shards are whole."""
     names = []

@@ -83,10 +83,10 @@ def test_another_pipeline_is_refused_at_once_and_nothing_is_lost(data, pipeline,
 
 
 def test_commands_take_the_pipeline_of_the_release(data, capsys):
-    before = times(data)
+    before = release(data)
     code, _, err = said(capsys, "render", "--data", data, "--limit", "1", "--workers", "1")
     assert (code, "render: 4 rows in" in err) == (0, True), err
-    assert times(data) == before
+    assert release(data) == before
     for place in (data, data / "release"):
         code, out, err = said(capsys, "validate", place, "--no-meshes", "--pictures", "0", "--workers", "1")
         assert code == 0
