@@ -119,7 +119,7 @@ class Chain(Waiting[Task]):
 
     def look(self) -> Overview:
         """Say how far the scenes are."""
-        at_work = [f"{task.scene} {task.job.stage}{_part(task)}" for task in self._at_work.values()]
+        at_work = [f"{task.scene} {task.job.stage}{_part(task)}" for task in list(self._at_work.values())]
         known = self._expectation
         scenes = len(self._ended), len(self._names)
         return Overview(known.done_s, known.left_s, *scenes, at_work, self._most_at_work)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import sys
+import textwrap
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -17,9 +19,12 @@ from aerialdojo_gen.common.terminal import raw, shown
 # Its own lock is a semaphore, which needs a /dev/shm that can be written and outlives a process that is killed.
 tqdm.set_lock(threading.RLock())
 
-_PLAIN_EVERY_S = 10.0
+# Where there is no terminal, lines are at least so far apart, and at most so far while nothing happens.
+_PLAIN_EVERY_S, _SILENT_S = 10.0, 30.0
 # So many scenes are named that are under way.
 _NAMED = 3
+# Columns of the bar of a whole run.
+_BAR = 6
 _WITHOUT_SPEED = "{l_bar}{bar}| {n_fmt}/{total_fmt} [{elapsed}{postfix}]"
 
 
@@ -55,42 +60,70 @@ class Rate:
         return (done - before) / (now - at) if done > before and now - at >= at - self._began else None
 
 
+class _Lines:
+    """Prints how far it is where there is no terminal: when something happens, and now and then when nothing does."""
+
+    def __init__(self, text: Callable[[], str], stream: TextIO) -> None:
+        self._text, self._stream, self._said = text, stream, time.monotonic()
+        self._ended = threading.Event()
+        threading.Thread(target=self._watch, name="progress", daemon=True).start()
+
+    def happened(self) -> None:
+        if time.monotonic() - self._said >= _PLAIN_EVERY_S:
+            self._say()
+
+    def close(self) -> None:
+        self._ended.set()
+
+    def _watch(self) -> None:
+        while not self._ended.wait(max(0.1, self._said + _SILENT_S - time.monotonic())):
+            if time.monotonic() - self._said >= _SILENT_S:
+                self._say()
+
+    def _say(self) -> None:
+        self._said = time.monotonic()
+        print(self._text(), file=self._stream, flush=True)
+
+
 class Bar:
     """Counts finished shards (or what `unit` says); `advance` counts them."""
 
     def __init__(self, label: str, total: int, stream: TextIO, quiet: bool, unit: str = "shards") -> None:
         label = shown(label)
-        self._label, self._total, self._stream, self._unit = label, total, stream, unit
+        self._label, self._total, self._unit = label, total, unit
         self._frames = 0
-        self._done, self._rate, self._frame_rate, self._said = 0, Rate(), Rate(), time.monotonic()
-        self._plain = not quiet and not stream.isatty()
+        self._done, self._rate, self._frame_rate = 0, Rate(), Rate()
+        self._lines = _Lines(self._text, stream) if total and not quiet and not stream.isatty() else None
         self._tqdm = _Tqdm(
             total=total,
             desc=label,
             unit=f" {unit}",
             file=stream,
             leave=False,
-            disable=quiet or self._plain or not total,
+            disable=quiet or self._lines is not None or not total,
         )
 
     def advance(self, n: int = 1, frames: int = 0) -> None:
         """Count `n` more, with as many frames of video."""
         self._done += n
         self._frames += frames
-        per_s = self._tqdm.per_s = self._rate.per_s(self._done)
+        self._tqdm.per_s = self._rate.per_s(self._done)
         frames_per_s = self._frame_rate.per_s(self._frames) if self._frames else None
         if frames_per_s:
             self._tqdm.set_postfix_str(f"{frames_per_s:.1f} frames/s", refresh=False)
         self._tqdm.update(n)
-        now = time.monotonic()
-        if self._plain and now - self._said >= _PLAIN_EVERY_S:
-            self._said = now
-            said = [f"{self._label}: {self._done}/{self._total} {self._unit}"]
-            said += [f"{per_s:.2f}/s"] if per_s else []
-            said += [f"{self._frames:,} frames"] if self._frames else []
-            said += [f"{frames_per_s:.1f} frames/s"] if frames_per_s else []
-            said += [f"ETA {(self._total - self._done) / per_s:.0f} s"] if per_s else []
-            print(", ".join(said), file=self._stream, flush=True)
+        if self._lines:
+            self._lines.happened()
+
+    def _text(self) -> str:
+        per_s = self._rate.per_s(self._done) if self._done else None
+        frames_per_s = self._frame_rate.per_s(self._frames) if self._frames else None
+        said = [f"{self._label}: {self._done}/{self._total} {self._unit}"]
+        said += [f"{per_s:.2f}/s"] if per_s else []
+        said += [f"{self._frames:,} frames"] if self._frames else []
+        said += [f"{frames_per_s:.1f} frames/s"] if frames_per_s else []
+        said += [f"ETA {(self._total - self._done) / per_s:.0f} s"] if per_s else []
+        return ", ".join(said)
 
     def refresh(self) -> None:
         """Show what is known; of shards nothing changes but by `advance`."""
@@ -98,6 +131,8 @@ class Bar:
     def close(self) -> None:
         """Take the bar off the screen."""
         self._tqdm.close()
+        if self._lines:
+            self._lines.close()
 
 
 @dataclass(frozen=True)
@@ -130,10 +165,19 @@ class Overview:
 
     def __str__(self) -> str:
         """Scenes, time left, and what is under way."""
+        return self.text()
+
+    def text(self, width: int | None = None) -> str:
+        """Say scenes, time left, and as much of what is under way as fits a width."""
         left = duration(self.left_s / max(1, min(self.processes, self.scenes - self.scenes_done)))
-        more = f" and {len(self.at_work) - _NAMED} more" if len(self.at_work) > _NAMED else ""
-        at_work = f": {', '.join(self.at_work[:_NAMED])}{more}" if self.at_work else ""
-        return shown(f"{self.scenes_done} of {self.scenes} scenes, about {left} left{at_work}")
+        # Short, for 80 columns.
+        text = f"{self.scenes_done}/{self.scenes} scenes, ~{left} left"
+        for named in range(min(_NAMED, len(self.at_work)), 0, -1):
+            more = f" +{len(self.at_work) - named}" if len(self.at_work) > named else ""
+            longer = shown(f"{text}: {', '.join(self.at_work[:named])}{more}")
+            if width is None or len(longer) <= width:
+                return longer
+        return text
 
 
 class Overall:
@@ -149,25 +193,27 @@ class Overall:
     """
 
     def __init__(self, look: Callable[[], Overview], stream: TextIO, quiet: bool) -> None:
-        self._look, self._stream, self._said = look, stream, time.monotonic()
+        self._look, self._stream = look, stream
         seen = look()
         nothing = quiet or seen.scenes_done == seen.scenes
-        self._plain = not nothing and not stream.isatty()
+        self._lines = None if nothing or stream.isatty() else _Lines(self._text, stream)
         self._tqdm = tqdm(
-            total=1.0, file=stream, leave=False, disable=nothing or self._plain, dynamic_ncols=True,
-            bar_format="{percentage:3.0f}%|{bar:12}| {desc}", mininterval=0.0,
+            total=1.0, file=stream, leave=False, disable=nothing or self._lines is not None, dynamic_ncols=True,
+            bar_format=f"{{percentage:3.0f}}%|{{bar:{_BAR}}}| {{desc}}", mininterval=0.0,
         )  # fmt: skip
 
     def refresh(self) -> None:
         """Show how far it is now."""
-        now = time.monotonic()
-        if self._plain and now - self._said >= _PLAIN_EVERY_S:
-            self._said, seen = now, self._look()
-            print(f"{100 * seen.share:.0f} %, {seen}", file=self._stream, flush=True)
+        if self._lines:
+            self._lines.happened()
         elif not self._tqdm.disable:
             seen = self._look()
             self._tqdm.n = seen.share
-            self._tqdm.set_description_str(str(seen))
+            self._tqdm.set_description_str(seen.text(columns(self._stream) - len(f"100%|{' ' * _BAR}| ")))
+
+    def _text(self) -> str:
+        seen = self._look()
+        return f"{100 * seen.share:.0f} %, {seen}"
 
     def advance(self, frames: int = 0) -> None:
         """Nothing by itself: how far it is is shown when the next shard is begun."""
@@ -175,6 +221,17 @@ class Overall:
     def close(self) -> None:
         """Take it off the screen."""
         self._tqdm.close()
+        if self._lines:
+            self._lines.close()
+
+
+def columns(stream: TextIO) -> int:
+    """Count the columns of a terminal that can be written to without it breaking the line."""
+    try:
+        found = os.get_terminal_size(stream.fileno()).columns
+    except (OSError, ValueError):
+        found = 0
+    return (found or 80) - 1
 
 
 def duration(seconds: float) -> str:
@@ -211,7 +268,16 @@ class Reporter:
     def line(self, text: str) -> None:
         """Write one line, above a bar if there is one."""
         if not self._quiet:
-            tqdm.write(shown(text), file=self._stream)
+            text = shown(text)
+            if self._stream.isatty():
+                text = textwrap.fill(
+                    text,
+                    columns(self._stream),
+                    subsequent_indent="  ",
+                    break_long_words=False,
+                    break_on_hyphens=False,
+                )
+            tqdm.write(text, file=self._stream)
             self._stream.flush()
 
     @contextmanager

@@ -10,6 +10,7 @@ import termios
 import time
 
 import pytest
+from support import chores
 
 from aerialdojo_gen.pipeline import progress
 from aerialdojo_gen.pipeline.progress import Overview, Rate, Reporter, duration
@@ -131,17 +132,48 @@ def test_how_far_a_run_is_fits_a_terminal():
     lines = [line.strip("\n\x1b[A") for line in said.split("\r") if line.strip()]
     assert max(map(len, lines)) <= 80, lines
     assert " 25%|" in said
-    assert "9 of 42 scenes, about 2 min 30 s left: U_ConstructionSite_1" in said
+    assert "9/42 scenes, ~2 min 30 s left: U_ConstructionSite_1 plan 3/8 +1" in said
+
+
+@pytest.mark.parametrize("width", [80, 120])
+def test_a_terminal_breaks_no_word(width):
+    words = " ".join(f"reason_{n} 1,{n:03}" for n in range(60))
+    seen = list(overviews())[1]
+
+    def show(stream):
+        reporter = Reporter(stream=stream)
+        reporter.line(f"plan: {words}")
+        with reporter.overall(lambda: seen) as bar:
+            bar.refresh()
+
+    lines = on_a_terminal(show, columns=width).replace("\r", "\n").splitlines()
+    assert max(map(len, lines)) < width, lines
+    summary = [line for line in lines if "reason_" in line]
+    assert len(summary) > 2
+    assert " ".join(" ".join(summary).split()) == f"plan: {words}"
+    bars = [line for line in lines if "25%|" in line]
+    end = "U_ConstructionSite_1 plan 3/8 +1" if width == 80 else "N_Forest_0 anchor-sample"
+    assert bars
+    assert all(line.rstrip().endswith(end) for line in bars), bars
+
+
+@pytest.mark.parametrize("kind", ["bar", "overall"])
+def test_without_a_terminal_a_line_comes_now_and_then_while_nothing_is_finished(kind, monkeypatch):
+    monkeypatch.setattr(progress, "_SILENT_S", 0.1)
+    stream = io.StringIO()
+    reporter = Reporter(stream=stream)
+    expected = "plan: 0/3 shards" if kind == "bar" else f"25 %, {list(overviews())[1]}"
+    with reporter.bar("plan", 3) if kind == "bar" else reporter.overall(lambda: list(overviews())[1]):
+        chores.until(lambda: stream.getvalue().count("\n") >= 2)
+    assert set(stream.getvalue().splitlines()) == {expected}
 
 
 def test_how_far_a_run_is_in_words():
     start, half, end = overviews()
     assert [one.share for one in (start, half, end)] == [0.0, 0.25, 1.0]
     # Two processes share what is left; of the last scene's there is none to share.
-    assert str(half) == (
-        "9 of 42 scenes, about 2 min 30 s left: U_ConstructionSite_1 plan 3/8, N_Forest_0 anchor-sample"
-    )
-    assert str(end).endswith("D_Flood_1 build-scenes and 1 more")
+    assert str(half) == ("9/42 scenes, ~2 min 30 s left: U_ConstructionSite_1 plan 3/8, N_Forest_0 anchor-sample")
+    assert str(end).endswith("D_Flood_1 build-scenes +1")
     assert [duration(s) for s in (0.4, 59.6, 200.0, 7800.0)] == ["0 s", "1 min 0 s", "3 min 20 s", "2 h 10 min"]
 
 
