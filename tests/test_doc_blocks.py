@@ -63,8 +63,6 @@ SCRIPTS = {
 # What stands for what on the smoke data, in this order: its scenes, a task of its own, less to draw.
 ON_SMOKE = (
     (r"pipelines/aerialdojo-200k\.toml", "pipelines/smoke.toml"),
-    (r"^((?:build-scenes|annotate-import|anchor-sample|reference-images|pair-objects|plan|filter|split|render|validate)"
-     r"\b(?!.*--pipeline).*)", r"\1 --pipeline pipelines/smoke.toml"),
     (r"\b[UNID]_[A-Z][A-Za-z]+_([01*])(?!-)", r"U_Courtyard_\1"),
     (r"\bI_Harbor_0-[0-9a-f]{12}-s\b", "TASK"),
     (r"^(add-scene .*)", r"\1 --force"),
