@@ -11,6 +11,7 @@ import shlex
 import shutil
 import subprocess
 import tomllib
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -125,11 +126,14 @@ def test_blocks_are_told_apart(tmp_path):
         "Text\n\n    make smoke      # a comment\n"
         "    aerialdojo-gen plan \\\n        --scene 'U_*'\n\n    pip x && make lint\n"
         "\n```python\nx = 1\n\n    y = 2\n```\n\n- a list\n  with a line\n\n    data/\n      release/\n"
+        "\n1. a list with a command\n\n        make docs\n\n    and more of it\n"
     )
     found = blocks(page)
     assert [(block.language, block.line, is_shell(block)) for block in found] == [
-        ("indented", 3, True), ("python", 10, False), ("indented", 18, False)
+        ("indented", 3, True), ("python", 10, False), ("indented", 18, False),
+        ("indented", 23, True),
     ]  # fmt: skip
+    assert list(commands(found[3])) == ["make docs"]
     assert list(commands(found[0])) == [
         "make smoke",
         "aerialdojo-gen plan --scene 'U_*'",
@@ -174,16 +178,16 @@ print(json.dumps([called(words) for words in json.load(open("calls.json"))]))
 @pytest.fixture(scope="module")
 def site_of(tmp_path_factory):
     """Gives the folder of packages that a reader has who has typed the installations of a text."""
-    made = {}
+
+    @cache
+    def made(extras, packages):
+        return plain_site(tmp_path_factory.mktemp("packages") / "site", extras, packages)
 
     def site(text=""):
-        commands = re.findall(r"pip install ([^`\n]*)", text)
-        extras = {
-            one for command in commands for some in re.findall(r"\[([\w,]+)\]", command) for one in some.split(",")
-        }
-        packages = {one for command in commands for one in command.split() if re.fullmatch(r"[a-z][\w-]+", one)}
-        key = (frozenset(extras), frozenset(packages))
-        return made.get(key) or made.setdefault(key, plain_site(tmp_path_factory.mktemp("packages") / "site", *key))
+        words = " ".join(re.findall(r"pip install ([^`\n]*)", text)).split()
+        extras = re.findall(r"(?:aerialdojo-gen|\.)\[([\w,]+)\]", " ".join(words))
+        packages = (word for word in words if re.fullmatch(r"[a-z][\w-]+", word))
+        return made(frozenset(",".join(extras).split(",")) - {""}, frozenset(packages))
 
     return site
 

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import json
 
+import av
 import numpy as np
 import pytest
 from support.court import CONFIG, ROUTE, SCENE, run_whole, write_inputs
+from support.doc_blocks import blocks
 from support.rendered import courtyard
 
 from aerialdojo_gen.commands.render import profile_keys
@@ -68,6 +70,20 @@ def test_every_view_comes_back_as_it_was_drawn(data):
     assert np.array_equal(recording.rgb["left"][2:4][1], recording.rgb["left"][3])
     with pytest.raises(RenderError, match="stores no millimetres"):
         recording.depth_m["front"].millimetres  # noqa: B018
+
+
+def test_the_block_of_the_page_reads_a_tiled_view(data, project):
+    """docs/recordings.md has the block indented, as the smoke data have no tiled recording to run it on."""
+    folder = data / "media" / SCENE / "nav_a"
+    (text,) = [
+        block.text
+        for block in blocks(project / "docs/recordings.md")
+        if TILED in block.text and "av.open" in block.text
+    ]
+    names = {"av": av, "np": np, "json": json, "folder": folder}
+    exec(text, names)
+    left = read_recording(folder).depth_m["left"]
+    assert np.allclose(np.stack(names["depth_m"]), np.stack([left[k] for k in range(len(left))]), rtol=1e-6)
 
 
 def test_the_full_recording_of_the_same_route_agrees(data, tmp_path):

@@ -42,8 +42,12 @@ def blocks(page: Path) -> list[Block]:
     for at in _INDENTED.finditer(rest):
         if at[0].strip():
             begin = at.start() + len(at[0]) - len(at[0].lstrip("\n"))
-            lines = "".join(f"{line[4:]}\n" for line in at[0].strip("\n").splitlines())
-            found.append(Block(page, rest.count("\n", 0, begin) + 1, "indented", lines))
+            lines = [line[4:] for line in at[0].strip("\n").splitlines()]
+            if lines[0].startswith("    "):  # a block of a list's item, and what the item goes on with
+                lines = [line[4:] for line in lines if line.startswith("    ")]
+            found.append(
+                Block(page, rest.count("\n", 0, begin) + 1, "indented", "".join(f"{line}\n" for line in lines))
+            )
     return sorted(found, key=lambda block: block.line)
 
 
