@@ -305,8 +305,8 @@ def _check(root: DataRoot, meshes: Collection[str]) -> None:
 def _settle(root: LocalRoot, partial: Path, names: Sequence[str]) -> None:
     """Give the fetched files their places: the release in one step, the meshes before it."""
     for name in filter(_is_mesh, names):
-        make_folder(root.path / "meshes")
-        _place(partial, name).replace(root.path / name)
+        with root.commit(name) as temporary:
+            _place(partial, name).replace(temporary)
     with root.lock(), atomic_folder(root.path / FOLDER) as folder:
         for name in names:
             if not _is_mesh(name):

@@ -37,6 +37,13 @@ STAGING = """
         with staged(root, root / "f"):
             pass
 """
+WRITING = """
+    import sys
+    from pathlib import Path
+    from aerialdojo_gen.store.atomic import atomic_file
+    with atomic_file(Path(sys.argv[1]), "deep/er/f.txt") as path:
+        path.write_text("new")
+"""
 REPLACING = """
     import sys
     from pathlib import Path
@@ -128,17 +135,10 @@ def test_a_folder_killed_at_any_step_is_the_old_one_or_the_new_one(tmp_path, exc
 
 @pytest.mark.kill
 def test_a_file_killed_at_any_step_is_the_old_one_or_the_new_one(tmp_path):
-    code = """
-        import sys
-        from pathlib import Path
-        from aerialdojo_gen.store.atomic import atomic_file
-        with atomic_file(Path(sys.argv[1]), "deep/er/f.txt") as path:
-            path.write_text("new")
-    """
     for n in range(1, 60):
         root = tmp_path / str(n)
         root.mkdir()
-        command = [sys.executable, "-c", textwrap.dedent(code), str(root)]
+        command = [sys.executable, "-c", textwrap.dedent(WRITING), str(root)]
         ended = subprocess.run(command, env=killing_environment(n), check=False).returncode
         sweep(root)
         assert names(root) in ({}, {"deep/er/f.txt": "new"})
@@ -148,17 +148,56 @@ def test_a_file_killed_at_any_step_is_the_old_one_or_the_new_one(tmp_path):
     assert names(root) == {"deep/er/f.txt": "new"}
 
 
-def test_what_is_renamed_is_on_the_disk_before_and_its_folder_after(tmp_path):
+def calls_of(tmp_path, code, *arguments):
+    """Run a program; gives its calls that sync, rename and make folders, in their order: kind, path, path before."""
     log = tmp_path / "log"
     environment = killing_environment(0) | {"PRELOAD_LOG": str(log)}
-    command = [sys.executable, "-c", textwrap.dedent(REPLACING), str(tmp_path / "root")]
-    (tmp_path / "root" / "f").mkdir(parents=True)
-    (tmp_path / "root" / "f" / "a").write_text("old")
-    subprocess.run(command, env=environment, check=True)
-    calls = [line.split()[0] for line in log.read_text().splitlines()]
-    renamed = next(k for k, call in enumerate(calls) if call == "renameat2")
-    assert calls[:renamed].count("fsync") >= 3  # two files and their folder
-    assert "fsync" in calls[renamed:]
+    subprocess.run([sys.executable, "-c", textwrap.dedent(code), *map(str, arguments)], env=environment, check=True)
+    return [tuple(line.split("\t")) for line in log.read_text().splitlines()]
+
+
+def assert_on_the_disk(calls, target, inside=()):
+    """Before a name is given all that bears it is synced, and after it the folder of the name."""
+    at = next(k for k, (kind, path, _) in enumerate(calls) if kind.startswith("rename") and path == str(target))
+    made = calls[at][2]
+    synced = {path for kind, path, _ in calls[:at] if kind == "fsync"}
+    assert {made, *(f"{made}/{name}" for name in inside)} <= synced
+    last = max(k for k, (kind, path, _) in enumerate(calls) if kind.startswith("rename") and path == str(target))
+    assert ("fsync", str(target.parent)) in {call[:2] for call in calls[last:]}
+
+
+def test_a_file_is_on_the_disk_before_it_has_its_name_and_its_folders_after(tmp_path):
+    root = tmp_path / "root"
+    root.mkdir()
+    calls = calls_of(tmp_path, WRITING, root)
+    assert_on_the_disk(calls, root / "deep" / "er" / "f.txt")
+    for folder in root / "deep", root / "deep" / "er":
+        after = calls[calls.index(("mkdir", str(folder), "")) :]
+        assert ("fsync", str(folder.parent), "") in after
+
+
+@pytest.mark.parametrize("old", [False, True], ids=["new", "exchange"])
+def test_a_folder_is_on_the_disk_before_it_has_its_name_and_its_parent_after(tmp_path, old):
+    root = tmp_path / "root"
+    (root / "f").mkdir(parents=True)
+    if old:
+        (root / "f" / "a").write_text("old")
+    assert_on_the_disk(calls_of(tmp_path, REPLACING, root), root / "f", ["a", "b"])
+
+
+def test_a_folder_of_many_files_is_on_the_disk_before_it_has_its_name(tmp_path):
+    code = (
+        REPLACING
+        + """
+        for number in range(40):
+            (path / str(number)).write_text("new")
+    """
+    )
+    root = tmp_path / "root"
+    (root / "f").mkdir(parents=True)
+    calls = calls_of(tmp_path, code, root)
+    at = next(k for k, (kind, path, _) in enumerate(calls) if kind == "rename" and path == str(root / "f"))
+    assert ("syncfs", calls[at][2], "") in calls[:at]
 
 
 def test_where_there_are_no_locks_files_are_written_and_nobody_s_are_removed(tmp_path):

@@ -44,6 +44,9 @@ static int number(void) {
     return n;
 }
 
+/* Where the file of a rename lies before it, for the log. */
+static __thread const char *from = "";
+
 static void count(const char *what, const char *path) {
     int saved = errno;
     /* Python's caches and the like do not count. */
@@ -54,8 +57,8 @@ static void count(const char *what, const char *path) {
     if (log) {
         int fd = open(log, O_WRONLY | O_APPEND | O_CREAT | O_CLOEXEC, 0600);
         if (fd >= 0) {
-            char line[600];
-            int length = snprintf(line, sizeof line, "%s %.500s\n", what, path ? path : "");
+            char line[1200];
+            int length = snprintf(line, sizeof line, "%s\t%.500s\t%.500s\n", what, path ? path : "", from);
             syscall(SYS_write, fd, line, length);
             close(fd);
         }
@@ -68,20 +71,32 @@ static void count(const char *what, const char *path) {
 
 #define REAL(name) __typeof__(&name) real = (__typeof__(&name))dlsym(RTLD_NEXT, #name)
 
-int rename(const char *a, const char *b) { REAL(rename); count("rename", b); return real(a, b); }
+static void count_rename(const char *what, const char *a, const char *b) {
+    from = a;
+    count(what, b);
+    from = "";
+}
+int rename(const char *a, const char *b) { REAL(rename); count_rename("rename", a, b); return real(a, b); }
 int renameat(int x, const char *a, int y, const char *b) {
     REAL(renameat);
-    count("rename", b);
+    count_rename("rename", a, b);
     return real(x, a, y, b);
 }
 int renameat2(int x, const char *a, int y, const char *b, unsigned f) {
     REAL(renameat2);
     if (getenv("PRELOAD_NO_EXCHANGE")) { errno = EINVAL; return -1; }
-    count("renameat2", b);
+    count_rename("renameat2", a, b);
     return real(x, a, y, b, f);
 }
-int fsync(int fd) { REAL(fsync); count("fsync", NULL); return real(fd); }
-int syncfs(int fd) { REAL(syncfs); count("syncfs", NULL); return real(fd); }
+static void count_sync(const char *what, int fd) {
+    char link[40], path[500];
+    snprintf(link, sizeof link, "/proc/self/fd/%d", fd);
+    ssize_t length = readlink(link, path, sizeof path - 1);
+    path[length < 0 ? 0 : length] = 0;
+    count(what, path);
+}
+int fsync(int fd) { REAL(fsync); count_sync("fsync", fd); return real(fd); }
+int syncfs(int fd) { REAL(syncfs); count_sync("syncfs", fd); return real(fd); }
 int unlink(const char *a) { REAL(unlink); count("unlink", a); return real(a); }
 int unlinkat(int x, const char *a, int f) { REAL(unlinkat); count("unlink", a); return real(x, a, f); }
 int rmdir(const char *a) { REAL(rmdir); count("rmdir", a); return real(a); }
