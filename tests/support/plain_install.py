@@ -18,9 +18,9 @@ ROOT = next(folder for folder in Path(__file__).resolve().parents if (folder / "
 
 
 def make_env_extras() -> list[str]:
-    """The extras that `make env` installs."""
-    recipe = (ROOT / "Makefile").read_text(encoding="utf-8").partition("\n.venv/.installed:")[2]
-    return re.findall(r"-e '\.\[([\w,]+)\]'", recipe)[0].split(",")
+    """The extras that `make env` installs, by the commands that it would call."""
+    commands = subprocess.run(["make", "-Bn", "env"], cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    return re.findall(r"-e '\.\[([\w,]+)\]'", commands)[0].split(",")
 
 
 def plain_site(folder: Path, extras: Iterable[str] = (), packages: Iterable[str] = ()) -> Path:
