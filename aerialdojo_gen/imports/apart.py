@@ -65,7 +65,8 @@ class Apart:
         if self.materials:
             out.append(f"{self.materials:,} pieces are of wide bodies, taken apart by material")
         if self.grown:
-            out.append(f"{self.grown:,} things were one surface with the ground, and stand by themselves now")
+            were = "thing was" if self.grown == 1 else "things were"
+            out.append(f"{self.grown:,} {were} one surface with the ground, now separated from it")
         return out
 
 

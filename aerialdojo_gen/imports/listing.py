@@ -130,7 +130,8 @@ def contents(
     low, high = place.low, place.high
     sure = "" if found.up_sure else ", not by much: look at it in a viewer"
     lines = [
-        f"{len(nodes):,} nodes with {triangles:,} triangles in {pieces:,} connected pieces, {colours:,} shades",
+        f"{len(nodes):,} node{'s' * (len(nodes) != 1)} with {triangles:,} triangle{'s' * (triangles != 1)} in "
+        f"{pieces:,} connected piece{'s' * (pieces != 1)}, {colours:,} colour{'s' * (colours != 1)}",
         f"up: {taken_up} {'as given' if up else f'by its form{sure}'} (--up {found.up} is the guess)",
         f"scale: {taken_scale:g} {'as given' if scale else f'if its unit is {found.units[0][1]}'}: "
         f"{size_text(high - low)} (x, y, z)",
