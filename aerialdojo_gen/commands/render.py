@@ -68,6 +68,9 @@ def render(
         "--verify", help="Read every recording and record again those whose content has changed.")] = False,
     estimate: Annotated[bool, typer.Option(
         "--estimate", help="Measure a few trajectories, say what all will take, and record nothing.")] = False,
+    prune: Annotated[bool, typer.Option(
+        "--prune", help="Remove the recordings of trajectories that the release no longer has, and record nothing."
+    )] = False,
     as_json: Json = False,
     executor: ExecutorName = "local", address: Address = None,
 ) -> None:  # fmt: skip
@@ -75,6 +78,9 @@ def render(
     from aerialdojo_gen.pipeline.freshness import Limits
 
     scene = together(scenes, scene)
+    if prune:
+        _prune(data, scene)
+        return
     limits = Limits(
         share_of(shard) if shard else (0, 1), time.time() + duration_s(budget) if budget else None, verify
     )
@@ -92,6 +98,15 @@ def render(
         "render", data=data, scene=chosen, pipeline=pipeline, workers=workers, force=force, quiet=quiet,
         verbose=verbose, limits=limits, replace=replace, executor=executor, address=address, **overrides,
     )  # fmt: skip
+
+
+def _prune(data: Where, scene: list[str] | None) -> None:
+    from aerialdojo_gen.release import recordings
+
+    if scene:
+        raise UsageError("--prune looks at all scenes: leave the scenes out")
+    gone = recordings.prune(data)
+    print(f"{len(gone):,} recordings removed: the release does not have their trajectories")
 
 
 def profile_keys(profile: str | None) -> dict[str, object]:

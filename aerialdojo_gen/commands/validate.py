@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -21,7 +22,12 @@ from aerialdojo_gen.commands.common import (
     print_json,
     together,
 )
+from aerialdojo_gen.common.advice import command
 from aerialdojo_gen.common.shipped import home
+
+if TYPE_CHECKING:
+    from aerialdojo_gen.pipeline.progress import Reporter
+    from aerialdojo_gen.validate.parts import Release
 
 app = typer.Typer()
 _MANY_DIGITS = 10
@@ -99,6 +105,7 @@ def validate(
         reporter.line(
             f"not the pipeline of the release, which is --pipeline {' or '.join(names)}: {definitions.name}"
         )
+    _name_orphans(release, reporter)
     found = validation.validate(asked, workers=workers, executor=executor, address=address, reporter=reporter)
     if report is not None:
         validation.write_report(found.faults, report)
@@ -110,3 +117,17 @@ def validate(
         print("\n".join([*found.fault_lines(lines), found.verdict()]))
     if found.faults:
         raise SystemExit(1)
+
+
+def _name_orphans(release: Release, reporter: Reporter) -> None:
+    """Warn of recordings beside the release whose trajectories it does not have."""
+    from aerialdojo_gen.errors import StoreError
+    from aerialdojo_gen.release.recordings import orphans
+
+    # Of a release that stands alone nobody knows the recordings; a damaged part is a fault that the checks name.
+    with contextlib.suppress(StoreError):
+        if release.folder and (gone := orphans(release.root)):
+            mend = command("render", "--prune", data=release.root.url)
+            reporter.line(
+                f"media/ has {len(gone):,} recordings of trajectories that the release does not have: {mend}"
+            )
