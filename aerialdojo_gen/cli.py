@@ -31,15 +31,27 @@ from aerialdojo_gen.commands import (
 from aerialdojo_gen.common import advice, terminal, trouble
 from aerialdojo_gen.errors import AerialDojoError
 
+_HEADINGS = {
+    "Look at a dataset": ("stats", "show", "view", "gallery", "validate"),
+    "Evaluate and train agents": ("evaluate", "report", "train"),
+    "Add your own scenes": ("add-scene", "add-map", "add-terrain", "annotate-draft", "annotate"),
+    "Exchange and share": ("export", "import-benchmark", "push-to-hub", "pull"),
+}
+
 
 class _Commands(TyperGroup):
-    """Lists the commands with all of what they do, not as much as fits on a line."""
+    """Lists the commands by purpose, with the whole of what they do."""
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
         """Write the names and their help, wrapped."""
-        rows = [(name, (self.commands[name].help or "").partition("\n\n")[0]) for name in self.list_commands(ctx)]
-        with formatter.section("Commands"):
-            formatter.write_dl(rows)
+        names = self.list_commands(ctx)
+        sections: dict[str, Any] = {"Commands": names}
+        if ctx.parent is None:
+            making = [name for name in names if not any(name in group for group in _HEADINGS.values())]
+            sections = {"Make a dataset": sorted(making, key=lambda name: name != "run"), **_HEADINGS}
+        for heading, group in sections.items():
+            with formatter.section(heading):
+                formatter.write_dl([(n, (self.commands[n].help or "").partition("\n\n")[0]) for n in group])
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Give help where nothing is asked for."""

@@ -50,7 +50,8 @@ NOT_RUN = {
     "tests/exchange/test_hub.py has one",
     r"(add-map|add-terrain) .*": "needs an extract or a height model: tests/imports/test_add_map.py, "
     "tests/imports/test_add_terrain.py",
-    r"validate DOWNLOADED .*": "runs in tests/validate/test_validate_release.py, on a release that lies elsewhere",
+    r"validate --release DOWNLOADED .*": "runs in tests/validate/test_validate_release.py, on a release "
+        "that lies elsewhere",
     r"cp -al .*|rm -r .*|run pipelines/aerialdojo-hard.toml .*": "plans 42 scenes: "
     "tests/stages/test_filter.py has its limits",
     r"import-benchmark exports/.*": "runs in tests/exchange/test_export_roundtrip.py",

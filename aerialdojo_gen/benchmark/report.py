@@ -22,6 +22,7 @@ from aerialdojo_gen.benchmark.radar import family_radars, metric_radars
 from aerialdojo_gen.benchmark.replay import Replay
 from aerialdojo_gen.benchmark.runs import Run
 from aerialdojo_gen.benchmark.score_rows import as_csv, as_json
+from aerialdojo_gen.common.terminal import shown_in_page
 from aerialdojo_gen.common.version import __version__
 from aerialdojo_gen.store.atomic import atomic_file
 
@@ -104,6 +105,7 @@ def html(wanted: Wanted, replays: Sequence[Replay], figures: dict[str, bytes], t
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("aerialdojo_gen.benchmark"),
         autoescape=True,
+        finalize=shown_in_page,
         undefined=jinja2.StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,

@@ -20,14 +20,14 @@ def annotate(
     pipeline: PipelineFile = None,
     port: Annotated[int, typer.Option(min=0, max=65535, help="Port to listen on.  (default: a free one)")] = 0,
     host: Annotated[
-        str, typer.Option(help="IPv4 address to listen on; any but loopback asks every visitor for a token.")
+        str, typer.Option(help="IPv4 address to listen on; except on loopback, visitors need a token.")
     ] = "127.0.0.1",
-    browser: Annotated[bool, typer.Option("--browser/--no-browser", help="Open the page.")] = True,
+    browser: Annotated[bool, typer.Option("--browser/--no-browser", help="Open the page in the browser.")] = True,
     coco: Annotated[
-        Path | None, typer.Option("--coco", help="Write boxes and pictures as a COCO archive (ZIP) and end.")
+        Path | None, typer.Option("--coco", help="Write boxes and pictures to this COCO archive (ZIP) and exit.")
     ] = None,
 ) -> None:
-    """Annotate a scene in the browser: landmarks, objects, their anchors; of several that fit one is picked."""
+    """Annotate a scene in the browser: landmarks, objects and their anchors."""
     from aerialdojo_gen.annotate.desk import open_desk
     from aerialdojo_gen.annotate.serve import serve_desk, write_coco
     from aerialdojo_gen.commands.picking import given_scene, pick_scene

@@ -62,7 +62,7 @@ Data = Annotated[
     str,
     typer.Option(
         "--data", metavar="DIR|URL", envvar="AERIALDOJO_DATA", callback=kept,
-        help="Data directory or s3://bucket/prefix: tables, meshes, release.",
+        help="Data directory or s3://bucket/prefix, for tables, meshes and the release.",
     ),
 ]  # fmt: skip
 Scene = Annotated[
@@ -76,7 +76,7 @@ Scene = Annotated[
 ]
 Scenes = Annotated[
     list[str] | None,
-    typer.Argument(metavar="SCENE", autocompletion=completion.scenes, help="Scenes or globs, as by --scene."),
+    typer.Argument(metavar="SCENE", autocompletion=completion.scenes, help="Scenes or globs; the same as --scene."),
 ]
 PipelineFile = Annotated[
     Path | None,
@@ -85,8 +85,8 @@ PipelineFile = Annotated[
         metavar="FILE|NAME",
         callback=kept,
         autocompletion=completion.pipelines,
-        help=f"Pipeline file, or the name of one that comes with this.  (default: that of the "
-        f"release in --data, else {Path(DEFAULT_PIPELINE).stem})",
+        help="Pipeline file, or the name of a shipped one.  (default: that of the release in --data, "
+        f"else {Path(DEFAULT_PIPELINE).stem})",
     ),
 ]
 PipelineArgument = Annotated[
@@ -95,38 +95,43 @@ PipelineArgument = Annotated[
         metavar="PIPELINE",
         callback=kept,
         autocompletion=completion.pipelines,
-        help="Pipeline file, or the name of one that comes with this: smoke, aerialdojo-200k.",
+        help=f"Pipeline file, or the name of a shipped one: {', '.join(completion.shipped_pipelines())}.",
     ),
 ]
 Workers = Annotated[
-    int | None, typer.Option("--workers", metavar="N", min=1, max=1024, help="Processes.  (default: all cores)")
+    int | None,
+    typer.Option("--workers", metavar="N", min=1, max=1024, help="Number of processes.  (default: one per core)"),
 ]
 ExecutorName = Annotated[
-    str, typer.Option("--executor", metavar="local|ray", help="Processes of this machine, or of a Ray cluster.")
+    str, typer.Option("--executor", metavar="local|ray", help="Run on this machine or on a Ray cluster.")
 ]
 Address = Annotated[
     str | None,
-    typer.Option("--address", metavar="HOST:PORT", help="Of a running Ray cluster.  (default: one on this machine)"),
+    typer.Option(
+        "--address",
+        metavar="HOST:PORT",
+        help="Address of a running Ray cluster.  (default: start one on this machine)",
+    ),
 ]
-Force = Annotated[bool, typer.Option("--force", help="Compute this stage's shards even where they are fresh.")]
+Force = Annotated[bool, typer.Option("--force", help="Compute this stage again even where it is up to date.")]
 Replace = Annotated[
-    bool, typer.Option("--replace", help="Put this release in the place of another pipeline's, which is lost.")
+    bool, typer.Option("--replace", help="Overwrite a release made by another pipeline; it is deleted.")
 ]
-Json = Annotated[bool, typer.Option("--json", help="Print JSON: figures unrounded, nothing cut.")]
+Json = Annotated[bool, typer.Option("--json", help="Print JSON with unrounded figures.")]
 OneScene = Annotated[
     str | None,
-    typer.Argument(metavar="SCENE", autocompletion=completion.scenes, help="Scene, or a glob that fits one."),
+    typer.Argument(metavar="SCENE", autocompletion=completion.scenes, help="Scene, or a glob that matches one."),
 ]
 SceneOption = Annotated[
     str | None,
-    typer.Option("--scene", metavar="NAME|GLOB", autocompletion=completion.scenes, help="The same as an option."),
+    typer.Option("--scene", metavar="NAME|GLOB", autocompletion=completion.scenes, help="The same as SCENE."),
 ]
 RendererName = Annotated[
     Literal["auto", "gl", "pybullet"],
     typer.Option("--renderer", help="Renderer; auto takes the fastest that works on this machine."),
 ]
-Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress and no summary.")]
-Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="A line also for a stage with nothing to do.")]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print no progress and no summary.")]
+Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="Print a line also for stages that are up to date.")]
 
 
 def together(scenes: list[str] | None, scene: list[str] | None) -> list[str] | None:
@@ -167,9 +172,9 @@ def run_until(
     force : bool
         Compute this stage's shards even where they are fresh (not those of the stages upstream).
     quiet : bool
-        No progress and no summary.
+        Print no progress and no summary.
     verbose : bool
-        A line also for a stage with nothing to do.
+        Print a line also for stages that are up to date.
     limits : Limits, optional
         How much of the stage is computed now; all of it where absent.
     replace : bool

@@ -15,10 +15,14 @@ if TYPE_CHECKING:
     from aerialdojo_gen.store.root import DataRoot
 
 
+def shipped_pipelines() -> list[str]:
+    """Return the names of the pipelines that come with the program."""
+    return sorted(file.stem for file in (home() / "pipelines").glob("*.toml"))
+
+
 def pipelines(incomplete: str) -> list[str]:
     """Offer the names of the pipelines that come with the program, and files in reach of what is written."""
-    names = sorted(file.stem for file in (home() / "pipelines").glob("*.toml"))
-    return [name for name in [*names, *_files(incomplete)] if name.startswith(incomplete)]
+    return [name for name in [*shipped_pipelines(), *_files(incomplete)] if name.startswith(incomplete)]
 
 
 def scenes(ctx: typer.Context, incomplete: str) -> list[str]:

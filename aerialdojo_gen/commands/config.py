@@ -10,13 +10,13 @@ import typer
 from aerialdojo_gen.commands.common import Json, PipelineFile, pipeline_file, print_json
 from aerialdojo_gen.common import advice
 
-app = typer.Typer(help="Show what a pipeline file may say, or write one to begin with.")
+app = typer.Typer(help="Show the keys of a pipeline file, or write one to start from.")
 
 
 @app.command("show")
 def show(
     stage: Annotated[
-        str | None, typer.Argument(metavar="STAGE", help="Section of this stage, e.g. plan.  (default: all)")
+        str | None, typer.Argument(metavar="STAGE", help="Show the section of one stage, e.g. plan.  (default: all)")
     ] = None,
     pipeline: PipelineFile = None,
     as_json: Json = False,
@@ -38,7 +38,9 @@ def init(
     path: Annotated[Path, typer.Argument(metavar="NAME.toml", help="File to write.")],
     pipeline: Annotated[
         Path | None,
-        typer.Option("--from", metavar="PIPELINE", help="Take over this pipeline's values.  (default: the defaults)"),
+        typer.Option(
+            "--from", metavar="PIPELINE", help="Start from this pipeline's values.  (default: the defaults)"
+        ),
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Overwrite an existing file.")] = False,
 ) -> None:

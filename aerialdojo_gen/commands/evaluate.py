@@ -48,22 +48,22 @@ def evaluate(
     ] = None,
     preset: Annotated[
         str | None,
-        typer.Option("--preset", help="A language model by name, in place of --agent: qwen3-vl-4b, …"),
+        typer.Option("--preset", help="A preset language model instead of --agent: qwen3-vl-4b, …"),
     ] = None,
     option: Annotated[
         list[str] | None,
         typer.Option(
-            "--option", help="An option of the agent, repeatable: --option seed=1, of the type of its default."
+            "--option", help="Option of the agent, repeatable: --option seed=1; converted to the type of its default."
         ),
     ] = None,
     run: Annotated[
-        str | None, typer.Option("--run", help="Name of the run.  (default: the agent's or preset's)")
+        str | None, typer.Option("--run", help="Name of the run.  (default: that of the agent or preset)")
     ] = None,
     split: Annotated[
         list[str] | None,
         typer.Option(
             "--split",
-            help="id_train, id_test, ood_train, ood_test; train and test are both partitions'; repeatable.  "
+            help="id_train, id_test, ood_train, ood_test; train or test for both ID and OOD; repeatable.  "
             "(default: all)",
         ),
     ] = None,
@@ -79,61 +79,75 @@ def evaluate(
         typer.Option(
             "--limit",
             min=1,
-            help="So many tasks in all, drawn evenly over the scenes; a semantic and an image goal are two.  "
+            help="Maximum number of tasks in total, spread evenly over scenes; semantic and image goals count "
+            "separately.  "
             "(default: all)",
         ),
     ] = None,
-    seed: Annotated[int, typer.Option("--seed", min=0, help="Of that draw.")] = 0,
+    seed: Annotated[int, typer.Option("--seed", min=0, help="Seed for the selection of tasks by --limit.")] = 0,
     view: Annotated[
-        list[str] | None, typer.Option("--view", help="front, left, right, down; in place of the agent's own.")
+        list[str] | None, typer.Option("--view", help="front, left, right, down; repeatable; overrides the agent's.")
     ] = None,
     width: Annotated[
-        int | None, typer.Option("--width", min=1, max=4096, help="Columns; in place of the agent's own.")
+        int | None, typer.Option("--width", min=1, max=4096, help="Image width in pixels; overrides the agent's.")
     ] = None,
     height: Annotated[
-        int | None, typer.Option("--height", min=1, max=4096, help="Rows; in place of the agent's own.")
+        int | None, typer.Option("--height", min=1, max=4096, help="Image height in pixels; overrides the agent's.")
     ] = None,
     renderer: RendererName = "auto",
     tell: Annotated[
         list[str] | None,
-        typer.Option("--tell", help="Tell agents more than the goal: heading, which way they face at the start."),
+        typer.Option("--tell", help="Give agents more than the goal: heading, the direction they face at the start."),
     ] = None,
     out: Annotated[
         str | None,
-        typer.Option("--out", metavar="DIR|URL", help="Where the log goes.  (default: the data directory)"),
+        typer.Option("--out", metavar="DIR|URL", help="Where to write the log.  (default: the data directory)"),
     ] = None,
     attempts: Annotated[
-        int, typer.Option("--attempts", min=1, max=1000, help="Tries of an episode where something outside fails.")
+        int,
+        typer.Option(
+            "--attempts",
+            min=1,
+            max=1000,
+            help="Maximum attempts per episode if something other than the agent fails.",
+        ),
     ] = 5,
     rerun_failed: Annotated[
         bool,
-        typer.Option("--rerun-failed", help="Fly exactly those again that failed for reasons outside the agent."),
+        typer.Option(
+            "--rerun-failed", help="Run only those episodes again that failed for reasons outside the agent."
+        ),
     ] = False,
     tolerate: Annotated[
         bool,
-        typer.Option("--tolerate", help="Log episodes in which the agent raises as failed; count no-actions; go on."),
+        typer.Option(
+            "--tolerate",
+            help="Continue when the agent raises or returns no valid action; the episode counts as failed.",
+        ),
     ] = False,
     traceback: Annotated[
-        bool, typer.Option("--traceback", help="Print the traceback of an agent that raises, not its place alone.")
+        bool, typer.Option("--traceback", help="Print the whole traceback of an agent that raises.")
     ] = False,
-    restart: Annotated[bool, typer.Option("--restart", help="Drop what the run has written before.")] = False,
+    restart: Annotated[bool, typer.Option("--restart", help="Delete what the run has written before.")] = False,
     estimate: Annotated[
         bool,
-        typer.Option("--estimate", help="Fly nothing: say what a language model would take, by a few requests."),
+        typer.Option(
+            "--estimate", help="Estimate time and cost of a language model with a few requests; fly nothing."
+        ),
     ] = False,
     max_cost: Annotated[
-        float | None, typer.Option("--max-cost", min=0, help="Begin no episode once so many US dollars are spent.")
+        float | None, typer.Option("--max-cost", min=0, help="Start no further episode after this cost, US dollars.")
     ] = None,
     max_tokens: Annotated[
-        int | None, typer.Option("--max-tokens", min=0, help="Begin no episode once so many tokens are spent.")
+        int | None, typer.Option("--max-tokens", min=0, help="Start no further episode after this number of tokens.")
     ] = None,
     requests_per_minute: Annotated[
         float | None,
-        typer.Option("--requests-per-minute", min=0.001, help="Send no more requests, all workers together."),
+        typer.Option("--requests-per-minute", min=0.001, help="Maximum request rate of all workers together."),
     ] = None,
     failures_in_row: Annotated[
         int,
-        typer.Option("--failures-in-row", min=1, help="End after so many failed episodes of one kind in a row."),
+        typer.Option("--failures-in-row", min=1, help="Stop after this many failed episodes of one kind in a row."),
     ] = 5,
     workers: Workers = None,
     executor: ExecutorName = "local",
@@ -141,7 +155,7 @@ def evaluate(
     pipeline: PipelineFile = None,
     quiet: Quiet = False,
 ) -> None:
-    """Fly an agent through released tasks, closed loop; finished episodes are never flown again."""
+    """Evaluate an agent on released tasks, closed loop; finished episodes are kept."""
     from aerialdojo_gen.benchmark.limits import Limits
     from aerialdojo_gen.benchmark.runner import Evaluation
     from aerialdojo_gen.benchmark.runner import evaluate as fly

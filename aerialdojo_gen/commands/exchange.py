@@ -24,54 +24,57 @@ def export(
     form: Annotated[str, typer.Option("--format", help="aerialdojo, habitat, lerobot or webdataset.")],
     scenes: Scenes = None,
     data: Data = "data",
-    out: Annotated[Path | None, typer.Option("--out", help="Folder to make.  (default: DATA/exports/FORMAT)")] = None,
+    out: Annotated[Path | None, typer.Option("--out", help="Folder to write.  (default: "
+        "DATA/exports/FORMAT)")] = None,
     scene: Scene = None,
     force: Annotated[bool, typer.Option("--force", help="Replace an earlier export there.")] = False,
     picture_size: Annotated[
         int | None,
         typer.Option(
-            help="Pixels of aerialdojo's pictures, drawn from the meshes; 0: the release's own.  (default: 640)"
+            help="aerialdojo: size of rendered pictures in pixels; 0: those of the release.  (default: 640)"
         ),
     ] = None,
     shards: Annotated[
-        bool, typer.Option("--shards", help="One tar a scene in place of aerialdojo's file a trajectory.")
+        bool, typer.Option("--shards", help="aerialdojo: one tar file per scene instead of one file per trajectory.")
     ] = False,
     split: Annotated[list[str] | None, typer.Option(
         "--split", help="id_train, id_test, ood_train, ood_test, train, test; repeatable.  (default: all)")] = None,
     setting: Annotated[list[str] | None, typer.Option(
         "--setting", help="base, standard, long_horizon; repeatable.")] = None,
     limit: Annotated[int | None, typer.Option(
-        "--limit", min=0, help="Trajectories of each scene and each of its three settings.  (default: 0, all)"
+        "--limit", min=0, help="Maximum number of trajectories per scene and setting, not in total.  "
+            "(default: 0, all)"
     )] = None,
     seed: Annotated[int | None, typer.Option(
-        "--seed", min=0, help="Of that draw.  (default: 0)")] = None,
+        "--seed", min=0, help="Seed for the selection of trajectories by --limit.  (default: 0)")] = None,
     view: Annotated[list[str] | None, typer.Option(
         "--view", help="front, left, right, down; repeatable.  (default: front)")] = None,
     width: Annotated[int | None, typer.Option(
-        "--width", min=16, max=4096, help="Columns of a picture.  (default: 128)")] = None,
+        "--width", min=16, max=4096, help="Image width in pixels.  (default: 128)")] = None,
     height: Annotated[int | None, typer.Option(
-        "--height", min=16, max=4096, help="Rows.  (default: the width)")] = None,
+        "--height", min=16, max=4096, help="Image height in pixels.  (default: the width)")] = None,
     no_depth: Annotated[bool, typer.Option(
-        "--no-depth", help="Pictures alone.")] = False,
+        "--no-depth", help="Export colour images without depth.")] = False,
     goal: Annotated[list[str] | None, typer.Option(
         "--goal", help="text, image; repeatable.  (default: text)")] = None,
     source: Annotated[str | None, typer.Option(
-        "--source", help="render draws; recordings reads what render has recorded; auto reads where there is one.  "
+        "--source", help="render: render now; recordings: read those of the command render; auto: read "
+            "where there are.  "
         "(default: render)")] = None,
     renderer: Annotated[str | None, typer.Option(
         "--renderer", help="auto, gl or pybullet.  (default: auto)")] = None,
     jpeg_quality: Annotated[int | None, typer.Option(
-        "--jpeg-quality", min=1, max=100, help="JPEG in place of webdataset's PNG, which loses nothing.")] = None,
+        "--jpeg-quality", min=1, max=100, help="webdataset: JPEG quality, instead of lossless PNG.")] = None,
     workers: Workers = None,
     estimate: Annotated[bool, typer.Option(
-        "--estimate", help="Measure a few trajectories, say what all will take, and write nothing.")] = False,
+        "--estimate", help="Measure a few trajectories and estimate time and size for all; write nothing.")] = False,
     as_json: Json = False,
     quiet: Quiet = False,
 ) -> None:  # fmt: skip
     """Write the release in the layout of AerialDojo's authors, as Habitat's ObjectNav-v1, or for training.
 
-    lerobot (LeRobotDataset v3) and webdataset (tar shards) have pictures and actions of every step. Options from
-    --split to --estimate are theirs alone. What is killed goes on by the same command.
+    lerobot (LeRobotDataset v3) and webdataset (tar shards) contain images and actions of every step; only they
+    take the options from --split to --estimate. After an interruption the same command continues.
     """
     from aerialdojo_gen.commands.common import print_json
     from aerialdojo_gen.common.names import unknown
@@ -172,25 +175,23 @@ def _options(given: dict[str, Any], estimate: bool, workers: int | None) -> list
 
 @app.command("import-benchmark")
 def import_benchmark(
-    files: Annotated[list[Path], typer.Argument(metavar="FILE...", help="Task files; for aerialdojo also a folder.")],
+    files: Annotated[list[Path], typer.Argument(metavar="FILE...", help="Task files; aerialdojo: also a folder.")],
     form: Annotated[str, typer.Option("--format", help="aerialdojo, uav-on, cityavos, aerialvln or openfly.")],
     data: Data = "data",
     frame: Annotated[
         str | None,
-        typer.Option(help="Where x, y, z point, for cityavos and openfly: enu, nwu, ned or esd (east, south, down)."),
+        typer.Option(help="Axes of cityavos and openfly: enu, nwu, ned or esd (east, south, down)."),
     ] = None,
-    angles: Annotated[str, typer.Option(help="Unit of cityavos's yaws: radians, degrees or mixed.")] = "radians",
+    angles: Annotated[str, typer.Option(help="Unit of yaw in cityavos: radians, degrees or mixed.")] = "radians",
     images: Annotated[
-        Path | None, typer.Option(help="Folder of cityavos's pictures.  (default: the file's own)")
+        Path | None, typer.Option(help="Folder of the pictures of cityavos.  (default: that of the file)")
     ] = None,
-    pictures: Annotated[bool, typer.Option("--pictures/--no-pictures", help="Read the goals' pictures.")] = True,
-    skip_bad: Annotated[
-        bool, typer.Option("--skip-bad", help="Keep the good records of a file with bad ones.")
-    ] = False,
+    pictures: Annotated[bool, typer.Option("--pictures/--no-pictures", help="Read the goal images.")] = True,
+    skip_bad: Annotated[bool, typer.Option("--skip-bad", help="Skip bad records and keep the good ones.")] = False,
     name: Annotated[str | None, typer.Option(help="Name of the import.  (default: the format)")] = None,
-    force: Annotated[bool, typer.Option("--force", help="Replace an import of that name.")] = False,
+    force: Annotated[bool, typer.Option("--force", help="Replace an import of the same name.")] = False,
 ) -> None:
-    """Read another benchmark's task files into tables like the release's, under DATA/imported/NAME."""
+    """Convert task files of another benchmark to tables like the release's, in DATA/imported/NAME."""
     from aerialdojo_gen.exchange import importing
     from aerialdojo_gen.store.root import open_root
 

@@ -12,23 +12,19 @@ from aerialdojo_gen.errors import brief
 
 app = typer.Typer()
 
-Repo = Annotated[str, typer.Argument(metavar="USER/NAME", help="Data set on the Hub, or at HF_ENDPOINT.")]
+Repo = Annotated[str, typer.Argument(metavar="USER/NAME", help="Dataset on the Hub, or at HF_ENDPOINT.")]
 
 
 @app.command("push-to-hub")
 def push_to_hub(
     repo: Repo,
     data: Data = "data",
-    private: Annotated[bool, typer.Option("--private", help="Make a new data set a private one.")] = False,
-    revision: Annotated[
-        str | None, typer.Option("--revision", help="Branch to write to.  (default: the main one)")
-    ] = None,
-    meshes: Annotated[
-        bool, typer.Option("--meshes", help="Send the meshes too: who flies in the scenes wants them.")
-    ] = False,
+    private: Annotated[bool, typer.Option("--private", help="If the dataset is new, make it private.")] = False,
+    revision: Annotated[str | None, typer.Option("--revision", help="Branch to write to.  (default: main)")] = None,
+    meshes: Annotated[bool, typer.Option("--meshes", help="Upload scene meshes too; evaluate needs them.")] = False,
     quiet: Quiet = False,
 ) -> None:
-    """Send the release to the Hugging Face Hub, its card as README; HF_TOKEN has the token."""
+    """Upload the release to the Hugging Face Hub, with its card as README; the token is HF_TOKEN."""
     from aerialdojo_gen.exchange import hub
     from aerialdojo_gen.pipeline.progress import Reporter
 
@@ -42,17 +38,17 @@ def pull(
     repo: Repo,
     data: Data = "data",
     revision: Annotated[
-        str | None, typer.Option("--revision", help="Branch, tag or commit.  (default: the main branch)")
+        str | None, typer.Option("--revision", help="Branch, tag or commit.  (default: main)")
     ] = None,
     meshes: Annotated[
-        bool, typer.Option("--meshes/--no-meshes", help="Fetch the meshes too, where the data set has them.")
+        bool, typer.Option("--meshes/--no-meshes", help="Download the meshes too, if the dataset has them.")
     ] = True,
     replace: Annotated[
-        bool, typer.Option("--replace", help="Put it in the place of a release and of meshes, which are lost.")
+        bool, typer.Option("--replace", help="Overwrite the release and meshes in --data; they are deleted.")
     ] = False,
     quiet: Quiet = False,
 ) -> None:
-    """Fetch a release from the Hugging Face Hub and check it; the same command goes on after a failure."""
+    """Download a release from the Hugging Face Hub and check it; after a failure the same command continues."""
     from aerialdojo_gen.exchange import hub
     from aerialdojo_gen.pipeline.progress import Reporter
 

@@ -16,30 +16,34 @@ app = typer.Typer()
 
 Project = Annotated[Path, typer.Option(help="Folder for your scenes and their pipeline.")]
 Cell = Annotated[
-    float | None, typer.Option(help="Distance of the ground's heights, metres.  (default: the model's own)")
+    float | None, typer.Option(help="Grid spacing of the ground, metres.  (default: that of the height model)")
 ]
-Ceiling = Annotated[float | None, typer.Option(help="Highest z to fly at, metres.  (default: a little over all)")]
-Seed = Annotated[int, typer.Option(min=0, help="Of what is added by rule.")]
-Attribution = Annotated[str, typer.Option(help="Whose heights they are, for the card.")]
+Ceiling = Annotated[
+    float | None, typer.Option(help="Maximum flying height z, metres.  (default: a little above the highest point)")
+]
+Seed = Annotated[int, typer.Option(min=0, help="Seed for procedurally added objects.")]
+Attribution = Annotated[str, typer.Option(help="Attribution of the height data, for the dataset card.")]
 Force = Annotated[bool, typer.Option("--force", help="Replace a scene of this name.")]
 
 
 @app.command("add-map")
 def add_map(
-    name: Annotated[str, typer.Argument(help="Name of the scene; of several, what their names begin with.")],
-    extract: Annotated[Path, typer.Argument(help="Extract of OpenStreetMap: .osm.pbf or .osm.")],
-    bbox: Annotated[list[str], typer.Option(help="WEST,SOUTH,EAST,NORTH in degrees; repeatable, a scene each.")],
-    tiles: Annotated[float | None, typer.Option(help="Cut every box into squares of so many metres.")] = None,
-    dem: Annotated[Path | None, typer.Option(help="Height model that the ground is of: .tif, .asc or .npz.")] = None,
+    name: Annotated[str, typer.Argument(help="Name of the scene; the prefix of the names if there are several.")],
+    extract: Annotated[Path, typer.Argument(help="OpenStreetMap extract: .osm.pbf or .osm.")],
+    bbox: Annotated[list[str], typer.Option(help="WEST,SOUTH,EAST,NORTH in degrees; repeatable, one scene each.")],
+    tiles: Annotated[
+        float | None, typer.Option(help="Cut every box into squares of this edge length, metres.")
+    ] = None,
+    dem: Annotated[Path | None, typer.Option(help="Height model for the ground: .tif, .asc or .npz.")] = None,
     cell: Cell = None,
-    drive_on: Annotated[str, typer.Option(help="Side of the street that is driven on: right or left.")] = "right",
+    drive_on: Annotated[str, typer.Option(help="Side of the road that traffic drives on: right or left.")] = "right",
     attribution: Attribution = "",
     ceiling: Ceiling = None,
     seed: Seed = 0,
     project: Project = Path("my-scenes"),
     force: Force = False,
 ) -> None:
-    """Make scenes of a map: streets, buildings and what stands about them."""
+    """Make scenes from a map: streets, buildings, trees and street furniture."""
     from aerialdojo_gen.imports import places
 
     added = places.add_map(
@@ -51,24 +55,28 @@ def add_map(
 
 @app.command("add-terrain")
 def add_terrain(
-    name: Annotated[str, typer.Argument(help="Name of the scene; the suffix _1 makes it out-of-distribution.")],
+    name: Annotated[str, typer.Argument(help="Name of the scene; with the suffix _1 it is out-of-distribution.")],
     dem: Annotated[Path, typer.Argument(help="Height model: .tif (GeoTIFF), .asc or .npz.")],
-    bbox: Annotated[str | None, typer.Option(help="Part of it: WEST,SOUTH,EAST,NORTH in degrees.")] = None,
-    size: Annotated[tuple[float, float] | None, typer.Option(help="Extent about the middle: x y, metres.")] = None,
+    bbox: Annotated[
+        str | None, typer.Option(help="Part of the model to use: WEST,SOUTH,EAST,NORTH in degrees.")
+    ] = None,
+    size: Annotated[
+        tuple[float, float] | None, typer.Option(help="Size of the part to use around the centre: x y, metres.")
+    ] = None,
     cell: Cell = None,
     water: Annotated[
-        float | None, typer.Option(help="There is water up to this height, metres as in the model.")
+        float | None, typer.Option(help="Water up to this height, metres in the model's heights.")
     ] = None,
-    sand: Annotated[float | None, typer.Option(help="There is sand up to this height.")] = None,
-    snow: Annotated[float | None, typer.Option(help="There is snow from this height on.")] = None,
-    bare: Annotated[bool, typer.Option("--bare", help="Nothing grows or lies about.")] = False,
+    sand: Annotated[float | None, typer.Option(help="Sand up to this height, metres.")] = None,
+    snow: Annotated[float | None, typer.Option(help="Snow above this height, metres.")] = None,
+    bare: Annotated[bool, typer.Option("--bare", help="Add no plants, rocks or other objects.")] = False,
     attribution: Attribution = "",
     ceiling: Ceiling = None,
     seed: Seed = 0,
     project: Project = Path("my-scenes"),
     force: Force = False,
 ) -> None:
-    """Make open country of a height model."""
+    """Make an open landscape from a height model."""
     from aerialdojo_gen.imports import places
 
     added = places.add_terrain(

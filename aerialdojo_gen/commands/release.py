@@ -33,15 +33,18 @@ app = typer.Typer()
 @app.command("stats")
 def stats(
     scenes: Scenes = None, data: Data = "data", scene: Scene = None, pipeline: PipelineFile = None,
-    pool: Annotated[bool, typer.Option("--pool", help="What filter kept, not the release.")] = False,
-    markdown: Annotated[Path | None, typer.Option("--markdown", help="Write the tables as Markdown.")] = None,
-    csv: Annotated[Path | None, typer.Option("--csv", help="Write the tables as CSV, a line a figure.")] = None,
+    pool: Annotated[bool, typer.Option("--pool", help="Show the candidates that filter kept instead of the "
+        "release.")] = False,
+    markdown: Annotated[Path | None, typer.Option("--markdown", help="Write the tables to this Markdown "
+        "file.")] = None,
+    csv: Annotated[Path | None, typer.Option("--csv", help="Write the tables to this CSV file, one figure "
+        "per line.")] = None,
     figures: Annotated[
-        Path | None, typer.Option("--figures", help="Draw the figures into this folder, as PNG and SVG.")
+        Path | None, typer.Option("--figures", help="Write figures to this folder, as PNG and SVG.")
     ] = None,
     as_json: Json = False,
 ) -> None:  # fmt: skip
-    """Set the release beside the paper's tables; before there is one, what filter kept."""
+    """Compare the release with the paper's tables; without a release, show what filter kept."""
     from aerialdojo_gen.release.contents import files_there, no_release, scenes_in_release, scenes_there
     from aerialdojo_gen.release.provenance import RECORD
     from aerialdojo_gen.store.remembered import key_of, remembered

@@ -48,26 +48,26 @@ def render(
     split: Annotated[str | None, typer.Option(
         "--split", help="train, test, all, id_train, id_test, ood_train or ood_test.")] = None,
     limit: Annotated[int | None, typer.Option(
-        "--limit", min=0, help="Trajectories of each scene and each of its three settings: 2 of 42 scenes are up to "
-        "252, of four views each; 0 for all.  (default: the pipeline's)")] = None,
+        "--limit", min=0, help="Maximum number of trajectories per scene and setting, not in total; 0 for all.  "
+        "(default: the pipeline's)")] = None,
     profile: Annotated[str | None, typer.Option(
-        "--profile", help="full (640 px, a file a view), or training (320 px, depth to 0.4 %, one file a "
-        "trajectory).")] = None,
+        "--profile", help="full (640 px, one file per view) or training (320 px, depth to 0.4 %, one file "
+        "per trajectory).")] = None,
     renderer: Annotated[str | None, typer.Option(
-        "--renderer", help="auto (the fastest that works here), gl or pybullet.")] = None,
+        "--renderer", help="auto (the fastest that works on this machine), gl or pybullet.")] = None,
     sampling: Annotated[str | None, typer.Option(
-        "--sampling", help="steps: a frame a pose; time: constant frame rate.")] = None,
-    frames: Annotated[str | None, typer.Option("--frames", help="video, or png for loose files.")] = None,
+        "--sampling", help="steps: one frame per pose; time: constant frame rate.")] = None,
+    frames: Annotated[str | None, typer.Option("--frames", help="video, or png for one file per frame.")] = None,
     instances: Annotated[bool, typer.Option("--instances", help="Record instance id maps too.")] = False,
     shard: Annotated[str | None, typer.Option(
-        "--shard", metavar="I/N", help="Record the I-th of N shares, e.g. 2/8; copied into one folder they are "
-        "what one machine records.")] = None,
+        "--shard", metavar="I/N", help="Record the I-th of N parts, e.g. 2/8. All parts copied into one folder "
+        "equal a run on one machine.")] = None,
     budget: Annotated[str | None, typer.Option(
-        "--budget", help="Stop after so long, e.g. 90m or 2h; the same command goes on.")] = None,
+        "--budget", help="Stop after this time, e.g. 90m or 2h; the same command continues.")] = None,
     verify: Annotated[bool, typer.Option(
-        "--verify", help="Read every recording and record again those whose content has changed.")] = False,
+        "--verify", help="Read every recording, and record those again whose content has changed.")] = False,
     estimate: Annotated[bool, typer.Option(
-        "--estimate", help="Measure a few trajectories, say what all will take, and record nothing.")] = False,
+        "--estimate", help="Measure a few trajectories and estimate time and size for all; record nothing.")] = False,
     prune: Annotated[bool, typer.Option(
         "--prune", help="Remove the recordings of trajectories that the release no longer has, and record nothing."
     )] = False,

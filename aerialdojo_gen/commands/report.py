@@ -10,7 +10,7 @@ import typer
 from typer.core import TyperCommand
 
 from aerialdojo_gen.commands.common import Data, Json
-from aerialdojo_gen.common.text_table import terminal_width
+from aerialdojo_gen.common.text_table import terminal_width, wrapped
 from aerialdojo_gen.errors import UsageError
 
 app = typer.Typer()
@@ -40,11 +40,12 @@ def report(
     data: Data = "data",
     log: Annotated[
         str | None,
-        typer.Option("--log", metavar="DIR|URL", help="Where evaluate wrote to, if not to the data directory."),
+        typer.Option("--log", metavar="DIR|URL", help="Where evaluate wrote its log (--out).  (default: the "
+            "data directory)"),
     ] = None,
     profile: Annotated[
         list[str] | None,
-        typer.Option("--profile", help="Rule of success, repeatable: aerialdojo, aerialdojo-5m, uav-on, aerialvln, "
+        typer.Option("--profile", help="Success rule, repeatable: aerialdojo, aerialdojo-5m, uav-on, aerialvln, "
                                        "openfly.  (default: the first two)"),
     ] = None,
     table: Annotated[
@@ -55,36 +56,41 @@ def report(
     ] = None,
     radius: Annotated[
         list[float] | None,
-        typer.Option("--radius", min=0.0, help="Radii of the table of radii, m: --radius 1 3 5 10.  (default: 3 5)"),
+        typer.Option("--radius", min=0.0, help="Success radii in metres for the radius table: --radius 1 3 "
+            "5 10.  (default: 3 5)"),
     ] = None,
     beside: Annotated[
-        Literal["paper"] | None, typer.Option("--beside", help="paper: set its own results below, of its simulator.")
+        Literal["paper"] | None, typer.Option("--beside", help="paper: add the paper's own results, from "
+            "its simulator.")
     ] = None,
     paired: Annotated[
-        bool, typer.Option("--paired", help="Compare two runs on the tasks that both have flown.")
+        bool, typer.Option("--paired", help="Compare two runs on the tasks that both have done.")
     ] = False,
     group: Annotated[
         list[str] | None,
-        typer.Option("--group", help="Heading of some runs, repeatable: --group open=qwen,phi --group closed=gpt."),
+        typer.Option("--group", help="Group runs under a heading, repeatable: --group open=qwen,phi --group "
+            "closed=gpt."),
     ] = None,
     intervals: Annotated[
-        bool, typer.Option("--intervals/--no-intervals", help="Print 95 % intervals below the results.")
+        bool, typer.Option("--intervals/--no-intervals", help="Print 95 % confidence intervals.")
     ] = True,
     floors: Annotated[
-        bool, typer.Option("--floors/--no-floors", help="Add stop, constant, random where they flew the same tasks.")
+        bool, typer.Option("--floors/--no-floors", help="Add the baselines stop, constant, random if they "
+            "did the same tasks.")
     ] = True,
     style: Annotated[
-        Literal["terminal", "markdown", "latex", "csv", "json"], typer.Option("--format", help="What is printed.")
+        Literal["terminal", "markdown", "latex", "csv", "json"], typer.Option("--format", help="Output format.")
     ] = "terminal",
     as_json: Json = False,
-    by_scene: Annotated[bool, typer.Option("--by-scene", help="Print the table of scenes too.")] = False,
+    by_scene: Annotated[bool, typer.Option("--by-scene", help="Print the table by scene too.")] = False,
     out: Annotated[
         Path | None, typer.Option("--out", help="Folder for report.html, tables, figures and metrics.csv.")
     ] = None,
-    replays: Annotated[int, typer.Option("--replays", min=0, max=50, help="Tasks that report.html replays.")] = 4,
-    frames: Annotated[bool, typer.Option("--frames", help="Render front pictures along the replays.")] = False,
+    replays: Annotated[int, typer.Option("--replays", min=0, max=50, help="Number of tasks that report.html "
+        "replays.")] = 4,
+    frames: Annotated[bool, typer.Option("--frames", help="Render front views for the replays.")] = False,
 ) -> None:  # fmt: skip
-    """Score runs of evaluate: SR, SR-view, OSR, SPL, DTS, CR as tables, figures, a page."""
+    """Score runs of evaluate: SR, SR-view, OSR, SPL, DTS and CR as tables, figures or a page."""
     from aerialdojo_gen.benchmark import contents, score_rows
     from aerialdojo_gen.benchmark.episodes import runs as runs_there
     from aerialdojo_gen.benchmark.floors import arranged, with_floors
@@ -99,7 +105,8 @@ def report(
     if as_json:
         style = "json"
     groups = _groups(group or [])
-    names = contents.check_names(list(table or contents.DEFAULT) + (["scene"] if by_scene else []))
+    asked = [*(table or contents.DEFAULT), *(["scene"] if by_scene else [])]
+    names = contents.check_names(asked + (["radius"] if radius and not table else []))
     rules = [profile_named(name) for name in dict.fromkeys(profile or DEFAULT_PROFILES)]
     root, written = open_root(data), open_root(log or data)
     if log is None and not runs_there(root):
@@ -120,6 +127,9 @@ def report(
         _show([*chosen, *(paired_tables(named, rules) if paired else [])], style)
         if lacking := contents.left_out(wanted, names):
             typer.echo(lacking, err=True)
+        if table is None and style == "terminal":
+            others = ", ".join(name for name in (*contents.NAMES, "all") if name not in names)
+            print("\n".join(["", *wrapped(f"More with --table: {others}.", terminal_width())]))
     if out is not None:
         from aerialdojo_gen.benchmark import replay
         from aerialdojo_gen.benchmark.report import write_report

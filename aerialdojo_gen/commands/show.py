@@ -18,11 +18,11 @@ def show(
     task_id: Annotated[str, typer.Argument(metavar="TASK_ID", help="A task_id or a nav_id of the release.")],
     data: Data = "data",
     out: Annotated[Path | None, typer.Option(help="PNG to write.  (default: TASK_ID.png)")] = None,
-    html: Annotated[Path | None, typer.Option(help="Page to write, all in one file.")] = None,
-    frames: Annotated[int, typer.Option(min=0, max=12, help="Front views along the way.")] = 5,
+    html: Annotated[Path | None, typer.Option(help="HTML page to write, in one file.")] = None,
+    frames: Annotated[int, typer.Option(min=0, max=12, help="Number of front views along the route.")] = 5,
     as_json: Json = False,
 ) -> None:
-    """Picture one task: goal, route in its scene, clearance, reference image, views along the way."""
+    """Draw one task: goal, route in its scene, clearance, reference image, views along the route."""
     from aerialdojo_gen.browse.lookup import find_task
     from aerialdojo_gen.common.text_table import facts, terminal_width
     from aerialdojo_gen.show.figure import write_png
@@ -50,10 +50,10 @@ def view(
     scenes: Scenes = None,
     data: Data = "data",
     scene: Scene = None,
-    port: Annotated[int, typer.Option(min=0, max=65535, help="Port on 127.0.0.1; 0 takes a free one.")] = 0,
-    browser: Annotated[bool, typer.Option("--browser/--no-browser", help="Open the page.")] = True,
+    port: Annotated[int, typer.Option(min=0, max=65535, help="Port on 127.0.0.1.  (default: a free one)")] = 0,
+    browser: Annotated[bool, typer.Option("--browser/--no-browser", help="Open the page in the browser.")] = True,
 ) -> None:
-    """Show the release in the browser: scenes and tasks to choose from, a scene with its objects and routes."""
+    """Browse the release in the browser: its scenes and tasks, each scene in 3D with objects and routes."""
     from aerialdojo_gen.web.serving import open_socket, require_web, serve, url_of
 
     require_web()

@@ -38,13 +38,13 @@ def _number_or_auto(value: str | None) -> str | None:
 
 @app.command("add-scene")
 def add_scene(
-    name: Annotated[str, typer.Argument(help="Name of the scene; the suffix _1 makes it out-of-distribution.")],
+    name: Annotated[str, typer.Argument(help="Name of the scene; with the suffix _1 it is out-of-distribution.")],
     mesh: Annotated[Path, typer.Argument(help="GLB, glTF, OBJ, STL, PLY, 3DS, DAE or FBX file.")],
     up: Annotated[str | None, typer.Option(help="The mesh's axis that points up: z or y.")] = None,
     scale: Annotated[
-        float | None, typer.Option(help="Metres a unit of the mesh: 0.01 for centimetres.  (default: 1)")
+        float | None, typer.Option(help="Metres per unit of the mesh: 0.01 for centimetres.  (default: 1)")
     ] = None,
-    annotations: Annotated[Path | None, typer.Option(help="Annotation file to go with it.")] = None,
+    annotations: Annotated[Path | None, typer.Option(help="Annotation file of the scene.")] = None,
     project: Annotated[Path, typer.Option(help="Folder for your scenes and their pipeline.")] = Path("my-scenes"),
     crop: Annotated[
         tuple[float, float, float] | None, typer.Option(help="Keep a circle: x y radius, metres.")
@@ -53,26 +53,27 @@ def add_scene(
         tuple[float, float, float, float] | None, typer.Option(help="Keep a rectangle: x0 y0 x1 y1, metres.")
     ] = None,
     tiles: Annotated[
-        float | None, typer.Option(help="Make a scene of every square of this edge, metres, in one frame.")
+        float | None, typer.Option(help="Cut the mesh into squares of this edge length in metres, one scene each.")
     ] = None,
     ceiling: Annotated[
-        float | None, typer.Option(help="Highest z to fly at, metres.  (default: 6 m over all)")
+        float | None, typer.Option(help="Maximum flying height z, metres.  (default: 6 m above the highest point)")
     ] = None,
-    names: Annotated[
-        Path | None, typer.Option(help="CSV of what nodes are called: pattern,name,category,plural.")
-    ] = None,
+    names: Annotated[Path | None, typer.Option(help="CSV that names nodes: pattern,name,category,plural.")] = None,
     light: Annotated[
-        str, typer.Option(help="Textures are lit by the sun, or have their light in them: auto, sun or baked.")
+        str, typer.Option(help="Lighting of textures: sun (lit by the scene), baked (already in them) or auto.")
     ] = "auto",
     texture_px: Annotated[
-        int, typer.Option("--texture-px", min=16, max=8192, help="Longest side of a texture that is kept, pixels.")
+        int,
+        typer.Option(
+            "--texture-px", min=16, max=8192, help="Maximum texture side, pixels; larger textures are reduced."
+        ),
     ] = 8192,
     force: Annotated[bool, typer.Option("--force", help="Replace a scene of this name.")] = False,
     show: Annotated[
-        bool, typer.Option("--list", help="Say what the file holds, and guess its axis and scale; write nothing.")
+        bool, typer.Option("--list", help="List what the file contains, and guess its axis and scale; write nothing.")
     ] = False,
 ) -> None:
-    """Make a scene of a mesh of your own."""
+    """Make a scene from your own mesh file."""
     from aerialdojo_gen.imports import command
 
     if show:
@@ -113,40 +114,46 @@ def annotate_draft(
     name: OneScene = None,
     scene: SceneOption = None,
     landmarks: Annotated[
-        int | None, typer.Option(min=1, help="How many.  (default: the paper's number, else 1 or 2)")
+        int | None, typer.Option(min=1, help="Number of landmarks.  (default: the paper's, else 1 or 2)")
     ] = None,
     objects: Annotated[
         str | None,
         typer.Option(
             metavar="N|auto",
             callback=_number_or_auto,
-            help="How many; auto takes what there is, up to 20.  (default: the paper's number, else auto)",
+            help="Number of objects; auto takes up to 20.  (default: the paper's, else auto)",
         ),
     ] = None,
     centre: Annotated[
-        tuple[float, float] | None, typer.Option(help="Middle of the core, x y in metres.  (default: the landmarks')")
+        tuple[float, float] | None,
+        typer.Option(help="Centre of the core area, x y in metres.  (default: the landmarks' centre)"),
     ] = None,
-    within: Annotated[float | None, typer.Option(min=1, help="Radius of the core, metres.")] = None,
-    core_share: Annotated[float, typer.Option(min=0, max=1, help="Share of the objects that lie in the core.")] = 1.0,
-    aloft: Annotated[float, typer.Option(min=0, max=1, help="Share of the core's objects from 3 m up.")] = 0.0,
-    plants: Annotated[int, typer.Option(min=0, help="Most objects of one category of vegetation.")] = 3,
-    most: Annotated[
+    within: Annotated[float | None, typer.Option(min=1, help="Radius of the core area, metres.")] = None,
+    core_share: Annotated[
+        float, typer.Option(min=0, max=1, help="Fraction of the objects that lie in the core area.")
+    ] = 1.0,
+    min_share_elevated: Annotated[
+        float, typer.Option(min=0, max=1, help="Minimum fraction of objects in the core 3 m or more above ground.")
+    ] = 0.0,
+    max_plants: Annotated[int, typer.Option(min=0, help="Maximum number of objects per category of plants.")] = 3,
+    max_per_category: Annotated[
         int | None,
         typer.Option(
             min=1,
-            help="Most objects of any other category.  (default: 5, more in a scene of few categories of your own)",
+            help="Maximum number of objects per other category.  (default: 5; more if a scene has few)",
         ),
     ] = None,
-    landmark: Annotated[list[str] | None, typer.Option(help="Node that is to be a landmark, repeatable.")] = None,
-    seed: Annotated[int, typer.Option(min=0, help="The same seed gives the same draft.")] = 0,
+    landmark: Annotated[list[str] | None, typer.Option(help="Node to use as a landmark; repeatable.")] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Seed; the same seed gives the same draft.")] = 0,
     pipeline: PipelineFile = None,
     force: Annotated[bool, typer.Option("--force", help="Overwrite an existing file.")] = False,
     keep_objects: Annotated[
-        bool, typer.Option("--keep-objects", help="Keep the file's objects and names, describe them anew.")
+        bool,
+        typer.Option("--keep-objects", help="Keep the file's objects and names, and write their descriptions again."),
     ] = False,
     quiet: Quiet = False,
 ) -> None:
-    """Draft a scene's annotations, to be checked and owned as sources."""
+    """Draft a scene's annotations, for you to check and commit."""
     from aerialdojo_gen.annotate.drafting import draft_scene
     from aerialdojo_gen.annotations.draft import Choice
     from aerialdojo_gen.commands.picking import given_scene, pick_scene
@@ -157,7 +164,12 @@ def annotate_draft(
     given = given_scene(name, scene)
     scene = pick_scene(given, known_scenes(roots.recipes) if given else chosen_scenes(config, roots))
     choice = Choice(
-        centre_m=centre, within_m=within, core_share=core_share, aloft_share=aloft, most_vegetation=plants, most=most
+        centre_m=centre,
+        within_m=within,
+        core_share=core_share,
+        aloft_share=min_share_elevated,
+        most_vegetation=max_plants,
+        most=max_per_category,
     )
     path = draft_scene(
         scene, config, roots, n_landmarks=landmarks,
@@ -173,13 +185,13 @@ def gallery(
     scenes: Scenes = None,
     out: Annotated[Path, typer.Option("--out", help="Folder for the pictures.")] = Path("docs/gallery"),
     scene: Scene = None, pipeline: PipelineFile = None,
-    props: Annotated[bool, typer.Option("--props/--no-props", help="The sheets of all props too.")] = True,
-    small: Annotated[bool, typer.Option("--small", help="JPEGs of 1280 columns, for pages.")] = False,
+    props: Annotated[bool, typer.Option("--props/--no-props", help="Draw the sheets of props too.")] = True,
+    small: Annotated[bool, typer.Option("--small", help="Write JPEGs 1280 pixels wide, for web pages.")] = False,
     references: Annotated[bool, typer.Option(
-        "--references", help="Instead, the objects' reference pictures with what is said of them.")] = False,
+        "--references", help="Draw the objects' reference images with their descriptions instead.")] = False,
     data: Data = "data",
 ) -> None:  # fmt: skip
-    """Picture every prop and every scene as contact sheets."""
+    """Draw every prop and every scene as contact sheets."""
     scene = together(scenes, scene)
     if references:
         _reference_sheets(out, scene, data, "jpg" if small else "png")

@@ -61,7 +61,7 @@ def plan(
     scenes: Scenes = None, data: Data = "data", scene: Scene = None, pipeline: PipelineFile = None,
     workers: Workers = None, force: Force = False, quiet: Quiet = False, verbose: Verbose = False,
     every: Annotated[
-        bool, typer.Option("--all", help="Search all candidates, also those that the release does not need.")
+        bool, typer.Option("--all", help="Plan all candidates, including those that the release does not need.")
     ] = False,
     executor: ExecutorName = "local", address: Address = None,
 ) -> None:  # fmt: skip
@@ -107,7 +107,7 @@ def run(
     data: Data = "data", scene: Scene = None,
     workers: Workers = None, force: Force = False, quiet: Quiet = False, verbose: Verbose = False,
     replace: Replace = False,
-    stats: Annotated[bool, typer.Option("--stats", help="Print at the end what stats prints.")] = False,
+    stats: Annotated[bool, typer.Option("--stats", help="Print the tables of stats at the end.")] = False,
     executor: ExecutorName = "local", address: Address = None,
 ) -> None:  # fmt: skip
     """Run a pipeline's stages, from recipes and annotations to the release."""

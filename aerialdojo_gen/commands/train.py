@@ -16,27 +16,32 @@ app = typer.Typer()
 @app.command("train")
 def train(
     recipe: Annotated[
-        Path, typer.Argument(metavar="RECIPE", help="A file, or the name of a shipped recipe: imitation, blind, …")
+        Path, typer.Argument(metavar="RECIPE", help="Recipe file, or the name of a shipped one: imitation, blind, …")
     ],
     data: Data = "data",
     small: Annotated[
-        bool, typer.Option("--small", help="A few scenes and epochs, by the recipe's [small]: a first try.")
+        bool,
+        typer.Option("--small", help="Use the recipe's section [small], with few scenes and epochs, as a first try."),
     ] = False,
     out: Annotated[
         Path | None,
-        typer.Option("--out", metavar="DIR", help="Weights and checkpoints.  (default: policies/NAME in --data)"),
+        typer.Option(
+            "--out", metavar="DIR", help="Folder for weights and checkpoints.  (default: policies/NAME in --data)"
+        ),
     ] = None,
     cache: Annotated[
         Path | None,
-        typer.Option("--cache", metavar="DIR", help="What was drawn.  (default: policies/cache in --data)"),
+        typer.Option(
+            "--cache", metavar="DIR", help="Cache for rendered images.  (default: policies/cache in --data)"
+        ),
     ] = None,
     device: Annotated[str, typer.Option("--device", help="auto, cpu or cuda.")] = "auto",
     renderer: RendererName = "auto",
-    restart: Annotated[bool, typer.Option("--restart", help="Forget an earlier training of this name.")] = False,
+    restart: Annotated[bool, typer.Option("--restart", help="Delete an earlier training of this name.")] = False,
     workers: Workers = None,
     quiet: Quiet = False,
 ) -> None:
-    """Train a policy by imitation and DAgger; what was killed goes on where it was."""
+    """Train a policy by imitation and DAgger; after an interruption the same command continues."""
     from aerialdojo_gen.learning.recipe import load_recipe
     from aerialdojo_gen.learning.training import train as learn
     from aerialdojo_gen.pipeline.progress import Reporter

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -35,34 +36,42 @@ _MANY_DIGITS = 10
 
 @app.command("validate")
 def validate(
-    folder: Annotated[
-        str | None, typer.Argument(metavar="RELEASE", help="A release, or a folder or URL with one; as --data.")
-    ] = None,
     scenes: Scenes = None,
     data: Annotated[
         str,
         typer.Option(
             "--data", metavar="DIR|URL", envvar="AERIALDOJO_DATA", callback=kept,
-            help="Data directory or s3://bucket/prefix, or the release itself.",
+            help="Data directory or s3://bucket/prefix; its release is checked.",
         ),
     ] = "data",
+    elsewhere: Annotated[
+        str | None,
+        typer.Option("--release", metavar="DIR|URL", help="Another release to check.  (default: the one in --data)"),
+    ] = None,
     scene: Scene = None,
     sample: Annotated[
-        int | None, typer.Option("--sample", min=0, help="Routes a scene that FCL is asked about.  (default: all)")
+        int | None, typer.Option("--sample", min=0, help="Number of routes per scene to check again with "
+            "FCL.  (default: all)")
     ] = None,
     pictures: Annotated[
-        str, typer.Option("--pictures", metavar="N|all", help="Reference images a scene that are drawn anew.")
+        str, typer.Option("--pictures", metavar="N|all", help="Number of reference images per scene to "
+            "render again and compare.")
     ] = "all",
     meshes: Annotated[
-        Path | None, typer.Option("--meshes", help="Folder of the meshes.  (default: meshes/ beside the release)")
+        Path | None, typer.Option("--meshes", help="Folder of the meshes.  (default: meshes/ next to the release)")
     ] = None,
     no_meshes: Annotated[
-        bool, typer.Option("--no-meshes", help="Leave unchecked, and say so, what needs a mesh.")
+        bool, typer.Option("--no-meshes", help="Skip the checks that need meshes; they are reported as not checked.")
     ] = False,
     report: Annotated[
         Path | None, typer.Option("--report", help="Write every fault to a .jsonl, .json, .csv or .parquet file.")
     ] = None,
-    lines: Annotated[int, typer.Option("--lines", min=0, help="Faults of a check that are printed.")] = 10,
+    max_faults: Annotated[
+        int, typer.Option("--max-faults", min=0, help="Maximum number of faults printed per check.")
+    ] = 10,
+    verbose: Annotated[
+        bool, typer.Option("--verbose", "-v", help="Print one line per check instead of one per table.")
+    ] = False,
     pipeline: PipelineFile = None,
     workers: Workers = None,
     executor: ExecutorName = "local",
@@ -70,7 +79,7 @@ def validate(
     quiet: Quiet = False,
     as_json: Json = False,
 ) -> None:  # fmt: skip
-    """Check a release again from its Parquet files and meshes alone, and name every row at fault."""
+    """Check a release independently, from its Parquet files and meshes, and name every faulty row."""
     from aerialdojo_gen import validate as validation
     from aerialdojo_gen.common.text_table import terminal_width
     from aerialdojo_gen.config.pipeline import load_pipeline
@@ -81,11 +90,14 @@ def validate(
     from aerialdojo_gen.validate.parts import release_of
     from aerialdojo_gen.validate.report import check_format
 
+    for name in scenes or ():
+        if "/" in name or Path(name).is_dir():
+            raise UsageError(f"{name} is no scene: name another release with --release {shlex.quote(name)}")
     if report is not None:
         check_format(report)
     if pictures != "all" and not (pictures.isascii() and pictures.isdigit() and len(pictures) < _MANY_DIGITS):
         raise UsageError(f"--pictures {pictures}: a number, or all")
-    release = release_of(folder or data)
+    release = release_of(elsewhere or data)
     file = pipeline or release_pipeline(release.root, release.folder, reads=True)
     definitions = load_pipeline(pipeline_file(file))
     if definitions.scene_assets is None:
@@ -113,8 +125,8 @@ def validate(
         print_json(found.as_json())
     else:
         if not quiet:
-            print("\n".join(found.table_lines(terminal_width())))
-        print("\n".join([*found.fault_lines(lines), found.verdict()]))
+            print("\n".join(found.table_lines(terminal_width(), verbose=verbose)))
+        print("\n".join([*found.fault_lines(max_faults), found.verdict()]))
     if found.faults:
         raise SystemExit(1)
 

@@ -25,6 +25,11 @@ def shown(text: str) -> str:
     return text.translate(_SHOWN)
 
 
+def shown_in_page(value: object) -> object:
+    """Return what a page's template writes for a value: of a text from outside, what `shown` makes of it."""
+    return shown(value) if type(value) is str else value  # markup is a template's own
+
+
 def raw(stream: TextIO) -> TextIO:
     """Return a stream that may control the terminal, as a progress bar does: its text is to be `shown`."""
     return cast(TextIO, _Output(stream.stream, stream.needed, str)) if isinstance(stream, _Output) else stream

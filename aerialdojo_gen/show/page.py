@@ -12,6 +12,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from aerialdojo_gen.common.pictures import PAGE_JPEG, data_url, encode_jpeg, encode_png
+from aerialdojo_gen.common.terminal import shown_in_page
 from aerialdojo_gen.show.drawing import CLEARANCE_COLOURS, CLEARANCE_SCALE, draw_map, draw_profile, draw_side
 from aerialdojo_gen.show.pictured import PicturedTask
 from aerialdojo_gen.store import schemas
@@ -33,7 +34,10 @@ def render_page(task: PicturedTask) -> str:
         HTML; every text from the data is escaped, every picture is a data URI.
     """
     template = Environment(
-        loader=PackageLoader("aerialdojo_gen.show", "."), autoescape=True, undefined=StrictUndefined
+        loader=PackageLoader("aerialdojo_gen.show", "."),
+        autoescape=True,
+        finalize=shown_in_page,
+        undefined=StrictUndefined,
     ).get_template("page.html.jinja")
     route = task.task.route
     return template.render(

@@ -69,18 +69,24 @@ class Report:
                 total.skipped[outcome.skipped] += 1
         return list(totals.values())
 
-    def table_lines(self, width: int | None = None) -> list[str]:
-        """Set every check as a line: rows checked, faults, what was not checked and why."""
-        totals = self.totals()
-        columns = [Column("of", words=True), Column("checked"), Column("faults")]
-        if any(total.skipped for total in totals):
-            columns.append(Column("not checked", words=True))
-        rows = []
-        for total in totals:
+    def table_lines(self, width: int | None = None, *, verbose: bool = False) -> list[str]:
+        """Write a line per table, or per check: rows checked, faults, what was not checked and why."""
+        groups: dict[str, list[CheckTotal]] = {}
+        for total in self.totals():
             of = next(iter(total.tables)) if len(total.tables) == 1 else "every table"
-            why = "; ".join(f"{why}{f' ({n} times)' if n > 1 else ''}" for why, n in total.skipped.items())
-            rows.append((total.check, [of, f"{total.judged:,}", f"{total.faults:,}", why]))
-        return TextTable("check", columns, rows).lines(width)
+            groups.setdefault(of, []).append(total)
+        rows = []
+        for of, totals in groups.items():
+            for part in [[total] for total in totals] if verbose else [totals]:
+                skipped = sum((total.skipped for total in part), Counter[str]())
+                why = "; ".join(f"{why}{f' ({n} times)' if n > 1 else ''}" for why, n in skipped.items())
+                judged, faults = max(total.judged for total in part), sum(total.faults for total in part)
+                first, second = (part[0].check, of) if verbose else (of, f"{len(part)}")
+                rows.append((first, [second, f"{judged:,}", f"{faults:,}", why]))
+        columns = [Column("table", words=True) if verbose else Column("checks"), Column("rows"), Column("faults")]
+        if any(total.skipped for total in self.totals()):
+            columns.append(Column("not checked", words=True))
+        return TextTable("check" if verbose else "table", columns, rows).lines(width)
 
     def fault_lines(self, limit: int) -> list[str]:
         """Name the first warnings and faults of every check, and how many there are."""
@@ -93,7 +99,7 @@ class Report:
                 lines.append(f"{name}: {len(faults):,} {word}")
                 lines += [f"  {line(fault)}" for fault in faults[:limit]]
                 if len(faults) > limit:
-                    more = "--report FILE has them all" if word == "at fault" else "--lines N names more"
+                    more = "--report FILE has them all" if word == "at fault" else "--max-faults N names more"
                     lines.append(f"  and {len(faults) - limit:,} more ({more})")
         return lines
 

@@ -33,6 +33,7 @@ pytestmark = pytest.mark.slow
 
 AT_3, AT_5 = PROFILES["aerialdojo"], PROFILES["aerialdojo-5m"]
 NASTY = "</script><script>alert(1)</script> & <b>$x_1$ | ä"
+TURNED = "\u202e"
 
 
 @pytest.fixture(scope="module")
@@ -317,7 +318,7 @@ def test_the_folder_of_a_report_is_whole_and_the_same_bytes_each_time(runs: list
 
 def test_a_page_loads_nothing_and_escapes_everything(log: Path) -> None:
     (run,) = load_runs(log, ["random"])
-    nasty = Run(NASTY, NASTY, NASTY, '{"x": "' + NASTY + '"}', run.table, run.episodes)
+    nasty = Run(NASTY, NASTY + TURNED, NASTY + TURNED, '{"x": "' + NASTY + '"}', run.table, run.episodes)
     made = wanted([nasty], AT_3)
     figures = dict.fromkeys(("families", "radar", "radius"), b"<svg/>")
     page = html(made, [], figures, contents.named_tables(made, ["all"]))
@@ -326,6 +327,7 @@ def test_a_page_loads_nothing_and_escapes_everything(log: Path) -> None:
     assert not re.search(r'(?:src|href)="(?!data:)', page)
     assert "url(" not in page
     assert "default-src 'none'" in page
+    assert "\u202e" not in page.partition("<body")[2].partition("<script")[0], "text that would turn what follows"
 
 
 def invoke(*arguments: str) -> str:
@@ -336,7 +338,12 @@ def invoke(*arguments: str) -> str:
 
 
 def test_the_command_prints_what_is_asked_for(log: Path, tmp_path: Path) -> None:
-    plain = invoke("--data", str(log))
+    brief = invoke("--data", str(log))
+    assert brief.startswith("Base (the form of the paper's Table 4)\n")
+    told = " ".join(brief.partition("\nMore with --table: ")[2].split())
+    assert told == ", ".join(name for name in (*contents.NAMES, "all") if name != "results") + "."
+    most = [part for name in contents.NAMES if name != "scene" for part in ("--table", name)]
+    plain = invoke("--data", str(log), *most)
     assert plain.startswith("Overall\n")
     assert plain.index("explorer") < plain.index("oracle") < plain.index("random")
     assert "uav-on, 20 m" in invoke("random", "--data", str(log), "--profile", "uav-on")

@@ -1,11 +1,14 @@
 """The command line: quick help, one line and an exit code for what a user can get wrong."""
 
 import os
+import re
 import subprocess
 import sys
 
 import pytest
+import typer.main
 
+from aerialdojo_gen import cli
 from aerialdojo_gen.common.names import choose_scenes
 from aerialdojo_gen.errors import UsageError
 from aerialdojo_gen.pipeline.registry import STAGES, upstream
@@ -44,9 +47,31 @@ def test_the_stages_commands_say_what_the_stages_say():
         assert f"{one.name} {one.help}" in text
 
 
+def test_the_commands_are_listed_by_purpose():
+    text = call("--help", COLUMNS="80").stdout
+    sections = dict(re.findall(r"^(\w[\w ]+):\n((?:  .*\n)+)", text, re.MULTILINE))
+    assert list(sections)[1:] == [
+        "Make a dataset", "Look at a dataset", "Evaluate and train agents", "Add your own scenes",
+        "Exchange and share",
+    ]  # fmt: skip
+    listed = {heading: re.findall(r"^  ([a-z][a-z-]*)  ", body, re.MULTILINE) for heading, body in sections.items()}
+    every = [name for names in listed.values() for name in names]
+    assert sorted(every) == sorted(typer.main.get_command(cli.app).commands)
+    # What is in no other section is there to make a dataset.
+    assert set(listed["Make a dataset"]) == {*(one.name for one in STAGES), "run", "status", "config"}
+
+
+def test_the_help_of_run_names_every_pipeline(project):
+    text = " ".join(call("run", "--help").stdout.split())
+    for file in (project / "pipelines").glob("*.toml"):
+        assert file.stem in text
+
+
 def assert_one_line(result, code, *words):
     assert result.returncode == code
-    assert result.stderr.count("\n") == 1, result.stderr
+    lines = result.stderr.splitlines()
+    # A run says below its error how to continue.
+    assert len(lines) == 1 + lines[-1].startswith("finished shards are kept"), result.stderr
     assert result.stderr.startswith("error: ")
     for word in words:
         assert word in result.stderr

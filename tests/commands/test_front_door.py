@@ -32,10 +32,8 @@ def call(capsys):
 @pytest.mark.parametrize("how", ["position", "option"])
 def test_scenes_are_named_by_position_and_by_option(name, how, smoke, call, tmp_path):
     scene = ["U_Nowhere_0"] if how == "position" else ["--scene", "U_Nowhere_0"]
-    # Of a release the first word is the release.
-    before = [smoke] if name == "validate" else []
-    data = ["--data", smoke] if name in OF_A_RELEASE[:-1] else []
-    code, _, said = call(name, *NEEDED.get(name, []), *before, *scene, *data)
+    data = ["--data", smoke] if name in OF_A_RELEASE else []
+    code, _, said = call(name, *NEEDED.get(name, []), *scene, *data)
     assert code == 2
     assert "no scene 'U_Nowhere_0'" in said.replace("has no scene", "no scene")
 

@@ -88,10 +88,14 @@ def test_commands_take_the_pipeline_of_the_release(data, capsys):
     assert (code, "render: 4 rows in" in err) == (0, True), err
     assert release(data) == before
     for place in (data, data / "release"):
-        code, out, err = said(capsys, "validate", place, "--no-meshes", "--pictures", "0", "--workers", "1")
+        code, out, err = said(
+            capsys, "validate", "--release", place, "--no-meshes", "--pictures", "0", "--workers", "1"
+        )
         assert code == 0
         assert "another salt" not in out + err
-    code, out, err = said(capsys, "validate", data, "--no-meshes", "--workers", "1", "--pipeline", "aerialdojo-200k")
+    code, out, err = said(
+        capsys, "validate", "--data", data, "--no-meshes", "--workers", "1", "--pipeline", "aerialdojo-200k"
+    )
     assert err.startswith("not the pipeline of the release, which is --pipeline smoke")
 
 

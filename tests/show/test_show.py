@@ -145,7 +145,7 @@ def test_the_page_needs_nothing_from_outside(pictured, page):
 
 
 def test_names_in_the_page_are_escaped(pictured):
-    evil = "</p><script>alert('x')</script>\"'><img src=x onerror=alert(1)> $\\frac{1}{0$"
+    evil = "</p><script>alert('x')</script>\"'><img src=x onerror=alert(1)> $\\frac{1}{0$\u202e"
     instance = {**pictured.instance, "target_name": evil, "description": evil, "landmark": evil, "task_id": evil}
     landmark, target = pictured.landmark | {"name": evil}, pictured.target | {"name": evil, "category": evil}
     start = pictured.start_object | {"name": evil}
@@ -154,6 +154,7 @@ def test_names_in_the_page_are_escaped(pictured):
     )
     page = render_page(task)
     assert "<script" not in page
+    assert "\u202e" not in page
     assert "<img src=x" not in page
     assert page.count("&lt;script&gt;alert(&#39;x&#39;)&lt;/script&gt;") >= 5
     # The quote cannot end an attribute either.

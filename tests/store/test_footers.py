@@ -144,7 +144,7 @@ def test_readers_say_in_a_line_that_a_footer_is_damaged(smoke, tmp_path, command
     shutil.copytree(smoke / "meshes", data / "meshes")
     path = store.shard_path(data, "routes/train", "U_Courtyard_0")
     with_json(path, text)
-    args = {"stats": ["stats", "--data", str(data)], "validate": ["validate", str(data), "--workers", "1"],
+    args = {"stats": ["stats", "--data", str(data)], "validate": ["validate", "--data", str(data), "--workers", "1"],
             "evaluate": ["evaluate", "--agent", "stop", "--data", str(data), "--split", "id_train"]}  # fmt: skip
     done = CliRunner().invoke(app, args[command])
     said = done.output + str(done.exception or "")

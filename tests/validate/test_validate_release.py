@@ -191,16 +191,26 @@ def run(*args):
 
 
 def test_the_command_passes_a_clean_release_and_says_what_it_did_not_check(planted):
-    done = run(planted.data, "--workers", 1)
+    done = run("--data", planted.data, "--workers", 1, "--verbose")
     assert done.returncode == 0, done.stdout + done.stderr
     assert "no fault" in done.stdout
     routes = sum(len(pq.read_table(p, partitioning=None)) for p in planted.release.glob("routes/*/*.parquet"))
     lines = [line.split() for line in done.stdout.splitlines()]
     assert all([name, "routes", str(routes), "0"] in lines for name in ("route_collision", "oracle_fails"))
-    bare = run(planted.release, "--no-meshes", "--workers", 1)
+    bare = run("--release", planted.release, "--no-meshes", "--workers", 1, "--verbose")
     assert bare.returncode == 0
     (line,) = [line.split() for line in bare.stdout.splitlines() if line.startswith("oracle_fails ")]
     assert line == ["oracle_fails", "routes", "0", "0", *["no", "meshes", "asked", "for", "(2", "times)"]]
+    brief = run("--release", planted.release, "--no-meshes", "--workers", 1)
+    assert brief.returncode == 0
+    assert brief.stdout.splitlines()[-1] == bare.stdout.splitlines()[-1]
+    lines = [line.split() for line in brief.stdout.splitlines() if not line.startswith(" ")]
+    assert len(lines) < 30, "a line per table"
+    checks = {table: int(n) for table, n, *_ in lines[2:-1] if table != "every"}
+    assert checks["routes"] == sum(line.split()[1:2] == ["routes"] for line in bare.stdout.splitlines())
+    (line,) = [line for line in lines if line[0] == "routes"]
+    assert line[2:4] == [str(routes), "0"]
+    assert "asked" in line, "what was not checked is said here too"
 
 
 def test_the_command_names_every_row_at_fault(planted, tmp_path):
@@ -209,7 +219,7 @@ def test_the_command_names_every_row_at_fault(planted, tmp_path):
         row["action_budget"] = 7
     planted.write("tasks/train", rows)
     report = tmp_path / "faults.csv"
-    done = run(planted.data, "--report", report, "--lines", 1, "--workers", 1, "--scene", "U_*_0")
+    done = run("--data", planted.data, "--report", report, "--max-faults", 1, "--workers", 1, "--scene", "U_*_0")
     assert done.returncode == 1
     assert "task_budget: 3 at fault" in done.stdout
     assert "and 2 more" in done.stdout
@@ -223,15 +233,16 @@ def test_the_command_names_every_row_at_fault(planted, tmp_path):
 @pytest.mark.parametrize(
     ("args", "code", "word"),
     [
-        (["no/such/folder"], 1, "there is no release"),
-        (["{data}", "--scene", "U_Mall_0"], 2, "no scene 'U_Mall_0'"),
-        (["{data}", "--report", "faults.xlsx"], 2, ".jsonl"),
+        (["--release", "no/such/folder"], 1, "there is no release"),
+        (["{data}"], 2, "name another release with --release {data}"),
+        (["--data", "{data}", "--scene", "U_Mall_0"], 2, "no scene 'U_Mall_0'"),
+        (["--data", "{data}", "--report", "faults.xlsx"], 2, ".jsonl"),
     ],
 )
 def test_what_a_user_can_get_wrong_is_one_line(planted, args, code, word):
     done = run(*(a.format(data=planted.data) for a in args))
     assert (done.returncode, done.stderr.count("\n")) == (code, 1), done.stderr
-    assert word in done.stderr
+    assert word.format(data=planted.data) in done.stderr
 
 
 def test_reports_hold_the_same_faults_in_every_format(tmp_path):
