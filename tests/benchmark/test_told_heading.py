@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from support.walled import write_walled
 
 from aerialdojo_gen.agents import AgentBase
-from aerialdojo_gen.agents.goal import BLIND, Goal, Heading, Observation
+from aerialdojo_gen.agents.goal import BLIND, Goal, Heading, Observation, Rules
 from aerialdojo_gen.benchmark import AerialDojoEnv
 from aerialdojo_gen.benchmark.contents import Wanted, report_tables
 from aerialdojo_gen.benchmark.episodes import read_run
@@ -21,8 +21,10 @@ from aerialdojo_gen.benchmark.runs import load_runs
 from aerialdojo_gen.benchmark.score_rows import as_csv
 from aerialdojo_gen.errors import UsageError
 from aerialdojo_gen.geometry.frames import compass_direction, compass_heading
+from aerialdojo_gen.geometry.motion import TURN_RAD, TURNS
 from aerialdojo_gen.llm.prompt import Sight, goal_text, system_prompt
 from aerialdojo_gen.store.root import open_root
+from aerialdojo_gen.store.schemas import TURN_LEFT, TURN_RIGHT
 
 ME = f"{__name__}:Listener"
 
@@ -61,6 +63,14 @@ def test_a_compass_shows_the_way_that_a_yaw_looks(yaw_rad: float) -> None:
 )
 def test_known_headings(yaw_deg: float, told: tuple[str, int]) -> None:
     assert compass_heading(math.radians(yaw_deg)) == told
+
+
+def test_a_model_is_told_what_turns_do_to_the_heading() -> None:
+    goal = Goal("semantic", "van", "tower", "north", "A van.", None, Rules(90), Heading("east", 90))
+    # After a turn by the motion model, from a yaw that faces east.
+    right, left = (compass_heading(TURNS[action] * TURN_RAD)[1] for action in (TURN_RIGHT, TURN_LEFT))
+    assert (right, left) == (105, 75)
+    assert "(0° is north, 90° east). Turning right adds, turning left takes away." in goal_text(goal)
 
 
 def test_it_is_told_where_it_is_asked_for_and_logged(court: Path, tmp_path: Path) -> None:

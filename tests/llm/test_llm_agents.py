@@ -160,6 +160,7 @@ def test_what_is_sent_follows_the_options(protocol: str) -> None:
     ]  # fmt: skip
     # The goal's picture, that of the step before, and two views.
     assert [p.shape for p in pictures_of(last)] == [(8, 8, 3), (32, 32, 3), (32, 32, 3), (32, 32, 3)]
+    assert [float(p.mean()) for p in pictures_of(last)] == pytest.approx([200, 0, 0, 40], abs=2)
     assert "Earlier, at step 2, front camera" in texts_of(last)
     assert "depth" not in texts_of(last)
 
