@@ -11,8 +11,7 @@ from __future__ import annotations
 from functools import cached_property
 from pathlib import Path
 
-from numba import njit
-
+from aerialdojo_gen.common.kernels import njit
 from aerialdojo_gen.planning.clearance import ClearanceGrid
 from aerialdojo_gen.planning.collision import CollisionWorld, collision_world
 from aerialdojo_gen.planning.grid_kernels import GridArrays, inside, segment_free

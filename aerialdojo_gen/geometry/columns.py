@@ -6,8 +6,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from aerialdojo_gen.common.kernels import njit
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -9,9 +9,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
+from aerialdojo_gen.common.kernels import njit
 from aerialdojo_gen.common.terms import ACTION_NAMES, APPROACH, STOP, TURN_LEFT, TURN_RIGHT
 from aerialdojo_gen.geometry.angles import wrap_one_rad
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from embreex.mesh_construction import TriangleMesh
 from embreex.rtcore_scene import EmbreeScene
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
+from aerialdojo_gen.common.kernels import njit
 from aerialdojo_gen.geometry.soup import Body, Things, soup
 
 Floats = NDArray[np.float64]

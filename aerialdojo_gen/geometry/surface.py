@@ -7,9 +7,9 @@ a tree would cost more to build than all of its queries. Whole scenes are `aeria
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
+from aerialdojo_gen.common.kernels import njit
 from aerialdojo_gen.geometry.soup import Body
 from aerialdojo_gen.geometry.triangles import closest_point_d2
 

@@ -7,8 +7,9 @@ All coordinates are float64, metres, world frame. A triangle is nine consecutive
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from aerialdojo_gen.common.kernels import njit
 
 _PARALLEL = 1e-14
 

@@ -9,9 +9,9 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from aerialdojo_gen.common.kernels import njit
 from aerialdojo_gen.common.terms import APPROACH, STOP
 from aerialdojo_gen.geometry.motion import fly
 from aerialdojo_gen.planning.certify import Examination, examine

@@ -7,9 +7,9 @@ The tree is implicit: node i has children 2i and 2i + 1, the leaves are the last
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from aerialdojo_gen.common.kernels import njit
 from aerialdojo_gen.geometry.morton import morton_codes
 from aerialdojo_gen.geometry.triangles import point_triangle_d2, segment_triangle_d2
 

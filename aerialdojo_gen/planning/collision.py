@@ -15,9 +15,9 @@ from functools import cached_property
 
 import fcl
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
+from aerialdojo_gen.common.kernels import njit
 from aerialdojo_gen.scenes.context import context_of
 from aerialdojo_gen.scenes.model import Instance, Scene
 

@@ -15,9 +15,9 @@ import math
 from functools import lru_cache
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from aerialdojo_gen.common.kernels import njit
 from aerialdojo_gen.planning.column_kernels import (
     FLAT,
     KIND_OF,

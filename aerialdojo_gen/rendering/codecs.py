@@ -17,9 +17,9 @@ from typing import Any
 import av
 import cv2
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from aerialdojo_gen.common.kernels import njit
 from aerialdojo_gen.common.pictures import FRAME_PNG, encode_png
 
 MAX_DEPTH_M = 65.535

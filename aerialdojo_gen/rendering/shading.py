@@ -10,9 +10,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from aerialdojo_gen.common.kernels import njit
 from aerialdojo_gen.geometry.cameras import Camera
 from aerialdojo_gen.rendering.lighting import Lighting, ShadowMap
 

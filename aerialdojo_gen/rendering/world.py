@@ -6,9 +6,9 @@ from pathlib import Path
 from types import TracebackType
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from aerialdojo_gen.common.kernels import njit
 from aerialdojo_gen.common.pictures import encode_png
 from aerialdojo_gen.errors import RenderError
 from aerialdojo_gen.geometry.cameras import Camera

@@ -9,11 +9,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import shapely
-from numba import njit
 from numpy.typing import NDArray
 from shapely.geometry import LineString
 from shapely.geometry.base import BaseGeometry
 
+from aerialdojo_gen.common.kernels import njit
 from aerialdojo_gen.scenes.mesh import Mesh
 from aerialdojo_gen.scenes.model import Instance
 from aerialdojo_gen.scenes.shapes_extruded import extrude, sweep

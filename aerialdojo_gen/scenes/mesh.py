@@ -9,9 +9,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
+from aerialdojo_gen.common.kernels import njit
 from aerialdojo_gen.scenes.model import Part
 
 Floats = NDArray[np.float64]

@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 import shapely
 from numpy.typing import ArrayLike, NDArray
-from opensimplex import OpenSimplex
 from shapely.geometry import LineString, Point
 from shapely.geometry.base import BaseGeometry
 
+from aerialdojo_gen.common.simplex import OpenSimplex
 from aerialdojo_gen.errors import AssetError
 from aerialdojo_gen.scenes.mesh import Floats, Ints
 

@@ -13,8 +13,8 @@ import time
 from pathlib import Path
 
 import numpy as np
-from numba import njit
 
+from aerialdojo_gen.common.kernels import njit
 from aerialdojo_gen.layouts.build import build_scene
 from aerialdojo_gen.planning.clearance import ClearanceGrid
 from aerialdojo_gen.planning.collision import CollisionWorld

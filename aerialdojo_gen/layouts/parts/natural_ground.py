@@ -6,9 +6,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from opensimplex import OpenSimplex
 from shapely.geometry import Polygon
 
+from aerialdojo_gen.common.simplex import OpenSimplex
 from aerialdojo_gen.scenes.grammar_props import next_variant
 from aerialdojo_gen.scenes.model import Instance
 from aerialdojo_gen.scenes.site import Site

@@ -8,15 +8,15 @@ from __future__ import annotations
 
 import contextlib
 import json
-import os
 import zipfile
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
+from aerialdojo_gen.common.kernel_cache import folder_name
 from aerialdojo_gen.errors import AssetError, UsageError
 
 MAX_BYTES = 200 << 20
-_NAMES, _TIMES = "carried.json", "times.json"
+_NAMES = "carried.json"
 _KERNELS = (".nbi", ".nbc")
 _EPOCH = (1980, 1, 1, 0, 0, 0)
 
@@ -41,16 +41,13 @@ def pack(target: Path, folders: Sequence[Path]) -> None:
     package = Path(__file__).resolve().parents[2]
     files: dict[str, Path] = {}
     names: dict[str, str] = {}
-    times: dict[str, int] = {}
+    # Machine code of other versions of the sources stays here.
+    kernels = {folder for folder in package.rglob("__pycache__/kernels/*") if _is_current(folder)}
     for path in _files(package):
-        if path.parent.name == "__pycache__" and path.suffix not in _KERNELS:
-            continue
-        name = f"{package.name}/{path.relative_to(package).as_posix()}"
-        files[name] = path
-        if path.suffix == _KERNELS[0]:
-            # Numba takes kernels for stale where the source has another time than when they were compiled.
-            source = path.parent.parent / f"{path.name.split('.', 1)[0].split('-', 1)[0]}.py"
-            times |= {f"{package.name}/{p.relative_to(package).as_posix()}": _mtime_ns(p) for p in _sources(source)}
+        if "__pycache__" not in path.relative_to(package).parts or (
+            path.parent in kernels and path.suffix in _KERNELS
+        ):
+            files[f"{package.name}/{path.relative_to(package).as_posix()}"] = path
     # What a command finds beside the package, or in it where a wheel is installed.
     beside = [package.parent / name for name in ("pipelines",) if (package.parent / "scene_assets").is_dir()]
     for number, folder in enumerate(dict.fromkeys([*beside, *folders])):
@@ -66,8 +63,7 @@ def pack(target: Path, folders: Sequence[Path]) -> None:
             "are carried to a cluster; leave out of these folders what is no recipe, prop or annotation"
         )
     with zipfile.ZipFile(target, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
-        for name, content in ((_NAMES, names), (_TIMES, times)):
-            archive.writestr(zipfile.ZipInfo(name, _EPOCH), json.dumps(content, sort_keys=True))
+        archive.writestr(zipfile.ZipInfo(_NAMES, _EPOCH), json.dumps(names, sort_keys=True))
         for name, path in sorted(files.items()):
             archive.writestr(zipfile.ZipInfo(name, _EPOCH), _bytes(path), zipfile.ZIP_DEFLATED)
 
@@ -76,12 +72,9 @@ def _files(folder: Path) -> Iterator[Path]:
     yield from (path for path in sorted(folder.rglob("*")) if path.is_file() and not path.name.startswith("."))
 
 
-def _sources(source: Path) -> list[Path]:
-    return [source] if source.is_file() else []
-
-
-def _mtime_ns(path: Path) -> int:
-    return path.stat().st_mtime_ns
+def _is_current(kernels: Path) -> bool:
+    source = kernels.parents[2] / f"{kernels.name.rpartition('-')[0]}.py"
+    return source.is_file() and folder_name(source) == kernels.name
 
 
 def _bytes(path: Path) -> bytes:
@@ -105,9 +98,6 @@ class Unpacked:
         self._names: dict[str, str] = {}
         with contextlib.suppress(FileNotFoundError):
             self._names = json.loads((folder / _NAMES).read_text(encoding="utf-8"))
-            for name, ns in json.loads((folder / _TIMES).read_text(encoding="utf-8")).items():
-                with contextlib.suppress(OSError):
-                    os.utime(folder / name, ns=(ns, ns))
 
     def place(self, path: Path) -> Path:
         """Return where a folder that was packed is here, or what is in it; any other path as it is."""

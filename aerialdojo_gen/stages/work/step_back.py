@@ -6,9 +6,9 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from aerialdojo_gen.common.kernels import njit
 from aerialdojo_gen.geometry.telling import Patch, in_picture
 from aerialdojo_gen.stages.work.anchor_world import World
 

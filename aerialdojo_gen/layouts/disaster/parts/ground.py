@@ -7,11 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 import shapely
-from opensimplex import OpenSimplex
 from shapely.affinity import rotate, scale, translate
 from shapely.geometry import LineString, Polygon
 from shapely.geometry.base import BaseGeometry
 
+from aerialdojo_gen.common.simplex import OpenSimplex
 from aerialdojo_gen.layouts.disaster.parts.wreckage import XY, Parts, bars, chunk, tilted_plate
 from aerialdojo_gen.scenes.grammar_scatter import poisson_disc, slab
 from aerialdojo_gen.scenes.mesh import translated

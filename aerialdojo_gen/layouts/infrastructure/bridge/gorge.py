@@ -8,9 +8,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from opensimplex import OpenSimplex
 from shapely.geometry import Polygon
 
+from aerialdojo_gen.common.simplex import OpenSimplex
 from aerialdojo_gen.layouts.infrastructure.bridge.decks import Deck, approach
 from aerialdojo_gen.layouts.infrastructure.bridge.gorge_things import furnish_gorge
 from aerialdojo_gen.layouts.parts.structures import Parts, block, letters, railing

@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 import shapely
-from opensimplex import OpenSimplex
 
+from aerialdojo_gen.common.simplex import OpenSimplex
 from aerialdojo_gen.scenes.mesh import Floats
 from aerialdojo_gen.scenes.terrain import Terrain, rolling_terrain
 

@@ -10,10 +10,10 @@ from dataclasses import replace
 
 import numpy as np
 import shapely
-from opensimplex import OpenSimplex
 from shapely.geometry import Polygon
 from shapely.geometry.base import BaseGeometry
 
+from aerialdojo_gen.common.simplex import OpenSimplex
 from aerialdojo_gen.layouts.parts.natural_ground import Spot, Thing, blob, furnish
 from aerialdojo_gen.scenes.grammar_props import next_variant
 from aerialdojo_gen.scenes.grammar_scatter import poisson_disc

@@ -7,12 +7,12 @@ from typing import Annotated
 
 import numpy as np
 import shapely
-from opensimplex import OpenSimplex
 from pydantic import BaseModel, ConfigDict, Field
 from shapely.affinity import rotate, scale
 from shapely.geometry import Polygon
 from shapely.geometry.base import BaseGeometry
 
+from aerialdojo_gen.common.simplex import OpenSimplex
 from aerialdojo_gen.layouts.natural.parts.groups import Deck
 from aerialdojo_gen.layouts.parts.natural_ground import blob
 from aerialdojo_gen.scenes.grammar_scatter import slab

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 import shapely
-from opensimplex import OpenSimplex
 from shapely.geometry.base import BaseGeometry
 
+from aerialdojo_gen.common.simplex import OpenSimplex
 from aerialdojo_gen.layouts.parts.natural_ground import downhill_deg, settled_z
 from aerialdojo_gen.scenes.grammar_scatter import poisson_disc
 from aerialdojo_gen.scenes.model import Instance

@@ -9,11 +9,11 @@ import contourpy
 import numpy as np
 import shapely
 from numpy.typing import NDArray
-from opensimplex import OpenSimplex
 from pydantic import BaseModel, ConfigDict, Field
 from shapely.geometry import Polygon
 from shapely.geometry.base import BaseGeometry
 
+from aerialdojo_gen.common.simplex import OpenSimplex
 from aerialdojo_gen.layouts.parts.natural_ground import settled_z
 from aerialdojo_gen.layouts.places.parts.heights import Heights
 from aerialdojo_gen.scenes.grammar_props import next_variant
