@@ -27,7 +27,7 @@ from aerialdojo_gen.errors import UsageError
 _PACKAGE = Path(__file__).resolve().parents[1]
 # Imports of a module's top level: only these give a kernel its functions and constants.
 _IMPORT = re.compile(rb"^(?:from (aerialdojo_gen[\w.]*) import (\([^)]*\)|.*)|import (aerialdojo_gen[\w.]*))", re.M)
-# A process that runs keeps its folders young when it starts; Numba makes one again that is removed all the same.
+# Every process renews the time of its folders when it starts. Numba makes a folder again that was removed.
 _UNUSED_S = 24 * 3600.0
 
 
