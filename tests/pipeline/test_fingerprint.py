@@ -105,6 +105,13 @@ def test_files_count_by_their_bytes(opened):
     assert prints(opened) == before
 
 
+def test_the_place_of_a_checkout_does_not_count(opened, project):
+    pipeline, roots = opened
+    _, elsewhere = open_pipeline(project / "pipelines" / "smoke.toml", roots.data)
+    assert elsewhere.recipes != roots.recipes
+    assert prints((pipeline, elsewhere)) == prints(opened)
+
+
 def test_the_papers_figures_count_where_they_are_read(opened, tmp_path, monkeypatch):
     before = prints(opened)
     files = fingerprint.paper.files()

@@ -144,6 +144,15 @@ def test_frames_by_steps_are_the_poses():
     assert frames.time_s == pytest.approx([0, 1 / 15, 2 / 15])
 
 
+def test_a_box_holds_every_pixel_and_no_row_or_column_without_one():
+    mask = np.zeros((6, 8), dtype=bool)
+    mask[2, 3] = True
+    assert reference_images.box_of(mask) == (3, 2, 4, 3)
+    mask[4, 1] = True
+    assert reference_images.box_of(mask) == (1, 2, 4, 5)
+    assert reference_images.box_of(np.ones((6, 8), dtype=bool)) == (0, 0, 8, 6)
+
+
 def test_reference_images_show_their_objects_where_the_box_says(data):
     config = ReferenceImagesConfig(width=160, height=160)
     (output,) = run_all(data, config, reference_images, "reference-images")

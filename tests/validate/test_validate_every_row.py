@@ -11,6 +11,7 @@ import pyarrow as pa
 import pytest
 from support.planting import definitions
 
+from aerialdojo_gen.geometry.surface import Surface
 from aerialdojo_gen.scenes.glb import read_glb
 from aerialdojo_gen.store.schemas import APPROACH, STOP
 from aerialdojo_gen.validate.parts import read_tables, release_of
@@ -155,18 +156,22 @@ def test_an_approach_may_be_a_metre_long(data, metres, far):
     assert found == (planted if far else [])
 
 
-def test_an_anchor_is_a_metre_from_its_object_to_a_millimetre(data):
-    """Moved away from what it faces, or towards it."""
-    objects = {row["object_id"]: row for row in data.tables["objects"].table.to_pylist()}
-    for metres in (-0.1, 0.1):
+@pytest.mark.parametrize("metres", [-0.1, 0.1])
+def test_an_anchor_is_a_metre_from_its_object(data, smoke, metres):
+    """Moved away from what it faces, or towards it, and its stored distance with it."""
+    scene = read_glb(smoke / "meshes" / f"{SCENE}.glb")
+    nodes = {row["object_id"]: row["mesh_node"] for row in data.tables["objects"].table.to_pylist()}
 
-        def change(row, metres=metres):
-            here, centre = (np.array([r[name] for name in PLACES]) for r in (row, objects[row["object_id"]]))
-            moved = here + metres * (here - centre) / np.linalg.norm(here - centre)
-            row.update(zip(PLACES, moved.tolist(), strict=True))
+    def change(row):
+        thing = scene[nodes[row["object_id"]]]
+        here = np.array([row[name] for name in PLACES])
+        moved = here + metres * (here - thing.centroid) / np.linalg.norm(here - thing.centroid)
+        row.update(zip(PLACES, moved.tolist(), strict=True))
+        row["surface_distance_m"] = float(Surface.of(thing).distance_m(moved[None])[0])
+        assert abs(row["surface_distance_m"] - 1.0) > 0.01
 
-        planted, found = judged(data, "anchor_surface", "anchors", change, by_rule)
-        assert found == planted
+    planted, found = judged(data, "anchor_surface", "anchors", change, by_rule)
+    assert found == planted
 
 
 def test_an_anchor_nearer_to_a_surface_than_the_radius_is_in_collision(data, smoke):
