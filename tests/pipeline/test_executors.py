@@ -208,7 +208,9 @@ def test_ctrl_c_ends_all_processes(executor, stopped, tmp_path):
     process, folder = start(tmp_path, executor, "sleep")
     wait_for_both(process, folder)
     if stopped:
-        os.kill(int(next(folder.iterdir()).name), signal.SIGSTOP)
+        worker = int(next(folder.iterdir()).name)
+        os.kill(worker, signal.SIGSTOP)
+        chores.until(lambda: Path(f"/proc/{worker}/stat").read_text().rsplit(")", 1)[1].split()[0] == "T")
     os.killpg(process.pid, signal.SIGINT)
     _, err = process.communicate(timeout=60)
     assert process.returncode == 130, err
