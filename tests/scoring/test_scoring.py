@@ -23,6 +23,7 @@ from aerialdojo_gen.rendering.raycast import RayRenderer
 from aerialdojo_gen.scenes.model import Instance
 from aerialdojo_gen.scoring.base import AnchorView
 from aerialdojo_gen.scoring.geometric import WEIGHTS, Parts, judge
+from aerialdojo_gen.scoring.knowing import fronting, telling
 from aerialdojo_gen.scoring.panel import Panel, panel
 from aerialdojo_gen.stages.work.anchor_sample import anchors_of
 from aerialdojo_gen.stages.work.anchor_world import Candidates
@@ -103,6 +104,19 @@ def test_what_hides_an_object_costs_more_than_its_weight(term, steps):
     for value, score in zip(steps, scores[1:], strict=True):
         assert score < 1.0 - WEIGHTS.get(term, 0.0) * (1.0 - value) - 0.02
     assert scores == sorted(scores, reverse=True)
+
+
+def test_clear_is_the_room_beyond_the_body():
+    standoff = CONFIG.standoff_m
+    for clearance, mark in ((0.0, 0.0), (RADIUS, 0.0), ((RADIUS + standoff) / 2, 0.5), (standoff, 1.0), (9.0, 1.0)):
+        view = replace(plain_view((1, 2, 3)), clearance_m=clearance)
+        assert judge(view, RADIUS, standoff).clear == pytest.approx(mark)
+
+
+def test_a_view_off_the_front_or_of_half_of_what_tells_is_worth_little():
+    off = np.radians([0.0, 25.0, 42.5, 60.0, 60.1, 120.0, 180.0])
+    assert fronting(off) == pytest.approx([1.0, 1.0, 0.75, 0.5, 0.15, 0.0, 0.0], abs=1e-3)
+    assert telling(np.array([[1.0, 1.0], [1.0, 0.0], [0.4, 0.8]])) == pytest.approx([1.0, 0.25, 0.5])
 
 
 def test_open_is_what_stands_nearer_and_no_floor():
