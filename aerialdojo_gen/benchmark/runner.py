@@ -131,9 +131,9 @@ def evaluate(
                     for scene in fly_units(root, evaluation, units, pool, tell, stopped):
                         run.bring_in(scene)
             except ServiceDown as error:
-                raise ServiceDown(f"{error} Finished episodes are kept: the same command goes on from here") from None
+                raise ServiceDown(f"{error} Finished episodes are kept: the same command continues") from None
         if tally.spent and len(run.todo(False)):
-            reporter.line(f"stopped at {tally.spent}: a higher one goes on from here")
+            reporter.line(f"stopped at {tally.spent}: the same command with a higher limit continues")
         finished, failed, successes = run.counts()
     why = ""
     if tally.failing is not None:

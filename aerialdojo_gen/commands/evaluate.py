@@ -195,7 +195,7 @@ def evaluate(
                 limits=Limits(max_cost, max_tokens, failures_in_row), reporter=reporter,
             )  # fmt: skip
     except KeyboardInterrupt:
-        print("interrupted: finished episodes are kept, the same command goes on from here", file=sys.stderr)
+        print("interrupted: finished episodes are kept, the same command continues from here", file=sys.stderr)
         raise SystemExit(130) from None
     scores = f"; for all scores: {command('report', evaluation.run, log=out)}" if outcome.finished else ""
     reporter.line(f"evaluate {evaluation.run}: {outcome}{scores}")

@@ -158,7 +158,7 @@ def _for_training(
         )
     except KeyboardInterrupt:
         # Said here because Typer turns Ctrl-C into a silent exit.
-        print("interrupted: finished parts are kept, the same command goes on from here", file=sys.stderr)
+        print("interrupted: finished parts are kept, the same command continues from here", file=sys.stderr)
         raise SystemExit(130) from None
     if as_json:
         print_json({"path": str(target), **asdict(made)})

@@ -53,5 +53,5 @@ def train(
             renderer=renderer, restart=restart, reporter=Reporter(quiet=quiet),
         )  # fmt: skip
     except KeyboardInterrupt:
-        print("interrupted: the same command goes on from the last checkpoint", file=sys.stderr)
+        print("interrupted: the same command continues from the last checkpoint", file=sys.stderr)
         raise SystemExit(130) from None

@@ -239,7 +239,7 @@ class Chain(Waiting[Task]):
         stage, tally = self._stages[number], self._tallies[number]
         if tally.computed < tally.tasks:
             left = f"{tally.tasks - tally.computed:,} of {tally.tasks:,} shards are left"
-            self._reporter.line(f"{stage.name}: the budget is spent, {left}; the same command goes on from here")
+            self._reporter.line(f"{stage.name}: the budget is spent, {left}; the same command continues from here")
         counts: Counter[str] = Counter()
         for summary in tally.summaries:
             counts.update(summary["counts"])
