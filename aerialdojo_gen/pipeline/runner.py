@@ -26,6 +26,8 @@ from aerialdojo_gen.pipeline.summary import StageSummary
 from aerialdojo_gen.pipeline.task import Computed, compute
 from aerialdojo_gen.store import shards as store
 
+_PACKAGE = Path(__file__).resolve().parents[1]
+
 
 def run(
     stages: Sequence[Stage],
@@ -104,6 +106,9 @@ def run(
             roots.data.refresh()
             now = limits if limits and group[-1] is stages[-1] else Limits()
             chain = Chain(group, scenes, pipeline, roots, forced, now, reporter, expectation)
+            busy = [stage.name for stage in group if any(expectation.left(stage.name, scene) for scene in scenes)]
+            if chain and (cold := uncompiled(busy)):
+                reporter.line(f"compiling {', '.join(cold)} to machine code, once: up to two minutes of CPU time")
             summaries += _go_through(chain, pool, reporter, interrupts, stages[-1].name)
             interrupts.check()
         if finish:
@@ -113,6 +118,18 @@ def run(
     if len(stages) > 1:
         reporter.line(_altogether(summaries, time.monotonic() - started))
     return summaries
+
+
+def uncompiled(stages: Sequence[str]) -> list[str]:
+    """Name the stages that have machine code for less than half of their modules with kernels."""
+    from aerialdojo_gen.common.kernel_cache import kernel_folder
+
+    def compiled(stage: str) -> list[bool]:
+        files = (_PACKAGE.parent.joinpath(*part.split(".")).with_suffix(".py") for part in stage_code(stage).parts)
+        kernels = [file for file in files if file.is_file() and b"common.kernels import njit" in file.read_bytes()]
+        return [any(kernel_folder(file).glob("*.nbi")) for file in kernels]
+
+    return [stage for stage in stages if 2 * sum(found := compiled(stage)) < len(found)]
 
 
 def _altogether(summaries: Sequence[StageSummary], seconds: float) -> str:

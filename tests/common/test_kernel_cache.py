@@ -23,6 +23,15 @@ from pathlib import Path
 from aerialdojo_gen.pipeline.executors.carried import pack
 pack(Path(sys.argv[1]), [])
 """
+# What a run says that it compiles, before and after.
+UNCOMPILED = """
+import numpy as np
+from aerialdojo_gen.pipeline.runner import uncompiled
+print(uncompiled(["filter", "split"]))
+from aerialdojo_gen.geometry import surface
+surface._distances(np.zeros((1, 3)), np.ones((1, 9)), np.zeros((1, 4)))
+print(uncompiled(["filter", "split"]))
+"""
 WRAPPED = "-2.2831853071795862\n"
 # Append to every module that importing one has loaded, and see whether the folder's name tells.
 UNSEEN = """
@@ -68,6 +77,11 @@ def fly(package, **variables):
 
 def compiled(folder):
     return {p.relative_to(folder): p.stat().st_mtime_ns for p in folder.rglob("*.nbc")}
+
+
+def test_a_stage_is_to_be_compiled_until_it_has_machine_code(package):
+    done = python(package, UNCOMPILED)
+    assert done.stdout == "['filter']\n[]\n", done.stderr
 
 
 @pytest.mark.slow
