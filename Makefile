@@ -9,7 +9,7 @@ RUN := .venv/bin/aerialdojo-gen
 RUN_FLAGS := $(if $(WORKERS),--workers $(WORKERS))
 
 .DEFAULT_GOAL := help
-.PHONY: help env dev torch docs dataset smoke evaluate test test-fast fuzz torture lint format gallery bench lock clean
+.PHONY: help env dev torch docs dataset smoke evaluate test test-fast fuzz torture nightly lint format gallery bench lock clean
 
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-9s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -81,10 +81,15 @@ test: .venv/.dev  ## run the tests (PYTEST_FLAGS='-k planner' for some of them)
 test-fast: .venv/.dev  ## unit and property tests alone: no whole pipeline, browser, kill, scene, cluster or object store
 	@.venv/bin/python -m pytest $(PYTEST_FLAGS) -m fast
 
-fuzz: .venv/.dev  ## mutants of every input into every parser, N=500 each (nightly: make fuzz N=10000 SEED=$$RANDOM)
+fuzz: .venv/.dev  ## mutants of every input into every parser, N=500 each
 	@PYTHONPATH=tests .venv/bin/python -m fuzzing -n $(or $(N),500) $(if $(SEED),--seed $(SEED)) $(foreach t,$(TARGET),--target $(t))
 torture: .venv/.dev  ## kill run, render, export, import and evaluate N=100 times and compare what repeating them leaves
-	@.venv/bin/python tests/torture.py -n $(or $(N),100)
+	@.venv/bin/python tests/torture.py -n $(or $(N),100) $(if $(SEED),--seed $(SEED))
+nightly: .venv/.dev  ## some hours: fuzz with N=10000, torture with N=100, ten small scenes of the dataset under load
+	@$(MAKE) --no-print-directory fuzz N=10000 SEED=$(NIGHT)
+	@$(MAKE) --no-print-directory torture N=100 SEED=$(NIGHT)
+	@.venv/bin/python tests/under_load.py
+NIGHT = $(or $(SEED),$(shell date +%Y%m%d))
 
 lint: .venv/.dev  ## ruff, the import contracts, mypy --strict, and vulture for what nothing uses
 	@.venv/bin/ruff check .

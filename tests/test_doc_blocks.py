@@ -30,8 +30,8 @@ PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").g
 
 # What cannot run on the smoke data, by what its text fits; a test named in a reason is one that runs it.
 NOT_RUN = {
-    r"make (dataset|evaluate|gallery|bench|fuzz|torture|test|test-fast|lint|lock|docs|torch)\b.*": "takes minutes "
-    "to hours",
+    r"make (dataset|evaluate|gallery|bench|fuzz|torture|nightly|test|test-fast|lint|lock|docs|torch)\b.*":
+        "takes minutes to hours",
     r"make smoke": "is what made the data that all this runs on",
     r"(\S*/)?(uv )?pip install .*": "installs packages",
     r"train .*|evaluate --agent policy .*|report small .*|tensorboard .*": "needs the "
