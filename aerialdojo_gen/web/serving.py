@@ -7,12 +7,14 @@ A page on another site must not reach it: not by a form or a script (``Origin``)
 from __future__ import annotations
 
 import base64
+import contextlib
 import hashlib
 import re
+import signal
 import socket
 import threading
 import webbrowser
-from collections.abc import Awaitable, Callable, MutableMapping, Sequence
+from collections.abc import Awaitable, Callable, Iterator, MutableMapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -230,10 +232,20 @@ def serve(app: FastAPI, listener: socket.socket, browser: bool = False, path: st
 
     from aerialdojo_gen.web.limits import bound_log, limits
 
+    class Server(uvicorn.Server):
+        @contextlib.contextmanager
+        def capture_signals(self) -> Iterator[None]:
+            """Leave a SIGINT ignored where it was, as in a script's background job."""
+            ignored = signal.getsignal(signal.SIGINT) is signal.SIG_IGN
+            with super().capture_signals():
+                if ignored:
+                    signal.signal(signal.SIGINT, signal.SIG_IGN)
+                yield
+
     url = url_of(listener) + path
     config = uvicorn.Config(app, log_level="warning", access_log=False, lifespan="off", timeout_graceful_shutdown=1,
                             proxy_headers=False, server_header=False, use_colors=False, **limits())  # fmt: skip
-    server = uvicorn.Server(config)
+    server = Server(config)
     bound_log()
     if browser:
         threading.Thread(target=webbrowser.open, args=(url,), daemon=True).start()
