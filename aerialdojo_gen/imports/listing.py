@@ -77,14 +77,15 @@ def guess(nodes: Sequence[RawNode]) -> Guess:
     return Guess(up, sure, fit or _UNITS[:1])
 
 
-def _guess_within_domes(nodes: Sequence[RawNode], naming: Naming | None) -> Guess:
+def _guess_within_domes(nodes: Sequence[RawNode], scale: float | None, naming: Naming | None) -> Guess:
     """Guess by what stands within sky domes, whose form tells neither axis nor scale of the place."""
     found = guess(nodes)
     for up in (found.up, "z" if found.up == "y" else "y"):
-        place = Place.of(nodes, up, 1.0, naming)
+        taken = scale or found.units[0][0]
+        place = Place.of(nodes, up, taken, naming)
         if place.domes:
-            # Back into the file's axes.
-            v = [b.vertices for b in place.bodies]
+            # Back into the file's axes and unit.
+            v = [b.vertices / taken for b in place.bodies]
             own = [x if up == "z" else np.column_stack([x[:, 0], x[:, 2], -x[:, 1]]) for x in v]
             return guess([b.placed(x) for b, x in zip(place.bodies, own, strict=True)])
     return found
@@ -119,7 +120,7 @@ def contents(
     AssetError
         There is nothing in it.
     """
-    found = _guess_within_domes(nodes, naming)
+    found = _guess_within_domes(nodes, scale, naming)
     taken_up, taken_scale = up or found.up, scale or found.units[0][0]
     place = Place.of(nodes, taken_up, taken_scale, naming)
     naming = naming or Naming()
