@@ -16,7 +16,16 @@ from aerialdojo_gen.errors import AerialDojoError, UsageError
 
 # Python with the libraries of a command has about 20 open, every worker process some more.
 _LEAST_FILES = 64
-_LEAST_MEMORY = 1 << 30
+# Address space of the largest process of a command on two small scenes: VmPeak on two cores, rounded up. Below it
+# native libraries crash or hang while they start. With large scenes a command takes more, in arrays of ours, whose
+# MemoryError is one line. Stages, which may run those before them, evaluate and export take up to 2,900.
+_USUAL_MB = 2900
+_COMMAND_MB = {
+    "add-map": 1300, "add-scene": 1500, "add-terrain": 1400, "annotate": 3000, "annotate-draft": 1600, "config": 100,
+    "gallery": 1800, "render": 3400, "report": 1800, "show": 3000, "stats": 1800, "validate": 3100, "view": 3000,
+}  # fmt: skip
+# For each further core: the two copies of OpenBLAS, of NumPy and SciPy, reserve 40 each for a thread of theirs.
+_CORE_MB = 80
 _NO_MEMORY = (
     "cannot allocate memory", "failed to map segment", "bad_alloc", "can't start new thread", "insufficient memory",
     "out of memory", "unable to allocate", "memory allocation still failed",
@@ -65,11 +74,8 @@ def check_limits(arguments: Sequence[str]) -> None:
     AerialDojoError
         That is too few, or there is so little memory that libraries would crash before they can say so.
     """
-    memory = resource.getrlimit(resource.RLIMIT_AS)[0]
-    if memory != resource.RLIM_INFINITY and memory < _LEAST_MEMORY and not {"-h", "--help"} & set(arguments):
-        raise AerialDojoError(
-            f"not enough memory{_address_space()}: at least {_LEAST_MEMORY >> 20} MB of address space are needed"
-        )
+    if arguments and not arguments[0].startswith("-") and not {"-h", "--help"} & set(arguments):
+        check_memory(arguments[0])
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     wanted = 4096 if hard == resource.RLIM_INFINITY else min(4096, hard)
     if soft != resource.RLIM_INFINITY and soft < wanted:
@@ -79,17 +85,23 @@ def check_limits(arguments: Sequence[str]) -> None:
         raise AerialDojoError(f"too few file descriptors: ulimit -n is {soft}, at least {_LEAST_FILES} are needed")
 
 
-def check_memory(needed_mb: int, what: str) -> None:
-    """Refuse work for which there is too little address space: the native libraries it uses crash or hang half-way.
+def memory_mb(command: str) -> int:
+    """Return the address space that a command needs on this machine, MB."""
+    return _COMMAND_MB.get(command, _USUAL_MB) + _CORE_MB * max(len(os.sched_getaffinity(0)) - 2, 0)
+
+
+def check_memory(command: str) -> None:
+    """Refuse a command for which there is too little address space: native libraries crash or hang half-way.
 
     Raises
     ------
     AerialDojoError
-        The process's limit is below what the work takes.
+        The process's limit is below what the command takes.
     """
+    needed_mb = memory_mb(command)
     memory = resource.getrlimit(resource.RLIMIT_AS)[0]
     if memory != resource.RLIM_INFINITY and memory < needed_mb << 20:
-        raise AerialDojoError(f"not enough memory{_address_space()}: {what} takes up to {needed_mb:,} MB")
+        raise AerialDojoError(f"not enough memory{_address_space()}: {command} needs {needed_mb:,} MB")
 
 
 def is_out_of_memory(text: str) -> bool:

@@ -206,7 +206,7 @@ class Chain(Waiting[Task]):
         config = self._configs[stage.name]
         lot = shards_of(stage, config, *here, self._reporter, self._limits)
         if lot.tasks:
-            check_memory(stage.memory_mb, stage.name)
+            check_memory(stage.name)
             stage.check(self._roots.data, self._names, config)
         return lot
 
