@@ -170,7 +170,7 @@ def test_axis_and_unit_are_guessed_by_form(up, scale, unit):
     found = guess([node.placed(node.vertices * scale)])
     assert found.up == up
     assert found.up_sure
-    # 190 m in millimetres may be 1.9 km in centimetres; a place in metres or centimetres is no larger in another unit.
+    # 190 m in millimetres may be 1.9 km in centimetres: the second guess. Metres and centimetres are the first one.
     assert [name for _, name in found.units].index(unit) <= (unit == "millimetres")
 
 
