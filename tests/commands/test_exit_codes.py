@@ -41,6 +41,7 @@ STAGE_NAMES = [stage.name for stage in STAGES]
 WRONG = {
     **{name: ["--scene", "U_Nowhere_0"] for name in STAGE_NAMES},
     "run": ["--scene", "U_Nowhere_0"],
+    "status": ["--scene", "U_Nowhere_0"],
     "add-scene": ["--scale", "much"],
     "add-map": ["--bbox", "here"],
     "add-terrain": ["--cell", "small"],
@@ -162,7 +163,7 @@ def test_a_name_or_value_that_makes_no_sense_is_2(arguments, ended):
     assert said.count("\n") == 1
 
 
-@pytest.mark.parametrize("name", [name for name in NAMES if name not in ("annotate-draft", "config show")])
+@pytest.mark.parametrize("name", [name for name in NAMES if name not in ("annotate-draft", "config show", "status")])
 def test_what_cannot_be_done_is_1(name, ended):
     code, said = ended(name, *NEEDED.get(name, []), *IMPOSSIBLE.get(name, []))
     assert code == 1, said
