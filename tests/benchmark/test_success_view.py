@@ -83,9 +83,15 @@ def test_no_stop_and_a_collision_are_no_success_however_near(court: Path, tmp_pa
     spun = flown(court, tmp_path, ",".join(["TurnLeft15"] * 90), "spun")
     assert (spun.termination == "budget").all()
     assert not spun.success_view.any()
+    # In sight of the target, 1 m from the goal.
+    near = flown(court, tmp_path, ",".join(["MoveRight5"] + ["TurnLeft15"] * 89), "near").loc["open"]
+    assert (near.termination, near.target_in_sight, near.viewpoint_distance_m) == ("budget", True, pytest.approx(1.0))
+    assert (near.success, near.success_view, near.oracle_success) == (False, False, True)
     hit = flown(court, tmp_path, "MoveForward3,Stop", "hit").loc["behind"]
     assert (hit.termination, hit.success_view) == ("collision", False)
     assert math.isfinite(hit.viewpoint_distance_m)
+    # The body touches the wall at x = 2.7 with its radius of 0.25 m; the goal is at x = 1.5.
+    assert hit.final_distance_m == hit.min_distance_m == pytest.approx(1.45, abs=2e-3)
 
 
 places = st.tuples(st.floats(-11, 11), st.floats(-11, 11), st.floats(0.1, 7.9))
@@ -128,6 +134,8 @@ _WALLED = walled()
 def test_the_goal_is_a_viewpoint_in_any_case_and_a_node_that_is_not_there_is_named() -> None:
     view = viewed(_WALLED, "crate", np.empty((0, 3)), (1.5, 0.0, 0.5), (1.5, 2.0, 0.5))
     assert (view.viewpoint_distance_m, view.target_in_sight) == (2.0, True)
+    farther = viewed(_WALLED, "crate", np.array([[9.0, 9.0, 0.5]]), (1.5, 0.0, 0.5), (1.5, 2.0, 0.5))
+    assert farther.viewpoint_distance_m == 2.0
     with pytest.raises(StoreError, match="U_Walled_0 has no node 'barrel'"):
         in_sight(_WALLED, "barrel", (0.0, 0.0, 5.0))
 
