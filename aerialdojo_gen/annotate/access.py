@@ -31,11 +31,6 @@ class TokenGate:
     is refused: the page's own scripts always have both alike. An address that has sent `MOST_GUESSES` wrong tokens is
     answered without a look at what it sends, until its time is up; not so one from which somebody has come in before,
     lest a neighbour behind the same router locks them out.
-
-    Parameters
-    ----------
-    app : ASGI application
-    token : str
     """
 
     def __init__(self, app: _Asgi, token: str) -> None:

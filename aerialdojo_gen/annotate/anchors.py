@@ -30,34 +30,15 @@ _MOST_PICTURES = 400
 
 @dataclass(frozen=True)
 class View:
-    """What a viewpoint shows.
+    """What a viewpoint shows."""
 
-    Attributes
-    ----------
-    png : bytes
-        Front view of the size of the reference images.
-    boxes : dict of str to (int, int, int, int)
-        Node and box in pixels (left, top, one past right, one past bottom) of every thing in it.
-    pixels : dict of str to int
-        How many pixels show it.
-    """
-
-    png: bytes
-    boxes: dict[str, tuple[int, int, int, int]]
-    pixels: dict[str, int]
+    png: bytes  # Front view of the size of the reference images
+    boxes: dict[str, tuple[int, int, int, int]]  # dict of str to (int, int, int, int)
+    pixels: dict[str, int]  # How many pixels show it
 
 
 class AnchorDesk:
-    """Anchors of one scene's objects; the heavy work is done by one thread, one thing after another.
-
-    Parameters
-    ----------
-    scene : Scene
-    pipeline : Pipeline
-        Its sections ``anchor-sample`` and ``reference-images``, seed and embodiment: candidates are those that the
-        stage will find.
-    roots : Roots
-    """
+    """Anchors of one scene's objects; the heavy work is done by one thread, one thing after another."""
 
     def __init__(self, scene: Scene, pipeline: Pipeline, roots: Roots) -> None:
         self.scene, self.config, self._pictures = scene, pipeline.anchor_sample, pipeline.reference_images
@@ -92,18 +73,7 @@ class AnchorDesk:
         return self._worker.submit(work).result()
 
     def candidates(self, entry: Object) -> list[dict[str, Any]]:
-        """Find an object's shortlist.
-
-        Parameters
-        ----------
-        entry : Object
-            Its node must be in the scene.
-
-        Returns
-        -------
-        list of dict
-            Rows of the table ``anchors``, the best first; empty where nothing can be reached that sees the object.
-        """
+        """Find an object's shortlist."""
         from aerialdojo_gen.stages.work.anchor_sample import anchors_of
 
         key = (entry.id, entry.node)
@@ -116,22 +86,9 @@ class AnchorDesk:
         return rows
 
     def place(self, entry: Object, eye_m: Floats) -> Floats:
-        """Put a viewpoint on the line of sight from an eye to an object, at the standoff from its surface.
+        """Put a viewpoint, (3,) world metres, on the line of sight from `eye_m` to an object.
 
-        Parameters
-        ----------
-        entry : Object
-        eye_m : (3,) float64
-            Where somebody looks from, metres, world frame.
-
-        Returns
-        -------
-        (3,) float64
-
-        Raises
-        ------
-        AerialDojoError
-            The eye is in the object's middle.
+        At the standoff from its surface.
         """
         instance = self.scene[entry.node]
         away = eye_m - instance.centroid
@@ -148,22 +105,7 @@ class AnchorDesk:
     def judge(
         self, entry: Object, position_m: Floats, yaw_rad: float | None = None
     ) -> tuple[dict[str, Any], list[str]]:
-        """Hold a viewpoint against what is asked of an anchor.
-
-        Parameters
-        ----------
-        entry : Object
-        position_m : (3,) float64
-        yaw_rad : float, optional
-            Towards the object's centroid where absent.
-
-        Returns
-        -------
-        row : dict
-            Of the table ``anchors``, but for rank and selection.
-        faults : list of str
-            Why it will not do; empty where it will.
-        """
+        """Check a viewpoint against the rules for anchors; returns its row of ``anchors`` and the list of faults."""
         from aerialdojo_gen.stages.work.anchor_choice import is_same, judge_anchor
 
         yaw = float(yaw_towards(position_m, self.scene[entry.node].centroid)) if yaw_rad is None else yaw_rad

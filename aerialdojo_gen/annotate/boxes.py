@@ -31,13 +31,7 @@ def nodes(recipe: Path) -> list[str]:
 
 
 def with_box(recipe: Path, cut: Cut) -> str:
-    """Return a recipe's text with a box more.
-
-    Raises
-    ------
-    AerialDojoError
-        It is not an imported scene's.
-    """
+    """Return a recipe's text with a box more."""
     if load_imported(recipe) is None:
         raise AerialDojoError(
             "this scene is built from a recipe, every thing in it has a node: there is nothing to box"
@@ -62,27 +56,7 @@ def without_box(recipe: Path, node: str) -> str:
 
 @contextlib.contextmanager
 def staged(roots: Roots, scene: str, text: str) -> Iterator[Roots]:
-    """Lay a changed recipe out for a build, with the scene's own mesh beside it.
-
-    Parameters
-    ----------
-    roots : Roots
-        The folders; the recipe in them stays as it is.
-    scene : str
-        Name of the scene.
-    text : str
-        The changed recipe.
-
-    Yields
-    ------
-    Roots
-        The same, but for the folder of recipes.
-
-    Raises
-    ------
-    StoreError
-        The disk for temporary files cannot be written.
-    """
+    """Lay a changed recipe out for a build, with the scene's own mesh beside it."""
     with contextlib.ExitStack() as held:
         try:
             folder = held.enter_context(scratch_folder())

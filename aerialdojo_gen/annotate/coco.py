@@ -20,19 +20,7 @@ _DATE = (1980, 1, 1, 0, 0, 0)  # the same annotations give the same bytes
 
 
 def coco_zip(desk: Desk) -> bytes:
-    """Pack ``instances.json`` and ``images/*.png``.
-
-    Parameters
-    ----------
-    desk : Desk
-        The scene; every object with an anchor (the chosen one, else the best candidate) gives an image, and every
-        annotated object that an image shows gives a box in it.
-
-    Returns
-    -------
-    bytes
-        A ZIP archive; the same annotations give the same bytes.
-    """
+    """Pack ``instances.json`` and ``images/*.png``."""
     document, pictures = coco(desk)
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w") as archive:

@@ -21,18 +21,7 @@ _MENTION = re.compile(r"\b(landmarks|objects)\[(\d+)\]")
 
 
 class Describer:
-    """Says of annotations of one scene what is to be said; not for several threads at once.
-
-    Parameters
-    ----------
-    scene : Scene
-    names : mapping of str to str
-        What a person says for each category.
-    counts : (int, int) or None
-        How many landmarks and objects there must be.
-    looks : mapping of str to tuple of Look, optional
-        What the catalogue says of how each category looks.
-    """
+    """Says of annotations of one scene what is to be said; not for several threads at once."""
 
     def __init__(
         self, scene: Scene, names: Mapping[str, str], counts: tuple[int, int] | None, looks: Looks | None = None
@@ -43,11 +32,7 @@ class Describer:
     def describe(self, annotations: Annotations) -> dict[str, Any]:
         """Describe all entries.
 
-        Returns
-        -------
-        dict
-            ``landmarks`` and ``objects``, each entry with its keys, ``position_m`` and ``faults`` (field, message);
-            an object with ``landmark``, ``direction`` and what it ``lacks`` besides; ``faults`` of no entry.
+        JSON with ``landmarks``, ``objects`` (each with its ``faults``) and ``faults`` of the file.
         """
         source = parse_annotations(format_annotations(annotations))
         faults: dict[tuple[str, int], list[dict[str, str]]] = {}

@@ -32,20 +32,7 @@ from aerialdojo_gen.web.payload import scene_payload
 
 
 class Desk:
-    """What the page's requests come down to.
-
-    Parameters
-    ----------
-    name : str
-        Name of the scene; its table ``scenes`` must be up to date.
-    pipeline, roots
-        Configuration and folders.
-
-    Raises
-    ------
-    AnnotationError
-        There is an annotation file, and it cannot be read.
-    """
+    """What the page's requests come down to."""
 
     def __init__(self, name: str, pipeline: Pipeline, roots: Roots) -> None:
         self.storage = Storage(roots.annotations, name)
@@ -121,13 +108,7 @@ class Desk:
     # What changes them.
 
     def change(self, version: str, author: Author, operation: Operation) -> dict[str, Any]:
-        """Do an operation and save it; see `Storage.change`.
-
-        Raises
-        ------
-        AerialDojoError
-            Besides those: the node is not in the scene, or the anchor will not do.
-        """
+        """Do an operation and save it; see `Storage.change`."""
         fields = {} if operation.do == "remove" else operation.fields.given()
         if fields.get("node", "") and fields["node"] not in self.scene:
             raise AerialDojoError(f"no node {fields['node']!r} in the scene")
@@ -166,19 +147,9 @@ class Desk:
     # What is under the cursor, and anchors.
 
     def pick(self, origin_m: Sequence[float], direction: Sequence[float]) -> dict[str, Any] | None:
-        """Find what a ray hits first, on the mesh itself.
+        """Find what a ray (world frame, metres) hits first: node, category, point and bearing.
 
-        Parameters
-        ----------
-        origin_m : (3,) sequence of float
-            Metres, world frame.
-        direction : (3,) sequence of float
-            Any length but zero.
-
-        Returns
-        -------
-        dict or None
-            Node, category, what the mesh knows of it, the point, and the bearing that a task would state.
+        None where it hits nothing.
         """
         ray = np.asarray([direction], dtype=np.float64)
         if not 1e-9 < float(np.linalg.norm(ray)) < 1e9:
@@ -213,25 +184,7 @@ class Desk:
     # Boxes, where a foreign mesh has no node for a thing.
 
     def cut(self, low_m: Sequence[float], high_m: Sequence[float], category: str) -> dict[str, Any]:
-        """Make a node of what lies in a box, in the scene's recipe and in the scene.
-
-        Parameters
-        ----------
-        low_m, high_m : (3,) sequence of float
-            Corners, metres, world frame.
-        category : str
-            Of the new node.
-
-        Returns
-        -------
-        dict
-            What is known of the new node.
-
-        Raises
-        ------
-        AerialDojoError
-            The scene is not an imported one, or the box is empty.
-        """
+        """Make a node of what lies in a box (corners in world metres); only imported scenes can be cut."""
         slug = re.sub(r"[^a-z0-9]+", "_", category.lower()).strip("_")[:60]
         if not slug:
             raise AerialDojoError("give the thing a category")
@@ -284,26 +237,7 @@ def _told(record: Record) -> dict[str, Any]:
 
 
 def open_desk(name: str, pipeline: Pipeline, roots: Roots) -> Desk:
-    """Open a scene at the desk, building its mesh where that is not up to date.
-
-    Parameters
-    ----------
-    name : str
-        Name of a scene with a recipe.
-    pipeline, roots
-        Configuration and folders.
-
-    Returns
-    -------
-    Desk
-
-    Raises
-    ------
-    UsageError
-        There is no such scene.
-    AnnotationError
-        Its annotation file cannot be read.
-    """
+    """Open a scene at the desk, building its mesh where that is not up to date."""
     from aerialdojo_gen.pipeline.runner import chosen_scenes
 
     scenes = chosen_scenes(pipeline, roots, [name])

@@ -85,23 +85,12 @@ Operation = Annotated[Add | Change | Remove, Field(discriminator="do")]
 
 
 class Edit(_Strict):
-    """One entry before and after.
-
-    Attributes
-    ----------
-    kind : {"landmarks", "objects"}
-    id : int
-        Of the entry.
-    index : int
-        Its place in the list.
-    before, after : Entry or None
-        None where the entry is not there.
-    """
+    """One entry before and after."""
 
     kind: Kind
-    id: _Id
-    index: Annotated[StrictInt, Field(ge=0)]
-    before: Object | Landmark | None
+    id: _Id  # Of the entry
+    index: Annotated[StrictInt, Field(ge=0)]  # Its place in the list
+    before: Object | Landmark | None  # None where the entry is not there
     after: Object | Landmark | None
 
     def reversed(self) -> Edit:
@@ -116,29 +105,7 @@ def find(annotations: Annotations, kind: Kind, entry_id: int) -> tuple[int, Entr
 
 
 def edits_of(operation: Operation, annotations: Annotations, next_id: int) -> list[Edit]:
-    """Turn an operation into edits of the annotations as they are.
-
-    Parameters
-    ----------
-    operation : Operation
-        What is asked for.
-    annotations : Annotations
-        What it is asked of.
-    next_id : int
-        Id for a new entry.
-
-    Returns
-    -------
-    list of Edit
-        Empty where nothing would change.
-
-    Raises
-    ------
-    ConflictError
-        The entry is not there.
-    AerialDojoError
-        The fields are not those of the kind, or there are too many entries.
-    """
+    """Turn an operation into edits of the annotations as they are."""
     model: type[Entry] = Landmark if operation.kind == "landmarks" else Object
     entries: Sequence[Entry] = getattr(annotations, operation.kind)
     if isinstance(operation, Add):
@@ -169,24 +136,7 @@ def _entry(model: type[Entry], values: dict[str, Any]) -> Entry:
 
 
 def apply(annotations: Annotations, edits: Sequence[Edit]) -> Annotations:
-    """Apply edits to annotations.
-
-    Parameters
-    ----------
-    annotations : Annotations
-        As they are.
-    edits : sequence of Edit
-        In their order.
-
-    Returns
-    -------
-    Annotations
-
-    Raises
-    ------
-    ConflictError
-        An entry is not what an edit takes it for; nothing is applied.
-    """
+    """Apply edits to annotations."""
     lists: dict[Kind, list[Entry]] = {"landmarks": [*annotations.landmarks], "objects": [*annotations.objects]}
     for edit in edits:
         entries = lists[edit.kind]

@@ -58,46 +58,7 @@ def draft_scene(
     keep_objects: bool = False,
     reporter: Reporter | None = None,
 ) -> Path:
-    """Draft a scene's annotations and write them to the folder of annotations.
-
-    Parameters
-    ----------
-    name : str
-        Name of the scene; its recipe is built anew.
-    pipeline, roots
-        Configuration and folders.
-    n_landmarks : int, optional
-        How many; where absent the paper's number for the scene, or one or two for a scene that the paper lacks.
-    n_objects : int or "auto", optional
-        How many. Where absent the paper's number for the scene, else ``"auto"``: as many as can be drafted, up to 20.
-        For a scene that the paper does not count a number is the most: fewer are taken with a warning.
-    choice : Choice, optional
-        Where objects are taken from and how many of a kind; its `refuses` is set here. Where its `most` is absent and
-        the scene is imported, kinds are given room for all the objects that are wanted.
-    landmarks : tuple of str
-        Nodes that are to be landmarks; the rest is chosen among the catalogue's landmarks.
-    seed : int
-        The same seed gives the same draft.
-    force : bool
-        Overwrite an existing file.
-    keep_objects : bool
-        Describe the file's own objects anew instead of choosing others; `force` is implied.
-    reporter : Reporter, optional
-        Shows what is proposed before anything is looked at, and progress; nothing is shown where absent.
-
-    Returns
-    -------
-    Path
-        The annotation file.
-
-    Raises
-    ------
-    UsageError
-        The file exists.
-    AnnotationError
-        The scene has too few landmarks, or nothing in it can be reached, seen and told apart: how many of its parts
-        were refused, and why, and what to do instead.
-    """
+    """Draft a scene's annotations and write them to the folder of annotations."""
     path, reporter = roots.annotations / f"{name}.json", reporter or Reporter(quiet=True)
     if keep_objects:
         return _described_anew(name, path, roots, seed)
@@ -185,20 +146,7 @@ def _described_anew(name: str, path: Path, roots: Roots, seed: int) -> Path:
 
 
 def refusals(scene: Scene, pipeline: Pipeline, roots: Roots) -> Callable[[str], str]:
-    """Make the test why a node cannot be an object: it must have a full shortlist of anchors.
-
-    Parameters
-    ----------
-    scene : Scene
-        The scene.
-    pipeline, roots
-        Configuration and folders.
-
-    Returns
-    -------
-    callable
-        ``node -> str``, to follow "17 things"; empty where the node will do. Each is looked at once.
-    """
+    """Make the test why a node cannot be an object: it must have a full shortlist of anchors."""
     config = pipeline.anchor_sample
     world = World.of(scene, pipeline.embodiment.radius_m, config.margin_m)
     job = Job("anchor-sample", scene.name, 0, 1, pipeline.seed, pipeline.embodiment, roots)

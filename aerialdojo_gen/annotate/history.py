@@ -18,44 +18,21 @@ Action = Literal["do", "undo", "redo", "import", "outside"]
 
 
 class Record(BaseModel):
-    """A line of the history.
-
-    Attributes
-    ----------
-    time : str
-        UTC, ISO 8601.
-    who : str
-        Name that the person gave.
-    client : str
-        The browser tab, whose undo and redo this is a part of.
-    action : {"do", "undo", "redo", "import", "outside"}
-        ``outside``: the file was changed by something other than this tool.
-    what : str
-        In words.
-    before, after : str
-        Versions of the file (SHA-256 of its bytes, hexadecimal).
-    edits : list of Edit
-    """
+    """A line of the history."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
-    time: str
-    who: str
-    client: str
-    action: Action
-    what: str
-    before: str
+    time: str  # UTC, ISO 8601
+    who: str  # Name that the person gave
+    client: str  # The browser tab, whose undo and redo this is a part of
+    action: Action  # ``outside``: the file was changed by something other than this tool
+    what: str  # In words
+    before: str  # Versions of the file (SHA-256 of its bytes, hexadecimal)
     after: str
     edits: tuple[Edit, ...]
 
 
 class History:
-    """The lines of a history file, read on as it grows.
-
-    Parameters
-    ----------
-    path : Path
-        ``<scene>.history.jsonl``; need not exist.
-    """
+    """The lines of a history file, read on as it grows."""
 
     def __init__(self, path: Path) -> None:
         self.path = path

@@ -17,26 +17,7 @@ from aerialdojo_gen.web.serving import open_socket, serve, url_of
 
 
 def serve_desk(desk: Desk, *, port: int, host: str, browser: bool, say: Callable[[str], None]) -> None:
-    """Serve the tool.
-
-    Parameters
-    ----------
-    desk : Desk
-        The scene.
-    port : int
-        0 for a free one.
-    host : str
-        IPv4 address to listen on; any other than 127.0.0.1 makes a token, without which nothing is answered.
-    browser : bool
-        Open the page; not where a token is asked for.
-    say : callable
-        Takes the lines for the user.
-
-    Raises
-    ------
-    UsageError
-        The address is none, or the port is taken.
-    """
+    """Serve the tool."""
     from aerialdojo_gen.annotate.server import make_app
 
     try:
@@ -61,13 +42,7 @@ def serve_desk(desk: Desk, *, port: int, host: str, browser: bool, say: Callable
 
 
 def write_coco(desk: Desk, path: Path) -> Path:
-    """Write `coco_zip` to a file, whole or not at all.
-
-    Raises
-    ------
-    StoreError
-        The file cannot be written.
-    """
+    """Write `coco_zip` to a file, whole or not at all."""
     content = coco_zip(desk)
     desk.anchors.close()
     with atomic_file(path.parent, path.name) as temporary:

@@ -85,19 +85,7 @@ class Viewpoint(_Body):
 
 
 def make_app(desk: Desk, *, any_host: bool = False) -> FastAPI:
-    """Make the tool's web application.
-
-    Parameters
-    ----------
-    desk : Desk
-        The scene.
-    any_host : bool
-        Answer to any ``Host``: for a server that other machines reach, behind `access.TokenGate`.
-
-    Returns
-    -------
-    fastapi.FastAPI
-    """
+    """Make the tool's web application."""
     app = local_app(str(STATIC / "index.html"), f"annotate {desk.scene.name}", MOST_BYTES, any_host=any_host)
 
     @app.exception_handler(ConflictError)

@@ -35,20 +35,11 @@ from aerialdojo_gen.store.layout import check_scene_name
 
 @dataclass(frozen=True)
 class State:
-    """The file at one moment.
-
-    Attributes
-    ----------
-    annotations : Annotations
-    text : str
-        The file, byte for byte; empty where there is none yet.
-    version : str
-        SHA-256 of its bytes, hexadecimal.
-    """
+    """The file at one moment."""
 
     annotations: Annotations
-    text: str
-    version: str
+    text: str  # The file, byte for byte; empty where there is none yet
+    version: str  # SHA-256 of its bytes, hexadecimal
 
 
 @dataclass(frozen=True)
@@ -60,13 +51,7 @@ class Author:
 
 
 class StaleError(ConflictError):
-    """A change was made for another version of the file than the one on disk.
-
-    Attributes
-    ----------
-    state : State
-        The file as it is.
-    """
+    """A change was made for another version of the file than the one on disk."""
 
     def __init__(self, state: State) -> None:
         super().__init__("somebody else has changed these annotations since")
@@ -74,15 +59,7 @@ class StaleError(ConflictError):
 
 
 class Storage:
-    """The annotation file of one scene and its history.
-
-    Parameters
-    ----------
-    folder : Path
-        The folder of annotations; made with the first change where it is missing.
-    scene : str
-        Name of the scene.
-    """
+    """The annotation file of one scene and its history."""
 
     def __init__(self, folder: Path, scene: str) -> None:
         self.scene = check_scene_name(scene)
@@ -92,13 +69,7 @@ class Storage:
         self._read: State | None = None
 
     def load(self) -> State:
-        """Read the file, and finish what a crash left half done.
-
-        Raises
-        ------
-        AnnotationError
-            It is no annotation file, or one of another scene: nothing can be saved until that is mended.
-        """
+        """Read the file, and finish what a crash left half done."""
         if self._temporary.exists():
             with self.locked():
                 self._recover()
@@ -122,27 +93,7 @@ class Storage:
         return parse_whole(raw, self.scene, str(self.path))
 
     def change(self, version: str, author: Author, operation: Operation) -> tuple[State, Record | None]:
-        """Do what somebody asks for.
-
-        Parameters
-        ----------
-        version : str
-            Of the file that they saw.
-        author : Author
-        operation : Operation
-
-        Returns
-        -------
-        State, Record or None
-            The file after it, and the line of the history; None where nothing changed, and nothing was written.
-
-        Raises
-        ------
-        StaleError
-            The file has another version by now.
-        ConflictError
-            The entry is not there.
-        """
+        """Do what somebody asks for."""
 
         def edits(state: State) -> list[Edit]:
             return edits_of(operation, state.annotations, self._next_id(state, operation.kind))
@@ -257,13 +208,7 @@ class Storage:
 
 
 def parse_whole(raw: bytes, scene: str, name: str) -> Annotations:
-    """Read an annotation file that has no fault of form.
-
-    Raises
-    ------
-    AnnotationError
-        It has one; the message names the first.
-    """
+    """Read an annotation file that has no fault of form."""
     try:
         source = parse_annotations(raw.decode("utf-8"))
     except UnicodeDecodeError as error:

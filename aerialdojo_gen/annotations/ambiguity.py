@@ -30,20 +30,9 @@ class Bearing:
 
 
 def nearest_landmark(centre_m: NDArray[np.float64], landmarks_m: NDArray[np.float64]) -> Bearing | None:
-    """Find the landmark that an object is located by (paper, section on goals).
+    """Find the nearest landmark in the plan (paper, section on goals).
 
-    Parameters
-    ----------
-    centre_m : (2,) or (3,) float64
-        Centre of the object's box, metres, world frame; z plays no part.
-    landmarks_m : (n, 2) or (n, 3) float64
-        Centres of the landmarks' boxes.
-
-    Returns
-    -------
-    Bearing or None
-        Of landmarks at the same distance the first; None without landmarks or where the nearest coincides with
-        the object in the plane, so that there is no direction.
+    Centres in world metres, None if there is no direction.
     """
     if len(landmarks_m) == 0:
         return None
@@ -60,17 +49,7 @@ def first_sentence(text: str) -> str:
 
 
 class Ambiguity:
-    """The check of descriptions against one scene.
-
-    Parameters
-    ----------
-    geometry : SceneGeometry
-        The scene's.
-    lexicon : Lexicon
-        Its phrases.
-    landmarks : sequence of int
-        Indices of the landmarks' instances, in the order of their ids.
-    """
+    """The check of descriptions against one scene."""
 
     def __init__(self, geometry: SceneGeometry, lexicon: Lexicon, landmarks: Sequence[int]) -> None:
         self.geometry = geometry
@@ -99,20 +78,7 @@ class Ambiguity:
         return [j for j in self._alike[category, self._bearings[i]] if j != i]
 
     def rivals(self, i: int, description: str) -> list[int]:
-        """Instances that a description of `i` fits as well.
-
-        Parameters
-        ----------
-        i : int
-            Index of the instance that is described.
-        description : str
-            English.
-
-        Returns
-        -------
-        list of int
-            Indices; empty where the description is unambiguous.
-        """
+        """Instances that a description of `i` fits as well."""
         candidates = self.candidates(i)
         if not candidates:
             return []
@@ -135,18 +101,6 @@ class Ambiguity:
         """Instances that the name and the first sentence of a description of `i` fit as well.
 
         Who looks for a thing may have read no farther.
-
-        Parameters
-        ----------
-        i : int
-            Index of the instance that is described.
-        name, description : str
-            English.
-
-        Returns
-        -------
-        list of int
-            Indices; empty where the first sentence tells it from all others.
         """
         return self.rivals(i, f"The {name}: {first_sentence(description)}")
 

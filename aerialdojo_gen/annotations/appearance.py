@@ -21,26 +21,7 @@ _EMPTY = frozenset({"a", "an", "the", "of", "on", "in", "its", "it", "and", "wit
 def unlike(
     text: str, instance: Instance, looks: Looks, materials: Mapping[str, Material], surface: Surface | None = None
 ) -> Iterator[str]:
-    """Say which of the catalogue's phrases stand in a text and are not so of its instance, or not to be seen.
-
-    Parameters
-    ----------
-    text : str
-        English.
-    instance : Instance
-        That the text is of.
-    looks : mapping of str to tuple of Look
-        The phrases of each category.
-    materials : mapping of str to Material
-        Of its scene.
-    surface : Surface, optional
-        Its ground and water; without it nothing is asked of what they hide.
-
-    Yields
-    ------
-    str
-        A message for each phrase, with the claim that fails.
-    """
+    """Say which of the catalogue's phrases stand in a text and are not so of its instance, or not to be seen."""
     said = _plain(text)
     for look in looks.get(instance.category, ()):
         if f" {_plain(look.say).strip()} " in said:
@@ -52,22 +33,7 @@ def unlike(
 
 
 def discoloured(text: str, instance: Instance, materials: Mapping[str, Material]) -> Iterator[str]:
-    """Say which of its colours a text says of an instance whose surface does not have it.
-
-    Parameters
-    ----------
-    text : str
-        English.
-    instance : Instance
-        That the text is of; its attribute ``colour`` is held against its materials where the text says it.
-    materials : mapping of str to Material
-        Of its scene.
-
-    Yields
-    ------
-    str
-        A message for each colour.
-    """
+    """Say which of its colours a text says of an instance whose surface does not have it."""
     value = instance.attributes.get("colour", "")
     if value and f" {_plain(value).strip()} " in _plain(text):
         for word in uncoloured(value, instance, materials):
@@ -75,21 +41,7 @@ def discoloured(text: str, instance: Instance, materials: Mapping[str, Material]
 
 
 def repeats(say: str, instance: Instance) -> bool:
-    """Whether a phrase says again what an attribute of its instance says.
-
-    Parameters
-    ----------
-    say : str
-        A phrase of the catalogue.
-    instance : Instance
-        Its name says its attributes: ``"with loose bricks on top"``.
-
-    Returns
-    -------
-    bool
-        True where all telling words of an attribute, two at least, or others of their stems stand in the phrase;
-        and where both say that it lacks the same.
-    """
+    """Whether a phrase says again what an attribute of its instance says."""
     said = _stems(say)
     for key, value in instance.attributes.items():
         telling = _stems(value)

@@ -20,13 +20,7 @@ _MOST_HIDDEN = 0.5
 
 
 class Surface:
-    """The upper side of a scene's ground and water.
-
-    Parameters
-    ----------
-    scene : Scene
-        Its instances of the ground, the terrain and the river are the surface.
-    """
+    """The upper side of a scene's ground and water."""
 
     def __init__(self, scene: Scene) -> None:
         self._scene = scene
@@ -46,19 +40,9 @@ class Surface:
         return shapely.STRtree(shapes[solid]), corners[solid]
 
     def hidden(self, instance: Instance, faces: NDArray[np.int64]) -> float:
-        """Share of some faces' area that lies under the surface.
+        """Share, 0 to 1, of the area of `faces`, (k,) indices into the instance's faces.
 
-        Parameters
-        ----------
-        instance : Instance
-            Of the scene. What is higher than its top, like a bridge's deck, is no surface to it.
-        faces : (k,) int64
-            Indices into its `faces`.
-
-        Returns
-        -------
-        float
-            0 to 1.
+        That lies under the surface.
         """
         under, areas = self._under(instance)
         return float(areas[faces][under[faces]].sum() / max(areas[faces].sum(), 1e-12))

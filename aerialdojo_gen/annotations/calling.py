@@ -39,13 +39,7 @@ _SPELT = {"gray": "grey", "golden": "gold", "silvery": "silver", "aqua": "turquo
 
 
 class Callings:
-    """The things and colours that a name can speak of.
-
-    Parameters
-    ----------
-    names : mapping of str to str
-        What a person says for each category of the catalogue.
-    """
+    """The things and colours that a name can speak of."""
 
     def __init__(self, names: Mapping[str, str]) -> None:
         self._categories: dict[tuple[str, ...], set[str]] = {}
@@ -57,20 +51,7 @@ class Callings:
         self._longest = max(map(len, self._categories), default=0)
 
     def contradictions(self, text: str, instance: Instance) -> Iterator[str]:
-        """Say what a name or a description calls an instance that the mesh says it is not.
-
-        Parameters
-        ----------
-        text : str
-            English.
-        instance : Instance
-            Of a scene that is made of the catalogue.
-
-        Yields
-        ------
-        str
-            A message for each.
-        """
+        """Say what a name or a description calls an instance that the mesh says it is not."""
         thing, colours = self._head(text)
         if thing and instance.category not in self._categories[thing]:
             # A stone wall may be the catalogue's garden wall: words in common are no contradiction.

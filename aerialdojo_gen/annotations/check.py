@@ -37,29 +37,7 @@ def check_source(
     geometry: SceneGeometry | None = None,
     looks: Looks | None = None,
 ) -> list[Fault]:
-    """Hold an annotation file against its scene.
-
-    Parameters
-    ----------
-    source : Source
-        The file as read by `parse_annotations`.
-    scene : Scene
-        The scene that it must be of.
-    names : mapping of str to str
-        The catalogue's categories and what a person says for each. A node has the category that its recipe gave
-        it; in an imported scene, which guesses from the file's names, a person may choose another one.
-    counts : (int, int) or None
-        How many landmarks and objects there must be; None where any number will do.
-    geometry : SceneGeometry, optional
-        The scene's, where the caller has it: it remembers what it has computed.
-    looks : mapping of str to tuple of Look, optional
-        What the catalogue says of how each category looks.
-
-    Returns
-    -------
-    list of Fault
-        Every fault, the form's included, in the order of the file's lines; empty where the file is right.
-    """
+    """Check an annotation file against its scene and return every fault, in the order of the file's lines."""
     faults = list(source.faults)
     if source.document.value is not None:
         if source.scene and source.scene != scene.name:
@@ -245,21 +223,7 @@ def make_ambiguity(
     order: Sequence[str],
     geometry: SceneGeometry | None = None,
 ) -> Ambiguity:
-    """Make the check of ambiguity of a scene.
-
-    Parameters
-    ----------
-    scene : Scene
-        The scene.
-    names : mapping of str to str
-        What a person says for each category.
-    landmarks : mapping of str to str
-        Name and node of each landmark.
-    order : sequence of str
-        The landmarks' nodes in the order of their ids.
-    geometry : SceneGeometry, optional
-        The scene's, where the caller has it.
-    """
+    """Make the check of ambiguity of a scene."""
     geometry = geometry or SceneGeometry(scene)
     bound = None if scene.imported else places_of(scene.name)
     places = None if bound is None else Places(geometry, bound)

@@ -81,22 +81,11 @@ def _tokens(text: str) -> list[str]:
 
 @dataclass(frozen=True)
 class Claim:
-    """A relation that a description asserts of its object.
-
-    Attributes
-    ----------
-    relation : str
-        ``beside``, ``against``, ``at``, ``near``, ``front``, ``behind``, ``on``, ``under``, ``above``, ``between`` or
-        ``side:<compass direction>``.
-    things : tuple of frozenset of int
-        For each thing named, the instances that answer to what is said of it; two for ``between``, else one.
-    text : str
-        The words, for messages.
-    """
+    """A relation that a description asserts of its object."""
 
     relation: str
     things: tuple[frozenset[int], ...]
-    text: str
+    text: str  # The words, for messages
 
     def holds(self, geometry: SceneGeometry, i: int, slack: float = 1.0) -> bool:
         """Whether the claim is true of instance `i`; see `relations` for `slack`."""
@@ -121,27 +110,13 @@ _TESTS: Mapping[str, Callable[[SceneGeometry, int, int, float], bool]] = {
 
 @dataclass(frozen=True)
 class Reading:
-    """What was read out of a text.
+    """What was read out of a text."""
 
-    Attributes
-    ----------
-    values : tuple of str
-        Attribute values said of the subject, anywhere.
-    named : tuple of str
-        Those that stand directly before the subject's own name: what it is called.
-    claims : tuple of Claim
-        Relations asserted of the subject.
-    subjects : tuple of str
-        Names of things that stand in no relation: what the text calls the subject.
-    places : tuple of str
-        Phrases of place, in lower case, bound to conditions or not.
-    """
-
-    values: tuple[str, ...]
-    named: tuple[str, ...]
-    claims: tuple[Claim, ...]
-    subjects: tuple[str, ...] = ()
-    places: tuple[str, ...] = ()
+    values: tuple[str, ...]  # Attribute values said of the subject, anywhere
+    named: tuple[str, ...]  # Those that stand directly before the subject's own name: what it is called
+    claims: tuple[Claim, ...]  # Relations asserted of the subject
+    subjects: tuple[str, ...] = ()  # Names of things that stand in no relation: what the text calls the subject
+    places: tuple[str, ...] = ()  # Phrases of place, in lower case, bound to conditions or not
 
 
 @dataclass
@@ -164,19 +139,7 @@ class _State:
 
 
 class Lexicon:
-    """The phrases that descriptions of a scene can be made of.
-
-    Parameters
-    ----------
-    geometry : SceneGeometry
-        The scene's.
-    names : mapping of str to str
-        What a person says for each category; a category that is not in it is called by its words.
-    landmarks : mapping of str to int
-        Name of each landmark and the index of its instance.
-    places : Places, optional
-        What the scene's phrases of place claim. Without it they are values like others: a scene of one's own.
-    """
+    """The phrases that descriptions of a scene can be made of."""
 
     def __init__(
         self,
@@ -239,20 +202,7 @@ class Lexicon:
             self._phrases[tokens] = (kind, meaning)
 
     def read(self, text: str, subject: int) -> Reading:
-        """Read a description or a name.
-
-        Parameters
-        ----------
-        text : str
-            English.
-        subject : int
-            Index of the instance that the text is of.
-
-        Returns
-        -------
-        Reading
-            What the text says of it.
-        """
+        """Read a description or a name."""
         tokens = _tokens(text)
         state, at = _State(), 0
         while at < len(tokens):

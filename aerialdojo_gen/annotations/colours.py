@@ -38,20 +38,7 @@ _ALONE, _AMONG = 0.1, 0.03
 
 
 def colour_shares(instance: Instance, materials: Mapping[str, Material]) -> dict[str, float]:
-    """Sum the surface of an instance by what a person may call its colours.
-
-    Parameters
-    ----------
-    instance : Instance
-        The thing.
-    materials : mapping of str to Material
-        Of its scene.
-
-    Returns
-    -------
-    dict of str to float
-        Share of the area by `colour_name`; what may be called two colours counts for both.
-    """
+    """Sum the surface of an instance by what a person may call its colours."""
     shares: dict[str, float] = {}
     whole = 0.0
     if any(materials[part.material].atlas for part in instance.parts):
@@ -103,22 +90,7 @@ def colour_words(text: str) -> list[str]:
 
 
 def uncoloured(text: str, instance: Instance, materials: Mapping[str, Material]) -> list[str]:
-    """List the colours of a text that an instance's surface does not bear out.
-
-    Parameters
-    ----------
-    text : str
-        What is said of the whole, e.g. ``"dark green"`` or ``"blue and white"``.
-    instance : Instance
-        The thing.
-    materials : mapping of str to Material
-        Of its scene.
-
-    Returns
-    -------
-    list of str
-        Colours of which too little is there: under a tenth of the surface, of several or of a part under 3 % each.
-    """
+    """List the colours of a text that an instance's surface does not bear out."""
     words = colour_words(text)
     shares = colour_shares(instance, materials)
     alone = [word for word in re.findall(r"[a-z]+", text.lower()) if word not in _DEGREES] == words[:1]

@@ -21,28 +21,7 @@ def compose(
     rng: np.random.Generator,
     used: dict[str, int],
 ) -> tuple[str, str]:
-    """Compose a description of one to three sentences.
-
-    Parameters
-    ----------
-    words, noun : Words, Noun
-        Of the thing described.
-    place : str
-        E.g. ``"in the car park"``; may be empty where there are facts.
-    needed : list of str
-        E.g. ``"beside a red mailbox"``: what tells the thing from others; all of it goes into the first sentence.
-    extra : list of str
-        What is said besides, in a sentence of its own.
-    rng : numpy.random.Generator
-        Chooses look, template and joints.
-    used : dict of str to int
-        How often each template and each look served already in this scene: the least used are chosen from.
-
-    Returns
-    -------
-    (str, str)
-        The description, and the template that it was made from.
-    """
+    """Compose a description of one to three sentences; returns it and the template that it was made from."""
     if place and needed and place.split()[0] == needed[0].split()[0] == "beside":
         needed = [needed[0].replace("beside", "next to", 1), *needed[1:]]
     look = _least_used(words.looks, rng, used) if words.looks else ""

@@ -35,15 +35,7 @@ _WORTH_SAYING = 0.35
 
 
 class Vocabulary:
-    """Words and nouns of a scene's instances.
-
-    Parameters
-    ----------
-    scene : Scene
-        The scene.
-    catalogue : Catalogue
-        Names, kinds and looks of its categories.
-    """
+    """Words and nouns of a scene's instances."""
 
     def __init__(self, scene: Scene, catalogue: Catalogue) -> None:
         self.scene = scene
@@ -95,17 +87,7 @@ class Vocabulary:
 
 
 class Teller:
-    """Describes instances of one scene.
-
-    Parameters
-    ----------
-    vocabulary : Vocabulary
-        The scene's.
-    landmarks : sequence of Landmark
-        Its landmarks.
-    seed : int
-        The same seed gives the same words.
-    """
+    """Describes instances of one scene."""
 
     def __init__(self, vocabulary: Vocabulary, landmarks: Sequence[Landmark], seed: int) -> None:
         self._vocabulary, self._scene, self._seed = vocabulary, vocabulary.scene, seed
@@ -122,22 +104,7 @@ class Teller:
         return not self._vocabulary.faults(self._scene.instances[i], name) and not self.ambiguity.untruths(i, name)
 
     def describe(self, i: int, others: Collection[str], name: str = "") -> str | None:
-        """Describe an instance.
-
-        Parameters
-        ----------
-        i : int
-            Its index.
-        others : collection of str
-            Descriptions that are taken.
-        name : str
-            What it is called; its noun where empty.
-
-        Returns
-        -------
-        str or None
-            One to three sentences that pass the checks of `annotate-import`; None where there are none.
-        """
+        """Describe an instance."""
         instance, noun = self._scene.instances[i], self._vocabulary.nouns[i]
         words = replace(self._vocabulary.words[i], looks=self._vocabulary.looks(instance))
         rng = generator(self._seed, STAGE, self._scene.name, instance.node)

@@ -32,35 +32,15 @@ _NOWHERE = "in no direction of a landmark, or outside the bounds"
 
 @dataclass(frozen=True)
 class Choice:
-    """Which instances may become objects, and how many of a kind.
-
-    Attributes
-    ----------
-    refuses : callable or None
-        ``node -> str``: why it cannot be an object, to follow "17 things", e.g. ``"without anchors"``; empty where it
-        can. Asked as late as possible. None lets all in.
-    centre_m : tuple of two float or None
-        Middle of the core that objects are taken from; the landmarks' mean where absent.
-    within_m : float or None
-        Radius of the core; None for the whole scene. How long tasks are hangs on it.
-    core_share : float
-        Share of the objects that come from the core; the others may stand anywhere.
-    aloft_share : float
-        Share of the core's objects that is taken from what stands 3 m above z = 0 or higher, as far as there is any:
-        roofs and decks against the street make routes that are not straight.
-    most_vegetation : int
-        Most objects of one category of vegetation.
-    most : int or None
-        Most objects of any other category; 5 where absent.
-    """
+    """Which instances may become objects, and how many of a kind."""
 
     refuses: Callable[[str], str] | None = None
     centre_m: tuple[float, float] | None = None
-    within_m: float | None = None
-    core_share: float = 1.0
+    within_m: float | None = None  # Radius of the core; None for the whole scene. How long tasks are hangs on it
+    core_share: float = 1.0  # Share of the objects that come from the core; the others may stand anywhere
     aloft_share: float = 0.0
-    most_vegetation: int = 3
-    most: int | None = None
+    most_vegetation: int = 3  # Most objects of one category of vegetation
+    most: int | None = None  # Most objects of any other category; 5 where absent
 
 
 def draft_annotations(
@@ -72,33 +52,7 @@ def draft_annotations(
     choice: Choice | None = None,
     landmarks: Sequence[str] = (),
 ) -> Annotations:
-    """Draft the annotations of a scene.
-
-    Parameters
-    ----------
-    scene : Scene
-        The scene.
-    catalogue : Catalogue
-        Names and kinds of its categories.
-    n_landmarks, n_objects : int
-        How many of each.
-    seed : int
-        The same seed gives the same draft.
-    choice : Choice or None
-        Which instances may become objects.
-    landmarks : sequence of str
-        Nodes of landmarks that are wanted; the rest is chosen among the catalogue's kind ``landmark``.
-
-    Returns
-    -------
-    Annotations
-        It passes `check.check_source`.
-
-    Raises
-    ------
-    AnnotationError
-        The scene has too few landmarks, or too few things that can be described without ambiguity.
-    """
+    """Draft the annotations of a scene."""
     vocabulary = Vocabulary(scene, catalogue)
     drafter = Drafter(vocabulary, choose_landmarks(vocabulary, n_landmarks, landmarks), seed, choice or Choice())
     objects = drafter.objects(n_objects)
@@ -111,28 +65,7 @@ def draft_annotations(
 
 
 class Drafter:
-    """Chooses and describes the objects of a scene.
-
-    Parameters
-    ----------
-    vocabulary : Vocabulary
-        The scene's.
-    marks : tuple of Landmark
-        Its landmarks.
-    seed : int
-        The same seed gives the same draft.
-    choice : Choice
-        Which instances may become objects.
-
-    Attributes
-    ----------
-    things : tuple of int
-        Indices of what may become an object before anything is looked at closely: what is no landmark and no ground.
-    refused : Counter of str
-        How many of those were looked at and not taken, by why.
-    confused : list of (str, sequence of str)
-        Nodes of what could not be told apart, and the nodes that what can be said of them fits as well.
-    """
+    """Chooses and describes the objects of a scene."""
 
     def __init__(self, vocabulary: Vocabulary, marks: tuple[Landmark, ...], seed: int, choice: Choice) -> None:
         self._vocabulary, self._scene, self._seed, self._choice = vocabulary, vocabulary.scene, seed, choice

@@ -22,40 +22,16 @@ _SMALLEST_M = 0.3
 
 @dataclass(frozen=True)
 class Fact:
-    """A relation of an instance to others, in words.
+    """A relation of an instance to others, in words."""
 
-    Attributes
-    ----------
-    text : str
-        ``"beside a red mailbox"``.
-    claims : tuple of Claim
-        The same as the check reads it.
-    weight : float
-        How natural it is to say; higher first.
-    things : frozenset of int
-        Indices of what it speaks of.
-    """
-
-    text: str
-    claims: tuple[Claim, ...]
-    weight: float
-    things: frozenset[int]
+    text: str  # ``"beside a red mailbox"``
+    claims: tuple[Claim, ...]  # The same as the check reads it
+    weight: float  # How natural it is to say; higher first
+    things: frozenset[int]  # Indices of what it speaks of
 
 
 class FactFinder:
-    """Finds facts about the instances of one scene.
-
-    Parameters
-    ----------
-    ambiguity : Ambiguity
-        The scene's geometry, lexicon and landmarks.
-    words : list of Words
-        Of every instance.
-    nouns : list of Noun
-        Of every instance.
-    landmarks : dict of int to str
-        Names of the landmarks by index.
-    """
+    """Finds facts about the instances of one scene."""
 
     def __init__(
         self, ambiguity: Ambiguity, words: list[Words], nouns: list[Noun], landmarks: dict[int, str]
@@ -69,20 +45,7 @@ class FactFinder:
         self._short = Counter(n.short for n in nouns)
 
     def facts(self, i: int, rng: np.random.Generator) -> list[Fact]:
-        """List facts about instance `i`, the most natural first.
-
-        Parameters
-        ----------
-        i : int
-            Index in the scene.
-        rng : numpy.random.Generator
-            Chooses among wordings, and among facts that are about as natural.
-
-        Returns
-        -------
-        list of Fact
-            True of the mesh by `relations`, with a margin.
-        """
+        """List facts about instance `i`, the most natural first."""
         things = [j for j in self._geometry.around(i, _REACH_M) if self._may_refer(i, j)]
         gaps = {j: self._geometry.gap_m(i, j) for j in things}
         things.sort(key=lambda j: (-self._salience(j) / (1.5 + gaps[j]), j))

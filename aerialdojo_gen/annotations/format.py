@@ -27,18 +27,10 @@ class _Entry(BaseModel):
 
 
 class Anchor(_Entry):
-    """A viewpoint that a person chose for an object.
+    """A viewpoint that a person chose for an object."""
 
-    Attributes
-    ----------
-    position_m : tuple of three float
-        Position of the body's centre, metres, world frame.
-    yaw_deg : float
-        Degrees, counter-clockwise from +x.
-    """
-
-    position_m: tuple[_Finite, _Finite, _Finite]
-    yaw_deg: _Finite
+    position_m: tuple[_Finite, _Finite, _Finite]  # Position of the body's centre, metres, world frame
+    yaw_deg: _Finite  # Degrees, counter-clockwise from +x
 
 
 class Landmark(_Entry):
@@ -50,70 +42,34 @@ class Landmark(_Entry):
 
 
 class Object(_Entry):
-    """A target object.
+    """A target object."""
 
-    Attributes
-    ----------
-    id : int
-        Unique in the scene.
-    name : str
-        What a person would call it, e.g. ``"red delivery van"``.
-    category : str
-        Category of the catalogue, the node's own.
-    description : str
-        One to three sentences: what it looks like and what stands by it.
-    node : str
-        Node of the scene's mesh.
-    anchor : Anchor or None
-        The viewpoint that a person chose, where one did.
-    """
-
-    id: _Id
-    name: StrictStr
-    category: StrictStr
-    description: StrictStr
-    node: StrictStr
-    anchor: Anchor | None = None
+    id: _Id  # Unique in the scene
+    name: StrictStr  # What a person would call it, e.g. ``"red delivery van"``
+    category: StrictStr  # Category of the catalogue, the node's own
+    description: StrictStr  # One to three sentences: what it looks like and what stands by it
+    node: StrictStr  # Node of the scene's mesh
+    anchor: Anchor | None = None  # The viewpoint that a person chose, where one did
 
 
 @dataclass(frozen=True)
 class Annotations:
-    """The content of one annotation file.
+    """The content of one annotation file."""
 
-    Attributes
-    ----------
-    scene : str
-        Name of the scene.
-    landmarks : tuple of Landmark
-    objects : tuple of Object
-    """
-
-    scene: str
+    scene: str  # Name of the scene
     landmarks: tuple[Landmark, ...]
     objects: tuple[Object, ...]
 
 
 @dataclass(frozen=True)
 class Source:
-    """An annotation file as far as it could be read.
+    """An annotation file as far as it could be read."""
 
-    Attributes
-    ----------
-    document : Document
-        The JSON with the line of every value.
-    scene : str
-        What the file says, empty where it says nothing of the kind.
-    landmarks, objects : dict of int to entry
-        The well-formed entries by their index in the file.
-    faults : tuple of Fault
-        What is wrong with the form; an entry at fault is in neither dict.
-    """
-
-    document: Document
-    scene: str
-    landmarks: dict[int, Landmark]
+    document: Document  # The JSON with the line of every value
+    scene: str  # What the file says, empty where it says nothing of the kind
+    landmarks: dict[int, Landmark]  # The well-formed entries by their index in the file
     objects: dict[int, Object]
-    faults: tuple[Fault, ...]
+    faults: tuple[Fault, ...]  # What is wrong with the form; an entry at fault is in neither dict
 
     @property
     def annotations(self) -> Annotations:
@@ -125,18 +81,7 @@ _E = TypeVar("_E", bound=_Entry)
 
 
 def parse_annotations(text: str) -> Source:
-    """Read an annotation file's text.
-
-    Parameters
-    ----------
-    text : str
-        The whole file.
-
-    Returns
-    -------
-    Source
-        Every fault of the form is in it, with path and line; nothing is raised.
-    """
+    """Read an annotation file's text."""
     document = read_json(text)
     faults = list(document.faults)
     raw = document.value
@@ -160,18 +105,7 @@ def parse_annotations(text: str) -> Source:
 
 
 def format_annotations(annotations: Annotations) -> str:
-    """Write annotations as the file's text: two spaces of indent, one key a line, keys in a fixed order.
-
-    Parameters
-    ----------
-    annotations : Annotations
-        What to write; entries keep their order.
-
-    Returns
-    -------
-    str
-        `parse_annotations` reads the same back, and writing that gives the same text.
-    """
+    """Write annotations as the file's text: two spaces of indent, one key a line, keys in a fixed order."""
     return json.dumps(
         {
             "format": FORMAT,

@@ -14,30 +14,14 @@ _RISE_M = 3.0
 
 
 class Grounds:
-    """The surfaces of a scene's ground.
-
-    Parameters
-    ----------
-    geometry : SceneGeometry
-        The scene's.
-    """
+    """The surfaces of a scene's ground."""
 
     def __init__(self, geometry: SceneGeometry) -> None:
         self._geometry = geometry
         self._trees: dict[str, tuple[shapely.STRtree, np.ndarray]] = {}
 
     def within(self, i: int, pattern: str, most_m: float) -> bool:
-        """Whether ground of a material comes within a distance of an instance's outline, about level with its foot.
-
-        Parameters
-        ----------
-        i : int
-            Index of the instance.
-        pattern : str
-            Patterns of materials, parted by ``|``.
-        most_m : float
-            Metres, in the plane.
-        """
+        """Whether ground of a material comes within `most_m` metres of an instance's outline."""
         tree, heights = self._tree(pattern)
         hits = tree.query(self._geometry.outline(i), predicate="dwithin", distance=most_m)
         low = float(self._geometry.boxes[i, 0, 2])

@@ -21,29 +21,7 @@ _SIDES = (("northernmost", 1, 1.0), ("southernmost", 1, -1.0), ("easternmost", 0
 def choose_landmarks(
     vocabulary: Vocabulary, n: int, wanted: Sequence[str] = (), at_most: bool = False
 ) -> tuple[Landmark, ...]:
-    """Choose landmarks: the wanted, then the tallest, then whatever is farthest from the chosen.
-
-    Parameters
-    ----------
-    vocabulary : Vocabulary
-        The scene's.
-    n : int
-        How many.
-    wanted : sequence of str
-        Nodes that are to be landmarks, first of all.
-    at_most : bool
-        Fewer will do, if there is one.
-
-    Returns
-    -------
-    tuple of Landmark
-        In the order of their choice. In an imported scene each has a name that is so of it alone.
-
-    Raises
-    ------
-    AnnotationError
-        There are too few, or a wanted one has no name of its own.
-    """
+    """Choose landmarks: the wanted, then the tallest, then whatever is farthest from the chosen."""
     scene = vocabulary.scene
     missing = [node for node in wanted if node not in scene]
     if missing:

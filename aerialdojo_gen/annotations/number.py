@@ -16,18 +16,7 @@ _GROUPS = {word: group for group, words in _STUFF.items() for word in words}
 
 
 def group_of(name: str) -> str:
-    """Say what makes one thing of a name.
-
-    Parameters
-    ----------
-    name : str
-        ``"autumn leaves"``, ``"grass"`` or ``"bus"``.
-
-    Returns
-    -------
-    str
-        ``"a group of"``, ``"a patch of"``; empty where the name is of one thing.
-    """
+    """Say what makes one thing of a name."""
     word = name.lower().split()[-1] if name.split() else ""
     if word in _GROUPS:
         return _GROUPS[word]

@@ -27,31 +27,15 @@ _VERBS = {"vehicle": ("is parked", "parked"), "vegetation": ("grows", "growing")
 
 @dataclass(frozen=True)
 class Words:
-    """What drafts say of a category.
+    """What drafts say of a category."""
 
-    Attributes
-    ----------
-    name : str
-        What a person calls it.
-    looks : tuple of str
-        Noun phrases to follow "with" or "it has".
-    verb, participle : str
-        ``"stands"`` and ``"standing"``, or what suits the thing better.
-    group : str
-        For plural names, what makes one thing of them: ``"a patch of"``; else empty.
-    reference : bool
-        Whether a description of something else may refer to it.
-    target : bool
-        Whether a draft may make it an object.
-    """
-
-    name: str
-    looks: tuple[str, ...] = ()
-    verb: str = "stands"
+    name: str  # What a person calls it
+    looks: tuple[str, ...] = ()  # Noun phrases to follow "with" or "it has"
+    verb: str = "stands"  # ``"stands"`` and ``"standing"``, or what suits the thing better
     participle: str = "standing"
-    group: str = ""
-    reference: bool = True
-    target: bool = True
+    group: str = ""  # For plural names, what makes one thing of them: ``"a patch of"``; else empty
+    reference: bool = True  # Whether a description of something else may refer to it
+    target: bool = True  # Whether a draft may make it an object
 
 
 @cache
@@ -78,25 +62,7 @@ def _colours() -> frozenset[str]:
 
 
 def words_of(category: str, name: str | None, kind: str, looks: tuple[str, ...] = (), target: bool = True) -> Words:
-    """Look up what drafts say of a category.
-
-    Parameters
-    ----------
-    category : str
-        E.g. ``"delivery_van"``.
-    name : str or None
-        The catalogue's name; None for structure, which is neither target nor reference unless the phrases say so.
-    kind : str
-        The catalogue's kind, empty for structure.
-    looks : tuple of str
-        Those of the catalogue's phrases that are so of the instance.
-    target : bool
-        Whether the catalogue lets tasks ask for it.
-
-    Returns
-    -------
-    Words
-    """
+    """Look up what drafts say of a category."""
     entry = _tables()[0].get(category, {})
     verb, participle = _VERBS.get(kind, ("stands", "standing"))
     in_catalogue = name is not None
@@ -113,24 +79,12 @@ def words_of(category: str, name: str | None, kind: str, looks: tuple[str, ...] 
 
 @dataclass(frozen=True)
 class Noun:
-    """A noun phrase in its pieces.
+    """A noun phrase in its pieces."""
 
-    Attributes
-    ----------
-    adjectives : tuple of str
-        Before the name.
-    name : str
-        The category's.
-    after : str
-        After it: ``"with a black roof"``; may be empty.
-    group : str
-        See `Words`.
-    """
-
-    adjectives: tuple[str, ...]
-    name: str
-    after: str
-    group: str
+    adjectives: tuple[str, ...]  # Before the name
+    name: str  # The category's
+    after: str  # After it: ``"with a black roof"``; may be empty
+    group: str  # See `Words`
 
     @property
     def bare(self) -> str:
@@ -153,20 +107,7 @@ class Noun:
 
 
 def noun_of(instance: Instance, words: Words) -> Noun:
-    """Make the noun phrase that says an instance's attributes.
-
-    Parameters
-    ----------
-    instance : Instance
-        Its attributes are what is said.
-    words : Words
-        Of its category.
-
-    Returns
-    -------
-    Noun
-        ``a red delivery van with a white stripe``.
-    """
+    """Make the noun phrase that says an instance's attributes."""
     called, group = (instance.attributes.get(key, "") for key in ("called", "group"))
     if called or group:
         words = replace(words, name=called or words.name, group=group or words.group)

@@ -32,23 +32,7 @@ _MOST_AMONG_M = 15.0
 
 @cache
 def places_of(scene: str) -> Mapping[str, Conditions] | None:
-    """Look up the phrases of place of a scene.
-
-    Parameters
-    ----------
-    scene : str
-        E.g. ``"U_Factory_0"``.
-
-    Returns
-    -------
-    mapping of str to mapping, or None
-        The conditions of each phrase; None for a scene that no file knows, such as one of one's own.
-
-    Raises
-    ------
-    AnnotationError
-        The file is wrong: names the phrase and the key.
-    """
+    """Look up the phrases of place of a scene."""
     path = _FOLDER / f"{scene.rpartition('_')[0]}.toml"
     tables = read_toml(path, AnnotationError) if path.is_file() else {}
     if scene not in tables:

@@ -27,15 +27,7 @@ _CORNERS: Mapping[str, tuple[int, int]] = {
 
 
 class Places:
-    """The phrases of place of one scene.
-
-    Parameters
-    ----------
-    geometry : SceneGeometry
-        The scene's.
-    phrases : mapping of str to mapping
-        The conditions of each phrase (`place_files.places_of`).
-    """
+    """The phrases of place of one scene."""
 
     def __init__(self, geometry: SceneGeometry, phrases: Mapping[str, Conditions]) -> None:
         self._geometry = geometry
@@ -54,22 +46,7 @@ class Places:
         return sorted(self._phrases)
 
     def fault(self, i: int, phrase: str, slack: float = 1.0) -> str:
-        """Say which condition of a phrase is not so of instance `i`.
-
-        Parameters
-        ----------
-        i : int
-            Index of the instance.
-        phrase : str
-            One that is bound, in lower case.
-        slack : float
-            Factor on lengths; above 1 for rivals, of which somebody might still think so.
-
-        Returns
-        -------
-        str
-            E.g. ``"near = 'coal_heap*'"``; empty where all hold.
-        """
+        """Say which condition of a phrase is not so of instance `i`."""
         key = i, phrase, slack
         if key not in self._found:
             conditions = self._phrases[phrase].items()

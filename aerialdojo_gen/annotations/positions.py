@@ -19,21 +19,11 @@ _HALF = re.compile("[\ud800-\udfff]")
 
 @dataclass(frozen=True)
 class Fault:
-    """Something wrong in an annotation file.
+    """Something wrong in an annotation file."""
 
-    Attributes
-    ----------
-    line : int
-        Counted from 1; 0 where no line can be named.
-    path : str
-        JSON path, e.g. ``"objects[3].node"``; empty for the file itself.
-    message : str
-        What is wrong, and the mend where one can be guessed.
-    """
-
-    line: int
-    path: str
-    message: str
+    line: int  # Counted from 1; 0 where no line can be named
+    path: str  # JSON path, e.g. ``"objects[3].node"``; empty for the file itself
+    message: str  # What is wrong, and the mend where one can be guessed
 
     def __str__(self) -> str:
         where = f"line {self.line}: " if self.line else ""
@@ -42,21 +32,11 @@ class Fault:
 
 @dataclass(frozen=True)
 class Document:
-    """A parsed JSON text.
+    """A parsed JSON text."""
 
-    Attributes
-    ----------
-    value : object
-        What `json.loads` would return; None where the text is not JSON.
-    lines : dict of path to int
-        Line of every value, counted from 1; the path ``()`` is the whole document.
-    faults : tuple of Fault
-        Syntax error, or keys that stand twice in one object.
-    """
-
-    value: Any
-    lines: dict[JsonPath, int]
-    faults: tuple[Fault, ...]
+    value: Any  # What `json.loads` would return; None where the text is not JSON
+    lines: dict[JsonPath, int]  # Line of every value, counted from 1; the path ``()`` is the whole document
+    faults: tuple[Fault, ...]  # Syntax error, or keys that stand twice in one object
 
     def fault(self, path: JsonPath, message: str) -> Fault:
         """Make a fault of the value at a path; where no such value stands, of the nearest one around it."""
@@ -104,19 +84,7 @@ class _Pairs(list[tuple[str, _Located]]):
 
 
 def read_json(text: str) -> Document:
-    """Parse a JSON text and note where every value stands.
-
-    Parameters
-    ----------
-    text : str
-        One JSON document.
-
-    Returns
-    -------
-    Document
-        A syntax error is a fault in it, with ``value`` None, and so is a text of more than `MOST_VALUES` values; of a
-        key that stands twice the last value is kept; half of a surrogate pair is a fault, and U+FFFD in the value.
-    """
+    """Parse a JSON text and note where every value stands."""
     if text.count(",") + text.count("[") + text.count("{") > MOST_VALUES:
         return Document(None, {}, (Fault(0, "", f"holds more than {MOST_VALUES} values"),))
     try:

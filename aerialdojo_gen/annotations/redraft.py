@@ -13,29 +13,7 @@ from aerialdojo_gen.scenes.model import Scene
 
 
 def redraft_annotations(scene: Scene, catalogue: Catalogue, annotations: Annotations, seed: int) -> Annotations:
-    """Describe the objects of annotations anew; which they are, their ids and their names stay.
-
-    Parameters
-    ----------
-    scene : Scene
-        The scene.
-    catalogue : Catalogue
-        Names, kinds and looks of its categories.
-    annotations : Annotations
-        Of the scene. A name that is not so of the mesh any more, or is another's of its kind, is replaced.
-    seed : int
-        The same seed gives the same words.
-
-    Returns
-    -------
-    Annotations
-        It passes `check.check_source` where the landmarks do.
-
-    Raises
-    ------
-    AnnotationError
-        A node is gone, or an object cannot be told from others of its kind.
-    """
+    """Describe the objects of annotations anew; which they are, their ids and their names stay."""
     for node in (*(m.node for m in annotations.landmarks), *(o.node for o in annotations.objects)):
         if node not in scene:
             raise AnnotationError(f"{scene.name}: no node {node!r} in the scene: draft the file anew")

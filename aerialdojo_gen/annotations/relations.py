@@ -40,13 +40,7 @@ _HELD = 3  # of five places below a thing
 
 
 class SceneGeometry:
-    """Distances and relations between the instances of a scene, each computed when first asked for.
-
-    Parameters
-    ----------
-    scene : Scene
-        The scene; instances are named by their index in it.
-    """
+    """Distances and relations between the instances of a scene, each computed when first asked for."""
 
     def __init__(self, scene: Scene) -> None:
         self.scene = scene

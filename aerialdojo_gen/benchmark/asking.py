@@ -20,18 +20,7 @@ class AgentError(AerialDojoError):
 
 
 class Asked:
-    """Asks an agent.
-
-    Parameters
-    ----------
-    agent : Agent
-    name : str
-        For messages.
-    secrets : Secrets
-        Kept out of messages and answers.
-    tolerate : bool
-        Take a value that is no action for an answer that names none, instead of raising.
-    """
+    """Asks an agent."""
 
     def __init__(self, agent: Agent, name: str, secrets: Secrets, tolerate: bool = False) -> None:
         self._agent, self._name, self._secrets, self._tolerate = agent, name, secrets, tolerate
@@ -41,13 +30,7 @@ class Asked:
         self.task = ""
 
     def reset(self, task_id: str, goal: Goal) -> None:
-        """Begin an episode.
-
-        Raises
-        ------
-        AgentError
-            The agent raised what it may not.
-        """
+        """Begin an episode."""
         self.task = task_id
         try:
             self._call("reset", self._agent.reset, goal)
@@ -55,13 +38,7 @@ class Asked:
             raise self._wrong(f"raised InvalidAnswer in reset, where there is nothing to answer: {error}") from error
 
     def act(self, observation: Observation) -> int | None:
-        """Ask for an action; None for an answer that names none.
-
-        Raises
-        ------
-        AgentError
-            The agent raised what it may not, or returned what is no action.
-        """
+        """Ask for an action; None for an answer that names none."""
         try:
             answer = self._call("act", self._agent.act, observation)
         except InvalidAnswer:

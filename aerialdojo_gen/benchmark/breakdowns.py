@@ -95,22 +95,9 @@ def average_table(runs: Sequence[Run], profile: Profile) -> Table:
 def part_table(
     title: str, runs: Sequence[Run], profile: Profile, parts: Sequence[tuple[str, Sequence[Bools]]], note: str = ""
 ) -> Table | None:
-    """Set parts of the episodes beside one another: SR, SR-view, OSR, SPL.
+    """Set parts of the episodes, boolean masks of (n,) a run, beside one another.
 
-    Parameters
-    ----------
-    title : str
-    runs : sequence of Run
-    profile : Profile
-    parts : sequence of (str, sequence of (n,) bool)
-        Heading of a part, and which episodes of every run belong to it.
-    note : str
-        What the parts are.
-
-    Returns
-    -------
-    Table or None
-        None where not two parts have episodes.
+    None where not two parts have episodes.
     """
     there = [(head, masks) for head, masks in parts if any(np.any(mask) for mask in masks)]
     if len(there) < 2:

@@ -20,30 +20,14 @@ from aerialdojo_gen.store.root import DataRoot
 
 @dataclass(frozen=True)
 class Wanted:
-    """What a report is made of.
+    """What a report is made of."""
 
-    Attributes
-    ----------
-    data : DataRoot
-        The data root, whose release says more of the tasks; the runs need not lie in it.
-    runs : sequence of Run
-        In the order and the groups of the lines.
-    profiles : sequence of Profile
-        Rules of success; what has room for one judges by the first.
-    radii_m : sequence of float
-        Of the table of radii, metres.
-    intervals : bool
-        Whether 95 % intervals are shown.
-    beside : sequence of PaperResult
-        The paper's results, to be set beside ours.
-    """
-
-    data: DataRoot
-    runs: Sequence[Run]
-    profiles: Sequence[Profile]
-    radii_m: Sequence[float] = radii.DEFAULT_RADII_M
-    intervals: bool = True
-    beside: Sequence[PaperResult] = ()
+    data: DataRoot  # The data root, whose release says more of the tasks; the runs need not lie in it
+    runs: Sequence[Run]  # In the order and the groups of the lines
+    profiles: Sequence[Profile]  # Rules of success; what has room for one judges by the first
+    radii_m: Sequence[float] = radii.DEFAULT_RADII_M  # Of the table of radii, metres
+    intervals: bool = True  # Whether 95 % intervals are shown
+    beside: Sequence[PaperResult] = ()  # The paper's results, to be set beside ours
 
     @cached_property
     def partings(self) -> Partings:
@@ -78,25 +62,7 @@ DEFAULT = ("results",)
 
 
 def report_tables(wanted: Wanted, names: Sequence[str] = DEFAULT) -> list[Table]:
-    """Make tables.
-
-    Parameters
-    ----------
-    wanted : Wanted
-        What they are made of.
-    names : sequence of str
-        Of `NAMES`; ``all`` for all of them.
-
-    Returns
-    -------
-    list of Table
-        In the report's order, each once.
-
-    Raises
-    ------
-    UsageError
-        There is no table of that name.
-    """
+    """Make tables."""
     return [table for made in named_tables(wanted, names).values() for table in made]
 
 

@@ -91,56 +91,29 @@ _BREAKDOWNS = (
 
 @dataclass(frozen=True)
 class Part:
-    """Some of the episodes of every run.
+    """Some of the episodes of every run."""
 
-    Attributes
-    ----------
-    head : str
-        What they have in common.
-    masks : tuple of (n,) bool
-        Which of them, a run each.
-    """
-
-    head: str
-    masks: tuple[Bools, ...]
+    head: str  # What they have in common
+    masks: tuple[Bools, ...]  # tuple of (n,) bool; which of them, a run each
 
 
 @dataclass(frozen=True)
 class Parting:
-    """Episodes parted by a column.
+    """Episodes parted by a column."""
 
-    Attributes
-    ----------
-    kind : str
-        `DIFFICULTY` or `SEEN`.
-    name : str
-        The column, or two of them.
-    title, note : str
-        Of its table.
-    parts : tuple of Part
-        Those that have episodes.
-    """
-
-    kind: str
-    name: str
-    title: str
+    kind: str  # `DIFFICULTY` or `SEEN`
+    name: str  # The column, or two of them
+    title: str  # Of its table
     note: str
-    parts: tuple[Part, ...]
+    parts: tuple[Part, ...]  # Those that have episodes
 
 
 @dataclass(frozen=True)
 class Partings:
-    """All that the episodes of some runs can be parted by.
-
-    Attributes
-    ----------
-    found : tuple of Parting
-    missing : tuple of str
-        Columns that neither the logs nor the release have.
-    """
+    """All that the episodes of some runs can be parted by."""
 
     found: tuple[Parting, ...] = ()
-    missing: tuple[str, ...] = ()
+    missing: tuple[str, ...] = ()  # Columns that neither the logs nor the release have
 
     @property
     def left_out(self) -> str:
@@ -155,18 +128,7 @@ class Partings:
 
 
 def partings_of(root: DataRoot, runs: Sequence[Run]) -> Partings:
-    """Part the episodes of runs by what the release says of their tasks, or the log.
-
-    Parameters
-    ----------
-    root : DataRoot
-        The data root. Without a release only what the log says is known.
-    runs : sequence of Run
-
-    Returns
-    -------
-    Partings
-    """
+    """Part the episodes of runs by what the release says of their tasks, or the log."""
     released = _Released(root)
     found, missing = [], []
     for b in _BREAKDOWNS:
@@ -181,17 +143,7 @@ def partings_of(root: DataRoot, runs: Sequence[Run]) -> Partings:
 
 
 def parting_tables(partings: Partings, kind: str, runs: Sequence[Run], profile: Profile) -> list[Table]:
-    """Make a table for every way that the episodes are parted by; where all are alike there is none.
-
-    Parameters
-    ----------
-    partings : Partings
-        Of these runs.
-    kind : str
-        `DIFFICULTY` or `SEEN`.
-    runs : sequence of Run
-    profile : Profile
-    """
+    """Make a table for every way that the episodes are parted by; where all are alike there is none."""
     tables = []
     for parting in partings.found:
         if parting.kind == kind:

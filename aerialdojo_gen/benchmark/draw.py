@@ -14,13 +14,6 @@ class TaskDraw:
     """Draws tasks with replacement, every one equally often, in blocks of one scene.
 
     The first of a block is drawn from all tasks, and with it its scene; the others from that scene's.
-
-    Parameters
-    ----------
-    scenes : sequence of str
-        The scene of every task.
-    in_a_row : int
-        Episodes of a block.
     """
 
     def __init__(self, scenes: Sequence[str], in_a_row: int = 1) -> None:

@@ -21,35 +21,6 @@ class Episode:
     It ends by Stop, by a collision or with the last action of the budget (paper: termination), and by the first of
     these that an action brings about: the last action may be a Stop or a collision, and is then judged as such. An
     episode that starts in collision ends in collision at its first action, whichever that is, Stop too.
-
-    Parameters
-    ----------
-    space : FlightSpace
-    start : tuple of float
-        x, y, z in metres, world frame, and yaw in radians.
-    goal : tuple of float
-        The goal anchor's position, metres, world frame.
-    action_budget : int
-        Most actions, Stop included.
-
-    Attributes
-    ----------
-    position : tuple of float
-        Of the body's centre, metres, world frame.
-    n_actions, n_refused, n_invalid : int
-        Actions spent; those that would have left the flight volume; answers that named no action.
-    path_length_m : float
-        Metres flown.
-    distance_m, min_distance_m : float
-        To the goal: now, and the smallest at the start, after any action, or at the contact.
-    horizontal_distance_m, min_horizontal_distance_m : float
-        The same in the plane.
-    termination : str or None
-        None while it goes on, then one of `aerialdojo_gen.store.schemas.TERMINATIONS`.
-    stop_called : bool
-        The agent chose Stop.
-    refused : bool
-        The last action would have left the flight volume.
     """
 
     __slots__ = (
@@ -89,20 +60,7 @@ class Episode:
         return self.termination == "stop" and self.distance_m <= radius_m
 
     def step(self, action: int | None) -> None:
-        """Spend an action.
-
-        Parameters
-        ----------
-        action : int or None
-            0 to 15; None for an answer that names none, which spends one and moves nothing.
-
-        Raises
-        ------
-        ValueError
-            There is no such action.
-        RuntimeError
-            The episode is over.
-        """
+        """Spend an action."""
         if self.termination is not None:
             raise RuntimeError(f"the episode is over ({self.termination}): begin another")
         if action is not None and not 0 <= action < N_ACTIONS:

@@ -34,29 +34,7 @@ def run_scenes(data: Where, run: str) -> list[str]:
 
 
 def read_run(data: Where, run: str, table: str = "episodes", columns: Sequence[str] | None = None) -> pa.Table:
-    """Read a table of a run, all its scenes.
-
-    Parameters
-    ----------
-    data : DataRoot, Path or str
-        The root that `evaluate` wrote to.
-    run : str
-        Name of the run.
-    table : str
-        One of `TABLES`.
-    columns : sequence of str, optional
-        Read these columns alone.
-
-    Returns
-    -------
-    pyarrow.Table
-        Scenes in the order of their names, rows in the order of the table's key.
-
-    Raises
-    ------
-    StoreError
-        There is no such run, or a part of it is damaged.
-    """
+    """Read a table of a run, all its scenes."""
     root = open_root(data)
     scenes = run_scenes(root, run)
     if not scenes:
@@ -77,20 +55,7 @@ def fingerprint_of(data: Where, run: str, scene: str) -> str | None:
 
 
 def add_records(data: Where, run: str, scene: str, records: Sequence[dict[str, Any]], fingerprint: str) -> None:
-    """Add finished episodes of a scene to a run's tables.
-
-    Parameters
-    ----------
-    data : DataRoot, Path or str
-        The root to write to.
-    run, scene : str
-    records : sequence of dict
-        Either ``episode``, ``timing`` and ``steps`` (column to list), or ``failure``; ``task_id`` in each. One that
-        stands in the tables already is replaced; of an episode that failed first and was finished later, the failure
-        goes.
-    fingerprint : str
-        Stored with the shards.
-    """
+    """Add finished episodes of a scene to a run's tables."""
     by_task = {record["task_id"]: record for record in records}
     ordered = [by_task[task_id] for task_id in sorted(by_task)]
     flown = [record for record in ordered if "episode" in record]

@@ -30,32 +30,17 @@ _ASSUMED_OUT, _ASSUMED_S = 60.0, 2.0
 
 @dataclass(frozen=True)
 class Estimate:
-    """What an evaluation will take.
-
-    Attributes
-    ----------
-    episodes : int
-    requests : tuple of int
-        If every episode takes as many actions as its reference, and if every one spends its budget.
-    tokens_in, tokens_out, request_s, render_s : float
-        Of a request; the last is what drawing its pictures takes.
-    measured : int
-        On so many requests; 0 where nobody answered and figures are reckoned or assumed.
-    why_not : str
-        Why nothing was measured.
-    cost_usd : tuple of float, or None
-        For the two numbers of requests.
-    """
+    """What an evaluation will take."""
 
     episodes: int
     requests: tuple[int, int]
-    tokens_in: float
+    tokens_in: float  # Of a request; the last is what drawing its pictures takes
     tokens_out: float
     request_s: float
     render_s: float
-    measured: int
-    why_not: str
-    cost_usd: tuple[float, float] | None
+    measured: int  # On so many requests; 0 where nobody answered and figures are reckoned or assumed
+    why_not: str  # Why nothing was measured
+    cost_usd: tuple[float, float] | None  # For the two numbers of requests
 
     def lines(self, workers: int) -> list[str]:
         """Return what to print."""
@@ -82,20 +67,7 @@ class Estimate:
 
 
 def estimate(data: Where, evaluation: Evaluation) -> Estimate:
-    """Estimate an evaluation: by a few real requests where the service answers, else by reckoning.
-
-    Parameters
-    ----------
-    data : DataRoot, Path or str
-        The data root.
-    evaluation : Evaluation
-        Of an agent that asks a language model.
-
-    Raises
-    ------
-    UsageError
-        The agent asks none, or no task fits.
-    """
+    """Estimate an evaluation: by a few real requests where the service answers, else by reckoning."""
     cls = agent_class(evaluation.agent)
     if not (isinstance(cls, type) and issubclass(cls, LanguageModelAgent)):
         raise UsageError(f"--estimate is for agents that ask a language model, not {evaluation.agent!r}")

@@ -16,44 +16,18 @@ from aerialdojo_gen.config.sections import Embodiment
 
 @dataclass(frozen=True)
 class Evaluation:
-    """What is evaluated: all that the log depends on, beside the data.
+    """What is evaluated: all that the log depends on, beside the data."""
 
-    Attributes
-    ----------
-    run : str
-        Name of the run.
-    agent : str
-        Name of the agent, or ``package.module:Class``.
-    options : dict
-        The agent's keyword arguments, JSON. Secrets among them are kept out of the log.
-    selection : Selection
-        Which tasks.
-    sensors : Sensors or None
-        In place of those that the agent asks for.
-    embodiment : Embodiment
-        The body.
-    renderer : str
-        As for `aerialdojo_gen.rendering.backend.open_renderer`; the log of an agent that looks depends on it.
-    conditions : Conditions
-        What a worker bears.
-    requests_per_minute : float or None
-        Of an agent that asks a service, all workers together.
-    used : dict or None
-        The options as the agent says that it uses them, for the log.
-    tell : tuple of str
-        Of `aerialdojo_gen.agents.goal.TELLABLE`: what the agent is told beside the paper's goal.
-    """
-
-    run: str = "default"
-    agent: str = "random"
+    run: str = "default"  # Name of the run
+    agent: str = "random"  # Name of the agent, or ``package.module:Class``
     options: Mapping[str, Any] = field(default_factory=dict)
-    selection: Selection = field(default_factory=Selection)
-    sensors: Sensors | None = None
-    embodiment: Embodiment = field(default_factory=Embodiment)
+    selection: Selection = field(default_factory=Selection)  # Which tasks
+    sensors: Sensors | None = None  # In place of those that the agent asks for
+    embodiment: Embodiment = field(default_factory=Embodiment)  # The body
     renderer: str = "auto"
-    conditions: Conditions = field(default_factory=Conditions)
-    requests_per_minute: float | None = None
-    used: Mapping[str, Any] | None = None
+    conditions: Conditions = field(default_factory=Conditions)  # What a worker bears
+    requests_per_minute: float | None = None  # Of an agent that asks a service, all workers together
+    used: Mapping[str, Any] | None = None  # The options as the agent says that it uses them, for the log
     tell: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
@@ -85,44 +59,20 @@ class Evaluation:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of an evaluation.
+    """What became of an evaluation."""
 
-    Attributes
-    ----------
-    episodes : int
-        That the evaluation has.
-    finished, failed : int
-        In the tables now: flown, and given up because something outside failed.
-    flown, actions : int
-        Episodes and actions of this call, failed ones too.
-    cost_usd : float
-        Of all calls for this run.
-    tokens : int
-        Both ways, of all calls for this run.
-    seconds : float
-        Of this call.
-    stopped : str
-        Why it ended early: too many failures in a row; empty otherwise.
-    failures : tuple of str
-        What failed, the most frequent first: how often, of which kind; of the first also the reason.
-    finished_now : int
-        Of the flown those that did not fail.
-    successes : int
-        Of the finished.
-    """
-
-    episodes: int
-    finished: int
+    episodes: int  # That the evaluation has
+    finished: int  # In the tables now: flown, and given up because something outside failed
     failed: int
-    flown: int
+    flown: int  # Episodes and actions of this call, failed ones too
     actions: int
-    cost_usd: float
-    tokens: int
-    seconds: float
-    stopped: str = ""
+    cost_usd: float  # Of all calls for this run
+    tokens: int  # Both ways, of all calls for this run
+    seconds: float  # Of this call
+    stopped: str = ""  # Why it ended early: too many failures in a row; empty otherwise
     failures: tuple[str, ...] = ()
-    finished_now: int = 0
-    successes: int = 0
+    finished_now: int = 0  # Of the flown those that did not fail
+    successes: int = 0  # Of the finished
 
     @property
     def fruitless(self) -> bool:
@@ -142,13 +92,7 @@ class Outcome:
         )
 
     def last_line(self, again: str = "--rerun-failed") -> str:
-        """Say what to know and do about failures; empty where there are none.
-
-        Parameters
-        ----------
-        again : str
-            What flies them again; it ends the line.
-        """
+        """Say what to know and do about failures; empty where there are none."""
         if not self.failures:
             return self.stopped
         left = self.episodes - self.finished - self.failed

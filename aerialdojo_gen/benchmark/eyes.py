@@ -54,24 +54,9 @@ def has_drawn() -> bool:
 def look(
     scene: Scene, sensors: Sensors, position: Point, yaw_rad: float, renderer: str = "auto"
 ) -> tuple[Pictures, Depths]:
-    """Render the views of a body.
+    """Render the views of a body (world metres, radians).
 
-    Parameters
-    ----------
-    scene : Scene
-    sensors : Sensors
-    position : tuple of float
-        The body's centre, metres, world frame.
-    yaw_rad : float
-    renderer : str
-        As for `aerialdojo_gen.rendering.backend.open_renderer`.
-
-    Returns
-    -------
-    rgb : dict of str to (H, W, 3) uint8
-        By view; empty without pictures.
-    depth_m : dict of str to (H, W) float32
-        By view, planar depth, metres, 0 where there is nothing within range; empty without depth.
+    RGB (H, W, 3) uint8 and planar depth (H, W) metres, by view.
     """
     rgb: Pictures = {}
     depth_m: Depths = {}

@@ -24,21 +24,7 @@ _STYLE: dict[Any, Any] = {
 
 
 def radius_curve(runs: Sequence[Run], profile: Profile, largest_m: float = 25.0) -> Figure:
-    """Draw overall SR (solid) and OSR (dashed) against the radius that counts as success.
-
-    Parameters
-    ----------
-    runs : sequence of Run
-        One or more.
-    profile : Profile
-        Everything of the rule but its radius, which is marked.
-    largest_m : float
-        End of the axis, metres.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-    """
+    """Draw overall SR (solid) and OSR (dashed) against the success radius, from 0 to `largest_m` metres."""
     radii = np.linspace(0.0, largest_m, 501)
 
     def draw(figure: Figure) -> None:
@@ -77,19 +63,7 @@ def figure_of(draw: Callable[[Figure], None], size_inches: tuple[float, float]) 
 
 
 def encoded(figure: Figure, kind: str) -> bytes:
-    """Encode a figure; the same figure gives the same bytes.
-
-    Parameters
-    ----------
-    figure : matplotlib.figure.Figure
-        From this module.
-    kind : str
-        png (at 200 dots an inch) or svg.
-
-    Returns
-    -------
-    bytes
-    """
+    """Encode a figure; the same figure gives the same bytes."""
     import matplotlib
 
     out = io.BytesIO()

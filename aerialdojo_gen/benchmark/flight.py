@@ -28,36 +28,9 @@ class Flight:
     """Flies tasks: the evaluator's side of the closed loop.
 
     An agent never gets this object, only the `goal` and what `observe` returns.
-
-    Parameters
-    ----------
-    data : DataRoot, Path or str
-        The data root, with release and meshes.
-    sensors : Sensors
-        What observations hold.
-    success_radius_m : float
-    embodiment : Embodiment
-        The body.
-    renderer : str
-        ``"gl"``, ``"pybullet"``, or ``"auto"`` for the fastest that works here; what they draw differs by a few
-        grey levels.
-    tell : sequence of str
-        Of `aerialdojo_gen.agents.goal.TELLABLE`: what agents are told beside the goal.
-    scenes_in_memory : int
-        How many scenes stay open in this process.
-
-    Attributes
-    ----------
-    sensors : Sensors
-    success_radius_m : float
-    task : Task
-        Under way, from `begin` on; so are the following.
-    goal : Goal
-    episode : Episode
-    space : FlightSpace
     """
 
-    task: Task
+    task: Task  # Under way, from `begin` on; so are the following
     goal: Goal
     episode: Episode
     space: FlightSpace
@@ -85,13 +58,7 @@ class Flight:
         self.success_radius_m = success_radius_m
 
     def begin(self, task: Task) -> Episode:
-        """Begin the episode of a task.
-
-        Raises
-        ------
-        StoreError
-            The scene's mesh or the goal's picture is missing.
-        """
+        """Begin the episode of a task."""
         row = task.row
         body, budget = self._body, row["action_budget"]
         rules = Rules(budget, self.success_radius_m, body.radius_m, body.wheelbase_m, self.sensors)
@@ -131,13 +98,7 @@ class Flight:
         self.__dict__.pop("space", None)
 
     def view(self) -> View | None:
-        """Say where the body is with regard to the target; None where the release has no viewpoints.
-
-        Raises
-        ------
-        StoreError
-            Viewpoints, objects and mesh of the scene do not belong together, or a part is damaged.
-        """
+        """Say where the body is with regard to the target; None where the release has no viewpoints."""
         task, scene = self.task, self.task.row["scene"]
         viewpoints = viewpoints_of(self._data, scene)
         if viewpoints is None:

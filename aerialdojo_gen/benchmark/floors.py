@@ -18,21 +18,7 @@ _FLOOR_AGENTS = tuple(agent for agent, group in GROUP_OF.items() if group == FLO
 
 
 def with_floors(log: DataRoot, runs: Sequence[Run]) -> list[Run]:
-    """Add the floors that were flown on the same tasks and are not among the runs.
-
-    Parameters
-    ----------
-    log : DataRoot
-        The root that `evaluate` wrote to.
-    runs : sequence of Run
-        Those to be reported.
-
-    Returns
-    -------
-    list of Run
-        The same, then of every floor (`stop`, `constant`, `random`) that is missing the first run that has flown all
-        their tasks, cut down to these.
-    """
+    """Add the floors that were flown on the same tasks and are not among the runs."""
     there = {run.agent for run in runs}
     wanted = {task for run in runs for task in run.table["task_id"].to_pylist()}
     added: dict[str, Run] = {}
@@ -58,24 +44,7 @@ def _is_floor(log: DataRoot, name: str) -> bool:
 
 
 def arranged(runs: Sequence[Run], groups: Mapping[str, Sequence[str]] | None = None) -> list[Run]:
-    """Put runs in order by their groups: the user's own, the others, then the upper bound and the floors.
-
-    Parameters
-    ----------
-    runs : sequence of Run
-        Within a group they keep their order.
-    groups : mapping of str to sequence of str, optional
-        Headings, and the names or agents of the runs that belong under them.
-
-    Returns
-    -------
-    list of Run
-
-    Raises
-    ------
-    UsageError
-        A group names a run that is not there.
-    """
+    """Put runs in order by their groups: the user's own, the others, then the upper bound and the floors."""
     chosen = dict(groups or {})
     for heading, names in chosen.items():
         for name in names:

@@ -17,16 +17,6 @@ def flying_code(agent: str) -> str:
 
     Libraries do not count, as they do for stages: an episode may have cost money, and a library's next patch should
     not end a run of a thousand of them.
-
-    Parameters
-    ----------
-    agent : str
-        Its name, or ``package.module:Class``; of an agent of one's own the module's file counts, not what it imports.
-
-    Returns
-    -------
-    str
-        SHA-256, hexadecimal; comments and docstrings of this package do not change it.
     """
     module = BUILT_IN.get(agent, agent).partition(":")[0]
     parts = dict(code_of("aerialdojo_gen.benchmark.worker").parts)

@@ -12,19 +12,7 @@ _SIGNS = {BEST: "¹", SECOND: "²"}
 
 
 def as_text(table: Table, width: int | None = None) -> str:
-    """Write a table for a terminal; the best has ¹, the second ².
-
-    Parameters
-    ----------
-    table : Table
-    width : int, optional
-        Columns of the terminal: what does not fit goes below, under the same first column.
-
-    Returns
-    -------
-    str
-        Lines without an end of the last.
-    """
+    """Write a table for a terminal; the best has ¹, the second ²."""
     columns = [Column(name, group) for group, names in table.groups for name in names]
     heads = [column.head for column in columns]
     cells = [list(row) for _, row in table.rows]

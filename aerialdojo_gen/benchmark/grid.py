@@ -15,53 +15,24 @@ BEST, SECOND = "best", "second"
 
 @dataclass(frozen=True)
 class Table:
-    """A table of text.
+    """A table of text."""
 
-    Attributes
-    ----------
-    title : str
-        What it shows.
-    stub : str
-        Head of the first column.
-    groups : tuple of (str, tuple of str)
-        Groups of columns: their head, and the heads of the columns.
-    rows : tuple of (str, tuple of str)
-        First column and cells. A row without a first column belongs to the one above it.
-    notes : tuple of str
-        What must be known to read it.
-    sections : dict of int to str
-        Headings within the table, by the row that they stand above.
-    marks : dict of (int, int) to str
-        `BEST` or `SECOND`, by row and cell.
-    """
-
-    title: str
-    stub: str
-    groups: tuple[tuple[str, tuple[str, ...]], ...]
-    rows: tuple[tuple[str, tuple[str, ...]], ...]
-    notes: tuple[str, ...] = ()
+    title: str  # What it shows
+    stub: str  # Head of the first column
+    groups: tuple[tuple[str, tuple[str, ...]], ...]  # Groups of columns: their head, and the heads of the columns
+    rows: tuple[tuple[str, tuple[str, ...]], ...]  # tuple of (str, tuple of str)
+    notes: tuple[str, ...] = ()  # What must be known to read it
     sections: Mapping[int, str] = field(default_factory=dict)
-    marks: Mapping[tuple[int, int], str] = field(default_factory=dict)
+    marks: Mapping[tuple[int, int], str] = field(default_factory=dict)  # `BEST` or `SECOND`, by row and cell
 
 
 @dataclass(frozen=True)
 class Measure:
-    """A column of a table of scores.
+    """A column of a table of scores."""
 
-    Attributes
-    ----------
-    head : str
-        Its heading.
-    metric : str
-        What is measured, one of `aerialdojo_gen.benchmark.scores.METRICS`: rates are printed per cent, distances in
-        metres.
-    signed : bool
-        Whether it is a difference: printed with its sign, and none is the best.
-    """
-
-    head: str
+    head: str  # Its heading
     metric: str
-    signed: bool = False
+    signed: bool = False  # Whether it is a difference: printed with its sign, and none is the best
 
     def text(self, value: float) -> str:
         """Format a value: two decimals, as the paper has them; a dash for NaN."""
@@ -85,33 +56,15 @@ MEASURES = tuple(Measure(HEADS[metric], metric) for metric in METRICS)
 
 @dataclass(frozen=True)
 class Line:
-    """A line of a table of scores.
+    """A line of a table of scores."""
 
-    Attributes
-    ----------
-    label : str
-        First column.
-    values : tuple of float
-        A value a measure: fractions and metres; NaN where there is none.
-    section : str
-        Heading that it stands under; empty for none.
-    rivals : str or None
-        Lines of the same word are compared for the best; None for a line that is not in the running.
-    spreads : tuple of float
-        ± of every value, or empty.
-    intervals : tuple of (float, float)
-        Interval of every value, or empty; printed in a row of its own.
-    before : tuple of str
-        Cells of columns that are no measures, and stand first.
-    """
-
-    label: str
-    values: tuple[float, ...]
-    section: str = ""
+    label: str  # First column
+    values: tuple[float, ...]  # A value a measure: fractions and metres; NaN where there is none
+    section: str = ""  # Heading that it stands under; empty for none
     rivals: str | None = ""
-    spreads: tuple[float, ...] = ()
-    intervals: tuple[tuple[float, float], ...] = ()
-    before: tuple[str, ...] = ()
+    spreads: tuple[float, ...] = ()  # ± of every value, or empty
+    intervals: tuple[tuple[float, float], ...] = ()  # Interval of every value, or empty; printed in a row of its own
+    before: tuple[str, ...] = ()  # Cells of columns that are no measures, and stand first
 
 
 def measures_of(known: bool, metrics: Sequence[str] = METRICS) -> tuple[Measure, ...]:
@@ -132,25 +85,7 @@ def score_table(
     notes: Sequence[str] = (),
     before: tuple[str, ...] = (),
 ) -> Table:
-    """Write lines of scores as a table.
-
-    Parameters
-    ----------
-    title, stub : str
-        As in `Table`.
-    groups : sequence of (str, sequence of Measure)
-        Heads of groups of columns, and their columns.
-    lines : sequence of Line
-        With a value for every measure of the groups, in their order.
-    notes : sequence of str
-        As in `Table`; what a mark means is added where there are marks.
-    before : tuple of str
-        Heads of the columns that `Line.before` fills.
-
-    Returns
-    -------
-    Table
-    """
+    """Write lines of scores as a table."""
     measures = [m for _, part in groups for m in part]
     rows: list[tuple[str, tuple[str, ...]]] = []
     sections: dict[int, str] = {}

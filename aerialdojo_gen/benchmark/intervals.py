@@ -24,21 +24,9 @@ LEVEL = 0.95
 
 
 def bootstrap(scenes: Sequence[Floats], resamples: int = RESAMPLES, level: float = LEVEL) -> tuple[Floats, Floats]:
-    """Percentile intervals of the mean of the families, scenes drawn anew within their family.
+    """95 % percentile intervals, low and high (m,), of the mean of the families.
 
-    Parameters
-    ----------
-    scenes : sequence of (n, m) float64
-        An array a family: a row a scene, a column a measure.
-    resamples : int
-        How often is drawn.
-    level : float
-        Share of the resamples within the interval.
-
-    Returns
-    -------
-    low, high : (m,) float64
-        NaN where a family has a single scene: how far scenes differ is then not known.
+    Scenes are resampled within their family.
     """
     width = scenes[0].shape[1] if scenes else len(METRICS)
     ends = np.full((2, width), math.nan)
@@ -77,62 +65,25 @@ def score_intervals(episodes: Episodes, profile: Profile) -> tuple[tuple[float, 
 
 @dataclass(frozen=True)
 class Paired:
-    """Two runs on the same tasks, the second against the first.
+    """Two runs on the same tasks, the second against the first."""
 
-    Attributes
-    ----------
-    first, second, difference : (6,) float64
-        Overall `METRICS`; fractions and metres; NaN where a log does not say.
-    low, high : (6,) float64
-        95 % interval of the difference, by scene; NaN where a family has a single scene.
-    p : (6,) float64
-        Two-sided: how often a difference as large arises where the two runs are exchanged scene by scene.
-    tasks, scenes : int
-        Flown by both.
-    only_first, only_second : int
-        Tasks that one of them solves, the other not.
-    p_mcnemar : float
-        Of these two counts, exact (binomial), two-sided; it takes episodes for independent.
-    """
-
-    first: Floats
+    first: Floats  # (6,) float64; overall `METRICS`; fractions and metres; NaN where a log does not say
     second: Floats
     difference: Floats
-    low: Floats
+    low: Floats  # (6,) float64; 95 % interval of the difference, by scene; NaN where a family has a single scene
     high: Floats
-    p: Floats
-    tasks: int
+    p: Floats  # Two-sided: how often a difference as large arises where the two runs are exchanged scene by scene
+    tasks: int  # Flown by both
     scenes: int
-    only_first: int
+    only_first: int  # Tasks that one of them solves, the other not
     only_second: int
-    p_mcnemar: float
+    p_mcnemar: float  # Of these two counts, exact (binomial), two-sided; it takes episodes for independent
 
 
 def paired(
     first: Episodes, second: Episodes, success: tuple[Any, Any], profile: Profile, resamples: int = RESAMPLES
 ) -> Paired:
-    """Compare two logs of the same tasks in the same order.
-
-    Parameters
-    ----------
-    first, second : Episodes
-        Row by row the same task.
-    success : tuple of (n,) bool
-        Successes of the two under the profile.
-    profile : Profile
-        The rule.
-    resamples : int
-        Of the interval and of the test; where there are fewer exchanges in all, the test is exact.
-
-    Returns
-    -------
-    Paired
-
-    Raises
-    ------
-    UsageError
-        There are no tasks.
-    """
+    """Compare two logs of the same tasks, row by row; the permutation test is exact where there are few exchanges."""
     if not len(first):
         raise UsageError("the runs have no task in common: a paired test needs runs on the same tasks")
     one, other = scene_scores(first, profile), scene_scores(second, profile)

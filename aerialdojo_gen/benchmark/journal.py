@@ -14,18 +14,7 @@ from aerialdojo_gen.errors import Malformed, StoreError
 
 
 class Journal:
-    """A file of finished episodes, written line by line; a context manager.
-
-    Parameters
-    ----------
-    path : Path
-        Gone on with where it is there: a worker that was lost may have begun it. Its folder is made.
-
-    Attributes
-    ----------
-    done : frozenset of str
-        The ``task_id`` of the records that it had.
-    """
+    """A file of finished episodes, written line by line; a context manager."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
@@ -64,13 +53,7 @@ def _cut_short_line(path: Path) -> None:
 
 
 def read(path: Path) -> Iterator[dict[str, Any]]:
-    """Yield the records of a journal; a line that a kill cut short is no record.
-
-    Raises
-    ------
-    StoreError
-        Another line is no record: the message names it.
-    """
+    """Yield the records of a journal; a line that a kill cut short is no record."""
     with path.open("rb") as file:
         for number, line in enumerate(file, start=1):
             if not line.endswith(b"\n"):

@@ -26,20 +26,7 @@ CHECKPOINT_S = 30.0
 
 
 class Journals:
-    """The journals of a run.
-
-    Parameters
-    ----------
-    root : DataRoot
-        Where the log goes.
-    run : str
-        Name of the run.
-
-    Attributes
-    ----------
-    folder : Path
-        Where workers write to, on this machine.
-    """
+    """The journals of a run."""
 
     def __init__(self, root: DataRoot, run: str) -> None:
         self._root, self._name = root, f"runs/{check_run_name(run)}/journal"
@@ -67,13 +54,7 @@ class Journals:
         return found
 
     def records(self, scene: str) -> list[dict[str, Any]]:
-        """Read the finished episodes of a scene; one may stand in a file and in an object.
-
-        Raises
-        ------
-        StoreError
-            A journal is damaged.
-        """
+        """Read the finished episodes of a scene; one may stand in a file and in an object."""
         paths, names = self.scenes(scene).get(scene, ([], []))
         return [record for path in [*map(self._root.local_copy, names), *paths] for record in journal.read(path)]
 
@@ -93,13 +74,7 @@ class Journals:
         self._sent.clear()
 
     def checkpoint(self) -> None:
-        """Commit what has come since the last checkpoint, if that is long enough ago; nothing in a data directory.
-
-        Raises
-        ------
-        StoreError
-            The store does not answer: the files keep what there is, and the next checkpoint commits it.
-        """
+        """Commit what has come since the last checkpoint, if that is long enough ago; nothing in a data directory."""
         if not self._committed or time.monotonic() - self._last < CHECKPOINT_S:
             return
         self._last = time.monotonic()

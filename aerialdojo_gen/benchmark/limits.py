@@ -9,33 +9,15 @@ from aerialdojo_gen.benchmark.worker import Failed, Finished
 
 @dataclass(frozen=True)
 class Limits:
-    """What a run may spend and bear, over all calls for it.
+    """What a run may spend and bear, over all calls for it."""
 
-    Attributes
-    ----------
-    cost_usd : float or None
-        Begin no episode once so much is spent.
-    tokens : int or None
-        Begin no episode once so many are spent, both ways.
-    failures_in_row : int
-        Begin no episode once so many have failed of one kind, one after the other: what fails for all tasks should
-        not use all of them up.
-    """
-
-    cost_usd: float | None = None
-    tokens: int | None = None
+    cost_usd: float | None = None  # Begin no episode once so much is spent
+    tokens: int | None = None  # Begin no episode once so many are spent, both ways
     failures_in_row: int = 5
 
 
 class Tally:
-    """Counts what is finished, and says when it is enough.
-
-    Parameters
-    ----------
-    limits : Limits
-    cost_usd, tokens : float, int
-        Spent by earlier calls.
-    """
+    """Counts what is finished, and says when it is enough."""
 
     def __init__(self, limits: Limits, cost_usd: float, tokens: int) -> None:
         self._limits = limits

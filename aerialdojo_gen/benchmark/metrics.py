@@ -22,49 +22,26 @@ Strings = NDArray[np.str_]
 
 @dataclass(frozen=True)
 class Episodes:
-    """Columns of an episode log, all of one length.
+    """Columns of an episode log, all of one length."""
 
-    Attributes
-    ----------
-    scene, family, scene_type, partition, setting, modality : (n,) str
-        What the episode belongs to.
-    stop_called, collision : (n,) bool
-        How it ended; both may hold in one step.
-    n_actions, action_budget : (n,) int64
-        Actions taken, Stop included, and how many were allowed.
-    final_distance_m, min_distance_m : (n,) float64
-        Distance to the goal anchor at the end, and the smallest over all poses, the start included.
-    final_horizontal_distance_m, min_horizontal_distance_m : (n,) float64
-        The same in the plane.
-    path_length_m : (n,) float64
-        Way flown, ℓ.
-    reference_length_m : (n,) float64
-        Length of the reference route, L: the sum over its moves, which are horizontal or vertical.
-    euclidean_m : (n,) float64
-        Straight distance from start to goal.
-    view_distance_m : (n,) float64
-        Distance to the nearest valid viewpoint of the target at the end; inf where the target is not in sight from
-        there, NaN where the log does not say.
-    """
-
-    scene: Strings
+    scene: Strings  # (n,) str; what the episode belongs to
     family: Strings
     scene_type: Strings
     partition: Strings
     setting: Strings
     modality: Strings
-    stop_called: Bools
+    stop_called: Bools  # (n,) bool; how it ended; both may hold in one step
     collision: Bools
-    n_actions: NDArray[np.int64]
+    n_actions: NDArray[np.int64]  # (n,) int64; actions taken, Stop included, and how many were allowed
     action_budget: NDArray[np.int64]
-    final_distance_m: Floats
+    final_distance_m: Floats  # (n,) float64
     min_distance_m: Floats
-    final_horizontal_distance_m: Floats
+    final_horizontal_distance_m: Floats  # (n,) float64; the same in the plane
     min_horizontal_distance_m: Floats
-    path_length_m: Floats
-    reference_length_m: Floats
-    euclidean_m: Floats
-    view_distance_m: Floats
+    path_length_m: Floats  # (n,) float64; way flown, ℓ
+    reference_length_m: Floats  # (n,) float64
+    euclidean_m: Floats  # (n,) float64; straight distance from start to goal
+    view_distance_m: Floats  # (n,) float64
 
     def __len__(self) -> int:
         """Return the number of episodes."""
@@ -86,22 +63,7 @@ _DERIVED = ("view_distance_m",)
 
 
 def episodes_of(table: pa.Table) -> Episodes:
-    """Take the metrics' columns out of a table of episodes, and check them.
-
-    Parameters
-    ----------
-    table : pyarrow.Table
-        Rows of `aerialdojo_gen.store.schemas` ``episodes``.
-
-    Returns
-    -------
-    Episodes
-
-    Raises
-    ------
-    StoreError
-        A length or distance is negative or no number, or the smallest distance exceeds the last one.
-    """
+    """Take the metrics' columns out of a table of episodes, and check them."""
     columns = {}
     for field in fields(Episodes):
         if field.name in _DERIVED:
@@ -136,26 +98,13 @@ def _view_distance_m(table: pa.Table) -> Floats:
 
 @dataclass(frozen=True)
 class Outcomes:
-    """What every episode earns under a profile.
+    """What every episode earns under a profile."""
 
-    Attributes
-    ----------
-    success, oracle_success, collision : (n,) bool
-        σ; ever within the radius, whatever happens later; ended by a collision.
-    success_view : (n,) float64
-        1 for a success that is taken at any viewpoint of the target with the target in sight, else 0; NaN where the
-        log does not say, and under a rule that measures in the plane.
-    spl : (n,) float64
-        σ·L / max(L, ℓ), in [0, 1].
-    distance_m : (n,) float64
-        Distance to the goal at the end, metres.
-    """
-
-    success: Bools
-    success_view: Floats
+    success: Bools  # (n,) bool; σ; ever within the radius, whatever happens later; ended by a collision
+    success_view: Floats  # (n,) float64
     oracle_success: Bools
-    spl: Floats
-    distance_m: Floats
+    spl: Floats  # (n,) float64; σ·L / max(L, ℓ), in [0, 1]
+    distance_m: Floats  # (n,) float64; distance to the goal at the end, metres
     collision: Bools
 
 
@@ -163,17 +112,6 @@ def outcomes(episodes: Episodes, profile: Profile) -> Outcomes:
     """Judge every episode by a profile.
 
     An episode that starts at its goal has L = 0: its SPL is 1 where it succeeds without moving, 0 where it moved.
-
-    Parameters
-    ----------
-    episodes : Episodes
-        The log.
-    profile : Profile
-        The rule.
-
-    Returns
-    -------
-    Outcomes
     """
     final, nearest = distances(episodes, profile)
     may = may_succeed(episodes, profile)

@@ -35,24 +35,7 @@ def _judge(
 
 
 class FlightSpace:
-    """A scene to fly in.
-
-    Parameters
-    ----------
-    scene : Scene
-        World coordinates, metres.
-    radius_m : float
-        Radius of the body's collision sphere.
-    world : CollisionWorld, optional
-        FCL's world of the scene, where there is one already.
-
-    Attributes
-    ----------
-    scene : Scene
-    radius_m : float
-    grid : ClearanceGrid
-        What proves legs free.
-    """
+    """A scene to fly in."""
 
     def __init__(self, scene: Scene, radius_m: float, world: CollisionWorld | None = None) -> None:
         self.scene = scene
@@ -74,22 +57,9 @@ class FlightSpace:
         )
 
     def fly(self, p: Point, q: Point) -> tuple[Point, bool, bool]:
-        """Fly straight from `p` towards `q`.
+        """Fly straight from `p` to `q` (world metres).
 
-        Parameters
-        ----------
-        p, q : tuple of float
-            Metres, world frame; the body is free at `p`.
-
-        Returns
-        -------
-        position : tuple of float
-            Where the body then is: `q`, the place of the contact (within a millimetre, on the free side), or `p`.
-        collision : bool
-            The sweep touches a surface.
-        refused : bool
-            `q` is outside the flight volume: nothing moved. A geofence holds the drone, for the volume's bounds are
-            no surface that a camera could see.
+        The position reached, whether it collided, whether the volume's bounds refused it.
         """
         collision, refused = self.hindered(p, q)
         if refused:
@@ -97,12 +67,7 @@ class FlightSpace:
         return (self._contact(p, q) if collision else q), collision, False
 
     def hindered(self, p: Point, q: Point) -> tuple[bool, bool]:
-        """Say what keeps a body from flying from `p` to `q`: `fly` without where it then is.
-
-        Returns
-        -------
-        collision, refused : bool
-        """
+        """Say what keeps a body from flying from `p` to `q`: `fly` without where it then is."""
         verdict = _judge(*p, *q, self.radius_m, self._arrays)
         if verdict in (_FREE, _OUTSIDE):
             return False, verdict == _OUTSIDE
@@ -125,19 +90,7 @@ def _between(p: Point, q: Point, share: float) -> Point:
 
 
 def flight_space(mesh: Path, sha256: str, radius_m: float, keep: int = SEVERAL) -> FlightSpace:
-    """Return a scene to fly in, a part of the scene's context: for all environments of a process.
-
-    Parameters
-    ----------
-    mesh : Path
-        The scene's GLB.
-    sha256 : str
-        Of the file, as `scenes` has it.
-    radius_m : float
-        Radius of the body.
-    keep : int
-        As for `aerialdojo_gen.scenes.context.open_scene`.
-    """
+    """Return a scene to fly in, a part of the scene's context: for all environments of a process."""
     return _space_of(open_scene(mesh, sha256, keep), radius_m)
 
 

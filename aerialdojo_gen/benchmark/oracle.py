@@ -14,27 +14,13 @@ LEAST_SPL = 0.99
 
 
 class Reference(NamedTuple):
-    """A navigation task with its reference trajectory.
+    """A navigation task with its reference trajectory."""
 
-    Attributes
-    ----------
-    start : tuple of float
-        x, y, z in metres, world frame, and yaw in radians.
-    goal : tuple of float
-        Position of the goal anchor, metres, world frame.
-    action_budget : int
-        Most actions, Stop included.
-    length_m : float
-        Told length of the trajectory.
-    actions : sequence of int
-        Of the trajectory; an Approach among them is not flown, for agents have none.
-    """
-
-    start: tuple[float, float, float, float]
-    goal: Point
-    action_budget: int
-    length_m: float
-    actions: Sequence[int]
+    start: tuple[float, float, float, float]  # x, y, z in metres, world frame, and yaw in radians
+    goal: Point  # Position of the goal anchor, metres, world frame
+    action_budget: int  # Most actions, Stop included
+    length_m: float  # Told length of the trajectory
+    actions: Sequence[int]  # Of the trajectory; an Approach among them is not flown, for agents have none
 
 
 def fly(space: FlightSpace, reference: Reference) -> Episode:
@@ -47,22 +33,7 @@ def fly(space: FlightSpace, reference: Reference) -> Episode:
 
 
 def shortcoming(episode: Episode, length_m: float, radius_m: float) -> str:
-    """Say what a flown reference lacks for a success (SR and OSR 100 %, CR 0, SPL of `LEAST_SPL` or more).
-
-    Parameters
-    ----------
-    episode : Episode
-        Of `fly`.
-    length_m : float
-        Told length of the reference, metres; 0 where its length does not matter.
-    radius_m : float
-        How near to the goal a Stop must be, metres.
-
-    Returns
-    -------
-    str
-        In words; empty where it lacks nothing.
-    """
+    """Say why a flown reference is no success (SR, OSR, CR, SPL); empty where it is one. Lengths in metres."""
     if episode.termination == "collision":
         x, y, z = episode.position
         return f"a collision at action {episode.n_actions}, at ({x:.2f}, {y:.2f}, {z:.2f}) m"

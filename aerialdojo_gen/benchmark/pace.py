@@ -8,15 +8,7 @@ from aerialdojo_gen.pipeline.executors.link import Link
 
 
 class Pace:
-    """Lets requests go at even intervals.
-
-    Parameters
-    ----------
-    per_minute : float
-        How many requests, all processes together.
-    link : Link
-        To where the turns are given out.
-    """
+    """Lets requests go at even intervals."""
 
     def __init__(self, per_minute: float, link: Link) -> None:
         self._interval_s, self._link = 60.0 / per_minute, link

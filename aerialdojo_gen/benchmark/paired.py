@@ -18,13 +18,7 @@ from aerialdojo_gen.errors import UsageError
 
 
 def paired_tables(runs: Sequence[Run], profiles: Sequence[Profile]) -> list[Table]:
-    """Compare the second run with the first, on the tasks that both have flown, a table a profile.
-
-    Raises
-    ------
-    UsageError
-        There are not two runs, or they have no task in common.
-    """
+    """Compare the second run with the first, on the tasks that both have flown, a table a profile."""
     if len(runs) != 2:
         named = ", ".join(run.name for run in runs)
         raise UsageError(f"--paired compares two runs, not {len(runs)} ({named}): name two")

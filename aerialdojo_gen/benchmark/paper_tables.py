@@ -22,23 +22,7 @@ _FURTHER = ("sr", "sr_view", "osr")
 def result_tables(
     runs: Sequence[Run], profiles: Sequence[Profile], intervals: bool = True, beside: Sequence[PaperResult] = ()
 ) -> list[Table]:
-    """Make a table for every length setting that any run has flown.
-
-    Parameters
-    ----------
-    runs : sequence of Run
-        In the order and the groups of the lines.
-    profiles : sequence of Profile
-        Of the first every metric is shown, of the others SR, SR-view and OSR.
-    intervals : bool
-        Whether the 95 % intervals stand below the scores.
-    beside : sequence of PaperResult
-        The paper's results, to be set below ours.
-
-    Returns
-    -------
-    list of Table
-    """
+    """Make a table for every length setting that any run has flown."""
     return [
         _result_table(setting, part, profiles, intervals, [r for r in beside if r.setting == setting])
         for setting in SETTINGS

@@ -15,18 +15,7 @@ if TYPE_CHECKING:
 
 
 def checked(evaluation: Evaluation, limits: Limits, reporter: Reporter) -> Evaluation:
-    """Check an agent that asks a service, by one request; other agents are left alone.
-
-    Returns
-    -------
-    Evaluation
-        With what the check has settled.
-
-    Raises
-    ------
-    AerialDojoError
-        The service does not answer or refuses, or a limit could not be kept.
-    """
+    """Check an agent that asks a service, by one request; other agents are left alone."""
     # By the class: an agent without a check may take long to make, and is made by the workers.
     if not hasattr(agent_class(evaluation.agent), "check"):
         return evaluation

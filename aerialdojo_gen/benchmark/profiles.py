@@ -14,32 +14,15 @@ class Profile:
 
     Distances are always measured to the goal anchor, which lies 1 m from the target's surface. Benchmarks that
     measure to the target itself judge by up to that metre and half the target's size differently.
-
-    Attributes
-    ----------
-    name : str
-        What ``--profile`` takes.
-    radius_m : float
-        Distance to the goal, metres, that still counts as there; the boundary is inside.
-    needs_stop : bool
-        Whether the agent must have called Stop.
-    fails_on_collision : bool
-        Whether a collision rules success out.
-    planar : bool
-        Whether distances are taken in the plane, height left out.
-    straight_reference : bool
-        Whether SPL compares with the straight distance from start to goal instead of the reference route's length.
-    about : str
-        Where the rule comes from, one line.
     """
 
-    name: str
-    radius_m: float
-    needs_stop: bool = True
-    fails_on_collision: bool = True
-    planar: bool = False
+    name: str  # What ``--profile`` takes
+    radius_m: float  # Distance to the goal, metres, that still counts as there; the boundary is inside
+    needs_stop: bool = True  # Whether the agent must have called Stop
+    fails_on_collision: bool = True  # Whether a collision rules success out
+    planar: bool = False  # Whether distances are taken in the plane, height left out
     straight_reference: bool = False
-    about: str = ""
+    about: str = ""  # Where the rule comes from, one line
 
 
 PROFILES = {
@@ -65,13 +48,7 @@ DEFAULT_PROFILES = ("aerialdojo", "aerialdojo-5m")
 
 
 def profile_named(name: str) -> Profile:
-    """Return a profile by its name.
-
-    Raises
-    ------
-    UsageError
-        There is none of that name; the message lists those there are.
-    """
+    """Return a profile by its name."""
     if name not in PROFILES:
         raise UsageError(unknown("no profile", name, PROFILES))
     return PROFILES[name]

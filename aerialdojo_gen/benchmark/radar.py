@@ -44,20 +44,7 @@ def axis_end(largest: float, most: float = math.inf) -> float:
 
 
 def metric_radars(runs: Sequence[Run], profile: Profile) -> Figure:
-    """Draw a chart a metric, an axis a family.
-
-    Parameters
-    ----------
-    runs : sequence of Run
-        One or more; the oracle is drawn where there is no other.
-    profile : Profile
-        The rule of success.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        A family without episodes is a gap in the curve, not a zero.
-    """
+    """Draw a chart a metric, an axis a family."""
     values, ends = _values(runs, profile)
     angles = np.linspace(0.0, 2.0 * math.pi, len(_FAMILIES), endpoint=False)
 
@@ -80,18 +67,7 @@ def metric_radars(runs: Sequence[Run], profile: Profile) -> Figure:
 
 
 def family_radars(runs: Sequence[Run], profile: Profile) -> Figure:
-    """Draw a chart a family, an axis a metric; an axis ends at the same value in all of them.
-
-    Parameters
-    ----------
-    runs, profile
-        As in `metric_radars`.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        A family without episodes has an empty chart.
-    """
+    """Draw a chart a family, an axis a metric; an axis ends at the same value in all of them."""
     values, ends = _values(runs, profile)
     angles = np.linspace(0.0, 2.0 * math.pi, len(PAPER_METRICS), endpoint=False)
     tips = [

@@ -32,20 +32,9 @@ def at_radius(profile: Profile, radius_m: float) -> Profile:
 
 
 def radius_table(runs: Sequence[Run], profile: Profile, radii_m: Sequence[float] = DEFAULT_RADII_M) -> Table:
-    """Set SR and OSR at several radii side by side, with their gains and gaps, in every length setting.
+    """Set SR and OSR at several radii, metres, side by side.
 
-    Parameters
-    ----------
-    runs : sequence of Run
-    profile : Profile
-        Everything of the rule but its radius.
-    radii_m : sequence of float
-        Metres.
-
-    Returns
-    -------
-    Table
-        Its notes name the pairs of agents whose order changes from one radius to the next.
+    Notes name the agents whose order changes between radii.
     """
     radii = sorted(set(radii_m))
     swept = not profile.planar and all(run.swept_distance_m is not None for run in runs)

@@ -36,63 +36,31 @@ _MOST_FRAMES = 40
 
 @dataclass(frozen=True)
 class Flight:
-    """What one run did on a task.
+    """What one run did on a task."""
 
-    Attributes
-    ----------
-    label : str
-        The run's label.
-    outcome : str
-        How it ended, in words.
-    x_m, y_m, z_m, yaw_rad, distance_m : list of float
-        The start, then the pose after every action; world frame, and the distance to the goal.
-    said : list of str
-        What was done to get there: "start", then names of actions.
-    answers : list of str
-        The agent's words, empty where it says nothing.
-    frames : dict of int to str
-        Front pictures as data URLs, by index of the pose.
-    """
-
-    label: str
-    outcome: str
-    x_m: list[float]
+    label: str  # The run's label
+    outcome: str  # How it ended, in words
+    x_m: list[float]  # The start, then the pose after every action; world frame, and the distance to the goal
     y_m: list[float]
     z_m: list[float]
     yaw_rad: list[float]
     distance_m: list[float]
-    said: list[str]
-    answers: list[str]
-    frames: dict[int, str]
+    said: list[str]  # What was done to get there: "start", then names of actions
+    answers: list[str]  # The agent's words, empty where it says nothing
+    frames: dict[int, str]  # Front pictures as data URLs, by index of the pose
 
 
 @dataclass(frozen=True)
 class Replay:
-    """A task with its map, its reference, and all flights.
+    """A task with its map, its reference, and all flights."""
 
-    Attributes
-    ----------
-    task : dict
-        The row of `tasks`.
-    goal : dict
-        Position of the goal (x_m, y_m, z_m) and of the target's centre and size.
-    reference : dict
-        Lists x_m, y_m, z_m of the reference route, and its length_m.
-    low_m, high_m : tuple of float
-        Corners of the map, metres.
-    map_url : str
-        The map as a data URL.
-    flights : list of Flight
-        One a run.
-    """
-
-    task: dict[str, Any]
-    goal: dict[str, float]
-    reference: dict[str, Any]
-    low_m: tuple[float, float]
+    task: dict[str, Any]  # The row of `tasks`
+    goal: dict[str, float]  # Position of the goal (x_m, y_m, z_m) and of the target's centre and size
+    reference: dict[str, Any]  # Lists x_m, y_m, z_m of the reference route, and its length_m
+    low_m: tuple[float, float]  # Corners of the map, metres
     high_m: tuple[float, float]
-    map_url: str
-    flights: list[Flight]
+    map_url: str  # The map as a data URL
+    flights: list[Flight]  # One a run
 
     def data(self) -> str:
         """Return the flights as JSON, for the page's script."""
@@ -107,20 +75,7 @@ class Replay:
 
 
 def choose_tasks(runs: Sequence[Run], count: int) -> list[str]:
-    """Choose tasks worth looking at: of every family in turn, those whose flights ended most differently.
-
-    Parameters
-    ----------
-    runs : sequence of Run
-        Tasks that all of them flew are preferred.
-    count : int
-        How many, at most.
-
-    Returns
-    -------
-    list of str
-        Task ids; the same for the same logs.
-    """
+    """Choose tasks worth looking at: of every family in turn, those whose flights ended most differently."""
     ends: dict[str, list[str]] = {}
     families: dict[str, str] = {}
     for run in runs:
@@ -141,30 +96,7 @@ def choose_tasks(runs: Sequence[Run], count: int) -> list[str]:
 def replays(
     data: Where, log: Where, runs: Sequence[Run], tasks: Sequence[str], frames: bool = False
 ) -> Iterator[Replay]:
-    """Make replays.
-
-    Parameters
-    ----------
-    data : DataRoot, Path or str
-        The data root, with the release that the runs were made from.
-    log : DataRoot, Path or str
-        The root that `evaluate` wrote to.
-    runs : sequence of Run
-        Those that flew a task are shown together.
-    tasks : sequence of str
-        Task ids.
-    frames : bool
-        Whether front pictures are rendered along the flights, 40 a flight at most.
-
-    Yields
-    ------
-    Replay
-
-    Raises
-    ------
-    StoreError, UsageError, AssetError
-        The release or its mesh is missing, or is not the one that the runs were made from.
-    """
+    """Make replays."""
     root = open_root(data)
     steps = {run.name: read_run(log, run.name, "steps") for run in runs if tasks}
     for task_id in tasks:

@@ -31,28 +31,7 @@ _FOLDED = ("type", "scene")
 
 
 def write_report(out: Path, wanted: Wanted, replays: Sequence[Replay]) -> list[Path]:
-    """Write everything that there is to say of some runs.
-
-    Parameters
-    ----------
-    out : Path
-        Folder, made where there is none; files of these names in it are replaced, each whole or not at all.
-    wanted : Wanted
-        Runs, rules and what else tables and figures are made of.
-    replays : sequence of Replay
-        Episodes to be shown; may be empty.
-
-    Returns
-    -------
-    list of Path
-        ``report.html``, ``metrics.csv``, ``metrics.json``, ``tables.md``, ``tables.tex``, and of ``families`` (a
-        radar a metric), ``radar`` (one a family) and ``radius`` a ``.png`` and a ``.svg``.
-
-    Raises
-    ------
-    StoreError
-        The folder cannot be written to.
-    """
+    """Write everything that there is to say of some runs."""
     named = named_tables(wanted, ["all"])
     tables = [table for made in named.values() for table in made]
     drawn_runs, _ = _of_the_radar(wanted.runs)
@@ -84,22 +63,7 @@ def _of_the_radar(runs: Sequence[Run]) -> tuple[Sequence[Run], str]:
 
 
 def html(wanted: Wanted, replays: Sequence[Replay], figures: dict[str, bytes], tables: dict[str, list[Table]]) -> str:
-    """Write the page.
-
-    Parameters
-    ----------
-    wanted, replays
-        As `write_report` takes them.
-    figures : dict of str to bytes
-        ``families``, ``radar`` and ``radius`` as SVG.
-    tables : dict of str to list of Table
-        By their names; the long ones are folded away.
-
-    Returns
-    -------
-    str
-        Self-contained: it loads nothing, and its own policy forbids the browser to load anything; text is escaped.
-    """
+    """Write the page."""
     folder = resources.files("aerialdojo_gen.benchmark").joinpath("templates")
     style, script = (folder.joinpath(name).read_text("utf-8") for name in ("report.css", "report.js"))
     environment = jinja2.Environment(

@@ -57,41 +57,7 @@ def evaluate(
     limits: Limits | None = None,
     reporter: Reporter | None = None,
 ) -> Outcome:
-    """Fly an agent through the tasks of a selection; `aerialdojo-gen evaluate` in the library.
-
-    Parameters
-    ----------
-    data : DataRoot, Path or str
-        The data root, with a release and its meshes.
-    evaluation : Evaluation
-    out : DataRoot, Path or str, optional
-        Where the log goes; `data` where absent.
-    workers : int, optional
-        Processes; with 1 everything runs in this one, with None on all cores there are.
-    executor, address : str
-        As for `aerialdojo_gen.pipeline.executors.make_executor`.
-    rerun_failed : bool
-        Fly exactly those again that failed for reasons outside the agent.
-    restart : bool
-        Drop what an earlier run of the name has written.
-    limits : Limits, optional
-        What the run may spend and bear.
-    reporter : Reporter, optional
-        Shows progress.
-
-    Returns
-    -------
-    Outcome
-
-    Raises
-    ------
-    UsageError
-        The run was begun with other settings, or with other data.
-    AerialDojoError
-        The agent, the data or the disk will not do; finished episodes are kept.
-    KeyboardInterrupt
-        Finished episodes are kept.
-    """
+    """Fly an agent through the tasks of a selection; `aerialdojo-gen evaluate` in the library."""
     started = time.monotonic()
     limits = limits or Limits()
     root, log = open_root(data), open_root(data if out is None else out)

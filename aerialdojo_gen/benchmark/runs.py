@@ -27,40 +27,18 @@ GROUP_OF = {"oracle": UPPER_BOUND, "stop": FLOORS, "constant": FLOORS, "random":
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """A run and its episodes.
+    """A run and its episodes."""
 
-    Attributes
-    ----------
-    name : str
-        The run's id.
-    label : str
-        What tables call it: its agent, with the run's id where two runs have one agent.
-    agent, options : str
-        The agent, and its options as JSON.
-    table : pyarrow.Table
-        The log, all columns.
-    episodes : Episodes
-        What the metrics take from it.
-    failed : int
-        Episodes that are not in it, given up for reasons outside the agent.
-    log : DataRoot or None
-        The root that `evaluate` wrote to, where its steps are.
-    group : str
-        Heading that tables set it under; empty for an agent like any other.
-    told : str
-        What the agent was told beside the goal; empty for nothing.
-    """
-
-    name: str
-    label: str
-    agent: str
+    name: str  # The run's id
+    label: str  # What tables call it: its agent, with the run's id where two runs have one agent
+    agent: str  # The agent, and its options as JSON
     options: str
-    table: pa.Table
-    episodes: Episodes
-    failed: int = 0
-    log: DataRoot | None = None
-    group: str = ""
-    told: str = ""
+    table: pa.Table  # The log, all columns
+    episodes: Episodes  # What the metrics take from it
+    failed: int = 0  # Episodes that are not in it, given up for reasons outside the agent
+    log: DataRoot | None = None  # The root that `evaluate` wrote to, where its steps are
+    group: str = ""  # Heading that tables set it under; empty for an agent like any other
+    told: str = ""  # What the agent was told beside the goal; empty for nothing
 
     def where(self, mask: Bools | NDArray[np.int64]) -> Run:
         """Return the run with the episodes that a mask selects, or with those at some indices in their order."""
@@ -76,24 +54,7 @@ class Run:
 
 
 def load_runs(data: Where, names: Sequence[str] = ()) -> list[Run]:
-    """Read runs.
-
-    Parameters
-    ----------
-    data : DataRoot, Path or str
-        The root that `evaluate` wrote to.
-    names : sequence of str
-        Their ids, in the order that tables keep; where empty all that have finished an episode.
-
-    Returns
-    -------
-    list of Run
-
-    Raises
-    ------
-    StoreError
-        There is no such run, or none at all, or one without a finished episode, or a part of one is damaged.
-    """
+    """Read runs."""
     root = open_root(data)
     tables = {name: read_run(root, name) for name in (names or runs(root))}
     if not names:
@@ -128,33 +89,17 @@ def load_runs(data: Where, names: Sequence[str] = ()) -> list[Run]:
 
 @dataclass(frozen=True)
 class Conduct:
-    """How a run's episodes went, whatever they earned.
+    """How a run's episodes went, whatever they earned."""
 
-    Attributes
-    ----------
-    episodes : int
-        How many.
-    ended : dict of str to float
-        Share of the episodes by how they ended: stop, collision, budget.
-    actions : float
-        Mean number of actions.
-    refused, invalid : int
-        Moves out of the flight volume; answers that named no action.
-    requests, input_tokens, output_tokens : int or None
-        Of an outside service, all episodes together; None where it does not say.
-    cost_usd : float or None
-        None where prices are not known.
-    """
-
-    episodes: int
-    ended: dict[str, float]
-    actions: float
-    refused: int
+    episodes: int  # How many
+    ended: dict[str, float]  # Share of the episodes by how they ended: stop, collision, budget
+    actions: float  # Mean number of actions
+    refused: int  # Moves out of the flight volume; answers that named no action
     invalid: int
-    requests: int | None
+    requests: int | None  # Of an outside service, all episodes together; None where it does not say
     input_tokens: int | None
     output_tokens: int | None
-    cost_usd: float | None
+    cost_usd: float | None  # None where prices are not known
 
 
 def conduct(run: Run) -> Conduct:

@@ -31,24 +31,7 @@ def as_csv(
     beside: Sequence[PaperResult] = (),
     partings: Partings = _NO_PARTINGS,
 ) -> str:
-    """Write every score as one row of a tidy CSV: fractions and metres, unrounded; empty where there is none.
-
-    Parameters
-    ----------
-    runs, profiles
-        What is scored, and by which rules.
-    beside : sequence of PaperResult
-        Results of the paper, written as rows of the run ``paper``.
-    partings : Partings
-        Of these runs: what else than the scopes below the episodes are parted by.
-
-    Returns
-    -------
-    str
-        Scopes: ``overall`` (with ``_sd`` over scenes and 95 % intervals), ``task_weighted`` (the mean of all
-        episodes), ``family``, ``partition``, ``scene_type``, ``scene``; of all settings and modalities together
-        also the columns that episodes are parted by (``plan_detour``, ``target_seen_in_train``, …).
-    """
+    """Write every score as one row of a tidy CSV: fractions and metres, unrounded; empty where there is none."""
     out = io.StringIO()
     write = csv.writer(out, lineterminator="\n").writerow
     write(COLUMNS)

@@ -19,25 +19,14 @@ from aerialdojo_gen.store.schemas import FAMILIES
 
 @dataclass(frozen=True)
 class Score:
-    """Means over some episodes, or means of such means.
+    """Means over some episodes, or means of such means."""
 
-    Attributes
-    ----------
-    episodes : int
-        How many stand behind it.
-    sr, sr_view, osr, spl, cr : float
-        Success rate, success rate at any viewpoint with the target in sight (NaN where the log does not say), oracle
-        success rate, success weighted by path length, collision rate: fractions in [0, 1].
-    dts_m : float
-        Distance to the goal at the end of the episode, metres.
-    """
-
-    episodes: int
+    episodes: int  # How many stand behind it
     sr: float
     sr_view: float
     osr: float
     spl: float
-    dts_m: float
+    dts_m: float  # Distance to the goal at the end of the episode, metres
     cr: float
 
 
@@ -78,27 +67,13 @@ def deviation(scores: Sequence[Score]) -> Score:
 
 @dataclass(frozen=True)
 class Summary:
-    """Scores of a log under a profile.
+    """Scores of a log under a profile."""
 
-    Attributes
-    ----------
-    profile : Profile
-        The rule.
-    scenes : dict of str to Score
-        By scene, in the order of names.
-    families : dict of str to Score
-        Means over a family's scenes; families without episodes are left out.
-    overall : Score
-        Mean of the families that are there.
-    deviation : Score
-        Standard deviation over all scenes.
-    """
-
-    profile: Profile
-    scenes: dict[str, Score]
-    families: dict[str, Score]
-    overall: Score
-    deviation: Score
+    profile: Profile  # The rule
+    scenes: dict[str, Score]  # By scene, in the order of names
+    families: dict[str, Score]  # Means over a family's scenes; families without episodes are left out
+    overall: Score  # Mean of the families that are there
+    deviation: Score  # Standard deviation over all scenes
 
     @property
     def missing_families(self) -> list[str]:
@@ -107,20 +82,7 @@ class Summary:
 
 
 def summarize(episodes: Episodes, profile: Profile) -> Summary:
-    """Average a log by scene, family and overall.
-
-    Parameters
-    ----------
-    episodes : Episodes
-        The log of one run, or a part of it.
-    profile : Profile
-        The rule of success.
-
-    Returns
-    -------
-    Summary
-        Of an empty log: no scenes, and NaN overall.
-    """
+    """Average a log by scene, family and overall."""
     judged = outcomes(episodes, profile)
     scenes: dict[str, Score] = {}
     members: dict[str, list[Score]] = {}
@@ -147,22 +109,7 @@ def slices(episodes: Episodes, column: str, order: Sequence[str]) -> Iterator[tu
 
 
 def success_curve(episodes: Episodes, profile: Profile, radii_m: Floats) -> tuple[Floats, Floats]:
-    """Overall SR and OSR as the radius grows, everything else by the profile.
-
-    Parameters
-    ----------
-    episodes : Episodes
-        The log, one episode or more.
-    profile : Profile
-        The rule whose radius is varied.
-    radii_m : (r,) float64
-        Radii, metres.
-
-    Returns
-    -------
-    sr, osr : (r,) float64
-        Fractions; neither ever falls.
-    """
+    """Overall SR and OSR, fractions (r,), at radii in metres, everything else by the profile."""
     # An episode's share of the overall mean: its scene's among its family's scenes, its family's among the families.
     weight = np.empty(len(episodes))
     families = sorted(set(episodes.family.tolist()))

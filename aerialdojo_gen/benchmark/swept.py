@@ -15,22 +15,9 @@ STEP_COLUMNS = ("task_id", "step", "x_m", "y_m", "z_m", "distance_m")
 
 
 def swept_distances(episodes: pa.Table, steps: pa.Table) -> Floats:
-    """Measure the smallest distance to the goal over the segments that were flown.
+    """Smallest distance to the goal over the flown segments, (n,) metres.
 
-    The log holds no goal and needs none: a segment's length and the distances at its ends fix the triangle that they
-    make with the goal.
-
-    Parameters
-    ----------
-    episodes : pyarrow.Table
-        Rows of ``episodes``.
-    steps : pyarrow.Table
-        Rows of ``steps`` with `STEP_COLUMNS`, in any order, of these episodes or of more.
-
-    Returns
-    -------
-    (n,) float64
-        Metres, in the order of the episodes; at most ``min_distance_m``.
+    A segment and its end distances fix a triangle.
     """
     nearest = np.array(episodes["min_distance_m"].to_numpy(), dtype=np.float64)
     owner = pc.index_in(steps["task_id"], value_set=episodes["task_id"].combine_chunks())

@@ -36,18 +36,10 @@ _COLUMNS = ("object_id", "x_m", "y_m", "z_m")
 
 @dataclass(frozen=True)
 class View:
-    """Where a body is with regard to a target.
+    """Where a body is with regard to a target."""
 
-    Attributes
-    ----------
-    viewpoint_distance_m : float
-        To the nearest valid viewpoint of the target, its goal included, metres.
-    target_in_sight : bool
-        A straight line reaches the target unobstructed.
-    """
-
-    viewpoint_distance_m: float
-    target_in_sight: bool
+    viewpoint_distance_m: float  # To the nearest valid viewpoint of the target, its goal included, metres
+    target_in_sight: bool  # A straight line reaches the target unobstructed
 
 
 def viewpoints_content(root: DataRoot, scene: str) -> list[str]:
@@ -63,23 +55,9 @@ def without_viewpoints(scenes: Sequence[str], of: int) -> str:
 
 @lru_cache(maxsize=64)
 def viewpoints_of(root: DataRoot, scene: str) -> dict[int, Floats] | None:
-    """Read the valid viewpoints of a scene's objects.
+    """Read the valid viewpoints of a scene's objects, (n, 3) world metres by ``object_id``.
 
-    Parameters
-    ----------
-    root : DataRoot
-        The data root, with a release.
-    scene : str
-
-    Returns
-    -------
-    dict of int to (n, 3) float64, or None
-        By ``object_id``, metres, world frame; None where the release has no viewpoints.
-
-    Raises
-    ------
-    StoreError
-        The file is damaged.
+    None where the release has none.
     """
     if not store.shards(root, _TABLE, scene):
         return None
@@ -97,24 +75,7 @@ def nodes_of(root: DataRoot, scene: str) -> dict[int, str]:
 
 
 def viewed(scene: Scene, node: str, viewpoints: Floats, goal: Point, position: Point) -> View:
-    """Say where a body is with regard to a target.
-
-    Parameters
-    ----------
-    scene : Scene
-    node : str
-        The target's node name.
-    viewpoints : (n, 3) float64
-        The target's valid viewpoints, metres, world frame; may be none.
-    goal : tuple of float
-        The goal anchor's position, which is a viewpoint in any case.
-    position : tuple of float
-        Of the body's centre.
-
-    Returns
-    -------
-    View
-    """
+    """Distance to the nearest viewpoint, world metres, and whether the target is in sight from a position."""
     nearest = math.dist(position, goal)
     if len(viewpoints):
         nearest = min(nearest, float(np.linalg.norm(viewpoints - np.array(position), axis=1).min()))

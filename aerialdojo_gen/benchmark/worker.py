@@ -32,20 +32,11 @@ _COLUMNS = [name for name in STEPS.schema.names if name not in ("run_id", "task_
 
 @dataclass(frozen=True)
 class Unit:
-    """Episodes of one scene that a worker flies.
-
-    Attributes
-    ----------
-    scene : str
-    rows : pyarrow.Table
-        Of `aerialdojo_gen.benchmark.tasks.select`.
-    journal : Path
-        Where finished episodes go.
-    """
+    """Episodes of one scene that a worker flies."""
 
     scene: str
-    rows: pa.Table
-    journal: Path
+    rows: pa.Table  # Of `aerialdojo_gen.benchmark.tasks.select`
+    journal: Path  # Where finished episodes go
 
 
 @dataclass(frozen=True)
@@ -58,26 +49,14 @@ class Failed:
 
 @dataclass(frozen=True)
 class Finished:
-    """What was finished, for progress and for the bill; sums add up.
+    """What was finished, for progress and for the bill; sums add up."""
 
-    Attributes
-    ----------
-    episodes, actions : int
-        Failed ones too.
-    cost_usd : float
-    tokens : int
-    flown : int
-        Episodes that did not fail.
-    streak : tuple of Failed
-        Failures since the last episode that did not fail.
-    """
-
-    episodes: int = 0
+    episodes: int = 0  # Failed ones too
     actions: int = 0
     cost_usd: float = 0.0
     tokens: int = 0
-    flown: int = 0
-    streak: tuple[Failed, ...] = ()
+    flown: int = 0  # Episodes that did not fail
+    streak: tuple[Failed, ...] = ()  # Failures since the last episode that did not fail
 
     def __add__(self, other: Finished) -> Finished:
         """Add what was finished later."""
@@ -93,37 +72,15 @@ class Finished:
 
 @dataclass(frozen=True)
 class Conditions:
-    """What a worker bears.
+    """What a worker bears."""
 
-    Attributes
-    ----------
-    attempts : int
-        How often an episode is begun before it is logged as failed.
-    pause_s : float
-        Before the second attempt; doubled each time, unless the service says how long to wait.
-    tolerate : bool
-        Log an episode in which the agent failed in a way of its own, instead of ending the run.
-    """
-
-    attempts: int = 5
-    pause_s: float = 1.0
-    tolerate: bool = False
+    attempts: int = 5  # How often an episode is begun before it is logged as failed
+    pause_s: float = 1.0  # Before the second attempt; doubled each time, unless the service says how long to wait
+    tolerate: bool = False  # Log an episode in which the agent failed in a way of its own, instead of ending the run
 
 
 class Worker:
-    """Flies units with one agent.
-
-    Parameters
-    ----------
-    agent : Agent
-    flight : Flight
-    data : DataRoot
-    identity : dict
-        Columns ``run_id``, ``agent`` and ``agent_options`` of `episodes`.
-    conditions : Conditions
-    secrets : Secrets
-        Kept out of the log.
-    """
+    """Flies units with one agent."""
 
     def __init__(
         self,
@@ -139,21 +96,7 @@ class Worker:
         self._asked = Asked(agent, identity["agent"], secrets, conditions.tolerate)
 
     def fly(self, unit: Unit, tell: Callable[[Finished], None], stopped: Callable[[], bool]) -> None:
-        """Fly a unit's episodes, each into the journal when it is finished.
-
-        Parameters
-        ----------
-        unit : Unit
-        tell : callable
-            Called after each episode.
-        stopped : callable
-            Asked before each, and while one waits to be tried again; True ends the unit.
-
-        Raises
-        ------
-        AgentError
-            The agent failed in a way of its own.
-        """
+        """Fly a unit's episodes, each into the journal when it is finished."""
         actions: dict[str, list[int]] = {}
         # The oracle alone, by its very class: no agent of another name can ask for it.
         if type(self._agent) is OracleAgent:

@@ -30,13 +30,7 @@ MEMORY_MB = 1000
 
 @contextlib.contextmanager
 def worker(data: DataRoot, evaluation: Evaluation, link: Link) -> Iterator[Worker]:
-    """Make an agent and what it flies in; the agent is closed at the end.
-
-    Raises
-    ------
-    UsageError
-        There is no such agent, its requests are to be paced and it does not let them, or it is of another release.
-    """
+    """Make an agent and what it flies in; the agent is closed at the end."""
     agent: Any = load_agent(evaluation.agent, **evaluation.options)
     if evaluation.requests_per_minute is not None:
         if not hasattr(agent, "pace"):
@@ -83,25 +77,7 @@ def fly_units(
     tell: Callable[[Finished], None],
     stopped: Callable[[], bool],
 ) -> Iterator[str]:
-    """Fly units, and yield a scene when all of its units are through.
-
-    Parameters
-    ----------
-    data : DataRoot
-    evaluation : Evaluation
-    units : sequence of Unit
-    executor : Executor
-        It has done nothing before.
-    tell : callable
-        Called in this process after every episode.
-    stopped : callable
-        Asked now and then in this process; no episode is begun once it is True. It may raise, to end everything.
-
-    Raises
-    ------
-    AerialDojoError
-        An expected failure, or a worker was killed.
-    """
+    """Fly units, and yield a scene when all of its units are through."""
     left = Counter(unit.scene for unit in units)
     work = [_Work(data, evaluation, unit) for unit in units]
     for outcome in executor.map(_fly, work, lambda one: one.scene, talk=Talk(tell, stopped), memory_mb=MEMORY_MB):

@@ -12,22 +12,7 @@ from aerialdojo_gen.common.secrets import Secrets
 
 
 def again(more: Sequence[str], *, without: Sequence[str] = (), data: str | None = None) -> str:
-    """Return this process's command with all its options, so that a shell takes it as it stands.
-
-    Parameters
-    ----------
-    more : sequence of str
-        Arguments that are added, unless they are there.
-    without : sequence of str
-        Flags that are left out.
-    data : str, optional
-        The data directory; named where it came from the environment, which another shell may lack.
-
-    Returns
-    -------
-    str
-        Quoted; secrets are ``[redacted]``.
-    """
+    """Return this process's command with all its options, so that a shell takes it as it stands."""
     kept = [argument for argument in sys.argv[1:] if argument not in without]
     if data is not None and os.environ.get("AERIALDOJO_DATA") and not _names(kept, "--data"):
         kept += ["--data", data]

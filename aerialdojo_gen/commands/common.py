@@ -155,40 +155,7 @@ def run_until(
     address: str | None = None,
     **overrides: object,
 ) -> None:
-    """Bring a stage's tables up to date, running what it needs upstream; the twin of a stage's command.
-
-    Parameters
-    ----------
-    stage : str
-        Name of the stage, e.g. ``"plan"``.
-    data : Path
-        The data directory.
-    scene : list of str, optional
-        Names or globs; the pipeline's scenes where absent.
-    pipeline : Path, optional
-        A pipeline file; where absent that of the release in the data directory, else the default one.
-    workers : int, optional
-        Processes; all cores where absent.
-    force : bool
-        Compute this stage's shards even where they are fresh (not those of the stages upstream).
-    quiet : bool
-        Print no progress and no summary.
-    verbose : bool
-        Print a line also for stages that are up to date.
-    limits : Limits, optional
-        How much of the stage is computed now; all of it where absent.
-    replace : bool
-        Whether scenes of the release that another pipeline made may be lost.
-    executor, address : str
-        As for `aerialdojo_gen.pipeline.executors.make_executor`.
-    **overrides
-        Values of the stage's section that replace the file's; None leaves one as it is.
-
-    Raises
-    ------
-    AerialDojoError
-        An expected failure.
-    """
+    """Bring a stage's tables up to date, running what it needs upstream; the twin of a stage's command."""
     from aerialdojo_gen.config.pipeline import with_overrides
     from aerialdojo_gen.pipeline.registry import upstream
 

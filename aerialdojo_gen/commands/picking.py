@@ -11,40 +11,14 @@ from aerialdojo_gen.errors import UsageError
 
 
 def given_scene(position: str | None, option: str | None) -> str | None:
-    """Return the scene that is named by position or by ``--scene``.
-
-    Raises
-    ------
-    UsageError
-        Both name one, and not the same.
-    """
+    """Return the scene that is named by position or by ``--scene``."""
     if position and option and position != option:
         raise UsageError(f"two scenes, {position} and --scene {option}: name one")
     return position or option
 
 
 def pick_scene(given: str | None, known: Sequence[str], ask: TextIO | None = None, tell: TextIO | None = None) -> str:
-    """Choose one of the scenes there are.
-
-    Parameters
-    ----------
-    given : str or None
-        A name or a glob; None for any.
-    known : sequence of str
-        The scenes.
-    ask, tell : text stream, optional
-        Where a number or a name is read, and where the list is written; standard input and error where absent.
-
-    Returns
-    -------
-    str
-        The only one that fits, or the one that was picked.
-
-    Raises
-    ------
-    UsageError
-        None fits; or several do, and nobody is there to pick one.
-    """
+    """Choose one of the scenes there are."""
     ask, tell = ask or sys.stdin, tell or sys.stderr
     fitting = choose_scenes([given] if given else None, known)
     if len(fitting) == 1:

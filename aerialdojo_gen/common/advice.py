@@ -23,19 +23,11 @@ _TAKES: dict[str, tuple[str, ...]] = {
 
 @dataclass(frozen=True)
 class Given:
-    """What a user gave on the command line, or to the library, and has to give again.
+    """What a user gave on the command line, or to the library, and has to give again."""
 
-    Attributes
-    ----------
-    pipeline, data : str
-        As written; empty where nothing was.
-    program : str
-        What the command line is called as here.
-    """
-
-    pipeline: str = ""
+    pipeline: str = ""  # As written; empty where nothing was
     data: str = ""
-    program: str = PROGRAM
+    program: str = PROGRAM  # What the command line is called as here
 
 
 _NOW = [Given()]
@@ -53,29 +45,12 @@ def remember(*, pipeline: object = None, data: object = None) -> None:
 
 
 def begin(called_as: str = "") -> None:
-    """Forget what was given, at the start of a command.
-
-    Parameters
-    ----------
-    called_as : str
-        The path that the program was started by, which is what is advised where its name alone finds nothing.
-    """
+    """Forget what was given, at the start of a command."""
     _NOW[0] = Given(program=program(called_as) or _NOW[0].program)
 
 
 def program(called_as: str) -> str:
-    """Say how the command line is called: by its name where a shell finds it by that, else by its path.
-
-    Parameters
-    ----------
-    called_as : str
-        The path that the program was started by.
-
-    Returns
-    -------
-    str
-        Empty where that is another program.
-    """
+    """Say how the command line is called: by its name where a shell finds it by that, else by its path."""
     if Path(called_as).name != PROGRAM:
         return ""
     found = shutil.which(PROGRAM)
@@ -94,23 +69,7 @@ def as_given(what: Given) -> Iterator[None]:
 
 
 def command(verb: str, *words: object, **options: object) -> str:
-    """Say a command so that it can be pasted into a shell.
-
-    Parameters
-    ----------
-    verb : str
-        The command's name, e.g. ``"annotate-draft"``.
-    *words : object
-        Its arguments, and options that are not given by key.
-    **options : object
-        Its options by key, in this order: ``scene="Campus"`` is ``--scene Campus``, True a flag alone, None and False
-        nothing at all. `pipeline` and `data` are those that were given, where the command takes them.
-
-    Returns
-    -------
-    str
-        ``"aerialdojo-gen annotate-draft Campus --pipeline 'my scenes/pipeline.toml'"``.
-    """
+    """Say a command so that it can be pasted into a shell."""
     kept = given()
     for key, own in (("pipeline", kept.pipeline), ("data", kept.data)):
         if own and key in _TAKES.get(verb, ("pipeline", "data")):

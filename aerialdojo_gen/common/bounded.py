@@ -49,29 +49,7 @@ _JSON_TOKEN = re.compile(r'"(?:[^"\\]|\\.)*+"|(?P<number>[0-9]++)|(?P<mark>[\[\]
 
 
 def read_toml(path: Path, error: type[AerialDojoError] = StoreError, *, finite: bool = True) -> dict[str, Any]:
-    """Read a TOML file.
-
-    Parameters
-    ----------
-    path : Path
-        At most `MAX_TOML_BYTES`, UTF-8.
-    error : type of AerialDojoError
-        What is raised.
-    finite : bool
-        False: nan and inf are let through, the caller refuses them.
-
-    Returns
-    -------
-    dict
-        All numbers finite, integers within 64 bits, nested at most `MAX_DEPTH` deep.
-
-    Raises
-    ------
-    AerialDojoError
-        Of the type `error`; one line that names the file and the place.
-    FileNotFoundError
-        There is no such file: the caller knows what it is needed for.
-    """
+    """Read a TOML file."""
     text = _text(path, MAX_TOML_BYTES, error)
     try:
         return loads_toml(text, finite=finite)
@@ -93,29 +71,7 @@ def loads_toml(text: str, *, finite: bool = True) -> dict[str, Any]:
 
 
 def read_json(path: Path, error: type[AerialDojoError] = StoreError, limit: int = MAX_JSON_BYTES) -> Any:
-    """Read a JSON file.
-
-    Parameters
-    ----------
-    path : Path
-        UTF-8, with or without a byte order mark.
-    error : type of AerialDojoError
-        What is raised.
-    limit : int
-        Most bytes of the file.
-
-    Returns
-    -------
-    object
-        As of `loads_json`.
-
-    Raises
-    ------
-    AerialDojoError
-        Of the type `error`; one line that names the file and the place.
-    FileNotFoundError
-        There is no such file: the caller knows what it is needed for.
-    """
+    """Read a JSON file."""
     text = _text(path, limit, error)
     try:
         return loads_json(text)
@@ -129,29 +85,7 @@ def loads_json(
     object_pairs_hook: Callable[[list[tuple[str, Any]]], Any] | None = None,
     finite: bool = True,
 ) -> Any:
-    """Parse JSON within bounds.
-
-    Parameters
-    ----------
-    text : str or bytes
-        One JSON document; bytes are UTF-8.
-    object_pairs_hook : callable, optional
-        As of `json.loads`; what it raises is let through.
-    finite : bool
-        False: NaN and infinities, which Python writes and which are not JSON, are taken.
-
-    Returns
-    -------
-    object
-        All numbers finite unless that is not asked for, integers within 64 bits, nested at most `MAX_DEPTH` deep,
-        every string valid Unicode.
-
-    Raises
-    ------
-    Malformed
-        It is not JSON, or `BeyondBounds`: it is, but not within these bounds. The message names the place. It is a
-        ValueError too.
-    """
+    """Parse JSON within bounds."""
     if isinstance(text, bytes):
         try:
             text = text.decode("utf-8-sig")
@@ -209,24 +143,7 @@ def check_value(value: Any, *, finite: bool = True, longest: int = MAX_JSON_BYTE
 def beyond(
     value: Any, *, finite: bool = True, integers: bool = True, longest: int = MAX_JSON_BYTES
 ) -> tuple[JsonPath, str] | None:
-    """Find a value that is beyond the bounds.
-
-    Parameters
-    ----------
-    value : object
-        Of dicts, lists, strings and numbers.
-    finite, integers : bool
-        False: NaN and infinities, or integers of any size, are let through.
-    longest : int
-        Most characters of a string or key.
-
-    Returns
-    -------
-    path : tuple of str and int
-        Where it stands.
-    why : str
-        What is wrong with it.
-    """
+    """Find a value that is beyond the bounds."""
     # Paths are linked backwards: most are never written out.
     stack: list[tuple[Any, Any, int]] = [(value, None, 0)]
     while stack:

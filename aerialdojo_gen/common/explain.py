@@ -18,33 +18,15 @@ _MOST_FAULTS = 20
 
 @dataclass(frozen=True)
 class ModelFault:
-    """One thing that is wrong.
+    """One thing that is wrong."""
 
-    Attributes
-    ----------
-    path : tuple of str or int
-        Where: keys, and indices of lists; empty for the whole.
-    said : str
-        What, as the end of a message that has named the place: ``"must be a list"``, ``"unknown key 'x': …"``.
-    line : str
-        What, with the last key of the path.
-    """
-
-    path: tuple[str | int, ...]
+    path: tuple[str | int, ...]  # Where: keys, and indices of lists; empty for the whole
     said: str
-    line: str
+    line: str  # What, with the last key of the path
 
 
 def faults_of(error: ValidationError, model: type[BaseModel]) -> list[ModelFault]:
-    """Take a validation error apart, with the nearest known key for an unknown one.
-
-    Parameters
-    ----------
-    error : pydantic.ValidationError
-        What validating against `model` raised.
-    model : type of BaseModel
-        The model, to look up the keys that exist.
-    """
+    """Take a validation error apart, with the nearest known key for an unknown one."""
     faults = []
     for raw in error.errors(include_url=False):
         path = tuple(raw["loc"])
@@ -67,20 +49,7 @@ def faults_of(error: ValidationError, model: type[BaseModel]) -> list[ModelFault
 
 
 def explain(error: ValidationError, model: type[BaseModel]) -> list[str]:
-    """Turn a validation error into one line a fault.
-
-    Parameters
-    ----------
-    error : pydantic.ValidationError
-        What validating against `model` raised.
-    model : type of BaseModel
-        The model, to look up the keys that exist.
-
-    Returns
-    -------
-    list of str
-        E.g. ``["[plan] unknown key 'wieght': did you mean 'weight'?"]``; of many faults the first and how many more.
-    """
+    """Turn a validation error into one line a fault."""
     faults = faults_of(error, model)
     told = [brief(f"{_table(fault.path[: _owner(fault.path)])}{fault.line}") for fault in faults[:_MOST_FAULTS]]
     return [*told, f"and {len(faults) - _MOST_FAULTS} more faults"] if len(faults) > _MOST_FAULTS else told

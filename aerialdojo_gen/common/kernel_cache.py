@@ -97,13 +97,7 @@ def _read(file: Path) -> tuple[str, list[Path]]:
 
 @cache
 def kernel_folder(source: Path) -> Path:
-    """Make the folder for the machine code of a module: beside the source, or where this user can write.
-
-    Raises
-    ------
-    UsageError
-        There is no such place.
-    """
+    """Make the folder for the machine code of a module: beside the source, or where this user can write."""
     name = folder_name(source)
     beside = source.parent / "__pycache__" / "kernels" / name
     tried = []

@@ -13,19 +13,7 @@ _MOST_LISTED = 20
 
 
 def closest(name: str, known: Iterable[str], most: int = 1, *, cutoff: float = 0.6) -> list[str]:
-    """Return the known names that are most like `name`, the best first, whatever their case.
-
-    Parameters
-    ----------
-    name : str
-        What was written.
-    known : iterable of str
-        What exists.
-    most : int
-        How many at the most.
-    cutoff : float
-        How alike they must be, 0 to 1.
-    """
+    """Return the known names that are most like `name`, the best first, whatever their case."""
     folded: dict[str, str] = {}
     for real in known:
         folded.setdefault(real.casefold(), real)
@@ -45,26 +33,7 @@ def nearest(name: str, known: Iterable[str], most: int = 1) -> str:
 
 
 def unknown(what: str, name: str, known: Iterable[str], *, besides: Sequence[str] = (), most: int = 1) -> str:
-    """Say that there is nothing of a name, with what was probably meant, else with what there is.
-
-    Parameters
-    ----------
-    what : str
-        What the name is to be of, e.g. ``"no agent"`` or ``"unknown key"``.
-    name : str
-        What was written.
-    known : iterable of str
-        What exists, in the order in which it is to be listed.
-    besides : sequence of str
-        What may be written as well, and is listed without being a name.
-    most : int
-        How many nearest names at the most.
-
-    Returns
-    -------
-    str
-        ``"no agent 'oracel': did you mean 'oracle'?"`` or ``"no agent 'x': there are oracle, random"``.
-    """
+    """Say that there is nothing of a name, with what was probably meant, else with what there is."""
     names = list(known)
     return f"{what} {brief(name, 100)!r}: {did_you_mean(name, names, most) or _listed([*names, *besides])}"
 
@@ -78,25 +47,7 @@ def _listed(names: Sequence[str]) -> str:
 
 
 def choose_scenes(patterns: Sequence[str] | None, known: Sequence[str]) -> list[str]:
-    """Resolve names and globs to scenes.
-
-    Parameters
-    ----------
-    patterns : sequence of str or None
-        Names or globs; None or empty for all scenes.
-    known : sequence of str
-        The scenes there are.
-
-    Returns
-    -------
-    list of str
-        In the order of `known`, each once.
-
-    Raises
-    ------
-    UsageError
-        A pattern matches nothing, and the message gives the nearest names; or there are no scenes.
-    """
+    """Resolve names and globs to scenes."""
     if not known:
         raise UsageError("there are no scenes: the folder of recipes is empty")
     chosen: set[str] = set()

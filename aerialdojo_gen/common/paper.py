@@ -13,27 +13,15 @@ from pathlib import Path
 
 @dataclass(frozen=True)
 class PaperScene:
-    """One row of the paper's Table 10.
+    """One row of the paper's Table 10."""
 
-    Attributes
-    ----------
-    scene : str
-        Name.
-    landmarks, objects : int
-        How many are annotated.
-    base, standard, long_horizon : int
-        Navigation tasks of each length setting; a task has two instances.
-    path_m : float
-        Summed length of the reference trajectories, metres.
-    """
-
-    scene: str
-    landmarks: int
+    scene: str  # Name
+    landmarks: int  # How many are annotated
     objects: int
-    base: int
+    base: int  # Navigation tasks of each length setting; a task has two instances
     standard: int
     long_horizon: int
-    path_m: float
+    path_m: float  # Summed length of the reference trajectories, metres
 
     @property
     def tasks(self) -> dict[str, int]:
@@ -66,38 +54,21 @@ def paper_counts() -> dict[str, tuple[int, int]]:
 
 @cache
 def splits() -> dict[tuple[str, str], dict[str, int]]:
-    """Read the paper's table of splits.
-
-    Returns
-    -------
-    dict
-        ``{("ID", "train"): {"base": 20320, "standard": 24199, "long_horizon": 12302}, …}``, navigation tasks.
-    """
+    """Read the paper's table of splits."""
     settings = ("base", "standard", "long_horizon")
     return {(r["partition"], r["subset"]): {s: int(r[s]) // 2 for s in settings} for r in _rows("splits.csv")}
 
 
 @dataclass(frozen=True)
 class PaperResult:
-    """A row of the paper's Table 4 (Base) or 5 (Standard): flown in its simulator, Unreal Engine.
+    """A row of the paper's Table 4 (Base) or 5 (Standard): flown in its simulator, Unreal Engine."""
 
-    Attributes
-    ----------
-    setting, group, model : str
-        ``base`` or ``standard``; ``open`` or ``closed`` (source); the model.
-    mean, spread : dict of (str, float) to float
-        By metric (``sr``, ``osr``, ``spl``, ``dts_m``, ``cr``) and radius, metres: fractions and metres. What the
-        paper's ± is, it does not say.
-    source : str
-        Table of the paper.
-    """
-
-    setting: str
+    setting: str  # ``base`` or ``standard``; ``open`` or ``closed`` (source); the model
     group: str
     model: str
-    mean: dict[tuple[str, float], float]
+    mean: dict[tuple[str, float], float]  # dict of (str, float) to float
     spread: dict[tuple[str, float], float]
-    source: str
+    source: str  # Table of the paper
 
 
 _MEASURED = {

@@ -31,25 +31,7 @@ _JPEG_START = b"\xff\xd8"
 
 
 def encode_png(image: NDArray[np.uint8] | NDArray[np.uint16], setting: tuple[int, ...] = PLAIN_PNG) -> bytes:
-    """Encode a picture as PNG; the same bytes for the same picture.
-
-    Parameters
-    ----------
-    image : (H, W, 3) uint8, or (H, W) uint8 or uint16
-        sRGB, or one channel.
-    setting : tuple of int
-        One of this module's.
-
-    Returns
-    -------
-    bytes
-        The file.
-
-    Raises
-    ------
-    RenderError
-        OpenCV cannot encode it.
-    """
+    """Encode (H, W, 3) uint8 sRGB, or one channel of uint8 or uint16, as PNG; the same bytes for the same picture."""
     return _encoded(image, ".png", setting)
 
 

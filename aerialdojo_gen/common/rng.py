@@ -17,22 +17,7 @@ def _digest(seed: int, stage: str, key: tuple[object, ...]) -> bytes:
 
 
 def generator(seed: int, stage: str, *key: object) -> np.random.Generator:
-    """Make the generator of one row.
-
-    Parameters
-    ----------
-    seed : int
-        The pipeline's seed; 0 is a seed like any other.
-    stage : str
-        Name of the stage that draws, e.g. ``"anchor-sample"``.
-    *key : object
-        The row's key, e.g. ``("U_Mall_0", 17)``; its parts are hashed by their ``str``.
-
-    Returns
-    -------
-    numpy.random.Generator
-        A PCG64 generator, the same on every platform, run and number of workers.
-    """
+    """Make the generator of one row."""
     return np.random.Generator(np.random.PCG64(int.from_bytes(_digest(seed, stage, key), "little")))
 
 

@@ -36,15 +36,7 @@ def is_secret_name(name: str) -> bool:
 
 
 class Secrets:
-    """The secrets that a run knows of, to be kept out of what it writes.
-
-    Parameters
-    ----------
-    options : mapping
-        Options of an agent: strings in them whose name, or that of what they stand in, is a secret's.
-    values : iterable of str
-        Known secrets besides. Those of the environment's variables with a secret's name are always among them.
-    """
+    """The secrets that a run knows of, to be kept out of what it writes."""
 
     def __init__(self, options: Mapping[str, Any] | None = None, values: Iterable[str] = ()) -> None:
         found = {value for name, value in os.environ.items() if is_secret_name(name) and name not in _FOLDERS}

@@ -37,15 +37,7 @@ def raw(stream: TextIO) -> TextIO:
 
 @contextmanager
 def standard_streams() -> Iterator[None]:
-    """Clean standard output and error, for the length of a command.
-
-    Raises
-    ------
-    AerialDojoError
-        Standard output cannot be written.
-    SystemExit
-        Its reader has closed it.
-    """
+    """Clean standard output and error, for the length of a command."""
     before = sys.stdout, sys.stderr
     # Python has no stream at all where the descriptor is closed.
     out, err = (stream or open(os.devnull, "w", encoding="utf-8") for stream in before)  # noqa: SIM115

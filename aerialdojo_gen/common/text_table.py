@@ -21,65 +21,27 @@ _LEAST_WORDS = 24
 
 @dataclass(frozen=True)
 class Column:
-    """A column.
+    """A column."""
 
-    Attributes
-    ----------
-    head : str
-        Its heading.
-    group : str
-        Heading over this column and its neighbours of the same group; empty for none.
-    words : bool
-        Whether it holds words, which stand to the left and are wrapped; figures stand to the right and are not.
-    joined : bool
-        Whether it says something of the column before it, and is shown beside that.
-    """
-
-    head: str
-    group: str = ""
+    head: str  # Its heading
+    group: str = ""  # Heading over this column and its neighbours of the same group; empty for none
     words: bool = False
-    joined: bool = False
+    joined: bool = False  # Whether it says something of the column before it, and is shown beside that
 
 
 @dataclass(frozen=True)
 class TextTable:
-    """A table of text.
+    """A table of text."""
 
-    Attributes
-    ----------
-    stub : str
-        Head of the first column, which names the rows.
-    columns : sequence of Column
-    rows : sequence of (str, sequence of str)
-        First column, and a cell a column. A row without a first column belongs to the one above it.
-    title : str
-        What it shows; empty for none.
-    notes : sequence of str
-        What must be known to read it.
-    sections : mapping of int to str
-        Headings within the table, by the row that they stand above.
-    """
-
-    stub: str
+    stub: str  # Head of the first column, which names the rows
     columns: Sequence[Column]
-    rows: Sequence[tuple[str, Sequence[str]]]
-    title: str = ""
-    notes: Sequence[str] = ()
+    rows: Sequence[tuple[str, Sequence[str]]]  # sequence of (str, sequence of str)
+    title: str = ""  # What it shows; empty for none
+    notes: Sequence[str] = ()  # What must be known to read it
     sections: Mapping[int, str] = field(default_factory=dict)
 
     def lines(self, width: int | None = None) -> list[str]:
-        """Write the table.
-
-        Parameters
-        ----------
-        width : int, optional
-            Columns of the terminal; one line a row, however long, where absent.
-
-        Returns
-        -------
-        list of str
-            Lines without their ends.
-        """
+        """Write the table."""
         body = _Body(self, width)
         out = [self.title] if self.title else []
         for n, block in enumerate(body.blocks()):

@@ -40,13 +40,7 @@ def use_utf8() -> None:
 
 
 def check_arguments(arguments: Sequence[str]) -> None:
-    """Refuse arguments that are no text, and empty ones.
-
-    Raises
-    ------
-    UsageError
-        An argument, the data directory in the environment or the working directory is not UTF-8, or one is empty.
-    """
+    """Refuse arguments that are no text, and empty ones."""
     for before, text in zip(("", *arguments), arguments, strict=False):
         option = before if before.startswith("--") else ""
         if not text:
@@ -67,13 +61,7 @@ def _check_text(text: str, option: str) -> None:
 
 
 def check_limits(arguments: Sequence[str]) -> None:
-    """Raise the number of file descriptors to what is allowed.
-
-    Raises
-    ------
-    AerialDojoError
-        That is too few, or there is so little memory that libraries would crash before they can say so.
-    """
+    """Raise the number of file descriptors to what is allowed."""
     if arguments and not arguments[0].startswith("-") and not {"-h", "--help"} & set(arguments):
         check_memory(arguments[0])
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
@@ -91,13 +79,7 @@ def memory_mb(command: str) -> int:
 
 
 def check_memory(command: str) -> None:
-    """Refuse a command for which there is too little address space: native libraries crash or hang half-way.
-
-    Raises
-    ------
-    AerialDojoError
-        The process's limit is below what the command takes.
-    """
+    """Refuse a command for which there is too little address space: native libraries crash or hang half-way."""
     needed_mb = memory_mb(command)
     memory = resource.getrlimit(resource.RLIMIT_AS)[0]
     if memory != resource.RLIM_INFINITY and memory < needed_mb << 20:

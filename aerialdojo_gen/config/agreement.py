@@ -18,18 +18,7 @@ NEAR_GOAL_M = 1.0
 
 
 def disagreements(pipeline: Pipeline) -> list[str]:
-    """Find what sections say differently of one and the same thing, so that no stage undoes another's work.
-
-    Parameters
-    ----------
-    pipeline : Pipeline
-        Whose sections are valid each by itself.
-
-    Returns
-    -------
-    list of str
-        One line a contradiction: the keys, their values, and which way they must go. Empty where all is well.
-    """
+    """Find what sections say differently of one and the same thing, so that no stage undoes another's work."""
     body, anchor, reference = pipeline.embodiment, pipeline.anchor_sample, pipeline.reference_images
     pair, plan, kept, render = pipeline.pair_objects, pipeline.plan, pipeline.filter, pipeline.render
     radius = body.radius_m

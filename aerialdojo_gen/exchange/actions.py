@@ -25,21 +25,11 @@ _EXACT_M = 1e-5
 
 @dataclass(frozen=True)
 class Move:
-    """What a foreign action does.
+    """What a foreign action does."""
 
-    Attributes
-    ----------
-    name : str
-        Its name in the file or, where that has numbers, in the benchmark's documents.
-    step : tuple of 4 float
-        Forward, left, up in metres; turn in radians, counter-clockwise.
-    ours : int or None
-        The action of ours that does the same; None where none does.
-    """
-
-    name: str
-    step: tuple[float, float, float, float]
-    ours: int | None
+    name: str  # Its name in the file or, where that has numbers, in the benchmark's documents
+    step: tuple[float, float, float, float]  # Forward, left, up in metres; turn in radians, counter-clockwise
+    ours: int | None  # The action of ours that does the same; None where none does
 
 
 def move(name: str, *, forward: float = 0, left: float = 0, up: float = 0, turn_deg: float = 0) -> Move:
@@ -55,19 +45,9 @@ def move(name: str, *, forward: float = 0, left: float = 0, up: float = 0, turn_
 
 
 def replay(start: Sequence[float] | Floats, steps: Floats) -> Floats:
-    """Fly steps from a start pose, without a map.
+    """Replay steps (n, 4) (forward, left, up in metres, turn in radians) from a pose, without a map.
 
-    Parameters
-    ----------
-    start : (4,) float
-        x, y, z in metres and yaw in radians, world frame.
-    steps : (n, 4) float64
-        Forward, left, up in metres, turn in radians.
-
-    Returns
-    -------
-    (n + 1, 4) float64
-        Poses before each step and after the last.
+    Poses (n + 1, 4).
     """
     x, y, z, yaw = start
     yaws = yaw + np.concatenate([[0.0], np.cumsum(steps[:, 3])])
@@ -106,18 +86,7 @@ _WORD_OF = {a: word for word, actions in _OURS.items() for a in actions}
 def words_of(actions: NDArray[np.int8], poses: Floats) -> list[str]:
     """Name what led into each pose in the words of the authors' layout.
 
-    Parameters
-    ----------
-    actions : (n,) int8
-        What is done at every pose, the last being Stop.
-    poses : (n, 4) float64
-        x, y, z in metres and yaw in radians.
-
-    Returns
-    -------
-    list of n str
-        ``start``, then a word a pose. The layout has none for Approach: it takes the word of the axis, in the body's
-        frame, along which it goes farthest.
+    An Approach takes the word of its main body axis.
     """
     words = ["start"]
     for k, action in enumerate(actions[:-1].tolist()):
@@ -132,22 +101,9 @@ def words_of(actions: NDArray[np.int8], poses: Floats) -> list[str]:
 
 
 def actions_of(words: Sequence[str], poses: Floats) -> tuple[list[int] | None, float]:
-    """Find the sizes of the authors' actions from the poses between which they stand.
+    """Find our actions for the authors' words from the poses (n, 4) (world metres, radians).
 
-    Parameters
-    ----------
-    words : sequence of n - 1 str
-        The action that led into each pose but the first; keys of `WORDS`.
-    poses : (n, 4) float64
-        x, y, z in metres and yaw in radians, world frame.
-
-    Returns
-    -------
-    list of n int, or None
-        What is done at every pose in our action set, the last Stop; None where a step is none of ours.
-    float
-        Metres between the recorded end and that of a replay of the nearest of our actions. An Approach, which has
-        no size of its own, is left out: the replay is then compared with the pose before it.
+    And the replay error in metres.
     """
     found = body_steps(poses)
     steps = np.zeros_like(found)

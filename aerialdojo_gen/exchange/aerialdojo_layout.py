@@ -26,23 +26,13 @@ _FOLDER = re.compile(r"(.+)_([BSL])_(Train|Test)")
 
 @dataclass(frozen=True)
 class Partition:
-    """One folder of tasks: a split, a setting and a scene.
+    """One folder of tasks: a split, a setting and a scene."""
 
-    Attributes
-    ----------
-    scene, setting : str
-        As in our tables.
-    partition, subset : str
-        ID or OOD; train or test.
-    split : str
-        The name of the split's folder.
-    """
-
-    scene: str
+    scene: str  # As in our tables
     setting: str
-    partition: str
+    partition: str  # ID or OOD; train or test
     subset: str
-    split: str
+    split: str  # The name of the split's folder
 
     @property
     def path(self) -> Path:

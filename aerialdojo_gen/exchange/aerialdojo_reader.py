@@ -35,13 +35,7 @@ _EXACT = 1e-6
 
 
 def task_files(path: Path) -> list[Path]:
-    """List the task files of a folder of this layout, or the one that is named.
-
-    Raises
-    ------
-    UsageError
-        There is none.
-    """
+    """List the task files of a folder of this layout, or the one that is named."""
     if not path.is_dir():
         return [path]
     root = path.resolve()

@@ -59,29 +59,6 @@ def write_scene(data: DataRoot, scene: str, root: Path, picture_px: int = 0) -> 
     """Write a scene's tasks, pictures and trajectories.
 
     As in the authors' data every scene has all of its partitions: one without tasks is an empty list.
-
-    Parameters
-    ----------
-    data : DataRoot
-        The data root.
-    scene : str
-        A scene of its release.
-    root : Path
-        Folder of the layout.
-    picture_px : int
-        Columns and rows of the pictures, drawn anew from the scene's mesh; 0 for the release's own.
-
-    Returns
-    -------
-    dict of str to int
-        Task files, tasks, trajectories and pictures written.
-
-    Raises
-    ------
-    StoreError
-        A table is missing or damaged, or an object that an image task names has no picture.
-    AssetError
-        Pictures are to be drawn, and the scene's mesh is missing or another one.
     """
     objects = {row["object_id"]: row for row in store.read_scene(data, "release/objects", scene).to_pylist()}
     draw = Redrawn(data, scene, picture_px) if picture_px else None

@@ -34,19 +34,7 @@ _OPTIONS = {
 
 
 class Clip:
-    """Writes a video frame by frame, at even intervals; a context manager.
-
-    Parameters
-    ----------
-    path : Path
-        An MP4 file to be made.
-    kind : str
-        ``"rgb"``: frames (H, W, 3) uint8, of even H and W; ``"depth"``: codes (H, W) uint16 below `DEPTH_CODES`.
-    width, height : int
-        Pixels.
-    fps : int
-        Frames a second: frame k stands at k / fps, exactly.
-    """
+    """Writes a video frame by frame, at even intervals; a context manager."""
 
     def __init__(self, path: Path, kind: str, width: int, height: int, fps: int) -> None:
         codec, pixels, options = _OPTIONS[kind]
@@ -78,20 +66,7 @@ class Clip:
 
 
 def depth_codes(depth_m: NDArray[np.float32], most_m: float) -> NDArray[np.uint16]:
-    """Depth in LeRobot's logarithmic steps.
-
-    Parameters
-    ----------
-    depth_m : float32 array
-        Metres, from 0 to `most_m`.
-    most_m : float
-        The depth of the last code.
-
-    Returns
-    -------
-    uint16 array
-        Codes of 12 bits; what is lost is at most half a step, 0.04 % of depth + 3.5 m for 65.535 m.
-    """
+    """Depth in metres, up to `most_m`, as LeRobot's logarithmic 12-bit codes; the error is at most half a step."""
     low, span = math.log(DEPTH_MIN_M + DEPTH_SHIFT_M), _span(most_m)
     scaled = (np.log(depth_m + np.float32(DEPTH_SHIFT_M)) - np.float32(low)) * np.float32((DEPTH_CODES - 1) / span)
     return np.rint(scaled).clip(0, DEPTH_CODES - 1).astype(np.uint16)

@@ -38,43 +38,7 @@ def export_release(
     shards: bool = False,
     reporter: Reporter | None = None,
 ) -> dict[str, int]:
-    """Write the release in a format of others.
-
-    Parameters
-    ----------
-    format_name : str
-        A key of `FORMATS`.
-    data : DataRoot, Path or str
-        The data root.
-    out : Path
-        Folder to be made; it appears when it is whole. Its ``export.json`` says what is in it and what is lost.
-    scenes : sequence of str, optional
-        Names or globs; all of the release where absent.
-    force : bool
-        Replace an earlier export there.
-    picture_px : int, optional
-        Columns and rows of the pictures of ``aerialdojo``, drawn anew from the meshes: 640 as the authors' where
-        absent; 0 for the release's own.
-    shards : bool
-        One tar archive a scene, ``SCENE.tar``, in place of a file a trajectory: unpacked in one folder they are what
-        is written without.
-    reporter : Reporter, optional
-        Is told how much it will be, before anything is written, and which scenes are done.
-
-    Returns
-    -------
-    dict of str to int
-        How many scenes, files and tasks were written.
-
-    Raises
-    ------
-    UsageError
-        The format or a scene does not exist, or the folder is not empty.
-    StoreError
-        The release is missing or damaged, or the disk has no room for it.
-    AssetError
-        Pictures are to be drawn, and a mesh is missing or another one.
-    """
+    """Write the release in a format of others."""
     if format_name not in FORMATS:
         raise UsageError(unknown("no format", format_name, FORMATS))
     if picture_px is not None and (format_name != "aerialdojo" or not (picture_px == 0 or 16 <= picture_px <= 4096)):

@@ -20,15 +20,7 @@ _FARTHEST_M = 2.1e7
 
 
 class BadField(Exception):  # noqa: N818 - it is caught where rows are read, and becomes a line of a report
-    """A field of a record makes no sense.
-
-    Attributes
-    ----------
-    field : str
-        Its path in the record, e.g. ``start_pose.start_position``.
-    why : str
-        What is wrong with it.
-    """
+    """A field of a record makes no sense."""
 
     def __init__(self, field: str, why: str) -> None:
         self.field, self.why = brief(field, 120), brief(why)
@@ -46,15 +38,7 @@ def plain(key: str) -> str:
 
 
 class Fields:
-    """An object of a file.
-
-    Parameters
-    ----------
-    value : object
-        What the file has; BadField unless it is an object.
-    path : str
-        Where it stands in its record.
-    """
+    """An object of a file."""
 
     def __init__(self, value: Any, path: str = "") -> None:
         if not isinstance(value, dict):
@@ -73,13 +57,7 @@ class Fields:
         return self._value.get(key) is not None
 
     def take(self, key: str) -> Any:
-        """The field as it is.
-
-        Raises
-        ------
-        BadField
-            There is none, as in every method here.
-        """
+        """The field as it is."""
         self._read.add(key)
         if key not in self._value:
             raise BadField(self.path(key), "is missing")
@@ -178,21 +156,7 @@ class Fields:
 
 
 def rows_of(rows: Sequence[Any], width: int, where: Callable[[int], str]) -> Floats:
-    """Check lists of so many finite numbers each.
-
-    Parameters
-    ----------
-    rows : sequence of n
-        What the file has.
-    width : int
-        Numbers that each must have.
-    where : callable
-        Path of a row, by its index.
-
-    Returns
-    -------
-    (n, width) float64
-    """
+    """Check rows of `width` finite numbers each and return them, (n, width) float64."""
     if all(type(row) is list and len(row) == width for row in rows):
         flat = list(chain.from_iterable(rows))
         if set(map(type, flat)) <= {float, int}:

@@ -21,44 +21,14 @@ _LARGEST_PICTURE = 32 << 20
 
 @contextlib.contextmanager
 def whole_folder(target: Path, marker: str, *, force: bool) -> Iterator[Path]:
-    """Fill a folder beside its place, and give it its name at the end.
-
-    Parameters
-    ----------
-    target : Path
-        The folder.
-    marker : str
-        Name of the file by which a folder of ours is known: only such a one is replaced.
-    force : bool
-        Replace it; without, a folder that holds anything is refused.
-
-    Yields
-    ------
-    Path
-        The temporary folder; gone if an error is raised.
-
-    Raises
-    ------
-    UsageError
-        The folder is not empty, or holds what is not ours to replace.
-    StoreError
-        The disk is full or read-only.
-    """
+    """Fill a folder beside its place, and give it its name at the end."""
     check_target(target, marker, force=force)
     with atomic_folder(target.absolute()) as temporary:
         yield temporary
 
 
 def check_target(target: Path, marker: str, *, force: bool) -> None:
-    """Refuse a folder that `whole_folder` could not fill, before work that takes long.
-
-    Raises
-    ------
-    UsageError
-        The folder is not empty, or holds what is not ours to replace.
-    StoreError
-        It cannot be read.
-    """
+    """Refuse a folder that `whole_folder` could not fill, before work that takes long."""
     target = target.absolute()
     # Before anything is decided: it may bring back what a kill between two renames took away.
     sweep(target.parent)
@@ -95,25 +65,7 @@ def write_json(path: Path, document: Mapping[str, Any]) -> None:
 
 
 def inside(root: Path, relative: str) -> Path:
-    """Follow a path that a file names, below a folder.
-
-    Parameters
-    ----------
-    root : Path
-        The folder.
-    relative : str
-        The path, with / or backslashes.
-
-    Returns
-    -------
-    Path
-        The file, whether or not it exists.
-
-    Raises
-    ------
-    ValueError
-        It is absolute, or leads out of the folder by ``..`` or by a symbolic link.
-    """
+    """Follow a path that a file names, below a folder."""
     name = PurePosixPath(relative.replace("\\", "/"))
     if not relative or "\0" in relative or name.is_absolute() or re.match(r"[A-Za-z]:", relative):
         raise ValueError(f"{relative!r} is no path relative to {root}")
@@ -128,13 +80,7 @@ def inside(root: Path, relative: str) -> Path:
 
 
 def check_picture(path: Path) -> Path:
-    """Return the path if a PNG or JPEG file of a sensible size is there.
-
-    Raises
-    ------
-    ValueError
-        What is wrong with it.
-    """
+    """Return the path if a PNG or JPEG file of a sensible size is there."""
     try:
         if not path.is_file():
             raise ValueError(f"there is no file {path}")

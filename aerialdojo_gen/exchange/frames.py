@@ -22,18 +22,10 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Frame:
-    """A right-handed frame whose z axis is vertical.
+    """A right-handed frame whose z axis is vertical."""
 
-    Attributes
-    ----------
-    name : str
-        Where its x, y and z axes point, e.g. ``ned`` for north, east, down.
-    to_world : (3, 3) tuple
-        Rows: east, north and up of the world as a signed choice of the frame's axes.
-    """
-
-    name: str
-    to_world: tuple[tuple[int, int, int], tuple[int, int, int], tuple[int, int, int]]
+    name: str  # Where its x, y and z axes point, e.g. ``ned`` for north, east, down
+    to_world: tuple[tuple[int, int, int], tuple[int, int, int], tuple[int, int, int]]  # (3, 3) tuple
 
     @property
     def matrix(self) -> Floats:
@@ -86,13 +78,7 @@ FRAMES: Mapping[str, Frame] = MappingProxyType(
 
 
 def frame_named(name: str) -> Frame:
-    """Look a frame up by its name.
-
-    Raises
-    ------
-    UsageError
-        There is no such frame.
-    """
+    """Look a frame up by its name."""
     if name not in FRAMES:
         raise UsageError(f"no frame {name!r}: it is one of {', '.join(FRAMES)} (the directions of x, y and z)")
     return FRAMES[name]

@@ -62,29 +62,7 @@ def write_index(root: Path, categories: Mapping[str, int]) -> None:
 
 
 def write_scene(data: DataRoot, scene: str, root: Path, categories: Mapping[str, int]) -> dict[str, int]:
-    """Write a scene's episodes, a file a subset.
-
-    Parameters
-    ----------
-    data : DataRoot
-        The data root.
-    scene : str
-        A scene of its release.
-    root : Path
-        Folder of the export.
-    categories : mapping of str to int
-        What `categories_of` returns for all scenes of the export.
-
-    Returns
-    -------
-    dict of str to int
-        Episode files and episodes written.
-
-    Raises
-    ------
-    StoreError
-        A table is missing or damaged.
-    """
+    """Write a scene's episodes, a file a subset."""
     mesh = store.read_scene(data, "release/scenes", scene, ["mesh_path"])["mesh_path"][0].as_py()
     rows = store.read_scene(data, "release/objects", scene).drop_columns("reference_image").to_pylist()
     anchors = defaultdict(list)

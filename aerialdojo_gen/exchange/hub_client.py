@@ -18,35 +18,7 @@ _REVISION = re.compile(r"[\w.][\w./-]{0,199}")
 
 
 class Hub:
-    """A data set on the Hub.
-
-    Parameters
-    ----------
-    repo : str
-        ``USER/NAME``.
-    verb : str
-        The command, for messages.
-    writes : bool
-        Whether a token is needed.
-
-    Attributes
-    ----------
-    repo : str
-    endpoint : str
-        Address of the server: that of ``HF_ENDPOINT``, else the Hub's own.
-    address : str
-        The same for messages, without what is secret in it.
-    token : str or False
-        That of ``HF_TOKEN``; one that another program has stored is not looked for.
-    api : huggingface_hub.HfApi
-
-    Raises
-    ------
-    UsageError
-        That is no name of a data set, or the token would go to another machine unencrypted.
-    AerialDojoError
-        There is no token to write with, or the package is missing.
-    """
+    """A data set on the Hub."""
 
     def __init__(self, repo: str, verb: str, *, writes: bool = False) -> None:
         if not _REPO.fullmatch(repo) or ".." in repo or repo.endswith(".git"):
@@ -79,20 +51,7 @@ class Hub:
 
     @contextmanager
     def told(self, doing: str) -> Iterator[None]:
-        """Turn what the server or the network answers into a line.
-
-        Parameters
-        ----------
-        doing : str
-            What is under way, e.g. ``"write to"``.
-
-        Raises
-        ------
-        UsageError
-            There is no such data set or revision, as far as the token may see.
-        AerialDojoError
-            The token is refused, the server answers otherwise than it should, or nobody answers.
-        """
+        """Turn what the server or the network answers into a line."""
         from huggingface_hub import errors
 
         # The library's own client: its name is another one in other versions.

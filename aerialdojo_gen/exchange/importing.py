@@ -29,21 +29,11 @@ Read = Callable[[Fields, Context], Task]
 
 @dataclass(frozen=True)
 class Format:
-    """A format that can be imported.
+    """A format that can be imported."""
 
-    Attributes
-    ----------
-    reader : callable
-        Makes what reads the records of one import.
-    key : str or None
-        Where the list of records stands; None: it is the whole file.
-    frame : str or None
-        Its frame; None where the format does not state it.
-    """
-
-    reader: Callable[[], Read]
-    key: str | None = None
-    frame: str | None = "ned"
+    reader: Callable[[], Read]  # Makes what reads the records of one import
+    key: str | None = None  # Where the list of records stands; None: it is the whole file
+    frame: str | None = "ned"  # Its frame; None where the format does not state it
 
 
 FORMATS = {
@@ -57,30 +47,14 @@ FORMATS = {
 
 @dataclass(frozen=True)
 class Options:
-    """What a format leaves open, and what to do with bad records.
+    """What a format leaves open, and what to do with bad records."""
 
-    Attributes
-    ----------
-    frame : str or None
-        For formats that do not state theirs.
-    angles : str
-        Unit of CityAVOS's yaws: radians, degrees, or mixed (more than a turn in radians is taken as degrees).
-    pictures : Path or None
-        Folder below which CityAVOS's pictures lie; None: the file's own.
-    with_pictures : bool
-        False: leave pictures aside, and the image instances of CityAVOS with them.
-    skip_bad : bool
-        Keep the good records of files that have bad ones.
-    record_limit : int
-        Most characters of a record.
-    """
-
-    frame: str | None = None
+    frame: str | None = None  # For formats that do not state theirs
     angles: str = "radians"
-    pictures: Path | None = None
-    with_pictures: bool = True
-    skip_bad: bool = False
-    record_limit: int = RECORD_LIMIT
+    pictures: Path | None = None  # Folder below which CityAVOS's pictures lie; None: the file's own
+    with_pictures: bool = True  # False: leave pictures aside, and the image instances of CityAVOS with them
+    skip_bad: bool = False  # Keep the good records of files that have bad ones
+    record_limit: int = RECORD_LIMIT  # Most characters of a record
 
 
 def import_benchmark(
@@ -92,36 +66,9 @@ def import_benchmark(
     name: str | None = None,
     force: bool = False,
 ) -> Report:
-    """Import others' task files.
+    """Import others' task files as tables.
 
-    Parameters
-    ----------
-    format_name : str
-        A key of `FORMATS`.
-    files : sequence of Path
-        Files of that format; for ``aerialdojo`` also the folder of the layout or of a part of it.
-    data : DataRoot, Path or str
-        The data root: tables are written to ``imported/<name>/{tasks,routes,objects}`` in it.
-    options : Options, optional
-        What the format leaves open.
-    name : str, optional
-        Name of the import; the format's where absent.
-    force : bool
-        Replace an import of that name.
-
-    Returns
-    -------
-    Report
-        What could not be mapped, and how well replays meet the recorded poses; also in ``import.json`` there.
-
-    Raises
-    ------
-    UsageError
-        The format, the frame or a name makes no sense, or the import is there already.
-    ImportRefused
-        A file is damaged, or has bad records and they are not to be skipped: nothing is written.
-    StoreError
-        The disk is full or read-only.
+    Nothing is written where a file is damaged, or bad records are not to be skipped.
     """
     options = options or Options()
     if format_name not in FORMATS:

@@ -94,27 +94,7 @@ class _Text:
 
 
 def records(path: Path, key: str | None = None, *, limit: int = RECORD_LIMIT) -> Iterator[Any]:
-    """Read a JSON list a record at a time.
-
-    Parameters
-    ----------
-    path : Path
-        A file whose outermost value is a list or, with `key`, an object that has the list under that key.
-    key : str, optional
-        That key; whatever else stands in the object is passed over.
-    limit : int
-        Most characters that a record may have; about as much again is held in memory.
-
-    Yields
-    ------
-    object
-        The records in their order; NaN and infinities as floats.
-
-    Raises
-    ------
-    ImportRefused
-        The file is missing, not JSON, truncated, or a record is larger than `limit`; the message says at which one.
-    """
+    """Read a JSON list a record at a time."""
     try:
         with path.open("rb") as file:
             text = _Text(file, path, limit)
@@ -168,16 +148,7 @@ def _list(text: _Text) -> Iterator[Any]:
 
 
 def small_document(path: Path, *, limit: int = RECORD_LIMIT) -> Any:
-    """Read a whole JSON file of at most `limit` bytes.
-
-    Raises
-    ------
-    ValueError
-        It is larger, not UTF-8, not JSON or beyond the bounds of `aerialdojo_gen.common.bounded`; the message says
-        which.
-    OSError
-        It cannot be read.
-    """
+    """Read a whole JSON file of at most `limit` bytes."""
     check_regular(path)
     with path.open("rb") as file:
         raw = file.read(limit + 1)

@@ -37,46 +37,25 @@ _MEASURED_PARTS, _MEASURED_STEPS = 6, 24
 
 @dataclass(frozen=True)
 class Made:
-    """What an export consists of.
+    """What an export consists of."""
 
-    Attributes
-    ----------
-    counts : dict of str to int
-        What there is of everything, by its name.
-    parts, parts_kept : int
-        How many parts it was made of, and how many of them an earlier run had finished.
-    """
-
-    counts: dict[str, int]
-    parts: int
+    counts: dict[str, int]  # What there is of everything, by its name
+    parts: int  # How many parts it was made of, and how many of them an earlier run had finished
     parts_kept: int
 
 
 @dataclass(frozen=True)
 class Estimate:
-    """What an export will take.
+    """What an export will take."""
 
-    Attributes
-    ----------
-    trajectories, frames, parts : int
-        Of the selection; a frame is a step, seen in every view.
-    cpu_s, wall_s : float
-        Seconds of one core, and on `workers` idle ones.
-    size_bytes : float
-        Of the whole export.
-    workers : int
-    measured : int
-        Frames that were drawn and encoded to find out.
-    """
-
-    trajectories: int
+    trajectories: int  # Of the selection; a frame is a step, seen in every view
     frames: int
     parts: int
-    cpu_s: float
+    cpu_s: float  # Seconds of one core, and on `workers` idle ones
     wall_s: float
-    size_bytes: float
+    size_bytes: float  # Of the whole export
     workers: int
-    measured: int
+    measured: int  # Frames that were drawn and encoded to find out
 
     def __str__(self) -> str:
         """Two lines for people."""
@@ -106,13 +85,7 @@ def wanted_from(
     renderer: str = "auto",
     jpeg_quality: int = 0,
 ) -> Wanted:
-    """Say what is to be exported; parameters as for `aerialdojo_gen.learning.Trajectories` and `Wanted`.
-
-    Raises
-    ------
-    UsageError
-        A value makes no sense.
-    """
+    """Say what is to be exported; parameters as for `aerialdojo_gen.learning.Trajectories` and `Wanted`."""
     if limit < 0:
         raise UsageError(f"a limit is 0, for all, or more, not {limit}")
     width, height = (size, size) if isinstance(size, int) else size
@@ -134,39 +107,7 @@ def export_for_learning(
     workers: int | None = None,
     reporter: Reporter | None = None,
 ) -> Made:
-    """Write trajectories with what the body sees on them, as a data set for training.
-
-    Parameters
-    ----------
-    format_name : str
-        A key of `WRITERS`.
-    data : DataRoot, Path or str
-        The data root: release and meshes, or recordings.
-    out : Path
-        Folder to be made; it appears when it is whole. Until then finished parts lie beside it in
-        ``.NAME.unfinished``, and the same call goes on with them; a call that asks for something else begins anew.
-    wanted : Wanted
-        Made by `wanted_from`.
-    force : bool
-        Replace an earlier export there.
-    workers : int, optional
-        Processes; all cores where absent.
-    reporter : Reporter, optional
-        Where progress is shown.
-
-    Returns
-    -------
-    Made
-
-    Raises
-    ------
-    UsageError
-        The folder is not empty, nothing is selected, or the format cannot hold what is asked for.
-    StoreError
-        The release or a mesh is missing or damaged, or the disk is full.
-    AerialDojoError
-        A worker was killed.
-    """
+    """Write trajectories with what the body sees on them, as a data set for training."""
     writer = _writer(format_name, wanted)
     told = reporter or Reporter(quiet=True)
     check_target(out, MARKER, force=force)
@@ -194,13 +135,7 @@ def export_for_learning(
 def estimate_for_learning(
     format_name: str, data: Where, wanted: Wanted, workers: int | None = None
 ) -> Estimate:  # fmt: skip
-    """Measure a few trajectories and say what all of them will take; nothing is written.
-
-    Raises
-    ------
-    UsageError, StoreError
-        As `export_for_learning`.
-    """
+    """Measure a few trajectories and say what all of them will take; nothing is written."""
     writer = _writer(format_name, wanted)
     root = open_root(data)
     parts = planned(root, wanted, writer.frames_a_part(wanted))

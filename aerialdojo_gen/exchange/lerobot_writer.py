@@ -151,22 +151,7 @@ def _described(key: str, counts: NDArray[np.int64], wanted: Wanted, frames: int)
 
 
 def finish(parts: list[Part], wanted: Wanted, made: list[Path], folder: Path) -> dict[str, int]:
-    """Put the files of all parts in their places, and write ``meta/``.
-
-    Parameters
-    ----------
-    parts : list of Part
-    wanted : Wanted
-    made : list of Path
-        What `write_part` has filled, a folder a part.
-    folder : Path
-        Where the dataset is to be.
-
-    Returns
-    -------
-    dict of str to int
-        How many episodes, frames, tasks and files there are.
-    """
+    """Put the files of all parts in their places, and write ``meta/``."""
     keys = list(video_kinds(wanted))
     tables: list[pa.Table] = []
     sums: Counts = {}

@@ -13,17 +13,9 @@ Stats = dict[str, list[Any]]
 
 
 def of_rows(values: NDArray[Any]) -> Stats:
-    """Describe the rows of an array.
+    """Statistics of the rows of an (n, d) array.
 
-    Parameters
-    ----------
-    values : (n,) or (n, d) array
-        At least one row.
-
-    Returns
-    -------
-    dict of str to list
-        ``min``, ``max``, ``mean``, ``std``, ``q01`` … ``q99``, each of d numbers, and ``count`` of one.
+    Min, max, mean, std and quantiles of d numbers each, and the count.
     """
     table = np.asarray(values, np.float64).reshape(len(values), -1)
     levels = np.quantile(table, list(QUANTILES.values()), axis=0)
@@ -38,21 +30,9 @@ def of_rows(values: NDArray[Any]) -> Stats:
 
 
 def of_counts(counts: NDArray[np.int64], values: NDArray[np.float64], frames: int) -> Stats:
-    """Describe the pixels of pictures.
+    """Statistics of pictures from counts (channels, n) of the values (n,), shaped (channels, 1.
 
-    Parameters
-    ----------
-    counts : (channels, n) int64
-        How often each value occurs.
-    values : (n,) float64
-        The values, ascending.
-    frames : int
-        How many pictures these are: the ``count``.
-
-    Returns
-    -------
-    dict of str to list
-        As `of_rows`; all but ``count`` of shape (channels, 1, 1), as pictures lead with the channel there.
+    1) as LeRobot has them.
     """
     total = counts.sum(axis=1).astype(np.float64)
     mean = counts @ values / total

@@ -35,13 +35,7 @@ class Objects:
         return self._numbers[key]
 
     def add(self, task: Task, number: int) -> list[str | None]:
-        """Take in what the task says about its target and its start.
-
-        Returns
-        -------
-        list of str or None
-            The reference image of each instance, by id.
-        """
+        """Take in what the task says about its target and its start."""
         known = task.known
         texts = [i.description for i in task.instances if i.description]
         row = {

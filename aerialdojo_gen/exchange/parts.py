@@ -20,15 +20,7 @@ _REQUEST, _LOCK = "request.json", "lock"
 
 
 class Unfinished:
-    """The parts of an export that are finished, beside the folder that it will be.
-
-    Parameters
-    ----------
-    target : Path
-        The export; what is unfinished lies in ``.NAME.unfinished`` beside it.
-    request : dict
-        JSON: all that decides what is written. Parts of another request are removed.
-    """
+    """The parts of an export that are finished, beside the folder that it will be."""
 
     def __init__(self, target: Path, request: dict[str, Any]) -> None:
         self.folder = target.absolute().with_name(f".{target.name}.unfinished")
@@ -37,15 +29,7 @@ class Unfinished:
 
     @contextlib.contextmanager
     def held(self) -> Iterator[None]:
-        """Hold the folder, which nobody else may write to meanwhile.
-
-        Raises
-        ------
-        UsageError
-            Another process makes the same export.
-        StoreError
-            The disk is full or read-only.
-        """
+        """Hold the folder, which nobody else may write to meanwhile."""
         make_folder(self.folder)
         with (self.folder / _LOCK).open("a") as lock:
             try:
@@ -98,13 +82,7 @@ def whole_part(unfinished: Path, number: int) -> Iterator[Path]:
 
 
 def place(source: Path, target: Path) -> None:
-    """Give a finished file its place in the export, without copying it where the disk can.
-
-    Raises
-    ------
-    StoreError
-        The file is gone.
-    """
+    """Give a finished file its place in the export, without copying it where the disk can."""
     target.parent.mkdir(parents=True, exist_ok=True)
     try:
         os.link(source, target)

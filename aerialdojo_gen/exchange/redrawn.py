@@ -22,24 +22,7 @@ _SAME_VIEW = 12.0
 
 
 class Redrawn:
-    """Draws a scene's reference pictures from where they were taken, at another size than the release has them.
-
-    Parameters
-    ----------
-    root : DataRoot
-        The data root: release and meshes.
-    scene : str
-        Name of the scene.
-    size_px : int
-        Columns and rows.
-
-    Raises
-    ------
-    StoreError
-        The release is missing or damaged.
-    AssetError
-        The mesh is missing, or not the one that the release was made from.
-    """
+    """Draws a scene's reference pictures from where they were taken, at another size than the release has them."""
 
     def __init__(self, root: DataRoot, scene: str, size_px: int) -> None:
         row = store.read_scene(root, "release/scenes", scene).to_pylist()[0]
@@ -64,23 +47,7 @@ class Redrawn:
         self._renderer_name = choose_renderer("auto").name
 
     def picture(self, object_id: int) -> bytes:
-        """Draw an object's picture.
-
-        Parameters
-        ----------
-        object_id : int
-            An object with a reference image.
-
-        Returns
-        -------
-        bytes
-            PNG, RGB.
-
-        Raises
-        ------
-        StoreError
-            It is not the view that the release shows (another field of view, say).
-        """
+        """Draw an object's picture."""
         x, y, z, yaw = self._poses[object_id]
         pose = view_pose((x, y, z), yaw, "front")
         rgb = kept_renderer(self._scene, self._renderer_name).render(self._camera, pose).rgb

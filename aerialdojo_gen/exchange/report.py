@@ -18,35 +18,17 @@ _FAR_M = 3.0
 
 @dataclass
 class Report:
-    """Counts over all files of an import.
+    """Counts over all files of an import."""
 
-    Attributes
-    ----------
-    format, frame : str
-        As asked or as the format fixes it.
-    records : int
-        Records read, good and bad.
-    bad : list of str
-        A line a bad record, the first thousand.
-    n_bad : int
-        All of them.
-    bad_fields : Counter
-        How many by field.
-    unmapped : Counter
-        Fields that have no place in the tables, and how many records have them.
-    notes : Counter
-        Else worth knowing, and of how many records.
-    """
-
-    format: str
+    format: str  # As asked or as the format fixes it
     frame: str
     files: list[str] = field(default_factory=list)
-    records: int = 0
-    bad: list[str] = field(default_factory=list)
-    n_bad: int = 0
-    bad_fields: Counter[str] = field(default_factory=Counter)
+    records: int = 0  # Records read, good and bad
+    bad: list[str] = field(default_factory=list)  # A line a bad record, the first thousand
+    n_bad: int = 0  # All of them
+    bad_fields: Counter[str] = field(default_factory=Counter)  # How many by field
     unmapped: Counter[str] = field(default_factory=Counter)
-    notes: Counter[str] = field(default_factory=Counter)
+    notes: Counter[str] = field(default_factory=Counter)  # Else worth knowing, and of how many records
     rows: dict[str, int] = field(default_factory=dict)
     empty: dict[str, int] = field(default_factory=dict)
     _errors: array[float] = field(default_factory=lambda: array("d"))

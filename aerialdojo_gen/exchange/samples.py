@@ -30,38 +30,18 @@ _PIXELS = 1 << 22
 
 @dataclass(frozen=True)
 class Wanted:
-    """What is exported.
+    """What is exported."""
 
-    Attributes
-    ----------
-    splits, settings, scenes : tuple of str
-        As in `aerialdojo_gen.benchmark.tasks.Selection`.
-    limit : int
-        Trajectories of each scene and each setting, drawn as `render` draws them; 0 for all.
-    seed : int
-        Of that draw.
-    sensors : Sensors
-        Views, size, and whether there is depth.
-    goal : tuple of str
-        Of `GOALS`.
-    source : str
-        As for `aerialdojo_gen.learning.trajectories.Trajectories`.
-    renderer : str
-        Name of what draws; not ``"auto"``, which may be another one in another process.
-    jpeg_quality : int
-        Of the pictures in shards, 1 to 100; 0 for PNG.
-    """
-
-    splits: tuple[str, ...]
+    splits: tuple[str, ...]  # As in `aerialdojo_gen.benchmark.tasks.Selection`
     settings: tuple[str, ...]
     scenes: tuple[str, ...]
-    limit: int
-    seed: int
-    sensors: Sensors
-    goal: tuple[str, ...]
-    source: str
-    renderer: str
-    jpeg_quality: int = 0
+    limit: int  # Trajectories of each scene and each setting, drawn as `render` draws them; 0 for all
+    seed: int  # Of that draw
+    sensors: Sensors  # Views, size, and whether there is depth
+    goal: tuple[str, ...]  # Of `GOALS`
+    source: str  # As for `aerialdojo_gen.learning.trajectories.Trajectories`
+    renderer: str  # Name of what draws; not ``"auto"``, which may be another one in another process
+    jpeg_quality: int = 0  # Of the pictures in shards, 1 to 100; 0 for PNG
 
     def __post_init__(self) -> None:
         """Refuse what there is not."""
@@ -80,31 +60,15 @@ class Wanted:
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """Trajectories of one scene that are written together.
+    """Trajectories of one scene that are written together."""
 
-    Attributes
-    ----------
-    number : int
-        From 0; files are called by it.
-    index : Index
-        Its trajectories, of one scene.
-    settings, splits : list of str
-        Of every trajectory.
-    tasks : (n,) int64
-        Number of every trajectory's text.
-    texts : list of str
-        What tells its goal in words.
-    first_episode, first_frame : int
-        How many trajectories and steps all parts before it have.
-    """
-
-    number: int
-    index: Index
-    settings: list[str]
+    number: int  # From 0; files are called by it
+    index: Index  # Its trajectories, of one scene
+    settings: list[str]  # Of every trajectory
     splits: list[str]
-    tasks: NDArray[np.int64]
-    texts: list[str]
-    first_episode: int
+    tasks: NDArray[np.int64]  # (n,) int64; number of every trajectory's text
+    texts: list[str]  # What tells its goal in words
+    first_episode: int  # How many trajectories and steps all parts before it have
     first_frame: int
 
     @property
@@ -131,28 +95,7 @@ class Part:
 
 
 def planned(root: DataRoot, wanted: Wanted, frames_a_part: int) -> list[Part]:
-    """Choose the trajectories, and cut them into parts.
-
-    Parameters
-    ----------
-    root : DataRoot
-        With a release.
-    wanted : Wanted
-    frames_a_part : int
-        A part ends with the trajectory that brings it to so many steps, or with its scene.
-
-    Returns
-    -------
-    list of Part
-        In the order of scenes and of navigation tasks.
-
-    Raises
-    ------
-    UsageError
-        No task fits, or none of them has a recording where recordings alone are asked for.
-    StoreError
-        There is no release, it is damaged, or a scene's mesh is missing.
-    """
+    """Choose the trajectories, and cut them into parts."""
     modalities = ("image",) if wanted.goal == ("image",) else ()
     selection = Selection(wanted.splits, wanted.settings, modalities, wanted.scenes)
     index = read_index(root, selection)
@@ -221,15 +164,7 @@ def _cuts(index: Index, frames_a_part: int) -> Iterator[NDArray[np.int64]]:
 
 
 class Eyes:
-    """What the trajectories of a part see, and what their goals look like.
-
-    Parameters
-    ----------
-    root : DataRoot
-        With meshes, and recordings where they are read.
-    part : Part
-    wanted : Wanted
-    """
+    """What the trajectories of a part see, and what their goals look like."""
 
     def __init__(self, root: DataRoot, part: Part, wanted: Wanted) -> None:
         self._root, self._part, self._sensors = root, part, wanted.sensors

@@ -25,21 +25,11 @@ _BLOCK = 4096
 
 @dataclass(frozen=True)
 class Size:
-    """What an export will be.
+    """What an export will be."""
 
-    Attributes
-    ----------
-    files : int
-        Exact.
-    bytes : int
-        To some tenths.
-    on_disk : int
-        The same in whole blocks.
-    """
-
-    files: int
-    bytes: int
-    on_disk: int
+    files: int  # Exact
+    bytes: int  # To some tenths
+    on_disk: int  # The same in whole blocks
 
     def __str__(self) -> str:
         """In words."""
@@ -52,22 +42,7 @@ class Size:
 
 
 def size_of(format_name: str, data: DataRoot, scenes: Sequence[str], picture_px: int) -> Size:
-    """Reckon what an export of scenes will be.
-
-    Parameters
-    ----------
-    format_name : str
-        ``aerialdojo`` or ``habitat``.
-    data : DataRoot
-    scenes : sequence of str
-    picture_px : int
-        Edge of the pictures of ``aerialdojo``; 0 for the release's own.
-
-    Raises
-    ------
-    StoreError
-        A table is missing or damaged.
-    """
+    """Reckon what an export of scenes will be."""
     files, size = 1, 0.0
     for scene in scenes:
         for subset in ("train", "test"):
@@ -97,13 +72,7 @@ def _pictures(data: DataRoot, scene: str, picture_px: int) -> float:
 
 
 def check_room(target: Path, needed: int) -> None:
-    """Refuse what the disk has no room for, before it is begun.
-
-    Raises
-    ------
-    StoreError
-        It has less room than that.
-    """
+    """Refuse what the disk has no room for, before it is begun."""
     folder = next(above for above in (target.absolute(), *target.absolute().parents) if above.exists())
     free = shutil.disk_usage(folder).free
     if free < needed:

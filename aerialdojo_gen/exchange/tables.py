@@ -63,13 +63,7 @@ IMPORTED_OBJECTS = _imported(
 
 
 class Tables:
-    """Writes rows as they come, a part when enough are there, so that memory does not grow with the files.
-
-    Parameters
-    ----------
-    root : Path
-        Folder of the tables.
-    """
+    """Writes rows as they come, a part when enough are there, so that memory does not grow with the files."""
 
     def __init__(self, root: Path) -> None:
         self._root = root

@@ -12,13 +12,6 @@ def pack(folder: Path, archive: Path) -> None:
 
     Owners, times and modes are the same for all: the archive depends on names and contents alone. Files that are
     links to one another stay so.
-
-    Parameters
-    ----------
-    folder : Path
-        What is packed, by paths relative to it.
-    archive : Path
-        File to be made.
     """
     with tarfile.open(archive, "w", format=tarfile.PAX_FORMAT) as tar:
         for path in sorted(folder.rglob("*")):

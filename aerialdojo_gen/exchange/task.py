@@ -31,95 +31,41 @@ class Instance(NamedTuple):
 
 @dataclass(frozen=True)
 class Route:
-    """A reference trajectory.
+    """A reference trajectory."""
 
-    Attributes
-    ----------
-    poses : (n, 4) float64
-        x, y, z in metres and yaw in radians, world frame.
-    action : list of n int, or None
-        What is done at every pose, in our set; None where a step is none of ours.
-    source_action : list of str or None
-        The file's own names.
-    replay_error_m : float or None
-        Metres between the recorded end and the replayed one.
-    """
-
-    poses: Floats
-    action: list[int] | None = None
-    source_action: list[str] | None = None
-    replay_error_m: float | None = None
+    poses: Floats  # (n, 4) float64; x, y, z in metres and yaw in radians, world frame
+    action: list[int] | None = None  # What is done at every pose, in our set; None where a step is none of ours
+    source_action: list[str] | None = None  # The file's own names
+    replay_error_m: float | None = None  # Metres between the recorded end and the replayed one
 
 
 @dataclass
 class Task:
-    """A navigation task.
+    """A navigation task."""
 
-    Attributes
-    ----------
-    source_id : str
-        The record's id in its file.
-    scene : str
-        Name of the scene.
-    start : (4,) float64
-        Start pose, world frame.
-    goal : (3,) float64 or None
-        Where success is measured from, world frame.
-    instances : list of Instance
-        How its goal is told.
-    nav_id : str or None
-        None: made of the file's name and the id.
-    object_key : object
-        What tells the target from others of the scene where the file has no number for it; None: there is no object.
-    object_m : (3,) float64 or None
-        Where the object is, world frame.
-    route : Route or None
-        The reference trajectory.
-    has_route_row : bool
-        False where another record of the same navigation task has brought it already.
-    known : dict
-        Further columns of `tasks`, `routes` and `objects` by their name.
-    """
-
-    source_id: str
-    scene: str
-    start: Floats
-    goal: Floats | None
-    instances: list[Instance]
-    nav_id: str | None = None
+    source_id: str  # The record's id in its file
+    scene: str  # Name of the scene
+    start: Floats  # (4,) float64; start pose, world frame
+    goal: Floats | None  # (3,) float64 or None; where success is measured from, world frame
+    instances: list[Instance]  # How its goal is told
+    nav_id: str | None = None  # None: made of the file's name and the id
     object_key: object = None
-    object_m: Floats | None = None
-    route: Route | None = None
-    has_route_row: bool = True
+    object_m: Floats | None = None  # (3,) float64 or None; where the object is, world frame
+    route: Route | None = None  # The reference trajectory
+    has_route_row: bool = True  # False where another record of the same navigation task has brought it already
     known: dict[str, Any] = field(default_factory=dict)
 
 
 @dataclass
 class Context:
-    """What a reader is told beside the record.
+    """What a reader is told beside the record."""
 
-    Attributes
-    ----------
-    file : Path
-        The file.
-    label : str
-        Its name as tables have it.
-    frame : Frame
-        The file's frame.
-    angles : str
-        Unit of angles where the format has both: radians, degrees or mixed.
-    pictures : Path or None
-        Folder below which pictures lie; None: leave them aside.
-    notes : Counter of str
-        What is to be told about the file, and of how many records.
-    """
-
-    file: Path
-    label: str
-    frame: Frame
-    angles: str
-    pictures: Path | None
-    notes: Counter[str]
+    file: Path  # The file
+    label: str  # Its name as tables have it
+    frame: Frame  # The file's frame
+    angles: str  # Unit of angles where the format has both: radians, degrees or mixed
+    pictures: Path | None  # Folder below which pictures lie; None: leave them aside
+    notes: Counter[str]  # What is to be told about the file, and of how many records
 
     def start_pose(self, position: Floats, yaw_rad: float) -> Floats:
         """Make a world pose, (4,) float64, of a position and a yaw of the file's frame."""

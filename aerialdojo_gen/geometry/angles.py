@@ -11,18 +11,7 @@ Floats = NDArray[np.float64]
 
 
 def wrap_angle_rad(angle_rad: ArrayLike) -> Floats:
-    """Bring angles into (-π, π].
-
-    Parameters
-    ----------
-    angle_rad : array_like
-        Angles in radians, any shape.
-
-    Returns
-    -------
-    ndarray of float64
-        The same directions in (-π, π], the shape of the input; a 0-d array for a number.
-    """
+    """Bring angles in radians, of any shape, into (-π, π]."""
     angle = np.asarray(angle_rad, dtype=np.float64)
     inside = (angle > -math.pi) & (angle <= math.pi)
     wrapped = math.pi - np.mod(math.pi - angle, 2.0 * math.pi)
@@ -32,17 +21,9 @@ def wrap_angle_rad(angle_rad: ArrayLike) -> Floats:
 
 
 def yaw_towards(position: ArrayLike, target: ArrayLike) -> Floats:
-    """Yaw that faces a target.
+    """Yaw in radians, in (-π, π], that faces a target in the world's plane.
 
-    Parameters
-    ----------
-    position, target : (..., 2) or (..., 3) array_like
-        Metres, world frame; z plays no part. They broadcast against each other.
-
-    Returns
-    -------
-    (...) ndarray of float64
-        Radians in (-π, π], counter-clockwise from +x; 0 where the two stand on one vertical line.
+    0 where the two stand on one vertical line.
     """
     p, q = np.asarray(position, dtype=np.float64), np.asarray(target, dtype=np.float64)
     yaw = np.arctan2(q[..., 1] - p[..., 1], q[..., 0] - p[..., 0])

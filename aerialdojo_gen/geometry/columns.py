@@ -24,21 +24,11 @@ _MOST_BINS = 1000
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """A lattice of columns over a rectangle.
+    """A lattice of columns over a rectangle."""
 
-    Attributes
-    ----------
-    low : (2,) float64
-        Its corner, metres, world frame.
-    step_m : float
-        From a column to the next one.
-    shape : tuple of int
-        Columns along x and y.
-    """
-
-    low: Floats
-    step_m: float
-    shape: tuple[int, int]
+    low: Floats  # (2,) float64; its corner, metres, world frame
+    step_m: float  # From a column to the next one
+    shape: tuple[int, int]  # Columns along x and y
 
     @classmethod
     def over(cls, low: Floats, high: Floats, step_m: float) -> Plan:
@@ -60,25 +50,7 @@ def lowest_of(triangles: Floats, plan: Plan) -> Floats:
 
 
 def shares_of(triangles: Floats, body: Ints, n: int, lowest: Floats, plan: Plan) -> tuple[Ints, Ints, Ints]:
-    """Count columns of bodies.
-
-    Parameters
-    ----------
-    triangles : (k, 9) float64
-        Metres, body by body.
-    body : (k,) int64
-        What body they belong to, 0 to n - 1, ascending.
-    n : int
-        Number of bodies.
-    lowest : (nx, ny) float64
-        What `lowest_of` returns for a whole scene.
-    plan : Plan
-
-    Returns
-    -------
-    covered, single, bottom : (n,) int64
-        Columns that meet the body; that meet it once; in which nothing lies lower than it.
-    """
+    """Count, for n bodies of triangles (k, 9), the columns they cover, cover once, and are lowest in; (n,) each."""
     counts = np.zeros((3, n), np.int64)
     _count(np.ascontiguousarray(triangles), body, plan.low[0], plan.low[1], plan.step_m, lowest, counts)
     return counts[0], counts[1], counts[2]
@@ -86,29 +58,14 @@ def shares_of(triangles: Floats, body: Ints, n: int, lowest: Floats, plan: Plan)
 
 @dataclass(frozen=True, eq=False)
 class ColumnIndex:
-    """Triangles by the squares of the plan that they lie over.
+    """Triangles by the squares of the plan that they lie over."""
 
-    Attributes
-    ----------
-    triangles : (n, 9) float64
-    low : (2,) float64
-        Corner of the first square, metres.
-    bin_m : float
-        Edge of a square.
-    shape : tuple of int
-        Squares along x and y.
-    first : (nx * ny + 1,) int64
-        Where each square's triangles begin in `member`.
-    member : (m,) int64
-        Rows of `triangles`.
-    """
-
-    triangles: Floats
-    low: Floats
-    bin_m: float
-    shape: tuple[int, int]
-    first: Ints
-    member: Ints
+    triangles: Floats  # (n, 9) float64
+    low: Floats  # (2,) float64; corner of the first square, metres
+    bin_m: float  # Edge of a square
+    shape: tuple[int, int]  # Squares along x and y
+    first: Ints  # (nx * ny + 1,) int64; where each square's triangles begin in `member`
+    member: Ints  # (m,) int64; rows of `triangles`
 
     @classmethod
     def of(cls, triangles: Floats) -> ColumnIndex:
@@ -135,21 +92,9 @@ class ColumnIndex:
         )  # fmt: skip
 
     def layers(self, points: Floats) -> tuple[Ints, Floats, Floats]:
-        """Look at the triangles in the columns of points.
+        """For points (n, 3).
 
-        Parameters
-        ----------
-        points : (n, 3) float64
-            Metres, world frame.
-
-        Returns
-        -------
-        below : (n,) int64
-            Layers lower than the point by more than 5 cm; what lies within a centimetre is one layer.
-        next_m : (n,) float64
-            Height of the highest of them, NaN where is none.
-        away_m : (n,) float64
-            Height of the layer nearest to the point above it, negative below it; infinite where is none.
+        Layers lower by more than 5 cm, height of the highest of them, height of the nearest one above.
         """
         n = len(points)
         below, next_m, away_m = np.zeros(n, np.int64), np.full(n, np.nan), np.full(n, np.inf)

@@ -43,46 +43,18 @@ _BESIDE_M = 0.02
 
 @dataclass(frozen=True, eq=False)
 class Ground:
-    """The sheets of a scene that are its ground.
+    """The sheets of a scene that are its ground."""
 
-    Attributes
-    ----------
-    triangles : (n, 9) float64
-        Metres, world frame; each once, whatever its winding.
-    rim : (m, 9) float64
-        Edges that one triangle alone has: their two ends, and that triangle's third corner.
-    bare : (k, 2) float64
-        Where in the plan of the flight volume nothing of the scene lies, nor half a metre north and east, metres.
-    nodes : frozenset of str
-        The things that triangles of it belong to.
-    """
-
-    triangles: Floats
-    rim: Floats
-    bare: Floats
-    nodes: frozenset[str] = frozenset()
+    triangles: Floats  # (n, 9) float64; metres, world frame; each once, whatever its winding
+    rim: Floats  # (m, 9) float64; edges that one triangle alone has: their two ends, and that triangle's third corner
+    bare: Floats  # (k, 2) float64
+    nodes: frozenset[str] = frozenset()  # The things that triangles of it belong to
 
     @classmethod
     def of(cls, scene: Things, radius_m: float | None = None) -> Ground | None:
-        """Find a scene's ground by its form alone.
+        """Find a scene's ground by form alone: open, level, mostly single-layered, lowest bodies.
 
-        A connected body of triangles is ground if it has a rim; is level rather than steep, or most of the scene;
-        mostly has a single layer; and is mostly the lowest thing in its columns, but for what lies below the flight
-        volume. Roofs, canopies and bridges have ground below them, houses and rocks are closed. All such bodies
-        together must be at least half of what the scene has in plan.
-
-        Parameters
-        ----------
-        scene : Things
-            World coordinates, metres.
-        radius_m : float, optional
-            Of a body: ground that it cannot get past, because something lies in every column that it can fly in, is
-            not looked for.
-
-        Returns
-        -------
-        Ground or None
-            None for a scene whose ground is a solid, or that has none.
+        None where it is a solid.
         """
         low, high = np.asarray(scene.bounds, np.float64)
         plan = Plan.over(low[:2], high[:2], _COLUMN_M)
@@ -144,42 +116,15 @@ class Ground:
         return self._columns.lowest_m(np.asarray(xy, np.float64).reshape(-1, 2))
 
     def below(self, points: ArrayLike) -> NDArray[np.bool_]:
-        """Whether points lie below ground.
-
-        Parameters
-        ----------
-        points : (n, 3) float
-            Metres, world frame.
-
-        Returns
-        -------
-        (n,) bool
-            True where a plumb line meets ground above the point and none below it. Below an overhang, a bridge that
-            belongs to the sheet, or in a cave's mouth there is ground below: such points are in the open.
-        """
+        """Whether points (n, 3), world metres, lie below ground: a plumb line meets ground above and none below."""
         p = np.asarray(points, np.float64).reshape(-1, 3)
         # A comparison with NaN is False: where there is no ground nothing lies below it.
         return np.asarray(p[:, 2] < self.lowest_m(p[:, :2]))
 
     def curtain(self, low: Floats, high: Floats, radius_m: float) -> Floats:
-        """Walls from the rim straight down, which close the sheet's underside to a body in the flight volume.
+        """Walls (n, 9) from the ground's rim straight down.
 
-        From an edge that overhangs the sheet they go down to the next layer, and only from every other one: between
-        the first layer and the second there is air, above that there is rock again.
-
-        Parameters
-        ----------
-        low, high : (3,) float64
-            Corners of the flight volume, metres.
-        radius_m : float
-            The body's radius: its centre keeps that from the volume's bounds.
-
-        Returns
-        -------
-        (n, 9) float64
-            Triangles, metres. None where the body cannot get past the rim: it lies outside the volume, nearer to its
-            bounds than the body, or ground of about the same height goes on beyond it; and none at all where
-            something lies in every column, for then the ground has its walls, if it has holes.
+        Which close its underside to a body of `radius_m` in the volume.
         """
         if not _within(self.bare, low, high, radius_m):
             return np.empty((0, 9))

@@ -29,20 +29,7 @@ def _interleaved(
 
 
 def morton_codes(points: NDArray[np.float64], bits: int = 21) -> NDArray[np.uint64]:
-    """Number points along a Morton curve through the cube that holds them.
-
-    Parameters
-    ----------
-    points : (n, 3) float64
-        Metres; one at least.
-    bits : int
-        Of each coordinate, 21 at most: the cube is cut into ``2**bits`` cells an axis.
-
-    Returns
-    -------
-    (n,) uint64
-        The bits of the three cell numbers, interleaved.
-    """
+    """Morton codes (n,) uint64 of points (n, 3) in their bounding cube, `bits` (at most 21) a coordinate."""
     low = points.min(axis=0)
     extent = max(float((points.max(axis=0) - low).max()), 1e-9)
     return np.asarray(_interleaved(np.ascontiguousarray(points, np.float64), low, extent, 2**bits - 1))

@@ -42,24 +42,9 @@ _wrapped = njit(cache=True, inline="always")(wrap_one_rad)
 
 
 def replay(start: ArrayLike, actions: ArrayLike) -> NDArray[np.float64]:
-    """Fly actions from a start pose, without collisions.
+    """Replay actions (n,) from a start pose (metres, radians, world) without collisions.
 
-    Parameters
-    ----------
-    start : (4,) float
-        x, y, z in metres, world frame, and yaw in radians.
-    actions : (n,) int
-        Ids of the action set. Stop and Approach do not move: where an Approach leads only a map can tell.
-
-    Returns
-    -------
-    (n + 1, 4) float64
-        Poses before each action and after the last; yaw in (-pi, pi].
-
-    Raises
-    ------
-    ValueError
-        There is no such action.
+    Poses (n + 1, 4), yaw in (-π, π].
     """
     a = np.asarray(actions, np.int64).reshape(-1)
     if ((a < STOP) | (a > APPROACH)).any():

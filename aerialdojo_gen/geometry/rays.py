@@ -80,13 +80,6 @@ class TriangleRayCaster:
     Embree works in float32: it finds the triangle, and the distance is then computed in float64 from that triangle's
     plane, so that it is exact to about 1e-9 m. Coordinates are centred first; over 400 m Embree itself is good to
     about 0.02 mm, which decides only which of two triangles a ray at their very edge takes.
-
-    Parameters
-    ----------
-    vertices : (n, 3) float64
-        Metres, world frame.
-    faces : (m, 3) int32
-        At least one; orientation does not matter, both sides are hit.
     """
 
     def __init__(self, vertices: Floats, faces: NDArray[np.int32]) -> None:
@@ -106,21 +99,9 @@ class TriangleRayCaster:
         )
 
     def first_hit(self, origins: ArrayLike, directions: ArrayLike) -> tuple[Floats, Ints]:
-        """Find the first triangle along every ray.
+        """First hit along rays (origins and directions (n, 3), world metres).
 
-        Parameters
-        ----------
-        origins : (n, 3) or (3,) array_like
-            Metres, world frame; broadcasts against the directions.
-        directions : (n, 3) array_like
-            Any length but zero.
-
-        Returns
-        -------
-        distance_m : (n,) float64
-            Along the ray; inf where it hits nothing.
-        face : (n,) int32
-            Index of the face that is hit, -1 where none is.
+        Distance (inf for none) and face (-1 for none).
         """
         d = np.asarray(directions, dtype=np.float64)
         if not len(d):
@@ -132,19 +113,9 @@ class TriangleRayCaster:
         return distance, face
 
     def unobstructed(self, origins: ArrayLike, points: ArrayLike, tolerance_m: float = 5e-3) -> NDArray[np.bool_]:
-        """Whether nothing stands between origins and points.
+        """Whether segments from origins to points, (n, 3) world metres, are free but for the last `tolerance_m`.
 
-        Parameters
-        ----------
-        origins, points : (n, 3) or (3,) array_like
-            Metres, world frame; they broadcast against each other.
-        tolerance_m : float
-            What is hit closer to the point than this is the point's own surface.
-
-        Returns
-        -------
-        (n,) bool
-            True where the segment is free.
+        (n,) bool.
         """
         o, p = _pairs(origins, points)
         free = np.ones(len(p), dtype=np.bool_)
@@ -158,23 +129,9 @@ class TriangleRayCaster:
     def first_between(
         self, origins: ArrayLike, points: ArrayLike, least_m: float
     ) -> tuple[NDArray[np.int64], Floats, Floats, Ints]:
-        """Find the first triangle along every ray from an origin to a point, or beyond the point.
+        """First hit towards points further than `least_m` from their origins.
 
-        Parameters
-        ----------
-        origins, points : (n, 3) or (3,) array_like
-            Metres, world frame; they broadcast against each other.
-        least_m : float
-            What is not further apart is left out.
-
-        Returns
-        -------
-        which : (k,) int64
-            The others.
-        length_m : (k,) float64
-            How far apart they are.
-        distance_m, face
-            As `first_hit` returns them, (k,).
+        Which (k,), length, distance and face of the hit.
         """
         o, p = _pairs(origins, points)
         far, length, unit, start, aim = _towards(o, p, self._centre, least_m)
@@ -191,20 +148,7 @@ def _pairs(origins: ArrayLike, points: ArrayLike) -> tuple[Floats, Floats]:
 
 
 class RayCaster:
-    """First hits of rays on the instances of a scene.
-
-    Parameters
-    ----------
-    scene : Things
-        All its instances are hit, from both sides.
-    triangles : TriangleRayCaster, optional
-        Over the triangles of its instances in their order, where there is one already.
-
-    Attributes
-    ----------
-    nodes : tuple of str
-        Node names in the scene's order: what `first_hit`'s indices mean.
-    """
+    """First hits of rays on the instances of a scene."""
 
     def __init__(self, scene: Things, triangles: TriangleRayCaster | None = None) -> None:
         self.nodes = tuple(i.node for i in scene.instances)
@@ -212,44 +156,16 @@ class RayCaster:
         self._triangles = triangles or TriangleRayCaster(*soup(scene.instances))
 
     def first_hit(self, origins: ArrayLike, directions: ArrayLike) -> tuple[Floats, Ints]:
-        """Find what every ray hits first.
-
-        Parameters
-        ----------
-        origins : (n, 3) or (3,) array_like
-            Metres, world frame; broadcasts against the directions.
-        directions : (n, 3) array_like
-            Any length but zero.
-
-        Returns
-        -------
-        distance_m : (n,) float64
-            Along the ray; inf where it hits nothing.
-        instance_index : (n,) int32
-            Index into `nodes` (and the scene's instances), -1 where nothing is hit.
-        """
+        """First hit along rays, world metres: distance (n,) and index of the instance (-1 for none)."""
         distance, face = self._triangles.first_hit(origins, directions)
         return distance, np.where(face >= 0, self._owner[face], np.int32(-1))
 
     def visible(
         self, origins: ArrayLike, points: ArrayLike, own_instance: int | Ints | None = None, tolerance_m: float = 5e-3
     ) -> NDArray[np.bool_]:
-        """Whether points are seen from origins.
+        """Whether points (n, 3) are seen from origins: the first hit is the point, its own instance, or nothing.
 
-        Parameters
-        ----------
-        origins, points : (n, 3) or (3,) array_like
-            Metres, world frame; they broadcast against each other.
-        own_instance : int or (n,) int32, optional
-            Index of the instance that the points belong to, or of each one's: where the ray meets that one first, be
-            it nearer than the point, the instance is seen along that line of sight, and the answer is True.
-        tolerance_m : float
-            What is hit closer to the point than this is the point's own surface.
-
-        Returns
-        -------
-        (n,) bool
-            True where the first thing hit on the way is the point (or its instance), or nothing is.
+        (n,) bool.
         """
         shape = np.broadcast_shapes(np.shape(origins), np.shape(points))
         seen = np.ones(1 if len(shape) == 1 else shape[0], dtype=np.bool_)
@@ -264,16 +180,5 @@ class RayCaster:
 
 
 def instance_caster(instance: Body) -> TriangleRayCaster:
-    """Cast rays at one instance as if it stood alone.
-
-    Parameters
-    ----------
-    instance : Body
-        In world coordinates.
-
-    Returns
-    -------
-    TriangleRayCaster
-        Over the instance's own faces.
-    """
+    """Cast rays at one instance as if it stood alone."""
     return TriangleRayCaster(instance.vertices, instance.faces)

@@ -50,20 +50,7 @@ class Things(Protocol):
 
 
 def soup(bodies: Sequence[Body]) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
-    """Put the triangles of bodies together, one body after the other, none welded.
-
-    Parameters
-    ----------
-    bodies : sequence of Body
-        One at least.
-
-    Returns
-    -------
-    vertices : (n, 3) float64
-        Metres, in the bodies' frame.
-    faces : (m, 3) int32
-        Indices into `vertices`.
-    """
+    """Concatenate the triangles of bodies, none welded: vertices (n, 3) metres and faces (m, 3)."""
     offsets = np.cumsum([0, *(len(body.vertices) for body in bodies[:-1])])
     faces = [body.faces.astype(np.int32) + np.int32(k) for body, k in zip(bodies, offsets, strict=True)]
     return np.concatenate([body.vertices for body in bodies]), np.concatenate(faces)

@@ -12,22 +12,7 @@ Floats = NDArray[np.float64]
 
 
 def view_of(points: Floats, poses: Floats) -> NDArray[np.int64]:
-    """Find the view in whose picture points lie, whatever stands before them.
-
-    The views are square, of 90° and level: the four of them are faces of a cube around the body's centre.
-
-    Parameters
-    ----------
-    points : (n, 3) float64
-        Metres, world frame.
-    poses : (n, 4) float64
-        The body's, one a point: x, y, z in metres and yaw in radians, world frame.
-
-    Returns
-    -------
-    (n,) int64
-        Index into `VIEWS`, the first where a point is on the border of two; -1 behind and above.
-    """
+    """Index into `VIEWS` of the 90° view that contains each point, (n,), from poses (n, 4); -1 behind and above."""
     away = points - poses[:, :3]
     c, s = np.cos(poses[:, 3]), np.sin(poses[:, 3])
     forward, left, up = c * away[:, 0] + s * away[:, 1], c * away[:, 1] - s * away[:, 0], away[:, 2]
@@ -44,26 +29,9 @@ def view_of(points: Floats, poses: Floats) -> NDArray[np.int64]:
 def seen_from(
     scene: TriangleRayCaster, own: TriangleRayCaster, points: ArrayLike, poses: ArrayLike
 ) -> tuple[Floats, NDArray[np.int64]]:
-    """Say how much of an object is seen from poses, and by which view.
+    """Share of an object's points (m, 3) seen from each pose (n, 4).
 
-    Parameters
-    ----------
-    scene : TriangleRayCaster
-        Everything that may stand in the way, the object included.
-    own : TriangleRayCaster
-        The object alone.
-    points : (m, 3) array_like
-        Of the object's surface, metres, world frame.
-    poses : (n, 4) array_like
-        The body's: x, y, z in metres and yaw in radians, world frame.
-
-    Returns
-    -------
-    share : (n,) float64
-        Of the points that the object's own body does not hide from the pose, the share that lies in one of the views
-        and that nothing else hides; 0 where there are none.
-    view : (n,) int64
-        Index into `VIEWS` of the view that sees most points, the first of equals; -1 where nothing is seen.
+    And the view that sees most of them (-1 for none).
     """
     p, q = np.asarray(points, dtype=np.float64), np.asarray(poses, dtype=np.float64)
     m = len(p)

@@ -71,15 +71,7 @@ def _march(
 
 
 class Surface:
-    """The surface of one mesh.
-
-    Parameters
-    ----------
-    vertices : (n, 3) float64
-        Metres, world frame.
-    faces : (m, 3) int32
-        At least one triangle; orientation does not matter.
-    """
+    """The surface of one mesh."""
 
     def __init__(self, vertices: Floats, faces: NDArray[np.int32]) -> None:
         corners = np.asarray(vertices, dtype=np.float64)[faces]
@@ -103,48 +95,16 @@ class Surface:
         return cls(instance.vertices, instance.faces)
 
     def distance_m(self, points: ArrayLike) -> Floats:
-        """Distance from points to the surface, whichever side they are on.
-
-        Parameters
-        ----------
-        points : (n, 3) array_like
-            Metres, world frame.
-
-        Returns
-        -------
-        (n,) float64
-            Metres, never negative.
-        """
+        """Unsigned distance, (n,) metres, from points (n, 3) to the surface."""
         p = np.ascontiguousarray(np.atleast_2d(np.asarray(points, dtype=np.float64)))
         return np.asarray(_distances(p, self._triangles, self._spheres)[0])
 
     def sample(self, n: int, rng: np.random.Generator) -> Floats:
-        """Draw points evenly by area, stratified: every n-th of the total area gets one point.
-
-        Parameters
-        ----------
-        n : int
-            Number of points.
-        rng : numpy.random.Generator
-            Source of the draw.
-
-        Returns
-        -------
-        (n, 3) float64
-            Metres, world frame.
-        """
+        """Draw n points (n, 3) evenly by area, stratified, world metres."""
         return self.sample_normals(n, rng)[0]
 
     def sample_normals(self, n: int, rng: np.random.Generator) -> tuple[Floats, Floats]:
-        """Draw points as `sample` does, the same ones, with the normals of their triangles.
-
-        Returns
-        -------
-        points : (n, 3) float64
-            Metres, world frame.
-        normals : (n, 3) float64
-            Unit vectors; which side they point to is the triangle's orientation's.
-        """
+        """Draw the points that `sample` draws, with the unit normals of their triangles; (n, 3) each."""
         total = np.cumsum(self.areas_m2)
         place = (np.arange(n) + rng.random(n)) / n * total[-1]
         which = np.minimum(np.searchsorted(total, place, side="right"), len(total) - 1)
@@ -154,24 +114,9 @@ class Surface:
         return np.asarray((1 - r) * a + r * (1 - s) * b + r * s * c), np.asarray(normals)
 
     def standoff(self, aims: ArrayLike, directions: ArrayLike, offset_m: float, tolerance_m: float = 1e-4) -> Floats:
-        """Come from far towards aims, and stop where the surface is as near as the offset.
+        """First point on each line from outside towards its aim whose distance to the surface is `offset_m`.
 
-        Parameters
-        ----------
-        aims : (3,) or (n, 3) array_like
-            Where the lines lead to, metres, world frame.
-        directions : (n, 3) array_like
-            Unit vectors from the aim outwards: the sides that the lines come from.
-        offset_m : float
-            Distance from the surface to stop at.
-        tolerance_m : float
-            The distance reached exceeds the offset by less than this.
-
-        Returns
-        -------
-        (n, 3) float64
-            The first point on each line, from outside, whose distance to the surface is the offset; NaN where a line
-            gets as far as its aim without coming that near.
+        NaN where none.
         """
         d = np.ascontiguousarray(directions, dtype=np.float64)
         aim = np.broadcast_to(np.asarray(aims, dtype=np.float64), d.shape)
@@ -183,18 +128,7 @@ class Surface:
         return np.asarray(origins - t[:, None] * d)
 
     def nearest_point(self, point: ArrayLike) -> Floats:
-        """Find a point of the surface that is as near as any.
-
-        Parameters
-        ----------
-        point : (3,) array_like
-            Metres, world frame.
-
-        Returns
-        -------
-        (3,) float64
-            On the surface, metres, world frame.
-        """
+        """A nearest point of the surface, (3,) world metres."""
         p = np.asarray(point, dtype=np.float64)
         _, which = _distances(p[None], self._triangles, self._spheres)
         return _closest_on_triangle(p, self._corners[int(which[0])])

@@ -23,25 +23,7 @@ _OFF_SURFACE_M = 2e-3
 
 
 def in_picture(positions: Floats, yaw_rad: Floats, points: Floats, fov_deg: float) -> NDArray[np.bool_]:
-    """Whether points lie in the front camera's picture, whatever hides them.
-
-    The camera is level, at the body's centre, its picture square.
-
-    Parameters
-    ----------
-    positions : (n, 3) float64
-        Metres, world frame.
-    yaw_rad : (n,) float64
-        Counter-clockwise from +x.
-    points : (m, 3) float64
-        Metres, world frame.
-    fov_deg : float
-        Horizontal and vertical.
-
-    Returns
-    -------
-    (n, m) bool
-    """
+    """Whether points (m, 3) lie in the front camera's picture from n poses, whatever hides them; (n, m) bool."""
     ray = points[None] - positions[:, None]
     cos, sin = np.cos(yaw_rad)[:, None], np.sin(yaw_rad)[:, None]
     ahead = ray[..., 0] * cos + ray[..., 1] * sin
@@ -51,22 +33,7 @@ def in_picture(positions: Floats, yaw_rad: Floats, points: Floats, fov_deg: floa
 
 
 def off_front_rad(positions: Floats, centroid: ArrayLike, fronts_rad: Sequence[float]) -> Floats:
-    """Angle in the plane between where viewpoints are, seen from the centroid, and the nearest front.
-
-    Parameters
-    ----------
-    positions : (n, 3) float64
-        Metres, world frame.
-    centroid : (3,) array_like
-        The object's, metres, world frame.
-    fronts_rad : sequence of float
-        Directions of its fronts, world frame, at least one.
-
-    Returns
-    -------
-    (n,) float64
-        In [0, π].
-    """
+    """Angle in the plan, (n,) in [0, π], between viewpoints (n, 3), seen from the centroid, and the nearest front."""
     away = positions - np.asarray(centroid)
     azimuth = np.arctan2(away[:, 1], away[:, 0])
     return np.asarray(np.min([np.abs(wrap_angle_rad(azimuth - front)) for front in fronts_rad], axis=0))
@@ -74,41 +41,16 @@ def off_front_rad(positions: Floats, centroid: ArrayLike, fronts_rad: Sequence[f
 
 @dataclass(frozen=True, eq=False)
 class Patch:
-    """Points of a part's surface.
+    """Points of a part's surface."""
 
-    Attributes
-    ----------
-    points : (m, 3) float64
-        Metres, world frame.
-    normals : (m, 3) float64
-        Unit vectors; the side that they point to has no meaning.
-    lit : (m, 2) bool
-        Whether the sun reaches the side that the normal points to, and the other one.
-    area_m2 : float
-        Of the part's faces, each counted from one side.
-    """
-
-    points: Floats
-    normals: Floats
-    lit: NDArray[np.bool_]
-    area_m2: float
+    points: Floats  # (m, 3) float64; metres, world frame
+    normals: Floats  # (m, 3) float64; unit vectors; the side that they point to has no meaning
+    lit: NDArray[np.bool_]  # Whether the sun reaches the side that the normal points to, and the other one
+    area_m2: float  # Of the part's faces, each counted from one side
 
     @classmethod
     def of(cls, surface: Surface, n: int, rng: np.random.Generator, scene: RayCaster, sun: ArrayLike) -> Patch:
-        """Draw points by area.
-
-        Parameters
-        ----------
-        surface : Surface
-            The part's, world frame.
-        n : int
-            How many.
-        rng : numpy.random.Generator
-        scene : RayCaster
-            What may be in the sun's way.
-        sun : (3,) array_like
-            Unit vector towards the sun.
-        """
+        """Draw n points by area from a part's surface and find which are in the sun."""
         points, normals = surface.sample_normals(n, rng)
         towards = np.asarray(sun, dtype=np.float64)
         facing = normals @ towards
@@ -121,26 +63,9 @@ class Patch:
 def seen_share(
     positions: Floats, yaw_rad: Floats, patches: Sequence[Patch], scene: RayCaster, fov_deg: float
 ) -> Floats:
-    """Tell how much of parts viewpoints see: not hidden, in the picture, not edge-on, and rather in the sun.
+    """Share (n, parts), 0 to 1, of each part that viewpoints see.
 
-    Parameters
-    ----------
-    positions : (n, 3) float64
-        Metres, world frame.
-    yaw_rad : (n,) float64
-        Counter-clockwise from +x.
-    patches : sequence of Patch
-        One a part.
-    scene : RayCaster
-        Everything, the object included.
-    fov_deg : float
-        Of the front camera.
-
-    Returns
-    -------
-    (n, len(patches)) float64
-        In [0, 1]: mean over a part's points of the cosine at which they are seen, 0 for those that are not, four
-        fifths of it for those in the shade.
+    Unhidden, in the picture, by incidence, less in the shade.
     """
     out = np.zeros((len(positions), len(patches)))
     for k, patch in enumerate(patches):

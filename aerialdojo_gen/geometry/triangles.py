@@ -132,24 +132,7 @@ def segment_triangle_d2(
     px: float, py: float, pz: float, qx: float, qy: float, qz: float,
     tri: NDArray[np.float64], k: int, bound: float,
 ) -> float:  # fmt: skip
-    """Squared distance between segment pq and triangle `tri[k]`; infinity where it exceeds `bound` squared.
-
-    Parameters
-    ----------
-    px, py, pz, qx, qy, qz : float
-        Ends of the segment, metres.
-    tri : (n, 9) float64
-        Triangles.
-    k : int
-        Row of the triangle.
-    bound : float
-        Distances beyond it need not be known, metres.
-
-    Returns
-    -------
-    float
-        Square metres, or infinity.
-    """
+    """Squared distance between segment pq and triangle `tri[k]`, metres²; inf where it exceeds `bound` squared."""
     ax, ay, az = tri[k, 0], tri[k, 1], tri[k, 2]
     bx, by, bz = tri[k, 3], tri[k, 4], tri[k, 5]
     cx, cy, cz = tri[k, 6], tri[k, 7], tri[k, 8]
@@ -183,23 +166,9 @@ def segment_triangle_d2(
 def split_triangles(
     triangles: NDArray[np.float64], max_edge_m: float, lower: NDArray[np.float64], upper: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Halve long triangles until none is longer than asked, and leave out what lies outside a box.
+    """Halve triangles (n, 9) until no edge exceeds `max_edge_m`, dropping those outside a box.
 
-    Parameters
-    ----------
-    triangles : (n, 9) float64
-        Metres.
-    max_edge_m : float
-        Longest edge that may remain.
-    lower, upper : (3,) float64
-        Corners of the box: triangles whose own box does not touch it are dropped.
-
-    Returns
-    -------
-    pieces : (m, 9) float64
-        Covering the same surface inside the box, in an order that depends on the input alone.
-    rows : (m,) int64
-        Which triangle each is a piece of.
+    Pieces and their rows.
     """
     todo = triangles.reshape(-1, 3, 3)
     near, small = _within(triangles, lower, upper, max_edge_m)

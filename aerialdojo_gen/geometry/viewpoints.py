@@ -34,33 +34,9 @@ def around(
     elevations_deg: Sequence[float],
     level_heights: Sequence[float],
 ) -> Floats:
-    """Place candidates at a distance from an object's surface, on all sides of it.
+    """Candidates (n, 3), world metres.
 
-    Every candidate is where a line that comes from far towards the object's centroid gets as near to its surface as
-    the standoff: one line an azimuth and elevation. A line that passes the object by (an arch has its centroid in its
-    opening) leads to the surface point nearest to the centroid instead. An object taller than what a level camera of
-    90° sees from the standoff gets lines to other heights of its vertical axis as well.
-
-    Parameters
-    ----------
-    surface : Surface
-        The object's, world frame.
-    box : (2, 3) float64
-        Its axis-aligned box, metres, world frame; the centroid is the box's centre.
-    standoff_m : float
-        Distance from the surface.
-    azimuths : int
-        Number of directions in the plane, the first one east.
-    elevations_deg : sequence of float
-        Elevations of the lines to the centroid, seen from it.
-    level_heights : sequence of float
-        Heights in the box, from 0 (bottom) to 1 (top), of more level lines to a tall object.
-
-    Returns
-    -------
-    (n, 3) float64
-        Metres, world frame, within 0.1 mm of the standoff; n is azimuths × (elevations + heights that apply). NaN
-        where a line comes nowhere near the surface.
+    At `standoff_m` from the surface on lines towards the centroid from all sides; NaN for none.
     """
     centroid = box.mean(axis=0)
     rows = [(centroid[2], e) for e in elevations_deg]
@@ -87,29 +63,13 @@ def around(
 
 @dataclass(frozen=True)
 class Views:
-    """What n viewpoints see of an object's m sample points.
+    """What n viewpoints see of an object's m sample points."""
 
-    Attributes
-    ----------
-    visible_fraction : (n,) float64
-        Of the sample points in the picture that the object itself does not hide (its far side, say), the share that
-        nothing else hides either. 0 where fewer than three points are in the picture.
-    framed : (n,) float64
-        Share of the sample points that lie within the picture with a little room, whatever hides them.
-    shown : (n,) float64
-        Sample points seen, over those that at least one of the n viewpoints would see if the object stood alone: how
-        much of the object one picture tells.
-    box_fraction : (n,) float64
-        Area of the seen points' box in the picture, over the picture's.
-    off_centre : (n,) float64
-        Distance of the seen points' mean from the picture's centre, in half edges of the picture.
-    """
-
-    visible_fraction: Floats
-    framed: Floats
-    shown: Floats
-    box_fraction: Floats
-    off_centre: Floats
+    visible_fraction: Floats  # (n,) float64
+    framed: Floats  # Share of the sample points that lie within the picture with a little room, whatever hides them
+    shown: Floats  # (n,) float64
+    box_fraction: Floats  # (n,) float64; area of the seen points' box in the picture, over the picture's
+    off_centre: Floats  # Distance of the seen points' mean from the picture's centre, in half edges of the picture
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,48 +77,22 @@ class Sight:
     """Which of an object's m sample points n viewpoints see, and where in their pictures.
 
     The camera is the front one: square picture, at the body's centre, level, looking along the yaw.
-
-    Attributes
-    ----------
-    u, v : (n, m) float64
-        Where the points are in the picture: -1 to 1 from edge to edge; meaningless behind the camera.
-    roomy : (n, m) bool
-        Points within the picture with a little room, whatever hides them.
-    facing : (n, m) bool
-        Points in the picture that the object itself does not hide.
-    seen : (n, m) bool
-        Those of them that nothing else hides either.
     """
 
-    u: Floats
+    u: Floats  # Where the points are in the picture: -1 to 1 from edge to edge; meaningless behind the camera
     v: Floats
-    roomy: NDArray[np.bool_]
-    facing: NDArray[np.bool_]
-    seen: NDArray[np.bool_]
+    roomy: NDArray[np.bool_]  # (n, m) bool; points within the picture with a little room, whatever hides them
+    facing: NDArray[np.bool_]  # (n, m) bool; points in the picture that the object itself does not hide
+    seen: NDArray[np.bool_]  # (n, m) bool; those of them that nothing else hides either
 
     @classmethod
     def of(
         cls, positions: Floats, yaw_rad: Floats, points: Floats, alone: TriangleRayCaster, scene: RayCaster,
         own_instance: int, fov_deg: float,
     ) -> Sight:  # fmt: skip
-        """Look at an object from viewpoints, by ray casts from the body's centre to sample points.
+        """Ray casts from viewpoints (n, 3) with yaws to an object's points (m, 3).
 
-        Parameters
-        ----------
-        positions : (n, 3) float64
-            Metres, world frame.
-        yaw_rad : (n,) float64
-            Radians, counter-clockwise from +x.
-        points : (m, 3) float64
-            On the object's surface, metres, world frame.
-        alone : TriangleRayCaster
-            The object by itself.
-        scene : RayCaster
-            Everything, the object included.
-        own_instance : int
-            The object's index in the scene.
-        fov_deg : float
-            Field of view of the camera, horizontal and vertical.
+        The camera is level, square, at the body's centre.
         """
         ray = points[None] - positions[:, None]
         cos, sin = np.cos(yaw_rad)[:, None], np.sin(yaw_rad)[:, None]
@@ -232,31 +166,9 @@ def look(
 def informativeness(
     views: Views, elevation_deg: Floats, clearance_m: Floats, radius_m: float, ample_m: float
 ) -> Floats:
-    """Score how well viewpoints show their object: the paper's "visual informativeness", made explicit.
+    """Visual informativeness (paper) in [0, 1], (n,).
 
-    A weighted mean (`WEIGHTS`) of six terms in [0, 1]: *visible*, the visible fraction; *shown*, the share of the
-    object that the picture tells, a stand-in for the correspondence of image and name; *size*, the edge of its box in
-    the picture, full marks from half of the picture's edge; *centred*, how near it is to the picture's centre;
-    *level*, `level_marks`; *clear*, room around the body, full
-    marks at the ample clearance.
-
-    Parameters
-    ----------
-    views : Views
-        What n viewpoints see.
-    elevation_deg : (n,) float64
-        Elevation of the viewpoint seen from the centroid.
-    clearance_m : (n,) float64
-        Distance to the nearest surface of the scene.
-    radius_m : float
-        The body's radius: no room at all.
-    ample_m : float
-        Clearance beyond which more is no better.
-
-    Returns
-    -------
-    (n,) float64
-        In [0, 1], higher is better.
+    Weighted mean of visible, shown, size, centred, level and clear.
     """
     terms = {
         "visible": views.visible_fraction,
@@ -273,45 +185,16 @@ def informativeness(
 
 
 def level_marks(elevation_deg: Floats | float) -> Floats:
-    """Mark the elevation of viewpoints, seen from the centroid: full from 5° below to 20° above, 0 at -30° and 50°.
-
-    Parameters
-    ----------
-    elevation_deg : (n,) float64 or float
-
-    Returns
-    -------
-    (n,) or () float64
-        In [0, 1].
-    """
+    """Score the elevation in degrees: 1 from -5 to 20, 0 at -30 and 50; (n,) in [0, 1]."""
     return np.asarray(np.interp(elevation_deg, _ELEVATIONS_DEG, _LEVEL_MARKS))
 
 
 def shortlist(
     score: Floats, azimuth_rad: Floats, count: int, separation_rad: float, wanted: NDArray[np.bool_] | None = None
 ) -> NDArray[np.int64]:
-    """Choose the best viewpoints that look from different sides.
+    """Greedy choice of the best scores at least `separation_rad` apart in azimuth.
 
-    Greedy: the best score first; then the best among those at least the separation away in azimuth from all that are
-    chosen; where there is none, the best score less the share of the separation that it lacks.
-
-    Parameters
-    ----------
-    score : (n,) float64
-        In [0, 1], higher is better.
-    azimuth_rad : (n,) float64
-        Direction of each viewpoint seen from the centroid.
-    count : int
-        How many to choose; fewer where n is smaller.
-    separation_rad : float
-        Wanted angle between any two.
-    wanted : (n,) bool, optional
-        One of these is chosen at least, if there is any: the best of them, in the place of the last one.
-
-    Returns
-    -------
-    (min(n, count),) int64
-        Indices, the highest score first; equal scores in the order of the index.
+    Indices, the highest score first.
     """
     chosen: list[int] = []
     apart = np.full(len(score), math.inf)

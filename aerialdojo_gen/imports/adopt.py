@@ -45,17 +45,10 @@ _MOST_NOTES = 8
 
 @dataclass
 class Repairs:
-    """What was found and how it was mended, for the user to read.
-
-    Attributes
-    ----------
-    lines : list of str
-    origin_m : (x, y, z)
-        Where the scene's origin lies in the file's axes, after `up` and `scale`, metres.
-    """
+    """What was found and how it was mended, for the user to read."""
 
     lines: list[str] = field(default_factory=list)
-    origin_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    origin_m: tuple[float, float, float] = (0.0, 0.0, 0.0)  # (x, y, z)
 
     def add(self, n: int, text: str) -> None:
         """Note a repair of n things, if there were any."""
@@ -65,19 +58,11 @@ class Repairs:
 
 @dataclass(frozen=True, eq=False)
 class Place:
-    """A foreign mesh in metres, z up, mended, before any of it is cut away.
+    """A foreign mesh in metres, z up, mended, before any of it is cut away."""
 
-    Attributes
-    ----------
-    bodies, domes : list of RawNode
-        What stands there, and the skies around it; in the order of their places.
-    repairs : Repairs
-        What was mended.
-    """
-
-    bodies: list[RawNode]
+    bodies: list[RawNode]  # What stands there, and the skies around it; in the order of their places
     domes: list[RawNode]
-    repairs: Repairs
+    repairs: Repairs  # What was mended
 
     @classmethod
     def of(cls, nodes: Sequence[RawNode], up: str, scale: float, naming: Naming | None = None) -> Place:
@@ -154,44 +139,9 @@ def adopt(
     naming: Naming | None = None,
     light: str = "auto",
 ) -> tuple[Scene, Repairs]:
-    """Make a scene of a foreign mesh.
+    """Make a scene of a foreign mesh, its origin in the middle at the ground.
 
-    Parameters
-    ----------
-    name : str
-        Name of the scene.
-    nodes : sequence of RawNode
-        What the file holds.
-    up : {"z", "y"}
-        The file's axis that points up.
-    scale : float
-        Metres a unit of the file: 0.01 for centimetres.
-    crop_m : (x, y, radius), optional
-        Keep what lies within a circle, metres, in the file's axes after `up` and `scale`. Triangles are cut at its
-        border, and closed bodies closed there again.
-    box_m : (x0, y0, x1, y1), optional
-        The same, of a rectangle.
-    ceiling_m : float, optional
-        Highest z that a drone may fly at; 6 m above the highest point, at least 12 m above the lowest, where absent.
-    naming : Naming, optional
-        What nodes are called; the words in their names where absent.
-    light : {"auto", "sun", "baked"}
-        Whether textures are lit by the scene's sun, or drawn as they are, as photographs, whose light is in them;
-        by what they look like where ``"auto"`` (`aerialdojo_gen.imports.skinning.photographed`).
-
-    Returns
-    -------
-    Scene
-        Its origin is the middle of the mesh at the ground. Nodes of the file are its instances; soups are taken apart
-        (`aerialdojo_gen.imports.apart`). Surfaces that are not closed are there from both sides; which of them are
-        the ground is decided (`aerialdojo_gen.imports.surfaces`), and sky domes are its backdrop.
-    Repairs
-        What had to be mended.
-
-    Raises
-    ------
-    AssetError
-        Nothing is left to build from, or the extent cannot be metres.
+    Returns the scene and what was repaired.
     """
     place = Place.of(nodes, up, scale, naming)
     return settled(name, place, region_of(crop_m, box_m), ceiling_m=ceiling_m, naming=naming, light=light)
@@ -227,30 +177,7 @@ def settled(
     origin_m: Floats | None = None,
     light: str = "auto",
 ) -> tuple[Scene, Repairs]:
-    """Make a scene of a place, or of a part of one.
-
-    Parameters
-    ----------
-    name : str
-        Name of the scene.
-    place : Place
-    region : Region, optional
-        The part to keep; the scene ends there for drones too.
-    ceiling_m, naming, light
-        As of `adopt`.
-    origin_m : (3,) float64, optional
-        Where in the place the scene's origin lies, metres; the middle of what is kept, at its lowest, where absent.
-
-    Returns
-    -------
-    Scene, Repairs
-        As of `adopt`.
-
-    Raises
-    ------
-    AssetError
-        As of `adopt`.
-    """
+    """Make a scene of a place, or of the part of it in `region`; returns the scene and what was repaired."""
     check_options(None, None, light)
     repairs = Repairs(list(place.repairs.lines))
     part = place if region is None else place.within(region)

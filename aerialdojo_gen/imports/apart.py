@@ -36,22 +36,12 @@ _MOST_MAPPED = 20_000
 
 @dataclass
 class Apart:
-    """How often what was taken apart.
+    """How often what was taken apart."""
 
-    Attributes
-    ----------
-    pieces, things : int
-        Connected pieces that soups fell into; what they were gathered to.
-    materials : int
-        Pieces of one material that wide connected bodies fell into.
-    grown : int
-        Things that were one surface with the ground.
-    """
-
-    pieces: int = 0
+    pieces: int = 0  # Connected pieces that soups fell into; what they were gathered to
     things: int = 0
-    materials: int = 0
-    grown: int = 0
+    materials: int = 0  # Pieces of one material that wide connected bodies fell into
+    grown: int = 0  # Things that were one surface with the ground
     soups: list[str] = field(default_factory=list)
 
     def lines(self) -> list[str]:
@@ -71,23 +61,7 @@ class Apart:
 
 
 def taken_apart(bodies: Sequence[RawNode]) -> tuple[list[RawNode], Apart]:
-    """Take soups apart; nodes that are things of their own stay whole.
-
-    Parameters
-    ----------
-    bodies : sequence of RawNode
-        z up, metres, equal places one vertex.
-
-    Returns
-    -------
-    bodies : list of RawNode
-        A file's only node, and a node of several pieces that spreads over 100 m along both axes, fall into connected
-        pieces. Bodies wider than 60 m that are no ground fall into pieces of one colour and material. What stands
-        out of an open surface that the rest stands on (a photogrammetric model is one surface) is cut from it. Last,
-        a piece goes to the smallest thing, not the ground, whose box and plan hold it: a roof has its tiles.
-    Apart
-        How often that was done.
-    """
+    """Segment unstructured meshes (z up, metres) into things; nodes that are things of their own stay whole."""
     told = Apart()
     low = np.min([b.vertices.min(axis=0) for b in bodies], axis=0)
     high = np.max([b.vertices.max(axis=0) for b in bodies], axis=0)

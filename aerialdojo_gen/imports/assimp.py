@@ -16,27 +16,7 @@ from aerialdojo_gen.imports.raw import RawNode, joined, no_corners
 
 
 def read_by_assimp(path: Path, resolve: Callable[[str], bytes], texture_px: int = TEXTURE_PX) -> list[RawNode]:
-    """Read a Collada or FBX file.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-    resolve : callable
-        Gives the bytes of a file that it refers to; FileNotFoundError where there is none.
-    texture_px : int
-        Longest side of a texture, pixels.
-
-    Returns
-    -------
-    list of RawNode
-        One a node of the file that shows a mesh, in the order of the file's tree; transformations are applied.
-
-    Raises
-    ------
-    AssetError
-        Assimp is not installed, or cannot read the file.
-    """
+    """Read a Collada or FBX file: one RawNode a mesh node, in the order of the tree, transforms applied."""
     try:
         assimp: Any = importlib.import_module("assimp_py")
     except ImportError:

@@ -9,20 +9,7 @@ _MAX_BYTES = 256 << 20
 
 
 class Beside:
-    """Gives the files beside a mesh file.
-
-    Parameters
-    ----------
-    path : Path
-        The mesh file.
-
-    Attributes
-    ----------
-    given : dict of str to bytes
-        What has been asked for and was there, by the name asked for.
-    missing : list of str
-        What was not.
-    """
+    """Gives the files beside a mesh file."""
 
     def __init__(self, path: Path) -> None:
         self._folder = path.resolve().parent

@@ -18,26 +18,7 @@ _OUT_OF_MEMORY = 3
 
 
 def read_in_child(module: str, path: Path, arguments: Sequence[str], max_memory_bytes: int, mend: str) -> None:
-    """Run a module that reads a file, and wait for it.
-
-    Parameters
-    ----------
-    module : str
-        Ends with ``raise SystemExit(bounded(...))``.
-    path : Path
-        The file.
-    arguments : sequence of str
-        What the module is given behind the memory and the file.
-    max_memory_bytes : int
-        Most address space of the process.
-    mend : str
-        What to do about a file that asks for too much.
-
-    Raises
-    ------
-    AssetError
-        The process ran out of memory or time, was killed, failed, or says what is wrong with the file.
-    """
+    """Run a module that reads a file, and wait for it."""
     # Not multiprocessing, which would run a caller's unguarded script a second time.
     command = [sys.executable, "-m", module, str(max_memory_bytes), str(path.resolve()), *arguments]
     try:
@@ -70,18 +51,7 @@ def _memory(most: int) -> int:
 
 
 def bounded(read: Callable[[list[str]], str]) -> int:
-    """Bound this process as its command line says, read, and print what is wrong with the file.
-
-    Parameters
-    ----------
-    read : callable
-        Takes the file and the other arguments; gives what is wrong with the file, or nothing.
-
-    Returns
-    -------
-    int
-        Exit code: 1 where something is wrong, another one where the memory is too little.
-    """
+    """Bound this process as its command line says, read, and print what is wrong with the file."""
     memory, *arguments = sys.argv[1:]
     resource.setrlimit(resource.RLIMIT_AS, (_memory(int(memory)),) * 2)
     # At the hard limit the kernel sends SIGKILL, which does not tell its cause.

@@ -30,24 +30,12 @@ PIPELINE = "pipeline.toml"
 
 @dataclass(frozen=True)
 class Added:
-    """What `add_scene` made.
+    """What `add_scene` made."""
 
-    Attributes
-    ----------
-    scene : Scene
-        The scene.
-    repairs : Repairs
-        What was mended in the mesh.
-    pipeline : Path
-        The project's pipeline file, for ``--pipeline``.
-    annotations : Path
-        Where the scene's annotations stand, or belong.
-    """
-
-    scene: Scene
-    repairs: Repairs
-    pipeline: Path
-    annotations: Path
+    scene: Scene  # The scene
+    repairs: Repairs  # What was mended in the mesh
+    pipeline: Path  # The project's pipeline file, for ``--pipeline``
+    annotations: Path  # Where the scene's annotations stand, or belong
 
 
 def add_scene(
@@ -66,53 +54,7 @@ def add_scene(
     texture_px: int = TEXTURE_PX,
     force: bool = False,
 ) -> Added:
-    """Make a scene of a mesh file, in a project folder.
-
-    The folder holds ``scenes/<name>.toml`` with ``scenes/<name>.glb`` beside it, ``annotations/`` and a
-    ``pipeline.toml``; scenes are added to it one by one, and nothing else in it is touched.
-
-    Parameters
-    ----------
-    name : str
-        Letters, digits, ``_`` and ``-``; the suffix ``_1`` puts the scene in the OOD partition.
-    mesh : Path
-        GLB, glTF, OBJ, STL, PLY, 3DS, Collada or FBX.
-    project : Path
-        The folder; made where it is missing.
-    up : {"z", "y"}
-        The mesh's axis that points up.
-    scale : float
-        Metres a unit of the mesh.
-    annotations : Path, optional
-        An annotation file to go with it.
-    crop_m : (x, y, radius), optional
-        Keep a circle, metres, in the file's axes.
-    box_m : (x0, y0, x1, y1), optional
-        Keep a rectangle.
-    ceiling_m : float, optional
-        Highest z that a drone may fly at.
-    names : Path, optional
-        A table of what the file's nodes are called (`aerialdojo_gen.imports.naming.read_names`).
-    light : {"auto", "sun", "baked"}
-        Whether textures are lit by the scene's sun, or drawn as they are (`aerialdojo_gen.imports.adopt.adopt`).
-    texture_px : int
-        Longest side of a texture, pixels; larger ones are made smaller.
-    force : bool
-        Replace a scene of this name.
-
-    Returns
-    -------
-    Added
-
-    Raises
-    ------
-    UsageError
-        The scene exists already, or its name is no name.
-    AssetError
-        The mesh cannot be read, or nothing is left of it.
-    AnnotationError
-        The annotation file is of another scene or malformed.
-    """
+    """Make a scene of a mesh file in a project folder; nothing else in the folder is touched."""
     _check_free([name], project, force)
     check_options(up, scale, light)
     region_of(crop_m, box_m)
@@ -144,28 +86,9 @@ def add_tiles(
     force: bool = False,
     watch: Callable[[Added], None] = lambda added: None,
 ) -> list[Added]:
-    """Make scenes of a large mesh, a square each, in one frame: their coordinates lie side by side.
+    """Make scenes of a large mesh, a square of `edge_m` metres each, in one frame.
 
-    Parameters
-    ----------
-    name : str
-        Of the whole; each scene's has its column from the west and its row from the south, ``"City-x0y2"``.
-    mesh, project, up, scale, crop_m, box_m, ceiling_m, names, light, texture_px, force
-        As of `add_scene`; what is kept by `crop_m` or `box_m` is cut into squares.
-    edge_m : float
-        Edge of a square, metres.
-    watch : callable
-        Called with each scene once it is written.
-
-    Returns
-    -------
-    list of Added
-        West to east, south to north; squares that hold next to nothing are left out.
-
-    Raises
-    ------
-    UsageError, AssetError
-        As of `add_scene`; one of the scenes exists already: nothing is written then.
+    All or none of them are written.
     """
     check_scene_name(tile_name(name, 99, 99))
     check_options(up, scale, light)

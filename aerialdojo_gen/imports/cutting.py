@@ -23,18 +23,10 @@ _GRID_M = 1e-6
 
 @dataclass(frozen=True)
 class Region:
-    """A convex part of the plan, with what a user calls it.
+    """A convex part of the plan, with what a user calls it."""
 
-    Attributes
-    ----------
-    corners : tuple of (x, y)
-        Metres, counter-clockwise.
-    said : str
-        ``"--crop 10 20 100"``.
-    """
-
-    corners: tuple[tuple[float, float], ...]
-    said: str
+    corners: tuple[tuple[float, float], ...]  # tuple of (x, y); metres, counter-clockwise
+    said: str  # ``"--crop 10 20 100"``
 
     @classmethod
     def circle(cls, x: float, y: float, radius: float) -> Region:
@@ -71,39 +63,15 @@ class Region:
 
 @dataclass(frozen=True, eq=False)
 class Pieces:
-    """What is left of triangles.
+    """What is left of triangles."""
 
-    Attributes
-    ----------
-    corners : (k, 3, 3) float64
-        Metres.
-    source : (k,) int64
-        The triangle that each was; for one that closes a cut, a triangle of the cut's rim.
-    weights : (k, 3, 3) float64
-        What each corner is made of: shares of the source's three corners, for whatever is interpolated.
-    """
-
-    corners: Floats
-    source: Ints
-    weights: Floats
+    corners: Floats  # (k, 3, 3) float64; metres
+    source: Ints  # (k,) int64; the triangle that each was; for one that closes a cut, a triangle of the cut's rim
+    weights: Floats  # What each corner is made of: shares of the source's three corners, for whatever is interpolated
 
 
 def cut(vertices: Floats, faces: Ints, region: Region) -> Pieces:
-    """Keep what of triangles lies within a region; those that cross its border are cut there.
-
-    Parameters
-    ----------
-    vertices : (n, 3) float64
-        Metres, equal places one vertex.
-    faces : (m, 3) int64
-    region : Region
-
-    Returns
-    -------
-    Pieces
-        In the order of the faces that they were; connected bodies that were closed are closed again by level pieces
-        of the border, behind them.
-    """
+    """Clip triangles to a convex region; closed bodies are closed again along the border."""
     corners = vertices[faces]
     body, closed = bodies_of(faces, len(vertices))
     pieces = Pieces(corners, np.arange(len(faces)), np.broadcast_to(np.eye(3), (len(faces), 3, 3)))
@@ -236,23 +204,7 @@ def _filled(lines: NDArray[np.object_]) -> NDArray[np.object_]:
 
 
 def bodies_of(faces: Ints, n: int) -> tuple[Ints, NDArray[np.bool_]]:
-    """Find the connected bodies of faces.
-
-    Parameters
-    ----------
-    faces : (m, 3) int64
-        Indices of vertices, equal places one vertex.
-    n : int
-        Number of vertices.
-
-    Returns
-    -------
-    body : (m,) int64
-        Number of each face's body, from 0. Bodies hang together by edges; where four faces and more meet in one,
-        closed bodies touch (a house on a plate), and do not hang together by it.
-    closed : (k,) bool
-        Which bodies have each edge twice, triangles that are there from both sides counted once.
-    """
+    """Edge-connected bodies of faces (m, 3): body of each face, and which bodies are closed."""
     if not len(faces):
         return np.zeros(0, np.int64), np.zeros(0, np.bool_)
     own = np.sort(faces, axis=1)
@@ -276,22 +228,7 @@ def bodies_of(faces: Ints, n: int) -> tuple[Ints, NDArray[np.bool_]]:
 
 
 def unique_rows(*columns: NDArray[Any]) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
-    """Find the different rows of columns of numbers, as `numpy.unique` by its axis 0 does, several times as fast.
-
-    Parameters
-    ----------
-    *columns : (n,) array
-        The first counts most.
-
-    Returns
-    -------
-    first : (k,) int64
-        Index of the first of each row, in the order of the rows' values.
-    same : (n,) int64
-        Which of them each row is.
-    times : (k,) int64
-        How often each is there.
-    """
+    """Unique rows of columns of numbers, as `numpy.unique(axis=0)`, several times as fast."""
     order = np.lexsort(columns[::-1])
     new = np.zeros(len(order), dtype=np.bool_)
     new[:1] = True

@@ -30,29 +30,13 @@ _SUFFIXES = (".tif", ".tiff", ".asc", ".npz")
 
 @dataclass(frozen=True, eq=False)
 class Dem:
-    """Heights on a grid.
+    """Heights on a grid."""
 
-    Attributes
-    ----------
-    path : Path
-        The file.
-    heights_m : (rows, columns) float64
-        Metres; rows run south from the northernmost, NaN where there is none.
-    x0, y0 : float
-        Of the north-western height, in the grid's own coordinates.
-    dx, dy : float
-        From one to the next, eastwards and southwards; both above 0.
-    geographic : bool or None
-        Whether its coordinates are degrees of longitude and latitude; None where they are metres from anywhere.
-    to_grid : callable or None
-        ``(lon, lat) -> (x, y)``; None where the grid is nowhere on earth.
-    """
-
-    path: Path
-    heights_m: Floats
-    x0: float
+    path: Path  # The file
+    heights_m: Floats  # Metres; rows run south from the northernmost, NaN where there is none
+    x0: float  # Of the north-western height, in the grid's own coordinates
     y0: float
-    dx: float
+    dx: float  # From one to the next, eastwards and southwards; both above 0
     dy: float
     geographic: bool | None
     to_grid: Callable[[Floats, Floats], tuple[Floats, Floats]] | None
@@ -86,22 +70,7 @@ class Dem:
 
 
 def read_dem(path: Path) -> Dem:
-    """Read a height model.
-
-    Parameters
-    ----------
-    path : Path
-        ``.tif``: the first band, in metres, of any coordinate system that is projected in metres or geographic.
-        ``.asc``: an ESRI ASCII grid. ``.npz``: `heights_m` (rows from north to south) with `cell_m`, or with
-        `bbox_deg` (west, south, east, north of the outermost heights).
-
-    Raises
-    ------
-    MissingPackage
-        A GeoTIFF, and rasterio is not installed.
-    AssetError
-        The file is missing, damaged, without a coordinate system or any height, or its system is in other units.
-    """
+    """Read a height model: GeoTIFF, ESRI ASCII grid, or ``.npz`` with `heights_m` and `cell_m` or `bbox_deg`."""
     suffix = path.suffix.lower()
     if suffix not in _SUFFIXES:
         raise AssetError(f"{path}: a height model is a file {', '.join(_SUFFIXES)}")

@@ -21,15 +21,12 @@ _POLE_DEG = 85.0
 
 @dataclass(frozen=True)
 class LocalFrame:
-    """Metres east and north of a point: the plane that touches the ellipsoid there, true to a millimetre over 1 km.
+    """Metres east and north of a point.
 
-    Attributes
-    ----------
-    lon_deg, lat_deg : float
-        The origin, WGS 84.
+    The plane that touches the ellipsoid there, true to a millimetre over 1 km.
     """
 
-    lon_deg: float
+    lon_deg: float  # The origin, WGS 84
     lat_deg: float
 
     @classmethod

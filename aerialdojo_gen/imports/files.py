@@ -36,27 +36,7 @@ MAX_TRIANGLES = 4_000_000
 
 
 def read_mesh(path: Path, max_memory_bytes: int = MAX_MEMORY_BYTES, texture_px: int = TEXTURE_PX) -> list[RawNode]:
-    """Read a mesh file's nodes, in bounded memory and time.
-
-    Parameters
-    ----------
-    path : Path
-        A file with one of `SUFFIXES`.
-    max_memory_bytes : int
-        Most address space of the reading process.
-    texture_px : int
-        Longest side of a texture, pixels; larger ones are made smaller (`aerialdojo_gen.imports.pictures`).
-
-    Returns
-    -------
-    list of RawNode
-        Nodes with at least one triangle, in the order of the file; transformations are applied.
-
-    Raises
-    ------
-    AssetError
-        The file is missing, of another kind, too large, damaged, empty, or needs too much memory or time.
-    """
+    """Read a mesh file's nodes with at least one triangle, transforms applied, in bounded memory and time."""
     suffix = path.suffix.lower()
     if suffix not in SUFFIXES:
         raise AssetError(f"{path}: meshes are read from {', '.join(s[1:].upper() for s in SUFFIXES)} files")
@@ -84,21 +64,9 @@ def _unlike(path: Path) -> str:
 
 
 def read_into(path: Path, out: Path, texture_px: int = TEXTURE_PX) -> str:
-    """Read a mesh file without bounds on memory and time: for a process of its own that has them.
+    """Read a mesh file without bounds, for a child process that has them.
 
-    Parameters
-    ----------
-    path : Path
-        The mesh file.
-    out : Path
-        Where the nodes go; `read_mesh` reads them from there.
-    texture_px : int
-        Longest side of a texture, pixels.
-
-    Returns
-    -------
-    str
-        What is wrong with the file; empty where nothing is.
+    Returns what is wrong, or an empty string.
     """
     # What readers grumble about is repaired and reported later.
     warnings.simplefilter("ignore")
@@ -195,11 +163,6 @@ def look_over_glb(path: Path) -> None:
 
     An accessor without a buffer view is all zeros and costs the file nothing, and several nodes may show one mesh: a
     few hundred bytes can ask for terabytes.
-
-    Raises
-    ------
-    AssetError
-        It is no glTF 2.0 file, or it asks for more triangles or numbers than `MAX_TRIANGLES` allows.
     """
     with path.open("rb") as file:
         text = file.read(MAX_FILE_BYTES // 4) if path.suffix.lower() == ".gltf" else _glb_json(file)

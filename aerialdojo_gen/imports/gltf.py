@@ -31,27 +31,7 @@ _CARELESS = ("trimesh", "meshlab", "open3d")
 
 
 def read_gltf(raw: bytes, resolve: Resolve, texture_px: int = TEXTURE_PX) -> list[RawNode]:
-    """Read a glTF file.
-
-    Parameters
-    ----------
-    raw : bytes
-        The whole .glb or .gltf.
-    resolve : callable
-        Gives the bytes of a file that it refers to; FileNotFoundError where there is none.
-    texture_px : int
-        Longest side of a texture, pixels.
-
-    Returns
-    -------
-    list of RawNode
-        One a node of the file's scene that shows a mesh; transformations are applied.
-
-    Raises
-    ------
-    AssetError, ValueError, KeyError, IndexError, TypeError, struct.error
-        It is damaged.
-    """
+    """Read glTF bytes: one RawNode a mesh node, transforms applied."""
     return _File(raw, resolve, texture_px).nodes()
 
 

@@ -28,22 +28,11 @@ _SHOWN = 12
 
 @dataclass(frozen=True)
 class Guess:
-    """What a file's form suggests.
+    """What a file's form suggests."""
 
-    Attributes
-    ----------
-    up : {"z", "y"}
-        The axis along which more of the surface is level.
-    up_sure : bool
-        Whether it is so by much.
-    units : tuple of (float, str)
-        Metres a unit and its name, ``(1.0, "metres")``, of the units by which the file has the size of a place to fly
-        in, the likeliest first; metres alone where there is none.
-    """
-
-    up: str
-    up_sure: bool
-    units: tuple[tuple[float, str], ...]
+    up: str  # The axis along which more of the surface is level
+    up_sure: bool  # Whether it is so by much
+    units: tuple[tuple[float, str], ...]  # tuple of (float, str)
 
 
 def guess(nodes: Sequence[RawNode]) -> Guess:
@@ -99,27 +88,7 @@ def contents(
     naming: Naming | None = None,
     width: int | None = None,
 ) -> list[str]:
-    """Say what a file holds, in lines for a terminal.
-
-    Parameters
-    ----------
-    nodes : sequence of RawNode
-        As read.
-    up, scale, naming
-        As of `adopt`; guessed, or by the names themselves, where absent.
-    width : int, optional
-        Columns of the terminal, for the table of the largest nodes.
-
-    Returns
-    -------
-    list of str
-        Ranges of x, y and z after `up` and `scale`, which are those of ``--crop``, ``--box`` and ``--tiles``.
-
-    Raises
-    ------
-    AssetError
-        There is nothing in it.
-    """
+    """Say what a file holds, in lines for a terminal."""
     found = _guess_within_domes(nodes, scale, naming)
     taken_up, taken_scale = up or found.up, scale or found.units[0][0]
     place = Place.of(nodes, taken_up, taken_scale, naming)

@@ -42,30 +42,14 @@ Cut = tuple[Feature, list[tuple[LineString, bool]]]
 
 @dataclass(frozen=True)
 class Bridge:
-    """A deck for one way or several side by side, with its ramps.
+    """A deck for one way or several side by side, with its ramps."""
 
-    Attributes
-    ----------
-    axis : LineString
-        Middle line from ramp's foot to ramp's foot, metres.
-    heights_m : tuple of float
-        Of the deck over the straight line between the ground at both ends, at `_STATION_M` along the axis.
-    span_m : (from, to)
-        What of the axis is bridge; the rest is ramp, metres along it.
-    kind : str
-        ``"rail"``, ``"road"`` or ``"path"``: the heaviest that it bears.
-    layer : int
-        As mapped.
-    members : tuple of Feature
-        Ways on the bridge itself.
-    """
-
-    axis: LineString
+    axis: LineString  # Middle line from ramp's foot to ramp's foot, metres
     heights_m: tuple[float, ...]
-    span_m: tuple[float, float]
-    kind: str
-    layer: int
-    members: tuple[Feature, ...]
+    span_m: tuple[float, float]  # (from, to); what of the axis is bridge; the rest is ramp, metres along it
+    kind: str  # ``"rail"``, ``"road"`` or ``"path"``: the heaviest that it bears
+    layer: int  # As mapped
+    members: tuple[Feature, ...]  # Ways on the bridge itself
 
     def height(self, x: float, y: float) -> float:
         """Height of the deck at a point over the line between its ends, metres."""
@@ -89,26 +73,7 @@ class Bridge:
 def bridges(
     lines: Sequence[Feature], areas: Sequence[Feature], site: Polygon, ground: Ground, told: Told
 ) -> tuple[list[Bridge], list[Feature]]:
-    """Find the bridges that touch the site.
-
-    Parameters
-    ----------
-    lines, areas : sequence of Feature
-        In metres.
-    site : Polygon
-        The scene's plan.
-    ground : callable
-        Height of the ground at (x, y), metres.
-    told : Told
-        Gets how many there are, and how many are lower than what passes below needs.
-
-    Returns
-    -------
-    bridges : list of Bridge
-        The lower before the higher.
-    lines : list of Feature
-        All lines; what lies on a bridge or its ramps has the tag `BRIDGE`, ways cut where ramps end.
-    """
+    """Find the bridges (metres) that touch the site, lowest first, and cut the lines that lie on them."""
     ways = [f for f in lines if _kind(f.tags) and isinstance(f.shape, LineString) and not below_ground(f.tags)]
     net = _Net(ways)
     out: list[Bridge] = []

@@ -120,19 +120,7 @@ def _to_centimetres(plan: Polygon) -> Polygon:
 def buildings(
     areas: Sequence[Feature], shops: Sequence[BaseGeometry], site: Polygon, told: Told
 ) -> list[dict[str, Any]]:
-    """Make the recipe's buildings.
-
-    Parameters
-    ----------
-    areas : sequence of Feature
-        In metres.
-    shops : sequence of points
-        Where shops, cafés and the like are.
-    site : Polygon
-        What is cut off at the scene's border is left out.
-    told : Told
-        Gets how their heights were found.
-    """
+    """Make the recipe's buildings from map areas in metres."""
     outlines = [a for a in areas if a.tags.get("building", "no") != "no" and not below_ground(a.tags)]
     parts = [a for a in areas if a.tags.get("building:part", "no") != "no" and not below_ground(a.tags)]
     levels = [n for a in outlines if (n := count(a.tags, "building:levels")) and n > 1]

@@ -35,32 +35,7 @@ def town_recipe(
     heights: Callable[[LocalFrame, tuple[float, float]], Heights] | None = None,
     extra_attribution: str = "", seed: int = 0, ceiling_m: float | None = None, drive_on: str = "right",
 ) -> tuple[str, Told]:  # fmt: skip
-    """Write the recipe of a town.
-
-    Parameters
-    ----------
-    found : Map
-        What the extract has in the bounding box and a little about it.
-    bbox : (west, south, east, north)
-        Degrees; its middle is the origin.
-    source : str
-        Name of the extract.
-    heights : callable, optional
-        ``(frame, size_m) -> table``: the ground's heights; level where absent.
-    extra_attribution : str
-        Of the heights.
-    seed : int
-        Of what is added by rule.
-    ceiling_m : float, optional
-        Highest z that a drone may fly at; 6 m over the highest roof where absent.
-    drive_on : {"right", "left"}
-        Side of the street that is driven on.
-
-    Raises
-    ------
-    UsageError
-        The box is no size that a drone flies in, or nothing of the map is in it.
-    """
+    """Write the recipe of a town from map data; the middle of the bounding box (degrees) is the origin."""
     width, depth = (float(math.floor(s * 100 + 0.5) / 100) for s in size_m(bbox))
     if not (min(width, depth) >= SMALLEST_M and max(width, depth) <= LARGEST_M):
         raise UsageError(

@@ -39,17 +39,9 @@ _MOST_BYTES = 4 << 20
 
 @dataclass(frozen=True)
 class Called:
-    """What a thing is called.
+    """What a thing is called."""
 
-    Attributes
-    ----------
-    category : str
-        Its kind, e.g. ``"fire_engine"``; empty where nothing is known.
-    attributes : dict of str to str
-        ``called``: its name where that is not the category's words; ``group``: what makes one thing of a plural.
-    """
-
-    category: str
+    category: str  # Its kind, e.g. ``"fire_engine"``; empty where nothing is known
     attributes: dict[str, str]
 
 
@@ -58,15 +50,9 @@ NOTHING = Called("", {})
 
 @dataclass(frozen=True)
 class Naming:
-    """A user's table of node patterns.
+    """A user's table of node patterns."""
 
-    Attributes
-    ----------
-    rows : sequence of (str, Called)
-        A glob, and what the nodes that it fits are called; the first that fits counts.
-    """
-
-    rows: Sequence[tuple[str, Called]] = ()
+    rows: Sequence[tuple[str, Called]] = ()  # sequence of (str, Called)
 
     def called(self, node: str) -> Called:
         """Say what a node of the file is called: by the table, else by the words in its name."""
@@ -80,18 +66,7 @@ class Naming:
 
 
 def words_in(node: str) -> list[str]:
-    """List the words in a node's name: no numbers, ids, hexadecimal digits, or what exporters say of everything.
-
-    Parameters
-    ----------
-    node : str
-        ``"StreetLamp.012"`` or ``"City_c3e0b"``.
-
-    Returns
-    -------
-    list of str
-        In lower case: ``["street", "lamp"]``, ``["city"]``; empty where nothing of it is a word.
-    """
+    """List the words in a node's name: no numbers, ids, hexadecimal digits, or what exporters say of everything."""
     split = re.sub(r"([a-z])([A-Z])", r"\1 \2", node)
     tokens = [token for token in re.split(r"[^A-Za-z0-9]+", split) if token]
     words = [word for word in map(_word, tokens) if word]
@@ -126,11 +101,6 @@ def read_names(path: Path) -> Naming:
     A pattern is a glob on the file's node names, case and all. ``name`` is what a person says; ``category`` its kind,
     made of the name where empty; ``plural`` is ``yes`` where the name is of many ("leaves"), or the words that make
     one thing of them ("a row of"), and may be left out, as may ``category``.
-
-    Raises
-    ------
-    AssetError
-        The file cannot be read, or a row of it makes no sense: which line, and why.
     """
     try:
         check_regular(path)

@@ -43,21 +43,11 @@ _Said = tuple[str, str, Tags]
 
 @dataclass(frozen=True)
 class Feature:
-    """A thing of the map.
-
-    Attributes
-    ----------
-    key : str
-        Where it is: the bounding box of all of it in degrees. Ids depend on who wrote the extract, this does not.
-    shape : shapely geometry
-        Point, LineString or Polygon, degrees; a multipolygon's parts are features of the same key.
-    tags : mapping
-        As mapped.
-    """
+    """A thing of the map."""
 
     key: str
-    shape: Any
-    tags: Tags
+    shape: Any  # Point, LineString or Polygon, degrees; a multipolygon's parts are features of the same key
+    tags: Tags  # As mapped
 
 
 @dataclass(frozen=True)
@@ -71,31 +61,7 @@ class Map:
 
 
 def read_maps(path: Path, boxes: Sequence[Bbox], max_memory_bytes: int = MAX_MEMORY_BYTES) -> list[Map]:
-    """Read what of an extract touches bounding boxes, in one pass; ways and areas whole.
-
-    Parameters
-    ----------
-    path : Path
-        ``.osm.pbf``, or ``.osm`` with or without ``.gz`` or ``.bz2``.
-    boxes : sequence of (west, south, east, north)
-        Degrees.
-    max_memory_bytes : int
-        Most address space of the reading process.
-
-    Returns
-    -------
-    list of Map
-        One a box.
-
-    Raises
-    ------
-    MissingPackage
-        osmium is not installed.
-    UsageError
-        A box lies outside the extract: the message has the extract's.
-    AssetError
-        The file is missing, too large, cut short, or no such file, or it needs too much memory or time.
-    """
+    """Read the features of an extract that touch bounding boxes (degrees), in one pass; ways and areas whole."""
     try:
         importlib.import_module("osmium")
     except ImportError:
@@ -138,19 +104,9 @@ def _part(path: Path, boxes: Sequence[Bbox]) -> str:
 
 
 def read_into(path: Path, out: Path, boxes: Sequence[Bbox]) -> str:
-    """Read an extract without bounds on memory and time: for a process of its own that has them.
+    """Read an extract without bounds, for a child process that has them.
 
-    Parameters
-    ----------
-    path, out : Path
-        The extract, and where what is found goes, as JSON.
-    boxes : sequence of (west, south, east, north)
-        Degrees.
-
-    Returns
-    -------
-    str
-        What is wrong with the file; empty where nothing is.
+    Returns what is wrong, or an empty string.
     """
     try:
         found, extent = _read(importlib.import_module("osmium"), path, boxes)

@@ -26,56 +26,21 @@ _HOLES, _GONE = 0.05, 0.1
 
 @dataclass(frozen=True)
 class Paint:
-    """What a file's material says, before its texture is decoded.
+    """What a file's material says, before its texture is decoded."""
 
-    Attributes
-    ----------
-    name : str
-        Its name, for messages.
-    factor : (r, g, b) of float
-        sRGB, 0-1: the colour, or what a texture is multiplied by, linearly.
-    image : bytes or None
-        The texture's file.
-    missing : str
-        Name of a texture that the file asks for and that is not there; empty where none is.
-    alpha : {"opaque", "mask", "blend"}
-        What the texture's alpha means.
-    cutoff : float
-        Of ``"mask"``.
-    mask : bytes or None
-        A file whose brightness is the texture's alpha.
-    double_sided, unlit : bool
-    """
-
-    name: str
-    factor: tuple[float, float, float] = (GREY[0] / 255, GREY[1] / 255, GREY[2] / 255)
-    image: bytes | None = None
-    missing: str = ""
-    alpha: str = "opaque"
-    cutoff: float = CUTOFF
-    mask: bytes | None = None
+    name: str  # Its name, for messages
+    factor: tuple[float, float, float] = (GREY[0] / 255, GREY[1] / 255, GREY[2] / 255)  # (r, g, b) of float
+    image: bytes | None = None  # The texture's file
+    missing: str = ""  # Name of a texture that the file asks for and that is not there; empty where none is
+    alpha: str = "opaque"  # What the texture's alpha means
+    cutoff: float = CUTOFF  # Of ``"mask"``
+    mask: bytes | None = None  # A file whose brightness is the texture's alpha
     double_sided: bool = False
     unlit: bool = False
 
 
 def surfaces_of(paints: Sequence[Paint], texture_px: int = TEXTURE_PX) -> tuple[tuple[RawSurface, ...], list[int]]:
-    """Decode what materials show.
-
-    Parameters
-    ----------
-    paints : sequence of Paint
-        The file's materials.
-    texture_px : int
-        Longest side of a texture; larger ones are made smaller, and all of them where together they are more than
-        `TEXELS`.
-
-    Returns
-    -------
-    surfaces : tuple of RawSurface
-        In the order of their digests, each once.
-    index : list of int
-        Where each of the paints is among them.
-    """
+    """Decode what materials show."""
     decoded: dict[bytes, tuple[NDArray[Any] | None, str]] = {}
     made = [_surface(paint, decoded) for paint in paints]
     made = _held(made, texture_px)

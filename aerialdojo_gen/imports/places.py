@@ -28,25 +28,13 @@ _MOST_SCENES = 100
 
 @dataclass(frozen=True)
 class Place:
-    """A scene that was made of a real place.
+    """A scene that was made of a real place."""
 
-    Attributes
-    ----------
-    name : str
-        Of the scene.
-    scene : Scene
-        As its recipe is built.
-    recipe, pipeline : Path
-        Files of the project.
-    said : tuple of str
-        What was done, for people.
-    """
-
-    name: str
-    scene: Scene
-    recipe: Path
+    name: str  # Of the scene
+    scene: Scene  # As its recipe is built
+    recipe: Path  # Files of the project
     pipeline: Path
-    said: tuple[str, ...]
+    said: tuple[str, ...]  # What was done, for people
 
 
 def add_map(
@@ -55,48 +43,9 @@ def add_map(
     cell_m: float | None = None, attribution: str = "", seed: int = 0, ceiling_m: float | None = None,
     drive_on: str = "right", force: bool = False,
 ) -> list[Place]:  # fmt: skip
-    """Make towns of an extract of OpenStreetMap, in a project folder.
+    """Make a town a bounding box (degrees, WGS 84) of an OpenStreetMap extract.
 
-    Each becomes a recipe, ``scenes/<name>.toml``: buildings, streets, areas and things in metres, to be read and
-    changed. It is built once before it is kept.
-
-    Parameters
-    ----------
-    name : str
-        Of the scene; of several, what their names begin with (``-1``, ``-2``, … follow).
-    extract : Path
-        ``.osm.pbf`` or another file of OpenStreetMap.
-    project : Path
-        The folder; made where it is missing.
-    bbox : sequence of (west, south, east, north)
-        Degrees, WGS 84; a scene each.
-    tile_m : float, optional
-        Cut every box into squares of this size.
-    dem : Path, optional
-        Height model that the ground is of.
-    cell_m : float, optional
-        Distance of the ground's heights.
-    attribution : str
-        Whose heights they are.
-    seed : int
-        Of what is added by rule.
-    ceiling_m : float, optional
-        Highest z to fly at.
-    drive_on : {"right", "left"}
-        Side of the street that is driven on.
-    force : bool
-        Replace scenes of these names.
-
-    Returns
-    -------
-    list of Place
-
-    Raises
-    ------
-    UsageError
-        A box is none, too large, or outside the extract; a scene exists; osmium or rasterio is not installed.
-    AssetError
-        A file cannot be read, or a recipe cannot be built.
+    Each is built once before it is kept.
     """
     if drive_on not in ("right", "left"):
         raise UsageError(f"--drive-on {drive_on[:20]!r}: right or left")
@@ -133,32 +82,7 @@ def add_terrain(
     sand_m: float | None = None, bare: bool = False, attribution: str = "", seed: int = 0,
     ceiling_m: float | None = None, force: bool = False,
 ) -> Place:  # fmt: skip
-    """Make open country of a height model, in a project folder.
-
-    Parameters
-    ----------
-    name : str
-        Of the scene.
-    dem : Path
-        GeoTIFF, ESRI ASCII grid or NPZ (`aerialdojo_gen.imports.dem.read_dem`).
-    project : Path
-        The folder; made where it is missing.
-    bbox, size_m, cell_m, water_m, snow_m, sand_m, bare, attribution, seed, ceiling_m
-        As `aerialdojo_gen.imports.relief.relief_recipe` takes them.
-    force : bool
-        Replace a scene of this name.
-
-    Returns
-    -------
-    Place
-
-    Raises
-    ------
-    UsageError
-        The part that is asked for has no heights or no size to fly in; the scene exists; rasterio is not installed.
-    AssetError
-        The file cannot be read.
-    """
+    """Make open country of a height model, in a project folder."""
     _check_free([name], project, force)
     model: Dem = read_dem(dem)
     text, said = relief_recipe(

@@ -22,36 +22,16 @@ CORNER = ("u", "v", "red", "green", "blue")
 
 @dataclass(frozen=True, eq=False)
 class RawSurface:
-    """A material of a file.
+    """A material of a file."""
 
-    Attributes
-    ----------
-    name : str
-        As in the file.
-    colour : tuple of int
-        sRGB, 0-255; a texture's mean where it has one.
-    texture : (H, W, 3) uint8 or None
-        sRGB; row 0 is the top (v = 1).
-    mask : (H, W) bool or None
-        Where the texture is there; None where it is everywhere.
-    double_sided : bool
-        Whether it is there from both sides.
-    unlit : bool
-        Whether it is to be drawn without light.
-    jpeg : bytes
-        The texture's file, where that is a JPEG and the texture is just what it decodes to.
-    notes : tuple of str
-        What was lost or changed of it, for the user to read.
-    """
-
-    name: str = ""
-    colour: tuple[int, int, int] = GREY
-    texture: NDArray[np.uint8] | None = None
-    mask: NDArray[np.bool_] | None = None
-    double_sided: bool = False
-    unlit: bool = False
-    jpeg: bytes = b""
-    notes: tuple[str, ...] = ()
+    name: str = ""  # As in the file
+    colour: tuple[int, int, int] = GREY  # sRGB, 0-255; a texture's mean where it has one
+    texture: NDArray[np.uint8] | None = None  # (H, W, 3) uint8 or None; sRGB; row 0 is the top (v = 1)
+    mask: NDArray[np.bool_] | None = None  # Where the texture is there; None where it is everywhere
+    double_sided: bool = False  # Whether it is there from both sides
+    unlit: bool = False  # Whether it is to be drawn without light
+    jpeg: bytes = b""  # The texture's file, where that is a JPEG and the texture is just what it decodes to
+    notes: tuple[str, ...] = ()  # What was lost or changed of it, for the user to read
 
     @cached_property
     def digest(self) -> str:
@@ -65,32 +45,14 @@ class RawSurface:
 
 @dataclass(frozen=True, eq=False)
 class RawNode:
-    """A node of a file: its name and its triangles.
+    """A node of a file: its name and its triangles."""
 
-    Attributes
-    ----------
-    name : str
-        As in the file; empty where it has none.
-    vertices : (n, 3) float64
-        In the file's own axes and units; anything may stand in it, NaN too.
-    faces : (m, 3) int64
-        Indices into `vertices`.
-    colours : (m, 3) uint8
-        sRGB of each face.
-    surface : (m,) int32 or None
-        Index into `surfaces` of each face's material, -1 where it has none but its colour; None where none has one.
-    corners : (m, 3, 5) float32 or None
-        What the corners of each face carry, see `CORNER`: whoever cuts a face finds it at the cut by weighting.
-    surfaces : tuple of RawSurface
-        The file's materials, in the order of their digests; nodes of a file share them.
-    """
-
-    name: str
-    vertices: NDArray[np.float64]
-    faces: NDArray[np.int64]
-    colours: NDArray[np.uint8]
-    surface: NDArray[np.int32] | None = None
-    corners: NDArray[np.float32] | None = None
+    name: str  # As in the file; empty where it has none
+    vertices: NDArray[np.float64]  # In the file's own axes and units; anything may stand in it, NaN too
+    faces: NDArray[np.int64]  # (m, 3) int64; indices into `vertices`
+    colours: NDArray[np.uint8]  # (m, 3) uint8; sRGB of each face
+    surface: NDArray[np.int32] | None = None  # (m,) int32 or None
+    corners: NDArray[np.float32] | None = None  # (m, 3, 5) float32 or None
     surfaces: tuple[RawSurface, ...] = ()
 
     def some(self, rows: NDArray[np.bool_] | NDArray[np.int64]) -> RawNode:

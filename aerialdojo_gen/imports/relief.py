@@ -27,30 +27,9 @@ _HEADROOM_M = 25.0
 def grid(
     dem: Dem, size: tuple[float, float], cell_m: float, frame: LocalFrame | None, middle: tuple[float, float]
 ) -> Floats:
-    """Sample a height model on a square grid about a point.
+    """Sample a height model on a square grid, (rows, columns) metres, rows running north.
 
-    Parameters
-    ----------
-    dem : Dem
-        Heights.
-    size : (float, float)
-        Extent along x and y, metres; whole cells.
-    cell_m : float
-        Distance of neighbouring points, metres.
-    frame : LocalFrame or None
-        Where on earth the grid's middle is; None where the grid has the model's own metres.
-    middle : (x, y)
-        The grid's middle in the model's own metres, without a frame.
-
-    Returns
-    -------
-    (rows, columns) float64
-        Metres, rows running north; what is missing is that of the nearest height there is.
-
-    Raises
-    ------
-    UsageError
-        Less than half of the grid has heights.
+    Gaps take the nearest height.
     """
     columns, rows = (round(s / cell_m) for s in size)
     x, y = np.meshgrid(*((np.arange(n + 1) - n / 2) * cell_m for n in (columns, rows)))
@@ -112,36 +91,7 @@ def relief_recipe(
     water_m: float | None = None, snow_m: float | None = None, sand_m: float | None = None, bare: bool = False,
     seed: int = 0, ceiling_m: float | None = None, attribution: str = "",
 ) -> tuple[str, list[str]]:  # fmt: skip
-    """Write the recipe of a relief.
-
-    Parameters
-    ----------
-    dem : Dem
-        Heights.
-    bbox : (west, south, east, north), optional
-        Part of it, degrees; the whole, or `size` about its middle, where absent.
-    size : (float, float), optional
-        Extent along x and y about the middle, metres.
-    cell_m : float, optional
-        Distance of heights in the scene, metres.
-    water_m, snow_m, sand_m : float, optional
-        There is water up to, snow from, and sand up to this height, metres as in the model.
-    bare : bool
-        Nothing grows or lies about.
-    seed : int
-        Of what does.
-    ceiling_m : float, optional
-        Highest z that a drone may fly at; 25 m over the highest point where absent.
-    attribution : str
-        Whose heights they are.
-
-    Returns
-    -------
-    str
-        The recipe.
-    list of str
-        What was done, for the user to read.
-    """
+    """Write the recipe of a relief (heights in metres), and list what was done."""
     frame, middle, size = _place(dem, bbox, size)
     if not (min(size) >= SMALLEST_M and max(size) <= LARGEST_M):
         raise UsageError(

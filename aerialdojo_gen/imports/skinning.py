@@ -27,35 +27,14 @@ _MIXED = "vertex colours"
 
 @dataclass
 class Skinner:
-    """Makes parts, and the materials that they are of.
+    """Makes parts, and the materials that they are of."""
 
-    Attributes
-    ----------
-    baked : bool
-        Whether textures and vertex colours have their light in them.
-    materials : dict of str to Material
-        What has been used, by name.
-    """
-
-    baked: bool = False
-    materials: dict[str, Material] = field(default_factory=dict)
+    baked: bool = False  # Whether textures and vertex colours have their light in them
+    materials: dict[str, Material] = field(default_factory=dict)  # What has been used, by name
     _scales: dict[str, float] = field(default_factory=dict)
 
     def parts(self, body: RawNode, double_sided: bool) -> tuple[Part, ...]:
-        """Make a body's parts, one a material.
-
-        Parameters
-        ----------
-        body : RawNode
-            Sound: every vertex finite, every index inside.
-        double_sided : bool
-            Whether its faces are there from both sides.
-
-        Returns
-        -------
-        tuple of Part
-            In the order of their materials' names; what has no area in float32 is left out.
-        """
+        """Make a body's parts, one a material, in the order of the materials' names."""
         found: list[tuple[Material, Part]] = []
         kind = _kinds(body)
         plain = kind == _PLAIN
@@ -182,19 +161,7 @@ def _name(material: Material) -> str:
 
 
 def photographed(nodes: Sequence[RawNode]) -> bool:
-    """Guess whether most of a mesh shows photographs of the place, with their light in them, and no patterns.
-
-    Parameters
-    ----------
-    nodes : sequence of RawNode
-        Sound ones.
-
-    Returns
-    -------
-    bool
-        Whether more than half of the area has a texture that hardly covers itself, or vertex colours of which there
-        are more than a few hundred.
-    """
+    """Guess whether most of a mesh shows photographs of the place, with their light in them, and no patterns."""
     whole = painted = 0.0
     shown: dict[str, float] = {}
     flat: dict[str, float] = {}

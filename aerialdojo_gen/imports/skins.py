@@ -25,20 +25,7 @@ class Skin:
 
 
 def skins_of(bodies: Sequence[Any], beside: Beside, texture_px: int) -> list[Skin]:
-    """Say what meshes of one file look like.
-
-    Parameters
-    ----------
-    bodies : sequence of trimesh.Trimesh
-    beside : Beside
-        That the file was read with: it has the textures' files.
-    texture_px : int
-        Longest side of a texture, pixels.
-
-    Returns
-    -------
-    list of Skin
-    """
+    """Describe the materials of the meshes of one file."""
     materials: dict[int, Any] = {}
     for body in bodies:
         material = getattr(body.visual, "material", None)

@@ -36,20 +36,7 @@ _PAGES = (b"<!doctype html", b"<html")
 
 
 def mismatch(path: Path, suffixes: tuple[str, ...]) -> str:
-    """Say what a file is, where it cannot be what its name says.
-
-    Parameters
-    ----------
-    path : Path
-        A file that is there.
-    suffixes : tuple of str
-        Suffixes of the formats that are read.
-
-    Returns
-    -------
-    str
-        What it is and what to do, to follow its name; empty where nothing speaks against its name.
-    """
+    """Say what a file is, where it cannot be what its name says."""
     with path.open("rb") as file:
         head = file.read(_HEAD)
     if not head:

@@ -34,20 +34,7 @@ _PROBES = 12
 
 
 def domes_of(bodies: Sequence[RawNode], called: Sequence[str]) -> list[int]:
-    """Find sky domes: large hollow shells that enclose everything else, and roof it over.
-
-    Parameters
-    ----------
-    bodies : sequence of RawNode
-        z up, metres, every one with triangles.
-    called : sequence of str
-        The category that each has by a table of names; empty where none says it.
-
-    Returns
-    -------
-    list of int
-        Which bodies are, the largest first. A body whose name says what else it is has to be called a sky.
-    """
+    """Find sky domes, the largest first: large hollow shells that enclose everything else and roof it over."""
     found: list[int] = []
     low = np.array([b.vertices.min(axis=0) for b in bodies])
     high = np.array([b.vertices.max(axis=0) for b in bodies])
@@ -93,21 +80,7 @@ def _roofs(body: RawNode, low: Floats, high: Floats) -> bool:
 
 
 def decided(scene: Scene, source_names: dict[str, str]) -> Scene:
-    """Say of every open surface of an imported scene whether it is the ground.
-
-    Parameters
-    ----------
-    scene : Scene
-        Its instances are ``"solid"`` where they are closed, else ``"sheet"``.
-    source_names : dict of str to str
-        By node: what the file calls it.
-
-    Returns
-    -------
-    Scene
-        Sheets that are the ground by their form (`aerialdojo_gen.geometry.ground.Ground.of`), and wide ones that are
-        called so, are ``"ground"``.
-    """
+    """Say of every open surface of an imported scene whether it is the ground."""
     unknown = replace(scene, instances=tuple(replace(i, surface="") for i in scene.instances))
     ground = Ground.of(unknown)
     nodes = frozenset() if ground is None else ground.nodes

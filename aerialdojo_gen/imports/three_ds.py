@@ -24,23 +24,7 @@ _HEAD = struct.Struct("<HI")
 
 
 def read_3ds(data: bytes) -> list[RawNode]:
-    """Read a 3DS file.
-
-    Parameters
-    ----------
-    data : bytes
-        The whole file.
-
-    Returns
-    -------
-    list of RawNode
-        One a triangle object, in the order of the file.
-
-    Raises
-    ------
-    AssetError
-        It is no 3DS file, or it is cut short.
-    """
+    """Read a 3DS file."""
     try:
         chunks = list(_chunks(data, 0, len(data)))
         if not chunks or chunks[0][0] != _MAIN:

@@ -24,24 +24,12 @@ _LEAST_SHARE = 0.02
 
 @dataclass(frozen=True, eq=False)
 class Tile:
-    """A part of a place as a scene.
+    """A part of a place as a scene."""
 
-    Attributes
-    ----------
-    name : str
-        Of its scene: that of the place with its column from the west and row from the south, ``"City-x0y2"``.
-    region : Region
-        The square, in the file's axes, metres.
-    scene : Scene
-        In the frame that all tiles share: their scenes' coordinates lie side by side.
-    repairs : Repairs
-        What was mended; its `origin_m` is the same for all tiles.
-    """
-
-    name: str
-    region: Region
-    scene: Scene
-    repairs: Repairs
+    name: str  # Of its scene: that of the place with its column from the west and row from the south, ``"City-x0y2"``
+    region: Region  # The square, in the file's axes, metres
+    scene: Scene  # In the frame that all tiles share: their scenes' coordinates lie side by side
+    repairs: Repairs  # What was mended; its `origin_m` is the same for all tiles
 
 
 def tiles_of(
@@ -53,26 +41,9 @@ def tiles_of(
     naming: Naming | None = None,
     light: str = "auto",
 ) -> Iterator[Tile]:
-    """Cut a place into squares, west to east and south to north, and make a scene of each that holds something.
+    """Cut a place into squares of `edge_m` metres, west to east and south to north.
 
-    Parameters
-    ----------
-    name : str
-        Of the place; a suffix ``_0`` or ``_1`` stays at the end of every tile's name, as it says its partition.
-    place : Place
-    edge_m : float
-        Edge of a square, metres.
-    ceiling_m, naming, light
-        As of `adopt`; where absent each tile's ceiling is 6 m over its own highest point.
-
-    Yields
-    ------
-    Tile
-
-    Raises
-    ------
-    AssetError
-        The edge is too small or too large, or there are too many squares.
+    A scene of each that holds something.
     """
     if not (math.isfinite(edge_m) and SMALLEST_M <= edge_m <= LARGEST_M):
         raise UsageError(f"--tiles {edge_m:g}: the edge of a tile is {SMALLEST_M:g} to {LARGEST_M:g} m")

@@ -8,17 +8,7 @@ from typing import Any
 
 
 def recipe_text(head: Mapping[str, Any], parameters: Mapping[str, Any], comments: tuple[str, ...] = ()) -> str:
-    """Write a recipe.
-
-    Parameters
-    ----------
-    head : mapping
-        Keys of the recipe but `parameters`.
-    parameters : mapping
-        Numbers, texts, truth values, lists and tables; a list of tables becomes ``[[parameters.key]]``.
-    comments : tuple of str
-        Lines to begin with.
-    """
+    """Write a recipe."""
     # A file's name may have any character in it, a new line too.
     lines = ["# " + "".join(c if c.isprintable() else "?" for c in line) for line in comments]
     lines += [f"{key} = {toml_value(value)}" for key, value in head.items()]

@@ -13,20 +13,9 @@ Floats = NDArray[np.float64]
 
 
 def blocked(space: FlightSpace, poses: ArrayLike) -> tuple[NDArray[np.bool_], NDArray[np.bool_], Floats]:
-    """Say which actions are blocked at some poses.
+    """For poses (n, 4) and the 16 actions.
 
-    Parameters
-    ----------
-    space : FlightSpace
-    poses : (n, 4) float
-        x, y, z in metres and yaw in radians, world frame; free of collision.
-
-    Returns
-    -------
-    collides, refused : (n, 16) bool
-        The action touches a surface; it would leave the flight volume, and moves nothing. Turns and Stop do neither.
-    ends : (n, 16, 3) float64
-        Where actions lead, metres, world frame: one that collides as if there were nothing, a refused one nowhere.
+    Whether each collides or is refused, (n, 16), and where it leads, (n, 16, 3).
     """
     p = np.asarray(poses, np.float64).reshape(-1, 4)
     c, s = np.cos(p[:, 3])[:, None], np.sin(p[:, 3])[:, None]

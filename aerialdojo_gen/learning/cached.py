@@ -38,38 +38,16 @@ _RECOUNT = 256 << 20
 
 @dataclass(frozen=True)
 class Store:
-    """Where pictures are kept.
+    """Where pictures are kept."""
 
-    Attributes
-    ----------
-    base : Path
-        Pictures that are made in another way have another folder in it.
-    most_bytes : int
-        How large the folder of one way may grow.
-    source, renderer : str
-        Where pictures come from, and what draws them.
-    """
-
-    base: Path
-    most_bytes: int
-    source: str
+    base: Path  # Pictures that are made in another way have another folder in it
+    most_bytes: int  # How large the folder of one way may grow
+    source: str  # Where pictures come from, and what draws them
     renderer: str
 
 
 class Cached:
-    """Pictures of a source, kept in a folder.
-
-    Parameters
-    ----------
-    source : Source
-        Where pictures come from that are not there.
-    index : Index
-    sensors : Sensors
-    store : Store
-        Where, and how much.
-    meshes : dict of str to str
-        SHA-256 of the scenes' meshes.
-    """
+    """Pictures of a source, kept in a folder."""
 
     def __init__(
         self, source: Source, index: Index, sensors: Sensors, store: Store, meshes: dict[str, str]
@@ -192,13 +170,7 @@ class Cached:
 
 
 def pictures_folder(store: Store, sensors: Sensors) -> Path:
-    """Return the folder of pictures that are made in one way, made where it is not there.
-
-    Raises
-    ------
-    StoreError
-        The folder cannot be made.
-    """
+    """Return the folder of pictures that are made in one way, made where it is not there."""
     s = sensors
     facts = {
         "code": [code_of(f"aerialdojo_gen.rendering.{name}").digest for name in ("bodies", "gl", "world", "reader")],

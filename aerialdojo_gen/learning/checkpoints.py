@@ -23,28 +23,14 @@ _FORMAT = "aerialdojo-gen policy 1"
 
 @dataclass(frozen=True)
 class About:
-    """What a policy is made for: it stands in the file beside the weights.
+    """What a policy is made for: it stands in the file beside the weights."""
 
-    Attributes
-    ----------
-    shape : dict
-        `aerialdojo_gen.learning.network.Shape`.
-    vocabulary : Vocabulary
-    sensors : Sensors
-    release : str
-        Fingerprint of the release that it learned from.
-    actions : str
-        Fingerprint of the action set.
-    named : tuple of str
-        Words that pictures are searched for.
-    """
-
-    shape: dict[str, Any]
+    shape: dict[str, Any]  # `aerialdojo_gen.learning.network.Shape`
     vocabulary: Vocabulary
     sensors: Sensors
-    release: str
-    actions: str
-    named: tuple[str, ...] = ()
+    release: str  # Fingerprint of the release that it learned from
+    actions: str  # Fingerprint of the action set
+    named: tuple[str, ...] = ()  # Words that pictures are searched for
 
     def as_text(self) -> str:
         """Return it as JSON."""
@@ -57,17 +43,7 @@ class About:
 
 
 def write(path: Path, tensors: Mapping[str, Any], about: About, state: Mapping[str, Any] | None = None) -> None:
-    """Write tensors with what they belong to.
-
-    Parameters
-    ----------
-    path : Path
-        ``.safetensors``; replaced where it is there.
-    tensors : mapping of str to torch.Tensor
-    about : About
-    state : mapping, optional
-        JSON: where a training is.
-    """
+    """Write tensors with what they belong to."""
     make_folder(path.parent)
     named = {name: tensor.detach().cpu().contiguous() for name, tensor in tensors.items()}
     text = {"format": _FORMAT, "about": about.as_text(), "state": json.dumps(dict(state or {}))}
@@ -76,21 +52,7 @@ def write(path: Path, tensors: Mapping[str, Any], about: About, state: Mapping[s
 
 
 def read(path: str | Path) -> tuple[dict[str, Any], About, dict[str, Any]]:
-    """Read what `write` wrote.
-
-    Returns
-    -------
-    tensors : dict of str to torch.Tensor
-    about : About
-    state : dict
-
-    Raises
-    ------
-    UsageError
-        There is no such file, or it is of another action set.
-    StoreError
-        It is damaged, or no policy.
-    """
+    """Read what `write` wrote."""
     torch_package()
     if not Path(path).is_file():
         raise UsageError(f"there are no weights {path}: run {command('train', 'imitation')}")

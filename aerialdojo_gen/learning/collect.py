@@ -35,21 +35,7 @@ def parts_of(
     data: DataRoot, index: Index, folder: Path, selection: tuple[tuple[str, ...], tuple[str, ...]], sensors: Sensors,
     size_px: int, seed: int, renderer: str, flying: Flying | None = None,
 ) -> list[Part]:  # fmt: skip
-    """Share trajectories out; a part's folder is named by all that shapes what will be in it.
-
-    Parameters
-    ----------
-    data : DataRoot
-    index : Index
-    folder : Path
-        Parts are folders in it.
-    selection : tuple
-        Splits and settings that the index was read by.
-    sensors, size_px, renderer, flying
-        As for `Part`.
-    seed : int
-        Of the draw of trajectories.
-    """
+    """Share trajectories out; a part's folder is named by all that shapes what will be in it."""
     # References are what they are whatever network flies later.
     modules = ["rendering.gl", "learning.parts", *(["learning.flights"] if flying is not None else [])]
     code = [code_of(f"aerialdojo_gen.{name}").digest for name in modules]
@@ -100,13 +86,7 @@ def survey_parts(
 
 
 def collect(parts: Sequence[Part], executor: Executor, reporter: Reporter, what: str) -> list[Steps]:
-    """Make the parts that are not there, and read them all.
-
-    Raises
-    ------
-    AerialDojoError
-        A part failed, or a worker was killed: what is finished is kept.
-    """
+    """Make the parts that are not there, and read them all."""
     todo = [part for part in parts if not is_written(part.folder)]
     if todo:
         unit = "trajectories" if todo[0].survey is None else "looks"

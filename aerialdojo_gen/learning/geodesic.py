@@ -28,13 +28,7 @@ _KEPT = 8
 
 
 class Geodesic:
-    """Lengths of shortest ways to the goals of a scene.
-
-    Parameters
-    ----------
-    space : FlightSpace
-        The scene and its grid: ways lead where the environment lets the body fly.
-    """
+    """Lengths of shortest ways to the goals of a scene."""
 
     def __init__(self, space: FlightSpace) -> None:
         self._space, self._grid = space, space.grid
@@ -43,42 +37,18 @@ class Geodesic:
         self._fields: OrderedDict[tuple[float, ...], NDArray[np.float32]] = OrderedDict()
 
     def distances_m(self, goal: ArrayLike, points: ArrayLike) -> Floats:
-        """Lengths of the shortest ways from points to a goal, in the planner's metric.
+        """Shortest way lengths (n,), metres in the action metric, from points (n.
 
-        Parameters
-        ----------
-        goal : (3,) float
-            Metres, world frame.
-        points : (n, 3) float
-            Metres, world frame.
-
-        Returns
-        -------
-        (n,) float64
-            Metres, horizontal and vertical ones added as actions fly them; at least the straight distance, infinite
-            where no way of up to 200 m leads. Ways run over a grid of half a metre: to within a percent or so.
+        3) to a goal over a half-metre grid; inf for none.
         """
         g, p = np.asarray(goal, np.float64), np.asarray(points, np.float64).reshape(-1, 3)
         found = np.asarray(costs_at(np.ascontiguousarray(p), self._grid.arrays, self._field(g)))
         return np.maximum(found, np.linalg.norm(p - g, axis=1))
 
     def actions(self, goal: ArrayLike, poses: ArrayLike) -> tuple[NDArray[np.bool_], NDArray[np.bool_], Floats]:
-        """What each of the 16 actions would do at some poses.
+        """For poses (n, 4) and the 16 actions: whether each collides or is refused, and the cost-to-go in metres.
 
-        Parameters
-        ----------
-        goal : (3,) float
-            Metres, world frame.
-        poses : (n, 4) float
-            x, y, z in metres and yaw in radians, world frame; free of collision.
-
-        Returns
-        -------
-        collides, refused : (n, 16) bool
-            The action touches a surface; it would leave the flight volume, and moves nothing.
-        cost_to_go_m : (n, 16) float64
-            Shortest way from where the action leads; infinite where it collides. A refused one leads nowhere else;
-            a turn and Stop cost what the pose itself does.
+        (n, 16) each.
         """
         collides, refused, ends = blocked(self._space, poses)
         cost = self.distances_m(goal, ends.reshape(-1, 3)).reshape(-1, N_ACTIONS)

@@ -29,20 +29,10 @@ _RESIDENT = 0.7
 
 @dataclass
 class Progress:
-    """Where a training is: JSON, for a checkpoint.
+    """Where a training is: JSON, for a checkpoint."""
 
-    Attributes
-    ----------
-    phase : int
-        -1 for what objects look like, 0 for the references, then the round of DAgger.
-    epoch, batch : int
-        Of the phase; batches that are done.
-    sums : list of float
-        Of the epoch so far: loss, right actions, steps.
-    """
-
-    phase: int = 0
-    epoch: int = 0
+    phase: int = 0  # -1 for what objects look like, 0 for the references, then the round of DAgger
+    epoch: int = 0  # Of the phase; batches that are done
     batch: int = 0
     sums: list[float] = field(default_factory=lambda: [0.0, 0.0, 0.0])
 
@@ -68,23 +58,11 @@ class Epoch:
 
 @dataclass(frozen=True)
 class Assessed:
-    """How well a network does on steps that it was not trained on.
-
-    Attributes
-    ----------
-    accuracy : float
-        Share of steps at which its likeliest action, by where it thinks the goal to be, is the teacher's.
-    goal_off_m : float
-        Median distance between where the goal is and where it is thought to be, metres.
-    goal_off_at_start_m : float
-        That at the first steps of episodes.
-    blocked_told, free_told : float or None
-        Share of blocked actions, and of free ones, that it takes for such; None where there are none.
-    """
+    """How well a network does on steps that it was not trained on."""
 
     accuracy: float
-    goal_off_m: float
-    goal_off_at_start_m: float
+    goal_off_m: float  # Median distance between where the goal is and where it is thought to be, metres
+    goal_off_at_start_m: float  # That at the first steps of episodes
     blocked_told: float | None
     free_told: float | None
 
@@ -92,20 +70,9 @@ class Assessed:
 def epoch_batches(
     lengths: NDArray[np.int64], most_steps: int, seed: int, phase: int, epoch: int
 ) -> list[NDArray[np.int64]]:
-    """Put episodes into batches of like lengths, shuffled; the same for one seed, phase and epoch.
+    """Batches of episodes of like lengths, shuffled by (seed, phase, epoch).
 
-    Parameters
-    ----------
-    lengths : (n,) int64
-        Steps of the episodes.
-    most_steps : int
-        Of a batch, padding among them; a longer episode is a batch of its own.
-    seed, phase, epoch : int
-
-    Returns
-    -------
-    list of (k,) int64
-        Episodes.
+    At most `most_steps` steps each, padding included.
     """
     draw = rng.generator(seed, "learning batches", phase, epoch)
     order = draw.permutation(np.flatnonzero(lengths > 0))
@@ -128,15 +95,7 @@ def touched(logits: Any, blocked: Any) -> Any:
 
 
 class Learner:
-    """A network, its optimiser, and what it learns by.
-
-    Parameters
-    ----------
-    network : Network
-    recipe : Recipe
-    device : str
-        ``cpu`` or ``cuda``.
-    """
+    """A network, its optimiser, and what it learns by."""
 
     def __init__(self, network: Network, recipe: Recipe, device: str) -> None:
         self.torch = torch_package()
@@ -200,22 +159,9 @@ class Learner:
         after: Callable[[Epoch], None],
         tick: Callable[[int, int, float, float], None],
     ) -> None:
-        """Go through a phase's epochs, from where the progress is.
+        """Train through a phase's epochs, from where the progress is.
 
-        Parameters
-        ----------
-        pool : Pool
-        survey : Pool, optional
-            Looks about, for the map beside the episodes' own pictures.
-        kept_back : (n,) bool
-            Episodes that are not learned from.
-        epochs : int
-        learning_rate : float
-            The highest.
-        after : callable
-            Called after each epoch.
-        tick : callable
-            Called after each batch with its number of all, how many there are, its loss and its accuracy.
+        `kept_back`, (n,) bool, are not learned from.
         """
         self.share_cores()
         anywhere = np.flatnonzero(np.repeat(~kept_back, pool.lengths))

@@ -29,38 +29,16 @@ _TOLD = ("target_name", "landmark", "direction")
 
 @dataclass(frozen=True, eq=False)
 class Index:
-    """The trajectories of a selection, sorted by scene and navigation task.
+    """The trajectories of a selection, sorted by scene and navigation task."""
 
-    Attributes
-    ----------
-    scenes : tuple of str
-        Their scenes, sorted.
-    scene : (n,) int32
-        Of every trajectory, an index of `scenes`.
-    nav_id : list of str
-    actions : (m,) int8
-        Of all trajectories one after the other: 0 to 15, the last of each a Stop.
-    first : (n + 1,) int64
-        Where each trajectory's begin.
-    start : (n, 4) float64
-        Start poses: x, y, z in metres and yaw in radians, world frame.
-    goal : (n, 3) float64
-        Goal anchors, metres, world frame.
-    budget : (n,) int32
-        Most actions, Stop included.
-    told : dict of str to list
-        ``target_name``, ``landmark``, ``direction``, ``description`` (None without a semantic instance) and
-        ``reference_image_id`` (None without an image instance).
-    """
-
-    scenes: tuple[str, ...]
-    scene: NDArray[np.int32]
+    scenes: tuple[str, ...]  # Their scenes, sorted
+    scene: NDArray[np.int32]  # (n,) int32; of every trajectory, an index of `scenes`
     nav_id: list[str]
-    actions: NDArray[np.int8]
-    first: NDArray[np.int64]
-    start: NDArray[np.float64]
-    goal: NDArray[np.float64]
-    budget: NDArray[np.int32]
+    actions: NDArray[np.int8]  # (m,) int8; of all trajectories one after the other: 0 to 15, the last of each a Stop
+    first: NDArray[np.int64]  # (n + 1,) int64; where each trajectory's begin
+    start: NDArray[np.float64]  # (n, 4) float64; start poses: x, y, z in metres and yaw in radians, world frame
+    goal: NDArray[np.float64]  # (n, 3) float64; goal anchors, metres, world frame
+    budget: NDArray[np.int32]  # (n,) int32; most actions, Stop included
     told: dict[str, list[str | None]]
 
     def __len__(self) -> int:
@@ -107,28 +85,7 @@ class Index:
 
 
 def read_index(root: DataRoot, selection: Selection, target_split: str | None = None) -> Index:
-    """Read the trajectories of a selection.
-
-    Parameters
-    ----------
-    root : DataRoot
-        With a release.
-    selection : Selection
-        Of tasks; the two instances of a navigation task are one trajectory, and a limit counts trajectories.
-    target_split : str, optional
-        ``train`` or ``test`` of the split by objects.
-
-    Returns
-    -------
-    Index
-
-    Raises
-    ------
-    UsageError
-        No task fits, or the release has no split by objects.
-    StoreError
-        There is no release, a part of it is damaged, or tasks and routes do not belong together.
-    """
+    """Read the trajectories of a selection."""
     if target_split is not None and target_split not in _SIDES:
         raise UsageError(unknown("no side of the split by objects", target_split, _SIDES))
     chosen = select(root, selection)

@@ -20,37 +20,13 @@ NO_ACTION = N_ACTIONS
 
 
 class Labels:
-    """Labels of a selection's trajectories.
-
-    Parameters
-    ----------
-    root : DataRoot
-        With the meshes, for what is privileged.
-    index : Index
-    privileged : tuple of str
-        Of `PRIVILEGED`.
-    """
+    """Labels of a selection's trajectories."""
 
     def __init__(self, root: DataRoot, index: Index, privileged: tuple[str, ...]) -> None:
         self._root, self.index, self.privileged = root, index, privileged
 
     def of(self, rows: NDArray[np.int64], steps: NDArray[np.int64], mask: NDArray[np.bool_]) -> dict[str, Any]:
-        """Label windows of steps.
-
-        Parameters
-        ----------
-        rows : (n,) int64
-            Trajectories.
-        steps : (n, T) int64
-            Steps of each.
-        mask : (n, T) bool
-            Which of them there are; where not, labels are 0.
-
-        Returns
-        -------
-        dict of str to (n, T, ...) array
-            See `aerialdojo_gen.learning.trajectories.Trajectories`.
-        """
+        """Labels of windows of steps (n, T), by name; 0 where the mask is false."""
         index = self.index
         n, window = steps.shape
         out: dict[str, Any] = {

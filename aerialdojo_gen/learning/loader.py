@@ -90,13 +90,7 @@ class Loader:
         return len(self._data.order(self._batch_size, **self._how))
 
     def __iter__(self) -> Iterator[dict[str, Any]]:
-        """Yield what is left of the epoch; the next iteration is the next epoch.
-
-        Raises
-        ------
-        WorkerDied
-            A worker was killed.
-        """
+        """Yield what is left of the epoch; the next iteration is the next epoch."""
         order = self._data.order(
             self._batch_size, seed=self._seed, epoch=self.epoch, start=self.batches_done, **self._how
         )

@@ -15,32 +15,13 @@ _SMALL = frozenset({"a", "an", "and", "at", "by", "for", "from", "in", "of", "on
 
 
 def naming_words(names: Iterable[str], at_least: int = 2) -> tuple[str, ...]:
-    """Collect the words of objects' names that occur in enough of them, by the alphabet.
-
-    Parameters
-    ----------
-    names : iterable of str
-        Each object's once.
-    at_least : int
-        Objects that a word names.
-    """
+    """Collect the words of objects' names that occur in enough of them, by the alphabet."""
     counted = Counter(word for name in names for word in set(words_of(name)))
     return tuple(sorted(w for w, n in counted.items() if n >= at_least and w.isalpha() and w not in _SMALL))
 
 
 def named_by(names: Sequence[str], words: Sequence[str]) -> NDArray[np.float32]:
-    """Say which words name objects.
-
-    Parameters
-    ----------
-    names : sequence of str
-    words : sequence of str
-
-    Returns
-    -------
-    (n, words) float32
-        Each row sums to 1, or is 0 where no word of the name is known.
-    """
+    """Which words name objects: (n, words) float32, rows sum to 1 or are 0 where no word is known."""
     place = {word: k for k, word in enumerate(words)}
     out = np.zeros((len(names), len(words)), np.float32)
     for row, name in zip(out, names, strict=True):

@@ -31,33 +31,17 @@ _NEVER = 1e6
 
 @dataclass(frozen=True)
 class Shape:
-    """Sizes of a network.
+    """Sizes of a network."""
 
-    Attributes
-    ----------
-    words : int
-        Numbers of the vocabulary, padding and the unknown word among them.
-    views, size_px : int
-        Pictures of a step, and their edge.
-    scenes : int
-        That are learned.
-    channels : tuple of int
-        Of the CNN's three layers: of patches of 4 x 4 pixels, then of two convolutions that halve.
-    features, word_features, hidden : int
-        See `aerialdojo_gen.learning.recipe.ModelConfig`.
-    named : int
-        Words that pictures are searched for; without any there is nothing that searches.
-    """
-
-    words: int
-    views: int
+    words: int  # Numbers of the vocabulary, padding and the unknown word among them
+    views: int  # Pictures of a step, and their edge
     size_px: int
-    scenes: int
+    scenes: int  # That are learned
     channels: tuple[int, int, int]
-    features: int
+    features: int  # See `aerialdojo_gen.learning.recipe.ModelConfig`
     word_features: int
     hidden: int
-    named: int = 0
+    named: int = 0  # Words that pictures are searched for; without any there is nothing that searches
 
     def as_json(self) -> dict[str, Any]:
         """Return it as plain values."""
@@ -65,39 +49,16 @@ class Shape:
 
 
 class Thought(NamedTuple):
-    """What comes out.
+    """What comes out."""
 
-    Attributes
-    ----------
-    logits : (n, T, 16)
-        Of the actions.
-    blocked : (n, T, 16)
-        Logits of each action's touching a surface or leaving the flight volume.
-    guess : Guess
-        Where the goal is thought to be, or was said to be.
-    """
-
-    logits: Any
-    blocked: Any
-    guess: Guess
+    logits: Any  # (n, T, 16); of the actions
+    blocked: Any  # (n, T, 16); logits of each action's touching a surface or leaving the flight volume
+    guess: Guess  # Where the goal is thought to be, or was said to be
 
     def actions(self, back: Any) -> Any:
-        """Choose the likeliest action that leads somewhere; Stop where the goal is thought to be within 2 m.
+        """Choose the likeliest free action, (n, T); Stop within 2 m of the goal estimate.
 
-        An action's chance counts with that of its being free: one collision ends an episode, and who imitates is
-        never told so. A reference stops at one of many steps, and where a body has strayed the planner hardly ever
-        says so: by the actions' chances alone a policy learns to fly on for ever. And who is torn between two turns
-        makes them in turn for ever: where the likeliest action leads back, the likeliest translation that does not is
-        taken.
-
-        Parameters
-        ----------
-        back : (n, T, 16) bool
-            Which actions lead back: `aerialdojo_gen.learning.seen.Reckoning.back`.
-
-        Returns
-        -------
-        (n, T) int64
+        Never a turn that leads back.
         """
         free = functional.logsigmoid(-self.blocked.float())
         moving = self.logits.float() + CAUTION * free
@@ -118,10 +79,6 @@ class Network(nn.Module):  # type: ignore[misc]  # torch is looked at by no type
     map or no more than the action before, went on turning once it had begun to turn, for that is what references do
     (the copycat problem of imitation learning: Wen et al. 2020). The planner needs none: its route from a pose
     depends on nothing before.
-
-    Parameters
-    ----------
-    shape : Shape
     """
 
     def __init__(self, shape: Shape) -> None:
@@ -170,44 +127,16 @@ class Network(nn.Module):  # type: ignore[misc]  # torch is looked at by no type
         return self.eye(patches.permute(0, 3, 1, 2))
 
     def understand(self, tokens: Any, images: Any, told_by_image: Any) -> Any:
-        """Encode goals.
-
-        Parameters
-        ----------
-        tokens : (n, length) int64
-        images : (n, H, W, 4) uint8
-            Black where the goal has none.
-        told_by_image : (n,) bool
-
-        Returns
-        -------
-        (n, features)
-        """
+        """Encode goals from tokens (n, length) and pictures (n, H, W, 4) uint8; (n, features)."""
         said = functional.relu(self.phrase(self.words(tokens).transpose(1, 2)))
         said = said.masked_fill((tokens == 0)[:, None], 0.0).amax(dim=2)
         shown = self.look(images) * told_by_image[:, None]
         return self.goal(torch.cat([said, shown, told_by_image[:, None].float()], dim=1))
 
     def forward(self, pictures: Any, goal: Any, odometry: Any, mask: Any, memory: Any = None) -> tuple[Thought, Any]:
-        """Choose actions for steps of episodes.
+        """Policy outputs for steps (n, T) of episodes, and the memory (n, sums) after them.
 
-        Parameters
-        ----------
-        pictures : (m, views, H, W, 4) uint8 or None
-            Of the steps that the mask has, row after row.
-        goal : (n, features)
-            Of the episodes.
-        odometry : (n, T, 4) float32
-            x ahead, y left, z up in metres and yaw in radians, in the frame of the start.
-        mask : (n, T) bool
-            Which steps there are: those of an episode come first.
-        memory : (n, sums), optional
-            Of the steps before; `blank` where absent.
-
-        Returns
-        -------
-        Thought
-        memory : (n, sums)
+        Odometry in the start's frame.
         """
         memory = self.blank(len(mask)).to(odometry.device) if memory is None else memory
         seen = self.features(pictures, goal, mask)

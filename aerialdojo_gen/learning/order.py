@@ -18,33 +18,7 @@ from aerialdojo_gen.errors import UsageError
 
 
 class Order:
-    """The batches of one epoch, as lists of sample numbers: a batch sampler for ``torch.utils.data.DataLoader``.
-
-    Parameters
-    ----------
-    scene : (n,) int
-        Scene of every trajectory.
-    first : (n + 1,) int64
-        Number of each trajectory's first sample; the last is the number of samples.
-    batch_size : int
-    seed, epoch : int
-        The order depends on these two, and on nothing that happened before.
-    start : int
-        Begin at this batch: what is left of an epoch that was broken off.
-    block : int
-        Samples of a scene that are drawn before the next scene is, about.
-    streams : int
-        Scenes that batches come from in turn.
-    shuffle : bool
-        False for the order of the numbers.
-    drop_last : bool
-        Leave out a last batch that is not full.
-
-    Attributes
-    ----------
-    how : dict
-        ``block``, ``streams``, ``shuffle`` and ``drop_last``: with another one, batches are others.
-    """
+    """The batches of one epoch, as lists of sample numbers: a batch sampler for ``torch.utils.data.DataLoader``."""
 
     def __init__(
         self,

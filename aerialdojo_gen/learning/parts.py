@@ -29,81 +29,40 @@ from aerialdojo_gen.store.root import DataRoot
 
 @dataclass(frozen=True)
 class Flying:
-    """A round of DAgger.
+    """A round of DAgger."""
 
-    Attributes
-    ----------
-    weights : Path
-        Of the policy that flies.
-    sha256 : str
-        Of that file.
-    seed, round : int
-        Of the draws.
-    teacher_share : float
-        Steps at which the teacher's action is flown.
-    """
-
-    weights: Path
-    sha256: str
-    seed: int
+    weights: Path  # Of the policy that flies
+    sha256: str  # Of that file
+    seed: int  # Of the draws
     round: int
-    teacher_share: float
+    teacher_share: float  # Steps at which the teacher's action is flown
 
 
 @dataclass(frozen=True)
 class Survey:
-    """Looks about in a scene.
+    """Looks about in a scene."""
 
-    Attributes
-    ----------
-    looks : int
-        How many.
-    seed, number : int
-        Of the draws; of this part among those of its scene.
-    target_split : str or None
-        Side of the split by objects whose references are followed.
-    """
-
-    looks: int
-    seed: int
+    looks: int  # How many
+    seed: int  # Of the draws; of this part among those of its scene
     number: int
-    target_split: str | None
+    target_split: str | None  # Side of the split by objects whose references are followed
 
 
 @dataclass(frozen=True)
 class Part:
-    """Trajectories of one scene.
-
-    Attributes
-    ----------
-    data : DataRoot
-    splits, settings : tuple of str
-        Where they are found.
-    scene : str
-    nav_ids : tuple of str
-    sensors : Sensors
-    size_px : int
-        Edge of the goals' pictures.
-    renderer : str
-    folder : Path
-        Where to; named by what is in it.
-    flying : Flying, optional
-        None for the references.
-    survey : Survey, optional
-        Looks about instead of trajectories.
-    """
+    """Trajectories of one scene."""
 
     data: DataRoot
-    splits: tuple[str, ...]
+    splits: tuple[str, ...]  # Where they are found
     settings: tuple[str, ...]
     scene: str
     nav_ids: tuple[str, ...]
     sensors: Sensors
-    size_px: int
+    size_px: int  # Edge of the goals' pictures
     renderer: str
-    folder: Path
-    flying: Flying | None = None
-    survey: Survey | None = None
+    folder: Path  # Where to; named by what is in it
+    flying: Flying | None = None  # None for the references
+    survey: Survey | None = None  # Looks about instead of trajectories
 
     @property
     def label(self) -> str:

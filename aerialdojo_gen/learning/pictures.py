@@ -28,18 +28,10 @@ _OPEN = 16
 
 @dataclass(frozen=True, eq=False)
 class Frames:
-    """What the chosen views show at some poses.
+    """What the chosen views show at some poses."""
 
-    Attributes
-    ----------
-    rgb : (n, views, H, W, 3) uint8 or None
-        sRGB.
-    depth_m : (n, views, H, W) float32 or None
-        Planar depth, metres; 0 where there is nothing within range.
-    """
-
-    rgb: NDArray[np.uint8] | None
-    depth_m: NDArray[np.float32] | None
+    rgb: NDArray[np.uint8] | None  # (n, views, H, W, 3) uint8 or None; sRGB
+    depth_m: NDArray[np.float32] | None  # Planar depth, metres; 0 where there is nothing within range
 
     def take(self, rows: NDArray[np.int64]) -> Frames:
         """Keep some poses, in their order."""
@@ -57,16 +49,7 @@ class Source(Protocol):
 
 
 class Drawn:
-    """Pictures drawn when they are asked for, as the environment and `render` draw them.
-
-    Parameters
-    ----------
-    root : DataRoot
-    index : Index
-    sensors : Sensors
-    renderer : str
-        As for `aerialdojo_gen.rendering.backend.open_renderer`.
-    """
+    """Pictures drawn when they are asked for, as the environment and `render` draw them."""
 
     def __init__(self, root: DataRoot, index: Index, sensors: Sensors, renderer: str) -> None:
         self._root, self._index, self._sensors, self._renderer = root, index, sensors, renderer
@@ -83,16 +66,7 @@ class Drawn:
 
 
 class Recorded:
-    """Pictures read from recordings, made smaller; what has none is drawn.
-
-    Parameters
-    ----------
-    root : DataRoot
-    index : Index
-    sensors : Sensors
-    drawn : Source
-        For trajectories that have no recording.
-    """
+    """Pictures read from recordings, made smaller; what has none is drawn."""
 
     def __init__(self, root: DataRoot, index: Index, sensors: Sensors, drawn: Source) -> None:
         self._root, self._index, self._sensors, self._drawn = root, index, sensors, drawn
@@ -148,12 +122,9 @@ def within(depth_m: NDArray[np.float32], sensors: Sensors) -> NDArray[np.float32
 
 
 def recorded_frames(root: DataRoot, scene: str, sensors: Sensors) -> dict[str, int]:
-    """Count the frames of those recordings of a scene that have all views asked for, of the same field of view.
+    """Count, by ``nav_id``, the frames of recordings that have all views asked for.
 
-    Returns
-    -------
-    dict of str to int
-        By ``nav_id``; those with a frame a trajectory pose alone, and without quality flags.
+    One frame a pose and no quality flags.
     """
     if not root.list("recordings", f"{scene}/*.parquet"):
         return {}

@@ -24,26 +24,7 @@ _LONGEST = 1024
 
 
 class Policy(AgentBase):
-    """Flies what a network says, the most likely action at each step.
-
-    Parameters
-    ----------
-    weights : str
-        A file that `aerialdojo-gen train` wrote.
-    any_release : bool
-        Fly in a release of other scenes than the one that it learned from.
-    device : str
-        ``cpu``, or ``cuda``.
-    sha256 : str, optional
-        Of the file, which the run then has in its log; other weights are refused.
-
-    Raises
-    ------
-    UsageError
-        There is no PyTorch, no such file, or it is of another action set.
-    StoreError
-        The file is damaged.
-    """
+    """Flies what a network says, the most likely action at each step."""
 
     def __init__(
         self, weights: str = "", any_release: bool = False, device: str = "cpu", sha256: str | None = None
@@ -70,13 +51,7 @@ class Policy(AgentBase):
         return {"sha256": self._sha256}
 
     def suits(self, release: str) -> None:
-        """Refuse a release of other scenes.
-
-        Raises
-        ------
-        UsageError
-            It is another one, and `any_release` is not set.
-        """
+        """Refuse a release of other scenes."""
         if release != self._about.release and not self._any_release:
             raise UsageError(
                 f"{self._weights} learned from another release: its fingerprint is {self._about.release[:16]}, and "

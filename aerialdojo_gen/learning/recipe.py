@@ -133,18 +133,7 @@ class Recipe(Section):
 
 
 def recipe_file(given: str | Path) -> Path:
-    """Find a recipe: as a path, else by its name among those that come with the program.
-
-    Parameters
-    ----------
-    given : str or Path
-        A path, or a name such as ``imitation``; what is at that path goes before what has that name.
-
-    Raises
-    ------
-    ConfigError
-        There is neither; the message lists the names.
-    """
+    """Find a recipe: as a path, else by its name among those that come with the program."""
     path, shipped = Path(given), home() / "pipelines" / "baselines"
     if path.is_file():
         return path
@@ -155,18 +144,7 @@ def recipe_file(given: str | Path) -> Path:
 
 
 def load_recipe(file: str | Path) -> Recipe:
-    """Read and validate a recipe.
-
-    Parameters
-    ----------
-    file : str or Path
-        A TOML file, or the name of one that comes with the program.
-
-    Raises
-    ------
-    ConfigError
-        It does not exist, is no TOML, or has a key or value that there is not; every fault is named.
-    """
+    """Read and validate a recipe."""
     path = recipe_file(file)
     raw: dict[str, Any] = read_toml(path, ConfigError, finite=False)
     try:

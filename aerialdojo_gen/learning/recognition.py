@@ -28,19 +28,7 @@ def recognise(
     after: Callable[[Epoch], None],
     tick: Callable[[int, int, float, float], None],
 ) -> None:
-    """Go through the epochs of a network's sight, from where the progress is.
-
-    Parameters
-    ----------
-    learner : Learner
-        Of a network with a sight.
-    survey : Pool
-        Looks about, with what their patches show.
-    words : tuple of str
-        That name objects.
-    after, tick : callable
-        As for `Learner.learn`; right is a patch whose likeliest word is one of its object's.
-    """
+    """Go through the epochs of a network's sight, from where the progress is."""
     torch, recipe, progress = learner.torch, learner.recipe, learner.progress
     learner.share_cores()
     chances = _chances(survey.names, words)

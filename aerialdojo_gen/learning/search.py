@@ -56,15 +56,7 @@ class _Thing:
 
 
 class Search:
-    """One episode's sightings, in the frame of its start: x ahead, y left, z up, metres.
-
-    Parameters
-    ----------
-    wanted : (words,) float32
-        Words of the goal's name: a row of `aerialdojo_gen.learning.naming.named_by`.
-    sensors : Sensors
-        Of the pictures.
-    """
+    """One episode's sightings, in the frame of its start: x ahead, y left, z up, metres."""
 
     def __init__(self, wanted: NDArray[np.float32], sensors: Sensors) -> None:
         self._wanted = wanted.astype(np.float64)
@@ -80,17 +72,7 @@ class Search:
     def look(
         self, log_chances: NDArray[np.float32], pictures: NDArray[np.uint8], odometry: NDArray[np.float32]
     ) -> None:
-        """Add what is seen at a step.
-
-        Parameters
-        ----------
-        log_chances : (patches, words + 1) float32
-            Of all views' patches: `aerialdojo_gen.learning.sight.Sight`, as logarithms of chances.
-        pictures : (views, H, W, 4) uint8
-            For the patches' depth.
-        odometry : (4,) float32
-            x, y, z in metres and yaw in radians, in the frame of the start.
-        """
+        """Add what is seen at a step: log chances (patches, words + 1), pictures (views, H, W, 4), odometry (4,)."""
         if not self._wanted.any():
             return
         away_m = self._rays * patch_depths_m(pictures, self._range_m)[:, None]
@@ -114,18 +96,9 @@ class Search:
             thing.nearest_m = min(thing.nearest_m, float(distance_m[k]))
 
     def towards(self, odometry: NDArray[np.float32], remaining: int) -> NDArray[np.float32]:
-        """Say where to fly: to what looks most like the goal till it is seen from nearby, else round the start.
+        """Where to fly, (3,) metres ahead, left and up.
 
-        Parameters
-        ----------
-        odometry : (4,) float32
-        remaining : int
-            Actions left: the last of them are for the way to what looked most like the goal of all.
-
-        Returns
-        -------
-        (3,) float32
-            Ahead, left and up of the body, metres; a corner of the ring is never within the 2 m of a Stop.
+        To the best match until seen from nearby, else round the start.
         """
         best = self._last or max(self._things.values(), key=lambda thing: thing.likeness, default=None)
         if best is None:

@@ -21,20 +21,9 @@ _SAME_M = 0.25
 
 
 def packed(rgb: NDArray[np.uint8], depth_m: NDArray[np.float32], sensors: Sensors) -> NDArray[np.uint8]:
-    """Join colours and depth to four bytes a pixel.
+    """Join colours (..., H, W, 3) and depth in metres to (..., H, W, 4) uint8.
 
-    Parameters
-    ----------
-    rgb : (..., H, W, 3) uint8
-    depth_m : (..., H, W) float32
-        Metres, 0 where there is nothing within range.
-    sensors : Sensors
-        For the range.
-
-    Returns
-    -------
-    (..., H, W, 4) uint8
-        The last is 255 times the root of depth over range: a near surface is told to some centimetres.
+    Depth as 255 times the root of depth over range.
     """
     near = np.sqrt(np.clip(depth_m / np.float32(sensors.max_depth_m), 0.0, 1.0), dtype=np.float32)
     return np.concatenate([rgb, np.rint(near * 255.0).astype(np.uint8)[..., None]], axis=-1)

@@ -26,13 +26,6 @@ class Sight(nn.Module):  # type: ignore[misc]  # torch is looked at by no type c
 
     Objects of a kind look alike in every scene: what is learned here holds in scenes that were never seen. It shares
     nothing with the network that tells places apart, which learns scenes by heart.
-
-    Parameters
-    ----------
-    words : int
-        Of objects' names; one output more stands for what is no object.
-    channels : tuple of int
-        As of `aerialdojo_gen.learning.network.Shape`.
     """
 
     def __init__(self, words: int, channels: tuple[int, int, int]) -> None:
@@ -47,20 +40,7 @@ class Sight(nn.Module):  # type: ignore[misc]  # torch is looked at by no type c
         self.to(memory_format=torch.channels_last)
 
     def forward(self, pictures: Any, keep: Any = None) -> Any:
-        """Name patches.
-
-        Parameters
-        ----------
-        pictures : (n, H, W, 4) uint8
-            See `aerialdojo_gen.learning.seen.packed`.
-        keep : (k,) int64, optional
-            Of all patches, picture after picture and row after row, those that are asked for.
-
-        Returns
-        -------
-        (n, H / 4 * W / 4, words + 1), or (k, words + 1)
-            Logits; the last is of no object.
-        """
+        """Name patches of pictures (n, H, W, 4): logits (patches, words + 1), the last of no object."""
         cut = as_patches(pictures)
         n, rows, columns, _ = cut.shape
         fine = functional.relu(self.patches(cut))

@@ -19,55 +19,23 @@ _FRAMES, _STEPS = "frames.npy", "steps.npz"
 
 @dataclass(frozen=True, eq=False)
 class Steps:
-    """Episodes one after the other; arrays of steps have m rows, those of episodes n.
+    """Episodes one after the other; arrays of steps have m rows, those of episodes n."""
 
-    Attributes
-    ----------
-    frames : (m, views, H, W, 4) uint8
-        See `aerialdojo_gen.learning.seen.packed`; of a blind policy there are no views.
-    first : (n + 1,) int64
-        Where each episode's steps begin.
-    label : (m,) int64
-        What the teacher does there, 0 to 15.
-    odometry : (m, 4) float32
-        Own motion from the start and in its frame: metres and radians.
-    offset : (m, 3) float32
-        The goal ahead, left and up of the body, metres: privileged, as is `pose`; for side tasks.
-    pose : (m, 4) float32
-        x, y, z in metres and yaw in radians, world frame.
-    blocked : (m, 16) bool
-        Actions that would touch a surface or leave the flight volume: privileged, for a side task.
-    text : (n, 2) str
-        The goal in words, without and with its description.
-    image : (n,) int64
-        Row of `images`, -1 without one.
-    semantic : (n,) bool
-        Whether there is a semantic instance.
-    images : (k, H, W, 4) uint8
-        The goals' pictures.
-    nav_id, scene : (n,) str
-    shown : (m, patches) int16
-        Of looks about: which object a patch shows, a number of `names`; -1 for none, -2 where that is not told.
-        Patches of all views, row after row.
-    names : (k,) str
-        Of those objects.
-    """
-
-    frames: NDArray[np.uint8]
-    first: NDArray[np.int64]
-    label: NDArray[np.int64]
-    odometry: NDArray[np.float32]
-    offset: NDArray[np.float32]
-    pose: NDArray[np.float32]
-    blocked: NDArray[np.bool_]
-    text: NDArray[np.str_]
-    image: NDArray[np.int64]
-    semantic: NDArray[np.bool_]
-    images: NDArray[np.uint8]
-    nav_id: NDArray[np.str_]
+    frames: NDArray[np.uint8]  # See `aerialdojo_gen.learning.seen.packed`; of a blind policy there are no views
+    first: NDArray[np.int64]  # (n + 1,) int64; where each episode's steps begin
+    label: NDArray[np.int64]  # (m,) int64; what the teacher does there, 0 to 15
+    odometry: NDArray[np.float32]  # (m, 4) float32; own motion from the start and in its frame: metres and radians
+    offset: NDArray[np.float32]  # (m, 3) float32
+    pose: NDArray[np.float32]  # (m, 4) float32; x, y, z in metres and yaw in radians, world frame
+    blocked: NDArray[np.bool_]  # (m, 16) bool
+    text: NDArray[np.str_]  # (n, 2) str; the goal in words, without and with its description
+    image: NDArray[np.int64]  # (n,) int64; row of `images`, -1 without one
+    semantic: NDArray[np.bool_]  # (n,) bool; whether there is a semantic instance
+    images: NDArray[np.uint8]  # (k, H, W, 4) uint8; the goals' pictures
+    nav_id: NDArray[np.str_]  # (n,) str
     scene: NDArray[np.str_]
-    shown: NDArray[np.int16] = field(default_factory=lambda: np.zeros((0, 0), np.int16))
-    names: NDArray[np.str_] = field(default_factory=lambda: np.zeros(0, "U1"))
+    shown: NDArray[np.int16] = field(default_factory=lambda: np.zeros((0, 0), np.int16))  # (m, patches) int16
+    names: NDArray[np.str_] = field(default_factory=lambda: np.zeros(0, "U1"))  # (k,) str; of those objects
 
     def __len__(self) -> int:
         """Return the number of episodes."""
@@ -88,13 +56,7 @@ def is_written(folder: Path) -> bool:
 
 
 def read_steps(folder: Path) -> Steps:
-    """Read episodes; pictures stay on the disk until they are asked for.
-
-    Raises
-    ------
-    StoreError
-        They are damaged.
-    """
+    """Read episodes; pictures stay on the disk until they are asked for."""
     try:
         with np.load(folder / _STEPS, allow_pickle=False) as file:
             rest = {one.name: file[one.name] for one in fields(Steps) if one.name != "frames"}
@@ -109,16 +71,7 @@ def read_steps(folder: Path) -> Steps:
 
 
 class Pool:
-    """All episodes that are learned from.
-
-    Parameters
-    ----------
-    parts : sequence of Steps
-    scenes : sequence of str
-        By whose order scenes are numbered.
-    vocabulary : Vocabulary
-        By which words are.
-    """
+    """All episodes that are learned from."""
 
     def __init__(self, parts: Sequence[Steps], scenes: Sequence[str], vocabulary: Vocabulary) -> None:
         self.parts = list(parts)
@@ -186,19 +139,7 @@ class Pool:
         return np.array(found, np.int64)
 
     def batch(self, episodes: NDArray[np.int64], by_image: NDArray[np.bool_]) -> dict[str, NDArray[Any]]:
-        """Put episodes side by side.
-
-        Parameters
-        ----------
-        episodes : (n,) int64
-        by_image : (n,) bool
-            Whose goal is to be told by its picture, where it has one.
-
-        Returns
-        -------
-        dict
-            ``rows`` (m,), and by name (n, T, …) arrays and (n, …) of the goals.
-        """
+        """Put episodes side by side: ``rows`` (m,), (n, T, …) arrays of steps and (n, …) of goals, by name."""
         j, lengths = self._joined, self.lengths[episodes]
         window = int(lengths.max())
         mask = np.arange(window)[None] < lengths[:, None]

@@ -26,14 +26,6 @@ class Teacher:
 
     The cost-to-go of a goal is made once; from every pose the planner's own search follows it, so that a label is the
     first action of the route that the release would have from there.
-
-    Parameters
-    ----------
-    scene : Scene
-    config : PlanConfig, optional
-        As the release was planned; as the paper's dataset was where absent.
-    radius_m : float
-        The body's radius.
     """
 
     def __init__(self, scene: Scene, config: PlanConfig | None = None, radius_m: float = 0.25) -> None:
@@ -42,20 +34,7 @@ class Teacher:
         self._planner = Planner(scene, own, radius_m)
 
     def labels(self, goals: Sequence[ArrayLike], poses: Sequence[ArrayLike]) -> NDArray[np.int64]:
-        """Label poses.
-
-        Parameters
-        ----------
-        goals : n times (4,) float
-            x, y, z in metres and yaw in radians, world frame.
-        poses : n times (4,) float
-            Free of collision.
-
-        Returns
-        -------
-        (n,) int64
-            Actions, 0 to 15; `NO_LABEL` where no way is found.
-        """
+        """Planner's actions (n,) for goals and poses (metres, radians, world); `NO_LABEL` where there is no way."""
         ways = self.ways(goals, poses)
         return np.array([way[0] if len(way) else NO_LABEL for way in ways], np.int64)
 

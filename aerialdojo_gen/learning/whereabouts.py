@@ -28,28 +28,13 @@ _FLOOR = 0.05
 
 
 class Guess(NamedTuple):
-    """Where things are thought to be, in units of 10 m.
+    """Where things are thought to be, in units of 10 m."""
 
-    Attributes
-    ----------
-    offset : (n, T, 3)
-        The goal ahead, left and up of the body, by all steps so far.
-    place : (n, T, 164)
-        Logits of where the body is in the scene's frame, by the step's pictures alone: 64 intervals of x, 64 of y, 36
-        of z.
-    heading : (n, T, 24)
-        Logits of sectors of the body's yaw, by the step's pictures alone.
-    scene : (n, T, scenes)
-        Logits of the scenes that were learned, by the step's pictures alone.
-    goal : (n, T, 164)
-        Logits of where the goal is in the scene's frame, by what is said of it and by the scene.
-    """
-
-    offset: Any
-    place: Any
-    heading: Any
-    scene: Any
-    goal: Any
+    offset: Any  # (n, T, 3); the goal ahead, left and up of the body, by all steps so far
+    place: Any  # (n, T, 164)
+    heading: Any  # (n, T, 24); logits of sectors of the body's yaw, by the step's pictures alone
+    scene: Any  # (n, T, scenes); logits of the scenes that were learned, by the step's pictures alone
+    goal: Any  # (n, T, 164); logits of where the goal is in the scene's frame, by what is said of it and by the scene
 
     @property
     def scene_nats(self) -> Any:
@@ -58,13 +43,7 @@ class Guess(NamedTuple):
         return -(told.exp() * told).sum(dim=-1)
 
     def led(self, offset_m: Any) -> Guess:
-        """Put the goal where something else says that it is.
-
-        Parameters
-        ----------
-        offset_m : (n, T, 3)
-            Ahead, left and up of the body, metres.
-        """
+        """Set the goal where an offset (n, T, 3), metres ahead, left and up, says that it is."""
         return self._replace(offset=offset_m / UNIT_M)
 
 
@@ -75,13 +54,6 @@ class Whereabouts(nn.Module):  # type: ignore[misc]  # torch is looked at by no 
     the goal's guess knows no more than which scene they show. So the goal's place cannot be read off the actions that
     a reference takes towards it, nor off what is seen where they lead, which tell it in training and never in flight
     (causal confusion in imitation learning: de Haan, Jayaraman and Levine 2019).
-
-    Parameters
-    ----------
-    seen, goal, hidden : int
-        Numbers of a step's pictures, of a goal, and of the layers between.
-    scenes : int
-        That are learned.
     """
 
     def __init__(self, seen: int, goal: int, hidden: int, scenes: int) -> None:
@@ -105,22 +77,9 @@ class Whereabouts(nn.Module):  # type: ignore[misc]  # torch is looked at by no 
         return place, heading, scene, functional.softplus(trust) + _LEAST
 
     def forward(self, seen: Any, goal: Any, odometry: Any, sums: Any) -> tuple[Guess, Any]:
-        """Guess at every step of episodes.
+        """Estimate poses for steps (n, T) of episodes from features and odometry.
 
-        Parameters
-        ----------
-        seen : (n, T, seen)
-        goal : (n, goal)
-        odometry : (n, T, 4)
-            x ahead, y left, z up in metres and yaw in radians, in the frame of the start.
-        sums : (n, sums)
-            Of the steps before.
-
-        Returns
-        -------
-        Guess
-        (n, sums)
-            Sums with these steps.
+        Also the sums (n, sums) after them.
         """
         steps = seen.shape[1]
         seen_at, facing, scene, trust = self.found(seen)
@@ -190,19 +149,7 @@ def directions(logits: Any) -> Any:
 
 
 def missed(guess: Guess, batch: Mapping[str, Any]) -> Any:
-    """Return the loss of guesses: of the goal seen from the body, and of what that was guessed from.
-
-    Parameters
-    ----------
-    guess : Guess
-    batch : mapping of str to Tensor
-        ``mask``, ``offset``, ``pose`` and ``scene`` as `aerialdojo_gen.learning.steps.Pool.batch` gives them.
-
-    Returns
-    -------
-    ()
-        In 10 m; beside it the mean cross-entropies of the intervals.
-    """
+    """Loss of the goal offset, in units of 10 m, and mean cross-entropies of the intervals."""
     mask = batch["mask"]
     offset, pose = batch["offset"][mask] / UNIT_M, batch["pose"][mask]
     # Turned by the yaw: seen from a heading of as much to the other side.
@@ -216,16 +163,7 @@ def missed(guess: Guess, batch: Mapping[str, Any]) -> Any:
 
 
 def astray(place: Any, heading: Any, scene: Any, pose: Any, number: Any) -> Any:
-    """Return the loss of guesses of where bodies are.
-
-    Parameters
-    ----------
-    place, heading, scene : (m, 164), (m, 24) and (m, scenes)
-        Logits.
-    pose : (m, 4)
-    number : (m,)
-        Of the scenes.
-    """
+    """Cross-entropy loss of place (m, 164), heading (m, 24) and scene (m, scenes) logits against poses (m, 4)."""
     sector = (torch.remainder(pose[:, 3] + math.pi, 2.0 * math.pi) / _SECTOR_RAD - 0.5)[:, None]
     sectors = torch.arange(_HEADINGS, device=pose.device)
     apart = torch.remainder(sectors - sector + _HEADINGS / 2, _HEADINGS) - _HEADINGS / 2

@@ -22,15 +22,9 @@ _EFFECTS = {
 
 @dataclass(frozen=True)
 class ActionSet:
-    """Names that a model answers with, and the actions that they mean.
+    """Names that a model answers with, and the actions that they mean."""
 
-    Attributes
-    ----------
-    ids : mapping of str to int
-        The action's id, 0 to 15, by the name that the model is told.
-    """
-
-    ids: Mapping[str, int]
+    ids: Mapping[str, int]  # The action's id, 0 to 15, by the name that the model is told
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -66,15 +60,7 @@ SIXTEEN = ActionSet({name: k for k, name in enumerate(ACTION_NAMES[:APPROACH])})
 
 
 def eight(move_m: int, climb_m: int) -> ActionSet:
-    """Return the paper's eight action types, each of one magnitude (paper, Appendix A).
-
-    Parameters
-    ----------
-    move_m : int
-        Of MoveForward, MoveLeft and MoveRight, metres: 1, 3 or 5.
-    climb_m : int
-        Of MoveUp and MoveDown, metres: 1 or 2. Turns are of 15°.
-    """
+    """The paper's eight action types (Appendix A), moves of `move_m` and climbs of `climb_m` metres, turns of 15°."""
     magnitudes = {"Stop": "", "Turn": "15", "MoveUp": str(climb_m), "MoveDown": str(climb_m), "Move": str(move_m)}
     ids = {}
     for kind in _EFFECTS:

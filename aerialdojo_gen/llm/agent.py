@@ -36,34 +36,18 @@ _PATIENCE_S = 10.0
 
 @dataclass(frozen=True)
 class Message:
-    """What is said, by whom.
+    """What is said, by whom."""
 
-    Attributes
-    ----------
-    role : str
-        user or assistant.
-    parts : tuple of str or Picture
-        In their order.
-    """
-
-    role: str
-    parts: tuple[str | Picture, ...]
+    role: str  # user or assistant
+    parts: tuple[str | Picture, ...]  # In their order
 
 
 @dataclass(frozen=True)
 class Reply:
-    """What a service answers.
+    """What a service answers."""
 
-    Attributes
-    ----------
-    text : str
-        All the text of it, or the arguments of its tool call.
-    input_tokens, output_tokens : int or None
-        Where the service says.
-    """
-
-    text: str
-    input_tokens: int | None = None
+    text: str  # All the text of it, or the arguments of its tool call
+    input_tokens: int | None = None  # Where the service says
     output_tokens: int | None = None
 
 
@@ -80,16 +64,6 @@ class LanguageModelAgent(AgentBase):
     ending the episode would weigh one slip in 300 steps like a crash.
 
     Subclasses speak a protocol: they name its package and implement `ask`.
-
-    Parameters
-    ----------
-    **options
-        Fields of `Options`.
-
-    Raises
-    ------
-    UsageError
-        An option is wrong or missing, the package is not installed, or there is no key.
     """
 
     package = ""
@@ -137,37 +111,11 @@ class LanguageModelAgent(AgentBase):
         return cleaned
 
     def ask(self, system: str, messages: Sequence[Message], retries: int | None = None) -> Reply:
-        """Send one request.
-
-        Parameters
-        ----------
-        system : str
-        messages : sequence of Message
-        retries : int, optional
-            In place of the option's.
-
-        Raises
-        ------
-        AgentUnavailable
-            The request failed; nothing of it is the model's doing.
-        ServiceDown, UsageError
-            Every request would fail.
-        """
+        """Send one request."""
         raise NotImplementedError
 
     def check(self) -> str:
-        """Send one small request as the run will send them; settles how answers are asked for.
-
-        Returns
-        -------
-        str
-            What was found, one line.
-
-        Raises
-        ------
-        AerialDojoError
-            The service does not answer, or refuses; one line.
-        """
+        """Send one small request as the run will send them; settles how answers are asked for."""
         grey = colour_picture(np.full((32, 32, 3), 128, np.uint8), 32)
         text = f"{self._example()} This is a test of the connection: choose Stop."
         forms = self.forms if self.options.answer == "auto" else (self.options.answer,)
@@ -247,15 +195,7 @@ class LanguageModelAgent(AgentBase):
         self.service.meter.reset()
 
     def act(self, observation: Observation) -> int:
-        """Ask for an action.
-
-        Raises
-        ------
-        InvalidAnswer
-            Neither the answer nor its repair names one.
-        AgentUnavailable, ServiceDown
-            As `ask` does; a refusal of all requests is a `ServiceDown` too.
-        """
+        """Ask for an action."""
         actions = self.options.action_set
         messages = [Message("user", (*self._goal, *self._report(observation)))]
         said = self._ask(messages)

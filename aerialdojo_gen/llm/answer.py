@@ -19,41 +19,16 @@ _FENCE = re.compile(r"\A```(?:json)?[ \t]*\n(.*)\n?```\Z", re.DOTALL)
 
 
 class Answer(BaseModel):
-    """One action.
-
-    Attributes
-    ----------
-    action : str
-        One of the names that were told.
-    thought : str
-        What the model says of it.
-    """
+    """One action."""
 
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
 
-    action: str
-    thought: str = ""
+    action: str  # One of the names that were told
+    thought: str = ""  # What the model says of it
 
 
 def parse_answer(text: str, names: Sequence[str] = SIXTEEN.names) -> Answer:
-    """Read an answer.
-
-    Parameters
-    ----------
-    text : str
-        All that the model said. A leading ``<think>`` block and a Markdown fence around the whole are taken off.
-    names : sequence of str
-        Of the actions.
-
-    Returns
-    -------
-    Answer
-
-    Raises
-    ------
-    InvalidAnswer
-        It is empty, too long, not one JSON object, has a key twice, an unknown or no action; the message says which.
-    """
+    """Read an answer."""
     if len(text) > MAX_CHARACTERS:
         raise InvalidAnswer(f"it has {len(text):,} characters, more than {MAX_CHARACTERS:,}")
     body = _THOUGHTS.sub("", text, count=1).strip()

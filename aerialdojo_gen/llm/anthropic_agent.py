@@ -12,13 +12,7 @@ from aerialdojo_gen.llm.options import Form
 
 
 class AnthropicAgent(LanguageModelAgent):
-    """Asks a model by way of the package ``anthropic``; the key is ANTHROPIC_API_KEY's, or ``key_env``'s.
-
-    Parameters
-    ----------
-    **options
-        Fields of `aerialdojo_gen.llm.options.Options`.
-    """
+    """Asks a model by way of the package ``anthropic``; the key is ANTHROPIC_API_KEY's, or ``key_env``'s."""
 
     package = "anthropic"
     forms: tuple[Form, ...] = ("tool", "json", "text")

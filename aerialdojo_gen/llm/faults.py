@@ -20,29 +20,7 @@ _OF_A_PICTURE = ("image", "picture", "media", "file")
 
 
 def refusal(status: int, body: Any, said: str, name: str, model: str, retry_after_s: float | None) -> AerialDojoError:
-    """Make the error for an HTTP status that is none of success.
-
-    Parameters
-    ----------
-    status : int
-    body : object
-        The error's body as JSON, or None.
-    said : str
-        Its message, one line, without keys.
-    name : str
-        Of the service, for the message.
-    model : str
-        Its model, which the message of an unknown one names.
-    retry_after_s : float or None
-        What the service asks for.
-
-    Returns
-    -------
-    AgentUnavailable
-        It concerns this request; ``again`` says whether the same may pass later.
-    UsageError
-        It concerns all requests: the key, the account, the model, the address.
-    """
+    """Make the error for an HTTP status that is none of success."""
     message = f"{name}: HTTP {status}: {said}"
     words = f"{_codes(body)} {said}".lower()
     if status in _ALL_REQUESTS or 300 <= status < 400 or _has(words, _NO_MONEY) or _has(words, _NO_KEY):

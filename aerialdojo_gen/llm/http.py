@@ -18,22 +18,12 @@ class BodyBoundError(Exception):
 
 @dataclass
 class Meter:
-    """Counts requests, and the time that they take.
+    """Counts requests, and the time that they take."""
 
-    Attributes
-    ----------
-    requests : int
-        Sent, repeated ones too.
-    seconds, longest_s : float
-        From sending a request to having its answer whole: of all together, and of the longest.
-    pace : callable, optional
-        Called before each request; waits until one may be sent.
-    """
-
-    requests: int = 0
-    seconds: float = 0.0
+    requests: int = 0  # Sent, repeated ones too
+    seconds: float = 0.0  # From sending a request to having its answer whole: of all together, and of the longest
     longest_s: float = 0.0
-    pace: Callable[[], None] | None = None
+    pace: Callable[[], None] | None = None  # Called before each request; waits until one may be sent
 
     def reset(self) -> None:
         """Begin to count anew."""
@@ -51,18 +41,6 @@ def bounded_client(base: Any, timeout: Any) -> Any:
 
     The client packages read a body whole, an error's too, however long it is. Redirects are not followed: they would
     carry the key elsewhere.
-
-    Parameters
-    ----------
-    base : type
-        The package's own ``DefaultAsyncHttpxClient``.
-    timeout : object
-        The package's own ``Timeout``.
-
-    Returns
-    -------
-    object
-        An instance of a subclass of `base`.
     """
 
     class BoundedClient(base):  # type: ignore[misc]  # a class that is known at run time alone

@@ -15,18 +15,10 @@ from aerialdojo_gen.common.pictures import ASKED_JPEG, encode_jpeg, encode_png, 
 
 @dataclass(frozen=True)
 class Picture:
-    """An encoded picture.
+    """An encoded picture."""
 
-    Attributes
-    ----------
-    media_type : str
-        ``image/jpeg`` or ``image/png``.
-    base64 : str
-        The file.
-    """
-
-    media_type: str
-    base64: str
+    media_type: str  # ``image/jpeg`` or ``image/png``
+    base64: str  # The file
 
     @property
     def data_url(self) -> str:
@@ -35,39 +27,13 @@ class Picture:
 
 
 def colour_picture(rgb: NDArray[np.uint8], size_px: int) -> Picture:
-    """Encode a colour picture as JPEG.
-
-    Parameters
-    ----------
-    rgb : (H, W, 3) uint8
-        sRGB.
-    size_px : int
-        Longest side; a larger picture is scaled down, a smaller one stays.
-
-    Returns
-    -------
-    Picture
-    """
+    """Encode (H, W, 3) uint8 sRGB as JPEG, scaled down to a longest side of `size_px`."""
     scaled = _at_most(rgb, size_px, cv2.INTER_AREA)
     return _picture(encode_jpeg(scaled, ASKED_JPEG))
 
 
 def depth_picture(depth_m: NDArray[np.float32], max_depth_m: float, size_px: int) -> Picture:
-    """Encode depth as a grey PNG, as `system_prompt` tells it.
-
-    Parameters
-    ----------
-    depth_m : (H, W) float32
-        Planar depth, metres; 0 or inf where nothing lies within range.
-    max_depth_m : float
-        Depth that is drawn white, 255; 0 m is black.
-    size_px : int
-        Longest side. Scaling takes the nearest sample: a mean over an edge would be a surface that is not there.
-
-    Returns
-    -------
-    Picture
-    """
+    """Encode planar depth (H, W) in metres as grey PNG, `max_depth_m` white; scaling takes the nearest sample."""
     scaled = _at_most(depth_m, size_px, cv2.INTER_NEAREST)
     seen = np.isfinite(scaled) & (scaled > 0.0)
     grey = np.where(seen, np.clip(np.where(seen, scaled, 0.0) / max_depth_m, 0.0, 1.0), 1.0)

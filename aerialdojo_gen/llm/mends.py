@@ -21,15 +21,6 @@ def refused(error: UsageError, model: str, key_variable: str) -> ServiceDown:
     """Make the error that ends a run from a service's refusal of all requests.
 
     Not what was asked for is wrong, as a `UsageError` says, but what stands behind it: the exit code is 1.
-
-    Parameters
-    ----------
-    error : UsageError
-        Of `aerialdojo_gen.llm.service.Connection.call`.
-    model : str
-        The model that was asked for.
-    key_variable : str
-        Environment variable of the key.
     """
     status = _STATUS.search(str(error))
     code = status[1] if status else ""

@@ -14,11 +14,6 @@ class OpenAIAgent(LanguageModelAgent):
 
     A service of one's own (``base_url``, or OPENAI_BASE_URL) may do without a key. Its answers are bounded by
     ``max_tokens``, OpenAI's own by ``max_completion_tokens``, the only one that its newer models take.
-
-    Parameters
-    ----------
-    **options
-        Fields of `aerialdojo_gen.llm.options.Options`.
     """
 
     package = "openai"

@@ -14,65 +14,15 @@ Form = Literal["auto", "json", "tool", "text"]
 
 
 class Options(BaseModel):
-    """Options of a language-model agent; none of them is a secret, keys come from the environment.
-
-    Attributes
-    ----------
-    model : str
-        Name of the model at the service.
-    base_url : str or None
-        Where the service is; the provider's own where absent.
-    key_env : str or None
-        Environment variable that holds the key, in place of OPENAI_API_KEY or ANTHROPIC_API_KEY.
-    temperature : float or None
-        None leaves it to the service; some models take no other.
-    max_tokens : int
-        Most tokens of an answer.
-    timeout_s : float
-        Longest wait for a whole answer, from the request to its last byte.
-    request_retries : int
-        How often a request that failed for the service's sake is sent again before the episode is given up. A
-        repeated request changes nothing for the agent; an episode begun again costs all of its requests anew.
-    answer : str
-        How the model answers: ``json`` (structured output: the service holds the answer to the schema), ``tool`` (a
-        tool call), ``text`` (the prompt alone asks for JSON), or ``auto``: the first of these that the service
-        takes in the check before the run. Without a check ``auto`` is ``text``.
-    actions : str
-        ``sixteen`` names, each with its magnitude, or ``eight`` types, as the paper has them, of `move_m` and
-        `climb_m`.
-    move_m, climb_m : int
-        Metres of a horizontal and of a vertical move under ``actions=eight``. Turns are of 15°.
-    views : tuple of str
-        Cameras whose pictures are sent; the paper's is the front one alone.
-    depth : bool
-        Whether their depth is sent too.
-    image_size_px : int
-        Width and height of the pictures.
-    max_depth_m : float
-        Depth that is drawn white.
-    history : int
-        How many earlier steps are told again: the action and what the model said of it.
-    history_images : int
-        Of how many earlier steps the colour picture of the first view is sent again.
-    max_pictures : int or None
-        Most pictures that a request may have, where the model or its server has a limit.
-    system_role : str
-        Who says the prompt: ``system``, or ``user`` for models without such a role (OpenAI's protocol alone).
-    extra_body : dict
-        Anything else that the service takes, e.g. ``{"seed": 1}``.
-    input_usd_per_million, output_usd_per_million : float or None
-        Prices of tokens; without them no cost is reported.
-    tokens_per_picture : int or None
-        For ``--estimate`` alone; reckoned as width x height / 750 where absent.
-    """
+    """Options of a language-model agent; none of them is a secret, keys come from the environment."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, hide_input_in_errors=True)
 
-    model: str = Field(min_length=1)
-    base_url: str | None = None
+    model: str = Field(min_length=1)  # Name of the model at the service
+    base_url: str | None = None  # Where the service is; the provider's own where absent
     key_env: str | None = Field(default=None, pattern=r"^[A-Za-z_][A-Za-z0-9_]*$")
     temperature: float | None = Field(default=None, ge=0.0, le=2.0)
-    max_tokens: int = Field(default=1024, ge=16)
+    max_tokens: int = Field(default=1024, ge=16)  # Most tokens of an answer
     timeout_s: float = Field(default=60.0, gt=0.0)
     request_retries: int = Field(default=3, ge=0, le=10)
     answer: Form = "auto"
@@ -80,14 +30,14 @@ class Options(BaseModel):
     move_m: Literal[1, 3, 5] = 3
     climb_m: Literal[1, 2] = 1
     views: tuple[View, ...] = Field(default=("front",), min_length=1)
-    depth: bool = True
-    image_size_px: int = Field(default=640, ge=32, le=2048)
-    max_depth_m: float = Field(default=50.0, gt=0.0)
+    depth: bool = True  # Whether their depth is sent too
+    image_size_px: int = Field(default=640, ge=32, le=2048)  # Width and height of the pictures
+    max_depth_m: float = Field(default=50.0, gt=0.0)  # Depth that is drawn white
     history: int = Field(default=8, ge=0)
     history_images: int = Field(default=1, ge=0, le=20)
     max_pictures: int | None = Field(default=None, ge=2)
     system_role: Literal["system", "developer", "user"] = "system"
-    extra_body: dict[str, Any] = {}
+    extra_body: dict[str, Any] = {}  # Anything else that the service takes, e.g. ``{"seed": 1}``
     input_usd_per_million: float | None = Field(default=None, ge=0.0)
     output_usd_per_million: float | None = Field(default=None, ge=0.0)
     tokens_per_picture: int | None = Field(default=None, ge=1)

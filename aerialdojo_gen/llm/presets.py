@@ -14,32 +14,16 @@ from aerialdojo_gen.errors import UsageError
 
 
 class Preset(BaseModel):
-    """A language model, and how it is asked.
-
-    Attributes
-    ----------
-    title : str
-        What people call it.
-    paper : bool
-        Whether it is one of the paper's nine.
-    served : str
-        By whom: vLLM, Ollama, or a vendor.
-    serve : str or None
-        A command that serves it on this machine.
-    agent : str
-        ``openai`` or ``anthropic``: the protocol.
-    options : dict
-        Of the agent.
-    """
+    """A language model, and how it is asked."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    title: str
-    paper: bool = False
-    served: str
-    serve: str | None = None
-    agent: Literal["openai", "anthropic"] = "openai"
-    options: dict[str, Any]
+    title: str  # What people call it
+    paper: bool = False  # Whether it is one of the paper's nine
+    served: str  # By whom: vLLM, Ollama, or a vendor
+    serve: str | None = None  # A command that serves it on this machine
+    agent: Literal["openai", "anthropic"] = "openai"  # ``openai`` or ``anthropic``: the protocol
+    options: dict[str, Any]  # Of the agent
 
 
 @cache
@@ -50,13 +34,7 @@ def presets() -> dict[str, Preset]:
 
 
 def preset(name: str) -> Preset:
-    """Find a preset.
-
-    Raises
-    ------
-    UsageError
-        There is none of the name.
-    """
+    """Find a preset."""
     known = presets()
     if name not in known:
         raise UsageError(unknown("no preset", name, known))

@@ -18,68 +18,28 @@ _LOOKS = {"front": "ahead", "left": "to the left", "right": "to the right", "dow
 
 @dataclass(frozen=True)
 class Turn:
-    """An earlier step, as it is told again.
+    """An earlier step, as it is told again."""
 
-    Attributes
-    ----------
-    step : int
-        Its number, from 0.
-    action : str or None
-        Name of the action; None where the answer could not be read.
-    thought : str
-        What the model said of it.
-    """
-
-    step: int
-    action: str | None
-    thought: str = ""
+    step: int  # Its number, from 0
+    action: str | None  # Name of the action; None where the answer could not be read
+    thought: str = ""  # What the model said of it
 
 
 @dataclass(frozen=True)
 class Sight:
-    """What is sent of what the cameras see.
+    """What is sent of what the cameras see."""
 
-    Attributes
-    ----------
-    views : tuple of str
-        Cameras whose pictures are sent.
-    depth : bool
-        Whether depth pictures go with them.
-    max_depth_m, fov_deg : float
-        Depth that is drawn white; horizontal field of view.
-    width, height : int
-        Of the pictures, pixels.
-    past_pictures : int
-        Of how many earlier steps the first camera's colour picture is sent again.
-    """
-
-    views: tuple[str, ...] = ("front",)
-    depth: bool = True
-    max_depth_m: float = 50.0
+    views: tuple[str, ...] = ("front",)  # Cameras whose pictures are sent
+    depth: bool = True  # Whether depth pictures go with them
+    max_depth_m: float = 50.0  # Depth that is drawn white; horizontal field of view
     fov_deg: float = 90.0
-    width: int = 640
+    width: int = 640  # Of the pictures, pixels
     height: int = 640
-    past_pictures: int = 0
+    past_pictures: int = 0  # Of how many earlier steps the first camera's colour picture is sent again
 
 
 def system_prompt(goal: Goal, sight: Sight, actions: ActionSet = SIXTEEN, form: str = "text") -> str:
-    """Write what holds for the whole episode (paper, Appendix A).
-
-    Parameters
-    ----------
-    goal : Goal
-        Its rules are told; the object itself stands in `goal_text`.
-    sight : Sight
-        The pictures.
-    actions : ActionSet
-        What may be chosen.
-    form : str
-        How it is to be answered: ``text``, ``json`` (the service holds the answer to the schema) or ``tool``.
-
-    Returns
-    -------
-    str
-    """
+    """Write what holds for the whole episode (paper, Appendix A)."""
     rules = goal.rules
     told = ", but you are told which way the drone faces at the start" if goal.heading is not None else ""
     return f"""\
@@ -156,19 +116,7 @@ def goal_text(goal: Goal) -> str:
 
 
 def step_text(observation: Observation, turns: Sequence[Turn]) -> str:
-    """Write the report before an action; the pictures follow.
-
-    Parameters
-    ----------
-    observation : Observation
-        The present one.
-    turns : sequence of Turn
-        Earlier steps that are told again, oldest first.
-
-    Returns
-    -------
-    str
-    """
+    """Write the report before an action; the pictures follow."""
     lines = []
     if turns:
         lines.append("YOUR LAST ACTIONS")

@@ -32,15 +32,7 @@ Result = TypeVar("Result")
 
 
 def check_url(url: str) -> None:
-    """Refuse a URL that no service has, or that holds a key.
-
-    Raises
-    ------
-    ValueError
-        It is no HTTP URL.
-    UsageError
-        It holds a name, a password or a query; the message does not repeat them.
-    """
+    """Refuse a URL that no service has, or that holds a key."""
     try:
         parts = urlsplit(url)
         wrong = parts.scheme not in ("http", "https") or not parts.hostname or parts.port == 0
@@ -54,13 +46,7 @@ def check_url(url: str) -> None:
 
 
 def api_key(variable: str, base_url: str | None) -> str:
-    """Read a key from the environment; a service of one's own may do without.
-
-    Raises
-    ------
-    UsageError
-        There is none and the service is the provider's own, or it has characters that no header may have.
-    """
+    """Read a key from the environment; a service of one's own may do without."""
     key = os.environ.get(variable, "").strip()
     if not key and base_url is None:
         raise UsageError(f"no API key: set {variable} in the environment (or base_url, for a service without keys)")
@@ -70,45 +56,7 @@ def api_key(variable: str, base_url: str | None) -> str:
 
 
 class Connection:
-    """A client of a service, with its key.
-
-    Parameters
-    ----------
-    package : str
-        ``openai`` or ``anthropic``.
-    base_url : str or None
-        Where the service is; ``OPENAI_BASE_URL`` or ``ANTHROPIC_BASE_URL`` where absent, else the provider's own.
-    timeout_s : float
-        Longest wait for a whole answer, from looking up the address to the last byte. One deadline holds for all of
-        it: a time-out for each read never ends a server that sends a few bytes at a time.
-    retries : int
-        How often a failed request is sent again before the episode is given up.
-    secrets : Secrets, optional
-        What is kept out of texts besides the key.
-    key_variable : str, optional
-        Environment variable of the key, in place of the package's own.
-    model : str
-        Its model, to tell an unknown model from a picture that is not found.
-
-    Attributes
-    ----------
-    client : object
-        The package's asynchronous client, used in a thread that runs its event loop; its own retries are off, so
-        that there is one place that tries again.
-    base_url : str or None
-        As found.
-    name : str
-        For messages.
-    meter : Meter
-        Requests and their times since it was last reset.
-
-    Raises
-    ------
-    MissingPackage
-        The package is not installed.
-    UsageError
-        There is no key, or the address holds one.
-    """
+    """A client of a service, with its key."""
 
     def __init__(
         self,
@@ -150,30 +98,7 @@ class Connection:
         threading.Thread(target=_run, args=(self._loop,), name=f"requests to {package}", daemon=True).start()
 
     def call(self, ask: Callable[[Any], Awaitable[Result]], retries: int | None = None) -> Result:
-        """Send a request; send it again where that may help.
-
-        Parameters
-        ----------
-        ask : callable
-            Takes the client, returns an awaitable of what the package makes of the answer.
-        retries : int, optional
-            In place of the connection's own.
-
-        Returns
-        -------
-        object
-            The result of `ask`.
-
-        Raises
-        ------
-        AgentUnavailable
-            This request failed: time-out, 429, 5xx, a lost connection, a content filter, a context too long, a
-            request that is refused, an answer too large or of another protocol.
-        ServiceDown
-            Nobody listens, or there is no route.
-        UsageError
-            Every request would be refused: a wrong key, no such model.
-        """
+        """Send a request; send it again where that may help."""
         again = Retrying(
             stop=stop_after_attempt(1 + (self._retries if retries is None else retries)),
             wait=_wait_s,

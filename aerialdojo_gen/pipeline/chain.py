@@ -39,25 +39,7 @@ class _Tally:
 
 
 class Chain(Waiting[Task]):
-    """Scenes that go through the same stages, one after the other.
-
-    Parameters
-    ----------
-    stages : sequence of Stage
-        In pipeline order; none but the first one waits for all scenes.
-    scenes : sequence of str
-        Names of the scenes.
-    pipeline, roots : Pipeline, Roots
-        Configuration, seed and folders.
-    forced : collection of str
-        Names of stages whose shards are computed even where they are fresh.
-    limits : Limits
-        How much is computed now; of several stages that is all.
-    reporter : Reporter
-        Is told what was decided, and what is damaged.
-    expectation : Expectation
-        What it all takes; learns what it took.
-    """
+    """Scenes that go through the same stages, one after the other."""
 
     def __init__(
         self,

@@ -118,34 +118,18 @@ _SHAPELESS = frozenset({"pydantic", "pydantic_core", "tqdm", "typer", "typing_ex
 
 @dataclass(frozen=True)
 class Choice:
-    """Which modules of a package are imported by a name that is made at run time, where a recipe tells.
+    """Which modules of a package are imported by a name that is made at run time, where a recipe tells."""
 
-    Attributes
-    ----------
-    package : str
-        Absolute name of the package. Where nothing is known of it, all of its modules count.
-    modules : tuple of str
-        Absolute names of the modules; they count, with what they import.
-    """
-
-    package: str
-    modules: tuple[str, ...]
+    package: str  # Absolute name of the package. Where nothing is known of it, all of its modules count
+    modules: tuple[str, ...]  # Absolute names of the modules; they count, with what they import
 
 
 @dataclass(frozen=True)
 class Code:
-    """The code that makes something.
+    """The code that makes something."""
 
-    Attributes
-    ----------
-    parts : dict of str to str
-        Digests by module, or by ``module:definition`` where the module is plumbing, or by file.
-    libraries : dict of str to str
-        Versions of the third-party packages imported by it; empty where one is not installed.
-    """
-
-    parts: dict[str, str]
-    libraries: dict[str, str]
+    parts: dict[str, str]  # Digests by module, or by ``module:definition`` where the module is plumbing, or by file
+    libraries: dict[str, str]  # Versions of the third-party packages imported by it; empty where one is not installed
 
     @cached_property
     def digest(self) -> str:
@@ -182,13 +166,7 @@ def counted(module: str) -> tuple[str, ...] | None:
 
 
 class Package:
-    """The sources of a copy of this package.
-
-    Parameters
-    ----------
-    folder : Path
-        The package's; ``__pycache__`` in it keeps what reading the sources gave, by their content.
-    """
+    """The sources of a copy of this package."""
 
     def __init__(self, folder: Path) -> None:
         self._folder, self._name = folder, folder.name
@@ -198,24 +176,7 @@ class Package:
         self._paths = {_module_name(path.relative_to(folder.parent)): path for path in sorted(folder.rglob("*.py"))}
 
     def of(self, module: str, chosen: Choice | None = None, idle: tuple[str, ...] = ()) -> Code:
-        """Return the code that a module consists of.
-
-        Parameters
-        ----------
-        module : str
-            Its absolute name.
-        chosen : Choice, optional
-            What is known of a package whose modules it imports by a name made at run time.
-        idle : tuple of str, optional
-            Absolute names of modules and of libraries that are not used, although there are imports of them.
-
-        Raises
-        ------
-        AssetError
-            A source is missing.
-        RuntimeError
-            A module imports what cannot be told from its source.
-        """
+        """Return the code that a module consists of."""
         search = self._followed(module, chosen.package if chosen else "", frozenset(idle))
         if chosen and chosen.package in search.asked:
             # What is reached does not depend on the order: the way to the package is the same for all its modules.

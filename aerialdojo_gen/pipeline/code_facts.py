@@ -15,91 +15,35 @@ _IMPORTERS = frozenset({"import_module", "__import__"})
 
 @dataclass(frozen=True, order=True)
 class Edge:
-    """Something that is imported.
+    """Something that is imported."""
 
-    Attributes
-    ----------
-    module : str
-        Absolute name of the module.
-    name : str
-        What is taken from it; ``""`` is the module itself, ``"*"`` all names, ``"**"`` every module below a package.
-    uses : tuple of str
-        Where the name may be a module: the attributes that are asked of it; ``("*",)`` where that cannot be told.
-    """
-
-    module: str
+    module: str  # Absolute name of the module
     name: str = ""
     uses: tuple[str, ...] = ("*",)
 
 
 @dataclass(frozen=True)
 class Definition:
-    """A name that a module binds at its top level.
+    """A name that a module binds at its top level."""
 
-    Attributes
-    ----------
-    digest : str
-        Of the statements that bind it, hexadecimal.
-    names : tuple of str
-        Names of the module that it refers to.
-    edges : tuple of Edge
-        What it imports, and what it uses of the module's imports.
-    """
-
-    digest: str
-    names: tuple[str, ...]
-    edges: tuple[Edge, ...]
+    digest: str  # Of the statements that bind it, hexadecimal
+    names: tuple[str, ...]  # Names of the module that it refers to
+    edges: tuple[Edge, ...]  # What it imports, and what it uses of the module's imports
 
 
 @dataclass(frozen=True)
 class Facts:
-    """What a module's source says.
+    """What a module's source says."""
 
-    Attributes
-    ----------
-    digest : str
-        Of the whole module, hexadecimal.
-    edges : tuple of Edge
-        All that it imports, also inside functions; not what it imports for type checkers alone.
-    definitions : dict of str to Definition
-        By name; empty where they were not asked for.
-    unknown : tuple of str
-        Imports whose module is known only when the code runs.
-    handed_on : dict of str to tuple of Edge
-        Names that the module binds at its top level by importing them from this package, and where they are from;
-        empty where definitions were not asked for.
-    """
-
-    digest: str
-    edges: tuple[Edge, ...]
-    definitions: dict[str, Definition] = field(default_factory=dict)
-    unknown: tuple[str, ...] = ()
+    digest: str  # Of the whole module, hexadecimal
+    edges: tuple[Edge, ...]  # All that it imports, also inside functions; not what it imports for type checkers alone
+    definitions: dict[str, Definition] = field(default_factory=dict)  # By name; empty where they were not asked for
+    unknown: tuple[str, ...] = ()  # Imports whose module is known only when the code runs
     handed_on: dict[str, tuple[Edge, ...]] = field(default_factory=dict)
 
 
 def module_facts(source: bytes, module: str, is_package: bool, by_definition: bool = False) -> Facts:
-    """Read a module's source.
-
-    Parameters
-    ----------
-    source : bytes
-        Of the module's file.
-    module : str
-        Its absolute name.
-    is_package : bool
-        Whether the file is an ``__init__.py``.
-    by_definition : bool
-        Whether `Facts.definitions` is filled in.
-
-    Returns
-    -------
-    Facts
-
-    Raises
-    ------
-    SyntaxError
-        The source is no Python.
-    """
+    """Read a module's source."""
     tree = ast.parse(source)
     package = module if is_package else module.rpartition(".")[0]
     imports = _Imports(tree, module, package)

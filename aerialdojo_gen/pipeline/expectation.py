@@ -17,17 +17,7 @@ _BELIEVED_S = 10.0
 
 
 class Expectation:
-    """What is left of stages, in seconds of one core, by the stages' own figures and by what was done so far.
-
-    Parameters
-    ----------
-    stages : sequence of Stage
-        All that a run does.
-    scenes : sequence of str
-        Names of the scenes.
-    roots : Roots
-        Where tables or annotations tell how many objects a scene has.
-    """
+    """What is left of stages, in seconds of one core, by the stages' own figures and by what was done so far."""
 
     def __init__(self, stages: Sequence[Stage], scenes: Sequence[str], roots: Roots) -> None:
         objects = {scene: objects_of(roots, scene) for scene in scenes}

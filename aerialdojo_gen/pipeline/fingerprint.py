@@ -24,27 +24,6 @@ def scene_fingerprint(stage: Stage, pipeline: Pipeline, roots: Roots, scene: str
     Inputs count by their content, not by their own fingerprint: where an upstream stage ran again and wrote the
     same rows, nothing downstream is stale. The code counts as `aerialdojo_gen.pipeline.code_digest` finds it, with
     the versions of the libraries that it imports; no absolute path counts.
-
-    Parameters
-    ----------
-    stage : Stage
-        The stage that writes.
-    pipeline : Pipeline
-        Its section, the seed and the embodiment count.
-    roots : Roots
-        Where the inputs and assets are.
-    scene : str
-        Name of the scene.
-
-    Returns
-    -------
-    str
-        Hexadecimal SHA-256.
-
-    Raises
-    ------
-    StoreError, AssetError
-        An input or an asset is missing or damaged.
     """
     code = scene_code(stage, roots, scene, pipeline.section(stage.name))
     # The paper's figures lie beside the package in a checkout, inside it in a wheel.

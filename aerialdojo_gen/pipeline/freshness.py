@@ -27,40 +27,20 @@ class Limits:
     """How much of a stage is computed now, and how closely what is there is looked at.
 
     What is left out is computed when the command is given again.
-
-    Attributes
-    ----------
-    share : (int, int)
-        ``(i, n)``: every n-th shard, from the i-th on. The shares of n machines, copied into one folder, are what one
-        machine writes.
-    deadline : float or None
-        Seconds since the epoch after which nothing further is begun.
-    verify : bool
-        Files count as whole if their digests are right, not their sizes alone.
     """
 
-    share: tuple[int, int] = (0, 1)
-    deadline: float | None = None
-    verify: bool = False
+    share: tuple[int, int] = (0, 1)  # (int, int)
+    deadline: float | None = None  # Seconds since the epoch after which nothing further is begun
+    verify: bool = False  # Files count as whole if their digests are right, not their sizes alone
 
 
 @dataclass(frozen=True)
 class Shards:
-    """A stage's shards under one configuration.
+    """A stage's shards under one configuration."""
 
-    Attributes
-    ----------
-    tasks : list of Task
-        What is to be computed.
-    fresh : list of dict
-        The summaries of what need not be.
-    errors : dict of str to AerialDojoError
-        What is missing or damaged of the inputs, by scene.
-    """
-
-    tasks: list[Task]
-    fresh: list[dict[str, Any]]
-    errors: dict[str, AerialDojoError]
+    tasks: list[Task]  # What is to be computed
+    fresh: list[dict[str, Any]]  # The summaries of what need not be
+    errors: dict[str, AerialDojoError]  # What is missing or damaged of the inputs, by scene
 
     @property
     def all_fresh(self) -> bool:
@@ -78,23 +58,7 @@ def shards_of(
     reporter: Reporter,
     limits: Limits,
 ) -> Shards:
-    """Find out which of a stage's shards are fresh, and remove what is none of them.
-
-    Parameters
-    ----------
-    stage, config : Stage, Section
-        The stage, and its section as it is settled.
-    scenes : sequence of str
-        Names of the scenes.
-    pipeline, roots : Pipeline, Roots
-        The other sections, the seed, the folders.
-    force : bool
-        None counts as fresh.
-    reporter : Reporter
-        Is told of what is damaged.
-    limits : Limits
-        Shards beyond the share are left out.
-    """
+    """Find out which of a stage's shards are fresh, and remove what is none of them."""
     pipeline = pipeline.model_copy(update={stage.name.replace("-", "_"): config})
     found = Shards([], [], {})
     shard = -1

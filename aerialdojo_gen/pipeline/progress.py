@@ -137,26 +137,14 @@ class Bar:
 
 @dataclass(frozen=True)
 class Overview:
-    """How far a run is.
+    """How far a run is."""
 
-    Attributes
-    ----------
-    done_s, left_s : float
-        What was done, and what is expected to be left, seconds of one core.
-    scenes_done, scenes : int
-        Scenes that nothing is to be done of, and all.
-    at_work : list of str
-        What is under way, in words.
-    processes : int
-        How many are at work when there is enough to do.
-    """
-
-    done_s: float
+    done_s: float  # What was done, and what is expected to be left, seconds of one core
     left_s: float
-    scenes_done: int
+    scenes_done: int  # Scenes that nothing is to be done of, and all
     scenes: int
-    at_work: list[str]
-    processes: int = 1
+    at_work: list[str]  # What is under way, in words
+    processes: int = 1  # How many are at work when there is enough to do
 
     @property
     def share(self) -> float:
@@ -181,16 +169,7 @@ class Overview:
 
 
 class Overall:
-    """Shows how far a run through several stages is.
-
-    Parameters
-    ----------
-    look : callable
-        Tells it.
-    stream : text stream
-    quiet : bool
-        Show nothing.
-    """
+    """Shows how far a run through several stages is."""
 
     def __init__(self, look: Callable[[], Overview], stream: TextIO, quiet: bool) -> None:
         self._look, self._stream = look, stream
@@ -245,21 +224,7 @@ def duration(seconds: float) -> str:
 
 
 class Reporter:
-    """Writes progress and summary lines to a stream (standard error by default).
-
-    Parameters
-    ----------
-    quiet : bool
-        Say nothing.
-    stream : text stream, optional
-        Where to write.
-    verbose : bool
-        Say more: a line also for a stage with nothing to do.
-
-    Attributes
-    ----------
-    verbose : bool
-    """
+    """Writes progress and summary lines to a stream (standard error by default)."""
 
     def __init__(self, quiet: bool = False, stream: TextIO | None = None, *, verbose: bool = False) -> None:
         self._quiet, self._stream = quiet, raw(stream or sys.stderr)

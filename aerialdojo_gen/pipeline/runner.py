@@ -44,45 +44,7 @@ def run(
     prepare: Callable[[], None] | None = None,
     finish: Callable[[], None] | None = None,
 ) -> list[StageSummary]:
-    """Run stages in their order on the scenes that are ready for them.
-
-    Parameters
-    ----------
-    stages : sequence of Stage
-        In pipeline order; what they read must be there or be written by an earlier one.
-    scenes : sequence of str
-        Names of the scenes.
-    pipeline : Pipeline
-        Configuration and seed.
-    roots : Roots
-        The folders.
-    workers : int, optional
-        Processes; with 1 everything runs in this one, with None on all cores there are.
-    executor, address : str
-        As for `aerialdojo_gen.pipeline.executors.make_executor`.
-    force : iterable of str
-        Names of stages whose shards are computed even where they are fresh.
-    reporter : Reporter, optional
-        Shows progress and summaries.
-    limits : Limits, optional
-        How much of the last stage is computed now; all of it where absent.
-
-    prepare, finish : callable, optional
-        Called before the first stage and after the last one, while the data directory is held.
-
-    Returns
-    -------
-    list of StageSummary
-        One a stage.
-
-    Raises
-    ------
-    AerialDojoError
-        A shard failed in an expected way: its scene stays at that stage, the others are taken on as far as no stage
-        wants all scenes.
-    KeyboardInterrupt
-        Workers have ended; finished shards stay.
-    """
+    """Run stages in their order on the scenes that are ready for them."""
     reporter = reporter or Reporter(quiet=True)
     forced, started = set(force), time.monotonic()
     summaries: list[StageSummary] = []
@@ -142,15 +104,7 @@ def _altogether(summaries: Sequence[StageSummary], seconds: float) -> str:
 
 
 def chained(stages: Sequence[Stage], *, alone: bool = False) -> list[list[Stage]]:
-    """Group stages that a scene goes through at its own pace; all scenes wait for one another before each group.
-
-    Parameters
-    ----------
-    stages : sequence of Stage
-        In pipeline order.
-    alone : bool
-        Whether the last one is a group of its own.
-    """
+    """Group stages that a scene goes through at its own pace; all scenes wait for one another before each group."""
     groups: list[list[Stage]] = []
     for stage in stages:
         if not groups or stage.waits or (alone and stage is stages[-1]):
@@ -188,27 +142,7 @@ def _go_through(
 
 
 def unready(stages: Sequence[Stage], scenes: Sequence[str], roots: Roots) -> dict[str, str]:
-    """Find the scenes that stages leave out, as these or what they build on want something of its author first.
-
-    Parameters
-    ----------
-    stages : sequence of Stage
-        What is to run.
-    scenes : sequence of str
-        Names of the scenes.
-    roots : Roots
-        The folders.
-
-    Returns
-    -------
-    dict of str to str
-        Why, by scene, in a line that names the mend.
-
-    Raises
-    ------
-    AssetError
-        None of the scenes would be left.
-    """
+    """Find the scenes that stages leave out, as these or what they build on want something of its author first."""
     before = {each.name: each for stage in stages for each in upstream(stage.name)}
     inputs = {table for stage in stages for table in stage.reads} - {t for stage in stages for t in stage.writes}
 
@@ -238,24 +172,12 @@ def known_scenes(recipes: Path) -> list[str]:
 
 
 def chosen_scenes(pipeline: Pipeline, roots: Roots, patterns: Sequence[str] | None = None) -> list[str]:
-    """Resolve names and globs to scenes with a recipe; the pipeline's own scenes where there are none.
-
-    Raises
-    ------
-    UsageError
-        A pattern matches nothing; the message gives the nearest names.
-    """
+    """Resolve names and globs to scenes with a recipe; the pipeline's own scenes where there are none."""
     return choose_scenes(patterns or pipeline.scenes, known_scenes(roots.recipes))
 
 
 def stages_named(names: Sequence[str] | None) -> list[Stage]:
-    """Return the stages of these names in pipeline order; all of them for None.
-
-    Raises
-    ------
-    UsageError
-        A name is unknown.
-    """
+    """Return the stages of these names in pipeline order; all of them for None."""
     if names is None:
         return list(STAGES)
     known = [stage.name for stage in STAGES]

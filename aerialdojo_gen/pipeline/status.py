@@ -17,24 +17,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class StageStatus:
-    """A stage's scenes by the state of their tables.
+    """A stage's scenes by the state of their tables."""
 
-    Attributes
-    ----------
-    stage : str
-        Name of the stage.
-    fresh : tuple of str
-        Scenes whose tables a run would keep, if their inputs stay as they are.
-    stale : tuple of str
-        Scenes whose tables a run would compute again: other inputs, settings or code, damaged, incomplete.
-    missing : tuple of str
-        Scenes without a table of this stage.
-    """
-
-    stage: str
-    fresh: tuple[str, ...] = ()
+    stage: str  # Name of the stage
+    fresh: tuple[str, ...] = ()  # Scenes whose tables a run would keep, if their inputs stay as they are
     stale: tuple[str, ...] = ()
-    missing: tuple[str, ...] = ()
+    missing: tuple[str, ...] = ()  # Scenes without a table of this stage
 
 
 def pipeline_status(
@@ -46,25 +34,6 @@ def pipeline_status(
     """Say which scenes of each stage are fresh, stale or missing; the twin of ``aerialdojo-gen status``.
 
     A stage after a stale one may become stale by it: each is compared with its inputs as they are now.
-
-    Parameters
-    ----------
-    pipeline : str, Path or Pipeline, optional
-        As for `aerialdojo_gen.run_pipeline`.
-    data : str, Path or DataRoot
-        The data directory; nothing is written to it.
-    scenes : sequence of str, optional
-        Names or globs; the pipeline's own where absent.
-
-    Returns
-    -------
-    list of StageStatus
-        One for each stage of the pipeline, in order.
-
-    Raises
-    ------
-    AerialDojoError
-        There is no such pipeline or scene.
     """
     from aerialdojo_gen.pipeline.run import open_pipeline
     from aerialdojo_gen.pipeline.runner import chosen_scenes, stages_named

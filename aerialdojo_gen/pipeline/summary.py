@@ -8,29 +8,15 @@ from dataclasses import dataclass, field
 
 @dataclass(frozen=True)
 class StageSummary:
-    """What a stage did.
+    """What a stage did."""
 
-    Attributes
-    ----------
-    stage : str
-        Name of the stage.
-    rows_in, rows_out : int
-        Over all its shards, also those that were already there.
-    counts : Counter
-        Reasons and outcomes, over all its shards.
-    shards, computed : int
-        Shards in all; shards that were computed now.
-    seconds : float
-        Time that its shards took, in all processes together, and looking which of them are fresh.
-    """
-
-    stage: str
-    rows_in: int
+    stage: str  # Name of the stage
+    rows_in: int  # Over all its shards, also those that were already there
     rows_out: int
-    counts: Counter[str] = field(default_factory=Counter)
-    shards: int = 0
+    counts: Counter[str] = field(default_factory=Counter)  # Reasons and outcomes, over all its shards
+    shards: int = 0  # Shards in all; shards that were computed now
     computed: int = 0
-    seconds: float = 0.0
+    seconds: float = 0.0  # Time that its shards took, in all processes together, and looking which of them are fresh
 
     def __str__(self) -> str:
         """One line: rows in, rows out, why the others were rejected, seconds."""

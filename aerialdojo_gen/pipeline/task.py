@@ -20,23 +20,11 @@ from aerialdojo_gen.store.footers import ShardFile
 
 @dataclass(frozen=True)
 class Task:
-    """A shard to compute.
+    """A shard to compute."""
 
-    Attributes
-    ----------
-    job : Job
-        What it is.
-    config : Section
-        Its stage's section.
-    fingerprint : str
-        To be stored with it.
-    given : Given
-        What the user gave, for the advice of messages in whatever process they are made.
-    """
-
-    job: Job
-    config: Section
-    fingerprint: str
+    job: Job  # What it is
+    config: Section  # Its stage's section
+    fingerprint: str  # To be stored with it
     given: Given = field(default_factory=given, compare=False)
 
     @property
@@ -64,30 +52,14 @@ class Task:
 
 @dataclass(frozen=True)
 class Computed:
-    """What is told of a shard that was computed.
+    """What is told of a shard that was computed."""
 
-    Attributes
-    ----------
-    summary : dict
-        ``rows_in``, ``rows_out``, ``counts``, as its footer has it.
-    seconds : float
-        Wall time that it took its process.
-    """
-
-    summary: dict[str, Any]
-    seconds: float
+    summary: dict[str, Any]  # ``rows_in``, ``rows_out``, ``counts``, as its footer has it
+    seconds: float  # Wall time that it took its process
 
 
 def compute(task: Task) -> Computed:
-    """Compute one shard and commit its tables.
-
-    Raises
-    ------
-    AerialDojoError
-        An expected failure.
-    RuntimeError
-        Anything else, with the shard in its message and the cause chained.
-    """
+    """Compute one shard and commit its tables."""
     job = task.job
     if job.deadline is not None and time.time() >= job.deadline:
         raise BudgetSpent(f"the budget was spent before {task.label}")

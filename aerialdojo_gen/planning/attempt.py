@@ -25,28 +25,14 @@ _ON_GOAL_M = 1e-9
 
 
 class Attempt(NamedTuple):
-    """What came of one search.
+    """What came of one search."""
 
-    Attributes
-    ----------
-    status, expansions : int
-        As `aerialdojo_gen.planning.hybrid_astar.search` returns them.
-    poses : (K + 1, 4) float64
-        x, y, z in metres and yaw in (-pi, pi]; no rows unless FOUND.
-    actions : (K + 1,) int8
-        What is done at every pose, Stop at the last.
-    length : float
-        The paper's L, metres.
-    seen : Examination
-        Of the route; meaningless unless FOUND.
-    """
-
-    status: int
+    status: int  # As `aerialdojo_gen.planning.hybrid_astar.search` returns them
     expansions: int
-    poses: NDArray[np.float64]
-    actions: NDArray[np.int8]
-    length: float
-    seen: Examination
+    poses: NDArray[np.float64]  # (K + 1, 4) float64; x, y, z in metres and yaw in (-pi, pi]; no rows unless FOUND
+    actions: NDArray[np.int8]  # (K + 1,) int8; what is done at every pose, Stop at the last
+    length: float  # The paper's L, metres
+    seen: Examination  # Of the route; meaningless unless FOUND
 
 
 @njit(cache=True)
@@ -85,34 +71,7 @@ def attempt(
     radius: float,
     bound: float,
 ) -> Attempt:
-    """Search a route, bring it into its best order, fly it and look how near it comes to surfaces.
-
-    Parameters
-    ----------
-    start : (4,) float64
-        x, y, z in metres, and yaw in radians; free.
-    goal : (3,) float64
-        Metres; free.
-    goal_heading : int
-        Heading to end with, counted from the start's yaw.
-    cost_to_go : (nx, ny, nz) float32
-        Of the goal, metres.
-    grid : GridArrays
-        The clearance grid.
-    memory : SearchArrays
-        Of the search.
-    options : SearchOptions
-        How to search.
-    radius : float
-        The body's radius, metres, without the margins of the search.
-    bound : float
-        Clearances beyond it need not be known, metres.
-
-    Returns
-    -------
-    Attempt
-        See there.
-    """
+    """Search a route from a pose (4,) to a goal (3,), order its moves, fly it and measure its clearance, metres."""
     status, expansions, moves = search(start, goal, goal_heading, cost_to_go, grid, memory, options)
     if status != FOUND:
         unseen = Examination(np.empty((0, 3)), False, np.empty(0, np.bool_), 0.0)

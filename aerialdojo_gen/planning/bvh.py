@@ -20,23 +20,7 @@ _STACK = 64
 def build_bvh(
     triangles: NDArray[np.float64],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
-    """Sort triangles and box them.
-
-    Parameters
-    ----------
-    triangles : (n, 9) float64
-        Metres; n may be 0.
-
-    Returns
-    -------
-    triangles : (n, 9) float64
-        In the tree's order.
-    boxes : (2 m, 6) float64
-        Lower and upper corner of every node's box, m leaves (a power of two); row 0 is unused, an empty node's box
-        is inverted.
-    order : (n,) int64
-        Which of the given triangles each is.
-    """
+    """Sort triangles (n, 9) into a tree: sorted triangles, node boxes (2 m, 6; row 0 unused) and the order."""
     n = len(triangles)
     order = np.arange(n)
     if n:
@@ -167,19 +151,9 @@ def segment_distance(
 
 @njit(cache=True)
 def crossings_above(px: float, py: float, pz: float, tri: NDArray[np.float64], boxes: NDArray[np.float64]) -> int:
-    """Surfaces crossed on the way straight up from p: outward faces count +1, inward faces -1.
+    """Surfaces crossed straight up from p, outward +1, inward -1.
 
-    Parameters
-    ----------
-    px, py, pz : float
-        World frame, metres.
-    tri, boxes : arrays
-        As `build_bvh` returns them.
-
-    Returns
-    -------
-    int
-        Positive inside a closed solid, or below a surface that faces up.
+    Positive inside a solid or below an upward surface.
     """
     leaves = boxes.shape[0] // 2
     stack = np.empty(_STACK, np.int64)
@@ -256,24 +230,7 @@ def nearest_owners(
     px: float, py: float, pz: float, bound: float, slack: float, tri: NDArray[np.float64],
     boxes: NDArray[np.float64], owner: NDArray[np.int32],
 ) -> NDArray[np.int32]:  # fmt: skip
-    """Whose the triangles are that are as near to p as any, give or take `slack`; none where all are beyond `bound`.
-
-    Parameters
-    ----------
-    px, py, pz : float
-        World frame, metres.
-    bound, slack : float
-        Metres.
-    tri, boxes : arrays
-        As `build_bvh` returns them.
-    owner : (n,) int32
-        Whose each triangle is.
-
-    Returns
-    -------
-    (k,) int32
-        Each owner once.
-    """
+    """Owners (k,) of the triangles nearest to p, give or take `slack` metres; none where all are beyond `bound`."""
     found = np.empty(8, np.int32)
     n = 0
     near = point_distance(px, py, pz, bound, tri, boxes)

@@ -21,43 +21,21 @@ from aerialdojo_gen.planning.grid_kernels import GridArrays, inside, polyline_cl
 
 @dataclass(frozen=True)
 class Certificate:
-    """What is known of a route.
+    """What is known of a route."""
 
-    Attributes
-    ----------
-    collision_free : bool
-        No surface is touched and the flight volume is not left.
-    min_clearance_m : float
-        Smallest distance from the centre line to any surface, metres, up to the grid's `cap_m`.
-    legs, asked : int
-        Straight legs of the route, and how many of them FCL was asked about.
-    """
-
-    collision_free: bool
-    min_clearance_m: float
-    legs: int
+    collision_free: bool  # No surface is touched and the flight volume is not left
+    min_clearance_m: float  # Smallest distance from the centre line to any surface, metres, up to the grid's `cap_m`
+    legs: int  # Straight legs of the route, and how many of them FCL was asked about
     asked: int
 
 
 class Examination(NamedTuple):
-    """What the grid and the triangles say of a route.
+    """What the grid and the triangles say of a route."""
 
-    Attributes
-    ----------
-    corners : (m, 3) float64
-        Where the route bends, ends included, metres.
-    inside : bool
-        Whether it stays in the flight volume.
-    undecided : (max(1, m - 1),) bool
-        Legs that the grid alone does not prove free.
-    clearance : float
-        Smallest distance from the centre line to any surface, metres, up to the bound asked for.
-    """
-
-    corners: NDArray[np.float64]
-    inside: bool
-    undecided: NDArray[np.bool_]
-    clearance: float
+    corners: NDArray[np.float64]  # (m, 3) float64; where the route bends, ends included, metres
+    inside: bool  # Whether it stays in the flight volume
+    undecided: NDArray[np.bool_]  # (max(1, m - 1),) bool; legs that the grid alone does not prove free
+    clearance: float  # Smallest distance from the centre line to any surface, metres, up to the bound asked for
 
 
 @njit(cache=True)
@@ -102,24 +80,7 @@ def _all_inside(points: NDArray[np.float64], grid: GridArrays) -> bool:
 
 @njit(cache=True)
 def examine(points: NDArray[np.float64], radius: float, bound: float, grid: GridArrays) -> Examination:
-    """See what is known of a route without FCL.
-
-    Parameters
-    ----------
-    points : (n, 3) float64
-        Positions along the route, world frame, metres; n at least 1.
-    radius : float
-        The body's radius, metres.
-    bound : float
-        Clearances beyond it need not be known, metres.
-    grid : GridArrays
-        The clearance grid.
-
-    Returns
-    -------
-    Examination
-        See there.
-    """
+    """Measure a route's points (n, 3), world metres, by the clearance grid alone, without FCL."""
     p = corners(points)
     return Examination(p, _all_inside(p, grid), _undecided(p, radius, grid), polyline_clearance(p, bound, grid))
 
@@ -127,25 +88,9 @@ def examine(points: NDArray[np.float64], radius: float, bound: float, grid: Grid
 def certify(
     points: NDArray[np.float64], radius_m: float, grid: ClearanceGrid, world: CollisionWorld, prove: bool = True
 ) -> Certificate:
-    """Check a route with FCL.
+    """Certify a route's points (n, 3), world metres.
 
-    Parameters
-    ----------
-    points : (n, 3) float64
-        Positions along the route, world frame, metres; n at least 1.
-    radius_m : float
-        The body's radius.
-    grid : ClearanceGrid
-        Of the same scene.
-    world : CollisionWorld
-        Of the same scene.
-    prove : bool
-        Leave FCL unasked where the grid proves a leg free; False asks it about every leg.
-
-    Returns
-    -------
-    Certificate
-        See there.
+    FCL is asked about every leg that the grid does not prove free.
     """
     seen = examine(np.ascontiguousarray(points, np.float64), radius_m, grid.cap_m, grid.arrays)
     return conclude(seen, radius_m, world, prove)

@@ -64,36 +64,16 @@ class _Space:
 
 @dataclass(frozen=True, eq=False)
 class ClearanceGrid:
-    """Distances on a grid, backed by the triangles where the grid cannot decide.
+    """Distances on a grid, backed by the triangles where the grid cannot decide."""
 
-    Attributes
-    ----------
-    arrays : GridArrays
-        Distance field, triangles and bounds, for numba kernels.
-    moves : (nx, ny, nz) uint32
-        Passable moves of every cell (`aerialdojo_gen.planning.connectivity.passable_moves`).
-    sky : (nx, ny, nz) bool
-        Cells from which the body can fly to the ceiling.
-    radius_m : float
-        The body's radius, with the planner's margin.
-    cap_m : float
-        Distances are known up to this.
-    ground : Ground or None
-        The scene's ground where that is an open sheet that the body could get past.
-    has_curtain : bool
-        Whether the body could get below it but for the curtain.
-    owner : (n,) int32
-        Index of the instance that each of ``arrays.real_tri`` is of.
-    """
-
-    arrays: GridArrays
-    moves: NDArray[np.uint32]
-    sky: NDArray[np.bool_]
-    radius_m: float
-    cap_m: float
-    owner: NDArray[np.int32]
-    ground: Ground | None = None
-    has_curtain: bool = False
+    arrays: GridArrays  # Distance field, triangles and bounds, for numba kernels
+    moves: NDArray[np.uint32]  # Passable moves of every cell (`aerialdojo_gen.planning.connectivity.passable_moves`)
+    sky: NDArray[np.bool_]  # (nx, ny, nz) bool; cells from which the body can fly to the ceiling
+    radius_m: float  # The body's radius, with the planner's margin
+    cap_m: float  # Distances are known up to this
+    owner: NDArray[np.int32]  # (n,) int32; index of the instance that each of ``arrays.real_tri`` is of
+    ground: Ground | None = None  # The scene's ground where that is an open sheet that the body could get past
+    has_curtain: bool = False  # Whether the body could get below it but for the curtain
 
     @classmethod
     def build(
@@ -106,30 +86,7 @@ class ClearanceGrid:
         margin_m: float = 0.0,
         closed_ground: bool = True,
     ) -> ClearanceGrid:
-        """Build the grid over a scene's flight volume.
-
-        Parameters
-        ----------
-        scene : Scene
-            World coordinates, metres.
-        cell_m : float
-            Edge of a cell.
-        radius_m : float
-            The body's radius.
-        band_m : float
-            The field is exact up to this distance.
-        cap_m : float
-            The field is never above this.
-        margin_m : float
-            Added to the radius against surfaces, not against the bounds of the flight volume.
-        closed_ground : bool
-            Keep the body from below open ground; False knows surfaces alone.
-
-        Returns
-        -------
-        ClearanceGrid
-            Depends on the scene and the parameters alone.
-        """
+        """Build the grid over a scene's flight volume (metres); it depends on the scene and the parameters alone."""
         space = _Space.build(scene, cell_m, radius_m, band_m, cap_m, closed_ground)
         return cls._within(space, radius_m + margin_m, cap_m)
 
@@ -163,58 +120,24 @@ class ClearanceGrid:
         return cls(space.arrays, moves, sky, radius_m, cap_m, space.owner, space.ground, space.has_curtain)
 
     def distance_m(self, p: ArrayLike) -> float:
-        """Exact distance from a point to the nearest surface, up to `cap_m`; metres.
-
-        Parameters
-        ----------
-        p : (3,) float
-            World frame, metres.
-        """
+        """Exact distance, metres, from a point (3,) in the world frame to the nearest surface, up to `cap_m`."""
         x, y, z = np.asarray(p, np.float64)
         return float(point_distance(x, y, z, self.cap_m, self.arrays.real_tri, self.arrays.real_boxes))
 
     def nearest(self, p: ArrayLike) -> NDArray[np.int32]:
-        """Instances whose surface is as near to a point as any: mostly one; none where all are beyond `cap_m`.
-
-        Parameters
-        ----------
-        p : (3,) float
-            World frame, metres, inside the flight volume.
-
-        Returns
-        -------
-        (k,) int32
-            Their indices.
-        """
+        """Indices (k,) of the instances nearest to a point (3,); mostly one, none where all are beyond `cap_m`."""
         x, y, z = np.asarray(p, np.float64)
         a = self.arrays
         return np.asarray(nearest_owners(x, y, z, self.cap_m, _SAME_M, a.real_tri, a.real_boxes, self.owner))
 
     def ball_proven_free(self, p: ArrayLike, radius_m: float) -> bool:
-        """Whether the grid alone proves that a ball touches nothing; False is undecided.
-
-        Parameters
-        ----------
-        p : (3,) float
-            Its centre, world frame, metres, inside the flight volume.
-        radius_m : float
-        """
+        """Whether the grid alone proves that a ball (centre in world metres) touches nothing; False is undecided."""
         return self.segment_proven_free(p, p, radius_m)
 
     def in_collision(self, p: ArrayLike) -> bool:
-        """Whether the body cannot be at a point: it would touch a surface, leave the bounds, or sit in a solid.
+        """Whether the body at a point (3,) touches a surface, leaves the bounds.
 
-        Parameters
-        ----------
-        p : (3,) float
-            World frame, metres.
-
-        Returns
-        -------
-        bool
-            True for a collision. A point that cannot reach the sky counts as inside a solid if it is below open
-            ground, or if a ray straight up leaves more surfaces than it enters; the air in a sealed room is no
-            collision.
+        Or sits in a solid or below open ground.
         """
         x, y, z = np.asarray(p, np.float64)
         a = self.arrays
@@ -225,13 +148,7 @@ class ClearanceGrid:
         )
 
     def reachable(self, p: ArrayLike) -> bool:
-        """Whether the body can be at a point above ground and fly from there to the ceiling.
-
-        Parameters
-        ----------
-        p : (3,) float
-            World frame, metres.
-        """
+        """Whether the body can be at a point (3,) above ground and fly from there to the ceiling."""
         x, y, z = np.asarray(p, np.float64)
         if not inside(x, y, z, self.arrays.lower, self.arrays.upper) or self.below_ground(p):
             return False
@@ -242,26 +159,10 @@ class ClearanceGrid:
         return self.ground is not None and bool(self.ground.below(points).any())
 
     def segment_proven_free(self, p: ArrayLike, q: ArrayLike, radius_m: float) -> bool:
-        """Whether the grid alone proves that a ball moving from `p` to `q` touches nothing; False is undecided.
-
-        Parameters
-        ----------
-        p, q : (3,) float
-            World frame, metres, inside the flight volume.
-        radius_m : float
-            Radius of the ball.
-        """
+        """Whether the grid alone proves that a ball moving from `p` to `q` touches nothing; False is undecided."""
         return bool(segment_free(*np.asarray(p, np.float64), *np.asarray(q, np.float64), radius_m, self.arrays, True))
 
     def segment_in_collision(self, p: ArrayLike, q: ArrayLike, radius_m: float) -> bool:
-        """Whether a ball moving from `p` to `q` touches a surface: the grid's answer, exact by the triangles.
-
-        Parameters
-        ----------
-        p, q : (3,) float
-            World frame, metres, inside the flight volume.
-        radius_m : float
-            Radius of the ball.
-        """
+        """Whether a ball moving from `p` to `q` touches a surface, exact by the triangles."""
         a, b = np.asarray(p, np.float64), np.asarray(q, np.float64)
         return not bool(segment_free(*a, *b, radius_m, self.arrays, False))

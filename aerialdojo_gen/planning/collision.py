@@ -69,13 +69,7 @@ def _touched(
 
 
 class CollisionWorld:
-    """Collision and distance queries against all instances of a scene.
-
-    Parameters
-    ----------
-    scene : Scene
-        World coordinates, metres.
-    """
+    """Collision and distance queries, world metres, against all instances of a scene."""
 
     def __init__(self, scene: Scene) -> None:
         self._instances = scene.instances
@@ -106,39 +100,14 @@ class CollisionWorld:
             return manager
 
     def sphere_in_collision(self, p: ArrayLike, radius_m: float) -> bool:
-        """Whether a ball touches a surface.
-
-        Parameters
-        ----------
-        p : (3,) float
-            Centre, world frame, metres.
-        radius_m : float
-            Radius of the ball.
-
-        Returns
-        -------
-        bool
-            True for a collision.
-        """
+        """Whether a ball (centre (3,), world metres) touches a surface."""
         x, y, z = np.asarray(p, np.float64).tolist()
         return self._collides(self._sphere(p, radius_m), x, y, z, x, y, z, radius_m)
 
     def segment_in_collision(self, p: ArrayLike, q: ArrayLike, radius_m: float) -> bool:
-        """Whether a ball that moves straight from `p` to `q` touches a surface anywhere on its way.
+        """Whether a ball moving straight from `p` to `q` touches a surface.
 
-        The ball's sweep is exactly a capsule, so that nothing is sampled.
-
-        Parameters
-        ----------
-        p, q : (3,) float
-            Ends of the centre's way, world frame, metres.
-        radius_m : float
-            Radius of the ball.
-
-        Returns
-        -------
-        bool
-            True for a collision.
+        Its sweep is exactly a capsule, nothing is sampled.
         """
         ax, ay, az = np.asarray(p, np.float64).tolist()
         bx, by, bz = np.asarray(q, np.float64).tolist()
@@ -158,15 +127,9 @@ class CollisionWorld:
         return self._collides(capsule, ax, ay, az, bx, by, bz, radius_m)
 
     def distance_m(self, p: ArrayLike, nearest: Iterable[int] = ()) -> float:
-        """Distance from a point to the nearest surface of the scene, metres; infinite in an empty scene.
+        """Distance, metres, from a point to the nearest surface, of the instances `nearest` alone where given.
 
-        Parameters
-        ----------
-        p : (3,) float
-            World frame, metres.
-        nearest : iterable of int
-            Indices of instances, where it is known that no others are nearer than the nearest of these: the others
-            are not asked.
+        Inf if empty.
         """
         if not self._instances:
             return float("inf")
@@ -180,39 +143,13 @@ class CollisionWorld:
         return max(float(data.result.min_distance), 0.0) + _POINT_RADIUS_M
 
     def instance_distance_m(self, node: str, p: ArrayLike) -> float:
-        """Distance from a point to the surface of one instance, metres.
-
-        Parameters
-        ----------
-        node : str
-            Node name of the instance.
-        p : (3,) float
-            World frame, metres.
-
-        Raises
-        ------
-        KeyError
-            There is no such node.
-        """
+        """Distance, metres, from a point to the surface of one instance."""
         sphere = self._sphere(p, _POINT_RADIUS_M)
         distance = fcl.distance(sphere, self._object(self._index[node]), self._distances)
         return max(float(distance), 0.0) + _POINT_RADIUS_M
 
     def route_in_collision(self, points: Sequence[ArrayLike] | NDArray[np.float64], radius_m: float) -> bool:
-        """Whether a ball that follows a polyline touches a surface.
-
-        Parameters
-        ----------
-        points : (n, 3) float
-            Corners of the way, world frame, metres.
-        radius_m : float
-            Radius of the ball.
-
-        Returns
-        -------
-        bool
-            True for a collision.
-        """
+        """Whether a ball that follows a polyline (n, 3), world metres, touches a surface."""
         p = np.asarray(points, np.float64)
         if len(p) == 1:
             return self.sphere_in_collision(p[0], radius_m)

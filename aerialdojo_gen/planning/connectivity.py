@@ -65,24 +65,7 @@ def _passable(
 
 @njit(cache=True, nogil=True)
 def passable_moves(grid: GridArrays, radius: float) -> NDArray[np.uint32]:
-    """Find the moves that the body can make from every cell.
-
-    Axis moves are exact. A diagonal or knight's move of a body at least as wide as a cell is passable where both ways
-    round it are, for what is left between them is too small to hold a surface that keeps its distance from both;
-    another diagonal is passable where the triangles say so. A thinner body's moves are all exact.
-
-    Parameters
-    ----------
-    grid : GridArrays
-        The clearance grid.
-    radius : float
-        The body's radius, metres.
-
-    Returns
-    -------
-    (nx, ny, nz) uint32
-        Bit m stands for ``MOVES[m]``; 0 for a cell in which the body cannot be, or cannot leave.
-    """
+    """Bits of passable ``MOVES`` of every cell, (nx, ny, nz) uint32; axis moves are exact."""
     field, cell = grid.field, grid.cell
     nx, ny, nz = field.shape
     moves = np.zeros((nx, ny, nz), np.uint32)
@@ -120,18 +103,7 @@ def passable_moves(grid: GridArrays, radius: float) -> NDArray[np.uint32]:
 
 @njit(cache=True, nogil=True)
 def connected_with_ceiling(moves: NDArray[np.uint32]) -> NDArray[np.bool_]:
-    """Mark the cells that `passable_moves` connects with the highest layer that has any.
-
-    Parameters
-    ----------
-    moves : (nx, ny, nz) uint32
-        What `passable_moves` returns.
-
-    Returns
-    -------
-    (nx, ny, nz) bool
-        True where the body can fly to the ceiling.
-    """
+    """Cells, (nx, ny, nz) bool, that `passable_moves` connects with the highest layer that has any."""
     nx, ny, nz = moves.shape
     seen = np.zeros((nx, ny, nz), np.bool_)
     flat_moves, flat_seen = moves.ravel(), seen.ravel()
@@ -160,24 +132,7 @@ def connected_with_ceiling(moves: NDArray[np.uint32]) -> NDArray[np.bool_]:
 
 @njit(cache=True)
 def linked_cell(x: float, y: float, z: float, radius: float, marked: NDArray[np.bool_], grid: GridArrays) -> bool:
-    """Whether the body at a point can move straight to the centre of a nearby cell that is marked.
-
-    Parameters
-    ----------
-    x, y, z : float
-        World frame, metres.
-    radius : float
-        The body's radius, metres.
-    marked : (nx, ny, nz) bool
-        Cells that count.
-    grid : GridArrays
-        The clearance grid.
-
-    Returns
-    -------
-    bool
-        True if there is such a cell among the 64 nearest.
-    """
+    """Whether the body at a point can move straight to one of the 64 nearest cells that is marked."""
     nx, ny, nz = marked.shape
     i0 = math.floor((x - grid.origin[0]) / grid.cell - 0.5)
     j0 = math.floor((y - grid.origin[1]) / grid.cell - 0.5)

@@ -36,18 +36,7 @@ from aerialdojo_gen.planning.preference import Preference, astray, squeeze
 
 @lru_cache(maxsize=4)
 def columns_by_distance(reach: int) -> NDArray[np.int32]:
-    """List the columns around a column, the nearest first.
-
-    Parameters
-    ----------
-    reach : int
-        How far in the grid's metric of 16 directions, cells; a goal's seeds lie up to two Approaches apart.
-
-    Returns
-    -------
-    (n, 2) int32
-        Offsets along x and y.
-    """
+    """Offsets (n, 2) of the columns around a column, the nearest first."""
     i, j = np.meshgrid(np.arange(-reach, reach + 1), np.arange(-reach, reach + 1), indexing="ij")
     high, low = np.maximum(abs(i), abs(j)), np.minimum(abs(i), abs(j))
     distance = np.where(
@@ -65,29 +54,9 @@ def seed_goal(
     gx: float, gy: float, gz: float, yaw: float, reach: float, radius: float,
     grid: GridArrays, moves: NDArray[np.uint32], cost: NDArray[np.float32], prefer: Preference,
 ) -> NDArray[np.int32]:  # fmt: skip
-    """Write the cost of the straight way to the goal into the cells that see it within `reach`.
+    """Write the cost of the straight way to the goal into the cells within `reach` that see it.
 
-    Parameters
-    ----------
-    gx, gy, gz, yaw : float
-        Goal, metres and radians.
-    reach : float
-        Longest Approach, metres.
-    radius : float
-        Radius that must stay clear, metres.
-    grid : GridArrays
-        The clearance grid.
-    moves : (nx, ny, nz) uint32
-        Its passable moves.
-    cost : (nx, ny, nz) float32
-        Filled in place, metres.
-    prefer : Preference
-        What costs beside metres.
-
-    Returns
-    -------
-    (n,) int32
-        Numbers of the cells that were written.
+    Returns their numbers.
     """
     nx, ny, nz = cost.shape
     found = np.empty(4096, np.int32)
@@ -131,34 +100,9 @@ def expand_cost(
     cost: NDArray[np.float32],
     narrow: NDArray[np.float32],
 ) -> int:
-    """Costs of the cheapest paths over the grid's passable moves, outwards from seeded cells.
+    """Cheapest costs over passable moves from seeded cells, into `cost` (nx, ny, nz).
 
-    A label-correcting search over columns: those that may have something to pass on are visited by their distance
-    from the goal, then in the opposite order, and so on until none is left. In the open one visit to a column is
-    enough, and only where ways lead back round something it takes more. The result is that of Dijkstra's algorithm,
-    to the bit, because sums of multiples of the quantum do not round.
-
-    Parameters
-    ----------
-    seeds : (n,) int32
-        Flat numbers of cells whose `cost` is set, in columns near the goal's.
-    order : (m, 2) int32
-        What `columns_by_distance` returns; columns beyond it are not entered.
-    bound : float
-        Costs above this are not found, metres.
-    cell : float
-        Edge of a cell, metres.
-    moves : (nx, ny, nz) uint32
-        Passable moves.
-    cost : (nx, ny, nz) float32
-        Infinite but for the seeds; filled in place, metres.
-    narrow : (nx, ny, nz) float32
-        What a metre in the cells costs beside itself (`aerialdojo_gen.planning.preference.narrow_cells`).
-
-    Returns
-    -------
-    int
-        Number of visits.
+    Label-correcting by columns, equal to Dijkstra's to the bit as quanta add up exactly.
     """
     nx, ny, nz = cost.shape
     lengths, coarse = move_lengths(cell)
@@ -210,29 +154,7 @@ def extra_cost(
     x: float, y: float, z: float, goal: NDArray[np.float64], grid: GridArrays, moves: NDArray[np.uint32],
     cost: NDArray[np.float32], narrow: NDArray[np.float32],
 ) -> float:  # fmt: skip
-    """How much of a point's cost-to-go is not metres: what the cheapest grid path costs beside its length.
-
-    The path is followed from the cell through which the goal is reached at least cost; sums of quanta are exact, so
-    that a cell's cost less a move's is the cost of the next cell to the bit.
-
-    Parameters
-    ----------
-    x, y, z : float
-        World frame, metres.
-    goal : (3,) float64
-        Metres.
-    grid : GridArrays
-        The clearance grid.
-    moves : (nx, ny, nz) uint32
-        Its passable moves.
-    cost, narrow : (nx, ny, nz) float32
-        What `expand_cost` filled, and was given.
-
-    Returns
-    -------
-    float
-        Metres; 0 where the goal is not reached.
-    """
+    """The part of a point's cost-to-go that is not metres, by following the cheapest grid path; 0 if unreached."""
     nx, ny, nz = cost.shape
     lengths, coarse = move_lengths(grid.cell)
     ci = math.floor((x - grid.origin[0]) / grid.cell - 0.5)
@@ -278,23 +200,9 @@ def cost_at(x: float, y: float, z: float, grid: GridArrays, cost: NDArray[np.flo
 def cost_between(
     x: float, y: float, z: float, ox: float, oy: float, oz: float, cell: float, cost: NDArray[np.float32]
 ) -> float:  # fmt: skip
-    """`cost_at` for inner loops, where a tuple of arrays costs more to hand over than the work itself.
+    """`cost_at` for inner loops, where handing over a tuple of arrays costs more than the work.
 
-    Parameters
-    ----------
-    x, y, z : float
-        World frame, metres.
-    ox, oy, oz : float
-        Lower corner of the grid, metres.
-    cell : float
-        Edge of a cell, metres.
-    cost : (nx, ny, nz) float32
-        Cost-to-go of the cells, metres.
-
-    Returns
-    -------
-    float
-        Metres; infinite where all of the cells are unreached.
+    Metres, inf if unreached.
     """
     nx, ny, nz = cost.shape
     fx, fy, fz = (x - ox) / cell - 0.5, (y - oy) / cell - 0.5, (z - oz) / cell - 0.5

@@ -23,24 +23,12 @@ _ROUNDING_M = 1e-6
 
 
 class Difficulty(NamedTuple):
-    """How hard routes are, a value each.
+    """How hard routes are, a value each."""
 
-    Attributes
-    ----------
-    free_length_m : (n,) float64
-        Shortest length without obstacles (`aerialdojo_gen.planning.free_length`).
-    plan_detour : (n,) float64
-        The route's length over it, at least 1.
-    straight_line_free : (n,) bool
-        Whether the body could fly straight from start to goal.
-    climb_m : (n,) float64
-        Metres flown upwards, the Approach's among them.
-    """
-
-    free_length_m: Floats
-    plan_detour: Floats
-    straight_line_free: NDArray[np.bool_]
-    climb_m: Floats
+    free_length_m: Floats  # (n,) float64; shortest length without obstacles (`aerialdojo_gen.planning.free_length`)
+    plan_detour: Floats  # (n,) float64; the route's length over it, at least 1
+    straight_line_free: NDArray[np.bool_]  # (n,) bool; whether the body could fly straight from start to goal
+    climb_m: Floats  # (n,) float64; metres flown upwards, the Approach's among them
 
 
 @njit(cache=True)
@@ -58,24 +46,7 @@ def _judge(starts: Floats, goals: Floats, radius: float, grid: GridArrays) -> ND
 def straight_lines_free(
     starts: Floats, goals: Floats, radius_m: float, grid: ClearanceGrid, world: CollisionWorld
 ) -> NDArray[np.bool_]:
-    """Whether the body touches nothing on the straight lines from starts to goals.
-
-    Parameters
-    ----------
-    starts, goals : (n, 3) float64
-        World frame, metres; inside the flight volume.
-    radius_m : float
-        The body's radius.
-    grid : ClearanceGrid
-        Of the scene: what it proves free, or its triangles block, FCL is not asked about.
-    world : CollisionWorld
-        Of the same scene.
-
-    Returns
-    -------
-    (n,) bool
-        True for a free line. A line that passes below open ground is not.
-    """
+    """Whether the body touches nothing on the straight lines from starts to goals, (n, 3) world metres; (n,) bool."""
     p, q = (np.ascontiguousarray(points, np.float64) for points in (starts, goals))
     verdicts = _judge(p, q, radius_m, grid.arrays)
     free = verdicts == _FREE
@@ -92,26 +63,7 @@ def difficulty_of(
     grid: ClearanceGrid,
     world: CollisionWorld,
 ) -> Difficulty:
-    """Tell how hard routes of one scene are.
-
-    Parameters
-    ----------
-    routes : sequence of (K + 1, 4) float64
-        Poses: x, y, z in metres and yaw in radians, world frame; one at least each.
-    lengths_m : (n,) float64
-        Their lengths L.
-    max_approach_m : float
-        Longest Approach.
-    radius_m : float
-        The body's radius.
-    grid, world : ClearanceGrid, CollisionWorld
-        Of the scene.
-
-    Returns
-    -------
-    Difficulty
-        In the order of the routes.
-    """
+    """Difficulty of routes, each (K + 1, 4) poses in world metres and radians, in their order."""
     starts = np.array([r[0] for r in routes]).reshape(-1, 4)
     goals = np.array([r[-1, :3] for r in routes]).reshape(-1, 3)
     free_m = free_lengths_m(starts, goals, max_approach_m)

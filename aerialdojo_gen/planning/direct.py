@@ -95,40 +95,9 @@ def direct_legs(
     most: float, radius: float, approach: float, prefer: Preference, grid: GridArrays,
     directions: NDArray[np.int64], metres: NDArray[np.int64],
 ) -> tuple[float, float]:  # fmt: skip
-    """Find the direct way from a state to the goal.
+    """Direct way from a state to the goal by at most three legs, written into `directions` and `metres`.
 
-    Parameters
-    ----------
-    x, y, z : float
-        The state, metres.
-    start_yaw : float
-        Yaw that headings are counted from, radians.
-    goal : (3,) float64
-        Metres.
-    goal_yaw : float
-        Final heading, radians.
-    h : float
-        Cost-to-go of the state, metres: where it tells of a detour, nothing is tried.
-    most : float
-        Ways that cost more need not be found, metres.
-    radius : float
-        Radius that must stay clear, metres.
-    approach : float
-        Longest Approach, metres.
-    prefer : Preference
-        What costs beside metres.
-    grid : GridArrays
-        The clearance grid.
-    directions, metres : (3,) int64
-        Filled: headings counted from the start's yaw, `UP` or `DOWN`, and how far; 0 metres for a leg that is not
-        needed.
-
-    Returns
-    -------
-    length : float
-        Metres, and what an Approach that does not fly ahead costs; infinite where the grid does not prove a way free.
-    extra : float
-        What the way costs beside its metres for the surfaces that it comes near.
+    Length (inf if not proved free) and extra cost, metres.
     """
     dx, dy, dz = goal[0] - x, goal[1] - y, goal[2] - z
     flat = math.sqrt(dx * dx + dy * dy)

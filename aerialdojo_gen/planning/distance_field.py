@@ -213,13 +213,9 @@ def _beyond(
 def _seeds(
     triangles: NDArray[np.float64], origin: NDArray[np.float64], field: NDArray[np.float32], cell: float, cap: float
 ) -> tuple[NDArray[np.bool_], NDArray[np.int64]]:
-    """Cells of the grid and, as far as surfaces reach, around it that are near enough to one to hold its points.
+    """Cells near enough to a surface to hold its points, (mx, my, mz) bool.
 
-    Returns
-    -------
-    seeds : (mx, my, mz) bool
-    before : (3,) int64
-        How many cells it begins below the grid's first one.
+    And by how many they begin below the grid.
     """
     half = cell * math.sqrt(3.0) / 2
     n = np.array(field.shape, np.int64)
@@ -249,32 +245,9 @@ def build_distance_field(
     band_m: float,
     cap_m: float,
 ) -> NDArray[np.float32]:
-    """Distance from every cell's centre to the nearest triangle.
+    """Distance (nx, ny, nz) float32 from cell centres to the nearest triangle.
 
-    Parameters
-    ----------
-    triangles : (n, 9) float64
-        Metres, world frame; those around the grid count too.
-    origin : (3,) float64
-        Lower corner of the grid; the centre of cell (i, j, k) is ``origin + (i + 0.5, j + 0.5, k + 0.5) * cell_m``.
-    shape : tuple of int
-        Cells along x, y, z.
-    cell_m : float
-        Edge of a cell.
-    band_m : float
-        Up to this distance the field is exact; at least half a cell's diagonal.
-    cap_m : float
-        The field is never above this.
-
-    Returns
-    -------
-    (nx, ny, nz) float32
-        Metres, never more than the true distance (and at most 2e-5 less within the band).
-
-    Raises
-    ------
-    ValueError
-        The band is too narrow for the bound beyond it.
+    Never above the truth, exact to 2e-5 in the band.
     """
     if band_m < cell_m * math.sqrt(3.0) / 2:
         raise ValueError(f"band_m = {band_m} is less than half the diagonal of a cell of {cell_m} m")

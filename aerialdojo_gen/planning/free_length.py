@@ -25,25 +25,9 @@ _HALF_SIDE = math.tan(TURN_RAD / 2)
 
 
 def free_lengths_m(starts: ArrayLike, goals: ArrayLike, max_approach_m: float) -> Floats:
-    """Shortest lengths of routes without obstacles.
+    """Shortest lengths (n,) without obstacles, metres.
 
-    By duality the length is the largest of <y, d> - A max(0, |y| - 1), d the displacement, over the prism of all y
-    that no unit move gains more than 1 on: the dual 24-gon times [-1, 1]. That is concave, and its largest value is
-    at one of five places that have closed forms. All of them lie in the prism, so that none promises too much.
-
-    Parameters
-    ----------
-    starts : (n, 4) float
-        x, y, z in metres and yaw in radians, world frame: the yaw fixes the headings.
-    goals : (n, 3) or (3,) float
-        Metres.
-    max_approach_m : float
-        Longest Approach, more than 0.
-
-    Returns
-    -------
-    (n,) float64
-        Metres; at least the straight distance, at most the length of any route.
+    By duality the maximum of a concave function over a prism, in closed form.
     """
     s, g = np.asarray(starts, np.float64).reshape(-1, 4), np.asarray(goals, np.float64)
     way = (g - s[:, :3]) / max_approach_m

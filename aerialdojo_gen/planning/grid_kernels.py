@@ -16,33 +16,16 @@ FREE, UNKNOWN = -1, -2
 
 
 class GridArrays(NamedTuple):
-    """What kernels need of a clearance grid.
+    """What kernels need of a clearance grid."""
 
-    Attributes
-    ----------
-    field : (nx, ny, nz) float32
-        Lower bound of the distance from a cell's centre to the nearest surface, metres.
-    origin : (3,) float64
-        Lower corner of cell (0, 0, 0), metres.
-    cell : float
-        Edge of a cell, metres.
-    tri, boxes : arrays
-        Triangles that stop a body and their tree (`aerialdojo_gen.planning.bvh.build_bvh`): the scene's surfaces, and
-        the curtain that closes open ground at its rim.
-    real_tri, real_boxes : arrays
-        The surfaces alone, for distances that are told; the same arrays where there is no curtain.
-    lower, upper : (3,) float64
-        Where the body's centre may be, metres.
-    """
-
-    field: NDArray[np.float32]
-    origin: NDArray[np.float64]
-    cell: float
+    field: NDArray[np.float32]  # Lower bound of the distance from a cell's centre to the nearest surface, metres
+    origin: NDArray[np.float64]  # (3,) float64; lower corner of cell (0, 0, 0), metres
+    cell: float  # Edge of a cell, metres
     tri: NDArray[np.float64]
     boxes: NDArray[np.float64]
     real_tri: NDArray[np.float64]
     real_boxes: NDArray[np.float64]
-    lower: NDArray[np.float64]
+    lower: NDArray[np.float64]  # (3,) float64; where the body's centre may be, metres
     upper: NDArray[np.float64]
 
 
@@ -78,29 +61,9 @@ def what_blocks(
     px: float, py: float, pz: float, qx: float, qy: float, qz: float,
     radius: float, grid: GridArrays, prove_only: bool, guess: int,
 ) -> int:  # fmt: skip
-    """Find a triangle that a ball touches when it moves from p to q.
+    """Row of a triangle that a ball moving from p to q touches, FREE, or UNKNOWN with `prove_only`.
 
-    The grid's bound is 1-Lipschitz and carries the ball over open space in few steps; where it cannot decide, the
-    triangles do, exactly.
-
-    Parameters
-    ----------
-    px, py, pz, qx, qy, qz : float
-        Ends, metres; inside the flight volume.
-    radius : float
-        Radius of the ball, metres.
-    grid : GridArrays
-        The clearance grid.
-    prove_only : bool
-        Do not ask the triangles.
-    guess : int
-        Row of a triangle that may well be in the way, and is asked first; -1 for none. It changes which of several
-        is found, not whether there is one.
-
-    Returns
-    -------
-    int
-        Row of the triangle; FREE where the ball touches nothing; UNKNOWN where only the triangles could tell.
+    The grid's 1-Lipschitz bound skips open space.
     """
     field, cell = grid.field, grid.cell
     ox, oy, oz = grid.origin[0], grid.origin[1], grid.origin[2]
@@ -150,46 +113,15 @@ def segment_free(
     px: float, py: float, pz: float, qx: float, qy: float, qz: float,
     radius: float, grid: GridArrays, prove_only: bool,
 ) -> bool:  # fmt: skip
-    """Whether a ball that moves from p to q stays clear of every surface.
-
-    Parameters
-    ----------
-    px, py, pz, qx, qy, qz : float
-        Ends, metres; inside the flight volume.
-    radius : float
-        Radius of the ball, metres.
-    grid : GridArrays
-        The clearance grid.
-    prove_only : bool
-        Do not ask the triangles: True is then a proof by the grid alone, False means undecided.
-
-    Returns
-    -------
-    bool
-        True for free.
-    """
+    """Whether a ball moving from p to q stays clear; with `prove_only` False means undecided."""
     return what_blocks(px, py, pz, qx, qy, qz, radius, grid, prove_only, -1) == FREE
 
 
 @njit(cache=True, error_model="numpy")
 def polyline_clearance(points: NDArray[np.float64], bound: float, grid: GridArrays) -> float:
-    """Smallest distance from a polyline to any surface, or `bound` where that is less.
+    """Smallest distance, metres, from a polyline (n, 3) to any surface, at most `bound`.
 
-    The pieces that the grid knows least to be clear come first, for what they give spares most of the others.
-
-    Parameters
-    ----------
-    points : (n, 3) float64
-        Corners, metres; n at least 1.
-    bound : float
-        Distances beyond it need not be known, metres.
-    grid : GridArrays
-        The clearance grid.
-
-    Returns
-    -------
-    float
-        Metres.
+    The least clear pieces come first.
     """
     n, last = 0, points.shape[0] - 1
     longest = 2.0 * grid.cell

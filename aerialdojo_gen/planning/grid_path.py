@@ -26,23 +26,13 @@ GAVE_UP = -1.0
 
 
 class PathArrays(NamedTuple):
-    """Memory of a search for a grid path; pages never written cost nothing.
+    """Memory of a search for a grid path; pages never written cost nothing."""
 
-    Attributes
-    ----------
-    heads : (_N_BUCKETS,) int32
-        First open entry of every bucket, -1 for none.
-    cell, cost, next : (n,) arrays
-        Open entries as linked lists: flat number of a cell, its cost in metres when it was entered, the next entry.
-    touched : (n,) int32
-        Cells whose cost was written.
-    """
-
-    heads: NDArray[np.int32]
-    cell: NDArray[np.int32]
+    heads: NDArray[np.int32]  # (_N_BUCKETS,) int32; first open entry of every bucket, -1 for none
+    cell: NDArray[np.int32]  # (n,) arrays
     cost: NDArray[np.float32]
     next: NDArray[np.int32]
-    touched: NDArray[np.int32]
+    touched: NDArray[np.int32]  # (n,) int32; cells whose cost was written
 
 
 def make_path_arrays() -> PathArrays:
@@ -69,33 +59,7 @@ def short_path_cost(
     seeds: NDArray[np.int32], x: float, y: float, z: float, bound: float, grid: GridArrays, moves: NDArray[np.uint32],
     narrow: NDArray[np.float32], costs: NDArray[np.float32], arrays: PathArrays,
 ) -> float:  # fmt: skip
-    """Cost of a short grid path from a start to the goal, in the costs of `expand_cost`.
-
-    Parameters
-    ----------
-    seeds : (n,) int32
-        Flat numbers of the cells whose `costs` are set.
-    x, y, z : float
-        The start, metres.
-    bound : float
-        Dearer paths are not looked for, metres.
-    grid : GridArrays
-        The clearance grid.
-    moves : (nx, ny, nz) uint32
-        Its passable moves.
-    narrow : (nx, ny, nz) float32
-        What a metre in the cells costs beside itself.
-    costs : (nx, ny, nz) float32
-        Infinite but for the seeds, and so again in the end.
-    arrays : PathArrays
-        Memory.
-
-    Returns
-    -------
-    float
-        Metres, at most `_WEIGHT` times the least; infinite where none is within the bound, GAVE_UP where there was
-        too much to look at.
-    """
+    """Cost, metres, of a short grid path from a start to the seeds, within `_WEIGHT` of the least; inf or GAVE_UP."""
     nx, ny, nz = costs.shape
     flat, flat_moves, flat_narrow = costs.reshape(-1), moves.reshape(-1), narrow.reshape(-1)
     heads, cells, entered, nexts, touched = arrays.heads, arrays.cell, arrays.cost, arrays.next, arrays.touched

@@ -63,91 +63,38 @@ _HASH = np.uint64(0x9E3779B97F4A7C15)
 
 
 class SearchArrays(NamedTuple):
-    """Memory of a search, made once and used again for every plan.
+    """Memory of a search, made once and used again for every plan."""
 
-    Attributes
-    ----------
-    pose : (n, 3) float64
-        Position of every expanded state, metres.
-    cost : (n,) float64
-        Cost from the start.
-    heading, move : (n,) int8
-        Heading, and the translation that led here.
-    parent : (n,) int32
-        Expanded state before it, -1 for the start.
-    edge_parent, edge_move, edge_next : arrays
-        Open edges, as linked lists; ~move for one that is known to be free, `_LONGER` and a direction for a step
-        of the shortest length that longer ones are left out for.
-    edge_extra : (m,) float32
-        What such an edge costs beside its metres.
-    heads : (_N_BUCKETS,) int32
-        First edge of every bucket, -1 for none.
-    keys : (power of two,) int64
-        Hash table of closed states.
-    stamps : (power of two,) int32
-        Search that wrote a slot of the table.
-    clock : (1,) int32
-        Number of the search.
-    highest : (1,) float64
-        Most that an edge could cost, its cost-to-go included, that the last search took off the list; metres.
-    blockers : (_N_BLOCKERS,) int32
-        Triangle that blocked an edge last, by where the edge's middle is; -1 for none.
-    """
-
-    pose: NDArray[np.float64]
-    cost: NDArray[np.float64]
-    heading: NDArray[np.int8]
+    pose: NDArray[np.float64]  # (n, 3) float64; position of every expanded state, metres
+    cost: NDArray[np.float64]  # (n,) float64; cost from the start
+    heading: NDArray[np.int8]  # (n,) int8; heading, and the translation that led here
     move: NDArray[np.int8]
-    parent: NDArray[np.int32]
+    parent: NDArray[np.int32]  # (n,) int32; expanded state before it, -1 for the start
     edge_parent: NDArray[np.int32]
     edge_move: NDArray[np.int8]
     edge_next: NDArray[np.int32]
-    edge_extra: NDArray[np.float32]
-    heads: NDArray[np.int32]
-    keys: NDArray[np.int64]
-    stamps: NDArray[np.int32]
-    clock: NDArray[np.int32]
-    highest: NDArray[np.float64]
-    blockers: NDArray[np.int32]
+    edge_extra: NDArray[np.float32]  # (m,) float32; what such an edge costs beside its metres
+    heads: NDArray[np.int32]  # (_N_BUCKETS,) int32; first edge of every bucket, -1 for none
+    keys: NDArray[np.int64]  # (power of two,) int64; hash table of closed states
+    stamps: NDArray[np.int32]  # (power of two,) int32; search that wrote a slot of the table
+    clock: NDArray[np.int32]  # (1,) int32; number of the search
+    highest: NDArray[np.float64]  # (1,) float64
+    blockers: NDArray[np.int32]  # Triangle that blocked an edge last, by where the edge's middle is; -1 for none
 
 
 class SearchOptions(NamedTuple):
-    """How to search.
+    """How to search."""
 
-    Attributes
-    ----------
-    radius : float
-        Radius that must stay clear, metres.
-    weight : float
-        Of the cost-to-go; 1 is plain A*.
-    action_cost : float
-        Cost of an action beside the metres that it flies.
-    approach : float
-        Longest Approach, metres.
-    budget : int
-        Most expansions.
-    cell : float
-        Edge of the cells that tell duplicates, metres.
-    sectors : int
-        Heading sectors that tell duplicates, a divisor of 24.
-    sideways : float
-        What a metre flown to the left or right counts as, in actions, when the found route's headings are chosen.
-    prefer : Preference
-        What costs beside metres and actions.
-    near_enough : float
-        A way to the goal is taken though another may be cheaper by this, metres.
-    """
-
-    radius: float
-    weight: float
-    action_cost: float
-    approach: float
-    budget: int
-    cell: float
-    sectors: int
+    radius: float  # Radius that must stay clear, metres
+    weight: float  # Of the cost-to-go; 1 is plain A*
+    action_cost: float  # Cost of an action beside the metres that it flies
+    approach: float  # Longest Approach, metres
+    budget: int  # Most expansions
+    cell: float  # Edge of the cells that tell duplicates, metres
+    sectors: int  # Heading sectors that tell duplicates, a divisor of 24
     sideways: float
-    prefer: Preference
-    near_enough: float
+    prefer: Preference  # What costs beside metres and actions
+    near_enough: float  # A way to the goal is taken though another may be cheaper by this, metres
 
 
 def make_search_arrays(budget: int) -> SearchArrays:
@@ -206,34 +153,7 @@ def search(
     s: SearchArrays,
     o: SearchOptions,
 ) -> tuple[int, int, NDArray[np.int8]]:
-    """Find a short way from a start pose to the goal.
-
-    Parameters
-    ----------
-    start : (4,) float64
-        x, y, z in metres, and yaw in radians; free.
-    goal : (3,) float64
-        Metres; free.
-    goal_heading : int
-        Heading to end with, counted from the start's yaw.
-    cost_to_go : (nx, ny, nz) float32
-        Of the goal, metres.
-    grid : GridArrays
-        The clearance grid.
-    s : SearchArrays
-        Memory.
-    o : SearchOptions
-        How to search.
-
-    Returns
-    -------
-    status : int
-        FOUND, EXHAUSTED (no state is left) or BUDGET.
-    expansions : int
-        Expanded states.
-    moves : (n,) int8
-        Translations from the start to within reach of the goal, without the Approach.
-    """
+    """Search a short way from a pose (4,) to a goal (3,): status, expansions and moves (n,) without the Approach."""
     flights = np.zeros((N_TRANSLATIONS, 4))  # dx, dy, dz and length of every translation
     for m in range(N_FLAT):
         angle, length = start[3] + m // N_STEPS * TURN_RAD, STEPS_M[m % N_STEPS]

@@ -18,13 +18,7 @@ _NOWHERE = -1
 
 
 class KeptFields:
-    """Fields by their goals.
-
-    Parameters
-    ----------
-    plain_mb, packed_mb : float
-        How many megabytes are kept as they are, and how many compressed; what comes after that is not kept.
-    """
+    """Fields by their goals."""
 
     def __init__(self, plain_mb: float, packed_mb: float) -> None:
         self._room = {True: plain_mb * 1e6, False: packed_mb * 1e6}
@@ -32,15 +26,7 @@ class KeptFields:
         self._packed: dict[bytes, pa.Buffer] = {}
 
     def find(self, goal: bytes, scratch: NDArray[np.float32]) -> NDArray[np.float32] | None:
-        """Return a goal's field, which may be written into `scratch`; None where it was not kept.
-
-        Parameters
-        ----------
-        goal : bytes
-            What `keep` was given.
-        scratch : (nx, ny, nz) float32
-            Overwritten where the field is kept compressed.
-        """
+        """Return a goal's field (nx, ny, nz), decompressed into `scratch` if need be; None where it was not kept."""
         if goal in self._plain:
             return self._plain[goal]
         if goal not in self._packed:
@@ -50,15 +36,7 @@ class KeptFields:
         return scratch
 
     def keep(self, goal: bytes, field: NDArray[np.float32]) -> None:
-        """Keep a goal's field where there is room.
-
-        Parameters
-        ----------
-        goal : bytes
-            What tells the goal from the others.
-        field : (nx, ny, nz) float32
-            Multiples of `QUANTUM_M`, or infinite; it is copied.
-        """
+        """Keep a copy of a goal's field, multiples of `QUANTUM_M` or inf, where there is room."""
         if self._takes(True, field.nbytes):
             self._plain[goal] = field.copy()
         elif self._room[False] > 0.0:

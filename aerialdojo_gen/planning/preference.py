@@ -23,44 +23,19 @@ _COS_ROUNDING = 1e-9
 
 
 class Preference(NamedTuple):
-    """What costs beside metres.
+    """What costs beside metres."""
 
-    Attributes
-    ----------
-    clearance : float
-        Distance from surfaces from which on a way costs its metres alone, metres.
-    weight : float
-        What a metre at a surface costs beside itself, metres; in between it falls linearly. 0 for no preference.
-    ahead_cos : float
-        Cosine of the largest angle between the final heading and an Approach that flies ahead; -1 for any.
-    astray : float
-        What another Approach costs beside its length, metres.
-    """
-
-    clearance: float
+    clearance: float  # Distance from surfaces from which on a way costs its metres alone, metres
     weight: float
     ahead_cos: float
-    astray: float
+    astray: float  # What another Approach costs beside its length, metres
 
 
 NO_PREFERENCE = Preference(1.0, 0.0, -1.0, 0.0)
 
 
 def narrow_cells(field: NDArray[np.float32], prefer: Preference) -> NDArray[np.float32]:
-    """What a metre costs beside itself in the cells of a clearance grid.
-
-    Parameters
-    ----------
-    field : (nx, ny, nz) float32
-        Distances of the cells' centres to the nearest surface, metres.
-    prefer : Preference
-        Its clearance and weight count.
-
-    Returns
-    -------
-    (nx, ny, nz) float32
-        Metres, multiples of `NARROW_UNIT`.
-    """
+    """Extra cost of a metre in each cell near surfaces, (nx, ny, nz) float32, multiples of `NARROW_UNIT`."""
     share = np.float32(1.0) - np.clip(field, 0.0, prefer.clearance) / np.float32(prefer.clearance)
     units = np.rint(share * np.float32(prefer.weight / NARROW_UNIT))
     return np.asarray(units * np.float32(NARROW_UNIT), np.float32)
@@ -92,24 +67,7 @@ def squeeze(
     px: float, py: float, pz: float, qx: float, qy: float, qz: float, clearance: float, weight: float,
     ox: float, oy: float, oz: float, cell: float, field: NDArray[np.float32],
 ) -> float:  # fmt: skip
-    """What a straight way costs beside its metres for the surfaces that it comes near.
-
-    Parameters
-    ----------
-    px, py, pz, qx, qy, qz : float
-        Its ends, metres; inside the flight volume.
-    clearance, weight : float
-        Of the `Preference`.
-    ox, oy, oz, cell : float
-        Lower corner and cells of the clearance grid, metres.
-    field : (nx, ny, nz) float32
-        The clearance grid's distances.
-
-    Returns
-    -------
-    float
-        Metres.
-    """
+    """Extra cost, metres, of a straight way for the surfaces that it comes near."""
     dx, dy, dz = qx - px, qy - py, qz - pz
     length = math.sqrt(dx * dx + dy * dy + dz * dz)
     if weight == 0.0 or length == 0.0:
@@ -131,22 +89,5 @@ def squeeze(
 
 @njit(cache=True, inline="always")
 def astray(dx: float, dy: float, yaw: float, length: float, ahead_cos: float, cost: float) -> float:
-    """What an Approach costs beside its length: nothing where it flies ahead.
-
-    Parameters
-    ----------
-    dx, dy : float
-        Its level displacement, metres.
-    yaw : float
-        Final heading, radians.
-    length : float
-        Its length, metres.
-    ahead_cos, cost : float
-        `ahead_cos` and `astray` of the `Preference`.
-
-    Returns
-    -------
-    float
-        Metres.
-    """
+    """Extra cost, metres, of an Approach that does not fly ahead."""
     return cost if dx * math.cos(yaw) + dy * math.sin(yaw) < (ahead_cos - _COS_ROUNDING) * length else 0.0

@@ -34,31 +34,15 @@ _APPROACH_SAVES = 0.45
 
 
 class QueryArrays(NamedTuple):
-    """Memory of single queries; as `make_query_arrays` made it between them.
+    """Memory of single queries; as `make_query_arrays` made it between them."""
 
-    Attributes
-    ----------
-    cost : (nx, ny, nz) float32
-        Cost-to-go, metres; infinite.
-    first, last : (nx, ny) int16
-        Range of a column's cells that the query is about; a last of 0 for a column not come to, -1 for none.
-    limit : (nx, ny) float32
-        Most that these cells may cost, metres.
-    waiting : (nx, ny) bool
-        Columns that may have something to pass on.
-    next : (nx * ny,) int32
-        Columns in bins, as linked lists.
-    columns : (nx * ny,) int32
-        Columns that were come to.
-    """
-
-    cost: NDArray[np.float32]
-    first: NDArray[np.int16]
+    cost: NDArray[np.float32]  # (nx, ny, nz) float32; cost-to-go, metres; infinite
+    first: NDArray[np.int16]  # (nx, ny) int16
     last: NDArray[np.int16]
-    limit: NDArray[np.float32]
-    waiting: NDArray[np.bool_]
-    next: NDArray[np.int32]
-    columns: NDArray[np.int32]
+    limit: NDArray[np.float32]  # (nx, ny) float32; most that these cells may cost, metres
+    waiting: NDArray[np.bool_]  # (nx, ny) bool; columns that may have something to pass on
+    next: NDArray[np.int32]  # (nx * ny,) int32; columns in bins, as linked lists
+    columns: NDArray[np.int32]  # (nx * ny,) int32; columns that were come to
 
 
 def make_query_arrays(shape: tuple[int, ...]) -> QueryArrays:
@@ -108,36 +92,9 @@ def expand_query(
     weight: float, bound: float, grid: GridArrays, moves: NDArray[np.uint32], narrow: NDArray[np.float32],
     arrays: QueryArrays,
 ) -> int:  # fmt: skip
-    """Costs of the cheapest grid paths, as `expand_cost` finds them, of the cells within reach.
+    """Costs as `expand_cost` finds them, of the cells within reach of one start.
 
-    Parameters
-    ----------
-    seeds : (n,) int32
-        Flat numbers of cells whose cost is set.
-    start, goal : (3,) float64
-        Metres.
-    approach : float
-        Longest Approach, metres.
-    reach : float
-        Cells are within reach whose distance from the start in the action metric and `weight` times whose cost are no
-        more than this together, metres.
-    weight : float
-        At least 1.
-    bound : float
-        Costs above this are not found, metres.
-    grid : GridArrays
-        The clearance grid.
-    moves : (nx, ny, nz) uint32
-        Its passable moves.
-    narrow : (nx, ny, nz) float32
-        What a metre in the cells costs beside itself.
-    arrays : QueryArrays
-        Memory; its `cost` is filled.
-
-    Returns
-    -------
-    int
-        Number of columns to be cleared again.
+    Returns columns to be cleared again.
     """
     nx, ny, nz = arrays.cost.shape
     costs, flat_moves, flat_narrow = arrays.cost.reshape(-1), moves.reshape(-1), narrow.reshape(-1)

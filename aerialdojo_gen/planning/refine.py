@@ -268,26 +268,7 @@ def moves_to_actions(
     options: SearchOptions,
     grid: GridArrays,
 ) -> NDArray[np.int8]:
-    """Turn the search's translations into actions.
-
-    Parameters
-    ----------
-    start : (4,) float64
-        x, y, z in metres, and yaw in radians.
-    moves : (n,) int8
-        Translations, as `aerialdojo_gen.planning.hybrid_astar.search` returns them.
-    goal_heading : int
-        Heading to end with, counted from the start's yaw.
-    options : SearchOptions
-        Of the search.
-    grid : GridArrays
-        The clearance grid.
-
-    Returns
-    -------
-    (m,) int8
-        Actions, the turns to the final heading included, Approach and Stop not.
-    """
+    """Turn the search's moves (n,) into actions (m,), the turns to the final heading included."""
     direction, metres = np.empty(len(moves) + 1, np.int64), np.empty(len(moves) + 1, np.int64)
     total = 0
     for i in range(len(moves)):

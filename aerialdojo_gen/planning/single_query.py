@@ -20,34 +20,15 @@ _SURPLUS_M = 1.1
 
 
 class Found(NamedTuple):
-    """What is known of the way from a start to a goal.
+    """What is known of the way from a start to a goal."""
 
-    Attributes
-    ----------
-    cost : (nx, ny, nz) float32 or None
-        Cost-to-go of the goal near the start and the ways from it, infinite elsewhere, metres; None where there is
-        no grid path within the bound, or it was not found.
-    none : bool
-        There is no grid path.
-    sure_m : float
-        As long as a search takes edges off its list that cost no more than this, it is that of the whole field.
-    """
-
-    cost: NDArray[np.float32] | None
-    none: bool
+    cost: NDArray[np.float32] | None  # (nx, ny, nz) float32 or None
+    none: bool  # There is no grid path
     sure_m: float
 
 
 class NearField:
-    """Finds the cost-to-go between one start and one goal at a time.
-
-    Parameters
-    ----------
-    grid : ClearanceGrid
-        Of the scene.
-    narrow : (nx, ny, nz) float32
-        What a metre in its cells costs beside itself.
-    """
+    """Finds the cost-to-go, metres, between one start and one goal at a time."""
 
     def __init__(self, grid: ClearanceGrid, narrow: NDArray[np.float32]) -> None:
         self.grid = grid
@@ -66,23 +47,7 @@ class NearField:
         bound: float,
         least: float,
     ) -> Iterator[Found]:
-        """Find the costs that a search from a start needs; they are there until the block ends.
-
-        Parameters
-        ----------
-        goal, start : (4,) float64
-            x, y, z in metres and yaw in radians; free.
-        weight : float
-            Of the cost-to-go in the search; at least 1.
-        seed : callable
-            Writes the cost of a goal into the cells that see it, and returns their numbers.
-        approach : float
-            Longest Approach, metres.
-        bound : float
-            Costs above this are not found, metres.
-        least : float
-            What `Found.sure_m` must be at least, metres.
-        """
+        """Yield the costs that a search from a start (4,) to a goal (4,) needs; they hold until the block ends."""
         cost, cells, moves = self._arrays.cost, self.grid.arrays, self.grid.moves
         seeds = seed(goal, cost)
         seeded = cost.ravel()[seeds]

@@ -105,18 +105,7 @@ def _rows(table: Comparison) -> str:
 
 
 def render_card(data: Where) -> str:
-    """Write the card's text from what the release holds.
-
-    Returns
-    -------
-    str
-        Markdown with a YAML head.
-
-    Raises
-    ------
-    StoreError
-        The release is missing or damaged.
-    """
+    """Write the card's text from what the release holds."""
     root = open_root(data)
     names = check_release(root)
     found = counts(root, names)
@@ -173,18 +162,7 @@ def render_card(data: Where) -> str:
 
 
 def write_card(data: Where) -> Path:
-    """Write ``release/README.md`` from what the release holds.
-
-    Returns
-    -------
-    Path
-        The card, or a copy of it on this machine.
-
-    Raises
-    ------
-    StoreError
-        The release is missing or damaged, or cannot be written.
-    """
+    """Write ``release/README.md`` from what the release holds."""
     root = open_root(data)
     text = render_card(root)
     with root.commit(CARD) as path:

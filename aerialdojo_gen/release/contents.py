@@ -19,21 +19,11 @@ from aerialdojo_gen.store.root import DataRoot, LocalRoot, Where, open_root
 
 @dataclass(frozen=True)
 class Table:
-    """A table of the release.
+    """A table of the release."""
 
-    Attributes
-    ----------
-    spec : TableSpec
-        Its columns.
-    about : str
-        What a row is.
-    split : bool
-        Whether it lies in a folder a split.
-    """
-
-    spec: schemas.TableSpec
-    about: str
-    split: bool = False
+    spec: schemas.TableSpec  # Its columns
+    about: str  # What a row is
+    split: bool = False  # Whether it lies in a folder a split
 
 
 TABLES = {
@@ -103,13 +93,7 @@ def prune_release(where: Where, scenes: Sequence[str]) -> list[str]:
 
 
 def release_scenes(where: Where, folder: str = FOLDER) -> list[str]:
-    """List the scenes of a release, by name; one that lacks a part is listed too.
-
-    Raises
-    ------
-    StoreError
-        There is no release: the line that every command says.
-    """
+    """List the scenes of a release, by name; one that lacks a part is listed too."""
     root = open_root(where)
     scenes = scenes_there(root, folder)
     if not scenes:
@@ -118,15 +102,7 @@ def release_scenes(where: Where, folder: str = FOLDER) -> list[str]:
 
 
 def scenes_in_release(where: Where, patterns: Sequence[str] | None = None, folder: str = FOLDER) -> list[str]:
-    """Resolve names and globs to scenes of a release, by name; all of them where there are no patterns.
-
-    Raises
-    ------
-    StoreError
-        There is no release.
-    UsageError
-        A pattern matches nothing; the message gives the nearest names.
-    """
+    """Resolve names and globs to scenes of a release, by name; all of them where there are no patterns."""
     return choose_scenes(patterns, release_scenes(where, folder))
 
 
@@ -164,25 +140,7 @@ def _lack(root: DataRoot, folder: str) -> str:
 
 
 def check_release(where: Where, scenes: list[str] | None = None) -> list[str]:
-    """Check from the footers that the release's parts are there, whole and of one run.
-
-    Parameters
-    ----------
-    where : DataRoot, Path or str
-        The data root.
-    scenes : list of str, optional
-        Look at these alone; every scene of the release where absent.
-
-    Returns
-    -------
-    list of str
-        The scenes, by name.
-
-    Raises
-    ------
-    StoreError
-        One line a part that is missing, damaged, of a wrong number of rows, or of another run than its fellows.
-    """
+    """Check from the footers that the release's parts are there, whole and of one run."""
     root = open_root(where)
     there = parts_there(root)
     known = sorted(set().union(*there.values())) if scenes is None else scenes
@@ -214,18 +172,7 @@ def _faults(root: DataRoot, scene: str, present: list[str]) -> list[str]:
 
 
 def counts(root: Where, scenes: list[str]) -> dict[str, dict[str, int]]:
-    """Count the rows of every table and split of these scenes, from the footers.
-
-    Returns
-    -------
-    dict
-        ``{"tasks": {"id_train": 113642, …}, …, "objects": {"all": 2099}, …}``; a split that no scene has is left out.
-
-    Raises
-    ------
-    StoreError
-        A part is missing or damaged.
-    """
+    """Count the rows of every table and split of these scenes, from the footers."""
     found: dict[str, dict[str, int]] = {name: {} for name in TABLES}
     for scene in scenes:
         for name in SHARDS:

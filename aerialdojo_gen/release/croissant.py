@@ -55,18 +55,7 @@ _TYPES = {
 
 
 def croissant(found: dict[str, dict[str, int]]) -> dict[str, Any]:
-    """Describe a release.
-
-    Parameters
-    ----------
-    found : dict
-        What `aerialdojo_gen.release.contents.counts` returns.
-
-    Returns
-    -------
-    dict
-        JSON-LD: a file set and a record set a table, a field a column, with meanings and units.
-    """
+    """Describe a release."""
     total = sum(found["tasks"].values())
     return {
         "@context": _CONTEXT,
@@ -148,18 +137,7 @@ def _field(table: str, field: pa.Field) -> dict[str, Any]:
 
 
 def write_croissant(data: Where) -> Path:
-    """Write ``release/croissant.json`` from what the release holds.
-
-    Returns
-    -------
-    Path
-        The file, or a copy of it on this machine.
-
-    Raises
-    ------
-    StoreError
-        The release is missing or damaged, or cannot be written.
-    """
+    """Write ``release/croissant.json`` from what the release holds."""
     root = open_root(data)
     found = counts(root, check_release(root))
     with root.commit(CROISSANT) as path:

@@ -11,13 +11,7 @@ from aerialdojo_gen.store.root import Where, open_root
 
 
 def release_fingerprint(data: Where) -> str:
-    """SHA-256, hexadecimal, of the names and meshes of a release's scenes.
-
-    Raises
-    ------
-    StoreError
-        There is no release.
-    """
+    """SHA-256, hexadecimal, of the names and meshes of a release's scenes."""
     root = open_root(data)
     facts = [
         store.read_scene(root, "release/scenes", scene, ("scene", "mesh_sha256")).to_pylist()

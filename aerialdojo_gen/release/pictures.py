@@ -13,22 +13,7 @@ from aerialdojo_gen.store.shards import read_scene, shards
 
 
 def scenes_with_pictures(where: Where, patterns: Sequence[str] | None = None) -> list[str]:
-    """List the scenes of which there are reference pictures, by name.
-
-    Parameters
-    ----------
-    where : DataRoot, Path or str
-        The data root.
-    patterns : sequence of str, optional
-        Names or globs; all of them where absent.
-
-    Raises
-    ------
-    StoreError
-        There are none: the line that every command says where there is no release.
-    UsageError
-        A pattern matches nothing.
-    """
+    """List the scenes of which there are reference pictures, by name."""
     root = open_root(where)
     folders = {PurePosixPath(path).name for path in root.list("references")}
     staged = {scene for scene in folders if shards(root, "references", scene)}
@@ -39,13 +24,7 @@ def scenes_with_pictures(where: Where, patterns: Sequence[str] | None = None) ->
 
 
 def pictured_objects(where: Where, scene: str) -> list[dict[str, Any]]:
-    """Read a scene's objects with their pictures: rows of `objects` and `references` together.
-
-    Raises
-    ------
-    StoreError
-        A table is missing or damaged.
-    """
+    """Read a scene's objects with their pictures: rows of `objects` and `references` together."""
     root = open_root(where)
     if not shards(root, "references", scene):
         rows: list[dict[str, Any]] = read_scene(root, "release/objects", scene).to_pylist()

@@ -17,29 +17,14 @@ from aerialdojo_gen.store.schemas import SETTINGS
 
 @dataclass(frozen=True)
 class Pool:
-    """What `filter` kept of a scene, and what the paper wants of it.
+    """What `filter` kept of a scene, and what the paper wants of it."""
 
-    Attributes
-    ----------
-    scene : str
-        Name.
-    candidates, judged : int
-        All candidates, and those of them that `plan` did not leave out as not needed: searched, or known without a
-        search to be no task.
-    kept : dict of str to int
-        Kept candidates by setting.
-    paper : PaperScene or None
-        The paper's row; None for a scene that the paper does not have.
-    path_m : (float, float) or None
-        Least and most summed length of as many routes as the paper wants, metres; None where a setting has too few.
-    """
-
-    scene: str
+    scene: str  # Name
     candidates: int
     judged: int
-    kept: dict[str, int]
-    paper: PaperScene | None
-    path_m: tuple[float, float] | None
+    kept: dict[str, int]  # Kept candidates by setting
+    paper: PaperScene | None  # The paper's row; None for a scene that the paper does not have
+    path_m: tuple[float, float] | None  # (float, float) or None
 
     @property
     def short(self) -> dict[str, int]:
@@ -56,13 +41,7 @@ class Pool:
 
 
 def pool_of(root: Where, scene: str) -> Pool:
-    """Read what `filter` kept of a scene.
-
-    Raises
-    ------
-    StoreError
-        There are no verdicts of the scene.
-    """
+    """Read what `filter` kept of a scene."""
     verdicts = store.read_scene(root, "verdicts", scene)
     keep = verdicts["keep"].to_numpy(zero_copy_only=False)
     setting = np.asarray(verdicts["setting"].to_pylist(), dtype=object)
@@ -79,13 +58,7 @@ def pool_of(root: Where, scene: str) -> Pool:
 
 
 def require_pools(root: Where, scenes: Sequence[str]) -> None:
-    """Raise a `PoolError` that names every scene and setting with fewer kept candidates than the paper has tasks.
-
-    Raises
-    ------
-    PoolError
-        One line a scene and setting that falls short, with the mend.
-    """
+    """Raise a `PoolError` that names every scene and setting with fewer kept candidates than the paper has tasks."""
     lacking = [
         f"{pool.scene}: {n} {setting} tasks short: {pool.kept[setting]} are kept, "
         f"the paper has {pool.kept[setting] + n}"

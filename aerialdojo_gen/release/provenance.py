@@ -26,22 +26,10 @@ _BESIDE = {"name", "scenes", "stages", "render", "scene_assets", "recipes", "ann
 
 @dataclass(frozen=True)
 class Maker:
-    """A pipeline as a release knows it.
+    """A pipeline as a release knows it."""
 
-    Attributes
-    ----------
-    name : str
-        The pipeline's name; empty where the release does not say.
-    sha256 : str
-        Of its settings, hexadecimal.
-    paper_counts : bool
-        Whether it means to release the paper's numbers; an older release does not say, and is held to them.
-    prefer_harder : float
-        How much it prefers harder candidates where the paper's numbers leave a choice.
-    """
-
-    name: str = ""
-    sha256: str = ""
+    name: str = ""  # The pipeline's name; empty where the release does not say
+    sha256: str = ""  # Of its settings, hexadecimal
     paper_counts: bool = field(default=True, compare=False)
     prefer_harder: float = field(default=0.0, compare=False)
 
@@ -89,13 +77,7 @@ def makers(data: Where) -> dict[str, Maker]:
 
 
 def made_of_scenes(data: Where, scenes: Sequence[str]) -> list[Made]:
-    """Read what a release holds of scenes, in the paper's order, beside the paper's figures where it follows them.
-
-    Raises
-    ------
-    StoreError
-        A part of a scene is missing or damaged.
-    """
+    """Read what a release holds of scenes, in the paper's order, beside the paper's figures where it follows them."""
     root = open_root(data)
     follow = {scene for scene, maker in makers(root).items() if maker.paper_counts}
     found = (made_of(root, scene) for scene in scenes)
@@ -126,25 +108,7 @@ def record_makers(data: Where, pipeline: Pipeline, scenes: Sequence[str]) -> Non
 
 
 def check_replaced(data: Where, pipeline: Pipeline, scenes: Sequence[str], *, whole: bool) -> None:
-    """Refuse to put a pipeline's release in the place of another one's.
-
-    Parameters
-    ----------
-    data : DataRoot, Path or str
-        The data root.
-    pipeline : Pipeline
-        What is about to run.
-    scenes : sequence of str
-        The scenes that it is about to release.
-    whole : bool
-        Whether these are all of it, so that others are removed.
-
-    Raises
-    ------
-    UsageError
-        Scenes would be removed that another pipeline made, or other settings of this one; or scenes replaced that a
-        pipeline of another name made.
-    """
+    """Refuse to put a pipeline's release in the place of another one's."""
     root, mine = open_root(data), maker_of(pipeline)
     found = makers(root)
     removed = [scene for scene, maker in found.items() if whole and scene not in scenes and maker != mine]

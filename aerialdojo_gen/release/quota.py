@@ -21,20 +21,7 @@ _STEEPEST = 1e4
 
 
 def apportion(total: int, sizes: Mapping[str, int]) -> dict[str, int]:
-    """Share a total out in proportion to sizes, in whole numbers (largest remainders, ties by name).
-
-    Parameters
-    ----------
-    total : int
-        At most the sum of `sizes`.
-    sizes : mapping of str to int
-        What each could give.
-
-    Returns
-    -------
-    dict of str to int
-        Sums to `total`; every share is its size times total / sum, rounded down or up.
-    """
+    """Share a total out in proportion to sizes, in whole numbers (largest remainders, ties by name)."""
     whole = sum(sizes.values())
     if not whole:
         return dict.fromkeys(sizes, 0)
@@ -51,20 +38,6 @@ def train_quotas(
     """Return a scene's share of the paper's training tasks of its partition.
 
     The shares hang on the paper's figures alone, so that each scene's part of the release can be written on its own.
-
-    Parameters
-    ----------
-    scene : str
-        Name of the scene.
-    scenes : mapping of str to PaperScene
-        What `aerialdojo_gen.common.paper.inventory` returns.
-    splits : mapping
-        What `aerialdojo_gen.common.paper.splits` returns.
-
-    Returns
-    -------
-    dict of str to int
-        By setting: how many navigation tasks train.
     """
     alike = [row for row in scenes.values() if partition(row.scene) == partition(scene)]
     totals = splits[partition(scene).upper(), "train"]
@@ -72,19 +45,9 @@ def train_quotas(
 
 
 def difficulty_steps(plan_detour: Floats, visible_at_start: Floats) -> NDArray[np.int64]:
-    """Count what makes tasks hard: a way round obstacles, and a target that the start does not see.
+    """Difficulty level (n,), 0 to 2.
 
-    Parameters
-    ----------
-    plan_detour : (n,) float64
-        Length over the shortest without obstacles; NaN where it is not known.
-    visible_at_start : (n,) float64
-        Share of the target that the start sees; NaN where it is not known.
-
-    Returns
-    -------
-    (n,) int64
-        0 to 2: one for a detour of `DETOUR` or more, one for a target of which nothing is seen.
+    One for a plan detour of `DETOUR` or more, one for a target that the start does not see.
     """
     return (plan_detour >= DETOUR).astype(np.int64) + (visible_at_start == 0.0)
 
@@ -99,35 +62,10 @@ def choose(
     steps: NDArray[np.int64] | Floats | None = None,
     preference: float = 0.0,
 ) -> NDArray[np.bool_]:
-    """Choose so many tasks of each setting that their lengths sum to a given total, the harder ones first.
+    """Weighted sample without replacement (Gumbel's trick), (n,) bool.
 
-    Every task draws a number from its own lot; the largest are taken, after `preference` has been added for each step
-    of difficulty, and after the numbers have been tilted towards short or long routes by as little as the total needs
-    (weighted sampling without replacement with weights exp(preference · steps + tilt · L), by Gumbel's trick). The
-    numbers of the settings hold whatever is preferred, and so does the total where any choice has it: the tilt knows
-    no bound. A task's chance hangs on its lot, its length and its steps alone, never on its row.
-
-    Parameters
-    ----------
-    lots, settings : sequences of n str
-        What the kept candidates draw with (`release.select.lot`), and their length settings.
-    length_m : (n,) float64
-        L, metres.
-    wanted : mapping of str to int
-        How many of each setting; each at most what there is.
-    path_m : float
-        Wanted sum of the lengths, metres. Where no choice reaches it, the nearest is made.
-    seed : int
-        Of the pipeline.
-    steps : (n,) int64, optional
-        How hard they are, as `difficulty_steps` counts; not asked for where absent.
-    preference : float
-        The odds of being chosen grow by e to this with each step.
-
-    Returns
-    -------
-    (n,) bool
-        True for the chosen.
+    The counts of each setting hold, lengths sum to `path_m` by tilting the weights, harder tasks are preferred. A
+    task's chance depends on its key, length and level, never on its row.
     """
     scores, place = _drawn(lots, settings, length_m, wanted, path_m, seed, steps, preference)
     mask = np.zeros(len(lots), dtype=bool)
@@ -146,18 +84,7 @@ def ranked(
     steps: NDArray[np.int64] | Floats | None = None,
     preference: float = 0.0,
 ) -> dict[str, NDArray[np.int64]]:
-    """Order the tasks of each setting as `choose` takes them, from the first to the last.
-
-    Parameters
-    ----------
-    lots, settings, length_m, wanted, path_m, seed, steps, preference
-        As for `choose`; a setting may have fewer than are wanted, and steps that are foreseen need not be whole.
-
-    Returns
-    -------
-    dict of str to (m,) int64
-        By setting, the rows of its tasks; the first `wanted` of them are what `choose` chooses.
-    """
+    """Rows of each setting's tasks in the order in which `choose` takes them."""
     scores, place = _drawn(lots, settings, length_m, wanted, path_m, seed, steps, preference)
     return {name: _best(scores, place, np.flatnonzero(np.asarray(settings) == name)) for name in sorted(wanted)}
 

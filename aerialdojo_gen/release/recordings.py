@@ -13,13 +13,7 @@ _MEDIA, _NOTE = "media", "recording.json"
 
 
 def orphans(where: Where) -> list[str]:
-    """List the folders of recordings, relative to the data root, whose trajectories the release does not have.
-
-    Raises
-    ------
-    StoreError
-        There is no release, or a part of its routes is missing or damaged: then nobody can tell.
-    """
+    """List the folders of recordings, relative to the data root, whose trajectories the release does not have."""
     root = open_root(where)
     released = set(release_scenes(root))
     by_scene: dict[str, list[PurePosixPath]] = {}

@@ -13,13 +13,7 @@ from aerialdojo_gen.common.rng import rank
 
 
 def lot(scene: str, pair_id: str) -> str:
-    """Return what a candidate draws with: it hangs on the pair alone, so that no salt changes which are released.
-
-    Returns
-    -------
-    str
-        The scene and 12 hexadecimal digits of a hash of the pair. It is in no table, for it tells the pair.
-    """
+    """Return what a candidate draws with: it hangs on the pair alone, so that no salt changes which are released."""
     return f"{scene}-{hashlib.blake2b(f'{scene}/{pair_id}'.encode(), digest_size=6).hexdigest()}"
 
 
@@ -31,22 +25,7 @@ def train_counts(settings: Sequence[str], fraction: float) -> dict[str, int]:
 def train_mask(
     lots: Sequence[str], settings: Sequence[str], trains: Mapping[str, int], seed: int
 ) -> NDArray[np.bool_]:
-    """Choose the navigation tasks that train.
-
-    Parameters
-    ----------
-    lots, settings : sequences of n str
-        What the tasks draw with, and their length settings.
-    trains : mapping of str to int
-        How many of each setting train.
-    seed : int
-        Of the pipeline. A task's place depends on the seed and its lot, not on its row.
-
-    Returns
-    -------
-    (n,) bool
-        True for training. Both instances of a task follow it.
-    """
+    """The navigation tasks that train, (n,) bool; it depends on the seed and a task's key, not on its row."""
     mask = np.zeros(len(lots), dtype=bool)
     for setting, n in trains.items():
         rows = [i for i, s in enumerate(settings) if s == setting]

@@ -7,21 +7,7 @@ from numpy.typing import NDArray
 
 
 def sampled(points: NDArray[np.float64], step_m: float = 0.5) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Lay points along a polyline, no farther apart than a step, corners included.
-
-    Parameters
-    ----------
-    points : (n, 3) float64
-        Metres; at least one.
-    step_m : float
-        Largest distance between consecutive samples.
-
-    Returns
-    -------
-    samples : (m, 3) float64
-    segment : (m,) int64
-        The segment that a sample lies on (its first point's index); the last sample is the last point.
-    """
+    """Points along a polyline, at most `step_m` metres apart, corners included, and the segment of each."""
     pieces, owners = [], []
     for k in range(len(points) - 1):
         n = max(1, int(np.ceil(np.linalg.norm(points[k + 1] - points[k]) / step_m - 1e-9)))

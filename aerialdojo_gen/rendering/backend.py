@@ -38,15 +38,7 @@ _here = threading.local()
 
 
 class Renderer(Protocol):
-    """A scene ready to be rendered; a context manager that frees its memory at its end.
-
-    Attributes
-    ----------
-    name : str
-        One of `RENDERERS`.
-    device : str
-        What draws, in the driver's words.
-    """
+    """A scene ready to be rendered; a context manager that frees its memory at its end."""
 
     @property
     def name(self) -> str:
@@ -59,38 +51,11 @@ class Renderer(Protocol):
         ...
 
     def render(self, camera: Camera, world_from_camera: Floats, instances: bool = False) -> Picture:
-        """Take a picture.
-
-        Parameters
-        ----------
-        camera : Camera
-        world_from_camera : (4, 4) float64
-            From `aerialdojo_gen.geometry.cameras.view_pose` or `look_at_pose`.
-        instances : bool
-            Whether the picture has an instance id map.
-
-        Returns
-        -------
-        Picture
-            Arrays of its own: a later call does not change them.
-        """
+        """Take a picture from a pose (4, 4); its arrays are not changed by later calls."""
         ...
 
     def render_views(self, camera: Camera, poses: Sequence[Floats], instances: bool = False) -> list[Picture]:
-        """Take several pictures, which costs less than one by one where they share their eye.
-
-        Parameters
-        ----------
-        camera : Camera
-        poses : sequence of (4, 4) float64
-            World_from_camera of every picture.
-        instances : bool
-
-        Returns
-        -------
-        list of Picture
-            The same that `render` gives of each.
-        """
+        """Take several pictures at once, which costs less where they share their eye."""
         ...
 
     def close(self) -> None:
@@ -109,12 +74,7 @@ class Renderer(Protocol):
 
 
 class PyBulletRenderer:
-    """A scene in PyBullet's TinyRenderer; see `Renderer`.
-
-    Parameters
-    ----------
-    scene : Scene
-    """
+    """A scene in PyBullet's TinyRenderer; see `Renderer`."""
 
     name = "pybullet"
     device = "TinyRenderer"
@@ -156,39 +116,14 @@ class PyBulletRenderer:
 
 @dataclass(frozen=True)
 class Choice:
-    """Which renderer is taken, and why.
+    """Which renderer is taken, and why."""
 
-    Attributes
-    ----------
-    name : str
-        One of `RENDERERS`.
-    why : str
-        One line for people.
-    """
-
-    name: RendererName
-    why: str
+    name: RendererName  # One of `RENDERERS`
+    why: str  # One line for people
 
 
 def open_renderer(scene: Scene, name: str = "auto") -> Renderer:
-    """Make a scene ready to be rendered.
-
-    Parameters
-    ----------
-    scene : Scene
-    name : str
-        One of `RENDERERS`, or ``"auto"``: the fastest that works here (`choose_renderer`).
-
-    Returns
-    -------
-    Renderer
-        For the caller to close, e.g. by ``with``.
-
-    Raises
-    ------
-    RenderError
-        The renderer does not work here.
-    """
+    """Make a scene ready to be rendered."""
     if name == "auto":
         name = choose_renderer().name
     if name == "pybullet":
@@ -201,16 +136,7 @@ def open_renderer(scene: Scene, name: str = "auto") -> Renderer:
 
 
 def kept_renderer(scene: Scene, name: str, anew: bool = False) -> Renderer:
-    """Return the scene's renderer: its context's, kept until one of another name is asked for; not to be closed.
-
-    Parameters
-    ----------
-    scene : Scene
-    name : str
-        As for `open_renderer`.
-    anew : bool
-        Make it anew: one that has gone wrong may be right then.
-    """
+    """Return the scene's renderer: its context's, kept until one of another name is asked for; not to be closed."""
     context = context_of(scene)
     if anew:
         context.drop("renderer")
@@ -229,23 +155,7 @@ def forget_renderers() -> None:
 
 @lru_cache
 def choose_renderer(name: str = "auto") -> Choice:
-    """Choose the fastest renderer whose pictures of a known scene are right, or check the one that is named.
-
-    Parameters
-    ----------
-    name : str
-        One of `RENDERERS`, or ``"auto"``.
-
-    Returns
-    -------
-    Choice
-        The same for every call of a process.
-
-    Raises
-    ------
-    RenderError
-        What was asked for does not work here, or draws what is not there.
-    """
+    """Choose the fastest renderer whose pictures of a known scene are right, or check the one that is named."""
     failures = []
     for candidate in RENDERERS if name == "auto" else (name,):
         try:
@@ -264,21 +174,7 @@ def choose_renderer(name: str = "auto") -> Choice:
 def check(renderer: Renderer) -> str:
     """Check a renderer of `probe_scene` against ray casts.
 
-    Parameters
-    ----------
-    renderer : Renderer
-        Of `probe_scene`.
-
-    Returns
-    -------
-    str
-        What was found, for people.
-
-    Raises
-    ------
-    RenderError
-        Fewer than 99.9 % of the pixels have their depth within 1 cm (a pixel of sky has none), or red is not where
-        the red cube is, and there alone.
+    Depth within 1 cm at 99.9 % of the pixels, red only where it is.
     """
     scene = probe_scene()
     caster, camera = RayCaster(scene), Camera(192, 192, 90.0)

@@ -29,27 +29,7 @@ _AHEAD = 4
 def draw_bodies(
     renderer: Renderer, camera: Camera, poses: Floats, views: Sequence[str], instance: NDArray[np.int32] | None = None
 ) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
-    """Take the pictures of all views at some poses.
-
-    Parameters
-    ----------
-    renderer : Renderer
-    camera : Camera
-        Of every view.
-    poses : (n, 4) float64
-        x, y, z in metres and yaw in radians, world frame, of the body's centre.
-    views : sequence of str
-        Of `aerialdojo_gen.store.schemas.VIEWS`.
-    instance : (n, views, H, W) int32, optional
-        Filled with the pictures' instance id maps: numbers in the scene's order, -1 where nothing is hit.
-
-    Returns
-    -------
-    rgb : (n, views, H, W, 3) uint8
-        sRGB; what `Renderer.render` gives for each alone, to the bit.
-    depth_m : (n, views, H, W) float32
-        Planar depth, metres; inf where nothing is hit.
-    """
+    """Pictures of all views at poses (n, 4): RGB (n, views, H, W, 3) uint8 and planar depth, inf for no hit."""
     shape = (len(poses), len(views), camera.height, camera.width)
     rgb, depth_m = np.empty((*shape, 3), np.uint8), np.empty(shape, np.float32)
     many = getattr(renderer, "bodies", None)
@@ -66,13 +46,7 @@ def draw_bodies(
 
 
 class GlBodies:
-    """Draws bodies' views with a `GlRenderer`.
-
-    Parameters
-    ----------
-    renderer : GlRenderer
-        Its buffers, programs and targets are used, and stay its own.
-    """
+    """Draws bodies' views with a `GlRenderer`."""
 
     def __init__(self, renderer: Any) -> None:
         self._renderer = renderer

@@ -59,31 +59,16 @@ def _looks_different(before: Floats, now: Floats, picture: Picture) -> bool:
 
 @dataclass
 class ViewChecks:
-    """Checks of one view's frames, in their order.
-
-    Attributes
-    ----------
-    camera : Camera
-    solid : Solid
-        The scene that is rendered.
-    flags : set of str
-        What has been found so far.
-    """
+    """Checks of one view's frames, in their order."""
 
     camera: Camera
-    solid: Solid
-    flags: set[str] = field(default_factory=set)
+    solid: Solid  # The scene that is rendered
+    flags: set[str] = field(default_factory=set)  # What has been found so far
     _picture: Picture | None = None
     _pose: Floats | None = None
 
     def add(self, picture: Picture, world_from_camera: Floats) -> None:
-        """Check the next frame.
-
-        Parameters
-        ----------
-        picture : Picture
-        world_from_camera : (4, 4) float64
-        """
+        """Check the next frame."""
         own = picture_flags(picture)
         self.flags |= own
         wrong, behind = self.against_rays(picture, world_from_camera)
@@ -105,22 +90,9 @@ class ViewChecks:
         self._picture, self._pose = picture, world_from_camera
 
     def against_rays(self, picture: Picture, world_from_camera: Floats) -> tuple[float, float]:
-        """Compare depth with ray casts at a lattice of pixels.
+        """Compare depth with ray casts at a lattice of pixels without edges.
 
-        Pixels at edges are left out: they have no one depth. An edge is where inverse depth, linear on any plane,
-        bends within the pixel's neighbours.
-
-        Parameters
-        ----------
-        picture : Picture
-        world_from_camera : (4, 4) float64
-
-        Returns
-        -------
-        wrong : float
-            Share of the compared pixels that differ by more than 1 cm (and the depth buffer's own resolution).
-        behind : float
-            Share of the rays that hit something which hit it from behind.
+        Shares that are wrong, and that hit from behind.
         """
         h, w = picture.depth_m.shape
         n = _SAMPLES_A_SIDE
@@ -150,14 +122,7 @@ class ViewChecks:
 
 
 class Solid:
-    """A scene for ray casts that tell front from back.
-
-    Parameters
-    ----------
-    scene : Scene
-    caster : TriangleRayCaster, optional
-        Over the triangles of its instances in their order, where there is one already.
-    """
+    """A scene for ray casts that tell front from back."""
 
     def __init__(self, scene: Scene, caster: TriangleRayCaster | None = None) -> None:
         vertices, faces = soup(scene.instances)
@@ -169,21 +134,7 @@ class Solid:
         self._caster = seen_caster(scene, caster or TriangleRayCaster(vertices, faces))
 
     def first_hit(self, origin: Floats, directions: Floats) -> tuple[Floats, float]:
-        """Find what rays hit first.
-
-        Parameters
-        ----------
-        origin : (3,) float64
-            Metres, world frame.
-        directions : (n, 3) float64
-
-        Returns
-        -------
-        distance_m : (n,) float64
-            Along the ray; inf where it hits nothing.
-        behind : float
-            Share of the rays that hit something which hit it from behind: near 1 inside a solid.
-        """
+        """First hits of rays, (n,) metres, and the share of hits from behind: near 1 inside a solid."""
         distance, face = self._caster.first_hit(origin, directions)
         hit = face >= 0
         away = np.einsum("ij,ij->i", self._normal[face[hit]], directions[hit]) > 0.0
@@ -196,17 +147,7 @@ def kept_solid(scene: Scene) -> Solid:
 
 
 def picture_flags(picture: Picture) -> set[str]:
-    """Check a frame by itself.
-
-    Parameters
-    ----------
-    picture : Picture
-
-    Returns
-    -------
-    set of str
-        Of ``black``, ``uniform``, ``depth_invalid``, and ``camera_inside`` where the camera touches a surface.
-    """
+    """Check a frame by itself."""
     flags = set()
     dark, widest = _darkness(picture.rgb)
     nearest = float(np.min(picture.depth_m))

@@ -37,20 +37,9 @@ _Y_OFFSET, _UV_OFFSET = (16 << 16) + (1 << 15), (128 << 18) + (1 << 17)
 
 
 def to_stored(depth_m: NDArray[np.floating[Any]], step: float = 0.0) -> NDArray[np.uint16]:
-    """Depth as it is stored.
+    """Planar depth in metres as stored uint16: whole millimetres, or the nearest of `stored_depths_m(step)`.
 
-    Parameters
-    ----------
-    depth_m : float array
-        Planar depth, metres; inf or NaN where nothing is hit.
-    step : float
-        0 for whole millimetres; else by what share a stored depth is more than the one before it, so that what is
-        lost is half of that share, near and far.
-
-    Returns
-    -------
-    uint16 array
-        Of `stored_depths_m(step)` the nearest; 0 where nothing lies within `MAX_DEPTH_M`.
+    0 for no hit.
     """
     depth = np.ascontiguousarray(depth_m)
     out = np.empty(depth.shape, dtype=np.uint16)
@@ -75,17 +64,9 @@ def to_metres(stored: NDArray[np.uint16], step: float = 0.0) -> NDArray[np.float
 
 @lru_cache
 def stored_depths_m(step: float) -> NDArray[np.float32]:
-    """List what the stored values of a relative step mean: 0.1 m * (1 + step) ** (value - 1).
+    """What the stored values of a relative step mean, (65536,) metres: 0.1 m * (1 + step) ** (value - 1).
 
-    Parameters
-    ----------
-    step : float
-        More than 0.
-
-    Returns
-    -------
-    (65536,) float32
-        Metres; inf for 0.
+    Inf for 0.
     """
     values = np.arange(1 << 16, dtype=np.float64)
     with np.errstate(over="ignore"):
@@ -104,25 +85,9 @@ def _steps(step: float) -> NDArray[np.uint16]:
 
 
 class VideoWriter:
-    """Write videos into one file, frame by frame; a context manager.
+    """Write video streams (H.264 RGB, 16-bit depth, instance ids) into one file, frame by frame.
 
-    Parameters
-    ----------
-    path : Path
-        The file; its suffix plays no part.
-    modalities : sequence of str
-        A stream each, in this order: ``"rgb"`` (frames (H, W, 3) uint8, even H and W), ``"depth"`` or ``"instance"``
-        (frames (H, W) uint16). ``"rgb"`` alone makes an MP4, all else a Matroska file.
-    width, height : int
-        Pixels.
-    fps : float
-        Frames a second.
-    crf : int
-        Quality of H.264, lower is better.
-    preset : str
-        x264's, from ``"ultrafast"`` (larger files) to ``"veryslow"``.
-    comment : str
-        Stored in the file: what the reader must know of the camera.
+    A context manager.
     """
 
     def __init__(
@@ -232,17 +197,7 @@ def _to_yuv(
 
 
 class PngWriter:
-    """Write frames as loose PNG files, ``000000.png`` and on; a context manager.
-
-    Parameters
-    ----------
-    folder : Path
-        Made here; it must not exist.
-    modality : str
-        ``"rgb"``, ``"depth"`` or ``"instance"``.
-    comment : str
-        Stored beside the frames, in ``camera.json``.
-    """
+    """Write frames as loose PNG files, ``000000.png`` and on; a context manager."""
 
     def __init__(self, folder: Path, modality: str, comment: str = "") -> None:
         self._folder, self._modality, self._n = folder, modality, 0

@@ -27,36 +27,19 @@ _MEASURED_SCENES, _MEASURED_POSES = 6, 12
 
 @dataclass(frozen=True)
 class Estimate:
-    """What a selection will take.
+    """What a selection will take."""
 
-    Attributes
-    ----------
-    trajectories, poses, videos : int
-        Of the selection; a pose is a frame in every view.
-    cpu_s, wall_s : float
-        Seconds of one core; seconds on `workers` idle ones, where every machine of `machines` has as many.
-    size_bytes : float
-        Of the videos.
-    memory_bytes : float
-        Of all workers of a machine.
-    workers, machines : int
-    measured : int
-        Poses that were rendered, encoded and checked to find out.
-    why : str
-        Which renderer, and why.
-    """
-
-    trajectories: int
+    trajectories: int  # Of the selection; a pose is a frame in every view
     poses: int
     videos: int
-    cpu_s: float
+    cpu_s: float  # Seconds of one core; seconds on `workers` idle ones, where every machine of `machines` has as many
     wall_s: float
-    size_bytes: float
-    memory_bytes: float
+    size_bytes: float  # Of the videos
+    memory_bytes: float  # Of all workers of a machine
     workers: int
     machines: int
-    measured: int
-    why: str
+    measured: int  # Poses that were rendered, encoded and checked to find out
+    why: str  # Which renderer, and why
 
     def __str__(self) -> str:
         """Three lines for people."""
@@ -75,34 +58,7 @@ class Estimate:
 def estimate(
     data: Where, scenes: list[str], config: RenderConfig, seed: int, workers: int, machines: int = 1
 ) -> Estimate:
-    """Measure a few trajectories and extrapolate to the selection.
-
-    Parameters
-    ----------
-    data : DataRoot, Path or str
-        The data root, with a release.
-    scenes : list of str
-    config : RenderConfig
-    seed : int
-        The pipeline's seed: the selection is drawn by it.
-    workers : int
-        Processes a machine.
-    machines : int
-        How many share the work.
-
-    Returns
-    -------
-    Estimate
-
-    Raises
-    ------
-    UsageError
-        Nothing is selected.
-    StoreError
-        A scene's routes or mesh are missing.
-    RenderError
-        The renderer does not work here.
-    """
+    """Measure a few trajectories and extrapolate to the selection."""
     choice = choose_renderer(config.renderer)
     poses = trajectories = 0
     selected: dict[str, str] = {}

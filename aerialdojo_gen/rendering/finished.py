@@ -26,24 +26,7 @@ _SELECTION = {"limit", "split", "trajectories_per_part"}
 
 
 def trajectory_fingerprint(code: str, mesh_sha256: str, route: Mapping[str, Any], config: RenderConfig) -> str:
-    """Hash what a trajectory's recording depends on.
-
-    Parameters
-    ----------
-    code : str
-        Digest of the stage's code.
-    mesh_sha256 : str
-        Of the scene's mesh.
-    route : mapping
-        Row of `routes`.
-    config : RenderConfig
-        Its renderer is one by name, not ``"auto"``.
-
-    Returns
-    -------
-    str
-        SHA-256, hexadecimal.
-    """
+    """Hash what a trajectory's recording depends on."""
     facts = {
         "code": code,
         "mesh": mesh_sha256,
@@ -54,19 +37,7 @@ def trajectory_fingerprint(code: str, mesh_sha256: str, route: Mapping[str, Any]
 
 
 def find(data: DataRoot, folder: str, fingerprint: str, *, verify: bool = False) -> list[dict[str, Any]] | None:
-    """Return the rows of a finished trajectory; None where there is none, or it is stale or damaged.
-
-    Parameters
-    ----------
-    data : DataRoot
-        The data root.
-    folder : str
-        The trajectory's, relative to it.
-    fingerprint : str
-        Of `trajectory_fingerprint`.
-    verify : bool
-        Compare the files' digests too, not their sizes alone.
-    """
+    """Return the rows of a finished trajectory; None where there is none, or it is stale or damaged."""
     try:
         note = read_json(data.local_copy(f"{folder}/{NOTE}"))
     except (OSError, StoreError):

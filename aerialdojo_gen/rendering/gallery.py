@@ -26,24 +26,7 @@ _FLYING_HEIGHT_M = 3.0
 
 
 def prop_picture(catalogue: Catalogue, category: str, size_px: int = 240, variant: str | None = None) -> Image:
-    """Picture a prop from before it and above, on a paved floor as wide as it needs.
-
-    Parameters
-    ----------
-    catalogue : Catalogue
-        Where the category stands.
-    category : str
-        Its key.
-    size_px : int
-        Edge of the picture.
-    variant : str, optional
-        One of its variants; the first by default.
-
-    Returns
-    -------
-    (size_px, size_px, 3) uint8
-        sRGB.
-    """
+    """Picture a prop from before it and above, (size_px, size_px, 3) uint8 sRGB."""
     names = [v.name for v in catalogue[category].variants]
     chosen = variant if variant is not None else (names[0] if names else None)
     prop = catalogue.instantiate(category, "prop", generator(0, "gallery", category), variant=chosen)
@@ -65,13 +48,7 @@ def prop_picture(catalogue: Catalogue, category: str, size_px: int = 240, varian
 def props_sheet(
     catalogue: Catalogue, names: Sequence[str] | None = None, size_px: int = 200, columns: int = 16
 ) -> Image:
-    """Picture categories under their names, in alphabetical order; all targets where none are named.
-
-    Returns
-    -------
-    (H, W, 3) uint8
-        sRGB.
-    """
+    """Picture categories under their names, alphabetically; (H, W, 3) uint8 sRGB."""
     names = sorted(catalogue.targets if names is None else names)
     return contact_sheet(
         [prop_picture(catalogue, name, size_px) for name in names], [catalogue[n].name for n in names], columns
@@ -79,20 +56,7 @@ def props_sheet(
 
 
 def scene_sheet(scene: Scene, width: int = 640, height: int = 440) -> Image:
-    """Picture a scene: from straight above, from four sides, and twice at flying height.
-
-    Parameters
-    ----------
-    scene : Scene
-        Any scene.
-    width, height : int
-        Of each picture, pixels.
-
-    Returns
-    -------
-    (H, W, 3) uint8
-        sRGB.
-    """
+    """Picture a scene from above, from four sides and twice at flying height; (H, W, 3) uint8 sRGB."""
     low, high = scene.bounds
     centre = np.array([*(low[:2] + high[:2]) / 2, low[2]])
     span = high - low
@@ -147,26 +111,7 @@ def _flying_views(scene: Scene) -> list[tuple[NDArray[np.float64], NDArray[np.fl
 
 
 def write_picture(image: Image, folder: Path, name: str, max_width: int | None = None) -> Path:
-    """Write a picture as PNG or JPEG, whole or not at all; returns its path.
-
-    Parameters
-    ----------
-    image : (H, W, 3) uint8
-        sRGB.
-    folder : Path
-        Made where it is missing.
-    name : str
-        Ends in ``.png`` or ``.jpg``.
-    max_width : int, optional
-        Columns that a wider picture is reduced to.
-
-    Raises
-    ------
-    RenderError
-        The picture could not be encoded.
-    StoreError
-        The disk is full or read-only.
-    """
+    """Write (H, W, 3) uint8 sRGB as PNG or JPEG, whole or not at all; returns its path."""
     if max_width is not None and image.shape[1] > max_width:
         height = round(image.shape[0] * max_width / image.shape[1])
         image = np.asarray(cv2.resize(image, (max_width, height), interpolation=cv2.INTER_AREA), dtype=np.uint8)

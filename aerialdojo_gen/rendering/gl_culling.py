@@ -24,23 +24,7 @@ NEAR_W, ROUNDING_PX = 0.05, 0.02
 def chunks_in_view(
     low: Floats, high: Floats, eye: Floats, clips: Floats
 ) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-    """Choose the chunks whose boxes one view at least may see.
-
-    Parameters
-    ----------
-    low, high : (k, 3) float64
-        The chunks' boxes, metres, world frame.
-    eye : (3,) float64
-    clips : (v, 4, 4) float64
-        OpenGL's matrices of the views, row-major.
-
-    Returns
-    -------
-    order : (m,) int64
-        Indices, the nearest first.
-    sees : (m, v) bool
-        Which views may see each of them.
-    """
+    """Chunks that at least one view may see, the nearest first, and which views may see each, (m, v) bool."""
     sees = _boxes_in_view(low, high, clips)
     found, away = np.empty(len(low), np.int64), np.empty(len(low), np.float64)
     n = 0
@@ -94,34 +78,7 @@ def triangles_in_view(
 ) -> tuple[NDArray[np.uint32], NDArray[np.int64]]:
     """Choose the triangles of every view.
 
-    Parameters
-    ----------
-    order, sees
-        Of `chunks_in_view`.
-    starts : (k + 1,) int64
-        First triangle of every chunk.
-    planes : (n, 4) float64
-        A triangle faces the eye where ``normal . eye + d`` is positive.
-    corners : (n, 9) float32
-        Metres, world frame.
-    clips : (v, 4, 4) float64
-    eye : (3,) float64
-        The views' common one.
-    low, high : (k, 3) float64
-        The chunks' boxes.
-    hides : bool
-        Whether what lies behind these triangles is not seen.
-    width, height : int
-        Pixels.
-    whole, part, covered
-        Of `aerialdojo_gen.rendering.gl_tiles.Tiles`: what is drawn already; what hides is added.
-
-    Returns
-    -------
-    indices : (v, 3 most) uint32
-        Three vertices a triangle, in the order of the chunks.
-    count : (v,) int64
-        How many of a view's indices count.
+    Vertex indices (v, 3 most) uint32, in the order of the chunks, and their counts.
     """
     views = len(clips)
     most = 0
@@ -205,16 +162,7 @@ def _box_hidden(low: Floats, high: Floats, m: Floats, width: int, height: int, w
 
 @njit(cache=True, error_model="numpy")
 def box_pixels(low: Floats, high: Floats, m: Floats, width: int, height: int) -> tuple[int, int, int, int, float]:
-    """Project a box.
-
-    Returns
-    -------
-    left, right, top, bottom : int
-        First and last columns and rows of pixels whose centres it could hold; the first is the larger where there
-        are none.
-    nearest : float
-        Inverse depth of its nearest corner; inf, and all pixels, where one is too near to be projected.
-    """
+    """Columns and rows of pixels that a box could hold, and the inverse depth of its nearest corner."""
     u0, u1, v0, v1, nearest = np.inf, -np.inf, np.inf, -np.inf, np.inf
     for corner in range(8):
         x = high[0] if corner & 1 else low[0]

@@ -17,17 +17,7 @@ _Key = tuple[int, int, bool, bool]
 
 
 def foreign_kinds(scene: Scene) -> list[Kind]:
-    """Pack the triangles that `aerialdojo_gen.rendering.gl_geometry.chunks` leaves out.
-
-    Parameters
-    ----------
-    scene : Scene
-
-    Returns
-    -------
-    list of Kind
-        One for every size of texture, with and without holes, from one side and from both. Empty for a built scene.
-    """
+    """Pack the triangles that `aerialdojo_gen.rendering.gl_geometry.chunks` leaves out."""
     return _kinds(scene.instances, scene.materials, True, ("FOREIGN",))
 
 

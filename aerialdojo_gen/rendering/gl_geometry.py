@@ -40,48 +40,17 @@ VERTEX = np.dtype(
 
 @dataclass(frozen=True, eq=False)
 class Chunks:
-    """Triangles of one kind of surface (with a texture, or without), cut into chunks.
+    """Triangles of one kind of surface (with a texture, or without), cut into chunks."""
 
-    Attributes
-    ----------
-    vertices : (3 n,) structured array of `VERTEX`
-        n triangles, chunk after chunk.
-    starts : (k + 1,) int64
-        First triangle of every chunk; the last is n.
-    low, high : (k, 3) float64
-        A chunk's box, metres, world frame.
-    planes : (n, 4) float64
-        A triangle faces the eye where ``normal . eye + d`` is positive.
-    corners : (n, 9) float32
-        The positions of `vertices`, by themselves: whoever chooses triangles reads nothing else.
-    """
-
-    vertices: NDArray[np.void]
-    starts: NDArray[np.int64]
-    low: Floats
+    vertices: NDArray[np.void]  # (3 n,) structured array of `VERTEX`; n triangles, chunk after chunk
+    starts: NDArray[np.int64]  # (k + 1,) int64; first triangle of every chunk; the last is n
+    low: Floats  # (k, 3) float64; a chunk's box, metres, world frame
     high: Floats
-    planes: Floats
-    corners: NDArray[np.float32]
+    planes: Floats  # (n, 4) float64; a triangle faces the eye where ``normal . eye + d`` is positive
+    corners: NDArray[np.float32]  # (n, 9) float32
 
     def seen(self, clips: Floats, eye: Floats, tiles: Tiles, hides: bool = True) -> list[NDArray[np.uint32]]:
-        """Choose what the views of one eye draw.
-
-        Parameters
-        ----------
-        clips : (v, 4, 4) float64
-            OpenGL's matrices of the cameras, row-major.
-        eye : (3,) float64
-            The cameras' common centre.
-        tiles : Tiles
-            What is drawn already; what is chosen here and hides is added.
-        hides : bool
-            Whether what lies behind a triangle is not seen: not so where its texture has holes.
-
-        Returns
-        -------
-        list of (3 k,) uint32
-            A view's indices into `vertices`, chunk by chunk, the nearest first.
-        """
+        """Vertex indices (3 k,) a view of what the views of one eye draw, chunk by chunk, the nearest first."""
         order, sees = chunks_in_view(self.low, self.high, eye, clips)
         indices, count = triangles_in_view(
             order, sees, self.starts, self.planes, self.corners, clips, eye, self.low, self.high, hides,
@@ -92,26 +61,13 @@ class Chunks:
 
 @dataclass(frozen=True, eq=False)
 class Kind:
-    """Surfaces that one program draws, from one texture array.
-
-    Attributes
-    ----------
-    chunks : Chunks
-    tags : tuple of str
-        What the program is made for (`aerialdojo_gen.rendering.gl_shaders.specialise`).
-    layers : (n, h, w, 3 or 4) uint8 or None
-        The layers of its texture array, first row at v = 0; None where it has none.
-    smooth : bool
-        Whether textures are drawn between their texels and their sizes, as those of foreign meshes are.
-    double_sided : bool
-        Whether both sides are drawn.
-    """
+    """Surfaces that one program draws, from one texture array."""
 
     chunks: Chunks
-    tags: tuple[str, ...]
-    layers: NDArray[np.uint8] | None
+    tags: tuple[str, ...]  # What the program is made for (`aerialdojo_gen.rendering.gl_shaders.specialise`)
+    layers: NDArray[np.uint8] | None  # The layers of its texture array, first row at v = 0; None where it has none
     smooth: bool = False
-    double_sided: bool = False
+    double_sided: bool = False  # Whether both sides are drawn
 
     @property
     def hides(self) -> bool:
@@ -120,18 +76,9 @@ class Kind:
 
 
 def chunks(scene: Scene) -> tuple[Chunks, Chunks, NDArray[np.uint8] | None]:
-    """Pack what of a scene has a material of the catalogue's making for OpenGL.
+    """Pack a scene's catalogue materials for OpenGL.
 
-    Parameters
-    ----------
-    scene : Scene
-
-    Returns
-    -------
-    textured, flat : Chunks
-        Either may be empty. Triangles without an area are left out.
-    textures : (n, e, e, 3) uint8 or None
-        The layers of the texture array, first row at v = 0; None where no material has a texture.
+    Textured and flat chunks, and the texture layers (n, e, e, 3) uint8.
     """
     names = [name for name, m in sorted(scene.materials.items()) if m.texture is not None and not m.atlas]
     layer = {name: float(k) for k, name in enumerate(names)}

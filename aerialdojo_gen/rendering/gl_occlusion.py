@@ -26,14 +26,7 @@ _SIZE = CHUNK_TRIANGLES
 
 
 class BodyCulling:
-    """Chooses the triangles of one kind of surface that the views of a body draw.
-
-    Parameters
-    ----------
-    chunks : Chunks
-    hides : bool
-        Whether what lies behind its triangles is not seen: not so where their texture has holes.
-    """
+    """Chooses the triangles of one kind of surface that the views of a body draw."""
 
     def __init__(self, chunks: Chunks, hides: bool = True) -> None:
         self._chunks = chunks
@@ -44,23 +37,9 @@ class BodyCulling:
     def seen(
         self, clips: Floats, eye: Floats, width: int, height: int, nearness: NDArray[np.float32]
     ) -> list[NDArray[np.uint32]]:
-        """Choose what every view draws.
+        """Vertex indices (3 k,) of what every view draws, the nearest first; valid until the next call.
 
-        Parameters
-        ----------
-        clips : (views, 4, 4) float64
-            OpenGL's matrices of the cameras, row-major.
-        eye : (3,) float64
-            Their common centre.
-        width, height : int
-            Pixels of each.
-        nearness : (views, height, width) float32
-            Inverse depth of what is drawn already, 0 where nothing is; raised here by what is chosen.
-
-        Returns
-        -------
-        list of (3 k,) uint32
-            By view, indices into the chunks' vertices, chunk by chunk, the nearest first; valid until the next call.
+        `nearness` is raised.
         """
         c = self._chunks
         if not self._hides:

@@ -236,22 +236,7 @@ SKY = (_SKY_VERTEX, _SKY_FRAGMENT)
 
 
 def specialise(source: str, *defined: str) -> str:
-    """Give a program its constants and its variant.
-
-    Parameters
-    ----------
-    source : str
-        One of this module's programs.
-    *defined : str
-        Of ``TEXTURED`` (samples the texture array, and fades it into its mean), ``INSTANCES`` (writes the instance id
-        map); and of a foreign mesh ``FOREIGN`` (vertex colours, both sides, light of its own), ``ATLAS`` (samples the
-        texture array at every distance), ``MASK`` (leaves its holes out) and ``BACKDROP`` (behind everything).
-
-    Returns
-    -------
-    str
-        GLSL that compiles.
-    """
+    """Give a program its constants and its variant."""
     constants = {
         "AMBIENT": shading._AMBIENT,
         "FROM_ABOVE": shading._FROM_ABOVE,

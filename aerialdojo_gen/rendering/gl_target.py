@@ -17,15 +17,7 @@ _here = threading.local()
 
 
 def clear_depth(target: Any, colours: int) -> None:
-    """Clear a target's depth, and none of its colours: what is drawn last covers them all.
-
-    Parameters
-    ----------
-    target : moderngl.Framebuffer
-        To be put to use after this and not before: that is what lets its colours be drawn again.
-    colours : int
-        How many it has.
-    """
+    """Clear a target's depth, and none of its colours: what is drawn last covers them all."""
     # One attachment has its mask alone, several have a tuple of them.
     none, every = (False,) * 4, (True,) * 4
     if colours:
@@ -51,17 +43,7 @@ def read_instances(target: Any, shape: tuple[int, int]) -> NDArray[np.int32]:
 
 
 def read_pixels(target: Any, rgb: NDArray[np.uint8], depth_m: NDArray[np.float32]) -> None:
-    """Read what was drawn.
-
-    Parameters
-    ----------
-    target : moderngl.Framebuffer
-        Of `aerialdojo_gen.rendering.gl.GlRenderer.draw_seen`.
-    rgb : (H, W, 3) uint8
-        sRGB.
-    depth_m : (H, W) float32
-        Planar depth; inf where nothing is hit.
-    """
+    """Read what was drawn into RGB (H, W, 3) uint8 and planar depth (H, W), inf where nothing is hit."""
     shape = depth_m.shape
     if getattr(_here, "shape", None) != shape:
         # The bytes of colours, which are no numbers, and depths.

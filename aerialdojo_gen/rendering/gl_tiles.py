@@ -31,25 +31,13 @@ _COLUMN = np.uint64(0x0101010101010101)
 
 @dataclass(frozen=True, eq=False)
 class Tiles:
-    """What is drawn already in some views, by tiles, rows first.
+    """What is drawn already in some views, by tiles, rows first."""
 
-    Attributes
-    ----------
-    width, height : int
-        Pixels of each view.
-    whole : (views, rows, columns) float32
-        Inverse depth, 1/m: every pixel of the tile shows something at least as near; 0 where nothing is known.
-    part : (views, rows, columns) float32
-        The same of the pixels in `covered`.
-    covered : (views, rows, columns) uint64
-        A bit a pixel, eight a row.
-    """
-
-    width: int
+    width: int  # Pixels of each view
     height: int
-    whole: NDArray[np.float32]
-    part: NDArray[np.float32]
-    covered: NDArray[np.uint64]
+    whole: NDArray[np.float32]  # (views, rows, columns) float32
+    part: NDArray[np.float32]  # (views, rows, columns) float32; the same of the pixels in `covered`
+    covered: NDArray[np.uint64]  # (views, rows, columns) uint64; a bit a pixel, eight a row
 
     @classmethod
     def empty(cls, views: int, width: int, height: int) -> Tiles:

@@ -22,43 +22,18 @@ _ENDLESS_M = 1e9
 
 @dataclass(frozen=True, eq=False)
 class Lighting:
-    """What shading must know of a scene; row k of the tables is surface k.
+    """What shading must know of a scene; row k of the tables is surface k."""
 
-    Attributes
-    ----------
-    colour : (n, 3) float64
-        The material's mean colour, 0-255.
-    texel_m : (n,) float64
-        Edge of a texel, metres; 0 for a flat material, endless for one that is never to fade into its mean.
-    unlit : (n,) bool
-        Whether the material has its light in its colours.
-    sun : (3,) float64
-        Unit vector towards the sun.
-    zenith, horizon : (3,) float64
-        The sky's colours, 0-255.
-    """
-
-    colour: Floats
-    texel_m: Floats
-    unlit: NDArray[np.bool_]
-    sun: Floats
-    zenith: Floats
+    colour: Floats  # (n, 3) float64; the material's mean colour, 0-255
+    texel_m: Floats  # (n,) float64
+    unlit: NDArray[np.bool_]  # (n,) bool; whether the material has its light in its colours
+    sun: Floats  # (3,) float64; unit vector towards the sun
+    zenith: Floats  # (3,) float64; the sky's colours, 0-255
     horizon: Floats
 
 
 def light_of(scene: Scene, materials: Sequence[str] = ()) -> Lighting:
-    """Collect what shading must know.
-
-    Parameters
-    ----------
-    scene : Scene
-    materials : sequence of str
-        Material of every surface, by name.
-
-    Returns
-    -------
-    Lighting
-    """
+    """Collect what shading must know."""
     found = [scene.materials[name] for name in materials]
     sky = np.array(scene.sky, dtype=np.float64)
     sun = np.array(scene.sun, dtype=np.float64)
@@ -80,19 +55,11 @@ def _texel_m(material: Material) -> float:
 
 @dataclass(frozen=True, eq=False)
 class ShadowMap:
-    """What the sun sees.
-
-    Attributes
-    ----------
-    camera : Camera
-    world_from_camera : (4, 4) float64
-    depth_m : (n, n) float32
-        Planar depth of the lit surfaces; inf where there is none.
-    """
+    """What the sun sees."""
 
     camera: Camera
-    world_from_camera: Floats
-    depth_m: NDArray[np.float32]
+    world_from_camera: Floats  # (4, 4) float64
+    depth_m: NDArray[np.float32]  # (n, n) float32; planar depth of the lit surfaces; inf where there is none
 
     @cached_property
     def texel_m(self) -> float:
@@ -102,22 +69,9 @@ class ShadowMap:
 
 
 def sun_view(scene: Scene, size_px: int = 2048) -> tuple[Camera, Floats, float, float]:
-    """Place the camera of the shadow map.
+    """The camera of the shadow map.
 
-    TinyRenderer has no parallel projection: the sun stands twelve scene radii away, its rays within 5° of parallel.
-
-    Parameters
-    ----------
-    scene : Scene
-    size_px : int
-        Edge of the map.
-
-    Returns
-    -------
-    camera : Camera
-    world_from_camera : (4, 4) float64
-    near_m, far_m : float
-        Planar depths that enclose the scene.
+    The sun stands twelve scene radii away, as TinyRenderer has no parallel projection.
     """
     boxes = np.stack([i.bounds for i in scene.instances])
     low, high = boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)

@@ -27,22 +27,12 @@ _OFF_SURFACE_M = 0.02
 
 @dataclass(frozen=True, eq=False)
 class Plane:
-    """Where the picture is taken from, and how large it is: the world's part that lies behind it is shown.
+    """Where the picture is taken from, and how large it is: the world's part that lies behind it is shown."""
 
-    Attributes
-    ----------
-    origin : (3,) float64
-        A point of the plane, metres, world frame: picture coordinates (0, 0).
-    right, up : (3,) float64
-        Orthogonal unit vectors in the plane.
-    extent_m : tuple of float
-        Left, right, bottom and top in picture coordinates, metres.
-    """
-
-    origin: Floats
-    right: Floats
+    origin: Floats  # (3,) float64; a point of the plane, metres, world frame: picture coordinates (0, 0)
+    right: Floats  # (3,) float64; orthogonal unit vectors in the plane
     up: Floats
-    extent_m: tuple[float, float, float, float]
+    extent_m: tuple[float, float, float, float]  # Left, right, bottom and top in picture coordinates, metres
 
     @classmethod
     def above(cls, z_m: float, extent_m: tuple[float, float, float, float]) -> Plane:
@@ -60,14 +50,7 @@ class Plane:
 
 
 class OrthographicPictures:
-    """Takes parallel projections of a scene.
-
-    Parameters
-    ----------
-    scene : Scene
-    caster : TriangleRayCaster, optional
-        Over the triangles of its instances in their order, where there is one already.
-    """
+    """Takes parallel projections of a scene."""
 
     def __init__(self, scene: Scene, caster: TriangleRayCaster | None = None) -> None:
         parts = [part for instance in scene.instances for part in instance.parts]
@@ -92,19 +75,7 @@ class OrthographicPictures:
         return self.take(Plane.above(self._ceiling_m + 1.0, extent_m), pixel_m)
 
     def take(self, plane: Plane, pixel_m: float) -> NDArray[np.uint8]:
-        """Take a picture.
-
-        Parameters
-        ----------
-        plane : Plane
-        pixel_m : float
-            Edge of a pixel, metres.
-
-        Returns
-        -------
-        (H, W, 3) uint8
-            sRGB; row 0 is the top.
-        """
+        """Take a picture with pixels of `pixel_m` metres; (H, W, 3) uint8 sRGB, row 0 at the top."""
         left, right, bottom, top = plane.extent_m
         width, height = max(1, round((right - left) / pixel_m)), max(1, round((top - bottom) / pixel_m))
         a = left + (np.arange(width) + 0.5) * (right - left) / width

@@ -19,24 +19,13 @@ TILED = "views.mkv"
 
 @dataclass(frozen=True)
 class Place:
-    """Where the pictures of one view and modality lie.
-
-    Attributes
-    ----------
-    view, modality : str
-    file : str
-        Name of the file, or of a folder of PNG files.
-    stream : int
-        Which of the file's videos.
-    left_px, top_px : int
-        The picture's top-left pixel in the video's frame.
-    """
+    """Where the pictures of one view and modality lie."""
 
     view: str
     modality: str
-    file: str
-    stream: int = 0
-    left_px: int = 0
+    file: str  # Name of the file, or of a folder of PNG files
+    stream: int = 0  # Which of the file's videos
+    left_px: int = 0  # The picture's top-left pixel in the video's frame
     top_px: int = 0
 
 
@@ -46,17 +35,7 @@ def modalities(config: RenderConfig) -> tuple[str, ...]:
 
 
 def places(config: RenderConfig) -> list[Place]:
-    """List what a recording consists of, view by view.
-
-    Parameters
-    ----------
-    config : RenderConfig
-
-    Returns
-    -------
-    list of Place
-        In the order of the views, and of `modalities`.
-    """
+    """List what a recording consists of, view by view."""
     return [
         _place(config, k, view, n, modality)
         for k, view in enumerate(config.views)
@@ -78,19 +57,7 @@ def columns(config: RenderConfig) -> int:
 
 
 def tiled(pictures: Mapping[str, NDArray[Any]], config: RenderConfig) -> NDArray[Any]:
-    """Lay the views' pictures side by side.
-
-    Parameters
-    ----------
-    pictures : mapping of str to (H, W, ...) array
-        By view; all of the configuration's.
-    config : RenderConfig
-
-    Returns
-    -------
-    array
-        Of `columns` tiles a row; zeros where there is no view.
-    """
+    """Lay the views' pictures side by side, `columns` a row; zeros where there is no view."""
     across = columns(config)
     down = -(-len(config.views) // across)
     first = pictures[config.views[0]]

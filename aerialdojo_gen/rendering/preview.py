@@ -16,24 +16,7 @@ from aerialdojo_gen.scenes.model import Scene
 def look_at(
     scene: Scene, eye: ArrayLike, target: ArrayLike, width: int = 640, height: int = 480, fov_deg: float = 60.0
 ) -> NDArray[np.uint8]:
-    """Take a picture of a scene.
-
-    Parameters
-    ----------
-    scene : Scene
-        Its renderer is kept until another scene is looked at.
-    eye, target : (3,) array_like
-        Where the camera stands and what it looks at, metres, world frame.
-    width, height : int
-        Pixels.
-    fov_deg : float
-        Horizontal field of view, degrees.
-
-    Returns
-    -------
-    (height, width, 3) uint8
-        sRGB.
-    """
+    """Take a picture of a scene from `eye` to `target`, world metres; (height, width, 3) uint8 sRGB."""
     camera = Camera(width, height, fov_deg)
     return kept_renderer(scene, "auto").render(camera, look_at_pose(eye, target)).rgb
 
@@ -41,27 +24,7 @@ def look_at(
 def contact_sheet(
     images: Sequence[NDArray[np.uint8]], labels: Sequence[str] = (), columns: int = 4
 ) -> NDArray[np.uint8]:
-    """Put pictures side by side, each under its label.
-
-    Parameters
-    ----------
-    images : sequence of (H, W, 3) uint8
-        At least one; smaller ones are padded to the largest.
-    labels : sequence of str
-        As many as pictures, or none.
-    columns : int
-        Pictures a row.
-
-    Returns
-    -------
-    (H', W', 3) uint8
-        The sheet.
-
-    Raises
-    ------
-    ValueError
-        If there is no picture, or the numbers of pictures and labels differ.
-    """
+    """Put pictures, (H, W, 3) uint8, side by side under their labels."""
     if not images or (labels and len(labels) != len(images)):
         raise ValueError(f"a sheet of {len(images)} pictures with {len(labels)} labels")
     height, width = max(i.shape[0] for i in images), max(i.shape[1] for i in images)

@@ -15,13 +15,7 @@ _FACES = ((0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), 
 
 @lru_cache(maxsize=1)
 def probe_scene() -> Scene:
-    """Build a yard of 16 m: a checkered ground, two walls, a red cube and slanted bars before the sky.
-
-    Returns
-    -------
-    Scene
-        The same object at every call.
-    """
+    """Build a yard of 16 m: a checkered ground, two walls, a red cube and slanted bars before the sky."""
     checks = np.kron([[60, 150], [150, 60]], np.ones((8, 8)))[..., None].repeat(3, axis=2).astype(np.uint8)
     materials = {
         "checks": Material("checks", (105, 105, 105), checks, 2.0),

@@ -32,19 +32,9 @@ _WIDE_M = 4.0
 
 
 class RayRenderer:
-    """A scene to be pictured by ray casts; see `aerialdojo_gen.rendering.backend.Renderer`.
+    """A scene pictured by ray casts, both sides of its triangles seen.
 
-    Parameters
-    ----------
-    scene : Scene
-        Both sides of its triangles are seen.
-    caster : TriangleRayCaster, optional
-        Over the triangles of its instances in their order, where there is one already.
-
-    Attributes
-    ----------
-    wide : (instances,) bool
-        Whether an instance is more than 4 m wide both ways.
+    See `aerialdojo_gen.rendering.backend.Renderer`.
     """
 
     name = "rays"
@@ -137,26 +127,7 @@ def _seen(
     eye: Floats, directions: Floats, distance: Floats, length: Floats, face: Ints, corners: Floats, uv: Floats,
     material: Ints, owner: Ints, tiles: NDArray[np.int64], texels: NDArray[np.uint8],
 ) -> tuple[NDArray[np.uint8], NDArray[np.float32], Ints, Ints]:  # fmt: skip
-    """Colour of the nearest texel where n rays hit, planar depth, material and instance.
-
-    Parameters
-    ----------
-    eye : (3,) float64
-    directions : (n, 3) float64
-        With a planar depth of 1.
-    distance, length : (n,) float64
-        Along the rays, inf where nothing is hit; and of their directions.
-    face : (n,) int32
-        That is hit, or -1.
-    corners : (f, 3, 3) float64
-        Of all faces.
-    uv : (f, 3, 2) float64
-        At the corners, in tiles.
-    material, owner : (f,) int32
-    tiles : (m, 3) int64
-        A material's first texel, rows and columns.
-    texels : (t, 3) uint8
-    """
+    """Colour of the nearest texel, planar depth, material and instance of n ray hits."""
     rays = len(face)
     albedo, depth = np.zeros((rays, 3), np.uint8), np.full(rays, np.inf, np.float32)
     surface, instance = np.full(rays, -1, np.int32), np.full(rays, -1, np.int32)

@@ -28,18 +28,7 @@ Floats = NDArray[np.float64]
 
 
 def frame_poses(route: dict[str, Any], config: RenderConfig) -> FramePoses:
-    """Poses of a recording's frames.
-
-    Parameters
-    ----------
-    route : dict
-        With the lists ``x_m``, ``y_m``, ``z_m``, ``yaw_rad`` and ``action`` of a row of `routes`.
-    config : RenderConfig
-
-    Returns
-    -------
-    FramePoses
-    """
+    """Poses of a recording's frames."""
     position = np.stack([route["x_m"], route["y_m"], route["z_m"]], axis=1)
     if config.sampling == "steps":
         return by_steps(position, route["yaw_rad"], route["action"], config.fps)
@@ -51,25 +40,7 @@ def frame_poses(route: dict[str, Any], config: RenderConfig) -> FramePoses:
 def record_views(
     renderer: Renderer, solid: Solid, views: Sequence[str], poses: FramePoses, config: RenderConfig, folder: Path
 ) -> dict[str, set[str]]:
-    """Render and encode views of a trajectory; two poses' frames at most are held together in memory.
-
-    Parameters
-    ----------
-    renderer : Renderer
-    solid : Solid
-        The same scene.
-    views : sequence of str
-        Of `aerialdojo_gen.store.schemas.VIEWS`; all of the configuration's where its layout is tiled.
-    poses : FramePoses
-    config : RenderConfig
-    folder : Path
-        Where the files of `aerialdojo_gen.rendering.placement.places` are written.
-
-    Returns
-    -------
-    dict of str to set of str
-        Quality flags (`aerialdojo_gen.rendering.checks.FLAGS`) by view.
-    """
+    """Render and encode views of a trajectory; two poses' frames at most are held together in memory."""
     camera = Camera(config.width, config.height, config.fov_deg)
     checks = {view: ViewChecks(camera, solid) for view in views}
     with ExitStack() as stack:
@@ -157,20 +128,7 @@ def _complete(path: Path, stream: int, n_frames: int) -> bool:
 
 
 def camera_pose(position: ArrayLike, yaw_rad: float, view: str, config: RenderConfig) -> Floats:
-    """Pose of a view's camera, world_from_camera, with the configured offset from the body's centre.
-
-    Parameters
-    ----------
-    position : (3,) array_like
-        The body's centre, metres, world frame.
-    yaw_rad : float
-    view : str
-    config : RenderConfig
-
-    Returns
-    -------
-    (4, 4) float64
-    """
+    """Pose (4, 4) of a view's camera, with the configured offset from the body's centre."""
     pose = view_pose(position, yaw_rad, view)
     if view in config.offsets_m:
         forward, left, up = config.offsets_m[view]

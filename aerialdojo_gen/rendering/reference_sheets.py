@@ -21,19 +21,7 @@ _INK, _WARNING = (30, 30, 30), (190, 30, 20)
 
 
 def reference_sheets(rows: Sequence[Mapping[str, Any]]) -> Iterator[Image]:
-    """Lay objects out on sheets: each one's picture, number and name, and its description below.
-
-    Parameters
-    ----------
-    rows : sequence of mapping
-        Objects with their `reference_image`, `object_id`, `name`, `description` and, where there is one,
-        `tells_missing`, which is printed in red; an object without a picture has an empty frame.
-
-    Yields
-    ------
-    (H, W, 3) uint8
-        sRGB, `PICTURES_A_SHEET` objects each.
-    """
+    """Lay objects out on sheets, (H, W, 3) uint8 sRGB: picture, number, name and description of each."""
     for first in range(0, len(rows), PICTURES_A_SHEET):
         page = rows[first : first + PICTURES_A_SHEET]
         height = _SIZE_PX + _LINES * _LINE_PX + _GAP_PX

@@ -22,22 +22,7 @@ def tables(config: RenderConfig, scene: str) -> tuple[str, ...]:
 
 
 def choose(rows: Iterable[Mapping[str, Any]], limit: int, seed: int) -> list[str]:
-    """Draw a sample of each length setting.
-
-    Parameters
-    ----------
-    rows : iterable of mapping
-        With ``nav_id`` and ``setting``.
-    limit : int
-        At most so many a setting; 0 for all.
-    seed : int
-        The pipeline's seed.
-
-    Returns
-    -------
-    list of str
-        The navigation tasks, sorted; a larger limit only adds to them.
-    """
+    """Draw a sample of each length setting."""
     by_setting: dict[str, list[str]] = {setting: [] for setting in SETTINGS}
     for row in rows:
         by_setting[row["setting"]].append(row["nav_id"])
@@ -49,25 +34,7 @@ def choose(rows: Iterable[Mapping[str, Any]], limit: int, seed: int) -> list[str
 
 
 def n_parts(data: Where, scene: str, config: RenderConfig) -> int:
-    """Count the shards of a scene: `trajectories_per_part` recordings each, at least one shard.
-
-    Parameters
-    ----------
-    data : DataRoot, Path or str
-        The data root.
-    scene : str
-        Name of the scene.
-    config : RenderConfig
-
-    Returns
-    -------
-    int
-
-    Raises
-    ------
-    StoreError
-        The scene's routes are missing.
-    """
+    """Count the shards of a scene: `trajectories_per_part` recordings each, at least one shard."""
     rows = [
         row
         for table in tables(config, scene)

@@ -7,25 +7,7 @@ from typing import Any
 
 
 def settle_renderer(config: Any, say: Callable[[str], None]) -> Any:
-    """Put what draws right on this machine in the place of ``auto``, and say why.
-
-    Parameters
-    ----------
-    config : Section
-        With a ``renderer``.
-    say : callable
-        Takes the line.
-
-    Returns
-    -------
-    Section
-        Of the same kind.
-
-    Raises
-    ------
-    RenderError
-        The renderer that is asked for does not work here.
-    """
+    """Put what draws right on this machine in the place of ``auto``, and say why."""
     from aerialdojo_gen.rendering.backend import choose_renderer
 
     choice = choose_renderer(config.renderer)

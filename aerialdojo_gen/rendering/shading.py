@@ -36,26 +36,7 @@ def shade(
     light: Lighting,
     shadow: ShadowMap,
 ) -> NDArray[np.uint8]:
-    """Light a picture.
-
-    Parameters
-    ----------
-    camera : Camera
-    world_from_camera : (4, 4) float64
-    albedo : (H, W, 3) uint8
-        Texture colour without light.
-    depth_m : (H, W) float32
-        Planar depth; inf where nothing is hit.
-    surface : (H, W) int32
-        Number of the material, -1 where nothing is hit.
-    light : Lighting
-    shadow : ShadowMap
-
-    Returns
-    -------
-    (H, W, 3) uint8
-        sRGB.
-    """
+    """Light a picture: albedo (H, W, 3) uint8, planar depth and surface (H, W) give sRGB (H, W, 3) uint8."""
     out = np.empty_like(albedo)
     _shade(
         albedo,

@@ -24,44 +24,12 @@ _RAYS_AT_ONCE = 1 << 18
 
 
 def in_sight(scene: Scene, node: str, position: ArrayLike) -> bool:
-    """Tell whether a straight line from a place reaches an object, before any other surface.
-
-    Parameters
-    ----------
-    scene : Scene
-    node : str
-        The object's node name.
-    position : (3,) array_like of float
-        Metres, world frame.
-
-    Raises
-    ------
-    StoreError
-        The scene has no such node.
-    """
+    """Whether a straight line from a position, world metres, reaches an object before any other surface."""
     return bool(all_in_sight(scene, [node], np.asarray(position, dtype=np.float64)[None])[0])
 
 
 def all_in_sight(scene: Scene, nodes: Sequence[str], positions: Floats) -> NDArray[np.bool_]:
-    """Tell from which places the objects that they are asked of can be seen, as `in_sight` does.
-
-    Parameters
-    ----------
-    scene : Scene
-    nodes : sequence of str
-        n node names.
-    positions : (n, 3) float64
-        A place for each, metres, world frame.
-
-    Returns
-    -------
-    (n,) bool
-
-    Raises
-    ------
-    StoreError
-        The scene has no such node.
-    """
+    """For n nodes and positions (n, 3), world metres: whether each is in sight; (n,) bool."""
     seen = np.zeros(len(nodes), dtype=np.bool_)
     if not len(nodes):
         return seen

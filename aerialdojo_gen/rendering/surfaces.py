@@ -27,41 +27,17 @@ _HALVINGS, _MOST_HOLED = 4, 200_000
 
 @dataclass(frozen=True, eq=False)
 class Surface:
-    """All triangles of one material.
+    """All triangles of one material."""
 
-    Attributes
-    ----------
-    material : str
-        Name of the material.
-    vertices : (n, 3) float64
-        Metres, world frame.
-    uv : (n, 2) float64
-        Texture coordinates in tiles.
-    faces : (m, 3) int64
-        Indices into `vertices`.
-    palette : (h, w, 3) uint8 or None
-        The texture that `uv` is of, where faces have colours of their own: one texel each.
-    """
-
-    material: str
-    vertices: NDArray[np.float64]
-    uv: NDArray[np.float64]
-    faces: NDArray[np.int64]
-    palette: NDArray[np.uint8] | None = None
+    material: str  # Name of the material
+    vertices: NDArray[np.float64]  # (n, 3) float64; metres, world frame
+    uv: NDArray[np.float64]  # (n, 2) float64; texture coordinates in tiles
+    faces: NDArray[np.int64]  # (m, 3) int64; indices into `vertices`
+    palette: NDArray[np.uint8] | None = None  # (h, w, 3) uint8 or None
 
 
 def surfaces(scene: Scene) -> list[Surface]:
-    """Merge a scene's triangles by material.
-
-    Parameters
-    ----------
-    scene : Scene
-
-    Returns
-    -------
-    list of Surface
-        Ordered by material name.
-    """
+    """Merge a scene's triangles by material."""
     by_material: dict[str, list[Part]] = {}
     for instance in scene.instances:
         for part in instance.parts:

@@ -28,15 +28,7 @@ _MOST_HOLES, _ON_M = 12, 1e-3
 
 
 class SurfaceTexels:
-    """Looks up places on the triangles of parts.
-
-    Parameters
-    ----------
-    parts : sequence of Part
-        Their triangles are numbered in this order.
-    materials : mapping of str to Material
-        That they are of.
-    """
+    """Looks up places on the triangles of parts."""
 
     def __init__(self, parts: Sequence[Part], materials: Mapping[str, Material]) -> None:
         names = sorted({part.material for part in parts})
@@ -108,14 +100,7 @@ def _vertex_colours(part: Part, material: Material) -> NDArray[np.uint8]:
 
 
 class SeenRayCaster:
-    """Casts rays at what is to be seen of a scene: through the holes in its textures.
-
-    Parameters
-    ----------
-    caster : TriangleRayCaster
-        Over the triangles of `texels`, in their order.
-    texels : SurfaceTexels
-    """
+    """Casts rays at what is to be seen of a scene: through the holes in its textures."""
 
     def __init__(self, caster: TriangleRayCaster, texels: SurfaceTexels) -> None:
         self._caster = caster
@@ -158,12 +143,7 @@ def seen_caster(scene: Scene, caster: TriangleRayCaster | None = None) -> Triang
 
 
 class Backdrop:
-    """Paints what a scene has behind everything.
-
-    Parameters
-    ----------
-    scene : Scene
-    """
+    """Paints what a scene has behind everything."""
 
     def __init__(self, scene: Scene) -> None:
         parts = [part for instance in scene.backdrop for part in instance.parts]
@@ -173,17 +153,7 @@ class Backdrop:
     def paint(
         self, rgb: NDArray[np.uint8], missing: NDArray[np.bool_], camera: Camera, world_from_camera: Floats
     ) -> None:
-        """Paint the backdrop into a picture.
-
-        Parameters
-        ----------
-        rgb : (H, W, 3) uint8
-            Changed in place.
-        missing : (H, W) bool
-            Pixels that show nothing else.
-        camera : Camera
-        world_from_camera : (4, 4) float64
-        """
+        """Paint the backdrop into the `missing` pixels of a picture, in place."""
         if self._caster is None or self._texels is None or not missing.any():
             return
         rows, columns = np.nonzero(missing)

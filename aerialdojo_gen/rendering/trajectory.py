@@ -14,48 +14,17 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class FramePoses:
-    """Where the body is in every frame.
+    """Where the body is in every frame."""
 
-    Attributes
-    ----------
-    time_s : (n,) float64
-        Since the first frame.
-    step : (n,) int32
-        Trajectory pose that the frame belongs to: the last one reached.
-    action : (n,) int8
-        Action under way: the one done at that pose.
-    position : (n, 3) float64
-        The body's centre, metres, world frame.
-    yaw_rad : (n,) float64
-        In (-π, π] where it is interpolated, as stored where it is not.
-    """
-
-    time_s: Floats
-    step: NDArray[np.int32]
-    action: NDArray[np.int8]
-    position: Floats
-    yaw_rad: Floats
+    time_s: Floats  # (n,) float64; since the first frame
+    step: NDArray[np.int32]  # (n,) int32; trajectory pose that the frame belongs to: the last one reached
+    action: NDArray[np.int8]  # (n,) int8; action under way: the one done at that pose
+    position: Floats  # (n, 3) float64; the body's centre, metres, world frame
+    yaw_rad: Floats  # (n,) float64; in (-π, π] where it is interpolated, as stored where it is not
 
 
 def by_steps(position: ArrayLike, yaw_rad: ArrayLike, action: ArrayLike, fps: float) -> FramePoses:
-    """One frame a trajectory pose.
-
-    Parameters
-    ----------
-    position : (n, 3) array_like
-        Metres, world frame.
-    yaw_rad : (n,) array_like
-        Radians.
-    action : (n,) array_like
-        Ids of `aerialdojo_gen.store.schemas.ACTION_NAMES`.
-    fps : float
-        At which the video plays: time is a matter of display here.
-
-    Returns
-    -------
-    FramePoses
-        n frames.
-    """
+    """One frame a trajectory pose: positions (n, 3) world metres, yaws (n,) radians, actions (n,)."""
     p = np.asarray(position, dtype=np.float64)
     step = np.arange(len(p), dtype=np.int32)
     yaw = np.asarray(yaw_rad, dtype=np.float64)
@@ -67,24 +36,7 @@ def by_time(
 ) -> FramePoses:
     """Frames at a constant rate along the path.
 
-    The body flies every segment at cruise speed and turns at the yaw rate, the short way round; a segment that does
-    both takes the longer of the two times.
-
-    Parameters
-    ----------
-    position, yaw_rad, action
-        As for `by_steps`.
-    fps : float
-        Frames a second.
-    cruise_m_s : float
-        Metres a second.
-    yaw_rate_deg_s : float
-        Degrees a second.
-
-    Returns
-    -------
-    FramePoses
-        The first frame is the first pose, the last frame the last pose.
+    A segment takes the longer of flying and turning the short way round.
     """
     p, yaw = np.asarray(position, dtype=np.float64), np.asarray(yaw_rad, dtype=np.float64)
     turn = wrap_angle_rad(np.diff(yaw))

@@ -16,20 +16,7 @@ from aerialdojo_gen.errors import RenderError
 
 
 class Video(Sequence[NDArray[Any]]):
-    """The frames of a video file, or of a folder of PNG files; decoded when asked for, in any order.
-
-    Parameters
-    ----------
-    path : str or Path
-        What `aerialdojo_gen.rendering.codecs.VideoWriter` or `PngWriter` wrote.
-    stream : int
-        Which of the file's videos.
-
-    Raises
-    ------
-    RenderError
-        The file cannot be read, or is cut off: the message names it.
-    """
+    """The frames of a video file, or of a folder of PNG files; decoded when asked for, in any order."""
 
     def __init__(self, path: str | Path, stream: int = 0) -> None:
         path = Path(path)
@@ -117,20 +104,7 @@ class Video(Sequence[NDArray[Any]]):
 
 
 class Tile(Video):
-    """One view of a tiled video, decoded with the others: the views of a frame are decoded once.
-
-    Parameters
-    ----------
-    whole : Video
-        The same for all views of a file.
-    camera : dict
-        What the file says of the view: ``left_px``, ``top_px``, ``width`` and ``height`` among it.
-
-    Raises
-    ------
-    RenderError
-        The view lies beyond the video's frame.
-    """
+    """One view of a tiled video; the views of a frame are decoded once."""
 
     def __init__(self, whole: Video, camera: dict[str, Any]) -> None:
         self.path, self.fps, self._pts = whole.path, whole.fps, whole._pts

@@ -30,20 +30,7 @@ _LARGEST_ATLAS_PX = 2048
 
 
 class RenderWorld:
-    """A scene ready to be rendered; a context manager that frees the renderer's memory at its end.
-
-    Parameters
-    ----------
-    scene : Scene
-        Copied into the renderer: one body a material (see `aerialdojo_gen.rendering.surfaces`). Only front faces are
-        drawn (those wound counter-clockwise as the camera sees them): TinyRenderer's double-sided flag does nothing,
-        and drawing every face twice doubles the time. What is there from both sides is loaded twice.
-
-    Raises
-    ------
-    RenderError
-        If PyBullet cannot start or cannot load a surface.
-    """
+    """A scene ready to be rendered; a context manager that frees the renderer's memory at its end."""
 
     def __init__(self, scene: Scene) -> None:
         found = surfaces(scene)
@@ -88,18 +75,7 @@ class RenderWorld:
             pybullet.changeVisualShape(body, -1, textureUniqueId=textures[material.name], physicsClientId=client)
 
     def render(self, camera: Camera, world_from_camera: Floats) -> Picture:
-        """Take a picture.
-
-        Parameters
-        ----------
-        camera : Camera
-        world_from_camera : (4, 4) float64
-            From `aerialdojo_gen.geometry.cameras.view_pose` or `look_at_pose`.
-
-        Returns
-        -------
-        Picture
-        """
+        """Take a picture from a pose (4, 4)."""
         albedo, depth, surface = self.rasterise(camera, world_from_camera)
         rgb = shade(camera, world_from_camera, albedo, depth, surface, self._light, self._shadow)
         self._backdrop.paint(rgb, surface < 0, camera, world_from_camera)
@@ -110,20 +86,7 @@ class RenderWorld:
     ) -> tuple[NDArray[np.uint8], NDArray[np.float32], NDArray[np.int32]]:
         """Rasterise without light.
 
-        Parameters
-        ----------
-        camera : Camera
-        world_from_camera : (4, 4) float64
-        near_m, far_m : float
-            Planar depths between which surfaces are drawn, metres.
-
-        Returns
-        -------
-        albedo : (H, W, 3) uint8
-        depth_m : (H, W) float32
-            Planar depth, inf where nothing is hit.
-        surface : (H, W) int32
-            Number of the surface, -1 where nothing is hit.
+        Albedo (H, W, 3) uint8, planar depth (inf for no hit) and surface number (-1 for none).
         """
         w, h = camera.width, camera.height
         projection = _projection(camera, near_m, far_m)
@@ -171,15 +134,9 @@ def _close_to_plane(points: Floats, plane: Floats, reach_m: float) -> Floats:
 
 
 def _nudge(close: Floats) -> float:
-    """Choose how far the camera steps back, metres, so that no vertex lies in its own plane.
+    """How far, metres, the camera steps back so that no vertex lies in its plane.
 
-    TinyRenderer divides by a vertex's depth: where that is zero, it loses triangles, writes NaN, or never ends. Poses
-    on whole metres meet such vertices often. The picture is the same: the depth that comes out is put right again.
-
-    Parameters
-    ----------
-    close : (k,) float64
-        Depths of the vertices near the plane.
+    TinyRenderer divides by a vertex's depth.
     """
     if not len(close):
         return 0.0
@@ -212,13 +169,7 @@ def render_world(scene: Scene) -> RenderWorld:
 
 
 def write_obj(path: Path, surface: Surface) -> None:
-    """Write a surface as Wavefront OBJ with texture coordinates.
-
-    Parameters
-    ----------
-    path : Path
-    surface : Surface
-    """
+    """Write a surface as Wavefront OBJ with texture coordinates."""
     with path.open("w", encoding="ascii") as file:
         file.write(("v %.5f %.5f %.5f\n" * len(surface.vertices)) % tuple(surface.vertices.ravel().tolist()))
         file.write(("vt %.5f %.5f\n" * len(surface.uv)) % tuple(surface.uv.ravel().tolist()))

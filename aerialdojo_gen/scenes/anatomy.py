@@ -19,60 +19,27 @@ _MOST_RUNS = 100_000
 
 @dataclass(frozen=True)
 class Run:
-    """Faces of one part that follow each other.
+    """Faces of one part that follow each other."""
 
-    Attributes
-    ----------
-    part : int
-        Index into the instance's parts (a part is what has one material).
-    first, faces : int
-        First face in that part and number of faces, of the first copy.
-    copies : int
-        How many copies follow each other, of as many faces each.
-    """
-
-    part: int
-    first: int
+    part: int  # Index into the instance's parts (a part is what has one material)
+    first: int  # First face in that part and number of faces, of the first copy
     faces: int
-    copies: int = 1
+    copies: int = 1  # How many copies follow each other, of as many faces each
 
 
 @dataclass(frozen=True, eq=False)
 class Anatomy:
-    """What the catalogue says of an instance's body.
+    """What the catalogue says of an instance's body."""
 
-    Attributes
-    ----------
-    yaw_rad : float
-        Direction of its own +x, world frame.
-    fronts_rad : tuple of float
-        Directions, world frame, of the sides from which a person recognises it; empty where all sides are alike.
-    tells : tuple of str
-        Parts that make its name and its variant's attributes true, each a part's name or several, ``"a|b"``, of which
-        one will do; empty where the whole body tells it.
-    runs : mapping of str to tuple of Run
-        The faces of every named part; a name is a tag or a role of the catalogue.
-    """
-
-    yaw_rad: float
+    yaw_rad: float  # Direction of its own +x, world frame
     fronts_rad: tuple[float, ...]
     tells: tuple[str, ...]
-    runs: Mapping[str, tuple[Run, ...]]
+    runs: Mapping[str, tuple[Run, ...]]  # The faces of every named part; a name is a tag or a role of the catalogue
 
     def copies(self, name: str, counts: Sequence[int]) -> list[NDArray[np.int64]]:
-        """List the copies of a part.
+        """The copies of a part, as indices (k,) into the instance's `faces`.
 
-        Parameters
-        ----------
-        name : str
-            A part's name, or ``"a|b"``; one that the instance lacks has no copies.
-        counts : sequence of int
-            Number of faces of each of the instance's parts.
-
-        Returns
-        -------
-        list of (k,) int64
-            Each copy's faces: indices into the instance's `faces`.
+        None where the instance lacks the part.
         """
         offsets = np.cumsum([0, *counts])
         found = []
@@ -99,20 +66,7 @@ class Anatomy:
 
 
 def read_anatomy(raw: Any, counts: Sequence[int]) -> Anatomy:
-    """Read what `Anatomy.document` said.
-
-    Parameters
-    ----------
-    raw : Any
-        As JSON gave it.
-    counts : sequence of int
-        Number of faces of each of the instance's parts.
-
-    Raises
-    ------
-    ValueError, TypeError, KeyError
-        It is none, or speaks of faces that are not there.
-    """
+    """Read what `Anatomy.document` said."""
     runs = {}
     total = 0
     for name, members in raw["parts"].items():
@@ -136,19 +90,9 @@ def read_anatomy(raw: Any, counts: Sequence[int]) -> Anatomy:
 
 
 def moved(runs: Mapping[str, Iterable[Run]], kept: Sequence[NDArray[np.bool_]]) -> dict[str, tuple[Run, ...]]:
-    """Follow runs through the loss of faces.
+    """Follow runs of faces through the loss of those that are not `kept`.
 
-    Parameters
-    ----------
-    runs : mapping of str to runs
-        Of parts as they were.
-    kept : sequence of (m,) bool
-        For each part which faces are left; a part without any is gone.
-
-    Returns
-    -------
-    dict of str to tuple of Run
-        Of what is left; a copy without a face is no copy any more.
+    A copy without a face is no copy any more.
     """
     if all(k.all() for k in kept):
         return {name: tuple(members) for name, members in runs.items()}

@@ -29,15 +29,7 @@ _CROWN_SHAPES = 6
 
 
 class Catalogue:
-    """All categories by name.
-
-    Parameters
-    ----------
-    categories : mapping of str to Category
-        By key.
-    materials : MaterialLibrary
-        What their roles may name.
-    """
+    """All categories by name."""
 
     def __init__(self, categories: Mapping[str, Category], materials: MaterialLibrary) -> None:
         self._categories = dict(categories)
@@ -77,40 +69,9 @@ class Catalogue:
         roles: Mapping[str, str] | None = None,
         attributes: Mapping[str, str] | None = None,
     ) -> Instance:
-        """Make an instance of a category.
+        """Make an instance of a category at a position (world metres).
 
-        Parameters
-        ----------
-        category : str
-            Key of the catalogue.
-        node : str
-            Node name, unique in the scene.
-        rng : numpy.random.Generator
-            Draws the variant by weight, then every parameter in file order, then what a builder draws.
-        position : (x, y, z)
-            Where the prop's origin goes, metres, world frame.
-        yaw_deg : float
-            Direction of its front, degrees, counter-clockwise from +x.
-        variant : str, optional
-            Name of a variant, in place of a drawn one.
-        scale : float
-            Factor on all lengths; patterns keep their size.
-        params : mapping, optional
-            Fixed values in place of drawn ones.
-        roles : mapping, optional
-            Materials in place of the variant's.
-        attributes : mapping, optional
-            Added to the variant's; they also fill ``{…}`` in a sign's text.
-
-        Returns
-        -------
-        Instance
-            World coordinates, exact in float32.
-
-        Raises
-        ------
-        AssetError
-            Unknown category, variant, parameter, role or material, or sizes that make no body.
+        Variant, parameters and builders draw from `rng` in file order.
         """
         prop = self[category]
         look = self._draw_variant(prop, variant, rng)
@@ -268,11 +229,6 @@ def load_catalogue(folder: Path) -> Catalogue:
     """Read a `scene_assets` folder: `materials.toml` and the files of `catalogue_files`.
 
     A process reads it once, as long as no file changes.
-
-    Raises
-    ------
-    AssetError
-        The first thing that is wrong: file, category, part or variant, key, and what was probably meant.
     """
     return _load(folder, tuple(_state(path) for path in (folder / _MATERIALS, *catalogue_files(folder))))
 

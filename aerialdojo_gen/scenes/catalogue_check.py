@@ -14,20 +14,7 @@ LEAST_TRUE = 2
 
 
 def catalogue_faults(catalogue: Catalogue, categories: Iterable[str] | None = None) -> list[str]:
-    """Build every variant of the categories that tasks ask for, and hold what is said of them against it.
-
-    Parameters
-    ----------
-    catalogue : Catalogue
-    categories : iterable of str, optional
-        Which ones; all targets by default.
-
-    Returns
-    -------
-    list of str
-        A line a fault: no front, too few phrases, a part that makes the name or an attribute true and is not there,
-        a phrase that is true of no variant, a variant of which too few are true.
-    """
+    """Build every variant of the categories that tasks ask for, and hold what is said of them against it."""
     faults = []
     for name in catalogue.targets if categories is None else categories:
         prop = catalogue[name]

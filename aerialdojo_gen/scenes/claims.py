@@ -35,36 +35,14 @@ class Materials(Protocol):
 
 
 def untrue(look: Look, instance: Instance, materials: Materials) -> list[str]:
-    """List the claims of a phrase that do not hold of an instance.
-
-    Parameters
-    ----------
-    look : Look
-    instance : Instance
-        Of the look's category, in world coordinates.
-    materials : Materials
-        At least the instance's.
-
-    Returns
-    -------
-    list of str
-        Each claim that fails, in words; empty where the phrase is true. Without anatomy nothing is.
-    """
+    """List the claims of a phrase that do not hold of an instance."""
     if instance.anatomy is None:
         return ["nothing is known of its parts"]
     return Body(instance, materials).untrue(look)
 
 
 class Body:
-    """An instance's mesh in its own frame, as claims ask of it.
-
-    Parameters
-    ----------
-    instance : Instance
-        With anatomy.
-    materials : Materials
-        At least the instance's.
-    """
+    """An instance's mesh in its own frame, as claims ask of it."""
 
     def __init__(self, instance: Instance, materials: Materials) -> None:
         assert instance.anatomy is not None

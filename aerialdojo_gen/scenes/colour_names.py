@@ -27,18 +27,7 @@ COLOURS = (
 
 
 def colour_name(rgb: ArrayLike) -> str:
-    """Name a colour.
-
-    Parameters
-    ----------
-    rgb : (3,) array_like
-        sRGB, 0-255.
-
-    Returns
-    -------
-    str
-        One of about a dozen everyday words, e.g. ``"brown"``.
-    """
+    """Name an sRGB colour by one of about a dozen everyday words, e.g. ``"brown"``."""
     red, green, blue = (float(c) / 255.0 for c in np.asarray(rgb, dtype=np.float64))
     hue, light, saturation = colorsys.rgb_to_hls(red, green, blue)
     if light > 0.9:

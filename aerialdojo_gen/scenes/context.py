@@ -34,16 +34,7 @@ _holders: WeakKeyDictionary[object, int] = WeakKeyDictionary()
 
 
 class SceneContext:
-    """A scene, and what is built on it.
-
-    Parameters
-    ----------
-    scene : Scene
-
-    Attributes
-    ----------
-    scene : Scene
-    """
+    """A scene, and what is built on it."""
 
     def __init__(self, scene: Scene) -> None:
         self.scene = scene
@@ -52,18 +43,7 @@ class SceneContext:
         self._parts: dict[str, tuple[tuple[Hashable, ...], Any]] = {}
 
     def part(self, kind: str, make: Callable[[], _T], *given: Hashable) -> _T:
-        """Return a part, made by the first who asks; who asks meanwhile waits for it.
-
-        Parameters
-        ----------
-        kind : str
-            What it is, e.g. ``"ray caster"``. There is one of a kind.
-        make : callable
-            Makes it; what it raises is passed on, and nothing is kept then. Where the part has a method ``close``,
-            that is called at its end: it belongs to the context, not to who asked.
-        *given : hashable
-            What else than the scene it is made from. Another part of its kind goes first.
-        """
+        """Return a part, made by the first who asks; who asks meanwhile waits for it."""
         with self._lock:
             known = self._parts.get(kind)
             if known is None or known[0] != given:
@@ -87,23 +67,7 @@ class SceneContext:
 
 
 def open_scene(mesh: Path, sha256: str, keep: int = 1) -> SceneContext:
-    """Return the context of a scene's mesh; it is read where it is not among those kept.
-
-    Parameters
-    ----------
-    mesh : Path
-        The scene's GLB.
-    sha256 : str
-        Of its bytes, as `scenes` has it: the same content has the same context, wherever it lies.
-    keep : int
-        How many contexts there are at most, with this one, unless `hold_scenes` asks for more; those that were not
-        asked for longest go, and before the mesh is read.
-
-    Raises
-    ------
-    AssetError
-        The mesh is missing, damaged, or another one.
-    """
+    """Return the context of a scene's mesh; it is read where it is not among those kept."""
     with _lock:
         context = _contexts.pop(sha256, None) or _ahead.pop(sha256, None)
         gone = _oldest_beyond(max(keep, *_holders.values(), 1) - 1)
@@ -121,15 +85,7 @@ def open_scene(mesh: Path, sha256: str, keep: int = 1) -> SceneContext:
 
 
 def keep_scene(scene: Scene, sha256: str) -> None:
-    """Keep a scene that was just written to a mesh, in the place of others: `open_scene` need not read it.
-
-    Parameters
-    ----------
-    scene : Scene
-        Equal to what `read_glb` makes of the mesh, as built scenes are.
-    sha256 : str
-        Of the mesh's bytes.
-    """
+    """Keep a scene that was just written to a mesh, in the place of others: `open_scene` need not read it."""
     with _lock:
         if sha256 in _contexts:
             return
@@ -142,18 +98,6 @@ def read_ahead(mesh: Path, sha256: str, make: Callable[[SceneContext], object]) 
     """Read a scene and build on it, in a thread beside the work on another one; `open_scene` takes it from there.
 
     No other scene goes for it: only who works on a scene lets go of what draws it, in the thread that drew.
-
-    Parameters
-    ----------
-    mesh, sha256
-        As for `open_scene`.
-    make : callable
-        Makes parts of its context; none that draws.
-
-    Raises
-    ------
-    AssetError
-        The mesh is missing, damaged, or another one.
     """
     with _lock:
         if sha256 in _contexts or sha256 in _ahead:

@@ -15,25 +15,7 @@ from aerialdojo_gen.scenes.sampling import colour_words, shown_colours
 
 
 def cut_out(scene: Scene, cuts: tuple[Cut, ...]) -> Scene:
-    """Make nodes of what lies in boxes.
-
-    Parameters
-    ----------
-    scene : Scene
-        An imported one.
-    cuts : tuple of Cut
-        Boxes, one after another: a triangle whose middle lies in one leaves its instance for the box's own.
-
-    Returns
-    -------
-    Scene
-        The same triangles; an instance that lost all of its own is gone.
-
-    Raises
-    ------
-    AssetError
-        A box is empty, or its node's name is taken.
-    """
+    """Make nodes of what lies in boxes."""
     instances = list(scene.instances)
     for cut in cuts:
         if any(instance.node == cut.node for instance in instances):

@@ -37,13 +37,9 @@ _CONSTANTS = {"pi": math.pi}
 
 
 def names_in(text: str) -> frozenset[str]:
-    """List the parameters that an expression speaks of.
+    """List the names in an arithmetic expression of numbers, names, ``+ - * / // %``.
 
-    Raises
-    ------
-    ShapeError
-        The text is no arithmetic of numbers, names, ``+ - * / // %``, brackets and the functions min, max, abs, sqrt,
-        round, floor, ceil, sin, cos, tan, atan2 (degrees).
+    Brackets and a few functions.
     """
     return _parse(text)[1]
 

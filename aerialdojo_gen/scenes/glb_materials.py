@@ -26,19 +26,7 @@ _LARGEST_TEXTURE_PX = 8192
 
 
 def material_entry(material: Material, image: Callable[[bytes, str], int]) -> dict[str, Any]:
-    """Describe a material as glTF does.
-
-    Parameters
-    ----------
-    material : Material
-    image : callable
-        Stores an image file of a media type and gives the number of the texture that shows it.
-
-    Returns
-    -------
-    dict
-        An entry of the document's ``materials``.
-    """
+    """Describe a material as glTF does."""
     surface: dict[str, Any] = {"metallicFactor": 0.0, "roughnessFactor": 0.9}
     extras: dict[str, Any] = {"colour": list(material.colour), "tile_m": material.tile_m}
     if material.texture is None:
@@ -60,20 +48,7 @@ def material_entry(material: Material, image: Callable[[bytes, str], int]) -> di
 
 
 def read_material(entry: dict[str, Any], image: Callable[[int], memoryview]) -> Material:
-    """Read what `material_entry` wrote.
-
-    Parameters
-    ----------
-    entry : dict
-        Of the document's ``materials``.
-    image : callable
-        Gives the image file of a texture by its number.
-
-    Raises
-    ------
-    ValueError, KeyError, TypeError
-        It is damaged, or its texture is too large.
-    """
+    """Read what `material_entry` wrote."""
     texture, mask, jpeg = None, None, b""
     extras = entry["extras"]
     atlas = bool(extras.get("atlas", False))

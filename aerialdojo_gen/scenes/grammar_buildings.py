@@ -37,27 +37,9 @@ def building(
     attributes: Mapping[str, str] | None = None,
     extra: Sequence[tuple[str, Mesh]] = (),
 ) -> Instance:
-    """Put up a building; it takes its ground.
+    """Put up a building on an outline (world metres).
 
-    Parameters
-    ----------
-    site : Site
-        Where.
-    plan : Polygon
-        Outline, world frame, metres; pitched roofs want a rectangle, turned as it may be.
-    wall, roof : str
-        Materials. A façade's windows are stretched to whole ones on every wall.
-    storeys, storey_m : int, float
-        Number and height of the storeys.
-    roof_kind : str
-        ``"flat"`` with a parapet of `parapet_m`, ``"gable"`` or ``"hip"`` with a ridge `roof_m` high and eaves of
-        `overhang_m`.
-    z : float, optional
-        Height of the floor; by default the lowest ground under the plan's corners.
-    node, category, attributes
-        As in `Site.add`.
-    extra : sequence of (material, Mesh)
-        More of the same building, world coordinates: canopies, chimneys, steps.
+    The windows of a façade are stretched to whole ones on every wall.
     """
     if roof_kind not in ROOFS:
         raise ValueError(f"roof_kind {roof_kind!r} is none of {', '.join(ROOFS)}")
@@ -103,10 +85,7 @@ def pitched_roof(
 ) -> list[tuple[str, Mesh]]:
     """Make a gable or hip roof over a rectangle, the ridge along its longer side.
 
-    Returns
-    -------
-    list of (material, Mesh)
-        World coordinates; the gables are of the wall's material.
+    (material, mesh) pairs in world metres.
     """
     centre, length, width, yaw = oriented_rectangle(plan)
     pitch = height_m / (width / 2)
@@ -146,19 +125,7 @@ def wall_with_openings(
     openings: Sequence[tuple[float, float, float, float]],
     thickness_m: float = 0.3,
 ) -> Mesh:
-    """Make a straight wall from `a` to `b` with rectangular openings that one can look and fly through.
-
-    Parameters
-    ----------
-    a, b : (x, y)
-        Ends of its middle line, world frame, metres.
-    z0_m, z1_m : float
-        Foot and top.
-    openings : sequence of (from, to, sill, head)
-        Along the wall from `a`, and up from its foot, metres; those that reach the foot are doorways.
-    thickness_m : float
-        Of the wall.
-    """
+    """Make a straight wall from `a` to `b` with openings (from, to, sill, head), metres, to look and fly through."""
     length = float(np.hypot(b[0] - a[0], b[1] - a[1]))
     face: BaseGeometry = Polygon([(0, 0), (length, 0), (length, z1_m - z0_m), (0, z1_m - z0_m)])
     for u0, u1, sill, head in openings:

@@ -17,19 +17,7 @@ from aerialdojo_gen.scenes.site import Site
 
 
 def fence(site: Site, path: Polyline, kind: str, colour: str | None = None) -> Instance:
-    """Put up a fence along a path: pickets, close boards, a hedge, a brick wall or railings.
-
-    Parameters
-    ----------
-    site : Site
-        Where; the fence takes its ground.
-    path : sequence of (x, y)
-        World frame, metres.
-    kind : str
-        ``"picket"``, ``"board"``, ``"hedge"``, ``"wall"`` or ``"railing"``.
-    colour : str, optional
-        Material of its body in place of the kind's own.
-    """
+    """Put up a picket, board, hedge, wall or railing fence along a path (world metres)."""
     material, height, thickness = {
         "picket": ("#f2efe6", 1.0, 0.05),
         "board": ("boards:#8d6f4c", 1.8, 0.08),

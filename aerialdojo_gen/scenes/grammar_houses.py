@@ -22,42 +22,22 @@ from aerialdojo_gen.scenes.site import Site
 
 @dataclass(frozen=True)
 class HouseStyle:
-    """What a house looks like.
+    """What a house looks like."""
 
-    Attributes
-    ----------
-    width_m, depth_m : float
-        Of its plan, across the front and from front to back.
-    storeys, storey_m : int, float
-        Number and height of its storeys.
-    wall, roof, trim, door : str
-        Materials.
-    roof_kind, roof_m : str, float
-        ``"gable"`` or ``"hip"``, and the ridge's height over the eaves.
-    porch_m : float
-        Depth of a roofed porch on posts along the front; 0 for a hood over the door.
-    garage : int
-        -1 or 1: a garage on the right or the left of the front; 0 for none.
-    chimney : bool
-        Whether there is one.
-    overhang_m : float
-        How far the eaves reach out; 0 where houses stand wall to wall.
-    """
-
-    width_m: float = 9.0
+    width_m: float = 9.0  # Of its plan, across the front and from front to back
     depth_m: float = 8.0
-    storeys: int = 2
+    storeys: int = 2  # Number and height of its storeys
     storey_m: float = 2.8
     wall: str = "planks:#d8d2c2"
-    roof: str = "shingles"
+    roof: str = "shingles"  # Materials
     trim: str = "#f2efe6"
     door: str = "#8a2f2a"
-    roof_kind: str = "gable"
+    roof_kind: str = "gable"  # ``"gable"`` or ``"hip"``, and the ridge's height over the eaves
     roof_m: float = 2.6
-    porch_m: float = 0.0
-    garage: int = 0
-    chimney: bool = True
-    overhang_m: float = 0.45
+    porch_m: float = 0.0  # Depth of a roofed porch on posts along the front; 0 for a hood over the door
+    garage: int = 0  # -1 or 1: a garage on the right or the left of the front; 0 for none
+    chimney: bool = True  # Whether there is one
+    overhang_m: float = 0.45  # How far the eaves reach out; 0 where houses stand wall to wall
 
 
 FLOOR_M = 0.4
@@ -67,21 +47,7 @@ _GARAGE_M = (3.6, 6.0, 2.9)
 def house(
     site: Site, frame: Frame, style: HouseStyle, attributes: dict[str, str] | None = None, *, z: float | None = None
 ) -> Instance:
-    """Put up a house with real windows, a door, steps, a pitched roof, and what its style asks for.
-
-    Parameters
-    ----------
-    site : Site
-        Where; the house takes its ground.
-    frame : Frame
-        Middle of its plan; u looks out of the front.
-    style : HouseStyle
-        Sizes and materials.
-    attributes : dict, optional
-        As in `Site.add`.
-    z : float, optional
-        Height of its foot, metres; the ground's there by default.
-    """
+    """Put up a house with windows, door, steps and pitched roof in a style; u of the frame looks out of the front."""
     d, w, top = style.depth_m / 2, style.width_m / 2, FLOOR_M + style.storeys * style.storey_m
     parts: Parts = [
         ("stone", block(-d - 0.06, -w - 0.06, d + 0.06, w + 0.06, -0.1, FLOOR_M)),

@@ -21,21 +21,7 @@ def next_variant(site: Site, category: str) -> str | None:
 def deal(
     site: Site, categories: Sequence[str], poses: Sequence[Pose], place: str = "", **options: Any
 ) -> list[Instance]:
-    """Set out props, a pose each and the categories in turn, always the variant that is rarest so far.
-
-    Parameters
-    ----------
-    site : Site
-        Where; poses whose ground is taken stay empty, and their category waits for the next one.
-    categories : sequence of str
-        Keys of the catalogue.
-    poses : sequence of Pose
-        Where to; as many props as poses at most.
-    place : str
-        Goes into the props' attributes where it is given, e.g. ``"in the car park"``.
-    **options
-        As in `Site.try_place`.
-    """
+    """Set out props, a pose each and the categories in turn, always the variant that is rarest so far."""
     out: list[Instance] = []
     for pose in poses:
         category = categories[len(out) % len(categories)]

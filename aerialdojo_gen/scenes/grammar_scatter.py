@@ -48,21 +48,7 @@ def along(
     end_m: float = 0.0,
     turn_deg: float = 0.0,
 ) -> list[Pose]:
-    """List poses along a polyline.
-
-    Parameters
-    ----------
-    path : sequence of (x, y)
-        World frame, metres.
-    spacing_m : float
-        Wanted distance; stretched a little so that the first and the last stand at the ends.
-    offset_m : float
-        To the left of the path (negative: to the right).
-    start_m, end_m : float
-        Lengths left out at the ends.
-    turn_deg : float
-        Added to the path's direction: 90 faces left of it.
-    """
+    """Poses along a polyline, about `spacing_m` apart and `offset_m` to its left; `turn_deg` 90 faces left of it."""
     line = LineString(path)
     length = line.length - start_m - end_m
     if length <= 0.0:
@@ -209,25 +195,9 @@ def poisson_disc(
     density: Callable[[float, float], float] | None = None,
     limit: int = 100_000,
 ) -> list[Pose]:
-    """Strew points over an area, none nearer to another than a radius, by Bridson's dart throwing.
+    """Poisson-disc poses over an area (Bridson's dart throwing), with random yaws.
 
-    Parameters
-    ----------
-    area : shapely geometry
-        World frame, metres.
-    radius_m : float
-        Least distance where the density is 1.
-    rng : numpy.random.Generator
-        Draws points and yaws.
-    density : callable, optional
-        ``(x, y) -> float`` in 0 to 1: the share of points kept there; the least distance grows as 1 / sqrt(density).
-    limit : int
-        Most points returned.
-
-    Returns
-    -------
-    list of Pose
-        With random yaws, in the order they were found.
+    The distance grows as 1 / sqrt(density).
     """
     if area.is_empty:
         return []

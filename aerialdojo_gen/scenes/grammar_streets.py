@@ -30,28 +30,7 @@ def streets(
     pavement: str = "paving",
     marks: bool = True,
 ) -> BaseGeometry:
-    """Paint streets that may cross: raised pavements, carriageways, edge lines, a dashed line between lanes.
-
-    Parameters
-    ----------
-    site : Site
-        Where.
-    paths : sequence of polylines
-        Middle lines, metres.
-    lanes, lane_m : int, float
-        Number and width of the lanes.
-    pavement_m : float
-        Width of the pavement on either side; 0 for none.
-    surface, pavement : str
-        Materials.
-    marks : bool
-        Whether there are lines; they stop at junctions.
-
-    Returns
-    -------
-    shapely geometry
-        All carriageways.
-    """
+    """Paint streets that may cross, from middle lines in metres; returns the area of all carriageways."""
     width = lanes * lane_m
     roads = [ribbon(path, width) for path in paths]
     if pavement_m > 0.0:
@@ -93,26 +72,7 @@ def parking_row(
     z: float | None = None,
     material: str = "marking",
 ) -> list[Pose]:
-    """Mark a row of parking bays.
-
-    Parameters
-    ----------
-    site : Site
-        Where; with `z` nothing is painted (a deck's lines are the deck's own affair).
-    x, y : float
-        Middle of the row's closed side, metres.
-    yaw_deg : float
-        Direction that parked cars face (from the open side to the closed one), degrees.
-    count : int
-        Number of bays.
-    bay_m : (float, float)
-        Width and depth of a bay, metres.
-
-    Returns
-    -------
-    list of Pose
-        Middle of every bay, facing the closed side.
-    """
+    """Mark a row of parking bays and return the pose of each, facing the closed side; metres and degrees."""
     width, depth = bay_m
     half = count * width / 2
     if z is None:

@@ -29,24 +29,12 @@ _MIN_AREA_M2 = 1e-4
 
 @dataclass(frozen=True, eq=False)
 class Surface:
-    """A painted area.
+    """A painted area."""
 
-    Attributes
-    ----------
-    area : Polygon or MultiPolygon
-        World frame, metres.
-    material : str
-        What it shows.
-    rise_m : float
-        Height over the terrain, metres: a pavement's 0.12, say; its edge becomes a kerb.
-    edge : str
-        Material of that kerb.
-    """
-
-    area: BaseGeometry
-    material: str
-    rise_m: float = 0.0
-    edge: str = "concrete"
+    area: BaseGeometry  # World frame, metres
+    material: str  # What it shows
+    rise_m: float = 0.0  # Height over the terrain, metres: a pavement's 0.12, say; its edge becomes a kerb
+    edge: str = "concrete"  # Material of that kerb
 
     @cached_property
     def bounds(self) -> tuple[float, float, float, float]:
@@ -58,23 +46,9 @@ class Surface:
 def ground_meshes(
     terrain: Terrain, extent: Polygon, base: str, surfaces: Sequence[Surface]
 ) -> list[tuple[str, Mesh]]:
-    """Cut the terrain into its surfaces.
+    """Cut the terrain into its painted surfaces, later ones covering earlier ones.
 
-    Parameters
-    ----------
-    terrain : Terrain
-        Heights.
-    extent : Polygon
-        Where there is ground.
-    base : str
-        Material where nothing is painted.
-    surfaces : sequence of Surface
-        In the order of painting: a later one covers an earlier one.
-
-    Returns
-    -------
-    list of (material, Mesh)
-        Together they cover the extent once; kerbs stand where rises differ.
+    Together they cover the extent once.
     """
     layers = visible_surfaces(extent, base, surfaces)
     flat = bool(np.ptp(terrain.heights_m) == 0.0)

@@ -37,27 +37,7 @@ _LONGEST = 120
 
 
 def text(*, text: str, height: float, depth: float = 0.0) -> Mesh:
-    """Write a line of letters that faces +x, reads along +y, and stands centred on the bottom middle.
-
-    Parameters
-    ----------
-    text : str
-        Small letters are written as capitals.
-    height : float
-        Of a capital, metres.
-    depth : float
-        Thickness from x = 0 towards +x, metres; 0 makes plates without sides or back, lying on x = 1 cm.
-
-    Returns
-    -------
-    Mesh
-        About 20 triangles a letter, 60 where it has depth.
-
-    Raises
-    ------
-    ShapeError
-        Names a character that the font lacks, or says that no letter is left.
-    """
+    """Write letters `height` metres high that face +x and read along +y; without `depth` plates at x = 1 cm."""
     _positive("height", (height,), 1)
     depth = number("depth", depth)
     if len(text) > _LONGEST:

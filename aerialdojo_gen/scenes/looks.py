@@ -28,78 +28,35 @@ _ORDER = re.compile(
 
 @dataclass(frozen=True)
 class Comparison:
-    """A measure of the body, or of a part, against a number or ``factor`` times another measure; metres.
+    """A measure of the body, or of a part, against a number or ``factor`` times another measure; metres."""
 
-    Attributes
-    ----------
-    part : str
-        Empty for the whole body.
-    measure : str
-        One of `MEASURES`.
-    greater : bool
-        Whether it must be the greater of the two.
-    factor : float
-        The number, or what the other measure is multiplied with.
-    other : (str, str) or None
-        Part and measure that it is held against.
-    text : str
-        As it was written.
-    """
-
-    part: str
-    measure: str
-    greater: bool
-    factor: float
-    other: tuple[str, str] | None
-    text: str
+    part: str  # Empty for the whole body
+    measure: str  # One of `MEASURES`
+    greater: bool  # Whether it must be the greater of the two
+    factor: float  # The number, or what the other measure is multiplied with
+    other: tuple[str, str] | None  # (str, str) or None; part and measure that it is held against
+    text: str  # As it was written
 
 
 @dataclass(frozen=True)
 class Order:
-    """Where a part is: relative to another one, or in the body.
-
-    Attributes
-    ----------
-    part : str
-    relation : str
-        One of `RELATIONS`, or of `PLACES`.
-    other : str
-        The other part; empty for places.
-    text : str
-        As it was written.
-    """
+    """Where a part is: relative to another one, or in the body."""
 
     part: str
-    relation: str
-    other: str
-    text: str
+    relation: str  # One of `RELATIONS`, or of `PLACES`
+    other: str  # The other part; empty for places
+    text: str  # As it was written
 
 
 @dataclass(frozen=True)
 class Look:
-    """A phrase, and what it claims.
+    """A phrase, and what it claims."""
 
-    Attributes
-    ----------
-    say : str
-        A noun phrase that follows "with" or "it has".
-    has, lacks : tuple of str
-        Parts that the body must have, or must not; ``"a|b"`` is either.
-    count : mapping of str to (least, most)
-        Copies of a part.
-    form : mapping of str to str
-        One of `FORMS`, of each copy of a part.
-    colour, material : mapping of str to tuple of str
-        Of a part: words of `aerialdojo_gen.scenes.colour_names`, and names in ``materials.toml``.
-    size : tuple of Comparison
-    order : tuple of Order
-    """
-
-    say: str
-    has: tuple[str, ...] = ()
+    say: str  # A noun phrase that follows "with" or "it has"
+    has: tuple[str, ...] = ()  # Parts that the body must have, or must not; ``"a|b"`` is either
     lacks: tuple[str, ...] = ()
-    count: Mapping[str, tuple[int, int]] = field(default_factory=dict)
-    form: Mapping[str, str] = field(default_factory=dict)
+    count: Mapping[str, tuple[int, int]] = field(default_factory=dict)  # Copies of a part
+    form: Mapping[str, str] = field(default_factory=dict)  # One of `FORMS`, of each copy of a part
     colour: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     material: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     size: tuple[Comparison, ...] = ()
@@ -116,24 +73,7 @@ class Look:
 
 
 def parse_looks(raw: Any, names: Sequence[str], materials: Sequence[str], where: str) -> tuple[Look, ...]:
-    """Read a category's looks.
-
-    Parameters
-    ----------
-    raw : Any
-        As TOML gave it.
-    names : sequence of str
-        The category's parts: tags and roles.
-    materials : sequence of str
-        Names in ``materials.toml``.
-    where : str
-        For messages: file and category.
-
-    Raises
-    ------
-    AssetError
-        A phrase claims nothing, or speaks of a part, a form, a colour or a material that is not known.
-    """
+    """Read a category's looks."""
     if not isinstance(raw, list):
         raise AssetError(f"{where}: looks must be an array of tables")
     looks = tuple(_look(entry, names, materials, f"{where} looks[{k}]") for k, entry in enumerate(raw))

@@ -62,13 +62,7 @@ class MaterialLibrary:
 
 
 def load_materials(path: Path) -> MaterialLibrary:
-    """Read `materials.toml`.
-
-    Raises
-    ------
-    AssetError
-        Names the file, the material and the key at fault.
-    """
+    """Read `materials.toml`."""
     entries = {}
     for name, body in read_toml(path).items():
         where = f"{path}: material {name!r}"

@@ -26,21 +26,11 @@ _FLAT_COSINE = 0.96
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
-    """Triangles, and where the shape knows better than a projection, their texture coordinates.
+    """Triangles, and where the shape knows better than a projection, their texture coordinates."""
 
-    Attributes
-    ----------
-    vertices : (n, 3) float64
-        Metres.
-    faces : (m, 3) int32
-        Indices into `vertices`, counter-clockwise seen from outside.
-    corner_uv : (m, 3, 2) float64 or None
-        Texture coordinates of every face's corners in metres; NaN for faces that are to be projected.
-    """
-
-    vertices: Floats
-    faces: Ints
-    corner_uv: Floats | None = None
+    vertices: Floats  # (n, 3) float64; metres
+    faces: Ints  # (m, 3) int32; indices into `vertices`, counter-clockwise seen from outside
+    corner_uv: Floats | None = None  # (m, 3, 2) float64 or None
 
     @property
     def volume_m3(self) -> float:
@@ -111,23 +101,7 @@ def mirrored(m: Mesh, axis: int) -> Mesh:
 
 
 def to_part(m: Mesh, material: str, tile_m: float) -> Part:
-    """Give a mesh its material and texture coordinates.
-
-    Parameters
-    ----------
-    m : Mesh
-        In the prop's own frame: the pattern is laid out in that frame.
-    material : str
-        Name of the material.
-    tile_m : float
-        Edge of a texture tile, metres.
-
-    Returns
-    -------
-    Part
-        Vertices are split where the texture coordinates jump. Each face is projected along its own normal:
-        u runs along the face's horizontal, v up its slope, so that patterns are level and undistorted.
-    """
+    """Give a mesh its material and box-projected texture coordinates in its own frame, a tile of `tile_m` metres."""
     uv_m = _projected_uv(m)
     if m.corner_uv is not None:
         given = ~np.isnan(m.corner_uv)

@@ -20,39 +20,15 @@ SURFACES = ("solid", "sheet", "ground", "dome")
 
 @dataclass(frozen=True, eq=False)
 class Material:
-    """A surface: a colour, a small tileable texture, or a picture that came with a foreign mesh.
+    """A surface: a colour, a small tileable texture, or a picture that came with a foreign mesh."""
 
-    Attributes
-    ----------
-    name : str
-        Unique in a scene, e.g. ``"brick:#9a4a3c"``.
-    colour : tuple of int
-        sRGB, 0-255; for a textured material the texture's mean colour.
-    texture : (H, W, 3) uint8 or None
-        sRGB tile, repeated over the surface; row 0 is the top (v = 1).
-    tile_m : float
-        Edge of one texture tile in metres; UVs are metres divided by it.
-    mask : (H, W) bool or None
-        Where the texture is there, of its size; None where it is everywhere.
-    atlas : bool
-        Whether the texture is a foreign mesh's own, in which a place stands for a place of the surface: it is drawn
-        at every distance, where a tileable one fades into its mean. `tile_m` is then its width at its mean scale.
-        So is one without a texture, whose parts have vertex colours.
-    double_sided : bool
-        Whether its triangles are there from both sides; else from the front alone.
-    unlit : bool
-        Whether its colours have their light in them, as those of a photograph have, and are drawn as they are.
-    jpeg : bytes
-        The texture's file, where that is a JPEG: it is stored as it is. Empty where the texture is stored as PNG.
-    """
-
-    name: str
-    colour: tuple[int, int, int]
-    texture: NDArray[np.uint8] | None = None
-    tile_m: float = 1.0
-    mask: NDArray[np.bool_] | None = None
+    name: str  # Unique in a scene, e.g. ``"brick:#9a4a3c"``
+    colour: tuple[int, int, int]  # sRGB, 0-255; for a textured material the texture's mean colour
+    texture: NDArray[np.uint8] | None = None  # sRGB tile, repeated over the surface; row 0 is the top (v = 1)
+    tile_m: float = 1.0  # Edge of one texture tile in metres; UVs are metres divided by it
+    mask: NDArray[np.bool_] | None = None  # Where the texture is there, of its size; None where it is everywhere
     atlas: bool = False
-    double_sided: bool = False
+    double_sided: bool = False  # Whether its triangles are there from both sides; else from the front alone
     unlit: bool = False
     jpeg: bytes = b""
 
@@ -64,57 +40,25 @@ class Material:
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """Triangles of one material.
+    """Triangles of one material."""
 
-    Attributes
-    ----------
-    vertices : (n, 3) float64
-        Metres; the frame is the owner's (a prop's own frame, or the world for an `Instance`).
-    faces : (m, 3) int32
-        Indices into `vertices`, counter-clockwise seen from outside.
-    uv : (n, 2) float32
-        Texture coordinates in tiles (metres / `Material.tile_m`).
-    material : str
-        Name of a `Material` of the scene.
-    colours : (n, 3) uint8 or None
-        sRGB of the vertices, in place of the material's colour; None where that counts.
-    """
-
-    vertices: NDArray[np.float64]
-    faces: NDArray[np.int32]
-    uv: NDArray[np.float32]
-    material: str
-    colours: NDArray[np.uint8] | None = None
+    vertices: NDArray[np.float64]  # (n, 3) float64
+    faces: NDArray[np.int32]  # (m, 3) int32; indices into `vertices`, counter-clockwise seen from outside
+    uv: NDArray[np.float32]  # (n, 2) float32; texture coordinates in tiles (metres / `Material.tile_m`)
+    material: str  # Name of a `Material` of the scene
+    colours: NDArray[np.uint8] | None = None  # (n, 3) uint8 or None
 
 
 @dataclass(frozen=True, eq=False)
 class Instance:
-    """A named thing that stands in the scene, in world coordinates.
+    """A named thing that stands in the scene, in world coordinates."""
 
-    Attributes
-    ----------
-    node : str
-        Unique in the scene and stable between builds, e.g. ``"delivery_van_003"``.
-    category : str
-        Category of the catalogue (``"delivery_van"``) or of the structure (``"ground"``, ``"mall_building"``).
-    variant : str
-        Name of the catalogue's variant, empty if it has none.
-    attributes : dict of str to str
-        What a description may speak of, e.g. ``{"colour": "red", "state": "open"}``.
-    parts : tuple of Part
-        At least one, none of them empty.
-    anatomy : Anatomy or None
-        Its fronts and named parts, where its catalogue says them.
-    surface : str
-        What its surface is, one of `SURFACES`, where ``add-scene`` has decided it; empty where form alone tells.
-    """
-
-    node: str
+    node: str  # Unique in the scene and stable between builds, e.g. ``"delivery_van_003"``
     category: str
-    variant: str
-    attributes: dict[str, str]
-    parts: tuple[Part, ...]
-    anatomy: Anatomy | None = None
+    variant: str  # Name of the catalogue's variant, empty if it has none
+    attributes: dict[str, str]  # What a description may speak of, e.g. ``{"colour": "red", "state": "open"}``
+    parts: tuple[Part, ...]  # At least one, none of them empty
+    anatomy: Anatomy | None = None  # Its fronts and named parts, where its catalogue says them
     surface: str = ""
 
     @property
@@ -158,39 +102,17 @@ class Instance:
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """A whole scene.
+    """A whole scene."""
 
-    Attributes
-    ----------
-    name : str
-        E.g. ``"U_Mall_0"``.
-    instances : tuple of Instance
-        In a stable order; node names are unique.
-    materials : dict of str to Material
-        By name; every part's material is here.
-    bounds : (2, 3) float64
-        The volume that a drone may fly in: lower corner (x, y, ground), upper corner (x, y, ceiling), metres.
-    sky : tuple of int
-        sRGB of the sky, 0-255.
-    sun : tuple of float
-        Unit vector from the scene towards the sun, world frame.
-    imported : bool
-        Whether it comes from a mesh of another make, whose categories are its own.
-    backdrop : tuple of Instance
-        Sky domes and the like: drawn behind everything, and nowhere else there, neither for rays nor for collision.
-    attribution : str
-        Whose data it is made of, and under which licence; empty for what is this program's own.
-    """
-
-    name: str
-    instances: tuple[Instance, ...]
-    materials: dict[str, Material]
-    bounds: NDArray[np.float64]
-    sky: tuple[int, int, int] = (150, 190, 230)
-    sun: tuple[float, float, float] = (0.45, -0.35, 0.82)
-    imported: bool = False
+    name: str  # E.g. ``"U_Mall_0"``
+    instances: tuple[Instance, ...]  # In a stable order; node names are unique
+    materials: dict[str, Material]  # By name; every part's material is here
+    bounds: NDArray[np.float64]  # (2, 3) float64
+    sky: tuple[int, int, int] = (150, 190, 230)  # sRGB of the sky, 0-255
+    sun: tuple[float, float, float] = (0.45, -0.35, 0.82)  # Unit vector from the scene towards the sun, world frame
+    imported: bool = False  # Whether it comes from a mesh of another make, whose categories are its own
     backdrop: tuple[Instance, ...] = ()
-    attribution: str = ""
+    attribution: str = ""  # Whose data it is made of, and under which licence; empty for what is this program's own
     _by_node: dict[str, Instance] = field(default_factory=dict, init=False, repr=False)
 
     def __post_init__(self) -> None:

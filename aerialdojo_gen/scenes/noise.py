@@ -61,15 +61,7 @@ def _cells(size: int, points: bytes) -> tuple[Floats, Floats, NDArray[np.int64]]
 def leaf_pattern(
     name: str, size: int, count: int, length_px: tuple[float, float], tones: int
 ) -> tuple[Floats, NDArray[np.int64]]:
-    """Strew small pointed leaves over a tile, darker towards their rims.
-
-    Returns
-    -------
-    light : (size, size) float64
-        Brightness of the leaf that lies on top.
-    tone : (size, size) int64
-        Which of the tones it has; -1 where no leaf lies.
-    """
+    """Strew leaves over a tile: brightness (size, size) of the top leaf, and its tone (-1 where there is none)."""
     rng = texture_rng(name)
     light = np.ones((size, size))
     tone = np.full((size, size), -1, dtype=np.int64)

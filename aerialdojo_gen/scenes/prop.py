@@ -39,52 +39,21 @@ class Variant:
 
 @dataclass(frozen=True)
 class Category:
-    """A kind of thing that scenes are furnished with.
+    """A kind of thing that scenes are furnished with."""
 
-    Attributes
-    ----------
-    category : str
-        Its key, e.g. ``"delivery_van"``.
-    name : str
-        What a person says, e.g. ``"delivery van"``.
-    kind : str
-        One of `KINDS`.
-    looks : tuple of Look
-        Phrases that may be said of it, each with what it claims; which are true is a matter of the instance.
-    params : mapping of str to (low, high)
-        Sizes drawn once an instance; a fixed one has low == high.
-    roles : mapping of str to str
-        Default material of every role.
-    parts : tuple of mapping
-        Tables of the parts; empty where a builder makes them.
-    builder : str or None
-        Name of the builder.
-    variants : tuple of Variant
-        At least one; a category without variants has one of an empty name.
-    source : str
-        File and category, for messages.
-    target : bool
-        Whether tasks may ask for it: false of landmarks and of scenery.
-    front : str
-        The sides from which a person recognises it, a key of `aerialdojo_gen.scenes.anatomy.FRONTS`; empty where the
-        catalogue does not say.
-    tells : tuple of str
-        Parts that make its name true; empty where the whole body does.
-    """
-
-    category: str
-    name: str
-    kind: str
+    category: str  # Its key, e.g. ``"delivery_van"``
+    name: str  # What a person says, e.g. ``"delivery van"``
+    kind: str  # One of `KINDS`
     looks: tuple[Look, ...]
-    params: Mapping[str, Range]
-    roles: Mapping[str, str]
-    parts: tuple[Mapping[str, Any], ...]
-    builder: str | None
-    variants: tuple[Variant, ...]
-    source: str
-    target: bool = True
+    params: Mapping[str, Range]  # Sizes drawn once an instance; a fixed one has low == high
+    roles: Mapping[str, str]  # Default material of every role
+    parts: tuple[Mapping[str, Any], ...]  # Tables of the parts; empty where a builder makes them
+    builder: str | None  # Name of the builder
+    variants: tuple[Variant, ...]  # At least one; a category without variants has one of an empty name
+    source: str  # File and category, for messages
+    target: bool = True  # Whether tasks may ask for it: false of landmarks and of scenery
     front: str = ""
-    tells: tuple[str, ...] = ()
+    tells: tuple[str, ...] = ()  # Parts that make its name true; empty where the whole body does
 
     def variant(self, name: str) -> Variant:
         """Look a variant up; an `AssetError` names the nearest one."""
@@ -96,13 +65,7 @@ class Category:
 
 
 def parse_category(path: Path, category: str, body: Any, materials: MaterialLibrary, target: bool = True) -> Category:
-    """Check one category's table.
-
-    Raises
-    ------
-    AssetError
-        Names file, category, part or variant, and key, with the nearest known name.
-    """
+    """Check one category's table."""
     where = f"{path}: [{category}]"
     if not isinstance(body, dict):
         raise AssetError(f"{where} is no table")

@@ -37,119 +37,55 @@ Sun = Annotated[tuple[_Direction, _Direction, _Direction], AfterValidator(_above
 
 
 class Level(BaseModel):
-    """A round place that is levelled for what stands on it.
-
-    Attributes
-    ----------
-    at : (x, y)
-        Middle, metres, world frame.
-    radius_m : float
-        Of what is level; the ground about it slopes back to its old height.
-    z_m : float or None
-        Height; the mean of the old ones by default.
-    blend_m : float
-        Width of the slope about it.
-    """
+    """A round place that is levelled for what stands on it."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    at: tuple[Place, Place]
+    at: tuple[Place, Place]  # (x, y); middle, metres, world frame
     radius_m: Annotated[float, Field(ge=0, le=50)] = 0.5
-    z_m: Place | None = None
-    blend_m: Annotated[float, Field(ge=0, le=50)] = 2.0
+    z_m: Place | None = None  # Height; the mean of the old ones by default
+    blend_m: Annotated[float, Field(ge=0, le=50)] = 2.0  # Width of the slope about it
 
 
 class Move(BaseModel):
-    """How far one node stands from where its layout puts it.
-
-    Attributes
-    ----------
-    by_m : (dx, dy)
-        World frame, metres; what stands on the ground keeps its height above it.
-    up_m : float
-        Upwards, metres.
-    turn_deg : float
-        Counter-clockwise, about its origin.
-    place : str or None
-        What descriptions say of where it is now; what the layout says by default.
-    """
+    """How far one node stands from where its layout puts it."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    by_m: tuple[Place, Place] = (0.0, 0.0)
-    up_m: Place = 0.0
-    turn_deg: Annotated[float, Field(ge=-360, le=360)] = 0.0
+    by_m: tuple[Place, Place] = (0.0, 0.0)  # World frame, metres; what stands on the ground keeps its height above it
+    up_m: Place = 0.0  # Upwards, metres
+    turn_deg: Annotated[float, Field(ge=-360, le=360)] = 0.0  # Counter-clockwise, about its origin
     place: Annotated[str, Field(min_length=1, max_length=_LONGEST)] | None = None
 
 
 class Origin(BaseModel):
-    """Where the origin of a real place's scene lies.
-
-    Attributes
-    ----------
-    lon_deg, lat_deg : float or None
-        Longitude and latitude, WGS 84.
-    x_m, y_m : float or None
-        In the metres of the model that its heights are from, where that does not say where on earth they are.
-    z_m : float
-        The height that is z = 0, metres.
-    """
+    """Where the origin of a real place's scene lies."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    lon_deg: Annotated[float, Field(ge=-180, le=180)] | None = None
+    lon_deg: Annotated[float, Field(ge=-180, le=180)] | None = None  # Longitude and latitude, WGS 84
     lat_deg: Annotated[float, Field(ge=-90, le=90)] | None = None
     x_m: Annotated[float, Field(ge=-1e9, le=1e9)] | None = None
     y_m: Annotated[float, Field(ge=-1e9, le=1e9)] | None = None
-    z_m: Annotated[float, Field(ge=-1e5, le=1e5)] = 0.0
+    z_m: Annotated[float, Field(ge=-1e5, le=1e5)] = 0.0  # The height that is z = 0, metres
 
 
 class Recipe(BaseModel):
-    """What a scene is made from.
-
-    Attributes
-    ----------
-    layout : str
-        Type of `aerialdojo_gen.layouts`.
-    seed : int
-        Of everything drawn in the scene.
-    size_m : (float, float)
-        Extent along x and y, metres; the origin lies in the middle.
-    ceiling_m : float
-        Highest z that a drone may fly at, metres.
-    sky : str
-        ``"#rrggbb"``.
-    sun : (float, float, float)
-        Direction towards the sun, of any length.
-    palette : dict of str to str
-        Materials by the layout's names for them.
-    parameters : dict
-        The layout's own.
-    inventory : dict of str to int
-        Least number of instances of a category that the built scene must have.
-    attribution : str
-        Whose data the scene is made of, and under which licence, where it is of a real place.
-    origin : Origin or None
-        Where on earth that is.
-    level : tuple of Level
-        Places levelled in the layout's ground, in their order.
-    moves : dict of str to Move
-        Props that stand elsewhere than the layout puts them, by node; whatever else it places stays where it is.
-    """
+    """What a scene is made from."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    layout: str
-    seed: Annotated[int, Field(ge=-(2**31), lt=2**31)] = 0
-    size_m: tuple[Extent, Extent]
-    ceiling_m: Height
+    layout: str  # Type of `aerialdojo_gen.layouts`
+    seed: Annotated[int, Field(ge=-(2**31), lt=2**31)] = 0  # Of everything drawn in the scene
+    size_m: tuple[Extent, Extent]  # (float, float); extent along x and y, metres; the origin lies in the middle
+    ceiling_m: Height  # Highest z that a drone may fly at, metres
     sky: Colour = "#96bee6"
-    sun: Sun = (0.45, -0.35, 0.82)
-    palette: dict[str, str] = {}
-    parameters: dict[str, Any] = {}
+    sun: Sun = (0.45, -0.35, 0.82)  # (float, float, float); direction towards the sun, of any length
+    palette: dict[str, str] = {}  # Materials by the layout's names for them
+    parameters: dict[str, Any] = {}  # The layout's own
     inventory: dict[str, Annotated[int, Field(ge=0, le=100_000)]] = {}
     attribution: Annotated[str, Field(max_length=500)] = ""
-    origin: Origin | None = None
+    origin: Origin | None = None  # Where on earth that is
     level: Annotated[tuple[Level, ...], Field(max_length=200)] = ()
     moves: Annotated[dict[str, Move], Field(max_length=500)] = {}
 
@@ -161,63 +97,31 @@ class Recipe(BaseModel):
 
 
 class Cut(BaseModel):
-    """A box that a person drew around a thing for which a foreign mesh has no node.
-
-    Attributes
-    ----------
-    node, category : str
-        Of the new node.
-    low_m, high_m : (x, y, z)
-        Corners, metres, world frame.
-    """
+    """A box that a person drew around a thing for which a foreign mesh has no node."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    node: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_]{0,79}$")
+    node: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_]{0,79}$")  # Of the new node
     category: str = Field(pattern=r"^[a-z0-9][a-z0-9_]{0,59}$")
-    low_m: tuple[Place, Place, Place]
+    low_m: tuple[Place, Place, Place]  # (x, y, z); corners, metres, world frame
     high_m: tuple[Place, Place, Place]
 
 
 class Imported(BaseModel):
-    """Where a scene comes from that ``add-scene`` made of a mesh, and what may still be set of it.
-
-    Attributes
-    ----------
-    source, source_sha256 : str
-        Name and digest of the mesh file.
-    up : str
-        The file's axis that pointed up.
-    scale : float
-        Metres a unit of the file.
-    crop_m : (x, y, radius) or None
-        The circle that was kept, metres, in the file's axes.
-    box_m : (x0, y0, x1, y1) or None
-        The rectangle that was kept.
-    origin_m : (x, y, z) or None
-        Where the scene's origin lies in the file's axes, after `up` and `scale`, metres; equal in tiles of a place.
-    ceiling_m : float
-        Highest z that a drone may fly at, metres.
-    sky : str
-        ``"#rrggbb"``.
-    sun : (float, float, float)
-        Direction towards the sun, of any length.
-    cuts : tuple of Cut
-        Things that people boxed out of it, with the annotation tool.
-    """
+    """Where a scene comes from that ``add-scene`` made of a mesh, and what may still be set of it."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    source: str
+    source: str  # Name and digest of the mesh file
     source_sha256: str
-    up: Literal["y", "z"]
-    scale: Positive
-    crop_m: tuple[Mapped, Mapped, Positive] | None = None
-    box_m: tuple[Mapped, Mapped, Mapped, Mapped] | None = None
-    origin_m: tuple[Mapped, Mapped, Mapped] | None = None
-    ceiling_m: Positive
+    up: Literal["y", "z"]  # The file's axis that pointed up
+    scale: Positive  # Metres a unit of the file
+    crop_m: tuple[Mapped, Mapped, Positive] | None = None  # The circle that was kept, metres, in the file's axes
+    box_m: tuple[Mapped, Mapped, Mapped, Mapped] | None = None  # The rectangle that was kept
+    origin_m: tuple[Mapped, Mapped, Mapped] | None = None  # (x, y, z) or None
+    ceiling_m: Positive  # Highest z that a drone may fly at, metres
     sky: Colour = "#96bee6"
-    sun: Sun = (0.45, -0.35, 0.82)
+    sun: Sun = (0.45, -0.35, 0.82)  # (float, float, float); direction towards the sun, of any length
     cuts: Annotated[tuple[Cut, ...], Field(max_length=1000)] = ()
 
 

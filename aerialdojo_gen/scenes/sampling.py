@@ -20,23 +20,7 @@ _NEUTRAL, _AS_MUCH = ("white", "grey", "black"), 1.5
 def shown_colours(
     parts: Sequence[Part], materials: Mapping[str, Material], n: int = _SAMPLES
 ) -> tuple[NDArray[np.uint8], NDArray[np.float64]]:
-    """Sample the surface of parts.
-
-    Parameters
-    ----------
-    parts : sequence of Part
-    materials : mapping of str to Material
-        That they are of.
-    n : int
-        Samples in all, about; parts of one colour take one each.
-
-    Returns
-    -------
-    colours : (k, 3) uint8
-        sRGB.
-    weights : (k,) float64
-        Share of the area of each, summing to 1; empty where there is no area.
-    """
+    """Sample about n surface colours of parts by area: colours (k, 3) uint8 sRGB and weights (k,)."""
     found: list[NDArray[np.uint8]] = []
     weights: list[NDArray[np.float64]] = []
     sizes = [areas(part.vertices, part.faces) for part in parts]
@@ -85,19 +69,7 @@ def texel(uv: NDArray[np.float64], rows: int, columns: int) -> tuple[NDArray[np.
 
 
 def colour_words(colours: NDArray[np.uint8], weights: NDArray[np.float64]) -> str:
-    """Say what a person calls the colours of a surface: of one, or of the two that it has most of.
-
-    Parameters
-    ----------
-    colours : (k, 3) uint8
-        sRGB.
-    weights : (k,) float64
-
-    Returns
-    -------
-    str
-        ``"grey"`` or ``"blue and white"``; empty where nothing is given.
-    """
+    """Name the colour of a surface, or the two that it has most of, e.g. ``"blue and white"``."""
     shares = named_shares(colours, weights)
     ranked = sorted(shares, key=lambda word: (-shares[word], word))
     if not ranked:

@@ -93,21 +93,7 @@ def torus(*, radius: float, tube: float, segments: float = 16, sides: float = 6)
 
 
 def lathe(*, points: Sequence[Numbers], segments: float = 12) -> Mesh:
-    """Turn a profile about z.
-
-    Parameters
-    ----------
-    points : sequence of (radius, z)
-        The profile, metres. Ends off the axis are closed by flat discs, unless the last point repeats the first:
-        then the profile is a closed ring.
-    segments : float
-        Corners of the turned polygon, at least 3.
-
-    Returns
-    -------
-    Mesh
-        Watertight. Textures wrap around (u) and run along the profile (v).
-    """
+    """Turn a profile of (radius, z) in metres about z; closed, u around and v along the profile."""
     profile = np.array(rows_of("points", points, 2))
     profile[np.abs(profile[:, 0]) < 1e-9, 0] = 0.0
     n = whole("segments", segments, 3, MAX_SEGMENTS)
@@ -152,19 +138,7 @@ def crown(
     subdivisions: float = 2,
     seed: float = 0,
 ) -> Mesh:
-    """Make a rough ellipsoid about its centre, for foliage, rocks and rubble.
-
-    Parameters
-    ----------
-    radii, radius : sequence of float or float
-        Half extents before the noise, metres.
-    noise : float
-        How far a point may lie from the ellipsoid, as a fraction of the radius, 0 to 0.6.
-    subdivisions : float
-        Of the icosahedron: 0, 1, 2, 3 make 20, 80, 320, 1280 triangles.
-    seed : float
-        Which of the random shapes; a whole number.
-    """
+    """Make a rough ellipsoid for foliage, rocks and rubble: half extents in metres, `noise` 0 to 0.6 of them."""
     scale = _radii(radius, radii)
     if not 0.0 <= number("noise", noise) <= 0.6:
         raise ShapeError(f"noise {noise:g} is outside 0 to 0.6")

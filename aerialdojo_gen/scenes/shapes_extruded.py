@@ -21,17 +21,7 @@ _SECTIONS = ("gable", "wedge", "trapezoid")
 
 
 def prism(*, size: Numbers, section: str = "gable", top: float = 0.5) -> Mesh:
-    """Make a prism that runs along x.
-
-    Parameters
-    ----------
-    size : sequence of float
-        Extent along x, y and z, metres.
-    section : str
-        ``"gable"`` (ridge in the middle), ``"wedge"`` (rises towards +y) or ``"trapezoid"``.
-    top : float
-        Width of the trapezoid's top as a fraction of its bottom.
-    """
+    """Make a prism along x with a gable, wedge or trapezoid section; size in metres."""
     x, y, z = _positive("size", size, 3)
     top = number("top", top)
     if section not in _SECTIONS:
@@ -73,24 +63,7 @@ def sweep(
     closed: bool = False,
     sides: float = 6,
 ) -> Mesh:
-    """Sweep a round or rectangular section along a path.
-
-    Parameters
-    ----------
-    path : sequence of (x, y, z)
-        Middle line, metres.
-    radius : float, optional
-        Of a round section with `sides` corners.
-    section : (width, height), optional
-        Of a rectangular section; height is measured up (across the path where it climbs straight up).
-    closed : bool
-        Join the last point to the first.
-
-    Returns
-    -------
-    Mesh
-        Watertight, mitred at the path's corners; textures run along the path.
-    """
+    """Sweep a round or rectangular section along a path in metres; closed, mitred at corners."""
     line = np.array(rows_of("path", path, 3, 1))
     line = line[np.concatenate([[True], np.linalg.norm(np.diff(line, axis=0), axis=1) > 1e-9])]
     if len(line) < (3 if closed else 2):
@@ -136,31 +109,13 @@ def extrude(plan: Polygon, height: float) -> Mesh:
 
 
 def triangulate(plan: Polygon) -> tuple[Floats, Ints]:
-    """Triangulate a polygon with holes.
-
-    Returns
-    -------
-    vertices : (n, 2) float64
-        Exterior first, then the holes, without closing points.
-    faces : (m, 3) int32
-        Counter-clockwise seen from +z.
-    """
+    """Triangulate a polygon with holes: vertices (n, 2), exterior first, and counter-clockwise faces (m, 3)."""
     vertices, _, faces = triangulate_all([plan])
     return vertices, faces
 
 
 def triangulate_all(plans: Sequence[Polygon]) -> tuple[Floats, NDArray[np.int64], Ints]:
-    """Triangulate polygons with holes, each by itself.
-
-    Returns
-    -------
-    vertices : (n, 2) float64
-        One polygon's after the other's: exterior first, then the holes, without closing points.
-    whose : (n,) int64
-        Which polygon's they are.
-    faces : (m, 3) int32
-        In the order of the polygons, counter-clockwise seen from +z.
-    """
+    """Triangulate polygons with holes: vertices (n, 2), the polygon of each, and counter-clockwise faces (m, 3)."""
     rings, owner = shapely.get_rings(np.asarray(plans, dtype=object), return_index=True)
     points, ring = shapely.get_coordinates(rings, return_index=True)
     first = np.flatnonzero(np.diff(ring, append=-1) == 0)

@@ -27,26 +27,7 @@ _MOST_NODES = 5_000
 
 
 class Site:
-    """What a layout builds on; the origin lies in the middle, x east, y north, z up, metres.
-
-    Parameters
-    ----------
-    name : str
-        Scene's name.
-    recipe : Recipe
-        Extents, palette and the rest.
-    catalogue : Catalogue
-        Props and materials.
-    parameters : object
-        The layout's own `Parameters`, validated; None where it has none.
-
-    Attributes
-    ----------
-    extent : Polygon
-        The site's rectangle.
-    rng : numpy.random.Generator
-        For the layout's own draws; props draw from generators of their own node names.
-    """
+    """What a layout builds on; the origin lies in the middle, x east, y north, z up, metres."""
 
     def __init__(self, name: str, recipe: Recipe, catalogue: Catalogue, parameters: Any = None) -> None:
         self.name = name
@@ -133,29 +114,9 @@ class Site:
         node: str | None = None,
         solid: bool = True,
     ) -> Instance:
-        """Place a prop of the catalogue.
+        """Place a prop of the catalogue at x, y in metres, its front towards `yaw_deg`.
 
-        Parameters
-        ----------
-        category : str
-            Key of the catalogue.
-        x, y : float
-            Where its origin goes, metres.
-        yaw_deg : float
-            Direction of its front, degrees, counter-clockwise from +x.
-        z : float, optional
-            Height of its base; the ground's there by default.
-        variant, scale, params, roles, attributes
-            As in `Catalogue.instantiate`.
-        node : str, optional
-            Its node name, in place of the next free one.
-        solid : bool
-            Whether it takes the ground it stands on.
-
-        Returns
-        -------
-        Instance
-            In world coordinates, where the layout puts it whether or not the recipe moves it.
+        On the ground unless `z` is given.
         """
         name = self._claim(node or self.node(category))
         base = self.ground_z(x, y) if z is None else z
@@ -233,22 +194,9 @@ class Site:
         variant: str = "",
         footprint: BaseGeometry | None = None,
     ) -> Instance:
-        """Add structure that the layout itself made.
+        """Add structure made by the layout.
 
-        Parameters
-        ----------
-        node : str or None
-            Node name; None takes the next free one of the category.
-        category : str
-            What it is, e.g. ``"mall_building"``; need not stand in the catalogue.
-        parts : sequence of (material, Mesh) or Part
-            World coordinates; meshes of one material become one part.
-        attributes : mapping, optional
-            What a description may say.
-        variant : str
-            Name of its look, if any.
-        footprint : shapely geometry, optional
-            Ground that it takes, over its whole height.
+        Parts in world metres, the ground that it takes, and what a description may say.
         """
         name = self._claim(node or self.node(category))
         instance = Instance(name, category, variant, dict(attributes or {}), placed(self._as_parts(parts), (0, 0, 0)))

@@ -13,15 +13,7 @@ from aerialdojo_gen.store.root import DataRoot, Where, leads_out, open_root
 
 
 def mesh_copy(where: Where, told: str) -> Path:
-    """Return the mesh that a row of `scenes` names, on this machine.
-
-    Raises
-    ------
-    AssetError
-        The row names one outside of the data root.
-    FileNotFoundError
-        It is not there.
-    """
+    """Return the mesh that a row of `scenes` names, on this machine."""
     root = open_root(where)
     if leads_out(root, told):
         raise AssetError(f"release/scenes: mesh_path {told!r} leads out of {root}")
@@ -32,15 +24,7 @@ def mesh_copy(where: Where, told: str) -> Path:
 
 
 def mesh_file(data: DataRoot, relative: str) -> Path:
-    """Return the mesh that a row of `scenes` names, on this machine.
-
-    Raises
-    ------
-    AssetError
-        It is missing, or the path leads out of the data root.
-    StoreError
-        The store does not answer.
-    """
+    """Return the mesh that a row of `scenes` names, on this machine."""
     try:
         return data.local_copy(relative)
     except FileNotFoundError:
@@ -52,13 +36,5 @@ def mesh_file(data: DataRoot, relative: str) -> Path:
 
 
 def read_scene_mesh(data: DataRoot, relative: str, sha256: str) -> Scene:
-    """Read the mesh that a row of `scenes` names: its ``mesh_path``, and its ``mesh_sha256``.
-
-    Raises
-    ------
-    AssetError
-        It is missing, damaged, or another one (see `aerialdojo_gen.scenes.glb.read_glb`).
-    StoreError
-        The store does not answer, or the path leads out of it.
-    """
+    """Read the mesh that a row of `scenes` names: its ``mesh_path``, and its ``mesh_sha256``."""
     return read_glb(mesh_file(data, relative), sha256)

@@ -17,22 +17,12 @@ from aerialdojo_gen.scenes.mesh import Floats, Ints
 
 @dataclass(frozen=True, eq=False)
 class Terrain:
-    """Heights on a regular grid; every cell is cut into two triangles by its south-west to north-east diagonal.
+    """Heights on a regular grid; every cell is cut into two triangles by its south-west to north-east diagonal."""
 
-    Attributes
-    ----------
-    x0_m, y0_m : float
-        South-west corner, world frame, metres.
-    cell_m : float
-        Edge of a cell, metres.
-    heights_m : (ny + 1, nx + 1) float64
-        z at the corners of the cells, metres; rows run north.
-    """
-
-    x0_m: float
+    x0_m: float  # South-west corner, world frame, metres
     y0_m: float
-    cell_m: float
-    heights_m: Floats
+    cell_m: float  # Edge of a cell, metres
+    heights_m: Floats  # (ny + 1, nx + 1) float64; z at the corners of the cells, metres; rows run north
 
     def z(self, x: ArrayLike, y: ArrayLike) -> Floats:
         """Height of the triangulated surface at points, metres; beyond the border that of the nearest point in it."""
@@ -80,21 +70,9 @@ class Terrain:
         return np.concatenate([np.column_stack([sw, se, ne]), np.column_stack([sw, ne, nw])]).astype(np.int32)
 
     def flattened(self, area: BaseGeometry, z_m: float | None = None, blend_m: float = 4.0) -> Terrain:
-        """Level an area (a shapely geometry, world frame).
+        """Level an area, grid corners within one cell of it too.
 
-        Parameters
-        ----------
-        area : shapely geometry
-            What becomes level; grid corners within one cell of it too, so that no triangle leans into it.
-        z_m : float, optional
-            The level; by default the mean height of the area.
-        blend_m : float
-            Width of the slope back to the old ground, metres.
-
-        Raises
-        ------
-        AssetError
-            The area lies off the terrain, so that there is no mean height; where `z_m` is given, nothing is levelled.
+        With a slope `blend_m` wide back to the old ground.
         """
         if area.is_empty:
             return self
@@ -106,15 +84,7 @@ class Terrain:
         return self._blended(np.full_like(self.heights_m, level), near, blend_m)
 
     def graded(self, path: ArrayLike, width_m: float, blend_m: float = 3.0, smooth_m: float = 12.0) -> Terrain:
-        """Lay a path into the ground: level across, and smoothed along over `smooth_m` metres.
-
-        Parameters
-        ----------
-        path : (n, 2) array-like
-            Middle line, world frame, metres.
-        width_m, blend_m, smooth_m : float
-            Level width, width of the slopes beside it, and length of the moving average along it.
-        """
+        """Lay a path (n, 2), world metres, into the ground: level across and smoothed along over `smooth_m`."""
         line = LineString(np.asarray(path, dtype=np.float64))
         s = np.linspace(0.0, line.length, max(int(line.length / 0.5), 2) + 1)
         points = shapely.get_coordinates(line.interpolate(s))
@@ -152,24 +122,9 @@ def rolling_terrain(
     gain: float = 0.45,
     ridged: bool = False,
 ) -> Terrain:
-    """Make a terrain about the origin by fractal simplex noise.
+    """Make a terrain about the origin, in metres, by fractal simplex noise.
 
-    Parameters
-    ----------
-    size_m : (float, float)
-        Extent along x and y, metres.
-    cell_m : float
-        Wanted edge of a cell; made a little smaller where it does not divide both extents.
-    seed : int
-        Of the noise.
-    amplitude_m : float
-        Heights lie within about plus or minus this, metres.
-    wavelength_m : float
-        Length of the longest waves, metres.
-    octaves, gain : int, float
-        Number of octaves, and the weight of each beside the one before.
-    ridged : bool
-        Sharp crests (mountains, dunes) in place of soft hills.
+    `ridged` makes crests in place of hills.
     """
     columns, rows = (int(np.ceil(s / cell_m - 1e-9)) for s in size_m)
     cell = max(size_m[0] / columns, size_m[1] / rows)

@@ -20,20 +20,7 @@ TEXTURES = {**NATURAL, **BUILT}
 
 @lru_cache(maxsize=256)
 def make_texture(name: str, colour: tuple[int, int, int]) -> NDArray[np.uint8]:
-    """Draw a texture.
-
-    Parameters
-    ----------
-    name : str
-        One of `TEXTURES`.
-    colour : tuple of int
-        Base colour, sRGB 0-255.
-
-    Returns
-    -------
-    (H, W, 3) uint8
-        sRGB, 64 to 256 pixels on a side, wrapping around without a seam; read-only.
-    """
+    """Draw one of `TEXTURES` in a base colour: (H, W, 3) uint8 sRGB, 64 to 256 pixels a side, seamless, read-only."""
     base = np.array(colour, dtype=np.float64)
     image = TEXTURES[name](base)
     if name in NATURAL:

@@ -55,27 +55,7 @@ def names_used(part: Mapping[str, Any]) -> frozenset[str]:
 
 
 def part_mesh(part: Mapping[str, Any], names: Mapping[str, float], words: Mapping[str, str]) -> Mesh:
-    """Make one part of a prop, repeated and placed in the prop's frame.
-
-    Parameters
-    ----------
-    part : mapping
-        The part's table in the asset file.
-    names : mapping of str to float
-        The prop's parameters.
-    words : mapping of str to str
-        The variant's attributes, which may stand in a sign's text as ``{label}``.
-
-    Returns
-    -------
-    Mesh
-        The shape turned, repeated along `array`, repeated around `ring`, moved to `at` and mirrored, in that order.
-
-    Raises
-    ------
-    ShapeError
-        Sizes that make no body, or an expression that cannot be computed.
-    """
+    """Make one part of a prop, repeated and placed in the prop's frame."""
     shape = part["shape"]
     own = {k: v if (shape, k) in _WORDS else _number(v, names) for k, v in part.items() if k not in PLACEMENT_KEYS}
     if shape == "text":

@@ -30,20 +30,6 @@ class ClipScorer:
     """Scores how well a picture fits the object's name; see `aerialdojo_gen.scoring.base.Scorer`.
 
     The candidate whose picture fits the name best has 1, another one exp(100 · (its cosine − the best cosine)).
-
-    Parameters
-    ----------
-    config : ClipConfig
-        Its files: an image encoder (input of four dimensions; output ``image_embeds``, or the first), a text encoder
-        (``input_ids`` and, if it has one, ``attention_mask``; output ``text_embeds``, or the first) and a
-        ``tokenizer.json``, as exported from Hugging Face models by Optimum.
-
-    Raises
-    ------
-    MissingPackage
-        The packages are not installed.
-    AssetError
-        A file is missing or is not what it should be.
     """
 
     name = "clip"
@@ -74,18 +60,7 @@ class ClipScorer:
         return [float(s) for s in np.exp(_SHARPNESS * (similarity - similarity.max()))]
 
     def similarity(self, name: str, rgb: NDArray[np.uint8]) -> NDArray[np.float64]:
-        """Cosines between a name's and pictures' embeddings.
-
-        Parameters
-        ----------
-        name : str
-        rgb : (n, H, W, 3) uint8
-
-        Returns
-        -------
-        (n,) float64
-            In [-1, 1].
-        """
+        """Cosines (n,) between a name's embedding and those of pictures (n, H, W, 3) uint8."""
         if name not in self._known:
             self._known[name] = self._embed_text(_PROMPT.format(name))
         return self._embed_pictures(rgb) @ self._known[name]
@@ -106,13 +81,7 @@ class ClipScorer:
 
 
 def digest(config: ClipConfig) -> str:
-    """SHA-256 over the scorer's three files: what it says depends on what is in them, not on their names.
-
-    Raises
-    ------
-    AssetError
-        One of them is missing.
-    """
+    """SHA-256 over the scorer's three files: what it says depends on what is in them, not on their names."""
     whole = hashlib.sha256()
     for path in (config.vision, config.text, config.tokenizer):
         try:

@@ -36,48 +36,19 @@ _RING = 1 / 16
 
 @dataclass(frozen=True)
 class Parts:
-    """The terms of the geometric score, each in [0, 1], higher is better.
+    """The terms of the geometric score, each in [0, 1], higher is better."""
 
-    Attributes
-    ----------
-    unoccluded : float
-        Of the pixels that would show the object if it stood alone, the share that do.
-    shown : float
-        Share of the object that the picture tells: a front rather than an edge, the whole rather than a corner.
-    size : float
-        Edge of the object's box in the picture; full marks from half of the picture's edge.
-    centred : float
-        How near the object's pixels are to the picture's centre.
-    contrast : float
-        Difference (CIE76) between the object's mean colour and that of what surrounds it in the picture.
-    sky : float
-        Share of sky in what surrounds it: there its outline is clear.
-    level : float
-        Full marks from 5° below the centroid to 20° above, none from 30° below and 50° above.
-    clear : float
-        Room around the body; full marks at the standoff.
-    tells : float or None
-        How well the parts that make its name true are seen (`aerialdojo_gen.scoring.knowing`); None where the whole
-        body tells, or nothing is known of it.
-    front : float or None
-        Full marks up to 25° off the object's front, little beyond 60°; None where it has none.
-    framed : float
-        Share of the object that lies within the picture's edges.
-    open : float
-        1 less the share that what stands nearer takes of the picture, or of the object's box in it: the larger one.
-    """
-
-    unoccluded: float
+    unoccluded: float  # Of the pixels that would show the object if it stood alone, the share that do
     shown: float
-    size: float
-    centred: float
+    size: float  # Edge of the object's box in the picture; full marks from half of the picture's edge
+    centred: float  # How near the object's pixels are to the picture's centre
     contrast: float
-    sky: float
-    level: float
-    clear: float
+    sky: float  # Share of sky in what surrounds it: there its outline is clear
+    level: float  # Full marks from 5° below the centroid to 20° above, none from 30° below and 50° above
+    clear: float  # Room around the body; full marks at the standoff
     tells: float | None = None
     front: float | None = None
-    framed: float = 1.0
+    framed: float = 1.0  # Share of the object that lies within the picture's edges
     open: float = 1.0
 
     @property
@@ -96,20 +67,7 @@ class Parts:
 
 
 def judge(view: AnchorView, radius_m: float, standoff_m: float) -> Parts:
-    """Take a view's terms, those of the picture rather from the picture behind it, where there is one.
-
-    Parameters
-    ----------
-    view : AnchorView
-    radius_m : float
-        The body's radius: no room at all.
-    standoff_m : float
-        The anchors' distance from their objects.
-
-    Returns
-    -------
-    Parts
-    """
+    """Take a view's terms, those of the picture rather from the picture behind it, where there is one."""
     terms = _pictured(view)
     if view.behind is not None:
         behind = _pictured(view.behind)
@@ -118,21 +76,7 @@ def judge(view: AnchorView, radius_m: float, standoff_m: float) -> Parts:
 
 
 def most(known: Known, radius_m: float, standoff_m: float, behind: AnchorView | None = None) -> float:
-    """Bound the score of every picture from a viewpoint from above, by what is known of the viewpoint without one.
-
-    Parameters
-    ----------
-    known : Known
-    radius_m, standoff_m : float
-        As for `judge`.
-    behind : AnchorView, optional
-        The picture from behind the viewpoint, where it is there already.
-
-    Returns
-    -------
-    float
-        No view of which this is known has a higher score by `judge`.
-    """
+    """Bound the score of every picture from a viewpoint from above, by what is known of the viewpoint without one."""
     terms = dict.fromkeys(("unoccluded", "size", "centred", "contrast", "sky", "open"), 1.0)
     terms["framed"] = known.framed
     if behind is not None:
@@ -206,13 +150,7 @@ def _terms(view: AnchorView) -> dict[str, Any]:
 
 
 class GeometricScorer:
-    """Scores by `judge`; see `aerialdojo_gen.scoring.base.Scorer`.
-
-    Parameters
-    ----------
-    radius_m, standoff_m : float
-        As for `judge`.
-    """
+    """Scores by `judge`; see `aerialdojo_gen.scoring.base.Scorer`."""
 
     name = "geometric"
 

@@ -16,34 +16,14 @@ SCORERS = ("geometric", "clip", "vlm")
 
 @dataclass(frozen=True)
 class Verdict:
-    """What the panel says of a view.
+    """What the panel says of a view."""
 
-    Attributes
-    ----------
-    score : float
-        Mean of the scorers that have an opinion, weighted; in [0, 1].
-    parts : dict of str to float or None
-        Each scorer's own score, by ``score_<name>``; None for one that was not asked or has no opinion.
-    """
-
-    score: float
+    score: float  # Mean of the scorers that have an opinion, weighted; in [0, 1]
     parts: dict[str, float | None]
 
 
 class Panel:
-    """All scorers of a configuration.
-
-    Parameters
-    ----------
-    config : AnchorSampleConfig
-    radius_m : float
-        The body's.
-
-    Raises
-    ------
-    AerialDojoError
-        A scorer lacks what it needs; the message says what.
-    """
+    """All scorers of a configuration."""
 
     def __init__(self, config: AnchorSampleConfig, radius_m: float) -> None:
         self._weighted: list[tuple[float, Scorer]] = []
@@ -66,20 +46,7 @@ class Panel:
             self._weighted.append((weights.vlm, VlmScorer(config.vlm)))
 
     def judge(self, name: str, views: Sequence[AnchorView]) -> list[Verdict]:
-        """Ask all scorers.
-
-        Parameters
-        ----------
-        name : str
-            The object's.
-        views : sequence of AnchorView
-            Of its candidates.
-
-        Returns
-        -------
-        list of Verdict
-            One a view.
-        """
+        """Ask all scorers."""
         if not views:
             return []
         opinions = {scorer.name: (weight, scorer.score(name, views)) for weight, scorer in self._weighted}

@@ -43,35 +43,9 @@ def take_view(
     off_front_rad: float | None = None,
     framed: float = 1.0,
 ) -> AnchorView:
-    """Take the front view of an object from a candidate anchor.
+    """Take the front view of an object from a candidate anchor (world metres, radians).
 
-    Parameters
-    ----------
-    renderer : RayRenderer
-        Of the scene; every machine gives the same instance mask.
-    alone : TriangleRayCaster
-        The object by itself.
-    thing : Body
-        The object: the triangles of `alone`.
-    own_instance : int
-        The object's index in the scene.
-    camera : Camera
-    position_m : (3,) float64
-        The body's centre, metres, world frame.
-    yaw_rad : float
-        Counter-clockwise from +x.
-    shown, elevation_deg, clearance_m : float
-        See `AnchorView`.
-    told : sequence of float
-        By ray casts: how much of each telling part is seen, over what the best viewpoint sees.
-    tells : sequence of (k,) int64
-        The faces of each of those parts: indices into the object's. One that is small in the picture counts less.
-    off_front_rad, framed
-        See `AnchorView`.
-
-    Returns
-    -------
-    AnchorView
+    Every machine gives the same mask.
     """
     pose = view_pose(position_m, yaw_rad, "front")
     picture = renderer.render(camera, pose)
@@ -109,24 +83,7 @@ def standing_nearer(
     camera: Camera,
     world_from_camera: Floats,
 ) -> NDArray[np.bool_]:
-    """Tell which pixels show what stands between a camera and an object.
-
-    Parameters
-    ----------
-    depth : (H, W) float32
-        Metres along the camera's axis; infinite where there is nothing.
-    visible : (H, W) bool
-        Pixels that show the object.
-    wide : (H, W) bool
-        Pixels that show something wide enough to stand on.
-    camera : Camera
-    world_from_camera : (4, 4) float64
-
-    Returns
-    -------
-    (H, W) bool
-        Of what is nearer than the object's nearest part, all but level surfaces of what is wide.
-    """
+    """Pixels (H, W) of what is nearer than the object's nearest part, but for level surfaces of what is wide."""
     if not visible.any():
         return np.zeros_like(visible)
     nearer = (depth < _NEARER * np.percentile(depth[visible], 2.0)) & ~visible
@@ -215,27 +172,9 @@ def part_shares(
     visible: NDArray[np.bool_],
     enough: float = math.inf,
 ) -> list[float]:
-    """Share of a picture's pixels that show parts of an object.
+    """Share, 0 to 1, of a picture's pixels that show each part.
 
-    Parameters
-    ----------
-    alone : TriangleRayCaster
-        The object by itself.
-    thing : Body
-        Its triangles.
-    parts : sequence of (k,) int64
-        Faces of each part: indices into the object's.
-    camera : Camera
-    world_from_camera : (4, 4) float64
-    visible : (H, W) bool
-        Pixels that show the object.
-    enough : float
-        A share that is at least this may be returned as less, but not as less than this: fewer rays are cast.
-
-    Returns
-    -------
-    list of float
-        In [0, 1], one a part.
+    One of at least `enough` may be understated, not below it.
     """
     counts = np.zeros(len(parts), dtype=np.int64)
     # Each pixel of a part lies in the part's box.

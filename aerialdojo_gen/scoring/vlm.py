@@ -37,16 +37,6 @@ class VlmScorer:
 
     The best has 1, the worst 0, the others are spaced evenly between. An answer that is no order is asked for once
     more; after that the scorer has no opinion, and says so in the log.
-
-    Parameters
-    ----------
-    config : VlmConfig
-        The key is OPENAI_API_KEY's; an endpoint of one's own may do without.
-
-    Raises
-    ------
-    UsageError
-        The package openai is not installed, or there is no key.
     """
 
     name = "vlm"
@@ -56,15 +46,7 @@ class VlmScorer:
         self._service = Connection("openai", config.base_url, config.timeout_s, config.retries, model=config.model)
 
     def score(self, name: str, views: Sequence[AnchorView]) -> list[float | None]:
-        """Score views by the model's order.
-
-        Raises
-        ------
-        AgentUnavailable
-            The service does not answer, after the retries.
-        UsageError
-            The service refuses for good: a wrong key, no such model.
-        """
+        """Score views by the model's order."""
         n = len(views)
         if n == 1:
             return [1.0]
@@ -112,25 +94,7 @@ class VlmScorer:
 
 
 def read_order(text: str, n: int) -> list[int]:
-    """Read a model's order, strictly.
-
-    Parameters
-    ----------
-    text : str
-        All that it said; a leading ``<think>`` block and a Markdown fence are taken off.
-    n : int
-        How many pictures it was shown.
-
-    Returns
-    -------
-    list of int
-        Numbers from 0 to n - 1, each once, the best first.
-
-    Raises
-    ------
-    ValueError
-        It is not one JSON object with the one key ``order`` and the numbers 1 to n in it; says why.
-    """
+    """Read a model's order, strictly."""
     wrapped = _WRAPPED.match(text)
     try:
         value = loads_json(wrapped[1] if wrapped else text)

@@ -34,15 +34,7 @@ _LABEL_SHARE = 0.09
 
 
 def draw_map(axes: Axes, task: PicturedTask, aspect: float) -> None:
-    """Draw the route from above, north up.
-
-    Parameters
-    ----------
-    axes : matplotlib.axes.Axes
-    task : PicturedTask
-    aspect : float
-        Width of the axes over their height.
-    """
+    """Draw the route from above, north up."""
     way, landmark = task.way, _centre(task.landmark)
     corners = np.array([way.min(axis=0), way.max(axis=0), *_box(task.target)])[:, :2]
     with_landmark = np.vstack([corners, landmark[:2]])
@@ -70,14 +62,9 @@ def draw_map(axes: Axes, task: PicturedTask, aspect: float) -> None:
 
 
 def draw_side(axes: Axes, task: PicturedTask, aspect: float) -> None:
-    """Draw the route from the side, from start on the left to goal on the right, all that stands before it cut away.
+    """Draw the route from the side, from start on the left to goal on the right.
 
-    Parameters
-    ----------
-    axes : matplotlib.axes.Axes
-    task : PicturedTask
-    aspect : float
-        Width of the axes over their height.
+    All that stands before it cut away.
     """
     first, last = task.way[0], task.way[-1]
     along = np.array([last[0] - first[0], last[1] - first[1], 0.0])

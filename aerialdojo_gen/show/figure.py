@@ -20,17 +20,7 @@ _FRAMES_IN = 2.95
 
 
 def task_figure(task: PicturedTask) -> Figure:
-    """Draw a task.
-
-    Parameters
-    ----------
-    task : PicturedTask
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        1680 pixels wide.
-    """
+    """Draw a task, 1680 pixels wide."""
     strip = _FRAMES_IN if task.frames else 0.0
     sheet = _Sheet(_WIDTH_IN, 8.7 + strip)
     figure, top = sheet.figure, sheet.height
@@ -105,15 +95,7 @@ def _frames(sheet: _Sheet, task: PicturedTask) -> None:
 
 
 def write_png(task: PicturedTask, path: Path) -> Path:
-    """Write the picture of a task, whole or not at all.
-
-    Raises
-    ------
-    UsageError
-        The name does not end in ``.png``.
-    StoreError
-        The file cannot be written.
-    """
+    """Write the picture of a task, whole or not at all."""
     if path.suffix.lower() != ".png":
         raise UsageError(f"{path}: the picture is a PNG, call it {path.with_suffix('.png').name}")
     with atomic_file(path.parent, path.name) as temporary:

@@ -23,45 +23,16 @@ SIZE_PX = 320
 
 @dataclass(frozen=True, eq=False)
 class Frame:
-    """One picture of the way.
+    """One picture of the way."""
 
-    Attributes
-    ----------
-    step : int
-        Pose of the route.
-    action : str
-        What is done there.
-    rgb : (SIZE_PX, SIZE_PX, 3) uint8
-        Front view, sRGB.
-    recorded : bool
-        Whether it comes from a recording.
-    """
-
-    step: int
-    action: str
-    rgb: NDArray[np.uint8]
-    recorded: bool
+    step: int  # Pose of the route
+    action: str  # What is done there
+    rgb: NDArray[np.uint8]  # (SIZE_PX, SIZE_PX, 3) uint8; front view, sRGB
+    recorded: bool  # Whether it comes from a recording
 
 
 def frames_along(task: FoundTask, count: int) -> list[Frame]:
-    """Pick poses evenly along a route, start and goal among them, and see what the front camera sees there.
-
-    Parameters
-    ----------
-    task : FoundTask
-    count : int
-        How many; 0 for none.
-
-    Returns
-    -------
-    list of Frame
-        In the route's order; fewer than `count` where the route has fewer poses.
-
-    Raises
-    ------
-    RenderError, StoreError
-        A recording is damaged, or rendering failed.
-    """
+    """Front views at poses evenly along a route, start and goal among them."""
     if count == 0:
         return []
     route = task.route

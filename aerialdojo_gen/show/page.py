@@ -22,17 +22,7 @@ _STOPS_M = (0.25, 0.5, 1.0, 2.0, 5.0)
 
 
 def render_page(task: PicturedTask) -> str:
-    """Render the page of a task.
-
-    Parameters
-    ----------
-    task : PicturedTask
-
-    Returns
-    -------
-    str
-        HTML; every text from the data is escaped, every picture is a data URI.
-    """
+    """Render the page of a task."""
     template = Environment(
         loader=PackageLoader("aerialdojo_gen.show", "."),
         autoescape=True,
@@ -70,13 +60,7 @@ def _hex(rgba: tuple[float, float, float, float]) -> str:
 
 
 def write_page(task: PicturedTask, path: Path) -> Path:
-    """Write the page of a task, whole or not at all.
-
-    Raises
-    ------
-    StoreError
-        The file cannot be written.
-    """
+    """Write the page of a task, whole or not at all."""
     with atomic_file(path.parent, path.name) as temporary:
         temporary.write_text(render_page(task), encoding="utf-8")
     return path

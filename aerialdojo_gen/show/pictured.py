@@ -22,42 +22,19 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class PicturedTask:
-    """A task, ready to be drawn.
-
-    Attributes
-    ----------
-    task : FoundTask
-    instance : dict
-        The row of `tasks` that is shown.
-    target, start_object, landmark : dict
-        Rows of `objects` and `landmarks`.
-    poses : (K + 1, 4) float64
-        x, y, z and yaw of every pose.
-    way : (n, 3) float64
-        Points every half metre of the route at most, metres, world frame.
-    along_m : (n,) float64
-        Distance flown to each of them.
-    clearance_m : (n,) float64
-        FCL's distance from each to the nearest surface.
-    below_m : (n,) float64
-        Height of the surface under each, NaN where there is none.
-    reference : (H, W, 3) uint8 or None
-        The target's reference image.
-    frames : list of Frame
-    pictures : OrthographicPictures
-    """
+    """A task, ready to be drawn."""
 
     task: FoundTask
-    instance: dict[str, Any]
-    target: dict[str, Any]
+    instance: dict[str, Any]  # The row of `tasks` that is shown
+    target: dict[str, Any]  # Rows of `objects` and `landmarks`
     start_object: dict[str, Any]
     landmark: dict[str, Any]
-    poses: Floats
-    way: Floats
-    along_m: Floats
-    clearance_m: Floats
-    below_m: Floats
-    reference: NDArray[np.uint8] | None
+    poses: Floats  # (K + 1, 4) float64; x, y, z and yaw of every pose
+    way: Floats  # (n, 3) float64; points every half metre of the route at most, metres, world frame
+    along_m: Floats  # (n,) float64; distance flown to each of them
+    clearance_m: Floats  # (n,) float64; fCL's distance from each to the nearest surface
+    below_m: Floats  # (n,) float64; height of the surface under each, NaN where there is none
+    reference: NDArray[np.uint8] | None  # (H, W, 3) uint8 or None; the target's reference image
     frames: list[Frame]
     pictures: OrthographicPictures
 
@@ -133,25 +110,7 @@ class PicturedTask:
 
 
 def picture_task(task: FoundTask, modality: str = "semantic", frames: int = 5) -> PicturedTask:
-    """Gather what is drawn of a task.
-
-    Parameters
-    ----------
-    task : FoundTask
-    modality : str
-        The instance whose goal is shown, if the release has it; else the other one.
-    frames : int
-        Front views along the way; 0 for none.
-
-    Returns
-    -------
-    PicturedTask
-
-    Raises
-    ------
-    AssetError, StoreError, RenderError
-        The mesh, a table or a recording is missing or damaged.
-    """
+    """Gather what is drawn of a task."""
     scene, route = task.scene, task.route
     rows = sorted(task.instances, key=lambda row: row["modality"] != modality)
     target = scene.object(route["target_object_id"])

@@ -20,24 +20,12 @@ _PAPERS = "paper's"
 
 @dataclass(frozen=True)
 class Column:
-    """A column of figures.
+    """A column of figures."""
 
-    Attributes
-    ----------
-    name : str
-        Heading.
-    unit : str
-        Unit of the figures, empty for counts.
-    exact : bool
-        Whether the figures are to be the paper's to the last digit; the others are shown side by side.
-    digits : int
-        Of a measure, after the point.
-    """
-
-    name: str
-    unit: str = ""
+    name: str  # Heading
+    unit: str = ""  # Unit of the figures, empty for counts
     exact: bool = True
-    digits: int = 1
+    digits: int = 1  # Of a measure, after the point
 
     def show(self, figure: Figure) -> str:
         """Format a figure; a dash where there is none."""
@@ -57,25 +45,13 @@ class Row:
 
 @dataclass(frozen=True)
 class Comparison:
-    """A table with a title.
+    """A table with a title."""
 
-    Attributes
-    ----------
-    title : str
-        What it shows.
-    key : str
-        Heading of the rows' names.
-    columns : tuple of Column
-    rows : tuple of Row
-    notes : tuple of str
-        What must be known to read it.
-    """
-
-    title: str
-    key: str
+    title: str  # What it shows
+    key: str  # Heading of the rows' names
     columns: tuple[Column, ...]
     rows: tuple[Row, ...]
-    notes: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()  # What must be known to read it
 
     @property
     def unlike(self) -> int:
@@ -187,23 +163,12 @@ def own_table(
 
 @dataclass(frozen=True)
 class Listing:
-    """A table of words, as the paper prints it.
+    """A table of words, as the paper prints it."""
 
-    Attributes
-    ----------
-    title : str
-        What it shows.
-    heads : tuple of str
-        Headings; the first column names the rows.
-    rows : tuple of tuple of str
-    notes : tuple of str
-        What must be known to read it.
-    """
-
-    title: str
-    heads: tuple[str, ...]
+    title: str  # What it shows
+    heads: tuple[str, ...]  # Headings; the first column names the rows
     rows: tuple[tuple[str, ...], ...]
-    notes: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()  # What must be known to read it
 
     def terminal(self, width: int | None = None) -> list[str]:
         """Lines for a terminal of so many columns."""

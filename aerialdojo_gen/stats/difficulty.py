@@ -25,23 +25,14 @@ _NAMES = dict(zip(SETTINGS, ("base", "standard", "long-horizon"), strict=True))
 
 @dataclass(frozen=True)
 class Tasks:
-    """One entry a navigation task; what the release does not say is NaN.
+    """One entry a navigation task; what the release does not say is NaN."""
 
-    Attributes
-    ----------
-    scene, setting, partition, subset, target_split : (n,) arrays of str
-        `target_split` is empty where the release does not say.
-    plan_detour, target_visible_at_start, climb_m : (n,) float64
-    straight_line_free, target_seen_in_train, start_seen_in_train, target_held_out, start_held_out : (n,) float64
-        1 or 0.
-    """
-
-    scene: NDArray[np.str_]
+    scene: NDArray[np.str_]  # (n,) arrays of str; `target_split` is empty where the release does not say
     setting: NDArray[np.str_]
     partition: NDArray[np.str_]
     subset: NDArray[np.str_]
-    plan_detour: Floats
-    straight_line_free: Floats
+    plan_detour: Floats  # (n,) float64
+    straight_line_free: Floats  # (n,) float64; 1 or 0
     target_visible_at_start: Floats
     climb_m: Floats
     target_seen_in_train: Floats
@@ -65,13 +56,7 @@ class Tasks:
 
 
 def read_tasks(data: Where, scenes: Sequence[str]) -> Tasks:
-    """Read how hard the tasks of a release's scenes are.
-
-    Raises
-    ------
-    StoreError
-        A part is missing or damaged.
-    """
+    """Read how hard the tasks of a release's scenes are."""
     root = open_root(data)
     found: dict[str, list[Any]] = {name: [] for name in Tasks.__dataclass_fields__}
     for scene in scenes:

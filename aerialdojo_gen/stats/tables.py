@@ -20,35 +20,17 @@ _KM = Column("km", "km", exact=False)
 
 @dataclass(frozen=True)
 class Made:
-    """What the release holds of a scene.
+    """What the release holds of a scene."""
 
-    Attributes
-    ----------
-    scene : str
-        Name.
-    family, scene_type : str
-        Of the scene.
-    landmarks, objects, anchors : int
-        How many; of the anchors those that end a search.
-    categories : frozenset of str
-        Of the objects.
-    tasks : dict of (str, str) to int
-        Navigation tasks by subset (train, test) and setting.
-    path_m : float
-        Summed length of their routes, metres.
-    paper : PaperScene or None
-        The paper's row.
-    """
-
-    scene: str
-    family: str
+    scene: str  # Name
+    family: str  # Of the scene
     scene_type: str
-    landmarks: int
+    landmarks: int  # How many; of the anchors those that end a search
     objects: int
-    categories: frozenset[str]
-    tasks: dict[tuple[str, str], int]
-    path_m: float
-    paper: PaperScene | None
+    categories: frozenset[str]  # Of the objects
+    tasks: dict[tuple[str, str], int]  # Navigation tasks by subset (train, test) and setting
+    path_m: float  # Summed length of their routes, metres
+    paper: PaperScene | None  # The paper's row
     anchors: int = 0
 
     def of(self, setting: str, subset: str | None = None) -> int:
@@ -62,13 +44,7 @@ class Made:
 
 
 def made_of(data: Where, scene: str) -> Made:
-    """Read what the release holds of a scene.
-
-    Raises
-    ------
-    StoreError
-        A part of the scene is missing or damaged.
-    """
+    """Read what the release holds of a scene."""
     root = open_root(data)
     tasks: Counter[tuple[str, str]] = Counter()
     path = 0.0

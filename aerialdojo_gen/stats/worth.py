@@ -26,59 +26,30 @@ _NAMES = dict(zip(SETTINGS, ("base", "standard", "long-horizon"), strict=True))
 
 @dataclass(frozen=True)
 class Goals:
-    """One entry an object; what the release does not say is NaN.
+    """One entry an object; what the release does not say is NaN."""
 
-    Attributes
-    ----------
-    family : (n,) array of str
-        Of its scene.
-    off_front_rad : (n,) float64
-        Of the selected anchor; NaN for an object without a front.
-    tells_shown : (n,) float64
-        Share of its telling parts that the reference picture shows; NaN where the whole body tells what it is.
-    unoccluded, framed : (n,) float64
-        Shares of the object that nothing hides in the picture, and that lie within its edges.
-    step_back_m : (n,) float64
-        From the anchor to where the picture is taken.
-    """
-
-    family: NDArray[np.str_]
-    off_front_rad: Floats
-    tells_shown: Floats
-    unoccluded: Floats
+    family: NDArray[np.str_]  # (n,) array of str; of its scene
+    off_front_rad: Floats  # (n,) float64; of the selected anchor; NaN for an object without a front
+    tells_shown: Floats  # (n,) float64
+    unoccluded: Floats  # Shares of the object that nothing hides in the picture, and that lie within its edges
     framed: Floats
-    step_back_m: Floats
+    step_back_m: Floats  # (n,) float64; from the anchor to where the picture is taken
 
 
 @dataclass(frozen=True)
 class Flights:
-    """One entry a reference route.
+    """One entry a reference route."""
 
-    Attributes
-    ----------
-    setting : (n,) array of str
-    min_clearance_m : (n,) float64
-    n_actions, n_turns : (n,) int64
-    ahead_m, sideways_m : (n,) float64
-        Flown before the last 3 m.
-    """
-
-    setting: NDArray[np.str_]
-    min_clearance_m: Floats
-    n_actions: NDArray[np.int64]
+    setting: NDArray[np.str_]  # (n,) array of str
+    min_clearance_m: Floats  # (n,) float64
+    n_actions: NDArray[np.int64]  # (n,) int64
     n_turns: NDArray[np.int64]
-    ahead_m: Floats
+    ahead_m: Floats  # (n,) float64; flown before the last 3 m
     sideways_m: Floats
 
 
 def read_goals(data: Where, scenes: Sequence[str]) -> Goals:
-    """Read what the goals of a release's scenes show.
-
-    Raises
-    ------
-    StoreError
-        A part is missing or damaged.
-    """
+    """Read what the goals of a release's scenes show."""
     root = open_root(data)
     found: dict[str, list[Any]] = {name: [] for name in Goals.__dataclass_fields__}
     for scene in scenes:
@@ -103,13 +74,7 @@ def read_goals(data: Where, scenes: Sequence[str]) -> Goals:
 
 
 def read_flights(data: Where, scenes: Sequence[str]) -> Flights:
-    """Read how the reference routes of a release's scenes fly.
-
-    Raises
-    ------
-    StoreError
-        A part is missing or damaged.
-    """
+    """Read how the reference routes of a release's scenes fly."""
     root = open_root(data)
     parts: list[Flights] = []
     for scene in scenes:
@@ -216,11 +181,5 @@ def flight_table(flights: Flights) -> Comparison:
 
 
 def worth_tables(data: Where, scenes: Sequence[str]) -> list[Comparison]:
-    """Make both tables.
-
-    Raises
-    ------
-    StoreError
-        A part is missing or damaged.
-    """
+    """Make both tables."""
     return [goal_table(read_goals(data, scenes)), flight_table(read_flights(data, scenes))]

@@ -23,25 +23,7 @@ _FEW_FILES = 32
 
 @contextlib.contextmanager
 def atomic_file(data: Path, relative: str) -> Iterator[Path]:
-    """Write a file under a folder: whole or not at all.
-
-    Parameters
-    ----------
-    data : Path
-        The data directory, or any folder; it gets the staging folder as long as something is written.
-    relative : str
-        Path below it; StoreError if it leads out of it.
-
-    Yields
-    ------
-    Path
-        A temporary path on the same disk, with the same suffix; renamed at the end, removed on an error.
-
-    Raises
-    ------
-    StoreError
-        The disk is full, read-only or not ours to write.
-    """
+    """Write a file under a folder: whole or not at all."""
     path = data / relative
     try:
         inside = path.resolve().is_relative_to(data.resolve())
@@ -62,25 +44,7 @@ def atomic_file(data: Path, relative: str) -> Iterator[Path]:
 
 @contextlib.contextmanager
 def atomic_folder(path: Path, root: Path | None = None) -> Iterator[Path]:
-    """Fill a folder: whole or not at all; one that is there stays until the new one is whole.
-
-    Parameters
-    ----------
-    path : Path
-        The folder.
-    root : Path, optional
-        A folder above it, which gets the staging folder; the parent where absent.
-
-    Yields
-    ------
-    Path
-        An empty temporary folder on the same disk; renamed at the end, removed on an error.
-
-    Raises
-    ------
-    StoreError
-        The disk is full, read-only or not ours to write.
-    """
+    """Fill a folder: whole or not at all; one that is there stays until the new one is whole."""
     try:
         _make_folders(path.parent)
         with staged(_staging_root(root or path.parent, path), path) as item:

@@ -48,22 +48,7 @@ class Content:
 
 
 class Bucket:
-    """A bucket of an S3 store.
-
-    Parameters
-    ----------
-    name : str
-        The bucket's.
-
-    Raises
-    ------
-    MissingPackage
-        The extra ``cloud`` is not installed.
-    StoreError
-        The AWS configuration is wrong. All methods raise it where the store
-        refuses or does not answer, FileNotFoundError where there is no object of that key, and `Changed` where a
-        condition does not hold.
-    """
+    """A bucket of an S3 store."""
 
     def __init__(self, name: str) -> None:
         self.name = name

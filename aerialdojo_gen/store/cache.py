@@ -28,13 +28,7 @@ _MEASURED_SHARE = 0.02
 
 
 class Cache:
-    """A folder of copies.
-
-    Parameters
-    ----------
-    folder : Path, optional
-        ``$AERIALDOJO_CACHE`` where absent.
-    """
+    """A folder of copies."""
 
     def __init__(self, folder: Path | None = None) -> None:
         self.folder = folder or cache_folder()

@@ -48,21 +48,7 @@ def _names(error: BaseException) -> set[str]:
 
 
 def cloud_error(error: Exception, url: str, endpoint: str | None) -> Exception | None:
-    """Return what to raise for an error of the client; None where it is a defect of ours.
-
-    Parameters
-    ----------
-    error : Exception
-        Of botocore.
-    url : str
-        What was asked for.
-    endpoint : str or None
-        The store's address.
-
-    Returns
-    -------
-    StoreError, FileNotFoundError, Changed or None
-    """
+    """Return what to raise for an error of the client; None where it is a defect of ours."""
     code, names = code_of(error), _names(error)
     bucket = url.removeprefix("s3://").partition("/")[0]
     if code in _MISSING:

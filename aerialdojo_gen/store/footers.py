@@ -24,47 +24,23 @@ _HALF_DIGEST = re.compile(r"[0-9a-f]{32}")
 
 @dataclass(frozen=True)
 class ShardFile:
-    """A file that was written with a shard.
+    """A file that was written with a shard."""
 
-    Attributes
-    ----------
-    size : int
-        Bytes.
-    sha256 : str
-        Hexadecimal; empty where the shard's rows have it.
-    """
-
-    size: int
-    sha256: str = ""
+    size: int  # Bytes
+    sha256: str = ""  # Hexadecimal; empty where the shard's rows have it
 
 
 @dataclass(frozen=True)
 class ShardInfo:
-    """What a shard's footer says.
+    """What a shard's footer says."""
 
-    Attributes
-    ----------
-    fingerprint : str
-        Of the code, configuration, inputs and assets that it was made from.
-    content : str
-        SHA-256 of the rows.
-    columns : dict of str to str
-        `aerialdojo_gen.store.tables.column_digests`; empty where an earlier version wrote it.
-    rows, parts : int
-        Rows in the shard; shards of the scene.
-    summary : dict
-        The stage's ``rows_in``, ``rows_out`` and ``counts`` of the shard.
-    files : dict of str to ShardFile
-        Files that were written with it, by their path relative to the data directory.
-    """
-
-    fingerprint: str
-    content: str
-    columns: dict[str, str]
-    rows: int
+    fingerprint: str  # Of the code, configuration, inputs and assets that it was made from
+    content: str  # SHA-256 of the rows
+    columns: dict[str, str]  # `aerialdojo_gen.store.tables.column_digests`; empty where an earlier version wrote it
+    rows: int  # Rows in the shard; shards of the scene
     parts: int
-    summary: dict[str, Any]
-    files: dict[str, ShardFile]
+    summary: dict[str, Any]  # The stage's ``rows_in``, ``rows_out`` and ``counts`` of the shard
+    files: dict[str, ShardFile]  # Files that were written with it, by their path relative to the data directory
 
 
 def encode(info: ShardInfo) -> bytes:
@@ -82,13 +58,7 @@ def encode(info: ShardInfo) -> bytes:
 
 
 def decode(raw: bytes) -> ShardInfo:
-    """Read what `encode` wrote, or an earlier version, whose footers have no checksums.
-
-    Raises
-    ------
-    ValueError
-        It is damaged, or somebody else's.
-    """
+    """Read what `encode` wrote, or an earlier version, whose footers have no checksums."""
     try:
         facts = loads_json(raw)
     except Malformed:

@@ -8,15 +8,7 @@ from fnmatch import translate
 
 
 def matching(names: Iterable[str], pattern: str) -> set[str]:
-    """Return the names, and the folders that they lie in, that match a glob as `Path.glob` does.
-
-    Parameters
-    ----------
-    names : iterable of str
-        Of files, with forward slashes.
-    pattern : str
-        ``*`` and ``?`` match within a part of a name, ``**`` any number of folders.
-    """
+    """Return the names, and the folders that they lie in, that match a glob as `Path.glob` does."""
     words = [re.compile(translate(part)) if part != "**" else None for part in pattern.split("/")]
     every = {"/".join(parts[:n]) for name in names for parts in [name.split("/")] for n in range(1, len(parts) + 1)}
     return {name for name in every if _matches(name.split("/"), words)}

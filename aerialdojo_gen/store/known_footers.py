@@ -29,13 +29,7 @@ _TOLD_APART_NS = 2 * 10**9
 
 
 class KnownFooters:
-    """The footers of a data directory, in a file; one that is damaged, or cannot be written, is none.
-
-    Parameters
-    ----------
-    root : LocalRoot
-        Where the shards lie.
-    """
+    """The footers of a data directory, in a file; one that is damaged, or cannot be written, is none."""
 
     def __init__(self, root: LocalRoot) -> None:
         self._root = root
@@ -61,17 +55,7 @@ class KnownFooters:
         return ShardInfo(**facts | {"files": {file: ShardFile(**told) for file, told in facts["files"].items()}})
 
     def note(self, root: DataRoot, name: str, version: str, asked_ns: int, info: ShardInfo) -> None:
-        """Keep what the footer of a shard says.
-
-        Parameters
-        ----------
-        root, name, version : DataRoot, str, str
-            The shard, and what version it had before it was read.
-        asked_ns : int
-            When that was, nanoseconds since the epoch.
-        info : ShardInfo
-            What its footer says.
-        """
+        """Keep what the footer of a shard says; `asked_ns` is when its version was read."""
         if root == self._root and asked_ns - changed_ns(version) > _TOLD_APART_NS:
             self._asked.add(name)
             self._entries[name] = {"version": version, "facts": asdict(info)}

@@ -55,20 +55,7 @@ def lease_s() -> float:
 
 
 class Lease:
-    """A lock that is held, and renewed by a thread until `release`.
-
-    Parameters
-    ----------
-    bucket, key : Bucket, str
-        Where the object lies.
-    url : str
-        The data root, for messages.
-
-    Raises
-    ------
-    StoreError
-        Somebody else holds it.
-    """
+    """A lock that is held, and renewed by a thread until `release`."""
 
     def __init__(self, bucket: Bucket, key: str, url: str) -> None:
         self._bucket, self._key, self._url = bucket, key, url

@@ -21,13 +21,7 @@ Files = dict[str, tuple[str, Entry]]
 
 
 class Folders:
-    """Folders of a bucket.
-
-    Parameters
-    ----------
-    state : State
-        Of the bucket.
-    """
+    """Folders of a bucket."""
 
     def __init__(self, state: State) -> None:
         self._state, self._bucket = state, state.bucket
@@ -63,22 +57,7 @@ class Folders:
         self._remove([f"{key}/{MANIFEST}"])
 
     def find(self, key: str, found: dict[str, Entry], first: str = "") -> Files:
-        """Find a file, or all files of a folder, as the manifests say.
-
-        Parameters
-        ----------
-        key : str
-            The file's or the folder's.
-        found : dict
-            A listing that has it, and the manifests of the folders that it lies in.
-        first : str
-            The outermost folder above it that may have a manifest which was put after the listing was made.
-
-        Returns
-        -------
-        dict
-            Keys and entries, by the names in the folder; a file's name is ``""``. Empty where there is none.
-        """
+        """Find a file, or all files of a folder, as the manifests say."""
         if first and f"{first}/{MANIFEST}" not in found:
             # What a listing has of a folder that is being written was put after the folder's manifest.
             found = found | self._bucket.list(f"{first}/{MANIFEST}")

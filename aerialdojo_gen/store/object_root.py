@@ -45,15 +45,7 @@ _TRIES = 5
 
 
 class ObjectRoot(DataRoot):
-    """A prefix of a bucket.
-
-    Parameters
-    ----------
-    bucket : str
-        The bucket's name.
-    prefix : str
-        Without slashes at its ends; empty for the whole bucket.
-    """
+    """A prefix of a bucket."""
 
     def __init__(self, bucket: str, prefix: str = "") -> None:
         self._name, self._prefix = bucket, prefix
@@ -267,13 +259,7 @@ class ObjectRoot(DataRoot):
         return self._key("".join(f"{part}/" for part in parts[:depth]))
 
     def _files(self, relative: str) -> dict[str, tuple[str, Entry]]:
-        """Find a file (under the name ``""``), or all files of a folder: keys and entries, by their names in it.
-
-        Raises
-        ------
-        FileNotFoundError
-            There is none of that name.
-        """
+        """Find a file (under the name ``""``), or all files of a folder: keys and entries, by their names in it."""
         relative = inside(relative).strip("/")
         key, state = self._key(relative), self._state
         if "/" not in relative:

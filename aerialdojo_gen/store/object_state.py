@@ -26,27 +26,13 @@ class _Listing:
 
 @dataclass
 class State:
-    """Shared by all roots of a bucket in this process.
+    """Shared by all roots of a bucket in this process."""
 
-    Attributes
-    ----------
-    bucket, cache : Bucket, Cache
-        The client; the copies on this machine.
-    digests : dict
-        SHA-256 by key and tag.
-    manifests : dict
-        What a folder's manifest says, by its key and tag.
-    leases : dict
-        Locks that this process holds, by the root's URL.
-    looked : dict
-        When a lock that another process holds for us was last found held, by its token.
-    """
-
-    bucket: Bucket
+    bucket: Bucket  # The client; the copies on this machine
     cache: Cache
-    digests: dict[tuple[str, str], str] = field(default_factory=dict)
+    digests: dict[tuple[str, str], str] = field(default_factory=dict)  # SHA-256 by key and tag
     manifests: dict[tuple[str, str], Any] = field(default_factory=dict)
-    leases: dict[str, Any] = field(default_factory=dict)
+    leases: dict[str, Any] = field(default_factory=dict)  # Locks that this process holds, by the root's URL
     looked: dict[str, float] = field(default_factory=dict)
     _listings: dict[str, _Listing] = field(default_factory=dict)
     _epoch: int = 0

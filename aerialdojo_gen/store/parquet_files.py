@@ -25,29 +25,7 @@ _DAMAGE = (pa.ArrowException, OSError, ValueError, OverflowError, MemoryError)
 
 
 def read_file(path: Path, columns: Sequence[str] | None = None, called: str = "") -> pa.Table:
-    """Read one Parquet file as it is, its page checksums verified.
-
-    Parameters
-    ----------
-    path : Path
-        The file; whatever folders are named, no column is made of them.
-    columns : sequence of str, optional
-        Read these columns alone.
-    called : str, optional
-        What messages call the file; its path where absent.
-
-    Returns
-    -------
-    pyarrow.Table
-        With the schema and the metadata that the file has.
-
-    Raises
-    ------
-    DamagedFile
-        It is no Parquet file, or its checksums are wrong.
-    StoreError
-        It cannot be read (permission denied, say).
-    """
+    """Read one Parquet file as it is, its page checksums verified."""
     wanted = None if columns is None else [*columns]
     try:
         # In this thread: where memory is short Arrow's pool gets no thread, and waits for one for ever. The processes
@@ -64,22 +42,7 @@ def read_file(path: Path, columns: Sequence[str] | None = None, called: str = ""
 
 
 def read_footer(file: Path | BinaryIO, called: str = "") -> tuple[int, dict[bytes, bytes]]:
-    """Return how many rows a Parquet file says it has, and its metadata.
-
-    Parameters
-    ----------
-    file : Path or binary file
-        It is read from its end, no more than the footer.
-    called : str, optional
-        What messages call the file; its path where absent.
-
-    Raises
-    ------
-    DamagedFile
-        It is no Parquet file (truncated, say).
-    StoreError
-        It cannot be read (permission denied, say).
-    """
+    """Return how many rows a Parquet file says it has, and its metadata."""
     try:
         footer = pq.read_metadata(file)
     except _DAMAGE as error:
@@ -97,29 +60,13 @@ def _unreadable(error: BaseException, where: object) -> StoreError:
 
 
 def write_file(path: Path, table: pa.Table) -> None:
-    """Write a table that is no shard (a report, say) as one Parquet file, whole or not at all.
-
-    Raises
-    ------
-    StoreError
-        The disk is full, read-only or not ours to write.
-    """
+    """Write a table that is no shard (a report, say) as one Parquet file, whole or not at all."""
     with atomic_file(path.parent, path.name) as temporary:
         pq.write_table(table, temporary, compression="zstd")
 
 
 def write_clustered(spec: TableSpec, table: pa.Table, path: Path) -> None:
-    """Write a Parquet file with the encodings of docs/release-format.md, a row group a cluster.
-
-    Parameters
-    ----------
-    spec : TableSpec
-        Says which columns have no dictionary, and which ones' changes begin a cluster.
-    table : pyarrow.Table
-        Of that schema; its metadata goes into the file.
-    path : Path
-        Written in place: give a temporary name.
-    """
+    """Write a Parquet file with the encodings of docs/release-format.md, a row group a cluster."""
     plain = [field for field in spec.schema if field.name in spec.plain]
     leaves = {f.name: f"{f.name}.list.element" if pa.types.is_list(f.type) else f.name for f in spec.schema}
     # A picture is compressed already; all else gains.

@@ -17,22 +17,7 @@ _TEXT = "text"
 
 
 def key_of(root: DataRoot, files: Iterable[str], *asked: object) -> str:
-    """Tell what is asked of which files by which code from everything else.
-
-    Parameters
-    ----------
-    root : DataRoot
-        Where the files lie.
-    files : iterable of str
-        Their names, relative to the root; one that is not there counts as that.
-    *asked : object
-        What is asked of them; its ``repr`` counts.
-
-    Returns
-    -------
-    str
-        Hexadecimal; another where any file, the package's sources or what is asked is another.
-    """
+    """Tell what is asked of which files by which code from everything else."""
     digest = hashlib.sha256(f"{_sources()}\n{root}\n{asked!r}".encode())
     for name in sorted(files):
         try:

@@ -68,18 +68,7 @@ def write_shard(
     files: Mapping[str, ShardFile] | None = None,
     run: str = "default",
 ) -> Path:
-    """Check a table, write it as a shard, and give it its name when it is whole.
-
-    Returns
-    -------
-    Path
-        The shard, or a copy of it on this machine.
-
-    Raises
-    ------
-    StoreError
-        The table does not fit its schema, or the disk is full or read-only; nothing is left behind.
-    """
+    """Check a table, write it as a shard, and give it its name when it is whole."""
     # Here alone, as in the other functions: half of what importing Arrow takes is what works on rows.
     from aerialdojo_gen.store.parquet_files import write_clustered
     from aerialdojo_gen.store.tables import check_table, column_digests, content_digest
@@ -104,22 +93,7 @@ def write_shard(
 
 
 def read_info(data: Where, name: str = "") -> ShardInfo:
-    """Read a shard's footer.
-
-    Parameters
-    ----------
-    data : DataRoot, Path or str
-        The data root, or, without a name, the shard's own path.
-    name : str
-        The shard's name, relative to the data root.
-
-    Raises
-    ------
-    DamagedFile
-        The shard is damaged (truncated, say, or something else wrote it), or has other rows than were written.
-    StoreError
-        It is missing or cannot be read.
-    """
+    """Read a shard's footer."""
     if not name:
         path = Path(str(data))
         data, name = LocalRoot(path.absolute().parent), path.name
@@ -196,32 +170,7 @@ def _parts(data: Where, table: str, scene: str, run: str = "default") -> dict[st
 def read_scene(
     data: Where, table: str, scene: str, columns: Sequence[str] | None = None, run: str = "default"
 ) -> pa.Table:
-    """Read all of a scene's rows of a table.
-
-    Parameters
-    ----------
-    data : DataRoot, Path or str
-        The data root.
-    table : str
-        A key of `LAYOUT`.
-    scene : str
-        Name of the scene.
-    columns : sequence of str, optional
-        Read these columns alone.
-    run : str
-        Name of the run, for tables of the benchmark.
-
-    Returns
-    -------
-    pyarrow.Table
-        With the table's schema, parts in their order. A column that may be null and that an older version did not
-        write is null.
-
-    Raises
-    ------
-    StoreError
-        A shard is missing, damaged or of another schema; the message names it and what to run.
-    """
+    """Read all of a scene's rows of a table."""
     from aerialdojo_gen.store.parquet_files import read_file
     from aerialdojo_gen.store.tables import column_digests
 
@@ -264,29 +213,7 @@ def _with_nulls(shard: pa.Table, wanted: pa.Schema) -> list[pa.ChunkedArray | pa
 
 
 def read_stored(data: Where, table: str, scene: str, columns: Sequence[str]) -> pa.Table:
-    """Read those of some columns that a scene's shards have, whatever version wrote them.
-
-    Parameters
-    ----------
-    data : DataRoot, Path or str
-        The data root.
-    table : str
-        A key of `LAYOUT`.
-    scene : str
-        Name of the scene.
-    columns : sequence of str
-        Columns of this version or of another one.
-
-    Returns
-    -------
-    pyarrow.Table
-        With fewer columns than were asked for where a shard lacks some, parts in their order.
-
-    Raises
-    ------
-    StoreError
-        A shard is missing or damaged.
-    """
+    """Read those of some columns that a scene's shards have, whatever version wrote them."""
     from aerialdojo_gen.store.parquet_files import read_file
     from aerialdojo_gen.store.tables import column_digests
 

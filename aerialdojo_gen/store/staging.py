@@ -30,25 +30,7 @@ NO_LOCKS = (errno.ENOLCK, errno.EOPNOTSUPP, errno.ENOTSUP, errno.ENOSYS, errno.E
 
 @contextlib.contextmanager
 def staged(root: Path, target: Path) -> Iterator[Path]:
-    """Hold an item of a staging folder; what dead writers left there is removed first.
-
-    Parameters
-    ----------
-    root : Path
-        The folder that has the staging folder; made where it is missing.
-    target : Path
-        What the item is to become, below `root`.
-
-    Yields
-    ------
-    Path
-        The item: an empty folder but for its lease. It is removed with all that is in it at the end.
-
-    Raises
-    ------
-    OSError
-        The folder cannot be written.
-    """
+    """Hold an item of a staging folder; what dead writers left there is removed first."""
     sweep(root)
     item, lease = _claim(root / AREA)
     try:
@@ -216,13 +198,7 @@ def exchange(one: Path, other: Path) -> bool:
 
 @contextlib.contextmanager
 def scratch_folder() -> Iterator[Path]:
-    """Hold an empty folder in the system's folder for temporary files; what killed runs left there is removed.
-
-    Raises
-    ------
-    OSError
-        There is no such folder that can be written.
-    """
+    """Hold an empty folder in the system's folder for temporary files; what killed runs left there is removed."""
     root = Path(tempfile.gettempdir()) / f"aerialdojo-gen-{os.getuid()}"
     root.mkdir(mode=0o700, exist_ok=True)
     if root.is_symlink() or root.stat().st_uid != os.getuid():

@@ -14,25 +14,7 @@ from aerialdojo_gen.store.schemas import TableSpec
 
 
 def from_rows(spec: TableSpec, rows: Sequence[Mapping[str, Any]]) -> pa.Table:
-    """Make a table of rows whose keys are exactly the schema's columns.
-
-    Parameters
-    ----------
-    spec : TableSpec
-        The table.
-    rows : sequence of mapping
-        One mapping a row, column name to value; sorted here into the table's order.
-
-    Returns
-    -------
-    pyarrow.Table
-
-    Raises
-    ------
-    StoreError
-        A row lacks a column or has one that the schema does not know (pyarrow would fill or drop it silently), or a
-        value that its column cannot hold.
-    """
+    """Make a table of rows whose keys are exactly the schema's columns."""
     names = set(spec.schema.names)
     for row in rows:
         if not isinstance(row, Mapping):
@@ -48,13 +30,7 @@ def from_rows(spec: TableSpec, rows: Sequence[Mapping[str, Any]]) -> pa.Table:
 
 
 def check_table(spec: TableSpec, table: pa.Table) -> pa.Table:
-    """Check a table against its schema and attach the schema's metadata.
-
-    Raises
-    ------
-    StoreError
-        Names, types, a null in a column without nulls, rows out of the table's order, or a key that stands twice.
-    """
+    """Check a table against its schema and attach the schema's metadata."""
     if (table.schema.names, table.schema.types) != (spec.schema.names, spec.schema.types):
         raise StoreError(f"{spec.name}: columns {table.schema.names} are not those of its schema, or types differ")
     # Not a cast: that fails with an error of its own on nulls, before they can be counted and named.

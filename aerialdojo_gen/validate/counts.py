@@ -22,30 +22,14 @@ _PATH_SHARE = 0.005
 
 @dataclass(frozen=True)
 class Tally:
-    """What a scene of the release holds, for the counts of the whole.
+    """What a scene of the release holds, for the counts of the whole."""
 
-    Attributes
-    ----------
-    scene : str
-        Name.
-    routes : Counter of (str, str)
-        Navigation tasks by folder (``"id_train"``) and setting.
-    tasks : Counter of str
-        Instances by folder.
-    path_m : float
-        Summed length of the routes, metres.
-    images : tuple of str
-        Ids of the reference images.
-    complete : bool
-        Whether all of its tables could be read.
-    """
-
-    scene: str
-    routes: Counter[tuple[str, str]] = field(default_factory=Counter)
-    tasks: Counter[str] = field(default_factory=Counter)
-    path_m: float = 0.0
-    images: tuple[str, ...] = ()
-    complete: bool = False
+    scene: str  # Name
+    routes: Counter[tuple[str, str]] = field(default_factory=Counter)  # Counter of (str, str)
+    tasks: Counter[str] = field(default_factory=Counter)  # Instances by folder
+    path_m: float = 0.0  # Summed length of the routes, metres
+    images: tuple[str, ...] = ()  # Ids of the reference images
+    complete: bool = False  # Whether all of its tables could be read
 
 
 def tally_of(data: SceneData, complete: bool) -> Tally:
@@ -94,19 +78,7 @@ def scene_counts(data: SceneData, tally: Tally) -> Outcome:
 
 
 def whole_counts(release: Release, tallies: Sequence[Tally], pipeline: Pipeline, every_scene: bool) -> list[Outcome]:
-    """Check what only all scenes together can tell.
-
-    Parameters
-    ----------
-    release : Release
-        Where the release lies.
-    tallies : sequence of Tally
-        One a scene.
-    pipeline : Pipeline
-        Says whether the paper's counts are wanted.
-    every_scene : bool
-        Whether all scenes of the release were looked at.
-    """
+    """Check what only all scenes together can tell."""
     outcomes = [Outcome(name, "counts") for name in WHOLE_CHECKS]
     for outcome, judge in zip(outcomes, (_splits, _path, _card, _images), strict=True):
         partial = "" if every_scene else "only some scenes were asked for"

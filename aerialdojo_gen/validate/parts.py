@@ -45,18 +45,10 @@ def release_tables() -> dict[str, list[str]]:
 
 @dataclass(frozen=True)
 class Release:
-    """Where a release lies.
+    """Where a release lies."""
 
-    Attributes
-    ----------
-    root : DataRoot
-        What holds it: meshes are named relative to this.
-    folder : str
-        The release's folder there; empty where it is the root itself.
-    """
-
-    root: DataRoot
-    folder: str = FOLDER
+    root: DataRoot  # What holds it: meshes are named relative to this
+    folder: str = FOLDER  # The release's folder there; empty where it is the root itself
 
     def name(self, relative: str) -> str:
         """Return the name of a file of the release, relative to the root."""
@@ -114,15 +106,7 @@ def _is_empty_folder(root: DataRoot, name: str) -> bool:
 
 
 def read_tables(release: Release, scene: str) -> tuple[dict[str, Rows], list[Outcome]]:
-    """Read a scene's tables, as far as they can be read.
-
-    Returns
-    -------
-    tables : dict of str to Rows
-        By name; a table with a part that is missing, damaged or of another schema is left out.
-    outcomes : list of Outcome
-        One each of `PART_CHECKS`.
-    """
+    """Read a scene's tables, as far as they can be read."""
     found = {name: Outcome(name, "files") for name in PART_CHECKS}
     runs: dict[str, str] = {}
     tables = {}

@@ -17,30 +17,14 @@ ALWAYS_AFTER = ("null_value", "not_finite", "unknown_word", "wrong_part")
 
 
 class Fault(NamedTuple):
-    """One row, part or table at fault.
+    """One row, part or table at fault."""
 
-    Attributes
-    ----------
-    check : str
-        Stable name of the check.
-    scene : str
-        Name of the scene, empty for the release as a whole.
-    table : str
-        Name of the table, empty for what is no table.
-    part : str
-        File, relative to the release.
-    key : str
-        Which row, e.g. ``"nav_id=U_Mall_0-3f0c51d2a9be"``; empty for a whole part.
-    found, expected : str
-        What stands there and what should.
-    """
-
-    check: str
-    scene: str
-    table: str
-    part: str
-    key: str
-    found: str
+    check: str  # Stable name of the check
+    scene: str  # Name of the scene, empty for the release as a whole
+    table: str  # Name of the table, empty for what is no table
+    part: str  # File, relative to the release
+    key: str  # Which row, e.g. ``"nav_id=U_Mall_0-3f0c51d2a9be"``; empty for a whole part
+    found: str  # What stands there and what should
     expected: str
 
 
@@ -58,59 +42,27 @@ Function = Callable[[SceneData, Rows], Iterable[Finding]]
 
 @dataclass(frozen=True)
 class Check:
-    """A check of one table's rows.
+    """A check of one table's rows."""
 
-    Attributes
-    ----------
-    name : str
-        Stable name; reports and tests go by it.
-    table : str
-        The table whose rows it judges; ``"*"`` for each of them.
-    needs : tuple of str
-        Other tables that it reads; ``"mesh"`` is the scene's mesh.
-    after : tuple of str
-        Checks of the same table: rows at fault by them are not judged again.
-    about : str
-        What must be so.
-    run : callable
-        Yields the rows at fault.
-    samples : bool
-        It judges those routes alone that ``--sample`` draws, or those objects that ``--pictures`` does.
-    """
-
-    name: str
-    table: str
-    needs: tuple[str, ...]
-    after: tuple[str, ...]
-    about: str
-    run: Function
+    name: str  # Stable name; reports and tests go by it
+    table: str  # The table whose rows it judges; ``"*"`` for each of them
+    needs: tuple[str, ...]  # Other tables that it reads; ``"mesh"`` is the scene's mesh
+    after: tuple[str, ...]  # Checks of the same table: rows at fault by them are not judged again
+    about: str  # What must be so
+    run: Function  # Yields the rows at fault
     samples: bool = False
 
 
 @dataclass
 class Outcome:
-    """What a check did on a scene, or on the whole release.
+    """What a check did on a scene, or on the whole release."""
 
-    Attributes
-    ----------
-    check, table : str
-        Name of the check and of the table.
-    rows : int
-        Rows that were judged.
-    faults : list of Fault
-        The rows at fault.
-    skipped : str
-        Why nothing was judged; empty where it was.
-    warnings : list of Fault
-        Rows that are worth knowing of and at no fault.
-    """
-
-    check: str
+    check: str  # Name of the check and of the table
     table: str
-    rows: int = 0
-    faults: list[Fault] = field(default_factory=list)
-    skipped: str = ""
-    warnings: list[Fault] = field(default_factory=list)
+    rows: int = 0  # Rows that were judged
+    faults: list[Fault] = field(default_factory=list)  # The rows at fault
+    skipped: str = ""  # Why nothing was judged; empty where it was
+    warnings: list[Fault] = field(default_factory=list)  # Rows that are worth knowing of and at no fault
 
 
 CHECKS: list[Check] = []
@@ -134,13 +86,7 @@ class UncheckedError(Exception):
 
 
 def run_checks(data: SceneData, checks: Iterable[Check]) -> Iterator[Outcome]:
-    """Run checks over a scene in their order.
-
-    Yields
-    ------
-    Outcome
-        One a check and table.
-    """
+    """Run checks over a scene in their order."""
     for one in checks:
         for table in TABLES if one.table == "*" else (one.table,):
             yield _run(data, one, table)

@@ -34,18 +34,10 @@ class CheckTotal:
 
 @dataclass(frozen=True)
 class Report:
-    """What became of every check.
+    """What became of every check."""
 
-    Attributes
-    ----------
-    scenes : tuple of str
-        Scenes that were looked at.
-    outcomes : tuple of Outcome
-        One a check, table and scene, in the order of the checks.
-    """
-
-    scenes: tuple[str, ...]
-    outcomes: tuple[Outcome, ...]
+    scenes: tuple[str, ...]  # Scenes that were looked at
+    outcomes: tuple[Outcome, ...]  # One a check, table and scene, in the order of the checks
 
     @property
     def faults(self) -> list[Fault]:
@@ -146,15 +138,7 @@ def check_format(path: Path) -> None:
 
 
 def write_report(faults: Sequence[Fault], path: Path) -> Path:
-    """Write every fault to a file: JSON lines (.jsonl, .json), CSV or Parquet by its suffix; whole or not at all.
-
-    Raises
-    ------
-    UsageError
-        The suffix is none of these.
-    StoreError
-        The file cannot be written.
-    """
+    """Write every fault to a file: JSON lines (.jsonl, .json), CSV or Parquet by its suffix; whole or not at all."""
     check_format(path)
     path = path.absolute()
     if path.suffix == ".parquet":

@@ -31,27 +31,13 @@ _NAMED_BY = {"tasks": ("task_id",), "scenes": ("scene",)}
 
 @dataclass(frozen=True, eq=False)
 class Rows:
-    """Rows of one table of a scene, from all of its parts.
+    """Rows of one table of a scene, from all of its parts."""
 
-    Attributes
-    ----------
-    name : str
-        Name of the table.
-    spec : TableSpec
-        Its schema and key.
-    table : pyarrow.Table
-        The rows, parts one after the other.
-    parts : tuple of str
-        Paths of the parts, relative to the release.
-    ends : tuple of int
-        Row after the last one of each part.
-    """
-
-    name: str
-    spec: TableSpec
-    table: pa.Table
-    parts: tuple[str, ...]
-    ends: tuple[int, ...]
+    name: str  # Name of the table
+    spec: TableSpec  # Its schema and key
+    table: pa.Table  # The rows, parts one after the other
+    parts: tuple[str, ...]  # Paths of the parts, relative to the release
+    ends: tuple[int, ...]  # Row after the last one of each part
 
     def __len__(self) -> int:
         """Count the rows."""
@@ -110,27 +96,13 @@ def unequal(a: pa.Array, b: pa.Array) -> Mask:
 
 @dataclass(frozen=True, eq=False)
 class Paths:
-    """Poses of the routes whose lists fit together, as flat arrays.
+    """Poses of the routes whose lists fit together, as flat arrays."""
 
-    Attributes
-    ----------
-    rows : (n,) int64
-        Rows of `routes` that they belong to; rows with unequal lists or less than two poses are left out.
-    first : (n + 1,) int64
-        Where each route's poses begin.
-    xyz : (m, 3) float64
-        Positions, metres, world frame.
-    yaw : (m,) float64
-        Radians.
-    action : (m,) int64
-        What is done at every pose.
-    """
-
-    rows: Ints
-    first: Ints
-    xyz: Floats
-    yaw: Floats
-    action: Ints
+    rows: Ints  # Rows of `routes` that they belong to; rows with unequal lists or less than two poses are left out
+    first: Ints  # (n + 1,) int64; where each route's poses begin
+    xyz: Floats  # (m, 3) float64; positions, metres, world frame
+    yaw: Floats  # (m,) float64; radians
+    action: Ints  # (m,) int64; what is done at every pose
 
     def of(self, k: int) -> slice:
         """Poses of the k-th route."""
@@ -186,36 +158,16 @@ def paths_of(routes: Rows) -> Paths:
 
 @dataclass(eq=False)
 class SceneData:
-    """One scene of a release, as the checks get it.
+    """One scene of a release, as the checks get it."""
 
-    Attributes
-    ----------
-    scene : str
-        Name.
-    release : Release
-        Where the release lies.
-    pipeline : Pipeline
-        Whose definitions the release is held to: the body, the rules of `filter`, the paper's counts.
-    tables : mapping of str to Rows
-        By name (tasks, routes, objects, landmarks, anchors, scenes); without those that cannot be read.
-    meshes : Path or None
-        Folder of the meshes; None for where the `scenes` table says, beside the release.
-    use_meshes : bool
-        False leaves everything that needs a mesh unchecked.
-    sample : int or None
-        How many routes FCL is asked about; None for all.
-    pictures : int or None
-        How many reference images are drawn anew; None for all.
-    """
-
-    scene: str
-    release: Release
+    scene: str  # Name
+    release: Release  # Where the release lies
     pipeline: Pipeline
     tables: Mapping[str, Rows]
-    meshes: Path | None = None
-    use_meshes: bool = True
-    sample: int | None = None
-    pictures: int | None = None
+    meshes: Path | None = None  # Folder of the meshes; None for where the `scenes` table says, beside the release
+    use_meshes: bool = True  # False leaves everything that needs a mesh unchecked
+    sample: int | None = None  # How many routes FCL is asked about; None for all
+    pictures: int | None = None  # How many reference images are drawn anew; None for all
     faulty: dict[tuple[str, str], Mask] = field(default_factory=dict)
     kept: dict[str, object] = field(default_factory=dict)
 

@@ -68,33 +68,15 @@ SCENE_CHECKS = tuple(one for module in _MODULES for one in CHECKS if one.run.__m
 
 @dataclass(frozen=True)
 class Asked:
-    """What to check.
+    """What to check."""
 
-    Attributes
-    ----------
-    release : Release, DataRoot, Path or str
-        The data root, or the release's own folder.
-    scenes : tuple of str
-        Names or globs; empty for all.
-    meshes : Path or None
-        Folder of the meshes; None for where `scenes` says, relative to the folder that the release lies in.
-    use_meshes : bool
-        False leaves everything that needs a mesh unchecked, and the report says so.
-    sample : int or None
-        Routes a scene that FCL is asked about; None for all.
-    pictures : int or None
-        Reference images a scene that are drawn anew; None for all.
-    pipeline : Pipeline
-        Whose definitions the release is held to.
-    """
-
-    release: Release | Where
-    scenes: tuple[str, ...] = ()
+    release: Release | Where  # The data root, or the release's own folder
+    scenes: tuple[str, ...] = ()  # Names or globs; empty for all
     meshes: Path | None = None
-    use_meshes: bool = True
-    sample: int | None = None
-    pictures: int | None = None
-    pipeline: Pipeline = field(default_factory=Pipeline)
+    use_meshes: bool = True  # False leaves everything that needs a mesh unchecked, and the report says so
+    sample: int | None = None  # Routes a scene that FCL is asked about; None for all
+    pictures: int | None = None  # Reference images a scene that are drawn anew; None for all
+    pipeline: Pipeline = field(default_factory=Pipeline)  # Whose definitions the release is held to
 
 
 @dataclass(frozen=True)
@@ -123,32 +105,7 @@ def validate(
     address: str | None = None,
     reporter: Reporter | None = None,
 ) -> Report:
-    """Check a release.
-
-    Parameters
-    ----------
-    asked : Asked
-        What to check.
-    workers : int, optional
-        Processes; with 1 everything runs in this one, with None on all cores there are. A process holds one scene at
-        a time.
-    executor, address : str
-        As for `aerialdojo_gen.pipeline.executors.make_executor`.
-    reporter : Reporter, optional
-        Shows progress.
-
-    Returns
-    -------
-    Report
-        Every check, and every row at fault.
-
-    Raises
-    ------
-    StoreError
-        The folder holds no release.
-    UsageError
-        A name or a glob fits no scene of the release.
-    """
+    """Check a release."""
     reporter = reporter or Reporter(quiet=True)
     release = release_of(asked.release)
     asked = replace(asked, release=release)

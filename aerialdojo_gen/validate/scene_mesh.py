@@ -60,13 +60,7 @@ def want_meshes(data: SceneData) -> None:
 
 
 def scene_mesh(data: SceneData) -> SceneMesh:
-    """Return the scene's mesh, read once.
-
-    Raises
-    ------
-    UncheckedError
-        There is none, or it is not the release's: checks have said so.
-    """
+    """Return the scene's mesh, read once."""
     want_meshes(data)
     if data.flagged("scenes", MESH_CHECKS).any():
         raise UncheckedError("no mesh")

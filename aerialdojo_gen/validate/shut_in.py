@@ -98,21 +98,7 @@ def _by_routes(data: SceneData, rays: RayCaster, places: Floats) -> Mask:
 
 
 def over_lattice(rays: RayCaster, bounds: Floats, places: Floats) -> Mask:
-    """Whether places see a lattice point that hangs together, by points that see each other, with one in the open.
-
-    Parameters
-    ----------
-    rays : RayCaster
-        Of the scene.
-    bounds : (2, 3) float64
-        The flight volume, metres.
-    places : (n, 3) float64
-        Metres.
-
-    Returns
-    -------
-    (n,) bool
-    """
+    """Whether places (n, 3) see a lattice point that hangs together with one in the open."""
     size = bounds[1] - bounds[0]
     step = max(_STEP_M, float(np.prod(size) / _MOST_NODES) ** (1 / 3))
     shape = np.maximum(1, (size / step).astype(np.int64))

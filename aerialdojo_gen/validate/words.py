@@ -50,24 +50,12 @@ _ANY_COLOUR = f"({'|'.join(_COLOURS)})"
 
 @dataclass(frozen=True)
 class _Words:
-    """What texts of a scene are read with.
+    """What texts of a scene are read with."""
 
-    Attributes
-    ----------
-    ambiguity : Ambiguity
-        Relations, phrases and rivals.
-    names : dict of str to str
-        What a person says for each category.
-    catalogue : Catalogue
-        Of the props.
-    surface : Surface
-        Ground and water, which hide what is under them.
-    """
-
-    ambiguity: Ambiguity
-    names: dict[str, str]
-    catalogue: Catalogue
-    surface: Surface
+    ambiguity: Ambiguity  # Relations, phrases and rivals
+    names: dict[str, str]  # What a person says for each category
+    catalogue: Catalogue  # Of the props
+    surface: Surface  # Ground and water, which hide what is under them
 
 
 @check("objects", needs=("landmarks", "mesh"), after=_FAULTS)

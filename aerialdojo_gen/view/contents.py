@@ -19,17 +19,7 @@ _NUMBERS = ("euclidean_m", "length_m", "detour_ratio", "min_clearance_m")
 
 
 def scene_index(scene: ReleasedScene) -> dict[str, Any]:
-    """Collect what the page lists and filters: places row by row, routes column by column (there may be 20,000).
-
-    Parameters
-    ----------
-    scene : ReleasedScene
-
-    Returns
-    -------
-    dict
-        JSON values; positions in metres, world frame, rounded to a millimetre.
-    """
+    """Collect what the page lists and filters: JSON values, world metres to a millimetre."""
     names = {row["landmark_id"]: row["name"] for row in scene.landmarks}
     routes = scene.routes.drop_columns(["x_m", "y_m", "z_m", "yaw_rad", "action"])
     modalities: dict[str, list[str]] = {}
@@ -81,18 +71,7 @@ def _xyz(row: dict[str, Any]) -> list[float]:
 
 
 def route_points(scene: ReleasedScene) -> bytes:
-    """Pack the ways of all routes, in the index's order, for the page.
-
-    Parameters
-    ----------
-    scene : ReleasedScene
-
-    Returns
-    -------
-    bytes
-        Little-endian: ``uint32`` number of routes n, n + 1 ``uint32`` offsets in points, then ``float32`` x y z,
-        metres. A pose that only turns, or goes straight on, adds no point.
-    """
+    """Pack all routes for the page, little-endian: n, n + 1 offsets, then float32 x y z in metres."""
     routes = scene.routes
     lists = [routes[f"{axis}_m"].combine_chunks() for axis in "xyz"]
     offsets = lists[0].offsets.to_numpy().astype(np.int64)
@@ -119,23 +98,7 @@ def _without(
 
 
 def route_detail(scene: ReleasedScene, nav_id: str) -> dict[str, Any]:
-    """Tell all of one route: poses, actions, clearance along the way, and what the agent reads.
-
-    Parameters
-    ----------
-    scene : ReleasedScene
-    nav_id : str
-
-    Returns
-    -------
-    dict
-        JSON values; ``way`` are points every half metre at most, ``clearance_m`` FCL's distance at each.
-
-    Raises
-    ------
-    UsageError
-        There is no such route.
-    """
+    """Tell all of one route: poses, actions, FCL's clearance every half metre at most, and what the agent reads."""
     route = scene.route(nav_id)
     poses = np.column_stack([route["x_m"], route["y_m"], route["z_m"]])
     moved = np.concatenate([[True], np.any(np.diff(poses, axis=0) != 0.0, axis=1)])

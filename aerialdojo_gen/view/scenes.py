@@ -64,14 +64,7 @@ class ShownScene:
 
 
 class ShownScenes:
-    """The scenes of a release, opened when they are asked for.
-
-    Parameters
-    ----------
-    root : DataRoot
-    names : sequence of str
-        Those that are shown.
-    """
+    """The scenes of a release, opened when they are asked for."""
 
     def __init__(self, root: DataRoot, names: Sequence[str]) -> None:
         self.root, self.names = root, tuple(names)

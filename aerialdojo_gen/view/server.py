@@ -20,24 +20,7 @@ _MOST_TASKS = 200
 
 
 def view_app(data: Where, scenes: str | Sequence[str] | None = None) -> FastAPI:
-    """Make the app that shows a release: a start page at ``/``, a page a scene at ``/scenes/NAME/``.
-
-    Parameters
-    ----------
-    data : DataRoot, Path or str
-        The data root; its release and its meshes are all that is read.
-    scenes : str or sequence of str, optional
-        Names or globs; all of the release where absent. One alone is read at once.
-
-    Returns
-    -------
-    fastapi.FastAPI
-
-    Raises
-    ------
-    UsageError, StoreError, AssetError
-        The scene, its tables or its mesh are missing or damaged.
-    """
+    """Make the app that shows a release: a start page at ``/``, a page a scene at ``/scenes/NAME/``."""
     root = open_root(data)
     names = chosen_scenes(root, scenes)
     app = local_app("start.html", f"aerialdojo-gen view {root}", also=("view.html",))

@@ -22,14 +22,7 @@ ORDERS = ("nav_id", "length_m", "detour_ratio", "min_clearance_m", "n_actions")
 
 
 class TaskList:
-    """Navigation tasks with their targets; a scene's are read when it is first asked for.
-
-    Parameters
-    ----------
-    release : Release
-    names : sequence of str
-        The scenes.
-    """
+    """Navigation tasks with their targets; a scene's are read when it is first asked for."""
 
     def __init__(self, release: Release, names: Sequence[str]) -> None:
         self._release, self._names = release, tuple(names)
@@ -56,36 +49,7 @@ class TaskList:
         self, scenes: Sequence[str], *, setting: str = "", split: str = "", words: str = "", order: str = "nav_id",
         descending: bool = False, offset: int = 0, most: int = 48,
     ) -> dict[str, Any]:  # fmt: skip
-        """Find tasks.
-
-        Parameters
-        ----------
-        scenes : sequence of str
-            Of the release; all where there are none.
-        setting, split : str
-            Of these alone; any where empty.
-        words : str
-            Each has to begin one of the target's name, category, description or landmark, or to be part of the id.
-        order : str
-            One of `ORDERS`; the ids, which are digests, give a fair mixture.
-        descending : bool
-        offset, most : int
-            Which part of the list.
-
-        Returns
-        -------
-        dict
-            ``total``, and ``tasks``: rows with ``nav_id``, ``scene``, ``setting``, ``split``, ``length_m`` (metres),
-            ``detour_ratio``, ``min_clearance_m``, ``n_actions``, ``object_id``, ``name``, ``description``,
-            ``direction`` and ``landmark``.
-
-        Raises
-        ------
-        UsageError
-            There is no such order.
-        StoreError
-            A part of the release is missing or damaged.
-        """
+        """Find tasks by words, setting and split, in an order: ``total`` and the rows of a page."""
         if order not in ORDERS:
             raise UsageError(f"tasks are ordered by {', '.join(ORDERS)}")
         parts = [_fitting(self._of(scene), setting, split, words.lower().split()) for scene in scenes or self._names]

@@ -155,13 +155,7 @@ class BoundedLog(logging.Filter):
 
 
 def limits() -> dict[str, Any]:
-    """Settings of `uvicorn.Config` that hold clients to these limits.
-
-    Returns
-    -------
-    dict
-        To be passed as keywords; `bound_log` is to be called after the configuration is made.
-    """
+    """Settings of `uvicorn.Config` that hold clients to these limits."""
     # uvicorn's own limit_concurrency counts every connection, so that half requests would lock all others out.
     return {"http": LimitedProtocol, "ws": "none", "backlog": 128, "timeout_keep_alive": 5}
 

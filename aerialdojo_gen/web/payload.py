@@ -43,23 +43,7 @@ class _Body:
 
 
 def scene_payload(scene: Scene) -> bytes:
-    """Pack a scene for ``static/scene.js``.
-
-    Parameters
-    ----------
-    scene : Scene
-        World frame, metres; coordinates become float32, as they are in the scene's GLB.
-
-    Returns
-    -------
-    bytes
-        The same scene always gives the same bytes.
-
-    Raises
-    ------
-    AssetError
-        A texture cannot be encoded.
-    """
+    """Pack a scene for ``static/scene.js``: float32 world metres, the same bytes for the same scene."""
     light = light_of(scene)
     body = _Body()
     groups: dict[_Look, list[tuple[int, Part]]] = {}

@@ -95,13 +95,7 @@ class _LocalOnly:
 
 
 def require_web() -> None:
-    """Say what is missing before anything else is done.
-
-    Raises
-    ------
-    MissingPackage
-        FastAPI or uvicorn is not installed.
-    """
+    """Say what is missing before anything else is done."""
     try:
         import fastapi  # noqa: F401
         import uvicorn  # noqa: F401
@@ -118,32 +112,7 @@ def one_line(text: str, most: int = 500) -> str:
 def local_app(
     page: str, title: str, max_body_bytes: int = 1 << 20, *, any_host: bool = False, also: Sequence[str] = ()
 ) -> FastAPI:
-    """Make an app that serves a page of ``static/`` at ``/``, the rest of that folder under ``/static/``.
-
-    Parameters
-    ----------
-    page : str
-        File name of the page in ``static/``; its import map, if it has one, is the only inline script it may hold.
-    title : str
-        Of the app.
-    max_body_bytes : int
-        Largest request body that is taken.
-    any_host : bool
-        Answer to any ``Host``, and to ``Origin`` of that host: for a page that asks for a token besides.
-    also : sequence of str
-        Other pages of ``static/`` that the caller serves: their import maps are allowed too.
-
-    Returns
-    -------
-    fastapi.FastAPI
-        To which the caller adds its routes; an `AerialDojoError` in them becomes ``{"error": message}`` with status
-        400 (404 where it is a `UsageError`), a malformed request one with status 422; a message is one line.
-
-    Raises
-    ------
-    UsageError
-        FastAPI is not installed.
-    """
+    """Make an app that serves a page of ``static/`` at ``/``, the rest of that folder under ``/static/``."""
     require_web()
     from fastapi import FastAPI, Request
     from fastapi.exceptions import RequestValidationError
@@ -194,13 +163,7 @@ def local_app(
 
 
 def open_socket(port: int, host: str = "127.0.0.1") -> socket.socket:
-    """Listen on this machine's loopback, or on another IPv4 address of it; port 0 takes a free one.
-
-    Raises
-    ------
-    UsageError
-        The port is taken, or not ours to take.
-    """
+    """Listen on this machine's loopback, or on another IPv4 address of it; port 0 takes a free one."""
     listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
     listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:
@@ -215,19 +178,7 @@ def open_socket(port: int, host: str = "127.0.0.1") -> socket.socket:
 
 
 def serve(app: FastAPI, listener: socket.socket, browser: bool = False, path: str = "") -> None:
-    """Serve until Ctrl-C, which is a plain end.
-
-    Parameters
-    ----------
-    app : fastapi.FastAPI
-        From `local_app`.
-    listener : socket.socket
-        From `open_socket`; closed at the end.
-    browser : bool
-        Whether to open the page in the user's browser.
-    path : str
-        Of the page that is opened, without a slash before it.
-    """
+    """Serve until Ctrl-C, which is a plain end."""
     import uvicorn
 
     from aerialdojo_gen.web.limits import bound_log, limits

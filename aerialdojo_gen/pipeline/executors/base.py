@@ -35,24 +35,12 @@ R = TypeVar("R")
 
 @dataclass(frozen=True)
 class Folders:
-    """The folders that tasks name.
-
-    Attributes
-    ----------
-    shared : tuple of Path
-        Every machine that works has to see these under the same path: the data directory, a release.
-    carried : tuple of Path
-        They are small, only read, and brought to other machines: recipes, props, annotations.
-    written : tuple of Path
-        Those of `shared`, or in them, that are held and written to.
-    say : callable
-        Told in a line what a run waits for.
-    """
+    """The folders that tasks name."""
 
     shared: tuple[Path, ...] = ()
     carried: tuple[Path, ...] = ()
-    written: tuple[Path, ...] = ()
-    say: Callable[[str], None] = print
+    written: tuple[Path, ...] = ()  # Those of `shared`, or in them, that are held and written to
+    say: Callable[[str], None] = print  # Told in a line what a run waits for
 
 
 def on_disk(*places: Path | DataRoot, below: str = "") -> tuple[Path, ...]:
@@ -63,17 +51,9 @@ def on_disk(*places: Path | DataRoot, below: str = "") -> tuple[Path, ...]:
 
 @dataclass(frozen=True)
 class Talk:
-    """The parent's side of the links that its workers have.
+    """The parent's side of the links that its workers have."""
 
-    Attributes
-    ----------
-    hear : callable
-        Called in this process with what a worker tells.
-    stopped : callable
-        Asked now and then in this process; once it is True workers begin nothing more. It may raise, to end all.
-    """
-
-    hear: Callable[[Any], None]
+    hear: Callable[[Any], None]  # Called in this process with what a worker tells
     stopped: Callable[[], bool]
 
 
@@ -111,46 +91,14 @@ class Executor(ABC):
         talk: Talk | None = None,
         memory_mb: int = 0,
     ) -> Iterator[R | AerialDojoError]:
-        """Do work on tasks that are known from the start: `run` of `Waiting`.
-
-        Parameters
-        ----------
-        work : callable
-            As for `run`.
-        tasks : sequence
-            What it is called with.
-        scene_of : callable, optional
-            A task's scene. A process stays with a scene while there is work, for it keeps what it has read and
-            built of it; tasks of no scene are done in their order.
-        talk, memory_mb : Talk, int
-            As for `run`.
-        """
+        """Do work on tasks that are known from the start: `run` of `Waiting`."""
         return self.run(work, Waiting(tasks, scene_of), talk=talk, memory_mb=memory_mb)
 
     @abstractmethod
     def run(
         self, work: Callable[..., R], waiting: Waiting[T], *, talk: Talk | None = None, memory_mb: int = 0
     ) -> Iterator[R | AerialDojoError]:
-        """Do work on tasks and yield what it returns, or the expected error, in the order of finishing.
-
-        Parameters
-        ----------
-        work : callable
-            A function of a module, called with a task: other processes import it.
-        waiting : Waiting
-            The tasks; it is told what is finished, and may have more tasks then.
-        talk : Talk, optional
-            Given, `work` is called with a task and a `aerialdojo_gen.pipeline.executors.link.Link`.
-        memory_mb : int
-            What a process needs, in megabytes, where that decides how many there are on a machine.
-
-        Raises
-        ------
-        AerialDojoError
-            A worker was killed, or as often as is borne.
-        Exception
-            What `work` raises beside AerialDojoError: a defect.
-        """
+        """Do work on tasks and yield what it returns, or the expected error, in the order of finishing."""
 
     @abstractmethod
     def close(self) -> None:
@@ -172,26 +120,7 @@ def guarded(work: Callable[..., R], task: Any, link: Link | None) -> R | AerialD
 def make_executor(
     name: str, workers: int | None = None, address: str | None = None, folders: Folders | None = None
 ) -> Executor:
-    """Make an executor; nothing is started yet.
-
-    Parameters
-    ----------
-    name : str
-        One of `EXECUTORS`.
-    workers : int, optional
-        Processes; where absent all cores, of this machine or of the cluster.
-    address : str, optional
-        Of a running Ray cluster, ``HOST:PORT``; one of this machine's own is started where absent.
-    folders : Folders, optional
-        What the tasks read and write.
-
-    Raises
-    ------
-    UsageError
-        There is none of that name, or it has no address.
-    AerialDojoError
-        The package that it needs is not installed.
-    """
+    """Make an executor; nothing is started yet."""
     if name not in EXECUTORS:
         raise UsageError(f"unknown executor {name!r}; executors: {', '.join(EXECUTORS)}")
     if name == "ray":

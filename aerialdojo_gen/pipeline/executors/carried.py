@@ -22,22 +22,7 @@ _EPOCH = (1980, 1, 1, 0, 0, 0)
 
 
 def pack(target: Path, folders: Sequence[Path]) -> None:
-    """Write the archive.
-
-    Parameters
-    ----------
-    target : Path
-        A file that is not there.
-    folders : sequence of Path
-        Absolute; what is in them travels beside the package.
-
-    Raises
-    ------
-    UsageError
-        They are too large to be carried.
-    AssetError
-        A file cannot be read.
-    """
+    """Write the archive."""
     package = Path(__file__).resolve().parents[2]
     files: dict[str, Path] = {}
     names: dict[str, str] = {}
@@ -85,13 +70,7 @@ def _bytes(path: Path) -> bytes:
 
 
 class Unpacked:
-    """An archive where Ray has unpacked it.
-
-    Parameters
-    ----------
-    folder : Path
-        Its folder; without an archive in it everything is where it was packed, on the same machine.
-    """
+    """An archive where Ray has unpacked it."""
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder

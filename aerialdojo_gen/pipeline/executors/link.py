@@ -12,15 +12,9 @@ from typing import Protocol
 
 
 class Link(Protocol):
-    """A worker's way to the process that gave it its task.
+    """A worker's way to the process that gave it its task."""
 
-    Attributes
-    ----------
-    every_s : float
-        How far messages should be apart, seconds; 0 where each costs nothing.
-    """
-
-    every_s: float
+    every_s: float  # How far messages should be apart, seconds; 0 where each costs nothing
 
     def tell(self, message: object) -> None:
         """Send a small message; the parent hears it while the task goes on."""

@@ -37,13 +37,7 @@ def own_cores() -> int:
 
 
 class LocalExecutor(Executor):
-    """Does work in `workers` processes; in this one where that is 1.
-
-    Parameters
-    ----------
-    workers : int, optional
-        All cores where absent.
-    """
+    """Does work in `workers` processes; in this one where that is 1."""
 
     def __init__(self, workers: int | None = None) -> None:
         self._workers = workers or own_cores()

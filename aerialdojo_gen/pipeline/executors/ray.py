@@ -62,17 +62,7 @@ class _Lane:
 
 
 class RayExecutor(Executor):
-    """Does work in actors of a Ray cluster.
-
-    Parameters
-    ----------
-    workers : int or None
-        Actors; None for as many as the cluster has cores.
-    address : str or None
-        ``HOST:PORT`` of the cluster's head; None starts one on this machine, which ends with this process.
-    folders : Folders
-        What tasks read and write.
-    """
+    """Does work in actors of a Ray cluster."""
 
     def __init__(self, workers: int | None, address: str | None, folders: Folders) -> None:
         if address is not None and not re.fullmatch(r"(ray://)?[^\s:/]+:\d{1,5}", address):

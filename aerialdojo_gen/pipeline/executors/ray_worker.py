@@ -24,23 +24,11 @@ _ASK_EVERY_S = 0.5
 
 @dataclass(frozen=True)
 class Expected:
-    """What a machine must see and have to work.
+    """What a machine must see and have to work."""
 
-    Attributes
-    ----------
-    seen : dict of str to str
-        Folders, with what `listing` gives of them.
-    marked : dict of str to str
-        Files, with their text.
-    versions : dict of str to str
-        Libraries by the name of their distribution.
-    environment : dict of str to str
-        Variables to be set: credentials, and whatever else is named for us. In no log, for Ray does not see them.
-    """
-
-    seen: Mapping[str, str]
-    marked: Mapping[str, str]
-    versions: Mapping[str, str]
+    seen: Mapping[str, str]  # Folders, with what `listing` gives of them
+    marked: Mapping[str, str]  # Files, with their text
+    versions: Mapping[str, str]  # Libraries by the name of their distribution
     environment: Mapping[str, str]
 
     def __repr__(self) -> str:

@@ -16,22 +16,7 @@ _CLUMP_CORNERS = 24
 
 
 def limb(points: ArrayLike, radii: Sequence[float], sides: int = 6) -> Mesh:
-    """Make a tapering trunk or branch.
-
-    Parameters
-    ----------
-    points : (n, 3) array-like
-        Middle line, metres.
-    radii : sequence of float
-        One a point, metres; a last radius of 0 ends the limb in a tip.
-    sides : int
-        Corners of the section.
-
-    Returns
-    -------
-    Mesh
-        Watertight; u runs around, v along the limb, in metres.
-    """
+    """Make a tapering trunk or branch along points (n, 3), metres; closed, u around and v along in metres."""
     line = np.asarray(points, dtype=np.float64)
     tip = radii[-1] == 0.0
     rings = len(line) - 1 if tip else len(line)
@@ -76,19 +61,7 @@ def clump(
     ragged: float = 0.3,
     belly: float = 0.6,
 ) -> Mesh:
-    """Make a clump of leaves: a lumpy ellipsoid bristling with sprays of twigs, 88 triangles, closed.
-
-    Parameters
-    ----------
-    rng : numpy.random.Generator
-        Draws lumps and sprays.
-    centre, radii : (x, y, z)
-        Middle and half extents, metres; sprays reach about `ragged` of the radius beyond.
-    ragged : float
-        Depth of lumps and sprays as a fraction of the radius.
-    belly : float
-        How far the clump hangs below its middle, as a fraction of its height above it.
-    """
+    """Make a clump of leaves: a lumpy closed ellipsoid bristling with sprays of twigs, 88 triangles."""
     directions, faces = _ball()
     turn = rng.uniform(0, 2 * np.pi)
     c, s = np.cos(turn), np.sin(turn)
@@ -140,25 +113,7 @@ def whorl(
     branches: int = 7,
     core: ArrayLike = (0.0, 0.0),
 ) -> Mesh:
-    """Make a tier of a conifer: branches that hang outwards from the stem like the ribs of a torn umbrella.
-
-    Parameters
-    ----------
-    rng : numpy.random.Generator
-        Draws each branch's length, hang and direction.
-    z : float
-        Height at which the branches leave the stem, metres.
-    reach : float
-        Length of the branches, metres.
-    droop : float
-        How far the tips hang below `z`, metres.
-    rise : float
-        How far the tier's top stands above `z`, metres.
-    branches : int
-        Number of branches.
-    core : (x, y)
-        Where the stem stands at that height, metres.
-    """
+    """Make a tier of a conifer: branches, in metres, that hang outwards like the ribs of a torn umbrella."""
     n = 2 * branches
     angles = (np.arange(n) + rng.uniform(-0.25, 0.25, size=n)) * 2 * np.pi / n + rng.uniform(0, 2 * np.pi)
     tips = np.arange(n) % 2 == 0
@@ -188,18 +143,9 @@ def blade(root: ArrayLike, bend: ArrayLike, tip: ArrayLike, width: float) -> Mes
 
 
 def stone(rng: np.random.Generator, radii: ArrayLike, corners: int = 22, sunk: float = 0.3) -> Mesh:
-    """Make an angular rock that stands on z = 0, `sunk` of its height below the ground.
+    """Make an angular rock (half extents in metres) on z = 0, `sunk` of its height below.
 
-    Parameters
-    ----------
-    rng : numpy.random.Generator
-        Draws the corners.
-    radii : (x, y, z)
-        Half extents, metres.
-    corners : int
-        Points whose convex hull is the rock: few make it blocky, many make it round.
-    sunk : float
-        Fraction of the whole height that lies below z = 0.
+    Few `corners` make it blocky.
     """
     p = rng.normal(size=(corners, 3))
     p /= np.linalg.norm(p, axis=1, keepdims=True)

@@ -32,44 +32,18 @@ _SAME_M, _SAME_RAD = 2e-3, math.radians(0.02)
 
 @dataclass(frozen=True)
 class Judged:
-    """A viewpoint as the checks of anchors see it.
-
-    Attributes
-    ----------
-    row : dict
-        Its row of ``anchors``, but for rank and selection; measures are None where they could not be taken.
-    faults : tuple of str
-        Why it will not do, in words; empty where it will.
-    """
+    """A viewpoint as the checks of anchors see it."""
 
     row: dict[str, Any]
-    faults: tuple[str, ...]
+    faults: tuple[str, ...]  # Why it will not do, in words; empty where it will
 
 
 def judge_anchor(
     position_m: Floats, yaw_rad: float, item: dict[str, Any], world: World, job: Job, config: AnchorSampleConfig
 ) -> Judged:
-    """Hold a viewpoint against what is asked of an anchor (paper: anchors).
+    """Check a viewpoint (world metres, radians) against the rules for anchors (paper: anchors).
 
-    Parameters
-    ----------
-    position_m : (3,) float64
-        The body's centre, metres, world frame.
-    yaw_rad : float
-        Counter-clockwise from +x.
-    item : dict
-        The object's row of ``objects``.
-    world : World
-        The scene.
-    job : Job
-        For its scene's name, seed and embodiment.
-    config : AnchorSampleConfig
-        Of ``anchor-sample``.
-
-    Returns
-    -------
-    Judged
-        All faults, not only the first.
+    Returns all faults.
     """
     k = world.index[item["mesh_node"]]
     instance = world.scene.instances[k]
@@ -126,28 +100,7 @@ def with_choice(
     job: Job,
     config: AnchorSampleConfig,
 ) -> list[dict[str, Any]]:
-    """Put the anchor that a person chose first among an object's anchors, and select it.
-
-    Parameters
-    ----------
-    rows : list of dict
-        The sampled anchors, the best first.
-    choice : dict
-        The object's row of ``chosen_anchors``: one of the sampled ones, or a viewpoint placed by hand, which then
-        takes the place of the last of a full shortlist.
-    item, world, job, config
-        As for `judge_anchor`.
-
-    Returns
-    -------
-    list of dict
-        Rows of ``anchors``, at most `shortlist`.
-
-    Raises
-    ------
-    AnnotationError
-        The chosen viewpoint will not do (the scene has changed since, say).
-    """
+    """Put the anchor that a person chose first among an object's anchors, and select it."""
     same = [row for row in rows if is_same(row, choice)]
     if same:
         first = same[0]

@@ -26,42 +26,17 @@ _LOOKED_AT_PX = 320
 
 @dataclass(frozen=True)
 class Looked:
-    """Candidates of an object, each with the place behind it that its reference picture is taken from.
+    """Candidates of an object, each with the place behind it that its reference picture is taken from."""
 
-    Attributes
-    ----------
-    found : Candidates
-        All of the object.
-    which : (k,) int64
-        Those that are meant.
-    step_back_m : (k,) float64
-        How far behind each the picture is taken.
-    behind : Candidates
-        From there.
-    rank : (k,) float64
-        Score of the ray casts from both places.
-    """
-
-    found: Candidates
-    which: NDArray[np.int64]
-    step_back_m: Floats
-    behind: Candidates
-    rank: Floats
+    found: Candidates  # All of the object
+    which: NDArray[np.int64]  # (k,) int64; those that are meant
+    step_back_m: Floats  # (k,) float64; how far behind each the picture is taken
+    behind: Candidates  # From there
+    rank: Floats  # (k,) float64; score of the ray casts from both places
 
     @classmethod
     def of(cls, found: Candidates, which: NDArray[np.int64], radius_m: float, config: AnchorSampleConfig) -> Looked:
-        """Look from behind candidates.
-
-        Parameters
-        ----------
-        found : Candidates
-            Of one object.
-        which : (k,) int64
-            Those to be looked from.
-        radius_m : float
-            The body's.
-        config : AnchorSampleConfig
-        """
+        """Look from behind the candidates `which` (k,)."""
         places, yaws = found.positions_m[which], found.yaw_rad[which]
         telling = [
             telling_m(found.patches, found.seen[k], places[n], float(yaws[n]), config.fov_deg)
@@ -77,22 +52,7 @@ class Looked:
         return cls(found, which, backs, behind, rank)
 
     def pictures(self, few: NDArray[np.int64], size_px: int, fov_deg: float) -> list[AnchorView]:
-        """Picture candidates.
-
-        Parameters
-        ----------
-        few : (m,) int64
-            Numbers among `which`.
-        size_px : int
-            Edge of the pictures.
-        fov_deg : float
-
-        Returns
-        -------
-        list of AnchorView
-            From the candidates, with the one from behind where there is one; what is shown of the object and of its
-            telling parts is the mean of both.
-        """
+        """Picture candidates; what is shown is the mean of the view and of the one from behind where there is one."""
         return [self.picture(n, size_px, fov_deg) for n in few.tolist()]
 
     def picture(self, n: int, size_px: int, fov_deg: float, back: AnchorView | None = None) -> AnchorView:
@@ -139,32 +99,9 @@ def best_pictured(
     radius_m: float,
     config: AnchorSampleConfig,
 ) -> tuple[NDArray[np.int64], list[tuple[AnchorView, Verdict]]]:
-    """Picture candidates, and shortlist the best of them.
+    """Picture candidates that could still be among the best, and shortlist.
 
-    Where nothing but geometry scores, a candidate is pictured only if it could still be among the best: the choice is
-    the same as of all pictures. What is seen from behind it counts for more, and is pictured first.
-
-    Parameters
-    ----------
-    name : str
-        What the object is called.
-    looked : Looked
-    few : (m,) int64
-        Numbers among ``looked.which``.
-    azimuth_rad : (m,) float64
-        Direction of each seen from the object's centroid.
-    front : (m,) bool
-        Which are before a front of the object.
-    radius_m : float
-        The body's.
-    config : AnchorSampleConfig
-
-    Returns
-    -------
-    best : (k,) int64
-        Indices into `few`, the best first, k at most `shortlist`.
-    shown : list of tuple
-        Picture and verdict of each of these.
+    Indices (k,) into `few` and their verdicts.
     """
     scorers, apart = panel(config, radius_m), math.radians(config.separation_deg)
     weights = config.weights

@@ -51,27 +51,6 @@ def run(job: Job, config: AnchorSampleConfig) -> Output:
     of all is selected, or the one that a person chose, which then comes first. Where the catalogue says an object's
     front and the parts that make its name true, these weigh as much as its silhouette, candidates are placed before
     those parts as well, and one anchor at least is within 60° of a front, if any candidate there sees the object.
-
-    Parameters
-    ----------
-    job : Job
-        The scene; reads `objects`, `chosen_anchors` and the scene's mesh.
-    config : AnchorSampleConfig
-        The stage's section.
-
-    Returns
-    -------
-    Output
-        `anchors`, and `viewpoints`, all candidates that see their object. Rows in are the candidates, and rows in is
-        rows out (of `anchors`) plus the counts above; ``no_anchor`` besides counts the objects that have none, and a
-        warning names each of them.
-
-    Raises
-    ------
-    StoreError
-        An object's mesh node is not in the scene: the two tables do not belong together.
-    AnnotationError
-        A viewpoint that a person chose will not do.
     """
     objects = job.read("objects").to_pylist()
     chosen = {row["object_id"]: row for row in job.read("chosen_anchors").to_pylist()}
@@ -110,46 +89,14 @@ def run(job: Job, config: AnchorSampleConfig) -> Output:
 def anchors_of(
     item: dict[str, Any], world: World, job: Job, config: AnchorSampleConfig
 ) -> tuple[list[dict[str, Any]], Counter[str]]:
-    """Find one object's anchors.
-
-    Parameters
-    ----------
-    item : dict
-        The object's row of `objects`.
-    world : World
-        The scene.
-    job : Job
-        For its scene's name, seed and embodiment.
-    config : AnchorSampleConfig
-        The stage's section.
-
-    Returns
-    -------
-    rows : list of dict
-        Rows of `anchors`, the best first, at most `shortlist`.
-    rejected : Counter of str
-        How many candidates failed which test; with the rows, all of them.
-    """
+    """Find one object's anchors."""
     return sampled(item, world, job, config)[:2]
 
 
 def sampled(
     item: dict[str, Any], world: World, job: Job, config: AnchorSampleConfig
 ) -> tuple[list[dict[str, Any]], Counter[str], list[dict[str, Any]]]:
-    """Find one object's anchors and viewpoints.
-
-    Parameters
-    ----------
-    item, world, job, config
-        As for `anchors_of`.
-
-    Returns
-    -------
-    rows, rejected
-        As `anchors_of` returns them.
-    viewpoints : list of dict
-        Rows of `viewpoints`: every candidate that sees the object.
-    """
+    """Find one object's anchors and viewpoints."""
     found, rejected, nearly = candidates_of(item, world, job, config)
     if found is None:
         return [], rejected, []
@@ -163,22 +110,7 @@ def sampled(
 def shortlisted(
     item: dict[str, Any], found: Candidates, nearly: Counter[str], world: World, job: Job, config: AnchorSampleConfig
 ) -> list[dict[str, Any]]:
-    """Picture and score the best candidates of an object, and keep the best of those.
-
-    Parameters
-    ----------
-    item, world, job, config
-        As for `anchors_of`.
-    found : Candidates
-        The object's.
-    nearly : Counter of str
-        Why places before its front are no candidates.
-
-    Returns
-    -------
-    list of dict
-        Rows of `anchors`, the best first, at most `shortlist`.
-    """
+    """Picture and score the best candidates of an object, and keep the best of those."""
     radius = job.embodiment.radius_m
     seen = found.seeing(config.min_visible_fraction)
     away = found.positions_m - world.scene.instances[found.instance].centroid
@@ -222,22 +154,7 @@ def shortlisted(
 def candidates_of(
     item: dict[str, Any], world: World, job: Job, config: AnchorSampleConfig
 ) -> tuple[Candidates | None, Counter[str], Counter[str]]:
-    """Find where an object can be looked at from: everywhere around it that a drone can be.
-
-    Parameters
-    ----------
-    item, world, job, config
-        As for `anchors_of`.
-
-    Returns
-    -------
-    found : Candidates or None
-        Viewpoints that are free and reachable, whether or not the object can be seen from them; None without any.
-    rejected : Counter of str
-        How many others failed which test.
-    nearly : Counter of str
-        The same of those that are before a front of the object.
-    """
+    """Find where an object can be looked at from: everywhere around it that a drone can be."""
     k = world.index[item["mesh_node"]]
     instance: Instance = world.scene.instances[k]
     surface = Surface.of(instance)

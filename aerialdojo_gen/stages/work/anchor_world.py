@@ -30,27 +30,13 @@ _LEAST_POINTS = 32
 
 @dataclass(frozen=True)
 class World:
-    """A scene, and what is asked of it for every object.
+    """A scene, and what is asked of it for every object."""
 
-    Attributes
-    ----------
-    scene : Scene
-        The scene.
-    collisions : CollisionWorld
-        For collision and clearance.
-    free : ClearanceGrid
-        For what is connected with the open sky.
-    rays : RayCaster
-        For what is seen.
-    index : dict of str to int
-        Index of an instance by its node name.
-    """
-
-    scene: Scene
-    collisions: CollisionWorld
-    free: ClearanceGrid
-    rays: RayCaster
-    index: dict[str, int]
+    scene: Scene  # The scene
+    collisions: CollisionWorld  # For collision and clearance
+    free: ClearanceGrid  # For what is connected with the open sky
+    rays: RayCaster  # For what is seen
+    index: dict[str, int]  # Index of an instance by its node name
 
     @classmethod
     def of(cls, scene: Scene, radius_m: float, margin_m: float) -> World:
@@ -75,74 +61,30 @@ class World:
 
 @dataclass(frozen=True, eq=False)
 class Candidates:
-    """Viewpoints of one object, and what ray casts tell of them.
-
-    Attributes
-    ----------
-    world : World
-    instance : int
-        The object's index in the scene.
-    alone : TriangleRayCaster
-        The object by itself.
-    positions_m : (n, 3) float64
-        The body's centres, world frame.
-    yaw_rad, elevation_deg, clearance_m : (n,) float64
-        Yaw; elevation seen from the object's centroid; distance to the nearest surface.
-    sight : Sight
-        Which points of the object's surface they see.
-    views : Views
-        What they see of the object.
-    points : (m, 3) float64
-        On the object's surface, metres, world frame.
-    patches : tuple of Patch
-        Points of each of the object's telling parts.
-    seen : (n, t) float64
-        Share that they see of each of those parts (`aerialdojo_gen.geometry.telling.seen_share`).
-    told : (n, t) float64
-        How much they see of each of the object's telling parts, over what the best of them sees; t = 0 where the
-        whole body tells what it is.
-    off_front_rad : (n,) float64 or None
-        Angle between where they are and the nearest of the object's fronts; None where it has none.
-    rank : (n,) float64
-        Score of the ray casts alone, which decides what is pictured at all.
-    """
+    """Viewpoints of one object, and what ray casts tell of them."""
 
     world: World
-    instance: int
-    alone: TriangleRayCaster
-    positions_m: Floats
-    yaw_rad: Floats
+    instance: int  # The object's index in the scene
+    alone: TriangleRayCaster  # The object by itself
+    positions_m: Floats  # (n, 3) float64; the body's centres, world frame
+    yaw_rad: Floats  # (n,) float64; yaw; elevation seen from the object's centroid; distance to the nearest surface
     elevation_deg: Floats
     clearance_m: Floats
-    sight: Sight
-    views: Views
-    points: Floats
-    patches: tuple[Patch, ...]
-    seen: Floats
-    told: Floats
-    off_front_rad: Floats | None
-    rank: Floats
+    sight: Sight  # Which points of the object's surface they see
+    views: Views  # What they see of the object
+    points: Floats  # (m, 3) float64; on the object's surface, metres, world frame
+    patches: tuple[Patch, ...]  # Points of each of the object's telling parts
+    seen: Floats  # Share that they see of each of those parts (`aerialdojo_gen.geometry.telling.seen_share`)
+    told: Floats  # (n, t) float64
+    off_front_rad: Floats | None  # (n,) float64 or None
+    rank: Floats  # (n,) float64; score of the ray casts alone, which decides what is pictured at all
 
     @classmethod
     def of(
         cls, world: World, instance: int, points: Floats, positions_m: Floats, yaw_rad: Floats, radius_m: float,
         config: AnchorSampleConfig,
     ) -> Candidates:  # fmt: skip
-        """Look from viewpoints by ray casts.
-
-        Parameters
-        ----------
-        world : World
-        instance : int
-            The object's index in the scene.
-        points : (m, 3) float64
-            On the object's surface, metres, world frame.
-        positions_m : (n, 3) float64
-        yaw_rad : (n,) float64
-        radius_m : float
-            The body's.
-        config : AnchorSampleConfig
-        """
+        """Look from viewpoints (n, 3), world metres, with yaws at an object's points (m, 3) by ray casts."""
         alone = instance_caster(world.scene.instances[instance])
         sight = Sight.of(positions_m, yaw_rad, points, alone, world.rays, instance, config.fov_deg)
         clearance = np.array([world.clearance_m(p) for p in positions_m])
@@ -176,23 +118,7 @@ class Candidates:
     def moved(
         self, which: NDArray[np.int64], positions_m: Floats, radius_m: float, config: AnchorSampleConfig
     ) -> Candidates:
-        """Look from other places, facing the same way; what is known of places that are the same is not asked again.
-
-        Parameters
-        ----------
-        which : (k,) int64
-            Numbers of viewpoints.
-        positions_m : (k, 3) float64
-            Where they are moved to.
-        radius_m : float
-            The body's.
-        config : AnchorSampleConfig
-
-        Returns
-        -------
-        Candidates
-            What `of` says of those places.
-        """
+        """Look from other places (k, 3), facing the same way; places that stay are not looked from again."""
         world, yaws = self.world, self.yaw_rad[which]
         new = np.flatnonzero((positions_m != self.positions_m[which]).any(axis=1))
         places, turned = positions_m[new], yaws[new]

@@ -23,27 +23,7 @@ from aerialdojo_gen.store.schemas import CHOSEN_ANCHORS, LANDMARKS, OBJECTS
 
 
 def run(job: Job, config: AnnotateImportConfig) -> Output:
-    """Import the landmarks and target objects of one scene (paper, section on annotation).
-
-    Parameters
-    ----------
-    job : Job
-        Names the scene; its file is ``<annotations>/<scene>.json``.
-    config : AnnotateImportConfig
-        Whether the paper's numbers of landmarks and objects are required.
-
-    Returns
-    -------
-    Output
-        `landmarks`, `objects` and `chosen_anchors`.
-
-    Raises
-    ------
-    UsageError
-        There is no annotation file.
-    AnnotationError
-        The file is wrong; the message lists every fault by line and JSON path, and nothing of it is imported.
-    """
+    """Import the landmarks and target objects of one scene (paper, section on annotation)."""
     path = job.roots.annotations / f"{job.scene}.json"
     try:
         text = path.read_text(encoding="utf-8")
@@ -67,20 +47,7 @@ def run(job: Job, config: AnnotateImportConfig) -> Output:
 
 
 def annotation_tables(annotations: Annotations, scene: Scene) -> dict[str, pa.Table]:
-    """Make the tables `landmarks`, `objects` and `chosen_anchors` of annotations that are right.
-
-    Parameters
-    ----------
-    annotations : Annotations
-        Checked by `check_source`.
-    scene : Scene
-        Its scene; centres and sizes are those of the nodes' axis-aligned boxes.
-
-    Returns
-    -------
-    dict of str to pyarrow.Table
-        Rows in the order of the ids.
-    """
+    """Make the tables `landmarks`, `objects` and `chosen_anchors` of annotations that are right."""
     landmarks = sorted(annotations.landmarks, key=lambda entry: entry.id)
     places = np.array([scene[entry.node].centroid for entry in landmarks]).reshape(-1, 3)
     landmark_rows = [

@@ -23,25 +23,7 @@ _PARTITIONS = {"0": "ID", "1": "OOD"}
 
 
 def run(job: Job, config: BuildScenesConfig) -> Output:
-    """Build one scene (paper, section on scene preparation).
-
-    Parameters
-    ----------
-    job : Job
-        Names the scene; its recipe is ``<recipes>/<scene>.toml``.
-    config : BuildScenesConfig
-        Nothing to set.
-
-    Returns
-    -------
-    Output
-        One row of `scenes`; the mesh is written to ``meshes/<scene>.glb``.
-
-    Raises
-    ------
-    AssetError
-        The recipe or the catalogue is wrong.
-    """
+    """Build one scene (paper, section on scene preparation)."""
     catalogue = load_catalogue(job.roots.scene_assets)
     scene = build_scene(job.roots.recipes / f"{job.scene}.toml", catalogue)
     relative = f"meshes/{job.scene}.glb"

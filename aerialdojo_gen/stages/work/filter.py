@@ -39,12 +39,9 @@ def _hidden_at_stop(job: Job, plans: pa.Table, targets: pa.Table) -> NDArray[np.
 
 
 def run(job: Job, config: FilterConfig) -> Output:
-    """Judge every candidate of a scene by `judge`, and then by what its agent sees at the end (``"target_hidden"``).
+    """Judge every candidate of a scene by `judge`.
 
-    Raises
-    ------
-    StoreError
-        Plans and pairs are not of the same candidates.
+    And then by what its agent sees at the end (``"target_hidden"``).
     """
     pairs = job.read("pairs")
     told = [field.name for field in DIFFICULTY]

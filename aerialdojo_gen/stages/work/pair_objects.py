@@ -30,25 +30,6 @@ def run(job: Job, config: PairObjectsConfig) -> Output:
 
     Left out are only pairs that no route could make a task, whatever the scene: see `length_bound_m`. Of every other
     one it is said how much of the target the start sees (`aerialdojo_gen.geometry.start_view.seen_from`).
-
-    Parameters
-    ----------
-    job : Job
-        The scene; reads `anchors`, `objects` and the scene's mesh.
-    config : PairObjectsConfig
-        The stage's section.
-
-    Returns
-    -------
-    Output
-        `pairs`, sorted by pair_id as a string. Rows in are all ordered pairs of a start anchor and another object's
-        selected anchor; counts are ``too_close`` (d_E at most `min_euclidean_m`) and ``too_far`` (no route of less
-        than `max_length_m`), and rows in is rows out plus the two.
-
-    Raises
-    ------
-    StoreError
-        A target's mesh node is not in the scene: the tables do not belong together.
     """
     anchors = job.read("anchors")
     object_id = anchors["object_id"].to_numpy()
@@ -119,23 +100,9 @@ def _seen_at_start(
 
 
 def length_bound_m(start: Floats, goal: Floats, max_approach_m: float) -> Floats:
-    """Bound the length of every route from below.
+    """Lower bound (n,), metres, of a route's length.
 
-    A route's moves are horizontal or vertical, so that up to the Approach it is at least as long as the horizontal
-    plus the vertical distance that it covers. The Approach alone goes straight, a metre at most, where the two
-    together would be up to √2 times as long: that much less is certain.
-
-    Parameters
-    ----------
-    start, goal : (n, 3) float64
-        Metres, world frame.
-    max_approach_m : float
-        Longest Approach.
-
-    Returns
-    -------
-    (n,) float64
-        Metres; no route is shorter.
+    Horizontal plus vertical distance, less what an Approach may cut.
     """
     way = np.abs(goal - start)
     return np.asarray(np.hypot(way[:, 0], way[:, 1]) + way[:, 2] - (math.sqrt(2.0) - 1.0) * max_approach_m)

@@ -39,25 +39,7 @@ def targets_of_part(object_ids: list[int], part: int, config: PlanConfig) -> lis
 
 
 def run(job: Job, config: PlanConfig) -> Output:
-    """Plan the candidates of a slice of the scene's targets; where a release is planned for, as many as it needs.
-
-    Parameters
-    ----------
-    job : Job
-        The scene and the slice; reads `objects`, `anchors`, `pairs` and the scene's mesh.
-    config : PlanConfig
-        The stage's section. With a `ReleasedPlanConfig` the slice is the whole scene.
-
-    Returns
-    -------
-    Output
-        `plans`, a row a candidate whatever became of it, sorted by pair_id; counts by outcome.
-
-    Raises
-    ------
-    StoreError
-        A pair names an anchor that does not exist: the two tables do not belong together.
-    """
+    """Plan the candidates of a slice of the scene's targets; where a release is planned for, as many as it needs."""
     paper = paper_scene(job.scene, config)
     targets = job.read("objects")["object_id"].to_pylist()
     if paper is None:

@@ -38,28 +38,14 @@ _DETOUR_SPREAD = 0.008
 
 @dataclass(frozen=True, eq=False)
 class Candidates:
-    """A scene's candidates, n of them, before any search.
+    """A scene's candidates, n of them, before any search."""
 
-    Attributes
-    ----------
-    scene : str
-        Name of the scene.
-    lots : list of str
-        What each draws with.
-    euclidean_m, free_length_m : (n,) float64
-        Straight distance, and shortest length without obstacles, metres.
-    visible : (n,) float64
-        Share of the target that the start sees.
-    predicted_m : (n,) float64
-        Length of the cheapest grid path, metres; infinite where no search is worth while.
-    """
-
-    scene: str
-    lots: list[str]
-    euclidean_m: Floats
+    scene: str  # Name of the scene
+    lots: list[str]  # What each draws with
+    euclidean_m: Floats  # (n,) float64; straight distance, and shortest length without obstacles, metres
     free_length_m: Floats
-    visible: Floats
-    predicted_m: Floats
+    visible: Floats  # (n,) float64; share of the target that the start sees
+    predicted_m: Floats  # Length of the cheapest grid path, metres; infinite where no search is worth while
 
     @classmethod
     def of(cls, pairs: pa.Table, free_length_m: Floats, predicted_m: Floats) -> Candidates:
@@ -76,19 +62,7 @@ class Candidates:
 
 
 class Draw:
-    """Says, round by round, which candidates of a scene to search next.
-
-    Parameters
-    ----------
-    candidates : Candidates
-        All of the scene's.
-    paper : PaperScene
-        How many tasks of each setting are released, and their metres.
-    config : ReleasedPlanConfig
-        The stage's section, with `filter`'s rules.
-    seed : int
-        Of the pipeline.
-    """
+    """Says, round by round, which candidates of a scene to search next."""
 
     def __init__(self, candidates: Candidates, paper: PaperScene, config: ReleasedPlanConfig, seed: int) -> None:
         self._of, self._paper, self._config, self._seed = candidates, paper, config, seed
@@ -109,13 +83,7 @@ class Draw:
         return self._up_to_margin()
 
     def more(self, routes: Sequence[Route | None]) -> Integers:
-        """Rows of the candidates that are searched next, (m,) int64, ascending; none where there is enough.
-
-        Parameters
-        ----------
-        routes : sequence of n Route or None
-            What was searched until now.
-        """
+        """Rows of the candidates that are searched next, (m,) int64, ascending; none where there is enough."""
         searched = [(k, route) for k, route in enumerate(routes) if route is not None]
         done = np.array([k for k, _ in searched], dtype=np.int64)
         outcomes = np.array([route.outcome for _, route in searched], dtype="U24")

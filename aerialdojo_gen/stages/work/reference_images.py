@@ -36,18 +36,6 @@ def run(job: Job, config: ReferenceImagesConfig) -> Output:
     How far back an object fits the picture is the anchor's to say (`step_back_m` of the table ``anchors``); the
     configuration says how far back it may be taken. A part that tells what the object is counts as shown where it has
     `LEAST_SHARE` of the picture's pixels.
-
-    Parameters
-    ----------
-    job : Job
-        Reads ``objects`` and ``anchors``.
-    config : ReferenceImagesConfig
-
-    Returns
-    -------
-    Output
-        ``references``, a row an object; an object without a selected anchor has no picture (``no_anchor``), one that
-        its picture does not show has no box (``not_in_view``).
     """
     objects = job.read("objects").to_pylist()
     anchors = {row["object_id"]: row for row in job.read("anchors").to_pylist() if row["selected"]}
@@ -94,21 +82,7 @@ def run(job: Job, config: ReferenceImagesConfig) -> Output:
 def missing_tells(
     instance: Instance, camera: Camera, world_from_camera: NDArray[np.float64], mask: NDArray[np.bool_]
 ) -> list[str]:
-    """Which of the parts that tell what an instance is a picture does not show.
-
-    Parameters
-    ----------
-    instance : Instance
-    camera : Camera
-    world_from_camera : (4, 4) float64
-    mask : (H, W) bool
-        Pixels that show the instance.
-
-    Returns
-    -------
-    list of str
-        Names of parts with less than `LEAST_SHARE` of the picture's pixels.
-    """
+    """Names of the identifying parts with less than `LEAST_SHARE` of a picture's pixels; mask is (H, W) bool."""
     names = () if instance.anatomy is None else instance.anatomy.tells
     if not names:
         return []
@@ -119,19 +93,7 @@ def missing_tells(
 
 
 def instance_map(rays: RayCaster, camera: Camera, world_from_camera: NDArray[np.float64]) -> NDArray[np.int32]:
-    """Which instance every pixel shows.
-
-    Parameters
-    ----------
-    rays : RayCaster
-    camera : Camera
-    world_from_camera : (4, 4) float64
-
-    Returns
-    -------
-    (H, W) int32
-        Index into ``rays.nodes``, -1 for the sky.
-    """
+    """Index (H, W) of the instance that every pixel shows, -1 for the sky."""
     return _window(rays, camera, world_from_camera, 0, 0, camera.width, camera.height)
 
 
@@ -139,25 +101,7 @@ def instance_mask(
     rays: RayCaster, instance: int, vertices: NDArray[np.float64], camera: Camera,
     world_from_camera: NDArray[np.float64], drawn: NDArray[np.int32] | None = None,
 ) -> NDArray[np.bool_]:  # fmt: skip
-    """Which pixels show an instance: `instance_map` compared with it, looked at only where the instance can be.
-
-    Parameters
-    ----------
-    rays : RayCaster
-    instance : int
-        Index into ``rays.nodes``.
-    vertices : (n, 3) float64
-        The instance's, metres, world frame.
-    camera : Camera
-    world_from_camera : (4, 4) float64
-    drawn : (H, W) int32, optional
-        What a renderer says of `instance_map`. Rays then are cast where it may be wrong: near the instance's outline,
-        at one pixel in so many elsewhere, and around each pixel where they say otherwise.
-
-    Returns
-    -------
-    (H, W) bool
-    """
+    """Pixels (H, W) that show an instance; with a drawn id map rays are cast only where it may be wrong."""
     mask = np.zeros((camera.height, camera.width), dtype=np.bool_)
     u0, v0, u1, v1 = box_px(camera, world_from_camera, vertices)
     if u0 < u1 and v0 < v1:

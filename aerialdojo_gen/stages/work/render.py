@@ -30,22 +30,7 @@ from aerialdojo_gen.store.tables import from_rows
 def run(job: Job, config: RenderConfig) -> Output:
     """Record this shard's share of the scene's sample.
 
-    Parameters
-    ----------
-    job : Job
-        Reads ``routes/train`` or ``routes/test``; writes into ``media/<scene>/<nav_id>``. A trajectory
-        that lies there finished is not recorded again.
-    config : RenderConfig
-
-    Returns
-    -------
-    Output
-        ``recordings``, a row a video, and ``frames``, a row a frame; the counts are quality flags, and frames.
-
-    Raises
-    ------
-    BudgetSpent
-        The job's deadline came; finished trajectories are kept.
+    Trajectories that lie there finished are not recorded again.
     """
     routes = {row["nav_id"]: row for table in tables(config, job.scene) for row in job.read(table).to_pylist()}
     mine = choose(routes.values(), config.limit, job.seed)[job.part :: job.parts]

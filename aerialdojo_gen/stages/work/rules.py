@@ -25,32 +25,9 @@ def judge(
     plan_detour: NDArray[np.float64] | None = None,
     visible_at_start: NDArray[np.float64] | None = None,
 ) -> tuple[NDArray[np.str_], NDArray[np.str_]]:
-    """Judge candidates by the paper's rules (section on filtering), and by two more that are off by default.
+    """Judge candidates by the paper's rules (section on filtering).
 
-    Parameters
-    ----------
-    outcome : (n,) str
-        One of `aerialdojo_gen.store.schemas.OUTCOMES`.
-    euclidean_m, length_m : (n,) float64
-        d_E and L, metres; the length of an unsolved plan does not matter.
-    n_actions : (n,) int32
-        Actions of the route, Stop included.
-    config : FilterConfig
-        Thresholds and settings.
-    plan_detour : (n,) float64, optional
-        L over the shortest L without obstacles; NaN, or none at all, where it is not known, which no
-        `min_plan_detour` above 1 lets pass.
-    visible_at_start : (n,) float64, optional
-        Share of the target that the start sees; where it is not known no `max_visible_at_start` below 1 lets it pass.
-
-    Returns
-    -------
-    reason : (n,) str
-        ``"kept"``, or the first rule that fails: the outcome in lower case (``"no_path"``), ``"too_close"``,
-        ``"too_short"``, ``"too_long"``, ``"near_straight"``, ``"over_budget"``, ``"small_plan_detour"``,
-        ``"target_in_view"``.
-    setting : (n,) str
-        ``"base"``, ``"standard"``, ``"long_horizon"``, or ``""`` where the length fits none.
+    Reason and setting, (n,) each, ``"kept"`` or the first rule that fails.
     """
     solved = outcome == "SOLVED"
     # Fixed widths: numpy would cut a longer word to the width of the first ones.

@@ -37,27 +37,7 @@ def _take(table: pa.Table, key: str, ids: pa.ChunkedArray) -> pa.Table:
 def routes_table(
     scene: str, kept: pa.Table, pairs: pa.Table, plans: pa.Table, goals: pa.Table, key: bytes
 ) -> pa.Table:
-    """Make the routes of the kept candidates.
-
-    Parameters
-    ----------
-    scene : str
-        Name of the scene.
-    kept : pyarrow.Table
-        Kept rows of `verdicts`.
-    pairs, plans : pyarrow.Table
-        All rows of the scene.
-    goals : pyarrow.Table
-        The selected anchors, one an object.
-    key : bytes
-        Of `aerialdojo_gen.release.ids.key_of`.
-
-    Returns
-    -------
-    pyarrow.Table
-        Rows of `aerialdojo_gen.store.schemas.ROUTES`, in its order, with ``action_budget`` and ``lot`` as further
-        columns.
-    """
+    """Make the routes of the kept candidates."""
     pairs = _take(pairs, "pair_id", kept.column("pair_id"))
     plans = _take(plans, "pair_id", kept.column("pair_id"))
     goal = _take(goals, "object_id", pairs.column("target_object_id"))
@@ -79,21 +59,9 @@ def routes_table(
 
 
 def splits_of(routes: pa.Table, train: NDArray[np.bool_], out: set[int]) -> dict[str, pa.Array]:
-    """Say of routes what training has seen of their ends, and on which side of the split by objects they are.
+    """What training has seen of the ends of routes, and their side of the split by objects.
 
-    Parameters
-    ----------
-    routes : pyarrow.Table
-        What `routes_table` returns.
-    train : (n,) bool
-        Which of them train, by the paper's split.
-    out : set of int
-        The objects that are held out.
-
-    Returns
-    -------
-    dict of str to pyarrow.Array
-        The columns of `aerialdojo_gen.store.schemas.TOLD_OF_SPLITS`, (n,) each.
+    (n,) columns of `TOLD_OF_SPLITS`.
     """
     target, start = (routes.column(f"{end}_object_id").to_numpy() for end in ("target", "start"))
     # A scene has few anchors an object: one number is both.
@@ -112,26 +80,7 @@ def splits_of(routes: pa.Table, train: NDArray[np.bool_], out: set[int]) -> dict
 def tasks_table(
     routes: pa.Table, train: NDArray[np.bool_], scene: dict[str, Any], objects: pa.Table, out: set[int]
 ) -> pa.Table:
-    """Make both instances of every navigation task: what an agent may know.
-
-    Parameters
-    ----------
-    routes : pyarrow.Table
-        What `routes_table` returns.
-    train : (n,) bool
-        Which of them train.
-    scene : dict
-        The scene's row of `scenes`.
-    objects : pyarrow.Table
-        The scene's objects, with the landmark's name as ``landmark`` and ``reference_image_id``.
-    out : set of int
-        The objects that the split by objects holds out.
-
-    Returns
-    -------
-    pyarrow.Table
-        Rows of `TASKS`, 2n of them, in its order.
-    """
+    """Make both instances of every navigation task, 2n rows of `TASKS`: what an agent may know."""
     n = routes.num_rows
     target = _take(objects, "object_id", routes.column("target_object_id"))
     nulls = pa.nulls(n, pa.string())

@@ -27,22 +27,9 @@ _TOLD, _BARELY_TOLD = 0.0014, 0.0007
 
 
 def fitting_m(vertices: Floats, position_m: Floats, yaw_rad: float, fov_deg: float) -> float:
-    """How far back a level camera must go for an object to fit its square picture.
+    """How far, metres, a level camera must go back for an object's vertices (n, 3) to fit its picture.
 
-    Parameters
-    ----------
-    vertices : (n, 3) float64
-        The object's, metres, world frame.
-    position_m : (3,) float64
-        Where the camera is.
-    yaw_rad : float
-        Its yaw; it goes back along its own axis.
-    fov_deg : float
-
-    Returns
-    -------
-    float
-        Metres; 0 where it fits already.
+    0 where they do.
     """
     half = _FILLED * math.tan(math.radians(fov_deg) / 2.0)
     x, y, z = (float(c) for c in position_m)
@@ -59,25 +46,7 @@ def _fitting(vertices: Floats, x: float, y: float, z: float, cos: float, sin: fl
 
 
 def telling_m(patches: Sequence[Patch], seen: Floats, position_m: Floats, yaw_rad: float, fov_deg: float) -> float:
-    """How far back a camera may go before a part that tells what the object is gets too small to be told.
-
-    Parameters
-    ----------
-    patches : sequence of Patch
-        Points of the parts.
-    seen : (len(patches),) float64
-        Share of each that is seen from the anchor.
-    position_m : (3,) float64
-        The anchor.
-    yaw_rad : float
-        Its yaw.
-    fov_deg : float
-
-    Returns
-    -------
-    float
-        Metres; infinite where none of the parts is seen from the anchor.
-    """
+    """How far, metres, a camera may go back before an identifying part gets too small; inf where none is seen."""
     most = math.inf
     ahead = np.array([math.cos(yaw_rad), math.sin(yaw_rad), 0.0])
     for patch, share in zip(patches, seen.tolist(), strict=True):
@@ -100,28 +69,7 @@ def step_back_m(
 def steps_back_m(
     world: World, instance: int, points: Floats, positions_m: Floats, yaw_rad: Floats, fov_deg: float, most_m: Floats
 ) -> Floats:
-    """How far to step back: as far as the object needs and the way is free, to where most of it is in sight.
-
-    Parameters
-    ----------
-    world : World
-    instance : int
-        The object's index in the scene.
-    points : (m, 3) float64
-        On its surface, metres, world frame.
-    positions_m : (n, 3) float64
-        Anchors of the object.
-    yaw_rad : (n,) float64
-        Their yaws.
-    fov_deg : float
-    most_m : (n,) float64
-        As far as it may go from each.
-
-    Returns
-    -------
-    (n,) float64
-        Metres, in centimetres; 0 where the picture is taken from the anchor.
-    """
+    """How far, metres (n,), to pull the camera back: as far as the object needs and the way is free."""
     steps = np.zeros(len(positions_m))
     vertices = world.scene.instances[instance].vertices
     fitting = [fitting_m(vertices, p, yaw, fov_deg) for p, yaw in zip(positions_m, yaw_rad.tolist(), strict=True)]

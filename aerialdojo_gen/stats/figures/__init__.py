@@ -18,28 +18,7 @@ __all__ = ["draw_figures"]
 
 
 def draw_figures(data: Where, scenes: Sequence[str], folder: Path) -> list[Path]:
-    """Draw all figures.
-
-    Parameters
-    ----------
-    data : DataRoot, Path or str
-        The data root; without a scene's mesh its map has no ground.
-    scenes : sequence of str
-        Scenes of the release.
-    folder : Path
-        Where they are written; made where it is missing.
-
-    Returns
-    -------
-    list of Path
-        ``<figure>.png`` and ``<figure>.svg``; the same release gives the same bytes. Of a release that does not say
-        how hard its tasks are there is no figure of it.
-
-    Raises
-    ------
-    StoreError
-        A part of the release is missing or damaged, or the folder cannot be written.
-    """
+    """Draw all figures."""
     root = open_root(data)
     routes: Routes = read_routes(root, scenes)
     tasks = read_tasks(root, scenes)

@@ -23,13 +23,7 @@ _MOST_NAMES = 160
 
 
 def categories(root: DataRoot, scenes: Sequence[str]) -> Figure:
-    """Draw every category as large as it has objects, in the colour of the family where most of them stand.
-
-    Raises
-    ------
-    StoreError
-        A part of the release is missing or damaged.
-    """
+    """Draw every category as large as it has objects, in the colour of the family where most of them stand."""
     homes: defaultdict[str, Counter[str]] = defaultdict(Counter)
     for scene in scenes:
         family = store.read_scene(root, "release/scenes", scene, ["family"]).to_pylist()[0]["family"]
@@ -39,13 +33,7 @@ def categories(root: DataRoot, scenes: Sequence[str]) -> Figure:
 
 
 def names(root: DataRoot, scenes: Sequence[str]) -> Figure:
-    """Draw the names of the objects (paper, Fig. 2), each as large as it is sought by tasks, the most sought ones.
-
-    Raises
-    ------
-    StoreError
-        A part of the release is missing or damaged.
-    """
+    """Draw the names of the objects (paper, Fig. 2), each as large as it is sought by tasks, the most sought ones."""
     homes: defaultdict[str, Counter[str]] = defaultdict(Counter)
     for scene in scenes:
         for subset in ("train", "test"):

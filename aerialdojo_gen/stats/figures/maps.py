@@ -30,13 +30,7 @@ _MARKS: dict[str, dict[str, Any]] = {
 
 
 def maps(root: DataRoot, scenes: Sequence[str]) -> Figure:
-    """Draw a small map of every scene, north up, each with a scale of its own.
-
-    Raises
-    ------
-    StoreError
-        A part of the release is missing or damaged.
-    """
+    """Draw a small map of every scene, north up, each with a scale of its own."""
     rows = [store.read_scene(root, "release/scenes", scene).to_pylist()[0] for scene in scenes]
     lines = [rows[k : k + _COLUMNS] for k in range(0, len(rows), _COLUMNS)]
     sizes = [[_size_in(row) for row in line] for line in lines]

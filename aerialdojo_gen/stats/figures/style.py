@@ -52,33 +52,20 @@ _STYLE: Any = {
 
 @dataclass(frozen=True)
 class Routes:
-    """One entry a navigation task.
+    """One entry a navigation task."""
 
-    Attributes
-    ----------
-    family, scene_type, partition, subset, setting : (n,) arrays of str
-    length_m, detour_ratio : (n,) float64
-    n_actions : (n,) int32
-    """
-
-    family: NDArray[np.str_]
+    family: NDArray[np.str_]  # (n,) arrays of str
     scene_type: NDArray[np.str_]
     partition: NDArray[np.str_]
     subset: NDArray[np.str_]
     setting: NDArray[np.str_]
-    length_m: NDArray[np.float64]
+    length_m: NDArray[np.float64]  # (n,) float64
     detour_ratio: NDArray[np.float64]
-    n_actions: NDArray[np.int32]
+    n_actions: NDArray[np.int32]  # (n,) int32
 
 
 def read_routes(root: DataRoot, scenes: Sequence[str]) -> Routes:
-    """Read what the charts show of the scenes' routes.
-
-    Raises
-    ------
-    StoreError
-        A part is missing or damaged.
-    """
+    """Read what the charts show of the scenes' routes."""
     columns = ["setting", "length_m", "detour_ratio", "n_actions"]
     belongs = ("family", "scene_type", "partition")
     tables: list[pa.Table] = []
@@ -106,13 +93,7 @@ def styled() -> AbstractContextManager[None]:
 
 
 def save(figure: Figure, folder: Path, name: str) -> list[Path]:
-    """Write a figure as PNG and as SVG, each whole or not at all, without a date.
-
-    Raises
-    ------
-    StoreError
-        The folder cannot be written.
-    """
+    """Write a figure as PNG and as SVG, each whole or not at all, without a date."""
     paths = []
     with styled():
         for suffix, metadata in ((".png", {"Software": None}), (".svg", {"Date": None, "Creator": None})):

@@ -31,31 +31,14 @@ def xyz(what: str, prefix: str = "") -> list[pa.Field]:
 
 @dataclass(frozen=True)
 class TableSpec:
-    """A table of the store.
+    """A table of the store."""
 
-    Attributes
-    ----------
-    name : str
-        Folder of the table under the data directory.
-    schema : pyarrow.Schema
-        Fields with unit and meaning in their metadata.
-    key : tuple of str
-        Columns that identify a row.
-    clusters : tuple of str
-        Columns by which the rows of a shard are sorted before the key; a row group holds one value of each, so that a
-        filter on them reads no other rows.
-    plain : tuple of str
-        Columns whose values compress better as they stand than by way of a dictionary.
-    command : str
-        The stage that writes it, for messages; empty where tables of several places are of this kind.
-    """
-
-    name: str
-    schema: pa.Schema
-    key: tuple[str, ...]
+    name: str  # Folder of the table under the data directory
+    schema: pa.Schema  # Fields with unit and meaning in their metadata
+    key: tuple[str, ...]  # Columns that identify a row
     clusters: tuple[str, ...] = ()
-    plain: tuple[str, ...] = ()
-    command: str = ""
+    plain: tuple[str, ...] = ()  # Columns whose values compress better as they stand than by way of a dictionary
+    command: str = ""  # The stage that writes it, for messages; empty where tables of several places are of this kind
 
     @property
     def order(self) -> tuple[str, ...]:
