@@ -10,16 +10,16 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING, Any
 
-from aerialdojo_gen.common.version import __version__
+from aerialdojo_gen.base.version import __version__
 
 if TYPE_CHECKING:
+    from aerialdojo_gen.base.config.keys import config_keys
+    from aerialdojo_gen.base.errors import AerialDojoError
     from aerialdojo_gen.benchmark.env import make_env
-    from aerialdojo_gen.browse.release import Release, open_release
-    from aerialdojo_gen.config.keys import config_keys
-    from aerialdojo_gen.errors import AerialDojoError
+    from aerialdojo_gen.dataset.build import run_pipeline
+    from aerialdojo_gen.dataset.release import Release, open_release
+    from aerialdojo_gen.dataset.status import pipeline_status
     from aerialdojo_gen.exchange.hub import pull_release, push_to_hub
-    from aerialdojo_gen.pipeline.run import run_pipeline
-    from aerialdojo_gen.pipeline.status import pipeline_status
     from aerialdojo_gen.pipeline.template import init_config
     from aerialdojo_gen.planning.planner import Planner, plan
     from aerialdojo_gen.rendering.gl import GlRenderer
@@ -45,20 +45,20 @@ __all__ = [
 
 # Imported when first asked for: with them come numba, FCL, OpenGL and PyArrow, and --help must not wait for those.
 _HOMES = {
-    "AerialDojoError": "aerialdojo_gen.errors",
+    "AerialDojoError": "aerialdojo_gen.base.errors",
     "GlRenderer": "aerialdojo_gen.rendering.gl",
     "Planner": "aerialdojo_gen.planning.planner",
-    "Release": "aerialdojo_gen.browse.release",
-    "config_keys": "aerialdojo_gen.config.keys",
+    "Release": "aerialdojo_gen.dataset.release",
+    "config_keys": "aerialdojo_gen.base.config.keys",
     "init_config": "aerialdojo_gen.pipeline.template",
     "make_env": "aerialdojo_gen.benchmark.env",
-    "open_release": "aerialdojo_gen.browse.release",
-    "pipeline_status": "aerialdojo_gen.pipeline.status",
+    "open_release": "aerialdojo_gen.dataset.release",
+    "pipeline_status": "aerialdojo_gen.dataset.status",
     "plan": "aerialdojo_gen.planning.planner",
     "pull_release": "aerialdojo_gen.exchange.hub",
     "push_to_hub": "aerialdojo_gen.exchange.hub",
     "read_glb": "aerialdojo_gen.scenes.glb",
-    "run_pipeline": "aerialdojo_gen.pipeline.run",
+    "run_pipeline": "aerialdojo_gen.dataset.build",
 }
 
 

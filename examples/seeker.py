@@ -5,7 +5,7 @@ import re
 import cv2
 import numpy as np
 
-from aerialdojo_gen.agents import AgentBase, Sensors
+from aerialdojo_gen.benchmark.agents import AgentBase, Sensors
 
 STOP, SLOW, AHEAD, UP, LEFT, RIGHT = 0, 1, 2, 10, 14, 15  # ids of docs/agent.md; SLOW is 1 m, AHEAD 3 m
 HUES = {"red": 0, "orange": 12, "yellow": 28, "green": 60, "teal": 90, "blue": 110, "purple": 140}  # of 180

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import hypothesis
 import pytest
 
-from aerialdojo_gen.common import advice
+from aerialdojo_gen.base import cli_context as advice
 
 if TYPE_CHECKING:
     from support.planting import Planted
@@ -86,7 +86,15 @@ def smoke(project: Path, shared: Path) -> Path:
     with (shared / "smoke.lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         if not whole.exists():
-            command = [sys.executable, "-m", "aerialdojo_gen.cli", "run", "pipelines/smoke.toml", "--data", str(data)]
+            command = [
+                sys.executable,
+                "-m",
+                "aerialdojo_gen.cli.app",
+                "run",
+                "pipelines/smoke.toml",
+                "--data",
+                str(data),
+            ]
             done = subprocess.run(command, cwd=project, capture_output=True, text=True, check=False)
             assert done.returncode == 0, done.stderr
             whole.touch()

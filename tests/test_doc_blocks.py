@@ -20,8 +20,8 @@ from support import foreign, task_files
 from support.doc_blocks import blocks, commands, is_shell
 from support.plain_install import as_script, plain_site, run_plain
 
-from aerialdojo_gen.agents.goal import N_ACTIONS, Goal, Observation, Rules
-from aerialdojo_gen.config.pipeline import Pipeline
+from aerialdojo_gen.base.config.pipeline import Pipeline
+from aerialdojo_gen.benchmark.agents.goal import N_ACTIONS, Goal, Observation, Rules
 from aerialdojo_gen.store import shards
 from aerialdojo_gen.store.schemas import ACTION_NAMES
 
@@ -36,12 +36,12 @@ NOT_RUN = {
     r"(\S*/)?(uv )?pip install .*": "installs packages",
     r"train .*|evaluate --agent policy .*|report small .*|tensorboard .*": "needs the "
     "extra train: tests/learning/test_training.py does",
-    r"(annotate|view) .*": "serves until Ctrl-C: tests/annotate/test_annotate_tool_browser.py, "
-    "tests/view/test_view_page.py",
+    r"(annotate|view) .*": "serves until Ctrl-C: tests/studio/test_annotate_tool_browser.py, "
+    "tests/studio/test_view_page.py",
     r"run my-scenes/.*": "runs in tests/imports/test_own_scene.py",
     r"add-scene \S+ (odm_|city\.).*": "reads a scan, a city: tests/imports/test_cuts.py and "
     "tests/imports/test_surfaces.py make some",
-    r"evaluate --preset .*": "asks a language model: tests/llm/test_llm_evaluate.py does, of a server of its own",
+    r"evaluate --preset .*": "asks a language model: tests/benchmark/test_llm_evaluate.py does, of a server of its own",
     r"vllm .*|docker .*|helm .*|kubectl .*": "needs what is not of this project",
     r".*(s3://|AWS_).*": "needs an object store: tests/store/test_readers_on_s3.py has one",
     r"sudo .*|python3.11 -m venv .*|git .*|ray .*|RAY_USAGE.*|.*--executor ray.*": "makes a cluster: "
@@ -50,10 +50,10 @@ NOT_RUN = {
     "tests/exchange/test_hub.py has one",
     r"(add-map|add-terrain) .*": "needs an extract or a height model: tests/imports/test_add_map.py, "
     "tests/imports/test_add_terrain.py",
-    r"validate --release DOWNLOADED .*": "runs in tests/validate/test_validate_release.py, on a release "
+    r"validate --release DOWNLOADED .*": "runs in tests/dataset/test_validate_release.py, on a release "
         "that lies elsewhere",
     r"cp -al .*|rm -r .*|run pipelines/aerialdojo-hard.toml .*": "plans 42 scenes: "
-    "tests/stages/test_filter.py has its limits",
+    "tests/pipeline/test_filter.py has its limits",
     r"import-benchmark exports/.*": "runs in tests/exchange/test_export_roundtrip.py",
 }  # fmt: skip
 # Whole blocks that are a script or a file, not commands one by one.

@@ -49,9 +49,9 @@ def resolves(dotted: str) -> bool:
 
 
 def test_names_are_told_from_what_is_no_name():
-    assert resolves("aerialdojo_gen.common.names.unknown")
+    assert resolves("aerialdojo_gen.base.names.unknown")
     assert resolves("aerialdojo_gen.open_release")
-    assert not resolves("aerialdojo_gen.common.names.known_scenes")
+    assert not resolves("aerialdojo_gen.base.names.known_scenes")
     assert not resolves("aerialdojo_gen.tasks.store")
 
 

@@ -11,8 +11,8 @@ import typer.main
 import yaml
 from support.browser import chromium, errors, until
 
-from aerialdojo_gen.cli import app
-from aerialdojo_gen.config.keys import config_keys
+from aerialdojo_gen.base.config.keys import config_keys
+from aerialdojo_gen.cli.app import app
 from aerialdojo_gen.store.layout import LAYOUT
 
 ROOT = next(folder for folder in Path(__file__).resolve().parents if (folder / "pyproject.toml").is_file())

@@ -62,7 +62,7 @@ def test_the_contracts_hold_and_an_arrow_that_goes_up_breaks_them(copied):
     assert "0 broken" in result.stdout
     with (copied / "geometry" / "soup.py").open("a") as file:
         file.write("\n\ndef up():\n    from aerialdojo_gen.planning import collision\n\n    return collision\n")
-    with (copied / "validate" / "words.py").open("a") as file:
+    with (copied / "dataset" / "validate" / "descriptions.py").open("a") as file:
         file.write("\nimport fcl\n")
     result = lint(copied)
     assert result.returncode == 1
@@ -105,7 +105,7 @@ def test_pybullet_is_loaded_by_who_draws_with_it():
     code = (
         "import sys\n"
         "from aerialdojo_gen.rendering import backend, casters, checks, gl, picture, raycast\n"
-        "from aerialdojo_gen.stages.work import anchor_sample, reference_images, render\n"
+        "from aerialdojo_gen.pipeline.stages.work import anchor_sample, reference_images, render\n"
         "from aerialdojo_gen.benchmark import eyes\n"
         "assert 'pybullet' not in sys.modules\n"
         "from aerialdojo_gen.rendering import world\n"

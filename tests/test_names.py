@@ -3,9 +3,9 @@
 import pytest
 from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
 
-from aerialdojo_gen.common.explain import explain, faults_of
-from aerialdojo_gen.common.names import choose_scenes, closest, did_you_mean, nearest, unknown
-from aerialdojo_gen.errors import UsageError
+from aerialdojo_gen.base.errors import UsageError
+from aerialdojo_gen.base.explain import explain, faults_of
+from aerialdojo_gen.base.names import choose_scenes, closest, did_you_mean, nearest, unknown
 
 SCENES = ["N_Forest_0", "U_Mall_0", "U_Mall_1"]
 

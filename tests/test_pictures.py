@@ -7,7 +7,8 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from aerialdojo_gen.common.pictures import (
+from aerialdojo_gen.base.errors import RenderError
+from aerialdojo_gen.base.pictures import (
     FRAME_PNG,
     REFERENCE_PNG,
     TEXTURE_PNG,
@@ -18,7 +19,6 @@ from aerialdojo_gen.common.pictures import (
     encode_jpeg,
     encode_png,
 )
-from aerialdojo_gen.errors import RenderError
 
 
 def noise(*shape, dtype=np.uint8):

@@ -5,7 +5,7 @@ import re
 
 import pytest
 
-from aerialdojo_gen.common.text_table import Column, TextTable, facts, terminal_width
+from aerialdojo_gen.base.text_table import Column, TextTable, facts, terminal_width
 
 FIGURES = TextTable(
     "scene",

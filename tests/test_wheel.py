@@ -26,7 +26,7 @@ def unpacked(project, tmp_path_factory):
 
 def run(site, *args):
     done = subprocess.run(
-        [sys.executable, "-m", "aerialdojo_gen.cli", *map(str, args)],
+        [sys.executable, "-m", "aerialdojo_gen.cli.app", *map(str, args)],
         cwd=site, env=os.environ | {"PYTHONPATH": str(site)}, capture_output=True, text=True, check=False,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
@@ -59,7 +59,7 @@ def test_every_pipeline_that_is_shipped_goes_by_its_name(unpacked, project):
     env = os.environ | {"PYTHONPATH": str(unpacked)}
     names = sorted(path.stem for path in (project / "pipelines").glob("*.toml"))
     assert {"smoke", "aerialdojo-200k"} <= set(names)
-    text = "import sys; from aerialdojo_gen.pipeline.run import open_pipeline as o; "
+    text = "import sys; from aerialdojo_gen.dataset.build import open_pipeline as o; "
     text += "print(*[o(name, 'd')[0].name for name in sys.argv[1:]])"
     done = subprocess.run(
         [sys.executable, "-c", text, *names], cwd=unpacked, env=env, capture_output=True, text=True, check=True
@@ -88,7 +88,7 @@ def test_a_recipe_that_is_shipped_goes_by_its_name_anywhere(unpacked, project, t
 
 def test_where_no_release_is_the_wheel_advises_what_it_has(unpacked, tmp_path):
     done = subprocess.run(
-        [sys.executable, "-m", "aerialdojo_gen.cli", "stats", "--data", str(tmp_path / "none")],
+        [sys.executable, "-m", "aerialdojo_gen.cli.app", "stats", "--data", str(tmp_path / "none")],
         cwd=tmp_path, env=os.environ | {"PYTHONPATH": str(unpacked)}, capture_output=True, text=True, check=False,
     )  # fmt: skip
     assert done.returncode == 1
@@ -119,7 +119,7 @@ assert choose_renderer("auto").name == "gl"
 from aerialdojo_gen.rendering.preview import look_at
 from aerialdojo_gen.rendering.probe import probe_scene
 assert look_at(probe_scene(), (-6, -6, 6), (0, 0, 1), 32, 24).std() > 5
-from aerialdojo_gen.errors import RenderError
+from aerialdojo_gen.base.errors import RenderError
 try:
     choose_renderer("pybullet")
 except RenderError as error:

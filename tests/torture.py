@@ -166,14 +166,14 @@ class Server:
 def serve() -> None:
     """Be a `Server`'s process."""
     for name in (
-        "stages.work.render",
-        "stages.work.plan",
-        "stages.work.anchor_sample",
+        "pipeline.stages.work.render",
+        "pipeline.stages.work.plan",
+        "pipeline.stages.work.anchor_sample",
         "benchmark.runner",
         "exchange.importing",
     ):
         importlib.import_module(f"aerialdojo_gen.{name}")
-    cli = importlib.import_module("aerialdojo_gen.cli")
+    cli = importlib.import_module("aerialdojo_gen.cli.app")
     for line in iter(sys.stdin.readline, ""):
         arguments, env, said = json.loads(line)
         child = os.fork()
@@ -359,7 +359,15 @@ def main() -> None:
         base: Path | None = asked.base
         if base is None:
             base = Path(folder) / "smoke"
-            command = [sys.executable, "-m", "aerialdojo_gen.cli", "run", "pipelines/smoke.toml", "--data", str(base)]
+            command = [
+                sys.executable,
+                "-m",
+                "aerialdojo_gen.cli.app",
+                "run",
+                "pipelines/smoke.toml",
+                "--data",
+                str(base),
+            ]
             subprocess.run(command, cwd=ROOT, check=True)
         bench = Bench(Path(folder), base)
         became: Counter[tuple[str, str]] = Counter()

@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping
 
-from aerialdojo_gen.annotations.buried import Surface
 from aerialdojo_gen.annotations.colours import uncoloured
+from aerialdojo_gen.annotations.hidden_parts import Surface
 from aerialdojo_gen.scenes.claims import untrue
 from aerialdojo_gen.scenes.looks import Look
 from aerialdojo_gen.scenes.model import Instance, Material

@@ -17,8 +17,8 @@ from aerialdojo_gen.annotations.ambiguity import Ambiguity
 from aerialdojo_gen.annotations.describing import STAGE, Teller, Vocabulary
 from aerialdojo_gen.annotations.format import Annotations, Landmark, Object
 from aerialdojo_gen.annotations.landmarks import choose_landmarks, spread_m
-from aerialdojo_gen.common.rng import rank
-from aerialdojo_gen.errors import AnnotationError
+from aerialdojo_gen.base.errors import AnnotationError
+from aerialdojo_gen.base.rng import rank
 from aerialdojo_gen.scenes.catalogue import Catalogue
 from aerialdojo_gen.scenes.model import Instance, Scene
 

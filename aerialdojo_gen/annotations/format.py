@@ -10,8 +10,8 @@ from typing import Annotated, Any, TypeVar
 from pydantic import BaseModel, ConfigDict, Field, StrictFloat, StrictInt, StrictStr, ValidationError
 
 from aerialdojo_gen.annotations.positions import Document, Fault, read_json
-from aerialdojo_gen.common.explain import faults_of
-from aerialdojo_gen.common.names import unknown
+from aerialdojo_gen.base.explain import faults_of
+from aerialdojo_gen.base.names import unknown
 from aerialdojo_gen.store.atomic import atomic_file
 
 FORMAT = "aerialdojo-annotations"

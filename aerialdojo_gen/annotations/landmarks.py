@@ -8,7 +8,7 @@ import numpy as np
 
 from aerialdojo_gen.annotations.describing import NO_THING, Vocabulary
 from aerialdojo_gen.annotations.format import Landmark
-from aerialdojo_gen.errors import AnnotationError
+from aerialdojo_gen.base.errors import AnnotationError
 from aerialdojo_gen.scenes.model import Instance
 
 # By so much the tallest must be taller than the next, and the northernmost farther north, to be called so.

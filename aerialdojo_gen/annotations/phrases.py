@@ -8,8 +8,8 @@ from itertools import pairwise
 from pathlib import Path
 
 from aerialdojo_gen.annotations.claims import spoken
-from aerialdojo_gen.common.bounded import read_toml
-from aerialdojo_gen.errors import AnnotationError
+from aerialdojo_gen.base.errors import AnnotationError
+from aerialdojo_gen.base.safe_parse import read_toml
 from aerialdojo_gen.scenes.model import Instance
 
 # Said before the noun, in the order of English: a small rotten brown wooden bench.

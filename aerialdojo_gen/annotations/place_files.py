@@ -15,9 +15,9 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from aerialdojo_gen.common.bounded import read_toml
-from aerialdojo_gen.common.names import nearest
-from aerialdojo_gen.errors import AnnotationError
+from aerialdojo_gen.base.errors import AnnotationError
+from aerialdojo_gen.base.names import nearest
+from aerialdojo_gen.base.safe_parse import read_toml
 
 Conditions = Mapping[str, Any]
 

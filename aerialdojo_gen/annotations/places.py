@@ -11,7 +11,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from aerialdojo_gen.annotations.grounds import GROUND, Grounds
+from aerialdojo_gen.annotations.ground_materials import GROUND, Grounds
 from aerialdojo_gen.annotations.place_files import SIDES, Conditions
 from aerialdojo_gen.annotations.relations import SceneGeometry
 

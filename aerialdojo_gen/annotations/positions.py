@@ -10,8 +10,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, cast
 
-from aerialdojo_gen.common.bounded import JsonPath, beyond, scan_json
-from aerialdojo_gen.errors import BeyondBounds, brief
+from aerialdojo_gen.base.errors import BeyondBounds, brief
+from aerialdojo_gen.base.safe_parse import JsonPath, beyond, scan_json
 
 MOST_VALUES = 200_000
 _HALF = re.compile("[\ud800-\udfff]")

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 from aerialdojo_gen.annotations.describing import Teller, Vocabulary
 from aerialdojo_gen.annotations.format import Annotations, Object
-from aerialdojo_gen.common.advice import command
-from aerialdojo_gen.errors import AnnotationError
+from aerialdojo_gen.base.cli_context import command
+from aerialdojo_gen.base.errors import AnnotationError
 from aerialdojo_gen.scenes.catalogue import Catalogue
 from aerialdojo_gen.scenes.model import Scene
 

@@ -13,7 +13,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from aerialdojo_gen.common.kernels import njit
+from aerialdojo_gen.base.kernels import njit
 from aerialdojo_gen.geometry.angles import wrap_angle_rad
 from aerialdojo_gen.scenes.model import Scene
 from aerialdojo_gen.store.schemas import DIRECTIONS

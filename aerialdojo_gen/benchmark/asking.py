@@ -6,11 +6,11 @@ import operator
 from collections.abc import Callable
 from typing import Any
 
-from aerialdojo_gen.agents import Agent, InvalidAnswer, Usage
-from aerialdojo_gen.agents.goal import N_ACTIONS, Goal, Observation
-from aerialdojo_gen.agents.load import keep_traceback, place
-from aerialdojo_gen.common.secrets import Secrets
-from aerialdojo_gen.errors import AerialDojoError
+from aerialdojo_gen.base.errors import AerialDojoError
+from aerialdojo_gen.base.secrets import Secrets
+from aerialdojo_gen.benchmark.agents import Agent, InvalidAnswer, Usage
+from aerialdojo_gen.benchmark.agents.goal import N_ACTIONS, Goal, Observation
+from aerialdojo_gen.benchmark.agents.load import keep_traceback, place
 
 _TOLERATED = "--tolerate logs such episodes as failures and goes on, --traceback shows the agent's traceback"
 

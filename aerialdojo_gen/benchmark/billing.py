@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-from aerialdojo_gen.agents import Usage
+from aerialdojo_gen.benchmark.agents import Usage
 
 
 def sum_of(a: Usage | None, b: Usage | None) -> Usage | None:

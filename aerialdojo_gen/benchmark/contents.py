@@ -6,15 +6,15 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
+from aerialdojo_gen.base.errors import UsageError
+from aerialdojo_gen.base.names import unknown
+from aerialdojo_gen.base.paper_figures import PaperResult
 from aerialdojo_gen.benchmark import breakdowns, radii, tables
 from aerialdojo_gen.benchmark.difficulty import DIFFICULTY, SEEN, Partings, parting_tables, partings_of
 from aerialdojo_gen.benchmark.grid import Table
 from aerialdojo_gen.benchmark.paper_tables import result_tables
 from aerialdojo_gen.benchmark.profiles import Profile
 from aerialdojo_gen.benchmark.runs import Run
-from aerialdojo_gen.common.names import unknown
-from aerialdojo_gen.common.paper import PaperResult
-from aerialdojo_gen.errors import UsageError
 from aerialdojo_gen.store.root import DataRoot
 
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from aerialdojo_gen.errors import UsageError
+from aerialdojo_gen.base.errors import UsageError
 
 
 class TaskDraw:

@@ -12,11 +12,14 @@ import pyarrow.compute as pc
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from aerialdojo_gen.agents.goal import N_ACTIONS, Sensors
+from aerialdojo_gen.base.config.agreement import SUCCESS_RADIUS_M
+from aerialdojo_gen.base.config.sections import Embodiment
+from aerialdojo_gen.base.errors import UsageError
+from aerialdojo_gen.base.names import unknown
+from aerialdojo_gen.benchmark.agents.goal import N_ACTIONS, Sensors
 from aerialdojo_gen.benchmark.draw import TaskDraw
-from aerialdojo_gen.benchmark.episode import Episode
-from aerialdojo_gen.benchmark.eyes import look, mosaic
 from aerialdojo_gen.benchmark.flight import Flight
+from aerialdojo_gen.benchmark.observations import look, mosaic
 from aerialdojo_gen.benchmark.tasks import (
     MODALITIES,
     Selection,
@@ -27,10 +30,7 @@ from aerialdojo_gen.benchmark.tasks import (
     select,
 )
 from aerialdojo_gen.benchmark.texts import GoalText
-from aerialdojo_gen.common.names import unknown
-from aerialdojo_gen.config.agreement import SUCCESS_RADIUS_M
-from aerialdojo_gen.config.sections import Embodiment
-from aerialdojo_gen.errors import UsageError
+from aerialdojo_gen.dataset.episode import Episode
 from aerialdojo_gen.scenes.context import SEVERAL
 from aerialdojo_gen.store.root import DataRoot, Where, open_root
 from aerialdojo_gen.store.schemas import DIRECTIONS, VIEWS

@@ -10,9 +10,9 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from aerialdojo_gen.common.advice import command
-from aerialdojo_gen.common.names import unknown
-from aerialdojo_gen.errors import StoreError
+from aerialdojo_gen.base.cli_context import command
+from aerialdojo_gen.base.errors import StoreError
+from aerialdojo_gen.base.names import unknown
 from aerialdojo_gen.store import schemas
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.layout import shard_folder

@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from aerialdojo_gen.agents import InvalidAnswer, agent_class, load_agent
+from aerialdojo_gen.base.errors import AerialDojoError, UsageError
+from aerialdojo_gen.benchmark.agents import InvalidAnswer, agent_class, load_agent
 from aerialdojo_gen.benchmark.flight import Flight
+from aerialdojo_gen.benchmark.llm.agent import LanguageModelAgent
 from aerialdojo_gen.benchmark.tasks import read_tasks, select
-from aerialdojo_gen.errors import AerialDojoError, UsageError
-from aerialdojo_gen.llm.agent import LanguageModelAgent
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.root import DataRoot, Where, open_root
 

@@ -7,11 +7,11 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
-from aerialdojo_gen.agents.goal import Sensors
+from aerialdojo_gen.base.config.sections import Embodiment
+from aerialdojo_gen.base.secrets import Secrets
+from aerialdojo_gen.benchmark.agents.goal import Sensors
 from aerialdojo_gen.benchmark.tasks import Selection, check_tell
 from aerialdojo_gen.benchmark.worker import Conditions
-from aerialdojo_gen.common.secrets import Secrets
-from aerialdojo_gen.config.sections import Embodiment
 
 
 @dataclass(frozen=True)

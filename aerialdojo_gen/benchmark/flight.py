@@ -8,16 +8,16 @@ from threading import Thread
 
 import numpy as np
 
-from aerialdojo_gen.agents.goal import Goal, Observation, Rules, Sensors
-from aerialdojo_gen.benchmark.episode import Episode
-from aerialdojo_gen.benchmark.eyes import look
-from aerialdojo_gen.benchmark.motion import FlightSpace, build_ahead, flight_space
+from aerialdojo_gen.base.cli_context import command
+from aerialdojo_gen.base.config.agreement import SUCCESS_RADIUS_M
+from aerialdojo_gen.base.config.sections import Embodiment
+from aerialdojo_gen.base.errors import StoreError
+from aerialdojo_gen.benchmark.agents.goal import Goal, Observation, Rules, Sensors
+from aerialdojo_gen.benchmark.observations import look
 from aerialdojo_gen.benchmark.tasks import Task, check_tell, goal_of, mesh_of
 from aerialdojo_gen.benchmark.viewpoints import View, nodes_of, viewed, viewpoints_of
-from aerialdojo_gen.common.advice import command
-from aerialdojo_gen.config.agreement import SUCCESS_RADIUS_M
-from aerialdojo_gen.config.sections import Embodiment
-from aerialdojo_gen.errors import StoreError
+from aerialdojo_gen.dataset.episode import Episode
+from aerialdojo_gen.planning.flight_space import FlightSpace, build_ahead, flight_space
 from aerialdojo_gen.scenes.context import SEVERAL, forget_scene, hold_scenes
 from aerialdojo_gen.store.root import Where, open_root
 

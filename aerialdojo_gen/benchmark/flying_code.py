@@ -7,7 +7,7 @@ import importlib.util
 import json
 from pathlib import Path
 
-from aerialdojo_gen.agents.load import BUILT_IN, look_here
+from aerialdojo_gen.benchmark.agents.load import BUILT_IN, look_here
 from aerialdojo_gen.pipeline.code_digest import code_of
 from aerialdojo_gen.store.files import file_digest
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
+from aerialdojo_gen.base.text_table import Column, TextTable
 from aerialdojo_gen.benchmark.grid import BEST, SECOND, Table
-from aerialdojo_gen.common.text_table import Column, TextTable
 
 _SIGNS = {BEST: "¹", SECOND: "²"}
 

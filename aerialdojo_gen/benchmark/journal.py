@@ -8,9 +8,9 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
-from aerialdojo_gen.common.bounded import loads_json
-from aerialdojo_gen.common.disk import disk_error
-from aerialdojo_gen.errors import Malformed, StoreError
+from aerialdojo_gen.base.disk import disk_error
+from aerialdojo_gen.base.errors import Malformed, StoreError
+from aerialdojo_gen.base.safe_parse import loads_json
 
 
 class Journal:

@@ -12,8 +12,8 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
+from aerialdojo_gen.base.errors import StoreError
 from aerialdojo_gen.benchmark.profiles import Profile
-from aerialdojo_gen.errors import StoreError
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from aerialdojo_gen.base.errors import UsageError
 from aerialdojo_gen.benchmark.grid import HEADS, NONE, Measure, Table
 from aerialdojo_gen.benchmark.intervals import Paired, paired
 from aerialdojo_gen.benchmark.metrics import outcomes
@@ -14,7 +15,6 @@ from aerialdojo_gen.benchmark.profiles import Profile
 from aerialdojo_gen.benchmark.runs import Run
 from aerialdojo_gen.benchmark.scores import METRICS
 from aerialdojo_gen.benchmark.tables import profile_head, shown_measures
-from aerialdojo_gen.errors import UsageError
 
 
 def paired_tables(runs: Sequence[Run], profiles: Sequence[Profile]) -> list[Table]:

@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+from aerialdojo_gen.base.paper_figures import PaperResult
 from aerialdojo_gen.benchmark.grid import Line, Measure, Table, score_table, values_of
 from aerialdojo_gen.benchmark.intervals import score_intervals
 from aerialdojo_gen.benchmark.profiles import Profile
 from aerialdojo_gen.benchmark.runs import Run
 from aerialdojo_gen.benchmark.scores import METRICS, summarize
 from aerialdojo_gen.benchmark.tables import NAMES, caveats, line_of, profile_head, shown_measures
-from aerialdojo_gen.common.paper import PaperResult
 from aerialdojo_gen.store.schemas import SETTINGS
 
 _TABLES = {"base": "the form of the paper's Table 4", "standard": "the form of the paper's Table 5"}

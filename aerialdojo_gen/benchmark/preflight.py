@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from aerialdojo_gen.agents import agent_class, load_agent
-from aerialdojo_gen.errors import UsageError
+from aerialdojo_gen.base.errors import UsageError
+from aerialdojo_gen.benchmark.agents import agent_class, load_agent
 from aerialdojo_gen.pipeline.progress import Reporter
 
 if TYPE_CHECKING:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from aerialdojo_gen.common.names import unknown
-from aerialdojo_gen.errors import UsageError
+from aerialdojo_gen.base.errors import UsageError
+from aerialdojo_gen.base.names import unknown
 
 
 @dataclass(frozen=True)

@@ -16,13 +16,13 @@ import numpy as np
 import pyarrow.compute as pc
 from numpy.typing import NDArray
 
-from aerialdojo_gen.agents.goal import Sensors
+from aerialdojo_gen.base.errors import StoreError
+from aerialdojo_gen.base.pictures import MAP_JPEG, REPLAY_JPEG, data_url, encode_jpeg
+from aerialdojo_gen.benchmark.agents.goal import Sensors
 from aerialdojo_gen.benchmark.episodes import read_run
-from aerialdojo_gen.benchmark.eyes import look
+from aerialdojo_gen.benchmark.observations import look
 from aerialdojo_gen.benchmark.runs import Run
-from aerialdojo_gen.browse.lookup import ReleasedScene
-from aerialdojo_gen.common.pictures import MAP_JPEG, REPLAY_JPEG, data_url, encode_jpeg
-from aerialdojo_gen.errors import StoreError
+from aerialdojo_gen.dataset.lookup import ReleasedScene
 from aerialdojo_gen.rendering.orthographic import orthographic_pictures
 from aerialdojo_gen.store.root import DataRoot, Where, open_root
 from aerialdojo_gen.store.schemas import ACTION_NAMES

@@ -13,6 +13,8 @@ from typing import Any
 import jinja2
 import markupsafe
 
+from aerialdojo_gen.base.terminal import shown_in_page
+from aerialdojo_gen.base.version import __version__
 from aerialdojo_gen.benchmark.contents import Wanted, named_tables
 from aerialdojo_gen.benchmark.figures import encoded, radius_curve
 from aerialdojo_gen.benchmark.formats import as_latex, as_markdown
@@ -22,8 +24,6 @@ from aerialdojo_gen.benchmark.radar import family_radars, metric_radars
 from aerialdojo_gen.benchmark.replay import Replay
 from aerialdojo_gen.benchmark.runs import Run
 from aerialdojo_gen.benchmark.score_rows import as_csv, as_json
-from aerialdojo_gen.common.terminal import shown_in_page
-from aerialdojo_gen.common.version import __version__
 from aerialdojo_gen.store.atomic import atomic_file
 
 # Long tables, folded away on the page.

@@ -19,8 +19,10 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from aerialdojo_gen.agents import ServiceDown
+from aerialdojo_gen.base.errors import StoreError, UsageError
+from aerialdojo_gen.base.safe_parse import read_json
 from aerialdojo_gen.benchmark import episodes
+from aerialdojo_gen.benchmark.agents import ServiceDown
 from aerialdojo_gen.benchmark.evaluation import Evaluation, Outcome
 from aerialdojo_gen.benchmark.flying_code import flying_code
 from aerialdojo_gen.benchmark.journals import Journals
@@ -30,8 +32,6 @@ from aerialdojo_gen.benchmark.tasks import select
 from aerialdojo_gen.benchmark.viewpoints import viewpoints_content, without_viewpoints
 from aerialdojo_gen.benchmark.worker import Finished, Unit
 from aerialdojo_gen.benchmark.workers import fly_units
-from aerialdojo_gen.common.bounded import read_json
-from aerialdojo_gen.errors import StoreError, UsageError
 from aerialdojo_gen.pipeline.executors import Folders, make_executor, on_disk
 from aerialdojo_gen.pipeline.interrupt import Interrupts
 from aerialdojo_gen.pipeline.progress import Reporter

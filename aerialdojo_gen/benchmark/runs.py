@@ -12,11 +12,11 @@ import pyarrow as pa
 import pyarrow.compute as pc
 from numpy.typing import NDArray
 
+from aerialdojo_gen.base.cli_context import command
+from aerialdojo_gen.base.errors import StoreError
 from aerialdojo_gen.benchmark.episodes import has_table, read_run, runs
 from aerialdojo_gen.benchmark.metrics import Bools, Episodes, Floats, episodes_of
-from aerialdojo_gen.benchmark.swept import STEP_COLUMNS, swept_distances
-from aerialdojo_gen.common.advice import command
-from aerialdojo_gen.errors import StoreError
+from aerialdojo_gen.benchmark.path_clearance_to_goal import STEP_COLUMNS, swept_distances
 from aerialdojo_gen.store.root import DataRoot, Where, open_root
 from aerialdojo_gen.store.schemas import TERMINATIONS
 

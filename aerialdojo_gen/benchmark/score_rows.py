@@ -9,6 +9,7 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import Any
 
+from aerialdojo_gen.base.paper_figures import PaperResult
 from aerialdojo_gen.benchmark.difficulty import Partings
 from aerialdojo_gen.benchmark.intervals import score_intervals
 from aerialdojo_gen.benchmark.metrics import Episodes
@@ -16,7 +17,6 @@ from aerialdojo_gen.benchmark.profiles import Profile
 from aerialdojo_gen.benchmark.runs import Run
 from aerialdojo_gen.benchmark.scores import METRICS, Score, Summary, slices, summarize, weighted_score
 from aerialdojo_gen.benchmark.tables import MODALITIES
-from aerialdojo_gen.common.paper import PaperResult
 from aerialdojo_gen.store.schemas import SETTINGS
 
 _HEAD = ("run", "agent", "profile", "radius_m", "setting", "modality", "scope", "name", "episodes")

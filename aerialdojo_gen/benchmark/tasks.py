@@ -13,15 +13,15 @@ import pyarrow as pa
 import pyarrow.compute as pc
 from numpy.typing import NDArray
 
-from aerialdojo_gen.agents.goal import TELLABLE, Goal, Heading, Rules
-from aerialdojo_gen.benchmark.motion import Point
-from aerialdojo_gen.common import rng
-from aerialdojo_gen.common.advice import command
-from aerialdojo_gen.common.names import unknown
-from aerialdojo_gen.common.pictures import decode_rgb
-from aerialdojo_gen.errors import StoreError, UsageError
+from aerialdojo_gen.base import rng
+from aerialdojo_gen.base.cli_context import command
+from aerialdojo_gen.base.errors import StoreError, UsageError
+from aerialdojo_gen.base.names import unknown
+from aerialdojo_gen.base.pictures import decode_rgb
+from aerialdojo_gen.benchmark.agents.goal import TELLABLE, Goal, Heading, Rules
+from aerialdojo_gen.dataset.contents import scenes_in_release
 from aerialdojo_gen.geometry.frames import compass_heading
-from aerialdojo_gen.release.contents import scenes_in_release
+from aerialdojo_gen.planning.flight_space import Point
 from aerialdojo_gen.scenes.stored import mesh_copy
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.root import DataRoot, Where, open_root

@@ -22,7 +22,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from aerialdojo_gen.benchmark.motion import Point
+from aerialdojo_gen.planning.flight_space import Point
 from aerialdojo_gen.rendering.sight import in_sight
 from aerialdojo_gen.scenes.model import Scene
 from aerialdojo_gen.store import shards as store

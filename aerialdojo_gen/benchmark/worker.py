@@ -11,17 +11,17 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from aerialdojo_gen.agents import Agent, AgentUnavailable, Usage
-from aerialdojo_gen.agents.goal import Observation
-from aerialdojo_gen.agents.load import place
-from aerialdojo_gen.agents.simple import OracleAgent
+from aerialdojo_gen.base.errors import RenderError
+from aerialdojo_gen.base.secrets import Secrets
 from aerialdojo_gen.benchmark import billing
+from aerialdojo_gen.benchmark.agents import Agent, AgentUnavailable, Usage
+from aerialdojo_gen.benchmark.agents.goal import Observation
+from aerialdojo_gen.benchmark.agents.load import place
+from aerialdojo_gen.benchmark.agents.simple import OracleAgent
 from aerialdojo_gen.benchmark.asking import AgentError, Asked
 from aerialdojo_gen.benchmark.flight import Flight
 from aerialdojo_gen.benchmark.journal import Journal
 from aerialdojo_gen.benchmark.tasks import Task, read_tasks, reference_actions
-from aerialdojo_gen.common.secrets import Secrets
-from aerialdojo_gen.errors import RenderError
 from aerialdojo_gen.rendering.backend import forget_renderers
 from aerialdojo_gen.store.root import DataRoot
 from aerialdojo_gen.store.schemas import STEPS

@@ -9,16 +9,16 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from aerialdojo_gen.agents import load_agent
-from aerialdojo_gen.agents.goal import Sensors
+from aerialdojo_gen.base.errors import AerialDojoError, UsageError
+from aerialdojo_gen.base.secrets import Secrets
+from aerialdojo_gen.benchmark.agents import load_agent
+from aerialdojo_gen.benchmark.agents.goal import Sensors
 from aerialdojo_gen.benchmark.flight import Flight
-from aerialdojo_gen.benchmark.pace import Pace
+from aerialdojo_gen.benchmark.rate_limit import Pace
 from aerialdojo_gen.benchmark.worker import Finished, Unit, Worker
-from aerialdojo_gen.common.secrets import Secrets
-from aerialdojo_gen.errors import AerialDojoError, UsageError
+from aerialdojo_gen.dataset.fingerprint import release_fingerprint
 from aerialdojo_gen.pipeline.executors import Executor, Talk
 from aerialdojo_gen.pipeline.executors.link import Link, at_end
-from aerialdojo_gen.release.fingerprint import release_fingerprint
 from aerialdojo_gen.store.root import DataRoot
 
 if TYPE_CHECKING:

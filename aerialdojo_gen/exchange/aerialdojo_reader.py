@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from aerialdojo_gen.errors import StoreError, UsageError
+from aerialdojo_gen.base.errors import StoreError, UsageError
 from aerialdojo_gen.exchange.actions import WORDS, actions_of
 from aerialdojo_gen.exchange.aerialdojo_layout import (
     KINDS,
@@ -25,7 +25,7 @@ from aerialdojo_gen.exchange.fields import BadField, Fields, plain, positions_of
 from aerialdojo_gen.exchange.folder import check_picture, inside
 from aerialdojo_gen.exchange.jsonstream import small_document
 from aerialdojo_gen.exchange.task import Context, Instance, Route, Task, digest
-from aerialdojo_gen.stages.work.build_scenes import parse_name
+from aerialdojo_gen.pipeline.stages.work.build_scenes import parse_name
 
 _PAIR = re.compile(r"(\d{1,9})_(\d{1,9})__(\d{1,9})")
 _STEP = ("position_ned_m", "quaternion_xyzw")

@@ -14,8 +14,8 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from aerialdojo_gen.common.advice import command
-from aerialdojo_gen.errors import StoreError
+from aerialdojo_gen.base.cli_context import command
+from aerialdojo_gen.base.errors import StoreError
 from aerialdojo_gen.exchange.actions import words_of
 from aerialdojo_gen.exchange.aerialdojo_layout import (
     IMAGE,
@@ -28,7 +28,7 @@ from aerialdojo_gen.exchange.aerialdojo_layout import (
     partition_of,
 )
 from aerialdojo_gen.exchange.frames import NED
-from aerialdojo_gen.exchange.redrawn import Redrawn
+from aerialdojo_gen.exchange.rerendered import Redrawn
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.root import DataRoot
 from aerialdojo_gen.store.schemas import TOLD_OF_DIFFICULTY, TOLD_OF_SPLITS

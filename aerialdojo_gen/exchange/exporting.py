@@ -6,15 +6,15 @@ from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
-from aerialdojo_gen.common.names import unknown
-from aerialdojo_gen.common.version import __version__
-from aerialdojo_gen.errors import UsageError
+from aerialdojo_gen.base.errors import UsageError
+from aerialdojo_gen.base.names import unknown
+from aerialdojo_gen.base.version import __version__
+from aerialdojo_gen.dataset.contents import scenes_in_release
 from aerialdojo_gen.exchange import aerialdojo_writer, habitat_writer
 from aerialdojo_gen.exchange.folder import whole_folder, write_json
 from aerialdojo_gen.exchange.size import check_room, size_of
 from aerialdojo_gen.exchange.tars import pack
 from aerialdojo_gen.pipeline.progress import Reporter
-from aerialdojo_gen.release.contents import scenes_in_release
 from aerialdojo_gen.store.root import Where, open_root
 
 MARKER = "export.json"

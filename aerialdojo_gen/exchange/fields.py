@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from aerialdojo_gen.errors import brief
+from aerialdojo_gen.base.errors import brief
 
 Floats = NDArray[np.float64]
 

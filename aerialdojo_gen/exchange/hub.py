@@ -10,10 +10,10 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import Any
 
-from aerialdojo_gen.errors import StoreError, UsageError
+from aerialdojo_gen.base.errors import StoreError, UsageError
+from aerialdojo_gen.dataset.contents import FOLDER, SHARDS, check_release, part_name, scenes_there
 from aerialdojo_gen.exchange.hub_client import Hub, check_revision
 from aerialdojo_gen.pipeline.progress import Reporter
-from aerialdojo_gen.release.contents import FOLDER, SHARDS, check_release, part_name, scenes_there
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.atomic import atomic_folder, make_folder
 from aerialdojo_gen.store.layout import is_plain

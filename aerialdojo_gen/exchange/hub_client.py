@@ -9,8 +9,8 @@ from contextlib import contextmanager
 from typing import Any
 from urllib.parse import urlsplit
 
-from aerialdojo_gen.common.secrets import Secrets
-from aerialdojo_gen.errors import AerialDojoError, MissingPackage, UsageError, brief, first_line, lacks
+from aerialdojo_gen.base.errors import AerialDojoError, MissingPackage, UsageError, brief, first_line, lacks
+from aerialdojo_gen.base.secrets import Secrets
 
 TOKEN, ENDPOINT, USUAL = "HF_TOKEN", "HF_ENDPOINT", "https://huggingface.co"
 _REPO = re.compile(r"[A-Za-z0-9][\w.-]{0,95}/[A-Za-z0-9][\w.-]{0,95}")

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TextIO
 
-from aerialdojo_gen.common.names import unknown
-from aerialdojo_gen.errors import ImportRefused, StoreError, UsageError, brief
+from aerialdojo_gen.base.errors import ImportRefused, StoreError, UsageError, brief
+from aerialdojo_gen.base.names import unknown
 from aerialdojo_gen.exchange import aerialdojo_reader, aerialvln, cityavos, openfly, uav_on
 from aerialdojo_gen.exchange.fields import BadField, Fields
 from aerialdojo_gen.exchange.folder import whole_folder_below, write_json

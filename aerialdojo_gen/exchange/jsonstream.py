@@ -12,9 +12,9 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from aerialdojo_gen.common.bounded import MAX_DEPTH, loads_json, too_deep
-from aerialdojo_gen.common.disk import check_regular
-from aerialdojo_gen.errors import ImportRefused, brief
+from aerialdojo_gen.base.disk import check_regular
+from aerialdojo_gen.base.errors import ImportRefused, brief
+from aerialdojo_gen.base.safe_parse import MAX_DEPTH, loads_json, too_deep
 from aerialdojo_gen.exchange.fields import shown
 
 RECORD_LIMIT = 16 << 20

@@ -10,12 +10,13 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from aerialdojo_gen.agents.goal import Sensors
-from aerialdojo_gen.benchmark.eyes import renderer_name
+from aerialdojo_gen.base import rng
+from aerialdojo_gen.base.errors import AerialDojoError, UsageError
+from aerialdojo_gen.base.version import __version__
+from aerialdojo_gen.benchmark.agents.goal import Sensors
+from aerialdojo_gen.benchmark.observations import renderer_name
 from aerialdojo_gen.benchmark.tasks import mesh_of
-from aerialdojo_gen.common import rng
-from aerialdojo_gen.common.version import __version__
-from aerialdojo_gen.errors import AerialDojoError, UsageError
+from aerialdojo_gen.dataset.contents import part_name
 from aerialdojo_gen.exchange import lerobot_writer, webdataset_writer
 from aerialdojo_gen.exchange.folder import check_target, whole_folder, write_json
 from aerialdojo_gen.exchange.parts import Unfinished, whole_part
@@ -23,7 +24,6 @@ from aerialdojo_gen.exchange.samples import Part, Wanted, named_splits, planned
 from aerialdojo_gen.pipeline.code_digest import code_of
 from aerialdojo_gen.pipeline.executors import make_executor
 from aerialdojo_gen.pipeline.progress import Reporter, duration
-from aerialdojo_gen.release.contents import part_name
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.files import size_of
 from aerialdojo_gen.store.root import DataRoot, Where, open_root

@@ -8,8 +8,8 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from aerialdojo_gen.exchange.clips import DEPTH_MIN_M, DEPTH_SHIFT_M, KEY_EVERY
 from aerialdojo_gen.exchange.samples import Wanted
+from aerialdojo_gen.exchange.video_clips import DEPTH_MIN_M, DEPTH_SHIFT_M, KEY_EVERY
 from aerialdojo_gen.geometry.motion import DISPLACEMENTS, TURN_RAD
 from aerialdojo_gen.store.schemas import STOP, TURN_LEFT, TURN_RIGHT
 

@@ -12,8 +12,7 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from aerialdojo_gen.exchange import moments
-from aerialdojo_gen.exchange.clips import DEPTH_CODES, Clip, depth_codes, depths_of_codes_m
+from aerialdojo_gen.exchange import feature_stats as moments
 from aerialdojo_gen.exchange.folder import write_json
 from aerialdojo_gen.exchange.lerobot_features import (
     DATA_PATH,
@@ -32,6 +31,7 @@ from aerialdojo_gen.exchange.lerobot_features import (
 )
 from aerialdojo_gen.exchange.parts import place
 from aerialdojo_gen.exchange.samples import Eyes, Part, Wanted
+from aerialdojo_gen.exchange.video_clips import DEPTH_CODES, Clip, depth_codes, depths_of_codes_m
 from aerialdojo_gen.learning.labels import Labels
 from aerialdojo_gen.store.parquet_files import read_file, write_file
 from aerialdojo_gen.store.root import DataRoot

@@ -11,8 +11,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from aerialdojo_gen.common.bounded import loads_json
-from aerialdojo_gen.errors import Malformed, StoreError, UsageError
+from aerialdojo_gen.base.errors import Malformed, StoreError, UsageError
+from aerialdojo_gen.base.safe_parse import loads_json
 from aerialdojo_gen.store.atomic import atomic_file, atomic_folder, make_folder
 from aerialdojo_gen.store.staging import NO_LOCKS, remove, sweep
 

@@ -9,11 +9,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from aerialdojo_gen.agents.goal import Sensors
+from aerialdojo_gen.base.cli_context import command
+from aerialdojo_gen.base.errors import UsageError
+from aerialdojo_gen.base.names import unknown
+from aerialdojo_gen.benchmark.agents.goal import Sensors
 from aerialdojo_gen.benchmark.tasks import Selection, mesh_of, reference_image, select
-from aerialdojo_gen.common.advice import command
-from aerialdojo_gen.common.names import unknown
-from aerialdojo_gen.errors import UsageError
 from aerialdojo_gen.learning.index import Index, read_index
 from aerialdojo_gen.learning.pictures import Drawn, Frames, Recorded, Source
 from aerialdojo_gen.learning.trajectories import SOURCES

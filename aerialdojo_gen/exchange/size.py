@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pyarrow.compute as pc
 
-from aerialdojo_gen.errors import StoreError
+from aerialdojo_gen.base.errors import StoreError
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.root import DataRoot
 from aerialdojo_gen.store.schemas import SETTINGS, SUBSETS

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from aerialdojo_gen.config.sections import FilterConfig
+from aerialdojo_gen.base.config.sections import FilterConfig
 from aerialdojo_gen.exchange.frames import Frame
 from aerialdojo_gen.exchange.tables import IMPORTED_ROUTES
 from aerialdojo_gen.geometry.angles import wrap_turned_rad

@@ -12,8 +12,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from aerialdojo_gen.common.pictures import FRAME_PNG, encode_png
-from aerialdojo_gen.errors import RenderError, StoreError, brief
+from aerialdojo_gen.base.errors import RenderError, StoreError, brief
+from aerialdojo_gen.base.pictures import FRAME_PNG, encode_png
 from aerialdojo_gen.exchange.folder import write_json
 from aerialdojo_gen.exchange.parts import place
 from aerialdojo_gen.exchange.samples import Eyes, Part, Wanted

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from aerialdojo_gen.common.kernels import njit
+from aerialdojo_gen.base.kernels import njit
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -11,7 +11,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from aerialdojo_gen.common.terms import DIRECTIONS
+from aerialdojo_gen.base.constants import DIRECTIONS
 from aerialdojo_gen.geometry.angles import wrap_angle_rad
 
 Floats = NDArray[np.float64]

@@ -11,8 +11,8 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from aerialdojo_gen.common.kernels import njit
-from aerialdojo_gen.common.terms import ACTION_NAMES, APPROACH, STOP, TURN_LEFT, TURN_RIGHT
+from aerialdojo_gen.base.constants import ACTION_NAMES, APPROACH, STOP, TURN_LEFT, TURN_RIGHT
+from aerialdojo_gen.base.kernels import njit
 from aerialdojo_gen.geometry.angles import wrap_one_rad
 
 N_HEADINGS = 24

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from aerialdojo_gen.common.terms import VIEWS
+from aerialdojo_gen.base.constants import VIEWS
 from aerialdojo_gen.geometry.rays import TriangleRayCaster
 
 Floats = NDArray[np.float64]

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from aerialdojo_gen.errors import AssetError, lacks
+from aerialdojo_gen.base.errors import AssetError, lacks
 from aerialdojo_gen.imports.pictures import TEXTURE_PX, Paint, surfaces_of
 from aerialdojo_gen.imports.raw import RawNode, joined, no_corners
 

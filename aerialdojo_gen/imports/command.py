@@ -10,10 +10,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from aerialdojo_gen.annotations.format import parse_annotations
-from aerialdojo_gen.common.disk import check_regular
-from aerialdojo_gen.errors import AnnotationError, AssetError, UsageError, brief
-from aerialdojo_gen.imports.adopt import Place, Repairs, adopt, check_options, region_of
+from aerialdojo_gen.base.disk import check_regular
+from aerialdojo_gen.base.errors import AnnotationError, AssetError, UsageError, brief
 from aerialdojo_gen.imports.files import read_mesh
+from aerialdojo_gen.imports.import_mesh import Place, Repairs, adopt, check_options, region_of
 from aerialdojo_gen.imports.listing import contents
 from aerialdojo_gen.imports.naming import read_names
 from aerialdojo_gen.imports.pictures import TEXTURE_PX

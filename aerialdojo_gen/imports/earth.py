@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from aerialdojo_gen.errors import UsageError
+from aerialdojo_gen.base.errors import UsageError
 
 Floats = NDArray[np.float64]
 Bbox = tuple[float, float, float, float]

@@ -17,16 +17,16 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
-from aerialdojo_gen.common.bounded import loads_json
-from aerialdojo_gen.common.disk import check_regular
-from aerialdojo_gen.common.trouble import is_out_of_memory
-from aerialdojo_gen.errors import AssetError
-from aerialdojo_gen.imports.beside import Beside
-from aerialdojo_gen.imports.child import MAX_MEMORY_BYTES, bounded, read_in_child
+from aerialdojo_gen.base.disk import check_regular
+from aerialdojo_gen.base.environment_errors import is_out_of_memory
+from aerialdojo_gen.base.errors import AssetError
+from aerialdojo_gen.base.safe_parse import loads_json
 from aerialdojo_gen.imports.gltf import read_gltf
+from aerialdojo_gen.imports.mesh_materials import skins_of
 from aerialdojo_gen.imports.pictures import TEXTURE_PX
 from aerialdojo_gen.imports.raw import RawNode, RawSurface, joined
-from aerialdojo_gen.imports.skins import skins_of
+from aerialdojo_gen.imports.sandbox import MAX_MEMORY_BYTES, bounded, read_in_child
+from aerialdojo_gen.imports.sibling_files import Beside
 from aerialdojo_gen.imports.sniffing import mismatch
 from aerialdojo_gen.store.staging import scratch_folder
 

@@ -15,8 +15,8 @@ from urllib.parse import unquote
 import numpy as np
 from numpy.typing import NDArray
 
-from aerialdojo_gen.common.bounded import loads_json
-from aerialdojo_gen.errors import AssetError
+from aerialdojo_gen.base.errors import AssetError
+from aerialdojo_gen.base.safe_parse import loads_json
 from aerialdojo_gen.imports.pictures import CUTOFF, TEXTURE_PX, Paint, srgb_of, surfaces_of
 from aerialdojo_gen.imports.raw import RawNode, joined, no_corners, plain
 

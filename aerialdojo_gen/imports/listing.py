@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from aerialdojo_gen.common.text_table import Column, TextTable
-from aerialdojo_gen.imports.adopt import LARGEST_M, Place, lies, size_text
+from aerialdojo_gen.base.text_table import Column, TextTable
 from aerialdojo_gen.imports.cutting import bodies_of
+from aerialdojo_gen.imports.import_mesh import LARGEST_M, Place, lies, size_text
 from aerialdojo_gen.imports.naming import Naming
 from aerialdojo_gen.imports.raw import RawNode
 from aerialdojo_gen.scenes.mesh import areas

@@ -13,7 +13,7 @@ from shapely import STRtree
 from shapely.geometry import Polygon
 from shapely.geometry.base import BaseGeometry
 
-from aerialdojo_gen.common.rng import rank
+from aerialdojo_gen.base.rng import rank
 from aerialdojo_gen.imports.map_tags import Tags, below_ground, colour, count, metres
 from aerialdojo_gen.imports.osm import Feature
 from aerialdojo_gen.scenes.colour_names import colour_name

@@ -10,14 +10,14 @@ import shapely
 from numpy.typing import NDArray
 from shapely.geometry import Polygon
 
-from aerialdojo_gen.errors import UsageError
+from aerialdojo_gen.base.errors import UsageError
 from aerialdojo_gen.imports import map_bridges, map_buildings, map_ground, map_things
 from aerialdojo_gen.imports.earth import Bbox, LocalFrame, in_words, size_m
 from aerialdojo_gen.imports.map_buildings import Told
 from aerialdojo_gen.imports.osm import ATTRIBUTION, Feature, Map
 from aerialdojo_gen.imports.toml_text import recipe_text
-from aerialdojo_gen.layouts.places.parts.heights import Heights as HeightTable
 from aerialdojo_gen.scenes.ground import polygons_of, rectangle
+from aerialdojo_gen.scenes.layouts.places.parts.heights import Heights as HeightTable
 
 SMALLEST_M, LARGEST_M = 20.0, 1000.0
 # Streets run on a little beyond the border, so that their ends are not seen.

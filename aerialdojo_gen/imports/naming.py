@@ -10,9 +10,9 @@ from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from pathlib import Path
 
-from aerialdojo_gen.annotations.number import group_of
-from aerialdojo_gen.common.disk import check_regular
-from aerialdojo_gen.errors import AssetError
+from aerialdojo_gen.annotations.grammatical_number import group_of
+from aerialdojo_gen.base.disk import check_regular
+from aerialdojo_gen.base.errors import AssetError
 
 # Said by exporters and by people who name nothing, of whatever the thing is.
 _NOISE = frozenset({

@@ -16,11 +16,11 @@ import numpy as np
 import shapely
 from shapely.geometry import LineString, Polygon
 
-from aerialdojo_gen.common.disk import check_regular
-from aerialdojo_gen.common.trouble import is_out_of_memory
-from aerialdojo_gen.errors import AssetError, MissingPackage, UsageError, lacks
-from aerialdojo_gen.imports.child import MAX_MEMORY_BYTES, bounded, read_in_child
+from aerialdojo_gen.base.disk import check_regular
+from aerialdojo_gen.base.environment_errors import is_out_of_memory
+from aerialdojo_gen.base.errors import AssetError, MissingPackage, UsageError, lacks
 from aerialdojo_gen.imports.earth import Bbox, in_words
+from aerialdojo_gen.imports.sandbox import MAX_MEMORY_BYTES, bounded, read_in_child
 from aerialdojo_gen.store.staging import scratch_folder
 
 ATTRIBUTION = "© OpenStreetMap contributors, Open Database License (ODbL) 1.0, openstreetmap.org/copyright"

@@ -7,16 +7,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from aerialdojo_gen.common.shipped import home
-from aerialdojo_gen.errors import AssetError, UsageError
+from aerialdojo_gen.base.errors import AssetError, UsageError
+from aerialdojo_gen.base.shipped import home
 from aerialdojo_gen.imports.command import PIPELINE, pipeline_text
 from aerialdojo_gen.imports.dem import Dem, read_dem
 from aerialdojo_gen.imports.earth import Bbox, checked_bbox, tiles
 from aerialdojo_gen.imports.map_recipe import town_recipe
 from aerialdojo_gen.imports.osm import read_maps
 from aerialdojo_gen.imports.relief import ground_of, relief_recipe
-from aerialdojo_gen.layouts.build import build_scene
 from aerialdojo_gen.scenes.catalogue import load_catalogue
+from aerialdojo_gen.scenes.layouts.build import build_scene
 from aerialdojo_gen.scenes.model import Scene
 from aerialdojo_gen.store.atomic import atomic_file, make_folder
 from aerialdojo_gen.store.layout import check_scene_name

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt
 
-from aerialdojo_gen.errors import UsageError
+from aerialdojo_gen.base.errors import UsageError
 from aerialdojo_gen.imports.dem import Dem, outside
 from aerialdojo_gen.imports.earth import Bbox, LocalFrame, in_words, size_m
 from aerialdojo_gen.imports.toml_text import recipe_text

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from aerialdojo_gen.errors import AssetError
+from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.imports.raw import RawNode, plain
 
 _MAIN, _EDITOR, _OBJECT, _MESH = 0x4D4D, 0x3D3D, 0x4000, 0x4100

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from aerialdojo_gen.errors import AssetError, UsageError
-from aerialdojo_gen.imports.adopt import LARGEST_M, SMALLEST_M, Place, Repairs, settled
+from aerialdojo_gen.base.errors import AssetError, UsageError
 from aerialdojo_gen.imports.cutting import Region
+from aerialdojo_gen.imports.import_mesh import LARGEST_M, SMALLEST_M, Place, Repairs, settled
 from aerialdojo_gen.imports.naming import Naming
 from aerialdojo_gen.scenes.model import Scene
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from aerialdojo_gen.agents.goal import N_ACTIONS
-from aerialdojo_gen.benchmark.motion import FlightSpace
+from aerialdojo_gen.benchmark.agents.goal import N_ACTIONS
 from aerialdojo_gen.geometry.motion import DISPLACEMENTS
+from aerialdojo_gen.planning.flight_space import FlightSpace
 
 Floats = NDArray[np.float64]
 

@@ -22,8 +22,8 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from aerialdojo_gen.agents.goal import Sensors
-from aerialdojo_gen.benchmark.eyes import renderer_name
+from aerialdojo_gen.benchmark.agents.goal import Sensors
+from aerialdojo_gen.benchmark.observations import renderer_name
 from aerialdojo_gen.learning.index import Index
 from aerialdojo_gen.learning.pictures import Frames, Source
 from aerialdojo_gen.pipeline.code_digest import code_of

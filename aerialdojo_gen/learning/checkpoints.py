@@ -9,12 +9,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from aerialdojo_gen.agents.goal import Sensors
-from aerialdojo_gen.common.advice import command
-from aerialdojo_gen.common.bounded import loads_json
-from aerialdojo_gen.errors import AerialDojoError, MissingPackage, StoreError, UsageError, first_line, lacks
+from aerialdojo_gen.base.cli_context import command
+from aerialdojo_gen.base.errors import AerialDojoError, MissingPackage, StoreError, UsageError, first_line, lacks
+from aerialdojo_gen.base.safe_parse import loads_json
+from aerialdojo_gen.benchmark.agents.goal import Sensors
+from aerialdojo_gen.learning.encoding import actions_fingerprint
 from aerialdojo_gen.learning.loader import torch_package
-from aerialdojo_gen.learning.seen import actions_fingerprint
 from aerialdojo_gen.learning.words import Vocabulary
 from aerialdojo_gen.store.atomic import atomic_file, make_folder
 

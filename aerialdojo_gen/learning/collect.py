@@ -10,9 +10,11 @@ from pathlib import Path
 
 import numpy as np
 
-from aerialdojo_gen.agents.goal import Sensors
+from aerialdojo_gen.base.errors import AerialDojoError
+from aerialdojo_gen.benchmark.agents.goal import Sensors
 from aerialdojo_gen.benchmark.tasks import mesh_of
-from aerialdojo_gen.errors import AerialDojoError
+from aerialdojo_gen.dataset.contents import part_name
+from aerialdojo_gen.dataset.fingerprint import release_fingerprint
 from aerialdojo_gen.learning.index import Index
 from aerialdojo_gen.learning.parts import Flying, Part, Survey, references
 from aerialdojo_gen.learning.steps import Steps, is_written, read_steps
@@ -21,8 +23,6 @@ from aerialdojo_gen.pipeline.code_digest import code_of
 from aerialdojo_gen.pipeline.executors import Executor
 from aerialdojo_gen.pipeline.executors.link import Link
 from aerialdojo_gen.pipeline.progress import Reporter
-from aerialdojo_gen.release.contents import part_name
-from aerialdojo_gen.release.fingerprint import release_fingerprint
 from aerialdojo_gen.store.root import DataRoot
 
 # Trajectories of a part: seconds of work, so that no process is left with a long one while the others wait.
@@ -70,7 +70,7 @@ def survey_parts(
     like: Part,
 ) -> list[Part]:  # fmt: skip
     """Share looks about out; cameras and renderer are those of another part."""
-    code = [code_of(f"aerialdojo_gen.{name}").digest for name in ("rendering.gl", "learning.survey")]
+    code = [code_of(f"aerialdojo_gen.{name}").digest for name in ("rendering.gl", "learning.exploration_views")]
     s, parts, release = like.sensors, [], release_fingerprint(data)
     for scene in scenes:
         for number, begin in enumerate(range(0, looks, _LOOKS)):
@@ -102,7 +102,7 @@ def make_part(part: Part, link: Link | None = None) -> int:
     """Make one part and write it; return how many trajectories it has."""
     del link
     if part.survey is not None:
-        from aerialdojo_gen.learning.survey import surveyed
+        from aerialdojo_gen.learning.exploration_views import surveyed
 
         steps = surveyed(part, part.survey)
     elif part.flying is None:

@@ -7,22 +7,22 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from aerialdojo_gen.agents.goal import N_ACTIONS
-from aerialdojo_gen.benchmark.episode import Episode
-from aerialdojo_gen.benchmark.motion import FlightSpace, flight_space
+from aerialdojo_gen.base import rng
+from aerialdojo_gen.base.config.agreement import SUCCESS_RADIUS_M
+from aerialdojo_gen.base.config.sections import Embodiment, PlanConfig
+from aerialdojo_gen.benchmark.agents.goal import N_ACTIONS
 from aerialdojo_gen.benchmark.tasks import mesh_of
-from aerialdojo_gen.common import rng
-from aerialdojo_gen.config.agreement import SUCCESS_RADIUS_M
-from aerialdojo_gen.config.sections import Embodiment, PlanConfig
+from aerialdojo_gen.dataset.episode import Episode
 from aerialdojo_gen.learning import checkpoints
 from aerialdojo_gen.learning.blocked import blocked
+from aerialdojo_gen.learning.encoding import Reckoning
 from aerialdojo_gen.learning.loader import torch_package
 from aerialdojo_gen.learning.parts import Flying, Part, goal_poses, goals_of, offsets, pictures
 from aerialdojo_gen.learning.policy import network_of
-from aerialdojo_gen.learning.seen import Reckoning
 from aerialdojo_gen.learning.steps import Steps
 from aerialdojo_gen.learning.teacher import Teacher, teacher_of
 from aerialdojo_gen.learning.words import Vocabulary
+from aerialdojo_gen.planning.flight_space import FlightSpace, flight_space
 from aerialdojo_gen.scenes.context import SEVERAL, open_scene
 from aerialdojo_gen.store.schemas import STOP
 

@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from aerialdojo_gen.agents.goal import N_ACTIONS
-from aerialdojo_gen.benchmark.motion import FlightSpace, flight_space
+from aerialdojo_gen.benchmark.agents.goal import N_ACTIONS
 from aerialdojo_gen.learning.blocked import blocked
 from aerialdojo_gen.planning.attempt import costs_at
 from aerialdojo_gen.planning.cost_to_go import columns_by_distance, expand_cost, seed_goal
+from aerialdojo_gen.planning.flight_space import FlightSpace, flight_space
 from aerialdojo_gen.planning.preference import NO_PREFERENCE
 from aerialdojo_gen.scenes.context import context_of
 

@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from aerialdojo_gen.common import rng
+from aerialdojo_gen.base import rng
 from aerialdojo_gen.learning.loader import torch_package
+from aerialdojo_gen.learning.localization import UNIT_M, Guess, astray, missed
 from aerialdojo_gen.learning.network import Network, Thought
 from aerialdojo_gen.learning.recipe import Recipe
 from aerialdojo_gen.learning.steps import Pool
-from aerialdojo_gen.learning.whereabouts import UNIT_M, Guess, astray, missed
 from aerialdojo_gen.pipeline.executors.local import own_cores
 
 # Batches of like lengths are put together from so many: padding costs time.

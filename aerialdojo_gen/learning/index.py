@@ -12,10 +12,10 @@ import pyarrow as pa
 import pyarrow.compute as pc
 from numpy.typing import NDArray
 
+from aerialdojo_gen.base.cli_context import command
+from aerialdojo_gen.base.errors import StoreError, UsageError
+from aerialdojo_gen.base.names import unknown
 from aerialdojo_gen.benchmark.tasks import Selection, select
-from aerialdojo_gen.common.advice import command
-from aerialdojo_gen.common.names import unknown
-from aerialdojo_gen.errors import StoreError, UsageError
 from aerialdojo_gen.geometry.motion import replay
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.root import DataRoot

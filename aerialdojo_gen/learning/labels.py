@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from aerialdojo_gen.agents.goal import N_ACTIONS
+from aerialdojo_gen.benchmark.agents.goal import N_ACTIONS
 from aerialdojo_gen.benchmark.tasks import mesh_of
 from aerialdojo_gen.geometry.angles import wrap_angle_rad
 from aerialdojo_gen.learning.geodesic import geodesic

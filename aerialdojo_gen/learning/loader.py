@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from aerialdojo_gen.benchmark.eyes import has_drawn
-from aerialdojo_gen.errors import AerialDojoError, MissingPackage, StoreError, UsageError, first_line, lacks
+from aerialdojo_gen.base.errors import AerialDojoError, MissingPackage, StoreError, UsageError, first_line, lacks
+from aerialdojo_gen.benchmark.observations import has_drawn
 from aerialdojo_gen.learning.order import Order
 from aerialdojo_gen.learning.trajectories import Trajectories
 

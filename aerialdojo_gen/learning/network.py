@@ -10,11 +10,11 @@ import torch
 from torch import nn
 from torch.nn import functional
 
-from aerialdojo_gen.agents.goal import N_ACTIONS
+from aerialdojo_gen.benchmark.agents.goal import N_ACTIONS
 from aerialdojo_gen.geometry.motion import TURNS
-from aerialdojo_gen.learning.seen import PATCH_PX
-from aerialdojo_gen.learning.sight import Sight, as_patches
-from aerialdojo_gen.learning.whereabouts import UNIT_M, Guess, Whereabouts
+from aerialdojo_gen.learning.encoding import PATCH_PX
+from aerialdojo_gen.learning.localization import UNIT_M, Guess, Whereabouts
+from aerialdojo_gen.learning.patch_classifier import Sight, as_patches
 from aerialdojo_gen.store.schemas import STOP
 
 # Wave lengths of the sines that tell places apart, metres; beside them the place itself.

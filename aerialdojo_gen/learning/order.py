@@ -13,8 +13,8 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from aerialdojo_gen.common import rng
-from aerialdojo_gen.errors import UsageError
+from aerialdojo_gen.base import rng
+from aerialdojo_gen.base.errors import UsageError
 
 
 class Order:

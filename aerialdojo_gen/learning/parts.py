@@ -9,18 +9,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from aerialdojo_gen.agents.goal import Sensors
-from aerialdojo_gen.benchmark.eyes import drawing
-from aerialdojo_gen.benchmark.motion import flight_space
+from aerialdojo_gen.base.config.sections import Embodiment
+from aerialdojo_gen.benchmark.agents.goal import Sensors
+from aerialdojo_gen.benchmark.observations import drawing
 from aerialdojo_gen.benchmark.tasks import Selection, mesh_of, reference_image
-from aerialdojo_gen.config.sections import Embodiment
 from aerialdojo_gen.learning.blocked import blocked
+from aerialdojo_gen.learning.encoding import goal_picture, packed
 from aerialdojo_gen.learning.index import Index, read_index
 from aerialdojo_gen.learning.labels import Labels
 from aerialdojo_gen.learning.pictures import within
-from aerialdojo_gen.learning.seen import goal_picture, packed
 from aerialdojo_gen.learning.steps import Steps
 from aerialdojo_gen.learning.words import goal_text
+from aerialdojo_gen.planning.flight_space import flight_space
 from aerialdojo_gen.rendering.bodies import draw_bodies
 from aerialdojo_gen.scenes.context import SEVERAL, open_scene
 from aerialdojo_gen.store import shards as store

@@ -10,11 +10,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from aerialdojo_gen.agents.goal import Sensors
-from aerialdojo_gen.benchmark.eyes import drawing
+from aerialdojo_gen.base.cli_context import command
+from aerialdojo_gen.base.errors import RenderError, StoreError
+from aerialdojo_gen.benchmark.agents.goal import Sensors
+from aerialdojo_gen.benchmark.observations import drawing
 from aerialdojo_gen.benchmark.tasks import mesh_of
-from aerialdojo_gen.common.advice import command
-from aerialdojo_gen.errors import RenderError, StoreError
 from aerialdojo_gen.learning.index import Index
 from aerialdojo_gen.rendering.bodies import draw_bodies
 from aerialdojo_gen.rendering.reader import Recording, read_recording

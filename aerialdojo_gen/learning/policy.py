@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from aerialdojo_gen.agents.base import AgentBase
-from aerialdojo_gen.agents.goal import N_ACTIONS, Goal, Observation
-from aerialdojo_gen.errors import StoreError, UsageError, first_line
+from aerialdojo_gen.base.errors import StoreError, UsageError, first_line
+from aerialdojo_gen.benchmark.agents.base import AgentBase
+from aerialdojo_gen.benchmark.agents.goal import N_ACTIONS, Goal, Observation
 from aerialdojo_gen.learning import checkpoints
+from aerialdojo_gen.learning.encoding import Reckoning, goal_picture, packed
 from aerialdojo_gen.learning.loader import torch_package
 from aerialdojo_gen.learning.naming import named_by
 from aerialdojo_gen.learning.search import LOST_NATS, Search
-from aerialdojo_gen.learning.seen import Reckoning, goal_picture, packed
 from aerialdojo_gen.learning.words import goal_text
 from aerialdojo_gen.store.files import file_digest
 

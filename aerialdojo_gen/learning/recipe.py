@@ -7,12 +7,12 @@ from typing import Any, Literal
 
 from pydantic import Field, ValidationError, model_validator
 
-from aerialdojo_gen.common.advice import PROGRAM
-from aerialdojo_gen.common.bounded import read_toml
-from aerialdojo_gen.common.explain import explain
-from aerialdojo_gen.common.shipped import home
-from aerialdojo_gen.config.sections import Section
-from aerialdojo_gen.errors import ConfigError
+from aerialdojo_gen.base.cli_context import PROGRAM
+from aerialdojo_gen.base.config.sections import Section
+from aerialdojo_gen.base.errors import ConfigError
+from aerialdojo_gen.base.explain import explain
+from aerialdojo_gen.base.safe_parse import read_toml
+from aerialdojo_gen.base.shipped import home
 
 View = Literal["front", "left", "right", "down"]
 SettingName = Literal["base", "standard", "long_horizon"]

@@ -8,9 +8,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from aerialdojo_gen.agents.goal import Sensors
+from aerialdojo_gen.benchmark.agents.goal import Sensors
 from aerialdojo_gen.geometry.cameras import view_pose
-from aerialdojo_gen.learning.seen import PATCH_PX, in_patches
+from aerialdojo_gen.learning.encoding import PATCH_PX, in_patches
 
 Floats = NDArray[np.float64]
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from aerialdojo_gen.errors import StoreError
+from aerialdojo_gen.base.errors import StoreError
 from aerialdojo_gen.learning.words import Vocabulary
 from aerialdojo_gen.store.atomic import atomic_folder, make_folder
 
@@ -21,7 +21,7 @@ _FRAMES, _STEPS = "frames.npy", "steps.npz"
 class Steps:
     """Episodes one after the other; arrays of steps have m rows, those of episodes n."""
 
-    frames: NDArray[np.uint8]  # See `aerialdojo_gen.learning.seen.packed`; of a blind policy there are no views
+    frames: NDArray[np.uint8]  # See `aerialdojo_gen.learning.encoding.packed`; of a blind policy there are no views
     first: NDArray[np.int64]  # (n + 1,) int64; where each episode's steps begin
     label: NDArray[np.int64]  # (m,) int64; what the teacher does there, 0 to 15
     odometry: NDArray[np.float32]  # (m, 4) float32; own motion from the start and in its frame: metres and radians

@@ -8,8 +8,8 @@ from contextlib import AbstractContextManager
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from aerialdojo_gen.agents.goal import N_ACTIONS
-from aerialdojo_gen.config.sections import PlanConfig
+from aerialdojo_gen.base.config.sections import PlanConfig
+from aerialdojo_gen.benchmark.agents.goal import N_ACTIONS
 from aerialdojo_gen.planning.difficulty import agent_actions
 from aerialdojo_gen.planning.planner import Planner
 from aerialdojo_gen.scenes.context import SceneContext

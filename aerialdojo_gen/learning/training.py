@@ -14,26 +14,26 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from aerialdojo_gen.agents.goal import Sensors
+from aerialdojo_gen.base import rng
+from aerialdojo_gen.base.errors import Malformed, UsageError
+from aerialdojo_gen.base.names import unknown
+from aerialdojo_gen.base.safe_parse import loads_json, read_json
+from aerialdojo_gen.benchmark.agents.goal import Sensors
 from aerialdojo_gen.benchmark.tasks import Selection
-from aerialdojo_gen.common import rng
-from aerialdojo_gen.common.bounded import loads_json, read_json
-from aerialdojo_gen.common.names import unknown
-from aerialdojo_gen.errors import Malformed, UsageError
+from aerialdojo_gen.dataset.fingerprint import release_fingerprint
 from aerialdojo_gen.learning import checkpoints
 from aerialdojo_gen.learning.collect import collect, parts_of, survey_parts
+from aerialdojo_gen.learning.encoding import actions_fingerprint
 from aerialdojo_gen.learning.index import Index, read_index
 from aerialdojo_gen.learning.loader import torch_package
 from aerialdojo_gen.learning.naming import naming_words
 from aerialdojo_gen.learning.parts import Flying, Part
 from aerialdojo_gen.learning.recipe import Recipe
-from aerialdojo_gen.learning.seen import actions_fingerprint
 from aerialdojo_gen.learning.steps import Pool, Steps
 from aerialdojo_gen.learning.trajectories import drawn_evenly
 from aerialdojo_gen.learning.words import Vocabulary, goal_text
 from aerialdojo_gen.pipeline.executors import make_executor
 from aerialdojo_gen.pipeline.progress import Rate, Reporter, duration
-from aerialdojo_gen.release.fingerprint import release_fingerprint
 from aerialdojo_gen.store.atomic import atomic_file, make_folder
 from aerialdojo_gen.store.files import file_digest
 from aerialdojo_gen.store.root import DataRoot, LocalRoot, Where, open_root

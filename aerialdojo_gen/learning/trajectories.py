@@ -12,12 +12,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from aerialdojo_gen.agents.goal import Sensors
+from aerialdojo_gen.base import rng
+from aerialdojo_gen.base.cli_context import command
+from aerialdojo_gen.base.errors import UsageError
+from aerialdojo_gen.base.names import unknown
+from aerialdojo_gen.benchmark.agents.goal import Sensors
 from aerialdojo_gen.benchmark.tasks import Selection, mesh_of, reference_image
-from aerialdojo_gen.common import rng
-from aerialdojo_gen.common.advice import command
-from aerialdojo_gen.common.names import unknown
-from aerialdojo_gen.errors import UsageError
 from aerialdojo_gen.learning.batches import scattered, unbatched
 from aerialdojo_gen.learning.cached import Cached, Store
 from aerialdojo_gen.learning.index import Index, read_index

@@ -11,9 +11,9 @@ import numpy as np
 from gymnasium import spaces
 from gymnasium.vector import AsyncVectorEnv, SyncVectorEnv
 
+from aerialdojo_gen.base.errors import UsageError
 from aerialdojo_gen.benchmark.env import AerialDojoEnv, make_env
 from aerialdojo_gen.benchmark.tasks import mesh_of
-from aerialdojo_gen.errors import UsageError
 from aerialdojo_gen.learning.geodesic import geodesic
 from aerialdojo_gen.learning.words import Vocabulary, goal_text
 from aerialdojo_gen.store.root import Where, open_root

@@ -12,10 +12,10 @@ from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from aerialdojo_gen.common.trouble import check_memory
-from aerialdojo_gen.config.pipeline import Pipeline
-from aerialdojo_gen.config.sections import Section
-from aerialdojo_gen.errors import AerialDojoError, BudgetSpent
+from aerialdojo_gen.base.config.pipeline import Pipeline
+from aerialdojo_gen.base.config.sections import Section
+from aerialdojo_gen.base.environment_errors import check_memory
+from aerialdojo_gen.base.errors import AerialDojoError, BudgetSpent
 from aerialdojo_gen.pipeline.executors.base import Waiting
 from aerialdojo_gen.pipeline.expectation import Expectation
 from aerialdojo_gen.pipeline.freshness import Limits, Shards, shards_of

@@ -19,28 +19,28 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-from aerialdojo_gen.errors import AssetError
+from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.pipeline.code_facts import Definition, Edge, Facts, module_facts
 
 # Modules of which the named definitions count, and nothing else. A configuration's values count, not its classes.
 PLUMBING: dict[str, tuple[str, ...]] = {
     "aerialdojo_gen": (),
     "aerialdojo_gen.benchmark": (),
-    "aerialdojo_gen.common": (),
-    "aerialdojo_gen.common.advice": (),
-    "aerialdojo_gen.common.disk": (),
-    "aerialdojo_gen.common.terms": ("*",),
-    "aerialdojo_gen.common.explain": (),
-    "aerialdojo_gen.common.names": (),
-    "aerialdojo_gen.common.secrets": (),
-    "aerialdojo_gen.common.text_table": (),
-    "aerialdojo_gen.common.trouble": (),
-    "aerialdojo_gen.common.version": (),
-    "aerialdojo_gen.config": (),
-    "aerialdojo_gen.config.agreement": (),
-    "aerialdojo_gen.config.pipeline": (),
-    "aerialdojo_gen.config.sections": (),
-    "aerialdojo_gen.errors": (),
+    "aerialdojo_gen.base": (),
+    "aerialdojo_gen.base.cli_context": (),
+    "aerialdojo_gen.base.disk": (),
+    "aerialdojo_gen.base.constants": ("*",),
+    "aerialdojo_gen.base.explain": (),
+    "aerialdojo_gen.base.names": (),
+    "aerialdojo_gen.base.secrets": (),
+    "aerialdojo_gen.base.text_table": (),
+    "aerialdojo_gen.base.environment_errors": (),
+    "aerialdojo_gen.base.version": (),
+    "aerialdojo_gen.base.config": (),
+    "aerialdojo_gen.base.config.agreement": (),
+    "aerialdojo_gen.base.config.pipeline": (),
+    "aerialdojo_gen.base.config.sections": (),
+    "aerialdojo_gen.base.errors": (),
     "aerialdojo_gen.learning": (),
     "aerialdojo_gen.pipeline": (),
     "aerialdojo_gen.pipeline.chain": (),
@@ -48,7 +48,7 @@ PLUMBING: dict[str, tuple[str, ...]] = {
     "aerialdojo_gen.pipeline.code_facts": (),
     "aerialdojo_gen.pipeline.executors": (),
     "aerialdojo_gen.pipeline.executors.base": (),
-    "aerialdojo_gen.pipeline.executors.carried": (),
+    "aerialdojo_gen.pipeline.executors.bundled": (),
     "aerialdojo_gen.pipeline.executors.link": (),
     "aerialdojo_gen.pipeline.executors.local": (),
     "aerialdojo_gen.pipeline.executors.ray": (),
@@ -62,8 +62,8 @@ PLUMBING: dict[str, tuple[str, ...]] = {
     "aerialdojo_gen.pipeline.runner": (),
     "aerialdojo_gen.pipeline.stage": ("Job",),
     "aerialdojo_gen.pipeline.summary": (),
-    "aerialdojo_gen.stages": (),
-    "aerialdojo_gen.stages.work": (),
+    "aerialdojo_gen.pipeline.stages": (),
+    "aerialdojo_gen.pipeline.stages.work": (),
     "aerialdojo_gen.pipeline.task": (),
     "aerialdojo_gen.store": (),
     "aerialdojo_gen.store.atomic": (),
@@ -97,7 +97,7 @@ _DECLARED = ("run", "parts", "sources")
 _WRITERS = (Edge("aerialdojo_gen.store.parquet_files", "write_clustered"), Edge("aerialdojo_gen.store.tables"))
 
 # Modules that import what their caller names; what that can be stands in the configuration.
-DYNAMIC = frozenset({"aerialdojo_gen.llm.service", "aerialdojo_gen.agents.load"})
+DYNAMIC = frozenset({"aerialdojo_gen.base.llm_client.service", "aerialdojo_gen.benchmark.agents.load"})
 
 # Files that modules read, relative to the package. Those outside of it are sources of the stages.
 DATA_FILES = {
@@ -155,14 +155,14 @@ def stage_code(stage: str, chosen: Choice | None = None, idle: tuple[str, ...] =
 
 def stage_module(stage: str) -> str:
     """Name the module of a stage."""
-    return f"aerialdojo_gen.stages.{stage.replace('-', '_')}"
+    return f"aerialdojo_gen.pipeline.stages.{stage.replace('-', '_')}"
 
 
 def counted(module: str) -> tuple[str, ...] | None:
     """Return which of a module's definitions count, ``("*",)`` for all that are asked for; None if all of it does."""
     if module in PLUMBING:
         return PLUMBING[module]
-    return _DECLARED if module.rpartition(".")[0] == "aerialdojo_gen.stages" else None
+    return _DECLARED if module.rpartition(".")[0] == "aerialdojo_gen.pipeline.stages" else None
 
 
 class Package:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Sequence
 
-from aerialdojo_gen.errors import AerialDojoError
+from aerialdojo_gen.base.errors import AerialDojoError
 from aerialdojo_gen.pipeline.stage import Roots, Stage
 from aerialdojo_gen.store import shards as store
 

@@ -8,10 +8,10 @@ from functools import cache, lru_cache
 from pathlib import Path
 from typing import Any
 
-from aerialdojo_gen.common import paper
-from aerialdojo_gen.config.pipeline import Pipeline
-from aerialdojo_gen.config.sections import Section
-from aerialdojo_gen.errors import AssetError
+from aerialdojo_gen.base import paper_figures as paper
+from aerialdojo_gen.base.config.pipeline import Pipeline
+from aerialdojo_gen.base.config.sections import Section
+from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.pipeline.code_digest import Code, stage_code
 from aerialdojo_gen.pipeline.stage import Roots, Stage
 from aerialdojo_gen.store import shards as store
@@ -27,7 +27,7 @@ def scene_fingerprint(stage: Stage, pipeline: Pipeline, roots: Roots, scene: str
     """
     code = scene_code(stage, roots, scene, pipeline.section(stage.name))
     # The paper's figures lie beside the package in a checkout, inside it in a wheel.
-    carried = paper.files() if "aerialdojo_gen.common.paper" in code.parts else []
+    carried = paper.files() if "aerialdojo_gen.base.paper_figures" in code.parts else []
     sources = [*stage.sources(roots, scene), *carried]
     facts = {
         "stage": stage.name,

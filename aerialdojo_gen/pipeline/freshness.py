@@ -11,9 +11,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from aerialdojo_gen.config.pipeline import Pipeline
-from aerialdojo_gen.config.sections import Section
-from aerialdojo_gen.errors import AerialDojoError, DamagedFile
+from aerialdojo_gen.base.config.pipeline import Pipeline
+from aerialdojo_gen.base.config.sections import Section
+from aerialdojo_gen.base.errors import AerialDojoError, DamagedFile
 from aerialdojo_gen.pipeline.fingerprint import scene_code, scene_fingerprint
 from aerialdojo_gen.pipeline.progress import Reporter
 from aerialdojo_gen.pipeline.stage import Job, Roots, Stage

@@ -14,7 +14,7 @@ from typing import Any, TextIO
 
 from tqdm import tqdm
 
-from aerialdojo_gen.common.terminal import raw, shown
+from aerialdojo_gen.base.terminal import raw, shown
 
 # Its own lock is a semaphore, which needs a /dev/shm that can be written and outlives a process that is killed.
 tqdm.set_lock(threading.RLock())

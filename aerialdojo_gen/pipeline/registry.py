@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from aerialdojo_gen.pipeline.stage import Stage
-from aerialdojo_gen.stages import (
+from aerialdojo_gen.pipeline.stages import (
     anchor_sample,
     annotate_import,
     build_scenes,

@@ -10,9 +10,9 @@ import time
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
-from aerialdojo_gen.common.names import choose_scenes, unknown
-from aerialdojo_gen.config.pipeline import Pipeline
-from aerialdojo_gen.errors import AerialDojoError, AssetError, BudgetSpent, UsageError
+from aerialdojo_gen.base.config.pipeline import Pipeline
+from aerialdojo_gen.base.errors import AerialDojoError, AssetError, BudgetSpent, UsageError
+from aerialdojo_gen.base.names import choose_scenes, unknown
 from aerialdojo_gen.pipeline.chain import Chain
 from aerialdojo_gen.pipeline.code_digest import stage_code
 from aerialdojo_gen.pipeline.executors import Executor, Folders, make_executor, on_disk
@@ -84,7 +84,7 @@ def run(
 
 def uncompiled(stages: Sequence[str]) -> list[str]:
     """Name the stages that have machine code for less than half of their modules with kernels."""
-    from aerialdojo_gen.common.kernel_cache import kernel_folder
+    from aerialdojo_gen.base.kernel_cache import kernel_folder
 
     def compiled(stage: str) -> list[bool]:
         files = (_PACKAGE.parent.joinpath(*part.split(".")).with_suffix(".py") for part in stage_code(stage).parts)

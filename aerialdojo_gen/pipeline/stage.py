@@ -1,6 +1,6 @@
 """What a stage is, and what its work is given and gives.
 
-A stage is declared by its module in `aerialdojo_gen.stages`; its work is a plain function
+A stage is declared by its module in `aerialdojo_gen.pipeline.stages`; its work is a plain function
 ``run(job, config) -> Output``. Nothing heavy is imported here: the command line reads the declarations.
 """
 
@@ -17,7 +17,7 @@ from aerialdojo_gen.store.root import DataRoot, open_root
 if TYPE_CHECKING:
     import pyarrow as pa
 
-    from aerialdojo_gen.config.sections import Embodiment
+    from aerialdojo_gen.base.config.sections import Embodiment
     from aerialdojo_gen.pipeline.code_digest import Choice
     from aerialdojo_gen.scenes.model import Scene
 
@@ -78,7 +78,7 @@ class Job:
     part, parts : int
         Which part of the scene's work this is, and how many there are.
     seed : int
-        Seed of the pipeline, for `aerialdojo_gen.common.rng.generator`.
+        Seed of the pipeline, for `aerialdojo_gen.base.rng.generator`.
     embodiment : Embodiment
         The drone's body.
     roots : Roots

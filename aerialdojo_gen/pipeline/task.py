@@ -8,10 +8,10 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from aerialdojo_gen.common.advice import Given, as_given, given
-from aerialdojo_gen.common.trouble import explained
-from aerialdojo_gen.config.sections import Section
-from aerialdojo_gen.errors import AerialDojoError, BudgetSpent
+from aerialdojo_gen.base.cli_context import Given, as_given, given
+from aerialdojo_gen.base.config.sections import Section
+from aerialdojo_gen.base.environment_errors import explained
+from aerialdojo_gen.base.errors import AerialDojoError, BudgetSpent
 from aerialdojo_gen.pipeline.registry import BY_NAME
 from aerialdojo_gen.pipeline.stage import Job
 from aerialdojo_gen.store import shards as store

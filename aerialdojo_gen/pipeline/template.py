@@ -11,12 +11,12 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from aerialdojo_gen.common.explain import explain
-from aerialdojo_gen.common.shipped import written_path
-from aerialdojo_gen.common.text_table import wrapped
-from aerialdojo_gen.config.keys import Key, config_keys, plain, section_meanings
-from aerialdojo_gen.config.pipeline import Pipeline, load_pipeline
-from aerialdojo_gen.errors import ConfigError, UsageError
+from aerialdojo_gen.base.config.keys import Key, config_keys, plain, section_meanings
+from aerialdojo_gen.base.config.pipeline import Pipeline, load_pipeline
+from aerialdojo_gen.base.errors import ConfigError, UsageError
+from aerialdojo_gen.base.explain import explain
+from aerialdojo_gen.base.shipped import written_path
+from aerialdojo_gen.base.text_table import wrapped
 from aerialdojo_gen.store.atomic import atomic_file
 
 _WIDTH = 100

@@ -11,8 +11,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from aerialdojo_gen.common.kernels import njit
-from aerialdojo_gen.common.terms import APPROACH, STOP
+from aerialdojo_gen.base.constants import APPROACH, STOP
+from aerialdojo_gen.base.kernels import njit
 from aerialdojo_gen.geometry.motion import fly
 from aerialdojo_gen.planning.certify import Examination, examine
 from aerialdojo_gen.planning.cost_to_go import cost_at, extra_cost

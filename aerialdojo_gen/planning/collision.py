@@ -17,7 +17,7 @@ import fcl
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from aerialdojo_gen.common.kernels import njit
+from aerialdojo_gen.base.kernels import njit
 from aerialdojo_gen.scenes.context import context_of
 from aerialdojo_gen.scenes.model import Instance, Scene
 

@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from aerialdojo_gen.common.kernels import njit
+from aerialdojo_gen.base.kernels import njit
 from aerialdojo_gen.planning.grid_kernels import GridArrays, segment_free
 
 # Half of the moves between cells: neighbours in the plane, knight's moves in the plane, up. Move k + 9 undoes move k.

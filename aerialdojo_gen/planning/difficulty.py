@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from aerialdojo_gen.common.kernels import njit
-from aerialdojo_gen.common.terms import APPROACH
+from aerialdojo_gen.base.constants import APPROACH
+from aerialdojo_gen.base.kernels import njit
 from aerialdojo_gen.planning.clearance import ClearanceGrid
 from aerialdojo_gen.planning.collision import CollisionWorld
 from aerialdojo_gen.planning.free_length import free_lengths_m

@@ -11,7 +11,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from aerialdojo_gen.common.kernels import njit
+from aerialdojo_gen.base.kernels import njit
 from aerialdojo_gen.geometry.motion import N_HEADINGS, TURN_RAD
 from aerialdojo_gen.planning.grid_kernels import GridArrays, bound_at, inside, segment_free
 from aerialdojo_gen.planning.preference import Preference, astray, squeeze

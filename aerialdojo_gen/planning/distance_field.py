@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from aerialdojo_gen.common.kernels import njit
+from aerialdojo_gen.base.kernels import njit
 from aerialdojo_gen.geometry.triangles import point_triangle_d2
 
 # float32 rounds either way: take off more than it can add, so that a bound stays a bound.

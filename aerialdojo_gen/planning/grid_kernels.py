@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from aerialdojo_gen.common.kernels import njit
+from aerialdojo_gen.base.kernels import njit
 from aerialdojo_gen.geometry.triangles import segment_triangle_d2
 from aerialdojo_gen.planning.bvh import point_distance, segment_blocker, segment_distance
 

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from aerialdojo_gen.common.kernels import njit
+from aerialdojo_gen.base.kernels import njit
 from aerialdojo_gen.planning.column_kernels import move_lengths
 from aerialdojo_gen.planning.connectivity import MOVES
 from aerialdojo_gen.planning.grid_kernels import GridArrays

@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from aerialdojo_gen.common.kernels import njit
+from aerialdojo_gen.base.kernels import njit
 from aerialdojo_gen.geometry.motion import N_HEADINGS, TURN_RAD
 from aerialdojo_gen.planning.cost_to_go import cost_at, cost_between
 from aerialdojo_gen.planning.direct import direct_legs

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from aerialdojo_gen.config.sections import PlanConfig, Rung
+from aerialdojo_gen.base.config.sections import PlanConfig, Rung
 from aerialdojo_gen.geometry.motion import TURN_RAD, nearest_heading
 from aerialdojo_gen.planning.attempt import attempt, costs_at, lengths_at
 from aerialdojo_gen.planning.certify import conclude
@@ -41,7 +41,7 @@ class Route:
     Attributes
     ----------
     outcome : str
-        One of `aerialdojo_gen.common.terms.OUTCOMES`.
+        One of `aerialdojo_gen.base.constants.OUTCOMES`.
     poses : (K + 1, 4) float64
         x, y, z in metres and yaw in (-pi, pi], world frame; no rows unless SOLVED.
     actions : (K + 1,) int8

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from aerialdojo_gen.common.kernels import njit
+from aerialdojo_gen.base.kernels import njit
 
 # Steps in which the cost of clearance is integrated along a way: the grid's cells are half a metre.
 _STEP_M = 0.5

@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from aerialdojo_gen.common.kernels import njit
+from aerialdojo_gen.base.kernels import njit
 from aerialdojo_gen.planning.column_kernels import FLAT, KIND_OF, KINDS, UP, leave, move_lengths, push, settle
 from aerialdojo_gen.planning.connectivity import MOVE_LENGTHS, MOVES
 from aerialdojo_gen.planning.grid_kernels import GridArrays

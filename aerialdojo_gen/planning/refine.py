@@ -13,8 +13,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from aerialdojo_gen.common.kernels import njit
-from aerialdojo_gen.common.terms import MOVE_DOWN_1, MOVE_UP_1, TURN_LEFT, TURN_RIGHT
+from aerialdojo_gen.base.constants import MOVE_DOWN_1, MOVE_UP_1, TURN_LEFT, TURN_RIGHT
+from aerialdojo_gen.base.kernels import njit
 from aerialdojo_gen.geometry.motion import N_HEADINGS, QUARTER, TURN_RAD
 from aerialdojo_gen.planning.grid_kernels import GridArrays, inside, segment_free
 from aerialdojo_gen.planning.hybrid_astar import SearchOptions

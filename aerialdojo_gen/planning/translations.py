@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from aerialdojo_gen.common.kernels import njit
+from aerialdojo_gen.base.kernels import njit
 from aerialdojo_gen.geometry.motion import N_HEADINGS, QUARTER
 
 # A translation is direction * 3 + step for the horizontal ones, then up 1 and 2 m, down 1 and 2 m.

@@ -21,8 +21,8 @@ from typing import Protocol, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from aerialdojo_gen.config.sections import RENDERERS, RendererName
-from aerialdojo_gen.errors import RenderError
+from aerialdojo_gen.base.config.sections import RENDERERS, RendererName
+from aerialdojo_gen.base.errors import RenderError
 from aerialdojo_gen.geometry.cameras import Camera, view_pose
 from aerialdojo_gen.geometry.rays import RayCaster
 from aerialdojo_gen.rendering.casters import ray_caster

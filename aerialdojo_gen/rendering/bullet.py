@@ -7,7 +7,7 @@ import os
 import sys
 from types import ModuleType
 
-from aerialdojo_gen.errors import RenderError
+from aerialdojo_gen.base.errors import RenderError
 
 
 def _import_silently() -> ModuleType:

@@ -19,8 +19,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from aerialdojo_gen.common.kernels import njit
-from aerialdojo_gen.common.pictures import FRAME_PNG, encode_png
+from aerialdojo_gen.base.kernels import njit
+from aerialdojo_gen.base.pictures import FRAME_PNG, encode_png
 
 MAX_DEPTH_M = 65.535
 RGB_CODEC, DEPTH_CODEC = "h264", "ffv1"

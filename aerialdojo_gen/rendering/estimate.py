@@ -8,9 +8,9 @@ import time
 from dataclasses import dataclass
 from typing import Any
 
-from aerialdojo_gen.common import rng
-from aerialdojo_gen.config.sections import RenderConfig
-from aerialdojo_gen.errors import UsageError
+from aerialdojo_gen.base import rng
+from aerialdojo_gen.base.config.sections import RenderConfig
+from aerialdojo_gen.base.errors import UsageError
 from aerialdojo_gen.rendering.backend import choose_renderer, open_renderer
 from aerialdojo_gen.rendering.checks import Solid
 from aerialdojo_gen.rendering.placement import places

@@ -13,9 +13,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from aerialdojo_gen.common.bounded import read_json
-from aerialdojo_gen.config.sections import RenderConfig
-from aerialdojo_gen.errors import StoreError
+from aerialdojo_gen.base.config.sections import RenderConfig
+from aerialdojo_gen.base.errors import StoreError
+from aerialdojo_gen.base.safe_parse import read_json
 from aerialdojo_gen.store.root import DataRoot
 from aerialdojo_gen.store.schemas import RECORDINGS
 from aerialdojo_gen.store.tables import check_table, from_rows

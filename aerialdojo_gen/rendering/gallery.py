@@ -10,8 +10,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from aerialdojo_gen.common.pictures import GALLERY_JPEG, SMALLEST_PNG, encode_jpeg, encode_png
-from aerialdojo_gen.common.rng import generator
+from aerialdojo_gen.base.pictures import GALLERY_JPEG, SMALLEST_PNG, encode_jpeg, encode_png
+from aerialdojo_gen.base.rng import generator
 from aerialdojo_gen.geometry.rays import RayCaster
 from aerialdojo_gen.rendering.preview import contact_sheet, look_at
 from aerialdojo_gen.scenes.catalogue import Catalogue

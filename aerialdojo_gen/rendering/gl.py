@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from aerialdojo_gen.errors import RenderError
+from aerialdojo_gen.base.errors import RenderError
 from aerialdojo_gen.geometry.cameras import Camera
 from aerialdojo_gen.rendering import gl_shaders as glsl
 from aerialdojo_gen.rendering.bodies import GlBodies

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from aerialdojo_gen.common.kernels import njit
+from aerialdojo_gen.base.kernels import njit
 from aerialdojo_gen.rendering.gl_culling import NEAR_W, ROUNDING_PX, box_pixels, chunks_in_view
 from aerialdojo_gen.rendering.gl_geometry import CHUNK_TRIANGLES, Chunks
 from aerialdojo_gen.rendering.gl_tiles import MOVED_PX, NEARER, NEAREST, Tiles

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from aerialdojo_gen.config.sections import RenderConfig
+from aerialdojo_gen.base.config.sections import RenderConfig
 from aerialdojo_gen.rendering.codecs import SUFFIX
 
 # The one file of a tiled recording.

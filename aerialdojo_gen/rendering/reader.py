@@ -18,9 +18,9 @@ from typing import Any, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from aerialdojo_gen.common.advice import command
-from aerialdojo_gen.common.bounded import loads_json
-from aerialdojo_gen.errors import Malformed, RenderError
+from aerialdojo_gen.base.cli_context import command
+from aerialdojo_gen.base.errors import Malformed, RenderError
+from aerialdojo_gen.base.safe_parse import loads_json
 from aerialdojo_gen.rendering.codecs import SUFFIX, to_metres
 from aerialdojo_gen.rendering.placement import TILED
 from aerialdojo_gen.rendering.video import Tile, Video

@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from aerialdojo_gen.config.sections import RenderConfig
-from aerialdojo_gen.errors import RenderError
+from aerialdojo_gen.base.config.sections import RenderConfig
+from aerialdojo_gen.base.errors import RenderError
 from aerialdojo_gen.geometry.cameras import Camera, view_pose
 from aerialdojo_gen.rendering.backend import Renderer
 from aerialdojo_gen.rendering.checks import Solid, ViewChecks

@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from aerialdojo_gen.common.pictures import decode_rgb
+from aerialdojo_gen.base.pictures import decode_rgb
 
 Image = NDArray[np.uint8]
 

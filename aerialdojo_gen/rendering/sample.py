@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from aerialdojo_gen.common import rng
-from aerialdojo_gen.config.sections import RenderConfig
+from aerialdojo_gen.base import rng
+from aerialdojo_gen.base.config.sections import RenderConfig
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.layout import partition as partition_of
 from aerialdojo_gen.store.root import Where

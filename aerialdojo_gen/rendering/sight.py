@@ -8,8 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from aerialdojo_gen.common import rng
-from aerialdojo_gen.errors import StoreError
+from aerialdojo_gen.base import rng
+from aerialdojo_gen.base.errors import StoreError
 from aerialdojo_gen.geometry.surface import Surface
 from aerialdojo_gen.rendering.casters import ray_caster
 from aerialdojo_gen.scenes.context import context_of

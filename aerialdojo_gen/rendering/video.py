@@ -11,8 +11,8 @@ import av
 import numpy as np
 from numpy.typing import NDArray
 
-from aerialdojo_gen.common.pictures import decode_as_stored
-from aerialdojo_gen.errors import RenderError
+from aerialdojo_gen.base.errors import RenderError
+from aerialdojo_gen.base.pictures import decode_as_stored
 
 
 class Video(Sequence[NDArray[Any]]):

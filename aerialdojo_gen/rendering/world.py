@@ -8,9 +8,9 @@ from types import TracebackType
 import numpy as np
 from numpy.typing import NDArray
 
-from aerialdojo_gen.common.kernels import njit
-from aerialdojo_gen.common.pictures import encode_png
-from aerialdojo_gen.errors import RenderError
+from aerialdojo_gen.base.errors import RenderError
+from aerialdojo_gen.base.kernels import njit
+from aerialdojo_gen.base.pictures import encode_png
 from aerialdojo_gen.geometry.cameras import Camera
 from aerialdojo_gen.rendering.bullet import pybullet
 from aerialdojo_gen.rendering.lighting import Lighting, ShadowMap, light_of, sun_view

@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from aerialdojo_gen.common.names import nearest
-from aerialdojo_gen.errors import AssetError, ShapeError
+from aerialdojo_gen.base.errors import AssetError, ShapeError
+from aerialdojo_gen.base.names import nearest
 from aerialdojo_gen.geometry.angles import wrap_angle_rad
 from aerialdojo_gen.scenes.anatomy import FRONTS, Anatomy, Run, moved
 from aerialdojo_gen.scenes.builders import builders

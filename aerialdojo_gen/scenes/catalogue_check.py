@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from aerialdojo_gen.common.rng import generator
+from aerialdojo_gen.base.rng import generator
 from aerialdojo_gen.scenes.catalogue import Catalogue
 from aerialdojo_gen.scenes.claims import untrue
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from aerialdojo_gen.errors import AssetError
+from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.scenes.model import Instance, Part, Scene
 from aerialdojo_gen.scenes.recipe import Cut
 from aerialdojo_gen.scenes.sampling import colour_words, shown_colours

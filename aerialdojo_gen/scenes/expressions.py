@@ -8,7 +8,7 @@ import operator
 from collections.abc import Callable, Mapping
 from functools import lru_cache
 
-from aerialdojo_gen.errors import ShapeError
+from aerialdojo_gen.base.errors import ShapeError
 
 _LONGEST = 200
 _BINARY: dict[type[ast.operator], Callable[[float, float], float]] = {

@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from aerialdojo_gen.common.advice import command
-from aerialdojo_gen.common.bounded import loads_json
-from aerialdojo_gen.errors import AssetError
+from aerialdojo_gen.base.cli_context import command
+from aerialdojo_gen.base.errors import AssetError
+from aerialdojo_gen.base.safe_parse import loads_json
 from aerialdojo_gen.scenes.anatomy import read_anatomy
 from aerialdojo_gen.scenes.glb_materials import linear_colours, material_entry, read_material, srgb_colours
 from aerialdojo_gen.scenes.model import SURFACES, Instance, Material, Part, Scene

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from aerialdojo_gen.common.image_size import image_size
-from aerialdojo_gen.common.pictures import (
+from aerialdojo_gen.base.image_size import image_size
+from aerialdojo_gen.base.pictures import (
     TEXTURE_PNG,
     decode_as_stored,
     decode_masked,

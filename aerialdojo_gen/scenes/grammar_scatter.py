@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from shapely.geometry import LineString
 from shapely.geometry.base import BaseGeometry
 
-from aerialdojo_gen.common.kernels import njit
+from aerialdojo_gen.base.kernels import njit
 from aerialdojo_gen.scenes.mesh import Mesh
 from aerialdojo_gen.scenes.model import Instance
 from aerialdojo_gen.scenes.shapes_extruded import extrude, sweep

@@ -8,7 +8,7 @@ import numpy as np
 from shapely.geometry import LineString, MultiPolygon, Polygon
 from shapely.ops import unary_union
 
-from aerialdojo_gen.errors import ShapeError
+from aerialdojo_gen.base.errors import ShapeError
 from aerialdojo_gen.scenes.mesh import Mesh, merge, mesh, translated
 from aerialdojo_gen.scenes.shapes import _positive, number
 from aerialdojo_gen.scenes.shapes_extruded import extrude, triangulate

@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from aerialdojo_gen.common.names import nearest
-from aerialdojo_gen.errors import AssetError
+from aerialdojo_gen.base.errors import AssetError
+from aerialdojo_gen.base.names import nearest
 from aerialdojo_gen.scenes.colour_names import COLOURS
 
 FORMS = ("round", "boxy", "flat", "slender", "tapering", "pointed", "sloping", "upright", "level")

@@ -7,9 +7,9 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from aerialdojo_gen.common import bounded
-from aerialdojo_gen.common.names import nearest
-from aerialdojo_gen.errors import AssetError
+from aerialdojo_gen.base import safe_parse as bounded
+from aerialdojo_gen.base.errors import AssetError
+from aerialdojo_gen.base.names import nearest
 from aerialdojo_gen.scenes.model import Material
 from aerialdojo_gen.scenes.textures import TEXTURES, make_texture
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from aerialdojo_gen.common.rng import generator
+from aerialdojo_gen.base.rng import generator
 
 Floats = NDArray[np.float64]
 

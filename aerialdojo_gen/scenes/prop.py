@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from aerialdojo_gen.common.names import nearest
-from aerialdojo_gen.errors import AssetError, ShapeError
+from aerialdojo_gen.base.errors import AssetError, ShapeError
+from aerialdojo_gen.base.names import nearest
 from aerialdojo_gen.scenes.anatomy import FRONTS
 from aerialdojo_gen.scenes.builders import builders
 from aerialdojo_gen.scenes.looks import Look, parse_looks

@@ -9,8 +9,8 @@ import numpy as np
 import pydantic_core
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 
-from aerialdojo_gen.common.explain import explain
-from aerialdojo_gen.errors import AssetError, brief
+from aerialdojo_gen.base.errors import AssetError, brief
+from aerialdojo_gen.base.explain import explain
 from aerialdojo_gen.scenes.materials import read_toml
 
 Model = TypeVar("Model", bound=BaseModel)
@@ -75,7 +75,7 @@ class Recipe(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    layout: str  # Type of `aerialdojo_gen.layouts`
+    layout: str  # Type of `aerialdojo_gen.scenes.layouts`
     seed: Annotated[int, Field(ge=-(2**31), lt=2**31)] = 0  # Of everything drawn in the scene
     size_m: tuple[Extent, Extent]  # (float, float); extent along x and y, metres; the origin lies in the middle
     ceiling_m: Height  # Highest z that a drone may fly at, metres

@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 import trimesh
 
-from aerialdojo_gen.common.rng import generator
-from aerialdojo_gen.errors import ShapeError
+from aerialdojo_gen.base.errors import ShapeError
+from aerialdojo_gen.base.rng import generator
 from aerialdojo_gen.scenes.mesh import Floats, Ints, Mesh, mesh, outward
 
 Numbers = Sequence[float]

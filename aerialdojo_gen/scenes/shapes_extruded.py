@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from shapely.geometry import Polygon
 from shapely.geometry.polygon import orient
 
-from aerialdojo_gen.errors import ShapeError
+from aerialdojo_gen.base.errors import ShapeError
 from aerialdojo_gen.scenes.mesh import Floats, Ints, Mesh, mesh, outward
 from aerialdojo_gen.scenes.shapes import MAX_SIDES, Numbers, _positive, number, rows_of, whole
 

@@ -10,9 +10,9 @@ import shapely
 from shapely.geometry import Point
 from shapely.geometry.base import BaseGeometry
 
-from aerialdojo_gen.common.names import nearest
-from aerialdojo_gen.common.rng import generator
-from aerialdojo_gen.errors import AssetError
+from aerialdojo_gen.base.errors import AssetError
+from aerialdojo_gen.base.names import nearest
+from aerialdojo_gen.base.rng import generator
 from aerialdojo_gen.scenes.catalogue import Catalogue, placed
 from aerialdojo_gen.scenes.footprints import Footprints, around, footprint
 from aerialdojo_gen.scenes.ground import Surface, ground_meshes, rectangle

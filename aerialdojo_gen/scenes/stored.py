@@ -5,8 +5,8 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from aerialdojo_gen.common.advice import command
-from aerialdojo_gen.errors import AssetError
+from aerialdojo_gen.base.cli_context import command
+from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.scenes.glb import read_glb
 from aerialdojo_gen.scenes.model import Scene
 from aerialdojo_gen.store.root import DataRoot, Where, leads_out, open_root

@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 from shapely.geometry import LineString, Point
 from shapely.geometry.base import BaseGeometry
 
-from aerialdojo_gen.common.simplex import OpenSimplex
-from aerialdojo_gen.errors import AssetError
+from aerialdojo_gen.base.errors import AssetError
+from aerialdojo_gen.base.simplex import OpenSimplex
 from aerialdojo_gen.scenes.mesh import Floats, Ints
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from aerialdojo_gen.errors import ShapeError
+from aerialdojo_gen.base.errors import ShapeError
 from aerialdojo_gen.scenes import lettering, shapes, shapes_extruded
 from aerialdojo_gen.scenes.expressions import evaluate, names_in
 from aerialdojo_gen.scenes.mesh import Mesh, merge, mirrored, rotated, rotation, translated

@@ -19,7 +19,7 @@ from io import BytesIO
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from aerialdojo_gen.errors import ConfigError, MissingPackage, StoreError, lacks
+from aerialdojo_gen.base.errors import ConfigError, MissingPackage, StoreError, lacks
 from aerialdojo_gen.store.cloud_errors import Changed, cloud_error, code_of, is_transient
 
 # A file of more bytes goes up in parts, several at a time; S3 takes 10,000 of them at most.

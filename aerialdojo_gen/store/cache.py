@@ -16,8 +16,8 @@ from collections import OrderedDict
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-from aerialdojo_gen.common.disk import disk_error
-from aerialdojo_gen.errors import ConfigError
+from aerialdojo_gen.base.disk import disk_error
+from aerialdojo_gen.base.errors import ConfigError
 from aerialdojo_gen.store.staging import remove, staged
 
 _DEFAULT_GB = 20.0

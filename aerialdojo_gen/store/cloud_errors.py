@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from aerialdojo_gen.errors import StoreError, first_line
+from aerialdojo_gen.base.errors import StoreError, first_line
 
 _KEPT = "what was finished is kept, nothing half-written"
 _CREDENTIALS = (

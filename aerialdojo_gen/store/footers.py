@@ -12,8 +12,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from aerialdojo_gen.common.bounded import loads_json
-from aerialdojo_gen.errors import Malformed
+from aerialdojo_gen.base.errors import Malformed
+from aerialdojo_gen.base.safe_parse import loads_json
 
 _KEYS = frozenset({"fingerprint", "content", "columns", "rows", "parts", "summary", "files", "checksum"})
 # Of a footer that vouches for nothing; logs and releases of then are still read.

@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
-from aerialdojo_gen.errors import SceneNameError, UsageError, brief
+from aerialdojo_gen.base.errors import SceneNameError, UsageError, brief
 from aerialdojo_gen.store import schemas
 
 _PLAIN = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}")

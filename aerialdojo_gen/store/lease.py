@@ -23,8 +23,8 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 
-from aerialdojo_gen.common.bounded import loads_json
-from aerialdojo_gen.errors import ConfigError, Malformed, StoreError
+from aerialdojo_gen.base.errors import ConfigError, Malformed, StoreError
+from aerialdojo_gen.base.safe_parse import loads_json
 from aerialdojo_gen.store.bucket import Bucket, Content
 from aerialdojo_gen.store.cloud_errors import Changed
 

@@ -8,8 +8,8 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-from aerialdojo_gen.common.bounded import loads_json
-from aerialdojo_gen.errors import Malformed, StoreError
+from aerialdojo_gen.base.errors import Malformed, StoreError
+from aerialdojo_gen.base.safe_parse import loads_json
 from aerialdojo_gen.store.bucket import Entry
 from aerialdojo_gen.store.files import sha256_of
 from aerialdojo_gen.store.object_state import State

@@ -28,7 +28,7 @@ from contextlib import contextmanager
 from pathlib import Path, PurePosixPath
 from typing import Any, BinaryIO
 
-from aerialdojo_gen.errors import StoreError
+from aerialdojo_gen.base.errors import StoreError
 from aerialdojo_gen.store.bucket import Bucket, Entry
 from aerialdojo_gen.store.cloud_errors import Changed
 from aerialdojo_gen.store.files import sha256_of

@@ -13,7 +13,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
-from aerialdojo_gen.errors import DamagedFile, StoreError, first_line
+from aerialdojo_gen.base.errors import DamagedFile, StoreError, first_line
 from aerialdojo_gen.store.atomic import atomic_file
 from aerialdojo_gen.store.schemas import TableSpec
 

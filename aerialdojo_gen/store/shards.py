@@ -18,8 +18,8 @@ from typing import Any
 
 import pyarrow as pa
 
-from aerialdojo_gen.common.advice import command
-from aerialdojo_gen.errors import DamagedFile, StoreError, first_line
+from aerialdojo_gen.base.cli_context import command
+from aerialdojo_gen.base.errors import DamagedFile, StoreError, first_line
 from aerialdojo_gen.store.footers import ShardFile, ShardInfo, decode, encode
 from aerialdojo_gen.store.known_footers import known_footers
 from aerialdojo_gen.store.layout import (

@@ -9,7 +9,7 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from aerialdojo_gen.errors import StoreError, first_line
+from aerialdojo_gen.base.errors import StoreError, first_line
 from aerialdojo_gen.store.schemas import TableSpec
 
 

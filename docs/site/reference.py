@@ -11,8 +11,8 @@ import pyarrow as pa
 import typer.main
 
 import aerialdojo_gen
-from aerialdojo_gen.cli import app
-from aerialdojo_gen.config.keys import Key, config_keys, plain, section_meanings
+from aerialdojo_gen.base.config.keys import Key, config_keys, plain, section_meanings
+from aerialdojo_gen.cli.app import app
 from aerialdojo_gen.store.layout import LAYOUT
 
 
@@ -136,10 +136,10 @@ def python_page() -> str:
     ]
     homes = {
         **aerialdojo_gen._HOMES,
-        "Agent": "aerialdojo_gen.agents.base",
-        "AgentBase": "aerialdojo_gen.agents.base",
+        "Agent": "aerialdojo_gen.benchmark.agents.base",
+        "AgentBase": "aerialdojo_gen.benchmark.agents.base",
     }
-    homes |= dict.fromkeys(("Goal", "Rules", "Sensors", "Observation"), "aerialdojo_gen.agents.goal")
+    homes |= dict.fromkeys(("Goal", "Rules", "Sensors", "Observation"), "aerialdojo_gen.benchmark.agents.goal")
     homes |= {"read_recording": "aerialdojo_gen.rendering.reader", "Recording": "aerialdojo_gen.rendering.reader"}
     for name, module in homes.items():
         out += ["", f"## {name}", "", f"::: {module}.{name}"]

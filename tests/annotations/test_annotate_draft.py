@@ -14,8 +14,8 @@ from aerialdojo_gen.annotations.draft import Choice, draft_annotations
 from aerialdojo_gen.annotations.format import format_annotations, parse_annotations
 from aerialdojo_gen.annotations.phrases import article, noun_of, words_of
 from aerialdojo_gen.annotations.redraft import redraft_annotations
-from aerialdojo_gen.common.rng import generator
-from aerialdojo_gen.errors import AnnotationError
+from aerialdojo_gen.base.errors import AnnotationError
+from aerialdojo_gen.base.rng import generator
 from aerialdojo_gen.scenes.catalogue import load_catalogue
 from aerialdojo_gen.scenes.model import Instance, Scene
 

@@ -14,7 +14,7 @@ from aerialdojo_gen.annotations.colours import colour_shares, uncoloured
 from aerialdojo_gen.annotations.format import format_annotations, parse_annotations
 from aerialdojo_gen.annotations.phrases import noun_of, words_of
 from aerialdojo_gen.annotations.relations import SceneGeometry
-from aerialdojo_gen.common.rng import generator
+from aerialdojo_gen.base.rng import generator
 from aerialdojo_gen.scenes.catalogue import load_catalogue
 from aerialdojo_gen.scenes.looks import Look
 from aerialdojo_gen.scenes.model import Material, Part, Scene

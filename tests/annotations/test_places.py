@@ -14,7 +14,7 @@ from aerialdojo_gen.annotations.format import format_annotations, parse_annotati
 from aerialdojo_gen.annotations.place_files import check_conditions, places_of
 from aerialdojo_gen.annotations.places import Places
 from aerialdojo_gen.annotations.relations import SceneGeometry
-from aerialdojo_gen.errors import AnnotationError
+from aerialdojo_gen.base.errors import AnnotationError
 from aerialdojo_gen.scenes.model import Instance, Scene
 
 ROOT = Path(__file__).resolve().parents[2]

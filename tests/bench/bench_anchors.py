@@ -20,14 +20,14 @@ from pathlib import Path
 
 import numpy as np
 
-from aerialdojo_gen.common.rng import generator
-from aerialdojo_gen.config.pipeline import load_pipeline
-from aerialdojo_gen.geometry.telling import FRONT_RAD
+from aerialdojo_gen.base.config.pipeline import load_pipeline
+from aerialdojo_gen.base.rng import generator
+from aerialdojo_gen.geometry.part_visibility import FRONT_RAD
+from aerialdojo_gen.pipeline.scoring.geometric import judge
 from aerialdojo_gen.pipeline.stage import Job, Roots
-from aerialdojo_gen.scoring.geometric import judge
-from aerialdojo_gen.stages.work.anchor_pictures import Looked
-from aerialdojo_gen.stages.work.anchor_sample import candidates_of
-from aerialdojo_gen.stages.work.anchor_world import World
+from aerialdojo_gen.pipeline.stages.work.anchor_pictures import Looked
+from aerialdojo_gen.pipeline.stages.work.anchor_sample import candidates_of
+from aerialdojo_gen.pipeline.stages.work.anchor_world import World
 from aerialdojo_gen.store import shards as store
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -16,7 +16,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 from bench_planner import RADIUS, free_pose, world
 
-from aerialdojo_gen.config.sections import PlanConfig
+from aerialdojo_gen.base.config.sections import PlanConfig
 from aerialdojo_gen.planning.planner import Planner
 
 REPEATS = 3

@@ -15,7 +15,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from aerialdojo_gen import GlRenderer, make_env
-from aerialdojo_gen.benchmark.eyes import drawing
+from aerialdojo_gen.benchmark.observations import drawing
 from aerialdojo_gen.benchmark.tasks import mesh_of
 from aerialdojo_gen.geometry.cameras import Camera, view_pose
 from aerialdojo_gen.learning import Trajectories

@@ -33,14 +33,14 @@ from ompl import base, geometric, util
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 from bench_planner import RADIUS, free_pose, world
 
-from aerialdojo_gen.config.pipeline import load_pipeline
-from aerialdojo_gen.config.sections import PlanConfig
+from aerialdojo_gen.base.config.pipeline import load_pipeline
+from aerialdojo_gen.base.config.sections import PlanConfig
 from aerialdojo_gen.pipeline.stage import Job, Roots
+from aerialdojo_gen.pipeline.stages.work import plan
 from aerialdojo_gen.planning.clearance import ClearanceGrid
 from aerialdojo_gen.planning.collision import CollisionWorld
 from aerialdojo_gen.planning.planner import Planner, Route
 from aerialdojo_gen.scenes.model import Scene
-from aerialdojo_gen.stages.work import plan
 
 ROOT = Path(__file__).resolve().parents[2]
 SCENES = ("U_Mall_0", "N_Forest_0", "U_ConstructionSite_0")

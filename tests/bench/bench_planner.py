@@ -20,7 +20,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 from support.flying import turned
 from support.handmade import box, instance
 
-from aerialdojo_gen.config.sections import PlanConfig, Rung
+from aerialdojo_gen.base.config.sections import PlanConfig, Rung
 from aerialdojo_gen.planning.certify import certify
 from aerialdojo_gen.planning.clearance import ClearanceGrid
 from aerialdojo_gen.planning.collision import CollisionWorld

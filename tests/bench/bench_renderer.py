@@ -18,14 +18,14 @@ from typing import Any
 import cv2
 import numpy as np
 
-from aerialdojo_gen.config.sections import RENDERERS, RenderConfig
+from aerialdojo_gen.base.config.sections import RENDERERS, RenderConfig
 from aerialdojo_gen.geometry.cameras import Camera, view_pose
 from aerialdojo_gen.geometry.rays import RayCaster
-from aerialdojo_gen.layouts.build import build_scene
 from aerialdojo_gen.rendering.backend import choose_renderer, open_renderer
 from aerialdojo_gen.rendering.checks import Solid
 from aerialdojo_gen.rendering.recording import frame_poses, record_views
 from aerialdojo_gen.scenes.catalogue import load_catalogue
+from aerialdojo_gen.scenes.layouts.build import build_scene
 from aerialdojo_gen.scenes.model import Scene
 from aerialdojo_gen.store.schemas import VIEWS
 

@@ -10,17 +10,17 @@ import pytest
 from support.extended import set_agent_actions, set_columns, with_column
 from support.planting import Planted, definitions
 
-from aerialdojo_gen.agents import load_agent
+from aerialdojo_gen.base.errors import StoreError, UsageError
+from aerialdojo_gen.benchmark.agents import load_agent
 from aerialdojo_gen.benchmark.episodes import read_run
 from aerialdojo_gen.benchmark.runner import Evaluation, evaluate
 from aerialdojo_gen.benchmark.tasks import Selection
-from aerialdojo_gen.errors import StoreError, UsageError
+from aerialdojo_gen.dataset.validate import oracle
+from aerialdojo_gen.dataset.validate.parts import read_tables, release_of
+from aerialdojo_gen.dataset.validate.registry import UncheckedError
+from aerialdojo_gen.dataset.validate.rows import Rows, SceneData
 from aerialdojo_gen.store.schemas import APPROACH, STOP
 from aerialdojo_gen.store.schemas.columns import list_of
-from aerialdojo_gen.validate import oracle
-from aerialdojo_gen.validate.parts import read_tables, release_of
-from aerialdojo_gen.validate.registry import UncheckedError
-from aerialdojo_gen.validate.rows import Rows, SceneData
 
 SEMANTIC = Selection(scenes=("U_Courtyard_0",), modalities=("semantic",))
 AS_AGENT = Evaluation("r", "oracle", {"actions": "agent_action"}, SEMANTIC)

@@ -13,13 +13,13 @@ from hypothesis import strategies as st
 from support.flying import town
 from support.handmade import box, instance, scene
 
-from aerialdojo_gen.agents.goal import N_ACTIONS
+from aerialdojo_gen.base.errors import RenderError, StoreError, UsageError
 from aerialdojo_gen.benchmark import AerialDojoEnv
-from aerialdojo_gen.benchmark.episode import Episode
-from aerialdojo_gen.benchmark.motion import FlightSpace
-from aerialdojo_gen.errors import RenderError, StoreError, UsageError
+from aerialdojo_gen.benchmark.agents.goal import N_ACTIONS
+from aerialdojo_gen.dataset.episode import Episode
 from aerialdojo_gen.geometry.motion import replay, route_length_m
 from aerialdojo_gen.planning.collision import CollisionWorld
+from aerialdojo_gen.planning.flight_space import FlightSpace
 from aerialdojo_gen.store import schemas
 
 RADIUS = 0.25
@@ -283,7 +283,7 @@ def test_a_task_that_was_not_chosen_is_named(smoke):
 
 
 def test_a_fork_of_a_process_that_has_drawn_is_told_so_and_does_not_hang(seeing, monkeypatch):
-    from aerialdojo_gen.benchmark import eyes
+    from aerialdojo_gen.benchmark import observations as eyes
 
     monkeypatch.setattr(eyes, "_drawn_by_gl", [os.getppid()])
     with pytest.raises(RenderError, match="start it by spawn"):

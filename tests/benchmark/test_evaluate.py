@@ -14,15 +14,15 @@ import numpy as np
 import pyarrow.compute as pc
 import pytest
 
-from aerialdojo_gen.agents import AgentBase, AgentUnavailable, InvalidAnswer, Usage
-from aerialdojo_gen.agents.goal import BLIND
+from aerialdojo_gen.base.errors import AerialDojoError, StoreError, UsageError
 from aerialdojo_gen.benchmark import journal
+from aerialdojo_gen.benchmark.agents import AgentBase, AgentUnavailable, InvalidAnswer, Usage
+from aerialdojo_gen.benchmark.agents.goal import BLIND
 from aerialdojo_gen.benchmark.episodes import TABLES, read_run, runs
 from aerialdojo_gen.benchmark.limits import Limits
 from aerialdojo_gen.benchmark.runner import Evaluation, Outcome, evaluate
 from aerialdojo_gen.benchmark.tasks import Selection, select
 from aerialdojo_gen.benchmark.worker import Conditions
-from aerialdojo_gen.errors import AerialDojoError, StoreError, UsageError
 from aerialdojo_gen.geometry.motion import replay
 from aerialdojo_gen.store import schemas
 
@@ -131,7 +131,7 @@ def test_several_workers_give_the_same_bytes(smoke, whole, tmp_path):
 
 SLOW = """
 import time
-from aerialdojo_gen.agents.simple import RandomAgent
+from aerialdojo_gen.benchmark.agents.simple import RandomAgent
 class Slow(RandomAgent):
     def reset(self, goal):
         time.sleep(0.01)
@@ -145,7 +145,7 @@ def test_killed_again_and_again_ends_with_the_same_bytes(project, smoke, tmp_pat
     env = os.environ | {"PYTHONPATH": f"{tmp_path}{os.pathsep}{project}"}
     out = tmp_path / "out"
     command = [
-        sys.executable, "-m", "aerialdojo_gen.cli", "evaluate", "--data", str(smoke), "--out", str(out), "--run", "r",
+        sys.executable, "-m", "aerialdojo_gen.cli.app", "evaluate", "--data", str(smoke), "--out", str(out), "--run", "r",
         "--agent", "slowagent:Slow", "--limit", "60", "--pipeline", str(project / "pipelines" / "smoke.toml"),
         "--workers", "1",
     ]  # fmt: skip
@@ -230,7 +230,7 @@ def test_other_settings_do_not_mix_with_a_run(smoke, tmp_path):
 
 def test_a_run_is_not_gone_on_with_by_other_code(smoke, tmp_path, monkeypatch):
     mine = tmp_path / "flyer_of_a_test.py"
-    text = "from aerialdojo_gen.agents.simple import StopAgent\n\n\nclass Flyer(StopAgent):\n    pass\n"
+    text = "from aerialdojo_gen.benchmark.agents.simple import StopAgent\n\n\nclass Flyer(StopAgent):\n    pass\n"
     mine.write_text(text)
     monkeypatch.syspath_prepend(tmp_path)
     flyer = job("flyer_of_a_test:Flyer", limit=1)
@@ -302,7 +302,7 @@ def test_the_command_in_one_line(project, smoke, tmp_path):
         command = [
             sys.executable,
             "-m",
-            "aerialdojo_gen.cli",
+            "aerialdojo_gen.cli.app",
             "evaluate",
             "--data",
             str(smoke),
@@ -327,7 +327,17 @@ def test_the_command_in_one_line(project, smoke, tmp_path):
 
 
 def test_the_last_line_has_the_success_rate_and_the_command_for_the_scores(smoke, tmp_path):
-    command = [sys.executable, "-m", "aerialdojo_gen.cli", "evaluate", "--data", smoke, "--out", tmp_path, "--agent"]
+    command = [
+        sys.executable,
+        "-m",
+        "aerialdojo_gen.cli.app",
+        "evaluate",
+        "--data",
+        smoke,
+        "--out",
+        tmp_path,
+        "--agent",
+    ]
     command += ["oracle", "--limit", "5", "--workers", "1"]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
@@ -335,7 +345,7 @@ def test_the_last_line_has_the_success_rate_and_the_command_for_the_scores(smoke
     assert "evaluate oracle: 5 of 5 episodes finished, success rate 100.0%; 5 flown now" in last
     advised = last.partition("; for all scores: aerialdojo-gen ")[2]
     assert advised == f"report oracle --log {tmp_path} --data {smoke}"
-    shown = [sys.executable, "-m", "aerialdojo_gen.cli", *advised.split(), "--json"]
+    shown = [sys.executable, "-m", "aerialdojo_gen.cli.app", *advised.split(), "--json"]
     told = subprocess.run(shown, capture_output=True, text=True, check=False)
     assert told.returncode == 0, told.stderr
     assert '"oracle"' in told.stdout
@@ -363,7 +373,7 @@ def test_ctrl_c_keeps_what_was_finished_and_ends_the_workers(project, smoke, tmp
     (tmp_path / "slowagent.py").write_text(SLOW.replace("0.01", "0.1"))
     out = tmp_path / "out"
     command = [
-        sys.executable, "-m", "aerialdojo_gen.cli", "evaluate", "--data", str(smoke), "--out", str(out), "--run", "r",
+        sys.executable, "-m", "aerialdojo_gen.cli.app", "evaluate", "--data", str(smoke), "--out", str(out), "--run", "r",
         "--agent", "slowagent:Slow", "--pipeline", str(project / "pipelines" / "smoke.toml"), "--workers", "2",
     ]  # fmt: skip
     env = os.environ | {"PYTHONPATH": f"{tmp_path}{os.pathsep}{project}"}

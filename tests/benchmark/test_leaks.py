@@ -6,14 +6,14 @@ import types
 import numpy as np
 import pytest
 
-from aerialdojo_gen.agents import AgentBase
-from aerialdojo_gen.agents.goal import Sensors
+from aerialdojo_gen.base.secrets import Secrets as Redactor
 from aerialdojo_gen.benchmark import AerialDojoEnv
+from aerialdojo_gen.benchmark.agents import AgentBase
+from aerialdojo_gen.benchmark.agents.goal import Sensors
 from aerialdojo_gen.benchmark.flight import Flight
 from aerialdojo_gen.benchmark.runner import Evaluation
 from aerialdojo_gen.benchmark.tasks import Selection, read_tasks, select
 from aerialdojo_gen.benchmark.worker import Conditions, Unit, Worker
-from aerialdojo_gen.common.secrets import Secrets as Redactor
 from aerialdojo_gen.store import shards as store
 
 SENSORS = Sensors(("front", "down"), width=24, height=16)

@@ -14,7 +14,6 @@ from support.extended import set_difficulty
 from support.planting import Planted
 from typer.testing import CliRunner
 
-from aerialdojo_gen import cli
 from aerialdojo_gen.benchmark.contents import Wanted, left_out, report_tables
 from aerialdojo_gen.benchmark.difficulty import partings_of
 from aerialdojo_gen.benchmark.profiles import PROFILES
@@ -22,6 +21,7 @@ from aerialdojo_gen.benchmark.runner import Evaluation, evaluate
 from aerialdojo_gen.benchmark.runs import Run, load_runs
 from aerialdojo_gen.benchmark.score_rows import as_csv
 from aerialdojo_gen.benchmark.tasks import Selection
+from aerialdojo_gen.cli import app as cli
 from aerialdojo_gen.store.root import open_root
 
 AT_3 = PROFILES["aerialdojo"]

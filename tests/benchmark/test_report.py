@@ -19,15 +19,15 @@ import pytest
 from support.run_logs import write_run
 from typer.testing import CliRunner
 
-from aerialdojo_gen import cli
+from aerialdojo_gen.base.errors import AerialDojoError, StoreError
+from aerialdojo_gen.base.paper_figures import results
 from aerialdojo_gen.benchmark import contents, figures, formats, radar, score_rows, tables
 from aerialdojo_gen.benchmark.grid import BEST, SECOND, Table
 from aerialdojo_gen.benchmark.profiles import PROFILES, Profile
 from aerialdojo_gen.benchmark.report import html, write_report
 from aerialdojo_gen.benchmark.runs import Run, conduct, load_runs
 from aerialdojo_gen.benchmark.scores import summarize
-from aerialdojo_gen.common.paper import results
-from aerialdojo_gen.errors import AerialDojoError, StoreError
+from aerialdojo_gen.cli import app as cli
 
 pytestmark = pytest.mark.slow
 
@@ -384,7 +384,7 @@ def test_the_command_says_in_one_line_what_is_wrong(log: Path, tmp_path: Path) -
     shutil.copytree(log, tmp_path / "broken")
     shard = next((tmp_path / "broken" / "episodes" / "random").glob("*.parquet"))
     shard.write_bytes(shard.read_bytes()[:100])
-    command = [sys.executable, "-m", "aerialdojo_gen.cli", "report", "--data", str(tmp_path / "broken")]
+    command = [sys.executable, "-m", "aerialdojo_gen.cli.app", "report", "--data", str(tmp_path / "broken")]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr.count("\n")) == (1, 1)
     assert "is damaged" in done.stderr

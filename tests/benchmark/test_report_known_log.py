@@ -12,16 +12,16 @@ import pytest
 from scipy import stats
 from support.run_logs import episode
 
+from aerialdojo_gen.base import rng
+from aerialdojo_gen.base.errors import UsageError
+from aerialdojo_gen.base.paper_figures import results
 from aerialdojo_gen.benchmark import breakdowns, contents, difficulty, intervals, paired, radii, score_rows
-from aerialdojo_gen.benchmark.floors import arranged, with_floors
+from aerialdojo_gen.benchmark.baselines import arranged, with_floors
 from aerialdojo_gen.benchmark.formats import as_text
 from aerialdojo_gen.benchmark.grid import BEST, SECOND, Table
 from aerialdojo_gen.benchmark.paper_tables import result_tables
 from aerialdojo_gen.benchmark.profiles import PROFILES
 from aerialdojo_gen.benchmark.runs import Run, load_runs
-from aerialdojo_gen.common import rng
-from aerialdojo_gen.common.paper import results
-from aerialdojo_gen.errors import UsageError
 from aerialdojo_gen.store import schemas
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.root import open_root

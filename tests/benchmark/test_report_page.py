@@ -14,6 +14,7 @@ import pyarrow.compute as pc
 import pytest
 from support.browser import chromium, errors
 
+from aerialdojo_gen.base.errors import AerialDojoError
 from aerialdojo_gen.benchmark.contents import Wanted
 from aerialdojo_gen.benchmark.episodes import read_run
 from aerialdojo_gen.benchmark.metrics import outcomes
@@ -24,7 +25,6 @@ from aerialdojo_gen.benchmark.runner import Evaluation, evaluate
 from aerialdojo_gen.benchmark.runs import Run, load_runs
 from aerialdojo_gen.benchmark.scores import summarize
 from aerialdojo_gen.benchmark.tasks import Selection
-from aerialdojo_gen.errors import AerialDojoError
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.schemas import ACTION_NAMES
 

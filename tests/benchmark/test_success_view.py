@@ -17,6 +17,8 @@ from hypothesis import strategies as st
 from support.extended import without_columns
 from support.walled import SCENE, VIEWPOINTS, walled, write_walled
 
+from aerialdojo_gen.base.errors import StoreError, UsageError
+from aerialdojo_gen.base.safe_parse import loads_json
 from aerialdojo_gen.benchmark.contents import Wanted, report_tables
 from aerialdojo_gen.benchmark.episodes import read_run
 from aerialdojo_gen.benchmark.profiles import PROFILES
@@ -25,8 +27,6 @@ from aerialdojo_gen.benchmark.runs import load_runs
 from aerialdojo_gen.benchmark.score_rows import as_csv, as_json
 from aerialdojo_gen.benchmark.tasks import Selection
 from aerialdojo_gen.benchmark.viewpoints import viewed
-from aerialdojo_gen.common.bounded import loads_json
-from aerialdojo_gen.errors import StoreError, UsageError
 from aerialdojo_gen.pipeline.progress import Reporter
 from aerialdojo_gen.rendering.sight import in_sight
 from aerialdojo_gen.store import shards as store

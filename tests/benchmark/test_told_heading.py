@@ -10,19 +10,19 @@ from hypothesis import given
 from hypothesis import strategies as st
 from support.walled import write_walled
 
-from aerialdojo_gen.agents import AgentBase
-from aerialdojo_gen.agents.goal import BLIND, Goal, Heading, Observation, Rules
+from aerialdojo_gen.base.errors import UsageError
 from aerialdojo_gen.benchmark import AerialDojoEnv
+from aerialdojo_gen.benchmark.agents import AgentBase
+from aerialdojo_gen.benchmark.agents.goal import BLIND, Goal, Heading, Observation, Rules
 from aerialdojo_gen.benchmark.contents import Wanted, report_tables
 from aerialdojo_gen.benchmark.episodes import read_run
+from aerialdojo_gen.benchmark.llm.prompt import Sight, goal_text, system_prompt
 from aerialdojo_gen.benchmark.profiles import PROFILES
 from aerialdojo_gen.benchmark.runner import Evaluation, evaluate
 from aerialdojo_gen.benchmark.runs import load_runs
 from aerialdojo_gen.benchmark.score_rows import as_csv
-from aerialdojo_gen.errors import UsageError
 from aerialdojo_gen.geometry.frames import compass_direction, compass_heading
 from aerialdojo_gen.geometry.motion import TURN_RAD, TURNS
-from aerialdojo_gen.llm.prompt import Sight, goal_text, system_prompt
 from aerialdojo_gen.store.root import open_root
 from aerialdojo_gen.store.schemas import TURN_LEFT, TURN_RIGHT
 

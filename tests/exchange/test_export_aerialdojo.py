@@ -14,10 +14,10 @@ import pytest
 from support.releases import copy_release, released, replace_rows
 from typer.testing import CliRunner
 
-from aerialdojo_gen.cli import app
-from aerialdojo_gen.errors import AssetError, StoreError, UsageError
+from aerialdojo_gen.base.errors import AssetError, StoreError, UsageError
+from aerialdojo_gen.cli.app import app
+from aerialdojo_gen.dataset.contents import scenes_there
 from aerialdojo_gen.exchange.exporting import export_release
-from aerialdojo_gen.release.contents import scenes_there
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.atomic import atomic_folder
 from aerialdojo_gen.store.staging import AREA

@@ -6,11 +6,11 @@ import tarfile
 
 import pytest
 
-from aerialdojo_gen.errors import StoreError, UsageError
+from aerialdojo_gen.base.errors import StoreError, UsageError
+from aerialdojo_gen.dataset.contents import release_scenes
 from aerialdojo_gen.exchange.exporting import export_release
 from aerialdojo_gen.exchange.size import Size, check_room, size_of
 from aerialdojo_gen.pipeline.progress import Reporter
-from aerialdojo_gen.release.contents import release_scenes
 from aerialdojo_gen.store.root import open_root
 
 

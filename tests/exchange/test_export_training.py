@@ -14,8 +14,8 @@ import pytest
 from support import lerobot_reader
 from typer.testing import CliRunner
 
-from aerialdojo_gen.cli import app
-from aerialdojo_gen.errors import StoreError, UsageError
+from aerialdojo_gen.base.errors import StoreError, UsageError
+from aerialdojo_gen.cli.app import app
 from aerialdojo_gen.exchange.learning_export import export_for_learning, wanted_from
 from aerialdojo_gen.exchange.parts import Unfinished
 from aerialdojo_gen.geometry.motion import replay

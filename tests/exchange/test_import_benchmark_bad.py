@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from support import task_files
 from typer.testing import CliRunner
 
-from aerialdojo_gen.cli import app
-from aerialdojo_gen.errors import ImportRefused, UsageError
+from aerialdojo_gen.base.errors import ImportRefused, UsageError
+from aerialdojo_gen.cli.app import app
 from aerialdojo_gen.exchange.exporting import export_release
 from aerialdojo_gen.exchange.folder import inside
 from aerialdojo_gen.exchange.importing import FORMATS, Options, import_benchmark

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from support import task_files
 from typer.testing import CliRunner
 
-from aerialdojo_gen.cli import app
-from aerialdojo_gen.errors import UsageError
+from aerialdojo_gen.base.errors import UsageError
+from aerialdojo_gen.cli.app import app
 from aerialdojo_gen.exchange.importing import Options, import_benchmark
 from aerialdojo_gen.geometry.motion import replay
 from aerialdojo_gen.store.schemas import ACTION_NAMES

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from support import task_files
 from support.authors_files import document, put
 
-from aerialdojo_gen.errors import ImportRefused
+from aerialdojo_gen.base.errors import ImportRefused
 from aerialdojo_gen.exchange.importing import Options, import_benchmark
 from aerialdojo_gen.geometry.angles import wrap_angle_rad
 

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from support import task_files
 
-from aerialdojo_gen.errors import ImportRefused
+from aerialdojo_gen.base.errors import ImportRefused
 from aerialdojo_gen.exchange import jsonstream
 from aerialdojo_gen.exchange.importing import Options, import_benchmark
 from aerialdojo_gen.exchange.jsonstream import records, small_document

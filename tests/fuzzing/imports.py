@@ -9,7 +9,7 @@ from pathlib import Path
 from fuzzing.cases import Case, Target, made
 from support import task_files
 
-from aerialdojo_gen.errors import AerialDojoError
+from aerialdojo_gen.base.errors import AerialDojoError
 from aerialdojo_gen.exchange.importing import Options, import_benchmark
 
 

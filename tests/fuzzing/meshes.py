@@ -10,9 +10,9 @@ import numpy as np
 from fuzzing.cases import Case, Target, made, utterable
 from support import foreign, rendered
 
-from aerialdojo_gen.errors import AerialDojoError
-from aerialdojo_gen.imports.adopt import adopt
+from aerialdojo_gen.base.errors import AerialDojoError
 from aerialdojo_gen.imports.files import read_into, unpacked
+from aerialdojo_gen.imports.import_mesh import adopt
 from aerialdojo_gen.scenes.glb import read_glb, write_glb
 
 

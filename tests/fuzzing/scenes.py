@@ -15,17 +15,17 @@ from fuzzing.meshes import court_glb
 from fuzzing.mutate import toml_dumped
 from support import annotation_scenes
 
-from aerialdojo_gen.annotate.storage import parse_whole
 from aerialdojo_gen.annotations.check import check_source
 from aerialdojo_gen.annotations.format import format_annotations, parse_annotations
 from aerialdojo_gen.annotations.relations import SceneGeometry
-from aerialdojo_gen.config.pipeline import load_pipeline
-from aerialdojo_gen.errors import AerialDojoError
-from aerialdojo_gen.layouts.build import build_scene
+from aerialdojo_gen.base.config.pipeline import load_pipeline
+from aerialdojo_gen.base.errors import AerialDojoError
+from aerialdojo_gen.pipeline.stages.work.annotate_import import annotation_tables
 from aerialdojo_gen.scenes.catalogue import load_catalogue
 from aerialdojo_gen.scenes.catalogue_files import FOLDERS, catalogue_files
 from aerialdojo_gen.scenes.glb import write_glb
-from aerialdojo_gen.stages.work.annotate_import import annotation_tables
+from aerialdojo_gen.scenes.layouts.build import build_scene
+from aerialdojo_gen.studio.annotate.storage import parse_whole
 
 
 def _annotations() -> list[Case]:

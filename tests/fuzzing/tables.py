@@ -10,11 +10,11 @@ from fuzzing.cases import Case, Target, made
 from support import court
 
 from aerialdojo_gen.benchmark import journal
-from aerialdojo_gen.llm.answer import parse_answer
+from aerialdojo_gen.benchmark.llm.answer import parse_answer
+from aerialdojo_gen.pipeline.scoring.vlm import read_order
 from aerialdojo_gen.rendering import finished
 from aerialdojo_gen.rendering.codecs import PngWriter, VideoWriter
 from aerialdojo_gen.rendering.reader import read_recording
-from aerialdojo_gen.scoring.vlm import read_order
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.root import open_root
 

@@ -8,8 +8,8 @@ import pytest
 from fuzzing import campaign, targets, worker
 from fuzzing.mutate import mutant
 
-from aerialdojo_gen.common.rng import generator
-from aerialdojo_gen.errors import AssetError
+from aerialdojo_gen.base.errors import AssetError
+from aerialdojo_gen.base.rng import generator
 
 pytestmark = pytest.mark.slow
 

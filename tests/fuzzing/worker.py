@@ -19,8 +19,8 @@ from fuzzing.cases import Case, Target, case_of, laid_out
 from fuzzing.mutate import mutant
 from fuzzing.targets import TARGETS
 
-from aerialdojo_gen.common.rng import generator
-from aerialdojo_gen.errors import AerialDojoError
+from aerialdojo_gen.base.errors import AerialDojoError
+from aerialdojo_gen.base.rng import generator
 
 HANG_S = 10.0
 MEMORY_BYTES = 2 << 30

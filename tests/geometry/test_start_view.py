@@ -9,7 +9,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from support.handmade import box, instance, scene
 
-from aerialdojo_gen.common.terms import VIEWS
+from aerialdojo_gen.base.constants import VIEWS
 from aerialdojo_gen.geometry.cameras import Camera, project, view_pose
 from aerialdojo_gen.geometry.rays import TriangleRayCaster, instance_caster
 from aerialdojo_gen.geometry.soup import soup

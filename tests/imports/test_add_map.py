@@ -8,14 +8,14 @@ import shapely
 from shapely.geometry import Point, Polygon
 from support import maps
 
-from aerialdojo_gen.common.shipped import home
-from aerialdojo_gen.errors import AssetError, MissingPackage, UsageError
+from aerialdojo_gen.base.errors import AssetError, MissingPackage, UsageError
+from aerialdojo_gen.base.shipped import home
 from aerialdojo_gen.imports.earth import in_words, size_m, tiles
 from aerialdojo_gen.imports.osm import read_maps
 from aerialdojo_gen.imports.places import add_map
-from aerialdojo_gen.layouts.build import build_scene
 from aerialdojo_gen.planning.clearance import ClearanceGrid
 from aerialdojo_gen.scenes.catalogue import load_catalogue
+from aerialdojo_gen.scenes.layouts.build import build_scene
 from aerialdojo_gen.scenes.recipe import load_recipe
 
 
@@ -168,8 +168,8 @@ def test_on_a_height_model_everything_stands_on_the_ground(extract, tmp_path):
 
 
 def test_whose_data_it_is_stands_in_the_mesh_and_in_the_table(town, tmp_path):
+    from aerialdojo_gen.pipeline.stages.work.build_scenes import scene_row
     from aerialdojo_gen.scenes.glb import read_glb, write_glb
-    from aerialdojo_gen.stages.work.build_scenes import scene_row
 
     assert town.scene.attribution.startswith("© OpenStreetMap contributors, Open Database License")
     write_glb(town.scene, tmp_path / "town.glb")

@@ -10,18 +10,18 @@ import pytest
 import trimesh
 from support import foreign
 
-from aerialdojo_gen.annotate.drafting import draft_scene
 from aerialdojo_gen.annotations.draft import Choice
-from aerialdojo_gen.commands.common import open_pipeline, run_until
-from aerialdojo_gen.errors import AnnotationError, AssetError, StoreError, UsageError
-from aerialdojo_gen.imports.adopt import adopt
+from aerialdojo_gen.base.errors import AnnotationError, AssetError, StoreError, UsageError
+from aerialdojo_gen.cli.common import open_pipeline, run_until
 from aerialdojo_gen.imports.command import add_scene
 from aerialdojo_gen.imports.files import look_over_glb, read_mesh
+from aerialdojo_gen.imports.import_mesh import adopt
 from aerialdojo_gen.imports.raw import RawNode, plain
 from aerialdojo_gen.imports.three_ds import read_3ds
 from aerialdojo_gen.scenes.colour_names import colour_name
 from aerialdojo_gen.scenes.glb import read_glb
 from aerialdojo_gen.store import shards as store
+from aerialdojo_gen.studio.annotate.drafting import draft_scene
 
 
 def raw(mesh: trimesh.Trimesh, name: str = "") -> RawNode:

@@ -9,15 +9,15 @@ import pytest
 from scipy.interpolate import RegularGridInterpolator
 from support import maps
 
-from aerialdojo_gen.common.shipped import home
-from aerialdojo_gen.errors import AssetError, MissingPackage, UsageError
+from aerialdojo_gen.base.errors import AssetError, MissingPackage, UsageError
+from aerialdojo_gen.base.shipped import home
 from aerialdojo_gen.geometry.rays import RayCaster
 from aerialdojo_gen.imports.dem import read_dem
 from aerialdojo_gen.imports.earth import LocalFrame
 from aerialdojo_gen.imports.places import add_terrain
-from aerialdojo_gen.layouts.build import build_scene
 from aerialdojo_gen.planning.clearance import ClearanceGrid
 from aerialdojo_gen.scenes.catalogue import load_catalogue
+from aerialdojo_gen.scenes.layouts.build import build_scene
 
 UTM = "EPSG:32635"
 

@@ -6,13 +6,13 @@ import shapely
 from shapely.geometry import LineString, Point
 from support import maps
 
-from aerialdojo_gen.common.shipped import home
-from aerialdojo_gen.errors import AssetError
+from aerialdojo_gen.base.errors import AssetError
+from aerialdojo_gen.base.shipped import home
 from aerialdojo_gen.geometry.rays import RayCaster
 from aerialdojo_gen.imports.places import add_map
-from aerialdojo_gen.layouts.build import build_scene
 from aerialdojo_gen.planning.clearance import ClearanceGrid
 from aerialdojo_gen.scenes.catalogue import load_catalogue
+from aerialdojo_gen.scenes.layouts.build import build_scene
 from aerialdojo_gen.scenes.recipe import load_recipe
 
 UP, DOWN = (0.0, 0.0, 1.0), (0.0, 0.0, -1.0)

@@ -14,10 +14,10 @@ from scipy.spatial import cKDTree
 from support.command_line import said
 from support.hills import hills, standing, write_hills
 
-from aerialdojo_gen.errors import AssetError, UsageError
-from aerialdojo_gen.imports.adopt import Place, adopt
+from aerialdojo_gen.base.errors import AssetError, UsageError
 from aerialdojo_gen.imports.command import add_scene, add_tiles
 from aerialdojo_gen.imports.cutting import _GRID_M, Region, cut
+from aerialdojo_gen.imports.import_mesh import Place, adopt
 from aerialdojo_gen.imports.listing import guess
 from aerialdojo_gen.imports.raw import RawNode, plain
 from aerialdojo_gen.scenes.glb import read_glb

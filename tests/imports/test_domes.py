@@ -6,7 +6,7 @@ import pytest
 import trimesh
 
 from aerialdojo_gen.geometry.cameras import Camera, look_at_pose
-from aerialdojo_gen.imports.adopt import adopt
+from aerialdojo_gen.imports.import_mesh import adopt
 from aerialdojo_gen.imports.raw import RawNode
 from aerialdojo_gen.rendering.gl import GlRenderer
 from aerialdojo_gen.rendering.raycast import RayRenderer

@@ -6,10 +6,10 @@ import trimesh
 from PIL import Image
 from support import foreign, maps
 
-from aerialdojo_gen.imports.adopt import adopt
 from aerialdojo_gen.imports.dem import read_dem
 from aerialdojo_gen.imports.earth import LocalFrame
 from aerialdojo_gen.imports.files import read_into, unpacked
+from aerialdojo_gen.imports.import_mesh import adopt
 
 # A tetrahedron, x east, y north, z up: four edges of different lengths meet in a corner, so that no mirror image and
 # no other turn of it has its corners in these places.

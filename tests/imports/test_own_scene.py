@@ -15,9 +15,9 @@ from support.command_line import said
 
 from aerialdojo_gen.annotations.describing import Vocabulary
 from aerialdojo_gen.annotations.draft import Choice, Drafter
+from aerialdojo_gen.annotations.grammatical_number import group_of
 from aerialdojo_gen.annotations.landmarks import choose_landmarks
-from aerialdojo_gen.annotations.number import group_of
-from aerialdojo_gen.imports.adopt import adopt
+from aerialdojo_gen.imports.import_mesh import adopt
 from aerialdojo_gen.imports.naming import words_in
 from aerialdojo_gen.imports.raw import RawNode, plain
 from aerialdojo_gen.scenes.catalogue import load_catalogue

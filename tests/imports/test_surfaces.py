@@ -14,15 +14,15 @@ from support.command_line import said
 from support.hills import hills, standing, write_hills
 
 from aerialdojo_gen.annotations.describing import Vocabulary
-from aerialdojo_gen.common.shipped import home
-from aerialdojo_gen.errors import AssetError
+from aerialdojo_gen.base.errors import AssetError
+from aerialdojo_gen.base.shipped import home
 from aerialdojo_gen.geometry.ground import Ground
-from aerialdojo_gen.imports.adopt import adopt
-from aerialdojo_gen.imports.apart import taken_apart
 from aerialdojo_gen.imports.command import add_scene
 from aerialdojo_gen.imports.files import read_mesh
+from aerialdojo_gen.imports.import_mesh import adopt
 from aerialdojo_gen.imports.naming import Called, Naming
 from aerialdojo_gen.imports.raw import RawNode, RawSurface, no_corners, plain
+from aerialdojo_gen.imports.split_components import taken_apart
 from aerialdojo_gen.planning.clearance import ClearanceGrid
 from aerialdojo_gen.planning.collision import CollisionWorld
 from aerialdojo_gen.scenes.catalogue import load_catalogue

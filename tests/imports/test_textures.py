@@ -12,11 +12,11 @@ import trimesh
 from support import textured
 
 from aerialdojo_gen.annotations.colours import colour_shares, uncoloured
-from aerialdojo_gen.common.image_size import image_size
-from aerialdojo_gen.errors import AssetError, UsageError
+from aerialdojo_gen.base.errors import AssetError, UsageError
+from aerialdojo_gen.base.image_size import image_size
 from aerialdojo_gen.geometry.cameras import Camera, look_at_pose
-from aerialdojo_gen.imports.adopt import adopt
 from aerialdojo_gen.imports.files import read_into, read_mesh, unpacked
+from aerialdojo_gen.imports.import_mesh import adopt
 from aerialdojo_gen.imports.pictures import Paint, surfaces_of
 from aerialdojo_gen.imports.raw import RawNode
 from aerialdojo_gen.rendering.checks import Solid
@@ -26,7 +26,7 @@ from aerialdojo_gen.rendering.raycast import RayRenderer
 from aerialdojo_gen.rendering.world import RenderWorld
 from aerialdojo_gen.scenes.glb import read_glb, write_glb
 from aerialdojo_gen.scenes.model import Scene
-from aerialdojo_gen.web.payload import scene_payload
+from aerialdojo_gen.studio.web.payload import scene_payload
 
 RENDERERS = (GlRenderer, RenderWorld, RayRenderer)
 CAMERA = Camera(256, 256, 90.0)

@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from aerialdojo_gen.benchmark.episode import Episode
-from aerialdojo_gen.benchmark.motion import flight_space
+from aerialdojo_gen.base.config.sections import Embodiment
 from aerialdojo_gen.benchmark.tasks import Selection, mesh_of
-from aerialdojo_gen.config.sections import Embodiment
+from aerialdojo_gen.dataset.episode import Episode
+from aerialdojo_gen.learning.encoding import Reckoning
 from aerialdojo_gen.learning.index import read_index
 from aerialdojo_gen.learning.parts import offsets, pictures
 from aerialdojo_gen.learning.recipe import Recipe
-from aerialdojo_gen.learning.seen import Reckoning
+from aerialdojo_gen.planning.flight_space import flight_space
 from aerialdojo_gen.store.root import open_root
 
 torch = pytest.importorskip("torch", reason="PyTorch is not installed: it is the extra 'train'")

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from aerialdojo_gen.errors import MissingPackage, StoreError, UsageError
+from aerialdojo_gen.base.errors import MissingPackage, StoreError, UsageError
 from aerialdojo_gen.learning import Loader, Trajectories
 from aerialdojo_gen.learning.order import Order
 

@@ -5,16 +5,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from aerialdojo_gen.agents.goal import Sensors
-from aerialdojo_gen.benchmark.eyes import drawing
+from aerialdojo_gen.benchmark.agents.goal import Sensors
+from aerialdojo_gen.benchmark.observations import drawing
 from aerialdojo_gen.benchmark.tasks import Selection, mesh_of
 from aerialdojo_gen.benchmark.viewpoints import nodes_of
 from aerialdojo_gen.geometry.cameras import view_pose
+from aerialdojo_gen.learning.exploration_views import NOTHING, UNTOLD, patches_of, surveyed
 from aerialdojo_gen.learning.index import read_index
 from aerialdojo_gen.learning.naming import named_by, naming_words
 from aerialdojo_gen.learning.parts import Part, Survey
 from aerialdojo_gen.learning.search import Search, patch_depths_m, patch_rays
-from aerialdojo_gen.learning.survey import NOTHING, UNTOLD, patches_of, surveyed
 from aerialdojo_gen.scenes.context import SEVERAL, open_scene
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.root import open_root

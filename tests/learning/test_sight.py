@@ -9,10 +9,10 @@ import time
 import numpy as np
 import pytest
 
-from aerialdojo_gen.agents.goal import Goal, Observation, Rules
+from aerialdojo_gen.base.errors import StoreError
+from aerialdojo_gen.benchmark.agents.goal import Goal, Observation, Rules
 from aerialdojo_gen.benchmark.runner import Evaluation, evaluate
 from aerialdojo_gen.benchmark.tasks import Selection
-from aerialdojo_gen.errors import StoreError
 from aerialdojo_gen.learning.index import read_index
 from aerialdojo_gen.learning.recipe import load_recipe
 from aerialdojo_gen.store import shards as store
@@ -21,9 +21,9 @@ from aerialdojo_gen.store.root import open_root
 torch = pytest.importorskip("torch", reason="PyTorch is not installed: it is the extra 'train'")
 
 from aerialdojo_gen.learning import checkpoints  # noqa: E402 - it needs torch
+from aerialdojo_gen.learning.localization import UNIT_M  # noqa: E402
 from aerialdojo_gen.learning.policy import Policy, network_of  # noqa: E402
 from aerialdojo_gen.learning.training import train  # noqa: E402
-from aerialdojo_gen.learning.whereabouts import UNIT_M  # noqa: E402
 
 TEXT = """
 name = "sight"
@@ -101,7 +101,7 @@ def test_killed_while_it_learns_to_see_it_goes_on_and_ends_the_same(smoke, cache
     file, out = tmp_path / "own.toml", tmp_path / "out"
     file.write_text(TEXT % 12)
     command = [
-        sys.executable, "-m", "aerialdojo_gen.cli", "train", str(file), "--data", str(smoke), "--out", str(out),
+        sys.executable, "-m", "aerialdojo_gen.cli.app", "train", str(file), "--data", str(smoke), "--out", str(out),
         "--cache", str(cache), "--workers", "1",
     ]  # fmt: skip
     with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE) as process:

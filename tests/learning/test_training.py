@@ -14,13 +14,13 @@ import pyarrow.parquet as pq
 import pytest
 from support.flying import town
 
-from aerialdojo_gen.agents.goal import Sensors
-from aerialdojo_gen.benchmark.episode import Episode
+from aerialdojo_gen.base.errors import ConfigError, StoreError, UsageError
+from aerialdojo_gen.benchmark.agents.goal import Sensors
 from aerialdojo_gen.benchmark.episodes import run_scenes
-from aerialdojo_gen.benchmark.motion import FlightSpace, flight_space
 from aerialdojo_gen.benchmark.runner import Evaluation, evaluate
 from aerialdojo_gen.benchmark.tasks import Selection, mesh_of
-from aerialdojo_gen.errors import ConfigError, StoreError, UsageError
+from aerialdojo_gen.dataset.contents import part_name
+from aerialdojo_gen.dataset.episode import Episode
 from aerialdojo_gen.learning.collect import collect, parts_of, survey_parts
 from aerialdojo_gen.learning.index import read_index
 from aerialdojo_gen.learning.parts import pictures
@@ -32,8 +32,8 @@ from aerialdojo_gen.pipeline.code_digest import code_of
 from aerialdojo_gen.pipeline.executors import make_executor
 from aerialdojo_gen.pipeline.progress import Reporter
 from aerialdojo_gen.planning.difficulty import agent_actions
+from aerialdojo_gen.planning.flight_space import FlightSpace, flight_space
 from aerialdojo_gen.planning.planner import Planner
-from aerialdojo_gen.release.contents import part_name
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.root import open_root
 from aerialdojo_gen.store.schemas import STOP
@@ -41,9 +41,9 @@ from aerialdojo_gen.store.schemas import STOP
 torch = pytest.importorskip("torch", reason="PyTorch is not installed: it is the extra 'train'")
 
 from aerialdojo_gen.learning import checkpoints  # noqa: E402 - it needs torch
+from aerialdojo_gen.learning.localization import astray  # noqa: E402
 from aerialdojo_gen.learning.policy import Policy, network_of  # noqa: E402
 from aerialdojo_gen.learning.training import train  # noqa: E402
-from aerialdojo_gen.learning.whereabouts import astray  # noqa: E402
 
 POLICY = "policy"
 SMALL = {
@@ -121,7 +121,7 @@ def test_killed_and_gone_on_with_it_ends_with_the_same_weights(smoke, cache, lea
     assert load_recipe(file) == short
     broken = tmp_path / "broken"
     command = [
-        sys.executable, "-m", "aerialdojo_gen.cli", "train", str(file), "--data", str(smoke), "--out", str(broken),
+        sys.executable, "-m", "aerialdojo_gen.cli.app", "train", str(file), "--data", str(smoke), "--out", str(broken),
         "--cache", str(cache), "--device", "cpu", "--workers", "1",
     ]  # fmt: skip
     with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE) as process:
@@ -399,7 +399,7 @@ def test_without_torch_there_is_one_line(smoke, tmp_path):
     env = os.environ | {"PYTHONPATH": os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")])}
     file = tmp_path / "recipe.toml"
     file.write_text('name = "small"\n')
-    command = [sys.executable, "-m", "aerialdojo_gen.cli", "train", str(file), "--data", str(smoke)]
+    command = [sys.executable, "-m", "aerialdojo_gen.cli.app", "train", str(file), "--data", str(smoke)]
     done = subprocess.run(command, capture_output=True, text=True, env=env, check=False)
     assert done.returncode == 1
     assert done.stderr == "error: train lacks the package torch: pip install 'aerialdojo-gen[train]'\n"

@@ -9,16 +9,16 @@ import pyarrow.parquet as pq
 import pytest
 
 from aerialdojo_gen import GlRenderer, open_release
-from aerialdojo_gen.agents.goal import N_ACTIONS
+from aerialdojo_gen.base.errors import StoreError, UsageError
+from aerialdojo_gen.benchmark.agents.goal import N_ACTIONS
 from aerialdojo_gen.benchmark.env import AerialDojoEnv
-from aerialdojo_gen.benchmark.episode import Episode
-from aerialdojo_gen.benchmark.motion import flight_space
 from aerialdojo_gen.benchmark.tasks import mesh_of
-from aerialdojo_gen.errors import StoreError, UsageError
+from aerialdojo_gen.dataset.episode import Episode
 from aerialdojo_gen.geometry.cameras import Camera, view_pose
 from aerialdojo_gen.learning import Trajectories, Vocabulary, collate
 from aerialdojo_gen.learning.cached import Cached
 from aerialdojo_gen.learning.labels import NO_ACTION
+from aerialdojo_gen.planning.flight_space import flight_space
 from aerialdojo_gen.store.root import open_root
 
 VIEWS = ("front", "down", "left")

@@ -8,7 +8,7 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 
 from aerialdojo_gen import make_env, open_release
-from aerialdojo_gen.errors import UsageError
+from aerialdojo_gen.base.errors import UsageError
 from aerialdojo_gen.learning.vector import OwnScenes, ProgressReward, make_vec
 
 

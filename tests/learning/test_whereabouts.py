@@ -6,12 +6,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from aerialdojo_gen.geometry.motion import replay
-from aerialdojo_gen.learning.seen import Reckoning
+from aerialdojo_gen.learning.encoding import Reckoning
 
 torch = pytest.importorskip("torch", reason="PyTorch is not installed: it is the extra 'train'")
 
+from aerialdojo_gen.learning.localization import UNIT_M, Guess, Whereabouts, directions, missed, places  # noqa: E402
 from aerialdojo_gen.learning.network import Network, Shape  # noqa: E402 - it needs torch
-from aerialdojo_gen.learning.whereabouts import UNIT_M, Guess, Whereabouts, directions, missed, places  # noqa: E402
 
 T, SCENES = 9, 3
 START, GOAL = np.array([31.0, -12.0, 6.0, 2.3]), np.array([-8.0, 20.0, 9.0])

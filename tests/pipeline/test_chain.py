@@ -9,14 +9,14 @@ from collections import Counter
 import pytest
 from support import chores
 
-from aerialdojo_gen.config.pipeline import load_pipeline
+from aerialdojo_gen.base.config.pipeline import load_pipeline
+from aerialdojo_gen.dataset.build import open_pipeline
 from aerialdojo_gen.pipeline.chain import Chain
 from aerialdojo_gen.pipeline.executors import make_executor
 from aerialdojo_gen.pipeline.expectation import Expectation
 from aerialdojo_gen.pipeline.freshness import Limits
 from aerialdojo_gen.pipeline.progress import Reporter
 from aerialdojo_gen.pipeline.registry import BY_NAME, STAGES
-from aerialdojo_gen.pipeline.run import open_pipeline
 from aerialdojo_gen.pipeline.runner import chained
 
 SCENES = ("U_Courtyard_0", "U_Courtyard_1")
@@ -68,7 +68,18 @@ def test_a_process_takes_a_scene_through_the_stages(project, smoke, tmp_path):
 
 def run(project, data, pipeline, *args, verb="run"):
     where = [str(pipeline)] if verb == "run" else ["--pipeline", str(pipeline)]
-    command = [sys.executable, "-m", "aerialdojo_gen.cli", verb, *where, "--data", str(data), "--workers", "1", *args]
+    command = [
+        sys.executable,
+        "-m",
+        "aerialdojo_gen.cli.app",
+        verb,
+        *where,
+        "--data",
+        str(data),
+        "--workers",
+        "1",
+        *args,
+    ]
     return subprocess.run(command, cwd=project, capture_output=True, text=True, check=False)
 
 

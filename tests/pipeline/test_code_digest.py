@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 
 import aerialdojo_gen
+from aerialdojo_gen.base.config.sections import AnchorSampleConfig, ClipConfig, ReferenceImagesConfig, RenderConfig
 from aerialdojo_gen.benchmark.flying_code import flying_code
-from aerialdojo_gen.config.sections import AnchorSampleConfig, ClipConfig, ReferenceImagesConfig, RenderConfig
 from aerialdojo_gen.pipeline import code_digest
 from aerialdojo_gen.pipeline.code_digest import PLUMBING, Package, code_of, stage_code, stage_module
 from aerialdojo_gen.pipeline.code_facts import module_facts
@@ -22,14 +22,14 @@ NAMES = [stage.name for stage in STAGES]
 SOURCES = Path(aerialdojo_gen.__file__).parent
 # A module that the stage uses by way of others, and a constant of it.
 USED = {
-    "build-scenes": ("layouts/urban/courtyard/layout.py", None),
+    "build-scenes": ("scenes/layouts/urban/courtyard/layout.py", None),
     "annotate-import": ("annotations/relations.py", None),
     "anchor-sample": ("geometry/viewpoints.py", None),
     "reference-images": ("rendering/gl_shaders.py", "#version 400 core"),
     "pair-objects": ("store/tables.py", '"ascending"'),
     "plan": ("geometry/motion.py", None),
-    "filter": ("common/terms.py", '"long_horizon"'),
-    "split": ("release/quota.py", None),
+    "filter": ("base/constants.py", '"long_horizon"'),
+    "split": ("pipeline/stages/work/quota.py", None),
     "render": ("rendering/codecs.py", None),
 }
 
@@ -72,7 +72,7 @@ def test_a_copy_elsewhere_has_the_same_digests(copied):
 @pytest.mark.parametrize("name", NAMES)
 def test_a_line_in_the_stages_own_module_makes_it_stale(copied, name):
     before = digests(copied)
-    path = copied / "stages" / f"{name.replace('-', '_')}.py"
+    path = copied / "pipeline" / "stages" / f"{name.replace('-', '_')}.py"
     work = path.parent / "work" / path.name
     run = re.search(r"^def run\(.*?\n    \"\"\"(.*?)\"\"\"\n", path.read_text(), re.DOTALL | re.MULTILINE)
     assert changed(before, edited(path, run[0], run[0] + "    raise RuntimeError\n")) == {name}
@@ -104,12 +104,12 @@ def test_a_constant_of_a_module_that_it_uses_makes_it_stale(copied, name):
     "relative",
     [
         "cli.py",
-        "commands/stages.py",
+        "cli/stages.py",
         "pipeline/progress.py",
         "pipeline/runner.py",
         "benchmark/report.py",
-        "release/card.py",
-        "common/advice.py",
+        "dataset/card.py",
+        "base/cli_context.py",
     ],
 )
 def test_messages_and_plumbing_make_nothing_stale(copied, relative):
@@ -139,7 +139,7 @@ def test_plumbing_is_what_it_is_said_to_be():
                      ".store.schemas.staged", ".store.shards", ".store.staging")
     }  # fmt: skip
     assert {name: counted for name, counted in PLUMBING.items() if counted} == {
-        "aerialdojo_gen.common.terms": ("*",),
+        "aerialdojo_gen.base.constants": ("*",),
         "aerialdojo_gen.pipeline.stage": ("Job",),
         "aerialdojo_gen.store.layout": ("partition", "check_scene_name"),
         "aerialdojo_gen.store.parquet_files": ("write_clustered",),
@@ -169,11 +169,11 @@ def test_an_edit_of_a_table_counts_for_who_uses_it(copied):
 def test_a_declaration_counts_by_what_it_computes(copied):
     """What a stage runs, its parts and its sources; not its help, nor what it settles or refuses."""
     before = digests(copied)
-    plan, split = copied / "stages" / "plan.py", copied / "stages" / "split.py"
+    plan, split = copied / "pipeline" / "stages" / "plan.py", copied / "pipeline" / "stages" / "split.py"
     assert changed(before, edited(plan, "// config.targets_per_part", "// 2")) == {"plan"}
-    assert changed(before, edited(copied / "stages" / "build_scenes.py", "materials.toml", "other.toml")) == {
-        "build-scenes"
-    }
+    assert changed(
+        before, edited(copied / "pipeline" / "stages" / "build_scenes.py", "materials.toml", "other.toml")
+    ) == {"build-scenes"}
     assert edited(plan, "Plan a collision-free", "Plan another") == before
     assert edited(split, "config.paper_counts", "not config.paper_counts") == before
     assert edited(copied / "rendering" / "settle.py", "say(choice.why)", "pass") == before
@@ -189,7 +189,7 @@ def test_what_is_imported_by_a_name_made_at_run_time_counts():
 
 
 def test_figures_of_the_paper_count_where_they_are_read():
-    assert [name for name in NAMES if "aerialdojo_gen.common.paper" in stage_code(name).parts] == [
+    assert [name for name in NAMES if "aerialdojo_gen.base.paper_figures" in stage_code(name).parts] == [
         "annotate-import",
         "plan",
         "split",
@@ -249,12 +249,12 @@ def test_what_is_idle_is_not_imported(project, smoke, tmp_path):
     for stage in ("anchor-sample", "reference-images"):
         idle = BY_NAME[stage].idle(SECTIONS[stage](**({"renderer": "gl"} if stage == "reference-images" else {})))
         told = subprocess.run(
-            [sys.executable, "-m", "aerialdojo_gen.cli", stage, "U_Courtyard_0", "--pipeline", "pipelines/smoke.toml",
+            [sys.executable, "-m", "aerialdojo_gen.cli.app", stage, "U_Courtyard_0", "--pipeline", "pipelines/smoke.toml",
              "--data", str(data), "--force", "--workers", "1"],
             cwd=project, env=python, capture_output=True, text=True, check=True,
         )  # fmt: skip
         imported = {line.rpartition("|")[2].strip() for line in told.stderr.splitlines() if "|" in line}
-        assert f"aerialdojo_gen.stages.work.{stage.replace('-', '_')}" in imported
+        assert f"aerialdojo_gen.pipeline.stages.work.{stage.replace('-', '_')}" in imported
         assert len(idle) == 2
         assert not imported & set(idle)
 
@@ -270,9 +270,9 @@ from .. import far as away
 from ..geometry.rays import RayCaster
 from aerialdojo_gen import store
 if TYPE_CHECKING:
-    from aerialdojo_gen.show import page
+    from aerialdojo_gen.studio.show import page
 def f():
-    from aerialdojo_gen.common.rng import generator
+    from aerialdojo_gen.base.rng import generator
     importlib.import_module(f"{__name__}.{np.x}")
     importlib.import_module(f"{away.__name__}.{np.x}")
     importlib.import_module("moderngl")
@@ -282,7 +282,7 @@ def f():
     found = {(edge.module, edge.name) for edge in facts.edges}
     assert {
         ("aerialdojo_gen.scenes", "near"), ("aerialdojo_gen", "far"), ("aerialdojo_gen.geometry.rays", "RayCaster"),
-        ("aerialdojo_gen", "store"), ("aerialdojo_gen.common.rng", "generator"), ("aerialdojo_gen.scenes.here", "**"),
+        ("aerialdojo_gen", "store"), ("aerialdojo_gen.base.rng", "generator"), ("aerialdojo_gen.scenes.here", "**"),
         ("aerialdojo_gen.far", "**"), ("moderngl", ""), ("numpy", ""),
     } <= found  # fmt: skip
     assert "page" not in {name for _, name in found}
@@ -293,7 +293,7 @@ def f():
 
 
 def test_an_import_that_cannot_be_told_is_a_defect(copied):
-    path = copied / "stages" / "work" / "filter.py"
+    path = copied / "pipeline" / "stages" / "work" / "filter.py"
     with pytest.raises(
         RuntimeError, match=r"aerialdojo_gen\.stages\.work\.filter imports name: its source does not tell"
     ):

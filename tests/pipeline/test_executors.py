@@ -12,7 +12,7 @@ import pytest
 from support import chores, preload
 from support.chores import Chore
 
-from aerialdojo_gen.errors import AerialDojoError, MissingPackage, UsageError
+from aerialdojo_gen.base.errors import AerialDojoError, MissingPackage, UsageError
 from aerialdojo_gen.pipeline.executors import Folders, Talk, make_executor
 
 TESTS = Path(__file__).resolve().parents[1]
@@ -268,7 +268,7 @@ def test_what_cannot_be_is_said_in_one_line(monkeypatch):
     # In a process of its own: this one may have a cluster.
     program = (
         "from pathlib import Path; from support import chores\n"
-        "from aerialdojo_gen.errors import AerialDojoError\n"
+        "from aerialdojo_gen.base.errors import AerialDojoError\n"
         "from aerialdojo_gen.pipeline.executors import make_executor\n"
         "try: list(make_executor('ray', address='127.0.0.1:1').map(chores.square, [chores.Chore(0, '', Path())]))\n"
         "except AerialDojoError as error: print(error)\n"

@@ -7,10 +7,10 @@ from pathlib import Path
 import pytest
 from pydantic import BaseModel
 
-from aerialdojo_gen.commands.common import open_pipeline
-from aerialdojo_gen.config.pipeline import Pipeline, load_pipeline
-from aerialdojo_gen.config.sections import PROFILES, ClipConfig, VlmConfig
-from aerialdojo_gen.errors import ConfigError
+from aerialdojo_gen.base.config.pipeline import Pipeline, load_pipeline
+from aerialdojo_gen.base.config.sections import PROFILES, ClipConfig, VlmConfig
+from aerialdojo_gen.base.errors import ConfigError
+from aerialdojo_gen.cli.common import open_pipeline
 from aerialdojo_gen.pipeline.fingerprint import scene_fingerprint
 from aerialdojo_gen.pipeline.registry import BY_NAME
 from aerialdojo_gen.store import shards as store

@@ -32,7 +32,7 @@ def checkout(tmp_path):
     for folder in ("scene_assets", "annotations", "pipelines"):
         (tmp_path / folder).symlink_to(CHECKOUT / folder)
     package = tmp_path / "aerialdojo_gen"
-    (package / "stages" / "tally.py").write_text(MODULE)
+    (package / "pipeline" / "stages" / "tally.py").write_text(MODULE)
     replaced(package / "store" / "schemas" / "staged.py", "STAGED = (", f"{SCHEMA}\n\nSTAGED = (")
     replaced(package / "store" / "schemas" / "staged.py", "VERDICTS)", "VERDICTS, TALLIES)")
     replaced(package / "pipeline" / "registry.py", "    split,\n)", "    split,\n    tally,\n)")
@@ -47,7 +47,7 @@ def replaced(path, old, new):
 
 
 def call(checkout, *args):
-    command = [sys.executable, "-m", "aerialdojo_gen.cli", *args]
+    command = [sys.executable, "-m", "aerialdojo_gen.cli.app", *args]
     env = os.environ | {"PYTHONPATH": str(checkout), "COLUMNS": "200"}
     done = subprocess.run(command, cwd=checkout, env=env, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
@@ -63,7 +63,7 @@ def test_a_new_stage_is_a_module_a_table_and_a_line(checkout):
     assert sum(row["things"] for row in rows) == scenes[0]["n_instances"]
     assert len(rows) == scenes[0]["n_categories"] == len(Counter(row["category"] for row in rows))
     # It follows its own code: a word that is shown makes nothing stale, a line that is run does.
-    module = checkout / "aerialdojo_gen" / "stages" / "tally.py"
+    module = checkout / "aerialdojo_gen" / "pipeline" / "stages" / "tally.py"
     replaced(module, "Count a scene's things", "Count things")
     assert "tally" in (said := call(checkout, *tally))
     assert "shards computed" not in said

@@ -14,11 +14,12 @@ from pathlib import Path
 import pytest
 from support.chores import until
 
+from aerialdojo_gen.base.errors import UsageError
 from aerialdojo_gen.benchmark.evaluation import Evaluation
 from aerialdojo_gen.benchmark.runner import evaluate
 from aerialdojo_gen.benchmark.tasks import Selection
-from aerialdojo_gen.errors import UsageError
-from aerialdojo_gen.pipeline.executors import carried, ray_worker
+from aerialdojo_gen.pipeline.executors import bundled as carried
+from aerialdojo_gen.pipeline.executors import ray_worker
 from aerialdojo_gen.store.staging import AREA
 
 # All of it on the loopback interface, as a cluster that a command starts for itself.
@@ -64,7 +65,7 @@ def nodes():
 
 def start(project, nodes, data, verb="run", *args):
     where = ["pipelines/smoke.toml"] if verb == "run" else ["--pipeline", "pipelines/smoke.toml"]
-    command = [sys.executable, "-m", "aerialdojo_gen.cli", verb, *where, "--data", str(data), *args]
+    command = [sys.executable, "-m", "aerialdojo_gen.cli.app", verb, *where, "--data", str(data), *args]
     return subprocess.Popen(
         [*command, "--executor", "ray", "--address", nodes.address], cwd=project, stderr=subprocess.PIPE,
         stdout=subprocess.DEVNULL, text=True, start_new_session=True,

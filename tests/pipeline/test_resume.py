@@ -13,7 +13,7 @@ import pytest
 import torture
 from support import chores
 
-from aerialdojo_gen.errors import AssetError
+from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.scenes.glb import read_glb
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.shards import read_info
@@ -27,7 +27,7 @@ TABLES = ("meshes", "scenes", "landmarks", "objects", "chosen_anchors", "anchors
 def start(project, data, *args, verb="plan", workers=2):
     # A session of its own, so that what it leaves behind can be found, and Ctrl-C can be sent to all of it.
     return subprocess.Popen(
-        [sys.executable, "-m", "aerialdojo_gen.cli", verb, *args, "--data", str(data), "--workers", str(workers)],
+        [sys.executable, "-m", "aerialdojo_gen.cli.app", verb, *args, "--data", str(data), "--workers", str(workers)],
         cwd=project, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True,
     )  # fmt: skip
 

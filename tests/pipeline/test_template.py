@@ -7,10 +7,10 @@ import pytest
 from typer.testing import CliRunner
 
 import aerialdojo_gen
-from aerialdojo_gen.cli import app
-from aerialdojo_gen.config.keys import config_keys, section_meanings
-from aerialdojo_gen.config.pipeline import Pipeline, load_pipeline
-from aerialdojo_gen.errors import AerialDojoError, ConfigError, UsageError
+from aerialdojo_gen.base.config.keys import config_keys, section_meanings
+from aerialdojo_gen.base.config.pipeline import Pipeline, load_pipeline
+from aerialdojo_gen.base.errors import AerialDojoError, ConfigError, UsageError
+from aerialdojo_gen.cli.app import app
 from aerialdojo_gen.pipeline.template import init_config, pipeline_text
 
 UNITS = {"_m": "m", "_deg": "°", "_px": "px", "_s": "s"}

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from support.flying import town
 from support.handmade import scene
 
-from aerialdojo_gen.config.sections import PlanConfig
+from aerialdojo_gen.base.config.sections import PlanConfig
 from aerialdojo_gen.geometry.motion import TURN_RAD
 from aerialdojo_gen.planning.direct import direct_legs
 from aerialdojo_gen.planning.free_length import free_lengths_m

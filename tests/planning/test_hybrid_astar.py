@@ -7,7 +7,7 @@ import pytest
 from support.flying import along, distances, solid, town
 from support.handmade import box, instance, scene
 
-from aerialdojo_gen.config.sections import PlanConfig, Rung
+from aerialdojo_gen.base.config.sections import PlanConfig, Rung
 from aerialdojo_gen.geometry.motion import DISPLACEMENTS, TURNS, replay
 from aerialdojo_gen.planning.planner import Planner
 from aerialdojo_gen.store.schemas import APPROACH, STOP

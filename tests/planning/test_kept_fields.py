@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 from support.flying import town
 
-from aerialdojo_gen.config.sections import PlanConfig
+from aerialdojo_gen.base.config.sections import PlanConfig
 from aerialdojo_gen.planning.column_kernels import QUANTUM_M
 from aerialdojo_gen.planning.kept_fields import KeptFields
 from aerialdojo_gen.planning.planner import Planner

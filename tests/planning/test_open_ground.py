@@ -12,19 +12,19 @@ from support.handmade import box, instance
 from support.hills import Hills, hills, standing, write_hills
 from support.planting import Planted, check, poses
 
-from aerialdojo_gen.annotate.drafting import draft_scene
 from aerialdojo_gen.annotations.draft import Choice
-from aerialdojo_gen.commands.common import open_pipeline, run_until
-from aerialdojo_gen.config.sections import PlanConfig
+from aerialdojo_gen.base.config.sections import PlanConfig
+from aerialdojo_gen.cli.common import open_pipeline, run_until
+from aerialdojo_gen.dataset.validate.below_ground import open_ground
 from aerialdojo_gen.geometry.ground import Ground
-from aerialdojo_gen.imports.adopt import adopt
 from aerialdojo_gen.imports.command import add_scene
+from aerialdojo_gen.imports.import_mesh import adopt
 from aerialdojo_gen.imports.raw import RawNode, plain
 from aerialdojo_gen.planning.clearance import ClearanceGrid
 from aerialdojo_gen.planning.planner import Planner
 from aerialdojo_gen.scenes.model import Material, Scene
 from aerialdojo_gen.store import shards as store
-from aerialdojo_gen.validate.underground import open_ground
+from aerialdojo_gen.studio.annotate.drafting import draft_scene
 
 NAME = "Hills_0"
 

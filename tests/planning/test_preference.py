@@ -10,11 +10,11 @@ from hypothesis import strategies as st
 from support.flying import along, distances, solid, town
 from support.handmade import box, instance, scene
 
-from aerialdojo_gen.benchmark.motion import FlightSpace
-from aerialdojo_gen.benchmark.oracle import Reference, fly, shortcoming
-from aerialdojo_gen.config.sections import PlanConfig
+from aerialdojo_gen.base.config.sections import PlanConfig
+from aerialdojo_gen.dataset.reference_flight import Reference, fly, shortcoming
 from aerialdojo_gen.planning.clearance import ClearanceGrid
 from aerialdojo_gen.planning.difficulty import agent_actions, difficulty_of, straight_lines_free
+from aerialdojo_gen.planning.flight_space import FlightSpace
 from aerialdojo_gen.planning.planner import Planner
 from aerialdojo_gen.planning.preference import squeeze
 from aerialdojo_gen.store.schemas import APPROACH

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from support.flying import town
 from support.handmade import box, instance, scene
 
-from aerialdojo_gen.config.sections import PlanConfig, Rung
+from aerialdojo_gen.base.config.sections import PlanConfig, Rung
 from aerialdojo_gen.planning.clearance import ClearanceGrid
 from aerialdojo_gen.planning.cost_to_go import columns_by_distance, cost_at, expand_cost, seed_goal
 from aerialdojo_gen.planning.grid_path import make_path_arrays, short_path_cost

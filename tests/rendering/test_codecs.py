@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from aerialdojo_gen.errors import RenderError
+from aerialdojo_gen.base.errors import RenderError
 from aerialdojo_gen.rendering.codecs import MAX_DEPTH_M, VideoWriter, _frame, to_metres, to_stored
 from aerialdojo_gen.rendering.reader import read_recording
 from aerialdojo_gen.rendering.video import Video

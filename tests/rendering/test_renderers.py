@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from support.rendered import MATERIALS, block, courtyard
 
-from aerialdojo_gen.errors import RenderError
+from aerialdojo_gen.base.errors import RenderError
 from aerialdojo_gen.geometry.cameras import Camera, look_at_pose, view_pose
 from aerialdojo_gen.geometry.rays import RayCaster
 from aerialdojo_gen.rendering import backend

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from aerialdojo_gen.common.rng import generator
-from aerialdojo_gen.errors import AssetError
+from aerialdojo_gen.base.errors import AssetError
+from aerialdojo_gen.base.rng import generator
 from aerialdojo_gen.scenes.anatomy import FRONTS, Run, moved, read_anatomy
 from aerialdojo_gen.scenes.catalogue import load_catalogue
 from aerialdojo_gen.scenes.catalogue_check import catalogue_faults

@@ -14,22 +14,22 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from shapely.geometry import Point, Polygon
 
-from aerialdojo_gen import layouts
-from aerialdojo_gen.config.sections import BuildScenesConfig, Embodiment
-from aerialdojo_gen.errors import AssetError
+from aerialdojo_gen.base.config.sections import BuildScenesConfig, Embodiment
+from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.geometry.rays import RayCaster
-from aerialdojo_gen.layouts.build import build_scene
 from aerialdojo_gen.pipeline.stage import Job, Roots
+from aerialdojo_gen.pipeline.stages.work import build_scenes
+from aerialdojo_gen.scenes import layouts
 from aerialdojo_gen.scenes.catalogue import load_catalogue
 from aerialdojo_gen.scenes.glb import read_glb
 from aerialdojo_gen.scenes.grammar_scatter import along, grid, poisson_disc, smooth_path
 from aerialdojo_gen.scenes.grammar_streets import crossing, parking_row, streets
 from aerialdojo_gen.scenes.ground import Surface, disc, ground_meshes, rectangle, ribbon
+from aerialdojo_gen.scenes.layouts.build import build_scene
 from aerialdojo_gen.scenes.recipe import Recipe
 from aerialdojo_gen.scenes.shapes_extruded import triangulate, triangulate_all
 from aerialdojo_gen.scenes.site import Site
 from aerialdojo_gen.scenes.terrain import flat_terrain, mound, rolling_terrain
-from aerialdojo_gen.stages.work import build_scenes
 
 ASSETS = Path(__file__).parents[2] / "scene_assets"
 LAYOUT = """
@@ -98,7 +98,7 @@ def assets(tmp_path, monkeypatch):
     code.write_text(LAYOUT)
     monkeypatch.setattr(layouts, "__path__", [*layouts.__path__, str(tmp_path / "code")])
     for name in ("test_family", "test_family.testplace", "test_family.testplace.layout"):
-        monkeypatch.delitem(sys.modules, f"aerialdojo_gen.layouts.{name}", raising=False)
+        monkeypatch.delitem(sys.modules, f"aerialdojo_gen.scenes.layouts.{name}", raising=False)
     return folder
 
 
@@ -141,7 +141,7 @@ def test_same_bytes_in_processes_that_hash_differently(assets, tmp_path):
         "import sys, hashlib, pathlib\n"
         "from aerialdojo_gen import layouts\n"
         "layouts.__path__.append(sys.argv[2])\n"
-        "from aerialdojo_gen.layouts.build import build_scene\n"
+        "from aerialdojo_gen.scenes.layouts.build import build_scene\n"
         "from aerialdojo_gen.scenes.catalogue import load_catalogue\n"
         "from aerialdojo_gen.scenes.glb import write_glb\n"
         "a = pathlib.Path(sys.argv[1])\n"

@@ -11,10 +11,12 @@ import numpy as np
 import pybullet
 import pytest
 
-from aerialdojo_gen.config.sections import PlanConfig
-from aerialdojo_gen.errors import AssetError
+from aerialdojo_gen.base.config.sections import PlanConfig
+from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.geometry.cameras import Camera, view_pose
 from aerialdojo_gen.geometry.rays import RayCaster
+from aerialdojo_gen.pipeline.stages.work.anchor_world import World
+from aerialdojo_gen.pipeline.stages.work.plan import _planner
 from aerialdojo_gen.planning.clearance import ClearanceGrid
 from aerialdojo_gen.planning.collision import CollisionWorld, collision_world
 from aerialdojo_gen.planning.planner import Planner
@@ -27,8 +29,6 @@ from aerialdojo_gen.rendering.raycast import RayRenderer, ray_renderer
 from aerialdojo_gen.rendering.world import RenderWorld, render_world
 from aerialdojo_gen.scenes.context import context_of, keep_scene, open_contexts, open_scene, release_scenes
 from aerialdojo_gen.scenes.glb import write_glb
-from aerialdojo_gen.stages.work.anchor_world import World
-from aerialdojo_gen.stages.work.plan import _planner
 
 
 @pytest.fixture(autouse=True)

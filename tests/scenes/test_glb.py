@@ -10,7 +10,7 @@ import trimesh
 from hypothesis import given
 from hypothesis import strategies as st
 
-from aerialdojo_gen.errors import AssetError
+from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.scenes import shapes
 from aerialdojo_gen.scenes.catalogue import placed
 from aerialdojo_gen.scenes.glb import read_glb, write_glb

@@ -5,9 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from aerialdojo_gen.errors import AssetError
-from aerialdojo_gen.layouts.build import build_scene
+from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.scenes.catalogue import load_catalogue
+from aerialdojo_gen.scenes.layouts.build import build_scene
 from aerialdojo_gen.scenes.recipe import Recipe
 from aerialdojo_gen.scenes.site import Site
 from aerialdojo_gen.scenes.terrain import rolling_terrain

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from aerialdojo_gen.common.rng import generator
+from aerialdojo_gen.base.rng import generator
 from aerialdojo_gen.scenes.mesh import areas
 from aerialdojo_gen.scenes.noise import value_noise
 from aerialdojo_gen.scenes.terrain import Terrain, flat_terrain, rolling_terrain

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from aerialdojo_gen.common.paper import inventory
+from aerialdojo_gen.base.paper_figures import inventory
 from aerialdojo_gen.scenes.catalogue import load_catalogue
 from aerialdojo_gen.scenes.recipe import load_recipe
 

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 from support.preload import killing_environment, unshared
 
-from aerialdojo_gen.errors import StoreError
+from aerialdojo_gen.base.errors import StoreError
 from aerialdojo_gen.store import staging
 from aerialdojo_gen.store.atomic import atomic_file, atomic_folder
 from aerialdojo_gen.store.root import LocalRoot

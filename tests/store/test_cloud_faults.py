@@ -11,7 +11,7 @@ import pytest
 from support.roots import fill, read_folder, write
 from support.s3_server import Proxy, forget_clients
 
-from aerialdojo_gen.errors import StoreError
+from aerialdojo_gen.base.errors import StoreError
 from aerialdojo_gen.store import schemas
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.bucket import Bucket
@@ -71,7 +71,7 @@ def test_a_store_that_takes_connections_and_never_answers_ends_a_command(cloud: 
     with socket.create_server(("127.0.0.1", 0)) as silent:
         url = f"http://127.0.0.1:{silent.getsockname()[1]}"
         limits = {"AERIALDOJO_TIMEOUT_S": "0.5", "AWS_MAX_ATTEMPTS": "2", "AWS_ENDPOINT_URL": url}
-        command = [sys.executable, "-m", "aerialdojo_gen.cli", "stats", "--data", cloud]
+        command = [sys.executable, "-m", "aerialdojo_gen.cli.app", "stats", "--data", cloud]
         done = subprocess.run(
             command, env=os.environ | limits, capture_output=True, text=True, timeout=100, check=False
         )
@@ -213,7 +213,7 @@ def test_what_the_environment_lacks_is_one_line(cloud: str, monkeypatch, tmp_pat
     with pytest.raises(Exception, match=told) as raised:
         open_root(cloud).exists("t/a/x")
     assert "\n" not in str(raised.value)
-    assert raised.type.__module__ == "aerialdojo_gen.errors"
+    assert raised.type.__module__ == "aerialdojo_gen.base.errors"
 
 
 def test_a_bucket_that_is_not_there_is_named(cloud: str):

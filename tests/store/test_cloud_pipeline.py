@@ -8,14 +8,14 @@ import sys
 import time
 from pathlib import Path
 
+from aerialdojo_gen.dataset.contents import scenes_there
 from aerialdojo_gen.pipeline.code_digest import PLUMBING
-from aerialdojo_gen.release.contents import scenes_there
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.root import open_root
 
 
 def test_a_killed_run_goes_on_and_gives_what_a_local_one_gives(cloud: str, smoke: Path, project: Path):
-    command = [sys.executable, "-m", "aerialdojo_gen.cli", "run", "pipelines/smoke.toml", "--data", cloud]
+    command = [sys.executable, "-m", "aerialdojo_gen.cli.app", "run", "pipelines/smoke.toml", "--data", cloud]
     environment = os.environ | {"AERIALDOJO_LEASE_S": "3"}
     root, local = open_root(cloud), open_root(smoke)
     killed = subprocess.Popen([*command, "--workers", "2"], cwd=project, env=environment, stderr=subprocess.DEVNULL)
@@ -48,4 +48,4 @@ def test_what_carries_rows_about_makes_nothing_stale():
     """Only what decides which bytes are written counts as a stage's code; that is no module of the data root."""
     folder = Path(store.__file__).parent
     plumbing = {f"aerialdojo_gen.store.{path.stem}" for path in folder.glob("*.py") if path.stem != "__init__"}
-    assert plumbing - set(PLUMBING) == {"aerialdojo_gen.store.remembered", "aerialdojo_gen.store.tables"}
+    assert plumbing - set(PLUMBING) == {"aerialdojo_gen.store.memo", "aerialdojo_gen.store.tables"}

@@ -6,9 +6,9 @@ import shutil
 import pytest
 from typer.testing import CliRunner
 
-from aerialdojo_gen.cli import app
-from aerialdojo_gen.common.rng import generator
-from aerialdojo_gen.errors import StoreError
+from aerialdojo_gen.base.errors import StoreError
+from aerialdojo_gen.base.rng import generator
+from aerialdojo_gen.cli.app import app
 from aerialdojo_gen.store import schemas
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.footers import ShardFile, ShardInfo, _checksum, decode, encode

@@ -5,7 +5,7 @@ import shutil
 
 import pytest
 
-from aerialdojo_gen.errors import StoreError
+from aerialdojo_gen.base.errors import StoreError
 from aerialdojo_gen.store import known_footers, schemas
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.known_footers import footers_known

@@ -13,14 +13,14 @@ from pathlib import Path
 import pytest
 from support.task_files import uav_on, write
 
-from aerialdojo_gen import cli
-from aerialdojo_gen.agents.goal import Sensors
+from aerialdojo_gen.base.errors import StoreError
 from aerialdojo_gen.benchmark import episodes, journals
+from aerialdojo_gen.benchmark.agents.goal import Sensors
 from aerialdojo_gen.benchmark.evaluation import Evaluation
 from aerialdojo_gen.benchmark.runner import evaluate
 from aerialdojo_gen.benchmark.tasks import Selection
-from aerialdojo_gen.browse.lookup import ReleasedScene
-from aerialdojo_gen.errors import StoreError
+from aerialdojo_gen.cli import app as cli
+from aerialdojo_gen.dataset.lookup import ReleasedScene
 from aerialdojo_gen.store.root import open_root
 
 _BLIND = Sensors(views=())
@@ -133,7 +133,7 @@ def test_another_machine_goes_on_from_the_last_checkpoint(uploaded, tmp_path, mo
     program = f"""
 from aerialdojo_gen.benchmark import journals, worker
 from aerialdojo_gen.benchmark.evaluation import Evaluation
-from aerialdojo_gen.agents.goal import Sensors
+from aerialdojo_gen.benchmark.agents.goal import Sensors
 from aerialdojo_gen.benchmark.runner import evaluate
 from aerialdojo_gen.benchmark.tasks import Selection
 import os, signal

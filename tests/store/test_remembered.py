@@ -7,9 +7,9 @@ import shutil
 
 import pytest
 
-from aerialdojo_gen.cli import app
-from aerialdojo_gen.errors import StoreError
-from aerialdojo_gen.store.remembered import keep, key_of, known, remembered
+from aerialdojo_gen.base.errors import StoreError
+from aerialdojo_gen.cli.app import app
+from aerialdojo_gen.store.memo import keep, key_of, known, remembered
 from aerialdojo_gen.store.root import open_root
 
 

@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 from support.roots import fill, read_folder, write
 
-from aerialdojo_gen.errors import StoreError, UsageError
-from aerialdojo_gen.release.contents import prune_release, scenes_there
+from aerialdojo_gen.base.errors import StoreError, UsageError
+from aerialdojo_gen.dataset.contents import prune_release, scenes_there
 from aerialdojo_gen.store import schemas
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.root import LocalRoot, open_root

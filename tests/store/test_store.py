@@ -13,7 +13,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from aerialdojo_gen.errors import DamagedFile, StoreError
+from aerialdojo_gen.base.errors import DamagedFile, StoreError
 from aerialdojo_gen.store import schemas
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.atomic import atomic_file, atomic_folder
@@ -180,7 +180,7 @@ def test_a_file_that_the_system_does_not_open_is_not_called_damaged(tmp_path):
     code = f"""
         import resource
         from pathlib import Path
-        from aerialdojo_gen.errors import StoreError
+        from aerialdojo_gen.base.errors import StoreError
         from aerialdojo_gen.store.parquet_files import read_file, read_footer
         resource.setrlimit(resource.RLIMIT_NOFILE, (3, 3))
         for read in read_file, read_footer:
@@ -231,7 +231,7 @@ def test_no_room_is_one_line_and_nothing_half_written(tmp_path):
         import sys; sys.path[:0] = {sys.path!r}
         from pathlib import Path
         from {__name__} import pair, write
-        from aerialdojo_gen.errors import StoreError
+        from aerialdojo_gen.base.errors import StoreError
         try:
             write(Path({str(tmp_path)!r}), [pair(i) for i in range(5000)])
         except StoreError as error:

@@ -8,7 +8,7 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-from aerialdojo_gen.errors import AssetError, StoreError
+from aerialdojo_gen.base.errors import AssetError, StoreError
 from aerialdojo_gen.pipeline.executors.base import Waiting
 from aerialdojo_gen.pipeline.executors.link import at_end
 from aerialdojo_gen.pipeline.task import compute

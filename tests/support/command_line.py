@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from aerialdojo_gen import cli
+from aerialdojo_gen.cli import app as cli
 
 
 def said(capsys, *arguments: object) -> tuple[int, str, str]:

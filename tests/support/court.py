@@ -9,14 +9,14 @@ import numpy as np
 from support.handmade import OPINIONS, UNTOLD
 from support.rendered import courtyard
 
-from aerialdojo_gen.config.pipeline import Pipeline
-from aerialdojo_gen.config.sections import Embodiment, RenderConfig
+from aerialdojo_gen.base.config.pipeline import Pipeline
+from aerialdojo_gen.base.config.sections import Embodiment, RenderConfig
 from aerialdojo_gen.pipeline import runner
 from aerialdojo_gen.pipeline.registry import BY_NAME
 from aerialdojo_gen.pipeline.stage import Job, Roots
+from aerialdojo_gen.pipeline.stages.work import render
 from aerialdojo_gen.rendering.sample import n_parts
 from aerialdojo_gen.scenes.glb import write_glb
-from aerialdojo_gen.stages.work import render
 from aerialdojo_gen.store import schemas
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.tables import check_table, from_rows

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import trimesh
 
+from aerialdojo_gen.pipeline.scoring.geometric import FACTORS, WEIGHTS
 from aerialdojo_gen.scenes.model import Instance, Material, Part, Scene
-from aerialdojo_gen.scoring.geometric import FACTORS, WEIGHTS
 from aerialdojo_gen.store.schemas import TOLD_OF_DIFFICULTY, TOLD_OF_SPLITS
 
 # Columns of anchors that do not matter to what reads them.

@@ -14,15 +14,15 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from aerialdojo_gen.config.pipeline import load_pipeline
+from aerialdojo_gen.base.config.pipeline import load_pipeline
+from aerialdojo_gen.dataset.validate import Asked, validate
+from aerialdojo_gen.dataset.validate.parts import part_path
 from aerialdojo_gen.geometry.angles import wrap_turned_rad
 from aerialdojo_gen.geometry.motion import replay
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.footers import decode, encode
 from aerialdojo_gen.store.schemas import APPROACH
 from aerialdojo_gen.store.tables import column_digests, content_digest
-from aerialdojo_gen.validate import Asked, validate
-from aerialdojo_gen.validate.parts import part_path
 
 SMOKE = Path(__file__).resolve().parents[2] / "pipelines" / "smoke.toml"
 LISTS = ("x_m", "y_m", "z_m", "yaw_rad", "action")

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from aerialdojo_gen.common import rng
-from aerialdojo_gen.common.paper import inventory
+from aerialdojo_gen.base import rng
+from aerialdojo_gen.base.paper_figures import inventory
 from aerialdojo_gen.store import schemas
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.tables import from_rows

@@ -7,11 +7,11 @@ from collections.abc import Iterator
 import numpy as np
 from support.handmade import box, ground, instance
 
-from aerialdojo_gen.config.sections import AnchorSampleConfig, Embodiment
+from aerialdojo_gen.base.config.sections import AnchorSampleConfig, Embodiment
+from aerialdojo_gen.pipeline.scoring.base import AnchorView
 from aerialdojo_gen.pipeline.stage import Job, Roots
+from aerialdojo_gen.pipeline.stages.work.anchor_world import World
 from aerialdojo_gen.scenes.model import Instance, Material, Part, Scene
-from aerialdojo_gen.scoring.base import AnchorView
-from aerialdojo_gen.stages.work.anchor_world import World
 
 RED, BLUE = Material("red", (220, 30, 30)), Material("blue", (30, 40, 210))
 EMBODIMENT = Embodiment()

@@ -10,7 +10,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Generic, Protocol, TypeVar
 
-from aerialdojo_gen.errors import AerialDojoError, UsageError
+from aerialdojo_gen.base.errors import AerialDojoError, UsageError
 from aerialdojo_gen.pipeline.executors.link import Link
 from aerialdojo_gen.store.root import DataRoot, LocalRoot
 

@@ -19,7 +19,7 @@ from multiprocessing.connection import Connection, wait
 from multiprocessing.reduction import ForkingPickler
 from typing import Any
 
-from aerialdojo_gen.errors import AerialDojoError
+from aerialdojo_gen.base.errors import AerialDojoError
 from aerialdojo_gen.pipeline.executors.base import Executor, R, T, Talk, Waiting, guarded
 from aerialdojo_gen.pipeline.executors.link import Here, Turns, end
 

@@ -22,9 +22,9 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-from aerialdojo_gen.errors import AerialDojoError, MissingPackage, UsageError, first_line, lacks
+from aerialdojo_gen.base.errors import AerialDojoError, MissingPackage, UsageError, first_line, lacks
 from aerialdojo_gen.pipeline.executors.base import Executor, Folders, R, T, Talk, Waiting
-from aerialdojo_gen.pipeline.executors.carried import pack
+from aerialdojo_gen.pipeline.executors.bundled import pack
 from aerialdojo_gen.pipeline.executors.local import own_cores
 from aerialdojo_gen.pipeline.executors.ray_worker import Board, Expected, Worker, listing, versions
 from aerialdojo_gen.store.staging import scratch_folder, staged

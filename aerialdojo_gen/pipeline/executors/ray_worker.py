@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from aerialdojo_gen.pipeline.executors.base import guarded
-from aerialdojo_gen.pipeline.executors.carried import Unpacked
+from aerialdojo_gen.pipeline.executors.bundled import Unpacked
 from aerialdojo_gen.pipeline.executors.link import Turns, end
 
 _ASK_EVERY_S = 0.5

@@ -1,6 +1,6 @@
 """Every table of the store: its columns with unit and meaning, and its primary key."""
 
-from aerialdojo_gen.common.terms import (
+from aerialdojo_gen.base.constants import (
     ACTION_NAMES,
     APPROACH,
     DIRECTIONS,

@@ -1,0 +1,76 @@
+"""Which of an instance's parts lie under the ground or under water, where nobody sees them."""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from aerialdojo_gen.annotations.ground_materials import GROUND
+from aerialdojo_gen.scenes.looks import Look
+from aerialdojo_gen.scenes.model import Instance, Scene
+
+Floats = NDArray[np.float64]
+
+# A body that stands on the ground touches it.
+_TOUCH_M = 0.01
+_MOST_HIDDEN = 0.5
+
+
+class Surface:
+    """The upper side of a scene's ground and water."""
+
+    def __init__(self, scene: Scene) -> None:
+        self._scene = scene
+        self._last: tuple[Instance, NDArray[np.bool_], Floats] | None = None
+
+    @cached_property
+    def _triangles(self) -> tuple[shapely.STRtree, Floats]:
+        found = [
+            part.vertices[part.faces]
+            for thing in self._scene.instances
+            if thing.category in GROUND
+            for part in thing.parts
+        ]
+        corners = np.concatenate(found) if found else np.zeros((0, 3, 3))
+        shapes = shapely.polygons(corners[:, :, :2])
+        solid = shapely.area(shapes) > 1e-6
+        return shapely.STRtree(shapes[solid]), corners[solid]
+
+    def hidden(self, instance: Instance, faces: NDArray[np.int64]) -> float:
+        """Share, 0 to 1, of the area of `faces`, (k,) indices into the instance's faces.
+
+        That lies under the surface.
+        """
+        under, areas = self._under(instance)
+        return float(areas[faces][under[faces]].sum() / max(areas[faces].sum(), 1e-12))
+
+    def _under(self, instance: Instance) -> tuple[NDArray[np.bool_], Floats]:
+        """Which of all faces' middles lie under the surface, and the faces' areas."""
+        if self._last is None or self._last[0] is not instance:
+            corners = instance.vertices[instance.faces]
+            a, b, c = np.moveaxis(corners, 1, 0)
+            middles = corners.mean(axis=1)
+            tree, ground = self._triangles
+            points, over = tree.query(shapely.points(middles[:, :2]), predicate="intersects")
+            heights = _heights(ground[over], middles[points, :2])
+            below = (heights > middles[points, 2] + _TOUCH_M) & (heights < instance.bounds[1, 2])
+            under = np.zeros(len(middles), bool)
+            under[points[below]] = True
+            self._last = instance, under, np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2.0
+        return self._last[1:]
+
+    def shows(self, look: Look, instance: Instance) -> bool:
+        """Whether what a phrase speaks of can be seen: half of each part, and of each copy where it counts them."""
+        pieces = [faces for name in look.count for faces in instance.copies_of(name)]
+        pieces += [faces for name in look.parts if len(faces := instance.faces_of(name))]
+        return all(self.hidden(instance, faces) <= _MOST_HIDDEN for faces in pieces)
+
+
+def _heights(triangles: Floats, points: Floats) -> Floats:
+    """Height of each triangle's plane, (n, 3, 3), over a point of the plane, (n, 2)."""
+    normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    away = points - triangles[:, 0, :2]
+    return np.asarray(triangles[:, 0, 2] - (normals[:, :2] * away).sum(axis=1) / normals[:, 2])

@@ -1,0 +1,1 @@
+"""What all rooms use: errors, configuration, names, text, seeds, the paper's figures, clients of services."""

@@ -1,0 +1,220 @@
+"""Talk to a service over HTTP within bounds of size, time and retries; tell its failures apart, and never its key."""
+
+from __future__ import annotations
+
+import asyncio
+import importlib
+import os
+import threading
+import time
+from collections.abc import Awaitable, Callable
+from typing import Any, TypeVar
+from urllib.parse import urlsplit
+
+from tenacity import RetryCallState, Retrying, retry_if_exception, stop_after_attempt
+
+from aerialdojo_gen.base.errors import (
+    AerialDojoError,
+    AgentUnavailable,
+    MissingPackage,
+    ServiceDown,
+    UsageError,
+    lacks,
+)
+from aerialdojo_gen.base.llm_client.faults import refusal
+from aerialdojo_gen.base.llm_client.http import BodyBoundError, Meter, bounded_client, retry_after_s
+from aerialdojo_gen.base.secrets import Secrets
+
+# A service may say when to come back; beyond this the runner's own schedule is the better one.
+MAX_WAIT_S = 60.0
+# Longest wait for a connection: a service that listens accepts one long before it has an answer.
+_CONNECT_S = 10.0
+
+_CLIENTS = {"openai": "OpenAI", "anthropic": "Anthropic"}
+# By name, for the packages bring one of two generations of httpx with them.
+_NO_ROUTE = ("ConnectError", "ConnectTimeout", "ProxyError", "UnsupportedProtocol", "InvalidURL")
+
+Result = TypeVar("Result")
+
+
+def check_url(url: str) -> None:
+    """Refuse a URL that no service has, or that holds a key."""
+    try:
+        parts = urlsplit(url)
+        wrong = parts.scheme not in ("http", "https") or not parts.hostname or parts.port == 0
+    except ValueError:
+        wrong = True
+    if wrong:
+        raise ValueError("not a URL like http://127.0.0.1:8000/v1")
+    # Options are written to the log of the run. Not a ValueError: its message would quote the URL.
+    if parts.username or parts.password or parts.query:
+        raise UsageError("base_url holds a name, a password or a query: keys come from the environment only")
+
+
+def api_key(variable: str, base_url: str | None) -> str:
+    """Read a key from the environment; a service of one's own may do without."""
+    key = os.environ.get(variable, "").strip()
+    if not key and base_url is None:
+        raise UsageError(f"no API key: set {variable} in the environment (or base_url, for a service without keys)")
+    if not (key.isascii() and key.isprintable()):
+        raise UsageError(f"{variable} has characters that no key has: copy it again")
+    return key or "none"
+
+
+class Connection:
+    """A client of a service, with its key."""
+
+    def __init__(
+        self,
+        package: str,
+        base_url: str | None,
+        timeout_s: float,
+        retries: int,
+        *,
+        secrets: Secrets | None = None,
+        key_variable: str | None = None,
+        model: str = "",
+    ) -> None:
+        try:
+            self._package = importlib.import_module(package)
+        except ImportError:
+            raise MissingPackage(lacks(f"agent {package!r}", package, "llm")) from None
+        variable = f"{package.upper()}_BASE_URL"
+        self.base_url = base_url or os.environ.get(variable) or None
+        if self.base_url:
+            try:
+                check_url(self.base_url)
+            except ValueError as error:
+                raise UsageError(f"{'base_url' if base_url else variable} is {error}") from None
+        self._key = api_key(key_variable or f"{package.upper()}_API_KEY", self.base_url if not key_variable else None)
+        self._secrets = secrets or Secrets()
+        self._timeout_s, self._retries, self._model = timeout_s, retries, model
+        self.name = self.base_url or _CLIENTS[package]
+        self.meter = Meter()
+        # Less than the deadline, so that an address where nobody listens is not taken for a slow answer.
+        timeout = self._package.Timeout(None, connect=min(timeout_s / 2, _CONNECT_S))
+        self.client = getattr(self._package, f"Async{_CLIENTS[package]}")(
+            api_key=self._key,
+            base_url=self.base_url,
+            max_retries=0,
+            timeout=timeout,
+            http_client=bounded_client(self._package.DefaultAsyncHttpxClient, timeout),
+        )
+        self._loop = asyncio.new_event_loop()
+        threading.Thread(target=_run, args=(self._loop,), name=f"requests to {package}", daemon=True).start()
+
+    def call(self, ask: Callable[[Any], Awaitable[Result]], retries: int | None = None) -> Result:
+        """Send a request; send it again where that may help."""
+        again = Retrying(
+            stop=stop_after_attempt(1 + (self._retries if retries is None else retries)),
+            wait=_wait_s,
+            retry=retry_if_exception(_worth_another_try),
+            sleep=lambda seconds: time.sleep(seconds),
+            reraise=True,
+        )
+        return again(self._once, ask)
+
+    def _once(self, ask: Callable[[Any], Awaitable[Result]]) -> Result:
+        if self.meter.pace is not None:
+            self.meter.pace()
+        began = time.monotonic()
+        future = asyncio.run_coroutine_threadsafe(self._within_deadline(ask), self._loop)
+        try:
+            return future.result()
+        except self._package.APIError as error:
+            failure = self._failure(error)
+        except TimeoutError:
+            said = f"{self.name}: no complete answer within {self._timeout_s:g} s"
+            failure = AgentUnavailable(said, kind="time-out")
+        except BodyBoundError as error:
+            # One of the packages wraps what its client raises, the other lets it through.
+            failure = self._bound(error)
+        finally:
+            # Ctrl-C leaves the request unfinished.
+            future.cancel()
+            self.meter.add(time.monotonic() - began)
+        raise failure from None
+
+    async def _within_deadline(self, ask: Callable[[Any], Awaitable[Result]]) -> Result:
+        async with asyncio.timeout(self._timeout_s):
+            return await ask(self.client)
+
+    def not_understood(self, what: str) -> AgentUnavailable:
+        """Make the error for an answer that is not what the protocol says."""
+        return AgentUnavailable(
+            f"{self.name}: its answer is no {what}: is base_url right?", kind="malformed answer", again=False
+        )
+
+    def filtered(self) -> AgentUnavailable:
+        """Make the error for an answer that the service's content filter has taken away."""
+        return AgentUnavailable(
+            f"{self.name}: its content filter took the answer away", kind="content filter", again=False
+        )
+
+    def clean(self, text: str) -> str:
+        """Return a text without keys, should the service have sent one back, and without lone surrogates."""
+        # No file and no request can hold half of a surrogate pair.
+        text = text.encode("utf-8", "replace").decode("utf-8")
+        text = text.replace(self._key, "[key]") if len(self._key) > 4 else text
+        return self._secrets.text(text)
+
+    def close(self) -> None:
+        """Close the connections."""
+        if self._loop.is_running():
+            closing = asyncio.run_coroutine_threadsafe(self.client.close(), self._loop)
+            closing.add_done_callback(lambda _: self._loop.stop())
+
+    def _bound(self, error: BodyBoundError) -> AgentUnavailable:
+        return AgentUnavailable(f"{self.name}: {self.clean(str(error))}", kind="malformed answer", again=False)
+
+    def _failure(self, error: Any) -> AerialDojoError:
+        if isinstance(error, self._package.APIStatusError):
+            body = getattr(error, "body", None)
+            said = self._line(body or error.message)
+            after_s = retry_after_s(error.response.headers)
+            return refusal(error.status_code, body, said, self.name, self._model, after_s)
+        cause = error.__cause__ or error
+        if isinstance(cause, BodyBoundError):
+            return self._bound(cause)
+        said = self._line(str(cause) or type(cause).__name__)
+        if type(cause).__name__ in _NO_ROUTE:
+            said = _system_error(cause) or said
+            return ServiceDown(f"{self.name}: {said}: is the service there, and is base_url right?")
+        return AgentUnavailable(f"{self.name}: {said}", kind="connection lost")
+
+    def _line(self, value: Any) -> str:
+        if isinstance(value, dict):
+            inner = value.get("error", value)
+            value = inner.get("message", inner) if isinstance(inner, dict) else inner
+        # The key goes before the text is cut: half a key is too much as well.
+        lines = self.clean(str(value)).strip().splitlines()
+        return " ".join((lines[0] if lines else "").split())[:300]
+
+
+def _system_error(error: BaseException | None) -> str | None:
+    """Find the system's error under the HTTP client's, which says "All connection attempts failed" alone."""
+    while error is not None:
+        if isinstance(error, OSError) and error.errno and error.errno > 0:
+            return f"[Errno {error.errno}] {os.strerror(error.errno)}"
+        several = error.exceptions if isinstance(error, BaseExceptionGroup) else (None,)
+        error = several[0] or error.__cause__ or error.__context__
+    return None
+
+
+def _run(loop: asyncio.AbstractEventLoop) -> None:
+    loop.run_forever()
+    loop.close()
+
+
+def _worth_another_try(error: BaseException) -> bool:
+    if isinstance(error, AgentUnavailable):
+        # An answer cut on its way may come whole the next time; a refusal is one for good.
+        worth = error.again or error.kind == "malformed answer"
+        return worth and (error.retry_after_s or 0.0) <= MAX_WAIT_S
+    return isinstance(error, ServiceDown)
+
+
+def _wait_s(state: RetryCallState) -> float:
+    error = state.outcome.exception() if state.outcome is not None else None
+    asked = error.retry_after_s if isinstance(error, AgentUnavailable) else None
+    return asked if asked is not None else min(2.0 ** (state.attempt_number - 1), MAX_WAIT_S)

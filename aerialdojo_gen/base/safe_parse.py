@@ -1,0 +1,252 @@
+r"""TOML and JSON from outside, parsed within bounds: how large, how deep, how many digits, which characters.
+
+The standard library's parsers take what they are given: ten kilobytes of brackets end in a RecursionError, a dotted
+key of 50,000 parts in gigabytes, an integer of 5,000 digits in a ValueError that names no place, and ``"\ud800"``
+becomes a string that no file can be written with. Every file, message and answer that this package has not written in
+the same process comes through here.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+import tomllib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from aerialdojo_gen.base.disk import check_regular
+from aerialdojo_gen.base.errors import AerialDojoError, BeyondBounds, Malformed, StoreError
+
+JsonPath = tuple[str | int, ...]
+
+MAX_DEPTH = 64
+MAX_INTEGER = 2**63 - 1
+MAX_TOML_BYTES = 4 << 20
+MAX_TOML_TEXT = 2000
+MAX_JSON_BYTES = 64 << 20
+# Integers within MAX_INTEGER have 19, and a float has no more than its precision, its exponent and some zeros.
+_MAX_DIGITS = 400
+
+# Of TOML: strings, comments, and what opens, closes or parts; a string without an end is an error for the parser.
+_TOML_TOKEN = re.compile(
+    r'"""(?:[^"\\]|\\.|"(?!""))*+"{3,5}|'
+    r"'''(?:[^']|'(?!''))*+'{3,5}|"
+    r'"(?:[^"\\\n]|\\.)*+"|'
+    r"'[^'\n]*+'|"
+    r"#[^\n]*+|"
+    r"(?P<number>[0-9][0-9_]*+)|"
+    r"(?P<mark>[\[\]{}.,=\n])|"
+    r"""(?P<open>["'])""",
+    re.DOTALL,
+)
+# What the text of a value beyond the bounds has, nesting aside: a long integer, a large exponent, an escaped half
+# character or NUL. Harmless text may have it too, in a string say.
+_JSON_SUSPECT = re.compile(r"(?:^|[^.0-9])[0-9]{19}|[0-9][eE][+-]?[0-9]{3,}(?:[,\]}\s]|$)|\\u(?:0000|[dD][89a-fA-F])")
+_BUT_BRACKETS = {code: None for code in range(128) if chr(code) not in '[]{}"\\'}
+_JSON_TOKEN = re.compile(r'"(?:[^"\\]|\\.)*+"|(?P<number>[0-9]++)|(?P<mark>[\[\]{}])|(?P<open>")', re.DOTALL)
+
+
+def read_toml(path: Path, error: type[AerialDojoError] = StoreError, *, finite: bool = True) -> dict[str, Any]:
+    """Read a TOML file."""
+    text = _text(path, MAX_TOML_BYTES, error)
+    try:
+        return loads_toml(text, finite=finite)
+    except Malformed as fault:
+        raise error(f"{path}: {fault}") from None
+
+
+def loads_toml(text: str, *, finite: bool = True) -> dict[str, Any]:
+    """Parse TOML as `read_toml` does; `Malformed` names the place."""
+    _scan(text, _TOML_TOKEN)
+    try:
+        value = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise Malformed(str(error)) from None
+    except (ValueError, OverflowError, RecursionError) as error:
+        raise Malformed(f"is no TOML ({error})") from None
+    check_value(value, finite=finite, longest=MAX_TOML_TEXT)
+    return value
+
+
+def read_json(path: Path, error: type[AerialDojoError] = StoreError, limit: int = MAX_JSON_BYTES) -> Any:
+    """Read a JSON file."""
+    text = _text(path, limit, error)
+    try:
+        return loads_json(text)
+    except Malformed as fault:
+        raise error(f"{path}: {fault}") from None
+
+
+def loads_json(
+    text: str | bytes,
+    *,
+    object_pairs_hook: Callable[[list[tuple[str, Any]]], Any] | None = None,
+    finite: bool = True,
+) -> Any:
+    """Parse JSON within bounds."""
+    if isinstance(text, bytes):
+        try:
+            text = text.decode("utf-8-sig")
+        except UnicodeDecodeError as error:
+            raise Malformed(f"is not UTF-8 (byte {error.start})") from None
+    try:
+        constant = _no_number if finite else None
+        value = json.loads(text, parse_constant=constant, object_pairs_hook=object_pairs_hook)
+    except json.JSONDecodeError as error:
+        raise Malformed(f"line {error.lineno}, column {error.colno}: is not JSON: {error.msg}") from None
+    except Malformed:
+        raise
+    except (RecursionError, ValueError) as error:
+        scan_json(text)
+        raise Malformed(f"is no JSON that can be read ({error})") from None
+    if not _harmless(text):
+        check_value(value, finite=finite)
+    return value
+
+
+def _harmless(text: str) -> bool:
+    """Whether text that is JSON shows at a glance that nothing is beyond the bounds: a tenth of `check_value`'s time.
+
+    False says nothing.
+    """
+    try:
+        plain = text if text.isascii() else text.encode().decode("ascii", "ignore")
+    except UnicodeEncodeError:
+        return False
+    if len(text) > MAX_JSON_BYTES or _JSON_SUSPECT.search(plain):
+        return False
+    # Strings leave two quotes each, and the innermost brackets go, level by level; a backslash stays.
+    left = plain.translate(_BUT_BRACKETS)
+    for _ in range(MAX_DEPTH - 1):
+        before = len(left)
+        left = left.replace('""', "").replace("[]", "").replace("{}", "")
+        if not left or len(left) == before:
+            break
+    return not left
+
+
+def scan_json(text: str) -> None:
+    """Refuse a text whose brackets or digits are beyond the bounds, without parsing it: `BeyondBounds`."""
+    _scan(text, _JSON_TOKEN)
+
+
+def check_value(value: Any, *, finite: bool = True, longest: int = MAX_JSON_BYTES) -> None:
+    """Hold a parsed value against the bounds; `BeyondBounds` names the path of a value that breaks one."""
+    found = beyond(value, finite=finite, longest=longest)
+    if found is not None:
+        path, why = found
+        raise BeyondBounds(f"{_dotted(path)}: {why}" if path else why)
+
+
+def beyond(
+    value: Any, *, finite: bool = True, integers: bool = True, longest: int = MAX_JSON_BYTES
+) -> tuple[JsonPath, str] | None:
+    """Find a value that is beyond the bounds."""
+    # Paths are linked backwards: most are never written out.
+    stack: list[tuple[Any, Any, int]] = [(value, None, 0)]
+    while stack:
+        item, path, depth = stack.pop()
+        kind = type(item)
+        if kind is str:
+            why = _wrong_text(item, longest)
+        elif kind is int and integers:
+            why = "" if -MAX_INTEGER - 1 <= item <= MAX_INTEGER else "is an integer beyond 64 bits"
+        elif kind is float and finite:
+            why = "" if math.isfinite(item) else f"is {item}, no finite number"
+        elif kind is dict or kind is list:
+            why = f"is nested more than {MAX_DEPTH} deep" if depth >= MAX_DEPTH else ""
+            if not why:
+                pairs = item.items() if kind is dict else enumerate(item)
+                stack += [(inner, (path, key), depth + 1) for key, inner in pairs]
+            if not why and kind is dict:
+                why = next((f"has a key that {wrong}" for key in item if (wrong := _wrong_text(key, longest))), "")
+        else:
+            why = ""
+        if why:
+            keys = []
+            while path is not None:
+                path, key = path
+                keys.append(key)
+            return tuple(reversed(keys)), why
+    return None
+
+
+def too_deep(value: Any) -> bool:
+    """Whether a parsed value is nested more than `MAX_DEPTH` deep; by levels, so that it costs little."""
+    level = [value]
+    for _ in range(MAX_DEPTH):
+        level = [
+            inner
+            for item in level
+            if type(item) in (dict, list)
+            for inner in (item.values() if type(item) is dict else item)
+            if type(inner) in (dict, list)
+        ]
+        if not level:
+            return False
+    return True
+
+
+def _text(path: Path, limit: int, error: type[AerialDojoError]) -> str:
+    try:
+        check_regular(path)
+        with path.open("rb") as file:
+            raw = file.read(limit + 1)
+    except FileNotFoundError:
+        raise
+    except OSError as fault:
+        raise error(f"{path}: cannot be read ({fault.strerror})") from None
+    if len(raw) > limit:
+        raise error(f"{path}: is larger than {limit >> 10:,} KiB")
+    try:
+        return raw.decode("utf-8-sig")
+    except UnicodeDecodeError as fault:
+        line = raw.count(b"\n", 0, fault.start) + 1
+        raise error(f"{path}: line {line}: is not UTF-8: save it in that encoding") from None
+
+
+def _scan(text: str, token: re.Pattern[str]) -> None:
+    """Refuse brackets, dotted keys and numbers beyond the bounds before a parser spends time and memory on them."""
+    depth = dots = 0
+    for found in token.finditer(text):
+        mark = found["mark"]
+        why = ""
+        if mark is None:
+            if found["open"]:
+                return  # a string that does not end: the parser says so
+            if found["number"] and len(found["number"]) > _MAX_DIGITS:
+                why = f"a number of {len(found['number']):,} digits"
+        elif mark == ".":
+            dots += 1
+            why = f"a key of more than {MAX_DEPTH} parts" if dots > MAX_DEPTH else ""
+        else:
+            dots = 0
+            depth += (mark in "[{") - (mark in "]}")
+            why = f"nested more than {MAX_DEPTH} deep" if depth > MAX_DEPTH else ""
+        if why:
+            line = text.count("\n", 0, found.start()) + 1
+            column = found.start() - text.rfind("\n", 0, found.start())
+            raise BeyondBounds(f"line {line}, column {column}: {why}")
+
+
+def _no_number(name: str) -> Any:
+    raise Malformed(f"is not JSON: {name} is no finite number")
+
+
+def _wrong_text(text: Any, longest: int) -> str:
+    if type(text) is str and len(text) > longest:
+        return f"has {len(text):,} characters, the most is {longest:,}"
+    if type(text) is not str or text.isascii():
+        return "has a NUL character" if type(text) is str and "\0" in text else ""
+    try:
+        text.encode()
+    except UnicodeEncodeError:
+        return "has half a Unicode character (a lone surrogate)"
+    return "has a NUL character" if "\0" in text else ""
+
+
+def _dotted(path: JsonPath) -> str:
+    shown = [f"[{k}]" if isinstance(k, int) else f".{k[:40] if k.isprintable() else ascii(k[:40])}" for k in path]
+    return "".join(shown if len(shown) <= 12 else [*shown[:10], "..."]).removeprefix(".")

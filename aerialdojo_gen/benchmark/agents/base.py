@@ -1,0 +1,91 @@
+"""The interface of an agent, and what it may raise."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
+
+from aerialdojo_gen.base.errors import AerialDojoError, AgentUnavailable, ServiceDown
+from aerialdojo_gen.benchmark.agents.goal import Goal, Observation
+
+
+class InvalidAnswer(AerialDojoError):  # noqa: N818
+    """The agent answered, and the answer names no action: it is counted and spends one, and nothing moves."""
+
+
+@dataclass(frozen=True)
+class Usage:
+    """What an agent has used since its last `reset`.
+
+    Attributes
+    ----------
+    requests : int
+        Calls of an outside service, repeated ones too.
+    input_tokens, output_tokens : int or None
+        Where the service says.
+    cost_usd : float or None
+        Where prices are known.
+    request_s, longest_request_s : float or None
+        Time from sending a request to having its answer, seconds: of all requests together, and of the longest.
+    """
+
+    requests: int = 0
+    input_tokens: int | None = None
+    output_tokens: int | None = None
+    cost_usd: float | None = None
+    request_s: float | None = None
+    longest_request_s: float | None = None
+
+
+@runtime_checkable
+class Agent(Protocol):
+    """What chooses actions.
+
+    Besides, an agent may have (``close``, ``usage`` and ``answer`` are in `AgentBase`, and do nothing there):
+
+    - ``sensors``, a `aerialdojo_gen.benchmark.agents.goal.Sensors`: what it wants to see; all four views where absent.
+    - ``close()``: called once, at the end of the run.
+    - ``usage() -> Usage or None``: what it has used since `reset`.
+    - ``answer() -> str or None``: the words behind the last action, kept in `steps`.
+    - ``check() -> str``: called once before a run, on an instance made for it: raises an `AerialDojoError` if
+      the agent cannot work (nobody listens, a wrong key), else returns what is worth telling.
+    - ``settled() -> dict``: options that ``check`` has settled, given to the instances that fly.
+    - ``used_options() -> dict``: its options with their defaults, JSON and no secrets, for the log.
+    - ``suits(release: str)``: called once before it flies, with the fingerprint of the release's scenes; raises an
+      `AerialDojoError` if the agent was made for others.
+    - ``pace``: a callable that the runner sets under ``--requests-per-minute``, to be called before each request.
+
+    A run has one instance a worker. Episodes come in any order, so that what an agent does must depend on nothing but
+    its options, the goal and the observations since `reset`.
+    """
+
+    def reset(self, goal: Goal) -> None:
+        """Begin an episode."""
+
+    def act(self, observation: Observation) -> int:
+        """Choose an action: its id, 0 to 15.
+
+        Raises
+        ------
+        AgentUnavailable
+            An outside service failed: the episode is begun again, or logged in `failures`.
+        ServiceDown, UsageError
+            No request will be answered: the run ends.
+        InvalidAnswer
+            There is an answer, and it names no action.
+        """
+
+
+class AgentBase:
+    """What an agent may have, left empty."""
+
+    def close(self) -> None:
+        """Free what the agent holds."""
+
+    def usage(self) -> Usage | None:
+        """Return what was used since `reset`; None without an outside service."""
+        return None
+
+    def answer(self) -> str | None:
+        """Return the words behind the last action, if there are any."""
+        return None

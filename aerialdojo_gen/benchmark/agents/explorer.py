@@ -1,0 +1,139 @@
+"""An explorer that learns nothing: it avoids walls by depth, visits frontiers, and stops where an image goal fits."""
+
+from __future__ import annotations
+
+import math
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from aerialdojo_gen.base.errors import UsageError
+from aerialdojo_gen.benchmark.agents.base import AgentBase
+from aerialdojo_gen.benchmark.agents.depth_map import DepthMap
+from aerialdojo_gen.benchmark.agents.goal import Goal, Observation, Sensors
+from aerialdojo_gen.geometry.motion import DISPLACEMENTS, TURN_RAD, TURNS
+from aerialdojo_gen.store.schemas import ACTION_NAMES, MOVE_UP_1, STOP, TURN_LEFT, TURN_RIGHT
+
+_FORWARD = [(ACTION_NAMES.index(f"MoveForward{m}"), float(m)) for m in (5, 3, 1)]
+# How many points of a way ahead the explorer heads for, and how many ways it considers before a move.
+_LOOK_ON, _REPLANS = 6, 8
+# Edge of the thumbnails that are compared with the goal's picture, pixels.
+_THUMB_PX = 24
+
+
+class ExplorerAgent(AgentBase):
+    """Frontier exploration in the plane, by depth alone (Yamauchi 1997), in a frame reckoned from its own actions.
+
+    It keeps the height it starts at, and climbs a metre where there is nowhere left to go. With an image goal it
+    stops where the front view correlates with the picture; the words of a goal it ignores. Its last action is a Stop,
+    wherever it is then.
+
+    Parameters
+    ----------
+    likeness : float
+        Correlation of the thumbnails, -1 to 1, at which an image goal counts as found.
+    clearance_m : float
+        Free depth that must be left ahead after a move.
+    """
+
+    sensors = Sensors(views=("front", "left", "right"), width=96, height=96)
+
+    def __init__(self, likeness: float = 0.75, clearance_m: float = 0.8) -> None:
+        if not -1.0 <= likeness <= 1.0:
+            raise ValueError(f"likeness is a correlation, -1 to 1, not {likeness}")
+        self._likeness, self._clearance_m = likeness, clearance_m
+
+    def reset(self, goal: Goal) -> None:
+        """Begin an episode."""
+        self._sensors = goal.rules.sensors
+        if not {"front", "left", "right"} <= set(self._sensors.views) or not self._sensors.depth:
+            raise UsageError("the explorer needs depth of the front, left and right views")
+        self._wanted = None if goal.image is None else thumbnail(goal.image)
+        self._radius_m = goal.rules.radius_m
+        self._map = DepthMap(self._sensors)
+        self._x_m = self._y_m = 0.0
+        self._headings = 0
+        rays = self._sensors.camera.rays()
+        self._across = np.abs(rays[..., :2]).max(axis=-1)
+        self._before = STOP
+        self._way: list[tuple[float, float]] = []
+
+    @property
+    def _yaw_rad(self) -> float:
+        return self._headings * TURN_RAD
+
+    def act(self, observation: Observation) -> int:
+        """Look, draw, choose."""
+        self._reckon(observation)
+        if observation.remaining_actions == 1 or self._found(observation):
+            return STOP
+        for view in ("front", "left", "right"):
+            self._map.add(view, observation.depth_m[view], self._x_m, self._y_m, self._yaw_rad)
+        self._before = self._choose(observation.depth_m["front"])
+        return self._before
+
+    def _reckon(self, observation: Observation) -> None:
+        """Dead reckoning: add what the last action did."""
+        ahead, left, _ = DISPLACEMENTS[self._before]
+        cos, sin = math.cos(self._yaw_rad), math.sin(self._yaw_rad)
+        dx, dy = cos * ahead - sin * left, sin * ahead + cos * left
+        if observation.refused:
+            # A fence that no camera sees: taken to stand across the way.
+            for aside in np.arange(-8.0, 8.5, 0.5) / math.hypot(dx, dy):
+                self._map.bar(self._x_m + dx - aside * dy, self._y_m + dy + aside * dx)
+            return
+        self._x_m, self._y_m = self._x_m + dx, self._y_m + dy
+        self._headings += int(TURNS[self._before])
+        if self._before == MOVE_UP_1:
+            self._map.clear()
+
+    def _found(self, observation: Observation) -> bool:
+        if self._wanted is None or "front" not in observation.rgb:
+            return False
+        return float((thumbnail(observation.rgb["front"]) * self._wanted).mean()) >= self._likeness
+
+    def _choose(self, depth_m: NDArray[np.float32]) -> int:
+        for _ in range(_REPLANS):
+            way = self._way = self._way or self._map.way_to_frontier(self._x_m, self._y_m)
+            if not way:
+                break
+            x, y = way[min(_LOOK_ON, len(way) - 1)]
+            bearing = math.atan2(y - self._y_m, x - self._x_m) - self._yaw_rad
+            turns = round(math.remainder(bearing, 2.0 * math.pi) / TURN_RAD)
+            if turns:
+                return TURN_LEFT if turns > 0 else TURN_RIGHT
+            # Until here the way stays what it was: the nearest frontier may change sides with every look.
+            self._way = []
+            free, straight = self._free_ahead_m(depth_m), self._straight_m(way)
+            for action, metres in _FORWARD:
+                if metres + self._clearance_m <= free and (metres <= straight or metres == 1.0):
+                    return action
+            # Too narrow after all: look for another way.
+            for x, y in way[2 : _LOOK_ON + 1]:
+                self._map.bar(x, y)
+        return MOVE_UP_1
+
+    def _straight_m(self, way: list[tuple[float, float]]) -> float:
+        """How far the way goes straight ahead."""
+        cos, sin = math.cos(self._yaw_rad), math.sin(self._yaw_rad)
+        farthest = 0.0
+        for x, y in way:
+            dx, dy = x - self._x_m, y - self._y_m
+            if abs(-sin * dx + cos * dy) > 1.0:
+                break
+            farthest = max(farthest, cos * dx + sin * dy)
+        return farthest
+
+    def _free_ahead_m(self, depth_m: NDArray[np.float32]) -> float:
+        """Depth of the nearest thing in the corridor that the body would fly through."""
+        depth = np.where(depth_m > 0.0, depth_m, np.inf)
+        corridor = self._across * np.where(np.isfinite(depth), depth, 0.0) <= 2.0 * self._radius_m
+        return float(np.where(corridor, depth, np.inf).min())
+
+
+def thumbnail(rgb: NDArray[np.uint8]) -> NDArray[np.float64]:
+    """Shrink a picture, (H, W, 3) uint8, to a thumbnail of mean 0 and variance 1 a channel, for correlations."""
+    small = cv2.resize(rgb, (_THUMB_PX, _THUMB_PX), interpolation=cv2.INTER_AREA).astype(np.float64)
+    small -= small.mean(axis=(0, 1))
+    return np.asarray(small / (small.std(axis=(0, 1)) + 1e-9))

@@ -1,0 +1,191 @@
+"""Find an agent by its name and make it."""
+
+from __future__ import annotations
+
+import importlib
+import inspect
+import os
+import sys
+import sysconfig
+import traceback
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+from aerialdojo_gen.base.errors import (
+    AerialDojoError,
+    BeyondBounds,
+    Malformed,
+    MissingPackage,
+    UsageError,
+    first_line,
+    lacks,
+)
+from aerialdojo_gen.base.names import unknown
+from aerialdojo_gen.base.safe_parse import loads_json
+from aerialdojo_gen.base.secrets import Secrets
+from aerialdojo_gen.benchmark.agents.base import Agent
+
+_HERE = "aerialdojo_gen.benchmark.agents"
+# Where the agents of this project are; nothing is imported before one is asked for.
+BUILT_IN = {
+    "oracle": f"{_HERE}.simple:OracleAgent",
+    "random": f"{_HERE}.simple:RandomAgent",
+    "stop": f"{_HERE}.simple:StopAgent",
+    "constant": f"{_HERE}.simple:ConstantAgent",
+    "explorer": f"{_HERE}.explorer:ExplorerAgent",
+    "openai": "aerialdojo_gen.benchmark.llm.openai_agent:OpenAIAgent",
+    "anthropic": "aerialdojo_gen.benchmark.llm.anthropic_agent:AnthropicAgent",
+    "policy": "aerialdojo_gen.learning.policy:Policy",
+}
+_BOOLEANS = {"true": True, "yes": True, "on": True, "1": True, "false": False, "no": False, "off": False, "0": False}
+# Where code is that is no agent of a user's.
+_LIBRARIES = (
+    "<frozen", os.path.join(Path(__file__).parent.parent, ""),
+    *(os.path.join(sysconfig.get_path(kind), "") for kind in ("stdlib", "platstdlib", "purelib", "platlib")),
+)  # fmt: skip
+# The extra whose packages an agent imports.
+_EXTRAS = {"openai": "llm", "anthropic": "llm", "policy": "train"}
+
+
+def agent_class(name: str) -> Callable[..., Any]:
+    """Find an agent's class; nothing is made of it.
+
+    Parameters
+    ----------
+    name : str
+        One of `BUILT_IN`, or ``package.module:Class`` for one of one's own, installed or in the working directory.
+
+    Raises
+    ------
+    UsageError
+        There is no such agent, or its module raises.
+    MissingPackage
+        One of `BUILT_IN` lacks a package.
+    """
+    where = BUILT_IN.get(name, name)
+    module_name, colon, class_name = where.partition(":")
+    if not colon or not module_name or not class_name:
+        raise UsageError(unknown("no agent", name, BUILT_IN, besides=("or package.module:Class",)))
+    if name not in BUILT_IN:
+        look_here()
+    try:
+        module = importlib.import_module(module_name)
+    except ImportError as error:
+        if name in _EXTRAS:
+            raise MissingPackage(lacks(f"agent {name!r}", error.name, _EXTRAS[name])) from None
+        raise UsageError(f"cannot load agent {name!r}: {first_line(error)}") from None
+    except AerialDojoError:
+        raise
+    except Exception as error:
+        raise keep_traceback(UsageError(f"cannot load agent {name!r}: {place(error)}"), error) from error
+    cls = getattr(module, class_name, None)
+    if cls is None:
+        raise UsageError(f"cannot load agent {name!r}: module {module_name} has no {class_name}")
+    if not callable(cls):
+        raise UsageError(f"cannot load agent {name!r}: {class_name} is no class")
+    made: Callable[..., Any] = cls
+    return made
+
+
+def load_agent(name: str, **options: Any) -> Agent:
+    """Make an agent.
+
+    Parameters
+    ----------
+    name : str
+        One of `BUILT_IN`, or ``package.module:Class`` for one of one's own.
+    **options
+        Keyword arguments of the class.
+
+    Returns
+    -------
+    Agent
+
+    Raises
+    ------
+    UsageError
+        There is no such agent, it has no such option, or it lacks ``reset`` or ``act``.
+    """
+    cls = agent_class(name)
+    try:
+        inspect.signature(cls).bind(**options)
+    except TypeError as error:
+        known = ", ".join(inspect.signature(cls).parameters) or "none"
+        raise UsageError(f"agent {name!r}: {error}; its options: {known}") from None
+    try:
+        agent = cls(**options)
+    except AerialDojoError:
+        raise
+    except (TypeError, ValueError) as error:
+        raise keep_traceback(UsageError(f"agent {name!r}: {first_line(error)}"), error) from error
+    except Exception as error:
+        raise keep_traceback(UsageError(f"agent {name!r} cannot be made: {place(error)}"), error) from error
+    if not isinstance(agent, Agent):
+        raise UsageError(f"{name!r} is no agent: it needs reset(goal) and act(observation)")
+    return agent
+
+
+def read_options(name: str, given: Mapping[str, str]) -> dict[str, Any]:
+    """Convert an agent's options from text to the types of their defaults.
+
+    Raises
+    ------
+    UsageError
+        There is no such agent, or a text cannot be converted.
+    """
+    parameters = inspect.signature(agent_class(name)).parameters
+    defaults = {key: parameters[key].default for key in given if key in parameters}
+    return {key: _converted(name, key, text, defaults.get(key)) for key, text in given.items()}
+
+
+def _converted(name: str, option: str, text: str, default: Any) -> Any:
+    kinds = ((bool, "true or false"), (int, "a whole number"), (float, "a number"))
+    for kind, what in kinds:
+        if isinstance(default, kind):
+            try:
+                return _BOOLEANS[text.strip().lower()] if kind is bool else kind(text)
+            except (KeyError, ValueError):
+                shown = Secrets().text(text)[:60]
+                raise UsageError(
+                    f"--option {option}={shown}: agent {name!r} takes {what} here, its default is {default!r}"
+                ) from None
+    try:
+        value: Any = None if text.strip() == "None" else loads_json(text)
+    except BeyondBounds as error:
+        raise UsageError(f"--option {option}: {error}") from None
+    except Malformed:
+        return text
+    # A name like 007 stays one; a list may be written as JSON, or as the agent reads it.
+    fits = str if isinstance(default, str) else str | list if isinstance(default, tuple | list) else object
+    return value if isinstance(value, fits) else text
+
+
+def look_here() -> None:
+    """Let modules of the working directory be imported, as ``python -m`` does; a console script does not.
+
+    Last, so that a file there takes no library's place.
+    """
+    if "" not in sys.path and os.getcwd() not in sys.path:
+        sys.path.append(os.getcwd())
+
+
+def place(error: BaseException) -> str:
+    """Say what was raised and where, in one line: ``KeyError at mine.py:12: 'map'``.
+
+    The place is the last one outside of libraries and of this package, so that it is in the agent's own code.
+    """
+    frames = traceback.extract_tb(error.__traceback__)
+    own = [frame for frame in frames if not frame.filename.startswith(_LIBRARIES)] or frames
+    where = f" at {Path(own[-1].filename).name}:{own[-1].lineno}" if own else ""
+    return f"{type(error).__name__}{where}: {first_line(error)}"
+
+
+def keep_traceback(error: AerialDojoError, cause: BaseException) -> AerialDojoError:
+    """Set an agent's own traceback on the error that is made of it: unlike a cause, it is pickled with it."""
+    at = cause.__traceback__
+    while at is not None and at.tb_frame.f_code.co_filename.startswith(_LIBRARIES):
+        at = at.tb_next
+    lines = traceback.format_exception(type(cause), cause, at or cause.__traceback__)
+    error.traceback = Secrets().text("".join(lines).rstrip())
+    return error

@@ -1,0 +1,257 @@
+"""An agent that asks a multimodal language model for every action; what the two protocols have in common."""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from pydantic import ValidationError
+
+from aerialdojo_gen.base.errors import AerialDojoError, UsageError
+from aerialdojo_gen.base.explain import explain
+from aerialdojo_gen.base.llm_client.images import Picture, colour_picture, depth_picture
+from aerialdojo_gen.base.llm_client.service import Connection
+from aerialdojo_gen.base.secrets import Secrets
+from aerialdojo_gen.benchmark.agents.base import AgentBase, AgentUnavailable, InvalidAnswer, ServiceDown, Usage
+from aerialdojo_gen.benchmark.agents.goal import Goal, Observation, Sensors
+from aerialdojo_gen.benchmark.llm.answer import parse_answer
+from aerialdojo_gen.benchmark.llm.error_hints import refused, unanswered
+from aerialdojo_gen.benchmark.llm.options import Form, Options
+from aerialdojo_gen.benchmark.llm.prompt import Sight, Turn, goal_text, repair_text, step_text, system_prompt
+
+# An answer that is shown again for repair, or kept in the log: enough to see what is wrong with it.
+_KEPT_CHARACTERS = 4_000
+# More tokens than any request has: what a service counts beyond this it has not counted.
+_MOST_TOKENS = 1 << 40
+# What a service answers that does not know structured outputs, or tool calls.
+_NOT_TAKEN = ("bad request", "not found", "malformed answer", "server error")
+# What may be over a moment later, and how long the check before a run waits for that, seconds.
+_PASSING = ("rate limit", "server error", "connection lost", "malformed answer")
+_PATIENCE_S = 10.0
+
+
+@dataclass(frozen=True)
+class Message:
+    """What is said, by whom."""
+
+    role: str  # user or assistant
+    parts: tuple[str | Picture, ...]  # In their order
+
+
+@dataclass(frozen=True)
+class Reply:
+    """What a service answers."""
+
+    text: str  # All the text of it, or the arguments of its tool call
+    input_tokens: int | None = None  # Where the service says
+    output_tokens: int | None = None
+
+
+def token_count(value: Any) -> int | None:
+    """Return a service's count of tokens; None where it is no count."""
+    return value if isinstance(value, int) and 0 <= value < _MOST_TOKENS and not isinstance(value, bool) else None
+
+
+class LanguageModelAgent(AgentBase):
+    """Asks a model for every action: all it knows in one message, strictly parsed, with one attempt at repair.
+
+    An answer that cannot be read even then raises `InvalidAnswer`: it is counted, it spends one action, and the drone
+    stays where it is. That is the fairest of the alternatives: an action guessed at would not be the model's, and
+    ending the episode would weigh one slip in 300 steps like a crash.
+
+    Subclasses speak a protocol: they name its package and implement `ask`.
+    """
+
+    package = ""
+    # In the order in which the check before a run tries them.
+    forms: tuple[Form, ...] = ("json", "tool", "text")
+
+    def __init__(self, **options: Any) -> None:
+        self._secrets = Secrets(options)
+        try:
+            self.options = Options.model_validate(options)
+        except ValidationError as error:
+            raise UsageError(self._secrets.text("; ".join(explain(error, Options)))) from None
+        o = self.options
+        self.form: Form = "text" if o.answer == "auto" else o.answer
+        self.tells_tokens = True
+        self.sensors = Sensors(o.views, depth=o.depth, width=o.image_size_px, height=o.image_size_px)
+        self.service = Connection(
+            self.package,
+            o.base_url,
+            o.timeout_s,
+            o.request_retries,
+            secrets=self._secrets,
+            key_variable=o.key_env,
+            model=o.model,
+        )
+        self._begin()
+
+    @property
+    def pace(self) -> Callable[[], None] | None:
+        """Called before each request; waits until one may be sent."""
+        return self.service.meter.pace
+
+    @pace.setter
+    def pace(self, pace: Callable[[], None] | None) -> None:
+        self.service.meter.pace = pace
+
+    def close(self) -> None:
+        """Close the connections."""
+        self.service.close()
+
+    def used_options(self) -> dict[str, Any]:
+        """Return all options as used, defaults too, without secrets."""
+        used = self.options.model_dump(mode="json") | {"answer": self.form}
+        cleaned: dict[str, Any] = self._secrets.options(used)
+        return cleaned
+
+    def ask(self, system: str, messages: Sequence[Message], retries: int | None = None) -> Reply:
+        """Send one request."""
+        raise NotImplementedError
+
+    def check(self) -> str:
+        """Send one small request as the run will send them; settles how answers are asked for."""
+        grey = colour_picture(np.full((32, 32, 3), 128, np.uint8), 32)
+        text = f"{self._example()} This is a test of the connection: choose Stop."
+        forms = self.forms if self.options.answer == "auto" else (self.options.answer,)
+        for form in forms:
+            self.form = form
+            try:
+                reply = self._tried(text, [Message("user", ("A grey picture:", grey))])
+            except ServiceDown as error:
+                raise ServiceDown(f"checked before the run, nothing flown: {error}") from None
+            except AgentUnavailable as error:
+                if form != forms[-1] and error.kind in _NOT_TAKEN:
+                    continue
+                raise AerialDojoError(f"checked before the run, nothing flown: {unanswered(error)}") from None
+            if form != forms[-1] and not self._readable(reply.text):
+                continue
+            self.tells_tokens = reply.input_tokens is not None and reply.output_tokens is not None
+            counted = "" if self.tells_tokens else ", tells no tokens"
+            seconds = self.service.meter.longest_s
+            return f"{self.service.name} answers in {seconds:.1f} s, by {form}{counted}"
+        raise AssertionError("the last form either answers or raises")
+
+    def _tried(self, system: str, messages: Sequence[Message]) -> Reply:
+        """Ask once more where the service answers at all: somebody waits, and one that is not there stays so."""
+        try:
+            return self._sent(system, messages, 0)
+        except AgentUnavailable as error:
+            if error.kind not in _PASSING or (error.retry_after_s or 0.0) > _PATIENCE_S:
+                raise
+            time.sleep(1.0 if error.retry_after_s is None else error.retry_after_s)
+        return self._sent(system, messages, 0)
+
+    def _sent(self, system: str, messages: Sequence[Message], retries: int | None = None) -> Reply:
+        """Ask; what is refused for all requests ends the run."""
+        try:
+            return self.ask(system, messages, retries)
+        except UsageError as error:
+            variable = self.options.key_env or f"{self.package.upper()}_API_KEY"
+            raise refused(error, self.options.model, variable) from None
+
+    def settled(self) -> dict[str, Any]:
+        """Return options that `check` has settled, for the agents that fly."""
+        return {"answer": self.form}
+
+    @property
+    def priced(self) -> bool:
+        """Whether the cost of an episode will be known, if the service tells tokens."""
+        return self.options.priced
+
+    def _readable(self, text: str) -> bool:
+        try:
+            parse_answer(text, self.options.action_set.names)
+        except InvalidAnswer:
+            return False
+        return True
+
+    def _example(self) -> str:
+        return f'Answer with one JSON object: {{"thought": "...", "action": "{self.options.action_set.names[0]}"}}.'
+
+    def reset(self, goal: Goal) -> None:
+        """Begin an episode."""
+        self._begin()
+        o = self.options
+        sensors = goal.rules.sensors
+        scale = min(1.0, o.image_size_px / max(sensors.width, sensors.height))
+        size = round(sensors.width * scale), round(sensors.height * scale)
+        sight = Sight(o.views, o.depth, o.max_depth_m, sensors.fov_deg, *size, o.history_images)
+        self._system = system_prompt(goal, sight, o.action_set, self.form)
+        self._goal: tuple[str | Picture, ...] = (goal_text(goal),)
+        if goal.image is not None:
+            self._goal += (colour_picture(goal.image, o.image_size_px),)
+
+    def _begin(self) -> None:
+        self._turns: deque[Turn] = deque(maxlen=self.options.history)
+        self._seen: deque[tuple[int, Picture]] = deque(maxlen=self.options.history_images)
+        self._tokens: list[int | None] = [0, 0]
+        self._answer: str | None = None
+        self.service.meter.reset()
+
+    def act(self, observation: Observation) -> int:
+        """Ask for an action."""
+        actions = self.options.action_set
+        messages = [Message("user", (*self._goal, *self._report(observation)))]
+        said = self._ask(messages)
+        try:
+            try:
+                answer = parse_answer(said, actions.names)
+            except InvalidAnswer as error:
+                shown = said[:_KEPT_CHARACTERS].strip() or "(nothing)"
+                again = repair_text(str(error), actions)
+                messages += [Message("assistant", (shown,)), Message("user", (again,))]
+                answer = parse_answer(self._ask(messages), actions.names)
+        except InvalidAnswer:
+            self._turns.append(Turn(observation.step, None))
+            raise
+        self._turns.append(Turn(observation.step, answer.action, " ".join(answer.thought.split())[:300]))
+        return actions.ids[answer.action]
+
+    def _ask(self, messages: Sequence[Message]) -> str:
+        reply = self._sent(self._system, messages)
+        for k, count in enumerate((reply.input_tokens, reply.output_tokens)):
+            so_far = self._tokens[k]
+            self._tokens[k] = None if so_far is None or count is None else so_far + count
+        self._answer = reply.text[:_KEPT_CHARACTERS]
+        return reply.text
+
+    def _report(self, observation: Observation) -> list[str | Picture]:
+        o = self.options
+        parts: list[str | Picture] = []
+        for step, picture in self._seen:
+            parts += [f"Earlier, at step {step}, {o.views[0]} camera:", picture]
+        parts.append(step_text(observation, tuple(self._turns)))
+        for k, view in enumerate(o.views):
+            if view in observation.rgb:
+                picture = colour_picture(observation.rgb[view], o.image_size_px)
+                parts += [f"{view} camera, colour:", picture]
+                if k == 0:
+                    self._seen.append((observation.step, picture))
+            if o.depth and view in observation.depth_m:
+                depth = depth_picture(observation.depth_m[view], o.max_depth_m, o.image_size_px)
+                parts += [f"{view} camera, depth (black 0 m, white {o.max_depth_m:g} m or more):", depth]
+        return parts
+
+    def reckoned_tokens(self, observation: Observation) -> int:
+        """Reckon what a request would have without sending it: four letters a token, and its pictures."""
+        o = self.options
+        parts = [self._system, *self._goal, *self._report(observation)]
+        a_picture = o.tokens_per_picture or round(o.image_size_px**2 / 750)
+        return sum(a_picture if isinstance(part, Picture) else -(-len(part) // 4) for part in parts)
+
+    def usage(self) -> Usage:
+        """Return requests, tokens, cost and times since `reset`."""
+        tokens_in, tokens_out = self._tokens
+        meter = self.service.meter
+        cost = self.options.cost_usd(tokens_in, tokens_out)
+        return Usage(meter.requests, tokens_in, tokens_out, cost, meter.seconds, meter.longest_s)
+
+    def answer(self) -> str | None:
+        """Return what the model said last, cut to 4,000 characters."""
+        return self._answer

@@ -1,0 +1,139 @@
+"""What a language model is told: the role, the body, the actions, the rules, and a report before every action.
+
+After the paper's Appendix A: front-facing RGB-D with its encoding, the action list with magnitudes, embodiment,
+termination, remaining budget, and one action as JSON.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from aerialdojo_gen.benchmark.agents.goal import Goal, Observation
+from aerialdojo_gen.benchmark.llm.actions import SIXTEEN, ActionSet
+
+_LOOKS = {"front": "ahead", "left": "to the left", "right": "to the right", "down": "straight down"}
+
+
+@dataclass(frozen=True)
+class Turn:
+    """An earlier step, as it is told again."""
+
+    step: int  # Its number, from 0
+    action: str | None  # Name of the action; None where the answer could not be read
+    thought: str = ""  # What the model said of it
+
+
+@dataclass(frozen=True)
+class Sight:
+    """What is sent of what the cameras see."""
+
+    views: tuple[str, ...] = ("front",)  # Cameras whose pictures are sent
+    depth: bool = True  # Whether depth pictures go with them
+    max_depth_m: float = 50.0  # Depth that is drawn white; horizontal field of view
+    fov_deg: float = 90.0
+    width: int = 640  # Of the pictures, pixels
+    height: int = 640
+    past_pictures: int = 0  # Of how many earlier steps the first camera's colour picture is sent again
+
+
+def system_prompt(goal: Goal, sight: Sight, actions: ActionSet = SIXTEEN, form: str = "text") -> str:
+    """Write what holds for the whole episode (paper, Appendix A)."""
+    rules = goal.rules
+    told = ", but you are told which way the drone faces at the start" if goal.heading is not None else ""
+    return f"""\
+You pilot a small drone that searches for one target object in a large outdoor scene. You know the scene only from \
+the drone's cameras; there is no map, no GPS and no compass{told}. Find the target, fly up to it, and stop in front \
+of it.
+
+BODY
+The drone is a quadrotor with a wheelbase of {rules.wheelbase_m:g} m. It collides with whatever comes within \
+{rules.radius_m:g} m of its centre, also while it moves from one place to the next. It always hovers level.
+
+SENSORS
+{_sensors(sight)}
+
+ACTIONS
+{actions.described()}
+Every action is carried out exactly, unless something stands in the way. A move that would leave the flight area is \
+refused: it is spent, and the drone stays where it is.
+
+THE EPISODE ENDS
+- when you choose Stop: a success if the drone is then within {rules.success_radius_m:g} m of the viewpoint in front \
+of the target (about 1 m from its surface), and a failure anywhere else;
+- when the drone hits anything: a failure;
+- when the budget of {rules.action_budget} actions is spent without Stop: a failure. Every action counts, and so \
+does an answer that cannot be read.
+
+ANSWER
+{_form(actions, form)}"""
+
+
+def _sensors(sight: Sight) -> str:
+    if not sight.views:
+        return "You see nothing."
+    cameras = ", ".join(f"{view} (looks {_LOOKS[view]})" for view in sight.views)
+    text = (
+        f"Before every action you see a colour picture from each of these cameras: {cameras}. Each picture has "
+        f"{sight.width} x {sight.height} pixels and a horizontal field of view of {sight.fov_deg:g}°."
+    )
+    if sight.depth:
+        text += (
+            " With each comes a depth map of the same view and size, in grey: the value of a pixel is its distance"
+            f" along the optical axis, linear from black at 0 m to white at {sight.max_depth_m:g} m; what is farther,"
+            f" or open sky, is white. A pixel of value v is v / 255 x {sight.max_depth_m:g} m away."
+        )
+    if sight.past_pictures:
+        steps = "the step before" if sight.past_pictures == 1 else f"up to {sight.past_pictures} earlier steps"
+        text += f" The {sight.views[0]} camera's colour picture of {steps} is shown again."
+    return text
+
+
+def _form(actions: ActionSet, form: str) -> str:
+    if form == "tool":
+        return 'Call the tool "act" once, with one name from the list above as its action.'
+    return (
+        "Answer with one JSON object and nothing else, no text around it. Its JSON schema:\n"
+        f"{json.dumps(actions.schema())}\n"
+        "That is:\n"
+        '{"thought": "<one or two sentences: what you see, where you go>", '
+        '"action": "<one name from the list above>"}'
+    )
+
+
+def goal_text(goal: Goal) -> str:
+    """Write what is to be found; for an image goal its picture follows."""
+    where = f"TARGET: {goal.target_name}. It lies {goal.direction} of the landmark nearest to it: {goal.landmark}."
+    if goal.heading is not None:
+        where += (
+            f"\nAt the start the drone faces {goal.heading.direction}: a compass would show "
+            f"{goal.heading.heading_deg}° (0° is north, 90° east). Turning right adds, turning left takes away."
+        )
+    if goal.image is not None:
+        return f"{where}\nThis picture shows the target from the viewpoint in front of it:"
+    return f"{where}\nDescription: {goal.description}"
+
+
+def step_text(observation: Observation, turns: Sequence[Turn]) -> str:
+    """Write the report before an action; the pictures follow."""
+    lines = []
+    if turns:
+        lines.append("YOUR LAST ACTIONS")
+        for turn in turns:
+            done = turn.action or "none (the answer could not be read)"
+            lines.append(f"- step {turn.step}: {done}" + (f". {turn.thought}" if turn.thought else ""))
+    if observation.refused:
+        lines.append("The last move was refused: it would have left the flight area.")
+    lines.append(
+        f"NOW: step {observation.step}; {observation.remaining_actions} actions left, Stop included. The drone sees:"
+    )
+    return "\n".join(lines)
+
+
+def repair_text(why: str, actions: ActionSet = SIXTEEN) -> str:
+    """Ask for a readable answer, once."""
+    return (
+        f"This answer cannot be read: {why}. Answer again, with the JSON object alone: "
+        '{"thought": "...", "action": "<one of ' + ", ".join(actions.names) + '>"}'
+    )

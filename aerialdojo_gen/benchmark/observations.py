@@ -1,0 +1,84 @@
+"""What the body's cameras see, as an agent gets it."""
+
+from __future__ import annotations
+
+import os
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aerialdojo_gen.base.errors import RenderError
+from aerialdojo_gen.benchmark.agents.goal import Sensors
+from aerialdojo_gen.planning.flight_space import Point
+from aerialdojo_gen.rendering.backend import Renderer, choose_renderer, kept_renderer
+from aerialdojo_gen.rendering.bodies import draw_bodies
+from aerialdojo_gen.scenes.model import Scene
+
+Pictures = dict[str, NDArray[np.uint8]]
+Depths = dict[str, NDArray[np.float32]]
+
+
+# The process that has drawn by OpenGL. A fork of it would wait for ever for threads that it does not have.
+_drawn_by_gl: list[int] = []
+
+
+def drawing(scene: Scene, name: str) -> Renderer:
+    """Return what draws a scene in this process; RenderError in a fork of one that has drawn."""
+    if _drawn_by_gl and os.getpid() not in _drawn_by_gl:
+        raise RenderError(
+            "this process was forked from one that has drawn by OpenGL: start it by spawn "
+            "(gymnasium.make_vec: vector_kwargs={'context': 'spawn'}), or take renderer='pybullet' in both"
+        )
+    renderer = kept_renderer(scene, name)
+    if renderer.name == "gl":
+        _drawn_by_gl[:] = [os.getpid()]
+    return renderer
+
+
+def renderer_name(name: str) -> str:
+    """Return the name of what draws in this process; ``"auto"`` is the fastest that works here."""
+    if name != "auto":
+        return name
+    chosen = choose_renderer().name
+    # To choose it a scene was drawn.
+    if not _drawn_by_gl:
+        _drawn_by_gl[:] = [os.getpid()]
+    return chosen
+
+
+def has_drawn() -> bool:
+    """Whether this process has drawn by OpenGL, so that a fork of it could not."""
+    return bool(_drawn_by_gl)
+
+
+def look(
+    scene: Scene, sensors: Sensors, position: Point, yaw_rad: float, renderer: str = "auto"
+) -> tuple[Pictures, Depths]:
+    """Render the views of a body (world metres, radians).
+
+    RGB (H, W, 3) uint8 and planar depth (H, W) metres, by view.
+    """
+    rgb: Pictures = {}
+    depth_m: Depths = {}
+    if sensors.blind:
+        return rgb, depth_m
+    pose = np.array([[*position, yaw_rad]])
+    pictures, depths = draw_bodies(drawing(scene, renderer), sensors.camera, pose, sensors.views)
+    for v, view in enumerate(sensors.views):
+        if sensors.rgb:
+            rgb[view] = pictures[0, v]
+        if sensors.depth:
+            depth_m[view] = depths[0, v]
+            np.putmask(depth_m[view], ~(depth_m[view] <= np.float32(sensors.max_depth_m)), np.float32(0.0))
+    return rgb, depth_m
+
+
+def mosaic(pictures: Pictures) -> NDArray[np.uint8]:
+    """Lay pictures out in rows of two: (rows · H, 2 · W, 3) uint8, or the picture itself where there is one."""
+    tiles = list(pictures.values())
+    if len(tiles) == 1:
+        return tiles[0]
+    if len(tiles) % 2:
+        tiles.append(np.zeros_like(tiles[0]))
+    rows = [np.concatenate(tiles[i : i + 2], axis=1) for i in range(0, len(tiles), 2)]
+    return np.concatenate(rows)

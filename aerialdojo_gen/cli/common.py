@@ -1,0 +1,204 @@
+"""What several commands share: their options, where the sources lie, how a pipeline is opened and run.
+
+Nothing heavy is imported before a command runs, so that ``--help`` answers at once.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import typer
+
+from aerialdojo_gen.base import cli_context as advice
+from aerialdojo_gen.cli import completion
+from aerialdojo_gen.dataset.build import (
+    DEFAULT_PIPELINE,
+    default_workers,
+    open_pipeline,
+    pipeline_file,
+    run_stages,
+)
+
+if TYPE_CHECKING:
+    from aerialdojo_gen.base.config.pipeline import Pipeline
+    from aerialdojo_gen.pipeline.freshness import Limits
+    from aerialdojo_gen.pipeline.stage import Roots, Stage
+    from aerialdojo_gen.store.root import Where
+
+__all__ = ["default_workers", "open_pipeline", "pipeline_file", "run_chosen", "run_until"]
+
+
+def print_json(value: object) -> None:
+    """Print what ``--json`` asks for: bytes left out, null where a figure is not finite."""
+    print(json_text(value))
+
+
+def json_text(value: object) -> str:
+    """Give what `print_json` prints."""
+    return json.dumps(_plain(value), ensure_ascii=False, indent=1, allow_nan=False)
+
+
+def _plain(value: object) -> object:
+    if isinstance(value, dict):
+        return {str(key): _plain(inner) for key, inner in value.items() if not isinstance(inner, bytes)}
+    if isinstance(value, list | tuple):
+        return [_plain(inner) for inner in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def kept(ctx: typer.Context, param: typer.CallbackParam, value: Any) -> Any:
+    """Keep what is written on the command line (not what the environment says) for the advice of messages."""
+    source = ctx.get_parameter_source(str(param.name))
+    if source is not None and source.name == "COMMANDLINE":
+        advice.remember(**{str(param.name): value})
+    return value
+
+
+Data = Annotated[
+    str,
+    typer.Option(
+        "--data", metavar="DIR|URL", envvar="AERIALDOJO_DATA", callback=kept,
+        help="Data directory or s3://bucket/prefix, for tables, meshes and the release.",
+    ),
+]  # fmt: skip
+Scene = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--scene",
+        metavar="NAME|GLOB",
+        autocompletion=completion.scenes,
+        help="Scene or glob, repeatable: --scene 'U_*'.  (default: all)",
+    ),
+]
+Scenes = Annotated[
+    list[str] | None,
+    typer.Argument(metavar="SCENE", autocompletion=completion.scenes, help="Scenes or globs; the same as --scene."),
+]
+PipelineFile = Annotated[
+    Path | None,
+    typer.Option(
+        "--pipeline",
+        metavar="FILE|NAME",
+        callback=kept,
+        autocompletion=completion.pipelines,
+        help="Pipeline file, or the name of a shipped one.  (default: that of the release in --data, "
+        f"else {Path(DEFAULT_PIPELINE).stem})",
+    ),
+]
+PipelineArgument = Annotated[
+    Path,
+    typer.Argument(
+        metavar="PIPELINE",
+        callback=kept,
+        autocompletion=completion.pipelines,
+        help=f"Pipeline file, or the name of a shipped one: {', '.join(completion.shipped_pipelines())}.",
+    ),
+]
+Workers = Annotated[
+    int | None,
+    typer.Option("--workers", metavar="N", min=1, max=1024, help="Number of processes.  (default: one per core)"),
+]
+ExecutorName = Annotated[
+    str, typer.Option("--executor", metavar="local|ray", help="Run on this machine or on a Ray cluster.")
+]
+Address = Annotated[
+    str | None,
+    typer.Option(
+        "--address",
+        metavar="HOST:PORT",
+        help="Address of a running Ray cluster.  (default: start one on this machine)",
+    ),
+]
+Force = Annotated[bool, typer.Option("--force", help="Compute this stage again even where it is up to date.")]
+Replace = Annotated[
+    bool, typer.Option("--replace", help="Overwrite a release made by another pipeline; it is deleted.")
+]
+Json = Annotated[bool, typer.Option("--json", help="Print JSON with unrounded figures.")]
+OneScene = Annotated[
+    str | None,
+    typer.Argument(metavar="SCENE", autocompletion=completion.scenes, help="Scene, or a glob that matches one."),
+]
+SceneOption = Annotated[
+    str | None,
+    typer.Option("--scene", metavar="NAME|GLOB", autocompletion=completion.scenes, help="The same as SCENE."),
+]
+RendererName = Annotated[
+    Literal["auto", "gl", "pybullet"],
+    typer.Option("--renderer", help="Renderer; auto takes the fastest that works on this machine."),
+]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print no progress and no summary.")]
+Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="Print a line also for stages that are up to date.")]
+
+
+def together(scenes: list[str] | None, scene: list[str] | None) -> list[str] | None:
+    """Join scenes that are given by position with those of ``--scene``; None where there is neither."""
+    return [*(scenes or ()), *(scene or ())] or None
+
+
+def run_until(
+    stage: str,
+    *,
+    data: Where,
+    scene: list[str] | None = None,
+    pipeline: Path | None = None,
+    workers: int | None = None,
+    force: bool = False,
+    quiet: bool = False,
+    verbose: bool = False,
+    limits: Limits | None = None,
+    replace: bool = False,
+    executor: str = "local",
+    address: str | None = None,
+    **overrides: object,
+) -> None:
+    """Bring a stage's tables up to date, running what it needs upstream; the twin of a stage's command."""
+    from aerialdojo_gen.base.config.pipeline import with_overrides
+    from aerialdojo_gen.pipeline.registry import upstream
+
+    config, roots = open_pipeline(pipeline, data)
+    config = with_overrides(config, stage, **overrides)
+    run_chosen(
+        list(upstream(stage)), config, roots, scene, workers, [stage] if force else [], quiet, limits, replace,
+        executor, address, verbose,
+    )  # fmt: skip
+
+
+def run_chosen(
+    stages: list[Stage],
+    config: Pipeline,
+    roots: Roots,
+    scene: list[str] | None,
+    workers: int | None,
+    force: list[str],
+    quiet: bool,
+    limits: Limits | None = None,
+    replace: bool = False,
+    executor: str = "local",
+    address: str | None = None,
+    verbose: bool = False,
+) -> None:
+    """Run stages with progress (`aerialdojo_gen.dataset.build.run_stages`), and say what an error or Ctrl-C leaves."""
+    from aerialdojo_gen.base.errors import UsageError
+    from aerialdojo_gen.pipeline.progress import Reporter
+
+    kept = "finished shards are kept, " + (
+        "and --force computes them again" if force else "the same command continues from where it stopped"
+    )
+    try:
+        run_stages(
+            stages, config, roots, scene, workers=workers, executor=executor, address=address, force=force,
+            reporter=Reporter(quiet=quiet, verbose=verbose), limits=limits, replace=replace,
+        )  # fmt: skip
+    except KeyboardInterrupt:
+        # Said here because Typer turns Ctrl-C into a silent exit.
+        print(f"interrupted: {kept}", file=sys.stderr)
+        raise SystemExit(130) from None
+    except Exception as error:
+        # A wrong option or pipeline file ended it before anything was computed.
+        if not isinstance(error, UsageError):
+            error.add_note(kept)
+        raise

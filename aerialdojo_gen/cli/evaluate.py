@@ -1,0 +1,264 @@
+"""Fly an agent through released tasks."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from aerialdojo_gen.base.cli_context import command
+from aerialdojo_gen.base.errors import AerialDojoError, UsageError
+from aerialdojo_gen.cli import completion
+from aerialdojo_gen.cli.again import again
+from aerialdojo_gen.cli.common import (
+    Address,
+    Data,
+    ExecutorName,
+    PipelineFile,
+    Quiet,
+    RendererName,
+    Scene,
+    Scenes,
+    Workers,
+    default_workers,
+    open_pipeline,
+    together,
+)
+
+if TYPE_CHECKING:
+    from aerialdojo_gen.benchmark.agents.goal import Sensors
+
+app = typer.Typer()
+
+
+@app.command("evaluate")
+def evaluate(
+    scenes: Scenes = None,
+    data: Data = "data",
+    agent: Annotated[
+        str | None,
+        typer.Option(
+            "--agent",
+            autocompletion=completion.agents,
+            help="oracle, random, stop, explorer, policy, …, or package.module:Class.  (default: random)",
+        ),
+    ] = None,
+    preset: Annotated[
+        str | None,
+        typer.Option("--preset", help="A preset language model instead of --agent: qwen3-vl-4b, …"),
+    ] = None,
+    option: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--option", help="Option of the agent, repeatable: --option seed=1; converted to the type of its default."
+        ),
+    ] = None,
+    run: Annotated[
+        str | None, typer.Option("--run", help="Name of the run.  (default: that of the agent or preset)")
+    ] = None,
+    split: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--split",
+            help="id_train, id_test, ood_train, ood_test; train or test for both ID and OOD; repeatable.  "
+            "(default: all)",
+        ),
+    ] = None,
+    setting: Annotated[
+        list[str] | None, typer.Option("--setting", help="base, standard, long_horizon; repeatable.")
+    ] = None,
+    modality: Annotated[
+        list[str] | None, typer.Option("--modality", help="semantic or image.  (default: both)")
+    ] = None,
+    scene: Scene = None,
+    limit: Annotated[
+        int | None,
+        typer.Option(
+            "--limit",
+            min=1,
+            help="Maximum number of tasks in total, spread evenly over scenes; semantic and image goals count "
+            "separately.  "
+            "(default: all)",
+        ),
+    ] = None,
+    seed: Annotated[int, typer.Option("--seed", min=0, help="Seed for the selection of tasks by --limit.")] = 0,
+    view: Annotated[
+        list[str] | None, typer.Option("--view", help="front, left, right, down; repeatable; overrides the agent's.")
+    ] = None,
+    width: Annotated[
+        int | None, typer.Option("--width", min=1, max=4096, help="Image width in pixels; overrides the agent's.")
+    ] = None,
+    height: Annotated[
+        int | None, typer.Option("--height", min=1, max=4096, help="Image height in pixels; overrides the agent's.")
+    ] = None,
+    renderer: RendererName = "auto",
+    tell: Annotated[
+        list[str] | None,
+        typer.Option("--tell", help="Give agents more than the goal: heading, the direction they face at the start."),
+    ] = None,
+    out: Annotated[
+        str | None,
+        typer.Option("--out", metavar="DIR|URL", help="Where to write the log.  (default: the data directory)"),
+    ] = None,
+    attempts: Annotated[
+        int,
+        typer.Option(
+            "--attempts",
+            min=1,
+            max=1000,
+            help="Maximum attempts per episode if something other than the agent fails.",
+        ),
+    ] = 5,
+    rerun_failed: Annotated[
+        bool,
+        typer.Option(
+            "--rerun-failed", help="Run only those episodes again that failed for reasons outside the agent."
+        ),
+    ] = False,
+    tolerate: Annotated[
+        bool,
+        typer.Option(
+            "--tolerate",
+            help="Continue when the agent raises or returns no valid action; the episode counts as failed.",
+        ),
+    ] = False,
+    traceback: Annotated[
+        bool, typer.Option("--traceback", help="Print the whole traceback of an agent that raises.")
+    ] = False,
+    restart: Annotated[bool, typer.Option("--restart", help="Delete what the run has written before.")] = False,
+    estimate: Annotated[
+        bool,
+        typer.Option(
+            "--estimate", help="Estimate time and cost of a language model with a few requests; fly nothing."
+        ),
+    ] = False,
+    max_cost: Annotated[
+        float | None, typer.Option("--max-cost", min=0, help="Start no further episode after this cost, US dollars.")
+    ] = None,
+    max_tokens: Annotated[
+        int | None, typer.Option("--max-tokens", min=0, help="Start no further episode after this number of tokens.")
+    ] = None,
+    requests_per_minute: Annotated[
+        float | None,
+        typer.Option("--requests-per-minute", min=0.001, help="Maximum request rate of all workers together."),
+    ] = None,
+    failures_in_row: Annotated[
+        int,
+        typer.Option("--failures-in-row", min=1, help="Stop after this many failed episodes of one kind in a row."),
+    ] = 5,
+    workers: Workers = None,
+    executor: ExecutorName = "local",
+    address: Address = None,
+    pipeline: PipelineFile = None,
+    quiet: Quiet = False,
+) -> None:
+    """Evaluate an agent on released tasks, closed loop; finished episodes are kept."""
+    from aerialdojo_gen.benchmark.limits import Limits
+    from aerialdojo_gen.benchmark.runner import Evaluation
+    from aerialdojo_gen.benchmark.runner import evaluate as fly
+    from aerialdojo_gen.benchmark.tasks import Selection
+    from aerialdojo_gen.benchmark.worker import Conditions
+    from aerialdojo_gen.pipeline.progress import Reporter
+
+    config, _ = open_pipeline(pipeline, data, reads=True)
+    splits, settings, modalities = (tuple(names or ()) for names in (split, setting, modality))
+    chosen = tuple(together(scenes, scene) or ())
+    name = preset or agent or "random"
+    with _tracebacks(traceback):
+        agent, options = _agent(agent, preset, _options(option or []))
+        evaluation = Evaluation(
+            run or name.replace(".", "-").replace(":", "-"),
+            agent,
+            options,
+            Selection(splits, settings, modalities, chosen, limit, seed),
+            _sensors(agent, options, view, width, height),
+            config.embodiment,
+            renderer,
+            Conditions(attempts, tolerate=tolerate),
+            requests_per_minute,
+            tell=tuple(tell or ()),
+        )
+    if estimate:
+        from aerialdojo_gen.benchmark.estimate import estimate as reckon
+
+        print("\n".join(reckon(data, evaluation).lines(workers or default_workers())))
+        return
+    reporter = Reporter(quiet=quiet)
+    try:
+        with _tracebacks(traceback):
+            outcome = fly(
+                data, evaluation, out=out, workers=workers, executor=executor, address=address,
+                rerun_failed=rerun_failed, restart=restart,
+                limits=Limits(max_cost, max_tokens, failures_in_row), reporter=reporter,
+            )  # fmt: skip
+    except KeyboardInterrupt:
+        print("interrupted: finished episodes are kept, the same command continues from here", file=sys.stderr)
+        raise SystemExit(130) from None
+    scores = f"; for all scores: {command('report', evaluation.run, log=out)}" if outcome.finished else ""
+    reporter.line(f"evaluate {evaluation.run}: {outcome}{scores}")
+    last = outcome.last_line(again(["--rerun-failed"], without=["--restart"], data=data))
+    if outcome.stopped or outcome.fruitless:
+        raise AerialDojoError(last)
+    if last:
+        # Not the reporter's: a failure is told under --quiet too.
+        print(last, file=sys.stderr)
+
+
+@contextmanager
+def _tracebacks(wanted: bool) -> Iterator[None]:
+    """Print an agent's traceback, if it raises in the block."""
+    try:
+        yield
+    except AerialDojoError as error:
+        if wanted and error.traceback:
+            print(error.traceback, file=sys.stderr)
+        raise
+
+
+def _agent(agent: str | None, preset: str | None, given: dict[str, str]) -> tuple[str, dict[str, Any]]:
+    """Take the agent, or a preset's with its options under those that are given."""
+    from aerialdojo_gen.benchmark.agents.load import read_options
+
+    if preset is None:
+        return agent or "random", read_options(agent or "random", given)
+    from aerialdojo_gen.benchmark.llm.presets import preset as find
+
+    found = find(preset)
+    if agent is not None and agent != found.agent:
+        raise UsageError(f"preset {preset!r} is of the agent {found.agent!r}: leave --agent {agent} out")
+    return found.agent, found.options | read_options(found.agent, given)
+
+
+def _options(given: list[str]) -> dict[str, str]:
+    from aerialdojo_gen.base.secrets import Secrets
+
+    options = {}
+    for item in given:
+        key, equals, options[key] = item.partition("=")
+        if not equals or not key.isidentifier():
+            raise UsageError(f"--option {Secrets().text(item)[:60]!r}: write key=value")
+    return options
+
+
+def _sensors(
+    agent: str, options: dict[str, Any], view: list[str] | None, width: int | None, height: int | None
+) -> Sensors | None:
+    """Take the agent's own sensors, with what was asked for instead; None leaves them as they are."""
+    if view is None and width is None and height is None:
+        return None
+    from dataclasses import replace
+
+    from aerialdojo_gen.benchmark.agents import load_agent
+    from aerialdojo_gen.benchmark.agents.goal import Sensors
+
+    wanted = getattr(load_agent(agent, **options), "sensors", None)
+    sensors = wanted if isinstance(wanted, Sensors) else Sensors()
+    return replace(
+        sensors,
+        views=sensors.views if view is None else tuple(view),
+        width=width or sensors.width,
+        height=height or sensors.height,
+    )

@@ -1,0 +1,203 @@
+"""Commands that bring tasks into and out of the formats of other benchmarks."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from aerialdojo_gen.cli.common import Data, Json, Quiet, Scene, Scenes, Workers, together
+
+if TYPE_CHECKING:
+    from aerialdojo_gen.store.root import DataRoot
+
+app = typer.Typer()
+
+# Formats with what the body sees on its way.
+FOR_TRAINING = ("lerobot", "webdataset")
+
+
+@app.command("export")
+def export(
+    form: Annotated[str, typer.Option("--format", help="aerialdojo, habitat, lerobot or webdataset.")],
+    scenes: Scenes = None,
+    data: Data = "data",
+    out: Annotated[Path | None, typer.Option("--out", help="Folder to write.  (default: "
+        "DATA/exports/FORMAT)")] = None,
+    scene: Scene = None,
+    force: Annotated[bool, typer.Option("--force", help="Replace an earlier export there.")] = False,
+    picture_size: Annotated[
+        int | None,
+        typer.Option(
+            help="aerialdojo: size of rendered pictures in pixels; 0: those of the release.  (default: 640)"
+        ),
+    ] = None,
+    shards: Annotated[
+        bool, typer.Option("--shards", help="aerialdojo: one tar file per scene instead of one file per trajectory.")
+    ] = False,
+    split: Annotated[list[str] | None, typer.Option(
+        "--split", help="id_train, id_test, ood_train, ood_test, train, test; repeatable.  (default: all)")] = None,
+    setting: Annotated[list[str] | None, typer.Option(
+        "--setting", help="base, standard, long_horizon; repeatable.")] = None,
+    limit: Annotated[int | None, typer.Option(
+        "--limit", min=0, help="Maximum number of trajectories per scene and setting, not in total.  "
+            "(default: 0, all)"
+    )] = None,
+    seed: Annotated[int | None, typer.Option(
+        "--seed", min=0, help="Seed for the selection of trajectories by --limit.  (default: 0)")] = None,
+    view: Annotated[list[str] | None, typer.Option(
+        "--view", help="front, left, right, down; repeatable.  (default: front)")] = None,
+    width: Annotated[int | None, typer.Option(
+        "--width", min=16, max=4096, help="Image width in pixels.  (default: 128)")] = None,
+    height: Annotated[int | None, typer.Option(
+        "--height", min=16, max=4096, help="Image height in pixels.  (default: the width)")] = None,
+    no_depth: Annotated[bool, typer.Option(
+        "--no-depth", help="Export colour images without depth.")] = False,
+    goal: Annotated[list[str] | None, typer.Option(
+        "--goal", help="text, image; repeatable.  (default: text)")] = None,
+    source: Annotated[str | None, typer.Option(
+        "--source", help="render: render now; recordings: read those of the command render; auto: read "
+            "where there are.  "
+        "(default: render)")] = None,
+    renderer: Annotated[str | None, typer.Option(
+        "--renderer", help="auto, gl or pybullet.  (default: auto)")] = None,
+    jpeg_quality: Annotated[int | None, typer.Option(
+        "--jpeg-quality", min=1, max=100, help="webdataset: JPEG quality, instead of lossless PNG.")] = None,
+    workers: Workers = None,
+    estimate: Annotated[bool, typer.Option(
+        "--estimate", help="Measure a few trajectories and estimate time and size for all; write nothing.")] = False,
+    as_json: Json = False,
+    quiet: Quiet = False,
+) -> None:  # fmt: skip
+    """Write the release in the layout of AerialDojo's authors, as Habitat's ObjectNav-v1, or for training.
+
+    lerobot (LeRobotDataset v3) and webdataset (tar shards) contain images and actions of every step; only they
+    take the options from --split to --estimate. After an interruption the same command continues.
+    """
+    from aerialdojo_gen.base.errors import UsageError
+    from aerialdojo_gen.base.names import unknown
+    from aerialdojo_gen.cli.common import print_json
+    from aerialdojo_gen.exchange.exporting import FORMATS, export_release
+    from aerialdojo_gen.pipeline.progress import Reporter
+    from aerialdojo_gen.store.root import LocalRoot, open_root
+
+    training = {
+        "split": split, "setting": setting, "limit": limit, "seed": seed, "views": view, "goal": goal,
+        "source": source, "renderer": renderer, "jpeg_quality": jpeg_quality, "depth": False if no_depth else None,
+        "size": (width or height or 128, height or width or 128) if width or height else None,
+    }  # fmt: skip
+    given = {name: value for name, value in training.items() if value}
+    given |= {name: value for name, value in training.items() if value is not None and not isinstance(value, list)}
+    if form not in (*FORMATS, *FOR_TRAINING):
+        raise UsageError(unknown("no format", form, (*FORMATS, *FOR_TRAINING)))
+    root = open_root(data)
+    if out is None and not isinstance(root, LocalRoot):
+        raise UsageError("an export is a folder of this machine: name it with --out")
+    target = out or Path(root.at(f"exports/{form}"))
+    if form in FOR_TRAINING:
+        if picture_size is not None:
+            raise UsageError("--picture-size is for --format aerialdojo: choose --width and --height here")
+        if shards:
+            raise UsageError("--shards is for --format aerialdojo")
+        _for_training(
+            form,
+            root,
+            target,
+            {**given, "scene": together(scenes, scene) or ()},
+            force,
+            workers,
+            estimate,
+            as_json,
+            quiet,
+        )
+        return
+    if given or estimate or workers is not None:
+        names = _options(given, estimate, workers)
+        verb = "is" if len(names) == 1 else "are"
+        raise UsageError(f"{', '.join(names)} {verb} for --format {' and '.join(FOR_TRAINING)}, not for {form}")
+    counts = export_release(
+        form, root, target, together(scenes, scene), force=force, picture_px=picture_size, shards=shards,
+        reporter=Reporter(quiet=quiet or as_json),
+    )  # fmt: skip
+    if as_json:
+        print_json({"path": str(target), **counts})
+    elif not quiet:
+        print(f"{target}: " + ", ".join(f"{n:,} {name}" for name, n in counts.items()))
+
+
+def _for_training(
+    form: str,
+    root: DataRoot,
+    target: Path,
+    asked: dict[str, Any],
+    force: bool,
+    workers: int | None,
+    estimate: bool,
+    as_json: bool,
+    quiet: bool,
+) -> None:
+    from dataclasses import asdict
+
+    from aerialdojo_gen.cli.common import print_json
+    from aerialdojo_gen.exchange.learning_export import estimate_for_learning, export_for_learning, wanted_from
+    from aerialdojo_gen.pipeline.progress import Reporter
+
+    wanted = wanted_from(**asked)
+    if estimate:
+        told = estimate_for_learning(form, root, wanted, workers)
+        if as_json:
+            print_json(asdict(told))
+        else:
+            print(told)
+        return
+    try:
+        made = export_for_learning(
+            form, root, target, wanted, force=force, workers=workers, reporter=Reporter(quiet=quiet)
+        )
+    except KeyboardInterrupt:
+        # Said here because Typer turns Ctrl-C into a silent exit.
+        print("interrupted: finished parts are kept, the same command continues from here", file=sys.stderr)
+        raise SystemExit(130) from None
+    if as_json:
+        print_json({"path": str(target), **asdict(made)})
+    elif not quiet:
+        print(f"{target}: " + ", ".join(f"{n:,} {name}" for name, n in made.counts.items()))
+
+
+def _options(given: dict[str, Any], estimate: bool, workers: int | None) -> list[str]:
+    """Name the options that were given as they are written."""
+    written = {"views": "--view", "size": "--width", "depth": "--no-depth", "jpeg_quality": "--jpeg-quality"}
+    names = [written.get(name, f"--{name}") for name in given]
+    return [*names, *(["--estimate"] if estimate else []), *(["--workers"] if workers is not None else [])]
+
+
+@app.command("import-benchmark")
+def import_benchmark(
+    files: Annotated[list[Path], typer.Argument(metavar="FILE...", help="Task files; aerialdojo: also a folder.")],
+    form: Annotated[str, typer.Option("--format", help="aerialdojo, uav-on, cityavos, aerialvln or openfly.")],
+    data: Data = "data",
+    frame: Annotated[
+        str | None,
+        typer.Option(help="Axes of cityavos and openfly: enu, nwu, ned or esd (east, south, down)."),
+    ] = None,
+    angles: Annotated[str, typer.Option(help="Unit of yaw in cityavos: radians, degrees or mixed.")] = "radians",
+    images: Annotated[
+        Path | None, typer.Option(help="Folder of the pictures of cityavos.  (default: that of the file)")
+    ] = None,
+    pictures: Annotated[bool, typer.Option("--pictures/--no-pictures", help="Read the goal images.")] = True,
+    skip_bad: Annotated[bool, typer.Option("--skip-bad", help="Skip bad records and keep the good ones.")] = False,
+    name: Annotated[str | None, typer.Option(help="Name of the import.  (default: the format)")] = None,
+    force: Annotated[bool, typer.Option("--force", help="Replace an import of the same name.")] = False,
+) -> None:
+    """Convert task files of another benchmark to tables like the release's, in DATA/imported/NAME."""
+    from aerialdojo_gen.exchange import importing
+    from aerialdojo_gen.store.root import open_root
+
+    options = importing.Options(
+        frame=frame, angles=angles, pictures=images, with_pictures=pictures, skip_bad=skip_bad
+    )
+    root = open_root(data)
+    report = importing.import_benchmark(form, files, root, options, name=name, force=force)
+    print("\n".join([root.at(f"imported/{name or form}"), *(f"  {line}" for line in report.lines())]))

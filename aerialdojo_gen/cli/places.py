@@ -1,0 +1,110 @@
+"""Commands that make scenes of real places: maps and height models."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from aerialdojo_gen.base import cli_context as advice
+
+if TYPE_CHECKING:
+    from aerialdojo_gen.imports.places import Place
+
+app = typer.Typer()
+
+Project = Annotated[Path, typer.Option(help="Folder for your scenes and their pipeline.")]
+Cell = Annotated[
+    float | None, typer.Option(help="Grid spacing of the ground, metres.  (default: that of the height model)")
+]
+Ceiling = Annotated[
+    float | None, typer.Option(help="Maximum flying height z, metres.  (default: a little above the highest point)")
+]
+Seed = Annotated[int, typer.Option(min=0, help="Seed for procedurally added objects.")]
+Attribution = Annotated[str, typer.Option(help="Attribution of the height data, for the dataset card.")]
+Force = Annotated[bool, typer.Option("--force", help="Replace a scene of this name.")]
+
+
+@app.command("add-map")
+def add_map(
+    name: Annotated[str, typer.Argument(help="Name of the scene; the prefix of the names if there are several.")],
+    extract: Annotated[Path, typer.Argument(help="OpenStreetMap extract: .osm.pbf or .osm.")],
+    bbox: Annotated[list[str], typer.Option(help="WEST,SOUTH,EAST,NORTH in degrees; repeatable, one scene each.")],
+    tiles: Annotated[
+        float | None, typer.Option(help="Cut every box into squares of this edge length, metres.")
+    ] = None,
+    dem: Annotated[Path | None, typer.Option(help="Height model for the ground: .tif, .asc or .npz.")] = None,
+    cell: Cell = None,
+    drive_on: Annotated[str, typer.Option(help="Side of the road that traffic drives on: right or left.")] = "right",
+    attribution: Attribution = "",
+    ceiling: Ceiling = None,
+    seed: Seed = 0,
+    project: Project = Path("my-scenes"),
+    force: Force = False,
+) -> None:
+    """Make scenes from a map: streets, buildings, trees and street furniture."""
+    from aerialdojo_gen.imports import places
+
+    added = places.add_map(
+        name, extract, project, bbox=[_box(text) for text in bbox], tile_m=tiles, dem=dem, cell_m=cell,
+        attribution=attribution, seed=seed, ceiling_m=ceiling, drive_on=drive_on, force=force,
+    )  # fmt: skip
+    _say(added, project)
+
+
+@app.command("add-terrain")
+def add_terrain(
+    name: Annotated[str, typer.Argument(help="Name of the scene; with the suffix _1 it is out-of-distribution.")],
+    dem: Annotated[Path, typer.Argument(help="Height model: .tif (GeoTIFF), .asc or .npz.")],
+    bbox: Annotated[
+        str | None, typer.Option(help="Part of the model to use: WEST,SOUTH,EAST,NORTH in degrees.")
+    ] = None,
+    size: Annotated[
+        tuple[float, float] | None, typer.Option(help="Size of the part to use around the centre: x y, metres.")
+    ] = None,
+    cell: Cell = None,
+    water: Annotated[
+        float | None, typer.Option(help="Water up to this height, metres in the model's heights.")
+    ] = None,
+    sand: Annotated[float | None, typer.Option(help="Sand up to this height, metres.")] = None,
+    snow: Annotated[float | None, typer.Option(help="Snow above this height, metres.")] = None,
+    bare: Annotated[bool, typer.Option("--bare", help="Add no plants, rocks or other objects.")] = False,
+    attribution: Attribution = "",
+    ceiling: Ceiling = None,
+    seed: Seed = 0,
+    project: Project = Path("my-scenes"),
+    force: Force = False,
+) -> None:
+    """Make an open landscape from a height model."""
+    from aerialdojo_gen.imports import places
+
+    added = places.add_terrain(
+        name, dem, project, bbox=None if bbox is None else _box(bbox), size_m=size, cell_m=cell, water_m=water,
+        snow_m=snow, sand_m=sand, bare=bare, attribution=attribution, seed=seed, ceiling_m=ceiling, force=force,
+    )  # fmt: skip
+    _say([added], project)
+
+
+def _box(text: str) -> tuple[float, float, float, float]:
+    try:
+        west, south, east, north = (float(part) for part in text.replace(",", " ").split())
+    except ValueError:
+        raise typer.BadParameter(
+            f"--bbox {text[:60]!r}: must be WEST,SOUTH,EAST,NORTH, four numbers in degrees"
+        ) from None
+    return west, south, east, north
+
+
+def _say(added: list[Place], project: Path) -> None:
+    for place in added:
+        size = place.scene.bounds[1] - place.scene.bounds[0]
+        print(
+            f"{place.name}: {len(place.scene.instances):,} instances, {place.scene.n_triangles:,} triangles, "
+            f"{size[0]:.0f} x {size[1]:.0f} m, ceiling {place.scene.ceiling_m:.0f} m"
+        )
+        for line in place.said:
+            print(f"  {line}")
+    first = added[0]
+    print(f"next: {advice.command('annotate-draft', first.name, pipeline=first.pipeline)}")
+    print(f"then: {advice.command('run', first.pipeline, data=project / 'data')}")

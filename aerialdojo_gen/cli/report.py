@@ -1,0 +1,160 @@
+"""The command that tells what an evaluation gave."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import typer
+from typer.core import TyperCommand
+
+from aerialdojo_gen.base.errors import UsageError
+from aerialdojo_gen.base.text_table import terminal_width, wrapped
+from aerialdojo_gen.cli.common import Data, Json
+
+app = typer.Typer()
+
+_NUMBER = re.compile(r"\d+(\.\d+)?")
+
+
+class _Command(TyperCommand):
+    """Takes several numbers after one ``--radius``."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Repeat the option before every number that follows it."""
+        spread: list[str] = []
+        after = False
+        for arg in args:
+            number = _NUMBER.fullmatch(arg) is not None
+            if after and number and spread[-1] != "--radius":
+                spread.append("--radius")
+            spread.append(arg)
+            after = arg == "--radius" or (after and number)
+        return super().parse_args(ctx, spread)
+
+
+@app.command("report", cls=_Command)
+def report(
+    runs: Annotated[list[str] | None, typer.Argument(help="Runs of evaluate.  (default: all)")] = None,
+    data: Data = "data",
+    log: Annotated[
+        str | None,
+        typer.Option("--log", metavar="DIR|URL", help="Where evaluate wrote its log (--out).  (default: the "
+            "data directory)"),
+    ] = None,
+    profile: Annotated[
+        list[str] | None,
+        typer.Option("--profile", help="Success rule, repeatable: aerialdojo, aerialdojo-5m, uav-on, aerialvln, "
+                                       "openfly.  (default: the first two)"),
+    ] = None,
+    table: Annotated[
+        list[str] | None,
+        typer.Option("--table", help="Print these tables, repeatable: overall, results, partition, family, averages, "
+                                     "setting, goal, modality, radius, visits, difficulty, seen, conduct, type, "
+                                     "scene, all."),
+    ] = None,
+    radius: Annotated[
+        list[float] | None,
+        typer.Option("--radius", min=0.0, help="Success radii in metres for the radius table: --radius 1 3 "
+            "5 10.  (default: 3 5)"),
+    ] = None,
+    beside: Annotated[
+        Literal["paper"] | None, typer.Option("--beside", help="paper: add the paper's own results, from "
+            "its simulator.")
+    ] = None,
+    paired: Annotated[
+        bool, typer.Option("--paired", help="Compare two runs on the tasks that both have done.")
+    ] = False,
+    group: Annotated[
+        list[str] | None,
+        typer.Option("--group", help="Group runs under a heading, repeatable: --group open=qwen,phi --group "
+            "closed=gpt."),
+    ] = None,
+    intervals: Annotated[
+        bool, typer.Option("--intervals/--no-intervals", help="Print 95 % confidence intervals.")
+    ] = True,
+    floors: Annotated[
+        bool, typer.Option("--floors/--no-floors", help="Add the baselines stop, constant, random if they "
+            "did the same tasks.")
+    ] = True,
+    style: Annotated[
+        Literal["terminal", "markdown", "latex", "csv", "json"], typer.Option("--format", help="Output format.")
+    ] = "terminal",
+    as_json: Json = False,
+    by_scene: Annotated[bool, typer.Option("--by-scene", help="Print the table by scene too.")] = False,
+    out: Annotated[
+        Path | None, typer.Option("--out", help="Folder for report.html, tables, figures and metrics.csv.")
+    ] = None,
+    replays: Annotated[int, typer.Option("--replays", min=0, max=50, help="Number of tasks that report.html "
+        "replays.")] = 4,
+    frames: Annotated[bool, typer.Option("--frames", help="Render front views for the replays.")] = False,
+) -> None:  # fmt: skip
+    """Score runs of evaluate: SR, SR-view, OSR, SPL, DTS and CR as tables, figures or a page."""
+    from aerialdojo_gen.base.paper_figures import results
+    from aerialdojo_gen.benchmark import contents, score_rows
+    from aerialdojo_gen.benchmark.baselines import arranged, with_floors
+    from aerialdojo_gen.benchmark.episodes import runs as runs_there
+    from aerialdojo_gen.benchmark.paired import paired_tables
+    from aerialdojo_gen.benchmark.profiles import DEFAULT_PROFILES, profile_named
+    from aerialdojo_gen.benchmark.radii import DEFAULT_RADII_M, at_radius
+    from aerialdojo_gen.benchmark.runs import load_runs
+    from aerialdojo_gen.dataset.contents import release_scenes
+    from aerialdojo_gen.store.root import open_root
+
+    if as_json:
+        style = "json"
+    groups = _groups(group or [])
+    asked = [*(table or contents.DEFAULT), *(["scene"] if by_scene else [])]
+    names = contents.check_names(asked + (["radius"] if radius and not table else []))
+    rules = [profile_named(name) for name in dict.fromkeys(profile or DEFAULT_PROFILES)]
+    root, written = open_root(data), open_root(log or data)
+    if log is None and not runs_there(root):
+        release_scenes(root)  # a folder without either is the wrong one
+    named = load_runs(written, runs or ())
+    loaded = arranged(with_floors(written, named) if floors else named, groups)
+    wanted = contents.Wanted(
+        root, loaded, rules, tuple(radius or DEFAULT_RADII_M), intervals, results() if beside else ()
+    )
+    if style in ("csv", "json"):
+        further = [at_radius(rules[0], r) for r in radius or () if r not in {rule.radius_m for rule in rules}]
+        write = score_rows.as_csv if style == "csv" else score_rows.as_json
+        print(write(loaded, [*rules, *further], wanted.beside, wanted.partings), end="")
+    elif paired and table is None:
+        _show(paired_tables(named, rules), style)
+    else:
+        chosen = contents.report_tables(wanted, names)
+        _show([*chosen, *(paired_tables(named, rules) if paired else [])], style)
+        if lacking := contents.left_out(wanted, names):
+            typer.echo(lacking, err=True)
+        if table is None and style == "terminal":
+            others = ", ".join(name for name in (*contents.NAMES, "all") if name not in names)
+            print("\n".join(["", *wrapped(f"More with --table: {others}.", terminal_width())]))
+    if out is not None:
+        from aerialdojo_gen.benchmark import replay
+        from aerialdojo_gen.benchmark.report import write_report
+
+        shown = list(replay.replays(root, written, loaded, replay.choose_tasks(loaded, replays), frames))
+        made = write_report(out, wanted, shown)
+        typer.echo(f"{made[0]} and {len(made) - 1} more files", err=True)
+
+
+def _show(tables: Any, style: str) -> None:
+    from aerialdojo_gen.benchmark import formats
+
+    if style == "terminal":
+        width = terminal_width()
+        parts = [*(formats.as_text(table, width) for table in tables), formats.legend(tables)]
+        print("\n\n".join(filter(None, parts)))
+    else:
+        print("\n\n".join(formats.FORMATS[style](table) for table in tables))
+
+
+def _groups(given: list[str]) -> dict[str, list[str]]:
+    groups: dict[str, list[str]] = {}
+    for item in given:
+        heading, equals, names = item.partition("=")
+        if not equals or not heading.strip() or not names.strip():
+            raise UsageError(f"--group {item!r}: write heading=run,run")
+        groups.setdefault(heading.strip(), []).extend(name.strip() for name in names.split(","))
+    return groups

@@ -1,0 +1,232 @@
+"""Commands that make and picture sources: scenes of one's own, drafts of annotations, the gallery."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from aerialdojo_gen.base import cli_context as advice
+from aerialdojo_gen.base.errors import UsageError
+from aerialdojo_gen.base.text_table import terminal_width
+from aerialdojo_gen.cli.common import (
+    Data,
+    OneScene,
+    PipelineFile,
+    Quiet,
+    Scene,
+    SceneOption,
+    Scenes,
+    open_pipeline,
+    pipeline_file,
+    together,
+)
+
+if TYPE_CHECKING:
+    from aerialdojo_gen.imports.command import Added
+
+app = typer.Typer()
+
+
+def _number_or_auto(value: str | None) -> str | None:
+    """Take a number from 2 on, or ``auto``."""
+    if value is None or value == "auto" or (value.isascii() and value.isdigit() and 2 <= int(value[:9]) < 10**6):
+        return value
+    raise typer.BadParameter(f"{value[:40]!r} is neither auto nor a number from 2 on")
+
+
+@app.command("add-scene")
+def add_scene(
+    name: Annotated[str, typer.Argument(help="Name of the scene; with the suffix _1 it is out-of-distribution.")],
+    mesh: Annotated[Path, typer.Argument(help="GLB, glTF, OBJ, STL, PLY, 3DS, DAE or FBX file.")],
+    up: Annotated[str | None, typer.Option(help="The mesh's axis that points up: z or y.")] = None,
+    scale: Annotated[
+        float | None, typer.Option(help="Metres per unit of the mesh: 0.01 for centimetres.  (default: 1)")
+    ] = None,
+    annotations: Annotated[Path | None, typer.Option(help="Annotation file of the scene.")] = None,
+    project: Annotated[Path, typer.Option(help="Folder for your scenes and their pipeline.")] = Path("my-scenes"),
+    crop: Annotated[
+        tuple[float, float, float] | None, typer.Option(help="Keep a circle: x y radius, metres.")
+    ] = None,
+    box: Annotated[
+        tuple[float, float, float, float] | None, typer.Option(help="Keep a rectangle: x0 y0 x1 y1, metres.")
+    ] = None,
+    tiles: Annotated[
+        float | None, typer.Option(help="Cut the mesh into squares of this edge length in metres, one scene each.")
+    ] = None,
+    ceiling: Annotated[
+        float | None, typer.Option(help="Maximum flying height z, metres.  (default: 6 m above the highest point)")
+    ] = None,
+    names: Annotated[Path | None, typer.Option(help="CSV that names nodes: pattern,name,category,plural.")] = None,
+    light: Annotated[
+        str, typer.Option(help="Lighting of textures: sun (lit by the scene), baked (already in them) or auto.")
+    ] = "auto",
+    texture_px: Annotated[
+        int,
+        typer.Option(
+            "--texture-px", min=16, max=8192, help="Maximum texture side, pixels; larger textures are reduced."
+        ),
+    ] = 8192,
+    force: Annotated[bool, typer.Option("--force", help="Replace a scene of this name.")] = False,
+    show: Annotated[
+        bool, typer.Option("--list", help="List what the file contains, and guess its axis and scale; write nothing.")
+    ] = False,
+) -> None:
+    """Make a scene from your own mesh file."""
+    from aerialdojo_gen.imports import command
+
+    if show:
+        print("\n".join(command.list_mesh(mesh, up=up, scale=scale, names=names, width=terminal_width())))
+        return
+    if up is None:
+        raise UsageError(f"--up is missing: z or y; {advice.command('add-scene', name, mesh, '--list')} guesses it")
+    if tiles is not None and annotations is not None:
+        raise UsageError("--annotations are of one scene, --tiles make several: leave one of them out")
+    cut: dict[str, Any] = {"crop_m": crop, "box_m": box, "ceiling_m": ceiling, "names": names, "force": force}
+    cut |= {"light": light, "texture_px": texture_px}
+    scale = 1.0 if scale is None else scale
+    if tiles is not None:
+        made = command.add_tiles(name, mesh, project, tiles, up=up, scale=scale, watch=_told, **cut)
+        print(f"{len(made):,} scenes in one frame")
+    else:
+        made = [command.add_scene(name, mesh, project, up=up, scale=scale, annotations=annotations, **cut)]
+        _told(made[0])
+    first = next((added for added in made if not added.annotations.exists()), None)
+    if first is not None:
+        print(f"next: {advice.command('annotate-draft', first.scene.name, pipeline=first.pipeline)}")
+    print(f"then: {advice.command('run', made[0].pipeline, data=project / 'data')}")
+
+
+def _told(added: Added) -> None:
+    scene = added.scene
+    size = scene.bounds[1] - scene.bounds[0]
+    print(
+        f"{scene.name}: {len(scene.instances):,} instances, {scene.n_triangles:,} triangles, "
+        f"{size[0]:.0f} x {size[1]:.0f} m, ceiling {scene.ceiling_m:.0f} m"
+    )
+    for line in added.repairs.lines:
+        print(f"  {line}")
+
+
+@app.command("annotate-draft")
+def annotate_draft(
+    name: OneScene = None,
+    scene: SceneOption = None,
+    landmarks: Annotated[
+        int | None, typer.Option(min=1, help="Number of landmarks.  (default: the paper's, else 1 or 2)")
+    ] = None,
+    objects: Annotated[
+        str | None,
+        typer.Option(
+            metavar="N|auto",
+            callback=_number_or_auto,
+            help="Number of objects; auto takes up to 20.  (default: the paper's, else auto)",
+        ),
+    ] = None,
+    centre: Annotated[
+        tuple[float, float] | None,
+        typer.Option(help="Centre of the core area, x y in metres.  (default: the landmarks' centre)"),
+    ] = None,
+    within: Annotated[float | None, typer.Option(min=1, help="Radius of the core area, metres.")] = None,
+    core_share: Annotated[
+        float, typer.Option(min=0, max=1, help="Fraction of the objects that lie in the core area.")
+    ] = 1.0,
+    min_share_elevated: Annotated[
+        float, typer.Option(min=0, max=1, help="Minimum fraction of objects in the core 3 m or more above ground.")
+    ] = 0.0,
+    max_plants: Annotated[int, typer.Option(min=0, help="Maximum number of objects per category of plants.")] = 3,
+    max_per_category: Annotated[
+        int | None,
+        typer.Option(
+            min=1,
+            help="Maximum number of objects per other category.  (default: 5; more if a scene has few)",
+        ),
+    ] = None,
+    landmark: Annotated[list[str] | None, typer.Option(help="Node to use as a landmark; repeatable.")] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Seed; the same seed gives the same draft.")] = 0,
+    pipeline: PipelineFile = None,
+    force: Annotated[bool, typer.Option("--force", help="Overwrite an existing file.")] = False,
+    keep_objects: Annotated[
+        bool,
+        typer.Option("--keep-objects", help="Keep the file's objects and names, and write their descriptions again."),
+    ] = False,
+    quiet: Quiet = False,
+) -> None:
+    """Draft a scene's annotations, for you to check and commit."""
+    from aerialdojo_gen.annotations.draft import Choice
+    from aerialdojo_gen.cli.picking import given_scene, pick_scene
+    from aerialdojo_gen.pipeline.progress import Reporter
+    from aerialdojo_gen.pipeline.runner import chosen_scenes, known_scenes
+    from aerialdojo_gen.studio.annotate.drafting import draft_scene
+
+    config, roots = open_pipeline(pipeline_file(pipeline), Path("data"))
+    given = given_scene(name, scene)
+    scene = pick_scene(given, known_scenes(roots.recipes) if given else chosen_scenes(config, roots))
+    choice = Choice(
+        centre_m=centre,
+        within_m=within,
+        core_share=core_share,
+        aloft_share=min_share_elevated,
+        most_vegetation=max_plants,
+        most=max_per_category,
+    )
+    path = draft_scene(
+        scene, config, roots, n_landmarks=landmarks,
+        n_objects=int(objects) if objects and objects != "auto" else objects,
+        choice=choice, landmarks=tuple(landmark or ()), seed=seed, force=force, keep_objects=keep_objects,
+        reporter=Reporter(quiet=quiet),
+    )  # fmt: skip
+    print(path)
+
+
+@app.command("gallery")
+def gallery(
+    scenes: Scenes = None,
+    out: Annotated[Path, typer.Option("--out", help="Folder for the pictures.")] = Path("docs/gallery"),
+    scene: Scene = None, pipeline: PipelineFile = None,
+    props: Annotated[bool, typer.Option("--props/--no-props", help="Draw the sheets of props too.")] = True,
+    small: Annotated[bool, typer.Option("--small", help="Write JPEGs 1280 pixels wide, for web pages.")] = False,
+    references: Annotated[bool, typer.Option(
+        "--references", help="Draw the objects' reference images with their descriptions instead.")] = False,
+    data: Data = "data",
+) -> None:  # fmt: skip
+    """Draw every prop and every scene as contact sheets."""
+    scene = together(scenes, scene)
+    if references:
+        _reference_sheets(out, scene, data, "jpg" if small else "png")
+        return
+    from aerialdojo_gen.pipeline import runner
+    from aerialdojo_gen.rendering.gallery import props_sheet, scene_sheet, write_picture
+    from aerialdojo_gen.scenes.catalogue import load_catalogue
+    from aerialdojo_gen.scenes.layouts.build import build_scene
+    from aerialdojo_gen.store.atomic import make_folder
+
+    config, roots = open_pipeline(pipeline, out)
+    chosen = runner.chosen_scenes(config, roots, scene)
+    make_folder(out)  # before anything is drawn
+    catalogue = load_catalogue(roots.scene_assets)
+    suffix, width = ("jpg", 1280) if small else ("png", None)
+    for name in chosen:
+        sheet = scene_sheet(build_scene(roots.recipes / f"{name}.toml", catalogue))
+        print(write_picture(sheet, out, f"{name}.{suffix}", width))
+    if props:
+        landmarks = [name for name in catalogue if catalogue[name].kind == "landmark"]
+        for title, names in (("props", catalogue.targets), ("landmarks", landmarks)):
+            size = 120 if small else 200
+            print(write_picture(props_sheet(catalogue, names, size), out, f"{title}.{suffix}"))
+
+
+def _reference_sheets(out: Path, scene: list[str] | None, data: str, suffix: str) -> None:
+    from aerialdojo_gen.dataset.pictures import pictured_objects, scenes_with_pictures
+    from aerialdojo_gen.rendering.gallery import write_picture
+    from aerialdojo_gen.rendering.reference_sheets import reference_sheets
+    from aerialdojo_gen.store.atomic import make_folder
+    from aerialdojo_gen.store.root import open_root
+
+    root = open_root(data)
+    scenes = scenes_with_pictures(root, scene)
+    make_folder(out)
+    for name in scenes:
+        for k, sheet in enumerate(reference_sheets(pictured_objects(root, name))):
+            print(write_picture(sheet, out, f"references-{name}-{k + 1}.{suffix}"))

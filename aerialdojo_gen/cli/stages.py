@@ -1,0 +1,136 @@
+"""One command a stage, and ``run``."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import asdict
+from typing import Annotated
+
+import typer
+
+from aerialdojo_gen.base.text_table import terminal_width
+from aerialdojo_gen.cli.common import (
+    Address,
+    Data,
+    ExecutorName,
+    Force,
+    Json,
+    PipelineArgument,
+    PipelineFile,
+    Quiet,
+    Replace,
+    Scene,
+    Scenes,
+    Verbose,
+    Workers,
+    open_pipeline,
+    print_json,
+    run_chosen,
+    run_until,
+    together,
+)
+from aerialdojo_gen.pipeline.registry import BY_NAME, STAGES
+
+app = typer.Typer()
+
+# Stages whose command has options of its own.
+_WITH_OPTIONS = ("plan", "split", "render")
+
+
+def _stage_command(name: str) -> Callable[..., None]:
+    def command(
+        scenes: Scenes = None, data: Data = "data", scene: Scene = None, pipeline: PipelineFile = None,
+        workers: Workers = None, force: Force = False, quiet: Quiet = False, verbose: Verbose = False,
+        executor: ExecutorName = "local", address: Address = None,
+    ) -> None:  # fmt: skip
+        run_until(
+            name, data=data, scene=together(scenes, scene), pipeline=pipeline, workers=workers, force=force,
+            quiet=quiet, verbose=verbose, executor=executor, address=address,
+        )  # fmt: skip
+
+    return command
+
+
+for _stage in STAGES:
+    if _stage.name not in _WITH_OPTIONS:
+        app.command(_stage.name, help=_stage.help)(_stage_command(_stage.name))
+
+
+@app.command("plan", help=BY_NAME["plan"].help)
+def plan(
+    scenes: Scenes = None, data: Data = "data", scene: Scene = None, pipeline: PipelineFile = None,
+    workers: Workers = None, force: Force = False, quiet: Quiet = False, verbose: Verbose = False,
+    every: Annotated[
+        bool, typer.Option("--all", help="Plan all candidates, including those that the release does not need.")
+    ] = False,
+    executor: ExecutorName = "local", address: Address = None,
+) -> None:  # fmt: skip
+    """Plan reference trajectories, with what they need upstream."""
+    run_until(
+        "plan", data=data, scene=together(scenes, scene), pipeline=pipeline, workers=workers, force=force,
+        quiet=quiet, verbose=verbose, executor=executor, address=address, search="all" if every else None,
+    )  # fmt: skip
+
+
+@app.command("split", help=BY_NAME["split"].help)
+def split(
+    scenes: Scenes = None, data: Data = "data", scene: Scene = None, pipeline: PipelineFile = None,
+    workers: Workers = None, force: Force = False, quiet: Quiet = False, verbose: Verbose = False,
+    replace: Replace = False,
+    executor: ExecutorName = "local", address: Address = None,
+) -> None:  # fmt: skip
+    """Write the release, with what it needs upstream."""
+    run_until(
+        "split", data=data, scene=together(scenes, scene), pipeline=pipeline, workers=workers, force=force,
+        quiet=quiet, verbose=verbose, replace=replace, executor=executor, address=address,
+    )  # fmt: skip
+
+
+@app.command("status")
+def status(
+    scenes: Scenes = None, data: Data = "data", scene: Scene = None, pipeline: PipelineFile = None,
+    as_json: Json = False,
+) -> None:  # fmt: skip
+    """Say which scenes of each stage are fresh, stale or missing; run and write nothing."""
+    from aerialdojo_gen.dataset.status import pipeline_status, status_table
+
+    found = pipeline_status(pipeline, data, scenes=together(scenes, scene))
+    if as_json:
+        print_json([asdict(one) for one in found])
+    else:
+        print("\n".join(status_table(found).lines(terminal_width())))
+
+
+@app.command("run")
+def run(
+    pipeline: PipelineArgument, scenes: Scenes = None,
+    data: Data = "data", scene: Scene = None,
+    workers: Workers = None, force: Force = False, quiet: Quiet = False, verbose: Verbose = False,
+    replace: Replace = False,
+    stats: Annotated[bool, typer.Option("--stats", help="Print the tables of stats at the end.")] = False,
+    executor: ExecutorName = "local", address: Address = None,
+) -> None:  # fmt: skip
+    """Run a pipeline's stages, from recipes and annotations to the release."""
+    from aerialdojo_gen.pipeline.runner import stages_named
+
+    config, roots = open_pipeline(pipeline, data)
+    stages = stages_named(config.stages)
+    forced = [stage.name for stage in stages] if force else []
+    run_chosen(
+        stages,
+        config,
+        roots,
+        together(scenes, scene),
+        workers,
+        forced,
+        quiet,
+        replace=replace,
+        executor=executor,
+        address=address,
+        verbose=verbose,
+    )
+    if stats:
+        from aerialdojo_gen.cli import release
+
+        # In this process: a second one would take a second to begin.
+        release.stats(data=data, pipeline=pipeline)

@@ -1,0 +1,145 @@
+"""``validate``: check a whole release again."""
+
+from __future__ import annotations
+
+import contextlib
+import shlex
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from aerialdojo_gen.base.cli_context import command
+from aerialdojo_gen.base.shipped import home
+from aerialdojo_gen.cli.common import (
+    Address,
+    ExecutorName,
+    Json,
+    PipelineFile,
+    Quiet,
+    Scene,
+    Scenes,
+    Workers,
+    kept,
+    pipeline_file,
+    print_json,
+    together,
+)
+
+if TYPE_CHECKING:
+    from aerialdojo_gen.dataset.validate.parts import Release
+    from aerialdojo_gen.pipeline.progress import Reporter
+
+app = typer.Typer()
+_MANY_DIGITS = 10
+
+
+@app.command("validate")
+def validate(
+    scenes: Scenes = None,
+    data: Annotated[
+        str,
+        typer.Option(
+            "--data", metavar="DIR|URL", envvar="AERIALDOJO_DATA", callback=kept,
+            help="Data directory or s3://bucket/prefix; its release is checked.",
+        ),
+    ] = "data",
+    elsewhere: Annotated[
+        str | None,
+        typer.Option("--release", metavar="DIR|URL", help="Another release to check.  (default: the one in --data)"),
+    ] = None,
+    scene: Scene = None,
+    sample: Annotated[
+        int | None, typer.Option("--sample", min=0, help="Number of routes per scene to check again with "
+            "FCL.  (default: all)")
+    ] = None,
+    pictures: Annotated[
+        str, typer.Option("--pictures", metavar="N|all", help="Number of reference images per scene to "
+            "render again and compare.")
+    ] = "all",
+    meshes: Annotated[
+        Path | None, typer.Option("--meshes", help="Folder of the meshes.  (default: meshes/ next to the release)")
+    ] = None,
+    no_meshes: Annotated[
+        bool, typer.Option("--no-meshes", help="Skip the checks that need meshes; they are reported as not checked.")
+    ] = False,
+    report: Annotated[
+        Path | None, typer.Option("--report", help="Write every fault to a .jsonl, .json, .csv or .parquet file.")
+    ] = None,
+    max_faults: Annotated[
+        int, typer.Option("--max-faults", min=0, help="Maximum number of faults printed per check.")
+    ] = 10,
+    verbose: Annotated[
+        bool, typer.Option("--verbose", "-v", help="Print one line per check instead of one per table.")
+    ] = False,
+    pipeline: PipelineFile = None,
+    workers: Workers = None,
+    executor: ExecutorName = "local",
+    address: Address = None,
+    quiet: Quiet = False,
+    as_json: Json = False,
+) -> None:  # fmt: skip
+    """Check a release independently, from its Parquet files and meshes, and name every faulty row."""
+    from aerialdojo_gen.base.config.pipeline import load_pipeline
+    from aerialdojo_gen.base.errors import UsageError
+    from aerialdojo_gen.base.text_table import terminal_width
+    from aerialdojo_gen.dataset import validate as validation
+    from aerialdojo_gen.dataset.build import release_pipeline
+    from aerialdojo_gen.dataset.provenance import pipeline_names
+    from aerialdojo_gen.dataset.validate.parts import release_of
+    from aerialdojo_gen.dataset.validate.report import check_format
+    from aerialdojo_gen.pipeline.progress import Reporter
+
+    for name in scenes or ():
+        if "/" in name or Path(name).is_dir():
+            raise UsageError(f"{name} is no scene: name another release with --release {shlex.quote(name)}")
+    if report is not None:
+        check_format(report)
+    if pictures != "all" and not (pictures.isascii() and pictures.isdigit() and len(pictures) < _MANY_DIGITS):
+        raise UsageError(f"--pictures {pictures}: a number, or all")
+    release = release_of(elsewhere or data)
+    file = pipeline or release_pipeline(release.root, release.folder, reads=True)
+    definitions = load_pipeline(pipeline_file(file))
+    if definitions.scene_assets is None:
+        definitions = definitions.model_copy(update={"scene_assets": home() / "scene_assets"})
+    asked = validation.Asked(
+        release=release,
+        scenes=tuple(together(scenes, scene) or ()),
+        meshes=meshes.absolute() if meshes else None,
+        use_meshes=not no_meshes,
+        sample=sample,
+        pictures=None if pictures == "all" else int(pictures),
+        pipeline=definitions,
+    )
+    reporter = Reporter(quiet=quiet)
+    names = pipeline_names(release.root, release.folder)
+    if names and definitions.name not in names:
+        reporter.line(
+            f"not the pipeline of the release, which is --pipeline {' or '.join(names)}: {definitions.name}"
+        )
+    _name_orphans(release, reporter)
+    found = validation.validate(asked, workers=workers, executor=executor, address=address, reporter=reporter)
+    if report is not None:
+        validation.write_report(found.faults, report)
+    if as_json:
+        print_json(found.as_json())
+    else:
+        if not quiet:
+            print("\n".join(found.table_lines(terminal_width(), verbose=verbose)))
+        print("\n".join([*found.fault_lines(max_faults), found.verdict()]))
+    if found.faults:
+        raise SystemExit(1)
+
+
+def _name_orphans(release: Release, reporter: Reporter) -> None:
+    """Warn of recordings beside the release whose trajectories it does not have."""
+    from aerialdojo_gen.base.errors import StoreError
+    from aerialdojo_gen.dataset.recordings import orphans
+
+    # Of a release that stands alone nobody knows the recordings; a damaged part is a fault that the checks name.
+    with contextlib.suppress(StoreError):
+        if release.folder and (gone := orphans(release.root)):
+            mend = command("render", "--prune", data=release.root.url)
+            reporter.line(
+                f"media/ has {len(gone):,} recordings of trajectories that the release does not have: {mend}"
+            )

@@ -1,0 +1,1 @@
+"""What users load: building a release, its card, readers, statistics, and `validate`."""

@@ -1,0 +1,307 @@
+"""Run a whole pipeline, or stages with what they need upstream, from sources to the release.
+
+Nothing heavy is imported before something runs: the command line imports this for its ``--help`` too.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+from collections.abc import Iterable, Sequence
+from dataclasses import replace as replaced
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from aerialdojo_gen.base import cli_context as advice
+from aerialdojo_gen.base.cli_context import PROGRAM
+from aerialdojo_gen.base.errors import AssetError, ConfigError, UsageError
+from aerialdojo_gen.base.shipped import home
+
+if TYPE_CHECKING:
+    from aerialdojo_gen.base.config.pipeline import Pipeline
+    from aerialdojo_gen.pipeline.freshness import Limits
+    from aerialdojo_gen.pipeline.progress import Reporter
+    from aerialdojo_gen.pipeline.stage import Roots, Stage
+    from aerialdojo_gen.pipeline.summary import StageSummary
+    from aerialdojo_gen.store.root import DataRoot
+
+log = logging.getLogger(__name__)
+
+DEFAULT_PIPELINE = "aerialdojo-200k.toml"
+
+
+def run_pipeline(
+    pipeline: str | Path | Pipeline | None = None,
+    data: str | Path | DataRoot = "data",
+    *,
+    stages: Sequence[str] | None = None,
+    scenes: Sequence[str] | None = None,
+    workers: int | None = None,
+    executor: str = "local",
+    address: str | None = None,
+    force: Iterable[str] = (),
+    replace: bool = False,
+    limits: Limits | None = None,
+    reporter: Reporter | None = None,
+) -> list[StageSummary]:
+    """Bring the tables of a pipeline up to date; the twin of ``aerialdojo-gen run`` and of the stages' commands.
+
+    Parameters
+    ----------
+    pipeline : str, Path or Pipeline, optional
+        A TOML file, the name of one that comes with the program (``"smoke"``), or what
+        `aerialdojo_gen.base.config.pipeline.load_pipeline` read of one; where absent that of the release in the data
+        directory, else the paper's.
+    data : str, Path or DataRoot
+        The data directory.
+    stages : sequence of str, optional
+        Stages to run, each with what it needs upstream, e.g. ``["plan"]``; the pipeline's own where absent.
+    scenes : sequence of str, optional
+        Names or globs; the pipeline's own where absent.
+    workers : int, optional
+        Processes; all cores where absent. With 1 everything runs in this one.
+    executor : str
+        ``"local"`` or ``"ray"``.
+    address : str, optional
+        ``HOST:PORT`` of a Ray cluster; one on this machine where absent.
+    force : iterable of str
+        Stages whose shards are computed even where they are fresh.
+    replace : bool
+        Whether scenes of the release that another pipeline made may be lost.
+    limits : Limits, optional
+        How much of the last stage is computed now; all of it where absent.
+    reporter : Reporter, optional
+        Shows progress and summaries; nothing is shown where absent.
+
+    Returns
+    -------
+    list of StageSummary
+        One a stage, in their order: rows in and out, reasons, shards computed, seconds.
+
+    Raises
+    ------
+    AerialDojoError
+        An expected failure, in one line that names the thing and the mend; finished shards stay.
+    """
+    from aerialdojo_gen.pipeline.registry import upstream
+    from aerialdojo_gen.pipeline.runner import stages_named
+
+    config, roots = open_pipeline(pipeline, data)
+    if stages is None:
+        chosen = stages_named(config.stages)
+    else:
+        needed = {stage.name for asked in stages_named(stages) for stage in upstream(asked.name)}
+        chosen = stages_named([*needed])
+    given = advice.given()
+    given = replaced(given, pipeline=str(pipeline) if isinstance(pipeline, (str, Path)) else given.pipeline)
+    given = replaced(given, data=str(data) if isinstance(data, (str, Path)) and str(data) != "data" else given.data)
+    with advice.as_given(given):
+        return run_stages(
+            chosen, config, roots, scenes, workers=workers, executor=executor, address=address, force=force,
+            reporter=reporter, limits=limits, replace=replace,
+        )  # fmt: skip
+
+
+def pipeline_file(given: str | Path | None = None) -> Path:
+    """Find a pipeline's file: as a path, else by its name among those that come with the program.
+
+    Parameters
+    ----------
+    given : str or Path, optional
+        A path, or a name such as ``smoke`` or ``smoke.toml``; the paper's pipeline where absent.
+
+    Returns
+    -------
+    Path
+        What is at that path goes before what has that name.
+
+    Raises
+    ------
+    ConfigError
+        There is neither; the message lists the names.
+    """
+    shipped = home() / "pipelines"
+    path = Path(given) if given else shipped / DEFAULT_PIPELINE
+    if path.is_file():
+        return path
+    if path.parent == Path() and (named := shipped / f"{path.name.removesuffix('.toml')}.toml").is_file():
+        return named
+    known = sorted(file.stem for file in shipped.glob("*.toml"))
+    beside = sorted(file.name for file in path.parent.glob("*.toml")) if path.parent.is_dir() else []
+    there = f"; there are {', '.join(beside)} in {path.parent}" if beside and path.parent != Path() else ""
+    raise ConfigError(f"no pipeline file {path}{there}; by name, as in {PROGRAM} run smoke: {', '.join(known)}")
+
+
+def release_pipeline(data: DataRoot, folder: str = "release", *, reads: bool = False) -> Path | None:
+    """Find the file of a release's pipeline, shipped or beside the data directory; None where there is no release.
+
+    Raises
+    ------
+    UsageError
+        Several pipelines made the release; or its pipeline's file is not found, and the caller does not only read.
+    """
+    from aerialdojo_gen.base.safe_parse import read_toml
+    from aerialdojo_gen.dataset.provenance import pipeline_names
+    from aerialdojo_gen.store.root import LocalRoot
+
+    names = pipeline_names(data, folder)
+    if len(names) > 1:
+        raise UsageError(
+            f"the release in {data} was made by pipelines {' and '.join(names)}: choose by --pipeline NAME"
+        )
+    for name in names:
+        shipped = home() / "pipelines" / f"{name}.toml"
+        if shipped.is_file():
+            return shipped
+        for file in sorted(data.path.parent.glob("*.toml")) if isinstance(data, LocalRoot) else ():
+            with contextlib.suppress(ConfigError, OSError):
+                if read_toml(file, ConfigError, finite=False).get("name") == name:
+                    return file
+        if not reads:
+            raise UsageError(f"the release in {data} was made by pipeline {name!r}: give its file, --pipeline FILE")
+    return None
+
+
+def open_pipeline(
+    pipeline: str | Path | Pipeline | None, data: str | Path | DataRoot, *, reads: bool = False
+) -> tuple[Pipeline, Roots]:
+    """Read the pipeline file and find the folders.
+
+    Parameters
+    ----------
+    pipeline : str, Path, Pipeline or None
+        The pipeline file as for `pipeline_file`, or what was read of one; None for that of the release in the data
+        directory, else the paper's.
+    data : str, Path or DataRoot
+        The data directory.
+    reads : bool
+        Nothing is written: where the file of the release's pipeline is not found, the paper's will do.
+
+    Returns
+    -------
+    Pipeline, Roots
+
+    Raises
+    ------
+    ConfigError
+        The file is missing or wrong.
+    UsageError
+        As for `release_pipeline`.
+    """
+    from aerialdojo_gen.base.config.pipeline import Pipeline, load_pipeline
+    from aerialdojo_gen.pipeline.stage import Roots
+    from aerialdojo_gen.store.root import open_root
+
+    data = open_root(data)
+    if pipeline is None:
+        pipeline = release_pipeline(data, reads=reads)
+    if not isinstance(pipeline, Pipeline):
+        pipeline = load_pipeline(pipeline_file(pipeline))
+    roots = Roots(
+        data=data,
+        scene_assets=(assets := pipeline.scene_assets or home() / "scene_assets"),
+        recipes=pipeline.recipes or assets / "scenes",
+        annotations=pipeline.annotations or home() / "annotations",
+    )
+    for key, folder in (("scene_assets", roots.scene_assets), ("recipes", roots.recipes)):
+        if not folder.is_dir():
+            raise ConfigError(f"no folder {folder}: set {key} in the pipeline file")
+    return pipeline, roots
+
+
+def run_stages(
+    stages: Sequence[Stage],
+    config: Pipeline,
+    roots: Roots,
+    scenes: Sequence[str] | None = None,
+    *,
+    workers: int | None = None,
+    executor: str = "local",
+    address: str | None = None,
+    force: Iterable[str] = (),
+    reporter: Reporter | None = None,
+    limits: Limits | None = None,
+    replace: bool = False,
+) -> list[StageSummary]:
+    """Run exactly these stages over the chosen scenes; after `split`, bring card and croissant.json up to date.
+
+    A scene without annotations is left out, with a warning that names the mend; the others are finished.
+
+    Parameters as for `run_pipeline`; `scenes` are names or globs, the pipeline's own where absent.
+
+    Raises
+    ------
+    AssetError
+        No scene has annotations, and nothing was run; or one that was asked for by its full name, or by a
+        pipeline that wants the paper's numbers, has none, and all others are finished.
+    UsageError
+        The release would lose scenes that another pipeline made, and `replace` is not given; nothing was run.
+    """
+    from aerialdojo_gen.dataset.provenance import check_replaced
+    from aerialdojo_gen.pipeline import runner
+    from aerialdojo_gen.pipeline.freshness import keep_footers
+    from aerialdojo_gen.pipeline.progress import Reporter
+    from aerialdojo_gen.store.known_footers import footers_known
+
+    reporter = reporter or Reporter(quiet=True)
+    names = runner.chosen_scenes(config, roots, scenes)
+    releases = any(stage.name == "split" for stage in stages)
+    left_out = runner.unready(stages, names, roots)
+    for line in left_out.values():
+        log.warning("left out: %s", line)
+    ready = [name for name in names if name not in left_out]
+
+    def prepare() -> None:
+        if releases and not replace:
+            check_replaced(roots.data, config, names, whole=not scenes)
+
+    def finish() -> None:
+        if releases:
+            _finish_release(config, roots.data, names, ready, not scenes, reporter)
+
+    with footers_known(roots.data):
+        summaries = runner.run(
+            stages, names, config, roots, workers=workers, executor=executor, address=address, force=force,
+            reporter=reporter, limits=limits, prepare=prepare, finish=finish,
+        )  # fmt: skip
+        if any(summary.computed for summary in summaries):
+            keep_footers(stages, ready, roots)
+    exact = config.split.paper_counts or config.annotate_import.paper_counts
+    owed = [line for name, line in left_out.items() if exact or name in (scenes or config.scenes)]
+    if owed:
+        raise AssetError("\n".join([*owed, "the other scenes are finished"]))
+    return summaries
+
+
+def _finish_release(
+    config: Pipeline, data: DataRoot, scenes: list[str], released: list[str], whole: bool, reporter: Reporter
+) -> None:
+    """Bring what stands beside the tables of a release up to date with them."""
+    from aerialdojo_gen.dataset.contents import CARD, CROISSANT, files_there, prune_release
+    from aerialdojo_gen.dataset.provenance import RECORD, record_makers
+    from aerialdojo_gen.store.memo import keep, key_of, known
+
+    if whole:
+        # The whole pipeline was asked for: the release holds its scenes and no others.
+        for gone in prune_release(data, scenes):
+            reporter.line(f"release: {gone} is no scene of this pipeline, removed")
+    record_makers(data, config, released)
+
+    def as_it_is() -> str:
+        return key_of(data, [*files_there(data), RECORD, CARD, CROISSANT], "documents")
+
+    if not known(as_it_is()):
+        from aerialdojo_gen.dataset.card import write_card
+        from aerialdojo_gen.dataset.croissant import write_croissant
+
+        write_croissant(data)
+        write_card(data)
+        keep(as_it_is())
+    reporter.line(f"release: {data.at('release')}")
+
+
+def default_workers() -> int:
+    """Count the cores that this process may use."""
+    from aerialdojo_gen.pipeline.executors.local import own_cores
+
+    return own_cores()

@@ -1,0 +1,211 @@
+"""What a release consists of, and whether all of it is there: tables, splits, rows, bytes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path, PurePosixPath
+
+import pyarrow as pa
+
+from aerialdojo_gen.base.cli_context import command, given
+from aerialdojo_gen.base.errors import StoreError
+from aerialdojo_gen.base.names import choose_scenes
+from aerialdojo_gen.store import schemas
+from aerialdojo_gen.store import shards as store
+from aerialdojo_gen.store.layout import LAYOUT, is_plain, partition, shard_name
+from aerialdojo_gen.store.root import DataRoot, LocalRoot, Where, open_root
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table of the release."""
+
+    spec: schemas.TableSpec  # Its columns
+    about: str  # What a row is
+    split: bool = False  # Whether it lies in a folder a split
+
+
+TABLES = {
+    "tasks": Table(
+        schemas.TASKS,
+        "One row a task instance: what an agent may know. It holds no coordinate of the target and no route.",
+        split=True,
+    ),
+    "routes": Table(
+        schemas.ROUTES,
+        "One row a navigation task: the goal and the reference trajectory, for the evaluator.",
+        split=True,
+    ),
+    "objects": Table(schemas.RELEASE_OBJECTS, "One row a target object, with the picture that image goals show."),
+    "landmarks": Table(schemas.LANDMARKS, "One row a landmark."),
+    "anchors": Table(schemas.RELEASE_ANCHORS, "One row a viewpoint; three an object, one selected as the goal."),
+    "viewpoints": Table(
+        schemas.VIEWPOINTS, "One row a place at 1 m from an object from which it is seen: where a person would stop."
+    ),
+    "scenes": Table(schemas.SCENES, "One row a scene."),
+}
+
+# Keys of `LAYOUT` that make up a scene's part of the release.
+SHARDS = tuple(name for name, place in LAYOUT.items() if place.in_release)
+FOLDER = "release"
+CARD = f"{FOLDER}/README.md"
+CROISSANT = f"{FOLDER}/croissant.json"
+
+
+def part_name(name: str, scene: str, folder: str = FOLDER) -> str:
+    """Return where a scene's part of one of `SHARDS` lies, relative to the data root; `folder` is the release's."""
+    return f"{folder}/{shard_name(name, scene).partition('/')[2]}".lstrip("/")
+
+
+def parts_there(where: Where, folder: str = FOLDER) -> dict[str, list[str]]:
+    """List what a release holds: the scenes, by name, that each of `SHARDS` has a part of."""
+    root = open_root(where)
+    found: dict[str, list[str]] = {}
+    for name in SHARDS:
+        folders = sorted({part_name(name, scene, folder).rpartition("/")[0] for scene in ("X_0", "X_1")})
+        stems = (PurePosixPath(path).stem for at in folders for path in root.list(at, "part-*.parquet"))
+        found[name] = sorted(filter(is_plain, (stem.removeprefix("part-") for stem in stems)))
+    return found
+
+
+def files_there(where: Where) -> list[str]:
+    """List what `TABLES` of a release are made of: names of files, relative to the data root."""
+    return [part_name(name, scene) for name, scenes in parts_there(where).items() for scene in scenes]
+
+
+def scenes_there(where: Where, folder: str = FOLDER) -> list[str]:
+    """List the scenes that any table of a release has a part of, by name; none where there is no release.
+
+    A scene that lacks a part is listed too, so that whoever reads it is told.
+    """
+    return sorted(set().union(*parts_there(where, folder).values()))
+
+
+def prune_release(where: Where, scenes: Sequence[str]) -> list[str]:
+    """Remove the parts of all other scenes from the release; returns the names of those removed."""
+    root = open_root(where)
+    gone = [scene for scene in scenes_there(root) if scene not in scenes]
+    for scene in gone:
+        for name in SHARDS:
+            root.delete(part_name(name, scene))
+    return gone
+
+
+def release_scenes(where: Where, folder: str = FOLDER) -> list[str]:
+    """List the scenes of a release, by name; one that lacks a part is listed too."""
+    root = open_root(where)
+    scenes = scenes_there(root, folder)
+    if not scenes:
+        raise no_release(root, folder)
+    return scenes
+
+
+def scenes_in_release(where: Where, patterns: Sequence[str] | None = None, folder: str = FOLDER) -> list[str]:
+    """Resolve names and globs to scenes of a release, by name; all of them where there are no patterns."""
+    return choose_scenes(patterns, release_scenes(where, folder))
+
+
+def no_release(where: Where, folder: str = FOLDER) -> StoreError:
+    """Say where no release is, what lacks there, and what to do: an error to be raised."""
+    root = open_root(where)
+    place = root.url if folder in ("", FOLDER) else root.at(folder)
+    return StoreError(
+        f"there is no release in {place}: {_lack(root, folder)}; "
+        f"name its folder with --data, or make one with {_making()}"
+    )
+
+
+def _making() -> str:
+    """Say what makes the dataset here: a wheel brings no Makefile."""
+    here = (Path(__file__).resolve().parents[2] / "Makefile").is_file()
+    return "make dataset" if here else f"{given().program} run aerialdojo-200k"
+
+
+def _lack(root: DataRoot, folder: str) -> str:
+    if isinstance(root, LocalRoot):
+        at = root.path if folder == FOLDER else root.path / folder
+        if not at.exists():
+            return "the folder does not exist"
+        if not at.is_dir():
+            return "it is a file, not a folder"
+    names = {PurePosixPath(path).name for path in root.list(folder, "*")}
+    there = [table for table in TABLES if table in names]
+    if there:
+        return f"{', '.join(there)} without a file part-<scene>.parquet"
+    if folder == FOLDER:
+        return "its folder release holds no tables" if root.exists(FOLDER) else "it has no folder release"
+    tables = list(TABLES)
+    return f"it has no folder release, nor {', '.join(tables[:-1])} or {tables[-1]}"
+
+
+def check_release(where: Where, scenes: list[str] | None = None) -> list[str]:
+    """Check from the footers that the release's parts are there, whole and of one run."""
+    root = open_root(where)
+    there = parts_there(root)
+    known = sorted(set().union(*there.values())) if scenes is None else scenes
+    if not known:
+        raise no_release(root)
+    wrong = [line for scene in known for line in _faults(root, scene, [n for n in SHARDS if scene in there[n]])]
+    if wrong:
+        raise StoreError("\n".join(wrong))
+    return known
+
+
+def _faults(root: DataRoot, scene: str, present: list[str]) -> list[str]:
+    mend = f"run {command('split', scene=scene)}"
+    if not present:
+        return [f"{scene} is not in the release in {root}: {mend}"]
+    lines, prints = [], {}
+    for name in SHARDS:
+        part = part_name(name, scene)
+        if name not in present:
+            lines.append(f"{root.at(part)} is missing: {mend}")
+            continue
+        try:
+            prints[name] = store.read_info(root, part).fingerprint
+        except StoreError as error:
+            lines.append(str(error))
+    if len(set(prints.values())) > 1:
+        lines.append(f"the release's parts of {scene} in {root} are of different runs: {mend} --force")
+    return lines
+
+
+def counts(root: Where, scenes: list[str]) -> dict[str, dict[str, int]]:
+    """Count the rows of every table and split of these scenes, from the footers."""
+    found: dict[str, dict[str, int]] = {name: {} for name in TABLES}
+    for scene in scenes:
+        for name in SHARDS:
+            table, split = table_and_split(name, scene)
+            rows = found[table]
+            rows[split] = rows.get(split, 0) + store.count_rows(root, name, scene)
+    return {
+        table: {s: rows[s] for s in (*schemas.SUBSETS, "all") if s in rows} for table, rows in found.items()
+    }  # fmt: skip
+
+
+def sizes(where: Where, scenes: list[str]) -> dict[str, int]:
+    """Bytes of every table of these scenes."""
+    root, total = open_root(where), dict.fromkeys(TABLES, 0)
+    for scene in scenes:
+        for name in SHARDS:
+            total[table_and_split(name, scene)[0]] += root.size(part_name(name, scene))
+    return total
+
+
+def table_and_split(name: str, scene: str) -> tuple[str, str]:
+    """Return the release's table and split that a scene's shard belongs to: ``"tasks/train"`` of U_Mall_1 is
+    ``("tasks", "ood_train")``, ``"release/objects"`` is ``("objects", "all")``.
+    """  # noqa: D205
+    first, second = name.split("/")
+    return (second, "all") if first == "release" else (first, f"{partition(scene)}_{second}")
+
+
+def meaning(field: pa.Field) -> str:
+    """What a column means, from its metadata."""
+    return field.metadata[b"meaning"].decode()
+
+
+def unit(field: pa.Field) -> str:
+    """A column's unit, from its metadata; empty where it has none."""
+    return field.metadata.get(b"unit", b"").decode()

@@ -1,0 +1,103 @@
+"""One episode, as the evaluator sees it: where the body is, how far from the goal, and whether it is over."""
+
+from __future__ import annotations
+
+import math
+
+from aerialdojo_gen.geometry.angles import wrap_one_rad
+from aerialdojo_gen.geometry.motion import DISPLACEMENTS, TURN_RAD, TURNS
+from aerialdojo_gen.planning.flight_space import FlightSpace, Point
+from aerialdojo_gen.store.schemas import APPROACH, STOP
+
+# Plain numbers: numpy's scalars would cost more than the motion itself.
+_MOVES = [tuple(row) for row in DISPLACEMENTS.tolist()]
+_TURNS = TURNS.tolist()
+
+
+class Episode:
+    """An episode under way.
+
+    It ends by Stop, by a collision or with the last action of the budget (paper: termination), and by the first of
+    these that an action brings about: the last action may be a Stop or a collision, and is then judged as such. An
+    episode that starts in collision ends in collision at its first action, whichever that is, Stop too.
+    """
+
+    __slots__ = (
+        "_budget", "_goal", "_heading", "_space", "_start_yaw", "_starts_free", "distance_m", "horizontal_distance_m",
+        "min_distance_m", "min_horizontal_distance_m", "n_actions", "n_invalid", "n_refused", "path_length_m",
+        "position", "refused", "stop_called", "termination",
+    )  # fmt: skip
+
+    def __init__(
+        self, space: FlightSpace, start: tuple[float, float, float, float], goal: Point, action_budget: int
+    ) -> None:
+        if action_budget < 1:
+            raise ValueError(f"an episode has at least one action, not {action_budget}")
+        self._space, self._goal, self._budget = space, goal, action_budget
+        self.position: Point = (start[0], start[1], start[2])
+        self._start_yaw, self._heading = start[3], 0
+        self._starts_free = not space.in_collision(self.position)
+        self.n_actions = self.n_refused = self.n_invalid = 0
+        self.path_length_m = 0.0
+        self.min_distance_m = self.min_horizontal_distance_m = math.inf
+        self.termination: str | None = None
+        self.stop_called = self.refused = False
+        self._measure()
+
+    @property
+    def yaw_rad(self) -> float:
+        """Yaw, radians, in (-pi, pi], counted from the start's as `aerialdojo_gen.geometry.motion.replay` does."""
+        return wrap_one_rad(self._start_yaw + self._heading * TURN_RAD)
+
+    @property
+    def remaining_actions(self) -> int:
+        """Actions left, Stop included."""
+        return self._budget - self.n_actions
+
+    def success(self, radius_m: float) -> bool:
+        """Whether it ended with a Stop at most `radius_m` from the goal, without collision (paper: success)."""
+        return self.termination == "stop" and self.distance_m <= radius_m
+
+    def step(self, action: int | None) -> None:
+        """Spend an action."""
+        if self.termination is not None:
+            raise RuntimeError(f"the episode is over ({self.termination}): begin another")
+        if action is not None and not 0 <= action < APPROACH:
+            raise ValueError(f"actions are numbers from 0 to {APPROACH - 1}, not {action}")
+        self.n_actions += 1
+        self.refused = False
+        self.stop_called = action == STOP
+        if not self._starts_free:
+            self.termination = "collision"
+        elif action is None:
+            self.n_invalid += 1
+        elif action == STOP:
+            self.termination = "stop"
+        elif _TURNS[action]:
+            self._heading += _TURNS[action]
+        else:
+            self._move(action)
+        if self.termination is None and self.n_actions >= self._budget:
+            self.termination = "budget"
+
+    def _move(self, action: int) -> None:
+        ahead, left, up = _MOVES[action]
+        yaw = self._start_yaw + self._heading * TURN_RAD
+        cos, sin = math.cos(yaw), math.sin(yaw)
+        x, y, z = before = self.position
+        wanted = (x + cos * ahead - sin * left, y + sin * ahead + cos * left, z + up)
+        self.position, collision, self.refused = self._space.fly(before, wanted)
+        if self.refused:
+            self.n_refused += 1
+            return
+        self.path_length_m += math.dist(before, self.position)
+        self._measure()
+        if collision:
+            self.termination = "collision"
+
+    def _measure(self) -> None:
+        dx, dy, dz = (a - b for a, b in zip(self.position, self._goal, strict=True))
+        self.horizontal_distance_m = math.hypot(dx, dy)
+        self.distance_m = math.sqrt(dx * dx + dy * dy + dz * dz)
+        self.min_distance_m = min(self.min_distance_m, self.distance_m)
+        self.min_horizontal_distance_m = min(self.min_horizontal_distance_m, self.horizontal_distance_m)

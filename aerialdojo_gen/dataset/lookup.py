@@ -1,0 +1,227 @@
+"""Look into a release: one scene of it with its mesh, one task of it by its id."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
+from numpy.typing import NDArray
+
+from aerialdojo_gen.base.cli_context import command
+from aerialdojo_gen.base.errors import AssetError, StoreError, UsageError
+from aerialdojo_gen.base.names import closest, unknown
+from aerialdojo_gen.dataset.contents import release_scenes
+from aerialdojo_gen.planning.collision import collision_world
+from aerialdojo_gen.scenes.context import SEVERAL, open_scene
+from aerialdojo_gen.scenes.model import Scene
+from aerialdojo_gen.scenes.stored import mesh_copy
+from aerialdojo_gen.store import shards as store
+from aerialdojo_gen.store.root import Where, open_root
+
+_TASK_ID = re.compile(r"(?P<nav>(?P<scene>[A-Za-z0-9][A-Za-z0-9_-]*)-(?P<key>[0-9a-f]{12}))(?:-[si])?")
+_SIDES = ("train", "test")
+
+
+class ReleasedScene:
+    """One scene of a release; tables and mesh are read when they are first asked for.
+
+    Parameters
+    ----------
+    data : DataRoot, Path or str
+        The data root.
+    name : str
+        Name of the scene.
+
+    Raises
+    ------
+    UsageError
+        The release has no such scene; the message names those that it has.
+    StoreError
+        There is no release.
+    """
+
+    def __init__(self, data: Where, name: str) -> None:
+        self.root = open_root(data)
+        known = release_scenes(self.root)
+        if name not in known:
+            raise UsageError(unknown(f"the release in {self.root} has no scene", name, known, most=3))
+        self.name = name
+
+    @cached_property
+    def row(self) -> dict[str, Any]:
+        """The row of `scenes`."""
+        rows = self._rows("scenes")
+        if len(rows) != 1:
+            raise StoreError(
+                f"release/scenes has {len(rows)} rows of {self.name}: run {command('split', scene=self.name)}"
+            )
+        return rows[0]
+
+    @cached_property
+    def landmarks(self) -> list[dict[str, Any]]:
+        """Rows of `landmarks`."""
+        return self._rows("landmarks")
+
+    @cached_property
+    def objects(self) -> list[dict[str, Any]]:
+        """Rows of `objects`, reference images and all."""
+        return self._rows("objects")
+
+    @cached_property
+    def anchors(self) -> list[dict[str, Any]]:
+        """Rows of `anchors`."""
+        return self._rows("anchors")
+
+    def _rows(self, table: str) -> list[dict[str, Any]]:
+        return store.read_scene(self.root, f"release/{table}", self.name).to_pylist()
+
+    def both_sides(self, table: str, columns: Sequence[str] | None = None) -> pa.Table:
+        """Read ``tasks`` or ``routes`` of train and test together, with the column ``split`` (``id_train``, …)."""
+        parts = []
+        for side in _SIDES:
+            part = store.read_scene(self.root, f"{table}/{side}", self.name, columns)
+            split = f"{store.partition(self.name)}_{side}"
+            parts.append(part.append_column("split", pa.array([split] * part.num_rows, pa.string())))
+        return pa.concat_tables(parts)
+
+    @cached_property
+    def routes(self) -> pa.Table:
+        """All of `routes`, with the column ``split``."""
+        return self.both_sides("routes")
+
+    @property
+    def model(self) -> Scene:
+        """The scene's mesh, of its context: read again where that had to go.
+
+        Raises
+        ------
+        AssetError
+            The mesh is missing, leads out of the data directory, or is not the one that the release was made from.
+        """
+        told = self.row["mesh_path"]
+        try:
+            path = mesh_copy(self.root, told)
+        except FileNotFoundError:
+            raise AssetError(
+                f"the mesh {self.root.at(told)} is missing: run {command('build-scenes', scene=self.name)}"
+            ) from None
+        return open_scene(path, self.row["mesh_sha256"], SEVERAL).scene
+
+    def route(self, nav_id: str) -> dict[str, Any]:
+        """Return the row of `routes`, with ``split``; UsageError where there is none."""
+        found = self.routes.filter(pc.equal(self.routes["nav_id"], nav_id)).to_pylist()
+        if not found:
+            raise UsageError(unknown("no navigation task", nav_id, self.routes["nav_id"].to_pylist()))
+        return dict(found[0])
+
+    def instances(self, nav_id: str) -> list[dict[str, Any]]:
+        """Return the rows of `tasks` of a navigation task: semantic first, then image."""
+        tasks = self._tasks
+        rows = tasks.filter(pc.equal(tasks["nav_id"], nav_id)).to_pylist()
+        return sorted(rows, key=lambda row: row["modality"] != "semantic")
+
+    @cached_property
+    def _tasks(self) -> pa.Table:
+        return self.both_sides("tasks")
+
+    def object(self, object_id: int) -> dict[str, Any]:
+        """Return the row of `objects`; UsageError where there is none."""
+        for row in self.objects:
+            if row["object_id"] == object_id:
+                return row
+        raise UsageError(f"{self.name} has no object {object_id}")
+
+    def landmark(self, landmark_id: int) -> dict[str, Any]:
+        """Return the row of `landmarks`; UsageError where there is none."""
+        for row in self.landmarks:
+            if row["landmark_id"] == landmark_id:
+                return row
+        raise UsageError(f"{self.name} has no landmark {landmark_id}")
+
+    def clearance(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Distances from points (n, 3), world frame, to the nearest surface (n,), metres, by FCL."""
+        world = collision_world(self.model)
+        return np.array([world.distance_m(p) for p in points], dtype=np.float64)
+
+
+@dataclass(frozen=True)
+class FoundTask:
+    """What an id stands for.
+
+    Attributes
+    ----------
+    scene : ReleasedScene
+    nav_id : str
+    route : dict
+        The row of `routes`, with ``split``.
+    instances : list of dict
+        Its rows of `tasks`, semantic first.
+    """
+
+    scene: ReleasedScene
+    nav_id: str
+    route: dict[str, Any]
+    instances: list[dict[str, Any]]
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the rows that belong to the task: of `routes`, `tasks`, `objects`, `landmarks` and `scenes`."""
+        scene, route = self.scene, self.route
+        target = scene.object(route["target_object_id"])
+        return {
+            "nav_id": self.nav_id, "scene": scene.row, "tasks": self.instances, "route": route,
+            "target": target, "start_object": scene.object(route["start_object_id"]),
+            "landmark": scene.landmark(target["landmark_id"]),
+        }  # fmt: skip
+
+
+def find_task(data: Where, task_id: str) -> FoundTask:
+    """Find a task of the release.
+
+    Parameters
+    ----------
+    data : DataRoot, Path or str
+        The data root.
+    task_id : str
+        A ``task_id`` or a ``nav_id``.
+
+    Returns
+    -------
+    FoundTask
+
+    Raises
+    ------
+    UsageError
+        There is no such task; the message names the nearest one, or how to list them.
+    StoreError
+        There is no release, or a part of it is missing or damaged.
+    """
+    root = open_root(data)
+    known = release_scenes(root)
+    match = _TASK_ID.fullmatch(task_id)
+    listing = f'tasks are listed by pandas.read_parquet({f"{root}/release/tasks"!r})["task_id"]'
+    if match is None:
+        example = ReleasedScene(root, known[0]).routes["nav_id"].to_pylist()
+        like = f", e.g. {min(example)}-s" if example else ""
+        raise UsageError(
+            f"{task_id!r} is no task id: <scene>-<12 hexadecimal digits>, or with -s or -i{like}; {listing}"
+        )
+    scene = ReleasedScene(root, match["scene"])
+    ids = scene.routes["nav_id"].to_pylist()
+    nav_id = match["nav"]
+    if nav_id not in ids:
+        near = closest(nav_id, ids, cutoff=0.0)
+        hint = f"the nearest is {near[0]}; " if near else ""
+        raise UsageError(f"no task {task_id!r} in the release of {scene.name}: {hint}{listing}")
+    instances = scene.instances(nav_id)
+    if not instances:
+        raise StoreError(
+            f"release/tasks has no instance of {nav_id}, which release/routes has: "
+            f"run {command('split', scene=scene.name)}"
+        )
+    return FoundTask(scene, nav_id, scene.route(nav_id), instances)

@@ -1,0 +1,205 @@
+"""A release in Python: its tables, scenes, meshes, pictures and recordings, and any task by its id."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+from numpy.typing import NDArray
+
+from aerialdojo_gen.base.errors import UsageError
+from aerialdojo_gen.base.names import unknown
+from aerialdojo_gen.base.pictures import decode_rgb
+from aerialdojo_gen.dataset.contents import scenes_in_release
+from aerialdojo_gen.dataset.lookup import FoundTask, ReleasedScene, find_task
+from aerialdojo_gen.rendering.reader import Recording, read_recording
+from aerialdojo_gen.scenes.model import Scene
+from aerialdojo_gen.store import shards as store
+from aerialdojo_gen.store.root import DataRoot, open_root
+from aerialdojo_gen.store.schemas import SUBSETS
+
+TABLES = ("tasks", "routes", "objects", "landmarks", "anchors", "viewpoints", "scenes")
+_SPLIT = ("tasks", "routes")
+# Each keeps its mesh once that is read, 10 to 100 MB.
+_MOST_SCENES = 4
+
+
+class Release:
+    """A release that was made, or copied here; everything is read when it is asked for.
+
+    Parameters
+    ----------
+    data : str, Path or DataRoot
+        The data directory, in which ``release/`` lies, and beside it ``meshes/`` and ``media/``.
+
+    Attributes
+    ----------
+    scenes : list of str
+        Names of its scenes, sorted.
+
+    Raises
+    ------
+    StoreError
+        There is no release.
+    """
+
+    def __init__(self, data: str | Path | DataRoot) -> None:
+        self._data = open_root(data)
+        self.scenes = scenes_in_release(self._data)
+        self._scene = lru_cache(maxsize=_MOST_SCENES)(lambda name: ReleasedScene(self._data, name))
+
+    def __repr__(self) -> str:
+        return f"<release in {self._data}, {len(self.scenes)} scenes>"
+
+    def table(
+        self,
+        name: str,
+        *,
+        split: str | Sequence[str] | None = None,
+        scene: str | Sequence[str] | None = None,
+        columns: Sequence[str] | None = None,
+    ) -> pa.Table:
+        """Read a table.
+
+        Parameters
+        ----------
+        name : str
+            ``tasks``, ``routes``, ``objects``, ``landmarks``, ``anchors`` or ``scenes``.
+        split : str or sequence of str, optional
+            Of ``id_train``, ``id_test``, ``ood_train``, ``ood_test``; all where absent. For tasks and routes.
+        scene : str or sequence of str, optional
+            Names or globs; all where absent.
+        columns : sequence of str, optional
+            Read these alone.
+
+        Returns
+        -------
+        pyarrow.Table
+            The columns of docs/release-format.md; tasks and routes with ``split`` besides. Ordered by scene and key.
+            ``.to_pandas()`` makes a DataFrame of it.
+
+        Raises
+        ------
+        UsageError
+            There is no table, split, scene or column of that name.
+        StoreError
+            A part is missing or damaged.
+        """
+        if name not in TABLES:
+            raise UsageError(unknown("no table", name, TABLES))
+        splits = _names(split) or SUBSETS
+        for one in splits:
+            if one not in SUBSETS:
+                raise UsageError(unknown("no split", one, SUBSETS))
+        if split is not None and name not in _SPLIT:
+            raise UsageError(f"{name} is one table, not split: leave split out")
+        key = f"{name}/train" if name in _SPLIT else f"release/{name}"
+        schema = store.LAYOUT[key].spec.schema
+        wanted = list(columns) if columns is not None else None
+        with_split = name in _SPLIT and (wanted is None or "split" in wanted)
+        read = None if wanted is None else [column for column in wanted if column != "split" or name not in _SPLIT]
+        for column in read or ():
+            if column not in schema.names:
+                raise UsageError(unknown(f"no column of {name}", column, schema.names))
+        parts = []
+        for scene_name in scenes_in_release(self._data, _names(scene)):
+            if name not in _SPLIT:
+                parts.append(store.read_scene(self._data, key, scene_name, read))
+                continue
+            for side in ("train", "test"):
+                subset = f"{store.partition(scene_name)}_{side}"
+                if subset in splits:
+                    part = store.read_scene(self._data, f"{name}/{side}", scene_name, read)
+                    if with_split:
+                        part = part.append_column("split", pa.array([subset] * part.num_rows, pa.string()))
+                    parts.append(part)
+        if not parts:
+            raise UsageError(f"no scene that was asked for has a part in {', '.join(splits)}")
+        table = pa.concat_tables(parts)
+        return table if wanted is None else table.select(wanted)
+
+    def tasks(
+        self, *, split: str | Sequence[str] | None = None, scene: str | Sequence[str] | None = None
+    ) -> pa.Table:
+        """Read the task instances: what an agent may know; parameters as for `table`."""
+        return self.table("tasks", split=split, scene=scene)
+
+    def routes(
+        self, *, split: str | Sequence[str] | None = None, scene: str | Sequence[str] | None = None
+    ) -> pa.Table:
+        """Read the navigation tasks: goal and reference trajectory, for the evaluator; parameters as for `table`."""
+        return self.table("routes", split=split, scene=scene)
+
+    def objects(self, *, scene: str | Sequence[str] | None = None) -> pa.Table:
+        """Read the objects, reference images (PNG bytes) and all."""
+        return self.table("objects", scene=scene)
+
+    def landmarks(self, *, scene: str | Sequence[str] | None = None) -> pa.Table:
+        """Read the landmarks."""
+        return self.table("landmarks", scene=scene)
+
+    def anchors(self, *, scene: str | Sequence[str] | None = None) -> pa.Table:
+        """Read the anchors."""
+        return self.table("anchors", scene=scene)
+
+    def task(self, task_id: str) -> FoundTask:
+        """Find a task by its ``task_id`` or ``nav_id``; UsageError where there is none, with the nearest."""
+        return find_task(self._data, task_id)
+
+    def scene(self, name: str) -> ReleasedScene:
+        """Open a scene; UsageError where there is none, with the nearest."""
+        opened: ReleasedScene = self._scene(name)
+        return opened
+
+    def mesh(self, name: str) -> Scene:
+        """Read a scene's mesh: named instances with their triangles, metres, world frame.
+
+        Raises
+        ------
+        UsageError
+            There is no such scene.
+        AssetError
+            The mesh is missing, or is not the one that the release was made from.
+        """
+        return self.scene(name).model
+
+    def picture(self, task_id: str) -> NDArray[np.uint8] | None:
+        """Return the picture of a task's target, (H, W, 3) uint8, sRGB; None where the target has none."""
+        found = self.task(task_id)
+        return decode_rgb(found.scene.object(found.route["target_object_id"])["reference_image"])
+
+    def recorded(self) -> list[str]:
+        """List the ``nav_id`` of the trajectories that were rendered, sorted."""
+        return sorted(path.split("/")[-2] for path in open_root(self._data).list("media", "*/*/recording.json"))
+
+    def recording(self, task_id: str) -> Recording:
+        """Open the recording of a task's reference trajectory; RenderError where it was not rendered."""
+        found = self.task(task_id)
+        return read_recording(self._data.local_copy(f"media/{found.scene.name}/{found.nav_id}"))
+
+
+def open_release(data: str | Path | DataRoot = "data") -> Release:
+    """Open a release.
+
+    Parameters
+    ----------
+    data : str, Path or DataRoot
+        The data directory.
+
+    Returns
+    -------
+    Release
+
+    Raises
+    ------
+    StoreError
+        There is no release.
+    """
+    return Release(data)
+
+
+def _names(given: str | Sequence[str] | None) -> tuple[str, ...]:
+    return () if given is None else (given,) if isinstance(given, str) else tuple(given)

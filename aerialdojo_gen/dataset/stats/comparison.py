@@ -1,0 +1,210 @@
+"""A table that sets our figures beside the paper's, and what it looks like on a terminal, in Markdown and in CSV."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aerialdojo_gen.base import text_table
+from aerialdojo_gen.base.text_table import TextTable
+
+Figure = int | float | None
+_PAPERS = "paper's"
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column of figures."""
+
+    name: str  # Heading
+    unit: str = ""  # Unit of the figures, empty for counts
+    exact: bool = True
+    digits: int = 1  # Of a measure, after the point
+
+    def show(self, figure: Figure) -> str:
+        """Format a figure; a dash where there is none."""
+        if figure is None:
+            return "–"
+        return f"{figure:,}" if isinstance(figure, int) else f"{figure:,.{self.digits}f}"
+
+
+@dataclass(frozen=True)
+class Row:
+    """Our figures of a thing, and the paper's where it has them (None where not), a figure a column."""
+
+    name: str
+    ours: tuple[Figure, ...]
+    paper: tuple[Figure, ...]
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """A table with a title."""
+
+    title: str  # What it shows
+    key: str  # Heading of the rows' names
+    columns: tuple[Column, ...]
+    rows: tuple[Row, ...]
+    notes: tuple[str, ...] = ()  # What must be known to read it
+
+    @property
+    def unlike(self) -> int:
+        """How many figures that are to be the paper's are not."""
+        return sum(len(self._differing(row)) for row in self.rows)
+
+    @property
+    def compared(self) -> int:
+        """How many figures that are to be the paper's there are."""
+        return sum(
+            column.exact and paper is not None
+            for row in self.rows
+            for column, paper in zip(self.columns, row.paper, strict=True)
+        )
+
+    def _differing(self, row: Row) -> list[int]:
+        return [
+            k
+            for k, (column, ours, paper) in enumerate(zip(self.columns, row.ours, row.paper, strict=True))
+            if column.exact and paper is not None and ours != paper
+        ]
+
+    def _beside(self, k: int) -> bool:
+        """Whether the paper's figures of a column have a column of their own."""
+        return not self.columns[k].exact and any(row.paper[k] is not None for row in self.rows)
+
+    def _heads(self) -> list[str]:
+        heads = [self.key]
+        for k, column in enumerate(self.columns):
+            heads += [column.name, _PAPERS] if self._beside(k) else [column.name]
+        return heads
+
+    def _cells(self, row: Row, bracket: bool = False) -> list[str]:
+        differing, cells = self._differing(row), [row.name]
+        for k, (ours, paper) in enumerate(zip(row.ours, row.paper, strict=True)):
+            show = self.columns[k].show
+            if self._beside(k):
+                cells += [show(ours), show(paper)]
+            else:
+                cells.append(show(ours) + (f" (paper: {show(paper)})" if bracket and k in differing else ""))
+        return cells
+
+    def terminal(self, width: int | None = None) -> list[str]:
+        """Lines for a terminal of so many columns; below a row the figures in which the paper differs."""
+        rows = []
+        for row in self.rows:
+            rows.append(self._cells(row))
+            if differing := self._differing(row):
+                below = ["  in the paper"]
+                for k, paper in enumerate(row.paper):
+                    below += ["", ""] if self._beside(k) else [self.columns[k].show(paper) if k in differing else ""]
+                rows.append(below)
+        stub, *heads = self._heads()
+        columns = [text_table.Column(head, joined=head == _PAPERS) for head in heads]
+        named = [(name, cells) for name, *cells in rows]
+        return TextTable(stub, columns, named, self.title, self._verdict()).lines(width)
+
+    def _verdict(self) -> list[str]:
+        if not self.compared:
+            return [*self.notes]
+        if not self.unlike:
+            return [*self.notes, f"All {self.compared:,} counts are the paper's."]
+        return [*self.notes, f"{self.unlike:,} of {self.compared:,} counts are not the paper's."]
+
+    def markdown(self) -> list[str]:
+        """Lines of Markdown; a count that is not the paper's has the paper's in brackets."""
+        heads = self._heads()
+        lines = [f"### {self.title}", "", "| " + " | ".join(heads) + " |", "|---|" + "---:|" * (len(heads) - 1)]
+        lines += ["| " + " | ".join(self._cells(row, bracket=True)) + " |" for row in self.rows]
+        return [*lines, "", *self._verdict()]
+
+    def as_json(self) -> dict[str, Any]:
+        """Return title, notes, units by column, and a row's figures by column, ours and the paper's."""
+        names = [column.name for column in self.columns]
+        rows = [
+            {"name": row.name, "ours": dict(zip(names, row.ours, strict=True)), "paper": None}
+            | ({} if set(row.paper) == {None} else {"paper": dict(zip(names, row.paper, strict=True))})
+            for row in self.rows
+        ]
+        units = {column.name: column.unit for column in self.columns}
+        return {"title": self.title, "key": self.key, "units": units, "rows": rows, "notes": self._verdict()}
+
+    def records(self) -> list[list[str]]:
+        """One record a figure: table, row, column, unit, ours, paper; empty where there is none."""
+        return [
+            [self.title, row.name, column.name, column.unit, *("" if f is None else repr(f) for f in (ours, paper))]
+            for row in self.rows
+            for column, ours, paper in zip(self.columns, row.ours, row.paper, strict=True)
+        ]
+
+
+def quantile(values: NDArray[np.float64], q: float) -> Figure:
+    """Quantile of the values that are known, None without any."""
+    known = values[np.isfinite(values)]
+    return float(np.quantile(known, q)) if len(known) else None
+
+
+def own_table(
+    title: str,
+    key: str,
+    columns: tuple[Column, ...],
+    rows: list[tuple[str, tuple[Figure, ...]]],
+    notes: tuple[str, ...] = (),
+) -> Comparison:
+    """Make a table that the paper has nothing of."""
+    none: tuple[Figure, ...] = (None,) * len(columns)
+    return Comparison(title, key, columns, tuple(Row(name, ours, none) for name, ours in rows), notes)
+
+
+@dataclass(frozen=True)
+class Listing:
+    """A table of words, as the paper prints it."""
+
+    title: str  # What it shows
+    heads: tuple[str, ...]  # Headings; the first column names the rows
+    rows: tuple[tuple[str, ...], ...]
+    notes: tuple[str, ...] = ()  # What must be known to read it
+
+    def terminal(self, width: int | None = None) -> list[str]:
+        """Lines for a terminal of so many columns."""
+        columns = [text_table.Column(head, words=True) for head in self.heads[1:]]
+        named = [(name, cells) for name, *cells in self.rows]
+        return TextTable(self.heads[0], columns, named, self.title, self.notes).lines(width)
+
+    def markdown(self) -> list[str]:
+        """Lines of Markdown."""
+        lines = [f"### {self.title}", "", "| " + " | ".join(self.heads) + " |", "|---" * len(self.heads) + "|"]
+        return [*lines, *("| " + " | ".join(row) + " |" for row in self.rows), "", *self.notes]
+
+    def as_json(self) -> dict[str, Any]:
+        """Return title, notes, and the cells of each row by their heading."""
+        rows = [dict(zip(self.heads, row, strict=True)) for row in self.rows]
+        return {"title": self.title, "key": self.heads[0], "rows": rows, "notes": [*self.notes]}
+
+    def records(self) -> list[list[str]]:
+        """One record a cell, as `Comparison.records` has them; all of it is the paper's but the last row."""
+        return [
+            [self.title, row[0], head, "", *((cell, "") if row is self.rows[-1] else ("", cell))]
+            for row in self.rows
+            for head, cell in zip(self.heads[1:], row[1:], strict=True)
+        ]
+
+
+def as_csv(tables: Sequence[Comparison | Listing]) -> str:
+    """Write tables as one CSV text in long form: a line a figure."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(["table", "row", "column", "unit", "ours", "paper"])
+    for table in tables:
+        writer.writerows(table.records())
+    return text.getvalue()
+
+
+def as_markdown(tables: Sequence[Comparison | Listing]) -> str:
+    """Write tables one below the other as Markdown."""
+    return "\n\n".join("\n".join(table.markdown()).rstrip() for table in tables) + "\n"

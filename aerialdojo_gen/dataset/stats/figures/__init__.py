@@ -1,0 +1,35 @@
+"""Figures of a release, as PNG and SVG: what it is made of, lengths, detours, difficulty, categories, names, maps."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from aerialdojo_gen.dataset.stats.difficulty import read_tasks
+from aerialdojo_gen.dataset.stats.figures.charts import composition, detours, lengths
+from aerialdojo_gen.dataset.stats.figures.cloud import categories, names
+from aerialdojo_gen.dataset.stats.figures.difficulty import difficulty
+from aerialdojo_gen.dataset.stats.figures.maps import maps
+from aerialdojo_gen.dataset.stats.figures.shares import shares
+from aerialdojo_gen.dataset.stats.figures.style import Routes, read_routes, save
+from aerialdojo_gen.store.root import Where, open_root
+
+__all__ = ["draw_figures"]
+
+
+def draw_figures(data: Where, scenes: Sequence[str], folder: Path) -> list[Path]:
+    """Draw all figures."""
+    root = open_root(data)
+    routes: Routes = read_routes(root, scenes)
+    tasks = read_tasks(root, scenes)
+    figures = {
+        "composition": composition(routes),
+        "shares": shares(routes),
+        "lengths": lengths(routes),
+        "detours": detours(routes),
+        **({"difficulty": difficulty(tasks)} if tasks.told else {}),
+        "categories": categories(root, scenes),
+        "names": names(root, scenes),
+        "maps": maps(root, scenes),
+    }
+    return [path for name, figure in figures.items() for path in save(figure, folder, name)]

@@ -1,0 +1,7 @@
+"""`validate`: a whole release checked again from its Parquet files and scene meshes alone."""
+
+from aerialdojo_gen.dataset.validate.registry import Fault, Outcome
+from aerialdojo_gen.dataset.validate.report import Report, write_report
+from aerialdojo_gen.dataset.validate.run import Asked, validate
+
+__all__ = ["Asked", "Fault", "Outcome", "Report", "validate", "write_report"]

@@ -1,0 +1,206 @@
+"""Checks of anchors: their ranks, where they look, how far the surfaces are, and whether the body can be there."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from aerialdojo_gen.dataset.validate.foreign_keys import sound
+from aerialdojo_gen.dataset.validate.registry import Finding, check
+from aerialdojo_gen.dataset.validate.rows import Rows, SceneData
+from aerialdojo_gen.dataset.validate.scene_mesh import scene_mesh
+from aerialdojo_gen.geometry.angles import wrap_angle_rad, yaw_towards
+from aerialdojo_gen.geometry.part_visibility import FRONT_RAD
+from aerialdojo_gen.geometry.surface import Surface
+from aerialdojo_gen.pipeline.scoring.ensemble import SCORERS
+from aerialdojo_gen.pipeline.scoring.geometric import FACTORS, WEIGHTS
+from aerialdojo_gen.pipeline.scoring.recognisability import FRONT_WEIGHT, TELLS_WEIGHT, clarity
+from aerialdojo_gen.pipeline.stages.work.anchor_choice import SLACK_M
+
+_SAME_M = 1e-4
+_SAME_RAD = 1e-6
+_SAME_SCORE = 1e-9
+# Anchors are marched to the wanted distance to a tenth of a millimetre; this is what a definition of 1 m bears.
+_STANDOFF_M = 1e-3
+
+
+@check("anchors", after=("duplicate_key",))
+def anchor_rank(_data: SceneData, rows: Rows) -> Iterator[Finding]:
+    """Ranks of an object's anchors count from 0, the better score first, but for a person's choice."""
+    ids, ranks, score = rows.ints("object_id"), rows.ints("anchor_id"), rows.floats("score")
+    by_hand = np.asarray(rows.texts("selected_by"), dtype=object) == "human"
+    for object_id in np.unique(ids):
+        own = np.flatnonzero(ids == object_id)
+        own = own[np.argsort(ranks[own], kind="stable")]
+        for wanted, row in enumerate(own.tolist()):
+            before = own[wanted - 1] if wanted else row
+            if ranks[row] != wanted:
+                yield Finding(row, f"rank {ranks[row]}", f"rank {wanted}")
+                break
+            if score[row] > score[before] and not by_hand[before]:
+                yield Finding(row, f"score {score[row]:.6g}", f"{score[before]:.6g} at most, the rank before")
+
+
+@check("anchors")
+def anchor_visibility(data: SceneData, rows: Rows) -> Iterator[Finding]:
+    """An anchor sees enough of its object, by its own account."""
+    least, seen = data.pipeline.anchor_sample.min_visible_fraction, rows.floats("visible_fraction")
+    for row in np.flatnonzero(~((seen >= least) & (seen > 0) & (seen <= 1))):
+        yield Finding(int(row), f"visible_fraction = {seen[row]:.6g}", f"{least:g} to 1")
+
+
+@check("anchors")
+def anchor_score(data: SceneData, rows: Rows) -> Iterator[Finding]:
+    """An anchor's score is what its parts make of it: each from 0 to 1, weighed as the pipeline says."""
+    names = (*WEIGHTS, *FACTORS)
+    parts = rows.floats(*(f"part_{name}" for name in names))
+    for row, k in zip(*np.nonzero(~((parts >= 0) & (parts <= 1))), strict=True):
+        yield Finding(int(row), f"part_{names[k]} = {parts[row, k]:.6g}", "0 to 1")
+    weights = data.pipeline.anchor_sample.weights
+    asked = {name: getattr(weights, name) for name in SCORERS}
+    scores = {name: rows.floats(f"score_{name}") for name in SCORERS}
+    geometric = parts[:, : len(WEIGHTS)] @ np.array([*WEIGHTS.values()])
+    known = rows.floats("part_tells", "part_front")
+    for row, k in zip(*np.nonzero((known < 0) | (known > 1)), strict=True):
+        yield Finding(int(row), f"{('part_tells', 'part_front')[k]} = {known[row, k]:.6g}", "0 to 1, or null")
+    share = np.where(np.isnan(known), 0.0, [TELLS_WEIGHT, FRONT_WEIGHT])
+    geometric = geometric * (1.0 - share.sum(axis=1)) + (share * np.nan_to_num(known)).sum(axis=1)
+    framed, unhindered = parts[:, len(WEIGHTS) :].T
+    unoccluded, level = (parts[:, names.index(name)] for name in ("unoccluded", "level"))
+    geometric = geometric * clarity(unoccluded, framed, 1.0 - unhindered, level)
+    by_hand = np.asarray(rows.texts("selected_by"), dtype=object) == "human"
+    for row, score in enumerate(rows.floats("score")):
+        own = {name: values[row] for name, values in scores.items() if np.isfinite(values[row])}
+        uncalled = sorted(name for name in own if not asked[name] and not by_hand[row])
+        total = sum(asked[name] for name in own)
+        wanted = sum(asked[name] * value for name, value in own.items()) / total if total else 0.0
+        if uncalled:
+            yield Finding(row, f"score_{uncalled[0]} = {own[uncalled[0]]:.6g}", "null: the scorer was not asked")
+        elif "geometric" in own and abs(own["geometric"] - geometric[row]) > _SAME_SCORE:
+            yield Finding(row, f"score_geometric = {own['geometric']:.6g}", f"{geometric[row]:.6g} by its parts")
+        elif not by_hand[row] and asked["geometric"] and "geometric" not in own:
+            yield Finding(row, "score_geometric is null", f"{geometric[row]:.6g} by its parts")
+        # What a person placed was compared with nothing: it has the geometric score alone.
+        elif min(abs(score - s) for s in (wanted, *([geometric[row]] if by_hand[row] else []))) > _SAME_SCORE:
+            yield Finding(row, f"score = {score:.6g}", f"{wanted:.6g} by its parts")
+
+
+@check("anchors", needs=("objects", "mesh"), after=("unknown_object",))
+def anchor_front(data: SceneData, rows: Rows) -> Iterator[Finding]:
+    """An anchor says how far off its object's front it is; a goal more than 60 degrees off says why."""
+    scene, objects = scene_mesh(data).scene, data["objects"]
+    item = objects.find("object_id", rows.column("object_id"))
+    nodes, off = objects.texts("mesh_node"), rows.floats("off_front_rad")
+    reasons, selected = rows.texts("no_front_reason"), rows.floats("selected") == 1.0
+    places = rows.floats("x_m", "y_m", "z_m")
+    for row, k in enumerate(item.tolist()):
+        if k < 0 or nodes[k] not in scene or not np.isfinite(places[row]).all():
+            continue
+        anatomy = scene[str(nodes[k])].anatomy
+        fronts = () if anatomy is None else anatomy.fronts_rad
+        away = places[row] - scene[str(nodes[k])].centroid
+        azimuth = np.arctan2(away[1], away[0])
+        found = min((abs(float(wrap_angle_rad(azimuth - front))) for front in fronts), default=np.nan)
+        if np.isnan(found) != np.isnan(off[row]) or abs(found - off[row]) > _SAME_RAD:
+            yield Finding(row, f"off_front_rad = {off[row]:.6g}", f"{found:.6g}")
+        elif bool(reasons[row]) != bool(selected[row] and found > FRONT_RAD):
+            wanted = "a reason: it is not seen from its front" if not reasons[row] else "null"
+            yield Finding(row, f"no_front_reason = {reasons[row]!r}", wanted)
+
+
+@check("anchors", needs=("objects",), after=("unknown_object",))
+def anchor_step(data: SceneData, rows: Rows) -> Iterator[Finding]:
+    """A selected anchor steps back as far as its object's picture was taken, in centimetres."""
+    back, most = rows.floats("step_back_m"), data.pipeline.anchor_sample.step_back_m
+    item = data["objects"].find("object_id", rows.column("object_id"))
+    selected, stored = rows.floats("selected") == 1.0, data["objects"].floats("step_back_m")
+    for row, k in enumerate(item.tolist()):
+        wanted = min(back[row], data.pipeline.reference_images.step_back_m)
+        if not 0.0 <= back[row] <= most or abs(back[row] * 100.0 - round(back[row] * 100.0)) > _SAME_M:
+            yield Finding(row, f"step_back_m = {back[row]:.6g}", f"0 to {most:g}, in centimetres")
+        elif k >= 0 and selected[row] and np.isfinite(stored[k]) and abs(stored[k] - wanted) > _SAME_SCORE:
+            yield Finding(row, f"step_back_m = {back[row]:.6g}", f"{stored[k]:g}, as far as its picture was taken")
+
+
+@check("viewpoints", needs=("objects", "mesh"), after=("viewpoint_object",))
+def viewpoint_place(data: SceneData, rows: Rows) -> Iterator[Finding]:
+    """A viewpoint is at the standoff from its object's surface and faces its centre; numbers count from 0."""
+    scene, objects, wanted = scene_mesh(data).scene, data["objects"], data.pipeline.anchor_sample.standoff_m
+    item = objects.find("object_id", rows.column("object_id"))
+    place, yaw, number = rows.floats("x_m", "y_m", "z_m"), rows.floats("yaw_rad"), rows.ints("viewpoint_id")
+    centre, nodes = objects.floats("x_m", "y_m", "z_m"), objects.texts("mesh_node")
+    for k in np.unique(item[item >= 0]).tolist():
+        own = np.flatnonzero((item == k) & np.isfinite(place).all(axis=1))
+        if nodes[k] not in scene or not len(own):
+            continue
+        distance = Surface.of(scene[str(nodes[k])]).distance_m(place[own])
+        off = np.abs(wrap_angle_rad(yaw[own] - yaw_towards(place[own], centre[k])))
+        for n, row in enumerate(own.tolist()):
+            if abs(distance[n] - wanted) > _STANDOFF_M:
+                yield Finding(row, f"{distance[n]:.4f} m from the object's surface", f"{wanted:g} m")
+            elif off[n] > _SAME_RAD:
+                yield Finding(row, f"yaw_rad = {yaw[row]:.6g}", "the yaw that faces the object's centre")
+            elif number[row] != n:
+                yield Finding(row, f"viewpoint_id = {number[row]}", f"{n}")
+
+
+@check("viewpoints", needs=("mesh",), after=("viewpoint_place",))
+def viewpoint_clearance(data: SceneData, rows: Rows) -> Iterator[Finding]:
+    """A body can be at a viewpoint, inside the flight volume."""
+    world, radius = scene_mesh(data).world, data.pipeline.embodiment.radius_m
+    low, high = scene_mesh(data).scene.bounds
+    for row, place in enumerate(rows.floats("x_m", "y_m", "z_m")):
+        if not (np.isfinite(place).all() and ((place >= low) & (place <= high)).all()):
+            yield Finding(row, "a place outside the flight volume", "one inside")
+        elif world.sphere_in_collision(place, radius):
+            yield Finding(row, "a place in collision", "a free one")
+
+
+@check("anchors", needs=("objects",), after=("unknown_object",))
+def anchor_yaw(data: SceneData, rows: Rows) -> Iterator[Finding]:
+    """An anchor faces its object's centre, unless a person placed it."""
+    objects = data["objects"]
+    item = objects.find("object_id", rows.column("object_id"))
+    by_hand = np.asarray(rows.texts("selected_by"), dtype=object) == "human"
+    fit = np.flatnonzero(sound(data, "objects", item) & ~by_hand)
+    centre = objects.floats("x_m", "y_m", "z_m")[item[fit]]
+    yaw = yaw_towards(rows.floats("x_m", "y_m", "z_m")[fit], centre)
+    off = np.abs(wrap_angle_rad(rows.floats("yaw_rad")[fit] - yaw))
+    for k in np.flatnonzero(off > _SAME_RAD):
+        yield Finding(int(fit[k]), f"{rows.floats('yaw_rad')[fit[k]]:.6f} rad", f"{yaw[k]:.6f} rad")
+
+
+@check("anchors", needs=("objects", "mesh"), after=("unknown_object",))
+def anchor_surface(data: SceneData, rows: Rows) -> Iterator[Finding]:
+    """An anchor is 1 m from its object's surface (about that, where a person placed it), and says how far."""
+    scene = scene_mesh(data).scene
+    by_hand = np.asarray(rows.texts("selected_by"), dtype=object) == "human"
+    slack = np.where(by_hand, SLACK_M + _SAME_M, _STANDOFF_M)
+    wanted = data.pipeline.anchor_sample.standoff_m
+    nodes = data["objects"].texts("mesh_node")
+    item = data["objects"].find("object_id", rows.column("object_id"))
+    place, stored = rows.floats("x_m", "y_m", "z_m"), rows.floats("surface_distance_m")
+    for k in np.unique(item[item >= 0]).tolist():
+        if nodes[k] not in scene:
+            continue
+        own = np.flatnonzero((item == k) & np.isfinite(place).all(axis=1))
+        found = Surface.of(scene[str(nodes[k])]).distance_m(place[own]) if len(own) else np.empty(0)
+        for row, distance in zip(own.tolist(), found.tolist(), strict=True):
+            if abs(distance - wanted) > slack[row]:
+                yield Finding(row, f"{distance:.4f} m from the object's surface", f"{wanted:g} m")
+            elif abs(distance - stored[row]) > _SAME_M:
+                yield Finding(row, f"surface_distance_m = {stored[row]:.6g}", f"{distance:.6g}")
+
+
+@check("anchors", needs=("mesh",), after=("anchor_surface",))
+def anchor_clearance(data: SceneData, rows: Rows) -> Iterator[Finding]:
+    """An anchor is free of collision, and says how far the nearest surface is."""
+    world, radius = scene_mesh(data).world, data.pipeline.embodiment.radius_m
+    stored = rows.floats("clearance_m")
+    for row, place in enumerate(rows.floats("x_m", "y_m", "z_m")):
+        distance = world.distance_m(place) if np.isfinite(place).all() else np.nan
+        if distance <= radius:
+            yield Finding(row, f"a surface at {distance:.4f} m", f"more than the body's radius, {radius:g} m")
+        elif abs(distance - stored[row]) > _STANDOFF_M:
+            yield Finding(row, f"clearance_m = {stored[row]:.6g}", f"{distance:.6g}")

@@ -1,0 +1,173 @@
+"""Checks that nobody flies below the ground: of anchors, of goals, and of routes from end to end.
+
+A surface without an underside stops no body that comes round its rim, so that a way below terrain touches nothing.
+What the generator keeps from there by its clearance grid is looked at here by rays alone: a place is below ground
+where one straight up meets ground and one straight down meets none. What is ground is found anew as well, by trimesh
+and Embree, a little more strictly than the generator does: what is doubtful is no fault. What the scene's file calls
+ground is ground whatever its form.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import trimesh
+
+from aerialdojo_gen.dataset.validate.registry import Finding, check
+from aerialdojo_gen.dataset.validate.rows import Floats, Mask, Rows, SceneData
+from aerialdojo_gen.dataset.validate.scene_mesh import scene_mesh
+from aerialdojo_gen.geometry.rays import RayCaster, TriangleRayCaster
+from aerialdojo_gen.geometry.soup import soup
+from aerialdojo_gen.scenes.model import Instance, Scene
+
+# Of a body's columns: those that meet one layer of it, those that meet nothing below it, and of its area the part in
+# plan; of the columns of the scene: those that meet ground.
+_ONE_LAYER, _UNDERMOST, _LEVEL, _COVER = 0.75, 0.55, 0.55, 0.55
+_PROBE_M = 1.0
+_LEAST_PROBES = 6
+_THIN_M = 0.01
+# Lattices of surveys are round numbers: rays stand between them.
+_ODD_M = (0.3183, 0.2718)
+_SAMPLE_M = 0.5
+_UP, _DOWN = np.array([[0.0, 0.0, 1.0]]), np.array([[0.0, 0.0, -1.0]])
+_FAR_M = 10_000.0
+
+
+@check("anchors", needs=("mesh",))
+def anchor_below_ground(data: SceneData, rows: Rows) -> Iterator[Finding]:
+    """An anchor is above the ground."""
+    yield from _buried(data, rows.floats("x_m", "y_m", "z_m"))
+
+
+@check("routes", needs=("mesh",))
+def goal_below_ground(data: SceneData, rows: Rows) -> Iterator[Finding]:
+    """A goal is above the ground."""
+    yield from _buried(data, rows.floats("goal_x_m", "goal_y_m", "goal_z_m"))
+
+
+@check("routes", needs=("mesh",), after=("list_lengths_differ", "out_of_bounds"))
+def route_below_ground(data: SceneData, _rows: Rows) -> Iterator[Finding]:
+    """A route stays above the ground, between its poses too."""
+    ground = _ground(data)
+    if ground is None:
+        return
+    paths = data.paths
+    points, pose = _along(paths.xyz, paths.first)
+    buried = _below(ground, points)
+    route = np.searchsorted(paths.first, pose[buried], side="right") - 1
+    for k, first in zip(*np.unique(route, return_index=True), strict=True):
+        at = int(np.flatnonzero(buried)[first])
+        told = f"below ground at {_place(points[at])}, after pose {pose[at] - paths.first[k]}"
+        yield Finding(int(paths.rows[k]), f"{told}, {int((route == k).sum())} samples of the way", "above ground")
+
+
+def _buried(data: SceneData, places: Floats) -> Iterator[Finding]:
+    ground = _ground(data)
+    if ground is None:
+        return
+    fit = np.flatnonzero((np.abs(places) < _FAR_M).all(axis=1))
+    for row in fit[_below(ground, places[fit])]:
+        yield Finding(int(row), f"below ground at {_place(places[row])}", "above ground")
+
+
+def _place(p: Floats) -> str:
+    return "({:.3f}, {:.3f}, {:.3f}) m".format(*p.tolist())
+
+
+def _along(xyz: Floats, first: np.ndarray) -> tuple[Floats, np.ndarray]:
+    """Points of polylines no further apart than the sample, and the pose that each comes after."""
+    # Poses that are no places are other checks' business.
+    xyz = np.where(np.abs(xyz) < _FAR_M, xyz, np.nan)
+    step = np.zeros_like(xyz)
+    step[:-1] = np.diff(xyz, axis=0)
+    step[first[1:] - 1] = 0.0
+    length = np.nan_to_num(np.linalg.norm(step, axis=1))
+    n = np.maximum(1, np.ceil(length / _SAMPLE_M)).astype(np.int64)
+    pose = np.repeat(np.arange(len(xyz)), n)
+    share = (np.arange(len(pose)) - np.repeat(np.cumsum(n) - n, n)) / n[pose]
+    points = xyz[pose] + share[:, None] * step[pose]
+    sound = np.isfinite(points).all(axis=1)
+    return points[sound], pose[sound]
+
+
+def _below(ground: TriangleRayCaster, points: Floats) -> Mask:
+    found = np.zeros(len(points), dtype=np.bool_)
+    if len(points):
+        roofed = np.flatnonzero(np.isfinite(ground.first_hit(points, np.repeat(_UP, len(points), axis=0))[0]))
+        if len(roofed):
+            beneath, _ = ground.first_hit(points[roofed], np.repeat(_DOWN, len(roofed), axis=0))
+            found[roofed] = np.isinf(beneath)
+    return found
+
+
+def _ground(data: SceneData) -> TriangleRayCaster | None:
+    if "ground" not in data.kept:
+        data.kept["ground"] = open_ground(scene_mesh(data).scene)
+    kept = data.kept["ground"]
+    assert kept is None or isinstance(kept, TriangleRayCaster)
+    return kept
+
+
+def open_ground(scene: Scene) -> TriangleRayCaster | None:
+    """Find the sheets that a scene has for its ground, to cast rays at; None where it has none."""
+    low, high = scene.bounds
+    # What ends below the flight volume (level ground that was laid under an import) leaves no room between.
+    standing = tuple(i for i in scene.instances if i.bounds[1, 2] >= low[2] - _THIN_M / 10)
+    if not standing:
+        return None
+    x, y = (np.arange(a + odd, b, _PROBE_M) for a, b, odd in zip(low[:2], high[:2], _ODD_M, strict=True))
+    plan = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
+    if not len(plan):
+        return None
+    under = np.column_stack([plan, np.full(len(plan), min(i.bounds[0, 2] for i in standing) - 1.0)])
+    over = np.column_stack([plan, np.full(len(plan), max(i.bounds[1, 2] for i in standing) + 1.0)])
+    upwards, downwards = np.repeat(_UP, len(plan), axis=0), np.repeat(_DOWN, len(plan), axis=0)
+    up, owner = RayCaster(Scene(scene.name, standing, {}, scene.bounds)).first_hit(under, upwards)
+    met = np.isfinite(up)
+    stored: list[trimesh.Trimesh] = []
+    sheets, covered = [], np.zeros(len(plan), dtype=np.bool_)
+    for k in np.flatnonzero(np.bincount(owner[met], minlength=len(standing)) >= _LEAST_PROBES):
+        for body in _open_bodies(standing[k]):
+            box = body.bounds
+            near = np.flatnonzero(((plan >= box[0, :2]) & (plan <= box[1, :2])).all(axis=1))
+            if len(near) < _LEAST_PROBES:
+                continue
+            alone = TriangleRayCaster(np.asarray(body.vertices), np.asarray(body.faces, dtype=np.int32))
+            bottom, _ = alone.first_hit(under[near], upwards[near])
+            top, _ = alone.first_hit(over[near], downwards[near])
+            own = np.isfinite(bottom) & np.isfinite(top)
+            thickness = (over[near, 2] - top) - (under[near, 2] + bottom)
+            if own.sum() < _LEAST_PROBES:
+                continue
+            normal = body.triangles_cross
+            level = np.abs(normal[:, 2]).sum() >= _LEVEL * np.linalg.norm(normal, axis=1).sum()
+            one_layer = (thickness[own] <= _THIN_M).mean() >= _ONE_LAYER
+            undermost = (bottom[own] <= up[near][own] + _THIN_M).mean() >= _UNDERMOST
+            if standing[k].surface == "ground":
+                stored.append(body)
+            elif one_layer and undermost and (level or own.sum() >= _COVER * met.sum()):
+                sheets.append(body)
+                covered[near[own]] = True
+    if covered.sum() < _COVER * met.sum():
+        sheets = []
+    return TriangleRayCaster(*soup([*stored, *sheets])) if stored or sheets else None
+
+
+def _open_bodies(instance: Instance) -> list[trimesh.Trimesh]:
+    """Connected bodies of an instance that have a rim; a surface that is there from both sides counts once."""
+    mesh = trimesh.Trimesh(instance.vertices, instance.faces, process=False)
+    mesh.merge_vertices(merge_tex=True, merge_norm=True, digits_vertex=3)
+    mesh.update_faces(mesh.unique_faces() & mesh.nondegenerate_faces())
+    if not len(mesh.faces):
+        return []
+    _, same, count = np.unique(mesh.edges_sorted, axis=0, return_inverse=True, return_counts=True)
+    rim = (count[same.reshape(-1)] == 1).reshape(-1, 3).any(axis=1)
+    if not rim.any():
+        return []
+    pieces = trimesh.graph.connected_components(mesh.edges, nodes=np.arange(len(mesh.vertices)))
+    label = np.empty(len(mesh.vertices), dtype=np.int64)
+    for k, piece in enumerate(pieces):
+        label[piece] = k
+    of_face = label[mesh.faces[:, 0]]
+    return [trimesh.Trimesh(mesh.vertices, mesh.faces[of_face == k], process=False) for k in np.unique(of_face[rim])]

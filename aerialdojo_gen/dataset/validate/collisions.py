@@ -1,0 +1,98 @@
+"""The certificate again: FCL is asked about every straight leg of every route, and about nothing less than its sweep.
+
+No clearance grid takes part. FCL's answers take less time than the grid takes to be built, and so a fault of the
+grid, which the planner searched by, cannot hide here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import pairwise
+
+import numpy as np
+
+from aerialdojo_gen.dataset.validate.registry import Finding, check
+from aerialdojo_gen.dataset.validate.rows import Floats, Rows, SceneData
+from aerialdojo_gen.dataset.validate.scene_mesh import scene_mesh
+from aerialdojo_gen.geometry.motion import replay
+from aerialdojo_gen.planning.certify import corners
+from aerialdojo_gen.planning.collision import CollisionWorld
+
+_FITS = ("list_lengths_differ", "out_of_bounds")
+# FCL's tolerance for a capsule against a triangle is well below this.
+_CLEARANCE_M = 1e-4
+_HALVINGS = 14
+
+
+@check("routes", needs=("mesh",), after=_FITS, samples=True)
+def route_collision(data: SceneData, _rows: Rows) -> Iterator[Finding]:
+    """The body's sweep along the stored positions touches no surface (FCL, a capsule a leg)."""
+    world, radius = scene_mesh(data).world, data.pipeline.embodiment.radius_m
+    paths = data.paths
+    for k in data.sampled:
+        hit = _hit(world, corners(paths.xyz[paths.of(k)]), radius)
+        if hit:
+            yield Finding(int(paths.rows[k]), f"the body touches a surface {hit}", "a free sweep")
+
+
+@check("routes", needs=("mesh",), after=(*_FITS, "action_order", "replay_differs", "route_collision"), samples=True)
+def replay_collision(data: SceneData, _rows: Rows) -> Iterator[Finding]:
+    """The body's sweep along the replayed actions touches no surface."""
+    world, radius = scene_mesh(data).world, data.pipeline.embodiment.radius_m
+    paths = data.paths
+    skip = data.flagged("routes", ("list_lengths_differ", "action_order", "replay_differs"))
+    for k in data.sampled:
+        if skip[paths.rows[k]]:
+            continue
+        where = paths.of(k)
+        start = (*paths.xyz[where][0], paths.yaw[where][0])
+        flown = replay(start, paths.action[where][:-1])[:, :3]
+        # Where the two agree to the last bit but for the Approach, the certificate above is this one too.
+        if np.array_equal(flown[:-1], paths.xyz[where][:-1]):
+            continue
+        hit = _hit(world, corners(flown), radius)
+        if hit:
+            yield Finding(int(paths.rows[k]), f"the body touches a surface {hit}", "a free sweep")
+
+
+@check("routes", needs=("mesh",), after=(*_FITS, "route_collision"), samples=True)
+def min_clearance(data: SceneData, rows: Rows) -> Iterator[Finding]:
+    """The stored clearance is right: a body a little thinner passes everywhere, one a little thicker does not."""
+    world = scene_mesh(data).world
+    cap = data.pipeline.plan.clearance_cap_m
+    stored, paths = rows.floats("min_clearance_m"), data.paths
+    skip = data.flagged("routes", (*_FITS, "route_collision", "null_value", "not_finite"))
+    for k in data.sampled:
+        row = int(paths.rows[k])
+        if skip[row]:
+            continue
+        legs, told = corners(paths.xyz[paths.of(k)]), float(stored[row])
+        if told > cap + _CLEARANCE_M:
+            yield Finding(row, f"{told:.6g} m", f"{cap:g} m at most")
+            continue
+        passes = told <= _CLEARANCE_M or not world.route_in_collision(legs, told - _CLEARANCE_M)
+        if not passes or (told < cap and not world.route_in_collision(legs, max(told, 0.0) + _CLEARANCE_M)):
+            yield Finding(row, f"{told:.6g} m", f"{_clearance_m(world, legs, cap):.4f} m")
+
+
+def _hit(world: CollisionWorld, legs: Floats, radius: float) -> str:
+    """Where a body on its way first touches a surface, in words; empty where nowhere."""
+    if len(legs) == 1 and world.sphere_in_collision(legs[0], radius):
+        return _between(legs[0], legs[0])
+    return next((_between(p, q) for p, q in pairwise(legs) if world.segment_in_collision(p, q, radius)), "")
+
+
+def _between(p: Floats, q: Floats) -> str:
+    a, b = (", ".join(f"{v:.2f}" for v in end) for end in (p, q))
+    return f"between ({a}) and ({b}) m"
+
+
+def _clearance_m(world: CollisionWorld, legs: Floats, cap: float) -> float:
+    """Smallest distance from the legs to a surface, up to the cap, by halving; metres."""
+    low, high = 0.0, cap
+    if not world.route_in_collision(legs, cap):
+        return cap
+    for _ in range(_HALVINGS):
+        middle = (low + high) / 2
+        low, high = (low, middle) if world.route_in_collision(legs, middle) else (middle, high)
+    return (low + high) / 2

@@ -1,0 +1,191 @@
+"""Checks of numbers: a scene's against the paper's, the release's against its card and the table of splits."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from aerialdojo_gen.base.config.pipeline import Pipeline
+from aerialdojo_gen.base.paper_figures import inventory, splits
+from aerialdojo_gen.base.safe_parse import loads_json
+from aerialdojo_gen.dataset.validate.parts import Release
+from aerialdojo_gen.dataset.validate.registry import Fault, Outcome
+from aerialdojo_gen.dataset.validate.rows import SceneData
+from aerialdojo_gen.store import shards as store
+from aerialdojo_gen.store.schemas import SETTINGS, SUBSETS
+
+# The paper's summed length of all routes is met to within this share, where all of its scenes are there.
+_PATH_SHARE = 0.005
+
+
+@dataclass(frozen=True)
+class Tally:
+    """What a scene of the release holds, for the counts of the whole."""
+
+    scene: str  # Name
+    routes: Counter[tuple[str, str]] = field(default_factory=Counter)  # Counter of (str, str)
+    tasks: Counter[str] = field(default_factory=Counter)  # Instances by folder
+    path_m: float = 0.0  # Summed length of the routes, metres
+    images: tuple[str, ...] = ()  # Ids of the reference images
+    complete: bool = False  # Whether all of its tables could be read
+
+
+def tally_of(data: SceneData, complete: bool) -> Tally:
+    """Count what a scene holds."""
+    routes: Counter[tuple[str, str]] = Counter()
+    tasks: Counter[str] = Counter()
+    path, images = 0.0, []
+    if "routes" in data.tables:
+        rows = data["routes"]
+        folders = [part.split("/")[-2] for part in rows.parts]
+        routes.update(zip((folders[k] for k in rows.part_of), map(str, rows.texts("setting")), strict=True))
+        path = float(data.paths.length_m.sum())
+    if "tasks" in data.tables:
+        rows = data["tasks"]
+        tasks.update(rows.parts[k].split("/")[-2] for k in rows.part_of)
+    if "objects" in data.tables:
+        images = [text for text in data["objects"].texts("reference_image_id") if text]
+    return Tally(data.scene, routes, tasks, path, tuple(images), complete)
+
+
+def scene_counts(data: SceneData, tally: Tally) -> Outcome:
+    """Hold a scene's landmarks, objects and tasks by setting and subset to the paper's, where the paper has it."""
+    outcome = Outcome("scene_counts", "counts")
+    paper = inventory().get(data.scene)
+    if paper is None or not data.pipeline.split.paper_counts:
+        outcome.skipped = "no scene of the paper" if paper is None else "the pipeline has no paper_counts"
+        return outcome
+    if not tally.complete:
+        outcome.skipped = "the scene cannot be read"
+        return outcome
+    from aerialdojo_gen.pipeline.stages.work.quota import train_quotas
+
+    trains = train_quotas(data.scene, inventory(), splits())
+    side = store.partition(data.scene)
+    wanted = {"landmarks": paper.landmarks, "objects": paper.objects}
+    found = {"landmarks": len(data["landmarks"]), "objects": len(data["objects"])}
+    for setting in SETTINGS:
+        for subset, n in (("train", trains[setting]), ("test", paper.tasks[setting] - trains[setting])):
+            wanted[f"{subset} {setting} tasks"] = n
+            found[f"{subset} {setting} tasks"] = tally.routes[f"{side}_{subset}", setting]
+    for name, n in wanted.items():
+        outcome.rows += 1
+        if found[name] != n:
+            outcome.faults.append(Fault("scene_counts", data.scene, "", "", name, f"{found[name]:,}", f"{n:,}"))
+    return outcome
+
+
+def whole_counts(release: Release, tallies: Sequence[Tally], pipeline: Pipeline, every_scene: bool) -> list[Outcome]:
+    """Check what only all scenes together can tell."""
+    outcomes = [Outcome(name, "counts") for name in WHOLE_CHECKS]
+    for outcome, judge in zip(outcomes, (_splits, _path, _card, _images), strict=True):
+        partial = "" if every_scene else "only some scenes were asked for"
+        if not partial and not all(tally.complete for tally in tallies):
+            partial = "a scene cannot be read"
+        outcome.skipped = partial or judge(outcome, release, tallies, pipeline)
+    return outcomes
+
+
+WHOLE_CHECKS = {
+    "split_counts": "All scenes together have the paper's numbers of train and test tasks, and its total.",
+    "path_total": "The routes' summed length is the paper's to within 0.5 %.",
+    "card_counts": "The dataset card tells the numbers that are there.",
+    "image_id_shared": "A picture's id stands in one scene.",
+}
+
+
+def _splits(outcome: Outcome, _release: Release, tallies: Sequence[Tally], pipeline: Pipeline) -> str:
+    if why := _not_the_papers(tallies, pipeline):
+        return why
+    for (side, subset), settings in splits().items():
+        folder = f"{side.lower()}_{subset}"
+        for setting, n in settings.items():
+            outcome.rows += 1
+            found = sum(tally.routes[folder, setting] for tally in tallies)
+            if found != n:
+                outcome.faults.append(
+                    Fault("split_counts", "", "", f"routes/{folder}", f"{setting} tasks", f"{found:,}", f"{n:,}")
+                )
+    return ""
+
+
+def _path(outcome: Outcome, _release: Release, tallies: Sequence[Tally], pipeline: Pipeline) -> str:
+    if why := _not_the_papers(tallies, pipeline):
+        return why
+    found, wanted = (sum(x) for x in ((t.path_m for t in tallies), (p.path_m for p in inventory().values())))
+    outcome.rows = 1
+    if abs(found - wanted) > _PATH_SHARE * wanted:
+        told = f"{found / 1000:,.1f} km", f"{wanted / 1000:,.1f} km to within {_PATH_SHARE:.1%}"
+        outcome.faults.append(Fault("path_total", "", "routes", "", "", *told))
+    return ""
+
+
+def _card(outcome: Outcome, release: Release, tallies: Sequence[Tally], _pipeline: Pipeline) -> str:
+    card = _text(release, "README.md")
+    if card is None:
+        outcome.rows = 1
+        outcome.faults.append(Fault("card_counts", "", "", "README.md", "", "no file", "the dataset card"))
+        return ""
+    told = _of_card(card)
+    machine = _text(release, "croissant.json")
+    if machine is not None:
+        try:
+            told += _of_croissant(machine)
+        except (ValueError, KeyError, TypeError):
+            outcome.faults.append(
+                Fault("card_counts", "", "", "croissant.json", "", "no record sets", "a Croissant description")
+            )
+    for file, table, folder, n in told:
+        outcome.rows += 1
+        if table == "tasks":
+            found = sum(tally.tasks[folder] for tally in tallies)
+        else:
+            found = sum(k for tally in tallies for (name, _), k in tally.routes.items() if name == folder)
+        if n != found:
+            outcome.faults.append(Fault("card_counts", "", table, file, folder, f"{n:,} rows told", f"{found:,}"))
+    return "" if outcome.rows else "neither card nor croissant.json tells the rows of the splits"
+
+
+def _text(release: Release, relative: str) -> str | None:
+    try:
+        path = release.root.local_copy(release.name(relative))
+    except FileNotFoundError:
+        return None
+    return path.read_text(encoding="utf-8", errors="replace") if path.is_file() else None
+
+
+def _of_card(text: str) -> list[tuple[str, str, str, int]]:
+    """Rows of `tasks` and `routes` by split, as the card's table of splits has them."""
+    found = re.findall(r"^\| `(\w+)` \| ([\d,]+) \| ([\d,]+) \|", text, re.MULTILINE)
+    counted = [(folder, ("tasks", a), ("routes", b)) for folder, a, b in found if folder in SUBSETS]
+    return [("README.md", t, folder, int(n.replace(",", ""))) for folder, *both in counted for t, n in both]
+
+
+def _of_croissant(text: str) -> list[tuple[str, str, str, int]]:
+    """Rows of `tasks` and `routes` by split, as croissant.json describes its record sets."""
+    described = {one["name"]: one["description"] for one in loads_json(text)["recordSet"]}
+    return [
+        ("croissant.json", table, folder, int(n.replace(",", "")))
+        for table in ("tasks", "routes")
+        for folder, n in re.findall(r"(\w+) \(([\d,]+) rows\)", described.get(table, ""))
+    ]
+
+
+def _images(outcome: Outcome, _release: Release, tallies: Sequence[Tally], _pipeline: Pipeline) -> str:
+    first: dict[str, str] = {}
+    for tally in tallies:
+        for image_id in tally.images:
+            outcome.rows += 1
+            if first.setdefault(image_id, tally.scene) != tally.scene:
+                told = f"reference_image_id={image_id}", f"of {first[image_id]} too", "one scene"
+                outcome.faults.append(Fault("image_id_shared", tally.scene, "objects", "", *told))
+    return ""
+
+
+def _not_the_papers(tallies: Sequence[Tally], pipeline: Pipeline) -> str:
+    if not pipeline.split.paper_counts:
+        return "the pipeline has no paper_counts"
+    missing = len(set(inventory()) - {tally.scene for tally in tallies})
+    return f"{missing} of the paper's {len(inventory())} scenes are not in it" if missing else ""

@@ -1,0 +1,156 @@
+"""Checks that routes are no longer than they need be: their own corners cut short, and a way over a grid.
+
+L is measured in the action set's metric: a free displacement costs |horizontal| + |vertical|. A straight way, or one
+over a grid, may be free and yet none that the actions can fly: steps of a metre and turns of 15° do not lead through
+every gap. So a route that either of them faults is only suspected, until a search far wider than the planner's own
+finds a shorter one that can be flown. The limits lie beyond what a sound release of 42 scenes has.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aerialdojo_gen.base.config.sections import Rung
+from aerialdojo_gen.dataset.validate.registry import Finding, check
+from aerialdojo_gen.dataset.validate.rows import Floats, Rows, SceneData
+from aerialdojo_gen.dataset.validate.scene_mesh import scene_mesh
+from aerialdojo_gen.planning.attempt import costs_at
+from aerialdojo_gen.planning.clearance import ClearanceGrid
+from aerialdojo_gen.planning.collision import CollisionWorld
+from aerialdojo_gen.planning.cost_to_go import columns_by_distance, expand_cost, seed_goal
+from aerialdojo_gen.planning.planner import Planner
+from aerialdojo_gen.planning.preference import NO_PREFERENCE, astray, narrow_cells, squeeze
+from aerialdojo_gen.store.schemas import APPROACH
+
+_FITS = ("list_lengths_differ", "out_of_bounds", "route_length", "route_collision")
+# A piece of a route is a needless one if going straight saves so many metres and so much of the piece, or very many.
+# The planner's own pieces go to 1.8 m at 0.37 of the piece, and to 2.6 m at a twentieth of it.
+_SAVED_M, _SAVED_SHARE, _SAVED_ANYWAY_M = 1.9, 0.45, 4.0
+# The straight way must be free by more than the body: the planner's search keeps margins too.
+_ROOM_M = 0.05
+# Cells of a metre make a grid in seconds, and lose passages, never invent them: its way is feasible, not the best.
+_CELL_M, _LONGER_M, _LONGER_SHARE = 1.0, 4.5, 0.1
+# The wide search: all but exhaustive (of the planner's own routes 4 % longer at most), a second a route.
+_WIDE = Rung(weight=0.97, budget=400_000, duplicate_cell_m=0.25)
+# Of what routes are searched for. The planner's own, where a grid or their corners cast doubt on them, go to 0.14.
+_SHORTER_M, _SHORTER_SHARE = 1.0, 0.15
+
+
+@check("routes", needs=("mesh",), after=_FITS, samples=True)
+def needless_piece(data: SceneData, _rows: Rows) -> Iterator[Finding]:
+    """No piece of a route is flown for nothing: the straight way between its ends is blocked, or hardly shorter."""
+    world, room = scene_mesh(data).world, data.pipeline.embodiment.radius_m + _ROOM_M
+    paths, skip = data.paths, data.flagged("routes", _FITS)
+    for k in data.sampled.tolist():
+        row = int(paths.rows[k])
+        positions = paths.xyz[paths.of(k)]
+        if skip[row] or not np.isfinite(positions).all():
+            continue
+        for first, last, flown, straight in _pieces(positions):
+            if _straight_is_free(world, positions[first], positions[last], room):
+                if _flown_shorter(data, k) is None:
+                    break
+                found = f"{flown:.2f} m from pose {first} to pose {last}"
+                yield Finding(row, found, f"{straight:.2f} m: the straight way is free")
+                break
+
+
+@check("routes", needs=("mesh", "anchors"), after=(*_FITS, "goal_anchor", "end_position"))
+def long_way_round(data: SceneData, rows: Rows) -> Iterator[Finding]:
+    """No route is much longer than a way over a grid of 1 m cells, found anew from every goal."""
+    paths = data.paths
+    left_out = data.flagged("routes", (*_FITS, "goal_anchor", "end_position"))[paths.rows]
+    goals = rows.floats("goal_x_m", "goal_y_m", "goal_z_m")[paths.rows]
+    left_out |= ~np.isfinite(goals).all(axis=1) | ~np.isfinite(paths.starts).all(axis=1)
+    fit = np.flatnonzero(~left_out)
+    if not len(fit):
+        return
+    plan, embodiment = data.pipeline.plan, data.pipeline.embodiment
+    grid = ClearanceGrid.build(
+        scene_mesh(data).scene, cell_m=_CELL_M, radius_m=embodiment.radius_m, margin_m=plan.margin_m,
+        cap_m=plan.clearance_cap_m,
+    )  # fmt: skip
+    cost = np.empty(grid.moves.shape, np.float32)
+    wide = narrow_cells(grid.arrays.field, NO_PREFERENCE)
+    longest = float(paths.length_m[fit].max())
+    order = columns_by_distance(math.ceil((longest + 2.0) / _CELL_M))
+    places, owner = np.unique(goals[fit], axis=0, return_inverse=True)
+    for g, goal in enumerate(places):
+        own = fit[owner.ravel() == g]
+        cost.fill(np.inf)
+        seeds = seed_goal(*goal, 0.0, _CELL_M, grid.radius_m, grid.arrays, grid.moves, cost, NO_PREFERENCE)
+        expand_cost(seeds, order, longest, grid.arrays.cell, grid.moves, cost, wide)
+        ways = np.asarray(costs_at(np.ascontiguousarray(paths.starts[own, :3]), grid.arrays, cost))
+        over = paths.length_m[own] - ways
+        for k in np.flatnonzero(over > np.maximum(_LONGER_M, _LONGER_SHARE * ways)):
+            shorter = _flown_shorter(data, int(own[k]))
+            if shorter is not None:
+                found = f"L = {paths.length_m[own[k]]:.2f} m"
+                yield Finding(int(paths.rows[own[k]]), found, f"{shorter:.2f} m, by a wider search")
+
+
+def _flown_shorter(data: SceneData, k: int) -> float | None:
+    """Metres of a route that the wide search finds, where it is clearly better than path `k`; else None.
+
+    Clearly is by `_SHORTER_M`, and by a share, of what routes are searched for: metres, and what they cost beside for
+    surfaces that they come near and an Approach that does not fly ahead (`aerialdojo_gen.planning.preference`).
+    """
+    planner = data.kept.get("wide")
+    if not isinstance(planner, Planner):
+        config = data.pipeline.plan.model_copy(update={"ladder": (_WIDE,), "min_detour_ratio": 1.0})
+        planner = Planner(scene_mesh(data).scene, config, data.pipeline.embodiment.radius_m)
+        data.kept["wide"] = planner
+    paths = data.paths
+    where = paths.of(k)
+    poses = np.column_stack([paths.xyz[where], paths.yaw[where]])
+    (route,) = planner.plan_target(poses[-1], [poses[0]])
+    if route.outcome != "SOLVED":
+        return None
+    own, other = _cost_m(planner, poses, paths.action[where]), _cost_m(planner, route.poses, route.actions)
+    return None if own - other <= max(_SHORTER_M, _SHORTER_SHARE * own) else float(route.length_m)
+
+
+def _cost_m(planner: Planner, poses: Floats, actions: NDArray[np.integer[Any]]) -> float:
+    """What a route costs in the planner's metres: its length, and what it had rather not do."""
+    plan, grid = planner.config, planner.grid.arrays
+    total = 0.0
+    for here, there in pairwise(poses[:, :3].tolist()):
+        total += math.dist(here, there) + squeeze(
+            *here, *there, plan.clearance_preference_m, plan.clearance_weight, *grid.origin.tolist(), grid.cell,
+            grid.field,
+        )  # fmt: skip
+    if len(actions) > 1 and actions[-2] == APPROACH:
+        dx, dy, dz = (poses[-1, :3] - poses[-2, :3]).tolist()
+        ahead = math.cos(math.radians(plan.max_approach_angle_deg))
+        total += astray(dx, dy, float(poses[-1, 3]), math.hypot(dx, dy, dz), ahead, plan.approach_detour_m)
+    return total
+
+
+def _pieces(positions: Floats) -> list[tuple[int, int, float, float]]:
+    """Shortest pieces of a route that the straight way would save enough of: first and last pose, flown, straight."""
+    along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(positions, axis=0), axis=1))])
+    offset = positions[None] - positions[:, None]
+    straight = np.hypot(offset[..., 0], offset[..., 1]) + np.abs(offset[..., 2])
+    flown = along[None] - along[:, None]
+    saved = flown - straight
+    worth = ((saved >= _SAVED_M) & (saved >= _SAVED_SHARE * flown)) | (saved >= _SAVED_ANYWAY_M)
+    found, end = [], len(positions)
+    # From the last start backwards: a piece that holds a shorter one is not looked at.
+    for first in range(len(positions) - 2, -1, -1):
+        ends = np.flatnonzero(worth[first, first + 1 : end])
+        if len(ends):
+            end = first + 1 + int(ends[0])
+            found.append((first, end, float(flown[first, end]), float(straight[first, end])))
+    return found
+
+
+def _straight_is_free(world: CollisionWorld, start: Floats, end: Floats, radius: float) -> bool:
+    """Whether level flight and a climb, in either order, lead from one place to the other."""
+    corners = (np.array([end[0], end[1], start[2]]), np.array([start[0], start[1], end[2]]))
+    return any(not world.route_in_collision(np.array([start, corner, end]), radius) for corner in corners)

@@ -1,0 +1,238 @@
+"""Checks of what a release says of difficulty and of its splits, each figure found anew by another way."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from aerialdojo_gen.dataset.validate.registry import Finding, UncheckedError, check
+from aerialdojo_gen.dataset.validate.rows import Floats, Mask, Rows, SceneData
+from aerialdojo_gen.dataset.validate.scene_mesh import scene_mesh
+from aerialdojo_gen.geometry.cameras import Camera, project, view_pose
+from aerialdojo_gen.geometry.motion import DISPLACEMENTS, replay
+from aerialdojo_gen.geometry.rays import instance_caster
+from aerialdojo_gen.pipeline.stages.work.pair_objects import surface_points
+from aerialdojo_gen.pipeline.stages.work.rules import settings_of
+from aerialdojo_gen.pipeline.stages.work.task_ids import held_out, key_of, nav_id
+from aerialdojo_gen.store.schemas import APPROACH, SETTINGS, STOP, TOLD_OF_DIFFICULTY, TOLD_OF_SPLITS, VIEWS
+
+_LENGTH_M = 1e-6
+# What FCL says of a body this much thinner or thicker counts: rounding does not.
+_THICKNESS_M = 1e-3
+# How much the 24-gon's prism sticks out of the unit sphere: an Approach of a metre saves no more than this.
+_SAVED_BY_APPROACH = math.hypot(1.0, 1.0 / math.cos(math.pi / 24)) - 1.0
+# Where something is seen its view is known; 0 with the word, and a share without, are not.
+# Of a point: a share times the number of points is whole.
+_WHOLE = 1e-6
+# Rays to points of the object that meet its own edges.
+_EITHER_WAY = 2
+_UNSEEN = "nothing is seen, and no view is named"
+_OF_ROUTE = (
+    "list_lengths_differ", "action_order", "n_actions", "route_length", "euclidean_distance", "replay_differs",
+    "start_anchor", "goal_anchor", "end_position", "stops_far", "out_of_bounds", "route_collision",
+    "replay_collision", "unknown_target", "unknown_start", "duplicate_key", "duplicate_route", "keeping_rule",
+)  # fmt: skip
+_OF_TASK = (
+    "duplicate_key", "task_in_both_subsets", "task_without_route", "task_instances", "task_start", "telling_number",
+)  # fmt: skip
+
+
+def _told(rows: Rows, *names: str) -> Mask:
+    """Rows that say all of some columns."""
+    return np.asarray(np.logical_and.reduce([_known(rows, name) for name in names]), dtype=np.bool_)
+
+
+def _known(rows: Rows, name: str) -> Mask:
+    return np.asarray(rows.column(name).is_valid().to_numpy(zero_copy_only=False), dtype=np.bool_)
+
+
+@check("routes", after=_OF_ROUTE)
+def difficulty_told(data: SceneData, rows: Rows) -> Iterator[Finding]:
+    """Every route says how hard it is, unless an older version wrote the release and none does."""
+    names = [name for name in TOLD_OF_DIFFICULTY if name != "visible_view_at_start"]
+    known = np.column_stack([_known(rows, name) for name in names])
+    for row in np.flatnonzero(known.any() & ~known.all(axis=1)):
+        yield Finding(int(row), f"no {names[int(known[row].argmin())]}", "a value, as other routes of the scene have")
+
+
+@check("routes", after=(*_OF_ROUTE, "difficulty_told"))
+def free_length(data: SceneData, rows: Rows) -> Iterator[Finding]:
+    """The shortest length without obstacles is no more than level flight and a climb, and no Approach saves more."""
+    paths, stored = data.paths, rows.floats("free_length_m")[data.paths.rows]
+    way = paths.ends[:, :3] - paths.starts[:, :3]
+    bearing = np.arctan2(way[:, 1], way[:, 0]) - paths.starts[:, 3]
+    turn = math.pi / 12
+    # Two headings enclose the way: flown in turn, they add up to so much.
+    beside = np.mod(bearing, turn)
+    level = np.hypot(way[:, 0], way[:, 1]) * (np.sin(beside) + np.sin(turn - beside)) / math.sin(turn)
+    most = level + np.abs(way[:, 2])
+    least = np.maximum(paths.euclidean_m, most - _SAVED_BY_APPROACH * data.pipeline.plan.max_approach_m)
+    for k in np.flatnonzero((stored < least - _LENGTH_M) | (stored > np.minimum(most, paths.length_m) + _LENGTH_M)):
+        yield Finding(int(paths.rows[k]), f"{stored[k]:.9g} m", f"{least[k]:.6g} to {most[k]:.6g} m")
+
+
+@check("routes", after=(*_OF_ROUTE, "difficulty_told", "free_length"))
+def plan_detour(data: SceneData, rows: Rows) -> Iterator[Finding]:
+    """`plan_detour` is L over the shortest length without obstacles, and never less than 1."""
+    paths = data.paths
+    ratio = np.maximum(paths.length_m / np.maximum(rows.floats("free_length_m")[paths.rows], 1e-12), 1.0)
+    yield from _unlike(data, rows, "plan_detour", ratio)
+
+
+@check("routes", after=(*_OF_ROUTE, "difficulty_told"))
+def climb(data: SceneData, rows: Rows) -> Iterator[Finding]:
+    """`climb_m` is the metres that the actions fly upwards, the Approach's among them."""
+    paths = data.paths
+    up = np.maximum(DISPLACEMENTS[np.clip(paths.action, STOP, APPROACH), 2], 0.0)
+    rise = np.append(np.diff(paths.xyz[:, 2]), 0.0)
+    up = np.where(paths.action == APPROACH, np.maximum(rise, 0.0), up)
+    if len(paths.rows):
+        yield from _unlike(data, rows, "climb_m", np.add.reduceat(up, paths.first[:-1]))
+
+
+def _unlike(data: SceneData, rows: Rows, name: str, wanted: Floats) -> Iterator[Finding]:
+    stored = rows.floats(name)[data.paths.rows]
+    for k in np.flatnonzero(np.abs(stored - wanted) > _LENGTH_M):
+        yield Finding(int(data.paths.rows[k]), f"{name} = {stored[k]:.9g}", f"{wanted[k]:.9g}")
+
+
+@check("routes", after=(*_OF_ROUTE, "difficulty_told"))
+def agent_action(data: SceneData, rows: Rows) -> Iterator[Finding]:
+    """`agent_action` has the 16 actions alone, ends in Stop, and leads to within an Approach of the goal in time."""
+    budgets = {s: rule.action_budget for s, rule in zip(SETTINGS, settings_of(data.pipeline.filter), strict=True)}
+    paths, settings, known = data.paths, rows.texts("setting"), _known(rows, "agent_action")
+    lists = rows.column("agent_action")
+    ends, actions = lists.offsets.to_numpy(), lists.values.to_numpy(zero_copy_only=False)
+    most_m = data.pipeline.plan.max_approach_m + _LENGTH_M
+    for k, row in enumerate(paths.rows.tolist()):
+        if not known[row]:
+            continue
+        flown = np.nan_to_num(actions[ends[row] : ends[row + 1]], nan=-1).astype(np.int64)
+        if not len(flown) or flown[-1] != STOP or (flown[:-1] <= STOP).any() or (flown >= APPROACH).any():
+            yield Finding(row, f"agent_action = {flown.tolist()[-8:]}", "actions 1 to 15, and Stop (0) at the end")
+            continue
+        off = float(np.linalg.norm(replay(paths.starts[k], flown)[-1, :3] - paths.ends[k, :3]))
+        budget = budgets.get(str(settings[row]), len(flown))
+        if off > most_m or len(flown) > budget:
+            told = f"Stop at {off:.3f} m from the goal after {len(flown)} actions"
+            yield Finding(row, told, f"{most_m:.3g} m and {budget} actions at most")
+
+
+@check("routes", needs=("mesh",), after=(*_OF_ROUTE, "difficulty_told"), samples=True)
+def straight_line(data: SceneData, rows: Rows) -> Iterator[Finding]:
+    """`straight_line_free` is true where the body's sweep from start to goal touches nothing, else false."""
+    world, radius = scene_mesh(data).world, data.pipeline.embodiment.radius_m
+    paths, told = data.paths, rows.floats("straight_line_free")
+    skip = data.flagged("routes", _OF_ROUTE)
+    for k in data.sampled.tolist():
+        row = int(paths.rows[k])
+        if skip[row] or not np.isfinite(told[row]):
+            continue
+        start, goal = paths.starts[k, :3], paths.ends[k, :3]
+        free = bool(told[row])
+        if free == world.segment_in_collision(start, goal, radius + (-_THICKNESS_M if free else _THICKNESS_M)):
+            yield Finding(row, f"straight_line_free = {free}", str(not free))
+
+
+@check("routes", needs=("mesh", "objects"), after=(*_OF_ROUTE, "difficulty_told"), samples=True)
+def start_view(data: SceneData, rows: Rows) -> Iterator[Finding]:
+    """What the start sees of the target is what its pictures would show, and the view is the one that shows most."""
+    mesh, paths, n = scene_mesh(data), data.paths, data.pipeline.pair_objects.surface_points
+    things = {item.node: item for item in mesh.scene.instances}
+    nodes, ids = data["objects"].texts("mesh_node"), data["objects"].ints("object_id").tolist()
+    told, views = rows.floats("target_visible_at_start"), rows.texts("visible_view_at_start")
+    skip = data.flagged("routes", _OF_ROUTE) | ~np.isfinite(told)
+    of_target: dict[int, list[int]] = {}
+    for k in data.sampled.tolist():
+        if not skip[paths.rows[k]]:
+            of_target.setdefault(int(data.target_of_route[paths.rows[k]]), []).append(k)
+    camera = Camera(2, 2, 90.0)
+    for target, routes in of_target.items():
+        item = things.get(str(nodes[target])) if target >= 0 else None
+        if item is None:
+            continue
+        points = surface_points(data.scene, ids[target], item, n)
+        origins, aims = np.repeat(paths.starts[routes, :3], n, axis=0), np.tile(points, (len(routes), 1))
+        facing = instance_caster(item).unobstructed(origins, aims).reshape(-1, n)
+        open_air = mesh.rays.visible(origins, aims).reshape(-1, n)
+        for k, bare, clear in zip(routes, facing, open_air, strict=True):
+            position, yaw = paths.starts[k, :3], float(paths.starts[k, 3])
+            free = bare & clear
+            shown = [free & _in_picture(camera, view_pose(position, yaw, view), points) for view in VIEWS]
+            share = float(np.any(shown, axis=0).sum() / max(bare.sum(), 1))
+            best = {
+                view for view, seen in zip(VIEWS, shown, strict=True) if seen.sum() == np.sum(shown, axis=1).max()
+            }
+            row = int(paths.rows[k])
+            # A ray along an edge may go either way, the object's own edge too; points are whole all the same.
+            whole = max(int(bare.sum()), 1)
+            counted = told[row] * np.arange(max(whole - _EITHER_WAY, 1), whole + _EITHER_WAY + 1)
+            if abs(share - told[row]) > 2.5 / whole or np.abs(counted - np.rint(counted)).min() > _WHOLE:
+                yield Finding(row, f"target_visible_at_start = {told[row]:.3f}", f"{share:.3f}")
+            elif (views[row] is None) != (told[row] == 0.0) or (share and told[row] and views[row] not in best):
+                wanted = " or ".join(sorted(best)) if share else _UNSEEN
+                yield Finding(row, f"visible_view_at_start = {views[row]}", wanted)
+
+
+def _in_picture(camera: Camera, pose: Floats, points: Floats) -> Mask:
+    uv, depth = project(camera, pose, points)
+    inside = (uv >= 0.0).all(axis=1) & (uv <= (camera.width, camera.height)).all(axis=1)
+    return np.asarray((depth > 0.0) & inside)
+
+
+@check("tasks", needs=("routes",), after=_OF_TASK)
+def seen_in_train(data: SceneData, rows: Rows) -> Iterator[Finding]:
+    """`target_seen_in_train` and `start_seen_in_train` are true where a training task has that target, that start."""
+    train = np.asarray(rows.texts("subset"), dtype=object) == "train"
+    target = np.append(data["routes"].ints("target_object_id"), -1)[data.route_of_task].tolist()
+    poses = rows.floats("start_x_m", "start_y_m", "start_z_m", "start_yaw_rad").tolist()
+    for name, own in (("target_seen_in_train", target), ("start_seen_in_train", [tuple(pose) for pose in poses])):
+        seen = {key for key, trains in zip(own, train, strict=True) if trains}
+        told = rows.floats(name)
+        wanted = np.fromiter((key in seen for key in own), dtype=np.float64, count=len(own))
+        for row in np.flatnonzero(np.isfinite(told) & (told != wanted)):
+            yield Finding(int(row), f"{name} = {bool(told[row])}", str(bool(wanted[row])))
+
+
+@check("tasks", needs=("routes", "objects"), after=_OF_TASK)
+def split_by_objects(data: SceneData, rows: Rows) -> Iterator[Finding]:
+    """`target_split` is train where neither end of the task is at an object that is held out, and test elsewhere."""
+    routes, fraction = data["routes"], data.pipeline.split.held_out_fraction
+    ids = data["objects"].ints("object_id").tolist()
+    key = key_of(data.pipeline.split.salt, data.pipeline.seed)
+    out = held_out(data.scene, ids, fraction, key) if _has_salt(data, key) else None
+    told = _told(rows, *TOLD_OF_SPLITS)
+    split, said = rows.texts("target_split"), {end: rows.floats(f"{end}_held_out") for end in ("target", "start")}
+    ends = {end: np.append(routes.ints(f"{end}_object_id"), -1)[data.route_of_task].tolist() for end in said}
+    known: dict[int, bool] = {}
+    for row in np.flatnonzero(told).tolist():
+        side = "test" if said["target"][row] or said["start"][row] else "train"
+        if split[row] != side:
+            yield Finding(row, f"target_split = {split[row]}", side)
+            continue
+        for end, own in ends.items():
+            # Without the salt an object is what the first task says it is.
+            wanted = own[row] in out if out is not None else known.setdefault(own[row], bool(said[end][row]))
+            if bool(said[end][row]) != wanted:
+                yield Finding(row, f"{end}_held_out = {bool(said[end][row])}", str(wanted))
+                break
+
+
+def _has_salt(data: SceneData, key: bytes) -> bool:
+    """Whether the release's ids were made with a key: told by one of them."""
+    routes = data["routes"]
+    pair = [routes.ints(name)[:1].tolist() for name in ("start_object_id", "start_anchor_id", "target_object_id")]
+    pairs = [f"{s}_{a}__{t}" for s, a, t in zip(*pair, strict=True)]
+    return [nav_id(data.scene, name, key) for name in pairs] == routes.texts("nav_id")[:1]
+
+
+@check("tasks")
+def splits_told(_data: SceneData, rows: Rows) -> Iterator[Finding]:
+    """Every task says on which sides of the splits it is, unless an older version wrote the release and none does."""
+    known = np.column_stack([_known(rows, name) for name in TOLD_OF_SPLITS])
+    if not known.any():
+        raise UncheckedError("the release does not say: an older version wrote it")
+    for row in np.flatnonzero(~known.all(axis=1)):
+        yield Finding(int(row), f"no {TOLD_OF_SPLITS[int(known[row].argmin())]}", "a value, as other tasks have")

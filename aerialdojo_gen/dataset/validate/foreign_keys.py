@@ -1,0 +1,247 @@
+"""Checks of what one table says of another: ids that exist, and things said twice that agree."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Iterator
+
+import numpy as np
+import pyarrow as pa
+
+from aerialdojo_gen.dataset.validate.registry import ALWAYS_AFTER, Finding, UncheckedError, check
+from aerialdojo_gen.dataset.validate.rows import Ints, Mask, Rows, SceneData, pose_text, unequal
+from aerialdojo_gen.geometry.frames import compass_direction
+from aerialdojo_gen.pipeline.stages.work.rules import settings_of
+from aerialdojo_gen.store.schemas import SETTINGS, TOLD_OF_SPLITS
+
+_SAME_PLACE_M = 1e-6
+_SHARED = (
+    "family", "scene_type", "partition", "subset", "setting", "action_budget", "start_x_m", "start_y_m", "start_z_m",
+    "start_yaw_rad", "target_name", "landmark", "direction", *TOLD_OF_SPLITS,
+)  # fmt: skip
+_SAID_OF_ROUTE = (
+    "duplicate_key", "task_in_both_subsets", "task_without_route", "task_instances", "task_scene", "task_setting",
+    "task_budget", "task_start", "task_goal", "telling_number", "telling_text", "telling_id",
+)  # fmt: skip
+
+
+def sound(data: SceneData, table: str, rows: Ints) -> Mask:
+    """Whether looked-up rows exist and are fit to compare with, (n,) bool."""
+    good = ~data.flagged(table, (*ALWAYS_AFTER, "duplicate_key"))
+    return (rows >= 0) & (np.append(good, False)[rows])
+
+
+@check("objects", needs=("landmarks",))
+def unknown_landmark(data: SceneData, rows: Rows) -> Iterator[Finding]:
+    """An object's landmark exists."""
+    for row in np.flatnonzero(data["landmarks"].find("landmark_id", rows.column("landmark_id")) < 0):
+        yield Finding(int(row), f"landmark_id = {rows.ints('landmark_id')[row]}", "a landmark of the scene")
+
+
+@check("objects", needs=("landmarks",), after=("unknown_landmark",))
+def landmark_nearest(data: SceneData, rows: Rows) -> Iterator[Finding]:
+    """An object's landmark is the nearest in the plane."""
+    landmarks = data["landmarks"]
+    if not len(landmarks):
+        raise UncheckedError("there is no landmark")
+    own = landmarks.find("landmark_id", rows.column("landmark_id"))
+    away = rows.floats("x_m", "y_m")[:, None] - landmarks.floats("x_m", "y_m")[None]
+    distance = np.linalg.norm(away, axis=2)
+    nearest = distance.argmin(axis=1)
+    for row in np.flatnonzero(distance[np.arange(len(rows)), own] > distance.min(axis=1) + _SAME_PLACE_M):
+        ids = landmarks.ints("landmark_id")
+        yield Finding(int(row), f"landmark_id = {ids[own[row]]}", f"{ids[nearest[row]]}, which is nearer")
+
+
+@check("objects", needs=("landmarks",), after=("unknown_landmark",))
+def landmark_direction(data: SceneData, rows: Rows) -> Iterator[Finding]:
+    """An object's direction is the one from its landmark."""
+    landmarks = data["landmarks"]
+    own = landmarks.find("landmark_id", rows.column("landmark_id"))
+    centres = np.vstack([landmarks.floats("x_m", "y_m").reshape(-1, 2), np.full((1, 2), np.nan)])
+    away = rows.floats("x_m", "y_m") - centres[own]
+    for row, said in enumerate(rows.texts("direction")):
+        dx, dy = away[row].tolist()
+        if own[row] >= 0 and math.isfinite(dx + dy) and (dx or dy) and (is_so := compass_direction(dx, dy)) != said:
+            yield Finding(row, str(said), is_so)
+
+
+@check("anchors", needs=("objects",))
+def unknown_object(data: SceneData, rows: Rows) -> Iterator[Finding]:
+    """An anchor's object exists."""
+    for row in np.flatnonzero(data["objects"].find("object_id", rows.column("object_id")) < 0):
+        yield Finding(int(row), f"object_id = {rows.ints('object_id')[row]}", "an object of the scene")
+
+
+@check("viewpoints", needs=("objects",))
+def viewpoint_object(data: SceneData, rows: Rows) -> Iterator[Finding]:
+    """A viewpoint is one of an object that there is."""
+    for row in np.flatnonzero(data["objects"].find("object_id", rows.column("object_id")) < 0):
+        yield Finding(int(row), f"object_id = {rows.ints('object_id')[row]}", "the id of an object")
+
+
+@check("objects", needs=("anchors",))
+def selected_anchor(data: SceneData, rows: Rows) -> Iterator[Finding]:
+    """An object with anchors has exactly one that is selected."""
+    anchors = data["anchors"]
+    ids = anchors.ints("object_id")
+    has = set(ids.tolist())
+    selected = Counter(ids[anchors.floats("selected") == 1.0].tolist())
+    for row, object_id in enumerate(rows.ints("object_id").tolist()):
+        if object_id in has and selected[object_id] != 1:
+            yield Finding(row, f"{selected[object_id]} selected anchors", "1")
+
+
+@check("routes", needs=("objects",))
+def unknown_target(data: SceneData, rows: Rows) -> Iterator[Finding]:
+    """A route's target exists."""
+    for row in np.flatnonzero(data.target_of_route < 0):
+        yield Finding(int(row), f"target_object_id = {rows.ints('target_object_id')[row]}", "an object of the scene")
+
+
+@check("routes", needs=("anchors",))
+def unknown_start(data: SceneData, rows: Rows) -> Iterator[Finding]:
+    """A route's start anchor exists."""
+    for row in np.flatnonzero(data.start_of_route < 0):
+        start = f"anchor {rows.ints('start_anchor_id')[row]} of object {rows.ints('start_object_id')[row]}"
+        yield Finding(int(row), start, "an anchor of the scene")
+
+
+@check("routes", needs=("tasks",))
+def route_without_task(data: SceneData, rows: Rows) -> Iterator[Finding]:
+    """A route has its task instances."""
+    for row in np.flatnonzero(data["tasks"].find("nav_id", rows.column("nav_id")) < 0):
+        yield Finding(int(row), "no row of tasks", "two instances")
+
+
+@check("tasks", needs=("routes",), after=("duplicate_key", "task_in_both_subsets"))
+def task_without_route(data: SceneData, rows: Rows) -> Iterator[Finding]:
+    """A task has its route, on the same side of the split."""
+    routes = data["routes"]
+    sides = np.array([part.split("/")[-2] for part in routes.parts], dtype=object)
+    side = sides[routes.part_of]
+    for row in range(len(rows)):
+        route = data.route_of_task[row]
+        own = rows.part(row).split("/")[-2]
+        if route < 0:
+            yield Finding(row, "no row of routes", f"one in routes/{own}")
+        elif side[route] != own:
+            yield Finding(row, f"its route stands in routes/{side[route]}", f"routes/{own}")
+
+
+@check("tasks", after=("duplicate_key", "task_in_both_subsets", "task_without_route"))
+def task_instances(data: SceneData, rows: Rows) -> Iterator[Finding]:
+    """A navigation task has one semantic and one image instance."""
+    copies = data.flagged("tasks", ("duplicate_key", "task_in_both_subsets"))
+    unfit = data.flagged("tasks", ALWAYS_AFTER)
+    found: dict[str | None, list[str]] = {}
+    first: dict[str | None, int] = {}
+    skip = set()
+    for row, (nav_id, modality) in enumerate(zip(rows.texts("nav_id"), rows.texts("modality"), strict=True)):
+        if unfit[row]:
+            skip.add(nav_id)
+        if not copies[row]:
+            found.setdefault(nav_id, []).append(str(modality))
+            first.setdefault(nav_id, row)
+    for nav_id, modalities in found.items():
+        if nav_id not in skip and sorted(modalities) != ["image", "semantic"]:
+            yield Finding(first[nav_id], " and ".join(sorted(modalities)), "image and semantic")
+
+
+@check("tasks", needs=("scenes",))
+def task_scene(data: SceneData, rows: Rows) -> Iterator[Finding]:
+    """A task's family, scene type and partition are its scene's."""
+    scenes = data["scenes"]
+    if len(scenes) != 1 or data.flagged("scenes", ALWAYS_AFTER).any():
+        raise UncheckedError("the scene's row is at fault")
+    for name in ("family", "scene_type", "partition"):
+        wanted = scenes.texts(name)[0]
+        for row in np.flatnonzero(np.asarray(rows.texts(name), dtype=object) != wanted):
+            yield Finding(int(row), f"{name} = {rows.texts(name)[row]!r}", repr(wanted))
+
+
+@check("tasks", needs=("routes",))
+def task_setting(data: SceneData, rows: Rows) -> Iterator[Finding]:
+    """A task's setting is its route's."""
+    routes = data["routes"]
+    theirs = routes.column("setting").take(_at(data.route_of_task))
+    fit = sound(data, "routes", data.route_of_task)
+    for row in np.flatnonzero(unequal(rows.column("setting"), theirs) & fit):
+        yield Finding(int(row), rows.texts("setting")[row] or "", theirs[int(row)].as_py())
+
+
+@check("tasks", after=("task_setting",))
+def task_budget(data: SceneData, rows: Rows) -> Iterator[Finding]:
+    """A task's action budget is that of its setting."""
+    budgets = {s: rule.action_budget for s, rule in zip(SETTINGS, settings_of(data.pipeline.filter), strict=True)}
+    wanted = np.array([budgets.get(str(s), -1) for s in rows.texts("setting")])
+    for row in np.flatnonzero(rows.ints("action_budget") != wanted):
+        yield Finding(int(row), str(rows.ints("action_budget")[row]), str(wanted[row]))
+
+
+@check("tasks", needs=("routes",), after=("telling_number",))
+def task_start(data: SceneData, rows: Rows) -> Iterator[Finding]:
+    """A task starts at the first pose of its route."""
+    paths, routes = data.paths, data["routes"]
+    starts = np.full((len(routes) + 1, 4), np.nan)
+    starts[paths.rows] = paths.starts
+    theirs = starts[data.route_of_task]
+    own = rows.floats("start_x_m", "start_y_m", "start_z_m", "start_yaw_rad")
+    off = np.abs(own - theirs).max(axis=1)
+    fit = sound(data, "routes", data.route_of_task)
+    for row in np.flatnonzero((off > _SAME_PLACE_M) & fit):
+        yield Finding(int(row), pose_text(own[row]), pose_text(theirs[row]))
+
+
+@check("tasks")
+def goal_of_modality(_data: SceneData, rows: Rows) -> Iterator[Finding]:
+    """A semantic task has a description and no picture, an image task a picture and no description."""
+    modality = rows.texts("modality")
+    for name, wanted in (("description", "semantic"), ("reference_image_id", "image")):
+        for row, (own, value) in enumerate(zip(modality, rows.texts(name), strict=True)):
+            if (own == wanted) != (value is not None):
+                yield Finding(row, f"{name} = {value!r} in a {own} task", "a text" if own == wanted else "null")
+
+
+@check("tasks", needs=("routes", "objects", "landmarks"), after=("goal_of_modality", "telling_text", "telling_id"))
+def task_goal(data: SceneData, rows: Rows) -> Iterator[Finding]:
+    """What a task says of its goal is what stands of the target in objects."""
+    objects, landmarks = data["objects"], data["landmarks"]
+    target = np.append(data.target_of_route, -1)[data.route_of_task]
+    landmark = landmarks.find("landmark_id", objects.column("landmark_id"))
+    theirs = {
+        "target_name": objects.column("name"),
+        "landmark": landmarks.column("name").take(_at(landmark)),
+        "direction": objects.column("direction"),
+        "description": objects.column("description"),
+        "reference_image_id": objects.column("reference_image_id"),
+    }
+    fit = sound(data, "objects", target) & sound(data, "routes", data.route_of_task)
+    for name, column in theirs.items():
+        own, wanted = rows.column(name), column.take(_at(target))
+        # The other modality's goal is null, and `goal_of_modality` sees to that.
+        for row in np.flatnonzero(unequal(own, wanted) & fit & _valid(own) & _valid(wanted)):
+            yield Finding(int(row), f"{name} = {own[int(row)].as_py()!r}", repr(wanted[int(row)].as_py()))
+
+
+@check("tasks", after=_SAID_OF_ROUTE)
+def instances_agree(data: SceneData, rows: Rows) -> Iterator[Finding]:
+    """Both instances of a navigation task share everything but the goal's representation."""
+    first = rows.find("nav_id", rows.column("nav_id"))
+    # A task that does not agree with its route has been named: its twin is not to blame.
+    fit = ~data.flagged("tasks", (*ALWAYS_AFTER, *_SAID_OF_ROUTE))[first]
+    for name in _SHARED:
+        own = rows.column(name)
+        theirs = own.take(_at(first))
+        for row in np.flatnonzero(unequal(own, theirs) & fit):
+            yield Finding(int(row), f"{name} = {own[int(row)].as_py()}", f"{theirs[int(row)].as_py()}, as its twin")
+
+
+def _at(rows: Ints) -> pa.Array:
+    """Row numbers for `take`, null where there is no row."""
+    return pa.array(rows, mask=rows < 0)
+
+
+def _valid(column: pa.Array) -> Mask:
+    return np.asarray(column.is_valid().to_numpy(zero_copy_only=False), dtype=np.bool_)

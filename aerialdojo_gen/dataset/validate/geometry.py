@@ -1,0 +1,126 @@
+"""Checks of routes by their stored poses: lists that fit, lengths computed anew, the paper's rules of keeping."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from aerialdojo_gen.dataset.validate.registry import Finding, UncheckedError, check
+from aerialdojo_gen.dataset.validate.rows import Floats, Rows, SceneData, list_lengths
+from aerialdojo_gen.pipeline.stages.work.rules import KEPT, judge
+from aerialdojo_gen.store.schemas import APPROACH, STOP
+
+_LENGTH_M = 1e-6
+
+
+@check("routes")
+def list_lengths_differ(_data: SceneData, rows: Rows) -> Iterator[Finding]:
+    """The five lists of a route are of equal length, two poses at least."""
+    lengths = list_lengths(rows)
+    for row in np.flatnonzero((lengths != lengths[:, :1]).any(axis=1) | (lengths[:, 0] < 2)):
+        yield Finding(int(row), f"lists of {', '.join(str(n) for n in lengths[row])}", "one length, 2 or more")
+
+
+@check("routes", after=("list_lengths_differ",))
+def action_order(data: SceneData, rows: Rows) -> Iterator[Finding]:
+    """Actions are those of the set; Stop is the last and no other, Approach the last but one or none."""
+    paths = data.paths
+    for k, row in enumerate(paths.rows.tolist()):
+        actions = paths.action[paths.of(k)]
+        if actions[-1] != STOP or (actions[:-1] <= STOP).any() or (actions > APPROACH).any():
+            yield Finding(row, f"actions {_some(actions)}", "Stop (0) at the last pose alone")
+        elif (actions[:-2] == APPROACH).any():
+            yield Finding(row, f"Approach at pose {int(np.flatnonzero(actions == APPROACH)[0])}", "the last but one")
+
+
+@check("routes", after=("list_lengths_differ",))
+def n_actions(data: SceneData, rows: Rows) -> Iterator[Finding]:
+    """The number of actions is the length of the list."""
+    counted = np.diff(data.paths.first)
+    stored = rows.ints("n_actions")[data.paths.rows]
+    for k in np.flatnonzero(stored != counted):
+        yield Finding(int(data.paths.rows[k]), str(stored[k]), str(counted[k]))
+
+
+@check("routes", after=("list_lengths_differ",))
+def route_length(data: SceneData, rows: Rows) -> Iterator[Finding]:
+    """L is the sum of the distances between consecutive positions."""
+    yield from _differs(data, rows.floats("length_m"), data.paths.length_m, "m")
+
+
+@check("routes", after=("list_lengths_differ",))
+def euclidean_distance(data: SceneData, rows: Rows) -> Iterator[Finding]:
+    """d_E is the distance from the first to the last position."""
+    yield from _differs(data, rows.floats("euclidean_m"), data.paths.euclidean_m, "m")
+
+
+@check("routes", after=("list_lengths_differ",))
+def detour_ratio(data: SceneData, rows: Rows) -> Iterator[Finding]:
+    """κ is L / d_E."""
+    ratio = data.paths.length_m / np.maximum(data.paths.euclidean_m, 1e-12)
+    yield from _differs(data, rows.floats("detour_ratio"), ratio, "")
+
+
+@check("routes", after=("list_lengths_differ",))
+def keeping_rule(data: SceneData, rows: Rows) -> Iterator[Finding]:
+    """The route passes the rules of `filter`: d_E, L, κ and the action budget of its setting."""
+    reason, _, length, euclidean = _judged(data, rows)
+    for k in np.flatnonzero(reason != KEPT):
+        told = f"L = {length[k]:.4f} m, d_E = {euclidean[k]:.4f} m, {np.diff(data.paths.first)[k]} actions"
+        yield Finding(int(data.paths.rows[k]), f"{reason[k]}: {told}", KEPT)
+
+
+@check("routes", after=("list_lengths_differ", "keeping_rule"))
+def route_setting(data: SceneData, rows: Rows) -> Iterator[Finding]:
+    """The setting is that of the route's length."""
+    _, setting, length, _ = _judged(data, rows)
+    stored = np.asarray(rows.texts("setting"), dtype=object)[data.paths.rows]
+    for k in np.flatnonzero(stored != setting.astype(object)):
+        yield Finding(int(data.paths.rows[k]), str(stored[k]), f"{setting[k]}, for {length[k]:.4f} m")
+
+
+@check("routes", needs=("scenes",), after=("list_lengths_differ",))
+def out_of_bounds(data: SceneData, _rows: Rows) -> Iterator[Finding]:
+    """The body never leaves the flight volume."""
+    paths, scenes = data.paths, data["scenes"]
+    if len(scenes) != 1:
+        raise UncheckedError("the scene's row is at fault")
+    radius = data.pipeline.embodiment.radius_m
+    low, high = (scenes.floats(*(f"{e}_{a}_m" for a in "xyz"))[0] for e in ("min", "max"))
+    outside = ((paths.xyz < low + radius - _LENGTH_M) | (paths.xyz > high - radius + _LENGTH_M)).any(axis=1)
+    route = np.searchsorted(paths.first, np.flatnonzero(outside), side="right") - 1
+    for k, pose in zip(*np.unique(route, return_index=True), strict=True):
+        step = int(np.flatnonzero(outside)[pose])
+        x, y, z = paths.xyz[step].tolist()
+        box = f"{radius:g} m inside {_corner(low)} to {_corner(high)}"
+        yield Finding(int(paths.rows[k]), f"pose {step - paths.first[k]} at ({x:.3f}, {y:.3f}, {z:.3f}) m", box)
+
+
+def _judged(data: SceneData, rows: Rows) -> tuple[np.ndarray, np.ndarray, Floats, Floats]:
+    """Reason and setting by the rules of `filter`, with L and d_E as they were judged there."""
+    paths = data.paths
+    length, euclidean = rows.floats("length_m")[paths.rows], rows.floats("euclidean_m")[paths.rows]
+    # A stored value that is right but for rounding decides at a threshold, as it did in filter.
+    length = np.where(np.abs(length - paths.length_m) <= _LENGTH_M, length, paths.length_m)
+    euclidean = np.where(np.abs(euclidean - paths.euclidean_m) <= _LENGTH_M, euclidean, paths.euclidean_m)
+    solved = np.full(len(length), "SOLVED")
+    actions = np.diff(paths.first).astype(np.int32)
+    detour, visible = (rows.floats(name)[paths.rows] for name in ("plan_detour", "target_visible_at_start"))
+    reason, setting = judge(solved, euclidean, length, actions, data.pipeline.filter, detour, visible)
+    return reason, setting, length, euclidean
+
+
+def _differs(data: SceneData, stored: Floats, computed: Floats, unit: str) -> Iterator[Finding]:
+    own = stored[data.paths.rows]
+    for k in np.flatnonzero(~(np.abs(own - computed) <= _LENGTH_M)):
+        yield Finding(int(data.paths.rows[k]), f"{own[k]:.9g} {unit}".strip(), f"{computed[k]:.9g} {unit}".strip())
+
+
+def _some(actions: np.ndarray) -> str:
+    shown = actions.tolist()
+    return str(shown) if len(shown) <= 8 else f"[… {', '.join(str(a) for a in shown[-8:])}]"
+
+
+def _corner(point: Floats) -> str:
+    return "(" + ", ".join(f"{v:g}" for v in point.tolist()) + ") m"

@@ -1,0 +1,200 @@
+"""Checks of the reference images: there, whole, showing something, and named once."""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Iterator
+
+import numpy as np
+
+from aerialdojo_gen.base.pictures import decode_grey
+from aerialdojo_gen.dataset.validate.registry import Finding, check
+from aerialdojo_gen.dataset.validate.rows import Rows, SceneData
+from aerialdojo_gen.dataset.validate.scene_mesh import scene_mesh
+from aerialdojo_gen.geometry.cameras import Camera, view_pose
+from aerialdojo_gen.rendering.casters import triangle_caster
+
+POSE = ("reference_x_m", "reference_y_m", "reference_z_m", "reference_yaw_rad")
+_BOX = ("box_u0_px", "box_v0_px", "box_u1_px", "box_v1_px")
+# Standard deviation of the grey values, of 255, below which a picture is a single surface or none at all.
+_BLANK = 2.0
+# Rays are cast through every so many pixels: all of them take a tenth of a second a picture.
+_EVERY = 4
+_SHARE, _EDGE = 0.002, 0.03
+# Of the picture's pixels, what a part must have to be told: 7 x 7 of 320 x 320.
+_TELL_SHARE = 0.0005
+_SAME_PLACE = 1e-6
+_SIGNATURE = b"\x89PNG\r\n\x1a\n"
+# Chunks of a PNG that carry words, and could carry where the picture was taken.
+_TELLING = frozenset({"tEXt", "zTXt", "iTXt", "eXIf"})
+
+
+@check("objects", needs=("routes",))
+def image_missing(data: SceneData, rows: Rows) -> Iterator[Finding]:
+    """An object that tasks ask for has a picture."""
+    asked = set(data["routes"].ints("target_object_id").tolist())
+    held = rows.column("reference_image").is_valid().to_numpy(zero_copy_only=False)
+    for row, object_id in enumerate(rows.ints("object_id").tolist()):
+        if object_id in asked and not held[row]:
+            yield Finding(row, "no reference_image", "a PNG: tasks ask for the object")
+
+
+@check("objects", after=("image_missing",))
+def image_damaged(_data: SceneData, rows: Rows) -> Iterator[Finding]:
+    """A picture is a whole PNG."""
+    for row, raw in enumerate(rows.column("reference_image")):
+        png = raw.as_py()
+        if png is None:
+            continue
+        # OpenCV fills in what a cut file lacks: the chunks' own checksums say whether it is whole.
+        kinds = _chunks(png)
+        if kinds[-1:] != ["IEND"] or decode_grey(png) is None:
+            yield Finding(row, f"{len(png):,} bytes that are no whole PNG", "a PNG")
+        elif told := _TELLING & set(kinds):
+            yield Finding(row, f"a PNG with words in it ({', '.join(sorted(told))})", "pixels alone")
+
+
+@check("objects", after=("image_missing", "image_damaged"))
+def image_blank(data: SceneData, rows: Rows) -> Iterator[Finding]:
+    """A picture shows something."""
+    damaged = data.flagged("objects", ("image_damaged",))
+    for row, raw in enumerate(rows.column("reference_image")):
+        if raw.as_py() is None or damaged[row]:
+            continue
+        picture = decode_grey(raw.as_py())
+        if picture is not None and float(picture.std()) < _BLANK:
+            yield Finding(row, f"grey values with a deviation of {float(picture.std()):.2f}", f"{_BLANK:g} at least")
+
+
+@check("objects", after=("image_missing", "image_damaged"))
+def image_box(data: SceneData, rows: Rows) -> Iterator[Finding]:
+    """The object's box lies in its picture and is not empty, and its share of the pixels fits into it."""
+    damaged = data.flagged("objects", ("image_damaged",))
+    boxes, fraction = rows.floats(*_BOX).reshape(-1, 4), rows.floats("image_fraction")
+    for row, raw in enumerate(rows.column("reference_image")):
+        if raw.as_py() is None or damaged[row] or np.isnan(boxes[row]).all():
+            continue
+        picture = decode_grey(raw.as_py())
+        if picture is None:
+            continue
+        height, width = picture.shape
+        u0, v0, u1, v1 = boxes[row].tolist()
+        if not (0 <= u0 < u1 <= width and 0 <= v0 < v1 <= height):
+            yield Finding(row, f"box ({u0:g}, {v0:g}) to ({u1:g}, {v1:g})", f"within {width} x {height} pixels")
+        elif not 0 < fraction[row] <= (u1 - u0) * (v1 - v0) / (width * height) + 1e-9:
+            yield Finding(row, f"image_fraction = {fraction[row]:.4g}", "more than 0, no more than the box's share")
+
+
+@check("objects", needs=("anchors", "mesh"), after=("image_missing",))
+def image_pose(data: SceneData, rows: Rows) -> Iterator[Finding]:
+    """A picture is taken from its object's selected anchor, or from behind it with nothing between the two."""
+    places = data["anchors"].floats("x_m", "y_m", "z_m", "yaw_rad").reshape(-1, 4)
+    rays, most = scene_mesh(data).rays, data.pipeline.reference_images.step_back_m
+    backs = rows.floats("step_back_m")
+    for row, pose in enumerate(rows.floats(*POSE)):
+        anchor = data.selected_of_object.get(int(rows.ints("object_id")[row]))
+        if (
+            anchor is None
+            or not np.isfinite(places[anchor]).all()
+            or not rows.column("reference_image")[row].is_valid
+        ):
+            continue
+        x, y, z, yaw = places[anchor]
+        behind = np.array([x - backs[row] * np.cos(yaw), y - backs[row] * np.sin(yaw), z, yaw])
+        if not 0.0 <= backs[row] <= most:
+            yield Finding(row, f"step_back_m = {backs[row]:.6g}", f"0 to {most:g}")
+        elif not np.abs(pose - behind).max() <= _SAME_PLACE:
+            told = ", ".join(f"{value:.4f}" for value in pose)
+            yield Finding(row, f"a camera at ({told})", f"{backs[row]:g} m behind the selected anchor, with its yaw")
+        elif backs[row] > 0.0 and not rays.visible(behind[:3], places[anchor, :3])[0]:
+            yield Finding(
+                row, f"something between the anchor and the camera {backs[row]:g} m behind it", "free sight"
+            )
+
+
+@check("objects", needs=("mesh",), after=("image_missing", "image_damaged", "image_box", "object_node", "image_pose"))
+def image_target(data: SceneData, rows: Rows) -> Iterator[Finding]:
+    """Box and share of pixels are those of the object as rays from the picture's camera find it."""
+    mesh = scene_mesh(data)
+    index = {node: k for k, node in enumerate(mesh.rays.nodes)}
+    skip = data.flagged("objects", ("image_damaged", "image_box", "object_node", "image_pose"))
+    nodes, boxes, fraction = rows.texts("mesh_node"), rows.floats(*_BOX).reshape(-1, 4), rows.floats("image_fraction")
+    for row, place in enumerate(rows.floats(*POSE)):
+        png = rows.column("reference_image")[row].as_py()
+        if png is None or skip[row] or not np.isfinite(place).all():
+            continue
+        picture = decode_grey(png)
+        if picture is None:
+            continue
+        camera = Camera(picture.shape[1], picture.shape[0], data.pipeline.reference_images.fov_deg)
+        pose = view_pose(place[:3], float(place[3]), "front")
+        directions = camera.rays()[::_EVERY, ::_EVERY].reshape(-1, 3) @ pose[:3, :3].T
+        seen = mesh.rays.first_hit(pose[:3, 3], directions)[1] == index[str(nodes[row])]
+        v, u = (k * _EVERY for k in np.unravel_index(np.flatnonzero(seen), picture[::_EVERY, ::_EVERY].shape))
+        u0, v0, u1, v1 = boxes[row].tolist()
+        share = float(seen.mean())
+        told = 0.0 if np.isnan(fraction[row]) else float(fraction[row])
+        # A pixel stands for the rays around it: along the object's edge that is a pixel more or less.
+        if abs(share - told) > _SHARE + _EDGE * told**0.5:
+            yield Finding(row, f"image_fraction = {told:.4f}", f"about {share:.4f}")
+        elif len(u) and not (u0 <= u.min() and v0 <= v.min() and u1 > u.max() and v1 > v.max()):
+            box = f"({u.min()}, {v.min()}) to ({u.max() + 1}, {v.max() + 1})"
+            yield Finding(row, f"box ({u0:g}, {v0:g}) to ({u1:g}, {v1:g})", f"one that holds {box}")
+
+
+@check("objects", needs=("mesh",), after=("image_missing", "image_damaged", "object_node", "image_pose"))
+def image_tells(data: SceneData, rows: Rows) -> Iterator[Finding]:
+    """A picture says which of the parts that make its object's name true it does not show."""
+    mesh = scene_mesh(data)
+    first = dict(zip(mesh.rays.nodes, np.cumsum([0, *(len(i.faces) for i in mesh.scene.instances)]), strict=False))
+    nodes, shown, missing = rows.texts("mesh_node"), rows.floats("tells_shown"), rows.texts("tells_missing")
+    triangles = triangle_caster(mesh.scene)
+    for row, place in enumerate(rows.floats(*POSE)):
+        png = rows.column("reference_image")[row].as_py()
+        anatomy = mesh.scene[str(nodes[row])].anatomy if nodes[row] in mesh.scene else None
+        tells = () if anatomy is None else anatomy.tells
+        if png is None or not np.isfinite(place).all() or (picture := decode_grey(png)) is None:
+            continue
+        if bool(tells) == bool(np.isnan(shown[row])):
+            yield Finding(row, f"tells_shown = {shown[row]:g}", f"{'a share' if tells else 'null'}")
+            continue
+        camera = Camera(picture.shape[1], picture.shape[0], data.pipeline.reference_images.fov_deg)
+        pose = view_pose(place[:3], float(place[3]), "front")
+        hit = (
+            triangles.first_hit(pose[:3, 3], camera.rays().reshape(-1, 3) @ pose[:3, :3].T)[1]
+            - first[str(nodes[row])]
+        )
+        counts = {tell: int(np.isin(hit, mesh.scene[str(nodes[row])].faces_of(tell)).sum()) for tell in tells}
+        least = _TELL_SHARE * picture.size
+        told = [word for word in (missing[row] or "").split(", ") if word]
+        wrong = [t for t, n in counts.items() if (t in told) != (n < least) and abs(n - least) > _EDGE * least + 2]
+        if wrong:
+            yield Finding(row, f"tells_missing = {missing[row]!r}", f"{wrong[0]} has {counts[wrong[0]]} pixels")
+        elif abs(shown[row] - (1.0 - len(told) / max(len(tells), 1))) > _SHARE and tells:
+            yield Finding(row, f"tells_shown = {shown[row]:g}", f"{1.0 - len(told) / len(tells):g}")
+        elif told:
+            yield Finding(
+                row, f"a picture that does not show {missing[row]}", "all that tells what it is", warning=True
+            )
+
+
+@check("objects")
+def image_id_twice(_data: SceneData, rows: Rows) -> Iterator[Finding]:
+    """A picture's id names one object."""
+    first: dict[str | None, int] = {}
+    for row, image_id in enumerate(rows.texts("reference_image_id")):
+        if first.setdefault(image_id, row) != row:
+            yield Finding(row, f"reference_image_id = {image_id!r}, as {rows.key(first[image_id])}", "its own")
+
+
+def _chunks(png: bytes) -> list[str]:
+    """Kinds of a PNG's chunks, in their order; none at all where one is cut or has a wrong checksum."""
+    kinds: list[str] = []
+    at = len(_SIGNATURE)
+    while png.startswith(_SIGNATURE) and at < len(png):
+        end = at + 12 + int.from_bytes(png[at : at + 4], "big")
+        if end > len(png) or zlib.crc32(png[at + 4 : end - 4]) != int.from_bytes(png[end - 4 : end], "big"):
+            return []
+        kinds.append(png[at + 4 : at + 8].decode("latin-1"))
+        at = end
+    return kinds

@@ -1,0 +1,136 @@
+"""Checks of the scenes' meshes, and of what the tables say of them: nodes, boxes, categories."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from aerialdojo_gen.base.errors import AssetError
+from aerialdojo_gen.dataset.validate.registry import Finding, check
+from aerialdojo_gen.dataset.validate.rows import Rows, SceneData
+from aerialdojo_gen.dataset.validate.scene_mesh import mesh_path, mesh_place, scene_mesh, want_meshes
+from aerialdojo_gen.pipeline.stages.work.build_scenes import scene_row
+from aerialdojo_gen.store.root import LocalRoot
+
+_SAME_M = 1e-4
+
+
+@check("scenes", needs=("mesh",))
+def mesh_outside(data: SceneData, rows: Rows) -> Iterator[Finding]:
+    """A mesh's path stays in the data directory."""
+    want_meshes(data)
+    told = str(rows.texts("mesh_path")[0])
+    away = Path(told).is_absolute() or ".." in Path(told).parts
+    # A folder that the user names may be a link to anywhere, the release's own path may not.
+    if data.meshes is None and isinstance(data.release.root, LocalRoot):
+        root = data.release.root.path.resolve()
+        away = away or not (root / told).resolve().is_relative_to(root)
+    if away:
+        yield Finding(0, f"mesh_path = {told!r}", "a path below the data directory")
+
+
+@check("scenes", needs=("mesh",), after=("mesh_outside",))
+def mesh_missing(data: SceneData, _rows: Rows) -> Iterator[Finding]:
+    """Every scene's mesh is there."""
+    want_meshes(data)
+    if data.flagged("scenes", ("mesh_outside",)).any():
+        return
+    try:
+        there = mesh_path(data).is_file()
+    except FileNotFoundError:
+        there = False
+    if not there:
+        yield Finding(0, f"no file {mesh_place(data)}", "the mesh (elsewhere: --meshes DIR; none: --no-meshes)")
+
+
+@check("scenes", needs=("mesh",), after=("mesh_outside", "mesh_missing"))
+def mesh_digest(data: SceneData, rows: Rows) -> Iterator[Finding]:
+    """A mesh's bytes have the SHA-256 of its scene."""
+    want_meshes(data)
+    if data.flagged("scenes", ("mesh_outside", "mesh_missing")).any():
+        return
+    with mesh_path(data).open("rb") as file:
+        digest = hashlib.file_digest(file, "sha256").hexdigest()
+    if digest != rows.texts("mesh_sha256")[0]:
+        yield Finding(0, f"SHA-256 {digest}", str(rows.texts("mesh_sha256")[0]))
+
+
+@check("scenes", needs=("mesh",), after=("mesh_outside", "mesh_missing", "mesh_digest"))
+def mesh_damaged(data: SceneData, _rows: Rows) -> Iterator[Finding]:
+    """A mesh is a scene file that can be read."""
+    try:
+        scene_mesh(data)
+    except AssetError as error:
+        yield Finding(0, str(error), "a scene that build-scenes wrote")
+
+
+@check("scenes", needs=("mesh",), after=("mesh_outside", "mesh_missing", "mesh_digest", "mesh_damaged"))
+def scene_of_mesh(data: SceneData, rows: Rows) -> Iterator[Finding]:
+    """What the scene's row says is so in its mesh."""
+    stored = rows.table.to_pylist()[0]
+    wanted = scene_row(scene_mesh(data).scene, stored["mesh_path"], stored["mesh_sha256"])
+    for name, value in wanted.items():
+        own = stored[name]
+        same = abs(own - value) <= _SAME_M if isinstance(value, float) else own == value
+        if not same:
+            yield Finding(0, f"{name} = {own}", str(value))
+
+
+@check("objects", needs=("mesh",))
+def object_node(data: SceneData, rows: Rows) -> Iterator[Finding]:
+    """An object's node stands in the mesh."""
+    yield from _unknown_nodes(data, rows)
+
+
+@check("landmarks", needs=("mesh",))
+def landmark_node(data: SceneData, rows: Rows) -> Iterator[Finding]:
+    """A landmark's node stands in the mesh."""
+    yield from _unknown_nodes(data, rows)
+
+
+@check("objects", needs=("mesh",), after=("object_node",))
+def object_box(data: SceneData, rows: Rows) -> Iterator[Finding]:
+    """An object's centre and size are those of its node's box."""
+    yield from _other_box(data, rows, rows.floats("size_x_m", "size_y_m", "size_z_m"))
+
+
+@check("objects", needs=("mesh",), after=("object_node",))
+def object_category(data: SceneData, rows: Rows) -> Iterator[Finding]:
+    """An object's category is its node's."""
+    scene = scene_mesh(data).scene
+    for row, (node, category) in enumerate(zip(rows.texts("mesh_node"), rows.texts("category"), strict=True)):
+        if node in scene and scene[str(node)].category != category:
+            yield Finding(row, repr(category), repr(scene[str(node)].category))
+
+
+@check("landmarks", needs=("mesh",), after=("landmark_node",))
+def landmark_box(data: SceneData, rows: Rows) -> Iterator[Finding]:
+    """A landmark's centre is that of its node's box."""
+    yield from _other_box(data, rows, None)
+
+
+def _unknown_nodes(data: SceneData, rows: Rows) -> Iterator[Finding]:
+    scene = scene_mesh(data).scene
+    for row, node in enumerate(rows.texts("mesh_node")):
+        if node not in scene:
+            yield Finding(row, f"mesh_node = {node!r}", "a node of the mesh")
+
+
+def _other_box(data: SceneData, rows: Rows, size: np.ndarray | None) -> Iterator[Finding]:
+    scene = scene_mesh(data).scene
+    centre = rows.floats("x_m", "y_m", "z_m")
+    for row, node in enumerate(rows.texts("mesh_node")):
+        if node not in scene:
+            continue
+        low, high = scene[str(node)].bounds
+        if np.abs(centre[row] - (low + high) / 2).max() > _SAME_M:
+            yield Finding(row, f"centre {_triple(centre[row])}", _triple((low + high) / 2))
+        elif size is not None and np.abs(size[row] - (high - low)).max() > _SAME_M:
+            yield Finding(row, f"size {_triple(size[row])}", _triple(high - low))
+
+
+def _triple(v: np.ndarray) -> str:
+    return "({:.4f}, {:.4f}, {:.4f}) m".format(*v.tolist())

@@ -1,0 +1,125 @@
+"""The closed loop as a check: the oracle agent, which flies the reference trajectories, succeeds at every task.
+
+So do the references as an agent can fly them (`agent_action`), which besides end where the target is seen.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from aerialdojo_gen.base.config.agreement import NEAR_GOAL_M, SUCCESS_RADIUS_M
+from aerialdojo_gen.dataset.reference_flight import LEAST_SPL, Reference, fly, shortcoming
+from aerialdojo_gen.dataset.validate.registry import ALWAYS_AFTER, Finding, UncheckedError, check
+from aerialdojo_gen.dataset.validate.rows import Ints, Mask, Rows, SceneData
+from aerialdojo_gen.dataset.validate.scene_mesh import scene_mesh
+from aerialdojo_gen.planning.flight_space import FlightSpace
+from aerialdojo_gen.rendering.sight import all_in_sight
+from aerialdojo_gen.store.schemas import APPROACH, STOP
+
+# What is wrong with a row by these makes an episode fail too, and is named better by them.
+_ROUTE_FAULTS = (
+    "list_lengths_differ", "action_order", "route_length", "keeping_rule", "out_of_bounds", "route_without_task",
+    "replay_differs", "goal_anchor", "stops_far", "route_collision", "replay_collision",
+)  # fmt: skip
+_TASK_FAULTS = ("telling_number", "task_start", "task_budget", "task_setting", "instances_agree")
+_EXPECTED = f"a success at {SUCCESS_RADIUS_M:g} m, SPL {LEAST_SPL:g} or more"
+# A stored position is the replay's to this much; it may make of the metre a little more.
+_REPLAY_M = 1e-5
+
+
+# Not sampled: a leg that the clearance grid proves free costs next to nothing.
+@check("routes", needs=("tasks", "mesh"), after=_ROUTE_FAULTS)
+def oracle_fails(data: SceneData, routes: Rows) -> Iterator[Finding]:
+    """An agent that flies the actions, by the environment's motion and collision, succeeds within the budget."""
+    paths = data.paths
+    space = FlightSpace(scene_mesh(data).scene, data.pipeline.embodiment.radius_m, scene_mesh(data).world)
+    told = _Told(data, routes)
+    for k in np.flatnonzero(~_left_out(data, _ROUTE_FAULTS)[paths.rows]).tolist():
+        row = int(paths.rows[k])
+        if told.task_of_route[row] < 0:
+            continue
+        reference = told.reference(row, paths.action[paths.of(k)].tolist())
+        lack = shortcoming(fly(space, reference), reference.length_m, SUCCESS_RADIUS_M)
+        if lack:
+            yield Finding(row, lack, _EXPECTED)
+
+
+@check(
+    "routes",
+    needs=("tasks", "objects", "mesh"),
+    after=(*_ROUTE_FAULTS, "oracle_fails", "unknown_target", "agent_action"),
+)
+def agent_action_fails(data: SceneData, routes: Rows) -> Iterator[Finding]:
+    """The list agent_action is an agent's: flown it stops within 1 m of the anchor, the target in sight."""
+    if "agent_action" not in routes.table.column_names:
+        raise UncheckedError("the routes have no agent_action, which an older version did not write")
+    scene, paths = scene_mesh(data).scene, data.paths
+    space = FlightSpace(scene, data.pipeline.embodiment.radius_m, scene_mesh(data).world)
+    told, nodes = _Told(data, routes), data["objects"].texts("mesh_node")
+    left_out = _left_out(data, (*_ROUTE_FAULTS, "oracle_fails", "unknown_target"))
+    lists = routes.column("agent_action").to_pylist()
+    stops: list[tuple[int, str, tuple[float, float, float]]] = []
+    for k in np.flatnonzero(~left_out[paths.rows]).tolist():
+        row = int(paths.rows[k])
+        target = int(data.target_of_route[row])
+        if told.task_of_route[row] < 0 or target < 0:
+            continue
+        if lists[row] is None:  # an older version wrote it
+            continue
+        actions = [-1 if action is None else action for action in lists[row] or []]
+        wrong = [action for action in actions if not 0 <= action < APPROACH]
+        if wrong or STOP in actions[:-1] or actions[-1:] != [STOP]:
+            what = f"action {wrong[0]}" if wrong else "no Stop at its end alone"
+            yield Finding(row, what, "actions 0 to 15, of which the last alone is 0 (Stop)")
+            continue
+        where, own = paths.of(k), paths.action[paths.of(k)]
+        if actions == own[own != APPROACH].tolist():
+            # These have been flown by the check above, to where the Approach begins.
+            end = tuple(paths.xyz[where][-2 if own[-2] == APPROACH else -1].tolist())
+        else:
+            flown = fly(space, told.reference(row, actions))
+            lack = shortcoming(flown, 0.0, SUCCESS_RADIUS_M)
+            if lack:
+                yield Finding(row, lack, f"a success at {SUCCESS_RADIUS_M:g} m")
+                continue
+            end = flown.position
+        away = math.dist(end, told.goal[row])
+        if away > NEAR_GOAL_M + _REPLAY_M:
+            yield Finding(row, f"a Stop {away:.3f} m from the anchor", f"{NEAR_GOAL_M:g} m at most")
+        elif (node := nodes[target]) in scene:
+            stops.append((row, str(node), end))
+    ends = np.array([end for _, _, end in stops]).reshape(-1, 3)
+    for k in np.flatnonzero(~all_in_sight(scene, [node for _, node, _ in stops], ends)).tolist():
+        yield Finding(stops[k][0], "a Stop from where no straight line reaches the target", "the target in sight")
+
+
+class _Told:
+    """What the tables tell of routes' episodes."""
+
+    def __init__(self, data: SceneData, routes: Rows) -> None:
+        tasks = data["tasks"]
+        # Instances agree in all that matters here: one tells.
+        self.task_of_route: Ints = tasks.find("nav_id", routes.column("nav_id"))
+        self._start = tasks.floats("start_x_m", "start_y_m", "start_z_m", "start_yaw_rad").tolist()
+        self._budget = tasks.ints("action_budget").tolist()
+        self._length_m = routes.floats("length_m").tolist()
+        self.goal: list[list[float]] = routes.floats("goal_x_m", "goal_y_m", "goal_z_m").tolist()
+
+    def reference(self, row: int, actions: Sequence[int]) -> Reference:
+        """Make the reference of a route's row, which has a task, of some actions."""
+        task = int(self.task_of_route[row])
+        x, y, z, yaw = self._start[task]
+        goal_x, goal_y, goal_z = self.goal[row]
+        budget, length_m = self._budget[task], self._length_m[row]
+        return Reference((x, y, z, yaw), (goal_x, goal_y, goal_z), budget, length_m, actions)
+
+
+def _left_out(data: SceneData, faults: tuple[str, ...]) -> Mask:
+    """Routes that are not flown, for something else is wrong with them or their task."""
+    left_out = data.flagged("routes", (*ALWAYS_AFTER, *faults))
+    faulty_tasks = data.flagged("tasks", (*ALWAYS_AFTER, *_TASK_FAULTS))
+    left_out[data.route_of_task[faulty_tasks & (data.route_of_task >= 0)]] = True
+    return left_out

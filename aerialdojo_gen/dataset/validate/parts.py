@@ -1,0 +1,203 @@
+"""The files of a release: which there should be, what they hold, and which do not belong."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import PurePosixPath
+
+import pyarrow as pa
+
+from aerialdojo_gen.base.errors import DamagedFile
+from aerialdojo_gen.dataset.contents import FOLDER, SHARDS, part_name
+from aerialdojo_gen.dataset.validate.registry import Fault, Outcome
+from aerialdojo_gen.dataset.validate.rows import Rows
+from aerialdojo_gen.store import shards as store
+from aerialdojo_gen.store.parquet_files import read_file
+from aerialdojo_gen.store.root import DataRoot, LocalRoot, Where, open_root
+from aerialdojo_gen.store.schemas import TableSpec
+from aerialdojo_gen.store.tables import content_digest
+
+# What lies beside the tables of a release: its cards, its licence, what a hub's client leaves, pictures of it.
+_BESIDE = {
+    "README.md",
+    "croissant.json",
+    "pipeline.json",
+    "LICENSE",
+    "CITATION.cff",
+    ".gitattributes",
+    "figures",
+    "stats",
+}
+
+# Tables without which a scene's tasks mean nothing; a split may have none of a scene's tasks.
+_FEW = ("release/scenes", "release/landmarks", "release/objects", "release/anchors")
+
+
+def release_tables() -> dict[str, list[str]]:
+    """Return the keys of `store.LAYOUT` that make up each table of a release, by the table's name."""
+    keys: dict[str, list[str]] = {}
+    for key in SHARDS:
+        keys.setdefault(store.LAYOUT[key].spec.name, []).append(key)
+    return keys
+
+
+@dataclass(frozen=True)
+class Release:
+    """Where a release lies."""
+
+    root: DataRoot  # What holds it: meshes are named relative to this
+    folder: str = FOLDER  # The release's folder there; empty where it is the root itself
+
+    def name(self, relative: str) -> str:
+        """Return the name of a file of the release, relative to the root."""
+        return f"{self.folder}/{relative}" if self.folder else relative
+
+    def at(self, relative: str) -> str:
+        """Return where a file of the release lies, as messages say it."""
+        return self.root.at(self.name(relative))
+
+
+def release_of(where: Release | Where) -> Release:
+    """Find the release in a data root; a release by itself, with or without meshes beside it, is one too."""
+    if isinstance(where, Release):
+        return where
+    root = open_root(where)
+    if root.exists(FOLDER):
+        return Release(root)
+    above, _, name = root.url.rstrip("/").rpartition("/")
+    # The root of a disk, or a whole bucket, lies in nothing.
+    if not name or above.endswith(":/"):
+        return Release(root, "")
+    return Release(open_root(above or "/"), name)
+
+
+def part_path(key: str, scene: str) -> str:
+    """Return where a scene's part lies, relative to the release."""
+    return part_name(key, scene, "")
+
+
+def foreign_files(release: Release, scenes: list[str]) -> Outcome:
+    """Find what does not belong: no part of a scene, no card."""
+    wanted = {part_path(key, scene) for keys in release_tables().values() for key in keys for scene in scenes}
+    outcome = Outcome("foreign_file", "files")
+    names = release.root.list(release.folder, "**/*")
+    folders = {str(parent) for name in names for parent in PurePosixPath(name).parents}
+    for name in names:
+        relative = PurePosixPath(name).relative_to(release.folder)
+        if name in folders or _is_empty_folder(release.root, name):
+            continue
+        outcome.rows += 1
+        if relative.as_posix() in wanted or relative.parts[0] in _BESIDE:
+            continue
+        outcome.faults.append(
+            Fault("foreign_file", "", "", relative.as_posix(), "", "a file that is no part of a release", "none")
+        )
+    return outcome
+
+
+def _is_empty_folder(root: DataRoot, name: str) -> bool:
+    """Whether it is a folder without anything in it, which only a file system has."""
+    if not isinstance(root, LocalRoot):
+        return False
+    path = root.path / name
+    return path.is_dir() and not path.is_symlink()
+
+
+def read_tables(release: Release, scene: str) -> tuple[dict[str, Rows], list[Outcome]]:
+    """Read a scene's tables, as far as they can be read."""
+    found = {name: Outcome(name, "files") for name in PART_CHECKS}
+    runs: dict[str, str] = {}
+    tables = {}
+    for name, keys in release_tables().items():
+        parts = [_read(release, key, scene, found, runs) for key in keys]
+        if any(part is None for part in parts):
+            continue
+        whole = [part for part in parts if part is not None]
+        ends = [sum(t.num_rows for t in whole[: k + 1]) for k in range(len(whole))]
+        paths = tuple(part_path(key, scene) for key in keys)
+        tables[name] = Rows(name, store.LAYOUT[keys[0]].spec, pa.concat_tables(whole), paths, tuple(ends))
+    _one_run(scene, runs, found["part_of_other_run"])
+    return tables, list(found.values())
+
+
+PART_CHECKS = {
+    "part_missing": "Every scene has its part of every table.",
+    "part_damaged": "A part can be read, checksums included.",
+    "part_schema": "A part has the declared columns, types and units.",
+    "leaking_column": "Tasks have no column beside the declared ones.",
+    "part_rows": "A scene has one row in scenes, and is not without landmarks, objects or anchors.",
+    "part_content": "A part's rows are those that its footer's digest was made of.",
+    "part_of_other_run": "A scene's parts were written by one run of split.",
+}
+
+
+def _read(release: Release, key: str, scene: str, found: dict[str, Outcome], runs: dict[str, str]) -> pa.Table | None:
+    spec = store.LAYOUT[key].spec
+    relative = part_path(key, scene)
+    name, where = release.name(relative), release.at(relative)
+
+    def fault(check: str, what: str, expected: str) -> None:
+        found[check].faults.append(Fault(check, scene, spec.name, relative, "", what, expected))
+
+    found["part_missing"].rows += 1
+    try:
+        path = release.root.local_copy(name)
+    except FileNotFoundError:
+        path = None
+    if path is None or not path.is_file():
+        fault("part_missing", "no file", f"the {spec.name} of {scene}")
+        return None
+    found["part_damaged"].rows += 1
+    try:
+        table, info = read_file(path, None, where), store.read_info(release.root, name)
+    except DamagedFile as error:
+        fault("part_damaged", str(error).removeprefix(f"{where} ").split(": delete")[0], "a whole Parquet file")
+        return None
+    found["part_schema"].rows += 1
+    runs[relative] = info.fingerprint
+    found["part_content"].rows += 1
+    if content_digest(table) != info.content:
+        fault("part_content", "other rows than its footer tells of", f"rows of SHA-256 {info.content[:12]}…")
+    extra = [name for name in table.column_names if name not in spec.schema.names]
+    if spec.name == "tasks":
+        found["leaking_column"].rows += 1
+        if extra:
+            fault("leaking_column", f"columns {', '.join(extra)}", "what an agent may know, no more")
+            table, extra = table.drop_columns(extra), []
+    wrong = list(_schema_faults(spec, table, extra))
+    if wrong:
+        fault("part_schema", "; ".join(wrong), f"the columns of {spec.name}")
+        return None
+    found["part_rows"].rows += 1
+    if key in _FEW and not (table.num_rows == 1 if key == "release/scenes" else table.num_rows):
+        fault("part_rows", f"{table.num_rows} rows", "one row" if key == "release/scenes" else "at least one")
+        return None
+    return table.replace_schema_metadata(None).cast(pa.schema([pa.field(f.name, f.type) for f in spec.schema]))
+
+
+def _one_run(scene: str, runs: dict[str, str], outcome: Outcome) -> None:
+    """Name the parts whose fingerprint is not that of most of the scene's parts."""
+    outcome.rows = len(runs)
+    for fingerprint, _ in Counter(runs.values()).most_common()[1:]:
+        for part in (part for part, own in runs.items() if own == fingerprint):
+            told = f"written by run {fingerprint[:12] or '(none)'}", "the run of the scene's other parts"
+            outcome.faults.append(Fault(outcome.check, scene, "", part, "", *told))
+
+
+def _schema_faults(spec: TableSpec, table: pa.Table, extra: list[str]) -> Iterator[str]:
+    if extra:
+        yield f"unknown columns {', '.join(extra)}"
+    missing = [name for name in spec.schema.names if name not in table.column_names]
+    if missing:
+        yield f"no columns {', '.join(missing)}"
+        return
+    for field in spec.schema:
+        own = table.schema.field(field.name)
+        if own.type != field.type:
+            yield f"{field.name} is {own.type}, not {field.type}"
+        elif (own.metadata or {}).get(b"unit") != (field.metadata or {}).get(b"unit"):
+            yield f"{field.name} is in another unit than {(field.metadata or {}).get(b'unit', b'none').decode()}"
+    if not extra and table.column_names != spec.schema.names:
+        yield "columns in another order"

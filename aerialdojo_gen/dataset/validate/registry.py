@@ -1,0 +1,117 @@
+"""What a check is, and how checks run over a scene."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+
+from aerialdojo_gen.base.errors import AerialDojoError
+from aerialdojo_gen.dataset.validate.rows import Rows, SceneData
+
+TABLES = ("scenes", "landmarks", "objects", "anchors", "viewpoints", "routes", "tasks")
+# A row without a value, or with one out of this world, is named once and not judged by what builds on it.
+ALWAYS_AFTER = ("null_value", "not_finite", "unknown_word", "wrong_part")
+
+
+class Fault(NamedTuple):
+    """One row, part or table at fault."""
+
+    check: str  # Stable name of the check
+    scene: str  # Name of the scene, empty for the release as a whole
+    table: str  # Name of the table, empty for what is no table
+    part: str  # File, relative to the release
+    key: str  # Which row, e.g. ``"nav_id=U_Mall_0-3f0c51d2a9be"``; empty for a whole part
+    found: str  # What stands there and what should
+    expected: str
+
+
+class Finding(NamedTuple):
+    """A row at fault, by its number: what a check yields; a warning is no fault, and worth knowing."""
+
+    row: int
+    found: str
+    expected: str
+    warning: bool = False
+
+
+Function = Callable[[SceneData, Rows], Iterable[Finding]]
+
+
+@dataclass(frozen=True)
+class Check:
+    """A check of one table's rows."""
+
+    name: str  # Stable name; reports and tests go by it
+    table: str  # The table whose rows it judges; ``"*"`` for each of them
+    needs: tuple[str, ...]  # Other tables that it reads; ``"mesh"`` is the scene's mesh
+    after: tuple[str, ...]  # Checks of the same table: rows at fault by them are not judged again
+    about: str  # What must be so
+    run: Function  # Yields the rows at fault
+    samples: bool = False
+
+
+@dataclass
+class Outcome:
+    """What a check did on a scene, or on the whole release."""
+
+    check: str  # Name of the check and of the table
+    table: str
+    rows: int = 0  # Rows that were judged
+    faults: list[Fault] = field(default_factory=list)  # The rows at fault
+    skipped: str = ""  # Why nothing was judged; empty where it was
+    warnings: list[Fault] = field(default_factory=list)  # Rows that are worth knowing of and at no fault
+
+
+CHECKS: list[Check] = []
+
+
+def check(
+    table: str, *, needs: tuple[str, ...] = (), after: tuple[str, ...] = (), samples: bool = False
+) -> Callable[[Function], Function]:
+    """Register a function as a check: its name is the check's, its docstring says what must be so."""
+
+    def register(function: Function) -> Function:
+        about = (function.__doc__ or "").strip().splitlines()[0]
+        CHECKS.append(Check(function.__name__, table, needs, after, about, function, samples))
+        return function
+
+    return register
+
+
+class UncheckedError(Exception):
+    """A check cannot be made, and why."""
+
+
+def run_checks(data: SceneData, checks: Iterable[Check]) -> Iterator[Outcome]:
+    """Run checks over a scene in their order."""
+    for one in checks:
+        for table in TABLES if one.table == "*" else (one.table,):
+            yield _run(data, one, table)
+
+
+def _run(data: SceneData, one: Check, table: str) -> Outcome:
+    missing = [name for name in (table, *one.needs) if name != "mesh" and name not in data.tables]
+    if missing:
+        return Outcome(one.name, table, skipped=f"{missing[0]} cannot be read")
+    rows = data[table]
+    left_out = data.flagged(table, (*(n for n in ALWAYS_AFTER if n != one.name), *one.after))
+    try:
+        findings = [f for f in one.run(data, rows) if not left_out[f.row]]
+    except UncheckedError as reason:
+        return Outcome(one.name, table, skipped=str(reason))
+    except AerialDojoError:
+        raise
+    except Exception as error:
+        raise RuntimeError(f"{data.scene}: check {one.name} of {table} failed: {error}") from error
+    mask = np.zeros(len(rows), dtype=np.bool_)
+    mask[[f.row for f in findings if not f.warning]] = True
+    data.faulty[table, one.name] = mask
+    told: dict[bool, list[Fault]] = {False: [], True: []}
+    for f in findings:
+        fault = Fault(one.name, data.scene, table, rows.part(f.row), rows.key(f.row), f.found, f.expected)
+        told[f.warning].append(fault)
+    judged = ~left_out[data.sampled_rows(table)] if one.samples else ~left_out
+    return Outcome(one.name, table, int(judged.sum()), told[False], warnings=told[True])

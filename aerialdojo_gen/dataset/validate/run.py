@@ -1,0 +1,163 @@
+"""Run every check over a release, a scene at a time, in one process or several."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from aerialdojo_gen.base.config.pipeline import Pipeline
+from aerialdojo_gen.base.errors import AerialDojoError
+from aerialdojo_gen.base.names import choose_scenes
+from aerialdojo_gen.dataset.contents import release_scenes
+from aerialdojo_gen.dataset.validate import (
+    anchors,
+    collisions,
+    detours,
+    difficulty,
+    geometry,
+    gltf,
+    id_leaks,
+    images,
+    leaks,
+    meshes,
+    oracle,
+    pictures,
+    tables,
+)
+from aerialdojo_gen.dataset.validate import below_ground as underground
+from aerialdojo_gen.dataset.validate import descriptions as words
+from aerialdojo_gen.dataset.validate import endpoints as ends
+from aerialdojo_gen.dataset.validate import foreign_keys as links
+from aerialdojo_gen.dataset.validate import reachability as shut_in
+from aerialdojo_gen.dataset.validate.counts import Tally, scene_counts, tally_of, whole_counts
+from aerialdojo_gen.dataset.validate.parts import (
+    Release,
+    foreign_files,
+    part_path,
+    read_tables,
+    release_of,
+    release_tables,
+)
+from aerialdojo_gen.dataset.validate.registry import CHECKS, Outcome, run_checks
+from aerialdojo_gen.dataset.validate.report import Report
+from aerialdojo_gen.dataset.validate.rows import SceneData
+from aerialdojo_gen.pipeline.executors import Folders, make_executor, on_disk
+from aerialdojo_gen.pipeline.interrupt import Interrupts
+from aerialdojo_gen.pipeline.progress import Reporter
+from aerialdojo_gen.store.root import Where
+
+# What a process is taken to need, megabytes; not measured.
+MEMORY_MB = 1500
+# A check looks at what those before it found fault with, so that their order is fixed here.
+_MODULES = (
+    tables,
+    geometry,
+    leaks,
+    links,
+    ends,
+    meshes,
+    gltf,
+    words,
+    anchors,
+    collisions,
+    underground,
+    shut_in,
+    detours,
+    difficulty,
+    oracle,
+    images,
+    pictures,
+    id_leaks,
+)
+SCENE_CHECKS = tuple(one for module in _MODULES for one in CHECKS if one.run.__module__ == module.__name__)
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What to check."""
+
+    release: Release | Where  # The data root, or the release's own folder
+    scenes: tuple[str, ...] = ()  # Names or globs; empty for all
+    meshes: Path | None = None
+    use_meshes: bool = True  # False leaves everything that needs a mesh unchecked, and the report says so
+    sample: int | None = None  # Routes a scene that FCL is asked about; None for all
+    pictures: int | None = None  # Reference images a scene that are drawn anew; None for all
+    pipeline: Pipeline = field(default_factory=Pipeline)  # Whose definitions the release is held to
+
+
+@dataclass(frozen=True)
+class _Work:
+    asked: Asked
+    scene: str
+
+    @property
+    def label(self) -> str:
+        return f"validate {self.scene}"
+
+    def moved(self, place: Callable[[Path], Path]) -> _Work:
+        """Return the same work for a machine where the props lie elsewhere."""
+        pipeline = self.asked.pipeline
+        if pipeline.scene_assets is None:
+            return self
+        pipeline = pipeline.model_copy(update={"scene_assets": place(pipeline.scene_assets)})
+        return replace(self, asked=replace(self.asked, pipeline=pipeline))
+
+
+def validate(
+    asked: Asked,
+    *,
+    workers: int | None = 1,
+    executor: str = "local",
+    address: str | None = None,
+    reporter: Reporter | None = None,
+) -> Report:
+    """Check a release."""
+    reporter = reporter or Reporter(quiet=True)
+    release = release_of(asked.release)
+    asked = replace(asked, release=release)
+    every = release_scenes(release.root, release.folder)
+    chosen = choose_scenes(asked.scenes, every)
+    by_scene: dict[str, tuple[list[Outcome], Tally]] = {}
+    shared = on_disk(release.root, *([asked.meshes] if asked.meshes else []))
+    assets = asked.pipeline.scene_assets
+    made = make_executor(executor, workers, address, Folders(shared, (assets,) if assets else (), (), reporter.line))
+    work = [_Work(asked, scene) for scene in _large_first(release, chosen)]
+    with Interrupts() as interrupts, made as pool, reporter.bar("validate", len(chosen)) as bar:
+        for done in pool.map(_check, work, memory_mb=MEMORY_MB):
+            interrupts.check()
+            if isinstance(done, AerialDojoError):
+                raise done
+            by_scene[done[1].scene] = done
+            bar.advance()
+    outcomes = [foreign_files(release, every)]
+    outcomes += [outcome for scene in chosen for outcome in by_scene[scene][0]]
+    tallies = [by_scene[scene][1] for scene in chosen]
+    outcomes += whole_counts(release, tallies, asked.pipeline, len(chosen) == len(every))
+    return Report(tuple(chosen), tuple(outcomes))
+
+
+def check_scene(asked: Asked, scene: str) -> tuple[list[Outcome], Tally]:
+    """Check one scene of a release."""
+    release = release_of(asked.release)
+    found, outcomes = read_tables(release, scene)
+    data = SceneData(scene, release, asked.pipeline, found, asked.meshes, asked.use_meshes, asked.sample,
+                     asked.pictures)  # fmt: skip
+    tally = tally_of(data, len(found) == len(release_tables()))
+    outcomes += run_checks(data, SCENE_CHECKS)
+    outcomes.append(scene_counts(data, tally))
+    return outcomes, tally
+
+
+def _check(work: _Work) -> tuple[list[Outcome], Tally]:
+    return check_scene(work.asked, work.scene)
+
+
+def _large_first(release: Release, scenes: Sequence[str]) -> list[str]:
+    """Order scenes so that no process is left alone with a large one at the end."""
+
+    def size(scene: str) -> int:
+        names = [release.name(part_path(key, scene)) for key in ("routes/train", "routes/test")]
+        return sum(release.root.size(name) for name in names if release.root.exists(name))
+
+    return sorted(scenes, key=lambda scene: (-size(scene), scene))

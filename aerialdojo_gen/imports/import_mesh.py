@@ -1,0 +1,419 @@
+"""From a file's nodes to a scene like those of recipes: axes, units, repair, instances, ground, ceiling."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import shapely
+import trimesh
+from numpy.typing import NDArray
+
+from aerialdojo_gen.annotations.describing import UNKNOWN
+from aerialdojo_gen.base.errors import AssetError, UsageError
+from aerialdojo_gen.imports.cutting import Region, bodies_of, unique_rows
+from aerialdojo_gen.imports.material_builder import LIGHTS, Skinner, photographed
+from aerialdojo_gen.imports.naming import Naming
+from aerialdojo_gen.imports.raw import RawNode, cut_to, in_place_order, joined
+from aerialdojo_gen.imports.split_components import taken_apart
+from aerialdojo_gen.imports.surfaces import SKY, decided, domes_of, told
+from aerialdojo_gen.scenes.catalogue import single
+from aerialdojo_gen.scenes.mesh import areas
+from aerialdojo_gen.scenes.model import Instance, Material, Part, Scene
+from aerialdojo_gen.scenes.sampling import colour_words, shown_colours
+
+Floats = NDArray[np.float64]
+
+LARGEST_M = 2000.0
+SMALLEST_M = 5.0
+# Cells of half a metre that planning keeps a few bytes each of.
+_MOST_CELLS = 150e6
+_MARGIN_M = 5.0
+_HEADROOM_M = 6.0
+_LOWEST_CEILING_M = 12.0
+_GROUND_COVER = 0.97
+_CLUTTER_M = 0.5
+_MOST_INSTANCES = 3000
+_LEAST_AREA_M2 = 1e-9
+_LEVEL_SHARE = 0.7
+_WELD_M = 1e-4
+_GROUND = (122, 132, 108)
+_MOST_NOTES = 8
+
+
+@dataclass
+class Repairs:
+    """What was found and how it was mended, for the user to read."""
+
+    lines: list[str] = field(default_factory=list)
+    origin_m: tuple[float, float, float] = (0.0, 0.0, 0.0)  # (x, y, z)
+
+    def add(self, n: int, text: str) -> None:
+        """Note a repair of n things, if there were any."""
+        if n:
+            self.lines.append(f"{n:,} {text}")
+
+
+@dataclass(frozen=True, eq=False)
+class Place:
+    """A foreign mesh in metres, z up, mended, before any of it is cut away."""
+
+    bodies: list[RawNode]  # What stands there, and the skies around it; in the order of their places
+    domes: list[RawNode]
+    repairs: Repairs  # What was mended
+
+    @classmethod
+    def of(cls, nodes: Sequence[RawNode], up: str, scale: float, naming: Naming | None = None) -> Place:
+        """Turn, scale and mend the nodes of a file; errors as of `adopt`."""
+        check_options(up, scale)
+        repairs = Repairs()
+        bodies = [b for node in nodes for b in [_sound(_turned(node, up, scale), repairs)] if len(b.faces)]
+        if not bodies:
+            raise AssetError("no triangle is left after repair: the mesh is empty or degenerate")
+        # Lines of repairs, too, must not depend on the order in which a reader gives the nodes.
+        repairs.lines.sort()
+        bodies = in_place_order(bodies)
+        called = [naming.told(b.name).category if naming else "" for b in bodies]
+        domes = domes_of(bodies, called)
+        rest = [b for k, b in enumerate(bodies) if k not in domes]
+        return cls(rest, [bodies[k] for k in domes], repairs)
+
+    @property
+    def low(self) -> Floats:
+        """Lower corner of what stands there, (3,) float64, metres."""
+        return _bounds(self.bodies)[0]
+
+    @property
+    def high(self) -> Floats:
+        """Upper corner, (3,) float64, metres."""
+        return _bounds(self.bodies)[1]
+
+    def within(self, region: Region) -> Place:
+        """Cut away what lies outside a region; AssetError where nothing is left, with what lies where."""
+        cut = [_sound(cut_to(b, region), Repairs()) for b in self.bodies]
+        kept = [b for b in cut if len(b.faces)]
+        if not kept:
+            raise AssetError(f"{region.said}: nothing of the mesh lies there: {lies(self.bodies)}")
+        return Place(kept, self.domes, self.repairs)
+
+
+def lies(bodies: Sequence[RawNode]) -> str:
+    """Say the ranges of x and y of bodies, and about where most of their triangles lie."""
+    low, high = _bounds(bodies)
+    middles = np.concatenate([b.vertices[b.faces].mean(axis=1)[:, :2] for b in bodies])
+    cell = max(float((high - low)[:2].max()) / 10, 1e-9)
+    places, n = np.unique(np.floor((middles - low[:2]) / cell).astype(np.int64), axis=0, return_counts=True)
+    x, y = low[:2] + (places[np.argmax(n)] + 0.5) * cell
+    return (
+        f"x is {low[0]:.7g} to {high[0]:.7g}, y {low[1]:.7g} to {high[1]:.7g} m, densest about x {x:.0f}, y {y:.0f} "
+        f"({int(n.max()):,} of {len(middles):,} triangles)"
+    )
+
+
+def size_text(size: Floats) -> str:
+    """Write lengths in metres, three digits of small ones: ``"1,250 by 84.5 by 12 m"``."""
+    return f"{' by '.join(f'{s:,.0f}' if s >= 99.95 else f'{s:.3g}' for s in size.tolist())} m"
+
+
+def check_options(up: str | None, scale: float | None, light: str = "auto") -> None:
+    """Refuse what says of no mesh how it lies: a `UsageError`, before any mesh is read."""
+    if up not in (None, "y", "z"):
+        raise UsageError(f"--up {up[:20]!r}: must be z or y, the mesh's axis that points up")
+    if scale is not None and not (math.isfinite(scale) and scale > 0):
+        raise UsageError(f"--scale {scale}: must be a number above 0")
+    if light not in LIGHTS:
+        raise UsageError(f"--light {light[:20]!r}: must be {', '.join(LIGHTS[:-1])} or {LIGHTS[-1]}")
+
+
+def adopt(
+    name: str,
+    nodes: Sequence[RawNode],
+    *,
+    up: str = "z",
+    scale: float = 1.0,
+    crop_m: tuple[float, float, float] | None = None,
+    box_m: tuple[float, float, float, float] | None = None,
+    ceiling_m: float | None = None,
+    naming: Naming | None = None,
+    light: str = "auto",
+) -> tuple[Scene, Repairs]:
+    """Make a scene of a foreign mesh, its origin in the middle at the ground.
+
+    Returns the scene and what was repaired.
+    """
+    place = Place.of(nodes, up, scale, naming)
+    return settled(name, place, region_of(crop_m, box_m), ceiling_m=ceiling_m, naming=naming, light=light)
+
+
+def region_of(
+    crop_m: tuple[float, float, float] | None, box_m: tuple[float, float, float, float] | None
+) -> Region | None:
+    """Return the part that is kept; UsageError for two of them, or one without an area."""
+    if crop_m is not None and box_m is not None:
+        raise UsageError("--crop and --box both say what to keep: give one of them")
+    numbers = crop_m or box_m or ()
+    if not all(math.isfinite(v) and abs(v) < 1e7 for v in numbers):
+        raise UsageError("--crop and --box take numbers of metres")
+    if crop_m is not None:
+        if crop_m[2] <= 0:
+            raise UsageError(f"--crop {crop_m[0]:g} {crop_m[1]:g} {crop_m[2]:g}: the radius must be above 0")
+        return Region.circle(*crop_m)
+    if box_m is not None:
+        if box_m[0] == box_m[2] or box_m[1] == box_m[3]:
+            raise UsageError("--box X0 Y0 X1 Y1: the two corners must differ in x and in y")
+        return Region.box(*box_m)
+    return None
+
+
+def settled(
+    name: str,
+    place: Place,
+    region: Region | None = None,
+    *,
+    ceiling_m: float | None = None,
+    naming: Naming | None = None,
+    origin_m: Floats | None = None,
+    light: str = "auto",
+) -> tuple[Scene, Repairs]:
+    """Make a scene of a place, or of the part of it in `region`; returns the scene and what was repaired."""
+    check_options(None, None, light)
+    repairs = Repairs(list(place.repairs.lines))
+    part = place if region is None else place.within(region)
+    bodies = part.bodies
+    low, high = part.low, part.high
+    _check_extent(high - low, bodies)
+    bodies, apart = taken_apart(bodies)
+    repairs.lines += apart.lines()
+    shift = np.array([(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, low[2]]) if origin_m is None else origin_m
+    repairs.origin_m = (float(shift[0]), float(shift[1]), float(shift[2]))
+    bodies = _merged_clutter(_moved(in_place_order(bodies), -shift))
+    domes = _moved(part.domes, -shift)
+    skinner = Skinner(light == "baked" or (light == "auto" and photographed(bodies)))
+    skinner.scale([*bodies, *domes])
+    parts = skinner.materials
+    dressed = [(b, made) for b in bodies for made in [_parts(b, skinner, repairs)] if made]
+    instances = _named(dressed, naming or Naming(), parts)
+    if not instances:
+        raise AssetError("no triangle is left after repair: the mesh is empty or degenerate")
+    instances = [
+        replace(instance, surface="solid" if bodies_of(body.faces, len(body.vertices))[1].all() else "sheet")
+        for instance, (body, _) in zip(instances, dressed, strict=True)
+    ]
+    called = {instance.node: body.name for instance, (body, _) in zip(instances, dressed, strict=True)}
+    backdrop = tuple(
+        Instance(f"{SKY}_{k:04d}", SKY, "", {}, _parts(dome, skinner, Repairs()), surface="dome")
+        for k, dome in enumerate(domes)
+    )
+    _tell_textures([*bodies, *domes], skinner, light, repairs)
+    low, high = low - shift, high - shift
+    cover = _ground_cover(instances, low, high)
+    if cover < _GROUND_COVER:
+        instances.insert(0, _ground_plane(low, high, parts))
+        repairs.lines.append(f"level ground laid under it (the mesh covers {cover:.0%} of its extent)")
+    top = max(float(high[2]) + _HEADROOM_M, float(low[2]) + _LOWEST_CEILING_M) if ceiling_m is None else ceiling_m
+    bounds = np.array(
+        [[low[0] - _MARGIN_M, low[1] - _MARGIN_M, low[2]], [high[0] + _MARGIN_M, high[1] + _MARGIN_M, top]]
+    )
+    if region is not None:
+        # What is cut open at the border is shut by the end of the flight volume.
+        bounds[0, :2] = np.maximum(bounds[0, :2], region.low - shift[:2])
+        bounds[1, :2] = np.minimum(bounds[1, :2], region.high - shift[:2])
+    scene = decided(Scene(name, tuple(instances), parts, bounds, imported=True, backdrop=backdrop), called)
+    repairs.lines += told(scene)
+    return replace(scene, imported=False), repairs
+
+
+def _moved(bodies: Sequence[RawNode], by_m: Floats) -> list[RawNode]:
+    return [b.placed(b.vertices + by_m) for b in bodies]
+
+
+def _turned(node: RawNode, up: str, scale: float) -> RawNode:
+    v = node.vertices * scale
+    if up == "y":
+        v = np.column_stack([v[:, 0], -v[:, 2], v[:, 1]])
+    return node.placed(v)
+
+
+def _sound(node: RawNode, repairs: Repairs) -> RawNode:
+    """Drop faces that are no triangles of finite size; weld vertices, so that neighbours are known."""
+    faces = node.faces
+    inside = ((faces >= 0) & (faces < len(node.vertices))).all(axis=1)
+    finite = np.asarray(np.isfinite(node.vertices).all(axis=1) & (np.abs(node.vertices) < 1e7).all(axis=1))
+    ok = np.array(inside)
+    ok[inside] = finite[faces[inside]].all(axis=1)
+    repairs.add(int((~ok).sum()), f"triangles of {node.name or 'the mesh'} with no place (NaN, infinite) dropped")
+    node = node.some(ok)
+    used, faces = np.unique(node.faces, return_inverse=True)
+    vertices = node.vertices[used]
+    if len(vertices):
+        first, same, _ = unique_rows(*np.round(vertices / _WELD_M).T)
+        vertices, faces = vertices[first], same[faces.reshape(-1)]
+    faces = faces.reshape(-1, 3).astype(np.int64)
+    solid = _areas(vertices, faces) > _LEAST_AREA_M2 if len(faces) else np.zeros(0, dtype=bool)
+    repairs.add(int((~solid).sum()), f"triangles of {node.name or 'the mesh'} without area dropped")
+    return node.placed(vertices, faces).some(solid)
+
+
+def _areas(vertices: Floats, faces: NDArray[np.int64]) -> Floats:
+    return areas(vertices, faces.astype(np.int32))
+
+
+def _bounds(bodies: Sequence[RawNode]) -> tuple[Floats, Floats]:
+    low = np.min([b.vertices.min(axis=0) for b in bodies], axis=0)
+    high = np.max([b.vertices.max(axis=0) for b in bodies], axis=0)
+    return low, high
+
+
+def _check_extent(size: Floats, bodies: Sequence[RawNode]) -> None:
+    wide = float(max(size[0], size[1]))
+    text = f"the mesh is {size_text(size)}"
+    if wide > LARGEST_M or math.prod(2 * (s + 2 * _MARGIN_M) for s in size) > _MOST_CELLS:
+        raise AssetError(
+            f"{text}, too large to plan in: --scale 0.01 if it is in centimetres, --crop X Y RADIUS or "
+            f"--box X0 Y0 X1 Y1 for a part, --tiles 200 for all of it in parts; {lies(bodies)}"
+        )
+    if wide < SMALLEST_M:
+        larger = 10 ** math.ceil(math.log10(SMALLEST_M / max(wide, 1e-9)))
+        raise AssetError(
+            f"{text}, too small to fly in: give --scale a value {larger:,} times as large, or larger still"
+        )
+
+
+def _merged_clutter(bodies: list[RawNode]) -> list[RawNode]:
+    """Make one body of all that is too small to be a thing of its own."""
+    size = np.array([np.linalg.norm(b.vertices.max(axis=0) - b.vertices.min(axis=0)) for b in bodies])
+    small = (size < _CLUTTER_M) & np.array([not b.name for b in bodies])
+    if len(bodies) - small.sum() > _MOST_INSTANCES:
+        small |= size < np.sort(size)[-_MOST_INSTANCES]
+    if small.sum() < 2:
+        return bodies
+    scraps = [b for b, s in zip(bodies, small, strict=True) if s]
+    return [*(b for b, s in zip(bodies, small, strict=True) if not s), joined("clutter", scraps)]
+
+
+def _parts(body: RawNode, skinner: Skinner, repairs: Repairs) -> tuple[Part, ...]:
+    """Make parts by material; a closed body faces outwards, an open one is there from both sides."""
+    mesh = trimesh.Trimesh(body.vertices, body.faces, process=False)
+    closed = mesh.is_watertight and mesh.is_winding_consistent
+    if closed and mesh.volume < 0:
+        corners = None if body.corners is None else body.corners[:, ::-1]
+        body = replace(body, faces=body.faces[:, ::-1], corners=corners)
+        repairs.lines.append(f"{body.name or 'a component'} was inside out")
+    return skinner.parts(body, double_sided=not closed)
+
+
+def _tell_textures(bodies: Sequence[RawNode], skinner: Skinner, light: str, repairs: Repairs) -> None:
+    """Say what became of the textures."""
+    shown = [m for m in skinner.materials.values() if m.texture is not None]
+    if shown:
+        sizes = {m.name.split(",")[0]: m.texture.shape[:2] for m in shown if m.texture is not None}
+        most = max(sizes.values(), key=lambda size: size[0] * size[1])
+        unlit = sum(m.unlit for m in shown)
+        how = "drawn as they are, with the light that is in them" if unlit else "lit by the scene's sun"
+        other = "" if light != "auto" else f" (--light {'sun' if unlit else 'baked'} for the other)"
+        repairs.add(len(sizes), f"textures, the largest {most[1]} x {most[0]} pixels, {how}{other}")
+    notes = {note: None for b in bodies for s in b.surfaces for note in s.notes}
+    repairs.lines += [*notes][:_MOST_NOTES]
+    repairs.add(max(len(notes) - _MOST_NOTES, 0), "more textures like that")
+
+
+def _named(
+    bodies: Sequence[tuple[RawNode, tuple[Part, ...]]], naming: Naming, materials: dict[str, Material]
+) -> list[Instance]:
+    """Give every body a node name, a category from it, and what can be said of its colour, height and form."""
+    counts: dict[str, int] = {}
+    heights = [float(b.vertices[:, 2].max() - b.vertices[:, 2].min()) for b, parts in bodies if parts]
+    tall, low = (float(np.quantile(heights, q)) for q in (0.8, 0.2)) if heights else (0.0, 0.0)
+    least, most = _bounds([body for body, _ in bodies]) if bodies else (np.zeros(3), np.zeros(3))
+    out = []
+    for body, parts in bodies:
+        if not parts:
+            continue
+        called = naming.called(body.name)
+        ground = len(bodies) > 1 and _is_terrain(body, most - least)
+        category = called.category or ("terrain" if ground and body.name != "clutter" else _category(body))
+        looks = _looks(body, parts, materials, tall, low)
+        looks |= (_form(body, looks) if category == UNKNOWN else {}) | called.attributes
+        k = counts[category] = counts.get(category, -1) + 1
+        out.append(Instance(f"{category}_{k:04d}", category, "", looks, parts))
+    return out
+
+
+def _is_terrain(body: RawNode, extent: Floats) -> bool:
+    """Whether a body is what the others stand on: as wide as half the place, uneven, and level rather than steep."""
+    size = np.ptp(body.vertices, axis=0)
+    if (size[:2] < 0.5 * extent[:2]).any() or not 0.05 * size[:2].max() <= size[2] < 0.25 * size[:2].min():
+        return False
+    a, b, c = (body.vertices[body.faces[:, k]] for k in range(3))
+    normal = np.cross(b - a, c - a)
+    level = np.abs(normal[:, 2]).sum() >= _LEVEL_SHARE * np.linalg.norm(normal, axis=1).sum()
+    return bool(level) and not bodies_of(body.faces, len(body.vertices))[1].all()
+
+
+def _category(body: RawNode) -> str:
+    """The category of a body whose name tells nothing: flat and wide is no thing to look for."""
+    size = body.vertices.max(axis=0) - body.vertices.min(axis=0)
+    flat = size[2] < 0.05 * max(size[0], size[1]) or (size[2] < 1.0 and max(size[:2]) > 10.0)
+    return "clutter" if body.name == "clutter" else "slab" if flat else UNKNOWN
+
+
+def _form(body: RawNode, looks: dict[str, str]) -> dict[str, str]:
+    """Say the form of what has no name, as nothing else tells it from others: each has one, and a size."""
+    size = body.vertices.max(axis=0) - body.vertices.min(axis=0)
+    outline = shapely.convex_hull(shapely.multipoints(body.vertices[:, :2]))
+    if outline.area < 1e-6:
+        return {}
+    around = shapely.minimum_rotated_rectangle(outline)
+    filled = outline.area / around.area
+    short, long = sorted(math.dist(around.exterior.coords[k], around.exterior.coords[k + 1]) for k in (0, 1))
+    if long > 3.0 * short:
+        plan = "long"
+    elif long > 1.15 * short:
+        plan = "oblong" if filled > 0.9 else "irregular"
+    else:
+        # A disc fills 0.785 of the square around it, an octagon 0.828.
+        plan = "square" if filled > 0.95 else "round" if 0.76 < filled < 0.84 else "irregular"
+    rise = "flat " if size[2] < 0.25 * short else "upright " if size[2] > 2.0 * long else ""
+    return {"size": looks.get("size", "medium-sized"), "shape": f"{rise}{plan}"}
+
+
+def _looks(
+    body: RawNode, parts: Sequence[Part], materials: dict[str, Material], tall: float, low: float
+) -> dict[str, str]:
+    size = body.vertices.max(axis=0) - body.vertices.min(axis=0)
+    looks = {"colour": colour_words(*shown_colours(parts, materials))}
+    if tall > 1.2 * low:
+        looks |= {"size": "tall"} if size[2] >= tall else {"size": "low"} if size[2] <= low else {}
+    flat = body.vertices[:, :2] - body.vertices[:, :2].mean(axis=0)
+    spread = np.sqrt(np.maximum(np.linalg.eigvalsh(np.cov(flat.T) + 1e-9 * np.eye(2)), 0.0))
+    if spread[1] > 3.0 * spread[0]:
+        looks["shape"] = "long"
+    return looks
+
+
+def _ground_cover(instances: Sequence[Instance], low: Floats, high: Floats) -> float:
+    """Share of a grid of plumb lines that meet the mesh."""
+    from aerialdojo_gen.geometry.rays import RayCaster
+
+    scene = Scene("probe", tuple(instances), {}, np.stack([low, high]))
+    fractions = (np.arange(24) + 0.5) / 24
+    places = np.stack(np.meshgrid(*(low[:2, None] + (high - low)[:2, None] * fractions), indexing="ij"), -1).reshape(
+        -1, 2
+    )
+    origins = np.column_stack([places, np.full(len(places), high[2] + 1.0)])
+    hit, _ = RayCaster(scene).first_hit(origins, np.tile([0.0, 0.0, -1.0], (len(origins), 1)))
+    return float(np.isfinite(hit).mean())
+
+
+def _ground_plane(low: Floats, high: Floats, materials: dict[str, Material]) -> Instance:
+    x0, y0, x1, y1 = low[0] - 4 * _MARGIN_M, low[1] - 4 * _MARGIN_M, high[0] + 4 * _MARGIN_M, high[1] + 4 * _MARGIN_M
+    spec = "#{:02x}{:02x}{:02x}".format(*_GROUND)
+    materials.setdefault(spec, Material(spec, _GROUND))
+    # Just under the lowest point, where a floor of the mesh may lie.
+    z = low[2] - 0.02
+    vertices = single(np.array([[x0, y0, z], [x1, y0, z], [x1, y1, z], [x0, y1, z]]))
+    faces = np.array([[0, 1, 2], [0, 2, 3]], dtype=np.int32)
+    part = Part(vertices, faces, np.zeros((4, 2), dtype=np.float32), spec)
+    return Instance("ground", "ground", "", {}, (part,), surface="sheet")

@@ -1,0 +1,135 @@
+"""The pictures that candidates are scored by: from where they are, and from where the reference picture is taken."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aerialdojo_gen.base.config.sections import AnchorSampleConfig
+from aerialdojo_gen.geometry.viewpoints import level_marks, shortlist
+from aerialdojo_gen.pipeline.scoring.base import AnchorView, Known
+from aerialdojo_gen.pipeline.scoring.ensemble import Verdict, panel
+from aerialdojo_gen.pipeline.scoring.geometric import most
+from aerialdojo_gen.pipeline.scoring.recognisability import clarity
+from aerialdojo_gen.pipeline.stages.work.anchor_world import Candidates
+from aerialdojo_gen.pipeline.stages.work.camera_pullback import steps_back_m, telling_m
+
+Floats = NDArray[np.float64]
+
+# Models that look at pictures are made for such.
+_LOOKED_AT_PX = 320
+
+
+@dataclass(frozen=True)
+class Looked:
+    """Candidates of an object, each with the place behind it that its reference picture is taken from."""
+
+    found: Candidates  # All of the object
+    which: NDArray[np.int64]  # (k,) int64; those that are meant
+    step_back_m: Floats  # (k,) float64; how far behind each the picture is taken
+    behind: Candidates  # From there
+    rank: Floats  # (k,) float64; score of the ray casts from both places
+
+    @classmethod
+    def of(cls, found: Candidates, which: NDArray[np.int64], radius_m: float, config: AnchorSampleConfig) -> Looked:
+        """Look from behind the candidates `which` (k,)."""
+        places, yaws = found.positions_m[which], found.yaw_rad[which]
+        telling = [
+            telling_m(found.patches, found.seen[k], places[n], float(yaws[n]), config.fov_deg)
+            for n, k in enumerate(which)
+        ]
+        most = np.minimum(config.step_back_m, telling)
+        backs = steps_back_m(found.world, found.instance, found.points, places, yaws, config.fov_deg, most)
+        away = np.column_stack([np.cos(yaws), np.sin(yaws), np.zeros(len(yaws))]) * backs[:, None]
+        behind = found.moved(which, places - away, radius_m, config)
+        views, elevation = behind.views, found.elevation_deg[which]
+        clear = clarity(views.visible_fraction, views.framed, np.zeros(len(which)), level_marks(elevation))
+        rank = (found.rank[which] + behind.rank) / 2.0 * clear
+        return cls(found, which, backs, behind, rank)
+
+    def pictures(self, few: NDArray[np.int64], size_px: int, fov_deg: float) -> list[AnchorView]:
+        """Picture candidates; what is shown is the mean of the view and of the one from behind where there is one."""
+        return [self.picture(n, size_px, fov_deg) for n in few.tolist()]
+
+    def picture(self, n: int, size_px: int, fov_deg: float, back: AnchorView | None = None) -> AnchorView:
+        """Picture one candidate, a number among `which`; see `pictures`. The one from behind may be there already."""
+        view = self.found.picture(int(self.which[n]), size_px, fov_deg)
+        if self.has_back(n):
+            back = back or self.behind.picture(n, size_px, fov_deg)
+            told = _mean(view.told, back.told)
+            view = replace(view, shown=(view.shown + back.shown) / 2.0, told=told, behind=back)
+        return view
+
+    def has_back(self, n: int) -> bool:
+        """Whether the reference picture of a candidate, a number among `which`, is taken from behind it."""
+        return bool(self.step_back_m[n] > 0.0)
+
+    def most(self, n: int, radius_m: float, standoff_m: float, back: AnchorView | None = None) -> float:
+        """Bound the geometric score of a candidate, a number among `which`, from above, without a picture from it.
+
+        Where there is one from behind it already, the bound is that much tighter.
+        """
+        k, found, behind = int(self.which[n]), self.found, self.behind
+        shown, told = float(found.views.shown[k]), tuple(found.told[k].tolist())
+        if self.has_back(n):
+            shown = (shown + float(behind.views.shown[n])) / 2.0
+            told = _mean(told, behind.told[n].tolist() if back is None else back.told)
+        known = Known(
+            shown,
+            float(found.elevation_deg[k]),
+            float(found.clearance_m[k]),
+            told,
+            None if found.off_front_rad is None else float(found.off_front_rad[k]),
+            float(found.views.framed[k]),
+            float(behind.views.framed[n]) if self.has_back(n) else None,
+        )
+        return most(known, radius_m, standoff_m, back)
+
+
+def best_pictured(
+    name: str,
+    looked: Looked,
+    few: NDArray[np.int64],
+    azimuth_rad: Floats,
+    front: NDArray[np.bool_],
+    radius_m: float,
+    config: AnchorSampleConfig,
+) -> tuple[NDArray[np.int64], list[tuple[AnchorView, Verdict]]]:
+    """Picture candidates that could still be among the best, and shortlist.
+
+    Indices (k,) into `few` and their verdicts.
+    """
+    scorers, apart = panel(config, radius_m), math.radians(config.separation_deg)
+    weights = config.weights
+    if weights.clip or weights.vlm:
+        views = looked.pictures(few, max(config.picture_px, _LOOKED_AT_PX), config.fov_deg)
+        found = dict(enumerate(zip(views, scorers.judge(name, views), strict=True)))
+        score = np.array([verdict.score for _, verdict in found.values()])
+    else:
+        found = {}
+        score = np.array([looked.most(n, radius_m, config.standoff_m) for n in few.tolist()])
+    backs: dict[int, AnchorView] = {}
+    while True:
+        # A choice among scores and bounds is that among scores, as soon as it falls on scores alone.
+        best = shortlist(score, azimuth_rad, config.shortlist, apart, front)
+        chosen = (*shortlist(score, azimuth_rad, config.shortlist, apart).tolist(), *best.tolist())
+        open_ones = [n for n in chosen if n not in found]
+        if not open_ones:
+            return best, [found[n] for n in best.tolist()]
+        n = open_ones[0]
+        which = int(few[n])
+        if looked.has_back(which) and n not in backs:
+            backs[n] = looked.behind.picture(which, config.picture_px, config.fov_deg)
+            score[n] = looked.most(which, radius_m, config.standoff_m, backs[n])
+            continue
+        view = looked.picture(which, config.picture_px, config.fov_deg, backs.get(n))
+        found[n] = view, scorers.judge(name, [view])[0]
+        score[n] = found[n][1].score
+
+
+def _mean(here: Sequence[float], there: Sequence[float]) -> tuple[float, ...]:
+    return tuple((a + b) / 2.0 for a, b in zip(here, there, strict=True))

@@ -1,0 +1,195 @@
+"""`anchor-sample`: viewpoints at 1 m from each object that see it (paper: anchors)."""
+
+from __future__ import annotations
+
+import logging
+import math
+from collections import Counter
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aerialdojo_gen.base.cli_context import command
+from aerialdojo_gen.base.config.sections import AnchorSampleConfig
+from aerialdojo_gen.base.errors import StoreError
+from aerialdojo_gen.base.rng import generator
+from aerialdojo_gen.geometry.angles import yaw_towards
+from aerialdojo_gen.geometry.part_visibility import FRONT_RAD, off_front_rad
+from aerialdojo_gen.geometry.surface import Surface
+from aerialdojo_gen.geometry.viewpoints import around, shortlist
+from aerialdojo_gen.pipeline.scoring.geometric import judge
+from aerialdojo_gen.pipeline.stage import Job, Output
+from aerialdojo_gen.pipeline.stages.work.anchor_choice import with_choice
+from aerialdojo_gen.pipeline.stages.work.anchor_pictures import Looked, best_pictured
+from aerialdojo_gen.pipeline.stages.work.anchor_world import Candidates, World, tells_of
+from aerialdojo_gen.scenes.model import Instance
+from aerialdojo_gen.store.schemas import ANCHORS, VIEWPOINTS
+from aerialdojo_gen.store.tables import from_rows
+
+Floats = NDArray[np.float64]
+log = logging.getLogger(__name__)
+
+# So many times what is pictured is looked at by ray casts from where its reference picture would be taken.
+_LOOKED_AT = 4
+# More parts than that get no candidates of their own.
+_MOST_TELLS = 4
+REASONS = ("no_surface", "out_of_bounds", "in_collision", "unreachable", "not_visible", "not_shortlisted")
+
+
+def run(job: Job, config: AnchorSampleConfig) -> Output:
+    """Find, judge and rank the anchors of every object of a scene.
+
+    A candidate lies `standoff_m` from the object's surface (its mesh, not its box) and faces its centroid in yaw. It
+    goes through these tests, and is counted under the first that it fails: ``no_surface`` (its line comes nowhere
+    near the surface), ``out_of_bounds`` (the body leaves the flight volume), ``in_collision`` (a surface within
+    the body's radius plus `margin_m`), ``unreachable`` (no way from the open sky: inside a closed room, or below
+    ground that is an open sheet), ``not_visible`` (visible fraction below `min_visible_fraction`),
+    ``not_shortlisted`` (`shortlist` others show the object better, or from a side of their own). Ray casts to points
+    of its surface put the visible ones in order; the best `pictured`, from different sides, are pictured and scored
+    (`aerialdojo_gen.pipeline.scoring`). The best of those, again from different sides, are the object's anchors, and the best
+    of all is selected, or the one that a person chose, which then comes first. Where the catalogue says an object's
+    front and the parts that make its name true, these weigh as much as its silhouette, candidates are placed before
+    those parts as well, and one anchor at least is within 60° of a front, if any candidate there sees the object.
+    """
+    objects = job.read("objects").to_pylist()
+    chosen = {row["object_id"]: row for row in job.read("chosen_anchors").to_pylist()}
+    world = World.of(job.scene_model(), job.embodiment.radius_m, config.margin_m)
+    rows: list[dict[str, Any]] = []
+    viewpoints: list[dict[str, Any]] = []
+    counts: Counter[str] = Counter(dict.fromkeys(REASONS, 0))
+    bare = 0
+    for item in objects:
+        if item["mesh_node"] not in world.index:
+            raise StoreError(
+                f"{job.scene}: object {item['object_id']} ({item['name']}) has the mesh node {item['mesh_node']!r}, "
+                f"which is not in the scene: run {command('annotate-import', scene=job.scene)}"
+            )
+        found, rejected, seen = sampled(item, world, job, config)
+        viewpoints += seen
+        if item["object_id"] in chosen:
+            before = found
+            found = with_choice(before, chosen[item["object_id"]], item, world, job, config)
+            rejected["not_shortlisted"] += sum(all(row["x_m"] != f["x_m"] for f in found) for row in before)
+        rows += found
+        counts += rejected
+        if not found:
+            bare += 1
+            why = ", ".join(f"{reason} {n}" for reason, n in rejected.items() if n)
+            log.warning("%s: object %d (%s) has no anchor: %s", job.scene, item["object_id"], item["name"], why)
+    tally = {reason: counts[reason] for reason in REASONS}
+    return Output(
+        {"anchors": from_rows(ANCHORS, rows), "viewpoints": from_rows(VIEWPOINTS, viewpoints)},
+        rows_in=len(rows) + sum(tally.values()),
+        rows_out=len(rows),
+        counts=tally | {"no_anchor": bare},
+    )
+
+
+def anchors_of(
+    item: dict[str, Any], world: World, job: Job, config: AnchorSampleConfig
+) -> tuple[list[dict[str, Any]], Counter[str]]:
+    """Find one object's anchors."""
+    return sampled(item, world, job, config)[:2]
+
+
+def sampled(
+    item: dict[str, Any], world: World, job: Job, config: AnchorSampleConfig
+) -> tuple[list[dict[str, Any]], Counter[str], list[dict[str, Any]]]:
+    """Find one object's anchors and viewpoints."""
+    found, rejected, nearly = candidates_of(item, world, job, config)
+    if found is None:
+        return [], rejected, []
+    rows = shortlisted(item, found, nearly, world, job, config)
+    seen = found.seeing(config.min_visible_fraction)
+    rejected["not_visible"] += len(found.positions_m) - len(seen)
+    rejected["not_shortlisted"] += len(seen) - len(rows)
+    return rows, rejected, found.viewpoints(seen, item["object_id"])
+
+
+def shortlisted(
+    item: dict[str, Any], found: Candidates, nearly: Counter[str], world: World, job: Job, config: AnchorSampleConfig
+) -> list[dict[str, Any]]:
+    """Picture and score the best candidates of an object, and keep the best of those."""
+    radius = job.embodiment.radius_m
+    seen = found.seeing(config.min_visible_fraction)
+    away = found.positions_m - world.scene.instances[found.instance].centroid
+    azimuth = np.arctan2(away[:, 1], away[:, 0])
+    front = found.before_front
+    apart = math.radians(config.separation_deg)
+    pictured = max(config.pictured, config.shortlist)
+    # Several a side: what stands before the object from one place does not from the next.
+    looked_at = seen[np.argsort(-found.rank[seen], kind="stable")[: _LOOKED_AT * pictured]]
+    of_sides = seen[shortlist(found.rank[seen], azimuth[seen], pictured, apart, front[seen])]
+    looked = Looked.of(found, np.union1d(looked_at, of_sides), radius, config)
+    of_looked = shortlist(looked.rank, azimuth[looked.which], pictured, apart, front[looked.which])
+    few, backs = looked.which[of_looked], looked.step_back_m[of_looked].tolist()
+    best, shown = best_pictured(item["name"], looked, of_looked, azimuth[few], front[few], radius, config)
+    own_distance = Surface.of(world.scene.instances[found.instance]).distance_m(found.positions_m[few[best]])
+    why = None
+    if len(best) and front[seen].any() and not front[few[best[0]]]:
+        why = "better_elsewhere"
+    elif len(best) and found.off_front_rad is not None and not front[few[best[0]]]:
+        nearly["not_visible"] += int((found.off_front_rad <= FRONT_RAD).sum())
+        why = max(sorted(nearly), key=lambda reason: nearly[reason]) if nearly.total() else "no_surface"
+    return [
+        {
+            "scene": job.scene,
+            "object_id": item["object_id"],
+            "anchor_id": rank,
+            **found.row(int(few[n]), float(own_distance[rank])),
+            "step_back_m": backs[n],
+            "no_front_reason": why if rank == 0 else None,
+            "score": verdict.score,
+            **verdict.parts,
+            **judge(picture, radius, config.standoff_m).columns,
+            "thumbnail": picture.jpeg(),
+            "selected": rank == 0,
+            "selected_by": "auto",
+        }
+        for rank, (n, (picture, verdict)) in enumerate(zip(best.tolist(), shown, strict=True))
+    ]
+
+
+def candidates_of(
+    item: dict[str, Any], world: World, job: Job, config: AnchorSampleConfig
+) -> tuple[Candidates | None, Counter[str], Counter[str]]:
+    """Find where an object can be looked at from: everywhere around it that a drone can be."""
+    k = world.index[item["mesh_node"]]
+    instance: Instance = world.scene.instances[k]
+    surface = Surface.of(instance)
+    radius = job.embodiment.radius_m
+    rejected: Counter[str] = Counter()
+    nearly: Counter[str] = Counter()
+    anatomy = instance.anatomy
+    fronts = anatomy.fronts_rad if anatomy is not None else ()
+    places = around(
+        surface, instance.bounds, config.standoff_m, config.azimuths, config.elevations_deg, config.level_heights
+    )
+    triangles = instance.vertices[instance.faces]
+    for faces in tells_of(instance)[:_MOST_TELLS]:
+        box = np.stack([triangles[faces].min(axis=(0, 1)), triangles[faces].max(axis=(0, 1))])
+        places = np.concatenate(
+            [places, around(surface, box, config.standoff_m, config.azimuths, config.tell_elevations_deg, ())]
+        )
+
+    def keep(places: Floats, passed: NDArray[np.bool_], reason: str) -> Floats:
+        rejected[reason] += int((~passed).sum())
+        if fronts and reason != "no_surface":
+            off = off_front_rad(places[~passed], instance.centroid, fronts)
+            nearly[reason] += int((off <= FRONT_RAD).sum())
+        return places[passed]
+
+    places = keep(places, ~np.isnan(places[:, 0]), "no_surface")
+    low, high = world.scene.bounds
+    places = keep(places, ((places >= low + radius) & (places <= high - radius)).all(axis=1), "out_of_bounds")
+    body = radius + config.margin_m
+    touching = np.array([world.ball_collides(p, body) for p in places], dtype=np.bool_)
+    places = keep(places, ~touching, "in_collision")
+    places = keep(places, np.array([world.free.reachable(p) for p in places], dtype=np.bool_), "unreachable")
+    if not len(places):
+        return None, rejected, nearly
+    centroid = np.array([item["x_m"], item["y_m"], item["z_m"]])
+    points = surface.sample(config.surface_points, generator(job.seed, "anchor-sample", job.scene, item["object_id"]))
+    found = Candidates.of(world, k, points, places, yaw_towards(places, centroid), radius, config)
+    return found, rejected, nearly

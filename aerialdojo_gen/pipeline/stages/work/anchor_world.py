@@ -1,0 +1,205 @@
+"""A scene as anchors are judged in it: what collides, what is reachable, what is seen."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aerialdojo_gen.base.config.sections import AnchorSampleConfig
+from aerialdojo_gen.base.rng import generator
+from aerialdojo_gen.geometry.cameras import Camera
+from aerialdojo_gen.geometry.part_visibility import FRONT_RAD, Patch, off_front_rad, seen_share
+from aerialdojo_gen.geometry.rays import RayCaster, TriangleRayCaster, instance_caster
+from aerialdojo_gen.geometry.surface import Surface
+from aerialdojo_gen.geometry.viewpoints import Sight, Views, informativeness
+from aerialdojo_gen.pipeline.scoring.base import AnchorView
+from aerialdojo_gen.pipeline.scoring.recognisability import fronting, knowing, telling
+from aerialdojo_gen.pipeline.scoring.views import take_view
+from aerialdojo_gen.planning.clearance import ClearanceGrid
+from aerialdojo_gen.planning.collision import CollisionWorld, collision_world
+from aerialdojo_gen.rendering.casters import ray_caster
+from aerialdojo_gen.rendering.raycast import ray_renderer
+from aerialdojo_gen.scenes.model import Instance, Scene
+
+Floats = NDArray[np.float64]
+_LEAST_POINTS = 32
+
+
+@dataclass(frozen=True)
+class World:
+    """A scene, and what is asked of it for every object."""
+
+    scene: Scene  # The scene
+    collisions: CollisionWorld  # For collision and clearance
+    free: ClearanceGrid  # For what is connected with the open sky
+    rays: RayCaster  # For what is seen
+    index: dict[str, int]  # Index of an instance by its node name
+
+    @classmethod
+    def of(cls, scene: Scene, radius_m: float, margin_m: float) -> World:
+        """Build it all for a body of a radius that keeps a margin to surfaces."""
+        return cls(
+            scene,
+            collision_world(scene),
+            ClearanceGrid.of(scene, radius_m=radius_m, margin_m=margin_m),
+            ray_caster(scene),
+            {i.node: k for k, i in enumerate(scene.instances)},
+        )
+
+    def clearance_m(self, position_m: Floats) -> float:
+        """Distance from a place in the flight volume, (3,) float64, to the nearest surface, metres, by FCL."""
+        return self.collisions.distance_m(position_m, self.free.nearest(position_m).tolist())
+
+    def ball_collides(self, position_m: Floats, radius_m: float) -> bool:
+        """Whether a ball in the flight volume touches a surface: FCL is asked where the grid cannot tell."""
+        proven = self.free.ball_proven_free(position_m, radius_m)
+        return not proven and self.collisions.sphere_in_collision(position_m, radius_m)
+
+
+@dataclass(frozen=True, eq=False)
+class Candidates:
+    """Viewpoints of one object, and what ray casts tell of them."""
+
+    world: World
+    instance: int  # The object's index in the scene
+    alone: TriangleRayCaster  # The object by itself
+    positions_m: Floats  # (n, 3) float64; the body's centres, world frame
+    yaw_rad: Floats  # (n,) float64; yaw; elevation seen from the object's centroid; distance to the nearest surface
+    elevation_deg: Floats
+    clearance_m: Floats
+    sight: Sight  # Which points of the object's surface they see
+    views: Views  # What they see of the object
+    points: Floats  # (m, 3) float64; on the object's surface, metres, world frame
+    patches: tuple[Patch, ...]  # Points of each of the object's telling parts
+    seen: Floats  # Share that they see of each of those parts (`aerialdojo_gen.geometry.part_visibility.seen_share`)
+    told: Floats  # (n, t) float64
+    off_front_rad: Floats | None  # (n,) float64 or None
+    rank: Floats  # (n,) float64; score of the ray casts alone, which decides what is pictured at all
+
+    @classmethod
+    def of(
+        cls, world: World, instance: int, points: Floats, positions_m: Floats, yaw_rad: Floats, radius_m: float,
+        config: AnchorSampleConfig,
+    ) -> Candidates:  # fmt: skip
+        """Look from viewpoints (n, 3), world metres, with yaws at an object's points (m, 3) by ray casts."""
+        alone = instance_caster(world.scene.instances[instance])
+        sight = Sight.of(positions_m, yaw_rad, points, alone, world.rays, instance, config.fov_deg)
+        clearance = np.array([world.clearance_m(p) for p in positions_m])
+        patches = patches_of(world, instance, points)
+        seen = seen_share(positions_m, yaw_rad, patches, world.rays, config.fov_deg)
+        return cls._judged(
+            world, instance, alone, positions_m, yaw_rad, clearance, sight, points, patches, seen, radius_m, config
+        )
+
+    @classmethod
+    def _judged(
+        cls, world: World, instance: int, alone: TriangleRayCaster, positions_m: Floats, yaw_rad: Floats,
+        clearance: Floats, sight: Sight, points: Floats, patches: tuple[Patch, ...], seen: Floats, radius_m: float,
+        config: AnchorSampleConfig,
+    ) -> Candidates:  # fmt: skip
+        thing = world.scene.instances[instance]
+        views = sight.views()
+        away = positions_m - thing.centroid
+        elevation = np.degrees(np.arctan2(away[:, 2], np.hypot(away[:, 0], away[:, 1])))
+        rank = informativeness(views, elevation, clearance, radius_m, config.standoff_m)
+        told = seen / np.maximum(seen.max(axis=0, initial=0.0), 1e-9)
+        off_front = None
+        if thing.anatomy is not None and thing.anatomy.fronts_rad:
+            off_front = off_front_rad(positions_m, thing.centroid, thing.anatomy.fronts_rad)
+        rank = knowing(rank, telling(told) if told.shape[1] else None, fronting(off_front))
+        return cls(
+            world, instance, alone, positions_m, yaw_rad, elevation, clearance, sight, views, points, patches, seen,
+            told, off_front, rank,
+        )  # fmt: skip
+
+    def moved(
+        self, which: NDArray[np.int64], positions_m: Floats, radius_m: float, config: AnchorSampleConfig
+    ) -> Candidates:
+        """Look from other places (k, 3), facing the same way; places that stay are not looked from again."""
+        world, yaws = self.world, self.yaw_rad[which]
+        new = np.flatnonzero((positions_m != self.positions_m[which]).any(axis=1))
+        places, turned = positions_m[new], yaws[new]
+        sight = Sight.of(places, turned, self.points, self.alone, world.rays, self.instance, config.fov_deg)
+        clearance, seen = self.clearance_m[which], self.seen[which]
+        clearance[new] = [world.clearance_m(p) for p in places]
+        seen[new] = seen_share(places, turned, self.patches, world.rays, config.fov_deg)
+        return self._judged(
+            world, self.instance, self.alone, positions_m, yaws, clearance, self.sight.with_rows(which, new, sight),
+            self.points, self.patches, seen, radius_m, config,
+        )  # fmt: skip
+
+    def seeing(self, least: float) -> NDArray[np.int64]:
+        """Numbers of the viewpoints that see at least so large a fraction of what faces them, and anything at all."""
+        fraction = self.views.visible_fraction
+        return np.flatnonzero((fraction > 0) & (fraction >= least))
+
+    @property
+    def before_front(self) -> NDArray[np.bool_]:
+        """Which of the viewpoints are before a front of the object, (n,) bool; none where it has no front."""
+        if self.off_front_rad is None:
+            return np.zeros(len(self.positions_m), dtype=np.bool_)
+        return np.asarray(self.off_front_rad <= FRONT_RAD)
+
+    def viewpoints(self, which: NDArray[np.int64], object_id: int) -> list[dict[str, Any]]:
+        """Rows of ``viewpoints``: where one may stop to have found the object."""
+        return [
+            {
+                "scene": self.world.scene.name,
+                "object_id": object_id,
+                "viewpoint_id": n,
+                **dict(zip(("x_m", "y_m", "z_m"), self.positions_m[k].tolist(), strict=True)),
+                "yaw_rad": float(self.yaw_rad[k]),
+            }
+            for n, k in enumerate(which)
+        ]
+
+    def picture(self, k: int, size_px: int, fov_deg: float) -> AnchorView:
+        """Take the front view from the k-th viewpoint."""
+        return take_view(
+            ray_renderer(self.world.scene),
+            self.alone,
+            self.world.scene.instances[self.instance],
+            self.instance,
+            Camera(size_px, size_px, fov_deg),
+            self.positions_m[k],
+            float(self.yaw_rad[k]),
+            shown=float(self.views.shown[k]),
+            elevation_deg=float(self.elevation_deg[k]),
+            clearance_m=float(self.clearance_m[k]),
+            told=tuple(float(share) for share in self.told[k]),
+            tells=tells_of(self.world.scene.instances[self.instance]),
+            off_front_rad=None if self.off_front_rad is None else float(self.off_front_rad[k]),
+            framed=float(self.views.framed[k]),
+        )
+
+    def row(self, k: int, surface_distance_m: float) -> dict[str, Any]:
+        """What a row of ``anchors`` says of where the k-th viewpoint is and what it sees."""
+        return {
+            **dict(zip(("x_m", "y_m", "z_m"), self.positions_m[k].tolist(), strict=True)),
+            "yaw_rad": float(self.yaw_rad[k]),
+            "clearance_m": float(self.clearance_m[k]),
+            "surface_distance_m": surface_distance_m,
+            "visible_fraction": float(self.views.visible_fraction[k]),
+            "off_front_rad": None if self.off_front_rad is None else float(self.off_front_rad[k]),
+        }
+
+
+def tells_of(instance: Instance) -> list[NDArray[np.int64]]:
+    """The faces of each of an instance's telling parts that it has."""
+    names = () if instance.anatomy is None else instance.anatomy.tells
+    return [faces for faces in map(instance.faces_of, names) if len(faces)]
+
+
+def patches_of(world: World, instance: int, points: Floats) -> tuple[Patch, ...]:
+    """Points of each of an instance's telling parts, drawn by the number of its surface's points."""
+    thing = world.scene.instances[instance]
+    # The same points whoever asks: the draw hangs on nothing but the node.
+    rng = generator(0, "anchor-sample", world.scene.name, thing.node)
+    n = max(_LEAST_POINTS, len(points) // 4)
+    return tuple(
+        Patch.of(Surface(thing.vertices, thing.faces[faces]), n, rng, world.rays, world.scene.sun)
+        for faces in tells_of(thing)
+    )

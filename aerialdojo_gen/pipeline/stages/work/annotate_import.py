@@ -1,0 +1,99 @@
+"""Stage ``annotate-import``: checks an annotation file against its scene and makes tables of it."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+
+from aerialdojo_gen.annotations.ambiguity import nearest_landmark
+from aerialdojo_gen.annotations.check import check_source
+from aerialdojo_gen.annotations.format import Annotations, parse_annotations
+from aerialdojo_gen.annotations.positions import Fault
+from aerialdojo_gen.base.config.sections import AnnotateImportConfig
+from aerialdojo_gen.base.errors import AnnotationError, UsageError
+from aerialdojo_gen.base.paper_figures import paper_counts
+from aerialdojo_gen.pipeline.stage import Job, Output
+from aerialdojo_gen.scenes.catalogue import load_catalogue
+from aerialdojo_gen.scenes.model import Scene
+from aerialdojo_gen.store.schemas import CHOSEN_ANCHORS, LANDMARKS, OBJECTS
+
+
+def run(job: Job, config: AnnotateImportConfig) -> Output:
+    """Import the landmarks and target objects of one scene (paper, section on annotation)."""
+    path = job.roots.annotations / f"{job.scene}.json"
+    try:
+        text = path.read_text(encoding="utf-8")
+    except FileNotFoundError:
+        raise UsageError(f"no annotations of {job.scene}: {path} does not exist") from None
+    except UnicodeDecodeError as error:
+        raise AnnotationError(f"{path} is not UTF-8: {error}") from None
+    source = parse_annotations(text)
+    scene = job.scene_model()
+    catalogue = load_catalogue(job.roots.scene_assets)
+    names = {category: catalogue[category].name for category in catalogue}
+    counts = paper_counts().get(job.scene) if config.paper_counts else None
+    looks = {category: catalogue[category].looks for category in catalogue}
+    faults = check_source(source, scene, names, counts, looks=looks)
+    if faults:
+        raise AnnotationError(_report(path, faults))
+    tables = annotation_tables(source.annotations, scene)
+    landmarks, chosen = tables["landmarks"].num_rows, tables["chosen_anchors"].num_rows
+    rows = landmarks + tables["objects"].num_rows
+    return Output(tables, rows, rows, {"landmarks": landmarks, "chosen_anchors": chosen})
+
+
+def annotation_tables(annotations: Annotations, scene: Scene) -> dict[str, pa.Table]:
+    """Make the tables `landmarks`, `objects` and `chosen_anchors` of annotations that are right."""
+    landmarks = sorted(annotations.landmarks, key=lambda entry: entry.id)
+    places = np.array([scene[entry.node].centroid for entry in landmarks]).reshape(-1, 3)
+    landmark_rows = [
+        {"scene": scene.name, "landmark_id": e.id, "name": e.name, "mesh_node": e.node, **_xyz("{}_m", place)}
+        for e, place in zip(landmarks, places, strict=True)
+    ]
+    object_rows = []
+    for entry in sorted(annotations.objects, key=lambda entry: entry.id):
+        instance = scene[entry.node]
+        bearing = nearest_landmark(instance.centroid, places)
+        assert bearing is not None, f"{scene.name}, object {entry.id}: unchecked annotations"
+        object_rows.append(
+            {
+                "scene": scene.name,
+                "object_id": entry.id,
+                "name": entry.name,
+                "category": entry.category,
+                "description": entry.description,
+                "mesh_node": entry.node,
+                **_xyz("{}_m", instance.centroid),
+                **_xyz("size_{}_m", instance.bounds[1] - instance.bounds[0]),
+                "landmark_id": landmarks[bearing.landmark].id,
+                "direction": bearing.direction,
+            }
+        )
+    chosen_rows = [
+        {
+            "scene": scene.name,
+            "object_id": entry.id,
+            **_xyz("{}_m", entry.anchor.position_m),
+            "yaw_rad": math.radians(entry.anchor.yaw_deg),
+        }
+        for entry in sorted(annotations.objects, key=lambda entry: entry.id)
+        if entry.anchor is not None
+    ]
+    return {
+        "landmarks": pa.Table.from_pylist(landmark_rows, schema=LANDMARKS.schema),
+        "objects": pa.Table.from_pylist(object_rows, schema=OBJECTS.schema),
+        "chosen_anchors": pa.Table.from_pylist(chosen_rows, schema=CHOSEN_ANCHORS.schema),
+    }
+
+
+def _xyz(name: str, values: Any) -> dict[str, float]:
+    return {name.format(axis): float(value) for axis, value in zip("xyz", values, strict=True)}
+
+
+def _report(path: Path, faults: list[Fault]) -> str:
+    lines = "\n".join(f"  {path.name}:{fault}".replace(":line ", ":", 1) for fault in faults)
+    return f"{path}: {len(faults)} fault{'s' if len(faults) != 1 else ''}, nothing imported\n{lines}"

@@ -1,0 +1,86 @@
+"""What `filter` kept of each scene, beside what the paper wants of it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from aerialdojo_gen.base.errors import PoolError
+from aerialdojo_gen.base.paper_figures import PaperScene, inventory
+from aerialdojo_gen.base.text_table import Column, TextTable
+from aerialdojo_gen.store import shards as store
+from aerialdojo_gen.store.root import Where
+from aerialdojo_gen.store.schemas import SETTINGS
+
+
+@dataclass(frozen=True)
+class Pool:
+    """What `filter` kept of a scene, and what the paper wants of it."""
+
+    scene: str  # Name
+    candidates: int
+    judged: int
+    kept: dict[str, int]  # Kept candidates by setting
+    paper: PaperScene | None  # The paper's row; None for a scene that the paper does not have
+    path_m: tuple[float, float] | None  # (float, float) or None
+
+    @property
+    def short(self) -> dict[str, int]:
+        """How many tasks each setting lacks; settings that lack none are left out."""
+        wanted = self.paper.tasks if self.paper else {}
+        return {s: n - self.kept[s] for s, n in wanted.items() if self.kept[s] < n}
+
+    @property
+    def reaches_path(self) -> bool:
+        """Whether a choice of tasks can have the paper's summed length to within 1 %."""
+        if self.paper is None or self.path_m is None:
+            return False
+        return self.path_m[0] <= 1.01 * self.paper.path_m and self.path_m[1] >= 0.99 * self.paper.path_m
+
+
+def pool_of(root: Where, scene: str) -> Pool:
+    """Read what `filter` kept of a scene."""
+    verdicts = store.read_scene(root, "verdicts", scene)
+    keep = verdicts["keep"].to_numpy(zero_copy_only=False)
+    setting = np.asarray(verdicts["setting"].to_pylist(), dtype=object)
+    length = verdicts["length_m"].to_numpy(zero_copy_only=False)
+    lengths = {s: np.sort(length[keep & (setting == s)]) for s in SETTINGS}
+    paper = inventory().get(scene)
+    path = None
+    if paper is not None and all(len(lengths[s]) >= n for s, n in paper.tasks.items()):
+        least = sum(float(lengths[s][:n].sum()) for s, n in paper.tasks.items())
+        most = sum(float(lengths[s][len(lengths[s]) - n :].sum()) for s, n in paper.tasks.items())
+        path = least, most
+    judged = sum(reason != "not_needed" for reason in verdicts["reason"].to_pylist())
+    return Pool(scene, verdicts.num_rows, judged, {s: len(v) for s, v in lengths.items()}, paper, path)
+
+
+def require_pools(root: Where, scenes: Sequence[str]) -> None:
+    """Raise a `PoolError` that names every scene and setting with fewer kept candidates than the paper has tasks."""
+    lacking = [
+        f"{pool.scene}: {n} {setting} tasks short: {pool.kept[setting]} are kept, "
+        f"the paper has {pool.kept[setting] + n}"
+        for pool in (pool_of(root, scene) for scene in scenes)
+        for setting, n in pool.short.items()
+    ]
+    if lacking:
+        mend = "move objects or obstacles in the recipe, or draft the annotations anew with another --within"
+        raise PoolError("\n".join([*lacking, f"nothing is released; {mend}"]))
+
+
+def pool_lines(pools: Sequence[Pool], width: int | None = None) -> list[str]:
+    """Set pools as a table for the terminal: kept / wanted, and kilometres that a choice can reach."""
+    heads = ["candidates", "judged", *(s.replace("_horizon", "") for s in SETTINGS), "km reachable/paper"]
+    rows = []
+    for pool in pools:
+        cells = [f"{pool.candidates}", f"{pool.judged}"]
+        for s in SETTINGS:
+            wanted = f"/{pool.paper.tasks[s]}" if pool.paper else ""
+            cells.append(f"{pool.kept[s]}{wanted}{'!' if s in pool.short else ' '}")
+        reach = f"{pool.path_m[0] / 1000:.1f}-{pool.path_m[1] / 1000:.1f}" if pool.path_m else "-"
+        paper = f"/{pool.paper.path_m / 1000:.1f}{' ' if pool.reaches_path else '!'}" if pool.paper else " "
+        cells.append(reach + paper)
+        rows.append((pool.scene, cells))
+    return TextTable("scene", [Column(head) for head in heads], rows).lines(width)

@@ -1,0 +1,90 @@
+"""filter: which candidates become tasks, and a stable reason for every other one."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
+from numpy.typing import NDArray
+
+from aerialdojo_gen.base.cli_context import command
+from aerialdojo_gen.base.config.sections import FilterConfig
+from aerialdojo_gen.base.errors import StoreError
+from aerialdojo_gen.pipeline.stage import Job, Output
+from aerialdojo_gen.pipeline.stages.work.rules import KEPT, judge, settings_of
+from aerialdojo_gen.rendering.sight import all_in_sight
+from aerialdojo_gen.store.schemas import APPROACH, SETTINGS, VERDICTS
+from aerialdojo_gen.store.schemas.columns import DIFFICULTY, START_VIEW
+
+
+def _stops(plans: pa.Table) -> NDArray[np.float64]:
+    """Where routes end without their Approach, which agents have not, (n, 3) float64."""
+    starts = np.cumsum([0, *pc.list_value_length(plans["action"]).to_pylist()])
+    actions = pc.list_flatten(plans["action"]).to_numpy()
+    last = starts[1:] - 1
+    last -= (np.diff(starts) > 1) & (actions[np.maximum(last - 1, 0)] == APPROACH)
+    return np.column_stack([pc.list_flatten(plans[f"{axis}_m"]).to_numpy()[last] for axis in "xyz"])
+
+
+def _hidden_at_stop(job: Job, plans: pa.Table, targets: pa.Table) -> NDArray[np.bool_]:
+    """Which of some routes end, flown without their Approach, where nothing of the target is in sight."""
+    if not plans.num_rows:
+        return np.zeros(0, dtype=np.bool_)
+    objects = job.read("objects").select(["object_id", "mesh_node"])
+    index = pc.index_in(targets["target_object_id"], value_set=objects["object_id"].combine_chunks())
+    nodes = objects["mesh_node"].take(index).to_pylist()
+    return ~all_in_sight(job.scene_model(), nodes, _stops(plans))
+
+
+def run(job: Job, config: FilterConfig) -> Output:
+    """Judge every candidate of a scene by `judge`.
+
+    And then by what its agent sees at the end (``"target_hidden"``).
+    """
+    pairs = job.read("pairs")
+    told = [field.name for field in DIFFICULTY]
+    flown = ["x_m", "y_m", "z_m", "action"]
+    plans = (
+        job.read("plans").select(["pair_id", "outcome", "length_m", "n_actions", *told, *flown]).sort_by("pair_id")
+    )
+    if not plans.column("pair_id").combine_chunks().equals(pairs.column("pair_id").combine_chunks()):
+        raise StoreError(
+            f"plans of {job.scene} are not those of its pairs: run {command('plan', scene=job.scene, force=True)}"
+        )
+    outcome = np.asarray(plans.column("outcome").to_pylist(), dtype="U24")
+    euclidean = pairs.column("euclidean_m").to_numpy()
+    length = plans.column("length_m").to_numpy()
+    n_actions = plans.column("n_actions").to_numpy()
+    detour, visible = (
+        table.column(name).to_numpy(zero_copy_only=False).astype(np.float64)
+        for table, name in ((plans, "plan_detour"), (pairs, "target_visible_at_start"))
+    )
+    reason, setting = judge(outcome, euclidean, length, n_actions, config, detour, visible)
+    fit = np.flatnonzero(reason == KEPT)
+    reason[fit[_hidden_at_stop(job, plans.take(fit), pairs.take(fit))]] = "target_hidden"
+    solved = outcome == "SOLVED"
+    budgets = {name: rule.action_budget for name, rule in zip(SETTINGS, settings_of(config), strict=True)}
+    n = len(outcome)
+    table = pa.table(
+        {
+            "scene": pa.array([job.scene] * n, pa.string()),
+            "pair_id": pairs.column("pair_id"),
+            "euclidean_m": euclidean,
+            "length_m": pa.array(length, mask=~solved),
+            "detour_ratio": pa.array(length / np.maximum(euclidean, 1e-12), mask=~solved),
+            "n_actions": pa.array(n_actions, pa.int32(), mask=~solved),
+            **{name: plans.column(name) for name in told},
+            **{field.name: pairs.column(field.name) for field in START_VIEW},
+            "keep": reason == KEPT,
+            "reason": pa.array(reason.tolist(), pa.string()),
+            "setting": pa.array([s or None for s in setting.tolist()], pa.string()),
+            "action_budget": pa.array([budgets.get(s) for s in setting.tolist()], pa.int32()),
+        },
+        schema=VERDICTS.schema,
+    )
+    counts = Counter(reason.tolist())
+    kept = counts.pop(KEPT, 0)
+    counts.update(Counter(f"{s} kept" for s, r in zip(setting.tolist(), reason.tolist(), strict=True) if r == KEPT))
+    return Output({"verdicts": table}, rows_in=n, rows_out=kept, counts=dict(counts))

@@ -1,0 +1,195 @@
+"""`plan`: a certified reference trajectory for every candidate, or the reason why there is none (paper: routes)."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
+from numpy.typing import NDArray
+
+from aerialdojo_gen.base.cli_context import command
+from aerialdojo_gen.base.config.sections import PlanConfig, ReleasedPlanConfig
+from aerialdojo_gen.base.errors import StoreError
+from aerialdojo_gen.base.paper_figures import PaperScene, inventory
+from aerialdojo_gen.geometry.angles import wrap_one_rad
+from aerialdojo_gen.pipeline.stage import Job, Output
+from aerialdojo_gen.pipeline.stages.work.candidate_policy import Candidates, Draw
+from aerialdojo_gen.planning.difficulty import Difficulty, agent_actions, difficulty_of
+from aerialdojo_gen.planning.free_length import free_lengths_m
+from aerialdojo_gen.planning.planner import Planner, Route
+from aerialdojo_gen.scenes.context import context_of
+from aerialdojo_gen.scenes.model import Scene
+from aerialdojo_gen.store.schemas import OUTCOMES, PLANS
+
+Floats = NDArray[np.float64]
+# Most that the goals' cost-to-go takes between foreseeing and searching, as it is and compressed to a tenth; what
+# does not fit is expanded once more.
+_FIELDS_MB = 300.0, 250.0
+
+
+def targets_of_part(object_ids: list[int], part: int, config: PlanConfig) -> list[int]:
+    """Return the targets of one shard: a slice of the scene's objects in the order of their ids."""
+    first = part * config.targets_per_part
+    return sorted(object_ids)[first : first + config.targets_per_part]
+
+
+def run(job: Job, config: PlanConfig) -> Output:
+    """Plan the candidates of a slice of the scene's targets; where a release is planned for, as many as it needs."""
+    paper = paper_scene(job.scene, config)
+    targets = job.read("objects")["object_id"].to_pylist()
+    if paper is None:
+        targets = targets_of_part(targets, job.part, config)
+    pairs = job.read("pairs")
+    pairs = pairs.filter(pc.is_in(pairs["target_object_id"], pa.array(targets, pa.int32()))).sort_by("pair_id")
+    routes: list[Route] = []
+    planner = None
+    if pairs.num_rows:
+        planner = _planner(job.scene_model(), config, job.embodiment.radius_m)
+        goals, starts = _ends(job, pairs)
+        if paper is None or not isinstance(config, ReleasedPlanConfig):
+            routes = _by_goal(planner.plan_target, goals, starts, np.arange(pairs.num_rows))
+        else:
+            routes = _released(planner, pairs, goals, starts, paper, config, job.seed)
+    counts = Counter(route.outcome for route in routes)
+    return Output(
+        {"plans": _table(job.scene, pairs["pair_id"].to_pylist(), routes, planner)},
+        rows_in=pairs.num_rows,
+        rows_out=len(routes),
+        counts={outcome: counts[outcome] for outcome in OUTCOMES if counts[outcome]},
+    )
+
+
+def paper_scene(scene: str, config: PlanConfig) -> PaperScene | None:
+    """Return what is released of a scene, where no more than that is searched."""
+    return inventory().get(scene) if config.search == "released" else None
+
+
+def _by_goal(
+    plan: Callable[[Floats, Floats], list[Route]], goals: Floats, starts: Floats, rows: NDArray[np.int64]
+) -> list[Route]:
+    """Plan some rows of (n, 4) goals and starts, one goal after the other; in the order of `rows`."""
+    found: list[Route | None] = [None] * len(rows)
+    _, which = np.unique(goals[rows], axis=0, return_inverse=True)
+    for goal in range(which.max(initial=-1) + 1):
+        places = np.flatnonzero(which.ravel() == goal)
+        for place, route in zip(places.tolist(), plan(goals[rows[places[0]]], starts[rows[places]]), strict=True):
+            found[place] = route
+    return [route for route in found if route is not None]
+
+
+def _released(
+    planner: Planner,
+    pairs: pa.Table,
+    goals: Floats,
+    starts: Floats,
+    paper: PaperScene,
+    config: ReleasedPlanConfig,
+    seed: int,
+) -> list[Route]:
+    """Search what the release needs; the others' outcome is what the goals' cost-to-go tells, or NOT_NEEDED."""
+    with planner.keeping_fields(*_FIELDS_MB):
+        routes = _by_goal(planner.foresee, goals, starts, np.arange(pairs.num_rows))
+        open_ = np.array([route.outcome == "NOT_NEEDED" for route in routes])
+        predicted = np.where(open_, [route.cost_to_go_m for route in routes], np.inf)
+        free = free_lengths_m(starts, goals[:, :3], config.max_approach_m)
+        draw = Draw(Candidates.of(pairs, free, predicted), paper, config, seed)
+        found: list[Route | None] = [None] * len(routes)
+        rows = draw.first()
+        while len(rows):
+            for row, route in zip(rows.tolist(), _by_goal(planner.plan_target, goals, starts, rows), strict=True):
+                found[row] = route
+            rows = draw.more(found)
+    return [route or foreseen for route, foreseen in zip(found, routes, strict=True)]
+
+
+def _planner(scene: Scene, config: PlanConfig, radius_m: float) -> Planner:
+    return context_of(scene).part("planner", lambda: Planner(scene, config, radius_m), config, radius_m)
+
+
+def _anchor_poses(job: Job) -> tuple[dict[tuple[int, int], Floats], dict[int, tuple[int, int]]]:
+    """Poses of all anchors by (object, anchor), and every object's selected anchor."""
+    poses: dict[tuple[int, int], Floats] = {}
+    selected: dict[int, tuple[int, int]] = {}
+    for a in job.read("anchors").to_pylist():
+        key = (a["object_id"], a["anchor_id"])
+        poses[key] = np.array([a["x_m"], a["y_m"], a["z_m"], a["yaw_rad"]])
+        if a["selected"]:
+            selected[a["object_id"]] = key
+    return poses, selected
+
+
+def _turned(anchor: Floats) -> Floats:
+    """Start pose: the start object's anchor, its yaw turned by 180° (paper: start poses)."""
+    return np.array([*anchor[:3], wrap_one_rad(float(anchor[3]) + math.pi)])
+
+
+def _ends(job: Job, pairs: pa.Table) -> tuple[Floats, Floats]:
+    """Goals and start poses of the candidates, (n, 4) float64 each."""
+    poses, selected = _anchor_poses(job)
+    columns = ("target_object_id", "start_object_id", "start_anchor_id")
+    try:
+        ends = [
+            (poses[selected[target]], _turned(poses[start, anchor]))
+            for target, start, anchor in zip(*(pairs[name].to_pylist() for name in columns), strict=True)
+        ]
+    except KeyError as error:
+        raise StoreError(
+            f"{job.scene}: a candidate needs anchor {error}, which is not in anchors: "
+            f"run {command('pair-objects', scene=job.scene)}"
+        ) from None
+    return np.array([goal for goal, _ in ends]), np.array([start for _, start in ends])
+
+
+def _told(planner: Planner | None, routes: list[Route], schema: pa.Schema) -> dict[str, pa.Array]:
+    """What the table says of the routes there are, null elsewhere: their difficulty, and an agent's actions."""
+    solved = [i for i, route in enumerate(routes) if route.outcome == "SOLVED"]
+    values: dict[str, Any] = {name: np.empty(0) for name in Difficulty._fields}
+    if planner is not None and solved:
+        c = planner.config
+        lengths = np.array([routes[i].length_m for i in solved])
+        poses = [routes[i].poses for i in solved]
+        values = difficulty_of(
+            poses, lengths, c.max_approach_m, planner.radius_m, planner.grid, planner.world
+        )._asdict()
+    place = np.full(len(routes), -1)
+    place[solved] = np.arange(len(solved))
+    rows = pa.array(place, pa.int32(), mask=place < 0)
+    told = {name: pa.array(v, schema.field(name).type).take(rows) for name, v in values.items()}
+    flown = [agent_actions(routes[i].actions) for i in solved]
+    ends = np.cumsum([0, *map(len, flown)], dtype=np.int32)
+    kind = schema.field("agent_action").type
+    flat = pa.array(np.concatenate([np.empty(0, np.int8), *flown]), kind.value_type)
+    told["agent_action"] = pa.ListArray.from_arrays(pa.array(ends), flat, type=kind).take(rows)
+    return told
+
+
+def _table(scene: str, pair_ids: list[str], routes: list[Route], planner: Planner | None) -> pa.Table:
+    """Put routes into a table; the lists go over as flat arrays, for millions of poses as objects take too long."""
+    ends = np.cumsum([0, *(len(r.poses) for r in routes)], dtype=np.int32)
+    poses = np.concatenate([np.empty((0, 4)), *(r.poses for r in routes)])
+    actions = np.concatenate([np.empty(0, np.int8), *(r.actions for r in routes)])
+    flat = {**dict(zip(("x_m", "y_m", "z_m", "yaw_rad"), poses.T, strict=True)), "action": actions}
+    columns = {
+        "scene": [scene] * len(routes),
+        "pair_id": pair_ids,
+        "outcome": [r.outcome for r in routes],
+        "predicted_length_m": [r.cost_to_go_m if math.isfinite(r.cost_to_go_m) else None for r in routes],
+        "length_m": [r.length_m for r in routes],
+        "n_actions": [r.n_actions for r in routes],
+        "expansions": [r.expansions for r in routes],
+        "min_clearance_m": [r.min_clearance_m for r in routes],
+        **_told(planner, routes, PLANS.schema),
+    }
+    arrays = []
+    for field in PLANS.schema:
+        if field.name in flat:
+            values = pa.array(np.ascontiguousarray(flat[field.name]), field.type.value_type)
+            arrays.append(pa.ListArray.from_arrays(pa.array(ends), values, type=field.type))
+        else:
+            arrays.append(pa.array(columns[field.name], field.type))
+    return pa.Table.from_arrays(arrays, schema=PLANS.schema)

@@ -1,0 +1,145 @@
+"""The paper's numbers as quotas: which of a scene's kept candidates are released, and how many of them train."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aerialdojo_gen.base.constants import DETOUR
+from aerialdojo_gen.base.paper_figures import PaperScene
+from aerialdojo_gen.base.rng import rank
+from aerialdojo_gen.store.layout import partition
+
+Floats = NDArray[np.float64]
+_HALVINGS = 60
+# Metres over which a tilt of 1 changes a route's odds by e; tilts are searched for between -_STEEPEST and _STEEPEST.
+_SCALE_M = 10.0
+_STEEPEST = 1e4
+
+
+def apportion(total: int, sizes: Mapping[str, int]) -> dict[str, int]:
+    """Share a total out in proportion to sizes, in whole numbers (largest remainders, ties by name)."""
+    whole = sum(sizes.values())
+    if not whole:
+        return dict.fromkeys(sizes, 0)
+    shares = {name: total * size // whole for name, size in sizes.items()}
+    by_rest = sorted(sizes, key=lambda name: (-(total * sizes[name] % whole), name))
+    for name in by_rest[: total - sum(shares.values())]:
+        shares[name] += 1
+    return shares
+
+
+def train_quotas(
+    scene: str, scenes: Mapping[str, PaperScene], splits: Mapping[tuple[str, str], Mapping[str, int]]
+) -> dict[str, int]:
+    """Return a scene's share of the paper's training tasks of its partition.
+
+    The shares hang on the paper's figures alone, so that each scene's part of the release can be written on its own.
+    """
+    alike = [row for row in scenes.values() if partition(row.scene) == partition(scene)]
+    totals = splits[partition(scene).upper(), "train"]
+    return {s: apportion(total, {row.scene: row.tasks[s] for row in alike})[scene] for s, total in totals.items()}
+
+
+def difficulty_steps(plan_detour: Floats, visible_at_start: Floats) -> NDArray[np.int64]:
+    """Difficulty level (n,), 0 to 2.
+
+    One for a plan detour of `DETOUR` or more, one for a target that the start does not see.
+    """
+    return (plan_detour >= DETOUR).astype(np.int64) + (visible_at_start == 0.0)
+
+
+def choose(
+    lots: Sequence[str],
+    settings: Sequence[str],
+    length_m: Floats,
+    wanted: Mapping[str, int],
+    path_m: float,
+    seed: int,
+    steps: NDArray[np.int64] | Floats | None = None,
+    preference: float = 0.0,
+) -> NDArray[np.bool_]:
+    """Weighted sample without replacement (Gumbel's trick), (n,) bool.
+
+    The counts of each setting hold, lengths sum to `path_m` by tilting the weights, harder tasks are preferred. A
+    task's chance depends on its key, length and level, never on its row.
+    """
+    scores, place = _drawn(lots, settings, length_m, wanted, path_m, seed, steps, preference)
+    mask = np.zeros(len(lots), dtype=bool)
+    for rows, n in _groups(settings, wanted):
+        mask[_best(scores, place, rows)[:n]] = True
+    return mask
+
+
+def ranked(
+    lots: Sequence[str],
+    settings: Sequence[str],
+    length_m: Floats,
+    wanted: Mapping[str, int],
+    path_m: float,
+    seed: int,
+    steps: NDArray[np.int64] | Floats | None = None,
+    preference: float = 0.0,
+) -> dict[str, NDArray[np.int64]]:
+    """Rows of each setting's tasks in the order in which `choose` takes them."""
+    scores, place = _drawn(lots, settings, length_m, wanted, path_m, seed, steps, preference)
+    return {name: _best(scores, place, np.flatnonzero(np.asarray(settings) == name)) for name in sorted(wanted)}
+
+
+def _groups(settings: Sequence[str], wanted: Mapping[str, int]) -> list[tuple[NDArray[np.int64], int]]:
+    return [(np.flatnonzero(np.asarray(settings) == s), n) for s, n in sorted(wanted.items())]
+
+
+def _best(scores: Floats, place: NDArray[np.int64], rows: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Sort rows by their scores, the largest first."""
+    return rows[np.lexsort((place[rows], -scores[rows]))]
+
+
+def _drawn(
+    lots: Sequence[str],
+    settings: Sequence[str],
+    length_m: Floats,
+    wanted: Mapping[str, int],
+    path_m: float,
+    seed: int,
+    steps: NDArray[np.int64] | Floats | None,
+    preference: float,
+) -> tuple[Floats, NDArray[np.int64]]:
+    """What the tasks have drawn, tilted as the metres need it, (n,) float64; and their places among equals, (n,)."""
+    luck = np.array([_gumbel(seed, lot) for lot in lots])
+    if steps is not None:
+        luck = luck + preference * steps
+    # Ties are broken by the lot, so that the order of rows decides nothing.
+    place = np.argsort(np.argsort(np.asarray(lots)))
+    groups = _groups(settings, wanted)
+
+    def tilted(tilt: float) -> Floats:
+        return np.asarray(luck + tilt * length_m / _SCALE_M)
+
+    def total(scores: Floats) -> float:
+        return float(sum(length_m[_best(scores, place, rows)[:n]].sum() for rows, n in groups))
+
+    low, high = -_STEEPEST, _STEEPEST
+    best = tilted(0.0)
+    nearest = abs(total(best) - path_m)
+    for _ in range(_HALVINGS):
+        middle = (low + high) / 2
+        scores = tilted(middle)
+        reached = total(scores)
+        if abs(reached - path_m) < nearest:
+            best, nearest = scores, abs(reached - path_m)
+        if reached < path_m:
+            low = middle
+        else:
+            high = middle
+        if abs(reached - path_m) <= 1e-4 * path_m:
+            break
+    return best, place
+
+
+def _gumbel(seed: int, lot: str) -> float:
+    uniform = (rank(seed, "quota", lot) + 0.5) / 2**64
+    return -math.log(-math.log(uniform))

@@ -1,0 +1,180 @@
+"""split: write one scene's part of the release (DESIGN: `tasks` an agent may know, `routes` only the evaluator)."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
+from numpy.typing import NDArray
+
+from aerialdojo_gen.base.config.sections import SplitConfig
+from aerialdojo_gen.base.paper_figures import PaperScene, inventory, splits
+from aerialdojo_gen.pipeline.stage import Job, Output
+from aerialdojo_gen.pipeline.stages.work import quota
+from aerialdojo_gen.pipeline.stages.work.selection import lot, train_counts, train_mask
+from aerialdojo_gen.pipeline.stages.work.task_ids import held_out, key_of, nav_id, reference_id
+from aerialdojo_gen.store.schemas import RELEASE_ANCHORS, RELEASE_OBJECTS, ROUTES, TASKS
+from aerialdojo_gen.store.schemas.columns import DIFFICULTY, START_VIEW
+
+_LISTS = ("x_m", "y_m", "z_m", "yaw_rad", "action")
+
+
+def _constant(value: str, n: int) -> pa.Array:
+    return pa.array([value] * n, pa.string())
+
+
+def _first(lists: pa.ChunkedArray) -> pa.ChunkedArray:
+    return pc.list_element(lists, 0)
+
+
+def _take(table: pa.Table, key: str, ids: pa.ChunkedArray) -> pa.Table:
+    """Rows of `table` whose `key` is `ids`, in the order of `ids`."""
+    return table.take(pc.index_in(ids, value_set=table.column(key).combine_chunks()))
+
+
+def routes_table(
+    scene: str, kept: pa.Table, pairs: pa.Table, plans: pa.Table, goals: pa.Table, key: bytes
+) -> pa.Table:
+    """Make the routes of the kept candidates."""
+    pairs = _take(pairs, "pair_id", kept.column("pair_id"))
+    plans = _take(plans, "pair_id", kept.column("pair_id"))
+    goal = _take(goals, "object_id", pairs.column("target_object_id"))
+    pair_ids = kept.column("pair_id").to_pylist()
+    columns: dict[str, Any] = {
+        "nav_id": pa.array([nav_id(scene, p, key) for p in pair_ids], pa.string()),
+        "scene": _constant(scene, kept.num_rows),
+        "setting": kept.column("setting"),
+        **{name: pairs.column(name) for name in ("start_object_id", "start_anchor_id", "target_object_id")},
+        **{f"goal_{name}": goal.column(name) for name in ("x_m", "y_m", "z_m", "yaw_rad")},
+        **{name: kept.column(name) for name in ("euclidean_m", "length_m", "detour_ratio", "n_actions")},
+        **{field.name: kept.column(field.name) for field in (*DIFFICULTY, *START_VIEW)},
+        **{name: plans.column(name) for name in ("min_clearance_m", *_LISTS, "agent_action")},
+    }
+    routes = pa.table({name: columns[name] for name in ROUTES.schema.names}, schema=ROUTES.schema)
+    routes = routes.append_column("action_budget", kept.column("action_budget"))
+    routes = routes.append_column("lot", pa.array([lot(scene, p) for p in pair_ids], pa.string()))
+    return routes.sort_by([(column, "ascending") for column in ROUTES.order])
+
+
+def splits_of(routes: pa.Table, train: NDArray[np.bool_], out: set[int]) -> dict[str, pa.Array]:
+    """What training has seen of the ends of routes, and their side of the split by objects.
+
+    (n,) columns of `TOLD_OF_SPLITS`.
+    """
+    target, start = (routes.column(f"{end}_object_id").to_numpy() for end in ("target", "start"))
+    # A scene has few anchors an object: one number is both.
+    pose = start.astype(np.int64) << 32 | routes.column("start_anchor_id").to_numpy()
+    gone = np.fromiter(out, dtype=np.int64, count=len(out))
+    target_out, start_out = np.isin(target, gone), np.isin(start, gone)
+    return {
+        "target_seen_in_train": pa.array(np.isin(target, target[train])),
+        "start_seen_in_train": pa.array(np.isin(pose, pose[train])),
+        "target_split": pa.array(np.where(target_out | start_out, "test", "train").tolist(), pa.string()),
+        "target_held_out": pa.array(target_out),
+        "start_held_out": pa.array(start_out),
+    }
+
+
+def tasks_table(
+    routes: pa.Table, train: NDArray[np.bool_], scene: dict[str, Any], objects: pa.Table, out: set[int]
+) -> pa.Table:
+    """Make both instances of every navigation task, 2n rows of `TASKS`: what an agent may know."""
+    n = routes.num_rows
+    target = _take(objects, "object_id", routes.column("target_object_id"))
+    nulls = pa.nulls(n, pa.string())
+    told = splits_of(routes, train, out)
+    instances = []
+    for modality in ("image", "semantic"):
+        columns: dict[str, Any] = {
+            "task_id": pc.binary_join_element_wise(routes.column("nav_id"), modality[0], "-"),
+            "nav_id": routes.column("nav_id"),
+            "scene": routes.column("scene"),
+            **{name: _constant(scene[name], n) for name in ("family", "scene_type", "partition")},
+            "subset": pc.if_else(pa.array(train), "train", "test"),
+            "setting": routes.column("setting"),
+            "modality": _constant(modality, n),
+            "action_budget": routes.column("action_budget"),
+            **{f"start_{name}": _first(routes.column(name)) for name in ("x_m", "y_m", "z_m", "yaw_rad")},
+            "target_name": target.column("name"),
+            "landmark": target.column("landmark"),
+            "direction": target.column("direction"),
+            "description": target.column("description") if modality == "semantic" else nulls,
+            "reference_image_id": target.column("reference_image_id") if modality == "image" else nulls,
+            **told,
+        }
+        instances.append(pa.table(columns, schema=TASKS.schema))
+    return pa.concat_tables(instances).sort_by([(key, "ascending") for key in TASKS.order])
+
+
+def _chosen(routes: pa.Table, paper: PaperScene, seed: int, preference: float) -> NDArray[np.bool_]:
+    detour, visible = (
+        routes.column(name).to_numpy(zero_copy_only=False).astype(np.float64)
+        for name in ("plan_detour", "target_visible_at_start")
+    )
+    return quota.choose(
+        routes.column("lot").to_pylist(),
+        routes.column("setting").to_pylist(),
+        routes.column("length_m").to_numpy(),
+        paper.tasks,
+        paper.path_m,
+        seed,
+        quota.difficulty_steps(detour, visible),
+        preference,
+    )
+
+
+def run(job: Job, config: SplitConfig) -> Output:
+    """Write a scene's tasks, routes, objects, landmarks, anchors and scene row to the release."""
+    scenes, landmarks, objects, anchors = (job.read(t) for t in ("scenes", "landmarks", "objects", "anchors"))
+    scene = scenes.to_pylist()[0]
+    verdicts = job.read("verdicts")
+    kept = verdicts.filter(verdicts.column("keep"))
+    key = key_of(config.salt, job.seed)
+    routes = routes_table(
+        job.scene, kept, job.read("pairs"), job.read("plans"), anchors.filter(anchors.column("selected")), key
+    )
+    references = _take(job.read("references"), "object_id", objects.column("object_id"))
+    names = [reference_id(job.scene, k, key) for k in objects.column("object_id").to_pylist()]
+    references = references.append_column("reference_image_id", pa.array(names, pa.string()))
+    pictured = pa.table(
+        {
+            name: (objects if name in objects.column_names else references).column(name)
+            for name in RELEASE_OBJECTS.schema.names
+        },
+        schema=RELEASE_OBJECTS.schema,
+    )
+    # Without the pictures: every task takes its target's row, and would take a copy of the picture with it.
+    named = pictured.drop_columns("reference_image").append_column(
+        "landmark", _take(landmarks, "landmark_id", objects.column("landmark_id")).column("name")
+    )
+    paper = inventory().get(job.scene) if config.paper_counts else None
+    if paper is not None:
+        routes = routes.filter(pa.array(_chosen(routes, paper, job.seed, config.prefer_harder)))
+        trains = quota.train_quotas(job.scene, inventory(), splits())
+    else:
+        fraction = config.ood_train_fraction if scene["partition"] == "OOD" else config.id_train_fraction
+        trains = train_counts(routes.column("setting").to_pylist(), fraction)
+    train = train_mask(routes.column("lot").to_pylist(), routes.column("setting").to_pylist(), trains, job.seed)
+    out = held_out(job.scene, objects.column("object_id").to_pylist(), config.held_out_fraction, key)
+    tasks = tasks_table(routes, train, scene, named, out)
+    routes = routes.drop_columns(["action_budget", "lot"])
+    is_train = pc.equal(tasks.column("subset"), "train")
+    tables = {
+        "tasks/train": tasks.filter(is_train),
+        "tasks/test": tasks.filter(pc.invert(is_train)),
+        "routes/train": routes.filter(pa.array(train)),
+        "routes/test": routes.filter(pa.array(~train)),
+        "release/scenes": scenes,
+        "release/landmarks": landmarks,
+        "release/objects": pictured,
+        "release/anchors": anchors.select(RELEASE_ANCHORS.schema.names),
+        "release/viewpoints": job.read("viewpoints"),
+    }
+    counts = {
+        "train": int(np.count_nonzero(train)) * 2,
+        "test": int(np.count_nonzero(~train)) * 2,
+        "navigation tasks": routes.num_rows,
+    }
+    return Output(tables, rows_in=kept.num_rows, rows_out=tasks.num_rows, counts=counts)

@@ -1,1 +1,0 @@
-"""The release: what users load, its tables' contents and its dataset card."""

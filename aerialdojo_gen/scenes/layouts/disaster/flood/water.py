@@ -1,0 +1,211 @@
+"""What floods are made of: standing water at z = 0, dykes with a breach, houses up to their sills, things adrift.
+
+The water is the ground itself, level at z = 0; what stands in it is let down by the flood's depth, and its lower part
+is hidden.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+import shapely
+from shapely.affinity import rotate, translate
+from shapely.geometry import Polygon
+from shapely.geometry.base import BaseGeometry
+
+from aerialdojo_gen.scenes.grammar_frames import Frame
+from aerialdojo_gen.scenes.grammar_houses import HouseStyle, house, window_parts
+from aerialdojo_gen.scenes.grammar_props import next_variant, put
+from aerialdojo_gen.scenes.grammar_scatter import Polyline, Pose, poisson_disc, slab
+from aerialdojo_gen.scenes.ground import polygons_of, rectangle, ribbon
+from aerialdojo_gen.scenes.layouts.parts.natural_ground import blob
+from aerialdojo_gen.scenes.layouts.parts.structures import Parts, block, letters
+from aerialdojo_gen.scenes.mesh import Mesh, merge, rotated, rotation, translated
+from aerialdojo_gen.scenes.model import Instance
+from aerialdojo_gen.scenes.shapes_extruded import sweep
+from aerialdojo_gen.scenes.site import Site
+from aerialdojo_gen.scenes.terrain import Terrain, rolling_terrain
+
+DEPTH_M = 1.25
+CELL_M = 1.0
+_SLOPE_M = 6.0
+
+
+def water_level(site: Site) -> Terrain:
+    """Make the level water that everything else rises from."""
+    return rolling_terrain(site.recipe.size_m, CELL_M, 1, 0.0, 50.0, 1)
+
+
+def raised(terrain: Terrain, crest: BaseGeometry, height_m: float, slope_m: float = _SLOPE_M) -> Terrain:
+    """Raise a bank: level on its crest, with slopes of `slope_m` down to the water."""
+    return terrain.flattened(crest, height_m, slope_m)
+
+
+def dry(crest: BaseGeometry, slope_m: float = _SLOPE_M) -> BaseGeometry:
+    """Give the area of a bank that stands out of the water."""
+    return crest.buffer(1.5 * CELL_M + 0.82 * slope_m, quad_segs=4)
+
+
+def paint_bank(site: Site, crests: Sequence[BaseGeometry], way: str, slope_m: float = _SLOPE_M) -> None:
+    """Paint banks: mud at the waterline, grass on the slopes, and a track on the crest."""
+    area = shapely.union_all([dry(c, slope_m) for c in crests])
+    rim = [area.boundary.interpolate(s) for s in np.arange(0.0, area.length, 3.4)]
+    lobes = [blob(p.x, p.y, 1.3, site.recipe.seed + k, 0.5, 14) for k, p in enumerate(rim)]
+    site.paint(shapely.union_all([area.buffer(0.7), *lobes]), site.material("mud", "mud"))
+    site.paint(area.buffer(-0.5), site.material("bank", "grass"))
+    site.paint(shapely.union_all([c.buffer(0.9) for c in crests]), site.material(way, "gravel"))
+
+
+def streaks(site: Site, paths: Sequence[Polyline], width_m: float) -> None:
+    """Paint lighter streaks of fast water along paths."""
+    rng = site.rng_for("streaks")
+    for path in paths:
+        line = shapely.LineString(path)
+        for _ in range(int(line.length * width_m / 9.0)):
+            s, v = float(rng.uniform(0, line.length)), float(rng.uniform(-width_m / 2, width_m / 2))
+            long, thin = float(rng.uniform(1.2, 4.0)), float(rng.uniform(0.05, 0.16))
+            a, b = line.interpolate(s), line.interpolate(min(s + 0.5, line.length))
+            yaw = float(np.degrees(np.arctan2(b.y - a.y, b.x - a.x)))
+            x, y = a.x - v * np.sin(np.radians(yaw)), a.y + v * np.cos(np.radians(yaw))
+            lens = Polygon([(-long, 0), (-long / 3, thin), (long / 2, thin), (long, 0), (0, -thin)])
+            site.paint(translate(rotate(lens, yaw, origin=(0, 0)), x, y), site.material("foam", "water:#a8947a"))
+
+
+def flooded_house(site: Site, frame: Frame, style: HouseStyle) -> Instance:
+    """Put up a house that stands in water up to its lower window sills, with a line of dirt above it."""
+    built = house(site, frame, style, z=-DEPTH_M)
+    d, w = style.depth_m / 2 + 0.03, style.width_m / 2 + 0.03
+    ring = rectangle(-d, -w, d, w).difference(rectangle(-d + 0.05, -w + 0.05, d - 0.05, w - 0.05))
+    stain = frame.area(ring)
+    parts: Parts = [(site.material("stain", "mud:#8a7152"), _band(stain))]
+    site.add(None, "water_mark", parts)
+    return built
+
+
+def flat_house(
+    site: Site, x0: float, y0: float, x1: float, y1: float, *, storeys: int, wall: str, name: str = "",
+    facing_deg: float = -90.0, trim: str = "#f2efe6", roof: str = "gravel", door: str = "wood",
+    parapet_m: float = 0.35,
+) -> float:  # fmt: skip
+    """Put up a building with a flat roof that people can flee to; gives the height of its roof, metres.
+
+    Parameters
+    ----------
+    site : Site
+        Where; the building takes its ground.
+    x0, y0, x1, y1 : float
+        Its plan, metres.
+    storeys : int
+        Of 3.1 m each.
+    wall, trim, roof, door : str
+        Materials.
+    name : str
+        Stands over the front door.
+    facing_deg : float
+        Of the front: a multiple of 90.
+    parapet_m : float
+        Height of the rim of its roof.
+    """
+    plan, top = rectangle(x0, y0, x1, y1), storeys * 3.1 - DEPTH_M + 0.3
+    rim = plan.buffer(0.12, join_style="mitre").difference(plan.buffer(-0.25, join_style="mitre"))
+    parts: Parts = [
+        (wall, block(x0, y0, x1, y1, -DEPTH_M, top - 0.02)),
+        (roof, block(x0 + 0.05, y0 + 0.05, x1 - 0.05, y1 - 0.05, top - 0.02, top)),
+        ("concrete", merge([slab(p, top - 0.3, top + parapet_m) for p in polygons_of(rim)])),
+        (site.material("stain", "mud:#8a7152"), _band(
+            plan.buffer(0.03, join_style="mitre").difference(plan.buffer(-0.02, join_style="mitre")))),
+    ]  # fmt: skip
+    middle = ((x0 + x1) / 2, (y0 + y1) / 2)
+    for yaw in (0.0, 90.0, 180.0, 270.0):
+        along_x = yaw in (90.0, 270.0)
+        out = (y1 - y0 if along_x else x1 - x0) / 2
+        wide = x1 - x0 if along_x else y1 - y0
+        count = max(int((wide - 1.0) // 2.6), 1)
+        for storey in range(storeys):
+            for k in range(count):
+                v = (k - (count - 1) / 2) * (wide - 1.0) / count
+                if storey == 0 and yaw == facing_deg % 360.0 and k == count // 2:
+                    continue
+                opening = window_parts(1.5, 1.4, trim)
+                z = storey * 3.1 - DEPTH_M + 1.25
+                turn = rotation(0.0, 0.0, yaw)
+                parts += [(m, translated(rotated(translated(b, (out, v, z)), turn), (*middle, 0.0)))
+                          for m, b in opening]  # fmt: skip
+    along_x = facing_deg % 180.0 == 90.0
+    out = (y1 - y0 if along_x else x1 - x0) / 2
+    wide = x1 - x0 if along_x else y1 - y0
+    count = max(int((wide - 1.0) // 2.6), 1)
+    v = (count // 2 - (count - 1) / 2) * (wide - 1.0) / count
+    frame = Frame(*middle, facing_deg)
+    panel = block(out, v - 0.6, out + 0.1, v + 0.6, 0.2 - DEPTH_M, 2.5 - DEPTH_M)
+    hood = block(out, v - 1.0, out + 0.9, v + 1.0, 2.75 - DEPTH_M, 2.9 - DEPTH_M)
+    parts += frame.parts([(door, panel), (trim, hood)])
+    if name:
+        at = (*frame.at(out + 0.02, 0.0), storeys * 3.1 - DEPTH_M - 0.72)
+        parts.append((site.material("lettering", "#3a332c"), letters(name, 0.5, at, facing_deg, 0.06)))
+    site.add(None, "flat_house", parts, footprint=plan)
+    return top
+
+
+def wade(site: Site, category: str, x: float, y: float, yaw_deg: float, place: str, depth_m: float = 0.0) -> Instance:
+    """Place a thing in the water, let down by a depth; 0 takes almost half of its height, at most the flood's."""
+    if not depth_m:
+        look = next_variant(site, category)
+        trial = site.catalogue.instantiate(category, "trial", site.rng_for("trial"), (x, y, 0.0), 0.0, look)
+        depth_m = min(0.47 * float(trial.bounds[1, 2]), DEPTH_M)
+    return put(site, category, x, y, yaw_deg, place, z=-depth_m)
+
+
+def drift(
+    site: Site, area: BaseGeometry, categories: Sequence[str], spacing_m: float, limit: int, place: str
+) -> None:
+    """Let things drift about an area, a category after the other."""
+    rng = site.rng_for("drift", place)
+    count = 0
+    for x, y, yaw in poisson_disc(area, spacing_m, rng, limit=limit * 4):
+        if count >= limit:
+            return
+        category = categories[count % len(categories)]
+        if site.is_free(x, y, 2.0):
+            put(site, category, x, y, yaw, place, z=-0.12)
+            count += 1
+
+
+def on_roof(site: Site, things: Sequence[tuple[str, float, float, float]], z_m: float, place: str) -> None:
+    """Set things (category, x, y, yaw) out on a roof."""
+    for category, x, y, yaw in things:
+        put(site, category, x, y, yaw, place, z=z_m)
+
+
+def standing_trees(site: Site, poses: Sequence[Pose], categories: Sequence[str]) -> None:
+    """Plant trees whose feet are under water."""
+    for k, pose in enumerate(poses):
+        category = categories[k % len(categories)]
+        site.try_place(category, *pose, z=-0.9, variant=next_variant(site, category))
+
+
+def wires(site: Site, heads: Sequence[tuple[float, float, float]], sag_m: float = 0.7) -> None:
+    """Hang a power line of two wires between the heads of poles, with the poles themselves."""
+    parts: Parts = []
+    for x, y, z in heads:
+        pole = block(x - 0.11, y - 0.11, x + 0.11, y + 0.11, -DEPTH_M, z + 0.25)
+        arm = block(x - 0.07, y - 0.75, x + 0.07, y + 0.75, z - 0.12, z)
+        parts += [("bark:#5a4a3a", merge([pole, arm]))]
+        parts += [("#e8e4da", merge([block(x - 0.05, y + s - 0.05, x + 0.05, y + s + 0.05, z, z + 0.2)
+                                     for s in (-0.6, 0.6)]))]  # fmt: skip
+    for (xa, ya, za), (xb, yb, zb) in pairwise(heads):
+        for s in (-0.6, 0.6):
+            t = np.linspace(0.0, 1.0, 7)
+            path = [(xa + (xb - xa) * u, ya + (yb - ya) * u + s, za + (zb - za) * u + 0.2 - sag_m * 4 * u * (1 - u))
+                    for u in t]  # fmt: skip
+            parts.append(("iron", sweep(path=path, radius=0.025, sides=4)))
+    site.add(None, "power_line", parts)
+    for x, y, _ in heads:
+        site.occupy(ribbon([(x - 0.3, y), (x + 0.3, y)], 0.6))
+
+
+def _band(area: BaseGeometry) -> Mesh:
+    """Make the strip of dirt that the water left on walls."""
+    return merge([slab(p, -0.1, 0.35) for p in polygons_of(area)])

@@ -1,0 +1,240 @@
+"""Buildings after a disaster: torn open, pancaked, leaning, or stripped to their frame.
+
+Everything is made in the building's own frame; see `aerialdojo_gen.scenes.layouts.disaster.parts.wrecks`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from shapely.geometry import Point, Polygon
+
+from aerialdojo_gen.scenes.ground import rectangle
+from aerialdojo_gen.scenes.layouts.disaster.parts.wreckage import (
+    XY,
+    Parts,
+    bars,
+    broken_edge,
+    hanging_slab,
+    remains,
+    torn_floor,
+    torn_wall,
+)
+from aerialdojo_gen.scenes.layouts.disaster.parts.wrecks import Wreck
+from aerialdojo_gen.scenes.layouts.parts.structures import block
+from aerialdojo_gen.scenes.mesh import Mesh, merge, rotated, rotation, translated
+from aerialdojo_gen.scenes.model import Instance
+from aerialdojo_gen.scenes.shapes import box
+from aerialdojo_gen.scenes.shapes_extruded import extrude
+from aerialdojo_gen.scenes.site import Site
+
+_FOOT_M = 0.9
+_PARAPET_M = 0.6
+
+
+def put_up(
+    site: Site, wreck: Wreck, base_m: float, node: str | None = None, category: str = "damaged_building"
+) -> Instance:
+    """Put a building up, its ground floor at `base_m`; it takes the ground that it did not lose."""
+    rng = site.rng_for("wreck", round(wreck.frame.x, 2), round(wreck.frame.y, 2))
+    parts = [*_shell(wreck, rng), *_floors(wreck, rng), *_partitions(wreck, rng)]
+    if wreck.style.columns:
+        parts += _columns(wreck)
+    if wreck.ridge_m:
+        parts += _pitched(wreck, rng)
+    if wreck.balconies:
+        parts += _balconies(wreck, rng)
+    if wreck.lean_deg:
+        # It tips over its front edge and digs in there.
+        edge = np.array([0.0, wreck.depth_m / 2, 0.0])
+        turn = rotation(wreck.lean_deg, 0.0, 0.0)
+        parts = [(m, translated(rotated(translated(b, edge), turn), -edge)) for m, b in parts]
+    footprint = wreck.frame.area(remains(wreck.plan, 0.5, wreck.bites))
+    return site.add(node, category, wreck.frame.parts(parts, base_m), footprint=footprint)
+
+
+def _edges(wreck: Wreck) -> list[tuple[XY, XY]]:
+    # Middle lines of the walls, half a wall inside the plan: front, right, back, left.
+    x, y = wreck.length_m / 2 - wreck.style.wall_m / 2, wreck.depth_m / 2 - wreck.style.wall_m / 2
+    return [((-x, -y), (x, -y)), ((x, -y), (x, y)), ((x, y), (-x, y)), ((-x, y), (-x, -y))]
+
+
+def _shell(wreck: Wreck, rng: np.random.Generator) -> Parts:
+    style, parts = wreck.style, []
+    top = wreck.height_m + (0.0 if wreck.ridge_m else _PARAPET_M)
+    for side, (a, b) in enumerate(_edges(wreck)):
+        length = float(np.hypot(b[0] - a[0], b[1] - a[1]))
+        outline = [(0.0, -_FOOT_M), (length, -_FOOT_M), (length, top), (0.0, top)]
+        if side % 2 == 0:
+            # Front and back run over the corners; the ends stand between them, so that nothing overlaps.
+            half = style.wall_m / 2
+            outline = [(-half, -_FOOT_M), (length + half, -_FOOT_M), (length + half, top), (-half, top)]
+        else:
+            half = style.wall_m / 2
+            outline = [(half, -_FOOT_M), (length - half, -_FOOT_M), (length - half, top), (half, top)]
+            if wreck.ridge_m:
+                outline.insert(3, (length / 2, top + wreck.ridge_m * (1.0 - 2 * half / length)))
+        openings = _openings(wreck, length, side)
+        body = torn_wall(a, b, Polygon(outline), wreck.bites, rng, openings, style.wall_m)
+        if body is not None:
+            parts.append((style.wall, body))
+        parts += _windows(wreck, a, b, openings, rng)
+    return parts
+
+
+def _openings(wreck: Wreck, length: float, side: int) -> list[tuple[float, float, float, float]]:
+    style = wreck.style
+    count = max(round((length - 0.8) / style.bay_m), 1)
+    pitch = length / count
+    wide, sill, head = style.window_m
+    out = []
+    for storey in range(wreck.storeys):
+        z = storey * style.storey_m
+        for k in range(count):
+            u = (k + 0.5) * pitch
+            if storey == 0 and side == 0 and style.shops:
+                out.append((u - 0.4 * pitch, u + 0.4 * pitch, 0.45 if k % 3 else 0.02, 2.6))
+            elif storey == 0 and side in (0, 2) and k % 3 == 1:
+                out.append((u - 0.65, u + 0.65, 0.02, 2.2))
+            elif side % 2 == 0 or k % 2 == 0:
+                out.append((u - wide / 2, u + wide / 2, z + sill, z + head))
+    return out
+
+
+def _windows(
+    wreck: Wreck, a: XY, b: XY, openings: Sequence[tuple[float, float, float, float]], rng: np.random.Generator
+) -> Parts:
+    style = wreck.style
+    length = float(np.hypot(b[0] - a[0], b[1] - a[1]))
+    along = (np.array(b) - a) / length
+    out = np.array([along[1], -along[0]])
+    yaw = float(np.degrees(np.arctan2(along[1], along[0])))
+    panes, trims, plumes = [], [], []
+    for u0, u1, sill, head in openings:
+        at = np.array(a) + along * (u0 + u1) / 2
+        near = Point(at).buffer((u1 - u0) / 2 + 0.35)
+        draws = rng.uniform(size=2)
+        if any(near.intersects(bite.area(z)) for bite in wreck.bites for z in (sill, head + 0.3)):
+            continue
+        w = u1 - u0
+        if sill > 0.1:
+            edge = at + out * (style.wall_m / 2 + 0.03)
+            trims.append(_posed(box(size=[w + 0.24, 0.16, 0.1]), yaw, (*edge, sill - 0.1)))
+        if draws[0] < style.panes:
+            panes.append(_posed(box(size=[w, 0.05, head - sill]), yaw, (*at, sill)))
+            trims.append(_posed(box(size=[0.07, 0.1, head - sill]), yaw, (*at, sill)))
+        if draws[1] < style.soot:
+            face = at + out * (style.wall_m / 2 + 0.012)
+            plume = box(size=[w * 1.05, 0.02, 0.9 + w * 0.3], taper=(0.55, 1.0))
+            plumes.append(_posed(plume, yaw, (*face, head + 0.01)))
+    found = (("window", panes), (style.band, trims), ("#2a2827", plumes))
+    return [(m, merge(bodies)) for m, bodies in found if bodies]
+
+
+def _floors(wreck: Wreck, rng: np.random.Generator) -> Parts:
+    style, parts = wreck.style, []
+    inner = wreck.plan.buffer(-style.wall_m, join_style="mitre")
+    steel, plates = [], []
+    last = wreck.storeys - (1 if wreck.ridge_m else 0)
+    for k in range(last + 1):
+        z = k * style.storey_m
+        body = torn_floor(inner, z, wreck.bites if k else [])
+        if body is None:
+            continue
+        parts.append((style.floor, body))
+        cover = torn_floor(inner.buffer(-0.05), z + 0.03, wreck.bites if k else [], 0.03)
+        finish = (style.roof if not wreck.ridge_m else style.floor) if k == wreck.storeys else style.inner[k % 4]
+        if cover is not None and k:
+            parts.append((finish, cover))
+        for n, (at, yaw) in enumerate(broken_edge(inner, z, wreck.bites) if k else ()):
+            if style.columns or n % 2:
+                steel.append(bars(at, z - 0.12, yaw, rng))
+            if n % 7 == 3:
+                plates.append(hanging_slab(at, z - 0.02, yaw + float(rng.uniform(-15, 15)), rng))
+    if steel:
+        parts.append(("rust" if style.columns else "wood", merge(steel)))
+    if plates:
+        parts.append((style.floor, merge(plates)))
+    return parts
+
+
+def _partitions(wreck: Wreck, rng: np.random.Generator) -> Parts:
+    style, parts = wreck.style, []
+    count = max(round(wreck.length_m / wreck.rooms_m), 1)
+    y = wreck.depth_m / 2 - style.wall_m
+    for storey in range(wreck.storeys):
+        z0, z1 = storey * style.storey_m, (storey + 1) * style.storey_m - 0.25
+        if wreck.ridge_m and storey == wreck.storeys - 1:
+            z1 += 0.25
+        for k in range(1, count):
+            x = -wreck.length_m / 2 + k * wreck.length_m / count
+            face = Polygon([(0, z0), (2 * y, z0), (2 * y, z1), (0, z1)])
+            u = y * (0.6 + 0.8 * ((storey + k) % 2))
+            body = torn_wall((x, -y), (x, y), face, wreck.bites, rng, [(u, u + 1.3, z0 + 0.02, z0 + 2.2)], 0.16)
+            if body is not None:
+                parts.append((style.inner[(storey + k) % len(style.inner)], body))
+    return parts
+
+
+def _columns(wreck: Wreck) -> Parts:
+    style = wreck.style
+    nx, ny = max(round(wreck.length_m / 5.2), 1), max(round(wreck.depth_m / 5.0), 1)
+    inset = style.wall_m + 0.25
+    bodies = []
+    for x in np.linspace(-wreck.length_m / 2 + inset, wreck.length_m / 2 - inset, nx + 1):
+        for y in np.linspace(-wreck.depth_m / 2 + inset, wreck.depth_m / 2 - inset, ny + 1):
+            for k in range(wreck.storeys):
+                z = k * style.storey_m
+                # A column stands while the floor that it carries does.
+                if wreck.bears(float(x), float(y), k + 1, 0.02):
+                    bodies.append(block(x - 0.2, y - 0.2, x + 0.2, y + 0.2, z - 0.02, z + style.storey_m - 0.24))
+    return [(style.floor, merge(bodies))] if bodies else []
+
+
+def _pitched(wreck: Wreck, rng: np.random.Generator) -> Parts:
+    style, over = wreck.style, 0.4
+    x, y, rise = wreck.length_m / 2 + over, wreck.depth_m / 2, wreck.ridge_m
+    pitch = rise / y
+    covers, rafters = [], []
+    for side in (-1, 1):
+        half = rectangle(-x, min(0.0, side * (y + over)), x, max(0.0, side * (y + over)))
+        for piece in (p for p in getattr(remains(half, wreck.height_m + rise / 2, wreck.bites), "geoms", None)
+                      or [remains(half, wreck.height_m + rise / 2, wreck.bites)]):  # fmt: skip
+            if isinstance(piece, Polygon) and piece.area > 1.0:
+                flat = extrude(piece, 0.14)
+                v = flat.vertices.copy()
+                v[:, 2] += wreck.height_m + rise - np.abs(v[:, 1]) * pitch
+                covers.append(Mesh(v, flat.faces))
+        # Rafters outlast the tiles: some still span the gap.
+        for u in np.arange(-x + over + 0.6, x - over, 0.9):
+            hole = not wreck.bears(float(u), side * y / 2, wreck.storeys, 0.02)
+            if hole and rng.uniform() < 0.6:
+                length = float(np.hypot(y, rise)) * float(rng.uniform(0.5, 1.0))
+                beam = box(size=[0.12, length, 0.16])
+                slope = rotation(float(np.degrees(np.arctan2(rise, y))), 0.0, 0.0 if side < 0 else 180.0)
+                beam = rotated(translated(beam, (0, length / 2, 0)), slope)
+                rafters.append(translated(beam, (float(u), side * (y - 0.15), wreck.height_m - 0.1)))
+    found = ((style.roof, covers), ("wood", rafters))
+    return [(m, merge(bodies)) for m, bodies in found if bodies]
+
+
+def _balconies(wreck: Wreck, rng: np.random.Generator) -> Parts:
+    style = wreck.style
+    y, count = -wreck.depth_m / 2, max(round((wreck.length_m - 0.8) / style.bay_m), 1)
+    floors, panels = [], []
+    for storey in range(1, wreck.storeys):
+        z = storey * style.storey_m
+        for k in range(0, count, 2):
+            x = -wreck.length_m / 2 + (k + 0.5) * wreck.length_m / count
+            reach = rectangle(x - 1.6, y - 1.4, x + 1.6, y + 1.0)
+            if any(reach.intersects(bite.area(z)) for bite in wreck.bites) or rng.uniform() < 0.12:
+                continue
+            floors.append(block(x - 1.5, y - 1.3, x + 1.5, y, z - 0.2, z))
+            panels.append(block(x - 1.5, y - 1.3, x + 1.5, y - 1.22, z, z + 0.95))
+            panels += [block(u, y - 1.22, u + 0.07, y, z, z + 0.95) for u in (x - 1.5, x + 1.43)]
+    return [("concrete", merge(floors)), (style.band, merge(panels))] if floors else []
+
+
+def _posed(body: Mesh, yaw_deg: float, at: tuple[float, ...]) -> Mesh:
+    return translated(rotated(body, rotation(0.0, 0.0, yaw_deg)), at)

@@ -1,0 +1,225 @@
+"""Ground after a disaster: faults, craters, rubble slopes, cracks, and loose pieces strewn over it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import shapely
+from shapely.affinity import rotate, scale, translate
+from shapely.geometry import LineString, Polygon
+from shapely.geometry.base import BaseGeometry
+
+from aerialdojo_gen.base.simplex import OpenSimplex
+from aerialdojo_gen.scenes.grammar_scatter import poisson_disc, slab
+from aerialdojo_gen.scenes.layouts.disaster.parts.wreckage import XY, Parts, bars, chunk, tilted_plate
+from aerialdojo_gen.scenes.mesh import translated
+from aerialdojo_gen.scenes.model import Instance
+from aerialdojo_gen.scenes.site import Site
+from aerialdojo_gen.scenes.terrain import Terrain
+
+
+def faulted(terrain: Terrain, path: Sequence[XY], drop_m: float, width_m: float = 1.6) -> Terrain:
+    """Let the ground right of a path sink by `drop_m`; the scarp is `width_m` wide. The path crosses the site."""
+    line = LineString(path)
+    corners = terrain.corners()[:, :2]
+    points = shapely.points(corners)
+    distance = shapely.distance(line, points)
+    at = shapely.line_locate_point(line, points)
+    ahead = shapely.get_coordinates(shapely.line_interpolate_point(line, np.minimum(at + 0.1, line.length)))
+    behind = shapely.get_coordinates(shapely.line_interpolate_point(line, np.maximum(at - 0.1, 0.0)))
+    along, away = ahead - behind, corners - behind
+    right = along[:, 0] * away[:, 1] - along[:, 1] * away[:, 0] < 0.0
+    t = np.clip(0.5 + np.where(right, distance, -distance) / width_m, 0.0, 1.0)
+    return replace(terrain, heights_m=terrain.heights_m - drop_m * t.reshape(terrain.heights_m.shape))
+
+
+def sloped(terrain: Terrain, path: Sequence[tuple[float, float, float]], axis: int) -> Terrain:
+    """Add a slope along x (axis 0) or y (axis 1): heights between stations (from, to, rise), smooth between them."""
+    corners = terrain.corners()[:, axis]
+    rise = np.zeros(len(corners))
+    for start, end, height in path:
+        t = np.clip((corners - start) / (end - start), 0.0, 1.0)
+        rise += height * t * t * (3.0 - 2.0 * t)
+    return replace(terrain, heights_m=terrain.heights_m + rise.reshape(terrain.heights_m.shape))
+
+
+def crater(terrain: Terrain, x: float, y: float, radius_m: float, depth_m: float, rim_m: float, seed: int) -> Terrain:
+    """Blast a crater: a bowl of `radius_m` to its crest, thrown-up earth `rim_m` high that runs out at twice that."""
+    corners = terrain.corners()[:, :2] - (x, y)
+    noise = OpenSimplex(seed=seed)
+    angle = np.arctan2(corners[:, 1], corners[:, 0])
+    wave = np.array([noise.noise2(1.5 * float(np.cos(a)), 1.5 * float(np.sin(a))) for a in angle])
+    r = np.hypot(corners[:, 0], corners[:, 1]) / (radius_m * (1.0 + 0.14 * wave))
+    bowl = -depth_m + (depth_m + rim_m) * np.clip(r, 0.0, 1.0) ** 2.2
+    slope = rim_m * np.clip(2.0 - r, 0.0, 1.0) ** 2
+    change = np.where(r < 1.0, bowl, slope).reshape(terrain.heights_m.shape)
+    return replace(terrain, heights_m=terrain.heights_m + change)
+
+
+def heaped(terrain: Terrain, area: Polygon, height_m: float, seed: int) -> Terrain:
+    """Pile rubble over an area: steep at its border, lumpy on top."""
+    corners = terrain.corners()[:, :2]
+    points = shapely.points(corners)
+    inside = np.where(shapely.contains_xy(area, *corners.T), shapely.distance(area.boundary, points), 0.0)
+    reach = max(float(inside.max()), 0.1)
+    noise = OpenSimplex(seed=seed)
+    lumps = np.array(
+        [noise.noise2(x / 2.3, y / 2.3) if d > 0 else 0.0 for (x, y), d in zip(corners, inside, strict=True)]
+    )
+    t = np.clip(inside / reach, 0.0, 1.0) ** 0.8
+    rise = height_m * t * (1.0 + 0.35 * lumps)
+    return replace(terrain, heights_m=terrain.heights_m + rise.reshape(terrain.heights_m.shape))
+
+
+def cracks(site: Site, starts: Sequence[tuple[float, float, float]], length_m: float, seed: int) -> None:
+    """Paint jagged cracks that start at (x, y) and run along a direction in degrees, forking once."""
+    rng = site.rng_for("cracks", seed)
+    for x, y, yaw in starts:
+        for turn, share in ((0.0, 1.0), (float(rng.uniform(25, 50)), 0.45)):
+            points, at, heading = [(x, y)], np.array([x, y]), np.radians(yaw + turn)
+            for _ in range(int(length_m * share / 0.9)):
+                heading += float(rng.uniform(-0.5, 0.5))
+                heading -= 0.25 * (heading - np.radians(yaw + turn))
+                at = at + 0.9 * np.array([np.cos(heading), np.sin(heading)])
+                points.append((float(at[0]), float(at[1])))
+            if len(points) > 2:
+                widths = np.linspace(0.22, 0.05, len(points))
+                band = shapely.union_all(
+                    [
+                        LineString(points[k : k + 2]).buffer(float(widths[k]), cap_style="square", quad_segs=1)
+                        for k in range(len(points) - 1)
+                    ]
+                )
+                site.paint(band.simplify(0.04).intersection(site.extent), "#2b2926")
+
+
+def strew_chunks(
+    site: Site,
+    area: BaseGeometry,
+    spacing_m: float,
+    key: str,
+    *,
+    plate: str = "concrete",
+    lump: str = "rubble",
+    brick: str = "brick",
+    beam: str = "concrete",
+    size_m: tuple[float, float] = (0.5, 1.9),
+    limit: int = 400,
+) -> Instance | None:
+    """Strew loose pieces over free ground of an area; larger pieces take their ground."""
+    rng = site.rng_for("chunks", key)
+    kinds = (("slab", plate, 0.34), ("lump", lump, 0.3), ("brick", brick, 0.24), ("beam", beam, 0.12))
+    parts: Parts = []
+    for pose in poisson_disc(area, spacing_m, rng, limit=limit):
+        pick, t = rng.uniform(size=2)
+        size = size_m[0] + (size_m[1] - size_m[0]) * float(t) ** 2
+        if not site.is_free(pose.x, pose.y, 0.45 * size + 0.15):
+            continue
+        shares = np.cumsum([share for _, _, share in kinds])
+        kind, material, _ = kinds[int(np.searchsorted(shares[:-1], pick, side="right"))]
+        at = (pose.x, pose.y, site.ground_z(pose.x, pose.y))
+        parts.append((material, translated(chunk(kind, size, rng), at)))
+        if kind == "slab" and size > 1.3:
+            for _ in range(3):
+                yaw = float(rng.uniform(0, 360))
+                parts.append(("rust", translated(bars((0.0, 0.0), 0.1, yaw, rng, 1.0 + size / 3), at)))
+    return site.add(None, "rubble_field", parts) if parts else None
+
+
+def slab_pile(
+    site: Site,
+    x: float,
+    y: float,
+    yaw_deg: float,
+    size_m: tuple[float, float],
+    count: int,
+    key: str,
+    *,
+    base_m: float | None = None,
+    gap_m: float = 0.75,
+    floor: str = "concrete",
+    wall: str = "plaster",
+    tilt_deg: float = 5.0,
+    top: str | None = None,
+    node: str | None = None,
+) -> float:
+    """Pile up the floors of a pancaked building, crushed walls between them; the top one lies level.
+
+    Parameters
+    ----------
+    site : Site
+        Where.
+    x, y, yaw_deg : float
+        Middle of the pile, metres, and the direction of its length.
+    size_m : (float, float)
+        Length and width of the lowest floor, metres.
+    count : int
+        Number of floors.
+    key : str
+        Of the draws.
+    base_m : float, optional
+        Height of its foot; the ground's in the middle by default.
+    gap_m : float
+        Mean distance of the floors, metres.
+    floor, wall, top : str
+        Materials; `top` is that of the highest floor where it differs.
+    tilt_deg : float
+        Most that a floor is tilted across.
+    node : str, optional
+        As in `Site.add`.
+
+    Returns
+    -------
+    float
+        Height of the level top, metres.
+    """
+    rng = site.rng_for("pile", key)
+    base = site.ground_z(x, y) if base_m is None else base_m
+    turn = np.radians(yaw_deg)
+    parts: Parts = []
+    z = base
+    for k in range(count):
+        z += gap_m * float(rng.uniform(0.8, 1.25))
+        level = k == count - 1
+        tilt = (
+            (0.0, 0.0) if level else tuple(float(v) for v in rng.uniform(-tilt_deg, tilt_deg, size=2) * (0.5, 0.25))
+        )
+        shift = rng.uniform(-0.7, 0.7, size=2) * (0.0 if level else 1.0)
+        shrink = 1.0 - 0.035 * k
+        at = (x + float(shift[0]), y + float(shift[1]), z)
+        size = (size_m[0] * shrink, size_m[1] * shrink)
+        yaw = yaw_deg + float(rng.uniform(-4, 4))
+        parts.append(((top or floor) if level else floor, tilted_plate(size, 0.26, at, (tilt[0], tilt[1]), yaw, rng)))
+        for _ in range(int(sum(size_m) / 1.3)):
+            # Crushed wall and columns look out between the floors all around.
+            edge, s = int(rng.integers(4)), float(rng.uniform(-0.45, 0.45))
+            u, v = ((s, -0.42), (0.44, s), (s, 0.42), (-0.44, s))[edge]
+            u, v = u * size[0], v * size[1]
+            px, py = x + u * np.cos(turn) - v * np.sin(turn), y + u * np.sin(turn) + v * np.cos(turn)
+            body = chunk("slab" if rng.uniform() < 0.6 else "brick", float(rng.uniform(1.0, 2.2)), rng)
+            parts.append(
+                (
+                    (wall, floor, "rubble")[int(rng.integers(3))],
+                    translated(body, (float(px), float(py), z - gap_m * 0.75)),
+                )
+            )
+            out = float(np.degrees(np.arctan2(py - y, px - x)))
+            if rng.uniform() < 0.5:
+                parts.append(("rust", bars((float(px), float(py)), z - 0.13, out, rng, 1.3)))
+    area = Polygon(
+        [
+            (-size_m[0] / 2, -size_m[1] / 2),
+            (size_m[0] / 2, -size_m[1] / 2),
+            (size_m[0] / 2, size_m[1] / 2),
+            (-size_m[0] / 2, size_m[1] / 2),
+        ]
+    )
+    plan = translate(rotate(area, yaw_deg, origin=(0, 0)), x, y)
+    core = scale(plan, 0.8, 0.72)
+    parts.append(("rubble", slab(core, base - 0.5, z - 0.4)))
+    site.add(node, "collapsed_building", parts)
+    # What lies on top of it is free to be stood on.
+    site.occupy(plan, base - 100.0, z - 0.05)
+    return z

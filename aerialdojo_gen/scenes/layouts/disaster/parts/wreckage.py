@@ -1,0 +1,241 @@
+"""Broken structure: what a collapse tears out of walls and floors, bared reinforcement, hanging slabs, loose chunks.
+
+Buildings are made in a frame of their own, z = 0 at their ground floor; see `buildings`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+import shapely
+from shapely.geometry import LineString, Point, Polygon
+from shapely.geometry.base import BaseGeometry
+
+from aerialdojo_gen.base.rng import generator
+from aerialdojo_gen.scenes.grammar_scatter import slab
+from aerialdojo_gen.scenes.ground import polygons_of
+from aerialdojo_gen.scenes.mesh import Floats, Mesh, merge, rotated, rotation, translated
+from aerialdojo_gen.scenes.shapes import box, crown
+from aerialdojo_gen.scenes.shapes_extruded import extrude, sweep
+
+Parts = list[tuple[str, Mesh]]
+XY = tuple[float, float]
+
+_CORNERS = 26
+_LEVEL_M = 0.55
+_CRUMB_M2 = 0.4
+_GRID_M = 0.01
+
+
+@dataclass(frozen=True)
+class Bite:
+    """A round, ragged hole that a collapse left in a building; usually wider above than below.
+
+    Attributes
+    ----------
+    x, y : float
+        Its axis in the building's frame, metres.
+    foot_m, head_m : float
+        Radius at `z0_m` and at `z1_m`.
+    z0_m, z1_m : float
+        Nothing is torn below `z0_m`; above `z1_m` the radius stays.
+    seed : int
+        Of its ragged edge.
+    """
+
+    x: float
+    y: float
+    foot_m: float
+    head_m: float
+    z0_m: float = 0.4
+    z1_m: float = 15.0
+    seed: int = 0
+
+    def area(self, z_m: float) -> Polygon:
+        """What is missing at a height, metres; empty below `z0_m`."""
+        if z_m < self.z0_m:
+            return Polygon()
+        t = min((z_m - self.z0_m) / max(self.z1_m - self.z0_m, 1e-6), 1.0)
+        wave = np.roll(_wave(self.seed), 3 * int(z_m // 3.0))
+        r = (self.foot_m + t * (self.head_m - self.foot_m)) * wave
+        angles = np.arange(_CORNERS) * 2 * np.pi / _CORNERS
+        return Polygon(np.column_stack([self.x + r * np.cos(angles), self.y + r * np.sin(angles)]))
+
+    def tear(self, a: XY, b: XY, top_m: float, rng: np.random.Generator) -> BaseGeometry:
+        """What is missing of an upright wall from `a` to `b`: a polygon of (along, up) metres."""
+        line = LineString([a, b])
+        out: BaseGeometry = Polygon()
+        left: list[XY] = []
+        right: list[XY] = []
+        for z in [*np.arange(self.z0_m, top_m + _LEVEL_M, _LEVEL_M), np.inf]:
+            cut = line.intersection(self.area(float(z))) if np.isfinite(z) else LineString()
+            if cut.is_empty:
+                if len(left) > 1:
+                    out = out.union(Polygon([*left, *right[::-1]]).buffer(0.0))
+                left, right = [], []
+                continue
+            x0, y0, x1, y1 = cut.bounds
+            ends = sorted(line.project(Point(p)) for p in ((x0, y0), (x1, y1), (x0, y1), (x1, y0)))
+            # A tear that reaches a corner takes it along, and one that reaches the top leaves it open.
+            u0 = -1.0 if ends[0] < 0.3 else ends[0] + rng.uniform(-0.3, 0.3)
+            u1 = line.length + 1.0 if ends[-1] > line.length - 0.3 else ends[-1] + rng.uniform(-0.3, 0.3)
+            up = float(z) if z + _LEVEL_M < top_m else top_m + 5.0
+            left.append((float(u0), up))
+            right.append((float(max(u1, u0 + 0.3)), up))
+        return out
+
+
+@lru_cache(maxsize=256)
+def _wave(seed: int) -> Floats:
+    rng = generator(seed, "bite")
+    rough = rng.uniform(-0.2, 0.2, size=_CORNERS)
+    slow = np.cos(np.arange(_CORNERS) * 2 * np.pi / _CORNERS * 3 + rng.uniform(0, 6.3))
+    return np.asarray(1.0 + rough + 0.12 * slow)
+
+
+def torn_wall(
+    a: XY,
+    b: XY,
+    face: BaseGeometry,
+    bites: Sequence[Bite],
+    rng: np.random.Generator,
+    openings: Sequence[tuple[float, float, float, float]] = (),
+    thickness_m: float = 0.28,
+) -> Mesh | None:
+    """Make what is left of an upright wall.
+
+    Parameters
+    ----------
+    a, b : (x, y)
+        Ends of its middle line, metres.
+    face : shapely geometry
+        The whole wall as (along, up) metres.
+    bites : sequence of Bite
+        What was torn out.
+    rng : numpy.random.Generator
+        Draws the broken edges.
+    openings : sequence of (from, to, sill, head)
+        Windows and doors, metres.
+    thickness_m : float
+        Of the wall.
+
+    Returns
+    -------
+    Mesh or None
+        None where nothing stands.
+    """
+    top = face.bounds[3]
+    for u0, u1, sill, head in openings:
+        face = face.difference(Polygon([(u0, sill), (u1, sill), (u1, head), (u0, head)]))
+    for bite in bites:
+        face = face.difference(bite.tear(a, b, top, rng))
+    yaw = float(np.degrees(np.arctan2(b[1] - a[1], b[0] - a[0])))
+    bodies = []
+    # Tears and openings that all but touch leave slivers that cannot be triangulated.
+    for piece in polygons_of(shapely.set_precision(face, _GRID_M)):
+        if piece.area < _CRUMB_M2:
+            continue
+        flat = extrude(piece, thickness_m)
+        u, v, w = flat.vertices.T
+        # (u, v, w) becomes (x, z, -y): the wall stands on y = 0 and its pattern is projected anew.
+        bodies.append(Mesh(np.column_stack([u, thickness_m / 2 - w, v]), flat.faces))
+    if not bodies:
+        return None
+    return translated(rotated(merge(bodies), rotation(0.0, 0.0, yaw)), (*a, 0.0))
+
+
+def torn_floor(plan: Polygon, top_m: float, bites: Sequence[Bite], thickness_m: float = 0.25) -> Mesh | None:
+    """Make what is left of a floor whose top lies at `top_m`; None where nothing is."""
+    pieces = [p for p in polygons_of(remains(plan, top_m, bites)) if p.area > 1.0]
+    return merge([slab(p, top_m - thickness_m, top_m) for p in pieces]) if pieces else None
+
+
+def remains(plan: Polygon, z_m: float, bites: Sequence[Bite]) -> BaseGeometry:
+    """Work out what of a plan is left at a height."""
+    left: BaseGeometry = plan
+    for bite in bites:
+        left = left.difference(bite.area(z_m))
+    return left
+
+
+def broken_edge(plan: Polygon, z_m: float, bites: Sequence[Bite], spacing_m: float = 0.8) -> list[tuple[XY, float]]:
+    """List points of a floor's broken edge, and the direction (degrees) that looks out into the gap from there."""
+    left = remains(plan, z_m, bites)
+    inner = plan.buffer(-0.3)
+    out: list[tuple[XY, float]] = []
+    for bite in bites:
+        for piece in polygons_of(left):
+            edge = piece.exterior.intersection(bite.area(z_m).boundary.buffer(0.02)).intersection(inner)
+            for line in getattr(edge, "geoms", [edge]):
+                for s in np.arange(spacing_m / 2, line.length, spacing_m):
+                    p = line.interpolate(s)
+                    yaw = float(np.degrees(np.arctan2(bite.y - p.y, bite.x - p.x)))
+                    out.append(((float(p.x), float(p.y)), yaw))
+    return out
+
+
+def bars(at: XY, z_m: float, yaw_deg: float, rng: np.random.Generator, reach_m: float = 0.9) -> Mesh:
+    """Make one bent reinforcement bar that sticks out of a broken edge."""
+    c, s = np.cos(np.radians(yaw_deg)), np.sin(np.radians(yaw_deg))
+    r, droop = reach_m * float(rng.uniform(0.5, 1.2)), float(rng.uniform(-0.5, 0.15))
+    side = float(rng.uniform(-0.3, 0.3))
+    path = [
+        (at[0] - 0.15 * c, at[1] - 0.15 * s, z_m),
+        (at[0] + 0.55 * r * c, at[1] + 0.55 * r * s, z_m + 0.2 * droop),
+        (at[0] + r * c - side * s, at[1] + r * s + side * c, z_m + droop),
+    ]
+    return sweep(path=path, radius=0.025, sides=3)
+
+
+def hanging_slab(at: XY, top_m: float, yaw_deg: float, rng: np.random.Generator, length_m: float = 2.4) -> Mesh:
+    """Make a piece of floor that hangs from a broken edge by its bars, steeply down."""
+    width, length = float(rng.uniform(1.2, 2.6)), length_m * float(rng.uniform(0.7, 1.1))
+    ragged = Polygon(
+        [(0, -width / 2), (length * 0.9, -width / 2 + 0.1), (length, -width * 0.1), (length * 0.8, width * 0.2),
+         (length * 0.92, width / 2), (0, width / 2)]
+    )  # fmt: skip
+    plate = translated(extrude(ragged, 0.22), (0, 0, -0.22))
+    turn = rotation(0.0, float(rng.uniform(48, 78)), yaw_deg)
+    return translated(rotated(plate, turn), (*at, top_m))
+
+
+def tilted_plate(
+    size_m: tuple[float, float], thickness_m: float, at: tuple[float, float, float],
+    tilt_deg: tuple[float, float], yaw_deg: float, rng: np.random.Generator,
+) -> Mesh:  # fmt: skip
+    """Make a broken plate with ragged ends about `at` (middle of its top), turned about x and y, then z."""
+    x, y = size_m[0] / 2, size_m[1] / 2
+    side = np.linspace(-y, y, 5)
+    right = [(x * float(rng.uniform(0.82, 1.08)), float(v)) for v in side]
+    left = [(-x * float(rng.uniform(0.82, 1.08)), float(v)) for v in side[::-1]]
+    plate = translated(extrude(Polygon([*right, *left]), thickness_m), (0, 0, -thickness_m))
+    return translated(rotated(plate, rotation(tilt_deg[0], tilt_deg[1], yaw_deg)), at)
+
+
+def chunk(kind: str, size_m: float, rng: np.random.Generator) -> Mesh:
+    """Make a loose piece about the origin, a third of it below z = 0.
+
+    Parameters
+    ----------
+    kind : str
+        ``"slab"``, ``"lump"``, ``"beam"`` or ``"brick"``.
+    size_m : float
+        About its length, metres.
+    rng : numpy.random.Generator
+        Draws its pose and proportions.
+    """
+    f = rng.uniform(0.7, 1.2, size=3)
+    if kind == "lump":
+        radii = [0.5 * size_m * f[0], 0.5 * size_m * f[1], 0.32 * size_m * f[2]]
+        return crown(radii=radii, noise=0.35, subdivisions=0, seed=int(rng.integers(1000)))
+    sizes = {
+        "slab": [size_m * f[0], 0.65 * size_m * f[1], 0.18],
+        "beam": [1.4 * size_m * f[0], 0.2, 0.24],
+        "brick": [0.45 * size_m * f[0], 0.25, 0.3 * size_m * f[2]],
+    }
+    body = box(size=sizes[kind], taper=(float(rng.uniform(0.8, 1.0)), 1.0))
+    tilt = (float(rng.uniform(-28, 28)), float(rng.uniform(-24, 24)), float(rng.uniform(0, 360)))
+    return translated(rotated(body, rotation(*tilt)), (0, 0, -0.03))

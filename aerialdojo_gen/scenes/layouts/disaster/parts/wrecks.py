@@ -1,0 +1,110 @@
+"""What a damaged building is: its size, its look, and what was torn out of it.
+
+A building's own frame has its origin in the middle of the plan, x along its length; its front looks along -y (south
+where its yaw is 0). z = 0 is the ground floor.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from shapely.geometry import Point, Polygon
+
+from aerialdojo_gen.scenes.grammar_frames import Frame
+from aerialdojo_gen.scenes.ground import rectangle
+from aerialdojo_gen.scenes.layouts.disaster.parts.wreckage import Bite, remains
+
+
+@dataclass(frozen=True)
+class Style:
+    """What a building looks like.
+
+    Attributes
+    ----------
+    wall, band : str
+        Materials of the outer walls, and of sills and balconies.
+    floor : str
+        Of the floors' edges and undersides.
+    inner : tuple of str
+        Of the partitions, room by room.
+    roof : str
+        Of a pitched roof, or of the covering of a flat one.
+    storey_m, bay_m : float
+        Height of a storey and distance of the windows, metres.
+    window_m : (float, float, float)
+        Width, sill and head of a window, metres.
+    wall_m : float
+        Thickness of the outer walls, metres.
+    columns : bool
+        Whether a frame of columns carries the floors.
+    shops : bool
+        Wide shop windows in the ground storey of the front.
+    panes, soot : float
+        Shares of the windows that kept their panes, and that have a plume of soot above.
+    """
+
+    wall: str = "plaster:#cfc3ab"
+    band: str = "concrete"
+    floor: str = "concrete"
+    inner: tuple[str, ...] = ("plaster:#b9c7b0", "plaster:#c9b0a0", "plaster:#a9b6c4", "plaster:#d3c79a")
+    roof: str = "gravel:#8f8a82"
+    storey_m: float = 3.1
+    bay_m: float = 3.4
+    window_m: tuple[float, float, float] = (1.5, 0.9, 2.3)
+    wall_m: float = 0.28
+    columns: bool = True
+    shops: bool = False
+    panes: float = 0.55
+    soot: float = 0.0
+
+
+@dataclass(frozen=True)
+class Wreck:
+    """A damaged building.
+
+    Attributes
+    ----------
+    frame : Frame
+        Middle of its plan, and the direction of its length.
+    length_m, depth_m, storeys : float, float, int
+        Its size.
+    style : Style
+        Its look.
+    bites : tuple of Bite
+        What was torn out, in its own frame.
+    lean_deg : float
+        How far the whole of it leans to its front.
+    ridge_m : float
+        Height of a pitched roof's ridge over the eaves; 0 makes a flat roof.
+    rooms_m : float
+        Distance of the partitions across it.
+    balconies : bool
+        Whether the front has them.
+    """
+
+    frame: Frame
+    length_m: float
+    depth_m: float
+    storeys: int
+    style: Style = field(default_factory=Style)
+    bites: tuple[Bite, ...] = ()
+    lean_deg: float = 0.0
+    ridge_m: float = 0.0
+    rooms_m: float = 6.8
+    balconies: bool = False
+
+    @property
+    def plan(self) -> Polygon:
+        """Its outline in its own frame, metres."""
+        x, y = self.length_m / 2, self.depth_m / 2
+        return rectangle(-x, -y, x, y)
+
+    @property
+    def height_m(self) -> float:
+        """Height of the eaves, metres."""
+        return self.storeys * self.style.storey_m
+
+    def bears(self, x: float, y: float, storey: int, radius_m: float = 0.6) -> bool:
+        """Whether a floor (`storeys`: the roof) carries a disc about a point of its own frame."""
+        floor = remains(self.plan, storey * self.style.storey_m, self.bites)
+        return bool(floor.buffer(-radius_m).contains(Point(x, y)))

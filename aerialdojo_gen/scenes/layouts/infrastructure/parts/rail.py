@@ -1,0 +1,229 @@
+"""Railways for layouts: tracks on ballast, platforms, overhead lines, trains.
+
+Rolling stock of the catalogue has z = 0 at the top of the rail, `RAIL_M` above the ground that a track is laid on.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import shapely
+from shapely.geometry import LineString
+from shapely.geometry.base import BaseGeometry
+
+from aerialdojo_gen.scenes.grammar_props import put
+from aerialdojo_gen.scenes.grammar_scatter import along, slab
+from aerialdojo_gen.scenes.ground import rectangle, ribbon
+from aerialdojo_gen.scenes.layouts.parts.structures import Parts, Point, block
+from aerialdojo_gen.scenes.mesh import Mesh, merge, rotated, rotation, translated
+from aerialdojo_gen.scenes.model import Instance
+from aerialdojo_gen.scenes.shapes import box, cylinder
+from aerialdojo_gen.scenes.shapes_extruded import extrude, sweep
+from aerialdojo_gen.scenes.site import Site
+
+BED_M = 0.35
+RAIL_M = 0.56
+_GAUGE_M = 1.44
+_SLEEPER_M = (0.26, 2.4, 0.2)
+_SPACING_M = 0.7
+
+
+def ballast(site: Site, paths: Sequence[Sequence[Point]], material: str = "gravel:#867e74") -> None:
+    """Paint the beds of tracks, a low shoulder about a higher middle; beds that meet become one."""
+    beds = shapely.unary_union([ribbon(p, 4.4) for p in paths])
+    site.paint(beds, material, BED_M / 2, material)
+    site.paint(shapely.unary_union([ribbon(p, 3.2) for p in paths]), material, BED_M, material)
+
+
+def track(
+    site: Site,
+    path: Sequence[Point],
+    *,
+    bed_z: float = BED_M,
+    clear: BaseGeometry | None = None,
+    sleeper: str = "planks:#5f4a38",
+) -> Instance:
+    """Lay sleepers and rails.
+
+    Parameters
+    ----------
+    site : Site
+        Where.
+    path : sequence of (x, y)
+        Middle line, metres.
+    bed_z : float
+        Height of the ballast's top; the rails' top lies `RAIL_M` - `BED_M` above it.
+    clear : shapely geometry, optional
+        Where another track has sleepers already.
+    sleeper : str
+        Material of the sleepers.
+    """
+    line = LineString(path)
+    top = bed_z + RAIL_M - BED_M
+    tie = translated(box(size=_SLEEPER_M), (0.0, 0.0, bed_z - 0.15))
+    ties = []
+    for pose in along(path, _SPACING_M, start_m=0.2, end_m=0.2):
+        if clear is None or not shapely.contains_xy(clear, pose.x, pose.y):
+            ties.append(translated(rotated(tie, rotation(0.0, 0.0, pose.yaw_deg)), (pose.x, pose.y, 0.0)))
+    rails = []
+    for side in (-1, 1):
+        run = line.offset_curve(side * _GAUGE_M / 2, join_style="mitre")
+        rails.append(sweep(path=[(x, y, top - 0.08) for x, y in run.coords], section=(0.14, 0.16)))
+    return site.add(None, "track", [(sleeper, merge(ties)), ("rust:#7a6a5e", merge(rails))] if ties else
+                    [("rust:#7a6a5e", merge(rails))])  # fmt: skip
+
+
+def s_curve(a: Point, b: Point, steps: int = 10) -> list[Point]:
+    """Lead a track from `a` to a parallel one at `b`, both running along x, metres."""
+    t = np.linspace(0.0, 1.0, steps + 1)
+    y = a[1] + (b[1] - a[1]) * t * t * (3.0 - 2.0 * t)
+    return [(float(u), float(v)) for u, v in zip(a[0] + (b[0] - a[0]) * t, y, strict=True)]
+
+
+def platform(site: Site, x0: float, y0: float, x1: float, y1: float, z1: float, floor: str, z0: float = 0.0) -> None:
+    """Build a platform with a coping and a yellow line along both edges that run along x."""
+    parts: Parts = [("blocks:#8f8a82", block(x0, y0, x1, y1, z0, z1 - 0.2))]
+    parts.append((floor, block(x0, y0 + 0.6, x1, y1 - 0.6, z1 - 0.2, z1)))
+    parts.append(("concrete:#c4c0b6", merge([block(x0, y0 - 0.06, x1, y0 + 0.6, z1 - 0.2, z1),
+                                              block(x0, y1 - 0.6, x1, y1 + 0.06, z1 - 0.2, z1)])))  # fmt: skip
+    lines = [block(x0, y, x1, y + 0.12, z1 - 0.05, z1 + 0.008) for y in (y0 + 0.62, y1 - 0.74)]
+    parts.append(("marking_yellow", merge(lines)))
+    site.add(None, "platform", parts)
+    site.occupy(rectangle(x0, y0, x1, y1), z0, z1 - 0.05)
+
+
+def shed_roof(
+    x0: float, y0: float, x1: float, y1: float, z_m: float, foot_m: float, *, roof: str, frame: str,
+    spacing_m: float = 8.0, rows: Sequence[float] = (),
+) -> Parts:  # fmt: skip
+    """Make a platform canopy that falls to a gutter in its middle (a butterfly), on posts in `rows` (y, metres)."""
+    middle, rise = (y0 + y1) / 2, 0.55
+    half = (y1 - y0) / 2
+    pitch = float(np.degrees(np.arctan2(rise, half)))
+    leaf = box(size=(x1 - x0, float(np.hypot(half, rise)), 0.14))
+    wing = [
+        translated(
+            rotated(leaf, rotation(s * pitch, 0.0, 0.0)), ((x0 + x1) / 2, middle + s * half / 2, z_m + rise / 2)
+        )
+        for s in (-1.0, 1.0)
+    ]
+    count = max(round((x1 - x0 - 2.0) / spacing_m), 1)
+    steps = [x0 + 1.0 + (x1 - x0 - 2.0) * k / count for k in range(count + 1)]
+    posts = [
+        translated(cylinder(radius=0.13, height=z_m + 0.1 - foot_m, segments=8), (x, y, foot_m))
+        for x in steps
+        for y in (rows or (middle,))
+    ]  # fmt: skip
+    ends = (y0 + 0.3, middle, y1 - 0.3)
+    arms = [
+        sweep(path=[(x, y, z_m + rise * abs(y - middle) / (y1 - middle) - 0.08) for y in ends], section=(0.14, 0.16))
+        for x in steps
+    ]
+    rim = [block(x0, y - 0.06, x1, y + 0.06, z_m + rise - 0.25, z_m + rise + 0.2) for y in (y0, y1)]
+    return [(roof, merge(wing)), (frame, merge([*posts, *arms, *rim]))]
+
+
+def portal(
+    site: Site, x: float, y0: float, y1: float, tracks: Sequence[float], *, foot: tuple[float, float],
+    z_m: float, wire_m: float,
+) -> None:  # fmt: skip
+    """Put up a lattice portal across tracks (y, metres) that carries their wires at `wire_m`."""
+    steel = "#7b8288"
+    bars = [block(x - 0.17, y - 0.17, x + 0.17, y + 0.17, f, z_m + 0.7) for y, f in zip((y0, y1), foot, strict=True)]
+    bars += [block(x - 0.09, min(y0, y1), x + 0.09, max(y0, y1), z, z + 0.12) for z in (z_m, z_m + 0.58)]
+    count = max(round(abs(y1 - y0) / 1.4), 2)
+    ys = np.linspace(min(y0, y1), max(y0, y1), count + 1)
+    zigzag = [(x, float(y), z_m + (0.06 if k % 2 else 0.62)) for k, y in enumerate(ys)]
+    bars.append(sweep(path=zigzag, section=(0.07, 0.07)))
+    insulators = []
+    for y in tracks:
+        bars.append(block(x - 0.05, y - 0.05, x + 0.05, y + 0.05, wire_m + 0.6, z_m))
+        insulators.append(translated(cylinder(radius=0.11, height=0.5, segments=8), (x, y, wire_m + 0.08)))
+    feet = [
+        block(x - 0.45, y - 0.45, x + 0.45, y + 0.45, f - 0.3, f + 0.25) for y, f in zip((y0, y1), foot, strict=True)
+    ]
+    site.add(
+        None,
+        "overhead_line_portal",
+        [(steel, merge(bars)), ("#7a3f2c", merge(insulators)), ("concrete", merge(feet))],
+    )
+    for y, f in zip((y0, y1), foot, strict=True):
+        site.occupy(rectangle(x - 0.5, y - 0.5, x + 0.5, y + 0.5), f, f + 7.0)
+
+
+def wires(site: Site, x0: float, x1: float, tracks: Sequence[float], wire_m: float) -> None:
+    """Hang a contact wire and a carrying wire over tracks that run along x, metres."""
+    bodies: list[Mesh] = []
+    for y in tracks:
+        bodies += [block(x0, y - 0.02, x1, y + 0.02, z, z + 0.04) for z in (wire_m, wire_m + 0.55)]
+        bodies += [
+            block(x - 0.015, y - 0.015, x + 0.015, y + 0.015, wire_m, wire_m + 0.55)
+            for x in np.arange(x0 + 4, x1, 8.0)
+        ]
+    site.add(None, "overhead_wire", [("#33373b", merge(bodies))])
+
+
+def train(
+    site: Site, y: float, cars: Sequence[tuple[str, str | None, float, float]], *, place: str, z: float = RAIL_M
+) -> list[Instance]:
+    """Put vehicles on a track along x: (category, variant or None for the rarest, x, yaw in degrees) each."""
+    out = []
+    for category, variant, x, yaw in cars:
+        options = {} if variant is None else {"variant": variant}
+        out.append(put(site, category, x, y, yaw, place, z=z, **options))
+    return out
+
+
+def things(
+    site: Site, place: str, spots: Sequence[tuple[str, float, float, float]], z: float | None = None,
+) -> None:  # fmt: skip
+    """Set out props, (category, x, y, yaw) each, on the ground or on a floor at `z`."""
+    for category, x, y, yaw in spots:
+        put(site, category, x, y, yaw, place, z=z)
+
+
+def footbridge_roof(x0: float, y0: float, x1: float, y1: float, floor_m: float, *, roof: str, frame: str) -> Parts:
+    """Make a light roof on posts over a footbridge that runs along y."""
+    posts = [block(x - 0.07, y - 0.07, x + 0.07, y + 0.07, floor_m, floor_m + 2.7)
+             for x in (x0 + 0.1, x1 - 0.1)
+             for y in np.linspace(y0 + 0.2, y1 - 0.2, max(round((y1 - y0) / 4.5), 1) + 1)]  # fmt: skip
+    top = slab(rectangle(x0 - 0.3, y0, x1 + 0.3, y1), floor_m + 2.7, floor_m + 2.86)
+    return [(frame, merge(posts)), (roof, top)]
+
+
+def arcade(
+    x0: float,
+    x1: float,
+    z0: float,
+    z1: float,
+    arches: Sequence[tuple[float, float, float]],
+    width_m: float,
+    y: float = 0.0,
+) -> Mesh:
+    """Make a wall of round arches that runs along x.
+
+    Parameters
+    ----------
+    x0, x1, z0, z1 : float
+        Ends, foot and top, metres.
+    arches : sequence of (middle, radius, springing)
+        Each opening reaches from the foot up to its springing and half a circle beyond, metres.
+    width_m : float
+        Across, about `y`.
+    """
+    face: BaseGeometry = rectangle(x0, z0, x1, z1)
+    for middle, radius, spring in arches:
+        face = face.difference(rectangle(middle - radius, z0 - 1.0, middle + radius, spring))
+        face = face.difference(shapely.Point(middle, spring).buffer(radius, quad_segs=8))
+    return upright(face, width_m, y)
+
+
+def upright(face: BaseGeometry, width_m: float, y: float = 0.0) -> Mesh:
+    """Extrude a side view, polygons of (x, z) in metres, along y, centred on `y`."""
+    bodies = []
+    for piece in getattr(face, "geoms", [face]):
+        flat = extrude(piece, width_m)
+        u, v, w = flat.vertices.T
+        bodies.append(Mesh(np.column_stack([u, y + width_m / 2 - w, v]), flat.faces))
+    return merge(bodies)

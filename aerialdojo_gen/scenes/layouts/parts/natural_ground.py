@@ -1,0 +1,136 @@
+"""How things sit on natural ground: organic outlines, slopes, and groups of props set out about a spot."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from shapely.geometry import Polygon
+
+from aerialdojo_gen.base.simplex import OpenSimplex
+from aerialdojo_gen.scenes.grammar_props import next_variant
+from aerialdojo_gen.scenes.model import Instance
+from aerialdojo_gen.scenes.site import Site
+
+_BELOW_M = 100.0
+
+
+@dataclass(frozen=True)
+class Thing:
+    """A prop of a group.
+
+    Attributes
+    ----------
+    category : str
+        Of the catalogue.
+    x, y : float
+        In the group's frame (x along the group's yaw), metres.
+    yaw_deg : float
+        Its front, counter-clockwise from the group's x.
+    variant : str or None
+        None draws one.
+    lift_m : float or None
+        Height of its base above the group's origin; None stands it on the ground.
+    words : mapping of str to str
+        Attributes of its own.
+    params : mapping of str to float
+        Fixed sizes.
+    """
+
+    category: str
+    x: float
+    y: float
+    yaw_deg: float = 0.0
+    variant: str | None = None
+    lift_m: float | None = None
+    words: Mapping[str, str] = field(default_factory=dict)
+    params: Mapping[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Spot:
+    """A place with a name where a group of things stands: world frame, metres and degrees."""
+
+    x: float
+    y: float
+    yaw_deg: float
+    place: str
+
+    def world(self, x: float, y: float) -> tuple[float, float]:
+        """Turn a point of the spot's own frame into the world's, metres."""
+        c, s = np.cos(np.radians(self.yaw_deg)), np.sin(np.radians(self.yaw_deg))
+        return float(self.x + c * x - s * y), float(self.y + s * x + c * y)
+
+
+def furnish(site: Site, spot: Spot, things: Sequence[Thing], margin_m: float = 1.3) -> list[Instance]:
+    """Set a group out and keep the room around every thing, so that trees leave it to be seen and flown around.
+
+    Parameters
+    ----------
+    site : Site
+        Gets the props; each says in its attribute ``place`` where it stands.
+    spot : Spot
+        The group's frame.
+    things : sequence of Thing
+        In the group's frame.
+    margin_m : float
+        Room kept around each, metres.
+    """
+    base = site.ground_z(spot.x, spot.y)
+    out = []
+    for t in things:
+        x, y = spot.world(t.x, t.y)
+        z = settled_z(site, x, y) if t.lift_m is None else base + t.lift_m
+        words = {"place": spot.place} | dict(t.words)
+        instance = site.place(
+            t.category, x, y, spot.yaw_deg + t.yaw_deg, z=z, variant=t.variant, attributes=words, params=t.params
+        )
+        keep_clear(site, instance, margin_m)
+        out.append(instance)
+    return out
+
+
+def keep_clear(site: Site, instance: Instance, margin_m: float) -> None:
+    """Take the ground within `margin_m` of an instance's plan, over all heights up to 8 m above its top."""
+    (x0, y0, _), (x1, y1, z1) = instance.bounds
+    corners = [(x0, y0), (x1, y0), (x1, y1), (x0, y1)]
+    site.occupy(Polygon(corners).buffer(margin_m, quad_segs=2), -_BELOW_M, float(z1) + 8.0)
+
+
+def settled_z(site: Site, x: float, y: float, radius_m: float = 0.5) -> float:
+    """Give the height at which a prop of that radius neither floats nor is buried on a slope, metres."""
+    angles = np.arange(6) * np.pi / 3
+    ring = [site.ground_z(x + radius_m * float(np.cos(a)), y + radius_m * float(np.sin(a))) for a in angles]
+    return (site.ground_z(x, y) + min(ring)) / 2.0
+
+
+def downhill_deg(site: Site, x: float, y: float, reach_m: float = 1.5) -> float:
+    """Give the direction in which the ground falls, degrees counter-clockwise from +x."""
+    east = site.ground_z(x + reach_m, y) - site.ground_z(x - reach_m, y)
+    north = site.ground_z(x, y + reach_m) - site.ground_z(x, y - reach_m)
+    return float(np.degrees(np.arctan2(-north, -east)))
+
+
+def blob(x: float, y: float, radius_m: float, seed: int, ragged: float = 0.25, corners: int = 28) -> Polygon:
+    """Make a round area with a wavy outline (a clearing, a pond, a patch of moss), metres, world frame."""
+    noise = OpenSimplex(seed=seed)
+    angles = np.arange(corners) * 2 * np.pi / corners
+    wave = np.array([noise.noise2(1.3 * float(np.cos(a)), 1.3 * float(np.sin(a))) for a in angles])
+    r = radius_m * (1.0 + ragged * wave / 0.6)
+    return Polygon(np.column_stack([x + r * np.cos(angles), y + r * np.sin(angles)]))
+
+
+def wild(site: Site, place: str, spots: Sequence[tuple[str, float, float, float]]) -> None:
+    """Set out props on uneven ground and keep the room around them."""
+    for category, x, y, yaw in spots:
+        instance = site.place(
+            category,
+            x,
+            y,
+            yaw,
+            z=settled_z(site, x, y),
+            variant=next_variant(site, category),
+            attributes={"place": place},
+        )
+        keep_clear(site, instance, 1.6)

@@ -1,0 +1,216 @@
+"""Bridges of a town: decks on piers between ramps, over what passes below."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from shapely.geometry import LineString, Point
+from shapely.geometry.base import BaseGeometry
+from shapely.ops import substring
+
+from aerialdojo_gen.scenes.grammar_scatter import slab
+from aerialdojo_gen.scenes.ground import Surface, ground_meshes, polygons_of
+from aerialdojo_gen.scenes.layouts.places.town.model import Bridge
+from aerialdojo_gen.scenes.layouts.places.town.roofs import Parts
+from aerialdojo_gen.scenes.mesh import Mesh, flipped, merge, mesh, translated
+from aerialdojo_gen.scenes.site import Site
+from aerialdojo_gen.scenes.terrain import Terrain
+
+_CELL_M = 2.0
+_RIM_M = 0.35
+_PARAPET_M, _THICK_M = 1.0, 0.25
+# Lower than this the deck stands on solid ground: nobody flies there.
+_LOWEST_FREE_M = 1.0
+_HIGHEST_OPEN_M = 0.4
+_PIERS_M, _PIER_M, _SHIFT_M, _END_M = 16.0, 0.8, 6.0, 1.0
+_FROM_ROADS_M = 0.6
+_SUNK_M = 0.3
+_SLICE_M = 4.0
+
+
+@dataclass(frozen=True)
+class Deck:
+    """A bridge where it stands.
+
+    Attributes
+    ----------
+    bridge : Bridge
+        Of the recipe.
+    plan : shapely geometry
+        Deck and ramps from above, where they are over the ground, metres.
+    span, solid : shapely geometry
+        What of the plan is free below, and what is not.
+    heights : Terrain
+        Of the road.
+    """
+
+    bridge: Bridge
+    plan: BaseGeometry
+    span: BaseGeometry
+    solid: BaseGeometry
+    heights: Terrain
+
+
+def deck(site: Site, bridge: Bridge, ways: Sequence[BaseGeometry]) -> Deck | None:
+    """Find where a bridge stands, of the plans of the ways that it bears; None where it rises nowhere on the site."""
+    plan = shapely.union_all(ways).buffer(_RIM_M + 1.0, join_style="mitre").buffer(-1.0, join_style="mitre")
+    plan = plan.intersection(site.extent)
+    if plan.is_empty:
+        return None
+    axis = LineString(bridge.line)
+    s = np.linspace(0.0, axis.length, len(bridge.heights_m))
+    across = 1.0 + float(shapely.hausdorff_distance(plan, axis))
+    terrain = _heights(site, bridge, axis, plan)
+    # Where it lies on the ground, it is the ground's.
+    up = [k for k, z in enumerate(bridge.heights_m) if z > 0.02]
+    ends = np.diff([site.terrain.z(*p) for p in (bridge.line[0], bridge.line[-1])])
+    level = abs(float(ends[0])) < 1e-6 and np.ptp(site.terrain.heights_m) == 0.0
+    if level:
+        if not up:
+            return None
+        first, last = max(up[0] - 1, 0), min(up[-1] + 1, len(s) - 1)
+        plan = _slice(plan, axis, s[first], s[last], across)
+    low, high = bridge.span_m
+    t = np.arange(low, high + 1e-9, 0.5)
+    at = shapely.get_coordinates(axis.interpolate(t))
+    free = terrain.z(*at.T) - bridge.depth_m - site.terrain.z(*at.T) >= _LOWEST_FREE_M
+    opening = _band(axis, t[free][0], t[free][-1], across) if free.sum() > 4 else shapely.Polygon()
+    # By the band itself: what is cut twice along one edge leaves slivers, which would be walls.
+    return Deck(bridge, plan, plan.intersection(opening), plan.difference(opening), terrain)
+
+
+def put_up_bridge(site: Site, deck: Deck, surfaces: Sequence[Surface], below: BaseGeometry) -> None:
+    """Build a bridge.
+
+    Parameters
+    ----------
+    site : Site
+        Where.
+    deck : Deck
+        Where it stands.
+    surfaces : sequence of Surface
+        What is painted on it, in order.
+    below : shapely geometry
+        Streets, paths and rails below, which piers keep off.
+    """
+    depth, axis = deck.bridge.depth_m, LineString(deck.bridge.line)
+    concrete = site.material("bridge", "concrete:#a19d95")
+    rim = _parapets(site, deck, axis)
+    painted = [*surfaces, *(Surface(p, concrete, _PARAPET_M, concrete) for p in polygons_of(rim))]
+    parts: Parts = []
+    for plan in polygons_of(deck.plan):
+        parts += ground_meshes(deck.heights, plan, site.material("pavement", "paving:#aaa59c"), painted)
+    for plan in polygons_of(deck.span):
+        under = [m for _, m in ground_meshes(deck.heights, plan, concrete, ())]
+        parts += [(concrete, flipped(translated(m, (0.0, 0.0, -depth)))) for m in under]
+        parts.append((concrete, _walls(plan, deck.heights, deck.heights, -depth)))
+    for plan in polygons_of(deck.solid):
+        parts.append((site.material("abutment", "stone"), _walls(plan, deck.heights, site.terrain, -_SUNK_M)))
+    parts += [(concrete, pier) for pier in _piers(site, deck, axis, below)]
+    attributes = {"place": f"called {deck.bridge.name}"} if deck.bridge.name else {}
+    site.add(None, "bridge", [(material, m) for material, m in parts if len(m.faces)], attributes)
+    _occupy(site, deck, axis)
+
+
+def _heights(site: Site, bridge: Bridge, axis: LineString, plan: BaseGeometry) -> Terrain:
+    """Heights of the road over a grid about the plan: what the axis has beside it."""
+    x0, y0, x1, y1 = plan.buffer(_CELL_M).bounds
+    x, y = (np.arange(a, b + _CELL_M, _CELL_M) for a, b in ((x0, x1), (y0, y1)))
+    grid = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+    s = axis.project(shapely.points(grid))
+    first, last = (float(site.terrain.z(*bridge.line[k])) for k in (0, -1))
+    own = np.interp(s, np.linspace(0.0, axis.length, len(bridge.heights_m)), bridge.heights_m)
+    z = first + (last - first) * s / axis.length + own
+    return Terrain(float(x[0]), float(y[0]), _CELL_M, z.reshape(len(y), len(x)))
+
+
+def _slice(plan: BaseGeometry, axis: LineString, low: float, high: float, across_m: float) -> BaseGeometry:
+    """Cut a plan across an axis, at two places along it."""
+    return plan.intersection(_band(axis, low, high, across_m))
+
+
+def _band(axis: LineString, low: float, high: float, across_m: float) -> BaseGeometry:
+    if high - low < 0.05:
+        return shapely.Polygon()
+    return substring(axis, low, high).buffer(across_m, cap_style="flat", join_style="mitre")
+
+
+def _parapets(site: Site, deck: Deck, axis: LineString) -> BaseGeometry:
+    """Find where parapets stand: along the rim, where the deck is over the ground, open at its ends."""
+    inner = deck.plan.buffer(-_THICK_M, join_style="mitre")
+    s = np.arange(0.0, axis.length + 1e-9, 0.5)
+    at = shapely.get_coordinates(axis.interpolate(s))
+    high = np.flatnonzero(deck.heights.z(*at.T) - site.terrain.z(*at.T) > _HIGHEST_OPEN_M)
+    if not len(high):
+        return shapely.Polygon()
+    across = 1.0 + float(shapely.hausdorff_distance(deck.plan, axis))
+    # What the site's border cuts has no end there, and no parapet across the road.
+    inside = site.extent.buffer(-_THICK_M - 0.01, join_style="mitre")
+    low, top = (min(max(s[k], 0.6), axis.length - 0.6) for k in (high[0], high[-1]))
+    rim = deck.plan.difference(inner)
+    return _slice(rim, axis, low, top, across).intersection(inside)
+
+
+def _walls(plan: BaseGeometry, top: Terrain, bottom: Terrain, sink_m: float) -> Mesh:
+    """Make the walls of a body around a plan, from the road down to a surface sunk by `sink_m`."""
+    out = []
+    for k, ring in enumerate((plan.exterior, *plan.interiors)):
+        xy = np.array(shapely.segmentize(ring, _CELL_M / 2).coords)[:, :2]
+        high = top.z(*xy.T)
+        low = np.minimum(bottom.z(*xy.T) + sink_m, high - 0.01)
+        n = len(xy)
+        a = np.arange(n - 1)
+        faces = np.concatenate([np.column_stack([a, a + 1, a + 1 + n]), np.column_stack([a, a + 1 + n, a + n])])
+        if ring.is_ccw != (k == 0):
+            faces = faces[:, ::-1]
+        out.append(mesh(np.concatenate([np.column_stack([xy, low]), np.column_stack([xy, high])]), faces))
+    return merge(out)
+
+
+def _piers(site: Site, deck: Deck, axis: LineString, below: BaseGeometry) -> list[Mesh]:
+    """Stand piers under the free span, none in a street."""
+    if deck.span.is_empty:
+        return []
+    free = [axis.project(Point(p)) for p in shapely.get_coordinates(deck.span)]
+    low, high = min(free), max(free)
+    count = max(round((high - low) / _PIERS_M), 1)
+    spots = [low + (high - low) * k / count for k in range(1, count)]
+    # Where the site's border cuts the span no ramp carries it.
+    cut = [axis.interpolate(s).distance(site.extent.exterior) < 1.0 for s in (low, high)]
+    spots = [low + _END_M] * cut[0] + spots + [high - _END_M] * cut[1]
+    streets = below.buffer(_FROM_ROADS_M)
+    out, taken = [], -1e9
+    for spot in spots:
+        for shift in (0.0, *(sign * d for d in np.arange(1.0, _SHIFT_M + 0.1) for sign in (1.0, -1.0))):
+            s = spot + shift
+            if not (max(low, taken) + _END_M <= s <= high - _END_M):
+                continue
+            plan = _slice(deck.span, axis, s - _PIER_M / 2, s + _PIER_M / 2, 100.0)
+            plan = plan.buffer(-0.15, join_style="mitre")
+            if plan.is_empty or plan.intersects(streets):
+                continue
+            x, y = shapely.get_coordinates(plan).T
+            foot = float(site.terrain.z(x, y).min()) - _SUNK_M
+            top = float(deck.heights.z(x, y).min()) - deck.bridge.depth_m / 2
+            out += [slab(piece, foot, top) for piece in polygons_of(plan)]
+            site.occupy(plan.buffer(0.1))
+            taken = s
+            break
+    return out
+
+
+def _occupy(site: Site, deck: Deck, axis: LineString) -> None:
+    """Take the air that the deck is in: what stands below stays below, and nothing stands in its ramps."""
+    site.occupy(deck.solid)
+    across = 1.0 + float(shapely.hausdorff_distance(deck.plan, axis))
+    for s in np.arange(0.0, axis.length, _SLICE_M):
+        part = _slice(deck.span, axis, s, min(s + _SLICE_M, axis.length), across)
+        if not part.is_empty:
+            z = deck.heights.z(*shapely.get_coordinates(part).T)
+            site.occupy(part.buffer(0.1), float(z.min()) - deck.bridge.depth_m - 0.1, 1000.0)
+
+
+__all__ = ["Deck", "deck", "put_up_bridge"]

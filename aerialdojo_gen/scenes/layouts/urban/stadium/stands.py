@@ -1,0 +1,217 @@
+"""Stands of sports grounds: stepped tiers round any front edge, seats, gangways and portals.
+
+Every function returns meshes in world coordinates with their materials, to be given to `Site.add`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+import shapely
+from shapely.geometry import Point as ShapelyPoint
+from shapely.geometry import Polygon
+from shapely.geometry.base import BaseGeometry
+from shapely.ops import unary_union
+
+from aerialdojo_gen.scenes.grammar_frames import Frame
+from aerialdojo_gen.scenes.grammar_scatter import Pose, slab
+from aerialdojo_gen.scenes.ground import polygons_of, rectangle
+from aerialdojo_gen.scenes.layouts.parts.structures import Parts
+from aerialdojo_gen.scenes.mesh import Mesh, merge, mesh, translated
+from aerialdojo_gen.scenes.shapes import box
+
+SEAT_M = 0.6
+AISLE_M = 1.2
+_QUARTER = 8
+_PARAPET_M = 0.95
+
+
+@dataclass(frozen=True)
+class Tier:
+    """Rows of steps round a front edge; every row lies one tread farther out and one riser higher than the last.
+
+    Attributes
+    ----------
+    core : Polygon
+        Its outline, grown by `front_m` with round corners, is the front edge; world frame, metres.
+    front_m : float
+        Distance from the core to the front edge.
+    rows : int
+        Number of rows.
+    z_m : float
+        Height of the first row.
+    foot_m : float
+        Where the front wall stands.
+    tread_m, riser_m : float
+        Depth and height of a row.
+    region : shapely geometry or None
+        Only what lies in it is built.
+    portals : tuple of Polygon
+        Passages through the tier from front to back: rows lower than `head_m` leave them open.
+    head_m : float
+        Least height of what spans a portal.
+    clear : tuple of shapely geometry
+        Where no seats stand: platforms, rooms, things.
+    """
+
+    core: Polygon
+    front_m: float
+    rows: int
+    z_m: float
+    foot_m: float = 0.0
+    tread_m: float = 0.85
+    riser_m: float = 0.42
+    region: BaseGeometry | None = None
+    portals: tuple[Polygon, ...] = ()
+    head_m: float = 3.2
+    clear: tuple[BaseGeometry, ...] = field(default=())
+
+    def edge(self, row: float) -> Polygon:
+        """Outline of what lies in front of a row, metres."""
+        return self.core.buffer(self.front_m + row * self.tread_m, quad_segs=_QUARTER)
+
+    def level_m(self, row: int) -> float:
+        """Height of a row, metres."""
+        return self.z_m + row * self.riser_m
+
+    def band(self, row: int) -> BaseGeometry:
+        """Plan of a row, without the portals that cut it."""
+        area = self.edge(row + 1).difference(self.edge(row))
+        if self.region is not None:
+            area = area.intersection(self.region)
+        return area
+
+    def is_cut(self, row: int) -> bool:
+        """Whether portals cut a row."""
+        return self.level_m(row) < self.head_m + 0.6
+
+    @property
+    def plan(self) -> BaseGeometry:
+        """Ground under all rows."""
+        area = self.edge(self.rows).difference(self.edge(0))
+        return area if self.region is None else area.intersection(self.region)
+
+
+def gangways(tier: Tier, spacing_m: float) -> list[Pose]:
+    """List the feet of gangways along the front edge about `spacing_m` apart, each facing up its tier."""
+    ring = tier.edge(0)
+    line = ring.exterior
+    count = max(round(line.length / spacing_m), 1)
+    out = []
+    for k in range(count):
+        s = line.length * (k + 0.5) / count
+        p, q = line.interpolate(s - 0.05), line.interpolate(s + 0.05)
+        yaw = float(np.degrees(np.arctan2(q.y - p.y, q.x - p.x))) + 90.0
+        ahead = (p.x + 0.3 * np.cos(np.radians(yaw)), p.y + 0.3 * np.sin(np.radians(yaw)))
+        if ring.contains(ShapelyPoint(ahead)):
+            yaw += 180.0
+        x, y = (p.x + q.x) / 2, (p.y + q.y) / 2
+        if tier.region is None or tier.region.buffer(-AISLE_M / 2).contains(ShapelyPoint(x, y).buffer(0.01)):
+            out.append(Pose(float(x), float(y), yaw))
+    return out
+
+
+def passage(foot: Pose, width_m: float, length_m: float) -> Polygon:
+    """Make a rectangle that leads from a front edge outwards, beginning half a metre before it."""
+    area = Frame(foot.x, foot.y, foot.yaw_deg).area(rectangle(-0.5, -width_m / 2, length_m, width_m / 2))
+    return Polygon(area.exterior)
+
+
+def tier_parts(
+    tier: Tier,
+    feet: Sequence[Pose],
+    *,
+    concrete: str,
+    step: str,
+    seat: Callable[[float, float, int], str],
+    parapet_m: float = _PARAPET_M,
+) -> Parts:
+    """Make a tier: steps, a front wall with a parapet, walls along portals, half steps in gangways, and seats.
+
+    Parameters
+    ----------
+    tier : Tier
+        What to build.
+    feet : sequence of Pose
+        Feet of the gangways, from `gangways`.
+    concrete, step : str
+        Materials of the rows and of the gangways' half steps.
+    seat : callable
+        ``(x, y, row) -> material`` of a seat.
+    parapet_m : float
+        Height of the front wall over the first row.
+    """
+    holes = unary_union(tier.portals) if tier.portals else Polygon()
+    bodies: list[Mesh] = []
+    for row in range(tier.rows):
+        area, top = tier.band(row), tier.level_m(row)
+        if tier.is_cut(row):
+            cheeks = unary_union([p.buffer(0.22, join_style="mitre") for p in tier.portals]).difference(holes)
+            bodies += [slab(p, tier.foot_m, top + 0.8) for p in polygons_of(area.intersection(cheeks))]
+            area = area.difference(holes)
+        elif row and tier.is_cut(row - 1):
+            lip = tier.edge(row + 0.25).difference(tier.edge(row)).intersection(holes)
+            bodies += [slab(p, top - 0.2, top + 0.9) for p in polygons_of(lip.intersection(area))]
+        bodies += [slab(p, top - tier.riser_m - 0.22, top) for p in polygons_of(area)]
+    front = tier.edge(0.0).difference(tier.core.buffer(tier.front_m - 0.22, quad_segs=_QUARTER))
+    if tier.region is not None:
+        front = front.intersection(tier.region)
+    walls = [slab(p, tier.foot_m, tier.z_m + parapet_m) for p in polygons_of(front.difference(holes))]
+    parts: Parts = [(concrete, merge(bodies)), (step, merge([*walls, *_half_steps(tier, feet, holes)]))]
+    return parts + _seats(tier, feet, holes, seat)
+
+
+def _half_steps(tier: Tier, feet: Sequence[Pose], holes: BaseGeometry) -> list[Mesh]:
+    out = []
+    for foot in feet:
+        frame = Frame(foot.x, foot.y, foot.yaw_deg)
+        for row in range(tier.rows - 1):
+            at = frame.at((row + 0.75) * tier.tread_m, 0.0)
+            if tier.is_cut(row) and shapely.contains_xy(holes.buffer(AISLE_M / 2), *at):
+                continue
+            tread = box(size=(tier.tread_m / 2, AISLE_M, tier.riser_m / 2))
+            out.append(frame.parts([("", translated(tread, ((row + 0.75) * tier.tread_m, 0, 0)))], tier.level_m(row)))
+    return [m for parts in out for _, m in parts]
+
+
+def _seats(tier: Tier, feet: Sequence[Pose], holes: BaseGeometry, seat: Callable[[float, float, int], str]) -> Parts:
+    aisles = [passage(f, AISLE_M + SEAT_M, (tier.rows + 1) * tier.tread_m) for f in feet]
+    shut = unary_union([*aisles, *tier.clear])
+    # Beside a portal the seats keep off its cheeks, over it they stand as everywhere.
+    low = shut.union(holes.buffer(0.6))
+    inside = tier.region.buffer(-0.35) if tier.region is not None else tier.edge(tier.rows)
+    for area in (shut, low, inside):
+        shapely.prepare(area)
+    places: dict[str, list[tuple[float, float, float, float]]] = {}
+    for row in range(tier.rows):
+        line = tier.edge(row + 0.62).exterior
+        count = int(line.length // SEAT_M)
+        for k in range(count):
+            s = line.length * k / count
+            p = line.interpolate(s)
+            if not shapely.contains_xy(inside, p.x, p.y):
+                continue
+            if shapely.contains_xy(low if tier.is_cut(row) else shut, p.x, p.y):
+                continue
+            q = line.interpolate((s + 0.1) % line.length)
+            yaw = float(np.arctan2(q.y - p.y, q.x - p.x))
+            places.setdefault(seat(p.x, p.y, row), []).append((p.x, p.y, tier.level_m(row), yaw))
+    # Shapely's outlines run clockwise, so that outwards lies to the left of the way.
+    return [(material, _copies(_seat(), np.array(where))) for material, where in sorted(places.items())]
+
+
+def _seat() -> Mesh:
+    back = translated(box(size=(0.44, 0.06, 0.46), taper=(0.85, 1.0)), (0.0, 0.13, 0.36))
+    return merge([back, translated(box(size=(0.44, 0.34, 0.43), taper=(1.0, 0.9)), (0.0, -0.09, 0.0))])
+
+
+def _copies(body: Mesh, where: np.ndarray) -> Mesh:
+    """Copy a mesh to (n, 4) places: x, y, z in metres and yaw in radians."""
+    c, s = np.cos(where[:, 3])[:, None], np.sin(where[:, 3])[:, None]
+    x, y, z = body.vertices.T
+    across, ahead = where[:, :1] + c * x - s * y, where[:, 1:2] + s * x + c * y
+    placed = np.stack([across, ahead, where[:, 2:3] + z[None]], axis=2)
+    offsets = np.arange(len(where)) * len(body.vertices)
+    return mesh(placed.reshape(-1, 3), (body.faces[None] + offsets[:, None, None]).reshape(-1, 3))

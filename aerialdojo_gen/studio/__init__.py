@@ -1,0 +1,1 @@
+"""Tools in the browser and pictures of tasks: annotate, view, show, and what they share."""

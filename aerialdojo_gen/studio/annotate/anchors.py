@@ -1,0 +1,155 @@
+"""Anchors in the tool: the candidates of an object, viewpoints placed by hand, and what each of them shows."""
+
+from __future__ import annotations
+
+import math
+import threading
+from collections import OrderedDict
+from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aerialdojo_gen.annotations.format import Object
+from aerialdojo_gen.base.config.pipeline import Pipeline
+from aerialdojo_gen.base.errors import AerialDojoError
+from aerialdojo_gen.base.pictures import REFERENCE_PNG, encode_png
+from aerialdojo_gen.geometry.angles import yaw_towards
+from aerialdojo_gen.geometry.cameras import Camera, view_pose
+from aerialdojo_gen.geometry.surface import Surface
+from aerialdojo_gen.pipeline.stage import Job, Roots
+from aerialdojo_gen.scenes.model import Scene
+
+Floats = NDArray[np.float64]
+_T = TypeVar("_T")
+_MOST_PICTURES = 400
+
+
+@dataclass(frozen=True)
+class View:
+    """What a viewpoint shows."""
+
+    png: bytes  # Front view of the size of the reference images
+    boxes: dict[str, tuple[int, int, int, int]]  # dict of str to (int, int, int, int)
+    pixels: dict[str, int]  # How many pixels show it
+
+
+class AnchorDesk:
+    """Anchors of one scene's objects; the heavy work is done by one thread, one thing after another."""
+
+    def __init__(self, scene: Scene, pipeline: Pipeline, roots: Roots) -> None:
+        self.scene, self.config, self._pictures = scene, pipeline.anchor_sample, pipeline.reference_images
+        self._job = Job("anchor-sample", scene.name, 0, 1, pipeline.seed, pipeline.embodiment, roots)
+        # One thread: PyBullet is not made for several, and two cores have the page to serve as well.
+        self._worker = ThreadPoolExecutor(1, thread_name_prefix="anchors")
+        self._world: Future[Any] = self._worker.submit(self._build)
+        self._found: OrderedDict[tuple[int, str], list[dict[str, Any]]] = OrderedDict()
+        self._views: OrderedDict[tuple[float, ...], View] = OrderedDict()
+        self._lock = threading.Lock()
+
+    def _build(self) -> Any:
+        from aerialdojo_gen.pipeline.stages.work.anchor_world import World
+
+        return World.of(self.scene, self._job.embodiment.radius_m, self.config.margin_m)
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Columns and rows of the pictures."""
+        return self._pictures.width, self._pictures.height
+
+    @property
+    def n_pixels(self) -> int:
+        """Pixels of a picture."""
+        return self._pictures.width * self._pictures.height
+
+    def close(self) -> None:
+        """Drop what is waiting to be done."""
+        self._worker.shutdown(wait=False, cancel_futures=True)
+
+    def _do(self, work: Callable[[], _T]) -> _T:
+        return self._worker.submit(work).result()
+
+    def candidates(self, entry: Object) -> list[dict[str, Any]]:
+        """Find an object's shortlist."""
+        from aerialdojo_gen.pipeline.stages.work.anchor_sample import anchors_of
+
+        key = (entry.id, entry.node)
+        with self._lock:
+            if key in self._found:
+                return self._found[key]
+        rows, _ = self._do(lambda: anchors_of(self._item(entry), self._world.result(), self._job, self.config))
+        with self._lock:
+            self._found[key] = rows
+        return rows
+
+    def place(self, entry: Object, eye_m: Floats) -> Floats:
+        """Put a viewpoint, (3,) world metres, on the line of sight from `eye_m` to an object.
+
+        At the standoff from its surface.
+        """
+        instance = self.scene[entry.node]
+        away = eye_m - instance.centroid
+        length = float(np.linalg.norm(away))
+        if length < 1e-3:
+            raise AerialDojoError("one cannot look at an object from its middle")
+        surface = Surface.of(instance)
+        direction = (away / length)[None]
+        place = surface.standoff(instance.centroid, direction, self.config.standoff_m)[0]
+        if np.isnan(place[0]):  # an arch: its middle is an opening
+            place = surface.standoff(surface.nearest_point(instance.centroid), direction, self.config.standoff_m)[0]
+        return np.asarray(np.round(place, 3))
+
+    def judge(
+        self, entry: Object, position_m: Floats, yaw_rad: float | None = None
+    ) -> tuple[dict[str, Any], list[str]]:
+        """Check a viewpoint against the rules for anchors; returns its row of ``anchors`` and the list of faults."""
+        from aerialdojo_gen.pipeline.stages.work.anchor_choice import is_same, judge_anchor
+
+        yaw = float(yaw_towards(position_m, self.scene[entry.node].centroid)) if yaw_rad is None else yaw_rad
+        yaw = math.radians(round(math.degrees(yaw), 2))
+        asked = {**dict(zip(("x_m", "y_m", "z_m"), position_m.tolist(), strict=True)), "yaw_rad": yaw}
+        for row in self.candidates(entry):
+            if is_same(row, asked):
+                return row, []
+        judged = self._do(
+            lambda: judge_anchor(position_m, yaw, self._item(entry), self._world.result(), self._job, self.config)
+        )
+        return judged.row, list(judged.faults)
+
+    def view(self, position_m: Floats, yaw_rad: float) -> View:
+        """Take the front view from a place (kept for the next time)."""
+        key = (*np.round(position_m, 4).tolist(), round(yaw_rad, 5))
+        with self._lock:
+            if key in self._views:
+                self._views.move_to_end(key)
+                return self._views[key]
+        view = self._do(lambda: self._look(position_m, yaw_rad))
+        with self._lock:
+            self._views[key] = view
+            while len(self._views) > _MOST_PICTURES:
+                self._views.popitem(last=False)
+        return view
+
+    def _look(self, position_m: Floats, yaw_rad: float) -> View:
+        from aerialdojo_gen.pipeline.stages.work.reference_images import box_of, instance_map
+        from aerialdojo_gen.rendering.backend import kept_renderer
+        from aerialdojo_gen.rendering.casters import ray_caster
+
+        camera = Camera(self._pictures.width, self._pictures.height, self._pictures.fov_deg)
+        pose = view_pose(position_m, yaw_rad, "front")
+        picture = kept_renderer(self.scene, self._pictures.renderer).render(camera, pose)
+        rays = ray_caster(self.scene)
+        shown = instance_map(rays, camera, pose)
+        found, counts = np.unique(shown[shown >= 0], return_counts=True)
+        return View(
+            encode_png(picture.rgb, REFERENCE_PNG),
+            {rays.nodes[k]: box_of(shown == k) for k in found},
+            {rays.nodes[k]: int(n) for k, n in zip(found, counts, strict=True)},
+        )
+
+    def _item(self, entry: Object) -> dict[str, Any]:
+        x, y, z = (float(v) for v in self.scene[entry.node].centroid)
+        return {"object_id": entry.id, "name": entry.name, "mesh_node": entry.node, "x_m": x, "y_m": y, "z_m": z}

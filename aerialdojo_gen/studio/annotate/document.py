@@ -1,0 +1,193 @@
+"""Annotations as they are edited: operations that people ask for, and the edits of single entries that they become.
+
+An edit knows its entry before and after. So it can be undone, it can be told whether it still fits what others have
+changed meanwhile, and a history of edits is enough to know who did what.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Annotated, Any, Literal
+
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, StrictInt, StrictStr
+
+from aerialdojo_gen.annotations.format import Anchor, Annotations, Landmark, Object
+from aerialdojo_gen.base.errors import AerialDojoError
+
+Kind = Literal["landmarks", "objects"]
+Entry = Landmark | Object
+MOST_ENTRIES = 5000
+
+
+class ConflictError(AerialDojoError):
+    """An operation does not fit the annotations as they are: somebody else changed them meanwhile."""
+
+
+def _plain(text: str) -> str:
+    if any(ord(c) < 32 or 0x7F <= ord(c) < 0xA0 or 0xD800 <= ord(c) < 0xE000 for c in text):
+        raise ValueError("control characters are not for texts")
+    return text
+
+
+def _line(most: int) -> Any:
+    return Annotated[StrictStr, Field(max_length=most), AfterValidator(_plain)]
+
+
+_Name, _Node, _Text = _line(120), _line(200), _line(2000)
+_Id = Annotated[StrictInt, Field(ge=0, le=2**31 - 1)]
+
+
+class _Strict(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class Fields(_Strict):
+    """Values of an entry's keys; a key that is left out stays as it is."""
+
+    name: _Name | None = None  # type: ignore[valid-type]
+    category: _Name | None = None  # type: ignore[valid-type]
+    description: _Text | None = None  # type: ignore[valid-type]
+    node: _Node | None = None  # type: ignore[valid-type]
+    anchor: Anchor | None = None
+
+    def given(self) -> dict[str, Any]:
+        """The values that were given; of those only an anchor may be None, which takes it away."""
+        values = {key: getattr(self, key) for key in self.model_fields_set}
+        return {key: value for key, value in values.items() if value is not None or key == "anchor"}
+
+
+class Add(_Strict):
+    """Add an entry; it gets the next id."""
+
+    do: Literal["add"]
+    kind: Kind
+    fields: Fields
+
+
+class Change(_Strict):
+    """Change fields of an entry."""
+
+    do: Literal["change"]
+    kind: Kind
+    id: _Id
+    fields: Fields
+
+
+class Remove(_Strict):
+    """Remove an entry; its id is not used again."""
+
+    do: Literal["remove"]
+    kind: Kind
+    id: _Id
+
+
+Operation = Annotated[Add | Change | Remove, Field(discriminator="do")]
+
+
+class Edit(_Strict):
+    """One entry before and after."""
+
+    kind: Kind
+    id: _Id  # Of the entry
+    index: Annotated[StrictInt, Field(ge=0)]  # Its place in the list
+    before: Object | Landmark | None  # None where the entry is not there
+    after: Object | Landmark | None
+
+    def reversed(self) -> Edit:
+        """The edit that takes this one back."""
+        return Edit(kind=self.kind, id=self.id, index=self.index, before=self.after, after=self.before)
+
+
+def find(annotations: Annotations, kind: Kind, entry_id: int) -> tuple[int, Entry] | None:
+    """Find an entry and its place in its list by its id."""
+    entries: Sequence[Entry] = getattr(annotations, kind)
+    return next(((k, entry) for k, entry in enumerate(entries) if entry.id == entry_id), None)
+
+
+def edits_of(operation: Operation, annotations: Annotations, next_id: int) -> list[Edit]:
+    """Turn an operation into edits of the annotations as they are."""
+    model: type[Entry] = Landmark if operation.kind == "landmarks" else Object
+    entries: Sequence[Entry] = getattr(annotations, operation.kind)
+    if isinstance(operation, Add):
+        if len(entries) >= MOST_ENTRIES:
+            raise AerialDojoError(
+                f"there are {len(entries)} {operation.kind} already, more than anybody searches for"
+            )
+        empty = {key: "" for key in model.model_fields if key not in ("id", "anchor")}
+        after = _entry(model, empty | {"id": next_id} | operation.fields.given())
+        return [Edit(kind=operation.kind, id=next_id, index=len(entries), before=None, after=after)]
+    found = find(annotations, operation.kind, operation.id)
+    if found is None:
+        raise ConflictError(f"{operation.kind[:-1]} {operation.id} is not there any more")
+    index, before = found
+    if isinstance(operation, Remove):
+        return [Edit(kind=operation.kind, id=operation.id, index=index, before=before, after=None)]
+    after = _entry(model, before.model_dump() | operation.fields.given())
+    if after == before:
+        return []
+    return [Edit(kind=operation.kind, id=operation.id, index=index, before=before, after=after)]
+
+
+def _entry(model: type[Entry], values: dict[str, Any]) -> Entry:
+    unknown = values.keys() - model.model_fields.keys()
+    if unknown:
+        raise AerialDojoError(f"a {model.__name__.lower()} has no {', '.join(sorted(unknown))}")
+    return model(**values)
+
+
+def apply(annotations: Annotations, edits: Sequence[Edit]) -> Annotations:
+    """Apply edits to annotations."""
+    lists: dict[Kind, list[Entry]] = {"landmarks": [*annotations.landmarks], "objects": [*annotations.objects]}
+    for edit in edits:
+        entries = lists[edit.kind]
+        at = next((k for k, entry in enumerate(entries) if entry.id == edit.id), None)
+        if (None if at is None else entries[at]) != edit.before:
+            raise ConflictError(f"{edit.kind[:-1]} {edit.id} has been changed since")
+        if at is None:
+            assert edit.after is not None
+            entries.insert(min(edit.index, len(entries)), edit.after)
+        elif edit.after is None:
+            del entries[at]
+        else:
+            entries[at] = edit.after
+    return Annotations(
+        annotations.scene,
+        tuple(e for e in lists["landmarks"] if isinstance(e, Landmark)),
+        tuple(e for e in lists["objects"] if isinstance(e, Object)),
+    )
+
+
+def difference(before: Annotations, after: Annotations) -> list[Edit]:
+    """Find the edits that make one state of the entries into another; those that stay keep their order."""
+    edits: list[Edit] = []
+    kinds: tuple[Kind, ...] = ("landmarks", "objects")
+    for kind in kinds:
+        old: Sequence[Entry] = getattr(before, kind)
+        new: Sequence[Entry] = getattr(after, kind)
+        mine, theirs = {e.id: e for e in old}, {e.id: e for e in new}
+        for k in reversed(range(len(old))):
+            if old[k].id not in theirs:
+                edits.append(Edit(kind=kind, id=old[k].id, index=k, before=old[k], after=None))
+        for k, entry in enumerate(new):
+            if mine.get(entry.id) != entry:
+                edits.append(Edit(kind=kind, id=entry.id, index=k, before=mine.get(entry.id), after=entry))
+    return edits
+
+
+def describe(edits: Sequence[Edit]) -> str:
+    """Say in a few words what edits do, for people."""
+    if not edits:
+        return "nothing"
+    words = []
+    for edit in edits[:3]:
+        entry = edit.after or edit.before
+        assert entry is not None
+        thing = f"{edit.kind[:-1]} {edit.id}" + (f" ({entry.name})" if entry.name else "")
+        if edit.before is None:
+            words.append(f"added {thing}")
+        elif edit.after is None:
+            words.append(f"removed {thing}")
+        else:
+            old, new = edit.before.model_dump(), edit.after.model_dump()
+            words.append(f"{', '.join(k for k in new if new[k] != old[k])} of {thing}")
+    return "; ".join(words) + (f" and {len(edits) - 3} more" if len(edits) > 3 else "")

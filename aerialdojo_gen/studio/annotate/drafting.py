@@ -1,0 +1,167 @@
+"""The twin of ``annotate-draft``: draft a scene's annotations from things that a drone can reach and see."""
+
+from __future__ import annotations
+
+import logging
+import math
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+from aerialdojo_gen.annotations.describing import UNKNOWN, Vocabulary
+from aerialdojo_gen.annotations.draft import MOST, SCENERY, Choice, Drafter
+from aerialdojo_gen.annotations.format import Annotations, parse_annotations, write_annotations
+from aerialdojo_gen.annotations.landmarks import choose_landmarks
+from aerialdojo_gen.annotations.redraft import redraft_annotations
+from aerialdojo_gen.base.cli_context import command
+from aerialdojo_gen.base.config.pipeline import Pipeline
+from aerialdojo_gen.base.errors import AnnotationError, UsageError
+from aerialdojo_gen.base.paper_figures import paper_counts
+from aerialdojo_gen.pipeline.progress import Reporter
+from aerialdojo_gen.pipeline.stage import Job, Roots
+from aerialdojo_gen.pipeline.stages.work.anchor_sample import candidates_of
+from aerialdojo_gen.pipeline.stages.work.anchor_world import World
+from aerialdojo_gen.scenes.catalogue import load_catalogue
+from aerialdojo_gen.scenes.layouts.build import build_scene
+from aerialdojo_gen.scenes.model import Scene
+
+log = logging.getLogger(__name__)
+
+AUTO = "auto"
+# As many objects as a first run of a scene of one's own is planned with: some hundred tasks.
+_AUTO_OBJECTS = 20
+_FEW_THINGS = 8
+# A task goes from one object to another.
+LEAST_OBJECTS = 2
+_CAUSES = {
+    "no_surface": "no surface 1 m away",
+    "out_of_bounds": "outside the flight volume",
+    "in_collision": "too close to something else",
+    "unreachable": "shut in, or below ground",
+    "not_visible": "hidden by something else",
+}
+
+
+def draft_scene(
+    name: str,
+    pipeline: Pipeline,
+    roots: Roots,
+    *,
+    n_landmarks: int | None = None,
+    n_objects: int | str | None = None,
+    choice: Choice | None = None,
+    landmarks: tuple[str, ...] = (),
+    seed: int = 0,
+    force: bool = False,
+    keep_objects: bool = False,
+    reporter: Reporter | None = None,
+) -> Path:
+    """Draft a scene's annotations and write them to the folder of annotations."""
+    path, reporter = roots.annotations / f"{name}.json", reporter or Reporter(quiet=True)
+    if keep_objects:
+        return _described_anew(name, path, roots, seed)
+    if path.exists() and not force:
+        raise UsageError(f"{path} exists: --force overwrites it, --keep-objects describes its objects anew")
+    counts = paper_counts().get(name)
+    exact = counts is not None and n_objects != AUTO
+    most = n_objects if isinstance(n_objects, int) else counts[1] if counts and exact else _AUTO_OBJECTS
+    catalogue = load_catalogue(roots.scene_assets)
+    scene = build_scene(roots.recipes / f"{name}.toml", catalogue)
+    vocabulary = Vocabulary(scene, catalogue)
+    targets = Counter(i.category for i, w in zip(scene.instances, vocabulary.words, strict=True) if w.target)
+    if not targets:
+        raise _nothing(name, f"; not taken: {len(scene.instances):,} {SCENERY}")
+    marks = choose_landmarks(
+        vocabulary, n_landmarks or (counts[0] if counts else 2 if targets.total() >= _FEW_THINGS else 1), landmarks,
+        at_most=n_landmarks is None and counts is None,
+    )  # fmt: skip
+    choice = choice or Choice()
+    if choice.most is None and scene.imported:
+        choice = replace(choice, most=max(MOST, math.ceil(most / len(targets))))
+    probe = Drafter(vocabulary, marks, seed, choice)
+    proposed = most if exact else min(most, probe.room())
+    kinds = len({scene.instances[k].category for k in probe.things})
+    if not proposed:
+        raise _nothing(name, probe.why_not())
+    reporter.line(
+        f"{name}: {_many(len(probe.things), 'thing')} of {_many(kinds, 'kind')} to look for; up to "
+        f"{_many(proposed, 'object')} by {_many(len(marks), 'landmark')} can be drafted, if drones can look at them"
+    )
+    # Counted is what ends the search: most things are never looked at, and the world is made before the first.
+    looked_at = replace(choice, refuses=refusals(scene, pipeline, roots))
+    with reporter.bar("annotate-draft", proposed, unit="objects") as bar:
+        drafter = Drafter(vocabulary, marks, seed, looked_at)
+        objects = drafter.objects(proposed, bar.advance)
+    _check_enough(name, len(objects), proposed, drafter.why_not(), exact=exact)
+    write_annotations(Annotations(name, marks, objects), path)
+    unknown = sum(entry.category == UNKNOWN for entry in objects)
+    if unknown:
+        log.warning(
+            "%s: needs a person: nothing is known of %d of %d objects but colour and form; say what they are: %s",
+            name, unknown, len(objects), command("annotate", scene=name),
+        )  # fmt: skip
+    reporter.line(f"{name}: {_many(len(marks), 'landmark')}, {_many(len(objects), 'object')}{drafter.why_not()}")
+    return path
+
+
+def _check_enough(name: str, found: int, wanted: int, why_not: str, *, exact: bool) -> None:
+    """Refuse a draft of nothing, or of fewer objects than there must be; warn of one of fewer than were proposed."""
+    by_hand = f"add others by hand: {command('annotate', scene=name)}"
+    if found == 0:
+        raise _nothing(name, why_not)
+    if found < wanted and exact:
+        fewer = f"--objects {found} takes those, or " if found >= LEAST_OBJECTS else ""
+        raise AnnotationError(
+            f"{name}: {wanted} objects are wanted, {found} can be chosen and told apart{why_not}: {fewer}{by_hand}"
+        )
+    if found < LEAST_OBJECTS:
+        log.warning("%s: one object makes no task, which goes from one to another%s; %s", name, why_not, by_hand)
+    elif found < wanted:
+        log.warning("%s: %d of %d objects can be chosen and told apart%s; %s", name, found, wanted, why_not, by_hand)
+
+
+def _nothing(name: str, why_not: str) -> AnnotationError:
+    return AnnotationError(
+        f"{name}: nothing in it can be drafted as an object{why_not}. Annotate it by hand, where a box (key B) cuts "
+        f"a thing out of a surface: {command('annotate', scene=name)}"
+    )
+
+
+def _many(n: int, what: str) -> str:
+    return f"{n:,} {what}{'' if n == 1 else 's'}"
+
+
+def _described_anew(name: str, path: Path, roots: Roots, seed: int) -> Path:
+    if not path.exists():
+        raise UsageError(f"{path} does not exist: there are no objects to keep")
+    source = parse_annotations(path.read_text(encoding="utf-8"))
+    if source.faults:
+        raise AnnotationError(f"{path}: {source.faults[0]}")
+    catalogue = load_catalogue(roots.scene_assets)
+    scene = build_scene(roots.recipes / f"{name}.toml", catalogue)
+    write_annotations(redraft_annotations(scene, catalogue, source.annotations, seed), path)
+    return path
+
+
+def refusals(scene: Scene, pipeline: Pipeline, roots: Roots) -> Callable[[str], str]:
+    """Make the test why a node cannot be an object: it must have a full shortlist of anchors."""
+    config = pipeline.anchor_sample
+    world = World.of(scene, pipeline.embodiment.radius_m, config.margin_m)
+    job = Job("anchor-sample", scene.name, 0, 1, pipeline.seed, pipeline.embodiment, roots)
+
+    @cache
+    def refused(node: str) -> str:
+        x, y, z = (float(v) for v in scene[node].centroid)
+        item = {"object_id": 0, "mesh_node": node, "x_m": x, "y_m": y, "z_m": z}
+        found, rejected, _ = candidates_of(item, world, job, config)
+        seen = 0 if found is None else len(found.seeing(config.min_visible_fraction))
+        if seen >= config.shortlist:
+            return ""
+        if found is not None:
+            rejected["not_visible"] += len(found.positions_m) - seen
+        cause = max(_CAUSES, key=lambda reason: rejected[reason])
+        return f"without {config.shortlist} viewpoints at {config.standoff_m:g} m ({_CAUSES[cause]})"
+
+    return refused

@@ -1,0 +1,232 @@
+"""The annotation tool's web server: requests in, the desk's answers out; checks nothing that the desk can check."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+from fastapi import FastAPI, Header, Query, Request
+from fastapi.responses import JSONResponse, Response
+from fastapi.staticfiles import StaticFiles
+from pydantic import BaseModel, ConfigDict, Field, StrictFloat, StrictStr, field_validator
+
+from aerialdojo_gen.base.errors import AerialDojoError, AnnotationError, StoreError
+from aerialdojo_gen.studio.annotate.coco import coco_zip
+from aerialdojo_gen.studio.annotate.document import ConflictError, Operation
+from aerialdojo_gen.studio.annotate.session import Desk
+from aerialdojo_gen.studio.annotate.storage import Author, StaleError
+from aerialdojo_gen.studio.web.serving import local_app, one_line
+
+STATIC = Path(__file__).resolve().parent / "static"
+MOST_BYTES = 8 << 20
+
+_Metres = Annotated[StrictFloat, Field(allow_inf_nan=False, ge=-1e5, le=1e5)]
+_Triple = tuple[_Metres, _Metres, _Metres]
+_Match = Annotated[str | None, Header(alias="If-Match", max_length=80)]
+_Object = Annotated[int, Field(ge=0, le=2**31 - 1)]
+
+
+class _Body(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class Signed(_Body):
+    """A request that changes something says who asks for it."""
+
+    who: Annotated[StrictStr, Field(max_length=80)] = ""
+    client: Annotated[StrictStr, Field(max_length=40, pattern=r"^[A-Za-z0-9-]*$")] = ""
+
+    @field_validator("who")
+    @classmethod
+    def _readable(cls, who: str) -> str:
+        return " ".join("".join(c if c.isprintable() else " " for c in who).split())
+
+    @property
+    def author(self) -> Author:
+        """The author of the change."""
+        return Author(self.who or "somebody", self.client)
+
+
+class Asked(Signed):
+    """An operation."""
+
+    operation: Operation
+
+
+class Imported(Signed):
+    """The text of an annotation file."""
+
+    text: StrictStr
+
+
+class Ray(_Body):
+    """A ray into the scene."""
+
+    origin_m: _Triple
+    direction: _Triple
+
+
+class Box(_Body):
+    """A box around a thing for which the mesh has no node."""
+
+    low_m: _Triple
+    high_m: _Triple
+    category: Annotated[StrictStr, Field(min_length=1, max_length=60)]
+
+
+class Viewpoint(_Body):
+    """A place to look at an object from; without a yaw it faces it, with `snap` it is moved to the standoff."""
+
+    position_m: _Triple
+    yaw_deg: Annotated[StrictFloat, Field(allow_inf_nan=False, ge=-720, le=720)] | None = None
+    snap: bool = False
+
+
+def make_app(desk: Desk, *, any_host: bool = False) -> FastAPI:
+    """Make the tool's web application."""
+    app = local_app(str(STATIC / "index.html"), f"annotate {desk.scene.name}", MOST_BYTES, any_host=any_host)
+
+    @app.exception_handler(ConflictError)
+    def conflict(request: Request, error: Exception) -> JSONResponse:
+        body: dict[str, Any] = {
+            "error": one_line(str(error)),
+            "state": desk.document(request.query_params.get("client", "")[:40]),
+        }
+        if isinstance(error, StaleError):
+            body["changes"] = desk.changes_since(_version(request.headers.get("if-match")))
+        return JSONResponse(body, status_code=412 if isinstance(error, StaleError) else 409)
+
+    @app.get("/api/scene")
+    def scene() -> Response:
+        return Response(desk.payload, media_type="application/octet-stream")
+
+    @app.get("/api/facts")
+    def facts() -> dict[str, Any]:
+        return desk.facts()
+
+    @app.get("/api/document")
+    def document(request: Request, client: Annotated[str, Query(max_length=40)] = "") -> Response:
+        if _version(request.headers.get("if-none-match")) == desk.storage.load().version:
+            return Response(status_code=304)
+        return _with_version(desk.document(client))
+
+    @app.post("/api/operations")
+    def operate(body: Asked, if_match: _Match = None) -> Response:
+        version = _required(if_match)
+        try:
+            return _with_version(desk.change(version, body.author, body.operation))
+        except (StoreError, AnnotationError) as error:
+            # A full disk, a file that an editor has left half: no fault of what is asked, which the page sends again.
+            return JSONResponse({"error": one_line(str(error))}, status_code=503)
+
+    @app.post("/api/undo")
+    def undo(body: Signed, if_match: _Match = None) -> Response:
+        return _with_version(desk.undo(_required(if_match), body.author))
+
+    @app.post("/api/redo")
+    def redo(body: Signed, if_match: _Match = None) -> Response:
+        return _with_version(desk.redo(_required(if_match), body.author))
+
+    @app.post("/api/import")
+    def take_over(body: Imported, if_match: _Match = None) -> Response:
+        return _with_version(desk.replace(_required(if_match), body.author, body.text.encode("utf-8", "replace")))
+
+    @app.post("/api/draft")
+    def draft(body: Asked) -> dict[str, Any]:
+        return desk.draft(body.operation)
+
+    @app.post("/api/pick")
+    def pick(body: Ray) -> dict[str, Any] | None:
+        return desk.pick(body.origin_m, body.direction)
+
+    @app.get("/api/nodes/{node}")
+    def about(node: str) -> dict[str, Any]:
+        return desk.about(node) if node in desk.scene else {}
+
+    @app.post("/api/boxes")
+    def cut(body: Box) -> dict[str, Any]:
+        return desk.cut(body.low_m, body.high_m, body.category)
+
+    @app.delete("/api/boxes/{node}")
+    def uncut(node: str) -> dict[str, Any]:
+        desk.uncut(node)
+        return {}
+
+    @app.get("/api/objects/{object_id}/anchors")
+    def anchors(object_id: _Object) -> list[dict[str, Any]]:
+        entry = desk.object(object_id)
+        return [_told(desk, entry.node, row, []) for row in desk.anchors.candidates(entry)]
+
+    @app.post("/api/objects/{object_id}/viewpoint")
+    def viewpoint(object_id: _Object, body: Viewpoint) -> dict[str, Any]:
+        entry = desk.object(object_id)
+        place = np.array(body.position_m)
+        if body.snap:
+            place = desk.anchors.place(entry, place)
+        yaw = None if body.yaw_deg is None else math.radians(body.yaw_deg)
+        return _told(desk, entry.node, *desk.anchors.judge(entry, place, yaw))
+
+    @app.get("/api/picture")
+    def picture(x: float, y: float, z: float, yaw_deg: float) -> Response:
+        place, yaw = np.array([x, y, z]), math.radians(yaw_deg)
+        low, high = desk.scene.bounds
+        if not (np.isfinite([*place, yaw]).all() and (place >= low - 5).all() and (place <= high + 5).all()):
+            raise AerialDojoError("no picture from outside the scene")
+        return Response(desk.anchors.view(place, yaw).png, media_type="image/png")
+
+    @app.get("/api/history")
+    def history() -> list[dict[str, Any]]:
+        return desk.history()
+
+    @app.get("/api/export")
+    def export() -> Response:
+        return _download(desk.export(), "application/json", desk.storage.path.name)
+
+    @app.get("/api/coco")
+    def coco() -> Response:
+        return _download(coco_zip(desk), "application/zip", f"{desk.scene.name}-coco.zip")
+
+    app.mount("/annotate", StaticFiles(directory=STATIC, follow_symlink=False), name="annotate")
+    return app
+
+
+def _told(desk: Desk, node: str, row: dict[str, Any], faults: list[str]) -> dict[str, Any]:
+    place = np.array([row["x_m"], row["y_m"], row["z_m"]])
+    view = desk.anchors.view(place, row["yaw_rad"]) if _near(desk, place) else None
+    box = view.boxes.get(node) if view else None
+    return {
+        "position_m": place.round(3).tolist(),
+        "yaw_deg": round(math.degrees(row["yaw_rad"]), 2),
+        "clearance_m": row["clearance_m"],
+        "surface_distance_m": row["surface_distance_m"],
+        "visible_fraction": row["visible_fraction"],
+        "score": row["score"],
+        "box_px": box,
+        "share": (view.pixels.get(node, 0) / desk.anchors.n_pixels) if view else 0.0,
+        "faults": faults,
+    }
+
+
+def _near(desk: Desk, place: Any) -> bool:
+    low, high = desk.scene.bounds
+    return bool((place >= low - 5).all() and (place <= high + 5).all())
+
+
+def _version(header: str | None) -> str:
+    return (header or "").removeprefix("W/").strip('"')
+
+
+def _required(header: str | None) -> str:
+    if not header:
+        raise AerialDojoError("say which version is to be changed: If-Match")
+    return _version(header)
+
+
+def _with_version(document: dict[str, Any]) -> JSONResponse:
+    return JSONResponse(document, headers={"ETag": f'"{document["version"]}"'})
+
+
+def _download(content: bytes, kind: str, name: str) -> Response:
+    return Response(content, media_type=kind, headers={"Content-Disposition": f'attachment; filename="{name}"'})

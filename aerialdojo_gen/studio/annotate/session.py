@@ -1,0 +1,255 @@
+"""One scene at the annotation desk: its annotations with everything that the page says about them."""
+
+from __future__ import annotations
+
+import itertools
+import re
+import threading
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from aerialdojo_gen.annotations.claims import spoken
+from aerialdojo_gen.annotations.format import Anchor, Object, format_annotations
+from aerialdojo_gen.base.config.pipeline import Pipeline
+from aerialdojo_gen.base.errors import AerialDojoError, UsageError
+from aerialdojo_gen.base.paper_figures import paper_counts
+from aerialdojo_gen.pipeline.stage import Job, Roots
+from aerialdojo_gen.rendering.casters import ray_caster
+from aerialdojo_gen.scenes.catalogue import load_catalogue
+from aerialdojo_gen.scenes.cuts import cut_out
+from aerialdojo_gen.scenes.model import Scene
+from aerialdojo_gen.scenes.recipe import Cut
+from aerialdojo_gen.studio.annotate import boxes
+from aerialdojo_gen.studio.annotate.anchors import AnchorDesk
+from aerialdojo_gen.studio.annotate.describe import Describer
+from aerialdojo_gen.studio.annotate.document import Add, Change, ConflictError, Operation, apply, edits_of, find
+from aerialdojo_gen.studio.annotate.history import Record
+from aerialdojo_gen.studio.annotate.storage import Author, State, Storage
+from aerialdojo_gen.studio.web.payload import scene_payload
+
+
+class Desk:
+    """What the page's requests come down to."""
+
+    def __init__(self, name: str, pipeline: Pipeline, roots: Roots) -> None:
+        self.storage = Storage(roots.annotations, name)
+        self.storage.load()
+        self._pipeline, self._roots = pipeline, roots
+        catalogue = load_catalogue(roots.scene_assets)
+        self._names = {category: catalogue[category].name for category in catalogue}
+        self._looks = {category: catalogue[category].looks for category in catalogue}
+        self._targets = catalogue.targets
+        self._counts = paper_counts().get(name) if pipeline.annotate_import.paper_counts else None
+        self._lock = threading.RLock()  # the geometry remembers as it goes
+        self._open_scene()
+
+    def _open_scene(self, commit: Callable[[], None] = lambda: None) -> None:
+        """Read the scene, do what makes it the desk's, and only then let go of the one before."""
+        name, pipeline = self.storage.scene, self._pipeline
+        job = Job("annotate", name, 0, 1, pipeline.seed, pipeline.embodiment, self._roots)
+        scene = job.scene_model(keep=2)  # a picture of the scene before may be under way
+        payload, describer = scene_payload(scene), Describer(scene, self._names, self._counts, self._looks)
+        rays = ray_caster(scene)
+        commit()
+        self.scene: Scene = scene
+        self.payload, self._describer, self._rays = payload, describer, rays
+        self._described: tuple[str, dict[str, Any]] | None = None
+        self.anchors = AnchorDesk(scene, pipeline, self._roots)
+
+    # What the page shows.
+
+    def facts(self) -> dict[str, Any]:
+        """What stays the same: the scene's name, bounds and categories with the words for them."""
+        there = {instance.category for instance in self.scene.instances}
+        words = {category: self._names.get(category, spoken(category)) for category in there}
+        if self.scene.imported:
+            words |= {category: self._names[category] for category in self._targets}
+        return {
+            "scene": self.scene.name,
+            "imported": self.scene.imported,
+            "bounds_m": self.scene.bounds.tolist(),
+            "categories": dict(sorted(words.items())),
+            "standoff_m": self.anchors.config.standoff_m,
+            "picture_px": self.anchors.size,
+            "file": self.storage.path.name,
+            "wanted": self._counts,
+        }
+
+    def document(self, client: str = "") -> dict[str, Any]:
+        """The annotations, where each entry is, what it lacks, and what the tab `client` can undo."""
+        return self._document(self.storage.load(), client)
+
+    def _document(self, state: State, client: str) -> dict[str, Any]:
+        with self._lock:
+            self.storage.history.refresh()
+            undo, redo = self.storage.history.stacks(client)
+            if self._described is None or self._described[0] != state.version:
+                self._described = (state.version, self._describer.describe(state.annotations))
+            return {
+                "scene": self.scene.name,
+                "version": state.version,
+                **self._described[1],
+                "undo": undo[-1].what if undo else None,
+                "redo": redo[-1].what if redo else None,
+            }
+
+    def draft(self, operation: Operation) -> dict[str, Any]:
+        """What would be said of an entry after an operation, which is not done: the check while somebody types."""
+        annotations = self.storage.load().annotations
+        edits = edits_of(operation, annotations, 2**31 - 1)
+        with self._lock:
+            described = self._describer.describe(apply(annotations, edits))
+        entry_id = 2**31 - 1 if isinstance(operation, Add) else operation.id
+        return next((e for e in described[operation.kind] if e["id"] == entry_id), {})
+
+    # What changes them.
+
+    def change(self, version: str, author: Author, operation: Operation) -> dict[str, Any]:
+        """Do an operation and save it; see `Storage.change`."""
+        fields = {} if operation.do == "remove" else operation.fields.given()
+        if fields.get("node", "") and fields["node"] not in self.scene:
+            raise AerialDojoError(f"no node {fields['node']!r} in the scene")
+        if fields.get("anchor") is not None and isinstance(operation, Change):
+            self._check_anchor(operation.id, fields["anchor"])
+        return self._saved(self.storage.change(version, author, operation), author)
+
+    def undo(self, version: str, author: Author) -> dict[str, Any]:
+        """Take back the author's last change."""
+        return self._saved(self.storage.undo(version, author), author)
+
+    def redo(self, version: str, author: Author) -> dict[str, Any]:
+        """Do again what the author took back."""
+        return self._saved(self.storage.redo(version, author), author)
+
+    def replace(self, version: str, author: Author, raw: bytes) -> dict[str, Any]:
+        """Take over another annotation file."""
+        return self._saved(self.storage.replace(version, author, raw), author)
+
+    def _saved(self, done: tuple[State, Record | None], author: Author) -> dict[str, Any]:
+        state, record = done
+        return self._document(state, author.client) | {"done": _told(record) if record else None}
+
+    def changes_since(self, version: str) -> list[dict[str, Any]]:
+        """What has been changed after a version, by whom."""
+        with self._lock:
+            self.storage.history.refresh()
+            return [_told(record) for record in self.storage.history.since(version)][-50:]
+
+    def history(self, most: int = 200) -> list[dict[str, Any]]:
+        """The last changes, the newest first."""
+        with self._lock:
+            self.storage.history.refresh()
+            return [_told(record) for record in reversed(self.storage.history.records[-most:])]
+
+    # What is under the cursor, and anchors.
+
+    def pick(self, origin_m: Sequence[float], direction: Sequence[float]) -> dict[str, Any] | None:
+        """Find what a ray (world frame, metres) hits first: node, category, point and bearing.
+
+        None where it hits nothing.
+        """
+        ray = np.asarray([direction], dtype=np.float64)
+        if not 1e-9 < float(np.linalg.norm(ray)) < 1e9:
+            raise AerialDojoError("a ray needs a direction")
+        distance, k = self._rays.first_hit(np.asarray(origin_m, dtype=np.float64), ray)
+        if k[0] < 0:
+            return None
+        point = np.asarray(origin_m) + float(distance[0]) * ray[0] / np.linalg.norm(ray[0])
+        return self.about(self._rays.nodes[int(k[0])]) | {"point_m": point.round(3).tolist()}
+
+    def about(self, node: str) -> dict[str, Any]:
+        """What the mesh knows of a node."""
+        instance = self.scene[node]
+        return {
+            "node": node,
+            "category": instance.category,
+            "word": self._names.get(instance.category, spoken(instance.category)),
+            "attributes": instance.attributes,
+            "boxed": node in boxes.nodes(self._recipe),
+            "size_m": np.ptp(instance.bounds, axis=0).round(2).tolist(),
+            **self._describer.place(node),
+            **self._describer.bearing(self.storage.load().annotations, node),
+        }
+
+    def object(self, object_id: int) -> Object:
+        """Look an object up whose node is in the scene; `UsageError` where there is none."""
+        found = find(self.storage.load().annotations, "objects", object_id)
+        if found is None or not isinstance(found[1], Object) or found[1].node not in self.scene:
+            raise UsageError(f"there is no object {object_id} with a node in the scene")
+        return found[1]
+
+    # Boxes, where a foreign mesh has no node for a thing.
+
+    def cut(self, low_m: Sequence[float], high_m: Sequence[float], category: str) -> dict[str, Any]:
+        """Make a node of what lies in a box (corners in world metres); only imported scenes can be cut."""
+        slug = re.sub(r"[^a-z0-9]+", "_", category.lower()).strip("_")[:60]
+        if not slug:
+            raise AerialDojoError("give the thing a category")
+        low, high = np.minimum(low_m, high_m).round(3), np.maximum(low_m, high_m).round(3)
+        with self._lock, self.storage.locked():
+            node = next(n for k in itertools.count() if (n := f"{slug}_{k:03d}") not in self.scene)
+            cut = Cut(node=node, category=slug, low_m=tuple(low.tolist()), high_m=tuple(high.tolist()))
+            cut_out(self.scene, (cut,))
+            self._rebuild(boxes.with_box(self._recipe, cut))
+        return self.about(node)
+
+    def uncut(self, node: str) -> None:
+        """Take a box away; `AerialDojoError` where its node is annotated, or no box made it."""
+        annotations = self.storage.load().annotations
+        if node in {e.node for e in annotations.landmarks} | {e.node for e in annotations.objects}:
+            raise AerialDojoError(f"{node} is annotated: remove its entry first")
+        with self._lock, self.storage.locked():
+            self._rebuild(boxes.without_box(self._recipe, node))
+
+    @property
+    def _recipe(self) -> Path:
+        return self._roots.recipes / f"{self.storage.scene}.toml"
+
+    def _rebuild(self, recipe: str) -> None:
+        with boxes.staged(self._roots, self.storage.scene, recipe) as roots:
+            build(self.storage.scene, self._pipeline, roots)
+        before = self.anchors
+        self._open_scene(commit=lambda: boxes.write(self._recipe, recipe))
+        before.close()
+
+    def _check_anchor(self, object_id: int, anchor: Anchor) -> None:
+        try:
+            entry = self.object(object_id)
+        except UsageError as error:
+            raise ConflictError(str(error)) from None
+        _, faults = self.anchors.judge(entry, np.array(anchor.position_m), float(np.radians(anchor.yaw_deg)))
+        if faults:
+            raise AerialDojoError(f"this anchor will not do: {'; '.join(faults)}")
+
+    def export(self) -> bytes:
+        """The annotation file, byte for byte; that of a scene without one."""
+        state = self.storage.load()
+        return (state.text or format_annotations(state.annotations)).encode("utf-8")
+
+
+def _told(record: Record) -> dict[str, Any]:
+    return record.model_dump(
+        mode="json", include={"time", "who", "client", "action", "what", "before", "after", "edits"}
+    )
+
+
+def open_desk(name: str, pipeline: Pipeline, roots: Roots) -> Desk:
+    """Open a scene at the desk, building its mesh where that is not up to date."""
+    from aerialdojo_gen.pipeline.runner import chosen_scenes
+
+    scenes = chosen_scenes(pipeline, roots, [name])
+    if len(scenes) > 1:
+        raise UsageError(f"{name} are {len(scenes)} scenes ({', '.join(scenes[:3])}, ...): annotate one at a time")
+    build(scenes[0], pipeline, roots)
+    return Desk(scenes[0], pipeline, roots)
+
+
+def build(scene: str, pipeline: Pipeline, roots: Roots) -> None:
+    """Bring a scene's mesh up to date with its recipe."""
+    from aerialdojo_gen.pipeline import runner
+    from aerialdojo_gen.pipeline.progress import Reporter
+
+    runner.run(runner.stages_named(("build-scenes",)), [scene], pipeline, roots, reporter=Reporter(quiet=True))

@@ -1,0 +1,225 @@
+"""An annotation file that several people and servers change: whole on disk after every change, or as before.
+
+A change goes to disk in three steps, under a lock: the new file under a temporary name, the line of the history,
+and the rename. A crash before the line leaves the file as it was; after it, the next to open the file finishes the
+rename. What was answered with "saved" is on disk either way.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl
+import hashlib
+import os
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+
+from aerialdojo_gen.annotations.format import Annotations, format_annotations, parse_annotations
+from aerialdojo_gen.base.disk import disk_error
+from aerialdojo_gen.base.errors import AnnotationError, brief
+from aerialdojo_gen.store.layout import check_scene_name
+from aerialdojo_gen.studio.annotate.document import (
+    ConflictError,
+    Edit,
+    Kind,
+    Operation,
+    apply,
+    describe,
+    difference,
+    edits_of,
+)
+from aerialdojo_gen.studio.annotate.history import Action, History, Record
+
+
+@dataclass(frozen=True)
+class State:
+    """The file at one moment."""
+
+    annotations: Annotations
+    text: str  # The file, byte for byte; empty where there is none yet
+    version: str  # SHA-256 of its bytes, hexadecimal
+
+
+@dataclass(frozen=True)
+class Author:
+    """Who changes something: the name that a person gave, and the tab it comes from."""
+
+    who: str
+    client: str
+
+
+class StaleError(ConflictError):
+    """A change was made for another version of the file than the one on disk."""
+
+    def __init__(self, state: State) -> None:
+        super().__init__("somebody else has changed these annotations since")
+        self.state = state
+
+
+class Storage:
+    """The annotation file of one scene and its history."""
+
+    def __init__(self, folder: Path, scene: str) -> None:
+        self.scene = check_scene_name(scene)
+        self.path = folder / f"{scene}.json"
+        self.history = History(folder / f"{scene}.history.jsonl")
+        self._temporary = folder / f".{scene}.json.next"
+        self._read: State | None = None
+
+    def load(self) -> State:
+        """Read the file, and finish what a crash left half done."""
+        if self._temporary.exists():
+            with self.locked():
+                self._recover()
+        return self._load()
+
+    def _load(self) -> State:
+        try:
+            raw = self.path.read_bytes()
+        except FileNotFoundError:
+            raw = b""
+        except OSError as error:
+            raise AnnotationError(f"{self.path} cannot be read: {error.strerror}") from None
+        version = hashlib.sha256(raw).hexdigest()
+        if self._read is None or self._read.version != version:
+            self._read = State(self._parse(raw), raw.decode("utf-8"), version)
+        return self._read
+
+    def _parse(self, raw: bytes) -> Annotations:
+        if not raw:
+            return Annotations(self.scene, (), ())
+        return parse_whole(raw, self.scene, str(self.path))
+
+    def change(self, version: str, author: Author, operation: Operation) -> tuple[State, Record | None]:
+        """Do what somebody asks for."""
+
+        def edits(state: State) -> list[Edit]:
+            return edits_of(operation, state.annotations, self._next_id(state, operation.kind))
+
+        return self._commit(version, author, "do", edits)
+
+    def replace(self, version: str, author: Author, raw: bytes) -> tuple[State, Record | None]:
+        """Put an annotation file in place of this one, as a change that can be undone; `AnnotationError` if wrong."""
+        after = parse_whole(raw, self.scene, "the file")
+        return self._commit(version, author, "import", lambda state: difference(state.annotations, after))
+
+    def undo(self, version: str, author: Author) -> tuple[State, Record | None]:
+        """Take back the last change of the author's tab; `ConflictError` where somebody changed the entry since."""
+
+        def edits(_: State) -> list[Edit]:
+            done, _undone = self.history.stacks(author.client)
+            return [edit.reversed() for edit in reversed(done[-1].edits)] if done else []
+
+        return self._commit(version, author, "undo", edits)
+
+    def redo(self, version: str, author: Author) -> tuple[State, Record | None]:
+        """Do again what the author's tab has taken back last."""
+
+        def edits(_: State) -> list[Edit]:
+            _done, undone = self.history.stacks(author.client)
+            return list(undone[-1].edits) if undone else []
+
+        return self._commit(version, author, "redo", edits)
+
+    def _next_id(self, state: State, kind: Kind) -> int:
+        present = max((entry.id for entry in getattr(state.annotations, kind)), default=-1)
+        return max(present, self.history.highest_id(kind)) + 1
+
+    def _commit(
+        self, version: str, author: Author, action: Action, edits_of_state: Callable[[State], Sequence[Edit]]
+    ) -> tuple[State, Record | None]:
+        with self.locked():
+            self._recover()
+            state = self._load()
+            if state.version != version:
+                raise StaleError(state)
+            edits = tuple(edits_of_state(state))
+            after = apply(state.annotations, edits)
+            if not edits:
+                return state, None
+            raw = format_annotations(after).encode("utf-8")
+            digest = hashlib.sha256(raw).hexdigest()
+            now = datetime.now(UTC).isoformat(timespec="seconds")
+            record = Record(
+                time=now, who=author.who, client=author.client, action=action, what=describe(edits),
+                before=state.version, after=digest, edits=edits,
+            )  # fmt: skip
+            lines = [record]
+            known = self.history.records[-1].after if self.history.records else state.version
+            if known != state.version:
+                outside = {"action": "outside", "what": "changed outside of this tool", "client": "", "who": ""}
+                lines.insert(
+                    0, record.model_copy(update=outside | {"before": known, "after": state.version, "edits": ()})
+                )
+            try:
+                self._write(raw, lines)
+            except OSError as error:
+                raise disk_error(error, self.path) from error
+            self.history.refresh()
+            self._read = State(after, raw.decode("utf-8"), digest)
+            return self._read, record
+
+    def _write(self, raw: bytes, records: Sequence[Record]) -> None:
+        with self._temporary.open("wb") as file:
+            file.write(raw)
+            file.flush()
+            os.fsync(file.fileno())
+        with self.history.path.open("r+b") as file:
+            file.truncate(self.history.whole)  # a line that a crash cut
+            file.seek(self.history.whole)
+            file.write(b"".join(record.model_dump_json().encode("utf-8") + b"\n" for record in records))
+            file.flush()
+            os.fsync(file.fileno())
+        self._rename()
+
+    def _rename(self) -> None:
+        self._temporary.replace(self.path)
+        folder = os.open(self.path.parent, os.O_RDONLY)
+        try:
+            os.fsync(folder)
+        finally:
+            os.close(folder)
+
+    def _recover(self) -> None:
+        """Finish the rename that the history's last line speaks of, or drop a file that nothing speaks of."""
+        self.history.refresh()
+        if not self._temporary.exists():
+            return
+        digest = hashlib.sha256(self._temporary.read_bytes()).hexdigest()
+        last = self.history.records[-1] if self.history.records else None
+        if last is not None and last.after == digest and self._load().version == last.before:
+            self._rename()
+        else:
+            self._temporary.unlink()
+
+    @contextlib.contextmanager
+    def locked(self) -> Iterator[None]:
+        """Keep everybody else who changes this scene waiting."""
+        # The history file is the lock, too: it is never replaced, so that all see the same one.
+        try:
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            with self.history.path.open("ab") as file:
+                fcntl.flock(file, fcntl.LOCK_EX)
+                yield
+        except OSError as error:
+            raise disk_error(error, self.history.path) from error
+
+
+def parse_whole(raw: bytes, scene: str, name: str) -> Annotations:
+    """Read an annotation file that has no fault of form."""
+    try:
+        source = parse_annotations(raw.decode("utf-8"))
+    except UnicodeDecodeError as error:
+        raise AnnotationError(f"{name} is not UTF-8: {error}") from None
+    if source.faults:
+        more = f" (and {len(source.faults) - 1} more)" if len(source.faults) > 1 else ""
+        raise AnnotationError(f"{name}: {source.faults[0]}{more}")
+    if source.scene != scene:
+        raise AnnotationError(f"{name} is of scene {brief(repr(source.scene), 60)}, not of {scene!r}")
+    for kind in ("landmarks", "objects"):
+        ids = [entry.id for entry in getattr(source.annotations, kind)]
+        if len(set(ids)) < len(ids):
+            raise AnnotationError(f"{name}: an id stands twice among the {kind}: mend it in an editor first")
+    return source.annotations

@@ -1,0 +1,110 @@
+"""A task on one sheet: a PNG for a paper, a talk or a look."""
+
+from __future__ import annotations
+
+import textwrap
+from pathlib import Path
+
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.cm import ScalarMappable
+from matplotlib.figure import Figure
+
+from aerialdojo_gen.base.errors import UsageError
+from aerialdojo_gen.store.atomic import atomic_file
+from aerialdojo_gen.studio.show.drawing import (
+    CLEARANCE_COLOURS,
+    CLEARANCE_SCALE,
+    draw_map,
+    draw_profile,
+    draw_side,
+    plain,
+)
+from aerialdojo_gen.studio.show.pictured import PicturedTask
+
+_WIDTH_IN, _DPI = 14.0, 120
+_FRAMES_IN = 2.95
+
+
+def task_figure(task: PicturedTask) -> Figure:
+    """Draw a task, 1680 pixels wide."""
+    strip = _FRAMES_IN if task.frames else 0.0
+    sheet = _Sheet(_WIDTH_IN, 8.7 + strip)
+    figure, top = sheet.figure, sheet.height
+    figure.text(
+        0.45 / _WIDTH_IN,
+        1 - 0.42 / top,
+        plain(task.title),
+        fontsize=min(19.0, 1700 / len(task.title)),
+        weight="bold",
+        va="center",
+    )
+    figure.text(0.45 / _WIDTH_IN, 1 - 0.80 / top, plain(task.place), fontsize=11, color="#475569", va="center")
+
+    draw_map(sheet.axes(0.45, top - 6.25, 8.3, 5.2), task, 8.3 / 5.2)
+    side = sheet.axes(0.85, strip + 0.3, 7.9, 1.95)
+    draw_side(side, task, 7.9 / 1.95)
+
+    if task.reference is not None:
+        image = sheet.axes(9.05, top - 3.35, 2.3, 2.3)
+        image.imshow(task.reference)
+        image.axis("off")
+        figure.text(9.05 / _WIDTH_IN, 1 - 0.96 / top, "reference image", fontsize=9, color="#475569")
+    y = top - 1.2
+    for name, value in task.facts:
+        figure.text(11.6 / _WIDTH_IN, y / top, name, fontsize=9, color="#475569")
+        y -= 0.17
+        for line in textwrap.wrap(plain(value), 27)[:3]:
+            figure.text(11.6 / _WIDTH_IN, y / top, line, fontsize=10.5)
+            y -= 0.17
+    words = "\n".join(line for part in plain(task.goal).splitlines() for line in textwrap.wrap(part, 68))
+    figure.text(
+        9.05 / _WIDTH_IN, (top - 3.85) / top, words, fontsize=9.5, va="top", linespacing=1.35,
+        bbox={"facecolor": "#e8eefc", "edgecolor": "none", "boxstyle": "square,pad=0.5"},
+    )  # fmt: skip
+    under_words = top - 4.25 - 0.19 * (words.count("\n") + 1)
+    draw_profile(sheet.axes(9.5, strip + 1.2, 4.2, min(2.9, under_words - strip - 1.2)), task)
+    bar = figure.colorbar(
+        ScalarMappable(CLEARANCE_SCALE, CLEARANCE_COLOURS), cax=sheet.axes(9.5, strip + 0.5, 4.2, 0.1),
+        orientation="horizontal", ticks=[0.25, 0.5, 1, 2, 5], format="%g",
+    )  # fmt: skip
+    bar.ax.minorticks_off()
+    bar.ax.tick_params(labelsize=7)
+    bar.set_label("clearance, m", fontsize=8, labelpad=1)
+    _frames(sheet, task)
+    return figure
+
+
+class _Sheet:
+    """A figure whose axes are placed in inches from the lower left corner."""
+
+    def __init__(self, width_in: float, height_in: float) -> None:
+        self.width, self.height = width_in, height_in
+        self.figure = Figure(figsize=(width_in, height_in), dpi=_DPI, facecolor="white")
+        FigureCanvasAgg(self.figure)
+
+    def axes(self, x: float, y: float, width: float, height: float) -> Axes:
+        return self.figure.add_axes((x / self.width, y / self.height, width / self.width, height / self.height))
+
+
+def _frames(sheet: _Sheet, task: PicturedTask) -> None:
+    if not task.frames:
+        return
+    count, gap = len(task.frames), 0.12
+    edge = min(2.45, (sheet.width - 0.9 - (count - 1) * gap) / count)
+    spare = min(0.25, (sheet.width - 0.9 - count * edge) / max(1, count - 1))
+    for k, frame in enumerate(task.frames):
+        axes = sheet.axes(0.45 + k * (edge + spare), 0.2, edge, edge)
+        axes.imshow(frame.rgb)
+        axes.set_xticks([])
+        axes.set_yticks([])
+        axes.set_title(f"pose {frame.step}: {frame.action}", fontsize=min(9.0, 4.2 * edge), pad=3)
+
+
+def write_png(task: PicturedTask, path: Path) -> Path:
+    """Write the picture of a task, whole or not at all."""
+    if path.suffix.lower() != ".png":
+        raise UsageError(f"{path}: the picture is a PNG, call it {path.with_suffix('.png').name}")
+    with atomic_file(path.parent, path.name) as temporary:
+        task_figure(task).savefig(temporary, format="png", metadata={"Software": None})
+    return path

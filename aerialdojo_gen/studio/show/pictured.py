@@ -1,0 +1,136 @@
+"""All that a picture of a task needs, gathered once for the PNG and the page."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aerialdojo_gen.base.pictures import decode_rgb
+from aerialdojo_gen.benchmark.agents.goal import Goal, Rules
+from aerialdojo_gen.benchmark.llm.prompt import goal_text
+from aerialdojo_gen.dataset.lookup import FoundTask
+from aerialdojo_gen.geometry.polyline import sampled
+from aerialdojo_gen.rendering.orthographic import OrthographicPictures, orthographic_pictures
+from aerialdojo_gen.store import schemas
+from aerialdojo_gen.studio.show.frames import Frame, frames_along
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class PicturedTask:
+    """A task, ready to be drawn."""
+
+    task: FoundTask
+    instance: dict[str, Any]  # The row of `tasks` that is shown
+    target: dict[str, Any]  # Rows of `objects` and `landmarks`
+    start_object: dict[str, Any]
+    landmark: dict[str, Any]
+    poses: Floats  # (K + 1, 4) float64; x, y, z and yaw of every pose
+    way: Floats  # (n, 3) float64; points every half metre of the route at most, metres, world frame
+    along_m: Floats  # (n,) float64; distance flown to each of them
+    clearance_m: Floats  # (n,) float64; fCL's distance from each to the nearest surface
+    below_m: Floats  # (n,) float64; height of the surface under each, NaN where there is none
+    reference: NDArray[np.uint8] | None  # (H, W, 3) uint8 or None; the target's reference image
+    frames: list[Frame]
+    pictures: OrthographicPictures
+
+    @property
+    def title(self) -> str:
+        """Say what is to be found, in a line."""
+        row = self.instance
+        return f"{row['target_name']}, {row['direction']} of the {row['landmark']}"
+
+    @property
+    def place(self) -> str:
+        """Say where the task stands, in a line."""
+        row, gap = self.instance, "   ·   "
+        kind = f"{row['setting'].replace('_', ' ')}, {row['modality']} goal, {self.task.route['split']}"
+        return gap.join([row["task_id"], f"{row['family']}, {row['scene_type']}", kind])
+
+    @property
+    def goal(self) -> str:
+        """The goal as an agent reads it."""
+        row = self.instance
+        return goal_text(
+            Goal(
+                row["modality"],
+                row["target_name"],
+                row["landmark"],
+                row["direction"],
+                row["description"],
+                self.reference if row["modality"] == "image" else None,
+                Rules(row["action_budget"]),
+            )
+        )
+
+    @property
+    def told(self) -> str:
+        """The goal for a terminal, which shows no picture: which one it is, and what the twin in words says."""
+        row = self.instance
+        if row["modality"] != "image" or self.reference is None:
+            return self.goal
+        height, width = self.reference.shape[:2]
+        lines = [
+            f"{self.goal.removesuffix(':')}: reference image {row['reference_image_id']}, {width} x {height} pixels"
+        ]
+        twin = next((other for other in self.task.instances if other["modality"] == "semantic"), None)
+        if twin is not None:
+            lines.append(f"In words, which {twin['task_id']} gives in its place: {twin['description']}")
+        return "\n".join(lines)
+
+    @property
+    def facts(self) -> list[tuple[str, str]]:
+        """Figures of the route, name and value."""
+        route = self.task.route
+        return [
+            ("length L", f"{route['length_m']:.2f} m"),
+            ("straight d_E", f"{route['euclidean_m']:.2f} m"),
+            ("detour κ = L / d_E", f"{route['detour_ratio']:.3f}"),
+            ("least clearance", f"{route['min_clearance_m']:.2f} m"),
+            ("actions", f"{route['n_actions']} of {self.instance['action_budget']}"),
+            ("starts at", f"{self.start_object['name']}, anchor {route['start_anchor_id']}"),
+            ("height", f"{self.poses[:, 2].min():.1f} to {self.poses[:, 2].max():.1f} m"),
+        ]
+
+    @property
+    def actions(self) -> list[tuple[str, int]]:
+        """The reference actions, repeats counted."""
+        runs: list[tuple[str, int]] = []
+        for action in self.task.route["action"]:
+            name = schemas.ACTION_NAMES[action]
+            if runs and runs[-1][0] == name:
+                runs[-1] = (name, runs[-1][1] + 1)
+            else:
+                runs.append((name, 1))
+        return runs
+
+
+def picture_task(task: FoundTask, modality: str = "semantic", frames: int = 5) -> PicturedTask:
+    """Gather what is drawn of a task."""
+    scene, route = task.scene, task.route
+    rows = sorted(task.instances, key=lambda row: row["modality"] != modality)
+    target = scene.object(route["target_object_id"])
+    poses = np.column_stack([route["x_m"], route["y_m"], route["z_m"], route["yaw_rad"]])
+    moved = np.concatenate([[True], np.any(np.diff(poses[:, :3], axis=0) != 0.0, axis=1)])
+    way, _ = sampled(poses[moved, :3])
+    pictures = orthographic_pictures(scene.model)
+    steps = np.linalg.norm(np.diff(way, axis=0), axis=1)
+    return PicturedTask(
+        task=task,
+        instance=rows[0],
+        target=target,
+        start_object=scene.object(route["start_object_id"]),
+        landmark=scene.landmark(target["landmark_id"]),
+        poses=poses,
+        way=way,
+        along_m=np.concatenate([[0.0], np.cumsum(steps)]),
+        clearance_m=scene.clearance(way),
+        below_m=pictures.surface_below(way),
+        reference=decode_rgb(target["reference_image"]),
+        frames=frames_along(task, frames),
+        pictures=pictures,
+    )

@@ -1,0 +1,134 @@
+"""The scenes that `view` shows: their payloads, pictures and ways, the last few of them kept."""
+
+from __future__ import annotations
+
+import threading
+from collections import OrderedDict
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from functools import cached_property, lru_cache
+from typing import Any, TypeVar
+
+import cv2
+import numpy as np
+
+from aerialdojo_gen.base.errors import UsageError
+from aerialdojo_gen.base.names import unknown
+from aerialdojo_gen.base.pictures import GALLERY_JPEG, decode_rgb, encode_jpeg
+from aerialdojo_gen.dataset.lookup import ReleasedScene
+from aerialdojo_gen.geometry.cameras import Camera, look_at_pose
+from aerialdojo_gen.scenes.model import Scene
+from aerialdojo_gen.store import shards as store
+from aerialdojo_gen.store.root import DataRoot
+from aerialdojo_gen.studio.view.contents import route_detail, route_points, scene_index
+from aerialdojo_gen.studio.web.payload import scene_payload
+
+_T = TypeVar("_T")
+# A payload is some 20 MB, a scene's objects with their pictures as much.
+_MOST_OPEN = 4
+_WIDTH_PX, _HEIGHT_PX, _FOV_DEG = 480, 300, 60.0
+THUMB_PX = 224
+
+
+class ShownScene:
+    """One scene with what the page asks for; what takes its mesh is made when it is first asked for."""
+
+    def __init__(self, released: ReleasedScene) -> None:
+        self.released = released
+
+    @cached_property
+    def payload(self) -> bytes:
+        """The mesh for the browser; AssetError where it is missing or another one."""
+        return scene_payload(self.released.model)
+
+    @cached_property
+    def index(self) -> dict[str, Any]:
+        """What the page lists and filters."""
+        return scene_index(self.released)
+
+    @cached_property
+    def points(self) -> bytes:
+        """The ways of all routes."""
+        return route_points(self.released)
+
+    def detail(self, nav_id: str) -> dict[str, Any]:
+        """All of one route; UsageError where there is none."""
+        return route_detail(self.released, nav_id)
+
+    def image(self, object_id: int) -> bytes:
+        """Return the reference image of an object, PNG; UsageError where it has none."""
+        image: bytes | None = self.released.object(object_id)["reference_image"]
+        if image is None:
+            raise UsageError(f"object {object_id} has no reference image")
+        return image
+
+
+class ShownScenes:
+    """The scenes of a release, opened when they are asked for."""
+
+    def __init__(self, root: DataRoot, names: Sequence[str]) -> None:
+        self.root, self.names = root, tuple(names)
+        self._open: OrderedDict[str, ShownScene] = OrderedDict()
+        self._small: dict[tuple[str, int], bytes] = {}
+        self._pictures: dict[str, bytes] = {}
+        self._lock = threading.Lock()
+        # A renderer belongs to the thread that has made it, FCL's manager is no thing for two, and scenes that are
+        # let go of close both: all that touches a mesh is done by one thread.
+        self._worker = ThreadPoolExecutor(1, "scenes")
+        self._drawing, self._reading = threading.Lock(), threading.Lock()
+        self._images = lru_cache(maxsize=_MOST_OPEN)(self._read_images)
+
+    def require(self, name: str) -> None:
+        """UsageError where there is no scene of the name."""
+        if name not in self.names:
+            raise UsageError(unknown("no scene", name, self.names, most=3))
+
+    def do(self, name: str, what: Callable[[ShownScene], _T]) -> _T:
+        """Do something with a scene; UsageError where there is none of the name."""
+        self.require(name)
+        return self._worker.submit(lambda: what(self._opened(name))).result()
+
+    def _opened(self, name: str) -> ShownScene:
+        with self._lock:
+            shown = self._open.pop(name, None) or ShownScene(ReleasedScene(self.root, name))
+            self._open[name] = shown
+            while len(self._open) > _MOST_OPEN:
+                self._open.popitem(last=False)
+            return shown
+
+    def thumb(self, name: str, object_id: int) -> bytes:
+        """Return an object's reference image made small, JPEG; UsageError where it has none."""
+        self.require(name)
+        with self._reading:
+            key = (name, object_id)
+            if key not in self._small:
+                image = decode_rgb(self._images(name).get(object_id))
+                if image is None:
+                    raise UsageError(f"object {object_id} of {name} has no reference image")
+                scale = THUMB_PX / max(image.shape[:2])
+                small = cv2.resize(image, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
+                self._small[key] = encode_jpeg(np.asarray(small, dtype=np.uint8), GALLERY_JPEG)
+            return self._small[key]
+
+    def _read_images(self, name: str) -> dict[int, bytes | None]:
+        table = store.read_scene(self.root, "release/objects", name, ["object_id", "reference_image"])
+        return dict(zip(table["object_id"].to_pylist(), table["reference_image"].to_pylist(), strict=True))
+
+    def picture(self, name: str) -> bytes:
+        """Return a picture of a scene from its south-west, JPEG, as the page of the scene begins."""
+        # One at a time: the start page asks for many, and who opens a scene is not to wait for them all.
+        with self._drawing:
+            if name not in self._pictures:
+                self._pictures[name] = self.do(name, lambda shown: _picture(shown.released.model))
+            return self._pictures[name]
+
+
+def _picture(scene: Scene) -> bytes:
+    from aerialdojo_gen.rendering.backend import choose_renderer, kept_renderer
+
+    low, high = scene.bounds
+    centre, size = (low + high) / 2, float(np.hypot(*(high - low)[:2]))
+    eye = np.array([centre[0] - 0.2 * size, centre[1] - 0.3 * size, low[2] + 0.4 * size])
+    camera = Camera(_WIDTH_PX, _HEIGHT_PX, _FOV_DEG)
+    pose = look_at_pose(eye, np.array([centre[0], centre[1], low[2] + 2.0]))
+    return encode_jpeg(kept_renderer(scene, choose_renderer().name).render(camera, pose).rgb, GALLERY_JPEG)

@@ -1,0 +1,142 @@
+"""A scene for the browser: one binary file, merged into a few draw calls, from which a triangle's node can be told.
+
+Layout (little-endian): ``uint32`` length of the header, the header as JSON padded to 4 bytes, then the body that the
+header's offsets point into. ``static/payload.js`` reads it. Triangles are merged into one group for all flat colours
+and one for every size of texture (each a texture array), so that a scene is three draw calls or so; within a group
+they lie node by node, and ``ranges`` says where a node begins and ends.
+"""
+
+from __future__ import annotations
+
+import json
+import struct
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aerialdojo_gen.base.pictures import PAGE_JPEG, TEXTURE_PNG, encode_jpeg, encode_masked, encode_png
+from aerialdojo_gen.geometry.soup import soup
+from aerialdojo_gen.rendering.lighting import light_of
+from aerialdojo_gen.rendering.texels import reduced
+from aerialdojo_gen.scenes.model import Material, Part, Scene
+
+VERSION = 1
+_FLAT = (0, 0)
+_LARGEST_PX = 4096
+# Larger textures are sent as JPEG, bytes of their pixels.
+_PNG_BYTES = 4 << 20
+_NOTHING = np.zeros((0, 3), dtype=np.int64)
+_Look = tuple[int, int, bool, bool, bool, bool]
+
+
+class _Body:
+    """The binary part, aligned to 4 bytes so that the browser can lay typed arrays over it."""
+
+    def __init__(self) -> None:
+        self.data = bytearray()
+
+    def add(self, raw: bytes) -> dict[str, int]:
+        view = {"offset": len(self.data), "bytes": len(raw)}
+        self.data += raw + b"\0" * (-len(raw) % 4)
+        return view
+
+
+def scene_payload(scene: Scene) -> bytes:
+    """Pack a scene for ``static/scene.js``: float32 world metres, the same bytes for the same scene."""
+    light = light_of(scene)
+    body = _Body()
+    groups: dict[_Look, list[tuple[int, Part]]] = {}
+    for behind, instances in ((False, scene.instances), (True, scene.backdrop)):
+        for k, instance in enumerate(instances):
+            for part in instance.parts:
+                groups.setdefault(_look(scene.materials[part.material], behind), []).append((k, part))
+    boxes = [i.bounds for i in scene.instances]
+    header = {
+        "version": VERSION,
+        "name": scene.name,
+        "bounds_m": scene.bounds.tolist(),
+        "n_triangles": scene.n_triangles,
+        "sun": light.sun.tolist(),
+        "zenith": (light.zenith / 255.0).tolist(),
+        "horizon": (light.horizon / 255.0).tolist(),
+        "nodes": [
+            {"node": i.node, "category": i.category, "variant": i.variant, "attributes": i.attributes}
+            for i in scene.instances
+        ],
+        "boxes": body.add(np.asarray(boxes, dtype="<f4").tobytes()),
+        "groups": [_group(body, look, groups[look], scene.materials) for look in sorted(groups)],
+    }
+    head = json.dumps(header, separators=(",", ":"), ensure_ascii=False, allow_nan=False).encode()
+    head += b" " * (-len(head) % 4)
+    return struct.pack("<I", len(head)) + head + bytes(body.data)
+
+
+def _look(material: Material, behind: bool) -> _Look:
+    """What decides with which others a part draws: size of the texture, holes, both sides, light, behind all."""
+    texture = _texture(material)
+    size = _FLAT if texture is None else (texture.shape[0], texture.shape[1])
+    return (*size, material.mask is not None, material.double_sided, material.unlit, behind)
+
+
+def _texture(material: Material) -> NDArray[np.uint8] | None:
+    """The texture as the page shows it: an atlas no larger than browsers take."""
+    if material.texture is None or not material.atlas:
+        return material.texture
+    return reduced(material.texture, _LARGEST_PX)
+
+
+def _group(body: _Body, look: _Look, parts: list[tuple[int, Part]], materials: dict[str, Material]) -> dict[str, Any]:
+    """Merge parts that draw together; within the group they stay in the order of the scene's instances."""
+    vertices, index = soup([p for _, p in parts])
+    counts = [len(p.vertices) for _, p in parts]
+    size, (holes, both_sides, unlit, behind) = look[:2], look[2:]
+    told = {"holes": holes, "both_sides": both_sides, "unlit": unlit, "behind": behind}
+    group: dict[str, Any] = {
+        **{key: True for key, value in told.items() if value},
+        "size": list(size),
+        "position": body.add(vertices.astype("<f4").tobytes()),
+        "index": body.add(index.astype("<u4").tobytes()),
+        "ranges": body.add((_NOTHING if behind else _ranges(parts)).astype("<u4").tobytes()),
+    }
+    if size == _FLAT:
+        colours = np.full((sum(counts), 4), 255, dtype=np.uint8)
+        own = [
+            np.tile(np.array(materials[p.material].colour, np.uint8), (n, 1)) if p.colours is None else p.colours
+            for (_, p), n in zip(parts, counts, strict=True)
+        ]
+        colours[:, :3] = np.concatenate(own)
+        return group | {"colour": body.add(colours.tobytes())}
+    names = sorted({p.material for _, p in parts})
+    layer = {name: k for k, name in enumerate(names)}
+    layers = np.repeat(np.array([layer[p.material] for _, p in parts], dtype="<f4"), counts)
+    # The model's v points up, a picture's rows down; textures repeat, so that the sign is all there is to it.
+    uv = np.concatenate([p.uv for _, p in parts]) * np.array([1.0, -1.0], dtype=np.float32)
+    return group | {
+        "uv": body.add(np.column_stack([uv, layers]).astype("<f4").tobytes()),
+        "layers": [_png(body, materials[name]) for name in names],
+    }
+
+
+def _ranges(parts: list[tuple[int, Part]]) -> NDArray[np.int64]:
+    """Rows (node, first face, faces) of a group, (n, 3): one row for the parts of a node together."""
+    rows: list[list[int]] = []
+    face = 0
+    for node, part in parts:
+        if rows and rows[-1][0] == node:
+            rows[-1][2] += len(part.faces)
+        else:
+            rows.append([node, face, len(part.faces)])
+        face += len(part.faces)
+    return np.array(rows, dtype=np.int64)
+
+
+def _png(body: _Body, material: Material) -> dict[str, int]:
+    texture = _texture(material)
+    assert texture is not None
+    if material.mask is not None:
+        mask = reduced(np.where(material.mask, 255, 0).astype(np.uint8), _LARGEST_PX) >= 128
+        return body.add(encode_masked(texture, mask, TEXTURE_PNG))
+    if material.atlas and texture.size > _PNG_BYTES:
+        return body.add(encode_jpeg(texture, PAGE_JPEG))
+    return body.add(encode_png(texture, TEXTURE_PNG))

@@ -1,7 +1,0 @@
-"""`validate`: a whole release checked again from its Parquet files and scene meshes alone."""
-
-from aerialdojo_gen.validate.registry import Fault, Outcome
-from aerialdojo_gen.validate.report import Report, write_report
-from aerialdojo_gen.validate.run import Asked, validate
-
-__all__ = ["Asked", "Fault", "Outcome", "Report", "validate", "write_report"]

@@ -1,0 +1,115 @@
+"""Commands that messages advise: they exist, take what is given to them, and can be pasted."""
+
+from __future__ import annotations
+
+import ast
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+from typer.main import get_command
+
+import aerialdojo_gen
+from aerialdojo_gen.base import cli_context as advice
+from aerialdojo_gen.cli import app as cli
+from aerialdojo_gen.store.shards import LAYOUT
+
+PACKAGE = Path(aerialdojo_gen.__file__).parent
+COMMANDS = get_command(cli.app).commands
+SOURCES = {path.relative_to(PACKAGE).as_posix(): ast.parse(path.read_text()) for path in PACKAGE.rglob("*.py")}
+
+
+def options(verb: str) -> set[str]:
+    return {name for param in COMMANDS[verb].params for name in param.opts if name.startswith("--")}
+
+
+def advised() -> list[tuple[str, ast.Call]]:
+    return [
+        (file, node)
+        for file, tree in SOURCES.items()
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Call)
+        and (getattr(node.func, "id", "") == "command" or ast.unparse(node.func) == "advice.command")
+    ]
+
+
+def test_every_advised_command_is_one_of_ours_and_has_the_options():
+    calls = advised()
+    assert len(calls) > 20
+    for file, call in calls:
+        if isinstance(call.args[0], ast.Constant):
+            verb = str(call.args[0].value)
+            unknown = {f"--{key.arg.replace('_', '-')}" for key in call.keywords if key.arg} - options(verb)
+            assert not unknown, (file, ast.unparse(call))
+    assert {spot.command for spot in LAYOUT.values()} <= set(COMMANDS)
+
+
+@pytest.mark.parametrize("verb", sorted(COMMANDS))
+def test_a_command_is_given_what_it_takes(verb):
+    with advice.as_given(advice.Given("mine/pipeline.toml", "mine/data")):
+        words = shlex.split(advice.command(verb))
+    assert {word for word in words if word.startswith("--")} == options(verb) & {"--pipeline", "--data"}
+
+
+def test_no_message_names_a_command_but_by_the_helper():
+    verbs = "|".join(map(re.escape, sorted(COMMANDS)))
+    docstrings = {
+        id(node.body[0].value)
+        for tree in SOURCES.values()
+        for node in ast.walk(tree)
+        if isinstance(node, (ast.Module, ast.ClassDef, ast.FunctionDef))
+        and node.body and isinstance(node.body[0], ast.Expr)
+    }  # fmt: skip
+    found = [
+        f"{file}: {node.value}"
+        for file, tree in SOURCES.items()
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in docstrings
+        and re.search(rf"aerialdojo-gen ({verbs})\b|\brun ({verbs}) (again|first)", node.value)
+    ]  # fmt: skip
+    # The title of a page is no advice.
+    assert [line for line in found if not line.startswith("studio/view/server.py")] == []
+
+
+def test_what_is_advised_is_quoted_and_repeats_what_was_given():
+    with advice.as_given(advice.Given("our scenes/$x.toml", "")):
+        text = advice.command("annotate", scene="A'b", port=8000, browser=None, coco=False)
+        assert shlex.split(text) == [
+            "aerialdojo-gen", "annotate", "--scene", "A'b", "--port", "8000", "--pipeline", "our scenes/$x.toml",
+        ]  # fmt: skip
+        assert advice.command("plan", force=True, pipeline="other.toml").endswith(
+            "plan --force --pipeline other.toml"
+        )
+    assert advice.given().pipeline == ""
+
+
+def test_only_what_is_written_is_repeated(monkeypatch, capsys):
+    monkeypatch.setenv("AERIALDOJO_DATA", "elsewhere")
+    for arguments, kept in (
+        (["plan", "--pipeline", "no such.toml"], ("no such.toml", "")),
+        (["plan", "--data", "here", "--pipeline", "gone.toml"], ("gone.toml", "here")),
+        (["run", "gone.toml"], ("gone.toml", "")),
+    ):
+        monkeypatch.setattr("sys.argv", ["aerialdojo-gen", *arguments])
+        with pytest.raises(SystemExit):
+            cli.main()
+        assert (advice.given().pipeline, advice.given().data) == kept
+    capsys.readouterr()
+    advice.begin()
+
+
+def test_the_program_is_called_as_it_was(monkeypatch, tmp_path):
+    tool = tmp_path / ".venv" / "bin" / "aerialdojo-gen"
+    tool.parent.mkdir(parents=True)
+    tool.write_text("#!/bin/sh\n")
+    tool.chmod(0o755)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("PATH", "/nowhere")
+    advice.begin(str(tool))
+    assert advice.command("stats") == ".venv/bin/aerialdojo-gen stats"
+    monkeypatch.setenv("PATH", str(tool.parent))
+    advice.begin(str(tool))
+    assert advice.command("stats") == "aerialdojo-gen stats"
+    advice.begin("pytest")
+    assert advice.command("stats") == "aerialdojo-gen stats"

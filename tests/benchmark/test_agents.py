@@ -1,0 +1,275 @@
+"""The agents: how they are found, what they do, and the explorer's map."""
+
+import math
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from support.flying import town
+from support.handmade import box, instance, scene
+
+import aerialdojo_gen
+from aerialdojo_gen.base.errors import UsageError
+from aerialdojo_gen.benchmark.agents import AgentBase, load_agent
+from aerialdojo_gen.benchmark.agents.depth_map import DepthMap
+from aerialdojo_gen.benchmark.agents.explorer import ExplorerAgent, thumbnail
+from aerialdojo_gen.benchmark.agents.goal import BLIND, Goal, Observation, Rules, Sensors
+from aerialdojo_gen.benchmark.agents.load import read_options
+from aerialdojo_gen.benchmark.agents.simple import BEST_CONSTANT, ConstantAgent, OracleAgent, RandomAgent, StopAgent
+from aerialdojo_gen.dataset.episode import Episode
+from aerialdojo_gen.geometry.cameras import view_pose
+from aerialdojo_gen.geometry.rays import RayCaster
+from aerialdojo_gen.planning.flight_space import FlightSpace
+from aerialdojo_gen.store import schemas
+
+EYES = Sensors(("front", "left", "right"), rgb=False, width=48, height=48)
+
+
+def goal(budget=90, name="red van", image=None, sensors=BLIND):
+    text = "A red van by the gate." if image is None else None
+    kind = "semantic" if image is None else "image"
+    return Goal(kind, name, "clock tower", "north", text, image, Rules(budget, sensors=sensors))
+
+
+def flown(agent, n, budget=90):
+    return [agent.act(Observation(k, budget - k)) for k in range(n)]
+
+
+class Nothing:
+    """No agent."""
+
+
+class Mine(AgentBase):
+    def __init__(self, gain=1.0):
+        if gain < 0:
+            raise ValueError("gain is not negative")
+
+    def reset(self, goal):
+        pass
+
+    def act(self, observation):
+        return 0
+
+
+def test_built_in_agents_are_made_by_name():
+    assert isinstance(load_agent("oracle"), OracleAgent)
+    assert isinstance(load_agent("random", seed=3), RandomAgent)
+    assert isinstance(load_agent("stop"), StopAgent)
+    assert isinstance(load_agent("constant"), ConstantAgent)
+    assert isinstance(load_agent("explorer", likeness=0.9), ExplorerAgent)
+    assert isinstance(load_agent(f"{__name__}:Mine", gain=2), Mine)
+
+
+@pytest.mark.parametrize(
+    ("name", "options", "message"),
+    [
+        ("oracel", {}, "did you mean 'oracle'"),
+        ("nobody", {}, "package.module:Class"),
+        ("no_such_module_here:Agent", {}, "cannot load agent .* No module named"),
+        (f"{__name__}:Missing", {}, f"module {__name__} has no Missing"),
+        (f"{__name__}:Nothing", {}, "it needs reset"),
+        (f"{__name__}:EYES", {}, "EYES is no class"),
+        ("random", {"sead": 1}, "its options: seed, stop_probability"),
+        ("random", {"stop_probability": 2}, "between 0 and 1"),
+        ("constant", {"actions": "MoveForward5,MoveBack1"}, "no action 'MoveBack1': there are Stop, MoveForward1, "),
+        ("constant", {"actions": [16]}, "no action '16'"),
+        (f"{__name__}:Mine", {"gain": -1}, "gain is not negative"),
+    ],
+)
+def test_what_cannot_be_made_is_said_in_one_line(name, options, message):
+    with pytest.raises(UsageError, match=message) as error:
+        load_agent(name, **options)
+    assert "\n" not in str(error.value)
+
+
+class Typed(AgentBase):
+    """Has a default of every type."""
+
+    def __init__(self, needed, n=3, share=0.5, flag=False, name="", seed=None, names=("a",)):
+        self.given = needed, n, share, flag, name, seed, names
+
+    def reset(self, goal): ...
+
+    def act(self, observation): ...
+
+
+@pytest.mark.parametrize(
+    ("option", "text", "value"),
+    [
+        ("n", "12", 12), ("n", "-1", -1), ("share", "2", 2.0), ("share", "1e-3", 1e-3),
+        ("flag", "true", True), ("flag", "False", False), ("flag", "1", True), ("flag", "no", False),
+        ("name", "12", "12"), ("name", "None", "None"), ("name", "true", "true"), ("name", "[1]", "[1]"),
+        ("name", '"quoted"', "quoted"), ("name", "", ""),
+        ("seed", "None", None), ("seed", "null", None), ("seed", "7", 7), ("seed", "words", "words"),
+        ("names", '["b", "c"]', ["b", "c"]), ("names", "b,c", "b,c"), ("names", "7", "7"),
+        ("needed", "7", 7), ("needed", "words", "words"), ("other", "true", True),
+    ],
+)  # fmt: skip
+def test_options_take_the_types_of_their_defaults(option, text, value):
+    read = read_options(f"{__name__}:Typed", {option: text})
+    assert read == {option: value}
+    assert type(read[option]) is type(value)
+
+
+@pytest.mark.parametrize(
+    ("option", "text", "what"),
+    [("n", "1.5", "a whole number"), ("n", "true", "a whole number"), ("n", "None", "a whole number"),
+     ("share", "much", "a number"), ("flag", "maybe", "true or false"), ("flag", "2", "true or false")],
+)  # fmt: skip
+def test_an_option_that_cannot_be_converted_is_named(option, text, what):
+    default = {"n": 3, "share": 0.5, "flag": False}[option]
+    message = rf"^--option {option}={text}: agent '\S+:Typed' takes {what} here, its default is {default}$"
+    with pytest.raises(UsageError, match=message):
+        read_options(f"{__name__}:Typed", {option: text})
+
+
+def test_the_constant_agent_does_the_same_whatever_it_is_told_and_then_stops():
+    names = schemas.ACTION_NAMES
+    for agent, expected in (
+        (load_agent("constant"), [names.index(name) for name in BEST_CONSTANT]),
+        (load_agent("constant", actions="moveup1, 14,MoveForward3"), [10, 14, 2]),
+        (load_agent("constant", actions=[9, "TurnRight15"]), [9, 15]),
+    ):
+        flights = []
+        for told in (goal(), goal(name="blue bench", budget=300)):
+            agent.reset(told)
+            flights.append(flown(agent, 6))
+        assert flights[0] == flights[1] == (expected + [schemas.STOP] * 6)[:6]
+
+
+def test_the_oracle_leaves_the_approach_out_and_stops_at_the_end():
+    agent = OracleAgent()
+    agent.follow([1, 14, 3, schemas.APPROACH, 0])
+    agent.reset(goal())
+    assert flown(agent, 6) == [1, 14, 3, 0, 0, 0]
+
+
+def test_random_draws_depend_on_seed_and_goal_alone():
+    def draws(seed=0, **kw):
+        agent = RandomAgent(seed)
+        agent.reset(goal(**kw))
+        return flown(agent, 90)
+
+    assert draws() == draws()
+    assert draws() != draws(seed=1)
+    assert draws() != draws(name="blue van")
+    everything = {a for name in range(20) for a in draws(name=str(name))}
+    assert everything == set(range(16))
+
+
+def test_how_likely_random_stops_can_be_set():
+    never = RandomAgent(stop_probability=0.0)
+    never.reset(goal())
+    assert 0 not in flown(never, 90)
+    always = RandomAgent(stop_probability=1.0)
+    always.reset(goal())
+    assert set(flown(always, 90)) == {0}
+
+
+def test_the_stop_agent_stops():
+    agent = StopAgent()
+    agent.reset(goal())
+    assert flown(agent, 1) == [0]
+
+
+class Seer:
+    """Depth by casting rays: no renderer, and no share in the explorer's code."""
+
+    def __init__(self, space):
+        self._caster = RayCaster(space.scene)
+        self._rays = EYES.camera.rays().reshape(-1, 3)
+
+    def look(self, episode, rgb=None):
+        depth = {}
+        for view in EYES.views:
+            pose = view_pose(episode.position, episode.yaw_rad, view)
+            along = self._caster.first_hit(pose[:3, 3], self._rays @ pose[:3, :3].T)[0]
+            planar = along / np.linalg.norm(self._rays, axis=1)
+            planar = np.where(planar <= EYES.max_depth_m, planar, 0.0).astype(np.float32)
+            depth[view] = planar.reshape(EYES.height, EYES.width)
+        return Observation(episode.n_actions, episode.remaining_actions, episode.refused, rgb or {}, depth)
+
+
+@pytest.fixture(scope="module")
+def village():
+    return FlightSpace(town(), 0.25)
+
+
+def test_the_map_knows_a_wall_from_the_open(village):
+    wall = instance("wall", box((5, -9, 0), (6, 9, 6)))
+    space = FlightSpace(scene(wall, half=12.0, ceiling=8.0), 0.25)
+    episode = Episode(space, (0.0, 0.0, 3.0, 0.0), (9.0, 0.0, 3.0), 90)
+    drawn = DepthMap(EYES)
+    for view, depth in Seer(space).look(episode).depth_m.items():
+        drawn.add(view, depth, 0.0, 0.0, 0.0)
+    occupied = np.argwhere(drawn._cells == 2)
+    x, y = drawn.point((occupied[:, 0], occupied[:, 1]))
+    assert x == pytest.approx(np.full(len(x), 5.0), abs=0.5), "the wall's face, and nothing else"
+    assert np.ptp(y) > 8.0
+    assert drawn._cells[drawn.cell(3.0, 0.0)] == 1
+    assert drawn._cells[drawn.cell(8.0, 0.0)] == 0, "nobody has seen what is behind it"
+    way = drawn.way_to_frontier(0.0, 0.0)
+    assert math.dist(way[-1], (0.0, 0.0)) > 2.0
+    assert max(px for px, _ in way) < 5.0 - 0.5
+    drawn.clear()
+    assert drawn.way_to_frontier(0.0, 0.0) == []
+
+
+def test_the_explorer_flies_on_and_touches_nothing(village):
+    seer, lengths = Seer(village), []
+    for k, start in enumerate([(0.0, -17.0, 2.0), (16.5, 16.5, 3.0), (-16.5, 0.0, 1.5)]):
+        if village.in_collision(start):
+            continue
+        episode = Episode(village, (*start, 0.7 * k), (50.0, 50.0, 2.0), 60)
+        agent = ExplorerAgent()
+        agent.reset(goal(60, sensors=EYES))
+        while episode.termination is None:
+            episode.step(agent.act(seer.look(episode)))
+        assert (episode.termination, episode.n_actions) == ("stop", 60), "the last action is a Stop"
+        x, y, _ = episode.position
+        heading = 0.7 * k
+        ahead = math.cos(heading) * (x - start[0]) + math.sin(heading) * (y - start[1])
+        left = -math.sin(heading) * (x - start[0]) + math.cos(heading) * (y - start[1])
+        assert (agent._x_m, agent._y_m) == pytest.approx((ahead, left), abs=1e-6), "it knows where it is"
+        lengths.append(episode.path_length_m)
+    assert len(lengths) >= 2
+    assert np.mean(lengths) > 15.0
+
+
+def test_the_explorer_stops_where_the_picture_fits(village):
+    picture = np.random.default_rng(0).integers(0, 255, (48, 48, 3)).astype(np.uint8)
+    other = np.random.default_rng(1).integers(0, 255, (48, 48, 3)).astype(np.uint8)
+    episode = Episode(village, (0.0, -17.0, 2.0, 0.0), (50.0, 50.0, 2.0), 60)
+    agent = ExplorerAgent()
+    agent.reset(goal(60, image=picture, sensors=EYES))
+    assert agent.act(Seer(village).look(episode, {"front": other})) != 0
+    assert agent.act(Seer(village).look(episode, {"front": picture})) == 0
+    assert (thumbnail(picture) ** 2).mean() == pytest.approx(1.0, abs=1e-3)
+
+
+def test_the_explorer_says_what_it_needs():
+    with pytest.raises(UsageError, match="front, left and right"):
+        ExplorerAgent().reset(goal(sensors=Sensors(("front",))))
+
+
+def test_an_agent_in_the_working_directory_is_found_and_takes_no_librarys_place(tmp_path):
+    """By a console script too, whose own folder is first on the path in place of the working directory."""
+    text = "class Mine:\n    def reset(self, goal): pass\n    def act(self, observation): return 0\n"
+    for name in ("mine", "numpy"):
+        (tmp_path / f"{name}.py").write_text(text)
+    code = (
+        "from aerialdojo_gen.benchmark.agents import load_agent\nfrom aerialdojo_gen.benchmark.flying_code import flying_code\n"
+        "before = flying_code('mine:Mine')\nprint(type(load_agent('mine:Mine')).__name__)\n"
+        "open('mine.py', 'a').write('x = 1')\nassert flying_code('mine:Mine') != before\n"
+        "load_agent('numpy:Mine')"
+    )
+    # -P: as a console script has it.
+    env = os.environ | {"PYTHONPATH": str(Path(aerialdojo_gen.__file__).parents[1])}
+    done = subprocess.run(
+        [sys.executable, "-P", "-c", code], cwd=tmp_path, env=env, capture_output=True, text=True, check=False
+    )
+    assert done.stdout == "Mine\n"
+    assert "module numpy has no Mine" in done.stderr

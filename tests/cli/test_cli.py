@@ -1,0 +1,131 @@
+"""The command line: quick help, one line and an exit code for what a user can get wrong."""
+
+import os
+import re
+import subprocess
+import sys
+
+import pytest
+import typer.main
+
+from aerialdojo_gen.base.errors import UsageError
+from aerialdojo_gen.base.names import choose_scenes
+from aerialdojo_gen.cli import app as cli
+from aerialdojo_gen.pipeline.registry import STAGES, upstream
+
+HEAVY = ("numpy", "pyarrow", "numba", "fcl", "pybullet", "trimesh", "cv2", "scipy", "av")
+
+
+def call(*args, **env):
+    command = [sys.executable, "-m", "aerialdojo_gen.cli.app", *args]
+    return subprocess.run(command, capture_output=True, text=True, env=os.environ | env, timeout=120, check=False)
+
+
+@pytest.mark.parametrize("args", [["--help"], ["plan", "--help"], ["render", "--help"]])
+def test_help_imports_nothing_heavy(args):
+    code = (
+        "import sys\nfrom aerialdojo_gen import cli\n"
+        f"try:\n    cli.app({args!r})\nexcept SystemExit: pass\n"
+        f"print([m for m in {HEAVY!r} if m in sys.modules])"
+    )
+    out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
+    assert "Usage" in out
+    assert out.strip().endswith("[]")
+
+
+def test_every_stage_has_a_command_with_the_common_options():
+    for one in STAGES:
+        text = call(one.name, "--help").stdout
+        assert one.help.split()[0] in text
+        for option in ("--data", "--scene", "--pipeline", "--workers", "--force", "--quiet"):
+            assert option in text, (one.name, option)
+
+
+def test_the_stages_commands_say_what_the_stages_say():
+    text = " ".join(call("--help", COLUMNS="200").stdout.split())
+    for one in STAGES:
+        assert f"{one.name} {one.help}" in text
+
+
+def test_the_commands_are_listed_by_purpose():
+    text = call("--help", COLUMNS="80").stdout
+    sections = dict(re.findall(r"^(\w[\w ]+):\n((?:  .*\n)+)", text, re.MULTILINE))
+    assert list(sections)[1:] == [
+        "Make a dataset", "Look at a dataset", "Evaluate and train agents", "Add your own scenes",
+        "Exchange and share",
+    ]  # fmt: skip
+    listed = {heading: re.findall(r"^  ([a-z][a-z-]*)  ", body, re.MULTILINE) for heading, body in sections.items()}
+    every = [name for names in listed.values() for name in names]
+    assert sorted(every) == sorted(typer.main.get_command(cli.app).commands)
+    # What is in no other section is there to make a dataset.
+    assert set(listed["Make a dataset"]) == {*(one.name for one in STAGES), "run", "status", "config"}
+
+
+def test_the_help_of_run_names_every_pipeline(project):
+    text = " ".join(call("run", "--help").stdout.split())
+    for file in (project / "pipelines").glob("*.toml"):
+        assert file.stem in text
+
+
+def assert_one_line(result, code, *words):
+    assert result.returncode == code
+    lines = result.stderr.splitlines()
+    # A run says below its error how to continue.
+    assert len(lines) == 1 + lines[-1].startswith("finished shards are kept"), result.stderr
+    assert result.stderr.startswith("error: ")
+    for word in words:
+        assert word in result.stderr
+
+
+def test_unknown_scene_gives_the_nearest_names(tmp_path):
+    result = call("plan", "--scene", "U_Mal_0", "--data", str(tmp_path / "d"))
+    assert_one_line(result, 2, "no scene 'U_Mal_0'", "U_Mall_0")
+    assert not (tmp_path / "d").exists()
+
+
+def test_unknown_key_in_a_pipeline(tmp_path):
+    path = tmp_path / "mine.toml"
+    path.write_text("[plan]\nwieght = 2\n")
+    assert_one_line(
+        call("run", str(path), "--data", str(tmp_path / "d")), 2, str(path), "[plan] unknown key 'wieght'"
+    )
+
+
+def test_unknown_stage_and_missing_folder(tmp_path):
+    path = tmp_path / "mine.toml"
+    path.write_text("stages = ['plann']\n")
+    assert_one_line(
+        call("run", str(path), "--data", str(tmp_path / "d")), 2, "no stage 'plann': did you mean 'plan'?"
+    )
+    path.write_text("recipes = 'nowhere'\n")
+    assert_one_line(call("run", str(path), "--data", str(tmp_path / "d")), 2, "nowhere", "set recipes")
+
+
+def test_data_directory_that_cannot_be_written(tmp_path):
+    blocked = tmp_path / "file"
+    blocked.write_text("")
+    assert_one_line(call("build-scenes", "--data", str(blocked / "data")), 1, "cannot write", "not a folder")
+
+
+def test_scene_patterns():
+    known = ["N_Forest_0", "U_Mall_0", "U_Mall_1"]
+    assert choose_scenes(["U_*"], known) == ["U_Mall_0", "U_Mall_1"]
+    assert choose_scenes(["U_Mall_1", "*_0"], known) == known
+    with pytest.raises(UsageError, match="no scene 'u_mall_0': did you mean 'U_Mall_0'"):
+        choose_scenes(["u_mall_0"], known)
+
+
+def test_upstream_of_each_stage_is_all_it_reads():
+    for one in STAGES:
+        chain = list(upstream(one.name))
+        assert chain[-1] is one
+        written = set()
+        for s in chain:
+            assert set(s.reads) <= written, (one.name, s.name)
+            written |= set(s.writes)
+
+
+def test_upstream_leaves_out_what_is_not_needed():
+    assert [s.name for s in upstream("plan")] == [
+        "build-scenes", "annotate-import", "anchor-sample", "pair-objects", "plan"
+    ]  # fmt: skip

@@ -1,0 +1,322 @@
+"""Files that would hang a command, fill the memory or end in a traceback: one line at the level of the user."""
+
+import json
+import subprocess
+import sys
+import tomllib
+
+import numpy as np
+import pytest
+from fuzzing.mutate import Raw, toml_dumped
+from shapely.geometry import Polygon
+from starlette.testclient import TestClient
+from support import annotating, rendered
+from support.annotating import AUTHOR, YARD
+
+from aerialdojo_gen.annotations.format import parse_annotations
+from aerialdojo_gen.base.config.pipeline import Pipeline
+from aerialdojo_gen.base.errors import AssetError
+from aerialdojo_gen.cli.common import open_pipeline
+from aerialdojo_gen.rendering import finished
+from aerialdojo_gen.rendering.codecs import PngWriter
+from aerialdojo_gen.rendering.reader import read_recording
+from aerialdojo_gen.scenes.catalogue import load_catalogue
+from aerialdojo_gen.scenes.glb import read_glb, write_glb
+from aerialdojo_gen.scenes.grammar_scatter import grid, poisson_disc
+from aerialdojo_gen.scenes.ground import disc
+from aerialdojo_gen.scenes.layouts.build import build_scene
+from aerialdojo_gen.scenes.model import Material, Scene
+from aerialdojo_gen.scenes.recipe import load_imported, load_recipe
+from aerialdojo_gen.scenes.terrain import rolling_terrain
+from aerialdojo_gen.store.root import open_root
+from aerialdojo_gen.studio.annotate.server import make_app
+from aerialdojo_gen.studio.annotate.session import open_desk
+
+COURT = {"layout": "courtyard", "size_m": [30, 30], "ceiling_m": 12, "parameters": {"things": []}}
+POST = {"name": "post", "roles": {"body": "#808080"}, "params": {"h": 2}}
+
+
+@pytest.mark.parametrize(
+    ("text", "place"),
+    [
+        ("a." * 50_000 + "a = 1", "line 1, column 130: a key of more than 64 parts"),
+        ("name = 'x'\nseed = " + "[" * 50_000, "line 2, column 72: nested more than 64 deep"),
+        ("name = 'x'\nseed = " + "7" * 5000, "line 2, column 8: a number of 5,000 digits"),
+        ("[render]\nwidth = 100000000", "[render] width = 100000000: Input should be less than or equal to 4096"),
+        ('scene_assets = "a\\u0000b"', "scene_assets: has a NUL character"),
+    ],
+)
+def test_a_command_names_the_place_in_a_pipeline_that_no_parser_survives(tmp_path, text, place):
+    path = tmp_path / "p.toml"
+    path.write_text(text)
+    command = [
+        sys.executable,
+        "-m",
+        "aerialdojo_gen.cli.app",
+        "plan",
+        "--pipeline",
+        str(path),
+        "--data",
+        str(tmp_path / "d"),
+    ]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (2, f"error: {path}: {place}\n")
+    assert not (tmp_path / "d").exists()
+
+
+def recipe(tmp_path, body):
+    path = tmp_path / "U_Court_0.toml"
+    path.write_text(toml_dumped(body))
+    return path
+
+
+@pytest.mark.parametrize(
+    ("change", "place"),
+    [
+        ({"size_m": [float("nan"), 30]}, "size_m[0]: is nan, no finite number"),
+        ({"sun": [0, 0, float("inf")]}, "sun[2]: is inf, no finite number"),
+        ({"size_m": [1e9, 30]}, "size_m.0 = 1000000000.0: Input should be less than or equal to 1000"),
+        ({"seed": 10**30}, "seed: is an integer beyond 64 bits"),
+        ({"seed": Raw("[" * 40_000)}, "nested more than 64 deep"),
+        ({"parameters": {"things": [], "walls": [[0, 0, 1e7, 0, 3]]}}, "parameters: walls.0.2 must lie within 2,000"),
+        ({"parameters": {"things": [0] * 1001}}, "parameters: things has 1,001 entries"),
+        ({"parameters": {"sign": "A" * 201}}, "parameters: sign has 201 characters"),
+    ],
+)
+def test_a_recipe_s_numbers_are_bounded_before_anything_is_made_of_them(tmp_path, change, place):
+    path = recipe(tmp_path, COURT | change)
+    with pytest.raises(AssetError) as refused:
+        load_recipe(path)
+    assert str(refused.value).startswith(str(path))
+    assert place in str(refused.value)
+
+
+def assert_named(message, start, place):
+    """A message names the key by its table and last keys, its value, and what is wrong with it."""
+    key, _, said = place.rpartition(": ")
+    assert message.startswith(start), message
+    assert key.replace(".", " ").split() == [k for k in key.replace(".", " ").split() if k in message], message
+    assert said in message, message
+
+
+@pytest.mark.parametrize(
+    ("drawing", "place"),
+    [
+        ({"roofs": [["nan", -6, 0, 0, 4]]}, "roofs.0.0: Input should be a valid number"),
+        ({"paths": [[0, 0, "inf", 9]]}, "paths.0.2: Input should be a valid number"),
+        ({"roofs": [[-6, False, 0, 0, 4]]}, "roofs.0.1: Input should be a valid number"),
+        (
+            {"roofs": [[-6, -1e-300, 0, 0, 4]]},
+            "roofs.0: a rectangle must be 0.05 m wide and deep or more",
+        ),
+        ({"roofs": [[-6, -6, 0, 0, 0.1]]}, "roofs.0.4: Input should be greater than or equal to 0.3"),
+        ({"walls": [[1, 1, 1, 1, 3]]}, "walls.0: points of a line must lie 0.05 m apart or more"),
+        (
+            {"things": [{"category": "bench", "at": [0, 0], "yaw": "inf"}]},
+            "things.0.yaw: Input should be a valid number",
+        ),
+    ],
+)
+def test_a_courtyard_s_walls_and_roofs_have_a_length_and_an_area(project, tmp_path, drawing, place):
+    things = {"things": [{"category": "bench", "at": [0, 0]}]}
+    path = recipe(tmp_path, COURT | {"parameters": things | drawing})
+    with pytest.raises(AssetError) as refused:
+        build_scene(path, load_catalogue(project / "scene_assets"))
+    assert_named(str(refused.value), f"{path}: parameters: ", place)
+
+
+@pytest.mark.parametrize(
+    ("layout", "parameters", "place"),
+    [
+        ("desert", {"tracks": [[[0, 0]]]}, "tracks.0: a line needs two points or more"),
+        ("desert", {"bed": [[0, 0], [5, 0], [5, 0]]}, "bed: points of a line must lie 0.05 m apart"),
+        ("desert", {"hills": [[0, 0, 0, 1]]}, "hills.0.2: Input should be greater than or equal to 0.1"),
+        ("desert", {"houses": [{"name": "a", "at": [0, 0], "size_m": [0.5, 5, 3]}]}, "houses.0.size_m.0: Input"),
+        ("desert", {"ground": "wash"}, "a wash needs the middle line of its bed"),
+        ("desert", {"steps": [[5, 5, 1]]}, "steps.0: a step ends 0.05 m or more beyond where it begins"),
+        ("mountain", {"ridges": [{"line": [], "width_m": 9}]}, "ridges.0.line: "),
+        ("mountain", {"ridges": [{"line": [[0, 0, -1]], "width_m": 9}]}, "ridges.0.line.0.2: Input should"),
+        ("mountain", {"ridges": [], "paths": [[[-2000, 0], [2000, 0]] * 2]}, "paths.0: a line may be 5,000 m long"),
+        ("snowfield", {"profile": []}, "profile: "),
+        ("snowfield", {"rink": {"at": [0, 0], "size_m": [6, 11]}}, "rink.size_m.0: Input should be greater"),
+        ("forest", {"birch_wood": {"creek": []}}, "birch_wood.creek: a line needs two points or more"),
+        ("park", {"furniture": [{"place": "", "things": [{"category": "bench", "at": [0, 0], "count": 1001}]}]},
+         "furniture.0.things.0.count: Input should be less than or equal to 1000"),
+    ],
+)  # fmt: skip
+def test_a_layout_s_lines_and_sizes_are_bounded_at_their_key(project, tmp_path, layout, parameters, place):
+    path = recipe(tmp_path, COURT | {"layout": layout, "parameters": parameters})
+    with pytest.raises(AssetError) as refused:
+        build_scene(path, load_catalogue(project / "scene_assets"))
+    assert_named(str(refused.value), f"{path}: parameters: ", place)
+
+
+@pytest.mark.parametrize(
+    ("parameters", "says"),
+    [
+        ({"houses": [{"name": "far", "at": [200, 100]}]}, "the ground about (200, 100) lies off the site"),
+        ({"rocks": [{"name": "far", "at": [200, 100], "radius_m": 4, "height_m": 3}]}, "rock_000 has no body"),
+        ({"groups": [{"name": "far", "at": [200, 100], "things": ["bench"]}]}, "'far' has no room for 'bench'"),
+        ({"groups": [{"name": "odd", "at": [0, 0], "things": ["bench @ 1-2 ."]}]}, "'bench @ 1-2 .' is no thing"),
+    ],
+)
+def test_what_a_layout_cannot_place_is_an_error_of_its_recipe(project, tmp_path, parameters, says):
+    path = recipe(tmp_path, COURT | {"layout": "desert", "parameters": parameters})
+    with pytest.raises(AssetError) as refused:
+        build_scene(path, load_catalogue(project / "scene_assets"))
+    assert str(refused.value).startswith(f"{path}: layout 'desert': ")
+    assert says in str(refused.value)
+
+
+def test_ground_stays_a_number_where_an_area_to_be_levelled_has_shrunk_to_nothing():
+    ground = rolling_terrain((20.0, 20.0), 2.0, 1, 1.0, 9.0)
+    assert ground.flattened(disc(0, 0, 1.0).buffer(-1.2), 0.5).heights_m.tolist() == ground.heights_m.tolist()
+    assert poisson_disc(Polygon(), 1.0, np.random.default_rng(0)) == grid(Polygon(), (1, 1), np.random.default_rng(0))
+
+
+def test_the_sun_of_an_imported_scene_stands_above_too(tmp_path):
+    body = {"source": "x", "source_sha256": "", "up": "z", "scale": 1, "ceiling_m": 9, "sun": [0, 0, 0]}
+    with pytest.raises(AssetError, match="the sun must stand above the horizon"):
+        load_imported(recipe(tmp_path, {"imported": body}))
+
+
+@pytest.mark.parametrize(
+    ("part", "place"),
+    [
+        ({"shape": "cylinder", "radius": 1, "height": 1, "segments": 100_000_000}, "segments must be 3 to 256"),
+        ({"shape": "cylinder", "radius": 1, "height": 1, "segments": "h*1e9"}, "segments must be 3 to 256"),
+        ({"shape": "torus", "radius": 1, "tube": 0.1, "sides": 1e16}, "sides must be 3 to 64"),
+        ({"shape": "sphere", "radius": 1, "subdivisions": 1e6}, "subdivisions must be 0 to 4"),
+        ({"shape": "sphere", "radius": 1, "subdivisions": 1e6, "half": True}, "subdivisions must be 0 to 4"),
+        ({"shape": "sweep", "path": [[0, 0, 0], [0, 0, 1]], "radius": 1, "sides": "1e15"}, "sides must be 3 to 64"),
+        ({"shape": "lathe", "points": [[1, 0]] * 2001}, "points must be 2 to 2,000 points"),
+        ({"shape": "box", "size": [1, 1, 1e300]}, "size must lie within 10,000"),
+        ({"shape": "box", "size": [1, 1, True]}, "size must be a number"),
+        ({"shape": "box", "size": [1, [1], 1]}, "size must be a number"),
+        ({"shape": "box", "size": {"x": 1}}, "is neither a number nor an expression"),
+        ({"shape": "box", "size": ["1/0", 1, 1]}, "division by zero"),
+        ({"shape": "box", "size": ["min(1)", 1, 1]}, "min does not take 1 arguments"),
+        ({"shape": "box", "size": ["1e308*10", 1, 1]}, "is inf, no finite number"),
+        ({"shape": "box", "size": ["-" * 1500 + "1", 1, 1]}, "has 1,501 characters"),
+        ({"shape": "box", "size": [1, 1, 1],
+          "array": {"count": 2000, "step": [1, 0, 0], "count2": 2000, "step2": [0, 1, 0]}},
+         "count 2000 makes 48,000,000 triangles"),
+        ({"shape": "box", "size": [1, 1, 1], "ring": {"count": 1e300}}, "count must lie within 10,000"),
+        ({"shape": "text", "text": "A" * 121, "height": 1}, "has 121 letters"),
+        ({"shape": "text", "text": 5, "height": 1}, "text must be letters"),
+        ({"shape": ["box"]}, "unknown shape"),
+        ({"shape": "box", "size": [1, 1, 1], "tag": [3]}, "tag must be a word"),
+        ({"shape": "box", "size": [1e-9, 1e-9, 1e-9]}, "no triangle of variant '' has an area"),
+    ],
+)  # fmt: skip
+def test_a_prop_s_counts_are_bounded_before_anything_is_made_of_them(tmp_path, part, place):
+    (tmp_path / "props").mkdir()
+    (tmp_path / "materials.toml").write_text("")
+    path = tmp_path / "props" / "x.toml"
+    path.write_text(toml_dumped({"post": POST | {"parts": [{"role": "body"} | part]}}))
+    with pytest.raises(AssetError) as refused:
+        load_catalogue(tmp_path).instantiate("post", "post_000", np.random.default_rng(0))
+    assert str(refused.value).startswith(f"{path}: [post]")
+    assert place in str(refused.value)
+
+
+def test_every_recipe_and_prop_of_ours_lies_within_the_bounds(project):
+    for path in sorted((project / "scene_assets" / "scenes").glob("*.toml")):
+        load_recipe(path)
+        things = tomllib.loads(path.read_text())["parameters"]
+        assert things or path
+    assert load_catalogue(project / "scene_assets").targets
+    Pipeline()
+
+
+def test_annotations_with_half_characters_are_refused_by_the_server_and_never_shown(project, tmp_path):
+    pipeline, roots = open_pipeline(annotating.yard_pipeline(project, tmp_path), tmp_path / "data")
+    desk = open_desk(YARD, pipeline, roots)
+    client = TestClient(make_app(desk), base_url="http://127.0.0.1", raise_server_exceptions=False)
+    good = desk.storage.path.read_text()
+    version = client.get("/api/document").json()["version"]
+    bad = good.replace('"name": "', '"name": "\\ud800', 1)
+    source = parse_annotations(bad)
+    assert [str(f) for f in source.faults] == [
+        f"line {source.faults[0].line}: landmarks[0].name: \\ud800 is half of a surrogate pair: no character"
+    ]
+    assert '"name"' in bad.splitlines()[source.faults[0].line - 1]
+    headers = {"If-Match": version}
+    for text in (bad, "[" * 50_000, '{"version": ' + "1" * 5000 + "}"):
+        answer = client.post("/api/import", json=AUTHOR | {"text": text}, headers=headers)
+        assert answer.status_code == 400, answer.text
+        assert "the file: " in answer.json()["error"]
+    for body in (
+        b'{"\\ud800": 1}',
+        b'{"who": "\\udfff", "text": ""}',
+        b"[" * 50_000,
+        b'{"text": ' + b"1" * 5000 + b"}",
+    ):
+        answer = client.post("/api/import", content=body, headers=headers | {"content-type": "application/json"})
+        assert 400 <= answer.status_code < 500, answer.text
+        assert answer.json()["error"]
+    assert desk.storage.path.read_text() == good
+    desk.storage.path.write_text(bad)
+    answer = client.get("/api/document")
+    assert answer.status_code == 400
+    assert "half of a surrogate pair" in answer.json()["error"]
+    desk.anchors.close()
+
+
+FINGERPRINT = "f" * 64
+ROW = {
+    "scene": "U_A_0", "nav_id": "n", "view": "front", "modality": "rgb", "path": "media/U_A_0/n/front_rgb.mp4",
+    "stream": 0, "left_px": 0, "top_px": 0, "depth_step": None,
+    "sampling": "steps", "n_frames": 1, "fps": 15.0, "width": 16, "height": 16, "fov_deg": 90.0, "codec": "h264",
+    "renderer": "gl", "device": "x", "bytes": 4, "sha256": "0" * 64, "ok": True, "flags": [],
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    "rows",
+    [
+        [], {}, "x", [1], [[]], [{}], [ROW | {"more": 1}],
+        [{k: v for k, v in ROW.items() if k != "fps"}],
+        [ROW | {"bytes": "4"}], [ROW | {"bytes": 4.5}], [ROW | {"width": 10**30}],
+        [ROW | {"flags": 5}],
+        [ROW | {"ok": None}],
+        [ROW | {"path": "../../front_rgb.mp4"}], [ROW | {"path": "media/U_A_0/n/.."}], [ROW | {"path": 5}],
+        [ROW, ROW],
+        [ROW | {"device": "\ud800"}], [ROW | {"view": ["front"]}],
+    ],
+)  # fmt: skip
+def test_a_recording_json_of_other_types_is_rendered_again(tmp_path, rows):
+    folder = tmp_path / "media" / "U_A_0" / "n"
+    folder.mkdir(parents=True)
+    (folder / "front_rgb.mp4").write_bytes(b"xxxx")
+    note = folder / "recording.json"
+    note.write_text(json.dumps({"fingerprint": FINGERPRINT, "recordings": [ROW]}))
+    assert finished.find(open_root(tmp_path), "media/U_A_0/n", FINGERPRINT) == [ROW]
+    note.write_text(json.dumps({"fingerprint": FINGERPRINT, "recordings": rows}))
+    assert finished.find(open_root(tmp_path), "media/U_A_0/n", FINGERPRINT) is None
+    for text in ("[" * 50_000, "[]", '"x"', "1" * 5000, '{"fingerprint": NaN}'):
+        note.write_text(text)
+        assert finished.find(open_root(tmp_path), "media/U_A_0/n", FINGERPRINT) is None
+
+
+def test_a_recording_is_read_by_its_path_as_text(tmp_path):
+    for modality in ("rgb", "depth"):
+        shape = (16, 16, 3) if modality == "rgb" else (16, 16)
+        with PngWriter(tmp_path / f"front_{modality}", modality, comment='{"fov_deg": 90.0}') as writer:
+            writer.write({modality: np.full(shape, 7, np.uint8 if modality == "rgb" else np.uint16)})
+    for path in (tmp_path, str(tmp_path)):
+        recording = read_recording(path)
+        assert recording.cameras == {"front": {"fov_deg": 90.0}}
+        assert recording.rgb["front"][0].shape == (16, 16, 3)
+
+
+def test_a_texture_that_asks_for_far_more_pixels_than_bytes_is_not_decoded(tmp_path):
+    wide = Material("grass", (90, 130, 70), np.zeros((2, 5000, 3), np.uint8), 2.0)
+    scene = rendered.courtyard()
+    path = tmp_path / "x.glb"
+    write_glb(scene, path)
+    assert len(read_glb(path).instances) == len(scene.instances)
+    write_glb(Scene(scene.name, scene.instances, scene.materials | {"grass": wide}, scene.bounds), path)
+    with pytest.raises(AssetError, match="is no scene file of this program or is damaged") as refused:
+        read_glb(path)
+    assert "texture is too large" in str(refused.value.__cause__)

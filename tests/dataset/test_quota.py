@@ -1,0 +1,221 @@
+"""Quotas: the paper's numbers to the integer, chosen by the tasks' own ids, or a word on what is lacking."""
+
+import json
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from aerialdojo_gen.base.errors import PoolError
+from aerialdojo_gen.base.paper_figures import inventory, splits
+from aerialdojo_gen.cli.common import open_pipeline, run_until
+from aerialdojo_gen.pipeline.stages.work.candidate_pool import pool_lines, pool_of, require_pools
+from aerialdojo_gen.pipeline.stages.work.quota import apportion, choose, difficulty_steps, train_quotas
+from aerialdojo_gen.pipeline.stages.work.task_ids import held_out, key_of, reference_id
+from aerialdojo_gen.store import schemas
+from aerialdojo_gen.store import shards as store
+from aerialdojo_gen.studio.annotate.drafting import draft_scene
+
+ROOT = Path(__file__).resolve().parents[2]
+SETTINGS = {"base": (5.0, 30.0), "standard": (30.0, 60.0), "long_horizon": (60.0, 100.0)}
+
+
+def test_the_paper_has_what_its_text_says():
+    rows = inventory().values()
+    assert len(rows) == 42
+    assert sum(row.landmarks for row in rows) == 109
+    assert sum(row.objects for row in rows) == 2099
+    assert sum(sum(row.tasks.values()) for row in rows) == 102_866
+    assert sum(row.path_m for row in rows) == pytest.approx(4_115_313, abs=500)
+
+
+def test_every_cell_of_the_papers_splits_is_met():
+    for (partition, subset), cells in splits().items():
+        scenes = [row for row in inventory().values() if (row.scene.endswith("_1")) == (partition == "OOD")]
+        for setting, n in cells.items():
+            trains = sum(train_quotas(row.scene, inventory(), splits())[setting] for row in scenes)
+            every = sum(row.tasks[setting] for row in scenes)
+            assert (trains if subset == "train" else every - trains) == n
+    for row in inventory().values():
+        share = 0.2 if row.scene.endswith("_1") else 0.8
+        for setting, n in train_quotas(row.scene, inventory(), splits()).items():
+            assert abs(n - share * row.tasks[setting]) < 1 + 0.01 * row.tasks[setting], (row.scene, setting)
+
+
+@given(
+    st.dictionaries(st.text("abc", min_size=1, max_size=4), st.integers(0, 500), min_size=1, max_size=12),
+    st.floats(0, 1),
+)
+def test_shares_are_whole_fair_and_sum_up(sizes, part):
+    total = int(part * sum(sizes.values()))
+    shares = apportion(total, sizes)
+    assert sum(shares.values()) == total
+    for name, size in sizes.items():
+        assert 0 <= shares[name] <= size
+        assert abs(shares[name] - total * size / max(sum(sizes.values()), 1)) < 1
+
+
+def pool(n, seed):
+    rng = np.random.default_rng(seed)
+    settings = rng.choice(list(SETTINGS), size=n)
+    lengths = np.array([rng.uniform(*SETTINGS[s]) for s in settings])
+    return [f"U_Test_0-{k:012x}" for k in rng.permutation(n)], settings.tolist(), lengths
+
+
+@settings(deadline=None, max_examples=30)
+@given(st.integers(0, 1000), st.floats(0.85, 1.15))
+def test_a_choice_has_the_numbers_and_the_metres(seed, longer):
+    ids, setting, lengths = pool(1500, seed)
+    wanted = {"base": 200, "standard": 150, "long_horizon": 40}
+    plain = sum(n * (SETTINGS[s][0] + SETTINGS[s][1]) / 2 for s, n in wanted.items())
+    mask = choose(ids, setting, lengths, wanted, longer * plain, seed)
+    assert {s: sum(m and t == s for m, t in zip(mask, setting, strict=True)) for s in wanted} == wanted
+    assert lengths[mask].sum() == pytest.approx(longer * plain, rel=0.01)
+    order = np.random.default_rng(seed).permutation(len(ids))
+    again = choose([ids[k] for k in order], [setting[k] for k in order], lengths[order], wanted, longer * plain, seed)
+    assert {ids[k] for k in np.flatnonzero(mask)} == {ids[order[k]] for k in np.flatnonzero(again)}
+
+
+def test_a_length_out_of_reach_takes_the_nearest():
+    ids, setting, lengths = pool(300, 3)
+    wanted = {"base": 40}
+    bases = np.sort(lengths[np.asarray(setting) == "base"])
+    least = lengths[choose(ids, setting, lengths, wanted, 1.0, 0)].sum()
+    most = lengths[choose(ids, setting, lengths, wanted, 1e9, 0)].sum()
+    assert least == pytest.approx(bases[:40].sum(), rel=0.02)
+    assert most == pytest.approx(bases[-40:].sum(), rel=0.02)
+
+
+def test_another_seed_releases_other_tasks():
+    ids, setting, lengths = pool(300, 3)
+    chosen = {choose(ids, setting, lengths, {"base": 40}, 700.0, seed).tobytes() for seed in range(4)}
+    assert len(chosen) == 4
+
+
+@settings(deadline=None, max_examples=25)
+@given(st.integers(0, 1000), st.floats(0.9, 1.1), st.sampled_from([0.5, 2.0, 5.0, 50.0]))
+def test_harder_tasks_are_preferred_and_numbers_and_metres_hold(seed, longer, preference):
+    ids, setting, lengths = pool(1500, seed)
+    rng = np.random.default_rng(seed)
+    steps = difficulty_steps(rng.choice([1.0, 1.2], 1500), rng.choice([0.0, 0.4], 1500))
+    assert set(steps.tolist()) == {0, 1, 2}
+    wanted = {"base": 150, "standard": 120, "long_horizon": 40}
+    path_m = longer * sum(n * (SETTINGS[s][0] + SETTINGS[s][1]) / 2 for s, n in wanted.items())
+    plain = choose(ids, setting, lengths, wanted, path_m, seed)
+    mask = choose(ids, setting, lengths, wanted, path_m, seed, steps, preference)
+    assert {s: sum(m and t == s for m, t in zip(mask, setting, strict=True)) for s in wanted} == wanted
+    assert lengths[mask].sum() == pytest.approx(path_m, rel=0.01)
+    assert steps[mask].sum() > steps[plain].sum()
+    # Equal steps are no preference, and the order of rows is none either.
+    assert (choose(ids, setting, lengths, wanted, path_m, seed, np.ones(1500, np.int64), preference) == plain).all()
+    order = rng.permutation(1500)
+    again = choose(
+        [ids[k] for k in order], [setting[k] for k in order], lengths[order], wanted, path_m, seed, steps[order],
+        preference,
+    )  # fmt: skip
+    assert {ids[k] for k in np.flatnonzero(mask)} == {ids[order[k]] for k in np.flatnonzero(again)}
+
+
+def test_where_all_candidates_are_wanted_nothing_is_preferred():
+    ids, setting, lengths = pool(300, 5)
+    wanted = {s: setting.count(s) for s in SETTINGS}
+    assert choose(ids, setting, lengths, wanted, 1.0, 0, np.arange(300) % 3, 50.0).all()
+
+
+def test_what_is_not_known_is_not_hard():
+    known = difficulty_steps(np.array([1.04, 1.05, np.nan, np.nan]), np.array([0.01, 0.0, 0.0, np.nan]))
+    assert known.tolist() == [0, 2, 1, 0]
+
+
+@given(st.sets(st.integers(0, 10_000), max_size=80), st.floats(0, 1), st.integers(0, 5))
+def test_held_out_objects_are_a_share_of_their_scene_by_the_salt(objects, fraction, salt):
+    key = key_of(f"salt number {salt:04}", 0)
+    out = held_out("U_Test_0", sorted(objects), fraction, key)
+    assert out <= objects
+    assert len(out) == int(fraction * len(objects) + 0.5)
+    assert held_out("U_Test_0", sorted(objects, reverse=True), fraction, key) == out
+    assert out <= held_out("U_Test_0", sorted(objects), 1.0, key) == objects
+
+
+def test_another_salt_or_scene_holds_out_other_objects():
+    sets = [
+        held_out(scene, range(200), 0.2, key_of(salt, 0))
+        for scene in ("U_A_0", "U_B_0") for salt in ("a salt of one's own", "another of one's own")
+    ]  # fmt: skip
+    assert all(len(out) == 40 for out in sets)
+    assert len({frozenset(out) for out in sets}) == 4
+
+
+def test_the_ids_of_pictures_do_not_tell_which_objects_are_held_out():
+    key = key_of("a salt of one's own", 0)
+    by_id = sorted(range(200), key=lambda k: reference_id("U_A_0", k, key))
+    # By chance a fifth of the 40 that come first.
+    assert len(held_out("U_A_0", range(200), 0.2, key) & set(by_id[:40])) < 20
+
+
+def verdicts(data, scene, kept):
+    rows = []
+    for setting, n in kept.items():
+        low, high = SETTINGS[setting]
+        for k in range(n):
+            length = low + (high - low) * (k + 0.5) / n
+            rows.append(
+                {
+                    "scene": scene,
+                    "pair_id": f"{setting}_{k:05}",
+                    "euclidean_m": length / 1.1,
+                    "length_m": length,
+                    "detour_ratio": 1.1,
+                    "n_actions": 9,
+                    "keep": True,
+                    "reason": "kept",
+                    "setting": setting,
+                    "action_budget": 90,
+                }
+            )
+    rows.sort(key=lambda row: row["pair_id"])
+    table = pa.Table.from_pylist(rows, schema=schemas.VERDICTS.schema)
+    store.write_shard(data, "verdicts", scene, 0, table)
+
+
+def test_a_pool_that_is_too_small_is_named_and_nothing_else(tmp_path):
+    verdicts(tmp_path, "D_Flood_1", {"base": 150, "standard": 94, "long_horizon": 5})
+    verdicts(tmp_path, "U_Park_0", {"base": 173, "standard": 45, "long_horizon": 3})
+    with pytest.raises(PoolError) as error:
+        require_pools(tmp_path, ["D_Flood_1", "U_Park_0"])
+    lines = str(error.value).splitlines()
+    assert lines[0] == "D_Flood_1: 1 standard tasks short: 94 are kept, the paper has 95"
+    assert len(lines) == 2
+    assert "nothing is released" in lines[1]
+    require_pools(tmp_path, ["U_Park_0"])
+    shown = pool_lines([pool_of(tmp_path, name) for name in ("D_Flood_1", "U_Park_0")])
+    assert "94/95!" in shown[2]
+    assert "173/173 " in shown[3]
+
+
+@pytest.mark.pipeline
+def test_split_writes_nothing_where_a_pool_is_too_small(tmp_path):
+    project = tmp_path / "project"
+    (project / "scenes").mkdir(parents=True)
+    (project / "annotations").mkdir()
+    shutil.copy(ROOT / "scene_assets" / "smoke" / "U_Courtyard_0.toml", project / "scenes" / "D_Flood_1.toml")
+    assets = json.dumps(str(ROOT / "scene_assets"))
+    (project / "pipeline.toml").write_text(
+        f'name = "short"\nscene_assets = {assets}\nrecipes = "scenes"\nannotations = "annotations"\n'
+        "[split]\npaper_counts = true\n"
+    )
+    data = tmp_path / "data"
+    pipeline, roots = open_pipeline(project / "pipeline.toml", data)
+    source = json.loads((ROOT / "annotations" / "smoke" / "U_Courtyard_0.json").read_text())
+    draft_scene(
+        "D_Flood_1", pipeline, roots, n_objects=4, landmarks=tuple(entry["node"] for entry in source["landmarks"]),
+        n_landmarks=len(source["landmarks"]),
+    )  # fmt: skip
+    with pytest.raises(PoolError, match=r"D_Flood_1: \d+ base tasks short"):
+        run_until("split", data=data, pipeline=project / "pipeline.toml", workers=1, quiet=True)
+    assert store.shards(data, "verdicts", "D_Flood_1")
+    assert not (data / "release").exists()

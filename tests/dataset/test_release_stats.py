@@ -1,0 +1,349 @@
+"""`stats`: our figures beside the paper's in three forms, and figures that show what the release holds."""
+
+import csv
+import io
+import subprocess
+import sys
+import xml.etree.ElementTree as ET
+from dataclasses import replace
+
+import cv2
+import numpy as np
+import pandas as pd
+import pytest
+
+from aerialdojo_gen.base.paper_figures import inventory, splits
+from aerialdojo_gen.dataset.contents import check_release
+from aerialdojo_gen.dataset.stats.comparison import as_csv, as_markdown
+from aerialdojo_gen.dataset.stats.difficulty import (
+    Tasks,
+    difficulty_tables,
+    held_out_table,
+    read_tasks,
+    scene_table,
+    seen_table,
+    setting_table,
+)
+from aerialdojo_gen.dataset.stats.figures import draw_figures
+from aerialdojo_gen.dataset.stats.figures.charts import composition
+from aerialdojo_gen.dataset.stats.figures.maps import _round_length
+from aerialdojo_gen.dataset.stats.figures.style import SETTING_COLOURS, read_routes
+from aerialdojo_gen.dataset.stats.quality import flight_table, goal_table, read_flights, read_goals, worth_tables
+from aerialdojo_gen.dataset.stats.tables import Made, benchmark_table, in_paper_order, made_of, tables
+from aerialdojo_gen.pipeline.stages.work.quota import train_quotas
+from aerialdojo_gen.store import schemas
+
+
+def as_the_paper(name, **changes):
+    """A scene that holds just what the paper's has."""
+    paper = inventory()[name]
+    trains = train_quotas(name, inventory(), splits())
+    tasks = {("train", s): n for s, n in trains.items()}
+    tasks |= {("test", s): paper.tasks[s] - n for s, n in trains.items()}
+    made = {
+        "scene": name, "family": schemas.FAMILIES[name[0]], "scene_type": name.split("_")[1],
+        "landmarks": paper.landmarks, "objects": paper.objects, "categories": frozenset({"van"}), "tasks": tasks,
+        "path_m": paper.path_m, "paper": paper, "anchors": paper.objects,
+    }  # fmt: skip
+    return Made(**(made | changes))
+
+
+@pytest.fixture(scope="module")
+def papers():
+    return in_paper_order([as_the_paper(name) for name in sorted(inventory())])
+
+
+def test_what_is_the_papers_is_said_to_be(papers):
+    for table in tables(papers)[1:4]:
+        assert table.unlike == 0
+        assert table.terminal()[-1] == f"All {table.compared} counts are the paper's."
+    assert [table.compared for table in tables(papers)] == [0, 5 * 9, 43 * 6, 5 * 4, 0, 0]
+
+
+def test_the_tables_of_42_scenes_fit_a_terminal(papers):
+    for table in tables(papers):
+        lines = table.terminal()
+        # The paper's Table 2 is the widest.
+        assert max(map(len, lines)) <= (115 if table.key == "family" else 100)
+        assert max(map(len, table.terminal(80))) <= 80
+    scenes = tables(papers)[2].terminal()
+    assert len(scenes) == 3 + 42 + 1 + 1
+    assert [line.split()[0] for line in scenes[3:45]] == list(inventory())
+    # Numbers stand flush right below their headings.
+    ends = {line.rstrip().rfind(line.split()[-1]) + len(line.split()[-1]) for line in scenes[1:2] + scenes[3:46]}
+    assert len(ends) == 1
+
+
+def test_totals_are_the_papers_own(papers):
+    total = {row.name: row.ours[0] for row in tables(papers)[0].rows}
+    assert total["scenes"] == 42
+    assert total["scene types"] == 21
+    assert total["landmarks"] == 109
+    assert total["objects"] == 2099
+    assert total["instances"] == 205_732
+    assert total["navigation tasks"] == 102_866
+    assert total["instances, base"] + total["instances, standard"] + total["instances, long-horizon"] == 205_732
+    by_split = {row.name: row.ours[-1] for row in tables(papers)[3].rows}
+    assert by_split == {
+        "ID train": 113_642, "ID test": 28_452, "OOD train": 12_712, "OOD test": 50_926, "all": 205_732
+    }  # fmt: skip
+
+
+def test_what_is_not_the_papers_is_shown_with_the_papers_below(papers):
+    wrong = as_the_paper("U_Park_0")
+    wrong = as_the_paper("U_Park_0", objects=13, tasks=wrong.tasks | {("test", "base"): 0})
+    table = tables(in_paper_order([wrong]))[2]
+    lines = table.terminal()
+    assert lines[3].split()[:3] == ["U_Park_0", "2", "13"]
+    assert lines[4].split() == ["in", "the", "paper", "14", "346", "442"]
+    assert lines[4].rfind("442") == lines[3].rfind(f"{wrong.instances}")
+    assert lines[-1] == "6 of 12 counts are not the paper's."
+    assert "| 13 (paper: 14) |" in as_markdown([table])
+
+
+def test_shares_and_lengths_are_those_of_the_appendix(papers):
+    shares = {row.name: (row.ours[0], row.paper[0]) for row in tables(papers)[4].rows}
+    assert len(shares) == 12
+    # The paper prints two digits; a release of its counts has its shares to half of the last one.
+    for name, (ours, paper) in shares.items():
+        assert ours == pytest.approx(paper, abs=0.0051), name
+    assert shares["malls"][1] == 28.82
+    lengths = {row.name: row.ours[0] for row in tables(papers)[5].rows}
+    # Table 2: 2,607.253 km of 125,064 instances, two a route.
+    assert lengths["Urban"] == pytest.approx(2_607_253 / 62_532)
+    assert list(lengths) == ["Urban", "Natural", "Infrastructure", "Disaster", "all"]
+
+
+def test_types_and_anchors_are_those_of_table_2(papers):
+    table = tables(papers)[1]
+    columns = [column.name for column in table.columns]
+    urban = dict(zip(columns, table.rows[0].ours, strict=True))
+    assert (urban["types"], urban["scenes"], urban["anchors"]) == (9, 18, 1030)
+    some = tables([m for m in papers if m.scene != "U_Mall_0"])[1]
+    assert (some.rows[0].paper[0], some.rows[1].paper[0]) == (None, 6)
+
+
+def test_the_release_stands_below_the_benchmarks_of_table_1(papers):
+    table = benchmark_table(papers)
+    assert [row[0] for row in table.rows] == [
+        "AerialVLN", "CityNav", "OpenUAV", "OpenFly", "UAV-ON", "CityAVOS", "AerialDojo-200K", "this release"
+    ]  # fmt: skip
+    assert table.rows[-1] == (
+        "this release",
+        "",
+        "OGS",
+        "4",
+        "instance",
+        "semantic or image",
+        "205,732",
+        "U N I D",
+        "42",
+    )
+    lines = table.terminal()
+    assert max(map(len, lines)) <= 100
+    assert table.markdown()[4] == "| AerialVLN | 2023 | VLN | 4 | location | movement instruction | 25.3K | U | 25 |"
+    assert len(table.records()) == 8 * 8
+
+
+def test_csv_has_every_figure_once_and_to_the_last_digit(papers):
+    made = tables(papers)
+    records = list(csv.DictReader(io.StringIO(as_csv(made))))
+    assert len(records) == sum(len(t.rows) * len(t.columns) for t in made)
+    keys = {(r["table"], r["row"], r["column"]) for r in records}
+    assert len(keys) == len(records)
+    ours = {(r["table"].split()[0], r["row"], r["column"]): r["ours"] for r in records}
+    for name, paper in inventory().items():
+        assert int(ours["Scenes", name, "instances"]) == 2 * sum(paper.tasks.values())
+        assert float(ours["Scenes", name, "km"]) == paper.path_m / 1000
+
+
+def test_markdown_tables_are_regular(papers):
+    for block in as_markdown(tables(papers)).split("### ")[1:]:
+        widths = {line.count("|") for line in block.splitlines() if line.startswith("|")}
+        assert len(widths) == 1
+
+
+def test_scenes_that_the_paper_lacks_have_no_papers_figures(smoke):
+    made = [made_of(smoke, name) for name in check_release(smoke)]
+    for table in tables(made):
+        assert table.compared == 0
+        assert not any("paper" in line for line in table.terminal())
+    names = [row.name for row in tables(made)[1].rows]
+    assert names == ["Urban", "all"]
+    total = {row.name: row.ours[0] for row in tables(made)[0].rows}
+    assert total["instances"] == sum(m.instances for m in made) > 0
+
+
+def test_a_release_of_other_numbers_is_not_held_to_the_papers(papers):
+    for table in (*tables([replace(m, paper=None) for m in papers]),):
+        assert table.compared == 0
+        assert not any("paper" in line for line in [*table.terminal(), *table.markdown()])
+
+
+@pytest.fixture(scope="module")
+def frame(smoke):
+    """Routes beside their tasks, by pandas alone."""
+    routes, tasks = (pd.concat(pd.read_parquet(p) for p in sorted((smoke / "release" / t).glob("*/*.parquet")))
+                     for t in ("routes", "tasks"))  # fmt: skip
+    return routes.merge(tasks[tasks["modality"] == "image"], on=["nav_id", "scene", "setting"])
+
+
+def test_difficulty_is_what_pandas_makes_of_the_tables(smoke, frame):
+    tasks = read_tasks(smoke, check_release(smoke))
+    by_scene = {row.name: row.ours for row in scene_table(tasks).rows}
+    for scene in (*check_release(smoke), "all"):
+        own = frame if scene == "all" else frame[frame["scene"] == scene]
+        assert by_scene[scene] == pytest.approx((
+            len(own), own["plan_detour"].median(), own["plan_detour"].quantile(0.9),
+            100 * (own["plan_detour"] < 1.05).mean(), 100 * own["straight_line_free"].mean(),
+            100 * (own["target_visible_at_start"] > 0).mean(), own["climb_m"].median(),
+        ))  # fmt: skip
+    assert by_scene["all"][0] == len(frame)
+    settings = {row.name: row.ours for row in setting_table(tasks).rows}
+    assert settings["base"][0] == (frame["setting"] == "base").sum()
+
+
+def test_splits_are_what_pandas_makes_of_the_tables(smoke, frame):
+    tasks = read_tasks(smoke, check_release(smoke))
+    test = frame[frame["subset"] == "test"]
+    new = ~test["target_seen_in_train"], ~test["start_seen_in_train"]
+    seen = {row.name: row.ours for row in seen_table(tasks).rows}["all"]
+    assert seen == pytest.approx((
+        len(test), new[0].sum(), 100 * new[0].mean(), new[1].sum(), 100 * new[1].mean(), (new[0] & new[1]).sum(),
+    ))  # fmt: skip
+    held = {row.name: row.ours for row in held_out_table(tasks).rows}
+    for partition in ("ID", "OOD"):
+        for side in ("train", "test"):
+            own = frame[(frame["partition"] == partition) & (frame["target_split"] == side)]
+            assert held[f"{partition} {side}"][0] == len(own) > 0
+            assert held[f"{partition} {side}"][4:6] == (own["target_held_out"].sum(), own["start_held_out"].sum())
+            assert side == "test" or not own["target_held_out"].any()
+
+
+def test_what_goals_show_is_what_pandas_makes_of_the_tables(smoke):
+    release = smoke / "release"
+    anchors, objects = (pd.concat(pd.read_parquet(p) for p in sorted((release / t).glob("*.parquet")))
+                        for t in ("anchors", "objects"))  # fmt: skip
+    goals = anchors[anchors["selected"]]
+    fronts, told = goals["off_front_rad"].dropna(), objects["tells_shown"].dropna()
+    table = goal_table(read_goals(smoke, check_release(smoke)))
+    assert table.rows[-1].ours == pytest.approx((
+        len(objects), len(fronts), 100 * (fronts <= np.radians(60.0)).mean(), 100 * (told == 1.0).mean(),
+        100 * goals["part_unoccluded"].mean(), 100 * goals["part_framed"].mean(), objects["step_back_m"].median(),
+    ))  # fmt: skip
+    assert sum(row.ours[0] for row in table.rows[:-1]) == len(objects)
+
+
+def test_how_routes_fly_is_what_a_loop_over_their_actions_makes(smoke, frame):
+    table = flight_table(read_flights(smoke, check_release(smoke)))
+    turns = ahead = sideways = 0
+    for actions in frame["action"]:
+        names = [schemas.ACTION_NAMES[a] for a in actions]
+        metres = [0 if n.startswith(("Turn", "Stop")) else 1.0 if n == "Approach" else float(n[-1]) for n in names]
+        flown = [0.0 if name == "Approach" else m for name, m in zip(names, metres, strict=True)]
+        for k, name in enumerate(names):
+            turns += name.startswith("Turn")
+            if sum(flown[k + 1 :]) >= 3.0:
+                ahead += metres[k] * name.startswith("MoveForward")
+                sideways += metres[k] * name.startswith(("MoveLeft", "MoveRight"))
+    n_actions = frame["action"].map(len)
+    assert table.rows[-1].ours == pytest.approx((
+        len(frame), frame["min_clearance_m"].median(), frame["min_clearance_m"].quantile(0.1), n_actions.median(),
+        100 * turns / n_actions.sum(), 100 * sideways / (ahead + sideways),
+    ))  # fmt: skip
+    assert max(len(line) for t in worth_tables(smoke, check_release(smoke)) for line in t.terminal(80)) <= 80
+
+
+def test_tables_of_difficulty_fit_a_terminal(smoke):
+    tasks = read_tasks(smoke, check_release(smoke))
+    many = Tasks(**{name: np.tile(values, 3) for name, values in vars(tasks).items()})
+    many = replace(many, scene=np.resize([*inventory()], len(many)))
+    for table in difficulty_tables(many):
+        assert max(map(len, table.terminal())) <= 100
+        assert max(map(len, table.terminal(80))) <= 80
+    assert len(scene_table(many).terminal(80)) == 3 + 42 + 1
+
+
+def test_a_release_that_does_not_say_has_no_such_tables(smoke):
+    tasks = read_tasks(smoke, check_release(smoke))
+    assert difficulty_tables(replace(tasks, plan_detour=np.full(len(tasks), np.nan))) == []
+    unsplit = replace(tasks, target_split=np.full(len(tasks), ""))
+    assert len(difficulty_tables(unsplit)) == 2
+
+
+def stats(*arguments):
+    command = [sys.executable, "-m", "aerialdojo_gen.cli.app", "stats", *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, check=False)
+
+
+@pytest.fixture(scope="module")
+def drawn(smoke, tmp_path_factory):
+    """The figures of the small release, by way of the command, and what it printed."""
+    out = tmp_path_factory.mktemp("figures")
+    files = ["--figures", out / "drawn", "--markdown", out / "stats.md", "--csv", out / "stats.csv"]
+    done = stats("--data", smoke, *files)
+    assert done.returncode == 0, done.stderr
+    return out, done.stdout
+
+
+FIGURES = ("composition", "shares", "lengths", "detours", "difficulty", "categories", "names", "maps")
+
+
+def test_the_command_writes_what_it_prints(smoke, drawn):
+    out, printed = drawn
+    scenes = in_paper_order([made_of(smoke, name) for name in check_release(smoke)])
+    told = difficulty_tables(read_tasks(smoke, [m.scene for m in scenes]))
+    made = [*tables(scenes), *worth_tables(smoke, [m.scene for m in scenes]), *told, benchmark_table(scenes)]
+    assert (out / "stats.md").read_text() == as_markdown(made)
+    assert (out / "stats.csv").read_text() == as_csv(made)
+    assert "\n\n".join("\n".join(table.terminal(80)) for table in made) in printed
+    paths = [str(out / "drawn" / f"{name}{suffix}") for name in FIGURES for suffix in (".png", ".svg")]
+    assert printed.splitlines()[-len(paths) :] == paths
+    assert sorted(str(p) for p in (out / "drawn").iterdir()) == sorted(paths)
+
+
+def test_figures_are_pictures_without_a_date_and_the_same_again(smoke, drawn, tmp_path):
+    for path in draw_figures(smoke, check_release(smoke), tmp_path):
+        assert path.read_bytes() == (drawn[0] / "drawn" / path.name).read_bytes()
+        if path.suffix == ".png":
+            picture = cv2.imread(str(path))
+            # Something is drawn, and nothing runs over the edge.
+            assert 0.02 < (picture != 255).any(axis=2).mean() < 0.95
+            edge = np.concatenate([picture[0], picture[-1], picture[:, 0], picture[:, -1]])
+            assert (edge == 255).all(), path.name
+        else:
+            root = ET.fromstring(path.read_text())
+            assert root.tag.endswith("svg")
+            assert "<dc:date>" not in path.read_text()
+            assert not [e for e in root.iter() if e.tag.endswith("}text")], "letters are outlines"
+
+
+def test_bars_are_as_long_as_the_counts(smoke):
+    names = check_release(smoke)
+    axes = composition(read_routes(smoke, names)).axes[0]
+    instances = sum(made_of(smoke, name).instances for name in names)
+    assert sum(bar.get_width() for bar in axes.patches) == instances
+    assert {t.get_text() for t in axes.texts} == {f"{instances:,}"}
+    assert len(SETTING_COLOURS) == len(set(SETTING_COLOURS.values())) == len(axes.containers)
+
+
+@pytest.mark.parametrize(("most", "length"), [(47.0, 20.0), (50.0, 50.0), (9.9, 5.0), (0.3, 0.2), (199, 100)])
+def test_scale_bars_are_round(most, length):
+    assert _round_length(most) == pytest.approx(length)
+
+
+def test_a_part_of_the_scenes_is_chosen_by_name_or_glob(smoke):
+    done = stats("--data", smoke, "--scene", "*_1")
+    assert done.returncode == 0, done.stderr
+    assert "U_Courtyard_1" in done.stdout
+    assert "U_Courtyard_0" not in done.stdout
+    done = stats("--data", smoke, "--scene", "U_Courtyard_2")
+    assert done.returncode == 2
+    assert done.stderr == "error: no scene 'U_Courtyard_2': did you mean 'U_Courtyard_1' or 'U_Courtyard_0'?\n"
+
+
+def test_without_a_release_files_are_refused(tmp_path):
+    done = stats("--data", tmp_path, "--csv", tmp_path / "x.csv")
+    assert done.returncode == 1
+    assert f"no release in {tmp_path}" in done.stderr
+    assert not (tmp_path / "x.csv").exists()

@@ -1,0 +1,267 @@
+"""Files of a release that are missing, cut, changed or foreign; counts of the whole; the command and its reports."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pandas as pd
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+from aerialdojo_gen.validate import Asked, validate, write_report
+from support.planting import SMOKE, check, faults_of
+
+from aerialdojo_gen.base.config.pipeline import Pipeline
+from aerialdojo_gen.base.config.sections import SplitConfig
+from aerialdojo_gen.base.errors import StoreError, UsageError
+from aerialdojo_gen.base.paper_figures import PaperScene
+from aerialdojo_gen.dataset.contents import check_release, scenes_there
+from aerialdojo_gen.dataset.validate import counts
+from aerialdojo_gen.dataset.validate.registry import Fault
+from aerialdojo_gen.store import shards as store
+from aerialdojo_gen.store.schemas import SETTINGS
+
+
+def relative(planted, key):
+    return planted.path(key).relative_to(planted.release).as_posix()
+
+
+@pytest.mark.parametrize("key", ["tasks/test", "routes/train", "release/objects", "release/scenes"])
+def test_a_part_that_is_missing(planted, key):
+    planted.path(key).unlink()
+    assert check(planted) == {"part_missing": [relative(planted, key)]}
+
+
+@pytest.mark.parametrize("key", ["tasks/train", "routes/test", "release/anchors"])
+def test_a_part_that_is_cut_short(planted, key):
+    raw = planted.path(key).read_bytes()
+    planted.path(key).write_bytes(raw[: len(raw) * 2 // 3])
+    assert check(planted) == {"part_damaged": [relative(planted, key)]}
+    with pytest.raises(StoreError, match="damaged"):
+        store.read_scene(planted.data, key, planted.scene)
+
+
+def test_a_flipped_bit_within_a_part(planted):
+    path = planted.path("routes/train")
+    raw = bytearray(path.read_bytes())
+    raw[len(raw) // 3] ^= 16
+    path.write_bytes(raw)
+    assert check(planted) == {"part_damaged": [relative(planted, "routes/train")]}
+
+
+@pytest.mark.parametrize("key", ["tasks/train", "release/anchors"])
+def test_a_part_that_something_else_wrote(planted, key):
+    path = planted.path(key)
+    pq.write_table(pq.read_table(path, partitioning=None).replace_schema_metadata(None), path)
+    assert check(planted) == {"part_damaged": [relative(planted, key)]}
+
+
+def test_a_column_that_is_missing_or_in_another_unit(planted):
+    table = pq.read_table(planted.path("release/landmarks"), partitioning=None)
+    planted.write_table("release/landmarks", table.drop_columns(["mesh_node"]))
+    field = pq.read_schema(planted.path("release/anchors")).field("x_m").with_metadata({"unit": "cm"})
+    anchors = pq.read_table(planted.path("release/anchors"), partitioning=None)
+    at = anchors.schema.get_field_index("x_m")
+    pq.write_table(anchors.set_column(at, field, anchors["x_m"]), planted.path("release/anchors"))
+    assert check(planted) == {
+        "part_schema": [relative(planted, "release/anchors"), relative(planted, "release/landmarks")]
+    }
+
+
+def test_a_column_that_tells_the_goal(planted):
+    table = pq.read_table(planted.path("tasks/train"), partitioning=None)
+    planted.write_table("tasks/train", table.append_column("goal_x_m", pa.array([1.5] * table.num_rows)))
+    assert check(planted) == {"leaking_column": [relative(planted, "tasks/train")]}
+
+
+def test_rows_that_are_not_those_of_the_footer(planted):
+    path = planted.path("tasks/train")
+    table = pq.read_table(path, partitioning=None)
+    pq.write_table(table.slice(0, table.num_rows - 2), path)
+    assert check(planted) == {"part_damaged": [relative(planted, "tasks/train")]}
+    name = table.schema.names.index("target_name")
+    pq.write_table(table.set_column(name, table.schema.field(name), pa.array(["a lamp"] * table.num_rows)), path)
+    assert check(planted)["part_content"] == [relative(planted, "tasks/train")]
+
+
+def test_files_that_do_not_belong(planted):
+    strange = ["notes.txt", "tasks/part-U_Courtyard_0.parquet", "routes/ood_train/part-U_Courtyard_0.parquet"]
+    strange += ["objects/.part-U_Courtyard_0.parquet.4242.tmp.parquet"]
+    for name in strange:
+        (planted.release / name).parent.mkdir(exist_ok=True)
+        (planted.release / name).write_bytes(b"x")
+    assert check(planted) == {"foreign_file": sorted(strange)}
+
+
+def test_a_scene_that_the_card_counts_and_nobody_has(planted):
+    for key, place in store.LAYOUT.items():
+        if place.template.startswith("release/"):
+            planted.path(key).unlink()
+    assert set(check(planted, whole=True)) == {"card_counts"}
+
+
+@pytest.mark.parametrize("table", ["scenes", "landmarks", "objects", "anchors"])
+def test_a_table_without_rows(planted, table):
+    planted.write(f"release/{table}", [])
+    assert check(planted) == {"part_rows": [relative(planted, f"release/{table}")]}
+
+
+def test_parts_of_two_runs(planted):
+    path = planted.path("release/anchors")
+    table = pq.read_table(path, partitioning=None)
+    planted.write_table("release/anchors", table, fingerprint="another")
+    assert check(planted) == {"part_of_other_run": [relative(planted, "release/anchors")]}
+
+
+def test_a_card_and_a_croissant_that_tell_other_numbers(planted):
+    card, machine = planted.release / "README.md", planted.release / "croissant.json"
+    rows = len(planted.rows("tasks/train"))
+    assert f"| `id_train` | {rows} |" in card.read_text()
+    card.write_text(card.read_text().replace(f"| `id_train` | {rows} |", "| `id_train` | 7,777 |"))
+    text = machine.read_text()
+    assert f"id_train ({rows} rows)" in text
+    machine.write_text(text.replace(f"id_train ({rows} rows)", "id_train (7,777 rows)"))
+    report = validate(Asked(planted.release, pipeline=Pipeline(), use_meshes=False))
+    assert [(f.check, f.part, f.table, f.found) for f in report.faults] == [
+        ("card_counts", "README.md", "tasks", "7,777 rows told"),
+        ("card_counts", "croissant.json", "tasks", "7,777 rows told"),
+    ]
+    machine.write_text("{")
+    card.unlink()
+    assert check(planted, whole=True) == {"card_counts": ["README.md"]}
+
+
+def test_a_lost_part_is_told_by_whoever_reads_the_release(planted):
+    planted.path("release/scenes").unlink()
+    assert planted.scene in scenes_there(planted.data)
+    with pytest.raises(StoreError, match="missing"):
+        check_release(planted.data)
+    with pytest.raises(StoreError, match=f"release/scenes of {planted.scene} is missing"):
+        store.read_scene(planted.data, "release/scenes", planted.scene)
+
+
+def papers(planted, **changes):
+    """The paper's table as it would be if it had this scene alone."""
+    tasks = dict.fromkeys(SETTINGS, 0)
+    path_m = 0.0
+    for side in ("train", "test"):
+        for row in planted.rows(f"routes/{side}"):
+            tasks[row["setting"]] += 1
+            path_m += row["length_m"]
+    held = {"landmarks": len(planted.rows("release/landmarks")), "objects": len(planted.rows("release/objects"))}
+    return {planted.scene: PaperScene(planted.scene, **(held | tasks | {"path_m": path_m} | changes))}
+
+
+def test_counts_that_are_not_the_papers(planted, monkeypatch):
+    pipeline = Pipeline(split=SplitConfig(paper_counts=True))
+    train = {s: sum(r["setting"] == s for r in planted.rows("routes/train")) for s in ("base", "standard")}
+    both = papers(planted)[planted.scene].tasks
+    splits = {("ID", "train"): train | {"long_horizon": 0}}
+    splits["ID", "test"] = {s: n - splits["ID", "train"][s] for s, n in both.items()}
+    monkeypatch.setattr(counts, "splits", lambda: splits)
+    monkeypatch.setattr(counts, "inventory", lambda: papers(planted))
+    assert check(planted, pipeline=pipeline) == {}
+    monkeypatch.setattr(counts, "inventory", lambda: papers(planted, objects=99, base=both["base"] + 3))
+    assert check(planted, pipeline=pipeline) == {"scene_counts": ["objects", "test base tasks"]}
+
+
+def test_splits_and_path_of_the_whole(planted, monkeypatch):
+    pipeline = Pipeline(split=SplitConfig(paper_counts=True))
+    other = type(planted)(planted.data, "U_Courtyard_1")
+    whole = papers(planted) | papers(other)
+    tally = {
+        (side.upper(), subset): {s: sum(r["setting"] == s for r in one.rows(f"routes/{subset}")) for s in SETTINGS}
+        for side, one in (("id", planted), ("ood", other))
+        for subset in ("train", "test")
+    }
+    monkeypatch.setattr(counts, "splits", lambda: tally)
+    monkeypatch.setattr(counts, "inventory", lambda: whole)
+    assert check(planted, pipeline=pipeline, whole=True) == {}
+    tally["OOD", "test"]["base"] += 1
+    whole[planted.scene] = papers(planted, path_m=whole[planted.scene].path_m * 1.02)[planted.scene]
+    found = check(planted, pipeline=pipeline, whole=True)
+    assert found == {"split_counts": ["base tasks"], "path_total": [""]}
+
+
+def run(*args):
+    command = [sys.executable, "-m", "aerialdojo_gen.cli.app", "validate", *map(str, args), "--pipeline", str(SMOKE)]
+    wide = os.environ | {"COLUMNS": "120"}
+    return subprocess.run(command, capture_output=True, text=True, timeout=300, check=False, env=wide)
+
+
+def test_the_command_passes_a_clean_release_and_says_what_it_did_not_check(planted):
+    done = run("--data", planted.data, "--workers", 1, "--verbose")
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "no fault" in done.stdout
+    routes = sum(len(pq.read_table(p, partitioning=None)) for p in planted.release.glob("routes/*/*.parquet"))
+    lines = [line.split() for line in done.stdout.splitlines()]
+    assert all([name, "routes", str(routes), "0"] in lines for name in ("route_collision", "oracle_fails"))
+    bare = run("--release", planted.release, "--no-meshes", "--workers", 1, "--verbose")
+    assert bare.returncode == 0
+    (line,) = [line.split() for line in bare.stdout.splitlines() if line.startswith("oracle_fails ")]
+    assert line == ["oracle_fails", "routes", "0", "0", *["no", "meshes", "asked", "for", "(2", "times)"]]
+    brief = run("--release", planted.release, "--no-meshes", "--workers", 1)
+    assert brief.returncode == 0
+    assert brief.stdout.splitlines()[-1] == bare.stdout.splitlines()[-1]
+    lines = [line.split() for line in brief.stdout.splitlines() if not line.startswith(" ")]
+    assert len(lines) < 30, "a line per table"
+    checks = {table: int(n) for table, n, *_ in lines[2:-1] if table != "every"}
+    assert checks["routes"] == sum(line.split()[1:2] == ["routes"] for line in bare.stdout.splitlines())
+    (line,) = [line for line in lines if line[0] == "routes"]
+    assert line[2:4] == [str(routes), "0"]
+    assert "asked" in line, "what was not checked is said here too"
+
+
+def test_the_command_names_every_row_at_fault(planted, tmp_path):
+    rows = planted.rows("tasks/train")
+    for row in rows[:3]:
+        row["action_budget"] = 7
+    planted.write("tasks/train", rows)
+    report = tmp_path / "faults.csv"
+    done = run("--data", planted.data, "--report", report, "--max-faults", 1, "--workers", 1, "--scene", "U_*_0")
+    assert done.returncode == 1
+    assert "task_budget: 3 at fault" in done.stdout
+    assert "and 2 more" in done.stdout
+    faults = pd.read_csv(report)
+    assert list(faults.columns) == list(Fault._fields)
+    assert set(faults["key"]) == {f"task_id={row['task_id']}" for row in rows[:3]}
+    assert set(faults["check"]) == {"task_budget"}
+    assert set(faults["found"]) == {7}
+
+
+@pytest.mark.parametrize(
+    ("args", "code", "word"),
+    [
+        (["--release", "no/such/folder"], 1, "there is no release"),
+        (["{data}"], 2, "name another release with --release {data}"),
+        (["--data", "{data}", "--scene", "U_Mall_0"], 2, "no scene 'U_Mall_0'"),
+        (["--data", "{data}", "--report", "faults.xlsx"], 2, ".jsonl"),
+    ],
+)
+def test_what_a_user_can_get_wrong_is_one_line(planted, args, code, word):
+    done = run(*(a.format(data=planted.data) for a in args))
+    assert (done.returncode, done.stderr.count("\n")) == (code, 1), done.stderr
+    assert word.format(data=planted.data) in done.stderr
+
+
+def test_reports_hold_the_same_faults_in_every_format(tmp_path):
+    faults = [Fault("a", "S", "tasks", "p", f"k={i}", 'found "x", ü', "y\nz") for i in range(3)]
+    paths = {s: write_report(faults, tmp_path / f"r.{s}") for s in ("jsonl", "json", "csv", "parquet")}
+    rows = [fault._asdict() for fault in faults]
+    assert [json.loads(line) for line in paths["jsonl"].read_text().splitlines()] == rows
+    assert paths["json"].read_bytes() == paths["jsonl"].read_bytes()
+    assert pd.read_csv(paths["csv"]).to_dict("records") == rows
+    assert pd.read_parquet(paths["parquet"]).to_dict("records") == rows
+    with pytest.raises(UsageError, match="one of"):
+        write_report(faults, Path("r.txt"))
+
+
+def test_workers_find_the_same_in_the_same_order(planted):
+    planted.edit("tasks/train", lambda row: row.update(action_budget=7))
+    asked = Asked(planted.release, pipeline=Pipeline())
+    one, two = validate(asked), validate(asked, workers=2)
+    assert one.faults == two.faults
+    assert set(faults_of(one)) == {"task_budget"}
+    assert one.table_lines() == two.table_lines()

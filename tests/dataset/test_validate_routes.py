@@ -1,0 +1,283 @@
+"""Faults planted in routes that are otherwise measured anew: each is found by its check and its row, and only it."""
+
+import numpy as np
+import pytest
+from support.planting import check, definitions, measured, poses, refly, turned
+
+from aerialdojo_gen.dataset.validate import collisions, oracle
+from aerialdojo_gen.dataset.validate.parts import read_tables, release_of
+from aerialdojo_gen.dataset.validate.registry import ALWAYS_AFTER, TABLES
+from aerialdojo_gen.dataset.validate.rows import SceneData
+from aerialdojo_gen.dataset.validate.run import SCENE_CHECKS
+from aerialdojo_gen.planning.collision import CollisionWorld
+from aerialdojo_gen.scenes.glb import read_glb
+from aerialdojo_gen.store.schemas import APPROACH, STOP, TURN_LEFT, TURN_RIGHT
+
+RADIUS = 0.25
+UP_2, DOWN_2, LEFT_5, RIGHT_5 = 11, 13, 6, 9
+KEY = "routes/train"
+
+
+def key(row):
+    return [f"nav_id={row['nav_id']}"]
+
+
+def replace(planted, old, new):
+    rows = [new if row["nav_id"] == old["nav_id"] else row for row in planted.rows(KEY)]
+    assert rows != planted.rows(KEY)
+    planted.write(KEY, rows)
+
+
+@pytest.fixture
+def world(planted):
+    return CollisionWorld(read_glb(planted.data / "meshes" / f"{planted.scene}.glb"))
+
+
+def roomy(row, metres=0.0, actions=0):
+    """Whether a route may grow by so much and keep its setting and its budget."""
+    longest, budget = {"base": (30, 90), "standard": (60, 180), "long_horizon": (100, 300)}[row["setting"]]
+    return row["length_m"] + metres < longest and row["n_actions"] + actions <= budget
+
+
+@pytest.mark.parametrize(
+    ("found_by", "name", "off"),
+    [
+        ("n_actions", "n_actions", 1),
+        ("route_length", "length_m", 0.5),
+        ("euclidean_distance", "euclidean_m", -0.01),
+        ("detour_ratio", "detour_ratio", 0.02),
+        ("min_clearance", "min_clearance_m", 0.01),
+        ("min_clearance", "min_clearance_m", -0.01),
+        ("goal_anchor", "goal_x_m", 0.1),
+        ("goal_anchor", "goal_yaw_rad", 0.01),
+    ],
+)
+def test_a_number_that_is_off(planted, found_by, name, off):
+    def change(row):
+        row[name] += off
+
+    row = planted.edit(KEY, change, lambda row: row["min_clearance_m"] < 0.9)
+    assert check(planted) == {found_by: key(row)}
+
+
+def test_lists_that_do_not_fit_together(planted):
+    row = planted.edit(KEY, lambda row: row["z_m"].pop())
+    assert check(planted) == {"list_lengths_differ": key(row)}
+
+
+def test_a_stop_on_the_way_and_an_approach_in_the_middle(planted):
+    rows = planted.rows(KEY)
+    rows[0]["action"][1] = STOP
+    rows[1]["action"][1] = APPROACH
+    rows[2]["action"][-1] = TURN_LEFT
+    planted.write(KEY, rows)
+    assert check(planted) == {"action_order": sorted(key(rows[k])[0] for k in range(3))}
+
+
+def test_a_route_over_its_budget(planted):
+    old = next(row for row in planted.rows(KEY) if row["setting"] == "base")
+    turns = [TURN_LEFT, TURN_RIGHT] * ((92 - old["n_actions"]) // 2)
+    new = refly(old, [*turns, *old["action"]])
+    assert new["n_actions"] > 90
+    replace(planted, old, new)
+    assert check(planted) == {"keeping_rule": key(old)}
+
+
+def test_a_setting_of_another_length(planted):
+    row = planted.edit(KEY, lambda row: row.update(setting="standard"), lambda row: row["setting"] == "base")
+    planted.edit_all(
+        "tasks/train",
+        lambda task: task.update(setting="standard", action_budget=180),
+        lambda task: task["nav_id"] == row["nav_id"],
+    )
+    assert check(planted) == {"route_setting": key(row)}
+
+
+def test_a_dive_below_the_ground(planted):
+    old = next(row for row in planted.rows(KEY) if roomy(row, 20, 10))
+    dive = int(np.ceil((old["z_m"][0] - RADIUS) / 2)) + 1
+    new = refly(old, [DOWN_2] * dive + [UP_2] * dive + old["action"])
+    replace(planted, old, new)
+    assert check(planted) == {"out_of_bounds": key(old)}
+
+
+def test_a_way_through_a_wall_and_back(planted, world):
+    scene = read_glb(planted.data / "meshes" / f"{planted.scene}.glb")
+    low, high = scene.bounds[0] + RADIUS, scene.bounds[1] - RADIUS
+
+    def through(row):
+        for aside in ([LEFT_5, RIGHT_5], [RIGHT_5, LEFT_5]):
+            new = refly(row, [*aside, *row["action"]])
+            path = poses(new)[:, :3]
+            inside = ((path >= low) & (path <= high)).all()
+            if inside and world.segment_in_collision(path[0], path[1], RADIUS):
+                return new
+        return None
+
+    old, new = next((row, new) for row in planted.rows(KEY) if roomy(row, 10, 2) and (new := through(row)))
+    replace(planted, old, new)
+    assert check(planted) == {"route_collision": key(old)}
+    # Not by its own length of arm: a body that fits through finds nothing.
+    assert "route_collision" not in check(planted, use_meshes=False)
+    # A sample of FCL's certificates may miss the route; the oracle flies them all.
+    found = check(planted, sample=0)
+    # Out and back through the wall may be a long way round besides, and nothing else.
+    assert found in ({"oracle_fails": key(old)}, {"oracle_fails": key(old), "long_way_round": key(old)})
+
+
+def test_a_wall_across_any_one_leg_of_any_route_is_found(planted, world):
+    """Two free routes joined through a wall: the joint is the first, a middle, the last or the only leg that hits."""
+    ends = {"first": (-1, 0), "middle": (0, 0), "last": (0, -1), "only": (-1, -1)}
+
+    def joined(place, row):
+        """The row's route and another's, joined as `place` says, where only the joint meets a surface."""
+        own = poses(row)
+        own = own[ends[place][0] :] if ends[place][0] else own
+        for other in others:
+            theirs = poses(other) if ends[place][1] == 0 else poses(other)[:1]
+            if world.segment_in_collision(own[-1, :3], theirs[0, :3], RADIUS):
+                return np.concatenate([own, theirs]), own[-1, :3], theirs[0, :3]
+        raise AssertionError("no route of the scene ends behind a wall")
+
+    others = planted.rows(KEY)
+    joints = {}
+    # The first and a middle route of the first part, and the first and the last of the second.
+    chosen = {
+        "routes/train": [("last", 0), ("middle", len(others) // 2)],
+        "routes/test": [("first", 0), ("only", -1)],
+    }
+    for part, places in chosen.items():
+        rows = planted.rows(part)
+        for place, k in places:
+            path, *joint = joined(place, rows[k])
+            rows[k] |= {name: path[:, i].tolist() for i, name in enumerate(("x_m", "y_m", "z_m", "yaw_rad"))}
+            rows[k]["action"] = [STOP] * len(path)
+            joints[key(rows[k])[0]] = joint
+        planted.write(part, rows)
+    data = scene_data(planted)
+    found = {data["routes"].key(f.row): f.found for f in collisions.route_collision(data, data["routes"])}
+    told = {name: [", ".join(f"{v:.2f}" for v in end) for end in joint] for name, joint in joints.items()}
+    assert found == {name: f"the body touches a surface between ({p}) and ({q}) m" for name, (p, q) in told.items()}
+
+
+def test_an_action_that_leads_elsewhere(planted):
+    def wanted(row):
+        return TURN_LEFT in row["action"]
+
+    def change(row):
+        row["action"][row["action"].index(TURN_LEFT)] = TURN_RIGHT
+
+    row = planted.edit(KEY, change, wanted)
+    assert check(planted) == {"replay_differs": key(row)}
+
+
+def test_an_end_that_faces_away(planted):
+    def away(row):
+        last = 2 if row["action"][-2] == APPROACH else 1
+        new = refly(row, [*row["action"][:-last], TURN_LEFT, *row["action"][-last:]])
+        return new if abs(turned(new["yaw_rad"][-1] - new["goal_yaw_rad"], 0.0)) > np.radians(7.6) else None
+
+    old, new = next((row, new) for row in planted.rows(KEY) if roomy(row, 0, 1) and (new := away(row)))
+    replace(planted, old, new)
+    assert check(planted) == {"final_yaw": key(old)}
+
+
+def test_an_end_beside_the_anchor(planted):
+    old = next(row for row in planted.rows(KEY) if row["action"][-2] == APPROACH)
+    path = poses(old)
+    path[-1, 2] += 0.002
+    new = measured(old, path, old["action"])
+    replace(planted, old, new)
+    assert check(planted, use_meshes=False) == {"end_position": key(old)}
+
+
+def test_an_approach_of_more_than_a_metre(planted):
+    for old in planted.rows(KEY):
+        if old["action"][-2] != APPROACH or old["action"][-3] >= TURN_LEFT:
+            continue
+        new = measured(old, np.delete(poses(old), -3, axis=0), [*old["action"][:-3], APPROACH, STOP])
+        new = refly(new, new["action"])
+        gap = float(np.linalg.norm(np.diff(poses(new)[-2:, :3], axis=0)))
+        if gap > 1.001 and new["detour_ratio"] > 1.06 and new["length_m"] > 5 and roomy(new):
+            break
+    else:
+        pytest.fail("no route of the fixture has a last move to leave out")
+    replace(planted, old, new)
+    assert check(planted, use_meshes=False) == {"stops_far": key(old)}
+
+
+def test_a_start_that_is_another_anchor(planted):
+    rows = planted.rows(KEY) + planted.rows("routes/test")
+    taken = {(r["start_object_id"], r["start_anchor_id"], r["target_object_id"]) for r in rows}
+
+    def other(row):
+        free = (a for a in range(3) if (row["start_object_id"], a, row["target_object_id"]) not in taken)
+        return next(free, None)
+
+    row = planted.edit(KEY, lambda row: row.update(start_anchor_id=other(row)), lambda row: other(row) is not None)
+    assert check(planted) == {"start_anchor": key(row)}
+
+
+def scene_data(planted, **options):
+    tables, _ = read_tables(release_of(planted.release), planted.scene)
+    return SceneData(planted.scene, release_of(planted.release), definitions(), tables, **options)
+
+
+def test_replayed_actions_are_swept_for_themselves(planted, world):
+    def change(row):
+        row["action"][:2] = [LEFT_5, RIGHT_5]
+
+    def hits(row):
+        actions = [LEFT_5, RIGHT_5, *row["action"][2:]]
+        return world.segment_in_collision(*poses(refly(row, actions))[:2, :3], RADIUS)
+
+    row = planted.edit(KEY, change, hits)
+    data = scene_data(planted)
+    found = [data["routes"].key(f.row) for f in collisions.replay_collision(data, data["routes"])]
+    assert found == key(row)
+    assert not list(collisions.route_collision(data, data["routes"]))
+
+
+@pytest.mark.parametrize(
+    ("key", "change", "words"),
+    [
+        (KEY, lambda row: row.update(length_m=0.9 * row["length_m"]), "m told: SPL 0.9"),
+        (KEY, lambda row: row.update(goal_z_m=row["goal_z_m"] + 4.5), "m from the goal"),
+        (KEY, lambda row: row["action"].__setitem__(-1, TURN_LEFT), "no Stop in its "),
+        (KEY, lambda row: row["action"].__setitem__(slice(0, 20), [UP_2] * 20), "that would leave the flight volume"),
+        ("tasks/train", lambda task: task.update(action_budget=5), "no Stop within the budget of 5 actions"),
+        ("tasks/train", lambda task: task.update(start_z_m=0.1), "a collision at action 1, at ("),
+    ],
+)
+def test_the_oracle_says_what_a_flight_lacks(planted, world, key, change, words):
+    def wanted(row):
+        # Nothing above the start, so that twenty moves up end at the ceiling.
+        start = [row[f"{axis}_m"][0] for axis in "xyz"]
+        return row["n_actions"] > 25 and not world.segment_in_collision(start, start + 30 * np.eye(3)[2], RADIUS)
+
+    def first_instance(task):
+        return task["nav_id"] in nav_ids and task["modality"] == "image"
+
+    nav_ids = {row["nav_id"] for row in planted.rows(KEY) if wanted(row)}
+    row = planted.edit(key, change, wanted if key == KEY else first_instance)
+    data = scene_data(planted)
+    found = {data["routes"].key(fault.row): fault.found for fault in oracle.oracle_fails(data, data["routes"])}
+    assert list(found) == [f"nav_id={row['nav_id']}"]
+    assert words in found[f"nav_id={row['nav_id']}"]
+
+
+def test_a_sample_asks_fcl_about_so_many_routes_and_always_the_same(planted):
+    asked = scene_data(planted, sample=5).sampled
+    assert len(asked) == 5
+    assert (asked == scene_data(planted, sample=5).sampled).all()
+    assert len(scene_data(planted).sampled) == len(planted.rows(KEY)) + len(planted.rows("routes/test"))
+
+
+def test_checks_stand_after_those_that_they_build_on():
+    seen = {table: set() for table in TABLES}
+    for one in SCENE_CHECKS:
+        for table in TABLES if one.table == "*" else (one.table,):
+            assert set(one.after) <= seen[table], one.name
+            seen[table].add(one.name)
+    assert all(set(ALWAYS_AFTER) <= names for names in seen.values())
+    assert len({one.name for one in SCENE_CHECKS}) == len(SCENE_CHECKS)

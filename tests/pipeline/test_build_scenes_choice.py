@@ -1,0 +1,46 @@
+"""Which layout a recipe names is found without reading its lists of things, as reading all of it would."""
+
+import pytest
+
+from aerialdojo_gen.base.safe_parse import read_toml
+from aerialdojo_gen.pipeline.stage import Roots
+from aerialdojo_gen.pipeline.stages.build_scenes import STAGE
+from aerialdojo_gen.scenes import layouts
+
+
+def chosen(folder, scene):
+    choice = STAGE.imports(Roots(folder, folder, folder, folder), scene)
+    return choice and choice.modules
+
+
+def test_every_recipe_names_its_own(project):
+    folder = project / "scene_assets" / "scenes"
+    known = layouts.layout_modules()
+    recipes = sorted(folder.glob("*.toml"))
+    assert len(recipes) >= 42
+    for path in recipes:
+        layout = read_toml(path)["layout"]
+        assert chosen(folder, path.stem) == (f"aerialdojo_gen.scenes.layouts.{known[layout]}",), path
+
+
+@pytest.mark.parametrize(
+    ("text", "modules"),
+    [
+        ('layout = "mall"\n[parameters]\nlayout = "park"\n', ("aerialdojo_gen.scenes.layouts.urban.mall.layout",)),
+        (
+            'note = """\n[x]\nlayout = "park"\n"""\nlayout = "mall"\n',
+            ("aerialdojo_gen.scenes.layouts.urban.mall.layout",),
+        ),
+        ('list = [\n[1],\n[2],\n]\nlayout = "mall"\n', ("aerialdojo_gen.scenes.layouts.urban.mall.layout",)),
+        ('layout = "mall"\n[imported]\nmesh = "a.glb"\n', ()),
+        ('[parameters]\nlayout = "mall"\n', None),
+        ('layout = "none"\n', None),
+        ("layout = [\n", None),
+    ],
+)
+def test_a_table_begins_where_toml_says(tmp_path, text, modules):
+    (tmp_path / "S_0.toml").write_text(text)
+    assert chosen(tmp_path, "S_0") == modules
+    (tmp_path / "S_1.toml").write_bytes(b"layout = '\xff'")
+    assert chosen(tmp_path, "S_1") is None
+    assert chosen(tmp_path, "S_2") is None

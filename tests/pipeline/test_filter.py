@@ -1,0 +1,107 @@
+"""The paper's rules, each at its boundary, and a reason for every candidate."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from aerialdojo_gen.base.config.sections import FilterConfig
+from aerialdojo_gen.pipeline.stages.work.rules import judge
+
+CONFIG = FilterConfig()
+
+
+def verdict(outcome="SOLVED", euclidean=10.0, length=12.0, n_actions=20, config=CONFIG):
+    reason, setting = judge(
+        np.array([outcome]), np.array([euclidean]), np.array([length]), np.array([n_actions], np.int32), config
+    )
+    return reason[0], setting[0]
+
+
+@pytest.mark.parametrize(
+    ("case", "expected"),
+    [
+        ({}, ("kept", "base")),
+        ({"euclidean": 3.0, "length": 6.0}, ("too_close", "base")),
+        ({"euclidean": 3.0000001, "length": 6.0}, ("kept", "base")),
+        ({"euclidean": 4.0, "length": 4.9999999}, ("too_short", "")),
+        ({"euclidean": 4.0, "length": 5.0}, ("kept", "base")),
+        ({"euclidean": 25.0, "length": 29.999}, ("kept", "base")),
+        ({"euclidean": 25.0, "length": 30.0}, ("kept", "standard")),
+        ({"euclidean": 50.0, "length": 60.0}, ("kept", "long_horizon")),
+        ({"euclidean": 90.0, "length": 99.999}, ("kept", "long_horizon")),
+        ({"euclidean": 90.0, "length": 100.0}, ("too_long", "")),
+        ({"euclidean": 10.0, "length": 10.5}, ("kept", "base")),
+        ({"euclidean": 10.0, "length": 10.4999}, ("near_straight", "base")),
+        ({"n_actions": 90}, ("kept", "base")),
+        ({"n_actions": 91}, ("over_budget", "base")),
+        ({"euclidean": 40.0, "length": 50.0, "n_actions": 180}, ("kept", "standard")),
+        ({"euclidean": 40.0, "length": 50.0, "n_actions": 181}, ("over_budget", "standard")),
+        ({"euclidean": 70.0, "length": 80.0, "n_actions": 301}, ("over_budget", "long_horizon")),
+        ({"outcome": "NO_PATH", "length": 0.0}, ("no_path", "")),
+        ({"outcome": "START_IN_COLLISION", "length": 0.0}, ("start_in_collision", "")),
+        ({"outcome": "GOAL_IN_COLLISION", "length": 0.0}, ("goal_in_collision", "")),
+        ({"outcome": "BUDGET_EXHAUSTED", "length": 0.0}, ("budget_exhausted", "")),
+        ({"euclidean": 0.0, "length": 8.0}, ("too_close", "base")),
+    ],
+)
+def test_rules_at_their_boundaries(case, expected):
+    assert verdict(**case) == expected
+
+
+HARD = FilterConfig(min_plan_detour=1.05, max_visible_at_start=0.1)
+
+
+@pytest.mark.parametrize(
+    ("detour", "visible", "config", "expected"),
+    [
+        (1.0, 1.0, CONFIG, "kept"),
+        (np.nan, np.nan, CONFIG, "kept"),
+        (1.05, 0.1, HARD, "kept"),
+        (1.0499, 0.1, HARD, "small_plan_detour"),
+        (1.0499, 0.2, HARD, "small_plan_detour"),
+        (1.05, 0.1001, HARD, "target_in_view"),
+        (np.nan, 0.0, HARD, "small_plan_detour"),
+        (1.2, np.nan, HARD, "target_in_view"),
+        (1.0, 0.0, FilterConfig(max_visible_at_start=0.0), "kept"),
+        (1.0, 1e-9, FilterConfig(max_visible_at_start=0.0), "target_in_view"),
+        (1.06, 1.0, FilterConfig(min_plan_detour=1.06), "kept"),
+    ],
+)
+def test_rules_of_difficulty_at_their_boundaries(detour, visible, config, expected):
+    case = (np.array(["SOLVED"]), np.array([10.0]), np.array([12.0]), np.array([20], np.int32))
+    assert judge(*case, config, np.array([detour]), np.array([visible]))[0][0] == expected
+    # The paper's own rules come first.
+    near = (case[0], case[1], np.array([10.1]), case[3])
+    assert judge(*near, config, np.array([detour]), np.array([visible]))[0][0] == "near_straight"
+
+
+def test_what_nobody_told_is_not_kept_where_it_is_asked_for():
+    case = (np.array(["SOLVED"]), np.array([10.0]), np.array([12.0]), np.array([20], np.int32))
+    assert judge(*case, HARD)[0][0] == "small_plan_detour"
+    assert judge(*case, CONFIG)[0][0] == "kept"
+
+
+@given(
+    st.lists(
+        st.tuples(
+            st.sampled_from(["SOLVED", "NO_PATH", "BUDGET_EXHAUSTED"]),
+            st.floats(0, 150), st.floats(0, 200), st.integers(0, 400),
+        ),
+        min_size=1,
+    )
+)  # fmt: skip
+def test_kept_rows_hold_every_rule_and_every_row_has_a_reason(rows):
+    outcome, euclidean, length, n_actions = (np.array(c) for c in zip(*rows, strict=True))
+    reason, setting = judge(outcome, euclidean, length, n_actions.astype(np.int32), CONFIG)
+    budgets = {"base": (5, 30, 90), "standard": (30, 60, 180), "long_horizon": (60, 100, 300)}
+    for (o, d, ell, n), r, s in zip(rows, reason, setting, strict=True):
+        assert r
+        holds = o == "SOLVED" and d > 3 and 5 <= ell < 100 and ell >= 1.05 * d
+        if r == "kept":
+            low, high, budget = budgets[s]
+            assert holds
+            assert low <= ell < high
+            assert n <= budget
+        else:
+            assert not holds or n > budgets[s][2]

@@ -1,0 +1,217 @@
+import hashlib
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from support.handmade import OPINIONS, box, instance, scene
+
+from aerialdojo_gen.base.config.sections import Embodiment, PairObjectsConfig
+from aerialdojo_gen.base.errors import StoreError
+from aerialdojo_gen.pipeline.stage import Job, Roots
+from aerialdojo_gen.pipeline.stages.work import pair_objects
+from aerialdojo_gen.scenes.glb import write_glb
+from aerialdojo_gen.store import schemas
+from aerialdojo_gen.store import shards as store
+from aerialdojo_gen.store.tables import check_table, from_rows
+
+SCENE = "U_Test_0"
+
+
+def anchor_rows(places, variants=3):
+    """Anchors of objects at places: variant k stands k × 0.5 m north of the first, the middle one is selected."""
+    return [
+        {
+            "scene": SCENE, "object_id": o, "anchor_id": a, "x_m": x, "y_m": y + 0.5 * a, "z_m": z, "yaw_rad": 0.0,
+            "clearance_m": 1.0, "surface_distance_m": 1.0, "visible_fraction": 1.0, "score": 1.0 - a / 10, **OPINIONS,
+            "selected": a == variants // 2, "selected_by": "human" if variants // 2 else "auto",
+        }
+        for o, (x, y, z) in enumerate(places)
+        for a in range(variants)
+    ]  # fmt: skip
+
+
+def things(data: Path, rows, *others):
+    """A scene with a ball 3 m south of each object's first anchor, and the tables that tell of it."""
+    first = {row["object_id"]: row for row in reversed(rows)}
+    balls = {
+        k: instance(
+            f"ball_{k}",
+            trimesh.creation.icosphere(2, radius=0.4).apply_translation([row["x_m"], row["y_m"] - 3.0, row["z_m"]]),
+        )
+        for k, row in first.items()
+    }
+    world = scene(*balls.values(), *others, half=120.0)
+    mesh = data / "meshes" / f"{SCENE}.glb"
+    mesh.parent.mkdir(parents=True, exist_ok=True)
+    write_glb(world, mesh)
+    low, high = world.bounds.tolist()
+    told = {
+        "scene": SCENE, "family": "Urban", "scene_type": "Test", "partition": "ID",
+        "mesh_path": f"meshes/{SCENE}.glb",
+        "attribution": None, "mesh_sha256": hashlib.sha256(mesh.read_bytes()).hexdigest(),
+        "ceiling_m": high[2],
+        **{f"{e}_{a}_m": v for e, c in (("min", low), ("max", high)) for a, v in zip("xyz", c, strict=True)},
+        "n_triangles": world.n_triangles, "n_instances": len(world.instances), "n_categories": 1,
+    }  # fmt: skip
+    objects = [
+        {
+            "scene": SCENE, "object_id": k, "name": f"ball {k}", "category": "ball", "description": "A ball.",
+            "mesh_node": f"ball_{k}", "x_m": 0.0, "y_m": 0.0, "z_m": 1.0, "size_x_m": 1.0, "size_y_m": 1.0,
+            "size_z_m": 1.0, "landmark_id": 0, "direction": "east",
+        }
+        for k in balls
+    ]  # fmt: skip
+    store.write_shard(data, "scenes", SCENE, 0, from_rows(schemas.SCENES, [told]))
+    store.write_shard(data, "objects", SCENE, 0, from_rows(schemas.OBJECTS, objects))
+
+
+def pair(data: Path, rows, config=None, others=()):
+    config = config or PairObjectsConfig()
+    store.write_shard(data, "anchors", SCENE, 0, from_rows(schemas.ANCHORS, rows))
+    things(data, rows, *others)
+    job = Job("pair-objects", SCENE, 0, 1, 0, Embodiment(), Roots(data, data, data, data))
+    out = pair_objects.run(job, config)
+    check_table(schemas.PAIRS, out.tables["pairs"])
+    assert out.rows_out == out.tables["pairs"].num_rows
+    assert out.rows_in == out.rows_out + sum(out.counts.values())
+    return out
+
+
+def test_every_start_anchor_meets_every_other_objects_selected_anchor(tmp_path):
+    places = [(0.0, 0.0, 2.0), (20.0, 0.0, 2.0), (0.0, 30.0, 9.0), (-15.0, -8.0, 4.0)]
+    out = pair(tmp_path, anchor_rows(places))
+    rows = out.tables["pairs"].to_pylist()
+    assert {(r["start_object_id"], r["start_anchor_id"], r["target_object_id"]) for r in rows} == {
+        (s, a, t) for s in range(4) for a in range(3) for t in range(4) if s != t
+    }
+    for r in rows:
+        assert r["pair_id"] == f"{r['start_object_id']}_{r['start_anchor_id']}__{r['target_object_id']}"
+        (sx, sy, sz), (tx, ty, tz) = places[r["start_object_id"]], places[r["target_object_id"]]
+        expected = math.dist((sx, sy + 0.5 * r["start_anchor_id"], sz), (tx, ty + 0.5, tz))
+        assert r["euclidean_m"] == pytest.approx(expected, abs=1e-12)
+
+
+def test_pair_ids_are_sorted_as_strings_with_many_objects(tmp_path):
+    places = [(7.0 * (k % 4), 7.0 * (k // 4), 3.0) for k in range(12)]
+    ids = pair(tmp_path, anchor_rows(places)).tables["pairs"]["pair_id"].to_pylist()
+    assert ids == sorted(ids)
+    assert len(set(ids)) == len(ids) == 12 * 11 * 3
+    assert ids.index("10_0__2") < ids.index("2_0__10")
+
+
+def test_close_and_far_pairs_are_counted(tmp_path):
+    rows = anchor_rows([(0.0, 0.0, 2.0), (3.0, 0.0, 2.0), (101.0, 0.0, 2.0)], variants=1)
+    out = pair(tmp_path, rows)
+    # 3 m exactly is not more than 3 m; from the second object the third is 98 m off.
+    assert out.counts == {"too_close": 2, "too_far": 2}
+    assert out.tables["pairs"]["pair_id"].to_pylist() == ["1_0__2", "2_0__1"]
+
+
+def test_a_pair_whose_shortest_route_is_as_long_as_the_limit_is_too_far(tmp_path):
+    """As `filter` has it: L is less than 100 m."""
+    config = PairObjectsConfig(max_approach_m=0.0)
+    for metres, counts in ((100.0, {"too_close": 0, "too_far": 2}), (99.999, {"too_close": 0, "too_far": 0})):
+        rows = anchor_rows([(-50.0, 0.0, 2.0), (metres - 50.0, 0.0, 2.0)], variants=1)
+        assert pair(tmp_path, rows, config).counts == counts
+
+
+def test_points_of_two_objects_are_drawn_apart():
+    balls = [instance(f"ball_{k}", trimesh.creation.icosphere(2, radius=0.4)) for k in range(2)]
+    first, second = (pair_objects.surface_points(SCENE, k, ball, 16) for k, ball in enumerate(balls))
+    assert not (first == second).any()
+    assert (pair_objects.surface_points(SCENE, 0, balls[0], 16) == first).all()
+
+
+def test_start_variants_limits_starts_and_not_goals(tmp_path):
+    rows = anchor_rows([(0.0, 0.0, 2.0), (20.0, 0.0, 2.0)])
+    out = pair(tmp_path, rows, PairObjectsConfig(start_variants=1))
+    assert out.tables["pairs"]["pair_id"].to_pylist() == ["0_0__1", "1_0__0"]
+    assert out.tables["pairs"]["euclidean_m"].to_pylist() == pytest.approx([math.hypot(20, 0.5)] * 2)
+
+
+def test_a_scene_without_anchors_or_with_one_object_has_no_pairs(tmp_path):
+    assert pair(tmp_path, []).rows_in == 0
+    assert pair(tmp_path, anchor_rows([(0.0, 0.0, 2.0)])).rows_in == 0
+
+
+def test_the_start_looks_away_from_its_own_anchor(tmp_path):
+    """All anchors face east: starts face west, and see the ball that lies there, or below, not the one behind."""
+    places = [(0.0, 0.0, 2.0), (20.0, 0.0, 2.0), (20.0, 0.0, 12.0)]
+    rows = {r["pair_id"]: r for r in pair(tmp_path, anchor_rows(places, variants=1)).tables["pairs"].to_pylist()}
+    told = {k: (r["target_visible_at_start"], r["visible_view_at_start"]) for k, r in rows.items()}
+    assert told["1_0__0"] == (1.0, "front")
+    assert told["0_0__1"] == (0.0, None)
+    assert told["2_0__1"] == (1.0, "down")
+    assert told["1_0__2"] == (0.0, None)
+
+
+def test_what_stands_between_hides_the_target(tmp_path):
+    places, wall = [(0.0, 0.0, 2.0), (20.0, 0.0, 2.0)], instance("wall", box((9, -9, 0), (9.5, 9, 9)))
+    rows = pair(tmp_path, anchor_rows(places, variants=1), others=(wall,)).tables["pairs"].to_pylist()
+    assert [(r["target_visible_at_start"], r["visible_view_at_start"]) for r in rows] == [(0.0, None)] * 2
+
+
+def test_an_object_that_the_mesh_lacks_is_named(tmp_path):
+    rows = anchor_rows([(0.0, 0.0, 2.0), (20.0, 0.0, 2.0)])
+    pair(tmp_path, rows)
+    objects = store.read_scene(tmp_path, "objects", SCENE).to_pylist()
+    objects[1]["mesh_node"] = "gone"
+    store.write_shard(tmp_path, "objects", SCENE, 0, from_rows(schemas.OBJECTS, objects))
+    job = Job("pair-objects", SCENE, 0, 1, 0, Embodiment(), Roots(*[tmp_path] * 4))
+    with pytest.raises(StoreError, match="object 1 is not in the scene's mesh: run aerialdojo-gen annotate-import"):
+        pair_objects.run(job, PairObjectsConfig())
+
+
+moves = st.one_of(
+    st.tuples(st.just("flat"), st.sampled_from([1.0, 3.0, 5.0]), st.integers(0, 23)),
+    st.tuples(st.just("up"), st.sampled_from([-2.0, -1.0, 1.0, 2.0]), st.just(0)),
+)
+
+
+@settings(max_examples=300)
+@given(
+    st.lists(moves, max_size=40),
+    st.floats(0, 1),
+    st.floats(-math.pi / 2, math.pi / 2),
+    st.floats(0, 2 * math.pi),
+)
+def test_no_route_of_the_action_set_is_shorter_than_the_bound(route, approach, elevation, azimuth):
+    p, length = np.zeros(3), approach
+    for kind, step, heading in route:
+        a = heading * math.pi / 12
+        p = p + (np.array([0, 0, step]) if kind == "up" else step * np.array([math.cos(a), math.sin(a), 0]))
+        length += abs(step)
+    flat = math.cos(elevation)
+    goal = p + approach * np.array([flat * math.cos(azimuth), flat * math.sin(azimuth), math.sin(elevation)])
+    bound = pair_objects.length_bound_m(np.zeros((1, 3)), goal[None], 1.0)
+    assert length >= bound[0] - 1e-9
+
+
+@settings(max_examples=60)
+@given(st.lists(st.tuples(*[st.integers(-60, 60)] * 2, st.integers(1, 40)), min_size=2, max_size=12))
+def test_what_is_left_out_could_not_be_kept(tmp_path_factory, places):
+    rows = anchor_rows([tuple(map(float, p)) for p in places], variants=1)
+    out = pair(tmp_path_factory.mktemp("data"), rows)
+    there = set(out.tables["pairs"]["pair_id"].to_pylist())
+    for s, p in enumerate(places):
+        for t, q in enumerate(places):
+            if s == t or f"{s}_0__{t}" in there:
+                continue
+            flat, up = math.hypot(q[0] - p[0], q[1] - p[1]), abs(q[2] - p[2])
+            # The shortest route there is: straight moves, and an Approach of up to a metre that cuts the corner.
+            cuts = [
+                flat + up - (math.cos(e) + math.sin(e) - 1) * min(1.0, flat, up)
+                for e in np.linspace(0, math.pi / 2, 91)
+            ]
+            assert math.dist(p, q) <= 3.0 or min(cuts) >= 100.0
+
+
+def test_the_bound_is_met_by_a_diagonal_approach():
+    goal = np.array([[99.7, 0.0, 0.8]])
+    assert pair_objects.length_bound_m(np.zeros((1, 3)), goal, 1.0)[0] == pytest.approx(
+        (99.7 - math.sqrt(0.5)) + (0.8 - math.sqrt(0.5)) + 1.0
+    )

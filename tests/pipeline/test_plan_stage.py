@@ -1,0 +1,202 @@
+import hashlib
+import math
+from pathlib import Path
+
+import numpy as np
+import pyarrow.compute as pc
+import pytest
+from support.flying import along, distances, solid, town
+from support.handmade import OPINIONS
+
+from aerialdojo_gen.base.config.sections import (
+    Embodiment,
+    FilterConfig,
+    PairObjectsConfig,
+    PlanConfig,
+    ReleasedPlanConfig,
+)
+from aerialdojo_gen.base.errors import StoreError
+from aerialdojo_gen.base.paper_figures import PaperScene
+from aerialdojo_gen.geometry.motion import replay
+from aerialdojo_gen.pipeline.stage import Job, Roots
+from aerialdojo_gen.pipeline.stages.work import pair_objects, plan
+from aerialdojo_gen.planning.clearance import ClearanceGrid
+from aerialdojo_gen.scenes.context import release_scenes
+from aerialdojo_gen.scenes.glb import write_glb
+from aerialdojo_gen.store import schemas
+from aerialdojo_gen.store import shards as store
+from aerialdojo_gen.store.tables import check_table, from_rows
+
+SCENE = "U_Test_0"
+CONFIG = PlanConfig(targets_per_part=2)
+N_OBJECTS = 5
+
+
+def job(data: Path, stage: str, part: int = 0, parts: int = 1) -> Job:
+    return Job(stage, SCENE, part, parts, 0, Embodiment(), Roots(data, data, data, data))
+
+
+def write(data: Path, name: str, spec: schemas.TableSpec, rows) -> None:
+    store.write_shard(data, name, SCENE, 0, from_rows(spec, rows))
+
+
+@pytest.fixture(scope="module")
+def data(tmp_path_factory) -> Path:
+    """A store with the town, five objects of three anchors each, one of them inside a house, and their pairs."""
+    root = tmp_path_factory.mktemp("data")
+    world = town()
+    (root / "meshes").mkdir()
+    write_glb(world, root / "meshes" / f"{SCENE}.glb")
+    digest = hashlib.sha256((root / "meshes" / f"{SCENE}.glb").read_bytes()).hexdigest()
+    low, high = world.bounds.tolist()
+    write(root, "scenes", schemas.SCENES, [
+        {"scene": SCENE, "family": "Urban", "scene_type": "Test", "partition": "ID",
+         "mesh_path": f"meshes/{SCENE}.glb", "attribution": None, "mesh_sha256": digest, "ceiling_m": high[2],
+         **{f"{e}_{a}_m": v for e, c in (("min", low), ("max", high)) for a, v in zip("xyz", c, strict=True)},
+         "n_triangles": world.n_triangles, "n_instances": len(world.instances), "n_categories": 2}])  # fmt: skip
+    write(root, "objects", schemas.OBJECTS, [
+        {"scene": SCENE, "object_id": k, "name": f"thing {k}", "category": "thing", "description": "A thing.",
+         "mesh_node": f"thing_{k:02d}", "x_m": 0.0, "y_m": 0.0, "z_m": 1.0, "size_x_m": 1.0, "size_y_m": 1.0,
+         "size_z_m": 1.0, "landmark_id": 0, "direction": "east"} for k in range(N_OBJECTS)])  # fmt: skip
+    grid = ClearanceGrid.build(world)
+    rng = np.random.default_rng(11)
+    anchors = []
+    for k in range(N_OBJECTS):
+        for a in range(3):
+            p = (0.0, 0.0, 0.0)
+            while not (grid.reachable(p) and grid.distance_m(p) > 0.4):
+                p = rng.uniform([-16, -16, 0.5], [16, 16, 6])
+            if (k, a) == (4, 2):
+                p = world["thing_00"].centroid
+            anchors.append(
+                {"scene": SCENE, "object_id": k, "anchor_id": a, "x_m": p[0], "y_m": p[1], "z_m": p[2],
+                 "yaw_rad": rng.uniform(-math.pi, math.pi), "clearance_m": 1.0, "surface_distance_m": 1.0,
+                 "visible_fraction": 1.0, "score": 1.0 - a / 10, "selected": a == 1, "selected_by": "human",
+                 **OPINIONS}
+            )  # fmt: skip
+    write(root, "anchors", schemas.ANCHORS, anchors)
+    pairs = pair_objects.run(job(root, "pair-objects"), PairObjectsConfig()).tables["pairs"]
+    store.write_shard(root, "pairs", SCENE, 0, pairs)
+    return root
+
+
+@pytest.fixture(scope="module")
+def shards(data):
+    parts = -(-N_OBJECTS // CONFIG.targets_per_part)
+    assert parts == 3
+    return [plan.run(job(data, "plan", k, parts), CONFIG) for k in range(parts)]
+
+
+def test_every_candidate_has_one_row_in_one_shard(data, shards):
+    ids = []
+    for out in shards:
+        table = check_table(schemas.PLANS, out.tables["plans"])
+        part = table["pair_id"].to_pylist()
+        assert part == sorted(part)
+        assert out.rows_in == out.rows_out == len(part) == sum(out.counts.values())
+        ids += part
+    assert sorted(ids) == sorted(store.read_scene(data, "pairs", SCENE)["pair_id"].to_pylist())
+    assert len(ids) > 40
+
+
+def test_the_anchor_inside_a_house_starts_nothing(shards):
+    rows = [r for out in shards for r in out.tables["plans"].to_pylist()]
+    for r in rows:
+        inside = r["pair_id"].startswith("4_2__")
+        assert r["outcome"] == ("START_IN_COLLISION" if inside else "SOLVED")
+        if inside:
+            assert (r["length_m"], r["n_actions"], r["x_m"], r["action"]) == (0.0, 0, [], [])
+            assert r["min_clearance_m"] is None
+
+
+def test_stored_routes_run_from_the_turned_start_anchor_to_the_selected_one(data, shards):
+    anchors = {(a["object_id"], a["anchor_id"]): a for a in store.read_scene(data, "anchors", SCENE).to_pylist()}
+    pairs = {p["pair_id"]: p for p in store.read_scene(data, "pairs", SCENE).to_pylist()}
+    mesh = solid(town())
+    checked = 0
+    for out in shards:
+        solved = out.tables["plans"].filter(pc.equal(out.tables["plans"]["outcome"], "SOLVED"))
+        for r in solved.to_pylist():
+            pair = pairs[r["pair_id"]]
+            begin = anchors[pair["start_object_id"], pair["start_anchor_id"]]
+            end = anchors[pair["target_object_id"], 1]
+            p = np.column_stack([r["x_m"], r["y_m"], r["z_m"]])
+            assert p[0] == pytest.approx([begin["x_m"], begin["y_m"], begin["z_m"]], abs=1e-12)
+            assert p[-1].tolist() == [end["x_m"], end["y_m"], end["z_m"]]
+            assert math.cos(r["yaw_rad"][0] - begin["yaw_rad"]) == pytest.approx(-1.0)
+            assert math.cos(r["yaw_rad"][-1] - end["yaw_rad"]) >= math.cos(math.radians(7.5)) - 1e-9
+            assert r["n_actions"] == len(r["action"]) == len(p)
+            flown = [a for a in r["action"] if a not in (schemas.STOP, schemas.APPROACH)]
+            replayed = replay([*p[0], r["yaw_rad"][0]], flown)
+            assert np.abs(replayed[:, :3] - p[: len(replayed)]).max() < 1e-5
+            assert r["length_m"] == pytest.approx(np.linalg.norm(np.diff(p, axis=0), axis=1).sum(), abs=1e-9)
+            if checked % 6 == 0:
+                assert distances(mesh, along(p, 0.1)).min() >= 0.25 - 1e-9
+            checked += 1
+    assert checked > 40
+
+
+def test_a_shard_does_not_depend_on_what_was_planned_before(data, shards):
+    release_scenes()
+    again = plan.run(job(data, "plan", 1, 3), CONFIG)
+    assert again.tables["plans"].equals(shards[1].tables["plans"])
+
+
+def test_a_part_beyond_the_targets_is_empty(data):
+    out = plan.run(job(data, "plan", 3, 4), CONFIG)
+    assert (out.rows_in, out.rows_out, out.tables["plans"].num_rows) == (0, 0, 0)
+    check_table(schemas.PLANS, out.tables["plans"])
+
+
+def test_a_pair_without_its_anchor_is_named(data, tmp_path):
+    for name in ("scenes", "objects", "anchors", "pairs"):
+        table = store.read_scene(data, name, SCENE)
+        if name == "anchors":
+            table = table.filter(pc.not_equal(table["object_id"], 3))
+        store.write_shard(tmp_path, name, SCENE, 0, table)
+    (tmp_path / "meshes").symlink_to(data / "meshes")
+    with pytest.raises(StoreError, match="pair-objects"):
+        plan.run(job(tmp_path, "plan"), CONFIG)
+
+
+# What is released of the town: a fifth of its short routes, and metres that they can have.
+RELEASED = PaperScene(SCENE, 1, N_OBJECTS, 12, 3, 0, 330.0)
+
+
+@pytest.fixture
+def released(data, monkeypatch):
+    def planned(paper: PaperScene, **values) -> tuple[dict, dict]:
+        monkeypatch.setattr(plan, "inventory", lambda: {SCENE: paper})
+        config = ReleasedPlanConfig(search="released", kept=FilterConfig(), prefer_harder=5.0, **values)
+        out = plan.run(job(data, "plan"), config)
+        assert out.rows_in == out.rows_out == store.read_scene(data, "pairs", SCENE).num_rows
+        return {r["pair_id"]: r for r in check_table(schemas.PLANS, out.tables["plans"]).to_pylist()}, out.counts
+
+    return planned
+
+
+def test_as_much_is_searched_as_is_released_and_nothing_of_it_differs(data, shards, released):
+    every = {r["pair_id"]: r for out in shards for r in out.tables["plans"].to_pylist()}
+    some, counts = released(RELEASED)
+    assert counts["NOT_NEEDED"] > 10
+    assert counts["SOLVED"] >= 15
+    kept = {"base": 0, "standard": 0}
+    for key, row in some.items():
+        if row["outcome"] != "NOT_NEEDED":
+            assert row == every[key]
+            kept["base" if row["length_m"] < 30 else "standard"] += row["length_m"] >= 5
+        else:
+            assert (row["length_m"], row["x_m"]) == (0.0, [])
+            assert row["predicted_length_m"] == pytest.approx(every[key]["length_m"], rel=0.15)
+    assert kept["base"] >= 12
+    assert kept["standard"] >= 3
+    # By another number of candidates searched at first the rest are searched later: there is enough in any case.
+    again, _ = released(RELEASED, search_margin=0.02)
+    assert sum(r["outcome"] == "SOLVED" for r in again.values()) <= counts["SOLVED"]
+
+
+def test_where_more_is_released_than_there_is_all_is_searched(shards, released):
+    every = {r["pair_id"]: r for out in shards for r in out.tables["plans"].to_pylist()}
+    all_of_it, counts = released(PaperScene(SCENE, 1, N_OBJECTS, 500, 500, 9, 3e4))
+    assert "NOT_NEEDED" not in counts
+    assert all_of_it == every

@@ -1,0 +1,280 @@
+"""Scorers that ask a model: CLIP in ONNX files made here, and a multimodal model behind a real HTTP server."""
+
+import base64
+import json
+import math
+import re
+import sys
+
+import cv2
+import numpy as np
+import pytest
+from support.llm_server import Drip, Hang, Say, Status, Trickle, serving
+from support.two_coloured import POST, item_of, job_in, plain_view, redness, world_of, yard
+
+from aerialdojo_gen.base.config.sections import AnchorSampleConfig, ClipConfig, ScorerWeights, VlmConfig
+from aerialdojo_gen.base.errors import AssetError, MissingPackage, UsageError
+from aerialdojo_gen.benchmark.agents.base import AgentUnavailable
+from aerialdojo_gen.pipeline.registry import BY_NAME
+from aerialdojo_gen.pipeline.scoring.clip import ClipScorer, digest
+from aerialdojo_gen.pipeline.scoring.ensemble import panel
+from aerialdojo_gen.pipeline.scoring.vlm import VlmScorer, read_order
+from aerialdojo_gen.pipeline.stages.work.anchor_sample import anchors_of
+
+WORDS = {"[UNK]": 0, "a": 1, "photo": 2, "of": 3, "red": 4, "blue": 5, "post": 6}
+KEY = "sk-test-0123456789"
+RED, GREY, BLUE = plain_view((220, 30, 30)), plain_view((128, 128, 128)), plain_view((30, 40, 210))
+
+
+@pytest.fixture(scope="session")
+def clip(tmp_path_factory):
+    """A CLIP whose embeddings are colours: a picture's mean, and what a word stands for."""
+    import onnx
+    from onnx import TensorProto, helper, numpy_helper
+
+    folder = tmp_path_factory.mktemp("clip")
+
+    def save(name, graph):
+        model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 13)], ir_version=8)
+        onnx.checker.check_model(model)
+        onnx.save(model, str(folder / name))
+
+    value = helper.make_tensor_value_info
+    save(
+        "vision.onnx",
+        helper.make_graph(
+            [helper.make_node("ReduceMean", ["pixel_values"], ["image_embeds"], axes=[2, 3], keepdims=0)],
+            "vision",
+            [value("pixel_values", TensorProto.FLOAT, ["n", 3, 32, 32])],
+            [value("image_embeds", TensorProto.FLOAT, ["n", 3])],
+        ),
+    )
+    meaning = np.zeros((len(WORDS), 3), np.float32)
+    meaning[WORDS["red"]], meaning[WORDS["blue"]] = (1.0, -0.5, -0.5), (-0.5, -0.5, 1.0)
+    save(
+        "text.onnx",
+        helper.make_graph(
+            [
+                helper.make_node("Gather", ["meaning", "input_ids"], ["words"]),
+                helper.make_node("ReduceSum", ["words", "axes"], ["text_embeds"], keepdims=0),
+            ],
+            "text",
+            [value("input_ids", TensorProto.INT64, ["n", "length"])],
+            [value("text_embeds", TensorProto.FLOAT, ["n", 3])],
+            [
+                numpy_helper.from_array(meaning, "meaning"),
+                numpy_helper.from_array(np.array([1], np.int64), "axes"),
+            ],
+        ),
+    )
+    from tokenizers import Tokenizer, models, pre_tokenizers
+
+    tokenizer = Tokenizer(models.WordLevel(WORDS, unk_token="[UNK]"))
+    tokenizer.pre_tokenizer = pre_tokenizers.Whitespace()
+    tokenizer.save(str(folder / "tokenizer.json"))
+    return ClipConfig(vision=folder / "vision.onnx", text=folder / "text.onnx", tokenizer=folder / "tokenizer.json")
+
+
+def selected(config, name, folder):
+    rows, _ = anchors_of(item_of(POST, name), world_of(yard(POST)), job_in(folder), config)
+    assert rows[0]["selected"]
+    return rows
+
+
+def looks_south(row):
+    return abs(math.remainder(row["yaw_rad"] + math.pi / 2, 2 * math.pi)) < math.radians(50)
+
+
+def test_clip_prefers_the_picture_that_fits_the_name(clip):
+    scorer = ClipScorer(clip)
+    assert scorer.score("red post", [BLUE, RED, GREY])[1] == 1.0
+    assert scorer.score("blue post", [BLUE, RED, GREY])[0] == 1.0
+    for scores in (scorer.score("red post", [BLUE, RED, GREY]), scorer.score("blue post", [RED])):
+        assert all(0.0 <= s <= 1.0 for s in scores)
+        assert max(scores) == 1.0
+
+
+def test_clips_scores_are_those_of_its_cosines(clip):
+    scorer = ClipScorer(clip)
+    pictures = np.stack([view.rgb for view in (RED, GREY, BLUE)])
+    mean, std = np.array([0.48145466, 0.4578275, 0.40821073]), np.array([0.26862954, 0.26130258, 0.27577711])
+    embedded = (pictures.reshape(3, -1, 3).mean(axis=1) / 255.0 - mean) / std
+    red = np.array([1.0, -0.5, -0.5])
+    cosine = embedded @ red / np.linalg.norm(embedded, axis=1) / np.linalg.norm(red)
+    assert scorer.similarity("red post", pictures) == pytest.approx(cosine, abs=1e-5)
+    assert scorer.score("red post", [RED, GREY, BLUE]) == pytest.approx(
+        np.exp(100 * (cosine - cosine.max())), abs=1e-3
+    )
+
+
+def test_clip_selects_the_side_that_the_name_tells(clip, tmp_path):
+    config = AnchorSampleConfig(weights=ScorerWeights(geometric=0.0, clip=1.0), clip=clip)
+    rows = selected(config, "red post", tmp_path)
+    assert looks_south(rows[0])  # the red side looks north
+    assert rows[0]["score"] == rows[0]["score_clip"] == 1.0
+    assert all(row["score_geometric"] is None for row in rows)
+    assert not looks_south(selected(config, "blue post", tmp_path)[0])
+
+
+def test_a_changed_model_changes_the_settled_configuration(clip, tmp_path):
+    copy = ClipConfig(**{k: tmp_path / getattr(clip, k).name for k in ("vision", "text", "tokenizer")})
+    for name in ("vision", "text", "tokenizer"):
+        getattr(copy, name).write_bytes(getattr(clip, name).read_bytes())
+    settle = BY_NAME["anchor-sample"].settle
+    config = AnchorSampleConfig(weights=ScorerWeights(clip=1.0), clip=copy)
+    first = settle(config, print)
+    assert first.clip.sha256 == digest(clip)
+    copy.tokenizer.write_bytes(copy.tokenizer.read_bytes() + b"\n")
+    assert settle(config, print).clip.sha256 != first.clip.sha256
+    assert settle(AnchorSampleConfig(clip=copy), print).clip.sha256 == ""
+
+
+@pytest.mark.parametrize("which", ["vision", "text", "tokenizer"])
+def test_a_file_that_is_missing_or_wrong_is_named(clip, which, tmp_path):
+    with pytest.raises(AssetError, match="nowhere"):
+        ClipScorer(clip.model_copy(update={which: tmp_path / "nowhere"}))
+    (tmp_path / "wrong").write_bytes(b"\x08\x07 no model")
+    with pytest.raises(AssetError, match="wrong"):
+        ClipScorer(clip.model_copy(update={which: tmp_path / "wrong"}))
+
+
+def test_encoders_in_each_others_place_are_noticed(clip):
+    with pytest.raises(AssetError, match="takes no pictures"):
+        ClipScorer(clip.model_copy(update={"vision": clip.text}))
+    with pytest.raises(AssetError, match="input_ids"):
+        ClipScorer(clip.model_copy(update={"text": clip.vision}))
+
+
+def test_clip_without_its_package_says_what_to_install(clip, monkeypatch):
+    monkeypatch.setitem(sys.modules, "onnxruntime", None)
+    with pytest.raises(MissingPackage, match=r"pip install 'aerialdojo-gen\[clip\]'"):
+        ClipScorer(clip)
+
+
+@pytest.fixture
+def key(monkeypatch):
+    monkeypatch.setenv("OPENAI_API_KEY", KEY)
+    monkeypatch.delenv("OPENAI_BASE_URL", raising=False)
+
+
+def vlm(service, **options):
+    return VlmConfig(model="m", base_url=f"{service.url}/v1", retries=0, **options)
+
+
+def shown(body):
+    """The pictures that a model is sent."""
+    parts = body["messages"][-1]["content"]
+    pictures = []
+    for url in (p["image_url"]["url"] for p in parts if p["type"] == "image_url"):
+        data = np.frombuffer(base64.b64decode(url.removeprefix("data:image/jpeg;base64,")), np.uint8)
+        pictures.append(cv2.imdecode(data, cv2.IMREAD_COLOR)[..., ::-1])
+    return pictures
+
+
+def by_redness(body):
+    """A model that likes red: it looks at the pictures that it is sent."""
+    pictures = shown(body)
+    order = sorted(range(len(pictures)), key=lambda k: -redness(pictures[k]))
+    return json.dumps({"order": [k + 1 for k in order]})
+
+
+def test_a_model_is_shown_the_pictures_and_the_name_and_orders_them(key):
+    with serving() as service:
+        service.policy = by_redness
+        assert VlmScorer(vlm(service)).score("red post", [BLUE, GREY, RED]) == [0.0, 0.5, 1.0]
+        (request,) = service.requests
+    assert request["path"] == "/v1/chat/completions"
+    assert request["headers"]["authorization"] == f"Bearer {KEY}"
+    assert KEY not in json.dumps(request["body"])
+    assert '"red post"' in request["body"]["messages"][-1]["content"][-1]["text"]
+    assert request["body"]["model"] == "m"
+    assert request["body"]["temperature"] == 0.0
+
+
+def test_the_models_order_selects_the_anchor(key, tmp_path):
+    with serving() as service:
+        service.policy = by_redness
+        config = AnchorSampleConfig(weights=ScorerWeights(geometric=0.0, vlm=1.0), vlm=vlm(service))
+        rows = selected(config, "red post", tmp_path)
+        assert len(service.requests) == 1
+    panel.cache_clear()
+    # A model is shown more than the thumbnails that geometry makes do with.
+    assert min(min(picture.shape[:2]) for picture in shown(service.requests[0]["body"])) >= 320
+    assert looks_south(rows[0])
+    assert [row["score_vlm"] for row in rows] == sorted((row["score_vlm"] for row in rows), reverse=True)
+    assert rows[0]["score"] == 1.0
+
+
+def test_an_answer_that_is_no_order_is_asked_for_once_more(key):
+    with serving(Say("I like the second one."), Say('```json\n{"order": [2, 1]}\n```')) as service:
+        assert VlmScorer(vlm(service)).score("post", [RED, BLUE]) == [0.0, 1.0]
+        assert len(service.requests) == 2
+    again = service.requests[1]["body"]["messages"]
+    assert again[-2] == {"role": "assistant", "content": "I like the second one."}
+    assert "not one JSON object" in again[-1]["content"]
+
+
+def test_a_model_that_gives_no_order_has_no_opinion(key, caplog):
+    with serving(Say('{"order": [1, 1]}')) as service:
+        assert VlmScorer(vlm(service)).score("post", [RED, BLUE]) == [None, None]
+        assert len(service.requests) == 2
+    assert "gave no order for post" in caplog.text
+
+
+def test_one_candidate_needs_no_model(key):
+    with serving() as service:
+        assert VlmScorer(vlm(service)).score("post", [RED]) == [1.0]
+        assert service.requests == []
+
+
+def test_a_service_that_refuses_ends_it_in_one_line_without_the_key(key):
+    with serving(Status(401, "wrong key")) as service, pytest.raises(UsageError, match="HTTP 401") as said:
+        VlmScorer(vlm(service)).score("post", [RED, BLUE])
+    assert KEY not in str(said.value)
+    assert "\n" not in str(said.value)
+
+
+@pytest.mark.parametrize("act", [Hang(), Trickle(), Drip()])
+def test_a_service_that_takes_too_long_is_given_up(key, act):
+    with serving(act) as service, pytest.raises(AgentUnavailable, match=r"no complete answer within 0\.3 s"):
+        VlmScorer(vlm(service, timeout_s=0.3)).score("post", [RED, BLUE])
+
+
+def test_a_busy_service_is_asked_again(key):
+    with serving(Status(503, headers={"retry-after": "0"}), Say('{"order": [1, 2]}')) as service:
+        scorer = VlmScorer(vlm(service).model_copy(update={"retries": 1}))
+        assert scorer.score("post", [RED, BLUE]) == [1.0, 0.0]
+
+
+@pytest.mark.parametrize(
+    ("text", "order"),
+    [
+        ('{"order": [2, 3, 1]}', [1, 2, 0]),
+        ('<think>the third?</think>\n{"order": [3, 1, 2]}', [2, 0, 1]),
+        ('```\n{"order": [1, 2, 3]}\n```', [0, 1, 2]),
+    ],
+)
+def test_orders_that_are_read(text, order):
+    assert read_order(text, 3) == order
+
+
+@pytest.mark.parametrize(
+    ("text", "why"),
+    [
+        ("", "JSON"),
+        ("2, 3, 1", "JSON"),
+        ('{"order": [1, 2, 3]} and more', "JSON"),
+        ("[1, 2, 3]", "order"),
+        ('{"order": [1, 2, 3], "why": "x"}', "order"),
+        ('{"order": "123"}', "order"),
+        ('{"order": [1, 2]}', "1 to 3"),
+        ('{"order": [1, 2, 2]}', "1 to 3"),
+        ('{"order": [0, 1, 2]}', "1 to 3"),
+        ('{"order": [1, 2, 3.0]}', "1 to 3"),
+        ('{"order": [true, 2, 3]}', "1 to 3"),
+        ("[" * 100_000, "JSON"),
+    ],
+)
+def test_orders_that_are_refused(text, why):
+    with pytest.raises(ValueError, match=re.escape(why)):
+        read_order(text, 3)

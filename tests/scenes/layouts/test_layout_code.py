@@ -1,0 +1,168 @@
+"""Layouts are found by their folders, and a scene is as fresh as the code of its own layout."""
+
+import importlib
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import aerialdojo_gen
+from aerialdojo_gen.base.config.pipeline import load_pipeline
+from aerialdojo_gen.pipeline import fingerprint
+from aerialdojo_gen.pipeline.code_digest import PLUMBING, Package, stage_code, stage_module
+from aerialdojo_gen.pipeline.registry import BY_NAME
+from aerialdojo_gen.pipeline.stage import Roots
+from aerialdojo_gen.scenes import layouts
+from aerialdojo_gen.scenes.recipe import load_recipe
+
+SOURCES = Path(aerialdojo_gen.__file__).parent
+PROJECT = SOURCES.parent
+ASSETS = PROJECT / "scene_assets"
+# Layouts of real places have no scene among the 42.
+PLACES = PROJECT / "tests" / "layouts" / "places"
+RECIPES = sorted([*ASSETS.glob("scenes/*.toml"), *ASSETS.glob("smoke/*.toml"), *PLACES.glob("*.toml")])
+BUILD = BY_NAME["build-scenes"]
+# It calls the layouts, and belongs to none.
+ENGINE = "aerialdojo_gen.scenes.layouts.build"
+
+
+def roots_of(recipe):
+    return Roots(PROJECT / "data", ASSETS, recipe.parent, PROJECT / "annotations")
+
+
+def chosen(recipe):
+    return BUILD.imports(roots_of(recipe), recipe.stem)
+
+
+def test_every_type_is_found_and_used_and_every_module_belongs_to_one():
+    found = layouts.layout_modules()
+    assert set(found) == {load_recipe(recipe).layout for recipe in RECIPES}
+    for module in found.values():
+        assert callable(importlib.import_module(f"aerialdojo_gen.scenes.layouts.{module}").build)
+    # Nothing lies about that no scene is made of.
+    used = {part for recipe in RECIPES for part in fingerprint.scene_code(BUILD, roots_of(recipe), recipe.stem).parts}
+    paths = [path.relative_to(PROJECT).with_suffix("") for path in (SOURCES / "layouts").rglob("*.py")]
+    assert {".".join(path.parts).removesuffix(".__init__") for path in paths} <= used
+
+
+def test_what_one_type_alone_uses_lies_in_its_folder_and_what_several_share_in_parts():
+    users: dict[str, set[str]] = {}
+    for recipe in RECIPES:
+        home = chosen(recipe).modules[0].removesuffix(".layout")
+        for part in fingerprint.scene_code(BUILD, roots_of(recipe), recipe.stem).parts:
+            path = SOURCES.joinpath(*part.split(".")[1:]).with_suffix(".py")
+            if part.startswith("aerialdojo_gen.scenes.layouts.") and part != ENGINE and path.is_file():
+                users.setdefault(part, set()).add(home)
+    for module, homes in users.items():
+        families = {home.rpartition(".")[0] for home in homes}
+        place = "aerialdojo_gen.scenes.layouts.parts" if len(families) > 1 else f"{min(families)}.parts"
+        assert module.rpartition(".")[0] == (min(homes) if len(homes) == 1 else place), (module, sorted(homes))
+
+
+def test_a_name_that_stands_twice_is_refused(tmp_path, monkeypatch):
+    other = tmp_path / "elsewhere" / "mall" / "layout.py"
+    other.parent.mkdir(parents=True)
+    other.write_text("")
+    monkeypatch.setattr(layouts, "__path__", [*layouts.__path__, str(tmp_path)])
+    with pytest.raises(RuntimeError, match=r"'mall' stands twice: urban\.mall\.layout and elsewhere\.mall\.layout"):
+        layouts.layout_modules()
+
+
+def test_what_a_process_imports_to_build_a_type_is_what_counts():
+    """Seen from outside: what is loaded of this package, against what the digest says is."""
+    one_a_type = {load_recipe(recipe).layout: recipe for recipe in RECIPES}
+    script = (
+        "import sys\n"
+        "from pathlib import Path\n"
+        "from aerialdojo_gen.scenes.layouts.build import _layout\n"
+        "from aerialdojo_gen.scenes.recipe import load_recipe\n"
+        "before = set(sys.modules)\n"
+        "for path in map(Path, sys.argv[1:]):\n"
+        "    for name in [name for name in set(sys.modules) - before if name.startswith('aerialdojo_gen.')]:\n"
+        "        del sys.modules[name]\n"
+        "    _layout(load_recipe(path), path)\n"
+        "    print(*(name for name in sys.modules if name.startswith('aerialdojo_gen')))\n"
+    )
+    command = [sys.executable, "-c", script, *map(str, one_a_type.values())]
+    run = subprocess.run(command, check=True, capture_output=True, text=True)
+    lines = run.stdout.splitlines()
+    for (layout, recipe), line in zip(one_a_type.items(), lines, strict=True):
+        loaded = set(line.split()) - set(PLUMBING)
+        parts = set(fingerprint.scene_code(BUILD, roots_of(recipe), recipe.stem).parts)
+        assert f"aerialdojo_gen.scenes.layouts.{layouts.layout_modules()[layout]}" in loaded
+        counted = {name for name in parts if ".layouts" in name}
+        assert {name for name in loaded if ".layouts" in name} - {ENGINE} == counted - {ENGINE}
+        assert loaded <= parts
+
+
+@pytest.fixture(scope="module")
+def copied(tmp_path_factory):
+    """A copy of the package's sources, with what reading them gave before."""
+    stage_code("build-scenes")
+    folder = tmp_path_factory.mktemp("copy") / "aerialdojo_gen"
+    for path in [*SOURCES.rglob("*.py"), *SOURCES.rglob("*.toml"), *SOURCES.glob("__pycache__/code-facts.json")]:
+        target = folder / path.relative_to(SOURCES)
+        target.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copyfile(path, target)
+    return folder
+
+
+@pytest.mark.parametrize(
+    ("relative", "stale"),
+    [
+        ("urban/mall/shops.py", {"mall"}),
+        ("natural/parts/strata.py", {"desert", "snowfield"}),
+        ("parts/structures.py", None),
+    ],
+)
+def test_a_change_makes_stale_what_is_built_with_it_and_nothing_else(copied, relative, stale):
+    def digests():
+        package = Package(copied)
+        return {recipe.stem: package.of(stage_module(BUILD.name), chosen(recipe)).digest for recipe in RECIPES}
+
+    path = copied / "layouts" / relative
+    before, text = digests(), path.read_text()
+    path.write_text(text + "\nFURTHER = 1\n")
+    after = digests()
+    path.write_text(text)
+    changed = {load_recipe(recipe).layout for recipe in RECIPES if before[recipe.stem] != after[recipe.stem]}
+    if stale is None:
+        assert {"mall", "harbor", "island"} <= changed
+        assert not {"mountain", "snowfield", "desert", "forest", "courtyard"} & changed
+    else:
+        assert changed == stale
+
+
+def test_a_recipe_that_is_wrong_counts_all_layouts_and_an_imported_scene_none(tmp_path):
+    roots = Roots(tmp_path, ASSETS, tmp_path, tmp_path)
+
+    def parts(text):
+        (tmp_path / "Place.toml").write_text(text)
+        found = fingerprint.scene_code(BUILD, roots, "Place").parts
+        return {name for name in found if name.startswith("aerialdojo_gen.scenes.layouts.")}
+
+    whole = {name for name in stage_code("build-scenes").parts if name.startswith("aerialdojo_gen.scenes.layouts.")}
+    assert len(whole) > 100
+    for text in ('layout = "mal"', "layout = [1]", "layout = ", "seed = 3"):
+        assert parts(text) == whole
+    assert parts('[imported]\nsource = "x.glb"') == {ENGINE}
+    assert BUILD.imports(roots, "Nowhere") is None
+
+
+def test_the_fingerprint_of_a_scene_follows_its_layout(tmp_path):
+    """Two recipes that differ in nothing but the layout's name differ in code, not in their bytes alone."""
+    pipeline = load_pipeline(PROJECT / "pipelines" / "smoke.toml")
+    texts = {"a": 'layout = "mall"', "b": 'layout = "park"'}
+    for name, text in texts.items():
+        (tmp_path / f"{name}.toml").write_text(text)
+    roots = Roots(tmp_path, ASSETS, tmp_path, tmp_path)
+    codes = {name: fingerprint.scene_code(BUILD, roots, name).digest for name in texts}
+    assert codes["a"] != codes["b"]
+    assert fingerprint.scene_fingerprint(BUILD, pipeline, roots, "a")
+    assert {
+        stage
+        for stage in BY_NAME
+        if fingerprint.scene_code(BY_NAME[stage], roots, "a").digest != stage_code(stage).digest
+    } == {BUILD.name}

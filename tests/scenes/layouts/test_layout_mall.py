@@ -1,0 +1,136 @@
+"""The mall as it is built: what stands in it, and where a drone can fly."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import fcl
+import numpy as np
+import pytest
+
+from aerialdojo_gen.base.errors import AssetError
+from aerialdojo_gen.base.rng import generator
+from aerialdojo_gen.planning.collision import CollisionWorld
+from aerialdojo_gen.scenes.catalogue import Catalogue, load_catalogue
+from aerialdojo_gen.scenes.layouts.build import build_scene
+from aerialdojo_gen.scenes.model import Instance, Scene
+
+ASSETS = Path(__file__).parents[2] / "scene_assets"
+RECIPE = ASSETS / "scenes" / "U_Mall_0.toml"
+URBAN = ("vehicles", "street", "retail", "park", "signs", "shopfronts", "landmarks_urban")
+HUNG = {"shop_sign", "wall_banner", "wall_clock", "storefront", "dock_door"}
+
+
+@pytest.fixture(scope="module")
+def catalogue() -> Catalogue:
+    return load_catalogue(ASSETS)
+
+
+@pytest.fixture(scope="module")
+def mall(scene_of: Callable[[str], Scene]) -> Scene:
+    return scene_of("U_Mall_0")
+
+
+@pytest.fixture(scope="module")
+def world(mall: Scene) -> CollisionWorld:
+    return CollisionWorld(mall)
+
+
+def props(scene: Scene, catalogue: Catalogue) -> list[Instance]:
+    return [i for i in scene.instances if i.category in catalogue]
+
+
+def test_every_prop_says_where_it_stands(mall: Scene, catalogue: Catalogue) -> None:
+    for i in props(mall, catalogue):
+        assert i.attributes.get("place", "").strip(), i.node
+
+
+def test_props_do_not_stand_in_each_other(mall: Scene, catalogue: Catalogue) -> None:
+    owners: dict[int, Instance] = {}
+    bodies = []
+    for i in props(mall, catalogue):
+        if catalogue[i.category].kind == "building":
+            continue
+        model = fcl.BVHModel()
+        model.beginModel(len(i.vertices), len(i.faces))
+        model.addSubModel(i.vertices, i.faces)
+        model.endModel()
+        owners[id(model)] = i
+        bodies.append(fcl.CollisionObject(model))
+    manager = fcl.DynamicAABBTreeCollisionManager()
+    manager.registerObjects(bodies)
+    manager.setup()
+    found = fcl.CollisionData(request=fcl.CollisionRequest(num_max_contacts=10_000))
+    manager.collide(found, fcl.defaultCollisionCallback)
+    pairs = {tuple(sorted(owners[id(g)].node for g in (c.o1, c.o2))) for c in found.result.contacts}
+    # Hedges run on from block to block, and trees grow out of them.
+    assert [p for p in sorted(pairs) if not any("hedge" in n for n in p)] == []
+
+
+def test_what_is_not_hung_up_stands_on_something(mall: Scene, world: CollisionWorld, catalogue: Catalogue) -> None:
+    for i in props(mall, catalogue):
+        if i.category in HUNG:
+            continue
+        base = float(i.bounds[0, 2])
+        feet = i.vertices[i.vertices[:, 2] < base + 0.1]
+        others = [o for o in mall.instances if o is not i and (o.bounds[0] - 0.1 <= feet.max(axis=0)).all()
+                  and (o.bounds[1] + 0.1 >= feet.min(axis=0)).all()]  # fmt: skip
+        gap = min(world.instance_distance_m(o.node, feet[k]) for o in others for k in (0, len(feet) // 2))
+        assert gap < 0.12, (i.node, gap)
+
+
+@pytest.mark.parametrize(
+    ("p", "q"),
+    [
+        ((-10.5, 15.0, 3.2), (-10.5, 60.0, 3.2)),
+        ((-29.0, 17.7, 4.3), (8.0, 17.7, 4.3)),
+        ((-33.65, 3.0, 3.9), (-33.65, 14.0, 3.9)),
+        ((-11.0, -20.0, 3.3), (-11.0, -1.5, 3.3)),
+        ((-59.6, 0.0, 4.4), (-59.6, 40.0, 4.4)),
+        ((47.0, 18.6, 2.4), (90.0, 18.6, 2.4)),
+        ((51.0, 37.0, 6.3), (90.0, 37.0, 6.3)),
+        ((57.0, -30.0, 2.9), (57.0, -12.0, 2.9)),
+        ((38.0, -14.0, 7.0), (38.0, 50.0, 7.0)),
+    ],
+    ids=["passage", "north arcade", "west arcade", "gate", "west canopy", "deck", "middle floor", "terrace", "drive"],
+)
+def test_a_drone_can_fly_under_it(world: CollisionWorld, p: tuple[float, ...], q: tuple[float, ...]) -> None:
+    assert not world.segment_in_collision(np.array(p), np.array(q), 0.25)
+
+
+@pytest.mark.parametrize(
+    ("p", "q"),
+    [
+        ((-20.0, 10.0, 2.0), (-20.0, 55.0, 2.0)),
+        ((0.0, 30.0, 12.0), (0.0, 30.0, 3.0)),
+        ((65.0, 30.0, 2.0), (65.0, 30.0, 9.0)),
+    ],
+    ids=["hall", "roof", "slab"],
+)
+def test_walls_and_floors_stop_it(world: CollisionWorld, p: tuple[float, ...], q: tuple[float, ...]) -> None:
+    assert world.segment_in_collision(np.array(p), np.array(q), 0.25)
+
+
+@pytest.mark.parametrize("theme", URBAN)
+def test_every_look_of_every_urban_prop(theme: str, catalogue: Catalogue) -> None:
+    for category in [c for c in catalogue if Path(catalogue[c].source.partition(":")[0]).stem == theme]:
+        prop = catalogue[category]
+        looks = [v.attributes for v in prop.variants]
+        assert all(looks), category
+        assert len({tuple(sorted(a.items())) for a in looks}) == len(looks), category
+        for variant in prop.variants:
+            body = catalogue.instantiate(category, "x", generator(0, "test", category), variant=variant.name)
+            triangles = sum(len(p.faces) for p in body.parts)
+            low, high = body.bounds
+            # A stack of pallets is made of boards.
+            assert 12 <= triangles <= 3000, (category, variant.name, triangles)
+            assert -0.05 <= low[2] < 0.5 or category in HUNG, (category, low)
+            assert 0.4 < (high - low).max() < 25.0, (category, high - low)
+
+
+def test_furniture_that_the_catalogue_lacks_is_named(tmp_path: Path, catalogue: Catalogue) -> None:
+    recipe = tmp_path / "U_Mall_9.toml"
+    recipe.write_text(RECIPE.read_text().replace('category = "ice_cream_cart"', 'category = "ice_cream_card"', 1))
+    with pytest.raises(AssetError, match=r"ice_cream_card.*ice_cream_cart"):
+        build_scene(recipe, catalogue)

@@ -1,0 +1,129 @@
+"""Earthquakes and explosions: broken structure holds together, and each scene stands up to a look from close by."""
+
+import numpy as np
+import pytest
+import shapely
+from shapely.geometry import Polygon
+from support.layout_checks import catalogue, clashes, floating, props_of
+
+from aerialdojo_gen.base.errors import AssetError
+from aerialdojo_gen.scenes.grammar_frames import Frame
+from aerialdojo_gen.scenes.ground import rectangle
+from aerialdojo_gen.scenes.layouts.disaster.parts.buildings import put_up
+from aerialdojo_gen.scenes.layouts.disaster.parts.ground import crater, faulted, heaped, slab_pile
+from aerialdojo_gen.scenes.layouts.disaster.parts.relief import stand, stand_on_floor, strew_things
+from aerialdojo_gen.scenes.layouts.disaster.parts.wreckage import Bite, broken_edge, torn_floor, torn_wall
+from aerialdojo_gen.scenes.layouts.disaster.parts.wrecks import Style, Wreck
+from aerialdojo_gen.scenes.recipe import Recipe
+from aerialdojo_gen.scenes.site import Site
+from aerialdojo_gen.scenes.terrain import rolling_terrain
+
+SCENES = [f"D_{kind}_{k}" for kind in ("Earthquake", "Explosion") for k in (0, 1)]
+BITE = Bite(0.0, -4.0, 2.0, 4.0, seed=3)
+
+
+def blank() -> Site:
+    return Site("D_T_0", Recipe(layout="none", size_m=(60, 60), ceiling_m=20), catalogue())
+
+
+def test_every_category_of_the_theme_stands_somewhere(scene_of):
+    placed = {i.category for name in SCENES for i in props_of(scene_of(name))}
+    theme = {"rubble_heap", "rescue_tent", "field_hospital_tent", "ambulance", "fire_engine", "stretcher",
+             "rescue_boat", "sandbag_wall", "overturned_car", "burnt_car", "broken_power_pole", "evacuation_sign",
+             "field_kitchen", "search_light"}  # fmt: skip
+    assert theme <= placed
+
+
+def test_bites_start_at_their_foot_and_widen():
+    bite = Bite(1.0, 2.0, 2.0, 5.0, 1.0, 11.0, seed=4)
+    assert bite.area(0.9).is_empty
+    assert bite.area(1.0).area < bite.area(6.0).area < bite.area(20.0).area
+    assert bite.area(20.0).area == pytest.approx(bite.area(20.5).area)
+
+
+def test_walls_lose_what_a_bite_takes_and_no_more():
+    rng = np.random.default_rng(1)
+    face = rectangle(0.0, 0.0, 20.0, 9.0)
+    whole = torn_wall((-10.0, -4.0), (10.0, -4.0), face, (), rng, thickness_m=0.3)
+    torn = torn_wall((-10.0, -4.0), (10.0, -4.0), face, (BITE,), rng, thickness_m=0.3)
+    assert whole is not None
+    assert torn is not None
+    assert whole.volume_m3 == pytest.approx(20.0 * 9.0 * 0.3)
+    assert 0.3 * whole.volume_m3 < torn.volume_m3 < 0.85 * whole.volume_m3
+    upper = torn.vertices[torn.vertices[:, 2] > 6.0]
+    assert np.abs(upper[:, 0]).min() > 1.0
+    assert torn_wall((0.0, 0.0), (1.0, 0.0), rectangle(0, 1, 1, 3), (Bite(0.5, 0.0, 9.0, 9.0),), rng) is None
+
+
+def test_floors_end_where_bars_stick_out():
+    plan = rectangle(-10.0, -5.0, 10.0, 5.0)
+    floor = torn_floor(plan, 3.0, (BITE,))
+    assert floor is not None
+    assert floor.volume_m3 == pytest.approx(0.25 * plan.difference(BITE.area(3.0)).area, rel=1e-6)
+    edge = broken_edge(plan, 3.0, (BITE,))
+    assert edge
+    for at, yaw in edge:
+        assert shapely.Point(at).distance(BITE.area(3.0).boundary) < 0.05
+        ahead = shapely.Point(at[0] + 0.4 * np.cos(np.radians(yaw)), at[1] + 0.4 * np.sin(np.radians(yaw)))
+        assert BITE.area(3.0).contains(ahead)
+
+
+def test_a_leaning_building_tips_over_its_front():
+    site = blank()
+    straight = put_up(site, Wreck(Frame(-15.0, 0.0), 12.0, 8.0, 4, Style()), 0.0)
+    leaning = put_up(site, Wreck(Frame(15.0, 0.0), 12.0, 8.0, 4, Style(), lean_deg=8.0), 0.0)
+    assert leaning.bounds[0, 1] < straight.bounds[0, 1] - 1.0
+    assert leaning.bounds[1, 2] > straight.bounds[1, 2]
+
+
+def test_nothing_is_stood_where_a_floor_is_gone():
+    site = blank()
+    wreck = Wreck(Frame(0.0, 0.0, 90.0), 16.0, 10.0, 3, Style(), (Bite(0.0, -5.0, 3.0, 6.0, seed=5),))
+    put_up(site, wreck, 0.0)
+    assert wreck.bears(6.0, 3.0, 2)
+    assert not wreck.bears(0.0, -4.0, 2)
+    (chair,) = stand_on_floor(site, wreck, 0.0, 2, "upstairs", [("rocking_chair", 6.0, 3.0, 0.0)])
+    assert chair.bounds[0, 2] == pytest.approx(2 * wreck.style.storey_m + 0.03, abs=0.01)
+    assert chair.centroid[:2] == pytest.approx(wreck.frame.at(6.0, 3.0), abs=0.3)
+    with pytest.raises(AssetError, match="no floor for rocking_chair"):
+        stand_on_floor(site, wreck, 0.0, 2, "upstairs", [("rocking_chair", 0.0, -4.0, 0.0)])
+
+
+def test_taken_ground_is_refused_by_name():
+    site = blank()
+    stand(site, "on the square", [("bench", 0.0, 0.0, 0.0)])
+    with pytest.raises(AssetError, match=r"no room for stretcher at \(0.2, 0\)"):
+        stand(site, "on the square", [("stretcher", 0.2, 0.0, 0.0)])
+    placed = strew_things(site, "on the square", rectangle(-8, -8, 8, 8), ["bench", "stretcher", "bench"], "t")
+    assert [i.category for i in placed] == ["bench", "stretcher", "bench"]
+    assert not clashes(site.scene())
+
+
+def test_the_top_of_a_pile_is_level_and_free():
+    site = blank()
+    z = slab_pile(site, 0.0, 0.0, 30.0, (14.0, 9.0), 4, "t")
+    assert site.is_free(1.0, 0.0, 0.5, z=z)
+    assert not site.is_free(1.0, 0.0, 0.5, z=z - 1.0)
+    stand(site, "on top", [("bench", 1.0, 0.0, 0.0)], z=z)
+    assert not floating(site.scene())
+
+
+def test_the_ground_sinks_right_of_a_fault():
+    ground = faulted(rolling_terrain((40, 40), 1.0, 1, 0.0, 20.0), [(-30.0, 0.0), (30.0, 0.0)], 1.5, 1.0)
+    assert float(ground.z(3.0, 5.0)) == pytest.approx(0.0)
+    assert float(ground.z(3.0, -5.0)) == pytest.approx(-1.5)
+
+
+def test_craters_have_a_bowl_and_a_rim():
+    ground = crater(rolling_terrain((60, 60), 1.0, 1, 0.0, 20.0), 0.0, 0.0, 6.0, 3.0, 1.0, 2)
+    assert float(ground.z(0.0, 0.0)) == pytest.approx(-3.0)
+    ring = [float(ground.z(r, 0.0)) for r in np.arange(0.0, 20.0, 0.5)]
+    assert max(ring) > 0.6
+    assert ring[-1] == pytest.approx(0.0)
+
+
+def test_heaps_rise_inside_their_area_only():
+    area = Polygon([(-5, -5), (5, -5), (5, 5), (-5, 5)])
+    ground = heaped(rolling_terrain((40, 40), 1.0, 1, 0.0, 20.0), area, 2.0, 3)
+    assert float(ground.z(0.0, 0.0)) > 1.0
+    assert float(ground.z(8.0, 0.0)) == pytest.approx(0.0)

@@ -1,0 +1,62 @@
+"""Harbours: quays over the water, ships afloat beside them, and everything on something."""
+
+import numpy as np
+import pytest
+import shapely
+from support.layout_checks import catalogue, props_of
+
+from aerialdojo_gen.scenes.footprints import footprint
+from aerialdojo_gen.scenes.ground import rectangle
+from aerialdojo_gen.scenes.layouts.infrastructure.harbor.quays import HIGH_M, LONG_M, QUAY_M, container_block, quay
+from aerialdojo_gen.scenes.model import Scene
+from aerialdojo_gen.scenes.recipe import Recipe
+from aerialdojo_gen.scenes.site import Site
+
+SCENES = ["I_Harbor_0", "I_Harbor_1"]
+each_scene = pytest.mark.parametrize("name", SCENES)
+_AFLOAT = {"freighter", "fishing_boat", "tugboat", "sailboat", "motor_yacht", "rowing_boat", "buoy"}
+
+
+def land(scene: Scene) -> shapely.Geometry:
+    """What of the ground lies above the water."""
+    ground = next(i for i in scene.instances if i.category == "ground")
+    corners = ground.vertices[ground.faces]
+    level = (np.ptp(corners[:, :, 2], axis=1) < 1e-6) & (corners[:, 0, 2] > 1.0)
+    return shapely.union_all(shapely.make_valid(shapely.polygons(corners[level][:, :, :2])), grid_size=0.01)
+
+
+@each_scene
+def test_boats_float_clear_of_the_quays(scene_of, name):
+    scene = scene_of(name)
+    boats = [i for i in props_of(scene) if i.category in _AFLOAT]
+    dry = land(scene)
+    assert len(boats) >= 10
+    for boat in boats:
+        assert boat.bounds[0, 2] < 0.05
+        hull = footprint(boat, 0.0)
+        assert hull.intersection(dry).area < 0.02 * hull.area, boat.node
+
+
+def test_the_port_has_every_category_of_harbours_and_vehicles(scene_of):
+    known = catalogue()
+    themes = [k for k in known.targets if known[k].kind in ("prop", "vehicle")]
+    there = {i.category for i in props_of(scene_of("I_Harbor_0"))}
+    wanted = set(_AFLOAT) | {
+        "shipping_container", "mooring_bollard", "reach_stacker", "straddle_carrier", "lifebuoy_stand", "fish_crates",
+        "harbour_crane", "fuel_pump", "anchor_monument", "navigation_beacon", "sedan", "hatchback", "suv",
+        "pickup_truck", "delivery_van", "box_truck", "city_bus", "motorcycle", "scooter", "bicycle", "food_truck",
+        "forklift", "golf_cart",
+    }  # fmt: skip
+    assert wanted <= set(themes)
+    assert wanted <= there
+
+
+def test_containers_are_stacked_in_tiers():
+    site = Site("I_T_0", Recipe(layout="none", size_m=(60, 60), ceiling_m=20), catalogue())
+    quay(site, rectangle(-30, -30, 30, 30))
+    plan = container_block(site, -20.0, -5.0, [[3, 1], [0, 2]])
+    stack = site.instances[-1]
+    assert stack.bounds[1, 2] == pytest.approx(QUAY_M + 3 * HIGH_M, abs=0.1)
+    assert plan.bounds[2] - plan.bounds[0] == pytest.approx(2 * LONG_M + 0.5)
+    assert not site.is_free(-10.0, -3.0, 0.3)
+    assert site.is_free(-10.0, 6.0, 0.3)

@@ -1,0 +1,85 @@
+"""Stadiums and amusement parks: each stands up to a look from close by."""
+
+from collections import Counter
+
+import numpy as np
+import pytest
+import shapely
+from support import layout_checks
+from support.layout_checks import props_of
+
+from aerialdojo_gen.geometry.rays import RayCaster
+from aerialdojo_gen.scenes.ground import rectangle
+from aerialdojo_gen.scenes.layouts.urban.stadium.stand_shells import platform
+from aerialdojo_gen.scenes.layouts.urban.stadium.stands import Tier, gangways, passage, tier_parts
+from aerialdojo_gen.scenes.model import Scene
+
+SCENES = ["U_Stadium_0", "U_Stadium_1", "U_Park_0", "U_Park_1"]
+
+
+def test_their_themes_are_shown_whole(scene_of):
+    shown = Counter(p.category for name in SCENES for p in props_of(scene_of(name)))
+    assets = layout_checks.ASSETS / "props"
+    for theme in ("stadium", "amusement", "park"):
+        lines = (assets / f"{theme}.toml").read_text(encoding="utf-8").splitlines()
+        categories = [
+            line[1:-1] for line in lines if line.startswith("[") and line.endswith("]") and "[[" not in line
+        ]
+        assert categories
+        assert not [c for c in categories if not shown[c]]
+
+
+def ray(scene: Scene, origin: tuple[float, float, float], towards: tuple[float, float, float]) -> float:
+    distance, _ = RayCaster(scene).first_hit(np.array([origin]), np.array([towards]))
+    return float(distance[0])
+
+
+@pytest.mark.parametrize("x", [-12.0, 0.0, 12.0])
+def test_one_flies_from_the_pitch_through_a_portal_and_out_of_the_ground(scene_of, x):
+    scene = scene_of("U_Stadium_0")
+    # Under the upper rows and through the outer wall; beside the portal the front wall bars the way.
+    assert ray(scene, (x + 1.1, -10.9, 2.0), (0.0, -1.0, 0.0)) > 9.0
+    assert ray(scene, (x + 1.9, -10.9, 0.9), (0.0, -1.0, 0.0)) < 1.5
+
+
+def one_tier(**options) -> Tier:
+    return Tier(rectangle(-10, -6, 10, 6), 4.0, 8, 1.0, **options)
+
+
+def test_tiers_rise_a_row_at_a_time():
+    tier = one_tier()
+    assert [tier.level_m(k) for k in (0, 7)] == pytest.approx([1.0, 1.0 + 7 * 0.42])
+    bands = [tier.band(k) for k in range(8)]
+    assert shapely.unary_union(bands).area == pytest.approx(tier.plan.area, rel=1e-6)
+    assert all(bands[k].intersection(bands[k + 1]).area < 1e-6 for k in range(7))
+
+
+def test_gangways_lead_straight_out_from_the_front_edge():
+    tier = one_tier()
+    for foot in gangways(tier, 6.0):
+        way = passage(foot, 1.2, tier.rows * tier.tread_m)
+        assert way.intersection(tier.edge(0)).area < 1.0
+        assert way.difference(tier.edge(0)).difference(tier.plan).area < 0.6
+
+
+def test_seats_keep_off_gangways_portals_and_what_is_to_stay_clear():
+    portal = passage(gangways(one_tier(), 6.0)[0], 3.0, 9.0)
+    clear = rectangle(4, 10, 9, 14)
+    tier = one_tier(portals=(portal,), clear=(clear,))
+    feet = gangways(tier, 6.0)
+    parts = dict(tier_parts(tier, feet, concrete="concrete", step="steps", seat=lambda x, y, row: "seat"))
+    seats = parts["seat"].vertices
+    assert len(seats) > 16 * 200
+    low = seats[seats[:, 2] < tier.head_m]
+    assert not shapely.contains_xy(portal, low[:, 0], low[:, 1]).any()
+    assert not shapely.contains_xy(clear.buffer(-0.3), seats[:, 0], seats[:, 1]).any()
+    for foot in feet:
+        way = passage(foot, 1.1, tier.rows * tier.tread_m)
+        assert not shapely.contains_xy(way, seats[:, 0], seats[:, 1]).any()
+
+
+def test_platforms_are_level_and_end_at_their_height():
+    parts = dict(platform(rectangle(0, 0, 3, 2), 0.5, 2.0, floor="floor", rim="rim"))
+    assert parts["floor"].vertices[:, 2].min() == 0.5
+    assert parts["floor"].vertices[:, 2].max() == 2.0
+    assert parts["rim"].vertices[:, 2].max() == pytest.approx(2.12)

@@ -1,0 +1,99 @@
+"""Factories and construction sites: each stands up to a look from close by, and structure bears what is on it."""
+
+import numpy as np
+import pytest
+import shapely
+from support.layout_checks import catalogue, props_of
+
+from aerialdojo_gen.base.errors import AssetError
+from aerialdojo_gen.geometry.rays import RayCaster
+from aerialdojo_gen.scenes.ground import rectangle
+from aerialdojo_gen.scenes.layouts.urban.construction_site.concrete import Frame, put_up_frame, scaffold
+from aerialdojo_gen.scenes.layouts.urban.parts.earthworks import grid_terrain, ramped, shaped
+from aerialdojo_gen.scenes.layouts.urban.parts.halls import Hall, flat_roof, put_up_hall
+from aerialdojo_gen.scenes.layouts.urban.parts.industry import Place, guard_rails, set_out
+from aerialdojo_gen.scenes.recipe import Recipe
+from aerialdojo_gen.scenes.site import Site
+
+SCENES = [f"U_{kind}_{k}" for kind in ("Factory", "ConstructionSite") for k in (0, 1)]
+each_scene = pytest.mark.parametrize("name", SCENES)
+
+
+def blank(size: float = 60.0) -> Site:
+    return Site("U_T_0", Recipe(layout="none", size_m=(size, size), ceiling_m=20), catalogue())
+
+
+@each_scene
+def test_things_stand_at_many_heights(scene_of, name):
+    scene = scene_of(name)
+    targets = set(catalogue().targets)
+    heights = np.array([p.bounds[0, 2] for p in props_of(scene) if p.category in targets])
+    assert np.percentile(heights, 95) - np.percentile(heights, 5) > 3.5
+
+
+def test_a_frame_bears_on_every_floor_and_is_open_between():
+    site = blank()
+    plan = rectangle(-8, -8, 8, 8)
+    void = rectangle(-2, -2, 2, 2)
+    put_up_frame(site, Frame((-7.0, 0.0, 7.0), (-7.0, 0.0, 7.0), ((plan, 3.6), (plan, 7.2)), 0.0, {0: void}))
+    cast = RayCaster(site.scene())
+    down = np.array([[0.0, 0.0, -1.0]])
+    assert cast.first_hit(np.array([[4.0, 4.0, 5.0]]), down)[0][0] == pytest.approx(1.4)
+    assert cast.first_hit(np.array([[1.0, 1.5, 5.0]]), down)[0][0] == pytest.approx(5.0)
+    across, _ = cast.first_hit(np.array([[-20.0, 3.5, 1.8], [-20.0, 3.5, 4.67]]), np.tile([1.0, 0.0, 0.0], (2, 1)))
+    assert across[0] > 30.0
+    assert across[1] == pytest.approx(12.1, abs=0.3)
+    assert not site.is_free(7.0, 7.0, 0.2)
+    assert site.is_free(4.0, 4.0, 1.0, z=3.6)
+
+
+def test_pits_have_benches_and_ramps_lead_down():
+    pit = rectangle(-15, -15, 15, 15)
+    ground = shaped(grid_terrain((60, 60), 1.0), pit, [(0, 0), (3, -2), (6, -2), (9, -5)])
+    assert ground.z(0, 0) == pytest.approx(-5.0)
+    assert ground.z(-10.5, 0) == pytest.approx(-2.0, abs=0.1)
+    assert ground.z(-20, 0) == 0.0
+    ground = ramped(ground, (-16, 0, 0.0), (4, 0, -5.0), 4.0)
+    profile = ground.z(np.linspace(-16, 4, 21), np.zeros(21))
+    assert profile == pytest.approx(np.linspace(0.0, -5.0, 21), abs=0.15)
+
+
+def test_halls_are_entered_by_their_gates_alone():
+    site = blank()
+    hall = Hall(-10, -6, 10, 6, 5.0, "brick", "gravel", {"s": ((8.0, 12.0, 0.0, 4.0),)})
+    put_up_hall(site, hall, "hall", flat_roof(hall))
+    cast = RayCaster(site.scene())
+    north = np.tile([0.0, 1.0, 0.0], (3, 1))
+    distance, _ = cast.first_hit(np.array([[0.0, -12.0, 1.8], [-6.0, -12.0, 1.8], [6.0, -12.0, 1.0]]), north)
+    assert distance[0] > 17.0
+    assert (distance[1:] < 6.2).all()
+    assert site.is_free(0.0, 0.0, 2.0)
+    assert not site.is_free(-6.0, -6.0, 0.2)
+
+
+def test_scaffolds_take_the_side_left_of_their_line():
+    site = blank()
+    scaffold(site, (0.0, 0.0), (10.0, 0.0), 6.0)
+    assert not site.is_free(5.0, 0.6, 0.2)
+    assert site.is_free(5.0, -0.6, 0.2)
+    assert site.instances[-1].bounds[1, 2] == pytest.approx(7.1, abs=0.1)
+
+
+def test_guard_rails_follow_every_line():
+    lines = shapely.MultiLineString([[(0, 0), (6, 0)], [(0, 4), (0, 9)]])
+    bodies = dict(guard_rails(lines, 2.0))
+    rail = bodies["marking_yellow"].vertices
+    assert rail[:, 2].min() == pytest.approx(2.0)
+    assert rail[:, 2].max() == pytest.approx(3.1)
+    assert rail[:, 0].max() == pytest.approx(6.0, abs=0.1)
+    assert rail[:, 1].max() == pytest.approx(9.0, abs=0.1)
+    assert "planks" not in dict(guard_rails(lines, 2.0, toe=None))
+
+
+def test_what_has_no_room_is_named():
+    site = blank()
+    places = [Place(place="in the yard", things=(("skip_container/blue_empty", 0, 0, 0), ("generator", 0.5, 0, 0)))]
+    with pytest.raises(AssetError, match=r"generator at \(0\.5, 0\)"):
+        set_out(site, places)
+    assert site.instances[0].variant == "blue_empty"
+    assert site.instances[0].attributes["place"] == "in the yard"

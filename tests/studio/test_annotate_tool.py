@@ -1,0 +1,341 @@
+"""The annotation tool without a server: operations, undo, versions, crashes."""
+
+import hashlib
+import itertools
+import json
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from pydantic import TypeAdapter, ValidationError
+
+from aerialdojo_gen.annotations.format import Anchor, Annotations, Landmark, Object, format_annotations
+from aerialdojo_gen.base.errors import AerialDojoError, AnnotationError, StoreError
+from aerialdojo_gen.studio.annotate.document import ConflictError, Operation, apply, describe, difference, edits_of
+from aerialdojo_gen.studio.annotate.storage import Author, StaleError, Storage
+
+OPERATION = TypeAdapter(Operation)
+ADA, BEN = Author("Ada", "tab-a"), Author("Ben", "tab-b")
+
+
+def asked(**operation):
+    return OPERATION.validate_json(json.dumps(operation))
+
+
+def rename(name, entry_id=0, kind="objects"):
+    return asked(do="change", kind=kind, id=entry_id, fields={"name": name})
+
+
+def add(name, kind="objects"):
+    return asked(do="add", kind=kind, fields={"name": name, "node": f"{name}_000"})
+
+
+@pytest.fixture
+def storage(tmp_path) -> Storage:
+    objects = tuple(
+        Object(id=k, name=f"thing {k}", category="thing", description="A thing.", node=f"thing_{k:03d}")
+        for k in (0, 1, 5)
+    )
+    start = Annotations("U_Yard_0", (Landmark(id=0, name="tower", node="tower_000"),), objects)
+    (tmp_path / "U_Yard_0.json").write_text(format_annotations(start))
+    return Storage(tmp_path, "U_Yard_0")
+
+
+def on_disk(storage):
+    return hashlib.sha256(storage.path.read_bytes()).hexdigest()
+
+
+texts = st.text(st.characters(blacklist_categories=("Cs", "Cc")), max_size=20)
+anchors = st.builds(
+    lambda p, y: {"position_m": p, "yaw_deg": y},
+    st.lists(st.floats(-500, 500), min_size=3, max_size=3), st.floats(-180, 180),
+)  # fmt: skip
+fields = st.fixed_dictionaries(
+    {}, optional={"name": texts, "category": texts, "description": texts, "anchor": st.none() | anchors}
+)
+operations = st.one_of(
+    st.builds(lambda f: {"do": "add", "kind": "objects", "fields": f}, fields),
+    st.builds(lambda f, i: {"do": "change", "kind": "objects", "id": i, "fields": f}, fields, st.integers(0, 8)),
+    st.builds(lambda i: {"do": "remove", "kind": "objects", "id": i}, st.integers(0, 8)),
+    st.builds(lambda i: {"do": "remove", "kind": "landmarks", "id": i}, st.integers(0, 3)),
+    st.builds(lambda n: {"do": "add", "kind": "landmarks", "fields": {"name": n}}, texts),
+)  # fmt: skip
+
+
+@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.lists(operations, max_size=8))
+def test_undo_gives_back_every_byte_and_redo_every_change(tmp_path_factory, todo):
+    folder = tmp_path_factory.mktemp("undo")
+    storage = Storage(folder, "U_Yard_0")
+    state = storage.load()
+    texts_before = [state.text]
+    for operation in todo:
+        try:
+            state, record = storage.change(state.version, ADA, asked(**operation))
+        except ConflictError:
+            continue
+        if record:
+            texts_before.append(state.text)
+    for text in reversed(texts_before[:-1]):
+        state, record = storage.undo(state.version, ADA)
+        assert record.action == "undo"
+        assert state.text == (text or format_annotations(Annotations("U_Yard_0", (), ())))
+    assert storage.undo(state.version, ADA)[1] is None
+    # Another process, and the reload of a page, know as much.
+    again = Storage(folder, "U_Yard_0")
+    for text in texts_before[1:]:
+        state, record = again.redo(state.version, ADA)
+        assert (record.action, state.text) == ("redo", text)
+    assert again.redo(state.version, ADA)[1] is None
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.lists(operations, max_size=6), st.lists(operations, max_size=6))
+def test_the_difference_of_two_states_leads_from_one_to_the_other(first, second):
+    def made(todo):
+        annotations = Annotations("U_Yard_0", (), ())
+        for k, operation in enumerate(todo):
+            try:
+                annotations = apply(annotations, edits_of(asked(**operation), annotations, k))
+            except ConflictError:
+                continue
+        return annotations
+
+    before, after = made(first), made(second)
+    edits = difference(before, after)
+    reached = apply(before, edits)
+    assert {e.id: e for e in reached.objects} == {e.id: e for e in after.objects}
+    assert {e.id: e for e in reached.landmarks} == {e.id: e for e in after.landmarks}
+    assert apply(reached, [edit.reversed() for edit in reversed(edits)]) == before
+    assert (describe(edits) == "nothing") == (not edits)
+
+
+def test_a_change_is_on_disk_when_it_is_answered_and_the_history_says_whose_it_was(storage):
+    state = storage.load()
+    after, record = storage.change(state.version, ADA, rename("red van"))
+    assert storage.path.read_text() == after.text == format_annotations(after.annotations)
+    assert after.version == on_disk(storage)
+    line = json.loads(storage.history.path.read_text())
+    assert (line["who"], line["action"], line["what"]) == ("Ada", "do", "name of object 0 (red van)")
+    assert (line["before"], line["after"]) == (state.version, after.version)
+    assert record.time == line["time"]
+    assert line["time"].endswith("+00:00")
+
+
+def test_opening_and_saving_without_a_change_writes_nothing(storage, project):
+    before, stamp = storage.path.read_bytes(), storage.path.stat()
+    state = storage.load()
+    state, record = storage.change(state.version, ADA, rename("thing 0"))
+    assert record is None
+    assert storage.path.read_bytes() == before
+    assert (storage.path.stat().st_mtime_ns, storage.path.stat().st_ino) == (stamp.st_mtime_ns, stamp.st_ino)
+    # Nor does a change and its undo leave a trace in any of the files that the repository holds.
+    for path in sorted((project / "annotations").glob("[UNID]_*_[01].json")):
+        copy = storage.path.parent / path.name
+        copy.write_bytes(path.read_bytes())
+        other = Storage(copy.parent, path.stem)
+        state, _ = other.change(other.load().version, ADA, rename("something else"))
+        assert copy.read_bytes() != path.read_bytes()
+        other.undo(state.version, ADA)
+        assert copy.read_bytes() == path.read_bytes(), path.name
+
+
+def test_the_second_of_two_people_is_told(storage):
+    seen = storage.load()
+    mine, _ = storage.change(seen.version, ADA, rename("van of Ada"))
+    other = Storage(storage.path.parent, "U_Yard_0")
+    with pytest.raises(StaleError) as error:
+        other.change(seen.version, BEN, rename("van of Ben"))
+    assert error.value.state == mine
+    assert [r.who for r in other.history.since(seen.version)] == ["Ada"]
+    assert on_disk(storage) == mine.version
+    merged, _ = other.change(mine.version, BEN, rename("van of Ben", entry_id=1))
+    assert [o.name for o in merged.annotations.objects] == ["van of Ada", "van of Ben", "thing 5"]
+
+
+def test_undo_takes_back_ones_own_and_never_what_another_changed_since(storage):
+    state, _ = storage.change(storage.load().version, ADA, rename("ada"))
+    state, _ = storage.change(state.version, BEN, rename("ben", entry_id=1))
+    state, _ = storage.undo(state.version, ADA)
+    assert [o.name for o in state.annotations.objects] == ["thing 0", "ben", "thing 5"]
+    state, _ = storage.redo(state.version, ADA)
+    state, _ = storage.change(state.version, BEN, rename("ben was here"))
+    with pytest.raises(ConflictError, match="object 0 has been changed since"):
+        storage.undo(state.version, ADA)
+    assert storage.load().version == state.version
+
+
+def test_many_people_at_once_lose_nothing(storage):
+    """Threads with storages of their own, as several servers would have: every one retries until it is its turn."""
+
+    def work(k):
+        mine = Storage(storage.path.parent, "U_Yard_0")
+        for n in range(5):
+            while True:
+                try:
+                    mine.change(mine.load().version, Author(f"p{k}", f"tab-{k}"), add(f"thing-{k}-{n}"))
+                    break
+                except StaleError:
+                    time.sleep(0.001)
+
+    threads = [threading.Thread(target=work, args=(k,)) for k in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    objects = storage.load().annotations.objects
+    assert {o.name for o in objects[3:]} == {f"thing-{k}-{n}" for k in range(4) for n in range(5)}
+    assert len({o.id for o in objects}) == len(objects) == 23
+    records = [json.loads(line) for line in storage.history.path.read_text().splitlines()]
+    assert all(a["after"] == b["before"] for a, b in itertools.pairwise(records))
+
+
+def test_an_id_is_not_used_again(storage):
+    state = storage.load()
+    state, _ = storage.change(state.version, ADA, asked(do="remove", kind="objects", id=5))
+    state, record = storage.change(state.version, ADA, add("new"))
+    assert record.edits[0].id == 6
+
+
+def test_a_change_of_the_file_by_an_editor_counts(storage):
+    state, _ = storage.change(storage.load().version, ADA, rename("ada"))
+    text = storage.path.read_text().replace("thing 1", "edited")
+    storage.path.write_text(text)
+    with pytest.raises(StaleError):
+        storage.change(state.version, ADA, rename("again"))
+    state, _ = storage.change(storage.load().version, ADA, rename("again"))
+    assert [o.name for o in state.annotations.objects][:2] == ["again", "edited"]
+    assert [r.action for r in storage.history.records] == ["do", "outside", "do"]
+    storage.path.write_text(text[:-20])
+    with pytest.raises(AnnotationError, match=r"U_Yard_0\.json: line \d+: not JSON"):
+        storage.change(state.version, ADA, rename("lost"))
+    assert storage.path.read_text() == text[:-20]
+
+
+@pytest.mark.parametrize(
+    ("text", "why"),
+    [("[]", "must be an object"), ('{"format": 1}', "missing"), ("\xff\xfe", "U_Yard_0.json"), ("{" * 99999, "not")],
+)
+def test_a_file_that_cannot_be_kept_whole_is_not_opened(tmp_path, text, why):
+    (tmp_path / "U_Yard_0.json").write_bytes(text.encode("latin-1"))
+    with pytest.raises(AnnotationError, match=why):
+        Storage(tmp_path, "U_Yard_0").load()
+
+
+def test_a_name_that_leads_elsewhere_is_none(tmp_path):
+    for name in ("../U_Yard_0", "a/b", "", ".hidden", "a\0b"):
+        with pytest.raises(StoreError, match="not a scene name"):
+            Storage(tmp_path, name)
+
+
+@pytest.mark.parametrize(
+    "operation",
+    [
+        {"do": "change", "kind": "objects", "id": 0, "fields": {"name": "a\nb"}},
+        {"do": "change", "kind": "objects", "id": 0, "fields": {"name": "x" * 121}},
+        {"do": "change", "kind": "objects", "id": 0, "fields": {"name": 3}},
+        {"do": "change", "kind": "objects", "id": -1, "fields": {}},
+        {"do": "change", "kind": "objects", "id": True, "fields": {}},
+        {"do": "change", "kind": "scenes", "id": 0, "fields": {}},
+        {"do": "change", "kind": "objects", "id": 0, "fields": {"colour": "red"}},
+        {"do": "change", "kind": "objects", "id": 0, "fields": {"anchor": {"position_m": [0, 0], "yaw_deg": 0}}},
+        {"do": "explode", "kind": "objects", "id": 0},
+    ],
+)
+def test_a_malformed_operation_is_refused(operation):
+    with pytest.raises(ValidationError):
+        asked(**operation)
+
+
+def test_a_landmark_has_no_description(storage):
+    with pytest.raises(AerialDojoError, match="a landmark has no description"):
+        storage.change(storage.load().version, ADA, asked(do="add", kind="landmarks", fields={"description": "A."}))
+
+
+# Crashes.
+
+CRASH = """
+import sys, os, json
+from pathlib import Path
+from aerialdojo_gen.studio.annotate.storage import Author, Storage
+from aerialdojo_gen.studio.annotate.document import Add, Fields
+storage = Storage(Path(sys.argv[1]), "U_Yard_0")
+where = sys.argv[2]
+if where == "before the rename":
+    storage._rename = lambda: os._exit(9)
+elif where == "before the history":
+    def write(raw, records):
+        storage._temporary.write_bytes(raw)
+        os._exit(9)
+    storage._write = write
+state, n = storage.load(), 0
+print("ready", flush=True)
+while True:
+    new = Add(do="add", kind="objects", fields=Fields(name=f"n{n}"))
+    state, _ = storage.change(state.version, Author("Ada", "tab-a"), new)
+    print(n, flush=True)
+    n += 1
+"""
+
+
+@pytest.mark.parametrize(("where", "kept"), [("before the rename", 1), ("before the history", 0)])
+def test_a_crash_within_a_save_leaves_all_of_it_or_nothing(storage, where, kept):
+    before = storage.load()
+    done = subprocess.run(
+        [sys.executable, "-c", CRASH, str(storage.path.parent), where], capture_output=True, text=True
+    )
+    assert (done.returncode, done.stderr) == (9, "")
+    assert on_disk(storage) == before.version
+    state = Storage(storage.path.parent, "U_Yard_0").load()
+    assert len(state.annotations.objects) == 3 + kept
+    assert state.version == on_disk(storage)
+    assert not [p for p in storage.path.parent.iterdir() if p.name.startswith(".")]
+
+
+def test_a_line_of_the_history_that_a_crash_cut_is_passed_over(storage):
+    state, _ = storage.change(storage.load().version, ADA, rename("first"))
+    with storage.history.path.open("a") as file:
+        file.write('{"time": "2026-')
+    fresh = Storage(storage.path.parent, "U_Yard_0")
+    state, _ = fresh.change(fresh.load().version, ADA, rename("second"))
+    lines = [json.loads(line) for line in fresh.history.path.read_text().splitlines()]
+    assert [line["action"] for line in lines] == ["do", "do"]
+    state, _ = fresh.undo(state.version, ADA)
+    assert state.annotations.objects[0].name == "first"
+
+
+@pytest.mark.kill
+def test_killed_in_the_middle_of_saves_nothing_that_was_answered_is_lost(storage):
+    for k in range(4):
+        command = [sys.executable, "-c", CRASH, str(storage.path.parent), "anywhere"]
+        had = len(Storage(storage.path.parent, "U_Yard_0").load().annotations.objects)
+        process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+        assert process.stdout.readline() == "ready\n"
+        time.sleep(0.02 + 0.013 * k)
+        os.kill(process.pid, signal.SIGKILL)
+        answered = [int(line) for line in process.communicate()[0].split()]
+        state = Storage(storage.path.parent, "U_Yard_0").load()
+        names = [o.name for o in state.annotations.objects[had:]]
+        assert len(names) - len(answered) in (0, 1)
+        assert names == [f"n{n}" for n in range(len(names))]
+        assert state.text == format_annotations(state.annotations)
+    records = [json.loads(line) for line in storage.history.path.read_text().splitlines()]
+    assert all(a["after"] == b["before"] for a, b in itertools.pairwise(records))
+    assert records[-1]["after"] == on_disk(storage)
+
+
+def test_anchors_are_kept_to_the_last_digit(storage):
+    anchor = {"position_m": [1.234, -0.001, 3.0], "yaw_deg": -112.5}
+    state, _ = storage.change(
+        storage.load().version, ADA, asked(do="change", kind="objects", id=5, fields={"anchor": anchor})
+    )
+    kept = Storage(storage.path.parent, "U_Yard_0").load().annotations.objects[2].anchor
+    assert kept == Anchor(position_m=(1.234, -0.001, 3.0), yaw_deg=-112.5)
+    state, _ = storage.change(state.version, ADA, asked(do="change", kind="objects", id=5, fields={"anchor": None}))
+    assert '"anchor"' not in state.text

@@ -1,0 +1,285 @@
+"""`show`: the picture and the page of a task tell what the release holds, and nothing in them calls outside."""
+
+import dataclasses
+import html as markup
+import re
+import shutil
+import subprocess
+import sys
+
+import cv2
+import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
+import pytest
+import trimesh
+from support.browser import chromium, errors
+from typer.testing import CliRunner
+
+from aerialdojo_gen.base.errors import AssetError, StoreError, UsageError
+from aerialdojo_gen.cli.app import app
+from aerialdojo_gen.dataset.lookup import ReleasedScene, find_task
+from aerialdojo_gen.geometry.polyline import sampled
+from aerialdojo_gen.scenes.context import release_scenes
+from aerialdojo_gen.store import shards as store
+from aerialdojo_gen.studio.show.figure import write_png
+from aerialdojo_gen.studio.show.page import render_page
+from aerialdojo_gen.studio.show.pictured import picture_task
+
+YARD = "U_Courtyard_0"
+
+
+def test_samples_lie_on_the_way_closer_than_the_step():
+    way = np.array([[0.0, 0, 0], [5, 0, 0], [5, 0, 2], [5, 0.3, 2]])
+    points, segment = sampled(way, 0.5)
+    steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    assert steps.max() <= 0.5 + 1e-9
+    assert steps.sum() == pytest.approx(7.3)
+    for corner in way:
+        assert np.abs(points - corner).sum(axis=1).min() < 1e-9
+    assert segment.tolist() == [0] * 10 + [1] * 4 + [2, 2]
+    assert sampled(way[:1])[0].tolist() == [[0, 0, 0]]
+
+
+# ---- a task ----
+
+
+@pytest.fixture(scope="module")
+def ids(smoke):
+    return ReleasedScene(smoke, YARD).routes["nav_id"].to_pylist()
+
+
+@pytest.fixture(scope="module")
+def pictured(smoke, ids):
+    return picture_task(find_task(smoke, ids[0]), frames=2)
+
+
+def test_a_picture_tells_the_release(smoke, ids, pictured):
+    route = ReleasedScene(smoke, YARD).route(ids[0])
+    facts = dict(pictured.facts)
+    assert facts["length L"] == f"{route['length_m']:.2f} m"
+    assert facts["detour κ = L / d_E"] == f"{route['detour_ratio']:.3f}"
+    assert facts["actions"] == f"{len(route['action'])} of 90"
+    assert sum(times for _, times in pictured.actions) == route["n_actions"]
+    assert pictured.along_m[-1] == pytest.approx(route["length_m"], abs=1e-6)
+    # FCL's certificate is the least over the whole way; samples every half metre miss at most a quarter of one.
+    least = min(5.0, pictured.clearance_m.min())
+    assert route["min_clearance_m"] - 2e-3 <= least <= route["min_clearance_m"] + 0.25
+    # What lies below is never above the route, and never nearer than its clearance.
+    drop = pictured.way[:, 2] - pictured.below_m
+    assert (drop[np.isfinite(drop)] >= pictured.clearance_m[np.isfinite(drop)] - 1e-3).all()
+    assert len(pictured.frames) == 2
+    assert [frame.step for frame in pictured.frames] == [0, len(route["action"]) - 1]
+
+
+def test_clearance_is_the_distance_to_the_mesh(pictured):
+    scene = pictured.task.scene.model
+    mesh = trimesh.util.concatenate([trimesh.Trimesh(i.vertices, i.faces, process=False) for i in scene.instances])
+    some = slice(None, None, max(1, len(pictured.way) // 6))
+    distance = trimesh.proximity.closest_point(mesh, pictured.way[some])[1]
+    assert pictured.clearance_m[some] == pytest.approx(distance, abs=1e-5)
+
+
+def test_semantic_and_image_goals_read_as_the_agent_reads_them(smoke, ids, pictured):
+    image = picture_task(find_task(smoke, f"{ids[0]}-i"), "image", frames=0)
+    assert pictured.instance["task_id"] == f"{ids[0]}-s"
+    assert image.instance["task_id"] == f"{ids[0]}-i"
+    assert pictured.target["description"] in pictured.goal
+    assert pictured.target["description"] not in image.goal
+    assert "picture shows the target" in image.goal
+    assert image.frames == []
+    for shown in (pictured, image):
+        assert shown.instance["landmark"] in shown.goal
+
+
+@pytest.fixture(scope="module")
+def pngs(smoke, ids, pictured, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("pictures")
+    other = picture_task(find_task(smoke, ids[-1]), frames=0)
+    return [write_png(task, folder / f"{k}.png") for k, task in enumerate((pictured, pictured, other))]
+
+
+def test_the_png_decodes_is_deterministic_and_differs_between_tasks(pngs):
+    first, other = (cv2.imread(str(pngs[k])) for k in (0, 2))
+    assert first.shape[1] == other.shape[1] == 1680
+    assert first.shape[0] > other.shape[0]  # without a strip of frames
+    assert pngs[0].read_bytes() == pngs[1].read_bytes()
+    assert (first[:900] != other[:900]).any(axis=2).mean() > 0.2
+    assert [path.name for path in sorted(pngs[0].parent.iterdir())] == ["0.png", "1.png", "2.png"]
+
+
+def test_a_recording_is_shown_where_there_is_one(smoke, tmp_path):
+    recorded = store.read_scene(smoke, "recordings", YARD)["nav_id"].to_pylist()[0]
+    from_file = picture_task(find_task(smoke, recorded), frames=3).frames
+    assert [frame.recorded for frame in from_file] == [True] * 3
+    bare = tmp_path / "data"
+    bare.mkdir()
+    for folder in ("release", "meshes"):
+        shutil.copytree(smoke / folder, bare / folder)
+    rendered = picture_task(find_task(bare, recorded), frames=3).frames
+    assert [frame.recorded for frame in rendered] == [False] * 3
+    for a, b in zip(from_file, rendered, strict=True):
+        assert (a.step, a.action) == (b.step, b.action)
+        assert a.rgb.shape == b.rgb.shape == (320, 320, 3)
+        assert np.abs(a.rgb.astype(int) - b.rgb).mean() < 6.0  # H.264, and half the resolution
+
+
+# ---- the page ----
+
+
+@pytest.fixture(scope="module")
+def page(pictured):
+    return render_page(pictured)
+
+
+def test_the_page_needs_nothing_from_outside(pictured, page):
+    words = re.sub(r"data:image/(png|jpeg);base64,[A-Za-z0-9+/=]+", "", page)
+    assert len(words) < 30_000
+    assert not re.search(r"https?:|//|<script|<link|<iframe|@import|url\(", words, re.IGNORECASE)
+    sources = re.findall(r'\b(?:src|href)="([^"]{0,40})', page)
+    assert len(sources) == 3 + 1 + 2
+    assert all(source.startswith(("data:image/png;base64,", "data:image/jpeg;base64,")) for source in sources)
+    assert markup.escape(pictured.target["description"]) in page.replace("&#39;", "&#x27;").replace("&#34;", "&quot;")
+    for k in range(len(pictured.poses)):
+        assert f"<td>{k}</td>" in page
+
+
+def test_names_in_the_page_are_escaped(pictured):
+    evil = "</p><script>alert('x')</script>\"'><img src=x onerror=alert(1)> $\\frac{1}{0$\u202e"
+    instance = {**pictured.instance, "target_name": evil, "description": evil, "landmark": evil, "task_id": evil}
+    landmark, target = pictured.landmark | {"name": evil}, pictured.target | {"name": evil, "category": evil}
+    start = pictured.start_object | {"name": evil}
+    task = dataclasses.replace(
+        pictured, instance=instance, target=target, landmark=landmark, start_object=start, frames=[]
+    )
+    page = render_page(task)
+    assert "<script" not in page
+    assert "\u202e" not in page
+    assert "<img src=x" not in page
+    assert page.count("&lt;script&gt;alert(&#39;x&#39;)&lt;/script&gt;") >= 5
+    # The quote cannot end an attribute either.
+    assert not re.search(r'alt="[^"]*"\'', page)
+
+
+def test_a_dollar_in_a_name_is_no_mathematics(pictured, tmp_path):
+    name = r"price board, $5 or $\frac{1}"
+    instance = {**pictured.instance, "target_name": name, "landmark": name, "description": name}
+    task = dataclasses.replace(
+        pictured, instance=instance, frames=[],
+        landmark=pictured.landmark | {"name": name}, start_object=pictured.start_object | {"name": name},
+    )  # fmt: skip
+    assert cv2.imread(str(write_png(task, tmp_path / "p.png"))) is not None
+
+
+@pytest.mark.browser
+def test_the_page_opens_in_a_browser_without_a_network(pictured, page, tmp_path):
+    path = tmp_path / "task.html"
+    path.write_text(page, encoding="utf-8")
+    with chromium("the page of show") as driver:
+        driver.execute_cdp_cmd("Network.enable", {})
+        offline = {"offline": True, "latency": 0, "downloadThroughput": 0, "uploadThroughput": 0}
+        driver.execute_cdp_cmd("Network.emulateNetworkConditions", offline)
+        driver.get(path.as_uri())
+        assert driver.title == f"{pictured.instance['task_id']}: {pictured.title}"
+        images = driver.execute_script("return [...document.images].map((i) => [i.complete, i.naturalWidth, i.alt])")
+        assert len(images) == 6
+        assert all(complete and width >= 300 and alt for complete, width, alt in images)
+        assert driver.execute_script("return document.querySelector('.goal').textContent") == pictured.goal
+        # Readable at 1280: nothing sticks out to the side.
+        assert driver.execute_script("return document.documentElement.scrollWidth") <= 1280
+        assert errors(driver) == []
+
+
+# ---- the command, and what can be wrong ----
+
+
+def test_the_command_writes_what_it_is_asked_for(smoke, ids, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    done = CliRunner().invoke(app, ["show", ids[1], "--data", str(smoke), "--html", "a/task.html", "--frames", "0"])
+    assert done.exit_code == 0, done.output
+    assert done.output.splitlines()[-1] == "a/task.html"
+    assert "TARGET: " in done.output
+    assert [str(p.relative_to(tmp_path)) for p in tmp_path.rglob("*") if p.is_file()] == ["a/task.html"]
+
+
+def test_an_unknown_id_gives_the_nearest(smoke, ids, tmp_path):
+    wrong = ids[3][:-1] + ("0" if ids[3][-1] != "0" else "1")
+    nearest = f"no task '{wrong}-s' in the release of {YARD}: the nearest is {ids[3]}; tasks are listed by"
+    with pytest.raises(UsageError, match=nearest):
+        find_task(smoke, f"{wrong}-s")
+    with pytest.raises(UsageError, match=rf"'nonsense' is no task id.*e\.g\. {min(ids)}-s.*read_parquet"):
+        find_task(smoke, "nonsense")
+    with pytest.raises(UsageError, match="has no scene 'U_Courtyard_7': did you mean 'U_Courtyard_"):
+        find_task(smoke, "U_Courtyard_7-0123456789ab")
+    with pytest.raises(UsageError, match="is no task id"):
+        find_task(smoke, "../../etc/passwd")
+    with pytest.raises(
+        StoreError, match=r"there is no release in .*: it has no folder release; name its folder with --data"
+    ):
+        find_task(tmp_path, ids[0])
+    command = [sys.executable, "-m", "aerialdojo_gen.cli.app", "show", wrong, "--data", str(smoke)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=tmp_path)
+    assert (done.returncode, done.stdout, done.stderr.count("\n")) == (2, "", 1)
+    assert done.stderr.startswith(f"error: no task '{wrong}'")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_picture_is_called_png(pictured, tmp_path):
+    with pytest.raises(UsageError, match=r"a\.jpg: the picture is a PNG, call it a\.png"):
+        write_png(pictured, tmp_path / "a.jpg")
+    (tmp_path / "b.png").mkdir()
+    with pytest.raises(StoreError, match=r"cannot write .*b\.png"):
+        write_png(pictured, tmp_path / "b.png")
+    assert [path.name for path in tmp_path.iterdir()] == ["b.png"]
+
+
+def test_a_route_without_an_instance_is_named(copied, ids):
+    for side in ("train", "test"):
+        tasks = store.read_scene(copied, f"tasks/{side}", YARD)
+        kept = tasks.filter(pc.not_equal(tasks["nav_id"], ids[0]))
+        store.write_shard(copied, f"tasks/{side}", YARD, 0, kept)
+    with pytest.raises(StoreError, match=f"release/tasks has no instance of {ids[0]}"):
+        find_task(copied, ids[0])
+    find_task(copied, ids[1])
+
+
+@pytest.fixture
+def copied(smoke, tmp_path):
+    for folder in ("release", "meshes"):
+        shutil.copytree(smoke / folder, tmp_path / folder)
+    return tmp_path
+
+
+def set_mesh_path(data, value):
+    table = store.read_scene(data, "release/scenes", YARD)
+    column = table.schema.get_field_index("mesh_path")
+    store.write_shard(data, "release/scenes", YARD, 0, table.set_column(column, "mesh_path", pa.array([value])))
+
+
+def test_another_mesh_is_refused(copied, ids):
+    mesh = copied / "meshes" / f"{YARD}.glb"
+    shutil.copy(copied / "meshes" / "U_Courtyard_1.glb", mesh)
+    release_scenes()  # this process may still have the right one
+    with pytest.raises(AssetError, match="is not the mesh that the tables were made from"):
+        picture_task(find_task(copied, ids[0]), frames=0)
+    mesh.unlink()
+    release_scenes()
+    with pytest.raises(AssetError, match=f"{YARD}.glb is missing: run aerialdojo-gen build-scenes --scene {YARD}"):
+        picture_task(find_task(copied, ids[0]), frames=0)
+
+
+@pytest.mark.parametrize("path", ["../outside.glb", "/etc/passwd", "meshes/../../outside.glb", "link/outside.glb"])
+def test_a_mesh_path_does_not_leave_the_data_directory(copied, ids, path, tmp_path_factory):
+    outside = tmp_path_factory.mktemp("elsewhere")
+    shutil.copy(copied / "meshes" / f"{YARD}.glb", outside / "outside.glb")
+    (copied / "link").symlink_to(outside)
+    set_mesh_path(copied, path)
+    with pytest.raises(AssetError, match="leads out of"):
+        picture_task(find_task(copied, ids[0]), frames=0)
+
+
+def test_a_damaged_part_is_named(copied, ids):
+    part = next((copied / "release" / "objects").glob(f"*{YARD}*"))
+    part.write_bytes(part.read_bytes()[:-100])
+    with pytest.raises(StoreError, match=str(part)):
+        picture_task(find_task(copied, ids[0]), frames=0)

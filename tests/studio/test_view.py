@@ -1,0 +1,312 @@
+"""`view`: the payload is the scene, and the server answers this machine alone, with what the release holds."""
+
+import http.client
+import json
+import re
+import signal
+import socket
+import struct
+import subprocess
+import sys
+import urllib.request
+from collections import Counter
+from pathlib import Path
+from urllib.parse import urlsplit
+
+import cv2
+import numpy as np
+import pytest
+from fastapi import Response
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from starlette.testclient import TestClient
+from support.rendered import MATERIALS, block
+from support.viewing import YARD, served
+
+from aerialdojo_gen.base.errors import StoreError, UsageError
+from aerialdojo_gen.dataset.lookup import ReleasedScene
+from aerialdojo_gen.scenes.model import Scene
+from aerialdojo_gen.studio.view.contents import route_detail, route_points, scene_index
+from aerialdojo_gen.studio.view.server import view_app
+from aerialdojo_gen.studio.web import serving
+from aerialdojo_gen.studio.web.payload import scene_payload
+
+SCENE = f"/scenes/{YARD}/"
+
+
+def unpacked(payload):
+    """The payload's header and triangles: {node: sorted rows of material colour or layer, nine coordinates}."""
+    (length,) = struct.unpack_from("<I", payload)
+    header, base = json.loads(payload[4 : 4 + length]), 4 + length
+
+    def array(view, dtype):
+        assert (base + view["offset"]) % 4 == 0
+        return np.frombuffer(payload, dtype, view["bytes"] // np.dtype(dtype).itemsize, base + view["offset"])
+
+    triangles = {}
+    for group in header["groups"]:
+        position = array(group["position"], "<f4").reshape(-1, 3)
+        index = array(group["index"], "<u4").reshape(-1, 3)
+        look = array(group["colour"], np.uint8).reshape(-1, 4)[:, :3] if "colour" in group else None
+        if look is None:
+            uvl = array(group["uv"], "<f4").reshape(-1, 3)
+            layers = [cv2.imdecode(array(v, np.uint8), cv2.IMREAD_COLOR)[..., ::-1] for v in group["layers"]]
+        covered = 0
+        for node, first, count in array(group["ranges"], "<u4").reshape(-1, 3):
+            assert first == covered
+            covered += count
+            for corners in index[first : first + count]:
+                if look is not None:
+                    key = tuple(look[corners[0]])
+                else:
+                    key = (layers[int(uvl[corners[0], 2])].tobytes(), tuple(map(tuple, uvl[corners, :2])))
+                triangles.setdefault(header["nodes"][node]["node"], []).append(
+                    (key, tuple(position[corners].ravel()))
+                )
+        assert covered == len(index)
+    return header, {node: Counter(found) for node, found in triangles.items()}
+
+
+def expected(scene):
+    found = {}
+    for item in scene.instances:
+        rows = found.setdefault(item.node, [])
+        for part in item.parts:
+            material = scene.materials[part.material]
+            for face in part.faces:
+                uv = part.uv[face].astype(np.float32) * np.float32([1, -1])
+                key = (
+                    tuple(material.colour)
+                    if material.texture is None
+                    else (material.texture.tobytes(), tuple(map(tuple, uv)))
+                )
+                rows.append((key, tuple(part.vertices[face].astype(np.float32).ravel())))
+    return {node: Counter(rows) for node, rows in found.items()}
+
+
+corner = st.tuples(*[st.floats(-50, 50, width=32).map(float)] * 3)
+blocks = st.lists(st.tuples(corner, st.sampled_from(sorted(MATERIALS))), min_size=1, max_size=6)
+
+
+@given(blocks)
+@settings(max_examples=40, deadline=None)
+def test_the_payload_is_the_scene(chosen):
+    items = tuple(
+        block(f"b{k}", low, tuple(v + 1.0 for v in low), material) for k, (low, material) in enumerate(chosen)
+    )
+    scene = Scene("U_Any_0", items, MATERIALS, np.array([[-60.0, -60, 0], [60, 60, 60]]))
+    payload = scene_payload(scene)
+    header, triangles = unpacked(payload)
+    assert triangles == expected(scene)
+    assert header["n_triangles"] == scene.n_triangles == sum(sum(rows.values()) for rows in triangles.values())
+    # All flat colours draw together, and all textures of a size: the calls do not grow with the materials.
+    assert len(header["groups"]) <= 2
+    assert payload == scene_payload(scene)
+
+
+# ---- the server ----
+
+
+@pytest.fixture(scope="module")
+def client(smoke):
+    return TestClient(view_app(smoke, YARD), base_url="http://127.0.0.1")
+
+
+@pytest.mark.parametrize(
+    "host", ["evil.example", "127.0.0.1.evil.example", "127.0.0.1:81", "localhost:1", "", "[::1]"]
+)
+def test_foreign_hosts_are_refused(client, host):
+    answer = client.get(f"{SCENE}api/index", headers={"host": host})
+    assert answer.status_code == 403
+    assert YARD not in answer.text
+
+
+@pytest.mark.parametrize(
+    "headers",
+    [
+        {"origin": "http://evil.example"},
+        {"origin": "null"},
+        {"origin": "https://127.0.0.1"},
+        {"origin": "http://127.0.0.1:9"},
+        {"sec-fetch-site": "cross-site"},
+        {"sec-fetch-site": "same-site"},
+    ],
+)
+def test_foreign_origins_are_refused(client, headers):
+    assert client.get(f"{SCENE}api/index", headers=headers).status_code == 403
+
+
+def test_ones_own_origin_is_not_refused(client):
+    for headers in ({}, {"origin": "http://127.0.0.1"}, {"host": "localhost", "origin": "http://localhost"}):
+        assert client.get(f"{SCENE}api/index", headers=headers).status_code == 200
+
+
+def test_a_link_out_of_the_folder_is_not_followed(tmp_path, monkeypatch):
+    outside, inside = tmp_path / "secret.txt", tmp_path / "static"
+    outside.write_text("secret")
+    inside.mkdir()
+    (inside / "page.html").write_text("<p>page")
+    (inside / "link.txt").symlink_to(outside)
+    monkeypatch.setattr(serving, "STATIC", inside)
+    client = TestClient(serving.local_app("page.html", "x"), base_url="http://127.0.0.1")
+    assert client.get("/static/page.html").text == "<p>page"
+    assert client.get("/static/link.txt").status_code == 404
+
+
+def test_every_answer_has_the_security_headers(client):
+    for path in ("/", "/static/view.js", f"{SCENE}api/index", "/nothing"):
+        headers = client.get(path).headers
+        policy = dict(rule.split(" ", 1) for rule in headers["content-security-policy"].split("; "))
+        assert policy["default-src"] == policy["frame-ancestors"] == policy["base-uri"] == "'none'"
+        assert re.fullmatch(r"'self' 'sha256-[A-Za-z0-9+/=]+'", policy["script-src"])
+        assert policy["connect-src"] == policy["style-src"] == "'self'"
+        assert headers["x-content-type-options"] == "nosniff"
+    assert client.get("/", headers={"host": "evil.example"}).headers["x-content-type-options"] == "nosniff"
+
+
+def test_large_bodies_are_refused_before_they_are_read():
+    app = serving.local_app("view.html", "x", max_body_bytes=1000)
+
+    @app.post("/api/size")
+    def size() -> Response:
+        return Response("taken")
+
+    client = TestClient(app, base_url="http://127.0.0.1")
+    assert client.post("/api/size", content=b"x" * 1000).text == "taken"
+    assert client.post("/api/size", content=b"x" * 1001).status_code == 413
+    assert client.post("/api/size", headers={"content-length": "-1"}).status_code == 413
+    assert client.post("/api/size", content=iter([b"x" * 2000])).status_code == 411
+
+
+def test_what_does_not_exist_is_named(client):
+    answer = client.get(f"{SCENE}api/routes/U_Courtyard_0-000000000000")
+    assert answer.status_code == 404
+    assert answer.json()["error"].startswith("no navigation task 'U_Courtyard_0-000000000000': did you mean 'U_Court")
+    assert client.get(f"{SCENE}api/objects/9999/image").status_code == 404
+    assert client.get(f"{SCENE}api/objects/x/image").status_code == 422
+
+
+def test_the_index_and_the_ways_are_the_release(smoke, client):
+    scene = ReleasedScene(smoke, YARD)
+    index = client.get(f"{SCENE}api/index").json()
+    assert index == json.loads(json.dumps(scene_index(scene)))
+    routes = scene.routes.to_pylist()
+    assert index["routes"]["nav_id"] == [row["nav_id"] for row in routes]
+    assert set(index["routes"]["split"]) == {"id_train", "id_test"}
+    assert all(sorted(kinds) == ["image", "semantic"] for kinds in index["routes"]["modality"])
+    assert len(index["objects"]) == len(scene.objects)
+    assert len(index["anchors"]) == len(scene.anchors)
+    raw = client.get(f"{SCENE}api/routes/points").content
+    assert raw == route_points(scene)
+    (n,) = struct.unpack_from("<I", raw)
+    offsets = np.frombuffer(raw, "<u4", n + 1, 4)
+    points = np.frombuffer(raw, "<f4", offset=8 + 4 * n).reshape(-1, 3)
+    assert (n, offsets[0], offsets[-1]) == (len(routes), 0, len(points))
+    for k, row in enumerate(routes):
+        way = points[offsets[k] : offsets[k + 1]].astype(np.float64)
+        poses = np.column_stack([row["x_m"], row["y_m"], row["z_m"]])
+        assert np.allclose(way[[0, -1]], poses[[0, -1]], atol=1e-4)
+        length = np.linalg.norm(np.diff(way, axis=0), axis=1)
+        assert (length > 0).all()
+        assert length.sum() == pytest.approx(row["length_m"], abs=1e-3)
+    for row in scene.objects:
+        assert client.get(f"{SCENE}api/objects/{row['object_id']}/image").content == row["reference_image"]
+
+
+def test_a_routes_clearance_is_its_certificates(smoke, client):
+    scene = ReleasedScene(smoke, YARD)
+    for row in scene.routes.slice(0, 12).to_pylist():
+        detail = client.get(f"{SCENE}api/routes/{row['nav_id']}").json()
+        assert detail == json.loads(json.dumps(route_detail(scene, row["nav_id"])))
+        least = min(detail["clearance_m"])
+        # The certificate is the least over the whole way; samples every half metre miss at most a quarter of one.
+        assert row["min_clearance_m"] - 2e-3 <= min(least, 5.0) <= row["min_clearance_m"] + 0.25
+        assert len(detail["poses"]) == len(detail["actions"]) == len(row["action"])
+        assert {task["task_id"][-2:] for task in detail["tasks"]} == {"-s", "-i"}
+
+
+# ---- the command ----
+
+
+def test_what_is_missing_is_named(smoke, tmp_path):
+    with pytest.raises(UsageError, match="did you mean 'U_Courtyard_0'"):
+        view_app(smoke, "U_Courtyard0")
+    with pytest.raises(StoreError, match="there is no release in"):
+        view_app(tmp_path, YARD)
+
+
+def test_a_taken_port_is_named():
+    with socket.socket() as other:
+        other.bind(("127.0.0.1", 0))
+        other.listen()
+        port = other.getsockname()[1]
+        with pytest.raises(UsageError, match=f"port {port}: Address already in use; leave --port out"):
+            serving.open_socket(port)
+
+
+@pytest.fixture(scope="module")
+def server(smoke):
+    with served(smoke, YARD) as url:
+        yield url
+
+
+def test_the_server_listens_on_the_loopback_alone(server):
+    port = urlsplit(server).port
+    listening = [row.split() for row in Path("/proc/net/tcp").read_text().splitlines()[1:]]
+    here = [row[1] for row in listening if row[3] == "0A" and int(row[1].partition(":")[2], 16) == port]
+    assert here == [f"0100007F:{port:04X}"]
+
+
+@pytest.mark.parametrize(
+    "path",
+    [
+        "/static/../serving.py",
+        "/static/..%2fserving.py",
+        "/static/%2e%2e/serving.py",
+        "/static/%2e%2e%2fserving.py",
+        "/static/..%5cserving.py",
+        "/static/three/../../serving.py",
+        "/static//etc/passwd",
+        "/static/%2fetc%2fpasswd",
+        "/static/../../../../../../../etc/passwd",
+        "/../serving.py",
+        "/static/",
+        "/static/three",
+        "/scenes/..%2f..%2fserving.py",
+        f"/scenes/{YARD}/api/routes/..%2f..%2fscene",
+    ],
+)
+def test_paths_do_not_escape(server, path):
+    # Not httpx or a browser: they tidy the path up before they send it.
+    connection = http.client.HTTPConnection("127.0.0.1", urlsplit(server).port)
+    connection.request("GET", path)
+    answer = connection.getresponse()
+    text = answer.read().decode()
+    connection.close()
+    assert answer.status == 404, text
+    assert "import" not in text
+    assert "root:" not in text
+
+
+@pytest.mark.kill
+def test_an_ignored_ctrl_c_stays_ignored_and_a_termination_is_a_plain_end():
+    program = (
+        "from aerialdojo_gen.studio.web.serving import local_app, open_socket, serve\n"
+        "listener = open_socket(0)\n"
+        "print(listener.getsockname()[1], flush=True)\n"
+        "serve(local_app('view.html', 'view'), listener)\n"
+    )
+    process = subprocess.Popen(
+        [sys.executable, "-c", program], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_IGN),
+    )  # fmt: skip
+    port = int(process.stdout.readline())
+
+    with urllib.request.urlopen(f"http://127.0.0.1:{port}/", timeout=60) as answer:
+        assert answer.status == 200
+    # Its handlers are there once it answers.
+    ignored = re.search(r"SigIgn:\s*([0-9a-f]+)", Path(f"/proc/{process.pid}/status").read_text())[1]
+    assert int(ignored, 16) >> (signal.SIGINT - 1) & 1
+    process.send_signal(signal.SIGTERM)
+    _, err = process.communicate(timeout=60)
+    assert (process.returncode, err) == (-signal.SIGTERM, "")

@@ -1,0 +1,416 @@
+"""The pages of `view` as one looks around in a release: start page, search, list of routes, flight, many routes."""
+
+import base64
+import re
+
+import cv2
+import numpy as np
+import pytest
+from selenium.webdriver import ActionChains
+from selenium.webdriver.common.keys import Keys
+from support.browser import chromium, errors, until
+from support.viewing import YARD, served
+
+from aerialdojo_gen.dataset.release import open_release
+
+pytestmark = pytest.mark.browser
+
+
+@pytest.fixture(scope="module")
+def browser(smoke):
+    """A browser and the address of the start page: (driver, address)."""
+    with served(smoke) as url, chromium("looking around in a release") as driver:
+        yield driver, url
+
+
+def ready(driver):
+    state = "return document.body?.dataset.ready"
+    assert until("the page is ready", lambda: driver.execute_script(state)) == "yes"
+
+
+@pytest.fixture(scope="module")
+def start(browser):
+    driver, url = browser
+    driver.get(url)
+    ready(driver)
+    return driver
+
+
+@pytest.fixture
+def yard(browser):
+    """The page of the yard, nothing selected."""
+    driver, url = browser
+    address = f"{url}scenes/{YARD}/"
+    if driver.current_url.partition("#")[0] != address:
+        driver.get(address)
+        ready(driver)
+    draw(driver, setting="", split="", modality="", target="", colour="setting", most="")
+    driver.execute_script("page.letGo(); page.tabs.show('panel')")
+    return driver
+
+
+def draw(driver, **choice):
+    driver.execute_script(
+        "for (const [id, value] of Object.entries(arguments[0])) document.getElementById(id).value = value", choice
+    )
+    driver.execute_async_script("page.routes.draw().then(arguments[0])")
+
+
+def texts(driver, selector):
+    return driver.execute_script(
+        "return [...document.querySelectorAll(arguments[0])].map((e) => e.textContent)", selector
+    )
+
+
+# ---- the start page ----
+
+
+def test_the_start_page_shows_scenes_and_tasks_with_pictures(smoke, start):
+    release = open_release(smoke)
+    assert texts(start, "#scenes strong") == release.scenes
+    assert texts(start, "#n-tasks") == [f"{release.routes().num_rows:,}"]
+    loaded = (
+        "return [...document.querySelectorAll(arguments[0])].every((i) => i.complete && i.naturalWidth > 100)"
+        " && document.querySelectorAll(arguments[0]).length"
+    )
+    assert until("pictures", lambda: start.execute_script(loaded, "#scenes img")) == len(release.scenes)
+    start.find_element("css selector", f"#scenes [data-scene={YARD}] button").click()
+    wanted = release.routes(scene=YARD).num_rows
+    until("the tasks of the yard", lambda: texts(start, "#n-tasks") == [f"{wanted:,}"])
+    assert all(YARD in text for text in texts(start, "#tasks li"))
+    until("goals", lambda: start.execute_script(loaded, "#tasks li:nth-child(-n+4) img") == 4)
+    assert errors(start) == []
+
+
+def test_a_task_of_the_start_page_opens_its_route(smoke, start):
+    box = start.find_element("css selector", "#words")
+    route = open_release(smoke).routes(scene=YARD).to_pylist()[3]
+    box.clear()
+    box.send_keys(f"{route['nav_id']}-i")
+    until("the task", lambda: texts(start, "#n-tasks") == ["1"])
+    start.find_element("css selector", "#tasks li a").click()
+    until("the scene", lambda: start.execute_script("return document.getElementById('title')?.textContent") == YARD)
+    ready(start)
+    assert texts(start, "#picked-route") == [route["nav_id"]]
+    assert start.execute_script("return document.querySelector('#busy').hidden")
+
+
+# ---- search ----
+
+
+def test_search_takes_words_in_any_order_and_arrows_lead_into_what_is_found(yard):
+    name = yard.execute_script("return page.index.objects.map((o) => o.name).find((n) => n.split(' ').length > 1)")
+    box = yard.find_element("css selector", "#search")
+    box.clear()
+    box.send_keys(" ".join(reversed(name.lower().split())))
+    found = texts(yard, "#results [role=option]")
+    assert found[0].startswith(name)
+    # Words begin where words begin: no "red" in "covered".
+    assert yard.execute_script(
+        "return import('/static/dom.js').then(({ hasWords }) =>"
+        " [hasWords('A covered Red bench_03', ['red', 'ben', '03']), hasWords('covered', ['red'])])"
+    ) == [True, False]
+    assert len(found) >= 2
+    box.send_keys(Keys.ARROW_DOWN)
+    chosen = "return [...document.querySelectorAll('#results [aria-selected=true]')].map((e) => e.id)"
+    assert yard.execute_script(chosen) == ["found-1"]
+    assert box.get_attribute("aria-activedescendant") == "found-1"
+    box.send_keys(Keys.ARROW_UP, Keys.ARROW_UP)
+    assert yard.execute_script(chosen) == [f"found-{len(found) - 1}"]
+    # The last one is the routes with these words.
+    assert re.match(r"[\d,]+ routes", found[-1])
+    box.send_keys(Keys.ENTER)
+    until("the list", lambda: yard.find_element("css selector", "#list").is_displayed())
+    wanted = int(found[-1].split()[0].replace(",", ""))
+    until("these routes", lambda: texts(yard, "#route-count") == [f"{wanted:,} routes"])
+    yard.execute_script("page.routes.words = []; page.list.find.value = ''")
+    box.send_keys(Keys.ESCAPE)
+    assert texts(yard, "#results li") == []
+
+
+# ---- the list ----
+
+
+def shown_in_list(driver):
+    return driver.execute_script(
+        "const box = document.getElementById('route-rows').getBoundingClientRect();"
+        "return [...document.querySelectorAll('.route')].filter((r) => { const b = r.getBoundingClientRect();"
+        " return b.bottom > box.top && b.top < box.bottom; }).map((r) => r.dataset.nav)"
+    )
+
+
+def test_the_list_holds_all_routes_sorted_and_makes_only_rows_in_sight(smoke, yard):
+    routes = open_release(smoke).routes(scene=YARD).to_pylist()
+    length = {row["nav_id"]: round(row["length_m"], 3) for row in routes}
+    # What is drawn may be a sample: the list is whole.
+    yard.execute_script("document.getElementById('most').value = '100'")
+    yard.find_element("css selector", "#tab-list").click()
+    draw(yard, most="100")
+    assert texts(yard, "#route-count") == [f"{len(routes):,} routes"]
+    made = "return document.querySelectorAll('.route').length"
+    assert 5 < yard.execute_script(made) < 40 < len(routes)
+    ordered = sorted(length.values())
+    assert [length[nav] for nav in shown_in_list(yard)] == ordered[: len(shown_in_list(yard))]
+    seen = set()
+    height = yard.execute_script("return document.getElementById('route-rows').clientHeight")
+    for top in range(0, 46 * len(routes), height):
+        yard.execute_script("const r = document.getElementById('route-rows'); r.scrollTop = arguments[0]", top)
+        yard.execute_async_script("requestAnimationFrame(() => requestAnimationFrame(arguments[0]))")
+        seen.update(shown_in_list(yard))
+        assert yard.execute_script(made) < 40
+    assert seen == set(length)
+    yard.find_element("css selector", "#route-turn").click()
+    assert [length[nav] for nav in shown_in_list(yard)] == ordered[::-1][: len(shown_in_list(yard))]
+    # Filters are those of the page, words narrow it further.
+    draw(yard, split="id_test")
+    assert texts(yard, "#route-count") == [f"{sum(row['split'] == 'id_test' for row in routes):,} routes"]
+    yard.find_element("css selector", "#route-turn").click()
+
+
+def test_a_route_is_picked_from_the_list_by_keys(yard):
+    yard.find_element("css selector", "#tab-list").click()
+    box = yard.find_element("css selector", "#route-rows")
+    box.send_keys(Keys.HOME, Keys.END)
+    last = yard.execute_script("const l = page.list; return page.index.routes.nav_id[l.sorted.at(-1)]")
+    assert last in shown_in_list(yard)
+    box.send_keys(Keys.ARROW_UP, Keys.ENTER)
+    picked = yard.execute_script("const l = page.list; return page.index.routes.nav_id[l.sorted.at(-2)]")
+    until("the route", lambda: texts(yard, "#picked-route") == [picked])
+    assert yard.find_element("css selector", "#panel").is_displayed()
+    yard.find_element("css selector", "#tab-list").click()
+    marked = "return [...document.querySelectorAll('.route[aria-selected=true]')].map((r) => r.dataset.nav)"
+    assert yard.execute_script(marked) == [picked]
+
+
+def test_the_panel_begins_at_its_top(yard):
+    yard.execute_script("page.pickObject(page.index.objects[0].object_id)")
+    top = "return document.getElementById('panel').scrollTop"
+    yard.execute_script("document.getElementById('panel').scrollTop = 200")
+    assert yard.execute_script(top) > 100
+    yard.execute_script("page.pickObject(page.index.objects[1].object_id)")
+    assert yard.execute_script(top) == 0
+
+
+# ---- flying along ----
+
+
+def test_a_flight_passes_between_poses_and_keeps_to_its_speed(smoke, yard):
+    row = open_release(smoke).routes(scene=YARD).to_pylist()[5]
+    yard.execute_async_script("page.pickRoute(arguments[0], true).then(arguments[1])", row["nav_id"])
+    yard.execute_script("page.ride(true)")
+    poses = np.column_stack([row[key] for key in ("x_m", "y_m", "z_m", "yaw_rad")])
+    times = np.array(yard.execute_script("return page.flight.times"))
+    assert (np.diff(times) > 0).all()
+    # Half-way between two poses, the camera is half-way, and half turned the shorter way.
+    camera = (
+        "page.flight.time = arguments[0]; page.flight.now(); const c = page.view.camera; c.updateMatrixWorld();"
+        "const e = c.matrixWorld.elements; return [...c.position.toArray(), -e[8], -e[9]]"
+    )
+    for k in range(0, len(poses) - 1, 3):
+        x, y, z, ahead_x, ahead_y = yard.execute_script(camera, (times[k] + times[k + 1]) / 2)
+        assert [x, y, z] == pytest.approx((poses[k, :3] + poses[k + 1, :3]) / 2, abs=2e-3)
+        turn = np.angle(np.exp(1j * (poses[k + 1, 3] - poses[k, 3])))
+        heading = np.arctan2(ahead_y, ahead_x)
+        assert abs(np.angle(np.exp(1j * (heading - poses[k, 3] - turn / 2)))) < 2e-3
+    # Space plays: places lie on the way, also between poses, and pause holds one.
+    yard.execute_script(
+        "page.flight.time = 0; document.activeElement.blur(); window.flown = []; const show = page.flight.show;"
+        "page.flight.show = (pose, k) => { flown.push([...pose, page.flight.time]); show(pose, k); }"
+    )
+    ActionChains(yard).send_keys(" ").perform()
+    under_way = "return flown.length >= 6 && page.flight.time > page.flight.end / 4"
+    until("flying", lambda: yard.execute_script(under_way))
+    assert texts(yard, "#play") == ["Pause"]
+    ActionChains(yard).send_keys(" ").perform()
+    held = yard.execute_script("return page.flight.time")
+    assert texts(yard, "#play") == ["Play"]
+    flown = np.array(yard.execute_script("return flown"))
+    assert (np.diff(flown[:, 4]) >= 0).all()
+    expected = [np.interp(flown[:, 4], times, poses[:, j]) for j in range(3)]
+    assert np.abs(flown[:, :3] - np.column_stack(expected)).max() < 1e-3
+    assert min(np.abs(flown[:, None, :3] - poses[None, :, :3]).sum(axis=2).min(axis=1).max(), 1.0) > 0.01
+    assert yard.execute_async_script("setTimeout(() => arguments[0](page.flight.time), 150)") == held
+    # Twice the speed is twice the way in the same time: what a frame of 100 ms adds.
+    steps = yard.execute_script(
+        """const added = [], raf = window.requestAnimationFrame;
+        for (const speed of [1, 8]) {
+          let tick = null;
+          window.requestAnimationFrame = (f) => { tick ??= f; return 0; };
+          page.flight.time = 0;
+          page.flight.speed = speed;
+          const begun = performance.now();
+          page.flight.play();
+          window.requestAnimationFrame = () => 0;
+          tick(begun + 100);
+          const before = page.flight.time;
+          tick(begun + 200);
+          added.push(page.flight.time - before);
+          page.flight.pause();
+        }
+        window.requestAnimationFrame = raf;
+        page.view.pending = 0;
+        return added;"""
+    )
+    assert steps == pytest.approx([0.1, 0.8], abs=1e-6)
+    yard.execute_script("page.flight.speed = 8; page.flight.play()")
+    until("the end", lambda: not yard.execute_script("return page.flight.playing"))
+    assert yard.execute_script("return document.getElementById('step').value") == str(len(poses) - 1)
+    assert errors(yard) == []
+
+
+# ---- thousands of routes ----
+
+LAYER = "const layer = page.view.layers.get('routes');"
+JOINED = "return layer.object.geometry.index.count / 2"
+
+
+def test_many_routes_are_one_buffer_with_a_busy_sign(smoke, yard):
+    routes = open_release(smoke).routes(scene=YARD)
+    n = 20_000
+    # The yard's routes again and again, each a little aside.
+    yard.execute_script(
+        """window.real = page.routes.ways; const n = page.index.routes.nav_id.length;
+        page.routes.wanted = () => Array.from({ length: arguments[0] }, (_, k) => k % n);
+        window.busy = [];
+        const sign = document.getElementById('busy');
+        new MutationObserver(() => busy.push([sign.hidden, sign.textContent.trim()])).observe(sign,
+          { attributes: true, childList: true, subtree: true });""",
+        n,
+    )
+    try:
+        draw(yard, most="")
+        told = yard.execute_script("return busy")
+        assert [hidden for hidden, _ in told][-1] is True
+        assert [False, f"Drawing {n:,} routes …"] in told
+        kind, ids, calls, segments = yard.execute_script(
+            LAYER + "const gl = page.view.renderer.info; for (const [name, other] of page.view.layers)"
+            " if (name !== 'routes') other.object.visible = false;"
+            "page.view.setVisible('scene', false); gl.autoReset = true; page.view.draw();"
+            "const drawn = gl.render.calls; layer.object.visible = false; page.view.draw();"
+            "const calls = drawn - gl.render.calls; layer.object.visible = true; page.view.setVisible('scene', true);"
+            "return [layer.constructor.name, layer.routes.length, calls, layer.segments]"
+        )
+        assert (kind, ids, calls) == ("CrowdLayer", n, 1)
+        assert segments >= n
+        assert ids > routes.num_rows
+        # While one moves fewer points are joined, and never more than a level allows; at rest all of them are.
+        for most in (segments, 20_000, 5_000):
+            joined = yard.execute_script(
+                LAYER + "layer.thin(arguments[0]); return layer.object.geometry.index.count / 2", most
+            )
+            assert 0.3 * most < joined <= most
+        yard.execute_script("page.view.draw()")
+        assert yard.execute_script(LAYER + "return layer.object.geometry.index.count / 2") == segments
+    finally:
+        yard.execute_script(
+            "delete page.routes.wanted; for (const name of ['objects', 'landmarks']) page.view.setVisible(name, true)"
+        )
+
+
+def test_what_is_drawn_in_motion_stays_near_what_is_drawn_at_rest(yard):
+    draw(yard, most="")
+    yard.execute_script(
+        "page.view.home(); for (const name of page.view.layers.keys()) page.view.setVisible(name, false)"
+    )
+    picture = (
+        "const view = page.view; cancelAnimationFrame(view.pending); view.pending = 1; view.draw(arguments[0]);"
+        "return view.canvas.toDataURL().split(',')[1]"
+    )
+    shots = []
+    for level in (0, 1, 3, 6):
+        png = base64.b64decode(yard.execute_script(picture, level))
+        image = cv2.imdecode(np.frombuffer(png, np.uint8), cv2.IMREAD_COLOR).astype(np.float32)
+        shots.append(cv2.resize(image, (48, 48), interpolation=cv2.INTER_AREA))
+    yard.execute_script(
+        "page.view.pending = 0; page.view.draw();"
+        "for (const name of ['objects', 'landmarks', 'routes']) page.view.setVisible(name, true)"
+    )
+    assert np.std(shots[0]) > 10
+    for level, most, shot in zip((1, 3, 6), (2.0, 5.0, 12.0), shots[1:], strict=True):
+        assert np.abs(shot - shots[0]).mean() < most, level
+
+
+def test_what_is_picked_is_what_the_camera_sees_now(yard):
+    """A frame may be drawn later: a click means the place where the camera is by then."""
+    picked = yard.execute_script(
+        """const { view, index } = page, seen = [];
+        view.pending = 1;  // no frame from now on
+        for (const { mesh_node: node } of index.objects.slice(0, 4)) {
+          view.focusOn(node);
+          const [x, y] = [view.width / 2, view.height / 2];
+          const before = view.pickNode(x, y)?.node;
+          view.draw();
+          seen.push([before, view.pickNode(x, y)?.node]);
+        }
+        view.pending = 0;
+        return seen;"""
+    )
+    assert all(before == after for before, after in picked)
+    assert len({after for _, after in picked}) > 1
+
+
+def test_the_pace_draws_less_of_slow_frames_and_more_of_quick_ones(yard):
+    levels, most = yard.execute_async_script(
+        """const done = arguments[0], real = performance.now;
+        import("/static/pace.js").then(({ LEVELS, Pace }) => {
+          const pace = new Pace(page.view.renderer.getContext(), 0), seen = [];
+          let now = 0;
+          performance.now = () => now;
+          for (const [frames, took, later] of [[1, 300, 0], [9, 100, 0], [40, 60, 0], [40, 5, 0], [80, 5, 20000]]) {
+            now += later;
+            for (let k = 0; k < frames; k++) pace.learn(took);
+            seen.push(pace.level);
+          }
+          performance.now = real;
+          done([seen, LEVELS.length - 1]);
+        });"""
+    )
+    # Two levels down at once, then to the last; not back to what was too slow a moment ago; later to the first.
+    assert levels == [2, most, most, most, 0]
+
+
+@pytest.mark.parametrize("turn", [False, True])
+def test_where_routes_overlap_the_tightest_gives_the_colour(yard, turn):
+    tight, wide = yard.execute_script(
+        "const c = page.index.routes.min_clearance_m, all = [...c.keys()].sort((a, b) => c[a] - c[b]);"
+        "return [all[0], all.at(-1)]"
+    )
+    # Two routes of one and the same way, many times, so that they are drawn as a crowd.
+    yard.execute_script(
+        """const [tight, wide, turn] = arguments, pair = turn ? [wide, tight] : [tight, wide];
+        window.real = page.routes.ways;
+        page.routes.ways = Promise.resolve(() => new Float32Array([-4, 0, 9, 4, 0, 9]));
+        page.routes.wanted = () => Array.from({ length: 600 }, (_, k) => pair[k % 2]);
+        for (const name of ['objects', 'landmarks']) page.view.setVisible(name, false);
+        page.view.controls.lookFrom([0, -8, 11], [0, 0, 9]);""",
+        tight, wide, turn,
+    )  # fmt: skip
+    try:
+        draw(yard, colour="clearance", most="")
+        assert "the tightest is on top" in texts(yard, "#legend")[0]
+        colours, pixels = yard.execute_async_script(
+            LAYER + """const [tight, wide, done] = arguments, view = page.view;
+            view.setVisible('scene', false);
+            import("/static/colours.js").then(({ clearanceColour }) => {
+              const rgb = (k) => [1, 3, 5].map((at) =>
+                parseInt(clearanceColour(page.index.routes.min_clearance_m[k]).slice(at, at + 2), 16));
+              view.draw();
+              const gl = view.renderer.getContext(), w = gl.drawingBufferWidth, h = gl.drawingBufferHeight;
+              const all = new Uint8Array(4 * w * h), count = [0, 0];
+              gl.readPixels(0, 0, w, h, gl.RGBA, gl.UNSIGNED_BYTE, all);
+              const two = [rgb(tight), rgb(wide)];
+              const like = (i, colour) => colour.every((v, j) => Math.abs(all[i + j] - v) < 3);
+              for (let i = 0; i < all.length; i += 4) two.forEach((colour, j) => { count[j] += like(i, colour); });
+              view.setVisible('scene', true);
+              done([two, count]);
+            });""",
+            tight, wide,
+        )  # fmt: skip
+        assert np.abs(np.subtract(*colours)).sum() > 30
+        assert pixels[0] > 100
+        assert pixels[1] < 0.02 * pixels[0]
+    finally:
+        yard.execute_script(
+            "page.routes.ways = window.real; delete page.routes.wanted;"
+            "for (const name of ['objects', 'landmarks']) page.view.setVisible(name, true); page.view.home()"
+        )

@@ -1,0 +1,344 @@
+"""The page of `view` in a real browser: it shows the scene, and does what its controls say."""
+
+import json
+import re
+import time
+
+import cv2
+import numpy as np
+import pytest
+from support.browser import chromium, errors, until
+from support.viewing import YARD, served
+
+from aerialdojo_gen.dataset.lookup import ReleasedScene
+from aerialdojo_gen.rendering.preview import look_at
+from aerialdojo_gen.store.schemas import ACTION_NAMES
+
+pytestmark = pytest.mark.browser
+
+
+@pytest.fixture(scope="module")
+def page(smoke):
+    """The page in a browser: (driver, address)."""
+    with served(smoke, YARD) as url, chromium("the page of view") as driver:
+        driver.get(url)
+        ready = "return document.body?.dataset.ready"
+        assert until("the page is ready", lambda: driver.execute_script(ready)) == "yes"
+        yield driver, url
+
+
+def screenshot(driver):
+    png = np.frombuffer(driver.get_screenshot_as_png(), dtype=np.uint8)
+    return cv2.imdecode(png, cv2.IMREAD_COLOR)[..., ::-1].astype(int)
+
+
+def canvas(driver):
+    """What the browser shows once it stands still, (720, 1280, 3) sRGB."""
+    # Reading a pixel waits for the graphics: without that, a slow machine shows the frame before.
+    driver.execute_async_script(
+        "const done = arguments[0], gl = page.view.renderer.getContext();"
+        "requestAnimationFrame(() => { page.view.draw();"
+        " gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4));"
+        " requestAnimationFrame(done); })"
+    )
+    last = screenshot(driver)
+    while not np.array_equal(last, now := screenshot(driver)):
+        last = now
+    return now
+
+
+def view_of(driver, picture):
+    box = driver.execute_script(
+        "const b = page.view.canvas.getBoundingClientRect(); return [b.left, b.top, b.width, b.height]"
+    )
+    left, top, width, height = (round(v) for v in box)
+    return picture[top : top + height, left : left + width]
+
+
+def fresh(driver):
+    """Everything as it was when the page was loaded."""
+    driver.execute_script(
+        "page.letGo(); page.mode('orbit'); page.view.home();"
+        "for (const id of ['setting', 'split', 'modality', 'target']) document.getElementById(id).value = '';"
+        "document.getElementById('most').value = '';"
+        "for (const box of document.querySelectorAll('[data-layer]'))"
+        " { box.checked = box.dataset.layer !== 'anchors'; page.setLayer(box.dataset.layer, box.checked); }"
+    )
+    driver.execute_async_script("page.routes.draw().then(arguments[0])")
+
+
+def test_the_page_asks_nobody_else_and_has_no_errors(page):
+    driver, url = page
+    assert errors(driver) == []
+    sent = [
+        json.loads(entry["message"])["message"]["params"]
+        for entry in driver.get_log("performance")
+        if '"Network.requestWillBeSent"' in entry["message"]
+    ]
+    # The browser's own empty tab, before the page was asked for, is not the page's doing.
+    asked = [event["request"]["url"] for event in sent if not event["documentURL"].startswith("chrome")]
+    root = url.partition("scenes/")[0]
+    assert {f"{url}api/scene", f"{url}api/index", f"{root}static/three/three.module.min.js"} <= set(asked)
+    assert [other for other in asked if not other.startswith((root, "data:", "blob:"))] == []
+
+
+def test_the_page_shows_the_scene_in_the_projects_colours(smoke, page):
+    driver, _ = page
+    fresh(driver)
+    driver.execute_script(
+        "for (const name of [...page.view.layers.keys()]) page.view.setVisible(name, false);"
+        "page.view.overlay.style.display = 'none'"
+    )
+    shown = view_of(driver, canvas(driver))
+    driver.execute_script("page.view.overlay.style.display = ''")
+    eye, target, fov = driver.execute_script(
+        "const v = page.view; return [v.camera.position.toArray(), v.controls.orbit.target.toArray(), v.camera.fov]"
+    )
+    height, width = shown.shape[:2]
+    across = 2 * np.degrees(np.arctan(np.tan(np.radians(fov / 2)) * width / height))
+    wanted = look_at(ReleasedScene(smoke, YARD).model, eye, target, width, height, across).astype(int)
+    assert len(np.unique(shown.reshape(-1, 3), axis=0)) > 1000
+    # Edges are smoothed and textures filtered here and not there: compare what both agree on at a coarser scale.
+    small = [cv2.resize(p.astype(np.float32), (width // 8, height // 8), interpolation=cv2.INTER_AREA)
+             for p in (shown, wanted)]  # fmt: skip
+    difference = np.abs(small[0] - small[1])
+    assert difference.mean() < 4.0
+    assert np.quantile(difference, 0.99) < 40.0
+
+
+def test_layers_are_switched_on_and_off(page):
+    driver, _ = page
+    fresh(driver)
+    driver.execute_script("document.querySelector('[data-layer=routes]').click()")
+    before = view_of(driver, canvas(driver))
+    yellow = np.array([250, 204, 21])
+    places = driver.execute_script(
+        "const p = [0, 0, 0];"
+        "return page.index.objects.map((o) => page.view.project(o.position, 0, p) && [p[0], p[1]])"
+    )
+    height, width = before.shape[:2]
+    inside = [(int(x), int(y)) for x, y in places if 8 < x < width - 8 and 8 < y < height - 8]
+    assert len(inside) >= 5
+    marked = [np.abs(before[y, x] - yellow).max() < 25 for x, y in inside]
+    assert sum(marked) >= len(inside) - 1  # a landmark's label may lie over one
+    driver.execute_script("document.querySelector('[data-layer=objects]').click()")
+    after = view_of(driver, canvas(driver))
+    assert not any(np.abs(after[y, x] - yellow).max() < 25 for x, y in inside)
+    driver.execute_script("document.querySelector('[data-layer=objects]').click()")
+    until("the marks are back", lambda: np.array_equal(view_of(driver, canvas(driver)), before))
+    driver.execute_script("document.querySelector('[data-layer=anchors]').click()")
+    assert (view_of(driver, canvas(driver)) != before).any(axis=2).sum() > 200
+
+
+def click(driver, x, y):
+    from selenium.webdriver import ActionChains
+
+    element = driver.execute_script("return page.view.canvas")
+    size = element.rect
+    ActionChains(driver, duration=0).move_to_element_with_offset(
+        element, round(x - size["width"] / 2), round(y - size["height"] / 2)
+    ).click().perform()
+
+
+def test_a_route_is_picked_by_a_click(page):
+    driver, _ = page
+    fresh(driver)
+    # One route alone, seen freely: the click can mean nothing else.
+    nav = driver.execute_script("return page.index.routes.nav_id[page.index.routes.setting.length - 1]")
+    driver.execute_script(
+        "const k = page.routes.row.get(arguments[0]); page.routes.wanted = () => [k];"
+        "for (const name of ['objects', 'landmarks']) page.view.setVisible(name, false)", nav,
+    )  # fmt: skip
+    driver.execute_async_script("page.routes.draw().then(arguments[0])")
+    x, y = driver.execute_async_script(
+        """
+        const [nav, done] = arguments, view = page.view;
+        page.routes.ways.then((ways) => {
+          const way = ways(page.routes.row.get(nav)), p = [0, 0, 0];
+          const middle = [0, 1, 2].map((j) => (way[j] + way[3 + j]) / 2);
+          view.focusOn(middle, { distance: 9 });
+          view.draw();
+          view.project(middle, 0, p);
+          done([p[0], p[1]]);
+        });""",
+        nav,
+    )
+    click(driver, x, y)
+    told = "return document.getElementById('picked-route')?.textContent"
+    heading = until("the panel names the route", lambda: driver.execute_script(told))
+    driver.execute_script("delete page.routes.wanted")
+    assert heading == nav
+    assert driver.execute_script("return location.hash") == f"#route={nav}"
+    facts = driver.execute_script("return document.getElementById('panel').textContent")
+    k = driver.execute_script("return page.routes.row.get(arguments[0])", nav)
+    length = driver.execute_script("return page.index.routes.length_m[arguments[0]]", k)
+    assert f"{length:.2f} m" in facts
+    assert f"{nav}-s" in facts
+    assert errors(driver) == []
+
+
+def test_flying_along_looks_as_the_drone_looks(smoke, page):
+    driver, url = page
+    row = ReleasedScene(smoke, YARD).routes.to_pylist()[4]
+    # The address of a route opens it.
+    driver.get(f"{url}#route={row['nav_id']}")
+    driver.refresh()
+    until("the page is ready", lambda: driver.execute_script("return document.body?.dataset.ready"))
+    assert driver.execute_script("return document.getElementById('picked-route').textContent") == row["nav_id"]
+    driver.execute_script("document.getElementById('ride').click()")
+    for k in (0, len(row["action"]) // 2, len(row["action"]) - 1):
+        driver.execute_script(
+            "const s = document.getElementById('step'); s.value = arguments[0];"
+            "s.dispatchEvent(new Event('input'))", k,
+        )  # fmt: skip
+        eye, ahead, fov = driver.execute_script(
+            "const c = page.view.camera, e = c.matrixWorld.elements; c.updateMatrixWorld();"
+            "return [c.position.toArray(), [-e[8], -e[9], -e[10]], c.fov]"
+        )
+        assert eye == pytest.approx([row["x_m"][k], row["y_m"][k], row["z_m"][k]], abs=1e-3)
+        assert ahead == pytest.approx([np.cos(row["yaw_rad"][k]), np.sin(row["yaw_rad"][k]), 0.0], abs=1e-3)
+        assert fov == 90
+        doing = driver.execute_script("return document.getElementById('doing').textContent")
+        assert doing.startswith(ACTION_NAMES[row["action"][k]])
+    driver.execute_script("page.letGo()")
+    assert driver.execute_script("return page.view.camera.fov") == 60
+
+
+def test_dragging_in_fly_mode_turns_the_camera_on_the_spot(page):
+    from selenium.webdriver import ActionChains
+
+    driver, _ = page
+    fresh(driver)
+    driver.execute_script("page.mode('fly'); page.view.controls.lookFrom([0, 0, 12], [0, 20, 12])")
+    canvas_of = driver.execute_script("return page.view.canvas")
+    ActionChains(driver, duration=50).move_to_element(canvas_of).click_and_hold().move_by_offset(100, 0).perform()
+    ActionChains(driver).release().perform()
+    eye, ahead = driver.execute_script(
+        "const c = page.view.camera, e = c.matrixWorld.elements; c.updateMatrixWorld();"
+        "return [c.position.toArray(), [-e[8], -e[9], -e[10]]]"
+    )
+    # The scene follows the hand: pulled to the right, it lets one look to the left, to the west of north.
+    assert eye == pytest.approx([0, 0, 12])
+    assert ahead[0] < -0.2
+    assert ahead[2] == pytest.approx(0.0, abs=1e-6)
+
+
+def test_an_object_is_picked_by_a_click_on_its_mesh(page):
+    driver, _ = page
+    fresh(driver)
+    for layer in ("routes", "objects", "landmarks"):
+        driver.execute_script(f"page.view.setVisible('{layer}', false)")
+    picture = "const i = document.querySelector('#panel img'); return i.complete && i.naturalWidth"
+    for item in driver.execute_script("return page.index.objects.slice(0, 3)"):
+        driver.execute_script("page.letGo(); page.view.focusOn(arguments[0]); page.view.draw()", item["mesh_node"])
+        spot = driver.execute_script(
+            """for (let y = 30; y < page.view.height; y += 9) for (let x = 30; x < page.view.width; x += 9)
+                 if (page.view.pickNode(x, y)?.node === arguments[0]) return [x, y];
+               return null;""",
+            item["mesh_node"],
+        )
+        assert spot, f"{item['name']} is not to be seen"
+        click(driver, *spot)
+        panel = driver.execute_script("return document.getElementById('panel').textContent")
+        assert item["name"] in panel
+        assert item["description"] in panel
+        assert until("the reference image", lambda: driver.execute_script(picture)) >= 300
+
+
+def test_what_is_picked_keeps_its_colours(page):
+    driver, _ = page
+    fresh(driver)
+    for layer in ("routes", "objects", "landmarks"):
+        driver.execute_script(f"page.view.setVisible('{layer}', false)")
+    item = driver.execute_script("return page.index.objects[0]")
+    driver.execute_script("page.view.focusOn(arguments[0])", item["mesh_node"])
+    before = view_of(driver, canvas(driver))
+    own = driver.execute_script(
+        """const found = [];
+           for (let y = 4; y < page.view.height; y += 6) for (let x = 4; x < page.view.width; x += 6)
+             if (page.view.pickNode(x, y)?.node === arguments[0]) found.push([x, y]);
+           return found;""",
+        item["mesh_node"],
+    )
+    driver.execute_script("page.pickObject(arguments[0])", item["object_id"])
+    after = view_of(driver, canvas(driver))
+    changed = (before != after).any(axis=2)
+    # The frame is there, and only its edges lie over the object.
+    assert changed.sum() > 300
+    assert np.mean([changed[y, x] for x, y in own]) < 0.12
+    assert driver.execute_script("return page.view.layers.has('frame')")
+    driver.execute_script("page.letGo()")
+    assert not driver.execute_script("return page.view.layers.has('frame')")
+
+
+def test_filters_count_as_the_release_does(smoke, page):
+    driver, _ = page
+    fresh(driver)
+    routes = ReleasedScene(smoke, YARD).routes.to_pylist()
+    target = routes[0]["target_object_id"]
+    for choice, wanted in (
+        ({"split": "id_test"}, [r for r in routes if r["split"] == "id_test"]),
+        ({"target": str(target)}, [r for r in routes if r["target_object_id"] == target]),
+        ({"target": str(target), "split": "id_train", "modality": "image"},
+         [r for r in routes if (r["target_object_id"], r["split"]) == (target, "id_train")]),
+        ({"setting": "long_horizon"}, [r for r in routes if r["setting"] == "long_horizon"]),
+    ):  # fmt: skip
+        driver.execute_script(
+            "for (const id of ['setting', 'split', 'modality', 'target']) {"
+            " const s = document.getElementById(id); s.value = arguments[0][id] ?? '';"
+            " s.dispatchEvent(new Event('change')); }",
+            choice,
+        )
+        driver.execute_async_script("page.routes.draw().then(arguments[0])")
+        drawn = driver.execute_script("return page.view.layers.get('routes').routes.map((r) => r.id)")
+        assert sorted(drawn) == sorted(r["nav_id"] for r in wanted), choice
+        assert driver.execute_script("return document.getElementById('n-routes').textContent") == f"{len(wanted):,}"
+
+
+def test_search_and_keys(page):
+    from selenium.webdriver import ActionChains
+    from selenium.webdriver.common.keys import Keys
+
+    driver, _ = page
+    fresh(driver)
+    name = driver.execute_script("return page.index.objects[2].name")
+    ActionChains(driver).send_keys("/").send_keys(name).send_keys(Keys.ENTER).perform()
+    assert name == driver.execute_script("return document.querySelector('#panel h2').textContent")
+    click(driver, 5, 5)
+    before = driver.execute_script("return page.view.camera.position.toArray()")
+    place = "return page.view.camera.position.toArray()"
+    ActionChains(driver).key_down("d").perform()
+    until("a move", lambda: np.linalg.norm(np.subtract(driver.execute_script(place), before)) > 0.2)
+    ActionChains(driver).key_up("d").perform()
+    after = driver.execute_script(place)
+    assert after[2] == pytest.approx(before[2])
+    ActionChains(driver).send_keys("t").perform()
+    canvas(driver)
+    heading = driver.execute_script("return document.querySelector('.scene-compass title').textContent")
+    assert re.search(r"Looking (0|360) degrees", heading)
+    ActionChains(driver).send_keys("f").perform()
+    assert driver.execute_script("return page.view.controls.mode") == "fly"
+
+
+def test_every_control_has_a_name(page):
+    driver, _ = page
+    nameless = driver.execute_script(
+        "return [...document.querySelectorAll('input, select, button')].filter((e) =>"
+        " !(e.labels?.length || e.textContent.trim() || e.getAttribute('aria-label'))).map((e) => e.outerHTML)"
+    )
+    assert nameless == []
+
+
+def test_names_from_files_stay_text(page):
+    driver, _ = page
+    fresh(driver)
+    driver.execute_script(
+        """const object = page.index.objects[0], was = { ...object };
+        Object.assign(object, { name: "<img src=x onerror=window.hit=1>",
+          description: "<script>window.hit=1</script>" });
+        page.pickObject(object.object_id); window.told = document.getElementById('panel').textContent;
+        Object.assign(object, was);"""
+    )
+    time.sleep(0.2)
+    assert driver.execute_script("return window.hit ?? null") is None
+    assert "<img src=x onerror=window.hit=1>" in driver.execute_script("return window.told")
