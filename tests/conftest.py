@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import hypothesis
 import pytest
 
-from aerialdojo_gen.base import cli_context as advice
+from aerialdojo_gen.base import cli_context
 
 if TYPE_CHECKING:
     from support.planting import Planted
@@ -48,7 +48,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 @pytest.fixture(autouse=True)
 def nothing_given() -> Iterator[None]:
     """Advice repeats what a command was given: in one process the next test was given nothing."""
-    with advice.as_given(advice.Given()):
+    with cli_context.use_context(cli_context.CliContext()):
         yield
 
 
@@ -89,7 +89,7 @@ def smoke(project: Path, shared: Path) -> Path:
             command = [
                 sys.executable,
                 "-m",
-                "aerialdojo_gen.cli.app",
+                "aerialdojo_gen.cli",
                 "run",
                 "pipelines/smoke.toml",
                 "--data",

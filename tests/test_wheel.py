@@ -26,7 +26,7 @@ def unpacked(project, tmp_path_factory):
 
 def run(site, *args):
     done = subprocess.run(
-        [sys.executable, "-m", "aerialdojo_gen.cli.app", *map(str, args)],
+        [sys.executable, "-m", "aerialdojo_gen.cli", *map(str, args)],
         cwd=site, env=os.environ | {"PYTHONPATH": str(site)}, capture_output=True, text=True, check=False,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
@@ -88,7 +88,7 @@ def test_a_recipe_that_is_shipped_goes_by_its_name_anywhere(unpacked, project, t
 
 def test_where_no_release_is_the_wheel_advises_what_it_has(unpacked, tmp_path):
     done = subprocess.run(
-        [sys.executable, "-m", "aerialdojo_gen.cli.app", "stats", "--data", str(tmp_path / "none")],
+        [sys.executable, "-m", "aerialdojo_gen.cli", "stats", "--data", str(tmp_path / "none")],
         cwd=tmp_path, env=os.environ | {"PYTHONPATH": str(unpacked)}, capture_output=True, text=True, check=False,
     )  # fmt: skip
     assert done.returncode == 1

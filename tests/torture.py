@@ -362,7 +362,7 @@ def main() -> None:
             command = [
                 sys.executable,
                 "-m",
-                "aerialdojo_gen.cli.app",
+                "aerialdojo_gen.cli",
                 "run",
                 "pipelines/smoke.toml",
                 "--data",

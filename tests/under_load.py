@@ -45,7 +45,7 @@ def load(processes: int) -> Iterator[None]:
 
 def cli(*arguments: str) -> str:
     """Run a command, and show and return what it says; AssertionError where it fails."""
-    command = [sys.executable, "-m", "aerialdojo_gen.cli.app", *arguments]
+    command = [sys.executable, "-m", "aerialdojo_gen.cli", *arguments]
     done = subprocess.run(command, stderr=subprocess.PIPE, text=True, check=False)
     print(done.stderr, flush=True)
     assert done.returncode == 0, f"{' '.join(arguments)} ended with {done.returncode}"

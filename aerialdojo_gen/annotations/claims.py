@@ -90,7 +90,7 @@ class Claim:
     def holds(self, geometry: SceneGeometry, i: int, slack: float = 1.0) -> bool:
         """Whether the claim is true of instance `i`; see `relations` for `slack`."""
         reach = 15.0 * slack
-        close = set(geometry.around(i, reach))
+        close = set(geometry.neighbours(i, reach))
         sets = [sorted((things & close) - {i}) for things in self.things]
         if self.relation == "between":
             return len(sets) == 2 and any(geometry.between(i, j, k, slack) for j in sets[0] for k in sets[1])

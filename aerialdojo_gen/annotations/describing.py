@@ -86,7 +86,7 @@ class Vocabulary:
         ]
 
 
-class Teller:
+class DescriptionWriter:
     """Describes instances of one scene."""
 
     def __init__(self, vocabulary: Vocabulary, landmarks: Sequence[Landmark], seed: int) -> None:

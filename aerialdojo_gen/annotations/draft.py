@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from aerialdojo_gen.annotations.ambiguity import Ambiguity
-from aerialdojo_gen.annotations.describing import STAGE, Teller, Vocabulary
+from aerialdojo_gen.annotations.describing import STAGE, DescriptionWriter, Vocabulary
 from aerialdojo_gen.annotations.format import Annotations, Landmark, Object
 from aerialdojo_gen.annotations.landmarks import choose_landmarks, spread_m
 from aerialdojo_gen.base.errors import AnnotationError
@@ -54,7 +54,9 @@ def draft_annotations(
 ) -> Annotations:
     """Draft the annotations of a scene."""
     vocabulary = Vocabulary(scene, catalogue)
-    drafter = Drafter(vocabulary, choose_landmarks(vocabulary, n_landmarks, landmarks), seed, choice or Choice())
+    drafter = AnnotationDrafter(
+        vocabulary, choose_landmarks(vocabulary, n_landmarks, landmarks), seed, choice or Choice()
+    )
     objects = drafter.objects(n_objects)
     if len(objects) < n_objects:
         raise AnnotationError(
@@ -64,7 +66,7 @@ def draft_annotations(
     return Annotations(scene.name, drafter.marks, objects)
 
 
-class Drafter:
+class AnnotationDrafter:
     """Chooses and describes the objects of a scene."""
 
     def __init__(self, vocabulary: Vocabulary, marks: tuple[Landmark, ...], seed: int, choice: Choice) -> None:
@@ -73,7 +75,7 @@ class Drafter:
         self.marks = marks
         self.refused: Counter[str] = Counter()
         self.confused: list[tuple[str, Sequence[str]]] = []
-        self._teller = Teller(vocabulary, marks, seed)
+        self._teller = DescriptionWriter(vocabulary, marks, seed)
         ambiguity = self._teller.ambiguity
         wanted = [k for k, w in enumerate(vocabulary.words) if w.target and k not in ambiguity.landmarks]
         self.things = tuple(k for k in wanted if self._placed(k, ambiguity))

@@ -46,7 +46,7 @@ class FactFinder:
 
     def facts(self, i: int, rng: np.random.Generator) -> list[Fact]:
         """List facts about instance `i`, the most natural first."""
-        things = [j for j in self._geometry.around(i, _REACH_M) if self._may_refer(i, j)]
+        things = [j for j in self._geometry.neighbours(i, _REACH_M) if self._may_refer(i, j)]
         gaps = {j: self._geometry.gap_m(i, j) for j in things}
         things.sort(key=lambda j: (-self._salience(j) / (1.5 + gaps[j]), j))
         found: list[Fact] = []
@@ -65,7 +65,7 @@ class FactFinder:
 
     def near(self, i: int) -> list[int]:
         """List the instances within the reach of facts about instance `i`, by index."""
-        return self._geometry.around(i, _REACH_M)
+        return self._geometry.neighbours(i, _REACH_M)
 
     def _may_refer(self, i: int, j: int) -> bool:
         size = self._geometry.boxes[j, 1] - self._geometry.boxes[j, 0]

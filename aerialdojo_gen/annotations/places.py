@@ -73,7 +73,7 @@ class Places:
     def _within(self, i: int, pattern: str, most_m: float) -> bool:
         if most_m >= AT_M and i in self._things(pattern):
             return True  # what makes the place is there itself
-        close = set(self._geometry.around(i, most_m))
+        close = set(self._geometry.neighbours(i, most_m))
         return any(self._geometry.gap_m(i, j) <= most_m for j in sorted(self._things(pattern) & close))
 
     def _beyond(self, i: int, pattern: str, direction: str) -> bool:
@@ -146,7 +146,7 @@ class Places:
         """In the gap between one thing and another, neither of them farther than `NEAR_M`."""
         geometry = self._geometry
         x, y = (float(c) for c in geometry.centres[i, :2])
-        close = set(geometry.around(i, NEAR_M * slack))
+        close = set(geometry.neighbours(i, NEAR_M * slack))
         first, second = (sorted(self._things(pattern) & close) for pattern in patterns)
         for a in first:
             for b in second:
@@ -269,7 +269,7 @@ class Places:
     def _among(self, i: int, value: list[Any], slack: float) -> bool:
         least, pattern, most_m = value
         others = self._things(pattern) - {i}
-        near = (j for j in self._geometry.around(i, most_m * slack) if j in others)
+        near = (j for j in self._geometry.neighbours(i, most_m * slack) if j in others)
         return sum(self._geometry.gap_m(i, j) <= most_m * slack for j in near) >= least
 
     def _part(self, i: int, part: str, slack: float) -> bool:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Any, cast
 
 from aerialdojo_gen.base.errors import BeyondBounds, brief
-from aerialdojo_gen.base.safe_parse import JsonPath, beyond, scan_json
+from aerialdojo_gen.base.safe_parse import JsonPath, find_violation, scan_json
 
 MOST_VALUES = 200_000
 _HALF = re.compile("[\ud800-\udfff]")
@@ -100,7 +100,7 @@ def read_json(text: str) -> Document:
     lines: dict[JsonPath, int] = {}
     faults: list[Fault] = []
     value = _unwrap(root, (), starts, lines, faults)
-    found = beyond(value, finite=False, integers=False)
+    found = find_violation(value, finite=False, integers=False)
     if found is not None:
         # What holds such a text can be neither shown nor written: nothing of the file is used.
         path, why = found

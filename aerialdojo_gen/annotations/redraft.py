@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from aerialdojo_gen.annotations.describing import Teller, Vocabulary
+from aerialdojo_gen.annotations.describing import DescriptionWriter, Vocabulary
 from aerialdojo_gen.annotations.format import Annotations, Object
 from aerialdojo_gen.base.cli_context import command
 from aerialdojo_gen.base.errors import AnnotationError
@@ -18,7 +18,7 @@ def redraft_annotations(scene: Scene, catalogue: Catalogue, annotations: Annotat
         if node not in scene:
             raise AnnotationError(f"{scene.name}: no node {node!r} in the scene: draft the file anew")
     vocabulary = Vocabulary(scene, catalogue)
-    teller = Teller(vocabulary, sorted(annotations.landmarks, key=lambda mark: mark.id), seed)
+    teller = DescriptionWriter(vocabulary, sorted(annotations.landmarks, key=lambda mark: mark.id), seed)
     index = teller.ambiguity.geometry.index
     objects: list[Object] = []
     for entry in annotations.objects:

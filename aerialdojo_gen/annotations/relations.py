@@ -92,7 +92,7 @@ class SceneGeometry:
         (low_i, high_i), (low_j, high_j) = self.boxes[i, :, 2], self.boxes[j, :, 2]
         return max(0.0, float(low_j - high_i), float(low_i - high_j))
 
-    def around(self, i: int, radius_m: float) -> list[int]:
+    def neighbours(self, i: int, radius_m: float) -> list[int]:
         """Instances whose box comes within a distance of an instance's box, by index, itself left out."""
         (x0, y0, z0), (x1, y1, z1) = self.boxes[i]
         r = radius_m

@@ -22,7 +22,7 @@ _TAKES: dict[str, tuple[str, ...]] = {
 
 
 @dataclass(frozen=True)
-class Given:
+class CliContext:
     """What a user gave on the command line, or to the library, and has to give again."""
 
     pipeline: str = ""  # As written; empty where nothing was
@@ -30,10 +30,10 @@ class Given:
     program: str = PROGRAM  # What the command line is called as here
 
 
-_NOW = [Given()]
+_NOW = [CliContext()]
 
 
-def given() -> Given:
+def given() -> CliContext:
     """Return what has been given."""
     return _NOW[0]
 
@@ -46,7 +46,7 @@ def remember(*, pipeline: object = None, data: object = None) -> None:
 
 def begin(called_as: str = "") -> None:
     """Forget what was given, at the start of a command."""
-    _NOW[0] = Given(program=program(called_as) or _NOW[0].program)
+    _NOW[0] = CliContext(program=program(called_as) or _NOW[0].program)
 
 
 def program(called_as: str) -> str:
@@ -58,7 +58,7 @@ def program(called_as: str) -> str:
 
 
 @contextmanager
-def as_given(what: Given) -> Iterator[None]:
+def use_context(what: CliContext) -> Iterator[None]:
     """Give advice for what somebody else was given, for the length of the block: a worker process."""
     before = _NOW[0]
     _NOW[0] = what

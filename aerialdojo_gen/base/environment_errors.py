@@ -91,7 +91,7 @@ def is_out_of_memory(text: str) -> bool:
     return any(words in text.lower() for words in _NO_MEMORY)
 
 
-def explained(error: BaseException) -> str | None:
+def environment_error(error: BaseException) -> str | None:
     """Return the line to print for an error that the machine's limits or its disk caused; None for any other."""
     for cause in _chain(error):
         said = str(cause).lower()

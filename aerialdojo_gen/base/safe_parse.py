@@ -134,13 +134,13 @@ def scan_json(text: str) -> None:
 
 def check_value(value: Any, *, finite: bool = True, longest: int = MAX_JSON_BYTES) -> None:
     """Hold a parsed value against the bounds; `BeyondBounds` names the path of a value that breaks one."""
-    found = beyond(value, finite=finite, longest=longest)
+    found = find_violation(value, finite=finite, longest=longest)
     if found is not None:
         path, why = found
         raise BeyondBounds(f"{_dotted(path)}: {why}" if path else why)
 
 
-def beyond(
+def find_violation(
     value: Any, *, finite: bool = True, integers: bool = True, longest: int = MAX_JSON_BYTES
 ) -> tuple[JsonPath, str] | None:
     """Find a value that is beyond the bounds."""
@@ -173,7 +173,7 @@ def beyond(
     return None
 
 
-def too_deep(value: Any) -> bool:
+def exceeds_depth(value: Any) -> bool:
     """Whether a parsed value is nested more than `MAX_DEPTH` deep; by levels, so that it costs little."""
     level = [value]
     for _ in range(MAX_DEPTH):

@@ -19,7 +19,7 @@ class AgentError(AerialDojoError):
     """An agent raised or returned what it may not: a defect of the agent's."""
 
 
-class Asked:
+class GuardedAgent:
     """Asks an agent."""
 
     def __init__(self, agent: Agent, name: str, secrets: Secrets, tolerate: bool = False) -> None:

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from aerialdojo_gen.benchmark.grid import Line, Measure, Table, score_table, values_of
+from aerialdojo_gen.benchmark.grid import Measure, Row, Table, score_table, values_of
 from aerialdojo_gen.benchmark.metrics import Bools
 from aerialdojo_gen.benchmark.paper_tables import in_setting
 from aerialdojo_gen.benchmark.profiles import Profile
@@ -102,7 +102,7 @@ def part_table(
     there = [(head, masks) for head, masks in parts if any(np.any(mask) for mask in masks)]
     if len(there) < 2:
         return None
-    lines: list[Line] = []
+    lines: list[Row] = []
     measures = shown_measures(runs, profile, _SHORT)
     for k, run in enumerate(runs):
         values: tuple[float, ...] = ()

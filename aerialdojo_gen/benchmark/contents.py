@@ -19,7 +19,7 @@ from aerialdojo_gen.store.root import DataRoot
 
 
 @dataclass(frozen=True)
-class Wanted:
+class ReportRequest:
     """What a report is made of."""
 
     data: DataRoot  # The data root, whose release says more of the tasks; the runs need not lie in it
@@ -35,11 +35,11 @@ class Wanted:
         return partings_of(self.data, self.runs)
 
 
-def _sliced(column: str) -> Callable[[Wanted], list[Table]]:
+def _sliced(column: str) -> Callable[[ReportRequest], list[Table]]:
     return lambda w: [tables.slice_table(w.runs, w.profiles[0], column)]
 
 
-_TABLES: dict[str, Callable[[Wanted], list[Table]]] = {
+_TABLES: dict[str, Callable[[ReportRequest], list[Table]]] = {
     "overall": lambda w: [tables.main_table(w.runs, w.profiles)],
     "results": lambda w: result_tables(w.runs, w.profiles, w.intervals, w.beside),
     "partition": lambda w: [breakdowns.partition_table(w.runs, w.profiles[0])],
@@ -61,12 +61,12 @@ NAMES = tuple(_TABLES)
 DEFAULT = ("results",)
 
 
-def report_tables(wanted: Wanted, names: Sequence[str] = DEFAULT) -> list[Table]:
+def report_tables(wanted: ReportRequest, names: Sequence[str] = DEFAULT) -> list[Table]:
     """Make tables."""
     return [table for made in named_tables(wanted, names).values() for table in made]
 
 
-def left_out(wanted: Wanted, names: Sequence[str] = DEFAULT) -> str:
+def left_out(wanted: ReportRequest, names: Sequence[str] = DEFAULT) -> str:
     """Say in one line which breakdowns of the tables asked for there are not, and why; empty where there are all."""
     asked = "all" in names or {"difficulty", "seen"} & set(names)
     return wanted.partings.left_out if asked else ""
@@ -80,7 +80,7 @@ def check_names(names: Sequence[str]) -> Sequence[str]:
     return names
 
 
-def named_tables(wanted: Wanted, names: Sequence[str]) -> dict[str, list[Table]]:
+def named_tables(wanted: ReportRequest, names: Sequence[str]) -> dict[str, list[Table]]:
     """Make tables as `report_tables` does, by the names that they go by."""
     check_names(names)
     chosen = NAMES if "all" in names else [name for name in NAMES if name in names]

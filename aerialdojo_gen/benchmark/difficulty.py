@@ -98,7 +98,7 @@ class Part:
 
 
 @dataclass(frozen=True)
-class Parting:
+class Breakdown:
     """Episodes parted by a column."""
 
     kind: str  # `DIFFICULTY` or `SEEN`
@@ -112,7 +112,7 @@ class Parting:
 class Partings:
     """All that the episodes of some runs can be parted by."""
 
-    found: tuple[Parting, ...] = ()
+    found: tuple[Breakdown, ...] = ()
     missing: tuple[str, ...] = ()  # Columns that neither the logs nor the release have
 
     @property
@@ -138,7 +138,7 @@ def partings_of(root: DataRoot, runs: Sequence[Run]) -> Partings:
             continue
         parts = (Part(head, tuple(_asked(v or [], is_it) for v in values)) for head, is_it in b.parts.items())
         there = tuple(part for part in parts if any(mask.any() for mask in part.masks))
-        found.append(Parting(b.kind, b.name, b.title, b.note, there))
+        found.append(Breakdown(b.kind, b.name, b.title, b.note, there))
     return Partings(tuple(found), tuple(missing))
 
 

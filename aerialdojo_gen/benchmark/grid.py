@@ -55,7 +55,7 @@ MEASURES = tuple(Measure(HEADS[metric], metric) for metric in METRICS)
 
 
 @dataclass(frozen=True)
-class Line:
+class Row:
     """A line of a table of scores."""
 
     label: str  # First column
@@ -81,7 +81,7 @@ def score_table(
     title: str,
     stub: str,
     groups: Sequence[tuple[str, Sequence[Measure]]],
-    lines: Sequence[Line],
+    lines: Sequence[Row],
     notes: Sequence[str] = (),
     before: tuple[str, ...] = (),
 ) -> Table:
@@ -118,7 +118,7 @@ def _interval(measure: Measure, low: float, high: float) -> str:
     return NONE if math.isnan(low) else f"{measure.text(low)}–{measure.text(high)}"
 
 
-def _marks(measure: Measure, lines: Sequence[Line], k: int) -> dict[int, str]:
+def _marks(measure: Measure, lines: Sequence[Row], k: int) -> dict[int, str]:
     """Find the best and the second best of a column among rivals, as they are printed: equal figures share a mark."""
     if not measure.direction:
         return {}

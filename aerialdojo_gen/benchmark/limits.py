@@ -16,7 +16,7 @@ class Limits:
     failures_in_row: int = 5
 
 
-class Tally:
+class BudgetTracker:
     """Counts what is finished, and says when it is enough."""
 
     def __init__(self, limits: Limits, cost_usd: float, tokens: int) -> None:

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 
 from aerialdojo_gen.base.paper_figures import PaperResult
-from aerialdojo_gen.benchmark.grid import Line, Measure, Table, score_table, values_of
+from aerialdojo_gen.benchmark.grid import Measure, Row, Table, score_table, values_of
 from aerialdojo_gen.benchmark.intervals import score_intervals
 from aerialdojo_gen.benchmark.profiles import Profile
 from aerialdojo_gen.benchmark.runs import Run
@@ -55,7 +55,7 @@ def _result_table(
                 known = dict(zip(METRICS, score_intervals(run.episodes, profile), strict=True))
                 ends += tuple(known[m.metric] for m in measures)
         line = line_of(run, values)
-        lines.append(Line(line.label, values, line.section, line.rivals, spreads, ends))
+        lines.append(Row(line.label, values, line.section, line.rivals, spreads, ends))
     lines += [_paper_line(result, shown) for result in beside]
     notes = ["Mean of the families, each the mean of its scenes; ± is the standard deviation over scenes."]
     if any(not math.isnan(low) for line in lines for low, _ in line.intervals):
@@ -75,14 +75,14 @@ def _result_table(
     return score_table(f"{NAMES[setting]}{about}", "agent", groups, lines, [*notes, *caveats(runs)])
 
 
-def _paper_line(result: PaperResult, shown: Sequence[tuple[Profile, tuple[Measure, ...]]]) -> Line:
+def _paper_line(result: PaperResult, shown: Sequence[tuple[Profile, tuple[Measure, ...]]]) -> Row:
     # Another rule at the same radius is another measure.
     keys = [
         (m.metric, profile.radius_m) if profile.name.startswith("aerialdojo") else ("", 0.0)
         for profile, measures in shown
         for m in measures
     ]
-    return Line(
+    return Row(
         result.model,
         tuple(result.mean.get(key, math.nan) for key in keys),
         f"another simulator (Unreal Engine; {result.source}), {result.group}-source",

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from aerialdojo_gen.benchmark.runner import Evaluation
 
 
-def checked(evaluation: Evaluation, limits: Limits, reporter: Reporter) -> Evaluation:
+def preflight(evaluation: Evaluation, limits: Limits, reporter: Reporter) -> Evaluation:
     """Check an agent that asks a service, by one request; other agents are left alone."""
     # By the class: an agent without a check may take long to make, and is made by the workers.
     if not hasattr(agent_class(evaluation.agent), "check"):

@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 
 from aerialdojo_gen.benchmark.breakdowns import by_setting
-from aerialdojo_gen.benchmark.grid import Line, Measure, Table, score_table
+from aerialdojo_gen.benchmark.grid import Measure, Row, Table, score_table
 from aerialdojo_gen.benchmark.metrics import Floats, outcomes
 from aerialdojo_gen.benchmark.profiles import Profile
 from aerialdojo_gen.benchmark.runs import Run
@@ -38,7 +38,7 @@ def radius_table(runs: Sequence[Run], profile: Profile, radii_m: Sequence[float]
     """
     radii = sorted(set(radii_m))
     swept = not profile.planar and all(run.swept_distance_m is not None for run in runs)
-    lines: list[Line] = []
+    lines: list[Row] = []
     rates: dict[str, list[tuple[str, Floats]]] = {}
     for section, run in by_setting(runs):
         sr, osr = success_curve(run.episodes, profile, np.array(radii))

@@ -15,7 +15,7 @@ import markupsafe
 
 from aerialdojo_gen.base.terminal import shown_in_page
 from aerialdojo_gen.base.version import __version__
-from aerialdojo_gen.benchmark.contents import Wanted, named_tables
+from aerialdojo_gen.benchmark.contents import ReportRequest, named_tables
 from aerialdojo_gen.benchmark.figures import encoded, radius_curve
 from aerialdojo_gen.benchmark.formats import as_latex, as_markdown
 from aerialdojo_gen.benchmark.grid import Table
@@ -30,7 +30,7 @@ from aerialdojo_gen.store.atomic import atomic_file
 _FOLDED = ("type", "scene")
 
 
-def write_report(out: Path, wanted: Wanted, replays: Sequence[Replay]) -> list[Path]:
+def write_report(out: Path, wanted: ReportRequest, replays: Sequence[Replay]) -> list[Path]:
     """Write everything that there is to say of some runs."""
     named = named_tables(wanted, ["all"])
     tables = [table for made in named.values() for table in made]
@@ -62,7 +62,9 @@ def _of_the_radar(runs: Sequence[Run]) -> tuple[Sequence[Run], str]:
     return (base, "Base tasks") if len(base) == len(runs) else (runs, "all tasks")
 
 
-def html(wanted: Wanted, replays: Sequence[Replay], figures: dict[str, bytes], tables: dict[str, list[Table]]) -> str:
+def html(
+    wanted: ReportRequest, replays: Sequence[Replay], figures: dict[str, bytes], tables: dict[str, list[Table]]
+) -> str:
     """Write the page."""
     folder = resources.files("aerialdojo_gen.benchmark").joinpath("templates")
     style, script = (folder.joinpath(name).read_text("utf-8") for name in ("report.css", "report.js"))

@@ -26,13 +26,13 @@ from aerialdojo_gen.benchmark.agents import ServiceDown
 from aerialdojo_gen.benchmark.evaluation import Evaluation, Outcome
 from aerialdojo_gen.benchmark.flying_code import flying_code
 from aerialdojo_gen.benchmark.journals import Journals
-from aerialdojo_gen.benchmark.limits import Limits, Tally
-from aerialdojo_gen.benchmark.preflight import checked
+from aerialdojo_gen.benchmark.limits import BudgetTracker, Limits
+from aerialdojo_gen.benchmark.preflight import preflight
 from aerialdojo_gen.benchmark.tasks import select
 from aerialdojo_gen.benchmark.viewpoints import viewpoints_content, without_viewpoints
-from aerialdojo_gen.benchmark.worker import Finished, Unit
+from aerialdojo_gen.benchmark.worker import Finished, WorkUnit
 from aerialdojo_gen.benchmark.workers import fly_units
-from aerialdojo_gen.pipeline.executors import Folders, make_executor, on_disk
+from aerialdojo_gen.pipeline.executors import SharedPaths, make_executor, on_disk
 from aerialdojo_gen.pipeline.interrupt import Interrupts
 from aerialdojo_gen.pipeline.progress import Reporter
 from aerialdojo_gen.store import shards as store
@@ -66,7 +66,10 @@ def evaluate(
     rows = select(root, evaluation.selection)
     run = _Run(root, log, folder, evaluation, rows)
     made = make_executor(
-        executor, workers, address, Folders(on_disk(root, below="release"), (), (run.journal_folder,), reporter.line)
+        executor,
+        workers,
+        address,
+        SharedPaths(on_disk(root, below="release"), (), (run.journal_folder,), reporter.line),
     )
     with folder.lock(), Interrupts() as interrupts:
         if restart:
@@ -75,10 +78,10 @@ def evaluate(
         run.bring_in()
         todo = run.todo(rerun_failed)
         if todo.num_rows:
-            evaluation = checked(evaluation, limits, reporter)
+            evaluation = preflight(evaluation, limits, reporter)
             if run.without_viewpoints:
                 reporter.line(without_viewpoints(run.without_viewpoints, len(rows["scene"].unique())))
-        tally = Tally(limits, *run.spent())
+        tally = BudgetTracker(limits, *run.spent())
         with reporter.bar(f"{evaluation.agent} ({evaluation.run})", todo.num_rows, "episodes") as bar:
 
             def tell(finished: Finished) -> None:
@@ -245,7 +248,7 @@ class _Run:
             for task_id in store.read_scene(self._out, table, scene, ["task_id"], self._name)["task_id"].to_pylist()
         ]
 
-    def units(self, todo: pa.Table, workers: int) -> list[Unit]:
+    def units(self, todo: pa.Table, workers: int) -> list[WorkUnit]:
         """Share the work: whole scenes where there are many, for a scene takes seconds to make ready."""
         by_scene = {s: todo.filter(pc.equal(todo["scene"], s)) for s in todo["scene"].unique().to_pylist()}
         share = -(-todo.num_rows // (4 * workers)) if workers > 1 else todo.num_rows
@@ -255,5 +258,5 @@ class _Run:
             parts = 1 if len(by_scene) >= 4 * workers else -(-rows.num_rows // share)
             size = -(-rows.num_rows // parts)
             for k in range(parts):
-                units.append(Unit(scene, rows.slice(k * size, size), self._journals.path(scene, k)))
+                units.append(WorkUnit(scene, rows.slice(k * size, size), self._journals.path(scene, k)))
         return units

@@ -102,7 +102,7 @@ class Conduct:
     cost_usd: float | None  # None where prices are not known
 
 
-def conduct(run: Run) -> Conduct:
+def episode_outcomes(run: Run) -> Conduct:
     """Count how a run's episodes went."""
     n = len(run.episodes)
     ends = run.table["termination"].to_pylist()

@@ -9,10 +9,10 @@ from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 
-from aerialdojo_gen.benchmark.grid import NONE, Line, Measure, Table, measures_of, score_table, values_of
+from aerialdojo_gen.benchmark.grid import NONE, Measure, Row, Table, measures_of, score_table, values_of
 from aerialdojo_gen.benchmark.metrics import knows_views
 from aerialdojo_gen.benchmark.profiles import Profile
-from aerialdojo_gen.benchmark.runs import GROUP_OF, UPPER_BOUND, Run, conduct
+from aerialdojo_gen.benchmark.runs import GROUP_OF, UPPER_BOUND, Run, episode_outcomes
 from aerialdojo_gen.benchmark.scores import METRICS, Score, slices, summarize
 from aerialdojo_gen.store.schemas import FAMILIES, SETTINGS
 
@@ -38,9 +38,9 @@ def shown_measures(runs: Sequence[Run], profile: Profile, metrics: Sequence[str]
     return measures_of(any(knows_views(run.episodes, profile) for run in runs), metrics)
 
 
-def line_of(run: Run, values: tuple[float, ...], rivals: str = "", section: str | None = None) -> Line:
+def line_of(run: Run, values: tuple[float, ...], rivals: str = "", section: str | None = None) -> Row:
     """Make a run's line: under its group's heading, and out of the running where it knows the way."""
-    return Line(
+    return Row(
         run.label,
         values,
         run.group if section is None else section,
@@ -76,7 +76,7 @@ def main_table(runs: Sequence[Run], profiles: Sequence[Profile]) -> Table:
             values += values_of(summary.overall, measures)
             spreads += values_of(summary.deviation, measures)
         line = line_of(run, values)
-        lines.append(Line(line.label, values, line.section, line.rivals, spreads, before=(f"{len(run.episodes):,}",)))
+        lines.append(Row(line.label, values, line.section, line.rivals, spreads, before=(f"{len(run.episodes):,}",)))
     groups = [(profile_head(profile), measures) for profile, measures in shown]
     notes.append("Mean of the four families, each the mean of its scenes; ± is the standard deviation over scenes.")
     return score_table("Overall", "agent", groups, lines, [*notes, *caveats(runs)], ("episodes",))
@@ -155,7 +155,7 @@ def stacked_table(
     """Set the values of a column below one another, a group of columns a run."""
     measures = shown_measures(runs, profile)
     lines = [
-        Line(name, tuple(v for part in scores for v in values_of(part.get(name), measures)), rivals=None)
+        Row(name, tuple(v for part in scores for v in values_of(part.get(name), measures)), rivals=None)
         for name in rows
     ]
     return score_table(f"{title}, {profile_head(profile)}", stub, [(run.label, measures) for run in runs], lines)
@@ -174,7 +174,7 @@ def conduct_table(runs: Sequence[Run]) -> Table:
     sections: dict[int, str] = {}
     above = ""
     for run in runs:
-        c = conduct(run)
+        c = episode_outcomes(run)
         counts = (c.refused, c.invalid, c.requests, c.input_tokens, c.output_tokens)
         cells = [f"{100 * share:.1f}" for share in c.ended.values()]
         cells += [f"{c.actions:.1f}", *(NONE if count is None else f"{count:,}" for count in counts)]

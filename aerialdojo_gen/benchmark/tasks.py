@@ -18,7 +18,7 @@ from aerialdojo_gen.base.cli_context import command
 from aerialdojo_gen.base.errors import StoreError, UsageError
 from aerialdojo_gen.base.names import unknown
 from aerialdojo_gen.base.pictures import decode_rgb
-from aerialdojo_gen.benchmark.agents.goal import TELLABLE, Goal, Heading, Rules
+from aerialdojo_gen.benchmark.agents.goal import HINTS, Goal, Heading, Rules
 from aerialdojo_gen.dataset.contents import scenes_in_release
 from aerialdojo_gen.geometry.frames import compass_heading
 from aerialdojo_gen.planning.flight_space import Point
@@ -234,9 +234,9 @@ def reference_actions(
 def check_tell(tell: Sequence[str]) -> tuple[str, ...]:
     """Return what is to be told beside the goal, in its one order; UsageError for what nobody tells."""
     for name in tell:
-        if name not in TELLABLE:
-            raise UsageError(unknown("nothing to tell called", name, TELLABLE))
-    return tuple(name for name in TELLABLE if name in tell)
+        if name not in HINTS:
+            raise UsageError(unknown("nothing to tell called", name, HINTS))
+    return tuple(name for name in HINTS if name in tell)
 
 
 def goal_of(root: DataRoot, task: Task, rules: Rules, tell: Sequence[str] = ()) -> Goal:

@@ -18,7 +18,7 @@ from aerialdojo_gen.benchmark.agents import Agent, AgentUnavailable, Usage
 from aerialdojo_gen.benchmark.agents.goal import Observation
 from aerialdojo_gen.benchmark.agents.load import place
 from aerialdojo_gen.benchmark.agents.simple import OracleAgent
-from aerialdojo_gen.benchmark.asking import AgentError, Asked
+from aerialdojo_gen.benchmark.asking import AgentError, GuardedAgent
 from aerialdojo_gen.benchmark.flight import Flight
 from aerialdojo_gen.benchmark.journal import Journal
 from aerialdojo_gen.benchmark.tasks import Task, read_tasks, reference_actions
@@ -31,7 +31,7 @@ _COLUMNS = [name for name in STEPS.schema.names if name not in ("run_id", "task_
 
 
 @dataclass(frozen=True)
-class Unit:
+class WorkUnit:
     """Episodes of one scene that a worker flies."""
 
     scene: str
@@ -93,9 +93,9 @@ class Worker:
     ) -> None:
         self._agent, self._flight, self._data = agent, flight, data
         self._identity, self._conditions, self._secrets = identity, conditions, secrets
-        self._asked = Asked(agent, identity["agent"], secrets, conditions.tolerate)
+        self._asked = GuardedAgent(agent, identity["agent"], secrets, conditions.tolerate)
 
-    def fly(self, unit: Unit, tell: Callable[[Finished], None], stopped: Callable[[], bool]) -> None:
+    def fly(self, unit: WorkUnit, tell: Callable[[Finished], None], stopped: Callable[[], bool]) -> None:
         """Fly a unit's episodes, each into the journal when it is finished."""
         actions: dict[str, list[int]] = {}
         # The oracle alone, by its very class: no agent of another name can ask for it.

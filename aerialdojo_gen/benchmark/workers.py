@@ -15,10 +15,10 @@ from aerialdojo_gen.benchmark.agents import load_agent
 from aerialdojo_gen.benchmark.agents.goal import Sensors
 from aerialdojo_gen.benchmark.flight import Flight
 from aerialdojo_gen.benchmark.rate_limit import Pace
-from aerialdojo_gen.benchmark.worker import Finished, Unit, Worker
+from aerialdojo_gen.benchmark.worker import Finished, Worker, WorkUnit
 from aerialdojo_gen.dataset.fingerprint import release_fingerprint
-from aerialdojo_gen.pipeline.executors import Executor, Talk
-from aerialdojo_gen.pipeline.executors.link import Link, at_end
+from aerialdojo_gen.pipeline.executors import Executor, ParentChannel
+from aerialdojo_gen.pipeline.executors.link import WorkerChannel, at_end
 from aerialdojo_gen.store.root import DataRoot
 
 if TYPE_CHECKING:
@@ -29,7 +29,7 @@ MEMORY_MB = 1000
 
 
 @contextlib.contextmanager
-def worker(data: DataRoot, evaluation: Evaluation, link: Link) -> Iterator[Worker]:
+def worker(data: DataRoot, evaluation: Evaluation, link: WorkerChannel) -> Iterator[Worker]:
     """Make an agent and what it flies in; the agent is closed at the end."""
     agent: Any = load_agent(evaluation.agent, **evaluation.options)
     if evaluation.requests_per_minute is not None:
@@ -58,7 +58,7 @@ def worker(data: DataRoot, evaluation: Evaluation, link: Link) -> Iterator[Worke
 class _Work:
     data: DataRoot
     evaluation: Evaluation
-    unit: Unit
+    unit: WorkUnit
 
     @property
     def label(self) -> str:
@@ -72,7 +72,7 @@ class _Work:
 def fly_units(
     data: DataRoot,
     evaluation: Evaluation,
-    units: Sequence[Unit],
+    units: Sequence[WorkUnit],
     executor: Executor,
     tell: Callable[[Finished], None],
     stopped: Callable[[], bool],
@@ -80,7 +80,9 @@ def fly_units(
     """Fly units, and yield a scene when all of its units are through."""
     left = Counter(unit.scene for unit in units)
     work = [_Work(data, evaluation, unit) for unit in units]
-    for outcome in executor.map(_fly, work, lambda one: one.scene, talk=Talk(tell, stopped), memory_mb=MEMORY_MB):
+    for outcome in executor.map(
+        _fly, work, lambda one: one.scene, talk=ParentChannel(tell, stopped), memory_mb=MEMORY_MB
+    ):
         if isinstance(outcome, AerialDojoError):
             raise outcome
         left[outcome] -= 1
@@ -92,7 +94,7 @@ def fly_units(
 _ours: dict[str, Worker] = {}
 
 
-def _fly(work: _Work, link: Link) -> str:
+def _fly(work: _Work, link: WorkerChannel) -> str:
     if "worker" not in _ours:
         stack = contextlib.ExitStack()
         at_end(_ours.clear)
@@ -106,7 +108,7 @@ def _fly(work: _Work, link: Link) -> str:
 class _Teller:
     """Tells the parent what was finished, no more often than its link bears, and what is left at its end."""
 
-    def __init__(self, link: Link) -> None:
+    def __init__(self, link: WorkerChannel) -> None:
         self._link, self._sum, self._last = link, Finished(), time.monotonic()
 
     def tell(self, finished: Finished) -> None:

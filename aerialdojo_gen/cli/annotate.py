@@ -30,8 +30,8 @@ def annotate(
     """Annotate a scene in the browser: landmarks, objects and their anchors."""
     from aerialdojo_gen.cli.picking import given_scene, pick_scene
     from aerialdojo_gen.pipeline.runner import chosen_scenes, known_scenes
-    from aerialdojo_gen.studio.annotate.serve import serve_desk, write_coco
-    from aerialdojo_gen.studio.annotate.session import open_desk
+    from aerialdojo_gen.studio.annotate.serve import serve_session, write_coco
+    from aerialdojo_gen.studio.annotate.session import open_session
     from aerialdojo_gen.studio.web.serving import require_web
 
     if coco is None:
@@ -39,8 +39,8 @@ def annotate(
     config, roots = open_pipeline(pipeline, data)
     given = given_scene(name, scene)
     scene = pick_scene(given, known_scenes(roots.recipes) if given else chosen_scenes(config, roots))
-    desk = open_desk(scene, config, roots)
+    desk = open_session(scene, config, roots)
     if coco is not None:
         print(write_coco(desk, coco))
     else:
-        serve_desk(desk, port=port, host=host, browser=browser, say=lambda line: print(line, flush=True))
+        serve_session(desk, port=port, host=host, browser=browser, say=lambda line: print(line, flush=True))

@@ -12,9 +12,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from aerialdojo_gen.base import cli_context as advice
-from aerialdojo_gen.base import environment_errors as trouble
-from aerialdojo_gen.base import terminal
+from aerialdojo_gen.base import cli_context, environment_errors, terminal
 from aerialdojo_gen.base.errors import AerialDojoError
 from aerialdojo_gen.cli import (
     annotate,
@@ -61,7 +59,7 @@ class _Commands(TyperGroup):
 
     def invoke(self, ctx: Any) -> Any:
         """Run the command, with nothing kept of another one."""
-        advice.begin(sys.argv[0])
+        cli_context.begin(sys.argv[0])
         return super().invoke(ctx)
 
 
@@ -121,7 +119,7 @@ _BadOption: Any = typer.BadParameter.__bases__[0]
 
 def main() -> None:
     """Run the command line; an expected error becomes one line and an exit code."""
-    trouble.use_utf8()
+    environment_errors.use_utf8()
     with terminal.standard_streams():
         try:
             code, line = _ended()
@@ -136,10 +134,10 @@ def main() -> None:
 def _ended() -> tuple[int, str]:
     """Run the command; return its exit code, and its error in one line where it is an expected one."""
     try:
-        trouble.check_arguments(sys.argv[1:])
-        trouble.check_limits(sys.argv[1:])
+        environment_errors.check_arguments(sys.argv[1:])
+        environment_errors.check_limits(sys.argv[1:])
         try:
-            called = advice.program(sys.argv[0]) or advice.PROGRAM
+            called = cli_context.program(sys.argv[0]) or cli_context.PROGRAM
             return _for(sys.argv[1:2])(prog_name=called, standalone_mode=False) or 0, ""
         finally:
             sys.stdout.flush()
@@ -149,7 +147,7 @@ def _ended() -> tuple[int, str]:
     except AerialDojoError as error:
         return error.exit_code, _with_notes(str(error), error)
     except Exception as error:
-        line = trouble.explained(error)
+        line = environment_errors.environment_error(error)
         if line is None:
             raise
         return 1, _with_notes(line, error)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from aerialdojo_gen.base import cli_context as advice
+from aerialdojo_gen.base import cli_context
 from aerialdojo_gen.cli import completion
 from aerialdojo_gen.dataset.build import (
     DEFAULT_PIPELINE,
@@ -26,7 +26,7 @@ from aerialdojo_gen.dataset.build import (
 if TYPE_CHECKING:
     from aerialdojo_gen.base.config.pipeline import Pipeline
     from aerialdojo_gen.pipeline.freshness import Limits
-    from aerialdojo_gen.pipeline.stage import Roots, Stage
+    from aerialdojo_gen.pipeline.stage import ProjectPaths, Stage
     from aerialdojo_gen.store.root import Where
 
 __all__ = ["default_workers", "open_pipeline", "pipeline_file", "run_chosen", "run_until"]
@@ -54,7 +54,7 @@ def kept(ctx: typer.Context, param: typer.CallbackParam, value: Any) -> Any:
     """Keep what is written on the command line (not what the environment says) for the advice of messages."""
     source = ctx.get_parameter_source(str(param.name))
     if source is not None and source.name == "COMMANDLINE":
-        advice.remember(**{str(param.name): value})
+        cli_context.remember(**{str(param.name): value})
     return value
 
 
@@ -170,7 +170,7 @@ def run_until(
 def run_chosen(
     stages: list[Stage],
     config: Pipeline,
-    roots: Roots,
+    roots: ProjectPaths,
     scene: list[str] | None,
     workers: int | None,
     force: list[str],

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from aerialdojo_gen.base import cli_context as advice
+from aerialdojo_gen.base import cli_context
 from aerialdojo_gen.cli.common import Json, PipelineFile, pipeline_file, print_json
 
 app = typer.Typer(help="Show the keys of a pipeline file, or write one to start from.")
@@ -48,4 +48,4 @@ def init(
     from aerialdojo_gen.pipeline.template import init_config
 
     print(init_config(path, pipeline and pipeline_file(pipeline), force=force))
-    print(f"next: {advice.command('run', path, data=f'data-{path.stem}')}")
+    print(f"next: {cli_context.command('run', path, data=f'data-{path.stem}')}")

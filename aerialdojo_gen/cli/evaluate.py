@@ -12,7 +12,7 @@ import typer
 from aerialdojo_gen.base.cli_context import command
 from aerialdojo_gen.base.errors import AerialDojoError, UsageError
 from aerialdojo_gen.cli import completion
-from aerialdojo_gen.cli.again import again
+from aerialdojo_gen.cli.again import rerun_command
 from aerialdojo_gen.cli.common import (
     Address,
     Data,
@@ -199,7 +199,7 @@ def evaluate(
         raise SystemExit(130) from None
     scores = f"; for all scores: {command('report', evaluation.run, log=out)}" if outcome.finished else ""
     reporter.line(f"evaluate {evaluation.run}: {outcome}{scores}")
-    last = outcome.last_line(again(["--rerun-failed"], without=["--restart"], data=data))
+    last = outcome.last_line(rerun_command(["--rerun-failed"], without=["--restart"], data=data))
     if outcome.stopped or outcome.fruitless:
         raise AerialDojoError(last)
     if last:

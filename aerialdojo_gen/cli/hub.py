@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from aerialdojo_gen.base import cli_context as advice
+from aerialdojo_gen.base import cli_context
 from aerialdojo_gen.base.errors import brief
 from aerialdojo_gen.cli.common import Data, Quiet
 
@@ -59,4 +59,4 @@ def pull(
     if moved.left:
         names = [brief(name, 100) for name in moved.left[:5]]
         print(f"left there: {', '.join(names)}{' …' if len(moved.left) > 5 else ''}")
-    print(f"next: {advice.command('validate', no_meshes=not moved.meshes)}")
+    print(f"next: {cli_context.command('validate', no_meshes=not moved.meshes)}")

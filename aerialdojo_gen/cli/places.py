@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from aerialdojo_gen.base import cli_context as advice
+from aerialdojo_gen.base import cli_context
 
 if TYPE_CHECKING:
     from aerialdojo_gen.imports.places import Place
@@ -106,5 +106,5 @@ def _say(added: list[Place], project: Path) -> None:
         for line in place.said:
             print(f"  {line}")
     first = added[0]
-    print(f"next: {advice.command('annotate-draft', first.name, pipeline=first.pipeline)}")
-    print(f"then: {advice.command('run', first.pipeline, data=project / 'data')}")
+    print(f"next: {cli_context.command('annotate-draft', first.name, pipeline=first.pipeline)}")
+    print(f"then: {cli_context.command('run', first.pipeline, data=project / 'data')}")

@@ -47,7 +47,7 @@ def stats(
     """Compare the release with the paper's tables; without a release, show what filter kept."""
     from aerialdojo_gen.dataset.contents import files_there, no_release, scenes_in_release, scenes_there
     from aerialdojo_gen.dataset.provenance import RECORD
-    from aerialdojo_gen.store.memo import key_of, remembered
+    from aerialdojo_gen.store.memo import key_of, memo
     from aerialdojo_gen.store.root import open_root
 
     root, scene = open_root(data), together(scenes, scene)
@@ -78,7 +78,7 @@ def stats(
         return "\n\n".join("\n".join(table.terminal(width)) for table in compared)
 
     # The same release gives the same tables, and make dataset prints them each time.
-    print(remembered(key_of(root, [*files_there(root), RECORD], "stats", names, as_json or width), show))
+    print(memo(key_of(root, [*files_there(root), RECORD], "stats", names, as_json or width), show))
     if markdown or csv:
         from aerialdojo_gen.dataset.stats.comparison import as_csv, as_markdown
         from aerialdojo_gen.store.atomic import atomic_file

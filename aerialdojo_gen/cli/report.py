@@ -113,7 +113,7 @@ def report(
         release_scenes(root)  # a folder without either is the wrong one
     named = load_runs(written, runs or ())
     loaded = arranged(with_floors(written, named) if floors else named, groups)
-    wanted = contents.Wanted(
+    wanted = contents.ReportRequest(
         root, loaded, rules, tuple(radius or DEFAULT_RADII_M), intervals, results() if beside else ()
     )
     if style in ("csv", "json"):

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from aerialdojo_gen.base import cli_context as advice
+from aerialdojo_gen.base import cli_context
 from aerialdojo_gen.base.errors import UsageError
 from aerialdojo_gen.base.text_table import terminal_width
 from aerialdojo_gen.cli.common import (
@@ -80,25 +80,27 @@ def add_scene(
         print("\n".join(command.list_mesh(mesh, up=up, scale=scale, names=names, width=terminal_width())))
         return
     if up is None:
-        raise UsageError(f"--up is missing: z or y; {advice.command('add-scene', name, mesh, '--list')} guesses it")
+        raise UsageError(
+            f"--up is missing: z or y; {cli_context.command('add-scene', name, mesh, '--list')} guesses it"
+        )
     if tiles is not None and annotations is not None:
         raise UsageError("--annotations are of one scene, --tiles make several: leave one of them out")
     cut: dict[str, Any] = {"crop_m": crop, "box_m": box, "ceiling_m": ceiling, "names": names, "force": force}
     cut |= {"light": light, "texture_px": texture_px}
     scale = 1.0 if scale is None else scale
     if tiles is not None:
-        made = command.add_tiles(name, mesh, project, tiles, up=up, scale=scale, watch=_told, **cut)
+        made = command.add_tiles(name, mesh, project, tiles, up=up, scale=scale, watch=_describe, **cut)
         print(f"{len(made):,} scenes in one frame")
     else:
         made = [command.add_scene(name, mesh, project, up=up, scale=scale, annotations=annotations, **cut)]
-        _told(made[0])
+        _describe(made[0])
     first = next((added for added in made if not added.annotations.exists()), None)
     if first is not None:
-        print(f"next: {advice.command('annotate-draft', first.scene.name, pipeline=first.pipeline)}")
-    print(f"then: {advice.command('run', made[0].pipeline, data=project / 'data')}")
+        print(f"next: {cli_context.command('annotate-draft', first.scene.name, pipeline=first.pipeline)}")
+    print(f"then: {cli_context.command('run', made[0].pipeline, data=project / 'data')}")
 
 
-def _told(added: Added) -> None:
+def _describe(added: Added) -> None:
     scene = added.scene
     size = scene.bounds[1] - scene.bounds[0]
     print(

@@ -102,7 +102,7 @@ def validate(
     definitions = load_pipeline(pipeline_file(file))
     if definitions.scene_assets is None:
         definitions = definitions.model_copy(update={"scene_assets": home() / "scene_assets"})
-    asked = validation.Asked(
+    asked = validation.ValidationOptions(
         release=release,
         scenes=tuple(together(scenes, scene) or ()),
         meshes=meshes.absolute() if meshes else None,

@@ -12,7 +12,7 @@ from dataclasses import replace as replaced
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from aerialdojo_gen.base import cli_context as advice
+from aerialdojo_gen.base import cli_context
 from aerialdojo_gen.base.cli_context import PROGRAM
 from aerialdojo_gen.base.errors import AssetError, ConfigError, UsageError
 from aerialdojo_gen.base.shipped import home
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from aerialdojo_gen.base.config.pipeline import Pipeline
     from aerialdojo_gen.pipeline.freshness import Limits
     from aerialdojo_gen.pipeline.progress import Reporter
-    from aerialdojo_gen.pipeline.stage import Roots, Stage
+    from aerialdojo_gen.pipeline.stage import ProjectPaths, Stage
     from aerialdojo_gen.pipeline.summary import StageSummary
     from aerialdojo_gen.store.root import DataRoot
 
@@ -92,10 +92,10 @@ def run_pipeline(
     else:
         needed = {stage.name for asked in stages_named(stages) for stage in upstream(asked.name)}
         chosen = stages_named([*needed])
-    given = advice.given()
+    given = cli_context.given()
     given = replaced(given, pipeline=str(pipeline) if isinstance(pipeline, (str, Path)) else given.pipeline)
     given = replaced(given, data=str(data) if isinstance(data, (str, Path)) and str(data) != "data" else given.data)
-    with advice.as_given(given):
+    with cli_context.use_context(given):
         return run_stages(
             chosen, config, roots, scenes, workers=workers, executor=executor, address=address, force=force,
             reporter=reporter, limits=limits, replace=replace,
@@ -164,7 +164,7 @@ def release_pipeline(data: DataRoot, folder: str = "release", *, reads: bool = F
 
 def open_pipeline(
     pipeline: str | Path | Pipeline | None, data: str | Path | DataRoot, *, reads: bool = False
-) -> tuple[Pipeline, Roots]:
+) -> tuple[Pipeline, ProjectPaths]:
     """Read the pipeline file and find the folders.
 
     Parameters
@@ -189,7 +189,7 @@ def open_pipeline(
         As for `release_pipeline`.
     """
     from aerialdojo_gen.base.config.pipeline import Pipeline, load_pipeline
-    from aerialdojo_gen.pipeline.stage import Roots
+    from aerialdojo_gen.pipeline.stage import ProjectPaths
     from aerialdojo_gen.store.root import open_root
 
     data = open_root(data)
@@ -197,7 +197,7 @@ def open_pipeline(
         pipeline = release_pipeline(data, reads=reads)
     if not isinstance(pipeline, Pipeline):
         pipeline = load_pipeline(pipeline_file(pipeline))
-    roots = Roots(
+    roots = ProjectPaths(
         data=data,
         scene_assets=(assets := pipeline.scene_assets or home() / "scene_assets"),
         recipes=pipeline.recipes or assets / "scenes",
@@ -212,7 +212,7 @@ def open_pipeline(
 def run_stages(
     stages: Sequence[Stage],
     config: Pipeline,
-    roots: Roots,
+    roots: ProjectPaths,
     scenes: Sequence[str] | None = None,
     *,
     workers: int | None = None,
@@ -246,7 +246,7 @@ def run_stages(
     reporter = reporter or Reporter(quiet=True)
     names = runner.chosen_scenes(config, roots, scenes)
     releases = any(stage.name == "split" for stage in stages)
-    left_out = runner.unready(stages, names, roots)
+    left_out = runner.scenes_missing_input(stages, names, roots)
     for line in left_out.values():
         log.warning("left out: %s", line)
     ready = [name for name in names if name not in left_out]

@@ -11,7 +11,7 @@ from aerialdojo_gen.base.text_table import Column, TextTable
 
 if TYPE_CHECKING:
     from aerialdojo_gen.base.config.pipeline import Pipeline
-    from aerialdojo_gen.pipeline.stage import Roots, Stage
+    from aerialdojo_gen.pipeline.stage import ProjectPaths, Stage
     from aerialdojo_gen.store.root import DataRoot
 
 
@@ -43,7 +43,7 @@ def pipeline_status(
     return [_status(stage, names, config, roots) for stage in stages_named(config.stages)]
 
 
-def _status(stage: Stage, scenes: Sequence[str], pipeline: Pipeline, roots: Roots) -> StageStatus:
+def _status(stage: Stage, scenes: Sequence[str], pipeline: Pipeline, roots: ProjectPaths) -> StageStatus:
     from aerialdojo_gen.pipeline.freshness import is_fresh
     from aerialdojo_gen.store import shards as store
 
@@ -51,7 +51,7 @@ def _status(stage: Stage, scenes: Sequence[str], pipeline: Pipeline, roots: Root
     made = [scene for scene in scenes if scene not in missing]
     section = pipeline.section(stage.name)
     # A run settles on one of these choices for all scenes: it keeps what was made by the best.
-    choices = stage.choices(section) or [stage.settle(section, lambda _: None)]
+    choices = stage.choices(section) or [stage.resolve_config(section, lambda _: None)]
     fresh = max(([s for s in made if is_fresh(stage, choice, s, pipeline, roots)] for choice in choices), key=len)
     return StageStatus(stage.name, tuple(fresh), tuple(s for s in made if s not in fresh), tuple(missing))
 

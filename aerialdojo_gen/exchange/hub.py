@@ -111,7 +111,7 @@ def push_to_hub(
         files |= {f"meshes/{scene}.glb": _mesh(root, scene) for scene in scenes}
     size = sum(path.stat().st_size for path in files.values())
     reporter.line(f"push-to-hub: {len(files):,} files, {size / 1e6:,.1f} MB to {hub.address}/datasets/{repo}")
-    with hub.told("make or write to"):
+    with hub.explain_errors("make or write to"):
         if not hub.api.repo_exists(repo, repo_type="dataset"):
             hub.api.create_repo(repo, repo_type="dataset", private=private)
         if revision:
@@ -179,7 +179,7 @@ def pull_release(
         raise UsageError(f"there is a release in {root.url}: name another folder with --data, or add --replace")
     reporter = reporter or Reporter(quiet=True)
     hub = Hub(repo, "pull")
-    with hub.told("read"):
+    with hub.explain_errors("read"):
         info = hub.api.repo_info(repo, repo_type="dataset", revision=revision, files_metadata=True)
     commit = str(info.sha)
     wanted = {
@@ -261,7 +261,7 @@ def _fetch(hub: Hub, commit: str, files: Sequence[Any], folder: Path, reporter: 
             path.unlink(missing_ok=True)
             raise StoreError(f"{sibling.rfilename} of {hub.repo} came damaged: the same command fetches it again")
 
-    with reporter.bar("pull", len(files), "files") as bar, hub.told("read"):
+    with reporter.bar("pull", len(files), "files") as bar, hub.explain_errors("read"):
         pool = ThreadPoolExecutor(_AT_ONCE)
         try:
             for done in as_completed([pool.submit(one, sibling) for sibling in files]):

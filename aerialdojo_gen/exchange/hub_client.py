@@ -50,7 +50,7 @@ class Hub:
         self.api: Any = huggingface_hub.HfApi(endpoint=self.endpoint, token=self.token, library_name="aerialdojo-gen")
 
     @contextmanager
-    def told(self, doing: str) -> Iterator[None]:
+    def explain_errors(self, doing: str) -> Iterator[None]:
         """Turn what the server or the network answers into a line."""
         from huggingface_hub import errors
 
@@ -65,9 +65,9 @@ class Hub:
                 cause = cause.__cause__
             if cause is None or isinstance(error, AerialDojoError):
                 raise
-            raise self._told(cause, doing) from None
+            raise self._explain(cause, doing) from None
 
-    def _told(self, error: BaseException, doing: str) -> AerialDojoError:
+    def _explain(self, error: BaseException, doing: str) -> AerialDojoError:
         from huggingface_hub import errors
 
         who = f"{TOKEN} may not see it" if self.token else f"it is private, and {TOKEN} is not set"

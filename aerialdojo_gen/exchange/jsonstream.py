@@ -14,7 +14,7 @@ from typing import Any, BinaryIO
 
 from aerialdojo_gen.base.disk import check_regular
 from aerialdojo_gen.base.errors import ImportRefused, brief
-from aerialdojo_gen.base.safe_parse import MAX_DEPTH, loads_json, too_deep
+from aerialdojo_gen.base.safe_parse import MAX_DEPTH, exceeds_depth, loads_json
 from aerialdojo_gen.exchange.fields import shown
 
 RECORD_LIMIT = 16 << 20
@@ -82,7 +82,7 @@ class _Text:
                 # A number may go on beyond what is read: 1, 1. and 1.5e+ begin alike.
                 cut = type(value) in (int, float) and len(self._text) - end < _LONGEST_EXPONENT
                 if self._done or (end < len(self._text) and not (cut and self._text[end] in ".eE")):
-                    if too_deep(value):
+                    if exceeds_depth(value):
                         raise self.fail(f"nested more than {MAX_DEPTH} deep")
                     self._at = end
                     return value

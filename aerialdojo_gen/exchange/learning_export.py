@@ -20,7 +20,7 @@ from aerialdojo_gen.dataset.contents import part_name
 from aerialdojo_gen.exchange import lerobot_writer, webdataset_writer
 from aerialdojo_gen.exchange.folder import check_target, whole_folder, write_json
 from aerialdojo_gen.exchange.parts import Unfinished, whole_part
-from aerialdojo_gen.exchange.samples import Part, Wanted, named_splits, planned
+from aerialdojo_gen.exchange.samples import ExportOptions, Part, named_splits, planned
 from aerialdojo_gen.pipeline.code_digest import code_of
 from aerialdojo_gen.pipeline.executors import make_executor
 from aerialdojo_gen.pipeline.progress import Reporter, duration
@@ -84,14 +84,14 @@ def wanted_from(
     source: str = "render",
     renderer: str = "auto",
     jpeg_quality: int = 0,
-) -> Wanted:
-    """Say what is to be exported; parameters as for `aerialdojo_gen.learning.Trajectories` and `Wanted`."""
+) -> ExportOptions:
+    """Say what is to be exported; parameters as for `aerialdojo_gen.learning.Trajectories` and `ExportOptions`."""
     if limit < 0:
         raise UsageError(f"a limit is 0, for all, or more, not {limit}")
     width, height = (size, size) if isinstance(size, int) else size
     sensors = Sensors(tuple(views), rgb, depth, width, height)
     name = "" if source == "recordings" else renderer_name(renderer)
-    return Wanted(
+    return ExportOptions(
         named_splits(split), tuple(setting), tuple(scene), limit, seed, sensors, tuple(goal), source, name,
         jpeg_quality,
     )  # fmt: skip
@@ -101,7 +101,7 @@ def export_for_learning(
     format_name: str,
     data: Where,
     out: Path,
-    wanted: Wanted,
+    wanted: ExportOptions,
     *,
     force: bool = False,
     workers: int | None = None,
@@ -133,7 +133,7 @@ def export_for_learning(
 
 
 def estimate_for_learning(
-    format_name: str, data: Where, wanted: Wanted, workers: int | None = None
+    format_name: str, data: Where, wanted: ExportOptions, workers: int | None = None
 ) -> Estimate:  # fmt: skip
     """Measure a few trajectories and say what all of them will take; nothing is written."""
     writer = _writer(format_name, wanted)
@@ -163,7 +163,7 @@ def estimate_for_learning(
     )  # fmt: skip
 
 
-def _writer(format_name: str, wanted: Wanted) -> ModuleType:
+def _writer(format_name: str, wanted: ExportOptions) -> ModuleType:
     s = wanted.sensors
     if format_name == "lerobot" and (s.width % 2 or s.height % 2):
         raise UsageError(f"a video has even --width and --height, not {s.width} x {s.height}")
@@ -178,7 +178,7 @@ class _Job:
 
     format_name: str
     data: str
-    wanted: Wanted
+    wanted: ExportOptions
     part: Part
     unfinished: Path
 
@@ -193,7 +193,7 @@ def _write(job: _Job) -> int:
     return job.part.frames
 
 
-def _request(format_name: str, root: DataRoot, wanted: Wanted, parts: list[Part]) -> dict[str, Any]:
+def _request(format_name: str, root: DataRoot, wanted: ExportOptions, parts: list[Part]) -> dict[str, Any]:
     """Collect what decides every byte: parts of another request are not gone on with."""
     scenes = sorted({part.scene for part in parts})
     read, shown = wanted.source != "render", "image" in wanted.goal
@@ -222,7 +222,7 @@ def _recordings(root: DataRoot, scene: str) -> list[str]:
 
 
 def _marker(
-    format_name: str, wanted: Wanted, parts: list[Part], counts: dict[str, int], writer: ModuleType
+    format_name: str, wanted: ExportOptions, parts: list[Part], counts: dict[str, int], writer: ModuleType
 ) -> dict[str, Any]:  # fmt: skip
     from aerialdojo_gen.store.schemas import ACTION_NAMES
 

@@ -8,7 +8,7 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from aerialdojo_gen.exchange.samples import Wanted
+from aerialdojo_gen.exchange.samples import ExportOptions
 from aerialdojo_gen.exchange.video_clips import DEPTH_MIN_M, DEPTH_SHIFT_M, KEY_EVERY
 from aerialdojo_gen.geometry.motion import DISPLACEMENTS, TURN_RAD
 from aerialdojo_gen.store.schemas import STOP, TURN_LEFT, TURN_RIGHT
@@ -47,7 +47,7 @@ def depth_key(view: str) -> str:
     return f"observation.depth.{view}"
 
 
-def video_kinds(wanted: Wanted) -> dict[str, str]:
+def video_kinds(wanted: ExportOptions) -> dict[str, str]:
     """Return the features that are videos, and of which kind each is: ``rgb`` or ``depth``."""
     s = wanted.sensors
     pictures = {view_key(view): "rgb" for view in s.views} if s.rgb else {}
@@ -55,7 +55,7 @@ def video_kinds(wanted: Wanted) -> dict[str, str]:
     return pictures | ({GOAL: "rgb"} if "image" in wanted.goal else {}) | depths
 
 
-def features(wanted: Wanted) -> dict[str, dict[str, Any]]:
+def features(wanted: ExportOptions) -> dict[str, dict[str, Any]]:
     """Return the features of frames: their types, shapes, names, and how videos are to be read."""
     numbers = {
         "observation.state": _feature("float32", len(STATE), list(STATE)),
@@ -90,7 +90,7 @@ def _feature(dtype: str, n: int, names: list[str] | None) -> dict[str, Any]:
     return {"dtype": dtype, "shape": [n], "names": names}
 
 
-def _video(wanted: Wanted, kind: str) -> dict[str, Any]:
+def _video(wanted: ExportOptions, kind: str) -> dict[str, Any]:
     s = wanted.sensors
     depth = kind == "depth"
     told: dict[str, Any] = {

@@ -12,7 +12,7 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from aerialdojo_gen.exchange import feature_stats as moments
+from aerialdojo_gen.exchange import feature_stats
 from aerialdojo_gen.exchange.folder import write_json
 from aerialdojo_gen.exchange.lerobot_features import (
     DATA_PATH,
@@ -30,7 +30,7 @@ from aerialdojo_gen.exchange.lerobot_features import (
     view_key,
 )
 from aerialdojo_gen.exchange.parts import place
-from aerialdojo_gen.exchange.samples import Eyes, Part, Wanted
+from aerialdojo_gen.exchange.samples import ExportOptions, Eyes, Part
 from aerialdojo_gen.exchange.video_clips import DEPTH_CODES, Clip, depth_codes, depths_of_codes_m
 from aerialdojo_gen.learning.labels import Labels
 from aerialdojo_gen.store.parquet_files import read_file, write_file
@@ -43,17 +43,17 @@ _FACTS = "part.json"
 Counts = dict[str, NDArray[np.int64]]
 
 
-def frames_a_part(wanted: Wanted) -> int:
+def frames_a_part(wanted: ExportOptions) -> int:
     """Return how many steps a part has at least, unless its scene has fewer."""
     del wanted
     return FRAMES_A_PART
 
 
-def write_part(root: DataRoot, part: Part, wanted: Wanted, folder: Path) -> None:
+def write_part(root: DataRoot, part: Part, wanted: ExportOptions, folder: Path) -> None:
     """Write the files of a part: its data, its videos, and ``part.json`` with what is counted of them."""
     labels = Labels(root, part.index, ())
     columns: dict[str, list[NDArray[Any]]] = {name: [] for name in frame_schema().names}
-    episodes: list[dict[str, moments.Stats]] = []
+    episodes: list[dict[str, feature_stats.Stats]] = []
     sums: Counts = {}
     with ExitStack() as stack:
         clips = {
@@ -66,7 +66,7 @@ def write_part(root: DataRoot, part: Part, wanted: Wanted, folder: Path) -> None
         for k in range(len(part.index)):
             own = _columns(labels, part, k)
             counts = _seen(eyes, k, wanted, clips, part)
-            stats = {name: moments.of_rows(values) for name, values in own.items()}
+            stats = {name: feature_stats.of_rows(values) for name, values in own.items()}
             stats |= {key: _described(key, found, wanted, len(own["index"])) for key, found in counts.items()}
             episodes.append(stats)
             for name, values in own.items():
@@ -106,7 +106,7 @@ def _columns(labels: Labels, part: Part, k: int) -> dict[str, NDArray[Any]]:
     }
 
 
-def _seen(eyes: Eyes, k: int, wanted: Wanted, clips: dict[str, Clip], part: Part) -> Counts:
+def _seen(eyes: Eyes, k: int, wanted: ExportOptions, clips: dict[str, Clip], part: Part) -> Counts:
     """Write what a trajectory sees into the videos, and count its values."""
     s = wanted.sensors
     counts: Counts = {}
@@ -144,13 +144,13 @@ def _counted(values: NDArray[Any], n: int) -> NDArray[np.int64]:
     return found.ravel().astype(np.int64)
 
 
-def _described(key: str, counts: NDArray[np.int64], wanted: Wanted, frames: int) -> moments.Stats:
+def _described(key: str, counts: NDArray[np.int64], wanted: ExportOptions, frames: int) -> feature_stats.Stats:
     if video_kinds(wanted)[key] == "depth":
-        return moments.of_counts(counts, depths_of_codes_m(wanted.sensors.max_depth_m), frames)
-    return moments.of_counts(counts, np.arange(256) / 255.0, frames)
+        return feature_stats.of_counts(counts, depths_of_codes_m(wanted.sensors.max_depth_m), frames)
+    return feature_stats.of_counts(counts, np.arange(256) / 255.0, frames)
 
 
-def finish(parts: list[Part], wanted: Wanted, made: list[Path], folder: Path) -> dict[str, int]:
+def finish(parts: list[Part], wanted: ExportOptions, made: list[Path], folder: Path) -> dict[str, int]:
     """Put the files of all parts in their places, and write ``meta/``."""
     keys = list(video_kinds(wanted))
     tables: list[pa.Table] = []
@@ -172,7 +172,7 @@ def finish(parts: list[Part], wanted: Wanted, made: list[Path], folder: Path) ->
     texts = dict(sorted({int(n): t for part in parts for n, t in zip(part.tasks, part.texts, strict=True)}.items()))
     write_file(folder / "meta" / "tasks.parquet", _tasks(list(texts.values())))
     every = pa.concat_tables(tables)
-    stats = {name: moments.of_rows(_values(every[name])) for name in frame_schema().names}
+    stats = {name: feature_stats.of_rows(_values(every[name])) for name in frame_schema().names}
     stats |= {key: _described(key, found, wanted, frames) for key, found in sums.items()}
     write_json(folder / "meta" / "stats.json", stats)
     info = {
@@ -192,7 +192,9 @@ def _values(column: pa.ChunkedArray) -> NDArray[Any]:
     return np.asarray(joined)
 
 
-def _episodes(part: Part, stats: list[dict[str, moments.Stats]], keys: list[str], at: dict[str, int]) -> pa.Table:
+def _episodes(
+    part: Part, stats: list[dict[str, feature_stats.Stats]], keys: list[str], at: dict[str, int]
+) -> pa.Table:
     index, n = part.index, len(part.index)
     begin, end = index.first[:-1], index.first[1:]
     columns: dict[str, Any] = {

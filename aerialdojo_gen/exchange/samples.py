@@ -29,7 +29,7 @@ _PIXELS = 1 << 22
 
 
 @dataclass(frozen=True)
-class Wanted:
+class ExportOptions:
     """What is exported."""
 
     splits: tuple[str, ...]  # As in `aerialdojo_gen.benchmark.tasks.Selection`
@@ -94,7 +94,7 @@ class Part:
         return Part(0, small, self.settings[:n], self.splits[:n], self.tasks[:n], self.texts[:n], 0, 0)
 
 
-def planned(root: DataRoot, wanted: Wanted, frames_a_part: int) -> list[Part]:
+def planned(root: DataRoot, wanted: ExportOptions, frames_a_part: int) -> list[Part]:
     """Choose the trajectories, and cut them into parts."""
     modalities = ("image",) if wanted.goal == ("image",) else ()
     selection = Selection(wanted.splits, wanted.settings, modalities, wanted.scenes)
@@ -129,7 +129,7 @@ def planned(root: DataRoot, wanted: Wanted, frames_a_part: int) -> list[Part]:
     return parts
 
 
-def _chosen(index: Index, known: dict[str, dict[str, str]], wanted: Wanted) -> NDArray[np.int64]:
+def _chosen(index: Index, known: dict[str, dict[str, str]], wanted: ExportOptions) -> NDArray[np.int64]:
     if not wanted.limit:
         return np.arange(len(index))
     by_scene: dict[str, list[dict[str, str]]] = {}
@@ -139,7 +139,7 @@ def _chosen(index: Index, known: dict[str, dict[str, str]], wanted: Wanted) -> N
     return np.flatnonzero([nav_id in taken for nav_id in index.nav_id])
 
 
-def _recorded(root: DataRoot, index: Index, wanted: Wanted) -> Index:
+def _recorded(root: DataRoot, index: Index, wanted: ExportOptions) -> Index:
     recorded = Recorded(root, index, wanted.sensors, Drawn(root, index, wanted.sensors, wanted.renderer))
     has = np.flatnonzero([recorded.has(k) for k in range(len(index))])
     if not len(has):
@@ -166,7 +166,7 @@ def _cuts(index: Index, frames_a_part: int) -> Iterator[NDArray[np.int64]]:
 class Eyes:
     """What the trajectories of a part see, and what their goals look like."""
 
-    def __init__(self, root: DataRoot, part: Part, wanted: Wanted) -> None:
+    def __init__(self, root: DataRoot, part: Part, wanted: ExportOptions) -> None:
         self._root, self._part, self._sensors = root, part, wanted.sensors
         drawn: Source = Drawn(root, part.index, wanted.sensors, wanted.renderer)
         self._source: Source = (

@@ -16,7 +16,7 @@ from aerialdojo_gen.base.errors import RenderError, StoreError, brief
 from aerialdojo_gen.base.pictures import FRAME_PNG, encode_png
 from aerialdojo_gen.exchange.folder import write_json
 from aerialdojo_gen.exchange.parts import place
-from aerialdojo_gen.exchange.samples import Eyes, Part, Wanted
+from aerialdojo_gen.exchange.samples import ExportOptions, Eyes, Part
 from aerialdojo_gen.learning.labels import Labels
 from aerialdojo_gen.rendering.codecs import to_stored
 from aerialdojo_gen.store.layout import is_plain
@@ -28,13 +28,13 @@ _PIXELS, _STEPS = 1 << 27, 4096
 _FILE = "shard.tar"
 
 
-def frames_a_part(wanted: Wanted) -> int:
+def frames_a_part(wanted: ExportOptions) -> int:
     """Return how many steps a shard has at least, unless its scene has fewer."""
     s = wanted.sensors
     return min(_STEPS, max(64, _PIXELS // (len(s.views) * s.width * s.height)))
 
 
-def write_part(root: DataRoot, part: Part, wanted: Wanted, folder: Path) -> None:
+def write_part(root: DataRoot, part: Part, wanted: ExportOptions, folder: Path) -> None:
     """Write the shard of a part."""
     labels, eyes = Labels(root, part.index, ()), Eyes(root, part, wanted)
     # The oldest form of the three has neither times of a finer kind nor names of users: the same bytes everywhere.
@@ -45,7 +45,7 @@ def write_part(root: DataRoot, part: Part, wanted: Wanted, folder: Path) -> None
                 raise StoreError(
                     f"routes of {part.scene} in {root}: nav_id {brief(repr(name), 60)} cannot name a file"
                 )
-            told = _told(labels, part, k, wanted)
+            told = _to_json(labels, part, k, wanted)
             goal = _picture(eyes.goal(k), wanted) if "image" in wanted.goal else None
             for begin, frames in eyes.frames(k):
                 seen = frames.rgb if frames.rgb is not None else frames.depth_m
@@ -66,7 +66,7 @@ def write_part(root: DataRoot, part: Part, wanted: Wanted, folder: Path) -> None
                     _add(tar, f"{key}.json", json.dumps(step, ensure_ascii=False).encode())
 
 
-def _told(labels: Labels, part: Part, k: int, wanted: Wanted) -> list[dict[str, Any]]:
+def _to_json(labels: Labels, part: Part, k: int, wanted: ExportOptions) -> list[dict[str, Any]]:
     """Return the JSON of every step of a trajectory."""
     index = part.index
     n = int(index.steps[k])
@@ -96,11 +96,11 @@ def _told(labels: Labels, part: Part, k: int, wanted: Wanted) -> list[dict[str, 
     ]
 
 
-def _kind(wanted: Wanted) -> str:
+def _kind(wanted: ExportOptions) -> str:
     return "jpg" if wanted.jpeg_quality else "png"
 
 
-def _picture(rgb: NDArray[np.uint8], wanted: Wanted) -> bytes:
+def _picture(rgb: NDArray[np.uint8], wanted: ExportOptions) -> bytes:
     if not wanted.jpeg_quality:
         return encode_png(rgb, FRAME_PNG)
     done, data = cv2.imencode(".jpg", rgb[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, wanted.jpeg_quality])
@@ -121,7 +121,7 @@ def _add(tar: tarfile.TarFile, name: str, content: bytes) -> None:
     tar.addfile(member, io.BytesIO(content))
 
 
-def finish(parts: list[Part], wanted: Wanted, made: list[Path], folder: Path) -> dict[str, int]:
+def finish(parts: list[Part], wanted: ExportOptions, made: list[Path], folder: Path) -> dict[str, int]:
     """Put the shards in their places, and list them; see `aerialdojo_gen.exchange.lerobot_writer.finish`."""
     del wanted
     shards = []

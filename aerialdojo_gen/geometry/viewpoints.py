@@ -26,7 +26,7 @@ _ROOM = 0.95
 WEIGHTS = {"visible": 0.30, "shown": 0.30, "size": 0.10, "centred": 0.10, "level": 0.10, "clear": 0.10}
 
 
-def around(
+def ring(
     surface: Surface,
     box: Floats,
     standoff_m: float,

@@ -13,7 +13,7 @@ from aerialdojo_gen.annotations.format import parse_annotations
 from aerialdojo_gen.base.disk import check_regular
 from aerialdojo_gen.base.errors import AnnotationError, AssetError, UsageError, brief
 from aerialdojo_gen.imports.files import read_mesh
-from aerialdojo_gen.imports.import_mesh import Place, Repairs, adopt, check_options, region_of
+from aerialdojo_gen.imports.import_mesh import Place, Repairs, check_options, import_mesh, region_of
 from aerialdojo_gen.imports.listing import contents
 from aerialdojo_gen.imports.naming import read_names
 from aerialdojo_gen.imports.pictures import TEXTURE_PX
@@ -61,7 +61,7 @@ def add_scene(
     naming = None if names is None else read_names(names)
     text = None if annotations is None else _annotations(annotations, name)
     with _naming_the_file(mesh):
-        scene, repairs = adopt(
+        scene, repairs = import_mesh(
             name, read_mesh(mesh, texture_px=texture_px), up=up, scale=scale, crop_m=crop_m, box_m=box_m,
             ceiling_m=ceiling_m, naming=naming, light=light,
         )  # fmt: skip

@@ -22,11 +22,11 @@ from aerialdojo_gen.base.environment_errors import is_out_of_memory
 from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.base.safe_parse import loads_json
 from aerialdojo_gen.imports.gltf import read_gltf
-from aerialdojo_gen.imports.mesh_materials import skins_of
+from aerialdojo_gen.imports.mesh_materials import mesh_materials
 from aerialdojo_gen.imports.pictures import TEXTURE_PX
 from aerialdojo_gen.imports.raw import RawNode, RawSurface, joined
-from aerialdojo_gen.imports.sandbox import MAX_MEMORY_BYTES, bounded, read_in_child
-from aerialdojo_gen.imports.sibling_files import Beside
+from aerialdojo_gen.imports.sandbox import MAX_MEMORY_BYTES, exit_status, read_in_sandbox
+from aerialdojo_gen.imports.sibling_files import SiblingFiles
 from aerialdojo_gen.imports.sniffing import mismatch
 from aerialdojo_gen.store.staging import scratch_folder
 
@@ -52,7 +52,7 @@ def read_mesh(path: Path, max_memory_bytes: int = MAX_MEMORY_BYTES, texture_px: 
     with scratch_folder() as folder:
         out = folder / "nodes.npz"
         arguments = [str(out), str(texture_px)]
-        read_in_child(__name__, path, arguments, max_memory_bytes, "simplify or split the mesh")
+        read_in_sandbox(__name__, path, arguments, max_memory_bytes, "simplify or split the mesh")
         return unpacked(out)
 
 
@@ -96,11 +96,11 @@ def _read(path: Path, texture_px: int) -> list[RawNode]:
         return read_3ds(path.read_bytes())
     if suffix in (".glb", ".gltf"):
         look_over_glb(path)
-        return read_gltf(path.read_bytes(), Beside(path).get, texture_px)
+        return read_gltf(path.read_bytes(), SiblingFiles(path).get, texture_px)
     if suffix in (".dae", ".fbx"):
         from aerialdojo_gen.imports.assimp import read_by_assimp
 
-        return read_by_assimp(path, Beside(path).get, texture_px)
+        return read_by_assimp(path, SiblingFiles(path).get, texture_px)
     import trimesh
 
     # What the file refers to comes through a resolver that stays in its folder.
@@ -116,7 +116,7 @@ def _read(path: Path, texture_px: int) -> list[RawNode]:
         if isinstance(body, trimesh.Trimesh):
             vertices = trimesh.transform_points(np.asarray(body.vertices, dtype=np.float64), transform)
             shown.append((str(name), body, vertices))
-    skins = skins_of([body for _, body, _ in shown], beside, texture_px)
+    skins = mesh_materials([body for _, body, _ in shown], beside, texture_px)
     named = _objects_of(path) if suffix == ".obj" else {}
     nodes: dict[str, list[RawNode]] = {}
     for (name, body, vertices), skin in zip(shown, skins, strict=True):
@@ -152,7 +152,7 @@ def _object_of(name: str, named: Mapping[str, str], path: Path) -> str:
 def _beside(path: Path) -> Any:
     import trimesh
 
-    class Resolver(Beside, trimesh.resolvers.Resolver):
+    class Resolver(SiblingFiles, trimesh.resolvers.Resolver):
         """What trimesh asks for files."""
 
     return Resolver(path)
@@ -251,4 +251,4 @@ def unpacked(path: Path) -> list[RawNode]:
 
 
 if __name__ == "__main__":
-    raise SystemExit(bounded(lambda given: read_into(Path(given[0]), Path(given[1]), int(given[2]))))
+    raise SystemExit(exit_status(lambda given: read_into(Path(given[0]), Path(given[1]), int(given[2]))))

@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 from aerialdojo_gen.annotations.describing import UNKNOWN
 from aerialdojo_gen.base.errors import AssetError, UsageError
 from aerialdojo_gen.imports.cutting import Region, bodies_of, unique_rows
-from aerialdojo_gen.imports.material_builder import LIGHTS, Skinner, photographed
+from aerialdojo_gen.imports.material_builder import LIGHTS, MaterialBuilder, photographed
 from aerialdojo_gen.imports.naming import Naming
 from aerialdojo_gen.imports.raw import RawNode, cut_to, in_place_order, joined
-from aerialdojo_gen.imports.split_components import taken_apart
-from aerialdojo_gen.imports.surfaces import SKY, decided, domes_of, told
+from aerialdojo_gen.imports.split_components import split_components
+from aerialdojo_gen.imports.surfaces import SKY, decided, describe, domes_of
 from aerialdojo_gen.scenes.catalogue import single
 from aerialdojo_gen.scenes.mesh import areas
 from aerialdojo_gen.scenes.model import Instance, Material, Part, Scene
@@ -66,7 +66,7 @@ class Place:
 
     @classmethod
     def of(cls, nodes: Sequence[RawNode], up: str, scale: float, naming: Naming | None = None) -> Place:
-        """Turn, scale and mend the nodes of a file; errors as of `adopt`."""
+        """Turn, scale and mend the nodes of a file; errors as of `import_mesh`."""
         check_options(up, scale)
         repairs = Repairs()
         bodies = [b for node in nodes for b in [_sound(_turned(node, up, scale), repairs)] if len(b.faces)]
@@ -95,11 +95,11 @@ class Place:
         cut = [_sound(cut_to(b, region), Repairs()) for b in self.bodies]
         kept = [b for b in cut if len(b.faces)]
         if not kept:
-            raise AssetError(f"{region.said}: nothing of the mesh lies there: {lies(self.bodies)}")
+            raise AssetError(f"{region.said}: nothing of the mesh lies there: {describe_extent(self.bodies)}")
         return Place(kept, self.domes, self.repairs)
 
 
-def lies(bodies: Sequence[RawNode]) -> str:
+def describe_extent(bodies: Sequence[RawNode]) -> str:
     """Say the ranges of x and y of bodies, and about where most of their triangles lie."""
     low, high = _bounds(bodies)
     middles = np.concatenate([b.vertices[b.faces].mean(axis=1)[:, :2] for b in bodies])
@@ -127,7 +127,7 @@ def check_options(up: str | None, scale: float | None, light: str = "auto") -> N
         raise UsageError(f"--light {light[:20]!r}: must be {', '.join(LIGHTS[:-1])} or {LIGHTS[-1]}")
 
 
-def adopt(
+def import_mesh(
     name: str,
     nodes: Sequence[RawNode],
     *,
@@ -184,13 +184,13 @@ def settled(
     bodies = part.bodies
     low, high = part.low, part.high
     _check_extent(high - low, bodies)
-    bodies, apart = taken_apart(bodies)
+    bodies, apart = split_components(bodies)
     repairs.lines += apart.lines()
     shift = np.array([(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, low[2]]) if origin_m is None else origin_m
     repairs.origin_m = (float(shift[0]), float(shift[1]), float(shift[2]))
     bodies = _merged_clutter(_moved(in_place_order(bodies), -shift))
     domes = _moved(part.domes, -shift)
-    skinner = Skinner(light == "baked" or (light == "auto" and photographed(bodies)))
+    skinner = MaterialBuilder(light == "baked" or (light == "auto" and photographed(bodies)))
     skinner.scale([*bodies, *domes])
     parts = skinner.materials
     dressed = [(b, made) for b in bodies for made in [_parts(b, skinner, repairs)] if made]
@@ -221,7 +221,7 @@ def settled(
         bounds[0, :2] = np.maximum(bounds[0, :2], region.low - shift[:2])
         bounds[1, :2] = np.minimum(bounds[1, :2], region.high - shift[:2])
     scene = decided(Scene(name, tuple(instances), parts, bounds, imported=True, backdrop=backdrop), called)
-    repairs.lines += told(scene)
+    repairs.lines += describe(scene)
     return replace(scene, imported=False), repairs
 
 
@@ -272,7 +272,7 @@ def _check_extent(size: Floats, bodies: Sequence[RawNode]) -> None:
     if wide > LARGEST_M or math.prod(2 * (s + 2 * _MARGIN_M) for s in size) > _MOST_CELLS:
         raise AssetError(
             f"{text}, too large to plan in: --scale 0.01 if it is in centimetres, --crop X Y RADIUS or "
-            f"--box X0 Y0 X1 Y1 for a part, --tiles 200 for all of it in parts; {lies(bodies)}"
+            f"--box X0 Y0 X1 Y1 for a part, --tiles 200 for all of it in parts; {describe_extent(bodies)}"
         )
     if wide < SMALLEST_M:
         larger = 10 ** math.ceil(math.log10(SMALLEST_M / max(wide, 1e-9)))
@@ -293,7 +293,7 @@ def _merged_clutter(bodies: list[RawNode]) -> list[RawNode]:
     return [*(b for b, s in zip(bodies, small, strict=True) if not s), joined("clutter", scraps)]
 
 
-def _parts(body: RawNode, skinner: Skinner, repairs: Repairs) -> tuple[Part, ...]:
+def _parts(body: RawNode, skinner: MaterialBuilder, repairs: Repairs) -> tuple[Part, ...]:
     """Make parts by material; a closed body faces outwards, an open one is there from both sides."""
     mesh = trimesh.Trimesh(body.vertices, body.faces, process=False)
     closed = mesh.is_watertight and mesh.is_winding_consistent
@@ -304,7 +304,7 @@ def _parts(body: RawNode, skinner: Skinner, repairs: Repairs) -> tuple[Part, ...
     return skinner.parts(body, double_sided=not closed)
 
 
-def _tell_textures(bodies: Sequence[RawNode], skinner: Skinner, light: str, repairs: Repairs) -> None:
+def _tell_textures(bodies: Sequence[RawNode], skinner: MaterialBuilder, light: str, repairs: Repairs) -> None:
     """Say what became of the textures."""
     shown = [m for m in skinner.materials.values() if m.texture is not None]
     if shown:

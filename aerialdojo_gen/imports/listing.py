@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from aerialdojo_gen.base.text_table import Column, TextTable
 from aerialdojo_gen.imports.cutting import bodies_of
-from aerialdojo_gen.imports.import_mesh import LARGEST_M, Place, lies, size_text
+from aerialdojo_gen.imports.import_mesh import LARGEST_M, Place, describe_extent, size_text
 from aerialdojo_gen.imports.naming import Naming
 from aerialdojo_gen.imports.raw import RawNode
 from aerialdojo_gen.scenes.mesh import areas
@@ -110,7 +110,7 @@ def contents(
             for other, unit in found.units
             if other != taken_scale
         ),
-        f"there: {lies(place.bodies)}",
+        f"there: {describe_extent(place.bodies)}",
         f"heights: z is {low[2]:.7g} to {high[2]:.7g} m",
     ]
     if max(high - low) > LARGEST_M:

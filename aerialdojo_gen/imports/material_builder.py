@@ -26,7 +26,7 @@ _MIXED = "vertex colours"
 
 
 @dataclass
-class Skinner:
+class MaterialBuilder:
     """Makes parts, and the materials that they are of."""
 
     baked: bool = False  # Whether textures and vertex colours have their light in them

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from aerialdojo_gen.imports.pictures import Paint, surfaces_of
 from aerialdojo_gen.imports.raw import RawSurface, no_corners, plain
-from aerialdojo_gen.imports.sibling_files import Beside
+from aerialdojo_gen.imports.sibling_files import SiblingFiles
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,7 +24,7 @@ class Skin:
     surfaces: tuple[RawSurface, ...]
 
 
-def skins_of(bodies: Sequence[Any], beside: Beside, texture_px: int) -> list[Skin]:
+def mesh_materials(bodies: Sequence[Any], beside: SiblingFiles, texture_px: int) -> list[Skin]:
     """Describe the materials of the meshes of one file."""
     materials: dict[int, Any] = {}
     for body in bodies:
@@ -64,7 +64,7 @@ def _skin(body: Any, place: dict[int, int], surfaces: tuple[RawSurface, ...]) ->
     return Skin(colours, np.full(n, k, dtype=np.int32), corners, surfaces)
 
 
-def _paint(material: Any, maps: dict[str, dict[str, str]], beside: Beside) -> Paint:
+def _paint(material: Any, maps: dict[str, dict[str, str]], beside: SiblingFiles) -> Paint:
     """Read a material of an MTL file, or of a PLY that names a picture."""
     name = str(getattr(material, "name", "") or "")
     told = maps.get(name, {})
@@ -78,7 +78,7 @@ def _paint(material: Any, maps: dict[str, dict[str, str]], beside: Beside) -> Pa
     return Paint(name, factor, file, missing, alpha="blend" if mask is None else "mask", mask=mask)
 
 
-def _maps(beside: Beside) -> dict[str, dict[str, str]]:
+def _maps(beside: SiblingFiles) -> dict[str, dict[str, str]]:
     """Read which pictures the MTL files name, by material."""
     out: dict[str, dict[str, str]] = {}
     for name, data in list(beside.given.items()):
@@ -92,7 +92,7 @@ def _maps(beside: Beside) -> dict[str, dict[str, str]]:
     return out
 
 
-def _asked(name: str, beside: Beside) -> tuple[bytes | None, str]:
+def _asked(name: str, beside: SiblingFiles) -> tuple[bytes | None, str]:
     try:
         return (beside.get(name) if name else None), ""
     except FileNotFoundError:

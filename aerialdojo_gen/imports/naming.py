@@ -38,29 +38,29 @@ _MOST_BYTES = 4 << 20
 
 
 @dataclass(frozen=True)
-class Called:
+class NodeName:
     """What a thing is called."""
 
     category: str  # Its kind, e.g. ``"fire_engine"``; empty where nothing is known
     attributes: dict[str, str]
 
 
-NOTHING = Called("", {})
+NOTHING = NodeName("", {})
 
 
 @dataclass(frozen=True)
 class Naming:
     """A user's table of node patterns."""
 
-    rows: Sequence[tuple[str, Called]] = ()  # sequence of (str, Called)
+    rows: Sequence[tuple[str, NodeName]] = ()  # sequence of (str, Called)
 
-    def called(self, node: str) -> Called:
+    def called(self, node: str) -> NodeName:
         """Say what a node of the file is called: by the table, else by the words in its name."""
         told = self.told(node)
         words = words_in(node)
         return told if told is not NOTHING else _called(" ".join(words), "", "") if words else NOTHING
 
-    def told(self, node: str) -> Called:
+    def told(self, node: str) -> NodeName:
         """Say what the table calls a node; `NOTHING` where it says nothing of it."""
         return next((called for pattern, called in self.rows if fnmatchcase(node, pattern)), NOTHING)
 
@@ -89,10 +89,10 @@ def _word(token: str) -> str:
     return word if spoken and not hexadecimal else ""
 
 
-def _called(name: str, category: str, group: str) -> Called:
+def _called(name: str, category: str, group: str) -> NodeName:
     kind = category or re.sub(r"[^a-z]+", "_", name.lower()).strip("_")[:40].strip("_")
     attributes = {"called": name} if name and name != kind.replace("_", " ") else {}
-    return Called(kind, attributes | ({"group": group} if group else {}))
+    return NodeName(kind, attributes | ({"group": group} if group else {}))
 
 
 def read_names(path: Path) -> Naming:
@@ -126,7 +126,7 @@ def read_names(path: Path) -> Naming:
     return Naming(tuple(rows))
 
 
-def _row(row: dict[str, str]) -> tuple[str, Called]:
+def _row(row: dict[str, str]) -> tuple[str, NodeName]:
     if row.get(""):
         raise ValueError("has more fields than columns")
     pattern, name, category, plural = ((row.get(key) or "").strip() for key in _COLUMNS)

@@ -20,7 +20,7 @@ from aerialdojo_gen.base.disk import check_regular
 from aerialdojo_gen.base.environment_errors import is_out_of_memory
 from aerialdojo_gen.base.errors import AssetError, MissingPackage, UsageError, lacks
 from aerialdojo_gen.imports.earth import Bbox, in_words
-from aerialdojo_gen.imports.sandbox import MAX_MEMORY_BYTES, bounded, read_in_child
+from aerialdojo_gen.imports.sandbox import MAX_MEMORY_BYTES, exit_status, read_in_sandbox
 from aerialdojo_gen.store.staging import scratch_folder
 
 ATTRIBUTION = "© OpenStreetMap contributors, Open Database License (ODbL) 1.0, openstreetmap.org/copyright"
@@ -78,7 +78,7 @@ def read_maps(path: Path, boxes: Sequence[Bbox], max_memory_bytes: int = MAX_MEM
     with scratch_folder() as folder:
         out = folder / "found.json"
         given = [str(out), json.dumps(boxes)]
-        read_in_child(__name__, path, given, max_memory_bytes, _part(path, boxes))
+        read_in_sandbox(__name__, path, given, max_memory_bytes, _part(path, boxes))
         found = json.loads(out.read_text(encoding="utf-8"))
     west, south, east, north = found["extent"]
     extent = (west, south, east, north)
@@ -191,4 +191,4 @@ def _line(nodes: Any) -> LineString | None:
 
 
 if __name__ == "__main__":
-    raise SystemExit(bounded(lambda given: read_into(Path(given[0]), Path(given[1]), json.loads(given[2]))))
+    raise SystemExit(exit_status(lambda given: read_into(Path(given[0]), Path(given[1]), json.loads(given[2]))))

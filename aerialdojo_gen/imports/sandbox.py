@@ -9,7 +9,7 @@ import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from aerialdojo_gen.base import environment_errors as trouble
+from aerialdojo_gen.base import environment_errors
 from aerialdojo_gen.base.errors import AssetError
 
 MAX_MEMORY_BYTES = 6 << 30
@@ -17,7 +17,7 @@ MAX_SECONDS = 300
 _OUT_OF_MEMORY = 3
 
 
-def read_in_child(module: str, path: Path, arguments: Sequence[str], max_memory_bytes: int, mend: str) -> None:
+def read_in_sandbox(module: str, path: Path, arguments: Sequence[str], max_memory_bytes: int, mend: str) -> None:
     """Run a module that reads a file, and wait for it."""
     # Not multiprocessing, which would run a caller's unguarded script a second time.
     command = [sys.executable, "-m", module, str(max_memory_bytes), str(path.resolve()), *arguments]
@@ -32,7 +32,7 @@ def read_in_child(module: str, path: Path, arguments: Sequence[str], max_memory_
 def _cause(ended: subprocess.CompletedProcess[str], max_memory_bytes: int, mend: str) -> str:
     """Say why a reading process ended with another code than 0."""
     said, failed = (text.strip().splitlines() for text in (ended.stdout, ended.stderr))
-    if ended.returncode == _OUT_OF_MEMORY or trouble.is_out_of_memory(ended.stderr):
+    if ended.returncode == _OUT_OF_MEMORY or environment_errors.is_out_of_memory(ended.stderr):
         return f"needs more than {_memory(max_memory_bytes) >> 20:,} MB of memory to read: {mend}"
     number = -ended.returncode
     if number == signal.SIGXCPU:
@@ -50,7 +50,7 @@ def _memory(most: int) -> int:
     return most if hard == resource.RLIM_INFINITY else min(most, hard)
 
 
-def bounded(read: Callable[[list[str]], str]) -> int:
+def exit_status(read: Callable[[list[str]], str]) -> int:
     """Bound this process as its command line says, read, and print what is wrong with the file."""
     memory, *arguments = sys.argv[1:]
     resource.setrlimit(resource.RLIMIT_AS, (_memory(int(memory)),) * 2)

@@ -8,7 +8,7 @@ from typing import Any
 _MAX_BYTES = 256 << 20
 
 
-class Beside:
+class SiblingFiles:
     """Gives the files beside a mesh file."""
 
     def __init__(self, path: Path) -> None:

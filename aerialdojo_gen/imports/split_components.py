@@ -60,7 +60,7 @@ class Apart:
         return out
 
 
-def taken_apart(bodies: Sequence[RawNode]) -> tuple[list[RawNode], Apart]:
+def split_components(bodies: Sequence[RawNode]) -> tuple[list[RawNode], Apart]:
     """Segment unstructured meshes (z up, metres) into things; nodes that are things of their own stay whole."""
     told = Apart()
     low = np.min([b.vertices.min(axis=0) for b in bodies], axis=0)

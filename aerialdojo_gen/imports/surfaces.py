@@ -96,7 +96,7 @@ def decided(scene: Scene, source_names: dict[str, str]) -> Scene:
     return replace(scene, instances=tuple(replace(i, surface=surface(i)) for i in scene.instances))
 
 
-def told(scene: Scene) -> list[str]:
+def describe(scene: Scene) -> list[str]:
     """Say what was decided, a line each."""
     from collections import Counter
 

@@ -21,7 +21,7 @@ from aerialdojo_gen.learning.steps import Steps, is_written, read_steps
 from aerialdojo_gen.learning.trajectories import draw_rank
 from aerialdojo_gen.pipeline.code_digest import code_of
 from aerialdojo_gen.pipeline.executors import Executor
-from aerialdojo_gen.pipeline.executors.link import Link
+from aerialdojo_gen.pipeline.executors.link import WorkerChannel
 from aerialdojo_gen.pipeline.progress import Reporter
 from aerialdojo_gen.store.root import DataRoot
 
@@ -98,7 +98,7 @@ def collect(parts: Sequence[Part], executor: Executor, reporter: Reporter, what:
     return [read_steps(part.folder) for part in parts]
 
 
-def make_part(part: Part, link: Link | None = None) -> int:
+def make_part(part: Part, link: WorkerChannel | None = None) -> int:
     """Make one part and write it; return how many trajectories it has."""
     del link
     if part.survey is not None:

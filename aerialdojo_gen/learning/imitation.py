@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from aerialdojo_gen.base import rng
 from aerialdojo_gen.learning.loader import torch_package
-from aerialdojo_gen.learning.localization import UNIT_M, Guess, astray, missed
-from aerialdojo_gen.learning.network import Network, Thought
+from aerialdojo_gen.learning.localization import UNIT_M, LocalizationOutput, offset_loss, pose_loss
+from aerialdojo_gen.learning.network import Network, PolicyOutput
 from aerialdojo_gen.learning.recipe import Recipe
 from aerialdojo_gen.learning.steps import Pool
 from aerialdojo_gen.pipeline.executors.local import own_cores
@@ -253,7 +253,7 @@ class Learner:
             out["pictures"] = self._pictures(pool, frames, rows)
         return out
 
-    def _forward(self, batch: dict[str, Any], *, told: bool) -> tuple[Thought, Guess]:
+    def _forward(self, batch: dict[str, Any], *, told: bool) -> tuple[PolicyOutput, LocalizationOutput]:
         """Guess where goals are, and choose by that guess, or by where they are where the choice is told.
 
         A choice is learned beside the true offset: beside guesses that are still wrong it learns not to go by them,
@@ -265,7 +265,7 @@ class Learner:
             seen = network.features(batch.get("pictures"), goal, batch["mask"])
             blank = network.blank(len(seen)).to(self.device)
             guess, _ = network.whereabouts(seen, goal, batch["odometry"], blank)
-            return network.choose(seen, guess.led(batch["offset"]) if told else guess), guess
+            return network.choose(seen, guess.with_goal_offset(batch["offset"]) if told else guess), guess
 
     def _looked_about(self, draw: np.random.Generator) -> Any:
         """Loss of places told by pictures from anywhere: an episode's are too much alike to learn a scene by."""
@@ -283,7 +283,7 @@ class Learner:
             seen = self.network.look(pictures.flatten(0, 1)).reshape(n, -1)
             place, heading, scene, _ = self.network.whereabouts.found(seen)
             hindered = self.network.blocked(seen)
-        return astray(place, heading, scene, pose, number) + touched(hindered, blocked)
+        return pose_loss(place, heading, scene, pose, number) + touched(hindered, blocked)
 
     def _pictures(self, pool: Pool, frames: Any, rows: NDArray[np.int64]) -> Any:
         if frames is None:
@@ -302,7 +302,7 @@ class Learner:
         logits, label = thought.logits[mask].float(), batch["label"][mask]
         loss = functional.cross_entropy(logits, label)
         touches = touched(thought.blocked[mask], batch["blocked"][mask])
-        where = missed(guess, batch) + touches + self._looked_about(draw)
+        where = offset_loss(guess, batch) + touches + self._looked_about(draw)
         self.update(loss + self.recipe.train.goal_weight * where, rate)
         right = (logits.argmax(-1) == label).sum()
         return float(loss.detach()), float(right), int(mask.sum())

@@ -27,7 +27,7 @@ _LEAST = 1e-3
 _FLOOR = 0.05
 
 
-class Guess(NamedTuple):
+class LocalizationOutput(NamedTuple):
     """Where things are thought to be, in units of 10 m."""
 
     offset: Any  # (n, T, 3); the goal ahead, left and up of the body, by all steps so far
@@ -42,12 +42,12 @@ class Guess(NamedTuple):
         told = self.scene.log_softmax(dim=-1)
         return -(told.exp() * told).sum(dim=-1)
 
-    def led(self, offset_m: Any) -> Guess:
+    def with_goal_offset(self, offset_m: Any) -> LocalizationOutput:
         """Set the goal where an offset (n, T, 3), metres ahead, left and up, says that it is."""
         return self._replace(offset=offset_m / UNIT_M)
 
 
-class Whereabouts(nn.Module):  # type: ignore[misc]  # torch is looked at by no type checker here
+class Localization(nn.Module):  # type: ignore[misc]  # torch is looked at by no type checker here
     """Guess where the goal is.
 
     Own motion is used for one thing alone: to carry guesses of earlier steps over to the present one. Of the pictures
@@ -76,7 +76,7 @@ class Whereabouts(nn.Module):  # type: ignore[misc]  # torch is looked at by no 
         place, heading, scene, trust = self.body(seen).float().split([_PLACES, _HEADINGS, self.scenes, 1], dim=-1)
         return place, heading, scene, functional.softplus(trust) + _LEAST
 
-    def forward(self, seen: Any, goal: Any, odometry: Any, sums: Any) -> tuple[Guess, Any]:
+    def forward(self, seen: Any, goal: Any, odometry: Any, sums: Any) -> tuple[LocalizationOutput, Any]:
         """Estimate poses for steps (n, T) of episodes from features and odometry.
 
         Also the sums (n, sums) after them.
@@ -109,7 +109,7 @@ class Whereabouts(nn.Module):  # type: ignore[misc]  # torch is looked at by no 
         away = goal_at / UNIT_M - (been - led) / weights
         ahead = torch.cat([_seen_from(away[..., :2], start), away[..., 2:]], dim=-1) - moved
         offset = torch.cat([_seen_from(ahead[..., :2], turn), ahead[..., 2:]], dim=-1)
-        return Guess(offset, seen_at, facing, scene, target), total[:, -1]
+        return LocalizationOutput(offset, seen_at, facing, scene, target), total[:, -1]
 
 
 def _seen_from(vector: Any, by: Any) -> Any:
@@ -148,7 +148,7 @@ def directions(logits: Any) -> Any:
     return mean * (2.0 - length.square()) / (1.05 - length.square())
 
 
-def missed(guess: Guess, batch: Mapping[str, Any]) -> Any:
+def offset_loss(guess: LocalizationOutput, batch: Mapping[str, Any]) -> Any:
     """Loss of the goal offset, in units of 10 m, and mean cross-entropies of the intervals."""
     mask = batch["mask"]
     offset, pose = batch["offset"][mask] / UNIT_M, batch["pose"][mask]
@@ -156,13 +156,13 @@ def missed(guess: Guess, batch: Mapping[str, Any]) -> Any:
     back = torch.stack([pose[:, 3].cos(), -pose[:, 3].sin()], dim=-1)
     away_m = torch.cat([_seen_from(offset[:, :2], back), offset[:, 2:]], dim=-1) * UNIT_M
     scene = batch["scene"][:, None].expand(mask.shape)[mask]
-    own = astray(guess.place[mask], guess.heading[mask], guess.scene[mask], pose, scene)
+    own = pose_loss(guess.place[mask], guess.heading[mask], guess.scene[mask], pose, scene)
     return (
         functional.smooth_l1_loss(guess.offset[mask], offset) + own + _unlike(guess.goal[mask], pose[:, :3] + away_m)
     )
 
 
-def astray(place: Any, heading: Any, scene: Any, pose: Any, number: Any) -> Any:
+def pose_loss(place: Any, heading: Any, scene: Any, pose: Any, number: Any) -> Any:
     """Cross-entropy loss of place (m, 164), heading (m, 24) and scene (m, scenes) logits against poses (m, 4)."""
     sector = (torch.remainder(pose[:, 3] + math.pi, 2.0 * math.pi) / _SECTOR_RAD - 0.5)[:, None]
     sectors = torch.arange(_HEADINGS, device=pose.device)

@@ -13,7 +13,7 @@ from torch.nn import functional
 from aerialdojo_gen.benchmark.agents.goal import N_ACTIONS
 from aerialdojo_gen.geometry.motion import TURNS
 from aerialdojo_gen.learning.encoding import PATCH_PX
-from aerialdojo_gen.learning.localization import UNIT_M, Guess, Whereabouts
+from aerialdojo_gen.learning.localization import UNIT_M, Localization, LocalizationOutput
 from aerialdojo_gen.learning.patch_classifier import Sight, as_patches
 from aerialdojo_gen.store.schemas import STOP
 
@@ -48,12 +48,12 @@ class Shape:
         return asdict(self)
 
 
-class Thought(NamedTuple):
+class PolicyOutput(NamedTuple):
     """What comes out."""
 
     logits: Any  # (n, T, 16); of the actions
     blocked: Any  # (n, T, 16); logits of each action's touching a surface or leaving the flight volume
-    guess: Guess  # Where the goal is thought to be, or was said to be
+    guess: LocalizationOutput  # Where the goal is thought to be, or was said to be
 
     def actions(self, back: Any) -> Any:
         """Choose the likeliest free action, (n, T); Stop within 2 m of the goal estimate.
@@ -108,7 +108,7 @@ class Network(nn.Module):  # type: ignore[misc]  # torch is looked at by no type
         self.goal = nn.Sequential(nn.Linear(2 * shape.features + 1, shape.features), nn.ReLU(inplace=True))
         # Who sees nothing guesses by what is said alone.
         pictured = max(shape.views, 1) * shape.features
-        self.whereabouts = Whereabouts(pictured, shape.features, shape.hidden, shape.scenes)
+        self.whereabouts = Localization(pictured, shape.features, shape.hidden, shape.scenes)
         self.choice = nn.Sequential(
             nn.Linear(pictured + _BEARING, shape.hidden), nn.ReLU(inplace=True), nn.Dropout(_DROPOUT),
             nn.Linear(shape.hidden, shape.hidden), nn.ReLU(inplace=True), nn.Linear(shape.hidden, N_ACTIONS),
@@ -133,7 +133,9 @@ class Network(nn.Module):  # type: ignore[misc]  # torch is looked at by no type
         shown = self.look(images) * told_by_image[:, None]
         return self.goal(torch.cat([said, shown, told_by_image[:, None].float()], dim=1))
 
-    def forward(self, pictures: Any, goal: Any, odometry: Any, mask: Any, memory: Any = None) -> tuple[Thought, Any]:
+    def forward(
+        self, pictures: Any, goal: Any, odometry: Any, mask: Any, memory: Any = None
+    ) -> tuple[PolicyOutput, Any]:
         """Policy outputs for steps (n, T) of episodes, and the memory (n, sums) after them.
 
         Odometry in the start's frame.
@@ -153,21 +155,21 @@ class Network(nn.Module):  # type: ignore[misc]  # torch is looked at by no type
         rows = mask.flatten().nonzero()[:, 0]
         return flat.index_copy(0, rows, looked).reshape(n, steps, -1)
 
-    def choose(self, seen: Any, guess: Guess) -> Thought:
+    def choose(self, seen: Any, guess: LocalizationOutput) -> PolicyOutput:
         """Choose actions by what is seen, (n, T, ...), and where the goal is thought to be, and by nothing else.
 
         What the goal is has done its part by then. With its words a choice learns routes of the training's scenes by
         heart, and beside a map that is still poor it learns not to go by the map.
         """
         logits = self.choice(torch.cat([seen, bearing(guess).to(seen.dtype)], dim=2))
-        return Thought(logits, self.blocked(seen), guess)
+        return PolicyOutput(logits, self.blocked(seen), guess)
 
     def blank(self, n: int) -> Any:
         """Return the memory of n episodes that begin: (n, sums)."""
         return torch.zeros(n, self.whereabouts.sums)
 
 
-def bearing(guess: Guess) -> Any:
+def bearing(guess: LocalizationOutput) -> Any:
     """Where the goal is thought to be, as numbers: (n, T, 30); choices teach it nothing."""
     away_m = guess.offset.detach() * UNIT_M
     flat = torch.linalg.vector_norm(away_m[..., :2], dim=-1, keepdim=True)

@@ -96,7 +96,7 @@ class Policy(AgentBase):
                 if np.mean(self._doubt) > LOST_NATS:
                     self._notice(self._search)
                     away = self._search.towards(self._reckoning.odometry, observation.remaining_actions)
-                    guess = guess.led(torch.from_numpy(away[None, None]).to(device))
+                    guess = guess.with_goal_offset(torch.from_numpy(away[None, None]).to(device))
             thought = self.network.choose(seen, guess)
         back = torch.from_numpy(self._reckoning.back[None, None]).to(device)
         self._previous = int(thought.actions(back)[0, 0])

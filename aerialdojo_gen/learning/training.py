@@ -303,7 +303,7 @@ class _Training:
                 if k is None
                 else (
                     f" (kept back: {k.accuracy:.1%}; goal off by {k.goal_off_at_start_m:.1f} m at the start, "
-                    f"{k.goal_off_m:.1f} m in all{_told(k)})"
+                    f"{k.goal_off_m:.1f} m in all{_describe(k)})"
                 )
             )
             self._reporter.line(
@@ -365,7 +365,7 @@ def _rows(file: Path) -> Iterator[dict[str, Any]]:
             return
 
 
-def _told(kept: Any) -> str:
+def _describe(kept: Any) -> str:
     """What is known of blocked and free actions, in words; `Assessed` to a clause."""
     shares = [(kept.blocked_told, "blocked"), (kept.free_told, "free")]
     known = [f"{share:.1%} of {what}" for share, what in shares if share is not None]

@@ -229,7 +229,7 @@ class Trajectories:
         steps = ends[:, None] + np.arange(1 - window, 1)
         mask = steps >= 0
         out: dict[str, Any] = {"mask": mask, "step": ends, "nav_id": [self.index.nav_id[k] for k, _ in places]}
-        out |= self._told(rows)
+        out |= self._goals(rows)
         out |= self._labels.of(rows, steps, mask)
         frames = self._frames(np.broadcast_to(rows[:, None], steps.shape)[mask], steps[mask])
         for name, seen in (("rgb", frames.rgb), ("depth_m", frames.depth_m)):
@@ -237,7 +237,7 @@ class Trajectories:
                 out[name] = seen.reshape(*mask.shape, *seen.shape[1:]) if mask.all() else scattered(seen, mask)
         return out
 
-    def _told(self, rows: NDArray[np.int64]) -> dict[str, Any]:
+    def _goals(self, rows: NDArray[np.int64]) -> dict[str, Any]:
         out: dict[str, Any] = {}
         if "text" in self.goal:
             out["text"] = [self._texts[k] for k in rows]

@@ -16,11 +16,11 @@ from aerialdojo_gen.base.config.pipeline import Pipeline
 from aerialdojo_gen.base.config.sections import Section
 from aerialdojo_gen.base.environment_errors import check_memory
 from aerialdojo_gen.base.errors import AerialDojoError, BudgetSpent
-from aerialdojo_gen.pipeline.executors.base import Waiting
-from aerialdojo_gen.pipeline.expectation import Expectation
+from aerialdojo_gen.pipeline.executors.base import TaskQueue
+from aerialdojo_gen.pipeline.expectation import RuntimeEstimate
 from aerialdojo_gen.pipeline.freshness import Limits, Shards, shards_of
 from aerialdojo_gen.pipeline.progress import Overview, Reporter
-from aerialdojo_gen.pipeline.stage import Roots, Stage
+from aerialdojo_gen.pipeline.stage import ProjectPaths, Stage
 from aerialdojo_gen.pipeline.summary import StageSummary
 from aerialdojo_gen.pipeline.task import Computed, Task
 
@@ -38,7 +38,7 @@ class _Tally:
     seconds: float = 0.0
 
 
-class Chain(Waiting[Task]):
+class SceneScheduler(TaskQueue[Task]):
     """Scenes that go through the same stages, one after the other."""
 
     def __init__(
@@ -46,11 +46,11 @@ class Chain(Waiting[Task]):
         stages: Sequence[Stage],
         scenes: Sequence[str],
         pipeline: Pipeline,
-        roots: Roots,
+        roots: ProjectPaths,
         forced: Collection[str],
         limits: Limits,
         reporter: Reporter,
-        expectation: Expectation,
+        expectation: RuntimeEstimate,
     ) -> None:
         super().__init__((), lambda task: task.scene)
         self._stages, self._names = stages, list(scenes)
@@ -115,7 +115,7 @@ class Chain(Waiting[Task]):
         told, self._told = self._told, min(self._passed.values(), default=len(self._stages))
         return [self._summary(number) for number in range(told, self._told)]
 
-    def finished(self, task: Task, outcome: Computed | AerialDojoError) -> None:
+    def on_done(self, task: Task, outcome: Computed | AerialDojoError) -> None:
         """Hear what became of a task; the last one of a scene's stage brings those of its next."""
         scene, number = task.scene, self._passed[task.scene]
         tally, name = self._tallies[number], self._stages[number].name
@@ -129,7 +129,7 @@ class Chain(Waiting[Task]):
             tally.summaries.append(outcome.summary)
             tally.computed += 1
             tally.seconds += outcome.seconds
-            self._expectation.took(name, scene, 1.0 / self._shards[scene], outcome.seconds)
+            self._expectation.record(name, scene, 1.0 / self._shards[scene], outcome.seconds)
         if self._left[scene] or scene in self._ended:
             return
         self._passed[scene] += 1
@@ -184,7 +184,7 @@ class Chain(Waiting[Task]):
                 if lot.all_fresh:
                     self._configs[stage.name] = choice
                     return lot
-            self._configs[stage.name] = stage.settle(section, self._reporter.line)
+            self._configs[stage.name] = stage.resolve_config(section, self._reporter.line)
         config = self._configs[stage.name]
         lot = shards_of(stage, config, *here, self._reporter, self._limits)
         if lot.tasks:

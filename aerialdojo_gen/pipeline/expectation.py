@@ -6,7 +6,7 @@ from collections import defaultdict
 from collections.abc import Sequence
 
 from aerialdojo_gen.base.errors import AerialDojoError
-from aerialdojo_gen.pipeline.stage import Roots, Stage
+from aerialdojo_gen.pipeline.stage import ProjectPaths, Stage
 from aerialdojo_gen.store import shards as store
 
 # Bytes of an annotation file for each of its objects, as in those of the 42 scenes.
@@ -16,10 +16,10 @@ _OBJECTS = 40
 _BELIEVED_S = 10.0
 
 
-class Expectation:
+class RuntimeEstimate:
     """What is left of stages, in seconds of one core, by the stages' own figures and by what was done so far."""
 
-    def __init__(self, stages: Sequence[Stage], scenes: Sequence[str], roots: Roots) -> None:
+    def __init__(self, stages: Sequence[Stage], scenes: Sequence[str], roots: ProjectPaths) -> None:
         objects = {scene: objects_of(roots, scene) for scene in scenes}
         self._expected = {
             (stage.name, scene): stage.seconds[0] + stage.seconds[1] * objects[scene]
@@ -30,7 +30,7 @@ class Expectation:
         self._took: defaultdict[str, float] = defaultdict(float)
         self._for: defaultdict[str, float] = defaultdict(float)
 
-    def took(self, stage: str, scene: str, share: float, seconds: float) -> None:
+    def record(self, stage: str, scene: str, share: float, seconds: float) -> None:
         """Hear how long a share of a scene's work took."""
         expected = self._expected[stage, scene] * share
         self._left[stage, scene] = max(0.0, self._left[stage, scene] - expected)
@@ -60,7 +60,7 @@ class Expectation:
         return (self._took[stage] + overall * _BELIEVED_S) / (self._for[stage] + _BELIEVED_S)
 
 
-def objects_of(roots: Roots, scene: str) -> float:
+def objects_of(roots: ProjectPaths, scene: str) -> float:
     """Tell about how many objects a scene has: by its table, else by the size of its annotation file."""
     try:
         return float(store.count_rows(roots.data, "objects", scene))

@@ -8,17 +8,17 @@ from functools import cache, lru_cache
 from pathlib import Path
 from typing import Any
 
-from aerialdojo_gen.base import paper_figures as paper
+from aerialdojo_gen.base import paper_figures
 from aerialdojo_gen.base.config.pipeline import Pipeline
 from aerialdojo_gen.base.config.sections import Section
 from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.pipeline.code_digest import Code, stage_code
-from aerialdojo_gen.pipeline.stage import Roots, Stage
+from aerialdojo_gen.pipeline.stage import ProjectPaths, Stage
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.files import file_digest
 
 
-def scene_fingerprint(stage: Stage, pipeline: Pipeline, roots: Roots, scene: str) -> str:
+def scene_fingerprint(stage: Stage, pipeline: Pipeline, roots: ProjectPaths, scene: str) -> str:
     """Hash all that the shards of a scene depend on.
 
     Inputs count by their content, not by their own fingerprint: where an upstream stage ran again and wrote the
@@ -27,7 +27,7 @@ def scene_fingerprint(stage: Stage, pipeline: Pipeline, roots: Roots, scene: str
     """
     code = scene_code(stage, roots, scene, pipeline.section(stage.name))
     # The paper's figures lie beside the package in a checkout, inside it in a wheel.
-    carried = paper.files() if "aerialdojo_gen.base.paper_figures" in code.parts else []
+    carried = paper_figures.files() if "aerialdojo_gen.base.paper_figures" in code.parts else []
     sources = [*stage.sources(roots, scene), *carried]
     facts = {
         "stage": stage.name,
@@ -46,13 +46,13 @@ def scene_fingerprint(stage: Stage, pipeline: Pipeline, roots: Roots, scene: str
     return hashlib.sha256(f"{{{whole}}}".encode()).hexdigest()
 
 
-def scene_code(stage: Stage, roots: Roots, scene: str, config: Section | None = None) -> Code:
+def scene_code(stage: Stage, roots: ProjectPaths, scene: str, config: Section | None = None) -> Code:
     """Return the code that a stage runs for a scene; without a configuration, all that any would run."""
     return stage_code(stage.name, stage.imports(roots, scene), () if config is None else stage.idle(config))
 
 
 @lru_cache(maxsize=4096)
-def _short(path: Path, roots: Roots) -> str:
+def _short(path: Path, roots: ProjectPaths) -> str:
     """Name a file by its place in its folder: the same in a checkout, in a wheel, and in a checkout elsewhere."""
     for name in ("recipes", "scene_assets", "annotations"):
         folder = getattr(roots, name)

@@ -16,7 +16,7 @@ from aerialdojo_gen.base.config.sections import Section
 from aerialdojo_gen.base.errors import AerialDojoError, DamagedFile
 from aerialdojo_gen.pipeline.fingerprint import scene_code, scene_fingerprint
 from aerialdojo_gen.pipeline.progress import Reporter
-from aerialdojo_gen.pipeline.stage import Job, Roots, Stage
+from aerialdojo_gen.pipeline.stage import Job, ProjectPaths, Stage
 from aerialdojo_gen.pipeline.task import Task
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.root import DataRoot
@@ -53,7 +53,7 @@ def shards_of(
     config: Section,
     scenes: Sequence[str],
     pipeline: Pipeline,
-    roots: Roots,
+    roots: ProjectPaths,
     force: bool,
     reporter: Reporter,
     limits: Limits,
@@ -89,7 +89,7 @@ def shards_of(
     return found
 
 
-def is_fresh(stage: Stage, config: Section, scene: str, pipeline: Pipeline, roots: Roots) -> bool:
+def is_fresh(stage: Stage, config: Section, scene: str, pipeline: Pipeline, roots: ProjectPaths) -> bool:
     """Whether all shards of a scene are fresh under a stage's section; nothing is written."""
     pipeline = pipeline.model_copy(update={stage.name.replace("-", "_"): config})
     try:
@@ -101,7 +101,7 @@ def is_fresh(stage: Stage, config: Section, scene: str, pipeline: Pipeline, root
     return all(_fresh(stage, roots.data, scene, k, parts, fingerprint, quiet) is not None for k in range(parts))
 
 
-def look_ahead(stage: Stage, scenes: Sequence[str], roots: Roots) -> None:
+def look_ahead(stage: Stage, scenes: Sequence[str], roots: ProjectPaths) -> None:
     """Begin to read the files whose digests tell whether a stage's shards are whole."""
     names = []
     for scene in scenes:
@@ -109,10 +109,10 @@ def look_ahead(stage: Stage, scenes: Sequence[str], roots: Roots) -> None:
             with contextlib.suppress(AerialDojoError):
                 infos = [store.read_info(roots.data, name) for name in store.shards(roots.data, table, scene)]
                 names += [name for info in infos for name, file in info.files.items() if file.sha256]
-    roots.data.digest_ahead(names)
+    roots.data.prefetch_digests(names)
 
 
-def keep_footers(stages: Sequence[Stage], scenes: Sequence[str], roots: Roots) -> None:
+def keep_footers(stages: Sequence[Stage], scenes: Sequence[str], roots: ProjectPaths) -> None:
     """Let the next run know what the footers of stages' shards say, those that this one has written among them."""
     for stage in stages:
         for scene in scenes:

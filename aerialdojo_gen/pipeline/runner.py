@@ -13,15 +13,15 @@ from pathlib import Path
 from aerialdojo_gen.base.config.pipeline import Pipeline
 from aerialdojo_gen.base.errors import AerialDojoError, AssetError, BudgetSpent, UsageError
 from aerialdojo_gen.base.names import choose_scenes, unknown
-from aerialdojo_gen.pipeline.chain import Chain
+from aerialdojo_gen.pipeline.chain import SceneScheduler
 from aerialdojo_gen.pipeline.code_digest import stage_code
-from aerialdojo_gen.pipeline.executors import Executor, Folders, make_executor, on_disk
-from aerialdojo_gen.pipeline.expectation import Expectation
+from aerialdojo_gen.pipeline.executors import Executor, SharedPaths, make_executor, on_disk
+from aerialdojo_gen.pipeline.expectation import RuntimeEstimate
 from aerialdojo_gen.pipeline.freshness import Limits, look_ahead
 from aerialdojo_gen.pipeline.interrupt import Interrupts
 from aerialdojo_gen.pipeline.progress import Reporter, duration
 from aerialdojo_gen.pipeline.registry import STAGES, upstream
-from aerialdojo_gen.pipeline.stage import Roots, Stage
+from aerialdojo_gen.pipeline.stage import ProjectPaths, Stage
 from aerialdojo_gen.pipeline.summary import StageSummary
 from aerialdojo_gen.pipeline.task import Computed, compute
 from aerialdojo_gen.store import shards as store
@@ -33,7 +33,7 @@ def run(
     stages: Sequence[Stage],
     scenes: Sequence[str],
     pipeline: Pipeline,
-    roots: Roots,
+    roots: ProjectPaths,
     *,
     workers: int | None = 1,
     executor: str = "local",
@@ -55,19 +55,19 @@ def run(
         # All of it now: who edits a file while this runs has loaded the old one, and gets all made anew next time.
         stage_code(stage.name)
     carried = (roots.scene_assets, roots.recipes, roots.annotations)
-    folders = Folders(on_disk(roots.data), carried, on_disk(roots.data), reporter.line)
-    left_out = unready(stages, scenes, roots)
+    folders = SharedPaths(on_disk(roots.data), carried, on_disk(roots.data), reporter.line)
+    left_out = scenes_missing_input(stages, scenes, roots)
     scenes = [scene for scene in scenes if scene not in left_out]
     made = make_executor(executor, workers, address, folders)
     with roots.data.lock(), Interrupts() as interrupts, made as pool:
         if prepare:
             prepare()
-        expectation = Expectation(stages, scenes, roots)
+        expectation = RuntimeEstimate(stages, scenes, roots)
         for group in chained(stages, alone=limits is not None):
             # What the stages before wrote, in whatever process, is to be found.
             roots.data.refresh()
             now = limits if limits and group[-1] is stages[-1] else Limits()
-            chain = Chain(group, scenes, pipeline, roots, forced, now, reporter, expectation)
+            chain = SceneScheduler(group, scenes, pipeline, roots, forced, now, reporter, expectation)
             busy = [stage.name for stage in group if any(expectation.left(stage.name, scene) for scene in scenes)]
             if chain and (cold := uncompiled(busy)):
                 reporter.line(f"compiling {', '.join(cold)} to machine code, once: up to two minutes of CPU time")
@@ -114,7 +114,7 @@ def chained(stages: Sequence[Stage], *, alone: bool = False) -> list[list[Stage]
 
 
 def _go_through(
-    chain: Chain, pool: Executor, reporter: Reporter, interrupts: Interrupts, asked: str
+    chain: SceneScheduler, pool: Executor, reporter: Reporter, interrupts: Interrupts, asked: str
 ) -> list[StageSummary]:
     """Take scenes through stages, and say what was done."""
     summaries: list[StageSummary] = []
@@ -141,14 +141,14 @@ def _go_through(
     return summaries
 
 
-def unready(stages: Sequence[Stage], scenes: Sequence[str], roots: Roots) -> dict[str, str]:
+def scenes_missing_input(stages: Sequence[Stage], scenes: Sequence[str], roots: ProjectPaths) -> dict[str, str]:
     """Find the scenes that stages leave out, as these or what they build on want something of its author first."""
     before = {each.name: each for stage in stages for each in upstream(stage.name)}
     inputs = {table for stage in stages for table in stage.reads} - {t for stage in stages for t in stage.writes}
 
     def wanting(scene: str) -> str:
-        why = next(filter(None, (stage.wants(roots, scene) for stage in stages)), "")
-        earlier = next(filter(None, (stage.wants(roots, scene) for stage in before.values())), "")
+        why = next(filter(None, (stage.missing_input(roots, scene) for stage in stages)), "")
+        earlier = next(filter(None, (stage.missing_input(roots, scene) for stage in before.values())), "")
         # What stages that do not run now made before, or a release brought along, is enough.
         made = why or not earlier or all(store.shards(roots.data, table, scene) for table in inputs)
         return why if made else earlier
@@ -171,7 +171,7 @@ def known_scenes(recipes: Path) -> list[str]:
     return sorted(path.stem for path in recipes.glob("*.toml"))
 
 
-def chosen_scenes(pipeline: Pipeline, roots: Roots, patterns: Sequence[str] | None = None) -> list[str]:
+def chosen_scenes(pipeline: Pipeline, roots: ProjectPaths, patterns: Sequence[str] | None = None) -> list[str]:
     """Resolve names and globs to scenes with a recipe; the pipeline's own scenes where there are none."""
     return choose_scenes(patterns or pipeline.scenes, known_scenes(roots.recipes))
 

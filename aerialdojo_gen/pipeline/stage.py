@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Roots:
+class ProjectPaths:
     """The folders that a run works with.
 
     Attributes
@@ -103,7 +103,7 @@ class Job:
     parts: int
     seed: int
     embodiment: Embodiment
-    roots: Roots
+    roots: ProjectPaths
     files: list[str] = field(default_factory=list, compare=False)
     digested: list[str] = field(default_factory=list, compare=False)
     deadline: float | None = None
@@ -159,15 +159,15 @@ def _no_choice(_config: Any) -> list[Any]:
     return []
 
 
-def _no_sources(_roots: Roots, _scene: str) -> list[Path]:
+def _no_sources(_roots: ProjectPaths, _scene: str) -> list[Path]:
     return []
 
 
-def _no_want(_roots: Roots, _scene: str) -> str:
+def _no_want(_roots: ProjectPaths, _scene: str) -> str:
     return ""
 
 
-def _any_module(_roots: Roots, _scene: str) -> Choice | None:
+def _any_module(_roots: ProjectPaths, _scene: str) -> Choice | None:
     return None
 
 
@@ -230,15 +230,15 @@ class Stage:
     writes: tuple[str, ...]
     run: Callable[[Job, Any], Output]
     parts: Callable[[DataRoot, str, Any], int] = _one_part
-    sources: Callable[[Roots, str], list[Path]] = _no_sources
-    wants: Callable[[Roots, str], str] = _no_want
-    imports: Callable[[Roots, str], Choice | None] = _any_module
+    sources: Callable[[ProjectPaths, str], list[Path]] = _no_sources
+    missing_input: Callable[[ProjectPaths, str], str] = _no_want
+    imports: Callable[[ProjectPaths, str], Choice | None] = _any_module
     idle: Callable[[Any], tuple[str, ...]] = _nothing_idle
     check: Callable[[DataRoot, Sequence[str], Any], None] = _no_check
-    settle: Callable[[Any, Callable[[str], None]], Any] = _as_it_is
+    resolve_config: Callable[[Any, Callable[[str], None]], Any] = _as_it_is
     choices: Callable[[Any], list[Any]] = _no_choice
     digests: tuple[str, str, str] | None = None
-    after_all: bool = False
+    barrier: bool = False
     seconds: tuple[float, float] = (1.0, 0.0)
     memory_mb: int = 1000
 
@@ -250,4 +250,4 @@ class Stage:
     @property
     def waits(self) -> bool:
         """Whether all scenes are to be through the stages before."""
-        return self.after_all or self.check is not _no_check
+        return self.barrier or self.check is not _no_check

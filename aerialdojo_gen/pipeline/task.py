@@ -8,9 +8,9 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from aerialdojo_gen.base.cli_context import Given, as_given, given
+from aerialdojo_gen.base.cli_context import CliContext, given, use_context
 from aerialdojo_gen.base.config.sections import Section
-from aerialdojo_gen.base.environment_errors import explained
+from aerialdojo_gen.base.environment_errors import environment_error
 from aerialdojo_gen.base.errors import AerialDojoError, BudgetSpent
 from aerialdojo_gen.pipeline.registry import BY_NAME
 from aerialdojo_gen.pipeline.stage import Job
@@ -25,7 +25,7 @@ class Task:
     job: Job  # What it is
     config: Section  # Its stage's section
     fingerprint: str  # To be stored with it
-    given: Given = field(default_factory=given, compare=False)
+    given: CliContext = field(default_factory=given, compare=False)
 
     @property
     def label(self) -> str:
@@ -66,12 +66,12 @@ def compute(task: Task) -> Computed:
     started = time.monotonic()
     stage = BY_NAME[job.stage]
     try:
-        with as_given(task.given):
+        with use_context(task.given):
             output = stage.run(job, task.config)
     except AerialDojoError:
         raise
     except Exception as error:
-        if why := explained(error):
+        if why := environment_error(error):
             # Without the shard: it is no fault of its own, and all of them say the same.
             raise AerialDojoError(why) from error
         raise RuntimeError(f"{task.label} failed: {type(error).__name__}: {error}") from error

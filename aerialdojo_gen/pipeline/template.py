@@ -97,14 +97,14 @@ def pipeline_text(pipeline: Pipeline, folder: Path | None = None) -> str:
                 within = [inner for inner in keys if inner.section.rstrip("[]") == f"{section}.{key.name}"]
                 out += [
                     "",
-                    *_comment(_told(key)),
-                    *(line for inner in within for line in _comment(_told(inner), True)),
+                    *_comment(_describe(key)),
+                    *(line for inner in within for line in _comment(_describe(inner), True)),
                 ]
                 out += _written(key, folder)
     return "\n".join(out) + "\n"
 
 
-def _told(key: Key) -> str:
+def _describe(key: Key) -> str:
     """Say what a key means, its unit and what its value must be."""
     words = key.kind if " or " in key.kind else ""
     nothing = "not set" if key.default is None and not key.required else ""

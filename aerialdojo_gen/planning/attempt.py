@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from aerialdojo_gen.base.constants import APPROACH, STOP
 from aerialdojo_gen.base.kernels import njit
 from aerialdojo_gen.geometry.motion import fly
-from aerialdojo_gen.planning.certify import Examination, examine
+from aerialdojo_gen.planning.certify import ClearanceProfile, examine
 from aerialdojo_gen.planning.cost_to_go import cost_at, extra_cost
 from aerialdojo_gen.planning.grid_kernels import GridArrays
 from aerialdojo_gen.planning.hybrid_astar import FOUND, SearchArrays, SearchOptions, search
@@ -32,13 +32,13 @@ class Attempt(NamedTuple):
     poses: NDArray[np.float64]  # (K + 1, 4) float64; x, y, z in metres and yaw in (-pi, pi]; no rows unless FOUND
     actions: NDArray[np.int8]  # (K + 1,) int8; what is done at every pose, Stop at the last
     length: float  # The paper's L, metres
-    seen: Examination  # Of the route; meaningless unless FOUND
+    seen: ClearanceProfile  # Of the route; meaningless unless FOUND
 
 
 @njit(cache=True)
 def lengths_at(
     points: NDArray[np.float64], goal: NDArray[np.float64], grid: GridArrays, moves: NDArray[np.uint32],
-    cost: NDArray[np.float32], narrow: NDArray[np.float32],
+    cost: NDArray[np.float32], clearance_cost: NDArray[np.float32],
 ) -> NDArray[np.float64]:  # fmt: skip
     """Lengths of the cheapest grid paths from points, (n, 3) float64 metres; (n,) float64 metres."""
     values = np.empty(len(points))
@@ -46,7 +46,7 @@ def lengths_at(
         x, y, z = points[i, 0], points[i, 1], points[i, 2]
         values[i] = cost_at(x, y, z, grid, cost)
         if values[i] < np.inf:
-            values[i] -= extra_cost(x, y, z, goal, grid, moves, cost, narrow)
+            values[i] -= extra_cost(x, y, z, goal, grid, moves, cost, clearance_cost)
     return values
 
 
@@ -60,7 +60,7 @@ def costs_at(points: NDArray[np.float64], grid: GridArrays, cost: NDArray[np.flo
 
 
 @njit(cache=True)
-def attempt(
+def plan_once(
     start: NDArray[np.float64],
     goal: NDArray[np.float64],
     goal_heading: int,
@@ -74,7 +74,7 @@ def attempt(
     """Search a route from a pose (4,) to a goal (3,), order its moves, fly it and measure its clearance, metres."""
     status, expansions, moves = search(start, goal, goal_heading, cost_to_go, grid, memory, options)
     if status != FOUND:
-        unseen = Examination(np.empty((0, 3)), False, np.empty(0, np.bool_), 0.0)
+        unseen = ClearanceProfile(np.empty((0, 3)), False, np.empty(0, np.bool_), 0.0)
         return Attempt(status, expansions, np.empty((0, 4)), np.empty(0, np.int8), 0.0, unseen)
     flown = moves_to_actions(start, moves, goal_heading, options, grid)
     poses = fly(start, flown)

@@ -29,7 +29,7 @@ class Certificate:
     asked: int
 
 
-class Examination(NamedTuple):
+class ClearanceProfile(NamedTuple):
     """What the grid and the triangles say of a route."""
 
     corners: NDArray[np.float64]  # (m, 3) float64; where the route bends, ends included, metres
@@ -79,10 +79,10 @@ def _all_inside(points: NDArray[np.float64], grid: GridArrays) -> bool:
 
 
 @njit(cache=True)
-def examine(points: NDArray[np.float64], radius: float, bound: float, grid: GridArrays) -> Examination:
+def examine(points: NDArray[np.float64], radius: float, bound: float, grid: GridArrays) -> ClearanceProfile:
     """Measure a route's points (n, 3), world metres, by the clearance grid alone, without FCL."""
     p = corners(points)
-    return Examination(p, _all_inside(p, grid), _undecided(p, radius, grid), polyline_clearance(p, bound, grid))
+    return ClearanceProfile(p, _all_inside(p, grid), _undecided(p, radius, grid), polyline_clearance(p, bound, grid))
 
 
 def certify(
@@ -96,7 +96,7 @@ def certify(
     return conclude(seen, radius_m, world, prove)
 
 
-def conclude(seen: Examination, radius_m: float, world: CollisionWorld, prove: bool) -> Certificate:
+def conclude(seen: ClearanceProfile, radius_m: float, world: CollisionWorld, prove: bool) -> Certificate:
     """Ask FCL about what an examination has left open; with `prove` False, about every leg."""
     p = seen.corners
     legs = max(1, len(p) - 1)

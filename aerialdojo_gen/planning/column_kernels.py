@@ -29,7 +29,7 @@ def move_lengths(cell: float) -> tuple[NDArray[np.float32], NDArray[np.float32]]
 
 @njit(cache=True, error_model="numpy")
 def settle(
-    costs: NDArray[np.float32], moves: NDArray[np.uint32], narrow: NDArray[np.float32], first: int, last: int,
+    costs: NDArray[np.float32], moves: NDArray[np.uint32], clearance_cost: NDArray[np.float32], first: int, last: int,
     length: np.float32, coarse: np.float32,
 ) -> None:  # fmt: skip
     """Relax the vertical moves between the cells from `first` to before `last`, up and then down."""
@@ -37,14 +37,14 @@ def settle(
     below = costs[first]
     for k in range(first + 1, last):
         here = costs[k]
-        reached = below + (length + coarse * narrow[k - 1])
+        reached = below + (length + coarse * clearance_cost[k - 1])
         if reached < here and (moves[k - 1] >> np.uint32(UP)) & one:
             costs[k] = here = reached
         below = here
     above = costs[last - 1]
     for k in range(last - 2, first - 1, -1):
         here = costs[k]
-        reached = above + (length + coarse * narrow[k + 1])
+        reached = above + (length + coarse * clearance_cost[k + 1])
         if reached < here and (moves[k + 1] >> np.uint32(DOWN)) & one:
             costs[k] = here = reached
         above = here
@@ -52,14 +52,14 @@ def settle(
 
 @njit(cache=True, error_model="numpy")
 def leave(
-    costs: NDArray[np.float32], narrow: NDArray[np.float32], first: int, n: int, length: np.float32,
+    costs: NDArray[np.float32], clearance_cost: NDArray[np.float32], first: int, n: int, length: np.float32,
     coarse: np.float32, left: NDArray[np.float32], at: int,
 ) -> None:  # fmt: skip
     """Costs of n cells with those of a move that leads from them, into `left` from `at` on."""
     # Unsigned, for else every index is asked whether it is negative, and the loop becomes no vector instructions.
     a, b = np.uint64(first), np.uint64(at)
     for k in range(np.uint64(n)):
-        left[b + k] = costs[a + k] + (length + coarse * narrow[a + k])
+        left[b + k] = costs[a + k] + (length + coarse * clearance_cost[a + k])
 
 
 @njit(cache=True, error_model="numpy")

@@ -31,7 +31,7 @@ from aerialdojo_gen.planning.column_kernels import (
 )
 from aerialdojo_gen.planning.connectivity import MOVES, cell_centre
 from aerialdojo_gen.planning.grid_kernels import GridArrays, segment_free
-from aerialdojo_gen.planning.preference import Preference, astray, squeeze
+from aerialdojo_gen.planning.preference import Preference, approach_penalty, clearance_penalty
 
 
 @lru_cache(maxsize=4)
@@ -81,8 +81,8 @@ def seed_goal(
                 x, y, z = cell_centre(i, j, k, grid)
                 d = math.sqrt((x - gx) ** 2 + (y - gy) ** 2 + (z - gz) ** 2)
                 if d <= reach and segment_free(x, y, z, gx, gy, gz, radius, grid, False):
-                    d += astray(gx - x, gy - y, yaw, d, prefer.ahead_cos, prefer.astray)
-                    d += squeeze(x, y, z, gx, gy, gz, prefer.clearance, prefer.weight,
+                    d += approach_penalty(gx - x, gy - y, yaw, d, prefer.ahead_cos, prefer.approach_penalty)
+                    d += clearance_penalty(x, y, z, gx, gy, gz, prefer.clearance, prefer.weight,
                                  grid.origin[0], grid.origin[1], grid.origin[2], grid.cell, grid.field)  # fmt: skip
                     cost[i, j, k] = round(d / QUANTUM_M) * QUANTUM_M
                     found[n] = (i * ny + j) * nz + k
@@ -98,7 +98,7 @@ def expand_cost(
     cell: float,
     moves: NDArray[np.uint32],
     cost: NDArray[np.float32],
-    narrow: NDArray[np.float32],
+    clearance_cost: NDArray[np.float32],
 ) -> int:
     """Cheapest costs over passable moves from seeded cells, into `cost` (nx, ny, nz).
 
@@ -108,7 +108,7 @@ def expand_cost(
     lengths, coarse = move_lengths(cell)
     limit = np.float32(bound)
     waiting, departed = np.zeros((nx, ny), np.bool_), np.empty(len(KINDS) * nz, np.float32)
-    costs, passable, tight = cost.reshape(-1), moves.reshape(-1), narrow.reshape(-1)
+    costs, passable, tight = cost.reshape(-1), moves.reshape(-1), clearance_cost.reshape(-1)
     left, visits = 0, 0
     middle_i, middle_j = 0, 0
     for seed in seeds:
@@ -152,7 +152,7 @@ def expand_cost(
 @njit(cache=True)
 def extra_cost(
     x: float, y: float, z: float, goal: NDArray[np.float64], grid: GridArrays, moves: NDArray[np.uint32],
-    cost: NDArray[np.float32], narrow: NDArray[np.float32],
+    cost: NDArray[np.float32], clearance_cost: NDArray[np.float32],
 ) -> float:  # fmt: skip
     """The part of a point's cost-to-go that is not metres, by following the cheapest grid path; 0 if unreached."""
     nx, ny, nz = cost.shape
@@ -178,7 +178,7 @@ def extra_cost(
             if not (moves[i, j, k] >> np.uint32(m)) & np.uint32(1):
                 continue
             u, v, w = i + MOVES[m, 0], j + MOVES[m, 1], k + MOVES[m, 2]
-            extra = coarse[m] * narrow[u, v, w]
+            extra = coarse[m] * clearance_cost[u, v, w]
             if cost[u, v, w] + (lengths[m] + extra) == cost[i, j, k]:
                 total += extra
                 i, j, k, on = u, v, w, True

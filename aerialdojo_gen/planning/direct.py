@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from aerialdojo_gen.base.kernels import njit
 from aerialdojo_gen.geometry.motion import N_HEADINGS, TURN_RAD
 from aerialdojo_gen.planning.grid_kernels import GridArrays, bound_at, inside, segment_free
-from aerialdojo_gen.planning.preference import Preference, astray, squeeze
+from aerialdojo_gen.planning.preference import Preference, approach_penalty, clearance_penalty
 from aerialdojo_gen.planning.translations import DOWN, UP
 
 # Orders of the three legs: along the nearer direction clockwise, counter-clockwise, vertical.
@@ -130,7 +130,7 @@ def direct_legs(
                 gap = math.sqrt(flat2 + ez * ez)
                 if gap > approach:
                     continue
-                cost = total + q + gap + (prefer.astray if ahead < prefer.ahead_cos * gap else 0.0)
+                cost = total + q + gap + (prefer.approach_penalty if ahead < prefer.ahead_cos * gap else 0.0)
                 if cost < best:
                     best, na, nb, nz = cost, p, total - p, q
     if best == np.inf:
@@ -142,8 +142,10 @@ def direct_legs(
         return np.inf, 0.0
     gx, gy, gz, cell = grid.origin[0], grid.origin[1], grid.origin[2], grid.cell
     length = na + nb + nz + math.sqrt((goal[0] - ux) ** 2 + (goal[1] - uy) ** 2 + (goal[2] - uz) ** 2)
-    length += astray(goal[0] - ux, goal[1] - uy, goal_yaw, length - na - nb - nz, prefer.ahead_cos, prefer.astray)
-    last = squeeze(
+    length += approach_penalty(
+        goal[0] - ux, goal[1] - uy, goal_yaw, length - na - nb - nz, prefer.ahead_cos, prefer.approach_penalty
+    )
+    last = clearance_penalty(
         ux, uy, uz, goal[0], goal[1], goal[2], prefer.clearance, prefer.weight, gx, gy, gz, cell, grid.field
     )  # fmt: skip
     least_extra, order = np.inf, 0
@@ -165,7 +167,7 @@ def direct_legs(
             ):
                 extra = np.inf
                 break
-            extra += squeeze(
+            extra += clearance_penalty(
                 px, py, pz, qx, qy, qz, prefer.clearance, prefer.weight, gx, gy, gz, cell, grid.field
             )  # fmt: skip
             if extra >= least_extra:

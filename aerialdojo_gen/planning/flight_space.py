@@ -15,7 +15,7 @@ from aerialdojo_gen.base.kernels import njit
 from aerialdojo_gen.planning.clearance import ClearanceGrid
 from aerialdojo_gen.planning.collision import CollisionWorld, collision_world
 from aerialdojo_gen.planning.grid_kernels import GridArrays, inside, segment_free
-from aerialdojo_gen.scenes.context import SEVERAL, SceneContext, open_scene, read_ahead
+from aerialdojo_gen.scenes.context import SEVERAL, SceneContext, open_scene, prefetch_mesh
 from aerialdojo_gen.scenes.model import Scene
 
 Point = tuple[float, float, float]
@@ -96,7 +96,7 @@ def flight_space(mesh: Path, sha256: str, radius_m: float, keep: int = SEVERAL) 
 
 def build_ahead(mesh: Path, sha256: str, radius_m: float) -> None:
     """Read a scene and build all that flying wants but what draws, for `flight_space` to find: in another thread."""
-    read_ahead(mesh, sha256, lambda context: _space_of(context, radius_m).world)
+    prefetch_mesh(mesh, sha256, lambda context: _space_of(context, radius_m).world)
 
 
 def _space_of(context: SceneContext, radius_m: float) -> FlightSpace:

@@ -57,11 +57,11 @@ def grid_metric(dx: float, dy: float, dz: float) -> float:
 @njit(cache=True, error_model="numpy")
 def short_path_cost(
     seeds: NDArray[np.int32], x: float, y: float, z: float, bound: float, grid: GridArrays, moves: NDArray[np.uint32],
-    narrow: NDArray[np.float32], costs: NDArray[np.float32], arrays: PathArrays,
+    clearance_cost: NDArray[np.float32], costs: NDArray[np.float32], arrays: PathArrays,
 ) -> float:  # fmt: skip
     """Cost, metres, of a short grid path from a start to the seeds, within `_WEIGHT` of the least; inf or GAVE_UP."""
     nx, ny, nz = costs.shape
-    flat, flat_moves, flat_narrow = costs.reshape(-1), moves.reshape(-1), narrow.reshape(-1)
+    flat, flat_moves, flat_narrow = costs.reshape(-1), moves.reshape(-1), clearance_cost.reshape(-1)
     heads, cells, entered, nexts, touched = arrays.heads, arrays.cell, arrays.cost, arrays.next, arrays.touched
     edge = grid.cell
     lengths, coarse = move_lengths(edge)

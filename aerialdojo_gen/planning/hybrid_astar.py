@@ -25,7 +25,7 @@ from aerialdojo_gen.geometry.motion import N_HEADINGS, TURN_RAD
 from aerialdojo_gen.planning.cost_to_go import cost_at, cost_between
 from aerialdojo_gen.planning.direct import direct_legs
 from aerialdojo_gen.planning.grid_kernels import FREE, GridArrays, segment_free, what_blocks
-from aerialdojo_gen.planning.preference import Preference, astray, squeeze
+from aerialdojo_gen.planning.preference import Preference, approach_penalty, clearance_penalty
 from aerialdojo_gen.planning.translations import (
     LIFTS_M,
     N_FLAT,
@@ -35,9 +35,9 @@ from aerialdojo_gen.planning.translations import (
     STEPS_M,
     TURN_BY,
     actions_of,
-    around,
     turns_between,
     with_legs,
+    wrap_heading,
 )
 
 # Ways to the goal: the Approach alone, and the direct way.
@@ -94,7 +94,7 @@ class SearchOptions(NamedTuple):
     sectors: int  # Heading sectors that tell duplicates, a divisor of 24
     sideways: float
     prefer: Preference  # What costs beside metres and actions
-    near_enough: float  # A way to the goal is taken though another may be cheaper by this, metres
+    goal_tolerance: float  # A way to the goal is taken though another may be cheaper by this, metres
 
 
 def make_search_arrays(budget: int) -> SearchArrays:
@@ -206,7 +206,7 @@ def search(
         if move >= _LONGER:
             move = (move - _LONGER) * N_STEPS
             px, py, pz = pose[parent, 0], pose[parent, 1], pose[parent, 2]
-            turns = N_TURNS[around(move // N_STEPS - int(headings[parent]))]
+            turns = N_TURNS[wrap_heading(move // N_STEPS - int(headings[parent]))]
             for m in range(move + 1, move + N_STEPS):
                 u, v = px + flights[m, 0], py + flights[m, 1]
                 if not (lx <= u <= hx and ly <= v <= hy):
@@ -224,8 +224,8 @@ def search(
             px, py, pz, heading = pose[parent, 0], pose[parent, 1], pose[parent, 2], int(headings[parent])
             x, y, z, turns = px + flights[move, 0], py + flights[move, 1], pz + flights[move, 2], 0
             if move < N_FLAT:
-                relative = around(move // N_STEPS - heading)
-                turns, heading = N_TURNS[relative], around(heading + TURN_BY[relative] - N_HEADINGS)
+                relative = wrap_heading(move // N_STEPS - heading)
+                turns, heading = N_TURNS[relative], wrap_heading(heading + TURN_BY[relative] - N_HEADINGS)
             g = cost[parent] + flights[move, 3] + o.action_cost * (turns + 1)
         key = int((x - lx) / o.cell + 1.0)
         key = (key << 20) | int((y - ly) / o.cell + 1.0)
@@ -243,7 +243,7 @@ def search(
                 blockers[place] = found
                 continue
             if tightness > 0.0:
-                extra = squeeze(px, py, pz, x, y, z, room, tightness, ox, oy, oz, edge, field)
+                extra = clearance_penalty(px, py, pz, x, y, z, room, tightness, ox, oy, oz, edge, field)
                 g += extra
                 bucket = min(level + int(extra / _BUCKET_M), _N_BUCKETS - 1)
                 if bucket > level:
@@ -258,9 +258,11 @@ def search(
         gap = math.sqrt((x - goal[0]) ** 2 + (y - goal[1]) ** 2 + (z - goal[2]) ** 2)
         if gap <= o.approach and segment_free(x, y, z, goal[0], goal[1], goal[2], o.radius, grid, False):
             f = g + gap + o.action_cost * (turns_between(heading, goal_heading) + 1) - f0
-            f += astray(goal[0] - x, goal[1] - y, goal_yaw, gap, o.prefer.ahead_cos, o.prefer.astray)
-            f += squeeze(x, y, z, goal[0], goal[1], goal[2], room, tightness, ox, oy, oz, edge, field)
-            f -= o.near_enough
+            f += approach_penalty(
+                goal[0] - x, goal[1] - y, goal_yaw, gap, o.prefer.ahead_cos, o.prefer.approach_penalty
+            )
+            f += clearance_penalty(x, y, z, goal[0], goal[1], goal[2], room, tightness, ox, oy, oz, edge, field)
+            f -= o.goal_tolerance
             if f < f_most:
                 f_most, bucket = f, max(0, int(f / _BUCKET_M))
                 edge_parent[n_edges], edge_move[n_edges], edge_next[n_edges] = n, _TO_GOAL, heads[bucket]
@@ -269,14 +271,14 @@ def search(
                 lowest = min(lowest, bucket)
         h = cost_between(x, y, z, ox, oy, oz, edge, cost_to_go)
         direct, extra = np.inf, 0.0
-        most = f_most + f0 + o.near_enough - g - _BETTER_M
+        most = f_most + f0 + o.goal_tolerance - g - _BETTER_M
         if h <= most and (h < nearest or n % _TRIED == 0):
             direct, extra = direct_legs(
                 x, y, z, start[3], goal, goal_yaw, h, most, o.radius, o.approach, o.prefer, grid, legs, metres
             )  # fmt: skip
         nearest = min(nearest, h)
         if direct < np.inf:
-            f = g + direct + _CARE * extra - f0 - o.near_enough
+            f = g + direct + _CARE * extra - f0 - o.goal_tolerance
             f += o.action_cost * actions_of(heading, goal_heading, legs, metres)
             if f < f_most:
                 f_most, bucket = f, max(0, int(f / _BUCKET_M))
@@ -286,7 +288,7 @@ def search(
                 lowest = min(lowest, bucket)
         f_near = g + o.weight * h - f0 + _SPREAD_M
         for m in range(0, N_FLAT, N_STEPS):
-            turns = N_TURNS[around(m // N_STEPS - heading)]
+            turns = N_TURNS[wrap_heading(m // N_STEPS - heading)]
             for step in range(N_STEPS):
                 u, v = x + flights[m + step, 0], y + flights[m + step, 1]
                 if not (lx <= u <= hx and ly <= v <= hy):

@@ -17,7 +17,7 @@ _CODEC = "lz4_raw"
 _NOWHERE = -1
 
 
-class KeptFields:
+class FieldCache:
     """Fields by their goals."""
 
     def __init__(self, plain_mb: float, packed_mb: float) -> None:

@@ -10,15 +10,15 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from aerialdojo_gen.base.config.sections import PlanConfig, Rung
+from aerialdojo_gen.base.config.sections import PlanConfig, SearchAttempt
 from aerialdojo_gen.geometry.motion import TURN_RAD, nearest_heading
-from aerialdojo_gen.planning.attempt import attempt, costs_at, lengths_at
+from aerialdojo_gen.planning.attempt import costs_at, lengths_at, plan_once
 from aerialdojo_gen.planning.certify import conclude
 from aerialdojo_gen.planning.clearance import ClearanceGrid
 from aerialdojo_gen.planning.collision import collision_world
 from aerialdojo_gen.planning.cost_to_go import columns_by_distance, expand_cost, seed_goal
 from aerialdojo_gen.planning.hybrid_astar import EXHAUSTED, FOUND, SearchArrays, SearchOptions, make_search_arrays
-from aerialdojo_gen.planning.kept_fields import KeptFields
+from aerialdojo_gen.planning.kept_fields import FieldCache
 from aerialdojo_gen.planning.preference import Preference, narrow_cells
 from aerialdojo_gen.planning.single_query import NearField
 from aerialdojo_gen.scenes.model import Scene
@@ -100,7 +100,7 @@ class Planner:
         )  # fmt: skip
         self._narrow = narrow_cells(self.grid.arrays.field, self._prefer)
         self._cost = self._scratch = np.empty(self.grid.moves.shape, np.float32)
-        self._fields = KeptFields(0, 0)
+        self._fields = FieldCache(0, 0)
         self._order = columns_by_distance(
             math.ceil((config.max_length_m * config.length_slack + 2 * config.max_approach_m) / config.cell_m)
         )
@@ -128,7 +128,7 @@ class Planner:
             self._search(s, target, route.cost_to_go_m, self._cost, self.config.ladder)
             if route.outcome == "NOT_NEEDED"
             else route
-            for s, route in zip(begins, self.foresee(target, begins), strict=True)
+            for s, route in zip(begins, self.estimate_routes(target, begins), strict=True)
         ]
 
     def plan_one(self, goal: ArrayLike, start: ArrayLike) -> Route:
@@ -173,7 +173,7 @@ class Planner:
                 return route
         return self.plan_target(target, begin)[0]
 
-    def foresee(self, goal: ArrayLike, starts: ArrayLike) -> list[Route]:
+    def estimate_routes(self, goal: ArrayLike, starts: ArrayLike) -> list[Route]:
         """Tell what the goal's cost-to-go alone knows of the routes to it; nothing is searched.
 
         Parameters
@@ -217,11 +217,11 @@ class Planner:
         plain_mb, packed_mb : float
             How many megabytes are kept as they are, and how many compressed; goals after that are expanded each time.
         """
-        self._fields = KeptFields(plain_mb, packed_mb)
+        self._fields = FieldCache(plain_mb, packed_mb)
         try:
             yield
         finally:
-            self._cost, self._fields = self._scratch, KeptFields(0, 0)
+            self._cost, self._fields = self._scratch, FieldCache(0, 0)
 
     def cost_to_go(self, points: ArrayLike) -> NDArray[np.float64]:
         """Cost-to-go of points, (n, 3) float metres; (n,) float64 metres.
@@ -273,7 +273,7 @@ class Planner:
 
     def _search(
         self, start: NDArray[np.float64], goal: NDArray[np.float64], value: float, cost: NDArray[np.float32],
-        ladder: tuple[Rung, ...],
+        ladder: tuple[SearchAttempt, ...],
     ) -> Route:  # fmt: skip
         c, g = self.config, self.grid
         heading = nearest_heading(float(start[3]), float(goal[3]))
@@ -287,7 +287,7 @@ class Planner:
                 rung.duplicate_cell_m, rung.heading_sectors, c.sideways_actions_per_m, self._prefer,
                 _NEAR_ENOUGH_M,
             )  # fmt: skip
-            tried = attempt(start, goal[:3], heading, cost, g.arrays, memory, options, self.radius_m, g.cap_m)
+            tried = plan_once(start, goal[:3], heading, cost, g.arrays, memory, options, self.radius_m, g.cap_m)
             expansions += tried.expansions
             if tried.status != FOUND:
                 continue

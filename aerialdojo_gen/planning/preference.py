@@ -28,7 +28,7 @@ class Preference(NamedTuple):
     clearance: float  # Distance from surfaces from which on a way costs its metres alone, metres
     weight: float
     ahead_cos: float
-    astray: float  # What another Approach costs beside its length, metres
+    approach_penalty: float  # What another Approach costs beside its length, metres
 
 
 NO_PREFERENCE = Preference(1.0, 0.0, -1.0, 0.0)
@@ -63,7 +63,7 @@ def _clearance(
 
 
 @njit(cache=True, error_model="numpy")
-def squeeze(
+def clearance_penalty(
     px: float, py: float, pz: float, qx: float, qy: float, qz: float, clearance: float, weight: float,
     ox: float, oy: float, oz: float, cell: float, field: NDArray[np.float32],
 ) -> float:  # fmt: skip
@@ -88,6 +88,6 @@ def squeeze(
 
 
 @njit(cache=True, inline="always")
-def astray(dx: float, dy: float, yaw: float, length: float, ahead_cos: float, cost: float) -> float:
+def approach_penalty(dx: float, dy: float, yaw: float, length: float, ahead_cos: float, cost: float) -> float:
     """Extra cost, metres, of an Approach that does not fly ahead."""
     return cost if dx * math.cos(yaw) + dy * math.sin(yaw) < (ahead_cos - _COS_ROUNDING) * length else 0.0

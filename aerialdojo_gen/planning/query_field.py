@@ -89,7 +89,7 @@ def _span(
 @njit(cache=True, error_model="numpy")
 def expand_query(
     seeds: NDArray[np.int32], start: NDArray[np.float64], goal: NDArray[np.float64], approach: float, reach: float,
-    weight: float, bound: float, grid: GridArrays, moves: NDArray[np.uint32], narrow: NDArray[np.float32],
+    weight: float, bound: float, grid: GridArrays, moves: NDArray[np.uint32], clearance_cost: NDArray[np.float32],
     arrays: QueryArrays,
 ) -> int:  # fmt: skip
     """Costs as `expand_cost` finds them, of the cells within reach of one start.
@@ -97,7 +97,7 @@ def expand_query(
     Returns columns to be cleared again.
     """
     nx, ny, nz = arrays.cost.shape
-    costs, flat_moves, flat_narrow = arrays.cost.reshape(-1), moves.reshape(-1), narrow.reshape(-1)
+    costs, flat_moves, flat_narrow = arrays.cost.reshape(-1), moves.reshape(-1), clearance_cost.reshape(-1)
     first, last, limit, waiting, nexts, columns = (
         arrays.first, arrays.last, arrays.limit, arrays.waiting, arrays.next, arrays.columns
     )  # fmt: skip

@@ -18,7 +18,7 @@ from aerialdojo_gen.base.kernels import njit
 from aerialdojo_gen.geometry.motion import N_HEADINGS, QUARTER, TURN_RAD
 from aerialdojo_gen.planning.grid_kernels import GridArrays, inside, segment_free
 from aerialdojo_gen.planning.hybrid_astar import SearchOptions
-from aerialdojo_gen.planning.preference import Preference, squeeze
+from aerialdojo_gen.planning.preference import Preference, clearance_penalty
 from aerialdojo_gen.planning.translations import DOWN, LIFTS_M, N_FLAT, N_STEPS, STEPS_M, UP, turns_between
 
 _MOVE_FORWARD_1, _MOVE_LEFT_1, _MOVE_RIGHT_1 = 1, 4, 7
@@ -120,7 +120,7 @@ def _leg_squeezed(
     x: float, y: float, z: float, u: float, v: float, w: float, prefer: Preference, grid: GridArrays
 ) -> float:  # fmt: skip
     """What a leg costs beside its metres for the surfaces that it comes near."""
-    return squeeze(
+    return clearance_penalty(
         x, y, z, u, v, w, prefer.clearance, prefer.weight,
         grid.origin[0], grid.origin[1], grid.origin[2], grid.cell, grid.field,
     )  # fmt: skip

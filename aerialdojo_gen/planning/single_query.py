@@ -30,9 +30,9 @@ class Found(NamedTuple):
 class NearField:
     """Finds the cost-to-go, metres, between one start and one goal at a time."""
 
-    def __init__(self, grid: ClearanceGrid, narrow: NDArray[np.float32]) -> None:
+    def __init__(self, grid: ClearanceGrid, clearance_cost: NDArray[np.float32]) -> None:
         self.grid = grid
-        self.narrow = narrow
+        self.clearance_cost = clearance_cost
         self._arrays = make_query_arrays(grid.moves.shape)
         self._path = make_path_arrays()
 
@@ -53,7 +53,7 @@ class NearField:
         seeded = cost.ravel()[seeds]
         # The start is not dearer than the bound as soon as one of the cells is not that it lies between.
         farthest = bound + reach_margin(cells.cell, 1.0)
-        path = short_path_cost(seeds, *start[:3], farthest, cells, moves, self.narrow, cost, self._path)
+        path = short_path_cost(seeds, *start[:3], farthest, cells, moves, self.clearance_cost, cost, self._path)
         if path == GAVE_UP or not math.isfinite(path):
             yield Found(None, path != GAVE_UP, 0.0)
             return
@@ -61,7 +61,7 @@ class NearField:
         sure = max(weight * path + _SURPLUS_M, least)
         written = expand_query(
             seeds, start[:3], goal[:3], approach, sure + reach_margin(cells.cell, weight), weight, bound, cells,
-            moves, self.narrow, self._arrays,
+            moves, self.clearance_cost, self._arrays,
         )  # fmt: skip
         try:
             yield Found(cost, False, sure)

@@ -30,7 +30,7 @@ def turns_between(a: int, b: int) -> int:
 
 
 @njit(cache=True, inline="always")
-def around(heading: int) -> int:
+def wrap_heading(heading: int) -> int:
     """Bring a number from -24 to 23 into 0 to 23; a division would take longer than what it is for."""
     return heading + N_HEADINGS if heading < 0 else heading
 
@@ -90,6 +90,6 @@ def actions_of(
             continue
         rest = metres[i] % 5
         count += metres[i] // 5 + rest // 3 + rest % 3
-        relative = around(directions[i] - heading)
-        count, heading = count + N_TURNS[relative], around(heading + TURN_BY[relative] - N_HEADINGS)
+        relative = wrap_heading(directions[i] - heading)
+        count, heading = count + N_TURNS[relative], wrap_heading(heading + TURN_BY[relative] - N_HEADINGS)
     return count + turns_between(heading, goal_heading)

@@ -35,7 +35,9 @@ def catalogue_faults(catalogue: Catalogue, categories: Iterable[str] | None = No
             wrong = {look.say: untrue(look, thing, catalogue.materials) for look in prop.looks}
             true = sum(not w for w in wrong.values())
             if true < min(LEAST_TRUE, len(prop.looks)):
-                faults.append(f"{prop.source} variant {variant.name!r}: {true} looks are true of it: {_told(wrong)}")
+                faults.append(
+                    f"{prop.source} variant {variant.name!r}: {true} looks are true of it: {_message(wrong)}"
+                )
             for say, claims in wrong.items():
                 why[say].append(f"{variant.name}: {', '.join(claims)}" if claims else "")
         faults += [
@@ -46,5 +48,5 @@ def catalogue_faults(catalogue: Catalogue, categories: Iterable[str] | None = No
     return faults
 
 
-def _told(wrong: dict[str, list[str]]) -> str:
+def _message(wrong: dict[str, list[str]]) -> str:
     return "; ".join(f"{say!r}: {', '.join(claims)}" for say, claims in wrong.items() if claims)

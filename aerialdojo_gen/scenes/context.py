@@ -94,7 +94,7 @@ def keep_scene(scene: Scene, sha256: str) -> None:
     _release(gone)
 
 
-def read_ahead(mesh: Path, sha256: str, make: Callable[[SceneContext], object]) -> None:
+def prefetch_mesh(mesh: Path, sha256: str, make: Callable[[SceneContext], object]) -> None:
     """Read a scene and build on it, in a thread beside the work on another one; `open_scene` takes it from there.
 
     No other scene goes for it: only who works on a scene lets go of what draws it, in the thread that drew.

@@ -43,7 +43,7 @@ def footprint(instance: Instance, base_z_m: float) -> BaseGeometry:
     return MultiPoint((low if len(low) else v)[:, :2]).convex_hull
 
 
-def around(x: float, y: float, radius_m: float) -> BaseGeometry:
+def disc(x: float, y: float, radius_m: float) -> BaseGeometry:
     """Round area about a point."""
     return Point(x, y).buffer(radius_m, quad_segs=4)
 

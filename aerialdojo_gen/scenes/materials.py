@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from aerialdojo_gen.base import safe_parse as bounded
+from aerialdojo_gen.base import safe_parse
 from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.base.names import nearest
 from aerialdojo_gen.scenes.model import Material
@@ -96,6 +96,6 @@ def refuse_unknown(body: Iterable[str], known: Iterable[str], where: str) -> Non
 def read_toml(path: Path) -> dict[str, Any]:
     """Read a TOML file; an `AssetError` names it and the line that cannot be read."""
     try:
-        return bounded.read_toml(path, AssetError)
+        return safe_parse.read_toml(path, AssetError)
     except FileNotFoundError as error:
         raise AssetError(f"{path}: cannot be read ({error.strerror})") from None

@@ -14,7 +14,7 @@ from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.base.names import nearest
 from aerialdojo_gen.base.rng import generator
 from aerialdojo_gen.scenes.catalogue import Catalogue, placed
-from aerialdojo_gen.scenes.footprints import Footprints, around, footprint
+from aerialdojo_gen.scenes.footprints import Footprints, disc, footprint
 from aerialdojo_gen.scenes.ground import Surface, ground_meshes, rectangle
 from aerialdojo_gen.scenes.materials import parse_colour
 from aerialdojo_gen.scenes.mesh import Mesh, merge, to_part
@@ -221,7 +221,7 @@ class Site:
     def is_free(self, x: float, y: float, radius_m: float, z: float | None = None, height_m: float = 2.0) -> bool:
         """Whether a disc of ground inside the site is free up to `height_m` above the ground (or above `z`)."""
         base = self.ground_z(x, y) if z is None else z
-        area = around(x, y, radius_m)
+        area = disc(x, y, radius_m)
         return bool(self.extent.contains(area)) and self._footprints.is_free(area, base, base + height_m)
 
     def scene(self) -> Scene:

@@ -63,7 +63,7 @@ class Bucket:
 
     def read_small(self, key: str) -> Content:
         """Read an object with its tag and its age."""
-        with self._told(key):
+        with self._location(key):
             answer = self._client.get_object(Bucket=self.name, Key=key)
             data = answer["Body"].read()
         return Content(data, answer["ETag"], _age_s(answer))
@@ -77,7 +77,7 @@ class Bucket:
         while at < end:
             # Of a whole object the client compares the checksum that the store has of it.
             part = {} if whole and at == 0 else {"Range": f"bytes={at}-{end - 1}"}
-            with self._told(key):
+            with self._location(key):
                 # The client itself tries again until an answer begins; what breaks off later is tried again here.
                 answer = self._client.get_object(Bucket=self.name, Key=key, IfMatch=etag, **part)
                 try:
@@ -95,14 +95,14 @@ class Bucket:
 
     def head(self, key: str) -> tuple[Entry, Mapping[str, str]]:
         """Return an object's entry, and what was said with it when it was put."""
-        with self._told(key):
+        with self._location(key):
             answer = self._client.head_object(Bucket=self.name, Key=key)
         return Entry(answer["ContentLength"], answer["ETag"]), answer.get("Metadata", {})
 
     def put(self, key: str, path: Path, said: Mapping[str, str]) -> Entry:
         """Put a file as an object: it is there whole or not at all, also where this process is killed."""
         size = path.stat().st_size
-        with self._told(key):
+        with self._location(key):
             if size <= _SINGLE:
                 with path.open("rb") as file:
                     answer = self._client.put_object(Bucket=self.name, Key=key, Body=file, Metadata=dict(said))
@@ -139,13 +139,13 @@ class Bucket:
     def put_bytes(self, key: str, data: bytes, *, new: bool = False, etag: str = "") -> Entry:
         """Put a small object; only where there is none (`new`), or where its tag is the one given."""
         condition = {"IfNoneMatch": "*"} if new else {"IfMatch": etag} if etag else {}
-        with self._told(key):
+        with self._location(key):
             answer = self._client.put_object(Bucket=self.name, Key=key, Body=data, **condition)
         return Entry(len(data), answer["ETag"])
 
     def copy(self, key: str, to: str) -> Entry:
         """Copy an object inside the store."""
-        with self._told(to):
+        with self._location(to):
             size = self._client.head_object(Bucket=self.name, Key=key)["ContentLength"]
             answer = self._client.copy_object(
                 Bucket=self.name, Key=to, CopySource={"Bucket": self.name, "Key": key}, MetadataDirective="COPY"
@@ -170,7 +170,7 @@ class Bucket:
         """Remove objects; those that are not there are no error."""
         for begin in range(0, len(keys), 1000):
             lot = keys[begin : begin + 1000]
-            with self._told(lot[0]):
+            with self._location(lot[0]):
                 if len(lot) == 1:
                     self._client.delete_object(Bucket=self.name, Key=lot[0])
                     continue
@@ -184,7 +184,7 @@ class Bucket:
         count = 0
         for page in self._pages("list_multipart_uploads", prefix, Prefix=prefix):
             for upload in page.get("Uploads", []):
-                with self._told(upload["Key"]), suppress(self._client.exceptions.NoSuchUpload):
+                with self._location(upload["Key"]), suppress(self._client.exceptions.NoSuchUpload):
                     self._client.abort_multipart_upload(
                         Bucket=self.name, Key=upload["Key"], UploadId=upload["UploadId"]
                     )
@@ -192,18 +192,18 @@ class Bucket:
         return count
 
     def _pages(self, request: str, prefix: str, **asked: Any) -> Iterator[dict[str, Any]]:
-        with self._told(prefix):
+        with self._location(prefix):
             yield from self._client.get_paginator(request).paginate(Bucket=self.name, **asked)
 
-    def _told(self, key: str) -> _Told:
-        return _Told(f"s3://{self.name}/{key}", self.endpoint)
+    def _location(self, key: str) -> _Location:
+        return _Location(f"s3://{self.name}/{key}", self.endpoint)
 
 
 class _UploadGone(Exception):  # noqa: N818 - it says what happened
     pass
 
 
-class _Told:
+class _Location:
     """Turns what the client raises into one line, FileNotFoundError or `Changed`."""
 
     def __init__(self, url: str, endpoint: str) -> None:

@@ -59,7 +59,7 @@ def file_digest(path: Path) -> str:
     return _digest(*version) if begun is None or begun.cancel() else begun.result()
 
 
-def read_ahead(paths: Iterable[Path]) -> None:
+def prefetch_files(paths: Iterable[Path]) -> None:
     """Read files in a thread whose digests `file_digest` will be asked for; those that are not there are left out."""
     asked = []
     for path in paths:

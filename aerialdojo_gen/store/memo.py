@@ -28,7 +28,7 @@ def key_of(root: DataRoot, files: Iterable[str], *asked: object) -> str:
     return digest.hexdigest()
 
 
-def remembered(key: str, make: Callable[[], str]) -> str:
+def memo(key: str, make: Callable[[], str]) -> str:
     """Return the text that belongs to a key: as it was kept, or as it is made now.
 
     Where the cache cannot be written the text is made each time.

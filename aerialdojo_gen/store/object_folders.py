@@ -20,7 +20,7 @@ _AT_ONCE = 4
 Files = dict[str, tuple[str, Entry]]
 
 
-class Folders:
+class ObjectFolders:
     """Folders of a bucket."""
 
     def __init__(self, state: State) -> None:

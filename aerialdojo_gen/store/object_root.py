@@ -34,7 +34,7 @@ from aerialdojo_gen.store.cloud_errors import Changed
 from aerialdojo_gen.store.files import sha256_of
 from aerialdojo_gen.store.globbing import matching
 from aerialdojo_gen.store.lease import lease_s, leased, lost, token_of
-from aerialdojo_gen.store.object_folders import MANIFEST, Folders
+from aerialdojo_gen.store.object_folders import MANIFEST, ObjectFolders
 from aerialdojo_gen.store.object_state import state_of
 from aerialdojo_gen.store.root import DataRoot, inside
 
@@ -196,7 +196,7 @@ class ObjectRoot(DataRoot):
         with self._state.cache.scratch() as folder:
             yield folder
             self._may_write()
-            Folders(self._state).put(key, folder, self._may_write)
+            ObjectFolders(self._state).put(key, folder, self._may_write)
 
     def delete(self, relative: str) -> None:
         """Remove an object, and those under it as a folder."""
@@ -204,7 +204,7 @@ class ObjectRoot(DataRoot):
         state, key = self._state, self._key(inside(relative).strip("/"))
         known = state.listing(self._group(relative)) if "/" in relative else state.bucket.list(key)
         if f"{key}/{MANIFEST}" in known:
-            Folders(state).delete(key)
+            ObjectFolders(state).delete(key)
             return
         gone = [name for name in known if name == key or name.startswith(f"{key}/")]
         if gone:
@@ -263,13 +263,13 @@ class ObjectRoot(DataRoot):
         relative = inside(relative).strip("/")
         key, state = self._key(relative), self._state
         if "/" not in relative:
-            files = Folders(state).find(key, state.bucket.list(key))
+            files = ObjectFolders(state).find(key, state.bucket.list(key))
         else:
             group, parts = self._group(relative), PurePosixPath(relative).parts
             first = self._key("/".join(parts[:3])) if parts[0] == "media" and len(parts) > 2 else ""
-            files = Folders(state).find(key, state.listing(group), first)
+            files = ObjectFolders(state).find(key, state.listing(group), first)
             if not files and state.is_old(group):
-                files = Folders(state).find(key, state.listing(group, anew=True), first)
+                files = ObjectFolders(state).find(key, state.listing(group, anew=True), first)
         if not files:
             raise FileNotFoundError(2, "there is no such file or folder", self.at(relative))
         return files

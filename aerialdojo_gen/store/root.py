@@ -71,7 +71,7 @@ class DataRoot(ABC):
             There is none of that name.
         """
 
-    def digest_ahead(self, names: Iterable[str]) -> None:  # noqa: B027 - what would cost requests is not asked twice
+    def prefetch_digests(self, names: Iterable[str]) -> None:  # noqa: B027 - what would cost requests is not asked twice
         """Begin to read files whose digests will be asked for, while other things are done, where that helps."""
 
     @abstractmethod
@@ -174,9 +174,9 @@ class LocalRoot(DataRoot):
         path = self._at(relative)
         return files.sha256_of(path) if anew or path.is_dir() else files.file_digest(path)
 
-    def digest_ahead(self, names: Iterable[str]) -> None:
+    def prefetch_digests(self, names: Iterable[str]) -> None:
         """Read files in a thread, for `digest` to find."""
-        files.read_ahead(self._at(name) for name in names)
+        files.prefetch_files(self._at(name) for name in names)
 
     def version(self, relative: str) -> str:
         """Inode, size and times of the file: one that is replaced or written to is another."""

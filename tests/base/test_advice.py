@@ -11,7 +11,7 @@ import pytest
 from typer.main import get_command
 
 import aerialdojo_gen
-from aerialdojo_gen.base import cli_context as advice
+from aerialdojo_gen.base import cli_context
 from aerialdojo_gen.cli import app as cli
 from aerialdojo_gen.store.shards import LAYOUT
 
@@ -47,8 +47,8 @@ def test_every_advised_command_is_one_of_ours_and_has_the_options():
 
 @pytest.mark.parametrize("verb", sorted(COMMANDS))
 def test_a_command_is_given_what_it_takes(verb):
-    with advice.as_given(advice.Given("mine/pipeline.toml", "mine/data")):
-        words = shlex.split(advice.command(verb))
+    with cli_context.use_context(cli_context.CliContext("mine/pipeline.toml", "mine/data")):
+        words = shlex.split(cli_context.command(verb))
     assert {word for word in words if word.startswith("--")} == options(verb) & {"--pipeline", "--data"}
 
 
@@ -73,15 +73,15 @@ def test_no_message_names_a_command_but_by_the_helper():
 
 
 def test_what_is_advised_is_quoted_and_repeats_what_was_given():
-    with advice.as_given(advice.Given("our scenes/$x.toml", "")):
-        text = advice.command("annotate", scene="A'b", port=8000, browser=None, coco=False)
+    with cli_context.use_context(cli_context.CliContext("our scenes/$x.toml", "")):
+        text = cli_context.command("annotate", scene="A'b", port=8000, browser=None, coco=False)
         assert shlex.split(text) == [
             "aerialdojo-gen", "annotate", "--scene", "A'b", "--port", "8000", "--pipeline", "our scenes/$x.toml",
         ]  # fmt: skip
-        assert advice.command("plan", force=True, pipeline="other.toml").endswith(
+        assert cli_context.command("plan", force=True, pipeline="other.toml").endswith(
             "plan --force --pipeline other.toml"
         )
-    assert advice.given().pipeline == ""
+    assert cli_context.given().pipeline == ""
 
 
 def test_only_what_is_written_is_repeated(monkeypatch, capsys):
@@ -94,9 +94,9 @@ def test_only_what_is_written_is_repeated(monkeypatch, capsys):
         monkeypatch.setattr("sys.argv", ["aerialdojo-gen", *arguments])
         with pytest.raises(SystemExit):
             cli.main()
-        assert (advice.given().pipeline, advice.given().data) == kept
+        assert (cli_context.given().pipeline, cli_context.given().data) == kept
     capsys.readouterr()
-    advice.begin()
+    cli_context.begin()
 
 
 def test_the_program_is_called_as_it_was(monkeypatch, tmp_path):
@@ -106,10 +106,10 @@ def test_the_program_is_called_as_it_was(monkeypatch, tmp_path):
     tool.chmod(0o755)
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("PATH", "/nowhere")
-    advice.begin(str(tool))
-    assert advice.command("stats") == ".venv/bin/aerialdojo-gen stats"
+    cli_context.begin(str(tool))
+    assert cli_context.command("stats") == ".venv/bin/aerialdojo-gen stats"
     monkeypatch.setenv("PATH", str(tool.parent))
-    advice.begin(str(tool))
-    assert advice.command("stats") == "aerialdojo-gen stats"
-    advice.begin("pytest")
-    assert advice.command("stats") == "aerialdojo-gen stats"
+    cli_context.begin(str(tool))
+    assert cli_context.command("stats") == "aerialdojo-gen stats"
+    cli_context.begin("pytest")
+    assert cli_context.command("stats") == "aerialdojo-gen stats"

@@ -7,16 +7,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from aerialdojo_gen.base import safe_parse as bounded
+from aerialdojo_gen.base import safe_parse
 from aerialdojo_gen.base.errors import AssetError, BeyondBounds, ConfigError, Malformed, StoreError
 from aerialdojo_gen.base.safe_parse import (
     MAX_DEPTH,
     MAX_INTEGER,
+    exceeds_depth,
     loads_json,
     loads_toml,
     read_json,
     read_toml,
-    too_deep,
 )
 
 HOSTILE_TOML = {
@@ -143,8 +143,8 @@ plain = st.recursive(
 def test_json_within_the_bounds_is_what_the_standard_library_reads(value, ascii_only):
     text = json.dumps(value, ensure_ascii=ascii_only)
     assert loads_json(text) == loads_json(text.encode()) == value
-    bounded.scan_json(text)
-    assert not too_deep(value)
+    safe_parse.scan_json(text)
+    assert not exceeds_depth(value)
 
 
 @given(st.integers(0, 200), st.booleans())
@@ -153,15 +153,15 @@ def test_depth_is_the_same_to_all_that_measure_it(depth, tables):
     for _ in range(depth):
         value = {"a": value} if tables else [value]
     refused = depth > MAX_DEPTH
-    assert (bounded.beyond(value) is not None) == refused
-    assert too_deep(value) == refused
+    assert (safe_parse.find_violation(value) is not None) == refused
+    assert exceeds_depth(value) == refused
     if refused:
         with pytest.raises(BeyondBounds):
             loads_json(json.dumps(value))
         with pytest.raises(BeyondBounds):
-            bounded.scan_json(json.dumps(value))
+            safe_parse.scan_json(json.dumps(value))
     else:
-        bounded.scan_json(json.dumps(value))
+        safe_parse.scan_json(json.dumps(value))
 
 
 beyond = st.sampled_from([2**63, -(2**63) - 1, 10**30, float("inf"), "\ud800", "\0", "x\0", "\udfff"])
@@ -174,13 +174,13 @@ odd = st.sampled_from(["[", "]", "{}", '"', '"]', "\\", "a[0]", "#9e4000", "1e99
 ), st.booleans())  # fmt: skip
 def test_what_a_glance_lets_pass_is_within_the_bounds(value, ascii_only):
     text = json.dumps(value, ensure_ascii=ascii_only).replace("Infinity", "1e999")
-    assert bounded.beyond(json.loads(text)) is None or not bounded._harmless(text)
+    assert safe_parse.find_violation(json.loads(text)) is None or not safe_parse._harmless(text)
 
 
 def test_a_glance_is_enough_for_annotations_and_deep_is_beyond_it(project):
     texts = [path.read_text(encoding="utf-8") for path in sorted(project.glob("annotations/*.json"))]
     assert len(texts) >= 42
-    assert all(map(bounded._harmless, texts))
+    assert all(map(safe_parse._harmless, texts))
     for depth in range(MAX_DEPTH - 2, MAX_DEPTH + 3):
         for text in ("[" * depth + "]" * depth, '{"a":' * (depth - 1) + "{}" + "}" * (depth - 1)):
-            assert depth <= MAX_DEPTH or not bounded._harmless(text)
+            assert depth <= MAX_DEPTH or not safe_parse._harmless(text)

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from aerialdojo_gen.base.terminal import CLOSED_PIPE, shown
 
-COMMAND = [sys.executable, "-m", "aerialdojo_gen.cli.app"]
+COMMAND = [sys.executable, "-m", "aerialdojo_gen.cli"]
 HOSTILE = "a\x1b]0;owned\x07\x1b[2J\x9b2J\u202eb\u2066\rc"
 VISIBLE = "a\\u001b]0;owned\\u0007\\u001b[2J\\u009b2J\\u202eb\\u2066\\u000dc"
 BIDI = "\u061c\u200e\u200f\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069"

@@ -19,7 +19,7 @@ def call(*args, cwd=None, limits=(), **env):
         for what, value in limits:
             resource.setrlimit(what, (value, value))
 
-    command = [sys.executable, "-m", "aerialdojo_gen.cli.app", *args]
+    command = [sys.executable, "-m", "aerialdojo_gen.cli", *args]
     done = subprocess.run(
         command, capture_output=True, env=os.environ | env, cwd=cwd, timeout=300, check=False, preexec_fn=set_limits
     )
@@ -143,7 +143,7 @@ def test_a_disk_that_is_read_only(smoke, tmp_path):
     disk = tmp_path / "disk"
     disk.mkdir()
     script = f'mount --bind {disk} {disk} && mount -o remount,bind,ro {disk} && exec "$@"'
-    command = [sys.executable, "-m", "aerialdojo_gen.cli.app", "export", "--format", "habitat", "--data", str(smoke)]
+    command = [sys.executable, "-m", "aerialdojo_gen.cli", "export", "--format", "habitat", "--data", str(smoke)]
     done = subprocess.run(
         [*unshared("--mount"), "sh", "-c", script, "sh", *command, "--out", str(disk / "out")],
         capture_output=True, text=True, check=False,

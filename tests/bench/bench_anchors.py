@@ -24,8 +24,8 @@ from aerialdojo_gen.base.config.pipeline import load_pipeline
 from aerialdojo_gen.base.rng import generator
 from aerialdojo_gen.geometry.part_visibility import FRONT_RAD
 from aerialdojo_gen.pipeline.scoring.geometric import judge
-from aerialdojo_gen.pipeline.stage import Job, Roots
-from aerialdojo_gen.pipeline.stages.work.anchor_pictures import Looked
+from aerialdojo_gen.pipeline.stage import Job, ProjectPaths
+from aerialdojo_gen.pipeline.stages.work.anchor_pictures import CandidateViews
 from aerialdojo_gen.pipeline.stages.work.anchor_sample import candidates_of
 from aerialdojo_gen.pipeline.stages.work.anchor_world import World
 from aerialdojo_gen.store import shards as store
@@ -38,7 +38,7 @@ MEASURES = ("seen", "framed", "open", "told", "parts", "front")
 
 
 def measures(found, chosen, radius_m, config):
-    looked = Looked.of(found, np.array(chosen), radius_m, config)
+    looked = CandidateViews.of(found, np.array(chosen), radius_m, config)
     for view in looked.pictures(np.arange(len(chosen)), config.picture_px, config.fov_deg):
         terms = judge(view, radius_m, config.standoff_m)
         front = None if view.off_front_rad is None else view.off_front_rad <= FRONT_RAD
@@ -48,7 +48,7 @@ def measures(found, chosen, radius_m, config):
 def scene_figures(name, data, pipeline):
     """(objects, 3 anchors, measures), and the smallest angle between an object's anchors, degrees."""
     config = pipeline.anchor_sample
-    roots = Roots(data, ROOT / "scene_assets", ROOT / "scene_assets/scenes", ROOT / "annotations")
+    roots = ProjectPaths(data, ROOT / "scene_assets", ROOT / "scene_assets/scenes", ROOT / "annotations")
     job = Job("anchor-sample", name, 0, 1, pipeline.seed, pipeline.embodiment, roots)
     world = World.of(job.scene_model(), pipeline.embodiment.radius_m, config.margin_m)
     anchors = job.read("anchors").to_pylist()

@@ -35,7 +35,7 @@ from bench_planner import RADIUS, free_pose, world
 
 from aerialdojo_gen.base.config.pipeline import load_pipeline
 from aerialdojo_gen.base.config.sections import PlanConfig
-from aerialdojo_gen.pipeline.stage import Job, Roots
+from aerialdojo_gen.pipeline.stage import Job, ProjectPaths
 from aerialdojo_gen.pipeline.stages.work import plan
 from aerialdojo_gen.planning.clearance import ClearanceGrid
 from aerialdojo_gen.planning.collision import CollisionWorld
@@ -72,7 +72,7 @@ def made_up(targets: int, starts: int, singles: int) -> Case:
 
 def of_dataset(scene_name: str, data: Path, targets: int, starts: int, singles: int) -> Case:
     pipeline = load_pipeline(ROOT / "pipelines/aerialdojo-200k.toml")
-    job = Job("plan", scene_name, 0, 1, pipeline.seed, pipeline.embodiment, Roots(data, data, data, data))
+    job = Job("plan", scene_name, 0, 1, pipeline.seed, pipeline.embodiment, ProjectPaths(data, data, data, data))
     scene, pairs = job.scene_model(), job.read("pairs").sort_by("pair_id")
     goals, begins = plan._ends(job, pairs)
     which, rng = pairs["target_object_id"].to_numpy(), np.random.default_rng(1)

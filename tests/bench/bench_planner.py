@@ -20,7 +20,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 from support.flying import turned
 from support.handmade import box, instance
 
-from aerialdojo_gen.base.config.sections import PlanConfig, Rung
+from aerialdojo_gen.base.config.sections import PlanConfig, SearchAttempt
 from aerialdojo_gen.planning.certify import certify
 from aerialdojo_gen.planning.clearance import ClearanceGrid
 from aerialdojo_gen.planning.collision import CollisionWorld
@@ -94,7 +94,9 @@ def main() -> None:
     rng = np.random.default_rng(1)
 
     t_field, plans, routes, certificates, whole = [], [], [], [], 0.0
-    exact = Planner(scene, PlanConfig(ladder=(Rung(weight=0.97, budget=400_000, duplicate_cell_m=0.25),)), RADIUS)
+    exact = Planner(
+        scene, PlanConfig(ladder=(SearchAttempt(weight=0.97, budget=400_000, duplicate_cell_m=0.25),)), RADIUS
+    )
     ratios = []
     for _ in range(options.targets):
         goal = free_pose(planner, rng)

@@ -184,7 +184,7 @@ def test_the_command_tells_a_faulty_agent_in_one_line(smoke: Path, tmp_path: Pat
     command = [
         sys.executable,
         "-m",
-        "aerialdojo_gen.cli.app",
+        "aerialdojo_gen.cli",
         "evaluate",
         "--data",
         str(smoke),
@@ -230,7 +230,7 @@ def test_an_agents_own_file_is_named_and_its_traceback_shown_on_demand(
     command = [
         sys.executable,
         "-m",
-        "aerialdojo_gen.cli.app",
+        "aerialdojo_gen.cli",
         "evaluate",
         "--data",
         str(smoke),

@@ -145,7 +145,7 @@ def test_killed_again_and_again_ends_with_the_same_bytes(project, smoke, tmp_pat
     env = os.environ | {"PYTHONPATH": f"{tmp_path}{os.pathsep}{project}"}
     out = tmp_path / "out"
     command = [
-        sys.executable, "-m", "aerialdojo_gen.cli.app", "evaluate", "--data", str(smoke), "--out", str(out), "--run", "r",
+        sys.executable, "-m", "aerialdojo_gen.cli", "evaluate", "--data", str(smoke), "--out", str(out), "--run", "r",
         "--agent", "slowagent:Slow", "--limit", "60", "--pipeline", str(project / "pipelines" / "smoke.toml"),
         "--workers", "1",
     ]  # fmt: skip
@@ -302,7 +302,7 @@ def test_the_command_in_one_line(project, smoke, tmp_path):
         command = [
             sys.executable,
             "-m",
-            "aerialdojo_gen.cli.app",
+            "aerialdojo_gen.cli",
             "evaluate",
             "--data",
             str(smoke),
@@ -330,7 +330,7 @@ def test_the_last_line_has_the_success_rate_and_the_command_for_the_scores(smoke
     command = [
         sys.executable,
         "-m",
-        "aerialdojo_gen.cli.app",
+        "aerialdojo_gen.cli",
         "evaluate",
         "--data",
         smoke,
@@ -345,7 +345,7 @@ def test_the_last_line_has_the_success_rate_and_the_command_for_the_scores(smoke
     assert "evaluate oracle: 5 of 5 episodes finished, success rate 100.0%; 5 flown now" in last
     advised = last.partition("; for all scores: aerialdojo-gen ")[2]
     assert advised == f"report oracle --log {tmp_path} --data {smoke}"
-    shown = [sys.executable, "-m", "aerialdojo_gen.cli.app", *advised.split(), "--json"]
+    shown = [sys.executable, "-m", "aerialdojo_gen.cli", *advised.split(), "--json"]
     told = subprocess.run(shown, capture_output=True, text=True, check=False)
     assert told.returncode == 0, told.stderr
     assert '"oracle"' in told.stdout
@@ -373,7 +373,7 @@ def test_ctrl_c_keeps_what_was_finished_and_ends_the_workers(project, smoke, tmp
     (tmp_path / "slowagent.py").write_text(SLOW.replace("0.01", "0.1"))
     out = tmp_path / "out"
     command = [
-        sys.executable, "-m", "aerialdojo_gen.cli.app", "evaluate", "--data", str(smoke), "--out", str(out), "--run", "r",
+        sys.executable, "-m", "aerialdojo_gen.cli", "evaluate", "--data", str(smoke), "--out", str(out), "--run", "r",
         "--agent", "slowagent:Slow", "--pipeline", str(project / "pipelines" / "smoke.toml"), "--workers", "2",
     ]  # fmt: skip
     env = os.environ | {"PYTHONPATH": f"{tmp_path}{os.pathsep}{project}"}

@@ -16,7 +16,7 @@ from support.llm_server import Act, Cut, Endless, Filtered, Hang, Raw, Say, Stat
 
 from aerialdojo_gen.base.errors import StoreError
 from aerialdojo_gen.benchmark.episodes import read_run
-from aerialdojo_gen.benchmark.runs import conduct, load_runs
+from aerialdojo_gen.benchmark.runs import episode_outcomes, load_runs
 
 KEY = "sk-test-0b7a41dc95e84f2f8c63"
 TURN, STOP, UNREADABLE = '{"thought": "Look.", "action": "TurnLeft15"}', '{"action": "Stop"}', "I am lost."
@@ -27,7 +27,7 @@ def fly(smoke: Path, out: Path, agent: str, url: str, *more: str) -> subprocess.
         "model": "m", "base_url": url + ("/v1" if agent == "openai" else ""), "request_retries": 0, "timeout_s": 20,
         "image_size_px": 32, "input_usd_per_million": 2.0, "output_usd_per_million": 10.0,
     }  # fmt: skip
-    command = [sys.executable, "-m", "aerialdojo_gen.cli.app", "evaluate", "--agent", agent, "--data", str(smoke)]
+    command = [sys.executable, "-m", "aerialdojo_gen.cli", "evaluate", "--agent", agent, "--data", str(smoke)]
     command += ["--out", str(out), "--limit", "2", "--workers", "1", "--modality", "semantic"]
     command += ["--option", "answer=text"]
     for name, value in options.items():
@@ -77,7 +77,7 @@ def test_an_evaluation_logs_what_was_said_and_what_it_cost(smoke: Path, tmp_path
     assert steps["action"].to_pylist() == [14, None, 0] * 2
     assert steps["answer"].to_pylist() == [TURN, UNREADABLE, STOP] * 2
     (run,) = load_runs(tmp_path)
-    assert (conduct(run).invalid, conduct(run).requests) == (2, 8)
+    assert (episode_outcomes(run).invalid, episode_outcomes(run).requests) == (2, 8)
     # Defaults too: how many pictures were sent is in the log.
     used = json.loads(episodes["agent_options"][0].as_py())
     assert (used["history_images"], used["actions"], used["image_size_px"], used["answer"]) == (
@@ -112,7 +112,7 @@ def test_a_failing_service_is_logged_apart_and_its_episodes_flown_again(smoke: P
         last = done.stderr.splitlines()[-1]
         assert last.startswith("error: 1 failed, which count as no episodes: 1 × server error (http://127.0.0.1")
         pasted = last.partition("To fly the failed again: ")[2]
-        assert shlex.split(pasted)[:4] == [sys.executable, "-m", "aerialdojo_gen.cli.app", "evaluate"]
+        assert shlex.split(pasted)[:4] == [sys.executable, "-m", "aerialdojo_gen.cli", "evaluate"]
         for given in (f"--data {smoke}", f"--out {tmp_path}", "--attempts 2", "--option 'model=\"m\"'"):
             assert given in pasted
         again = paste(pasted, tmp_path)

@@ -14,7 +14,7 @@ from support.extended import set_difficulty
 from support.planting import Planted
 from typer.testing import CliRunner
 
-from aerialdojo_gen.benchmark.contents import Wanted, left_out, report_tables
+from aerialdojo_gen.benchmark.contents import ReportRequest, left_out, report_tables
 from aerialdojo_gen.benchmark.difficulty import partings_of
 from aerialdojo_gen.benchmark.profiles import PROFILES
 from aerialdojo_gen.benchmark.runner import Evaluation, evaluate
@@ -73,7 +73,7 @@ def test_every_part_is_the_one_that_a_join_finds(planted: Planted) -> None:
         assert parts.keys() == set(wanted.unique()), name
         for head, mask in parts.items():
             assert mask.tolist() == (wanted == head).tolist(), (name, head)
-    tables = report_tables(Wanted(open_root(planted.data), runs, [AT_3]), ["difficulty", "seen"])
+    tables = report_tables(ReportRequest(open_root(planted.data), runs, [AT_3]), ["difficulty", "seen"])
     assert len(tables) == 9
     heads = {table.title.split(",")[0]: table for table in tables}
     one = heads["Targets that training shows"]
@@ -94,7 +94,7 @@ def test_a_release_without_the_columns_leaves_them_out_and_says_why(planted: Pla
             drop = [name for name in whole.column_names if any(word in name for word in gone)]
             planted.write_table(f"{table}/{side}", whole.drop_columns(drop))
     runs = flown(planted.data)
-    wanted = Wanted(open_root(planted.data), runs, [AT_3])
+    wanted = ReportRequest(open_root(planted.data), runs, [AT_3])
     # Which targets training shows can be counted without the column.
     missing = [*COLUMNS, *SEEN[1:]]
     assert left_out(wanted) == (

@@ -25,7 +25,7 @@ from aerialdojo_gen.benchmark import contents, figures, formats, radar, score_ro
 from aerialdojo_gen.benchmark.grid import BEST, SECOND, Table
 from aerialdojo_gen.benchmark.profiles import PROFILES, Profile
 from aerialdojo_gen.benchmark.report import html, write_report
-from aerialdojo_gen.benchmark.runs import Run, conduct, load_runs
+from aerialdojo_gen.benchmark.runs import Run, episode_outcomes, load_runs
 from aerialdojo_gen.benchmark.scores import summarize
 from aerialdojo_gen.cli import app as cli
 
@@ -61,8 +61,8 @@ def test_runs_are_found_named_and_told_apart(log: Path, tmp_path: Path) -> None:
         load_runs(tmp_path / "nothing")
 
 
-def wanted(runs: list[Run], *profiles: Profile) -> contents.Wanted:
-    return contents.Wanted(Path("no-release"), runs, list(profiles))
+def wanted(runs: list[Run], *profiles: Profile) -> contents.ReportRequest:
+    return contents.ReportRequest(Path("no-release"), runs, list(profiles))
 
 
 def all_tables(runs: list[Run], *profiles: Profile) -> list[Table]:
@@ -126,7 +126,7 @@ def test_what_a_comparison_lacks_is_said_under_the_table(tmp_path: Path) -> None
 
 def test_conduct_counts_ends_and_does_not_add_what_is_not_known(runs: list[Run]) -> None:
     for run in runs:
-        c = conduct(run)
+        c = episode_outcomes(run)
         assert sum(c.ended.values()) == pytest.approx(1.0)
         assert c.ended["collision"] == pytest.approx(run.episodes.collision.mean())
         assert (c.cost_usd is None) == (run.agent != "explorer")
@@ -209,7 +209,7 @@ def test_markdown_and_latex_have_every_cell_and_escape_the_rest(runs: list[Run])
 
 def test_latex_compiles_or_parses(runs: list[Run], tmp_path: Path) -> None:
     labelled = [dataclasses.replace(run, label=f"{NASTY} 50% #{k} ~^[{{}}]") for k, run in enumerate(runs)]
-    made = contents.Wanted(Path("no-release"), labelled, [AT_3, AT_5], (1.0, 3.0, 5.0, 10.0), beside=results())
+    made = contents.ReportRequest(Path("no-release"), labelled, [AT_3, AT_5], (1.0, 3.0, 5.0, 10.0), beside=results())
     text = "\n\n".join(map(formats.as_latex, contents.report_tables(made, ["all"])))
     if compiler := shutil.which("pdflatex"):
         head = "\\documentclass{article}\n\\usepackage[a0paper,landscape]{geometry}\n\\usepackage{booktabs}\n"
@@ -384,7 +384,7 @@ def test_the_command_says_in_one_line_what_is_wrong(log: Path, tmp_path: Path) -
     shutil.copytree(log, tmp_path / "broken")
     shard = next((tmp_path / "broken" / "episodes" / "random").glob("*.parquet"))
     shard.write_bytes(shard.read_bytes()[:100])
-    command = [sys.executable, "-m", "aerialdojo_gen.cli.app", "report", "--data", str(tmp_path / "broken")]
+    command = [sys.executable, "-m", "aerialdojo_gen.cli", "report", "--data", str(tmp_path / "broken")]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr.count("\n")) == (1, 1)
     assert "is damaged" in done.stderr

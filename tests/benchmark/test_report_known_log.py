@@ -281,7 +281,7 @@ def test_intervals_are_scipys_and_the_exact_ones(runs: list[Run]) -> None:
 
 
 def test_tables_are_chosen_by_name(log: Path, runs: list[Run]) -> None:
-    wanted = contents.Wanted(log, runs, [AT_3, AT_5])
+    wanted = contents.ReportRequest(log, runs, [AT_3, AT_5])
     titles = [table.title for table in contents.report_tables(wanted, ["visits", "overall", "visits"])]
     assert titles == ["Overall", "Where visits are lost, 3 m"]
     assert len(contents.report_tables(wanted, ["all"])) == 14

@@ -15,7 +15,7 @@ import pytest
 from support.browser import chromium, errors
 
 from aerialdojo_gen.base.errors import AerialDojoError
-from aerialdojo_gen.benchmark.contents import Wanted
+from aerialdojo_gen.benchmark.contents import ReportRequest
 from aerialdojo_gen.benchmark.episodes import read_run
 from aerialdojo_gen.benchmark.metrics import outcomes
 from aerialdojo_gen.benchmark.profiles import PROFILES
@@ -115,7 +115,7 @@ def test_the_page_works_in_a_browser_and_asks_for_nothing(
 ) -> None:
     shown[0].task["target_name"] = "</h3><script>alert(1)</script>"
     shown[0].flights[1].answers[1] = '</script><img src=x onerror="document.title=1">'
-    wanted = Wanted(smoke, runs, [PROFILES["aerialdojo"], PROFILES["aerialdojo-5m"]])
+    wanted = ReportRequest(smoke, runs, [PROFILES["aerialdojo"], PROFILES["aerialdojo-5m"]])
     page = write_report(tmp_path, wanted, shown)[0]
     text = page.read_text()
     assert text.count("</script>") == 1 + len(shown)

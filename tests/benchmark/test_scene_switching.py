@@ -12,7 +12,7 @@ from aerialdojo_gen.base.errors import UsageError
 from aerialdojo_gen.benchmark.draw import TaskDraw
 from aerialdojo_gen.benchmark.tasks import mesh_of
 from aerialdojo_gen.learning.vector import OwnScenes
-from aerialdojo_gen.scenes.context import context_of, forget_scene, open_contexts, open_scene, read_ahead
+from aerialdojo_gen.scenes.context import context_of, forget_scene, open_contexts, open_scene, prefetch_mesh
 from aerialdojo_gen.scenes.context import release_scenes as let_go
 from aerialdojo_gen.store.root import open_root
 
@@ -134,7 +134,7 @@ def test_what_is_read_ahead_is_taken_up_and_keeps_nobody_waiting(smoke):
     def make(context):
         context.part("slow", lambda: (begun.set(), go_on.wait(60), made.append(context)))
 
-    ahead = threading.Thread(target=read_ahead, args=(*there, make), daemon=True)
+    ahead = threading.Thread(target=prefetch_mesh, args=(*there, make), daemon=True)
     ahead.start()
     assert begun.wait(60)
     worked = threading.Event()

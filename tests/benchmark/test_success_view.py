@@ -19,7 +19,7 @@ from support.walled import SCENE, VIEWPOINTS, walled, write_walled
 
 from aerialdojo_gen.base.errors import StoreError, UsageError
 from aerialdojo_gen.base.safe_parse import loads_json
-from aerialdojo_gen.benchmark.contents import Wanted, report_tables
+from aerialdojo_gen.benchmark.contents import ReportRequest, report_tables
 from aerialdojo_gen.benchmark.episodes import read_run
 from aerialdojo_gen.benchmark.profiles import PROFILES
 from aerialdojo_gen.benchmark.runner import Evaluation, evaluate
@@ -149,7 +149,7 @@ def test_a_release_without_viewpoints_has_no_such_rate_and_says_so_once(
     assert said == ["the release has no viewpoints/, which an older version did not write: SR-view stays empty"]
     rows = read_run(data, "r")
     assert [rows[name].null_count for name in NEW] == [3, 3, 3, 0]
-    (overall,) = report_tables(Wanted(open_root(data), load_runs(data), [AT_3]), ["overall"])
+    (overall,) = report_tables(ReportRequest(open_root(data), load_runs(data), [AT_3]), ["overall"])
     assert "SR-view ↑" not in overall.groups[1][1]
     assert any(note.startswith("No SR-view of stop: flown by an older version or on a") for note in overall.notes)
 
@@ -189,7 +189,7 @@ def test_relations_hold_on_real_episodes(viewed_smoke: Path) -> None:
 
 def test_the_report_has_it_beside_sr_with_intervals(viewed_smoke: Path) -> None:
     runs = load_runs(viewed_smoke, ["random", "constant"])
-    wanted = Wanted(open_root(viewed_smoke), runs, [AT_3, AT_5])
+    wanted = ReportRequest(open_root(viewed_smoke), runs, [AT_3, AT_5])
     for table in report_tables(wanted, ["overall", "results", "family", "goal", "difficulty"]):
         heads = [head for _, names in table.groups for head in names if head in ("SR ↑", "SR-view ↑")]
         assert heads.count("SR-view ↑") == heads.count("SR ↑")
@@ -215,7 +215,7 @@ def test_a_log_of_an_older_version_is_reported_beside_a_new_one(viewed_smoke: Pa
     for path in (tmp_path / "episodes" / "random").glob("*.parquet"):
         without_columns(path, NEW)
     runs = load_runs(tmp_path, ["random", "constant"])
-    (overall,) = report_tables(Wanted(open_root(tmp_path), runs, [AT_3]), ["overall"])
+    (overall,) = report_tables(ReportRequest(open_root(tmp_path), runs, [AT_3]), ["overall"])
     at = overall.groups[1][1].index("SR-view ↑") + 1
     cells = dict(overall.rows)
     assert cells["random"][at] == "–"

@@ -14,7 +14,7 @@ from aerialdojo_gen.base.errors import UsageError
 from aerialdojo_gen.benchmark import AerialDojoEnv
 from aerialdojo_gen.benchmark.agents import AgentBase
 from aerialdojo_gen.benchmark.agents.goal import BLIND, Goal, Heading, Observation, Rules
-from aerialdojo_gen.benchmark.contents import Wanted, report_tables
+from aerialdojo_gen.benchmark.contents import ReportRequest, report_tables
 from aerialdojo_gen.benchmark.episodes import read_run
 from aerialdojo_gen.benchmark.llm.prompt import Sight, goal_text, system_prompt
 from aerialdojo_gen.benchmark.profiles import PROFILES
@@ -85,7 +85,7 @@ def test_it_is_told_where_it_is_asked_for_and_logged(court: Path, tmp_path: Path
     assert read_run(tmp_path, "told")["told"].to_pylist() == ["heading"] * 3
     runs = load_runs(tmp_path, ["plain", "told"])
     assert [run.label for run in runs] == [ME, f"{ME} + heading"]
-    (overall,) = report_tables(Wanted(open_root(court), runs, [PROFILES["aerialdojo"]]), ["overall"])
+    (overall,) = report_tables(ReportRequest(open_root(court), runs, [PROFILES["aerialdojo"]]), ["overall"])
     assert f"Told more than the goal: {ME} + heading (heading)." in overall.notes
     told = {line.split(",")[0]: line.split(",")[-1] for line in as_csv(runs, [PROFILES["aerialdojo"]]).splitlines()}
     assert told == {"run": "told", "plain": "", "told": "heading"}

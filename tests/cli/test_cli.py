@@ -17,7 +17,7 @@ HEAVY = ("numpy", "pyarrow", "numba", "fcl", "pybullet", "trimesh", "cv2", "scip
 
 
 def call(*args, **env):
-    command = [sys.executable, "-m", "aerialdojo_gen.cli.app", *args]
+    command = [sys.executable, "-m", "aerialdojo_gen.cli", *args]
     return subprocess.run(command, capture_output=True, text=True, env=os.environ | env, timeout=120, check=False)
 
 

@@ -30,7 +30,7 @@ from aerialdojo_gen.scenes.recipe import load_imported, load_recipe
 from aerialdojo_gen.scenes.terrain import rolling_terrain
 from aerialdojo_gen.store.root import open_root
 from aerialdojo_gen.studio.annotate.server import make_app
-from aerialdojo_gen.studio.annotate.session import open_desk
+from aerialdojo_gen.studio.annotate.session import open_session
 
 COURT = {"layout": "courtyard", "size_m": [30, 30], "ceiling_m": 12, "parameters": {"things": []}}
 POST = {"name": "post", "roles": {"body": "#808080"}, "params": {"h": 2}}
@@ -52,7 +52,7 @@ def test_a_command_names_the_place_in_a_pipeline_that_no_parser_survives(tmp_pat
     command = [
         sys.executable,
         "-m",
-        "aerialdojo_gen.cli.app",
+        "aerialdojo_gen.cli",
         "plan",
         "--pipeline",
         str(path),
@@ -231,7 +231,7 @@ def test_every_recipe_and_prop_of_ours_lies_within_the_bounds(project):
 
 def test_annotations_with_half_characters_are_refused_by_the_server_and_never_shown(project, tmp_path):
     pipeline, roots = open_pipeline(annotating.yard_pipeline(project, tmp_path), tmp_path / "data")
-    desk = open_desk(YARD, pipeline, roots)
+    desk = open_session(YARD, pipeline, roots)
     client = TestClient(make_app(desk), base_url="http://127.0.0.1", raise_server_exceptions=False)
     good = desk.storage.path.read_text()
     version = client.get("/api/document").json()["version"]

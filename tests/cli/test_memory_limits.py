@@ -29,7 +29,7 @@ def arguments(verb, data, tmp_path):
 
 
 def run(verb, data, tmp_path, mb):
-    command = [sys.executable, "-m", "aerialdojo_gen.cli.app", *map(str, arguments(verb, data, tmp_path))]
+    command = [sys.executable, "-m", "aerialdojo_gen.cli", *map(str, arguments(verb, data, tmp_path))]
     return subprocess.run(
         command, capture_output=True, text=True, timeout=600, check=False,
         preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (mb << 20, mb << 20)),

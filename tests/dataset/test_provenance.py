@@ -67,7 +67,7 @@ def test_another_pipeline_is_refused_at_once_and_nothing_is_lost(data, pipeline,
     file = str(pipeline())
     command = [verb, file] if verb == "run" else [verb, "--pipeline", file]
     done = subprocess.run(
-        [sys.executable, "-m", "aerialdojo_gen.cli.app", *command, "--data", str(data)],
+        [sys.executable, "-m", "aerialdojo_gen.cli", *command, "--data", str(data)],
         capture_output=True, text=True, check=False,
     )  # fmt: skip
     assert done.returncode == 2

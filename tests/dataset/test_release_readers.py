@@ -259,7 +259,7 @@ def test_stats_of_a_broken_release_names_every_fault_and_shows_no_table(broken):
     remove(broken)
     truncate(broken)
     done = subprocess.run(
-        [sys.executable, "-m", "aerialdojo_gen.cli.app", "stats", "--data", str(broken)],
+        [sys.executable, "-m", "aerialdojo_gen.cli", "stats", "--data", str(broken)],
         capture_output=True, text=True, check=False,
     )  # fmt: skip
     assert done.returncode == 1

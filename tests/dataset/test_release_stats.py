@@ -272,7 +272,7 @@ def test_a_release_that_does_not_say_has_no_such_tables(smoke):
 
 
 def stats(*arguments):
-    command = [sys.executable, "-m", "aerialdojo_gen.cli.app", "stats", *map(str, arguments)]
+    command = [sys.executable, "-m", "aerialdojo_gen.cli", "stats", *map(str, arguments)]
     return subprocess.run(command, capture_output=True, text=True, check=False)
 
 

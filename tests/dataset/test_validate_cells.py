@@ -7,7 +7,7 @@ import pytest
 from support.planting import check, definitions
 
 from aerialdojo_gen.dataset.contents import SHARDS
-from aerialdojo_gen.dataset.validate import Asked, validate
+from aerialdojo_gen.dataset.validate import ValidationOptions, validate
 from aerialdojo_gen.dataset.validate.parts import read_tables, release_of
 from aerialdojo_gen.store import shards as store
 
@@ -52,7 +52,7 @@ def test_every_cell_is_held_to_something(planted, key):
             row[field.name] = other(row[field.name], field.type)
             wanted[field.name] = {names(planted, key, r) for r in (before, row)}
         planted.write(key, rows)
-        asked = Asked(planted.release, (planted.scene,), sample=sample, pipeline=definitions())
+        asked = ValidationOptions(planted.release, (planted.scene,), sample=sample, pipeline=definitions())
         faults = validate(asked).faults
         named = {fault.key for fault in faults if fault.table == spec.name}
         untold = {name for name, keys in wanted.items() if not keys & named}

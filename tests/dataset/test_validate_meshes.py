@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from support.planting import check, definitions
 
-from aerialdojo_gen.dataset.validate import Asked, validate
+from aerialdojo_gen.dataset.validate import ValidationOptions, validate
 
 OBJECTS, SCENES = "release/objects", "release/scenes"
 
@@ -36,7 +36,7 @@ def test_a_mesh_that_is_not_there(planted):
 def test_meshes_that_lie_elsewhere(planted, tmp_path):
     elsewhere = tmp_path / "elsewhere"
     (planted.data / "meshes").rename(elsewhere)
-    report = validate(Asked(planted.release, (planted.scene,), meshes=elsewhere, pipeline=definitions()))
+    report = validate(ValidationOptions(planted.release, (planted.scene,), meshes=elsewhere, pipeline=definitions()))
     assert not report.faults
     assert not [o for o in report.outcomes if o.skipped and "mesh" in o.skipped]
     assert next(o.rows for o in report.outcomes if o.check == "oracle_fails") == sum(

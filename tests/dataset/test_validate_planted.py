@@ -8,7 +8,7 @@ import pytest
 from support.planting import check, definitions, edit_mesh, poses, refly, rename, retell
 
 from aerialdojo_gen.base.config.pipeline import Pipeline
-from aerialdojo_gen.dataset.validate import Asked, validate
+from aerialdojo_gen.dataset.validate import ValidationOptions, validate
 from aerialdojo_gen.dataset.validate.detours import _pieces
 from aerialdojo_gen.pipeline.stages.work.task_ids import key_of, nav_id
 from aerialdojo_gen.store.schemas import APPROACH
@@ -54,7 +54,7 @@ def test_pictures_swapped_or_copied(planted, renderer):
         )  # fmt: skip
     drawn = definitions().reference_images.model_copy(update={"renderer": renderer})
     pipeline = definitions().model_copy(update={"reference_images": drawn})
-    report = validate(Asked(planted.release, (planted.scene,), pipeline=pipeline))
+    report = validate(ValidationOptions(planted.release, (planted.scene,), pipeline=pipeline))
     told = {fault.key: fault.found for fault in report.faults}
     assert {fault.check for fault in report.faults} == {"image_redrawn"}
     assert told == {
@@ -82,7 +82,7 @@ def test_pictures_swapped_or_copied(planted, renderer):
 def test_a_picture_that_was_changed(planted, change, found_by, words):
     object_id = sorted(pictured(planted))[1]
     repaint(planted, object_id, change)
-    report = validate(Asked(planted.release, (planted.scene,), pipeline=definitions()))
+    report = validate(ValidationOptions(planted.release, (planted.scene,), pipeline=definitions()))
     found = [(fault.check, fault.key) for fault in report.faults if fault.check != "image_box"]
     # A smaller picture is too small for its box as well.
     assert found == [(found_by, f"object_id={object_id}")]
@@ -91,7 +91,7 @@ def test_a_picture_that_was_changed(planted, change, found_by, words):
 
 def test_a_sample_of_pictures_is_drawn_anew(planted):
     def judged(**options):
-        report = validate(Asked(planted.release, (planted.scene,), pipeline=definitions(), **options))
+        report = validate(ValidationOptions(planted.release, (planted.scene,), pipeline=definitions(), **options))
         return next(outcome.rows for outcome in report.outcomes if outcome.check == "image_redrawn")
 
     assert [judged(pictures=n) for n in (0, 2, None)] == [0, 2, len(pictured(planted))]

@@ -186,7 +186,7 @@ def test_splits_and_path_of_the_whole(planted, monkeypatch):
 
 
 def run(*args):
-    command = [sys.executable, "-m", "aerialdojo_gen.cli.app", "validate", *map(str, args), "--pipeline", str(SMOKE)]
+    command = [sys.executable, "-m", "aerialdojo_gen.cli", "validate", *map(str, args), "--pipeline", str(SMOKE)]
     wide = os.environ | {"COLUMNS": "120"}
     return subprocess.run(command, capture_output=True, text=True, timeout=300, check=False, env=wide)
 

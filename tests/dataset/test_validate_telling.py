@@ -5,7 +5,7 @@ import math
 import pytest
 from support.planting import check, definitions
 
-from aerialdojo_gen.dataset.validate import Asked, validate
+from aerialdojo_gen.dataset.validate import ValidationOptions, validate
 
 OBJECTS, ANCHORS, VIEWPOINTS = "release/objects", "release/anchors", "release/viewpoints"
 
@@ -47,7 +47,7 @@ def test_a_picture_that_says_what_is_not_so(planted, values, found_by):
 
 def test_a_part_that_is_shown_and_told_as_missing(planted):
     row = first(planted, OBJECTS, lambda row: row["tells_shown"] == 1.0)
-    report = validate(Asked(planted.release, (planted.scene,), pipeline=definitions()))
+    report = validate(ValidationOptions(planted.release, (planted.scene,), pipeline=definitions()))
     warned = {w.key for w in report.warnings if w.check == "image_tells"}
     assert warned == {
         f"object_id={row['object_id']}" for row in planted.rows(OBJECTS) if row["tells_missing"] is not None
@@ -66,7 +66,7 @@ def test_a_camera_behind_a_wall(planted):
         x, y = a["x_m"] - far * math.cos(a["yaw_rad"]), a["y_m"] - far * math.sin(a["yaw_rad"])
         change(planted, OBJECTS, row, ["object_id"], reference_x_m=x, reference_y_m=y, step_back_m=far)
         blocked.append(row["object_id"])
-    report = validate(Asked(planted.release, (planted.scene,), pipeline=definitions()))
+    report = validate(ValidationOptions(planted.release, (planted.scene,), pipeline=definitions()))
     told = [fault for fault in report.faults if fault.check == "image_pose"]
     assert told
     assert all("between the anchor and the camera" in fault.found for fault in told)

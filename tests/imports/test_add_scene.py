@@ -15,7 +15,7 @@ from aerialdojo_gen.base.errors import AnnotationError, AssetError, StoreError, 
 from aerialdojo_gen.cli.common import open_pipeline, run_until
 from aerialdojo_gen.imports.command import add_scene
 from aerialdojo_gen.imports.files import look_over_glb, read_mesh
-from aerialdojo_gen.imports.import_mesh import adopt
+from aerialdojo_gen.imports.import_mesh import import_mesh
 from aerialdojo_gen.imports.raw import RawNode, plain
 from aerialdojo_gen.imports.three_ds import read_3ds
 from aerialdojo_gen.scenes.colour_names import colour_name
@@ -50,7 +50,7 @@ def village(tmp_path_factory) -> Path:
 @pytest.mark.slow
 @pytest.mark.parametrize("suffix", ["glb", "obj", "stl", "ply", "3ds"])
 def test_every_format_gives_the_same_nine_bodies(village, suffix):
-    scene, _ = adopt("Village", read_mesh(village / f"village.{suffix}"))
+    scene, _ = import_mesh("Village", read_mesh(village / f"village.{suffix}"))
     assert len(things(scene)) == 9
     ground = [i for i in scene.instances if i.category == "ground"]
     assert len(ground) == 1
@@ -62,33 +62,33 @@ def test_every_format_gives_the_same_nine_bodies(village, suffix):
 
 
 def test_names_and_colours_come_along(village):
-    scene, _ = adopt("Village", read_mesh(village / "village.glb"))
+    scene, _ = import_mesh("Village", read_mesh(village / "village.glb"))
     assert sorted({i.category for i in things(scene)}) == ["clock_tower", "house"]
     assert {i.attributes["colour"] for i in things(scene) if i.category == "house"} == {"red", "blue", "green"}
-    painted, _ = adopt("Village", read_mesh(village / "village.3ds"))
+    painted, _ = import_mesh("Village", read_mesh(village / "village.3ds"))
     assert {i.attributes["colour"] for i in things(painted)} == {"blue"}
 
 
 def test_axes_and_units():
     box = trimesh.creation.box((2000, 300, 1000))
-    scene, _ = adopt("Box", [raw(box)], up="y", scale=0.01)
+    scene, _ = import_mesh("Box", [raw(box)], up="y", scale=0.01)
     (body,) = things(scene)
     np.testing.assert_allclose(body.bounds[1] - body.bounds[0], [20, 10, 3], atol=1e-4)
     with pytest.raises(UsageError, match=r"--up 'x'"):
-        adopt("Box", [raw(box)], up="x")
+        import_mesh("Box", [raw(box)], up="x")
     with pytest.raises(UsageError, match="--scale"):
-        adopt("Box", [raw(box)], scale=float("nan"))
+        import_mesh("Box", [raw(box)], scale=float("nan"))
 
 
 def test_what_is_inside_out_is_turned_and_what_is_open_is_there_from_both_sides():
     closed = trimesh.creation.box((10, 10, 4))
     closed.invert()
-    scene, repairs = adopt("Box", [raw(closed)])
+    scene, repairs = import_mesh("Box", [raw(closed)])
     (body,) = things(scene)
     assert trimesh.Trimesh(body.vertices, body.faces).volume == pytest.approx(400, rel=1e-4)
     assert any("inside out" in line for line in repairs.lines)
     open_box = trimesh.Trimesh(closed.vertices, closed.faces[2:], process=False)
-    scene, _ = adopt("Box", [raw(open_box)])
+    scene, _ = import_mesh("Box", [raw(open_box)])
     assert sum(len(i.faces) for i in things(scene)) == len(open_box.faces)
     assert all(scene.materials[p.material].double_sided for i in things(scene) for p in i.parts)
 
@@ -97,7 +97,7 @@ def test_what_has_no_place_is_dropped_and_said():
     box = trimesh.creation.box((10, 10, 4))
     vertices = np.vstack([box.vertices, [[np.nan, 0, 0], [np.inf, 1, 1]]])
     faces = np.vstack([box.faces, [[8, 0, 1], [9, 0, 1], [0, 0, 1]]])
-    scene, repairs = adopt("Box", [RawNode("", vertices, faces, plain(len(faces)))])
+    scene, repairs = import_mesh("Box", [RawNode("", vertices, faces, plain(len(faces)))])
     assert np.isfinite(np.concatenate([i.vertices for i in scene.instances])).all()
     assert sum(len(i.faces) for i in things(scene)) == 12
     text = "\n".join(repairs.lines)
@@ -109,7 +109,7 @@ def test_nothing_left_is_an_error():
     empty = RawNode("", np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64), plain(0))
     for node in (empty, RawNode("", np.full((3, 3), np.nan), np.array([[0, 1, 2]]), plain(1))):
         with pytest.raises(AssetError, match="empty or degenerate"):
-            adopt("Nothing", [node])
+            import_mesh("Nothing", [node])
 
 
 def test_a_million_degenerate_triangles_take_bounded_memory():
@@ -121,7 +121,7 @@ def test_a_million_degenerate_triangles_take_bounded_memory():
     faces = np.vstack([np.column_stack([np.arange(n), np.arange(n), np.arange(n)]), box.faces + n])
     node = RawNode("", vertices, faces, plain(len(faces)))
     tracemalloc.start()
-    scene, repairs = adopt("Slivers", [node])
+    scene, repairs = import_mesh("Slivers", [node])
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert sum(len(i.faces) for i in things(scene)) == 12
@@ -132,15 +132,15 @@ def test_a_million_degenerate_triangles_take_bounded_memory():
 @pytest.mark.parametrize(("edge", "word"), [(40_000.0, "too large"), (0.5, "too small")])
 def test_an_extent_that_cannot_be_metres(edge, word):
     with pytest.raises(AssetError, match=rf"{word}.*--scale"):
-        adopt("Odd", [raw(trimesh.creation.box((edge, edge, edge / 10)))])
+        import_mesh("Odd", [raw(trimesh.creation.box((edge, edge, edge / 10)))])
 
 
 def test_a_part_can_be_kept(village):
     nodes = read_mesh(village / "village.glb")
-    scene, _ = adopt("Village", nodes, crop_m=(0.0, 0.0, 12.0))
+    scene, _ = import_mesh("Village", nodes, crop_m=(0.0, 0.0, 12.0))
     assert 1 < len(things(scene)) < 9
     with pytest.raises(AssetError, match="nothing of the mesh lies there"):
-        adopt("Village", nodes, crop_m=(900.0, 900.0, 5.0))
+        import_mesh("Village", nodes, crop_m=(900.0, 900.0, 5.0))
 
 
 def test_a_glb_that_asks_for_terabytes_is_refused_before_it_gets_them(tmp_path):
@@ -204,10 +204,10 @@ def test_a_file_reads_nothing_outside_its_folder(tmp_path):
     folder.mkdir()
     box = trimesh.creation.box((10, 10, 5)).export(file_type="obj", include_normals=False)
     (folder / "box.obj").write_text("mtllib ../secret.mtl\nusemtl wall\n" + box)
-    outside, _ = adopt("Box", read_mesh(folder / "box.obj"))
+    outside, _ = import_mesh("Box", read_mesh(folder / "box.obj"))
     (folder / "secret.mtl").write_text(secret.read_text())
     (folder / "box.obj").write_text("mtllib secret.mtl\nusemtl wall\n" + box)
-    inside, _ = adopt("Box", read_mesh(folder / "box.obj"))
+    inside, _ = import_mesh("Box", read_mesh(folder / "box.obj"))
     assert things(inside)[0].attributes["colour"] == "red"
     assert things(outside)[0].attributes["colour"] != "red"
 
@@ -252,7 +252,7 @@ def test_helsinki_up_to_planned_tasks(tmp_path):
 
 @pytest.mark.pipeline
 def test_the_monastery_up_to_planned_tasks(tmp_path):
-    whole, _ = adopt("Monastery", read_mesh(foreign.monastery()), up="y")
+    whole, _ = import_mesh("Monastery", read_mesh(foreign.monastery()), up="y")
     assert whole.n_triangles > 100_000
     # The middle of it: drafting asks every one of its 1,400 bodies for viewpoints, and 32 m of it take three minutes.
     added, verdicts = planned(tmp_path, "Monastery", foreign.monastery(), 4, up="y", crop_m=(-7.0, 1.0, 14.0))
@@ -297,7 +297,7 @@ def test_the_same_file_gives_the_same_bytes_in_whatever_order_its_nodes_come(vil
         file.parent.mkdir()
         file.write_bytes(reordered(glb, order))
         # What was two bodies is one node of two materials, and no category is made of a reader's random digits.
-        scene, _ = adopt("Village", read_mesh(file))
+        scene, _ = import_mesh("Village", read_mesh(file))
         assert len(things(scene)) == 8
         assert {i.category for i in things(scene)} <= {"clock_tower", "house"}
         added = add_scene("Village", file, tmp_path / f"project{k}", up="z")

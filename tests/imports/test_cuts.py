@@ -17,7 +17,7 @@ from support.hills import hills, standing, write_hills
 from aerialdojo_gen.base.errors import AssetError, UsageError
 from aerialdojo_gen.imports.command import add_scene, add_tiles
 from aerialdojo_gen.imports.cutting import _GRID_M, Region, cut
-from aerialdojo_gen.imports.import_mesh import Place, adopt
+from aerialdojo_gen.imports.import_mesh import Place, import_mesh
 from aerialdojo_gen.imports.listing import guess
 from aerialdojo_gen.imports.raw import RawNode, plain
 from aerialdojo_gen.scenes.glb import read_glb
@@ -97,7 +97,7 @@ def test_a_crop_cuts_triangles_of_one_large_object_and_closes_its_houses():
         ({"crop_m": (70.0, 80.0, 40.0)}, Region.circle(70, 80, 40)),
         ({"box_m": (110.0, 131.5, 60.0, 44.0)}, Region.box(60, 44, 110, 131.5)),
     ):
-        scene, repairs = adopt("City", nodes, **options)
+        scene, repairs = import_mesh("City", nodes, **options)
         origin = np.array(repairs.origin_m)
         for thing in scene.instances:
             if thing.category != "ground":
@@ -115,15 +115,15 @@ def test_a_part_without_anything_says_what_lies_where():
     with pytest.raises(
         AssetError, match=r"--crop 900 900 5: nothing of the mesh lies there: x is -5 to 185, y -5 to"
     ):
-        adopt("City", nodes, crop_m=(900.0, 900.0, 5.0))
+        import_mesh("City", nodes, crop_m=(900.0, 900.0, 5.0))
     with pytest.raises(
         AssetError, match=r"too large to plan in.*--box X0 Y0 X1 Y1.*--tiles 200.*x is -250 to 9250, y"
     ):
-        adopt("City", nodes, scale=50.0)
+        import_mesh("City", nodes, scale=50.0)
     for wrong in ({"crop_m": (0.0, 0.0, -5.0)}, {"box_m": (0.0, 0.0, 0.0, 9.0)}, {"crop_m": (0.0, float("nan"), 5.0)},
                   {"crop_m": (0.0, 0.0, 9.0), "box_m": (0.0, 0.0, 9.0, 9.0)}):  # fmt: skip
         with pytest.raises(UsageError, match=r"--crop|--box"):
-            adopt("City", nodes, **wrong)
+            import_mesh("City", nodes, **wrong)
 
 
 def test_tiles_lie_side_by_side_in_one_frame(tmp_path):

@@ -14,10 +14,10 @@ from support import foreign
 from support.command_line import said
 
 from aerialdojo_gen.annotations.describing import Vocabulary
-from aerialdojo_gen.annotations.draft import Choice, Drafter
+from aerialdojo_gen.annotations.draft import AnnotationDrafter, Choice
 from aerialdojo_gen.annotations.grammatical_number import group_of
 from aerialdojo_gen.annotations.landmarks import choose_landmarks
-from aerialdojo_gen.imports.import_mesh import adopt
+from aerialdojo_gen.imports.import_mesh import import_mesh
 from aerialdojo_gen.imports.naming import words_in
 from aerialdojo_gen.imports.raw import RawNode, plain
 from aerialdojo_gen.scenes.catalogue import load_catalogue
@@ -195,9 +195,9 @@ def test_what_cannot_be_told_apart_says_with_what_it_is_confused(project):
     for name, body, place in (("Tower", box(5, 5, 20), (0, 0, 10)), *crates):
         faces = np.asarray(body.faces, np.int64)
         nodes.append(RawNode(name, np.asarray(body.vertices) + place, faces, plain(len(faces))))
-    adopted, _ = adopt("Stack", nodes)
+    adopted, _ = import_mesh("Stack", nodes)
     vocabulary = Vocabulary(dataclasses.replace(adopted, imported=True), load_catalogue(project / "scene_assets"))
-    drafter = Drafter(vocabulary, choose_landmarks(vocabulary, 1), 0, Choice(most=30))
+    drafter = AnnotationDrafter(vocabulary, choose_landmarks(vocabulary, 1), 0, Choice(most=30))
     chosen = []
     made = drafter.objects(9, lambda: chosen.append(1))
     assert len(chosen) == len(made) < 9

@@ -19,10 +19,10 @@ from aerialdojo_gen.base.shipped import home
 from aerialdojo_gen.geometry.ground import Ground
 from aerialdojo_gen.imports.command import add_scene
 from aerialdojo_gen.imports.files import read_mesh
-from aerialdojo_gen.imports.import_mesh import adopt
-from aerialdojo_gen.imports.naming import Called, Naming
+from aerialdojo_gen.imports.import_mesh import import_mesh
+from aerialdojo_gen.imports.naming import Naming, NodeName
 from aerialdojo_gen.imports.raw import RawNode, RawSurface, no_corners, plain
-from aerialdojo_gen.imports.split_components import taken_apart
+from aerialdojo_gen.imports.split_components import split_components
 from aerialdojo_gen.planning.clearance import ClearanceGrid
 from aerialdojo_gen.planning.collision import CollisionWorld
 from aerialdojo_gen.scenes.catalogue import load_catalogue
@@ -48,11 +48,11 @@ def yard() -> list[RawNode]:
 @pytest.mark.parametrize("kind", ["ball", "half", "box"])
 @pytest.mark.parametrize("name", ["SkyDome", "Sphere.001", ""])
 def test_a_dome_is_drawn_and_never_in_the_way(kind, name, tmp_path):
-    scene, repairs = adopt("Yard", [*yard(), raw(dome(kind), name)])
+    scene, repairs = import_mesh("Yard", [*yard(), raw(dome(kind), name)])
     assert [b.surface for b in scene.backdrop] == ["dome"]
     assert "sky_0000" not in scene
     assert any("sky_0000: drawn as the sky" in line for line in repairs.lines)
-    plain_scene, _ = adopt("Yard", yard())
+    plain_scene, _ = import_mesh("Yard", yard())
     # All else is as if it were not there: extent, ceiling, what may be hit.
     np.testing.assert_array_equal(scene.bounds, plain_scene.bounds)
     assert [i.node for i in scene.instances] == [i.node for i in plain_scene.instances]
@@ -72,12 +72,12 @@ def test_what_encloses_and_is_no_sky_stays():
     hall = trimesh.creation.box((70, 40, 18)).apply_translation([18, 0, 9])
     greenhouse = trimesh.creation.icosphere(3, 60.0).slice_plane([0, 0, -1e-3], [0, 0, 1])
     for body, name in ((hall, "Hall"), (hall, ""), (greenhouse, "Greenhouse")):
-        scene, _ = adopt("Yard", [*yard(), raw(body, name)])
+        scene, _ = import_mesh("Yard", [*yard(), raw(body, name)])
         assert not scene.backdrop
     # A table has the last word, either way.
-    sky, shed = (Naming((("X*", Called(category, {})),)) for category in ("sky", "greenhouse"))
-    assert adopt("Yard", [*yard(), raw(greenhouse, "X1")], naming=sky)[0].backdrop
-    assert not adopt("Yard", [*yard(), raw(greenhouse, "X1")], naming=shed)[0].backdrop
+    sky, shed = (Naming((("X*", NodeName(category, {})),)) for category in ("sky", "greenhouse"))
+    assert import_mesh("Yard", [*yard(), raw(greenhouse, "X1")], naming=sky)[0].backdrop
+    assert not import_mesh("Yard", [*yard(), raw(greenhouse, "X1")], naming=shed)[0].backdrop
 
 
 @settings(max_examples=8, deadline=None)
@@ -85,7 +85,7 @@ def test_what_encloses_and_is_no_sky_stays():
 def test_the_ground_that_is_stored_is_the_ground_by_form(seed, relief_m, turned):
     field = hills(seed, cells=14, relief_m=relief_m)
     nodes = [raw(field.mesh(turned), "Mesh.007"), *(raw(b) for b in standing(field, 3, seed))]
-    scene, repairs = adopt("Hills", nodes)
+    scene, repairs = import_mesh("Hills", nodes)
     assert sorted(i.surface for i in scene.instances) == ["ground", "solid", "solid", "solid"]
     assert any(line.startswith("nobody flies below the open ground") for line in repairs.lines)
     ground = Ground.of(scene)
@@ -104,9 +104,9 @@ def test_terrain_by_name_is_ground_where_its_form_leaves_it_open():
     field = hills(5, cells=16, relief_m=5.0)
     patch = field.mesh().apply_translation([0, 0, 2.0])
     yard_ = trimesh.creation.box(bounds=[[-60, -60, -0.5], [60, 60, 0]])
-    scene, _ = adopt("Patch", [raw(patch, "Terrain"), raw(yard_, "Yard")])
+    scene, _ = import_mesh("Patch", [raw(patch, "Terrain"), raw(yard_, "Yard")])
     assert {i.category: i.surface for i in scene.instances} == {"terrain": "ground", "yard": "solid"}
-    nameless, _ = adopt("Patch", [raw(patch, "Awning"), raw(yard_, "Yard")])
+    nameless, _ = import_mesh("Patch", [raw(patch, "Awning"), raw(yard_, "Yard")])
     assert {i.category: i.surface for i in nameless.instances} == {"awning": "sheet", "yard": "solid"}
 
 
@@ -132,14 +132,14 @@ def scan(seed: int) -> tuple[RawNode, list[np.ndarray]]:
 @pytest.mark.parametrize("seed", [0, 1, 2])
 def test_what_stands_out_of_one_surface_becomes_things(seed):
     node, places = scan(seed)
-    bodies, told = taken_apart([node])
+    bodies, told = split_components([node])
     assert told.grown == len(places)
     assert len(bodies) == 1 + len(places)
     assert sum(len(b.faces) for b in bodies) == len(node.faces)
     middles = [(b.vertices.min(axis=0) + b.vertices.max(axis=0))[:2] / 2 for b in bodies[1:]]
     for place in places:
         assert min(np.abs(m - place).max() for m in middles) < 2.0
-    scene, repairs = adopt("Scan", [node])
+    scene, repairs = import_mesh("Scan", [node])
     assert any(line.startswith("9 things were one surface with the ground") for line in repairs.lines)
     # What was one surface with the ground has nothing below it either, and nobody flies into a house from below.
     ground, origin = Ground.of(scene), np.array(repairs.origin_m)
@@ -150,7 +150,7 @@ def test_what_stands_out_of_one_surface_becomes_things(seed):
 
 def test_bare_hills_are_not_taken_apart():
     field = hills(7, cells=30, relief_m=14.0)
-    bodies, told = taken_apart([raw(field.mesh())])
+    bodies, told = split_components([raw(field.mesh())])
     assert (len(bodies), told.grown) == (1, 0)
 
 
@@ -166,11 +166,11 @@ def test_a_fence_does_not_swallow_what_it_stands_around_and_a_house_has_its_chim
     tower = trimesh.creation.box(bounds=[[60, 10, 0], [66, 16, 20]])
     hatch = trimesh.creation.box(bounds=[[62, 12, 20], [63, 13, 20.2]])
     soup = trimesh.util.concatenate([ring, house, roof, tower, hatch])
-    bodies, told = taken_apart([raw(soup)])
+    bodies, told = split_components([raw(soup)])
     assert told.pieces == 5
     sizes = sorted(len(b.faces) for b in bodies)
     assert sizes == sorted([len(ring.faces), 12, 12, 24])
-    assert len(taken_apart([raw(fence, "Fence"), raw(house, "House")])[0]) == 2
+    assert len(split_components([raw(fence, "Fence"), raw(house, "House")])[0]) == 2
 
 
 def terrace() -> tuple[np.ndarray, np.ndarray]:
@@ -192,7 +192,7 @@ def test_wide_bodies_of_several_colours_or_textures_fall_apart_by_material(by):
         paint[1][::2], paint[1][1::2] = (220, 60, 60), (180, 20, 20)
         surfaces = tuple(RawSurface(f"m{k}", (200, 40, 40), picture) for k, picture in enumerate(paint))
         node = replace(node, surface=turns.astype(np.int32), corners=no_corners(len(turns)), surfaces=surfaces)
-    bodies, _ = taken_apart([node])
+    bodies, _ = split_components([node])
     assert 8 <= len(bodies) <= 16
     assert sum(len(b.faces) for b in bodies) == 96
     assert by == "colour" or all(len(np.unique(b.surface)) == 1 for b in bodies)
@@ -208,7 +208,7 @@ def test_nodes_in_any_order_make_the_same_bytes(tmp_path_factory, random):
     nodes += [RawNode("Hut.9", np.full((3, 3), np.nan), np.array([[0, 1, 2]]), plain(1))]
     made = []
     for order in (list(range(len(nodes))), random.sample(range(len(nodes)), len(nodes))):
-        scene, repairs = adopt("Hills", [nodes[k] for k in order], crop_m=(12.0, 12.0, 10.0))
+        scene, repairs = import_mesh("Hills", [nodes[k] for k in order], crop_m=(12.0, 12.0, 10.0))
         write_glb(scene, folder / "x.glb")
         made.append(((folder / "x.glb").read_bytes(), repairs))
     assert made[0] == made[1]
@@ -285,7 +285,7 @@ def test_the_ground_of_a_scan_without_a_name_is_nothing_to_look_for():
         [np.column_stack([cell, cell + 1, cell + 122]), np.column_stack([cell, cell + 122, cell + 121])]
     )
     scan = RawNode("Mesh_0", np.column_stack([x.ravel(), y.ravel(), z.ravel()]), faces, plain(len(faces)))
-    scene, _ = adopt("Scan", [scan])
+    scene, _ = import_mesh("Scan", [scan])
     wide = [i for i in scene.instances if np.ptp(i.bounds, axis=0)[:2].min() > 100.0]
     assert [(i.category, i.surface) for i in wide] == [("terrain", "ground")]
     # What stands on it stays: three blocks, each to be found.

@@ -16,7 +16,7 @@ from aerialdojo_gen.base.errors import AssetError, UsageError
 from aerialdojo_gen.base.image_size import image_size
 from aerialdojo_gen.geometry.cameras import Camera, look_at_pose
 from aerialdojo_gen.imports.files import read_into, read_mesh, unpacked
-from aerialdojo_gen.imports.import_mesh import adopt
+from aerialdojo_gen.imports.import_mesh import import_mesh
 from aerialdojo_gen.imports.pictures import Paint, surfaces_of
 from aerialdojo_gen.imports.raw import RawNode
 from aerialdojo_gen.rendering.checks import Solid
@@ -51,7 +51,7 @@ def thing(scene: Scene, category: str):
 def yard(tmp_path_factory) -> Scene:
     folder = tmp_path_factory.mktemp("yard")
     nodes = nodes_of(textured.yard(folder / "yard.glb"), folder / "nodes.npz")
-    return stored(adopt("Yard", nodes, light="sun")[0], folder / "scene.glb")
+    return stored(import_mesh("Yard", nodes, light="sun")[0], folder / "scene.glb")
 
 
 @pytest.fixture(scope="module")
@@ -64,7 +64,7 @@ def board(tmp_path_factory) -> Scene:
     ground = np.array([[-30.0, -30, 0], [30, -30, 0], [30, 30, 0], [-30, 30, 0]])
     out.node("Ground", ground, textured.WALL_FACES, out.material(factor=[0.2, 0.25, 0.15, 1]))
     nodes = nodes_of(out.write(folder / "board.glb"), folder / "nodes.npz")
-    return stored(adopt("Board", nodes, light="baked")[0], folder / "scene.glb")
+    return stored(import_mesh("Board", nodes, light="baked")[0], folder / "scene.glb")
 
 
 @pytest.mark.parametrize("renderer", RENDERERS)
@@ -171,7 +171,7 @@ def test_a_scene_comes_back_from_its_file_to_the_bit_and_twice_the_same(tmp_path
     digests = set()
     for k in range(2):
         path = textured.yard(tmp_path / f"{k}.glb")
-        scene, _ = adopt("Yard", nodes_of(path, tmp_path / f"{k}.npz"), light="auto")
+        scene, _ = import_mesh("Yard", nodes_of(path, tmp_path / f"{k}.npz"), light="auto")
         back = stored(scene, tmp_path / f"scene{k}.glb")
         digests.add(hashlib.sha256((tmp_path / f"scene{k}.glb").read_bytes()).hexdigest())
         write_glb(back, tmp_path / "again.glb")
@@ -194,7 +194,7 @@ def test_a_scene_comes_back_from_its_file_to_the_bit_and_twice_the_same(tmp_path
 
 def test_a_scan_keeps_its_jpeg_and_is_drawn_as_it_is(tmp_path):
     path = textured.scan(tmp_path / "scan.obj")
-    scene, repairs = adopt("Scan", nodes_of(path, tmp_path / "nodes.npz"))
+    scene, repairs = import_mesh("Scan", nodes_of(path, tmp_path / "nodes.npz"))
     (material,) = [m for m in scene.materials.values() if m.texture is not None]
     assert material.jpeg == (tmp_path / "scan.jpg").read_bytes()
     assert material.unlit
@@ -213,7 +213,7 @@ def test_a_scans_jpeg_is_taken_as_it_is_stored_however_the_camera_was_held(tmp_p
     exif = b"Exif\0\0" + tiff
     turned = turned[:2] + b"\xff\xe1" + (2 + len(exif)).to_bytes(2, "big") + exif + turned[2:]
     (tmp_path / "scan.jpg").write_bytes(turned)
-    scene, _ = adopt("Scan", nodes_of(path, tmp_path / "nodes.npz"))
+    scene, _ = import_mesh("Scan", nodes_of(path, tmp_path / "nodes.npz"))
     (mine,) = [m.texture for m in scene.materials.values() if m.texture is not None]
     (theirs,) = [m.texture for m in stored(scene, tmp_path / "s.glb").materials.values() if m.texture is not None]
     assert mine.shape == (64, 128, 3)
@@ -224,7 +224,7 @@ def test_a_scans_jpeg_is_taken_as_it_is_stored_however_the_camera_was_held(tmp_p
 def test_a_scene_that_asks_for_gigabytes_of_pixels_is_refused(kind, tmp_path, monkeypatch):
     """Scenes come from the Hub too: neither may a file of another kind pass for a small PNG."""
     path = textured.scan(tmp_path / "scan.obj", cells=8, texture_px=64)
-    scene, _ = adopt("Scan", nodes_of(path, tmp_path / "nodes.npz"))
+    scene, _ = import_mesh("Scan", nodes_of(path, tmp_path / "nodes.npz"))
     write_glb(scene, tmp_path / "s.glb")
     whole, jpeg = (tmp_path / "s.glb").read_bytes(), (tmp_path / "scan.jpg").read_bytes()
     if kind == "jpeg":
@@ -246,7 +246,7 @@ def test_a_scene_that_asks_for_gigabytes_of_pixels_is_refused(kind, tmp_path, mo
 
 def test_textures_keep_to_their_budget_and_it_is_told(tmp_path):
     path = textured.scan(tmp_path / "scan.obj", texture_px=512)
-    scene, repairs = adopt("Scan", nodes_of(path, tmp_path / "nodes.npz", texture_px=128))
+    scene, repairs = import_mesh("Scan", nodes_of(path, tmp_path / "nodes.npz", texture_px=128))
     (material,) = [m for m in scene.materials.values() if m.texture is not None]
     assert material.texture is not None
     assert material.texture.shape == (128, 128, 3)
@@ -256,11 +256,11 @@ def test_textures_keep_to_their_budget_and_it_is_told(tmp_path):
 def test_a_missing_texture_is_told(tmp_path):
     path = textured.scan(tmp_path / "scan.obj")
     (tmp_path / "scan.jpg").unlink()
-    scene, repairs = adopt("Scan", nodes_of(path, tmp_path / "nodes.npz"))
+    scene, repairs = import_mesh("Scan", nodes_of(path, tmp_path / "nodes.npz"))
     assert all(m.texture is None for m in scene.materials.values())
     assert any("scan.jpg" in line for line in repairs.lines)
     path.with_suffix(".mtl").unlink()
-    _, repairs = adopt("Scan", nodes_of(path, tmp_path / "nodes.npz"))
+    _, repairs = import_mesh("Scan", nodes_of(path, tmp_path / "nodes.npz"))
     assert any("scan.mtl" in line for line in repairs.lines)
 
 
@@ -302,7 +302,7 @@ def test_files_elsewhere_are_not_read(tmp_path):
     path = textured.scan(tmp_path / "in" / "scan.obj")
     (tmp_path / "in" / "scan.jpg").rename(tmp_path / "scan.jpg")
     path.with_suffix(".mtl").write_text("newmtl atlas\nmap_Kd ../scan.jpg\n")
-    _, repairs = adopt("Scan", nodes_of(path, tmp_path / "nodes.npz"))
+    _, repairs = import_mesh("Scan", nodes_of(path, tmp_path / "nodes.npz"))
     assert any("../scan.jpg is not there" in line for line in repairs.lines)
 
 
@@ -312,7 +312,7 @@ def test_ply_keeps_the_colours_of_its_vertices(tmp_path):
     paint = np.column_stack([255 * height, 80 * np.ones_like(height), 255 * (1 - height)])
     body.visual.vertex_colors = np.rint(paint).astype(np.uint8)
     body.export(tmp_path / "ball.ply")
-    scene, _ = adopt("Ball", nodes_of(tmp_path / "ball.ply", tmp_path / "nodes.npz"))
+    scene, _ = import_mesh("Ball", nodes_of(tmp_path / "ball.ply", tmp_path / "nodes.npz"))
     (part,) = next(i for i in scene.instances if i.category != "ground").parts
     assert part.colours is not None
     high = part.vertices[:, 2] / np.ptp(part.vertices[:, 2])
@@ -369,7 +369,7 @@ def test_sizes_of_pictures_are_told_without_decoding():
 def test_only_known_lights_are_taken(tmp_path):
     nodes = read_mesh(textured.scan(tmp_path / "scan.obj", cells=8))
     with pytest.raises(UsageError, match="--light 'moon'"):
-        adopt("Scan", nodes, light="moon")
+        import_mesh("Scan", nodes, light="moon")
 
 
 _DAE = """<?xml version="1.0"?>

@@ -125,7 +125,7 @@ def test_a_reader_that_is_killed_says_by_what(tmp_path, verb, number, words):
         path.write_text(OBJ)
     module = {"mesh": "aerialdojo_gen.imports.files", "map": "aerialdojo_gen.imports.osm"}[verb]
     arguments = map(str, command(verb, path, tmp_path))
-    running = subprocess.Popen([sys.executable, "-m", "aerialdojo_gen.cli.app", *arguments], stderr=subprocess.PIPE)
+    running = subprocess.Popen([sys.executable, "-m", "aerialdojo_gen.cli", *arguments], stderr=subprocess.PIPE)
     os.kill(_child(running, module), number)
     err = running.communicate(timeout=120)[1].decode()
     assert running.returncode == 1

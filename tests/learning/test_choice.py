@@ -44,7 +44,7 @@ def flown(root, network, sensors, index, k, led):
         seen = network.features(torch.from_numpy(pictures(part, pose)), goal, step)
         guess, memory = network.whereabouts(seen, goal, torch.from_numpy(reckoning.odometry[None, None]), memory)
         if led:
-            guess = guess.led(torch.from_numpy(offsets(pose, index.goal[k : k + 1]))[None])
+            guess = guess.with_goal_offset(torch.from_numpy(offsets(pose, index.goal[k : k + 1]))[None])
         action = int(network.choose(seen, guess).actions(torch.from_numpy(reckoning.back[None, None]))[0, 0])
         episode.step(action)
         reckoning.add(action, episode.refused)

@@ -101,7 +101,7 @@ def test_killed_while_it_learns_to_see_it_goes_on_and_ends_the_same(smoke, cache
     file, out = tmp_path / "own.toml", tmp_path / "out"
     file.write_text(TEXT % 12)
     command = [
-        sys.executable, "-m", "aerialdojo_gen.cli.app", "train", str(file), "--data", str(smoke), "--out", str(out),
+        sys.executable, "-m", "aerialdojo_gen.cli", "train", str(file), "--data", str(smoke), "--out", str(out),
         "--cache", str(cache), "--workers", "1",
     ]  # fmt: skip
     with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE) as process:
@@ -138,7 +138,7 @@ class Beacon:
         assert pictures.shape == (2, 32, 32, 4)
 
     def towards(self, odometry, remaining):
-        Beacon.led += 1
+        Beacon.with_goal_offset += 1
         return np.array([1.0, 0.5, 0.0], np.float32)
 
 
@@ -159,9 +159,9 @@ def test_the_search_leads_where_the_place_is_not_known_and_nowhere_else(smoke, t
     assert rows
     if lost:
         assert all(row["n_actions"] == 1 and row["termination"] == "stop" for row in rows)
-        assert Beacon.led == Beacon.looked == len(rows)
+        assert Beacon.with_goal_offset == Beacon.looked == len(rows)
     else:
-        assert Beacon.led == 0
+        assert Beacon.with_goal_offset == 0
         assert Beacon.looked == 0
         assert any(row["n_actions"] > 1 for row in rows)
 
@@ -193,7 +193,7 @@ def test_a_guess_that_is_led_is_where_it_was_led_to(trained):
         guess, _ = network.whereabouts(seen, goal, torch.zeros(2, 3, 4), network.blank(2))
         assert ((guess.scene_nats >= 0.0) & (guess.scene_nats <= np.log(max(guess.scene.shape[-1], 2)))).all()
         away_m = torch.tensor([3.0, -4.0, 1.0]).expand(2, 3, 3)
-        led = guess.led(away_m)
+        led = guess.with_goal_offset(away_m)
         assert torch.allclose(led.offset * UNIT_M, away_m)
         one, two = (network.choose(seen, one).logits for one in (guess, led))
         assert not torch.allclose(one, two)

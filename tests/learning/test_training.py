@@ -41,7 +41,7 @@ from aerialdojo_gen.store.schemas import STOP
 torch = pytest.importorskip("torch", reason="PyTorch is not installed: it is the extra 'train'")
 
 from aerialdojo_gen.learning import checkpoints  # noqa: E402 - it needs torch
-from aerialdojo_gen.learning.localization import astray  # noqa: E402
+from aerialdojo_gen.learning.localization import pose_loss  # noqa: E402
 from aerialdojo_gen.learning.policy import Policy, network_of  # noqa: E402
 from aerialdojo_gen.learning.training import train  # noqa: E402
 
@@ -121,7 +121,7 @@ def test_killed_and_gone_on_with_it_ends_with_the_same_weights(smoke, cache, lea
     assert load_recipe(file) == short
     broken = tmp_path / "broken"
     command = [
-        sys.executable, "-m", "aerialdojo_gen.cli.app", "train", str(file), "--data", str(smoke), "--out", str(broken),
+        sys.executable, "-m", "aerialdojo_gen.cli", "train", str(file), "--data", str(smoke), "--out", str(broken),
         "--cache", str(cache), "--device", "cpu", "--workers", "1",
     ]  # fmt: skip
     with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE) as process:
@@ -273,7 +273,7 @@ def test_a_map_is_learned_from_looks_about_too(smoke, cache, tmp_path):
             seen = network.look(torch.from_numpy(np.array(found.frames)).flatten(0, 1)).reshape(200, -1)
             place, heading, scene, _ = network.whereabouts.found(seen)
         pose, number = torch.from_numpy(found.pose), torch.zeros(200, dtype=torch.int64)
-        loss[looks] += float(astray(place, heading, scene, pose, number))
+        loss[looks] += float(pose_loss(place, heading, scene, pose, number))
     assert loss[300] < loss[0]
 
 
@@ -399,7 +399,7 @@ def test_without_torch_there_is_one_line(smoke, tmp_path):
     env = os.environ | {"PYTHONPATH": os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")])}
     file = tmp_path / "recipe.toml"
     file.write_text('name = "small"\n')
-    command = [sys.executable, "-m", "aerialdojo_gen.cli.app", "train", str(file), "--data", str(smoke)]
+    command = [sys.executable, "-m", "aerialdojo_gen.cli", "train", str(file), "--data", str(smoke)]
     done = subprocess.run(command, capture_output=True, text=True, env=env, check=False)
     assert done.returncode == 1
     assert done.stderr == "error: train lacks the package torch: pip install 'aerialdojo-gen[train]'\n"

@@ -10,7 +10,14 @@ from aerialdojo_gen.learning.encoding import Reckoning
 
 torch = pytest.importorskip("torch", reason="PyTorch is not installed: it is the extra 'train'")
 
-from aerialdojo_gen.learning.localization import UNIT_M, Guess, Whereabouts, directions, missed, places  # noqa: E402
+from aerialdojo_gen.learning.localization import (  # noqa: E402
+    UNIT_M,
+    Localization,
+    LocalizationOutput,
+    directions,
+    offset_loss,
+    places,
+)
 from aerialdojo_gen.learning.network import Network, Shape  # noqa: E402 - it needs torch
 
 T, SCENES = 9, 3
@@ -73,7 +80,7 @@ def scene_logits(number=1):
 
 def guessing(place, yaw, goal, trust):
     """Make whereabouts that guess this at every step."""
-    made = Whereabouts(4, 4, 4, SCENES)
+    made = Localization(4, 4, 4, SCENES)
     made.body = Known(torch.cat([place_logits(place), heading_logits(yaw), scene_logits(), trust], dim=-1))
     made.target = Known(place_logits(goal))
     return made
@@ -132,17 +139,17 @@ def test_one_sure_look_is_remembered_through_steps_that_know_nothing(flight):
 def test_the_loss_falls_only_where_each_guess_is_right(flight):
     """No logits have a smaller loss than those of the truth: each guess moved off it costs more."""
     place, yaw, goal = truth(flight)
-    right = Guess(
+    right = LocalizationOutput(
         flight["offset"] / UNIT_M, place_logits(place), heading_logits(yaw), scene_logits(), place_logits(goal),
     )  # fmt: skip
-    least = float(missed(right, flight))
-    assert float(missed(right._replace(offset=right.offset + 0.5), flight)) == pytest.approx(least + 0.125)
+    least = float(offset_loss(right, flight))
+    assert float(offset_loss(right._replace(offset=right.offset + 0.5), flight)) == pytest.approx(least + 0.125)
     wrong = {
         "place": place_logits(place + 3.0), "goal": place_logits(goal - 3.0), "heading": heading_logits(yaw + 0.5),
         "scene": scene_logits(2),
     }  # fmt: skip
     for name, logits in wrong.items():
-        assert float(missed(right._replace(**{name: logits}), flight)) > least + 1.0, name
+        assert float(offset_loss(right._replace(**{name: logits}), flight)) > least + 1.0, name
 
 
 @pytest.fixture(scope="module")
@@ -284,7 +291,7 @@ def test_of_likely_actions_it_takes_one_that_is_free(episode):
 def test_the_goal_knows_no_more_of_the_pictures_than_the_scene(flight):
     """Other pictures, taken for the same scene, put the goal at the same place."""
     torch.manual_seed(4)
-    made = Whereabouts(6, 5, 16, SCENES).eval()
+    made = Localization(6, 5, 16, SCENES).eval()
     seen, goal = torch.randn(2, T, 6), torch.randn(1, 5).expand(2, 5)
     with torch.no_grad():
         made.body[2].bias[164 + 24 + 1] += 60.0

@@ -11,7 +11,7 @@ from aerialdojo_gen.base.config.sections import AnchorSampleConfig, Embodiment
 from aerialdojo_gen.base.errors import AnnotationError, StoreError
 from aerialdojo_gen.geometry.angles import wrap_angle_rad
 from aerialdojo_gen.geometry.viewpoints import shortlist
-from aerialdojo_gen.pipeline.stage import Job, Roots
+from aerialdojo_gen.pipeline.stage import Job, ProjectPaths
 from aerialdojo_gen.pipeline.stages.work import anchor_sample
 from aerialdojo_gen.pipeline.stages.work.anchor_choice import is_same
 from aerialdojo_gen.pipeline.stages.work.anchor_sample import World, anchors_of
@@ -25,7 +25,9 @@ RADIUS = Embodiment().radius_m
 
 
 def job(tmp_path, seed=0):
-    return Job("anchor-sample", "U_Test_0", 0, 1, seed, Embodiment(), Roots(tmp_path, tmp_path, tmp_path, tmp_path))
+    return Job(
+        "anchor-sample", "U_Test_0", 0, 1, seed, Embodiment(), ProjectPaths(tmp_path, tmp_path, tmp_path, tmp_path)
+    )
 
 
 def item(thing, object_id=0):

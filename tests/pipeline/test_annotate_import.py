@@ -14,7 +14,7 @@ from aerialdojo_gen.annotations.format import Anchor, Landmark, format_annotatio
 from aerialdojo_gen.base.config.sections import AnnotateImportConfig, Embodiment
 from aerialdojo_gen.base.errors import AnnotationError, UsageError
 from aerialdojo_gen.base.paper_figures import paper_counts
-from aerialdojo_gen.pipeline.stage import Job, Roots
+from aerialdojo_gen.pipeline.stage import Job, ProjectPaths
 from aerialdojo_gen.pipeline.stages.work import annotate_import
 from aerialdojo_gen.scenes.model import Scene
 from aerialdojo_gen.store.schemas import LANDMARKS, OBJECTS
@@ -32,7 +32,7 @@ class _StreetJob(Job):
 
 def _job(tmp_path, text):
     (tmp_path / "U_Street_0.json").write_text(text, encoding="utf-8")
-    roots = Roots(tmp_path, ROOT / "scene_assets", tmp_path, tmp_path)
+    roots = ProjectPaths(tmp_path, ROOT / "scene_assets", tmp_path, tmp_path)
     return _StreetJob("annotate-import", "U_Street_0", 0, 1, 0, Embodiment(), roots)
 
 

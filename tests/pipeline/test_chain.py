@@ -11,9 +11,9 @@ from support import chores
 
 from aerialdojo_gen.base.config.pipeline import load_pipeline
 from aerialdojo_gen.dataset.build import open_pipeline
-from aerialdojo_gen.pipeline.chain import Chain
+from aerialdojo_gen.pipeline.chain import SceneScheduler
 from aerialdojo_gen.pipeline.executors import make_executor
-from aerialdojo_gen.pipeline.expectation import Expectation
+from aerialdojo_gen.pipeline.expectation import RuntimeEstimate
 from aerialdojo_gen.pipeline.freshness import Limits
 from aerialdojo_gen.pipeline.progress import Reporter
 from aerialdojo_gen.pipeline.registry import BY_NAME, STAGES
@@ -43,9 +43,9 @@ def test_a_process_takes_a_scene_through_the_stages(project, smoke, tmp_path):
         shutil.rmtree(data / table)
     config, roots = open_pipeline(load_pipeline(project / "pipelines" / "smoke.toml"), data)
     stages = [BY_NAME[name] for name in TABLES]
-    known = Expectation(stages, SCENES, roots)
+    known = RuntimeEstimate(stages, SCENES, roots)
     expected_s = known.left_s
-    chain = Chain(stages, SCENES, config, roots, (), Limits(), Reporter(quiet=True), known)
+    chain = SceneScheduler(stages, SCENES, config, roots, (), Limits(), Reporter(quiet=True), known)
     with make_executor("local", 2) as pool:
         outcomes = list(pool.run(chores.compute_and_sign, chain))
     assert not chain.errors
@@ -71,7 +71,7 @@ def run(project, data, pipeline, *args, verb="run"):
     command = [
         sys.executable,
         "-m",
-        "aerialdojo_gen.cli.app",
+        "aerialdojo_gen.cli",
         verb,
         *where,
         "--data",
@@ -119,12 +119,12 @@ def test_a_scene_that_fails_stops_alone(project, smoke, tmp_path):
 def test_what_is_left_follows_what_was_done(project, tmp_path):
     _, roots = open_pipeline(load_pipeline(project / "pipelines" / "aerialdojo-200k.toml"), tmp_path)
     stages, scenes = [BY_NAME["build-scenes"], BY_NAME["plan"]], ["U_Mall_0", "U_Park_0"]
-    known = Expectation(stages, scenes, roots)
+    known = RuntimeEstimate(stages, scenes, roots)
     # A scene with nine times as many objects takes longer, as its annotations tell before there is a table.
     assert known.left("plan", "U_Mall_0") > 3 * known.left("plan", "U_Park_0")
     before = known.left("plan", "U_Park_0"), known.left("build-scenes", "U_Park_0")
     # Half of a scene took ten times what was expected: the rest and other scenes do as well, other stages less so.
-    known.took("plan", "U_Mall_0", 0.5, 5.0 * known.left("plan", "U_Mall_0"))
+    known.record("plan", "U_Mall_0", 0.5, 5.0 * known.left("plan", "U_Mall_0"))
     assert 5.0 < known.left("plan", "U_Park_0") / before[0] < 10.0
     assert 1.0 < known.left("build-scenes", "U_Park_0") / before[1] < 10.0
     known.drop("plan", "U_Park_0")

@@ -249,7 +249,7 @@ def test_what_is_idle_is_not_imported(project, smoke, tmp_path):
     for stage in ("anchor-sample", "reference-images"):
         idle = BY_NAME[stage].idle(SECTIONS[stage](**({"renderer": "gl"} if stage == "reference-images" else {})))
         told = subprocess.run(
-            [sys.executable, "-m", "aerialdojo_gen.cli.app", stage, "U_Courtyard_0", "--pipeline", "pipelines/smoke.toml",
+            [sys.executable, "-m", "aerialdojo_gen.cli", stage, "U_Courtyard_0", "--pipeline", "pipelines/smoke.toml",
              "--data", str(data), "--force", "--workers", "1"],
             cwd=project, env=python, capture_output=True, text=True, check=True,
         )  # fmt: skip

@@ -13,7 +13,7 @@ from support import chores, preload
 from support.chores import Chore
 
 from aerialdojo_gen.base.errors import AerialDojoError, MissingPackage, UsageError
-from aerialdojo_gen.pipeline.executors import Folders, Talk, make_executor
+from aerialdojo_gen.pipeline.executors import ParentChannel, SharedPaths, make_executor
 
 TESTS = Path(__file__).resolve().parents[1]
 RAY = pytest.param("ray", marks=pytest.mark.ray)
@@ -23,7 +23,7 @@ RAY = pytest.param("ray", marks=pytest.mark.ray)
 def ray_pool(tmp_path_factory):
     os.environ["AERIALDOJO_TRIED"] = "forwarded"
     data = tmp_path_factory.mktemp("ray-data")
-    with make_executor("ray", 2, None, Folders((data,), (), (data,))) as pool:
+    with make_executor("ray", 2, None, SharedPaths((data,), (), (data,))) as pool:
         yield pool
     del os.environ["AERIALDOJO_TRIED"]
     assert not list(data.rglob("*")), "the marker is gone with the executor"
@@ -106,17 +106,17 @@ def test_expected_errors_are_results_and_defects_end_it(pool, tmp_path):
 
 def test_workers_tell_while_they_work_and_stop_when_they_are_asked(pool, tmp_path):
     heard = []
-    assert sum(pool.map(chores.talk, tasks(tmp_path, 4), talk=Talk(heard.append, lambda: False))) == 12
+    assert sum(pool.map(chores.talk, tasks(tmp_path, 4), talk=ParentChannel(heard.append, lambda: False))) == 12
     assert sorted(heard) == [(n, k) for n in range(4) for k in range(3)]
     heard.clear()
     # They end by themselves once both have been heard.
-    talk = Talk(heard.append, lambda: len(heard) == 2)
+    talk = ParentChannel(heard.append, lambda: len(heard) == 2)
     done = list(pool.map(chores.go_on_until_stopped, tasks(tmp_path, 2), talk=talk))
     assert sorted(done) == sorted(heard) == [0, 1]
 
 
 def test_turns_are_given_out_over_all_processes(pool, tmp_path):
-    talk = Talk(print, lambda: False)
+    talk = ParentChannel(print, lambda: False)
     waits = [wait_s for one in pool.map(chores.take_turns, tasks(tmp_path, 3), talk=talk) for wait_s in one]
     # Six turns, a thousand seconds apart; how much of them is over when one is taken does not matter.
     assert sorted(round(w / 1000.0) for w in waits) == [0, 1, 2, 3, 4, 5]

@@ -13,9 +13,9 @@ from aerialdojo_gen.geometry.cameras import Camera, view_pose
 from aerialdojo_gen.geometry.part_visibility import in_picture
 from aerialdojo_gen.geometry.rays import instance_caster
 from aerialdojo_gen.geometry.viewpoints import shortlist
-from aerialdojo_gen.pipeline.scoring.ensemble import panel
+from aerialdojo_gen.pipeline.scoring.ensemble import scorer_ensemble
 from aerialdojo_gen.pipeline.scoring.views import part_shares
-from aerialdojo_gen.pipeline.stages.work.anchor_pictures import Looked, best_pictured
+from aerialdojo_gen.pipeline.stages.work.anchor_pictures import CandidateViews, best_pictured
 from aerialdojo_gen.pipeline.stages.work.anchor_sample import candidates_of
 from aerialdojo_gen.pipeline.stages.work.anchor_world import Candidates
 from aerialdojo_gen.pipeline.stages.work.camera_pullback import fitting_m, step_back_m, steps_back_m
@@ -104,7 +104,7 @@ def test_candidates_that_are_moved_are_what_they_are_where_they_are_moved_to(fou
 
 
 def test_no_picture_scores_more_than_its_bound_and_the_best_are_those_of_all_pictures(found):
-    looked = Looked.of(found, found.seeing(CONFIG.min_visible_fraction), RADIUS, CONFIG)
+    looked = CandidateViews.of(found, found.seeing(CONFIG.min_visible_fraction), RADIUS, CONFIG)
     away = found.positions_m - found.world.scene.instances[found.instance].centroid
     turn = np.arctan2(away[:, 1], away[:, 0])[looked.which]
     front, apart = found.before_front[looked.which], math.radians(CONFIG.separation_deg)
@@ -112,7 +112,7 @@ def test_no_picture_scores_more_than_its_bound_and_the_best_are_those_of_all_pic
     for first in range(0, len(looked.which) - 6, 3):
         few = np.arange(first, first + 6)
         views = looked.pictures(few, CONFIG.picture_px, CONFIG.fov_deg)
-        verdicts = panel(CONFIG, RADIUS).judge("kiosk", views)
+        verdicts = scorer_ensemble(CONFIG, RADIUS).judge("kiosk", views)
         score = np.array([verdict.score for verdict in verdicts])
         assert all(s <= looked.most(int(n), RADIUS, CONFIG.standoff_m) for n, s in zip(few, score, strict=True))
         counted = CountedPictures(looked)
@@ -128,7 +128,7 @@ def test_no_picture_scores_more_than_its_bound_and_the_best_are_those_of_all_pic
 class CountedPictures:
     """Candidates that count the pictures taken of them."""
 
-    def __init__(self, looked: Looked) -> None:
+    def __init__(self, looked: CandidateViews) -> None:
         self._looked, self.taken = looked, 0
 
     def __getattr__(self, name):

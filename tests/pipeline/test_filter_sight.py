@@ -7,7 +7,7 @@ import pytest
 from support.walled import SCENE, VIEWPOINTS, filled, walled, write_walled
 
 from aerialdojo_gen.base.config.sections import Embodiment, FilterConfig
-from aerialdojo_gen.pipeline.stage import Job, Roots
+from aerialdojo_gen.pipeline.stage import Job, ProjectPaths
 from aerialdojo_gen.pipeline.stages.work.filter import run
 from aerialdojo_gen.rendering.sight import all_in_sight, in_sight
 from aerialdojo_gen.store import shards as store
@@ -53,7 +53,7 @@ def data(tmp_path):
 
 
 def test_a_stop_behind_a_wall_or_over_a_roof_makes_no_task(data):
-    job = Job("filter", SCENE, 0, 1, 0, Embodiment(), Roots(data, data, data, data))
+    job = Job("filter", SCENE, 0, 1, 0, Embodiment(), ProjectPaths(data, data, data, data))
     made = run(job, FilterConfig())
     reasons = dict(zip(*(made.tables["verdicts"][name].to_pylist() for name in ("pair_id", "reason")), strict=True))
     hidden = {"behind", "above", "behind, no Approach", "above, no Approach"}

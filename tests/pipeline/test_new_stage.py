@@ -47,7 +47,7 @@ def replaced(path, old, new):
 
 
 def call(checkout, *args):
-    command = [sys.executable, "-m", "aerialdojo_gen.cli.app", *args]
+    command = [sys.executable, "-m", "aerialdojo_gen.cli", *args]
     env = os.environ | {"PYTHONPATH": str(checkout), "COLUMNS": "200"}
     done = subprocess.run(command, cwd=checkout, env=env, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr

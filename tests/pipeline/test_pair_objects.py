@@ -11,7 +11,7 @@ from support.handmade import OPINIONS, box, instance, scene
 
 from aerialdojo_gen.base.config.sections import Embodiment, PairObjectsConfig
 from aerialdojo_gen.base.errors import StoreError
-from aerialdojo_gen.pipeline.stage import Job, Roots
+from aerialdojo_gen.pipeline.stage import Job, ProjectPaths
 from aerialdojo_gen.pipeline.stages.work import pair_objects
 from aerialdojo_gen.scenes.glb import write_glb
 from aerialdojo_gen.store import schemas
@@ -73,7 +73,7 @@ def pair(data: Path, rows, config=None, others=()):
     config = config or PairObjectsConfig()
     store.write_shard(data, "anchors", SCENE, 0, from_rows(schemas.ANCHORS, rows))
     things(data, rows, *others)
-    job = Job("pair-objects", SCENE, 0, 1, 0, Embodiment(), Roots(data, data, data, data))
+    job = Job("pair-objects", SCENE, 0, 1, 0, Embodiment(), ProjectPaths(data, data, data, data))
     out = pair_objects.run(job, config)
     check_table(schemas.PAIRS, out.tables["pairs"])
     assert out.rows_out == out.tables["pairs"].num_rows
@@ -161,7 +161,7 @@ def test_an_object_that_the_mesh_lacks_is_named(tmp_path):
     objects = store.read_scene(tmp_path, "objects", SCENE).to_pylist()
     objects[1]["mesh_node"] = "gone"
     store.write_shard(tmp_path, "objects", SCENE, 0, from_rows(schemas.OBJECTS, objects))
-    job = Job("pair-objects", SCENE, 0, 1, 0, Embodiment(), Roots(*[tmp_path] * 4))
+    job = Job("pair-objects", SCENE, 0, 1, 0, Embodiment(), ProjectPaths(*[tmp_path] * 4))
     with pytest.raises(StoreError, match="object 1 is not in the scene's mesh: run aerialdojo-gen annotate-import"):
         pair_objects.run(job, PairObjectsConfig())
 

@@ -270,7 +270,7 @@ def test_the_card_is_written(smoke, tasks):
 
 def test_render_command_keeps_to_the_pipelines_scenes(smoke, project):
     before = {p: p.stat().st_mtime_ns for p in smoke.rglob("*.parquet")}
-    command = [sys.executable, "-m", "aerialdojo_gen.cli.app", "render", "--pipeline", "pipelines/smoke.toml"]
+    command = [sys.executable, "-m", "aerialdojo_gen.cli", "render", "--pipeline", "pipelines/smoke.toml"]
     done = subprocess.run(
         [*command, "--limit", "1", "--data", str(smoke)], cwd=project, capture_output=True, text=True, check=False
     )
@@ -283,7 +283,7 @@ def test_render_command_keeps_to_the_pipelines_scenes(smoke, project):
 
 def test_a_run_prints_what_stats_prints(smoke, project):
     def said(*args):
-        command = [sys.executable, "-m", "aerialdojo_gen.cli.app", *args, "--data", str(smoke)]
+        command = [sys.executable, "-m", "aerialdojo_gen.cli", *args, "--data", str(smoke)]
         done = subprocess.run(command, cwd=project, capture_output=True, text=True, check=False)
         assert done.returncode == 0, done.stderr
         return done.stdout

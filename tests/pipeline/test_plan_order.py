@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 
 from aerialdojo_gen.base.config.sections import FilterConfig, ReleasedPlanConfig
 from aerialdojo_gen.base.paper_figures import PaperScene
-from aerialdojo_gen.pipeline.stages.work.candidate_policy import Candidates, Draw
-from aerialdojo_gen.pipeline.stages.work.quota import choose, difficulty_steps
+from aerialdojo_gen.pipeline.stages.work.candidate_policy import CandidatePolicy, Candidates
+from aerialdojo_gen.pipeline.stages.work.quota import difficulty_steps, select_quota
 from aerialdojo_gen.pipeline.stages.work.rules import judge
 from aerialdojo_gen.planning.planner import Route
 
@@ -30,7 +30,7 @@ def scene(seed: int, n: int) -> tuple[Candidates, np.ndarray, np.ndarray]:
     return Candidates("U_Test_0", lots, euclidean, free, visible, predicted), outcome, length
 
 
-def searched(draw: Draw, outcome: np.ndarray, length: np.ndarray) -> np.ndarray:
+def searched(draw: CandidatePolicy, outcome: np.ndarray, length: np.ndarray) -> np.ndarray:
     """Search in rounds as `plan` does; which candidates were."""
     found: list[Route | None] = [None] * len(length)
     rows = draw.first()
@@ -55,7 +55,7 @@ def released(
     c: Candidates, rows: np.ndarray, setting: np.ndarray, length: np.ndarray, paper: PaperScene
 ) -> np.ndarray:
     steps = difficulty_steps(length[rows] / c.free_length_m[rows], c.visible[rows])
-    mask = choose(
+    mask = select_quota(
         [c.lots[k] for k in rows], setting[rows].tolist(), length[rows], paper.tasks, paper.path_m, 200, steps,
         PREFERENCE,
     )  # fmt: skip
@@ -70,7 +70,7 @@ def test_what_is_searched_holds_the_papers_numbers_and_metres(seed, margin, long
     config = ReleasedPlanConfig(
         search="released", search_margin=margin, kept=FilterConfig(), prefer_harder=PREFERENCE
     )
-    which = searched(Draw(c, paper, config, 200), outcome, length)
+    which = searched(CandidatePolicy(c, paper, config, 200), outcome, length)
     keep, setting = kept(c, outcome, length)
     rows = released(c, np.flatnonzero(keep & which), setting, length, paper)
     assert {name: int(np.count_nonzero(setting[rows] == name)) for name in paper.tasks} == paper.tasks
@@ -88,7 +88,7 @@ def test_a_pool_that_is_too_small_is_searched_whole(seed):
     c, outcome, length = scene(seed, 200)
     paper = PaperScene("U_Test_0", 1, 20, 400, 90, 25, 20_000.0)
     config = ReleasedPlanConfig(search="released", kept=FilterConfig(), prefer_harder=PREFERENCE)
-    which = searched(Draw(c, paper, config, 200), outcome, length)
+    which = searched(CandidatePolicy(c, paper, config, 200), outcome, length)
     assert which.tolist() == np.isfinite(c.predicted_m).tolist()
 
 
@@ -96,13 +96,16 @@ def test_rows_in_another_order_are_searched_all_the_same():
     c, outcome, length = scene(5, 800)
     paper = PaperScene("U_Test_0", 1, 20, 60, 60, 9, 5000.0)
     config = ReleasedPlanConfig(search="released", kept=FilterConfig(), prefer_harder=PREFERENCE)
-    which = searched(Draw(c, paper, config, 200), outcome, length)
+    which = searched(CandidatePolicy(c, paper, config, 200), outcome, length)
     order = np.random.default_rng(0).permutation(800)
     mixed = Candidates(
         c.scene, [c.lots[k] for k in order], c.euclidean_m[order], c.free_length_m[order], c.visible[order],
         c.predicted_m[order],
     )  # fmt: skip
-    assert searched(Draw(mixed, paper, config, 200), outcome[order], length[order]).tolist() == which[order].tolist()
+    assert (
+        searched(CandidatePolicy(mixed, paper, config, 200), outcome[order], length[order]).tolist()
+        == which[order].tolist()
+    )
 
 
 def test_a_few_more_are_kept_than_are_released():
@@ -118,5 +121,5 @@ def test_a_few_more_are_kept_than_are_released():
         )
         # One in a hundred has no route.
         outcome = np.where(np.arange(n) % 100 == 0, "NO_PATH", "SOLVED")
-        which = searched(Draw(c, paper, config, 200), outcome, length)
+        which = searched(CandidatePolicy(c, paper, config, 200), outcome, length)
         assert np.count_nonzero(which & (outcome == "SOLVED")) >= wanted + spare

@@ -18,7 +18,7 @@ from aerialdojo_gen.base.config.sections import (
 from aerialdojo_gen.base.errors import StoreError
 from aerialdojo_gen.base.paper_figures import PaperScene
 from aerialdojo_gen.geometry.motion import replay
-from aerialdojo_gen.pipeline.stage import Job, Roots
+from aerialdojo_gen.pipeline.stage import Job, ProjectPaths
 from aerialdojo_gen.pipeline.stages.work import pair_objects, plan
 from aerialdojo_gen.planning.clearance import ClearanceGrid
 from aerialdojo_gen.scenes.context import release_scenes
@@ -33,7 +33,7 @@ N_OBJECTS = 5
 
 
 def job(data: Path, stage: str, part: int = 0, parts: int = 1) -> Job:
-    return Job(stage, SCENE, part, parts, 0, Embodiment(), Roots(data, data, data, data))
+    return Job(stage, SCENE, part, parts, 0, Embodiment(), ProjectPaths(data, data, data, data))
 
 
 def write(data: Path, name: str, spec: schemas.TableSpec, rows) -> None:

@@ -18,8 +18,7 @@ from aerialdojo_gen.base.errors import UsageError
 from aerialdojo_gen.benchmark.evaluation import Evaluation
 from aerialdojo_gen.benchmark.runner import evaluate
 from aerialdojo_gen.benchmark.tasks import Selection
-from aerialdojo_gen.pipeline.executors import bundled as carried
-from aerialdojo_gen.pipeline.executors import ray_worker
+from aerialdojo_gen.pipeline.executors import bundled, ray_worker
 from aerialdojo_gen.store.staging import AREA
 
 # All of it on the loopback interface, as a cluster that a command starts for itself.
@@ -65,7 +64,7 @@ def nodes():
 
 def start(project, nodes, data, verb="run", *args):
     where = ["pipelines/smoke.toml"] if verb == "run" else ["--pipeline", "pipelines/smoke.toml"]
-    command = [sys.executable, "-m", "aerialdojo_gen.cli.app", verb, *where, "--data", str(data), *args]
+    command = [sys.executable, "-m", "aerialdojo_gen.cli", verb, *where, "--data", str(data), *args]
     return subprocess.Popen(
         [*command, "--executor", "ray", "--address", nodes.address], cwd=project, stderr=subprocess.PIPE,
         stdout=subprocess.DEVNULL, text=True, start_new_session=True,
@@ -178,12 +177,12 @@ def test_a_secret_is_in_no_text():
 def test_what_travels_is_the_same_bytes_and_comes_to_its_place(tmp_path, project):
     pack = tmp_path / "a.zip"
     folders = [project / "scene_assets", project / "annotations" / "smoke"]
-    carried.pack(pack, folders)
-    carried.pack(tmp_path / "b.zip", folders)
+    bundled.pack(pack, folders)
+    bundled.pack(tmp_path / "b.zip", folders)
     assert pack.read_bytes() == (tmp_path / "b.zip").read_bytes()
     with zipfile.ZipFile(pack) as archive:
         archive.extractall(tmp_path / "there")
-    unpacked = carried.Unpacked(tmp_path / "there")
+    unpacked = bundled.Unpacked(tmp_path / "there")
     for folder in (*folders, project / "scene_assets" / "smoke"):
         names = {p.relative_to(folder) for p in folder.rglob("*") if p.is_file()}
         there = unpacked.place(folder)
@@ -194,6 +193,6 @@ def test_what_travels_is_the_same_bytes_and_comes_to_its_place(tmp_path, project
 
 def test_what_is_too_large_to_travel_is_one_line(tmp_path):
     with (tmp_path / "large.glb").open("wb") as file:
-        file.truncate(carried.MAX_BYTES + 1)
+        file.truncate(bundled.MAX_BYTES + 1)
     with pytest.raises(UsageError, match=r"have 2\d\d MB: no more than 200 MB are carried"):
-        carried.pack(tmp_path.parent / "never.zip", [tmp_path])
+        bundled.pack(tmp_path.parent / "never.zip", [tmp_path])

@@ -27,7 +27,7 @@ TABLES = ("meshes", "scenes", "landmarks", "objects", "chosen_anchors", "anchors
 def start(project, data, *args, verb="plan", workers=2):
     # A session of its own, so that what it leaves behind can be found, and Ctrl-C can be sent to all of it.
     return subprocess.Popen(
-        [sys.executable, "-m", "aerialdojo_gen.cli.app", verb, *args, "--data", str(data), "--workers", str(workers)],
+        [sys.executable, "-m", "aerialdojo_gen.cli", verb, *args, "--data", str(data), "--workers", str(workers)],
         cwd=project, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True,
     )  # fmt: skip
 

@@ -17,9 +17,9 @@ from aerialdojo_gen.base.errors import ConfigError
 from aerialdojo_gen.geometry.cameras import Camera, view_pose
 from aerialdojo_gen.geometry.surface import Surface
 from aerialdojo_gen.pipeline.scoring.base import AnchorView
-from aerialdojo_gen.pipeline.scoring.ensemble import Panel, panel
+from aerialdojo_gen.pipeline.scoring.ensemble import ScorerEnsemble, scorer_ensemble
 from aerialdojo_gen.pipeline.scoring.geometric import WEIGHTS, Parts, judge
-from aerialdojo_gen.pipeline.scoring.recognisability import fronting, telling
+from aerialdojo_gen.pipeline.scoring.recognisability import front_score, part_score
 from aerialdojo_gen.pipeline.stages.work.anchor_sample import anchors_of
 from aerialdojo_gen.pipeline.stages.work.anchor_world import Candidates
 from aerialdojo_gen.rendering.backend import check, open_renderer
@@ -115,8 +115,8 @@ def test_clear_is_the_room_beyond_the_body():
 
 def test_a_view_off_the_front_or_of_half_of_what_tells_is_worth_little():
     off = np.radians([0.0, 25.0, 42.5, 60.0, 60.1, 120.0, 180.0])
-    assert fronting(off) == pytest.approx([1.0, 1.0, 0.75, 0.5, 0.15, 0.0, 0.0], abs=1e-3)
-    assert telling(np.array([[1.0, 1.0], [1.0, 0.0], [0.4, 0.8]])) == pytest.approx([1.0, 0.25, 0.5])
+    assert front_score(off) == pytest.approx([1.0, 1.0, 0.75, 0.5, 0.15, 0.0, 0.0], abs=1e-3)
+    assert part_score(np.array([[1.0, 1.0], [1.0, 0.0], [0.4, 0.8]])) == pytest.approx([1.0, 0.25, 0.5])
 
 
 def test_open_is_what_stands_nearer_and_no_floor():
@@ -251,7 +251,7 @@ class Opinion:
 
 
 def test_the_panel_weighs_those_that_have_an_opinion():
-    judges = Panel(AnchorSampleConfig(), RADIUS)
+    judges = ScorerEnsemble(AnchorSampleConfig(), RADIUS)
     judges._weighted = [(3.0, Opinion("geometric", [0.2, 0.4, 0.9])), (1.0, Opinion("vlm", [1.0, None, 0.0]))]
     verdicts = judges.judge("post", [plain_view((1, 2, 3))] * 3)
     assert [v.score for v in verdicts] == pytest.approx([0.4, 0.4, 0.675])
@@ -265,7 +265,7 @@ def test_the_panel_weighs_those_that_have_an_opinion():
 )
 def test_a_scorer_without_its_section_is_named(weights, said):
     with pytest.raises(ConfigError, match=said):
-        panel(AnchorSampleConfig(weights=ScorerWeights(**weights)), RADIUS)
+        scorer_ensemble(AnchorSampleConfig(weights=ScorerWeights(**weights)), RADIUS)
 
 
 def test_files_of_a_pipeline_lie_beside_it(tmp_path):

@@ -13,11 +13,10 @@ from support.llm_server import Drip, Hang, Say, Status, Trickle, serving
 from support.two_coloured import POST, item_of, job_in, plain_view, redness, world_of, yard
 
 from aerialdojo_gen.base.config.sections import AnchorSampleConfig, ClipConfig, ScorerWeights, VlmConfig
-from aerialdojo_gen.base.errors import AssetError, MissingPackage, UsageError
-from aerialdojo_gen.benchmark.agents.base import AgentUnavailable
+from aerialdojo_gen.base.errors import AgentUnavailable, AssetError, MissingPackage, UsageError
 from aerialdojo_gen.pipeline.registry import BY_NAME
 from aerialdojo_gen.pipeline.scoring.clip import ClipScorer, digest
-from aerialdojo_gen.pipeline.scoring.ensemble import panel
+from aerialdojo_gen.pipeline.scoring.ensemble import scorer_ensemble
 from aerialdojo_gen.pipeline.scoring.vlm import VlmScorer, read_order
 from aerialdojo_gen.pipeline.stages.work.anchor_sample import anchors_of
 
@@ -120,13 +119,13 @@ def test_a_changed_model_changes_the_settled_configuration(clip, tmp_path):
     copy = ClipConfig(**{k: tmp_path / getattr(clip, k).name for k in ("vision", "text", "tokenizer")})
     for name in ("vision", "text", "tokenizer"):
         getattr(copy, name).write_bytes(getattr(clip, name).read_bytes())
-    settle = BY_NAME["anchor-sample"].settle
+    resolve_config = BY_NAME["anchor-sample"].resolve_config
     config = AnchorSampleConfig(weights=ScorerWeights(clip=1.0), clip=copy)
-    first = settle(config, print)
+    first = resolve_config(config, print)
     assert first.clip.sha256 == digest(clip)
     copy.tokenizer.write_bytes(copy.tokenizer.read_bytes() + b"\n")
-    assert settle(config, print).clip.sha256 != first.clip.sha256
-    assert settle(AnchorSampleConfig(clip=copy), print).clip.sha256 == ""
+    assert resolve_config(config, print).clip.sha256 != first.clip.sha256
+    assert resolve_config(AnchorSampleConfig(clip=copy), print).clip.sha256 == ""
 
 
 @pytest.mark.parametrize("which", ["vision", "text", "tokenizer"])
@@ -197,7 +196,7 @@ def test_the_models_order_selects_the_anchor(key, tmp_path):
         config = AnchorSampleConfig(weights=ScorerWeights(geometric=0.0, vlm=1.0), vlm=vlm(service))
         rows = selected(config, "red post", tmp_path)
         assert len(service.requests) == 1
-    panel.cache_clear()
+    scorer_ensemble.cache_clear()
     # A model is shown more than the thumbnails that geometry makes do with.
     assert min(min(picture.shape[:2]) for picture in shown(service.requests[0]["body"])) >= 320
     assert looks_south(rows[0])

@@ -16,7 +16,7 @@ from support.handmade import scene as handmade_scene
 from aerialdojo_gen.base.config.sections import Embodiment, FilterConfig, SplitConfig
 from aerialdojo_gen.dataset.card import write_card
 from aerialdojo_gen.dataset.contents import counts
-from aerialdojo_gen.pipeline.stage import Job, Roots
+from aerialdojo_gen.pipeline.stage import Job, ProjectPaths
 from aerialdojo_gen.pipeline.stages.work import filter as filter_stage
 from aerialdojo_gen.pipeline.stages.work import split
 from aerialdojo_gen.pipeline.stages.work.selection import train_counts, train_mask
@@ -118,7 +118,7 @@ def data(tmp_path_factory):
     }.items():  # fmt: skip
         spec = store.LAYOUT[table].spec
         store.write_shard(data, table, SCENE, 0, from_rows(spec, rows))
-    roots = Roots(data, data, data, data)
+    roots = ProjectPaths(data, data, data, data)
     for name, run, config in (
         ("filter", filter_stage.run, FilterConfig()),
         ("split", split.run, SplitConfig()),
@@ -161,7 +161,7 @@ def test_of_a_scene_that_is_out_of_distribution_a_fifth_trains(data, tmp_path):
     shutil.copytree(data, tmp_path / "data", ignore=shutil.ignore_patterns("release"))
     scene = store.read_scene(data, "scenes", SCENE).to_pylist()[0] | {"partition": "OOD"}
     store.write_shard(tmp_path / "data", "scenes", SCENE, 0, from_rows(schemas.SCENES, [scene]))
-    job = Job("split", SCENE, 0, 1, 0, Embodiment(), Roots(*[tmp_path / "data"] * 4))
+    job = Job("split", SCENE, 0, 1, 0, Embodiment(), ProjectPaths(*[tmp_path / "data"] * 4))
     tables = {name: table.to_pandas() for name, table in split.run(job, SplitConfig()).tables.items()}
     n = load(data, "routes").groupby("setting").size()
     for table, instances in (("tasks", 2), ("routes", 1)):
@@ -229,7 +229,7 @@ def test_difficulty_goes_from_plans_and_pairs_to_verdicts_and_routes(data):
 def test_verdicts_are_judged_by_each_candidates_own_figures(data):
     verdicts = pd.read_parquet(data / "verdicts").set_index("pair_id")
     assert np.allclose(verdicts["detour_ratio"], verdicts["length_m"] / verdicts["euclidean_m"], atol=1e-12)
-    paper, roots = verdicts[verdicts["keep"]], Roots(data, data, data, data)
+    paper, roots = verdicts[verdicts["keep"]], ProjectPaths(data, data, data, data)
     assert paper["detour_ratio"].min() >= 1.05
     job = Job("filter", SCENE, 0, 1, 0, Embodiment(), roots)
     for rule, kept in (
@@ -284,7 +284,7 @@ def test_ids_hang_on_the_salt_and_tell_no_pair():
 def test_another_salt_renames_the_same_tasks(data, tmp_path):
     """Which candidates are released, and on which side, hangs on the pairs alone; the salt stands nowhere."""
     shutil.copytree(data, tmp_path / "data", ignore=shutil.ignore_patterns("release"))
-    roots, salt = Roots(*[tmp_path / "data"] * 4), "nobody is to know this"
+    roots, salt = ProjectPaths(*[tmp_path / "data"] * 4), "nobody is to know this"
     output = split.run(Job("split", SCENE, 0, 1, 0, Embodiment(), roots), SplitConfig(salt=salt))
     pair = ["start_object_id", "start_anchor_id", "target_object_id"]
     for subset in ("train", "test"):

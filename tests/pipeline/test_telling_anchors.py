@@ -13,7 +13,7 @@ from aerialdojo_gen.geometry.cameras import Camera, project, view_pose
 from aerialdojo_gen.geometry.part_visibility import FRONT_RAD, Patch, in_picture, off_front_rad, seen_share
 from aerialdojo_gen.geometry.rays import RayCaster
 from aerialdojo_gen.geometry.surface import Surface
-from aerialdojo_gen.pipeline.stage import Job, Roots
+from aerialdojo_gen.pipeline.stage import Job, ProjectPaths
 from aerialdojo_gen.pipeline.stages.work.anchor_sample import anchors_of
 from aerialdojo_gen.pipeline.stages.work.anchor_world import World
 from aerialdojo_gen.pipeline.stages.work.camera_pullback import fitting_m, step_back_m
@@ -38,7 +38,9 @@ CABINET = told(
 
 
 def anchors(place, node, tmp_path, config=CONFIG):
-    job = Job("anchor-sample", "U_Test_0", 0, 1, 0, Embodiment(), Roots(tmp_path, tmp_path, tmp_path, tmp_path))
+    job = Job(
+        "anchor-sample", "U_Test_0", 0, 1, 0, Embodiment(), ProjectPaths(tmp_path, tmp_path, tmp_path, tmp_path)
+    )
     x, y, z = place[node].centroid.tolist()
     item = {"object_id": 0, "name": node, "mesh_node": node, "x_m": x, "y_m": y, "z_m": z}
     return anchors_of(item, World.of(place, RADIUS, CONFIG.margin_m), job, config)[0]

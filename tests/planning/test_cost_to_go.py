@@ -18,8 +18,8 @@ def field(grid, goal, bound=200.0, prefer=NO_PREFERENCE):
     cost = np.full(grid.moves.shape, np.inf, np.float32)
     seeds = seed_goal(*goal, 0.0, 1.0, grid.radius_m, grid.arrays, grid.moves, cost, prefer)
     order = columns_by_distance(math.ceil((bound + 2.0) / grid.arrays.cell))
-    narrow = narrow_cells(grid.arrays.field, prefer)
-    visits = expand_cost(seeds, order, bound, grid.arrays.cell, grid.moves, cost, narrow)
+    clearance_cost = narrow_cells(grid.arrays.field, prefer)
+    visits = expand_cost(seeds, order, bound, grid.arrays.cell, grid.moves, cost, clearance_cost)
     return cost, seeds, visits
 
 
@@ -29,7 +29,7 @@ def test_it_is_dijkstras_on_the_same_graph(prefer):
     grid = ClearanceGrid.build(town(half=12.0, ceiling=8.0, n=16))
     goal = next(p for p in [(0.1, 0.2, 1.4), (4, 4, 1.4), (-7, 2, 3.4)] if grid.reachable(p))
     cost, seeds, _ = field(grid, goal, prefer=prefer)
-    narrow = narrow_cells(grid.arrays.field, prefer).ravel()
+    clearance_cost = narrow_cells(grid.arrays.field, prefer).ravel()
     shape = grid.moves.shape
     n = grid.moves.size
     i, j, k = np.indices(shape).reshape(3, -1)
@@ -38,7 +38,7 @@ def test_it_is_dijkstras_on_the_same_graph(prefer):
         has = ((grid.moves.ravel() >> np.uint32(m)) & 1).astype(bool)
         rows.append(np.flatnonzero(has))
         columns.append(np.ravel_multi_index((i[has] + dx, j[has] + dy, k[has] + dz), shape))
-        lengths.append(MOVE_LENGTHS[m] * grid.arrays.cell * (1.0 + narrow[has]))
+        lengths.append(MOVE_LENGTHS[m] * grid.arrays.cell * (1.0 + clearance_cost[has]))
     again = np.full(shape, np.inf, np.float32)
     seed_goal(*goal, 0.0, 1.0, grid.radius_m, grid.arrays, grid.moves, again, prefer)
     source = np.full(len(seeds), n)
@@ -62,10 +62,10 @@ def test_what_is_not_metres_is_told_apart():
     goal = next(p for p in [(0.1, 0.2, 1.4), (4, 4, 1.4), (-7, 2, 3.4)] if grid.reachable(p))
     plain, _, _ = field(grid, goal)
     cost, _, _ = field(grid, goal, prefer=prefer)
-    narrow = narrow_cells(grid.arrays.field, prefer)
+    clearance_cost = narrow_cells(grid.arrays.field, prefer)
     centres = np.argwhere(np.isfinite(plain))[::37]
     points = grid.arrays.origin + (centres + 0.5) * grid.arrays.cell
-    values = lengths_at(points, np.array(goal, float), grid.arrays, grid.moves, cost, narrow)
+    values = lengths_at(points, np.array(goal, float), grid.arrays, grid.moves, cost, clearance_cost)
     shortest = np.array([cost_at(*p, grid.arrays, plain) for p in points])
     dearest = np.array([cost_at(*p, grid.arrays, cost) for p in points])
     assert len(points) > 200

@@ -13,7 +13,7 @@ from aerialdojo_gen.geometry.motion import TURN_RAD
 from aerialdojo_gen.planning.direct import direct_legs
 from aerialdojo_gen.planning.free_length import free_lengths_m
 from aerialdojo_gen.planning.planner import Planner
-from aerialdojo_gen.planning.preference import Preference, astray, squeeze
+from aerialdojo_gen.planning.preference import Preference, approach_penalty, clearance_penalty
 from aerialdojo_gen.planning.translations import DOWN, UP
 
 RADIUS, APPROACH_M = 0.25, 1.0
@@ -66,9 +66,14 @@ def test_direct_ways_are_free_end_at_the_goal_and_cost_what_they_say(built):
         gap = float(np.linalg.norm(way))
         assert gap <= APPROACH_M
         a = built.grid.arrays
-        paid = sum(m for _, m in legs) + gap + astray(*way[:2], goal[3], gap, PREFER.ahead_cos, PREFER.astray)
+        paid = (
+            sum(m for _, m in legs)
+            + gap
+            + approach_penalty(*way[:2], goal[3], gap, PREFER.ahead_cos, PREFER.approach_penalty)
+        )
         paid += sum(
-            squeeze(*p, *q, PREFER.clearance, PREFER.weight, *a.origin, a.cell, a.field) for p, q in pairwise(points)
+            clearance_penalty(*p, *q, PREFER.clearance, PREFER.weight, *a.origin, a.cell, a.field)
+            for p, q in pairwise(points)
         )
         assert cost == pytest.approx(paid, abs=1e-9)
     assert found > 200
@@ -102,7 +107,7 @@ def test_in_the_open_no_way_along_those_headings_is_cheaper(empty, p, q, yaw, go
         rest = (dx - a * one[0] - b * other[0], dy - a * one[1] - b * other[1], dz - up * c)
         gap = math.hypot(*rest)
         if gap <= APPROACH_M:
-            ahead = astray(rest[0], rest[1], goal_yaw, gap, prefer.ahead_cos, prefer.astray)
+            ahead = approach_penalty(rest[0], rest[1], goal_yaw, gap, prefer.ahead_cos, prefer.approach_penalty)
             least = min(least, a + b + c + gap + ahead)
     assert cost == pytest.approx(least, abs=1e-6)
     assert legs in [list(order) for order in permutations(legs)]

@@ -7,7 +7,7 @@ import pytest
 from support.flying import along, distances, solid, town
 from support.handmade import box, instance, scene
 
-from aerialdojo_gen.base.config.sections import PlanConfig, Rung
+from aerialdojo_gen.base.config.sections import PlanConfig, SearchAttempt
 from aerialdojo_gen.geometry.motion import DISPLACEMENTS, TURNS, replay
 from aerialdojo_gen.planning.planner import Planner
 from aerialdojo_gen.store.schemas import APPROACH, STOP
@@ -184,7 +184,7 @@ def test_no_route_makes_a_loop_where_the_way_across_is_free():
 def test_routes_are_as_short_as_an_exhaustive_search_finds():
     _, triples = planned()
     # Weight below 1 / 1.028: the cost-to-go never overestimates, so that the search is exhaustive.
-    plain = PlanConfig(ladder=(Rung(weight=0.97, budget=150_000, duplicate_cell_m=0.25),))
+    plain = PlanConfig(ladder=(SearchAttempt(weight=0.97, budget=150_000, duplicate_cell_m=0.25),))
     exact = Planner(town(), plain, RADIUS)
     ratios = []
     for k in (0, 25, 50):
@@ -248,7 +248,7 @@ def test_outcomes_of_what_cannot_be_planned():
 
 
 def test_a_budget_that_is_too_small_says_so():
-    config = PlanConfig(ladder=(Rung(weight=1.05, budget=3),))
+    config = PlanConfig(ladder=(SearchAttempt(weight=1.05, budget=3),))
     route = plan_one(town(), (-16.0, -16.0, 1.0, 0.0), (16.0, 16.0, 1.0, 0.0), config)
     assert route.outcome == "BUDGET_EXHAUSTED"
     assert route.expansions == 3
@@ -263,9 +263,9 @@ def test_what_lies_beyond_the_longest_length_is_no_path():
 
 def test_a_rung_that_fails_counts_too_and_the_next_one_is_tried():
     start, goal = (-16.0, -16.0, 1.0, 0.0), (16.0, 16.0, 1.0, 0.0)
-    wide = Rung(weight=1.05, budget=20_000)
+    wide = SearchAttempt(weight=1.05, budget=20_000)
     alone = plan_one(town(), start, goal, PlanConfig(ladder=(wide,)))
-    second = plan_one(town(), start, goal, PlanConfig(ladder=(Rung(weight=1.05, budget=3), wide)))
+    second = plan_one(town(), start, goal, PlanConfig(ladder=(SearchAttempt(weight=1.05, budget=3), wide)))
     assert (alone.attempts, second.attempts) == (1, 2)
     assert second.expansions == alone.expansions + 3
     assert second.poses.tobytes() == alone.poses.tobytes()
@@ -275,7 +275,9 @@ def test_a_rung_with_a_larger_radius_keeps_more_room():
     goal, starts = (16.0, 16.0, 6.0, 0.0), [(-16.0, y, 6.0, 0.0) for y in (-16.0, -8.0, 0.0, 8.0)]
     least = []
     for extra in (0.0, 0.2):
-        config = METRES.model_copy(update={"ladder": (Rung(weight=1.05, budget=20_000, extra_radius_m=extra),)})
+        config = METRES.model_copy(
+            update={"ladder": (SearchAttempt(weight=1.05, budget=20_000, extra_radius_m=extra),)}
+        )
         routes = Planner(town(), config, RADIUS).plan_target(goal, starts)
         assert {r.outcome for r in routes} == {"SOLVED"}
         least.append(min(r.min_clearance_m for r in routes))

@@ -11,7 +11,7 @@ from support.flying import town
 
 from aerialdojo_gen.base.config.sections import PlanConfig
 from aerialdojo_gen.planning.column_kernels import QUANTUM_M
-from aerialdojo_gen.planning.kept_fields import KeptFields
+from aerialdojo_gen.planning.kept_fields import FieldCache
 from aerialdojo_gen.planning.planner import Planner
 
 FIELDS = arrays.arrays(
@@ -23,7 +23,7 @@ FIELDS = arrays.arrays(
 
 @given(FIELDS, st.booleans())
 def test_a_field_comes_back_bit_for_bit(field, plain):
-    kept = KeptFields(1.0 if plain else 0.0, 1.0)
+    kept = FieldCache(1.0 if plain else 0.0, 1.0)
     scratch = field.copy()
     kept.keep(b"goal", scratch)
     scratch.fill(3.0)
@@ -36,7 +36,7 @@ def test_a_field_comes_back_bit_for_bit(field, plain):
 
 def test_no_more_is_kept_than_there_is_room_for():
     rough = np.random.default_rng(1).integers(0, 2**24, (100, 100, 6)).astype(np.float32) * np.float32(QUANTUM_M)
-    kept = KeptFields(0.5, 0.3)  # two as they are, one compressed
+    kept = FieldCache(0.5, 0.3)  # two as they are, one compressed
     for k in range(5):
         kept.keep(bytes([k]), rough)
     there = [kept.find(bytes([k]), np.empty_like(rough)) is not None for k in range(5)]
@@ -60,7 +60,7 @@ def test_routes_are_the_same_however_fields_are_kept(planner, room):
     assert not planner.grid.in_collision(goals[-1][:3])
     expected = [planner.plan_target(goal, starts) for goal in goals]
     with planner.keeping_fields(*room):
-        foreseen = [planner.foresee(goal, starts) for goal in goals]
+        foreseen = [planner.estimate_routes(goal, starts) for goal in goals]
         routes = [planner.plan_target(goal, starts) for goal in goals]
     assert sum(route.outcome == "SOLVED" for route in expected[0]) > 6
     for before, after, told in zip(expected, routes, foreseen, strict=True):

@@ -18,7 +18,7 @@ from aerialdojo_gen.cli.common import open_pipeline, run_until
 from aerialdojo_gen.dataset.validate.below_ground import open_ground
 from aerialdojo_gen.geometry.ground import Ground
 from aerialdojo_gen.imports.command import add_scene
-from aerialdojo_gen.imports.import_mesh import adopt
+from aerialdojo_gen.imports.import_mesh import import_mesh
 from aerialdojo_gen.imports.raw import RawNode, plain
 from aerialdojo_gen.planning.clearance import ClearanceGrid
 from aerialdojo_gen.planning.planner import Planner
@@ -35,7 +35,7 @@ def adopted(field: Hills, *things: trimesh.Trimesh, turned: bool = False) -> tup
     nodes = [
         RawNode(n, np.asarray(m.vertices), np.asarray(m.faces, np.int64), plain(len(m.faces))) for n, m in bodies
     ]
-    scene, _ = adopt(NAME, nodes)
+    scene, _ = import_mesh(NAME, nodes)
     return scene, shift_of(field, things)
 
 
@@ -129,7 +129,9 @@ def test_an_overhang_is_open_and_the_rock_above_it_is_not():
         [[i * n + j, i * n + j + 1, (i + 1) * n + j + 1, (i + 1) * n + j] for i in range(30) for j in range(6)]
     )
     sheet = trimesh.Trimesh(vertices, np.concatenate([cell[:, :3], cell[:, [0, 2, 3]]]), process=False)
-    scene, _ = adopt(NAME, [RawNode("Cliff", vertices, np.asarray(sheet.faces, np.int64), plain(len(sheet.faces)))])
+    scene, _ = import_mesh(
+        NAME, [RawNode("Cliff", vertices, np.asarray(sheet.faces, np.int64), plain(len(sheet.faces)))]
+    )
     shift = np.array([15.0, 15.0, 2.0])
     grid = ClearanceGrid.build(scene)
     assert grid.ground is not None
@@ -152,7 +154,7 @@ def test_a_canopy_over_level_ground_that_was_laid_is_not_the_ground():
     roof = trimesh.Trimesh([[0, 0, 4], [12, 0, 4], [12, 10, 4], [0, 10, 4]], [[0, 1, 2], [0, 2, 3]], process=False)
     nodes = [RawNode(f"Body.{k}", np.asarray(m.vertices), np.asarray(m.faces, np.int64), plain(len(m.faces)))
              for k, m in enumerate([*posts, *halls, roof])]  # fmt: skip
-    scene, repairs = adopt(NAME, nodes)
+    scene, repairs = import_mesh(NAME, nodes)
     assert any("level ground" in line for line in repairs.lines)
     assert Ground.of(scene) is None
     assert open_ground(scene) is None

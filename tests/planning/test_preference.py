@@ -16,7 +16,7 @@ from aerialdojo_gen.planning.clearance import ClearanceGrid
 from aerialdojo_gen.planning.difficulty import agent_actions, difficulty_of, straight_lines_free
 from aerialdojo_gen.planning.flight_space import FlightSpace
 from aerialdojo_gen.planning.planner import Planner
-from aerialdojo_gen.planning.preference import squeeze
+from aerialdojo_gen.planning.preference import clearance_penalty
 from aerialdojo_gen.store.schemas import APPROACH
 
 RADIUS = 0.25
@@ -110,10 +110,12 @@ def test_walls_are_not_climbed_flush():
 )
 def test_near_the_ground_the_cost_of_clearance_is_the_integral(a, b, weight):
     grid = flat_ground()
-    found = squeeze(*a, *b, 1.0, weight, *grid.origin, grid.cell, grid.field)
+    found = clearance_penalty(*a, *b, 1.0, weight, *grid.origin, grid.cell, grid.field)
     length = math.dist(a, b)
     assert found == pytest.approx(weight * length * (1.0 - (a[2] + b[2]) / 2), rel=1e-3, abs=1e-3)
-    assert squeeze(*b, *a, 1.0, weight, *grid.origin, grid.cell, grid.field) == pytest.approx(found, rel=1e-6)
+    assert clearance_penalty(*b, *a, 1.0, weight, *grid.origin, grid.cell, grid.field) == pytest.approx(
+        found, rel=1e-6
+    )
 
 
 @lru_cache(maxsize=1)
@@ -123,7 +125,7 @@ def flat_ground():
 
 def test_far_from_surfaces_nothing_is_added():
     grid = flat_ground()
-    assert squeeze(-8.0, -8.0, 2.0, 8.0, 8.0, 5.0, 1.0, 1.0, *grid.origin, grid.cell, grid.field) == 0.0
+    assert clearance_penalty(-8.0, -8.0, 2.0, 8.0, 8.0, 5.0, 1.0, 1.0, *grid.origin, grid.cell, grid.field) == 0.0
 
 
 def test_what_agents_fly_succeeds_by_the_evaluators_own_replay():

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from support.flying import town
 from support.handmade import box, instance, scene
 
-from aerialdojo_gen.base.config.sections import PlanConfig, Rung
+from aerialdojo_gen.base.config.sections import PlanConfig, SearchAttempt
 from aerialdojo_gen.planning.clearance import ClearanceGrid
 from aerialdojo_gen.planning.cost_to_go import columns_by_distance, cost_at, expand_cost, seed_goal
 from aerialdojo_gen.planning.grid_path import make_path_arrays, short_path_cost
@@ -75,7 +75,7 @@ CONFIGS = [
     PlanConfig(),
     PlanConfig(clearance_weight=0.0, max_approach_angle_deg=180.0),
     PlanConfig(max_length_m=9.0, min_detour_ratio=1.05),
-    PlanConfig(cell_m=0.8, ladder=(Rung(weight=1.4, budget=2_000),)),
+    PlanConfig(cell_m=0.8, ladder=(SearchAttempt(weight=1.4, budget=2_000),)),
 ]
 
 
@@ -99,17 +99,17 @@ def ground():
     grid = ClearanceGrid.build(town())
     goal = np.array([0.1, 0.2, 1.4]) if grid.reachable((0.1, 0.2, 1.4)) else np.array([4.0, 4.0, 1.4])
     assert grid.reachable(goal)
-    narrow = narrow_cells(grid.arrays.field, PREFER)
+    clearance_cost = narrow_cells(grid.arrays.field, PREFER)
     whole = np.full(grid.moves.shape, np.inf, np.float32)
     seeds = seed_goal(*goal, 0.0, 1.0, grid.radius_m, grid.arrays, grid.moves, whole, PREFER)
     seeded = whole.ravel()[seeds]
-    expand_cost(seeds, columns_by_distance(400), 100.0, grid.arrays.cell, grid.moves, whole, narrow)
-    return grid, goal, narrow, whole, seeds, seeded
+    expand_cost(seeds, columns_by_distance(400), 100.0, grid.arrays.cell, grid.moves, whole, clearance_cost)
+    return grid, goal, clearance_cost, whole, seeds, seeded
 
 
 @pytest.mark.parametrize(("weight", "beyond"), [(1.0, 0.0), (1.05, 1.0), (1.05, 4.0), (1.6, 6.0)])
 def test_within_reach_costs_are_those_of_the_whole_field_to_the_bit(weight, beyond):
-    grid, goal, narrow, whole, seeds, seeded = ground()
+    grid, goal, clearance_cost, whole, seeds, seeded = ground()
     arrays = make_query_arrays(grid.moves.shape)
     centres = [grid.arrays.origin[a] + (np.arange(n) + 0.5) * grid.arrays.cell for a, n in enumerate(whole.shape)]
     x, y, z = np.meshgrid(*centres, indexing="ij")
@@ -120,7 +120,17 @@ def test_within_reach_costs_are_those_of_the_whole_field_to_the_bit(weight, beyo
         for _ in range(2):
             arrays.cost.reshape(-1)[seeds] = seeded
             n = expand_query(
-                seeds, np.array(start), goal, 1.0, reach, weight, 100.0, grid.arrays, grid.moves, narrow, arrays
+                seeds,
+                np.array(start),
+                goal,
+                1.0,
+                reach,
+                weight,
+                100.0,
+                grid.arrays,
+                grid.moves,
+                clearance_cost,
+                arrays,
             )
             assert within.sum() > 100
             assert (arrays.cost[within] == whole[within]).all()
@@ -134,7 +144,7 @@ def test_within_reach_costs_are_those_of_the_whole_field_to_the_bit(weight, beyo
 
 
 def test_a_short_grid_path_is_little_longer_than_the_shortest():
-    grid, _, narrow, whole, seeds, seeded = ground()
+    grid, _, clearance_cost, whole, seeds, seeded = ground()
     cost, arrays = np.full(whole.shape, np.inf, np.float32), make_path_arrays()
     rng, ratios = np.random.default_rng(1), []
     while len(ratios) < 60:
@@ -142,12 +152,14 @@ def test_a_short_grid_path_is_little_longer_than_the_shortest():
         if not grid.reachable(p):
             continue
         cost.reshape(-1)[seeds] = seeded
-        found = short_path_cost(seeds, *p, 100.0, grid.arrays, grid.moves, narrow, cost, arrays)
+        found = short_path_cost(seeds, *p, 100.0, grid.arrays, grid.moves, clearance_cost, cost, arrays)
         assert np.isinf(cost).all()
         assert (arrays.heads == -1).all()
         ratios.append(found / cost_at(*p, grid.arrays, whole))
         cost.reshape(-1)[seeds] = seeded
-        assert short_path_cost(seeds, *p, found / 1.2, grid.arrays, grid.moves, narrow, cost, arrays) == np.inf
+        assert (
+            short_path_cost(seeds, *p, found / 1.2, grid.arrays, grid.moves, clearance_cost, cost, arrays) == np.inf
+        )
     # Between cells the cost-to-go is interpolated, the path's is of one of them.
     assert min(ratios) > 0.97
     assert max(ratios) < 1.1
@@ -170,6 +182,6 @@ def test_planning_one_trajectory_is_a_single_query():
     (route,) = Planner(town(), PlanConfig(), RADIUS).plan_target(ends[1], [ends[0]])
     assert route.outcome == "SOLVED"
     same(plan(town(), *ends), route)
-    exhaustive = PlanConfig(ladder=(Rung(weight=0.97, budget=50_000),))
+    exhaustive = PlanConfig(ladder=(SearchAttempt(weight=0.97, budget=50_000),))
     (route,) = Planner(town(), exhaustive, RADIUS).plan_target(ends[1], [ends[0]])
     same(plan(town(), *ends, config=exhaustive), route)

@@ -17,7 +17,7 @@ from shapely.geometry import Point, Polygon
 from aerialdojo_gen.base.config.sections import BuildScenesConfig, Embodiment
 from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.geometry.rays import RayCaster
-from aerialdojo_gen.pipeline.stage import Job, Roots
+from aerialdojo_gen.pipeline.stage import Job, ProjectPaths
 from aerialdojo_gen.pipeline.stages.work import build_scenes
 from aerialdojo_gen.scenes import layouts
 from aerialdojo_gen.scenes.catalogue import load_catalogue
@@ -107,7 +107,7 @@ def build(assets: Path):
 
 
 def test_stage_writes_mesh_and_row(assets, tmp_path):
-    roots = Roots(tmp_path / "data", assets, assets / "scenes", tmp_path)
+    roots = ProjectPaths(tmp_path / "data", assets, assets / "scenes", tmp_path)
     job = Job("build-scenes", "U_Test_0", 0, 1, 0, Embodiment(), roots)
     output = build_scenes.run(job, BuildScenesConfig())
     row = output.tables["scenes"].to_pylist()[0]
@@ -128,7 +128,7 @@ def test_stage_writes_mesh_and_row(assets, tmp_path):
 
 
 def test_file_holds_the_built_scene_exactly(assets, tmp_path):
-    roots = Roots(tmp_path / "data", assets, assets / "scenes", tmp_path)
+    roots = ProjectPaths(tmp_path / "data", assets, assets / "scenes", tmp_path)
     build_scenes.run(Job("build-scenes", "U_Test_0", 0, 1, 0, Embodiment(), roots), BuildScenesConfig())
     stored, built = read_glb(tmp_path / "data/meshes/U_Test_0.glb"), build(assets)
     for a, b in zip(stored.instances, built.instances, strict=True):

@@ -71,7 +71,7 @@ def test_a_store_that_takes_connections_and_never_answers_ends_a_command(cloud: 
     with socket.create_server(("127.0.0.1", 0)) as silent:
         url = f"http://127.0.0.1:{silent.getsockname()[1]}"
         limits = {"AERIALDOJO_TIMEOUT_S": "0.5", "AWS_MAX_ATTEMPTS": "2", "AWS_ENDPOINT_URL": url}
-        command = [sys.executable, "-m", "aerialdojo_gen.cli.app", "stats", "--data", cloud]
+        command = [sys.executable, "-m", "aerialdojo_gen.cli", "stats", "--data", cloud]
         done = subprocess.run(
             command, env=os.environ | limits, capture_output=True, text=True, timeout=100, check=False
         )

@@ -15,7 +15,7 @@ from aerialdojo_gen.store.root import open_root
 
 
 def test_a_killed_run_goes_on_and_gives_what_a_local_one_gives(cloud: str, smoke: Path, project: Path):
-    command = [sys.executable, "-m", "aerialdojo_gen.cli.app", "run", "pipelines/smoke.toml", "--data", cloud]
+    command = [sys.executable, "-m", "aerialdojo_gen.cli", "run", "pipelines/smoke.toml", "--data", cloud]
     environment = os.environ | {"AERIALDOJO_LEASE_S": "3"}
     root, local = open_root(cloud), open_root(smoke)
     killed = subprocess.Popen([*command, "--workers", "2"], cwd=project, env=environment, stderr=subprocess.DEVNULL)

@@ -9,7 +9,7 @@ import pytest
 
 from aerialdojo_gen.base.errors import StoreError
 from aerialdojo_gen.cli.app import app
-from aerialdojo_gen.store.memo import keep, key_of, known, remembered
+from aerialdojo_gen.store.memo import keep, key_of, known, memo
 from aerialdojo_gen.store.root import open_root
 
 
@@ -43,7 +43,7 @@ def test_a_key_is_of_the_files_and_of_what_is_asked(root, tmp_path):
 def test_a_text_is_made_once(root):
     asked = []
     key = key_of(root, ["a"])
-    texts = [remembered(key, lambda: asked.append(1) or "ärial") for _ in range(3)]
+    texts = [memo(key, lambda: asked.append(1) or "ärial") for _ in range(3)]
     assert texts == ["ärial"] * 3
     assert len(asked) == 1
     assert known(key)
@@ -52,7 +52,7 @@ def test_a_text_is_made_once(root):
 
 def test_where_nothing_can_be_kept_it_is_made_each_time(root, cache):
     cache.write_text("a file where the folder should be")
-    assert [remembered(key_of(root, ["a"]), lambda: "text") for _ in range(2)] == ["text"] * 2
+    assert [memo(key_of(root, ["a"]), lambda: "text") for _ in range(2)] == ["text"] * 2
     keep(key_of(root, ["a"]))
     assert not known(key_of(root, ["a"]))
 

@@ -19,23 +19,23 @@ from aerialdojo_gen.cli.common import open_pipeline
 from aerialdojo_gen.pipeline.stages.work.annotate_import import annotation_tables
 from aerialdojo_gen.scenes.model import Scene
 from aerialdojo_gen.studio.annotate.access import TokenGate
-from aerialdojo_gen.studio.annotate.serve import serve_desk, write_coco
+from aerialdojo_gen.studio.annotate.serve import serve_session, write_coco
 from aerialdojo_gen.studio.annotate.server import MOST_BYTES, STATIC, make_app
-from aerialdojo_gen.studio.annotate.session import Desk, open_desk
+from aerialdojo_gen.studio.annotate.session import AnnotationSession, open_session
 from aerialdojo_gen.studio.annotate.storage import Storage
 
 
 @pytest.fixture(scope="module")
-def yard(project, tmp_path_factory) -> Desk:
+def yard(project, tmp_path_factory) -> AnnotationSession:
     folder = tmp_path_factory.mktemp("yard")
     pipeline, roots = open_pipeline(annotating.yard_pipeline(project, folder), folder / "data")
-    desk = open_desk(YARD, pipeline, roots)
+    desk = open_session(YARD, pipeline, roots)
     yield desk
     desk.anchors.close()
 
 
 @pytest.fixture
-def desk(yard, project, tmp_path) -> Desk:
+def desk(yard, project, tmp_path) -> AnnotationSession:
     """The yard with annotations of the test's own."""
     (tmp_path / f"{YARD}.json").write_bytes((project / "annotations" / "smoke" / f"{YARD}.json").read_bytes())
     yard.storage = Storage(tmp_path, YARD)
@@ -377,15 +377,15 @@ def test_other_machines_need_the_token(desk):
 
 def test_an_address_that_is_none_is_named(desk):
     with pytest.raises(UsageError, match="--host nowhere: give an IPv4 address"):
-        serve_desk(desk, port=0, host="nowhere", browser=False, say=print)
+        serve_session(desk, port=0, host="nowhere", browser=False, say=print)
 
 
 def test_several_scenes_at_once_are_refused(project, tmp_path):
     pipeline, roots = open_pipeline(annotating.yard_pipeline(project, tmp_path), tmp_path / "data")
     with pytest.raises(UsageError, match=r"annotate one at a time"):
-        open_desk("U_*", pipeline, roots)
+        open_session("U_*", pipeline, roots)
     with pytest.raises(UsageError, match="U_Courtyard_0"):
-        open_desk("u_courtyard_0", pipeline, roots)
+        open_session("u_courtyard_0", pipeline, roots)
 
 
 def test_the_archive_is_written_whole(desk, tmp_path):

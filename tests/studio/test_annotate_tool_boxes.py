@@ -31,7 +31,7 @@ from aerialdojo_gen.scenes.cuts import cut_out
 from aerialdojo_gen.scenes.layouts.build import build_scene
 from aerialdojo_gen.scenes.recipe import Cut
 from aerialdojo_gen.studio.annotate.server import make_app
-from aerialdojo_gen.studio.annotate.session import open_desk
+from aerialdojo_gen.studio.annotate.session import open_session
 
 # Where changed recipes are laid out for a build.
 SCRATCH = Path(tempfile.gettempdir()) / f"aerialdojo-gen-{os.getuid()}"
@@ -80,7 +80,7 @@ def test_what_is_boxed_out_is_annotated_becomes_an_object_and_can_be_put_back(te
     pipeline, roots = open_pipeline(terrain.pipeline, tmp_path / "data")
     recipe = roots.recipes / "Scan.toml"
     before = recipe.read_bytes()
-    desk = open_desk("Scan", pipeline, roots)
+    desk = open_session("Scan", pipeline, roots)
     client = TestClient(make_app(desk), base_url="http://127.0.0.1")
     made = []
     for category, (low, high) in {"Garden shed": SHED, "tower": ([-12, -10, 0.05], [-8.5, -6.5, 20])}.items():

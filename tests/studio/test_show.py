@@ -217,7 +217,7 @@ def test_an_unknown_id_gives_the_nearest(smoke, ids, tmp_path):
         StoreError, match=r"there is no release in .*: it has no folder release; name its folder with --data"
     ):
         find_task(tmp_path, ids[0])
-    command = [sys.executable, "-m", "aerialdojo_gen.cli.app", "show", wrong, "--data", str(smoke)]
+    command = [sys.executable, "-m", "aerialdojo_gen.cli", "show", wrong, "--data", str(smoke)]
     done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=tmp_path)
     assert (done.returncode, done.stdout, done.stderr.count("\n")) == (2, "", 1)
     assert done.stderr.startswith(f"error: no task '{wrong}'")

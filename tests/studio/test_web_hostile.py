@@ -223,7 +223,7 @@ def test_an_enormous_body_is_refused_unread(desk):
 def annotating_for_all(project, folder):
     """``annotate --host 0.0.0.0`` with few files to open, as macOS gives; its port, its token, and its log."""
     pipeline = annotating.yard_pipeline(project, folder)
-    command = [sys.executable, "-m", "aerialdojo_gen.cli.app", "annotate", "--scene", annotating.YARD, "--no-browser",
+    command = [sys.executable, "-m", "aerialdojo_gen.cli", "annotate", "--scene", annotating.YARD, "--no-browser",
                "--pipeline", str(pipeline), "--data", str(folder / "data"), "--host", "0.0.0.0"]  # fmt: skip
     log = folder / "log.txt"
     with log.open("wb") as file:
@@ -366,7 +366,7 @@ def test_a_page_without_the_web_extra_names_it(project, tmp_path, missing, comma
     line = [
         sys.executable,
         "-m",
-        "aerialdojo_gen.cli.app",
+        "aerialdojo_gen.cli",
         command,
         "--scene",
         YARD,

@@ -19,7 +19,7 @@ def served(
     project: Path, scene: str, pipeline: Path, data: Path, port: int = 0
 ) -> Iterator[tuple[str, subprocess.Popen[str]]]:
     """Run ``aerialdojo-gen annotate``; gives the page's address and the process, which is ended at last."""
-    command = [sys.executable, "-m", "aerialdojo_gen.cli.app", "annotate", "--scene", scene, "--pipeline", str(pipeline),
+    command = [sys.executable, "-m", "aerialdojo_gen.cli", "annotate", "--scene", scene, "--pipeline", str(pipeline),
                "--data", str(data), "--no-browser", "--port", str(port)]  # fmt: skip
     process = subprocess.Popen(command, cwd=project, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
     try:

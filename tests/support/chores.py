@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from aerialdojo_gen.base.errors import AssetError, StoreError
-from aerialdojo_gen.pipeline.executors.base import Waiting
+from aerialdojo_gen.pipeline.executors.base import TaskQueue
 from aerialdojo_gen.pipeline.executors.link import at_end
 from aerialdojo_gen.pipeline.task import compute
 
@@ -94,7 +94,7 @@ def talk(chore, link):
     return told
 
 
-class Steps(Waiting):
+class Steps(TaskQueue):
     """Scenes that take `steps` steps each, one after the other; a step's `parts` chores can be done together."""
 
     def __init__(self, scenes, steps, parts, folder, alone_at=()):

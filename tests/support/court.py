@@ -13,7 +13,7 @@ from aerialdojo_gen.base.config.pipeline import Pipeline
 from aerialdojo_gen.base.config.sections import Embodiment, RenderConfig
 from aerialdojo_gen.pipeline import runner
 from aerialdojo_gen.pipeline.registry import BY_NAME
-from aerialdojo_gen.pipeline.stage import Job, Roots
+from aerialdojo_gen.pipeline.stage import Job, ProjectPaths
 from aerialdojo_gen.pipeline.stages.work import render
 from aerialdojo_gen.rendering.sample import n_parts
 from aerialdojo_gen.scenes.glb import write_glb
@@ -95,7 +95,7 @@ def write_inputs(data, bad=BAD):
 
 def run_all(data, config, stage=render, name="render"):
     parts = n_parts(data, SCENE, config) if name == "render" else 1
-    roots = Roots(data=data, scene_assets=data, recipes=data, annotations=data)
+    roots = ProjectPaths(data=data, scene_assets=data, recipes=data, annotations=data)
     outputs = [stage.run(Job(name, SCENE, k, parts, 0, Embodiment(), roots), config) for k in range(parts)]
     for output in outputs:
         for table, rows in output.tables.items():
@@ -105,7 +105,7 @@ def run_all(data, config, stage=render, name="render"):
 
 def run_whole(data, config, workers=1, **options):
     """Run the stage as the command does."""
-    roots = Roots(data=data, scene_assets=data, recipes=data, annotations=data)
+    roots = ProjectPaths(data=data, scene_assets=data, recipes=data, annotations=data)
     pipeline = Pipeline(render=config)
     return runner.run([BY_NAME["render"]], [SCENE], pipeline, roots, workers=workers, **options)
 

@@ -15,7 +15,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from aerialdojo_gen.base.config.pipeline import load_pipeline
-from aerialdojo_gen.dataset.validate import Asked, validate
+from aerialdojo_gen.dataset.validate import ValidationOptions, validate
 from aerialdojo_gen.dataset.validate.parts import part_path
 from aerialdojo_gen.geometry.angles import wrap_turned_rad
 from aerialdojo_gen.geometry.motion import replay
@@ -169,4 +169,4 @@ def check(planted: Planted, **options) -> dict[str, list[str]]:
     """Validate the scene that was planted in; the whole release with ``whole=True``."""
     scenes = () if options.pop("whole", False) else (planted.scene,)
     options = {"pipeline": definitions()} | options
-    return faults_of(validate(Asked(planted.release, scenes=scenes, **options)))
+    return faults_of(validate(ValidationOptions(planted.release, scenes=scenes, **options)))

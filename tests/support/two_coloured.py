@@ -9,7 +9,7 @@ from support.handmade import box, ground, instance
 
 from aerialdojo_gen.base.config.sections import AnchorSampleConfig, Embodiment
 from aerialdojo_gen.pipeline.scoring.base import AnchorView
-from aerialdojo_gen.pipeline.stage import Job, Roots
+from aerialdojo_gen.pipeline.stage import Job, ProjectPaths
 from aerialdojo_gen.pipeline.stages.work.anchor_world import World
 from aerialdojo_gen.scenes.model import Instance, Material, Part, Scene
 
@@ -44,7 +44,7 @@ def world_of(place: Scene) -> World:
 
 
 def job_in(folder) -> Job:
-    return Job("anchor-sample", "U_Test_0", 0, 1, 0, EMBODIMENT, Roots(folder, folder, folder, folder))
+    return Job("anchor-sample", "U_Test_0", 0, 1, 0, EMBODIMENT, ProjectPaths(folder, folder, folder, folder))
 
 
 def item_of(thing: Instance, name: str) -> dict:

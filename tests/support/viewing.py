@@ -16,7 +16,7 @@ YARD = "U_Courtyard_0"
 @contextmanager
 def served(data: Path, scene: str | None = None, *, silent: bool = True) -> Iterator[str]:
     """Run ``aerialdojo-gen view``; gives the address of the page that it opens; Ctrl-C has to be a plain end."""
-    command = [sys.executable, "-m", "aerialdojo_gen.cli.app", "view", "--data", str(data), "--no-browser"]
+    command = [sys.executable, "-m", "aerialdojo_gen.cli", "view", "--data", str(data), "--no-browser"]
     command += ["--scene", scene] if scene else []
     called, path = (scene, f"scenes/{scene}/") if scene else (r"\d+ scenes", "")
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)

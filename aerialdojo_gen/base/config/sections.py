@@ -144,7 +144,7 @@ class PairObjectsConfig(Section):
     )
 
 
-class Rung(Section):
+class SearchAttempt(Section):
     """One search of the planner's ladder."""
 
     weight: float = Field(gt=0, le=1000, description="of the cost-to-go; 1 is plain A*")
@@ -198,11 +198,11 @@ class PlanConfig(Section):
     )
     clearance_cap_m: float = Field(5.0, gt=0, le=100, description="clearances are known up to this distance")
     prove_by_grid: bool = Field(True, description="leave FCL unasked about legs that the grid proves free")
-    ladder: tuple[Rung, ...] = Field(
+    ladder: tuple[SearchAttempt, ...] = Field(
         (
-            Rung(weight=1.05, budget=20_000),
-            Rung(weight=1.15, budget=8_000, duplicate_cell_m=0.25, heading_sectors=4, extra_radius_m=0.02),
-            Rung(weight=1.15, budget=25_000, duplicate_cell_m=0.25, heading_sectors=4),
+            SearchAttempt(weight=1.05, budget=20_000),
+            SearchAttempt(weight=1.15, budget=8_000, duplicate_cell_m=0.25, heading_sectors=4, extra_radius_m=0.02),
+            SearchAttempt(weight=1.15, budget=25_000, duplicate_cell_m=0.25, heading_sectors=4),
         ),
         min_length=1,
         max_length=16,

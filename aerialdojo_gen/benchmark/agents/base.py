@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
-from aerialdojo_gen.base.errors import AerialDojoError, AgentUnavailable, ServiceDown
+from aerialdojo_gen.base.errors import AerialDojoError
 from aerialdojo_gen.benchmark.agents.goal import Goal, Observation
 
 

@@ -97,7 +97,7 @@ class Rules:
 
 
 # What an agent may be told beside the paper's goal, where it is asked for.
-TELLABLE = ("heading",)
+HINTS = ("heading",)
 
 
 @dataclass(frozen=True)

@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 from pydantic import ValidationError
 
-from aerialdojo_gen.base.errors import AerialDojoError, UsageError
+from aerialdojo_gen.base.errors import AerialDojoError, AgentUnavailable, ServiceDown, UsageError
 from aerialdojo_gen.base.explain import explain
 from aerialdojo_gen.base.llm_client.images import Picture, colour_picture, depth_picture
 from aerialdojo_gen.base.llm_client.service import Connection
 from aerialdojo_gen.base.secrets import Secrets
-from aerialdojo_gen.benchmark.agents.base import AgentBase, AgentUnavailable, InvalidAnswer, ServiceDown, Usage
+from aerialdojo_gen.benchmark.agents.base import AgentBase, InvalidAnswer, Usage
 from aerialdojo_gen.benchmark.agents.goal import Goal, Observation, Sensors
 from aerialdojo_gen.benchmark.llm.answer import parse_answer
 from aerialdojo_gen.benchmark.llm.error_hints import refused, unanswered

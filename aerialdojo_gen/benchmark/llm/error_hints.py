@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import re
 
-from aerialdojo_gen.base.errors import AerialDojoError, UsageError
-from aerialdojo_gen.benchmark.agents.base import AgentUnavailable, ServiceDown
+from aerialdojo_gen.base.errors import AerialDojoError, AgentUnavailable, ServiceDown, UsageError
 
 # By the kind of a failure that is met in the check before a run.
 _BY_KIND = {

@@ -2,6 +2,6 @@
 
 from aerialdojo_gen.dataset.validate.registry import Fault, Outcome
 from aerialdojo_gen.dataset.validate.report import Report, write_report
-from aerialdojo_gen.dataset.validate.run import Asked, validate
+from aerialdojo_gen.dataset.validate.run import ValidationOptions, validate
 
-__all__ = ["Asked", "Fault", "Outcome", "Report", "validate", "write_report"]
+__all__ = ["ValidationOptions", "Fault", "Outcome", "Report", "validate", "write_report"]

@@ -15,7 +15,7 @@ from aerialdojo_gen.geometry.part_visibility import FRONT_RAD
 from aerialdojo_gen.geometry.surface import Surface
 from aerialdojo_gen.pipeline.scoring.ensemble import SCORERS
 from aerialdojo_gen.pipeline.scoring.geometric import FACTORS, WEIGHTS
-from aerialdojo_gen.pipeline.scoring.recognisability import FRONT_WEIGHT, TELLS_WEIGHT, clarity
+from aerialdojo_gen.pipeline.scoring.recognisability import FRONT_WEIGHT, TELLS_WEIGHT, clarity_score
 from aerialdojo_gen.pipeline.stages.work.anchor_choice import SLACK_M
 
 _SAME_M = 1e-4
@@ -68,7 +68,7 @@ def anchor_score(data: SceneData, rows: Rows) -> Iterator[Finding]:
     geometric = geometric * (1.0 - share.sum(axis=1)) + (share * np.nan_to_num(known)).sum(axis=1)
     framed, unhindered = parts[:, len(WEIGHTS) :].T
     unoccluded, level = (parts[:, names.index(name)] for name in ("unoccluded", "level"))
-    geometric = geometric * clarity(unoccluded, framed, 1.0 - unhindered, level)
+    geometric = geometric * clarity_score(unoccluded, framed, 1.0 - unhindered, level)
     by_hand = np.asarray(rows.texts("selected_by"), dtype=object) == "human"
     for row, score in enumerate(rows.floats("score")):
         own = {name: values[row] for name, values in scores.items() if np.isfinite(values[row])}

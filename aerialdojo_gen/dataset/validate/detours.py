@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from aerialdojo_gen.base.config.sections import Rung
+from aerialdojo_gen.base.config.sections import SearchAttempt
 from aerialdojo_gen.dataset.validate.registry import Finding, check
 from aerialdojo_gen.dataset.validate.rows import Floats, Rows, SceneData
 from aerialdojo_gen.dataset.validate.scene_mesh import scene_mesh
@@ -25,7 +25,7 @@ from aerialdojo_gen.planning.clearance import ClearanceGrid
 from aerialdojo_gen.planning.collision import CollisionWorld
 from aerialdojo_gen.planning.cost_to_go import columns_by_distance, expand_cost, seed_goal
 from aerialdojo_gen.planning.planner import Planner
-from aerialdojo_gen.planning.preference import NO_PREFERENCE, astray, narrow_cells, squeeze
+from aerialdojo_gen.planning.preference import NO_PREFERENCE, approach_penalty, clearance_penalty, narrow_cells
 from aerialdojo_gen.store.schemas import APPROACH
 
 _FITS = ("list_lengths_differ", "out_of_bounds", "route_length", "route_collision")
@@ -37,7 +37,7 @@ _ROOM_M = 0.05
 # Cells of a metre make a grid in seconds, and lose passages, never invent them: its way is feasible, not the best.
 _CELL_M, _LONGER_M, _LONGER_SHARE = 1.0, 4.5, 0.1
 # The wide search: all but exhaustive (of the planner's own routes 4 % longer at most), a second a route.
-_WIDE = Rung(weight=0.97, budget=400_000, duplicate_cell_m=0.25)
+_WIDE = SearchAttempt(weight=0.97, budget=400_000, duplicate_cell_m=0.25)
 # Of what routes are searched for. The planner's own, where a grid or their corners cast doubt on them, go to 0.14.
 _SHORTER_M, _SHORTER_SHARE = 1.0, 0.15
 
@@ -121,14 +121,14 @@ def _cost_m(planner: Planner, poses: Floats, actions: NDArray[np.integer[Any]]) 
     plan, grid = planner.config, planner.grid.arrays
     total = 0.0
     for here, there in pairwise(poses[:, :3].tolist()):
-        total += math.dist(here, there) + squeeze(
+        total += math.dist(here, there) + clearance_penalty(
             *here, *there, plan.clearance_preference_m, plan.clearance_weight, *grid.origin.tolist(), grid.cell,
             grid.field,
         )  # fmt: skip
     if len(actions) > 1 and actions[-2] == APPROACH:
         dx, dy, dz = (poses[-1, :3] - poses[-2, :3]).tolist()
         ahead = math.cos(math.radians(plan.max_approach_angle_deg))
-        total += astray(dx, dy, float(poses[-1, 3]), math.hypot(dx, dy, dz), ahead, plan.approach_detour_m)
+        total += approach_penalty(dx, dy, float(poses[-1, 3]), math.hypot(dx, dy, dz), ahead, plan.approach_detour_m)
     return total
 
 

@@ -39,7 +39,7 @@ _OF_TASK = (
 )  # fmt: skip
 
 
-def _told(rows: Rows, *names: str) -> Mask:
+def _all_known(rows: Rows, *names: str) -> Mask:
     """Rows that say all of some columns."""
     return np.asarray(np.logical_and.reduce([_known(rows, name) for name in names]), dtype=np.bool_)
 
@@ -49,7 +49,7 @@ def _known(rows: Rows, name: str) -> Mask:
 
 
 @check("routes", after=_OF_ROUTE)
-def difficulty_told(data: SceneData, rows: Rows) -> Iterator[Finding]:
+def difficulty_known(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """Every route says how hard it is, unless an older version wrote the release and none does."""
     names = [name for name in TOLD_OF_DIFFICULTY if name != "visible_view_at_start"]
     known = np.column_stack([_known(rows, name) for name in names])
@@ -203,7 +203,7 @@ def split_by_objects(data: SceneData, rows: Rows) -> Iterator[Finding]:
     ids = data["objects"].ints("object_id").tolist()
     key = key_of(data.pipeline.split.salt, data.pipeline.seed)
     out = held_out(data.scene, ids, fraction, key) if _has_salt(data, key) else None
-    told = _told(rows, *TOLD_OF_SPLITS)
+    told = _all_known(rows, *TOLD_OF_SPLITS)
     split, said = rows.texts("target_split"), {end: rows.floats(f"{end}_held_out") for end in ("target", "start")}
     ends = {end: np.append(routes.ints(f"{end}_object_id"), -1)[data.route_of_task].tolist() for end in said}
     known: dict[int, bool] = {}
@@ -229,7 +229,7 @@ def _has_salt(data: SceneData, key: bytes) -> bool:
 
 
 @check("tasks")
-def splits_told(_data: SceneData, rows: Rows) -> Iterator[Finding]:
+def splits_known(_data: SceneData, rows: Rows) -> Iterator[Finding]:
     """Every task says on which sides of the splits it is, unless an older version wrote the release and none does."""
     known = np.column_stack([_known(rows, name) for name in TOLD_OF_SPLITS])
     if not known.any():

@@ -65,7 +65,7 @@ def mesh_moved(data: SceneData, _rows: Rows) -> Iterator[Finding]:
         name, world = off[0]
         others = f" and {len(off) - 1:,} more" if len(off) > 1 else ""
         yield Finding(
-            0, f"node {name}{others} moved by {_told(world)}", "z up turned into y up, and no other transform"
+            0, f"node {name}{others} moved by {_describe(world)}", "z up turned into y up, and no other transform"
         )
     scene = scene_mesh(data).scene
     wanted = Counter(instance.node for instance in (*scene.instances, *scene.backdrop))
@@ -170,7 +170,7 @@ def _local(node: dict[str, Any]) -> Floats:
     return local
 
 
-def _told(world: Floats) -> str:
+def _describe(world: Floats) -> str:
     """Say how a transform differs from the one that is wanted, in the world's frame."""
     rest = np.linalg.inv(_UP) @ world
     if np.abs(rest[:3, :3] - np.eye(3)).max() <= _SAME:

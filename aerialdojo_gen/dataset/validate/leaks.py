@@ -56,13 +56,13 @@ def telling_number(data: SceneData, rows: Rows) -> Iterator[Finding]:
     starts = np.full((len(routes) + 1, 4), np.nan)
     starts[paths.rows] = paths.starts
     own, theirs = rows.floats(*_START), secret[data.route_of_task]
-    told = _told(own, theirs, starts[data.route_of_task])
+    told = _leaked(own, theirs, starts[data.route_of_task])
     for row in np.flatnonzero(told.any(axis=1)):
         name = _START[int(told[row].argmax())]
         yield Finding(int(row), f"{name} = {own[row, int(told[row].argmax())]:.9g}", "nothing of the goal")
 
 
-def _told(own: Floats, secret: Floats, start: Floats) -> Floats:
+def _leaked(own: Floats, secret: Floats, start: Floats) -> Floats:
     """Which numbers of a row stand in the goal and are not the start's own."""
     alike = (np.abs(own[:, :, None] - secret[:, None, :]) <= _SAME_M).any(axis=2)
     return np.asarray(alike & ~(np.abs(own - start) <= _SAME_M))

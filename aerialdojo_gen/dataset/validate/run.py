@@ -12,9 +12,13 @@ from aerialdojo_gen.base.names import choose_scenes
 from aerialdojo_gen.dataset.contents import release_scenes
 from aerialdojo_gen.dataset.validate import (
     anchors,
+    below_ground,
     collisions,
+    descriptions,
     detours,
     difficulty,
+    endpoints,
+    foreign_keys,
     geometry,
     gltf,
     id_leaks,
@@ -23,13 +27,9 @@ from aerialdojo_gen.dataset.validate import (
     meshes,
     oracle,
     pictures,
+    reachability,
     tables,
 )
-from aerialdojo_gen.dataset.validate import below_ground as underground
-from aerialdojo_gen.dataset.validate import descriptions as words
-from aerialdojo_gen.dataset.validate import endpoints as ends
-from aerialdojo_gen.dataset.validate import foreign_keys as links
-from aerialdojo_gen.dataset.validate import reachability as shut_in
 from aerialdojo_gen.dataset.validate.counts import Tally, scene_counts, tally_of, whole_counts
 from aerialdojo_gen.dataset.validate.parts import (
     Release,
@@ -42,7 +42,7 @@ from aerialdojo_gen.dataset.validate.parts import (
 from aerialdojo_gen.dataset.validate.registry import CHECKS, Outcome, run_checks
 from aerialdojo_gen.dataset.validate.report import Report
 from aerialdojo_gen.dataset.validate.rows import SceneData
-from aerialdojo_gen.pipeline.executors import Folders, make_executor, on_disk
+from aerialdojo_gen.pipeline.executors import SharedPaths, make_executor, on_disk
 from aerialdojo_gen.pipeline.interrupt import Interrupts
 from aerialdojo_gen.pipeline.progress import Reporter
 from aerialdojo_gen.store.root import Where
@@ -54,15 +54,15 @@ _MODULES = (
     tables,
     geometry,
     leaks,
-    links,
-    ends,
+    foreign_keys,
+    endpoints,
     meshes,
     gltf,
-    words,
+    descriptions,
     anchors,
     collisions,
-    underground,
-    shut_in,
+    below_ground,
+    reachability,
     detours,
     difficulty,
     oracle,
@@ -74,7 +74,7 @@ SCENE_CHECKS = tuple(one for module in _MODULES for one in CHECKS if one.run.__m
 
 
 @dataclass(frozen=True)
-class Asked:
+class ValidationOptions:
     """What to check."""
 
     release: Release | Where  # The data root, or the release's own folder
@@ -88,7 +88,7 @@ class Asked:
 
 @dataclass(frozen=True)
 class _Work:
-    asked: Asked
+    asked: ValidationOptions
     scene: str
 
     @property
@@ -105,7 +105,7 @@ class _Work:
 
 
 def validate(
-    asked: Asked,
+    asked: ValidationOptions,
     *,
     workers: int | None = 1,
     executor: str = "local",
@@ -121,7 +121,9 @@ def validate(
     by_scene: dict[str, tuple[list[Outcome], Tally]] = {}
     shared = on_disk(release.root, *([asked.meshes] if asked.meshes else []))
     assets = asked.pipeline.scene_assets
-    made = make_executor(executor, workers, address, Folders(shared, (assets,) if assets else (), (), reporter.line))
+    made = make_executor(
+        executor, workers, address, SharedPaths(shared, (assets,) if assets else (), (), reporter.line)
+    )
     work = [_Work(asked, scene) for scene in _large_first(release, chosen)]
     with Interrupts() as interrupts, made as pool, reporter.bar("validate", len(chosen)) as bar:
         for done in pool.map(_check, work, memory_mb=MEMORY_MB):
@@ -137,7 +139,7 @@ def validate(
     return Report(tuple(chosen), tuple(outcomes))
 
 
-def check_scene(asked: Asked, scene: str) -> tuple[list[Outcome], Tally]:
+def check_scene(asked: ValidationOptions, scene: str) -> tuple[list[Outcome], Tally]:
     """Check one scene of a release."""
     release = release_of(asked.release)
     found, outcomes = read_tables(release, scene)

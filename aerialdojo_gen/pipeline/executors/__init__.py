@@ -1,5 +1,12 @@
 """Where tasks are computed: in processes of this machine, or on a Ray cluster."""
 
-from aerialdojo_gen.pipeline.executors.base import EXECUTORS, Executor, Folders, Talk, make_executor, on_disk
+from aerialdojo_gen.pipeline.executors.base import (
+    EXECUTORS,
+    Executor,
+    ParentChannel,
+    SharedPaths,
+    make_executor,
+    on_disk,
+)
 
-__all__ = ["EXECUTORS", "Executor", "Folders", "Talk", "make_executor", "on_disk"]
+__all__ = ["EXECUTORS", "Executor", "SharedPaths", "ParentChannel", "make_executor", "on_disk"]

@@ -11,7 +11,7 @@ from types import TracebackType
 from typing import Any, Generic, Protocol, TypeVar
 
 from aerialdojo_gen.base.errors import AerialDojoError, UsageError
-from aerialdojo_gen.pipeline.executors.link import Link
+from aerialdojo_gen.pipeline.executors.link import WorkerChannel
 from aerialdojo_gen.store.root import DataRoot, LocalRoot
 
 EXECUTORS = ("local", "ray")
@@ -34,7 +34,7 @@ R = TypeVar("R")
 
 
 @dataclass(frozen=True)
-class Folders:
+class SharedPaths:
     """The folders that tasks name."""
 
     shared: tuple[Path, ...] = ()
@@ -50,7 +50,7 @@ def on_disk(*places: Path | DataRoot, below: str = "") -> tuple[Path, ...]:
 
 
 @dataclass(frozen=True)
-class Talk:
+class ParentChannel:
     """The parent's side of the links that its workers have."""
 
     hear: Callable[[Any], None]  # Called in this process with what a worker tells
@@ -88,15 +88,15 @@ class Executor(ABC):
         tasks: Sequence[T],
         scene_of: Callable[[T], str] | None = None,
         *,
-        talk: Talk | None = None,
+        talk: ParentChannel | None = None,
         memory_mb: int = 0,
     ) -> Iterator[R | AerialDojoError]:
-        """Do work on tasks that are known from the start: `run` of `Waiting`."""
-        return self.run(work, Waiting(tasks, scene_of), talk=talk, memory_mb=memory_mb)
+        """Do work on tasks that are known from the start: `run` of `TaskQueue`."""
+        return self.run(work, TaskQueue(tasks, scene_of), talk=talk, memory_mb=memory_mb)
 
     @abstractmethod
     def run(
-        self, work: Callable[..., R], waiting: Waiting[T], *, talk: Talk | None = None, memory_mb: int = 0
+        self, work: Callable[..., R], waiting: TaskQueue[T], *, talk: ParentChannel | None = None, memory_mb: int = 0
     ) -> Iterator[R | AerialDojoError]:
         """Do work on tasks and yield what it returns, or the expected error, in the order of finishing."""
 
@@ -109,7 +109,7 @@ class Executor(ABC):
         """End the processes now, and wait until they are gone."""
 
 
-def guarded(work: Callable[..., R], task: Any, link: Link | None) -> R | AerialDojoError:
+def guarded(work: Callable[..., R], task: Any, link: WorkerChannel | None) -> R | AerialDojoError:
     """Do work on a task; an expected error is returned."""
     try:
         return work(task) if link is None else work(task, link)
@@ -118,7 +118,7 @@ def guarded(work: Callable[..., R], task: Any, link: Link | None) -> R | AerialD
 
 
 def make_executor(
-    name: str, workers: int | None = None, address: str | None = None, folders: Folders | None = None
+    name: str, workers: int | None = None, address: str | None = None, folders: SharedPaths | None = None
 ) -> Executor:
     """Make an executor; nothing is started yet."""
     if name not in EXECUTORS:
@@ -126,7 +126,7 @@ def make_executor(
     if name == "ray":
         from aerialdojo_gen.pipeline.executors.ray import RayExecutor
 
-        return RayExecutor(workers, address, folders or Folders())
+        return RayExecutor(workers, address, folders or SharedPaths())
     if address is not None:
         raise UsageError("--address is of --executor ray: leave it out, or give both")
     from aerialdojo_gen.pipeline.executors.local import LocalExecutor
@@ -134,7 +134,7 @@ def make_executor(
     return LocalExecutor(workers)
 
 
-class Waiting(Generic[T]):
+class TaskQueue(Generic[T]):
     """Tasks that nobody has begun, by scene; `Executor.run` takes them from here."""
 
     def __init__(self, tasks: Sequence[T], scene_of: Callable[[T], str] | None) -> None:
@@ -179,7 +179,7 @@ class Waiting(Generic[T]):
             scene = scene if scene in self._scenes else next(iter(self._scenes))
             yield self._pop(scene)
 
-    def finished(self, task: T, outcome: Any) -> None:
+    def on_done(self, task: T, outcome: Any) -> None:
         """Hear what became of a task, an error that was expected among it."""
 
     def put_back(self, task: T) -> None:

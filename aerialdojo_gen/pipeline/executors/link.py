@@ -11,7 +11,7 @@ from collections.abc import Callable
 from typing import Protocol
 
 
-class Link(Protocol):
+class WorkerChannel(Protocol):
     """A worker's way to the process that gave it its task."""
 
     every_s: float  # How far messages should be apart, seconds; 0 where each costs nothing
@@ -26,7 +26,7 @@ class Link(Protocol):
         """Return how many seconds to wait for a turn; turns of all workers are at least `interval_s` apart."""
 
 
-class Turns:
+class RateLimiter:
     """Turns at even intervals, seconds of one clock that all who ask share; `next` is when the next one is."""
 
     def __init__(self, following: float = 0.0) -> None:
@@ -39,14 +39,14 @@ class Turns:
         return at - now
 
 
-class Here:
+class InProcessChannel:
     """The link of a worker that is its own parent."""
 
     every_s = 0.0
 
     def __init__(self, hear: Callable[[object], None], stopped: Callable[[], bool]) -> None:
         self.tell, self.stopped = hear, stopped
-        self._turns = Turns()
+        self._turns = RateLimiter()
 
     def turn(self, interval_s: float) -> float:
         """Return how many seconds to wait for a turn."""

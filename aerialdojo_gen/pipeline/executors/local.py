@@ -20,8 +20,8 @@ from multiprocessing.reduction import ForkingPickler
 from typing import Any
 
 from aerialdojo_gen.base.errors import AerialDojoError
-from aerialdojo_gen.pipeline.executors.base import Executor, R, T, Talk, Waiting, guarded
-from aerialdojo_gen.pipeline.executors.link import Here, Turns, end
+from aerialdojo_gen.pipeline.executors.base import Executor, ParentChannel, R, T, TaskQueue, guarded
+from aerialdojo_gen.pipeline.executors.link import InProcessChannel, RateLimiter, end
 
 # How often the parent looks whether workers are to stop, seconds.
 _LOOK_EVERY_S = 0.2
@@ -80,17 +80,17 @@ class LocalExecutor(Executor):
         end()
 
     def run(
-        self, work: Callable[..., R], waiting: Waiting[T], *, talk: Talk | None = None, memory_mb: int = 0
+        self, work: Callable[..., R], waiting: TaskQueue[T], *, talk: ParentChannel | None = None, memory_mb: int = 0
     ) -> Iterator[R | AerialDojoError]:
         """Do work on tasks and yield what it returns, or the expected error, in the order of finishing."""
         if self._workers <= 1 or waiting.alone:
-            here = Here(talk.hear, talk.stopped) if talk else None
+            here = InProcessChannel(talk.hear, talk.stopped) if talk else None
             for task in waiting.one_by_one():
                 outcome = guarded(work, task, here)
-                waiting.finished(task, outcome)
+                waiting.on_done(task, outcome)
                 yield outcome
             return
-        turns, running, stopping = Turns(), dict[int, T](), set[int]()
+        turns, running, stopping = RateLimiter(), dict[int, T](), set[int]()
         try:
             while True:
                 # One task a process keeps a Ctrl-C from waiting for what has not begun.
@@ -114,7 +114,7 @@ class LocalExecutor(Executor):
                         case "raised", error, origin:
                             raise error from RuntimeError(f"in a worker process\n{origin}")
                         case "done", outcome:
-                            waiting.finished(running.pop(number), outcome)
+                            waiting.on_done(running.pop(number), outcome)
                             yield outcome
                 if not running and not waiting:
                     return

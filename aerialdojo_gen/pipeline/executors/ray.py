@@ -23,10 +23,10 @@ from pathlib import Path
 from typing import Any
 
 from aerialdojo_gen.base.errors import AerialDojoError, MissingPackage, UsageError, first_line, lacks
-from aerialdojo_gen.pipeline.executors.base import Executor, Folders, R, T, Talk, Waiting
+from aerialdojo_gen.pipeline.executors.base import Executor, ParentChannel, R, SharedPaths, T, TaskQueue
 from aerialdojo_gen.pipeline.executors.bundled import pack
 from aerialdojo_gen.pipeline.executors.local import own_cores
-from aerialdojo_gen.pipeline.executors.ray_worker import Board, Expected, Worker, listing, versions
+from aerialdojo_gen.pipeline.executors.ray_worker import Expected, MessageBoard, Worker, listing, versions
 from aerialdojo_gen.store.staging import scratch_folder, staged
 
 # How often a task is begun before its fault is taken for its own.
@@ -64,7 +64,7 @@ class _Lane:
 class RayExecutor(Executor):
     """Does work in actors of a Ray cluster."""
 
-    def __init__(self, workers: int | None, address: str | None, folders: Folders) -> None:
+    def __init__(self, workers: int | None, address: str | None, folders: SharedPaths) -> None:
         if address is not None and not re.fullmatch(r"(ray://)?[^\s:/]+:\d{1,5}", address):
             raise UsageError(f"--address {address}: write HOST:PORT, as `ray start --head` says it")
         self._ray = _import_ray(address is None)
@@ -86,7 +86,7 @@ class RayExecutor(Executor):
         return self._asked
 
     def run(
-        self, work: Callable[..., R], waiting: Waiting[T], *, talk: Talk | None = None, memory_mb: int = 0
+        self, work: Callable[..., R], waiting: TaskQueue[T], *, talk: ParentChannel | None = None, memory_mb: int = 0
     ) -> Iterator[R | AerialDojoError]:
         """Do work on tasks and yield what it returns, or the expected error, in the order of finishing."""
         if not waiting:
@@ -130,7 +130,7 @@ class RayExecutor(Executor):
                 else:
                     if talk:
                         self._hear(talk)
-                    waiting.finished(task, outcome)
+                    waiting.on_done(task, outcome)
                     yield outcome
             if not running and time.monotonic() - begun_s > _SAY_AFTER_S:
                 begun_s = float("inf")
@@ -186,7 +186,7 @@ class RayExecutor(Executor):
         self._stack.callback(ray.shutdown)
         here = ray.get_runtime_context().get_node_id()
         stay = ray.util.scheduling_strategies.NodeAffinitySchedulingStrategy(here, soft=False)
-        self._board = ray.remote(Board).options(num_cpus=0, scheduling_strategy=stay).remote()
+        self._board = ray.remote(MessageBoard).options(num_cpus=0, scheduling_strategy=stay).remote()
         own_names = {name for name in os.environ if _FORWARDED.fullmatch(name)}
         self._expected = Expected(
             seen={
@@ -289,7 +289,7 @@ class RayExecutor(Executor):
         self._lanes.clear()
         self._refs.clear()
 
-    def _hear(self, talk: Talk) -> None:
+    def _hear(self, talk: ParentChannel) -> None:
         for message in self._ray.get(self._board.take.remote(talk.stopped())):
             talk.hear(message)
 

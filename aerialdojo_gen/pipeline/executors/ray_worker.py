@@ -17,7 +17,7 @@ from typing import Any
 
 from aerialdojo_gen.pipeline.executors.base import guarded
 from aerialdojo_gen.pipeline.executors.bundled import Unpacked
-from aerialdojo_gen.pipeline.executors.link import Turns, end
+from aerialdojo_gen.pipeline.executors.link import RateLimiter, end
 
 _ASK_EVERY_S = 0.5
 
@@ -105,13 +105,13 @@ def _above_marker(path: str) -> Path:
     return Path(path).parents[2]
 
 
-class Board:
+class MessageBoard:
     """Keeps what workers tell until the driver takes it; Ray makes an actor of it."""
 
     def __init__(self) -> None:
         self._told: list[object] = []
         self._stopped = False
-        self._turns = Turns()
+        self._turns = RateLimiter()
 
     def tell(self, message: object) -> None:
         """Keep a message."""

@@ -22,7 +22,7 @@ class Verdict:
     parts: dict[str, float | None]
 
 
-class Panel:
+class ScorerEnsemble:
     """All scorers of a configuration."""
 
     def __init__(self, config: AnchorSampleConfig, radius_m: float) -> None:
@@ -61,6 +61,6 @@ class Panel:
 
 
 @lru_cache(maxsize=2)
-def panel(config: AnchorSampleConfig, radius_m: float) -> Panel:
+def scorer_ensemble(config: AnchorSampleConfig, radius_m: float) -> ScorerEnsemble:
     """Return the panel of a configuration, kept in memory: a model takes seconds to load."""
-    return Panel(config, radius_m)
+    return ScorerEnsemble(config, radius_m)

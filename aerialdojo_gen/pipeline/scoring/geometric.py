@@ -13,13 +13,13 @@ import numpy as np
 
 from aerialdojo_gen.geometry.viewpoints import level_marks
 from aerialdojo_gen.pipeline.scoring.base import AnchorView, Known
-from aerialdojo_gen.pipeline.scoring.recognisability import clarity, fronting, knowing, telling
+from aerialdojo_gen.pipeline.scoring.recognisability import clarity_score, front_score, part_score, recognisability
 
 WEIGHTS = {
     "unoccluded": 0.25, "shown": 0.25, "size": 0.1, "centred": 0.1, "contrast": 0.05, "sky": 0.025, "level": 0.1,
     "clear": 0.125,
 }  # fmt: skip
-# The weighted mean is multiplied by the `clarity` (module knowing) of these, of `unoccluded` and of `level`.
+# The weighted mean is multiplied by the `clarity_score` (module knowing) of these, of `unoccluded` and of `level`.
 FACTORS = ("framed", "open")
 
 # Of a term of the picture, what is that of the reference picture where this is taken from further back.
@@ -57,8 +57,8 @@ class Parts:
         terms = asdict(self)
         silhouette = sum(weight * terms[name] for name, weight in WEIGHTS.items())
         known = [None if mark is None else np.array([mark]) for mark in (self.tells, self.front)]
-        clear = clarity(*np.array([[self.unoccluded], [self.framed], [1.0 - self.open], [self.level]]))
-        return float((knowing(np.array([silhouette]), *known) * clear)[0])
+        clear = clarity_score(*np.array([[self.unoccluded], [self.framed], [1.0 - self.open], [self.level]]))
+        return float((recognisability(np.array([silhouette]), *known) * clear)[0])
 
     @property
     def columns(self) -> dict[str, float | None]:
@@ -95,8 +95,8 @@ def _parts(known: AnchorView | Known, terms: dict[str, Any], radius_m: float, st
     level = float(level_marks(known.elevation_deg))
     room = standoff_m - radius_m
     clear = min(max((known.clearance_m - radius_m) / room, 0.0), 1.0) if room > 0.0 else 1.0
-    tells = float(telling(np.array([known.told]))[0]) if known.told else None
-    off = fronting(None if known.off_front_rad is None else np.array([known.off_front_rad]))
+    tells = float(part_score(np.array([known.told]))[0]) if known.told else None
+    off = front_score(None if known.off_front_rad is None else np.array([known.off_front_rad]))
     return Parts(
         shown=known.shown,
         level=level,

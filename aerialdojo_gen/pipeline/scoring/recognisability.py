@@ -11,17 +11,17 @@ TELLS_WEIGHT, FRONT_WEIGHT = 0.35, 0.3
 _ANGLES_RAD, _MARKS = np.radians([0.0, 25.0, 60.0, 60.001, 120.0]), (1.0, 1.0, 0.5, 0.15, 0.0)
 
 
-def telling(told: Floats) -> Floats:
+def part_score(told: Floats) -> Floats:
     """Score how well identifying parts (n, t), 0 to 1, are seen: half the worst one, half their mean."""
     return np.asarray((told.min(axis=1) + told.mean(axis=1)) / 2.0)
 
 
-def fronting(off_front_rad: Floats | None) -> Floats | None:
+def front_score(off_front_rad: Floats | None) -> Floats | None:
     """Mark angles off the front: full up to 25°, half at 60°, little beyond; None for an object without a front."""
     return None if off_front_rad is None else np.asarray(np.interp(off_front_rad, _ANGLES_RAD, _MARKS))
 
 
-def clarity(unoccluded: Floats, framed: Floats, foreground: Floats, level: Floats) -> Floats:
+def clarity_score(unoccluded: Floats, framed: Floats, foreground: Floats, level: Floats) -> Floats:
     """Factor (n,) in (0, 1] for what hides the object, cuts it off or stands nearer, and for looking up or down."""
     return np.asarray(
         np.interp(unoccluded, (0.4, 0.95), (0.4, 1.0))
@@ -31,7 +31,7 @@ def clarity(unoccluded: Floats, framed: Floats, foreground: Floats, level: Float
     )
 
 
-def knowing(score: Floats, tells: Floats | None, front: Floats | None) -> Floats:
+def recognisability(score: Floats, tells: Floats | None, front: Floats | None) -> Floats:
     """Combine the silhouette's score with those of identifying parts and front, (n,) in [0, 1].
 
     None leaves its weight to the silhouette.

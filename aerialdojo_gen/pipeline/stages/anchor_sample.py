@@ -18,7 +18,7 @@ def run(job: Job, config: AnchorSampleConfig) -> Output:
     return anchor_sample.run(job, config)
 
 
-def settle(config: AnchorSampleConfig, _say: Callable[[str], None]) -> AnchorSampleConfig:
+def resolve_config(config: AnchorSampleConfig, _say: Callable[[str], None]) -> AnchorSampleConfig:
     """Put the digest of the CLIP model's files in the place of their names, where they are asked."""
     if config.clip is None or not config.weights.clip:
         return config
@@ -40,7 +40,7 @@ STAGE = Stage(
     reads=("scenes", "objects", "chosen_anchors"),
     writes=("anchors", "viewpoints"),
     run=run,
-    settle=settle,
+    resolve_config=resolve_config,
     idle=idle,
     seconds=(1.0, 0.1),
 )

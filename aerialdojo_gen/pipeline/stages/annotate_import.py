@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from aerialdojo_gen.base.cli_context import command
 from aerialdojo_gen.base.errors import AssetError
-from aerialdojo_gen.pipeline.stage import Job, Output, Roots, Stage
+from aerialdojo_gen.pipeline.stage import Job, Output, ProjectPaths, Stage
 from aerialdojo_gen.scenes.catalogue_files import catalogue_files
 
 if TYPE_CHECKING:
@@ -21,14 +21,14 @@ def run(job: Job, config: AnnotateImportConfig) -> Output:
     return annotate_import.run(job, config)
 
 
-def sources(roots: Roots, scene: str) -> list[Path]:
+def sources(roots: ProjectPaths, scene: str) -> list[Path]:
     """List the annotation file and the catalogue; AssetError where there is no such file."""
-    if missing := wants(roots, scene):
+    if missing := missing_input(roots, scene):
         raise AssetError(missing)
     return [_file(roots, scene), *catalogue_files(roots.scene_assets)]
 
 
-def wants(roots: Roots, scene: str) -> str:
+def missing_input(roots: ProjectPaths, scene: str) -> str:
     """Say that a scene has no annotation file, and how to make one; empty where it has."""
     file = _file(roots, scene)
     if file.is_file():
@@ -39,7 +39,7 @@ def wants(roots: Roots, scene: str) -> str:
     )
 
 
-def _file(roots: Roots, scene: str) -> Path:
+def _file(roots: ProjectPaths, scene: str) -> Path:
     return roots.annotations / f"{scene}.json"
 
 
@@ -50,6 +50,6 @@ STAGE = Stage(
     writes=("landmarks", "objects", "chosen_anchors"),
     run=run,
     sources=sources,
-    wants=wants,
+    missing_input=missing_input,
     seconds=(0.5, 0.0),
 )

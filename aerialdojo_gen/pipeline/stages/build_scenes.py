@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from aerialdojo_gen.base.errors import AssetError, Malformed
 from aerialdojo_gen.base.safe_parse import loads_toml, read_toml
-from aerialdojo_gen.pipeline.stage import Job, Output, Roots, Stage
+from aerialdojo_gen.pipeline.stage import Job, Output, ProjectPaths, Stage
 from aerialdojo_gen.scenes import layouts
 from aerialdojo_gen.scenes.catalogue_files import catalogue_files
 
@@ -24,7 +24,7 @@ def run(job: Job, config: BuildScenesConfig) -> Output:
     return build_scenes.run(job, config)
 
 
-def sources(roots: Roots, scene: str) -> list[Path]:
+def sources(roots: ProjectPaths, scene: str) -> list[Path]:
     """List recipe, mesh beside it, materials and catalogue."""
     mesh = roots.recipes / f"{scene}.glb"
     return [
@@ -35,7 +35,7 @@ def sources(roots: Roots, scene: str) -> list[Path]:
     ]
 
 
-def imports(roots: Roots, scene: str) -> Choice | None:
+def imports(roots: ProjectPaths, scene: str) -> Choice | None:
     """Choose the layout that the recipe names; of a recipe that is wrong the stage itself says what is."""
     from aerialdojo_gen.pipeline.code_digest import Choice
 

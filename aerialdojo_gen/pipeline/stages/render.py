@@ -33,10 +33,10 @@ STAGE = Stage(
     writes=("recordings", "frames"),
     run=run,
     parts=parts,
-    settle=settle_renderer,
+    resolve_config=settle_renderer,
     choices=renderer_choices,
     idle=idle_renderers,
     digests=("recordings", "path", "sha256"),
     seconds=(10.0, 0.0),
-    after_all=True,
+    barrier=True,
 )

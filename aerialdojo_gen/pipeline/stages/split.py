@@ -38,5 +38,5 @@ STAGE = Stage(
     run=run,
     check=check,
     seconds=(0.2, 0.005),
-    after_all=True,
+    barrier=True,
 )  # fmt: skip

@@ -20,7 +20,7 @@ from aerialdojo_gen.base.pictures import REFERENCE_PNG, encode_png
 from aerialdojo_gen.geometry.angles import yaw_towards
 from aerialdojo_gen.geometry.cameras import Camera, view_pose
 from aerialdojo_gen.geometry.surface import Surface
-from aerialdojo_gen.pipeline.stage import Job, Roots
+from aerialdojo_gen.pipeline.stage import Job, ProjectPaths
 from aerialdojo_gen.scenes.model import Scene
 
 Floats = NDArray[np.float64]
@@ -40,7 +40,7 @@ class View:
 class AnchorDesk:
     """Anchors of one scene's objects; the heavy work is done by one thread, one thing after another."""
 
-    def __init__(self, scene: Scene, pipeline: Pipeline, roots: Roots) -> None:
+    def __init__(self, scene: Scene, pipeline: Pipeline, roots: ProjectPaths) -> None:
         self.scene, self.config, self._pictures = scene, pipeline.anchor_sample, pipeline.reference_images
         self._job = Job("anchor-sample", scene.name, 0, 1, pipeline.seed, pipeline.embodiment, roots)
         # One thread: PyBullet is not made for several, and two cores have the page to serve as well.

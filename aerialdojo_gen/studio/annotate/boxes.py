@@ -16,7 +16,7 @@ from pathlib import Path
 
 from aerialdojo_gen.base.disk import disk_error
 from aerialdojo_gen.base.errors import AerialDojoError
-from aerialdojo_gen.pipeline.stage import Roots
+from aerialdojo_gen.pipeline.stage import ProjectPaths
 from aerialdojo_gen.scenes.recipe import Cut, load_imported
 from aerialdojo_gen.store.atomic import atomic_file
 from aerialdojo_gen.store.staging import scratch_folder
@@ -55,7 +55,7 @@ def without_box(recipe: Path, node: str) -> str:
 
 
 @contextlib.contextmanager
-def staged(roots: Roots, scene: str, text: str) -> Iterator[Roots]:
+def staged(roots: ProjectPaths, scene: str, text: str) -> Iterator[ProjectPaths]:
     """Lay a changed recipe out for a build, with the scene's own mesh beside it."""
     with contextlib.ExitStack() as held:
         try:

@@ -12,14 +12,14 @@ import numpy as np
 from aerialdojo_gen.annotations.format import Object
 
 if TYPE_CHECKING:
-    from aerialdojo_gen.studio.annotate.session import Desk
+    from aerialdojo_gen.studio.annotate.session import AnnotationSession
 
 # A thing of fewer pixels is nothing to learn a box from.
 LEAST_PIXELS = 16
 _DATE = (1980, 1, 1, 0, 0, 0)  # the same annotations give the same bytes
 
 
-def coco_zip(desk: Desk) -> bytes:
+def coco_zip(desk: AnnotationSession) -> bytes:
     """Pack ``instances.json`` and ``images/*.png``."""
     document, pictures = coco(desk)
     buffer = io.BytesIO()
@@ -31,7 +31,7 @@ def coco_zip(desk: Desk) -> bytes:
     return buffer.getvalue()
 
 
-def coco(desk: Desk) -> tuple[dict[str, Any], dict[str, bytes]]:
+def coco(desk: AnnotationSession) -> tuple[dict[str, Any], dict[str, bytes]]:
     """Make the COCO document and its pictures, by file name.
 
     Boxes are ``[left, top, width, height]`` in pixels, areas the pixels that show the object, image ids the ids of
@@ -74,7 +74,7 @@ def coco(desk: Desk) -> tuple[dict[str, Any], dict[str, bytes]]:
     return document, pictures
 
 
-def _anchor(desk: Desk, entry: Object) -> tuple[Any, float] | None:
+def _anchor(desk: AnnotationSession, entry: Object) -> tuple[Any, float] | None:
     if entry.anchor is not None:
         return np.array(entry.anchor.position_m), float(np.radians(entry.anchor.yaw_deg))
     rows = desk.anchors.candidates(entry)

@@ -11,7 +11,7 @@ from functools import cache
 from pathlib import Path
 
 from aerialdojo_gen.annotations.describing import UNKNOWN, Vocabulary
-from aerialdojo_gen.annotations.draft import MOST, SCENERY, Choice, Drafter
+from aerialdojo_gen.annotations.draft import MOST, SCENERY, AnnotationDrafter, Choice
 from aerialdojo_gen.annotations.format import Annotations, parse_annotations, write_annotations
 from aerialdojo_gen.annotations.landmarks import choose_landmarks
 from aerialdojo_gen.annotations.redraft import redraft_annotations
@@ -20,7 +20,7 @@ from aerialdojo_gen.base.config.pipeline import Pipeline
 from aerialdojo_gen.base.errors import AnnotationError, UsageError
 from aerialdojo_gen.base.paper_figures import paper_counts
 from aerialdojo_gen.pipeline.progress import Reporter
-from aerialdojo_gen.pipeline.stage import Job, Roots
+from aerialdojo_gen.pipeline.stage import Job, ProjectPaths
 from aerialdojo_gen.pipeline.stages.work.anchor_sample import candidates_of
 from aerialdojo_gen.pipeline.stages.work.anchor_world import World
 from aerialdojo_gen.scenes.catalogue import load_catalogue
@@ -47,7 +47,7 @@ _CAUSES = {
 def draft_scene(
     name: str,
     pipeline: Pipeline,
-    roots: Roots,
+    roots: ProjectPaths,
     *,
     n_landmarks: int | None = None,
     n_objects: int | str | None = None,
@@ -80,7 +80,7 @@ def draft_scene(
     choice = choice or Choice()
     if choice.most is None and scene.imported:
         choice = replace(choice, most=max(MOST, math.ceil(most / len(targets))))
-    probe = Drafter(vocabulary, marks, seed, choice)
+    probe = AnnotationDrafter(vocabulary, marks, seed, choice)
     proposed = most if exact else min(most, probe.room())
     kinds = len({scene.instances[k].category for k in probe.things})
     if not proposed:
@@ -92,7 +92,7 @@ def draft_scene(
     # Counted is what ends the search: most things are never looked at, and the world is made before the first.
     looked_at = replace(choice, refuses=refusals(scene, pipeline, roots))
     with reporter.bar("annotate-draft", proposed, unit="objects") as bar:
-        drafter = Drafter(vocabulary, marks, seed, looked_at)
+        drafter = AnnotationDrafter(vocabulary, marks, seed, looked_at)
         objects = drafter.objects(proposed, bar.advance)
     _check_enough(name, len(objects), proposed, drafter.why_not(), exact=exact)
     write_annotations(Annotations(name, marks, objects), path)
@@ -133,7 +133,7 @@ def _many(n: int, what: str) -> str:
     return f"{n:,} {what}{'' if n == 1 else 's'}"
 
 
-def _described_anew(name: str, path: Path, roots: Roots, seed: int) -> Path:
+def _described_anew(name: str, path: Path, roots: ProjectPaths, seed: int) -> Path:
     if not path.exists():
         raise UsageError(f"{path} does not exist: there are no objects to keep")
     source = parse_annotations(path.read_text(encoding="utf-8"))
@@ -145,7 +145,7 @@ def _described_anew(name: str, path: Path, roots: Roots, seed: int) -> Path:
     return path
 
 
-def refusals(scene: Scene, pipeline: Pipeline, roots: Roots) -> Callable[[str], str]:
+def refusals(scene: Scene, pipeline: Pipeline, roots: ProjectPaths) -> Callable[[str], str]:
     """Make the test why a node cannot be an object: it must have a full shortlist of anchors."""
     config = pipeline.anchor_sample
     world = World.of(scene, pipeline.embodiment.radius_m, config.margin_m)

@@ -12,11 +12,13 @@ from aerialdojo_gen.base.errors import UsageError
 from aerialdojo_gen.store.atomic import atomic_file
 from aerialdojo_gen.studio.annotate.access import TokenGate
 from aerialdojo_gen.studio.annotate.coco import coco_zip
-from aerialdojo_gen.studio.annotate.session import Desk
+from aerialdojo_gen.studio.annotate.session import AnnotationSession
 from aerialdojo_gen.studio.web.serving import open_socket, serve, url_of
 
 
-def serve_desk(desk: Desk, *, port: int, host: str, browser: bool, say: Callable[[str], None]) -> None:
+def serve_session(
+    desk: AnnotationSession, *, port: int, host: str, browser: bool, say: Callable[[str], None]
+) -> None:
     """Serve the tool."""
     from aerialdojo_gen.studio.annotate.server import make_app
 
@@ -41,7 +43,7 @@ def serve_desk(desk: Desk, *, port: int, host: str, browser: bool, say: Callable
         desk.anchors.close()
 
 
-def write_coco(desk: Desk, path: Path) -> Path:
+def write_coco(desk: AnnotationSession, path: Path) -> Path:
     """Write `coco_zip` to a file, whole or not at all."""
     content = coco_zip(desk)
     desk.anchors.close()

@@ -15,7 +15,7 @@ from pydantic import BaseModel, ConfigDict, Field, StrictFloat, StrictStr, field
 from aerialdojo_gen.base.errors import AerialDojoError, AnnotationError, StoreError
 from aerialdojo_gen.studio.annotate.coco import coco_zip
 from aerialdojo_gen.studio.annotate.document import ConflictError, Operation
-from aerialdojo_gen.studio.annotate.session import Desk
+from aerialdojo_gen.studio.annotate.session import AnnotationSession
 from aerialdojo_gen.studio.annotate.storage import Author, StaleError
 from aerialdojo_gen.studio.web.serving import local_app, one_line
 
@@ -49,7 +49,7 @@ class Signed(_Body):
         return Author(self.who or "somebody", self.client)
 
 
-class Asked(Signed):
+class OperationRequest(Signed):
     """An operation."""
 
     operation: Operation
@@ -84,7 +84,7 @@ class Viewpoint(_Body):
     snap: bool = False
 
 
-def make_app(desk: Desk, *, any_host: bool = False) -> FastAPI:
+def make_app(desk: AnnotationSession, *, any_host: bool = False) -> FastAPI:
     """Make the tool's web application."""
     app = local_app(str(STATIC / "index.html"), f"annotate {desk.scene.name}", MOST_BYTES, any_host=any_host)
 
@@ -113,7 +113,7 @@ def make_app(desk: Desk, *, any_host: bool = False) -> FastAPI:
         return _with_version(desk.document(client))
 
     @app.post("/api/operations")
-    def operate(body: Asked, if_match: _Match = None) -> Response:
+    def operate(body: OperationRequest, if_match: _Match = None) -> Response:
         version = _required(if_match)
         try:
             return _with_version(desk.change(version, body.author, body.operation))
@@ -134,7 +134,7 @@ def make_app(desk: Desk, *, any_host: bool = False) -> FastAPI:
         return _with_version(desk.replace(_required(if_match), body.author, body.text.encode("utf-8", "replace")))
 
     @app.post("/api/draft")
-    def draft(body: Asked) -> dict[str, Any]:
+    def draft(body: OperationRequest) -> dict[str, Any]:
         return desk.draft(body.operation)
 
     @app.post("/api/pick")
@@ -157,7 +157,7 @@ def make_app(desk: Desk, *, any_host: bool = False) -> FastAPI:
     @app.get("/api/objects/{object_id}/anchors")
     def anchors(object_id: _Object) -> list[dict[str, Any]]:
         entry = desk.object(object_id)
-        return [_told(desk, entry.node, row, []) for row in desk.anchors.candidates(entry)]
+        return [_viewpoint_json(desk, entry.node, row, []) for row in desk.anchors.candidates(entry)]
 
     @app.post("/api/objects/{object_id}/viewpoint")
     def viewpoint(object_id: _Object, body: Viewpoint) -> dict[str, Any]:
@@ -166,7 +166,7 @@ def make_app(desk: Desk, *, any_host: bool = False) -> FastAPI:
         if body.snap:
             place = desk.anchors.place(entry, place)
         yaw = None if body.yaw_deg is None else math.radians(body.yaw_deg)
-        return _told(desk, entry.node, *desk.anchors.judge(entry, place, yaw))
+        return _viewpoint_json(desk, entry.node, *desk.anchors.judge(entry, place, yaw))
 
     @app.get("/api/picture")
     def picture(x: float, y: float, z: float, yaw_deg: float) -> Response:
@@ -192,7 +192,7 @@ def make_app(desk: Desk, *, any_host: bool = False) -> FastAPI:
     return app
 
 
-def _told(desk: Desk, node: str, row: dict[str, Any], faults: list[str]) -> dict[str, Any]:
+def _viewpoint_json(desk: AnnotationSession, node: str, row: dict[str, Any], faults: list[str]) -> dict[str, Any]:
     place = np.array([row["x_m"], row["y_m"], row["z_m"]])
     view = desk.anchors.view(place, row["yaw_rad"]) if _near(desk, place) else None
     box = view.boxes.get(node) if view else None
@@ -209,7 +209,7 @@ def _told(desk: Desk, node: str, row: dict[str, Any], faults: list[str]) -> dict
     }
 
 
-def _near(desk: Desk, place: Any) -> bool:
+def _near(desk: AnnotationSession, place: Any) -> bool:
     low, high = desk.scene.bounds
     return bool((place >= low - 5).all() and (place <= high + 5).all())
 

@@ -16,7 +16,7 @@ from aerialdojo_gen.annotations.format import Anchor, Object, format_annotations
 from aerialdojo_gen.base.config.pipeline import Pipeline
 from aerialdojo_gen.base.errors import AerialDojoError, UsageError
 from aerialdojo_gen.base.paper_figures import paper_counts
-from aerialdojo_gen.pipeline.stage import Job, Roots
+from aerialdojo_gen.pipeline.stage import Job, ProjectPaths
 from aerialdojo_gen.rendering.casters import ray_caster
 from aerialdojo_gen.scenes.catalogue import load_catalogue
 from aerialdojo_gen.scenes.cuts import cut_out
@@ -31,10 +31,10 @@ from aerialdojo_gen.studio.annotate.storage import Author, State, Storage
 from aerialdojo_gen.studio.web.payload import scene_payload
 
 
-class Desk:
+class AnnotationSession:
     """What the page's requests come down to."""
 
-    def __init__(self, name: str, pipeline: Pipeline, roots: Roots) -> None:
+    def __init__(self, name: str, pipeline: Pipeline, roots: ProjectPaths) -> None:
         self.storage = Storage(roots.annotations, name)
         self.storage.load()
         self._pipeline, self._roots = pipeline, roots
@@ -130,19 +130,19 @@ class Desk:
 
     def _saved(self, done: tuple[State, Record | None], author: Author) -> dict[str, Any]:
         state, record = done
-        return self._document(state, author.client) | {"done": _told(record) if record else None}
+        return self._document(state, author.client) | {"done": _to_json(record) if record else None}
 
     def changes_since(self, version: str) -> list[dict[str, Any]]:
         """What has been changed after a version, by whom."""
         with self._lock:
             self.storage.history.refresh()
-            return [_told(record) for record in self.storage.history.since(version)][-50:]
+            return [_to_json(record) for record in self.storage.history.since(version)][-50:]
 
     def history(self, most: int = 200) -> list[dict[str, Any]]:
         """The last changes, the newest first."""
         with self._lock:
             self.storage.history.refresh()
-            return [_told(record) for record in reversed(self.storage.history.records[-most:])]
+            return [_to_json(record) for record in reversed(self.storage.history.records[-most:])]
 
     # What is under the cursor, and anchors.
 
@@ -230,13 +230,13 @@ class Desk:
         return (state.text or format_annotations(state.annotations)).encode("utf-8")
 
 
-def _told(record: Record) -> dict[str, Any]:
+def _to_json(record: Record) -> dict[str, Any]:
     return record.model_dump(
         mode="json", include={"time", "who", "client", "action", "what", "before", "after", "edits"}
     )
 
 
-def open_desk(name: str, pipeline: Pipeline, roots: Roots) -> Desk:
+def open_session(name: str, pipeline: Pipeline, roots: ProjectPaths) -> AnnotationSession:
     """Open a scene at the desk, building its mesh where that is not up to date."""
     from aerialdojo_gen.pipeline.runner import chosen_scenes
 
@@ -244,10 +244,10 @@ def open_desk(name: str, pipeline: Pipeline, roots: Roots) -> Desk:
     if len(scenes) > 1:
         raise UsageError(f"{name} are {len(scenes)} scenes ({', '.join(scenes[:3])}, ...): annotate one at a time")
     build(scenes[0], pipeline, roots)
-    return Desk(scenes[0], pipeline, roots)
+    return AnnotationSession(scenes[0], pipeline, roots)
 
 
-def build(scene: str, pipeline: Pipeline, roots: Roots) -> None:
+def build(scene: str, pipeline: Pipeline, roots: ProjectPaths) -> None:
     """Bring a scene's mesh up to date with its recipe."""
     from aerialdojo_gen.pipeline import runner
     from aerialdojo_gen.pipeline.progress import Reporter

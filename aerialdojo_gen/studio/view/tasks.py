@@ -58,7 +58,7 @@ class TaskList:
         sort = pa.table({"key": key, "id": found["nav_id"]})
         rank = pc.sort_indices(sort, [("key", "descending" if descending else "ascending"), ("id", "ascending")])
         rows = found.take(rank.slice(offset, most)).to_pylist()
-        return {"total": found.num_rows, "tasks": [_told(row) for row in rows]}
+        return {"total": found.num_rows, "tasks": [_to_json(row) for row in rows]}
 
 
 def _fitting(table: pa.Table, setting: str, split: str, words: Sequence[str]) -> pa.Table:
@@ -78,6 +78,6 @@ def _fitting(table: pa.Table, setting: str, split: str, words: Sequence[str]) ->
     return table.filter(pa.array(keep))
 
 
-def _told(row: dict[str, Any]) -> dict[str, Any]:
+def _to_json(row: dict[str, Any]) -> dict[str, Any]:
     told = {key: round(value, 3) if isinstance(value, float) else value for key, value in row.items()}
     return {"object_id" if key == "target_object_id" else key: value for key, value in told.items()}

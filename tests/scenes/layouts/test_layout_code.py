@@ -13,7 +13,7 @@ from aerialdojo_gen.base.config.pipeline import load_pipeline
 from aerialdojo_gen.pipeline import fingerprint
 from aerialdojo_gen.pipeline.code_digest import PLUMBING, Package, stage_code, stage_module
 from aerialdojo_gen.pipeline.registry import BY_NAME
-from aerialdojo_gen.pipeline.stage import Roots
+from aerialdojo_gen.pipeline.stage import ProjectPaths
 from aerialdojo_gen.scenes import layouts
 from aerialdojo_gen.scenes.recipe import load_recipe
 
@@ -29,7 +29,7 @@ ENGINE = "aerialdojo_gen.scenes.layouts.build"
 
 
 def roots_of(recipe):
-    return Roots(PROJECT / "data", ASSETS, recipe.parent, PROJECT / "annotations")
+    return ProjectPaths(PROJECT / "data", ASSETS, recipe.parent, PROJECT / "annotations")
 
 
 def chosen(recipe):
@@ -136,7 +136,7 @@ def test_a_change_makes_stale_what_is_built_with_it_and_nothing_else(copied, rel
 
 
 def test_a_recipe_that_is_wrong_counts_all_layouts_and_an_imported_scene_none(tmp_path):
-    roots = Roots(tmp_path, ASSETS, tmp_path, tmp_path)
+    roots = ProjectPaths(tmp_path, ASSETS, tmp_path, tmp_path)
 
     def parts(text):
         (tmp_path / "Place.toml").write_text(text)
@@ -157,7 +157,7 @@ def test_the_fingerprint_of_a_scene_follows_its_layout(tmp_path):
     texts = {"a": 'layout = "mall"', "b": 'layout = "park"'}
     for name, text in texts.items():
         (tmp_path / f"{name}.toml").write_text(text)
-    roots = Roots(tmp_path, ASSETS, tmp_path, tmp_path)
+    roots = ProjectPaths(tmp_path, ASSETS, tmp_path, tmp_path)
     codes = {name: fingerprint.scene_code(BUILD, roots, name).digest for name in texts}
     assert codes["a"] != codes["b"]
     assert fingerprint.scene_fingerprint(BUILD, pipeline, roots, "a")

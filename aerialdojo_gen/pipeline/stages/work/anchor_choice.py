@@ -19,7 +19,7 @@ from aerialdojo_gen.geometry.surface import Surface
 from aerialdojo_gen.pipeline.scoring.ensemble import SCORERS
 from aerialdojo_gen.pipeline.scoring.geometric import judge
 from aerialdojo_gen.pipeline.stage import Job
-from aerialdojo_gen.pipeline.stages.work.anchor_pictures import Looked
+from aerialdojo_gen.pipeline.stages.work.anchor_pictures import CandidateViews
 from aerialdojo_gen.pipeline.stages.work.anchor_world import Candidates, World
 
 Floats = NDArray[np.float64]
@@ -74,7 +74,7 @@ def judge_anchor(
     if seen <= 0 or seen < config.min_visible_fraction:
         faults.append(f"it does not see the object: {seen:.0%} of what it faces, {config.min_visible_fraction:.0%} "
                       "is the least")  # fmt: skip
-    looked = Looked.of(found, np.zeros(1, np.int64), radius, config)
+    looked = CandidateViews.of(found, np.zeros(1, np.int64), radius, config)
     (picture,) = looked.pictures(np.zeros(1, np.int64), config.picture_px, config.fov_deg)
     parts = judge(picture, radius, config.standoff_m)
     row = {

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from aerialdojo_gen.base.config.sections import AnchorSampleConfig
 from aerialdojo_gen.geometry.viewpoints import level_marks, shortlist
 from aerialdojo_gen.pipeline.scoring.base import AnchorView, Known
-from aerialdojo_gen.pipeline.scoring.ensemble import Verdict, panel
+from aerialdojo_gen.pipeline.scoring.ensemble import Verdict, scorer_ensemble
 from aerialdojo_gen.pipeline.scoring.geometric import most
-from aerialdojo_gen.pipeline.scoring.recognisability import clarity
+from aerialdojo_gen.pipeline.scoring.recognisability import clarity_score
 from aerialdojo_gen.pipeline.stages.work.anchor_world import Candidates
 from aerialdojo_gen.pipeline.stages.work.camera_pullback import steps_back_m, telling_m
 
@@ -25,7 +25,7 @@ _LOOKED_AT_PX = 320
 
 
 @dataclass(frozen=True)
-class Looked:
+class CandidateViews:
     """Candidates of an object, each with the place behind it that its reference picture is taken from."""
 
     found: Candidates  # All of the object
@@ -35,7 +35,9 @@ class Looked:
     rank: Floats  # (k,) float64; score of the ray casts from both places
 
     @classmethod
-    def of(cls, found: Candidates, which: NDArray[np.int64], radius_m: float, config: AnchorSampleConfig) -> Looked:
+    def of(
+        cls, found: Candidates, which: NDArray[np.int64], radius_m: float, config: AnchorSampleConfig
+    ) -> CandidateViews:
         """Look from behind the candidates `which` (k,)."""
         places, yaws = found.positions_m[which], found.yaw_rad[which]
         telling = [
@@ -47,7 +49,7 @@ class Looked:
         away = np.column_stack([np.cos(yaws), np.sin(yaws), np.zeros(len(yaws))]) * backs[:, None]
         behind = found.moved(which, places - away, radius_m, config)
         views, elevation = behind.views, found.elevation_deg[which]
-        clear = clarity(views.visible_fraction, views.framed, np.zeros(len(which)), level_marks(elevation))
+        clear = clarity_score(views.visible_fraction, views.framed, np.zeros(len(which)), level_marks(elevation))
         rank = (found.rank[which] + behind.rank) / 2.0 * clear
         return cls(found, which, backs, behind, rank)
 
@@ -92,7 +94,7 @@ class Looked:
 
 def best_pictured(
     name: str,
-    looked: Looked,
+    looked: CandidateViews,
     few: NDArray[np.int64],
     azimuth_rad: Floats,
     front: NDArray[np.bool_],
@@ -103,7 +105,7 @@ def best_pictured(
 
     Indices (k,) into `few` and their verdicts.
     """
-    scorers, apart = panel(config, radius_m), math.radians(config.separation_deg)
+    scorers, apart = scorer_ensemble(config, radius_m), math.radians(config.separation_deg)
     weights = config.weights
     if weights.clip or weights.vlm:
         views = looked.pictures(few, max(config.picture_px, _LOOKED_AT_PX), config.fov_deg)

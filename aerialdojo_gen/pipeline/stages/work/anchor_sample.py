@@ -17,11 +17,11 @@ from aerialdojo_gen.base.rng import generator
 from aerialdojo_gen.geometry.angles import yaw_towards
 from aerialdojo_gen.geometry.part_visibility import FRONT_RAD, off_front_rad
 from aerialdojo_gen.geometry.surface import Surface
-from aerialdojo_gen.geometry.viewpoints import around, shortlist
+from aerialdojo_gen.geometry.viewpoints import ring, shortlist
 from aerialdojo_gen.pipeline.scoring.geometric import judge
 from aerialdojo_gen.pipeline.stage import Job, Output
 from aerialdojo_gen.pipeline.stages.work.anchor_choice import with_choice
-from aerialdojo_gen.pipeline.stages.work.anchor_pictures import Looked, best_pictured
+from aerialdojo_gen.pipeline.stages.work.anchor_pictures import CandidateViews, best_pictured
 from aerialdojo_gen.pipeline.stages.work.anchor_world import Candidates, World, tells_of
 from aerialdojo_gen.scenes.model import Instance
 from aerialdojo_gen.store.schemas import ANCHORS, VIEWPOINTS
@@ -121,7 +121,7 @@ def shortlisted(
     # Several a side: what stands before the object from one place does not from the next.
     looked_at = seen[np.argsort(-found.rank[seen], kind="stable")[: _LOOKED_AT * pictured]]
     of_sides = seen[shortlist(found.rank[seen], azimuth[seen], pictured, apart, front[seen])]
-    looked = Looked.of(found, np.union1d(looked_at, of_sides), radius, config)
+    looked = CandidateViews.of(found, np.union1d(looked_at, of_sides), radius, config)
     of_looked = shortlist(looked.rank, azimuth[looked.which], pictured, apart, front[looked.which])
     few, backs = looked.which[of_looked], looked.step_back_m[of_looked].tolist()
     best, shown = best_pictured(item["name"], looked, of_looked, azimuth[few], front[few], radius, config)
@@ -163,14 +163,14 @@ def candidates_of(
     nearly: Counter[str] = Counter()
     anatomy = instance.anatomy
     fronts = anatomy.fronts_rad if anatomy is not None else ()
-    places = around(
+    places = ring(
         surface, instance.bounds, config.standoff_m, config.azimuths, config.elevations_deg, config.level_heights
     )
     triangles = instance.vertices[instance.faces]
     for faces in tells_of(instance)[:_MOST_TELLS]:
         box = np.stack([triangles[faces].min(axis=(0, 1)), triangles[faces].max(axis=(0, 1))])
         places = np.concatenate(
-            [places, around(surface, box, config.standoff_m, config.azimuths, config.tell_elevations_deg, ())]
+            [places, ring(surface, box, config.standoff_m, config.azimuths, config.tell_elevations_deg, ())]
         )
 
     def keep(places: Floats, passed: NDArray[np.bool_], reason: str) -> Floats:

@@ -16,7 +16,7 @@ from aerialdojo_gen.geometry.rays import RayCaster, TriangleRayCaster, instance_
 from aerialdojo_gen.geometry.surface import Surface
 from aerialdojo_gen.geometry.viewpoints import Sight, Views, informativeness
 from aerialdojo_gen.pipeline.scoring.base import AnchorView
-from aerialdojo_gen.pipeline.scoring.recognisability import fronting, knowing, telling
+from aerialdojo_gen.pipeline.scoring.recognisability import front_score, part_score, recognisability
 from aerialdojo_gen.pipeline.scoring.views import take_view
 from aerialdojo_gen.planning.clearance import ClearanceGrid
 from aerialdojo_gen.planning.collision import CollisionWorld, collision_world
@@ -109,7 +109,7 @@ class Candidates:
         off_front = None
         if thing.anatomy is not None and thing.anatomy.fronts_rad:
             off_front = off_front_rad(positions_m, thing.centroid, thing.anatomy.fronts_rad)
-        rank = knowing(rank, telling(told) if told.shape[1] else None, fronting(off_front))
+        rank = recognisability(rank, part_score(told) if told.shape[1] else None, front_score(off_front))
         return cls(
             world, instance, alone, positions_m, yaw_rad, elevation, clearance, sight, views, points, patches, seen,
             told, off_front, rank,

@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 from aerialdojo_gen.base.config.sections import ReleasedPlanConfig
 from aerialdojo_gen.base.constants import DETOUR, SETTINGS
 from aerialdojo_gen.base.paper_figures import PaperScene
-from aerialdojo_gen.pipeline.stages.work.quota import choose, difficulty_steps, ranked
+from aerialdojo_gen.pipeline.stages.work.quota import difficulty_steps, rank_candidates, select_quota
 from aerialdojo_gen.pipeline.stages.work.rules import KEPT, judge
-from aerialdojo_gen.pipeline.stages.work.selection import lot
+from aerialdojo_gen.pipeline.stages.work.selection import sampling_key
 from aerialdojo_gen.planning.planner import Route
 
 Floats = NDArray[np.float64]
@@ -53,7 +53,7 @@ class Candidates:
         scenes = pairs["scene"].to_pylist()
         return cls(
             scenes[0] if scenes else "",
-            [lot(*key) for key in zip(scenes, pairs["pair_id"].to_pylist(), strict=True)],
+            [sampling_key(*key) for key in zip(scenes, pairs["pair_id"].to_pylist(), strict=True)],
             pairs["euclidean_m"].to_numpy(),
             free_length_m,
             pairs["target_visible_at_start"].to_numpy(),
@@ -61,7 +61,7 @@ class Candidates:
         )
 
 
-class Draw:
+class CandidatePolicy:
     """Says, round by round, which candidates of a scene to search next."""
 
     def __init__(self, candidates: Candidates, paper: PaperScene, config: ReleasedPlanConfig, seed: int) -> None:
@@ -132,7 +132,7 @@ class Draw:
         # A step of difficulty counts by how likely it is.
         likely = 1.0 / (1.0 + np.exp(-(self._detour(rows, length_m) - DETOUR) / _DETOUR_SPREAD))
         steps = likely + (self._of.visible[rows] == 0.0)
-        places = ranked(
+        places = rank_candidates(
             [self._of.lots[k] for k in rows.tolist()], setting.tolist(), length_m, self._paper.tasks,
             self._paper.path_m, self._seed, steps, self._config.prefer_harder,
         )  # fmt: skip
@@ -143,7 +143,7 @@ class Draw:
         for name, n in self._paper.tasks.items():
             if n and np.count_nonzero(setting == name) < n + max(2, math.ceil(_LEAST_SPARE * n)):
                 return False
-        chosen = choose(
+        chosen = select_quota(
             [self._of.lots[k] for k in rows.tolist()], setting.tolist(), length_m, self._paper.tasks,
             self._paper.path_m, self._seed, difficulty_steps(self._detour(rows, length_m), self._of.visible[rows]),
             self._config.prefer_harder,

@@ -18,7 +18,7 @@ from aerialdojo_gen.base.errors import StoreError
 from aerialdojo_gen.base.paper_figures import PaperScene, inventory
 from aerialdojo_gen.geometry.angles import wrap_one_rad
 from aerialdojo_gen.pipeline.stage import Job, Output
-from aerialdojo_gen.pipeline.stages.work.candidate_policy import Candidates, Draw
+from aerialdojo_gen.pipeline.stages.work.candidate_policy import CandidatePolicy, Candidates
 from aerialdojo_gen.planning.difficulty import Difficulty, agent_actions, difficulty_of
 from aerialdojo_gen.planning.free_length import free_lengths_m
 from aerialdojo_gen.planning.planner import Planner, Route
@@ -93,11 +93,11 @@ def _released(
 ) -> list[Route]:
     """Search what the release needs; the others' outcome is what the goals' cost-to-go tells, or NOT_NEEDED."""
     with planner.keeping_fields(*_FIELDS_MB):
-        routes = _by_goal(planner.foresee, goals, starts, np.arange(pairs.num_rows))
+        routes = _by_goal(planner.estimate_routes, goals, starts, np.arange(pairs.num_rows))
         open_ = np.array([route.outcome == "NOT_NEEDED" for route in routes])
         predicted = np.where(open_, [route.cost_to_go_m for route in routes], np.inf)
         free = free_lengths_m(starts, goals[:, :3], config.max_approach_m)
-        draw = Draw(Candidates.of(pairs, free, predicted), paper, config, seed)
+        draw = CandidatePolicy(Candidates.of(pairs, free, predicted), paper, config, seed)
         found: list[Route | None] = [None] * len(routes)
         rows = draw.first()
         while len(rows):
@@ -145,7 +145,7 @@ def _ends(job: Job, pairs: pa.Table) -> tuple[Floats, Floats]:
     return np.array([goal for goal, _ in ends]), np.array([start for _, start in ends])
 
 
-def _told(planner: Planner | None, routes: list[Route], schema: pa.Schema) -> dict[str, pa.Array]:
+def _difficulty_columns(planner: Planner | None, routes: list[Route], schema: pa.Schema) -> dict[str, pa.Array]:
     """What the table says of the routes there are, null elsewhere: their difficulty, and an agent's actions."""
     solved = [i for i, route in enumerate(routes) if route.outcome == "SOLVED"]
     values: dict[str, Any] = {name: np.empty(0) for name in Difficulty._fields}
@@ -183,7 +183,7 @@ def _table(scene: str, pair_ids: list[str], routes: list[Route], planner: Planne
         "n_actions": [r.n_actions for r in routes],
         "expansions": [r.expansions for r in routes],
         "min_clearance_m": [r.min_clearance_m for r in routes],
-        **_told(planner, routes, PLANS.schema),
+        **_difficulty_columns(planner, routes, PLANS.schema),
     }
     arrays = []
     for field in PLANS.schema:

@@ -52,7 +52,7 @@ def difficulty_steps(plan_detour: Floats, visible_at_start: Floats) -> NDArray[n
     return (plan_detour >= DETOUR).astype(np.int64) + (visible_at_start == 0.0)
 
 
-def choose(
+def select_quota(
     lots: Sequence[str],
     settings: Sequence[str],
     length_m: Floats,
@@ -74,7 +74,7 @@ def choose(
     return mask
 
 
-def ranked(
+def rank_candidates(
     lots: Sequence[str],
     settings: Sequence[str],
     length_m: Floats,
@@ -84,7 +84,7 @@ def ranked(
     steps: NDArray[np.int64] | Floats | None = None,
     preference: float = 0.0,
 ) -> dict[str, NDArray[np.int64]]:
-    """Rows of each setting's tasks in the order in which `choose` takes them."""
+    """Rows of each setting's tasks in the order in which `select_quota` takes them."""
     scores, place = _drawn(lots, settings, length_m, wanted, path_m, seed, steps, preference)
     return {name: _best(scores, place, np.flatnonzero(np.asarray(settings) == name)) for name in sorted(wanted)}
 
@@ -109,15 +109,15 @@ def _drawn(
     preference: float,
 ) -> tuple[Floats, NDArray[np.int64]]:
     """What the tasks have drawn, tilted as the metres need it, (n,) float64; and their places among equals, (n,)."""
-    luck = np.array([_gumbel(seed, lot) for lot in lots])
+    gumbel_scores = np.array([_gumbel(seed, lot) for lot in lots])
     if steps is not None:
-        luck = luck + preference * steps
+        gumbel_scores = gumbel_scores + preference * steps
     # Ties are broken by the lot, so that the order of rows decides nothing.
     place = np.argsort(np.argsort(np.asarray(lots)))
     groups = _groups(settings, wanted)
 
     def tilted(tilt: float) -> Floats:
-        return np.asarray(luck + tilt * length_m / _SCALE_M)
+        return np.asarray(gumbel_scores + tilt * length_m / _SCALE_M)
 
     def total(scores: Floats) -> float:
         return float(sum(length_m[_best(scores, place, rows)[:n]].sum() for rows, n in groups))

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from aerialdojo_gen.base.rng import rank
 
 
-def lot(scene: str, pair_id: str) -> str:
+def sampling_key(scene: str, pair_id: str) -> str:
     """Return what a candidate draws with: it hangs on the pair alone, so that no salt changes which are released."""
     return f"{scene}-{hashlib.blake2b(f'{scene}/{pair_id}'.encode(), digest_size=6).hexdigest()}"
 

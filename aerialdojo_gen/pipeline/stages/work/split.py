@@ -13,7 +13,7 @@ from aerialdojo_gen.base.config.sections import SplitConfig
 from aerialdojo_gen.base.paper_figures import PaperScene, inventory, splits
 from aerialdojo_gen.pipeline.stage import Job, Output
 from aerialdojo_gen.pipeline.stages.work import quota
-from aerialdojo_gen.pipeline.stages.work.selection import lot, train_counts, train_mask
+from aerialdojo_gen.pipeline.stages.work.selection import sampling_key, train_counts, train_mask
 from aerialdojo_gen.pipeline.stages.work.task_ids import held_out, key_of, nav_id, reference_id
 from aerialdojo_gen.store.schemas import RELEASE_ANCHORS, RELEASE_OBJECTS, ROUTES, TASKS
 from aerialdojo_gen.store.schemas.columns import DIFFICULTY, START_VIEW
@@ -54,7 +54,7 @@ def routes_table(
     }
     routes = pa.table({name: columns[name] for name in ROUTES.schema.names}, schema=ROUTES.schema)
     routes = routes.append_column("action_budget", kept.column("action_budget"))
-    routes = routes.append_column("lot", pa.array([lot(scene, p) for p in pair_ids], pa.string()))
+    routes = routes.append_column("lot", pa.array([sampling_key(scene, p) for p in pair_ids], pa.string()))
     return routes.sort_by([(column, "ascending") for column in ROUTES.order])
 
 
@@ -113,7 +113,7 @@ def _chosen(routes: pa.Table, paper: PaperScene, seed: int, preference: float) -
         routes.column(name).to_numpy(zero_copy_only=False).astype(np.float64)
         for name in ("plan_detour", "target_visible_at_start")
     )
-    return quota.choose(
+    return quota.select_quota(
         routes.column("lot").to_pylist(),
         routes.column("setting").to_pylist(),
         routes.column("length_m").to_numpy(),
