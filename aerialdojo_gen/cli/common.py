@@ -181,7 +181,7 @@ def run_chosen(
     address: str | None = None,
     verbose: bool = False,
 ) -> None:
-    """Run stages with progress (`aerialdojo_gen.dataset.build.run_stages`), and say what an error or Ctrl-C leaves."""
+    """Run stages with progress (`aerialdojo_gen.dataset.build.run_stages`), and say what an error or Ctrl-C left."""
     from aerialdojo_gen.base.errors import UsageError
     from aerialdojo_gen.pipeline.progress import Reporter
 

@@ -43,7 +43,7 @@ class Agent(Protocol):
 
     Besides, an agent may have (``close``, ``usage`` and ``answer`` are in `AgentBase`, and do nothing there):
 
-    - ``sensors``, a `aerialdojo_gen.benchmark.agents.goal.Sensors`: what it wants to see; all four views where absent.
+    - ``sensors``, a `Sensors` (module ``goal`` beside this): what it wants to see; all four views where absent.
     - ``close()``: called once, at the end of the run.
     - ``usage() -> Usage or None``: what it has used since `reset`.
     - ``answer() -> str or None``: the words behind the last action, kept in `steps`.

@@ -4,4 +4,4 @@ from aerialdojo_gen.dataset.validate.registry import Fault, Outcome
 from aerialdojo_gen.dataset.validate.report import Report, write_report
 from aerialdojo_gen.dataset.validate.run import ValidationOptions, validate
 
-__all__ = ["ValidationOptions", "Fault", "Outcome", "Report", "validate", "write_report"]
+__all__ = ["Fault", "Outcome", "Report", "ValidationOptions", "validate", "write_report"]

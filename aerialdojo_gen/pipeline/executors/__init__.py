@@ -9,4 +9,4 @@ from aerialdojo_gen.pipeline.executors.base import (
     on_disk,
 )
 
-__all__ = ["EXECUTORS", "Executor", "SharedPaths", "ParentChannel", "make_executor", "on_disk"]
+__all__ = ["EXECUTORS", "Executor", "ParentChannel", "SharedPaths", "make_executor", "on_disk"]

@@ -25,7 +25,7 @@ from aerialdojo_gen.scenes.recipe import load_recipe
 SCENES = sorted(path.stem for path in (ASSETS / "scenes").glob("*.toml"))
 TYPES = sorted({name.rpartition("_")[0] for name in SCENES})
 # SHA-256 of the meshes of the release, as sha256sum writes them: `make dataset`, then
-# (cd data/meshes && sha256sum *.glb) > tests/scenes/layouts/meshes.sha256.
+# (cd data/meshes && sha256sum *.glb) > tests/layouts/meshes.sha256.
 RELEASED = {
     name.removesuffix(".glb"): digest
     for digest, name in (line.split() for line in Path(__file__).with_name("meshes.sha256").read_text().splitlines())

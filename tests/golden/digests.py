@@ -1,0 +1,35 @@
+"""Digests of everything a release is made of: the golden file that shows that a change of code changes no data.
+
+    python tests/golden/digests.py data > tests/golden/release.sha256
+
+One line a table and scene, and a mesh: a digest of the rows (what footers say of code and time is left out) and what it is of.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import sys
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from aerialdojo_gen.store.layout import LAYOUT
+from aerialdojo_gen.store.shards import content, shards
+
+# Logs of agents, and tables that hold wall times, are no part of a release.
+LEFT_OUT = ("episodes", "steps", "timings", "failures", "recordings", "frames")
+
+
+def digests(data: Path, scenes: Sequence[str] = ()) -> Iterator[tuple[str, str]]:
+    """Yield (digest, what) of every mesh and of every table of the scenes, all of them where none is named."""
+    names = sorted(scenes or (path.stem for path in (data / "meshes").glob("*.glb")))
+    for scene in names:
+        yield hashlib.sha256((data / "meshes" / f"{scene}.glb").read_bytes()).hexdigest(), f"meshes/{scene}.glb"
+        for table in LAYOUT:
+            if table not in LEFT_OUT and shards(data, table, scene):
+                parts = "\n".join(content(data, table, scene))
+                yield hashlib.sha256(parts.encode()).hexdigest(), f"{table}/{scene}"
+
+
+if __name__ == "__main__":
+    for digest, what in digests(Path(sys.argv[1]), sys.argv[2:]):
+        print(f"{digest}  {what}")
