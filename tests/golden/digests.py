@@ -2,7 +2,7 @@
 
     python tests/golden/digests.py data > tests/golden/release.sha256
 
-One line a table and scene, and a mesh: a digest of the rows (what footers say of code and time is left out) and what it is of.
+One line per mesh, and per table and scene: a digest of the rows, without what footers say of the code, and its name.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Four scenes from nothing to their tasks: their tables and meshes are those of the golden file, row by row.
 
-A change that is to change data changes `release.sha256` in the same commit (`digests.py` says how); any other must not.
+A change that is meant to change data changes `release.sha256` in the same commit (`digests.py` says how).
 """
 
 from __future__ import annotations

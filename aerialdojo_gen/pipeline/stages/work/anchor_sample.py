@@ -47,10 +47,10 @@ def run(job: Job, config: AnchorSampleConfig) -> Output:
     ground that is an open sheet), ``not_visible`` (visible fraction below `min_visible_fraction`),
     ``not_shortlisted`` (`shortlist` others show the object better, or from a side of their own). Ray casts to points
     of its surface put the visible ones in order; the best `pictured`, from different sides, are pictured and scored
-    (`aerialdojo_gen.pipeline.scoring`). The best of those, again from different sides, are the object's anchors, and
-    the best of all is selected, or the one that a person chose, which then comes first. Where the catalogue says an object's
-    front and the parts that make its name true, these weigh as much as its silhouette, candidates are placed before
-    those parts as well, and one anchor at least is within 60° of a front, if any candidate there sees the object.
+    (`aerialdojo_gen.pipeline.scoring`). The best of those, again from different sides, are the object's anchors; the
+    best of all is selected, or the one that a person chose, which then comes first. Where the catalogue gives an
+    object's front and identifying parts, these weigh as much as its silhouette, candidates are placed before those
+    parts as well, and one anchor at least is within 60° of a front, if any candidate there sees the object.
     """
     objects = job.read("objects").to_pylist()
     chosen = {row["object_id"]: row for row in job.read("chosen_anchors").to_pylist()}
