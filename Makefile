@@ -85,10 +85,12 @@ fuzz: .venv/.dev  ## mutants of every input into every parser, N=500 each
 	@PYTHONPATH=tests .venv/bin/python -m fuzzing -n $(or $(N),500) $(if $(SEED),--seed $(SEED)) $(foreach t,$(TARGET),--target $(t))
 torture: .venv/.dev  ## kill run, render, export, import and evaluate N=100 times and compare what repeating them leaves
 	@.venv/bin/python tests/torture.py -n $(or $(N),100) $(if $(SEED),--seed $(SEED))
-nightly: .venv/.dev  ## some hours: fuzz with N=10000, torture with N=100, ten small scenes of the dataset under load
+nightly: .venv/.dev  ## some hours: fuzz with N=10000, torture with N=100, ten small scenes under load, the golden file
 	@$(MAKE) --no-print-directory fuzz N=10000 SEED=$(NIGHT)
 	@$(MAKE) --no-print-directory torture N=100 SEED=$(NIGHT)
 	@.venv/bin/python tests/under_load.py
+	@$(RUN) run pipelines/aerialdojo-200k.toml --data $(DATA) $(RUN_FLAGS)
+	@.venv/bin/python tests/golden/digests.py $(DATA) | diff tests/golden/release.sha256 -
 NIGHT = $(or $(SEED),$(shell date +%Y%m%d))
 
 lint: .venv/.dev  ## ruff, the import contracts, mypy --strict, and vulture for what nothing uses
